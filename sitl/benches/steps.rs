@@ -8,11 +8,11 @@
 use afbc::{Adaptive, Backstepping, Controller, Profile};
 use afbc_control::{FlightController, Validated};
 use afbc_plant::{Deviations, Drag, Plant, PlantModel, Realism, Rotors, Sensing, Turbulence, Wind};
-use afbc_sim::case::Case;
-use afbc_sim::contender::{Contender, ControllerKind};
+use afbc_scenario::Scenario;
+use afbc_scenario::case::Case;
+use afbc_scenario::contender::{Contender, ControllerKind};
+use afbc_scenario::paper::scenario;
 use afbc_sim::flight::{LawOnly, Pilot, World, fly};
-use afbc_sim::paper::scenario;
-use afbc_sim::scenario::Scenario;
 use afbc_types::{Parameters, RotorSpeeds, Setpoint, State};
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};

@@ -1,7 +1,7 @@
 //! A board connected to a serial port.
 
+use afbc_hil::{Autopilot, Error, Station};
 use afbc_link::Command;
-use afbc_sim::in_the_loop::{Autopilot, Error, Station};
 use serialport::SerialPort;
 use std::io;
 use std::thread;
@@ -104,8 +104,8 @@ fn failed(error: io::Error) -> Error {
 #[allow(clippy::unwrap_used, reason = "tests")]
 mod tests {
     use super::*;
-    use afbc_sim::in_the_loop::{Host, LoopEnd, MessagePeriods, fly};
-    use afbc_sim::scenario::{Scenario, built_in};
+    use afbc_hil::{Host, LoopEnd, MessagePeriods, fly};
+    use afbc_scenario::{Scenario, built_in};
     use core::ops::ControlFlow;
     use serialport::TTYPort;
     use std::io::{Read, Write};

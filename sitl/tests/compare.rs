@@ -4,7 +4,7 @@
 
 mod common;
 
-use afbc_sim::contender::ControllerKind;
+use afbc_scenario::contender::ControllerKind;
 use common::{command, folder, refused, succeeds};
 use serde_json::Value;
 use std::fs;

@@ -9,15 +9,15 @@
 use afbc_plant::{Environment, Gust, GustKind, Motion, PlantModel};
 use afbc_report::claims::VANISHED;
 use afbc_report::claims::claims;
-use afbc_sim::case::{Case, Reading, Uncertainty};
-use afbc_sim::contender::ControllerKind;
+use afbc_scenario::Scenario;
+use afbc_scenario::case::{Case, Reading, Uncertainty};
+use afbc_scenario::contender::ControllerKind;
+use afbc_scenario::paper::scenario;
+use afbc_scenario::trajectory::Trajectory;
 use afbc_sim::flight::Sample;
 use afbc_sim::flown::Flown;
 use afbc_sim::metrics::{self, Metrics};
-use afbc_sim::paper::scenario;
 use afbc_sim::run::Run;
-use afbc_sim::scenario::Scenario;
-use afbc_sim::trajectory::Trajectory;
 use nalgebra::{Vector3, Vector4};
 
 fn fly_both(scenario: &Scenario) -> Vec<Flown> {

@@ -3,11 +3,11 @@
 
 use afbc::Profile;
 use afbc_plant::PlantModel;
-use afbc_sim::case::Case;
-use afbc_sim::contender::{Contender, ControllerKind};
+use afbc_scenario::Scenario;
+use afbc_scenario::case::Case;
+use afbc_scenario::contender::{Contender, ControllerKind};
+use afbc_scenario::paper::scenario;
 use afbc_sim::flight::{Sample, fly};
-use afbc_sim::paper::scenario;
-use afbc_sim::scenario::Scenario;
 use afbc_types::Axis;
 use proptest::prelude::{ProptestConfig, Rng as _};
 use proptest::test_runner::{RngSeed, TestRunner};

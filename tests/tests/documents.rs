@@ -3,7 +3,7 @@
 
 use afbc::Profile;
 use afbc::adaptive;
-use afbc_sim::contender::ControllerKind;
+use afbc_scenario::contender::ControllerKind;
 use std::fs;
 use std::path::Path;
 

@@ -1,15 +1,14 @@
 //! Ten hours of hover in noise: the estimates of the profile `flight` stay bounded, those of the law as printed drift.
 #![allow(clippy::unwrap_used, missing_docs, reason = "a flight that cannot begin must fail the test")]
 
-use afbc::{Adaptive, Cascade, Controller, Profile};
-use afbc_control::AdaptiveEstimate;
+use afbc::{Adaptive, AdaptiveEstimate, Cascade, Controller, Profile};
 use afbc_control::{FlightController, Validated};
 use afbc_plant::sensors::Deviations;
 use afbc_plant::{Environment, Motion, Plant, PlantModel, Realism, Rotors, Sensing, StateSensor};
-use afbc_sim::contender::ControllerKind;
+use afbc_scenario::contender::ControllerKind;
+use afbc_scenario::{Scenario, built_in};
 use afbc_sim::flight::Sample;
 use afbc_sim::run::Run;
-use afbc_sim::scenario::{Scenario, built_in};
 use afbc_types::{Axis, Parameters, PerAxis, Setpoint};
 use nalgebra::Vector3;
 

@@ -3,11 +3,11 @@
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs)] // what cannot be flown must stop the test
 
 use afbc_plant::instruments::{Failure, InstrumentFault};
-use afbc_sim::contender::{Contender, ControllerKind};
+use afbc_scenario::contender::{Contender, ControllerKind};
+use afbc_scenario::trajectory::Trajectory;
+use afbc_scenario::{Outage, Scenario, built_in};
 use afbc_sim::flight::{Estimated, Sample, World, fly};
 use afbc_sim::metrics::{Accumulator, Aid, EstimateMetrics, Metrics, SETTLED_S};
-use afbc_sim::scenario::{Outage, Scenario, built_in};
-use afbc_sim::trajectory::Trajectory;
 use nalgebra::{Vector3, Vector4};
 
 fn scenario(name: &str) -> Scenario {
@@ -233,7 +233,7 @@ fn shaken_twice_as_much() {
             let mut trips = false;
             let lost = fly(&Scenario { seed, ..scenario.clone() }, &contender, |sample| {
                 metrics.add(sample);
-                trips |= sample.action.health.trip.is_some();
+                trips |= sample.action.health.fallback.is_some();
             });
             let [roll, pitch, yaw, thrust] = metrics.finish().mean_abs_delta_u.map(|change_n| 1e3 * change_n).into();
             println!("{name}, seed {seed}: {roll:.1}, {pitch:.1}, {yaw:.1}, {thrust:.1} mN a step");

@@ -3,9 +3,9 @@
 #![allow(clippy::unwrap_used, clippy::panic, missing_docs)] // a flight that cannot begin must stop the test
 
 use afbc::Profile;
-use afbc_sim::contender::{Contender, ControllerKind};
+use afbc_scenario::contender::{Contender, ControllerKind};
+use afbc_scenario::{Scenario, built_in};
 use afbc_sim::run::Run;
-use afbc_sim::scenario::{Scenario, built_in};
 use afbc_vehicles::{BUILT_IN, Vehicle};
 use std::thread;
 
@@ -37,7 +37,7 @@ fn fault(scenario: &Scenario, contender: &Contender) -> Option<String> {
     let fault = if let Some(lost) = run.lost {
         format!("lost after {} s: {}", lost.time_s, lost.reason)
     } else if let Some(tripped) = run.tripped {
-        format!("tripped after {} s: {}", tripped.time_s, tripped.trip)
+        format!("tripped after {} s: {}", tripped.time_s, tripped.reason)
     } else if rms_m > bounds.rms_m {
         format!("{rms_m} m RMS")
     } else if calm && end_m > bounds.end_m {

@@ -3,9 +3,9 @@
 #![allow(clippy::unwrap_used, missing_docs, reason = "a flight that cannot begin must fail the test")]
 
 use afbc_flight_core::{EndReason, Mode};
+use afbc_hil::{Host, Station};
 use afbc_link::Command;
 use afbc_plant::{Contact, Environment, Motion, Plant, PlantModel, Realism};
-use afbc_sim::in_the_loop::{Host, Station};
 use afbc_types::{Parameters, State};
 use nalgebra::Vector3;
 

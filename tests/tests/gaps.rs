@@ -5,15 +5,15 @@ use afbc::adaptive::{self};
 use afbc::fuzzy::{Basis, Membership};
 use afbc::law::Context;
 use afbc::law::Tracking;
-use afbc::{Adaptive, Backstepping, Cascade, Controller, Law, Profile, Settings};
-use afbc_control::{AdaptiveEstimate, Errors, FlightController, Validated};
+use afbc::{Adaptive, AdaptiveEstimate, Backstepping, Cascade, Controller, Law, Profile, Settings};
+use afbc_control::{Errors, FlightController, Validated};
 use afbc_plant::{Environment, Motion, Plant, PlantModel};
-use afbc_sim::case::{Case, Reading};
-use afbc_sim::contender::{self, Contender, ControllerKind};
+use afbc_scenario::Scenario;
+use afbc_scenario::case::{Case, Reading};
+use afbc_scenario::contender::{self, Contender, ControllerKind};
+use afbc_scenario::paper::scenario;
 use afbc_sim::flight::{FlightEnd, LawOnly, Sample, World, lockstep};
-use afbc_sim::paper::scenario;
 use afbc_sim::run::Run;
-use afbc_sim::scenario::Scenario;
 use afbc_types::{Axis, Parameters, PerAxis, Setpoint, State};
 use core::ops::ControlFlow;
 use nalgebra::Vector3;
@@ -47,10 +47,6 @@ impl<L: Law> Law for Rateless<L> {
 
     fn approach(&self, axis: Axis, known: Option<&afbc::model::ModelConstants>) -> f32 {
         self.0.approach(axis, known)
-    }
-
-    fn learnt(estimate: &L::Estimate) -> AdaptiveEstimate {
-        L::learnt(estimate)
     }
 }
 

@@ -3,9 +3,9 @@
 #![allow(clippy::unwrap_used, clippy::panic, missing_docs)]
 
 use afbc::Profile;
-use afbc_sim::contender::{Contender, ControllerKind};
+use afbc_scenario::contender::{Contender, ControllerKind};
+use afbc_scenario::{Scenario, built_in};
 use afbc_sim::run::Run;
-use afbc_sim::scenario::{Scenario, built_in};
 use afbc_types::{Parameters, Rotor};
 use proptest::prelude::*;
 

@@ -7,14 +7,13 @@
     reason = "what cannot be built or is missing must stop the test"
 )]
 
-use afbc::Safeguards;
 use afbc::adaptive::{Gains, Subsystem};
 use afbc::backstepping::{self, ideal, proportional};
 use afbc::cascade::desired_attitude;
 use afbc::fuzzy::{Basis, Membership};
 use afbc::law::Tracking;
 use afbc::model::Dynamics;
-use afbc_control::AdaptiveEstimate;
+use afbc::{AdaptiveEstimate, Safeguards};
 use afbc_control::mixer::Mixer;
 use afbc_types::{Inputs, Parameters, RotorSpeeds};
 use flight_tests::{ROWS, Row, golden};

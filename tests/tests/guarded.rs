@@ -3,13 +3,13 @@
 #![allow(clippy::unwrap_used, missing_docs)] // what cannot be flown must stop the test
 
 use afbc::monitor::Bounds;
-use afbc::{Guarded, Profile, Settings, guarded};
-use afbc_control::{Action, FlightController, Trace, Trip, Validated};
+use afbc::{Guarded, Profile, Settings, Trip, guarded};
+use afbc_control::{Action, FlightController, Trace, Validated};
 use afbc_plant::{
     Deviations, Drag, Environment, Motion, Plant, PlantModel, Realism, Rotors, Sensing, StateSensor, Turbulence, Wind,
 };
-use afbc_sim::case::Case;
-use afbc_sim::paper;
+use afbc_scenario::case::Case;
+use afbc_scenario::paper;
 use afbc_types::{Axis, Inputs, Parameters, PerAxis, Setpoint};
 use nalgebra::{Vector2, Vector3, Vector4};
 
@@ -150,12 +150,12 @@ fn a_flight_goes_on_across_a_trip_and_back() {
         last = bench.step(&setpoint);
         (earlier, before) = (before, bench.trace());
     }
-    assert_eq!((last.health.trip, bench.memory.control.trip()), (None, Some(Trip::Theta(Axis::X))));
+    assert_eq!((last.health.fallback, bench.memory.control.trip()), (None, Some(Trip::Theta(Axis::X))));
     let _ = bench.step(&setpoint);
     bumpless(&earlier, &before, &bench.trace(), "fallback");
     for _ in 0..20 * SECOND {
         let action = bench.step(&setpoint);
-        assert_eq!(action.health.trip, Some(Trip::Theta(Axis::X)), "engaged by itself");
+        assert_eq!(action.health.fallback, Some(Trip::Theta(Axis::X).reason()), "engaged by itself");
         assert!(bench.distance_m(&setpoint) < 0.5, "{} m off", bench.distance_m(&setpoint));
         (earlier, before) = (before, bench.trace());
     }
@@ -168,7 +168,7 @@ fn a_flight_goes_on_across_a_trip_and_back() {
     bumpless(&earlier, &before, &bench.trace(), "engaged");
     for _ in 0..20 * SECOND {
         let action = bench.step(&setpoint);
-        assert_eq!((action.health.trip, bench.memory.control.trip()), (None, None));
+        assert_eq!((action.health.fallback, bench.memory.control.trip()), (None, None));
         assert!(bench.distance_m(&setpoint) < 0.05, "{} m off", bench.distance_m(&setpoint));
     }
 }

@@ -2,9 +2,9 @@
 #![allow(clippy::unwrap_used, missing_docs, reason = "a flight that cannot begin must fail the test")]
 
 use afbc::Profile;
-use afbc_sim::contender::{Contender, ControllerKind};
+use afbc_scenario::contender::{Contender, ControllerKind};
+use afbc_scenario::{Scenario, built_in};
 use afbc_sim::run::Run;
-use afbc_sim::scenario::{Scenario, built_in};
 
 fn hardware() -> Scenario {
     built_in("hardware").unwrap().read().unwrap()

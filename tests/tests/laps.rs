@@ -3,10 +3,10 @@
 
 use afbc::Profile;
 use afbc_plant::{Environment, Motion};
-use afbc_sim::contender::{Contender, ControllerKind};
+use afbc_scenario::contender::{Contender, ControllerKind};
+use afbc_scenario::trajectory::{Sine, Trajectory};
+use afbc_scenario::{Scenario, built_in};
 use afbc_sim::run::Run;
-use afbc_sim::scenario::{Scenario, built_in};
-use afbc_sim::trajectory::{Sine, Trajectory};
 use core::f64::consts::{SQRT_2, TAU};
 use nalgebra::Vector3;
 

@@ -6,12 +6,12 @@
 #![allow(clippy::expect_used, clippy::indexing_slicing, reason = "a test that cannot go on should say why")]
 
 use afbc_flight_core::{Mode, Refusal, Request};
+use afbc_hil::{Host, Station};
 use afbc_link::Command;
 use afbc_plant::{Contact, Environment, Motion, Plant, PlantModel, Realism};
-use afbc_sim::in_the_loop::{Host, Station};
-use afbc_sim::paper;
-use afbc_sim::scenario::Scenario;
-use afbc_sim::trajectory::Trajectory;
+use afbc_scenario::Scenario;
+use afbc_scenario::paper;
+use afbc_scenario::trajectory::Trajectory;
 use afbc_types::{Parameters, RotorSpeeds};
 use core::ops::Range;
 use nalgebra::Vector3;
@@ -39,7 +39,7 @@ enum Flight {
 
 impl Flight {
     fn scenario(self) -> Scenario {
-        let paper = paper::scenario(PlantModel::RigidBody, afbc_sim::case::Case::DEFAULT).expect("in range");
+        let paper = paper::scenario(PlantModel::RigidBody, afbc_scenario::case::Case::DEFAULT).expect("in range");
         let hover = |height_m: f64| Scenario {
             environment: Environment::calm(Parameters::PAPER).expect("in range"),
             initial: Motion { position_m: Vector3::new(0.0, 0.0, height_m), ..Motion::default() },

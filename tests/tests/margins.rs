@@ -12,10 +12,10 @@ use afbc_campaign::suite::SUITES;
 use afbc_control::drag::KnownDrag;
 use afbc_plant::{Drag, Environment, Turbulence};
 use afbc_reader::BuiltIn;
-use afbc_sim::contender::{Contender, ControllerKind};
+use afbc_scenario::contender::{Contender, ControllerKind};
+use afbc_scenario::trajectory::{Sine, Trajectory};
+use afbc_scenario::{Scenario, built_in};
 use afbc_sim::run::Run;
-use afbc_sim::scenario::{Scenario, built_in};
-use afbc_sim::trajectory::{Sine, Trajectory};
 use nalgebra::Vector3;
 
 fn flown(kind: ControllerKind) -> Contender {

@@ -2,14 +2,14 @@
 #![allow(clippy::unwrap_used, missing_docs, reason = "a flight that cannot begin must fail the test")]
 
 use afbc::Profile;
+use afbc::Trip;
 use afbc_campaign::suite::{SUITES, Suite};
-use afbc_control::Trip;
 use afbc_plant::{Drag, Environment, ParameterChange, PlantParameter, Turbulence};
 use afbc_reader::BuiltIn;
-use afbc_sim::contender::{Contender, ControllerKind};
+use afbc_scenario::contender::{Contender, ControllerKind};
+use afbc_scenario::trajectory::Trajectory;
+use afbc_scenario::{Scenario, built_in};
 use afbc_sim::flight::fly;
-use afbc_sim::scenario::{Scenario, built_in};
-use afbc_sim::trajectory::Trajectory;
 use afbc_types::Axis;
 use nalgebra::Vector3;
 
@@ -18,12 +18,12 @@ const FAULT_S: f64 = 10.0;
 
 /// Flies AFBC as on board, and returns when and why the monitor tripped and how far from the reference, in the largest
 /// coordinate, the vehicle was \[m\].
-fn trip(scenario: &Scenario) -> Option<(f64, Trip, f64)> {
+fn trip(scenario: &Scenario) -> Option<(f64, &'static str, f64)> {
     let contender = Contender::of(ControllerKind::Afbc, Profile::Flight).monitored().for_vehicle(&scenario.vehicle);
     let mut tripped = None;
     let _ = fly(scenario, &contender, |sample| {
         let off_m = (sample.motion.position_m - sample.reference.position_m).amax();
-        let first = sample.action.health.trip.filter(|_| tripped.is_none());
+        let first = sample.action.health.fallback.filter(|_| tripped.is_none());
         tripped = first.map(|trip| (sample.time_s, trip, off_m)).or(tripped);
     })
     .unwrap();
@@ -48,7 +48,7 @@ fn faults_trip_for_what_they_are_and_in_time() {
     for (name, reason, within_s, within_m) in expected {
         let scenario = scenarios.iter().find(|scenario| scenario.name == name).unwrap();
         let (time_s, trip, off_m) = trip(scenario).unwrap();
-        assert_eq!(trip, reason, "{name}");
+        assert_eq!(trip, reason.reason(), "{name}");
         assert!(time_s - FAULT_S < within_s && off_m < within_m, "{name}: at {time_s} s, {off_m} m off");
     }
 }

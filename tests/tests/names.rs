@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 const SHARED: [(&str, &str); 6] = [
     ("Error", "a library's error, as in std"),
     ("Gains", "a law's gains, named with the law's module: `pid::Gains`"),
-    ("Law", "afbc: what fills the cascade; sim: a law of the list, with its gains"),
+    ("Law", "afbc: what fills the cascade; scenario: a law of the list, with its gains"),
     ("Limits", "bounds on what the module computes, named with it: `limiter::Limits`"),
     ("Memory", "what changes from step to step, named with the module that steps"),
     ("Settings", "the constants of a crate, named with it: `estimator::Settings`"),

@@ -3,10 +3,10 @@
 #![allow(clippy::unwrap_used, clippy::panic, missing_docs)] // a table that cannot be flown must stop the test
 
 use afbc_plant::PlantModel;
-use afbc_sim::case::{Case, Reading, Sign, Uncertainty};
-use afbc_sim::contender::ControllerKind;
+use afbc_scenario::case::{Case, Reading, Sign, Uncertainty};
+use afbc_scenario::contender::ControllerKind;
+use afbc_scenario::paper::scenario;
 use afbc_sim::metrics::Metrics;
-use afbc_sim::paper::scenario;
 use afbc_sim::run::Run;
 use flight_tests::{Row, golden};
 use std::sync::LazyLock;

@@ -2,9 +2,9 @@
 //! alone.
 #![allow(clippy::unwrap_used, missing_docs, reason = "what cannot be flown must stop the test")]
 
-use afbc_sim::contender::ControllerKind;
+use afbc_scenario::contender::ControllerKind;
+use afbc_scenario::{Outage, Scenario, built_in};
 use afbc_sim::flight::{Lost, Sample, fly};
-use afbc_sim::scenario::{Outage, Scenario, built_in};
 
 /// The paper's flight on hardware, with an outage of `length_s` from 7.45 s on, during which a gust begins.
 fn scenario(length_s: f64, flight_core: bool) -> Scenario {
@@ -17,7 +17,7 @@ fn scenario(length_s: f64, flight_core: bool) -> Scenario {
 
 /// Returns for each contender its name, the loss, the largest distance from the reference \[m\] and the last sample.
 fn outcomes(scenario: &Scenario) -> Vec<(String, Option<Lost>, f64, Sample)> {
-    let outcome = |contender: &afbc_sim::contender::Contender| {
+    let outcome = |contender: &afbc_scenario::contender::Contender| {
         let (mut worst_m, mut last) = (0.0_f64, None);
         let lost = fly(scenario, contender, |sample| {
             if sample.time_s > 5.0 {

@@ -13,7 +13,7 @@ use afbc_onboard::{Configuration, Link};
 use afbc_plant::instruments::{Accelerometer, Barometer, Gnss, Gyroscope, Imu, Magnetometer, TrackerModel};
 use afbc_plant::{Battery, Contact, Deviations, Drag, Dropouts, GroundEffect, Rotors, Sensing, Turbulence, Wind};
 use afbc_reader::words::{self, number};
-use afbc_sim::contender::{ControllerKind, Law};
+use afbc_scenario::contender::{ControllerKind, Law};
 use afbc_types::{Declaration, Declared, Mounting, OutOfRange, Parameters, Range, Value};
 use core::convert::Infallible;
 use core::fmt::Write;

@@ -2,10 +2,10 @@
 //! 60,000 control ticks no bit differs from the same code on the host.
 #![allow(clippy::expect_used, clippy::panic, reason = "a test that cannot go on should say why")]
 
+use afbc_hil::{Host, LoopEnd, MessagePeriods, Station, fly};
 use afbc_plant::PlantModel;
-use afbc_sim::case::Case;
-use afbc_sim::in_the_loop::{Host, LoopEnd, MessagePeriods, Station, fly};
-use afbc_sim::paper::scenario;
+use afbc_scenario::case::Case;
+use afbc_scenario::paper::scenario;
 use core::ops::ControlFlow;
 use pil::budget::TICK_INSTRUCTIONS_MAX;
 use pil::{Emulator, Image, Twins};

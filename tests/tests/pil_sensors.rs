@@ -2,9 +2,9 @@
 //! preset of an instrument: no bit of estimate and rotor commands differs from the same code on the host.
 #![allow(clippy::expect_used, clippy::panic, reason = "a test that cannot go on should say why")]
 
+use afbc_hil::{Host, LoopEnd, MessagePeriods, Station, fly};
 use afbc_plant::instruments::{Barometer, Failure, Imu, InstrumentFault, Magnetometer};
-use afbc_sim::in_the_loop::{Host, LoopEnd, MessagePeriods, Station, fly};
-use afbc_sim::scenario::{Scenario, built_in};
+use afbc_scenario::{Scenario, built_in};
 use core::ops::ControlFlow;
 use pil::budget::{ESTIMATING_INSTRUCTIONS_MAX, ESTIMATING_INSTRUCTIONS_MEAN};
 use pil::{Emulator, Image, Twins};

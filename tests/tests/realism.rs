@@ -1,10 +1,10 @@
 //! Flights with real rotors, air, ground and sensors, from scenario files.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs)] // what cannot be flown must stop the test
 
-use afbc_sim::contender::ControllerKind;
+use afbc_scenario::contender::ControllerKind;
+use afbc_scenario::{Scenario, built_in, parse};
 use afbc_sim::flight::{Sample, fly};
 use afbc_sim::run::Run;
-use afbc_sim::scenario::{Scenario, built_in, parse};
 
 fn scenario(name: &str, duration_s: f64) -> Scenario {
     Scenario { duration_s, ..built_in(name).unwrap().read().unwrap() }

@@ -9,8 +9,8 @@
 
 use afbc_campaign::compare;
 use afbc_report::results;
+use afbc_scenario::built_in;
 use afbc_sim::run::Run;
-use afbc_sim::scenario::built_in;
 
 const PAGE: &str = include_str!("../../docs/results.md");
 

@@ -9,10 +9,10 @@
 
 use afbc::Profile;
 use afbc_control::FlightController;
-use afbc_flight_core::{ArmingLimits, FlightCore, FlightCoreMemory, Inbox, Mode, Request, Stamped, TicketedRequest};
+use afbc_flight_core::{ArmingLimits, FlightCore, FlightCoreMemory, Inbox, Mode, Request, Stamped, Ticketed};
 use afbc_plant::Sensing;
-use afbc_sim::contender::{Contender, ControllerKind, Task};
-use afbc_sim::scenario::{Scenario, built_in};
+use afbc_scenario::contender::{Contender, ControllerKind, Task};
+use afbc_scenario::{Scenario, built_in};
 use afbc_types::{OutOfRange, State};
 use std::collections::VecDeque;
 
@@ -73,7 +73,7 @@ fn fly<C: FlightController<N>, const N: usize>(
         }
         inbox.put_setpoint(Stamped { value: reference.setpoint(), at_us: now_ms * 1000 });
         if now_ms == ARMED_MS {
-            inbox.request(TicketedRequest { request: Request::Arm, ticket: 0 });
+            inbox.request(Ticketed { value: Request::Arm, ticket: 0 });
         }
         let tick = vehicle.tick(&mut memory, now_ms * 1000, &inbox.take());
         if now_ms >= ARMED_MS {

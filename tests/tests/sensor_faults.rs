@@ -6,9 +6,9 @@ use afbc::Profile;
 use afbc_campaign::suite::SUITES;
 use afbc_plant::instruments::{Failure, InstrumentFault, TrackerModel};
 use afbc_plant::{Environment, ParameterChange, PlantParameter};
-use afbc_sim::contender::{Contender, ControllerKind};
+use afbc_scenario::Scenario;
+use afbc_scenario::contender::{Contender, ControllerKind};
 use afbc_sim::flight::{LOST_DISTANCE_M, fly};
-use afbc_sim::scenario::Scenario;
 use nalgebra::Vector3;
 use std::{env, fs, thread};
 

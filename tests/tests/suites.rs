@@ -8,7 +8,7 @@ use afbc_plant::{Misreading, PlantParameter};
 use afbc_reader::BuiltIn;
 use afbc_report::markers;
 use afbc_report::suite::{self, FlownSuite};
-use afbc_sim::contender::{Contender, ControllerKind};
+use afbc_scenario::contender::{Contender, ControllerKind};
 use afbc_sim::flight::fly;
 use afbc_types::{Axis, Declared, Value};
 use core::convert::Infallible;
@@ -138,10 +138,10 @@ fn a_suites_figures_are_those_of_the_flight() {
                     count += 1.0;
                     largest_m = largest_m.max(distance_m);
                 }
-                tripped = tripped.or(sample.action.health.trip.map(|trip| (sample.time_s, trip)));
+                tripped = tripped.or(sample.action.health.fallback.map(|reason| (sample.time_s, reason)));
             });
             let [flight] = entry.flights.as_slice() else { panic!("one seed") };
-            assert_eq!((flight.lost, flight.tripped.map(|t| (t.time_s, t.trip))), (lost.unwrap(), tripped));
+            assert_eq!((flight.lost, flight.tripped.map(|t| (t.time_s, t.reason))), (lost.unwrap(), tripped));
             let rms_m: f64 = (squares / count).sqrt();
             assert!((flight.metrics.rmse.xyz().norm() - rms_m).abs() < 1e-9 * (1.0 + rms_m));
             assert!((flight.metrics.max_distance_m - largest_m).abs() < 1e-12);
@@ -153,7 +153,7 @@ fn a_suites_figures_are_those_of_the_flight() {
 #[test]
 fn the_flights_of_the_field_are_those_it_names() {
     let suite = built_in("field");
-    let peak = |flight: &SuiteFlight, derivative: fn(&afbc_sim::trajectory::Reference) -> f64| {
+    let peak = |flight: &SuiteFlight, derivative: fn(&afbc_scenario::trajectory::Reference) -> f64| {
         let times = (0..(flight.scenario.duration_s * 1e3) as u32).map(|k| 1e-3 * f64::from(k));
         times.map(|t| derivative(&flight.scenario.trajectory.at(t))).fold(0.0, f64::max)
     };

@@ -1,7 +1,7 @@
 //! Reference trajectories: analytic derivatives compared with differences, continuity, and shape.
 #![allow(clippy::indexing_slicing, missing_docs)] // what is missing must stop the test
 
-use afbc_sim::trajectory::{Reference, Sine, Trajectory, Waypoint};
+use afbc_scenario::trajectory::{Reference, Sine, Trajectory, Waypoint};
 use nalgebra::Vector3;
 use proptest::prelude::*;
 

@@ -7,7 +7,7 @@
 )]
 
 use afbc::Profile;
-use afbc_sim::contender::{Contender, ControllerKind};
+use afbc_scenario::contender::{Contender, ControllerKind};
 use afbc_tune::{LOST, by_hand, conditions, conditions_on, costs, held_out, held_out_on, mean, training, training_on};
 use afbc_vehicles::BUILT_IN;
 

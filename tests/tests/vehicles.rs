@@ -3,9 +3,9 @@
 
 use afbc::{Guarded, Profile};
 use afbc_plant::Environment;
-use afbc_sim::contender::{Contender, ControllerKind};
+use afbc_scenario::contender::{Contender, ControllerKind};
+use afbc_scenario::{Scenario, built_in};
 use afbc_sim::flight::fly;
-use afbc_sim::scenario::{Scenario, built_in};
 use afbc_types::{Axis, Parameters};
 use nalgebra::Vector3;
 use proptest::prelude::*;
@@ -34,7 +34,7 @@ fn hovers(kind: ControllerKind, vehicle: Parameters<f64>, margin: f64) -> Result
     let (mut distance_m, mut trip) = (f64::NAN, None);
     let lost = fly(&scenario, &contender, |sample| {
         distance_m = (sample.motion.position_m - sample.reference.position_m).norm();
-        trip = trip.or(sample.action.health.trip);
+        trip = trip.or(sample.action.health.fallback);
     });
     assert_eq!((lost.unwrap(), trip), (None, None), "{} {vehicle:?}", kind.name());
     Ok(distance_m)
@@ -118,9 +118,9 @@ fn a_perfect_hover_does_not_trip() {
         for _ in 0..5_000 {
             let command =
                 guarded.step(&mut memory, Some(&afbc_types::State::default()), &afbc_types::Setpoint::default());
-            assert_eq!(command.health.trip, None, "{mass_kg} kg");
+            assert_eq!(command.health.fallback, None, "{mass_kg} kg");
         }
-        let learnt = Guarded::learnt(&memory.control);
+        let learnt = memory.control.estimates();
         assert!(Axis::ALL.iter().all(|axis| learnt[*axis].theta.norm().is_finite()));
     }
 }

@@ -5,7 +5,7 @@ use crate::fuzzy::{Basis, Firing, Membership};
 use crate::law::{Context, Law, Tracking};
 use crate::model::ModelConstants;
 use crate::safeguards::Safeguards;
-use afbc_control::{AdaptiveEstimate, Errors, math};
+use afbc_control::{Errors, math};
 use afbc_types::{Axis, Declared, OutOfRange, PerAxis, parameters};
 use nalgebra::{Matrix3, Vector3};
 
@@ -77,6 +77,18 @@ impl Gains {
             ..*self
         }
     }
+}
+
+/// Adaptive estimates of one subsystem. Zero at the start.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct AdaptiveEstimate {
+    /// Theta_hat: one consequent parameter per fuzzy rule, rows by the Gaussians of the first input, columns by those
+    /// of the second; in the unit of the subsystem's input.
+    pub theta: Matrix3<f32>,
+    /// delta_hat: estimated bound of approximation error and disturbance; in the unit of the subsystem's input.
+    pub delta: f32,
 }
 
 /// Derivatives of an [`AdaptiveEstimate`]; that of Theta_hat, gamma e_2 w(x), in factors ([`Firing`]).
@@ -314,10 +326,6 @@ impl Law for Adaptive {
     fn hover_thrust_n(&self, z: &AdaptiveEstimate, weight_n: f32, known_n: f32) -> f32 {
         // The rule for zero error and zero speed.
         math::max(known_n + z.theta.m22, HOVER_SHARE_MIN * weight_n)
-    }
-
-    fn learnt(estimate: &AdaptiveEstimate) -> AdaptiveEstimate {
-        *estimate
     }
 }
 

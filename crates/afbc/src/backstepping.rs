@@ -2,7 +2,7 @@
 
 use crate::law::{Context, Law, Tracking};
 use crate::model::{Dynamics, ModelConstants};
-use afbc_control::{AdaptiveEstimate, Errors};
+use afbc_control::Errors;
 use afbc_types::{Axis, Declared, OutOfRange, Parameters, PerAxis, parameters};
 
 /// Returns the ideal law u*_eq (16) for known f, g and dg/dt, with c e_1 for e_1.
@@ -101,9 +101,5 @@ impl Law for Backstepping {
 
     fn approach(&self, axis: Axis, _known: Option<&ModelConstants>) -> f32 {
         self.gains[axis].approach(self.model.hover_gain(axis))
-    }
-
-    fn learnt((): &()) -> AdaptiveEstimate {
-        AdaptiveEstimate::default()
     }
 }

@@ -13,7 +13,7 @@ use crate::standstill::Standstill;
 use crate::tilt::Tilt;
 use afbc_control::command_filter::{CommandFilter, Filtered};
 use afbc_control::mixer::{Allocation, Mixer};
-use afbc_control::{Action, AdaptiveEstimate, Errors, FlightController, Smoothed, Smoother, Trace, math};
+use afbc_control::{Action, Errors, FlightController, Smoothed, Smoother, Trace, math};
 use afbc_types::{Airframe, Axis, Declared, Inputs, OutOfRange, Parameters, PerAxis, Setpoint, State};
 use nalgebra::Vector3;
 
@@ -507,9 +507,5 @@ impl<L: Law, const N: usize> FlightController<N> for Controller<L, N> {
 
     fn trace(memory: &Self::Memory) -> Trace {
         memory.trace()
-    }
-
-    fn learnt(memory: &Self::Memory) -> PerAxis<AdaptiveEstimate> {
-        PerAxis::from_fn(|axis| L::learnt(&memory.estimates[axis]))
     }
 }

@@ -1,13 +1,14 @@
 //! AFBC under its [monitor](crate::monitor). When the monitor trips, [integral backstepping](crate::integral) takes
 //! over with the last inputs; AFBC is engaged again on command only.
 
-use crate::adaptive::{self, Adaptive};
+use crate::adaptive::{self, Adaptive, AdaptiveEstimate};
 use crate::cascade::{Cascade, Controller, Settings};
 use crate::integral::{Integral, IntegralBackstepping};
 use crate::model::ModelConstants;
 use crate::monitor::{Bounds, Monitor, MonitorFigures};
 use crate::safeguards::Safeguards;
-use afbc_control::{Action, AdaptiveEstimate, Errors, FlightController, Mixer, Trace, Trip};
+use crate::trip::Trip;
+use afbc_control::{Action, Errors, FlightController, Mixer, Trace};
 use afbc_types::{Airframe, Axis, OutOfRange, PerAxis, Range, Setpoint, State};
 
 /// Smallest Theta_max of z, in weights. With feed-forward, rotors that produce 45 % of their thrust need 1.2 of it on
@@ -60,6 +61,11 @@ impl<const N: usize> Memory<N> {
     /// Returns the monitor's last figures of AFBC.
     pub fn figures(&self) -> &MonitorFigures {
         &self.figures
+    }
+
+    /// Returns AFBC's estimates; zero while the fallback law flies.
+    pub fn estimates(&self) -> PerAxis<AdaptiveEstimate> {
+        if self.tripped.is_some() { PerAxis::default() } else { self.afbc.estimates }
     }
 
     /// Returns why the monitor tripped, while the fallback law flies.
@@ -121,7 +127,7 @@ impl<const N: usize> Guarded<N> {
             StandIn { cascade, action: Action::default() }
         });
         *action = self.fallback.cascade(cascade, state, setpoint, fresh);
-        action.health.trip = Some(tripped.trip);
+        action.health.fallback = Some(tripped.trip.reason());
         action
     }
 
@@ -200,10 +206,5 @@ impl<const N: usize> FlightController<N> for Guarded<N> {
         };
         *memory = Memory { afbc, ..Memory::default() };
         true
-    }
-
-    /// Zero while the fallback law flies.
-    fn learnt(memory: &Memory<N>) -> PerAxis<AdaptiveEstimate> {
-        if memory.tripped.is_some() { PerAxis::default() } else { memory.afbc.estimates }
     }
 }

@@ -14,7 +14,7 @@ use crate::backstepping::{self, classical};
 use crate::law::{Context, Law, Tracking};
 use crate::model::ModelConstants;
 use crate::safeguards::Safeguards;
-use afbc_control::{AdaptiveEstimate, Errors, math};
+use afbc_control::{Errors, math};
 use afbc_types::{Axis, Declared, OutOfRange, Parameters, PerAxis};
 
 /// Gains of one subsystem.
@@ -95,9 +95,5 @@ impl Law for IntegralBackstepping {
     fn hover_thrust_n(&self, z: &Integral, weight_n: f32, _: f32) -> f32 {
         // Not weight plus integral, which would include the thrust of manoeuvres.
         z.hover_thrust_n.unwrap_or(weight_n)
-    }
-
-    fn learnt(_: &Integral) -> AdaptiveEstimate {
-        AdaptiveEstimate::default()
     }
 }

@@ -1,7 +1,7 @@
 //! Interface of a control law in the [cascade](crate::cascade).
 
 use crate::model::{Dynamics, ModelConstants, RollPitch};
-use afbc_control::{AdaptiveEstimate, Errors};
+use afbc_control::Errors;
 use afbc_types::{Axis, PerAxis, State};
 use nalgebra::Vector3;
 
@@ -14,7 +14,7 @@ pub trait Law {
     const OBSERVES: bool = false;
 
     /// Memory of the law for one subsystem.
-    type Estimate: Copy + Default + core::fmt::Debug;
+    type Estimate: Copy + Default + core::fmt::Debug + 'static;
 
     /// Returns u_i in the subsystem's unit (N for roll, pitch, yaw and z; m/s2 for x and y), and the errors. Updates
     /// the estimate if the context allows it.
@@ -31,9 +31,6 @@ pub trait Law {
     fn hover_thrust_n(&self, _z: &Self::Estimate, weight_n: f32, _known_n: f32) -> f32 {
         weight_n
     }
-
-    /// Returns `estimate` in AFBC's terms, for logs and monitors; zero for a law without adaptation.
-    fn learnt(estimate: &Self::Estimate) -> AdaptiveEstimate;
 }
 
 /// Data shared by all six subsystems in one step.

@@ -56,8 +56,9 @@ pub mod safeguards;
 mod settings;
 pub mod standstill;
 pub mod tilt;
+mod trip;
 
-pub use adaptive::Adaptive;
+pub use adaptive::{Adaptive, AdaptiveEstimate};
 pub use backstepping::Backstepping;
 pub use cascade::{Cascade, Controller, Settings};
 pub use guarded::Guarded;
@@ -65,3 +66,4 @@ pub use law::Law;
 pub use limits::Limits;
 pub use profile::{LAG_S, Profile, by_rule, slowness};
 pub use safeguards::Safeguards;
+pub use trip::Trip;

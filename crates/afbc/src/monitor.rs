@@ -12,9 +12,10 @@
 //!
 //! Norms and errors are updated for one subsystem per step, so each is at most six steps old.
 
-use crate::adaptive;
+use crate::adaptive::{self, AdaptiveEstimate};
 use crate::cascade::{Cascade, Settings};
-use afbc_control::{AdaptiveEstimate, Trip, math};
+use crate::trip::Trip;
+use afbc_control::math;
 use afbc_types::{Axis, Declared, OutOfRange, Parameters, PerAxis, parameters};
 
 /// Time over which figures are averaged \[s\].

@@ -341,10 +341,10 @@ proptest! {
     }
 }
 
-/// The speed limit shortens the error, not the distance that a monitor looks at; and a controller tells its time step,
-/// its mixer and what its law has learnt.
+/// The speed limit shortens the error, not the distance that a monitor looks at; and a controller reports its time
+/// step, its mixer and its estimates.
 #[test]
-fn a_controller_tells_what_others_need() {
+fn a_controller_reports_what_others_need() {
     let (vehicle, settings) = (Parameters::PAPER.to_f32(), Profile::Paper.settings().with_dt_s(0.004));
     let limits = Limits { speed_max_m_s: 1.0, climb_max_m_s: 1.0, ..Limits::NONE };
     let law = Adaptive::new(Profile::Paper.gains()).unwrap();
@@ -357,6 +357,5 @@ fn a_controller_tells_what_others_need() {
     let distances = memory.control.distances;
     assert_eq!([distances.x, distances.y, distances.z], [30.0, -20.0, 10.0]);
     assert!(trace.errors.x.e1 < 2.0 && trace.errors.y.e1 > -2.0 && trace.errors.z.e1 < 2.0);
-    let learnt = Controller::<Adaptive>::learnt(&memory.control);
-    assert!(learnt == memory.control.estimates && Axis::ALL.iter().any(|axis| learnt[*axis].delta > 0.0));
+    assert!(Axis::ALL.iter().any(|axis| memory.control.estimates[*axis].delta > 0.0));
 }

@@ -9,9 +9,9 @@ use afbc::disturbance::DisturbanceObserver;
 use afbc::monitor::Bounds;
 use afbc::reference::ReferenceModel;
 use afbc::standstill::LIFT_SHARE;
-use afbc::{Adaptive, Controller, Guarded, Profile, Settings, guarded};
+use afbc::{Adaptive, AdaptiveEstimate, Controller, Guarded, Profile, Settings, Trip, guarded};
 use afbc_control::mixer::HOVER_MARGIN;
-use afbc_control::{AdaptiveEstimate, FlightController, Health, Smoothing, Trip, Validated};
+use afbc_control::{FlightController, Health, Smoothing, Validated};
 use afbc_types::{Axis, Inputs, Parameters, PerAxis, Setpoint, State};
 use common::{Stepped, U, check_step, gains, plausible, setpoint, settings, state, step, value};
 use nalgebra::Vector3;
@@ -113,11 +113,11 @@ proptest! {
             let tripped = memory.control.trip();
             let command = step(&controller, &mut memory, &state, &setpoint);
             check_step(&command, &settings)?;
-            prop_assert_eq!(command.action.health.trip, tripped);
+            prop_assert_eq!(command.action.health.fallback, tripped.map(Trip::reason));
             prop_assert_eq!(command.action.health.state_rejected, !state.is_plausible());
             prop_assert_eq!(command.action.health.setpoint_rejected, !setpoint.is_plausible());
             prop_assert!(tripped.is_none() || memory.control.trip() == tripped, "re-engaged by itself");
-            let learnt = Guarded::learnt(&memory.control);
+            let learnt = memory.control.estimates();
             prop_assert!(Axis::ALL.iter().all(|axis| learnt[*axis].theta.iter().all(|theta| theta.is_finite())));
         }
     }
@@ -141,7 +141,7 @@ proptest! {
             controller.engage(&mut memory.control);
             let command = step(&controller, &mut memory, &state, &setpoint);
             prop_assert_eq!(command, step(&law, &mut other, &state, &setpoint));
-            prop_assert_eq!(Guarded::learnt(&memory.control), other.control.estimates);
+            prop_assert_eq!(memory.control.estimates(), other.control.estimates);
         }
         prop_assert_eq!(memory.control.trip(), None);
     }
@@ -158,7 +158,7 @@ proptest! {
         let mut memory = Flight::default();
         let last_of_afbc = step(&controller, &mut memory, &state, &setpoint);
         prop_assert_eq!(
-            (last_of_afbc.action.health.trip, memory.control.trip()),
+            (last_of_afbc.action.health.fallback, memory.control.trip()),
             (None, Some(Trip::Theta(Axis::Roll)))
         );
 
@@ -166,11 +166,11 @@ proptest! {
         let mut at_once = memory;
         controller.engage(&mut at_once.control);
         let first_of_afbc = step(&controller, &mut at_once, &state, &setpoint);
-        prop_assert_eq!(first_of_afbc.action.health.trip, None);
+        prop_assert_eq!(first_of_afbc.action.health.fallback, None);
         position_is_the_same(&last_of_afbc, &first_of_afbc)?;
 
         let mut last_of_fallback = step(&controller, &mut memory, &state, &setpoint);
-        prop_assert_eq!(last_of_fallback.action.health.trip, memory.control.trip());
+        prop_assert_eq!(last_of_fallback.action.health.fallback, memory.control.trip().map(Trip::reason));
         position_is_the_same(&last_of_afbc, &last_of_fallback)?;
         for _ in 0..lasting {
             last_of_fallback = step(&controller, &mut memory, &state, &setpoint);
@@ -179,7 +179,7 @@ proptest! {
         prop_assume!(last_of_fallback.trace.inputs.thrust_n >= LIFT_SHARE * WEIGHT_N);
         controller.engage(&mut memory.control);
         let first_of_afbc = step(&controller, &mut memory, &state, &setpoint);
-        prop_assert_eq!((first_of_afbc.action.health.trip, memory.control.trip().is_some()), (None, true));
+        prop_assert_eq!((first_of_afbc.action.health.fallback, memory.control.trip().is_some()), (None, true));
         position_is_the_same(&last_of_fallback, &first_of_afbc)?;
     }
 
@@ -282,11 +282,11 @@ fn a_tripped_controller_learns_nothing_and_says_why() {
     for _ in 0..1000 {
         let health = step(&controller, &mut memory, &state, &setpoint).action.health;
         let mut expected = Health::default();
-        (expected.trip, expected.saturated) = (memory.control.trip(), health.saturated);
+        (expected.fallback, expected.saturated) = (memory.control.trip().map(Trip::reason), health.saturated);
         assert_eq!(health, expected);
     }
     assert_eq!(*memory.control.figures(), seen);
-    assert_eq!(Guarded::learnt(&memory.control), PerAxis::<AdaptiveEstimate>::default(), "the other law flies");
+    assert_eq!(memory.control.estimates(), PerAxis::<AdaptiveEstimate>::default(), "the other law flies");
 }
 
 #[test]
@@ -377,9 +377,9 @@ fn engaging_does_not_trip_by_itself() {
         controller.engage(&mut memory.control);
         for _ in 0..100 {
             let command = step(&controller, &mut memory, &State::default(), &Setpoint::default());
-            assert_eq!((command.action.health.trip, memory.control.trip()), (None, None), "{yaw_n} N");
+            assert_eq!((command.action.health.fallback, memory.control.trip()), (None, None), "{yaw_n} N");
             assert!((command.trace.inputs.yaw_n - before.trace.inputs.yaw_n).abs() < 5e-3, "{yaw_n} N: {command:?}");
-            let learnt = Guarded::learnt(&memory.control).yaw.theta;
+            let learnt = memory.control.estimates().yaw.theta;
             assert!(learnt.norm() < bounds.theta.yaw && (yaw_n.abs() > 0.7 || learnt.max() - learnt.min() < 1e-2));
         }
     }
@@ -442,11 +442,11 @@ fn engaging_is_bumpless_where_no_even_estimate_fits() {
             break;
         }
     }
-    assert!(before.action.health.trip.is_some() && !before.action.health.saturated, "{before:?}");
+    assert!(before.action.health.fallback.is_some() && !before.action.health.saturated, "{before:?}");
     assert!(controller.engage(&mut memory.control));
     let after = step(&controller, &mut memory, &state, &setpoint);
     same(&before, &after).unwrap();
-    let learnt = Guarded::learnt(&memory.control);
+    let learnt = memory.control.estimates();
     for axis in [Axis::Roll, Axis::Pitch] {
         let theta = learnt[axis].theta;
         assert!(theta.max() - theta.min() > 0.1 && theta.norm() < bounds.theta[axis], "{axis:?}: {theta}");
@@ -462,7 +462,7 @@ fn the_tilt_does_not_step_at_a_trip() {
     for _ in 0..20 {
         let aside = Setpoint { position_m: Vector3::new(0.1, 0.0, 0.0), ..Setpoint::default() };
         let after = step(&controller, &mut memory, &State::default(), &aside);
-        assert!(after.action.health.trip.is_some() && after.trace.inputs.thrust_n > 1.3 * WEIGHT_N, "{after:?}");
+        assert!(after.action.health.fallback.is_some() && after.trace.inputs.thrust_n > 1.3 * WEIGHT_N, "{after:?}");
         assert!(
             (vertical(&after) / vertical(&before) - 1.0).abs() < 0.02,
             "{} then {}",
@@ -511,7 +511,7 @@ fn what_turns_the_vehicle_is_handed_over() {
         let stepped = step(controller, &mut memory, &state, &Setpoint::default());
         let Inputs { roll_n, pitch_n, yaw_n, .. } = stepped.action.given;
         rates += (Vector3::new(roll_n, pitch_n, yaw_n).component_mul(&paper.effectiveness()) + moment) * 1e-3;
-        (Vector3::new(roll_n, pitch_n, yaw_n), stepped.action.health.trip)
+        (Vector3::new(roll_n, pitch_n, yaw_n), stepped.action.health.fallback)
     };
     let mut last = Vector3::zeros();
     for _ in 0..2000 {

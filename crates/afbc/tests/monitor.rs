@@ -2,8 +2,7 @@
 #![allow(clippy::indexing_slicing, clippy::unwrap_used, missing_docs)] // what cannot be built must stop the test
 
 use afbc::monitor::{Bounds, Monitor, MonitorFigures, TRIM_SHARE};
-use afbc::{Cascade, Profile, Settings};
-use afbc_control::{AdaptiveEstimate, Trip};
+use afbc::{AdaptiveEstimate, Cascade, Profile, Settings, Trip};
 use afbc_types::{Axis, Inputs, Parameters, PerAxis};
 use nalgebra::Matrix3;
 use proptest::prelude::*;

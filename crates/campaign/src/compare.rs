@@ -2,12 +2,12 @@
 
 use afbc::Profile;
 use afbc_reader::FileError;
-use afbc_sim::contender::{Contender, ControllerKind};
+use afbc_scenario::Scenario;
+use afbc_scenario::contender::{Contender, ControllerKind};
 use afbc_sim::flight::Lost;
 use afbc_sim::flown::Flown;
 use afbc_sim::metrics::Metrics;
 use afbc_sim::run::{Run, Tripped};
-use afbc_sim::scenario::Scenario;
 use afbc_types::OutOfRange;
 use rayon::prelude::*;
 

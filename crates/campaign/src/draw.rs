@@ -3,7 +3,7 @@
 use crate::plan::{Campaign, Course, Spread};
 use crate::quantity::{self, QUANTITIES, Quantity};
 use afbc_plant::noise::{Noise, Stream};
-use afbc_sim::scenario::Scenario;
+use afbc_scenario::Scenario;
 use afbc_types::OutOfRange;
 
 /// Values drawn for one flight.

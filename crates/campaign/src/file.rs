@@ -6,7 +6,7 @@ use afbc_plant::InstrumentSuite;
 use afbc_reader::FileError;
 use afbc_reader::Table;
 use afbc_reader::words::out_of_range;
-use afbc_sim::scenario::{self, DURATION, Scenario, built_in, similar_built_in};
+use afbc_scenario::{DURATION, Scenario, built_in, similar_built_in};
 use afbc_types::Range;
 use std::path::{Path, PathBuf};
 
@@ -46,7 +46,7 @@ pub fn parse(file: &str, text: &str, name: &str, folder: &Path) -> Result<Campai
 /// Reads the scenario, by name or as a table, which needs no trajectory if there is a course.
 fn scenario(root: &mut Table<'_>, folder: &Path, course: Option<&Course>) -> Result<Scenario, FileError> {
     if let Some(table) = root.table_if("scenario")? {
-        return scenario::read(table, "own", course.map(|course| &course.trajectory));
+        return afbc_scenario::read(table, "own", course.map(|course| &course.trajectory));
     }
     let Some(name) = root.text("scenario")? else {
         return Err(root.missing("scenario", "name a scenario, as in scenario = \"hardware\""));
@@ -88,7 +88,7 @@ pub(crate) fn named(root: &Table<'_>, key: &str, name: &str, folder: &Path) -> R
         return built_in.read();
     }
     let path: PathBuf = folder.join(name);
-    scenario::load(&path)
+    afbc_scenario::load(&path)
 }
 
 fn spreads(mut table: Table<'_>, scenario: &Scenario) -> Result<Vec<Spread>, FileError> {

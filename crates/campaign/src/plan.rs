@@ -1,8 +1,8 @@
 //! Definition of a campaign.
 
 use afbc_plant::Motion;
-use afbc_sim::scenario::Scenario;
-use afbc_sim::trajectory::Trajectory;
+use afbc_scenario::Scenario;
+use afbc_scenario::trajectory::Trajectory;
 use serde::Serialize;
 
 /// A quantity and the interval from which it is drawn uniformly; a single value if both ends are equal.

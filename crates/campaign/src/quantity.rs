@@ -2,7 +2,7 @@
 
 use afbc_plant::instruments::{Accelerometer, Barometer, Gyroscope, Imu, Magnetometer, Preset};
 use afbc_plant::{Deviations, Dropouts, Environment, InstrumentSuite, Payload, RotorFault, Turbulence};
-use afbc_sim::scenario::Scenario;
+use afbc_scenario::Scenario;
 use afbc_types::{OutOfRange, Parameters, Range};
 use core::f64::consts::TAU;
 use nalgebra::Vector3;

@@ -1,11 +1,10 @@
 //! Result of one flight of one contender.
 
 use crate::plan::Campaign;
-use afbc_control::Trip;
-use afbc_sim::contender::Contender;
+use afbc_scenario::Scenario;
+use afbc_scenario::contender::Contender;
 use afbc_sim::flight::{Lost, fly};
 use afbc_sim::metrics::{Accumulator, Metrics, is_settled, tracking_error};
-use afbc_sim::scenario::Scenario;
 use afbc_types::OutOfRange;
 
 /// Result of one flight of one contender: a row of the results.
@@ -50,7 +49,7 @@ pub struct Figure {
 struct Tally {
     lost: Option<Lost>,
     /// When and why the contender's monitor tripped, if it did.
-    trip: Option<(f64, Trip)>,
+    tripped: Option<(f64, &'static str)>,
     metrics: Metrics,
     /// Number of steps in which errors were evaluated.
     settled: u64,
@@ -79,7 +78,7 @@ const fn figure(name: &'static str, meaning: &'static str, value: fn(&Tally) -> 
 /// [`SETTLED_S`](afbc_sim::metrics::SETTLED_S) on.
 pub static FIGURES: [Figure; 21] = [
     figure("lost_at_s", "when the vehicle was lost", |o| o.lost.map(|lost| lost.time_s)),
-    figure("tripped_at_s", "when the monitor switched to the fallback law", |o| o.trip.map(|(time_s, _)| time_s)),
+    figure("tripped_at_s", "when the monitor switched to the fallback law", |o| o.tripped.map(|(time_s, _)| time_s)),
     figure("rmse_x_m", "root mean square error along x", |o| o.measured(o.metrics.rmse.x)),
     figure("rmse_y_m", "root mean square error along y", |o| o.measured(o.metrics.rmse.y)),
     figure("rmse_z_m", "root mean square error along z", |o| o.measured(o.metrics.rmse.z)),
@@ -131,7 +130,7 @@ impl Campaign {
                 contender: contender.name.clone(),
                 trajectory: trajectory.into(),
                 lost_reason: outcome.lost.map(|lost| lost.reason.into()),
-                trip_reason: outcome.trip.map(|(_, trip)| trip.reason().into()),
+                trip_reason: outcome.tripped.map(|(_, reason)| reason.into()),
                 numbers: draw.values.iter().copied().map(Some).chain(figures).collect(),
             })
         };
@@ -149,7 +148,7 @@ impl Tally {
             outcome.steps += 1;
             let health = &sample.action.health;
             outcome.saturated += u64::from(health.saturated);
-            outcome.trip = outcome.trip.or(health.trip.map(|trip| (sample.time_s, trip)));
+            outcome.tripped = outcome.tripped.or(health.fallback.map(|reason| (sample.time_s, reason)));
             if is_settled(sample.time_s) {
                 outcome.settled += 1;
                 outcome.max_position_m = outcome.max_position_m.max(tracking_error(sample).xyz().norm());

@@ -3,8 +3,8 @@
 use crate::compare;
 use crate::file::named;
 use afbc_reader::{BuiltIn, FileError, LIKE, Table};
-use afbc_sim::contender::Contender;
-use afbc_sim::scenario::{self, Scenario};
+use afbc_scenario::Scenario;
+use afbc_scenario::contender::Contender;
 use afbc_types::Range;
 use std::path::Path;
 
@@ -148,7 +148,7 @@ fn flight(
             table.finish()?;
             scenario
         }
-        None => scenario::read(table, name, None)?,
+        None => afbc_scenario::read(table, name, None)?,
     };
     Ok(SuiteFlight { scenario, tilt_max_rad, published })
 }

@@ -7,8 +7,8 @@ use afbc::Profile;
 use afbc_campaign::{self as campaign, Campaign, Course, Manifest, Shard, Spread};
 use afbc_plant::instruments::{Accelerometer, Gyroscope, Imu};
 use afbc_reader::words;
-use afbc_sim::contender::{Contender, ControllerKind, Law};
-use afbc_sim::scenario::{self, Scenario};
+use afbc_scenario::Scenario;
+use afbc_scenario::contender::{Contender, ControllerKind, Law};
 use afbc_types::{Axis, Declaration, Declared, Mounting, Parameters, Value};
 use afbc_vehicles::Vehicle;
 use nalgebra::Vector3;
@@ -45,7 +45,7 @@ fn scenario_file(text: &str) -> Result<String, String> {
     let added = if text.contains("[trajectory]") { "" } else { hover };
     let alone = text.contains("[instruments.") && !text.contains("[instruments.imu");
     let imu = if alone { "\n[instruments.imu]\n" } else { "" };
-    let scenario = scenario::parse("f", &format!("{text}{added}{imu}"), "f").map_err(|error| error.to_string())?;
+    let scenario = afbc_scenario::parse("f", &format!("{text}{added}{imu}"), "f").map_err(|error| error.to_string())?;
     Ok(fingerprint(&of(scenario)))
 }
 
@@ -58,7 +58,7 @@ fn vehicle_file(text: &str) -> Result<String, String> {
 fn on(vehicle: &Vehicle) -> Result<Campaign, String> {
     let laws = ControllerKind::ALL.map(|kind| format!("\"{}\"", kind.name())).join(", ");
     let text = format!("controllers = [{laws}]\n[trajectory]\nkind = \"hover\"\nposition_m = [0, 0, 1]\n");
-    let scenario = scenario::parse("f", &text, "f").unwrap();
+    let scenario = afbc_scenario::parse("f", &text, "f").unwrap();
     scenario.on(vehicle, Profile::Flight).map(of).map_err(|error| error.to_string())
 }
 
@@ -147,7 +147,7 @@ fn others(text: &str, leaf: &Leaf, read: Read) -> Vec<String> {
             // What it may be, as the error says, or a built-in vehicle or scenario.
             let listed = names.split('"').skip(1).step_by(2).map(str::to_owned);
             let vehicles = afbc_vehicles::BUILT_IN.iter().map(|known| known.name.to_owned());
-            let scenarios = scenario::BUILT_IN.iter().map(|known| known.name.to_owned());
+            let scenarios = afbc_scenario::BUILT_IN.iter().map(|known| known.name.to_owned());
             let all = listed.chain(vehicles).chain(scenarios).filter(|name| format!("\"{name}\"") != old);
             all.map(|name| format!("\"{name}\"")).collect()
         }
@@ -385,8 +385,8 @@ fn comments_order_and_names_do_not_count() {
     assert_eq!(plain, vehicle("iris.toml", &reversed(iris), "iris"));
     assert_eq!(plain, vehicle("iris.toml", &format!("# another comment\n{iris}\n# and one more\n"), "iris"));
 
-    let text = scenario::built_in("storm").unwrap().text;
-    let scenario = |file, text: &str, name| fingerprint(&of(scenario::parse(file, text, name).unwrap()));
+    let text = afbc_scenario::built_in("storm").unwrap().text;
+    let scenario = |file, text: &str, name| fingerprint(&of(afbc_scenario::parse(file, text, name).unwrap()));
     let plain = scenario("storm.toml", text, "storm");
     let unnamed = text.replace("name = \"storm\"\n", "");
     assert_eq!(plain, scenario("/elsewhere/mine.toml", &unnamed, "mine"));

@@ -1,6 +1,5 @@
 //! Result of a control step.
 
-use crate::Trip;
 use afbc_types::{Inputs, ROTORS_MAX, RotorForces, RotorSpeeds};
 
 /// Result of a control step.
@@ -47,6 +46,8 @@ pub struct Health {
     pub setpoint_rejected: bool,
     /// A rotor force was limited.
     pub saturated: bool,
-    /// Reason why a fallback law flies instead of the controller's own, if one does.
-    pub trip: Option<Trip>,
+    /// Reason why a fallback law flies instead of the controller's own, if one does: at most 50 characters, for a
+    /// station's status text. With `serde` it is written, but not read.
+    #[cfg_attr(feature = "serde", serde(skip_deserializing))]
+    pub fallback: Option<&'static str>,
 }

@@ -1,8 +1,8 @@
 //! Interface of all controllers: one test harness, tuner and campaign fly any of them.
 
 use crate::screen::Validated;
-use crate::{Action, AdaptiveEstimate, Health, Mixer, Trace};
-use afbc_types::{PerAxis, Setpoint, State};
+use crate::{Action, Health, Mixer, Trace};
+use afbc_types::{Setpoint, State};
 
 /// A controller: computes the speeds of `N` rotors from the measured state and the setpoint.
 ///
@@ -44,7 +44,7 @@ use afbc_types::{PerAxis, Setpoint, State};
 /// ```
 pub trait FlightController<const N: usize = 4> {
     /// State of the controller between steps.
-    type Memory: Copy + Default + core::fmt::Debug;
+    type Memory: Copy + Default + core::fmt::Debug + 'static;
 
     /// Returns the time between steps \[s\].
     fn dt_s(&self) -> f32;
@@ -79,11 +79,6 @@ pub trait FlightController<const N: usize = 4> {
 
     /// Returns the internal signals of the last step.
     fn trace(memory: &Self::Memory) -> Trace;
-
-    /// Returns the estimates of an adaptive law, in AFBC's terms; zero for a law without any.
-    fn learnt(_memory: &Self::Memory) -> PerAxis<AdaptiveEstimate> {
-        PerAxis::default()
-    }
 
     /// Returns control from a fallback law to the controller's own, without a jump of the inputs. True if the fallback
     /// was active; otherwise nothing changes.

@@ -26,7 +26,6 @@ mod screen;
 pub mod settings;
 pub mod smoothing;
 mod trace;
-mod trip;
 
 pub use action::{Action, Health};
 pub use controller::FlightController;
@@ -35,5 +34,4 @@ pub use nalgebra;
 pub use screen::{Screen, Validated};
 pub use settings::Settings;
 pub use smoothing::{Smoothed, Smoother, Smoothing};
-pub use trace::{AdaptiveEstimate, Errors, Trace};
-pub use trip::Trip;
+pub use trace::{Errors, Trace};

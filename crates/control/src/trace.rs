@@ -2,7 +2,6 @@
 
 use crate::command_filter::Filtered;
 use afbc_types::{Inputs, PerAxis};
-use nalgebra::Matrix3;
 
 /// Internal signals of the last step; all zero before the first.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -33,16 +32,4 @@ pub struct Errors {
     pub e1_dot: f32,
     /// e_2 (12); 0 for laws without it.
     pub e2: f32,
-}
-
-/// Adaptive estimates of one subsystem. Zero at the start.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct AdaptiveEstimate {
-    /// Theta_hat: one consequent parameter per fuzzy rule, rows by the Gaussians of the first input, columns by those
-    /// of the second; in the unit of the subsystem's input.
-    pub theta: Matrix3<f32>,
-    /// delta_hat: estimated bound of approximation error and disturbance; in the unit of the subsystem's input.
-    pub delta: f32,
 }

@@ -2,7 +2,7 @@
 //! `cargo run -p afbc-flight-core --example flight_core`.
 
 use afbc::{Adaptive, Controller, Profile};
-use afbc_flight_core::{ArmingLimits, FlightCore, FlightCoreMemory, Inbox, Mode, Request, Stamped, TicketedRequest};
+use afbc_flight_core::{ArmingLimits, FlightCore, FlightCoreMemory, Inbox, Mode, Request, Stamped, Ticketed};
 use afbc_types::{OutOfRange, Parameters, Setpoint, State};
 
 fn main() -> Result<(), OutOfRange> {
@@ -24,7 +24,7 @@ fn main() -> Result<(), OutOfRange> {
         value.position_m.z = if ms > 2000 { 1.0 } else { 0.0 };
         inbox.put_setpoint(Stamped { value, at_us });
         if ms == 1500 {
-            inbox.request(TicketedRequest { request: Request::Arm, ticket: 0 });
+            inbox.request(Ticketed { value: Request::Arm, ticket: 0 });
         }
         let outcome = core.tick(&mut memory, at_us, &inbox.take());
         if let Some(answer) = outcome.answer {

@@ -3,22 +3,26 @@
 use crate::reasons::Reasons;
 use crate::supervisor::{Refusal, Request};
 use afbc_types::{Pose, Setpoint, Stamped, State};
+use heapless::Deque;
 
-/// A request, with a ticket that identifies its answer.
+/// Something asked for, with a ticket that identifies its answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct TicketedRequest {
-    /// The request.
-    pub request: Request,
+pub struct Ticketed<T> {
+    /// What is asked for.
+    pub value: T,
     /// Returned with the answer, and not used otherwise.
     pub ticket: u8,
 }
 
-/// Largest number of queued requests.
-pub const REQUESTS_MAX: usize = 4;
+/// Values in the order of arrival; a tick answers one.
+pub type Queue<T> = Deque<Ticketed<T>, QUEUE_MAX>;
+
+/// Largest number of values in a [`Queue`].
+pub const QUEUE_MAX: usize = 4;
 
 /// Newest inputs, written by the link and taken by the control tick. Implausible values are rejected here, so the tick
 /// need not check them.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Inbox {
     state: Option<Stamped<State>>,
     /// True if the state is the vehicle's own estimate.
@@ -30,8 +34,7 @@ pub struct Inbox {
     /// True if the vehicle rests on the ground.
     rests: Option<bool>,
     inhibited: Reasons,
-    /// Requests in the order of arrival, without gaps.
-    requests: [Option<TicketedRequest>; REQUESTS_MAX],
+    requests: Queue<Request>,
 }
 
 impl Inbox {
@@ -45,7 +48,7 @@ impl Inbox {
         setpoint: None,
         rests: None,
         inhibited: Reasons::NONE,
-        requests: [None; REQUESTS_MAX],
+        requests: Queue::new(),
     };
 
     /// Stores a measured state, stamped by a [`Tracker`](crate::Tracker), if it is [plausible](State::is_plausible).
@@ -145,13 +148,13 @@ impl Inbox {
     }
 
     /// Returns the oldest request, which the next tick answers.
-    pub fn asked(&self) -> Option<TicketedRequest> {
-        self.requests.first().copied().flatten()
+    pub fn asked(&self) -> Option<Ticketed<Request>> {
+        self.requests.front().copied()
     }
 
     /// True if one of the requests is [`Request::Kill`], which takes precedence over earlier ones.
     pub fn kills(&self) -> bool {
-        self.requests.iter().map_while(|asked| *asked).any(|asked| asked.request == Request::Kill)
+        self.requests.iter().any(|asked| asked.value == Request::Kill)
     }
 
     /// Merges `news` into this inbox.
@@ -165,23 +168,18 @@ impl Inbox {
         self.setpoint = news.setpoint.or(self.setpoint);
         self.rests = news.rests.or(self.rests);
         self.inhibited = if news.inhibited.is_empty() { self.inhibited } else { news.inhibited };
-        for asked in news.requests.iter().flatten() {
+        for asked in &news.requests {
             self.request(*asked);
         }
     }
 
-    /// Queues a request; each tick answers one. False if [`REQUESTS_MAX`] are queued already: then it is dropped,
-    /// unless it is [`Request::Kill`], which replaces the newest one.
-    pub fn request(&mut self, asked: TicketedRequest) -> bool {
-        let free = self.requests.iter().position(Option::is_none);
-        let newest = (asked.request == Request::Kill).then_some(REQUESTS_MAX - 1);
-        match free.or(newest).and_then(|place| self.requests.get_mut(place)) {
-            Some(place) => {
-                *place = Some(asked);
-                true
-            }
-            None => false,
+    /// Queues a request; each tick answers one. False if [`QUEUE_MAX`] are queued already: then it is dropped, unless
+    /// it is [`Request::Kill`], which replaces the newest one.
+    pub fn request(&mut self, asked: Ticketed<Request>) -> bool {
+        if asked.value == Request::Kill && self.requests.is_full() {
+            self.requests.pop_back();
         }
+        self.requests.push_back(asked).is_ok()
     }
 
     /// Returns a copy for the next tick, and removes the pose and the oldest request.
@@ -217,11 +215,10 @@ impl Inbox {
             (new, old) => *old = *new,
         }
         (taken.rests, taken.inhibited) = (self.rests, self.inhibited);
-        taken.requests = self.requests;
-        // By hand, since rotating a slice costs a hundred instructions.
-        let [first, second, third, fourth] = self.requests;
-        if first.is_some() {
-            self.requests = [second, third, fourth, None];
+        // Rarely there.
+        if !(self.requests.is_empty() && taken.requests.is_empty()) {
+            taken.requests.clone_from(&self.requests);
+            self.requests.pop_front();
         }
     }
 }

@@ -37,7 +37,7 @@ pub mod tumble;
 
 pub use afbc_types::Stamped;
 pub use clock::SourceClock;
-pub use inbox::{Inbox, TicketedRequest};
+pub use inbox::{Inbox, Queue, Ticketed};
 pub use motor::Motor;
 pub use reasons::Reasons;
 pub use supervisor::{ArmingLimits, EndReason, Mode, Refusal, Request};

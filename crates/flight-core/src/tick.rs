@@ -246,7 +246,7 @@ impl<C: FlightController<N>, const N: usize> FlightCore<C, N> {
         };
         let asked = inbox.asked();
         let observed = SupervisorInputs {
-            request: asked.map(|asked| asked.request),
+            request: asked.map(|asked| asked.value),
             kill: asked.is_some() && inbox.kills(),
             ready: against.verdict(),
             state_age_us,
@@ -256,8 +256,8 @@ impl<C: FlightController<N>, const N: usize> FlightCore<C, N> {
             tumbled: flight.as_ref().is_some_and(|flight| flight.tumble.is_lost()),
         };
         let answer = asked.map(|asked| {
-            let result = mode.answer(asked.request, &observed);
-            RequestAnswer { ticket: asked.ticket, request: asked.request, result }
+            let result = mode.answer(asked.value, &observed);
+            RequestAnswer { ticket: asked.ticket, request: asked.value, result }
         });
         let done = |request| answer.is_some_and(|answer| answer.request == request && answer.result.is_ok());
         let ended = mode.end(&observed);

@@ -6,7 +6,7 @@ use afbc_flight_core::clock::{BACK_SPREAD_US, BACK_US, NEW_COUNT, SILENCE_US};
 use afbc_flight_core::supervisor::COAST_US;
 use afbc_flight_core::tracker::{POSE_AGE_MAX_US, Refused, SILENT_US, Sighting};
 use afbc_flight_core::{
-    ArmingLimits, FlightCore, FlightCoreMemory, Inbox, Mode, Request, SourceClock, Stamped, TicketedRequest, Tracker,
+    ArmingLimits, FlightCore, FlightCoreMemory, Inbox, Mode, Request, SourceClock, Stamped, Ticketed, Tracker,
 };
 use afbc_types::{Parameters, Pose, PoseSigmas, Setpoint, State};
 use proptest::prelude::*;
@@ -65,7 +65,7 @@ fn play(mut sent: Vec<Sent>) -> Seen {
         }
         inbox.put_setpoint(Stamped { value: Setpoint::default(), at_us: now_us });
         if now_us == ARM_US {
-            assert!(inbox.request(TicketedRequest { request: Request::Arm, ticket: 0 }));
+            assert!(inbox.request(Ticketed { value: Request::Arm, ticket: 0 }));
         }
         let mode = vehicle.tick(&mut memory, now_us, &inbox.take()).mode;
         if now_us >= ARM_US && seen.modes.last() != Some(&mode) {

@@ -3,7 +3,7 @@
 
 use afbc_control::{Action, FlightController, Mixer, Trace};
 use afbc_flight_core::{
-    ArmingLimits, FlightCore, FlightCoreMemory, Inbox, Mode, Refusal, Request, Stamped, TickOutcome, TicketedRequest,
+    ArmingLimits, FlightCore, FlightCoreMemory, Inbox, Mode, Refusal, Request, Stamped, TickOutcome, Ticketed,
 };
 use afbc_types::{Inputs, Parameters, RotorForces, RotorSpeeds, Setpoint, State};
 
@@ -61,7 +61,7 @@ impl Bench {
         }
         inbox.put_setpoint(Stamped { value: Setpoint::default(), at_us });
         if let Some(request) = request {
-            assert!(inbox.request(TicketedRequest { request, ticket: 7 }));
+            assert!(inbox.request(Ticketed { value: request, ticket: 7 }));
         }
         self.vehicle.tick(&mut self.memory, at_us, &inbox)
     }

@@ -4,7 +4,7 @@
 
 use afbc::{Adaptive, Controller, Profile};
 use afbc_flight_core::{
-    ArmingLimits, FlightCore, FlightCoreMemory, Inbox, Mode, Refusal, Request, RequestAnswer, Stamped, TicketedRequest,
+    ArmingLimits, FlightCore, FlightCoreMemory, Inbox, Mode, Refusal, Request, RequestAnswer, Stamped, Ticketed,
     Tracker,
 };
 use afbc_link::{Address, Command, Counters, Decoder, FRAME_MAX, Sender, Uplink};
@@ -97,7 +97,7 @@ fn play(mut frames: Vec<Frame>) -> Seen {
     for ms in 0..END_MS {
         let (now_us, since_ms) = (ms * 1000, ms as i64 - FAULT_MS as i64);
         while let Some(frame) = frames.next_if(|frame| frame.at_ms <= since_ms) {
-            let ask = |inbox: &mut Inbox, request| assert!(inbox.request(TicketedRequest { request, ticket: 0 }));
+            let ask = |inbox: &mut Inbox, request| assert!(inbox.request(Ticketed { value: request, ticket: 0 }));
             decoder.feed(&frame.bytes, |_, message| match message {
                 Uplink::State { sent_us, state, .. } => {
                     if let Some(state) = tracker.stamp(1, sent_us, now_us, state) {

@@ -1,12 +1,12 @@
 //! Order of requests, rejection of implausible values, and ages.
 
-use afbc_flight_core::inbox::REQUESTS_MAX;
-use afbc_flight_core::{Inbox, Reasons, Refusal, Request, Stamped, TicketedRequest};
+use afbc_flight_core::inbox::QUEUE_MAX;
+use afbc_flight_core::{Inbox, Reasons, Refusal, Request, Stamped, Ticketed};
 use afbc_types::{Pose, PoseSigmas, Setpoint, State};
 use nalgebra::Vector3;
 
-fn asked(request: Request, ticket: usize) -> TicketedRequest {
-    TicketedRequest { request, ticket: ticket as u8 }
+fn asked(request: Request, ticket: usize) -> Ticketed<Request> {
+    Ticketed { value: request, ticket: ticket as u8 }
 }
 
 /// One per tick, in order, whether requested directly or posted.
@@ -30,10 +30,10 @@ fn requests_wait_for_their_turn() {
 #[test]
 fn a_full_inbox_takes_the_request_to_kill_only() {
     let mut inbox = Inbox::default();
-    for ticket in 0..REQUESTS_MAX {
+    for ticket in 0..QUEUE_MAX {
         assert!(inbox.request(asked(Request::Arm, ticket)));
     }
-    let full = inbox;
+    let full = inbox.clone();
     assert!(!inbox.request(asked(Request::Disarm, 99)));
     assert_eq!(inbox, full);
     assert!(inbox.request(asked(Request::Kill, 99)));
@@ -149,7 +149,7 @@ fn news_are_merged() {
     inbox.put_adrift(None, Refusal::HeadingUnknown);
     inbox.put_setpoint(Stamped { value: Setpoint::default(), at_us: 1 });
     inbox.inhibit(Refusal::BatteryLow.into());
-    let before = inbox;
+    let before = inbox.clone();
     inbox.merge(&Inbox::EMPTY);
     assert_eq!(inbox, before);
     let mut news = Inbox::EMPTY;

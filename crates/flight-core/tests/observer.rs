@@ -7,9 +7,7 @@ use afbc::{Guarded, Profile, guarded};
 use afbc_flight_core::dead_reckoning::{DeadReckoning, Reckoning};
 use afbc_flight_core::motor::Response;
 use afbc_flight_core::observer::{HOLD_US, LATE_US, PoseObserver};
-use afbc_flight_core::{
-    ArmingLimits, FlightCore, FlightCoreMemory, Inbox, Mode, Refusal, Request, Stamped, TicketedRequest,
-};
+use afbc_flight_core::{ArmingLimits, FlightCore, FlightCoreMemory, Inbox, Mode, Refusal, Request, Stamped, Ticketed};
 use afbc_types::{Inputs, Parameters, Pose, PoseSigmas, Setpoint, State};
 use nalgebra::Vector3;
 use proptest::prelude::*;
@@ -147,7 +145,7 @@ fn flying() -> (FlightCore<Guarded>, Memory, Inbox, u64) {
         inbox.locate(Stamped { value: State::default(), at_us: now_us });
         inbox.put_setpoint(Stamped { value: Setpoint::default(), at_us: now_us });
         if ms == 1_200 {
-            inbox.request(TicketedRequest { request: Request::Arm, ticket: 0 });
+            inbox.request(Ticketed { value: Request::Arm, ticket: 0 });
         }
         let _ = vehicle.tick(&mut memory, now_us, &inbox.take());
     }

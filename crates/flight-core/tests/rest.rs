@@ -9,12 +9,12 @@ use afbc_flight_core::supervisor::{COAST_US, DESCEND_US};
 use afbc_flight_core::tumble::LOST_US;
 use afbc_flight_core::{
     ArmingLimits, EndReason, FlightCore, FlightCoreMemory, Inbox, Mode, Refusal, Request, Stamped, TickOutcome,
-    TicketedRequest,
+    Ticketed,
 };
 use afbc_types::{Inputs, Parameters, RotorSpeeds, Setpoint, State};
 use nalgebra::Vector3;
 
-type Adapted = afbc::Cascade<afbc_control::AdaptiveEstimate>;
+type Adapted = afbc::Cascade<afbc::AdaptiveEstimate>;
 
 fn controller() -> Controller<Adaptive> {
     let settings = Settings { reference: ReferenceModel::DEFAULT, ..Profile::Flight.settings() };
@@ -44,7 +44,7 @@ impl Bench {
     }
 
     fn ask(&mut self, request: Request) -> TickOutcome {
-        assert!(self.inbox.request(TicketedRequest { request, ticket: 3 }));
+        assert!(self.inbox.request(Ticketed { value: request, ticket: 3 }));
         self.tick(true)
     }
 

@@ -7,7 +7,7 @@ use afbc_flight_core::landing::LandDetector;
 use afbc_flight_core::supervisor::REST_US;
 use afbc_flight_core::{
     ArmingLimits, EndReason, FlightCore, FlightCoreMemory, Inbox, Mode, Refusal, Request, RequestAnswer, Stamped,
-    TickOutcome, TicketedRequest,
+    TickOutcome, Ticketed,
 };
 use afbc_types::{Inputs, Parameters, RotorForces, RotorSpeeds, Setpoint, State};
 use core::f32::consts::{PI, TAU};
@@ -87,7 +87,7 @@ impl Bench {
     }
 
     fn ask(&mut self, request: Request) {
-        assert!(self.inbox.request(TicketedRequest { request, ticket: 9 }));
+        assert!(self.inbox.request(Ticketed { value: request, ticket: 9 }));
     }
 
     /// Runs `ms` ticks in this state; returns when and why the flight ended, if it did.

@@ -8,13 +8,13 @@ use afbc_flight_core::descent::SINK_M_S;
 use afbc_flight_core::landing::{CARRIED_US, STILL_US};
 use afbc_flight_core::{
     ArmingLimits, EndReason, FlightCore, FlightCoreMemory, Inbox, Mode, Refusal, Request, RequestAnswer, Stamped,
-    TickOutcome, TicketedRequest,
+    TickOutcome, Ticketed,
 };
 use afbc_types::{Parameters, RotorSpeeds, Setpoint, State};
 use nalgebra::{Vector3, Vector4};
 use proptest::prelude::*;
 
-type Adapted = afbc::Cascade<afbc_control::AdaptiveEstimate>;
+type Adapted = afbc::Cascade<afbc::AdaptiveEstimate>;
 
 /// Without a reference model, errors are distances from the setpoint.
 fn settings() -> Settings {
@@ -57,7 +57,7 @@ impl Bench {
     }
 
     fn ask(&mut self, request: Request) {
-        assert!(self.inbox.request(TicketedRequest { request, ticket: 3 }));
+        assert!(self.inbox.request(Ticketed { value: request, ticket: 3 }));
     }
 
     /// A bench that has been flying at `state` towards `setpoint` for a tick.
@@ -381,7 +381,7 @@ fn the_reasons_of_a_tick_are_its_answer() {
         (1010, here, Some(near())),
     ] {
         for _ in 0..ticks {
-            let mut twin = Bench { memory: bench.memory, inbox: bench.inbox, ..Bench::new() };
+            let mut twin = Bench { memory: bench.memory, inbox: bench.inbox.clone(), ..Bench::new() };
             (twin.now_us, twin.noise_m) = (bench.now_us, bench.noise_m);
             twin.ask(Request::Arm);
             let told = bench.tick(state, setpoint).against;

@@ -2,8 +2,8 @@
 //! `cargo run -p afbc-guidance --example guidance_alone`.
 #![allow(clippy::unwrap_used, reason = "an example whose settings are not valid should say so")]
 
-use afbc_flight_core::Mode;
-use afbc_guidance::{FailedSensors, Guidance, GuidanceInputs, Lift, Order, Orders, Settings, TicketedOrder};
+use afbc_flight_core::{Mode, Ticketed};
+use afbc_guidance::{FailedSensors, Guidance, GuidanceInputs, Lift, Order, Orders, Settings};
 use afbc_types::State;
 use nalgebra::Vector3;
 
@@ -18,7 +18,7 @@ fn main() {
             _ => None,
         };
         if let Some(order) = order {
-            orders.give(TicketedOrder { order, ticket: 0 });
+            orders.given.push_back(Ticketed { value: order, ticket: 0 }).unwrap();
         }
         let inputs = GuidanceInputs {
             now_us: 1000 * ms,
@@ -31,7 +31,8 @@ fn main() {
             sensors: FailedSensors::default(),
             lift,
         };
-        let guided = guidance.tick(&inputs, &orders.take());
+        let guided = guidance.tick(&inputs, &orders);
+        orders.given.pop_front();
         if let Some((_, answer)) = guided.answer {
             println!("{ms:5} ms: answer {answer:?}");
         }

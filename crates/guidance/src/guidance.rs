@@ -11,7 +11,7 @@ use crate::mission::Mission;
 use crate::mode::FlightMode;
 use crate::net::{self, FailedSensors, Findings, Watch};
 use crate::notice::{Cause, ModeReason, Notice, Notices};
-use crate::order::{OrderRefusal, Orders, TicketedOrder};
+use crate::order::{OrderRefusal, Orders};
 use crate::settings::Settings;
 use crate::sticks;
 use crate::table::{self, FailsafeAction, TransitionInputs};
@@ -264,9 +264,8 @@ impl Memory {
         if new != 0 {
             net::announce(&settings.net, new, announced, &mut notices);
         }
-        let [first, ..] = &orders.given;
-        let answer = first
-            .map(|TicketedOrder { order, ticket }| (ticket, self.order(settings, &order, state, &seen, &mut notices)));
+        let first = orders.given.front();
+        let answer = first.map(|given| (given.ticket, self.order(settings, &given.value, state, &seen, &mut notices)));
 
         // Flies it.
         let mut reached = None;

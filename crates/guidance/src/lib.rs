@@ -40,8 +40,6 @@ pub use limiter::{Limiter, LimiterTarget};
 pub use mode::FlightMode;
 pub use net::{FailedSensors, Net};
 pub use notice::{Cause, ModeReason, Notice, Notices, Severity};
-pub use order::{
-    AttitudeTarget, Item, Leg, MotionTarget, OffboardTarget, Order, OrderRefusal, Orders, Sticks, TicketedOrder,
-};
+pub use order::{AttitudeTarget, Item, Leg, MotionTarget, OffboardTarget, Order, OrderRefusal, Orders, Sticks};
 pub use settings::{Flying, Limits, Settings};
 pub use table::{FailsafeAction, TransitionInputs};

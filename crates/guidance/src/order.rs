@@ -1,7 +1,7 @@
 //! What a station, a companion computer or a pilot may ask for.
 
 use crate::mode::FlightMode;
-use afbc_flight_core::Stamped;
+use afbc_flight_core::{Queue, Stamped};
 use nalgebra::{UnitQuaternion, Vector3};
 
 /// Something to be done, answered once.
@@ -26,15 +26,6 @@ pub enum Order {
     Home(Option<Vector3<f32>>),
     /// Go on with the mission at this item.
     Resume(u16),
-}
-
-/// An order, with a ticket that identifies its answer.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TicketedOrder {
-    /// The order.
-    pub order: Order,
-    /// Returned with the answer, and not used otherwise.
-    pub ticket: u8,
 }
 
 /// Why an order is not carried out. The numbers are part of the link's protocol, beside those of
@@ -159,11 +150,8 @@ pub struct Leg {
     pub is_last: bool,
 }
 
-/// Largest number of queued orders.
-pub const ORDERS_MAX: usize = 4;
-
 /// What the link brings for the guidance.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Orders {
     /// Newest target.
     pub target: Option<Stamped<OffboardTarget>>,
@@ -173,27 +161,6 @@ pub struct Orders {
     pub leg: Option<Leg>,
     /// Time at which the station in control was last heard; none before \[us\].
     pub heard_us: Option<u64>,
-    /// Orders, oldest first, without gaps; a tick of the guidance answers the first.
-    pub given: [Option<TicketedOrder>; ORDERS_MAX],
-}
-
-impl Orders {
-    /// Queues an order; false if [`ORDERS_MAX`] are queued already, and it is dropped.
-    pub fn give(&mut self, given: TicketedOrder) -> bool {
-        match self.given.iter_mut().find(|place| place.is_none()) {
-            Some(place) => {
-                *place = Some(given);
-                true
-            }
-            None => false,
-        }
-    }
-
-    /// Returns a copy for the next tick, and removes the oldest order.
-    pub fn take(&mut self) -> Orders {
-        let taken = *self;
-        let [_, second, third, fourth] = self.given;
-        self.given = [second, third, fourth, None];
-        taken
-    }
+    /// Orders; a tick of the guidance answers the oldest.
+    pub given: Queue<Order>,
 }

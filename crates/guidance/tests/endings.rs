@@ -5,7 +5,7 @@
 mod fixture;
 
 use afbc_flight_core::landing::LEFT_M;
-use afbc_flight_core::{Mode, Refusal, Request, Stamped};
+use afbc_flight_core::{Mode, Refusal, Request, Stamped, Ticketed};
 use afbc_guidance::*;
 use afbc_types::{Setpoint, State};
 use fixture::*;
@@ -152,7 +152,7 @@ fn the_setpoint_keeps_to_the_vehicle() {
         fixture.state = state;
     };
     let lands = |fixture: &mut Fixture| {
-        fixture.orders.give(TicketedOrder { order: Order::Select(FlightMode::Land), ticket: 1 });
+        fixture.orders.given.push_back(Ticketed { value: Order::Select(FlightMode::Land), ticket: 1 }).unwrap();
     };
     for axis in [x, -x, y, -y, z, -z] {
         both(axis * 5.0, &goes_on);

@@ -1,7 +1,7 @@
 //! Whatever comes in, setpoints are finite and within the limits.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
-use afbc_flight_core::{Mode, Stamped};
+use afbc_flight_core::{Mode, Queue, Stamped, Ticketed};
 use afbc_guidance::*;
 use afbc_types::{Setpoint, State};
 use nalgebra::{Quaternion, Unit, Vector3};
@@ -139,7 +139,7 @@ fn check(
     orders: &Orders,
     guided: &Guided,
 ) -> Result<(), TestCaseError> {
-    prop_assert_eq!(guided.answer.is_some(), orders.given[0].is_some());
+    prop_assert_eq!(guided.answer.is_some(), !orders.given.is_empty());
     prop_assert!(guided.notices.iter().all(|notice| notice.to_string().len() <= 50));
     prop_assert!(guided.charge.is_none_or(|charge| (0.0..=1.0).contains(&charge)));
     prop_assert!(!guided.rests || sight.core.armed());
@@ -175,14 +175,15 @@ proptest! {
                 now_us = now_us.wrapping_add_signed(spell.step_us);
                 let at_us = if spell.fresh { now_us } else { now_us.wrapping_sub(u64::from(tick) * 1000) };
                 let sticks = spell.sticks.map(|[roll, pitch, throttle, yaw]| Sticks { roll, pitch, throttle, yaw });
-                let given = spell.order.filter(|_| tick == 0).map(|order| TicketedOrder { order, ticket: 1 });
-                let orders = Orders {
+                let given = spell.order.filter(|_| tick == 0).map(|order| Ticketed { value: order, ticket: 1 });
+                let mut orders = Orders {
                     target: spell.target.map(|value| Stamped { value, at_us }),
                     sticks: sticks.map(|value| Stamped { value, at_us }),
                     leg: spell.item.map(|(number, upload, item, is_last)| Leg { number, upload, item, is_last }),
                     heard_us: Some(at_us),
-                    given: [given, None, None, None],
+                    given: Queue::new(),
                 };
+                orders.given.extend(given);
                 let sight = GuidanceInputs {
                     now_us,
                     dt_s: spell.dt_s,

@@ -4,7 +4,7 @@
 
 mod bench;
 
-use afbc_flight_core::{Mode, Stamped};
+use afbc_flight_core::{Mode, Stamped, Ticketed};
 use afbc_guidance::table::{forced, select};
 use afbc_guidance::*;
 use bench::{Bench, motion, settings};
@@ -254,8 +254,8 @@ proptest! {
                 }
                 Step::Kill => bench.core = Mode::Disarmed,
                 Step::Order(order) => {
-                    let queued = bench.orders.give(TicketedOrder { order, ticket: 9 });
-                    prop_assert!(queued);
+                    let queued = bench.orders.given.push_back(Ticketed { value: order, ticket: 9 });
+                    prop_assert!(queued.is_ok());
                     asked = Some(order);
                 }
                 Step::Target(target) => bench.aim(target),

@@ -1,10 +1,10 @@
 //! What messages bring for a tick.
 
-use afbc_flight_core::Inbox;
-use afbc_guidance::{BatteryReading, Orders, TicketedOrder};
+use afbc_flight_core::{Inbox, Queue, Ticketed};
+use afbc_guidance::{BatteryReading, Order, Orders};
 
 /// Inputs of the flight core and of the guidance, written by what receives messages and taken by the control tick.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct ControlInputs {
     /// For the flight core.
     pub inbox: Inbox,
@@ -25,7 +25,7 @@ impl Default for ControlInputs {
 impl ControlInputs {
     /// Nothing.
     pub const EMPTY: Self = {
-        let orders = Orders { target: None, sticks: None, leg: None, heard_us: None, given: [None; ORDERS] };
+        let orders = Orders { target: None, sticks: None, leg: None, heard_us: None, given: Queue::new() };
         ControlInputs { inbox: Inbox::EMPTY, orders, battery: None, fresh: false }
     };
 
@@ -49,7 +49,9 @@ impl ControlInputs {
         mine.sticks = sticks.or(mine.sticks);
         mine.leg = leg.or(mine.leg);
         mine.heard_us = heard_us.or(mine.heard_us);
-        given.iter().flatten().for_each(|given| give(mine, *given));
+        for given in given {
+            give(mine, *given);
+        }
     }
 
     /// Brings the inputs of the last tick up to date for the next one, and removes what is handed over only once.
@@ -72,22 +74,11 @@ impl ControlInputs {
         replace(&mut taken.leg, leg);
         replace(&mut taken.heard_us, heard_us);
         // Those that the tick has not answered yet stay.
-        given.iter_mut().filter_map(Option::take).for_each(|given| give(taken, given));
-    }
-
-    /// Removes and returns the oldest order.
-    #[inline(always)]
-    pub(crate) fn next_order(&mut self) -> Option<TicketedOrder> {
-        // By hand, as in the inbox.
-        let [first, second, third, fourth] = self.orders.given;
-        if first.is_some() {
-            self.orders.given = [second, third, fourth, None];
+        while let Some(given) = given.pop_front() {
+            give(taken, given);
         }
-        first
     }
 }
-
-const ORDERS: usize = afbc_guidance::order::ORDERS_MAX;
 
 fn replace<T>(old: &mut Option<T>, new: &mut Option<T>) {
     if new.is_some() {
@@ -96,8 +87,6 @@ fn replace<T>(old: &mut Option<T>, new: &mut Option<T>) {
 }
 
 /// Queues an order; dropped if there is no place for it: whoever gives orders keeps count.
-pub fn give(orders: &mut Orders, given: TicketedOrder) {
-    if let Some(place) = orders.given.iter_mut().find(|place| place.is_none()) {
-        *place = Some(given);
-    }
+pub fn give(orders: &mut Orders, given: Ticketed<Order>) {
+    let _ = orders.given.push_back(given);
 }

@@ -86,7 +86,7 @@ pub struct Report<const N: usize = 4> {
     /// Ticks since power-up in which a rotor was commanded a force outside its limits.
     pub saturated_ticks: u32,
     /// Norms of the estimates of one subsystem, all reported in turn; none before the first flight.
-    pub learnt: Option<(Axis, Norm)>,
+    pub norms: Option<(Axis, Norm)>,
     /// Answer to a request.
     pub answer: Option<RequestAnswer>,
     /// Why the flight ended, if it did in this tick.
@@ -101,7 +101,7 @@ impl<const N: usize> Report<N> {
     /// Returns the report extended with zeros to the largest number of rotors.
     #[must_use]
     pub fn padded(&self) -> Report<ROTORS_MAX> {
-        let Report { time_us, mode, motors, throttles, estimate, health, saturated_ticks, learnt, answer, .. } = *self;
+        let Report { time_us, mode, motors, throttles, estimate, health, saturated_ticks, norms, answer, .. } = *self;
         let throttles = array::from_fn(|i| throttles.get(i).copied().unwrap_or_default());
         let motors = motors.padded();
         let (ended, against, guided) = (self.ended, self.against, self.guided);
@@ -113,7 +113,7 @@ impl<const N: usize> Report<N> {
             estimate,
             health,
             saturated_ticks,
-            learnt,
+            norms,
             answer,
             ended,
             against,
@@ -192,7 +192,7 @@ impl<const N: usize> Flight<N> {
             estimate: observed.or(estimate.map(|estimate| estimate.state)),
             health: outcome.health,
             saturated_ticks: self.saturated_ticks,
-            learnt: self.memory.control().map(|control| control.figures().latest()),
+            norms: self.memory.control().map(|control| control.figures().latest()),
             answer: outcome.answer,
             ended: outcome.ended,
             against: outcome.against,

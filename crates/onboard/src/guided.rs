@@ -3,7 +3,7 @@
 use crate::configuration::Configuration;
 use crate::control_inputs::ControlInputs;
 use afbc_flight_core::supervisor::COAST_US;
-use afbc_flight_core::{Mode, Stamped, TicketedRequest};
+use afbc_flight_core::{Mode, Stamped, Ticketed};
 use afbc_guidance::net::FailedSensors;
 use afbc_guidance::notice::Notices;
 use afbc_guidance::{FlightMode, Guidance, GuidanceInputs, Lift, OrderRefusal};
@@ -116,11 +116,11 @@ impl Guide {
         if let Some(request) = guided.request {
             // A station's request goes first.
             if inbox.asked().is_none() {
-                inbox.request(TicketedRequest { request, ticket: OWN });
+                inbox.request(Ticketed { value: request, ticket: OWN });
             }
         }
         if guided.answer.is_some() {
-            inputs.next_order();
+            inputs.orders.given.pop_front();
         }
         GuidanceResult {
             mode: guided.mode,

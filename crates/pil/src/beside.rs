@@ -3,7 +3,7 @@
 use crate::budget::Linked;
 use crate::exercise::motion;
 use crate::{EmulatedBoard, Error};
-use afbc_sim::in_the_loop::Station;
+use afbc_hil::Station;
 use std::path::Path;
 use std::time::Duration;
 

@@ -1,7 +1,7 @@
 //! A flight with every kind of event, as the bytes that reach the vehicle, for comparisons and budgets.
 
+use afbc_hil::Station;
 use afbc_link::{Command, Uplink};
-use afbc_sim::in_the_loop::Station;
 use afbc_types::{Setpoint, State};
 use nalgebra::Vector3;
 

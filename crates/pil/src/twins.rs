@@ -1,8 +1,8 @@
 //! Emulated processor and host, compared.
 
 use crate::emulator::{Emulator, TickReply};
+use afbc_hil::{Autopilot, Error, Extremes, Host, HostTick};
 use afbc_onboard::Readings;
-use afbc_sim::in_the_loop::{Autopilot, Error, Extremes, Host, HostTick};
 
 /// The emulated processor and the same code on the host. The host gets the same bytes at the same times, and every
 /// output of every tick is compared. The loop has no other input, so as long as none differs, the host alone would have

@@ -7,9 +7,9 @@
 
 use crate::{Emulator, Error};
 use afbc_estimator::Measurement;
+use afbc_hil::Station;
 use afbc_link::{Command, Uplink};
 use afbc_onboard::{AIDS_MAX, Aged, Readings};
-use afbc_sim::in_the_loop::Station;
 use afbc_types::{Setpoint, State};
 use nalgebra::Vector3;
 use rand_xoshiro::SplitMix64;

@@ -4,8 +4,8 @@
 mod common;
 
 use afbc_flight_core::Refusal;
+use afbc_hil::Station;
 use afbc_link::{Address, Answer, Command, Decoder, Downlink, HealthArray, Uplink};
-use afbc_sim::in_the_loop::Station;
 use afbc_station::CLOCK_FAILED;
 use common::start_or_skip;
 use pil::budget::Linked;

@@ -4,8 +4,8 @@
 mod common;
 
 use afbc_flight_core::Mode;
+use afbc_hil::{Host, HostTick, Station};
 use afbc_link::{Command, Uplink};
-use afbc_sim::in_the_loop::{Host, HostTick, Station};
 use afbc_station::services::streams::DEFAULTS;
 use common::start_or_skip;
 use pil::exercise::{TICKS, bytes_of_tick};

@@ -1,9 +1,9 @@
 //! The paper's three claims about its experiment, checked on the flights.
 
-use afbc_sim::contender::ControllerKind;
+use afbc_scenario::contender::ControllerKind;
+use afbc_scenario::paper;
 use afbc_sim::flown::Flown;
 use afbc_sim::metrics::tracking_error;
-use afbc_sim::paper;
 use afbc_sim::run::Run;
 use nalgebra::Vector4;
 

@@ -2,11 +2,11 @@
 
 use afbc::model::ModelConstants;
 use afbc_plant::{EffectsState, Sensing};
+use afbc_scenario::Scenario;
+use afbc_scenario::contender::Contender;
 use afbc_sim::columns::{ESTIMATE, MOTION};
-use afbc_sim::contender::Contender;
 use afbc_sim::flight::Sample;
 use afbc_sim::flown::Flown;
-use afbc_sim::scenario::Scenario;
 use afbc_types::{Axis, Parameters, PerAxis, State};
 use csv::ByteRecord;
 use nalgebra::Vector4;
@@ -130,7 +130,7 @@ fn columns(scenario: &Scenario, contender: &Contender) -> Vec<Column> {
         add("lyapunov_sum".into(), Box::new(move |row| Single(sum(row))));
     }
     if contender.monitored {
-        add("tripped".into(), Box::new(|row| Flag(row.sample.action.health.trip.is_some())));
+        add("tripped".into(), Box::new(|row| Flag(row.sample.action.health.fallback.is_some())));
     }
     columns.extend(real(scenario));
     columns

@@ -1,8 +1,8 @@
 //! Flights grouped by scenario, and their file names.
 
 use crate::words::{case_words, slug};
+use afbc_scenario::Scenario;
 use afbc_sim::flown::Flown;
-use afbc_sim::scenario::Scenario;
 use std::collections::HashSet;
 
 /// The flights of one scenario, and their file names.

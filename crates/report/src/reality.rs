@@ -1,7 +1,7 @@
 //! What a scenario adds to the ideal vehicle, for the report.
 
 use afbc_plant::{Deviations, Rotors, Sensing};
-use afbc_sim::scenario::Scenario;
+use afbc_scenario::Scenario;
 
 /// Returns name and value of each part present.
 pub(super) fn rows(scenario: &Scenario) -> Vec<(&'static str, String)> {

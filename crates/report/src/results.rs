@@ -2,12 +2,12 @@
 
 use crate::markers;
 use afbc_plant::PlantModel;
-use afbc_sim::case::{Case, Reading, Uncertainty};
+use afbc_scenario::Scenario;
+use afbc_scenario::case::{Case, Reading, Uncertainty};
+use afbc_scenario::paper::scenario;
 use afbc_sim::flown::Flown;
 use afbc_sim::metrics::Metrics;
-use afbc_sim::paper::scenario;
 use afbc_sim::run::Run;
-use afbc_sim::scenario::Scenario;
 use afbc_types::OutOfRange;
 use core::fmt::Write;
 

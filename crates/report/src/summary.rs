@@ -1,7 +1,7 @@
 //! `summary.json`: the figures of merit of each run.
 
 use afbc::Profile;
-use afbc_sim::case::{Reading, Sign};
+use afbc_scenario::case::{Reading, Sign};
 use afbc_sim::flown::Flown;
 use afbc_sim::metrics::{Aid, AidMetrics, EstimateMetrics, SETTLED_S};
 use nalgebra::Vector4;
@@ -124,7 +124,7 @@ fn summary(Flown { scenario, run }: &Flown) -> Summary<'_> {
         lost_at_s: run.lost.map(|lost| lost.time_s),
         lost_reason: run.lost.map(|lost| lost.reason),
         tripped_at_s: run.tripped.map(|tripped| tripped.time_s),
-        tripped_reason: run.tripped.map(|tripped| tripped.trip.reason()),
+        tripped_reason: run.tripped.map(|tripped| tripped.reason),
         seed: scenario.seed,
         measured_from_s: SETTLED_S,
         rmse: measured(run.metrics.rmse).map(Outputs::from),

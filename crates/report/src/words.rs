@@ -5,11 +5,11 @@ use afbc_plant::{
     CosineGust, Gust, GustKind, Misreading, ParameterChange, Payload, PlantParameter, Realism, RotorFault, Rotors,
     Sensing, SensorFault, Wind,
 };
-use afbc_sim::case::{Reading, Sign};
-use afbc_sim::contender::Contender;
+use afbc_scenario::Scenario;
+use afbc_scenario::case::{Reading, Sign};
+use afbc_scenario::contender::Contender;
 use afbc_sim::metrics::EstimateMetrics;
 use afbc_sim::run::Tripped;
-use afbc_sim::scenario::Scenario;
 use afbc_types::Axis;
 
 /// Returns a file name without extension: letters, digits, `-` and `_` of `name`, and `-` for anything else.
@@ -232,7 +232,7 @@ pub(super) fn estimate(estimate: &EstimateMetrics) -> String {
 
 /// Example: "the monitor switched to backstepping at t = 15.625 s: rotors stay saturated".
 pub(super) fn tripped(tripped: &Tripped) -> String {
-    let reason = tripped.trip.reason();
+    let reason = tripped.reason;
     let reason = reason.strip_prefix("AFBC off: ").unwrap_or(reason);
     format!("the monitor switched to backstepping at t = {:.3} s: {reason}", tripped.time_s)
 }

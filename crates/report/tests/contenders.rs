@@ -5,7 +5,7 @@ mod common;
 
 use afbc_campaign::compare;
 use afbc_report::{self as report, flights};
-use afbc_sim::scenario::Scenario;
+use afbc_scenario::Scenario;
 use common::{OWN, flown, folder, gone_alike, hover, labels, named, number, open, svgs, words};
 use roxmltree::{Document, Node};
 use std::collections::{BTreeSet, HashMap};

@@ -1,10 +1,10 @@
 //! The parameters of a vehicle in a file, by the firmware's code.
 
 use afbc_files::{Flash, FlashError};
+use afbc_hil::Host;
 use afbc_onboard::Link;
 use afbc_onboard::parameters::{Kept, RecordChange};
-use afbc_sim::in_the_loop::Host;
-use afbc_sim::scenario::Scenario;
+use afbc_scenario::Scenario;
 use afbc_store::{Error, Store, hash};
 use afbc_types::OutOfRange;
 use std::io::ErrorKind;

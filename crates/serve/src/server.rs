@@ -4,7 +4,7 @@ use crate::ParameterFile;
 use crate::command::{COMMANDS, Line, ServerCommand, WorldChange, parse};
 use crate::systems::listed;
 use crate::vehicle::ServedVehicle;
-use afbc_sim::scenario::Scenario;
+use afbc_scenario::Scenario;
 use afbc_types::OutOfRange;
 
 /// The vehicles, on one clock, which begins when they are powered up.

@@ -3,8 +3,7 @@
 use afbc_plant::{Motion, Realism, Rotors, Start};
 use afbc_reader::FileError;
 use afbc_reader::words::out_of_range;
-use afbc_sim::in_the_loop;
-use afbc_sim::scenario::Scenario;
+use afbc_scenario::Scenario;
 use nalgebra::Vector3;
 
 /// Largest number of vehicles: MAVLink has 255 system ids, of which stations take those at the end.
@@ -21,7 +20,7 @@ const PAPER: &str = "paper";
 /// One line on what the firmware cannot fly, or what is out of range.
 pub fn fleet(scenario: &Scenario, vehicles: u8) -> Result<Vec<Scenario>, FileError> {
     let refused = |problem: String| FileError::whole(&scenario.name, problem);
-    in_the_loop::check(scenario).map_err(|error| refused(error.to_string()))?;
+    afbc_hil::check(scenario).map_err(|error| refused(error.to_string()))?;
     if scenario.instruments.imu.is_none() {
         let cure = "add [instruments] with an imu, or take the scenarios outdoor or mocap";
         return Err(refused(format!("the vehicle has no sensors to fly on; {cure}")));

@@ -6,8 +6,8 @@ use afbc_plant::{
     CosineGust, Environment, Gust, GustKind, InstrumentSuite, ParameterChange, Payload, RotorFault, Wind,
 };
 use afbc_reader::words::out_of_range;
+use afbc_scenario::Scenario;
 use afbc_sim::flight::World;
-use afbc_sim::scenario::Scenario;
 use afbc_types::{Axis, OutOfRange};
 
 /// What a vehicle suffers now, and what its scenario has in store.

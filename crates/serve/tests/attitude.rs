@@ -1,12 +1,12 @@
 //! Targets of attitude and thrust in closed loop, without clock and sockets.
 #![allow(clippy::unwrap_used, missing_docs, reason = "tests")]
 
-use afbc_control::Trip;
+use afbc::Trip;
 use afbc_guidance::FlightMode;
 use afbc_link::{Address, AttitudeAndThrust, Command, ExternalTarget, FRAME_MAX, Sender, Uplink};
 use afbc_plant::Motion;
+use afbc_scenario::built_in;
 use afbc_serve::{Server, fleet};
-use afbc_sim::scenario::built_in;
 use afbc_station::services::modes;
 use afbc_types::Axis;
 use nalgebra::{UnitQuaternion, Vector3};

@@ -4,8 +4,8 @@
 use afbc_link::{
     Address, Command, Decoder, Downlink, FRAME_MAX, ParameterName, ParameterRequest, Sender, Storage, Uplink,
 };
+use afbc_scenario::built_in;
 use afbc_serve::{ParameterFile, Server, fleet};
-use afbc_sim::scenario::built_in;
 use std::path::{Path, PathBuf};
 
 const STATION: Address = Address { system: 255, component: 190 };

@@ -2,8 +2,8 @@
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs, reason = "tests")]
 
 use afbc_link::{Address, Command, Decoder, Downlink, FRAME_MAX, Sender, Uplink};
+use afbc_scenario::built_in;
 use afbc_serve::{Addresses, Lines, Ports, RunEnd, Server, TimeRate, fleet, run};
-use afbc_sim::scenario::built_in;
 use std::io::{Cursor, ErrorKind, Read, Write};
 use std::net::{TcpStream, UdpSocket};
 use std::sync::atomic::AtomicBool;

@@ -2,8 +2,8 @@
 #![allow(clippy::unwrap_used, missing_docs, reason = "tests")]
 
 use afbc_link::{Address, Answer, Command, Decoder, Downlink, FRAME_MAX, Sender, Telemetry, Uplink};
+use afbc_scenario::built_in;
 use afbc_serve::{Server, fleet};
-use afbc_sim::scenario::built_in;
 
 const STATION: Address = Address { system: 255, component: 190 };
 const ARM: u16 = 400;

@@ -3,8 +3,8 @@
 
 use afbc_link::{Address, Command, Decoder, Downlink, FRAME_MAX, Sender, Uplink};
 use afbc_plant::InstrumentSuite;
+use afbc_scenario::{Scenario, built_in};
 use afbc_serve::{Server, Then, fleet};
-use afbc_sim::scenario::{Scenario, built_in};
 
 /// A command that no vehicle knows, which is answered all the same.
 const UNKNOWN: u16 = 31_999;

@@ -3,7 +3,6 @@
 
 use afbc_control::{Action, FlightController, Mixer, Trace};
 use afbc_sim::flight::{LawOnly, World, lockstep};
-use afbc_sim::scenario;
 use afbc_types::{Inputs, Parameters, Setpoint, State};
 use core::ops::ControlFlow;
 
@@ -47,7 +46,7 @@ impl FlightController for OwnLaw {
 }
 
 fn main() {
-    let scenario = scenario::built_in("hover").unwrap().read().unwrap();
+    let scenario = afbc_scenario::built_in("hover").unwrap().read().unwrap();
     let vehicle = scenario.vehicle.to_f32();
     let law = OwnLaw { vehicle, mixer: Mixer::new(vehicle, 3.0).unwrap() };
     let (mut world, mut distance_m) = (World::new(&scenario, 0.001).unwrap(), 0.0);

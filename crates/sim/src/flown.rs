@@ -1,7 +1,7 @@
 //! A flight with its scenario.
 
 use crate::run::Run;
-use crate::scenario::Scenario;
+use afbc_scenario::Scenario;
 
 /// One contender's flight of one scenario.
 #[derive(Clone, Debug)]

@@ -1,10 +1,9 @@
 //! One flight with its log and metrics.
 
-use crate::contender::Contender;
 use crate::flight::{Lost, Sample, fly};
 use crate::metrics::{Accumulator, Metrics, SETTLED_S, inputs};
-use crate::scenario::Scenario;
-use afbc_control::Trip;
+use afbc_scenario::Scenario;
+use afbc_scenario::contender::Contender;
 use afbc_types::OutOfRange;
 use nalgebra::Vector4;
 
@@ -31,8 +30,8 @@ pub struct Run {
 pub struct Tripped {
     /// Time \[s\].
     pub time_s: f64,
-    /// Reason.
-    pub trip: Trip,
+    /// Reason in words.
+    pub reason: &'static str,
 }
 
 impl Run {
@@ -53,8 +52,8 @@ impl Run {
         let (mut step, mut tripped) = (0, None);
         let lost = fly(scenario, contender, |sample| {
             metrics.add(sample);
-            if let Some(trip) = sample.action.health.trip {
-                tripped.get_or_insert(Tripped { time_s: sample.time_s, trip });
+            if let Some(reason) = sample.action.health.fallback {
+                tripped.get_or_insert(Tripped { time_s: sample.time_s, reason });
             }
             let u = inputs(sample);
             let extremes = match unlogged.take() {

@@ -4,7 +4,7 @@
 use afbc_plant::instruments::{Barometer, Gnss, Imu, TrackerModel};
 use afbc_plant::{Dropouts, InstrumentSuite, Truth};
 use afbc_reader::FileError;
-use afbc_sim::scenario::{Scenario, parse};
+use afbc_scenario::{Scenario, parse};
 use nalgebra::Vector3;
 
 fn example(text: &str) -> Result<Scenario, FileError> {

@@ -2,9 +2,9 @@
 #![allow(clippy::panic, clippy::unwrap_used, missing_docs)] // tests
 
 use afbc_control::{Action, FlightController, Mixer, Trace};
-use afbc_sim::contender::{Contender, ControllerKind};
+use afbc_scenario::contender::{Contender, ControllerKind};
+use afbc_scenario::{Scenario, parse};
 use afbc_sim::flight::{GROUNDED_S, LawOnly, Lost, OFF_S, World, fly, lockstep};
-use afbc_sim::scenario::{Scenario, parse};
 use afbc_types::{Inputs, Parameters, Setpoint, State};
 use core::ops::{ControlFlow, Range};
 

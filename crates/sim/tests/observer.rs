@@ -7,7 +7,7 @@ use afbc_flight_core::Stamped;
 use afbc_flight_core::dead_reckoning::DeadReckoning;
 use afbc_flight_core::motor::Response;
 use afbc_flight_core::observer::PoseObserver;
-use afbc_sim::scenario::parse;
+use afbc_scenario::parse;
 use afbc_types::{Inputs, Parameters, Pose, PoseSigmas, State};
 use nalgebra::Vector3;
 use std::collections::VecDeque;

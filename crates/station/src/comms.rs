@@ -11,7 +11,6 @@ use crate::services::telemetry::compose;
 use crate::services::texts::{Words, reason, urgency};
 use crate::setup::Setup;
 use afbc::monitor::Norm;
-use afbc_control::Trip;
 use afbc_control::math::sqrt;
 use afbc_flight_core::rate;
 use afbc_flight_core::supervisor::COAST_US;
@@ -57,7 +56,7 @@ pub struct Comms {
     state_is_news: bool,
     failsafes: Failsafes,
     norms: PerAxis<Norm>,
-    trip: Option<Trip>,
+    fallback: Option<&'static str>,
     rate: rate::RateReport,
     /// Bytes that may still be sent after this tick.
     left: usize,
@@ -89,7 +88,7 @@ impl Comms {
             state_is_news: false,
             failsafes: Failsafes::default(),
             norms: PerAxis::default(),
-            trip: None,
+            fallback: None,
             rate: rate::RateReport::default(),
             left: 0,
         }
@@ -188,7 +187,7 @@ impl Comms {
             (dispatcher.status.state, self.state_is_news) = (Some(estimate), true);
         }
         dispatcher.tick();
-        if let Some((axis, norm)) = report.learnt {
+        if let Some((axis, norm)) = report.norms {
             self.norms[axis] = norm;
         }
         self.saturated_ticks = report.saturated_ticks;
@@ -282,9 +281,9 @@ impl Comms {
         for (severity, notice) in failsafes.watch(report, *tick) {
             dispatcher.texts.put(severity, notice);
         }
-        let trip = report.health.control.trip;
-        if let (Some(trip), None) = (trip, self.trip) {
-            dispatcher.texts.put(warning, trip.reason());
+        let fallback = report.health.control.fallback;
+        if let (Some(reason), None) = (fallback, self.fallback) {
+            dispatcher.texts.put(warning, reason);
         }
         let (rate, before) = (report.health.rate, self.rate);
         self.rate = rate;
@@ -295,7 +294,7 @@ impl Comms {
         }
         // While the vehicle flies blind there is no report of a law.
         if report.mode != Mode::Coasting {
-            self.trip = trip;
+            self.fallback = fallback;
         }
     }
 

@@ -3,8 +3,8 @@
 
 mod common;
 
-use afbc_control::Trip;
-use afbc_flight_core::inbox::REQUESTS_MAX;
+use afbc::Trip;
+use afbc_flight_core::inbox::QUEUE_MAX;
 use afbc_flight_core::{EndReason, Mode, Refusal, Request};
 use afbc_link::{Address, Answer, Command, Downlink, FRAME_MAX, MavSeverity, Sender, Text, Uplink};
 use afbc_onboard::Report;
@@ -90,13 +90,13 @@ proptest! {
             let (mut requests, mut all) = (0, 0);
             for (command, from) in tick {
                 requests += usize::from(is_request(command));
-                if requests < REQUESTS_MAX || !is_request(command) {
+                if requests < QUEUE_MAX || !is_request(command) {
                     bench.hear_from(from, Uplink::Command(command));
                     due.push((command.id(), expected(command, from, &mut holder), from));
                     all += 1;
                 }
             }
-            told.extend(listen(&mut bench, REQUESTS_MAX + all / ANSWERS_PER_TICK));
+            told.extend(listen(&mut bench, QUEUE_MAX + all / ANSWERS_PER_TICK));
         }
         prop_assert_eq!(sorted(told), sorted(due));
     }
@@ -129,7 +129,7 @@ proptest! {
         };
         let refused = asked.iter().filter(refused).count();
         let requests = asked.iter().filter(|(command, _)| is_request(*command)).count() - refused;
-        let others = asked.len() - requests.min(REQUESTS_MAX - 1);
+        let others = asked.len() - requests.min(QUEUE_MAX - 1);
         prop_assert_eq!(unanswered as usize, others.saturating_sub(ANSWERS_MAX));
     }
 }
@@ -213,7 +213,7 @@ fn every_refusal_is_told_with_its_reason() {
             bench.hear(Uplink::Command(command));
             bench.inputs.take_into(&mut bench.taken);
             let asked = bench.taken.inbox.asked().expect("asked");
-            assert_eq!(asked.request, request);
+            assert_eq!(asked.value, request);
             let answer = afbc_flight_core::RequestAnswer { ticket: asked.ticket, request, result: Err(refusal) };
             let said = bench.said(&Report { answer: Some(answer), ..idle });
             assert_eq!(answers(&said), [(id, Answer::Refused(refusal as i32), STATION)]);
@@ -237,10 +237,10 @@ fn a_kill_is_always_accepted() {
     let told = listen(&mut bench, 30);
     assert_eq!(told.len(), 22);
     let of = |answer| told.iter().filter(|told| **told == (400, answer, STATION)).count();
-    assert_eq!(of(Answer::Refused(BUSY)), 20 - (REQUESTS_MAX - 1));
+    assert_eq!(of(Answer::Refused(BUSY)), 20 - (QUEUE_MAX - 1));
     assert_eq!(
         of(Answer::Refused(Refusal::Overtaken as i32)) + of(Answer::Refused(Refusal::StateStale as i32)),
-        REQUESTS_MAX - 1
+        QUEUE_MAX - 1
     );
     assert!(told.contains(&(400, Answer::Accepted, second)) && told.contains(&(400, Answer::Accepted, third)));
 }
@@ -251,16 +251,16 @@ fn a_kill_is_always_accepted() {
 fn requests_whose_tick_went_unreported_fail() {
     let mut bench = Bench::new();
     for _ in 0..3 {
-        for _ in 0..REQUESTS_MAX - 1 {
+        for _ in 0..QUEUE_MAX - 1 {
             bench.hear(Uplink::Command(Command::Disarm));
         }
-        for _ in 0..REQUESTS_MAX {
+        for _ in 0..QUEUE_MAX {
             bench.now_us += 1000;
             bench.inputs.take_into(&mut bench.taken);
             bench.flight.tick(bench.now_us, &mut bench.taken, &afbc_onboard::Readings::NONE);
         }
         let told = listen(&mut bench, FORGOTTEN_US as usize / 1000 + 10);
-        assert_eq!(told, [(400, Answer::Failed, STATION); REQUESTS_MAX - 1]);
+        assert_eq!(told, [(400, Answer::Failed, STATION); QUEUE_MAX - 1]);
     }
     bench.hear(Uplink::Command(Command::Disarm));
     assert_eq!(listen(&mut bench, 2), [(400, Answer::Accepted, STATION)]);
@@ -285,7 +285,7 @@ fn the_largest_output_of_a_tick_is_sent_completely() {
         let mode = if odd { Mode::Coasting } else { Mode::Disarmed };
         let ended = odd.then_some(EndReason::StateLost);
         let mut report = Report { mode, ended, answer: Some(answer), time_us: bench.now_us, ..idle };
-        report.health.control.trip = odd.then_some(Trip::Theta(Axis::Pitch));
+        report.health.control.fallback = odd.then_some(Trip::Theta(Axis::Pitch).reason());
         report.health.rate.clock_failed = odd;
         report.motors.0.fill(1.234);
         let said = bench.said(&report);

@@ -3,8 +3,9 @@
 //! in control. The flight core and the guidance are played: they answer at random.
 #![allow(clippy::expect_used, clippy::indexing_slicing, reason = "a test that cannot go on should say why")]
 
-use afbc_flight_core::{Refusal, Request};
-use afbc_guidance::{FlightMode, OrderRefusal, TicketedOrder};
+use afbc_flight_core::inbox::QUEUE_MAX;
+use afbc_flight_core::{Refusal, Request, Ticketed};
+use afbc_guidance::{FlightMode, Order, OrderRefusal};
 use afbc_link::{
     Address, Answer, Command, ControlRequest, Counters, Decoder, Downlink, ExternalTarget, Message, Mission,
     ParameterRequest, Uplink,
@@ -127,7 +128,7 @@ fn every_command_is_answered_once_to_its_sender() {
     let mut comms = Comms::new();
     let mut table: ParameterTable = ParameterTable::new(Configuration::default());
     comms.set_aux_sensors(AuxSensors { origin: EarthOrigin::new(EarthOrigin::SIMULATED), ..AuxSensors::default() });
-    let mut orders: VecDeque<TicketedOrder> = VecDeque::new();
+    let mut orders: VecDeque<Ticketed<Order>> = VecDeque::new();
     let mut model = Model::default();
     // Answers that are due to a command of a station, less those that came.
     let mut due: BTreeMap<(u16, (u8, u8)), i64> = BTreeMap::new();
@@ -194,17 +195,17 @@ fn every_command_is_answered_once_to_its_sender() {
             assert_eq!(update.orders, heard_only, "after {sent} frames");
             assert_eq!(update.inbox.setpoint(), None);
             let stops = |request| matches!(request, Request::Disarm | Request::Kill);
-            assert!(update.inbox.asked().is_none_or(|asked| stops(asked.request)), "after {sent} frames");
+            assert!(update.inbox.asked().is_none_or(|asked| stops(asked.value)), "after {sent} frames");
         }
         inputs.merge(&update);
         inputs.take_into(&mut taken);
-        orders.extend(taken.orders.given.iter_mut().filter_map(Option::take));
-        assert!(orders.len() <= afbc_guidance::order::ORDERS_MAX);
+        orders.extend(core::iter::from_fn(|| taken.orders.given.pop_front()));
+        assert!(orders.len() <= QUEUE_MAX);
 
         // Flight core and guidance.
         let answer = taken.inbox.asked().map(|asked| {
             let result = if random.below(2) == 0 { Ok(()) } else { Err(random.of(&Refusal::ALL)) };
-            afbc_flight_core::RequestAnswer { ticket: asked.ticket, request: asked.request, result }
+            afbc_flight_core::RequestAnswer { ticket: asked.ticket, request: asked.value, result }
         });
         let ordered = orders.pop_front().map(|order| {
             given += 1;

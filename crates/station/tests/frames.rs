@@ -176,7 +176,7 @@ proptest! {
             prop_assert_eq!(update.orders, Orders::default(), "{:?}", sent);
             prop_assert_eq!(update.inbox.setpoint(), None);
             if let Some(asked) = update.inbox.asked() {
-                prop_assert!(matches!(asked.request, Request::Disarm | Request::Kill), "{:?}", sent);
+                prop_assert!(matches!(asked.value, Request::Disarm | Request::Kill), "{:?}", sent);
             }
             prop_assert!(!bench.comms.wants_reboot());
             bench.step();

@@ -3,15 +3,15 @@
 
 mod common;
 
-use afbc_control::Trip;
+use afbc::Trip;
 use afbc_flight_core::{Mode, Request};
 use afbc_link::{Answer, Command, Downlink, MavCmd, MavSeverity, Text, Uplink};
 use afbc_onboard::Report;
 use afbc_types::{Axis, State};
 use common::{Bench, STATION};
 
-fn text(trip: Trip) -> Downlink {
-    Downlink::Text { severity: MavSeverity::MAV_SEVERITY_WARNING, text: Text::from(trip.reason()) }
+fn text(reason: &str) -> Downlink {
+    Downlink::Text { severity: MavSeverity::MAV_SEVERITY_WARNING, text: Text::from(reason) }
 }
 
 fn accepted(command: MavCmd) -> Downlink {
@@ -34,22 +34,22 @@ fn a_trip_is_told_once_and_ended_by_command() {
     let mut askew = State::default();
     askew.attitude_rad.x = 1.2;
     let mut told = Vec::new();
-    let mut trip = None;
+    let mut reason = None;
     for _ in 0..9_000 {
         let (report, said) = bench.tick(&askew);
         told.extend(said);
-        trip = report.health.control.trip;
+        reason = report.health.control.fallback;
     }
-    let trip = trip.expect("nine seconds on its side");
-    assert_eq!(told, [text(trip)]);
+    let reason = reason.expect("nine seconds on its side");
+    assert_eq!(told, [text(reason)]);
 
     bench.hear(Uplink::Command(Command::Engage));
     let (report, said) = bench.tick(&State::default());
     assert_eq!(report.answer.map(|answer| (answer.request, answer.result)), Some((Request::Engage, Ok(()))));
-    assert_eq!(report.health.control.trip, None);
+    assert_eq!(report.health.control.fallback, None);
     assert_eq!(said, [accepted(MavCmd::MAV_CMD_USER_1)]);
     let (report, said) = bench.tick(&State::default());
-    assert_eq!((report.health.control.trip, said), (None, vec![]), "AFBC flies");
+    assert_eq!((report.health.control.fallback, said), (None, vec![]), "AFBC flies");
 }
 
 /// A trip is reported again only if the monitor trips again, not when states return after a gap.
@@ -57,18 +57,18 @@ fn a_trip_is_told_once_and_ended_by_command() {
 fn a_gap_in_the_states_does_not_repeat_it() {
     let mut bench = Bench::new();
     let (idle, _) = bench.tick(&State::default());
-    let trip = Trip::Theta(Axis::Roll);
-    let told = text(trip);
-    let mut says = |mode, trip| {
+    let reason = Trip::Theta(Axis::Roll).reason();
+    let told = text(reason);
+    let mut says = |mode, fallback| {
         let mut report = Report { mode, ..idle };
-        report.health.control.trip = trip;
+        report.health.control.fallback = fallback;
         bench.said(&report).into_iter().filter(|message| *message == told).count()
     };
     assert_eq!(says(Mode::Flying, None), 0);
-    assert_eq!(says(Mode::Flying, Some(trip)), 1);
-    assert_eq!(says(Mode::Flying, Some(trip)), 0);
+    assert_eq!(says(Mode::Flying, Some(reason)), 1);
+    assert_eq!(says(Mode::Flying, Some(reason)), 0);
     assert_eq!(says(Mode::Coasting, None), 0);
-    assert_eq!(says(Mode::Flying, Some(trip)), 0);
+    assert_eq!(says(Mode::Flying, Some(reason)), 0);
     assert_eq!(says(Mode::Flying, None), 0);
-    assert_eq!(says(Mode::Flying, Some(trip)), 1);
+    assert_eq!(says(Mode::Flying, Some(reason)), 1);
 }

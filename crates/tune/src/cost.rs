@@ -2,10 +2,10 @@
 
 use crate::fast;
 use crate::scale::Scale;
-use afbc_sim::contender::Contender;
+use afbc_scenario::Scenario;
+use afbc_scenario::contender::Contender;
 use afbc_sim::metrics::Metrics;
 use afbc_sim::run::Run;
-use afbc_sim::scenario::Scenario;
 use afbc_types::OutOfRange;
 use rayon::prelude::*;
 

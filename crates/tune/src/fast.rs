@@ -2,9 +2,9 @@
 
 use crate::maker::{Maker, TrainingFlight};
 use crate::scale::Scale;
-use afbc_sim::contender::Contender;
-use afbc_sim::scenario::Scenario;
-use afbc_sim::trajectory::{Sine, Trajectory};
+use afbc_scenario::Scenario;
+use afbc_scenario::contender::Contender;
+use afbc_scenario::trajectory::{Sine, Trajectory};
 use core::f64::consts::TAU;
 use libm::sqrt;
 use nalgebra::Vector3;

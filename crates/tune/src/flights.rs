@@ -17,8 +17,8 @@ use afbc_plant::{
     Battery, Contact, Environment, GroundEffect, Gust, GustKind, InstrumentSuite, Payload, PlantParameter, RotorFault,
     Sensing, Turbulence,
 };
-use afbc_sim::scenario::{Outage, Scenario};
-use afbc_sim::trajectory::{Sine, Trajectory, Waypoint};
+use afbc_scenario::trajectory::{Sine, Trajectory, Waypoint};
+use afbc_scenario::{Outage, Scenario};
 use afbc_types::Axis;
 use afbc_vehicles::Vehicle;
 use nalgebra::Vector3;

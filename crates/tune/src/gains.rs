@@ -2,7 +2,7 @@
 
 use afbc::Profile;
 use afbc_reader::words;
-use afbc_sim::contender::{Contender, ControllerKind, Law};
+use afbc_scenario::contender::{Contender, ControllerKind, Law};
 use afbc_types::{Axis, Declaration, Declared, Range, Value, ValueMut};
 use afbc_vehicles::{CASCADE, Vehicle};
 use core::convert::Infallible;

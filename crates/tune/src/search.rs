@@ -4,8 +4,8 @@ use crate::cma_es::Search;
 use crate::conditions::{Condition, FAILED, factor};
 use crate::cost::{LOST, costs, flown, mean};
 use crate::gains::{self, GainChange};
-use afbc_sim::contender::Contender;
-use afbc_sim::scenario::Scenario;
+use afbc_scenario::Scenario;
+use afbc_scenario::contender::Contender;
 use afbc_types::OutOfRange;
 use rayon::prelude::*;
 

@@ -5,7 +5,7 @@ use afbc::disturbance::DisturbanceObserver;
 use afbc::reference::ReferenceModel;
 use afbc::{Profile, Settings};
 use afbc_control::Smoothing;
-use afbc_sim::contender::{Contender, ControllerKind, Law};
+use afbc_scenario::contender::{Contender, ControllerKind, Law};
 use afbc_vehicles::Vehicle;
 
 /// Returns the law of this kind with hand-tuned gains, limits of the profile `flight` and a hand-tuned cascade; AFBC

@@ -1,8 +1,8 @@
 //! Flights made from a vehicle's own data, searches that do not depend on threads, and a folder that resumes.
 #![allow(clippy::unwrap_used, missing_docs, reason = "what cannot be flown must stop the test")]
 
-use afbc_sim::contender::ControllerKind;
-use afbc_sim::scenario::Scenario;
+use afbc_scenario::Scenario;
+use afbc_scenario::contender::ControllerKind;
 use afbc_tune::fleet::{Results, Search};
 use afbc_tune::{
     LOST, SearchOptions, by_hand_on, conditions_on, costs, held_out, held_out_on, search, training, training_on,
@@ -131,7 +131,7 @@ fn an_interrupted_fleet_resumes_to_the_same_bytes() {
     let bare = built_in("racer").unwrap().text.split("# Gains found by").next().unwrap();
     let text = format!("{bare}\n{gains}");
     let read = afbc_vehicles::parse("racer.toml", &text, "racer").unwrap();
-    afbc_sim::contender::Law::on(ControllerKind::Indi, &read, afbc::Profile::Flight).unwrap();
+    afbc_scenario::contender::Law::on(ControllerKind::Indi, &read, afbc::Profile::Flight).unwrap();
 
     let refused = |course, searches: &[Search]| {
         Results::open(&whole, searches, course, false).err().map(|error| error.to_string()).unwrap()

@@ -9,7 +9,7 @@ use super::written::{Output, show};
 use super::{interrupt, random, suite};
 use afbc_campaign::compare::{self, standard};
 use afbc_report::compare as report;
-use afbc_sim::contender::Contender;
+use afbc_scenario::contender::Contender;
 use clap::Args;
 use std::path::PathBuf;
 use std::process::ExitCode;

@@ -2,7 +2,7 @@
 
 use super::progress::Progress;
 use super::terminal::{Failure, INTERRUPTED, print, say};
-use afbc_sim::contender::{ControllerKind, Law};
+use afbc_scenario::contender::{ControllerKind, Law};
 use afbc_tune::fleet::{FleetOutcome, GAINS, Results, Search};
 use afbc_tune::{SearchOptions, is_paper};
 use afbc_vehicles::Vehicle;

@@ -7,8 +7,8 @@ use super::target::Target;
 use super::terminal::Failure;
 use super::vehicle::OnVehicle;
 use afbc::Profile;
-use afbc_sim::contender::{Contender, ControllerKind};
-use afbc_sim::scenario::Scenario;
+use afbc_scenario::Scenario;
+use afbc_scenario::contender::{Contender, ControllerKind};
 use clap::Args;
 use std::process::ExitCode;
 

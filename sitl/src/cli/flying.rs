@@ -9,9 +9,9 @@ use super::written::show;
 use afbc_files::Folder;
 use afbc_report::claims::Claim;
 use afbc_report::flights;
+use afbc_scenario::{DURATION, Scenario};
 use afbc_sim::flown::Flown;
 use afbc_sim::run::Run;
-use afbc_sim::scenario::{DURATION, Scenario};
 use clap::Args;
 
 /// Flights of more steps than this, about a second of computing time, show their progress.

@@ -4,8 +4,8 @@ use super::in_the_loop::{InTheLoop, Recorder, outcome};
 use super::target::Target;
 use super::terminal::{Failure, print};
 use crate::serial::{self, Serial};
+use afbc_hil::{LoopEnd, MessagePeriods, Station};
 use afbc_sim::flight::Sample;
-use afbc_sim::in_the_loop::{self, LoopEnd, MessagePeriods, Station};
 use clap::Args;
 use std::ops::ControlFlow;
 use std::process::ExitCode;
@@ -68,7 +68,7 @@ impl Hitl {
             ControlFlow::Continue(()) if !stop.load(Ordering::Relaxed) => ControlFlow::Continue(()),
             _ => ControlFlow::Break(()),
         };
-        let end = in_the_loop::fly(&scenario, &mut station, &mut serial, pace, observe)?;
+        let end = afbc_hil::fly(&scenario, &mut station, &mut serial, pace, observe)?;
         let late_ms = serial.late_max().as_secs_f64() * 1e3;
         let metrics = recorder.finish()?;
 

@@ -3,11 +3,11 @@
 use super::target::Target;
 use super::terminal::Failure;
 use super::vehicle::OnVehicle;
+use afbc_hil::{Error, Log, LoopEnd};
+use afbc_scenario::{DURATION, Scenario};
 use afbc_sim::flight::Sample;
-use afbc_sim::in_the_loop::{self, Error, Log, LoopEnd};
 use afbc_sim::metrics::{Accumulator, Metrics};
 use afbc_sim::run::Run;
-use afbc_sim::scenario::{DURATION, Scenario};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::ops::ControlFlow;
@@ -33,8 +33,8 @@ pub(crate) fn outcome(scenario: &Scenario, metrics: &Metrics, end: &LoopEnd) -> 
     let LoopEnd { lost, interrupted, disarmed } = end;
     let mut text = match (lost, interrupted) {
         (None, false) => {
-            let without_link = Run::fly(scenario, &in_the_loop::firmware(scenario)?, u64::MAX)?.metrics;
-            in_the_loop::tracking(scenario.duration_s, metrics, &without_link)
+            let without_link = Run::fly(scenario, &afbc_hil::firmware(scenario)?, u64::MAX)?.metrics;
+            afbc_hil::tracking(scenario.duration_s, metrics, &without_link)
         }
         (Some(lost), _) => format!("The vehicle was lost at t = {:.3} s: {}.\n", lost.time_s, lost.reason),
         (None, true) => "The flight was aborted.\n".into(),
@@ -51,7 +51,7 @@ impl InTheLoop {
         let mut scenario = self.on.put(target.scenario()?)?;
         scenario.duration_s = self.duration.unwrap_or(scenario.duration_s);
         DURATION.check(scenario.duration_s)?;
-        in_the_loop::check(&scenario).map_err(|error| format!("{}: {error}", scenario.name))?;
+        afbc_hil::check(&scenario).map_err(|error| format!("{}: {error}", scenario.name))?;
         Ok(scenario)
     }
 }

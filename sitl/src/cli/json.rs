@@ -3,8 +3,8 @@
 use super::terminal::{Failure, print};
 use afbc::Profile;
 use afbc_campaign::Campaign;
-use afbc_sim::contender::Contender;
-use afbc_sim::scenario::Scenario;
+use afbc_scenario::Scenario;
+use afbc_scenario::contender::Contender;
 use afbc_tune::{GainChange, SearchResult, fragment};
 use clap::Args;
 use serde::Serialize;

@@ -1,7 +1,7 @@
 //! `--log-hz`: the rate of a flight's log.
 
-use afbc_sim::contender::Contender;
-use afbc_sim::scenario::Scenario;
+use afbc_scenario::Scenario;
+use afbc_scenario::contender::Contender;
 use std::str::FromStr;
 
 /// Largest number of rows of a log: somewhat more than an hour at 100 Hz.

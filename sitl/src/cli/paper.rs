@@ -6,10 +6,10 @@ use super::place::Place;
 use super::terminal::Failure;
 use afbc_plant::PlantModel;
 use afbc_report::claims::claims;
-use afbc_sim::case::{Case, Reading, Sign, Uncertainty};
+use afbc_scenario::Scenario;
+use afbc_scenario::case::{Case, Reading, Sign, Uncertainty};
+use afbc_scenario::paper::scenario;
 use afbc_sim::flown::Flown;
-use afbc_sim::paper::scenario;
-use afbc_sim::scenario::Scenario;
 use clap::{Args, ValueEnum};
 use std::process::ExitCode;
 

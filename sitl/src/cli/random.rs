@@ -9,7 +9,7 @@ use afbc_campaign::random::{self, FLIGHTS, FlownDraw, NAME, Random, Seen};
 use afbc_reader::BuiltIn;
 use afbc_report::random::{self as report, Judged};
 use afbc_report::suite::markers;
-use afbc_sim::contender::Contender;
+use afbc_scenario::contender::Contender;
 use afbc_vehicles::{BUILT_IN, Vehicle};
 use clap::{Args, ValueEnum};
 use std::path::Path;

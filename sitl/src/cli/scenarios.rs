@@ -7,8 +7,8 @@ use super::target::Target;
 use super::terminal::{Failure, print};
 use afbc_campaign::Campaign;
 use afbc_reader::BuiltIn;
-use afbc_sim::contender::Contender;
-use afbc_sim::scenario::{BUILT_IN, Scenario, built_in};
+use afbc_scenario::contender::Contender;
+use afbc_scenario::{BUILT_IN, Scenario, built_in};
 use clap::Args;
 use std::process::ExitCode;
 

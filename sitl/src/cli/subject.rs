@@ -2,7 +2,7 @@
 
 use afbc_campaign::{self as campaign, Campaign};
 use afbc_reader::FileError;
-use afbc_sim::scenario::{self, Scenario};
+use afbc_scenario::Scenario;
 use std::path::{Path, PathBuf};
 use toml::de::DeTable;
 
@@ -70,7 +70,7 @@ impl Kind {
 
     fn built_in(self, name: &str) -> Option<Found> {
         let text = match self {
-            Kind::Scenario => scenario::built_in(name)?.text,
+            Kind::Scenario => afbc_scenario::built_in(name)?.text,
             Kind::Campaign => campaign::built_in(name)?.text,
         };
         let file = format!("built-in {name}");
@@ -80,7 +80,7 @@ impl Kind {
 
     fn similar(self, name: &str) -> Option<&'static str> {
         match self {
-            Kind::Scenario => scenario::similar_built_in(name).map(|known| known.name),
+            Kind::Scenario => afbc_scenario::similar_built_in(name).map(|known| known.name),
             Kind::Campaign => campaign::similar_built_in(name).map(|known| known.name),
         }
     }
@@ -136,7 +136,7 @@ impl Found {
     }
 
     fn scenario(&self) -> Result<Scenario, FileError> {
-        scenario::parse(&self.file, &self.text, &self.name)
+        afbc_scenario::parse(&self.file, &self.text, &self.name)
     }
 
     fn campaign(&self) -> Result<Campaign, FileError> {
@@ -178,7 +178,7 @@ mod tests {
 
     #[test]
     fn every_built_in_file_is_told_by_its_text() {
-        for known in &scenario::BUILT_IN {
+        for known in &afbc_scenario::BUILT_IN {
             assert_eq!(Kind::of(known.text), Some(Kind::Scenario), "{}", known.name);
         }
         for known in &campaign::BUILT_IN {

@@ -10,7 +10,7 @@ use afbc_campaign::random::NAME;
 use afbc_campaign::suite::{SUITES, Suite, parse};
 use afbc_reader::{BuiltIn, FileError};
 use afbc_report::suite::{self as report, FlownSuite};
-use afbc_sim::contender::Contender;
+use afbc_scenario::contender::Contender;
 use clap::Args;
 use std::ffi::OsStr;
 use std::path::Path;

@@ -3,7 +3,7 @@
 use super::subject::{self, Subject};
 use super::terminal::Failure;
 use afbc_campaign::Campaign;
-use afbc_sim::scenario::Scenario;
+use afbc_scenario::Scenario;
 use std::ffi::OsString;
 use std::fmt;
 use std::path::PathBuf;

@@ -3,8 +3,8 @@
 use super::{Tick, Truth};
 use afbc_link::{Address, Command, Decoder, Downlink, FRAME_MAX, Mission, MissionItem, ParameterRequest, Plan, Sender};
 use afbc_link::{Datum, Height, Place, Uplink};
+use afbc_scenario::{Scenario, built_in};
 use afbc_serve::{Server, fleet};
-use afbc_sim::scenario::{Scenario, built_in};
 use afbc_station::services::origin::EarthOrigin;
 use nalgebra::Vector3;
 

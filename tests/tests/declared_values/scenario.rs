@@ -2,9 +2,9 @@
 
 use super::document::{Case, Document};
 use super::subject::{Responses, Subject, change_each, compare, fields};
-use afbc_sim::contender::ControllerKind;
+use afbc_scenario::Scenario;
+use afbc_scenario::contender::ControllerKind;
 use afbc_sim::flight::{Sample, fly};
-use afbc_sim::scenario::{self, Scenario};
 use afbc_types::Axis;
 use std::collections::BTreeSet;
 use std::collections::hash_map::DefaultHasher;
@@ -12,7 +12,7 @@ use std::hash::{Hash, Hasher};
 
 impl Subject for Scenario {
     fn read(text: &str) -> Result<Self, String> {
-        scenario::parse("f", text, "f").map_err(|error| error.to_string())
+        afbc_scenario::parse("f", text, "f").map_err(|error| error.to_string())
     }
 
     fn document(&self) -> Document {

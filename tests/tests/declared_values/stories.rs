@@ -5,7 +5,7 @@ use crate::airborne::session::{is_armed, item};
 use crate::airborne::{STATION, Session, Tick, velocity};
 use afbc_guidance::FlightMode;
 use afbc_link::{Command, ExternalTarget, ManualControl, Uplink};
-use afbc_sim::scenario::Scenario;
+use afbc_scenario::Scenario;
 use afbc_station::services::modes;
 use std::collections::hash_map::DefaultHasher;
 use std::hash::{Hash, Hasher};

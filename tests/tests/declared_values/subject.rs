@@ -3,7 +3,7 @@
 use super::document::{Case, Document};
 use crate::airborne;
 use afbc_campaign::{self as campaign, Campaign, Course, Manifest, Shard};
-use afbc_sim::scenario::Scenario;
+use afbc_scenario::Scenario;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 

@@ -3,7 +3,7 @@
 use super::bisection::largest;
 use afbc_plant::noise::Noise;
 use afbc_plant::{Drag, Environment, Frame, ParameterChange, Payload, PlantParameter, RotorFault, Turbulence};
-use afbc_sim::scenario::Scenario;
+use afbc_scenario::Scenario;
 use afbc_types::OutOfRange;
 use afbc_vehicles::Vehicle;
 use core::fmt;

@@ -1,7 +1,7 @@
 //! A drawn flight.
 
 use super::change::Change;
-use afbc_sim::scenario::Scenario;
+use afbc_scenario::Scenario;
 
 /// What the controllers see.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -17,9 +17,9 @@ pub use standing::{Difference, RESAMPLES, Score, Standing, is_level, standings};
 
 use crate::compare::{self, Outcome};
 use afbc_reader::FileError;
-use afbc_sim::contender::Contender;
+use afbc_scenario::Scenario;
+use afbc_scenario::contender::Contender;
 use afbc_sim::run::Run;
-use afbc_sim::scenario::Scenario;
 use afbc_types::OutOfRange;
 use afbc_vehicles::Vehicle;
 use base::Base;

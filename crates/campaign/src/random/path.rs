@@ -4,7 +4,7 @@ use super::bisection::largest;
 use super::change::whole;
 use super::power::Power;
 use afbc_plant::noise::Noise;
-use afbc_sim::trajectory::{Sine, Trajectory, Waypoint};
+use afbc_scenario::trajectory::{Sine, Trajectory, Waypoint};
 use core::f64::consts::TAU;
 use libm::sqrt;
 use nalgebra::Vector3;

@@ -3,7 +3,7 @@
 use super::bisection::largest;
 use super::change::Change;
 use afbc_plant::Battery;
-use afbc_sim::trajectory::{Reference, Trajectory};
+use afbc_scenario::trajectory::{Reference, Trajectory};
 use afbc_types::Rotor;
 use afbc_vehicles::Vehicle;
 use core::f64::consts::TAU;

@@ -10,7 +10,7 @@ use crate::motor::Response;
 use crate::supervisor::{COAST_US, DESCEND_US, GIVE_UP_US};
 use crate::{
     ArmingLimits, EndReason, FlightCore, FlightCoreMemory, Inbox, Mode, Refusal, Request, Stamped, TickOutcome,
-    TicketedRequest,
+    Ticketed,
 };
 use afbc_control::{Action, FlightController, Mixer, Trace};
 use afbc_types::{Inputs, Parameters, Pose, PoseSigmas, RotorForces, RotorSpeeds, Setpoint, State};
@@ -140,7 +140,7 @@ impl Bench {
             }
         };
         run(1500);
-        assert!(bench.inbox.request(TicketedRequest { request: Request::Arm, ticket: 0 }));
+        assert!(bench.inbox.request(Ticketed { value: Request::Arm, ticket: 0 }));
         for _ in 0..1500 {
             let _ = if own { bench.own() } else { bench.linked(0) };
         }
@@ -445,7 +445,7 @@ fn poses_replace_an_estimate_at_once() {
     assert!(!bench.nothing().health.observed, "it was replaced");
 
     // A disarmed vehicle observes nothing.
-    assert!(bench.inbox.request(TicketedRequest { request: Request::Kill, ticket: 0 }));
+    assert!(bench.inbox.request(Ticketed { value: Request::Kill, ticket: 0 }));
     let _ = bench.own();
     (0..50).for_each(|_| assert!(!bench.posed(4000).health.observed));
 }
@@ -477,7 +477,7 @@ fn after_a_flight_its_memory_remains_and_no_trace() {
     let _ = bench.nothing();
     let trace = bench.memory.trace::<Notes, 4>();
     assert_eq!(trace.inputs.thrust_n, bench.steps() as f32);
-    assert!(bench.inbox.request(TicketedRequest { request: Request::Kill, ticket: 0 }));
+    assert!(bench.inbox.request(Ticketed { value: Request::Kill, ticket: 0 }));
     assert_eq!(bench.linked(0).ended, Some(EndReason::Killed));
     assert!(!bench.memory.airborne() && bench.steps() > 1000);
     assert_eq!(bench.memory.trace::<Notes, 4>(), Trace::default());
@@ -493,7 +493,7 @@ fn after_a_flight_its_memory_remains_and_no_trace() {
         let _ = bench.nothing();
     }
     assert_ne!(bench.memory.trace::<Notes, 4>(), Trace::default());
-    assert!(bench.inbox.request(TicketedRequest { request: Request::Kill, ticket: 0 }));
+    assert!(bench.inbox.request(Ticketed { value: Request::Kill, ticket: 0 }));
     let _ = bench.nothing();
     assert_eq!(bench.memory.trace::<Notes, 4>(), Trace::default());
 }

@@ -3,7 +3,7 @@
 
 use afbc_flight_core::landing::LandDetector;
 use afbc_flight_core::supervisor::REST_US;
-use afbc_flight_core::{ArmingLimits, Mode, Request, Stamped};
+use afbc_flight_core::{ArmingLimits, Mode, Request, Stamped, Ticketed};
 use afbc_guidance::*;
 use afbc_types::{Setpoint, State};
 use nalgebra::Vector3;
@@ -96,7 +96,7 @@ impl Bench {
     }
 
     pub(crate) fn order(&mut self, order: Order) -> Result<(), OrderRefusal> {
-        assert!(self.orders.give(TicketedOrder { order, ticket: 7 }));
+        self.orders.given.push_back(Ticketed { value: order, ticket: 7 }).unwrap();
         let guided = self.tick();
         let (ticket, answer) = guided.answer.unwrap();
         assert_eq!(ticket, 7);
@@ -152,7 +152,8 @@ impl Bench {
             sensors: self.sensors,
             lift: Lift { most_m_s2: 2.0 * G_M_S2, gravity_m_s2: G_M_S2, given_m_s2: None },
         };
-        let guided = self.guidance.tick(&sight, &self.orders.take());
+        let guided = self.guidance.tick(&sight, &self.orders);
+        self.orders.given.pop_front();
         self.said.extend(guided.notices.iter());
         self.reached.extend(guided.reached);
         self.answers.extend(guided.answer);

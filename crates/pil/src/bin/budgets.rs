@@ -1,7 +1,7 @@
 //! Measures the firmware's cost and writes the table of `docs/budgets.md`; with `--check`, writes nothing. Fails if a
 //! budget is exceeded. Both images must have been built.
 
-use afbc_sim::in_the_loop::Station;
+use afbc_hil::Station;
 use pil::beside::Beside;
 use pil::budget::{ESTIMATING_INSTRUCTIONS_MAX, FRAME_BYTES, LEVELS, Linked, TICK_INSTRUCTIONS_MAX};
 use pil::exercise::{TICKS, bytes_of_tick};

@@ -3,7 +3,7 @@
 use super::canvas::text_width_px;
 use super::palette::TINTS;
 use crate::words;
-use afbc_sim::scenario::Scenario;
+use afbc_scenario::Scenario;
 use plotters::style::RGBColor;
 
 /// An event with a label, at a time or over an interval.

@@ -58,8 +58,7 @@ pub(super) fn csv(out: &mut dyn Write, judged: &Judged<'_>) -> io::Result<()> {
             let level = lost.is_none() && best_m.is_some_and(|best_m| is_level(rms_m, best_m));
             let none = || [String::new(), String::new()];
             let [lost_at, lost] = lost.map_or_else(none, |lost| [lost.time_s.to_string(), lost.reason.into()]);
-            let [tripped_at, trip] =
-                tripped.map_or_else(none, |trip| [trip.time_s.to_string(), trip.trip.reason().into()]);
+            let [tripped_at, trip] = tripped.map_or_else(none, |trip| [trip.time_s.to_string(), trip.reason.into()]);
             let how = [
                 contender.name.clone(),
                 contender.kind().name().into(),
@@ -138,7 +137,7 @@ pub fn json(out: &mut dyn Write, judged: &Judged<'_>) -> io::Result<()> {
 }
 
 fn of_group<'a>(judged: &Judged<'a>, group: &'a Group<'a>) -> GroupWords<'a> {
-    let words = |(contender, standing): (&'a afbc_sim::contender::Contender, &Standing)| {
+    let words = |(contender, standing): (&'a afbc_scenario::contender::Contender, &Standing)| {
         let Standing { wins, lost, lost_alone, median_m, geometric_m, difference } = *standing;
         Words {
             name: &contender.name,

@@ -1,7 +1,7 @@
 //! Flights that were drawn and flown, and how the contenders stand.
 
 use afbc_campaign::random::{FlownDraw, Random, Score, Seen, Standing, standings};
-use afbc_sim::contender::Contender;
+use afbc_scenario::contender::Contender;
 
 /// Flights that were drawn and flown, and how the contenders stand in them.
 #[derive(Clone, Debug)]

@@ -68,7 +68,7 @@ pub(super) fn lost(entry: &Entry) -> Option<String> {
 pub(super) fn trip(entry: &Entry) -> Option<String> {
     let mut trips = entry.flights.iter().filter_map(|flight| flight.tripped);
     let (first, others) = (trips.next()?, trips.count());
-    let reason = first.trip.reason();
+    let reason = first.reason;
     let reason = reason.strip_prefix("AFBC off: ").unwrap_or(reason);
     let of = entry.flights.len();
     let when = if of > 1 { format!("{} of {of} trip, first", others + 1) } else { "trip".into() };

@@ -23,8 +23,7 @@ pub(super) fn csv(out: &mut dyn Write, flown: FlownSuite<'_>) -> io::Result<()> 
                 let inputs = metrics.mean_abs_delta_u.iter().copied();
                 let figures = errors.into_iter().chain(inputs).map(|figure| figure.to_string());
                 let lost = lost.map_or([String::new(), String::new()], |l| [l.time_s.to_string(), l.reason.into()]);
-                let trip =
-                    tripped.map_or([String::new(), String::new()], |t| [t.time_s.to_string(), t.trip.reason().into()]);
+                let trip = tripped.map_or([String::new(), String::new()], |t| [t.time_s.to_string(), t.reason.into()]);
                 let row = who.into_iter().chain([seed.to_string()]).chain(figures).chain(lost).chain(trip);
                 csv.write_record(row)?;
             }
@@ -98,7 +97,7 @@ fn contender(entry: &Entry) -> Contender<'_> {
         first_lost_at_s: lost.map(|lost| lost.time_s),
         tripped: trips.len(),
         first_tripped_at_s: trips.first().map(|trip| trip.time_s),
-        first_trip: trips.first().map(|trip| trip.trip.reason()),
+        first_trip: trips.first().map(|trip| trip.reason),
         mean: FIGURES.iter().map(|f| (f.name, entry.average(f.value).map(|average| average.mean))).collect(),
     }
 }

@@ -4,10 +4,10 @@
 use afbc_campaign::{self as campaign, Drawn, FIGURES, Manifest, QUANTITIES, Row, Shard, Summary};
 use afbc_files::Folder;
 use afbc_plant::{CosineGust, Environment, Gust, GustKind, ParameterChange, Payload, PlantParameter, RotorFault};
-use afbc_sim::contender::{Contender, ControllerKind};
+use afbc_scenario::contender::{Contender, ControllerKind};
+use afbc_scenario::{Outage, Scenario, built_in};
 use afbc_sim::flown::Flown;
 use afbc_sim::run::Run;
-use afbc_sim::scenario::{Outage, Scenario, built_in};
 use nalgebra::Vector3;
 use roxmltree::{Document, Node};
 use std::collections::BTreeMap;

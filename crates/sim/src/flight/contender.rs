@@ -5,9 +5,9 @@ use super::law_only::LawOnly;
 use super::lockstep::{Lost, lockstep};
 use super::sample::Sample;
 use super::world::World;
-use crate::contender::{Contender, Task, decimal};
-use crate::scenario::Scenario;
 use afbc_control::FlightController;
+use afbc_scenario::Scenario;
+use afbc_scenario::contender::{Contender, Task, decimal};
 use afbc_types::OutOfRange;
 use core::ops::ControlFlow;
 

@@ -1,11 +1,11 @@
 //! The vehicle's own estimate, by the [front end](EstimatorFrontEnd) that flies on board, and how good it is.
 
 use super::sensing::{Sensing, still};
-use crate::scenario::Scenario;
 use afbc_estimator::{Aid, Estimate, Estimator, ImuCalibration, OutputFilter};
 use afbc_flight_core::{Inbox, Refusal};
 use afbc_onboard::{Aged, EstimatorFrontEnd};
 use afbc_plant::Truth;
+use afbc_scenario::Scenario;
 use afbc_types::{OutOfRange, Pose, State};
 use nalgebra::{Quaternion, SMatrix, SVector, Vector3};
 

@@ -1,12 +1,12 @@
 //! Any controller inside the flight core, as on board, but without board and link.
 
 use super::pilot::Pilot;
-use super::sample::Sample;
+use super::sample::{Sample, estimates};
 use super::world::{View, World};
 use afbc_control::{Action, FlightController, Mixer};
 use afbc_flight_core::motor::Response;
 use afbc_flight_core::rate::{PERIOD_US, WINDOW_US};
-use afbc_flight_core::{ArmingLimits, FlightCore, FlightCoreMemory, Inbox, Mode, Request, Stamped, TicketedRequest};
+use afbc_flight_core::{ArmingLimits, FlightCore, FlightCoreMemory, Inbox, Mode, Request, Stamped, Ticketed};
 use afbc_onboard::Aged;
 use afbc_types::{OutOfRange, Parameters, Setpoint, State};
 use core::convert::Infallible;
@@ -63,7 +63,7 @@ impl<C: FlightController<N>, const N: usize> InFlightCore<C, N> {
         for _ in 0..TICKS_HELD {
             let _ = self.tick(view, setpoint);
         }
-        self.inbox.request(TicketedRequest { request: Request::Arm, ticket: 0 });
+        self.inbox.request(Ticketed { value: Request::Arm, ticket: 0 });
         let _ = self.tick(view, setpoint);
     }
 }
@@ -82,7 +82,7 @@ impl<C: FlightController<N>, const N: usize> Pilot for InFlightCore<C, N> {
         let mut action = if self.now_us > 0 { self.tick(&view, setpoint) } else { Action::default() };
         action.health.state_rejected = state.is_none();
         action.health.setpoint_rejected = !setpoint.is_plausible();
-        let estimates = self.memory.control().map(C::learnt).unwrap_or_default();
+        let estimates = self.memory.control().map(|control| estimates::<N>(control)).unwrap_or_default();
         Ok(view.sample(action, self.memory.trace::<C, N>(), estimates))
     }
 

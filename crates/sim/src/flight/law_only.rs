@@ -1,7 +1,7 @@
 //! A law without the flight core.
 
 use super::pilot::Pilot;
-use super::sample::Sample;
+use super::sample::{Sample, estimates};
 use super::world::World;
 use afbc_control::{FlightController, Validated};
 use core::convert::Infallible;
@@ -28,6 +28,6 @@ impl<C: FlightController<N>, const N: usize> Pilot for LawOnly<C, N> {
         let view = world.look();
         let action = self.controller.step(&mut self.memory, view.state.as_ref(), &view.reference.setpoint());
         let Validated { control, .. } = &self.memory;
-        Ok(view.sample(action, C::trace(control), C::learnt(control)))
+        Ok(view.sample(action, C::trace(control), estimates::<N>(control)))
     }
 }

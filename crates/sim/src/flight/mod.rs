@@ -3,7 +3,7 @@
 //! A [`World`] has the plant, its disturbances and its sensors; a vehicle with an inertial sensor estimates its state
 //! itself, by the estimator that flies on board. A [`Pilot`] reads the sensors and commands the rotors:
 //! a law [`LawOnly`], the flight core with a law inside ([`InFlightCore`]), or the firmware at the other end of a link
-//! ([`crate::in_the_loop`]). [`lockstep`] is the loop around both.
+//! (`afbc-hil`). [`lockstep`] is the loop around both.
 
 mod contender;
 mod estimation;

@@ -1,10 +1,12 @@
 //! Record of one step of a flight.
 
 use super::estimation::Estimated;
-use crate::trajectory::Reference;
-use afbc_control::{Action, AdaptiveEstimate, Trace};
+use afbc::{AdaptiveEstimate, Cascade, guarded};
+use afbc_control::{Action, Trace};
 use afbc_plant::{EffectsState, Motion, StateMeasurement};
+use afbc_scenario::trajectory::Reference;
 use afbc_types::{PerAxis, ROTORS_MAX};
+use core::any::Any;
 
 /// All quantities of one step.
 #[derive(Clone, Copy, Debug)]
@@ -25,6 +27,14 @@ pub struct Sample {
     pub action: Action<ROTORS_MAX>,
     /// The controller's trace.
     pub trace: Trace,
-    /// The law's estimates; zero for a law without adaptation.
+    /// AFBC's estimates; zero for other laws.
     pub estimates: PerAxis<AdaptiveEstimate>,
+}
+
+/// Returns the estimates in a law's memory, if the law is AFBC, with or without its monitor; zero for another.
+#[inline(always)]
+pub(super) fn estimates<const N: usize>(memory: &dyn Any) -> PerAxis<AdaptiveEstimate> {
+    let alone = || memory.downcast_ref().map(|cascade: &Cascade<AdaptiveEstimate>| cascade.estimates);
+    let guarded = memory.downcast_ref().map(|memory: &guarded::Memory<N>| memory.estimates());
+    guarded.or_else(alone).unwrap_or_default()
 }

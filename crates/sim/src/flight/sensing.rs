@@ -1,10 +1,10 @@
 //! What a vehicle's own sensors say: the instruments' readings, as they reach its software.
 
 use super::sensor_model;
-use crate::scenario::{Outage, Scenario};
 use afbc_estimator::{Measurement, Stamped};
 use afbc_onboard::{AIDS_MAX, Aged, Readings};
 use afbc_plant::{InstrumentSuite, Instruments, Truth};
+use afbc_scenario::{Outage, Scenario};
 use afbc_types::OutOfRange;
 use nalgebra::Vector3;
 use std::collections::VecDeque;

@@ -3,14 +3,15 @@
 use super::estimation::{Estimated, Look, SimulatedEstimator};
 use super::sample::Sample;
 use super::sensing::Wired;
-use crate::scenario::{Outage, Scenario};
-use crate::trajectory::{Reference, Trajectory};
-use afbc_control::{Action, AdaptiveEstimate, Trace};
+use afbc::AdaptiveEstimate;
+use afbc_control::{Action, Trace};
 use afbc_flight_core::Refusal;
 use afbc_onboard::{Aged, Readings};
 use afbc_plant::{
     EffectsState, InstrumentSuite, Instruments, Motion, Plant, SensorFaults, StateMeasurement, StateSensor,
 };
+use afbc_scenario::trajectory::{Reference, Trajectory};
+use afbc_scenario::{Outage, Scenario};
 use afbc_types::{OutOfRange, PerAxis, Pose, ROTORS_MAX, RotorSpeeds, State};
 
 /// Plant, sensors, link and reference of a scenario.

@@ -1,9 +1,8 @@
 //! Answers to commands: each exactly once, to its sender.
 
-use afbc_flight_core::inbox::REQUESTS_MAX;
-use afbc_flight_core::{Request, TicketedRequest};
-use afbc_guidance::order::ORDERS_MAX;
-use afbc_guidance::{Order, OrderRefusal, TicketedOrder};
+use afbc_flight_core::inbox::QUEUE_MAX;
+use afbc_flight_core::{Request, Ticketed};
+use afbc_guidance::{Order, OrderRefusal};
 use afbc_link::{Address, Answer, Downlink};
 use heapless::Deque;
 
@@ -30,10 +29,10 @@ pub const NOT_KNOWN: i32 = 66;
 pub struct Commands {
     /// Requests that the flight core has not answered, indexed by ticket. The first place is reserved for
     /// [`Request::Kill`], so that it is always accepted. The flight core's inbox never overflows.
-    asked: [Option<Open>; REQUESTS_MAX],
+    asked: [Option<Open>; QUEUE_MAX],
     /// Orders that the guidance has not answered, indexed by ticket. The guidance's queue never
     /// overflows either.
-    ordered: [Option<Open>; ORDERS_MAX],
+    ordered: [Option<Open>; QUEUE_MAX],
     /// A command that is in progress, and when that was last reported \[us\].
     lasting: Option<(Open, u64)>,
     waiting: Deque<Told, ANSWERS_MAX>,
@@ -58,13 +57,13 @@ struct Open {
 
 impl Commands {
     /// Gives the flight core's request for a command; none if too many are open, which is answered.
-    pub fn ask(&mut self, request: Request, command: u16, from: Address, at_us: u64) -> Option<TicketedRequest> {
+    pub fn ask(&mut self, request: Request, command: u16, from: Address, at_us: u64) -> Option<Ticketed<Request>> {
         let kills = request == Request::Kill;
         let mut places = self.asked.iter_mut().zip(0..).filter(|(_, ticket)| (*ticket == 0) == kills);
         match places.find(|(place, _)| place.is_none()) {
             Some((place, ticket)) => {
                 *place = Some(Open { command: Some(command), from, at_us });
-                Some(TicketedRequest { request, ticket })
+                Some(Ticketed { value: request, ticket })
             }
             None => {
                 // The motors are about to be stopped already.
@@ -76,11 +75,11 @@ impl Commands {
 
     /// Gives the guidance's order for a command, or for a message without an answer; none if too many are open, which
     /// is answered.
-    pub fn order(&mut self, order: Order, command: Option<u16>, from: Address, at_us: u64) -> Option<TicketedOrder> {
+    pub fn order(&mut self, order: Order, command: Option<u16>, from: Address, at_us: u64) -> Option<Ticketed<Order>> {
         match self.ordered.iter_mut().zip(0..).find(|(place, _)| place.is_none()) {
             Some((place, ticket)) => {
                 *place = Some(Open { command, from, at_us });
-                Some(TicketedOrder { order, ticket })
+                Some(Ticketed { value: order, ticket })
             }
             None => {
                 command.into_iter().for_each(|command| self.answer(command, Answer::Refused(BUSY), from));

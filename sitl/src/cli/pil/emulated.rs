@@ -2,9 +2,9 @@
 
 use crate::cli::in_the_loop::{InTheLoop, Recorder, outcome};
 use crate::cli::terminal::{Failure, print};
+use afbc_hil::{Host, MessagePeriods, Station};
+use afbc_scenario::Scenario;
 use afbc_sim::flight::Sample;
-use afbc_sim::in_the_loop::{self, Host, MessagePeriods, Station};
-use afbc_sim::scenario::Scenario;
 use pil::{Emulator, Image, TwinComparison, Twins};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -22,7 +22,7 @@ pub(super) fn fly(scenario: &Scenario, flying: &InTheLoop, image: Option<PathBuf
 
     let start = Instant::now();
     let observe = |sample: &Sample| recorder.observe(sample);
-    let end = in_the_loop::fly(scenario, &mut Station::new(), &mut twins, MessagePeriods::LOCKSTEP, observe)?;
+    let end = afbc_hil::fly(scenario, &mut Station::new(), &mut twins, MessagePeriods::LOCKSTEP, observe)?;
     let seconds = start.elapsed().as_secs_f64();
     let comparison = twins.comparison();
     let metrics = recorder.finish()?;

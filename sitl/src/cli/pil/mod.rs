@@ -39,7 +39,7 @@ impl Pil {
 #[cfg(not(unix))]
 mod emulated {
     use super::{ExitCode, Failure, InTheLoop, PathBuf};
-    use afbc_sim::scenario::Scenario;
+    use afbc_scenario::Scenario;
 
     pub(super) fn fly(_: &Scenario, _: &InTheLoop, _: Option<PathBuf>) -> Result<ExitCode, Failure> {
         Err("the emulator needs Unix, for its pipes and sockets; `sitl fly` flies the same scenario without it".into())

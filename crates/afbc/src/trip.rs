@@ -1,7 +1,6 @@
 //! Reasons for switching from the adaptive law to its fallback.
 
 use afbc_types::Axis;
-use core::fmt;
 
 /// Reason why the adaptive law was switched off.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -49,11 +48,5 @@ impl Trip {
             Trip::LimitCycle(Axis::Yaw) => "AFBC off: limit cycle of U3 (yaw)",
             Trip::LimitCycle(_) => "AFBC off: limit cycle of U4 (thrust)",
         }
-    }
-}
-
-impl fmt::Display for Trip {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.reason())
     }
 }

@@ -1,12 +1,11 @@
 //! Reasons of a trip, as a station shows them.
 #![allow(missing_docs)]
 
-use afbc_control::Trip;
+use afbc::Trip;
 use afbc_types::Axis;
 use std::collections::BTreeSet;
 
-/// Each reason is its own, names its subsystem and what went wrong, and fits the status text of a link; it prints as
-/// its words.
+/// Each reason is its own, names its subsystem and what went wrong, and fits the status text of a link.
 #[test]
 fn every_reason_says_what_and_where() {
     let of = |make: fn(Axis) -> Trip, word: &'static str| Axis::ALL.map(|axis| (make(axis), word, Some(axis.name())));
@@ -22,7 +21,6 @@ fn every_reason_says_what_and_where() {
         assert!(reason.starts_with("AFBC off: ") && reason.contains(word), "{reason}");
         assert!(place.is_none_or(|place| reason.contains(place)), "{reason}");
         assert!(reason.len() <= 50 && reason.is_ascii(), "{reason}");
-        assert_eq!(trip.to_string(), reason);
     }
     let words: BTreeSet<_> = reasons.iter().map(|(trip, ..)| trip.reason()).collect();
     assert_eq!(words.len(), reasons.len());

@@ -1,13 +1,13 @@
 //! The closed loop over the link.
 
 use super::{Autopilot, Error, MessagePeriods, ReceivedMessages, Station};
-use crate::contender::{Contender, ControllerKind};
-use crate::flight::{Lost, Pilot, Sample, View, World, lockstep};
-use crate::scenario::Scenario;
 use afbc::Profile;
 use afbc_control::{Action, Trace};
 use afbc_link::{Answer, Command};
 use afbc_reader::FileError;
+use afbc_scenario::Scenario;
+use afbc_scenario::contender::{Contender, ControllerKind};
+use afbc_sim::flight::{Lost, Pilot, Sample, View, World, lockstep};
 use afbc_types::{Inputs, Parameters, PerAxis, Rotor, RotorForces, Setpoint};
 use core::ops::ControlFlow;
 use nalgebra::Vector3;

@@ -2,12 +2,12 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::indexing_slicing, reason = "tests")]
 
 use super::*;
-use crate::columns::MOTION;
-use crate::contender::Law;
-use crate::metrics::{Accumulator, Metrics};
-use crate::run::Run;
-use crate::scenario::{Scenario, built_in};
-use crate::trajectory::Trajectory;
+use afbc_scenario::contender::Law;
+use afbc_scenario::trajectory::Trajectory;
+use afbc_scenario::{Scenario, built_in};
+use afbc_sim::columns::MOTION;
+use afbc_sim::metrics::{Accumulator, Metrics};
+use afbc_sim::run::Run;
 use core::ops::ControlFlow;
 use nalgebra::Vector3;
 
@@ -113,7 +113,7 @@ fn the_firmware_flies_on_its_own_estimate() {
     });
     assert_eq!(end.unwrap(), LoopEnd { lost: None, interrupted: false, disarmed: true });
     assert!(off_m > 0.0 && off_m < 0.02, "{off_m} m");
-    scenario.outages = vec![crate::scenario::Outage { start_s: -10.0, end_s: 20.0 }];
+    scenario.outages = vec![afbc_scenario::Outage { start_s: -10.0, end_s: 20.0 }];
     let error = fly(&scenario, &mut Station::new(), &mut Host::new().unwrap(), MessagePeriods::LOCKSTEP, |_| {
         ControlFlow::Continue(())
     });
@@ -184,7 +184,7 @@ fn the_observer_can_break_off() {
 #[test]
 fn a_link_that_stays_down_ends_the_flight() {
     let mut scenario = scenario("hover", 20.0);
-    scenario.outages = vec![crate::scenario::Outage { start_s: 2.0, end_s: 20.0 }];
+    scenario.outages = vec![afbc_scenario::Outage { start_s: 2.0, end_s: 20.0 }];
     let (end, _) = fly_host(&scenario);
     let lost = end.lost.expect("it cannot go on");
     assert!(lost.time_s > 2.0, "{lost:?}");

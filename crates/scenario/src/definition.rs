@@ -72,7 +72,7 @@ pub struct Scenario {
     pub instrument_faults: Vec<InstrumentFault>,
     /// Outages of the link.
     pub outages: Vec<Outage>,
-    /// Whether the controllers fly inside the [flight core](crate::flight::InFlightCore), as on board.
+    /// Whether the controllers fly inside the flight core, as on board.
     pub flight_core: bool,
     /// Seed of all random effects. The same seed gives the same flight.
     pub seed: u64,

@@ -1,8 +1,8 @@
 //! The paper's experiment, Section IV, in each of its readings.
 
+use crate::Scenario;
 use crate::case::{Case, Reading, Uncertainty};
 use crate::contender::{Contender, ControllerKind};
-use crate::scenario::Scenario;
 use crate::trajectory::Trajectory;
 use afbc::Profile;
 use afbc_plant::{

@@ -11,6 +11,7 @@
 //!
 //! The firmware has the paper's vehicle and its own law ([`firmware`]); a scenario with others is refused ([`check`]).
 //! Plant, gusts, true parameters, start and trajectory are the scenario's.
+#![forbid(unsafe_code)]
 
 mod autopilot;
 mod error;

@@ -1,6 +1,6 @@
 //! `[[gust]]`, `[[change]]`, `[[payload]]` and `[[outage]]`: events in flight.
 
-use crate::scenario::definition::Outage;
+use crate::definition::Outage;
 use afbc_plant::{
     Environment, Gust, GustKind, PAYLOAD_AHEAD, PAYLOAD_BELOW, PAYLOAD_LEFT, ParameterChange, Payload, PlantParameter,
 };

@@ -6,7 +6,7 @@ use super::parse;
 use crate::case::Case;
 use crate::contender::{Contender, Law};
 use crate::paper;
-use crate::scenario::{BUILT_IN, Scenario, built_in};
+use crate::{BUILT_IN, Scenario, built_in};
 use afbc::Profile;
 use afbc::adaptive;
 use afbc_peers::pid;
@@ -36,7 +36,7 @@ struct Section {
 }
 
 fn sections() -> Vec<Section> {
-    let page = include_str!("../../../../../docs/scenarios.md");
+    let page = include_str!("../../../../docs/scenarios.md");
     let mut sections = Vec::new();
     for part in page.split("```toml\n").skip(1) {
         let (example, text) = part.split_once("```").unwrap();

@@ -1,8 +1,8 @@
 //! CSV log of a flight in the loop.
 
 use super::Error;
-use crate::columns::MOTION;
-use crate::flight::Sample;
+use afbc_sim::columns::MOTION;
+use afbc_sim::flight::Sample;
 use csv::Writer;
 use std::fs::File;
 use std::path::Path;

@@ -1,6 +1,6 @@
 //! Tracking errors for the terminal.
 
-use crate::metrics::{Metrics, SETTLED_S};
+use afbc_sim::metrics::{Metrics, SETTLED_S};
 use nalgebra::Vector4;
 
 /// Formats the tracking errors over `duration_s` in the loop, next to those of the same flight without a link.

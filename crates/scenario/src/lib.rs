@@ -1,0 +1,19 @@
+//! Scenarios: one vehicle, one trajectory, one environment, the contenders to compare.
+//!
+//! A scenario comes from [`paper`], from a file ([`load`]) or from the [`built_in()`] ones. A [`contender`] is a
+//! control law of the one list of laws, with its gains. Nothing flies here: that is `afbc-sim`.
+#![forbid(unsafe_code)]
+
+mod built_in;
+pub mod case;
+pub mod contender;
+mod definition;
+mod file;
+mod laws;
+pub mod paper;
+mod task;
+pub mod trajectory;
+
+pub use built_in::{BUILT_IN, built_in, similar_built_in};
+pub use definition::{DURATION, Outage, Scenario};
+pub use file::{load, parse, read};
