@@ -67,7 +67,7 @@ pub async fn spawner() -> Spawner {
 
 /// The interrupt lines of the executors, each named after the module whose tasks it takes.
 #[expect(missing_docs, reason = "as above")]
-pub struct Lines<I> {
+pub struct InterruptLines<I> {
     pub control: I,
     pub comms: I,
     pub housekeeping: I,
@@ -79,8 +79,8 @@ pub struct Lines<I> {
 
 /// Starts the executors and sets the time base's priority. To be called once.
 #[expect(unsafe_code, reason = "priorities are set by hand")]
-pub(crate) fn start<I: InterruptNumber>(core: &mut cortex_m::Peripherals, lines: Lines<I>) -> Executors {
-    let Lines { control, comms, housekeeping, sampling, aiding } = lines;
+pub(crate) fn start<I: InterruptNumber>(core: &mut cortex_m::Peripherals, lines: InterruptLines<I>) -> Executors {
+    let InterruptLines { control, comms, housekeeping, sampling, aiding } = lines;
     for (line, dispensable) in [Some(comms), Some(housekeeping), aiding].into_iter().flatten().zip(&DISPENSABLE) {
         dispensable.store(line.number(), Ordering::Relaxed);
     }

@@ -152,7 +152,7 @@ macro_rules! image {
         fn main() -> ! {
             type Line = <$board as $crate::board::Board>::Interrupt;
             let core = cortex_m::Peripherals::take().expect("taken once");
-            let lines = $crate::executors::Lines {
+            let lines = $crate::executors::InterruptLines {
                 control: Line::$control,
                 comms: Line::$comms,
                 housekeeping: Line::$housekeeping,

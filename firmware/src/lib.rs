@@ -47,7 +47,7 @@ use embassy_executor::SendSpawner;
 /// [`image!`] defines all of them.
 pub fn run<B: Board>(
     mut core: cortex_m::Peripherals,
-    lines: executors::Lines<B::Interrupt>,
+    lines: executors::InterruptLines<B::Interrupt>,
     sample: impl FnOnce(SendSpawner, B::Sampler),
     aid: impl FnOnce(SendSpawner, B::Aids),
     control: impl FnOnce(SendSpawner, &'static mut vehicle::Flight, B),

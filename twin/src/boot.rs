@@ -3,7 +3,7 @@
 //!
 //! Models and processor are those of `rigless`, which nobody of this project wrote; the image is the one that is
 //! flashed.
-use crate::check;
+use crate::check::check;
 use afbc_link::{Address, Decoder, Downlink};
 use rigless::chip::uart::Pattern;
 use rigless::edge::Edge;

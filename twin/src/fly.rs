@@ -1,19 +1,20 @@
 //! A flight of the image as flashed, in lockstep with the plant: the instruments' readings at the registers of the
 //! board's sensors, motor commands from its pins, a station at its telemetry UART.
 
-use crate::check;
+use crate::check::check;
 use crate::pins::{BIT_NS, BITS, Frames};
 use crate::wire::Telemetry;
 use crate::world::Transducers;
 use afbc_flight_core::motor::{THROTTLE_MAX, THROTTLE_MIN};
 
 use afbc_link::{Address, Command, Datum, Decoder, Downlink, FRAME_MAX, Height, Sender, Uplink};
+use afbc_scenario::load;
 use afbc_sim::flight::World;
-use afbc_sim::scenario;
 use afbc_types::{ROTORS_MAX, RotorSpeeds};
 use rigless::edge::Edge;
 use rigless::emulator::{AccessKind, Driver, Host, Settled, Start, Stop, run};
 use rigless::image::Image;
+use rigless::machine::flight::Actuator;
 use rigless::machine::matekh743::MatekH743;
 use rigless::session::Session;
 use rigless::time::VirtualNanos;
@@ -65,6 +66,8 @@ struct Flight {
     transducers: Transducers,
     frames: Frames,
     sampling: Sampling,
+    /// When the pins are looked at next [ns].
+    look_ns: Option<u64>,
     throttles: Vec<u16>,
     speed_max_rad_s: f32,
     wire: Telemetry,
@@ -84,7 +87,7 @@ struct Flight {
 
 /// Flies a scenario.
 pub fn fly(image: &Path, file: &Path) -> Result<(), Box<dyn Error>> {
-    let scenario = scenario::load(file)?;
+    let scenario = load(file)?;
     let mut board = Box::new(MatekH743::new()?);
     let wire = Telemetry::default();
     check(rigless::machine::Board::attach_host(&mut *board, LINK, Box::new(wire.clone())), "the link is wired")?;
@@ -93,6 +96,7 @@ pub fn fly(image: &Path, file: &Path) -> Result<(), Box<dyn Error>> {
         transducers: Transducers::new(),
         frames: Frames::new(scenario.rotors.len()),
         sampling: Sampling::Idle,
+        look_ns: None,
         throttles: vec![0; scenario.rotors.len()],
         speed_max_rad_s: 1000.0,
         wire,
@@ -116,8 +120,9 @@ pub fn fly(image: &Path, file: &Path) -> Result<(), Box<dyn Error>> {
     let [unmapped, refused] = [finished.session.unmapped().len(), finished.session.refused().len()];
     let Flight { frames, error, off_m: (sum, count), tilt_rad, now_ms, phase, .. } = finished.driver;
     let off_m = sum / count.max(1) as f64;
-    println!("{:.1} s, {} frames to each motor, hover off by {off_m:.2} m on average, largest tilt {tilt_rad:.2} rad",
-        now_ms as f64 * 1e-3, frames.sent);
+    let (time_s, sent) = (now_ms as f64 * 1e-3, frames.sent);
+    println!("{time_s:.1} s, {sent} frames to each motor");
+    println!("hover off by {off_m:.2} m on average, largest tilt {tilt_rad:.2} rad");
     if let Some(error) = error {
         return Err(error.into());
     }
@@ -128,21 +133,25 @@ pub fn fly(image: &Path, file: &Path) -> Result<(), Box<dyn Error>> {
     check(finished.session.resets().is_empty(), "no reset")
 }
 
+fn has_pulse(pin: &Actuator) -> bool {
+    pin.pulse.is_some_and(|pulse| pulse.width.0 > 0)
+}
+
 impl Driver<MatekH743> for Flight {
     fn on_settled(&mut self, session: &mut Session<MatekH743>, _: &mut dyn Host, settled: Settled) {
-        match (settled, self.sampling) {
-            (Settled::Access { access, value }, _)
+        match settled {
+            Settled::Access { access, value }
                 if (access.kind, access.address, value & 1) == (AccessKind::Write, DMA_S0CR, 1) =>
             {
                 self.sampling = Sampling::Waits(LOOKS);
-                session.pause_at(Some(VirtualNanos(access.virtual_time.0 + LOOK_NS)));
+                self.look_ns = Some(access.virtual_time.0 + LOOK_NS);
             }
-            (Settled::Stop(stop), Sampling::Waits(_) | Sampling::Reads(..)) if session.pause() == Some(stop.at) => {
-                let next = self.sample(session, stop.at.0);
-                session.pause_at(next.map(VirtualNanos));
+            Settled::Stop(stop) if self.look_ns.is_some_and(|look_ns| stop.at.0 >= look_ns) => {
+                self.look_ns = self.sample(session, stop.at.0);
             }
-            _ => {}
+            _ => return,
         }
+        session.pause_at(self.look_ns.map(VirtualNanos));
     }
 
     fn on_stop(&mut self, session: &mut Session<MatekH743>, stop: Stop, _: &mut dyn Host) -> Option<VirtualNanos> {
@@ -170,7 +179,7 @@ impl Flight {
         let pins = outputs.get(FIRST..FIRST + self.throttles.len())?;
         let (first_ns, taken) = match self.sampling {
             Sampling::Idle => return None,
-            Sampling::Waits(_) if pins.iter().any(|pin| pin.pulse.is_some_and(|pulse| pulse.width.0 > 0)) => (now_ns, 0),
+            Sampling::Waits(_) if pins.iter().any(has_pulse) => (now_ns, 0),
             Sampling::Waits(0) => {
                 self.frames.wrong.push(format!("no frame at {now_ns} ns"));
                 self.sampling = Sampling::Idle;
@@ -225,7 +234,16 @@ impl Flight {
         let passed_ms = self.now_ms - self.since_ms;
         let second = passed_ms % 1000 == 999;
         if self.now_ms % 5000 == 0 {
-            println!("{:7.3} s: {:?}, {x:.2} {y:.2} {z:.2} m", self.now_ms as f64 * 1e-3, self.phase);
+            let [east, north, up] = self.transducers.fix_m();
+            println!(
+                "{:7.3} s: {:?}, {x:.2} {y:.2} {z:.2} m; fix off by {:.2} {:.2} {:.2} m, height by {:.2} m",
+                self.now_ms as f64 * 1e-3,
+                self.phase,
+                east - x,
+                north - y,
+                up - z,
+                self.transducers.height_m() - z
+            );
         }
         let next = match self.phase {
             Phase::Wakes => {

@@ -4,12 +4,12 @@
 #![forbid(unsafe_code)]
 
 mod boot;
+mod check;
 mod fly;
 mod pins;
 mod wire;
 mod world;
 
-use std::error::Error;
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -31,8 +31,4 @@ fn main() -> ExitCode {
             ExitCode::FAILURE
         }
     }
-}
-
-fn check(holds: bool, what: &str) -> Result<(), Box<dyn Error>> {
-    if holds { Ok(()) } else { Err(format!("failed: {what}").into()) }
 }

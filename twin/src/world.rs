@@ -17,6 +17,8 @@ pub struct Transducers {
     signals: Signals,
     /// Metres per ten-millionth of a degree to the north and to the east.
     scale: [f64; 2],
+    fix_m: [f64; 3],
+    height_m: f64,
 }
 
 impl Transducers {
@@ -24,7 +26,17 @@ impl Transducers {
         let [latitude, longitude, altitude] = PLACE;
         let origin = Origin::new(latitude, longitude, altitude).expect("a place");
         let step = origin.local(latitude + 1e-3, longitude + 1e-3, altitude) * 1e-4;
-        Transducers { signals: AT_REST, scale: [step.x.into(), (-step.y).into()] }
+        Transducers { signals: AT_REST, scale: [step.x.into(), (-step.y).into()], fix_m: [0.0; 3], height_m: 0.0 }
+    }
+
+    /// Returns the newest fix, in the world's frame [m].
+    pub fn fix_m(&self) -> [f64; 3] {
+        self.fix_m
+    }
+
+    /// Returns the newest height of the barometer [m].
+    pub fn height_m(&self) -> f64 {
+        self.height_m
     }
 
     /// Returns what the transducers feel when the instruments read this.
@@ -37,6 +49,7 @@ impl Transducers {
         for aid in readings.aids.iter().flatten() {
             match aid.value {
                 Measurement::Height { height_m, .. } => {
+                    self.height_m = height_m.into();
                     let height_m = f64::from(height_m) + PLACE[2];
                     let pressure_pa = SEA_LEVEL_PA * (1.0 - height_m / 44_330.77).powf(1.0 / 0.190_263_2);
                     self.signals.pressure = pressure_pa.round() as u32;
@@ -46,6 +59,7 @@ impl Transducers {
                     self.signals.magnetic_field = frd(field).map(|field| (field * 1e3).round() as i32);
                 }
                 Measurement::Gnss { position_m, velocity_m_s, .. } => {
+                    self.fix_m = position_m.cast::<f64>().into();
                     let [north, down] = [position_m.x, -position_m.z].map(f64::from);
                     let east = f64::from(-position_m.y);
                     let [latitude, longitude, altitude] = PLACE;

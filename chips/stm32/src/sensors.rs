@@ -1,6 +1,6 @@
 //! Buses and clock of sensors.
 
-use afbc_drivers::{Driver, PartTiming, Registers, SensorFault, SensorPart};
+use afbc_drivers::{Driver, PartFault, PartTiming, Registers, SensorPart};
 use afbc_types::Stamped;
 use embassy_futures::select::{Either, select};
 use embassy_stm32::exti::ExtiInput;
@@ -61,7 +61,7 @@ pub async fn run<P: SensorPart, B: Registers, T: PartTiming>(
     mut driver: Driver<P, B, T>,
     mut take: impl FnMut(Stamped<P::Reading>),
 ) {
-    let mut last: Option<SensorFault> = None;
+    let mut last: Option<PartFault> = None;
     loop {
         match driver.reading().await {
             Ok(reading) => {

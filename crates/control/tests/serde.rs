@@ -1,5 +1,5 @@
 //! Feature `serde`: values survive a round trip, and their format is what files and other programs rely on.
-#![allow(clippy::unwrap_used, missing_docs, reason = "tests")]
+#![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs, reason = "tests")]
 
 use afbc_control::{Action, Errors, Health, Mixer, Settings, Trace};
 use afbc_types::{Axis, Inputs, Parameters, PerAxis, Setpoint, State};

@@ -10,7 +10,7 @@
 
 use crate::bus::SpiFormat;
 use crate::mpu::{ACCEL_XOUT_H, I2C_IF_DIS, LENGTH, Mpu9250, USER_CTRL};
-use crate::part::{SensorFault, SensorPart, Step};
+use crate::part::{PartFault, SensorPart, Step};
 use crate::reading::{InertialReading, MagneticReading, little};
 use nalgebra::Vector3;
 
@@ -18,7 +18,7 @@ use nalgebra::Vector3;
 #[derive(Clone, Copy, Debug)]
 pub struct Mpu9250Ak8963 {
     /// Factors of the magnetometer's axes, or why there are none.
-    adjustment: Result<Vector3<f32>, SensorFault>,
+    adjustment: Result<Vector3<f32>, PartFault>,
     last: [u8; MAGNETIC_LENGTH],
     /// Readings since the last measurement of the field.
     age: u32,
@@ -30,7 +30,7 @@ pub struct Mpu9250Reading {
     /// Rates, specific force and temperature.
     pub inertial: InertialReading,
     /// Field along the axes of the IMU, if it was measured anew, or what is wrong with the magnetometer.
-    pub magnetic: Result<Option<MagneticReading>, SensorFault>,
+    pub magnetic: Result<Option<MagneticReading>, PartFault>,
 }
 
 // Registers of the MPU-9250.
@@ -141,7 +141,7 @@ const MAGNETOMETER: &[Step] = &[
 
 impl Default for Mpu9250Ak8963 {
     fn default() -> Self {
-        Mpu9250Ak8963 { adjustment: Err(SensorFault::Calibration), last: [0; MAGNETIC_LENGTH], age: 0 }
+        Mpu9250Ak8963 { adjustment: Err(PartFault::Calibration), last: [0; MAGNETIC_LENGTH], age: 0 }
     }
 }
 
@@ -154,13 +154,13 @@ impl SensorPart for Mpu9250Ak8963 {
     const SETUP: &'static [Step] = &join::<{ Mpu9250::SETUP.len() + MAGNETOMETER.len() }>(Mpu9250::SETUP, MAGNETOMETER);
     const CYCLE: &'static [Step] = &[Step::Ready(2_000), Step::Read(ACCEL_XOUT_H, LENGTH + MAGNETIC_LENGTH)];
 
-    fn take(&mut self, register: u8, answer: &[u8]) -> Result<Option<Mpu9250Reading>, SensorFault> {
-        let (inertial, external) = answer.split_at_checked(LENGTH).ok_or(SensorFault::Bus)?;
+    fn take(&mut self, register: u8, answer: &[u8]) -> Result<Option<Mpu9250Reading>, PartFault> {
+        let (inertial, external) = answer.split_at_checked(LENGTH).ok_or(PartFault::Bus)?;
         if let &[x, y, z, identity] = external {
             (self.adjustment, self.age) = (adjustment([x, y, z], identity), 0);
             return Ok(None);
         }
-        let external = external.try_into().map_err(|_| SensorFault::Bus)?;
+        let external = external.try_into().map_err(|_| PartFault::Bus)?;
         let inertial = Mpu9250 {}.take(register, inertial)?;
         Ok(inertial.map(|inertial| Mpu9250Reading { inertial, magnetic: self.magnetic(external) }))
     }
@@ -168,21 +168,21 @@ impl SensorPart for Mpu9250Ak8963 {
 
 impl Mpu9250Ak8963 {
     /// Takes ST1, the field and ST2, as they were read for the last time.
-    fn magnetic(&mut self, answer: [u8; MAGNETIC_LENGTH]) -> Result<Option<MagneticReading>, SensorFault> {
+    fn magnetic(&mut self, answer: [u8; MAGNETIC_LENGTH]) -> Result<Option<MagneticReading>, PartFault> {
         let adjustment = self.adjustment?;
         let [st1, field @ .., st2] = answer;
         // An answer stands until the next one; noise makes them differ.
         let is_new = st1 & DRDY != 0 && answer != self.last;
         (self.last, self.age) = (answer, if is_new { 0 } else { self.age.saturating_add(1) });
         if !is_new {
-            return if self.age < AGE_MAX { Ok(None) } else { Err(SensorFault::Late) };
+            return if self.age < AGE_MAX { Ok(None) } else { Err(PartFault::Late) };
         }
         if st2 & BITM == 0 {
-            return Err(SensorFault::Register(CNTL1));
+            return Err(PartFault::Register(CNTL1));
         }
         let field = little(field);
         if st2 & HOFL != 0 || field.amax() > LSB_MAX {
-            return Err(SensorFault::Range);
+            return Err(PartFault::Range);
         }
         let field = field.component_mul(&adjustment) * UT_PER_LSB;
         // Its x is the IMU's y, its y the IMU's x, and its z points the other way.
@@ -191,14 +191,14 @@ impl Mpu9250Ak8963 {
 }
 
 /// Returns the factors of the axes.
-fn adjustment(asa: [u8; 3], identity: u8) -> Result<Vector3<f32>, SensorFault> {
+fn adjustment(asa: [u8; 3], identity: u8) -> Result<Vector3<f32>, PartFault> {
     match identity {
         IDENTITY => (),
-        0x00 | 0xFF => return Err(SensorFault::Silent),
-        _ => return Err(SensorFault::Identity(identity)),
+        0x00 | 0xFF => return Err(PartFault::Silent),
+        _ => return Err(PartFault::Identity(identity)),
     }
     if asa.iter().any(|&asa| matches!(asa, 0x00 | 0xFF)) {
-        return Err(SensorFault::Calibration);
+        return Err(PartFault::Calibration);
     }
     Ok(Vector3::from(asa).map(|asa| (f32::from(asa) - 128.0) * 0.5 / 128.0 + 1.0))
 }

@@ -11,7 +11,7 @@
 //! The axis x of the gyroscope senses a little of z; the part tells how much (GYR_CAS), and the reading is corrected.
 
 use crate::bus::SpiFormat;
-use crate::part::{SensorFault, SensorPart, Step};
+use crate::part::{PartFault, SensorPart, Step};
 use crate::reading::{InertialReading, little};
 use bmi2::config::BMI270_CONFIG_FILE;
 
@@ -84,19 +84,19 @@ impl SensorPart for Bmi270 {
     ];
     const CYCLE: &'static [Step] = &[Step::Ready(1_250), Step::Read(DATA_8, 12), Step::Read(INTERNAL_STATUS, 3)];
 
-    fn take(&mut self, register: u8, answer: &[u8]) -> Result<Option<InertialReading>, SensorFault> {
+    fn take(&mut self, register: u8, answer: &[u8]) -> Result<Option<InertialReading>, PartFault> {
         match (register, answer) {
             // Seven bits with a sign, in 1/512.
             (GYR_CAS, &[cas]) => self.zx = f32::from((cas << 1).cast_signed() >> 1) / 512.0,
             (INTERNAL_STATUS, &[status, t0, t1]) => {
                 if status & MESSAGE != INIT_OK {
-                    return Err(SensorFault::Register(INTERNAL_STATUS));
+                    return Err(PartFault::Register(INTERNAL_STATUS));
                 }
                 let temperature = i16::from_le_bytes([t0, t1]);
                 self.temperature_c = (temperature != INVALID).then(|| f32::from(temperature) / 512.0 + 23.0);
             }
             (DATA_8, &[ref force @ .., r0, r1, r2, r3, r4, r5]) => {
-                let force = little(force.try_into().map_err(|_| SensorFault::Bus)?);
+                let force = little(force.try_into().map_err(|_| PartFault::Bus)?);
                 let mut rates = little([r0, r1, r2, r3, r4, r5]);
                 rates.x = (rates.x - self.zx * rates.z).clamp(-32768.0, 32767.0);
                 return Ok(self.temperature_c.map(|temperature_c| InertialReading {
@@ -105,7 +105,7 @@ impl SensorPart for Bmi270 {
                     temperature_c,
                 }));
             }
-            _ => return Err(SensorFault::Bus),
+            _ => return Err(PartFault::Bus),
         }
         Ok(None)
     }

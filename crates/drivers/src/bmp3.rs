@@ -5,7 +5,7 @@
 //! flags are. The coefficients have a CRC-8 in the register before them, which the maker's self-test checks.
 
 use crate::bus::SpiFormat;
-use crate::part::{SensorFault, SensorPart, Step};
+use crate::part::{PartFault, SensorPart, Step};
 use crate::reading::{PressureReading, in_range};
 
 /// BMP388.
@@ -75,18 +75,18 @@ impl<const IDENTITY: u8> SensorPart for Bmp3<IDENTITY> {
     ];
     const CYCLE: &'static [Step] = &[Step::Wait(17_000), Step::Await(STATUS, DRDY, DRDY, 23), Step::Read(DATA_0, 6)];
 
-    fn take(&mut self, register: u8, answer: &[u8]) -> Result<Option<PressureReading>, SensorFault> {
+    fn take(&mut self, register: u8, answer: &[u8]) -> Result<Option<PressureReading>, PartFault> {
         if register == CALIBRATION {
             self.coefficients = None;
-            let (&check, trim) = answer.split_first().ok_or(SensorFault::Bus)?;
+            let (&check, trim) = answer.split_first().ok_or(PartFault::Bus)?;
             if crc(trim) != check {
-                return Err(SensorFault::Calibration);
+                return Err(PartFault::Calibration);
             }
-            self.coefficients = Some(Coefficients::new(trim.try_into().map_err(|_| SensorFault::Bus)?));
+            self.coefficients = Some(Coefficients::new(trim.try_into().map_err(|_| PartFault::Bus)?));
             return Ok(None);
         }
-        let &[p0, p1, p2, t0, t1, t2] = answer else { return Err(SensorFault::Bus) };
-        let coefficients = self.coefficients.ok_or(SensorFault::Calibration)?;
+        let &[p0, p1, p2, t0, t1, t2] = answer else { return Err(PartFault::Bus) };
+        let coefficients = self.coefficients.ok_or(PartFault::Calibration)?;
         let [pressure, temperature] = [[p0, p1, p2, 0], [t0, t1, t2, 0]].map(|raw| u32::from_le_bytes(raw) as f32);
         in_range(coefficients.compensate(pressure, temperature), RANGE_PA, RANGE_C)
     }

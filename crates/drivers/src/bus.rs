@@ -1,9 +1,10 @@
 //! Registers behind SPI or I2C.
 
-use crate::part::READ_MAX;
 use embedded_hal_async::i2c::I2c;
 use embedded_hal_async::spi::{Operation, SpiDevice};
 
+/// Longest answer to a [`Step::Read`](crate::Step::Read) \[bytes\].
+pub const READ_MAX: usize = 32;
 /// Longest block that I2C writes \[bytes\].
 const BLOCK_MAX: usize = 31;
 

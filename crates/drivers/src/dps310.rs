@@ -11,7 +11,7 @@
 //! | temperature fuses | enabled by five writes, as Infineon's library does | |
 
 use crate::bus::SpiFormat;
-use crate::part::{SensorFault, SensorPart, Step};
+use crate::part::{PartFault, SensorPart, Step};
 use crate::reading::{PressureReading, in_range};
 
 /// DPS310.
@@ -118,15 +118,15 @@ impl<const IS_SPL06: bool> SensorPart for Dps3xx<IS_SPL06> {
     const CYCLE: &'static [Step] =
         &[Step::Wait(28_000), Step::Await(MEAS_CFG, PRS_RDY, PRS_RDY, 35), Step::Read(PSR_B2, 6)];
 
-    fn take(&mut self, register: u8, answer: &[u8]) -> Result<Option<PressureReading>, SensorFault> {
+    fn take(&mut self, register: u8, answer: &[u8]) -> Result<Option<PressureReading>, PartFault> {
         if register == COEF {
-            let answer = answer.try_into().map_err(|_| SensorFault::Bus)?;
+            let answer = answer.try_into().map_err(|_| PartFault::Bus)?;
             self.coefficients = (self.raw == answer).then(|| Coefficients::new(answer));
             self.raw = answer;
             return Ok(None);
         }
-        let &[p2, p1, p0, t2, t1, t0] = answer else { return Err(SensorFault::Bus) };
-        let coefficients = self.coefficients.ok_or(SensorFault::Calibration)?;
+        let &[p2, p1, p0, t2, t1, t0] = answer else { return Err(PartFault::Bus) };
+        let coefficients = self.coefficients.ok_or(PartFault::Calibration)?;
         in_range(coefficients.compensate(signed([p2, p1, p0, 0], 24), signed([t2, t1, t0, 0], 24)), RANGE_PA, RANGE_C)
     }
 }

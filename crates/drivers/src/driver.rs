@@ -1,7 +1,7 @@
 //! Runs the scripts of a part, watches it, and sets it up again after faults.
 
-use crate::bus::{BusError, Registers};
-use crate::part::{READ_MAX, SensorFault, SensorPart, Step};
+use crate::bus::{BusError, READ_MAX, Registers};
+use crate::part::{PartFault, SensorPart, Step};
 use afbc_types::Stamped;
 use embassy_futures::select::{Either, select};
 
@@ -72,7 +72,7 @@ impl<P: SensorPart, B: Registers, T: PartTiming> Driver<P, B, T> {
     ///
     /// # Errors
     /// The fault that this cycle, or the set-up, met. Call it again.
-    pub async fn reading(&mut self) -> Result<Stamped<P::Reading>, SensorFault> {
+    pub async fn reading(&mut self) -> Result<Stamped<P::Reading>, PartFault> {
         let result = self.attempt().await;
         match &result {
             Ok(_) => self.faults = 0,
@@ -84,7 +84,7 @@ impl<P: SensorPart, B: Registers, T: PartTiming> Driver<P, B, T> {
         result
     }
 
-    async fn attempt(&mut self) -> Result<Stamped<P::Reading>, SensorFault> {
+    async fn attempt(&mut self) -> Result<Stamped<P::Reading>, PartFault> {
         if !self.is_up {
             if self.faults > 0 {
                 self.timing.wait(PAUSE_US).await;
@@ -96,11 +96,11 @@ impl<P: SensorPart, B: Registers, T: PartTiming> Driver<P, B, T> {
                 return Ok(reading);
             }
         }
-        Err(SensorFault::Late)
+        Err(PartFault::Late)
     }
 
     /// Runs the set-up, and reads back what was set.
-    async fn set_up(&mut self) -> Result<(), SensorFault> {
+    async fn set_up(&mut self) -> Result<(), PartFault> {
         for step in P::SETUP {
             self.step(step).await?;
         }
@@ -112,7 +112,7 @@ impl<P: SensorPart, B: Registers, T: PartTiming> Driver<P, B, T> {
         Ok(())
     }
 
-    async fn cycle(&mut self) -> Result<Option<Stamped<P::Reading>>, SensorFault> {
+    async fn cycle(&mut self) -> Result<Option<Stamped<P::Reading>>, PartFault> {
         self.cycles += 1;
         if self.cycles >= CYCLES_A_LOOK {
             let at = (self.looks + 1) % P::SETUP.len().max(1);
@@ -128,7 +128,7 @@ impl<P: SensorPart, B: Registers, T: PartTiming> Driver<P, B, T> {
     }
 
     /// Reads back the register that a step of the set-up set, if it did.
-    async fn look(&mut self, at: usize) -> Result<(), SensorFault> {
+    async fn look(&mut self, at: usize) -> Result<(), PartFault> {
         let Some(step) = P::SETUP.get(at) else { return Ok(()) };
         let Some(register) = register_set_by(step) else { return Ok(()) };
         // A script may set a register twice.
@@ -136,11 +136,11 @@ impl<P: SensorPart, B: Registers, T: PartTiming> Driver<P, B, T> {
             return Ok(());
         }
         let value = self.value(step).await?;
-        if self.byte(register).await? == value { Ok(()) } else { Err(SensorFault::Register(register)) }
+        if self.byte(register).await? == value { Ok(()) } else { Err(PartFault::Register(register)) }
     }
 
     /// Returns the value that a step of the set-up gives its register.
-    async fn value(&mut self, step: &Step) -> Result<u8, SensorFault> {
+    async fn value(&mut self, step: &Step) -> Result<u8, PartFault> {
         Ok(match *step {
             Step::Set(_, value) => value,
             Step::SetLike(_, value, mask, other) => value | self.byte(other).await? & mask,
@@ -148,14 +148,14 @@ impl<P: SensorPart, B: Registers, T: PartTiming> Driver<P, B, T> {
         })
     }
 
-    async fn step(&mut self, step: &Step) -> Result<Option<Stamped<P::Reading>>, SensorFault> {
+    async fn step(&mut self, step: &Step) -> Result<Option<Stamped<P::Reading>>, PartFault> {
         match *step {
             Step::Identify(register, identities) => {
                 let identity = self.byte(register).await?;
                 match identity {
                     _ if identities.contains(&identity) => (),
-                    0x00 | 0xFF => return Err(SensorFault::Silent),
-                    _ => return Err(SensorFault::Identity(identity)),
+                    0x00 | 0xFF => return Err(PartFault::Silent),
+                    _ => return Err(PartFault::Identity(identity)),
                 }
             }
             Step::Set(register, value) | Step::Write(register, value) => self.write(register, &[value]).await?,
@@ -168,46 +168,46 @@ impl<P: SensorPart, B: Registers, T: PartTiming> Driver<P, B, T> {
             Step::Await(register, mask, value, ms) => {
                 let mut looks = ms;
                 while self.byte(register).await? & mask != value {
-                    looks = looks.checked_sub(1).ok_or(SensorFault::Late)?;
+                    looks = looks.checked_sub(1).ok_or(PartFault::Late)?;
                     self.timing.wait(AWAIT_US).await;
                 }
             }
             Step::Wait(us) => self.timing.wait(us).await,
             Step::Ready(us) => {
                 if !self.timing.ready(us).await {
-                    return Err(SensorFault::Late);
+                    return Err(PartFault::Late);
                 }
             }
         }
         Ok(None)
     }
 
-    async fn write(&mut self, register: u8, bytes: &[u8]) -> Result<(), SensorFault> {
+    async fn write(&mut self, register: u8, bytes: &[u8]) -> Result<(), PartFault> {
         transfer(&self.timing, bytes.len(), self.bus.write(register, bytes)).await
     }
 
-    async fn byte(&mut self, register: u8) -> Result<u8, SensorFault> {
+    async fn byte(&mut self, register: u8) -> Result<u8, PartFault> {
         let mut answer = [0];
         transfer(&self.timing, answer.len(), self.bus.read(register, &mut answer)).await?;
         let [byte] = answer;
         Ok(byte)
     }
 
-    async fn read(&mut self, register: u8, length: usize) -> Result<Option<Stamped<P::Reading>>, SensorFault> {
+    async fn read(&mut self, register: u8, length: usize) -> Result<Option<Stamped<P::Reading>>, PartFault> {
         let at_us = self.timing.now_us();
         let mut answer = [0; READ_MAX];
-        let answer = answer.get_mut(..length).ok_or(SensorFault::Bus)?;
+        let answer = answer.get_mut(..length).ok_or(PartFault::Bus)?;
         transfer(&self.timing, length, self.bus.read(register, answer)).await?;
         if length >= SILENCE_LENGTH && [0x00, 0xFF].iter().any(|idle| answer.iter().all(|byte| byte == idle)) {
-            return Err(SensorFault::Silent);
+            return Err(PartFault::Silent);
         }
         let reading = self.part.take(register, answer)?;
         if reading.is_some() {
-            let last = self.last.get_mut(..length).ok_or(SensorFault::Bus)?;
+            let last = self.last.get_mut(..length).ok_or(PartFault::Bus)?;
             self.equals = if last == answer { self.equals.saturating_add(1) } else { 0 };
             last.copy_from_slice(answer);
             if self.equals >= P::STUCK_AFTER {
-                return Err(SensorFault::Stuck);
+                return Err(PartFault::Stuck);
             }
         }
         Ok(reading.map(|value| Stamped { value, at_us }))
@@ -227,16 +227,16 @@ async fn transfer(
     timing: &impl PartTiming,
     length: usize,
     transfer: impl Future<Output = Result<(), BusError>>,
-) -> Result<(), SensorFault> {
+) -> Result<(), PartFault> {
     let limit_us = TRANSFER_US.saturating_add(BYTE_US.saturating_mul(u32::try_from(length).unwrap_or(u32::MAX)));
     match select(transfer, timing.wait(limit_us)).await {
         Either::First(result) => Ok(result?),
-        Either::Second(()) => Err(SensorFault::Bus),
+        Either::Second(()) => Err(PartFault::Bus),
     }
 }
 
-impl From<BusError> for SensorFault {
+impl From<BusError> for PartFault {
     fn from(_: BusError) -> Self {
-        SensorFault::Bus
+        PartFault::Bus
     }
 }

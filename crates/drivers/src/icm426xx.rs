@@ -5,7 +5,7 @@
 //! 1 kHz; one that is read without it, by the board's clock, at 4 kHz, so that a reading is never older than 0.25 ms.
 
 use crate::bus::SpiFormat;
-use crate::part::{SensorFault, SensorPart, Step};
+use crate::part::{PartFault, SensorPart, Step};
 use crate::reading::{InertialReading, big};
 
 /// ICM-42688-P.
@@ -62,9 +62,9 @@ impl<const IDENTITY: u8, const POLLED: bool> SensorPart for Icm426xx<IDENTITY, P
     ];
     const CYCLE: &'static [Step] = &[Step::Ready(2_000), Step::Read(TEMP_DATA1, LENGTH)];
 
-    fn take(&mut self, _: u8, answer: &[u8]) -> Result<Option<InertialReading>, SensorFault> {
-        let &[t1, t0, ref force @ .., r5, r4, r3, r2, r1, r0] = answer else { return Err(SensorFault::Bus) };
-        let force = big(force.try_into().map_err(|_| SensorFault::Bus)?);
+    fn take(&mut self, _: u8, answer: &[u8]) -> Result<Option<InertialReading>, PartFault> {
+        let &[t1, t0, ref force @ .., r5, r4, r3, r2, r1, r0] = answer else { return Err(PartFault::Bus) };
+        let force = big(force.try_into().map_err(|_| PartFault::Bus)?);
         let rates = big([r5, r4, r3, r2, r1, r0]);
         if force.iter().chain(&rates).any(|&axis| axis == INVALID) {
             return Ok(None);

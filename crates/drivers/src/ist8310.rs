@@ -6,7 +6,7 @@
 //! alone: a calibration of the compass covers it.
 
 use crate::bus::SpiFormat;
-use crate::part::{SensorFault, SensorPart, Step};
+use crate::part::{PartFault, SensorPart, Step};
 use crate::reading::{MagneticReading, little};
 use nalgebra::Vector3;
 
@@ -61,11 +61,11 @@ impl SensorPart for Ist8310 {
         Step::Read(DATAXL, 6),
     ];
 
-    fn take(&mut self, _: u8, answer: &[u8]) -> Result<Option<MagneticReading>, SensorFault> {
-        let field_ut = little(answer.try_into().map_err(|_| SensorFault::Bus)?) * UT_PER_LSB;
+    fn take(&mut self, _: u8, answer: &[u8]) -> Result<Option<MagneticReading>, PartFault> {
+        let field_ut = little(answer.try_into().map_err(|_| PartFault::Bus)?) * UT_PER_LSB;
         let field_ut = field_ut.component_mul(&Vector3::new(1.0, 1.0, -1.0));
         if field_ut.abs().iter().zip(&RANGE_UT).any(|(ut, max_ut)| ut > max_ut) {
-            return Err(SensorFault::Range);
+            return Err(PartFault::Range);
         }
         Ok(Some(MagneticReading { field_ut }))
     }

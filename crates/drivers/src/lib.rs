@@ -1,8 +1,8 @@
 //! Drivers of the sensors that flight controllers have.
 //!
 //! A [`SensorPart`] is data and arithmetic: the scripts that set it up and read it, as [`Step`]s on its registers, and
-//! what the answers mean. A [`Driver`] runs the scripts over any `embedded-hal-async` bus ([`SpiRegisters`], [`I2cRegisters`]),
-//! stamps each reading with the time of the part's interrupt, and watches the part:
+//! what the answers mean. A [`Driver`] runs the scripts over any `embedded-hal-async` bus ([`SpiRegisters`],
+//! [`I2cRegisters`]), stamps each reading with the time of the part's interrupt, and watches the part:
 //!
 //! | fault | found by | then |
 //! |---|---|---|
@@ -42,7 +42,7 @@ mod part;
 pub mod qmc5883l;
 mod reading;
 
-pub use bus::{BusError, I2cRegisters, Registers, SpiFormat, SpiRegisters};
+pub use bus::{BusError, I2cRegisters, READ_MAX, Registers, SpiFormat, SpiRegisters};
 pub use driver::{Driver, FAULTS_MAX, PAUSE_US, PartTiming};
-pub use part::{READ_MAX, SensorFault, SensorPart, Step};
+pub use part::{PartFault, SensorPart, Step};
 pub use reading::{FixReading, InertialReading, MagneticReading, PressureReading};

@@ -1,10 +1,10 @@
 //! ST LIS3MDL, by SPI or I2C (DS9463).
 //!
 //! +-4 gauss (400 uT) at 80 Hz in ultra-high-performance mode, the quietest. Its temperature is not used, nor is DRDY:
-//! the flag of its register is. A field beyond the range is a fault ([`SensorFault::Range`]).
+//! the flag of its register is. A field beyond the range is a fault ([`PartFault::Range`]).
 
 use crate::bus::SpiFormat;
-use crate::part::{SensorFault, SensorPart, Step};
+use crate::part::{PartFault, SensorPart, Step};
 use crate::reading::{MagneticReading, little};
 
 /// The part.
@@ -46,10 +46,10 @@ impl SensorPart for Lis3mdl {
     const CYCLE: &'static [Step] =
         &[Step::Wait(10_000), Step::Await(STATUS_REG, ZYXDA, ZYXDA, 15), Step::Read(OUT_X_L | INCREMENT, 6)];
 
-    fn take(&mut self, _: u8, answer: &[u8]) -> Result<Option<MagneticReading>, SensorFault> {
-        let field_ut = little(answer.try_into().map_err(|_| SensorFault::Bus)?) * UT_PER_LSB;
+    fn take(&mut self, _: u8, answer: &[u8]) -> Result<Option<MagneticReading>, PartFault> {
+        let field_ut = little(answer.try_into().map_err(|_| PartFault::Bus)?) * UT_PER_LSB;
         if field_ut.amax() > RANGE_UT {
-            return Err(SensorFault::Range);
+            return Err(PartFault::Range);
         }
         Ok(Some(MagneticReading { field_ut }))
     }

@@ -19,7 +19,7 @@
 //! ICM-20602 in I2C_IF. Early MPU-6000 (revision C, of 2011) read half of the force and are not told from others.
 
 use crate::bus::SpiFormat;
-use crate::part::{SensorFault, SensorPart, Step};
+use crate::part::{PartFault, SensorPart, Step};
 use crate::reading::{InertialReading, big};
 
 /// MPU-6000.
@@ -126,9 +126,9 @@ impl<const IDENTITY: u8> SensorPart for Mpu<IDENTITY> {
     ];
     const CYCLE: &'static [Step] = &[Step::Ready(2_000), Step::Read(ACCEL_XOUT_H, LENGTH)];
 
-    fn take(&mut self, _: u8, answer: &[u8]) -> Result<Option<InertialReading>, SensorFault> {
-        let &[ref force @ .., t1, t0, r5, r4, r3, r2, r1, r0] = answer else { return Err(SensorFault::Bus) };
-        let force = big(force.try_into().map_err(|_| SensorFault::Bus)?);
+    fn take(&mut self, _: u8, answer: &[u8]) -> Result<Option<InertialReading>, PartFault> {
+        let &[ref force @ .., t1, t0, r5, r4, r3, r2, r1, r0] = answer else { return Err(PartFault::Bus) };
+        let force = big(force.try_into().map_err(|_| PartFault::Bus)?);
         let (lsb_per_k, zero_c) = Self::THERMOMETER;
         Ok(Some(InertialReading {
             rates_rad_s: big([r5, r4, r3, r2, r1, r0]) * RAD_S_PER_LSB,

@@ -6,7 +6,7 @@
 //! reads differently. A MS5607 has the same commands, but reads a quite different pressure.
 
 use crate::bus::SpiFormat;
-use crate::part::{SensorFault, SensorPart, Step};
+use crate::part::{PartFault, SensorPart, Step};
 use crate::reading::{PressureReading, in_range};
 
 /// The part.
@@ -61,24 +61,24 @@ impl SensorPart for Ms5611 {
         Step::Read(ADC_READ, 3),
     ];
 
-    fn take(&mut self, command: u8, answer: &[u8]) -> Result<Option<PressureReading>, SensorFault> {
+    fn take(&mut self, command: u8, answer: &[u8]) -> Result<Option<PressureReading>, PartFault> {
         match *answer {
             [high, low] => self.take_prom(command, u16::from_be_bytes([high, low])).map(|()| None),
             [high, middle, low] => self.take_adc(i64::from(u32::from_be_bytes([0, high, middle, low]))),
-            _ => Err(SensorFault::Bus),
+            _ => Err(PartFault::Bus),
         }
     }
 }
 
 impl Ms5611 {
-    fn take_prom(&mut self, command: u8, value: u16) -> Result<(), SensorFault> {
+    fn take_prom(&mut self, command: u8, value: u16) -> Result<(), PartFault> {
         self.d2 = None;
         let at = usize::from(command.wrapping_sub(PROM_READ) / 2);
-        let word = self.prom.get_mut(at).ok_or(SensorFault::Bus)?;
+        let word = self.prom.get_mut(at).ok_or(PartFault::Bus)?;
         let is_known = self.coefficients.is_some();
         match command {
             PROM_READ_LAST if is_known && *word == value => return Ok(()),
-            PROM_READ_LAST if is_known => return Err(SensorFault::Calibration),
+            PROM_READ_LAST if is_known => return Err(PartFault::Calibration),
             PROM_READ => self.coefficients = None, // set up again
             _ => (),
         }
@@ -89,11 +89,11 @@ impl Ms5611 {
         Ok(())
     }
 
-    fn take_adc(&mut self, value: i64) -> Result<Option<PressureReading>, SensorFault> {
-        let coefficients = self.coefficients.ok_or(SensorFault::Calibration)?;
+    fn take_adc(&mut self, value: i64) -> Result<Option<PressureReading>, PartFault> {
+        let coefficients = self.coefficients.ok_or(PartFault::Calibration)?;
         // What an interrupted or missing conversion gives.
         if value == 0 {
-            return Err(SensorFault::Silent);
+            return Err(PartFault::Silent);
         }
         let Some(d2) = self.d2.take() else {
             self.d2 = Some(value);
@@ -104,10 +104,10 @@ impl Ms5611 {
 }
 
 /// Returns C1 to C6 of a sound PROM.
-fn coefficients(prom: [u16; 8]) -> Result<[i64; 6], SensorFault> {
+fn coefficients(prom: [u16; 8]) -> Result<[i64; 6], PartFault> {
     let [first, c1, c2, c3, c4, c5, c6, last] = prom;
     if prom.iter().all(|&word| word == 0) || prom.iter().all(|&word| word == 0xFFFF) {
-        return Err(SensorFault::Silent);
+        return Err(PartFault::Silent);
     }
     let mut remainder = 0;
     for byte in [first, c1, c2, c3, c4, c5, c6, last & 0xFF00].into_iter().flat_map(u16::to_be_bytes) {
@@ -116,7 +116,7 @@ fn coefficients(prom: [u16; 8]) -> Result<[i64; 6], SensorFault> {
         });
     }
     if remainder >> 12 != last & 0xF || [c1, c2, c3, c4, c5, c6].contains(&0) {
-        return Err(SensorFault::Calibration);
+        return Err(PartFault::Calibration);
     }
     Ok([c1, c2, c3, c4, c5, c6].map(i64::from))
 }

@@ -3,9 +3,6 @@
 use crate::bus::SpiFormat;
 use core::fmt;
 
-/// Longest answer to a [`Step::Read`] \[bytes\].
-pub const READ_MAX: usize = 32;
-
 /// A step of a script.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Step {
@@ -21,8 +18,8 @@ pub enum Step {
     Write(u8, u8),
     /// Writes bytes from a register on, in one transfer; none are a command.
     WriteAll(u8, &'static [u8]),
-    /// Reads so many bytes from a register on, at most [`READ_MAX`], for [`SensorPart::take`]. Three and more whose bits
-    /// are all equal are no answer; one or two may well be.
+    /// Reads so many bytes from a register on, at most [`READ_MAX`](crate::READ_MAX), for [`SensorPart::take`]. Three and
+    /// more whose bits are all equal are no answer; one or two may well be.
     Read(u8, usize),
     /// Waits until the bits of a mask in a register have a value: register, mask, value, at most so many milliseconds.
     Await(u8, u8, u8, u32),
@@ -53,12 +50,12 @@ pub trait SensorPart {
     ///
     /// # Errors
     /// The answer is not one that a working part gives.
-    fn take(&mut self, register: u8, answer: &[u8]) -> Result<Option<Self::Reading>, SensorFault>;
+    fn take(&mut self, register: u8, answer: &[u8]) -> Result<Option<Self::Reading>, PartFault>;
 }
 
 /// What is wrong with a part.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum SensorFault {
+pub enum PartFault {
     /// A transfer has failed.
     Bus,
     /// Nothing answers: every bit reads the same.
@@ -81,19 +78,19 @@ pub enum SensorFault {
     Overflow,
 }
 
-impl fmt::Display for SensorFault {
+impl fmt::Display for PartFault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            SensorFault::Bus => f.write_str("a transfer failed: check wiring and address"),
-            SensorFault::Silent => f.write_str("no answer: check wiring and power"),
-            SensorFault::Identity(identity) => write!(f, "another part answers, with identity {identity:#04x}"),
-            SensorFault::Register(register) => write!(f, "register {register:#04x} does not keep its value"),
-            SensorFault::Late => f.write_str("it does not become ready"),
-            SensorFault::Stuck => f.write_str("its readings do not change"),
-            SensorFault::Range => f.write_str("its readings are outside of its range"),
-            SensorFault::Calibration => f.write_str("its factory calibration is damaged"),
-            SensorFault::SelfTest => f.write_str("it failed its self-test"),
-            SensorFault::Overflow => f.write_str("it lost readings"),
+            PartFault::Bus => f.write_str("a transfer failed: check wiring and address"),
+            PartFault::Silent => f.write_str("no answer: check wiring and power"),
+            PartFault::Identity(identity) => write!(f, "another part answers, with identity {identity:#04x}"),
+            PartFault::Register(register) => write!(f, "register {register:#04x} does not keep its value"),
+            PartFault::Late => f.write_str("it does not become ready"),
+            PartFault::Stuck => f.write_str("its readings do not change"),
+            PartFault::Range => f.write_str("its readings are outside of its range"),
+            PartFault::Calibration => f.write_str("its factory calibration is damaged"),
+            PartFault::SelfTest => f.write_str("it failed its self-test"),
+            PartFault::Overflow => f.write_str("it lost readings"),
         }
     }
 }

@@ -2,10 +2,10 @@
 //!
 //! +-8 gauss (800 uT) at 100 Hz, each the mean of 512 samples, the narrowest of the part's filters. The period of its
 //! set and reset pulses is the one that the data sheet recommends. DRDY is not used, the flag of its register is.
-//! A field beyond the range is a fault ([`SensorFault::Range`]); beyond 10.9 gauss the part flags it itself.
+//! A field beyond the range is a fault ([`PartFault::Range`]); beyond 10.9 gauss the part flags it itself.
 
 use crate::bus::SpiFormat;
-use crate::part::{SensorFault, SensorPart, Step};
+use crate::part::{PartFault, SensorPart, Step};
 use crate::reading::{MagneticReading, little};
 
 /// The part.
@@ -43,11 +43,11 @@ impl SensorPart for Qmc5883l {
     const CYCLE: &'static [Step] =
         &[Step::Wait(8_000), Step::Await(STATUS, DRDY, DRDY, 12), Step::Read(DATA_OUTPUT_X_LSB, 7)];
 
-    fn take(&mut self, _: u8, answer: &[u8]) -> Result<Option<MagneticReading>, SensorFault> {
-        let &[ref data @ .., status] = answer else { return Err(SensorFault::Bus) };
-        let field_ut = little(data.try_into().map_err(|_| SensorFault::Bus)?) * UT_PER_LSB;
+    fn take(&mut self, _: u8, answer: &[u8]) -> Result<Option<MagneticReading>, PartFault> {
+        let &[ref data @ .., status] = answer else { return Err(PartFault::Bus) };
+        let field_ut = little(data.try_into().map_err(|_| PartFault::Bus)?) * UT_PER_LSB;
         if status & OVL != 0 || field_ut.amax() > RANGE_UT {
-            return Err(SensorFault::Range);
+            return Err(PartFault::Range);
         }
         Ok(Some(MagneticReading { field_ut }))
     }

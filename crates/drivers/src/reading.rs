@@ -1,6 +1,6 @@
 //! What parts read, in SI units and the part's own axes.
 
-use crate::part::SensorFault;
+use crate::part::PartFault;
 use nalgebra::Vector3;
 
 /// What an IMU reads.
@@ -68,8 +68,8 @@ pub(crate) fn in_range(
     reading: PressureReading,
     [min_pa, max_pa]: [f32; 2],
     [min_c, max_c]: [f32; 2],
-) -> Result<Option<PressureReading>, SensorFault> {
+) -> Result<Option<PressureReading>, PartFault> {
     let PressureReading { pressure_pa, temperature_c } = reading;
     let is_right = (min_pa..=max_pa).contains(&pressure_pa) && (min_c..=max_c).contains(&temperature_c);
-    if is_right { Ok(Some(reading)) } else { Err(SensorFault::Range) }
+    if is_right { Ok(Some(reading)) } else { Err(PartFault::Range) }
 }

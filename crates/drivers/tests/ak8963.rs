@@ -1,14 +1,12 @@
 //! MPU-9250 with AK8963 against their registers.
 #![allow(clippy::expect_used, clippy::panic, clippy::indexing_slicing, reason = "tests")]
 
-#[path = "models/mpu.rs"]
-mod model;
 mod rig;
 
-use afbc_drivers::SensorFault;
+use afbc_drivers::PartFault;
 use afbc_drivers::ak8963::{Mpu9250Ak8963, Mpu9250Reading};
-use model::{Magnetometer, Registers};
 use nalgebra::Vector3;
+use rig::mpu_registers::{Magnetometer, Registers};
 use rig::{Rig, refuses_another, run, survives_all_troubles};
 
 /// Along the IMU's axes.
@@ -86,7 +84,7 @@ fn its_full_range_is_read_whatever_its_sensitivity() {
         rig.with(|part| part.magnetometer.as_mut().expect("one").field_ut = [2000.0, 2000.0, 1000.0]);
         let _ = run(&mut driver, &rig, 50_000);
         let (readings, faults) = run(&mut driver, &rig, 200_000);
-        let ranges = readings.iter().filter(|reading| reading.value.magnetic == Err(SensorFault::Range)).count();
+        let ranges = readings.iter().filter(|reading| reading.value.magnetic == Err(PartFault::Range)).count();
         assert!(faults.is_empty() && ranges > 15 && news(&readings) == 0, "{ranges}");
     }
 }
@@ -101,7 +99,7 @@ fn a_magnetometer_that_is_no_more_costs_no_reading_of_the_imu() {
     assert!(
         faults.is_empty() && readings.len() >= 198 && readings.iter().all(|reading| is_right_of_imu(&reading.value))
     );
-    let late = readings.iter().position(|reading| reading.value.magnetic == Err(SensorFault::Late)).expect("late");
+    let late = readings.iter().position(|reading| reading.value.magnetic == Err(PartFault::Late)).expect("late");
     assert!((80..=120).contains(&late), "{late}");
     rig.with(|part| part.magnetometer.as_mut().expect("one").answers = true);
     let _ = run(&mut driver, &rig, 50_000);
@@ -123,7 +121,7 @@ fn a_magnetometer_that_was_reset_goes_on() {
 
 #[test]
 fn a_magnetometer_that_is_missing_another_one_or_damaged_is_told() {
-    let is = |change: &dyn Fn(&mut Registers), fault: SensorFault| {
+    let is = |change: &dyn Fn(&mut Registers), fault: PartFault| {
         let rig = Rig::new(both());
         rig.with(|part| change(part));
         let mut driver = rig.driver(Mpu9250Ak8963::default());
@@ -131,9 +129,9 @@ fn a_magnetometer_that_is_missing_another_one_or_damaged_is_told() {
         assert!(faults.is_empty() && readings.len() > 600, "{faults:?}");
         assert!(readings.iter().all(|reading| is_right_of_imu(&reading.value) && reading.value.magnetic == Err(fault)));
     };
-    is(&|part| part.magnetometer = None, SensorFault::Silent);
-    is(&|part| part.magnetometer.as_mut().expect("one").answers = false, SensorFault::Silent);
-    is(&|part| part.magnetometer.as_mut().expect("one").identity = 0x09, SensorFault::Identity(0x09));
-    is(&|part| part.magnetometer.as_mut().expect("one").adjustment = [0x80, 0xFF, 0x80], SensorFault::Calibration);
-    is(&|part| part.magnetometer.as_mut().expect("one").adjustment = [0x80, 0x80, 0x00], SensorFault::Calibration);
+    is(&|part| part.magnetometer = None, PartFault::Silent);
+    is(&|part| part.magnetometer.as_mut().expect("one").answers = false, PartFault::Silent);
+    is(&|part| part.magnetometer.as_mut().expect("one").identity = 0x09, PartFault::Identity(0x09));
+    is(&|part| part.magnetometer.as_mut().expect("one").adjustment = [0x80, 0xFF, 0x80], PartFault::Calibration);
+    is(&|part| part.magnetometer.as_mut().expect("one").adjustment = [0x80, 0x80, 0x00], PartFault::Calibration);
 }

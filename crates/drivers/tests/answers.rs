@@ -8,7 +8,7 @@ use afbc_drivers::ist8310::Ist8310;
 use afbc_drivers::lis3mdl::Lis3mdl;
 use afbc_drivers::ms5611::Ms5611;
 use afbc_drivers::qmc5883l::Qmc5883l;
-use afbc_drivers::{MagneticReading, PressureReading, SensorFault, SensorPart, Step};
+use afbc_drivers::{MagneticReading, PartFault, PressureReading, SensorPart, Step};
 use nalgebra::Vector3;
 use proptest::array::uniform8;
 use proptest::collection::vec;
@@ -120,7 +120,7 @@ fn the_largest_numbers_of_a_ms5611_fit() {
         for (d2, d1) in [(1_u32, 1_u32), (1, 0xFF_FFFF), (0xFF_FFFF, 1), (0xFF_FFFF, 0xFF_FFFF)] {
             assert_eq!(part.take(0x00, &d2.to_be_bytes()[1..]), Ok(None));
             let reading = part.take(0x00, &d1.to_be_bytes()[1..]);
-            assert!(matches!(reading, Ok(Some(_)) | Err(SensorFault::Range)), "{reading:?}");
+            assert!(matches!(reading, Ok(Some(_)) | Err(PartFault::Range)), "{reading:?}");
         }
     }
 }

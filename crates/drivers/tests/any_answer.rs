@@ -7,7 +7,7 @@ use afbc_drivers::ak8963::Mpu9250Ak8963;
 use afbc_drivers::bmi270::Bmi270;
 use afbc_drivers::icm426xx::{Icm42605, Icm42688p};
 use afbc_drivers::mpu::{Icm20602, Icm20608, Icm20689, Mpu6000, Mpu6500, Mpu9250};
-use afbc_drivers::{InertialReading, READ_MAX, SensorFault, SensorPart, Step};
+use afbc_drivers::{InertialReading, PartFault, READ_MAX, SensorPart, Step};
 use proptest::prelude::*;
 use rig::{Model, Rig, run};
 
@@ -94,7 +94,7 @@ fn survives<P: SensorPart + Default>(
     let rig = Rig::new(Anything::new::<P>(bytes));
     let mut driver = rig.driver(P::default());
     let (readings, faults) = run(&mut driver, &rig, 500_000);
-    prop_assert!(!faults.contains(&SensorFault::Bus), "{}: {faults:?}", P::NAME);
+    prop_assert!(!faults.contains(&PartFault::Bus), "{}: {faults:?}", P::NAME);
     readings.iter().try_for_each(|reading| check(&reading.value))
 }
 

@@ -4,7 +4,7 @@
 mod rig;
 
 use afbc_drivers::bmi270::Bmi270;
-use afbc_drivers::{InertialReading, Registers as _, SensorFault, SensorPart, SpiRegisters, Step};
+use afbc_drivers::{InertialReading, PartFault, Registers as _, SensorPart, SpiRegisters, Step};
 use embassy_futures::block_on;
 use embedded_hal_async::spi::{ErrorType, Operation, SpiDevice};
 use nalgebra::Vector3;
@@ -247,7 +247,7 @@ fn a_part_whose_configuration_is_lost_is_late() {
     let _ = run(&mut driver, &rig, 500_000);
     rig.with(|part| part.started_us = Some((0, false)));
     let (readings, faults) = run(&mut driver, &rig, 5_000);
-    assert!(readings.is_empty() && faults.contains(&SensorFault::Late), "{faults:?}");
+    assert!(readings.is_empty() && faults.contains(&PartFault::Late), "{faults:?}");
 }
 
 /// What a device was sent, for a transfer.

@@ -4,7 +4,7 @@
 mod rig;
 
 use afbc_drivers::bmp3::{Bmp388, Bmp390};
-use afbc_drivers::{PressureReading, SensorFault};
+use afbc_drivers::{PartFault, PressureReading};
 use rig::{Model, Rig, noise, refuses_another, run, survives_all_troubles};
 
 /// NVM_PAR_T1 to T3 and P1 to P11.
@@ -224,7 +224,7 @@ fn a_damaged_calibration_is_refused() {
             rig.with(|part| part.calibration[byte] ^= 1 << bit);
             let (readings, faults) = run(&mut rig.driver(Bmp388::default()), &rig, 300_000);
             assert!(readings.is_empty() && !faults.is_empty(), "byte {byte}, bit {bit}");
-            assert!(faults.iter().all(|fault| *fault == SensorFault::Calibration), "{faults:?}");
+            assert!(faults.iter().all(|fault| *fault == PartFault::Calibration), "{faults:?}");
         }
     }
 }
@@ -234,6 +234,6 @@ fn beyond_its_range_there_is_no_reading() {
     for (pressure_pa, temperature_c) in [(29_900.0, 25.0), (125_100.0, 25.0), (1e5, -40.5), (1e5, 85.5)] {
         let rig = Rig::new(Registers { pressure_pa, temperature_c, ..Registers::new(0x50, SETS[0]) });
         let (readings, faults) = run(&mut rig.driver(Bmp388::default()), &rig, 500_000);
-        assert!(readings.is_empty() && faults.iter().all(|fault| *fault == SensorFault::Range), "{faults:?}");
+        assert!(readings.is_empty() && faults.iter().all(|fault| *fault == PartFault::Range), "{faults:?}");
     }
 }

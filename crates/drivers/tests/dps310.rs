@@ -4,7 +4,7 @@
 mod rig;
 
 use afbc_drivers::dps310::{Dps310, Spl06};
-use afbc_drivers::{PressureReading, SensorFault};
+use afbc_drivers::{PartFault, PressureReading};
 use rig::{Model, Rig, noise, refuses_another, run, survives_all_troubles};
 
 /// Table 16: time of a measurement of 1, 2, 4 ... 128 samples.
@@ -266,7 +266,7 @@ fn beyond_its_range_there_is_no_reading() {
     for (pressure_pa, temperature_c) in [(29_900.0, 25.0), (120_100.0, 25.0), (1e5, -40.5), (1e5, 85.5)] {
         let rig = Rig::new(Registers { pressure_pa, temperature_c, ..Registers::new(false) });
         let (readings, faults) = run(&mut rig.driver(Dps310::default()), &rig, 500_000);
-        assert!(readings.is_empty() && faults.iter().all(|fault| *fault == SensorFault::Range), "{faults:?}");
+        assert!(readings.is_empty() && faults.iter().all(|fault| *fault == PartFault::Range), "{faults:?}");
     }
 }
 
@@ -275,7 +275,7 @@ fn coefficients_that_read_differently_are_not_used() {
     let rig = Rig::new(Registers { coefficients_flicker: true, ..Registers::new(false) });
     let mut driver = rig.driver(Dps310::default());
     let (readings, faults) = run(&mut driver, &rig, 1_000_000);
-    assert!(readings.is_empty() && faults.iter().all(|fault| *fault == SensorFault::Calibration), "{faults:?}");
+    assert!(readings.is_empty() && faults.iter().all(|fault| *fault == PartFault::Calibration), "{faults:?}");
     rig.with(|part| part.coefficients_flicker = false);
     let _ = run(&mut driver, &rig, 1_000_000);
     let (readings, faults) = run(&mut driver, &rig, 500_000);

@@ -4,7 +4,7 @@
 mod rig;
 
 use afbc_drivers::ist8310::Ist8310;
-use afbc_drivers::{MagneticReading, SensorFault};
+use afbc_drivers::{MagneticReading, PartFault};
 use nalgebra::Vector3;
 use rig::{Model, Rig, noise, refuses_another, run, survives_all_troubles};
 
@@ -111,7 +111,7 @@ fn after_a_reset_it_soon_measures_as_before() {
     let _ = run(&mut driver, &rig, 500_000);
     rig.set(rig::Trouble::Reset);
     let (_, faults) = run(&mut driver, &rig, 2_000_000);
-    assert!(faults.iter().any(|fault| matches!(fault, SensorFault::Register(_))), "{faults:?}");
+    assert!(faults.iter().any(|fault| matches!(fault, PartFault::Register(_))), "{faults:?}");
     let (readings, faults) = run(&mut driver, &rig, 2_000_000);
     assert!(faults.is_empty() && readings.iter().all(|reading| right(&reading.value)), "{faults:?}");
 }
@@ -144,6 +144,6 @@ fn fields_of_the_whole_range_are_read_and_none_beyond() {
         rig.with(|part| part.field_ut = field_ut);
         let _ = run(&mut driver, &rig, 100_000);
         let (readings, faults) = run(&mut driver, &rig, 500_000);
-        assert!(readings.is_empty() && faults.iter().all(|fault| *fault == SensorFault::Range), "{readings:?}");
+        assert!(readings.is_empty() && faults.iter().all(|fault| *fault == PartFault::Range), "{readings:?}");
     }
 }

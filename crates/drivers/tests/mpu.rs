@@ -1,14 +1,12 @@
 //! The family of the MPU-6000 against its registers.
 #![allow(clippy::expect_used, clippy::panic, clippy::indexing_slicing, reason = "tests")]
 
-#[path = "models/mpu.rs"]
-mod model;
 mod rig;
 
 use afbc_drivers::mpu::{Icm20602, Icm20608, Icm20689, Mpu, Mpu6000, Mpu6500, Mpu9250};
 use afbc_drivers::{InertialReading, SensorPart};
-use model::Registers;
 use nalgebra::Vector3;
+use rig::mpu_registers::Registers;
 use rig::{Rig, refuses_another, run, survives_all_troubles};
 
 fn right(reading: &InertialReading) -> bool {

@@ -4,7 +4,7 @@
 mod rig;
 
 use afbc_drivers::ms5611::Ms5611;
-use afbc_drivers::{PressureReading, SensorFault, SensorPart};
+use afbc_drivers::{PartFault, PressureReading, SensorPart};
 use rig::{Model, Rig, noise, run, survives_all_troubles};
 
 /// C1 to C6: the example of figure 2, a common part's, small and large ones.
@@ -199,7 +199,7 @@ fn a_damaged_prom_is_refused() {
             rig.with(|part| part.prom[word] ^= 1 << bit);
             let (readings, faults) = run(&mut rig.driver(Ms5611::default()), &rig, 500_000);
             assert!(readings.is_empty() && !faults.is_empty(), "word {word}, bit {bit}");
-            assert!(faults.iter().all(|fault| *fault == SensorFault::Calibration), "{faults:?}");
+            assert!(faults.iter().all(|fault| *fault == PartFault::Calibration), "{faults:?}");
         }
     }
 }
@@ -209,6 +209,6 @@ fn beyond_its_range_there_is_no_reading() {
     for (pressure_pa, temperature_c) in [(950.0, 25.0), (120_100.0, 25.0), (1e5, -40.5), (1e5, 85.5)] {
         let rig = Rig::new(Part5611 { pressure_pa, temperature_c, ..Part5611::new(SETS[0]) });
         let (readings, faults) = run(&mut rig.driver(Ms5611::default()), &rig, 500_000);
-        assert!(readings.is_empty() && faults.iter().all(|fault| *fault == SensorFault::Range), "{faults:?}");
+        assert!(readings.is_empty() && faults.iter().all(|fault| *fault == PartFault::Range), "{faults:?}");
     }
 }

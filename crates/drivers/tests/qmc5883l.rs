@@ -4,7 +4,7 @@
 mod rig;
 
 use afbc_drivers::qmc5883l::Qmc5883l;
-use afbc_drivers::{MagneticReading, SensorFault};
+use afbc_drivers::{MagneticReading, PartFault};
 use nalgebra::Vector3;
 use rig::{Model, Rig, noise, refuses_another, run, survives_all_troubles};
 
@@ -146,7 +146,7 @@ fn fields_of_the_whole_range_are_read_and_none_beyond() {
             rig.with(|part| part.field_ut[axis] = ut);
             let _ = run(&mut driver, &rig, 50_000);
             let (readings, faults) = run(&mut driver, &rig, 500_000);
-            assert!(readings.is_empty() && faults.iter().all(|fault| *fault == SensorFault::Range), "{readings:?}");
+            assert!(readings.is_empty() && faults.iter().all(|fault| *fault == PartFault::Range), "{readings:?}");
             rig.with(|part| part.field_ut = FIELD_UT);
             let _ = run(&mut driver, &rig, 300_000);
             let (readings, faults) = run(&mut driver, &rig, 200_000);

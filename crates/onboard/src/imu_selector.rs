@@ -7,9 +7,10 @@ const SILENT_US: u64 = 3_000;
 /// Samples in which the difference of both sensors is averaged, at least.
 const AVERAGED: f32 = 5_000.0;
 
-/// Chooses between two inertial sensors: whichever reads first, usually the first, flies until it is silent, as a driver
-/// makes one whose readings are wrong; then the other does. It stays, since a sensor that failed once may fail again. So that the estimate does not
-/// jump, the second's samples are corrected by its mean difference from the first while both worked.
+/// Chooses between two inertial sensors: whichever reads first, usually the first, flies until it is silent, as a
+/// driver makes one whose readings are wrong; then the other does. It stays, since a sensor that failed once may fail
+/// again. So that the estimate does not jump, the second's samples are corrected by its mean difference from the first
+/// while both worked.
 #[derive(Clone, Debug)]
 pub struct ImuSelector {
     second_flies: bool,

@@ -9,7 +9,9 @@
 )]
 #![allow(dead_code, reason = "not every test uses everything")]
 
-use afbc_drivers::{BusError, Driver, PartTiming, Registers, SensorFault, SensorPart};
+pub mod mpu_registers;
+
+use afbc_drivers::{BusError, Driver, PartFault, PartTiming, Registers, SensorPart};
 use afbc_types::Stamped;
 use core::future::pending;
 use embassy_futures::block_on;
@@ -184,7 +186,7 @@ pub fn run<P: SensorPart, M: Model>(
     driver: &mut Driver<P, Rig<M>, Rig<M>>,
     rig: &Rig<M>,
     us: u64,
-) -> (Vec<Stamped<P::Reading>>, Vec<SensorFault>) {
+) -> (Vec<Stamped<P::Reading>>, Vec<PartFault>) {
     let (mut readings, mut faults) = (Vec::new(), Vec::new());
     let end_us = rig.now_us() + us;
     while rig.now_us() < end_us {
@@ -257,7 +259,7 @@ pub fn survives_all_troubles<P: SensorPart, M: Model>(
 pub fn refuses_another<P: SensorPart, M: Model>(part: P, model: M, identity: u8) {
     let rig = Rig::new(model);
     let (readings, faults) = run(&mut rig.driver(part), &rig, 500_000);
-    assert!(readings.is_empty() && faults.iter().all(|fault| *fault == SensorFault::Identity(identity)), "{faults:?}");
+    assert!(readings.is_empty() && faults.iter().all(|fault| *fault == PartFault::Identity(identity)), "{faults:?}");
 }
 
 /// Numbers that differ from one time to the next, in -1..1, as noise.

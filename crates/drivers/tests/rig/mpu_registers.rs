@@ -1,8 +1,7 @@
 //! Registers of the MPU-6000 and its successors, and of the AK8963 behind the MPU-9250, as RM-MPU-6000A, RM-MPU-6500A,
 //! RM-MPU-9250A, DS-000176, RM-000030, DS-000143 and MS1356 have them.
-#![allow(dead_code, reason = "not every test uses everything")]
 
-use crate::rig::{Model, noise};
+use super::{Model, noise};
 
 /// A part, by its identity.
 pub(crate) struct Registers {

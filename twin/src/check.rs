@@ -1,0 +1,8 @@
+//! What must hold.
+
+use std::error::Error;
+
+/// Fails with what does not hold.
+pub fn check(holds: bool, what: &str) -> Result<(), Box<dyn Error>> {
+    if holds { Ok(()) } else { Err(format!("failed: {what}").into()) }
+}
