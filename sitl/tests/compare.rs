@@ -344,7 +344,7 @@ fn tries(fragment: &str) -> &str {
 }
 
 #[test]
-fn tune_tries_as_many_gains_as_it_was_told_to() {
+fn tune_tries_as_many_gains_as_asked() {
     let folder = soft("budget");
     // A generation has some ten tries: budgets below one, between two, and of several with a remainder.
     for budget in ["1", "2", "9", "12", "13", "14", "40"] {

@@ -222,7 +222,7 @@ fn errors_are_one_line_on_stderr_with_json_too() {
 }
 
 #[test]
-fn a_campaign_is_told_from_a_scenario() {
+fn a_campaign_is_distinguished_from_a_scenario() {
     let folder = small("kinds");
     // The kind of a file is recognised without an extension, and with wrong values.
     fs::write(folder.join("plain"), SMALL).unwrap();

@@ -88,7 +88,7 @@ fn a_bad_line_gets_one_line_and_changes_nothing() {
 
 /// A store of another vehicle is told, and its values are not used; garbage is no store.
 #[test]
-fn a_store_that_does_not_fit_is_told() {
+fn a_store_that_does_not_fit_is_reported() {
     let folder = folder("other");
     fs::write(folder.join("mine.parm"), "MOT_IDLE 0.07\n").unwrap();
     succeeds(&sitl(&folder, &["params", "import", "mine.parm", "--store", "a.store"]));
@@ -97,9 +97,9 @@ fn a_store_that_does_not_fit_is_told() {
         (succeeds(&output), String::from_utf8(output.stderr).unwrap())
     };
     assert_eq!(diff("paper", "a.store"), ("MOT_IDLE         0.05 -> 0.07\n".into(), String::new()));
-    let told = "a.store: parameters: stored for another vehicle, not used\n";
-    assert_eq!(diff("iris", "a.store"), (String::new(), told.into()));
+    let reported = "a.store: parameters: stored for another vehicle, not used\n";
+    assert_eq!(diff("iris", "a.store"), (String::new(), reported.into()));
     fs::write(folder.join("b.store"), vec![0x5A; 32 * 1024]).unwrap();
-    let told = "b.store: parameters: store unreadable, all at defaults\n";
-    assert_eq!(diff("paper", "b.store"), (String::new(), told.into()));
+    let reported = "b.store: parameters: store unreadable, all at defaults\n";
+    assert_eq!(diff("paper", "b.store"), (String::new(), reported.into()));
 }

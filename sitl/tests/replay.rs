@@ -46,7 +46,7 @@ fn says_how_far_the_estimates_are_apart() {
 
 /// What is told of the compass decides how sure the heading is.
 #[test]
-fn the_error_of_the_compass_can_be_told() {
+fn the_error_of_the_compass_can_be_stated() {
     let folder = folder("compass");
     log_at_rest(&folder, 14);
     let sigma = |error: &str| {

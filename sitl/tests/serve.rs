@@ -25,9 +25,9 @@ fn with_lines(test: &str, arguments: &[&str], lines: &str) -> Output {
 }
 
 #[test]
-fn a_newcomer_is_told_how_to_connect_each_client() {
+fn a_newcomer_learns_how_to_connect_each_client() {
     let lines = ["serve", "--port", "0", "--tcp", "0", "--fast", "--vehicles", "3", "--do", "at 0.01 quit"];
-    let told = succeeds(&sitl(&folder("newcomer"), &lines));
+    let reported = succeeds(&sitl(&folder("newcomer"), &lines));
     for wanted in [
         "outdoor: 3 vehicles, system ids 1 to 3.",
         "System().connect(\"udpin://0.0.0.0:14540\")",
@@ -38,7 +38,7 @@ fn a_newcomer_is_told_how_to_connect_each_client() {
         "tcp:127.0.0.1:",
         "0.010 ok at 0.01 quit",
     ] {
-        assert!(told.contains(wanted), "{wanted}: {told}");
+        assert!(reported.contains(wanted), "{wanted}: {reported}");
     }
 }
 
@@ -49,8 +49,9 @@ fn the_same_lines_give_the_same_answers() {
     let options = ["--lockstep", "--seed", "7", "--do", "at 1.2 battery 0.4"];
     let [first, second] = ["first", "second"].map(|test| succeeds(&with_lines(test, &options, lines)));
     // Without the guide, which names the ports.
-    let answers = |told: &str| told.lines().skip_while(|line| !line.starts_with("ok")).map(str::to_owned).collect();
-    let [first, second]: [Vec<String>; 2] = [&first, &second].map(|told| answers(told));
+    let answers =
+        |reported: &str| reported.lines().skip_while(|line| !line.starts_with("ok")).map(str::to_owned).collect();
+    let [first, second]: [Vec<String>; 2] = [&first, &second].map(|reported| answers(reported));
     assert_eq!(first, second);
     assert!(first.iter().any(|line| line == "1.200 ok at 1.2 battery 0.4"), "{first:?}");
     assert!(first.last().is_some_and(|line| line == "ok status, 1.600 s"), "{first:?}");
@@ -82,15 +83,15 @@ fn what_cannot_be_served_is_refused_in_one_line() {
 fn ctrl_c_ends_it_cleanly() {
     for (signal, options) in [("-INT", &[] as &[&str]), ("-TERM", &["--lockstep"])] {
         let mut child = started(&format!("ctrl-c{signal}"), options);
-        let mut told = BufReader::new(child.stdout.take().unwrap());
+        let mut reported = BufReader::new(child.stdout.take().unwrap());
         let mut line = String::new();
         while !line.starts_with("Lines typed here") {
             line.clear();
-            assert_ne!(told.read_line(&mut line).unwrap(), 0, "it ended before it served");
+            assert_ne!(reported.read_line(&mut line).unwrap(), 0, "it ended before it served");
         }
         assert!(Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap().success());
         let mut rest = String::new();
-        told.read_to_string(&mut rest).unwrap();
+        reported.read_to_string(&mut rest).unwrap();
         assert_eq!(child.wait().unwrap().code(), Some(130), "{rest}");
     }
 }
@@ -98,6 +99,9 @@ fn ctrl_c_ends_it_cleanly() {
 /// The end of stdin, as under a service manager, ends nothing but a lockstep.
 #[test]
 fn without_stdin_it_goes_on() {
-    let told = succeeds(&with_lines("no-stdin", &["--fast", "--indoors", "--do", "at 5 quit"], ""));
-    assert!(told.contains("mocap: 1 vehicle, system id 1.") && told.ends_with("5.000 ok at 5 quit\n"), "{told}");
+    let reported = succeeds(&with_lines("no-stdin", &["--fast", "--indoors", "--do", "at 5 quit"], ""));
+    assert!(
+        reported.contains("mocap: 1 vehicle, system id 1.") && reported.ends_with("5.000 ok at 5 quit\n"),
+        "{reported}"
+    );
 }

@@ -109,12 +109,12 @@ fn the_printed_hover_is_lost_upwards_and_level() {
     let fly = |kind| Run::fly(&scenario, scenario.contender(kind).unwrap(), 7).unwrap();
     let run = fly(ControllerKind::Afbc);
     let (lost, last) = (run.lost.unwrap(), run.log.last().unwrap());
-    let told = format!(
+    let reported = format!(
         "after {:.1} s (`sitl fly hover --duration 300`), level, and {:.0} m up",
         lost.time_s, last.motion.position_m.z
     );
     let page = include_str!("../../docs/results.md").split_whitespace().collect::<Vec<_>>().join(" ");
-    assert!(page.contains(&told), "docs/results.md does not say: {told}");
+    assert!(page.contains(&reported), "docs/results.md does not say: {reported}");
 
     let tilt = |sample: &Sample| sample.motion.attitude_rad.xy().amax();
     assert!(run.log.iter().filter(|sample| sample.time_s > 5.0).all(|sample| tilt(sample) < 0.06));

@@ -25,9 +25,9 @@ fn laps(vehicle: &str, speed_m_s: f64, drag: f64) -> (Scenario, f64) {
     scenario.duration_s = LAPS as f64 * period_s;
     let start = scenario.trajectory.at(0.0);
     scenario.initial = Motion { position_m: start.position_m, velocity_m_s: start.velocity_m_s, ..Motion::default() };
-    let told = scenario.realism.drag.as_mut().unwrap();
-    told.blade_n_s2_m *= drag;
-    told.area_m2 *= drag;
+    let stated = scenario.realism.drag.as_mut().unwrap();
+    stated.blade_n_s2_m *= drag;
+    stated.area_m2 *= drag;
     (scenario, period_s)
 }
 

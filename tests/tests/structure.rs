@@ -185,7 +185,7 @@ fn what_is_no_circle_is_not_found() {
 
 /// A parent that only declares its children and hands on their items is in no circle; one that uses them may be.
 #[test]
-fn parents_are_told_from_their_children() {
+fn parents_are_distinguished_from_their_children() {
     let parent = ("p.rs", "mod a; mod b; pub use a::A; pub use b::{B, C};");
     let a = ("p/a.rs", "use super::B; pub struct A;");
     assert!(found(&[parent, a, ("p/b.rs", "pub struct B; pub struct C;")]).is_empty());
@@ -225,8 +225,8 @@ fn crates_to_be_published_have_complete_metadata() {
             continue;
         }
         let name = folder.file_name().unwrap().to_str().unwrap().to_owned();
-        let told = ["description = ", "keywords = ", "categories = ", "readme = ", "license.", "rust-version."];
-        for key in told.into_iter().chain(["[package.metadata.docs.rs]", "all-features = true"]) {
+        let required = ["description = ", "keywords = ", "categories = ", "readme = ", "license.", "rust-version."];
+        for key in required.into_iter().chain(["[package.metadata.docs.rs]", "all-features = true"]) {
             assert!(has(key), "{name}: {key}");
         }
         for file in ["README.md", "LICENSE-MIT", "LICENSE-APACHE"] {

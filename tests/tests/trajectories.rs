@@ -227,13 +227,13 @@ proptest! {
     fn the_setpoint_is_the_reference_rounded(trajectory in smooth(), t in 0.0_f64..80.0) {
         let reference = trajectory.at(t);
         let s = reference.setpoint();
-        let told: [[f32; 4]; 3] = [
+        let reported: [[f32; 4]; 3] = [
             [s.position_m.x, s.position_m.y, s.position_m.z, s.yaw_rad],
             [s.velocity_m_s.x, s.velocity_m_s.y, s.velocity_m_s.z, s.yaw_rate_rad_s],
             [s.acceleration_m_s2.x, s.acceleration_m_s2.y, s.acceleration_m_s2.z, s.yaw_acceleration_rad_s2],
         ];
-        prop_assert_eq!(told, orders(&reference).map(|order| order.map(|x| x as f32)));
-        let told = [s.acceleration_m_s2, s.jerk_m_s3, s.snap_m_s4];
-        prop_assert_eq!(told, higher(&reference).map(|order| order.cast()));
+        prop_assert_eq!(reported, orders(&reference).map(|order| order.map(|x| x as f32)));
+        let reported = [s.acceleration_m_s2, s.jerk_m_s3, s.snap_m_s4];
+        prop_assert_eq!(reported, higher(&reference).map(|order| order.cast()));
     }
 }

@@ -499,7 +499,7 @@ impl<L: Law, const N: usize> FlightController<N> for Controller<L, N> {
         self.cascade(memory, state, setpoint, fresh)
     }
 
-    fn adrift(&self, memory: &mut Self::Memory) {
+    fn position_lost(&self, memory: &mut Self::Memory) {
         if let Some(observed) = &mut memory.observed {
             observed.hold();
         }

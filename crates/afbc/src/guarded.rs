@@ -187,8 +187,8 @@ impl<const N: usize> FlightController<N> for Guarded<N> {
         action
     }
 
-    fn adrift(&self, memory: &mut Memory<N>) {
-        self.adaptive.adrift(&mut memory.afbc);
+    fn position_lost(&self, memory: &mut Memory<N>) {
+        self.adaptive.position_lost(&mut memory.afbc);
     }
 
     fn trace(memory: &Memory<N>) -> Trace {

@@ -300,7 +300,7 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 1_000, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
-    fn afbc_is_told_what_its_subsystems_must_know(
+    fn afbc_sees_what_its_subsystems_must_know(
         settings in settings(), inputs in prop::collection::vec(near(), 1..12),
     ) {
         let gains = Profile::Paper.gains().map(|gains| afbc::adaptive::Gains { epsilon: 0.5, ..*gains });
@@ -310,7 +310,7 @@ proptest! {
     }
 
     #[test]
-    fn backstepping_is_told_what_its_subsystems_must_know(
+    fn backstepping_sees_what_its_subsystems_must_know(
         settings in settings(), inputs in prop::collection::vec(near(), 1..12),
     ) {
         let vehicle = Parameters::PAPER.to_f32();
@@ -319,7 +319,7 @@ proptest! {
     }
 
     #[test]
-    fn the_fallback_is_told_what_its_subsystems_must_know(
+    fn the_fallback_sees_what_its_subsystems_must_know(
         settings in settings(), inputs in prop::collection::vec(near(), 1..12),
     ) {
         let vehicle = Parameters::PAPER.to_f32();

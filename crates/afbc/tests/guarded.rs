@@ -389,14 +389,14 @@ fn engaging_does_not_trip_by_itself() {
 /// reckoned motion looks like, with the monitor and without.
 #[test]
 fn a_reckoned_motion_shows_no_disturbance() {
-    fn push<C: FlightController>(controller: &C, adrift: bool) -> [f32; 2] {
+    fn push<C: FlightController>(controller: &C, position_lost: bool) -> [f32; 2] {
         let (mut memory, mut state) = (Validated::<C::Memory>::default(), State::default());
         // On its setpoint throughout, so that nothing is learnt from errors.
-        let mut fly = |accelerates_m_s2: f32, adrift| {
+        let mut fly = |accelerates_m_s2: f32, position_lost| {
             let mut asked = 0.0;
             for _ in 0..1000 {
-                if adrift {
-                    controller.adrift(&mut memory.control);
+                if position_lost {
+                    controller.position_lost(&mut memory.control);
                 }
                 let (position_m, velocity_m_s) = (state.position_m, state.velocity_m_s);
                 let setpoint = Setpoint { position_m, velocity_m_s, ..Setpoint::default() };
@@ -405,13 +405,13 @@ fn a_reckoned_motion_shows_no_disturbance() {
             }
             asked
         };
-        [fly(1.0, false), fly(0.0, adrift)]
+        [fly(1.0, false), fly(0.0, position_lost)]
     }
     fn check<C: FlightController>(controller: &C) {
         let [pushed, calm] = push(controller, false);
         assert!((pushed + 1.0).abs() < 0.02 && calm.abs() < 0.02, "{pushed}, then {calm} m/s2");
-        let [pushed, adrift] = push(controller, true);
-        assert!((adrift - pushed).abs() < 0.02, "{pushed}, then {adrift} m/s2");
+        let [pushed, position_lost] = push(controller, true);
+        assert!((position_lost - pushed).abs() < 0.02, "{pushed}, then {position_lost} m/s2");
     }
     check(&guarded(bounds()));
     let law = Adaptive::new(Profile::Flight.gains()).unwrap();

@@ -177,8 +177,8 @@ proptest! {
             let known = ideal(&backstepping, &errors, tracking.x1d_ddot, &Dynamics { f, ..nominal });
             let mut estimate = before;
             let (alone, _) = adaptive.input(axis, &tracking, &context, &mut estimate);
-            let told = Context { known: Some(&model), ..context };
-            let (whole, seen) = adaptive.input(axis, &tracking, &told, &mut estimate);
+            let with_model = Context { known: Some(&model), ..context };
+            let (whole, seen) = adaptive.input(axis, &tracking, &with_model, &mut estimate);
             let allowed = 4.0 * U * (f64::from(alone.abs()) + f64::from(known.abs()));
             prop_assert_eq!(seen, errors);
             prop_assert!(

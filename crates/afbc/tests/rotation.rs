@@ -41,7 +41,7 @@ fn turning(eta: &Vector3<f64>, eta_dot: &Vector3<f64>, h: f64) -> Vector3<f64> {
 proptest! {
     /// A tilt about any horizontal axis and a turn about the thrust, one after the other, are told apart.
     #[test]
-    fn tilt_and_yaw_are_told_apart(direction in -3.1_f64..3.1, tilt in 0.0_f64..2.8, yaw in -2.8_f64..2.8) {
+    fn tilt_and_yaw_are_distinguished(direction in -3.1_f64..3.1, tilt in 0.0_f64..2.8, yaw in -2.8_f64..2.8) {
         let axis = Vector3::new(direction.cos(), direction.sin(), 0.0);
         let q = UnitQuaternion::from_scaled_axis(axis * tilt) * UnitQuaternion::from_scaled_axis(Vector3::z() * yaw);
         let expected = axis * (2.0 * (0.5 * tilt).sin()) + Vector3::z() * (2.0 * (0.5 * yaw).sin());

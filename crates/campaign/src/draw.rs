@@ -1,6 +1,6 @@
 //! Drawing of flights from a seed.
 
-use crate::plan::{Campaign, Course, Spread};
+use crate::plan::{Campaign, NamedTrajectory, Spread};
 use crate::quantity::{self, QUANTITIES, Quantity};
 use afbc_plant::noise::{Noise, Stream};
 use afbc_scenario::Scenario;
@@ -42,8 +42,8 @@ impl Campaign {
     }
 
     /// Returns the reference of flight `flight`; all are flown in turn.
-    pub fn course(&self, flight: u64) -> Option<&Course> {
-        self.courses.get((flight % self.courses.len().max(1) as u64) as usize)
+    pub fn trajectory(&self, flight: u64) -> Option<&NamedTrajectory> {
+        self.trajectories.get((flight % self.trajectories.len().max(1) as u64) as usize)
     }
 
     /// Returns flight `flight` as a scenario.
@@ -54,12 +54,13 @@ impl Campaign {
         self.with(flight, &self.draw(flight))
     }
 
-    /// Checks both ends of every spread on every course; if they are in range, the flights between them normally are.
+    /// Checks both ends of every spread on every trajectory; if they are in range, the flights between them normally
+    /// are.
     ///
     /// # Errors
     /// The first parameter out of range.
     pub fn check(&self) -> Result<(), OutOfRange> {
-        let flights = 0..self.courses.len() as u64;
+        let flights = 0..self.trajectories.len() as u64;
         (0..2).try_for_each(|end| flights.clone().try_for_each(|flight| self.at_end(flight, end)?.check()))
     }
 
@@ -72,9 +73,9 @@ impl Campaign {
     /// Returns flight `flight` with the given draw.
     pub(super) fn with(&self, flight: u64, draw: &Draw) -> Result<Scenario, OutOfRange> {
         let mut scenario = Scenario { seed: draw.seed, ..self.scenario.clone() };
-        if let Some(course) = self.course(flight) {
-            scenario.trajectory = course.trajectory.clone();
-            scenario.initial = course.initial;
+        if let Some(named) = self.trajectory(flight) {
+            scenario.trajectory = named.trajectory.clone();
+            scenario.initial = named.initial;
         }
         let quantities = self.spreads.iter().filter_map(Spread::quantity);
         quantity::apply(scenario, quantities.zip(draw.values.iter().copied()))

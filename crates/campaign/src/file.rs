@@ -1,6 +1,6 @@
 //! Campaign files. `docs/campaigns.md` describes each key.
 
-use crate::plan::{Campaign, Course, Spread};
+use crate::plan::{Campaign, NamedTrajectory, Spread};
 use crate::quantity::{QUANTITIES, Quantity};
 use afbc_plant::InstrumentSuite;
 use afbc_reader::FileError;
@@ -26,15 +26,15 @@ pub fn parse(file: &str, text: &str, name: &str, folder: &Path) -> Result<Campai
         let flights = root.whole(&FLIGHTS)?.ok_or_else(|| root.missing(FLIGHTS.name, "say how many to fly"))?;
         let seed = root.whole(&SEED)?.unwrap_or(1);
         let duration_s = root.number(&DURATION)?;
-        let courses = courses(&mut root, folder)?;
-        let mut scenario = scenario(&mut root, folder, courses.first())?;
+        let trajectories = trajectories(&mut root, folder)?;
+        let mut scenario = scenario(&mut root, folder, trajectories.first())?;
         scenario.duration_s = duration_s.unwrap_or(scenario.duration_s);
-        let courses = if courses.is_empty() { vec![course(scenario.clone())] } else { courses };
+        let trajectories = if trajectories.is_empty() { vec![trajectory(scenario.clone())] } else { trajectories };
         let spreads = match root.table("spread")? {
             Some(table) => spreads(table, &scenario)?,
             None => Vec::new(),
         };
-        let campaign = Campaign { name, description, flights, seed, scenario, courses, spreads };
+        let campaign = Campaign { name, description, flights, seed, scenario, trajectories, spreads };
         campaign
             .check()
             .map_err(|error| root.fault("spread", format!("it causes {}; narrow it", out_of_range(&error))))?;
@@ -43,10 +43,10 @@ pub fn parse(file: &str, text: &str, name: &str, folder: &Path) -> Result<Campai
     })
 }
 
-/// Reads the scenario, by name or as a table, which needs no trajectory if there is a course.
-fn scenario(root: &mut Table<'_>, folder: &Path, course: Option<&Course>) -> Result<Scenario, FileError> {
+/// Reads the scenario, by name or as a table, which needs no trajectory of its own if one is given.
+fn scenario(root: &mut Table<'_>, folder: &Path, trajectory: Option<&NamedTrajectory>) -> Result<Scenario, FileError> {
     if let Some(table) = root.table_if("scenario")? {
-        return afbc_scenario::read(table, "own", course.map(|course| &course.trajectory));
+        return afbc_scenario::read(table, "own", trajectory.map(|named| &named.trajectory));
     }
     let Some(name) = root.text("scenario")? else {
         return Err(root.missing("scenario", "name a scenario, as in scenario = \"hardware\""));
@@ -54,25 +54,25 @@ fn scenario(root: &mut Table<'_>, folder: &Path, course: Option<&Course>) -> Res
     named(root, "scenario", name, folder)
 }
 
-fn course(Scenario { name, trajectory, initial, .. }: Scenario) -> Course {
-    Course { name, trajectory, initial }
+fn trajectory(Scenario { name, trajectory, initial, .. }: Scenario) -> NamedTrajectory {
+    NamedTrajectory { name, trajectory, initial }
 }
 
 /// Reads the references of the scenarios in the list `trajectories`, if there is one.
-fn courses(root: &mut Table<'_>, folder: &Path) -> Result<Vec<Course>, FileError> {
+fn trajectories(root: &mut Table<'_>, folder: &Path) -> Result<Vec<NamedTrajectory>, FileError> {
     let Some(names) = root.texts("trajectories")? else { return Ok(Vec::new()) };
-    let mut courses: Vec<Course> = Vec::new();
+    let mut trajectories: Vec<NamedTrajectory> = Vec::new();
     for name in names {
-        let next = course(named(root, "trajectories", name, folder)?);
-        if courses.iter().any(|course| course.name == next.name) {
+        let next = trajectory(named(root, "trajectories", name, folder)?);
+        if trajectories.iter().any(|trajectory| trajectory.name == next.name) {
             return Err(root.fault_at("trajectories", format!("\"{}\" is listed twice; once is enough", next.name)));
         }
-        courses.push(next);
+        trajectories.push(next);
     }
-    if courses.is_empty() {
+    if trajectories.is_empty() {
         return Err(root.fault_at("trajectories", "the list is empty; name a scenario in it, or leave it out"));
     }
-    Ok(courses)
+    Ok(trajectories)
 }
 
 /// Reads a scenario by name: a plain name is a built-in one, anything else a file.

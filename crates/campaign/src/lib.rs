@@ -29,7 +29,7 @@ pub use file::parse;
 pub use fly::{fly, merge};
 pub use folder::CampaignFolder;
 pub use manifest::{Drawn, Manifest, Shard, hash_of};
-pub use plan::{Campaign, Course, Spread};
+pub use plan::{Campaign, NamedTrajectory, Spread};
 pub use quantity::{QUANTITIES, Quantity};
 pub use row::{Column, FIGURES, Figure, Row};
 pub use summary::{BINS, Bad, Count, Summary, Tally};

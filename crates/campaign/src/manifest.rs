@@ -100,7 +100,7 @@ impl Manifest {
             seed: campaign.seed,
             flights: campaign.flights,
             contenders: campaign.scenario.contenders.iter().map(|contender| contender.name.clone()).collect(),
-            trajectories: campaign.courses.iter().map(|course| course.name.clone()).collect(),
+            trajectories: campaign.trajectories.iter().map(|trajectory| trajectory.name.clone()).collect(),
             drawn: campaign.spreads.iter().filter_map(drawn).collect(),
             shard,
         }
@@ -141,11 +141,11 @@ impl Manifest {
 
 /// Returns a fingerprint that differs between campaigns and between versions of this program.
 fn fingerprint(campaign: &Campaign) -> String {
-    let Campaign { name: _, description: _, flights, seed, scenario, courses, spreads } = campaign;
+    let Campaign { name: _, description: _, flights, seed, scenario, trajectories, spreads } = campaign;
     // By name, since a quantity's place may change.
     let spreads: Vec<_> =
         spreads.iter().map(|spread| (spread.quantity().map(|quantity| quantity.range.name), spread.ends)).collect();
-    hash_of(&(env!("CARGO_PKG_VERSION"), flights, seed, scenario, courses, spreads))
+    hash_of(&(env!("CARGO_PKG_VERSION"), flights, seed, scenario, trajectories, spreads))
 }
 
 /// Returns a hash of what decides a result, as it is written. Numbers are written to the last bit; infinity, of an

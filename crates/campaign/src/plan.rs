@@ -16,7 +16,7 @@ pub struct Spread {
 
 /// A reference, and the initial state of flights along it.
 #[derive(Clone, Debug, Serialize)]
-pub struct Course {
+pub struct NamedTrajectory {
     /// Name of the scenario it is from.
     pub name: String,
     /// The reference.
@@ -38,8 +38,8 @@ pub struct Campaign {
     pub seed: u64,
     /// Everything that is not drawn.
     pub scenario: Scenario,
-    /// Courses flown in turn: flight `i` takes the one at `i` modulo their number. At least one.
-    pub courses: Vec<Course>,
+    /// Trajectories flown in turn: flight `i` takes the one at `i` modulo their number. At least one.
+    pub trajectories: Vec<NamedTrajectory>,
     /// Quantities drawn, in the order of [`QUANTITIES`](crate::QUANTITIES).
     pub spreads: Vec<Spread>,
 }

@@ -120,7 +120,7 @@ impl Campaign {
     pub fn rows(&self, flight: u64) -> Result<Vec<Row>, OutOfRange> {
         let draw = self.draw(flight);
         let scenario = self.with(flight, &draw)?;
-        let trajectory = self.course(flight).map(|course| course.name.as_str()).unwrap_or_default();
+        let trajectory = self.trajectory(flight).map(|trajectory| trajectory.name.as_str()).unwrap_or_default();
         let row = |contender: &Contender| {
             let outcome = Tally::of(&scenario, contender)?;
             let figures = FIGURES.iter().map(|figure| (figure.value)(&outcome));

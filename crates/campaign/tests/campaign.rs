@@ -299,8 +299,8 @@ fn what_is_drawn_reaches_the_vehicle() {
     assert_eq!(rotors.faults.len(), 1);
     assert_eq!((rotors.faults[0].efficiency, f64::from(rotors.faults[0].rotor)), (values[3], values[4]));
     assert_eq!(rotors.faults[0].start_s, values[5]);
-    // Courses are flown in turn.
-    assert_eq!(campaign.course(5).unwrap().name, "circle");
+    // Trajectories are flown in turn.
+    assert_eq!(campaign.trajectory(5).unwrap().name, "circle");
     assert_ne!(campaign.flight(4).unwrap().trajectory, flight.trajectory);
 }
 
@@ -500,7 +500,7 @@ fn a_scenario_may_be_written_out() {
     let error = campaign::parse("f", &text.replace(line, ""), "f", Path::new("")).unwrap_err().to_string();
     assert!(error.contains("scenario.trajectory: missing; "), "{error}");
     let own = "[scenario.trajectory]\nkind = \"hover\"\nposition_m = [0, 0, 9]\n";
-    assert_eq!(parse(&(text.replace(line, "") + own)).courses[0].initial.position_m.z, 9.0);
+    assert_eq!(parse(&(text.replace(line, "") + own)).trajectories[0].initial.position_m.z, 9.0);
     // A mistake in the table is reported with its key.
     let error = campaign::parse("f", &text.replace("\"pid\"", "\"pdi\""), "f", Path::new("")).unwrap_err().to_string();
     assert!(error.contains("contender.controller: \"pdi\" is unknown"), "{error}");

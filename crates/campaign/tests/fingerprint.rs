@@ -4,7 +4,7 @@
 #![expect(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "tests")]
 
 use afbc::Profile;
-use afbc_campaign::{self as campaign, Campaign, Course, Manifest, Shard, Spread};
+use afbc_campaign::{self as campaign, Campaign, Manifest, NamedTrajectory, Shard, Spread};
 use afbc_plant::instruments::{Accelerometer, Gyroscope, Imu};
 use afbc_reader::words;
 use afbc_scenario::Scenario;
@@ -31,7 +31,7 @@ fn fingerprint(campaign: &Campaign) -> String {
 fn of(scenario: Scenario) -> Campaign {
     let plain = campaign::parse("f", "flights = 1\nscenario = \"hover\"", "f", Path::new("")).unwrap();
     let Scenario { trajectory, initial, .. } = scenario.clone();
-    Campaign { courses: vec![Course { name: "own".into(), trajectory, initial }], scenario, ..plain }
+    Campaign { trajectories: vec![NamedTrajectory { name: "own".into(), trajectory, initial }], scenario, ..plain }
 }
 
 fn campaign_file(text: &str) -> Result<String, String> {
@@ -202,9 +202,9 @@ fn ask_for_keys(text: &str, read: Read, known: &mut BTreeMap<String, BTreeSet<St
         let parents = leaves.iter().filter(|leaf| leaf.table == parent && leaf.alone).map(|leaf| leaf.at.end);
         let dotted = parents.map(|at| with(text, &(at..at), &format!("\n{key}.{STRANGE} = 1")));
         let errors: Vec<_> = beside.chain(headed).chain(dotted).map(|text| read(&text).unwrap_err()).collect();
-        let told = errors.iter().find_map(|error| Some(error.split_once(&own)?.1));
-        let told = told.unwrap_or_else(|| panic!("[{path}] has any key, {errors:?}, in\n{text}"));
-        known.entry(path.into()).or_default().extend(told.split(", ").map(str::to_owned));
+        let reported = errors.iter().find_map(|error| Some(error.split_once(&own)?.1));
+        let reported = reported.unwrap_or_else(|| panic!("[{path}] has any key, {errors:?}, in\n{text}"));
+        known.entry(path.into()).or_default().extend(reported.split(", ").map(str::to_owned));
     }
 }
 
@@ -441,7 +441,9 @@ fn numbers_count_to_the_last_bit() {
     };
     changed(&|it| it.scenario.vehicle.mass_kg = it.scenario.vehicle.mass_kg.next_up());
     changed(&|it| it.scenario.realism.rotors.delay_s = -0.0);
-    changed(&|it| it.courses.iter_mut().for_each(|course| course.initial.position_m.x += f64::MIN_POSITIVE));
+    changed(&|it| {
+        it.trajectories.iter_mut().for_each(|trajectory| trajectory.initial.position_m.x += f64::MIN_POSITIVE)
+    });
     changed(&|it| it.spreads.iter_mut().for_each(|Spread { ends, .. }| ends[1] = ends[1].next_down()));
     changed(&|it| {
         let settings = &mut it.scenario.contenders[0].settings;

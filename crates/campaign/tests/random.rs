@@ -95,8 +95,8 @@ fn what_is_drawn_is_what_flies() {
             let calm = scenario.realism.wind == Default::default();
             let intact = scenario.environment.payloads().is_empty() && scenario.environment.changes().is_empty();
             let whole = scenario.realism.rotors.faults.is_empty();
-            let told = scenario.vehicle_file.as_ref().unwrap();
-            assert_eq!(told, &vehicle);
+            let stated = scenario.vehicle_file.as_ref().unwrap();
+            assert_eq!(stated, &vehicle);
             assert_eq!(scenario.sensing.noise.position_m, 0.001);
             match change {
                 Change::Nothing => assert!(calm && intact && whole),
@@ -125,7 +125,7 @@ fn what_is_drawn_is_what_flies() {
                 }
                 Change::Drag(factor) => {
                     let area = |drag: Option<afbc_plant::Drag>| drag.map_or(0.0, |drag| drag.area_m2.z);
-                    let ratio = area(scenario.realism.drag) - factor * area(told.realism.drag);
+                    let ratio = area(scenario.realism.drag) - factor * area(stated.realism.drag);
                     assert!(ratio.abs() < 1e-12 && (0.5..=2.0).contains(&factor) && calm && intact && whole);
                 }
                 Change::Older(age_s) => {

@@ -59,7 +59,7 @@ pub trait FlightController<const N: usize = 4> {
 
     /// Announces that the horizontal motion of the next state is not measured: a vehicle that does not know where it is
     /// reckons it. Nothing may be observed from it.
-    fn adrift(&self, _memory: &mut Self::Memory) {}
+    fn position_lost(&self, _memory: &mut Self::Memory) {}
 
     /// Performs one step from a measurement that may be missing, implausible or not finite:
     /// [`FlightController::decide`] behind a [`Screen`](crate::Screen). [`Action::health`] reports rejected input.

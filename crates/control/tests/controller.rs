@@ -12,7 +12,7 @@ struct Listener(Mixer);
 
 /// What the controller was told in its last step, and how often.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Told {
+struct Seen {
     steps: u32,
     state: State,
     setpoint: Setpoint,
@@ -22,7 +22,7 @@ struct Told {
 const THRUST_N: f32 = 4.8;
 
 impl FlightController for Listener {
-    type Memory = Told;
+    type Memory = Seen;
 
     fn dt_s(&self) -> f32 {
         0.001
@@ -32,12 +32,12 @@ impl FlightController for Listener {
         &self.0
     }
 
-    fn decide(&self, memory: &mut Told, state: &State, setpoint: &Setpoint, fresh: bool) -> Action {
-        *memory = Told { steps: memory.steps + 1, state: *state, setpoint: *setpoint, fresh };
+    fn decide(&self, memory: &mut Seen, state: &State, setpoint: &Setpoint, fresh: bool) -> Action {
+        *memory = Seen { steps: memory.steps + 1, state: *state, setpoint: *setpoint, fresh };
         self.0.action(&Inputs { roll_n: 0.1, thrust_n: THRUST_N, ..Inputs::default() })
     }
 
-    fn trace(_: &Told) -> Trace {
+    fn trace(_: &Seen) -> Trace {
         Trace::default()
     }
 }
@@ -73,9 +73,9 @@ proptest! {
     /// The law is told the last plausible state and setpoint, and whether the state is new; before there is a state, it
     /// is told nothing and the rotors stand still; before there is a setpoint, it holds where it is.
     #[test]
-    fn a_law_is_told_what_is_plausible(steps in prop::collection::vec((state(), setpoint()), 1..40)) {
+    fn a_law_sees_what_is_plausible(steps in prop::collection::vec((state(), setpoint()), 1..40)) {
         let (listener, mut memory) = (listener(), Validated::default());
-        let (mut last_state, mut last_setpoint, mut told) = (None, None, Told::default());
+        let (mut last_state, mut last_setpoint, mut seen) = (None, None, Seen::default());
         for (measured, setpoint) in steps {
             let fresh = measured.is_some_and(|state| state.is_plausible());
             if fresh {
@@ -91,12 +91,12 @@ proptest! {
             let Some(state) = last_state else {
                 prop_assert_eq!(action, { let mut none = Action::default(); none.health = health; none });
                 prop_assert!(!health.saturated && health.fallback.is_none());
-                prop_assert_eq!(memory.control, told);
+                prop_assert_eq!(memory.control, seen);
                 continue;
             };
             let setpoint = *last_setpoint.get_or_insert(Setpoint::hold(&state));
-            told = Told { steps: told.steps + 1, state, setpoint, fresh };
-            prop_assert_eq!(memory.control, told);
+            seen = Seen { steps: seen.steps + 1, state, setpoint, fresh };
+            prop_assert_eq!(memory.control, seen);
             prop_assert!((action.forces.0.sum() - THRUST_N).abs() < 1e-5 && action.given.thrust_n == THRUST_N);
             prop_assert!(action.speeds.0.iter().all(|speed| *speed > 100.0));
         }
@@ -110,7 +110,7 @@ fn a_plain_law_has_no_fallback() {
     let _ = listener.step(&mut memory, Some(&State::default()), &Setpoint::default());
     let before = memory;
     assert!(!listener.engage(&mut memory.control));
-    listener.adrift(&mut memory.control);
+    listener.position_lost(&mut memory.control);
     assert_eq!(memory, before);
 }
 

@@ -73,9 +73,10 @@ fn a_state_or_setpoint_may_leave_out_what_is_zero() {
 #[test]
 fn names_are_those_of_scenario_files() {
     let mut health = Health::default();
-    health.fallback = Some("rotors stay saturated");
-    let mut expected = json!({ "state_rejected": false, "setpoint_rejected": false, "saturated": false });
-    expected["fallback"] = json!("rotors stay saturated");
+    let fallback = "rotors stay saturated";
+    health.fallback = Some(fallback);
+    let expected =
+        json!({ "state_rejected": false, "setpoint_rejected": false, "saturated": false, "fallback": fallback });
     assert_eq!(serde_json::to_value(health).unwrap(), expected);
     health.fallback = None;
     assert_eq!(serde_json::from_value::<Health>(expected).unwrap(), health, "a reason is not read");

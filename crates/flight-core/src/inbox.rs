@@ -27,12 +27,12 @@ pub struct Inbox {
     state: Option<Stamped<State>>,
     /// True if the state is the vehicle's own estimate.
     own: bool,
-    adrift: Option<Stamped<State>>,
+    position_lost: Option<Stamped<State>>,
     missing: Option<Refusal>,
     pose: Option<Stamped<Pose>>,
     setpoint: Option<Stamped<Setpoint>>,
     /// True if the vehicle rests on the ground.
-    rests: Option<bool>,
+    idle_on_ground: Option<bool>,
     inhibited: Reasons,
     requests: Queue<Request>,
 }
@@ -42,11 +42,11 @@ impl Inbox {
     pub const EMPTY: Self = Inbox {
         state: None,
         own: false,
-        adrift: None,
+        position_lost: None,
         missing: None,
         pose: None,
         setpoint: None,
-        rests: None,
+        idle_on_ground: None,
         inhibited: Reasons::NONE,
         requests: Queue::new(),
     };
@@ -61,15 +61,15 @@ impl Inbox {
     /// Stores a state of the vehicle's own estimate, which is always [plausible](State::is_plausible), in place of any
     /// other.
     pub fn locate(&mut self, state: Stamped<State>) {
-        (self.state, self.own, self.adrift, self.missing) = (Some(state), true, None, None);
+        (self.state, self.own, self.position_lost, self.missing) = (Some(state), true, None, None);
     }
 
     /// Stores a state of the vehicle's own estimate, which `missing` something and does not know where it is: attitude,
     /// rates, height and vertical velocity may be used, the horizontal position and velocity may not. It replaces any
     /// other state. Without one, what the link says stands.
-    pub fn put_adrift(&mut self, state: Option<Stamped<State>>, missing: Refusal) {
-        self.adrift = state;
-        if self.adrift.is_some() {
+    pub fn put_position_lost(&mut self, state: Option<Stamped<State>>, missing: Refusal) {
+        self.position_lost = state;
+        if self.position_lost.is_some() {
             self.state = None;
         }
         self.missing = Some(missing);
@@ -93,13 +93,13 @@ impl Inbox {
 
     /// Marks whether an armed vehicle on the ground rests there: its motors idle, and the law does not fly, until the
     /// mark is taken away. It has no effect in the air.
-    pub fn rest(&mut self, rests: bool) {
-        self.rests = Some(rests);
+    pub fn set_idle_on_ground(&mut self, idle_on_ground: bool) {
+        self.idle_on_ground = Some(idle_on_ground);
     }
 
-    /// True if an armed vehicle on the ground [rests](Self::rest) there.
-    pub fn rests(&self) -> bool {
-        self.rests == Some(true)
+    /// True if an armed vehicle on the ground [rests](Self::set_idle_on_ground) there.
+    pub fn idle_on_ground(&self) -> bool {
+        self.idle_on_ground == Some(true)
     }
 
     /// Sets what speaks against arming besides what the flight core checks itself.
@@ -122,9 +122,9 @@ impl Inbox {
         self.own
     }
 
-    /// Returns the newest state of a vehicle that [does not know where it is](Self::put_adrift).
-    pub fn adrift(&self) -> Option<&Stamped<State>> {
-        self.adrift.as_ref()
+    /// Returns the newest state of a vehicle that [does not know where it is](Self::put_position_lost).
+    pub fn position_lost(&self) -> Option<&Stamped<State>> {
+        self.position_lost.as_ref()
     }
 
     /// Returns what the vehicle's estimate misses; none if it has none of its own.
@@ -160,13 +160,13 @@ impl Inbox {
     /// Merges `news` into this inbox.
     pub fn merge(&mut self, news: &Inbox) {
         self.state = news.state.or(self.state);
-        self.adrift = news.adrift.or(self.adrift);
+        self.position_lost = news.position_lost.or(self.position_lost);
         self.missing = news.missing.or(self.missing);
         if let Some(pose) = &news.pose {
             self.pose = Some(*pose);
         }
         self.setpoint = news.setpoint.or(self.setpoint);
-        self.rests = news.rests.or(self.rests);
+        self.idle_on_ground = news.idle_on_ground.or(self.idle_on_ground);
         self.inhibited = if news.inhibited.is_empty() { self.inhibited } else { news.inhibited };
         for asked in &news.requests {
             self.request(*asked);
@@ -194,9 +194,9 @@ impl Inbox {
     pub fn take_into(&mut self, taken: &mut Inbox) {
         (taken.state, taken.own) = (self.state, self.own);
         // Hardly ever there: only the mark is copied.
-        match &self.adrift {
-            Some(adrift) => taken.adrift = Some(*adrift),
-            None => taken.adrift = None,
+        match &self.position_lost {
+            Some(position_lost) => taken.position_lost = Some(*position_lost),
+            None => taken.position_lost = None,
         }
         taken.missing = self.missing;
         // Rarely there, and only once.
@@ -214,7 +214,7 @@ impl Inbox {
             }
             (new, old) => *old = *new,
         }
-        (taken.rests, taken.inhibited) = (self.rests, self.inhibited);
+        (taken.idle_on_ground, taken.inhibited) = (self.idle_on_ground, self.inhibited);
         // Rarely there.
         if !(self.requests.is_empty() && taken.requests.is_empty()) {
             taken.requests.clone_from(&self.requests);

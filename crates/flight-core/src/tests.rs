@@ -3,5 +3,5 @@
 extern crate std;
 
 mod detectors;
+mod law_inputs;
 mod reckoning;
-mod told;

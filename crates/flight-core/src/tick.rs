@@ -62,7 +62,7 @@ struct Armed<M> {
     /// Inputs of the last tick, if it had no step of the law.
     open_loop: Option<Inputs>,
     /// True if it rests on the ground, and the controller's memory is as at take-off.
-    rests: bool,
+    idle_on_ground: bool,
     guide: Guide,
     landing: LandDetector,
     tumble: Tumble,
@@ -78,7 +78,7 @@ struct Guide {
     hold: Option<Setpoint>,
     descent: Option<Descent>,
     /// Motion and descent of a vehicle that does not know where it is.
-    adrift: Option<(Drift, Descent)>,
+    position_lost: Option<(Drift, Descent)>,
 }
 
 impl<M> FlightCoreMemory<M> {
@@ -227,9 +227,9 @@ impl<C: FlightController<N>, const N: usize> FlightCore<C, N> {
         let fresh =
             memory.state.filter(|_| state_age_us <= COAST_US).map(|state| extrapolated(&state.value, state_age_us));
         let fresh = fresh.as_ref();
-        let adrift = inbox.adrift().filter(|_| fresh.is_none()).and_then(|state| upright(state, now_us));
+        let position_lost = inbox.position_lost().filter(|_| fresh.is_none()).and_then(|state| upright(state, now_us));
         memory.orient(inbox);
-        memory.watch(fresh, adrift.as_ref(), inbox.rests(), &self.limits, dt_s);
+        memory.watch(fresh, position_lost.as_ref(), inbox.idle_on_ground(), &self.limits, dt_s);
         let FlightCoreMemory {
             mode, rate, state: last, steady_us, rest_us, frozen_states, oriented_us, flight, ..
         } = memory;
@@ -274,15 +274,15 @@ impl<C: FlightController<N>, const N: usize> FlightCore<C, N> {
 
         // Controls.
         let action = match flight {
-            Some(flight) if mode.armed() && !arms && inbox.rests() && !observed.airborne => {
-                flight.rest(&self.dead_reckoning, fresh.or(adrift.as_ref()));
+            Some(flight) if mode.armed() && !arms && inbox.idle_on_ground() && !observed.airborne => {
+                flight.rest(&self.dead_reckoning, fresh.or(position_lost.as_ref()));
                 self.open_loop(flight, Inputs::default())
             }
             Some(flight) if mode.armed() && !arms => {
-                flight.rests = false;
-                flight.reckon(&self.dead_reckoning, fresh.filter(|_| measured).or(adrift.as_ref()));
+                flight.idle_on_ground = false;
+                flight.reckon(&self.dead_reckoning, fresh.filter(|_| measured).or(position_lost.as_ref()));
                 let engaged = done(Request::Engage) && self.controller.engage(&mut flight.control);
-                match (fresh, &adrift) {
+                match (fresh, &position_lost) {
                     // Likewise, the tick of engaging has no step: the rotors keep their inputs.
                     _ if engaged => self.open_loop(flight, flight.applied),
                     (Some(state), _) => {
@@ -297,10 +297,10 @@ impl<C: FlightController<N>, const N: usize> FlightCore<C, N> {
                         action
                     }
                     (None, Some(state)) => {
-                        let state = inbox.adrift().map_or(state, |adrift| &adrift.value);
+                        let state = inbox.position_lost().map_or(state, |position_lost| &position_lost.value);
                         let last = last.as_ref().map(|last| &last.value);
                         let (state, target) = flight.guide.down(state, last, dt_s);
-                        self.controller.adrift(&mut flight.control);
+                        self.controller.position_lost(&mut flight.control);
                         let action = self.controller.decide(&mut flight.control, &state, target, true);
                         flight.open_loop = None;
                         flight.applied = action.given;
@@ -334,7 +334,7 @@ impl<C: FlightController<N>, const N: usize> FlightCore<C, N> {
     /// Returns the action without a state.
     #[inline(always)]
     fn blind_action<M>(&self, flight: &mut Armed<M>, mode: Mode) -> Action<N> {
-        (flight.guide.descent, flight.guide.adrift) = (None, None);
+        (flight.guide.descent, flight.guide.position_lost) = (None, None);
         let inputs = match mode {
             Mode::Descending => self.dead_reckoning.descend(&flight.reckoning),
             _ => self.dead_reckoning.coast(&flight.reckoning),
@@ -445,26 +445,34 @@ impl<M> FlightCoreMemory<M> {
 
     /// Notes the time of the newest attitude.
     fn orient(&mut self, inbox: &Inbox) {
-        let newest = inbox.adrift().map(|state| state.at_us).max(self.state.map(|state| state.at_us));
+        let newest = inbox.position_lost().map(|state| state.at_us).max(self.state.map(|state| state.at_us));
         self.oriented_us = self.oriented_us.max(newest);
     }
 
-    /// Updates the detectors with a fresh state, or with that of a vehicle adrift, or none; `rests`: the inbox's mark.
-    fn watch(&mut self, fresh: Option<&State>, adrift: Option<&State>, rests: bool, limits: &ArmingLimits, dt_s: f32) {
+    /// Updates the detectors with a fresh state, or with that of a vehicle without a position, or none;
+    /// `idle_on_ground`: the inbox's mark.
+    fn watch(
+        &mut self,
+        fresh: Option<&State>,
+        position_lost: Option<&State>,
+        idle_on_ground: bool,
+        limits: &ArmingLimits,
+        dt_s: f32,
+    ) {
         let gap_us = self.rate.gap_us();
         let longer = |time_us: u32, lasts| if lasts { time_us.saturating_add(gap_us) } else { 0 };
         self.steady_us = longer(self.steady_us, fresh.is_some());
         self.rest_us = longer(self.rest_us, fresh.is_some_and(|state| limits.at_rest(state)));
         let armed = self.mode.armed();
         let Some(flight) = self.flight.as_mut().filter(|_| armed) else { return };
-        if rests && !flight.landing.airborne() {
-            flight.landing.rest(fresh.or(adrift));
-            return match fresh.or(adrift) {
+        if idle_on_ground && !flight.landing.airborne() {
+            flight.landing.rest(fresh.or(position_lost));
+            return match fresh.or(position_lost) {
                 Some(state) => flight.tumble.advance(state, gap_us),
                 None => flight.tumble.advance_blind(gap_us),
             };
         }
-        match (fresh, adrift) {
+        match (fresh, position_lost) {
             (Some(state), _) => {
                 flight.tumble.advance(state, gap_us);
                 flight.landing.advance(state, flight.applied.thrust_n, gap_us, dt_s);
@@ -494,7 +502,7 @@ impl<M: Default> Armed<M> {
             observer: None,
             applied: Inputs::default(),
             open_loop: None,
-            rests: true,
+            idle_on_ground: true,
             guide: Guide::default(),
             landing: LandDetector::new(state, weight_n),
             tumble: Tumble::default(),
@@ -507,10 +515,10 @@ impl<M: Default> Armed<M> {
 impl<M: Default> Armed<M> {
     /// Rests on the ground: the law begins afresh when it takes off, as after arming.
     fn rest(&mut self, dead_reckoning: &DeadReckoning, state: Option<&State>) {
-        if !self.rests {
+        if !self.idle_on_ground {
             self.forget();
         }
-        (self.rests, self.applied) = (true, Inputs::default());
+        (self.idle_on_ground, self.applied) = (true, Inputs::default());
         if let Some(state) = state {
             self.reckoning = dead_reckoning.start(state);
         }
@@ -548,7 +556,7 @@ impl Guide {
     /// Returns state and setpoint of a vehicle that does not know where it is, since `last`: downwards.
     fn down(&mut self, state: &State, last: Option<&State>, dt_s: f32) -> (State, &Setpoint) {
         (self.hold, self.descent) = (None, None);
-        let (drift, descent) = self.adrift.get_or_insert_with(|| {
+        let (drift, descent) = self.position_lost.get_or_insert_with(|| {
             let mut drift = Drift::new(last.unwrap_or(state).position_m.xy(), state);
             let begin = drift.advance(state, 0.0);
             (drift, Descent::new(&begin))
@@ -559,7 +567,7 @@ impl Guide {
 
     /// Returns the setpoint for a fresh `state`: the descent's, the commander's, or a hold if there is none.
     fn target<'a>(&'a mut self, mode: Mode, state: &State, setpoint: Option<&'a Setpoint>, dt_s: f32) -> &'a Setpoint {
-        self.adrift = None;
+        self.position_lost = None;
         if mode == Mode::Descending {
             let descent = self.descent.get_or_insert_with(|| Descent::new(state));
             descent.advance(dt_s);

@@ -127,17 +127,23 @@ fn one_state_stands_at_a_time() {
     inbox.locate(at(2));
     assert_eq!((inbox.state(), inbox.is_own()), (Some(&at(2)), true));
     assert!(inbox.take().is_own());
-    inbox.put_adrift(Some(at(3)), Refusal::PositionUnknown);
-    assert_eq!((inbox.state(), inbox.adrift(), inbox.missing()), (None, Some(&at(3)), Some(Refusal::PositionUnknown)));
+    inbox.put_position_lost(Some(at(3)), Refusal::PositionUnknown);
+    assert_eq!(
+        (inbox.state(), inbox.position_lost(), inbox.missing()),
+        (None, Some(&at(3)), Some(Refusal::PositionUnknown))
+    );
     let taken = inbox.take();
-    assert_eq!((taken.state(), taken.adrift(), taken.missing()), (None, Some(&at(3)), inbox.missing()));
+    assert_eq!((taken.state(), taken.position_lost(), taken.missing()), (None, Some(&at(3)), inbox.missing()));
     inbox.locate(at(4));
-    assert_eq!((inbox.adrift(), inbox.missing()), (None, None));
+    assert_eq!((inbox.position_lost(), inbox.missing()), (None, None));
     inbox.put_state(at(5));
     assert!(!inbox.is_own());
     // An estimate with nothing at all leaves what the link says.
-    inbox.put_adrift(None, Refusal::AttitudeUnknown);
-    assert_eq!((inbox.state(), inbox.adrift(), inbox.missing()), (Some(&at(5)), None, Some(Refusal::AttitudeUnknown)));
+    inbox.put_position_lost(None, Refusal::AttitudeUnknown);
+    assert_eq!(
+        (inbox.state(), inbox.position_lost(), inbox.missing()),
+        (Some(&at(5)), None, Some(Refusal::AttitudeUnknown))
+    );
 }
 
 /// News replace what they bring, and leave the rest.
@@ -146,17 +152,17 @@ fn news_are_merged() {
     let at = |at_us| Stamped { value: State::default(), at_us };
     let mut inbox = Inbox::EMPTY;
     inbox.put_state(at(1));
-    inbox.put_adrift(None, Refusal::HeadingUnknown);
+    inbox.put_position_lost(None, Refusal::HeadingUnknown);
     inbox.put_setpoint(Stamped { value: Setpoint::default(), at_us: 1 });
     inbox.inhibit(Refusal::BatteryLow.into());
     let before = inbox.clone();
     inbox.merge(&Inbox::EMPTY);
     assert_eq!(inbox, before);
     let mut news = Inbox::EMPTY;
-    news.put_adrift(Some(at(2)), Refusal::PositionUnknown);
+    news.put_position_lost(Some(at(2)), Refusal::PositionUnknown);
     news.inhibit(Refusal::SensorFailed.into());
     inbox.merge(&news);
-    assert_eq!((inbox.adrift(), inbox.missing()), (Some(&at(2)), Some(Refusal::PositionUnknown)));
+    assert_eq!((inbox.position_lost(), inbox.missing()), (Some(&at(2)), Some(Refusal::PositionUnknown)));
     assert_eq!((inbox.state(), inbox.inhibited()), (Some(&at(1)), Refusal::SensorFailed.into()));
     assert_eq!(inbox.take().inhibited(), Refusal::SensorFailed.into());
     inbox.inhibit(Reasons::NONE);

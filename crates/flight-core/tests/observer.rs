@@ -175,7 +175,8 @@ proptest! {
                 Event::Pose(value, age_us) => inbox.put_pose(Stamped { value, at_us: at(age_us) }),
                 Event::Lost(state) => {
                     let state = state.filter(State::is_plausible);
-                    inbox.put_adrift(state.map(|value| Stamped { value, at_us: now_us }), Refusal::PositionUnknown);
+                    let state = state.map(|value| Stamped { value, at_us: now_us });
+                    inbox.put_position_lost(state, Refusal::PositionUnknown);
                 }
                 Event::Nothing(wait) => ticks = wait,
             }

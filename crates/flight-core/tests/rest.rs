@@ -37,7 +37,7 @@ impl Bench {
         let vehicle = FlightCore::new(Parameters::PAPER.to_f32(), limits, controller()).expect("valid");
         let (memory, inbox, state) = (FlightCoreMemory::default(), Inbox::default(), State::default());
         let mut bench = Bench { vehicle, memory, now_us: 0, inbox, state };
-        bench.inbox.rest(rests);
+        bench.inbox.set_idle_on_ground(rests);
         bench.run(1001);
         assert_eq!(bench.ask(Request::Arm).answer.map(|answer| answer.result), Some(Ok(())));
         bench
@@ -93,10 +93,10 @@ fn the_law_begins_afresh_when_it_takes_off() {
     for flown in [0, 300] {
         let mut bench = Bench::armed(flown == 0);
         bench.run(flown + 1);
-        bench.inbox.rest(true);
+        bench.inbox.set_idle_on_ground(true);
         bench.state.position_m = Vector3::new(0.05, 0.0, 0.0);
         bench.run(50);
-        bench.inbox.rest(false);
+        bench.inbox.set_idle_on_ground(false);
         let (controller, mut memory) = (controller(), Validated::default());
         let target = Setpoint { position_m: Vector3::new(0.3, -0.2, 0.5), ..Setpoint::default() };
         for tick in 0..200 {
@@ -115,7 +115,7 @@ fn in_the_air_the_mark_has_no_effect() {
     let (mut plain, mut marked) = (Bench::armed(false), Bench::armed(false));
     for tick in 0..3000 {
         let airborne = tick > CARRIED_US / 1000;
-        marked.inbox.rest(airborne);
+        marked.inbox.set_idle_on_ground(airborne);
         for bench in [&mut plain, &mut marked] {
             let t = tick as f32 * 1e-3;
             bench.state.position_m = Vector3::new(0.1 * t, 0.0, 0.5 + 1e-6 * (tick % 2) as f32);
@@ -154,15 +154,18 @@ fn a_resting_vehicle_is_supervised() {
 #[test]
 fn the_mark_stays_until_it_is_changed() {
     let (mut inbox, mut news) = (Inbox::EMPTY, Inbox::EMPTY);
-    assert!(!inbox.rests());
-    inbox.rest(true);
+    assert!(!inbox.idle_on_ground());
+    inbox.set_idle_on_ground(true);
     inbox.merge(&news);
-    assert!(inbox.rests() && inbox.take().rests() && inbox.rests(), "news without a mark change nothing");
-    news.rest(false);
+    assert!(
+        inbox.idle_on_ground() && inbox.take().idle_on_ground() && inbox.idle_on_ground(),
+        "news without a mark change nothing"
+    );
+    news.set_idle_on_ground(false);
     inbox.merge(&news);
-    assert!(!inbox.rests() && !inbox.take().rests());
+    assert!(!inbox.idle_on_ground() && !inbox.take().idle_on_ground());
     let mut taken = Inbox::EMPTY;
-    taken.rest(true);
+    taken.set_idle_on_ground(true);
     inbox.take_into(&mut taken);
-    assert!(!taken.rests(), "the copy of the last tick is replaced");
+    assert!(!taken.idle_on_ground(), "the copy of the last tick is replaced");
 }

@@ -324,9 +324,9 @@ proptest! {
 fn a_descent_without_a_position_counts_when_the_position_comes_back() {
     let (weight_n, gap_us, dt_s) = (10.0, 1000, 1e-3);
     let mut landing = LandDetector::new(&State::default(), weight_n);
-    let mut now = |state: &State, thrust_n: f32, adrift: bool, milliseconds: u32| {
+    let mut now = |state: &State, thrust_n: f32, position_lost: bool, milliseconds: u32| {
         for _ in 0..milliseconds {
-            if adrift {
+            if position_lost {
                 landing.advance_adrift(state, thrust_n, gap_us, dt_s);
             } else {
                 landing.advance(state, thrust_n, gap_us, dt_s);

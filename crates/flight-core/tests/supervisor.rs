@@ -74,10 +74,10 @@ fn in_flight_the_age_decides() {
                 let observed = SupervisorInputs { ready, state_age_us, attitude_age_us: state_age_us, ..CALM };
                 assert_eq!(mode.next(&observed), expected, "{mode:?}, {observed:?}");
                 // With an attitude the descent takes as long as it takes.
-                let adrift = SupervisorInputs { attitude_age_us: GIVE_UP_US, ..observed };
+                let attitude_lost = SupervisorInputs { attitude_age_us: GIVE_UP_US, ..observed };
                 let given_up = state_age_us > GIVE_UP_US && mode.armed();
                 let next = if given_up { Descending } else { expected };
-                assert_eq!(mode.next(&adrift), next, "{mode:?}, {adrift:?}");
+                assert_eq!(mode.next(&attitude_lost), next, "{mode:?}, {attitude_lost:?}");
             }
         }
     }

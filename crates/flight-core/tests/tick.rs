@@ -384,10 +384,10 @@ fn the_reasons_of_a_tick_are_its_answer() {
             let mut twin = Bench { memory: bench.memory, inbox: bench.inbox.clone(), ..Bench::new() };
             (twin.now_us, twin.noise_m) = (bench.now_us, bench.noise_m);
             twin.ask(Request::Arm);
-            let told = bench.tick(state, setpoint).against;
+            let received = bench.tick(state, setpoint).against;
             let asked = twin.tick(state, setpoint);
-            assert_eq!((asked.answer, asked.against), (answer(Request::Arm, told.verdict()), told));
-            assert_eq!(told.contains(Refusal::NotAtRest), !bench.memory.rested());
+            assert_eq!((asked.answer, asked.against), (answer(Request::Arm, received.verdict()), received));
+            assert_eq!(received.contains(Refusal::NotAtRest), !bench.memory.rested());
         }
     }
     bench.ask(Request::Arm);

@@ -53,7 +53,7 @@ pub struct Guided {
     /// Setpoint for the flight core; none without a state.
     pub setpoint: Option<Setpoint>,
     /// True if the vehicle is armed and stays on the ground: its motors idle.
-    pub rests: bool,
+    pub idle_on_ground: bool,
     /// A request to the flight core, repeated until it is granted.
     pub request: Option<Request>,
     /// Ticket and answer of the first of [`Orders::given`].
@@ -281,14 +281,14 @@ impl Memory {
                 None
             }
         };
-        let (setpoint, rests) = flight.map_or((None, armed && !airborne), |(setpoint, rests)| (setpoint, rests));
+        let (setpoint, idle_on_ground) = flight.unwrap_or((None, armed && !airborne));
         if !armed {
             self.against = self.against(settings, given, state);
         }
-        let request = self.disarms(settings, armed, airborne, rests, held, dt_s, &mut reached, &mut notices);
+        let request = self.disarms(settings, armed, airborne, idle_on_ground, held, dt_s, &mut reached, &mut notices);
         Guided {
             setpoint,
-            rests,
+            idle_on_ground,
             request,
             answer,
             mode: self.mode,
@@ -345,13 +345,13 @@ impl Memory {
         settings: &Settings,
         armed: bool,
         airborne: bool,
-        rests: bool,
+        idle_on_ground: bool,
         held: FailsafeAction,
         dt_s: f32,
         reached: &mut Option<u16>,
         notices: &mut Notices,
     ) -> Option<Request> {
-        if !armed || airborne || !rests {
+        if !armed || airborne || !idle_on_ground {
             (self.ground_s, self.disarms) = (0.0, false);
             return None;
         }

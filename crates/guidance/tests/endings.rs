@@ -28,9 +28,9 @@ fn after_a_flight_it_holds() {
         (fixture.core, fixture.airborne) = (Mode::Disarmed, false);
         let guided = fixture.tick();
         assert_eq!((guided.mode, guided.request), (becomes, None));
-        let told: &[Notice] =
+        let reported: &[Notice] =
             if mode == becomes { &[] } else { &[Notice::Mode(FlightMode::Hold, ModeReason::Disarmed)] };
-        assert_eq!(fixture.said, told, "{mode:?}");
+        assert_eq!(fixture.said, reported, "{mode:?}");
     }
 }
 
@@ -188,7 +188,7 @@ fn a_takeoff_without_lift_is_given_up() {
         (fixture.airborne, fixture.state) = (airborne, Some(at(1.0, 2.0, 3.0 + up_m)));
         fixture.said.clear();
         let gives_up = (1..12_000).find(|_| fixture.tick().notices.iter().next().is_some());
-        (gives_up, fixture.guidance.mode(), fixture.said.clone(), fixture.tick().rests)
+        (gives_up, fixture.guidance.mode(), fixture.said.clone(), fixture.tick().idle_on_ground)
     };
     let exhausted = Some(2.0 * G);
     let (after, mode, said, rests) = takes_off(false, None, 0.0);
@@ -300,8 +300,8 @@ fn a_mission_may_end_in_another_mode() {
         let modes = [FlightMode::Mission, FlightMode::Return];
         let reasons = [ModeReason::Ordered, ModeReason::Mission];
         let expected = modes.into_iter().zip(reasons).map(|(mode, reason)| Notice::Mode(mode, reason));
-        let told: Vec<_> = fixture.said.iter().filter(|notice| **notice != Notice::Disarms).copied().collect();
-        assert_eq!(told, expected.collect::<Vec<_>>());
+        let reported: Vec<_> = fixture.said.iter().filter(|notice| **notice != Notice::Disarms).copied().collect();
+        assert_eq!(reported, expected.collect::<Vec<_>>());
     }
 }
 

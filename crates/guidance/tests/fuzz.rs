@@ -142,7 +142,7 @@ fn check(
     prop_assert_eq!(guided.answer.is_some(), !orders.given.is_empty());
     prop_assert!(guided.notices.iter().all(|notice| notice.to_string().len() <= 50));
     prop_assert!(guided.charge.is_none_or(|charge| (0.0..=1.0).contains(&charge)));
-    prop_assert!(!guided.rests || sight.core.armed());
+    prop_assert!(!guided.idle_on_ground || sight.core.armed());
     prop_assert!(guided.home_m.is_none_or(|home_m| home_m.iter().all(|value| value.is_finite())));
     let Some(setpoint) = &guided.setpoint else { return Ok(()) };
     prop_assert!(setpoint.is_plausible(), "{:?}", setpoint);

@@ -13,7 +13,7 @@ fn armed_on_the_ground_it_rests_and_is_disarmed() {
     let mut bench = Bench::new(settings());
     bench.run(1.5);
     bench.arm();
-    assert!(bench.tick().rests);
+    assert!(bench.tick().idle_on_ground);
     bench.run(8.0);
     assert!(bench.core.armed());
     bench.run(3.0);

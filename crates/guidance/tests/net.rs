@@ -196,8 +196,8 @@ fn a_disarming_is_announced_once_however_long_it_has_stood() {
         bench.heard = false;
         bench.run_until(3.0, |guided| guided.request.is_some());
         bench.run(1.0);
-        let told = bench.said.iter().filter(|notice| **notice == Notice::Disarms).count();
-        assert_eq!((told, bench.core), (1, Mode::Disarmed), "{:?}", bench.said);
+        let reported = bench.said.iter().filter(|notice| **notice == Notice::Disarms).count();
+        assert_eq!((reported, bench.core), (1, Mode::Disarmed), "{:?}", bench.said);
     }
 }
 

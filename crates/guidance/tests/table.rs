@@ -221,10 +221,10 @@ fn follow(bench: &mut Bench, asked: Option<Order>) -> Result<(), TestCaseError> 
         prop_assert!(guided.mode == wanted || ended);
     }
     // It rests only where it stands, and asks to stop the motors only there.
-    prop_assert!(!guided.rests || was_armed);
+    prop_assert!(!guided.idle_on_ground || was_armed);
     if bench.airborne() {
         prop_assert!(guided.request.is_none());
-        prop_assert!(!guided.rests, "{:?}", bench.state);
+        prop_assert!(!guided.idle_on_ground, "{:?}", bench.state);
     }
     if let Some(setpoint) = guided.setpoint {
         prop_assert!(setpoint.is_plausible());

@@ -219,12 +219,12 @@ fn an_implausible_state_is_none() {
     fixture.follows = false;
     fixture.state = Some(at(NAN, 0.0, 0.0));
     let guided = fixture.tick();
-    assert_eq!((guided.setpoint, guided.rests), (None, false));
+    assert_eq!((guided.setpoint, guided.idle_on_ground), (None, false));
     assert_eq!(fixture.select(FlightMode::Hold), Err(OrderRefusal::NoPosition));
     fixture.airborne = false;
-    assert!(fixture.tick().rests, "armed on the ground");
+    assert!(fixture.tick().idle_on_ground, "armed on the ground");
     fixture.core = Mode::Disarmed;
-    assert!(!fixture.tick().rests);
+    assert!(!fixture.tick().idle_on_ground);
 }
 
 /// Through a gap of the state the motion goes on as it was, in the air only.

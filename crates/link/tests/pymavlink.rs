@@ -121,8 +121,8 @@ fn clocks_and_parameters_are_read() {
 
 #[test]
 fn places_are_read_and_written() {
-    let told = |name, telemetry| check_both(name, &Downlink::Telemetry(telemetry));
-    told(
+    let both = |name, telemetry| check_both(name, &Downlink::Telemetry(telemetry));
+    both(
         "<GLOBAL_POSITION_INT",
         Telemetry::Global(GlobalPosition {
             time_ms: 5,
@@ -133,7 +133,7 @@ fn places_are_read_and_written() {
             heading_cdeg: 35_999,
         }),
     );
-    told(
+    both(
         "<GPS_RAW_INT",
         Telemetry::Fix(Fix {
             time_us: 9,
@@ -147,7 +147,7 @@ fn places_are_read_and_written() {
         }),
     );
     let (place_e7, altitude_mm, time_us) = ([1, 2], 3, 99);
-    told("<GPS_GLOBAL_ORIGIN", Telemetry::Origin(GlobalOrigin { place_e7, altitude_mm, time_us }));
+    both("<GPS_GLOBAL_ORIGIN", Telemetry::Origin(GlobalOrigin { place_e7, altitude_mm, time_us }));
     let (position_m, attitude) = (Vector3::new(4.0, -5.0, -6.0), [1.0, 0.0, -0.0, -0.0]);
     // Read alone: zeros change their signs with the frames.
     check(
@@ -158,10 +158,10 @@ fn places_are_read_and_written() {
 
 #[test]
 fn telemetry_is_read_and_written() {
-    let told = |name, telemetry| check_both(name, &Downlink::Telemetry(telemetry));
+    let both = |name, telemetry| check_both(name, &Downlink::Telemetry(telemetry));
     let (attitude, rates_rad_s) = ([0.5, 0.25, 0.5, -0.75], Vector3::new(1.0, -2.0, -3.0));
-    told("<ATTITUDE_QUATERNION", Telemetry::Attitude(AttitudeQuaternion { time_ms: 5, attitude, rates_rad_s }));
-    told(
+    both("<ATTITUDE_QUATERNION", Telemetry::Attitude(AttitudeQuaternion { time_ms: 5, attitude, rates_rad_s }));
+    both(
         "<SYS_STATUS",
         Telemetry::System(SystemStatus {
             present: 7,
@@ -174,7 +174,7 @@ fn telemetry_is_read_and_written() {
             dropped_frames: 11,
         }),
     );
-    told(
+    both(
         "<BATTERY_STATUS",
         Telemetry::Battery(BatteryStatus {
             voltage_mv: 16_100,
@@ -184,14 +184,14 @@ fn telemetry_is_read_and_written() {
             charge: 1,
         }),
     );
-    told("<EXTENDED_SYS_STATE", Telemetry::Landed(2));
+    both("<EXTENDED_SYS_STATE", Telemetry::Landed(2));
     let sigma_m = [0.5, 0.75];
-    told("<ESTIMATOR_STATUS", Telemetry::Estimator(EstimatorStatus { time_us: 9, flags: 831, sigma_m }));
+    both("<ESTIMATOR_STATUS", Telemetry::Estimator(EstimatorStatus { time_us: 9, flags: 831, sigma_m }));
     let throttles = [0.25, 0.5, 0.75, 1.0, 0.0, 0.0, 0.0, 0.0];
-    told("<ACTUATOR_OUTPUT_STATUS", Telemetry::Outputs(ActuatorOutputs { time_us: 9, active: 4, throttles }));
+    both("<ACTUATOR_OUTPUT_STATUS", Telemetry::Outputs(ActuatorOutputs { time_us: 9, active: 4, throttles }));
     let (software, commit) = ([1, 2, 3, 255], [1, 2, 3, 4, 5, 6, 7, 8]);
-    told("<AUTOPILOT_VERSION", Telemetry::Version(Version { capabilities: 8706, uid: 77, software, commit }));
-    told(
+    both("<AUTOPILOT_VERSION", Telemetry::Version(Version { capabilities: 8706, uid: 77, software, commit }));
+    both(
         "<VFR_HUD",
         Telemetry::Summary(VfrHud {
             speed_m_s: 1.5,

@@ -9,7 +9,7 @@ use afbc_flight_core::ArmingLimits;
 use afbc_flight_core::motor::{Curve, Response};
 use afbc_types::{Airframe, Mounting, Parameters, PerAxis};
 
-/// What the firmware is told of the vehicle that it flies; `vehicles/` has one for each.
+/// What the firmware knows of the vehicle that it flies; `vehicles/` has one for each.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Configuration<const N: usize = 4> {
     /// Nominal parameters and rotors.

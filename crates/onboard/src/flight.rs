@@ -25,7 +25,7 @@ pub struct Flight<const N: usize = 4> {
     /// True if the state of the last tick was observed.
     observes: bool,
     /// True if an armed vehicle was to rest on the ground in the last tick.
-    rests: bool,
+    idle_on_ground: bool,
     saturated_ticks: u32,
 }
 
@@ -137,7 +137,7 @@ impl<const N: usize> Flight<N> {
             guide,
             timeouts: SensorTimeouts::default(),
             observes: false,
-            rests: false,
+            idle_on_ground: false,
             saturated_ticks: 0,
         })
     }
@@ -171,12 +171,12 @@ impl<const N: usize> Flight<N> {
         // One that repeats itself has failed, too.
         sensors.inertial |= self.observes;
         let (mode, airborne, rested) = (self.memory.mode(), self.memory.airborne(), self.memory.rested());
-        self.front_end.set_on_ground(!mode.armed() || self.rests && !airborne);
+        self.front_end.set_on_ground(!mode.armed() || self.idle_on_ground && !airborne);
         let estimate = self.front_end.tick(now_us, readings, &mut inputs.inbox);
         let observed = if self.observes { self.memory.state().copied() } else { None };
         let core = Core { mode, airborne, rested, sensors, observed };
         let guided = self.guide.tick(now_us, inputs, &core);
-        self.rests = inputs.inbox.rests();
+        self.idle_on_ground = inputs.inbox.idle_on_ground();
         let outcome = self.vehicle.tick(&mut self.memory, now_us, &inputs.inbox);
         self.guide.gave(outcome.forces.0.iter().sum());
         self.observes = outcome.health.observed;

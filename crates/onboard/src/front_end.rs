@@ -183,7 +183,7 @@ fn publish(estimate: &Estimate, state: State, now_us: u64, inbox: &mut Inbox) {
     };
     match missing {
         None => inbox.locate(stamped),
-        Some(missing) => inbox.put_adrift(Some(stamped).filter(|_| validity.attitude), missing),
+        Some(missing) => inbox.put_position_lost(Some(stamped).filter(|_| validity.attitude), missing),
     }
 }
 

@@ -38,7 +38,7 @@ pub struct GuidanceResult {
     pub charge: Option<f32>,
 }
 
-/// The guidance of a vehicle, and what it is told of it.
+/// The guidance of a vehicle, and what it knows of it.
 #[derive(Clone, Debug)]
 pub(crate) struct Guide {
     guidance: Guidance,
@@ -92,8 +92,8 @@ impl Guide {
     #[inline(always)]
     pub(crate) fn tick(&mut self, now_us: u64, inputs: &mut ControlInputs, core: &Core) -> GuidanceResult {
         let ControlInputs { inbox, orders, battery, .. } = inputs;
-        let told = inbox.state().filter(|state| state.age_us(now_us) <= COAST_US);
-        let state = told.map(|state| &state.value).or(core.observed.as_ref());
+        let fresh = inbox.state().filter(|state| state.age_us(now_us) <= COAST_US);
+        let state = fresh.map(|state| &state.value).or(core.observed.as_ref());
         let dt_s = now_us.saturating_sub(self.last_us) as f32 * 1e-6;
         self.last_us = now_us;
         let sight = GuidanceInputs {
@@ -111,7 +111,7 @@ impl Guide {
         if let Some(value) = guided.setpoint {
             inbox.put_setpoint(Stamped { value, at_us: now_us });
         }
-        inbox.rest(guided.rests);
+        inbox.set_idle_on_ground(guided.idle_on_ground);
         inbox.inhibit(guided.against);
         if let Some(request) = guided.request {
             // A station's request goes first.

@@ -223,11 +223,11 @@ fn upon(reference: &Setpoint) -> Motion {
 }
 
 /// Distance from the eight after two of its rounds, largest \[m\].
-fn off_the_eight<C: FlightController>(controller: &C, rig: Rig, period_s: f64, told: impl Fn(&mut Setpoint)) -> f64 {
+fn off_the_eight<C: FlightController>(controller: &C, rig: Rig, period_s: f64, adjust: impl Fn(&mut Setpoint)) -> f64 {
     let path = eight(period_s);
     let reference = |t| {
         let mut setpoint = path(t);
-        told(&mut setpoint);
+        adjust(&mut setpoint);
         setpoint
     };
     let times = [period_s, 3.0 * period_s];
@@ -267,7 +267,7 @@ fn jerk_and_snap_keep_dfbc_on_its_path() {
 
 /// What INDI is told of the rotors need not be exact.
 #[test]
-fn indi_flies_rotors_of_half_to_twice_the_lag_it_is_told() {
+fn indi_flies_rotors_of_half_to_twice_the_lag_it_knows() {
     for lag_s in [0.01, 0.015, 0.02, 0.03, 0.04] {
         let off = off_the_eight(&indi(), Rig { lag_s, ..Rig::ALL }, 6.0, |_| ());
         assert!(off < 0.003, "{off} m with a lag of {lag_s} s");

@@ -47,7 +47,7 @@ fn a_perfect_one_sends_the_truth_at_once_at_its_rate() {
 /// A fix arrives in the first step after its delay, which is uniform within the jitter, and its stamp is the time of
 /// its motion.
 #[test]
-fn delays_are_spread_as_declared_and_stamps_tell_them() {
+fn delays_are_spread_as_declared_and_stamps_show_them() {
     let tracker = TrackerModel { delay_s: 0.0105, jitter_s: 0.004, rate_hz: 250.0, ..TrackerModel::DEFAULT };
     let fixes = fixes(tracker, 2, 200_000);
     let mut late = Vec::new();

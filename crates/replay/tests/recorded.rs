@@ -42,8 +42,8 @@ fn rest_before_the_first_fix_is_rest() {
     for name in ["px4_sitl_hover.ulg", "ecl_iris_gps.csv"] {
         let Some(mut recording) = shared(name) else { continue };
         // Where nobody tells that it stands, too; and where no fix ever comes.
-        for (told, fixes) in [(true, true), (false, true), (true, false)] {
-            if !told {
+        for (stated, fixes) in [(true, true), (false, true), (true, false)] {
+            if !stated {
                 recording.landed.clear();
                 recording.disarmed.clear();
             }
@@ -72,11 +72,11 @@ fn rest_before_the_first_fix_is_rest() {
 /// A magnetometer in a field that is not the earth's, which lies level instead of dipping by 74 degrees: its heading
 /// counts as unknown. That of the log's own estimate turns by 12 degrees meanwhile, though the vehicle stands.
 #[test]
-fn a_field_that_is_not_the_earths_tells_no_heading() {
+fn a_field_that_is_not_the_earths_gives_no_heading() {
     let Some(recording) = shared("sample_log_small.ulg") else { return };
     let replayed = fly(&recording, None).unwrap();
-    let told = recording.notes.iter().any(|note| note.contains("magnetometer") && note.contains("calibrate"));
-    assert!(told, "{:?}", recording.notes);
+    let stated = recording.notes.iter().any(|note| note.contains("magnetometer") && note.contains("calibrate"));
+    assert!(stated, "{:?}", recording.notes);
     for row in &replayed.rows {
         let Some((ours, turn)) = row.ours.zip(row.turn_rad()) else { continue };
         let sigma = f64::from(ours.sigmas.attitude_rad.z);

@@ -130,7 +130,7 @@ fn a_log_that_begins_in_the_air_starts_in_its_own_state() {
 
 /// The log's position jumps by 10 m with its reference: the place is the same, and the reset is told.
 #[test]
-fn resets_of_the_log_are_told_and_its_references_followed() {
+fn resets_of_the_log_are_reported_and_its_references_followed() {
     let (recording, replayed) = replay("reset.ulg", &log(&Kind { reset_s: 17.0, ..Kind::default() }));
     agrees(&replayed, "reset");
     assert_eq!(recording.resets.len(), 1, "{:?}", recording.resets);

@@ -10,7 +10,7 @@ use roxmltree::{Document, Node};
 use std::collections::BTreeSet;
 
 #[test]
-fn events_that_overlap_are_told_apart_and_each_has_its_label() {
+fn events_that_overlap_are_distinguished_and_each_has_its_label() {
     let out = folder("events");
     flights::write(&open(&out), &flown(&eventful(), &["afbc"]), &[]).unwrap();
     // Start and end of each shaded event, in seconds.
@@ -84,7 +84,7 @@ fn events_that_overlap_are_told_apart_and_each_has_its_label() {
 }
 
 #[test]
-fn two_of_the_same_that_overlap_are_told_apart() {
+fn two_of_the_same_that_overlap_are_distinguished() {
     let mut two = eventful();
     two.environment = Environment::new(
         two.vehicle,

@@ -81,7 +81,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_lost_is_told_and_not_caught_up_with() {
+    fn what_is_lost_is_reported_and_not_caught_up_with() {
         let mut pace = Pace::new(1.0, Duration::ZERO);
         assert_eq!(pace.step(MS / 2), Wait::For(MS / 2));
         // A little is caught up with.

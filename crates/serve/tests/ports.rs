@@ -27,12 +27,12 @@ fn socket() -> UdpSocket {
 
 /// Runs `server` for so many milliseconds at the time `now`.
 fn steps(server: &mut Server, ports: &mut Ports, milliseconds: u32, now: Duration) -> Vec<String> {
-    let mut told = Vec::new();
+    let mut reported = Vec::new();
     for _ in 0..milliseconds {
-        ports.receive(server, now, |line| told.push(line.into()));
-        let _ = server.step(|vehicle, bytes| ports.send(vehicle, bytes), |line| told.push(line.into()));
+        ports.receive(server, now, |line| reported.push(line.into()));
+        let _ = server.step(|vehicle, bytes| ports.send(vehicle, bytes), |line| reported.push(line.into()));
     }
-    told
+    reported
 }
 
 /// Returns the datagrams that wait.
@@ -83,8 +83,8 @@ fn stations_get_heartbeats_and_whoever_asks_gets_everything() {
 
     other.send_to(&command(), vehicle).unwrap();
     station.send_to(&command(), vehicle).unwrap();
-    let told = steps(&mut server, &mut ports, 200, Duration::from_secs(3));
-    assert_eq!(told.len(), 2, "{told:?}");
+    let reported = steps(&mut server, &mut ports, 200, Duration::from_secs(3));
+    assert_eq!(reported.len(), 2, "{reported:?}");
     let (at_station, at_other) = (messages(&datagrams(&station)), messages(&datagrams(&other)));
     // Every frame goes to all peers; the answers are for both.
     assert_eq!(at_station, at_other);
@@ -93,8 +93,8 @@ fn stations_get_heartbeats_and_whoever_asks_gets_everything() {
 
     station.send_to(&command(), vehicle).unwrap();
     steps(&mut server, &mut ports, 20, Duration::from_secs(50));
-    let told = steps(&mut server, &mut ports, 2000, Duration::from_secs(64));
-    assert_eq!(told, [format!("2.720 vehicle 1: udp {} gone", other.local_addr().unwrap())]);
+    let reported = steps(&mut server, &mut ports, 2000, Duration::from_secs(64));
+    assert_eq!(reported, [format!("2.720 vehicle 1: udp {} gone", other.local_addr().unwrap())]);
     let _ = datagrams(&other);
     steps(&mut server, &mut ports, 100, Duration::from_secs(64));
     assert!(datagrams(&other).is_empty() && !datagrams(&station).is_empty());
@@ -122,15 +122,15 @@ fn tcp_streams_are_peers_too() {
     let (half, rest) = (command()[..9].to_vec(), command()[9..].to_vec());
     here.write_all(&half).unwrap();
     there.write_all(&half).unwrap();
-    let mut told = Vec::new();
-    while told.len() < 2 {
-        told.extend(steps(&mut server, &mut ports, 1, Duration::ZERO));
+    let mut reported = Vec::new();
+    while reported.len() < 2 {
+        reported.extend(steps(&mut server, &mut ports, 1, Duration::ZERO));
     }
     drop(there);
-    while told.len() < 3 {
-        told.extend(steps(&mut server, &mut ports, 1, Duration::ZERO));
+    while reported.len() < 3 {
+        reported.extend(steps(&mut server, &mut ports, 1, Duration::ZERO));
     }
-    assert!(told[2].ends_with("gone"), "{told:?}");
+    assert!(reported[2].ends_with("gone"), "{reported:?}");
     here.write_all(&rest).unwrap();
     here.set_nonblocking(true).unwrap();
     let (mut decoder, mut heard, mut buffer) = (Decoder::<Downlink>::new(STATION), 0, [0; 65_536]);
@@ -153,12 +153,12 @@ fn a_stream_that_is_not_read_is_closed() {
     let (mut server, mut ports) = (served(1), Ports::open(&free(), 1).unwrap());
     let address = ports.addresses().unwrap()[0].1.unwrap();
     let _deaf = TcpStream::connect(address).unwrap();
-    let mut told = Vec::new();
-    while told.len() < 2 {
-        told.extend(steps(&mut server, &mut ports, 1000, Duration::ZERO));
-        assert!(server.now_s() < 3600.0, "{told:?}");
+    let mut reported = Vec::new();
+    while reported.len() < 2 {
+        reported.extend(steps(&mut server, &mut ports, 1000, Duration::ZERO));
+        assert!(server.now_s() < 3600.0, "{reported:?}");
     }
-    assert!(told[1].ends_with("gone"), "{told:?}");
+    assert!(reported[1].ends_with("gone"), "{reported:?}");
 }
 
 #[test]
@@ -177,13 +177,13 @@ fn a_port_that_is_taken_is_named_with_the_cure() {
 fn in_lockstep_lines_drive_the_clock() {
     let session = |text: &'static str| {
         let (mut server, mut ports) = (served(1), Ports::open(&free(), 1).unwrap());
-        let mut told = Vec::new();
+        let mut reported = Vec::new();
         let (mut lines, stop) = (Lines::of(Cursor::new(text)), AtomicBool::new(false));
         let end =
-            run(&mut server, &mut ports, TimeRate::Lockstep, &mut lines, &stop, |line| told.push(line.to_owned()));
-        (end, server.now_s(), told)
+            run(&mut server, &mut ports, TimeRate::Lockstep, &mut lines, &stop, |line| reported.push(line.to_owned()));
+        (end, server.now_s(), reported)
     };
-    let (end, now_s, told) = session("step 250\nspeed 2\nwind 1 0 0\nstep 50\nnonsense");
+    let (end, now_s, reported) = session("step 250\nspeed 2\nwind 1 0 0\nstep 50\nnonsense");
     assert_eq!((end, now_s), (RunEnd::Silent, 0.3));
     let wanted = [
         "ok step 250",
@@ -192,22 +192,23 @@ fn in_lockstep_lines_drive_the_clock() {
         "ok step 50",
         "error \"nonsense\": no such command; help lists the commands",
     ];
-    assert_eq!(told, wanted);
+    assert_eq!(reported, wanted);
     assert_eq!(session("step 10\nquit\nstep 10"), (RunEnd::Quit, 0.01, vec!["ok step 10".into(), "ok quit".into()]));
     let (end, now_s, _) = session("at 0.1 quit\nstep 1000");
     assert_eq!((end, now_s), (RunEnd::Quit, 0.101));
 }
 
 #[test]
-fn as_fast_as_possible_it_ends_when_it_is_told() {
+fn as_fast_as_possible_it_ends_when_asked_to() {
     let (mut server, mut ports) = (served(1), Ports::open(&free(), 1).unwrap());
     assert_eq!(server.line("at 30 quit").lines, ["ok at 30 quit"]);
     let (mut lines, stop) = (Lines::of(Cursor::new("step 5")), AtomicBool::new(false));
-    let mut told = Vec::new();
-    let end = run(&mut server, &mut ports, TimeRate::Times(0.0), &mut lines, &stop, |line| told.push(line.to_owned()));
+    let mut reported = Vec::new();
+    let end =
+        run(&mut server, &mut ports, TimeRate::Times(0.0), &mut lines, &stop, |line| reported.push(line.to_owned()));
     assert_eq!(end, RunEnd::Quit);
     assert!((server.now_s() - 30.001).abs() < 1e-9);
-    assert!(told.contains(&"error step: time goes on by itself; start with --lockstep".into()), "{told:?}");
+    assert!(reported.contains(&"error step: time goes on by itself; start with --lockstep".into()), "{reported:?}");
     stop.store(true, std::sync::atomic::Ordering::Relaxed);
     let end = run(&mut server, &mut ports, TimeRate::Lockstep, &mut lines, &stop, |_| ());
     assert_eq!(end, RunEnd::Stopped);

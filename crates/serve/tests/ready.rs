@@ -32,7 +32,7 @@ fn whoever_arms_once_home_is_known_is_not_refused() {
                         asked = true;
                         say(&mut server, Command::Arm);
                     }
-                    Downlink::Answer { command: ARM, answer: told, .. } => answer = Some(told),
+                    Downlink::Answer { command: ARM, answer: reported, .. } => answer = Some(reported),
                     _ => {}
                 }
             }

@@ -153,7 +153,7 @@ fn what_is_sent_to_one_vehicle_reaches_no_other() {
 }
 
 #[test]
-fn faults_and_weather_change_what_flies_and_are_told() {
+fn faults_and_weather_change_what_flies_and_are_reported() {
     let mut server = served("outdoor", 2);
     run(&mut server, 2000);
     let wind = |server: &Server, place: usize| server.vehicles()[place].world().plant().telemetry().unwrap().wind_m_s;
@@ -176,8 +176,8 @@ fn faults_and_weather_change_what_flies_and_are_told() {
     ok(&mut server, "battery 0.2");
     ok(&mut server, "clear");
     run(&mut server, 1);
-    let told = status(&mut server);
-    assert!(!told.contains("rotor") && told.matches(" 20 %").count() == 2, "{told}");
+    let reported = status(&mut server);
+    assert!(!reported.contains("rotor") && reported.matches(" 20 %").count() == 2, "{reported}");
     assert!((wind(&server, 1) - wind(&server, 0)).norm() > 0.0, "turbulence is the scenario's again");
 }
 
@@ -202,10 +202,10 @@ fn lines_with_a_time_are_carried_out_then_and_in_order() {
     for line in ["at 0.3 battery 0.3", "at 0.1 battery 0.1", "at 0.3 battery 0.5", "at 0.2 quit", "at 0.4 speed 3"] {
         ok(&mut server, line);
     }
-    let mut told = Vec::new();
+    let mut reported = Vec::new();
     let mut ends = Vec::new();
     for step in 0..500 {
-        match server.step(|_, _| (), |line| told.push(line.to_owned())) {
+        match server.step(|_, _| (), |line| reported.push(line.to_owned())) {
             Then::Nothing => {}
             then => ends.push((step, then)),
         }
@@ -218,7 +218,7 @@ fn lines_with_a_time_are_carried_out_then_and_in_order() {
         "0.300 ok at 0.3 battery 0.5",
         "0.400 ok at 0.4 speed 3",
     ];
-    assert_eq!(told, wanted);
+    assert_eq!(reported, wanted);
     assert!(status(&mut server).contains("50 %"));
     assert_eq!(server.line("at 0.4 battery 1").lines, ["error 0.4 s are over; it is 0.500 s"]);
 }

@@ -262,7 +262,7 @@ impl Comms {
         change
     }
 
-    /// Notes what the pilot is to be told of a tick.
+    /// Queues what is to be announced of a tick.
     fn watch<const N: usize>(&mut self, report: &Report<N>) {
         let Comms { dispatcher, failsafes, tick, .. } = self;
         let warning = MavSeverity::MAV_SEVERITY_WARNING;

@@ -67,9 +67,9 @@ pub(crate) struct Dispatcher {
     given: Option<(u16, u16)>,
     /// The item that was reached last.
     reached: Option<u16>,
-    /// When the guidance was last told that the station in control is there \[us\].
+    /// When the guidance last learned that the station in control is there \[us\].
     heard_us: Option<u64>,
-    /// Wish to be told what speaks against arming, and whether one of the stations that have it may arm.
+    /// Wish to know what speaks against arming, and whether one of the stations that have it may arm.
     checks: Option<bool>,
     /// True if the shell can reboot.
     reboots: bool,
@@ -193,7 +193,7 @@ impl Dispatcher {
         Downlink::Mission { message: Mission::Current(current), to: Address::default() }
     }
 
-    /// True if `from` is in control, from now on if nobody was. Another one is told.
+    /// True if `from` is in control, from now on if nobody was. Another one is informed.
     fn may(&mut self, from: Address, inputs: &mut ControlInputs) -> bool {
         let claim = self.control.claim(from, self.now_us);
         self.warn_not_in_control(from, claim);

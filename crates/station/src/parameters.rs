@@ -22,7 +22,7 @@ pub struct Heard {
     pub change: Option<RecordChange>,
     /// Line to the station: why nothing has changed.
     pub refused: Option<Reason>,
-    /// What the station is told that has named what there is not.
+    /// Answer to a station that has named what there is not.
     pub error: Option<ParameterError>,
 }
 

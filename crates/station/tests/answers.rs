@@ -68,9 +68,9 @@ fn commands() -> impl Strategy<Value = Command> {
     ]
 }
 
-fn sorted(mut told: Vec<Told>) -> Vec<Told> {
-    told.sort_by_key(|told| format!("{told:?}"));
-    told
+fn sorted(mut reported: Vec<Told>) -> Vec<Told> {
+    reported.sort_by_key(|reported| format!("{reported:?}"));
+    reported
 }
 
 proptest! {
@@ -83,7 +83,7 @@ proptest! {
         ),
     ) {
         let mut bench = Bench::new();
-        let (mut told, mut due, mut holder) = (Vec::new(), Vec::new(), None);
+        let (mut reported, mut due, mut holder) = (Vec::new(), Vec::new(), None);
         for tick in asked {
             // The flight core answers one request per tick; of other answers three are sent per tick.
             prop_assert!(answers(&bench.step().1).is_empty());
@@ -96,9 +96,9 @@ proptest! {
                     all += 1;
                 }
             }
-            told.extend(listen(&mut bench, QUEUE_MAX + all / ANSWERS_PER_TICK));
+            reported.extend(listen(&mut bench, QUEUE_MAX + all / ANSWERS_PER_TICK));
         }
-        prop_assert_eq!(sorted(told), sorted(due));
+        prop_assert_eq!(sorted(reported), sorted(due));
     }
 
     /// More commands than there is room for: requests that the flight core cannot accept are refused, commands that
@@ -111,18 +111,18 @@ proptest! {
         for (command, from) in &asked {
             bench.hear_from(*from, Uplink::Command(*command));
         }
-        let (mut told, mut unanswered) = (0, 0.0);
+        let (mut reported, mut unanswered) = (0, 0.0);
         for _ in 0..200 {
             let (_, said) = bench.step();
             prop_assert!(answers(&said).len() <= 1 + ANSWERS_PER_TICK);
-            told += answers(&said).len();
+            reported += answers(&said).len();
             for message in said {
                 if let Downlink::Health(health) = message {
                     unanswered = f64::from(health.unanswered);
                 }
             }
         }
-        prop_assert_eq!(told + unanswered as usize, asked.len());
+        prop_assert_eq!(reported + unanswered as usize, asked.len());
         let mut holder = None;
         let refused = |(command, from): &&(Command, Address)| {
             expected(*command, *from, &mut holder) == Answer::Refused(NOT_IN_CONTROL)
@@ -200,7 +200,7 @@ fn only_the_forced_one_disarms_in_flight() {
 
 /// Every refusal of the flight core is sent with its number and its text.
 #[test]
-fn every_refusal_is_told_with_its_reason() {
+fn every_refusal_is_reported_with_its_reason() {
     for request in [Request::Arm, Request::Disarm, Request::Engage] {
         for refusal in Refusal::ALL {
             let mut bench = Bench::new();
@@ -234,15 +234,15 @@ fn a_kill_is_always_accepted() {
     bench.hear_from(second, Uplink::Command(Command::Kill));
     bench.hear_from(third, Uplink::Command(Command::Kill));
     assert!(bench.inputs.inbox.kills());
-    let told = listen(&mut bench, 30);
-    assert_eq!(told.len(), 22);
-    let of = |answer| told.iter().filter(|told| **told == (400, answer, STATION)).count();
+    let reported = listen(&mut bench, 30);
+    assert_eq!(reported.len(), 22);
+    let of = |answer| reported.iter().filter(|reported| **reported == (400, answer, STATION)).count();
     assert_eq!(of(Answer::Refused(BUSY)), 20 - (QUEUE_MAX - 1));
     assert_eq!(
         of(Answer::Refused(Refusal::Overtaken as i32)) + of(Answer::Refused(Refusal::StateStale as i32)),
         QUEUE_MAX - 1
     );
-    assert!(told.contains(&(400, Answer::Accepted, second)) && told.contains(&(400, Answer::Accepted, third)));
+    assert!(reported.contains(&(400, Answer::Accepted, second)) && reported.contains(&(400, Answer::Accepted, third)));
 }
 
 /// If the link falls behind, reports are dropped; requests of such ticks are answered with "failed", and their places
@@ -259,8 +259,8 @@ fn requests_whose_tick_went_unreported_fail() {
             bench.inputs.take_into(&mut bench.taken);
             bench.flight.tick(bench.now_us, &mut bench.taken, &afbc_onboard::Readings::NONE);
         }
-        let told = listen(&mut bench, FORGOTTEN_US as usize / 1000 + 10);
-        assert_eq!(told, [(400, Answer::Failed, STATION); QUEUE_MAX - 1]);
+        let reported = listen(&mut bench, FORGOTTEN_US as usize / 1000 + 10);
+        assert_eq!(reported, [(400, Answer::Failed, STATION); QUEUE_MAX - 1]);
     }
     bench.hear(Uplink::Command(Command::Disarm));
     assert_eq!(listen(&mut bench, 2), [(400, Answer::Accepted, STATION)]);

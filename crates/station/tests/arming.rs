@@ -65,7 +65,7 @@ fn refused(refusal: Refusal) -> (Answer, bool) {
 }
 
 #[test]
-fn the_guidance_refuses_with_its_reason_and_stations_are_told_before() {
+fn the_guidance_refuses_with_its_reason_and_stations_know_before() {
     let here = State::default();
     let mut well = bench();
     stand(&mut well, 1500, &here, &Readings::NONE);
@@ -100,19 +100,19 @@ fn the_guidance_refuses_with_its_reason_and_stations_are_told_before() {
 
 /// Whoever arms as soon as the vehicle says that it may be armed, is not refused; it is so within 1.1 s at rest.
 #[test]
-fn what_is_told_agrees_with_the_answer() {
+fn what_is_reported_agrees_with_the_answer() {
     let (here, moves) = (State::default(), State { velocity_m_s: Vector3::new(0.6, 0.0, 0.0), ..State::default() });
     let mut armable = Vec::new();
     for rest_ms in (800..1300).step_by(20) {
         let mut bench = Bench::new();
         stand(&mut bench, 2000, &moves, &Readings::NONE);
         stand(&mut bench, rest_ms, &here, &Readings::NONE);
-        let (answer, told) = arm(&mut bench, &here);
-        assert!(!told || answer == Answer::Accepted, "{rest_ms} ms: {answer:?}");
-        armable.push(told);
+        let (answer, reported) = arm(&mut bench, &here);
+        assert!(!reported || answer == Answer::Accepted, "{rest_ms} ms: {answer:?}");
+        armable.push(reported);
     }
     assert_eq!((armable.first(), armable.last()), (Some(&false), Some(&true)));
-    assert!(armable.iter().skip_while(|told| !**told).all(|told| *told));
+    assert!(armable.iter().skip_while(|reported| !**reported).all(|reported| *reported));
 }
 
 /// What a station is told that asks for everything at once: the answer to its wish to arm, the texts of the checks in
@@ -298,20 +298,20 @@ fn the_limits_of_the_parameters_count() {
         for _ in 0..spell.ticks {
             spell.tick(&mut bench);
         }
-        let told = ask(&mut bench, STATION, &spell);
+        let reported = ask(&mut bench, STATION, &spell);
         let (answer, text) = if ready {
             (Answer::Accepted, "ready to arm")
         } else {
             (Answer::Refused(Refusal::NotAtRest as i32), Refusal::NotAtRest.reason())
         };
-        assert_eq!((told.answer, told.armable), (answer, ready));
-        assert_eq!(told.checks.first(), Some(&Text::from(text)));
+        assert_eq!((reported.answer, reported.armable), (answer, ready));
+        assert_eq!(reported.checks.first(), Some(&Text::from(text)));
     }
 }
 
 /// A station that is not in control is told so: it would be refused.
 #[test]
-fn a_station_that_may_not_arm_is_not_told_that_it_may() {
+fn a_station_that_may_not_arm_does_not_read_that_it_may() {
     const OTHER: Address = Address { system: 245, component: 190 };
     let mut bench = limited(&[0.5, 0.5, 0.26, 2.0]);
     let spell = Stands {
@@ -329,12 +329,12 @@ fn a_station_that_may_not_arm_is_not_told_that_it_may() {
     }
     let mine = Text::from("ready to arm");
     let theirs = Text::from("245/190 may not arm: 255/190 is in control");
-    let told = ask(&mut bench, OTHER, &spell);
-    assert_eq!(told.answer, Answer::Refused(afbc_station::NOT_IN_CONTROL));
-    assert!(told.checks.contains(&theirs) && !told.checks.contains(&mine), "{:?}", told.checks);
+    let reported = ask(&mut bench, OTHER, &spell);
+    assert_eq!(reported.answer, Answer::Refused(afbc_station::NOT_IN_CONTROL));
+    assert!(reported.checks.contains(&theirs) && !reported.checks.contains(&mine), "{:?}", reported.checks);
     // Both at once: each is told.
     bench.hear_from(OTHER, Uplink::Command(Command::CheckArming));
-    let told = ask(&mut bench, STATION, &spell);
-    assert_eq!(told.answer, Answer::Accepted);
-    assert!(told.checks.contains(&theirs) && told.checks.contains(&mine), "{:?}", told.checks);
+    let reported = ask(&mut bench, STATION, &spell);
+    assert_eq!(reported.answer, Answer::Accepted);
+    assert!(reported.checks.contains(&theirs) && reported.checks.contains(&mine), "{:?}", reported.checks);
 }

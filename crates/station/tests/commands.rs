@@ -175,7 +175,7 @@ fn upload(bench: &mut Bench, items: &[MissionItem]) -> Option<MissionResult> {
                 Downlink::Mission { message: Mission::Request(number, _), to: STATION } => {
                     bench.hear(Uplink::Mission(Mission::Item(items[usize::from(number)], Plan::MISSION)));
                 }
-                Downlink::Mission { message: Mission::Ack(told, _), to: STATION } => result = Some(told),
+                Downlink::Mission { message: Mission::Ack(reported, _), to: STATION } => result = Some(reported),
                 _ => (),
             }
         }
@@ -245,7 +245,7 @@ impl Current for Bench {
 fn orders_are_for_the_station_in_control() {
     let mut bench = bench(true);
     leads_to(&mut bench, Command::Speed(2.0), &[Order::Speed(2.0)]);
-    let mut told = |command| {
+    let mut reported = |command| {
         bench.hear_from(OTHER, Uplink::Command(command));
         assert!(bench.inputs.orders.given.is_empty());
         let said = step(&mut bench);
@@ -269,12 +269,15 @@ fn orders_are_for_the_station_in_control() {
         Command::Storage(Storage::Reset),
         Command::TakeOff(Height { metres: 2.0, above: Datum::Here }),
     ] {
-        assert_eq!(told(command), Some(Answer::Refused(NOT_IN_CONTROL)), "{command:?}");
+        assert_eq!(reported(command), Some(Answer::Refused(NOT_IN_CONTROL)), "{command:?}");
     }
     for command in [Command::Disarm, Command::Kill, Command::CheckArming, Command::RequestProtocol] {
-        assert_eq!(told(command), Some(Answer::Accepted), "{command:?}");
+        assert_eq!(reported(command), Some(Answer::Accepted), "{command:?}");
     }
-    assert_eq!([Command::Denied(178), Command::Other(9)].map(told), [Some(Answer::Denied), Some(Answer::Unsupported)]);
+    assert_eq!(
+        [Command::Denied(178), Command::Other(9)].map(reported),
+        [Some(Answer::Denied), Some(Answer::Unsupported)]
+    );
 }
 
 /// What comes back of its own is not heard.
@@ -339,7 +342,7 @@ fn messages_on_request_are_sent_or_refused_with_the_reason() {
 }
 
 #[test]
-fn intervals_are_set_and_told_on_the_wire() {
+fn intervals_are_set_and_reported_on_the_wire() {
     let mut bench = bench(true);
     let set = |message, interval_us| Command::SetInterval { message, interval_us };
     refused(&mut bench, set(id::ATTITUDE, 5_000), Answer::Accepted);
@@ -367,8 +370,8 @@ fn it_reboots_where_it_can_and_disarmed_only() {
         bench.hear(Uplink::Command(Command::Reboot));
         let said = bench.step().1;
         let expected = if armed { Answer::Refused(Refusal::AlreadyArmed as i32) } else { Answer::Accepted };
-        let told = said.iter().any(|it| matches!(it, Downlink::Answer { answer, .. } if *answer == expected));
-        assert!(told && bench.comms.wants_reboot() != armed, "{said:?}");
+        let reported = said.iter().any(|it| matches!(it, Downlink::Answer { answer, .. } if *answer == expected));
+        assert!(reported && bench.comms.wants_reboot() != armed, "{said:?}");
     }
 }
 
@@ -402,7 +405,7 @@ fn targets_and_sticks_reach_the_guidance() {
     };
     let (step_m, fast) = (Vector3::new(2.0, -3.0, 1.0), Vector3::new(0.5, 0.25, -0.125));
     let mut bench = bench(true);
-    let mut told = |from: Address, message: Uplink| {
+    let mut reported = |from: Address, message: Uplink| {
         bench.hear_from(from, message);
         let target = bench.inputs.orders.target.map(|target| target.value);
         let sticks = bench.inputs.orders.sticks.map(|sticks| sticks.value);
@@ -416,31 +419,32 @@ fn targets_and_sticks_reach_the_guidance() {
         (Axes::Body, step_m, nan, step_m, false),
         (Axes::BodyOffset, step_m, nan, step_m, true),
     ] {
-        let (target, _) = told(STATION, Uplink::Target(ExternalTarget::Motion(motion(axes, position_m, velocity_m_s))));
+        let (target, _) =
+            reported(STATION, Uplink::Target(ExternalTarget::Motion(motion(axes, position_m, velocity_m_s))));
         let Some(afbc_guidance::OffboardTarget::Motion(target)) = target else { panic!("{axes:?}: {target:?}") };
         let found = (target.position_m, target.velocity_m_s, target.yaw_rad, target.body);
         assert_eq!(format!("{found:?}"), format!("{:?}", (flown_m, velocity_m_s, 0.25, body)), "{axes:?}");
     }
     let there = place([40.0, -30.0, 0.0], Datum::Sea, 500.0);
-    let (target, _) = told(STATION, Uplink::Target(ExternalTarget::Place(there, motion(Axes::Local, nan, fast))));
+    let (target, _) = reported(STATION, Uplink::Target(ExternalTarget::Place(there, motion(Axes::Local, nan, fast))));
     let Some(afbc_guidance::OffboardTarget::Motion(target)) = target else { panic!("{target:?}") };
     assert!((target.position_m - Vector3::new(40.0, -30.0, 12.0)).norm() < 0.02, "{target:?}");
     assert_eq!((target.velocity_m_s, target.body), (fast, false));
     let attitude = AttitudeAndThrust { attitude: [0.6, 0.8, 0.0, 0.0], yaw_rate_rad_s: 0.5, thrust: 0.25 };
-    let (target, _) = told(STATION, Uplink::Target(ExternalTarget::Attitude(attitude)));
+    let (target, _) = reported(STATION, Uplink::Target(ExternalTarget::Attitude(attitude)));
     let Some(afbc_guidance::OffboardTarget::Attitude(target)) = target else { panic!("{target:?}") };
     assert_eq!((target.yaw_rate_rad_s, target.thrust), (0.5, 0.25));
     assert!((target.attitude.w - 0.6).abs() < 1e-6 && (target.attitude.i.abs() - 0.8).abs() < 1e-6);
     let sticks = ManualControl { roll: 0.1, pitch: -0.2, throttle: 0.3, yaw: -0.4 };
-    let (target, told_sticks) = told(STATION, Uplink::Target(ExternalTarget::Sticks(sticks)));
+    let (target, told_sticks) = reported(STATION, Uplink::Target(ExternalTarget::Sticks(sticks)));
     assert_eq!(target, None);
     let found = told_sticks.expect("sticks");
     for (found, sent) in [(found.roll, 0.1), (found.pitch, -0.2), (found.throttle, 0.3), (found.yaw, -0.4)] {
         assert!((found - sent).abs() < 1e-2, "{found} {sent}");
     }
     // Another one's are not.
-    assert_eq!(told(OTHER, Uplink::Target(ExternalTarget::Sticks(sticks))), (None, None));
-    assert_eq!(told(OTHER, Uplink::Setpoint(Setpoint::default())), (None, None));
+    assert_eq!(reported(OTHER, Uplink::Target(ExternalTarget::Sticks(sticks))), (None, None));
+    assert_eq!(reported(OTHER, Uplink::Setpoint(Setpoint::default())), (None, None));
 }
 
 /// An offset from where the vehicle is needs to know where it is.
@@ -495,7 +499,7 @@ fn heartbeats_come_once_per_second() {
 
 /// DEBUG_FLOAT_ARRAY "health" tells what the tick took at most, what was dropped, and what was not answered.
 #[test]
-fn health_tells_counts_and_times() {
+fn health_reports_counts_and_times() {
     let mut bench = Bench::new();
     let health = |bench: &mut Bench, tick_us: f32| {
         let mut decoder = afbc_link::Decoder::<Downlink>::new(STATION);
@@ -503,15 +507,15 @@ fn health_tells_counts_and_times() {
         bench.now_us += 1000;
         bench.inputs.take_into(&mut bench.taken);
         let report: Report = bench.flight.tick(bench.now_us, &mut bench.taken, &afbc_onboard::Readings::NONE);
-        let mut told = None;
+        let mut reported = None;
         bench.comms.report(&report, tick_us, |bytes| {
             decoder.feed(bytes, |_, message| {
                 if let Downlink::Health(health) = message {
-                    told = Some(health);
+                    reported = Some(health);
                 }
             });
         });
-        told.expect("sent")
+        reported.expect("sent")
     };
     let first = health(&mut bench, 1000.0);
     assert_eq!((first.tick_us, first.tick_max_us, bench.comms.bad_frames()), (1000.0, 1000.0, 0));
@@ -536,12 +540,12 @@ fn health_tells_counts_and_times() {
 
 /// What a shell says is told, and the battery that it measures reaches the guidance in volts and amperes.
 #[test]
-fn what_the_shell_says_is_told() {
+fn what_the_shell_says_is_reported() {
     let mut bench = bench(true);
     bench.comms.warn("flash is worn");
     let said = step(&mut bench);
-    let told = |it: &Downlink| matches!(it, Downlink::Text { text, .. } if text.to_str() == Ok("flash is worn"));
-    assert!(said.iter().any(told), "{said:?}");
+    let reported = |it: &Downlink| matches!(it, Downlink::Text { text, .. } if text.to_str() == Ok("flash is worn"));
+    assert!(said.iter().any(reported), "{said:?}");
     for (current_ca, current_a) in [(1250, 12.5), (-1, 0.0)] {
         let battery =
             BatteryStatus { voltage_mv: 11_100, current_ca, remaining_percent: -1, consumed_mah: -1, charge: 0 };
@@ -553,7 +557,7 @@ fn what_the_shell_says_is_told() {
 
 /// An item that is reached is announced to everyone, and MISSION_CURRENT tells how far the mission is.
 #[test]
-fn a_mission_tells_how_far_it_is() {
+fn a_mission_reports_how_far_it_is() {
     let mut bench = bench(true);
     let state = |bench: &mut Bench| {
         let current = bench.comms_current();
@@ -567,7 +571,9 @@ fn a_mission_tells_how_far_it_is() {
     report.guided.reached = Some(0);
     let said = bench.said(&report);
     let reached = |said: &[Downlink], number| {
-        said.iter().any(|it| matches!(it, Downlink::Mission { message: Mission::Reached(told), .. } if *told == number))
+        said.iter().any(
+            |it| matches!(it, Downlink::Mission { message: Mission::Reached(reported), .. } if *reported == number),
+        )
     };
     assert!(reached(&said, 0), "{said:?}");
     let current = |bench: &mut Bench, report: &Report| {

@@ -34,7 +34,7 @@ fn critical(said: &[Downlink]) -> Option<bool> {
 
 /// Runs ticks with or without states and setpoints; returns the texts, and what the heartbeats report.
 fn fly(bench: &mut Bench, ticks: u32, states: bool, setpoints: bool) -> (Vec<(MavSeverity, String)>, Vec<bool>) {
-    let (mut told, mut heartbeats) = (Vec::new(), Vec::new());
+    let (mut received, mut heartbeats) = (Vec::new(), Vec::new());
     for _ in 0..ticks {
         if states {
             bench.measure(&State::default());
@@ -43,20 +43,20 @@ fn fly(bench: &mut Bench, ticks: u32, states: bool, setpoints: bool) -> (Vec<(Ma
             bench.hear(Uplink::Setpoint(Setpoint::default()));
         }
         let (_, said) = bench.step();
-        told.extend(notices(&said));
+        received.extend(notices(&said));
         heartbeats.extend(critical(&said));
     }
-    (told, heartbeats)
+    (received, heartbeats)
 }
 
 #[test]
 fn losing_the_state_is_reported_step_by_step() {
     let mut bench = Bench::flying();
-    let (told, heartbeats) = fly(&mut bench, 5000, false, true);
-    let severities: Vec<_> = told.iter().map(|(severity, _)| *severity).collect();
-    assert_eq!(severities, [WARNING, CRITICAL, EMERGENCY, INFO], "{told:?}");
+    let (received, heartbeats) = fly(&mut bench, 5000, false, true);
+    let severities: Vec<_> = received.iter().map(|(severity, _)| *severity).collect();
+    assert_eq!(severities, [WARNING, CRITICAL, EMERGENCY, INFO], "{received:?}");
     let words = ["state for 20 ms: coasting", "state for 0.25 s: descending", "motors stopped", "hold: disarmed"];
-    for ((_, text), words) in told.iter().zip(words) {
+    for ((_, text), words) in received.iter().zip(words) {
         assert!(text.contains(words), "{text}");
     }
     // Until 2.25 s, and for one more second.
@@ -70,10 +70,10 @@ fn a_short_gap_shows_in_the_next_heartbeat() {
     for before in [1, 100, 500, 850, 899, 960, 990] {
         let mut bench = Bench::flying();
         assert_eq!(fly(&mut bench, before, true, true).0, []);
-        let (told, mut heartbeats) = fly(&mut bench, 30, false, true);
-        assert!(matches!(told.as_slice(), [(WARNING, text)] if text.contains("coasting")), "{told:?}");
-        let (told, after) = fly(&mut bench, 3000, true, true);
-        assert_eq!(told, []);
+        let (received, mut heartbeats) = fly(&mut bench, 30, false, true);
+        assert!(matches!(received.as_slice(), [(WARNING, text)] if text.contains("coasting")), "{received:?}");
+        let (received, after) = fly(&mut bench, 3000, true, true);
+        assert_eq!(received, []);
         heartbeats.extend(after);
         let critical = heartbeats.iter().filter(|critical| **critical).count();
         assert!((1..=2).contains(&critical), "{before} ms after: {heartbeats:?}");
@@ -85,14 +85,14 @@ fn a_short_gap_shows_in_the_next_heartbeat() {
 fn losing_the_setpoint_is_reported_each_time() {
     let mut bench = Bench::flying();
     for _ in 0..3 {
-        let (told, _) = fly(&mut bench, 2000, true, false);
-        assert!(matches!(told.as_slice(), [(WARNING, text)] if text.contains("no targets")), "{told:?}");
+        let (received, _) = fly(&mut bench, 2000, true, false);
+        assert!(matches!(received.as_slice(), [(WARNING, text)] if text.contains("no targets")), "{received:?}");
         // It holds until it is told to follow again.
         let (_, heartbeats) = fly(&mut bench, 1000, true, true);
         assert_eq!(heartbeats, [true]);
         bench.follow();
-        let (told, heartbeats) = fly(&mut bench, 3000, true, true);
-        assert!(matches!(told.as_slice(), [(INFO, text)] if text.contains("offboard")), "{told:?}");
+        let (received, heartbeats) = fly(&mut bench, 3000, true, true);
+        assert!(matches!(received.as_slice(), [(INFO, text)] if text.contains("offboard")), "{received:?}");
         assert_eq!(heartbeats, [true, false, false]);
     }
 }

@@ -100,14 +100,14 @@ proptest! {
     #[test]
     fn every_command_is_answered_once(ticks in prop::collection::vec(prop::collection::vec(sent(), 0..4), 1..60)) {
         let mut bench = Bench::new();
-        let (mut due, mut told, mut unanswered) = (Counts::new(), Counts::new(), 0);
+        let (mut due, mut reported, mut unanswered) = (Counts::new(), Counts::new(), 0);
         let mut count = |said: &[Downlink]| {
             for message in said {
                 match *message {
                     // "In progress" is none.
                     Downlink::Answer { answer: Answer::InProgress, .. } => (),
                     Downlink::Answer { command, to, .. } => {
-                        *told.entry((command, to.system, to.component)).or_default() += 1;
+                        *reported.entry((command, to.system, to.component)).or_default() += 1;
                     }
                     Downlink::Health(health) => unanswered = health.unanswered,
                     _ => (),
@@ -125,7 +125,7 @@ proptest! {
         }
         (0..400).for_each(|_| count(&bench.step().1));
         prop_assert_eq!(unanswered, 0);
-        prop_assert_eq!(told, due);
+        prop_assert_eq!(reported, due);
     }
 
     /// Damaged, cut and nested frames: whatever arrives, it does not panic, and what is sent can be read
@@ -210,7 +210,7 @@ fn commands_that_do_not_need_control() {
 
 /// Control passes to another station after silence, and is handed over.
 #[test]
-fn a_second_station_is_told_once_and_follows() {
+fn a_second_station_is_informed_once_and_follows() {
     let mut bench = Bench::new();
     let [first, second, _] = STATIONS;
     let heard = |bench: &mut Bench| {

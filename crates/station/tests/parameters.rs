@@ -228,7 +228,7 @@ fn padded(text: &str) -> ParameterName {
 }
 
 /// Everything told in `ms` ticks of a millisecond.
-fn told(
+fn reported(
     service: &mut Service,
     now_us: &mut u64,
     ms: u64,
@@ -252,13 +252,13 @@ fn a_list_is_complete_and_leaves_the_link_to_others() {
     for baud in [57_600, 115_200, 921_600] {
         let (mut table, mut service, mut now_us) = (table(), Service::default(), 0);
         let bytes_s = baud / 10;
-        told(&mut service, &mut now_us, 1000, bytes_s, &table);
+        reported(&mut service, &mut now_us, 1000, bytes_s, &table);
         service.hear(ParameterRequest::List, &mut table, true);
         let start_us = now_us;
         let mut list = Vec::new();
         let mut most_in_a_second = 0;
         while list.len() < usize::from(table.count()) {
-            let second = told(&mut service, &mut now_us, 100, bytes_s, &table);
+            let second = reported(&mut service, &mut now_us, 100, bytes_s, &table);
             most_in_a_second = most_in_a_second.max(second.len() as u32 * VALUE_BYTES * 10);
             list.extend(second);
             assert!(now_us < 60_000_000, "{}", list.len());
@@ -269,13 +269,13 @@ fn a_list_is_complete_and_leaves_the_link_to_others() {
         assert!(share > 0.2 && share < 0.5, "{baud}: {share}");
         assert!(most_in_a_second <= bytes_s / 2 + 4 * VALUE_BYTES * 10, "{baud}: {most_in_a_second}");
         assert_eq!(LINK_SHARE, 40);
-        let places: Vec<u16> = list.iter().map(|told| told.place).collect();
+        let places: Vec<u16> = list.iter().map(|reported| reported.place).collect();
         assert_eq!(places, (0..table.count()).collect::<Vec<_>>());
-        for (told, parameter) in list.iter().zip(all(&table)) {
-            assert_eq!((told.count, told.name), (table.count(), parameter.name.to_bytes()));
-            assert_eq!(told.value, parameter.kind.encode(parameter.value));
+        for (reported, parameter) in list.iter().zip(all(&table)) {
+            assert_eq!((reported.count, reported.name), (table.count(), parameter.name.to_bytes()));
+            assert_eq!(reported.value, parameter.kind.encode(parameter.value));
         }
-        assert!(told(&mut service, &mut now_us, 2000, bytes_s, &table).is_empty());
+        assert!(reported(&mut service, &mut now_us, 2000, bytes_s, &table).is_empty());
     }
 }
 
@@ -284,10 +284,10 @@ fn a_list_is_complete_and_leaves_the_link_to_others() {
 fn two_stations_hear_everything() {
     let (mut table, mut service, mut now_us) = (table(), Service::default(), 0);
     service.hear(ParameterRequest::List, &mut table, true);
-    told(&mut service, &mut now_us, 300, 5760, &table);
+    reported(&mut service, &mut now_us, 300, 5760, &table);
     service.hear(ParameterRequest::List, &mut table, true);
     let second: BTreeSet<u16> =
-        told(&mut service, &mut now_us, 10_000, 5760, &table).iter().map(|told| told.place).collect();
+        reported(&mut service, &mut now_us, 10_000, 5760, &table).iter().map(|reported| reported.place).collect();
     assert_eq!(second.len(), usize::from(table.count()));
 }
 
@@ -313,8 +313,8 @@ fn gaps_are_filled_by_place_and_by_name() {
         let error = ParameterError { name, place, error: ParameterError::DOES_NOT_EXIST };
         assert_eq!((heard.error, heard.change, heard.refused), (Some(error), None, None));
     }
-    let said = told(&mut service, &mut now_us, 1000, 5760, &table);
-    assert_eq!(said.iter().map(|told| told.place).collect::<Vec<_>>(), [3, 0, table.count() - 1]);
+    let said = reported(&mut service, &mut now_us, 1000, 5760, &table);
+    assert_eq!(said.iter().map(|reported| reported.place).collect::<Vec<_>>(), [3, 0, table.count() - 1]);
 }
 
 #[test]
@@ -323,7 +323,7 @@ fn every_set_is_answered_and_an_armed_vehicle_refuses() {
     let mut set = |ask, disarmed| {
         let heard = service.hear(ask, &mut table, disarmed);
         // At once, whatever the link.
-        let said = told(&mut service, &mut now_us, 1, 1, &table);
+        let said = reported(&mut service, &mut now_us, 1, 1, &table);
         assert_eq!(said.len(), 1, "{ask:?}");
         let value = f32::from_le_bytes(said[0].value);
         (heard.change, heard.refused.map(|reason| reason.to_string()), value)
@@ -350,7 +350,7 @@ fn every_set_is_answered_and_an_armed_vehicle_refuses() {
     assert_eq!(as_integer(set(ask([1, 0, 0, 0], 8), true)), (None, odd, 1));
     let heard = service.hear(real("NOTHING", 1.0), &mut table, true);
     assert_eq!(heard.refused.unwrap().as_str(), "NOTHING: no such parameter");
-    assert!(told(&mut service, &mut now_us, 1000, 5760, &table).is_empty());
+    assert!(reported(&mut service, &mut now_us, 1000, 5760, &table).is_empty());
 }
 
 #[test]
@@ -362,7 +362,7 @@ fn defaults_are_restored_and_listed() {
     assert_ne!(table, image);
     assert_eq!(service.restore(&mut table, true), Ok(RecordChange::Restored));
     assert_eq!(table, image);
-    assert_eq!(told(&mut service, &mut now_us, 10_000, 11_520, &table).len(), 1 + usize::from(table.count()));
+    assert_eq!(reported(&mut service, &mut now_us, 10_000, 11_520, &table).len(), 1 + usize::from(table.count()));
 }
 
 proptest! {
@@ -529,7 +529,7 @@ fn what_is_dropped_is_counted() {
             assert_eq!(service.dropped(), u32::max(number, 31) - 31);
         }
         let mut now_us = 0;
-        assert_eq!(told(&mut service, &mut now_us, 10_000, 5760, &table).len(), 32);
+        assert_eq!(reported(&mut service, &mut now_us, 10_000, 5760, &table).len(), 32);
     }
 }
 
@@ -539,9 +539,9 @@ fn reads_take_their_share() {
     for link_bytes_s in [5_184, 10_000, 82_944] {
         let (mut table, mut service, mut now_us) = (table(), Service::default(), 0);
         service.hear(ParameterRequest::List, &mut table, true);
-        let first = told(&mut service, &mut now_us, 1, link_bytes_s, &table).len();
+        let first = reported(&mut service, &mut now_us, 1, link_bytes_s, &table).len();
         assert!(first <= 4, "{first} at once");
-        let count = told(&mut service, &mut now_us, 500, link_bytes_s, &table).len();
+        let count = reported(&mut service, &mut now_us, 500, link_bytes_s, &table).len();
         let share = link_bytes_s as usize / 2 * LINK_SHARE as usize / 100 / VALUE_BYTES as usize;
         assert!(count.abs_diff(share.min(all(&table).len() - first)) <= 5, "{count} of {share}");
     }

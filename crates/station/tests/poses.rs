@@ -81,7 +81,7 @@ fn arm(bench: &mut Bench, from_ms: u64) -> Option<Answer> {
 #[test]
 fn a_vehicle_knows_where_it_is() {
     for by in [By::Pose, By::State] {
-        let (mut bench, mut told) = (Bench::new(), None);
+        let (mut bench, mut reported) = (Bench::new(), None);
         for ms in 0..START_MS {
             // The sender's clock is not the vehicle's.
             if ms % 20 == 0 {
@@ -89,12 +89,12 @@ fn a_vehicle_knows_where_it_is() {
                 measured.position_m += noise(ms) * 1e-3;
                 bench.hear(message(by, 1_700_000_000_000_000 + ms * 1000, measured, PoseSigmas::UNKNOWN));
             }
-            told = bench.sense(&sample(ms, 0.0)).0.estimate;
+            reported = bench.sense(&sample(ms, 0.0)).0.estimate;
         }
-        let told = told.expect("an estimate");
-        assert!((told.position_m - PLACE_M).amax() < 0.005, "{by:?}: {told:?}");
-        assert!((told.attitude_rad - Vector3::new(0.0, 0.0, YAW_RAD)).amax() < 0.02, "{by:?}: {told:?}");
-        assert!(told.velocity_m_s.amax() < 0.05, "{by:?}: {told:?}");
+        let reported = reported.expect("an estimate");
+        assert!((reported.position_m - PLACE_M).amax() < 0.005, "{by:?}: {reported:?}");
+        assert!((reported.attitude_rad - Vector3::new(0.0, 0.0, YAW_RAD)).amax() < 0.02, "{by:?}: {reported:?}");
+        assert!(reported.velocity_m_s.amax() < 0.05, "{by:?}: {reported:?}");
         assert_eq!(arm(&mut bench, START_MS), Some(Answer::Accepted), "{by:?}");
     }
 }
@@ -148,8 +148,8 @@ fn late_poses_count_for_their_own_time() {
             let (offset_m, acceleration_m_s2) = swing(ms);
             let (report, said) = bench.sense(&sample(ms, acceleration_m_s2));
             if ms > START_MS + 1_000 {
-                let told = report.estimate.expect("an estimate");
-                let error_m = told.position_m - state(offset_m).position_m;
+                let reported = report.estimate.expect("an estimate");
+                let error_m = reported.position_m - state(offset_m).position_m;
                 assert!(error_m.amax() < 0.03, "{by:?}, {ms} ms: {error_m}");
             }
             for message in said {
@@ -211,24 +211,24 @@ fn outlives(left: Left) -> (Vec<Mode>, Vec<String>, Report) {
         let dead = ms > dies_ms;
         // A tracker never repeats a state exactly.
         let noise_ms = if dead && left == Left::Frozen { dies_ms } else { ms };
-        let told = State { position_m: place.position_m + noise(noise_ms) * 1e-4, ..place };
+        let reported = State { position_m: place.position_m + noise(noise_ms) * 1e-4, ..place };
         let bad = PoseSigmas { position_m: Some(0.2), attitude_rad: Some(0.01) };
         let sigmas = if dead && left == Left::Unsure { bad } else { PoseSigmas::UNKNOWN };
         let sent_us = bench.now_us;
         let mut readings = if dead { Readings::NONE } else { sample(ms, 0.0) };
         match left {
-            Left::States => bench.hear(Uplink::State { sent_us, state: told, sigmas }),
+            Left::States => bench.hear(Uplink::State { sent_us, state: reported, sigmas }),
             Left::Nothing | Left::Positions | Left::Late if dead => (),
-            _ => bench.hear(Uplink::Pose { sent_us, pose: Pose::of(&told, sigmas) }),
+            _ => bench.hear(Uplink::Pose { sent_us, pose: Pose::of(&reported, sigmas) }),
         }
         if dead && left == Left::Late {
             // Read by the vehicle: the link's clock would learn a lateness that stays.
-            let Pose { position_m, attitude, .. } = Pose::of(&told, sigmas);
+            let Pose { position_m, attitude, .. } = Pose::of(&reported, sigmas);
             let value = Measurement::Pose { position_m, attitude, position_sigma_m: 0.003, attitude_sigma_rad: 0.01 };
             readings.aids = [Some(Aged { value, age_us: 60_000 }), None];
         }
         if dead && left == Left::Positions {
-            let value = Measurement::Position { position_m: told.position_m, sigma_m: 0.003 };
+            let value = Measurement::Position { position_m: reported.position_m, sigma_m: 0.003 };
             readings.aids = [Some(Aged { value, age_us: 1_000 }), None];
         }
         bench.hear(Uplink::Setpoint(Setpoint { position_m: PLACE_M, yaw_rad: YAW_RAD, ..Setpoint::default() }));
@@ -259,9 +259,9 @@ fn a_tracker_stands_in_for_a_dead_sensor() {
         let flies = matches!(left, States | Poses);
         assert_eq!(modes.last() == Some(&Mode::Flying), flies, "{left:?}: {:?}, {texts:?}", modes.last());
         assert_eq!(last.health.observed, left == Poses, "{left:?}");
-        let told = texts.iter().filter(|text| text.contains("inertial sensor failed")).count();
+        let reported = texts.iter().filter(|text| text.contains("inertial sensor failed")).count();
         // That a tracker is frozen shows only after a moment.
-        assert_eq!(told, usize::from(matches!(left, Poses | Frozen)), "{left:?}: {texts:?}");
+        assert_eq!(reported, usize::from(matches!(left, Poses | Frozen)), "{left:?}: {texts:?}");
         if left == Poses {
             // Not even a moment without a state; the guidance tells of the sensor, too.
             let others = texts.iter().filter(|text| !text.contains("inertial sensor failed"));
@@ -280,8 +280,8 @@ fn the_sensor_comes_back() {
     let (mut bench, place) = (Bench::new(), state(0.0));
     let (mut observed, mut modes) = (0, Vec::new());
     for ms in 1..START_MS + 6_000 {
-        let told = State { position_m: place.position_m + noise(ms) * 1e-4, ..place };
-        bench.hear(Uplink::Pose { sent_us: bench.now_us, pose: Pose::of(&told, PoseSigmas::UNKNOWN) });
+        let reported = State { position_m: place.position_m + noise(ms) * 1e-4, ..place };
+        bench.hear(Uplink::Pose { sent_us: bench.now_us, pose: Pose::of(&reported, PoseSigmas::UNKNOWN) });
         bench.hear(Uplink::Setpoint(Setpoint { position_m: PLACE_M, yaw_rad: YAW_RAD, ..Setpoint::default() }));
         if ms == START_MS {
             bench.follow();

@@ -221,7 +221,7 @@ fn ask(bench: &mut Bench, stations: &[Address], sample: &Sample, answers: &[u32]
     for station in stations {
         bench.hear_bytes(&frame(*station, sample));
     }
-    let mut told: Vec<Sample> = Vec::new();
+    let mut reported: Vec<Sample> = Vec::new();
     let mut waiting: BTreeSet<(u8, u8)> = stations.iter().map(|it| (it.system, it.component)).collect();
     for _ in 0..WITHIN {
         for answer in step(bench).into_iter().filter(|sent| answers.contains(&sent.id)) {
@@ -232,13 +232,13 @@ fn ask(bench: &mut Bench, stations: &[Address], sample: &Sample, answers: &[u32]
                 }
                 None => waiting.clear(),
             }
-            told.push(answer);
+            reported.push(answer);
         }
         if waiting.is_empty() {
-            return told;
+            return reported;
         }
     }
-    panic!("no answer to {waiting:?}: {sample:?}, but {told:?}");
+    panic!("no answer to {waiting:?}: {sample:?}, but {reported:?}");
 }
 
 #[test]
@@ -309,12 +309,12 @@ fn nothing_else_is_answered() {
 fn there_are_no_logs() {
     let mut bench = on(921_600);
     let list = at(&LOG_REQUEST_LIST_DATA { start: 0, end: 0xFFFF, ..LOG_REQUEST_LIST_DATA::DEFAULT }, 4, &[]);
-    let told = ask(&mut bench, &[STATION], &list, &[118]);
-    let entry = MavMessage::parse(MavlinkVersion::V2, 118, &told[0].payload).expect("an entry");
+    let reported = ask(&mut bench, &[STATION], &list, &[118]);
+    let entry = MavMessage::parse(MavlinkVersion::V2, 118, &reported[0].payload).expect("an entry");
     assert_eq!(entry, MavMessage::LOG_ENTRY(LOG_ENTRY_DATA::DEFAULT));
     let data = at(&LOG_REQUEST_DATA_DATA { ofs: 90, count: 900, id: 5, ..LOG_REQUEST_DATA_DATA::DEFAULT }, 10, &[]);
-    let told = ask(&mut bench, &[STATION], &data, &[120]);
-    let none = MavMessage::parse(MavlinkVersion::V2, 120, &told[0].payload).expect("data");
+    let reported = ask(&mut bench, &[STATION], &data, &[120]);
+    let none = MavMessage::parse(MavlinkVersion::V2, 120, &reported[0].payload).expect("data");
     assert_eq!(none, MavMessage::LOG_DATA(LOG_DATA_DATA { ofs: 90, id: 5, ..LOG_DATA_DATA::DEFAULT }));
 }
 
@@ -324,9 +324,9 @@ fn every_file_operation_is_refused() {
     let mut bench = on(921_600);
     for operation in 0..128 {
         for (sequence, next) in [(0, 1), (777, 778), (u16::MAX, 0)] {
-            let told = ask(&mut bench, &[OTHER], &file(sequence, operation, operation), &[110]);
-            assert_eq!(told.len(), 1);
-            let payload = &told[0].payload;
+            let reported = ask(&mut bench, &[OTHER], &file(sequence, operation, operation), &[110]);
+            assert_eq!(reported.len(), 1);
+            let payload = &reported[0].payload;
             assert_eq!(u16::from_le_bytes([payload[3], payload[4]]), next);
             // Session, NAK, one byte of data, which operation; UnknownCommand.
             assert_eq!(payload[5..9], [operation, 129, 1, operation]);
@@ -345,20 +345,23 @@ fn what_there_is_not_is_named() {
     let place = at(&PARAM_REQUEST_READ_DATA { param_index: 9_999, ..Default::default() }, 2, &[]);
     let set = at(&PARAM_SET_DATA { param_id: name.into(), ..Default::default() }, 4, &[]);
     for (sample, index, name) in [(read, -1_i16, name), (place, 9_999, [0; 16]), (set, -1, name)] {
-        let told = ask(&mut bench, &[OTHER], &sample, &[22, 345]);
-        let mut payload = told[0].payload.clone();
+        let reported = ask(&mut bench, &[OTHER], &sample, &[22, 345]);
+        let mut payload = reported[0].payload.clone();
         payload.resize(21, 0);
-        assert_eq!((told[0].id, &payload[..2]), (345, index.to_le_bytes().as_slice()));
+        assert_eq!((reported[0].id, &payload[..2]), (345, index.to_le_bytes().as_slice()));
         // Does not exist.
         assert_eq!((&payload[4..20], payload[20]), (name.as_slice(), 1));
     }
     let read =
         at(&PARAM_EXT_REQUEST_READ_DATA { param_index: -1, param_id: name.into(), ..Default::default() }, 2, &[]);
-    let told = ask(&mut bench, &[OTHER], &read, &[322]);
-    assert_eq!((&told[0].payload[..4], &told[0].payload[4..20]), ([0, 0, 255, 255].as_slice(), name.as_slice()));
+    let reported = ask(&mut bench, &[OTHER], &read, &[322]);
+    assert_eq!(
+        (&reported[0].payload[..4], &reported[0].payload[4..20]),
+        ([0, 0, 255, 255].as_slice(), name.as_slice())
+    );
     let set = at(&PARAM_EXT_SET_DATA { param_id: name.into(), ..Default::default() }, 0, &[]);
-    let told = ask(&mut bench, &[OTHER], &set, &[324]);
-    assert_eq!((&told[0].payload[..16], told[0].payload[145]), (name.as_slice(), 1));
+    let reported = ask(&mut bench, &[OTHER], &set, &[324]);
+    assert_eq!((&reported[0].payload[..16], reported[0].payload[145]), (name.as_slice(), 1));
 }
 
 /// MAV_CMD_REQUEST_MESSAGE of any message of the dialect: it is sent, or refused.
@@ -379,9 +382,9 @@ fn any_message_can_be_requested() {
 #[test]
 fn a_mission_is_uploaded_by_messages_of_old() {
     let mut bench = on(921_600);
-    let next = |told: &[Sample], number: u16| {
-        let bytes = told[0].payload.clone();
-        assert_eq!((told[0].id, bytes.first().copied()), (51, Some(number as u8)), "{told:?}");
+    let next = |reported: &[Sample], number: u16| {
+        let bytes = reported[0].payload.clone();
+        assert_eq!((reported[0].id, bytes.first().copied()), (51, Some(number as u8)), "{reported:?}");
     };
     let count = at(&MISSION_COUNT_DATA { count: 2, ..Default::default() }, 2, &[0]);
     next(&ask(&mut bench, &[STATION], &count, &[51, 47]), 0);
@@ -393,12 +396,12 @@ fn a_mission_is_uploaded_by_messages_of_old() {
     let first = item(0, MavFrame::MAV_FRAME_GLOBAL_RELATIVE_ALT, [-47.5, 8.25, 10.0]);
     next(&ask(&mut bench, &[STATION], &first, &[51, 47]), 1);
     let second = item(1, MavFrame::MAV_FRAME_LOCAL_NED, [12.5, -3.25, -4.0]);
-    let told = ask(&mut bench, &[STATION], &second, &[51, 47]);
-    assert_eq!((told[0].id, told[0].payload.get(2).copied().unwrap_or(0)), (47, 0), "{told:?}");
+    let reported = ask(&mut bench, &[STATION], &second, &[51, 47]);
+    assert_eq!((reported[0].id, reported[0].payload.get(2).copied().unwrap_or(0)), (47, 0), "{reported:?}");
     for (number, x, y) in [(0, -475_000_000, 82_500_000), (1, 125_000, -32_500)] {
         let request = at(&MISSION_REQUEST_INT_DATA { seq: number, ..Default::default() }, 2, &[0]);
-        let told = ask(&mut bench, &[OTHER], &request, &[73, 47]);
-        let read = MavMessage::parse(MavlinkVersion::V2, told[0].id, &told[0].payload);
+        let reported = ask(&mut bench, &[OTHER], &request, &[73, 47]);
+        let read = MavMessage::parse(MavlinkVersion::V2, reported[0].id, &reported[0].payload);
         let Ok(MavMessage::MISSION_ITEM_INT(item)) = read else { panic!("{read:?}") };
         assert_eq!((item.x, item.y), (x, y));
     }

@@ -49,7 +49,7 @@ fn listen(bench: &mut Bench, ticks: usize) -> Heard {
 }
 
 /// The value of the last PARAM_VALUE of `name`.
-fn told(heard: &Heard, name: &str) -> Option<f32> {
+fn reported(heard: &Heard, name: &str) -> Option<f32> {
     let value = heard.values.iter().rev().find(|value| value.name == padded(name))?;
     Some(f32::from_le_bytes(value.value))
 }
@@ -64,13 +64,13 @@ fn the_station_in_control_sets_and_everyone_hears_it() {
     let mut bench = Bench::new();
     bench.hear(set(HEIGHT, 4.0));
     let heard = listen(&mut bench, 20);
-    assert_eq!(told(&heard, HEIGHT), Some(4.0));
+    assert_eq!(reported(&heard, HEIGHT), Some(4.0));
     assert_eq!((height(&bench), bench.changes.len(), heard.texts.len()), (4.0, 1, 0), "{:?}", heard.texts);
     assert!(matches!(bench.changes[..], [RecordChange::Set(_, Some(4.0))]));
     // Another one is told who is in control, and the value that has not changed.
     bench.hear_from(SECOND, set(HEIGHT, 7.0));
     let heard = listen(&mut bench, 20);
-    assert_eq!((told(&heard, HEIGHT), height(&bench), bench.changes.len()), (Some(4.0), 4.0, 1));
+    assert_eq!((reported(&heard, HEIGHT), height(&bench), bench.changes.len()), (Some(4.0), 4.0, 1));
     assert_eq!(heard.texts, ["245/190 ignored: 255/190 is in control"]);
     // The same value once more: it is kept if it was not.
     bench.hear(set(HEIGHT, 4.0));
@@ -78,7 +78,10 @@ fn the_station_in_control_sets_and_everyone_hears_it() {
     assert_eq!((bench.changes[1], bench.changes.len()), (bench.changes[0], 2));
     // The other one may read.
     bench.hear_from(SECOND, Uplink::Parameter(ParameterRequest::ReadName(padded("V_MASS"))));
-    assert_eq!(told(&listen(&mut bench, 20), "V_MASS"), Some(bench.table.configuration().airframe.parameters.mass_kg));
+    assert_eq!(
+        reported(&listen(&mut bench, 20), "V_MASS"),
+        Some(bench.table.configuration().airframe.parameters.mass_kg)
+    );
 }
 
 #[test]
@@ -105,7 +108,7 @@ fn nothing_is_set_or_restored_while_armed() {
     bench.hear(set(HEIGHT, 4.0));
     bench.hear(Uplink::Command(Command::Storage(Storage::Reset)));
     let heard = listen(&mut bench, 20);
-    assert_eq!(told(&heard, HEIGHT), Some(before));
+    assert_eq!(reported(&heard, HEIGHT), Some(before));
     assert_eq!(heard.texts, ["MIS_TAKEOFF_ALT: not while armed"]);
     assert!(matches!(heard.answers[..], [Answer::Refused(_)]), "{:?}", heard.answers);
     assert!(bench.changes.is_empty());

@@ -11,9 +11,9 @@ use nalgebra::Vector3;
 
 /// POSITION_TARGET_LOCAL_NED tells four times per second what the law is given, while the vehicle is armed.
 #[test]
-fn the_setpoint_that_is_followed_is_told() {
+fn the_setpoint_that_is_followed_is_reported() {
     let mut bench = Bench::new();
-    let mut told = Vec::new();
+    let mut reported = Vec::new();
     for tick in 0..4000_u32 {
         match tick {
             1100 => bench.follow(),
@@ -31,12 +31,12 @@ fn the_setpoint_that_is_followed_is_told() {
                 assert_eq!(u64::from(time_ms), report.time_us / 1000);
                 let followed = report.guided.setpoint.expect("it has a state");
                 assert_eq!(format!("{motion:?}"), format!("{:?}", PositionTarget::from(&followed)));
-                told.push((tick, motion.position_m));
+                reported.push((tick, motion.position_m));
             }
         }
     }
-    assert!((7..=9).contains(&told.len()), "{told:?}");
-    let (_, last) = told.last().expect("some");
+    assert!((7..=9).contains(&reported.len()), "{reported:?}");
+    let (_, last) = reported.last().expect("some");
     assert!((last - Vector3::new(0.5, -0.25, 0.5)).norm() < 0.2, "{last}");
     // And nothing that is not: a request is refused once it is disarmed.
     bench.hear(Uplink::Command(Command::RequestMessage { message: id::POSITION_TARGET_LOCAL_NED, index: 0 }));

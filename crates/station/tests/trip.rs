@@ -20,7 +20,7 @@ fn accepted(command: MavCmd) -> Downlink {
 
 /// A vehicle held at a wrong attitude trips, reports it once, and MAV_CMD_USER_1 engages AFBC again.
 #[test]
-fn a_trip_is_told_once_and_ended_by_command() {
+fn a_trip_is_reported_once_and_ended_by_command() {
     let mut bench = Bench::new();
     for _ in 0..1000 {
         bench.tick(&State::default());
@@ -33,15 +33,15 @@ fn a_trip_is_told_once_and_ended_by_command() {
 
     let mut askew = State::default();
     askew.attitude_rad.x = 1.2;
-    let mut told = Vec::new();
+    let mut received = Vec::new();
     let mut reason = None;
     for _ in 0..9_000 {
         let (report, said) = bench.tick(&askew);
-        told.extend(said);
+        received.extend(said);
         reason = report.health.control.fallback;
     }
     let reason = reason.expect("nine seconds on its side");
-    assert_eq!(told, [text(reason)]);
+    assert_eq!(received, [text(reason)]);
 
     bench.hear(Uplink::Command(Command::Engage));
     let (report, said) = bench.tick(&State::default());
@@ -58,11 +58,11 @@ fn a_gap_in_the_states_does_not_repeat_it() {
     let mut bench = Bench::new();
     let (idle, _) = bench.tick(&State::default());
     let reason = Trip::Theta(Axis::Roll).reason();
-    let told = text(reason);
+    let received = text(reason);
     let mut says = |mode, fallback| {
         let mut report = Report { mode, ..idle };
         report.health.control.fallback = fallback;
-        bench.said(&report).into_iter().filter(|message| *message == told).count()
+        bench.said(&report).into_iter().filter(|message| *message == received).count()
     };
     assert_eq!(says(Mode::Flying, None), 0);
     assert_eq!(says(Mode::Flying, Some(reason)), 1);

@@ -83,7 +83,7 @@ impl Vehicle {
         profile.settings_for(self.force_max_n as f32, self.lag_s())
     }
 
-    /// Returns what flight software is told of the vehicle: the firmware's image, the same code in simulation, and a
+    /// Returns what flight software knows of the vehicle: the firmware's image, the same code in simulation, and a
     /// station's file of parameters.
     ///
     /// # Errors

@@ -53,17 +53,17 @@ fn the_papers_vehicle_has_the_profiles_gains() {
 fn drag_of_the_file_is_known_per_mass() {
     for known in &BUILT_IN {
         let vehicle = known.read().unwrap();
-        let (told, drag) = (vehicle.settings(Profile::Flight).common.drag, vehicle.realism.drag.unwrap());
+        let (stated, drag) = (vehicle.settings(Profile::Flight).common.drag, vehicle.realism.drag.unwrap());
         let p = &vehicle.parameters;
         // Blades drag in proportion to the speeds of all rotors: each has a share of the weight.
         let count = vehicle.rotors.len() as f64;
         let each_rad_s = (p.mass_kg * p.gravity_m_s2 / count / p.thrust_factor_n_s2).sqrt();
         let blades = drag.blade_n_s2_m * each_rad_s * count / p.mass_kg;
         let body = 0.5 * drag.air_density_kg_m3 * 0.5 * (drag.area_m2.x + drag.area_m2.y) / p.mass_kg;
-        let near = |told: f32, is: f64| (f64::from(told) - is).abs() < 1e-5 * (1.0 + is);
-        assert!(near(told.rotor_drag_1_s, blades), "{}: {told:?}, {blades}", known.name);
-        assert!(near(told.body_drag_1_m, body), "{}: {told:?}, {body}", known.name);
-        assert!(near(told.rotor_height_m, drag.rotor_height_m), "{}: {told:?}", known.name);
+        let near = |stated: f32, is: f64| (f64::from(stated) - is).abs() < 1e-5 * (1.0 + is);
+        assert!(near(stated.rotor_drag_1_s, blades), "{}: {stated:?}, {blades}", known.name);
+        assert!(near(stated.body_drag_1_m, body), "{}: {stated:?}, {body}", known.name);
+        assert!(near(stated.rotor_height_m, drag.rotor_height_m), "{}: {stated:?}", known.name);
     }
 }
 
@@ -245,13 +245,13 @@ fn the_estimators_settings_are_the_files() {
             assert!(error.contains(&format!("estimator.{}", range.name)), "{error}");
         }
     }
-    for (line, told) in [
+    for (line, stated) in [
         ("gyro_noise = 1e-3", "did you mean gyro_noise_rad_s_rthz"),
         ("coast_s = \"5\"", "estimator.coast_s"),
         ("gate_sigmas = nan", "estimator.gate_sigmas"),
     ] {
         let error = refused(&format!("{}\n[estimator]\n{line}\n", text("iris")));
-        assert!(error.contains(told), "{error}");
+        assert!(error.contains(stated), "{error}");
     }
     for (vehicle_m_s2, estimator_m_s2) in [("9.79", 9.79), ("6.0", 9.7), ("11.0", 9.9)] {
         let there = changed("racer", "[vehicle]", &format!("[vehicle]\ngravity_m_s2 = {vehicle_m_s2}"));

@@ -95,7 +95,7 @@ struct Drawn {
 
 /// Returns the summary of a campaign.
 pub(crate) fn campaign(campaign: &Campaign) -> impl Serialize + '_ {
-    let Campaign { name, description, flights, seed, scenario, courses, spreads, .. } = campaign;
+    let Campaign { name, description, flights, seed, scenario, trajectories, spreads, .. } = campaign;
     let drawn =
         spreads.iter().filter_map(|spread| Some(Drawn { name: spread.quantity()?.range.name, ends: spread.ends }));
     CampaignWords {
@@ -107,7 +107,7 @@ pub(crate) fn campaign(campaign: &Campaign) -> impl Serialize + '_ {
         duration_s: scenario.duration_s,
         plant: scenario.model.name(),
         contenders: who(&scenario.contenders),
-        trajectories: courses.iter().map(|course| course.name.as_str()).collect(),
+        trajectories: trajectories.iter().map(|trajectory| trajectory.name.as_str()).collect(),
         drawn: drawn.collect(),
     }
 }

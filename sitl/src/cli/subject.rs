@@ -177,7 +177,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_built_in_file_is_told_by_its_text() {
+    fn every_built_in_file_is_recognised_by_its_text() {
         for known in &afbc_scenario::BUILT_IN {
             assert_eq!(Kind::of(known.text), Some(Kind::Scenario), "{}", known.name);
         }

@@ -294,8 +294,8 @@ impl Checker {
         for message in &tick.heard {
             let Downlink::Heartbeat { armed, mode, .. } = *message else { continue };
             if mode != modes::custom(self.mode) && tick.time_ms - self.mode_ms > 2 {
-                let told = modes::of_custom(mode);
-                self.complain(tick.time_ms, &format!("the heartbeat says {told:?}, announced was {:?}", self.mode));
+                let reported = modes::of_custom(mode);
+                self.complain(tick.time_ms, &format!("the heartbeat says {reported:?}, announced was {:?}", self.mode));
             }
             if armed != self.armed {
                 self.complain(tick.time_ms, "heartbeat and rotors disagree");

@@ -2,7 +2,7 @@
 
 use super::document::{Case, Document};
 use crate::airborne;
-use afbc_campaign::{self as campaign, Campaign, Course, Manifest, Shard};
+use afbc_campaign::{self as campaign, Campaign, Manifest, NamedTrajectory, Shard};
 use afbc_scenario::Scenario;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -113,6 +113,6 @@ fn fingerprint(subject: &impl Subject) -> String {
     let plain = campaign::parse("f", "flights = 1\nscenario = \"hover\"", "f", Path::new("")).unwrap();
     let scenario = subject.scenario();
     let Scenario { trajectory, initial, .. } = scenario.clone();
-    let courses = vec![Course { name: "own".into(), trajectory, initial }];
-    Manifest::new(&Campaign { courses, scenario, ..plain }, Shard::WHOLE).fingerprint
+    let trajectories = vec![NamedTrajectory { name: "own".into(), trajectory, initial }];
+    Manifest::new(&Campaign { trajectories, scenario, ..plain }, Shard::WHOLE).fingerprint
 }

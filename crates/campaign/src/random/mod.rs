@@ -9,11 +9,11 @@ mod change;
 mod flight;
 mod path;
 mod power;
-mod standing;
+mod ranking;
 
 pub use change::Change;
 pub use flight::{DrawnFlight, Seen};
-pub use standing::{Difference, RESAMPLES, Score, Standing, is_level, standings};
+pub use ranking::{Difference, RESAMPLES, Ranking, Score, is_level, rankings};
 
 use crate::compare::{self, Outcome};
 use afbc_reader::FileError;

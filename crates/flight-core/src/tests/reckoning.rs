@@ -207,17 +207,17 @@ proptest! {
         let mut drift = Drift::new(place_m, &state);
         let direction = Vector2::new(towards.cos(), towards.sin());
         let size = if jumps { 0.21 + change } else { change };
-        let mut told = state;
+        let mut reckoned = state;
         for _ in 0..first {
-            told = drift.advance(&state, DT_S);
+            reckoned = drift.advance(&state, DT_S);
         }
         let mut later = state;
         later.velocity_m_s.x += size * direction.x;
         later.velocity_m_s.y += size * direction.y;
         later.position_m += Vector3::new(7.0, 8.0, -0.5);
-        let before = told;
+        let before = reckoned;
         for _ in 0..then {
-            told = drift.advance(&later, DT_S);
+            reckoned = drift.advance(&later, DT_S);
         }
         let (t1, t2) = (first as f32 * DT_S, then as f32 * DT_S);
         let fade = |t: f32| (-0.5 * t).exp();
@@ -225,20 +225,20 @@ proptest! {
         let begin = state.velocity_m_s.xy();
         let changed = if jumps { Vector2::zeros() } else { direction * (size * fade(t1)) };
         let velocity = begin * fade(t1 + t2) + changed * fade(t2);
-        prop_assert!((told.velocity_m_s.xy() - velocity).amax() < 0.01, "{told:?}, not {velocity:?}");
+        prop_assert!((reckoned.velocity_m_s.xy() - velocity).amax() < 0.01, "{reckoned:?}, not {velocity:?}");
         let position = place_m + begin * way(t1 + t2) + changed * way(t2);
-        prop_assert!((told.position_m.xy() - position).amax() < 0.01, "{told:?}, not {position:?}");
+        prop_assert!((reckoned.position_m.xy() - position).amax() < 0.01, "{reckoned:?}, not {position:?}");
         prop_assert!((before.velocity_m_s.xy() - begin * fade(t1)).amax() < 0.01);
         let vertical =
             |state: &State| (state.position_m.z, state.velocity_m_s.z, state.attitude_rad, state.rates_rad_s);
-        prop_assert_eq!(vertical(&told), vertical(&later));
+        prop_assert_eq!(vertical(&reckoned), vertical(&later));
     }
 }
 
 /// Many small changes count, however far they lead; a jump does so in no direction, and what follows it does again.
 #[test]
 fn a_jump_of_the_estimate_is_no_motion() {
-    let told = |steps: &[[f32; 2]]| {
+    let reckoned = |steps: &[[f32; 2]]| {
         let mut state = State::default();
         let mut drift = Drift::new(Vector2::zeros(), &state);
         for [x, y] in steps {
@@ -248,11 +248,11 @@ fn a_jump_of_the_estimate_is_no_motion() {
         }
         drift.advance(&state, DT_S).velocity_m_s
     };
-    assert!((told(&[[0.1, -0.1]; 5]) - Vector3::new(0.5, -0.5, 0.0)).amax() < 0.01);
-    assert!((told(&[[0.19, 0.0]]) - Vector3::new(0.19, 0.0, 0.0)).amax() < 0.001);
+    assert!((reckoned(&[[0.1, -0.1]; 5]) - Vector3::new(0.5, -0.5, 0.0)).amax() < 0.01);
+    assert!((reckoned(&[[0.19, 0.0]]) - Vector3::new(0.19, 0.0, 0.0)).amax() < 0.001);
     for jump in [[0.21, 0.0], [0.0, -0.21], [0.15, 0.15], [3.0, 0.0]] {
-        assert_eq!(told(&[jump]), Vector3::zeros(), "{jump:?}");
-        assert!((told(&[jump, [0.05, 0.1]]) - Vector3::new(0.05, 0.1, 0.0)).amax() < 0.001, "{jump:?}");
+        assert_eq!(reckoned(&[jump]), Vector3::zeros(), "{jump:?}");
+        assert!((reckoned(&[jump, [0.05, 0.1]]) - Vector3::new(0.05, 0.1, 0.0)).amax() < 0.001, "{jump:?}");
     }
 }
 

@@ -83,8 +83,8 @@ impl Memory {
             self.change(FlightMode::Hold, ModeReason::Done, notices);
             (self.plan, self.enters) = (Plan::Hold(Hold { at_m, ..Hold::default() }), false);
         }
-        let rests = !airborne && !output.lifts;
-        if rests {
+        let idle_on_ground = !airborne && !output.lifts;
+        if idle_on_ground {
             self.limiter.rest(state);
             (self.lift_s, self.left, self.stood_m) = (0.0, false, state.position_m);
             return Some((self.limiter.setpoint(), true));

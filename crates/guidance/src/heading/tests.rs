@@ -11,14 +11,14 @@ fn acceleration(heading: &Heading, turn: &Turn, limits: &Turning) -> f64 {
     let largest = f64::from(limits.acceleration_rad_s2);
     let braking = 0.7 * largest;
     let (wanted, change) = match *turn {
-        Turn::By(told) => (f64::from(told).clamp(-most, most), 0.0),
-        Turn::To(yaw, told) => {
-            let told = f64::from(told);
+        Turn::By(goal_rad_s) => (f64::from(goal_rad_s).clamp(-most, most), 0.0),
+        Turn::To(yaw, goal_rad_s) => {
+            let goal_rad_s = f64::from(goal_rad_s);
             let e = (f64::from(yaw) - f64::from(heading.yaw_rad) + PI).rem_euclid(TAU) - PI;
             let c = braking / 2.0;
             let f = |e: f64| ((c * c + 2.0 * braking * e.abs()).sqrt() - c) * e.signum();
-            let (h, shaping) = (1e-6, told - rate);
-            let wanted = told + f(e);
+            let (h, shaping) = (1e-6, goal_rad_s - rate);
+            let wanted = goal_rad_s + f(e);
             let change = (f(e + shaping * h) - f(e - shaping * h)) / (2.0 * h);
             if wanted.abs() <= most { (wanted, change) } else { (wanted.clamp(-most, most), 0.0) }
         }
@@ -46,16 +46,16 @@ proptest! {
         let limits = Turning { rate_rad_s: rate_max, acceleration_rad_s2: acceleration_max };
         let before = Heading { yaw_rad, rate_rad_s: rate, acceleration_rad_s2: 9.0 };
         let turn = match (turn, near) {
-            (Turn::To(_, told), Some(near)) => Turn::To(yaw_rad + near, told),
+            (Turn::To(_, goal_rad_s), Some(near)) => Turn::To(yaw_rad + near, goal_rad_s),
             (turn, _) => turn,
         };
         let mut heading = before;
         heading.advance(&turn, &limits, dt_s);
-        if let Turn::To(yaw, told) = turn {
+        if let Turn::To(yaw, goal_rad_s) = turn {
             let off = wrap_angle(yaw - yaw_rad).abs();
-            let off_rad_s = (told - rate).abs();
-            let reached = off_rad_s <= REACHED_RAD_S && off <= REACHED_RAD + off_rad_s * dt_s && told.abs() <= rate_max;
-            let hit = heading == Heading { yaw_rad: yaw, rate_rad_s: told, acceleration_rad_s2: 0.0 };
+            let off_rad_s = (goal_rad_s - rate).abs();
+            let reached = off_rad_s <= REACHED_RAD_S && off <= REACHED_RAD + off_rad_s * dt_s && goal_rad_s.abs() <= rate_max;
+            let hit = heading == Heading { yaw_rad: yaw, rate_rad_s: goal_rad_s, acceleration_rad_s2: 0.0 };
             prop_assert_eq!(hit, reached);
             if reached {
                 return Ok(());
@@ -78,10 +78,10 @@ proptest! {
 #[test]
 fn it_is_reached_within_tolerances_only() {
     let limits = Turning { rate_rad_s: 1.0, acceleration_rad_s2: 2.0 };
-    let hits = |off: f32, off_rad_s: f32, told: f32| {
-        let mut heading = Heading { yaw_rad: 0.5 - off, rate_rad_s: told - off_rad_s, acceleration_rad_s2: 0.1 };
-        heading.advance(&Turn::To(0.5, told), &limits, 1e-3);
-        heading == Heading { yaw_rad: 0.5, rate_rad_s: told, acceleration_rad_s2: 0.0 }
+    let hits = |off: f32, off_rad_s: f32, goal_rad_s: f32| {
+        let mut heading = Heading { yaw_rad: 0.5 - off, rate_rad_s: goal_rad_s - off_rad_s, acceleration_rad_s2: 0.1 };
+        heading.advance(&Turn::To(0.5, goal_rad_s), &limits, 1e-3);
+        heading == Heading { yaw_rad: 0.5, rate_rad_s: goal_rad_s, acceleration_rad_s2: 0.0 }
     };
     for sign in [1.0, -1.0] {
         assert!(hits(sign * 0.99e-3, 0.0, 0.0) && !hits(sign * 1.02e-3, 0.0, 0.0));

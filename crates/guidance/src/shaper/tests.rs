@@ -66,7 +66,7 @@ impl Page {
     fn wanted<const D: usize>(&self, motion: &Motion<D>, goal: &Goal<D>, reach: &Reach) -> (Vec64<D>, Vec64<D>) {
         let zero = Vec64::<D>::zeros();
         let v = wide(&motion.velocity);
-        let Some(told) = goal.velocity.as_ref().map(wide) else {
+        let Some(given) = goal.velocity.as_ref().map(wide) else {
             // x with g(x) as the acceleration.
             let a = wide(&goal.acceleration);
             let size = ((a.norm() + self.d).powi(2) - self.d * self.d) / (2.0 * self.settling);
@@ -74,19 +74,19 @@ impl Page {
             return (shortened(ahead, 0.98 * limit(&ahead, reach.approach)), zero);
         };
         let Some(position) = goal.position.as_ref().map(wide) else {
-            return (shortened(told, 0.98 * limit(&told, reach.approach)), zero);
+            return (shortened(given, 0.98 * limit(&given, reach.approach)), zero);
         };
         let e = position - wide(&motion.position) - wide(&motion.below);
         let most = 0.98 * limit(&e, reach.approach);
         let approach = self.f(&e);
         let change = if approach.norm() <= most {
             let h = 1e-6;
-            let shaping = (told - v) * h;
+            let shaping = (given - v) * h;
             (self.f(&(e + shaping)) - self.f(&(e - shaping))) / (2.0 * h)
         } else {
             zero
         };
-        let wanted = told + shortened(approach, most);
+        let wanted = given + shortened(approach, most);
         (shortened(wanted, 0.98 * limit(&wanted, reach.speed)), change)
     }
 
@@ -95,11 +95,11 @@ impl Page {
         let (v, a) = (wide(&motion.velocity), wide(&motion.acceleration));
         let (wanted, change) = self.wanted(motion, goal, reach);
         let x = wanted - v;
-        let told = if goal.velocity.is_some() { wide(&goal.acceleration) } else { Vec64::<D>::zeros() };
+        let given = if goal.velocity.is_some() { wide(&goal.acceleration) } else { Vec64::<D>::zeros() };
         let (own, slope) = self.g(&x);
         let own = change + own;
-        let rise = if own.norm() <= self.a { (change + told - a) * slope } else { Vec64::<D>::zeros() };
-        let wanted = shortened(told + shortened(own, self.a), f64::from(reach.acceleration));
+        let rise = if own.norm() <= self.a { (change + given - a) * slope } else { Vec64::<D>::zeros() };
+        let wanted = shortened(given + shortened(own, self.a), f64::from(reach.acceleration));
         // The acceleration from which the speed settles to its limit in time.
         let size = wanted.norm();
         let jerk = if size > 0.0 {

@@ -167,7 +167,7 @@ impl Bench {
 
     fn fly(&mut self, guided: &Guided) {
         let State { position_m, velocity_m_s, .. } = self.state;
-        let idles = !self.core.armed() || guided.rests && !self.landing.airborne();
+        let idles = !self.core.armed() || guided.idle_on_ground && !self.landing.airborne();
         let wanted_m_s2 = match &guided.setpoint {
             _ if idles => Vector3::new(0.0, 0.0, -G_M_S2),
             None => Vector3::zeros(),
@@ -198,7 +198,7 @@ impl Bench {
         if !self.core.armed() {
             return;
         }
-        if guided.rests && !self.landing.airborne() {
+        if guided.idle_on_ground && !self.landing.airborne() {
             self.landing.rest(Some(&self.state));
         } else {
             self.landing.advance(&self.state, self.thrust_m_s2, 1000, DT_S);

@@ -67,7 +67,7 @@ mod tests {
 
     /// Types 1 to 6, in both encodings.
     #[test]
-    fn both_encodings_of_every_integer_are_told_apart() {
+    fn both_encodings_of_every_integer_are_distinguished() {
         let step = 997;
         for number in (-8_388_607..=8_388_607_i32).step_by(step).chain(-70_000..=70_000) {
             let value = number as f32;

@@ -81,7 +81,7 @@ impl Kept {
             let mut more = false;
             store.visit(|name, edition, bits| {
                 let Ok((name, value)) = self.read(name, edition, bits) else { return };
-                // What is unknown, or out of its own range, has been told.
+                // What is unknown, or out of its own range, has been reported.
                 let known = table.get(name).filter(|parameter| parameter.range.check(value).is_ok());
                 if known.is_some_and(|parameter| parameter.value != value) {
                     match table.set(name, value) {

@@ -44,7 +44,7 @@ const ROLES: [Shades; 12] = [
     [TINTS[4], rgb(0x3D2E5A)],
 ];
 
-/// Colours of the built-in contenders. Any two can be told apart also by the colour-blind, on white (contrast 3 : 1 or
+/// Colours of the built-in contenders. Any two differ to the colour-blind, too, on white (contrast 3 : 1 or
 /// more) and in the dark (4 : 1 or more).
 const KNOWN: [(&str, Shades); 10] = [
     ("afbc", shades(0x0072B2, 0x7FA8ED)),
@@ -174,7 +174,7 @@ mod tests {
     }
 
     #[test]
-    fn known_contenders_are_told_apart_by_everyone_on_white_and_in_the_dark() {
+    fn known_contenders_are_distinguished_by_everyone_on_white_and_in_the_dark() {
         for shade in [0, 1] {
             let paper = ROLES[0][shade];
             for (i, (name, a)) in KNOWN.iter().enumerate() {

@@ -204,7 +204,7 @@ fn unusual_flights_have_figures() {
 /// same panel. The figure states this, and marks no other place. In the panels of x, y and psi the cross is at the
 /// loss.
 #[test]
-fn a_loss_beyond_a_panel_is_told_and_not_marked_elsewhere() {
+fn a_loss_beyond_a_panel_is_reported_and_not_marked_elsewhere() {
     let hover = Scenario { duration_s: 200.0, ..built_in("hover").unwrap().read().unwrap() };
     let flown = both(&hover);
     assert!(flown[0].run.lost.is_some() && flown[1].run.lost.is_none());

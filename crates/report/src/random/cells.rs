@@ -1,7 +1,7 @@
 //! Contents of the tables, and what they mean.
 
 use super::judged::{Group, Judged};
-use afbc_campaign::random::{Difference, RESAMPLES, Standing};
+use afbc_campaign::random::{Difference, RESAMPLES, Ranking};
 use afbc_sim::metrics::SETTLED_S;
 
 /// Heads of the columns beside the contender's, the last for what the others are compared with.
@@ -17,8 +17,8 @@ pub(super) fn heads(judged: &Judged<'_>) -> [String; HEADS.len()] {
 }
 
 /// Returns a contender's cells.
-pub(super) fn cells(group: &Group<'_>, standing: &Standing) -> [String; HEADS.len()] {
-    let Standing { wins, lost, lost_alone, median_m, geometric_m, difference } = standing;
+pub(super) fn cells(group: &Group<'_>, ranking: &Ranking) -> [String; HEADS.len()] {
+    let Ranking { wins, lost, lost_alone, median_m, geometric_m, difference } = ranking;
     let percent = 100.0 * *wins as f64 / group.kept().max(1) as f64;
     let metres = |distance_m: &Option<f64>| distance_m.map_or("lost".into(), |distance_m| format!("{distance_m:.5}"));
     [

@@ -3,7 +3,7 @@
 use super::Judged;
 use super::judged::Group;
 use afbc_campaign::compare::Outcome;
-use afbc_campaign::random::{Standing, is_level};
+use afbc_campaign::random::{Ranking, is_level};
 use serde::Serialize;
 use std::io::{self, Write};
 
@@ -137,8 +137,8 @@ pub fn json(out: &mut dyn Write, judged: &Judged<'_>) -> io::Result<()> {
 }
 
 fn of_group<'a>(judged: &Judged<'a>, group: &'a Group<'a>) -> GroupWords<'a> {
-    let words = |(contender, standing): (&'a afbc_scenario::contender::Contender, &Standing)| {
-        let Standing { wins, lost, lost_alone, median_m, geometric_m, difference } = *standing;
+    let words = |(contender, ranking): (&'a afbc_scenario::contender::Contender, &Ranking)| {
+        let Ranking { wins, lost, lost_alone, median_m, geometric_m, difference } = *ranking;
         Words {
             name: &contender.name,
             controller: contender.kind().name(),
@@ -159,6 +159,6 @@ fn of_group<'a>(judged: &Judged<'a>, group: &'a Group<'a>) -> GroupWords<'a> {
         vehicle: group.vehicle,
         flights: group.flights,
         lost_by_all: &group.lost_by_all,
-        contenders: judged.contenders().iter().zip(&group.standings).map(words).collect(),
+        contenders: judged.contenders().iter().zip(&group.rankings).map(words).collect(),
     }
 }

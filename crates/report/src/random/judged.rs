@@ -1,6 +1,6 @@
 //! Flights that were drawn and flown, and how the contenders stand.
 
-use afbc_campaign::random::{FlownDraw, Random, Score, Seen, Standing, standings};
+use afbc_campaign::random::{FlownDraw, Random, Ranking, Score, Seen, rankings};
 use afbc_scenario::contender::Contender;
 
 /// Flights that were drawn and flown, and how the contenders stand in them.
@@ -27,7 +27,7 @@ pub(super) struct Group<'a> {
     /// Names of the flights that the contender with which the others are compared lost, and another kept.
     pub(super) lost_alone: Vec<&'a str>,
     /// One for each contender.
-    pub(super) standings: Vec<Standing>,
+    pub(super) rankings: Vec<Ranking>,
 }
 
 impl<'a> Judged<'a> {
@@ -96,6 +96,6 @@ fn group<'a>(flown: &'a [FlownDraw], vehicle: Option<&'a str>, against: usize) -
         flights: scores.len(),
         lost_by_all: named(|score, _| score.best_m().is_none()),
         lost_alone: named(|score, against| score.best_m().is_some() && score.of(against).is_none()),
-        standings: standings(&scores, against),
+        rankings: rankings(&scores, against),
     }
 }

@@ -15,8 +15,8 @@ pub fn markdown(judged: &Judged<'_>) -> String {
         // Writing to a String cannot fail.
         let _ = writeln!(page, "\n| {}, {} flights | {} |", group.name(), group.flights, heads.join(" | "));
         let _ = writeln!(page, "|---|{rule}");
-        for (contender, standing) in judged.contenders().iter().zip(&group.standings) {
-            let cells = cells(group, standing).map(|cell| escaped(&cell));
+        for (contender, ranking) in judged.contenders().iter().zip(&group.rankings) {
+            let cells = cells(group, ranking).map(|cell| escaped(&cell));
             let _ = writeln!(page, "| {} | {} |", contender.title(), cells.join(" | "));
         }
         notes(judged, group).iter().for_each(|note| page += &format!("\n{}", paragraph(note)));

@@ -19,7 +19,7 @@ pub(super) fn page(judged: &Judged<'_>) -> String {
             p.quiet { (legend(judged)) }
             @for group in &judged.groups {
                 h2 { (group.name()) }
-                div.scroll { (standings(judged, group)) }
+                div.scroll { (rankings(judged, group)) }
                 @for note in notes(judged, group) { p { (note) } }
             }
         },
@@ -27,7 +27,7 @@ pub(super) fn page(judged: &Judged<'_>) -> String {
 }
 
 /// A row for each contender.
-fn standings(judged: &Judged<'_>, group: &Group<'_>) -> Markup {
+fn rankings(judged: &Judged<'_>, group: &Group<'_>) -> Markup {
     html! {
         table {
             thead { tr {
@@ -35,10 +35,10 @@ fn standings(judged: &Judged<'_>, group: &Group<'_>) -> Markup {
                 @for head in heads(judged) { th scope="col" { (head) } }
             } }
             tbody {
-                @for (contender, standing) in judged.contenders().iter().zip(&group.standings) {
+                @for (contender, ranking) in judged.contenders().iter().zip(&group.rankings) {
                     tr {
                         th scope="row" { (contender.title()) }
-                        @for cell in cells(group, standing) { td { (cell) } }
+                        @for cell in cells(group, ranking) { td { (cell) } }
                     }
                 }
             }

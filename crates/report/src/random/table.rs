@@ -10,9 +10,9 @@ pub fn table(judged: &Judged<'_>) -> String {
     for group in &judged.groups {
         let head = format!("{}, {} flights", group.name(), group.flights);
         rows.push([head].into_iter().chain(heads(judged)).collect());
-        for (contender, standing) in judged.contenders().iter().zip(&group.standings) {
+        for (contender, ranking) in judged.contenders().iter().zip(&group.rankings) {
             let name = format!("  {}", contender.title());
-            rows.push([name].into_iter().chain(cells(group, standing)).collect());
+            rows.push([name].into_iter().chain(cells(group, ranking)).collect());
         }
     }
     let columns = rows.first().map_or(0, Vec::len);
@@ -28,7 +28,7 @@ pub fn table(judged: &Judged<'_>) -> String {
     });
     let mut lines = vec![format!("Suite random: {}.", judged.words()), String::new()];
     for group in &judged.groups {
-        lines.extend(formatted.by_ref().take(1 + group.standings.len()));
+        lines.extend(formatted.by_ref().take(1 + group.rankings.len()));
         for note in notes(judged, group) {
             wrap(&mut lines, "  ", &note);
         }

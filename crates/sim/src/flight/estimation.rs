@@ -48,7 +48,7 @@ pub struct Estimated {
 /// How a measurement agreed with the estimate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Innovation {
-    /// What it tells.
+    /// What it measures.
     pub aid: Aid,
     /// Normalised innovation squared, the sum over its scalars: as many as these on the average if both are consistent.
     pub nis: f32,
@@ -78,7 +78,7 @@ pub(super) struct Look {
     /// The state, if it is valid.
     pub(super) state: Option<State>,
     /// The state of a vehicle that knows its attitude, but not all of the rest.
-    pub(super) adrift: Option<State>,
+    pub(super) position_lost: Option<State>,
     /// What the estimate misses for a valid state.
     pub(super) missing: Option<Refusal>,
     /// A tracker's pose, once the inertial sensor has failed.
@@ -178,8 +178,8 @@ impl SimulatedEstimator {
         let inbox = &self.inbox;
         let pose = inbox.pose().map(|pose| Aged { value: pose.value, age_us: pose.age_us(now_us) });
         let state = inbox.state().map(|state| state.value);
-        let adrift = inbox.adrift().map(|state| state.value);
-        let look = Look { state, adrift, missing: inbox.missing(), pose, estimated };
+        let position_lost = inbox.position_lost().map(|state| state.value);
+        let look = Look { state, position_lost, missing: inbox.missing(), pose, estimated };
         self.last = Some((truth.time_s, look));
         look
     }

@@ -46,7 +46,7 @@ impl<C: FlightController<N>, const N: usize> InFlightCore<C, N> {
         }
         match (view.state.filter(|state| view.new && state.is_plausible()), view.missing) {
             (Some(state), _) => self.inbox.locate(stamped(state)),
-            (None, Some(missing)) => self.inbox.put_adrift(view.adrift.map(stamped), missing),
+            (None, Some(missing)) => self.inbox.put_position_lost(view.position_lost.map(stamped), missing),
             (None, None) => {}
         }
         self.inbox.put_setpoint(Stamped { value: setpoint, at_us });

@@ -47,7 +47,7 @@ pub struct View {
     /// Newest state that has reached the pilot, held between samples; none in a dropout or an outage.
     pub state: Option<State>,
     /// Estimate of a vehicle that knows its attitude, but not where it is.
-    pub adrift: Option<State>,
+    pub position_lost: Option<State>,
     /// What the vehicle's own estimate misses for a state; none without instruments.
     pub missing: Option<Refusal>,
     /// Pose of a tracker in front of a vehicle whose inertial sensor has failed.
@@ -164,7 +164,7 @@ impl World {
             telemetry,
             reference,
             state,
-            adrift: None,
+            position_lost: None,
             missing: None,
             pose: None,
             new,
@@ -198,7 +198,7 @@ impl View {
 #[inline(never)]
 fn estimated(estimator: &mut SimulatedEstimator, plant: &Plant, motion: Motion, reference: Reference) -> View {
     let (time_s, telemetry) = (plant.time_s(), plant.telemetry());
-    let Look { state, adrift, missing, pose, estimated } = estimator.look(&plant.truth());
+    let Look { state, position_lost, missing, pose, estimated } = estimator.look(&plant.truth());
     View {
         time_s,
         motion,
@@ -207,7 +207,7 @@ fn estimated(estimator: &mut SimulatedEstimator, plant: &Plant, motion: Motion, 
         telemetry,
         reference,
         state,
-        adrift,
+        position_lost,
         missing,
         pose,
         new: true,

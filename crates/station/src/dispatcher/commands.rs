@@ -55,7 +55,7 @@ impl Dispatcher {
             _ => match self.order_of(command) {
                 Ok(order) => {
                     if let Command::Home(_) = command {
-                        // MAVLink wants it told whether it has changed or not.
+                        // MAVLink wants it reported whether it has changed or not.
                         self.streams.request(Requested { message: id::HOME_POSITION, index: 0 });
                     }
                     if let Command::StartMission(number @ 1..) = command {
@@ -155,7 +155,7 @@ impl Dispatcher {
         }
     }
 
-    /// Notes that a station wants to know what speaks against arming, and tells whether another is in control.
+    /// Notes that a station wants to know what speaks against arming, and reports whether another is in control.
     fn check_arming(&mut self, from: Address) {
         let holder = self.control.holder(self.now_us).filter(|holder| *holder != from);
         if let Some(holder) = holder {

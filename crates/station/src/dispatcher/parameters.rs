@@ -9,7 +9,7 @@ use afbc_onboard::ControlInputs;
 use afbc_onboard::parameters::{ParameterTable, RecordChange};
 
 impl Dispatcher {
-    /// Notes a message about parameters. A station that is not in control is told the value that it has not set.
+    /// Notes a message about parameters. A station that is not in control is sent the value that it has not set.
     pub(super) fn parameter(&mut self, request: ParameterRequest, from: Address, inputs: &mut ControlInputs) {
         let request = match request {
             ParameterRequest::Set { name, .. } if !self.may(from, inputs) => ParameterRequest::ReadName(name),

@@ -34,13 +34,13 @@ pub struct Commands {
     /// overflows either.
     ordered: [Option<Open>; QUEUE_MAX],
     /// A command that is in progress, and when that was last reported \[us\].
-    lasting: Option<(Open, u64)>,
-    waiting: Deque<Told, ANSWERS_MAX>,
+    in_progress: Option<(Open, u64)>,
+    waiting: Deque<QueuedAnswer, ANSWERS_MAX>,
     unanswered: u32,
 }
 
 /// A queued answer.
-struct Told {
+struct QueuedAnswer {
     command: u16,
     answer: Answer,
     to: Address,
@@ -91,10 +91,10 @@ impl Commands {
     /// Begins a command that lasts: "in progress" is sent until it is [ended](Self::end). False if there is one
     /// already; then this one is answered.
     pub fn begin(&mut self, command: u16, from: Address, at_us: u64) -> bool {
-        let is_free = self.lasting.is_none();
+        let is_free = self.in_progress.is_none();
         if is_free {
             self.answer(command, Answer::InProgress, from);
-            self.lasting = Some((Open { command: Some(command), from, at_us }, at_us));
+            self.in_progress = Some((Open { command: Some(command), from, at_us }, at_us));
         } else {
             self.answer(command, Answer::Refused(BUSY), from);
         }
@@ -103,14 +103,14 @@ impl Commands {
 
     /// Ends the command that lasts.
     pub fn end(&mut self, answer: Answer) {
-        if let Some((Open { command: Some(command), from, .. }, _)) = self.lasting.take() {
+        if let Some((Open { command: Some(command), from, .. }, _)) = self.in_progress.take() {
             self.answer(command, answer, from);
         }
     }
 
     /// Queues the answer to a command.
     pub fn answer(&mut self, command: u16, answer: Answer, to: Address) {
-        if self.waiting.push_back(Told { command, answer, to }).is_err() {
+        if self.waiting.push_back(QueuedAnswer { command, answer, to }).is_err() {
             self.unanswered = self.unanswered.saturating_add(1);
         }
     }
@@ -129,18 +129,18 @@ impl Commands {
 
     /// Returns the next answer to be sent at `now_us`.
     pub fn next(&mut self, now_us: u64) -> Option<Downlink> {
-        if let Some(Told { command, answer, to }) = self.waiting.pop_front() {
+        if let Some(QueuedAnswer { command, answer, to }) = self.waiting.pop_front() {
             return Some(Downlink::Answer { command, answer, to });
         }
         let forgotten = |open: &mut Open| now_us.saturating_sub(open.at_us) > FORGOTTEN_US;
         let mut open = self.asked.iter_mut().chain(&mut self.ordered);
         // A message without an answer is forgotten without one.
         while let Some(lost) = open.find_map(|place| place.take_if(forgotten)) {
-            if let Some(told) = lost.answered(Answer::Failed) {
-                return Some(told);
+            if let Some(answer) = lost.answered(Answer::Failed) {
+                return Some(answer);
             }
         }
-        match &mut self.lasting {
+        match &mut self.in_progress {
             Some((open, told_us)) if now_us.saturating_sub(*told_us) >= IN_PROGRESS_US => {
                 *told_us = now_us;
                 open.answered(Answer::InProgress)
@@ -169,7 +169,7 @@ mod tests {
     const A: Address = Address { system: 255, component: 190 };
     const B: Address = Address { system: 245, component: 190 };
 
-    fn told(command: u16, answer: Answer, to: Address) -> Option<Downlink> {
+    fn answered(command: u16, answer: Answer, to: Address) -> Option<Downlink> {
         Some(Downlink::Answer { command, answer, to })
     }
 
@@ -180,15 +180,15 @@ mod tests {
         let give = |commands: &mut Commands, from| commands.order(order, Some(21), from, 0).map(|it| it.ticket);
         assert_eq!([A, B, A, B].map(|from| give(&mut commands, from)), [Some(0), Some(1), Some(2), Some(3)]);
         assert_eq!(give(&mut commands, A), None);
-        assert_eq!(commands.next(0), told(21, Answer::Refused(BUSY), A));
-        assert_eq!(commands.settle_order(1, Ok(())), told(21, Answer::Accepted, B));
+        assert_eq!(commands.next(0), answered(21, Answer::Refused(BUSY), A));
+        assert_eq!(commands.settle_order(1, Ok(())), answered(21, Answer::Accepted, B));
         assert_eq!(commands.settle_order(1, Ok(())), None, "once");
         let declined = OrderRefusal::NotArmed;
-        assert_eq!(commands.settle_order(0, Err(declined)), told(21, Answer::Refused(declined as i32), A));
+        assert_eq!(commands.settle_order(0, Err(declined)), answered(21, Answer::Refused(declined as i32), A));
         assert_eq!(commands.settle_order(77, Ok(())), None);
         assert_eq!(commands.next(FORGOTTEN_US), None);
-        assert_eq!(commands.next(FORGOTTEN_US + 1), told(21, Answer::Failed, A));
-        assert_eq!(commands.next(FORGOTTEN_US + 1), told(21, Answer::Failed, B));
+        assert_eq!(commands.next(FORGOTTEN_US + 1), answered(21, Answer::Failed, A));
+        assert_eq!(commands.next(FORGOTTEN_US + 1), answered(21, Answer::Failed, B));
         assert_eq!(commands.next(FORGOTTEN_US + 1), None);
     }
 
@@ -206,14 +206,14 @@ mod tests {
         let mut commands = Commands::default();
         assert!(commands.begin(245, A, 0));
         assert!(!commands.begin(245, B, 10));
-        assert_eq!(commands.next(20), told(245, Answer::InProgress, A));
-        assert_eq!(commands.next(20), told(245, Answer::Refused(BUSY), B));
+        assert_eq!(commands.next(20), answered(245, Answer::InProgress, A));
+        assert_eq!(commands.next(20), answered(245, Answer::Refused(BUSY), B));
         assert_eq!(commands.next(IN_PROGRESS_US - 1), None);
-        assert_eq!(commands.next(IN_PROGRESS_US), told(245, Answer::InProgress, A));
+        assert_eq!(commands.next(IN_PROGRESS_US), answered(245, Answer::InProgress, A));
         assert_eq!(commands.next(IN_PROGRESS_US), None);
         commands.end(Answer::Accepted);
         commands.end(Answer::Accepted);
-        assert_eq!(commands.next(3 * IN_PROGRESS_US), told(245, Answer::Accepted, A));
+        assert_eq!(commands.next(3 * IN_PROGRESS_US), answered(245, Answer::Accepted, A));
         assert_eq!(commands.next(9 * IN_PROGRESS_US), None);
     }
 }

@@ -7,8 +7,8 @@ use afbc_link::{Address, Command, ControlAnswer, ControlRequest as Wish};
 
 /// Silence after which a station is no longer in control \[us\].
 pub const SILENT_US: u64 = 10_000_000;
-/// Stations that are told who is in control.
-const TOLD_MAX: usize = 4;
+/// Stations that are informed who is in control.
+const INFORMED_MAX: usize = 4;
 
 /// Who is in control.
 #[derive(Clone, Copy, Debug)]
@@ -16,9 +16,9 @@ pub struct OperatorControl {
     silent_us: u64,
     /// The station in control, and when it was last heard \[us\].
     holder: Option<(Address, u64)>,
-    /// Stations that were told that another is in control. The oldest is overwritten.
-    told: [Option<Address>; TOLD_MAX],
-    /// Place in `told` to be written next.
+    /// Stations that were informed that another is in control. The oldest is overwritten.
+    informed: [Option<Address>; INFORMED_MAX],
+    /// Place in `informed` to be written next.
     next: usize,
 }
 
@@ -31,14 +31,14 @@ pub enum ControlClaim {
     Refused {
         /// Who is in control.
         holder: Address,
-        /// True if the station has not been told yet.
+        /// True if the station has not been informed yet.
         first_time: bool,
     },
 }
 
 impl Default for OperatorControl {
     fn default() -> Self {
-        OperatorControl { silent_us: SILENT_US, holder: None, told: [None; TOLD_MAX], next: 0 }
+        OperatorControl { silent_us: SILENT_US, holder: None, informed: [None; INFORMED_MAX], next: 0 }
     }
 }
 
@@ -70,7 +70,7 @@ impl OperatorControl {
             Some(holder) if holder != from => ControlClaim::Refused { holder, first_time: self.is_first_refusal(from) },
             Some(_) => ControlClaim::Granted,
             None => {
-                (self.holder, self.told, self.next) = (Some((from, now_us)), [None; TOLD_MAX], 0);
+                (self.holder, self.informed, self.next) = (Some((from, now_us)), [None; INFORMED_MAX], 0);
                 ControlClaim::Granted
             }
         }
@@ -90,14 +90,14 @@ impl OperatorControl {
         (ControlAnswer { station: from.system, control: wish, granted }, claim)
     }
 
-    /// Returns whether a station is told for the first time.
+    /// Returns whether a station is informed for the first time.
     fn is_first_refusal(&mut self, from: Address) -> bool {
-        let first_time = !self.told.contains(&Some(from));
+        let first_time = !self.informed.contains(&Some(from));
         if first_time {
-            if let Some(place) = self.told.get_mut(self.next) {
+            if let Some(place) = self.informed.get_mut(self.next) {
                 *place = Some(from);
             }
-            self.next = (self.next + 1) % TOLD_MAX;
+            self.next = (self.next + 1) % INFORMED_MAX;
         }
         first_time
     }
@@ -187,32 +187,32 @@ mod tests {
         assert_eq!(control.holder(2), Some(A));
     }
 
-    /// Each station is told once, as long as no more than so many others have been told since; another holder is told
-    /// of anew.
+    /// Each station is informed once, as long as no more than so many others have been since; another holder is
+    /// announced anew.
     #[test]
-    fn stations_are_told_once() {
+    fn stations_are_informed_once() {
         let mut control = OperatorControl::default();
         control.claim(A, 0);
         let station = |system| Address { system, component: 1 };
-        let told = |control: &mut OperatorControl, system| match control.claim(station(system), 1) {
+        let informed = |control: &mut OperatorControl, system| match control.claim(station(system), 1) {
             ControlClaim::Refused { holder, first_time } => (holder, first_time),
             ControlClaim::Granted => (station(system), false),
         };
-        for system in 1..=TOLD_MAX as u8 {
-            assert_eq!(told(&mut control, system), (A, true));
+        for system in 1..=INFORMED_MAX as u8 {
+            assert_eq!(informed(&mut control, system), (A, true));
         }
-        for system in 1..=TOLD_MAX as u8 {
-            assert_eq!(told(&mut control, system), (A, false));
+        for system in 1..=INFORMED_MAX as u8 {
+            assert_eq!(informed(&mut control, system), (A, false));
         }
         // One more takes the place of the first, which takes that of the second.
         for system in [9, 1] {
-            assert_eq!(told(&mut control, system), (A, true));
+            assert_eq!(informed(&mut control, system), (A, true));
         }
-        assert_eq!([told(&mut control, 3), told(&mut control, 9)], [(A, false); 2]);
-        assert_eq!(told(&mut control, 2), (A, true));
+        assert_eq!([informed(&mut control, 3), informed(&mut control, 9)], [(A, false); 2]);
+        assert_eq!(informed(&mut control, 2), (A, true));
         control.change(Wish::Release, A, 2);
         control.claim(B, 3);
-        assert_eq!(told(&mut control, 9), (B, true));
+        assert_eq!(informed(&mut control, 9), (B, true));
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! Events, which the vehicle does not send: it tells in texts.
+//! Events, which the vehicle does not send: it reports in texts.
 
 use afbc_link::{EventError, EventRequest};
 

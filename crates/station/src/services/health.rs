@@ -41,10 +41,10 @@ pub fn system(status: &VehicleStatus) -> SystemStatus {
         (true, true, sensor::MOTORS),
         (true, armable, sensor::ARMING),
     ];
-    let told = aux.sensors;
-    let present = sets.iter().filter(|(present, ..)| *present).fold(told.present, |all, (_, _, bits)| all | bits);
+    let reported = aux.sensors;
+    let present = sets.iter().filter(|(present, ..)| *present).fold(reported.present, |all, (_, _, bits)| all | bits);
     let well = sets.iter().filter(|(present, healthy, _)| *present && *healthy);
-    let healthy = well.fold(told.present & told.healthy, |all, (_, _, bits)| all | bits);
+    let healthy = well.fold(reported.present & reported.healthy, |all, (_, _, bits)| all | bits);
     let battery = aux.battery;
     SystemStatus {
         present,
@@ -179,11 +179,15 @@ mod tests {
             let ill = if !has(0) && !has(1) { sensor::TRACKER } else { 0 }
                 + if has(2) && !(has(1) && has(3)) { sensor::SATELLITES } else { 0 }
                 + if has(6) && !has(5) { sensor::ARMING } else { 0 };
-            let told = system(&status);
-            assert_eq!((told.present, told.enabled, told.healthy), (present, present, present - ill), "{case:#b}");
-            assert_eq!((told.load_permille, told.dropped_frames), (123, 77));
+            let reported = system(&status);
+            assert_eq!(
+                (reported.present, reported.enabled, reported.healthy),
+                (present, present, present - ill),
+                "{case:#b}"
+            );
+            assert_eq!((reported.load_permille, reported.dropped_frames), (123, 77));
             let battery = if has(4) { (11_100, 250, 66) } else { (u16::MAX, -1, -1) };
-            assert_eq!((told.voltage_mv, told.current_ca, told.remaining_percent), battery);
+            assert_eq!((reported.voltage_mv, reported.current_ca, reported.remaining_percent), battery);
 
             status.aux.origin = has(6).then(|| {
                 let at = crate::services::origin::EarthOrigin::SIMULATED;
@@ -200,14 +204,14 @@ mod tests {
         // What the shell says is ill is ill, and what is not there is not well.
         let sensors = SensorBits { present: sensor::BAROMETER, healthy: sensor::MAGNETOMETER };
         status.aux.sensors = sensors;
-        let told = system(&status);
-        assert_eq!((told.present & 12, told.healthy & 12), (sensor::BAROMETER, 0));
+        let reported = system(&status);
+        assert_eq!((reported.present & 12, reported.healthy & 12), (sensor::BAROMETER, 0));
         (status.tick_us, status.dropped_frames) = (5e3, 70_000);
         assert_eq!((system(&status).load_permille, system(&status).dropped_frames), (1000, u16::MAX));
     }
 
     #[test]
-    fn landings_are_told_in_the_air_only() {
+    fn landings_are_reported_in_the_air_only() {
         let mut status = well();
         for (mode, flight_mode, airborne, expected) in [
             (Mode::Flying, FlightMode::Land, true, LANDING),

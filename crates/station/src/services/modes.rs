@@ -120,8 +120,11 @@ mod tests {
         let offered = (0..=u8::MAX).filter_map(available).collect::<heapless::Vec<_, 16>>();
         assert_eq!(offered.len(), FlightMode::ALL.len());
         for (mode, place) in FlightMode::ALL.into_iter().zip(1..) {
-            let told = offered.iter().find(|told| told.custom == custom(mode));
-            assert_eq!(told.map(|told| (told.place, told.count, told.standard)), Some((place, COUNT, standard(mode))));
+            let reported = offered.iter().find(|reported| reported.custom == custom(mode));
+            assert_eq!(
+                reported.map(|reported| (reported.place, reported.count, reported.standard)),
+                Some((place, COUNT, standard(mode)))
+            );
             assert!(standard(mode) == 0 || of_standard(standard(mode)) == Some(mode));
         }
         assert_eq!(of_standard(0), None);
@@ -131,15 +134,15 @@ mod tests {
     #[test]
     fn properties_and_names_are_the_modes() {
         for (mode, place) in FlightMode::ALL.into_iter().zip(1..) {
-            let told = available(place).expect("offered");
+            let reported = available(place).expect("offered");
             let properties = match mode {
                 FlightMode::Position | FlightMode::Altitude | FlightMode::Stabilised => 0,
                 FlightMode::Offboard => 5,
                 _ => 4,
             };
-            assert_eq!((told.place, told.properties), (place, properties), "{mode:?}");
-            let end = told.name.iter().position(|byte| *byte == 0).expect("short");
-            assert_eq!(core::str::from_utf8(told.name.get(..end).expect("within")), Ok(mode.name()));
+            assert_eq!((reported.place, reported.properties), (place, properties), "{mode:?}");
+            let end = reported.name.iter().position(|byte| *byte == 0).expect("short");
+            assert_eq!(core::str::from_utf8(reported.name.get(..end).expect("within")), Ok(mode.name()));
             let now = current(mode, FlightMode::Hold);
             assert_eq!((now.standard, now.custom, now.intended), (standard(mode), custom(mode), 0x0304_0000));
         }

@@ -9,7 +9,7 @@ use afbc_onboard::GuidanceResult;
 use afbc_onboard::Report;
 use afbc_types::{ROTORS_MAX, State};
 
-/// What the shell tells, since the control tick does not know it.
+/// What the shell reports, since the control tick does not know it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct AuxSensors {
     /// Where the local frame's origin is on the earth.
@@ -69,7 +69,7 @@ pub struct VehicleStatus {
     pub tick_us: f32,
     /// Frames dropped since power-up.
     pub dropped_frames: u32,
-    /// What the shell has told.
+    /// What the shell has reported.
     pub aux: AuxSensors,
 }
 
@@ -89,7 +89,7 @@ impl VehicleStatus {
         (self.time_us / 1000) as u32
     }
 
-    /// Returns the flight mode that stations are told.
+    /// Returns the flight mode that is reported to stations.
     pub fn flight_mode(&self) -> FlightMode {
         if self.mode == Mode::Descending { FlightMode::Land } else { self.guided.mode }
     }
@@ -126,8 +126,8 @@ mod tests {
         status.guided.mode = FlightMode::Mission;
         for mode in [Mode::Disarmed, Mode::Flying, Mode::Coasting, Mode::Descending] {
             status.mode = mode;
-            let told = if mode == Mode::Descending { FlightMode::Land } else { FlightMode::Mission };
-            assert_eq!(status.flight_mode(), told);
+            let reported = if mode == Mode::Descending { FlightMode::Land } else { FlightMode::Mission };
+            assert_eq!(status.flight_mode(), reported);
         }
         for airborne in [true, false] {
             status.guided.airborne = airborne;

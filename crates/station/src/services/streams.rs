@@ -287,7 +287,7 @@ mod tests {
     }
 
     #[test]
-    fn intervals_are_set_and_told() {
+    fn intervals_are_set_and_reported() {
         let mut streams = Streams::new(1_000_000);
         assert_eq!(streams.interval_us(id::ATTITUDE), 20_000);
         assert!(streams.set(id::ATTITUDE, 5_000, 0));
@@ -321,9 +321,9 @@ mod tests {
     #[test]
     fn older_stations_set_rates_of_groups() {
         let mut streams = Streams::new(1_000_000);
-        for (group, rate_hz, told_hz) in [(10, 4, 4), (6, 0, 0), (200, 9, 0)] {
-            let told = streams.set_group(DataStream { group, rate_hz }, 0);
-            assert_eq!(told, DataStream { group, rate_hz: told_hz });
+        for (group, rate_hz, reported_hz) in [(10, 4, 4), (6, 0, 0), (200, 9, 0)] {
+            let reported = streams.set_group(DataStream { group, rate_hz }, 0);
+            assert_eq!(reported, DataStream { group, rate_hz: reported_hz });
         }
         assert_eq!(streams.interval_us(id::ATTITUDE), 250_000);
         assert_eq!(streams.interval_us(id::GLOBAL_POSITION_INT), -1);
@@ -356,8 +356,8 @@ mod tests {
         for group in 0..=20 {
             let messages = groups.iter().find(|(other, _)| *other == group).map_or(&[][..], |(_, messages)| messages);
             let mut streams = Streams::new(1_000_000);
-            let told = streams.set_group(DataStream { group, rate_hz: 7 }, 0);
-            assert_eq!(told.rate_hz, if messages.is_empty() { 0 } else { 7 });
+            let reported = streams.set_group(DataStream { group, rate_hz: 7 }, 0);
+            assert_eq!(reported.rate_hz, if messages.is_empty() { 0 } else { 7 });
             for (message, default_us) in DEFAULTS {
                 let expected = if messages.contains(&message) { 142_857 } else { default_us as i32 };
                 let expected = if expected == 0 { -1 } else { expected };

@@ -16,7 +16,7 @@ use nalgebra::Vector3;
 const CAPABILITIES: u64 = 4 | 8 | 16 | 64 | 128 | 256 | 8192;
 const TAU: f32 = core::f32::consts::TAU;
 
-/// Returns the telemetry message numbered `message`, if what it tells is known.
+/// Returns the telemetry message numbered `message`, if its content is known.
 pub fn compose(message: u32, status: &VehicleStatus) -> Option<Downlink> {
     let telemetry = |telemetry| Some(Downlink::Telemetry(telemetry));
     let (time_ms, time_us) = (status.time_ms(), status.time_us);
@@ -172,7 +172,7 @@ mod tests {
 
     /// Telemetry contains no value that is not known; a vehicle without any reports that it is not healthy.
     #[test]
-    fn what_is_not_known_is_not_told() {
+    fn what_is_not_known_is_not_reported() {
         let status = VehicleStatus::default();
         for message in [
             id::GPS_RAW_INT,
@@ -210,7 +210,7 @@ mod tests {
         status
     }
 
-    fn told(message: u32, status: &VehicleStatus) -> Telemetry {
+    fn reported(message: u32, status: &VehicleStatus) -> Telemetry {
         match compose(message, status) {
             Some(Downlink::Telemetry(telemetry)) => telemetry,
             other => panic!("message {message}: {other:?}"),
@@ -219,26 +219,26 @@ mod tests {
 
     /// The messages of the state, each number by its meaning: z up and y to the left here, down and to the right there.
     #[test]
-    fn a_flying_vehicle_tells_its_state() {
+    fn a_flying_vehicle_reports_its_state() {
         let status = flying();
         let (origin, state) = (status.aux.origin.expect("known"), status.state.expect("known"));
         let here = origin.global(&state.position_m);
-        let Telemetry::Global(global) = told(id::GLOBAL_POSITION_INT, &status) else { panic!("another") };
+        let Telemetry::Global(global) = reported(id::GLOBAL_POSITION_INT, &status) else { panic!("another") };
         assert_eq!((global.time_ms, global.place_e7, global.altitude_mm), (5_000, here.e7(), 500_500));
         assert_eq!((global.relative_mm, global.velocity_ned_cm_s), (10_000, [300, 400, -125]));
         // Half a radian to the right.
         assert_eq!(global.heading_cdeg, 2864);
-        let Telemetry::Fix(fix) = told(id::GPS_RAW_INT, &status) else { panic!("another") };
+        let Telemetry::Fix(fix) = reported(id::GPS_RAW_INT, &status) else { panic!("another") };
         assert_eq!((fix.time_us, fix.place_e7, fix.altitude_mm), (5_000_123, here.e7(), 500_500));
         assert_eq!((fix.kind, fix.satellites, fix.sigma_mm), (3, 11, [700, 900]));
         // 3 m/s north, 4 m/s east: 53.13 degrees, to 0.16.
         assert_eq!(fix.speed_cm_s, 500);
         assert!(fix.course_cdeg.abs_diff(5313) <= 16, "{}", fix.course_cdeg);
-        let Telemetry::Summary(summary) = told(id::VFR_HUD, &status) else { panic!("another") };
+        let Telemetry::Summary(summary) = reported(id::VFR_HUD, &status) else { panic!("another") };
         assert_eq!((summary.speed_m_s, summary.altitude_m, summary.climb_m_s), (5.0, 500.5, 1.25));
         // Nothing, half, full, half.
         assert_eq!((summary.heading_deg, summary.throttle_percent), (28, 50));
-        let Telemetry::Attitude(attitude) = told(id::ATTITUDE_QUATERNION, &status) else { panic!("another") };
+        let Telemetry::Attitude(attitude) = reported(id::ATTITUDE_QUATERNION, &status) else { panic!("another") };
         let q = state.quaternion().coords;
         assert_eq!((attitude.time_ms, attitude.rates_rad_s), (5_000, state.rates_rad_s));
         assert_eq!(attitude.attitude, [q.w, q.x, q.y, q.z]);
@@ -250,48 +250,48 @@ mod tests {
         let (position_m, velocity_m_s) = (state.position_m, state.velocity_m_s);
         let position = Downlink::Position { time_ms: 5_000, position_m, velocity_m_s };
         assert_eq!(compose(id::LOCAL_POSITION_NED, &status), Some(position));
-        let Telemetry::Home(home) = told(id::HOME_POSITION, &status) else { panic!("another") };
+        let Telemetry::Home(home) = reported(id::HOME_POSITION, &status) else { panic!("another") };
         let at = origin.global(&Vector3::new(1.0, 2.0, 2.5));
         assert_eq!((home.place_e7, home.altitude_mm, home.time_us), (at.e7(), 490_500, 5_000_123));
         assert_eq!((home.position_m, home.attitude), (Vector3::new(1.0, 2.0, 2.5), [1.0, 0.0, 0.0, 0.0]));
-        let Telemetry::Origin(place) = told(id::GPS_GLOBAL_ORIGIN, &status) else { panic!("another") };
+        let Telemetry::Origin(place) = reported(id::GPS_GLOBAL_ORIGIN, &status) else { panic!("another") };
         assert_eq!(
             (place.place_e7, place.altitude_mm, place.time_us),
             (EarthOrigin::SIMULATED.e7(), 488_000, 5_000_123)
         );
-        let Telemetry::Outputs(outputs) = told(id::ACTUATOR_OUTPUT_STATUS, &status) else { panic!("another") };
+        let Telemetry::Outputs(outputs) = reported(id::ACTUATOR_OUTPUT_STATUS, &status) else { panic!("another") };
         assert_eq!((outputs.time_us, outputs.active), (5_000_123, 4));
         assert_eq!(outputs.throttles, [0.0, 0.5, 1.0, 0.5, 0.0, 0.0, 0.0, 0.0]);
     }
 
-    /// Without a place on the earth, or a position, only what is known is told.
+    /// Without a place on the earth, or a position, only what is known is reported.
     #[test]
-    fn what_is_half_known_is_told_by_halves() {
+    fn what_is_half_known_is_reported_by_halves() {
         let mut status = flying();
         status.health.state_age_us = u32::MAX;
         assert_eq!(compose(id::GLOBAL_POSITION_INT, &status), None);
-        let Telemetry::Fix(fix) = told(id::GPS_RAW_INT, &status) else { panic!("another") };
+        let Telemetry::Fix(fix) = reported(id::GPS_RAW_INT, &status) else { panic!("another") };
         assert_eq!((fix.place_e7, fix.altitude_mm, fix.speed_cm_s, fix.course_cdeg), ([0; 2], 0, 65_535, 65_535));
         let mut status = flying();
         status.aux.origin = None;
-        let Telemetry::Summary(summary) = told(id::VFR_HUD, &status) else { panic!("another") };
+        let Telemetry::Summary(summary) = reported(id::VFR_HUD, &status) else { panic!("another") };
         assert_eq!(summary.altitude_m, 12.5);
         assert_eq!([id::HOME_POSITION, id::GPS_GLOBAL_ORIGIN].map(|it| compose(it, &status)), [None, None]);
         // While there is no home, heights count from the origin.
         let mut status = flying();
         status.guided.home_m = None;
-        let Telemetry::Global(global) = told(id::GLOBAL_POSITION_INT, &status) else { panic!("another") };
+        let Telemetry::Global(global) = reported(id::GLOBAL_POSITION_INT, &status) else { panic!("another") };
         assert_eq!((global.relative_mm, compose(id::HOME_POSITION, &status)), (12_500, None));
     }
 
     #[test]
-    fn clocks_versions_and_modes_are_told() {
+    fn clocks_versions_and_modes_are_reported() {
         let mut status = flying();
         let time = |unix_us| Some(Downlink::Clock(Clock::Time { unix_us, boot_ms: 5_000 }));
         assert_eq!(compose(id::SYSTEM_TIME, &status), time(1_700_000_005_000_123));
         status.aux.powered_up_us = 0;
         assert_eq!(compose(id::SYSTEM_TIME, &status), time(0));
-        let Telemetry::Version(version) = told(id::AUTOPILOT_VERSION, &status) else { panic!("another") };
+        let Telemetry::Version(version) = reported(id::AUTOPILOT_VERSION, &status) else { panic!("another") };
         // MISSION_INT, COMMAND_INT, PARAM_ENCODE_BYTEWISE; SET_ATTITUDE_TARGET, both SET_POSITION_TARGET; MAVLINK2; and
         // neither FTP nor logs.
         let bits = [2, 3, 4, 6, 7, 8, 13];
@@ -302,7 +302,7 @@ mod tests {
             assert_eq!(text(part), crate::services::texts::Words::of(digits));
         }
         assert_eq!(version.software[3], 255);
-        assert_eq!(told(id::PROTOCOL_VERSION, &status), Telemetry::Protocol);
+        assert_eq!(reported(id::PROTOCOL_VERSION, &status), Telemetry::Protocol);
         let mode = afbc_guidance::FlightMode::Hold;
         assert_eq!(compose(id::CURRENT_MODE, &status), Some(Downlink::CurrentMode(modes::current(mode, mode))));
         for message in [id::SYS_STATUS, id::ESTIMATOR_STATUS, id::EXTENDED_SYS_STATE] {
@@ -311,7 +311,7 @@ mod tests {
                 id::ESTIMATOR_STATUS => Telemetry::Estimator(health::estimator(&status)),
                 _ => Telemetry::Landed(health::landed(&status)),
             };
-            assert_eq!(told(message, &status), expected);
+            assert_eq!(reported(message, &status), expected);
         }
         assert_eq!(compose(9_999, &status), None);
     }
@@ -325,7 +325,7 @@ mod tests {
         let mut status = flying();
         let state = status.state.as_mut().expect("known");
         state.attitude_rad.z = 1e-5;
-        let Telemetry::Global(global) = told(id::GLOBAL_POSITION_INT, &status) else { panic!("another") };
+        let Telemetry::Global(global) = reported(id::GLOBAL_POSITION_INT, &status) else { panic!("another") };
         assert!(global.heading_cdeg <= 35_999);
     }
 }

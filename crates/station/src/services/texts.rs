@@ -115,7 +115,7 @@ mod tests {
     }
 
     #[test]
-    fn every_reason_is_told_in_other_words() {
+    fn every_reason_is_reported_in_other_words() {
         let all = [
             (OrderRefusal::NoPosition, "position"),
             (OrderRefusal::NotArmed, "not armed"),

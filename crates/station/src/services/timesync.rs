@@ -28,8 +28,8 @@ mod tests {
     #[test]
     fn questions_are_answered_with_what_was_asked() {
         let asked = Clock::Sync { answered_ns: 0, asked_ns: 77, to: ALL };
-        let told = Clock::Sync { answered_ns: 5_000_000, asked_ns: 77, to: STATION };
-        assert_eq!(answer(asked, STATION, ME, 5_000), Some(told));
+        let reported = Clock::Sync { answered_ns: 5_000_000, asked_ns: 77, to: STATION };
+        assert_eq!(answer(asked, STATION, ME, 5_000), Some(reported));
         let ping = Clock::Ping { time_us: 9, number: 3, to: ALL };
         assert_eq!(answer(ping, STATION, ME, 0), Some(Clock::Ping { time_us: 9, number: 3, to: STATION }));
     }

@@ -87,8 +87,8 @@ fn the_heading_on_the_way_is_towards_the_waypoint() {
     mission.resume(5);
     let other = progress(&mut mission, &Stage::at(here()), &leg(5, waypoint(place)));
     assert_eq!(limited(&other.output).yaw_rad, limited(&first.output).yaw_rad);
-    let told = Item::Waypoint { position_m: place, yaw_rad: 0.3, hold_s: 0.0, within_m: 1.0, fly_through: true };
-    assert_eq!(limited(&progress(&mut wanting(0), &aside, &leg(0, told)).output).yaw_rad, 0.3);
+    let stated = Item::Waypoint { position_m: place, yaw_rad: 0.3, hold_s: 0.0, within_m: 1.0, fly_through: true };
+    assert_eq!(limited(&progress(&mut wanting(0), &aside, &leg(0, stated)).output).yaw_rad, 0.3);
 }
 
 /// From the ground a waypoint begins with a climb to the take-off height, or as far as the ceiling allows.

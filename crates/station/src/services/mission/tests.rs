@@ -54,9 +54,9 @@ fn what_was_uploaded_can_be_downloaded() {
     assert_eq!(said(&mut missions), [(Mission::Count(64, PLAN), B)]);
     for item in &items {
         missions.hear(Mission::Request(item.number, PLAN), B, false, 0);
-        let told = said(&mut missions);
+        let reported = said(&mut missions);
         // A heading that is not given is NaN, which differs from itself.
-        assert_eq!(std::format!("{told:?}"), std::format!("{:?}", [(Mission::Item(*item, PLAN), B)]));
+        assert_eq!(std::format!("{reported:?}"), std::format!("{:?}", [(Mission::Item(*item, PLAN), B)]));
     }
     missions.hear(Mission::Request(64, PLAN), B, false, 0);
     assert_eq!(said(&mut missions), [(Mission::Ack(MissionResult::INVALID_SEQUENCE, PLAN), B)]);
@@ -311,7 +311,7 @@ fn each_item_is_one_of_the_guidance() {
 
 /// MISSION_STATE: 1 no mission, 2 not begun, 3 flies, 4 paused, 5 done.
 #[test]
-fn the_state_of_a_mission_is_told() {
+fn the_state_of_a_mission_is_reported() {
     let mut missions = Missions::default();
     let state = |missions: &Missions, item, reached, flies| {
         let MissionCurrent { number, total, state, mode } = missions.current(item, reached, flies);
@@ -346,14 +346,18 @@ fn every_message_is_answered_by_what_it_is_about() {
         };
         let ack = |result| std::vec![(Mission::Ack(result, plan), A)];
         let is_mission = plan == Plan::MISSION;
-        let (told, heard, _) = ask(Mission::List(plan), false);
+        let (reported, heard, _) = ask(Mission::List(plan), false);
         assert_eq!(
-            (told, heard),
+            (reported, heard),
             (std::vec![(Mission::Count(if is_mission { 2 } else { 0 }, plan), A)], Heard::default())
         );
-        let (told, ..) = ask(Mission::Request(1, plan), false);
-        let is_item = matches!(told[..], [(Mission::Item(MissionItem { number: 1, .. }, told), A)] if told == plan);
-        assert!(is_item == is_mission && (is_mission || told == ack(MissionResult::INVALID_SEQUENCE)), "{told:?}");
+        let (reported, ..) = ask(Mission::Request(1, plan), false);
+        let is_item =
+            matches!(reported[..], [(Mission::Item(MissionItem { number: 1, .. }, reported), A)] if reported == plan);
+        assert!(
+            is_item == is_mission && (is_mission || reported == ack(MissionResult::INVALID_SEQUENCE)),
+            "{reported:?}"
+        );
         assert_eq!(
             ask(Mission::Part(afbc_link::Part { writes: true, numbers: [0, 1] }, plan), true).0,
             ack(MissionResult::UNSUPPORTED)
@@ -362,13 +366,13 @@ fn every_message_is_answered_by_what_it_is_about() {
             assert_eq!(ask(message, false), (ack(MissionResult::DENIED), Heard::default(), 2));
         }
         let known = plan.0 <= 2 || plan == Plan::ALL;
-        let (told, _, left) = ask(Mission::Clear(plan), true);
-        assert_eq!(told, ack(if known { MissionResult::ACCEPTED } else { MissionResult::UNSUPPORTED }));
+        let (reported, _, left) = ask(Mission::Clear(plan), true);
+        assert_eq!(reported, ack(if known { MissionResult::ACCEPTED } else { MissionResult::UNSUPPORTED }));
         assert_eq!(left, if is_mission || plan == Plan::ALL { 0 } else { 2 });
-        let (told, ..) = ask(Mission::Count(0, plan), true);
-        assert_eq!(told, ack(if plan.0 <= 2 { MissionResult::ACCEPTED } else { MissionResult::UNSUPPORTED }));
-        let (told, ..) = ask(Mission::Count(ITEMS_MAX as u16, plan), true);
-        assert_eq!(told == [(Mission::Request(0, plan), A)], is_mission, "{told:?}");
+        let (reported, ..) = ask(Mission::Count(0, plan), true);
+        assert_eq!(reported, ack(if plan.0 <= 2 { MissionResult::ACCEPTED } else { MissionResult::UNSUPPORTED }));
+        let (reported, ..) = ask(Mission::Count(ITEMS_MAX as u16, plan), true);
+        assert_eq!(reported == [(Mission::Request(0, plan), A)], is_mission, "{reported:?}");
     }
 }
 

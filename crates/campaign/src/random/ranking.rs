@@ -24,7 +24,7 @@ pub struct Score {
 
 /// How a contender stands.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Standing {
+pub struct Ranking {
     /// Number of flights in which it is best, or level with the best.
     pub wins: usize,
     /// Number of vehicles lost.
@@ -68,12 +68,12 @@ impl Score {
 }
 
 /// Returns how each contender of `results` stands, compared with the one at place `against`.
-pub fn standings(results: &[Score], against: usize) -> Vec<Standing> {
+pub fn rankings(results: &[Score], against: usize) -> Vec<Ranking> {
     let contenders = results.first().map_or(0, |result| result.rms_m.len());
-    (0..contenders).map(|contender| standing(results, contender, against)).collect()
+    (0..contenders).map(|contender| ranking(results, contender, against)).collect()
 }
 
-fn standing(results: &[Score], contender: usize, against: usize) -> Standing {
+fn ranking(results: &[Score], contender: usize, against: usize) -> Ranking {
     let level =
         |result: &&Score| result.of(contender).zip(result.best_m()).is_some_and(|(own, best)| is_level(own, best));
     let lost = || results.iter().filter(|result| result.of(contender).is_none());
@@ -82,7 +82,7 @@ fn standing(results: &[Score], contender: usize, against: usize) -> Standing {
     all.resize(results.len(), f64::INFINITY);
     all.sort_by(f64::total_cmp);
     let logs = kept.iter().map(|distance_m| logarithm(*distance_m)).sum::<f64>();
-    Standing {
+    Ranking {
         wins: results.iter().filter(level).count(),
         lost: lost().count(),
         lost_alone: lost().filter(|result| result.best_m().is_some()).count(),
@@ -136,7 +136,7 @@ mod tests {
             result(2, [None, None, None]),
             result(3, [Some(0.04), None, Some(0.05)]),
         ];
-        let [a, b, c] = standings(&results, 0).try_into().unwrap();
+        let [a, b, c] = rankings(&results, 0).try_into().unwrap();
         assert_eq!((a.wins, a.lost, a.lost_alone), (3, 2, 1));
         assert_eq!((b.wins, b.lost, b.lost_alone), (2, 2, 1));
         assert_eq!((c.wins, c.lost, c.lost_alone), (1, 2, 1));
@@ -159,9 +159,9 @@ mod tests {
     #[test]
     fn a_median_that_is_lost_is_none_and_so_is_the_mean_of_nothing() {
         let lost = result(1, [None, Some(0.1), None]);
-        let standings = standings(&[lost.clone(), lost, result(1, [Some(0.2), Some(0.1), None])], 1);
-        assert_eq!((standings[0].median_m, standings[0].geometric_m), (None, Some(exp(log(0.2)))));
-        assert_eq!((standings[2].median_m, standings[2].geometric_m, standings[2].difference), (None, None, None));
+        let rankings = rankings(&[lost.clone(), lost, result(1, [Some(0.2), Some(0.1), None])], 1);
+        assert_eq!((rankings[0].median_m, rankings[0].geometric_m), (None, Some(exp(log(0.2)))));
+        assert_eq!((rankings[2].median_m, rankings[2].geometric_m, rankings[2].difference), (None, None, None));
     }
 
     /// All flights of a seed are drawn together: with equal ones, the interval is that of one flight per seed. A single
@@ -172,13 +172,13 @@ mod tests {
         let factors = [1.5, 0.8, 1.2, 1.1, 0.9];
         let interval = |copies: usize| {
             let seeds = factors.iter().zip(1..).flat_map(|(factor, seed)| vec![at(seed, *factor); copies]);
-            standings(&seeds.collect::<Vec<_>>(), 0)[1].difference.unwrap().interval.unwrap()
+            rankings(&seeds.collect::<Vec<_>>(), 0)[1].difference.unwrap().interval.unwrap()
         };
         let ([low, high], [one_low, one_high]) = (interval(7), interval(1));
         close(low, one_low);
         close(high, one_high);
         let single: Vec<_> = factors.iter().map(|factor| at(9, *factor)).collect();
-        assert_eq!(standings(&single, 0)[1].difference.unwrap().interval, Some([one_low, one_high]));
-        assert_eq!(standings(&single[..1], 0)[1].difference.unwrap().interval, None);
+        assert_eq!(rankings(&single, 0)[1].difference.unwrap().interval, Some([one_low, one_high]));
+        assert_eq!(rankings(&single[..1], 0)[1].difference.unwrap().interval, None);
     }
 }

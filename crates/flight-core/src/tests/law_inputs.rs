@@ -1,4 +1,4 @@
-//! What the tick tells the law, by a law that notes it: the state and setpoint of every tick, for late, missing and
+//! Inputs of the law in a tick, by a law that notes them: the state and setpoint of every tick, for late, missing and
 //! lost states, and for poses instead of states.
 #![allow(clippy::expect_used, clippy::indexing_slicing, reason = "a test that cannot go on should say why")]
 
@@ -26,10 +26,10 @@ struct Notes {
 
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Noted {
-    told: Option<(State, Setpoint)>,
+    received: Option<(State, Setpoint)>,
     steps: u32,
-    /// Steps that were announced to be adrift, and true if the next one is.
-    adrift: u32,
+    /// Steps that were announced to be without a position, and true if the next one is.
+    position_lost: u32,
     announced: bool,
 }
 
@@ -50,14 +50,14 @@ impl FlightController for Notes {
         trace
     }
 
-    fn adrift(&self, noted: &mut Noted) {
+    fn position_lost(&self, noted: &mut Noted) {
         noted.announced = true;
     }
 
     fn decide(&self, noted: &mut Noted, state: &State, setpoint: &Setpoint, fresh: bool) -> Action {
         assert!(fresh && state.is_plausible() && setpoint.is_plausible());
-        noted.adrift += u32::from(noted.announced);
-        (noted.told, noted.steps, noted.announced) = (Some((*state, *setpoint)), noted.steps + 1, false);
+        noted.position_lost += u32::from(noted.announced);
+        (noted.received, noted.steps, noted.announced) = (Some((*state, *setpoint)), noted.steps + 1, false);
         Action::new(RotorSpeeds([300.0; 4].into()), RotorForces([1.0; 4].into()), self.asks, false)
     }
 }
@@ -115,8 +115,8 @@ impl Bench {
     }
 
     /// Runs a tick with an estimate that does not know where it is.
-    fn adrift(&mut self, value: State) -> TickOutcome {
-        self.tick(|inbox, at_us| inbox.put_adrift(Some(Stamped { value, at_us }), Refusal::PositionUnknown))
+    fn position_lost(&mut self, value: State) -> TickOutcome {
+        self.tick(|inbox, at_us| inbox.put_position_lost(Some(Stamped { value, at_us }), Refusal::PositionUnknown))
     }
 
     /// Runs a tick with the pose of so long ago.
@@ -152,8 +152,8 @@ impl Bench {
         *self.memory.control().expect("armed")
     }
 
-    fn told(&self) -> (State, Setpoint) {
-        self.noted().told.expect("stepped")
+    fn received(&self) -> (State, Setpoint) {
+        self.noted().received.expect("stepped")
     }
 
     fn steps(&self) -> u32 {
@@ -186,7 +186,7 @@ fn late_states_are_carried_on_to_the_present() {
             // From the first one on that is newer than the last before.
             if tick > late_us / 1000 {
                 assert_eq!(u64::from(outcome.health.state_age_us), late_us);
-                let (state, setpoint) = bench.told();
+                let (state, setpoint) = bench.received();
                 assert!(off(&state, &at(bench.now_us)) < 1e-5, "{late_us} us: {state:?}");
                 assert_eq!(setpoint, target());
                 assert_eq!(bench.memory.state(), Some(&at(bench.now_us - late_us)));
@@ -195,7 +195,7 @@ fn late_states_are_carried_on_to_the_present() {
     }
     let mut bench = Bench::flying(asks(1.0), false);
     let _ = bench.linked(0);
-    assert_eq!(bench.told().0, at(bench.now_us), "as it is, to the bit");
+    assert_eq!(bench.received().0, at(bench.now_us), "as it is, to the bit");
 }
 
 /// Between two states roll and pitch are reckoned from the inputs, all else is carried on; when the state is stale the
@@ -215,7 +215,7 @@ fn between_states_roll_and_pitch_are_reckoned() {
             let outcome = bench.nothing();
             assert_eq!((outcome.mode, outcome.health.state_age_us), (Mode::Flying, age_ms * 1000));
             dead_reckoning.advance(&mut reckoning, &given);
-            let (state, _) = bench.told();
+            let (state, _) = bench.received();
             let there = at(bench.now_us);
             let expected = State {
                 attitude_rad: Vector3::new(state.attitude_rad.x, state.attitude_rad.y, there.attitude_rad.z),
@@ -228,8 +228,11 @@ fn between_states_roll_and_pitch_are_reckoned() {
             let t = age_ms as f32 * 1e-3;
             for (axis, input, authority) in [(0, given.roll_n, 0.25 / 0.0038), (1, given.pitch_n, 0.25 / 0.0038)] {
                 let rate = last.rates_rad_s[axis] + authority * input * (1.0 - learnt) * t;
-                let told = state.rates_rad_s[axis];
-                assert!((told - rate).abs() < 2e-3 + 0.3 * (rate - last.rates_rad_s[axis]).abs(), "{told}, not {rate}");
+                let received = state.rates_rad_s[axis];
+                assert!(
+                    (received - rate).abs() < 2e-3 + 0.3 * (rate - last.rates_rad_s[axis]).abs(),
+                    "{received}, not {rate}"
+                );
             }
         }
         assert_eq!(bench.steps() - steps, COAST_US / 1000);
@@ -292,7 +295,7 @@ impl Bench {
 /// A vehicle that does not know where it is: the law is told the last place and the fading estimated motion, and a
 /// setpoint that sinks there; height, vertical velocity and attitude as they are.
 #[test]
-fn a_vehicle_adrift_is_told_a_fading_motion_and_sinks() {
+fn without_a_position_the_law_sees_a_fading_motion_and_the_vehicle_sinks() {
     let mut bench = Bench::flying(asks(1.0), true);
     for flight in 0..2 {
         let seen = *bench.memory.state().expect("seen");
@@ -307,13 +310,13 @@ fn a_vehicle_adrift_is_told_a_fading_motion_and_sinks() {
         let mut first = None;
         for ms in 1..=400_u64 {
             let now_us = bench.now_us + 1000;
-            let outcome = bench.adrift(wrong(now_us));
+            let outcome = bench.position_lost(wrong(now_us));
             if ms <= u64::from(COAST_US) / 1000 {
-                assert_eq!(bench.noted().adrift, noted.adrift, "{ms} ms");
+                assert_eq!(bench.noted().position_lost, noted.position_lost, "{ms} ms");
                 continue;
             }
             let begin = *first.get_or_insert(ms);
-            let (state, setpoint) = bench.told();
+            let (state, setpoint) = bench.received();
             let t = (ms - begin + 1) as f32 * 1e-3;
             let fade = (-0.5 * t).exp();
             let way = 2.0 * (fade - (-t).exp());
@@ -332,7 +335,7 @@ fn a_vehicle_adrift_is_told_a_fading_motion_and_sinks() {
             let from_m = wrong(began_us + begin * 1000).position_m.z;
             assert!((sunk - Vector3::new(0.0, 0.0, from_m - SINK_M_S * t)).amax() < 2e-3, "{ms} ms: {setpoint:?}");
             assert_eq!(setpoint.velocity_m_s, Vector3::new(0.0, 0.0, -SINK_M_S));
-            assert_eq!(bench.noted().adrift - noted.adrift, (ms - begin + 1) as u32, "announced");
+            assert_eq!(bench.noted().position_lost - noted.position_lost, (ms - begin + 1) as u32, "announced");
             let descends = ms * 1000 > u64::from(DESCEND_US);
             assert_eq!(outcome.mode, if descends { Mode::Descending } else { Mode::Coasting });
             // The second time the vehicle finds itself before it descends.
@@ -344,15 +347,15 @@ fn a_vehicle_adrift_is_told_a_fading_motion_and_sinks() {
             for _ in 0..300 {
                 let _ = bench.own();
             }
-            assert_eq!((bench.memory.mode(), bench.told().1), (Mode::Flying, target()));
+            assert_eq!((bench.memory.mode(), bench.received().1), (Mode::Flying, target()));
         }
     }
     // What comes back during the descent is descended on from where the vehicle is.
     let _ = bench.own();
     let here = at(bench.now_us);
-    assert_eq!(bench.told().0, here);
+    assert_eq!(bench.received().0, here);
     let sinks = here.position_m - Vector3::new(0.0, 0.0, SINK_M_S * 1e-3);
-    assert!((bench.told().1.position_m - sinks).amax() < 1e-5, "{:?}", bench.told().1);
+    assert!((bench.received().1.position_m - sinks).amax() < 1e-5, "{:?}", bench.received().1);
 }
 
 /// As long as the attitude is known the descent goes on, and with a stale one it ends. The thrust decides the landing,
@@ -363,7 +366,7 @@ fn a_vehicle_adrift_lands_by_its_thrust_or_gives_up() {
         State { position_m: Vector3::new(9e3, 0.0, 2.0), velocity_m_s: Vector3::repeat(-9.0), ..State::default() };
     let mut bench = Bench::flying(asks(1.0), true);
     for _ in 0..3 * GIVE_UP_US / 1000 {
-        assert_eq!(bench.adrift(fast).ended, None, "carried");
+        assert_eq!(bench.position_lost(fast).ended, None, "carried");
     }
     let ended = (1..5000).find_map(|ms| bench.nothing().ended.map(|end| (ms, end)));
     assert_eq!(ended, Some((GIVE_UP_US / 1000 + 1, EndReason::StateLost)));
@@ -372,7 +375,7 @@ fn a_vehicle_adrift_lands_by_its_thrust_or_gives_up() {
     let (mut ms, ended) = (
         0,
         loop {
-            if let Some(ended) = bench.adrift(fast).ended {
+            if let Some(ended) = bench.position_lost(fast).ended {
                 break ended;
             }
             assert!(bench.now_us < 20_000_000, "not landed");
@@ -385,7 +388,7 @@ fn a_vehicle_adrift_lands_by_its_thrust_or_gives_up() {
     // On its side it is lost.
     let mut bench = Bench::flying(asks(1.0), true);
     let over = State { attitude_rad: Vector3::new(2.0, 0.0, 0.0), ..State::default() };
-    let ended = (0..3000).find_map(|_| bench.adrift(over).ended);
+    let ended = (0..3000).find_map(|_| bench.position_lost(over).ended);
     assert_eq!(ended, Some(EndReason::Tumbled));
 }
 
@@ -412,7 +415,7 @@ fn poses_replace_states_that_are_missing_and_give_way_to_them() {
         assert_eq!(health.state_age_us, if stale { 0 } else { ((age_ms + ms) * 1000) as u32 });
         if stale {
             // Until the push of its tilt is known, a tenth of gravity.
-            let state = bench.told().0;
+            let state = bench.received().0;
             assert!(off(&state, &at(bench.now_us)) < 0.4, "{ms} ms: {state:?}, not {:?}", at(bench.now_us));
         }
     }
@@ -431,7 +434,7 @@ fn poses_replace_an_estimate_at_once() {
     for ms in 1..=300 {
         let outcome = bench.posed(4000);
         assert_eq!((outcome.health.observed, outcome.health.state_age_us), (true, 0), "{ms} ms");
-        assert!(off(&bench.told().0, &at(bench.now_us)) < 0.4, "{:?}", bench.told().0);
+        assert!(off(&bench.received().0, &at(bench.now_us)) < 0.4, "{:?}", bench.received().0);
         assert_eq!(outcome.mode, Mode::Flying);
     }
     // Poses that are too old or unsure are as good as none.
