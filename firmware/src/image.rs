@@ -18,10 +18,12 @@ macro_rules! image {
         );
 
         const _: () = {
-            let (sampling, aiding): (&[&str], &[&str]) = (&[$(stringify!($sampling))?], &[$(stringify!($aiding))?]);
+            let sampling: &[&str] = &[$(stringify!($sampling))?];
+            let aiding: &[&str] = &[$(stringify!($aiding))?];
             assert!(
                 <<$board as $crate::board::Board>::Sampler as $crate::samples::Sampler>::SENSES != sampling.is_empty()
-                    && <<$board as $crate::board::Board>::Aids as $crate::samples::Sampler>::SENSES != aiding.is_empty(),
+                    && <<$board as $crate::board::Board>::Aids as $crate::samples::Sampler>::SENSES
+                        != aiding.is_empty(),
                 "a board with sensors, and no other, names interrupt lines for their executors: sampling, aiding"
             )
         };

@@ -15,8 +15,8 @@ use nmea0183::{GGA, GPSQuality, ParseResult, Parser, RMC};
 pub const RANGE_SIGMA_M: f32 = 2.5;
 /// Ratio of vertical to horizontal dilution, usually.
 const VERTICAL: f32 = 1.5;
-/// Standard deviation of the velocity \[m/s\].
-const SPEED_SIGMA_M_S: f32 = 0.5;
+/// Standard deviation of the velocity \[m/s\]: that of a vertical speed from two altitudes.
+const SPEED_SIGMA_M_S: f32 = 1.5;
 /// Longest time between two altitudes that give a vertical speed \[s\].
 const CLIMB_S: f32 = 2.0;
 /// Seconds of a day.

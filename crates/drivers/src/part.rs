@@ -18,8 +18,8 @@ pub enum Step {
     Write(u8, u8),
     /// Writes bytes from a register on, in one transfer; none are a command.
     WriteAll(u8, &'static [u8]),
-    /// Reads so many bytes from a register on, at most [`READ_MAX`](crate::READ_MAX), for [`SensorPart::take`]. Three and
-    /// more whose bits are all equal are no answer; one or two may well be.
+    /// Reads so many bytes from a register on, at most [`READ_MAX`](crate::READ_MAX), for [`SensorPart::take`]. Three
+    /// and more whose bits are all equal are no answer; one or two may well be.
     Read(u8, usize),
     /// Waits until the bits of a mask in a register have a value: register, mask, value, at most so many milliseconds.
     Await(u8, u8, u8, u32),

@@ -78,7 +78,8 @@ impl EstimatorFrontEnd {
         self.memory.set_on_ground(on_ground);
     }
 
-    /// Goes on with another estimator. If the inertial sensor is mounted otherwise, the estimate starts again from rest.
+    /// Goes on with another estimator. If the inertial sensor is mounted otherwise, the estimate starts again, from
+    /// rest.
     pub(crate) fn adopt(&mut self, estimator: &Estimator, output_filter: &OutputFilter, calibration: &ImuCalibration) {
         (self.estimator, self.output_filter) = (*estimator, *output_filter);
         if !self.calibration.has_mounting_of(calibration) {

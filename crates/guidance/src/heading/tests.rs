@@ -54,7 +54,8 @@ proptest! {
         if let Turn::To(yaw, goal_rad_s) = turn {
             let off = wrap_angle(yaw - yaw_rad).abs();
             let off_rad_s = (goal_rad_s - rate).abs();
-            let reached = off_rad_s <= REACHED_RAD_S && off <= REACHED_RAD + off_rad_s * dt_s && goal_rad_s.abs() <= rate_max;
+            let is_near = off <= REACHED_RAD + off_rad_s * dt_s;
+            let reached = off_rad_s <= REACHED_RAD_S && is_near && goal_rad_s.abs() <= rate_max;
             let hit = heading == Heading { yaw_rad: yaw, rate_rad_s: goal_rad_s, acceleration_rad_s2: 0.0 };
             prop_assert_eq!(hit, reached);
             if reached {
