@@ -260,7 +260,7 @@ impl Flight {
                     let height = Height { metres: HEIGHT_M, above: Datum::Here };
                     self.say(&Uplink::Command(Command::TakeOff(height)));
                 }
-                (z - self.start_m[2] > 0.9 * f64::from(HEIGHT_M)).then_some(Phase::Hovers)
+                (z - self.start_m[2] > 0.6 * f64::from(HEIGHT_M)).then_some(Phase::Hovers)
             }
             Phase::Hovers => {
                 if passed_ms > 3000 {

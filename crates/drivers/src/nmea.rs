@@ -2,7 +2,7 @@
 //! and course of the same time (RMC); other sentences are left out.
 //!
 //! The sentences do not say how good a fix is: its standard deviations are taken from the dilution of precision and
-//! [`RANGE_SIGMA_M`]. Nor do they have a vertical speed: it is that between two altitudes.
+//! [`RANGE_SIGMA_M`]. Nor do they have a vertical speed: it is the mean change of the altitude over some [`CLIMB_S`].
 
 use crate::reading::FixReading;
 use afbc_types::sin_cos;
@@ -15,10 +15,11 @@ use nmea0183::{GGA, GPSQuality, ParseResult, Parser, RMC};
 pub const RANGE_SIGMA_M: f32 = 2.5;
 /// Ratio of vertical to horizontal dilution, usually.
 const VERTICAL: f32 = 1.5;
-/// Standard deviation of the velocity \[m/s\]: that of a vertical speed from two altitudes.
-const SPEED_SIGMA_M_S: f32 = 1.5;
-/// Longest time between two altitudes that give a vertical speed \[s\].
-const CLIMB_S: f32 = 2.0;
+/// Standard deviation of the velocity \[m/s\]: that of the vertical speed, from altitudes with a noise of half a metre.
+const SPEED_SIGMA_M_S: f32 = 1.0;
+/// Time constant of the vertical speed, and longest time between two altitudes that it takes \[s\].
+pub const CLIMB_S: f32 = 1.0;
+const PAUSE_S: f32 = 2.0;
 /// Seconds of a day.
 const DAY_S: f32 = 86_400.0;
 /// Baud rates of receivers as they are delivered, the most common first.
@@ -28,8 +29,8 @@ pub const BAUDS: [u32; 5] = [38_400, 9_600, 115_200, 57_600, 230_400];
 pub struct NmeaDecoder {
     parser: Parser,
     fix: Option<GGA>,
-    /// Time of day \[s\] and altitude of the last fix \[m\].
-    last: Option<(f32, f32)>,
+    /// Time of day \[s\], altitude \[m\] and vertical speed \[m/s\] of the last fix.
+    last: Option<[f32; 3]>,
     bad_sentences: u32,
 }
 
@@ -74,14 +75,20 @@ impl NmeaDecoder {
     fn reading(&mut self, fix: &GGA, motion: &RMC) -> Option<FixReading> {
         let altitude_m = fix.altitude.as_ref()?.meters;
         let time_s = seconds(&fix.time);
-        let since = self.last.replace((time_s, altitude_m)).map(|(last_s, last_m)| {
-            let passed_s = time_s - last_s;
-            (if passed_s < 0.0 { passed_s + DAY_S } else { passed_s }, altitude_m - last_m)
-        });
-        let climb_m_s = match since {
-            Some((passed_s, risen_m)) if passed_s > 0.0 && passed_s <= CLIMB_S => risen_m / passed_s,
-            _ => 0.0,
+        let climb_m_s = match self.last {
+            Some([last_s, last_m, climb_m_s]) => {
+                let passed_s = time_s - last_s;
+                let passed_s = if passed_s < 0.0 { passed_s + DAY_S } else { passed_s };
+                if passed_s <= PAUSE_S {
+                    // The share of a step in a first-order filter, times the change in it.
+                    climb_m_s + (altitude_m - last_m - passed_s * climb_m_s) / (passed_s + CLIMB_S)
+                } else {
+                    0.0
+                }
+            }
+            None => 0.0,
         };
+        self.last = Some([time_s, altitude_m, climb_m_s]);
         let course_deg = motion.course.as_ref().map_or(0.0, |course| course.degrees);
         let course_rad = course_deg.clamp(-360.0, 360.0) * (core::f32::consts::PI / 180.0);
         let (east, north) = sin_cos(course_rad);

@@ -49,12 +49,17 @@ proptest! {
         let mut decoder = NmeaDecoder::new();
         let before = epoch(time_s, [latitude, longitude, altitude], speed, course);
         prop_assert_eq!(fixes(&mut decoder, &before).len(), 1);
-        let after = epoch(time_s + 0.2, [latitude, longitude, altitude + 0.2 * climb], speed, course);
-        let read = fixes(&mut decoder, &after);
-        prop_assert_eq!(read.len(), 1);
-        let fix = read[0].expect("a fix");
+        let mut fix = None;
+        for step in 1..=40 {
+            let passed_s = 0.2 * f64::from(step);
+            let place = [latitude, longitude, altitude + passed_s * climb];
+            let read = fixes(&mut decoder, &epoch((time_s + passed_s) % 86_400.0, place, speed, course));
+            prop_assert_eq!(read.len(), 1);
+            fix = read[0];
+        }
+        let fix = fix.expect("a fix");
         prop_assert!((fix.latitude_deg - latitude).abs() < 1.1e-7 && (fix.longitude_deg - longitude).abs() < 1.1e-7);
-        prop_assert!((fix.altitude_m - altitude - 0.2 * climb).abs() < 2e-3);
+        prop_assert!((fix.altitude_m - altitude - 8.0 * climb).abs() < 2e-3);
         let (east, north) = course.to_radians().sin_cos();
         prop_assert!((f64::from(fix.velocity_ned_m_s.x) - speed * north).abs() < 0.02);
         prop_assert!((f64::from(fix.velocity_ned_m_s.y) - speed * east).abs() < 0.02);
