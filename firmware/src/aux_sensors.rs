@@ -15,9 +15,6 @@ use nalgebra::Matrix3;
 
 /// Time without a reading after which a sensor has failed \[us\].
 const SILENT_US: u64 = 2_000_000;
-/// `GPS_FIX_TYPE`.
-const NO_FIX: u8 = 1;
-const FIX_3D: u8 = 3;
 
 struct Known {
     frame: FixFrame,
@@ -57,8 +54,8 @@ pub fn put_field(reading: &Stamped<MagneticReading>, to_body: &Matrix3<f32>) {
 /// Puts a GNSS receiver's fix; none for an epoch without one.
 pub fn put_fix(at_us: u64, fix: Option<FixReading>) {
     let measurement = with(|known| {
-        let receiver = fix.map_or(GnssReceiver { kind: NO_FIX, ..GnssReceiver::default() }, |fix| GnssReceiver {
-            kind: FIX_3D,
+        let receiver = fix.map_or(GnssReceiver::NO_FIX, |fix| GnssReceiver {
+            kind: GnssReceiver::FIX_3D,
             satellites: fix.satellites,
             sigma_mm: [fix.horizontal_sigma_m, fix.vertical_sigma_m].map(|sigma_m| (sigma_m * 1e3) as u32),
         });
@@ -84,8 +81,8 @@ pub(crate) fn known(now_us: u64) -> AuxSensors {
             sensors.present |= if at_us.is_some() { bit } else { 0 };
             sensors.healthy |= if at_us.is_some_and(works) { bit } else { 0 };
         }
-        let silent = GnssReceiver { kind: NO_FIX, ..GnssReceiver::default() };
-        let receiver = known.receiver.map(|(at_us, receiver)| if works(at_us) { receiver } else { silent });
+        let receiver =
+            known.receiver.map(|(at_us, receiver)| if works(at_us) { receiver } else { GnssReceiver::NO_FIX });
         AuxSensors { origin: known.origin, receiver, sensors, ..AuxSensors::default() }
     });
     aux.unwrap_or_default()

@@ -2,8 +2,6 @@
 
 use afbc_drivers::{Driver, PartFault, PartTiming, Registers, SensorPart};
 use afbc_types::Stamped;
-use embassy_futures::select::{Either, select};
-use embassy_stm32::exti::ExtiInput;
 use embassy_stm32::gpio::{Level, Output, Pin, Speed};
 use embassy_stm32::mode::Async;
 use embassy_stm32::spi::mode::Master;
@@ -112,23 +110,5 @@ impl PartTiming for Polled {
     async fn ready(&mut self, _us: u32) -> bool {
         Timer::at(firmware::time::next_period()).await;
         true
-    }
-}
-
-/// The clock of a part with its interrupt.
-pub struct Interrupted(pub ExtiInput<'static, Async>);
-
-impl PartTiming for Interrupted {
-    fn now_us(&self) -> u64 {
-        Polled.now_us()
-    }
-
-    async fn wait(&self, us: u32) {
-        Polled.wait(us).await;
-    }
-
-    async fn ready(&mut self, us: u32) -> bool {
-        let late = Timer::after(Duration::from_micros(us.into()));
-        matches!(select(self.0.wait_for_rising_edge(), late).await, Either::First(()))
     }
 }

@@ -1,5 +1,5 @@
 //! GNSS receivers that speak NMEA 0183: every one does, without being configured. An epoch is a fix (GGA) and the speed
-//! and course of the same time (RMC); other sentences are left out.
+//! and course of the same time (RMC), in either order, as makers differ; other sentences are left out.
 //!
 //! The sentences do not say how good a fix is: its standard deviations are taken from the dilution of precision and
 //! [`RANGE_SIGMA_M`]. Nor do they have a vertical speed: it is the mean change of the altitude over some [`CLIMB_S`].
@@ -28,7 +28,9 @@ pub const BAUDS: [u32; 5] = [38_400, 9_600, 115_200, 57_600, 230_400];
 /// Makes fixes of the bytes of a receiver.
 pub struct NmeaDecoder {
     parser: Parser,
+    /// The halves of an epoch that is not complete.
     fix: Option<GGA>,
+    motion: Option<RMC>,
     /// Time of day \[s\], altitude \[m\] and vertical speed \[m/s\] of the last fix.
     last: Option<[f32; 3]>,
     bad_sentences: u32,
@@ -44,7 +46,7 @@ impl NmeaDecoder {
     /// One that has read nothing.
     #[must_use]
     pub fn new() -> Self {
-        NmeaDecoder { parser: Parser::new(), fix: None, last: None, bad_sentences: 0 }
+        NmeaDecoder { parser: Parser::new(), fix: None, motion: None, last: None, bad_sentences: 0 }
     }
 
     /// Number of sentences that were damaged: a bad line, or the wrong baud rate.
@@ -53,28 +55,41 @@ impl NmeaDecoder {
         self.bad_sentences
     }
 
-    /// Takes a byte, and returns the fix whose last one it is: `Some(None)` for an epoch without a fix.
+    /// Takes a byte, and returns the fix that it completes: `Some(None)` for an epoch without a fix.
     pub fn take(&mut self, byte: u8) -> Option<Option<FixReading>> {
         match self.parser.parse_from_byte(byte)? {
-            Ok(ParseResult::GGA(fix)) => {
-                self.fix = fix.filter(|fix| fix.gps_quality != GPSQuality::NoFix);
-                if self.fix.is_some() { None } else { Some(None) }
-            }
-            Ok(ParseResult::RMC(Some(motion))) => {
-                let fix = self.fix.take()?;
-                (seconds(&fix.time) == seconds(&motion.datetime.time)).then(|| self.reading(&fix, &motion))
-            }
-            Ok(_) => None,
+            Ok(ParseResult::GGA(fix)) => match fix.filter(|fix| fix.gps_quality != GPSQuality::NoFix) {
+                Some(fix) => self.fix = Some(fix),
+                None => {
+                    self.fix = None;
+                    return Some(None);
+                }
+            },
+            Ok(ParseResult::RMC(motion)) => self.motion = motion,
+            Ok(_) => return None,
             Err(_) => {
                 self.bad_sentences = self.bad_sentences.saturating_add(1);
-                None
+                return None;
             }
         }
+        let [fix_s, motion_s] = [&self.fix.as_ref()?.time, &self.motion.as_ref()?.datetime.time].map(seconds);
+        if fix_s != motion_s {
+            return None;
+        }
+        let (fix, motion) = (self.fix.take()?, self.motion.take()?);
+        Some(self.reading(&fix, &motion))
     }
 
     fn reading(&mut self, fix: &GGA, motion: &RMC) -> Option<FixReading> {
         let altitude_m = fix.altitude.as_ref()?.meters;
-        let time_s = seconds(&fix.time);
+        let (time_s, speed_m_s) = (seconds(&fix.time), motion.speed.as_mps());
+        let sigma_m = fix.hdop * RANGE_SIGMA_M;
+        let course_deg = motion.course.as_ref().map_or(0.0, |course| course.degrees);
+        let [latitude_deg, longitude_deg] = [fix.latitude.as_f64(), fix.longitude.as_f64()];
+        let is_finite = [altitude_m, time_s, speed_m_s, sigma_m, course_deg].iter().all(|number| number.is_finite());
+        if !(is_finite && latitude_deg.is_finite() && longitude_deg.is_finite() && sigma_m > 0.0) {
+            return None;
+        }
         let climb_m_s = match self.last {
             Some([last_s, last_m, climb_m_s]) => {
                 let passed_s = time_s - last_s;
@@ -89,24 +104,17 @@ impl NmeaDecoder {
             None => 0.0,
         };
         self.last = Some([time_s, altitude_m, climb_m_s]);
-        let course_deg = motion.course.as_ref().map_or(0.0, |course| course.degrees);
-        let course_rad = course_deg.clamp(-360.0, 360.0) * (core::f32::consts::PI / 180.0);
-        let (east, north) = sin_cos(course_rad);
-        let speed_m_s = motion.speed.as_mps();
-        let sigma_m = fix.hdop * RANGE_SIGMA_M;
-        let reading = FixReading {
-            latitude_deg: fix.latitude.as_f64(),
-            longitude_deg: fix.longitude.as_f64(),
+        let (east, north) = sin_cos(course_deg.clamp(-360.0, 360.0) * (core::f32::consts::PI / 180.0));
+        Some(FixReading {
+            latitude_deg,
+            longitude_deg,
             altitude_m: f64::from(altitude_m),
             velocity_ned_m_s: Vector3::new(north * speed_m_s, east * speed_m_s, -climb_m_s),
             horizontal_sigma_m: sigma_m,
             vertical_sigma_m: VERTICAL * sigma_m,
             speed_sigma_m_s: SPEED_SIGMA_M_S,
             satellites: fix.sat_in_use,
-        };
-        let numbers = [reading.latitude_deg, reading.longitude_deg, reading.altitude_m, sigma_m.into()];
-        let finite = numbers.iter().all(|number| number.is_finite()) && speed_m_s.is_finite();
-        (finite && sigma_m > 0.0).then_some(reading)
+        })
     }
 }
 

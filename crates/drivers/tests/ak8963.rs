@@ -7,7 +7,7 @@ use afbc_drivers::PartFault;
 use afbc_drivers::ak8963::{Mpu9250Ak8963, Mpu9250Reading};
 use nalgebra::Vector3;
 use rig::mpu_registers::{Magnetometer, Registers};
-use rig::{Rig, refuses_another, run, survives_all_troubles};
+use rig::{Rig, reads, refuses_another, run, survives_all_troubles};
 
 /// Along the IMU's axes.
 const FIELD_UT: [f64; 3] = [20.0, -7.0, 44.0];
@@ -24,11 +24,7 @@ fn both() -> Registers {
 }
 
 fn is_right_of_imu(reading: &Mpu9250Reading) -> bool {
-    let rates = Vector3::new(10.0, -250.0, 0.5) * core::f32::consts::PI / 180.0;
-    let force = Vector3::new(0.1, -0.2, 1.0) * 9.80665;
-    (reading.inertial.rates_rad_s - rates).amax() < 5e-3
-        && (reading.inertial.specific_force_m_s2 - force).amax() < 0.06
-        && (reading.inertial.temperature_c - 31.0).abs() < 0.1
+    reads(&reading.inertial, [10.0, -250.0, 0.5], [0.1, -0.2, 1.0], 31.0)
 }
 
 fn is_near(reading: &Mpu9250Reading, field_ut: [f64; 3], error_ut: f32) -> bool {

@@ -8,7 +8,7 @@ use afbc_drivers::{InertialReading, PartFault, Registers as _, SensorPart, SpiRe
 use embassy_futures::block_on;
 use embedded_hal_async::spi::{ErrorType, Operation, SpiDevice};
 use nalgebra::Vector3;
-use rig::{Model, Rig, noise, refuses_another, run, survives_all_troubles};
+use rig::{Model, Rig, noise, reads, refuses_another, run, survives_all_troubles};
 
 /// FNV-1a of `bmi270_config_file` in Bosch's `BMI270_SensorAPI`.
 const CONFIGURATION: u64 = 0xA3AB_E71B_91DB_4895;
@@ -182,11 +182,7 @@ impl Model for Registers {
 }
 
 fn right(reading: &InertialReading) -> bool {
-    let rates = Vector3::new(10.0, -250.0, 500.0) * core::f32::consts::PI / 180.0;
-    let force = Vector3::new(0.1, -0.2, 1.0) * 9.80665;
-    (reading.rates_rad_s - rates).amax() < 5e-3
-        && (reading.specific_force_m_s2 - force).amax() < 0.06
-        && (reading.temperature_c - 31.0).abs() < 0.1
+    reads(reading, [10.0, -250.0, 500.0], [0.1, -0.2, 1.0], 31.0)
 }
 
 #[test]

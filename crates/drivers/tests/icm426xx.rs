@@ -5,8 +5,7 @@ mod rig;
 
 use afbc_drivers::InertialReading;
 use afbc_drivers::icm426xx::{Icm42605, Icm42688p};
-use nalgebra::Vector3;
-use rig::{Model, Rig, noise, refuses_another, run, survives_all_troubles};
+use rig::{Model, Rig, noise, reads, refuses_another, run, survives_all_troubles};
 
 /// Bank 0; other banks are selected and then left alone.
 struct Registers {
@@ -120,11 +119,7 @@ impl Model for Registers {
 }
 
 fn right(reading: &InertialReading) -> bool {
-    let rates = Vector3::new(10.0, -250.0, 0.5) * core::f32::consts::PI / 180.0;
-    let force = Vector3::new(0.1, -0.2, 1.0) * 9.80665;
-    (reading.rates_rad_s - rates).amax() < 5e-3
-        && (reading.specific_force_m_s2 - force).amax() < 0.06
-        && (reading.temperature_c - 31.0).abs() < 0.1
+    reads(reading, [10.0, -250.0, 0.5], [0.1, -0.2, 1.0], 31.0)
 }
 
 #[test]

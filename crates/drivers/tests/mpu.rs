@@ -7,14 +7,10 @@ use afbc_drivers::mpu::{Icm20602, Icm20608, Icm20689, Mpu, Mpu6000, Mpu6500, Mpu
 use afbc_drivers::{InertialReading, SensorPart};
 use nalgebra::Vector3;
 use rig::mpu_registers::Registers;
-use rig::{Rig, refuses_another, run, survives_all_troubles};
+use rig::{Rig, reads, refuses_another, run, survives_all_troubles};
 
 fn right(reading: &InertialReading) -> bool {
-    let rates = Vector3::new(10.0, -250.0, 0.5) * core::f32::consts::PI / 180.0;
-    let force = Vector3::new(0.1, -0.2, 1.0) * 9.80665;
-    (reading.rates_rad_s - rates).amax() < 5e-3
-        && (reading.specific_force_m_s2 - force).amax() < 0.06
-        && (reading.temperature_c - 31.0).abs() < 0.1
+    reads(reading, [10.0, -250.0, 0.5], [0.1, -0.2, 1.0], 31.0)
 }
 
 fn is_right<const IDENTITY: u8>() {

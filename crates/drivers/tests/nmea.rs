@@ -34,6 +34,13 @@ fn epoch(time_s: f64, [latitude, longitude, altitude]: [f64; 3], speed_m_s: f64,
         + &sentence(&format!("GNVTG,{course_deg:.2},T,,M,{knots:.3},N,,K,A"))
 }
 
+/// The same, with speed and course in front, as u-blox sends them.
+fn motion_first(epoch: &str) -> String {
+    let mut sentences: Vec<&str> = epoch.split_inclusive("\r\n").collect();
+    sentences.rotate_right(2);
+    sentences.concat()
+}
+
 fn fixes(decoder: &mut NmeaDecoder, text: &str) -> Vec<Option<FixReading>> {
     text.bytes().filter_map(|byte| decoder.take(byte)).collect()
 }
@@ -44,7 +51,12 @@ proptest! {
     fn what_is_sent_is_read(
         latitude in -89.0..89.0_f64, longitude in -179.9..179.9_f64, altitude in -400.0..8000.0_f64,
         speed in 0.0..50.0_f64, course in 0.0..359.9_f64, climb in -5.0..5.0_f64, time_s in 0.0..86_390.0,
+        motion_comes_first in any::<bool>(),
     ) {
+        let epoch = |time_s, place, speed, course| {
+            let epoch = epoch(time_s, place, speed, course);
+            if motion_comes_first { motion_first(&epoch) } else { epoch }
+        };
         let time_s = f64::round(time_s);
         let mut decoder = NmeaDecoder::new();
         let before = epoch(time_s, [latitude, longitude, altitude], speed, course);
@@ -96,6 +108,31 @@ proptest! {
         let mut decoder = NmeaDecoder::new();
         let _ = fixes(&mut decoder, &sentence(&format!("{head},{text}")));
         let _ = fixes(&mut decoder, &sentence(&format!("{head}{text}")));
+    }
+}
+
+#[test]
+fn numbers_that_are_none_spoil_no_fix() {
+    for odd in ["inf", "-inf", "NaN", "1e39"] {
+        let mut decoder = NmeaDecoder::new();
+        let good = |time_s| epoch(time_s, [47.0, 8.0, 400.0], 1.0, 30.0);
+        let bad = ["0.90", "400.000", "1.944", "30.00"].map(|number| {
+            let sentences = good(1000.0);
+            let changed = sentences.split_inclusive("\r\n").map(|whole| {
+                let text = whole.trim_start_matches('$').split('*').next().expect("a text");
+                sentence(&text.replace(number, odd))
+            });
+            changed.collect::<String>()
+        });
+        for (at, bad) in (0_u32..).zip(bad) {
+            let time_s = 1001.0 + f64::from(at);
+            let text = good(time_s - 0.6) + &bad + &good(time_s - 0.4) + &good(time_s - 0.2);
+            let all: Vec<FixReading> = fixes(&mut decoder, &text).into_iter().flatten().collect();
+            assert!(all.len() >= 2, "{odd}: {all:?}");
+            for fix in all {
+                assert!(fix.velocity_ned_m_s.norm() < 2.0 && fix.horizontal_sigma_m < 3.0, "{odd}: {fix:?}");
+            }
+        }
     }
 }
 

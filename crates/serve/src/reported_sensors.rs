@@ -14,9 +14,6 @@ use afbc_station::services::status::{GnssReceiver, SensorBits};
 
 /// Silence after which a sensor counts as failed \[ms\].
 const SILENT_MS: u32 = 1000;
-/// Kinds of a satellite receiver's fix.
-const NO_FIX: u8 = 1;
-const FIX_3D: u8 = 3;
 /// Satellites of a simulated receiver.
 const SATELLITES: u8 = 14;
 
@@ -68,10 +65,13 @@ impl ReportedSensors {
         let charge = world.plant().telemetry().and_then(|telemetry| telemetry.battery);
         AuxSensors {
             origin: self.origin,
-            receiver: self.suite.gnss.map(|_| GnssReceiver {
-                kind: if receives { FIX_3D } else { NO_FIX },
-                satellites: if receives { SATELLITES } else { 0 },
-                sigma_mm: self.sigma_mm,
+            receiver: self.suite.gnss.map(|_| {
+                let known = GnssReceiver { sigma_mm: self.sigma_mm, ..GnssReceiver::NO_FIX };
+                if receives {
+                    GnssReceiver { kind: GnssReceiver::FIX_3D, satellites: SATELLITES, ..known }
+                } else {
+                    known
+                }
             }),
             battery: charge.map(|charge| BatteryStatus {
                 voltage_mv: (charge.voltage_v * 1e3) as u16,

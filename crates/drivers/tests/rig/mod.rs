@@ -11,10 +11,11 @@
 
 pub mod mpu_registers;
 
-use afbc_drivers::{BusError, Driver, PartFault, PartTiming, Registers, SensorPart};
+use afbc_drivers::{BusError, Driver, InertialReading, PartFault, PartTiming, Registers, SensorPart};
 use afbc_types::Stamped;
 use core::future::pending;
 use embassy_futures::block_on;
+use nalgebra::Vector3;
 use std::cell::RefCell;
 use std::rc::Rc;
 
@@ -260,6 +261,15 @@ pub fn refuses_another<P: SensorPart, M: Model>(part: P, model: M, identity: u8)
     let rig = Rig::new(model);
     let (readings, faults) = run(&mut rig.driver(part), &rig, 500_000);
     assert!(readings.is_empty() && faults.iter().all(|fault| *fault == PartFault::Identity(identity)), "{faults:?}");
+}
+
+/// True if an IMU reads this motion, but for its noise.
+pub fn reads(reading: &InertialReading, rates_deg_s: [f64; 3], force_g: [f64; 3], temperature_c: f64) -> bool {
+    let rates_rad_s = Vector3::from(rates_deg_s).map(f64::to_radians).cast::<f32>();
+    let force_m_s2 = (Vector3::from(force_g) * 9.80665).cast::<f32>();
+    (reading.rates_rad_s - rates_rad_s).amax() < 5e-3
+        && (reading.specific_force_m_s2 - force_m_s2).amax() < 0.06
+        && (f64::from(reading.temperature_c) - temperature_c).abs() < 0.1
 }
 
 /// Numbers that differ from one time to the next, in -1..1, as noise.

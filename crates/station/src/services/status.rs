@@ -35,6 +35,13 @@ pub struct GnssReceiver {
     pub sigma_mm: [u32; 2],
 }
 
+impl GnssReceiver {
+    /// Without a fix.
+    pub const NO_FIX: Self = GnssReceiver { kind: 1, satellites: 0, sigma_mm: [0; 2] };
+    /// [`kind`](Self::kind) of a fix in three dimensions.
+    pub const FIX_3D: u8 = 3;
+}
+
 /// Sets of sensors, as `MAV_SYS_STATUS_SENSOR`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SensorBits {
