@@ -6,6 +6,8 @@
 mod boot;
 mod check;
 mod fly;
+mod host;
+mod pilot;
 mod pins;
 mod wire;
 mod world;
@@ -14,7 +16,8 @@ use std::path::Path;
 use std::process::ExitCode;
 
 const USAGE: &str = "twin boot IMAGE: boots it, and looks at bus and pins
-twin fly IMAGE SCENARIO: takes off, hovers and lands, in lockstep with the plant";
+twin fly IMAGE SCENARIO: takes off, hovers and lands, in lockstep with the plant
+twin host SCENARIO: the same with the firmware's code on this machine";
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -22,6 +25,7 @@ fn main() -> ExitCode {
     let result = match *arguments {
         ["boot", image] => boot::boot(Path::new(image)),
         ["fly", image, scenario] => fly::fly(Path::new(image), Path::new(scenario)),
+        ["host", scenario] => host::fly(Path::new(scenario)),
         _ => Err(USAGE.into()),
     };
     match result {

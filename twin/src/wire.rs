@@ -32,6 +32,14 @@ impl Telemetry {
     pub fn take(&self) -> Vec<u8> {
         self.with(|wire| std::mem::take(&mut wire.from_board))
     }
+
+    /// The board's end: takes all that is on its way, and sends this.
+    pub fn exchange(&self, from_board: &[u8]) -> Vec<u8> {
+        self.with(|wire| {
+            wire.from_board.extend(from_board);
+            wire.to_board.drain(..).collect()
+        })
+    }
 }
 
 impl Store for Telemetry {}

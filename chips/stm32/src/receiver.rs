@@ -1,7 +1,7 @@
 //! A GNSS receiver on a UART.
 
 use afbc_drivers::FixReading;
-use afbc_drivers::nmea::{BAUDS, NmeaDecoder};
+use afbc_drivers::nmea::{BAUDS, LATENCY_US, NmeaDecoder};
 use embassy_futures::select::{Either, select};
 use embassy_stm32::usart::BufferedUart;
 use embassy_time::{Duration, Instant, Timer};
@@ -12,8 +12,8 @@ const SILENT_S: u64 = 3;
 /// Pause between two epochs, at least \[us\].
 const PAUSE_US: u64 = 20_000;
 
-/// Receives fixes for ever, at whichever baud rate the receiver has, and passes each on with the time of its first byte
-/// \[us\]; none for an epoch without a fix.
+/// Receives fixes for ever, at whichever baud rate the receiver has, and passes each on with its time \[us\], which is
+/// some time before its first byte; none for an epoch without a fix.
 pub async fn run(mut uart: BufferedUart<'static>, mut take: impl FnMut(u64, Option<FixReading>)) {
     let mut decoder = NmeaDecoder::new();
     let mut bytes = [0; 64];
@@ -35,7 +35,7 @@ pub async fn run(mut uart: BufferedUart<'static>, mut take: impl FnMut(u64, Opti
             for byte in bytes.iter().take(length) {
                 if let Some(fix) = decoder.take(*byte) {
                     heard = Instant::now();
-                    take(began_us, fix);
+                    take(began_us.saturating_sub(LATENCY_US.into()), fix);
                 }
             }
         }

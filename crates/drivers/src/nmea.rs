@@ -15,8 +15,11 @@ use nmea0183::{GGA, GPSQuality, ParseResult, Parser, RMC};
 pub const RANGE_SIGMA_M: f32 = 2.5;
 /// Ratio of vertical to horizontal dilution, usually.
 const VERTICAL: f32 = 1.5;
-/// Standard deviation of the velocity to the north, and to the east \[m/s\].
-const SPEED_SIGMA_M_S: f32 = 1.0;
+/// Standard deviation of the velocity to the north, and to the east \[m/s\]: what PX4 takes for receivers that do not
+/// say (`EKF2_GPS_V_NOISE`).
+const SPEED_SIGMA_M_S: f32 = 0.3;
+/// Time from a fix to the first byte of its sentences \[us\]: that of u-blox's M10 as PX4 and ArduPilot take it.
+pub const LATENCY_US: u32 = 120_000;
 /// Standard deviation of the vertical speed \[m/s\]: white noise of 1 m in the altitudes of a receiver with 10 fixes a
 /// second leaves 0.9 m/s, and the mean lags 1 m/s behind a vehicle that climbs faster by 1 m/s2.
 const CLIMB_SIGMA_M_S: f32 = 1.5;

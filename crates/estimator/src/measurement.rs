@@ -18,6 +18,7 @@ pub struct ImuSample {
 /// Standard deviations are positive; those below a tenth of a millimetre, of a milliradian or a millimetre per second
 /// count as that much.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Measurement {
     /// A tracker's pose.
     Pose {

@@ -7,6 +7,7 @@ use heapless::Deque;
 
 /// Something asked for, with a ticket that identifies its answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Ticketed<T> {
     /// What is asked for.
     pub value: T,
@@ -23,6 +24,7 @@ pub const QUEUE_MAX: usize = 4;
 /// Newest inputs, written by the link and taken by the control tick. Implausible values are rejected here, so the tick
 /// need not check them.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Inbox {
     state: Option<Stamped<State>>,
     /// True if the state is the vehicle's own estimate.

@@ -4,6 +4,7 @@ use crate::refusal::Refusal;
 
 /// Reasons against arming, in the order of [`Refusal::ARMING`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Reasons(u32);
 
 impl Reasons {

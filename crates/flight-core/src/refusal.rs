@@ -4,6 +4,7 @@
 /// numbers are part of the link's protocol.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Refusal {
     /// The vehicle is armed.
     AlreadyArmed = 1,

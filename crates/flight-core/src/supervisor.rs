@@ -62,6 +62,7 @@ pub enum Mode {
 
 /// A request from the commander.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Request {
     /// Start the motors: they idle for a tick, then the law flies.
     Arm,

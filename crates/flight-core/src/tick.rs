@@ -229,7 +229,7 @@ impl<C: FlightController<N>, const N: usize> FlightCore<C, N> {
         let fresh = fresh.as_ref();
         let position_lost = inbox.position_lost().filter(|_| fresh.is_none()).and_then(|state| upright(state, now_us));
         memory.orient(inbox);
-        memory.watch(fresh, position_lost.as_ref(), inbox.idle_on_ground(), &self.limits, dt_s);
+        memory.watch(fresh, position_lost.as_ref(), inbox, &self.limits, dt_s);
         let FlightCoreMemory {
             mode, rate, state: last, steady_us, rest_us, frozen_states, oriented_us, flight, ..
         } = memory;
@@ -449,13 +449,13 @@ impl<M> FlightCoreMemory<M> {
         self.oriented_us = self.oriented_us.max(newest);
     }
 
-    /// Updates the detectors with a fresh state, or with that of a vehicle without a position, or none;
-    /// `idle_on_ground`: the inbox's mark.
+    /// Updates the detectors with a fresh state, or with that of a vehicle without a position, or none, and with the
+    /// inbox's marks.
     fn watch(
         &mut self,
         fresh: Option<&State>,
         position_lost: Option<&State>,
-        idle_on_ground: bool,
+        inbox: &Inbox,
         limits: &ArmingLimits,
         dt_s: f32,
     ) {
@@ -465,7 +465,7 @@ impl<M> FlightCoreMemory<M> {
         self.rest_us = longer(self.rest_us, fresh.is_some_and(|state| limits.at_rest(state)));
         let armed = self.mode.armed();
         let Some(flight) = self.flight.as_mut().filter(|_| armed) else { return };
-        if idle_on_ground && !flight.landing.airborne() {
+        if inbox.idle_on_ground() && !flight.landing.airborne() {
             flight.landing.rest(fresh.or(position_lost));
             return match fresh.or(position_lost) {
                 Some(state) => flight.tumble.advance(state, gap_us),
@@ -475,7 +475,7 @@ impl<M> FlightCoreMemory<M> {
         match (fresh, position_lost) {
             (Some(state), _) => {
                 flight.tumble.advance(state, gap_us);
-                flight.landing.advance(state, flight.applied.thrust_n, gap_us, dt_s);
+                flight.landing.advance(state, inbox.is_own(), flight.applied.thrust_n, gap_us, dt_s);
                 flight.distrusts |= flight.landing.contradicts();
             }
             (None, Some(state)) => {

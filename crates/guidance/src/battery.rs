@@ -8,6 +8,7 @@ const SMOOTH_S: f32 = 2.0;
 
 /// A battery's measurements.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct BatteryReading {
     /// Voltage \[V\].
     pub voltage_v: f32,

@@ -2,6 +2,7 @@
 
 /// What determines the setpoint. The names are PX4's.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum FlightMode {
     /// Holds position and heading ("loiter").
     #[default]

@@ -6,6 +6,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 
 /// Something to be done, answered once.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Order {
     /// Fly in this mode.
     Select(FlightMode),
@@ -57,6 +58,7 @@ pub enum OrderRefusal {
 
 /// A companion computer's target.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum OffboardTarget {
     /// A motion.
     Motion(MotionTarget),
@@ -66,6 +68,7 @@ pub enum OffboardTarget {
 
 /// A target of position, velocity or acceleration: NaN where there is none.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct MotionTarget {
     /// Position \[m\].
     pub position_m: Vector3<f32>,
@@ -83,6 +86,7 @@ pub struct MotionTarget {
 
 /// A target of attitude and thrust.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct AttitudeTarget {
     /// Attitude.
     pub attitude: UnitQuaternion<f32>,
@@ -94,6 +98,7 @@ pub struct AttitudeTarget {
 
 /// A pilot's sticks, -1 to 1: to the right, forward, up, to the right.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Sticks {
     /// Roll: positive to the right.
     pub roll: f32,
@@ -107,6 +112,7 @@ pub struct Sticks {
 
 /// An item of a mission, in the local frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Item {
     /// Take off to this height \[m\], local frame.
     TakeOff {
@@ -139,6 +145,7 @@ pub enum Item {
 
 /// The item of a mission that the guidance [wants](crate::Order::Resume), and what follows.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Leg {
     /// Number of the item.
     pub number: u16,
@@ -152,6 +159,7 @@ pub struct Leg {
 
 /// What the link brings for the guidance.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Orders {
     /// Newest target.
     pub target: Option<Stamped<OffboardTarget>>,

@@ -5,6 +5,7 @@ use afbc_guidance::{BatteryReading, Order, Orders};
 
 /// Inputs of the flight core and of the guidance, written by what receives messages and taken by the control tick.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ControlInputs {
     /// For the flight core.
     pub inbox: Inbox,

@@ -8,6 +8,7 @@ pub const AIDS_MAX: usize = 2;
 
 /// A value that was true some time before the tick that takes it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Aged<T> {
     /// The value.
     pub value: T,
@@ -24,6 +25,7 @@ impl<T> Aged<T> {
 
 /// Readings for one tick. The default is that of a vehicle without sensors.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Readings {
     /// Rates \[rad/s\] and specific force \[m/s2\] in the sensor's axes ([`Mounting`](afbc_types::Mounting)), if there
     /// is a new sample.

@@ -6,6 +6,7 @@ use nalgebra::{Quaternion, Vector3};
 
 /// A tracker's pose. Frames as in the crate's [conventions](crate).
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Pose {
     /// Position, earth frame \[m\].
     pub position_m: Vector3<f32>,
@@ -43,6 +44,7 @@ impl Pose {
 
 /// Standard deviations of a [`Pose`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct PoseSigmas {
     /// Of each coordinate of the position \[m\]; none if unknown.
     pub position_m: Option<f32>,

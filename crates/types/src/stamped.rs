@@ -2,6 +2,7 @@
 
 /// A value with its time on the vehicle's clock.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Stamped<T> {
     /// The value.
     pub value: T,

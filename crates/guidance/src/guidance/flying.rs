@@ -10,7 +10,7 @@ use crate::order::{OffboardTarget, Orders, Sticks};
 use crate::settings::Settings;
 use crate::sticks;
 use crate::targets::Targets;
-use afbc_control::math::{abs_max, max};
+use afbc_control::math::{abs_max, max, min};
 use afbc_flight_core::Stamped;
 use afbc_flight_core::landing::LEFT_M;
 use afbc_types::{Setpoint, State};
@@ -25,11 +25,13 @@ const LEASH_S: f32 = 1.0;
 const ANEW_M: f32 = 1.0;
 const ANEW_M_S: f32 = 1.5;
 /// A landing vehicle touches the ground once it has been above its setpoint by this much \[m\], for this long \[s\],
-/// and does not sink faster than this \[m/s\]. Then the rotors give this share of gravity less, for so long \[s\]: by
-/// then it has been found on the ground, or its velocity is not what it seems.
-const TOUCHES_M: f32 = 0.1;
+/// and does not sink faster than this \[m/s\], or than this share of its setpoint's speed: an estimated vertical speed
+/// may be off by tenths. Then the rotors give this share of gravity less, for so long \[s\]: by then it has been found
+/// on the ground, or its velocity is not what it seems.
+const TOUCHES_M: f32 = 0.3;
 const TOUCHES_S: f32 = 0.1;
 const TOUCHES_M_S: f32 = 0.25;
+const TOUCHES_SHARE: f32 = 0.8;
 const SETTLES_S: f32 = 3.0;
 const SETTLES_SHARE: f32 = 0.7;
 
@@ -108,7 +110,12 @@ impl Memory {
         }
         // What is observed without an inertial sensor follows from the thrust, so that it would fall.
         if output.lands && !given.sensors.inertial && self.touches(state, &present, dt_s) {
-            return Some((Some(settled(state, given.lift.gravity_m_s2)).filter(Setpoint::is_plausible), false));
+            // Level, whatever the law has learnt of the wind, and with little thrust, so that it does not push itself
+            // about.
+            let thrust_m_s2 = (1.0 - SETTLES_SHARE) * given.lift.gravity_m_s2;
+            let level = given.lift.setpoint(state, Vector3::z(), thrust_m_s2);
+            let level = self.trim.advance(&given.lift, state, &level, dt_s);
+            return Some((Some(level).filter(Setpoint::is_plausible), false));
         }
         let setpoint = match output.shaping {
             Shaping::Limited(aim) => {
@@ -143,7 +150,7 @@ impl Memory {
 
     /// True if a landing vehicle stands on the ground. In the air it would sink, and this would end.
     fn touches(&mut self, state: &State, present: &Setpoint, dt_s: f32) -> bool {
-        let sinks = state.velocity_m_s.z < -TOUCHES_M_S;
+        let sinks = state.velocity_m_s.z < min(-TOUCHES_M_S, TOUCHES_SHARE * present.velocity_m_s.z);
         let presses = state.position_m.z - present.position_m.z > TOUCHES_M;
         self.touch_s = if presses && !sinks { self.touch_s + dt_s } else { 0.0 };
         (TOUCHES_S..TOUCHES_S + SETTLES_S).contains(&self.touch_s)
@@ -258,18 +265,6 @@ impl Memory {
             return ModeOutput { lifts: inputs.airborne, ..ModeOutput::fly(inputs.stop()) };
         }
         progress.output
-    }
-}
-
-/// Returns the setpoint of a vehicle that has touched the ground: as it stands, so that no law pushes it about, and
-/// with little thrust.
-fn settled(state: &State, gravity_m_s2: f32) -> Setpoint {
-    Setpoint {
-        position_m: state.position_m,
-        velocity_m_s: state.velocity_m_s,
-        acceleration_m_s2: Vector3::new(0.0, 0.0, -SETTLES_SHARE * gravity_m_s2),
-        yaw_rad: state.attitude_rad.z,
-        ..Setpoint::default()
     }
 }
 

@@ -1,0 +1,72 @@
+//! The same flight with the firmware's code in this process: to compare, and to see in a second what a change does. Its
+//! GNSS receiver is the board's, which speaks NMEA; the other readings are taken as they are.
+
+use crate::pilot::Pilot;
+use crate::wire::Telemetry;
+use afbc_drivers::nmea::{LATENCY_US, NmeaDecoder};
+use afbc_estimator::Measurement;
+use afbc_hil::Host;
+use afbc_onboard::sensors::FixFrame;
+use afbc_onboard::{Aged, Readings};
+use afbc_scenario::load;
+use rigless::chip::nmea::Receiver;
+use rigless::chip::uart::Peer;
+use rigless::machine::flight::{AT_REST, Signals};
+use rigless::time::VirtualNanos;
+use std::error::Error;
+use std::path::Path;
+
+/// Flies a scenario.
+pub fn fly(file: &Path) -> Result<(), Box<dyn Error>> {
+    let wire = Telemetry::default();
+    let mut pilot = Pilot::new(&load(file)?, wire.clone())?;
+    let (mut host, mut gnss) = (Host::new()?, Gnss::new());
+    let (mut now_ms, mut bytes) = (0, Vec::new());
+    while let Some((mut readings, signals)) = pilot.advance(now_ms) {
+        gnss.replace(&mut readings, &signals, now_ms);
+        host.sense(&readings);
+        let tick = host.next_tick(&wire.exchange(&bytes));
+        bytes = tick.bytes;
+        pilot.command(tick.report.throttles.map(Some));
+        now_ms += 1;
+    }
+    pilot.verdict()
+}
+
+/// The receiver, its wire at 38,400 baud, and its driver.
+struct Gnss {
+    receiver: Receiver,
+    decoder: NmeaDecoder,
+    frame: FixFrame,
+    /// When the epoch's first byte came, and the last byte \[ms\].
+    began_ms: u64,
+    last_ms: u64,
+}
+
+impl Gnss {
+    fn new() -> Self {
+        let (receiver, decoder) = (Receiver::new(), NmeaDecoder::new());
+        Gnss { receiver, decoder, frame: FixFrame::NEW, began_ms: 0, last_ms: 0 }
+    }
+
+    /// Puts the fix that is complete in this millisecond in the place of the instruments'.
+    fn replace(&mut self, readings: &mut Readings, signals: &Signals, now_ms: u64) {
+        self.receiver.set_position(signals.position);
+        self.receiver.set_velocity(signals.velocity);
+        let mut aids: Vec<_> = readings.aids.into_iter().flatten().collect();
+        aids.retain(|aid| !matches!(aid.value, Measurement::Gnss { .. }));
+        // None before the first position.
+        for _ in 0..if signals.position == AT_REST.position { 0 } else { 4 } {
+            let Some(byte) = self.receiver.transmit(VirtualNanos(now_ms * 1_000_000)) else { break };
+            if now_ms - self.last_ms > 20 {
+                self.began_ms = now_ms;
+            }
+            self.last_ms = now_ms;
+            let fix = self.decoder.take(byte as u8).flatten();
+            if let Some((value, _)) = fix.and_then(|fix| self.frame.measure(&fix)) {
+                aids.push(Aged { value, age_us: ((now_ms - self.began_ms) * 1000) as u32 + LATENCY_US });
+            }
+        }
+        readings.aids = std::array::from_fn(|index| aids.get(index).copied());
+    }
+}

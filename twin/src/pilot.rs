@@ -1,0 +1,205 @@
+//! A flight seen from outside: the plant with its instruments, a station at the telemetry UART, and what must hold.
+
+use crate::check::check;
+use crate::wire::Telemetry;
+use crate::world::Transducers;
+use afbc_flight_core::motor::{THROTTLE_MAX, THROTTLE_MIN};
+use afbc_link::{Address, Command, Datum, Decoder, Downlink, FRAME_MAX, Height, Sender, Uplink};
+use afbc_onboard::Readings;
+use afbc_scenario::Scenario;
+use afbc_sim::flight::World;
+use afbc_types::{ROTORS_MAX, RotorSpeeds};
+use rigless::machine::flight::Signals;
+use std::error::Error;
+
+const STATION: Address = Address { system: 255, component: 190 };
+/// Height of the hover above where it stood [m], and its time [ms].
+const HEIGHT_M: f32 = 5.0;
+const HOVER_MS: u64 = 30_000;
+/// Time within which it must arm, climb, and land and disarm [ms].
+const PATIENCE_MS: [u64; 3] = [40_000, 15_000, 40_000];
+/// What the hover may be off on average, and the vehicle be tilted by at any time, in gusts [m, rad].
+const OFF_M: f64 = 2.5;
+const TILT_RAD: f64 = 0.7;
+
+/// Parts of the flight.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Phase {
+    Wakes,
+    Climbs,
+    Hovers,
+    Lands,
+    Done,
+}
+
+/// The world around a vehicle, and who leads it through the flight.
+pub struct Pilot {
+    world: World,
+    transducers: Transducers,
+    throttles: Vec<u16>,
+    speed_max_rad_s: f32,
+    wire: Telemetry,
+    sender: Sender,
+    decoder: Decoder<Downlink>,
+    phase: Phase,
+    /// Milliseconds, and when the phase began.
+    now_ms: u64,
+    since_ms: u64,
+    armed: bool,
+    /// Where it hovers, by the truth [m].
+    start_m: [f64; 3],
+    off_m: (f64, u64),
+    tilt_rad: f64,
+    error: Option<String>,
+}
+
+impl Pilot {
+    /// At the start of a scenario, at the other end of the wire.
+    pub fn new(scenario: &Scenario, wire: Telemetry) -> Result<Self, Box<dyn Error>> {
+        Ok(Pilot {
+            world: World::released(scenario, 1e-3)?,
+            transducers: Transducers::new(),
+            throttles: vec![0; scenario.rotors.len()],
+            speed_max_rad_s: 1000.0,
+            wire,
+            sender: Sender::new(STATION),
+            decoder: Decoder::new(STATION),
+            phase: Phase::Wakes,
+            now_ms: 0,
+            since_ms: 0,
+            armed: false,
+            start_m: [0.0; 3],
+            off_m: (0.0, 0),
+            tilt_rad: 0.0,
+            error: None,
+        })
+    }
+
+    /// Takes what the motors' wires say; none keeps what was said before.
+    pub fn command(&mut self, throttles: impl IntoIterator<Item = Option<u16>>) {
+        for (known, new) in self.throttles.iter_mut().zip(throttles) {
+            *known = new.unwrap_or(*known);
+        }
+    }
+
+    /// Advances to this millisecond, and returns what the transducers feel there; none at the end.
+    pub fn advance(&mut self, now_ms: u64) -> Option<(Readings, Signals)> {
+        self.now_ms = now_ms;
+        let mut speeds = RotorSpeeds::<ROTORS_MAX>::default();
+        for (speed, throttle) in speeds.0.iter_mut().zip(&self.throttles) {
+            let share = throttle.saturating_sub(THROTTLE_MIN) as f32 / f32::from(THROTTLE_MAX - THROTTLE_MIN);
+            *speed = share * self.speed_max_rad_s;
+        }
+        self.world.advance(&speeds);
+        self.world.look();
+        let readings = self.world.readings().copied().unwrap_or_default();
+        let signals = self.transducers.feel(&readings);
+        self.talk();
+        self.supervise();
+        (self.error.is_none() && self.phase != Phase::Done).then_some((readings, signals))
+    }
+
+    /// Prints how the flight was, and fails if it was not well flown.
+    pub fn verdict(self) -> Result<(), Box<dyn Error>> {
+        let Pilot { error, off_m: (sum, count), tilt_rad, now_ms, phase, .. } = self;
+        let off_m = sum / count.max(1) as f64;
+        println!("{:.1} s; hover off by {off_m:.2} m on average, largest tilt {tilt_rad:.2} rad", now_ms as f64 * 1e-3);
+        if let Some(error) = error {
+            return Err(error.into());
+        }
+        check(phase == Phase::Done, "the flight ends")?;
+        check(off_m < OFF_M && tilt_rad < TILT_RAD, "it flies well")
+    }
+
+    fn say(&mut self, message: &Uplink) {
+        let mut frame = [0; FRAME_MAX];
+        let bytes = self.sender.send(message, &mut frame).to_vec();
+        self.wire.send(&bytes);
+    }
+
+    /// Hears the vehicle.
+    fn talk(&mut self) {
+        let bytes = self.wire.take();
+        let now_ms = self.now_ms;
+        let armed = &mut self.armed;
+        self.decoder.feed(&bytes, |_, message| match message {
+            Downlink::Heartbeat { armed: is_armed, .. } => *armed = is_armed,
+            Downlink::Text { text, .. } => println!("{:7.3} s: {}", now_ms as f64 * 1e-3, text.to_str().unwrap_or("?")),
+            _ => {}
+        });
+        if self.now_ms % 1000 == 0 {
+            self.say(&Uplink::Heartbeat);
+        }
+    }
+
+    /// Leads it through the flight, and watches.
+    fn supervise(&mut self) {
+        let motion = self.world.plant().motion();
+        let [x, y, z]: [f64; 3] = motion.position_m.into();
+        let tilt_rad = motion.attitude_rad.x.hypot(motion.attitude_rad.y);
+        self.tilt_rad = self.tilt_rad.max(tilt_rad);
+        let passed_ms = self.now_ms - self.since_ms;
+        let second = passed_ms % 1000 == 999;
+        if self.now_ms % 5000 == 0 {
+            let [east, north, up] = self.transducers.fix_m();
+            println!(
+                "{:7.3} s: {:?}, {x:.2} {y:.2} {z:.2} m; fix off by {:.2} {:.2} {:.2} m, height by {:.2} m",
+                self.now_ms as f64 * 1e-3,
+                self.phase,
+                east - x,
+                north - y,
+                up - z,
+                self.transducers.height_m() - z
+            );
+        }
+        let next = match self.phase {
+            Phase::Wakes => {
+                if second && self.now_ms > 3000 {
+                    self.say(&Uplink::Command(Command::Arm));
+                }
+                self.armed.then_some(Phase::Climbs)
+            }
+            Phase::Climbs => {
+                if passed_ms == 0 {
+                    self.start_m = [x, y, z];
+                }
+                if passed_ms % 2000 == 500 && z - self.start_m[2] < 0.5 {
+                    let height = Height { metres: HEIGHT_M, above: Datum::Here };
+                    self.say(&Uplink::Command(Command::TakeOff(height)));
+                }
+                (z - self.start_m[2] > 0.6 * f64::from(HEIGHT_M)).then_some(Phase::Hovers)
+            }
+            Phase::Hovers => {
+                if passed_ms > 3000 {
+                    self.off_m.0 += (x - self.start_m[0]).hypot(y - self.start_m[1]).hypot(z - self.start_m[2] - 5.0);
+                    self.off_m.1 += 1;
+                }
+                (passed_ms >= HOVER_MS).then_some(Phase::Lands)
+            }
+            Phase::Lands => {
+                if passed_ms % 2000 == 0 && self.armed {
+                    self.say(&Uplink::Command(Command::Land));
+                }
+                (!self.armed).then_some(Phase::Done)
+            }
+            Phase::Done => None,
+        };
+        let patience_ms = match self.phase {
+            Phase::Wakes => PATIENCE_MS[0],
+            Phase::Climbs => PATIENCE_MS[1],
+            Phase::Lands => PATIENCE_MS[2],
+            _ => u64::MAX,
+        };
+        if let Some(next) = next {
+            (self.phase, self.since_ms) = (next, self.now_ms);
+        } else if passed_ms > patience_ms {
+            self.error = Some(format!("{:?}: not within {} s", self.phase, patience_ms / 1000));
+        }
+        if matches!(self.phase, Phase::Climbs | Phase::Hovers) && !self.armed {
+            self.error = Some(format!("{:?}: it disarmed", self.phase));
+        }
+        if tilt_rad > 1.5 {
+            self.error = Some(format!("{:?}: it turned over", self.phase));
+        }
+    }
+}
