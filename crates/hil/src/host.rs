@@ -5,6 +5,7 @@ use afbc_flight_core::rate::PERIOD_US;
 use afbc_link::{Decoder, Uplink};
 use afbc_onboard::parameters::{Kept, ParameterTable, Reason, RecordChange};
 use afbc_onboard::{Configuration, ControlInputs, Flight, Link, Prepared, Readings, Report};
+use afbc_recorder::Recorder;
 use afbc_station::{Comms, Setup};
 use afbc_store::Store;
 use afbc_types::{OutOfRange, ROTORS_MAX, with_rotors};
@@ -21,6 +22,17 @@ pub struct Host {
     taken: ControlInputs,
     readings: Readings,
     time_us: u64,
+    /// Number of the next tick, and the exact log of it all, if it is kept.
+    number: u32,
+    log: Option<ExactLog>,
+}
+
+/// Makes the exact log, and what takes its bytes.
+struct ExactLog {
+    recorder: Recorder,
+    write: Box<dyn FnMut(&[u8])>,
+    /// Number of the configuration that the last tick left to the next.
+    adopted: Option<u16>,
 }
 
 /// The half that decides, of a vehicle with any number of rotors, and its parameters.
@@ -35,6 +47,9 @@ trait Core {
 
     /// Does what stations want of the parameters, and flies what has changed.
     fn parameters(&mut self, comms: &mut Comms, send: &mut dyn FnMut(&[u8])) -> Option<RecordChange>;
+
+    /// Records the start, or a change.
+    fn record(&self, log: &mut ExactLog, change: Option<RecordChange>);
 }
 
 /// What reports a tick that took so long.
@@ -64,6 +79,13 @@ impl<const N: usize> Core for (Flight<N>, ParameterTable<N>) {
         let adopted = Prepared::new(table.configuration()).is_ok_and(|prepared| flight.adopt(&prepared));
         debug_assert!(adopted, "a change that is not flown");
         Some(change)
+    }
+
+    fn record(&self, ExactLog { recorder, write, adopted }: &mut ExactLog, change: Option<RecordChange>) {
+        match change {
+            None => recorder.start(&self.1, write),
+            Some(change) => *adopted = Some(recorder.change(&self.1, change, write)),
+        }
     }
 }
 
@@ -138,6 +160,8 @@ impl Host {
             taken: ControlInputs::EMPTY,
             readings: Readings::NONE,
             time_us: 0,
+            number: 0,
+            log: None,
         })
     }
 
@@ -157,10 +181,26 @@ impl Host {
         &mut self.comms
     }
 
+    /// Keeps an exact log ([`afbc_recorder`]) from now on, before the first tick; `write` takes its bytes.
+    pub fn record(&mut self, write: impl FnMut(&[u8]) + 'static) {
+        let mut log = ExactLog { recorder: Recorder::default(), write: Box::new(write), adopted: None };
+        self.flight.record(&mut log, None);
+        self.log = Some(log);
+    }
+
+    /// Takes what messages have brought.
+    fn merge(&mut self, news: &ControlInputs) {
+        self.inputs.merge(news);
+        if let Some(ExactLog { recorder, write, .. }) = &mut self.log {
+            recorder.inputs(self.number, news, write);
+        }
+    }
+
     /// Receives, for the next tick, the next bytes of one of several streams, each with a decoder of its own.
     pub fn hear(&mut self, decoder: &mut Decoder<Uplink>, bytes: &[u8]) {
         self.comms.exchange(decoder);
-        self.inputs.merge(&self.comms.receive(bytes));
+        let news = self.comms.receive(bytes);
+        self.merge(&news);
         self.comms.exchange(decoder);
     }
 
@@ -172,7 +212,8 @@ impl Host {
     /// Runs one control tick at `time_us` since power-up, after `uplink` has reached the link. The tick reports a
     /// duration of `tick_us`.
     pub fn tick(&mut self, uplink: &[u8], time_us: u64, tick_us: f32) -> HostTick {
-        self.inputs.merge(&self.comms.receive(uplink));
+        let news = self.comms.receive(uplink);
+        self.merge(&news);
         self.inputs.take_into(&mut self.taken);
         let readings = core::mem::take(&mut self.readings);
         let mut bytes = Vec::new();
@@ -180,6 +221,14 @@ impl Host {
         let tell = Tell { comms: &mut self.comms, tick_us, send: &mut send };
         let report = self.flight.tick(time_us, &mut self.taken, &readings, tell);
         let change = self.flight.parameters(&mut self.comms, &mut send);
+        if let Some(log) = &mut self.log {
+            if change.is_some() {
+                self.flight.record(log, change);
+            }
+            let adopted = log.adopted.take();
+            log.recorder.tick(self.number, false, &readings, &report, adopted, &mut log.write);
+        }
+        self.number = self.number.wrapping_add(1);
         self.time_us = time_us;
         HostTick { report, bytes, change }
     }

@@ -1,0 +1,84 @@
+//! The writing side.
+
+use crate::frame::{FRAME_MAX, write};
+use crate::record::{Given, Record, Start, TickRecord, VERSION};
+use afbc_onboard::parameters::{ParameterTable, RecordChange};
+use afbc_onboard::{ControlInputs, Readings, Report};
+
+/// Makes the frames of a log, in the order in which it is called: beside the control tick, not in it.
+#[derive(Clone, Debug)]
+pub struct Recorder {
+    buffer: [u8; FRAME_MAX],
+    configuration: u16,
+}
+
+impl Default for Recorder {
+    fn default() -> Self {
+        Recorder { buffer: [0; FRAME_MAX], configuration: 0 }
+    }
+}
+
+impl Recorder {
+    /// Records the start of a processor, with the parameters that are not as its image has them; calls `send` with each
+    /// frame.
+    pub fn start<const N: usize>(&mut self, table: &ParameterTable<N>, send: &mut impl FnMut(&[u8])) {
+        self.configuration = 0;
+        let rotors = u8::try_from(N).unwrap_or(u8::MAX);
+        self.frame(&Record::Start(Start { version: VERSION, rotors, parameters: table.count() }), send);
+        for parameter in table.iter() {
+            let image = table.default_of(parameter.name).map(|parameter| parameter.value.to_bits());
+            if image != Some(parameter.value.to_bits()) {
+                self.frame(&Record::Parameter { configuration: 0, name: parameter.name, value: parameter.value }, send);
+            }
+        }
+    }
+
+    /// Records a change of the table, and returns the number of the configuration that it makes.
+    pub fn change<const N: usize>(
+        &mut self,
+        table: &ParameterTable<N>,
+        change: RecordChange,
+        send: &mut impl FnMut(&[u8]),
+    ) -> u16 {
+        self.configuration = self.configuration.wrapping_add(1);
+        let configuration = self.configuration;
+        match change {
+            RecordChange::Set(name, _) => {
+                if let Some(parameter) = table.get(name) {
+                    self.frame(&Record::Parameter { configuration, name, value: parameter.value }, send);
+                }
+            }
+            RecordChange::Restored => self.frame(&Record::Restored { configuration }, send),
+        }
+        configuration
+    }
+
+    /// Records what messages have brought for the tick of this number, if they have brought anything.
+    pub fn inputs(&mut self, tick: u32, inputs: &ControlInputs, send: &mut impl FnMut(&[u8])) {
+        if *inputs != ControlInputs::EMPTY {
+            self.frame(&Record::Inputs { tick, inputs: inputs.clone() }, send);
+        }
+    }
+
+    /// Records a tick: its number, whether its clock was not trusted, what it took and gave, and the number of the
+    /// configuration that is flown from the next one on, if it is another.
+    pub fn tick<const N: usize>(
+        &mut self,
+        number: u32,
+        clock_failed: bool,
+        readings: &Readings,
+        report: &Report<N>,
+        adopted: Option<u16>,
+        send: &mut impl FnMut(&[u8]),
+    ) {
+        let (time_us, given) = (report.time_us, Given::of(report));
+        let record = TickRecord { number, time_us, clock_failed, readings: *readings, adopted, given };
+        self.frame(&Record::Tick(record), send);
+    }
+
+    fn frame(&mut self, record: &Record, send: &mut impl FnMut(&[u8])) {
+        if let Some(frame) = write(record, &mut self.buffer) {
+            send(frame);
+        }
+    }
+}
