@@ -1,5 +1,6 @@
 //! Buses and clock of sensors.
 
+use afbc_drivers::alignment::CW270_FLIP;
 use afbc_drivers::{Driver, PartFault, PartTiming, Registers, SensorPart};
 use afbc_types::Stamped;
 use embassy_stm32::gpio::{Level, Output, Pin, Speed};
@@ -10,6 +11,10 @@ use embassy_stm32::time::Hertz;
 use embassy_stm32::{Peri, i2c};
 use embassy_time::{Duration, Instant, Timer};
 use embedded_hal_async::spi::{ErrorType, Operation, SpiDevice};
+use nalgebra::Matrix3;
+
+/// Alignment of the compass beside a receiver, which faces down and is turned by 270 degrees in the usual module.
+pub const COMPASS: Matrix3<f32> = CW270_FLIP;
 
 /// A part that is alone on its SPI.
 pub struct Device {
@@ -22,6 +27,17 @@ impl Device {
     pub fn new(spi: Spi<'static, Async, Master>, select: Peri<'static, impl Pin>) -> Self {
         Device { spi, select: Output::new(select, Level::High, Speed::VeryHigh) }
     }
+
+    /// Sets the fastest clock of an SPI fed with `kernel_hz` that is not above `most_hz`.
+    pub fn set_clock(&mut self, kernel_hz: u32, most_hz: u32) {
+        // Nothing can be wrong with it.
+        let _ = self.spi.set_config(&spi(divided(kernel_hz, most_hz)));
+    }
+}
+
+/// Returns the fastest clock that a prescaler of 2, 4 ... 256 makes of `kernel_hz`, not above `most_hz` if possible.
+fn divided(kernel_hz: u32, most_hz: u32) -> u32 {
+    (1..8).map(|power| kernel_hz >> power).find(|hz| *hz <= most_hz).unwrap_or(kernel_hz >> 8)
 }
 
 /// A part's select pin while it is low; a transfer that is given up ends it too.
@@ -51,6 +67,21 @@ impl SpiDevice for Device {
             }
         }
         Ok(())
+    }
+}
+
+/// Reads a part as [`run`] does if it answers; returns if its first reading fails.
+pub async fn run_if_it_answers<P: SensorPart, B: Registers, T: PartTiming>(
+    mut driver: Driver<P, B, T>,
+    mut take: impl FnMut(Stamped<P::Reading>),
+) {
+    match driver.reading().await {
+        Ok(reading) => {
+            defmt::info!("{=str}: works", P::NAME);
+            take(reading);
+            run(driver, take).await;
+        }
+        Err(fault) => defmt::warn!("{=str}: {}", P::NAME, defmt::Display2Format(&fault)),
     }
 }
 

@@ -27,6 +27,7 @@
 #![forbid(unsafe_code)]
 
 pub mod ak8963;
+pub mod alignment;
 pub mod bmi270;
 pub mod bmp3;
 mod bus;
