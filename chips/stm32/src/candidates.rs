@@ -62,6 +62,7 @@ candidates!(A, B);
 candidates!(A, B, C);
 candidates!(A, B, C, D);
 candidates!(A, B, C, D, E);
+candidates!(A, B, C, D, E, F);
 
 impl BarometerCandidates for () {
     async fn run(_bus: impl I2c + Clone, _take: impl FnMut(Stamped<PressureReading>)) {}
