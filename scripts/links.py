@@ -47,7 +47,8 @@ def wrong(page):
 
 def main():
     """Prints everything that is wrong."""
-    pages = [*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), *ROOT.glob("scripts/*.md"), *ROOT.glob("crates/*/README.md")]
+    globs = ["*.md", "docs/**/*.md", "scripts/*.md", "crates/*/README.md"]
+    pages = [page for glob in globs for page in ROOT.glob(glob)]
     complaints = [complaint for page in sorted(pages) for complaint in wrong(page)]
     contents = (ROOT / "docs/SUMMARY.md").read_text()
     listed = LINK.findall(contents)

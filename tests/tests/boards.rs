@@ -1,8 +1,8 @@
 //! Firmware and boards meet in one place, nothing on a board is used twice, every interrupt has the priority of its
 //! purpose, and the documented wiring is that of the code.
 //!
-//! The compiler already refuses a pin on the wrong peripheral, a DMA stream of another request, the wrong channel of a
-//! timer, and any of them used twice; the linker refuses two handlers of an interrupt, and an image that is too large.
+//! The compiler already refuses a pin on the wrong peripheral, a DMA stream of another request, the wrong channel of
+//! a timer, and any of them used twice; the linker refuses two handlers of an interrupt, and an image that is too large.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, clippy::panic, missing_docs)] // what cannot be read must stop it
 
 mod board_table;
@@ -278,8 +278,8 @@ fn prioritised(code: &str) -> BTreeMap<String, String> {
     found
 }
 
-/// From Betaflight's descriptions of the boards (`betaflight/config`, and for the Matek F405-STD `unified-targets`): the
-/// gyroscope's data in, select and alignment, motors 1 to 4, clock and data of the barometer's bus.
+/// From Betaflight's descriptions of the boards (`betaflight/config`): the gyroscope's data in, select and alignment,
+/// motors 1 to 4, clock and data of the barometer's bus.
 #[test]
 fn boards_are_as_betaflight_describes_them() {
     let tables: BTreeMap<_, _> = kinds().0.into_iter().collect();

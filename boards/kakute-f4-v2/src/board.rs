@@ -1,5 +1,6 @@
 //! Kakute F4 V2; `docs/boards/kakute-f4-v2.md` shows the wiring.
 
+use afbc_drivers::bmp280::Bmp280;
 use afbc_drivers::dps310::Dps310;
 use afbc_drivers::mpu::{Icm20689, Mpu6000};
 
@@ -15,7 +16,7 @@ chip_stm32f4::flight_controller! {
     i2c: I2C1 {
         clock: PB8, data: PB9, interrupts: I2C1_EV, I2C1_ER,
         dma: DMA1_CH7 by DMA1_STREAM7, DMA1_CH5 by DMA1_STREAM5,
-        barometer: (Dps310,)
+        barometer: (Dps310, Bmp280)
     },
     motors: 4 as BETAFLIGHT {
         first: TIM3<u16>, DMA1_CH2 by DMA1_STREAM2 { (), (), (PB0: GPIOB 0, motor 1), (PB1: GPIOB 1, motor 2) },

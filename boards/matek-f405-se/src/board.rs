@@ -3,6 +3,7 @@
 //! The compass shares I2C1 with the barometer: I2C2 would need DMA1's stream 7 as I2C1 does, whose other one, stream 6,
 //! is that of TIM4.
 
+use afbc_drivers::bmp280::Bmp280;
 use afbc_drivers::dps310::Dps310;
 use afbc_drivers::mpu::Mpu6000;
 
@@ -18,7 +19,7 @@ chip_stm32f4::flight_controller! {
     i2c: I2C1 {
         clock: PB8, data: PB9, interrupts: I2C1_EV, I2C1_ER,
         dma: DMA1_CH7 by DMA1_STREAM7, DMA1_CH0 by DMA1_STREAM0,
-        barometer: (Dps310,)
+        barometer: (Dps310, Bmp280)
     },
     motors: 4 as BETAFLIGHT {
         first: TIM4<u16>, DMA1_CH6 by DMA1_STREAM6 { (PB6: GPIOB 6, motor 2), (PB7: GPIOB 7, motor 1), (), () },

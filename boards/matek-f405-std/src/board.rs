@@ -1,6 +1,7 @@
 //! Matek F405-STD; `docs/boards/matek-f405-std.md` shows the wiring.
 
 use afbc_drivers::bmi270::Bmi270;
+use afbc_drivers::bmp280::Bmp280;
 use afbc_drivers::dps310::Dps310;
 use afbc_drivers::icm426xx::Icm42688p;
 use afbc_drivers::mpu::{Icm20602, Icm20689, Mpu6000, Mpu6500};
@@ -17,7 +18,7 @@ chip_stm32f4::flight_controller! {
     i2c: I2C1 {
         clock: PB6, data: PB7, interrupts: I2C1_EV, I2C1_ER,
         dma: DMA1_CH6 by DMA1_STREAM6, DMA1_CH0 by DMA1_STREAM0,
-        barometer: (Dps310,)
+        barometer: (Dps310, Bmp280)
     },
     motors: 4 as BETAFLIGHT {
         first: TIM8<u16>, DMA2_CH1 by DMA2_STREAM1 {

@@ -27,11 +27,13 @@ const TRANSFER_MAX_US: u64 = 2_000;
 /// Newest throttles of a timer's motors, for its task: 0, or 48 to 2047; 0 where there is no motor.
 pub type Throttles = Signal<CriticalSectionRawMutex, [u16; CHANNELS]>;
 
-/// The waveform, with a row for each bit and a column for each channel. A DMA burst of four columns must not cross 1 KiB.
+/// The waveform, with a row for each bit and a column for each channel. A DMA burst of four columns must not cross
+/// 1 KiB.
 #[repr(align(16))]
 struct Rows<W>([[W; CHANNELS]; 17]);
 
-/// Motors of a timer. `W` is `u16`, or `u32` on a timer of 32 bits: a narrower store would fill both halves of its register.
+/// Motors of a timer. `W` is `u16`, or `u32` on a timer of 32 bits: a narrower store would fill both halves of its
+/// register.
 pub struct Motors<T: GeneralInstance4Channel, D: UpDma<T>, I, W> {
     pwm: SimplePwm<'static, T>,
     dma: Peri<'static, D>,

@@ -4,8 +4,8 @@
 /// relative, and defines `stop_motors`. The crate names all of its dependencies.
 ///
 /// * Each peripheral has its DMA's streams, as `DMA1_CH6` for stream 6, with their interrupts.
-/// * IMU and barometer are [candidates](chip_stm32::candidates): the one that answers is read. The IMU's axes are one of
-///   [`alignment`](afbc_drivers::alignment).
+/// * IMU and barometer are [candidates](chip_stm32::candidates): the one that answers is read. How the IMU sits is one
+///   of `afbc_drivers::alignment`.
 /// * Motors are so many, numbered as [`numbering`](chip_stm32::motors::numbering) has it. They have a line for each
 ///   timer, with the type of its registers, the stream of its updates, and what its channels 1 to 4 drive: the pin, the
 ///   same again as port and number, and the number of the motor.

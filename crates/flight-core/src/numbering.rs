@@ -1,7 +1,7 @@
 //! Which rotor is which motor on a flight controller for X frames.
 //!
-//! Such a controller numbers its outputs by the corners of an X. Four rotors with one in each corner are driven by their
-//! corners, in whatever order the vehicle's file lists them; of any other frame, output n drives rotor n.
+//! Such a controller numbers its outputs by the corners of an X. Four rotors with one in each corner are driven by
+//! their corners, in whatever order the vehicle's file lists them; of any other frame, output n drives rotor n.
 
 use afbc_types::Rotor;
 use core::array;
@@ -24,8 +24,8 @@ pub const ARDUPILOT: [Corner; 4] = [Corner::FrontRight, Corner::RearLeft, Corner
 /// Least distance from the body's x and y axes of a rotor in a corner \[arm lengths\].
 const ASIDE: f32 = 0.1;
 
-/// Returns the index of the rotor that each output drives, first output first; beyond the vehicle's rotors for an output
-/// without one.
+/// Returns the index of the rotor that each output drives, first output first; beyond the vehicle's rotors for an
+/// output without one.
 #[must_use]
 pub fn rotors_of_outputs<const N: usize, const OUTPUTS: usize>(
     numbering: [Corner; 4],
