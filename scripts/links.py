@@ -47,13 +47,15 @@ def wrong(page):
 
 def main():
     """Prints everything that is wrong."""
-    pages = [*ROOT.glob("*.md"), *ROOT.glob("docs/*.md"), *ROOT.glob("scripts/*.md"), *ROOT.glob("crates/*/README.md")]
+    globs = ["*.md", "docs/**/*.md", "scripts/*.md", "crates/*/README.md"]
+    pages = [page for glob in globs for page in ROOT.glob(glob)]
     complaints = [complaint for page in sorted(pages) for complaint in wrong(page)]
     contents = (ROOT / "docs/SUMMARY.md").read_text()
     listed = LINK.findall(contents)
-    for page in sorted(ROOT.glob("docs/*.md")):
-        if page.name != "SUMMARY.md" and listed.count(page.name) != 1:
-            complaints.append(f"docs/SUMMARY.md: {page.name} is there {listed.count(page.name)} times")
+    for page in sorted(ROOT.glob("docs/**/*.md")):
+        name = str(page.relative_to(ROOT / "docs"))
+        if name != "SUMMARY.md" and listed.count(name) != 1:
+            complaints.append(f"docs/SUMMARY.md: {name} is there {listed.count(name)} times")
     index = (ROOT / "scripts/README.md").read_text()
     for script in sorted(ROOT.glob("scripts/*")):
         if script.is_file() and script.name != "README.md" and f"| `{script.name}` |" not in index:

@@ -1,7 +1,14 @@
-//! Firmware and boards meet in one place, and the documented wiring is that of the code.
-#![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs)] // a file that cannot be read must stop the test
+//! Firmware and boards meet in one place, nothing on a board is used twice, every interrupt has the priority of its
+//! purpose, and the documented wiring is that of the code.
+//!
+//! The compiler already refuses a pin on the wrong peripheral, a DMA stream of another request, the wrong channel of
+//! a timer, and any of them used twice; the linker refuses two handlers of an interrupt, and an image that is too large.
+#![allow(clippy::unwrap_used, clippy::indexing_slicing, clippy::panic, missing_docs)] // what cannot be read must stop it
 
-use std::collections::BTreeSet;
+mod board_table;
+
+use board_table::{BoardTable, Motor, Stream, Timer, wiring};
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -41,11 +48,10 @@ fn every_board_is_a_folder_and_meets_the_firmware_once() {
     let boards: Vec<_> = boards.iter().filter(|path| path.is_dir()).collect();
     assert!(boards.len() >= 3, "{boards:?}");
     for board in boards {
-        let files = sources(board);
-        for once in ["firmware::image!(", "impl Board for "] {
-            let count: usize = files.iter().map(|(_, text)| text.matches(once).count()).sum();
-            assert_eq!(count, 1, "{}: {once}", board.display());
-        }
+        let text: String = sources(board).into_iter().map(|(_, text)| text).collect();
+        assert_eq!(text.matches("firmware::image!(").count(), 1, "{}", board.display());
+        let interfaces = text.matches("impl Board for ").count() + text.matches("::flight_controller! {").count();
+        assert_eq!(interfaces, 1, "{}", board.display());
         assert!(board.join("memory.x").is_file() || root().join("memory.x").is_file(), "{}", board.display());
     }
 }
@@ -77,16 +83,243 @@ fn the_firmware_knows_no_board() {
 
 #[test]
 fn the_wiring_is_what_the_board_uses() {
-    let page = fs::read_to_string(root().join("docs/firmware.md")).unwrap();
-    let wiring = page.split("\n## ").find(|section| section.starts_with("Wiring")).unwrap();
-    for (board, heading, count) in [("stm32f405", "Wiring", 6), ("stm32h743", "Matek H743", 26)] {
-        let table = wiring.split("\n### ").find(|section| section.starts_with(heading)).unwrap();
-        let code = fs::read_to_string(root().join("boards").join(board).join("src/board.rs")).unwrap();
+    for (board, page, heading, count) in [
+        ("stm32f405", "firmware.md", "\n## Wiring", 6),
+        ("stm32h743", "firmware.md", "\n### Matek H743", 26),
+        ("pixracer", "boards/pixracer.md", "\n## Wiring", 26),
+    ] {
+        let text = fs::read_to_string(root().join("docs").join(page)).unwrap();
+        let table = text.split_once(heading).unwrap().1.split("\n#").next().unwrap();
+        let code = code_of(&root().join("boards").join(board));
         let (head, body) = code.split_once("\nuse ").unwrap();
         assert_eq!(pins(body).len(), count, "{board}: {:?}", pins(body));
         // Those of crystal and debugger are fixed by the chip.
         let fixed = ["PH0", "PH1", "PA13", "PA14"].map(str::to_owned).into();
-        assert_eq!(&pins(table) - &fixed, pins(body), "docs/firmware.md, {board}");
+        assert_eq!(&pins(table) - &fixed, pins(body), "docs/{page}, {board}");
         assert_eq!(&pins(head) - &fixed, pins(body), "the table of {board} itself");
+    }
+}
+
+/// Returns a board's code.
+fn code_of(board: &Path) -> String {
+    fs::read_to_string(board.join("src/board.rs")).unwrap()
+}
+
+/// Returns the folders of the boards that are a table, with it, and of those that are code.
+fn kinds() -> (Vec<(PathBuf, BoardTable)>, Vec<PathBuf>) {
+    let folders = fs::read_dir(root().join("boards")).unwrap().map(|entry| entry.unwrap().path());
+    let mut folders: Vec<_> = folders.filter(|path| path.is_dir() && !path.ends_with("emulated")).collect();
+    folders.sort();
+    let (mut tables, mut codes) = (Vec::new(), Vec::new());
+    for folder in folders {
+        match BoardTable::read(&folder) {
+            Some(table) => tables.push((folder, table)),
+            None => codes.push(folder),
+        }
+    }
+    assert!(tables.len() >= 6 && codes.len() >= 3, "{tables:?} {codes:?}");
+    (tables, codes)
+}
+
+/// Returns the words of `text` that begin with `start`, without it, up to what is no part of a name.
+fn names_after<'a>(text: &'a str, start: &'a str) -> Vec<&'a str> {
+    let is_end = |c: char| !c.is_ascii_alphanumeric() && c != '_';
+    text.split(start).skip(1).map(|rest| rest.split(is_end).next().unwrap()).collect()
+}
+
+/// Returns the interrupt lines that a board's executors take.
+fn executors(board: &Path) -> Vec<String> {
+    let text = fs::read_to_string(board.join("src/main.rs")).unwrap();
+    let image = text.split_once("firmware::image!(").unwrap().1.split_once(");").unwrap().0;
+    let words: Vec<_> = image.split([',', '\n']).filter_map(|word| word.split_once(": ")).collect();
+    words.iter().map(|(_, line)| line.trim().to_owned()).collect()
+}
+
+fn assert_once<T: Ord + std::fmt::Debug>(what: Vec<T>, board: &Path) {
+    let count = what.len();
+    let once: BTreeSet<_> = what.into_iter().collect();
+    assert_eq!(once.len(), count, "{}: one of {once:?} is there twice", board.display());
+}
+
+#[test]
+fn nothing_is_used_twice() {
+    for (board, table) in kinds().0 {
+        let BoardTable { link, gnss, imu, i2c, timers, .. } = &table;
+        assert_once(table.pins(), &board);
+        let names = [&link.name, &gnss.name, &imu.name, &i2c.name];
+        assert_once(names.into_iter().chain(timers.iter().map(|timer| &timer.name)).collect(), &board);
+        let mut motors: Vec<_> = table.motors().map(|motor| motor.number).collect();
+        motors.sort_unstable();
+        assert_eq!(motors, (1..=table.outputs).collect::<Vec<_>>(), "{}", board.display());
+        let streams = table.streams().into_iter().map(|stream| stream.line.clone());
+        let lines = streams.chain(i2c.lines.clone()).chain([link.name.clone(), gnss.name.clone()]);
+        assert_once(lines.chain(executors(&board)).collect(), &board);
+    }
+    for board in kinds().1 {
+        let code = code_of(&board);
+        let bound = code.split_once("bind_interrupts!(").unwrap().1.split_once("});").unwrap().0;
+        let lines = bound.lines().filter_map(|line| line.split_once(" => ")).map(|(line, _)| line.trim().to_owned());
+        assert_once(lines.chain(executors(&board)).collect(), &board);
+    }
+}
+
+/// What a table says twice, it says alike.
+#[test]
+fn streams_have_their_interrupts_and_motors_their_pins() {
+    for (board, table) in kinds().0 {
+        for Stream { channel, line } in table.streams() {
+            assert_eq!(channel.replace("_CH", "_STREAM"), *line, "{}", board.display());
+        }
+        for Motor { pin, port, bit, .. } in table.motors() {
+            assert_eq!(*pin, format!("P{}{bit}", port.strip_prefix("GPIO").unwrap()), "{}", board.display());
+        }
+        assert_eq!(table.i2c.lines, ["EV", "ER"].map(|line| format!("{}_{line}", table.i2c.name)));
+        for Timer { name, word, .. } in &table.timers {
+            // Those of 32 bits (RM0090).
+            let is_wide = ["TIM2", "TIM5"].contains(&name.as_str());
+            assert_eq!(word, if is_wide { "u32" } else { "u16" }, "{}", board.display());
+        }
+    }
+    // In code, the pins of the motors are those that are held low after a panic.
+    for board in kinds().1 {
+        let code = code_of(&board);
+        let driven: BTreeSet<_> = names_after(&code, "pin(p.").into_iter().map(str::to_owned).collect();
+        let mut held = BTreeSet::new();
+        for call in code.split("hold_low(pac::GPIO").skip(1) {
+            let (port, rest) = call.split_once(", ").unwrap();
+            let numbers: Vec<usize> = match rest.strip_prefix('[') {
+                Some(list) => list.split_once(']').unwrap().0.split(", ").map(|it| it.parse().unwrap()).collect(),
+                None => {
+                    let (first, last) = rest.split_once(')').unwrap().0.split_once("..=").unwrap();
+                    (first.parse().unwrap()..=last.parse().unwrap()).collect()
+                }
+            };
+            held.extend(numbers.iter().map(|number| format!("P{port}{number}")));
+        }
+        assert_eq!(driven, held, "{}", board.display());
+        assert!(driven.len() >= 4, "{}", board.display());
+    }
+}
+
+/// Bytes of serial ports come first, then the IMU's transfers, the motors', the slow sensors'.
+#[test]
+fn every_interrupt_has_the_priority_of_its_purpose() {
+    let table = fs::read_to_string(root().join("chips/stm32f4/src/flight_controller.rs")).unwrap();
+    let purposes: BTreeMap<_, _> = [
+        ("$link", "UART"),
+        ("$gnss", "UART"),
+        ("$spi_tx_line", "SAMPLING"),
+        ("$spi_rx_line", "SAMPLING"),
+        ("$event", "AIDING"),
+        ("$error", "AIDING"),
+        ("$i2c_tx_line", "AIDING"),
+        ("$i2c_rx_line", "AIDING"),
+        ("$line", "MOTOR_DMA"),
+    ]
+    .into();
+    assert_eq!(prioritised(&table), purposes.iter().map(|(line, of)| (line.to_string(), of.to_string())).collect());
+    assert_eq!(handlers(&table).into_keys().collect::<Vec<_>>(), purposes.keys().copied().collect::<Vec<_>>());
+
+    for board in kinds().1 {
+        let code = code_of(&board);
+        let priorities = prioritised(&code);
+        let handlers = handlers(&code);
+        assert!(priorities.keys().eq(handlers.keys()), "{}: {priorities:?} {handlers:?}", board.display());
+        let motors: Vec<_> = code.split("Motors<").skip(1).filter_map(|it| it.split(", ").nth(1)).collect();
+        for (line, handler) in handlers {
+            let priority = priorities[&line].as_str();
+            let fits = match handler.split("::").next().unwrap() {
+                "usart" => priority == "UART",
+                "i2c" => priority == "AIDING",
+                _ if motors.iter().any(|motor| handler.contains(motor)) => priority == "MOTOR_DMA",
+                _ => ["SAMPLING", "AIDING"].contains(&priority),
+            };
+            assert!(fits, "{}: {line} has priority {priority}", board.display());
+        }
+    }
+}
+
+/// Returns the interrupts that code binds, with their handlers.
+fn handlers(code: &str) -> BTreeMap<String, String> {
+    let bound = code.split_once("bind_interrupts!(struct").unwrap().1.split_once("});").unwrap().0;
+    let lines = bound.lines().filter_map(|line| line.split_once(" => "));
+    let name = |line: &str| line.trim().trim_start_matches("$(").to_owned();
+    lines.map(|(line, handler)| (name(line), handler.trim_start_matches("embassy_stm32::").to_owned())).collect()
+}
+
+/// Returns the interrupts that code gives a priority, with its name: one by one, in pairs, or a list in a loop.
+fn prioritised(code: &str) -> BTreeMap<String, String> {
+    let mut found = BTreeMap::new();
+    let mut add = |line: &str, priority: &str| {
+        let priority = priority.split([')', ',']).next().unwrap().to_owned();
+        assert!(found.insert(line.to_owned(), priority).is_none(), "{line} has two priorities");
+    };
+    for pair in code.split("(Interrupt::").skip(1) {
+        let (line, rest) = pair.split_once(", priority::").unwrap();
+        add(line, rest);
+    }
+    for one in code.split(" interrupt::").skip(1).filter(|one| one.contains(".set_priority(Priority::from(priority::"))
+    {
+        if let Some((line, rest)) = one.split_once(".set_priority(Priority::from(priority::") {
+            if !line.contains(char::is_whitespace) {
+                add(line, rest);
+            }
+        }
+    }
+    for list in code.split("for line in ").skip(1) {
+        let Some((name, rest)) = list.split_once(" {\n            line.set_priority(Priority::from(priority::") else {
+            continue;
+        };
+        let (_, lines) = code.split_once(&format!("const {name}: [Interrupt")).unwrap();
+        for line in names_after(lines.split_once("];").unwrap().0, "Interrupt::") {
+            add(line, rest);
+        }
+    }
+    found
+}
+
+/// From Betaflight's descriptions of the boards (`betaflight/config`): the gyroscope's data in, select and alignment,
+/// motors 1 to 4, clock and data of the barometer's bus.
+#[test]
+fn boards_are_as_betaflight_describes_them() {
+    let tables: BTreeMap<_, _> = kinds().0.into_iter().collect();
+    let described = [
+        ("speedybee-f405-v3", ["PA6", "PA4", "CW0"], ["PB6", "PB7", "PB8", "PB9"], ["PB10", "PB11"]),
+        ("speedybee-f405-v4", ["PA6", "PA4", "CW90"], ["PB6", "PB7", "PB0", "PB1"], ["PB8", "PB9"]),
+        ("speedybee-f405-mini", ["PA6", "PA4", "CW270"], ["PB6", "PB7", "PB1", "PB0"], ["PB8", "PB9"]),
+        ("matek-f405-se", ["PA6", "PA4", "CW270"], ["PB7", "PB6", "PB0", "PB1"], ["PB8", "PB9"]),
+        ("matek-f405-std", ["PA6", "PC2", "CW180"], ["PC6", "PC7", "PC8", "PC9"], ["PB6", "PB7"]),
+        ("kakute-f4-v2", ["PA6", "PC4", "CW270"], ["PB0", "PB1", "PA3", "PA2"], ["PB8", "PB9"]),
+    ];
+    assert_eq!(tables.len(), described.len());
+    for (name, gyroscope, motors, bus) in described {
+        let table = &tables[&root().join("boards").join(name)];
+        assert_eq!([&*table.imu.into, &table.imu.select, &table.imu.alignment], gyroscope, "{name}");
+        assert_eq!([&*table.imu.clock, &table.imu.out], ["PA5", "PA7"], "{name}");
+        for (number, pin) in (1..).zip(motors) {
+            assert!(table.motors().any(|motor| motor.number == number && motor.pin == pin), "{name}: motor {number}");
+        }
+        assert_eq!([&*table.i2c.clock, &table.i2c.data], bus, "{name}");
+        assert_eq!((table.crystal_hz, table.numbering.as_str()), (8_000_000, "BETAFLIGHT"), "{name}");
+    }
+}
+
+const BEGIN: &str = "<!-- wiring: written by WRITE=1 cargo test -p flight-tests --test boards -->\n";
+const END: &str = "<!-- end -->";
+
+#[test]
+fn every_board_that_is_a_table_has_its_page() {
+    for (board, table) in kinds().0 {
+        let name = board.file_name().unwrap().to_str().unwrap();
+        let path = root().join("docs/boards").join(name).with_extension("md");
+        let page = fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+        let (head, rest) = page.split_once(BEGIN).unwrap();
+        let (_, tail) = rest.split_once(END).unwrap();
+        let wired = format!("{head}{BEGIN}{}{END}{tail}", wiring(&table));
+        if std::env::var_os("WRITE").is_some() {
+            fs::write(&path, &wired).unwrap();
+        }
+        assert_eq!(fs::read_to_string(&path).unwrap(), wired, "run WRITE=1 cargo test -p flight-tests --test boards");
+        assert!(page.contains(&format!("cargo xtask fw {name}")), "{}", path.display());
     }
 }

@@ -156,7 +156,10 @@ mod tests {
             assert!(read(wrong).is_err(), "{wrong}");
         }
         let error = read("fw stm32f1").expect_err("unknown");
-        assert!(error.contains("stm32f1") && error.contains("emulated, stm32f405, stm32h743"), "{error}");
+        assert!(
+            error.contains("stm32f1") && error.contains("emulated, ") && error.contains("stm32f405, stm32h743"),
+            "{error}"
+        );
         assert!(read("fw emulated --run").expect("read").run().is_err());
     }
 }

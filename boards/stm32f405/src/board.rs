@@ -10,7 +10,7 @@
 //! | sensors | none yet, so no alignment: the state comes over the link |
 
 use chip_stm32::link::{self, Receiver, Transmitter};
-use chip_stm32::motors::{CHANNELS, Motors, Throttles, hold_low};
+use chip_stm32::motors::{CHANNELS, Motors, Throttles, hold_low, pin};
 use chip_stm32::{crystal, faults, watchdog};
 use chip_stm32f4::{clocks, reset};
 use embassy_executor::SendSpawner;
@@ -67,7 +67,7 @@ impl Board for Stm32f405 {
         let link = link::new(uart.expect("the baud rate divides the clock"));
         interrupt::USART1.set_priority(Priority::from(priority::UART));
 
-        let motors = Motors::new(p.TIM8, p.PC6, p.PC7, p.PC8, p.PC9, p.DMA2_CH1, Irqs);
+        let motors = Motors::new(p.TIM8, pin(p.PC6), pin(p.PC7), pin(p.PC8), pin(p.PC9), p.DMA2_CH1, Irqs);
         interrupt::DMA2_STREAM1.set_priority(Priority::from(priority::MOTOR_DMA));
         control.spawn(self::motors(motors).expect("spawned once"));
 

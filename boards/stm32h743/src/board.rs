@@ -21,7 +21,7 @@ use afbc_drivers::icm426xx::{Icm42605, Icm42688p};
 use afbc_drivers::qmc5883l::Qmc5883l;
 use afbc_drivers::{Driver, I2cRegisters, SensorPart, SpiRegisters};
 use chip_stm32::link::{self, Receiver, Transmitter};
-use chip_stm32::motors::{CHANNELS, Motors, Throttles, hold_low};
+use chip_stm32::motors::{CHANNELS, Motors, Throttles, hold_low, pin};
 use chip_stm32::sensors::{Device, Polled};
 use chip_stm32::{crystal, faults, watchdog};
 use chip_stm32h7::flash::Words;
@@ -145,9 +145,9 @@ impl Board for Stm32h743 {
         }
         interrupt::USART2.set_priority(Priority::from(priority::UART));
 
-        let motors = Motors::new(p.TIM5, p.PA0, p.PA1, p.PA2, p.PA3, p.DMA1_CH0, Irqs);
+        let motors = Motors::new(p.TIM5, pin(p.PA0), pin(p.PA1), pin(p.PA2), pin(p.PA3), p.DMA1_CH0, Irqs);
         control.spawn(motors_1_to_4(motors).expect("spawned once"));
-        let motors = Motors::new(p.TIM4, p.PD12, p.PD13, p.PD14, p.PD15, p.DMA1_CH1, Irqs);
+        let motors = Motors::new(p.TIM4, pin(p.PD12), pin(p.PD13), pin(p.PD14), pin(p.PD15), p.DMA1_CH1, Irqs);
         control.spawn(motors_5_to_8(motors).expect("spawned once"));
         interrupt::DMA1_STREAM0.set_priority(Priority::from(priority::MOTOR_DMA));
         interrupt::DMA1_STREAM1.set_priority(Priority::from(priority::MOTOR_DMA));

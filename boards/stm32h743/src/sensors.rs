@@ -1,24 +1,19 @@
-//! The sensors of the Matek H743. Both IMUs face down; their axes, and the compass's, are turned to the body's (x
-//! forward, y left, z up) here.
+//! The sensors of the Matek H743. Both IMUs face down, the first turned by 180 degrees, the second by 270; their axes,
+//! and the compass's, are turned to the body's (x forward, y left, z up) here.
 
+use afbc_drivers::alignment::{CW0_FLIP, CW90_FLIP, turned};
 use afbc_drivers::dps310::Dps310;
 use afbc_drivers::icm426xx::{Icm42605, Icm42688p};
 use afbc_drivers::qmc5883l::Qmc5883l;
-use afbc_drivers::{Driver, I2cRegisters, InertialReading, SpiRegisters};
+use afbc_drivers::{Driver, I2cRegisters, SpiRegisters};
 use chip_stm32::receiver;
-use chip_stm32::sensors::{Device, Polled, run};
+use chip_stm32::sensors::{COMPASS, Device, Polled, run};
 use embassy_futures::join::{join, join3};
 use embassy_stm32::i2c::{I2c, Master};
 use embassy_stm32::mode::Async;
 use embassy_stm32::usart::BufferedUart;
 use firmware::samples::Sampler;
 use firmware::{aux_sensors, samples};
-use nalgebra::{Matrix3, Vector3};
-
-/// From the first IMU's axes, turned by 180 degrees, to the body's.
-const FIRST: Matrix3<f32> = Matrix3::new(-1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, -1.0);
-/// From the second IMU's axes, turned by 270 degrees.
-const SECOND: Matrix3<f32> = Matrix3::new(0.0, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, -1.0);
 
 /// A bus of sensors.
 type Bus = I2c<'static, Async, Master>;
@@ -32,20 +27,12 @@ pub(crate) struct Imus {
 impl Sampler for Imus {
     async fn run(self) {
         join(
-            run(self.first, |reading| samples::put_first_imu(reading.at_us, turned(&reading.value, &FIRST))),
-            run(self.second, |reading| samples::put_second_imu(reading.at_us, turned(&reading.value, &SECOND))),
+            run(self.first, |reading| samples::put_first_imu(reading.at_us, turned(&reading.value, &CW0_FLIP))),
+            run(self.second, |reading| samples::put_second_imu(reading.at_us, turned(&reading.value, &CW90_FLIP))),
         )
         .await;
     }
 }
-
-/// Returns rates and specific force in the body's axes.
-fn turned(reading: &InertialReading, to_body: &Matrix3<f32>) -> [Vector3<f32>; 2] {
-    [reading.rates_rad_s, reading.specific_force_m_s2].map(|value| to_body * value)
-}
-
-/// From the axes of the compass beside the receiver, which faces down and is turned by 90 degrees.
-const COMPASS: Matrix3<f32> = Matrix3::new(0.0, -1.0, 0.0, -1.0, 0.0, 0.0, 0.0, 0.0, -1.0);
 
 /// The slow sensors.
 pub(crate) struct Aids {

@@ -1,11 +1,13 @@
 //! What boards of all STM32 share. A chip's name is a feature of `embassy-stm32` that the board sets.
 #![no_std]
 
+pub mod candidates;
 pub mod crystal;
 pub mod faults;
 pub mod link;
 pub mod motors;
 pub mod receiver;
+pub mod sensor_set;
 pub mod sensors;
 
 use embassy_stm32::Peri;

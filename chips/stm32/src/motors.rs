@@ -1,8 +1,9 @@
-//! DSHOT600 on the four channels of a timer, sent by DMA. A board has a timer, and a task that [runs](Motors::run) it,
-//! for every four motors.
+//! DSHOT600 on up to four channels of a timer, sent by DMA. A board has one timer or more for its motors, each with a
+//! task that [runs](Motors::run) it.
+
+pub use afbc_flight_core::numbering::{self, rotors_of_outputs};
 
 use afbc_flight_core::dshot::{BIT_RATE_HZ, Timing};
-use core::ops::RangeInclusive;
 use embassy_stm32::dma::word::Word;
 use embassy_stm32::dma::{self, ChannelInstance};
 use embassy_stm32::gpio::OutputType;
@@ -12,13 +13,13 @@ use embassy_stm32::pac::gpio::vals::Moder;
 use embassy_stm32::time::Hertz;
 use embassy_stm32::timer::low_level::CountingMode;
 use embassy_stm32::timer::simple_pwm::{PwmPin, SimplePwm};
-use embassy_stm32::timer::{Ch1, Ch2, Ch3, Ch4, Channel, GeneralInstance4Channel, TimerPin, UpDma};
+use embassy_stm32::timer::{Ch1, Ch2, Ch3, Ch4, Channel, GeneralInstance4Channel, TimerChannel, TimerPin, UpDma};
 use embassy_stm32::{Peri, rcc};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
 use embassy_time::{Instant, with_deadline};
 
-/// Motors of a timer.
+/// Most motors of a timer.
 pub const CHANNELS: usize = 4;
 /// Longest transfer of a frame to the motors before it is aborted \[us\].
 const TRANSFER_MAX_US: u64 = 2_000;
@@ -26,11 +27,13 @@ const TRANSFER_MAX_US: u64 = 2_000;
 /// Newest throttles of a timer's motors, for its task: 0, or 48 to 2047; 0 where there is no motor.
 pub type Throttles = Signal<CriticalSectionRawMutex, [u16; CHANNELS]>;
 
-/// The waveform, with a row for each bit and a column for each motor. A DMA burst of four columns must not cross 1 KiB.
+/// The waveform, with a row for each bit and a column for each channel. A DMA burst of four columns must not cross
+/// 1 KiB.
 #[repr(align(16))]
 struct Rows<W>([[W; CHANNELS]; 17]);
 
-/// Four motors. `W` is `u16`, or `u32` on a timer of 32 bits: a narrower store would fill both halves of its register.
+/// Motors of a timer. `W` is `u16`, or `u32` on a timer of 32 bits: a narrower store would fill both halves of its
+/// register.
 pub struct Motors<T: GeneralInstance4Channel, D: UpDma<T>, I, W> {
     pwm: SimplePwm<'static, T>,
     dma: Peri<'static, D>,
@@ -46,29 +49,21 @@ where
     I: Binding<D::Interrupt, dma::InterruptHandler<D>> + Copy,
     W: Word + From<u16> + Into<T::Word>,
 {
-    /// Sets up a timer and its pins, low. To be called at the start.
+    /// Sets up a timer and its pins, low; a channel without a [`pin`] is none. To be called at the start.
     ///
     /// # Panics
     /// If the timer's clock is out of DSHOT's range.
     pub fn new(
         timer: Peri<'static, T>,
-        first: Peri<'static, impl TimerPin<T, Ch1>>,
-        second: Peri<'static, impl TimerPin<T, Ch2>>,
-        third: Peri<'static, impl TimerPin<T, Ch3>>,
-        fourth: Peri<'static, impl TimerPin<T, Ch4>>,
+        first: Option<PwmPin<'static, T, Ch1>>,
+        second: Option<PwmPin<'static, T, Ch2>>,
+        third: Option<PwmPin<'static, T, Ch3>>,
+        fourth: Option<PwmPin<'static, T, Ch4>>,
         dma: Peri<'static, D>,
         irqs: I,
     ) -> Self {
-        let pin = OutputType::PushPull;
-        let pwm = SimplePwm::new(
-            timer,
-            Some(PwmPin::new(first, pin)),
-            Some(PwmPin::new(second, pin)),
-            Some(PwmPin::new(third, pin)),
-            Some(PwmPin::new(fourth, pin)),
-            Hertz(BIT_RATE_HZ),
-            CountingMode::EdgeAlignedUp,
-        );
+        let counting = CountingMode::EdgeAlignedUp;
+        let pwm = SimplePwm::new(timer, first, second, third, fourth, Hertz(BIT_RATE_HZ), counting);
         // Not `expect`: to print the error would take a tenth of the flash.
         let Ok(timing) = Timing::new(rcc::frequency::<T>().0) else { panic!("the timer's clock is out of range") };
         Motors { pwm, dma, irqs, timing, rows: Rows([[W::from(0); CHANNELS]; 17]) }
@@ -96,14 +91,31 @@ where
     }
 }
 
-/// Encodes a frame for each motor. Out of line, like the control tick, to be counted.
+/// The output of a motor on a channel, low.
+pub fn pin<T: GeneralInstance4Channel, C: TimerChannel>(
+    pin: Peri<'static, impl TimerPin<T, C>>,
+) -> Option<PwmPin<'static, T, C>> {
+    Some(PwmPin::new(pin, OutputType::PushPull))
+}
+
+/// Returns what the outputs send, each for the rotor with its index in `rotors`; 0 if the vehicle does not have it.
+pub fn of_outputs<const OUTPUTS: usize>(rotors: &[usize; OUTPUTS], throttles: &[u16]) -> [u16; OUTPUTS] {
+    rotors.map(|rotor| throttles.get(rotor).copied().unwrap_or(0))
+}
+
+/// Returns what the channels of a timer send: what the outputs with these numbers do, 0 for the number 0.
+pub fn of_channels(motors: [usize; CHANNELS], outputs: &[u16]) -> [u16; CHANNELS] {
+    motors.map(|motor| motor.checked_sub(1).and_then(|at| outputs.get(at)).copied().unwrap_or(0))
+}
+
+/// Encodes a frame for each channel. Out of line, like the control tick, to be counted.
 #[inline(never)]
 fn encode<W: Copy + From<u16>>(timing: &Timing, throttles: [u16; CHANNELS], rows: &mut Rows<W>) {
     timing.rows(throttles, &mut rows.0);
 }
 
 /// Holds pins of a port low, whatever state the program is in. Motor controllers then stop by themselves.
-pub fn hold_low(port: Gpio, pins: RangeInclusive<usize>) {
+pub fn hold_low(port: Gpio, pins: impl IntoIterator<Item = usize>) {
     // They become plain outputs, whose output register is 0 since start-up.
-    port.moder().modify(|mode| pins.for_each(|pin| mode.set_moder(pin, Moder::OUTPUT)));
+    port.moder().modify(|mode| pins.into_iter().for_each(|pin| mode.set_moder(pin, Moder::OUTPUT)));
 }

@@ -1,5 +1,6 @@
 //! Buses and clock of sensors.
 
+use afbc_drivers::alignment::CW270_FLIP;
 use afbc_drivers::{Driver, PartFault, PartTiming, Registers, SensorPart};
 use afbc_types::Stamped;
 use embassy_stm32::gpio::{Level, Output, Pin, Speed};
@@ -8,8 +9,14 @@ use embassy_stm32::spi::mode::Master;
 use embassy_stm32::spi::{self, MODE_3, Spi};
 use embassy_stm32::time::Hertz;
 use embassy_stm32::{Peri, i2c};
+use embassy_sync::blocking_mutex::raw::NoopRawMutex;
+use embassy_sync::mutex::Mutex;
 use embassy_time::{Duration, Instant, Timer};
 use embedded_hal_async::spi::{ErrorType, Operation, SpiDevice};
+use nalgebra::Matrix3;
+
+/// Alignment of the compass beside a receiver, which faces down and is turned by 270 degrees in the usual module.
+pub const COMPASS: Matrix3<f32> = CW270_FLIP;
 
 /// A part that is alone on its SPI.
 pub struct Device {
@@ -22,6 +29,17 @@ impl Device {
     pub fn new(spi: Spi<'static, Async, Master>, select: Peri<'static, impl Pin>) -> Self {
         Device { spi, select: Output::new(select, Level::High, Speed::VeryHigh) }
     }
+
+    /// Sets the fastest clock of an SPI fed with `kernel_hz` that is not above `most_hz`.
+    pub fn set_clock(&mut self, kernel_hz: u32, most_hz: u32) {
+        // Nothing can be wrong with it.
+        let _ = self.spi.set_config(&spi(divided(kernel_hz, most_hz)));
+    }
+}
+
+/// Returns the fastest clock that a prescaler of 2, 4 ... 256 makes of `kernel_hz`, not above `most_hz` if possible.
+fn divided(kernel_hz: u32, most_hz: u32) -> u32 {
+    (1..8).map(|power| kernel_hz >> power).find(|hz| *hz <= most_hz).unwrap_or(kernel_hz >> 8)
 }
 
 /// A part's select pin while it is low; a transfer that is given up ends it too.
@@ -39,18 +57,73 @@ impl ErrorType for Device {
 
 impl SpiDevice for Device {
     async fn transaction(&mut self, operations: &mut [Operation<'_, u8>]) -> Result<(), spi::Error> {
-        self.select.set_low();
-        let _selected = Selected(&mut self.select);
-        for operation in operations {
-            match operation {
-                Operation::Read(into) => self.spi.read(into).await?,
-                Operation::Write(bytes) => self.spi.write(bytes).await?,
-                Operation::Transfer(into, bytes) => self.spi.transfer(into, bytes).await?,
-                Operation::TransferInPlace(bytes) => self.spi.transfer_in_place(bytes).await?,
-                Operation::DelayNs(ns) => Timer::after(Duration::from_micros(u64::from(*ns).div_ceil(1000))).await,
-            }
+        operate(&mut self.spi, &mut self.select, operations).await
+    }
+}
+
+/// An SPI that several parts of one task share.
+pub type SharedSpi = Mutex<NoopRawMutex, Spi<'static, Async, Master>>;
+
+/// A part that shares its SPI.
+pub struct SharedDevice<'a> {
+    spi: &'a SharedSpi,
+    select: Output<'static>,
+    config: spi::Config,
+}
+
+impl<'a> SharedDevice<'a> {
+    /// The part behind a select pin; all such pins must be high before the first transfer. Its clock is the fastest of
+    /// an SPI fed with `kernel_hz` that is not above `most_hz`.
+    pub fn new(spi: &'a SharedSpi, select: Output<'static>, kernel_hz: u32, most_hz: u32) -> Self {
+        SharedDevice { spi, select, config: self::spi(divided(kernel_hz, most_hz)) }
+    }
+}
+
+impl ErrorType for SharedDevice<'_> {
+    type Error = spi::Error;
+}
+
+impl SpiDevice for SharedDevice<'_> {
+    async fn transaction(&mut self, operations: &mut [Operation<'_, u8>]) -> Result<(), spi::Error> {
+        let mut spi = self.spi.lock().await;
+        // Nothing can be wrong with it.
+        let _ = spi.set_config(&self.config);
+        operate(&mut spi, &mut self.select, operations).await
+    }
+}
+
+/// Transfers, with the select pin low meanwhile.
+async fn operate(
+    spi: &mut Spi<'static, Async, Master>,
+    select: &mut Output<'static>,
+    operations: &mut [Operation<'_, u8>],
+) -> Result<(), spi::Error> {
+    select.set_low();
+    let _selected = Selected(select);
+    for operation in operations {
+        match operation {
+            Operation::Read(into) => spi.read(into).await?,
+            Operation::Write(bytes) => spi.write(bytes).await?,
+            Operation::Transfer(into, bytes) => spi.transfer(into, bytes).await?,
+            Operation::TransferInPlace(bytes) => spi.transfer_in_place(bytes).await?,
+            Operation::DelayNs(ns) => Timer::after(Duration::from_micros(u64::from(*ns).div_ceil(1000))).await,
         }
-        Ok(())
+    }
+    Ok(())
+}
+
+/// Reads a part as [`run`] does if it answers; returns if its first reading fails.
+pub async fn run_if_it_answers<P: SensorPart, B: Registers, T: PartTiming>(
+    mut driver: Driver<P, B, T>,
+    mut take: impl FnMut(Stamped<P::Reading>),
+) {
+    match driver.reading().await {
+        Ok(reading) => {
+            defmt::info!("{=str}: works", P::NAME);
+            take(reading);
+            run(driver, take).await;
+        }
+        Err(fault) => defmt::warn!("{=str}: {}", P::NAME, defmt::Display2Format(&fault)),
     }
 }
 

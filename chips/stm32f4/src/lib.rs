@@ -3,4 +3,5 @@
 #![no_std]
 
 pub mod clocks;
+mod flight_controller;
 pub mod reset;

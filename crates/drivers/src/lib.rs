@@ -20,14 +20,16 @@
 //! |---|---|
 //! | IMU | [`bmi270`], [`icm426xx`], [`mpu`] |
 //! | IMU and magnetometer | [`ak8963`] |
-//! | barometer | [`bmp3`], [`dps310`], [`ms5611`] |
+//! | barometer | [`bmp280`], [`bmp3`], [`dps310`], [`ms5611`] |
 //! | magnetometer | [`ist8310`], [`lis3mdl`], [`qmc5883l`] |
 //! | GNSS receiver | [`nmea`] |
 #![no_std]
 #![forbid(unsafe_code)]
 
 pub mod ak8963;
+pub mod alignment;
 pub mod bmi270;
+pub mod bmp280;
 pub mod bmp3;
 mod bus;
 pub mod dps310;

@@ -3,6 +3,7 @@
 #![allow(clippy::expect_used, clippy::panic, clippy::indexing_slicing, reason = "tests")]
 
 use afbc_drivers::bmp3::{Bmp388, Bmp390};
+use afbc_drivers::bmp280::Bmp280;
 use afbc_drivers::dps310::{Dps310, Spl06};
 use afbc_drivers::ist8310::Ist8310;
 use afbc_drivers::lis3mdl::Lis3mdl;
@@ -56,6 +57,7 @@ proptest! {
     fn any_answers_are_survived(
         dps310 in answers::<Dps310>(),
         bmp388 in answers::<Bmp388>(),
+        bmp280 in answers::<Bmp280>(),
         ms5611 in answers::<Ms5611>(),
         qmc5883l in answers::<Qmc5883l>(),
         ist8310 in answers::<Ist8310>(),
@@ -65,6 +67,7 @@ proptest! {
         pressures(&give(&mut Spl06::default(), &dps310), [30_000.0, 120_000.0]);
         pressures(&give(&mut Bmp388::default(), &bmp388), [30_000.0, 125_000.0]);
         pressures(&give(&mut Bmp390::default(), &bmp388), [30_000.0, 125_000.0]);
+        pressures(&give(&mut Bmp280::default(), &bmp280), [30_000.0, 110_000.0]);
         pressures(&give(&mut Ms5611::default(), &ms5611), [1_000.0, 120_000.0]);
         fields(&give(&mut Qmc5883l, &qmc5883l), [800.0; 3]);
         fields(&give(&mut Ist8310, &ist8310), [1_600.0, 1_600.0, 2_480.0]);
@@ -85,6 +88,13 @@ proptest! {
         }
         let answers: Vec<_> = raw.iter().map(|(raw, _)| (0x00, raw.to_vec())).collect();
         pressures(&give(&mut part, &answers), [30_000.0, 120_000.0]);
+
+        let mut part = Bmp280::default();
+        for _ in 0..2 {
+            prop_assert_eq!(part.take(0x88, &[&coefficients[..], &trim[..6]].concat()), Ok(None));
+        }
+        let answers: Vec<_> = raw.iter().map(|(raw, _)| (0xF7, raw.to_vec())).collect();
+        pressures(&give(&mut part, &answers), [30_000.0, 110_000.0]);
 
         let mut part = Bmp388::default();
         with_checksum(&mut part, 0x30, &mut trim, 0, 0xFF);

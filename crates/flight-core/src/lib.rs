@@ -26,6 +26,7 @@ pub mod frozen_tracker;
 pub mod inbox;
 pub mod landing;
 pub mod motor;
+pub mod numbering;
 pub mod observer;
 pub mod rate;
 pub mod reasons;

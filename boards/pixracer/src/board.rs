@@ -1,0 +1,217 @@
+//! Pixracer, with an STM32F427VI; `docs/boards/pixracer.md` shows the wiring.
+//!
+//! | what | where |
+//! |---|---|
+//! | crystal | 24 MHz on PH0, PH1 |
+//! | first link (TELEM1) | USART2: TX on PD5, RX on PD6 |
+//! | second link (TELEM2) | USART3: TX on PD8, RX on PD9 |
+//! | motors 1 to 4 | TIM1, channels 4 to 1: PE14, PE13, PE11, PE9; driven by DMA2's stream 5 |
+//! | motors 5 and 6 | TIM4, channels 2 and 3: PD13, PD14; driven by DMA1's stream 6 |
+//! | memory | `memory.x` beside this folder |
+//! | parameters | sectors 1 and 2 of the flash |
+//! | SPI of IMUs and compass | SPI1: SCK on PA5, MISO on PA6, MOSI on PA7 |
+//! | first IMU | ICM-20608-G, select PC15 |
+//! | second IMU | MPU-9250, select PC2 |
+//! | compass | LIS3MDL, select PE15 |
+//! | barometer | MS5611 on SPI2: SCK on PB10, MISO on PB14, MOSI on PB15, select PD7; with a memory, select PD10 |
+//! | compass, outside | QMC5883L on I2C1: SCL on PB8, SDA on PB9 |
+//! | GNSS receiver, outside | NMEA on UART4: TX on PA0, RX on PA1 |
+//! | supply of the sensors | PE3, on if high |
+
+use crate::sensors::{Aids, Inside};
+use afbc_drivers::ms5611::Ms5611;
+use afbc_drivers::qmc5883l::Qmc5883l;
+use afbc_drivers::{Driver, I2cRegisters, SensorPart, SpiRegisters};
+use chip_stm32::link::{self, Receiver, Transmitter};
+use chip_stm32::motors::{Motors, Throttles, hold_low, numbering, of_channels, of_outputs, pin, rotors_of_outputs};
+use chip_stm32::sensors::{Device, Polled};
+use chip_stm32::{crystal, faults, watchdog};
+use chip_stm32f4::{clocks, reset};
+use embassy_executor::SendSpawner;
+use embassy_stm32::flash::{Bank1Region1, Blocking, Flash};
+use embassy_stm32::gpio::{Level, Output, Speed};
+use embassy_stm32::i2c::{self, I2c};
+use embassy_stm32::interrupt::{Interrupt, InterruptExt, Priority};
+use embassy_stm32::peripherals::{
+    DMA1_CH0, DMA1_CH3, DMA1_CH4, DMA1_CH6, DMA1_CH7, DMA2_CH0, DMA2_CH3, DMA2_CH5, I2C1, IWDG, SPI1, SPI2, TIM1, TIM4,
+    UART4, USART2, USART3,
+};
+use embassy_stm32::spi::Spi;
+use embassy_stm32::usart::{self, BufferedUart};
+use embassy_stm32::wdg::IndependentWatchdog;
+use embassy_stm32::{bind_interrupts, dma, pac, rcc};
+use firmware::board::{Board, BoardLink, Parts};
+use firmware::executors::priority;
+use firmware::vehicle::{CONFIGURATION, ROTORS};
+use static_cell::StaticCell;
+
+/// The crystal \[Hz\].
+const CRYSTAL_HZ: u32 = 24_000_000;
+/// Motors: four channels of one timer, two of another.
+const OUTPUTS: usize = 6;
+/// Motor of each channel, from 1.
+const CHANNELS_OF_TIM1: [usize; 4] = [4, 3, 2, 1];
+const CHANNELS_OF_TIM4: [usize; 4] = [0, 5, 6, 0];
+
+bind_interrupts!(struct Irqs {
+    USART2 => usart::BufferedInterruptHandler<USART2>;
+    USART3 => usart::BufferedInterruptHandler<USART3>;
+    UART4 => usart::BufferedInterruptHandler<UART4>;
+    DMA2_STREAM0 => dma::InterruptHandler<DMA2_CH0>;
+    DMA2_STREAM3 => dma::InterruptHandler<DMA2_CH3>;
+    DMA1_STREAM3 => dma::InterruptHandler<DMA1_CH3>;
+    DMA1_STREAM4 => dma::InterruptHandler<DMA1_CH4>;
+    I2C1_EV => i2c::EventInterruptHandler<I2C1>;
+    I2C1_ER => i2c::ErrorInterruptHandler<I2C1>;
+    DMA1_STREAM0 => dma::InterruptHandler<DMA1_CH0>;
+    DMA1_STREAM7 => dma::InterruptHandler<DMA1_CH7>;
+    DMA2_STREAM5 => dma::InterruptHandler<DMA2_CH5>;
+    DMA1_STREAM6 => dma::InterruptHandler<DMA1_CH6>;
+});
+
+/// Each interrupt with its priority.
+const PRIORITIES: [(Interrupt, u8); 13] = [
+    (Interrupt::USART2, priority::UART),
+    (Interrupt::USART3, priority::UART),
+    (Interrupt::UART4, priority::UART),
+    (Interrupt::DMA2_STREAM0, priority::SAMPLING),
+    (Interrupt::DMA2_STREAM3, priority::SAMPLING),
+    (Interrupt::DMA1_STREAM3, priority::AIDING),
+    (Interrupt::DMA1_STREAM4, priority::AIDING),
+    (Interrupt::I2C1_EV, priority::AIDING),
+    (Interrupt::I2C1_ER, priority::AIDING),
+    (Interrupt::DMA1_STREAM0, priority::AIDING),
+    (Interrupt::DMA1_STREAM7, priority::AIDING),
+    (Interrupt::DMA2_STREAM5, priority::MOTOR_DMA),
+    (Interrupt::DMA1_STREAM6, priority::MOTOR_DMA),
+];
+
+/// Ring buffers of the links, and of the receiver, which is told nothing.
+static RX: [StaticCell<[u8; 1024]>; 3] = [const { StaticCell::new() }; 3];
+static TX: [StaticCell<[u8; 1024]>; 2] = [const { StaticCell::new() }; 2];
+static GNSS_TX: StaticCell<[u8; 16]> = StaticCell::new();
+
+/// Newest throttles, for the motors' tasks.
+static THROTTLES: [Throttles; 2] = [const { Throttles::new() }; 2];
+
+/// The board after start-up.
+pub(crate) struct Pixracer {
+    watchdog: IndependentWatchdog<'static, IWDG>,
+    /// Index of the rotor of each output.
+    rotors: [usize; OUTPUTS],
+    /// Held as they are: the sensors' supply on, the memory on the barometer's SPI not selected.
+    _held: [Output<'static>; 2],
+}
+
+impl Board for Pixracer {
+    type Interrupt = pac::Interrupt;
+    type Sampler = Inside;
+    type Aids = Aids;
+    type Links = [BoardLink<Receiver, Transmitter>; 2];
+    type Memory = Bank1Region1<'static, Blocking>;
+    const CORE_HZ: u32 = clocks::CORE_HZ;
+    /// Sectors 1 and 2, of 16 KiB each (`memory.x`).
+    const STORE: u32 = 16 * 1024;
+    const OUTPUTS: usize = OUTPUTS;
+
+    fn start(_core: &mut cortex_m::Peripherals, control: SendSpawner) -> Parts<Self> {
+        let p = clocks::start::<CRYSTAL_HZ>();
+        reset::log();
+        for (line, priority) in PRIORITIES {
+            line.set_priority(Priority::from(priority));
+        }
+        // The sensors have their supply before a line to them is high.
+        let supply = Output::new(p.PE3, Level::High, Speed::Low);
+        let memory = Output::new(p.PD10, Level::High, Speed::Low);
+
+        let [tx, tx2] = TX.each_ref().map(|ring| ring.init([0; 1024]));
+        let [rx, rx2, rx3] = RX.each_ref().map(|ring| ring.init([0; 1024]));
+        let first = BufferedUart::new(p.USART2, p.PD6, p.PD5, tx, rx, Irqs, link::config());
+        let second = BufferedUart::new(p.USART3, p.PD9, p.PD8, tx2, rx2, Irqs, link::config());
+        let links = [first, second].map(|uart| link::new(uart.expect("the baud rate divides the clock")));
+        let tx = GNSS_TX.init([0; 16]);
+        let receiver = BufferedUart::new(p.UART4, p.PA1, p.PA0, tx, rx3, Irqs, usart::Config::default());
+
+        let kernel_hz = rcc::frequency::<SPI1>().0;
+        let config = chip_stm32::sensors::spi(kernel_hz / 256);
+        let spi = Spi::new(p.SPI1, p.PA5, p.PA7, p.PA6, p.DMA2_CH3, p.DMA2_CH0, Irqs, config);
+        let selects = [
+            Output::new(p.PC15, Level::High, Speed::Medium),
+            Output::new(p.PC2, Level::High, Speed::VeryHigh),
+            Output::new(p.PE15, Level::High, Speed::VeryHigh),
+        ];
+        let sampler = Inside { spi, kernel_hz, selects };
+
+        let kernel_hz = rcc::frequency::<SPI2>().0;
+        let config = chip_stm32::sensors::spi(kernel_hz / 256);
+        let spi = Spi::new(p.SPI2, p.PB10, p.PB15, p.PB14, p.DMA1_CH4, p.DMA1_CH3, Irqs, config);
+        let format = Ms5611::SPI.expect("a part on SPI");
+        let mut barometer = Device::new(spi, p.PD7);
+        barometer.set_clock(kernel_hz, format.clock_hz);
+        let config = chip_stm32::sensors::i2c();
+        let outside = I2c::new(p.I2C1, p.PB8, p.PB9, p.DMA1_CH7, p.DMA1_CH0, Irqs, config);
+        let aids = Aids {
+            barometer: Driver::new(Ms5611::default(), SpiRegisters::new(barometer, format), Polled),
+            compass: Driver::new(Qmc5883l, I2cRegisters::new(outside, 0x0D), Polled),
+            receiver: receiver.expect("the baud rate divides the clock"),
+        };
+
+        let motors = Motors::new(p.TIM1, pin(p.PE9), pin(p.PE11), pin(p.PE13), pin(p.PE14), p.DMA2_CH5, Irqs);
+        control.spawn(motors_1_to_4(motors).expect("spawned once"));
+        let motors = Motors::new(p.TIM4, None, pin(p.PD13), pin(p.PD14), None, p.DMA1_CH6, Irqs);
+        control.spawn(motors_5_and_6(motors).expect("spawned once"));
+
+        // A debugger that halts the core halts the watchdog.
+        pac::DBGMCU.apb1fzr().modify(|freeze| freeze.set_iwdg(true));
+        let rotors = rotors_of_outputs(numbering::ARDUPILOT, &CONFIGURATION.airframe.rotors);
+        Parts {
+            board: Pixracer { watchdog: watchdog(p.IWDG), rotors, _held: [supply, memory] },
+            sampler,
+            aids,
+            links,
+            memory: Flash::new_blocking(p.FLASH).into_blocking_regions().bank1_region1,
+        }
+    }
+
+    fn unleash_watchdog(&mut self) {
+        self.watchdog.unleash();
+    }
+
+    /// True if the crystal has failed and the chip's own oscillator has taken over.
+    fn clock_has_failed(&self) -> bool {
+        crystal::has_failed()
+    }
+
+    fn task_has_failed(&self) -> bool {
+        faults::task_has_failed()
+    }
+
+    fn drive(&mut self, throttles: [u16; ROTORS]) {
+        let outputs = of_outputs(&self.rotors, &throttles);
+        let [main, auxiliary] = &THROTTLES;
+        main.signal(of_channels(CHANNELS_OF_TIM1, &outputs));
+        auxiliary.signal(of_channels(CHANNELS_OF_TIM4, &outputs));
+    }
+
+    fn feed_watchdog(&mut self) {
+        self.watchdog.pet();
+    }
+}
+
+#[embassy_executor::task]
+async fn motors_1_to_4(mut motors: Motors<TIM1, DMA2_CH5, Irqs, u16>) {
+    let [throttles, _] = &THROTTLES;
+    motors.run(throttles).await
+}
+
+#[embassy_executor::task]
+async fn motors_5_and_6(mut motors: Motors<TIM4, DMA1_CH6, Irqs, u16>) {
+    let [_, throttles] = &THROTTLES;
+    motors.run(throttles).await
+}
+
+/// Stops the motors' signals, whatever state the program is in.
+pub(crate) fn stop_motors() {
+    hold_low(pac::GPIOE, [9, 11, 13, 14]);
+    hold_low(pac::GPIOD, [13, 14]);
+}

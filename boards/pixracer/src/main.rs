@@ -1,0 +1,15 @@
+//! The image that flies, on a Pixracer. Its pins and timers are in [`board`].
+#![no_std]
+#![no_main]
+
+mod board;
+mod sensors;
+
+use defmt_rtt as _;
+
+// The interrupt lines of CAN1 and CAN2, which this firmware does not need.
+firmware::image!(
+    board::Pixracer, control: CAN2_TX, comms: CAN2_RX0, housekeeping: CAN2_RX1, sampling: CAN1_TX,
+    aiding: CAN1_RX0
+);
+chip_stm32::faults!(board::stop_motors);

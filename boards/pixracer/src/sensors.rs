@@ -1,0 +1,84 @@
+//! The sensors of a Pixracer. IMUs and compass face down; their x points forward.
+
+use afbc_drivers::alignment::{CW180_FLIP, turned};
+use afbc_drivers::lis3mdl::Lis3mdl;
+use afbc_drivers::mpu::{Icm20608, Mpu9250};
+use afbc_drivers::ms5611::Ms5611;
+use afbc_drivers::qmc5883l::Qmc5883l;
+use afbc_drivers::{Driver, I2cRegisters, SensorPart, SpiRegisters};
+use chip_stm32::receiver;
+use chip_stm32::sensors::{COMPASS, Device, Polled, SharedDevice, SharedSpi, run};
+use core::sync::atomic::{AtomicBool, Ordering};
+use embassy_futures::join::join3;
+use embassy_stm32::gpio::Output;
+use embassy_stm32::i2c::{I2c, Master};
+use embassy_stm32::mode::Async;
+use embassy_stm32::spi::{self, Spi};
+use embassy_stm32::usart::BufferedUart;
+use firmware::samples::Sampler;
+use firmware::{aux_sensors, samples};
+
+/// True once a compass outside has been read: then the one inside, beside the currents, is not used.
+static IS_COMPASS_OUTSIDE: AtomicBool = AtomicBool::new(false);
+
+/// The inertial sensors and the compass inside, on one SPI.
+pub(crate) struct Inside {
+    pub(crate) spi: Spi<'static, Async, spi::mode::Master>,
+    pub(crate) kernel_hz: u32,
+    /// Select pins of ICM-20608-G, MPU-9250 and LIS3MDL.
+    pub(crate) selects: [Output<'static>; 3],
+}
+
+impl Sampler for Inside {
+    async fn run(self) {
+        let spi = SharedSpi::new(self.spi);
+        let [first, second, compass] = self.selects;
+        // The first one's turn comes first in every control period.
+        join3(
+            run(driver(Icm20608 {}, &spi, first, self.kernel_hz), |reading| {
+                samples::put_first_imu(reading.at_us, turned(&reading.value, &CW180_FLIP));
+            }),
+            run(driver(Mpu9250 {}, &spi, second, self.kernel_hz), |reading| {
+                samples::put_second_imu(reading.at_us, turned(&reading.value, &CW180_FLIP));
+            }),
+            run(driver(Lis3mdl {}, &spi, compass, self.kernel_hz), |reading| {
+                if !IS_COMPASS_OUTSIDE.load(Ordering::Relaxed) {
+                    aux_sensors::put_field(&reading, &CW180_FLIP);
+                }
+            }),
+        )
+        .await;
+    }
+}
+
+/// A part on the shared SPI, which is fed with `kernel_hz`.
+fn driver<'a, P: SensorPart>(
+    part: P,
+    spi: &'a SharedSpi,
+    select: Output<'static>,
+    kernel_hz: u32,
+) -> Driver<P, SpiRegisters<SharedDevice<'a>>, Polled> {
+    let format = P::SPI.expect("a part on SPI");
+    Driver::new(part, SpiRegisters::new(SharedDevice::new(spi, select, kernel_hz, format.clock_hz), format), Polled)
+}
+
+/// The slow sensors.
+pub(crate) struct Aids {
+    pub(crate) barometer: Driver<Ms5611, SpiRegisters<Device>, Polled>,
+    pub(crate) compass: Driver<Qmc5883l, I2cRegisters<I2c<'static, Async, Master>>, Polled>,
+    pub(crate) receiver: BufferedUart<'static>,
+}
+
+impl Sampler for Aids {
+    async fn run(self) {
+        join3(
+            run(self.barometer, |reading| aux_sensors::put_pressure(&reading)),
+            run(self.compass, |reading| {
+                IS_COMPASS_OUTSIDE.store(true, Ordering::Relaxed);
+                aux_sensors::put_field(&reading, &COMPASS);
+            }),
+            receiver::run(self.receiver, aux_sensors::put_fix),
+        )
+        .await;
+    }
+}

@@ -1,0 +1,24 @@
+//! SpeedyBee F405 Mini; `docs/boards/speedybee-f405-mini.md` shows the wiring.
+
+use afbc_drivers::dps310::Dps310;
+use afbc_drivers::icm426xx::Icm42688p;
+
+chip_stm32f4::flight_controller! {
+    crystal_hz: 8_000_000,
+    link: USART3 { tx: PC10, rx: PC11 },
+    gnss: USART6 { tx: PC6, rx: PC7 },
+    imu: SPI1 {
+        clock: PA5, out: PA7, in: PA6, select: PA4,
+        dma: DMA2_CH3 by DMA2_STREAM3, DMA2_CH0 by DMA2_STREAM0,
+        parts: (Icm42688p<true>,), alignment: CW270
+    },
+    i2c: I2C1 {
+        clock: PB8, data: PB9, interrupts: I2C1_EV, I2C1_ER,
+        dma: DMA1_CH7 by DMA1_STREAM7, DMA1_CH0 by DMA1_STREAM0,
+        barometer: (Dps310,)
+    },
+    motors: 4 as BETAFLIGHT {
+        first: TIM4<u16>, DMA1_CH6 by DMA1_STREAM6 { (PB6: GPIOB 6, motor 1), (PB7: GPIOB 7, motor 2), (), () },
+        second: TIM3<u16>, DMA1_CH2 by DMA1_STREAM2 { (), (), (PB0: GPIOB 0, motor 4), (PB1: GPIOB 1, motor 3) },
+    },
+}

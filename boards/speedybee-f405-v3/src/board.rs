@@ -1,0 +1,26 @@
+//! SpeedyBee F405 V3; `docs/boards/speedybee-f405-v3.md` shows the wiring.
+
+use afbc_drivers::bmi270::Bmi270;
+use afbc_drivers::dps310::Spl06;
+
+chip_stm32f4::flight_controller! {
+    crystal_hz: 8_000_000,
+    link: USART3 { tx: PC10, rx: PC11 },
+    gnss: USART6 { tx: PC6, rx: PC7 },
+    imu: SPI1 {
+        clock: PA5, out: PA7, in: PA6, select: PA4,
+        dma: DMA2_CH3 by DMA2_STREAM3, DMA2_CH0 by DMA2_STREAM0,
+        parts: (Bmi270,), alignment: CW0
+    },
+    i2c: I2C2 {
+        clock: PB10, data: PB11, interrupts: I2C2_EV, I2C2_ER,
+        dma: DMA1_CH7 by DMA1_STREAM7, DMA1_CH3 by DMA1_STREAM3,
+        barometer: (Spl06,)
+    },
+    motors: 4 as BETAFLIGHT {
+        first: TIM4<u16>, DMA1_CH6 by DMA1_STREAM6 {
+            (PB6: GPIOB 6, motor 1), (PB7: GPIOB 7, motor 2), (PB8: GPIOB 8, motor 3),
+            (PB9: GPIOB 9, motor 4)
+        },
+    },
+}

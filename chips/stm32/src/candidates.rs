@@ -1,0 +1,69 @@
+//! Parts of which a board has one: boards are sold with one or another, on the same pins. They are tried in turn until
+//! one answers, which is then read for ever.
+
+use crate::sensors::{Device, Polled, run_if_it_answers};
+use afbc_drivers::{Driver, I2cRegisters, InertialReading, PressureReading, SensorPart, SpiRegisters};
+use afbc_types::Stamped;
+use embassy_time::Timer;
+use embedded_hal_async::i2c::I2c;
+
+/// Pause after each part has been tried \[s\].
+const PAUSE_S: u64 = 1;
+
+/// IMUs on SPI: a tuple of parts.
+#[allow(async_fn_in_trait, reason = "used generically, never boxed")]
+pub trait ImuCandidates {
+    /// Reads the one that is there, by an SPI that is fed with `kernel_hz`.
+    async fn run(device: &mut Device, kernel_hz: u32, take: impl FnMut(Stamped<InertialReading>));
+}
+
+/// Barometers on I2C, at any of their addresses: a tuple of parts, which is empty if the board has none.
+#[allow(async_fn_in_trait, reason = "used generically, never boxed")]
+pub trait BarometerCandidates {
+    /// Reads the one that is there.
+    async fn run(bus: impl I2c + Clone, take: impl FnMut(Stamped<PressureReading>));
+}
+
+macro_rules! candidates {
+    ($($part:ident),+) => {
+        impl<$($part: SensorPart<Reading = InertialReading> + Default),+> ImuCandidates for ($($part,)+) {
+            async fn run(device: &mut Device, kernel_hz: u32, mut take: impl FnMut(Stamped<InertialReading>)) {
+                loop {
+                    $(
+                        if let Some(format) = $part::SPI {
+                            device.set_clock(kernel_hz, format.clock_hz);
+                            let registers = SpiRegisters::new(&mut *device, format);
+                            run_if_it_answers(Driver::new($part::default(), registers, Polled), &mut take).await;
+                        }
+                    )+
+                    Timer::after_secs(PAUSE_S).await;
+                }
+            }
+        }
+
+        impl<$($part: SensorPart<Reading = PressureReading> + Default),+> BarometerCandidates for ($($part,)+) {
+            async fn run(bus: impl I2c + Clone, mut take: impl FnMut(Stamped<PressureReading>)) {
+                loop {
+                    $(
+                        for address in $part::I2C {
+                            let registers = I2cRegisters::new(bus.clone(), *address);
+                            run_if_it_answers(Driver::new($part::default(), registers, Polled), &mut take).await;
+                        }
+                    )+
+                    Timer::after_secs(PAUSE_S).await;
+                }
+            }
+        }
+    };
+}
+
+candidates!(A);
+candidates!(A, B);
+candidates!(A, B, C);
+candidates!(A, B, C, D);
+candidates!(A, B, C, D, E);
+candidates!(A, B, C, D, E, F);
+
+impl BarometerCandidates for () {
+    async fn run(_bus: impl I2c + Clone, _take: impl FnMut(Stamped<PressureReading>)) {}
+}

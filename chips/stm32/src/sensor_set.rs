@@ -1,0 +1,76 @@
+//! The sensors of a usual flight controller: an IMU alone on an SPI; barometer, and compass outside, on one I2C; a GNSS
+//! receiver outside.
+
+use crate::candidates::{BarometerCandidates, ImuCandidates};
+use crate::receiver;
+use crate::sensors::{COMPASS, Device, Polled, run};
+use afbc_drivers::alignment::turned;
+use afbc_drivers::qmc5883l::Qmc5883l;
+use afbc_drivers::{Driver, I2cRegisters};
+use core::marker::PhantomData;
+use embassy_embedded_hal::shared_bus::asynch::i2c::I2cDevice;
+use embassy_futures::join::join3;
+use embassy_stm32::i2c::{I2c, Master};
+use embassy_stm32::mode::Async;
+use embassy_stm32::usart::BufferedUart;
+use embassy_sync::blocking_mutex::raw::NoopRawMutex;
+use embassy_sync::mutex::Mutex;
+use firmware::samples::{SampleTime, SampleValue, Sampler};
+use firmware::{aux_sensors, samples};
+use nalgebra::Matrix3;
+
+/// The address of a QMC5883L.
+const COMPASS_ADDRESS: u8 = 0x0D;
+
+/// An IMU, one of `P`.
+pub struct Imu<P> {
+    device: Device,
+    kernel_hz: u32,
+    to_body: Matrix3<f32>,
+    parts: PhantomData<P>,
+}
+
+impl<P> Imu<P> {
+    /// The IMU on an SPI that is fed with `kernel_hz`, whose axes `to_body` turns into the body's.
+    pub fn new(device: Device, kernel_hz: u32, to_body: Matrix3<f32>) -> Self {
+        Imu { device, kernel_hz, to_body, parts: PhantomData }
+    }
+}
+
+impl<P: ImuCandidates> Sampler for Imu<P> {
+    async fn run(mut self) {
+        let Imu { device, kernel_hz, to_body, .. } = &mut self;
+        P::run(device, *kernel_hz, |reading| {
+            let value = SampleValue::Imu(turned(&reading.value, to_body));
+            samples::put(SampleTime::At(reading.at_us), value);
+        })
+        .await;
+    }
+}
+
+/// The slow sensors, with a barometer of `P`.
+pub struct SlowSensors<P> {
+    bus: I2c<'static, Async, Master>,
+    receiver: BufferedUart<'static>,
+    parts: PhantomData<P>,
+}
+
+impl<P> SlowSensors<P> {
+    /// Barometer and compass on `bus`, and a receiver.
+    pub fn new(bus: I2c<'static, Async, Master>, receiver: BufferedUart<'static>) -> Self {
+        SlowSensors { bus, receiver, parts: PhantomData }
+    }
+}
+
+impl<P: BarometerCandidates> Sampler for SlowSensors<P> {
+    async fn run(self) {
+        let bus = Mutex::<NoopRawMutex, _>::new(self.bus);
+        let compass = I2cRegisters::new(I2cDevice::new(&bus), COMPASS_ADDRESS);
+        join3(
+            P::run(I2cDevice::new(&bus), |reading| aux_sensors::put_pressure(&reading)),
+            run(Driver::new(Qmc5883l, compass, Polled), |reading| aux_sensors::put_field(&reading, &COMPASS)),
+            receiver::run(self.receiver, aux_sensors::put_fix),
+        )
+        .await;
+    }
+}

@@ -1,0 +1,205 @@
+//! A usual flight controller by a table of its pins.
+
+/// Implements [`Board`](firmware::board::Board) for `FlightController`, a usual flight controller with a STM32F405 or a
+/// relative, and defines `stop_motors`. The crate names all of its dependencies.
+///
+/// * Each peripheral has its DMA's streams, as `DMA1_CH6` for stream 6, with their interrupts.
+/// * IMU and barometer are [candidates](chip_stm32::candidates): the one that answers is read. How the IMU sits is one
+///   of `afbc_drivers::alignment`.
+/// * Motors are so many, numbered as [`numbering`](chip_stm32::motors::numbering) has it. They have a line for each
+///   timer, with the type of its registers, the stream of its updates, and what its channels 1 to 4 drive: the pin, the
+///   same again as port and number, and the number of the motor.
+///
+/// The compiler checks that a pin belongs to the peripheral, and a stream to the direction; that nothing is used twice;
+/// and, when it links, that no interrupt has two handlers. Priorities follow from what an interrupt is for.
+#[macro_export]
+macro_rules! flight_controller {
+    (
+        crystal_hz: $crystal_hz:literal,
+        link: $link:ident { tx: $link_tx:ident, rx: $link_rx:ident },
+        gnss: $gnss:ident { tx: $gnss_tx:ident, rx: $gnss_rx:ident },
+        imu: $spi:ident {
+            clock: $sck:ident, out: $mosi:ident, in: $miso:ident, select: $select:ident,
+            dma: $spi_tx:ident by $spi_tx_line:ident, $spi_rx:ident by $spi_rx_line:ident,
+            parts: $imu:ty, alignment: $alignment:ident
+        },
+        i2c: $i2c:ident {
+            clock: $scl:ident, data: $sda:ident, interrupts: $event:ident, $error:ident,
+            dma: $i2c_tx:ident by $i2c_tx_line:ident, $i2c_rx:ident by $i2c_rx_line:ident,
+            barometer: $barometer:ty
+        },
+        motors: $outputs:literal as $numbering:ident {
+            $($task:ident: $timer:ident<$word:ty>, $dma:ident by $line:ident { $($channel:tt),+ },)+
+        },
+    ) => {
+        use embassy_stm32::interrupt::{self, InterruptExt, Priority};
+        use embassy_stm32::{i2c, pac, peripherals, usart};
+
+        embassy_stm32::bind_interrupts!(struct Irqs {
+            $link => usart::BufferedInterruptHandler<peripherals::$link>;
+            $gnss => usart::BufferedInterruptHandler<peripherals::$gnss>;
+            $spi_tx_line => embassy_stm32::dma::InterruptHandler<peripherals::$spi_tx>;
+            $spi_rx_line => embassy_stm32::dma::InterruptHandler<peripherals::$spi_rx>;
+            $event => i2c::EventInterruptHandler<peripherals::$i2c>;
+            $error => i2c::ErrorInterruptHandler<peripherals::$i2c>;
+            $i2c_tx_line => embassy_stm32::dma::InterruptHandler<peripherals::$i2c_tx>;
+            $i2c_rx_line => embassy_stm32::dma::InterruptHandler<peripherals::$i2c_rx>;
+            $($line => embassy_stm32::dma::InterruptHandler<peripherals::$dma>;)+
+        });
+
+        /// Each interrupt with its priority.
+        const PRIORITIES: &[(interrupt::Interrupt, u8)] = {
+            use firmware::executors::priority;
+            use interrupt::Interrupt;
+            &[
+                (Interrupt::$link, priority::UART),
+                (Interrupt::$gnss, priority::UART),
+                (Interrupt::$spi_tx_line, priority::SAMPLING),
+                (Interrupt::$spi_rx_line, priority::SAMPLING),
+                (Interrupt::$event, priority::AIDING),
+                (Interrupt::$error, priority::AIDING),
+                (Interrupt::$i2c_tx_line, priority::AIDING),
+                (Interrupt::$i2c_rx_line, priority::AIDING),
+                $((Interrupt::$line, priority::MOTOR_DMA),)+
+            ]
+        };
+
+        /// The board after start-up.
+        pub(crate) struct FlightController {
+            watchdog: embassy_stm32::wdg::IndependentWatchdog<'static, peripherals::IWDG>,
+            /// Index of the rotor of each output.
+            rotors: [usize; $outputs],
+        }
+
+        impl firmware::board::Board for FlightController {
+            type Interrupt = pac::Interrupt;
+            type Sampler = chip_stm32::sensor_set::Imu<$imu>;
+            type Aids = chip_stm32::sensor_set::SlowSensors<$barometer>;
+            type Links = [firmware::board::BoardLink<chip_stm32::link::Receiver, chip_stm32::link::Transmitter>; 1];
+            type Memory = embassy_stm32::flash::Bank1Region1<'static, embassy_stm32::flash::Blocking>;
+            const CORE_HZ: u32 = chip_stm32f4::clocks::CORE_HZ;
+            /// Sectors 1 and 2, of 16 KiB each (`memory.x`).
+            const STORE: u32 = 16 * 1024;
+            const OUTPUTS: usize = $outputs;
+
+            fn start(
+                _core: &mut cortex_m::Peripherals,
+                control: embassy_executor::SendSpawner,
+            ) -> firmware::board::Parts<Self> {
+                use embassy_stm32::usart::BufferedUart;
+                use static_cell::StaticCell;
+
+                // Ring buffers: of the link, and of the receiver, which is told nothing.
+                static RINGS: [StaticCell<[u8; 1024]>; 2] = [const { StaticCell::new() }; 2];
+                static GNSS_RX: StaticCell<[u8; 512]> = StaticCell::new();
+                static GNSS_TX: StaticCell<[u8; 16]> = StaticCell::new();
+
+                let p = chip_stm32f4::clocks::start::<$crystal_hz>();
+                chip_stm32f4::reset::log();
+                for (line, priority) in PRIORITIES {
+                    line.set_priority(Priority::from(*priority));
+                }
+
+                let [tx, rx] = RINGS.each_ref().map(|ring| ring.init([0; 1024]));
+                let config = chip_stm32::link::config();
+                let link = BufferedUart::new(p.$link, p.$link_rx, p.$link_tx, tx, rx, Irqs, config);
+                let (tx, rx) = (GNSS_TX.init([0; 16]), GNSS_RX.init([0; 512]));
+                let config = usart::Config::default();
+                let gnss = BufferedUart::new(p.$gnss, p.$gnss_rx, p.$gnss_tx, tx, rx, Irqs, config);
+
+                let kernel_hz = embassy_stm32::rcc::frequency::<peripherals::$spi>().0;
+                let config = chip_stm32::sensors::spi(kernel_hz / 256);
+                let spi = embassy_stm32::spi::Spi::new(
+                    p.$spi, p.$sck, p.$mosi, p.$miso, p.$spi_tx, p.$spi_rx, Irqs, config,
+                );
+                let device = chip_stm32::sensors::Device::new(spi, p.$select);
+                let config = chip_stm32::sensors::i2c();
+                let bus = i2c::I2c::new(p.$i2c, p.$scl, p.$sda, p.$i2c_tx, p.$i2c_rx, Irqs, config);
+
+                $(
+                    let motors = chip_stm32f4::flight_controller!(@motors p, $timer, $dma, $($channel),+);
+                    control.spawn($task::run(motors).expect("spawned once"));
+                )+
+
+                // A debugger that halts the core halts the watchdog.
+                pac::DBGMCU.apb1fzr().modify(|freeze| freeze.set_iwdg(true));
+                let rotors = chip_stm32::motors::rotors_of_outputs(
+                    chip_stm32::motors::numbering::$numbering,
+                    &firmware::vehicle::CONFIGURATION.airframe.rotors,
+                );
+                firmware::board::Parts {
+                    board: FlightController { watchdog: chip_stm32::watchdog(p.IWDG), rotors },
+                    sampler: chip_stm32::sensor_set::Imu::new(device, kernel_hz, afbc_drivers::alignment::$alignment),
+                    aids: chip_stm32::sensor_set::SlowSensors::new(bus, gnss.expect("the baud rate divides the clock")),
+                    links: [chip_stm32::link::new(link.expect("the baud rate divides the clock"))],
+                    memory: embassy_stm32::flash::Flash::new_blocking(p.FLASH).into_blocking_regions().bank1_region1,
+                }
+            }
+
+            fn unleash_watchdog(&mut self) {
+                self.watchdog.unleash();
+            }
+
+            /// True if the crystal has failed and the chip's own oscillator has taken over.
+            fn clock_has_failed(&self) -> bool {
+                chip_stm32::crystal::has_failed()
+            }
+
+            fn task_has_failed(&self) -> bool {
+                chip_stm32::faults::task_has_failed()
+            }
+
+            fn drive(&mut self, throttles: [u16; firmware::vehicle::ROTORS]) {
+                let throttles = chip_stm32::motors::of_outputs(&self.rotors, &throttles);
+                $(
+                    let motors = [$(chip_stm32f4::flight_controller!(@motor $channel)),+];
+                    $task::THROTTLES.signal(chip_stm32::motors::of_channels(motors, &throttles));
+                )+
+            }
+
+            fn feed_watchdog(&mut self) {
+                self.watchdog.pet();
+            }
+        }
+
+        $(
+            mod $task {
+                use embassy_stm32::peripherals::{$dma, $timer};
+
+                /// Newest throttles, for the task.
+                pub(super) static THROTTLES: chip_stm32::motors::Throttles = chip_stm32::motors::Throttles::new();
+
+                #[embassy_executor::task]
+                pub(super) async fn run(mut motors: chip_stm32::motors::Motors<$timer, $dma, super::Irqs, $word>) {
+                    motors.run(&THROTTLES).await
+                }
+            }
+        )+
+
+        /// Stops the motors' signals, whatever state the program is in.
+        pub(crate) fn stop_motors() {
+            $($(chip_stm32f4::flight_controller!(@stop $channel);)+)+
+        }
+    };
+    (@motors $p:ident, $timer:ident, $dma:ident, $first:tt, $second:tt, $third:tt, $fourth:tt) => {
+        chip_stm32::motors::Motors::new(
+            $p.$timer,
+            chip_stm32f4::flight_controller!(@pin $p, $first),
+            chip_stm32f4::flight_controller!(@pin $p, $second),
+            chip_stm32f4::flight_controller!(@pin $p, $third),
+            chip_stm32f4::flight_controller!(@pin $p, $fourth),
+            $p.$dma,
+            Irqs,
+        )
+    };
+    (@pin $p:ident, ()) => { None };
+    (@pin $p:ident, ($pin:ident: $port:ident $number:literal, motor $motor:literal)) => {
+        chip_stm32::motors::pin($p.$pin)
+    };
+    (@motor ()) => { 0 };
+    (@motor ($pin:ident: $port:ident $number:literal, motor $motor:literal)) => { $motor };
+    (@stop ()) => {};
+    (@stop ($pin:ident: $port:ident $number:literal, motor $motor:literal)) => {
+        chip_stm32::motors::hold_low(pac::$port, [$number])
+    };
+}

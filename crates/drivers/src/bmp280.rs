@@ -1,0 +1,140 @@
+//! Bosch BMP280, by I2C (BST-BMP280-DS001).
+//!
+//! 300 to 1100 hPa and -40 to 85 degrees C, some 40 times a second: a temperature of one sample and a pressure of 8,
+//! without the part's own filter. It has no interrupt and no flag of a new reading, so each is ordered (forced mode).
+//! The coefficients have no checksum, so they are read twice. What is set stays set but for one register, which is read
+//! in each cycle: after a reset it reads differently.
+//!
+//! By SPI, a write clears the highest bit of its register's address, which [`SpiFormat`] cannot say.
+
+use crate::bus::SpiFormat;
+use crate::part::{PartFault, SensorPart, Step};
+use crate::reading::{PressureReading, in_range};
+
+/// The part.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Bmp280 {
+    /// The coefficients as they were read last.
+    raw: [u8; CALIBRATION_LENGTH],
+    /// What they mean, if they were read twice alike.
+    coefficients: Option<Coefficients>,
+}
+
+/// As the data sheet's table 17 names them.
+#[derive(Clone, Copy, Debug)]
+struct Coefficients {
+    t1: f32,
+    t2: f32,
+    t3: f32,
+    p1: f32,
+    p2: f32,
+    p3: f32,
+    p4: f32,
+    p5: f32,
+    p6: f32,
+    p7: f32,
+    p8: f32,
+    p9: f32,
+}
+
+/// dig_T1 to dig_P9.
+const CALIBRATION: u8 = 0x88;
+const CALIBRATION_LENGTH: usize = 24;
+const ID: u8 = 0xD0;
+const RESET: u8 = 0xE0;
+const STATUS: u8 = 0xF3;
+const CTRL_MEAS: u8 = 0xF4;
+const CONFIG: u8 = 0xF5;
+const PRESS_MSB: u8 = 0xF7;
+
+const IDENTITY: u8 = 0x58;
+const SOFT_RESET: u8 = 0xB6;
+/// Bits of STATUS: it measures, it copies its calibration.
+const MEASURING: u8 = 0x08;
+const IM_UPDATE: u8 = 0x01;
+/// Temperature once, pressure 8 times, now.
+const FORCED: u8 = 0b0011_0001;
+/// Filter off. The pause between measurements, which are ordered here, means nothing: it tells that the part was reset.
+const CONFIG_VALUE: u8 = 0b0010_0000;
+/// Longest measurement: 1.25 + 2.3 + 8 * 2.3 + 0.575 ms (section 3.8.1).
+const MEASUREMENT_US: u32 = 22_600;
+/// What has not been measured reads.
+const SKIPPED: u32 = 0x80000;
+const RANGE_PA: [f32; 2] = [30_000.0, 110_000.0];
+const RANGE_C: [f32; 2] = [-40.0, 85.0];
+
+impl SensorPart for Bmp280 {
+    type Reading = PressureReading;
+    const NAME: &'static str = "BMP280";
+    const SPI: Option<SpiFormat> = None;
+    const I2C: &'static [u8] = &[0x76, 0x77];
+    const STUCK_AFTER: u32 = 20;
+    const SETUP: &'static [Step] = &[
+        Step::Write(RESET, SOFT_RESET),
+        Step::Wait(3_000), // 2 ms, and some
+        Step::Identify(ID, &[IDENTITY]),
+        Step::Await(STATUS, IM_UPDATE, 0, 10),
+        Step::Read(CALIBRATION, CALIBRATION_LENGTH),
+        Step::Read(CALIBRATION, CALIBRATION_LENGTH),
+        Step::Set(CONFIG, CONFIG_VALUE),
+    ];
+    const CYCLE: &'static [Step] = &[
+        Step::Write(CTRL_MEAS, FORCED),
+        Step::Wait(MEASUREMENT_US),
+        Step::Await(STATUS, MEASURING, 0, 5),
+        Step::Await(CONFIG, 0xFF, CONFIG_VALUE, 0), // not reset
+        Step::Read(PRESS_MSB, 6),
+    ];
+
+    fn take(&mut self, register: u8, answer: &[u8]) -> Result<Option<PressureReading>, PartFault> {
+        if register == CALIBRATION {
+            let answer = answer.try_into().map_err(|_| PartFault::Bus)?;
+            self.coefficients = (self.raw == answer).then(|| Coefficients::new(answer));
+            self.raw = answer;
+            return Ok(None);
+        }
+        let &[p2, p1, p0, t2, t1, t0] = answer else { return Err(PartFault::Bus) };
+        let coefficients = self.coefficients.ok_or(PartFault::Calibration)?;
+        let raw = [[0, p2, p1, p0], [0, t2, t1, t0]].map(|raw| u32::from_be_bytes(raw) >> 4);
+        if raw.contains(&SKIPPED) {
+            return Err(PartFault::Late);
+        }
+        let [pressure, temperature] = raw.map(|raw| raw as f32);
+        in_range(coefficients.compensate(pressure, temperature), RANGE_PA, RANGE_C)
+    }
+}
+
+impl Coefficients {
+    fn new(raw: [u8; CALIBRATION_LENGTH]) -> Self {
+        let [a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p, q, r, s, t, u, v, w, x] = raw;
+        let word = |low, high| f32::from(u16::from_le_bytes([low, high]));
+        let signed = |low, high| f32::from(i16::from_le_bytes([low, high]));
+        Coefficients {
+            t1: word(a, b),
+            t2: signed(c, d),
+            t3: signed(e, f),
+            p1: word(g, h),
+            p2: signed(i, j),
+            p3: signed(k, l),
+            p4: signed(m, n),
+            p5: signed(o, p),
+            p6: signed(q, r),
+            p7: signed(s, t),
+            p8: signed(u, v),
+            p9: signed(w, x),
+        }
+    }
+
+    /// Section 8.1, with the powers of 2 gathered. A `p1` of 0 gives no number, which is out of range.
+    fn compensate(&self, pressure: f32, temperature: f32) -> PressureReading {
+        let Coefficients { t1, t2, t3, p1, p2, p3, p4, p5, p6, p7, p8, p9 } = *self;
+        let above = temperature / 16_384.0 - t1 / 1_024.0;
+        let fine = above * t2 + above * above * t3 / 64.0;
+        let warm = fine / 2.0 - 64_000.0;
+        let offset = (warm * (warm * (p6 / 32_768.0) + p5 * 2.0) / 4.0 + p4 * 65_536.0) / 4_096.0;
+        let slope = (1.0 + warm * (warm * (p3 / 524_288.0) + p2) / 524_288.0 / 32_768.0) * p1;
+        let plain = (1_048_576.0 - pressure - offset) * 6_250.0 / slope;
+        let bend = (plain * (plain * (p9 / 2_147_483_648.0) + p8 / 32_768.0) + p7) / 16.0;
+        PressureReading { pressure_pa: plain + bend, temperature_c: fine / 5_120.0 }
+    }
+}

@@ -1,0 +1,7 @@
+//! Boards that are a table (`chip_stm32f4::flight_controller!`): reading it, and its page's table of wires.
+
+mod page;
+mod read;
+
+pub(crate) use page::wiring;
+pub(crate) use read::{BoardTable, Motor, Stream, Timer};

@@ -1,0 +1,87 @@
+//! The table of wires on a board's page.
+
+use super::{BoardTable, Stream};
+use std::fmt::Write;
+
+/// Returns the table.
+pub(crate) fn wiring(board: &BoardTable) -> String {
+    let BoardTable { link, gnss, imu, i2c, .. } = board;
+    let mut rows = vec![
+        [format!("crystal, {} MHz", board.crystal_hz / 1_000_000), "PH0, PH1".to_owned(), "HSE".to_owned()],
+        [
+            "link: out (TX), in (RX)".to_owned(),
+            format!("{}, {}", link.tx, link.rx),
+            format!("{}, 921,600 baud, 8N1, 3.3 V", link.name),
+        ],
+        [
+            "IMU: clock, in, out, select".to_owned(),
+            [&*imu.clock, &imu.into, &imu.out, &imu.select].join(", "),
+            format!("{} on {}, {}; `{}`", names(&imu.parts), imu.name, streams(&imu.streams), imu.alignment),
+        ],
+        [
+            "barometer: clock, data".to_owned(),
+            format!("{}, {}", i2c.clock, i2c.data),
+            format!("{} on {}, 400 kHz, {}", names(&i2c.barometers), i2c.name, streams(&i2c.streams)),
+        ],
+        ["compass, outside".to_owned(), "the same".to_owned(), "QMC5883L at 0x0D".to_owned()],
+        [
+            "GNSS receiver, outside: out, in".to_owned(),
+            format!("{}, {}", gnss.tx, gnss.rx),
+            format!("NMEA on {}", gnss.name),
+        ],
+    ];
+    let corners = match board.numbering.as_str() {
+        "BETAFLIGHT" => ["rear right", "front right", "rear left", "front left"],
+        "ARDUPILOT" => ["front right", "rear left", "front left", "rear right"],
+        other => panic!("{other}"),
+    };
+    let mut motors = Vec::new();
+    for timer in &board.timers {
+        for (channel, motor) in (1..).zip(&timer.channels) {
+            let Some(motor) = motor else { continue };
+            let corner = corners.get(motor.number - 1).unwrap();
+            motors.push([
+                format!("motor {}, {corner}", motor.number),
+                motor.pin.clone(),
+                format!(
+                    "{} channel {channel}, DSHOT600 by {}",
+                    timer.name,
+                    streams(std::slice::from_ref(&timer.stream))
+                ),
+            ]);
+        }
+    }
+    motors.sort();
+    rows.extend(motors);
+    rows.push(["debugger".to_owned(), "PA13, PA14".to_owned(), "SWDIO, SWCLK".to_owned()]);
+    let mut table = "| what | pin | peripheral |\n|---|---|---|\n".to_owned();
+    for row in rows {
+        writeln!(table, "| {} |", row.join(" | ")).unwrap();
+    }
+    table
+}
+
+/// Returns the names of parts as their makers write them.
+fn names(parts: &[String]) -> String {
+    let name = |part: &String| match part.as_str() {
+        "Bmi270" => "BMI270",
+        "Bmp280" => "BMP280",
+        "Dps310" => "DPS310",
+        "Icm20602" => "ICM-20602",
+        "Icm20689" => "ICM-20689",
+        "Icm42688p" => "ICM-42688-P",
+        "Mpu6000" => "MPU-6000",
+        "Mpu6500" => "MPU-6500",
+        "Spl06" => "SPL06-001",
+        other => panic!("{other}"),
+    };
+    parts.iter().map(name).collect::<Vec<_>>().join(" or ")
+}
+
+/// Returns streams as `DMA2 streams 3 and 0`.
+fn streams(streams: &[Stream]) -> String {
+    let parts: Vec<_> = streams.iter().map(|stream| stream.line.split_once("_STREAM").unwrap()).collect();
+    let numbers: Vec<_> = parts.iter().map(|(_, number)| *number).collect();
+    let plural = if parts.len() > 1 { "s" } else { "" };
+    format!("{} stream{plural} {}", parts[0].0, numbers.join(" and "))
+}

@@ -1,0 +1,242 @@
+//! Reads a board's table from its code.
+
+use proc_macro2::{Delimiter, TokenStream, TokenTree};
+use std::fs;
+use std::path::Path;
+
+/// A DMA stream by its peripheral (`DMA1_CH6`) and its interrupt (`DMA1_STREAM6`).
+#[derive(Debug, PartialEq, Eq)]
+pub(crate) struct Stream {
+    pub(crate) channel: String,
+    pub(crate) line: String,
+}
+
+/// A serial port.
+#[derive(Debug)]
+pub(crate) struct Uart {
+    pub(crate) name: String,
+    pub(crate) tx: String,
+    pub(crate) rx: String,
+}
+
+/// The IMU's bus.
+#[derive(Debug)]
+pub(crate) struct Spi {
+    pub(crate) name: String,
+    pub(crate) clock: String,
+    pub(crate) out: String,
+    pub(crate) into: String,
+    pub(crate) select: String,
+    /// Out, in.
+    pub(crate) streams: [Stream; 2],
+    pub(crate) parts: Vec<String>,
+    pub(crate) alignment: String,
+}
+
+/// The bus of barometer and compass.
+#[derive(Debug)]
+pub(crate) struct I2c {
+    pub(crate) name: String,
+    pub(crate) clock: String,
+    pub(crate) data: String,
+    /// Event, error.
+    pub(crate) lines: [String; 2],
+    /// Out, in.
+    pub(crate) streams: [Stream; 2],
+    pub(crate) barometers: Vec<String>,
+}
+
+/// What a channel of a timer drives.
+#[derive(Debug)]
+pub(crate) struct Motor {
+    pub(crate) pin: String,
+    pub(crate) port: String,
+    pub(crate) bit: String,
+    pub(crate) number: usize,
+}
+
+/// A timer of motors.
+#[derive(Debug)]
+pub(crate) struct Timer {
+    pub(crate) name: String,
+    pub(crate) word: String,
+    pub(crate) stream: Stream,
+    /// Channels 1 to 4.
+    pub(crate) channels: Vec<Option<Motor>>,
+}
+
+/// A board.
+#[derive(Debug)]
+pub(crate) struct BoardTable {
+    pub(crate) crystal_hz: u32,
+    pub(crate) link: Uart,
+    pub(crate) gnss: Uart,
+    pub(crate) imu: Spi,
+    pub(crate) i2c: I2c,
+    pub(crate) outputs: usize,
+    pub(crate) numbering: String,
+    pub(crate) timers: Vec<Timer>,
+}
+
+impl BoardTable {
+    /// Reads the table in a board's folder; none if it is code.
+    pub(crate) fn read(board: &Path) -> Option<Self> {
+        let text = fs::read_to_string(board.join("src/board.rs")).unwrap();
+        let file = syn::parse_file(&text).unwrap();
+        let tokens = file.items.into_iter().find_map(|item| match item {
+            syn::Item::Macro(item) if item.mac.path.segments.last().unwrap().ident == "flight_controller" => {
+                Some(item.mac.tokens)
+            }
+            _ => None,
+        })?;
+        let mut words = Words::of(tokens);
+        let crystal_hz = words.after("crystal_hz :").parse().unwrap();
+        let link = words.uart("link");
+        let gnss = words.uart("gnss");
+        let imu = Spi {
+            name: words.after("imu :"),
+            clock: words.after("{ clock :"),
+            out: words.after("out :"),
+            into: words.after("in :"),
+            select: words.after("select :"),
+            streams: words.streams(),
+            parts: words.parts("parts :"),
+            alignment: words.after("alignment :"),
+        };
+        words.expect("}");
+        let i2c = I2c {
+            name: words.after("i2c :"),
+            clock: words.after("{ clock :"),
+            data: words.after("data :"),
+            lines: [words.after("interrupts :"), words.after("")],
+            streams: words.streams(),
+            barometers: words.parts("barometer :"),
+        };
+        words.expect("}");
+        let outputs = words.after("motors :").parse().unwrap();
+        let numbering = words.after("as");
+        words.expect("{");
+        let mut timers = Vec::new();
+        while words.peek() != "}" {
+            words.after(""); // name of the task
+            let (name, word) = (words.after(":"), words.after("<"));
+            words.expect(">");
+            let stream = words.stream();
+            words.expect("{");
+            let channels = (0..4).map(|_| words.channel()).collect();
+            words.expect("}");
+            timers.push(Timer { name, word, stream, channels });
+        }
+        words.expect("}");
+        assert!(words.0.is_empty(), "{}: {:?}", board.display(), words.0);
+        Some(BoardTable { crystal_hz, link, gnss, imu, i2c, outputs, numbering, timers })
+    }
+
+    /// Returns the motors.
+    pub(crate) fn motors(&self) -> impl Iterator<Item = &Motor> {
+        self.timers.iter().flat_map(|timer| timer.channels.iter().flatten())
+    }
+
+    /// Returns the DMA streams.
+    pub(crate) fn streams(&self) -> Vec<&Stream> {
+        let buses = self.imu.streams.iter().chain(&self.i2c.streams);
+        buses.chain(self.timers.iter().map(|timer| &timer.stream)).collect()
+    }
+
+    /// Returns every pin that is used, once for each use.
+    pub(crate) fn pins(&self) -> Vec<&str> {
+        let uarts = [&self.link, &self.gnss].into_iter().flat_map(|uart| [&uart.tx, &uart.rx]);
+        let Spi { clock, out, into, select, .. } = &self.imu;
+        let buses = [clock, out, into, select, &self.i2c.clock, &self.i2c.data];
+        uarts.chain(buses).chain(self.motors().map(|motor| &motor.pin)).map(String::as_str).collect()
+    }
+}
+
+/// Words of a table, without commas, last one first.
+struct Words(Vec<String>);
+
+impl Words {
+    fn of(tokens: TokenStream) -> Self {
+        let mut words = flat(tokens);
+        words.reverse();
+        Words(words)
+    }
+
+    fn peek(&self) -> &str {
+        self.0.last().unwrap()
+    }
+
+    fn expect(&mut self, word: &str) {
+        assert_eq!(self.0.pop().as_deref(), Some(word), "before {:?}", self.0.iter().rev().take(8).collect::<Vec<_>>());
+    }
+
+    /// Returns the word after those of `key`.
+    fn after(&mut self, key: &str) -> String {
+        key.split_whitespace().for_each(|word| self.expect(word));
+        self.0.pop().unwrap()
+    }
+
+    fn uart(&mut self, key: &str) -> Uart {
+        let uart = Uart { name: self.after(&format!("{key} :")), tx: self.after("{ tx :"), rx: self.after("rx :") };
+        self.expect("}");
+        uart
+    }
+
+    fn stream(&mut self) -> Stream {
+        Stream { channel: self.after(""), line: self.after("by") }
+    }
+
+    fn streams(&mut self) -> [Stream; 2] {
+        self.expect("dma");
+        self.expect(":");
+        [self.stream(), self.stream()]
+    }
+
+    /// Returns the words of a tuple, without what is between angle brackets.
+    fn parts(&mut self, key: &str) -> Vec<String> {
+        let mut parts = Vec::new();
+        let mut word = self.after(&format!("{key} ("));
+        let mut depth = 0;
+        while word != ")" {
+            match word.as_str() {
+                "<" => depth += 1,
+                ">" => depth -= 1,
+                _ if depth == 0 => parts.push(word),
+                _ => (),
+            }
+            word = self.after("");
+        }
+        parts
+    }
+
+    fn channel(&mut self) -> Option<Motor> {
+        self.expect("(");
+        let motor = (self.peek() != ")").then(|| Motor {
+            pin: self.after(""),
+            port: self.after(":"),
+            bit: self.after(""),
+            number: self.after("motor").parse().unwrap(),
+        });
+        self.expect(")");
+        motor
+    }
+}
+
+/// Returns the words of tokens.
+fn flat(tokens: TokenStream) -> Vec<String> {
+    let words = |token: TokenTree| match token {
+        TokenTree::Group(group) => {
+            let (open, close) = match group.delimiter() {
+                Delimiter::Brace => ("{", "}"),
+                Delimiter::Parenthesis => ("(", ")"),
+                Delimiter::Bracket | Delimiter::None => ("[", "]"),
+            };
+            let inside = flat(group.stream());
+            [vec![open.to_owned()], inside, vec![close.to_owned()]].concat()
+        }
+        TokenTree::Punct(punct) if punct.as_char() == ',' => Vec::new(),
+        TokenTree::Literal(literal) => vec![literal.to_string().replace('_', "")],
+        token => vec![token.to_string()],
+    };
+    tokens.into_iter().flat_map(words).collect()
+}
