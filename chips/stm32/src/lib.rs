@@ -1,12 +1,14 @@
 //! What boards of all STM32 share. A chip's name is a feature of `embassy-stm32` that the board sets.
 #![no_std]
 
+pub mod boot_loader;
 pub mod crystal;
 pub mod faults;
 pub mod link;
 pub mod motors;
 pub mod receiver;
 pub mod sensors;
+pub mod usb;
 
 use embassy_stm32::Peri;
 use embassy_stm32::wdg::{self, IndependentWatchdog};

@@ -2,5 +2,6 @@
 //! `embassy-stm32` that the board sets.
 #![no_std]
 
+pub mod boot_loader;
 pub mod clocks;
 pub mod reset;
