@@ -8,12 +8,13 @@ use embassy_executor::SpawnToken;
 use embassy_futures::join::join3;
 use embassy_stm32::interrupt::typelevel::Binding;
 use embassy_stm32::interrupt::{Interrupt, InterruptExt, Priority};
+use embassy_stm32::pac::otg::regs::Gintsts;
 use embassy_stm32::peripherals::USB_OTG_FS;
 use embassy_stm32::usb::{Config, DmPin, DpPin, Driver, Instance, InterruptHandler};
 use embassy_stm32::{Peri, pac, rcc, uid};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::pipe::Pipe;
-use embassy_time::{Duration, with_timeout};
+use embassy_time::{Duration, Timer, with_timeout};
 use embassy_usb::Builder;
 use embassy_usb::class::cdc_acm::{self, CdcAcmClass};
 use firmware::board::BoardLink;
@@ -29,6 +30,8 @@ const PACKET_MAX: usize = 64;
 const SENT_MAX: usize = PACKET_MAX - 1;
 /// A host that has not read for this long gets newer bytes when it reads again.
 const STALLED: Duration = Duration::from_millis(100);
+/// Time from the start of the time base to that of USB.
+const START: Duration = Duration::from_millis(100);
 /// Identification of the cores that the driver knows; one that is not there reads 0.
 const CORES: [u32; 7] = [0x1000, 0x1100, 0x1200, 0x2000, 0x2100, 0x2300, 0x3100];
 
@@ -67,9 +70,11 @@ pub(crate) fn send(mut bytes: &[u8]) {
     }
 }
 
-/// Spawns the port's task from within its executor, where it need not be Send.
+/// Spawns the port's task from within its executor, where it need not be Send, when the vehicle runs already: nothing
+/// of USB may hold up its start.
 #[embassy_executor::task]
 async fn start(driver: Driver<'static, USB_OTG_FS>) {
+    Timer::after(START).await;
     executors::spawner().await.spawn(claim(driver));
 }
 
@@ -98,10 +103,12 @@ async fn port(driver: Driver<'static, USB_OTG_FS>) {
     join3(device.run(), pass_on(sender), take_in(receiver)).await;
 }
 
-/// True if the core is there: the driver would wait for it forever.
+/// True if the core is there, and clears flags by ones: the driver would wait forever for one that does not.
 fn answers() -> bool {
     rcc::enable_and_reset::<USB_OTG_FS>();
-    CORES.contains(&pac::USB_OTG_FS.cid().read().0)
+    let (core, ones) = (pac::USB_OTG_FS, Gintsts(u32::MAX));
+    core.gintsts().write_value(ones);
+    CORES.contains(&core.cid().read().0) && core.gintsts().read() != ones
 }
 
 /// Sends what the ring holds whenever a host is there.
