@@ -85,7 +85,7 @@ impl Board for Stm32f405 {
             board,
             sampler: NoSensors,
             aids: NoSensors,
-            links: [link, usb::new(p.USB_OTG_FS, p.PA12, p.PA11, Irqs)],
+            links: [link, link::of_usb(usb::start(p.USB_OTG_FS, p.PA12, p.PA11, Irqs))],
             memory: Flash::new_blocking(p.FLASH).into_blocking_regions().bank1_region1,
         }
     }

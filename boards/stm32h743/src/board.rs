@@ -125,7 +125,7 @@ impl Board for Stm32h743 {
         let first = BufferedUart::new(p.UART7, p.PE7, p.PE8, tx, rx, Irqs, link::config());
         let second = BufferedUart::new(p.USART1, p.PA10, p.PA9, tx2, rx2, Irqs, link::config());
         let [first, second] = [first, second].map(|uart| link::new(uart.expect("the baud rate divides the clock")));
-        let links = [first, second, usb::new(p.USB_OTG_FS, p.PA12, p.PA11, Irqs)];
+        let links = [first, second, link::of_usb(usb::start(p.USB_OTG_FS, p.PA12, p.PA11, Irqs))];
         interrupt::UART7.set_priority(Priority::from(priority::UART));
         interrupt::USART1.set_priority(Priority::from(priority::UART));
 

@@ -1,7 +1,7 @@
 //! The boot loader in the chip's own memory, which takes programs by USB and UARTs (application note AN2606).
 //!
-//! It expects a chip as after a reset: so the chip is reset, and then the program jumps there before anything else. What
-//! it remembers across the reset is in a backup register, which must be writable in both functions.
+//! It expects a chip as after a reset: so the chip is reset, and then the program jumps there before anything else.
+//! What it remembers across the reset is in a backup register, which must be writable in both functions.
 
 use cortex_m::peripheral::SCB;
 use embassy_stm32::pac::RTC;

@@ -1,6 +1,6 @@
 //! Links: by UART, with ring buffers that its interrupt fills and empties, and by [`usb`].
 
-use crate::usb;
+use crate::usb::{self, UsbPort};
 use core::future::poll_fn;
 use core::pin::pin;
 use core::task::{Poll, ready};
@@ -25,6 +25,11 @@ pub fn config() -> Config {
 pub fn new(uart: BufferedUart<'static>) -> BoardLink<Receiver, Transmitter> {
     let (transmitter, receiver) = uart.split();
     BoardLink { receiver: Receiver::Uart(receiver), transmitter: Transmitter::Uart(transmitter) }
+}
+
+/// Makes a link of the USB port.
+pub fn of_usb(_started: UsbPort) -> BoardLink<Receiver, Transmitter> {
+    BoardLink { receiver: Receiver::Usb, transmitter: Transmitter::Usb }
 }
 
 /// Receiving side.

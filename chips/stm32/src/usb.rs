@@ -3,7 +3,6 @@
 //! Interrupt and tasks have the lowest priority, since a host waits. A flight goes on without them: the links' task
 //! only touches two rings, and bytes for a host that does not read are dropped.
 
-use crate::link::{Receiver, Transmitter};
 use embassy_executor::SpawnToken;
 use embassy_futures::join::join3;
 use embassy_stm32::interrupt::typelevel::Binding;
@@ -17,7 +16,6 @@ use embassy_sync::pipe::Pipe;
 use embassy_time::{Duration, Timer, with_timeout};
 use embassy_usb::Builder;
 use embassy_usb::class::cdc_acm::{self, CdcAcmClass};
-use firmware::board::BoardLink;
 use firmware::executors::{self, priority};
 use static_cell::StaticCell;
 
@@ -40,14 +38,17 @@ pub(crate) static RECEIVED: Pipe<CriticalSectionRawMutex, 256> = Pipe::new();
 /// Bytes for the host: all messages after a tick, and some more.
 static SENT: Pipe<CriticalSectionRawMutex, 1024> = Pipe::new();
 
-/// Makes a link of the core with its pins D+ and D-, whose clock must have 48 MHz. The voltage of the bus is not
+/// The port, once it is started.
+pub struct UsbPort(());
+
+/// Starts the port of the core with its pins D+ and D-, whose clock must have 48 MHz. The voltage of the bus is not
 /// sensed, since its pin, PA9, is a UART's.
-pub fn new(
+pub fn start(
     core: Peri<'static, USB_OTG_FS>,
     plus: Peri<'static, impl DpPin<USB_OTG_FS>>,
     minus: Peri<'static, impl DmPin<USB_OTG_FS>>,
     line: impl Binding<<USB_OTG_FS as Instance>::Interrupt, InterruptHandler<USB_OTG_FS>> + 'static,
-) -> BoardLink<Receiver, Transmitter> {
+) -> UsbPort {
     // Packets of the port and of the control endpoint.
     static PACKETS: StaticCell<[u8; 2 * PACKET_MAX]> = StaticCell::new();
     let mut config = Config::default();
@@ -55,8 +56,8 @@ pub fn new(
     let driver = Driver::new_fs(core, line, plus, minus, PACKETS.init([0; 2 * PACKET_MAX]), config);
     Interrupt::OTG_FS.set_priority(Priority::from(priority::HOUSEKEEPING));
     executors::dispense_with(Interrupt::OTG_FS);
-    executors::housekeeping().spawn(start(driver).expect("spawned once"));
-    BoardLink { receiver: Receiver::Usb, transmitter: Transmitter::Usb }
+    executors::housekeeping().spawn(wait(driver).expect("spawned once"));
+    UsbPort(())
 }
 
 /// Queues bytes for the host, all of them or, if it is too far behind, none.
@@ -73,7 +74,7 @@ pub(crate) fn send(mut bytes: &[u8]) {
 /// Spawns the port's task from within its executor, where it need not be Send, when the vehicle runs already: nothing
 /// of USB may hold up its start.
 #[embassy_executor::task]
-async fn start(driver: Driver<'static, USB_OTG_FS>) {
+async fn wait(driver: Driver<'static, USB_OTG_FS>) {
     Timer::after(START).await;
     executors::spawner().await.spawn(claim(driver));
 }

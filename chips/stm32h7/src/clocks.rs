@@ -41,8 +41,8 @@ pub fn start<const CRYSTAL_HZ: u32>(scb: &mut SCB) -> Peripherals {
     peripherals
 }
 
-/// 400 MHz; buses at 200 MHz, peripherals' and SPI at 100, timers at 200; USB at 48 by an oscillator of its own, so that
-/// it needs no PLL that the crystal's failure would stop.
+/// 400 MHz; buses at 200 MHz, peripherals' and SPI at 100, timers at 200; USB at 48 by an oscillator of its own, so
+/// that it needs no PLL that the crystal's failure would stop.
 fn config<const CRYSTAL_HZ: u32>(crystal: bool) -> Config {
     let source = if crystal { PllSource::HSE } else { PllSource::HSI };
     let prediv = if crystal { PllPreDiv::from_bits((CRYSTAL_HZ / PLL_INPUT_HZ) as u8) } else { PllPreDiv::DIV16 };
