@@ -26,6 +26,11 @@ pub trait Board: Sized + 'static {
     const STORE: u32;
     /// Most motors that it drives.
     const OUTPUTS: usize;
+    /// Restarts the chip into its boot loader, if it has one.
+    const BOOT_LOADER: Option<fn() -> !> = None;
+
+    /// Runs first after a reset, before anything is set up: what [`BOOT_LOADER`](Self::BOOT_LOADER) needs then.
+    fn after_reset() {}
 
     /// Brings up clocks and peripherals; the core runs at [`CORE_HZ`](Self::CORE_HZ) from then on. To be called once. A
     /// board's tasks spawned on `control` run right after the control tick.

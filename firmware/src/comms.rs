@@ -8,7 +8,7 @@ use crate::samples::Sampler as _;
 use crate::ticks::{self, Tick};
 use crate::vehicle::ParameterTable;
 pub use afbc_station::Comms;
-use afbc_station::{REPORT_MAX, Setup};
+use afbc_station::{REPORT_MAX, Reboot, Setup};
 use core::array;
 use core::future::poll_fn;
 use core::pin::pin;
@@ -39,10 +39,11 @@ pub type Desk = (Comms, ParameterTable);
 /// Creates it, with nothing received, to be called once: in place, since a task would store a value twice and take the
 /// stack for it.
 #[inline(never)]
-pub fn make(table: ParameterTable) -> &'static mut Desk {
+pub fn make(table: ParameterTable, boot_loader: bool) -> &'static mut Desk {
     static DESK: StaticCell<Desk> = StaticCell::new();
     DESK.init_with(|| {
-        let setup = Setup { reboots: true, ..Setup::of(&table.configuration().link) };
+        let reboots: &[_] = if boot_loader { &[Reboot::Program, Reboot::BootLoader] } else { &[Reboot::Program] };
+        let setup = Setup { reboots, ..Setup::of(&table.configuration().link) };
         (Comms::with(setup), table)
     })
 }
@@ -81,9 +82,13 @@ pub async fn run<B: Board, const OTHERS: usize>((comms, table): &mut Desk, links
                     let news = comms.receive(&[]);
                     control::with_mail(|inputs| inputs.merge(&news));
                 }
-                leaving += u32::from(comms.wants_reboot());
+                let wanted = comms.wants_reboot();
+                leaving += u32::from(wanted.is_some());
                 if leaving >= FAREWELL && !control::armed() {
-                    cortex_m::peripheral::SCB::sys_reset();
+                    match (wanted, B::BOOT_LOADER) {
+                        (Some(Reboot::BootLoader), Some(restart)) => restart(),
+                        _ => cortex_m::peripheral::SCB::sys_reset(),
+                    }
                 }
             }
         }

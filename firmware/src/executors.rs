@@ -25,7 +25,7 @@ pub mod priority {
     pub const AIDING: u8 = 7 << 4;
     /// [`crate::comms`].
     pub const COMMS: u8 = 8 << 4;
-    /// [`crate::housekeeping`].
+    /// [`crate::housekeeping`], and USB, whose hosts wait.
     pub const HOUSEKEEPING: u8 = 12 << 4;
 }
 
@@ -35,8 +35,22 @@ static AIDING: InterruptExecutor = InterruptExecutor::new();
 static COMMS: InterruptExecutor = InterruptExecutor::new();
 static HOUSEKEEPING: InterruptExecutor = InterruptExecutor::new();
 
-/// Interrupt lines of the tasks without which a flight goes on: the links', housekeeping, and slow sensors'.
-static DISPENSABLE: [AtomicU16; 3] = [const { AtomicU16::new(u16::MAX) }; 3];
+/// Interrupt lines of the tasks without which a flight goes on: the links', housekeeping, slow sensors', and USB's.
+static DISPENSABLE: [AtomicU16; 4] = [const { AtomicU16::new(u16::MAX) }; 4];
+
+/// Declares that a flight goes on without the driver that has the interrupt `usb`, of a priority below the motors'.
+pub fn dispense_with(usb: impl InterruptNumber) {
+    let [.., last] = &DISPENSABLE;
+    last.store(usb.number(), Ordering::Relaxed);
+}
+
+/// Returns the spawner of the executor with the lowest priority, which has started.
+///
+/// # Panics
+/// If it has not.
+pub fn housekeeping() -> SendSpawner {
+    HOUSEKEEPING.spawner()
+}
 
 /// True in a task that is not needed in flight.
 pub fn in_dispensable_task() -> bool {

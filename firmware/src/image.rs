@@ -152,6 +152,7 @@ macro_rules! image {
 
         #[cortex_m_rt::entry]
         fn main() -> ! {
+            <$board as $crate::board::Board>::after_reset();
             type Line = <$board as $crate::board::Board>::Interrupt;
             let core = cortex_m::Peripherals::take().expect("taken once");
             let lines = $crate::executors::InterruptLines {

@@ -22,9 +22,10 @@
 //! | 6 | end of the motors' DMA | 1 us per millisecond |
 //! | 7 | [`aux_sensors`]: reading the slow ones, whose drivers may wait for their bus | |
 //! | 8 | [`comms`]: the link's messages | |
-//! | 12 | [`housekeeping`]: logging, stack monitoring; [`parameters`]: writing to flash | |
+//! | 12 | [`housekeeping`]: logging, stack monitoring; [`parameters`]: writing to flash; USB | |
 //!
-//! The links precede the control tick because a UART may buffer one byte only, and the next comes within 11 us.
+//! The links precede the control tick because a UART may buffer one byte only, and the next comes within 11 us. USB
+//! comes last: its host waits, whatever it sends.
 #![no_std]
 
 pub mod aux_sensors;
@@ -61,7 +62,7 @@ pub fn run<B: Board>(
         link.transmitter.set_baud(table.configuration().link.baud);
     }
     let flight = control::make(table.configuration());
-    let desk = comms::make(table);
+    let desk = comms::make(table, B::BOOT_LOADER.is_some());
     board.unleash_watchdog();
     time::start(core.SYST, B::CORE_HZ);
     comms(executors.comms, desk, links);

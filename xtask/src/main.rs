@@ -2,47 +2,86 @@
 //!
 //! ```sh
 //! cargo xtask fw stm32h743 --vehicle racer --run
+//! cargo xtask flash stm32f405
 //! ```
 #![forbid(unsafe_code)]
 
-use clap::Parser;
+mod image;
+
 use clap::builder::{PossibleValue, PossibleValuesParser};
+use clap::{Parser, ValueEnum};
+use image::{Contents, Region, Usage, room};
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
-use std::{env, fs};
+use std::{env, fs, io};
 
 const TARGET: &str = "thumbv7em-none-eabihf";
+/// Chips of which a share of flash and RAM has to stay free \[%\].
+const ROOM: (&str, u64) = ("STM32F405", 25);
+/// USB's vendor and product of the chips' boot loader.
+const BOOT_LOADER: &str = "0483:df11";
 
 /// Work on the firmware.
 #[derive(Debug, Parser)]
 #[command(name = "cargo xtask", bin_name = "cargo xtask", arg_required_else_help = true)]
 enum Task {
     Fw(Build),
+    Flash(Flash),
 }
 
-/// Build the image of a board, and flash it.
+/// Build the image of a board: an ELF file, and beside it an Intel HEX file. Reports flash and RAM.
 ///
 /// RUSTUP_TOOLCHAIN=$(scripts/thumb-toolchain.sh) selects a compiler where rustup has no target for microcontrollers.
 #[derive(Debug, clap::Args)]
 #[command(verbatim_doc_comment, arg_required_else_help = true)]
 struct Build {
+    #[command(flatten)]
+    image: Image,
+    /// Flash and run it by probe-rs, and show its log.
+    #[arg(long)]
+    run: bool,
+}
+
+/// Build the image of a board, and flash it.
+#[derive(Debug, clap::Args)]
+#[command(arg_required_else_help = true)]
+struct Flash {
+    #[command(flatten)]
+    image: Image,
+    /// What to flash it by.
+    #[arg(long, value_enum, default_value = "dfu")]
+    by: Programmer,
+}
+
+/// What flashes an image.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Programmer {
+    /// By USB and dfu-util, a board whose boot loader runs.
+    Dfu,
+    /// By an SWD probe and probe-rs.
+    Probe,
+}
+
+/// Which image.
+#[derive(Debug, clap::Args)]
+struct Image {
     /// A folder in boards/.
     #[arg(value_parser = named())]
     board: String,
     /// A name in vehicles/, or a path [default: VEHICLE of the environment, or the paper's].
     #[arg(long)]
     vehicle: Option<String>,
-    /// Flash and run it by probe-rs, and show its log.
-    #[arg(long)]
-    run: bool,
     /// Further options of cargo.
     #[arg(last = true)]
     options: Vec<String>,
 }
 
 fn main() -> ExitCode {
-    let Task::Fw(build) = Task::parse();
-    build.run().unwrap_or_else(|error| {
+    let result = match Task::parse() {
+        Task::Fw(build) => build.run(),
+        Task::Flash(flash) => flash.run(),
+    };
+    result.map(|()| ExitCode::SUCCESS).unwrap_or_else(|error| {
         eprintln!("xtask: {error}");
         ExitCode::FAILURE
     })
@@ -74,6 +113,12 @@ struct Board {
 }
 
 impl Board {
+    /// Returns the chip of a board that can be flashed.
+    fn chip(&self, image: &Image) -> Result<&str, String> {
+        let emulated = || format!("{} is emulated: fly it by `cargo run --release -- pil`", image.board);
+        self.chip.as_deref().ok_or_else(emulated)
+    }
+
     fn read(name: &str) -> Result<Self, String> {
         let path = root().join("boards").join(name).join("Cargo.toml");
         let of = |error: &dyn std::fmt::Display| format!("{}: {error}", path.display());
@@ -91,32 +136,94 @@ impl Board {
 }
 
 impl Build {
-    fn run(&self) -> Result<ExitCode, String> {
-        let Board { package, image, chip } = Board::read(&self.board)?;
-        if self.run && chip.is_none() {
-            return Err(format!("{} is emulated: fly it by `cargo run --release -- pil`", self.board));
-        }
-        let mut cargo = Command::new(env::var_os("CARGO").unwrap_or("cargo".into()));
-        cargo.current_dir(root()).args(["build", "--profile", "firmware", "--target", TARGET]);
-        cargo.args(["--package", &package, "--bin", &image]).args(&self.options);
-        if let Some(vehicle) = &self.vehicle {
-            cargo.env("VEHICLE", vehicle);
-        }
-        if !succeeds(&mut cargo, "cargo")? {
-            return Ok(ExitCode::FAILURE);
-        }
-        let target = env::var_os("CARGO_TARGET_DIR").map_or_else(|| root().join("target"), PathBuf::from);
-        let image = target.join(TARGET).join("firmware").join(&image);
-        println!("{}", image.display());
-        let Some(chip) = chip.filter(|_| self.run) else { return Ok(ExitCode::SUCCESS) };
-        let flashed = succeeds(Command::new("probe-rs").args(["run", "--chip", &chip]).arg(&image), "probe-rs")?;
-        Ok(if flashed { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+    fn run(&self) -> Result<(), String> {
+        let board = Board::read(&self.image.board)?;
+        let chip = if self.run { Some(board.chip(&self.image)?) } else { None };
+        let (elf, _) = self.image.build(&board)?;
+        let Some(chip) = chip else { return Ok(()) };
+        run(Command::new("probe-rs").args(["run", "--chip", chip]).arg(elf))
     }
 }
 
-/// Runs a command; true if it succeeds.
-fn succeeds(command: &mut Command, name: &str) -> Result<bool, String> {
-    command.status().map(|status| status.success()).map_err(|error| format!("{name}: {error}"))
+impl Flash {
+    fn run(&self) -> Result<(), String> {
+        let board = Board::read(&self.image.board)?;
+        let chip = board.chip(&self.image)?;
+        let (elf, contents) = self.image.build(&board)?;
+        if self.by == Programmer::Probe {
+            run(Command::new("probe-rs").args(["download", "--chip", chip]).arg(elf))?;
+            return run(Command::new("probe-rs").args(["reset", "--chip", chip]));
+        }
+        // A file for each block, so that what is between them stays: the parameters.
+        for (index, block) in contents.blocks.iter().enumerate() {
+            let path = elf.with_extension(format!("{:08x}.bin", block.address));
+            write(&path, &block.bytes)?;
+            let leave = if index + 1 == contents.blocks.len() { ":leave" } else { "" };
+            let place = format!("{:#010x}{leave}", block.address);
+            run(Command::new("dfu-util").args(["-d", BOOT_LOADER, "-a", "0", "-s", &place, "-D"]).arg(path))?;
+        }
+        Ok(())
+    }
+}
+
+impl Image {
+    /// Builds it; returns its ELF file and what is in it.
+    fn build(&self, board: &Board) -> Result<(PathBuf, Contents), String> {
+        let mut cargo = Command::new(env::var_os("CARGO").unwrap_or("cargo".into()));
+        cargo.current_dir(root()).args(["build", "--profile", "firmware", "--target", TARGET]);
+        cargo.args(["--package", &board.package, "--bin", &board.image]).args(&self.options);
+        if let Some(vehicle) = &self.vehicle {
+            cargo.env("VEHICLE", vehicle);
+        }
+        run(&mut cargo)?;
+        let target = env::var_os("CARGO_TARGET_DIR").map_or_else(|| root().join("target"), PathBuf::from);
+        let elf = target.join(TARGET).join("firmware").join(&board.image);
+        let of = |error: &dyn std::fmt::Display| format!("{}: {error}", elf.display());
+        let contents = Contents::read(&fs::read(&elf).map_err(|error| of(&error))?).map_err(|error| of(&error))?;
+        let hex = elf.with_extension("hex");
+        write(&hex, contents.hex().map_err(|error| of(&error))?)?;
+        println!("{}\n{}", elf.display(), hex.display());
+        self.report(board, &contents)?;
+        Ok((elf, contents))
+    }
+
+    /// Reports what it takes of the board's memory.
+    fn report(&self, board: &Board, contents: &Contents) -> Result<(), String> {
+        let own = root().join("boards").join(&self.board).join("memory.x");
+        let path = if own.is_file() { own } else { root().join("memory.x") };
+        let script = fs::read_to_string(&path).map_err(|error| format!("{}: {error}", path.display()))?;
+        let usage = contents.usage(&Region::of_script(&script));
+        usage.iter().for_each(|usage| println!("{usage}"));
+        let (chip, percent) = ROOM;
+        let (flash, ram): (Vec<&Usage>, Vec<&Usage>) = usage.iter().partition(|usage| usage.region.name == "FLASH");
+        for (what, usage) in [("flash", flash), ("RAM", ram)] {
+            let room = room(&usage);
+            println!("{what}: {room}");
+            if room.percent < percent && board.chip.as_deref().is_some_and(|name| name.starts_with(chip)) {
+                return Err(format!("{}: {what} {room}, and {percent} % have to be", self.board));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Writes a file.
+fn write(path: &Path, bytes: impl AsRef<[u8]>) -> Result<(), String> {
+    fs::write(path, bytes).map_err(|error| format!("{}: {error}", path.display()))
+}
+
+/// Runs a command.
+fn run(command: &mut Command) -> Result<(), String> {
+    let name = command.get_program().to_string_lossy().into_owned();
+    let name = Path::new(&name).file_stem().unwrap_or_default().to_string_lossy();
+    match command.status() {
+        Ok(status) if status.success() => Ok(()),
+        Ok(status) => Err(format!("{name}: {status}")),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => {
+            Err(format!("{name} is not installed: docs/firmware.md, \"Build and flash\", says where it comes from"))
+        }
+        Err(error) => Err(format!("{name}: {error}")),
+    }
 }
 
 /// The workspace's root.
@@ -125,14 +232,14 @@ fn root() -> &'static Path {
 }
 
 #[cfg(test)]
-#[allow(clippy::expect_used, reason = "a test that cannot go on should say why")]
+#[allow(clippy::expect_used, clippy::panic, reason = "a test that cannot go on should say why")]
 mod tests {
     use super::*;
     use std::collections::BTreeSet;
 
-    fn read(line: &str) -> Result<Build, String> {
+    fn read(line: &str) -> Result<Task, String> {
         let words = ["xtask"].into_iter().chain(line.split_whitespace());
-        Task::try_parse_from(words).map(|Task::Fw(build)| build).map_err(|error| error.to_string())
+        Task::try_parse_from(words).map_err(|error| error.to_string())
     }
 
     #[test]
@@ -149,17 +256,37 @@ mod tests {
 
     #[test]
     fn arguments_are_read_or_refused_by_name() {
-        let build = read("fw stm32h743 --vehicle racer --run -- --locked").expect("valid");
-        assert_eq!((build.board.as_str(), build.vehicle.as_deref(), build.run), ("stm32h743", Some("racer"), true));
-        assert_eq!(build.options, ["--locked"]);
-        for wrong in ["", "flash", "fw", "fw stm32f405 stm32h743", "fw stm32f405 --fast", "fw stm32f405 --vehicle"] {
+        let Ok(Task::Fw(Build { image, run })) = read("fw stm32h743 --vehicle racer --run -- --locked") else {
+            panic!()
+        };
+        assert_eq!((image.board.as_str(), image.vehicle.as_deref(), run), ("stm32h743", Some("racer"), true));
+        assert_eq!(image.options, ["--locked"]);
+        for (line, by) in [("flash stm32f405", Programmer::Dfu), ("flash stm32f405 --by probe", Programmer::Probe)] {
+            assert!(matches!(read(line), Ok(Task::Flash(flash)) if flash.by == by), "{line}");
+        }
+        for wrong in
+            ["", "burn", "fw", "flash", "fw stm32f405 stm32h743", "fw stm32f405 --fast", "fw stm32f405 --vehicle"]
+        {
             assert!(read(wrong).is_err(), "{wrong}");
         }
+        assert!(read("flash stm32f405 --by magic").is_err());
         let error = read("fw stm32f1").expect_err("unknown");
         assert!(
             error.contains("stm32f1") && error.contains("emulated, ") && error.contains("stm32f405, stm32h743"),
             "{error}"
         );
-        assert!(read("fw emulated --run").expect("read").run().is_err());
+        for line in ["fw emulated --run", "flash emulated"] {
+            let result = match read(line).expect("read") {
+                Task::Fw(build) => build.run(),
+                Task::Flash(flash) => flash.run(),
+            };
+            assert!(result.expect_err("it has no chip").contains("emulated"));
+        }
+    }
+
+    #[test]
+    fn a_missing_program_is_named() {
+        let error = run(&mut Command::new("no-such-programmer")).expect_err("missing");
+        assert!(error.contains("no-such-programmer is not installed"), "{error}");
     }
 }

@@ -5,6 +5,7 @@
 //! | crystal | 24 MHz on PH0, PH1 |
 //! | first link (TELEM1) | USART2: TX on PD5, RX on PD6 |
 //! | second link (TELEM2) | USART3: TX on PD8, RX on PD9 |
+//! | third link | USB: D- on PA11, D+ on PA12 |
 //! | motors 1 to 4 | TIM1, channels 4 to 1: PE14, PE13, PE11, PE9; driven by DMA2's stream 5 |
 //! | motors 5 and 6 | TIM4, channels 2 and 3: PD13, PD14; driven by DMA1's stream 6 |
 //! | memory | `memory.x` beside this folder |
@@ -25,8 +26,8 @@ use afbc_drivers::{Driver, I2cRegisters, SensorPart, SpiRegisters};
 use chip_stm32::link::{self, Receiver, Transmitter};
 use chip_stm32::motors::{Motors, Throttles, hold_low, numbering, of_channels, of_outputs, pin, rotors_of_outputs};
 use chip_stm32::sensors::{Device, Polled};
-use chip_stm32::{crystal, faults, watchdog};
-use chip_stm32f4::{clocks, reset};
+use chip_stm32::{crystal, faults, usb, watchdog};
+use chip_stm32f4::{boot_loader, clocks, reset};
 use embassy_executor::SendSpawner;
 use embassy_stm32::flash::{Bank1Region1, Blocking, Flash};
 use embassy_stm32::gpio::{Level, Output, Speed};
@@ -34,7 +35,7 @@ use embassy_stm32::i2c::{self, I2c};
 use embassy_stm32::interrupt::{Interrupt, InterruptExt, Priority};
 use embassy_stm32::peripherals::{
     DMA1_CH0, DMA1_CH3, DMA1_CH4, DMA1_CH6, DMA1_CH7, DMA2_CH0, DMA2_CH3, DMA2_CH5, I2C1, IWDG, SPI1, SPI2, TIM1, TIM4,
-    UART4, USART2, USART3,
+    UART4, USART2, USART3, USB_OTG_FS,
 };
 use embassy_stm32::spi::Spi;
 use embassy_stm32::usart::{self, BufferedUart};
@@ -67,6 +68,7 @@ bind_interrupts!(struct Irqs {
     DMA1_STREAM7 => dma::InterruptHandler<DMA1_CH7>;
     DMA2_STREAM5 => dma::InterruptHandler<DMA2_CH5>;
     DMA1_STREAM6 => dma::InterruptHandler<DMA1_CH6>;
+    OTG_FS => embassy_stm32::usb::InterruptHandler<USB_OTG_FS>;
 });
 
 /// Each interrupt with its priority.
@@ -107,12 +109,17 @@ impl Board for Pixracer {
     type Interrupt = pac::Interrupt;
     type Sampler = Inside;
     type Aids = Aids;
-    type Links = [BoardLink<Receiver, Transmitter>; 2];
+    type Links = [BoardLink<Receiver, Transmitter>; 3];
     type Memory = Bank1Region1<'static, Blocking>;
     const CORE_HZ: u32 = clocks::CORE_HZ;
     /// Sectors 1 and 2, of 16 KiB each (`memory.x`).
     const STORE: u32 = 16 * 1024;
     const OUTPUTS: usize = OUTPUTS;
+    const BOOT_LOADER: Option<fn() -> !> = Some(boot_loader::restart);
+
+    fn after_reset() {
+        boot_loader::enter_if_wanted();
+    }
 
     fn start(_core: &mut cortex_m::Peripherals, control: SendSpawner) -> Parts<Self> {
         let p = clocks::start::<CRYSTAL_HZ>();
@@ -128,7 +135,8 @@ impl Board for Pixracer {
         let [rx, rx2, rx3] = RX.each_ref().map(|ring| ring.init([0; 1024]));
         let first = BufferedUart::new(p.USART2, p.PD6, p.PD5, tx, rx, Irqs, link::config());
         let second = BufferedUart::new(p.USART3, p.PD9, p.PD8, tx2, rx2, Irqs, link::config());
-        let links = [first, second].map(|uart| link::new(uart.expect("the baud rate divides the clock")));
+        let [first, second] = [first, second].map(|uart| link::new(uart.expect("the baud rate divides the clock")));
+        let links = [first, second, link::of_usb(usb::start(p.USB_OTG_FS, p.PA12, p.PA11, Irqs))];
         let tx = GNSS_TX.init([0; 16]);
         let receiver = BufferedUart::new(p.UART4, p.PA1, p.PA0, tx, rx3, Irqs, usart::Config::default());
 

@@ -3,7 +3,8 @@
 //! | what | where |
 //! |---|---|
 //! | crystal | 8 MHz on PH0, PH1 |
-//! | link | USART1: TX on PA9, RX on PA10 |
+//! | first link | USART1: TX on PA9, RX on PA10 |
+//! | second link | USB: D- on PA11, D+ on PA12 |
 //! | motors 1 to 4 | TIM8, channels 1 to 4: PC6, PC7, PC8, PC9; driven by DMA2's stream 1 |
 //! | memory | `memory.x` at the workspace's root |
 //! | parameters | sectors 1 and 2 of the flash |
@@ -11,12 +12,12 @@
 
 use chip_stm32::link::{self, Receiver, Transmitter};
 use chip_stm32::motors::{CHANNELS, Motors, Throttles, hold_low, pin};
-use chip_stm32::{crystal, faults, watchdog};
-use chip_stm32f4::{clocks, reset};
+use chip_stm32::{crystal, faults, usb, watchdog};
+use chip_stm32f4::{boot_loader, clocks, reset};
 use embassy_executor::SendSpawner;
 use embassy_stm32::flash::{Bank1Region1, Blocking, Flash};
 use embassy_stm32::interrupt::{self, InterruptExt, Priority};
-use embassy_stm32::peripherals::{DMA2_CH1, IWDG, TIM8, USART1};
+use embassy_stm32::peripherals::{DMA2_CH1, IWDG, TIM8, USART1, USB_OTG_FS};
 use embassy_stm32::usart::{self, BufferedUart};
 use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_stm32::{bind_interrupts, dma, pac};
@@ -32,9 +33,10 @@ const CRYSTAL_HZ: u32 = 8_000_000;
 bind_interrupts!(struct Irqs {
     USART1 => usart::BufferedInterruptHandler<USART1>;
     DMA2_STREAM1 => dma::InterruptHandler<DMA2_CH1>;
+    OTG_FS => embassy_stm32::usb::InterruptHandler<USB_OTG_FS>;
 });
 
-/// Ring buffers of the link.
+/// Ring buffers of the first link.
 static RX: StaticCell<[u8; 1024]> = StaticCell::new();
 static TX: StaticCell<[u8; 1024]> = StaticCell::new();
 
@@ -50,13 +52,18 @@ impl Board for Stm32f405 {
     type Interrupt = pac::Interrupt;
     type Sampler = NoSensors;
     type Aids = NoSensors;
-    type Links = [BoardLink<Receiver, Transmitter>; 1];
+    type Links = [BoardLink<Receiver, Transmitter>; 2];
     type Memory = Bank1Region1<'static, Blocking>;
     const CORE_HZ: u32 = clocks::CORE_HZ;
     /// Sectors 1 and 2, of 16 KiB each (`memory.x`).
     const STORE: u32 = 16 * 1024;
     /// The channels of one timer.
     const OUTPUTS: usize = CHANNELS;
+    const BOOT_LOADER: Option<fn() -> !> = Some(boot_loader::restart);
+
+    fn after_reset() {
+        boot_loader::enter_if_wanted();
+    }
 
     fn start(_core: &mut cortex_m::Peripherals, control: SendSpawner) -> Parts<Self> {
         let p = clocks::start::<CRYSTAL_HZ>();
@@ -78,7 +85,7 @@ impl Board for Stm32f405 {
             board,
             sampler: NoSensors,
             aids: NoSensors,
-            links: [link],
+            links: [link, link::of_usb(usb::start(p.USB_OTG_FS, p.PA12, p.PA11, Irqs))],
             memory: Flash::new_blocking(p.FLASH).into_blocking_regions().bank1_region1,
         }
     }

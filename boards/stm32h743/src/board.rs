@@ -5,6 +5,7 @@
 //! | crystal | 8 MHz on PH0, PH1 |
 //! | first link | UART7: TX on PE8, RX on PE7 |
 //! | second link | USART1: TX on PA9, RX on PA10 |
+//! | third link | USB: D- on PA11, D+ on PA12 |
 //! | motors 1 to 4 (S3 to S6) | TIM5, channels 1 to 4: PA0, PA1, PA2, PA3; driven by DMA1's stream 0 |
 //! | motors 5 to 8 (S7 to S10) | TIM4, channels 1 to 4: PD12, PD13, PD14, PD15; driven by DMA1's stream 1 |
 //! | memory | `memory.x` beside this folder |
@@ -23,15 +24,15 @@ use afbc_drivers::{Driver, I2cRegisters, SensorPart, SpiRegisters};
 use chip_stm32::link::{self, Receiver, Transmitter};
 use chip_stm32::motors::{CHANNELS, Motors, Throttles, hold_low, pin};
 use chip_stm32::sensors::{Device, Polled};
-use chip_stm32::{crystal, faults, watchdog};
+use chip_stm32::{crystal, faults, usb, watchdog};
 use chip_stm32h7::flash::Words;
-use chip_stm32h7::{clocks, reset};
+use chip_stm32h7::{boot_loader, clocks, reset};
 use embassy_executor::SendSpawner;
 use embassy_stm32::i2c::{self, I2c};
 use embassy_stm32::interrupt::{self, Interrupt, InterruptExt, Priority};
 use embassy_stm32::peripherals::{
     DMA1_CH0, DMA1_CH1, DMA1_CH2, DMA1_CH3, DMA1_CH4, DMA1_CH5, DMA1_CH6, DMA1_CH7, DMA2_CH0, DMA2_CH1, I2C1, I2C2,
-    IWDG1, TIM4, TIM5, UART7, USART1, USART2,
+    IWDG1, TIM4, TIM5, UART7, USART1, USART2, USB_OTG_FS,
 };
 use embassy_stm32::spi::Spi;
 use embassy_stm32::usart::{self, BufferedUart};
@@ -80,6 +81,7 @@ bind_interrupts!(struct Irqs {
     I2C1_ER => i2c::ErrorInterruptHandler<I2C1>;
     I2C2_EV => i2c::EventInterruptHandler<I2C2>;
     I2C2_ER => i2c::ErrorInterruptHandler<I2C2>;
+    OTG_FS => embassy_stm32::usb::InterruptHandler<USB_OTG_FS>;
 });
 
 /// Ring buffers of the links and of the GNSS receiver.
@@ -103,11 +105,16 @@ impl Board for Stm32h743 {
     type Interrupt = pac::Interrupt;
     type Sampler = Imus;
     type Aids = Aids;
-    type Links = [BoardLink<Receiver, Transmitter>; 2];
+    type Links = [BoardLink<Receiver, Transmitter>; 3];
     type Memory = Words;
     const CORE_HZ: u32 = clocks::CORE_HZ;
     const STORE: u32 = 0;
     const OUTPUTS: usize = OUTPUTS;
+    const BOOT_LOADER: Option<fn() -> !> = Some(boot_loader::restart);
+
+    fn after_reset() {
+        boot_loader::enter_if_wanted();
+    }
 
     fn start(core: &mut cortex_m::Peripherals, control: SendSpawner) -> Parts<Self> {
         let p = clocks::start::<CRYSTAL_HZ>(&mut core.SCB);
@@ -117,7 +124,8 @@ impl Board for Stm32h743 {
         let [rx, rx2, rx3] = RX.each_ref().map(|ring| ring.init([0; 1024]));
         let first = BufferedUart::new(p.UART7, p.PE7, p.PE8, tx, rx, Irqs, link::config());
         let second = BufferedUart::new(p.USART1, p.PA10, p.PA9, tx2, rx2, Irqs, link::config());
-        let links = [first, second].map(|uart| link::new(uart.expect("the baud rate divides the clock")));
+        let [first, second] = [first, second].map(|uart| link::new(uart.expect("the baud rate divides the clock")));
+        let links = [first, second, link::of_usb(usb::start(p.USB_OTG_FS, p.PA12, p.PA11, Irqs))];
         interrupt::UART7.set_priority(Priority::from(priority::UART));
         interrupt::USART1.set_priority(Priority::from(priority::UART));
 

@@ -1,6 +1,7 @@
 //! What boards of all STM32 share. A chip's name is a feature of `embassy-stm32` that the board sets.
 #![no_std]
 
+pub mod boot_loader;
 pub mod candidates;
 pub mod crystal;
 pub mod faults;
@@ -9,6 +10,7 @@ pub mod motors;
 pub mod receiver;
 pub mod sensor_set;
 pub mod sensors;
+pub mod usb;
 
 use embassy_stm32::Peri;
 use embassy_stm32::wdg::{self, IndependentWatchdog};

@@ -1,5 +1,6 @@
-//! A link by UART, with ring buffers that its interrupt fills and empties.
+//! Links: by UART, with ring buffers that its interrupt fills and empties, and by [`usb`].
 
+use crate::usb::{self, UsbPort};
 use core::future::poll_fn;
 use core::pin::pin;
 use core::task::{Poll, ready};
@@ -23,42 +24,65 @@ pub fn config() -> Config {
 /// Makes a link of a UART.
 pub fn new(uart: BufferedUart<'static>) -> BoardLink<Receiver, Transmitter> {
     let (transmitter, receiver) = uart.split();
-    BoardLink { receiver: Receiver(receiver), transmitter: Transmitter(transmitter) }
+    BoardLink { receiver: Receiver::Uart(receiver), transmitter: Transmitter::Uart(transmitter) }
+}
+
+/// Makes a link of the USB port.
+pub fn of_usb(_started: UsbPort) -> BoardLink<Receiver, Transmitter> {
+    BoardLink { receiver: Receiver::Usb, transmitter: Transmitter::Usb }
 }
 
 /// Receiving side.
-pub struct Receiver(BufferedUartRx<'static>);
+pub enum Receiver {
+    /// Of a UART.
+    Uart(BufferedUartRx<'static>),
+    /// Of the USB port, from its ring.
+    Usb,
+}
 
 impl board::Receiver for Receiver {
     fn receive(&mut self, buffer: &mut [u8]) -> impl Future<Output = usize> {
         // A new read each time, since polling one that has ended would panic. An overrun loses bytes, which the decoder
         // notices.
         poll_fn(move |context| {
-            let length = ready!(pin!(self.0.fill_buf()).poll(context)).map_or(0, |bytes| {
+            let uart = match self {
+                Receiver::Uart(uart) => uart,
+                Receiver::Usb => return pin!(usb::RECEIVED.read(buffer)).poll(context),
+            };
+            let length = ready!(pin!(uart.fill_buf()).poll(context)).map_or(0, |bytes| {
                 buffer.iter_mut().zip(bytes).for_each(|(to, from)| *to = *from);
                 bytes.len().min(buffer.len())
             });
-            self.0.consume(length);
+            uart.consume(length);
             Poll::Ready(length)
         })
     }
 }
 
 /// Sending side.
-pub struct Transmitter(BufferedUartTx<'static>);
+pub enum Transmitter {
+    /// Of a UART.
+    Uart(BufferedUartTx<'static>),
+    /// Of the USB port, through its ring.
+    Usb,
+}
 
 impl board::Transmitter for Transmitter {
     fn set_baud(&mut self, baud: u32) {
-        if self.0.set_baudrate(baud).is_err() {
+        if let Transmitter::Uart(uart) = self
+            && uart.set_baudrate(baud).is_err()
+        {
             defmt::warn!("{=u32} baud do not divide the clock", baud);
         }
     }
 
     /// Drops the bytes if the line is too far behind.
     fn transmit(&mut self, _tick: &Tick, bytes: &[u8]) {
-        // Accepts all bytes or, if the ring is full, none; the driver does not wake those who wait for room.
-        if !bytes.is_empty() {
-            let _ = poll_once(self.0.write(bytes));
+        match self {
+            // Accepts all bytes or, if the ring is full, none; the driver does not wake those who wait for room.
+            Transmitter::Uart(uart) if !bytes.is_empty() => drop(poll_once(uart.write(bytes))),
+            Transmitter::Uart(_) => (),
+            Transmitter::Usb => usb::send(bytes),
         }
     }
 }

@@ -35,7 +35,7 @@ pub fn start<const CRYSTAL_HZ: u32>() -> Peripherals {
     peripherals
 }
 
-/// 168 MHz; buses at 168, 42 and 84 MHz.
+/// 168 MHz; buses at 168, 42 and 84 MHz; USB at 48.
 fn config<const CRYSTAL_HZ: u32>(crystal: bool) -> Config {
     let source = if crystal { PllSource::HSE } else { PllSource::HSI };
     let prediv = if crystal { PllPreDiv::from_bits((CRYSTAL_HZ / PLL_INPUT_HZ) as u8) } else { PllPreDiv::DIV8 };

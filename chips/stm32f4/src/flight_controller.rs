@@ -3,6 +3,7 @@
 /// Implements [`Board`](firmware::board::Board) for `FlightController`, a usual flight controller with a STM32F405 or a
 /// relative, and defines `stop_motors`. The crate names all of its dependencies.
 ///
+/// * USB is on PA11 and PA12, as on every chip of the kind.
 /// * Each peripheral has its DMA's streams, as `DMA1_CH6` for stream 6, with their interrupts.
 /// * IMU and barometer are [candidates](chip_stm32::candidates): the one that answers is read. How the IMU sits is one
 ///   of `afbc_drivers::alignment`.
@@ -45,6 +46,7 @@ macro_rules! flight_controller {
             $i2c_tx_line => embassy_stm32::dma::InterruptHandler<peripherals::$i2c_tx>;
             $i2c_rx_line => embassy_stm32::dma::InterruptHandler<peripherals::$i2c_rx>;
             $($line => embassy_stm32::dma::InterruptHandler<peripherals::$dma>;)+
+            OTG_FS => embassy_stm32::usb::InterruptHandler<peripherals::USB_OTG_FS>;
         });
 
         /// Each interrupt with its priority.
@@ -75,12 +77,17 @@ macro_rules! flight_controller {
             type Interrupt = pac::Interrupt;
             type Sampler = chip_stm32::sensor_set::Imu<$imu>;
             type Aids = chip_stm32::sensor_set::SlowSensors<$barometer>;
-            type Links = [firmware::board::BoardLink<chip_stm32::link::Receiver, chip_stm32::link::Transmitter>; 1];
+            type Links = [firmware::board::BoardLink<chip_stm32::link::Receiver, chip_stm32::link::Transmitter>; 2];
             type Memory = embassy_stm32::flash::Bank1Region1<'static, embassy_stm32::flash::Blocking>;
             const CORE_HZ: u32 = chip_stm32f4::clocks::CORE_HZ;
             /// Sectors 1 and 2, of 16 KiB each (`memory.x`).
             const STORE: u32 = 16 * 1024;
             const OUTPUTS: usize = $outputs;
+            const BOOT_LOADER: Option<fn() -> !> = Some(chip_stm32f4::boot_loader::restart);
+
+            fn after_reset() {
+                chip_stm32f4::boot_loader::enter_if_wanted();
+            }
 
             fn start(
                 _core: &mut cortex_m::Peripherals,
@@ -131,7 +138,10 @@ macro_rules! flight_controller {
                     board: FlightController { watchdog: chip_stm32::watchdog(p.IWDG), rotors },
                     sampler: chip_stm32::sensor_set::Imu::new(device, kernel_hz, afbc_drivers::alignment::$alignment),
                     aids: chip_stm32::sensor_set::SlowSensors::new(bus, gnss.expect("the baud rate divides the clock")),
-                    links: [chip_stm32::link::new(link.expect("the baud rate divides the clock"))],
+                    links: [
+                        chip_stm32::link::new(link.expect("the baud rate divides the clock")),
+                        chip_stm32::link::of_usb(chip_stm32::usb::start(p.USB_OTG_FS, p.PA12, p.PA11, Irqs)),
+                    ],
                     memory: embassy_stm32::flash::Flash::new_blocking(p.FLASH).into_blocking_regions().bank1_region1,
                 }
             }

@@ -2,6 +2,7 @@
 //! `embassy-stm32` that the board sets.
 #![no_std]
 
+pub mod boot_loader;
 pub mod clocks;
 mod flight_controller;
 pub mod reset;

@@ -6,10 +6,13 @@
 
 use chip_stm32::crystal;
 use cortex_m::peripheral::SCB;
-use embassy_stm32::pac::RCC;
+use embassy_stm32::pac::crs::vals::Syncsrc;
 use embassy_stm32::pac::rcc::vals::{Pllm, Pllsrc, Sw};
+use embassy_stm32::pac::{CRS, RCC};
+use embassy_stm32::rcc::mux::Usbsel;
 use embassy_stm32::rcc::{
-    AHBPrescaler, APBPrescaler, Hse, HseMode, Pll, PllDiv, PllMul, PllPreDiv, PllSource, Sysclk, VoltageScale,
+    AHBPrescaler, APBPrescaler, Hse, HseMode, Hsi48Config, Pll, PllDiv, PllMul, PllPreDiv, PllSource, Sysclk,
+    VoltageScale,
 };
 use embassy_stm32::time::Hertz;
 use embassy_stm32::{Config, Peripherals};
@@ -31,20 +34,23 @@ pub fn start<const CRYSTAL_HZ: u32>(scb: &mut SCB) -> Peripherals {
     RCC.cr().modify(|cr| cr.set_hseon(true));
     let starts = crystal::starts(START_UP_CYCLES_PER_MS, || RCC.cr().read().hserdy());
     let peripherals = embassy_stm32::init(config::<CRYSTAL_HZ>(starts));
+    trim_usb_clock();
     scb.enable_icache();
     // The clock security system switches to the chip's oscillator and raises an NMI if the crystal fails.
     RCC.cr().modify(|cr| cr.set_hsecsson(starts));
     peripherals
 }
 
-/// 400 MHz; buses at 200 MHz, peripherals' and SPI at 100, timers at 200.
+/// 400 MHz; buses at 200 MHz, peripherals' and SPI at 100, timers at 200; USB at 48 by an oscillator of its own, so
+/// that it needs no PLL that the crystal's failure would stop.
 fn config<const CRYSTAL_HZ: u32>(crystal: bool) -> Config {
     let source = if crystal { PllSource::HSE } else { PllSource::HSI };
     let prediv = if crystal { PllPreDiv::from_bits((CRYSTAL_HZ / PLL_INPUT_HZ) as u8) } else { PllPreDiv::DIV16 };
     let mut config = Config::default();
     let rcc = &mut config.rcc;
     rcc.hse = crystal.then_some(Hse { freq: Hertz(CRYSTAL_HZ), mode: HseMode::Oscillator });
-    rcc.hsi48 = None;
+    rcc.hsi48 = Some(Hsi48Config { sync_from_usb: true });
+    rcc.mux.usbsel = Usbsel::HSI48;
     rcc.pll1 = Some(Pll {
         source,
         prediv,
@@ -62,6 +68,16 @@ fn config<const CRYSTAL_HZ: u32>(crystal: bool) -> Config {
     rcc.apb3_pre = APBPrescaler::DIV2;
     rcc.apb4_pre = APBPrescaler::DIV2;
     config
+}
+
+/// Selects the host's frames on OTG_FS, which the manual calls USB2, as what trims USB's clock; embassy selects OTG_HS.
+fn trim_usb_clock() {
+    /// USB2 in the field SYNCSRC.
+    const USB2: Syncsrc = Syncsrc::_RESERVED_3;
+    // The source may change while the counter is off.
+    CRS.cr().modify(|cr| cr.set_cen(false));
+    CRS.cfgr().modify(|cfgr| cfgr.set_syncsrc(USB2));
+    CRS.cr().modify(|cr| cr.set_cen(true));
 }
 
 /// Handles a failed crystal: the core runs at 64 MHz, and is set to 400 MHz again within a few control periods.

@@ -2,6 +2,7 @@
 //! board sets.
 #![no_std]
 
+pub mod boot_loader;
 pub mod clocks;
 pub mod flash;
 pub mod reset;

@@ -10,7 +10,7 @@
 
 use afbc_link::{
     Address, Answer, Axes, Command, Counters, Decoder, Downlink, ExternalTarget, FRAME_MAX, HealthArray, MavCmd,
-    MavSeverity, Message, PositionTarget, Sender, StatesRefused, Uplink,
+    MavSeverity, Message, PositionTarget, Reboot, Sender, StatesRefused, Uplink,
 };
 use afbc_types::{Axis, PerAxis, PoseSigmas, RotorSpeeds, Setpoint, State};
 use mavlink::dialects::common::{
@@ -369,6 +369,13 @@ fn commands() {
         assert_eq!(read(arm, -0.0, 21196.0), Command::Kill);
         for param1 in [0.5, -1.0, 2.0, f32::NAN, f32::INFINITY] {
             assert_eq!(read(arm, param1, 21196.0), Command::Denied(400));
+        }
+        let reboot = MavCmd::MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN;
+        assert_eq!(read(reboot, 1.0, 0.0), Command::Reboot(Reboot::Program));
+        assert_eq!(read(reboot, 3.0, 0.0), Command::Reboot(Reboot::BootLoader));
+        // Nothing, shut down, and what is neither.
+        for param1 in [0.0, 2.0, 2.5, 4.0, -1.0, f32::NAN] {
+            assert_eq!(read(reboot, param1, 0.0), Command::Denied(246));
         }
         assert_eq!(read(MavCmd::MAV_CMD_USER_1, 0.5, f32::NAN), Command::Engage);
         assert_eq!(read(MavCmd::MAV_CMD_NAV_LAND, 1.0, 0.0), Command::Land);

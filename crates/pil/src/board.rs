@@ -1,8 +1,8 @@
 //! The `flight` image on an emulated board.
 
 use crate::Error;
-use crate::clock_tree::{self, ClockTree};
-use crate::gdb::{self, Gdb};
+use crate::clock_tree::{self, ClockTree, RTC_BKP0R};
+use crate::gdb::{self, Gdb, Watch};
 use crate::qemu::{self, Qemu};
 use object::{Object, ObjectSection};
 use std::io::{Read, Write};
@@ -54,19 +54,24 @@ impl EmulatedBoard {
         EmulatedBoard::boot_with(elf, false)
     }
 
+    /// Boots the image after a reset that left `word` in the first backup register; returns what it leaves there when
+    /// it looks at a vector table at `vectors`, which is not emulated.
+    ///
+    /// # Errors
+    /// If QEMU or the image is missing, or the image does not go there.
+    pub fn boot_to_loader(elf: &Path, word: u32, vectors: u32) -> Result<u32, Error> {
+        let (_qemu, mut gdb) = start(elf)?;
+        let mut clock_tree = ClockTree::new(&mut gdb, true)?;
+        clock_tree.boot_system_memory(&mut gdb, word)?;
+        gdb.watch(Watch::Access, vectors)?;
+        match gdb.run(WRITE_TIMEOUT)? {
+            Some(address) if address == vectors => Ok(clock_tree.register(RTC_BKP0R)),
+            other => Err(Error::Protocol(format!("no vector table at {vectors:#x}, but an access to {other:x?}"))),
+        }
+    }
+
     fn boot_with(elf: &Path, crystal: bool) -> Result<Self, Error> {
-        let serial = [
-            "-S",
-            "-serial",
-            "unix:usart1,server=on,wait=off",
-            "-chardev",
-            "socket,path=gdb,server=on,wait=off,id=gdb",
-            "-gdb",
-            "chardev:gdb",
-        ];
-        let arguments = [qemu::count_instructions(qemu::SHIFT).as_slice(), &serial.map(String::from)].concat();
-        let qemu = Qemu::start(elf, Qemu::folder()?, &[qemu::OLIMEX], &arguments)?;
-        let mut gdb = Gdb::connect(&qemu.path("gdb"))?;
+        let (qemu, mut gdb) = start(elf)?;
         let usart1 = gdb::connect(&qemu.path("usart1"))?;
         usart1.set_write_timeout(Some(WRITE_TIMEOUT))?;
         let received = listen(usart1.try_clone()?);
@@ -136,6 +141,23 @@ impl EmulatedBoard {
             Err(RecvTimeoutError::Disconnected) => Err(Error::Protocol("USART1 was closed".into())),
         }
     }
+}
+
+/// Starts the emulator, halted at reset.
+fn start(elf: &Path) -> Result<(Qemu, Gdb), Error> {
+    let serial = [
+        "-S",
+        "-serial",
+        "unix:usart1,server=on,wait=off",
+        "-chardev",
+        "socket,path=gdb,server=on,wait=off,id=gdb",
+        "-gdb",
+        "chardev:gdb",
+    ];
+    let arguments = [qemu::count_instructions(qemu::SHIFT).as_slice(), &serial.map(String::from)].concat();
+    let qemu = Qemu::start(elf, Qemu::folder()?, &[qemu::OLIMEX], &arguments)?;
+    let gdb = Gdb::connect(&qemu.path("gdb"))?;
+    Ok((qemu, gdb))
 }
 
 /// Returns the address of the idle loop's sleep instruction.

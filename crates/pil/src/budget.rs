@@ -61,7 +61,7 @@ pub struct Reach {
     pub indirect: Vec<String>,
 }
 
-/// Executors' wakers, the targets of all calls through a pointer except those in [`EXECUTORS`].
+/// Executors' wakers, the targets of all calls through a pointer except those in [`EXECUTORS`] and by [`USB_CALLERS`].
 const WAKER: [&str; 3] =
     ["embassy_executor::raw::waker::wake", "embassy_executor::raw::waker::clone", "embassy_executor::raw::waker::drop"];
 
@@ -70,20 +70,31 @@ const WAKER: [&str; 3] =
 const EXECUTORS: [(&str, &[&str]); 3] = [
     ("CAN2_TX", &["firmware::control::tick", "chip_stm32::motors::encode"]),
     ("CAN2_RX0", &["firmware::comms::report"]),
-    ("CAN2_RX1", &["firmware::housekeeping::deepest_stack", "firmware::parameters::keep"]),
+    (
+        "CAN2_RX1",
+        &[
+            "firmware::housekeeping::deepest_stack",
+            "firmware::parameters::keep",
+            "chip_stm32::usb::claim",
+            "chip_stm32::usb::__port_task::__port_task_inner_function::{{closure}}",
+        ],
+    ),
 ];
+/// The callers of what a USB class does about requests, by pointer, and these functions.
+const USB_CALLERS: [&str; 2] = ["chip_stm32::usb::", "embassy_usb::"];
+const USB_CLASS: [&str; 2] = ["embassy_usb::class::cdc_acm::Control", "embassy_usb::Handler::"];
 /// Name of the function of every task.
 const POLL: &str = "embassy_executor::raw::TaskStorage<F>::poll";
 
 /// Interrupts of the flight image by priority, highest first; those of one level do not nest.
-pub const LEVELS: [(&str, &str); 7] = [
-    ("-2", "NonMaskableInt"),
-    ("1", "SysTick"),
-    ("2", "USART1"),
-    ("4", "CAN2_TX"),
-    ("6", "DMA2_STREAM1"),
-    ("8", "CAN2_RX0"),
-    ("12", "CAN2_RX1"),
+pub const LEVELS: [(&str, &[&str]); 7] = [
+    ("-2", &["NonMaskableInt"]),
+    ("1", &["SysTick"]),
+    ("2", &["USART1"]),
+    ("4", &["CAN2_TX"]),
+    ("6", &["DMA2_STREAM1"]),
+    ("8", &["CAN2_RX0"]),
+    ("12", &["CAN2_RX1", "OTG_FS"]),
 ];
 /// Bytes that the processor pushes on an interrupt: 26 words with those of the FPU, and 1 for alignment.
 pub const FRAME_BYTES: u32 = 108;
@@ -201,6 +212,10 @@ impl Linked {
                 for mark in *marks {
                     callees.insert(self.task(mark)?);
                 }
+            }
+            if USB_CALLERS.iter().any(|caller| function.name.starts_with(caller)) {
+                let is_class = |function: &Function| USB_CLASS.iter().any(|name| function.name.contains(name));
+                callees.extend(self.functions.iter().filter(|(_, f)| is_class(f)).map(|(address, _)| *address));
             }
         }
         Ok(callees)

@@ -25,9 +25,13 @@ const PWR_CR: u32 = 0x4000_7000;
 const FLASH_OPTCR: u32 = 0x4002_3C14;
 const DBGMCU_IDCODE: u32 = 0xE004_2000;
 const SYST_CSR: u32 = 0xE000_E010;
+/// First backup register (26.6.20), which a reset does not change.
+pub const RTC_BKP0R: u32 = 0x4000_2850;
+/// What is at address 0 (9.2.1); 1: the system memory.
+const SYSCFG_MEMRMP: u32 = 0x4001_3800;
 
 /// Every register watched, with its reset value; option bytes as delivered, on a chip of revision 2.
-const WATCHED: [(u32, u32); 12] = [
+const WATCHED: [(u32, u32); 14] = [
     (RCC_CR, 0x0000_0083),
     (RCC_PLLCFGR, 0x2400_3010),
     (RCC_CFGR, 0),
@@ -40,6 +44,8 @@ const WATCHED: [(u32, u32); 12] = [
     (FLASH_OPTCR, 0x0FFF_AAED),
     (DBGMCU_IDCODE, 0x1007_6413),
     (SYST_CSR, 0),
+    (RTC_BKP0R, 0),
+    (SYSCFG_MEMRMP, 0),
 ];
 
 // Bits of RCC_CR, RCC_CFGR and RCC_CIR.
@@ -81,6 +87,13 @@ impl ClockTree {
     /// accesses. The processor is halted again.
     pub(crate) fn boot(&mut self, gdb: &mut Gdb) -> Result<usize, Error> {
         self.serve(gdb, SYST_CSR, 1)
+    }
+
+    /// Runs a halted processor from a reset that left `word` in the first backup register, until the system memory is
+    /// at address 0.
+    pub(crate) fn boot_system_memory(&mut self, gdb: &mut Gdb, word: u32) -> Result<usize, Error> {
+        self.written.insert(RTC_BKP0R, word);
+        self.serve(gdb, SYSCFG_MEMRMP, 1)
     }
 
     /// Stops the crystal and does the hardware's part of the clock security system (RM0090, 7.2.7). True if that raises

@@ -14,6 +14,7 @@ use pil::exercise::motion;
 use pil::gdb::{PC, SP, XPSR};
 use pil::{EmulatedBoard, Image};
 use std::collections::HashSet;
+use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 /// Far longer than needed, even on a busy machine.
@@ -115,6 +116,18 @@ fn it_boots_ticks_and_listens() {
     talk.until(None, |heard| heard.heartbeats > 0 && heard.health.rate_hz > 0.0);
     assert!(RATE_HZ.contains(&talk.heard.health.rate_hz), "{:?}", talk.heard);
     talk.ask();
+}
+
+/// The system memory's place (RM0090, table 5), where the chip has its boot loader.
+const SYSTEM_MEMORY: u32 = 0x1FFF_0000;
+/// What the command into the boot loader leaves for the next start (`chips/stm32/src/boot_loader.rs`).
+const WANTED: u32 = 0xB007_4DF0;
+
+#[test]
+fn it_enters_the_boot_loader_once_if_that_is_wanted() {
+    let boot = |elf: PathBuf| EmulatedBoard::boot_to_loader(&elf, WANTED, SYSTEM_MEMORY);
+    let Some(left) = start_or_skip(Image::Flight, boot) else { return };
+    assert_eq!(left, 0);
 }
 
 #[test]
@@ -225,8 +238,8 @@ fn the_flight_image_has_a_log() {
     }
 }
 
-/// Address range of the stack, at the bottom of the RAM (`memory.x`).
-const STACK: std::ops::Range<u32> = 0x2000_0000..0x2001_0000;
+/// Address range of the stack, in the core-coupled memory (`memory.x`).
+const STACK: std::ops::Range<u32> = 0x1000_0000..0x1001_0000;
 const HARD_FAULT: u32 = 3;
 
 #[test]

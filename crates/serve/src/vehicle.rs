@@ -7,7 +7,7 @@ use crate::reported_sensors::ReportedSensors;
 use crate::world_changes::WorldChanges;
 use afbc_flight_core::Mode;
 use afbc_hil::{Host, HostTick};
-use afbc_link::{Address, Decoder, Uplink};
+use afbc_link::{Address, Decoder, Reboot, Uplink};
 use afbc_onboard::Link;
 use afbc_reader::words::out_of_range;
 use afbc_scenario::Scenario;
@@ -111,7 +111,7 @@ impl ServedVehicle {
             self.host.comms().warn(error.reason());
         }
         // What was sent before has left.
-        if self.host.comms().wants_reboot() {
+        if self.host.comms().wants_reboot().is_some() {
             self.restart();
         }
         bytes
@@ -186,7 +186,7 @@ fn power_up(
         Some(keeper) => keeper.power_up(scenario, link, |notice| notices.push(notice.into()))?,
         None => Host::linked(scenario.vehicle_file.as_ref(), link)?,
     };
-    let setup = Setup { bytes_per_s: BYTES_PER_S, reboots: true, ..host.setup() };
+    let setup = Setup { bytes_per_s: BYTES_PER_S, reboots: &[Reboot::Program], ..host.setup() };
     Ok(host.with(setup))
 }
 

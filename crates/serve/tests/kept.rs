@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, missing_docs, reason = "tests")]
 
 use afbc_link::{
-    Address, Command, Decoder, Downlink, FRAME_MAX, ParameterName, ParameterRequest, Sender, Storage, Uplink,
+    Address, Command, Decoder, Downlink, FRAME_MAX, ParameterName, ParameterRequest, Reboot, Sender, Storage, Uplink,
 };
 use afbc_scenario::built_in;
 use afbc_serve::{ParameterFile, Server, fleet};
@@ -87,7 +87,7 @@ fn what_is_set_is_there_after_a_restart() {
 fn a_reboot_restarts_the_vehicle() {
     let mut server = served(&fresh("reboot"));
     set(&mut server, "MIS_TAKEOFF_ALT", 4.0);
-    let (messages, lines) = exchange(&mut server, Uplink::Command(Command::Reboot));
+    let (messages, lines) = exchange(&mut server, Uplink::Command(Command::Reboot(Reboot::Program)));
     assert!(messages.iter().any(|message| matches!(message, Downlink::Answer { command: 246, .. })));
     assert!(lines.iter().any(|line| line.ends_with("vehicle 1: restarted")), "{lines:?}");
     assert_eq!(get(&mut server, "MIS_TAKEOFF_ALT"), 4.0);
@@ -101,7 +101,7 @@ fn a_reboot_restarts_the_vehicle() {
     let default = get(&mut server, "MIS_TAKEOFF_ALT");
     set(&mut server, "MIS_TAKEOFF_ALT", 4.0);
     assert_eq!(get(&mut server, "MIS_TAKEOFF_ALT"), 4.0);
-    exchange(&mut server, Uplink::Command(Command::Reboot));
+    exchange(&mut server, Uplink::Command(Command::Reboot(Reboot::Program)));
     assert_eq!(get(&mut server, "MIS_TAKEOFF_ALT"), default);
 }
 
@@ -133,7 +133,7 @@ fn the_system_id_is_a_parameter() {
     assert_eq!(whole(&mut server, "MAV_SYS_ID"), 1);
     set(&mut server, "MAV_SYS_ID", 42.0);
     assert_eq!((heartbeat_of(&mut server, 0), server.systems()), (1, vec![1]));
-    exchange(&mut server, Uplink::Command(Command::Reboot));
+    exchange(&mut server, Uplink::Command(Command::Reboot(Reboot::Program)));
     assert_eq!((heartbeat_of(&mut server, 0), server.systems()), (42, vec![42]));
     // It answers to its new name, and is known by it.
     assert_eq!(whole(&mut server, "MAV_SYS_ID"), 42);
@@ -149,7 +149,7 @@ fn the_system_id_is_a_parameter() {
     let mut server = Server::kept(&scenarios, 5, keepers()).unwrap();
     assert_eq!((server.systems(), server.ambiguous()), (vec![5, 6, 7], None));
     set(&mut server, "MAV_SYS_ID", 7.0);
-    let (_, lines) = exchange(&mut server, Uplink::Command(Command::Reboot));
+    let (_, lines) = exchange(&mut server, Uplink::Command(Command::Reboot(Reboot::Program)));
     assert!(lines.iter().any(|line| line.contains("several vehicles have the system id 7")), "{lines:?}");
     assert_eq!((server.systems(), server.ambiguous()), (vec![7, 6, 7], Some(7)));
     drop(server);

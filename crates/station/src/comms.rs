@@ -17,7 +17,9 @@ use afbc_flight_core::supervisor::COAST_US;
 use afbc_flight_core::tracker::{POSE_AGE_MAX_US, Refused, Sighting};
 use afbc_flight_core::{Mode, Stamped, Tracker};
 use afbc_guidance::{BatteryReading, Cause, ModeReason, Notice};
-use afbc_link::{Address, Decoder, Downlink, FRAME_MAX, MavSeverity, PositionTarget, Sender, StatesRefused, Uplink};
+use afbc_link::{
+    Address, Decoder, Downlink, FRAME_MAX, MavSeverity, PositionTarget, Reboot, Sender, StatesRefused, Uplink,
+};
 use afbc_onboard::ControlInputs;
 use afbc_onboard::Report;
 use afbc_onboard::parameters::{ParameterTable, RecordChange};
@@ -104,8 +106,8 @@ impl Comms {
         self.dispatcher.texts.put(MavSeverity::MAV_SEVERITY_WARNING, text);
     }
 
-    /// True if a station has asked the disarmed vehicle to reboot: what has been sent should leave first.
-    pub fn wants_reboot(&self) -> bool {
+    /// Returns what a station has asked the disarmed vehicle to reboot into: what has been sent should leave first.
+    pub fn wants_reboot(&self) -> Option<Reboot> {
         self.dispatcher.reboot
     }
 

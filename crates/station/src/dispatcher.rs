@@ -16,7 +16,7 @@ use crate::setup::Setup;
 use afbc_guidance::Order;
 use afbc_link::{
     Address, Clock, ControlAnswer, DataStream, Downlink, Interval, MavSeverity, Mission, ParameterError,
-    ParameterRequest, Question, QuestionRefusal, Uplink,
+    ParameterRequest, Question, QuestionRefusal, Reboot, Uplink,
 };
 use afbc_onboard::ControlInputs;
 use afbc_types::Setpoint;
@@ -71,10 +71,10 @@ pub(crate) struct Dispatcher {
     heard_us: Option<u64>,
     /// Wish to know what speaks against arming, and whether one of the stations that have it may arm.
     checks: Option<bool>,
-    /// True if the shell can reboot.
-    reboots: bool,
-    /// True if a station has asked for a reboot.
-    pub(crate) reboot: bool,
+    /// What the shell can reboot into.
+    reboots: &'static [Reboot],
+    /// What a station has asked to reboot into.
+    pub(crate) reboot: Option<Reboot>,
 }
 
 impl Dispatcher {
@@ -96,7 +96,7 @@ impl Dispatcher {
             heard_us: None,
             checks: None,
             reboots: setup.reboots,
-            reboot: false,
+            reboot: None,
         }
     }
 

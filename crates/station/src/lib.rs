@@ -26,6 +26,7 @@ pub mod parameters;
 pub mod services;
 mod setup;
 
+pub use afbc_link::Reboot;
 pub use comms::{CLOCK_FAILED, Comms, REPORT_MAX, TICK_OFF};
 pub use services::commands::{ANSWERS_MAX, ANSWERS_PER_TICK, BUSY, FORGOTTEN_US, NO_ORIGIN, NOT_IN_CONTROL, NOT_KNOWN};
 pub use services::status::AuxSensors;

@@ -1,5 +1,6 @@
 //! What shell and parameters decide about the link.
 
+use afbc_link::Reboot;
 use afbc_onboard::Link;
 
 /// What shell and parameters decide about the link.
@@ -10,15 +11,15 @@ pub struct Setup {
     /// What everything but rotor commands for a simulator may take of the link: while these are sent, 5/9 of it
     /// \[bytes/s\].
     pub bytes_per_s: u32,
-    /// True if the shell reboots when it is [asked to](crate::Comms::wants_reboot).
-    pub reboots: bool,
+    /// What the shell reboots into when it is [asked to](crate::Comms::wants_reboot).
+    pub reboots: &'static [Reboot],
 }
 
 impl Setup {
     /// What the parameters make of it: nine tenths of the line, whose bytes have ten bits; no reboot.
     pub fn of(link: &Link) -> Self {
         // In range: at most 250.
-        Setup { system: link.system as u8, bytes_per_s: link.baud / 100 * 9, reboots: false }
+        Setup { system: link.system as u8, bytes_per_s: link.baud / 100 * 9, reboots: &[] }
     }
 }
 

@@ -8,8 +8,8 @@ use afbc_guidance::{FlightMode, Order, OrderRefusal};
 use afbc_link::telemetry::BatteryStatus;
 use afbc_link::{
     Address, Answer, AttitudeAndThrust, Axes, Command, Datum, Downlink, ExternalTarget, FRAME_MAX, Height,
-    ManualControl, Mission, MissionItem, MissionResult, Place, Plan, PositionTarget, Sender, Storage, Telemetry,
-    Uplink,
+    ManualControl, Mission, MissionItem, MissionResult, Place, Plan, PositionTarget, Reboot, Sender, Storage,
+    Telemetry, Uplink,
 };
 use afbc_onboard::Report;
 use afbc_onboard::parameters::RecordChange;
@@ -263,7 +263,8 @@ fn orders_are_for_the_station_in_control() {
         Command::SelectStandardMode(7),
         Command::StartMission(0),
         Command::SetCurrent(0),
-        Command::Reboot,
+        Command::Reboot(Reboot::Program),
+        Command::Reboot(Reboot::BootLoader),
         Command::Arm,
         Command::Engage,
         Command::Storage(Storage::Reset),
@@ -358,20 +359,29 @@ fn intervals_are_set_and_reported_on_the_wire() {
     }
 }
 
+/// Each program only where the shell can enter it, and neither while the motors may turn: PX4 refuses likewise.
 #[test]
 fn it_reboots_where_it_can_and_disarmed_only() {
-    let mut plain = bench(true);
-    refused(&mut plain, Command::Reboot, Answer::Unsupported);
-    assert!(!plain.comms.wants_reboot());
-    for armed in [false, true] {
+    let both: &[Reboot] = &[Reboot::Program, Reboot::BootLoader];
+    for (reboots, into, armed, expected) in [
+        (&[] as &[_], Reboot::Program, false, Answer::Unsupported),
+        (&[Reboot::Program], Reboot::BootLoader, false, Answer::Unsupported),
+        (&[Reboot::Program], Reboot::BootLoader, true, Answer::Unsupported),
+        (&[Reboot::Program], Reboot::Program, false, Answer::Accepted),
+        (both, Reboot::Program, false, Answer::Accepted),
+        (both, Reboot::BootLoader, false, Answer::Accepted),
+        (both, Reboot::Program, true, Answer::Refused(Refusal::AlreadyArmed as i32)),
+        (both, Reboot::BootLoader, true, Answer::Refused(Refusal::AlreadyArmed as i32)),
+    ] {
         let mut bench = if armed { Bench::flying() } else { Bench::new() };
-        bench.comms = Comms::with(Setup { reboots: true, ..Setup::default() });
+        bench.comms = Comms::with(Setup { reboots, ..Setup::default() });
         bench.step();
-        bench.hear(Uplink::Command(Command::Reboot));
+        bench.hear(Uplink::Command(Command::Reboot(into)));
+        // The answer leaves before the shell acts.
         let said = bench.step().1;
-        let expected = if armed { Answer::Refused(Refusal::AlreadyArmed as i32) } else { Answer::Accepted };
-        let reported = said.iter().any(|it| matches!(it, Downlink::Answer { answer, .. } if *answer == expected));
-        assert!(reported && bench.comms.wants_reboot() != armed, "{said:?}");
+        let answered = said.iter().any(|it| matches!(it, Downlink::Answer { answer, .. } if *answer == expected));
+        let wanted = Some(into).filter(|_| expected == Answer::Accepted);
+        assert!(answered && bench.comms.wants_reboot() == wanted, "{reboots:?} {into:?} {armed}: {said:?}");
     }
 }
 

@@ -7,7 +7,7 @@ mod common;
 
 use afbc_flight_core::Request;
 use afbc_guidance::Orders;
-use afbc_link::{Address, Answer, Command, Downlink, FRAME_MAX, Message, Mission, Plan, Sender, Uplink};
+use afbc_link::{Address, Answer, Command, Downlink, FRAME_MAX, Message, Mission, Plan, Reboot, Sender, Uplink};
 use afbc_station::services::control::is_needed_for;
 use afbc_types::State;
 use common::{Bench, STATION};
@@ -178,7 +178,7 @@ proptest! {
             if let Some(asked) = update.inbox.asked() {
                 prop_assert!(matches!(asked.value, Request::Disarm | Request::Kill), "{:?}", sent);
             }
-            prop_assert!(!bench.comms.wants_reboot());
+            prop_assert!(bench.comms.wants_reboot().is_none());
             bench.step();
         }
     }
@@ -200,7 +200,7 @@ fn commands_that_do_not_need_control() {
         Command::Other(1),
     ];
     assert!(free.into_iter().all(|command| !is_needed_for(command)));
-    let bound = [Command::Arm, Command::Engage, Command::Land, Command::Return, Command::Reboot];
+    let bound = [Command::Arm, Command::Engage, Command::Land, Command::Return, Command::Reboot(Reboot::BootLoader)];
     assert!(bound.into_iter().all(is_needed_for));
     let page = include_str!("../../../docs/security.md");
     for word in ["disarm", "kill", "message", "interval"] {

@@ -435,7 +435,7 @@ fn needs_control(command: &Command) -> bool {
             | Command::Home(_)
             | Command::StartMission(_)
             | Command::SetCurrent(_)
-            | Command::Reboot
+            | Command::Reboot(_)
             | Command::Storage(_)
     )
 }

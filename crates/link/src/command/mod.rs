@@ -68,8 +68,8 @@ pub enum Command {
     RequestProtocol,
     /// MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES (520).
     RequestCapabilities,
-    /// MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN (246) with 1, or 3, which stays in the boot loader where there is one.
-    Reboot,
+    /// MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN (246).
+    Reboot(Reboot),
     /// MAV_CMD_PREFLIGHT_STORAGE (245) of the parameters.
     Storage(Storage),
     /// MAV_CMD_RUN_PREARM_CHECKS (401).
@@ -78,6 +78,15 @@ pub enum Command {
     Denied(u16),
     /// Any other command, by number, of any dialect: answered with "unsupported".
     Other(u16),
+}
+
+/// What runs after a reboot.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Reboot {
+    /// The same program: 1.
+    Program,
+    /// The boot loader, which waits for another program: 3.
+    BootLoader,
 }
 
 /// What is done with the stored parameters.
@@ -164,7 +173,7 @@ impl Command {
             Command::RequestMessage { .. } => REQUEST_MESSAGE,
             Command::RequestProtocol => REQUEST_PROTOCOL,
             Command::RequestCapabilities => REQUEST_CAPABILITIES,
-            Command::Reboot => REBOOT,
+            Command::Reboot(_) => REBOOT,
             Command::Storage(_) => STORAGE,
             Command::CheckArming => CHECK_ARMING,
             Command::Denied(id) | Command::Other(id) => id,

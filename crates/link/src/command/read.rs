@@ -2,8 +2,8 @@
 
 use super::{
     ARM_DISARM, CHECK_ARMING, CUSTOM_MODE, Command, ENGAGE, FORCED, GET_INTERVAL, HOME, LAND, REBOOT, REPOSITION,
-    REQUEST_CAPABILITIES, REQUEST_MESSAGE, REQUEST_PROTOCOL, RETURN, SELECT_MODE, SELECT_STANDARD_MODE, SET_CURRENT,
-    SET_INTERVAL, SPEED, START_MISSION, STORAGE, Storage, TAKE_OFF, USUAL,
+    REQUEST_CAPABILITIES, REQUEST_MESSAGE, REQUEST_PROTOCOL, RETURN, Reboot, SELECT_MODE, SELECT_STANDARD_MODE,
+    SET_CURRENT, SET_INTERVAL, SPEED, START_MISSION, STORAGE, Storage, TAKE_OFF, USUAL,
 };
 use crate::address::Address;
 use crate::message::{Fault, MessageFormat};
@@ -107,7 +107,8 @@ fn known(id: u16, [p1, p2, p3, p4]: [f32; 4], place: Option<Place>) -> Option<Co
         REQUEST_MESSAGE => Command::RequestMessage { message: whole(p1)?, index: whole(p2).unwrap_or(0) },
         REQUEST_PROTOCOL if p1 == 1.0 => Command::RequestProtocol,
         REQUEST_CAPABILITIES if p1 == 1.0 => Command::RequestCapabilities,
-        REBOOT if p1 == 1.0 || p1 == 3.0 => Command::Reboot,
+        REBOOT if p1 == 1.0 => Command::Reboot(Reboot::Program),
+        REBOOT if p1 == 3.0 => Command::Reboot(Reboot::BootLoader),
         STORAGE if p1 == 0.0 => Command::Storage(Storage::Load),
         STORAGE if p1 == 1.0 => Command::Storage(Storage::Save),
         STORAGE if p1 == 2.0 => Command::Storage(Storage::Reset),

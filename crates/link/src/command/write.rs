@@ -1,7 +1,7 @@
 //! Writing of commands, to everyone.
 
 use super::read::{INT, LONG};
-use super::{Command, FORCED, Storage, USUAL};
+use super::{Command, FORCED, Reboot, Storage, USUAL};
 use crate::address::Address;
 use crate::message::PAYLOAD_MAX;
 use crate::place::{Datum, Height, Place, frame};
@@ -30,7 +30,10 @@ pub(crate) fn write(command: Command, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, 
         Command::SetInterval { message, interval_us } => ([message as f32, interval_us as f32, 0.0, 0.0], None),
         Command::GetInterval(message) => ([message as f32, 0.0, 0.0, 0.0], None),
         Command::RequestMessage { message, index } => ([message as f32, index as f32, 0.0, 0.0], None),
-        Command::RequestProtocol | Command::RequestCapabilities | Command::Reboot => ([1.0, 0.0, 0.0, 0.0], None),
+        Command::RequestProtocol | Command::RequestCapabilities | Command::Reboot(Reboot::Program) => {
+            ([1.0, 0.0, 0.0, 0.0], None)
+        }
+        Command::Reboot(Reboot::BootLoader) => ([3.0, 0.0, 0.0, 0.0], None),
         Command::Storage(storage) => {
             let action = match storage {
                 Storage::Load => 0.0,

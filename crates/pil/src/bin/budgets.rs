@@ -15,11 +15,13 @@ const DOCUMENT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/budgets.
 const BEGIN: &str = "<!-- budgets: written by cargo run --release -p pil --bin budgets -->\n";
 const END: &str = "<!-- end -->\n";
 
+/// Name of the function that ends the program for the chip's boot loader.
+const BOOT_LOADER: &str = "chip_stm32::boot_loader::enter";
 /// Name of the control tick's function.
 const TICK: &str = "firmware::control::tick";
 
 /// Interrupts whose tasks are not needed in flight: a panic in one of them ends that task alone.
-const DISPENSABLE: [&str; 2] = ["CAN2_RX0", "CAN2_RX1"];
+const DISPENSABLE: [&str; 3] = ["CAN2_RX0", "CAN2_RX1", "OTG_FS"];
 /// Panics in the motors' output, all in its driver (`docs/budgets.md` lists them).
 const VITAL_PANICS: u64 = 6;
 
@@ -61,8 +63,9 @@ fn run() -> Result<bool, Error> {
 
     // The deepest chain of start-up, and on top of it one interrupt of each level.
     let start_up = flight.reach("main")?;
-    if !start_up.indirect.is_empty() {
-        let callers = start_up.indirect.join(", ");
+    let callers: Vec<_> = start_up.indirect.iter().map(String::as_str).filter(|name| *name != BOOT_LOADER).collect();
+    if !callers.is_empty() {
+        let callers = callers.join(", ");
         return Err(Error::Protocol(format!("start-up calls through a pointer, which no proof follows, in {callers}")));
     }
     let mut nested = start_up.stack_bytes;
@@ -71,15 +74,21 @@ fn run() -> Result<bool, Error> {
         println!("    {bytes:6} {name}");
     }
     let (mut vital, mut dispensable) = (tick.panics.clone(), Vec::new());
-    for (priority, interrupt) in LEVELS {
-        let reach = flight.reach(interrupt)?;
-        nested += reach.stack_bytes + FRAME_BYTES;
-        println!("{:6} bytes of stack: {interrupt}, priority {priority}", reach.stack_bytes + FRAME_BYTES);
-        let panics = if DISPENSABLE.contains(&interrupt) { &mut dispensable } else { &mut vital };
-        panics.extend(reach.panics);
+    for (priority, interrupts) in LEVELS {
+        let mut deepest = 0;
+        for interrupt in interrupts {
+            let reach = flight.reach(interrupt)?;
+            deepest = deepest.max(reach.stack_bytes + FRAME_BYTES);
+            println!("{:6} bytes of stack: {interrupt}, priority {priority}", reach.stack_bytes + FRAME_BYTES);
+            let panics = if DISPENSABLE.contains(interrupt) { &mut dispensable } else { &mut vital };
+            panics.extend(reach.panics);
+        }
+        nested += deepest;
     }
-    vital.sort();
-    vital.dedup();
+    for panics in [&mut vital, &mut dispensable] {
+        panics.sort();
+        panics.dedup();
+    }
     for chain in &vital {
         println!("stops the motors: {}", chain.join(" > "));
     }
@@ -112,9 +121,9 @@ fn run() -> Result<bool, Error> {
         line("panics that the control tick can reach", "", tick.panics.len() as u64, Some(0)),
         line("double arithmetic that the control tick can reach", "", tick.doubles.len() as u64, Some(0)),
         line("panics that other interrupts needed in flight can reach", "", vital.len() as u64, Some(VITAL_PANICS)),
-        line("panics that link and housekeeping can reach, contained", "", dispensable.len() as u64, None),
-        line("flash", "bytes", flight.flash_bytes, Some(384 * 1024)),
-        line("static RAM without the stack", "bytes", flight.ram_bytes, Some(41 * 1024)),
+        line("panics that link, housekeeping and USB can reach, contained", "", dispensable.len() as u64, None),
+        line("flash", "bytes", flight.flash_bytes, Some(416 * 1024)),
+        line("static RAM without the stack", "bytes", flight.ram_bytes, Some(46 * 1024)),
     ];
     let table = table(&budgets);
     print!("{table}");

@@ -41,10 +41,10 @@ impl Dispatcher {
             Command::RequestMessage { message, index } => self.request(message, index),
             Command::RequestProtocol => self.request(id::PROTOCOL_VERSION, 0),
             Command::RequestCapabilities => self.request(id::AUTOPILOT_VERSION, 0),
-            Command::Reboot if !self.reboots => Answer::Unsupported,
-            Command::Reboot if self.status.mode.armed() => Answer::Refused(Refusal::AlreadyArmed as i32),
-            Command::Reboot => {
-                self.reboot = true;
+            Command::Reboot(into) if !self.reboots.contains(&into) => Answer::Unsupported,
+            Command::Reboot(_) if self.status.mode.armed() => Answer::Refused(Refusal::AlreadyArmed as i32),
+            Command::Reboot(into) => {
+                self.reboot = Some(into);
                 Answer::Accepted
             }
             Command::Storage(storage) => self.storage(storage),

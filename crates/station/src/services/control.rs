@@ -119,7 +119,7 @@ pub fn is_needed_for(command: Command) -> bool {
         | Command::Home(_)
         | Command::StartMission(_)
         | Command::SetCurrent(_)
-        | Command::Reboot
+        | Command::Reboot(_)
         | Command::Storage(_) => true,
         Command::Disarm
         | Command::Kill

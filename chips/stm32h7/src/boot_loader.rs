@@ -1,0 +1,24 @@
+//! The boot loader in the chip's system memory.
+
+use chip_stm32::boot_loader;
+use embassy_stm32::pac::PWR;
+
+/// Where it begins within the system memory (AN2606, STM32H743).
+const VECTORS: usize = 0x1FF0_9800;
+
+/// Restarts the chip into it.
+pub fn restart() -> ! {
+    unlock();
+    boot_loader::restart()
+}
+
+/// Enters it after a [`restart`]. To be called first after a reset.
+pub fn enter_if_wanted() {
+    unlock();
+    boot_loader::enter_if_wanted(VECTORS, || ());
+}
+
+/// Makes the backup registers writable.
+fn unlock() {
+    PWR.cr1().modify(|power| power.set_dbp(true));
+}
