@@ -1,7 +1,7 @@
 //! From the inertial sensor's own samples to those of a sensor at the centre of mass, along the body's axes.
 
 use crate::measurement::ImuSample;
-use afbc_types::{Mounting, sin_cos};
+use afbc_types::{Mounting, SensorCalibration};
 use nalgebra::{Matrix3, Vector3};
 
 /// Longest time between two samples whose rates give the angular acceleration \[us\]. With a longer one the lever arm's
@@ -14,8 +14,9 @@ const LEVER_GAP_US: u64 = 10_000;
 /// omega = R omega_s,   f = R f_s - d omega/dt x r - omega x (omega x r)
 /// ```
 ///
-/// where d omega/dt is the difference from the last sample. The default is at the centre of mass, along the body's
-/// axes, and changes no bit.
+/// where d omega/dt is the difference from the last sample, and omega_s and f_s are what the sensor reads, less its
+/// [calibrated](SensorCalibration) errors. The default is at the centre of mass, along the body's axes, without errors,
+/// and changes no bit.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ImuCalibration {
     mounted: Option<Mounted>,
@@ -29,20 +30,36 @@ struct Mounted {
     to_body: Matrix3<f32>,
     /// r \[m\]
     position_m: Vector3<f32>,
+    gyro_offset_rad_s: Vector3<f32>,
+    accel_offset_m_s2: Vector3<f32>,
+    accel_scale: Vector3<f32>,
 }
 
 impl ImuCalibration {
-    /// Creates it for a sensor that is mounted like this; its numbers must be [valid](afbc_types::Declared::validate).
+    /// Creates it for a sensor without errors that is mounted like this; its numbers must be
+    /// [valid](afbc_types::Declared::validate).
     #[must_use]
     pub fn new(mounting: &Mounting) -> Self {
-        let mounted = (!mounting.is_plain())
-            .then(|| Mounted { to_body: to_body(&mounting.attitude_rad), position_m: mounting.position_m });
+        Self::calibrated(mounting, &SensorCalibration::DEFAULT)
+    }
+
+    /// The same for a sensor with these errors.
+    #[must_use]
+    pub fn calibrated(mounting: &Mounting, errors: &SensorCalibration) -> Self {
+        let SensorCalibration { gyro_offset_rad_s, accel_offset_m_s2, accel_scale, .. } = *errors;
+        let mounted = (!mounting.is_plain() || !errors.leaves_imu()).then(|| Mounted {
+            to_body: mounting.r_body_sensor(),
+            position_m: mounting.position_m,
+            gyro_offset_rad_s,
+            accel_offset_m_s2,
+            accel_scale,
+        });
         ImuCalibration { mounted, last: None }
     }
 
-    /// True if both are for the same mounting.
+    /// True if both correct alike: the same mounting, the same errors.
     #[must_use]
-    pub fn has_mounting_of(&self, other: &Self) -> bool {
+    pub fn corrects_like(&self, other: &Self) -> bool {
         self.mounted == other.mounted
     }
 
@@ -54,15 +71,19 @@ impl ImuCalibration {
 
     #[inline(never)]
     fn mounted(&mut self, sample: ImuSample) -> ImuSample {
-        let Some(Mounted { to_body, position_m: r }) = &self.mounted else { return sample };
-        let rates_rad_s = to_body * sample.rates_rad_s;
+        let Some(Mounted { to_body, position_m: r, gyro_offset_rad_s, accel_offset_m_s2, accel_scale }) = &self.mounted
+        else {
+            return sample;
+        };
+        let rates_rad_s = to_body * (sample.rates_rad_s - gyro_offset_rad_s);
+        let felt_m_s2 = (sample.specific_force_m_s2 - accel_offset_m_s2).component_mul(accel_scale);
         let since = self.last.map(|last| (sample.at_us.saturating_sub(last.at_us), rates_rad_s - last.rates_rad_s));
         let acceleration_rad_s2 = match since {
             Some((us @ 1..=LEVER_GAP_US, change_rad_s)) => change_rad_s * (1e6 / us as f32),
             _ => Vector3::zeros(),
         };
         let lever_m_s2 = acceleration_rad_s2.cross(r) + rates_rad_s.cross(&rates_rad_s.cross(r));
-        let specific_force_m_s2 = to_body * sample.specific_force_m_s2 - lever_m_s2;
+        let specific_force_m_s2 = to_body * felt_m_s2 - lever_m_s2;
         let corrected = ImuSample { at_us: sample.at_us, rates_rad_s, specific_force_m_s2 };
         // A sample that is no number spoils no other.
         self.last = Some(corrected).filter(|_| rates_rad_s.norm_squared().is_finite());
@@ -70,20 +91,11 @@ impl ImuCalibration {
     }
 }
 
-/// Returns R = Rz(yaw) Ry(pitch) Rx(roll).
-fn to_body(attitude_rad: &Vector3<f32>) -> Matrix3<f32> {
-    let [(sr, cr), (sp, cp), (sy, cy)] = [attitude_rad.x, attitude_rad.y, attitude_rad.z].map(sin_cos);
-    let x = Vector3::new(cy * cp, sy * cp, -sp);
-    let y = Vector3::new(cy * sp * sr - sy * cr, sy * sp * sr + cy * cr, cp * sr);
-    let z = Vector3::new(cy * sp * cr + sy * sr, sy * sp * cr - cy * sr, cp * cr);
-    Matrix3::from_columns(&[x, y, z])
-}
-
 #[cfg(test)]
 mod tests {
     use super::ImuCalibration;
     use crate::measurement::ImuSample;
-    use afbc_types::Mounting;
+    use afbc_types::{Mounting, SensorCalibration};
     use nalgebra::{Rotation3, Vector3};
     use proptest::prelude::*;
 
@@ -112,6 +124,30 @@ mod tests {
             prop_assert!((sample.rates_rad_s - omega).norm() < 1e-4);
             prop_assert!((sample.specific_force_m_s2 - force).norm() < 2e-2, "{}", sample.specific_force_m_s2 - force);
             prop_assert_eq!(sample.at_us, at_us + step_us);
+        }
+    }
+
+    proptest! {
+        /// Errors that a sensor has in its own axes are taken back before its mounting counts.
+        #[test]
+        fn errors_are_taken_back_in_the_sensors_axes(
+            attitude_rad in vector(3.0), omega in vector(8.0), force in vector(20.0), gyro_offset_rad_s in vector(0.5),
+            accel_offset_m_s2 in vector(3.0), change in vector(0.15),
+        ) {
+            let accel_scale = Vector3::repeat(1.0) + change;
+            let errors = SensorCalibration {
+                gyro_offset_rad_s, accel_offset_m_s2, accel_scale, ..SensorCalibration::DEFAULT
+            };
+            let mounting = Mounting { attitude_rad, ..Mounting::PLAIN };
+            let to_body = Rotation3::from_euler_angles(attitude_rad.x, attitude_rad.y, attitude_rad.z);
+            let read = ImuSample {
+                at_us: 1,
+                rates_rad_s: to_body.inverse() * omega + gyro_offset_rad_s,
+                specific_force_m_s2: (to_body.inverse() * force).component_div(&accel_scale) + accel_offset_m_s2,
+            };
+            let sample = ImuCalibration::calibrated(&mounting, &errors).apply(read);
+            prop_assert!((sample.rates_rad_s - omega).norm() < 1e-4);
+            prop_assert!((sample.specific_force_m_s2 - force).norm() < 1e-4);
         }
     }
 

@@ -3,6 +3,7 @@
 use crate::dispatcher::Dispatcher;
 use crate::failsafes::Failsafes;
 use crate::parameters::VALUE_BYTES;
+use crate::services::calibration::Calibrator;
 use crate::services::commands::ANSWERS_PER_TICK;
 use crate::services::modes;
 use crate::services::status::AuxSensors;
@@ -19,8 +20,8 @@ use afbc_flight_core::{Mode, Stamped, Tracker};
 use afbc_guidance::{BatteryReading, Cause, ModeReason, Notice};
 use afbc_link::{Address, Decoder, Downlink, FRAME_MAX, MavSeverity, PositionTarget, Sender, StatesRefused, Uplink};
 use afbc_onboard::ControlInputs;
-use afbc_onboard::Report;
 use afbc_onboard::parameters::{ParameterTable, RecordChange};
+use afbc_onboard::{RawReadings, Report};
 use afbc_types::{PerAxis, Pose};
 
 /// Component of the vehicle: autopilot.
@@ -260,6 +261,24 @@ impl Comms {
         }
         (self.sender, self.left) = (outlet.sender, outlet.left);
         change
+    }
+
+    /// True while the vehicle is calibrated: [`calibrate`](Self::calibrate) needs what the sensors read.
+    pub fn is_calibrating(&self) -> bool {
+        self.dispatcher.calibration.active.is_some()
+    }
+
+    /// Goes on with a calibration that a station has asked for, to be called before each
+    /// [`parameters`](Self::parameters), which sets what is found; only in a shell that
+    /// [has sensors](Setup::calibrates). `raw` is what the control tick has added since.
+    pub fn calibrate<const N: usize>(
+        &mut self,
+        calibrator: &mut Calibrator,
+        raw: &mut RawReadings,
+        table: &ParameterTable<N>,
+    ) {
+        let sample = raw.take();
+        self.dispatcher.calibrate(calibrator, sample, table);
     }
 
     /// Queues what is to be announced of a tick.
