@@ -61,7 +61,7 @@ pub fn run<B: Board>(
         link.transmitter.set_baud(table.configuration().link.baud);
     }
     let flight = control::make(table.configuration());
-    let desk = comms::make(table);
+    let desk = comms::make::<B>(table);
     board.unleash_watchdog();
     time::start(core.SYST, B::CORE_HZ);
     comms(executors.comms, desk, links);

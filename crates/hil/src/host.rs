@@ -1,6 +1,7 @@
 //! The firmware's code in this process.
 
 use super::{Autopilot, Error};
+use afbc_calibration::Sample;
 use afbc_flight_core::rate::PERIOD_US;
 use afbc_link::{Decoder, Uplink};
 use afbc_onboard::parameters::{Kept, ParameterTable, Reason, RecordChange};
@@ -37,7 +38,7 @@ trait Core {
     ) -> Report<ROTORS_MAX>;
 
     /// Goes on with a calibration.
-    fn calibrate(&mut self, comms: &mut Comms, calibrator: &mut Calibrator, raw: &mut RawReadings);
+    fn calibrate(&mut self, comms: &mut Comms, calibrator: &mut Calibrator, sample: Option<Sample>);
 
     /// Does what stations want of the parameters, and flies what has changed.
     fn parameters(&mut self, comms: &mut Comms, send: &mut dyn FnMut(&[u8])) -> Option<RecordChange>;
@@ -63,8 +64,8 @@ impl<const N: usize> Core for (Flight<N>, ParameterTable<N>) {
         report.padded()
     }
 
-    fn calibrate(&mut self, comms: &mut Comms, calibrator: &mut Calibrator, raw: &mut RawReadings) {
-        comms.calibrate(calibrator, raw, &self.1);
+    fn calibrate(&mut self, comms: &mut Comms, calibrator: &mut Calibrator, sample: Option<Sample>) {
+        comms.calibrate(calibrator, sample, &self.1);
     }
 
     fn parameters(&mut self, comms: &mut Comms, send: &mut dyn FnMut(&[u8])) -> Option<RecordChange> {
@@ -196,7 +197,7 @@ impl Host {
         } else {
             self.raw = RawReadings::NONE;
         }
-        self.flight.calibrate(&mut self.comms, &mut self.calibrator, &mut self.raw);
+        self.flight.calibrate(&mut self.comms, &mut self.calibrator, self.raw.take());
         let change = self.flight.parameters(&mut self.comms, &mut send);
         self.time_us = time_us;
         HostTick { report, bytes, change }

@@ -12,6 +12,7 @@ use crate::services::telemetry::compose;
 use crate::services::texts::{Words, reason, urgency};
 use crate::setup::Setup;
 use afbc::monitor::Norm;
+use afbc_calibration::Sample;
 use afbc_control::math::sqrt;
 use afbc_flight_core::rate;
 use afbc_flight_core::supervisor::COAST_US;
@@ -20,8 +21,8 @@ use afbc_flight_core::{Mode, Stamped, Tracker};
 use afbc_guidance::{BatteryReading, Cause, ModeReason, Notice};
 use afbc_link::{Address, Decoder, Downlink, FRAME_MAX, MavSeverity, PositionTarget, Sender, StatesRefused, Uplink};
 use afbc_onboard::ControlInputs;
+use afbc_onboard::Report;
 use afbc_onboard::parameters::{ParameterTable, RecordChange};
-use afbc_onboard::{RawReadings, Report};
 use afbc_types::{PerAxis, Pose};
 
 /// Component of the vehicle: autopilot.
@@ -270,14 +271,14 @@ impl Comms {
 
     /// Goes on with a calibration that a station has asked for, to be called before each
     /// [`parameters`](Self::parameters), which sets what is found; only in a shell that
-    /// [has sensors](Setup::calibrates). `raw` is what the control tick has added since.
+    /// [has sensors](Setup::calibrates). `sample` is what [`RawReadings`](afbc_onboard::RawReadings) have come to, if
+    /// they have since the last call.
     pub fn calibrate<const N: usize>(
         &mut self,
         calibrator: &mut Calibrator,
-        raw: &mut RawReadings,
+        sample: Option<Sample>,
         table: &ParameterTable<N>,
     ) {
-        let sample = raw.take();
         self.dispatcher.calibrate(calibrator, sample, table);
     }
 
