@@ -77,7 +77,10 @@ pub async fn run<B: Board, const OTHERS: usize>((comms, table): &mut Desk, links
                     comms.set_aux_sensors(aux_sensors::known(tick.report.time_us));
                 }
                 report(comms, &tick, B::CORE_HZ, &mut outgoing);
-                if let Some(calibrator) = &mut calibrator {
+                // A constant, so that a board without sensors has none of it.
+                if B::Sampler::SENSES
+                    && let Some(calibrator) = &mut calibrator
+                {
                     calibrate(comms, calibrator, table);
                 }
                 serve(comms, table, &mut outgoing);

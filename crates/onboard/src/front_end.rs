@@ -3,7 +3,7 @@
 
 use crate::readings::{Aged, Readings};
 use afbc_control::math::{max, min};
-use afbc_estimator::{Estimate, Estimator, ImuCalibration, Measurement, Memory, OutputFilter, Stamped};
+use afbc_estimator::{Estimate, Estimator, ImuCalibration, ImuSample, Measurement, Memory, OutputFilter, Stamped};
 use afbc_flight_core::{Inbox, Refusal};
 use afbc_types::{Mounting, Pose, PoseSigmas, SensorCalibration, State};
 use nalgebra::Vector3;
@@ -48,6 +48,8 @@ pub struct EstimatorFrontEnd {
     memory: Memory,
     output_filter: OutputFilter,
     corrections: Corrections,
+    /// The last sample as corrected.
+    last: Option<ImuSample>,
     /// True if there has been a sample.
     senses: bool,
     /// True if the inertial sensor worked in the last tick.
@@ -78,6 +80,7 @@ impl EstimatorFrontEnd {
             memory: Memory::default(),
             output_filter,
             corrections,
+            last: None,
             senses: false,
             works: true,
             origin_m: None,
@@ -108,9 +111,8 @@ impl EstimatorFrontEnd {
     /// the estimate starts again, from rest.
     pub(crate) fn adopt(&mut self, estimator: &Estimator, output_filter: &OutputFilter, corrections: &Corrections) {
         (self.estimator, self.output_filter) = (*estimator, *output_filter);
-        let Corrections { imu, field } = &self.corrections;
-        if !imu.corrects_like(&corrections.imu) || *field != corrections.field {
-            self.corrections = *corrections;
+        if self.corrections != *corrections {
+            (self.corrections, self.last) = (*corrections, None);
             self.memory.align_again();
             self.stands_m = None;
         }
@@ -120,7 +122,7 @@ impl EstimatorFrontEnd {
     /// none before the first sample.
     #[inline(always)]
     pub fn tick(&mut self, now_us: u64, readings: &Readings, inbox: &mut Inbox) -> Option<Estimate> {
-        let sample = readings.sample(now_us).map(|sample| self.corrections.imu.apply(sample));
+        let sample = readings.sample(now_us).map(|sample| self.corrections.imu.apply(&mut self.last, sample));
         self.senses |= sample.is_some();
         if !self.senses {
             return None;
