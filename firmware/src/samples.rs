@@ -3,7 +3,7 @@
 //! The task runs at a higher priority than the tick, so that a sample's time is that of its interrupt, and a transfer
 //! from a sensor goes on while the tick runs. The tick takes what has arrived.
 
-use afbc_calibration::Sample;
+use afbc_calibration::RawSample;
 use afbc_estimator::Measurement;
 use afbc_onboard::{Aged, ImuSelector, RawReadings, Readings};
 use core::cell::RefCell;
@@ -106,7 +106,7 @@ fn put_selected(at_us: u64, select: impl FnOnce(&mut ImuSelector) -> Option<[Vec
 }
 
 /// Returns the next sample for a calibration; collects readings, or not, from now on.
-pub(crate) fn raw(collects: bool) -> Option<Sample> {
+pub(crate) fn raw(collects: bool) -> Option<RawSample> {
     let collected = CALIBRATES.swap(collects, Ordering::Relaxed);
     RAW.lock(|raw| {
         let mut raw = raw.try_borrow_mut().ok().filter(|_| collects)?;

@@ -2,7 +2,7 @@
 
 use crate::rest::{Limits, Rest};
 use crate::side::{Side, Sides};
-use crate::{Event, Failure, Sample};
+use crate::{CalibrationEvent, CalibrationFailure, RawSample};
 use afbc_types::Mounting;
 use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 
@@ -39,7 +39,7 @@ pub struct AccelerometerErrors {
 /// That a side does not point straight down, as a vehicle held by hand, has no effect. The axes of the sensor must be
 /// near those of the body, in any order.
 #[derive(Clone, Debug)]
-pub struct Accelerometer {
+pub struct AccelerometerCalibration {
     to_body: Matrix3<f32>,
     gravity_m_s2: f32,
     /// When the last side was done \[us\].
@@ -54,11 +54,11 @@ pub struct Accelerometer {
 /// Specific force on each side.
 type Matrix3x6 = nalgebra::SMatrix<f32, 3, 6>;
 
-impl Accelerometer {
+impl AccelerometerCalibration {
     /// Creates it for a sensor that is mounted like this, and a gravity \[m/s2\].
     #[must_use]
     pub fn new(mounting: &Mounting, gravity_m_s2: f32) -> Self {
-        Accelerometer {
+        AccelerometerCalibration {
             to_body: mounting.r_body_sensor(),
             gravity_m_s2,
             done_us: None,
@@ -72,16 +72,16 @@ impl Accelerometer {
     /// Takes a sample; returns the errors, or why there are none.
     pub fn step(
         &mut self,
-        sample: &Sample,
-        mut tell: impl FnMut(Event),
-    ) -> Option<Result<AccelerometerErrors, Failure>> {
+        sample: &RawSample,
+        mut tell: impl FnMut(CalibrationEvent),
+    ) -> Option<Result<AccelerometerErrors, CalibrationFailure>> {
         let done_us = *self.done_us.get_or_insert_with(|| {
-            tell(Event::Pending(Sides::ALL));
+            tell(CalibrationEvent::Pending(Sides::ALL));
             sample.at_us
         });
         let rests = sample.is_finite() && self.rest.add(sample, &Limits::HELD);
         if !rests && matches!(self.detected.take(), Some((Some(_), false))) {
-            tell(Event::Moved);
+            tell(CalibrationEvent::Moved);
         }
         let rested_us = self.rest.elapsed_us();
         match self.detected {
@@ -90,9 +90,9 @@ impl Accelerometer {
                 let is_new = side.is_some_and(|side| self.pending.contains(side));
                 self.detected = Some((side, !is_new));
                 tell(match side {
-                    None => Event::Askew,
-                    Some(side) if is_new => Event::Detected(side),
-                    Some(side) => Event::Repeated(side),
+                    None => CalibrationEvent::Askew,
+                    Some(side) if is_new => CalibrationEvent::Detected(side),
+                    Some(side) => CalibrationEvent::Repeated(side),
                 });
             }
             Some((Some(side), false)) if rested_us >= MEASURE_US => {
@@ -106,26 +106,26 @@ impl Accelerometer {
                     .nth(side as usize)
                     .into_iter()
                     .for_each(|mut it| it.copy_from(&read_m_s2));
-                tell(Event::Done(side));
-                tell(Event::Progress(self.pending.done_percent()));
+                tell(CalibrationEvent::Done(side));
+                tell(CalibrationEvent::Progress(self.pending.done_percent()));
                 if self.pending.is_empty() {
                     return Some(fit(&self.read_m_s2, self.gravity_m_s2));
                 }
-                tell(Event::Pending(self.pending));
+                tell(CalibrationEvent::Pending(self.pending));
             }
             _ => (),
         }
-        (sample.at_us.saturating_sub(done_us) >= PATIENCE_US).then_some(Err(Failure::TimedOut))
+        (sample.at_us.saturating_sub(done_us) >= PATIENCE_US).then_some(Err(CalibrationFailure::TimedOut))
     }
 }
 
 /// Solves the six equations by Newton's method, in units of gravity.
-fn fit(read_m_s2: &Matrix3x6, gravity_m_s2: f32) -> Result<AccelerometerErrors, Failure> {
+fn fit(read_m_s2: &Matrix3x6, gravity_m_s2: f32) -> Result<AccelerometerErrors, CalibrationFailure> {
     let read = read_m_s2 / gravity_m_s2;
     let mean = read.column_mean();
     let along = |axis: Vector3<f32>| read.column_iter().any(|force| axis.dot(&(force - mean)) >= ALONG_MIN);
     if !Side::ALL.into_iter().all(|side| along(side.up())) {
-        return Err(Failure::TooFewDirections);
+        return Err(CalibrationFailure::TooFewDirections);
     }
     let (mut offset, mut scale) = (Vector3::zeros(), Vector3::repeat(1.0));
     for _ in 0..STEPS {
@@ -138,14 +138,14 @@ fn fit(read_m_s2: &Matrix3x6, gravity_m_s2: f32) -> Result<AccelerometerErrors, 
             let of_scale = 2.0 * scaled.component_mul(&less);
             row.iter_mut().zip(of_offset.iter().chain(&of_scale)).for_each(|(to, from)| *to = *from);
         }
-        let change = jacobian.lu().solve(&residuals).ok_or(Failure::TooFewDirections)?;
+        let change = jacobian.lu().solve(&residuals).ok_or(CalibrationFailure::TooFewDirections)?;
         offset += change.fixed_rows::<3>(0);
         scale += change.fixed_rows::<3>(3);
         // False of NaN.
         let is_possible =
             offset.amax() * gravity_m_s2 <= 2.0 * OFFSET_MAX_M_S2 && scale.amin() > 0.5 && scale.amax() < 2.0;
         if !is_possible {
-            return Err(Failure::TooLarge);
+            return Err(CalibrationFailure::TooLarge);
         }
         if change.amax() <= PRECISION {
             break;
@@ -154,5 +154,5 @@ fn fit(read_m_s2: &Matrix3x6, gravity_m_s2: f32) -> Result<AccelerometerErrors, 
     let errors = AccelerometerErrors { offset_m_s2: offset * gravity_m_s2, scale };
     let is_usual =
         errors.offset_m_s2.amax() <= OFFSET_MAX_M_S2 && (scale - Vector3::repeat(1.0)).amax() <= SCALE_ERROR_MAX;
-    if is_usual { Ok(errors) } else { Err(Failure::TooLarge) }
+    if is_usual { Ok(errors) } else { Err(CalibrationFailure::TooLarge) }
 }

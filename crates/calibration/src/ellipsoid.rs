@@ -1,6 +1,6 @@
 //! The ellipsoid on which a magnetometer's readings lie.
 
-use crate::Failure;
+use crate::CalibrationFailure;
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
 /// Unit of the sums, so that their numbers are near one \[uT\].
@@ -87,26 +87,26 @@ impl FieldSums {
     /// Fits an ellipsoid if it is much better than a sphere, which needs fewer readings to be sound.
     ///
     /// # Errors
-    /// [`TooFewDirections`](Failure::TooFewDirections), [`TooLarge`](Failure::TooLarge),
-    /// [`FieldStrength`](Failure::FieldStrength) or [`FieldUneven`](Failure::FieldUneven).
-    pub fn fit(&self) -> Result<FieldFit, Failure> {
+    /// [`TooFewDirections`](CalibrationFailure::TooFewDirections), [`TooLarge`](CalibrationFailure::TooLarge),
+    /// [`FieldStrength`](CalibrationFailure::FieldStrength) or [`FieldUneven`](CalibrationFailure::FieldUneven).
+    pub fn fit(&self) -> Result<FieldFit, CalibrationFailure> {
         if self.readings < READINGS_MIN {
-            return Err(Failure::TooFewDirections);
+            return Err(CalibrationFailure::TooFewDirections);
         }
-        let (sphere, sphere_error) = self.sphere().ok_or(Failure::TooFewDirections)?;
+        let (sphere, sphere_error) = self.sphere().ok_or(CalibrationFailure::TooFewDirections)?;
         let ellipsoid = self.ellipsoid().filter(|(_, error)| *error < WORTH * sphere_error);
         let (numbers, squared) = ellipsoid.unwrap_or((sphere, sphere_error));
-        let Surface { centre, matrix, strength } = Surface::of(&numbers).ok_or(Failure::TooFewDirections)?;
+        let Surface { centre, matrix, strength } = Surface::of(&numbers).ok_or(CalibrationFailure::TooFewDirections)?;
         if !self.covers(&centre, &matrix, strength) {
-            return Err(Failure::TooFewDirections);
+            return Err(CalibrationFailure::TooFewDirections);
         }
         if !STRENGTH_UT.contains(&(strength * UNIT_UT)) {
-            return Err(Failure::FieldStrength);
+            return Err(CalibrationFailure::FieldStrength);
         }
         // Near the surface, the equation's value is twice the strength times the distance.
         let residual = libm::sqrt(squared.max(0.0) / self.readings) / (2.0 * strength);
         if residual > RESIDUAL_MAX * strength {
-            return Err(Failure::FieldUneven);
+            return Err(CalibrationFailure::FieldUneven);
         }
         let [[sx, xy, xz], [_, sy, yz], [.., sz]] = matrix.data.0;
         let (scale, off_diagonal) = (Vector3::new(sx, sy, sz), Vector3::new(xy, xz, yz));
@@ -114,7 +114,7 @@ impl FieldSums {
             && scale.amin() >= 0.6
             && scale.amax() <= 1.6
             && off_diagonal.amax() <= 0.4;
-        is_usual.then_some(()).ok_or(Failure::TooLarge)?;
+        is_usual.then_some(()).ok_or(CalibrationFailure::TooLarge)?;
         Ok(FieldFit {
             offset_ut: (centre * UNIT_UT).cast(),
             scale: scale.cast(),

@@ -1,7 +1,7 @@
 //! The gyroscope's offset.
 
 use crate::rest::{Limits, Rest};
-use crate::{Event, Failure, Sample};
+use crate::{CalibrationEvent, CalibrationFailure, RawSample};
 use nalgebra::Vector3;
 
 /// Time at rest whose mean is the offset \[us\].
@@ -16,28 +16,36 @@ const STEP: u8 = 10;
 /// Measures the gyroscope's offset, the mean of its rates while the vehicle stands still. A steady turn about the
 /// vertical cannot be distinguished from an offset.
 #[derive(Clone, Debug, Default)]
-pub struct Gyroscope {
+pub struct GyroscopeCalibration {
     began_us: Option<u64>,
     rest: Rest,
     told: u8,
 }
 
-impl Gyroscope {
+impl GyroscopeCalibration {
     /// Takes a sample; returns the offset, sensor axes \[rad/s\], or why there is none.
-    pub fn step(&mut self, sample: &Sample, mut tell: impl FnMut(Event)) -> Option<Result<Vector3<f32>, Failure>> {
+    pub fn step(
+        &mut self,
+        sample: &RawSample,
+        mut tell: impl FnMut(CalibrationEvent),
+    ) -> Option<Result<Vector3<f32>, CalibrationFailure>> {
         let began_us = *self.began_us.get_or_insert(sample.at_us);
         if !sample.is_finite() || !self.rest.add(sample, &Limits::STANDING) {
-            tell(Event::Moved);
+            tell(CalibrationEvent::Moved);
         }
         if self.rest.elapsed_us() >= MEASURE_US {
             let offset = self.rest.rates_rad_s();
-            return Some(if offset.amax() <= OFFSET_MAX_RAD_S { Ok(offset) } else { Err(Failure::TooLarge) });
+            return Some(if offset.amax() <= OFFSET_MAX_RAD_S {
+                Ok(offset)
+            } else {
+                Err(CalibrationFailure::TooLarge)
+            });
         }
         let share = (100 * self.rest.elapsed_us() / MEASURE_US) as u8 / STEP * STEP;
         if share > self.told {
             self.told = share;
-            tell(Event::Progress(share));
+            tell(CalibrationEvent::Progress(share));
         }
-        (sample.at_us.saturating_sub(began_us) >= PATIENCE_US).then_some(Err(Failure::Moving))
+        (sample.at_us.saturating_sub(began_us) >= PATIENCE_US).then_some(Err(CalibrationFailure::Moving))
     }
 }

@@ -1,7 +1,7 @@
 //! Roll and pitch of the inertial sensor's mounting.
 
 use crate::rest::{Limits, Rest};
-use crate::{Event, Failure, Sample};
+use crate::{CalibrationEvent, CalibrationFailure, RawSample};
 use afbc_types::{Mounting, SensorCalibration, euler_angles};
 use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion, Vector3};
 
@@ -16,7 +16,7 @@ const TILT_MAX_RAD: f32 = 0.262;
 /// Measures how the inertial sensor is tilted in a vehicle that stands level. Its heading in the vehicle does not show
 /// at rest, and stays.
 #[derive(Clone, Debug)]
-pub struct Level {
+pub struct LevelCalibration {
     mounting: Mounting,
     errors: SensorCalibration,
     began_us: Option<u64>,
@@ -24,27 +24,31 @@ pub struct Level {
     told: bool,
 }
 
-impl Level {
+impl LevelCalibration {
     /// Creates it for a sensor that is thought to be mounted like this, with these errors.
     #[must_use]
     pub fn new(mounting: &Mounting, errors: &SensorCalibration) -> Self {
-        Level { mounting: *mounting, errors: *errors, began_us: None, rest: Rest::default(), told: false }
+        LevelCalibration { mounting: *mounting, errors: *errors, began_us: None, rest: Rest::default(), told: false }
     }
 
     /// Takes a sample; returns roll, pitch and yaw of the mounting \[rad\], or why there are none.
-    pub fn step(&mut self, sample: &Sample, mut tell: impl FnMut(Event)) -> Option<Result<Vector3<f32>, Failure>> {
+    pub fn step(
+        &mut self,
+        sample: &RawSample,
+        mut tell: impl FnMut(CalibrationEvent),
+    ) -> Option<Result<Vector3<f32>, CalibrationFailure>> {
         let began_us = *self.began_us.get_or_insert(sample.at_us);
         if !sample.is_finite() || !self.rest.add(sample, &Limits::STANDING) {
-            tell(Event::Moved);
+            tell(CalibrationEvent::Moved);
         }
         if self.rest.elapsed_us() >= MEASURE_US {
-            return Some(self.attitude().ok_or(Failure::NotLevel));
+            return Some(self.attitude().ok_or(CalibrationFailure::NotLevel));
         }
         if self.rest.elapsed_us() >= MEASURE_US / 2 && !self.told {
             self.told = true;
-            tell(Event::Progress(50));
+            tell(CalibrationEvent::Progress(50));
         }
-        (sample.at_us.saturating_sub(began_us) >= PATIENCE_US).then_some(Err(Failure::Moving))
+        (sample.at_us.saturating_sub(began_us) >= PATIENCE_US).then_some(Err(CalibrationFailure::Moving))
     }
 
     /// Returns the attitude of the sensor in which what it felt is vertical: C R, where C is the smallest rotation that

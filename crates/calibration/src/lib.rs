@@ -1,23 +1,23 @@
 //! Calibration of a vehicle's own sensors, by the vehicle itself, on the ground.
 //!
-//! * [`Gyroscope`]: the offset, as the mean at rest.
-//! * [`Accelerometer`]: offset and scale of each axis, from the vehicle at rest on each of its six sides.
-//! * [`Level`]: roll and pitch of the inertial sensor's mounting, from the vehicle standing level.
-//! * [`Magnetometer`]: offset and matrix, from the vehicle turned about the vertical on each of its six sides.
+//! * [`GyroscopeCalibration`]: the offset, as the mean at rest.
+//! * [`AccelerometerCalibration`]: offset and scale of each axis, from the vehicle at rest on each of its six sides.
+//! * [`LevelCalibration`]: roll and pitch of the inertial sensor's mounting, from the vehicle standing level.
+//! * [`MagnetometerCalibration`]: offset and matrix, from the vehicle turned about the vertical on each of its six sides.
 //!
-//! Each is a state machine that takes a [`Sample`], tells what happens by [`Event`]s, and returns its result, or the
-//! [`Failure`] that ended it. It keeps sums, no samples. Messages, arming and the storage of results are the caller's.
+//! Each is a state machine that takes a [`RawSample`], tells what happens by [`CalibrationEvent`]s, and returns its result, or the
+//! [`CalibrationFailure`] that ended it. It keeps sums, no samples. Messages, arming and the storage of results are the caller's.
 //!
 //! ```
-//! use afbc_calibration::{Gyroscope, Sample};
+//! use afbc_calibration::{GyroscopeCalibration, RawSample};
 //! use nalgebra::Vector3;
 //!
 //! let offset = Vector3::new(0.02, -0.01, 0.005);
-//! let mut gyroscope = Gyroscope::default();
+//! let mut gyroscope = GyroscopeCalibration::default();
 //! let mut found = None;
 //! for number in 1..200 {
 //!     let specific_force_m_s2 = Vector3::new(0.0, 0.0, 9.81);
-//!     let sample = Sample { at_us: number * 20_000, rates_rad_s: offset, specific_force_m_s2, field_ut: None };
+//!     let sample = RawSample { at_us: number * 20_000, rates_rad_s: offset, specific_force_m_s2, field_ut: None };
 //!     found = found.or(gyroscope.step(&sample, |_event| ()));
 //! }
 //! assert!(found.is_some_and(|found| found.is_ok_and(|found| (found - offset).norm() < 1e-6)));
@@ -32,18 +32,18 @@ mod magnetometer;
 mod rest;
 mod side;
 
-pub use accelerometer::{Accelerometer, AccelerometerErrors};
+pub use accelerometer::{AccelerometerCalibration, AccelerometerErrors};
 pub use ellipsoid::{FieldFit, FieldSums};
-pub use gyroscope::Gyroscope;
-pub use level::Level;
-pub use magnetometer::Magnetometer;
+pub use gyroscope::GyroscopeCalibration;
+pub use level::LevelCalibration;
+pub use magnetometer::MagnetometerCalibration;
 pub use side::{Side, Sides};
 
 use nalgebra::Vector3;
 
 /// What the sensors have read, uncorrected: the mean over some 20 ms.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Sample {
+pub struct RawSample {
     /// Time of the newest reading, on a clock that does not run backward \[us\].
     pub at_us: u64,
     /// Rates, sensor axes \[rad/s\].
@@ -54,7 +54,7 @@ pub struct Sample {
     pub field_ut: Option<Vector3<f32>>,
 }
 
-impl Sample {
+impl RawSample {
     /// True if every number is finite.
     fn is_finite(&self) -> bool {
         let numbers = self.rates_rad_s.iter().chain(&self.specific_force_m_s2);
@@ -65,7 +65,7 @@ impl Sample {
 /// What happens on the way to a result.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
-pub enum Event {
+pub enum CalibrationEvent {
     /// Share of the work that is done \[%\].
     Progress(u8),
     /// The vehicle has moved where it should rest; it begins again.
@@ -87,7 +87,7 @@ pub enum Event {
 /// Why a calibration has failed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
-pub enum Failure {
+pub enum CalibrationFailure {
     /// The vehicle did not rest.
     Moving,
     /// Nothing that was asked for has happened in time.

@@ -3,7 +3,7 @@
 use crate::ellipsoid::{FieldFit, FieldSums};
 use crate::rest::{Limits, Rest};
 use crate::side::{Side, Sides};
-use crate::{Event, Failure, Sample};
+use crate::{CalibrationEvent, CalibrationFailure, RawSample};
 use afbc_types::{Mounting, SensorCalibration};
 use nalgebra::{Matrix3, Vector3};
 
@@ -25,7 +25,7 @@ const SILENT_US: u64 = 1_000_000;
 /// Measures the magnetometer's errors while the vehicle is turned about the vertical by a whole turn on each of its six
 /// sides. The gyroscope says how far it is turned, so that readings are spread evenly.
 #[derive(Clone, Debug)]
-pub struct Magnetometer {
+pub struct MagnetometerCalibration {
     to_body: Matrix3<f32>,
     errors: SensorCalibration,
     sums: FieldSums,
@@ -50,11 +50,11 @@ struct Turn {
     parts: u32,
 }
 
-impl Magnetometer {
+impl MagnetometerCalibration {
     /// Creates it for an inertial sensor that is mounted like this and has these errors.
     #[must_use]
     pub fn new(mounting: &Mounting, errors: &SensorCalibration) -> Self {
-        Magnetometer {
+        MagnetometerCalibration {
             to_body: mounting.r_body_sensor(),
             errors: *errors,
             sums: FieldSums::default(),
@@ -69,10 +69,14 @@ impl Magnetometer {
     }
 
     /// Takes a sample; returns the errors, or why there are none.
-    pub fn step(&mut self, sample: &Sample, mut tell: impl FnMut(Event)) -> Option<Result<FieldFit, Failure>> {
+    pub fn step(
+        &mut self,
+        sample: &RawSample,
+        mut tell: impl FnMut(CalibrationEvent),
+    ) -> Option<Result<FieldFit, CalibrationFailure>> {
         let at_us = sample.at_us;
         let done_us = *self.done_us.get_or_insert_with(|| {
-            tell(Event::Pending(Sides::ALL));
+            tell(CalibrationEvent::Pending(Sides::ALL));
             (self.read_us, self.last_us) = (at_us, at_us);
             at_us
         });
@@ -82,7 +86,7 @@ impl Magnetometer {
         if sample.field_ut.is_some() {
             self.read_us = at_us;
         } else if at_us.saturating_sub(self.read_us) >= SILENT_US {
-            return Some(Err(Failure::NoField));
+            return Some(Err(CalibrationFailure::NoField));
         }
         let step_us = core::mem::replace(&mut self.last_us, at_us);
         let step_us = at_us.saturating_sub(step_us);
@@ -99,19 +103,19 @@ impl Magnetometer {
             }
             let late = at_us.saturating_sub(turn.began_us) >= TURN_US;
             if turn.parts.count_ones() < PARTS_MIN {
-                return late.then_some(Err(Failure::NotRotated));
+                return late.then_some(Err(CalibrationFailure::NotRotated));
             }
             let side = turn.side;
             self.turn = None;
             self.done_us = Some(at_us);
             self.pending = self.pending.without(side);
             self.told = true;
-            tell(Event::Done(side));
-            tell(Event::Progress(self.pending.done_percent()));
+            tell(CalibrationEvent::Done(side));
+            tell(CalibrationEvent::Progress(self.pending.done_percent()));
             if self.pending.is_empty() {
                 return Some(self.sums.fit());
             }
-            tell(Event::Pending(self.pending));
+            tell(CalibrationEvent::Pending(self.pending));
             return None;
         }
         if !self.rest.add(sample, &Limits::HELD) {
@@ -120,16 +124,16 @@ impl Magnetometer {
         if self.rest.elapsed_us() >= DETECT_US && !self.told {
             self.told = true;
             match Side::of(&(self.to_body * self.rest.specific_force_m_s2())) {
-                None => tell(Event::Askew),
-                Some(side) if !self.pending.contains(side) => tell(Event::Repeated(side)),
+                None => tell(CalibrationEvent::Askew),
+                Some(side) if !self.pending.contains(side) => tell(CalibrationEvent::Repeated(side)),
                 Some(side) => {
                     self.turn = Some(Turn { side, began_us: at_us, turns: 0.0, parts: 0 });
-                    tell(Event::Detected(side));
-                    tell(Event::Rotate);
+                    tell(CalibrationEvent::Detected(side));
+                    tell(CalibrationEvent::Rotate);
                 }
             }
         }
-        (at_us.saturating_sub(done_us) >= PATIENCE_US).then_some(Err(Failure::TimedOut))
+        (at_us.saturating_sub(done_us) >= PATIENCE_US).then_some(Err(CalibrationFailure::TimedOut))
     }
 }
 

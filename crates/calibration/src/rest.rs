@@ -1,6 +1,6 @@
 //! Whether the vehicle rests, and what its sensors read meanwhile.
 
-use crate::Sample;
+use crate::RawSample;
 use nalgebra::Vector3;
 
 /// How much samples may differ at rest: largest less smallest, per axis.
@@ -31,7 +31,7 @@ pub(crate) struct Rest {
 
 impl Rest {
     /// Takes a sample; false if the vehicle has moved, which begins again with this sample.
-    pub(crate) fn add(&mut self, sample: &Sample, limits: &Limits) -> bool {
+    pub(crate) fn add(&mut self, sample: &RawSample, limits: &Limits) -> bool {
         let mut with = *self;
         with.now_us = sample.at_us;
         with.samples += 1.0;

@@ -1,9 +1,12 @@
-//! Gyroscope, accelerometer and level against simulated sensors, whose errors are known.
+//! GyroscopeCalibration, accelerometer and level against simulated sensors, whose errors are known.
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, missing_docs, reason = "tests")]
 
 mod common;
 
-use afbc_calibration::{Accelerometer, AccelerometerErrors, Event, Failure, Gyroscope, Level, Sample, Side, Sides};
+use afbc_calibration::{
+    AccelerometerCalibration, AccelerometerErrors, CalibrationEvent, CalibrationFailure, GyroscopeCalibration,
+    LevelCalibration, RawSample, Side, Sides,
+};
 use afbc_plant::instruments::{Accelerometer as Accel, Imu};
 use afbc_types::{Mounting, SensorCalibration};
 use common::{GRAVITY, Hands, keep};
@@ -12,8 +15,11 @@ use proptest::prelude::*;
 
 const PRESETS: [Imu; 3] = [Imu::ICM_42688_P, Imu::BMI270, Imu::MPU_6000];
 
-fn gyroscope(hands: &mut Hands, samples: u32) -> (Option<Result<Vector3<f32>, Failure>>, Vec<Event>) {
-    let (mut gyroscope, mut told) = (Gyroscope::default(), Vec::new());
+fn gyroscope(
+    hands: &mut Hands,
+    samples: u32,
+) -> (Option<Result<Vector3<f32>, CalibrationFailure>>, Vec<CalibrationEvent>) {
+    let (mut gyroscope, mut told) = (GyroscopeCalibration::default(), Vec::new());
     let found = (0..samples).find_map(|_| gyroscope.step(&hands.sample(), keep(&mut told)));
     (found, told)
 }
@@ -24,10 +30,11 @@ fn six_sides(
     mounting: &Mounting,
     sides: &[Side],
     askew_rad: impl Fn(usize) -> [f64; 2],
-) -> (Option<Result<AccelerometerErrors, Failure>>, Vec<Event>) {
-    let (mut accelerometer, mut told, mut found) = (Accelerometer::new(mounting, GRAVITY as f32), Vec::new(), None);
+) -> (Option<Result<AccelerometerErrors, CalibrationFailure>>, Vec<CalibrationEvent>) {
+    let (mut accelerometer, mut told, mut found) =
+        (AccelerometerCalibration::new(mounting, GRAVITY as f32), Vec::new(), None);
     for (number, side) in sides.iter().enumerate() {
-        let mut step = |sample: &Sample| {
+        let mut step = |sample: &RawSample| {
             if found.is_none() {
                 found = accelerometer.step(sample, keep(&mut told));
             }
@@ -50,7 +57,7 @@ proptest! {
         let truth = hands.instruments.imu_bias().unwrap().rates_rad_s;
         let error = (found.unwrap().unwrap().cast::<f64>() - truth).amax();
         prop_assert!(error < 6e-4, "{error}");
-        let progress: Vec<_> = (1..10).map(|tenth| Event::Progress(10 * tenth)).collect();
+        let progress: Vec<_> = (1..10).map(|tenth| CalibrationEvent::Progress(10 * tenth)).collect();
         prop_assert_eq!(told, progress);
     }
 
@@ -72,10 +79,10 @@ proptest! {
         let offset = (errors.offset_m_s2.cast::<f64>() - truth).amax();
         prop_assert!(offset < 0.04, "{}", offset);
         for side in &sides {
-            prop_assert!(told.contains(&Event::Detected(*side)) && told.contains(&Event::Done(*side)));
+            prop_assert!(told.contains(&CalibrationEvent::Detected(*side)) && told.contains(&CalibrationEvent::Done(*side)));
         }
-        prop_assert_eq!(told.first(), Some(&Event::Pending(Sides::ALL)));
-        prop_assert_eq!(told.last(), Some(&Event::Progress(100)));
+        prop_assert_eq!(told.first(), Some(&CalibrationEvent::Pending(Sides::ALL)));
+        prop_assert_eq!(told.last(), Some(&CalibrationEvent::Progress(100)));
         // In any attitude the corrected reading has the size of gravity. What is left is misalignment: where all axes
         // feel the same, a third of the sum of its six elements, 0.053 m/s2 of an MPU-6000, of which this is five times.
         let found = SensorCalibration {
@@ -98,7 +105,7 @@ proptest! {
     ) {
         let (offset, scale) = (Vector3::from(offset), Vector3::from(scale));
         let mut hands = Hands::with_imu(Imu::DEFAULT, 1);
-        let (mut accelerometer, mut found) = (Accelerometer::new(&Mounting::PLAIN, GRAVITY as f32), None);
+        let (mut accelerometer, mut found) = (AccelerometerCalibration::new(&Mounting::PLAIN, GRAVITY as f32), None);
         for (number, side) in Side::ALL.into_iter().enumerate() {
             hands.put(side, [askew[2 * number], askew[2 * number + 1]]);
             for _ in 0..120 {
@@ -124,7 +131,7 @@ proptest! {
         let angles = |it: &Rotation3<f64>| { let (roll, pitch, yaw) = it.euler_angles(); Vector3::new(roll, pitch, yaw) };
         let mounting = |it| Mounting { attitude_rad: angles(it), position_m: Vector3::zeros() };
         let mut hands = Hands::with_imu(Imu { mounting: mounting(&truth), ..Imu::DEFAULT }, seed);
-        let mut level = Level::new(&mounting(&thought).to_f32(), &SensorCalibration::DEFAULT);
+        let mut level = LevelCalibration::new(&mounting(&thought).to_f32(), &SensorCalibration::DEFAULT);
         let found = (0..120).find_map(|_| level.step(&hands.sample(), |_| ())).unwrap().unwrap();
         let found = Rotation3::from_euler_angles(found.x, found.y, found.z).cast::<f64>();
         // What the sensor feels is vertical again, and the smallest turn led there.
@@ -136,11 +143,11 @@ proptest! {
     /// Whatever sensors say, nothing panics, and no result is without numbers.
     #[test]
     fn nothing_spoils_a_calibration(numbers in prop::collection::vec(prop::num::f32::ANY, 60), step_us in 0..3_000_000_u64) {
-        let (mut gyroscope, mut accelerometer) = (Gyroscope::default(), Accelerometer::new(&Mounting::PLAIN, 9.81));
-        let mut level = Level::new(&Mounting::PLAIN, &SensorCalibration::DEFAULT);
+        let (mut gyroscope, mut accelerometer) = (GyroscopeCalibration::default(), AccelerometerCalibration::new(&Mounting::PLAIN, 9.81));
+        let mut level = LevelCalibration::new(&Mounting::PLAIN, &SensorCalibration::DEFAULT);
         for (number, six) in numbers.chunks_exact(6).enumerate() {
             for repeat in 0..3 {
-                let sample = Sample {
+                let sample = RawSample {
                     at_us: (3 * number as u64 + repeat) * step_us,
                     rates_rad_s: Vector3::new(six[0], six[1], six[2]),
                     specific_force_m_s2: Vector3::new(six[3], six[4], six[5]),
@@ -161,11 +168,11 @@ fn a_moving_gyroscope_is_not_calibrated() {
     let mut hands = Hands::with_imu(Imu::ICM_42688_P, 5);
     hands.tremor_rad = 0.01;
     let (found, told) = gyroscope(&mut hands, 1100);
-    assert_eq!(found, Some(Err(Failure::Moving)));
-    assert!(told.contains(&Event::Moved) && !told.contains(&Event::Progress(90)), "{told:?}");
+    assert_eq!(found, Some(Err(CalibrationFailure::Moving)));
+    assert!(told.contains(&CalibrationEvent::Moved) && !told.contains(&CalibrationEvent::Progress(90)), "{told:?}");
 
     // Knocked after 2 s, still from then on.
-    let (mut gyroscope, mut told) = (Gyroscope::default(), Vec::new());
+    let (mut gyroscope, mut told) = (GyroscopeCalibration::default(), Vec::new());
     hands.tremor_rad = 0.0;
     for number in 0..160 {
         let mut sample = hands.sample();
@@ -175,14 +182,14 @@ fn a_moving_gyroscope_is_not_calibrated() {
     let found = (0..160).find_map(|_| gyroscope.step(&hands.sample(), keep(&mut told)));
     let truth = hands.instruments.imu_bias().unwrap().rates_rad_s;
     assert!((found.unwrap().unwrap().cast::<f64>() - truth).amax() < 6e-4);
-    assert_eq!(told.iter().filter(|event| **event == Event::Moved).count(), 2);
+    assert_eq!(told.iter().filter(|event| **event == CalibrationEvent::Moved).count(), 2);
 }
 
 #[test]
 fn a_gyroscope_with_too_large_an_offset_is_broken() {
     let mut hands = Hands::with_imu(Imu::DEFAULT, 5);
     hands.spin_rad_s = 0.9;
-    assert_eq!(gyroscope(&mut hands, 160).0, Some(Err(Failure::TooLarge)));
+    assert_eq!(gyroscope(&mut hands, 160).0, Some(Err(CalibrationFailure::TooLarge)));
 }
 
 #[test]
@@ -190,9 +197,9 @@ fn a_tilted_vehicle_is_not_level() {
     for (tilt_rad, fails) in [(0.25_f64, false), (0.28, true), (3.0, true)] {
         let mut hands = Hands::with_imu(Imu::DEFAULT, 5);
         hands.put(Side::Down, [tilt_rad, 0.0]);
-        let mut level = Level::new(&Mounting::PLAIN, &SensorCalibration::DEFAULT);
+        let mut level = LevelCalibration::new(&Mounting::PLAIN, &SensorCalibration::DEFAULT);
         let found = (0..120).find_map(|_| level.step(&hands.sample(), |_| ())).unwrap();
-        assert_eq!(found == Err(Failure::NotLevel), fails, "{tilt_rad}");
+        assert_eq!(found == Err(CalibrationFailure::NotLevel), fails, "{tilt_rad}");
     }
 }
 
@@ -203,7 +210,7 @@ fn level_knows_the_accelerometers_errors() {
     let mut hands = Hands::with_imu(Imu { accel, ..Imu::DEFAULT }, 7);
     let accel_offset_m_s2 = hands.instruments.imu_bias().unwrap().specific_force_m_s2.cast();
     let tilt = |errors: &SensorCalibration, hands: &mut Hands| {
-        let mut level = Level::new(&Mounting::PLAIN, errors);
+        let mut level = LevelCalibration::new(&Mounting::PLAIN, errors);
         (0..120).find_map(|_| level.step(&hands.sample(), |_| ())).unwrap().unwrap().xy().norm()
     };
     let errors = SensorCalibration { accel_offset_m_s2, ..SensorCalibration::DEFAULT };
@@ -217,23 +224,26 @@ fn what_an_operator_does_wrong_is_told() {
     let mut hands = Hands::with_imu(Imu::ICM_42688_P, 3);
     let at = |_| [0.0; 2];
     let (found, told) = six_sides(&mut hands, &Mounting::PLAIN, &[Side::Left, Side::Down, Side::Left], at);
-    assert_eq!((found, told.last()), (None, Some(&Event::Repeated(Side::Left))));
-    assert_eq!(told.iter().filter(|event| **event == Event::Done(Side::Left)).count(), 1);
+    assert_eq!((found, told.last()), (None, Some(&CalibrationEvent::Repeated(Side::Left))));
+    assert_eq!(told.iter().filter(|event| **event == CalibrationEvent::Done(Side::Left)).count(), 1);
 
     let (_, told) = six_sides(&mut hands, &Mounting::PLAIN, &[Side::Down], |_| [0.8, 0.0]);
-    assert_eq!(told, [Event::Pending(Sides::ALL), Event::Askew]);
+    assert_eq!(told, [CalibrationEvent::Pending(Sides::ALL), CalibrationEvent::Askew]);
 
     // Put down elsewhere a second after it was detected.
-    let (mut accelerometer, mut told) = (Accelerometer::new(&Mounting::PLAIN, GRAVITY as f32), Vec::new());
+    let (mut accelerometer, mut told) = (AccelerometerCalibration::new(&Mounting::PLAIN, GRAVITY as f32), Vec::new());
     hands.put(Side::Up, [0.0; 2]);
     (0..60).for_each(|_| assert_eq!(accelerometer.step(&hands.sample(), keep(&mut told)), None));
     hands.turn_to(Side::Front, [0.0; 2], |sample| assert_eq!(accelerometer.step(sample, keep(&mut told)), None));
-    assert_eq!(told, [Event::Pending(Sides::ALL), Event::Detected(Side::Up), Event::Moved]);
+    assert_eq!(
+        told,
+        [CalibrationEvent::Pending(Sides::ALL), CalibrationEvent::Detected(Side::Up), CalibrationEvent::Moved]
+    );
 
-    let (mut accelerometer, mut told) = (Accelerometer::new(&Mounting::PLAIN, GRAVITY as f32), Vec::new());
+    let (mut accelerometer, mut told) = (AccelerometerCalibration::new(&Mounting::PLAIN, GRAVITY as f32), Vec::new());
     hands.put(Side::Down, [0.8, 0.0]);
     let failed = (0..5000).find_map(|_| accelerometer.step(&hands.sample(), keep(&mut told)));
-    assert_eq!(failed, Some(Err(Failure::TimedOut)));
+    assert_eq!(failed, Some(Err(CalibrationFailure::TimedOut)));
 }
 
 /// A board that is turned by 45 degrees: its axes x and y cannot be separated by the six sides.
@@ -242,7 +252,7 @@ fn a_board_between_the_axes_is_refused() {
     let mounting = Mounting { attitude_rad: Vector3::new(0.0, 0.0, 0.785), position_m: Vector3::zeros() };
     let mut hands = Hands::with_imu(Imu { mounting, ..Imu::ICM_42688_P }, 3);
     let (found, _) = six_sides(&mut hands, &mounting.to_f32(), &Side::ALL, |_| [0.0; 2]);
-    assert_eq!(found, Some(Err(Failure::TooFewDirections)));
+    assert_eq!(found, Some(Err(CalibrationFailure::TooFewDirections)));
 }
 
 #[test]
@@ -253,7 +263,7 @@ fn a_broken_accelerometer_is_refused() {
         let bias = hands.instruments.imu_bias().unwrap().specific_force_m_s2.amax();
         let (found, _) = six_sides(&mut hands, &Mounting::PLAIN, &Side::ALL, |_| [0.0; 2]);
         assert!(bias < 2.0 || !matches!(found, Some(Ok(_))), "{bias}: {found:?}");
-        matches!(found, Some(Err(Failure::TooLarge)))
+        matches!(found, Some(Err(CalibrationFailure::TooLarge)))
     });
     assert!(refused.count() > 3);
 }

@@ -3,7 +3,9 @@
 
 mod common;
 
-use afbc_calibration::{Event, Failure, FieldFit, FieldSums, Magnetometer, Sample, Side};
+use afbc_calibration::{
+    CalibrationEvent, CalibrationFailure, FieldFit, FieldSums, MagnetometerCalibration, RawSample, Side,
+};
 use afbc_plant::InstrumentSuite;
 use afbc_plant::instruments::{Imu, Magnetometer as Part};
 use afbc_types::{Mounting, SensorCalibration};
@@ -27,12 +29,12 @@ fn turned(
     hands: &mut Hands,
     sides: &[Side],
     spin_rad_s: f64,
-    spoil: impl Fn(Side, &mut Sample),
-) -> (Option<Result<FieldFit, Failure>>, Vec<Event>) {
-    let mut magnetometer = Magnetometer::new(&Mounting::PLAIN, &calibrated(hands));
+    spoil: impl Fn(Side, &mut RawSample),
+) -> (Option<Result<FieldFit, CalibrationFailure>>, Vec<CalibrationEvent>) {
+    let mut magnetometer = MagnetometerCalibration::new(&Mounting::PLAIN, &calibrated(hands));
     let (mut told, mut found) = (Vec::new(), None);
     for side in sides {
-        let mut step = |sample: &Sample| {
+        let mut step = |sample: &RawSample| {
             let mut sample = *sample;
             spoil(*side, &mut sample);
             if found.is_none() {
@@ -73,7 +75,7 @@ proptest! {
         let mut hands = hands(part, seed);
         let (found, told) = turned(&mut hands, &sides, spin_rad_s, |_, _| ());
         let fit = found.unwrap().unwrap();
-        prop_assert_eq!(told.last(), Some(&Event::Progress(100)));
+        prop_assert_eq!(told.last(), Some(&CalibrationEvent::Progress(100)));
         let (mag_offset_ut, mag_scale, mag_off_diagonal) = (fit.offset_ut, fit.scale, fit.off_diagonal);
         let found = SensorCalibration { mag_offset_ut, mag_scale, mag_off_diagonal, ..SensorCalibration::DEFAULT };
         let attitudes = (0..20).map(|number| Rotation3::from_euler_angles(f64::from(number), 2.5 * f64::from(number), 0.7));
@@ -146,58 +148,61 @@ fn too_few_directions_are_refused() {
     };
     assert!(spiral(-1.0, 1.0).is_ok());
     for (from, to) in [(0.0, 1.0), (-1.0, 0.0), (-0.5, 1.0), (0.3, 0.31), (-0.1, 0.1), (-0.3, 0.3), (0.5, 1.0)] {
-        assert_eq!(spiral(from, to), Err(Failure::TooFewDirections), "{from} to {to}");
+        assert_eq!(spiral(from, to), Err(CalibrationFailure::TooFewDirections), "{from} to {to}");
     }
-    assert_eq!(FieldSums::default().fit(), Err(Failure::TooFewDirections));
+    assert_eq!(FieldSums::default().fit(), Err(CalibrationFailure::TooFewDirections));
 }
 
 #[test]
 fn a_field_that_cannot_be_the_earths_is_refused() {
-    for (strength_ut, expected) in [(10.0, Err(Failure::FieldStrength)), (150.0, Err(Failure::FieldStrength))] {
+    for (strength_ut, expected) in
+        [(10.0, Err(CalibrationFailure::FieldStrength)), (150.0, Err(CalibrationFailure::FieldStrength))]
+    {
         let mut hands = hands(Part { strength_ut: f64::min(strength_ut, 100.0), ..Part::QMC5883L }, 3);
         let factor = (strength_ut / f64::min(strength_ut, 100.0)) as f32;
-        let spoil = |_, sample: &mut Sample| sample.field_ut = sample.field_ut.map(|field| factor * field);
+        let spoil = |_, sample: &mut RawSample| sample.field_ut = sample.field_ut.map(|field| factor * field);
         assert_eq!(turned(&mut hands, &Side::ALL, 1.0, spoil).0, Some(expected));
     }
     let mut hands = hands(Part::QMC5883L, 3);
-    let spoil = |_, sample: &mut Sample| sample.field_ut = sample.field_ut.map(|it| it + Vector3::new(0.0, 450.0, 0.0));
-    assert_eq!(turned(&mut hands, &Side::ALL, 1.0, spoil).0, Some(Err(Failure::TooLarge)));
+    let spoil =
+        |_, sample: &mut RawSample| sample.field_ut = sample.field_ut.map(|it| it + Vector3::new(0.0, 450.0, 0.0));
+    assert_eq!(turned(&mut hands, &Side::ALL, 1.0, spoil).0, Some(Err(CalibrationFailure::TooLarge)));
 }
 
 /// Iron that is near on some sides and not on others.
 #[test]
 fn an_uneven_field_is_refused() {
     let mut hands = hands(Part::QMC5883L, 3);
-    let spoil = |side, sample: &mut Sample| {
+    let spoil = |side, sample: &mut RawSample| {
         let near = if matches!(side, Side::Back | Side::Left | Side::Down) { 15.0 } else { -15.0 };
         sample.field_ut = sample.field_ut.map(|field| field + Vector3::new(near, near, near));
     };
-    assert_eq!(turned(&mut hands, &Side::ALL, 1.0, spoil).0, Some(Err(Failure::FieldUneven)));
+    assert_eq!(turned(&mut hands, &Side::ALL, 1.0, spoil).0, Some(Err(CalibrationFailure::FieldUneven)));
 }
 
 #[test]
 fn what_is_left_out_is_told() {
     // Not rotated.
     let (found, told) = turned(&mut hands(Part::QMC5883L, 3), &[Side::Down, Side::Down], 0.0, |_, _| ());
-    assert_eq!(found, Some(Err(Failure::NotRotated)));
-    assert_eq!(told.get(1..3), Some([Event::Detected(Side::Down), Event::Rotate].as_slice()));
+    assert_eq!(found, Some(Err(CalibrationFailure::NotRotated)));
+    assert_eq!(told.get(1..3), Some([CalibrationEvent::Detected(Side::Down), CalibrationEvent::Rotate].as_slice()));
     // To and fro by a quarter: half a turn in all is never a whole one.
     let mut quarters = hands(Part::QMC5883L, 3);
-    let mut magnetometer = Magnetometer::new(&Mounting::PLAIN, &calibrated(&quarters));
+    let mut magnetometer = MagnetometerCalibration::new(&Mounting::PLAIN, &calibrated(&quarters));
     let found = (0..3000).find_map(|number| {
         quarters.spin_rad_s = if number < 40 { 0.0 } else { 1.5 * if number / 50 % 2 == 0 { 1.0 } else { -1.0 } };
         magnetometer.step(&quarters.sample(), |_| ())
     });
-    assert_eq!(found, Some(Err(Failure::NotRotated)));
+    assert_eq!(found, Some(Err(CalibrationFailure::NotRotated)));
     // No magnetometer.
     let (found, _) = turned(&mut hands(Part::QMC5883L, 3), &[Side::Down], 1.0, |_, sample| sample.field_ut = None);
-    assert_eq!(found, Some(Err(Failure::NoField)));
+    assert_eq!(found, Some(Err(CalibrationFailure::NoField)));
     // A side again, and then none.
     let (found, told) = turned(&mut hands(Part::QMC5883L, 3), &[Side::Up, Side::Down, Side::Up], 1.0, |_, _| ());
-    assert_eq!((found, told.last()), (None, Some(&Event::Repeated(Side::Up))));
+    assert_eq!((found, told.last()), (None, Some(&CalibrationEvent::Repeated(Side::Up))));
     let mut askew = hands(Part::QMC5883L, 3);
     askew.put(Side::Down, [0.8, 0.0]);
-    let mut magnetometer = Magnetometer::new(&Mounting::PLAIN, &calibrated(&askew));
+    let mut magnetometer = MagnetometerCalibration::new(&Mounting::PLAIN, &calibrated(&askew));
     let found = (0..5000).find_map(|_| magnetometer.step(&askew.sample(), |_| ()));
-    assert_eq!(found, Some(Err(Failure::TimedOut)));
+    assert_eq!(found, Some(Err(CalibrationFailure::TimedOut)));
 }

@@ -1,7 +1,7 @@
 //! The firmware's code in this process.
 
 use super::{Autopilot, Error};
-use afbc_calibration::Sample;
+use afbc_calibration::RawSample;
 use afbc_flight_core::rate::PERIOD_US;
 use afbc_link::{Decoder, Uplink};
 use afbc_onboard::parameters::{Kept, ParameterTable, Reason, RecordChange};
@@ -38,7 +38,7 @@ trait Core {
     ) -> Report<ROTORS_MAX>;
 
     /// Goes on with a calibration.
-    fn calibrate(&mut self, comms: &mut Comms, calibrator: &mut Calibrator, sample: Option<Sample>);
+    fn calibrate(&mut self, comms: &mut Comms, calibrator: &mut Calibrator, sample: Option<RawSample>);
 
     /// Does what stations want of the parameters, and flies what has changed.
     fn parameters(&mut self, comms: &mut Comms, send: &mut dyn FnMut(&[u8])) -> Option<RecordChange>;
@@ -64,7 +64,7 @@ impl<const N: usize> Core for (Flight<N>, ParameterTable<N>) {
         report.padded()
     }
 
-    fn calibrate(&mut self, comms: &mut Comms, calibrator: &mut Calibrator, sample: Option<Sample>) {
+    fn calibrate(&mut self, comms: &mut Comms, calibrator: &mut Calibrator, sample: Option<RawSample>) {
         comms.calibrate(calibrator, sample, &self.1);
     }
 

@@ -1,11 +1,11 @@
 //! Uncorrected readings, from the control tick to a calibration.
 
 use crate::readings::Readings;
-use afbc_calibration::Sample;
+use afbc_calibration::RawSample;
 use afbc_estimator::Measurement;
 use nalgebra::Vector3;
 
-/// Readings of the inertial sensor in a [`Sample`]: 20 ms of them.
+/// Readings of the inertial sensor in a [`RawSample`]: 20 ms of them.
 const READINGS: u16 = 20;
 
 /// Sums of what the sensors have read, added to in each tick while the vehicle is calibrated.
@@ -51,14 +51,14 @@ impl RawReadings {
     }
 
     /// Returns the means, once there are readings enough, and begins again.
-    pub fn take(&mut self) -> Option<Sample> {
+    pub fn take(&mut self) -> Option<RawSample> {
         if self.readings < READINGS {
             return None;
         }
         let RawReadings { newest_us, readings, rates_rad_s, specific_force_m_s2, fields, field_ut } =
             core::mem::replace(self, RawReadings::NONE);
         let count = f32::from(readings);
-        Some(Sample {
+        Some(RawSample {
             at_us: newest_us,
             rates_rad_s: rates_rad_s / count,
             specific_force_m_s2: specific_force_m_s2 / count,

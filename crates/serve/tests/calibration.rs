@@ -2,7 +2,7 @@
 //! them, the parameters, and the sensors' true errors.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, clippy::panic, missing_docs, reason = "tests")]
 
-use afbc_link::{Address, Answer, Calibration, Command, Decoder, Downlink, FRAME_MAX, Sender, Uplink};
+use afbc_link::{Address, Answer, CalibrationRequest, Command, Decoder, Downlink, FRAME_MAX, Sender, Uplink};
 use afbc_plant::InstrumentSuite;
 use afbc_plant::instruments::{Imu, Magnetometer};
 use afbc_scenario::built_in;
@@ -101,7 +101,7 @@ impl Served {
         self.run(20);
     }
 
-    fn begin(&mut self, what: Calibration) {
+    fn begin(&mut self, what: CalibrationRequest) {
         self.texts.clear();
         self.ask(Command::Calibrate(what));
         assert_eq!(self.answers, [Answer::Accepted]);
@@ -140,7 +140,7 @@ fn a_new_vehicle_is_set_up() {
         (bias.rates_rad_s.cast::<f32>(), bias.specific_force_m_s2.cast::<f32>())
     };
 
-    served.begin(Calibration::Gyroscope);
+    served.begin(CalibrationRequest::Gyroscope);
     served.run(5_000);
     let mut expected = vec![Status::Started("gyro".into())];
     expected.extend((1..10).map(|tenth| Status::Progress(10 * tenth)));
@@ -149,7 +149,7 @@ fn a_new_vehicle_is_set_up() {
     let gyro = served.vector("CAL_GYRO0_OFF");
     assert!((gyro - truth(&mut served).0).amax() < 6e-4, "{gyro}");
 
-    served.begin(Calibration::Accelerometer);
+    served.begin(CalibrationRequest::Accelerometer);
     let sides = ["down", "left", "right", "up", "front", "back"];
     for side in sides {
         served.line(&format!("hold {side}"));
@@ -172,7 +172,7 @@ fn a_new_vehicle_is_set_up() {
     assert!((accel - truth(&mut served).1).amax() < 0.04, "{accel}");
     assert!((served.vector("CAL_ACC0_SCALE") - Vector3::repeat(1.0)).amax() < 0.05);
 
-    served.begin(Calibration::Magnetometer);
+    served.begin(CalibrationRequest::Magnetometer);
     for side in sides {
         served.line(&format!("hold {side} 60"));
         served.run(10_000);
@@ -184,7 +184,7 @@ fn a_new_vehicle_is_set_up() {
 
     served.line("hold none");
     served.run(3_000);
-    served.begin(Calibration::Level);
+    served.begin(CalibrationRequest::Level);
     served.run(4_000);
     assert_eq!(
         served.statuses(),
@@ -204,23 +204,28 @@ fn a_new_vehicle_is_set_up() {
 fn calibration_and_flight_exclude_each_other() {
     let mut served = Served::new(cheap, 12);
     served.run(15_000);
-    served.begin(Calibration::Accelerometer);
+    served.begin(CalibrationRequest::Accelerometer);
     served.ask(Command::Arm);
     assert!(matches!(served.answers[..], [Answer::Refused(_)]));
     assert_eq!(served.texts.last().map(String::as_str), Some("arming refused: calibrating"));
-    served.ask(Command::Calibrate(Calibration::Gyroscope));
+    served.ask(Command::Calibrate(CalibrationRequest::Gyroscope));
     assert!(matches!(served.answers[..], [Answer::Refused(_)]));
-    served.ask(Command::Calibrate(Calibration::Cancel));
+    served.ask(Command::Calibrate(CalibrationRequest::Cancel));
     assert_eq!(served.answers, [Answer::Accepted]);
     assert_eq!(served.statuses().last(), Some(&Status::Cancelled));
     // MAVSDK sends it twice.
     let told = served.statuses();
-    served.ask(Command::Calibrate(Calibration::Cancel));
+    served.ask(Command::Calibrate(CalibrationRequest::Cancel));
     assert_eq!((served.answers.as_slice(), served.statuses()), ([Answer::Accepted].as_slice(), told));
 
     served.ask(Command::Arm);
     assert_eq!(served.answers, [Answer::Accepted], "{:?}", served.texts);
-    for what in [Calibration::Gyroscope, Calibration::Accelerometer, Calibration::Level, Calibration::Magnetometer] {
+    for what in [
+        CalibrationRequest::Gyroscope,
+        CalibrationRequest::Accelerometer,
+        CalibrationRequest::Level,
+        CalibrationRequest::Magnetometer,
+    ] {
         served.ask(Command::Calibrate(what));
         assert!(matches!(served.answers[..], [Answer::Refused(_)]));
     }
@@ -237,18 +242,18 @@ fn reasons_are_told() {
     };
     served.line("hold down 20");
     served.run(1_100);
-    served.begin(Calibration::Level);
+    served.begin(CalibrationRequest::Level);
     served.line("hold left");
     served.run(6_000);
     assert_eq!(failed(&served), "tilted above 15 degrees");
     served.line("hold none");
     served.run(2_000);
-    served.begin(Calibration::Gyroscope);
+    served.begin(CalibrationRequest::Gyroscope);
     served.line("fault imu dead");
     served.run(1_500);
     assert_eq!(failed(&served), "no sensor readings");
     served.line("clear");
-    served.begin(Calibration::Magnetometer);
+    served.begin(CalibrationRequest::Magnetometer);
     served.line("fault magnetometer lost");
     served.run(1_500);
     assert_eq!(failed(&served), "no magnetometer readings");

@@ -12,7 +12,7 @@ use crate::services::telemetry::compose;
 use crate::services::texts::{Words, reason, urgency};
 use crate::setup::Setup;
 use afbc::monitor::Norm;
-use afbc_calibration::Sample;
+use afbc_calibration::RawSample;
 use afbc_control::math::sqrt;
 use afbc_flight_core::rate;
 use afbc_flight_core::supervisor::COAST_US;
@@ -276,7 +276,7 @@ impl Comms {
     pub fn calibrate<const N: usize>(
         &mut self,
         calibrator: &mut Calibrator,
-        sample: Option<Sample>,
+        sample: Option<RawSample>,
         table: &ParameterTable<N>,
     ) {
         self.dispatcher.calibrate(calibrator, sample, table);

@@ -1,7 +1,7 @@
 //! Simulated sensors of a vehicle that is held in any attitude.
 #![allow(dead_code, unreachable_pub, clippy::unwrap_used, reason = "shared by tests")]
 
-use afbc_calibration::{Event, Sample, Side};
+use afbc_calibration::{CalibrationEvent, RawSample, Side};
 use afbc_plant::instruments::Imu;
 use afbc_plant::{Environment, InstrumentSuite, Instruments, Motion, Plant, PlantModel, Truth};
 use afbc_types::Parameters;
@@ -74,7 +74,7 @@ impl Hands {
     }
 
     /// Returns the next 20 ms.
-    pub fn sample(&mut self) -> Sample {
+    pub fn sample(&mut self) -> RawSample {
         let (mut rates, mut force, mut field, mut fields) = (Vector3::zeros(), Vector3::zeros(), Vector3::zeros(), 0.0);
         for _ in 0..READINGS {
             let truth = self.truth();
@@ -87,7 +87,7 @@ impl Hands {
                 fields += 1.0;
             }
         }
-        Sample {
+        RawSample {
             at_us: u64::from(self.steps) * 1000,
             rates_rad_s: (rates / f64::from(READINGS)).cast(),
             specific_force_m_s2: (force / f64::from(READINGS)).cast(),
@@ -96,7 +96,7 @@ impl Hands {
     }
 
     /// Turns it as a hand does, to where `put` is, within half a second.
-    pub fn turn_to(&mut self, side: Side, askew_rad: [f64; 2], mut step: impl FnMut(&Sample)) {
+    pub fn turn_to(&mut self, side: Side, askew_rad: [f64; 2], mut step: impl FnMut(&RawSample)) {
         let (from, spin_rad_s) = (self.attitude, std::mem::take(&mut self.spin_rad_s));
         self.put(side, askew_rad);
         let to = self.attitude;
@@ -112,6 +112,6 @@ impl Hands {
 }
 
 /// Keeps what is told.
-pub fn keep(told: &mut Vec<Event>) -> impl FnMut(Event) {
+pub fn keep(told: &mut Vec<CalibrationEvent>) -> impl FnMut(CalibrationEvent) {
     |event| told.push(event)
 }

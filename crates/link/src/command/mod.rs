@@ -73,7 +73,7 @@ pub enum Command {
     /// MAV_CMD_PREFLIGHT_STORAGE (245) of the parameters.
     Storage(Storage),
     /// MAV_CMD_PREFLIGHT_CALIBRATION (241), one at a time.
-    Calibrate(Calibration),
+    Calibrate(CalibrationRequest),
     /// MAV_CMD_RUN_PREARM_CHECKS (401).
     CheckArming,
     /// One of these commands, by number, with an invalid parameter: answered with "denied".
@@ -95,7 +95,7 @@ pub enum Storage {
 
 /// What is calibrated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Calibration {
+pub enum CalibrationRequest {
     /// The gyroscope (param1 = 1).
     Gyroscope,
     /// The magnetometer (param2 = 1).

@@ -1,8 +1,8 @@
 //! Reading of commands.
 
 use super::{
-    ARM_DISARM, CALIBRATE, CHECK_ARMING, CUSTOM_MODE, Calibration, Command, ENGAGE, FORCED, GET_INTERVAL, HOME, LAND,
-    REBOOT, REPOSITION, REQUEST_CAPABILITIES, REQUEST_MESSAGE, REQUEST_PROTOCOL, RETURN, SELECT_MODE,
+    ARM_DISARM, CALIBRATE, CHECK_ARMING, CUSTOM_MODE, CalibrationRequest, Command, ENGAGE, FORCED, GET_INTERVAL, HOME,
+    LAND, REBOOT, REPOSITION, REQUEST_CAPABILITIES, REQUEST_MESSAGE, REQUEST_PROTOCOL, RETURN, SELECT_MODE,
     SELECT_STANDARD_MODE, SET_CURRENT, SET_INTERVAL, SPEED, START_MISSION, STORAGE, Storage, TAKE_OFF, USUAL,
 };
 use crate::address::Address;
@@ -126,11 +126,11 @@ fn known(id: u16, [p1, p2, p3, p4]: [f32; 4], place: Option<Place>) -> Option<Co
 /// Returns what is calibrated: a single parameter says it, and all others are 0 or NaN.
 fn calibration(parameters: [f32; 7]) -> Command {
     let asked = match parameters.map(or_zero) {
-        [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0] => Calibration::Gyroscope,
-        [0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0] => Calibration::Magnetometer,
-        [0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0] => Calibration::Accelerometer,
-        [0.0, 0.0, 0.0, 0.0, 2.0, 0.0, 0.0] => Calibration::Level,
-        [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0] => Calibration::Cancel,
+        [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0] => CalibrationRequest::Gyroscope,
+        [0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0] => CalibrationRequest::Magnetometer,
+        [0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0] => CalibrationRequest::Accelerometer,
+        [0.0, 0.0, 0.0, 0.0, 2.0, 0.0, 0.0] => CalibrationRequest::Level,
+        [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0] => CalibrationRequest::Cancel,
         _ => return Command::Denied(CALIBRATE),
     };
     Command::Calibrate(asked)

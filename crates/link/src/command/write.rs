@@ -1,7 +1,7 @@
 //! Writing of commands, to everyone.
 
 use super::read::{INT, LONG};
-use super::{Calibration, Command, FORCED, Storage, USUAL};
+use super::{CalibrationRequest, Command, FORCED, Storage, USUAL};
 use crate::address::Address;
 use crate::message::PAYLOAD_MAX;
 use crate::place::{Datum, Height, Place, frame};
@@ -14,11 +14,11 @@ pub(crate) fn write(command: Command, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, 
         Command::Kill => ([0.0, FORCED, 0.0, 0.0], None),
         Command::Calibrate(asked) => {
             let (first, fifth) = match asked {
-                Calibration::Gyroscope => ([1.0, 0.0], 0.0),
-                Calibration::Magnetometer => ([0.0, 1.0], 0.0),
-                Calibration::Accelerometer => ([0.0; 2], 1.0),
-                Calibration::Level => ([0.0; 2], 2.0),
-                Calibration::Cancel => ([0.0; 2], 0.0),
+                CalibrationRequest::Gyroscope => ([1.0, 0.0], 0.0),
+                CalibrationRequest::Magnetometer => ([0.0, 1.0], 0.0),
+                CalibrationRequest::Accelerometer => ([0.0; 2], 1.0),
+                CalibrationRequest::Level => ([0.0; 2], 2.0),
+                CalibrationRequest::Cancel => ([0.0; 2], 0.0),
             };
             let [p1, p2] = first;
             let parameters = [p1, p2, 0.0, 0.0, fifth, 0.0, 0.0];

@@ -4,9 +4,9 @@ use super::{Dispatcher, ParameterTask};
 use crate::services::calibration::{Calibrator, Step, name};
 use crate::services::commands::BUSY;
 use crate::services::texts::Words;
-use afbc_calibration::Sample;
+use afbc_calibration::RawSample;
 use afbc_flight_core::Refusal;
-use afbc_link::{Address, Answer, Calibration, MavSeverity, ParameterRequest};
+use afbc_link::{Address, Answer, CalibrationRequest, MavSeverity, ParameterRequest};
 use afbc_onboard::parameters::{Kind, ParameterTable};
 
 /// Begins of the texts by which stations know what has become of a calibration.
@@ -17,12 +17,12 @@ const CANCELLED: &str = "[cal] calibration cancelled";
 
 impl Dispatcher {
     /// Answers MAV_CMD_PREFLIGHT_CALIBRATION.
-    pub(super) fn ask_calibration(&mut self, what: Calibration) -> Answer {
+    pub(super) fn ask_calibration(&mut self, what: CalibrationRequest) -> Answer {
         let info = MavSeverity::MAV_SEVERITY_INFO;
         if !self.calibrates {
             return Answer::Unsupported;
         }
-        if what == Calibration::Cancel {
+        if what == CalibrationRequest::Cancel {
             if self.calibration.active.take().is_some() {
                 self.texts.put(info, CANCELLED);
             }
@@ -44,7 +44,7 @@ impl Dispatcher {
     pub(crate) fn calibrate<const N: usize>(
         &mut self,
         calibrator: &mut Calibrator,
-        sample: Option<Sample>,
+        sample: Option<RawSample>,
         table: &ParameterTable<N>,
     ) {
         let Some(what) = self.calibration.active else { return calibrator.stop() };
@@ -69,7 +69,7 @@ impl Dispatcher {
         }
     }
 
-    fn end_calibration(&mut self, calibrator: &mut Calibrator, result: Result<Calibration, &'static str>) {
+    fn end_calibration(&mut self, calibrator: &mut Calibrator, result: Result<CalibrationRequest, &'static str>) {
         calibrator.stop();
         self.calibration.active = None;
         match result {

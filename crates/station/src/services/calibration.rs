@@ -2,8 +2,11 @@
 //! and texts, whose words QGroundControl and MAVSDK read.
 
 use crate::services::texts::Words;
-use afbc_calibration::{Accelerometer, Event, Failure, Gyroscope, Level, Magnetometer, Sample, Side, Sides};
-use afbc_link::Calibration;
+use afbc_calibration::{
+    AccelerometerCalibration, CalibrationEvent, CalibrationFailure, GyroscopeCalibration, LevelCalibration,
+    MagnetometerCalibration, RawSample, Side, Sides,
+};
+use afbc_link::CalibrationRequest;
 use afbc_onboard::Configuration;
 use afbc_store::RecordName;
 use heapless::Vec;
@@ -20,7 +23,7 @@ pub(crate) struct CalibrationState {
     /// Number of those that were begun, to distinguish one from the next.
     pub(crate) number: u8,
     /// What is calibrated.
-    pub(crate) active: Option<Calibration>,
+    pub(crate) active: Option<CalibrationRequest>,
 }
 
 /// Calibrates the sensors of a vehicle, on its [`Comms`](crate::Comms::calibrate)' behalf. A shell without sensors has
@@ -40,10 +43,10 @@ pub struct Calibrator {
 #[derive(Debug)]
 #[expect(clippy::large_enum_variant, reason = "there is one, and no heap")]
 enum Procedure {
-    Gyroscope(Gyroscope),
-    Accelerometer(Accelerometer),
-    Level(Level),
-    Magnetometer(Magnetometer),
+    Gyroscope(GyroscopeCalibration),
+    Accelerometer(AccelerometerCalibration),
+    Level(LevelCalibration),
+    Magnetometer(MagnetometerCalibration),
 }
 
 /// What follows from a step.
@@ -73,26 +76,28 @@ impl Calibrator {
     }
 
     /// Begins.
-    fn begin<const N: usize>(&mut self, what: Calibration, configuration: &Configuration<N>, now_us: u64) {
+    fn begin<const N: usize>(&mut self, what: CalibrationRequest, configuration: &Configuration<N>, now_us: u64) {
         self.stop();
         self.heard_us = now_us;
         let Configuration { imu, calibration, estimation, .. } = configuration;
         self.procedure = match what {
-            Calibration::Gyroscope => Some(Procedure::Gyroscope(Gyroscope::default())),
-            Calibration::Accelerometer => {
-                Some(Procedure::Accelerometer(Accelerometer::new(imu, estimation.gravity_m_s2)))
+            CalibrationRequest::Gyroscope => Some(Procedure::Gyroscope(GyroscopeCalibration::default())),
+            CalibrationRequest::Accelerometer => {
+                Some(Procedure::Accelerometer(AccelerometerCalibration::new(imu, estimation.gravity_m_s2)))
             }
-            Calibration::Level => Some(Procedure::Level(Level::new(imu, calibration))),
-            Calibration::Magnetometer => Some(Procedure::Magnetometer(Magnetometer::new(imu, calibration))),
-            Calibration::Cancel => None,
+            CalibrationRequest::Level => Some(Procedure::Level(LevelCalibration::new(imu, calibration))),
+            CalibrationRequest::Magnetometer => {
+                Some(Procedure::Magnetometer(MagnetometerCalibration::new(imu, calibration)))
+            }
+            CalibrationRequest::Cancel => None,
         };
     }
 
     /// Goes on with `what`, whose number this is, with the sensors' next sample if there is one.
     pub(crate) fn step<const N: usize>(
         &mut self,
-        (number, what): (u8, Calibration),
-        sample: Option<Sample>,
+        (number, what): (u8, CalibrationRequest),
+        sample: Option<RawSample>,
         (configuration, now_us): (&Configuration<N>, u64),
         say: impl FnMut(&Words),
     ) -> Step {
@@ -127,7 +132,7 @@ impl Calibrator {
     }
 
     /// Advances the procedure.
-    fn find(&mut self, sample: &Sample, mut say: impl FnMut(&Words)) -> Option<Result<(), Failure>> {
+    fn find(&mut self, sample: &RawSample, mut say: impl FnMut(&Words)) -> Option<Result<(), CalibrationFailure>> {
         let found = &mut self.found;
         let mut put = |name: &str, values: Vector3<f32>| {
             for (axis, value) in ['X', 'Y', 'Z'].into_iter().zip(values.iter()) {
@@ -153,13 +158,13 @@ impl Calibrator {
 }
 
 /// Returns what stations call a calibration.
-pub(crate) fn name(what: Calibration) -> &'static str {
+pub(crate) fn name(what: CalibrationRequest) -> &'static str {
     match what {
-        Calibration::Gyroscope => "gyro",
-        Calibration::Accelerometer => "accel",
-        Calibration::Level => "level",
-        Calibration::Magnetometer => "mag",
-        Calibration::Cancel => "",
+        CalibrationRequest::Gyroscope => "gyro",
+        CalibrationRequest::Accelerometer => "accel",
+        CalibrationRequest::Level => "level",
+        CalibrationRequest::Magnetometer => "mag",
+        CalibrationRequest::Cancel => "",
     }
 }
 
@@ -175,20 +180,20 @@ fn side_name(side: Side) -> &'static str {
 }
 
 /// Says what happens, in PX4's words as far as stations read them.
-fn words(event: Event, say: &mut impl FnMut(&Words)) {
+fn words(event: CalibrationEvent, say: &mut impl FnMut(&Words)) {
     let cal = Words::of("[cal] ");
     match event {
-        Event::Progress(percent) => say(&cal.and("progress <").number(percent.into()).and(">")),
-        Event::Moved => say(&cal.and("detected motion, hold still...")),
-        Event::Pending(sides) => {
+        CalibrationEvent::Progress(percent) => say(&cal.and("progress <").number(percent.into()).and(">")),
+        CalibrationEvent::Moved => say(&cal.and("detected motion, hold still...")),
+        CalibrationEvent::Pending(sides) => {
             say(&pending(sides));
             say(&Words::of("[cal] hold vehicle still on a pending side"));
         }
-        Event::Askew => say(&cal.and("no side faces down, rotate to one")),
-        Event::Detected(side) => say(&cal.and(side_name(side)).and(" orientation detected")),
-        Event::Repeated(side) => say(&cal.and(side_name(side)).and(" side already completed")),
-        Event::Rotate => say(&cal.and("rotate vehicle around the vertical")),
-        Event::Done(side) => say(&cal.and(side_name(side)).and(" side done, rotate to a different side")),
+        CalibrationEvent::Askew => say(&cal.and("no side faces down, rotate to one")),
+        CalibrationEvent::Detected(side) => say(&cal.and(side_name(side)).and(" orientation detected")),
+        CalibrationEvent::Repeated(side) => say(&cal.and(side_name(side)).and(" side already completed")),
+        CalibrationEvent::Rotate => say(&cal.and("rotate vehicle around the vertical")),
+        CalibrationEvent::Done(side) => say(&cal.and(side_name(side)).and(" side done, rotate to a different side")),
         _ => (),
     }
 }
@@ -198,17 +203,17 @@ fn pending(sides: Sides) -> Words {
 }
 
 /// Returns why, in at most 24 characters: so many are left of a text.
-fn reason(failure: Failure) -> &'static str {
+fn reason(failure: CalibrationFailure) -> &'static str {
     match failure {
-        Failure::Moving => "vehicle moved",
-        Failure::TimedOut => "no side in time",
-        Failure::NotRotated => "not rotated in time",
-        Failure::NoField => "no magnetometer readings",
-        Failure::NotLevel => "tilted above 15 degrees",
-        Failure::TooFewDirections => "too few directions",
-        Failure::TooLarge => "sensor errors too large",
-        Failure::FieldStrength => "not the earth's field",
-        Failure::FieldUneven => "field uneven: iron near?",
+        CalibrationFailure::Moving => "vehicle moved",
+        CalibrationFailure::TimedOut => "no side in time",
+        CalibrationFailure::NotRotated => "not rotated in time",
+        CalibrationFailure::NoField => "no magnetometer readings",
+        CalibrationFailure::NotLevel => "tilted above 15 degrees",
+        CalibrationFailure::TooFewDirections => "too few directions",
+        CalibrationFailure::TooLarge => "sensor errors too large",
+        CalibrationFailure::FieldStrength => "not the earth's field",
+        CalibrationFailure::FieldUneven => "field uneven: iron near?",
         _ => "unknown",
     }
 }
@@ -217,24 +222,31 @@ fn reason(failure: Failure) -> &'static str {
 mod tests {
     use super::*;
 
-    const FAILURES: [Failure; 9] = [
-        Failure::Moving,
-        Failure::TimedOut,
-        Failure::NotRotated,
-        Failure::NoField,
-        Failure::NotLevel,
-        Failure::TooFewDirections,
-        Failure::TooLarge,
-        Failure::FieldStrength,
-        Failure::FieldUneven,
+    const FAILURES: [CalibrationFailure; 9] = [
+        CalibrationFailure::Moving,
+        CalibrationFailure::TimedOut,
+        CalibrationFailure::NotRotated,
+        CalibrationFailure::NoField,
+        CalibrationFailure::NotLevel,
+        CalibrationFailure::TooFewDirections,
+        CalibrationFailure::TooLarge,
+        CalibrationFailure::FieldStrength,
+        CalibrationFailure::FieldUneven,
     ];
 
     /// No text is cut off: MAVLink's have 50 characters.
     #[test]
     fn texts_fit() {
-        let of_sides =
-            Side::ALL.into_iter().flat_map(|side| [Event::Detected, Event::Repeated, Event::Done].map(|it| it(side)));
-        let others = [Event::Progress(100), Event::Moved, Event::Pending(Sides::ALL), Event::Askew, Event::Rotate];
+        let of_sides = Side::ALL.into_iter().flat_map(|side| {
+            [CalibrationEvent::Detected, CalibrationEvent::Repeated, CalibrationEvent::Done].map(|it| it(side))
+        });
+        let others = [
+            CalibrationEvent::Progress(100),
+            CalibrationEvent::Moved,
+            CalibrationEvent::Pending(Sides::ALL),
+            CalibrationEvent::Askew,
+            CalibrationEvent::Rotate,
+        ];
         for event in of_sides.chain(others) {
             words(event, &mut |words| {
                 let longer = words.clone().and("!");
