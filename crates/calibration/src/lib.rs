@@ -3,10 +3,11 @@
 //! * [`GyroscopeCalibration`]: the offset, as the mean at rest.
 //! * [`AccelerometerCalibration`]: offset and scale of each axis, from the vehicle at rest on each of its six sides.
 //! * [`LevelCalibration`]: roll and pitch of the inertial sensor's mounting, from the vehicle standing level.
-//! * [`MagnetometerCalibration`]: offset and matrix, from the vehicle turned about the vertical on each of its six sides.
+//! * [`MagnetometerCalibration`]: offset and matrix, from the vehicle turned about the vertical on each of its sides.
 //!
-//! Each is a state machine that takes a [`RawSample`], tells what happens by [`CalibrationEvent`]s, and returns its result, or the
-//! [`CalibrationFailure`] that ended it. It keeps sums, no samples. Messages, arming and the storage of results are the caller's.
+//! Each is a state machine that takes a [`RawSample`], tells what happens by [`CalibrationEvent`]s, and returns its
+//! result, or the [`CalibrationFailure`] that ended it. It keeps sums, no samples. Messages, arming and the storage of
+//! results are the caller's.
 //!
 //! ```
 //! use afbc_calibration::{GyroscopeCalibration, RawSample};
