@@ -173,9 +173,9 @@ WRITE=1 cargo test -p flight-tests --test parameters
 **Name** is a parameter's name on a ground station and in flash: the prefix of its group, an axis or a part of the
 group, its id, and X, Y or Z of a vector. A name has at most 16 characters, MAVLink's limit, and never changes. **Key**
 is the name in [scenario files](scenarios.md). The groups `V_`, `MOT_`, `IMU_`, `CAL_`, `ARM_`, `EST_`, `C_`, `A_`
-and those without a prefix can be set while the vehicle runs ([storage.md](storage.md)). **Tuned** marks the parameters that
-`sitl tune` searches; the others belong to the vehicle and its task. Where there are two profiles, the firmware flies
-`flight`, and scenario files start from `paper`.
+and those without a prefix can be set while the vehicle runs ([storage.md](storage.md)). **Tuned** marks the parameters
+that `sitl tune` searches; the others belong to the vehicle and its task. Where there are two profiles, the firmware
+flies `flight`, and scenario files start from `paper`.
 ";
 
 fn page() -> String {

@@ -78,14 +78,15 @@ proptest! {
         prop_assert_eq!(told.last(), Some(&CalibrationEvent::Progress(100)));
         let (mag_offset_ut, mag_scale, mag_off_diagonal) = (fit.offset_ut, fit.scale, fit.off_diagonal);
         let found = SensorCalibration { mag_offset_ut, mag_scale, mag_off_diagonal, ..SensorCalibration::DEFAULT };
-        let attitudes = (0..20).map(|number| Rotation3::from_euler_angles(f64::from(number), 2.5 * f64::from(number), 0.7));
+        let attitudes = (0..20).map(f64::from).map(|it| Rotation3::from_euler_angles(it, 2.5 * it, 0.7));
         for attitude in attitudes {
             let read = mean(&mut hands, attitude);
             let off = found.field(&read).norm() / fit.strength_ut - 1.0;
             prop_assert!(off.abs() < 0.03, "{} of {}", off, fit.strength_ut);
         }
         // The earth's field is taken back by opposite attitudes; what is left is the hard iron.
-        let pairs = [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| Rotation3::from_scaled_axis(axis * std::f64::consts::PI));
+        let half = std::f64::consts::PI;
+        let pairs = [Vector3::x(), Vector3::y(), Vector3::z()].map(|it| Rotation3::from_scaled_axis(it * half));
         let four = core::iter::once(Rotation3::identity()).chain(pairs);
         let hard_ut = four.map(|attitude| mean(&mut hands, attitude)).sum::<Vector3<f32>>() / 4.0;
         prop_assert!((hard_ut - fit.offset_ut).norm() < 0.03 * fit.strength_ut, "{} {}", hard_ut, fit.offset_ut);
