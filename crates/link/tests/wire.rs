@@ -9,8 +9,8 @@
 )]
 
 use afbc_link::{
-    Address, Answer, Axes, Command, Counters, Decoder, Downlink, ExternalTarget, FRAME_MAX, HealthArray, MavCmd,
-    MavSeverity, Message, PositionTarget, Sender, StatesRefused, Uplink,
+    Address, Answer, Axes, CalibrationRequest, Command, Counters, Decoder, Downlink, ExternalTarget, FRAME_MAX,
+    HealthArray, MavCmd, MavSeverity, Message, PositionTarget, Sender, StatesRefused, Uplink,
 };
 use afbc_types::{Axis, PerAxis, PoseSigmas, RotorSpeeds, Setpoint, State};
 use mavlink::dialects::common::{
