@@ -4,11 +4,11 @@ use crate::aux_sensors;
 use crate::board::{Board, Links, Receiver as _, Transmitter as _};
 use crate::control;
 use crate::parameters;
-use crate::samples::Sampler as _;
+use crate::samples::{self, Sampler as _};
 use crate::ticks::{self, Tick};
 use crate::vehicle::ParameterTable;
 pub use afbc_station::Comms;
-use afbc_station::{REPORT_MAX, Reboot, Setup};
+use afbc_station::{Calibrator, REPORT_MAX, Reboot, Setup};
 use core::array;
 use core::future::poll_fn;
 use core::pin::pin;
@@ -39,11 +39,13 @@ pub type Desk = (Comms, ParameterTable);
 /// Creates it, with nothing received, to be called once: in place, since a task would store a value twice and take the
 /// stack for it.
 #[inline(never)]
-pub fn make(table: ParameterTable, boot_loader: bool) -> &'static mut Desk {
+pub fn make<B: Board>(table: ParameterTable) -> &'static mut Desk {
     static DESK: StaticCell<Desk> = StaticCell::new();
     DESK.init_with(|| {
+        let boot_loader = B::BOOT_LOADER.is_some();
         let reboots: &[_] = if boot_loader { &[Reboot::Program, Reboot::BootLoader] } else { &[Reboot::Program] };
-        let setup = Setup { reboots, ..Setup::of(&table.configuration().link) };
+        let calibrates = B::Sampler::SENSES;
+        let setup = Setup { reboots, calibrates, ..Setup::of(&table.configuration().link) };
         (Comms::with(setup), table)
     })
 }
@@ -55,6 +57,7 @@ pub async fn run<B: Board, const OTHERS: usize>((comms, table): &mut Desk, links
     let mut incoming = [0; READ_MAX];
     let mut outgoing = Vec::<u8, REPORT_MAX>::new();
     let mut leaving = 0;
+    let mut calibrator = B::Sampler::SENSES.then(calibrator);
     loop {
         match select(receive(links, &mut incoming), ticks::next()).await {
             Either::First((link, length)) => {
@@ -76,6 +79,12 @@ pub async fn run<B: Board, const OTHERS: usize>((comms, table): &mut Desk, links
                     comms.set_aux_sensors(aux_sensors::known(tick.report.time_us));
                 }
                 report(comms, &tick, B::CORE_HZ, &mut outgoing);
+                // A constant, so that a board without sensors has none of it.
+                if B::Sampler::SENSES
+                    && let Some(calibrator) = &mut calibrator
+                {
+                    calibrate(comms, calibrator, table);
+                }
                 serve(comms, table, &mut outgoing);
                 links.each().iter_mut().for_each(|link| link.transmitter.transmit(&tick, &outgoing));
                 if comms.has_mail() {
@@ -114,6 +123,20 @@ fn report(comms: &mut Comms, tick: &Tick, core_hz: u32, outgoing: &mut Vec<u8, R
     let tick_us = tick.cycles as f32 / (core_hz / 1_000_000) as f32;
     // There is room for every frame.
     comms.report(&tick.report, tick_us, |frame| drop(outgoing.extend_from_slice(frame)));
+}
+
+/// Creates what calibrates, to be called once, by a board with sensors: the others do not have its memory.
+#[inline(never)]
+fn calibrator() -> &'static mut Calibrator {
+    static CALIBRATOR: StaticCell<Calibrator> = StaticCell::new();
+    CALIBRATOR.init_with(Calibrator::new)
+}
+
+/// Goes on with a calibration. Out of line like the report.
+#[inline(never)]
+fn calibrate(comms: &mut Comms, calibrator: &mut Calibrator, table: &ParameterTable) {
+    let sample = samples::raw(comms.is_calibrating());
+    comms.calibrate(calibrator, sample, table);
 }
 
 /// Sends values of parameters, and passes on what has changed. Out of line like the report.

@@ -62,7 +62,7 @@ pub fn run<B: Board>(
         link.transmitter.set_baud(table.configuration().link.baud);
     }
     let flight = control::make(table.configuration());
-    let desk = comms::make(table, B::BOOT_LOADER.is_some());
+    let desk = comms::make::<B>(table);
     board.unleash_watchdog();
     time::start(core.SYST, B::CORE_HZ);
     comms(executors.comms, desk, links);

@@ -3,10 +3,12 @@
 //! The task runs at a higher priority than the tick, so that a sample's time is that of its interrupt, and a transfer
 //! from a sensor goes on while the tick runs. The tick takes what has arrived.
 
+use afbc_calibration::RawSample;
 use afbc_estimator::Measurement;
-use afbc_onboard::{Aged, ImuSelector, Readings};
+use afbc_onboard::{Aged, ImuSelector, RawReadings, Readings};
 use core::cell::RefCell;
 use core::future::ready;
+use core::sync::atomic::{AtomicBool, Ordering};
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use heapless::Deque;
@@ -65,6 +67,10 @@ static SELECTOR: Mutex<CriticalSectionRawMutex, RefCell<ImuSelector>> = Mutex::n
 static ARRIVED: Mutex<CriticalSectionRawMutex, RefCell<Arrived>> =
     Mutex::new(RefCell::new(Arrived { imu: None, aids: Deque::new() }));
 
+/// True while the vehicle is calibrated, and what its sensors have read meanwhile.
+static CALIBRATES: AtomicBool = AtomicBool::new(false);
+static RAW: Mutex<CriticalSectionRawMutex, RefCell<RawReadings>> = Mutex::new(RefCell::new(RawReadings::NONE));
+
 /// Puts what a sensor has read where the next tick takes it.
 pub fn put(time: SampleTime, value: SampleValue) {
     ARRIVED.lock(|arrived| {
@@ -99,6 +105,25 @@ fn put_selected(at_us: u64, select: impl FnOnce(&mut ImuSelector) -> Option<[Vec
     }
 }
 
+/// Returns the next sample for a calibration; collects readings, or not, from now on.
+pub(crate) fn raw(collects: bool) -> Option<RawSample> {
+    let collected = CALIBRATES.swap(collects, Ordering::Relaxed);
+    RAW.lock(|raw| {
+        let mut raw = raw.try_borrow_mut().ok().filter(|_| collects)?;
+        if !collected {
+            *raw = RawReadings::NONE;
+        }
+        raw.take()
+    })
+}
+
+/// Adds the readings of a tick to what a calibration takes.
+#[cold]
+#[inline(never)]
+fn collect(now_us: u64, readings: &Readings) {
+    RAW.lock(|raw| raw.try_borrow_mut().ok().map(|mut raw| raw.add(now_us, readings)));
+}
+
 /// Sets `readings` to what has arrived, for a tick that begins at `now_us`; further measurements wait for the next one.
 pub(crate) fn take(now_us: u64, readings: &mut Readings) {
     readings.clear();
@@ -112,6 +137,9 @@ pub(crate) fn take(now_us: u64, readings: &mut Readings) {
             *slot = Some(Aged { value, age_us: time.age_us(now_us) });
         }
     });
+    if CALIBRATES.load(Ordering::Relaxed) {
+        collect(now_us, readings);
+    }
 }
 
 impl SampleTime {

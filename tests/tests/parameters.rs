@@ -14,7 +14,7 @@ use afbc_plant::instruments::{Accelerometer, Barometer, Gnss, Gyroscope, Imu, Ma
 use afbc_plant::{Battery, Contact, Deviations, Drag, Dropouts, GroundEffect, Rotors, Sensing, Turbulence, Wind};
 use afbc_reader::words::{self, number};
 use afbc_scenario::contender::{ControllerKind, Law};
-use afbc_types::{Declaration, Declared, Mounting, OutOfRange, Parameters, Range, Value};
+use afbc_types::{Declaration, Declared, Mounting, OutOfRange, Parameters, Range, SensorCalibration, Value};
 use core::convert::Infallible;
 use core::fmt::Write;
 use std::collections::{BTreeMap, BTreeSet};
@@ -132,6 +132,7 @@ fn groups() -> Vec<Group> {
         group("Motors: `[motor]` of a vehicle file", "MOT_", Curve::DEFAULT),
         group("Rotors, as flight software knows them", "MOT_", Response::DEFAULT),
         group("Inertial sensor: `[imu]` of a vehicle file", "IMU_", Mounting::DEFAULT),
+        group("Calibration of the sensors, by the vehicle itself", "CAL_", SensorCalibration::DEFAULT),
         group("Arming: `[arming]` of a vehicle file", "ARM_", ArmingLimits::DEFAULT),
         group("Estimator: `[estimator]` of a vehicle file", "EST_", afbc_estimator::Settings::DEFAULT),
         group("Guidance: `[guidance]` of a vehicle file", "", afbc_guidance::Settings::DEFAULT),
@@ -171,10 +172,10 @@ WRITE=1 cargo test -p flight-tests --test parameters
 
 **Name** is a parameter's name on a ground station and in flash: the prefix of its group, an axis or a part of the
 group, its id, and X, Y or Z of a vector. A name has at most 16 characters, MAVLink's limit, and never changes. **Key**
-is the name in [scenario files](scenarios.md). The groups `V_`, `MOT_`, `IMU_`, `ARM_`, `EST_`, `C_`, `A_` and those
-without a prefix can be set while the vehicle runs ([storage.md](storage.md)). **Tuned** marks the parameters that
-`sitl tune` searches; the others belong to the vehicle and its task. Where there are two profiles, the firmware flies
-`flight`, and scenario files start from `paper`.
+is the name in [scenario files](scenarios.md). The groups `V_`, `MOT_`, `IMU_`, `CAL_`, `ARM_`, `EST_`, `C_`, `A_`
+and those without a prefix can be set while the vehicle runs ([storage.md](storage.md)). **Tuned** marks the parameters
+that `sitl tune` searches; the others belong to the vehicle and its task. Where there are two profiles, the firmware
+flies `flight`, and scenario files start from `paper`.
 ";
 
 fn page() -> String {
@@ -325,7 +326,7 @@ fn what_a_station_may_set_is_declared_here() {
     for parameter in table.iter() {
         assert_eq!(rows[parameter.name.as_str()].range, parameter.range, "{}", parameter.name);
     }
-    let settable = ["", "V_", "MOT_", "IMU_", "ARM_", "EST_", "C_", "A_"];
+    let settable = ["", "V_", "MOT_", "IMU_", "CAL_", "ARM_", "EST_", "C_", "A_"];
     let expected: usize =
         groups().iter().filter(|group| settable.contains(&group.prefix)).map(|group| group.rows.len()).sum();
     assert_eq!(usize::from(table.count()), expected);

@@ -1,7 +1,7 @@
 //! From the inertial sensor's own samples to those of a sensor at the centre of mass, along the body's axes.
 
 use crate::measurement::ImuSample;
-use afbc_types::{Mounting, sin_cos};
+use afbc_types::{Mounting, SensorCalibration};
 use nalgebra::{Matrix3, Vector3};
 
 /// Longest time between two samples whose rates give the angular acceleration \[us\]. With a longer one the lever arm's
@@ -14,14 +14,11 @@ const LEVER_GAP_US: u64 = 10_000;
 /// omega = R omega_s,   f = R f_s - d omega/dt x r - omega x (omega x r)
 /// ```
 ///
-/// where d omega/dt is the difference from the last sample. The default is at the centre of mass, along the body's
-/// axes, and changes no bit.
+/// where d omega/dt is the difference from the last sample, and omega_s and f_s are what the sensor reads, less its
+/// [calibrated](SensorCalibration) errors. The default is at the centre of mass, along the body's axes, without errors,
+/// and changes no bit.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct ImuCalibration {
-    mounted: Option<Mounted>,
-    /// The last sample, body frame, if its rates are finite.
-    last: Option<ImuSample>,
-}
+pub struct ImuCalibration(Option<Mounted>);
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Mounted {
@@ -29,61 +26,65 @@ struct Mounted {
     to_body: Matrix3<f32>,
     /// r \[m\]
     position_m: Vector3<f32>,
+    gyro_offset_rad_s: Vector3<f32>,
+    accel_offset_m_s2: Vector3<f32>,
+    accel_scale: Vector3<f32>,
 }
 
 impl ImuCalibration {
-    /// Creates it for a sensor that is mounted like this; its numbers must be [valid](afbc_types::Declared::validate).
+    /// Creates it for a sensor without errors that is mounted like this; its numbers must be
+    /// [valid](afbc_types::Declared::validate).
     #[must_use]
     pub fn new(mounting: &Mounting) -> Self {
-        let mounted = (!mounting.is_plain())
-            .then(|| Mounted { to_body: to_body(&mounting.attitude_rad), position_m: mounting.position_m });
-        ImuCalibration { mounted, last: None }
+        Self::calibrated(mounting, &SensorCalibration::DEFAULT)
     }
 
-    /// True if both are for the same mounting.
+    /// The same for a sensor with these errors.
     #[must_use]
-    pub fn has_mounting_of(&self, other: &Self) -> bool {
-        self.mounted == other.mounted
+    pub fn calibrated(mounting: &Mounting, errors: &SensorCalibration) -> Self {
+        let SensorCalibration { gyro_offset_rad_s, accel_offset_m_s2, accel_scale, .. } = *errors;
+        ImuCalibration((!mounting.is_plain() || !errors.leaves_imu()).then(|| Mounted {
+            to_body: mounting.r_body_sensor(),
+            position_m: mounting.position_m,
+            gyro_offset_rad_s,
+            accel_offset_m_s2,
+            accel_scale,
+        }))
     }
 
-    /// Returns what a sensor at the centre of mass would have measured.
+    /// Returns what a sensor at the centre of mass would have measured. `last` is what it returned for the sample
+    /// before, none at first, and becomes what it returns.
     #[inline(always)]
-    pub fn apply(&mut self, sample: ImuSample) -> ImuSample {
-        if self.mounted.is_none() { sample } else { self.mounted(sample) }
+    pub fn apply(&self, last: &mut Option<ImuSample>, sample: ImuSample) -> ImuSample {
+        self.0.as_ref().map_or(sample, |mounted| mounted.apply(last, sample))
     }
+}
 
+impl Mounted {
     #[inline(never)]
-    fn mounted(&mut self, sample: ImuSample) -> ImuSample {
-        let Some(Mounted { to_body, position_m: r }) = &self.mounted else { return sample };
-        let rates_rad_s = to_body * sample.rates_rad_s;
-        let since = self.last.map(|last| (sample.at_us.saturating_sub(last.at_us), rates_rad_s - last.rates_rad_s));
+    fn apply(&self, last: &mut Option<ImuSample>, sample: ImuSample) -> ImuSample {
+        let Mounted { to_body, position_m: r, gyro_offset_rad_s, accel_offset_m_s2, accel_scale } = self;
+        let rates_rad_s = to_body * (sample.rates_rad_s - gyro_offset_rad_s);
+        let felt_m_s2 = (sample.specific_force_m_s2 - accel_offset_m_s2).component_mul(accel_scale);
+        let since = last.map(|before| (sample.at_us.saturating_sub(before.at_us), rates_rad_s - before.rates_rad_s));
         let acceleration_rad_s2 = match since {
             Some((us @ 1..=LEVER_GAP_US, change_rad_s)) => change_rad_s * (1e6 / us as f32),
             _ => Vector3::zeros(),
         };
         let lever_m_s2 = acceleration_rad_s2.cross(r) + rates_rad_s.cross(&rates_rad_s.cross(r));
-        let specific_force_m_s2 = to_body * sample.specific_force_m_s2 - lever_m_s2;
+        let specific_force_m_s2 = to_body * felt_m_s2 - lever_m_s2;
         let corrected = ImuSample { at_us: sample.at_us, rates_rad_s, specific_force_m_s2 };
         // A sample that is no number spoils no other.
-        self.last = Some(corrected).filter(|_| rates_rad_s.norm_squared().is_finite());
+        *last = Some(corrected).filter(|_| rates_rad_s.norm_squared().is_finite());
         corrected
     }
-}
-
-/// Returns R = Rz(yaw) Ry(pitch) Rx(roll).
-fn to_body(attitude_rad: &Vector3<f32>) -> Matrix3<f32> {
-    let [(sr, cr), (sp, cp), (sy, cy)] = [attitude_rad.x, attitude_rad.y, attitude_rad.z].map(sin_cos);
-    let x = Vector3::new(cy * cp, sy * cp, -sp);
-    let y = Vector3::new(cy * sp * sr - sy * cr, sy * sp * sr + cy * cr, cp * sr);
-    let z = Vector3::new(cy * sp * cr + sy * sr, sy * sp * cr - cy * sr, cp * cr);
-    Matrix3::from_columns(&[x, y, z])
 }
 
 #[cfg(test)]
 mod tests {
     use super::ImuCalibration;
     use crate::measurement::ImuSample;
-    use afbc_types::Mounting;
+    use afbc_types::{Mounting, SensorCalibration};
     use nalgebra::{Rotation3, Vector3};
     use proptest::prelude::*;
 
@@ -100,18 +101,42 @@ mod tests {
         ) {
             let mounting = Mounting { position_m, attitude_rad };
             let to_body = Rotation3::from_euler_angles(attitude_rad.x, attitude_rad.y, attitude_rad.z);
-            let mut calibration = ImuCalibration::new(&mounting);
+            let (calibration, mut last) = (ImuCalibration::new(&mounting), None);
             let before = omega - change * (step_us as f32 * 1e-6);
             let felt = |omega: Vector3<f32>, at_us: u64| {
                 let lever = change.cross(&position_m) + omega.cross(&omega.cross(&position_m));
                 ImuSample { at_us, rates_rad_s: to_body.inverse() * omega,
                     specific_force_m_s2: to_body.inverse() * (force + lever) }
             };
-            let _ = calibration.apply(felt(before, at_us));
-            let sample = calibration.apply(felt(omega, at_us + step_us));
+            let _ = calibration.apply(&mut last, felt(before, at_us));
+            let sample = calibration.apply(&mut last, felt(omega, at_us + step_us));
             prop_assert!((sample.rates_rad_s - omega).norm() < 1e-4);
             prop_assert!((sample.specific_force_m_s2 - force).norm() < 2e-2, "{}", sample.specific_force_m_s2 - force);
             prop_assert_eq!(sample.at_us, at_us + step_us);
+        }
+    }
+
+    proptest! {
+        /// Errors that a sensor has in its own axes are taken back before its mounting counts.
+        #[test]
+        fn errors_are_taken_back_in_the_sensors_axes(
+            attitude_rad in vector(3.0), omega in vector(8.0), force in vector(20.0), gyro_offset_rad_s in vector(0.5),
+            accel_offset_m_s2 in vector(3.0), change in vector(0.15),
+        ) {
+            let accel_scale = Vector3::repeat(1.0) + change;
+            let errors = SensorCalibration {
+                gyro_offset_rad_s, accel_offset_m_s2, accel_scale, ..SensorCalibration::DEFAULT
+            };
+            let mounting = Mounting { attitude_rad, ..Mounting::PLAIN };
+            let to_body = Rotation3::from_euler_angles(attitude_rad.x, attitude_rad.y, attitude_rad.z);
+            let read = ImuSample {
+                at_us: 1,
+                rates_rad_s: to_body.inverse() * omega + gyro_offset_rad_s,
+                specific_force_m_s2: (to_body.inverse() * force).component_div(&accel_scale) + accel_offset_m_s2,
+            };
+            let sample = ImuCalibration::calibrated(&mounting, &errors).apply(&mut None, read);
+            prop_assert!((sample.rates_rad_s - omega).norm() < 1e-4);
+            prop_assert!((sample.specific_force_m_s2 - force).norm() < 1e-4);
         }
     }
 
@@ -120,10 +145,10 @@ mod tests {
         let mounting = Mounting { position_m: Vector3::new(0.1, 0.2, 0.0), ..Mounting::PLAIN };
         let at = |at_us| ImuSample { at_us, rates_rad_s: Vector3::repeat(1.0), ..ImuSample::default() };
         for odd in [f32::NAN, f32::INFINITY, f32::MAX] {
-            let mut calibration = ImuCalibration::new(&mounting);
-            let _ = calibration.apply(at(1_000));
-            let _ = calibration.apply(ImuSample { rates_rad_s: Vector3::new(0.0, odd, 0.0), ..at(2_000) });
-            let next = calibration.apply(at(3_000));
+            let (calibration, mut last) = (ImuCalibration::new(&mounting), None);
+            let _ = calibration.apply(&mut last, at(1_000));
+            let _ = calibration.apply(&mut last, ImuSample { rates_rad_s: Vector3::new(0.0, odd, 0.0), ..at(2_000) });
+            let next = calibration.apply(&mut last, at(3_000));
             assert!(next.specific_force_m_s2.norm() < 1.0, "{odd}: {}", next.specific_force_m_s2);
         }
     }
@@ -135,16 +160,16 @@ mod tests {
             rates_rad_s: Vector3::new(f32::NAN, 1e-40, -0.0),
             specific_force_m_s2: Vector3::new(1.0, f32::INFINITY, 9.81),
         };
-        let plain = ImuCalibration::new(&Mounting::PLAIN).apply(odd);
+        let plain = ImuCalibration::new(&Mounting::PLAIN).apply(&mut None, odd);
         assert_eq!(plain.rates_rad_s.map(f32::to_bits), odd.rates_rad_s.map(f32::to_bits));
         assert_eq!(plain.specific_force_m_s2.map(f32::to_bits), odd.specific_force_m_s2.map(f32::to_bits));
 
         let mounting = Mounting { position_m: Vector3::new(0.1, 0.0, 0.0), ..Mounting::PLAIN };
-        let mut calibration = ImuCalibration::new(&mounting);
+        let (calibration, mut last) = (ImuCalibration::new(&mounting), None);
         let turning = |at_us, z| ImuSample { at_us, rates_rad_s: Vector3::new(0.0, 0.0, z), ..ImuSample::default() };
         for at_us in [1_000, 11_001, 11_001, 5_000] {
             let rate = at_us as f32 * 1e-4;
-            let force = calibration.apply(turning(at_us, rate)).specific_force_m_s2;
+            let force = calibration.apply(&mut last, turning(at_us, rate)).specific_force_m_s2;
             assert!((force - Vector3::new(0.1 * rate * rate, 0.0, 0.0)).norm() < 1e-6, "{at_us}: {force}");
         }
     }

@@ -1,12 +1,13 @@
 //! The firmware's code in this process.
 
 use super::{Autopilot, Error};
+use afbc_calibration::RawSample;
 use afbc_flight_core::rate::PERIOD_US;
 use afbc_link::{Decoder, Uplink};
 use afbc_onboard::parameters::{Kept, ParameterTable, Reason, RecordChange};
-use afbc_onboard::{Configuration, ControlInputs, Flight, Link, Prepared, Readings, Report};
+use afbc_onboard::{Configuration, ControlInputs, Flight, Link, Prepared, RawReadings, Readings, Report};
 use afbc_recorder::Recorder;
-use afbc_station::{Comms, Setup};
+use afbc_station::{Calibrator, Comms, Setup};
 use afbc_store::Store;
 use afbc_types::{OutOfRange, ROTORS_MAX, with_rotors};
 use afbc_vehicles::Vehicle;
@@ -21,6 +22,9 @@ pub struct Host {
     /// What the last tick took of it.
     taken: ControlInputs,
     readings: Readings,
+    calibrator: Box<Calibrator>,
+    /// What the sensors have read while it calibrates.
+    raw: RawReadings,
     time_us: u64,
     /// Number of the next tick, and the exact log of it all, if it is kept.
     number: u32,
@@ -44,6 +48,9 @@ trait Core {
         readings: &Readings,
         tell: Tell<'_>,
     ) -> Report<ROTORS_MAX>;
+
+    /// Goes on with a calibration.
+    fn calibrate(&mut self, comms: &mut Comms, calibrator: &mut Calibrator, sample: Option<RawSample>);
 
     /// Does what stations want of the parameters, and flies what has changed.
     fn parameters(&mut self, comms: &mut Comms, send: &mut dyn FnMut(&[u8])) -> Option<RecordChange>;
@@ -70,6 +77,10 @@ impl<const N: usize> Core for (Flight<N>, ParameterTable<N>) {
         let report = self.0.tick(now_us, inputs, readings);
         tell.comms.report(&report, tell.tick_us, tell.send);
         report.padded()
+    }
+
+    fn calibrate(&mut self, comms: &mut Comms, calibrator: &mut Calibrator, sample: Option<RawSample>) {
+        comms.calibrate(calibrator, sample, &self.1);
     }
 
     fn parameters(&mut self, comms: &mut Comms, send: &mut dyn FnMut(&[u8])) -> Option<RecordChange> {
@@ -150,7 +161,7 @@ impl Host {
     }
 
     fn of<const N: usize>(table: ParameterTable<N>) -> Result<Self, OutOfRange> {
-        let setup = Setup::of(&table.configuration().link);
+        let setup = Setup { calibrates: true, ..Setup::of(&table.configuration().link) };
         let flight = Flight::new(table.configuration())?;
         Ok(Host {
             flight: Box::new((flight, table)),
@@ -159,6 +170,8 @@ impl Host {
             inputs: ControlInputs::EMPTY,
             taken: ControlInputs::EMPTY,
             readings: Readings::NONE,
+            calibrator: Box::default(),
+            raw: RawReadings::NONE,
             time_us: 0,
             number: 0,
             log: None,
@@ -220,6 +233,12 @@ impl Host {
         let mut send = |frame: &[u8]| bytes.extend_from_slice(frame);
         let tell = Tell { comms: &mut self.comms, tick_us, send: &mut send };
         let report = self.flight.tick(time_us, &mut self.taken, &readings, tell);
+        if self.comms.is_calibrating() {
+            self.raw.add(time_us, &readings);
+        } else {
+            self.raw = RawReadings::NONE;
+        }
+        self.flight.calibrate(&mut self.comms, &mut self.calibrator, self.raw.take());
         let change = self.flight.parameters(&mut self.comms, &mut send);
         if let Some(log) = &mut self.log {
             if change.is_some() {

@@ -6,8 +6,8 @@ use afbc_guidance::FlightMode;
 use afbc_link::{
     Address, Answer, Command, Counters, Decoder, Downlink, FRAME_MAX, HealthArray, MavCmd, Sender, Text, Uplink,
 };
-use afbc_station::BUSY;
 use afbc_station::services::modes;
+use afbc_station::{BUSY, CALIBRATES};
 use afbc_types::{PoseSigmas, ROTORS_MAX, RotorSpeeds, Setpoint, State};
 use nalgebra::Vector3;
 use std::time::Instant;
@@ -177,7 +177,8 @@ impl ReceivedMessages {
     pub fn refusal(&self) -> Option<&'static str> {
         let Some(Answer::Refused(number)) = self.answer else { return None };
         let known = Refusal::ALL.into_iter().find(|refusal| *refusal as i32 == number).map(Refusal::reason);
-        let busy = (number == BUSY).then_some("refused: too many requests are queued");
-        Some(known.or(busy).unwrap_or("arming refused: reason unknown"))
+        let others = [(BUSY, "refused: too many requests are queued"), (CALIBRATES, "arming refused: calibrating")];
+        let other = others.into_iter().find(|(known, _)| *known == number).map(|(_, reason)| reason);
+        Some(known.or(other).unwrap_or("arming refused: reason unknown"))
     }
 }

@@ -54,7 +54,7 @@ mod wire;
 pub use address::Address;
 pub use answer::Answer;
 pub use clocks::Clock;
-pub use command::{Command, Reboot, Storage};
+pub use command::{CalibrationRequest, Command, Reboot, Storage};
 pub use decoder::{Counters, Decoder};
 pub use downlink::{Downlink, Text};
 pub use framing::{FRAME_MAX, Sender};

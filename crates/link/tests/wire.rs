@@ -9,8 +9,8 @@
 )]
 
 use afbc_link::{
-    Address, Answer, Axes, Command, Counters, Decoder, Downlink, ExternalTarget, FRAME_MAX, HealthArray, MavCmd,
-    MavSeverity, Message, PositionTarget, Reboot, Sender, StatesRefused, Uplink,
+    Address, Answer, Axes, CalibrationRequest, Command, Counters, Decoder, Downlink, ExternalTarget, FRAME_MAX,
+    HealthArray, MavCmd, MavSeverity, Message, PositionTarget, Reboot, Sender, StatesRefused, Uplink,
 };
 use afbc_types::{Axis, PerAxis, PoseSigmas, RotorSpeeds, Setpoint, State};
 use mavlink::dialects::common::{
@@ -380,6 +380,56 @@ fn commands() {
         assert_eq!(read(MavCmd::MAV_CMD_USER_1, 0.5, f32::NAN), Command::Engage);
         assert_eq!(read(MavCmd::MAV_CMD_NAV_LAND, 1.0, 0.0), Command::Land);
         assert_eq!(read(MavCmd::MAV_CMD_DO_SET_SERVO, 1.0, 0.0), Command::Other(183));
+    }
+}
+
+/// MAV_CMD_PREFLIGHT_CALIBRATION (241) by its parameters, as MAVLink's common dialect numbers them, and with those that
+/// MAVSDK leaves out, which are NaN.
+#[test]
+fn calibrations_are_read() {
+    let read = |parameters: [f32; 7]| {
+        let [param1, param2, param3, param4, param5, param6, param7] = parameters;
+        let command = MavCmd::MAV_CMD_PREFLIGHT_CALIBRATION;
+        let frame = COMMAND_LONG_DATA {
+            command,
+            param1,
+            param2,
+            param3,
+            param4,
+            param5,
+            param6,
+            param7,
+            ..COMMAND_LONG_DATA::DEFAULT
+        };
+        match read(&theirs(&frame)) {
+            Ok(Uplink::Command(command)) => command,
+            other => panic!("{other:?}"),
+        }
+    };
+    let known = [
+        (CalibrationRequest::Cancel, 0, 0.0),
+        (CalibrationRequest::Gyroscope, 0, 1.0),
+        (CalibrationRequest::Magnetometer, 1, 1.0),
+        (CalibrationRequest::Accelerometer, 4, 1.0),
+        (CalibrationRequest::Level, 4, 2.0),
+    ];
+    for (asked, place, value) in known {
+        for rest in [0.0, f32::NAN] {
+            let mut parameters = [0.0, 0.0, 0.0, 0.0, 0.0, rest, rest];
+            parameters[place] = value;
+            assert_eq!(read(parameters), Command::Calibrate(asked));
+        }
+    }
+    // Every other value of every parameter, and two at once: pressure, radio, airspeed, temperature, simple.
+    for place in 0..7 {
+        for value in [-1.0, 0.5, 1.0, 2.0, 3.0, 4.0, f32::INFINITY] {
+            let mut parameters = [0.0; 7];
+            parameters[place] = value;
+            let is_known = known.iter().any(|(_, at, what)| (*at, *what) == (place, value));
+            assert_eq!(read(parameters) == Command::Denied(241), !is_known, "{parameters:?}");
+            parameters[usize::from(place == 0)] = 1.0;
+            assert_eq!(read(parameters), Command::Denied(241), "{parameters:?}");
+        }
     }
 }
 

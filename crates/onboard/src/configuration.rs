@@ -7,7 +7,7 @@ use afbc_control::drag::KnownDrag;
 use afbc_estimator::Settings as Estimation;
 use afbc_flight_core::ArmingLimits;
 use afbc_flight_core::motor::{Curve, Response};
-use afbc_types::{Airframe, Mounting, Parameters, PerAxis};
+use afbc_types::{Airframe, Mounting, Parameters, PerAxis, SensorCalibration};
 
 /// What the firmware knows of the vehicle that it flies; `vehicles/` has one for each.
 #[derive(Clone, Debug, PartialEq)]
@@ -24,6 +24,8 @@ pub struct Configuration<const N: usize = 4> {
     pub response: Response,
     /// Mounting of the inertial sensor.
     pub imu: Mounting,
+    /// Errors of the sensors, found by calibration on the vehicle.
+    pub calibration: SensorCalibration,
     /// Settings of the estimator.
     pub estimation: Estimation,
     /// Limits for arming.
@@ -46,6 +48,7 @@ impl<const N: usize> Configuration<N> {
             curve: Curve::DEFAULT,
             response: Response::DEFAULT,
             imu: Mounting::PLAIN,
+            calibration: SensorCalibration::DEFAULT,
             estimation: Estimation::DEFAULT,
             arming: ArmingLimits::DEFAULT,
             guidance: afbc_guidance::Settings::DEFAULT,

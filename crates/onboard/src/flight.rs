@@ -2,13 +2,13 @@
 
 use crate::configuration::Configuration;
 use crate::control_inputs::ControlInputs;
-use crate::front_end::EstimatorFrontEnd;
+use crate::front_end::{Corrections, EstimatorFrontEnd};
 use crate::guided::{Core, GuidanceResult, Guide};
 use crate::readings::Readings;
 use crate::sensor_timeouts::SensorTimeouts;
 use afbc::monitor::{Bounds, Norm};
 use afbc::{Guarded, guarded};
-use afbc_estimator::{Estimator, ImuCalibration, OutputFilter};
+use afbc_estimator::{Estimator, OutputFilter};
 use afbc_flight_core::{EndReason, FlightCore, FlightCoreMemory, Mode, Motor, Reasons, RequestAnswer, TickHealth};
 use afbc_types::{Axis, Declared, OutOfRange, ROTORS_MAX, RotorSpeeds, State};
 use core::array;
@@ -35,7 +35,7 @@ pub struct Prepared<const N: usize = 4> {
     vehicle: FlightCore<Guarded<N>, N>,
     estimator: Estimator,
     output_filter: OutputFilter,
-    calibration: ImuCalibration,
+    corrections: Corrections,
     motor: Motor,
     guide: Guide,
 }
@@ -47,20 +47,22 @@ impl<const N: usize> Prepared<N> {
     /// The first parameter, setting or gain out of range, or the first that leaves the vehicle without a margin to
     /// hover.
     pub fn new(configuration: &Configuration<N>) -> Result<Self, OutOfRange> {
-        let Configuration { airframe, settings, gains, curve, response, imu, estimation, arming, .. } = configuration;
+        let Configuration { airframe, settings, gains, curve, response, imu, calibration, estimation, arming, .. } =
+            configuration;
         // The controller checks what follows from these and assumes that each is in its range.
         let parameters = &airframe.parameters;
         parameters.validate()?;
         settings.validate()?;
         gains.validate()?;
         imu.validate()?;
+        calibration.validate()?;
         let bounds = Bounds::new(gains, parameters, settings);
         let controller = Guarded::new(*airframe, *settings, *gains, bounds)?;
         Ok(Prepared {
             vehicle: FlightCore::with_rotors(*parameters, response, *arming, controller)?,
             estimator: Estimator::new(*estimation)?,
             output_filter: OutputFilter::of(parameters, N),
-            calibration: ImuCalibration::new(imu),
+            corrections: Corrections::new(imu, calibration),
             motor: Motor::new(*curve)?,
             guide: Guide::new(configuration)?,
         })
@@ -128,11 +130,11 @@ impl<const N: usize> Flight<N> {
     /// # Errors
     /// Those of [`Prepared::new`].
     pub fn new(configuration: &Configuration<N>) -> Result<Self, OutOfRange> {
-        let Prepared { vehicle, estimator, output_filter, calibration, motor, guide } = Prepared::new(configuration)?;
+        let Prepared { vehicle, estimator, output_filter, corrections, motor, guide } = Prepared::new(configuration)?;
         Ok(Flight {
             vehicle,
             memory: FlightCoreMemory::default(),
-            front_end: EstimatorFrontEnd::new(estimator, output_filter, calibration),
+            front_end: EstimatorFrontEnd::corrected(estimator, output_filter, corrections),
             motor,
             guide,
             timeouts: SensorTimeouts::default(),
@@ -143,14 +145,14 @@ impl<const N: usize> Flight<N> {
     }
 
     /// Flies with another configuration from the next tick on; what the estimator knows stays, unless the inertial
-    /// sensor is mounted otherwise. False, and without effect, while armed.
+    /// sensor is mounted otherwise, or a sensor is corrected otherwise. False, and without effect, while armed.
     #[must_use = "an armed vehicle keeps its configuration"]
     pub fn adopt(&mut self, prepared: &Prepared<N>) -> bool {
         let disarmed = !self.memory.mode().armed();
         if disarmed {
-            let Prepared { vehicle, estimator, output_filter, calibration, motor, guide } = prepared;
+            let Prepared { vehicle, estimator, output_filter, corrections, motor, guide } = prepared;
             self.vehicle.clone_from(vehicle);
-            self.front_end.adopt(estimator, output_filter, calibration);
+            self.front_end.adopt(estimator, output_filter, corrections);
             self.motor = *motor;
             self.guide.adopt(guide);
         }

@@ -3,15 +3,35 @@
 
 use crate::readings::{Aged, Readings};
 use afbc_control::math::{max, min};
-use afbc_estimator::{Estimate, Estimator, ImuCalibration, Measurement, Memory, OutputFilter, Stamped};
+use afbc_estimator::{Estimate, Estimator, ImuCalibration, ImuSample, Measurement, Memory, OutputFilter, Stamped};
 use afbc_flight_core::{Inbox, Refusal};
-use afbc_types::{Pose, PoseSigmas, State};
+use afbc_types::{Mounting, Pose, PoseSigmas, SensorCalibration, State};
 use nalgebra::Vector3;
 
 /// Number of fixes whose mean the local frame's origin is, at rest.
 const FIXES: f32 = 10.0;
 /// Standard deviations of a tracker's pose that does not say how good it is: a motion-capture system's \[m, rad\].
 const TRACKER: (f32, f32) = (0.003, 0.01);
+
+/// What is corrected of a vehicle's own readings.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Corrections {
+    imu: ImuCalibration,
+    /// Offset \[uT\], diagonal and off-diagonal of the magnetometer's matrix, if it has errors.
+    field: Option<[Vector3<f32>; 3]>,
+}
+
+impl Corrections {
+    /// What follows from a mounting and a calibration.
+    pub(crate) fn new(imu: &Mounting, calibration: &SensorCalibration) -> Self {
+        let of_field = |of: &SensorCalibration| [of.mag_offset_ut, of.mag_scale, of.mag_off_diagonal];
+        let field = of_field(calibration);
+        Corrections {
+            imu: ImuCalibration::calibrated(imu, calibration),
+            field: (field != of_field(&SensorCalibration::DEFAULT)).then_some(field),
+        }
+    }
+}
 
 /// Estimator and memory of a vehicle. Until its first sample of an inertial sensor, the vehicle flies on the states
 /// that come over the link; from then on their poses, and poses that come alone, are measurements like others. While
@@ -27,7 +47,9 @@ pub struct EstimatorFrontEnd {
     estimator: Estimator,
     memory: Memory,
     output_filter: OutputFilter,
-    calibration: ImuCalibration,
+    corrections: Corrections,
+    /// The last sample as corrected.
+    last: Option<ImuSample>,
     /// True if there has been a sample.
     senses: bool,
     /// True if the inertial sensor worked in the last tick.
@@ -45,13 +67,20 @@ pub struct EstimatorFrontEnd {
 }
 
 impl EstimatorFrontEnd {
-    /// Creates it with nothing read, for an inertial sensor that is mounted as `calibration` says.
-    pub fn new(estimator: Estimator, output_filter: OutputFilter, calibration: ImuCalibration) -> Self {
+    /// Creates it with nothing read, for an inertial sensor that is mounted as `imu` says, and other sensors without
+    /// errors.
+    pub fn new(estimator: Estimator, output_filter: OutputFilter, imu: ImuCalibration) -> Self {
+        Self::corrected(estimator, output_filter, Corrections { imu, field: None })
+    }
+
+    /// The same with these corrections.
+    pub(crate) fn corrected(estimator: Estimator, output_filter: OutputFilter, corrections: Corrections) -> Self {
         EstimatorFrontEnd {
             estimator,
             memory: Memory::default(),
             output_filter,
-            calibration,
+            corrections,
+            last: None,
             senses: false,
             works: true,
             origin_m: None,
@@ -78,12 +107,12 @@ impl EstimatorFrontEnd {
         self.memory.set_on_ground(on_ground);
     }
 
-    /// Goes on with another estimator. If the inertial sensor is mounted otherwise, the estimate starts again, from
-    /// rest.
-    pub(crate) fn adopt(&mut self, estimator: &Estimator, output_filter: &OutputFilter, calibration: &ImuCalibration) {
+    /// Goes on with another estimator. If the inertial sensor is mounted otherwise, or a sensor is corrected otherwise,
+    /// the estimate starts again, from rest.
+    pub(crate) fn adopt(&mut self, estimator: &Estimator, output_filter: &OutputFilter, corrections: &Corrections) {
         (self.estimator, self.output_filter) = (*estimator, *output_filter);
-        if !self.calibration.has_mounting_of(calibration) {
-            self.calibration = *calibration;
+        if self.corrections != *corrections {
+            (self.corrections, self.last) = (*corrections, None);
             self.memory.align_again();
             self.stands_m = None;
         }
@@ -93,7 +122,7 @@ impl EstimatorFrontEnd {
     /// none before the first sample.
     #[inline(always)]
     pub fn tick(&mut self, now_us: u64, readings: &Readings, inbox: &mut Inbox) -> Option<Estimate> {
-        let sample = readings.sample(now_us).map(|sample| self.calibration.apply(sample));
+        let sample = readings.sample(now_us).map(|sample| self.corrections.imu.apply(&mut self.last, sample));
         self.senses |= sample.is_some();
         if !self.senses {
             return None;
@@ -121,13 +150,16 @@ impl EstimatorFrontEnd {
         Some(estimate)
     }
 
-    /// Returns a measurement in the local frame; none for a fix before a usable one.
+    /// Returns a measurement corrected and in the local frame; none for a fix before a usable one.
     #[inline(always)]
     fn localized(&mut self, aid: Aged<Measurement>) -> Option<Aged<Measurement>> {
-        if self.origin_is_known || !matches!(aid.value, Measurement::Gnss { .. }) {
-            return Some(aid);
+        match (aid.value, &self.corrections.field) {
+            (Measurement::Gnss { .. }, _) if !self.origin_is_known => self.located(aid),
+            (Measurement::MagneticField { field, sigma }, Some(errors)) => {
+                Some(Aged { value: Measurement::MagneticField { field: corrected(&field, errors), sigma }, ..aid })
+            }
+            _ => Some(aid),
         }
-        self.located(aid)
     }
 
     #[inline(never)]
@@ -159,6 +191,13 @@ impl EstimatorFrontEnd {
         let sigmas_m = Vector3::new(horizontal_sigma_m, horizontal_sigma_m, vertical_sigma_m);
         (self.memory.runs() && is_good && fix.is_plausible()).then_some(sigmas_m)
     }
+}
+
+/// Returns a magnetometer's reading without its errors \[uT\].
+#[inline(never)]
+fn corrected(read_ut: &Vector3<f32>, errors: &[Vector3<f32>; 3]) -> Vector3<f32> {
+    let [mag_offset_ut, mag_scale, mag_off_diagonal] = *errors;
+    SensorCalibration { mag_offset_ut, mag_scale, mag_off_diagonal, ..SensorCalibration::DEFAULT }.field(read_ut)
 }
 
 /// Leaves a tracker's pose to the flight core.

@@ -192,6 +192,15 @@ impl Plant {
         }
     }
 
+    /// Puts the vehicle where it is held by hand, with this motion from now on.
+    pub fn set_motion(&mut self, motion: &Motion) {
+        let model = match &self.body {
+            Body::Simplified(_) => PlantModel::Simplified,
+            Body::RigidBody(_) => PlantModel::RigidBody,
+        };
+        self.body = Body::new(model, motion);
+    }
+
     /// Returns what instruments feel now: the motion with its accelerations under the forces of the last step.
     pub fn truth(&self) -> Truth {
         let parameters = &self.segment.parameters;

@@ -1,5 +1,6 @@
 //! Commands in text, one a line, that change weather and faults while vehicles fly.
 
+use crate::hand::{Grip, SIDES};
 use afbc_plant::instruments::{Failure, limits as failure};
 use afbc_plant::rotors::limits as rotor;
 use afbc_plant::wind::limits as gust;
@@ -92,12 +93,14 @@ pub enum WorldChange {
     },
     /// The battery has this share of its charge.
     Battery(f64),
+    /// A hand holds the vehicle, or puts it down.
+    Hold(Grip),
     /// No faults; weather and load are the scenario's.
     Clear,
 }
 
 /// What each command is called, what follows it, and what it does.
-pub const COMMANDS: [[&str; 3]; 16] = [
+pub const COMMANDS: [[&str; 3]; 17] = [
     ["wind", "X Y Z", "steady wind [m/s], towards north, west, up"],
     ["turbulence", "none|light|moderate|severe", "turbulence of the wind"],
     ["gust", "X Y Z [RISE [HOLD]]", "a gust with this peak [m/s], rising for 1 s, there for 2 s"],
@@ -111,6 +114,11 @@ pub const COMMANDS: [[&str; 3]; 16] = [
     ],
     ["rotor", "NUMBER SHARE", "share of the thrust that a rotor has left; 1 repairs it"],
     ["battery", "SHARE", "charge of the battery, 0 to 1"],
+    [
+        "hold",
+        "SIDE [DEG_S]|none",
+        "by hand, this side down: down, up, left, right, front, back; turned so fast about the vertical",
+    ],
     ["clear", "", "no faults; weather and load as the scenario has them"],
     ["status", "", "where each vehicle is and what it suffers"],
     ["speed", "FACTOR", "times real time; 0: as fast as possible"],
@@ -128,6 +136,8 @@ const SPEED: Range = Range::new("speed", 0.0, 1000.0);
 /// Accepted factors on a parameter and on a moment.
 const FACTOR: Range = Range::new("factor", 0.01, 100.0);
 const MOMENT_FACTOR: Range = Range::new("factor", -10.0, 10.0);
+/// Accepted turn of a held vehicle about the vertical, positive to the left \[deg/s\].
+const TURN: Range = Range::new("turn", -180.0, 180.0);
 /// Most milliseconds of one command: an hour.
 const STEP_MAX: u32 = 3_600_000;
 /// A gust, unless said otherwise \[s\].
@@ -221,6 +231,7 @@ fn change(word: &str, words: &mut Words<'_>) -> Result<WorldChange, String> {
             efficiency: words.number(&rotor::EFFICIENCY)?,
         },
         "battery" => WorldChange::Battery(words.number(&Battery::CHARGE.range)?),
+        "hold" => WorldChange::Hold(grip(words)?),
         "clear" => WorldChange::Clear,
         _ => {
             let cure = match nearest(word, COMMANDS.iter().map(|[name, ..]| *name)) {
@@ -230,6 +241,15 @@ fn change(word: &str, words: &mut Words<'_>) -> Result<WorldChange, String> {
             return Err(format!("{}: no such command; {cure}", shown(word)));
         }
     })
+}
+
+/// Reads how a hand holds the vehicle, as `left 60`.
+fn grip(words: &mut Words<'_>) -> Result<Grip, String> {
+    let sides = SIDES.map(|(name, level_rad)| (name, Some(level_rad)));
+    let options: Vec<_> = sides.into_iter().chain([("none", None)]).collect();
+    let Some(level_rad) = words.choice(&options)? else { return Ok(Grip::Down) };
+    let turn_rad_s = words.optional(&TURN)?.unwrap_or(0.0).to_radians();
+    Ok(Grip::Held { level_rad, turn_rad_s })
 }
 
 /// Reads how an instrument fails, as `gnss jumped 5 0 0`.

@@ -13,6 +13,7 @@
 pub mod command;
 mod frames;
 mod guide;
+mod hand;
 mod pace;
 mod parameter_file;
 mod peer;

@@ -3,6 +3,7 @@
 use crate::ParameterFile;
 use crate::command::WorldChange;
 use crate::frames::frames;
+use crate::hand::Hand;
 use crate::reported_sensors::ReportedSensors;
 use crate::world_changes::WorldChanges;
 use afbc_flight_core::Mode;
@@ -32,6 +33,8 @@ pub struct ServedVehicle {
     host: Host,
     world: World,
     changes: WorldChanges,
+    /// Who holds it, if anybody does.
+    hand: Option<Hand>,
     /// A decoder for each peer: no stream's bytes complete a frame of another's.
     peers: BTreeMap<u32, Decoder<Uplink>>,
     mode: Mode,
@@ -58,6 +61,7 @@ impl ServedVehicle {
             host,
             world: World::released(scenario, STEP_S)?,
             changes: WorldChanges::new(scenario),
+            hand: None,
             peers: BTreeMap::new(),
             mode: Mode::Disarmed,
             reported: ReportedSensors::new(scenario),
@@ -91,7 +95,10 @@ impl ServedVehicle {
     /// Runs a millisecond; returns the bytes that it has sent, whole frames. What is worth a line goes to `log`.
     pub fn step(&mut self, mut log: impl FnMut(&str)) -> Vec<u8> {
         self.notices.drain(..).for_each(|notice| log(&notice));
-        self.world.look();
+        match &self.hand {
+            Some(_) => self.world.look_held(),
+            None => drop(self.world.look()),
+        }
         if let Some(readings) = self.world.readings() {
             self.host.sense(readings);
         }
@@ -99,6 +106,7 @@ impl ServedVehicle {
         self.host.comms().set_aux_sensors(self.reported.look(&self.world, &readings));
         let HostTick { report, bytes, change } = self.host.next_tick(&[]);
         self.world.advance(&report.motors);
+        self.hold();
         if report.mode.armed() != self.mode.armed() {
             log(if report.mode.armed() { "armed" } else { "disarmed" });
         }
@@ -132,11 +140,30 @@ impl ServedVehicle {
         }
     }
 
+    /// Moves the vehicle where a hand holds it.
+    fn hold(&mut self) {
+        let Some(hand) = &self.hand else { return };
+        let plant = self.world.plant_mut();
+        let now_s = plant.time_s();
+        plant.set_motion(&hand.motion(now_s));
+        if hand.has_left(now_s) {
+            self.hand = None;
+        }
+    }
+
     /// Changes weather or faults.
     ///
     /// # Errors
     /// One line on why it does not.
     pub fn apply(&mut self, change: &WorldChange) -> Result<(), String> {
+        if let WorldChange::Hold(grip) = change {
+            if self.mode.armed() {
+                return Err("hold: an armed vehicle is not touched".into());
+            }
+            let plant = self.world.plant();
+            let now_s = plant.time_s();
+            self.hand.get_or_insert_with(|| Hand::new(&plant.motion(), now_s)).take(*grip, now_s);
+        }
         self.changes.apply(change, &mut self.world)
     }
 

@@ -86,6 +86,8 @@ impl WorldChanges {
                 true => Ok(()),
                 false => Err("this vehicle has no battery".into()),
             },
+            // The hand is the vehicle's own.
+            WorldChange::Hold(_) => Ok(()),
             WorldChange::Clear => {
                 let wind = self.scenario_wind.clone();
                 self.set_wind(world, |now| *now = wind)?;

@@ -3,6 +3,7 @@
 use crate::dispatcher::Dispatcher;
 use crate::failsafes::Failsafes;
 use crate::parameters::VALUE_BYTES;
+use crate::services::calibration::Calibrator;
 use crate::services::commands::ANSWERS_PER_TICK;
 use crate::services::modes;
 use crate::services::status::AuxSensors;
@@ -11,6 +12,7 @@ use crate::services::telemetry::compose;
 use crate::services::texts::{Words, reason, urgency};
 use crate::setup::Setup;
 use afbc::monitor::Norm;
+use afbc_calibration::RawSample;
 use afbc_control::math::sqrt;
 use afbc_flight_core::rate;
 use afbc_flight_core::supervisor::COAST_US;
@@ -262,6 +264,24 @@ impl Comms {
         }
         (self.sender, self.left) = (outlet.sender, outlet.left);
         change
+    }
+
+    /// True while the vehicle is calibrated: [`calibrate`](Self::calibrate) needs what the sensors read.
+    pub fn is_calibrating(&self) -> bool {
+        self.dispatcher.calibration.active.is_some()
+    }
+
+    /// Goes on with a calibration that a station has asked for, to be called before each
+    /// [`parameters`](Self::parameters), which sets what is found; only in a shell that
+    /// [has sensors](Setup::calibrates). `sample` is what [`RawReadings`](afbc_onboard::RawReadings) have come to, if
+    /// they have since the last call.
+    pub fn calibrate<const N: usize>(
+        &mut self,
+        calibrator: &mut Calibrator,
+        sample: Option<RawSample>,
+        table: &ParameterTable<N>,
+    ) {
+        self.dispatcher.calibrate(calibrator, sample, table);
     }
 
     /// Queues what is to be announced of a tick.

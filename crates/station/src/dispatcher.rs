@@ -1,10 +1,12 @@
 //! Hands each message to its service.
 
+mod calibration;
 mod commands;
 mod parameters;
 mod targets;
 
 use crate::parameters::Service;
+use crate::services::calibration::CalibrationState;
 use crate::services::commands::Commands;
 use crate::services::control::{ControlClaim, OperatorControl};
 use crate::services::mission::Missions;
@@ -63,6 +65,9 @@ pub(crate) struct Dispatcher {
     /// What stations want of the parameters.
     wishes: Deque<ParameterTask, WISHES_MAX>,
     pub(crate) parameters: Service,
+    pub(crate) calibration: CalibrationState,
+    /// True if the shell can calibrate.
+    calibrates: bool,
     /// The item and upload that the guidance has been given last.
     given: Option<(u16, u16)>,
     /// The item that was reached last.
@@ -91,6 +96,8 @@ impl Dispatcher {
             replies: Deque::new(),
             wishes: Deque::new(),
             parameters: Service::default(),
+            calibration: CalibrationState::default(),
+            calibrates: setup.calibrates,
             given: None,
             reached: None,
             heard_us: None,

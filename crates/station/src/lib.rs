@@ -28,6 +28,9 @@ mod setup;
 
 pub use afbc_link::Reboot;
 pub use comms::{CLOCK_FAILED, Comms, REPORT_MAX, TICK_OFF};
-pub use services::commands::{ANSWERS_MAX, ANSWERS_PER_TICK, BUSY, FORGOTTEN_US, NO_ORIGIN, NOT_IN_CONTROL, NOT_KNOWN};
+pub use services::calibration::Calibrator;
+pub use services::commands::{
+    ANSWERS_MAX, ANSWERS_PER_TICK, BUSY, CALIBRATES, FORGOTTEN_US, NO_ORIGIN, NOT_IN_CONTROL, NOT_KNOWN,
+};
 pub use services::status::AuxSensors;
 pub use setup::Setup;

@@ -13,13 +13,15 @@ pub struct Setup {
     pub bytes_per_s: u32,
     /// What the shell reboots into when it is [asked to](crate::Comms::wants_reboot).
     pub reboots: &'static [Reboot],
+    /// True if the shell has sensors and calibrates them ([`Calibrator`](crate::Calibrator)).
+    pub calibrates: bool,
 }
 
 impl Setup {
     /// What the parameters make of it: nine tenths of the line, whose bytes have ten bits; no reboot.
     pub fn of(link: &Link) -> Self {
         // In range: at most 250.
-        Setup { system: link.system as u8, bytes_per_s: link.baud / 100 * 9, reboots: &[] }
+        Setup { system: link.system as u8, bytes_per_s: link.baud / 100 * 9, reboots: &[], calibrates: false }
     }
 }
 

@@ -36,6 +36,7 @@ mod mounting;
 mod parameters;
 mod pose;
 mod range;
+mod sensor_calibration;
 mod stamped;
 mod trigonometry;
 
@@ -52,5 +53,6 @@ pub use nalgebra;
 pub use parameters::Parameters;
 pub use pose::{Pose, PoseSigmas};
 pub use range::{OutOfRange, Range};
+pub use sensor_calibration::SensorCalibration;
 pub use stamped::Stamped;
 pub use trigonometry::sin_cos;

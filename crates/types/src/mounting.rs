@@ -1,7 +1,7 @@
 //! Place of a sensor on the vehicle.
 
-use crate::{Number, parameters};
-use nalgebra::Vector3;
+use crate::{Number, parameters, sin_cos};
+use nalgebra::{Matrix3, Vector3};
 
 parameters! {
     /// Mounting of the inertial sensor: the truth in `f64` in the plant, what flight software knows of it in `f32`.
@@ -24,6 +24,17 @@ impl Mounting {
         let zero = Vector3::new(0.0, 0.0, 0.0);
         Mounting { position_m: zero, attitude_rad: zero }
     };
+
+    /// Returns the matrix that turns the sensor's axes into the body's, Rz(yaw) Ry(pitch) Rx(roll).
+    #[must_use]
+    pub fn r_body_sensor(&self) -> Matrix3<f32> {
+        let [[roll, pitch, yaw]] = self.attitude_rad.data.0;
+        let [(sr, cr), (sp, cp), (sy, cy)] = [roll, pitch, yaw].map(sin_cos);
+        let x = Vector3::new(cy * cp, sy * cp, -sp);
+        let y = Vector3::new(cy * sp * sr - sy * cr, sy * sp * sr + cy * cr, cp * sr);
+        let z = Vector3::new(cy * sp * cr + sy * sr, sy * sp * cr - cy * sr, cp * cr);
+        Matrix3::from_columns(&[x, y, z])
+    }
 }
 
 impl<T: Number> Mounting<T> {

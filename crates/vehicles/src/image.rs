@@ -25,8 +25,20 @@ impl Vehicle {
     fn values<const N: usize>(&self) -> Value {
         // As many rotors as there are: with_rotors.
         let Ok(configuration) = self.configuration::<N>() else { return Value::Null };
-        let Configuration { airframe, settings, gains, curve, response, imu, estimation, arming, guidance, link: _ } =
-            configuration;
+        // Errors of sensors are one vehicle's, not its kind's; the link is the board's.
+        let Configuration {
+            airframe,
+            settings,
+            gains,
+            curve,
+            response,
+            imu,
+            calibration: _,
+            estimation,
+            arming,
+            guidance,
+            link: _,
+        } = configuration;
         let Airframe { parameters, rotors } = airframe;
         json!({
             "airframe": { "parameters": parameters, "rotors": rotors.as_slice() },

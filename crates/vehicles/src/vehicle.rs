@@ -10,7 +10,7 @@ use afbc_flight_core::motor::{Curve, Response};
 use afbc_onboard::{Configuration, Link};
 use afbc_plant::Realism;
 use afbc_reader::{FileError, Table};
-use afbc_types::{Airframe, Mounting, OutOfRange, Parameters, PerAxis, Rotor, with_rotors};
+use afbc_types::{Airframe, Mounting, OutOfRange, Parameters, PerAxis, Rotor, SensorCalibration, with_rotors};
 
 /// Table of the settings of AFBC's cascade, beside those of the laws' gains.
 pub const CASCADE: &str = "cascade";
@@ -96,6 +96,7 @@ impl Vehicle {
             curve: self.curve,
             response: self.response(),
             imu: self.imu.to_f32(),
+            calibration: SensorCalibration::DEFAULT,
             estimation: self.estimation,
             arming: self.arming,
             guidance: self.guidance,

@@ -72,6 +72,8 @@ pub enum Command {
     Reboot(Reboot),
     /// MAV_CMD_PREFLIGHT_STORAGE (245) of the parameters.
     Storage(Storage),
+    /// MAV_CMD_PREFLIGHT_CALIBRATION (241), one at a time.
+    Calibrate(CalibrationRequest),
     /// MAV_CMD_RUN_PREARM_CHECKS (401).
     CheckArming,
     /// One of these commands, by number, with an invalid parameter: answered with "denied".
@@ -100,6 +102,21 @@ pub enum Storage {
     Reset,
 }
 
+/// What is calibrated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum CalibrationRequest {
+    /// The gyroscope (param1 = 1).
+    Gyroscope,
+    /// The magnetometer (param2 = 1).
+    Magnetometer,
+    /// The accelerometer, on six sides (param5 = 1).
+    Accelerometer,
+    /// The mounting of the inertial sensor, level (param5 = 2).
+    Level,
+    /// Nothing any more (all parameters 0).
+    Cancel,
+}
+
 pub(crate) const RETURN: u16 = 20;
 pub(crate) const LAND: u16 = 21;
 pub(crate) const TAKE_OFF: u16 = 22;
@@ -108,6 +125,7 @@ pub(crate) const SPEED: u16 = 178;
 pub(crate) const HOME: u16 = 179;
 pub(crate) const REPOSITION: u16 = 192;
 pub(crate) const SET_CURRENT: u16 = 224;
+pub(crate) const CALIBRATE: u16 = 241;
 pub(crate) const STORAGE: u16 = 245;
 pub(crate) const REBOOT: u16 = 246;
 pub(crate) const SELECT_STANDARD_MODE: u16 = 262;
@@ -130,7 +148,7 @@ pub(crate) const USUAL: f32 = -1.0;
 
 impl Command {
     /// Numbers of the commands that are understood.
-    pub const KNOWN: [u16; 20] = [
+    pub const KNOWN: [u16; 21] = [
         RETURN,
         LAND,
         TAKE_OFF,
@@ -139,6 +157,7 @@ impl Command {
         HOME,
         REPOSITION,
         SET_CURRENT,
+        CALIBRATE,
         STORAGE,
         REBOOT,
         SELECT_STANDARD_MODE,
@@ -175,6 +194,7 @@ impl Command {
             Command::RequestCapabilities => REQUEST_CAPABILITIES,
             Command::Reboot(_) => REBOOT,
             Command::Storage(_) => STORAGE,
+            Command::Calibrate(_) => CALIBRATE,
             Command::CheckArming => CHECK_ARMING,
             Command::Denied(id) | Command::Other(id) => id,
         }

@@ -1,9 +1,9 @@
 //! Reading of commands.
 
 use super::{
-    ARM_DISARM, CHECK_ARMING, CUSTOM_MODE, Command, ENGAGE, FORCED, GET_INTERVAL, HOME, LAND, REBOOT, REPOSITION,
-    REQUEST_CAPABILITIES, REQUEST_MESSAGE, REQUEST_PROTOCOL, RETURN, Reboot, SELECT_MODE, SELECT_STANDARD_MODE,
-    SET_CURRENT, SET_INTERVAL, SPEED, START_MISSION, STORAGE, Storage, TAKE_OFF, USUAL,
+    ARM_DISARM, CALIBRATE, CHECK_ARMING, CUSTOM_MODE, CalibrationRequest, Command, ENGAGE, FORCED, GET_INTERVAL, HOME,
+    LAND, REBOOT, REPOSITION, REQUEST_CAPABILITIES, REQUEST_MESSAGE, REQUEST_PROTOCOL, RETURN, Reboot, SELECT_MODE,
+    SELECT_STANDARD_MODE, SET_CURRENT, SET_INTERVAL, SPEED, START_MISSION, STORAGE, Storage, TAKE_OFF, USUAL,
 };
 use crate::address::Address;
 use crate::message::{Fault, MessageFormat};
@@ -36,6 +36,9 @@ pub(crate) fn read(id: u32, payload: &[u8]) -> Result<(Command, Address), Fault>
     match id {
         COMMAND_LONG_DATA::ID => {
             let ([p1, p2, p3, p4, latitude, longitude, metres], id, to, _) = LONG.read(payload);
+            if id == CALIBRATE {
+                return Ok((calibration([p1, p2, p3, p4, latitude, longitude, metres]), to));
+            }
             // It has no frame: stations send heights of places above the sea, and of a take-off above the ground.
             let above = if id == TAKE_OFF { Datum::Here } else { Datum::Sea };
             let place =
@@ -44,6 +47,10 @@ pub(crate) fn read(id: u32, payload: &[u8]) -> Result<(Command, Address), Fault>
         }
         COMMAND_INT_DATA::ID => {
             let (parameters, [latitude_e7, longitude_e7], metres, id, to, frame, _) = INT.read(payload);
+            if id == CALIBRATE {
+                let [p1, p2, p3, p4] = parameters;
+                return Ok((calibration([p1, p2, p3, p4, latitude_e7 as f32, longitude_e7 as f32, metres]), to));
+            }
             let place = datum(frame).map(|above| Place { latitude_e7, longitude_e7, height: Height { metres, above } });
             Ok((command(id, parameters, place), to))
         }
@@ -115,6 +122,19 @@ fn known(id: u16, [p1, p2, p3, p4]: [f32; 4], place: Option<Place>) -> Option<Co
         CHECK_ARMING => Command::CheckArming,
         _ => return None,
     })
+}
+
+/// Returns what is calibrated: a single parameter says it, and all others are 0 or NaN.
+fn calibration(parameters: [f32; 7]) -> Command {
+    let asked = match parameters.map(or_zero) {
+        [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0] => CalibrationRequest::Gyroscope,
+        [0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0] => CalibrationRequest::Magnetometer,
+        [0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0] => CalibrationRequest::Accelerometer,
+        [0.0, 0.0, 0.0, 0.0, 2.0, 0.0, 0.0] => CalibrationRequest::Level,
+        [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0] => CalibrationRequest::Cancel,
+        _ => return Command::Denied(CALIBRATE),
+    };
+    Command::Calibrate(asked)
 }
 
 fn or_zero(number: f32) -> f32 {

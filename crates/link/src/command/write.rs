@@ -1,7 +1,7 @@
 //! Writing of commands, to everyone.
 
 use super::read::{INT, LONG};
-use super::{Command, FORCED, Reboot, Storage, USUAL};
+use super::{CalibrationRequest, Command, FORCED, Reboot, Storage, USUAL};
 use crate::address::Address;
 use crate::message::PAYLOAD_MAX;
 use crate::place::{Datum, Height, Place, frame};
@@ -12,6 +12,18 @@ pub(crate) fn write(command: Command, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, 
     let (first, place) = match command {
         Command::Arm | Command::CheckArming => ([1.0, 0.0, 0.0, 0.0], None),
         Command::Kill => ([0.0, FORCED, 0.0, 0.0], None),
+        Command::Calibrate(asked) => {
+            let (first, fifth) = match asked {
+                CalibrationRequest::Gyroscope => ([1.0, 0.0], 0.0),
+                CalibrationRequest::Magnetometer => ([0.0, 1.0], 0.0),
+                CalibrationRequest::Accelerometer => ([0.0; 2], 1.0),
+                CalibrationRequest::Level => ([0.0; 2], 2.0),
+                CalibrationRequest::Cancel => ([0.0; 2], 0.0),
+            };
+            let [p1, p2] = first;
+            let parameters = [p1, p2, 0.0, 0.0, fifth, 0.0, 0.0];
+            return LONG.write(&(parameters, command.id(), Address::default(), 0), payload);
+        }
         // No parameter of any command may be infinite.
         Command::Denied(id) => return LONG.write(&([f32::INFINITY; 7], id, Address::default(), 0), payload),
         Command::Disarm | Command::Engage | Command::Land | Command::Return | Command::Other(_) => ([0.0; 4], None),

@@ -44,11 +44,22 @@ struct Found;
 /// Shows every group, in the order of the list, with its prefix.
 macro_rules! each_group {
     ($configuration:expr, |$prefix:pat_param, $group:ident| $show:expr) => {{
-        let Configuration { airframe, settings, gains, curve, response, imu, estimation, arming, guidance, link } =
-            $configuration;
+        let Configuration {
+            airframe,
+            settings,
+            gains,
+            curve,
+            response,
+            imu,
+            calibration,
+            estimation,
+            arming,
+            guidance,
+            link,
+        } = $configuration;
         let Airframe { parameters, rotors: _ } = airframe;
         each_group!(@ $prefix, $group, $show, ["V_" parameters, "MOT_" curve, "MOT_" response, "IMU_" imu,
-            "ARM_" arming, "EST_" estimation, "" guidance, "" link, "C_" settings, "A_" gains]);
+            "CAL_" calibration, "ARM_" arming, "EST_" estimation, "" guidance, "" link, "C_" settings, "A_" gains]);
     }};
     (@ $prefix:pat_param, $group:ident, $show:expr, [$($name:literal $field:ident),*]) => {
         $(

@@ -120,6 +120,10 @@ impl Wired {
         self
     }
 
+    pub(super) fn instruments(&self) -> &Instruments {
+        &self.sensing.instruments
+    }
+
     pub(super) fn instruments_mut(&mut self) -> &mut Instruments {
         self.sensing.instruments_mut()
     }

@@ -7,12 +7,14 @@ use afbc::AdaptiveEstimate;
 use afbc_control::{Action, Trace};
 use afbc_flight_core::Refusal;
 use afbc_onboard::{Aged, Readings};
+use afbc_plant::instruments::ImuBias;
 use afbc_plant::{
-    EffectsState, InstrumentSuite, Instruments, Motion, Plant, SensorFaults, StateMeasurement, StateSensor,
+    EffectsState, InstrumentSuite, Instruments, Motion, Plant, SensorFaults, StateMeasurement, StateSensor, Truth,
 };
 use afbc_scenario::trajectory::{Reference, Trajectory};
 use afbc_scenario::{Outage, Scenario};
 use afbc_types::{OutOfRange, PerAxis, Pose, ROTORS_MAX, RotorSpeeds, State};
+use nalgebra::Vector3;
 
 /// Plant, sensors, link and reference of a scenario.
 pub struct World {
@@ -114,6 +116,11 @@ impl World {
         self.wired.as_deref_mut().map(Wired::instruments_mut)
     }
 
+    /// Returns the true biases of the inertial sensor of a [wired](Self::wired) world.
+    pub fn imu_bias(&self) -> Option<ImuBias> {
+        self.wired.as_deref()?.instruments().imu_bias()
+    }
+
     /// Returns what the instruments of a [wired](Self::wired) world read in the last look.
     pub fn readings(&self) -> Option<&Readings> {
         self.wired.as_deref().map(Wired::readings)
@@ -169,6 +176,13 @@ impl World {
             pose: None,
             new,
         }
+    }
+
+    /// Measures a vehicle that is held by hand: nothing accelerates it but gravity's reaction.
+    pub fn look_held(&mut self) {
+        let zero = Vector3::zeros();
+        let truth = Truth { acceleration_m_s2: zero, angular_acceleration_rad_s2: zero, ..self.plant.truth() };
+        self.wired.iter_mut().for_each(|wired| wired.look(&truth));
     }
 
     /// Moves the vehicle by one step with commanded rotor speeds `speeds`.

@@ -1,7 +1,7 @@
 //! What each command leads to.
 
 use super::{Dispatcher, Reply};
-use crate::services::commands::{BUSY, NO_ORIGIN, NOT_IN_CONTROL, NOT_KNOWN};
+use crate::services::commands::{BUSY, CALIBRATES, NO_ORIGIN, NOT_IN_CONTROL, NOT_KNOWN};
 use crate::services::origin::resolve;
 use crate::services::streams::{Requested, Streams, id};
 use crate::services::telemetry::compose;
@@ -21,6 +21,10 @@ impl Dispatcher {
             return self.commands.answer(id, Answer::Refused(NOT_IN_CONTROL), from);
         }
         let answer = match command {
+            Command::Arm if self.calibration.active.is_some() => {
+                self.texts.put(MavSeverity::MAV_SEVERITY_WARNING, "arming refused: calibrating");
+                Answer::Refused(CALIBRATES)
+            }
             Command::Arm => return self.ask(Request::Arm, id, from, inputs),
             Command::Disarm => return self.ask(Request::Disarm, id, from, inputs),
             Command::Kill => return self.ask(Request::Kill, id, from, inputs),
@@ -48,6 +52,7 @@ impl Dispatcher {
                 Answer::Accepted
             }
             Command::Storage(storage) => self.storage(storage),
+            Command::Calibrate(what) => self.ask_calibration(what),
             Command::CheckArming => {
                 self.check_arming(from);
                 Answer::Accepted
@@ -168,7 +173,11 @@ impl Dispatcher {
     /// Tells what spoke against arming in the tick before, as the flight core sees it: what it would have answered.
     pub(super) fn report_checks(&mut self) {
         let (Some(may), Some(against)) = (self.checks.take(), self.status.against) else { return };
-        if may && against.is_empty() {
+        let calibrates = self.calibration.active.is_some();
+        if calibrates {
+            self.texts.put(MavSeverity::MAV_SEVERITY_WARNING, "arming refused: calibrating");
+        }
+        if may && !calibrates && against.is_empty() {
             self.texts.put(MavSeverity::MAV_SEVERITY_INFO, "ready to arm");
         }
         for reason in against.iter() {

@@ -24,6 +24,9 @@ pub const NO_ORIGIN: i32 = 65;
 /// Number of the reason "the message cannot be sent now: its content is not known".
 pub const NOT_KNOWN: i32 = 66;
 
+/// Number of the reason "the vehicle is being calibrated".
+pub const CALIBRATES: i32 = 67;
+
 /// Keeps track of the answers.
 #[derive(Default)]
 pub struct Commands {

@@ -120,6 +120,7 @@ pub fn is_needed_for(command: Command) -> bool {
         | Command::StartMission(_)
         | Command::SetCurrent(_)
         | Command::Reboot(_)
+        | Command::Calibrate(_)
         | Command::Storage(_) => true,
         Command::Disarm
         | Command::Kill

@@ -1,6 +1,7 @@
 //! What the vehicle does for stations: each service a state machine without input and output of its own. Those that it
 //! does not have answer every question with a refusal, so that nobody waits.
 
+pub mod calibration;
 pub mod commands;
 pub mod control;
 pub mod events;

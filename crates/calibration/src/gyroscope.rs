@@ -1,0 +1,51 @@
+//! The gyroscope's offset.
+
+use crate::rest::{Limits, Rest};
+use crate::{CalibrationEvent, CalibrationFailure, RawSample};
+use nalgebra::Vector3;
+
+/// Time at rest whose mean is the offset \[us\].
+const MEASURE_US: u64 = 3_000_000;
+/// Time in which that must have succeeded \[us\].
+const PATIENCE_US: u64 = 20_000_000;
+/// Largest offset: more than twice that of an MPU-6000, 20 deg/s \[rad/s\].
+const OFFSET_MAX_RAD_S: f32 = 0.8;
+/// Step of the progress \[%\].
+const STEP: u8 = 10;
+
+/// Measures the gyroscope's offset, the mean of its rates while the vehicle stands still. A steady turn about the
+/// vertical cannot be distinguished from an offset.
+#[derive(Clone, Debug, Default)]
+pub struct GyroscopeCalibration {
+    began_us: Option<u64>,
+    rest: Rest,
+    told: u8,
+}
+
+impl GyroscopeCalibration {
+    /// Takes a sample; returns the offset, sensor axes \[rad/s\], or why there is none.
+    pub fn step(
+        &mut self,
+        sample: &RawSample,
+        mut tell: impl FnMut(CalibrationEvent),
+    ) -> Option<Result<Vector3<f32>, CalibrationFailure>> {
+        let began_us = *self.began_us.get_or_insert(sample.at_us);
+        if !sample.is_finite() || !self.rest.add(sample, &Limits::STANDING) {
+            tell(CalibrationEvent::Moved);
+        }
+        if self.rest.elapsed_us() >= MEASURE_US {
+            let offset = self.rest.rates_rad_s();
+            return Some(if offset.amax() <= OFFSET_MAX_RAD_S {
+                Ok(offset)
+            } else {
+                Err(CalibrationFailure::TooLarge)
+            });
+        }
+        let share = (100 * self.rest.elapsed_us() / MEASURE_US) as u8 / STEP * STEP;
+        if share > self.told {
+            self.told = share;
+            tell(CalibrationEvent::Progress(share));
+        }
+        (sample.at_us.saturating_sub(began_us) >= PATIENCE_US).then_some(Err(CalibrationFailure::Moving))
+    }
+}

@@ -1,0 +1,150 @@
+//! The magnetometer's offset and matrix.
+
+use crate::ellipsoid::{FieldFit, FieldSums};
+use crate::rest::{Limits, Rest};
+use crate::side::{Side, Sides};
+use crate::{CalibrationEvent, CalibrationFailure, RawSample};
+use afbc_types::{Mounting, SensorCalibration};
+use nalgebra::{Matrix3, Vector3};
+
+/// Time at rest after which the side is known \[us\].
+const DETECT_US: u64 = 500_000;
+/// Time for the next side, and for its turn \[us\].
+const PATIENCE_US: u64 = 90_000_000;
+const TURN_US: u64 = 40_000_000;
+/// Parts of a turn: a reading is taken in each, and a side is done when most have one.
+const PARTS: u8 = 24;
+const PARTS_MIN: u32 = 22;
+/// Cosine of the largest tilt from the side in which readings are taken.
+const ALONG_MIN: f32 = 0.6;
+/// Longest time between samples over which a rate is integrated \[us\].
+const GAP_US: u64 = 100_000;
+/// Time without a reading after which there is no magnetometer \[us\].
+const SILENT_US: u64 = 1_000_000;
+
+/// Measures the magnetometer's errors while the vehicle is turned about the vertical by a whole turn on each of its six
+/// sides. The gyroscope says how far it is turned, so that readings are spread evenly.
+#[derive(Clone, Debug)]
+pub struct MagnetometerCalibration {
+    to_body: Matrix3<f32>,
+    errors: SensorCalibration,
+    sums: FieldSums,
+    /// When the last side was done, and when the field was last read \[us\].
+    done_us: Option<u64>,
+    read_us: u64,
+    last_us: u64,
+    rest: Rest,
+    /// True if the present rest has been told of.
+    told: bool,
+    turn: Option<Turn>,
+    pending: Sides,
+}
+
+/// A turn on a side.
+#[derive(Clone, Copy, Debug)]
+struct Turn {
+    side: Side,
+    began_us: u64,
+    /// Net angle \[turns\], and the parts that have a reading.
+    turns: f32,
+    parts: u32,
+}
+
+impl MagnetometerCalibration {
+    /// Creates it for an inertial sensor that is mounted like this and has these errors.
+    #[must_use]
+    pub fn new(mounting: &Mounting, errors: &SensorCalibration) -> Self {
+        MagnetometerCalibration {
+            to_body: mounting.r_body_sensor(),
+            errors: *errors,
+            sums: FieldSums::default(),
+            done_us: None,
+            read_us: 0,
+            last_us: 0,
+            rest: Rest::default(),
+            told: false,
+            turn: None,
+            pending: Sides::ALL,
+        }
+    }
+
+    /// Takes a sample; returns the errors, or why there are none.
+    pub fn step(
+        &mut self,
+        sample: &RawSample,
+        mut tell: impl FnMut(CalibrationEvent),
+    ) -> Option<Result<FieldFit, CalibrationFailure>> {
+        let at_us = sample.at_us;
+        let done_us = *self.done_us.get_or_insert_with(|| {
+            tell(CalibrationEvent::Pending(Sides::ALL));
+            (self.read_us, self.last_us) = (at_us, at_us);
+            at_us
+        });
+        if !sample.is_finite() {
+            return None;
+        }
+        if sample.field_ut.is_some() {
+            self.read_us = at_us;
+        } else if at_us.saturating_sub(self.read_us) >= SILENT_US {
+            return Some(Err(CalibrationFailure::NoField));
+        }
+        let step_us = core::mem::replace(&mut self.last_us, at_us);
+        let step_us = at_us.saturating_sub(step_us);
+        let up = self.to_body * self.errors.specific_force(&sample.specific_force_m_s2);
+        let rates_rad_s = self.to_body * (sample.rates_rad_s - self.errors.gyro_offset_rad_s);
+        if let Some(turn) = &mut self.turn {
+            if step_us <= GAP_US {
+                turn.turns += turn.side.up().dot(&rates_rad_s) * (step_us as f32 * 1e-6) / core::f32::consts::TAU;
+            }
+            if turn.side.up().dot(&up) >= ALONG_MIN * up.norm()
+                && let Some(field_ut) = sample.field_ut
+            {
+                turn.take(&field_ut, &mut self.sums);
+            }
+            let late = at_us.saturating_sub(turn.began_us) >= TURN_US;
+            if turn.parts.count_ones() < PARTS_MIN {
+                return late.then_some(Err(CalibrationFailure::NotRotated));
+            }
+            let side = turn.side;
+            self.turn = None;
+            self.done_us = Some(at_us);
+            self.pending = self.pending.without(side);
+            self.told = true;
+            tell(CalibrationEvent::Done(side));
+            tell(CalibrationEvent::Progress(self.pending.done_percent()));
+            if self.pending.is_empty() {
+                return Some(self.sums.fit());
+            }
+            tell(CalibrationEvent::Pending(self.pending));
+            return None;
+        }
+        if !self.rest.add(sample, &Limits::HELD) {
+            self.told = false;
+        }
+        if self.rest.elapsed_us() >= DETECT_US && !self.told {
+            self.told = true;
+            match Side::of(&(self.to_body * self.rest.specific_force_m_s2())) {
+                None => tell(CalibrationEvent::Askew),
+                Some(side) if !self.pending.contains(side) => tell(CalibrationEvent::Repeated(side)),
+                Some(side) => {
+                    self.turn = Some(Turn { side, began_us: at_us, turns: 0.0, parts: 0 });
+                    tell(CalibrationEvent::Detected(side));
+                    tell(CalibrationEvent::Rotate);
+                }
+            }
+        }
+        (at_us.saturating_sub(done_us) >= PATIENCE_US).then_some(Err(CalibrationFailure::TimedOut))
+    }
+}
+
+impl Turn {
+    /// Takes the first reading of each part of the turn.
+    fn take(&mut self, field_ut: &Vector3<f32>, sums: &mut FieldSums) {
+        let share = self.turns - libm::floorf(self.turns);
+        let part = 1 << ((share * f32::from(PARTS)) as u8).min(PARTS - 1);
+        if self.parts & part == 0 {
+            self.parts |= part;
+            sums.add(field_ut);
+        }
+    }
+}

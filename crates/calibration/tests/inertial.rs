@@ -1,0 +1,297 @@
+//! GyroscopeCalibration, accelerometer and level against simulated sensors, whose errors are known.
+#![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, missing_docs, reason = "tests")]
+
+mod common;
+
+use afbc_calibration::{
+    AccelerometerCalibration, AccelerometerErrors, CalibrationEvent, CalibrationFailure, GyroscopeCalibration,
+    LevelCalibration, RawSample, Side, Sides,
+};
+use afbc_plant::instruments::{Accelerometer as Accel, Imu};
+use afbc_types::{Mounting, SensorCalibration};
+use common::{GRAVITY, Hands, keep};
+use nalgebra::{Rotation3, Vector3};
+use proptest::prelude::*;
+
+const PRESETS: [Imu; 3] = [Imu::ICM_42688_P, Imu::BMI270, Imu::MPU_6000];
+
+fn gyroscope(
+    hands: &mut Hands,
+    samples: u32,
+) -> (Option<Result<Vector3<f32>, CalibrationFailure>>, Vec<CalibrationEvent>) {
+    let (mut gyroscope, mut told) = (GyroscopeCalibration::default(), Vec::new());
+    let found = (0..samples).find_map(|_| gyroscope.step(&hands.sample(), keep(&mut told)));
+    (found, told)
+}
+
+/// Measures the six sides in this order, each askew by so much.
+fn six_sides(
+    hands: &mut Hands,
+    mounting: &Mounting,
+    sides: &[Side],
+    askew_rad: impl Fn(usize) -> [f64; 2],
+) -> (Option<Result<AccelerometerErrors, CalibrationFailure>>, Vec<CalibrationEvent>) {
+    let (mut accelerometer, mut told, mut found) =
+        (AccelerometerCalibration::new(mounting, GRAVITY as f32), Vec::new(), None);
+    for (number, side) in sides.iter().enumerate() {
+        let mut step = |sample: &RawSample| {
+            if found.is_none() {
+                found = accelerometer.step(sample, keep(&mut told));
+            }
+        };
+        hands.turn_to(*side, askew_rad(number), &mut step);
+        (0..120).for_each(|_| step(&hands.sample()));
+    }
+    (found, told)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+
+    /// The bias of any sensor, to five standard deviations of what its noise, instability and random walk leave of a
+    /// mean over 3 s: 0.12 mrad/s of an MPU-6000.
+    #[test]
+    fn a_gyroscopes_offset_is_found(preset in 0..3_usize, seed: u64) {
+        let mut hands = Hands::with_imu(PRESETS[preset], seed);
+        let (found, told) = gyroscope(&mut hands, 160);
+        let truth = hands.instruments.imu_bias().unwrap().rates_rad_s;
+        let error = (found.unwrap().unwrap().cast::<f64>() - truth).amax();
+        prop_assert!(error < 6e-4, "{error}");
+        let progress: Vec<_> = (1..10).map(|tenth| CalibrationEvent::Progress(10 * tenth)).collect();
+        prop_assert_eq!(told, progress);
+    }
+
+    /// Offset and scale, of a vehicle whose sides are up to 8 degrees askew in hands that tremble. What is left is of
+    /// second order: the products of misalignment, 0.7 % of an MPU-6000, and skew.
+    #[test]
+    fn an_accelerometers_errors_are_found(
+        preset in 0..3_usize, seed: u64, sides in Just(Side::ALL.to_vec()).prop_shuffle(),
+        askew in prop::array::uniform12(-0.14..0.14), turned in 0..4_u8,
+    ) {
+        // A board turned by quarters.
+        let attitude_rad = Vector3::new(0.0, 0.0, f64::from(turned) * std::f64::consts::FRAC_PI_2);
+        let mounting = Mounting { attitude_rad, position_m: Vector3::zeros() };
+        let mut hands = Hands::with_imu(Imu { mounting, ..PRESETS[preset] }, seed);
+        hands.tremor_rad = 0.004;
+        let (found, told) = six_sides(&mut hands, &mounting.to_f32(), &sides, |n| [askew[2 * n], askew[2 * n + 1]]);
+        let errors = found.unwrap().unwrap();
+        let truth = hands.instruments.imu_bias().unwrap().specific_force_m_s2;
+        let offset = (errors.offset_m_s2.cast::<f64>() - truth).amax();
+        prop_assert!(offset < 0.04, "{}", offset);
+        for side in &sides {
+            let (detected, done) = (CalibrationEvent::Detected(*side), CalibrationEvent::Done(*side));
+            prop_assert!(told.contains(&detected) && told.contains(&done));
+        }
+        prop_assert_eq!(told.first(), Some(&CalibrationEvent::Pending(Sides::ALL)));
+        prop_assert_eq!(told.last(), Some(&CalibrationEvent::Progress(100)));
+        // In any attitude the corrected reading has the size of gravity. What is left is misalignment: where all axes
+        // feel the same, a third of the sum of its six elements, 0.053 m/s2 of an MPU-6000; this is five times that.
+        let found = SensorCalibration {
+            accel_offset_m_s2: errors.offset_m_s2, accel_scale: errors.scale, ..SensorCalibration::DEFAULT
+        };
+        hands.tremor_rad = 0.0;
+        for number in 0..40 {
+            hands.attitude = Rotation3::from_euler_angles(f64::from(number), 2.0 * f64::from(number), 0.0).into();
+            let mean = (0..10).map(|_| hands.sample().specific_force_m_s2).sum::<Vector3<f32>>() / 10.0;
+            let error = f64::from(found.specific_force(&mean).norm()) - GRAVITY;
+            prop_assert!(error.abs() < 0.27, "{} in attitude {}", error, number);
+        }
+    }
+
+    /// A perfect sensor with known offset and scale, so that nothing is left but the arithmetic and the noise.
+    #[test]
+    fn scale_and_offset_are_exact_without_misalignment(
+        offset in prop::array::uniform3(-1.5_f32..1.5), scale in prop::array::uniform3(0.9_f32..1.1),
+        askew in prop::array::uniform12(-0.25..0.25),
+    ) {
+        let (offset, scale) = (Vector3::from(offset), Vector3::from(scale));
+        let mut hands = Hands::with_imu(Imu::DEFAULT, 1);
+        let (mut accelerometer, mut found) = (AccelerometerCalibration::new(&Mounting::PLAIN, GRAVITY as f32), None);
+        for (number, side) in Side::ALL.into_iter().enumerate() {
+            hands.put(side, [askew[2 * number], askew[2 * number + 1]]);
+            for _ in 0..120 {
+                let mut sample = hands.sample();
+                sample.specific_force_m_s2 = sample.specific_force_m_s2.component_div(&scale) + offset;
+                if found.is_none() {
+                    found = accelerometer.step(&sample, |_| ());
+                }
+            }
+        }
+        let errors = found.unwrap().unwrap();
+        prop_assert!((errors.offset_m_s2 - offset).amax() < 1e-3, "{:?} {offset}", errors);
+        prop_assert!((errors.scale - scale).amax() < 1e-4, "{:?} {scale}", errors);
+    }
+
+    /// The mounting's roll and pitch are found, its yaw stays, whatever the error of what was thought.
+    #[test]
+    fn level_is_found(
+        thought in prop::array::uniform3(-1.2..1.2), off in prop::array::uniform2(-0.15..0.15), seed: u64,
+    ) {
+        let thought = Rotation3::from_euler_angles(thought[0], thought[1], thought[2]);
+        let truth = Rotation3::from_euler_angles(off[0], off[1], 0.0) * thought;
+        let angles = |it: &Rotation3<f64>| Vector3::from(<[f64; 3]>::from(it.euler_angles()));
+        let mounting = |it| Mounting { attitude_rad: angles(it), position_m: Vector3::zeros() };
+        let mut hands = Hands::with_imu(Imu { mounting: mounting(&truth), ..Imu::DEFAULT }, seed);
+        let mut level = LevelCalibration::new(&mounting(&thought).to_f32(), &SensorCalibration::DEFAULT);
+        let found = (0..120).find_map(|_| level.step(&hands.sample(), |_| ())).unwrap().unwrap();
+        let found = Rotation3::from_euler_angles(found.x, found.y, found.z).cast::<f64>();
+        // What the sensor feels is vertical again, and the smallest turn led there.
+        let felt = truth.inverse() * Vector3::z();
+        prop_assert!((found * felt - Vector3::z()).norm() < 1e-4);
+        prop_assert!((found * thought.inverse()).angle() < 1e-4 + truth.rotation_to(&thought).angle());
+    }
+
+    /// Whatever sensors say, nothing panics, and no result is without numbers.
+    #[test]
+    fn nothing_spoils_a_calibration(
+        numbers in prop::collection::vec(prop::num::f32::ANY, 60), step_us in 0..3_000_000_u64,
+    ) {
+        let mut gyroscope = GyroscopeCalibration::default();
+        let mut accelerometer = AccelerometerCalibration::new(&Mounting::PLAIN, 9.81);
+        let mut level = LevelCalibration::new(&Mounting::PLAIN, &SensorCalibration::DEFAULT);
+        for (number, six) in numbers.chunks_exact(6).enumerate() {
+            for repeat in 0..3 {
+                let sample = RawSample {
+                    at_us: (3 * number as u64 + repeat) * step_us,
+                    rates_rad_s: Vector3::new(six[0], six[1], six[2]),
+                    specific_force_m_s2: Vector3::new(six[3], six[4], six[5]),
+                    field_ut: None,
+                };
+                let finite = |found: Result<Vector3<f32>, _>| found.is_err() || found.is_ok_and(|it| it.norm() < 10.0);
+                prop_assert!(gyroscope.step(&sample, |_| ()).is_none_or(finite));
+                prop_assert!(level.step(&sample, |_| ()).is_none_or(finite));
+                let _ = accelerometer.step(&sample, |_| ());
+            }
+        }
+    }
+}
+
+/// A vehicle that is moved begins again; one that does not come to rest fails after 20 s.
+#[test]
+fn a_moving_gyroscope_is_not_calibrated() {
+    let mut hands = Hands::with_imu(Imu::ICM_42688_P, 5);
+    hands.tremor_rad = 0.01;
+    let (found, told) = gyroscope(&mut hands, 1100);
+    assert_eq!(found, Some(Err(CalibrationFailure::Moving)));
+    assert!(told.contains(&CalibrationEvent::Moved) && !told.contains(&CalibrationEvent::Progress(90)), "{told:?}");
+
+    // Knocked after 2 s, still from then on.
+    let (mut gyroscope, mut told) = (GyroscopeCalibration::default(), Vec::new());
+    hands.tremor_rad = 0.0;
+    for number in 0..160 {
+        let mut sample = hands.sample();
+        sample.rates_rad_s.x += if number == 100 { 0.1 } else { 0.0 };
+        assert_eq!(gyroscope.step(&sample, keep(&mut told)), None, "{number}");
+    }
+    let found = (0..160).find_map(|_| gyroscope.step(&hands.sample(), keep(&mut told)));
+    let truth = hands.instruments.imu_bias().unwrap().rates_rad_s;
+    assert!((found.unwrap().unwrap().cast::<f64>() - truth).amax() < 6e-4);
+    assert_eq!(told.iter().filter(|event| **event == CalibrationEvent::Moved).count(), 2);
+}
+
+#[test]
+fn a_gyroscope_with_too_large_an_offset_is_broken() {
+    let mut hands = Hands::with_imu(Imu::DEFAULT, 5);
+    hands.spin_rad_s = 0.9;
+    assert_eq!(gyroscope(&mut hands, 160).0, Some(Err(CalibrationFailure::TooLarge)));
+}
+
+#[test]
+fn a_tilted_vehicle_is_not_level() {
+    for (tilt_rad, fails) in [(0.25_f64, false), (0.28, true), (3.0, true)] {
+        let mut hands = Hands::with_imu(Imu::DEFAULT, 5);
+        hands.put(Side::Down, [tilt_rad, 0.0]);
+        let mut level = LevelCalibration::new(&Mounting::PLAIN, &SensorCalibration::DEFAULT);
+        let found = (0..120).find_map(|_| level.step(&hands.sample(), |_| ())).unwrap();
+        assert_eq!(found == Err(CalibrationFailure::NotLevel), fails, "{tilt_rad}");
+    }
+}
+
+/// The accelerometer's calibrated errors count, so that they do not become a tilt.
+#[test]
+fn level_knows_the_accelerometers_errors() {
+    let accel = Accel { bias_m_s2: 0.5, ..Accel::DEFAULT };
+    let mut hands = Hands::with_imu(Imu { accel, ..Imu::DEFAULT }, 7);
+    let accel_offset_m_s2 = hands.instruments.imu_bias().unwrap().specific_force_m_s2.cast();
+    let tilt = |errors: &SensorCalibration, hands: &mut Hands| {
+        let mut level = LevelCalibration::new(&Mounting::PLAIN, errors);
+        (0..120).find_map(|_| level.step(&hands.sample(), |_| ())).unwrap().unwrap().xy().norm()
+    };
+    let errors = SensorCalibration { accel_offset_m_s2, ..SensorCalibration::DEFAULT };
+    assert!(tilt(&errors, &mut hands) < 1e-4);
+    assert!(tilt(&SensorCalibration::DEFAULT, &mut hands) > 1e-2);
+}
+
+/// A side again, a vehicle between sides, one moved while it is measured, and one that is left alone.
+#[test]
+fn what_an_operator_does_wrong_is_told() {
+    let mut hands = Hands::with_imu(Imu::ICM_42688_P, 3);
+    let at = |_| [0.0; 2];
+    let (found, told) = six_sides(&mut hands, &Mounting::PLAIN, &[Side::Left, Side::Down, Side::Left], at);
+    assert_eq!((found, told.last()), (None, Some(&CalibrationEvent::Repeated(Side::Left))));
+    assert_eq!(told.iter().filter(|event| **event == CalibrationEvent::Done(Side::Left)).count(), 1);
+
+    let (_, told) = six_sides(&mut hands, &Mounting::PLAIN, &[Side::Down], |_| [0.8, 0.0]);
+    assert_eq!(told, [CalibrationEvent::Pending(Sides::ALL), CalibrationEvent::Askew]);
+
+    // Put down elsewhere a second after it was detected.
+    let (mut accelerometer, mut told) = (AccelerometerCalibration::new(&Mounting::PLAIN, GRAVITY as f32), Vec::new());
+    hands.put(Side::Up, [0.0; 2]);
+    (0..60).for_each(|_| assert_eq!(accelerometer.step(&hands.sample(), keep(&mut told)), None));
+    hands.turn_to(Side::Front, [0.0; 2], |sample| assert_eq!(accelerometer.step(sample, keep(&mut told)), None));
+    assert_eq!(
+        told,
+        [CalibrationEvent::Pending(Sides::ALL), CalibrationEvent::Detected(Side::Up), CalibrationEvent::Moved]
+    );
+
+    let (mut accelerometer, mut told) = (AccelerometerCalibration::new(&Mounting::PLAIN, GRAVITY as f32), Vec::new());
+    hands.put(Side::Down, [0.8, 0.0]);
+    let failed = (0..5000).find_map(|_| accelerometer.step(&hands.sample(), keep(&mut told)));
+    assert_eq!(failed, Some(Err(CalibrationFailure::TimedOut)));
+}
+
+/// A board that is turned by 45 degrees: its axes x and y cannot be separated by the six sides.
+#[test]
+fn a_board_between_the_axes_is_refused() {
+    let mounting = Mounting { attitude_rad: Vector3::new(0.0, 0.0, 0.785), position_m: Vector3::zeros() };
+    let mut hands = Hands::with_imu(Imu { mounting, ..Imu::ICM_42688_P }, 3);
+    let (found, _) = six_sides(&mut hands, &mounting.to_f32(), &Side::ALL, |_| [0.0; 2]);
+    assert_eq!(found, Some(Err(CalibrationFailure::TooFewDirections)));
+}
+
+#[test]
+fn a_broken_accelerometer_is_refused() {
+    let accel = Accel { bias_m_s2: 2.0, ..Accel::DEFAULT };
+    let refused = (0..20).filter(|seed| {
+        let mut hands = Hands::with_imu(Imu { accel, ..Imu::DEFAULT }, *seed);
+        let bias = hands.instruments.imu_bias().unwrap().specific_force_m_s2.amax();
+        let (found, _) = six_sides(&mut hands, &Mounting::PLAIN, &Side::ALL, |_| [0.0; 2]);
+        assert!(bias < 2.0 || !matches!(found, Some(Ok(_))), "{bias}: {found:?}");
+        matches!(found, Some(Err(CalibrationFailure::TooLarge)))
+    });
+    assert!(refused.count() > 3);
+}
+
+/// PX4's names: the side that is down.
+#[test]
+fn sides_are_named_by_what_is_down() {
+    // Attitudes by roll and pitch, right-handed about forward and left: nose down, the nose's axis points down.
+    let quarter = std::f64::consts::FRAC_PI_2;
+    let expected = [
+        (Side::Down, [0.0, 0.0]),
+        (Side::Up, [2.0 * quarter, 0.0]),
+        (Side::Front, [0.0, quarter]),
+        (Side::Back, [0.0, -quarter]),
+        // Rolled to the right, the right side is down.
+        (Side::Right, [quarter, 0.0]),
+        (Side::Left, [-quarter, 0.0]),
+    ];
+    for (side, [roll, pitch]) in expected {
+        let body_to_earth = Rotation3::from_euler_angles(roll, pitch, 0.0);
+        let felt = body_to_earth.inverse() * Vector3::new(0.0, 0.0, GRAVITY);
+        assert_eq!(Side::of(&felt.cast()), Some(side));
+        assert_eq!(Side::of(&(1.5 * felt).cast()), None, "not at rest");
+    }
+    assert_eq!(Side::of(&Vector3::new(7.0, 0.0, 7.0)), None);
+    assert_eq!(Side::of(&Vector3::repeat(f32::NAN)), None);
+}
