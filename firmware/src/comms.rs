@@ -4,6 +4,7 @@ use crate::aux_sensors;
 use crate::board::{Board, Links, Receiver as _, Transmitter as _};
 use crate::control;
 use crate::parameters;
+use crate::recording::{self, ExactLog};
 use crate::samples::{self, Sampler as _};
 use crate::ticks::{self, Tick};
 use crate::vehicle::ParameterTable;
@@ -58,6 +59,7 @@ pub async fn run<B: Board, const OTHERS: usize>((comms, table): &mut Desk, links
     let mut outgoing = Vec::<u8, REPORT_MAX>::new();
     let mut leaving = 0;
     let mut calibrator = B::Sampler::SENSES.then(calibrator);
+    let mut log = if recording::is_possible::<B>() { ExactLog::begin::<B>(table) } else { None };
     loop {
         match select(receive(links, &mut incoming), ticks::next()).await {
             Either::First((link, length)) => {
@@ -71,7 +73,12 @@ pub async fn run<B: Board, const OTHERS: usize>((comms, table): &mut Desk, links
                     }
                     None => comms.receive(bytes),
                 };
-                control::with_mail(|inputs| inputs.merge(&news));
+                let tick = control::with_mail(|inputs| inputs.merge(&news));
+                if recording::is_possible::<B>()
+                    && let Some(log) = &mut log
+                {
+                    log.inputs(tick, &news);
+                }
                 BAD_FRAMES.store(comms.bad_frames(), Ordering::Relaxed);
             }
             Either::Second(tick) => {
@@ -85,11 +92,25 @@ pub async fn run<B: Board, const OTHERS: usize>((comms, table): &mut Desk, links
                 {
                     calibrate(comms, calibrator, table);
                 }
-                serve(comms, table, &mut outgoing);
-                links.each().iter_mut().for_each(|link| link.transmitter.transmit(&tick, &outgoing));
+                // A constant here, too, as below.
+                let kept = if recording::is_possible::<B>() { log.as_deref_mut() } else { None };
+                let logs = kept.as_ref().map(|log| log.link());
+                serve(comms, table, kept, &mut outgoing);
+                let told = links.each().iter_mut().enumerate().filter(|(index, _)| Some(*index) != logs);
+                told.for_each(|(_, link)| link.transmitter.transmit(&tick, &outgoing));
                 if comms.has_mail() {
                     let news = comms.receive(&[]);
-                    control::with_mail(|inputs| inputs.merge(&news));
+                    let tick = control::with_mail(|inputs| inputs.merge(&news));
+                    if recording::is_possible::<B>()
+                        && let Some(log) = &mut log
+                    {
+                        log.inputs(tick, &news);
+                    }
+                }
+                if recording::is_possible::<B>()
+                    && let Some(log) = &mut log
+                {
+                    log.send(&tick, links);
                 }
                 let wanted = comms.wants_reboot();
                 leaving += u32::from(wanted.is_some());
@@ -141,11 +162,16 @@ fn calibrate(comms: &mut Comms, calibrator: &mut Calibrator, table: &ParameterTa
 
 /// Sends values of parameters, and passes on what has changed. Out of line like the report.
 #[inline(never)]
-fn serve(comms: &mut Comms, table: &mut ParameterTable, outgoing: &mut Vec<u8, REPORT_MAX>) {
+fn serve(
+    comms: &mut Comms,
+    table: &mut ParameterTable,
+    log: Option<&mut ExactLog>,
+    outgoing: &mut Vec<u8, REPORT_MAX>,
+) {
     let change = comms.parameters(table, |frame| drop(outgoing.extend_from_slice(frame)));
-    if let Some(change) = change
-        && !parameters::change(table, change)
-    {
+    let Some(change) = change else { return };
+    let number = log.map_or(0, |log| log.change(table, change));
+    if !parameters::change(table, change, number) {
         comms.warn(NOT_KEPT);
     }
 }

@@ -1,6 +1,7 @@
 //! The control tick, 1000 times per second.
 
 use crate::board::Board;
+use crate::recording::{self, RecordedTick};
 use crate::samples::{self, Sampler as _};
 use crate::ticks::{self, Tick};
 use crate::time::{self, Stopwatch};
@@ -13,8 +14,9 @@ use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_time::{Instant, Timer};
 use static_cell::StaticCell;
 
-/// Newest inputs, written by [`crate::comms`].
-static MAIL: Mutex<CriticalSectionRawMutex, RefCell<ControlInputs>> = Mutex::new(RefCell::new(ControlInputs::EMPTY));
+/// Newest inputs, written by [`crate::comms`], and the number of the tick that takes them.
+static MAIL: Mutex<CriticalSectionRawMutex, RefCell<(ControlInputs, u32)>> =
+    Mutex::new(RefCell::new((ControlInputs::EMPTY, 0)));
 
 /// Cycles of the last control tick and of the longest, for [`crate::housekeeping`].
 static CYCLES: AtomicU32 = AtomicU32::new(0);
@@ -25,14 +27,14 @@ pub fn cycles() -> [u32; 2] {
     [&CYCLES, &CYCLES_MAX].map(|cycles| cycles.load(Ordering::Relaxed))
 }
 
-/// Configuration to be flown from the next disarmed tick on.
-static NEXT: Mutex<CriticalSectionRawMutex, RefCell<Option<Prepared>>> = Mutex::new(RefCell::new(None));
+/// Configuration to be flown from the next disarmed tick on, with its number.
+static NEXT: Mutex<CriticalSectionRawMutex, RefCell<Option<(Prepared, u16)>>> = Mutex::new(RefCell::new(None));
 /// True if the vehicle was armed in the last tick.
 static ARMED: AtomicBool = AtomicBool::new(false);
 
-/// Flies another configuration from the next disarmed tick on.
-pub fn fly(prepared: Prepared) {
-    NEXT.lock(|next| next.try_borrow_mut().ok().map(|mut next| *next = Some(prepared)));
+/// Flies another configuration, of this number, from the next disarmed tick on.
+pub fn fly(prepared: Prepared, number: u16) {
+    NEXT.lock(|next| next.try_borrow_mut().ok().map(|mut next| *next = Some((prepared, number))));
 }
 
 /// True if the vehicle is armed.
@@ -40,10 +42,15 @@ pub fn armed() -> bool {
     ARMED.load(Ordering::Relaxed)
 }
 
-/// Changes the inputs of the next tick.
-pub fn with_mail(change: impl FnOnce(&mut ControlInputs)) {
+/// Changes the inputs of the next tick, and returns its number.
+pub fn with_mail(change: impl FnOnce(&mut ControlInputs)) -> u32 {
     // Not borrowed elsewhere while it is locked; no panic in any case.
-    MAIL.lock(|inputs| inputs.try_borrow_mut().ok().map(|mut inputs| change(&mut inputs)));
+    let tick = MAIL.lock(|shared| {
+        let mut shared = shared.try_borrow_mut().ok()?;
+        change(&mut shared.0);
+        Some(shared.1)
+    });
+    tick.unwrap_or_default()
 }
 
 /// Creates the vehicle, disarmed, to be called once: in place, since a task would store a value twice and take the
@@ -62,16 +69,21 @@ pub fn make(configuration: &Configuration) -> &'static mut Flight {
 
 /// Runs the ticks.
 pub async fn run<B: Board>(flight: &mut Flight, board: &mut B) -> ! {
-    let (mut inputs, mut readings) = (ControlInputs::EMPTY, Readings::NONE);
+    let (mut inputs, mut readings, mut adopted) = (ControlInputs::EMPTY, Readings::NONE, None);
     loop {
         // Not a ticker, whose periods begin when it is created: just after the start of a control period, when alarms
         // are due, it would tick twice in every second period.
         Timer::at(time::next_period()).await;
         let stopwatch = Stopwatch::start();
-        let report = tick(flight, &mut inputs, &mut readings, board);
+        let (report, number) = tick(flight, &mut inputs, &mut readings, board);
+        if recording::is_possible::<B>() && recording::records() {
+            let clock_failed = board.clock_has_failed();
+            recording::push(&RecordedTick { number, clock_failed, adopted, readings, report });
+        }
+        adopted = None;
         ARMED.store(report.mode.armed(), Ordering::Relaxed);
         if !report.mode.armed() {
-            adopt(flight);
+            adopted = adopt(flight);
         }
         let cycles = stopwatch.cycles(B::CORE_HZ);
         CYCLES.store(cycles, Ordering::Relaxed);
@@ -80,25 +92,35 @@ pub async fn run<B: Board>(flight: &mut Flight, board: &mut B) -> ! {
     }
 }
 
-/// Takes over a configuration, if there is one. Out of line, since it is rare.
+/// Takes over a configuration, if there is one, and returns its number. Out of line, since it is rare.
 #[inline(never)]
-fn adopt(flight: &mut Flight) {
+fn adopt(flight: &mut Flight) -> Option<u16> {
     NEXT.lock(|next| {
-        if let Some(prepared) = next.try_borrow_mut().ok().and_then(|mut next| next.take()) {
-            // Disarmed: the caller has looked.
-            let _ = flight.adopt(&prepared);
-        }
-    });
+        let (prepared, number) = next.try_borrow_mut().ok().and_then(|mut next| next.take())?;
+        // Disarmed: the caller has looked.
+        flight.adopt(&prepared).then_some(number)
+    })
 }
 
 /// The top loop: takes the newest inputs; supervises, controls and gates the motors ([`afbc_flight_core::tick`]);
-/// drives them; checks the rate. Out of line, so that its stack and its instructions can be counted
+/// drives them; checks the rate; returns the report and the tick's number. Out of line, so that its stack and its instructions can be counted
 /// (`docs/budgets.md`).
 #[inline(never)]
-fn tick<B: Board>(flight: &mut Flight, inputs: &mut ControlInputs, readings: &mut Readings, board: &mut B) -> Report {
+fn tick<B: Board>(
+    flight: &mut Flight,
+    inputs: &mut ControlInputs,
+    readings: &mut Readings,
+    board: &mut B,
+) -> (Report, u32) {
     let now_us = Instant::now().as_micros();
     // Not borrowed elsewhere while it is locked; the tick has no panic.
-    MAIL.lock(|shared| shared.try_borrow_mut().ok().map(|mut shared| shared.take_into(inputs)));
+    let number = MAIL.lock(|shared| {
+        let mut shared = shared.try_borrow_mut().ok()?;
+        let (mail, number) = &mut *shared;
+        mail.take_into(inputs);
+        *number = number.wrapping_add(1);
+        Some(number.wrapping_sub(1))
+    });
 
     if board.clock_has_failed() {
         flight.distrust_clock();
@@ -117,5 +139,5 @@ fn tick<B: Board>(flight: &mut Flight, inputs: &mut ControlInputs, readings: &mu
     if report.health.rate.alive && !may_reset {
         board.feed_watchdog();
     }
-    report
+    (report, number.unwrap_or_default())
 }

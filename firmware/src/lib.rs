@@ -36,6 +36,7 @@ pub mod executors;
 pub mod housekeeping;
 mod image;
 pub mod parameters;
+pub mod recording;
 pub mod samples;
 pub mod ticks;
 pub mod time;

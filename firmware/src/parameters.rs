@@ -100,12 +100,12 @@ pub fn read<M: NorFlash>(memory: M, start: u32) -> (Keeper<M>, ParameterTable) {
     (Keeper(Some(store)), table)
 }
 
-/// Takes a change over to flight and flash: the next tick of the disarmed vehicle flies `table`. False if too many
-/// changes are waiting to be written; this one will be forgotten at the next start.
+/// Takes a change over to flight and flash: the next tick of the disarmed vehicle flies `table`, the configuration of
+/// this number. False if too many changes are waiting to be written; this one will be forgotten at the next start.
 #[must_use = "the station is to be told"]
-pub fn change(table: &ParameterTable, change: RecordChange) -> bool {
+pub fn change(table: &ParameterTable, change: RecordChange, number: u16) -> bool {
     if let Ok(prepared) = Prepared::new(table.configuration()) {
-        control::fly(prepared);
+        control::fly(prepared, number);
     }
     let queued = CHANGES.lock(|changes| changes.try_borrow_mut().ok()?.push_back(change).ok()).is_some();
     CHANGED.signal(());

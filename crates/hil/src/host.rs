@@ -35,7 +35,7 @@ pub struct Host {
 struct ExactLog {
     recorder: Recorder,
     write: Box<dyn FnMut(&[u8])>,
-    /// Number of the configuration that the last tick left to the next.
+    /// Number of the configuration that the next tick flies, if it is another.
     adopted: Option<u16>,
 }
 
@@ -233,6 +233,9 @@ impl Host {
         let mut send = |frame: &[u8]| bytes.extend_from_slice(frame);
         let tell = Tell { comms: &mut self.comms, tick_us, send: &mut send };
         let report = self.flight.tick(time_us, &mut self.taken, &readings, tell);
+        if let Some(ExactLog { recorder, write, adopted }) = &mut self.log {
+            recorder.tick(self.number, false, &readings, &report, adopted.take(), write);
+        }
         if self.comms.is_calibrating() {
             self.raw.add(time_us, &readings);
         } else {
@@ -240,12 +243,8 @@ impl Host {
         }
         self.flight.calibrate(&mut self.comms, &mut self.calibrator, self.raw.take());
         let change = self.flight.parameters(&mut self.comms, &mut send);
-        if let Some(log) = &mut self.log {
-            if change.is_some() {
-                self.flight.record(log, change);
-            }
-            let adopted = log.adopted.take();
-            log.recorder.tick(self.number, false, &readings, &report, adopted, &mut log.write);
+        if let (Some(log), true) = (&mut self.log, change.is_some()) {
+            self.flight.record(log, change);
         }
         self.number = self.number.wrapping_add(1);
         self.time_us = time_us;

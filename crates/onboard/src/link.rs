@@ -12,5 +12,9 @@ parameters! {
         /// Baud rate of the serial line, and so what telemetry may take of it, from the next start on.
         #[parameter(SER_TEL1_BAUD, "number", 9600.0..=921600.0)]
         pub baud: u32 = 921_600,
+        /// Link that carries the exact log in place of MAVLink, counted from 1; 0 for none, from the next start on. The
+        /// first one never does.
+        #[parameter(LOG_PORT, "number", 0.0..=4.0)]
+        pub log_port: u32 = 0,
     }
 }

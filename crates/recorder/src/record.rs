@@ -65,7 +65,7 @@ pub struct TickRecord {
     pub clock_failed: bool,
     /// What the sensors had read.
     pub readings: Readings,
-    /// Number of the configuration that is flown from the next tick on, if it is another.
+    /// Number of the configuration that is flown from this tick on, if it is another.
     pub adopted: Option<u16>,
     /// What it gave.
     pub given: Given,

@@ -61,7 +61,7 @@ impl Recorder {
     }
 
     /// Records a tick: its number, whether its clock was not trusted, what it took and gave, and the number of the
-    /// configuration that is flown from the next one on, if it is another.
+    /// configuration that is flown from it on, if it is another.
     pub fn tick<const N: usize>(
         &mut self,
         number: u32,

@@ -152,12 +152,12 @@ impl<const N: usize> Replayer<N> {
         if tick.clock_failed {
             self.flight.distrust_clock();
         }
-        let report = self.flight.tick(tick.time_us, &mut self.taken, &tick.readings);
         if let Some(number) = tick.adopted
             && !self.adopt(number)
         {
-            return Replayed::Differs(Difference::Missing(tick.number), Some(report));
+            return Replayed::Differs(Difference::Missing(tick.number), None);
         }
+        let report = self.flight.tick(tick.time_us, &mut self.taken, &tick.readings);
         let (number, then, now) = (tick.number, tick.given, Given::of(&report));
         if then == now {
             Replayed::Same(report)

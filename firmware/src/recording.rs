@@ -1,0 +1,122 @@
+//! What ticks took and gave, from the control task to the links' task, for the exact log ([`afbc_recorder`]). Nothing is
+//! kept unless a link carries it.
+
+use crate::board::{Board, Links, Transmitter};
+use crate::samples::Sampler;
+use crate::ticks::Tick;
+use crate::vehicle::{ParameterTable, Report};
+use afbc_onboard::parameters::RecordChange;
+use afbc_onboard::{ControlInputs, Readings};
+use afbc_recorder::Recorder;
+use core::cell::RefCell;
+use core::sync::atomic::{AtomicBool, Ordering};
+use embassy_sync::blocking_mutex::Mutex;
+use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
+use heapless::{Deque, Vec};
+use static_cell::StaticCell;
+
+/// Ticks that wait, at most; further ones are missing in the log.
+const WAITING: usize = 8;
+
+/// A tick for the log.
+#[derive(Clone, Copy)]
+pub struct RecordedTick {
+    /// Its number.
+    pub number: u32,
+    /// True if its clock was not trusted.
+    pub clock_failed: bool,
+    /// Number of the configuration that it was the first to fly, if any.
+    pub adopted: Option<u16>,
+    /// What it took of the sensors.
+    pub readings: Readings,
+    /// What it gave.
+    pub report: Report,
+}
+
+static RECORDS: AtomicBool = AtomicBool::new(false);
+static TICKS: Mutex<CriticalSectionRawMutex, RefCell<Deque<RecordedTick, WAITING>>> =
+    Mutex::new(RefCell::new(Deque::new()));
+
+/// True if ticks are kept.
+pub fn records() -> bool {
+    RECORDS.load(Ordering::Relaxed)
+}
+
+/// Keeps a tick. Out of line, since few vehicles do.
+#[cold]
+#[inline(never)]
+pub fn push(tick: &RecordedTick) {
+    // Not borrowed elsewhere while it is locked; no panic in any case.
+    let _ = TICKS.lock(|ticks| ticks.try_borrow_mut().ok().map(|mut ticks| ticks.push_back(*tick)));
+}
+
+/// True if a board may keep an exact log: it has sensors, and a link to spare. Others have none of it.
+pub const fn is_possible<B: Board>() -> bool {
+    B::Sampler::SENSES && B::Links::COUNT > 1
+}
+
+/// Bytes of the log that wait for the end of a tick, at most; further frames are missing.
+const BYTES: usize = 1024;
+
+/// The exact log on one of the links.
+pub struct ExactLog {
+    recorder: Recorder,
+    bytes: Vec<u8, BYTES>,
+    /// Index of the link.
+    link: usize,
+}
+
+impl ExactLog {
+    /// Begins the log, before the first tick, if the parameters want one; to be called once.
+    #[inline(never)]
+    pub fn begin<B: Board>(table: &ParameterTable) -> Option<&'static mut Self> {
+        static LOG: StaticCell<ExactLog> = StaticCell::new();
+        let link = usize::try_from(table.configuration().link.log_port).ok()?.checked_sub(1)?;
+        if !is_possible::<B>() || link == 0 || link >= B::Links::COUNT {
+            return None;
+        }
+        let log = LOG.init_with(|| ExactLog { recorder: Recorder::default(), bytes: Vec::new(), link });
+        let ExactLog { recorder, bytes, .. } = log;
+        recorder.start(table, &mut |frame| drop(bytes.extend_from_slice(frame)));
+        RECORDS.store(true, Ordering::Relaxed);
+        Some(log)
+    }
+
+    /// Records what messages have brought for the tick of this number.
+    #[inline(never)]
+    pub fn inputs(&mut self, tick: u32, inputs: &ControlInputs) {
+        let ExactLog { recorder, bytes, .. } = self;
+        recorder.inputs(tick, inputs, &mut |frame| drop(bytes.extend_from_slice(frame)));
+    }
+
+    /// Records a change of the parameters, and returns the number of the configuration.
+    pub fn change(&mut self, table: &ParameterTable, change: RecordChange) -> u16 {
+        let ExactLog { recorder, bytes, .. } = self;
+        recorder.change(table, change, &mut |frame| drop(bytes.extend_from_slice(frame)))
+    }
+
+    /// Sends what is recorded, the ticks that are kept included.
+    #[inline(never)]
+    pub fn send(&mut self, tick: &Tick, links: &mut impl Links) {
+        let ExactLog { recorder, bytes, link } = self;
+        while let Some(RecordedTick { number, clock_failed, adopted, readings, report }) = pop() {
+            recorder.tick(number, clock_failed, &readings, &report, adopted, &mut |frame| {
+                drop(bytes.extend_from_slice(frame));
+            });
+        }
+        if let Some(link) = links.each().get_mut(*link) {
+            link.transmitter.transmit(tick, bytes);
+        }
+        bytes.clear();
+    }
+
+    /// Index of the link that carries it.
+    pub fn link(&self) -> usize {
+        self.link
+    }
+}
+
+/// Returns the oldest tick that is kept.
+fn pop() -> Option<RecordedTick> {
+    TICKS.lock(|ticks| ticks.try_borrow_mut().ok()?.pop_front())
+}
