@@ -45,8 +45,10 @@ pub struct FixReading {
     pub horizontal_sigma_m: f32,
     /// Standard deviation of the altitude \[m\].
     pub vertical_sigma_m: f32,
-    /// Standard deviation of each coordinate of the velocity \[m/s\].
+    /// Standard deviation of the velocity to the north, and to the east \[m/s\].
     pub speed_sigma_m_s: f32,
+    /// Standard deviation of the velocity down \[m/s\].
+    pub climb_sigma_m_s: f32,
     /// Satellites in use.
     pub satellites: u8,
 }

@@ -78,6 +78,8 @@ proptest! {
         let down = f64::from(fix.velocity_ned_m_s.z);
         prop_assert!((down + climb).abs() < 0.15, "{down} and {climb}");
         prop_assert!((fix.horizontal_sigma_m - 0.9 * RANGE_SIGMA_M).abs() < 1e-6);
+        // The vertical speed is a mean of altitudes, and known less well.
+        prop_assert!(fix.climb_sigma_m_s > fix.speed_sigma_m_s);
         prop_assert_eq!((fix.satellites, decoder.bad_sentences()), (10, 0));
     }
 

@@ -47,8 +47,10 @@ pub enum Measurement {
         horizontal_sigma_m: f32,
         /// Standard deviation of z \[m\].
         vertical_sigma_m: f32,
-        /// Standard deviation of each coordinate of the velocity \[m/s\].
+        /// Standard deviation of the velocity's x and of its y \[m/s\].
         speed_sigma_m_s: f32,
+        /// Standard deviation of the velocity's z \[m/s\].
+        climb_sigma_m_s: f32,
     },
     /// A barometer's height above any fixed reference; its offset is estimated.
     Height {
@@ -122,12 +124,20 @@ impl Measurement {
                     && is_sigma(*attitude_sigma_rad)
             }
             Measurement::Position { position_m, sigma_m } => within(position_m, POSITION_MAX_M) && is_sigma(*sigma_m),
-            Measurement::Gnss { position_m, velocity_m_s, horizontal_sigma_m, vertical_sigma_m, speed_sigma_m_s } => {
+            Measurement::Gnss {
+                position_m,
+                velocity_m_s,
+                horizontal_sigma_m,
+                vertical_sigma_m,
+                speed_sigma_m_s,
+                climb_sigma_m_s,
+            } => {
                 within(position_m, POSITION_MAX_M)
                     && within(velocity_m_s, VELOCITY_MAX_M_S)
                     && is_sigma(*horizontal_sigma_m)
                     && is_sigma(*vertical_sigma_m)
                     && is_sigma(*speed_sigma_m_s)
+                    && is_sigma(*climb_sigma_m_s)
             }
             Measurement::Height { height_m, sigma_m } => height_m.abs() <= POSITION_MAX_M && is_sigma(*sigma_m),
             Measurement::MagneticField { field, sigma } => {

@@ -135,12 +135,20 @@ pub(crate) fn parts(measurement: &Measurement) -> [Option<Part>; 2] {
         Measurement::Position { position_m, sigma_m } => {
             [part(Aid::TrackerPosition, Target::Position(position_m), same(square(sigma_m, LEAST))), None]
         }
-        Measurement::Gnss { position_m, velocity_m_s, horizontal_sigma_m, vertical_sigma_m, speed_sigma_m_s } => {
-            let (horizontal, vertical) = (square(horizontal_sigma_m, LEAST), square(vertical_sigma_m, LEAST));
-            let position = Vector3::new(horizontal, horizontal, vertical);
+        Measurement::Gnss {
+            position_m,
+            velocity_m_s,
+            horizontal_sigma_m,
+            vertical_sigma_m,
+            speed_sigma_m_s,
+            climb_sigma_m_s,
+        } => {
+            let level = |horizontal: f32, vertical: f32| Vector3::new(horizontal, horizontal, vertical);
+            let position = level(square(horizontal_sigma_m, LEAST), square(vertical_sigma_m, LEAST));
+            let velocity = level(square(speed_sigma_m_s, LEAST_M_S), square(climb_sigma_m_s, LEAST_M_S));
             [
                 part(Aid::GnssPosition, Target::Position(position_m), position),
-                part(Aid::GnssVelocity, Target::Velocity(velocity_m_s), same(square(speed_sigma_m_s, LEAST_M_S))),
+                part(Aid::GnssVelocity, Target::Velocity(velocity_m_s), velocity),
             ]
         }
         Measurement::Height { height_m, sigma_m } => {

@@ -39,15 +39,18 @@ fn any_measurement() -> impl Strategy<Value = Measurement> {
             Measurement::Pose { position_m, attitude, position_sigma_m: p, attitude_sigma_rad: a }
         }),
         (any_vector(), any_sigma()).prop_map(|(position_m, sigma_m)| Measurement::Position { position_m, sigma_m }),
-        (any_vector(), any_vector(), any_sigma(), any_sigma()).prop_map(|(position_m, velocity_m_s, p, v)| {
-            Measurement::Gnss {
-                position_m,
-                velocity_m_s,
-                horizontal_sigma_m: p,
-                vertical_sigma_m: p,
-                speed_sigma_m_s: v,
+        (any_vector(), any_vector(), any_sigma(), any_sigma(), any_sigma()).prop_map(
+            |(position_m, velocity_m_s, p, v, climb)| {
+                Measurement::Gnss {
+                    position_m,
+                    velocity_m_s,
+                    horizontal_sigma_m: p,
+                    vertical_sigma_m: p,
+                    speed_sigma_m_s: v,
+                    climb_sigma_m_s: climb,
+                }
             }
-        }),
+        ),
         (any_number(), any_sigma()).prop_map(|(height_m, sigma_m)| Measurement::Height { height_m, sigma_m }),
         (any_vector(), any_sigma()).prop_map(|(field, sigma)| Measurement::MagneticField { field, sigma }),
         (any_number(), any_sigma())
@@ -190,6 +193,7 @@ fn hours_leave_it_sound() {
                     horizontal_sigma_m: 1.0,
                     vertical_sigma_m: 1.0,
                     speed_sigma_m_s: 0.1,
+                    climb_sigma_m_s: 0.1,
                 };
                 memory.offer(&Stamped { value, at_us: at_us - 100_000 });
             }

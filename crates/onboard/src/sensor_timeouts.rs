@@ -77,6 +77,7 @@ mod tests {
             horizontal_sigma_m: 1.0,
             vertical_sigma_m: 1.0,
             speed_sigma_m_s: 1.0,
+            climb_sigma_m_s: 1.0,
         };
         let pose = Measurement::Pose {
             position_m: zero,

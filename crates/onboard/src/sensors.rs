@@ -43,6 +43,7 @@ impl FixFrame {
             horizontal_sigma_m: fix.horizontal_sigma_m,
             vertical_sigma_m: fix.vertical_sigma_m,
             speed_sigma_m_s: fix.speed_sigma_m_s,
+            climb_sigma_m_s: fix.climb_sigma_m_s,
         };
         Some((measurement, is_first))
     }
@@ -77,6 +78,7 @@ mod tests {
             horizontal_sigma_m: 1.5,
             vertical_sigma_m: 2.5,
             speed_sigma_m_s: 0.2,
+            climb_sigma_m_s: 0.3,
             satellites: 9,
         };
         let mut frame = FixFrame::NEW;
@@ -86,6 +88,7 @@ mod tests {
         assert!(is_first);
         assert!(matches!(measurement, Measurement::Gnss { position_m, velocity_m_s, horizontal_sigma_m: 1.5, .. }
             if position_m == Vector3::zeros() && velocity_m_s == velocity));
+        assert!(matches!(measurement, Measurement::Gnss { speed_sigma_m_s: 0.2, climb_sigma_m_s: 0.3, .. }));
         let (measurement, is_first) = frame
             .measure(&FixReading { latitude_deg: 47.001, longitude_deg: 8.001, altitude_m: 510.0, ..first })
             .expect("near");

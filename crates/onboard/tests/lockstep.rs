@@ -34,17 +34,24 @@ fn vector() -> impl Strategy<Value = Vector3<f32>> {
 }
 
 fn aid() -> impl Strategy<Value = Measurement> {
-    let four = [number(), number(), number(), number()];
+    let four = || [number(), number(), number(), number()];
     prop_oneof![
-        (vector(), four, number(), number()).prop_map(
+        (vector(), four(), number(), number()).prop_map(
             |(position_m, attitude, position_sigma_m, attitude_sigma_rad)| {
                 Measurement::Pose { position_m, attitude, position_sigma_m, attitude_sigma_rad }
             }
         ),
         (vector(), number()).prop_map(|(position_m, sigma_m)| Measurement::Position { position_m, sigma_m }),
-        (vector(), vector(), [number(), number(), number()]).prop_map(|(position_m, velocity_m_s, sigmas)| {
-            let [horizontal_sigma_m, vertical_sigma_m, speed_sigma_m_s] = sigmas;
-            Measurement::Gnss { position_m, velocity_m_s, horizontal_sigma_m, vertical_sigma_m, speed_sigma_m_s }
+        (vector(), vector(), four()).prop_map(|(position_m, velocity_m_s, sigmas)| {
+            let [horizontal_sigma_m, vertical_sigma_m, speed_sigma_m_s, climb_sigma_m_s] = sigmas;
+            Measurement::Gnss {
+                position_m,
+                velocity_m_s,
+                horizontal_sigma_m,
+                vertical_sigma_m,
+                speed_sigma_m_s,
+                climb_sigma_m_s,
+            }
         }),
         (number(), number()).prop_map(|(height_m, sigma_m)| Measurement::Height { height_m, sigma_m }),
         (vector(), number()).prop_map(|(field, sigma)| Measurement::MagneticField { field, sigma }),

@@ -24,6 +24,7 @@ fn fix(position_m: Vector3<f32>, velocity_m_s: Vector3<f32>, sigma_m: f32) -> Me
         horizontal_sigma_m: sigma_m,
         vertical_sigma_m: sigma_m,
         speed_sigma_m_s: 0.05,
+        climb_sigma_m_s: 0.05,
     }
 }
 

@@ -33,6 +33,7 @@ fn readings(ms: u64, place_m: Vector3<f32>, wander_m: Vector3<f32>, hand: [Vecto
         horizontal_sigma_m: 1.3,
         vertical_sigma_m: 2.0,
         speed_sigma_m_s: 0.06,
+        climb_sigma_m_s: 0.06,
     };
     let height = moved_m.z + 0.3 * (0.06 * t).sin() + noise(ms + 7_000_000).x * 0.2;
     let field = Vector3::new(0.2, 0.0, -0.43) + noise(ms + 8_000_000) * 0.005;

@@ -170,6 +170,7 @@ impl EmulatedFlight {
                 horizontal_sigma_m: 1.0,
                 vertical_sigma_m: 2.0,
                 speed_sigma_m_s: 0.1,
+                climb_sigma_m_s: 0.1,
             },
             Measurement::Height { height_m: state.position_m.z, sigma_m: 0.1 },
             Measurement::MagneticField { field: Vector3::new(20.0, other, -40.0), sigma: 0.5 },

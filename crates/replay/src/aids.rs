@@ -66,6 +66,7 @@ pub(crate) fn gnss(fixes: &[Fix], origin: &Origin, delay_us: u64) -> Vec<Aiding>
             horizontal_sigma_m: sigma(fix.horizontal_m, HORIZONTAL_M),
             vertical_sigma_m: sigma(fix.vertical_m, VERTICAL_M),
             speed_sigma_m_s,
+            climb_sigma_m_s: speed_sigma_m_s,
         };
         aided(value, fix.arrived_us, fix.arrived_us, delay_us)
     };

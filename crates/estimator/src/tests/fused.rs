@@ -47,6 +47,7 @@ fn measurement(aid: Aid, memory: &Memory, by: V3) -> Measurement {
             horizontal_sigma_m: SIGMA as f32,
             vertical_sigma_m: SIGMA as f32,
             speed_sigma_m_s: 1e3,
+            climb_sigma_m_s: 1e3,
         },
         Aid::GnssVelocity => Measurement::Gnss {
             position_m: n.position,
@@ -54,6 +55,7 @@ fn measurement(aid: Aid, memory: &Memory, by: V3) -> Measurement {
             horizontal_sigma_m: 1e4,
             vertical_sigma_m: 1e4,
             speed_sigma_m_s: SIGMA as f32,
+            climb_sigma_m_s: SIGMA as f32,
         },
         Aid::TrackerAttitude => {
             let q = UnitQuaternion::new(by).into_inner().coords.map(|x| x as f32);
@@ -232,6 +234,7 @@ fn a_receivers_variance_is_divided() {
             horizontal_sigma_m: sigma,
             vertical_sigma_m: 0.4,
             speed_sigma_m_s: 10.0,
+            climb_sigma_m_s: 10.0,
         },
         at_us,
     };

@@ -433,10 +433,18 @@ fn the_door_has_bounds() {
         position_sigma_m,
         attitude_sigma_rad,
     };
-    let gnss = |position_m, velocity_m_s, [horizontal_sigma_m, vertical_sigma_m, speed_sigma_m_s]: [f32; 3]| {
-        Measurement::Gnss { position_m, velocity_m_s, horizontal_sigma_m, vertical_sigma_m, speed_sigma_m_s }
+    let gnss = |position_m, velocity_m_s, sigmas: [f32; 4]| {
+        let [horizontal_sigma_m, vertical_sigma_m, speed_sigma_m_s, climb_sigma_m_s] = sigmas;
+        Measurement::Gnss {
+            position_m,
+            velocity_m_s,
+            horizontal_sigma_m,
+            vertical_sigma_m,
+            speed_sigma_m_s,
+            climb_sigma_m_s,
+        }
     };
-    let (zero, level, sigmas) = (Vector3::zeros(), [1.0, 0.0, 0.0, 0.0], [1.0; 3]);
+    let (zero, level, sigmas) = (Vector3::zeros(), [1.0, 0.0, 0.0, 0.0], [1.0; 4]);
     let check = |what: &str, most: f32, of: &dyn Fn(f32) -> bool| {
         assert!(of(0.999 * most), "{what}: {most} is refused");
         assert!(!of(1.001 * most) && !of(f32::NAN) && !of(f32::INFINITY), "{what}: beyond {most} is accepted");
@@ -459,7 +467,9 @@ fn the_door_has_bounds() {
             check("height", 5e4, &|x| Measurement::Height { height_m: sign * x, sigma_m: 1.0 }.is_plausible());
             check("heading", 1e3, &|x| Measurement::Heading { heading_rad: sign * x, sigma_rad: 1.0 }.is_plausible());
         }
-        let mut sigmas = [1.0; 3];
+    }
+    for k in 0..4 {
+        let mut sigmas = sigmas;
         check("sigma", 1e4, &|x| {
             let mut sigmas = sigmas;
             sigmas[k] = x;

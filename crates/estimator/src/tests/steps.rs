@@ -168,6 +168,7 @@ fn what_is_rejected_for_long_is_believed() {
         horizontal_sigma_m: 0.1,
         vertical_sigma_m: 0.1,
         speed_sigma_m_s: 0.1,
+        climb_sigma_m_s: 0.1,
     };
     let heading = |heading_rad| Measurement::Heading { heading_rad, sigma_rad: 0.01 };
     let height = |memory: &Memory, by: f32| Measurement::Height {
@@ -472,14 +473,19 @@ fn each_part_has_its_variance() {
             assert!((part.variance.x - sigma.max(least).powi(2)).abs() < 1e-9 && parts[1].is_none());
         }
     }
-    let fix = parts(&Measurement::Gnss {
-        position_m: zero,
-        velocity_m_s: zero,
-        horizontal_sigma_m: 2.0,
-        vertical_sigma_m: 3.0,
-        speed_sigma_m_s: 1e-5,
-    });
-    let [Some(position), Some(velocity)] = fix else { panic!("{fix:?}") };
+    let fix = |speed_sigma_m_s, climb_sigma_m_s| {
+        parts(&Measurement::Gnss {
+            position_m: zero,
+            velocity_m_s: zero,
+            horizontal_sigma_m: 2.0,
+            vertical_sigma_m: 3.0,
+            speed_sigma_m_s,
+            climb_sigma_m_s,
+        })
+    };
+    let [_, Some(velocity)] = fix(0.5, 1.5) else { panic!("no velocity") };
+    assert_eq!(velocity.variance, Vector3::new(0.25, 0.25, 2.25));
+    let [Some(position), Some(velocity)] = fix(1e-5, 1e-5) else { panic!("a part is missing") };
     assert!((position.variance - Vector3::new(4.0, 4.0, 9.0)).norm() < 1e-5);
     assert!((velocity.variance - Vector3::repeat(1e-6)).norm() < 1e-9);
     assert_eq!((position.aid, velocity.aid), (Some(Aid::GnssPosition), Some(Aid::GnssVelocity)));

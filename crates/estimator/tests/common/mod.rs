@@ -310,6 +310,7 @@ impl<'a> Flight<'a> {
                     horizontal_sigma_m: told.0 as f32,
                     vertical_sigma_m: told.1 as f32,
                     speed_sigma_m_s: speed as f32,
+                    climb_sigma_m_s: speed as f32,
                 },
             );
         }

@@ -42,12 +42,14 @@ pub(super) fn pose(fix: &TrackerFix, tracker: &TrackerModel, at_us: impl Fn(f64)
 
 /// A fix, as good as the receiver says.
 pub(super) fn gnss(fix: &GnssFix, at_us: impl Fn(f64) -> u64) -> Stamped<Measurement> {
+    let speed_sigma_m_s = sigma(&[fix.velocity_sigma_m_s]).max(1e-3);
     let value = Measurement::Gnss {
         position_m: fix.position_m.cast(),
         velocity_m_s: fix.velocity_m_s.cast(),
         horizontal_sigma_m: sigma(&[fix.horizontal_sigma_m]),
         vertical_sigma_m: sigma(&[fix.vertical_sigma_m]),
-        speed_sigma_m_s: sigma(&[fix.velocity_sigma_m_s]).max(1e-3),
+        speed_sigma_m_s,
+        climb_sigma_m_s: speed_sigma_m_s,
     };
     timed(value, fix.true_at_s, at_us)
 }
