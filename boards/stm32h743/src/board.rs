@@ -13,7 +13,7 @@
 //! | second IMU | ICM-42605 on SPI4: SCK on PE12, MISO on PE13, MOSI on PE14, select PC13; turned by 270 degrees |
 //! | barometer | DPS310 on I2C2 at 0x76: SCL on PB10, SDA on PB11 |
 //! | compass | QMC5883L on I2C1, outside: SCL on PB6, SDA on PB7 |
-//! | GNSS receiver | NMEA on USART2, outside: TX on PD5, RX on PD6 |
+//! | GNSS receiver | u-blox or NMEA on USART2, outside: TX on PD5, RX on PD6 |
 
 use crate::sensors::{Aids, Imus};
 use afbc_drivers::dps310::Dps310;

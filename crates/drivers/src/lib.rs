@@ -22,7 +22,7 @@
 //! | IMU and magnetometer | [`ak8963`] |
 //! | barometer | [`bmp3`], [`dps310`], [`ms5611`] |
 //! | magnetometer | [`ist8310`], [`lis3mdl`], [`qmc5883l`] |
-//! | GNSS receiver | [`nmea`] |
+//! | GNSS receiver | [`ublox`], [`nmea`] |
 #![no_std]
 #![forbid(unsafe_code)]
 
@@ -41,6 +41,7 @@ pub mod nmea;
 mod part;
 pub mod qmc5883l;
 mod reading;
+pub mod ublox;
 
 pub use bus::{BusError, I2cRegisters, READ_MAX, Registers, SpiFormat, SpiRegisters};
 pub use driver::{Driver, FAULTS_MAX, PAUSE_US, PartTiming};
