@@ -9,7 +9,7 @@ use cortex_m::peripheral::SCB;
 use embassy_stm32::pac::RCC;
 use embassy_stm32::pac::rcc::vals::{Pllm, Pllsrc, Sw};
 use embassy_stm32::rcc::{
-    AHBPrescaler, APBPrescaler, Hse, HseMode, Pll, PllDiv, PllMul, PllPreDiv, PllSource, Sysclk, VoltageScale,
+    AHBPrescaler, APBPrescaler, Hse, HseMode, Pll, PllDiv, PllMul, PllPreDiv, PllSource, Sysclk, VoltageScale, mux,
 };
 use embassy_stm32::time::Hertz;
 use embassy_stm32::{Config, Peripherals};
@@ -61,6 +61,8 @@ fn config<const CRYSTAL_HZ: u32>(crystal: bool) -> Config {
     rcc.apb2_pre = APBPrescaler::DIV2;
     rcc.apb3_pre = APBPrescaler::DIV2;
     rcc.apb4_pre = APBPrescaler::DIV2;
+    // The converters run on the chip's own oscillator, which no failure of the crystal stops.
+    rcc.mux.adcsel = mux::Adcsel::PER;
     config
 }
 

@@ -23,10 +23,12 @@
 //! | barometer | [`bmp3`], [`dps310`], [`ms5611`] |
 //! | magnetometer | [`ist8310`], [`lis3mdl`], [`qmc5883l`] |
 //! | GNSS receiver | [`ublox`], [`nmea`] |
+//! | battery | [`battery`] |
 #![no_std]
 #![forbid(unsafe_code)]
 
 pub mod ak8963;
+pub mod battery;
 pub mod bmi270;
 pub mod bmp3;
 mod bus;

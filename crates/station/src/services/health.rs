@@ -132,6 +132,26 @@ mod tests {
         }
     }
 
+    /// A converter's readings become SYS_STATUS; one that reads no battery is a sensor that is there and not well.
+    #[test]
+    fn a_battery_is_told() {
+        for (reading, told, healthy) in [
+            (Some((14.8, Some(12.5))), (14_800, 1250, -1), sensor::BATTERY),
+            (Some((14.8, None)), (14_800, -1, -1), sensor::BATTERY),
+            (Some((99.0, Some(400.0))), (65_533, i16::MAX, -1), sensor::BATTERY),
+            (None, (u16::MAX, -1, -1), 0),
+        ] {
+            let mut status = well();
+            status.aux.put_battery(reading);
+            let reported = system(&status);
+            assert_eq!((reported.voltage_mv, reported.current_ca, reported.remaining_percent), told);
+            assert_eq!(
+                (reported.present & sensor::BATTERY, reported.healthy & sensor::BATTERY),
+                (sensor::BATTERY, healthy)
+            );
+        }
+    }
+
     #[test]
     fn the_landed_state_follows_modes() {
         let mut status = well();
