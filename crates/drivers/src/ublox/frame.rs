@@ -29,7 +29,7 @@ impl UbxCommand {
         let length = payload.len().min(Self::PAYLOAD_MAX) as u16;
         let summed = id.into_iter().chain(length.to_le_bytes()).chain(payload.iter().copied().take(length.into()));
         let sum = checksum(summed.clone());
-        let mut command = UbxCommand { bytes: [0; _], length: usize::from(length) + AROUND };
+        let mut command = UbxCommand { bytes: [0; Self::PAYLOAD_MAX + AROUND], length: usize::from(length) + AROUND };
         command.bytes.iter_mut().zip(BEGIN.into_iter().chain(summed).chain(sum)).for_each(|(to, from)| *to = from);
         command
     }

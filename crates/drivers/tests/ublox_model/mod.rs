@@ -111,12 +111,17 @@ impl Model {
         }
         while self.due.front().is_some_and(|(epoch_us, _)| epoch_us + DELAY_US <= now_us) {
             let Some((epoch_us, truth)) = self.due.pop_front() else { break };
-            if self.nmea {
-                self.says.extend(sentences(epoch_us, &truth).bytes());
-            }
-            if self.solves {
-                self.say([0x01, 0x07], &solution(epoch_us, &truth));
-            }
+            self.report(epoch_us, &truth);
+        }
+    }
+
+    /// Sends an epoch.
+    pub(crate) fn report(&mut self, epoch_us: u64, truth: &Truth) {
+        if self.nmea {
+            self.says.extend(sentences(epoch_us, truth).bytes());
+        }
+        if self.solves {
+            self.say([0x01, 0x07], &solution(epoch_us, truth));
         }
     }
 
