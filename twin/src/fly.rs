@@ -3,6 +3,7 @@
 
 use crate::check::check;
 use crate::pins::{BIT_NS, BITS, Frames};
+use crate::ublox::{Generation, UbloxPeer};
 use crate::wire::Telemetry;
 use crate::world::Transducers;
 use afbc_flight_core::motor::{THROTTLE_MAX, THROTTLE_MIN};
@@ -64,6 +65,8 @@ enum Sampling {
 struct Flight {
     world: World,
     transducers: Transducers,
+    /// In place of the board's own one.
+    receiver: Option<UbloxPeer>,
     frames: Frames,
     sampling: Sampling,
     /// When the pins are looked at next [ns].
@@ -85,8 +88,8 @@ struct Flight {
     error: Option<String>,
 }
 
-/// Flies a scenario.
-pub fn fly(image: &Path, file: &Path) -> Result<(), Box<dyn Error>> {
+/// Flies a scenario, with a receiver of u-blox's if one is given.
+pub fn fly(image: &Path, file: &Path, receiver: Option<Generation>) -> Result<(), Box<dyn Error>> {
     let scenario = load(file)?;
     let mut board = Box::new(MatekH743::new()?);
     let wire = Telemetry::default();
@@ -94,6 +97,7 @@ pub fn fly(image: &Path, file: &Path) -> Result<(), Box<dyn Error>> {
     let flight = Flight {
         world: World::released(&scenario, 1e-3)?,
         transducers: Transducers::new(),
+        receiver: receiver.map(UbloxPeer::new),
         frames: Frames::new(scenario.rotors.len()),
         sampling: Sampling::Idle,
         look_ns: None,
@@ -118,7 +122,10 @@ pub fn fly(image: &Path, file: &Path) -> Result<(), Box<dyn Error>> {
         println!("the models say: {} {}: {}", told.instance, told.register, told.reason);
     }
     let [unmapped, refused] = [finished.session.unmapped().len(), finished.session.refused().len()];
-    let Flight { frames, error, off_m: (sum, count), tilt_rad, now_ms, phase, .. } = finished.driver;
+    let Flight { frames, error, off_m: (sum, count), tilt_rad, now_ms, phase, receiver, .. } = finished.driver;
+    if let Some(receiver) = receiver {
+        println!("{}", receiver.told());
+    }
     let off_m = sum / count.max(1) as f64;
     let (time_s, sent) = (now_ms as f64 * 1e-3, frames.sent);
     println!("{time_s:.1} s, {sent} frames to each motor");
@@ -154,7 +161,7 @@ impl Driver<MatekH743> for Flight {
         session.pause_at(self.look_ns.map(VirtualNanos));
     }
 
-    fn on_stop(&mut self, session: &mut Session<MatekH743>, stop: Stop, _: &mut dyn Host) -> Option<VirtualNanos> {
+    fn on_stop(&mut self, session: &mut Session<MatekH743>, stop: Stop, host: &mut dyn Host) -> Option<VirtualNanos> {
         self.now_ms = stop.at.0 / TICK_NS;
         let mut speeds = RotorSpeeds::<ROTORS_MAX>::default();
         for (speed, throttle) in speeds.0.iter_mut().zip(&self.throttles) {
@@ -165,7 +172,10 @@ impl Driver<MatekH743> for Flight {
         self.world.look();
         let readings = self.world.readings().copied().unwrap_or_default();
         let signals = self.transducers.feel(&readings);
-        session.board_mut().sense(&signals);
+        match &self.receiver {
+            Some(receiver) => receiver.sense(session.board_mut(), host, stop.at, (&readings, &signals)),
+            None => session.board_mut().sense(&signals),
+        }
         self.talk();
         self.supervise();
         (self.error.is_none() && self.phase != Phase::Done).then(|| VirtualNanos(stop.at.0 + TICK_NS))

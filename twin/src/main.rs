@@ -7,21 +7,25 @@ mod boot;
 mod check;
 mod fly;
 mod pins;
+mod ublox;
 mod wire;
 mod world;
 
 use std::path::Path;
 use std::process::ExitCode;
+use ublox::Generation;
 
 const USAGE: &str = "twin boot IMAGE: boots it, and looks at bus and pins
-twin fly IMAGE SCENARIO: takes off, hovers and lands, in lockstep with the plant";
+twin fly IMAGE SCENARIO [m8|m10]: with a new receiver of u-blox's, or one of NMEA, takes off, hovers and lands, in lockstep with the plant";
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
     let result = match *arguments {
         ["boot", image] => boot::boot(Path::new(image)),
-        ["fly", image, scenario] => fly::fly(Path::new(image), Path::new(scenario)),
+        ["fly", image, scenario] => fly::fly(Path::new(image), Path::new(scenario), None),
+        ["fly", image, scenario, "m8"] => fly::fly(Path::new(image), Path::new(scenario), Some(Generation::Eight)),
+        ["fly", image, scenario, "m10"] => fly::fly(Path::new(image), Path::new(scenario), Some(Generation::Ten)),
         _ => Err(USAGE.into()),
     };
     match result {
