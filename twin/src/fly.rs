@@ -146,6 +146,9 @@ fn has_pulse(pin: &Actuator) -> bool {
 
 impl Driver<MatekH743> for Flight {
     fn on_settled(&mut self, session: &mut Session<MatekH743>, _: &mut dyn Host, settled: Settled) {
+        if let Some(receiver) = &self.receiver {
+            receiver.watch(&settled);
+        }
         match settled {
             Settled::Access { access, value }
                 if (access.kind, access.address, value & 1) == (AccessKind::Write, DMA_S0CR, 1) =>
@@ -161,7 +164,7 @@ impl Driver<MatekH743> for Flight {
         session.pause_at(self.look_ns.map(VirtualNanos));
     }
 
-    fn on_stop(&mut self, session: &mut Session<MatekH743>, stop: Stop, host: &mut dyn Host) -> Option<VirtualNanos> {
+    fn on_stop(&mut self, session: &mut Session<MatekH743>, stop: Stop, _: &mut dyn Host) -> Option<VirtualNanos> {
         self.now_ms = stop.at.0 / TICK_NS;
         let mut speeds = RotorSpeeds::<ROTORS_MAX>::default();
         for (speed, throttle) in speeds.0.iter_mut().zip(&self.throttles) {
@@ -173,7 +176,7 @@ impl Driver<MatekH743> for Flight {
         let readings = self.world.readings().copied().unwrap_or_default();
         let signals = self.transducers.feel(&readings);
         match &self.receiver {
-            Some(receiver) => receiver.sense(session.board_mut(), host, stop.at, (&readings, &signals)),
+            Some(receiver) => receiver.sense(session.board_mut(), stop.at, (&readings, &signals)),
             None => session.board_mut().sense(&signals),
         }
         self.talk();

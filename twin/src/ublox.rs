@@ -11,11 +11,10 @@ use rigless::chip::Timeline;
 use rigless::chip::nmea;
 use rigless::chip::uart::Peer;
 use rigless::edge::Edge;
-use rigless::emulator::Host;
+use rigless::emulator::{AccessKind, Settled};
 use rigless::machine::flight::Signals;
 use rigless::machine::matekh743::MatekH743;
 use rigless::snapshot::Store;
-use rigless::soc::Width;
 use rigless::time::VirtualNanos;
 use std::sync::{Arc, Mutex};
 pub(crate) use ublox_model::Generation;
@@ -58,19 +57,20 @@ impl UbloxPeer {
         change(&mut self.0.lock().unwrap_or_else(std::sync::PoisonError::into_inner))
     }
 
+    /// Sees what the image does to the UART's divider.
+    pub fn watch(&self, settled: &Settled) {
+        if let Settled::Access { access, value } = settled
+            && (access.kind, access.address) == (AccessKind::Write, USART2_BRR)
+        {
+            self.with(|line| line.baud = CLOCK_HZ / (*value).max(1));
+        }
+    }
+
     /// Lets the board feel what its transducers do, this receiver with it: a fix of the instruments, which has its
     /// delay, is sent when it arrives.
-    pub fn sense(
-        &self,
-        board: &mut MatekH743,
-        host: &mut dyn Host,
-        at: VirtualNanos,
-        (readings, signals): (&Readings, &Signals),
-    ) {
+    pub fn sense(&self, board: &mut MatekH743, at: VirtualNanos, (readings, signals): (&Readings, &Signals)) {
         let now_us = at.0 / 1000;
-        let divider = host.read(USART2_BRR, Width::W32).unwrap_or(0).max(1);
         self.with(|line| {
-            line.baud = CLOCK_HZ / divider;
             let period_us = line.model.period_us.saturating_sub(JITTER_US);
             for aid in readings.aids.iter().flatten() {
                 let Measurement::Gnss { horizontal_sigma_m, vertical_sigma_m, speed_sigma_m_s, .. } = aid.value else {
