@@ -73,7 +73,7 @@ pub async fn run<B: Board, const OTHERS: usize>((comms, table): &mut Desk, links
             Either::Second(tick) => {
                 if B::Sampler::SENSES {
                     let net = &table.configuration().guidance.net;
-                    let told = [net.volts_per_volt, net.amperes_per_volt];
+                    let told = [net.divider, net.current_a_v];
                     comms.set_aux_sensors(aux_sensors::known(tick.report.time_us, told));
                     // Also that there is none any more.
                     let battery = comms.battery();

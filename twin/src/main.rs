@@ -16,7 +16,8 @@ use std::process::ExitCode;
 use ublox::Generation;
 
 const USAGE: &str = "twin boot IMAGE: boots it, and looks at bus and pins
-twin fly IMAGE SCENARIO [m8|m10]: with a new receiver of u-blox's, or one of NMEA, takes off, hovers and lands, in lockstep with the plant";
+twin fly IMAGE SCENARIO [m8|m10]: takes off, hovers and lands, in lockstep with the plant, with an NMEA receiver or a
+    new one of u-blox's";
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();

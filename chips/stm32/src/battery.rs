@@ -26,8 +26,8 @@ impl<T: Instance> BatteryConverter<T> {
     }
 }
 
-/// Reads for ever, by `convert`, which returns numbers up to `end`, and passes each reading on with its time \[us\]; none
-/// if it is none of a battery.
+/// Reads for ever, by `convert`, which returns numbers up to `end`, and passes each reading on with its time \[us\];
+/// none if it is none of a battery.
 pub async fn run<T: Instance>(
     mut converter: BatteryConverter<T>,
     end: u16,

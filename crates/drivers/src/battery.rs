@@ -1,5 +1,5 @@
-//! A battery's voltage and current, at two pins of a converter: a divider, and the amplifier of a shunt or a Hall sensor,
-//! on the board or in a power module.
+//! A battery's voltage and current, at two pins of a converter: a divider, and the amplifier of a shunt or a Hall
+//! sensor, on the board or in a power module.
 //!
 //! | fault | found by | then |
 //! |---|---|---|

@@ -1,6 +1,5 @@
 //! What the services know of the vehicle.
 
-use crate::services::health::sensor;
 use crate::services::origin::EarthOrigin;
 use afbc_flight_core::supervisor::COAST_US;
 use afbc_flight_core::{Mode, Reasons, TickHealth};
@@ -23,22 +22,6 @@ pub struct AuxSensors {
     pub sensors: SensorBits,
     /// Time since 1970 at power-up, 0 if unknown \[us\].
     pub powered_up_us: u64,
-}
-
-impl AuxSensors {
-    /// Puts what a battery's converter has read: voltage \[V\] and current \[A\], if that is measured; none for a
-    /// converter that reads no battery.
-    pub fn put_battery(&mut self, reading: Option<(f32, Option<f32>)>) {
-        self.sensors.present |= sensor::BATTERY;
-        self.battery = reading.map(|(voltage_v, current_a)| BatteryStatus {
-            // The two largest numbers mean other things.
-            voltage_mv: (voltage_v * 1e3).min(65_533.0) as u16,
-            current_ca: current_a.map_or(-1, |current_a| (current_a * 1e2) as i16),
-            consumed_mah: -1,
-            remaining_percent: -1,
-            charge: 0,
-        });
-    }
 }
 
 /// A satellite receiver.
