@@ -1,6 +1,8 @@
-//! Barometer, magnetometer and GNSS receiver: their readings as measurements, and what stations are to know of them.
+//! Barometer, magnetometer, GNSS receiver and battery: their readings as measurements, and what stations are to know of
+//! them.
 
 use crate::samples::{self, SampleTime, SampleValue};
+use afbc_drivers::battery::{BatteryPins, BatteryScale};
 use afbc_drivers::{FixReading, MagneticReading, PressureReading};
 use afbc_onboard::sensors::{FixFrame, field, height};
 use afbc_station::AuxSensors;
@@ -24,6 +26,8 @@ struct Known {
     /// Time of the newest reading \[us\].
     barometer: Option<u64>,
     magnetometer: Option<u64>,
+    /// Newest reading, with its time \[us\] and the board's own scale.
+    battery: Option<(u64, Option<BatteryPins>, BatteryScale)>,
 }
 
 static KNOWN: Mutex<CriticalSectionRawMutex, RefCell<Known>> = Mutex::new(RefCell::new(Known {
@@ -32,6 +36,7 @@ static KNOWN: Mutex<CriticalSectionRawMutex, RefCell<Known>> = Mutex::new(RefCel
     receiver: None,
     barometer: None,
     magnetometer: None,
+    battery: None,
 }));
 
 /// Not borrowed elsewhere while it is locked; no panic in any case.
@@ -72,8 +77,14 @@ pub fn put_fix(at_us: u64, fix: Option<FixReading>) {
     }
 }
 
-/// Returns what stations are to know at `now_us`.
-pub(crate) fn known(now_us: u64) -> AuxSensors {
+/// Puts what a battery's pins have read, which mean `scale` on this board; none if it is none of a battery.
+pub fn put_battery(at_us: u64, pins: Option<BatteryPins>, scale: BatteryScale) {
+    let _ = with(|known| known.battery = Some((at_us, pins, scale)));
+}
+
+/// Returns what stations are to know at `now_us`, where the vehicle's parameters tell these volts and amperes per volt
+/// at the battery's pins.
+pub(crate) fn known(now_us: u64, told: [f32; 2]) -> AuxSensors {
     let works = |at_us: u64| now_us.saturating_sub(at_us) < SILENT_US;
     let aux = with(|known| {
         let mut sensors = SensorBits::default();
@@ -83,7 +94,11 @@ pub(crate) fn known(now_us: u64) -> AuxSensors {
         }
         let receiver =
             known.receiver.map(|(at_us, receiver)| if works(at_us) { receiver } else { GnssReceiver::NO_FIX });
-        AuxSensors { origin: known.origin, receiver, sensors, ..AuxSensors::default() }
+        let mut aux = AuxSensors { origin: known.origin, receiver, sensors, ..AuxSensors::default() };
+        if let Some((at_us, pins, scale)) = known.battery {
+            aux.put_battery(pins.filter(|_| works(at_us)).map(|pins| scale.changed(told).read(&pins)));
+        }
+        aux
     });
     aux.unwrap_or_default()
 }

@@ -83,7 +83,12 @@ pub async fn run<B: Board, const OTHERS: usize>((comms, table): &mut Desk, links
             }
             Either::Second(tick) => {
                 if B::Sampler::SENSES {
-                    comms.set_aux_sensors(aux_sensors::known(tick.report.time_us));
+                    let net = &table.configuration().guidance.net;
+                    let told = [net.divider, net.current_a_v];
+                    comms.set_aux_sensors(aux_sensors::known(tick.report.time_us, told));
+                    // Also that there is none any more.
+                    let battery = comms.battery();
+                    control::with_mail(|inputs| inputs.battery = battery);
                 }
                 report(comms, &tick, B::CORE_HZ, &mut outgoing);
                 // A constant, so that a board without sensors has none of it.

@@ -85,7 +85,7 @@ fn the_firmware_knows_no_board() {
 fn the_wiring_is_what_the_board_uses() {
     for (board, page, heading, count) in [
         ("stm32f405", "firmware.md", "\n## Wiring", 8),
-        ("stm32h743", "firmware.md", "\n### Matek H743", 28),
+        ("stm32h743", "firmware.md", "\n### Matek H743", 30),
         ("pixracer", "boards/pixracer.md", "\n## Wiring", 28),
     ] {
         let text = fs::read_to_string(root().join("docs").join(page)).unwrap();

@@ -4,6 +4,7 @@
 //! Models and processor are those of `rigless`, which nobody of this project wrote; the image is the one that is
 //! flashed.
 use crate::check::check;
+use afbc_link::telemetry::Telemetry;
 use afbc_link::{Address, Decoder, Downlink};
 use rigless::chip::uart::Pattern;
 use rigless::edge::Edge;
@@ -40,6 +41,9 @@ const LOOK_EVERY: u64 = 1_000;
 const TICK: u64 = 1_000_000;
 /// What the sensors, at a higher priority, may delay a tick by \[ns\]: most while an IMU is set up.
 const JITTER: u64 = 150_000;
+
+/// Voltage of the battery that the models have at rest \[mV\].
+const BATTERY_MV: u16 = 16_800;
 
 /// What is seen from outside.
 #[derive(Default)]
@@ -109,13 +113,18 @@ pub fn boot(image: &Path) -> Result<(), Box<dyn Error>> {
     check(*store & 0xFFFF_FFFF != 0xFFFF_FFFF, "the parameters' store has a header")?;
     let words = finished.session.board_mut().host_mut(LINK).map(|peer| peer.received().to_vec()).unwrap_or_default();
     let bytes: Vec<u8> = words.iter().map(|word| *word as u8).collect();
-    let (mut messages, mut heartbeats) = (0, 0);
+    let (mut messages, mut heartbeats, mut battery_mv) = (0, 0, None);
     Decoder::new(Address { system: 255, component: 190 }).feed(&bytes, |_, message: Downlink| {
         messages += 1;
         heartbeats += u32::from(matches!(message, Downlink::Heartbeat { .. }));
+        if let Downlink::Telemetry(Telemetry::System(system)) = message {
+            battery_mv = Some(system.voltage_mv);
+        }
     });
     println!("{} bytes on the link: {messages} messages, {heartbeats} of them heartbeats", bytes.len());
     check(heartbeats >= 2, "a heartbeat every second")?;
+    println!("battery: {battery_mv:?} mV");
+    check(battery_mv.is_some_and(|voltage_mv| voltage_mv.abs_diff(BATTERY_MV) < 50), "a battery of four cells")?;
 
     let [unmapped, refused] = [finished.session.unmapped().len(), finished.session.refused().len()];
     check(unmapped + refused == 0, &format!("{unmapped} unmapped and {refused} refused accesses"))?;

@@ -4,6 +4,7 @@
 use crate::check::check;
 use crate::pilot::Pilot;
 use crate::pins::{BIT_NS, BITS, Frames};
+use crate::ublox::{Generation, UbloxPeer};
 use crate::wire::Telemetry;
 use afbc_scenario::load;
 use rigless::edge::Edge;
@@ -38,6 +39,8 @@ enum Sampling {
 
 struct Flight {
     pilot: Pilot,
+    /// In place of the board's own one.
+    receiver: Option<UbloxPeer>,
     frames: Frames,
     sampling: Sampling,
     /// When the pins are looked at next [ns].
@@ -45,8 +48,8 @@ struct Flight {
     motors: usize,
 }
 
-/// Flies a scenario.
-pub fn fly(image: &Path, file: &Path) -> Result<(), Box<dyn Error>> {
+/// Flies a scenario, with a receiver of u-blox's if one is given.
+pub fn fly(image: &Path, file: &Path, receiver: Option<Generation>) -> Result<(), Box<dyn Error>> {
     let scenario = load(file)?;
     let mut board = Box::new(MatekH743::new()?);
     let wire = Telemetry::default();
@@ -54,6 +57,7 @@ pub fn fly(image: &Path, file: &Path) -> Result<(), Box<dyn Error>> {
     let motors = scenario.rotors.len();
     let flight = Flight {
         pilot: Pilot::new(&scenario, wire)?,
+        receiver: receiver.map(UbloxPeer::new),
         frames: Frames::new(motors),
         sampling: Sampling::Idle,
         look_ns: None,
@@ -66,8 +70,11 @@ pub fn fly(image: &Path, file: &Path) -> Result<(), Box<dyn Error>> {
         println!("the models say: {} {}: {}", told.instance, told.register, told.reason);
     }
     let [unmapped, refused] = [finished.session.unmapped().len(), finished.session.refused().len()];
-    let Flight { frames, pilot, .. } = finished.driver;
+    let Flight { frames, pilot, receiver, .. } = finished.driver;
     println!("{} frames to each motor", frames.sent);
+    if let Some(receiver) = receiver {
+        println!("{}", receiver.told());
+    }
     pilot.verdict()?;
     check(frames.wrong.is_empty(), &format!("DSHOT600: {:?}", frames.wrong))?;
     check(unmapped + refused == 0, &format!("{unmapped} unmapped and {refused} refused accesses"))?;
@@ -80,6 +87,9 @@ fn has_pulse(pin: &Actuator) -> bool {
 
 impl Driver<MatekH743> for Flight {
     fn on_settled(&mut self, session: &mut Session<MatekH743>, _: &mut dyn Host, settled: Settled) {
+        if let Some(receiver) = &self.receiver {
+            receiver.watch(&settled);
+        }
         match settled {
             Settled::Access { access, value }
                 if (access.kind, access.address, value & 1) == (AccessKind::Write, DMA_S0CR, 1) =>
@@ -96,8 +106,11 @@ impl Driver<MatekH743> for Flight {
     }
 
     fn on_stop(&mut self, session: &mut Session<MatekH743>, stop: Stop, _: &mut dyn Host) -> Option<VirtualNanos> {
-        let (_, signals) = self.pilot.advance(stop.at.0 / TICK_NS)?;
-        session.board_mut().sense(&signals);
+        let (readings, signals) = self.pilot.advance(stop.at.0 / TICK_NS)?;
+        match &self.receiver {
+            Some(receiver) => receiver.sense(session.board_mut(), stop.at, (&readings, &signals)),
+            None => session.board_mut().sense(&signals),
+        }
         Some(VirtualNanos(stop.at.0 + TICK_NS))
     }
 }

@@ -3,7 +3,8 @@
 
 use crate::pilot::Pilot;
 use crate::wire::Telemetry;
-use afbc_drivers::nmea::{LATENCY_US, NmeaDecoder};
+use afbc_drivers::nmea::NmeaDecoder;
+use afbc_drivers::ublox::DELAY_US;
 use afbc_estimator::Measurement;
 use afbc_hil::Host;
 use afbc_onboard::sensors::FixFrame;
@@ -64,7 +65,7 @@ impl Gnss {
             self.last_ms = now_ms;
             let fix = self.decoder.take(byte as u8).flatten();
             if let Some((value, _)) = fix.and_then(|fix| self.frame.measure(&fix)) {
-                aids.push(Aged { value, age_us: ((now_ms - self.began_ms) * 1000) as u32 + LATENCY_US });
+                aids.push(Aged { value, age_us: ((now_ms - self.began_ms) * 1000 + DELAY_US) as u32 });
             }
         }
         readings.aids = std::array::from_fn(|index| aids.get(index).copied());

@@ -9,14 +9,17 @@ mod fly;
 mod host;
 mod pilot;
 mod pins;
+mod ublox;
 mod wire;
 mod world;
 
 use std::path::Path;
 use std::process::ExitCode;
+use ublox::Generation;
 
 const USAGE: &str = "twin boot IMAGE: boots it, and looks at bus and pins
-twin fly IMAGE SCENARIO: takes off, hovers and lands, in lockstep with the plant
+twin fly IMAGE SCENARIO [m8|m10]: takes off, hovers and lands, in lockstep with the plant, with an NMEA receiver or a
+    new one of u-blox's
 twin host SCENARIO: the same with the firmware's code on this machine";
 
 fn main() -> ExitCode {
@@ -24,7 +27,9 @@ fn main() -> ExitCode {
     let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
     let result = match *arguments {
         ["boot", image] => boot::boot(Path::new(image)),
-        ["fly", image, scenario] => fly::fly(Path::new(image), Path::new(scenario)),
+        ["fly", image, scenario] => fly::fly(Path::new(image), Path::new(scenario), None),
+        ["fly", image, scenario, "m8"] => fly::fly(Path::new(image), Path::new(scenario), Some(Generation::Eight)),
+        ["fly", image, scenario, "m10"] => fly::fly(Path::new(image), Path::new(scenario), Some(Generation::Ten)),
         ["host", scenario] => host::fly(Path::new(scenario)),
         _ => Err(USAGE.into()),
     };

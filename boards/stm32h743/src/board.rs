@@ -14,13 +14,15 @@
 //! | second IMU | ICM-42605 on SPI4: SCK on PE12, MISO on PE13, MOSI on PE14, select PC13; turned by 270 degrees |
 //! | barometer | DPS310 on I2C2 at 0x76: SCL on PB10, SDA on PB11 |
 //! | compass | QMC5883L on I2C1, outside: SCL on PB6, SDA on PB7 |
-//! | GNSS receiver | NMEA on USART2, outside: TX on PD5, RX on PD6 |
+//! | battery | voltage on PC0, current on PC1: ADC1 |
+//! | GNSS receiver | u-blox or NMEA on USART2, outside: TX on PD5, RX on PD6 |
 
 use crate::sensors::{Aids, Imus};
 use afbc_drivers::dps310::Dps310;
 use afbc_drivers::icm426xx::{Icm42605, Icm42688p};
 use afbc_drivers::qmc5883l::Qmc5883l;
 use afbc_drivers::{Driver, I2cRegisters, SensorPart, SpiRegisters};
+use chip_stm32::battery::BatteryConverter;
 use chip_stm32::link::{self, Receiver, Transmitter};
 use chip_stm32::motors::{CHANNELS, Motors, Throttles, hold_low, pin};
 use chip_stm32::sensors::{Device, Polled};
@@ -28,6 +30,7 @@ use chip_stm32::{crystal, faults, usb, watchdog};
 use chip_stm32h7::flash::Words;
 use chip_stm32h7::{boot_loader, clocks, reset};
 use embassy_executor::SendSpawner;
+use embassy_stm32::adc::Adc;
 use embassy_stm32::i2c::{self, I2c};
 use embassy_stm32::interrupt::{self, Interrupt, InterruptExt, Priority};
 use embassy_stm32::peripherals::{
@@ -143,6 +146,7 @@ impl Board for Stm32h743 {
         let aids = Aids {
             compass: Driver::new(Qmc5883l, I2cRegisters::new(outside, 0x0D), Polled),
             barometer: Driver::new(Dps310::default(), I2cRegisters::new(inside, 0x76), Polled),
+            battery: BatteryConverter::new(Adc::new(p.ADC1), p.PC0, p.PC1),
             receiver: receiver.expect("the baud rate divides the clock"),
         };
         for line in IMU_INTERRUPTS {

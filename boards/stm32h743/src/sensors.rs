@@ -2,15 +2,19 @@
 //! and the compass's, are turned to the body's (x forward, y left, z up) here.
 
 use afbc_drivers::alignment::{CW0_FLIP, CW90_FLIP, turned};
+use afbc_drivers::battery::BatteryScale;
 use afbc_drivers::dps310::Dps310;
 use afbc_drivers::icm426xx::{Icm42605, Icm42688p};
 use afbc_drivers::qmc5883l::Qmc5883l;
 use afbc_drivers::{Driver, I2cRegisters, SpiRegisters};
+use chip_stm32::battery::{self, BatteryConverter};
 use chip_stm32::receiver;
 use chip_stm32::sensors::{COMPASS, Device, Polled, run};
-use embassy_futures::join::{join, join3};
+use embassy_futures::join::{join, join4};
+use embassy_stm32::adc::SampleTime;
 use embassy_stm32::i2c::{I2c, Master};
 use embassy_stm32::mode::Async;
+use embassy_stm32::peripherals::ADC1;
 use embassy_stm32::usart::BufferedUart;
 use firmware::samples::Sampler;
 use firmware::{aux_sensors, samples};
@@ -34,18 +38,30 @@ impl Sampler for Imus {
     }
 }
 
+/// What a volt at the battery's pins means, by the board's divider and amplifier.
+const BATTERY: BatteryScale = BatteryScale { volts_per_volt: 11.0, amperes_per_volt: 40.0 };
+/// Largest number of the converter, at its reset of 16 bits.
+const ADC_END: u16 = u16::MAX;
+
 /// The slow sensors.
 pub(crate) struct Aids {
     pub(crate) compass: Driver<Qmc5883l, I2cRegisters<Bus>, Polled>,
     pub(crate) barometer: Driver<Dps310, I2cRegisters<Bus>, Polled>,
+    pub(crate) battery: BatteryConverter<ADC1>,
     pub(crate) receiver: BufferedUart<'static>,
 }
 
 impl Sampler for Aids {
     async fn run(self) {
-        join3(
+        join4(
             run(self.compass, |reading| aux_sensors::put_field(&reading, &COMPASS)),
             run(self.barometer, |reading| aux_sensors::put_pressure(&reading)),
+            battery::run(
+                self.battery,
+                ADC_END,
+                |adc, pin| adc.blocking_read(pin, SampleTime::CYCLES387_5),
+                |at_us, pins| aux_sensors::put_battery(at_us, pins, BATTERY),
+            ),
             receiver::run(self.receiver, aux_sensors::put_fix),
         )
         .await;

@@ -1,42 +1,52 @@
 //! A GNSS receiver on a UART.
 
 use afbc_drivers::FixReading;
-use afbc_drivers::nmea::{BAUDS, LATENCY_US, NmeaDecoder};
+use afbc_drivers::ublox::{ReceiverAction, UbxReceiver};
 use embassy_futures::select::{Either, select};
 use embassy_stm32::usart::BufferedUart;
-use embassy_time::{Duration, Instant, Timer};
-use embedded_io_async::Read;
+use embassy_time::{Duration, Instant, Timer, with_timeout};
+use embedded_io_async::{Read, Write};
 
-/// Time without a fix after which another baud rate is tried: two epochs of a slow receiver \[s\].
-const SILENT_S: u64 = 3;
-/// Pause between two epochs, at least \[us\].
-const PAUSE_US: u64 = 20_000;
+/// Time between two looks at what is to be done, at most, and for a command to leave, of which the longest takes 46 ms
+/// at 9,600 baud \[ms\].
+const LOOK_MS: u64 = 50;
+const SEND_MS: u64 = 100;
+/// Bits of a byte on the line.
+const BYTE_BITS: u64 = 10;
 
-/// Receives fixes for ever, at whichever baud rate the receiver has, and passes each on with its time \[us\], which is
-/// some time before its first byte; none for an epoch without a fix.
+/// Receives fixes for ever, at whichever baud rate the receiver has, and passes each on with the time at which it was
+/// true \[us\]; none for an epoch without a fix.
 pub async fn run(mut uart: BufferedUart<'static>, mut take: impl FnMut(u64, Option<FixReading>)) {
-    let mut decoder = NmeaDecoder::new();
-    let mut bytes = [0; 64];
-    let (mut began_us, mut last_us) = (0, 0);
-    for baud in BAUDS.into_iter().cycle() {
-        // One that does not divide the clock is tried like the others, in vain.
-        let _ = uart.set_baudrate(baud);
-        let mut heard = Instant::now();
-        while heard.elapsed() < Duration::from_secs(SILENT_S) {
-            let length = match select(uart.read(&mut bytes), Timer::after(Duration::from_secs(1))).await {
-                Either::First(Ok(length)) => length,
-                _ => continue,
-            };
-            let now_us = Instant::now().as_micros();
-            if now_us.saturating_sub(last_us) > PAUSE_US {
-                began_us = now_us;
-            }
-            last_us = now_us;
-            for byte in bytes.iter().take(length) {
-                if let Some(fix) = decoder.take(*byte) {
-                    heard = Instant::now();
-                    take(began_us.saturating_sub(LATENCY_US.into()), fix);
+    let mut receiver = UbxReceiver::new();
+    // Half of the UART's ring, at which it wakes this task too.
+    let mut bytes = [0; 512];
+    let mut byte_us = 0;
+    loop {
+        while let Some(action) = receiver.poll(Instant::now().as_micros()) {
+            match action {
+                ReceiverAction::Baud(baud) => {
+                    // One that does not divide the clock is tried like the others, in vain.
+                    let _ = uart.set_baudrate(baud);
+                    byte_us = BYTE_BITS * 1_000_000 / u64::from(baud.max(1));
                 }
+                ReceiverAction::Send(command) => {
+                    let send = async {
+                        uart.write_all(command.as_bytes()).await?;
+                        uart.flush().await
+                    };
+                    // One that does not leave is not answered, and sent again.
+                    let _ = with_timeout(Duration::from_millis(SEND_MS), send).await;
+                }
+            }
+        }
+        let Either::First(Ok(length)) = select(uart.read(&mut bytes), Timer::after_millis(LOOK_MS)).await else {
+            continue;
+        };
+        // The UART wakes this task when the line has been idle for a byte.
+        let first_us = Instant::now().as_micros().saturating_sub(byte_us * (length as u64 + 1));
+        for (at, byte) in (0..).zip(bytes.iter().take(length)) {
+            if let Some(fix) = receiver.take(first_us + at * byte_us, *byte) {
+                take(fix.at_us, fix.value);
             }
         }
     }

@@ -12,7 +12,7 @@ use embassy_stm32::pac::{CRS, RCC};
 use embassy_stm32::rcc::mux::Usbsel;
 use embassy_stm32::rcc::{
     AHBPrescaler, APBPrescaler, Hse, HseMode, Hsi48Config, Pll, PllDiv, PllMul, PllPreDiv, PllSource, Sysclk,
-    VoltageScale,
+    VoltageScale, mux,
 };
 use embassy_stm32::time::Hertz;
 use embassy_stm32::{Config, Peripherals};
@@ -67,6 +67,8 @@ fn config<const CRYSTAL_HZ: u32>(crystal: bool) -> Config {
     rcc.apb2_pre = APBPrescaler::DIV2;
     rcc.apb3_pre = APBPrescaler::DIV2;
     rcc.apb4_pre = APBPrescaler::DIV2;
+    // The converters run on the chip's own oscillator, which no failure of the crystal stops.
+    rcc.mux.adcsel = mux::Adcsel::PER;
     config
 }
 

@@ -22,12 +22,14 @@
 //! | IMU and magnetometer | [`ak8963`] |
 //! | barometer | [`bmp280`], [`bmp3`], [`dps310`], [`ms5611`] |
 //! | magnetometer | [`ist8310`], [`lis3mdl`], [`qmc5883l`] |
-//! | GNSS receiver | [`nmea`] |
+//! | GNSS receiver | [`ublox`], [`nmea`] |
+//! | battery | [`battery`] |
 #![no_std]
 #![forbid(unsafe_code)]
 
 pub mod ak8963;
 pub mod alignment;
+pub mod battery;
 pub mod bmi270;
 pub mod bmp280;
 pub mod bmp3;
@@ -43,6 +45,7 @@ pub mod nmea;
 mod part;
 pub mod qmc5883l;
 mod reading;
+pub mod ublox;
 
 pub use bus::{BusError, I2cRegisters, READ_MAX, Registers, SpiFormat, SpiRegisters};
 pub use driver::{Driver, FAULTS_MAX, PAUSE_US, PartTiming};

@@ -18,8 +18,6 @@ const VERTICAL: f32 = 1.5;
 /// Standard deviation of the velocity to the north, and to the east \[m/s\]: what PX4 takes for receivers that do not
 /// say (`EKF2_GPS_V_NOISE`).
 const SPEED_SIGMA_M_S: f32 = 0.3;
-/// Time from a fix to the first byte of its sentences \[us\]: that of u-blox's M10 as PX4 and ArduPilot take it.
-pub const LATENCY_US: u32 = 120_000;
 /// Standard deviation of the vertical speed \[m/s\]: white noise of 1 m in the altitudes of a receiver with 10 fixes a
 /// second leaves 0.9 m/s, and the mean lags 1 m/s behind a vehicle that climbs faster by 1 m/s2.
 const CLIMB_SIGMA_M_S: f32 = 1.5;
@@ -28,8 +26,6 @@ pub const CLIMB_S: f32 = 1.0;
 const PAUSE_S: f32 = 2.0;
 /// Seconds of a day.
 const DAY_S: f32 = 86_400.0;
-/// Baud rates of receivers as they are delivered, the most common first.
-pub const BAUDS: [u32; 5] = [38_400, 9_600, 115_200, 57_600, 230_400];
 
 /// Makes fixes of the bytes of a receiver.
 pub struct NmeaDecoder {
@@ -39,6 +35,7 @@ pub struct NmeaDecoder {
     motion: Option<RMC>,
     /// Time of day \[s\], altitude \[m\] and vertical speed \[m/s\] of the last fix.
     last: Option<[f32; 3]>,
+    good_sentences: u32,
     bad_sentences: u32,
 }
 
@@ -52,7 +49,18 @@ impl NmeaDecoder {
     /// One that has read nothing.
     #[must_use]
     pub fn new() -> Self {
-        NmeaDecoder { parser: Parser::new(), fix: None, motion: None, last: None, bad_sentences: 0 }
+        NmeaDecoder { parser: Parser::new(), fix: None, motion: None, last: None, good_sentences: 0, bad_sentences: 0 }
+    }
+
+    /// Begins a sentence anew, after bytes of another protocol.
+    pub fn begin(&mut self) {
+        self.parser = Parser::new();
+    }
+
+    /// Number of sentences that were whole, and of a known kind.
+    #[must_use]
+    pub fn good_sentences(&self) -> u32 {
+        self.good_sentences
     }
 
     /// Number of sentences that were damaged: a bad line, or the wrong baud rate.
@@ -63,7 +71,9 @@ impl NmeaDecoder {
 
     /// Takes a byte, and returns the fix that it completes: `Some(None)` for an epoch without a fix.
     pub fn take(&mut self, byte: u8) -> Option<Option<FixReading>> {
-        match self.parser.parse_from_byte(byte)? {
+        let parsed = self.parser.parse_from_byte(byte)?;
+        self.good_sentences = self.good_sentences.saturating_add(parsed.is_ok().into());
+        match parsed {
             Ok(ParseResult::GGA(fix)) => match fix.filter(|fix| fix.gps_quality != GPSQuality::NoFix) {
                 Some(fix) => self.fix = Some(fix),
                 None => {

@@ -43,6 +43,12 @@ parameters! {
         /// What follows from a failed sensor.
         #[choice(COM_SENS_ACT)]
         pub sensors_action: SensorsAction = SensorsAction::Warn,
+        /// Volts of the battery per volt at the board's pin; 0 and below for the board's own divider.
+        #[parameter(BAT1_V_DIV, "1", -1.0..=1000.0)]
+        pub divider: f32 = -1.0,
+        /// Amperes of the battery per volt at the board's pin; 0 and below for the board's own amplifier.
+        #[parameter(BAT1_A_PER_V, "A/V", -1.0..=10000.0)]
+        pub current_a_v: f32 = -1.0,
         /// Number of the battery's cells; 0 if it is not to be watched.
         #[parameter(BAT1_N_CELLS, "number", 0.0..=24.0)]
         pub cells: u32 = 0,

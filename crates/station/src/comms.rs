@@ -150,12 +150,17 @@ impl Comms {
             other => dispatcher.hear(from, other, &mut update),
         });
         dispatcher.hand_over(&mut update);
-        update.battery = dispatcher.status.aux.battery.map(|battery| BatteryReading {
+        update.battery = self.battery();
+        update
+    }
+
+    /// Returns what is known of the battery, for the control tick.
+    pub fn battery(&self) -> Option<BatteryReading> {
+        self.dispatcher.status.aux.battery.map(|battery| BatteryReading {
             voltage_v: f32::from(battery.voltage_mv) * 1e-3,
             // Negative: not measured.
             current_a: f32::from(battery.current_ca.max(0)) * 1e-2,
-        });
-        update
+        })
     }
 
     /// Exchanges the decoder. Where there are several streams of bytes, each has one of its own, which is put in before

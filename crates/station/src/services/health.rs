@@ -1,9 +1,9 @@
 //! The vehicle's health as stations read it.
 
-use crate::services::status::VehicleStatus;
+use crate::services::status::{AuxSensors, VehicleStatus};
 use afbc_flight_core::{Mode, Reasons};
 use afbc_guidance::FlightMode;
-use afbc_link::telemetry::{EstimatorStatus, SystemStatus};
+use afbc_link::telemetry::{BatteryStatus, EstimatorStatus, SystemStatus};
 
 /// `MAV_SYS_STATUS_SENSOR`.
 pub mod sensor {
@@ -25,6 +25,22 @@ const ON_GROUND: u8 = 1;
 const IN_AIR: u8 = 2;
 const TAKING_OFF: u8 = 3;
 const LANDING: u8 = 4;
+
+impl AuxSensors {
+    /// Puts what a battery's converter has read: voltage \[V\] and current \[A\], if that is measured; none for a
+    /// converter that reads no battery.
+    pub fn put_battery(&mut self, reading: Option<(f32, Option<f32>)>) {
+        self.sensors.present |= sensor::BATTERY;
+        self.battery = reading.map(|(voltage_v, current_a)| BatteryStatus {
+            // The two largest numbers mean other things.
+            voltage_mv: (voltage_v * 1e3).min(65_533.0) as u16,
+            current_ca: current_a.map_or(-1, |current_a| (current_a * 1e2) as i16),
+            consumed_mah: -1,
+            remaining_percent: -1,
+            charge: 0,
+        });
+    }
+}
 
 /// Returns SYS_STATUS.
 pub fn system(status: &VehicleStatus) -> SystemStatus {
@@ -132,6 +148,26 @@ mod tests {
         }
     }
 
+    /// A converter's readings become SYS_STATUS; one that reads no battery is a sensor that is there and not well.
+    #[test]
+    fn a_battery_is_told() {
+        for (reading, told, healthy) in [
+            (Some((14.8, Some(12.5))), (14_800, 1250, -1), sensor::BATTERY),
+            (Some((14.8, None)), (14_800, -1, -1), sensor::BATTERY),
+            (Some((99.0, Some(400.0))), (65_533, i16::MAX, -1), sensor::BATTERY),
+            (None, (u16::MAX, -1, -1), 0),
+        ] {
+            let mut status = well();
+            status.aux.put_battery(reading);
+            let reported = system(&status);
+            assert_eq!((reported.voltage_mv, reported.current_ca, reported.remaining_percent), told);
+            assert_eq!(
+                (reported.present & sensor::BATTERY, reported.healthy & sensor::BATTERY),
+                (sensor::BATTERY, healthy)
+            );
+        }
+    }
+
     #[test]
     fn the_landed_state_follows_modes() {
         let mut status = well();
@@ -158,7 +194,7 @@ mod tests {
             }
             status.aux.receiver =
                 has(2).then_some(GnssReceiver { kind: if has(3) { 3 } else { 2 }, satellites: 9, sigma_mm: [0; 2] });
-            let battery = afbc_link::telemetry::BatteryStatus {
+            let battery = BatteryStatus {
                 voltage_mv: 11_100,
                 current_ca: 250,
                 remaining_percent: 66,

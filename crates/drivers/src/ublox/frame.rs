@@ -1,0 +1,159 @@
+//! Frames: two bytes that begin it, class, number, length of the payload, payload, and Fletcher's checksum of all
+//! between.
+
+/// Longest payload that is taken: a version with ten extensions. A longer one, which no configured receiver sends, is
+/// noise, so that a damaged length holds up what follows for a third of a second at most.
+pub(super) const PAYLOAD_MAX: usize = 340;
+const BEGIN: [u8; 2] = [0xB5, 0x62];
+/// Bytes around a payload.
+const AROUND: usize = 8;
+/// Pause within a frame after which its rest is not waited for \[us\].
+const PAUSE_US: u64 = 200_000;
+
+/// Class and number of a message.
+pub(super) type MessageId = [u8; 2];
+
+/// A frame to be sent.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct UbxCommand {
+    bytes: [u8; UbxCommand::PAYLOAD_MAX + AROUND],
+    length: usize,
+}
+
+impl UbxCommand {
+    /// Longest payload.
+    const PAYLOAD_MAX: usize = 36;
+
+    /// One with this payload, of 36 bytes at most.
+    pub(super) fn new(id: MessageId, payload: &[u8]) -> Self {
+        let length = payload.len().min(Self::PAYLOAD_MAX) as u16;
+        let summed = id.into_iter().chain(length.to_le_bytes()).chain(payload.iter().copied().take(length.into()));
+        let sum = checksum(summed.clone());
+        let mut command = UbxCommand { bytes: [0; Self::PAYLOAD_MAX + AROUND], length: usize::from(length) + AROUND };
+        command.bytes.iter_mut().zip(BEGIN.into_iter().chain(summed).chain(sum)).for_each(|(to, from)| *to = from);
+        command
+    }
+
+    /// Returns its bytes.
+    #[must_use]
+    pub fn as_bytes(&self) -> &[u8] {
+        self.bytes.get(..self.length).unwrap_or_default()
+    }
+
+    /// Returns class and number.
+    pub(super) fn id(&self) -> MessageId {
+        let [_, _, class, number, ..] = self.bytes;
+        [class, number]
+    }
+}
+
+/// Returns Fletcher's checksum of 8 bits (RFC 1145).
+fn checksum(bytes: impl Iterator<Item = u8>) -> [u8; 2] {
+    bytes.fold([0, 0], |[a, b]: [u8; 2], byte| {
+        let a = a.wrapping_add(byte);
+        [a, b.wrapping_add(a)]
+    })
+}
+
+/// What the bytes at hand begin with.
+enum Front<T> {
+    /// Part of a frame.
+    Part,
+    /// So many bytes of noise.
+    Noise(usize),
+    /// A frame with a wrong checksum.
+    Damaged,
+    /// A frame of so many bytes.
+    Whole(usize, T),
+}
+
+/// Finds frames among bytes.
+pub(super) struct FrameDecoder {
+    bytes: [u8; PAYLOAD_MAX + AROUND],
+    length: usize,
+    /// Times of the first and of the newest of them \[us\].
+    first_us: u64,
+    newest_us: u64,
+    damaged: u32,
+}
+
+impl FrameDecoder {
+    pub(super) const NEW: Self =
+        FrameDecoder { bytes: [0; PAYLOAD_MAX + AROUND], length: 0, first_us: 0, newest_us: 0, damaged: 0 };
+
+    /// Number of frames with a wrong checksum.
+    pub(super) fn damaged(&self) -> u32 {
+        self.damaged
+    }
+
+    /// Appends a byte.
+    pub(super) fn push(&mut self, at_us: u64, byte: u8) {
+        if at_us.saturating_sub(self.newest_us) > PAUSE_US {
+            self.length = 0;
+        }
+        if self.length == 0 {
+            self.first_us = at_us;
+        }
+        self.newest_us = at_us;
+        if let Some(place) = self.bytes.get_mut(self.length) {
+            *place = byte;
+            self.length += 1;
+        }
+    }
+
+    /// Returns what `read` makes of the next whole frame, with the time of its first byte, where a byte takes
+    /// `byte_us`. To be called after each byte until there is none.
+    pub(super) fn next<T>(&mut self, byte_us: u64, read: impl Fn(MessageId, &[u8]) -> T) -> Option<(u64, T)> {
+        loop {
+            match front(self.bytes.get(..self.length)?, &read) {
+                Front::Part => return None,
+                Front::Noise(count) => self.remove(count, byte_us),
+                Front::Damaged => {
+                    self.damaged = self.damaged.saturating_add(1);
+                    // Another frame may begin within it.
+                    self.remove(BEGIN.len(), byte_us);
+                }
+                Front::Whole(length, message) => {
+                    let first_us = self.first_us;
+                    self.remove(length, byte_us);
+                    return Some((first_us, message));
+                }
+            }
+        }
+    }
+
+    fn remove(&mut self, count: usize, byte_us: u64) {
+        if let Some(held) = self.bytes.get_mut(..self.length) {
+            let count = count.min(held.len());
+            held.rotate_left(count);
+            self.length -= count;
+        }
+        self.first_us = self.newest_us.saturating_sub(byte_us * self.length.saturating_sub(1) as u64);
+    }
+}
+
+fn front<T>(held: &[u8], read: impl Fn(MessageId, &[u8]) -> T) -> Front<T> {
+    let [begin, _] = BEGIN;
+    match held {
+        [] => Front::Part,
+        [a] if *a == begin => Front::Part,
+        [a, b, rest @ ..] if [*a, *b] == BEGIN => {
+            let [class, number, low, high, rest @ ..] = rest else { return Front::Part };
+            let length = usize::from(u16::from_le_bytes([*low, *high]));
+            if length > PAYLOAD_MAX {
+                return Front::Noise(BEGIN.len());
+            }
+            let Some((payload, [a, b, ..])) = rest.split_at_checked(length) else { return Front::Part };
+            let summed = [*class, *number, *low, *high].into_iter().chain(payload.iter().copied());
+            if checksum(summed) == [*a, *b] {
+                Front::Whole(length + AROUND, read([*class, *number], payload))
+            } else {
+                Front::Damaged
+            }
+        }
+        [_, rest @ ..] => {
+            let next = rest.iter().position(|byte| *byte == begin).unwrap_or(rest.len());
+            Front::Noise(1 + next)
+        }
+    }
+}

@@ -1,0 +1,126 @@
+//! A u-blox receiver at the board's UART, new from its maker: what the board's own model of one has no part in, its
+//! configuration and its baud rate.
+
+#[allow(dead_code, reason = "shared with the drivers' tests, which use all of it")]
+#[path = "../../crates/drivers/tests/ublox_model/mod.rs"]
+mod ublox_model;
+
+use afbc_estimator::Measurement;
+use afbc_onboard::Readings;
+use rigless::chip::Timeline;
+use rigless::chip::nmea;
+use rigless::chip::uart::Peer;
+use rigless::edge::Edge;
+use rigless::emulator::{AccessKind, Settled};
+use rigless::machine::flight::Signals;
+use rigless::machine::matekh743::MatekH743;
+use rigless::snapshot::Store;
+use rigless::time::VirtualNanos;
+use std::sync::{Arc, Mutex};
+pub(crate) use ublox_model::Generation;
+use ublox_model::{Model, Truth};
+
+/// USART2 among the board's, its divider (RM0433, 48.8.5) and its clock [Hz].
+const USART2: usize = 1;
+const USART2_BRR: u64 = 0x4000_440C;
+const CLOCK_HZ: u64 = 100_000_000;
+/// What a period may be shorter than configured, for the instruments' jitter [us].
+const JITTER_US: u64 = 50_000;
+
+#[derive(Debug)]
+struct Line {
+    model: Model,
+    /// Baud rate of the board's UART.
+    baud: u64,
+    sent_us: u64,
+}
+
+impl Line {
+    /// Returns a byte as it arrives at the other end.
+    fn carry(&self, byte: u8) -> u8 {
+        // Baud rates within 2 % understand each other.
+        let is_good = self.baud.abs_diff(self.model.baud.into()) * 50 <= self.baud;
+        if is_good { byte } else { byte.rotate_left(3) ^ 0x5A }
+    }
+}
+
+/// A receiver. Clones are the same one.
+#[derive(Clone, Debug)]
+pub struct UbloxPeer(Arc<Mutex<Line>>);
+
+impl UbloxPeer {
+    pub fn new(generation: Generation) -> Self {
+        UbloxPeer(Arc::new(Mutex::new(Line { model: Model::new(generation), baud: 0, sent_us: 0 })))
+    }
+
+    fn with<T>(&self, change: impl FnOnce(&mut Line) -> T) -> T {
+        change(&mut self.0.lock().unwrap_or_else(std::sync::PoisonError::into_inner))
+    }
+
+    /// Sees what the image does to the UART's divider.
+    pub fn watch(&self, settled: &Settled) {
+        if let Settled::Access { access, value } = settled
+            && (access.kind, access.address) == (AccessKind::Write, USART2_BRR)
+        {
+            self.with(|line| line.baud = CLOCK_HZ / (*value).max(1));
+        }
+    }
+
+    /// Lets the board feel what its transducers do, this receiver with it: a fix of the instruments, which has its
+    /// delay, is sent when it arrives.
+    pub fn sense(&self, board: &mut MatekH743, at: VirtualNanos, (readings, signals): (&Readings, &Signals)) {
+        let now_us = at.0 / 1000;
+        self.with(|line| {
+            let period_us = line.model.period_us.saturating_sub(JITTER_US);
+            for aid in readings.aids.iter().flatten() {
+                let Measurement::Gnss { horizontal_sigma_m, vertical_sigma_m, speed_sigma_m_s, .. } = aid.value else {
+                    continue;
+                };
+                if now_us - line.sent_us < period_us {
+                    continue;
+                }
+                line.sent_us = now_us;
+                let position = signals.position;
+                let sigmas = [horizontal_sigma_m, vertical_sigma_m, speed_sigma_m_s];
+                let truth = Truth {
+                    place: [position.latitude, position.longitude],
+                    altitude_mm: position.altitude,
+                    velocity_mm_s: signals.velocity,
+                    accuracies: sigmas.map(|sigma| (sigma * 1e3).round().max(1.0) as u32),
+                    ..Truth::ZURICH
+                };
+                line.model.report(now_us.saturating_sub(aid.age_us.into()), &truth);
+            }
+        });
+        // The board gives what a receiver feels to one of its own kind.
+        board.mcu.usart[USART2].attach(nmea::Receiver::new());
+        board.sense(signals);
+        board.mcu.usart[USART2].attach(self.clone());
+    }
+
+    /// Says how it is configured.
+    pub fn told(&self) -> String {
+        self.with(|line| {
+            let Model { baud, period_us, solves, nmea, dynamic_model, .. } = &line.model;
+            format!(
+                "u-blox: {baud} baud, {} ms, NAV-PVT {solves}, NMEA {nmea}, dynamic model {dynamic_model}",
+                period_us / 1000
+            )
+        })
+    }
+}
+
+impl Store for UbloxPeer {}
+
+impl Peer for UbloxPeer {
+    fn receive(&mut self, word: u16, _: &mut Timeline<'_, '_>) {
+        self.with(|line| {
+            let byte = line.carry(word as u8);
+            line.model.hear(byte);
+        });
+    }
+
+    fn transmit(&mut self, _: VirtualNanos) -> Option<u16> {
+        self.with(|line| line.model.says.pop_front().map(|byte| line.carry(byte))).map(u16::from)
+    }
+}
