@@ -4,6 +4,7 @@
 use crate::check::check;
 use crate::pilot::Pilot;
 use crate::pins::{BIT_NS, BITS, Frames};
+use crate::same;
 use crate::ublox::{Generation, UbloxPeer};
 use crate::wire::Telemetry;
 use afbc_scenario::load;
@@ -24,6 +25,8 @@ const DMA_S0CR: u64 = 0x4002_0010;
 const FIRST: usize = 2;
 /// The wire of the first link, UART7.
 const LINK: &str = "serial1";
+/// The second link, USART1, among the chip's.
+const SECOND_LINK: usize = 0;
 /// Time between two looks for the first bit of a frame, and for how long [ns].
 const LOOK_NS: u64 = 200;
 const LOOKS: u32 = 100;
@@ -48,15 +51,18 @@ struct Flight {
     motors: usize,
 }
 
-/// Flies a scenario, with a receiver of u-blox's if one is given.
-pub fn fly(image: &Path, file: &Path, receiver: Option<Generation>) -> Result<(), Box<dyn Error>> {
+/// Flies a scenario, with a receiver of u-blox's if one is given. The exact log, if it is to be kept in a file, must be
+/// flown again with the same result to the last bit.
+pub fn fly(image: &Path, file: &Path, receiver: Option<Generation>, log: Option<&Path>) -> Result<(), Box<dyn Error>> {
     let scenario = load(file)?;
     let mut board = Box::new(MatekH743::new()?);
     let wire = Telemetry::default();
     check(rigless::machine::Board::attach_host(&mut *board, LINK, Box::new(wire.clone())), "the link is wired")?;
+    let recorded = Telemetry::default();
+    board.mcu.usart[SECOND_LINK].attach_boxed(Box::new(recorded.clone()));
     let motors = scenario.rotors.len();
     let flight = Flight {
-        pilot: Pilot::new(&scenario, wire)?,
+        pilot: Pilot::new(&scenario, wire, log.is_some())?,
         receiver: receiver.map(UbloxPeer::new),
         frames: Frames::new(motors),
         sampling: Sampling::Idle,
@@ -75,10 +81,16 @@ pub fn fly(image: &Path, file: &Path, receiver: Option<Generation>) -> Result<()
     if let Some(receiver) = receiver {
         println!("{}", receiver.told());
     }
-    pilot.verdict()?;
+    let verdict = pilot.verdict();
+    if let Some(log) = log {
+        let bytes = recorded.take();
+        std::fs::write(log, &bytes)?;
+        same::check_log(&bytes)?;
+    }
+    verdict?;
     check(frames.wrong.is_empty(), &format!("DSHOT600: {:?}", frames.wrong))?;
     check(unmapped + refused == 0, &format!("{unmapped} unmapped and {refused} refused accesses"))?;
-    check(finished.session.resets().is_empty(), "no reset")
+    check(finished.session.resets().len() == usize::from(log.is_some()), "no reset but that for the log")
 }
 
 fn has_pulse(pin: &Actuator) -> bool {

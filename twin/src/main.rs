@@ -9,6 +9,7 @@ mod fly;
 mod host;
 mod pilot;
 mod pins;
+mod same;
 mod ublox;
 mod wire;
 mod world;
@@ -18,8 +19,9 @@ use std::process::ExitCode;
 use ublox::Generation;
 
 const USAGE: &str = "twin boot IMAGE: boots it, and looks at bus and pins
-twin fly IMAGE SCENARIO [m8|m10]: takes off, hovers and lands, in lockstep with the plant, with an NMEA receiver or a
-    new one of u-blox's
+twin fly IMAGE SCENARIO [m8|m10] [LOG]: takes off, hovers and lands, in lockstep with the plant, with an NMEA receiver
+    or a new one of u-blox's; keeps the exact log in a file, and flies it again: the same to the last bit
+twin replay LOG: flies an exact log again
 twin host SCENARIO: the same with the firmware's code on this machine";
 
 fn main() -> ExitCode {
@@ -27,9 +29,18 @@ fn main() -> ExitCode {
     let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
     let result = match *arguments {
         ["boot", image] => boot::boot(Path::new(image)),
-        ["fly", image, scenario] => fly::fly(Path::new(image), Path::new(scenario), None),
-        ["fly", image, scenario, "m8"] => fly::fly(Path::new(image), Path::new(scenario), Some(Generation::Eight)),
-        ["fly", image, scenario, "m10"] => fly::fly(Path::new(image), Path::new(scenario), Some(Generation::Ten)),
+        ["fly", image, scenario, ref options @ ..] if options.len() <= 2 => {
+            let (mut receiver, mut log) = (None, None);
+            for option in options {
+                match *option {
+                    "m8" => receiver = Some(Generation::Eight),
+                    "m10" => receiver = Some(Generation::Ten),
+                    file => log = Some(Path::new(file)),
+                }
+            }
+            fly::fly(Path::new(image), Path::new(scenario), receiver, log)
+        }
+        ["replay", log] => std::fs::read(log).map_err(Into::into).and_then(|bytes| same::check_log(&bytes)),
         ["host", scenario] => host::fly(Path::new(scenario)),
         _ => Err(USAGE.into()),
     };

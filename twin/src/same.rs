@@ -1,0 +1,26 @@
+//! The same bits: the flight again on this machine, from the exact log that the board has kept.
+
+use crate::check::check;
+use afbc_onboard::Configuration;
+use afbc_recorder::{Frames, Replayed, Replayer};
+use std::error::Error;
+
+/// Flies a log of the image's default vehicle again, and fails at the first tick that differs.
+pub fn check_log(log: &[u8]) -> Result<(), Box<dyn Error>> {
+    let mut replayer = Replayer::new(Configuration::<4>::default())?;
+    let mut frames = Frames::default();
+    let (mut ticks, mut flown) = (0_u32, 0_u32);
+    for record in log.iter().filter_map(|byte| frames.take(*byte)) {
+        match replayer.take(&record) {
+            Replayed::Nothing => {}
+            Replayed::Same(report) => {
+                ticks += 1;
+                flown += u32::from(report.mode.armed());
+            }
+            Replayed::Differs(difference, _) => return Err(format!("after {ticks} ticks: {difference:?}").into()),
+        }
+    }
+    println!("{ticks} ticks, {flown} of them armed, the same again to the last bit");
+    check(frames.damaged() == 0, &format!("{} damaged frames of the log", frames.damaged()))?;
+    check(ticks > 1_000, "a log")
+}
