@@ -261,10 +261,10 @@ fn prioritised(code: &str) -> BTreeMap<String, String> {
     }
     for one in code.split(" interrupt::").skip(1).filter(|one| one.contains(".set_priority(Priority::from(priority::"))
     {
-        if let Some((line, rest)) = one.split_once(".set_priority(Priority::from(priority::") {
-            if !line.contains(char::is_whitespace) {
-                add(line, rest);
-            }
+        if let Some((line, rest)) = one.split_once(".set_priority(Priority::from(priority::")
+            && !line.contains(char::is_whitespace)
+        {
+            add(line, rest);
         }
     }
     for list in code.split("for line in ").skip(1) {

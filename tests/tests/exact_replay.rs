@@ -1,10 +1,16 @@
 //! A flight is flown again from its exact log, to the last bit, and what differs is named.
-#![allow(clippy::unwrap_used, clippy::panic, missing_docs, reason = "a test that cannot go on should say why")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    clippy::indexing_slicing,
+    missing_docs,
+    reason = "a test that cannot go on should say why"
+)]
 
 use afbc_hil::Host;
 use afbc_link::{Address, Command, Datum, FRAME_MAX, Height, ParameterRequest, Sender, Uplink};
 use afbc_onboard::Configuration;
-use afbc_recorder::{Difference, FRAME_MAX as RECORD_MAX, Frames, Record, Replayed, Replayer, write};
+use afbc_recorder::{FRAME_MAX as RECORD_MAX, Frames, Record, ReplayDifference, ReplayStep, Replayer, write};
 use afbc_scenario::{Scenario, load};
 use afbc_sim::flight::World;
 use afbc_types::{ROTORS_MAX, RotorSpeeds, State};
@@ -25,7 +31,7 @@ fn sends(ms: u64, random: &mut Xoshiro256PlusPlus) -> Option<Uplink> {
         6_000 | 7_000 | 8_000 | 9_000 => return command(Command::Arm),
         6_300 | 7_300 | 8_300 | 9_300 => return command(Command::TakeOff(Height { metres: 4.0, above: Datum::Home })),
         18_000 => return command(Command::Land),
-        _ if ms % 1_000 == 0 => return Some(Uplink::Heartbeat),
+        _ if ms.is_multiple_of(1_000) => return Some(Uplink::Heartbeat),
         _ => {}
     }
     match random.next_u32() % 300 {
@@ -73,14 +79,14 @@ fn fly(scenario: &Scenario, seed: u64, ticks: u64) -> Vec<u8> {
 }
 
 /// Flies again; returns the number of ticks and the first difference.
-fn replay(log: &[u8]) -> (u32, Option<Difference>) {
+fn replay(log: &[u8]) -> (u32, Option<ReplayDifference>) {
     let (mut replayer, mut frames) = (Replayer::new(Configuration::<4>::default()).unwrap(), Frames::default());
     let (mut ticks, mut armed) = (0, false);
     for record in log.iter().filter_map(|byte| frames.take(*byte)) {
         match replayer.take(&record) {
-            Replayed::Nothing => {}
-            Replayed::Same(report) => (ticks, armed) = (ticks + 1, armed || report.mode.armed()),
-            Replayed::Differs(difference, _) => return (ticks, Some(difference)),
+            ReplayStep::Nothing => {}
+            ReplayStep::Same(report) => (ticks, armed) = (ticks + 1, armed || report.mode.armed()),
+            ReplayStep::Differs(difference, _) => return (ticks, Some(difference)),
         }
     }
     assert!(armed || ticks < 10_000, "it flew");
@@ -132,18 +138,19 @@ fn what_differs_is_named() {
                 rates.x = f32::from_bits(rates.x.to_bits() ^ 1 << (random.next_u32() % 22 + 1));
                 let (ticks, difference) = replay(&log_of(&changed));
                 assert!((number..number + 3).contains(&ticks), "{ticks}: {difference:?}");
-                assert!(matches!(difference, Some(Difference::Given { .. })), "{difference:?}");
+                assert!(matches!(difference, Some(ReplayDifference::Given { .. })), "{difference:?}");
             }
             1 => {
                 tick.given.throttles[random.next_u32() as usize % 4] ^= 1 << (random.next_u32() % 11);
                 let (ticks, difference) = replay(&log_of(&changed));
                 assert_eq!(ticks, number);
-                let named = matches!(difference, Some(Difference::Given { number: named, .. }) if named == number);
+                let named =
+                    matches!(difference, Some(ReplayDifference::Given { number: named, .. }) if named == number);
                 assert!(named, "{difference:?}");
             }
             _ => {
                 changed.remove(at);
-                assert_eq!(replay(&log_of(&changed)), (number, Some(Difference::Missing(number))));
+                assert_eq!(replay(&log_of(&changed)), (number, Some(ReplayDifference::Missing(number))));
             }
         }
     }

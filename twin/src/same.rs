@@ -2,7 +2,7 @@
 
 use crate::check::check;
 use afbc_onboard::Configuration;
-use afbc_recorder::{Frames, Replayed, Replayer};
+use afbc_recorder::{Frames, ReplayStep, Replayer};
 use std::error::Error;
 
 /// Flies a log of the image's default vehicle again, and fails at the first tick that differs.
@@ -12,12 +12,12 @@ pub fn check_log(log: &[u8]) -> Result<(), Box<dyn Error>> {
     let (mut ticks, mut flown) = (0_u32, 0_u32);
     for record in log.iter().filter_map(|byte| frames.take(*byte)) {
         match replayer.take(&record) {
-            Replayed::Nothing => {}
-            Replayed::Same(report) => {
+            ReplayStep::Nothing => {}
+            ReplayStep::Same(report) => {
                 ticks += 1;
                 flown += u32::from(report.mode.armed());
             }
-            Replayed::Differs(difference, _) => return Err(format!("after {ticks} ticks: {difference:?}").into()),
+            ReplayStep::Differs(difference, _) => return Err(format!("after {ticks} ticks: {difference:?}").into()),
         }
     }
     println!("{ticks} ticks, {flown} of them armed, the same again to the last bit");

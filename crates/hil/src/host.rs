@@ -31,10 +31,13 @@ pub struct Host {
     log: Option<ExactLog>,
 }
 
+/// What takes the bytes of a log.
+type Sink = Box<dyn FnMut(&[u8])>;
+
 /// Makes the exact log, and what takes its bytes.
 struct ExactLog {
     recorder: Recorder,
-    write: Box<dyn FnMut(&[u8])>,
+    write: Sink,
     /// Number of the configuration that the next tick flies, if it is another.
     adopted: Option<u16>,
 }

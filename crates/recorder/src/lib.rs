@@ -7,7 +7,7 @@
 //!
 //! A frame is a [`Record`] in [postcard](https://postcard.jamesmunns.com)'s format, its CRC-32 (ISO-HDLC), both
 //! COBS-encoded, and a zero: a reader finds the next frame whatever was lost. The format is that of one version of this
-//! software ([`Start::version`]).
+//! software ([`StartRecord::version`]).
 #![no_std]
 
 mod frame;
@@ -16,6 +16,6 @@ mod recorder;
 mod replayer;
 
 pub use frame::{FRAME_MAX, Frames, write};
-pub use record::{Given, Record, Start, TickRecord, VERSION};
+pub use record::{Given, Record, StartRecord, TickRecord, VERSION};
 pub use recorder::Recorder;
-pub use replayer::{Difference, Replayed, Replayer};
+pub use replayer::{ReplayDifference, ReplayStep, Replayer};

@@ -16,7 +16,7 @@ const CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 #[allow(clippy::large_enum_variant, reason = "one at a time")]
 pub enum Record {
     /// The processor has started.
-    Start(Start),
+    Start(StartRecord),
     /// A parameter has this value in the configuration of this number, and in those that follow.
     Parameter {
         /// Number of the configuration, 0 for that of the start.
@@ -45,7 +45,7 @@ pub enum Record {
 
 /// What was started.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Start {
+pub struct StartRecord {
     /// [`VERSION`] of the writer.
     pub version: u16,
     /// Motors of the vehicle.

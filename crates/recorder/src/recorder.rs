@@ -1,7 +1,7 @@
 //! The writing side.
 
 use crate::frame::{FRAME_MAX, write};
-use crate::record::{Given, Record, Start, TickRecord, VERSION};
+use crate::record::{Given, Record, StartRecord, TickRecord, VERSION};
 use afbc_onboard::parameters::{ParameterTable, RecordChange};
 use afbc_onboard::{ControlInputs, Readings, Report};
 
@@ -24,7 +24,7 @@ impl Recorder {
     pub fn start<const N: usize>(&mut self, table: &ParameterTable<N>, send: &mut impl FnMut(&[u8])) {
         self.configuration = 0;
         let rotors = u8::try_from(N).unwrap_or(u8::MAX);
-        self.frame(&Record::Start(Start { version: VERSION, rotors, parameters: table.count() }), send);
+        self.frame(&Record::Start(StartRecord { version: VERSION, rotors, parameters: table.count() }), send);
         for parameter in table.iter() {
             let image = table.default_of(parameter.name).map(|parameter| parameter.value.to_bits());
             if image != Some(parameter.value.to_bits()) {

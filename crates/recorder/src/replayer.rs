@@ -1,6 +1,6 @@
 //! The reading side: the flight again.
 
-use crate::record::{Given, Record, Start, TickRecord, VERSION};
+use crate::record::{Given, Record, StartRecord, TickRecord, VERSION};
 use afbc_onboard::parameters::ParameterTable;
 use afbc_onboard::{Configuration, ControlInputs, Flight, Prepared, Report};
 use afbc_types::OutOfRange;
@@ -31,20 +31,20 @@ pub struct Replayer<const N: usize> {
 /// What became of a record.
 #[derive(Clone, Debug, PartialEq)]
 #[allow(clippy::large_enum_variant, reason = "one at a time")]
-pub enum Replayed<const N: usize> {
+pub enum ReplayStep<const N: usize> {
     /// It is no tick, or one before the start.
     Nothing,
     /// The tick gives the same again.
     Same(Report<N>),
     /// It gives something else, or cannot be run.
-    Differs(Difference, Option<Report<N>>),
+    Differs(ReplayDifference, Option<Report<N>>),
 }
 
 /// What differs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Difference {
+pub enum ReplayDifference {
     /// The log is of another version of this software, or of a vehicle with other rotors or parameters.
-    Start(Start),
+    Start(StartRecord),
     /// A parameter has a name, a value, or makes a vehicle that this software does not know.
     Parameter,
     /// The log lacks the ticks from this number on, or the configuration that one of them flew.
@@ -82,11 +82,11 @@ impl<const N: usize> Replayer<N> {
     }
 
     /// Takes the next record of the log; a tick is run again.
-    pub fn take(&mut self, record: &Record) -> Replayed<N> {
+    pub fn take(&mut self, record: &Record) -> ReplayStep<N> {
         match record {
             Record::Start(start) => match self.start(start) {
-                Ok(()) => Replayed::Nothing,
-                Err(difference) => Replayed::Differs(difference, None),
+                Ok(()) => ReplayStep::Nothing,
+                Err(difference) => ReplayStep::Differs(difference, None),
             },
             Record::Parameter { configuration, name, value } => {
                 let known = self.table.put(*name, *value).is_ok();
@@ -101,13 +101,13 @@ impl<const N: usize> Replayer<N> {
                     self.coming.pop_front();
                 }
                 let _ = self.coming.push_back((*tick, inputs.clone()));
-                Replayed::Nothing
+                ReplayStep::Nothing
             }
             Record::Tick(tick) => self.tick(tick),
         }
     }
 
-    fn start(&mut self, start: &Start) -> Result<(), Difference> {
+    fn start(&mut self, start: &StartRecord) -> Result<(), ReplayDifference> {
         self.table = ParameterTable::new(self.image.clone());
         let is_mine =
             start.version == VERSION && usize::from(start.rotors) == N && start.parameters == self.table.count();
@@ -115,33 +115,33 @@ impl<const N: usize> Replayer<N> {
         self.waiting.clear();
         self.coming.clear();
         (self.starts, self.began, self.next) = (true, is_mine, 0);
-        if is_mine { Ok(()) } else { Err(Difference::Start(*start)) }
+        if is_mine { Ok(()) } else { Err(ReplayDifference::Start(*start)) }
     }
 
     /// Notes a configuration; that of the start is flown at once.
-    fn configured(&mut self, number: u16, known: bool) -> Replayed<N> {
+    fn configured(&mut self, number: u16, known: bool) -> ReplayStep<N> {
         if number > 0 {
             if self.waiting.is_full() {
                 self.waiting.pop_front();
             }
             let _ = self.waiting.push_back((number, self.table.configuration().clone()));
         }
-        if known { Replayed::Nothing } else { Replayed::Differs(Difference::Parameter, None) }
+        if known { ReplayStep::Nothing } else { ReplayStep::Differs(ReplayDifference::Parameter, None) }
     }
 
-    fn tick(&mut self, tick: &TickRecord) -> Replayed<N> {
+    fn tick(&mut self, tick: &TickRecord) -> ReplayStep<N> {
         if !self.began {
-            return Replayed::Nothing;
+            return ReplayStep::Nothing;
         }
         if tick.number != self.next {
             self.began = false;
-            return Replayed::Differs(Difference::Missing(self.next), None);
+            return ReplayStep::Differs(ReplayDifference::Missing(self.next), None);
         }
         self.next = self.next.wrapping_add(1);
         if core::mem::take(&mut self.starts) {
             match Flight::new(self.table.configuration()) {
                 Ok(flight) => self.flight = flight,
-                Err(_) => return Replayed::Differs(Difference::Parameter, None),
+                Err(_) => return ReplayStep::Differs(ReplayDifference::Parameter, None),
             }
         }
         while let Some((_, inputs)) = self.coming.front().filter(|(number, _)| *number <= tick.number) {
@@ -155,14 +155,14 @@ impl<const N: usize> Replayer<N> {
         if let Some(number) = tick.adopted
             && !self.adopt(number)
         {
-            return Replayed::Differs(Difference::Missing(tick.number), None);
+            return ReplayStep::Differs(ReplayDifference::Missing(tick.number), None);
         }
         let report = self.flight.tick(tick.time_us, &mut self.taken, &tick.readings);
         let (number, then, now) = (tick.number, tick.given, Given::of(&report));
         if then == now {
-            Replayed::Same(report)
+            ReplayStep::Same(report)
         } else {
-            Replayed::Differs(Difference::Given { number, then, now }, Some(report))
+            ReplayStep::Differs(ReplayDifference::Given { number, then, now }, Some(report))
         }
     }
 

@@ -392,8 +392,8 @@ fn rest_in_the_air_without_thrust_contradicts() {
     assert!(!land.0.contradicts());
 }
 
-/// Ticks after which a vehicle that sinks, and whose rotors then give this share of its weight, has landed by an inertial
-/// estimate whose vertical velocity is off by `bias_m_s`; it accelerates by `acceleration_m_s2` from then on.
+/// Ticks after which a vehicle that sinks, and whose rotors then give this share of its weight, has landed by an
+/// inertial estimate whose vertical velocity is off by `bias_m_s`; it accelerates by `acceleration_m_s2` from then on.
 fn held(is_inertial: bool, share: f32, acceleration_m_s2: Vector3<f32>, bias_m_s: f32) -> Option<u32> {
     let mut land = Land::hovering();
     let mut state = moving(along(2, -0.7 + bias_m_s));
