@@ -4,6 +4,7 @@
 use crate::samples::Sampler;
 use crate::ticks::Tick;
 use crate::vehicle::ROTORS;
+use afbc_flight_core::protocol::MotorProtocol;
 use cortex_m::interrupt::InterruptNumber;
 use embassy_executor::SendSpawner;
 use embedded_storage::nor_flash::NorFlash;
@@ -35,6 +36,9 @@ pub trait Board: Sized + 'static {
     /// Brings up clocks and peripherals; the core runs at [`CORE_HZ`](Self::CORE_HZ) from then on. To be called once. A
     /// board's tasks spawned on `control` run right after the control tick.
     fn start(core: &mut cortex_m::Peripherals, control: SendSpawner) -> Parts<Self>;
+
+    /// Sets how throttles are sent to the motors, before the first are; nothing if there is only one way.
+    fn set_motor_protocol(&mut self, _protocol: MotorProtocol) {}
 
     /// Starts the watchdog, if there is one; nothing is erased from now on.
     fn unleash_watchdog(&mut self);

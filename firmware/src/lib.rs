@@ -62,6 +62,7 @@ pub fn run<B: Board>(
     for link in links.each() {
         link.transmitter.set_baud(table.configuration().link.baud);
     }
+    board.set_motor_protocol(table.configuration().outputs.protocol);
     let flight = control::make(table.configuration());
     let desk = comms::make::<B>(table);
     board.unleash_watchdog();

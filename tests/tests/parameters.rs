@@ -8,6 +8,7 @@ use afbc::Profile;
 use afbc::monitor::Bounds;
 use afbc_flight_core::ArmingLimits;
 use afbc_flight_core::motor::{Curve, Response};
+use afbc_flight_core::protocol::MotorOutputs;
 use afbc_onboard::parameters::ParameterTable;
 use afbc_onboard::{Configuration, Link};
 use afbc_plant::instruments::{Accelerometer, Barometer, Gnss, Gyroscope, Imu, Magnetometer, TrackerModel};
@@ -131,6 +132,7 @@ fn groups() -> Vec<Group> {
         group("Vehicle: `[vehicle]`, `[truth]`", "V_", Parameters::DEFAULT),
         group("Motors: `[motor]` of a vehicle file", "MOT_", Curve::DEFAULT),
         group("Rotors, as flight software knows them", "MOT_", Response::DEFAULT),
+        group("Outputs to the motor controllers", "MOT_", MotorOutputs::DEFAULT),
         group("Inertial sensor: `[imu]` of a vehicle file", "IMU_", Mounting::DEFAULT),
         group("Calibration of the sensors, by the vehicle itself", "CAL_", SensorCalibration::DEFAULT),
         group("Arming: `[arming]` of a vehicle file", "ARM_", ArmingLimits::DEFAULT),

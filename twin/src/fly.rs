@@ -6,7 +6,7 @@ use crate::pilot::Pilot;
 use crate::pins::{BIT_NS, BITS, Frames};
 use crate::same;
 use crate::ublox::{Generation, UbloxPeer};
-use crate::wire::Telemetry;
+use crate::wire::Wire;
 use afbc_scenario::load;
 use rigless::edge::Edge;
 use rigless::emulator::{AccessKind, Driver, Host, Settled, Start, Stop, run};
@@ -56,9 +56,9 @@ struct Flight {
 pub fn fly(image: &Path, file: &Path, receiver: Option<Generation>, log: Option<&Path>) -> Result<(), Box<dyn Error>> {
     let scenario = load(file)?;
     let mut board = Box::new(MatekH743::new()?);
-    let wire = Telemetry::default();
+    let wire = Wire::default();
     check(rigless::machine::Board::attach_host(&mut *board, LINK, Box::new(wire.clone())), "the link is wired")?;
-    let recorded = Telemetry::default();
+    let recorded = Wire::default();
     board.mcu.usart[SECOND_LINK].attach_boxed(Box::new(recorded.clone()));
     let motors = scenario.rotors.len();
     let flight = Flight {

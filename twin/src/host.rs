@@ -2,7 +2,7 @@
 //! GNSS receiver is the board's, which speaks NMEA; the other readings are taken as they are.
 
 use crate::pilot::Pilot;
-use crate::wire::Telemetry;
+use crate::wire::Wire;
 use afbc_drivers::nmea::NmeaDecoder;
 use afbc_drivers::ublox::DELAY_US;
 use afbc_estimator::Measurement;
@@ -19,7 +19,7 @@ use std::path::Path;
 
 /// Flies a scenario.
 pub fn fly(file: &Path) -> Result<(), Box<dyn Error>> {
-    let wire = Telemetry::default();
+    let wire = Wire::default();
     let mut pilot = Pilot::new(&load(file)?, wire.clone(), false)?;
     let (mut host, mut gnss) = (Host::new()?, Gnss::new());
     let (mut now_ms, mut bytes) = (0, Vec::new());

@@ -7,6 +7,7 @@ mod boot;
 mod check;
 mod fly;
 mod host;
+mod machine;
 mod pilot;
 mod pins;
 mod same;
@@ -14,11 +15,13 @@ mod ublox;
 mod wire;
 mod world;
 
+use rigless::machine::matekh743::MatekH743;
+use rigless::machine::pixracer::Pixracer;
 use std::path::Path;
 use std::process::ExitCode;
 use ublox::Generation;
 
-const USAGE: &str = "twin boot IMAGE: boots it, and looks at bus and pins
+const USAGE: &str = "twin boot matekh743|pixracer IMAGE: boots it, and looks at bus and pins
 twin fly IMAGE SCENARIO [m8|m10] [LOG]: takes off, hovers and lands, in lockstep with the plant, with an NMEA receiver
     or a new one of u-blox's; keeps the exact log in a file, and flies it again: the same to the last bit
 twin replay LOG: flies an exact log again
@@ -28,7 +31,8 @@ fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
     let result = match *arguments {
-        ["boot", image] => boot::boot(Path::new(image)),
+        ["boot", "matekh743", image] => boot::boot::<MatekH743>(Path::new(image)),
+        ["boot", "pixracer", image] => boot::boot::<Pixracer>(Path::new(image)),
         ["fly", image, scenario, ref options @ ..] if options.len() <= 2 => {
             let (mut receiver, mut log) = (None, None);
             for option in options {

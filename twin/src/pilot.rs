@@ -1,7 +1,7 @@
 //! A flight seen from outside: the plant with its instruments, a station at the telemetry UART, and what must hold.
 
 use crate::check::check;
-use crate::wire::Telemetry;
+use crate::wire::Wire;
 use crate::world::Transducers;
 use afbc_flight_core::motor::{THROTTLE_MAX, THROTTLE_MIN};
 use afbc_link::{
@@ -45,7 +45,7 @@ pub struct Pilot {
     transducers: Transducers,
     throttles: Vec<u16>,
     speed_max_rad_s: f32,
-    wire: Telemetry,
+    wire: Wire,
     sender: Sender,
     decoder: Decoder<Downlink>,
     phase: Phase,
@@ -65,7 +65,7 @@ pub struct Pilot {
 impl Pilot {
     /// At the start of a scenario, at the other end of the wire; with `records`, the board is first told to keep an
     /// exact log on its second link, and started again.
-    pub fn new(scenario: &Scenario, wire: Telemetry, records: bool) -> Result<Self, Box<dyn Error>> {
+    pub fn new(scenario: &Scenario, wire: Wire, records: bool) -> Result<Self, Box<dyn Error>> {
         Ok(Pilot {
             world: World::released(scenario, 1e-3)?,
             transducers: Transducers::new(),

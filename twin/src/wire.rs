@@ -16,9 +16,9 @@ struct Bytes {
 
 /// A wire, whose bytes move at the pace of the board's UART. Clones are the same wire.
 #[derive(Clone, Debug, Default)]
-pub struct Telemetry(Arc<Mutex<Bytes>>);
+pub struct Wire(Arc<Mutex<Bytes>>);
 
-impl Telemetry {
+impl Wire {
     fn with<T>(&self, change: impl FnOnce(&mut Bytes) -> T) -> T {
         change(&mut self.0.lock().unwrap_or_else(std::sync::PoisonError::into_inner))
     }
@@ -42,9 +42,9 @@ impl Telemetry {
     }
 }
 
-impl Store for Telemetry {}
+impl Store for Wire {}
 
-impl Peer for Telemetry {
+impl Peer for Wire {
     fn receive(&mut self, word: u16, _: &mut Timeline<'_, '_>) {
         self.with(|wire| wire.from_board.push(word as u8));
     }

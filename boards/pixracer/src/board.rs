@@ -24,7 +24,10 @@ use afbc_drivers::ms5611::Ms5611;
 use afbc_drivers::qmc5883l::Qmc5883l;
 use afbc_drivers::{Driver, I2cRegisters, SensorPart, SpiRegisters};
 use chip_stm32::link::{self, Receiver, Transmitter};
-use chip_stm32::motors::{Motors, Throttles, hold_low, numbering, of_channels, of_outputs, pin, rotors_of_outputs};
+use chip_stm32::motors::{
+    MotorProtocol, Motors, Throttles, hold_low, numbering, of_channels, of_outputs, pin, rotors_of_outputs,
+    set_protocol,
+};
 use chip_stm32::sensors::{Device, Polled};
 use chip_stm32::{crystal, faults, usb, watchdog};
 use chip_stm32f4::{boot_loader, clocks, reset};
@@ -179,6 +182,10 @@ impl Board for Pixracer {
             links,
             memory: Flash::new_blocking(p.FLASH).into_blocking_regions().bank1_region1,
         }
+    }
+
+    fn set_motor_protocol(&mut self, protocol: MotorProtocol) {
+        set_protocol(protocol);
     }
 
     fn unleash_watchdog(&mut self) {

@@ -11,7 +11,7 @@
 //! | sensors | none yet, so no alignment: the state comes over the link |
 
 use chip_stm32::link::{self, Receiver, Transmitter};
-use chip_stm32::motors::{CHANNELS, Motors, Throttles, hold_low, pin};
+use chip_stm32::motors::{CHANNELS, MotorProtocol, Motors, Throttles, hold_low, pin, set_protocol};
 use chip_stm32::{crystal, faults, usb, watchdog};
 use chip_stm32f4::{boot_loader, clocks, reset};
 use embassy_executor::SendSpawner;
@@ -88,6 +88,10 @@ impl Board for Stm32f405 {
             links: [link, link::of_usb(usb::start(p.USB_OTG_FS, p.PA12, p.PA11, Irqs))],
             memory: Flash::new_blocking(p.FLASH).into_blocking_regions().bank1_region1,
         }
+    }
+
+    fn set_motor_protocol(&mut self, protocol: MotorProtocol) {
+        set_protocol(protocol);
     }
 
     fn unleash_watchdog(&mut self) {

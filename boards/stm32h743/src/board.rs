@@ -24,7 +24,7 @@ use afbc_drivers::qmc5883l::Qmc5883l;
 use afbc_drivers::{Driver, I2cRegisters, SensorPart, SpiRegisters};
 use chip_stm32::battery::BatteryConverter;
 use chip_stm32::link::{self, Receiver, Transmitter};
-use chip_stm32::motors::{CHANNELS, Motors, Throttles, hold_low, pin};
+use chip_stm32::motors::{CHANNELS, MotorProtocol, Motors, Throttles, hold_low, pin, set_protocol};
 use chip_stm32::sensors::{Device, Polled};
 use chip_stm32::{crystal, faults, usb, watchdog};
 use chip_stm32h7::flash::Words;
@@ -168,6 +168,10 @@ impl Board for Stm32h743 {
         pac::DBGMCU.apb4fzr1().modify(|freeze| freeze.set_iwdg1(true));
         let board = Stm32h743 { watchdog: watchdog(p.IWDG1) };
         Parts { board, sampler, aids, links, memory: Words::new(p.FLASH) }
+    }
+
+    fn set_motor_protocol(&mut self, protocol: MotorProtocol) {
+        set_protocol(protocol);
     }
 
     fn unleash_watchdog(&mut self) {

@@ -1,31 +1,47 @@
-//! DSHOT600 on up to four channels of a timer, sent by DMA. A board has one timer or more for its motors, each with a
-//! task that [runs](Motors::run) it.
+//! Up to four motors on the channels of a timer: DSHOT, sent by DMA, or pulses. A board has one timer or more for its
+//! motors, each with a task that [runs](Motors::run) it.
 
 pub use afbc_flight_core::numbering::{self, rotors_of_outputs};
+pub use afbc_flight_core::protocol::MotorProtocol;
 
-use afbc_flight_core::dshot::{BIT_RATE_HZ, Timing};
+use afbc_flight_core::dshot::{DshotRate, Timing};
+use afbc_flight_core::protocol::MotorSignal;
+use afbc_flight_core::pulse::{PulseFormat, PulseTiming};
+use afbc_flight_core::timer_clock::TimerClock;
+use core::cell::Cell;
 use embassy_stm32::dma::word::Word;
 use embassy_stm32::dma::{self, ChannelInstance};
 use embassy_stm32::gpio::OutputType;
 use embassy_stm32::interrupt::typelevel::Binding;
 use embassy_stm32::pac::gpio::Gpio;
 use embassy_stm32::pac::gpio::vals::Moder;
-use embassy_stm32::time::Hertz;
-use embassy_stm32::timer::low_level::CountingMode;
-use embassy_stm32::timer::simple_pwm::{PwmPin, SimplePwm};
+use embassy_stm32::timer::low_level::{CountingMode, OutputCompareMode, Timer};
+use embassy_stm32::timer::simple_pwm::PwmPin;
 use embassy_stm32::timer::{Ch1, Ch2, Ch3, Ch4, Channel, GeneralInstance4Channel, TimerChannel, TimerPin, UpDma};
 use embassy_stm32::{Peri, rcc};
+use embassy_sync::blocking_mutex::CriticalSectionMutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
 use embassy_time::{Instant, with_deadline};
 
 /// Most motors of a timer.
 pub const CHANNELS: usize = 4;
+/// The channels.
+const EACH: [Channel; CHANNELS] = [Channel::Ch1, Channel::Ch2, Channel::Ch3, Channel::Ch4];
 /// Longest transfer of a frame to the motors before it is aborted \[us\].
 const TRANSFER_MAX_US: u64 = 2_000;
 
 /// Newest throttles of a timer's motors, for its task: 0, or 48 to 2047; 0 where there is no motor.
 pub type Throttles = Signal<CriticalSectionRawMutex, [u16; CHANNELS]>;
+
+/// Protocol of all motors.
+static PROTOCOL: CriticalSectionMutex<Cell<MotorProtocol>> =
+    CriticalSectionMutex::new(Cell::new(MotorProtocol::Dshot600));
+
+/// Sets the protocol of all motors, before they get their first throttles.
+pub fn set_protocol(protocol: MotorProtocol) {
+    PROTOCOL.lock(|cell| cell.set(protocol));
+}
 
 /// The waveform, with a row for each bit and a column for each channel. A DMA burst of four columns must not cross
 /// 1 KiB.
@@ -35,12 +51,21 @@ struct Rows<W>([[W; CHANNELS]; 17]);
 /// Motors of a timer. `W` is `u16`, or `u32` on a timer of 32 bits: a narrower store would fill both halves of its
 /// register.
 pub struct Motors<T: GeneralInstance4Channel, D: UpDma<T>, I, W> {
-    pwm: SimplePwm<'static, T>,
+    timer: Timer<'static, T>,
+    /// Held, since a pin that is let go of is no output.
+    _pins: Pins<T>,
+    clock: TimerClock,
     dma: Peri<'static, D>,
     irqs: I,
-    timing: Timing,
     rows: Rows<W>,
 }
+
+type Pins<T> = (
+    Option<PwmPin<'static, T, Ch1>>,
+    Option<PwmPin<'static, T, Ch2>>,
+    Option<PwmPin<'static, T, Ch3>>,
+    Option<PwmPin<'static, T, Ch4>>,
+);
 
 impl<T, D, I, W> Motors<T, D, I, W>
 where
@@ -52,7 +77,7 @@ where
     /// Sets up a timer and its pins, low; a channel without a [`pin`] is none. To be called at the start.
     ///
     /// # Panics
-    /// If the timer's clock is out of DSHOT's range.
+    /// If the timer's clock is out of range.
     pub fn new(
         timer: Peri<'static, T>,
         first: Option<PwmPin<'static, T, Ch1>>,
@@ -62,31 +87,88 @@ where
         dma: Peri<'static, D>,
         irqs: I,
     ) -> Self {
-        let counting = CountingMode::EdgeAlignedUp;
-        let pwm = SimplePwm::new(timer, first, second, third, fourth, Hertz(BIT_RATE_HZ), counting);
         // Not `expect`: to print the error would take a tenth of the flash.
-        let Ok(timing) = Timing::new(rcc::frequency::<T>().0) else { panic!("the timer's clock is out of range") };
-        Motors { pwm, dma, irqs, timing, rows: Rows([[W::from(0); CHANNELS]; 17]) }
+        let Ok(clock) = TimerClock::new(rcc::frequency::<T>().0) else { panic!("the timer's clock is out of range") };
+        let timer = Timer::new(timer);
+        timer.set_counting_mode(CountingMode::EdgeAlignedUp);
+        timer.enable_outputs();
+        for channel in EACH {
+            timer.set_output_compare_mode(channel, OutputCompareMode::PwmMode1);
+            timer.set_output_compare_preload(channel, true);
+        }
+        timer.set_autoreload_preload(true);
+        let rows = Rows([[W::from(0); CHANNELS]; 17]);
+        Motors { timer, _pins: (first, second, third, fourth), clock, dma, irqs, rows }
     }
 
-    /// Sends a frame for each new set of throttles.
+    /// Sends each new set of throttles.
     pub async fn run(&mut self, throttles: &Throttles) -> ! {
-        loop {
-            self.send(throttles.wait().await).await;
+        // The protocol has been set when the first come.
+        let first = throttles.wait().await;
+        match PROTOCOL.lock(Cell::get).signal() {
+            MotorSignal::Frames(rate) => self.send_frames(rate, first, throttles).await,
+            MotorSignal::Pulses(format) => self.send_pulses(format, first, throttles).await,
         }
     }
 
-    /// Sends one frame to each motor; takes 28 us.
-    async fn send(&mut self, throttles: [u16; CHANNELS]) {
-        encode(&self.timing, throttles, &mut self.rows);
+    /// Starts the timer, whose outputs stay low until the compare values are other than 0.
+    fn start(&mut self, divider: u16, period: u16) {
+        let registers = self.timer.regs_core();
+        registers.psc().write_value(divider.saturating_sub(1));
+        registers.arr().write(|reload| reload.set_arr(period.saturating_sub(1)));
+        for channel in EACH {
+            self.timer.enable_channel(channel, true);
+        }
+        // Takes them over from the preload registers.
+        self.timer.generate_update_event();
+        self.timer.start();
+    }
+
+    async fn send_frames(&mut self, rate: DshotRate, first: [u16; CHANNELS], throttles: &Throttles) -> ! {
+        let timing = Timing::new(self.clock, rate);
+        self.start(1, timing.period());
+        let mut newest = first;
+        loop {
+            self.send_frame(&timing, newest).await;
+            newest = throttles.wait().await;
+        }
+    }
+
+    /// Sends one frame to each motor; takes 28 us at 600 kbit/s.
+    async fn send_frame(&mut self, timing: &Timing, throttles: [u16; CHANNELS]) {
+        encode(timing, throttles, &mut self.rows);
         let rows = self.rows.0.as_flattened();
         let dma = self.dma.reborrow();
-        let transfer = self.pwm.waveform_up_multi_channel(dma, self.irqs, Channel::Ch1, Channel::Ch4, rows);
+        self.timer.enable_update_dma(true);
+        let transfer = self.timer.setup_update_dma_burst(dma, self.irqs, Channel::Ch1, Channel::Ch4, rows);
         // Wrapping, without a check for an overflow after 585,000 years that could panic.
         let deadline = Instant::from_micros(Instant::now().as_micros().wrapping_add(TRANSFER_MAX_US));
         if with_deadline(deadline, transfer).await.is_err() {
             // The next frame sets up the stream again.
             defmt::warn!("the motors' DMA transfer has stopped");
+        }
+        self.timer.enable_update_dma(false);
+    }
+
+    async fn send_pulses(&mut self, format: PulseFormat, first: [u16; CHANNELS], throttles: &Throttles) -> ! {
+        let timing = PulseTiming::new(self.clock, format);
+        self.start(timing.divider(), timing.period());
+        let mut newest = first;
+        loop {
+            self.set_compare_values(newest.map(|throttle| timing.compare(throttle)));
+            if format.is_one_shot {
+                // Starts the pulses; what the timer takes over at the end of its period is no further one.
+                self.timer.generate_update_event();
+                self.set_compare_values([0; CHANNELS]);
+            }
+            newest = throttles.wait().await;
+        }
+    }
+
+    /// Sets the compare values from the next update on.
+    fn set_compare_values(&mut self, values: [u16; CHANNELS]) {
+        for (channel, value) in EACH.into_iter().zip(values) {
+            self.timer.set_compare_value(channel, W::from(value).into());
         }
     }
 }

@@ -146,6 +146,10 @@ macro_rules! flight_controller {
                 }
             }
 
+            fn set_motor_protocol(&mut self, protocol: chip_stm32::motors::MotorProtocol) {
+                chip_stm32::motors::set_protocol(protocol);
+            }
+
             fn unleash_watchdog(&mut self) {
                 self.watchdog.unleash();
             }

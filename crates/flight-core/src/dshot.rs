@@ -1,15 +1,20 @@
-//! DSHOT600: sixteen bits to a motor controller, each a pulse whose length is its value.
+//! DSHOT: sixteen bits to a motor controller, each a pulse whose length is its value.
 //!
-//! A bit lasts 1.67 us (600 kbit/s); its pulse is high for 1250 ns if it is one and for 625 ns if it is zero, that is
-//! for 3/4 and 3/8 of the bit. The [`Waveform`] is output by a timer with one bit per period, whose compare values are
-//! read from memory.
+//! A bit's pulse is high for 3/4 of the bit if it is one and for 3/8 if it is zero; at 600 kbit/s a bit lasts 1.67 us,
+//! and its pulse 1250 ns or 625 ns. The [`Waveform`] is output by a timer with one bit per period, whose compare values
+//! are read from memory.
 
-use afbc_types::{OutOfRange, Range};
+use crate::timer_clock::TimerClock;
 
 /// Bits per second.
-pub const BIT_RATE_HZ: u32 = 600_000;
-/// Accepted clock of the timer \[Hz\]: pulse lengths are within 4 % of a bit, and a period fits the timer.
-pub const TIMER_CLOCK: Range = Range::new("timer_hz", 8e6, 500e6);
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[expect(missing_docs, reason = "named after what they are, in kbit/s")]
+#[repr(u32)]
+pub enum DshotRate {
+    Dshot150 = 150_000,
+    Dshot300 = 300_000,
+    Dshot600 = 600_000,
+}
 
 /// A frame: 11 bits of throttle, the telemetry request (always off), 4 bits of checksum; sent from the highest bit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -46,17 +51,13 @@ pub struct Timing {
 }
 
 impl Timing {
-    /// Computes the lengths for a timer that counts at `timer_hz`.
-    ///
-    /// # Errors
-    /// If the clock is outside [`TIMER_CLOCK`].
-    pub fn new(timer_hz: u32) -> Result<Self, OutOfRange> {
-        TIMER_CLOCK.check(timer_hz)?;
-        let counts = |numerator: u32, denominator: u32| {
-            let rate_hz = BIT_RATE_HZ * denominator;
-            ((timer_hz * numerator + rate_hz / 2) / rate_hz) as u16
-        };
-        Ok(Timing { period: counts(1, 1), one: counts(3, 4), zero: counts(3, 8) })
+    /// Computes the lengths for a timer that counts at `clock`.
+    pub const fn new(clock: TimerClock, rate: DshotRate) -> Self {
+        const fn counts(clock: TimerClock, rate: DshotRate, numerator: u32, denominator: u32) -> u16 {
+            let rate_hz = rate as u32 * denominator;
+            ((clock.hz() * numerator + rate_hz / 2) / rate_hz) as u16
+        }
+        Timing { period: counts(clock, rate, 1, 1), one: counts(clock, rate, 3, 4), zero: counts(clock, rate, 3, 8) }
     }
 
     /// Returns the counts per bit; the timer reloads at one less.

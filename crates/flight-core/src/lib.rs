@@ -15,7 +15,7 @@
 //! 5. [`dead_reckoning`]: flight without measurements; [`observer`]: flight on poses alone; [`descent`]: descent with
 //!    measurements.
 //! 6. [`rate`]: supervision of the tick rate.
-//! 7. [`motor`], [`dshot`]: throttle curve, and the waveform to the motor controllers.
+//! 7. [`motor`]: throttle curve; [`protocol`]: the way to the motor controllers, by [`dshot`] or [`pulse`].
 #![no_std]
 
 pub mod clock;
@@ -28,11 +28,14 @@ pub mod landing;
 pub mod motor;
 pub mod numbering;
 pub mod observer;
+pub mod protocol;
+pub mod pulse;
 pub mod rate;
 pub mod reasons;
 pub mod refusal;
 pub mod supervisor;
 pub mod tick;
+pub mod timer_clock;
 pub mod tracker;
 pub mod tumble;
 

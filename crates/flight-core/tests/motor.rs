@@ -1,14 +1,19 @@
 //! Rotor speed to throttle, frame and waveform.
 #![allow(clippy::expect_used, reason = "a test that cannot go on should say why")]
 
-use afbc_flight_core::dshot::{DshotFrame, Timing};
+use afbc_flight_core::dshot::{DshotFrame, DshotRate, Timing};
 use afbc_flight_core::motor::{Curve, Motor};
+use afbc_flight_core::timer_clock::TimerClock;
 use afbc_types::RotorSpeeds;
 use nalgebra::Vector4;
 use proptest::prelude::*;
 
 fn motor(linearity: f32, idle: f32) -> Motor {
     Motor::new(Curve { speed_max_rad_s: 1000.0, linearity, idle }).expect("valid")
+}
+
+fn timing(timer_hz: u32, rate: DshotRate) -> Timing {
+    Timing::new(TimerClock::new(timer_hz).expect("valid"), rate)
 }
 
 #[test]
@@ -77,7 +82,7 @@ fn frames_by_hand() {
 #[test]
 fn the_waveform_of_a_frame() {
     // The timers of an STM32F405 at 168 MHz: 84 MHz on the first bus, 140 counts per bit.
-    let timing = Timing::new(84_000_000).expect("valid");
+    let timing = timing(84_000_000, DshotRate::Dshot600);
     assert_eq!(timing.period(), 140);
     let (one, zero) = (105, 53);
     let waveform = timing.waveform(DshotFrame::new(1046)); // 1000 0010 1100 0110
@@ -92,18 +97,27 @@ fn the_waveform_of_a_frame() {
 
 #[test]
 fn pulses_last_as_long_as_they_should_at_every_usual_clock() {
-    for timer_hz in [8_000_000, 72_000_000, 84_000_000, 168_000_000, 480_000_000] {
-        let timing = Timing::new(timer_hz).expect("valid");
+    // Periods and pulses of DSHOT [ns].
+    let rates = [
+        (DshotRate::Dshot600, [1666.7, 1250.0, 625.0]),
+        (DshotRate::Dshot300, [3333.3, 2500.0, 1250.0]),
+        (DshotRate::Dshot150, [6666.7, 5000.0, 2500.0]),
+    ];
+    for (timer_hz, (rate, [bit_ns, one_ns, zero_ns])) in [8_000_000, 72_000_000, 84_000_000, 168_000_000, 480_000_000]
+        .into_iter()
+        .flat_map(|hz| rates.map(|it| (hz, it)))
+    {
+        let timing = timing(timer_hz, rate);
         let count_ns = 1e9 / f64::from(timer_hz);
         let [one, .., zero, low] = timing.waveform(DshotFrame::new(1046));
         let long = |counts: u16| f64::from(counts) * count_ns;
-        assert!((long(timing.period()) - 1666.7).abs() <= 0.51 * count_ns, "{timer_hz}");
-        assert!((long(one) - 1250.0).abs() <= 0.51 * count_ns, "{timer_hz}");
-        assert!((long(zero) - 625.0).abs() <= 0.51 * count_ns, "{timer_hz}");
+        assert!((long(timing.period()) - bit_ns).abs() <= 0.51 * count_ns, "{timer_hz}");
+        assert!((long(one) - one_ns).abs() <= 0.51 * count_ns, "{timer_hz}");
+        assert!((long(zero) - zero_ns).abs() <= 0.51 * count_ns, "{timer_hz}");
         assert_eq!(low, 0);
     }
     for timer_hz in [0, 1_000_000, 600_000_000, u32::MAX] {
-        assert!(Timing::new(timer_hz).is_err());
+        assert!(TimerClock::new(timer_hz).is_err());
     }
 }
 
@@ -130,7 +144,7 @@ proptest! {
     /// Frames pass a receiver's check, and the waveform has the frame's bits.
     #[test]
     fn waveforms_decode(throttle in 48u16..=2047) {
-        let timing = Timing::new(84_000_000).expect("valid");
+        let timing = timing(84_000_000, DshotRate::Dshot600);
         let pulses = timing.waveform(DshotFrame::new(throttle));
         let bits = pulses.iter().take(16).fold(0u16, |bits, &pulse| bits << 1 | u16::from(pulse > 79));
         prop_assert_eq!(bits >> 5, throttle);
@@ -140,7 +154,7 @@ proptest! {
     /// The four columns of a burst are the motors' waveforms, whatever the rows contained before.
     #[test]
     fn rows_are_waveforms_side_by_side(throttles in any::<[u16; 4]>(), before in any::<u16>()) {
-        let timing = Timing::new(168_000_000).expect("valid");
+        let timing = timing(168_000_000, DshotRate::Dshot600);
         let mut rows = [[before; 4]; 17];
         timing.rows(throttles, &mut rows);
         let waveforms = throttles.map(|throttle| timing.waveform(DshotFrame::new(throttle)));

@@ -7,6 +7,7 @@ use afbc_control::drag::KnownDrag;
 use afbc_estimator::Settings as Estimation;
 use afbc_flight_core::ArmingLimits;
 use afbc_flight_core::motor::{Curve, Response};
+use afbc_flight_core::protocol::MotorOutputs;
 use afbc_types::{Airframe, Mounting, Parameters, PerAxis, SensorCalibration};
 
 /// What the firmware knows of the vehicle that it flies; `vehicles/` has one for each.
@@ -22,6 +23,8 @@ pub struct Configuration<const N: usize = 4> {
     pub curve: Curve,
     /// How the rotors follow their commands.
     pub response: Response,
+    /// The outputs to the motor controllers.
+    pub outputs: MotorOutputs,
     /// Mounting of the inertial sensor.
     pub imu: Mounting,
     /// Errors of the sensors, found by calibration on the vehicle.
@@ -47,6 +50,7 @@ impl<const N: usize> Configuration<N> {
             gains: PerAxis { roll: GAINS, pitch: GAINS, yaw: GAINS, z: GAINS, x: GAINS, y: GAINS },
             curve: Curve::DEFAULT,
             response: Response::DEFAULT,
+            outputs: MotorOutputs::DEFAULT,
             imu: Mounting::PLAIN,
             calibration: SensorCalibration::DEFAULT,
             estimation: Estimation::DEFAULT,

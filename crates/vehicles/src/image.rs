@@ -25,13 +25,14 @@ impl Vehicle {
     fn values<const N: usize>(&self) -> Value {
         // As many rotors as there are: with_rotors.
         let Ok(configuration) = self.configuration::<N>() else { return Value::Null };
-        // Errors of sensors are one vehicle's, not its kind's; the link is the board's.
+        // Errors of sensors are one vehicle's, not its kind's, and so are motor controllers; the link is the board's.
         let Configuration {
             airframe,
             settings,
             gains,
             curve,
             response,
+            outputs: _,
             imu,
             calibration: _,
             estimation,

@@ -7,6 +7,7 @@ use afbc::{Profile, Settings};
 use afbc_estimator::Settings as Estimation;
 use afbc_flight_core::ArmingLimits;
 use afbc_flight_core::motor::{Curve, Response};
+use afbc_flight_core::protocol::MotorOutputs;
 use afbc_onboard::{Configuration, Link};
 use afbc_plant::Realism;
 use afbc_reader::{FileError, Table};
@@ -95,6 +96,7 @@ impl Vehicle {
             gains: self.gains(Profile::Flight),
             curve: self.curve,
             response: self.response(),
+            outputs: MotorOutputs::DEFAULT,
             imu: self.imu.to_f32(),
             calibration: SensorCalibration::DEFAULT,
             estimation: self.estimation,

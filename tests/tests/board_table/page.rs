@@ -43,11 +43,7 @@ pub(crate) fn wiring(board: &BoardTable) -> String {
             motors.push([
                 format!("motor {}, {corner}", motor.number),
                 motor.pin.clone(),
-                format!(
-                    "{} channel {channel}, DSHOT600 by {}",
-                    timer.name,
-                    streams(std::slice::from_ref(&timer.stream))
-                ),
+                format!("{} channel {channel}, DMA by {}", timer.name, streams(std::slice::from_ref(&timer.stream))),
             ]);
         }
     }

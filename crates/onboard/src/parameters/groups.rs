@@ -50,6 +50,7 @@ macro_rules! each_group {
             gains,
             curve,
             response,
+            outputs,
             imu,
             calibration,
             estimation,
@@ -58,8 +59,8 @@ macro_rules! each_group {
             link,
         } = $configuration;
         let Airframe { parameters, rotors: _ } = airframe;
-        each_group!(@ $prefix, $group, $show, ["V_" parameters, "MOT_" curve, "MOT_" response, "IMU_" imu,
-            "CAL_" calibration, "ARM_" arming, "EST_" estimation, "" guidance, "" link, "C_" settings, "A_" gains]);
+        each_group!(@ $prefix, $group, $show, ["V_" parameters, "MOT_" curve, "MOT_" response,
+            "MOT_" outputs, "IMU_" imu, "CAL_" calibration, "ARM_" arming, "EST_" estimation, "" guidance, "" link, "C_" settings, "A_" gains]);
     }};
     (@ $prefix:pat_param, $group:ident, $show:expr, [$($name:literal $field:ident),*]) => {
         $(
