@@ -8,8 +8,8 @@ mod work;
 
 pub use boards::{BOARDS, BoardTimes, RateOfUart};
 pub use bus::{Script, i2c_ns, scripts, spi_clock_hz, spi_ns};
-pub use cycles::{CORTEX_M4F, CORTEX_M7, CoreCycles, Mix, Pace};
-pub use work::{Row, Section, Work};
+pub use cycles::{CORTEX_M4F, CORTEX_M7, CoreCycles, CycleLimit, Mix};
+pub use work::{Section, TimingRow, Work};
 
 use crate::Error;
 use crate::response::load;
@@ -40,7 +40,7 @@ fn report(board: &BoardTimes, work: &Work) -> BoardReport {
     let (mut text, mut over) = (String::new(), Vec::new());
     let core = board.core;
     let _ = writeln!(text, "### {}\n", board.names);
-    let [best, bound] = [Pace::Best, Pace::Bound].map(|pace| core.per_instruction(pace));
+    let [best, bound] = [CycleLimit::Best, CycleLimit::Bound].map(|limit| core.per_instruction(limit));
     let _ = writeln!(
         text,
         "{}, {} MHz: {best:.2} cycles per instruction at best, {bound:.2} at most.\n",
@@ -49,7 +49,7 @@ fn report(board: &BoardTimes, work: &Work) -> BoardReport {
     );
     let _ = writeln!(text, "| | period | C, best | C, most | blocked | R, best | R, most | deadline | share |");
     let _ = writeln!(text, "|---|--:|--:|--:|--:|--:|--:|--:|--:|");
-    let [best, bound] = [Pace::Best, Pace::Bound].map(|pace| work.rows(board, pace));
+    let [best, bound] = [CycleLimit::Best, CycleLimit::Bound].map(|limit| work.rows(board, limit));
     for (best, bound) in best.iter().zip(&bound) {
         let deadline = bound.deadline_ns.map_or_else(String::new, us);
         let share = match (bound.deadline_ns, bound.response_ns) {
@@ -77,7 +77,7 @@ fn report(board: &BoardTimes, work: &Work) -> BoardReport {
             bound.response_ns.map_or_else(none, us),
         );
     }
-    let share = |rows: &[Row]| {
+    let share = |rows: &[TimingRow]| {
         let tasks: Vec<_> = rows.iter().map(|row| row.task).collect();
         format!("{:.0} %", load(&tasks) * 100.0)
     };
@@ -97,9 +97,10 @@ fn report(board: &BoardTimes, work: &Work) -> BoardReport {
     let _ = writeln!(text, "| DSHOT600 frame, by DMA | | 600 kHz | {} |\n", us(bus::FRAME_NS));
     let _ = writeln!(text, "| with interrupts off | instructions | best | most |\n|---|--:|--:|--:|");
     for section in work.sections(board) {
-        let time = |pace| us(section.time_ns(core, pace));
+        let time = |limit| us(section.time_ns(core, limit));
         let count = section.straight + section.looped;
-        let _ = writeln!(text, "| {} | {count} | {} | {} |", section.what, time(Pace::Best), time(Pace::Bound));
+        let _ =
+            writeln!(text, "| {} | {count} | {} | {} |", section.what, time(CycleLimit::Best), time(CycleLimit::Bound));
     }
     BoardReport { text, over }
 }

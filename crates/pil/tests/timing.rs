@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, missing_docs)] // a file that cannot be read must stop the test
 
 use pil::timing::{
-    BOARDS, CORTEX_M4F, CORTEX_M7, Pace, RateOfUart, Work, i2c_ns, page, reports, scripts, spi_clock_hz, spi_ns,
+    BOARDS, CORTEX_M4F, CORTEX_M7, CycleLimit, RateOfUart, Work, i2c_ns, page, reports, scripts, spi_clock_hz, spi_ns,
 };
 use std::collections::BTreeSet;
 use std::fs;
@@ -29,11 +29,16 @@ fn the_page_has_the_tables() {
 fn the_tick_is_in_time() {
     let work = Work::read(&read("docs/budgets.md")).unwrap();
     for board in &BOARDS {
-        for pace in [Pace::Best, Pace::Bound] {
-            let rows = work.rows(board, pace);
+        for limit in [CycleLimit::Best, CycleLimit::Bound] {
+            let rows = work.rows(board, limit);
             let tick = rows.iter().find(|row| row.name.starts_with("control tick")).unwrap();
             let is_in_time = tick.response_ns.is_some_and(|response| Some(response) <= tick.deadline_ns);
-            assert_eq!(is_in_time, board.names != "pixracer" || pace == Pace::Best, "{}, {pace:?}", board.names);
+            assert_eq!(
+                is_in_time,
+                board.names != "pixracer" || limit == CycleLimit::Best,
+                "{}, {limit:?}",
+                board.names
+            );
         }
     }
 }
@@ -72,13 +77,13 @@ fn a_script_is_walked() {
 #[test]
 fn limits_of_the_cores() {
     for core in [&CORTEX_M4F, &CORTEX_M7] {
-        let [best, bound] = [Pace::Best, Pace::Bound].map(|pace| core.per_instruction(pace));
-        assert!(best < bound && core.per_cached(Pace::Bound) < bound, "{}", core.name);
-        assert!(core.exception_ns(Pace::Best) < core.exception_ns(Pace::Bound));
+        let [best, bound] = [CycleLimit::Best, CycleLimit::Bound].map(|limit| core.per_instruction(limit));
+        assert!(best < bound && core.per_cached(CycleLimit::Bound) < bound, "{}", core.name);
+        assert!(core.exception_ns(CycleLimit::Best) < core.exception_ns(CycleLimit::Bound));
     }
     // Arm's Cortex-M4 issues one instruction at a time.
-    assert!(CORTEX_M4F.per_instruction(Pace::Best) >= 1.0);
-    assert!(CORTEX_M7.per_instruction(Pace::Best) >= 0.5);
+    assert!(CORTEX_M4F.per_instruction(CycleLimit::Best) >= 1.0);
+    assert!(CORTEX_M7.per_instruction(CycleLimit::Best) >= 0.5);
 }
 
 /// Every board has a table, with its links and parts.

@@ -2,7 +2,7 @@
 
 /// Which of the two limits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Pace {
+pub enum CycleLimit {
     /// Every fetch hits a cache, nothing waits for the result before it.
     Best,
     /// No fetch hits a cache, everything waits.
@@ -110,10 +110,10 @@ pub static CORTEX_M7: CoreCycles = CoreCycles {
 impl CoreCycles {
     /// Returns the cycles of an instruction of a loop that its cache holds.
     #[must_use]
-    pub fn per_cached(&self, pace: Pace) -> f64 {
-        let Kinds { load, store, multiple, multiply_add, divide, branch, other } = match pace {
-            Pace::Best => self.best,
-            Pace::Bound => self.bound,
+    pub fn per_cached(&self, limit: CycleLimit) -> f64 {
+        let Kinds { load, store, multiple, multiply_add, divide, branch, other } = match limit {
+            CycleLimit::Best => self.best,
+            CycleLimit::Bound => self.bound,
         };
         let rest = 1.0 - MIX.load - MIX.store - MIX.multiple - MIX.multiply_add - MIX.divide - MIX.branch;
         MIX.load * load
@@ -128,31 +128,31 @@ impl CoreCycles {
     /// Returns the cycles of an instruction: at most, with a wait for each branch, each literal and each line, of which
     /// a prefetch takes the time of the line before it, at one cycle an instruction.
     #[must_use]
-    pub fn per_instruction(&self, pace: Pace) -> f64 {
+    pub fn per_instruction(&self, limit: CycleLimit) -> f64 {
         let line = self.line_bytes / MIX.bytes;
         let in_line = if self.prefetches { (1.0 + self.line_wait - line).max(0.0) } else { self.line_wait };
         let waits = in_line / line + (MIX.branch + MIX.literal) * self.line_wait;
-        self.per_cached(pace) + if pace == Pace::Bound { waits } else { 0.0 }
+        self.per_cached(limit) + if limit == CycleLimit::Bound { waits } else { 0.0 }
     }
 
     /// Returns the time of instructions, and of those in loops \[ns\].
     #[must_use]
-    pub fn time_ns(&self, straight: u64, looped: u64, pace: Pace) -> u64 {
-        let cycles = straight as f64 * self.per_instruction(pace) + looped as f64 * self.per_cached(pace);
+    pub fn time_ns(&self, straight: u64, looped: u64, limit: CycleLimit) -> u64 {
+        let cycles = straight as f64 * self.per_instruction(limit) + looped as f64 * self.per_cached(limit);
         (cycles * 1e9 / self.hz as f64).ceil() as u64
     }
 
     /// Returns the time of the instructions of an interrupt for a byte \[ns\].
     #[must_use]
-    pub fn byte_ns(&self, instructions: u64, pace: Pace) -> u64 {
-        if self.keeps_interrupts { self.time_ns(0, instructions, pace) } else { self.time_ns(instructions, 0, pace) }
+    pub fn byte_ns(&self, instructions: u64, limit: CycleLimit) -> u64 {
+        if self.keeps_interrupts { self.time_ns(0, instructions, limit) } else { self.time_ns(instructions, 0, limit) }
     }
 
     /// Returns the time of entry to and exit from an interrupt \[ns\].
     #[must_use]
-    pub fn exception_ns(&self, pace: Pace) -> u64 {
+    pub fn exception_ns(&self, limit: CycleLimit) -> u64 {
         let [best, bound] = self.exception;
-        let cycles = if pace == Pace::Best { best } else { bound };
+        let cycles = if limit == CycleLimit::Best { best } else { bound };
         (cycles * 1_000_000_000).div_ceil(self.hz)
     }
 }

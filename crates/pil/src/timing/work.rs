@@ -3,7 +3,7 @@
 use super::TICK_NS;
 use super::boards::{BoardTimes, RateOfUart};
 use super::bus::{FRAME_NS, scripts};
-use super::cycles::{CoreCycles, Pace};
+use super::cycles::{CoreCycles, CycleLimit};
 use crate::Error;
 use crate::response::{PeriodicTask, worst_response_ns};
 
@@ -62,7 +62,7 @@ pub struct Section {
 
 /// A line of a board's table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Row {
+pub struct TimingRow {
     /// What runs.
     pub name: &'static str,
     /// When.
@@ -136,7 +136,7 @@ impl Work {
 
     /// Returns the lines of a board's table.
     #[must_use]
-    pub fn rows(&self, board: &BoardTimes, pace: Pace) -> Vec<Row> {
+    pub fn rows(&self, board: &BoardTimes, limit: CycleLimit) -> Vec<TimingRow> {
         let core = board.core;
         let sections = self.sections(board);
         let entries = self.entries(board);
@@ -146,20 +146,20 @@ impl Work {
                 let lower = sections.iter().filter(|section| section.priority > entry.priority);
                 let is_byte = entry.priority == priority::UART;
                 let own = |instructions| {
-                    if is_byte { core.byte_ns(instructions, pace) } else { core.time_ns(instructions, 0, pace) }
+                    if is_byte { core.byte_ns(instructions, limit) } else { core.time_ns(instructions, 0, limit) }
                 };
                 PeriodicTask {
                     priority: entry.priority,
                     period_ns: entry.period_ns,
                     jitter_ns: 0,
-                    cost_ns: own(entry.instructions) + entry.interrupts * core.exception_ns(pace),
-                    blocking_ns: lower.map(|section| section.time_ns(core, pace)).max().unwrap_or(0),
+                    cost_ns: own(entry.instructions) + entry.interrupts * core.exception_ns(limit),
+                    blocking_ns: lower.map(|section| section.time_ns(core, limit)).max().unwrap_or(0),
                 }
             })
             .collect();
         let row = |(index, entry): (usize, &Entry)| {
             let response_ns = worst_response_ns(&tasks, index).map(|response| response + entry.bus_ns);
-            tasks.get(index).map(|task| Row {
+            tasks.get(index).map(|task| TimingRow {
                 name: entry.name,
                 task: *task,
                 deadline_ns: entry.deadline_ns,
@@ -273,7 +273,7 @@ impl Work {
 impl Section {
     /// Returns how long it takes \[ns\].
     #[must_use]
-    pub fn time_ns(&self, core: &CoreCycles, pace: Pace) -> u64 {
-        core.time_ns(self.straight, self.looped, pace)
+    pub fn time_ns(&self, core: &CoreCycles, limit: CycleLimit) -> u64 {
+        core.time_ns(self.straight, self.looped, limit)
     }
 }
