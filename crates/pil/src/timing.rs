@@ -7,16 +7,13 @@ mod cycles;
 mod work;
 
 pub use boards::{BOARDS, BoardTimes, RateOfUart};
-pub use bus::{Script, i2c_ns, scripts, spi_clock_hz, spi_ns};
+pub use bus::{Script, i2c_ns, spi_clock_hz, spi_ns};
 pub use cycles::{CORTEX_M4F, CORTEX_M7, CoreCycles, CycleLimit, Mix};
 pub use work::{Section, TimingRow, Work};
 
 use crate::Error;
 use crate::response::load;
 use std::fmt::Write as _;
-
-/// A period of the control tick \[ns\].
-pub const TICK_NS: u64 = 1_000_000;
 
 /// The tables of one board, and what exceeds its deadline in them.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -84,7 +81,7 @@ fn report(board: &BoardTimes, work: &Work) -> BoardReport {
     let _ = writeln!(text, "| load | | {} | {} | | | | | |\n", share(&best), share(&bound));
 
     let _ = writeln!(text, "| transfer | bytes | clock | time |\n|---|--:|--:|--:|");
-    for script in scripts(board) {
+    for script in board.scripts() {
         let _ = writeln!(
             text,
             "| {} | {} | {} kHz | {} |",

@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, missing_docs)] // a file that cannot be read must stop the test
 
 use pil::timing::{
-    BOARDS, CORTEX_M4F, CORTEX_M7, CycleLimit, RateOfUart, Work, i2c_ns, page, reports, scripts, spi_clock_hz, spi_ns,
+    BOARDS, CORTEX_M4F, CORTEX_M7, CycleLimit, RateOfUart, Work, i2c_ns, page, reports, spi_clock_hz, spi_ns,
 };
 use std::collections::BTreeSet;
 use std::fs;
@@ -69,7 +69,7 @@ fn buses_by_hand() {
 #[test]
 fn a_script_is_walked() {
     let board = BOARDS.iter().find(|board| board.names == "stm32h743").unwrap();
-    let script = scripts(board).into_iter().find(|script| script.part == "ICM-42688-P").unwrap();
+    let script = board.scripts().into_iter().find(|script| script.part == "ICM-42688-P").unwrap();
     assert_eq!((script.bytes, script.transfers, script.clock_hz), (17, 2, 12_500_000));
     assert_eq!(script.time_ns, 9_600 + 1_280);
 }
@@ -95,7 +95,7 @@ fn boards_are_those_of_the_project() {
     let known: BTreeSet<_> = BOARDS.iter().flat_map(|board| board.names.split(", ")).map(str::to_owned).collect();
     assert_eq!(names, known);
     for board in &BOARDS {
-        let parts: BTreeSet<_> = scripts(board).iter().map(|script| name_in_code(script.part)).collect();
+        let parts: BTreeSet<_> = board.scripts().iter().map(|script| name_in_code(script.part)).collect();
         for name in board.names.split(", ") {
             let folder = root().join("boards").join(name).join("src");
             let files = fs::read_dir(folder).unwrap().map(|entry| fs::read_to_string(entry.unwrap().path()).unwrap());

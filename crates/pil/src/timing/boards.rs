@@ -56,11 +56,19 @@ pub struct BoardTimes {
     /// The same of the slow sensors' task.
     pub aiding: u64,
     /// Readings of its parts; of candidates all.
-    pub(super) parts: &'static [fn() -> Script],
+    parts: &'static [fn() -> Script],
     /// The first so many of them are read by the sampling task.
     pub sampled: usize,
     /// True if only one of the sampled parts is there.
     pub is_one: bool,
+}
+
+impl BoardTimes {
+    /// Returns the readings of its parts.
+    #[must_use]
+    pub fn scripts(&self) -> Vec<Script> {
+        self.parts.iter().map(|part| part()).collect()
+    }
 }
 
 /// APB2 of an STM32F405 or F427, which feeds SPI1 \[Hz\].

@@ -1,6 +1,5 @@
 //! Times on the buses of sensors and motors.
 
-use super::boards::BoardTimes;
 use afbc_drivers::{SensorPart, Step};
 use afbc_flight_core::dshot::BIT_RATE_HZ;
 
@@ -52,12 +51,6 @@ pub fn spi_ns(bytes: u64, clock_hz: u32) -> u64 {
 #[must_use]
 pub fn i2c_ns(bytes: u64, conditions: u64) -> u64 {
     ((bytes * 9 + conditions) * 1_000_000_000).div_ceil(I2C_HZ.into())
-}
-
-/// Returns the readings of a board's parts.
-#[must_use]
-pub fn scripts(board: &BoardTimes) -> Vec<Script> {
-    board.parts.iter().map(|part| part()).collect()
 }
 
 /// Walks the longest cycle of a part that is ready: its script, and one look at a register.

@@ -1,8 +1,7 @@
 //! What runs on a board, how often, for how long, and how long it holds interrupts off.
 
-use super::TICK_NS;
 use super::boards::{BoardTimes, RateOfUart};
-use super::bus::{FRAME_NS, scripts};
+use super::bus::FRAME_NS;
 use super::cycles::{CoreCycles, CycleLimit};
 use crate::Error;
 use crate::response::{PeriodicTask, worst_response_ns};
@@ -19,6 +18,8 @@ mod priority {
     pub(super) const HOUSEKEEPING: u8 = 12;
 }
 
+/// A period of the control tick \[ns\].
+const TICK_NS: u64 = 1_000_000;
 /// End of a DMA transfer, with the waker: their code in the image, each instruction once.
 const DMA_END: u64 = 120;
 /// I2C's interrupt for an event, likewise.
@@ -201,7 +202,7 @@ impl Work {
         }
         if board.senses {
             entries.push(byte("GNSS receiver: byte", RateOfUart::Gnss, true));
-            let scripts = scripts(board);
+            let scripts = board.scripts();
             let (sampled, slow) = scripts.split_at(board.sampled.min(scripts.len()));
             let times = sampled.iter().map(|script| script.time_ns);
             let transfers = sampled.iter().map(|script| script.transfers);
