@@ -58,21 +58,26 @@ pub fn put_field(reading: &Stamped<MagneticReading>, to_body: &Matrix3<f32>) {
 
 /// Puts a GNSS receiver's fix; none for an epoch without one.
 pub fn put_fix(at_us: u64, fix: Option<FixReading>) {
-    let measurement = with(|known| {
-        let receiver = fix.map_or(GnssReceiver::NO_FIX, |fix| GnssReceiver {
-            kind: GnssReceiver::FIX_3D,
-            satellites: fix.satellites,
-            sigma_mm: [fix.horizontal_sigma_m, fix.vertical_sigma_m].map(|sigma_m| (sigma_m * 1e3) as u32),
-        });
-        known.receiver = Some((at_us, receiver));
-        let (measurement, is_first) = known.frame.measure(&fix?)?;
-        if is_first {
-            let FixReading { latitude_deg, longitude_deg, altitude_m, .. } = fix?;
-            known.origin = EarthOrigin::new(Global { latitude_deg, longitude_deg, altitude_m });
-        }
-        Some(measurement)
+    let receiver = fix.map_or(GnssReceiver::NO_FIX, |fix| GnssReceiver {
+        kind: GnssReceiver::FIX_3D,
+        satellites: fix.satellites,
+        sigma_mm: [fix.horizontal_sigma_m, fix.vertical_sigma_m].map(|sigma_m| (sigma_m * 1e3) as u32),
     });
-    if let Some(measurement) = measurement.flatten() {
+    // Computed outside the lock, which all interrupts wait for: places are in double precision. Nobody else has fixes.
+    let mut frame = with(|known| known.frame).unwrap_or(FixFrame::NEW);
+    let measured = fix.and_then(|fix| Some((fix, frame.measure(&fix)?)));
+    let first = measured.filter(|(_, (_, is_first))| *is_first).map(|(fix, _)| fix);
+    let origin = first.and_then(|FixReading { latitude_deg, longitude_deg, altitude_m, .. }| {
+        EarthOrigin::new(Global { latitude_deg, longitude_deg, altitude_m })
+    });
+    let _ = with(|known| {
+        known.frame = frame;
+        known.receiver = Some((at_us, receiver));
+        if origin.is_some() {
+            known.origin = origin;
+        }
+    });
+    if let Some((_, (measurement, _))) = measured {
         samples::put(SampleTime::At(at_us), SampleValue::Aid(measurement));
     }
 }

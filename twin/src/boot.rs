@@ -2,12 +2,11 @@
 //! ticks at 1 kHz, feeds its watchdog, drives its motor outputs and talks.
 
 use crate::check::check;
+use crate::kept::parameters;
 use crate::machine::{Machine, Signal};
 use crate::wire::Wire;
 use afbc_link::telemetry::Telemetry;
 use afbc_link::{Address, Decoder, Downlink};
-use afbc_store::{Ram, RecordName, Store, hash};
-use embedded_storage::nor_flash::ReadNorFlash;
 use rigless::emulator::{AccessKind, Driver, Host, Settled, Start, Stop, run};
 use rigless::image::Image;
 use rigless::session::Session;
@@ -22,10 +21,6 @@ const LINK: &str = "serial1";
 const FEED: u64 = 0xAAAA;
 /// The station, as in [`Decoder::new`].
 const STATION: Address = Address { system: 255, component: 190 };
-/// The vehicle of the image, whose parameters count.
-const VEHICLE: &[u8] = b"paper";
-/// A sector of the parameters' flash of an STM32F4 \[bytes\].
-const SECTOR: usize = 16 * 1024;
 /// DSHOT600 \[ns\]: the pulse of a zero, and the time of a bit; a stopped motor's frame has sixteen zeros.
 const PULSE_NS: u64 = 625;
 const BIT_NS: u64 = 1_667;
@@ -84,17 +79,6 @@ impl<M: Machine> Driver<M> for Seen {
     }
 }
 
-/// Returns the parameters' flash in which a station has set the motors' protocol.
-fn parameters(protocol: f32) -> Result<Vec<u8>, Box<dyn Error>> {
-    let mut store = Store::open(Ram::<SECTOR>::BLANK, 0, hash(VEHICLE)).map_err(|error| error.reason())?;
-    store.make_room().map_err(|error| error.reason())?;
-    let name = RecordName::new("MOT_PROTOCOL").ok_or("a name")?;
-    store.set(name, 0, Some(protocol.to_bits())).map_err(|error| error.reason())?;
-    let mut bytes = vec![0; 2 * SECTOR];
-    store.into_flash().read(0, &mut bytes).map_err(|error| format!("{error:?}"))?;
-    Ok(bytes)
-}
-
 /// Boots an image.
 pub fn boot<M: Machine>(image: &Path) -> Result<(), Box<dyn Error>> {
     let mut board = M::built()?;
@@ -103,7 +87,7 @@ pub fn boot<M: Machine>(image: &Path) -> Result<(), Box<dyn Error>> {
     let seen = Seen { feeds: Vec::new(), pulses: vec![0; M::MOTORS.len()], looks: 0, wrong: Vec::new(), store: 0 };
     let mut images = vec![Image::read(image, None)?];
     if let Signal::Pwm400(protocol) = M::SIGNAL {
-        images.push(Image::new(Path::new("parameters"), parameters(protocol)?, Some(M::STORE))?);
+        images.push(Image::new(Path::new("parameters"), parameters("MOT_PROTOCOL", protocol, 4)?, Some(M::STORE))?);
     }
     let finished = run(Session::new(board, 0, VirtualNanos(LOOK_FROM))?, &Start::new(&images), seen)?;
 

@@ -20,7 +20,7 @@ use std::path::Path;
 /// Flies a scenario.
 pub fn fly(file: &Path) -> Result<(), Box<dyn Error>> {
     let wire = Wire::default();
-    let mut pilot = Pilot::new(&load(file)?, wire.clone(), false)?;
+    let mut pilot = Pilot::new(&load(file)?, wire.clone())?;
     let (mut host, mut gnss) = (Host::new()?, Gnss::new());
     let (mut now_ms, mut bytes) = (0, Vec::new());
     while let Some((mut readings, signals)) = pilot.advance(now_ms) {

@@ -7,6 +7,7 @@ mod boot;
 mod check;
 mod fly;
 mod host;
+mod kept;
 mod machine;
 mod pilot;
 mod pins;

@@ -4,9 +4,7 @@ use crate::check::check;
 use crate::wire::Wire;
 use crate::world::Transducers;
 use afbc_flight_core::motor::{THROTTLE_MAX, THROTTLE_MIN};
-use afbc_link::{
-    Address, Command, Datum, Decoder, Downlink, FRAME_MAX, Height, ParameterRequest, Reboot, Sender, Uplink,
-};
+use afbc_link::{Address, Command, Datum, Decoder, Downlink, FRAME_MAX, Height, Sender, Uplink};
 use afbc_onboard::Readings;
 use afbc_scenario::Scenario;
 use afbc_sim::flight::World;
@@ -15,9 +13,6 @@ use rigless::machine::flight::Signals;
 use std::error::Error;
 
 const STATION: Address = Address { system: 255, component: 190 };
-/// The parameter that names the link of the exact log, and its type, MAV_PARAM_TYPE_INT32.
-const LOG_PORT: [u8; 16] = *b"LOG_PORT\0\0\0\0\0\0\0\0";
-const INT32: u8 = 6;
 /// Height of the hover above where it stood [m], and its time [ms].
 const HEIGHT_M: f32 = 5.0;
 const HOVER_MS: u64 = 30_000;
@@ -30,8 +25,6 @@ const TILT_RAD: f64 = 0.7;
 /// Parts of the flight.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Phase {
-    /// Has the exact log kept, from a start of its own.
-    Records,
     Wakes,
     Climbs,
     Hovers,
@@ -53,8 +46,6 @@ pub struct Pilot {
     now_ms: u64,
     since_ms: u64,
     armed: bool,
-    /// True if the board has answered that it will keep a log.
-    recording: bool,
     /// Where it hovers, by the truth [m].
     start_m: [f64; 3],
     off_m: (f64, u64),
@@ -63,9 +54,8 @@ pub struct Pilot {
 }
 
 impl Pilot {
-    /// At the start of a scenario, at the other end of the wire; with `records`, the board is first told to keep an
-    /// exact log on its second link, and started again.
-    pub fn new(scenario: &Scenario, wire: Wire, records: bool) -> Result<Self, Box<dyn Error>> {
+    /// At the start of a scenario, at the other end of the wire.
+    pub fn new(scenario: &Scenario, wire: Wire) -> Result<Self, Box<dyn Error>> {
         Ok(Pilot {
             world: World::released(scenario, 1e-3)?,
             transducers: Transducers::new(),
@@ -74,11 +64,10 @@ impl Pilot {
             wire,
             sender: Sender::new(STATION),
             decoder: Decoder::new(STATION),
-            phase: if records { Phase::Records } else { Phase::Wakes },
+            phase: Phase::Wakes,
             now_ms: 0,
             since_ms: 0,
             armed: false,
-            recording: false,
             start_m: [0.0; 3],
             off_m: (0.0, 0),
             tilt_rad: 0.0,
@@ -132,10 +121,9 @@ impl Pilot {
     fn talk(&mut self) {
         let bytes = self.wire.take();
         let now_ms = self.now_ms;
-        let (armed, recording) = (&mut self.armed, &mut self.recording);
+        let armed = &mut self.armed;
         self.decoder.feed(&bytes, |_, message| match message {
             Downlink::Heartbeat { armed: is_armed, .. } => *armed = is_armed,
-            Downlink::Parameter(value) if value.name == LOG_PORT => *recording = true,
             Downlink::Text { text, .. } => println!("{:7.3} s: {}", now_ms as f64 * 1e-3, text.to_str().unwrap_or("?")),
             _ => {}
         });
@@ -165,18 +153,8 @@ impl Pilot {
             );
         }
         let next = match self.phase {
-            Phase::Records => {
-                // The change is written before the start.
-                if second && self.recording {
-                    self.say(&Uplink::Command(Command::Reboot(Reboot::Program)));
-                } else if second {
-                    let value = 2_i32.to_le_bytes();
-                    self.say(&Uplink::Parameter(ParameterRequest::Set { name: LOG_PORT, value, kind: INT32 }));
-                }
-                (second && self.recording).then_some(Phase::Wakes)
-            }
             Phase::Wakes => {
-                if second && passed_ms > 3000 {
+                if second && self.now_ms > 3000 {
                     self.say(&Uplink::Command(Command::Arm));
                 }
                 self.armed.then_some(Phase::Climbs)
@@ -207,7 +185,7 @@ impl Pilot {
             Phase::Done => None,
         };
         let patience_ms = match self.phase {
-            Phase::Records | Phase::Wakes => PATIENCE_MS[0],
+            Phase::Wakes => PATIENCE_MS[0],
             Phase::Climbs => PATIENCE_MS[1],
             Phase::Lands => PATIENCE_MS[2],
             _ => u64::MAX,

@@ -60,13 +60,16 @@ pub fn start(
     UsbPort(())
 }
 
+/// Bytes that are copied at once into the ring for the host.
+pub const PIECE: usize = 64;
+
 /// Queues bytes for the host, all of them or, if it is too far behind, none.
 pub(crate) fn send(mut bytes: &[u8]) {
     if SENT.free_capacity() < bytes.len() {
         return;
     }
-    // The ring accepts bytes up to its end, then the rest.
-    while let Ok(length @ 1..) = SENT.try_write(bytes) {
+    // A piece at a time: all interrupts wait for one to be copied. The ring accepts bytes up to its end, then the rest.
+    while let Ok(length @ 1..) = SENT.try_write(bytes.get(..PIECE).unwrap_or(bytes)) {
         bytes = bytes.get(length..).unwrap_or_default();
     }
 }

@@ -32,6 +32,8 @@ pub mod exercise;
 pub mod gdb;
 mod image;
 mod qemu;
+pub mod response;
+pub mod timing;
 mod twins;
 pub mod worst;
 

@@ -1,0 +1,157 @@
+//! What the times of each board depend on: its core, its links and its parts. `tests/timing.rs` compares it with
+//! `boards/`.
+
+use super::bus::{Script, Wire, script};
+use super::cycles::{CORTEX_M4F, CORTEX_M7, CoreCycles};
+use afbc_drivers::bmi270::Bmi270;
+use afbc_drivers::bmp280::Bmp280;
+use afbc_drivers::dps310::{Dps310, Spl06};
+use afbc_drivers::icm426xx::{Icm42605, Icm42688p};
+use afbc_drivers::lis3mdl::Lis3mdl;
+use afbc_drivers::mpu::{Icm20602, Icm20608, Icm20689, Mpu6000, Mpu6500, Mpu9250};
+use afbc_drivers::ms5611::Ms5611;
+use afbc_drivers::qmc5883l::Qmc5883l;
+
+/// Baud of a GNSS receiver, the highest that is tried.
+const GNSS_BAUD: u64 = 230_400;
+/// Bits of a byte on a line: start, eight, stop.
+const BYTE_BITS: u64 = 10;
+
+/// Bytes of a UART, each with an interrupt.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RateOfUart {
+    /// A link, at the default of SER_TEL1_BAUD.
+    Link,
+    /// A GNSS receiver.
+    Gnss,
+}
+
+impl RateOfUart {
+    /// Returns the time of a byte \[ns\].
+    #[must_use]
+    pub fn byte_ns(self) -> u64 {
+        let baud = match self {
+            RateOfUart::Link => u64::from(afbc_onboard::Link::default().baud),
+            RateOfUart::Gnss => GNSS_BAUD,
+        };
+        BYTE_BITS * 1_000_000_000 / baud
+    }
+}
+
+/// A kind of board.
+#[derive(Debug)]
+pub struct BoardTimes {
+    /// Names of the boards, as in `boards/`, with commas between them.
+    pub names: &'static str,
+    /// Its core.
+    pub core: &'static CoreCycles,
+    /// Links by UART.
+    pub links: usize,
+    /// True if it has sensors.
+    pub senses: bool,
+    /// Timers of motors.
+    pub timers: u64,
+    /// Instructions of the sampling task with all that it can reach, each once.
+    pub sampling: u64,
+    /// The same of the slow sensors' task.
+    pub aiding: u64,
+    /// Readings of its parts; of candidates all.
+    parts: &'static [fn() -> Script],
+    /// The first so many of them are read by the sampling task.
+    pub sampled: usize,
+    /// True if only one of the sampled parts is there.
+    pub is_one: bool,
+}
+
+impl BoardTimes {
+    /// Returns the readings of its parts.
+    #[must_use]
+    pub fn scripts(&self) -> Vec<Script> {
+        self.parts.iter().map(|part| part()).collect()
+    }
+}
+
+/// APB2 of an STM32F405 or F427, which feeds SPI1 \[Hz\].
+const SPI1_HZ: u32 = 84_000_000;
+/// APB1, which feeds SPI2 \[Hz\].
+const SPI2_HZ: u32 = 42_000_000;
+/// SPI of the STM32H743 \[Hz\]: the board divides it by eight.
+const SPI_H743_HZ: u32 = 25_000_000;
+
+macro_rules! parts {
+    ($($part:ty: $wire:expr),+ $(,)?) => { &[$(|| script::<$part>($wire)),+] };
+}
+
+/// All boards. The instructions of tasks are those of the images of 464c7b1.
+pub static BOARDS: [BoardTimes; 4] = [
+    BoardTimes {
+        names: "stm32f405",
+        core: &CORTEX_M4F,
+        links: 1,
+        senses: false,
+        timers: 1,
+        sampling: 0,
+        aiding: 0,
+        parts: &[],
+        sampled: 0,
+        is_one: false,
+    },
+    BoardTimes {
+        names: "kakute-f4-v2, matek-f405-se, matek-f405-std, speedybee-f405-mini, speedybee-f405-v3, speedybee-f405-v4",
+        core: &CORTEX_M4F,
+        links: 1,
+        senses: true,
+        timers: 2,
+        sampling: 7_096,
+        aiding: 23_085,
+        parts: parts![
+            Icm42688p<true>: Wire::Spi(SPI1_HZ),
+            Bmi270: Wire::Spi(SPI1_HZ),
+            Icm20602: Wire::Spi(SPI1_HZ),
+            Icm20689: Wire::Spi(SPI1_HZ),
+            Mpu6000: Wire::Spi(SPI1_HZ),
+            Mpu6500: Wire::Spi(SPI1_HZ),
+            Spl06: Wire::I2c,
+            Dps310: Wire::I2c,
+            Bmp280: Wire::I2c,
+            Qmc5883l: Wire::I2c,
+        ],
+        sampled: 6,
+        is_one: true,
+    },
+    BoardTimes {
+        names: "pixracer",
+        core: &CORTEX_M4F,
+        links: 2,
+        senses: true,
+        timers: 2,
+        sampling: 12_624,
+        aiding: 24_825,
+        parts: parts![
+            Icm20608: Wire::Spi(SPI1_HZ),
+            Mpu9250: Wire::Spi(SPI1_HZ),
+            Lis3mdl: Wire::Spi(SPI1_HZ),
+            Ms5611: Wire::Spi(SPI2_HZ),
+            Qmc5883l: Wire::I2c,
+        ],
+        sampled: 3,
+        is_one: false,
+    },
+    BoardTimes {
+        names: "stm32h743",
+        core: &CORTEX_M7,
+        links: 2,
+        senses: true,
+        timers: 2,
+        sampling: 7_552,
+        aiding: 23_515,
+        parts: parts![
+            Icm42688p<true>: Wire::Spi(SPI_H743_HZ),
+            Icm42605<true>: Wire::Spi(SPI_H743_HZ),
+            Dps310: Wire::I2c,
+            Qmc5883l: Wire::I2c,
+        ],
+        sampled: 2,
+        is_one: false,
+    },
+];

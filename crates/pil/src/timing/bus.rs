@@ -1,0 +1,96 @@
+//! Times on the buses of sensors and motors.
+
+use afbc_drivers::{SensorPart, Step};
+use afbc_flight_core::dshot::DshotRate;
+
+/// Bits of a DSHOT frame, and one without a pulse that ends it.
+const FRAME_BITS: u64 = 17;
+/// Time of a frame \[ns\].
+pub(super) const FRAME_NS: u64 = (FRAME_BITS * 1_000_000_000).div_ceil(DshotRate::Dshot600 as u64);
+/// Clock of I2C \[Hz\].
+const I2C_HZ: u32 = 400_000;
+
+/// One reading of a part.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Script {
+    /// Its name.
+    pub part: &'static str,
+    /// Bytes on the bus, addresses included.
+    pub bytes: u64,
+    /// Transfers.
+    pub transfers: u64,
+    /// Clock of the bus \[Hz\].
+    pub clock_hz: u32,
+    /// Time on the bus \[ns\].
+    pub time_ns: u64,
+}
+
+/// How a part is wired.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Wire {
+    /// SPI, fed with a clock \[Hz\].
+    Spi(u32),
+    /// I2C.
+    I2c,
+}
+
+/// Returns the fastest clock that a prescaler of 2, 4 ... 256 makes of `kernel_hz`, not above `most_hz` if possible.
+#[must_use]
+pub fn spi_clock_hz(kernel_hz: u32, most_hz: u32) -> u32 {
+    (1..8).map(|power| kernel_hz >> power).find(|hz| *hz <= most_hz).unwrap_or(kernel_hz >> 8)
+}
+
+/// Returns the time of `bytes` over SPI \[ns\].
+#[must_use]
+pub fn spi_ns(bytes: u64, clock_hz: u32) -> u64 {
+    (bytes * 8 * 1_000_000_000).div_ceil(clock_hz.into())
+}
+
+/// Returns the time of a transfer over I2C \[ns\]: `bytes` with addresses, nine bits each, and `conditions`: start,
+/// repeated start, stop, a bit each.
+#[must_use]
+pub fn i2c_ns(bytes: u64, conditions: u64) -> u64 {
+    ((bytes * 9 + conditions) * 1_000_000_000).div_ceil(I2C_HZ.into())
+}
+
+/// Walks the longest cycle of a part that is ready: its script, and one look at a register.
+pub(super) fn script<P: SensorPart>(wire: Wire) -> Script {
+    let format = P::SPI;
+    let clock_hz = match (wire, format) {
+        (Wire::Spi(kernel_hz), Some(format)) => spi_clock_hz(kernel_hz, format.clock_hz),
+        _ => I2C_HZ,
+    };
+    let dummies = format.map_or(0, |format| format.dummies as u64);
+    let mut script = Script { part: P::NAME, bytes: 0, transfers: 0, clock_hz, time_ns: 0 };
+    let mut add = |data: u64, is_read: bool| {
+        let (bytes, time_ns) = match wire {
+            Wire::Spi(_) => {
+                let bytes = 1 + data + if is_read { dummies } else { 0 };
+                (bytes, spi_ns(bytes, clock_hz))
+            }
+            // Address and register; the address again before the answer.
+            Wire::I2c => {
+                let bytes = 2 + data + u64::from(is_read);
+                (bytes, i2c_ns(bytes, 2 + u64::from(is_read)))
+            }
+        };
+        script.bytes += bytes;
+        script.transfers += 1;
+        script.time_ns += time_ns;
+    };
+    for step in P::CYCLE {
+        match *step {
+            Step::Read(_, length) => add(length as u64, true),
+            Step::Identify(..) | Step::Await(..) => add(1, true),
+            Step::Set(..) | Step::Write(..) => add(1, false),
+            Step::SetLike(..) => {
+                add(1, true);
+                add(1, false);
+            }
+            Step::WriteAll(_, bytes) => add(bytes.len() as u64, false),
+            Step::Wait(_) | Step::Ready(_) => (),
+        }
+    }
+    add(1, true);
+    script
+}

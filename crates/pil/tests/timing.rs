@@ -1,0 +1,142 @@
+//! Times on the buses by hand, boards as `boards/` has them, and the tables of `docs/timing.md`.
+#![allow(clippy::unwrap_used, clippy::expect_used, missing_docs)] // a file that cannot be read must stop the test
+
+use pil::timing::{
+    BOARDS, CORTEX_M4F, CORTEX_M7, CycleLimit, RateOfUart, Work, i2c_ns, page, reports, spi_clock_hz, spi_ns,
+};
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
+}
+
+fn read(path: &str) -> String {
+    fs::read_to_string(root().join(path)).unwrap()
+}
+
+#[test]
+fn the_page_has_the_tables() {
+    let text = read("docs/timing.md");
+    let written = page(&text, &reports(&read("docs/budgets.md")).unwrap()).unwrap();
+    assert_eq!(text, written, "cargo run --release -p pil --bin timing");
+}
+
+/// What the page promises: the motors' frame of a tick has gone out before the next one, except that a Pixracer whose
+/// two links are both full in both directions has no bound; on every board if all fetches hit.
+#[test]
+fn the_tick_is_in_time() {
+    let work = Work::read(&read("docs/budgets.md")).unwrap();
+    for board in &BOARDS {
+        for limit in [CycleLimit::Best, CycleLimit::Bound] {
+            let rows = work.rows(board, limit);
+            let tick = rows.iter().find(|row| row.name.starts_with("control tick")).unwrap();
+            let is_in_time = tick.response_ns.is_some_and(|response| Some(response) <= tick.deadline_ns);
+            assert_eq!(
+                is_in_time,
+                board.names != "pixracer" || limit == CycleLimit::Best,
+                "{}, {limit:?}",
+                board.names
+            );
+        }
+    }
+}
+
+#[test]
+fn a_page_that_lacks_a_row_is_refused() {
+    let text = read("docs/budgets.md");
+    assert!(Work::read(&text).is_ok());
+    let error = Work::read(&text.replace("SysTick's interrupt |", "its interrupt |")).unwrap_err();
+    assert!(error.to_string().contains("SysTick"), "{error}");
+}
+
+#[test]
+fn buses_by_hand() {
+    // Data sheets' examples: 14 bytes and a register at 1 MHz; a byte of 921,600 baud.
+    assert_eq!(spi_ns(15, 1_000_000), 120_000);
+    assert_eq!(RateOfUart::Link.byte_ns(), 10_850);
+    // UM10204: start, address, register, start, address, one byte, stop: 39 bits of 2.5 us.
+    assert_eq!(i2c_ns(4, 3), 97_500);
+    // RM0090's baud rates: f/2 to f/256.
+    assert_eq!(spi_clock_hz(84_000_000, 24_000_000), 21_000_000);
+    assert_eq!(spi_clock_hz(84_000_000, 42_000_000), 42_000_000);
+    assert_eq!(spi_clock_hz(84_000_000, 1_000_000), 656_250);
+    assert_eq!(spi_clock_hz(84_000_000, 1_000), 328_125);
+}
+
+/// ICM-42688-P: temperature, force and rates (14 bytes) and a byte of its set-up, each behind a register.
+#[test]
+fn a_script_is_walked() {
+    let board = BOARDS.iter().find(|board| board.names == "stm32h743").unwrap();
+    let script = board.scripts().into_iter().find(|script| script.part == "ICM-42688-P").unwrap();
+    assert_eq!((script.bytes, script.transfers, script.clock_hz), (17, 2, 12_500_000));
+    assert_eq!(script.time_ns, 9_600 + 1_280);
+}
+
+#[test]
+fn limits_of_the_cores() {
+    for core in [&CORTEX_M4F, &CORTEX_M7] {
+        let [best, bound] = [CycleLimit::Best, CycleLimit::Bound].map(|limit| core.per_instruction(limit));
+        assert!(best < bound && core.per_cached(CycleLimit::Bound) < bound, "{}", core.name);
+        assert!(core.exception_ns(CycleLimit::Best) < core.exception_ns(CycleLimit::Bound));
+    }
+    // Arm's Cortex-M4 issues one instruction at a time.
+    assert!(CORTEX_M4F.per_instruction(CycleLimit::Best) >= 1.0);
+    assert!(CORTEX_M7.per_instruction(CycleLimit::Best) >= 0.5);
+}
+
+/// Every board has a table, with its links and parts.
+#[test]
+fn boards_are_those_of_the_project() {
+    let folders = fs::read_dir(root().join("boards")).unwrap().map(|entry| entry.unwrap().path());
+    let folders = folders.filter(|path| path.is_dir() && !path.ends_with("emulated"));
+    let names: BTreeSet<_> = folders.map(|path| path.file_name().unwrap().to_str().unwrap().to_owned()).collect();
+    let known: BTreeSet<_> = BOARDS.iter().flat_map(|board| board.names.split(", ")).map(str::to_owned).collect();
+    assert_eq!(names, known);
+    for board in &BOARDS {
+        let parts: BTreeSet<_> = board.scripts().iter().map(|script| name_in_code(script.part)).collect();
+        for name in board.names.split(", ") {
+            let folder = root().join("boards").join(name).join("src");
+            let files = fs::read_dir(folder).unwrap().map(|entry| fs::read_to_string(entry.unwrap().path()).unwrap());
+            let code: String = files.collect();
+            let uses = code.lines().filter_map(|line| line.strip_prefix("use afbc_drivers::"));
+            let used: String = uses.collect();
+            let words: BTreeSet<_> = used.split(|c: char| !c.is_alphanumeric()).filter(|word| is_part(word)).collect();
+            assert!(words.iter().all(|word| parts.contains(*word)), "{name}: {words:?}, not {parts:?}");
+            let is_table = code.contains("flight_controller! {");
+            let uarts = if is_table { 1 } else { code.matches("link::config()").count() };
+            assert_eq!(uarts, board.links, "{name}");
+        }
+    }
+}
+
+/// Types of parts begin with a letter in upper case and have digits.
+fn is_part(word: &str) -> bool {
+    word.starts_with(|c: char| c.is_ascii_uppercase())
+        && word.contains(|c: char| c.is_ascii_digit())
+        && !word.starts_with("CW")
+        && !word.ends_with("Registers")
+}
+
+/// `Icm42688p` of ICM-42688-P.
+fn name_in_code(part: &str) -> &str {
+    match part {
+        "ICM-42688-P" => "Icm42688p",
+        "ICM-42605" => "Icm42605",
+        "ICM-20602" => "Icm20602",
+        "ICM-20608-G" => "Icm20608",
+        "ICM-20689" => "Icm20689",
+        "MPU-6000" => "Mpu6000",
+        "MPU-6500" => "Mpu6500",
+        "MPU-9250" => "Mpu9250",
+        "BMI270" => "Bmi270",
+        "SPL06-001" => "Spl06",
+        "DPS310" => "Dps310",
+        "BMP280" => "Bmp280",
+        "MS5611" => "Ms5611",
+        "LIS3MDL" => "Lis3mdl",
+        "QMC5883L" => "Qmc5883l",
+        other => other,
+    }
+}

@@ -1,0 +1,22 @@
+//! The parameters' flash of a board, as if a station had set one of them before.
+
+use afbc_store::{Ram, RecordName, Store, hash};
+use embedded_storage::nor_flash::ReadNorFlash;
+use std::error::Error;
+
+/// Bytes of a sector as the store counts them, and the vehicle of the images.
+const SECTOR: usize = 16 * 1024;
+const VEHICLE: &[u8] = b"paper";
+
+/// Returns the content of the flash in which a parameter has this value. A word of four bytes takes `stride` bytes of
+/// the chip's, the rest of which is not written.
+pub fn parameters(name: &str, value: f32, stride: usize) -> Result<Vec<u8>, Box<dyn Error>> {
+    let mut store = Store::open(Ram::<SECTOR>::BLANK, 0, hash(VEHICLE)).map_err(|error| error.reason())?;
+    store.make_room().map_err(|error| error.reason())?;
+    let name = RecordName::new(name).ok_or("a name")?;
+    store.set(name, 0, Some(value.to_bits())).map_err(|error| error.reason())?;
+    let mut bytes = vec![0; 2 * SECTOR];
+    store.into_flash().read(0, &mut bytes).map_err(|error| format!("{error:?}"))?;
+    let words = bytes.as_chunks::<4>().0.iter();
+    Ok(words.flat_map(|word| word.iter().copied().chain(std::iter::repeat_n(0xFF, stride - 4))).collect())
+}
