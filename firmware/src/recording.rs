@@ -47,7 +47,7 @@ pub fn records() -> bool {
 #[inline(never)]
 pub fn push(tick: &RecordedTick) {
     // Not borrowed elsewhere while it is locked; no panic in any case.
-    let _ = TICKS.lock(|ticks| ticks.try_borrow_mut().ok().map(|mut ticks| ticks.push_back(*tick)));
+    let _ = TICKS.lock(|ticks| ticks.try_borrow_mut().ok().map(|mut ticks| ticks.push_back(*tick).is_ok()));
 }
 
 /// True if a board may keep an exact log: it has sensors, and a link to spare. Others have none of it.

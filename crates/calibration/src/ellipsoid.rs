@@ -36,7 +36,7 @@ pub struct FieldFit {
     pub residual_ut: f32,
 }
 
-/// Normal equations of the ellipsoid, without the readings. With x in [`UNIT_UT`], a reading fulfils
+/// Normal equations of the ellipsoid, without the readings. With x in `UNIT_UT`, a reading fulfils
 ///
 /// ```text
 /// (1 + u) x^2 + (1 + v) y^2 + (1 - u - v) z^2 + 2 d xy + 2 e xz + 2 f yz + 2 g x + 2 h y + 2 i z + k = 0
