@@ -17,7 +17,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Mutex, OnceLock};
 
 /// Tables of a file, and the prefix of their parameters on a station.
-const PREFIXES: [(&str, &str); 8] = [
+const PREFIXES: [(&str, &str); 9] = [
     ("vehicle", "V_"),
     ("motor", "MOT_"),
     ("imu", "IMU_"),
@@ -260,6 +260,7 @@ fn every_parameter_of_a_station_is_in_the_file() {
     const ELSEWHERE: [(&str, &str); 8] = [
         ("CAL_", "those of calibrations: of each vehicle's own sensors"),
         ("LOG_PORT", "the link's"),
+        ("MOT_PROTOCOL", "what its motor controllers understand"),
         ("MOT_LAG", "time_constant_s of [rotors]"),
         ("C_FORCE_MAX", "force_max_n of [rotors]"),
         ("EST_GRAVITY", "gravity_m_s2 of [vehicle]"),
