@@ -34,32 +34,31 @@ const FAREWELL: u32 = 100;
 /// Text to the station when more changes of parameters are waiting for the flash than there is room for.
 const NOT_KEPT: &str = "parameter not kept: set it again";
 
-/// What the links' task has: the services for stations, and the parameters.
-pub type Desk = (Comms, ParameterTable);
+/// What the links' task has: the services for stations, the parameters, and the exact log if there is one.
+pub type Desk = (Comms, ParameterTable, Option<&'static mut ExactLog>);
 
 /// Creates it, with nothing received, to be called once: in place, since a task would store a value twice and take the
 /// stack for it.
 #[inline(never)]
-pub fn make<B: Board>(table: ParameterTable) -> &'static mut Desk {
+pub fn make<B: Board>(table: ParameterTable, log: Option<&'static mut ExactLog>) -> &'static mut Desk {
     static DESK: StaticCell<Desk> = StaticCell::new();
     DESK.init_with(|| {
         let boot_loader = B::BOOT_LOADER.is_some();
         let reboots: &[_] = if boot_loader { &[Reboot::Program, Reboot::BootLoader] } else { &[Reboot::Program] };
         let calibrates = B::Sampler::SENSES;
         let setup = Setup { reboots, calibrates, ..Setup::of(&table.configuration().link) };
-        (Comms::with(setup), table)
+        (Comms::with(setup), table, log)
     })
 }
 
 /// Receives messages, and reports every tick on every link, of which there are `OTHERS` beside the first.
-pub async fn run<B: Board, const OTHERS: usize>((comms, table): &mut Desk, links: &mut B::Links) -> ! {
+pub async fn run<B: Board, const OTHERS: usize>((comms, table, log): &mut Desk, links: &mut B::Links) -> ! {
     // The first link's is in `comms`.
     let mut decoders: [_; OTHERS] = array::from_fn(|_| comms.decoder());
     let mut incoming = [0; READ_MAX];
     let mut outgoing = Vec::<u8, REPORT_MAX>::new();
     let mut leaving = 0;
     let mut calibrator = B::Sampler::SENSES.then(calibrator);
-    let mut log = if recording::is_possible::<B>() { ExactLog::begin::<B>(table) } else { None };
     loop {
         match select(receive(links, &mut incoming), ticks::next()).await {
             Either::First((link, length)) => {
@@ -75,7 +74,7 @@ pub async fn run<B: Board, const OTHERS: usize>((comms, table): &mut Desk, links
                 };
                 let tick = control::with_mail(|inputs| inputs.merge(&news));
                 if recording::is_possible::<B>()
-                    && let Some(log) = &mut log
+                    && let Some(log) = log
                 {
                     log.inputs(tick, &news);
                 }
@@ -107,13 +106,13 @@ pub async fn run<B: Board, const OTHERS: usize>((comms, table): &mut Desk, links
                     let news = comms.receive(&[]);
                     let tick = control::with_mail(|inputs| inputs.merge(&news));
                     if recording::is_possible::<B>()
-                        && let Some(log) = &mut log
+                        && let Some(log) = log
                     {
                         log.inputs(tick, &news);
                     }
                 }
                 if recording::is_possible::<B>()
-                    && let Some(log) = &mut log
+                    && let Some(log) = log
                 {
                     log.send(&tick, links);
                 }

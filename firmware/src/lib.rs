@@ -64,7 +64,9 @@ pub fn run<B: Board>(
     }
     board.set_motor_protocol(table.configuration().outputs.protocol);
     let flight = control::make(table.configuration());
-    let desk = comms::make::<B>(table);
+    // Before the watchdog: it looks at each parameter.
+    let log = if recording::is_possible::<B>() { recording::ExactLog::begin::<B>(&table) } else { None };
+    let desk = comms::make::<B>(table, log);
     board.unleash_watchdog();
     time::start(core.SYST, B::CORE_HZ);
     comms(executors.comms, desk, links);
