@@ -17,7 +17,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Mutex, OnceLock};
 
 /// Tables of a file, and the prefix of their parameters on a station.
-const PREFIXES: [(&str, &str); 9] = [
+const PREFIXES: [(&str, &str); 8] = [
     ("vehicle", "V_"),
     ("motor", "MOT_"),
     ("imu", "IMU_"),
@@ -257,7 +257,7 @@ fn every_value_of_a_vehicles_file_counts() {
 /// What a station may set is in a vehicle's file, but for what follows from another key, or is not the vehicle's.
 #[test]
 fn every_parameter_of_a_station_is_in_the_file() {
-    const ELSEWHERE: [(&str, &str); 8] = [
+    const ELSEWHERE: [(&str, &str); 9] = [
         ("CAL_", "those of calibrations: of each vehicle's own sensors"),
         ("LOG_PORT", "the link's"),
         ("MOT_PROTOCOL", "what its motor controllers understand"),
