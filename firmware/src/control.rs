@@ -69,13 +69,13 @@ pub fn make(configuration: &Configuration) -> &'static mut Flight {
 
 /// Runs the ticks.
 pub async fn run<B: Board>(flight: &mut Flight, board: &mut B) -> ! {
-    let (mut inputs, mut readings, mut adopted) = (ControlInputs::EMPTY, Readings::NONE, None);
+    let (mut inputs, mut readings, mut number, mut adopted) = (ControlInputs::EMPTY, Readings::NONE, 0, None);
     loop {
         // Not a ticker, whose periods begin when it is created: just after the start of a control period, when alarms
         // are due, it would tick twice in every second period.
         Timer::at(time::next_period()).await;
         let stopwatch = Stopwatch::start();
-        let (report, number) = tick(flight, &mut inputs, &mut readings, board);
+        let report = tick(flight, &mut inputs, &mut readings, &mut number, board);
         if recording::is_possible::<B>() && recording::records() {
             let clock_failed = board.clock_has_failed();
             recording::push(&RecordedTick { number, clock_failed, adopted, readings, report });
@@ -103,23 +103,24 @@ fn adopt(flight: &mut Flight) -> Option<u16> {
 }
 
 /// The top loop: takes the newest inputs; supervises, controls and gates the motors ([`afbc_flight_core::tick`]);
-/// drives them; checks the rate; returns the report and the tick's number. Out of line, so that its stack and its instructions can be counted
+/// drives them; checks the rate. Out of line, so that its stack and its instructions can be counted
 /// (`docs/budgets.md`).
 #[inline(never)]
 fn tick<B: Board>(
     flight: &mut Flight,
     inputs: &mut ControlInputs,
     readings: &mut Readings,
+    number: &mut u32,
     board: &mut B,
-) -> (Report, u32) {
+) -> Report {
     let now_us = Instant::now().as_micros();
     // Not borrowed elsewhere while it is locked; the tick has no panic.
-    let number = MAIL.lock(|shared| {
-        let mut shared = shared.try_borrow_mut().ok()?;
-        let (mail, number) = &mut *shared;
+    MAIL.lock(|shared| {
+        let Ok(mut shared) = shared.try_borrow_mut() else { return };
+        let (mail, next) = &mut *shared;
         mail.take_into(inputs);
-        *number = number.wrapping_add(1);
-        Some(number.wrapping_sub(1))
+        *number = *next;
+        *next = next.wrapping_add(1);
     });
 
     if board.clock_has_failed() {
@@ -139,5 +140,5 @@ fn tick<B: Board>(
     if report.health.rate.alive && !may_reset {
         board.feed_watchdog();
     }
-    (report, number.unwrap_or_default())
+    report
 }
