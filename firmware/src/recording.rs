@@ -1,5 +1,5 @@
-//! What ticks took and gave, from the control task to the links' task, for the exact log ([`afbc_recorder`]). Nothing is
-//! kept unless a link carries it.
+//! What ticks took and gave, from the control task to the links' task, for the exact log ([`afbc_recorder`]). Nothing
+//! is kept unless a link carries it.
 
 use crate::board::{Board, Links, Transmitter};
 use crate::samples::Sampler;

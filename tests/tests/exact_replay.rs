@@ -114,8 +114,8 @@ fn flights_are_flown_again_to_the_last_bit() {
     }
 }
 
-/// A bit of a reading that is not as it was changes the flight, from that tick on or soon after; what a tick gave that is
-/// not as it was is named at once, and so is a tick that is missing.
+/// A bit of a reading that is not as it was changes the flight, from that tick on or soon after; what a tick gave that
+/// is not as it was is named at once, and so is a tick that is missing.
 #[test]
 fn what_differs_is_named() {
     let scenario = load(Path::new(SCENARIO)).unwrap();
