@@ -2,8 +2,9 @@
 //! purpose, and the documented wiring is that of the code.
 //!
 //! The compiler already refuses a pin on the wrong peripheral, a DMA stream of another request, the wrong channel of
-//! a timer, and any of them used twice; the linker refuses two handlers of an interrupt, and an image that is too large.
-#![allow(clippy::unwrap_used, clippy::indexing_slicing, clippy::panic, missing_docs)] // what cannot be read must stop it
+//! a timer, and any of them used twice; the linker refuses two handlers of an interrupt, and an image that is too
+//! large.
+#![allow(clippy::unwrap_used, clippy::indexing_slicing, clippy::panic, missing_docs)] // what is unreadable must stop it
 
 mod board_table;
 
