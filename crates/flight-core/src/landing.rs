@@ -35,8 +35,8 @@ pub const FROZEN_US: u32 = 500_000;
 /// Time of hovering after which an earlier descent no longer counts \[us\].
 pub const HOVER_US: u32 = 2_000_000;
 /// Speed that a falling vehicle would have gained when one that has gained less than this share of it stands on the
-/// ground \[m/s\].
-pub const FALL_M_S: f32 = 1.5;
+/// ground \[m/s\]. Rotors that follow within 0.1 s, the slowest, leave a falling one 1 m/s short of it.
+pub const FALL_M_S: f32 = 3.0;
 /// That share.
 pub const FALL_SHARE: f32 = 0.5;
 /// Speed along each axis up to which that counts: faster, drag may carry a vehicle \[m/s\].
