@@ -78,7 +78,7 @@ pub async fn run<B: Board>(flight: &mut Flight, board: &mut B) -> ! {
         let report = tick(flight, &mut inputs, &mut readings, &mut number, board);
         if recording::is_possible::<B>() && recording::records() {
             let clock_failed = board.clock_has_failed();
-            recording::push(&RecordedTick { number, clock_failed, adopted, readings, report });
+            recording::push(&RecordedTick { number, clock_failed, adopted, readings, battery: inputs.battery, report });
         }
         adopted = None;
         ARMED.store(report.mode.armed(), Ordering::Relaxed);
@@ -119,8 +119,10 @@ fn tick<B: Board>(
         let Ok(mut shared) = shared.try_borrow_mut() else { return };
         let (mail, next) = &mut *shared;
         mail.take_into(inputs);
-        *number = *next;
-        *next = next.wrapping_add(1);
+        if recording::is_possible::<B>() {
+            *number = *next;
+            *next = next.wrapping_add(1);
+        }
     });
 
     if board.clock_has_failed() {

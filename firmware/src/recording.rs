@@ -5,9 +5,10 @@ use crate::board::{Board, Links, Transmitter};
 use crate::samples::Sampler;
 use crate::ticks::Tick;
 use crate::vehicle::{ParameterTable, Report};
+use afbc_guidance::BatteryReading;
 use afbc_onboard::parameters::RecordChange;
 use afbc_onboard::{ControlInputs, Readings};
-use afbc_recorder::Recorder;
+use afbc_recorder::{Given, Recorder, TickRecord};
 use core::cell::RefCell;
 use core::sync::atomic::{AtomicBool, Ordering};
 use embassy_sync::blocking_mutex::Mutex;
@@ -29,6 +30,8 @@ pub struct RecordedTick {
     pub adopted: Option<u16>,
     /// What it took of the sensors.
     pub readings: Readings,
+    /// What it took of the battery.
+    pub battery: Option<BatteryReading>,
     /// What it gave.
     pub report: Report,
 }
@@ -99,10 +102,10 @@ impl ExactLog {
     #[inline(never)]
     pub fn send(&mut self, tick: &Tick, links: &mut impl Links) {
         let ExactLog { recorder, bytes, link } = self;
-        while let Some(RecordedTick { number, clock_failed, adopted, readings, report }) = pop() {
-            recorder.tick(number, clock_failed, &readings, &report, adopted, &mut |frame| {
-                drop(bytes.extend_from_slice(frame));
-            });
+        while let Some(RecordedTick { number, clock_failed, adopted, readings, battery, report }) = pop() {
+            let (time_us, given) = (report.time_us, Given::of(&report));
+            let record = TickRecord { number, time_us, clock_failed, readings, battery, adopted, given };
+            recorder.tick(&record, &mut |frame| drop(bytes.extend_from_slice(frame)));
         }
         if let Some(link) = links.each().get_mut(*link) {
             link.transmitter.transmit(tick, bytes);

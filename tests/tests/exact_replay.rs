@@ -8,11 +8,13 @@
 )]
 
 use afbc_hil::Host;
+use afbc_link::telemetry::BatteryStatus;
 use afbc_link::{Address, Command, Datum, FRAME_MAX, Height, ParameterRequest, Sender, Uplink};
 use afbc_onboard::Configuration;
 use afbc_recorder::{FRAME_MAX as RECORD_MAX, Frames, Record, ReplayDifference, ReplayStep, Replayer, write};
 use afbc_scenario::{Scenario, load};
 use afbc_sim::flight::World;
+use afbc_station::AuxSensors;
 use afbc_types::{ROTORS_MAX, RotorSpeeds, State};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
@@ -21,6 +23,9 @@ use std::path::Path;
 use std::rc::Rc;
 
 const STATION: Address = Address { system: 255, component: 190 };
+/// Types of parameters, as MAV_PARAM_TYPE.
+const INT32: u8 = 6;
+const REAL32: u8 = 9;
 /// From the ground, outdoors.
 const SCENARIO: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../twin/scenarios/hover.toml");
 
@@ -28,6 +33,7 @@ const SCENARIO: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../twin/scenarios/h
 fn sends(ms: u64, random: &mut Xoshiro256PlusPlus) -> Option<Uplink> {
     let command = |command| Some(Uplink::Command(command));
     match ms {
+        500 => return Some(set(b"BAT1_N_CELLS", 3_i32.to_le_bytes(), INT32)),
         6_000 | 7_000 | 8_000 | 9_000 => return command(Command::Arm),
         6_300 | 7_300 | 8_300 | 9_300 => return command(Command::TakeOff(Height { metres: 4.0, above: Datum::Home })),
         18_000 => return command(Command::Land),
@@ -42,10 +48,8 @@ fn sends(ms: u64, random: &mut Xoshiro256PlusPlus) -> Option<Uplink> {
         2 => command(Command::SelectStandardMode((random.next_u32() % 8) as u8)),
         3 => command(Command::Home(None)),
         4 => {
-            let mut name = [0; 16];
-            name.iter_mut().zip(b"MPC_XY_VEL_MAX").for_each(|(to, from)| *to = *from);
-            let value = (2.0_f32 + (random.next_u32() % 9) as f32).to_le_bytes();
-            Some(Uplink::Parameter(ParameterRequest::Set { name, value, kind: 9 }))
+            let speed_m_s = 2.0_f32 + (random.next_u32() % 9) as f32;
+            Some(set(b"MPC_XY_VEL_MAX", speed_m_s.to_le_bytes(), REAL32))
         }
         5 => Some(Uplink::State { sent_us: ms * 1_000, state: State::default(), sigmas: Default::default() }),
         6 if ms > 12_000 => command(Command::Return),
@@ -53,11 +57,20 @@ fn sends(ms: u64, random: &mut Xoshiro256PlusPlus) -> Option<Uplink> {
     }
 }
 
+/// Sets a parameter.
+fn set(name: &[u8], value: [u8; 4], kind: u8) -> Uplink {
+    let mut letters = [0; 16];
+    letters.iter_mut().zip(name).for_each(|(to, from)| *to = *from);
+    Uplink::Parameter(ParameterRequest::Set { name: letters, value, kind })
+}
+
 /// Flies, with noise on the link, and returns the log.
 fn fly(scenario: &Scenario, seed: u64, ticks: u64) -> Vec<u8> {
     let (log, mut host) = (Rc::new(RefCell::new(Vec::new())), Host::new().unwrap());
     let sink = Rc::clone(&log);
     host.record(move |frame| sink.borrow_mut().extend_from_slice(frame));
+    let battery = BatteryStatus { voltage_mv: 12_500, current_ca: 500, ..BatteryStatus::default() };
+    host.comms().set_aux_sensors(AuxSensors { battery: Some(battery), ..AuxSensors::default() });
     let mut world = World::released(&Scenario { seed, ..scenario.clone() }, 1e-3).unwrap();
     let (mut random, mut sender) = (Xoshiro256PlusPlus::seed_from_u64(seed), Sender::new(STATION));
     let (mut speeds, mut buffer) = (RotorSpeeds::<ROTORS_MAX>::default(), [0; FRAME_MAX]);
@@ -154,6 +167,32 @@ fn what_differs_is_named() {
             }
         }
     }
+}
+
+/// A board measures its battery beside the messages; what a tick took of it counts, too.
+#[test]
+fn a_battery_counts() {
+    let scenario = load(Path::new(SCENARIO)).unwrap();
+    let mut changed = records(&fly(&scenario, 3, 40_000));
+    let full = replay(&log_of(&changed));
+    assert_eq!(full, (40_000, None));
+    for record in &mut changed {
+        if let Record::Tick(tick) = record
+            && tick.number >= 10_000
+        {
+            tick.battery.as_mut().unwrap().voltage_v = 7.0;
+        }
+    }
+    let (ticks, difference) = replay(&log_of(&changed));
+    assert!((10_000..40_000).contains(&ticks), "{ticks}: {difference:?}");
+}
+
+/// The longest record has room in a frame.
+#[test]
+fn every_record_fits() {
+    let scenario = load(Path::new(SCENARIO)).unwrap();
+    let longest = records(&fly(&scenario, 5, 20_000)).into_iter().map(|record| log_of(&[record]).len()).max().unwrap();
+    assert!(longest < RECORD_MAX / 2, "{longest}");
 }
 
 /// Damaged bytes are noticed, whatever they are: never a panic, never another flight that passes for this one.

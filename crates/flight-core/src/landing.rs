@@ -3,9 +3,7 @@
 //! An armed vehicle is on the ground until it moves away or has been carried by its rotors for a moment. It has landed
 //! if it was seen to descend and stop, and then stays at rest for a second although its rotors do not carry it. If it
 //! appears to be at rest all the time while its thrust decreases, it has not landed: its tracker has frozen.
-//!
-//! An estimate by an inertial sensor shows the ground sooner, and also if its velocity is off by tenths of a metre per
-//! second: a vehicle that its rotors do not carry, and that does not fall, stands on something.
+//! An estimate by an inertial sensor shows the ground sooner ([`crate::fall_check`]).
 //!
 //! `afbc::standstill` is a separate detector, which stops the adaptation: it uses the thrust demanded by the law, and
 //! is faster, since it does not stop the motors.
@@ -34,15 +32,6 @@ pub const STILL_US: u32 = 1_000_000;
 pub const FROZEN_US: u32 = 500_000;
 /// Time of hovering after which an earlier descent no longer counts \[us\].
 pub const HOVER_US: u32 = 2_000_000;
-/// Speed that a falling vehicle would have gained when one that has gained less than this share of it stands on the
-/// ground \[m/s\]. Rotors that follow within 0.1 s, the slowest, leave a falling one 1 m/s short of it.
-pub const FALL_M_S: f32 = 3.0;
-/// That share.
-pub const FALL_SHARE: f32 = 0.5;
-/// Speed along each axis up to which that counts: faster, drag may carry a vehicle \[m/s\].
-pub const FALL_MAX_M_S: f32 = 1.5;
-/// Acceleration of free fall \[m/s2\].
-const GRAVITY_M_S2: f32 = 9.81;
 
 /// Tells whether the vehicle is in the air, and when it has landed.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -60,10 +49,6 @@ pub struct LandDetector {
     still_us: u32,
     carried_us: u32,
     uncarried_us: u32,
-    /// Vertical velocity when the rotors carried it last, and the speed that it would have gained since in falling
-    /// \[m/s\].
-    carried_m_s: f32,
-    fall_m_s: f32,
 }
 
 impl LandDetector {
@@ -78,14 +63,11 @@ impl LandDetector {
             still_us: 0,
             carried_us: 0,
             uncarried_us: 0,
-            carried_m_s: 0.0,
-            fall_m_s: 0.0,
         }
     }
 
     /// Processes a tick with a fresh state, `gap_us` after the last one, in which the rotors gave `thrust_n`.
-    /// `is_inertial`: whether the state is an estimate by an inertial sensor.
-    pub fn advance(&mut self, state: &State, is_inertial: bool, thrust_n: f32, gap_us: u32, dt_s: f32) {
+    pub fn advance(&mut self, state: &State, thrust_n: f32, gap_us: u32, dt_s: f32) {
         let faster = |speed_m_s: f32| state.velocity_m_s.iter().any(|velocity_m_s| velocity_m_s.abs() > speed_m_s);
         self.wait(gap_us);
         if faster(STILL_M_S) {
@@ -93,10 +75,8 @@ impl LandDetector {
         }
         if thrust_n > CARRY_SHARE * self.usual_n {
             self.uncarried_us = 0;
-            (self.carried_m_s, self.fall_m_s) = (state.velocity_m_s.z, 0.0);
         } else {
             self.carried_us = 0;
-            self.fall_m_s += dt_s * GRAVITY_M_S2 * (1.0 - thrust_n / self.usual_n);
         }
         self.sank |= state.velocity_m_s.z < -SINKS_M_S;
         self.left = self.left || faster(LEFT_M_S) || abs_max(&(state.position_m - self.stood_m)) > LEFT_M;
@@ -108,11 +88,20 @@ impl LandDetector {
         if self.still_us >= HOVER_US && self.uncarried_us == 0 {
             self.sank = false;
         }
-        let falls_m_s = self.carried_m_s - state.velocity_m_s.z;
-        let is_held =
-            is_inertial && self.fall_m_s > FALL_M_S && falls_m_s < FALL_SHARE * self.fall_m_s && !faster(FALL_MAX_M_S);
-        let stands = self.stands_for_us() > STILL_US;
-        if self.sank && (is_held || stands) || !self.left && stands {
+        if self.stands_for_us() > STILL_US && (self.sank || !self.left) {
+            let usual_n = self.usual_n;
+            *self = LandDetector { usual_n, ..LandDetector::new(state, usual_n) };
+        }
+    }
+
+    /// Returns the thrust as a share of the usual one.
+    pub fn thrust_share(&self, thrust_n: f32) -> f32 {
+        thrust_n / self.usual_n
+    }
+
+    /// A vehicle that was seen to descend stands on the ground: it has landed.
+    pub fn touch_down(&mut self, state: &State) {
+        if self.sank {
             let usual_n = self.usual_n;
             *self = LandDetector { usual_n, ..LandDetector::new(state, usual_n) };
         }
@@ -131,8 +120,6 @@ impl LandDetector {
             still_us: 0,
             carried_us: 0,
             uncarried_us: 0,
-            carried_m_s: 0.0,
-            fall_m_s: 0.0,
         };
     }
 
@@ -140,7 +127,7 @@ impl LandDetector {
     /// have not carried it for long enough.
     pub fn advance_adrift(&mut self, state: &State, thrust_n: f32, gap_us: u32, dt_s: f32) {
         self.sank = true;
-        self.advance(&State { velocity_m_s: Vector3::zeros(), ..*state }, false, thrust_n, gap_us, dt_s);
+        self.advance(&State { velocity_m_s: Vector3::zeros(), ..*state }, thrust_n, gap_us, dt_s);
         // Also for the states that come back, which may see no more of the descent than its end. Nor did it hover.
         self.sank |= self.airborne;
         self.still_us = self.still_us.min(STILL_US.saturating_add(1));

@@ -22,6 +22,7 @@ pub mod clock;
 pub mod dead_reckoning;
 pub mod descent;
 pub mod dshot;
+pub mod fall_check;
 pub mod frozen_tracker;
 pub mod inbox;
 pub mod landing;

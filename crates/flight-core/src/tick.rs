@@ -2,6 +2,7 @@
 
 use crate::dead_reckoning::{DeadReckoning, Reckoning};
 use crate::descent::{Descent, Drift};
+use crate::fall_check::FallCheck;
 use crate::frozen_tracker::FrozenTrackerCheck;
 use crate::inbox::Inbox;
 use crate::landing::LandDetector;
@@ -65,6 +66,8 @@ struct Armed<M> {
     idle_on_ground: bool,
     guide: Guide,
     landing: LandDetector,
+    /// Whether it falls, if the state is an estimate by an inertial sensor.
+    fall: FallCheck,
     tumble: Tumble,
     witness: FrozenTrackerCheck,
     /// True if the tracker contradicted itself or the thrust: its states are ignored for the rest of the flight.
@@ -475,7 +478,10 @@ impl<M> FlightCoreMemory<M> {
         match (fresh, position_lost) {
             (Some(state), _) => {
                 flight.tumble.advance(state, gap_us);
-                flight.landing.advance(state, inbox.is_own(), flight.applied.thrust_n, gap_us, dt_s);
+                flight.landing.advance(state, flight.applied.thrust_n, gap_us, dt_s);
+                if inbox.is_own() {
+                    check_fall(&mut flight.fall, &mut flight.landing, flight.applied.thrust_n, state, dt_s);
+                }
                 flight.distrusts |= flight.landing.contradicts();
             }
             (None, Some(state)) => {
@@ -487,6 +493,14 @@ impl<M> FlightCoreMemory<M> {
                 flight.landing.advance_blind(gap_us);
             }
         }
+    }
+}
+
+/// Looks for the ground by an inertial sensor's estimate. Out of line, for the ticks without one.
+#[inline(never)]
+fn check_fall(fall: &mut FallCheck, landing: &mut LandDetector, thrust_n: f32, state: &State, dt_s: f32) {
+    if fall.stands(&state.velocity_m_s, landing.thrust_share(thrust_n), dt_s) {
+        landing.touch_down(state);
     }
 }
 
@@ -505,6 +519,7 @@ impl<M: Default> Armed<M> {
             idle_on_ground: true,
             guide: Guide::default(),
             landing: LandDetector::new(state, weight_n),
+            fall: FallCheck::default(),
             tumble: Tumble::default(),
             witness: FrozenTrackerCheck::new(state, now_us),
             distrusts: false,

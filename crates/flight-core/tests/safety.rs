@@ -329,7 +329,7 @@ fn a_descent_without_a_position_counts_when_the_position_comes_back() {
             if position_lost {
                 landing.advance_adrift(state, thrust_n, gap_us, dt_s);
             } else {
-                landing.advance(state, false, thrust_n, gap_us, dt_s);
+                landing.advance(state, thrust_n, gap_us, dt_s);
             }
         }
         landing.airborne()

@@ -6,7 +6,7 @@ use afbc_flight_core::rate::PERIOD_US;
 use afbc_link::{Decoder, Uplink};
 use afbc_onboard::parameters::{Kept, ParameterTable, Reason, RecordChange};
 use afbc_onboard::{Configuration, ControlInputs, Flight, Link, Prepared, RawReadings, Readings, Report};
-use afbc_recorder::Recorder;
+use afbc_recorder::{Given, Recorder, TickRecord};
 use afbc_station::{Calibrator, Comms, Setup};
 use afbc_store::Store;
 use afbc_types::{OutOfRange, ROTORS_MAX, with_rotors};
@@ -237,7 +237,10 @@ impl Host {
         let tell = Tell { comms: &mut self.comms, tick_us, send: &mut send };
         let report = self.flight.tick(time_us, &mut self.taken, &readings, tell);
         if let Some(ExactLog { recorder, write, adopted }) = &mut self.log {
-            recorder.tick(self.number, false, &readings, &report, adopted.take(), write);
+            let (number, given, battery) = (self.number, Given::of(&report), self.taken.battery);
+            let adopted = adopted.take();
+            recorder
+                .tick(&TickRecord { number, time_us, clock_failed: false, readings, battery, adopted, given }, write);
         }
         if self.comms.is_calibrating() {
             self.raw.add(time_us, &readings);

@@ -1,5 +1,6 @@
 //! What is recorded.
 
+use afbc_guidance::BatteryReading;
 use afbc_onboard::{ControlInputs, Readings, Report};
 use afbc_store::RecordName;
 use afbc_types::ROTORS_MAX;
@@ -65,6 +66,8 @@ pub struct TickRecord {
     pub clock_failed: bool,
     /// What the sensors had read.
     pub readings: Readings,
+    /// The battery, if it was measured.
+    pub battery: Option<BatteryReading>,
     /// Number of the configuration that is flown from this tick on, if it is another.
     pub adopted: Option<u16>,
     /// What it gave.

@@ -1,9 +1,9 @@
 //! The writing side.
 
 use crate::frame::{FRAME_MAX, write};
-use crate::record::{Given, Record, StartRecord, TickRecord, VERSION};
+use crate::record::{Record, StartRecord, TickRecord, VERSION};
+use afbc_onboard::ControlInputs;
 use afbc_onboard::parameters::{ParameterTable, RecordChange};
-use afbc_onboard::{ControlInputs, Readings, Report};
 
 /// Makes the frames of a log, in the order in which it is called: beside the control tick, not in it.
 #[derive(Clone, Debug)]
@@ -53,27 +53,19 @@ impl Recorder {
         configuration
     }
 
-    /// Records what messages have brought for the tick of this number, if they have brought anything.
+    /// Records what messages have brought for the tick of this number, if they have brought anything. The battery is
+    /// recorded with the tick.
     pub fn inputs(&mut self, tick: u32, inputs: &ControlInputs, send: &mut impl FnMut(&[u8])) {
-        if *inputs != ControlInputs::EMPTY {
-            self.frame(&Record::Inputs { tick, inputs: inputs.clone() }, send);
+        let mut inputs = inputs.clone();
+        inputs.battery = None;
+        if inputs != ControlInputs::EMPTY {
+            self.frame(&Record::Inputs { tick, inputs }, send);
         }
     }
 
-    /// Records a tick: its number, whether its clock was not trusted, what it took and gave, and the number of the
-    /// configuration that is flown from it on, if it is another.
-    pub fn tick<const N: usize>(
-        &mut self,
-        number: u32,
-        clock_failed: bool,
-        readings: &Readings,
-        report: &Report<N>,
-        adopted: Option<u16>,
-        send: &mut impl FnMut(&[u8]),
-    ) {
-        let (time_us, given) = (report.time_us, Given::of(report));
-        let record = TickRecord { number, time_us, clock_failed, readings: *readings, adopted, given };
-        self.frame(&Record::Tick(record), send);
+    /// Records a tick.
+    pub fn tick(&mut self, record: &TickRecord, send: &mut impl FnMut(&[u8])) {
+        self.frame(&Record::Tick(*record), send);
     }
 
     fn frame(&mut self, record: &Record, send: &mut impl FnMut(&[u8])) {

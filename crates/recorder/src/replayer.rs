@@ -149,6 +149,8 @@ impl<const N: usize> Replayer<N> {
             self.coming.pop_front();
         }
         self.inputs.take_into(&mut self.taken);
+        // Not from messages, and not only what is new.
+        self.taken.battery = tick.battery;
         if tick.clock_failed {
             self.flight.distrust_clock();
         }

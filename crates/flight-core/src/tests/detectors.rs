@@ -2,10 +2,11 @@
 //! times, to the tick.
 #![allow(clippy::expect_used, reason = "a test that cannot go on should say why")]
 
+use crate::fall_check::{FALL_M_S, FALL_MAX_M_S, FALL_SHARE, FallCheck};
 use crate::frozen_tracker::{FrozenTrackerCheck, STANDS_SHARE, TRAVEL_M, TURN_RAD, WINDOW_US};
 use crate::landing::{
-    CARRIED_US, CARRY_SHARE, FALL_M_S, FALL_MAX_M_S, FALL_SHARE, FROZEN_US, HOVER_US, LEFT_M, LEFT_M_S, LandDetector,
-    SINKS_M_S, STILL_M_S, STILL_US, USUAL_S,
+    CARRIED_US, CARRY_SHARE, FROZEN_US, HOVER_US, LEFT_M, LEFT_M_S, LandDetector, SINKS_M_S, STILL_M_S, STILL_US,
+    USUAL_S,
 };
 use crate::tumble::{LOST_US, SPIN_RAD_S, TILT_COSINE_MIN, Tumble, UPRIGHT_US};
 use afbc_types::State;
@@ -254,7 +255,7 @@ impl Land {
     /// Runs so many ticks; true if the vehicle is in the air then.
     fn run(&mut self, ticks: u32, state: &State, thrust_n: f32) -> bool {
         for _ in 0..ticks {
-            self.0.advance(state, false, thrust_n, GAP_US, DT_S);
+            self.0.advance(state, thrust_n, GAP_US, DT_S);
         }
         self.0.airborne()
     }
@@ -392,63 +393,62 @@ fn rest_in_the_air_without_thrust_contradicts() {
     assert!(!land.0.contradicts());
 }
 
-/// Ticks after which a vehicle that sinks, and whose rotors then give this share of its weight, has landed by an
-/// inertial estimate whose vertical velocity is off by `bias_m_s`; it accelerates by `acceleration_m_s2` from then on.
-fn held(is_inertial: bool, share: f32, acceleration_m_s2: Vector3<f32>, bias_m_s: f32) -> Option<u32> {
-    let mut land = Land::hovering();
-    let mut state = moving(along(2, -0.7 + bias_m_s));
-    land.0.advance(&state, is_inertial, WEIGHT_N, GAP_US, DT_S);
-    if acceleration_m_s2.z == 0.0 {
-        state = moving(along(2, bias_m_s));
-    }
-    (1..=900).find(|_| {
-        state.velocity_m_s += acceleration_m_s2 * DT_S;
-        land.0.advance(&state, is_inertial, share * WEIGHT_N, GAP_US, DT_S);
-        !land.0.airborne()
-    })
+/// Ticks after which a vehicle that stood still, and whose rotors then give this share of the usual thrust, is found
+/// standing, if its vertical velocity is off by `bias_m_s`; it accelerates by `acceleration_m_s2` from then on.
+fn held(share: f32, acceleration_m_s2: f32, bias_m_s: f32) -> Option<u32> {
+    let mut fall = FallCheck::default();
+    assert!(!fall.stands(&along(2, bias_m_s), 1.0, DT_S));
+    (1..=900).find(|tick| fall.stands(&along(2, bias_m_s + acceleration_m_s2 * *tick as f32 * DT_S), share, DT_S))
 }
 
 /// What neither its rotors carry nor falls, stands, whatever its velocity is off by.
 #[test]
 fn what_does_not_fall_stands() {
     for (share, bias_m_s) in [(0.0, 0.0), (0.3, 0.0), (0.3, -0.4), (0.3, 0.4), (0.5, -0.4)] {
-        let ticks = held(true, share, Vector3::zeros(), bias_m_s).expect("landed");
-        let falls_s = FALL_M_S / (9.81 * (1.0 - share));
-        // The usual thrust decreases meanwhile.
-        assert!((falls_s / DT_S - 2.0..1.1 * falls_s / DT_S).contains(&(ticks as f32)), "{share}: {ticks} ticks");
-        assert_eq!(held(false, share, Vector3::zeros(), bias_m_s), None, "of a tracker that may have frozen");
+        let ticks = held(share, 0.0, bias_m_s).expect("it stands") as f32;
+        assert!((ticks - FALL_M_S / (9.81 * (1.0 - share)) / DT_S).abs() < 3.0, "{share}: {ticks} ticks");
     }
-    assert_eq!(held(true, CARRY_SHARE * 1.05, Vector3::zeros(), 0.0), None, "carried");
+    assert_eq!(held(CARRY_SHARE * 1.05, 0.0, 0.0), None, "carried");
     // It falls, by more or less than the share that counts.
     for share in [0.0, 0.3, 0.5] {
-        let falls = |of_it: f32| held(true, share, along(2, -of_it * 9.81 * (1.0 - share)), 0.5);
-        assert_eq!(falls(FALL_SHARE + 0.4), None);
-        assert!(falls(FALL_SHARE - 0.2).is_some());
+        let falls = |of_it: f32| held(share, -of_it * 9.81 * (1.0 - share), 0.5);
+        assert_eq!(falls(FALL_SHARE + 0.1), None);
+        assert!(falls(FALL_SHARE - 0.1).is_some());
     }
-    // Nor has it landed if its rotors are slow to follow, and its velocity is old by as much as a state may be.
+    // Fast ones may be carried by their drag, or roll.
+    for axis in 0..3 {
+        for (size, stands) in [(1.01, false), (0.99, true), (-1.01, false), (-0.99, true)] {
+            let (mut fall, velocity_m_s) = (FallCheck::default(), along(axis, size * FALL_MAX_M_S));
+            fall.stands(&velocity_m_s, 1.0, DT_S);
+            assert_eq!((0..900).any(|_| fall.stands(&velocity_m_s, 0.0, DT_S)), stands, "{axis}: {size}");
+        }
+    }
+}
+
+/// Nor has it landed if its rotors are slow to follow, and its velocity is as old as a state may be.
+#[test]
+fn what_falls_late_does_not_stand() {
     for (lag_s, from_m_s) in [(0.02, -0.3), (0.07, -0.3), (0.1, -0.3), (0.1, -1.0), (0.1, 0.5)] {
-        let mut land = Land::hovering();
-        land.0.advance(&moving(along(2, -0.3)), true, WEIGHT_N, GAP_US, DT_S);
-        land.0.advance(&moving(along(2, from_m_s)), true, WEIGHT_N, GAP_US, DT_S);
+        let mut fall = FallCheck::default();
+        fall.stands(&along(2, from_m_s), 1.0, DT_S);
         for tick in 0..900 {
             let time_s = (tick as f32 * DT_S - 0.02).max(0.0);
             let falls_m_s = 9.81 * (time_s - lag_s * (1.0 - (-time_s / lag_s).exp()));
-            land.0.advance(&moving(along(2, from_m_s - falls_m_s)), true, 0.0, GAP_US, DT_S);
-            assert!(land.0.airborne(), "{lag_s} s, from {from_m_s} m/s, after {tick} ms");
+            let stands = fall.stands(&along(2, from_m_s - falls_m_s), 0.0, DT_S);
+            assert!(!stands, "{lag_s} s, from {from_m_s} m/s, after {tick} ms");
         }
     }
-    // Fast ones may be carried by their drag, or roll.
-    let mut land = Land::hovering();
-    land.0.advance(&moving(along(2, -1.0)), true, WEIGHT_N, GAP_US, DT_S);
-    for fast in [along(0, 1.01 * FALL_MAX_M_S), along(1, -1.01 * FALL_MAX_M_S), along(2, -1.01 * FALL_MAX_M_S)] {
-        let mut land = Land(land.0);
-        (0..900).for_each(|_| land.0.advance(&moving(fast), true, 0.0, GAP_US, DT_S));
-        assert!(land.0.airborne(), "{fast}");
+}
+
+/// A vehicle that has sunk lands when it touches down; one that has not has not.
+#[test]
+fn a_touch_down_ends_a_descent() {
+    for (sinks, airborne) in [(1.01 * SINKS_M_S, false), (0.99 * SINKS_M_S, true)] {
+        let mut land = Land::hovering();
+        land.run(1, &moving(along(2, -sinks)), WEIGHT_N);
+        land.0.touch_down(&somewhere());
+        assert_eq!(land.0.airborne(), airborne, "{sinks} m/s");
     }
-    // One that has not sunk has not landed.
-    let mut land = Land::hovering();
-    (0..5000).for_each(|_| land.0.advance(&somewhere(), true, 0.0, GAP_US, DT_S));
-    assert!(land.0.airborne());
 }
 
 /// At rest by the mark it stands where it is, if that is known, as if it had never flown but for its usual thrust.
@@ -462,11 +462,11 @@ fn a_resting_vehicle_stands_where_it_is() {
         assert!(!land.0.airborne());
         let stands = *state.unwrap_or(&somewhere());
         let mut same = land.0;
-        same.advance(&stands, false, 0.0, GAP_US, DT_S);
+        same.advance(&stands, 0.0, GAP_US, DT_S);
         assert!(!same.airborne());
         let left = State { position_m: stands.position_m + along(1, 1.1 * LEFT_M), ..stands };
         let mut gone = land.0;
-        gone.advance(&left, false, 0.0, GAP_US, DT_S);
+        gone.advance(&left, 0.0, GAP_US, DT_S);
         assert!(gone.airborne());
         // All times begin anew.
         assert!(!land.run(CARRIED_US / GAP_US - 1, &stands, WEIGHT_N) && land.run(1, &stands, WEIGHT_N));

@@ -201,7 +201,7 @@ impl Bench {
         if guided.idle_on_ground && !self.landing.airborne() {
             self.landing.rest(Some(&self.state));
         } else {
-            self.landing.advance(&self.state, false, self.thrust_m_s2, 1000, DT_S);
+            self.landing.advance(&self.state, self.thrust_m_s2, 1000, DT_S);
         }
     }
 }
