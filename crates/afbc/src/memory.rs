@@ -61,7 +61,7 @@ impl Memory {
         for (theta, f_hat) in remembered.theta.iter_mut().zip(f_hat_m_s2) {
             let by = self.share * f_hat;
             theta.zip_apply(weights, |theta, w| {
-                *theta = math::settled(math::min(math::max(*theta + by * w, -THETA_MAX_M_S2), THETA_MAX_M_S2));
+                *theta = math::settled(math::limited(*theta + by * w, THETA_MAX_M_S2));
             });
         }
     }
