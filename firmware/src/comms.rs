@@ -9,7 +9,9 @@ use crate::samples::{self, Sampler as _};
 use crate::ticks::{self, Tick};
 use crate::vehicle::ParameterTable;
 pub use afbc_station::Comms;
-use afbc_station::{Calibrator, REPORT_MAX, Reboot, Setup};
+use afbc_station::services::imus::{self, ImuNews};
+use afbc_station::services::status::SensorBits;
+use afbc_station::{AuxSensors, Calibrator, REPORT_MAX, Reboot, Setup};
 use core::array;
 use core::future::poll_fn;
 use core::pin::pin;
@@ -59,6 +61,7 @@ pub async fn run<B: Board, const OTHERS: usize>((comms, table, log): &mut Desk, 
     let mut outgoing = Vec::<u8, REPORT_MAX>::new();
     let mut leaving = 0;
     let mut calibrator = B::Sampler::SENSES.then(calibrator);
+    let mut imu_news = ImuNews::default();
     loop {
         match select(receive(links, &mut incoming), ticks::next()).await {
             Either::First((link, length)) => {
@@ -84,7 +87,11 @@ pub async fn run<B: Board, const OTHERS: usize>((comms, table, log): &mut Desk, 
                 if B::Sampler::SENSES {
                     let net = &table.configuration().guidance.net;
                     let told = [net.divider, net.current_a_v];
-                    comms.set_aux_sensors(aux_sensors::known(tick.report.time_us, told));
+                    let mut aux = aux_sensors::known(tick.report.time_us, told);
+                    if B::Sampler::IS_REDUNDANT {
+                        report_imus(comms, &mut imu_news, &mut aux, tick.report.time_us);
+                    }
+                    comms.set_aux_sensors(aux);
                     // Also that there is none any more.
                     let battery = comms.battery();
                     control::with_mail(|inputs| inputs.battery = battery);
@@ -148,6 +155,18 @@ fn report(comms: &mut Comms, tick: &Tick, core_hz: u32, outgoing: &mut Vec<u8, R
     let tick_us = tick.cycles as f32 / (core_hz / 1_000_000) as f32;
     // There is room for every frame.
     comms.report(&tick.report, tick_us, |frame| drop(outgoing.extend_from_slice(frame)));
+}
+
+/// Reports two inertial sensors. Out of line like the report.
+#[inline(never)]
+fn report_imus(comms: &mut Comms, news: &mut ImuNews, aux: &mut AuxSensors, now_us: u64) {
+    let pair = samples::imu_pair(now_us);
+    let SensorBits { present, healthy } = imus::bits(&pair);
+    aux.sensors.present |= present;
+    aux.sensors.healthy |= healthy;
+    if let Some(text) = news.look(now_us, &pair) {
+        comms.warn(text);
+    }
 }
 
 /// Creates what calibrates, to be called once, by a board with sensors: the others do not have its memory.

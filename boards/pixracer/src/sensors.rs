@@ -30,6 +30,8 @@ pub(crate) struct Inside {
 }
 
 impl Sampler for Inside {
+    const IS_REDUNDANT: bool = true;
+
     async fn run(self) {
         let spi = SharedSpi::new(self.spi);
         let [first, second, compass] = self.selects;

@@ -29,6 +29,8 @@ pub(crate) struct Imus {
 }
 
 impl Sampler for Imus {
+    const IS_REDUNDANT: bool = true;
+
     async fn run(self) {
         join(
             run(self.first, |reading| samples::put_first_imu(reading.at_us, turned(&reading.value, &CW0_FLIP))),

@@ -37,7 +37,7 @@ pub use control_inputs::{ControlInputs, give};
 pub use flight::{Flight, Prepared, Report};
 pub use front_end::EstimatorFrontEnd;
 pub use guided::GuidanceResult;
-pub use imu_selector::ImuSelector;
+pub use imu_selector::{ImuPair, ImuSelector};
 pub use link::Link;
 pub use lockstep::ReplyHead;
 pub use raw_readings::RawReadings;
