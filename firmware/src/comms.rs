@@ -3,6 +3,7 @@
 use crate::aux_sensors;
 use crate::board::{Board, Links, Receiver as _, Transmitter as _};
 use crate::control;
+use crate::indication;
 use crate::parameters;
 use crate::recording::{self, ExactLog};
 use crate::samples::{self, Sampler as _};
@@ -13,11 +14,14 @@ use afbc_station::services::imus::{self, ImuNews};
 use afbc_station::services::status::SensorBits;
 use afbc_station::{AuxSensors, Calibrator, REPORT_MAX, Reboot, Setup};
 use core::array;
+use core::cell::RefCell;
 use core::future::poll_fn;
 use core::pin::pin;
 use core::sync::atomic::{AtomicU32, Ordering};
 use core::task::Poll;
 use embassy_futures::select::{Either, select};
+use embassy_sync::blocking_mutex::Mutex;
+use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use heapless::Vec;
 use static_cell::StaticCell;
 
@@ -61,7 +65,6 @@ pub async fn run<B: Board, const OTHERS: usize>((comms, table, log): &mut Desk, 
     let mut outgoing = Vec::<u8, REPORT_MAX>::new();
     let mut leaving = 0;
     let mut calibrator = B::Sampler::SENSES.then(calibrator);
-    let mut imu_news = ImuNews::default();
     loop {
         match select(receive(links, &mut incoming), ticks::next()).await {
             Either::First((link, length)) => {
@@ -84,12 +87,15 @@ pub async fn run<B: Board, const OTHERS: usize>((comms, table, log): &mut Desk, 
                 BAD_FRAMES.store(comms.bad_frames(), Ordering::Relaxed);
             }
             Either::Second(tick) => {
+                if B::INDICATES {
+                    indication::put(&tick.report);
+                }
                 if B::Sampler::SENSES {
                     let net = &table.configuration().guidance.net;
                     let told = [net.divider, net.current_a_v];
                     let mut aux = aux_sensors::known(tick.report.time_us, told);
                     if B::Sampler::IS_REDUNDANT {
-                        report_imus(comms, &mut imu_news, &mut aux, tick.report.time_us);
+                        report_imus(comms, &mut aux, tick.report.time_us);
                     }
                     comms.set_aux_sensors(aux);
                     // Also that there is none any more.
@@ -157,14 +163,16 @@ fn report(comms: &mut Comms, tick: &Tick, core_hz: u32, outgoing: &mut Vec<u8, R
     comms.report(&tick.report, tick_us, |frame| drop(outgoing.extend_from_slice(frame)));
 }
 
-/// Reports two inertial sensors. Out of line like the report.
+/// Reports two inertial sensors. Out of line like the report, and what has been told is no part of the task: boards
+/// with one sensor do not have its memory.
 #[inline(never)]
-fn report_imus(comms: &mut Comms, news: &mut ImuNews, aux: &mut AuxSensors, now_us: u64) {
+fn report_imus(comms: &mut Comms, aux: &mut AuxSensors, now_us: u64) {
+    static NEWS: Mutex<CriticalSectionRawMutex, RefCell<ImuNews>> = Mutex::new(RefCell::new(ImuNews::NEW));
     let pair = samples::imu_pair(now_us);
     let SensorBits { present, healthy } = imus::bits(&pair);
     aux.sensors.present |= present;
     aux.sensors.healthy |= healthy;
-    if let Some(text) = news.look(now_us, &pair) {
+    if let Some(text) = NEWS.lock(|news| news.try_borrow_mut().ok()?.look(now_us, &pair)) {
         comms.warn(text);
     }
 }

@@ -22,6 +22,7 @@ mod flight;
 mod front_end;
 mod guided;
 mod imu_selector;
+pub mod indicator;
 mod link;
 mod lockstep;
 pub mod parameters;

@@ -26,13 +26,10 @@ pub struct ImuNews {
     told_us: Option<u64>,
 }
 
-impl Default for ImuNews {
-    fn default() -> Self {
-        ImuNews { second_flies: false, works: [true; 2], told_us: None }
-    }
-}
-
 impl ImuNews {
+    /// Nothing: the first flies, and both work.
+    pub const NEW: Self = ImuNews { second_flies: false, works: [true; 2], told_us: None };
+
     /// Returns what is to be told at `now_us`: which sensor flies, if that has changed; then, which does not work any
     /// more, or works again. At most one text a second: what changes back within it is not told.
     pub fn look(&mut self, now_us: u64, pair: &ImuPair) -> Option<&'static str> {
@@ -87,7 +84,7 @@ mod tests {
 
     #[test]
     fn each_change_is_told_once_and_the_one_that_flies_first() {
-        let mut news = ImuNews::default();
+        let mut news = ImuNews::NEW;
         assert_eq!(told(&mut news, 0, 10, &WELL), []);
         let failed = ImuPair { second_flies: true, works: [false, true], ..WELL };
         let texts = [(10_000_000, "IMU 2 in use instead of IMU 1"), (11_000_000, "IMU 1 failed")];
@@ -102,7 +99,7 @@ mod tests {
     /// A sensor that has not been set up yet has not failed; one that never answers has.
     #[test]
     fn nothing_has_failed_before_it_could_be_set_up() {
-        let mut news = ImuNews::default();
+        let mut news = ImuNews::NEW;
         let none = ImuPair::default();
         assert_eq!(told(&mut news, 0, 1, &none), []);
         let one = ImuPair { present: [true, false], works: [true, false], ..none };
@@ -112,7 +109,7 @@ mod tests {
     /// However often it changes, a text a second at most, each fits into STATUSTEXT, and the last says how it is.
     #[test]
     fn a_flood_of_changes_is_none_of_texts() {
-        let mut news = ImuNews::default();
+        let mut news = ImuNews::NEW;
         let mut texts = Vec::new();
         for ms in 0..20_000_u64 {
             let pair = ImuPair { second_flies: ms / 7 % 2 == 0, ..WELL };
