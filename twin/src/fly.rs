@@ -20,21 +20,21 @@ use rigless::time::VirtualNanos;
 use std::error::Error;
 use std::path::Path;
 
-const TICK_NS: u64 = 1_000_000;
+pub(crate) const TICK_NS: u64 = 1_000_000;
 /// Control register of the DMA stream of the motors' timer, TIM5; its lowest bit starts a frame (RM0433, 15.5.5).
 const DMA_S0CR: u64 = 0x4002_0010;
 /// First motor's output: PWM3.
 const FIRST: usize = 2;
 /// The wire of the first link, UART7.
-const LINK: &str = "serial1";
+pub(crate) const LINK: &str = "serial1";
 /// The second link, USART1, among the chip's.
 const SECOND_LINK: usize = 0;
 /// Time between two looks for the first bit of a frame, and for how long [ns].
 const LOOK_NS: u64 = 200;
 const LOOKS: u32 = 100;
 /// Reading a frame of the motors.
-#[derive(Clone, Copy)]
-enum Sampling {
+#[derive(Clone, Copy, PartialEq)]
+pub(crate) enum Sampling {
     Idle,
     /// Looks left for the first bit.
     Waits(u32),
@@ -42,15 +42,15 @@ enum Sampling {
     Reads(u64, u64),
 }
 
-struct Flight {
-    pilot: Pilot,
+pub(crate) struct Flight {
+    pub(crate) pilot: Pilot,
     /// In place of the board's own one.
-    receiver: Option<UbloxPeer>,
-    frames: Frames,
-    sampling: Sampling,
+    pub(crate) receiver: Option<UbloxPeer>,
+    pub(crate) frames: Frames,
+    pub(crate) sampling: Sampling,
     /// When the pins are looked at next [ns].
-    look_ns: Option<u64>,
-    motors: usize,
+    pub(crate) look_ns: Option<u64>,
+    pub(crate) motors: usize,
 }
 
 /// Flies a scenario, with a receiver of u-blox's if one is given. The exact log, if it is to be kept in a file, must be
