@@ -3,6 +3,7 @@
 
 use crate::check::check;
 use crate::fly::{Flight, LINK, Sampling, TICK_NS};
+use crate::machine::quiet_usb;
 use crate::pilot::Pilot;
 use crate::pins::Frames;
 use crate::wire::Wire;
@@ -80,6 +81,7 @@ impl Driver<MatekH743> for Climb {
     }
 
     fn on_stop(&mut self, session: &mut Session<MatekH743>, stop: Stop, host: &mut dyn Host) -> Option<VirtualNanos> {
+        quiet_usb(session, stop.at);
         let pilot = &mut self.flight.pilot;
         self.past.0.push((pilot.throttles().to_vec(), self.link.pass()));
         let (_, signals) = pilot.advance(stop.at.0 / TICK_NS)?;

@@ -4,7 +4,7 @@
 use crate::check::check;
 use crate::fly::LINK;
 use crate::kept::Changes;
-use crate::machine::Machine;
+use crate::machine::{Machine, quiet_usb};
 use crate::random::Random;
 use crate::wire::Wire;
 use afbc_link::{Address, Decoder, Downlink, FRAME_MAX, ParameterName, ParameterRequest, Sender, Uplink};
@@ -161,33 +161,65 @@ impl Driver<MatekH743> for Cut {
         }
     }
 
-    fn on_stop(&mut self, _: &mut Session<MatekH743>, stop: Stop, _: &mut dyn Host) -> Option<VirtualNanos> {
+    fn on_stop(&mut self, session: &mut Session<MatekH743>, stop: Stop, _: &mut dyn Host) -> Option<VirtualNanos> {
         let now_ns = stop.at.0;
+        quiet_usb(session, stop.at);
         match self.during {
-            During::Write if now_ns < SET_NS => Some(VirtualNanos(SET_NS)),
+            During::Write if now_ns < SET_NS => Some(VirtualNanos(now_ns + MS)),
             During::Write if !self.is_set => {
                 let (name, _, new) = WRITTEN;
                 let request = ParameterRequest::Set { name: padded(name), value: new.to_le_bytes(), kind: REAL32 };
                 say(&self.wire, &[Uplink::Heartbeat, Uplink::Parameter(request)]);
                 self.is_set = true;
-                Some(VirtualNanos(now_ns + WRITES_NS))
+                Some(VirtualNanos(now_ns + MS))
             }
-            During::Write => None,
-            During::Erase => (now_ns < START_NS).then_some(VirtualNanos(START_NS)),
+            During::Write => (now_ns < SET_NS + WRITES_NS).then_some(VirtualNanos(now_ns + MS)),
+            During::Erase => (now_ns < START_NS).then_some(VirtualNanos(now_ns + MS)),
         }
     }
 }
 
-/// A start with what a cut has left, asked for the parameters.
-struct Asked {
+/// Starts with what the cuts have left, one after another, each asked for the parameters.
+struct Starts {
     wire: Wire,
+    random: Random,
     decoder: Decoder<Downlink>,
+    left: std::vec::IntoIter<(u64, Vec<u8>)>,
+    /// When the cut was, and when it was started again [ns].
+    cut_ns: u64,
+    started_ns: u64,
     /// Of [`WRITTEN`] and [`OTHER`].
     values: [Option<f32>; 2],
+    /// When a cut was, and what was there at the next start.
+    found: Vec<(u64, [Option<f32>; 2])>,
 }
 
-impl Driver<MatekH743> for Asked {
-    fn on_stop(&mut self, _: &mut Session<MatekH743>, stop: Stop, _: &mut dyn Host) -> Option<VirtualNanos> {
+impl Starts {
+    /// Starts with the next flash, and with noise in all memories; none after the last.
+    fn next(&mut self, session: &mut Session<MatekH743>, stop: Stop, host: &mut dyn Host) -> Option<VirtualNanos> {
+        let (cut_ns, bytes) = self.left.next()?;
+        for (address, cells) in (MatekH743::STORE..).step_by(8).zip(bytes.as_chunks::<8>().0) {
+            let value = u64::from_le_bytes(*cells);
+            if host.read(address, Width::W64).ok()? != value {
+                host.program(address, Width::W64, value).ok()?;
+            }
+        }
+        lose_memory(session, host, &mut self.random);
+        session.reset_by_pin(stop.at, stop.instruction_count, host);
+        self.wire.exchange(&[]);
+        self.wire.take();
+        (self.cut_ns, self.started_ns, self.values) = (cut_ns, stop.at.0, [None; 2]);
+        self.decoder = Decoder::new(STATION);
+        Some(VirtualNanos(stop.at.0 + MS))
+    }
+}
+
+impl Driver<MatekH743> for Starts {
+    fn on_stop(&mut self, session: &mut Session<MatekH743>, stop: Stop, host: &mut dyn Host) -> Option<VirtualNanos> {
+        quiet_usb(session, stop.at);
+        if self.started_ns == 0 {
+            return self.next(session, stop, host);
+        }
         let values = &mut self.values;
         self.decoder.feed(&self.wire.take(), |_, message: Downlink| {
             if let Downlink::Parameter(value) = message {
@@ -198,12 +230,26 @@ impl Driver<MatekH743> for Asked {
                 }
             }
         });
-        if self.values.iter().all(Option::is_some) {
-            return None;
+        if self.values.iter().all(Option::is_some) || stop.at.0 > self.started_ns + START_NS {
+            self.found.push((self.cut_ns, self.values));
+            return self.next(session, stop, host);
+        }
+        if (stop.at.0 - self.started_ns) % (20 * MS) != 0 {
+            return Some(VirtualNanos(stop.at.0 + MS));
         }
         let names = [WRITTEN.0, OTHER.0].map(|name| Uplink::Parameter(ParameterRequest::ReadName(padded(name))));
         say(&self.wire, &names);
-        (stop.at.0 < START_NS).then_some(VirtualNanos(stop.at.0 + 50 * MS))
+        Some(VirtualNanos(stop.at.0 + MS))
+    }
+}
+
+/// Fills the memories with noise, as they are after a start.
+pub fn lose_memory(session: &mut Session<MatekH743>, host: &mut dyn Host, random: &mut Random) {
+    let memory = session.mcu().bus().memory().to_vec();
+    for region in memory.iter().filter(|region| region.kind.is_writable()) {
+        for offset in (0..region.size).step_by(8) {
+            let _ = host.write(region.base + offset, Width::W64, random.next());
+        }
     }
 }
 
@@ -228,13 +274,21 @@ fn flash(bytes: Vec<u8>) -> Result<Image, Box<dyn Error>> {
     Ok(Image::new(Path::new("parameters"), bytes, Some(MatekH743::STORE))?)
 }
 
-/// Returns what starts, asked with this flash.
-fn ask(image: &Image, bytes: Vec<u8>) -> Result<[Option<f32>; 2], Box<dyn Error>> {
+/// Starts with each flash, and returns when the power was cut, and the values that are there then.
+fn ask(image: &Image, left: Vec<(u64, Vec<u8>)>, seed: u64) -> Result<Vec<(u64, [Option<f32>; 2])>, Box<dyn Error>> {
     let wire = Wire::default();
-    let session = Session::new(board(&wire)?, 0, VirtualNanos(20 * MS))?;
-    let asked = Asked { wire, decoder: Decoder::new(STATION), values: [None; 2] };
-    let images = [image.clone(), flash(bytes)?];
-    Ok(run(session, &Start::new(&images), asked)?.driver.values)
+    let session = Session::new(board(&wire)?, 0, VirtualNanos(MS))?;
+    let starts = Starts {
+        wire,
+        random: Random::new(seed, "starts"),
+        decoder: Decoder::new(STATION),
+        left: left.into_iter(),
+        cut_ns: 0,
+        started_ns: 0,
+        values: [None; 2],
+        found: Vec::new(),
+    };
+    Ok(run(session, &Start::new(std::slice::from_ref(image)), starts)?.driver.found)
 }
 
 /// Cuts the power about so many times in each of a write and a start that erases.
@@ -253,7 +307,7 @@ pub fn cut_all(image: &Path, seed: u64, cuts: u64) -> Result<(), Box<dyn Error>>
         }
         before.set(name, old)?;
         let wire = Wire::default();
-        let session = Session::new(board(&wire)?, 0, VirtualNanos(if during == During::Write { SET_NS } else { MS }))?;
+        let session = Session::new(board(&wire)?, 0, VirtualNanos(MS))?;
         let cut = Cut {
             during,
             wire,
@@ -267,17 +321,17 @@ pub fn cut_all(image: &Path, seed: u64, cuts: u64) -> Result<(), Box<dyn Error>>
         };
         let images = [image.clone(), flash(before.bytes(WORD as usize)?)?];
         let kept = run(session, &Start::new(&images), cut)?.driver.kept;
-        let cells = |bytes: &[u8]| -> usize { bytes.iter().filter(|byte| **byte != 0xFF).count() };
         println!("{what}: {} instants", kept.len());
+        let instants = kept.len();
         let (mut olds, mut news, mut wrong) = (0, 0, Vec::new());
-        for (now_ns, bytes) in kept {
-            let programmed = cells(&bytes);
-            match ask(&image, bytes)? {
+        for (now_ns, found) in ask(&image, kept, seed)? {
+            match found {
                 [Some(value), Some(other)] if value == old && other == OTHER.1 => olds += 1,
                 [Some(value), Some(other)] if value == new && other == OTHER.1 => news += 1,
-                values => wrong.push(format!("{now_ns} ns ({programmed} bytes): {values:?}")),
+                values => wrong.push(format!("cut at {now_ns} ns: {values:?}")),
             }
         }
+        check(olds + news + wrong.len() == instants, "a start after each cut")?;
         println!("{what}: {olds} times the old value, {news} times the new one, {} times another", wrong.len());
         check(wrong.is_empty(), &wrong.join("\n"))?;
         check(during == During::Erase || news > 0 && olds > 0, "cuts before and after the write")?;

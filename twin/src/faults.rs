@@ -3,6 +3,7 @@
 use crate::aloft::{Aloft, Link};
 use crate::check::check;
 use crate::fly::{Flight, TICK_NS};
+use crate::machine::quiet_usb;
 use crate::random::Random;
 use crate::table::{ROWS, Row};
 use rigless::edge::Edge;
@@ -162,6 +163,7 @@ impl Driver<MatekH743> for Watched {
     }
 
     fn on_stop(&mut self, session: &mut Session<MatekH743>, stop: Stop, _: &mut dyn Host) -> Option<VirtualNanos> {
+        quiet_usb(session, stop.at);
         self.link.pass();
         let (_, signals) = self.flight.pilot.watch(stop.at.0 / TICK_NS);
         let board = session.board_mut();

@@ -3,7 +3,7 @@
 
 use crate::check::check;
 use crate::kept::parameters;
-use crate::machine::Machine;
+use crate::machine::{Machine, quiet_usb};
 use crate::pilot::Pilot;
 use crate::pins::{BIT_NS, BITS, Frames};
 use crate::same;
@@ -125,6 +125,7 @@ impl Driver<MatekH743> for Flight {
     }
 
     fn on_stop(&mut self, session: &mut Session<MatekH743>, stop: Stop, _: &mut dyn Host) -> Option<VirtualNanos> {
+        quiet_usb(session, stop.at);
         let (readings, signals) = self.pilot.advance(stop.at.0 / TICK_NS)?;
         match &self.receiver {
             Some(receiver) => receiver.sense(session.board_mut(), stop.at, (&readings, &signals)),

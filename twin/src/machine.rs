@@ -5,7 +5,10 @@ use rigless::machine::Board;
 use rigless::machine::flight::{Actuate, Actuator};
 use rigless::machine::matekh743::MatekH743;
 use rigless::machine::pixracer::Pixracer;
-use rigless::soc::Error;
+use rigless::mcu::Operate;
+use rigless::session::Session;
+use rigless::soc::{Error, Width};
+use rigless::time::VirtualNanos;
 use std::ops::Range;
 
 /// What the motors' outputs carry.
@@ -80,4 +83,14 @@ impl Machine for Pixracer {
     fn motors(&mut self) -> Vec<Actuator> {
         self.drive().actuators().get(Self::MOTORS).unwrap_or_default().to_vec()
     }
+}
+
+/// Interrupt status of the Matek H743's USB core (RM0433, 57.14.6).
+const GINTSTS: u64 = 0x4008_0014;
+
+/// Keeps USB still: the models have registers of it, but not what they do, and a flag that is cleared by writing a one
+/// stays set. Its driver would never end, and nothing else of its priority begin.
+pub fn quiet_usb(session: &mut Session<MatekH743>, at: VirtualNanos) {
+    // Nothing to be done about a core that is not clocked.
+    let _ = session.mcu().write(at, GINTSTS, Width::W32, 0);
 }

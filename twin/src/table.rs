@@ -1,11 +1,11 @@
 //! The faults.
 
+use crate::cuts::lose_memory;
 use crate::faults::{Outcome, Trouble};
 use rigless::chip::uart::Rate;
 use rigless::device::ResetCause;
 use rigless::edge::Edge;
 use rigless::emulator::InterruptLine;
-use rigless::soc::Width;
 
 /// A fault.
 pub struct Row {
@@ -156,7 +156,7 @@ pub const ROWS: &[Row] = &[
     }),
     row("brown-out", "the supply drops for a moment: the memory's content is random", Lost, 5_000, |t| {
         if t.looks == 0 {
-            t.lose_memory();
+            lose_memory(t.session, t.host, t.random);
             t.session.mcu().reset(t.at, ResetCause::PowerOn);
             t.session.reset_by_pin(t.at, t.instructions, t.host);
         }
@@ -214,17 +214,6 @@ impl Trouble<'_> {
         }
         if self.session.pause().is_none() {
             self.session.pause_at(Some(rigless::time::VirtualNanos(self.at.0 + 5_000)));
-        }
-    }
-
-    /// Fills the memories with noise.
-    fn lose_memory(&mut self) {
-        let memory = self.session.mcu().bus().memory().to_vec();
-        for region in memory.iter().filter(|region| region.kind.is_writable()) {
-            for offset in (0..region.size).step_by(8) {
-                let noise = self.random.next();
-                let _ = self.host.write(region.base + offset, Width::W64, noise);
-            }
         }
     }
 }
