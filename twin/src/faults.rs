@@ -184,9 +184,10 @@ fn fly(aloft: &Aloft, row: &'static Row, seed: u64) -> Result<bool, Box<dyn Erro
     let is_well = outcome >= row.expected;
     let touch = touch_m_s.map_or(String::new(), |touch_m_s| format!(", touches the ground at {touch_m_s:.1} m/s"));
     println!(
-        "{} {:24} at {:.6} s: {outcome}, expected {}; off by {off_m:.2} m, tilt {tilt_rad:.2} rad{touch}",
+        "{} {}, {}, at {:.6} s: {outcome}, expected {}; off by {off_m:.2} m, tilt {tilt_rad:.2} rad{touch}",
         if is_well { "pass" } else { "FAIL" },
         row.name,
+        row.what,
         begins_ns as f64 * 1e-9,
         row.expected
     );
