@@ -2,16 +2,15 @@
 //! to be told again. So many faults begin in the same instant of one flight.
 
 use crate::check::check;
-use crate::fly::{Flight, LINK, Sampling, TICK_NS};
-use crate::machine::quiet_usb;
+use crate::fly::{Flight, TICK_NS};
+use crate::machine::{Machine, quiet_usb};
 use crate::pilot::Pilot;
-use crate::pins::Frames;
+use crate::pins::MotorPins;
 use crate::wire::Wire;
 use afbc_scenario::{Scenario, load};
 use rigless::edge::Edge;
 use rigless::emulator::{Driver, Finished, Host, Settled, Start, Stop, run};
 use rigless::image::{Image, digest};
-use rigless::machine::Board;
 use rigless::machine::matekh743::MatekH743;
 use rigless::session::Session;
 use rigless::snapshot::{Error as SnapshotError, Reader, Snapshot, Store, Writer, take};
@@ -87,7 +86,7 @@ impl Driver<MatekH743> for Climb {
         let (_, signals) = pilot.advance(stop.at.0 / TICK_NS)?;
         session.board_mut().sense(&signals);
         let is_there = pilot.hovers_ms().is_some_and(|hovers_ms| hovers_ms >= HOVERED_MS);
-        if is_there && self.flight.sampling == Sampling::Idle {
+        if is_there && self.flight.pins.look_ns().is_none() {
             self.taken = Some(take(session, host, stop, &self.firmware, &self.past).map(|taken| taken.file));
             return None;
         }
@@ -97,20 +96,17 @@ impl Driver<MatekH743> for Climb {
 
 fn flight(scenario: &Scenario, link: &Link, prints: bool) -> Result<Flight, Box<dyn Error>> {
     let pilot = Pilot::new(scenario, link.pilot.clone())?;
-    let motors = scenario.rotors.len();
     Ok(Flight {
         pilot: if prints { pilot } else { pilot.quiet() },
+        hearer: None,
         receiver: None,
-        frames: Frames::new(motors),
-        sampling: Sampling::Idle,
-        look_ns: None,
-        motors,
+        pins: MotorPins::new(MatekH743::SIGNAL, scenario.rotors.len()),
     })
 }
 
 fn board(link: &Link) -> Result<Box<MatekH743>, Box<dyn Error>> {
     let mut board = Box::new(MatekH743::new()?);
-    check(board.attach_host(LINK, Box::new(link.board.clone())), "the link is wired")?;
+    check(board.attach_link(link.board.clone()), "the link is wired")?;
     Ok(board)
 }
 

@@ -2,7 +2,6 @@
 //! next start must find each parameter as it was or as it was to be, whatever the interrupted word or sector holds.
 
 use crate::check::check;
-use crate::fly::LINK;
 use crate::kept::Changes;
 use crate::machine::{Machine, quiet_usb};
 use crate::random::Random;
@@ -10,7 +9,6 @@ use crate::wire::Wire;
 use afbc_link::{Address, Decoder, Downlink, FRAME_MAX, ParameterName, ParameterRequest, Sender, Uplink};
 use rigless::emulator::{AccessKind, Driver, Host, Settled, Start, Stop, run};
 use rigless::image::Image;
-use rigless::machine::Board;
 use rigless::machine::matekh743::MatekH743;
 use rigless::session::Session;
 use rigless::soc::Width;
@@ -266,7 +264,7 @@ fn say(wire: &Wire, messages: &[Uplink]) {
 
 fn board(wire: &Wire) -> Result<Box<MatekH743>, Box<dyn Error>> {
     let mut board = Box::new(MatekH743::new()?);
-    check(board.attach_host(LINK, Box::new(wire.clone())), "the link is wired")?;
+    check(board.attach_link(wire.clone()), "the link is wired")?;
     Ok(board)
 }
 

@@ -200,7 +200,7 @@ fn fly(aloft: &Aloft, row: &'static Row, seed: u64) -> Result<bool, Box<dyn Erro
     for told in session.told() {
         println!("     the models say: {} {}: {}", told.instance, told.register, told.reason);
     }
-    let wrong = &flight.frames.wrong;
+    let wrong = &flight.pins.wrong;
     if !wrong.is_empty() {
         println!("     motors: {wrong:?}");
     }

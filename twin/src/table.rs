@@ -3,7 +3,6 @@
 use crate::cuts::lose_memory;
 use crate::faults::{Outcome, Trouble};
 use rigless::chip::uart::Rate;
-use rigless::device::ResetCause;
 use rigless::edge::Edge;
 use rigless::emulator::InterruptLine;
 
@@ -157,7 +156,6 @@ pub const ROWS: &[Row] = &[
     row("brown-out", "the supply drops for a moment: the memory's content is random", Lost, 3_000, |t| {
         if t.looks == 0 {
             lose_memory(t.session, t.host, t.random);
-            t.session.mcu().reset(t.at, ResetCause::PowerOn);
             t.session.reset_by_pin(t.at, t.instructions, t.host);
         }
     }),
