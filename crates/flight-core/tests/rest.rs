@@ -11,7 +11,7 @@ use afbc_flight_core::{
     ArmingLimits, EndReason, FlightCore, FlightCoreMemory, Inbox, Mode, Refusal, Request, Stamped, TickOutcome,
     Ticketed,
 };
-use afbc_types::{Inputs, Parameters, RotorSpeeds, Setpoint, State};
+use afbc_types::{Inputs, Parameters, Setpoint, State};
 use nalgebra::Vector3;
 
 type Adapted = afbc::Cascade<afbc::AdaptiveEstimate>;
@@ -110,8 +110,8 @@ fn the_law_begins_afresh_when_it_takes_off() {
     }
 }
 
-/// A vehicle that counts as airborne, and touches the ground by the guidance's account, idles; its law goes on afterwards
-/// with what it knew.
+/// A vehicle that counts as airborne, and touches the ground by the guidance's account, idles; its law goes on
+/// afterwards with what it knew.
 #[test]
 fn in_the_air_the_mark_idles_the_motors() {
     let (mut bench, idle) = (Bench::armed(false), controller().mixer().action(&Inputs::default()));

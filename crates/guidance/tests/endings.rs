@@ -212,12 +212,12 @@ fn a_takeoff_without_lift_is_given_up() {
 }
 
 /// A landing vehicle that stays above its setpoint stands on the ground: its motors idle for a while, unless it falls.
-/// Without an inertial sensor its motion follows from its thrust, and a descent of the flight core has a setpoint of its
-/// own: then this is left out.
+/// Without an inertial sensor its motion follows from its thrust, and a descent of the flight core has a setpoint of
+/// its own: then this is left out.
 #[test]
 fn a_touch_idles_the_motors_of_a_landing_vehicle() {
-    // Ticks after which the motors idle, and number of ticks for which they do, of a vehicle that stops sinking, has this
-    // velocity until they idle, and then that one.
+    // Ticks after which the motors idle, and number of ticks for which they do, of a vehicle that stops sinking, has
+    // this velocity until they idle, and then that one.
     let idles = |inertial: bool, core: Mode, [before, after]: [f32; 2], mode: FlightMode| {
         let mut fixture = Fixture::flying(Settings::DEFAULT);
         fixture.sensors.inertial = inertial;

@@ -7,7 +7,7 @@ use afbc_drivers::nmea::NmeaDecoder;
 use afbc_drivers::ublox::DELAY_US;
 use afbc_estimator::{Measurement, Origin};
 use afbc_hil::Host;
-use afbc_link::{Command, Datum, FRAME_MAX, Address, Height, Sender, Uplink};
+use afbc_link::{Address, Command, Datum, FRAME_MAX, Height, Sender, Uplink};
 use afbc_onboard::sensors::FixFrame;
 use afbc_onboard::{Aged, Readings};
 use afbc_scenario::{Scenario, load};
@@ -46,7 +46,8 @@ struct NmeaReceiver {
 impl NmeaReceiver {
     fn new() -> Self {
         let [latitude, longitude, altitude] = PLACE;
-        let step_m = Origin::new(latitude, longitude, altitude).unwrap().local(latitude + 1e-3, longitude + 1e-3, altitude);
+        let step_m =
+            Origin::new(latitude, longitude, altitude).unwrap().local(latitude + 1e-3, longitude + 1e-3, altitude);
         let scale = [1e-3 / f64::from(step_m.x), 1e-3 / -f64::from(step_m.y)];
         let (decoder, frame) = (NmeaDecoder::new(), FixFrame::NEW);
         NmeaReceiver { newest: None, wire: VecDeque::new(), began_ms: 0, decoder, frame, scale }
@@ -131,7 +132,9 @@ fn land(scenario: &Scenario, mut host: Host, mut receiver: Option<NmeaReceiver>)
         host.sense(&readings);
         let command = match armed_ms {
             None if now_ms > 4_000 && now_ms % 500 == 0 => Some(Command::Arm),
-            Some(armed_ms) if now_ms < armed_ms + 4_000 && (now_ms - armed_ms) % 1000 == 500 && motion.position_m.z < 0.5 => {
+            Some(armed_ms)
+                if now_ms < armed_ms + 4_000 && (now_ms - armed_ms) % 1000 == 500 && motion.position_m.z < 0.5 =>
+            {
                 Some(Command::TakeOff(Height { metres: 3.0, above: Datum::Here }))
             }
             Some(_) if now_ms >= land_ms && (now_ms - land_ms) % 2_000 == 0 => Some(Command::Land),
@@ -212,8 +215,8 @@ fn sweep(vehicle: Option<&Vehicle>, seeds: impl Iterator<Item = u64> + Clone) {
     }
 }
 
-/// With NMEA, seed 1 once ended under the fallback law, rocking by 1.1 rad: the vehicle stood on an edge of its feet, and
-/// the moments that were to level it gave so much thrust that it was not found on the ground.
+/// With NMEA, seed 1 once ended under the fallback law, rocking by 1.1 rad: the vehicle stood on an edge of its feet,
+/// and the moments that were to level it gave so much thrust that it was not found on the ground.
 #[test]
 fn landings_end_upright_under_the_law_that_flew() {
     sweep(None, 1..=6);

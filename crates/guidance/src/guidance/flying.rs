@@ -11,8 +11,8 @@ use crate::settings::Settings;
 use crate::sticks;
 use crate::targets::Targets;
 use afbc_control::math::{abs_max, max};
-use afbc_flight_core::{Mode, Stamped};
 use afbc_flight_core::landing::LEFT_M;
+use afbc_flight_core::{Mode, Stamped};
 use afbc_types::{Setpoint, State};
 use nalgebra::Vector3;
 
@@ -26,9 +26,9 @@ const ANEW_M: f32 = 1.0;
 const ANEW_M_S: f32 = 1.5;
 /// A landing vehicle touches the ground once it has been above its setpoint by this much \[m\], for this long \[s\],
 /// and does not sink faster than this \[m/s\], or than this share of its setpoint's speed: an estimated vertical speed
-/// may be off by tenths. Then its motors idle for so long at most \[s\]: by then it has been found on the ground, or its
-/// velocity is not what it seems. In the air it falls, and soon sinks faster than this \[m/s\], which ends it; a vehicle
-/// that drops from the edge of its feet does not.
+/// may be off by tenths. Then its motors idle for so long at most \[s\]: by then it has been found on the ground, or
+/// its velocity is not what it seems. In the air it falls, and soon sinks faster than this \[m/s\], which ends it; a
+/// vehicle that drops from the edge of its feet does not.
 const TOUCHES_M: f32 = 0.3;
 const TOUCHES_S: f32 = 0.1;
 const TOUCHES_M_S: f32 = 0.25;
