@@ -107,7 +107,7 @@ pub async fn run<B: Board, const OTHERS: usize>((comms, table, log): &mut Desk, 
                 if B::Sampler::SENSES
                     && let Some(calibrator) = &mut calibrator
                 {
-                    calibrate(comms, calibrator, table);
+                    calibrate(comms, calibrator, table, &mut outgoing);
                 }
                 // A constant here, too, as below.
                 let kept = if recording::is_possible::<B>() { log.as_deref_mut() } else { None };
@@ -184,11 +184,16 @@ fn calibrator() -> &'static mut Calibrator {
     CALIBRATOR.init_with(Calibrator::new)
 }
 
-/// Goes on with a calibration. Out of line like the report.
+/// Goes on with a calibration, and shows stations what the sensors read. Out of line like the report.
 #[inline(never)]
-fn calibrate(comms: &mut Comms, calibrator: &mut Calibrator, table: &ParameterTable) {
-    let sample = samples::raw(comms.is_calibrating());
-    comms.calibrate(calibrator, sample, table);
+fn calibrate(
+    comms: &mut Comms,
+    calibrator: &mut Calibrator,
+    table: &ParameterTable,
+    outgoing: &mut Vec<u8, REPORT_MAX>,
+) {
+    let sample = samples::raw(comms.takes_samples());
+    comms.calibrate(calibrator, sample, table, |frame| drop(outgoing.extend_from_slice(frame)));
 }
 
 /// Sends values of parameters, and passes on what has changed. Out of line like the report.

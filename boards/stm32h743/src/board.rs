@@ -1,4 +1,5 @@
-//! Links, motors and watchdog of an STM32H743VI with the pins of the Matek H743; `docs/firmware.md` shows the wiring.
+//! Links, motors and watchdog of an STM32H743VI with the pins of the Matek H743; `docs/boards/stm32h743.md` shows
+//! the wiring.
 //!
 //! | what | where |
 //! |---|---|

@@ -23,7 +23,7 @@ pub struct Host {
     taken: ControlInputs,
     readings: Readings,
     calibrator: Box<Calibrator>,
-    /// What the sensors have read while it calibrates.
+    /// What the sensors have read while somebody wants to know.
     raw: RawReadings,
     time_us: u64,
     /// Number of the next tick, and the exact log of it all, if it is kept.
@@ -52,8 +52,14 @@ trait Core {
         tell: Tell<'_>,
     ) -> Report<ROTORS_MAX>;
 
-    /// Goes on with a calibration.
-    fn calibrate(&mut self, comms: &mut Comms, calibrator: &mut Calibrator, sample: Option<RawSample>);
+    /// Goes on with a calibration, and shows stations what the sensors read.
+    fn calibrate(
+        &mut self,
+        comms: &mut Comms,
+        calibrator: &mut Calibrator,
+        sample: Option<RawSample>,
+        send: &mut dyn FnMut(&[u8]),
+    );
 
     /// Does what stations want of the parameters, and flies what has changed.
     fn parameters(&mut self, comms: &mut Comms, send: &mut dyn FnMut(&[u8])) -> Option<RecordChange>;
@@ -82,8 +88,14 @@ impl<const N: usize> Core for (Flight<N>, ParameterTable<N>) {
         report.padded()
     }
 
-    fn calibrate(&mut self, comms: &mut Comms, calibrator: &mut Calibrator, sample: Option<RawSample>) {
-        comms.calibrate(calibrator, sample, &self.1);
+    fn calibrate(
+        &mut self,
+        comms: &mut Comms,
+        calibrator: &mut Calibrator,
+        sample: Option<RawSample>,
+        send: &mut dyn FnMut(&[u8]),
+    ) {
+        comms.calibrate(calibrator, sample, &self.1, send);
     }
 
     fn parameters(&mut self, comms: &mut Comms, send: &mut dyn FnMut(&[u8])) -> Option<RecordChange> {
@@ -242,12 +254,12 @@ impl Host {
             recorder
                 .tick(&TickRecord { number, time_us, clock_failed: false, readings, battery, adopted, given }, write);
         }
-        if self.comms.is_calibrating() {
+        if self.comms.takes_samples() {
             self.raw.add(time_us, &readings);
         } else {
             self.raw = RawReadings::NONE;
         }
-        self.flight.calibrate(&mut self.comms, &mut self.calibrator, self.raw.take());
+        self.flight.calibrate(&mut self.comms, &mut self.calibrator, self.raw.take(), &mut send);
         let change = self.flight.parameters(&mut self.comms, &mut send);
         if let (Some(log), true) = (&mut self.log, change.is_some()) {
             self.flight.record(log, change);

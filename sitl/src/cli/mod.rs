@@ -1,5 +1,6 @@
 //! The command line: one module for each command.
 
+mod bring_up;
 mod campaign;
 mod compare;
 mod fleet;
@@ -69,6 +70,7 @@ enum Command {
     Serve(serve::Serve),
     Pil(pil::Pil),
     Hitl(hitl::Hitl),
+    BringUp(bring_up::BringUp),
 }
 
 impl Cli {
@@ -92,6 +94,7 @@ impl Cli {
             Command::Serve(serve) => serve.run(),
             Command::Pil(pil) => pil.run(),
             Command::Hitl(hitl) => hitl.run(),
+            Command::BringUp(bring_up) => bring_up.run(),
         }
     }
 }
