@@ -8,7 +8,7 @@ use afbc_link::{Decoder, Uplink};
 use afbc_onboard::parameters::{Kept, ParameterTable, Reason, RecordChange};
 use afbc_onboard::{Configuration, ControlInputs, Flight, Link, Prepare, RawReadings, Readings, Report};
 use afbc_recorder::{Given, Recorder, TickRecord};
-use afbc_scenario::Aboard;
+use afbc_scenario::OtherLaw;
 use afbc_scenario::contender::{ControllerKind, Law, Task};
 use afbc_station::{Calibrator, Comms, Setup};
 use afbc_store::Store;
@@ -153,7 +153,7 @@ impl Task for Under<'_> {
     {
         let Under { vehicle, law } = self;
         let table = ParameterTable::<N>::new(vehicle.configuration()?);
-        Host::of(table, Aboard::new(law, controller), [&vehicle.name, law.kind().name()])
+        Host::of(table, OtherLaw::new(law, controller), [&vehicle.name, law.kind().name()])
     }
 }
 

@@ -56,8 +56,10 @@ pub enum ReplayDifference {
     Parameter,
     /// The parameters of the start are not those of the log: it is another vehicle, or some of them are lost.
     Parameters(StartRecord),
-    /// The log lacks the ticks from this number on, or the configuration that one of them flew.
+    /// The log lacks the ticks from this number on.
     Missing(u32),
+    /// The log lacks the configuration that the tick of this number was the first to fly.
+    Configuration(u32),
     /// The tick of this number gave this, and gives this again.
     Given {
         /// Number of the tick.
@@ -217,7 +219,8 @@ impl<const N: usize, P: Prepare<N>> Replayer<N, P> {
         if let Some(number) = tick.adopted
             && !self.adopt(number)
         {
-            return ReplayStep::Differs(ReplayDifference::Missing(tick.number), None);
+            self.began = false;
+            return ReplayStep::Differs(ReplayDifference::Configuration(tick.number), None);
         }
         let report = self.flight.tick(tick.time_us, &mut self.taken, &tick.readings);
         let (number, then, now) = (tick.number, tick.given, Given::of(&report));

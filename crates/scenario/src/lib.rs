@@ -4,18 +4,18 @@
 //! control law of the one list of laws, with its gains. Nothing flies here: that is `afbc-sim`.
 #![forbid(unsafe_code)]
 
-mod aboard;
 mod built_in;
 pub mod case;
 pub mod contender;
 mod definition;
 mod file;
 mod laws;
+mod other_law;
 pub mod paper;
 mod task;
 pub mod trajectory;
 
-pub use aboard::Aboard;
 pub use built_in::{BUILT_IN, built_in, similar_built_in};
 pub use definition::{DURATION, Outage, Scenario};
 pub use file::{load, parse, read};
+pub use other_law::OtherLaw;

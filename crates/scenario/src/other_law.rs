@@ -9,19 +9,19 @@ use core::any::Any;
 /// Prepares flights of the firmware's code under a law of the list, without a monitor: its gains stay, vehicle and
 /// settings are those of the configuration.
 #[derive(Clone, Debug)]
-pub struct Aboard<C> {
+pub struct OtherLaw<C> {
     law: Law,
     controller: C,
 }
 
-impl<C> Aboard<C> {
+impl<C> OtherLaw<C> {
     /// Makes it of a law and a controller of that law, as [`Law::build`] hands it to a task.
     pub fn new(law: Law, controller: C) -> Self {
-        Aboard { law, controller }
+        OtherLaw { law, controller }
     }
 }
 
-impl<C: FlightController<N> + Clone + 'static, const N: usize> Prepare<N> for Aboard<C> {
+impl<C: FlightController<N> + Clone + 'static, const N: usize> Prepare<N> for OtherLaw<C> {
     type Law = Unmonitored<C>;
 
     fn prepare(&self, configuration: &Configuration<N>) -> Result<Prepared<N, Unmonitored<C>>, OutOfRange> {
