@@ -49,13 +49,16 @@ impl<const N: usize> Prepared<N> {
     /// The first parameter, setting or gain out of range, or the first that leaves the vehicle without a margin to
     /// hover.
     pub fn new(configuration: &Configuration<N>) -> Result<Self, OutOfRange> {
+        let Configuration { airframe, settings, gains, imu, calibration, .. } = configuration;
         // The controller checks what follows from these and assumes that each is in its range.
-        let Configuration { airframe, settings, gains, .. } = configuration;
-        airframe.parameters.validate()?;
+        let parameters = &airframe.parameters;
+        parameters.validate()?;
         settings.validate()?;
         gains.validate()?;
-        let bounds = Bounds::new(gains, &airframe.parameters, settings);
-        Self::under(configuration, Guarded::new(*airframe, *settings, *gains, bounds)?)
+        imu.validate()?;
+        calibration.validate()?;
+        let bounds = Bounds::new(gains, parameters, settings);
+        Self::around(configuration, Guarded::new(*airframe, *settings, *gains, bounds)?)
     }
 }
 
@@ -64,13 +67,18 @@ impl<const N: usize, C: FlightLaw<N>> Prepared<N, C> {
     ///
     /// # Errors
     /// The first of the other parameters and settings out of range.
-    // Always: the firmware's start-up has it on its stack once.
-    #[inline(always)]
     pub fn under(configuration: &Configuration<N>, controller: C) -> Result<Self, OutOfRange> {
+        configuration.imu.validate()?;
+        configuration.calibration.validate()?;
+        Self::around(configuration, controller)
+    }
+
+    /// Puts everything around a controller. Always inline: out of line, its result is on the stack of the firmware's
+    /// start-up twice.
+    #[inline(always)]
+    fn around(configuration: &Configuration<N>, controller: C) -> Result<Self, OutOfRange> {
         let Configuration { airframe, curve, response, imu, calibration, estimation, arming, .. } = configuration;
         let parameters = &airframe.parameters;
-        imu.validate()?;
-        calibration.validate()?;
         Ok(Prepared {
             vehicle: FlightCore::with_rotors(*parameters, response, *arming, controller)?,
             estimator: Estimator::new(*estimation)?,
