@@ -2,14 +2,13 @@
 
 use super::{Autopilot, Error};
 use afbc_calibration::RawSample;
-use afbc_control::FlightController;
 use afbc_flight_core::rate::PERIOD_US;
 use afbc_link::{Decoder, Uplink};
 use afbc_onboard::parameters::{Kept, ParameterTable, Reason, RecordChange};
 use afbc_onboard::{Configuration, ControlInputs, Flight, Link, Prepare, RawReadings, Readings, Report};
 use afbc_recorder::{Given, Recorder, TickRecord};
 use afbc_scenario::OtherLaw;
-use afbc_scenario::contender::{ControllerKind, Law, Task};
+use afbc_scenario::contender::{ControllerKind, Law};
 use afbc_station::{Calibrator, Comms, Setup};
 use afbc_store::Store;
 use afbc_types::{OutOfRange, ROTORS_MAX, with_rotors};
@@ -138,25 +137,6 @@ impl<P: Prepare<N>, const N: usize> Aircraft<P, N> {
     }
 }
 
-/// Makes a host under the law whose controller it is given.
-struct Under<'a> {
-    vehicle: &'a Vehicle,
-    law: Law,
-}
-
-impl Task for Under<'_> {
-    type Output = Host;
-
-    fn with<C, const N: usize>(self, controller: C) -> Result<Host, OutOfRange>
-    where
-        C: FlightController<N> + Clone + 'static,
-    {
-        let Under { vehicle, law } = self;
-        let table = ParameterTable::<N>::new(vehicle.configuration()?);
-        Host::of(table, OtherLaw::new(law, controller), [&vehicle.name, law.kind().name()])
-    }
-}
-
 /// Result of one control tick.
 #[derive(Clone, Debug)]
 pub struct HostTick {
@@ -204,8 +184,8 @@ impl Host {
     /// The first parameter or gain out of range.
     pub fn under(vehicle: &Vehicle, law: Law) -> Result<Self, OutOfRange> {
         with_rotors!(vehicle.rotors.len(), N => {
-            let configuration = vehicle.configuration::<N>()?;
-            law.build(configuration.airframe, configuration.settings, Under { vehicle, law })
+            let table = ParameterTable::<N>::new(vehicle.configuration()?);
+            Self::of(table, OtherLaw(law), [&vehicle.name, law.kind().name()])
         })
     }
 

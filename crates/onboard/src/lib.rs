@@ -39,7 +39,7 @@ pub use flight::{Flight, Prepare, Prepared, Report};
 pub use front_end::EstimatorFrontEnd;
 pub use guided::GuidanceResult;
 pub use imu_selector::ImuSelector;
-pub use law::{FlightLaw, Unmonitored};
+pub use law::FlightLaw;
 pub use link::Link;
 pub use lockstep::ReplyHead;
 pub use raw_readings::RawReadings;

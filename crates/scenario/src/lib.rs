@@ -18,4 +18,4 @@ pub mod trajectory;
 pub use built_in::{BUILT_IN, built_in, similar_built_in};
 pub use definition::{DURATION, Outage, Scenario};
 pub use file::{load, parse, read};
-pub use other_law::OtherLaw;
+pub use other_law::{AnyController, AnyControllerMemory, OtherLaw};

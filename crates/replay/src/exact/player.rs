@@ -2,13 +2,13 @@
 
 use super::change::SettingChange;
 use afbc::Profile;
-use afbc_control::{FlightController, Trace};
+use afbc_control::Trace;
 use afbc_onboard::Prepare;
 use afbc_reader::FileError;
 use afbc_reader::words::out_of_range;
 use afbc_recorder::{Record, ReplayStep, Replayer, StartRecord};
 use afbc_scenario::OtherLaw;
-use afbc_scenario::contender::{ControllerKind, Law, Task};
+use afbc_scenario::contender::{ControllerKind, Law};
 use afbc_store::RecordName;
 use afbc_types::{OutOfRange, ROTORS_MAX, with_rotors};
 use afbc_vehicles::Vehicle;
@@ -126,24 +126,6 @@ fn player(vehicle: &Vehicle, kind: ControllerKind) -> Result<Box<dyn Player>, Re
     let law = Law::on(kind, vehicle, Profile::Flight).map_err(Refusal::File)?;
     with_rotors!(vehicle.rotors.len(), N => {
         let image = vehicle.configuration::<N>().map_err(refused)?;
-        law.build(image.airframe, image.settings, Under { vehicle, law }).map_err(refused)
+        Ok(Box::new(Replayer::<N, _>::under(OtherLaw(law), image).map_err(refused)?))
     })
-}
-
-/// Makes the player under the law whose controller it is given.
-struct Under<'a> {
-    vehicle: &'a Vehicle,
-    law: Law,
-}
-
-impl Task for Under<'_> {
-    type Output = Box<dyn Player>;
-
-    fn with<C, const N: usize>(self, controller: C) -> Result<Box<dyn Player>, OutOfRange>
-    where
-        C: FlightController<N> + Clone + 'static,
-    {
-        let prepare = OtherLaw::new(self.law, controller);
-        Ok(Box::new(Replayer::<N, _>::under(prepare, self.vehicle.configuration::<N>()?)?))
-    }
 }
