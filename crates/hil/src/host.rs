@@ -7,7 +7,7 @@ use afbc_link::{Decoder, Uplink};
 use afbc_onboard::parameters::{Kept, ParameterTable, Reason, RecordChange};
 use afbc_onboard::{Configuration, ControlInputs, Flight, Link, Prepared, RawReadings, Readings, Report};
 use afbc_recorder::{Given, Recorder, TickRecord};
-use afbc_station::{Calibrator, Comms, Setup};
+use afbc_station::{Calibrator, Comms, RadioControl, Setup};
 use afbc_store::Store;
 use afbc_types::{OutOfRange, ROTORS_MAX, with_rotors};
 use afbc_vehicles::Vehicle;
@@ -22,6 +22,7 @@ pub struct Host {
     /// What the last tick took of it.
     taken: ControlInputs,
     readings: Readings,
+    radio: Box<RadioControl>,
     calibrator: Box<Calibrator>,
     /// What the sensors have read while it calibrates.
     raw: RawReadings,
@@ -55,6 +56,9 @@ trait Core {
     /// Goes on with a calibration.
     fn calibrate(&mut self, comms: &mut Comms, calibrator: &mut Calibrator, sample: Option<RawSample>);
 
+    /// Takes bytes of a radio receiver; returns what the pilot wants.
+    fn pilot(&mut self, comms: &mut Comms, radio: &mut RadioControl, bytes: &[u8]) -> Option<ControlInputs>;
+
     /// Does what stations want of the parameters, and flies what has changed.
     fn parameters(&mut self, comms: &mut Comms, send: &mut dyn FnMut(&[u8])) -> Option<RecordChange>;
 
@@ -84,6 +88,10 @@ impl<const N: usize> Core for (Flight<N>, ParameterTable<N>) {
 
     fn calibrate(&mut self, comms: &mut Comms, calibrator: &mut Calibrator, sample: Option<RawSample>) {
         comms.calibrate(calibrator, sample, &self.1);
+    }
+
+    fn pilot(&mut self, comms: &mut Comms, radio: &mut RadioControl, bytes: &[u8]) -> Option<ControlInputs> {
+        comms.pilot(radio, bytes, &self.1.configuration().radio)
     }
 
     fn parameters(&mut self, comms: &mut Comms, send: &mut dyn FnMut(&[u8])) -> Option<RecordChange> {
@@ -173,6 +181,7 @@ impl Host {
             inputs: ControlInputs::EMPTY,
             taken: ControlInputs::EMPTY,
             readings: Readings::NONE,
+            radio: Box::default(),
             calibrator: Box::default(),
             raw: RawReadings::NONE,
             time_us: 0,
@@ -220,6 +229,13 @@ impl Host {
         self.comms.exchange(decoder);
     }
 
+    /// Receives, for the next tick, the next bytes of a radio receiver.
+    pub fn hear_radio(&mut self, bytes: &[u8]) {
+        if let Some(news) = self.flight.pilot(&mut self.comms, &mut self.radio, bytes) {
+            self.merge(&news);
+        }
+    }
+
     /// Sets what the vehicle's own sensors read for the next tick alone.
     pub fn sense(&mut self, readings: &Readings) {
         self.readings = *readings;
@@ -253,6 +269,8 @@ impl Host {
             self.flight.record(log, change);
         }
         self.number = self.number.wrapping_add(1);
+        // Notices that there are none.
+        self.hear_radio(&[]);
         self.time_us = time_us;
         HostTick { report, bytes, change }
     }

@@ -47,8 +47,19 @@ impl<const N: usize> Prepared<N> {
     /// The first parameter, setting or gain out of range, or the first that leaves the vehicle without a margin to
     /// hover.
     pub fn new(configuration: &Configuration<N>) -> Result<Self, OutOfRange> {
-        let Configuration { airframe, settings, gains, curve, response, imu, calibration, estimation, arming, .. } =
-            configuration;
+        let Configuration {
+            airframe,
+            settings,
+            gains,
+            curve,
+            response,
+            imu,
+            calibration,
+            estimation,
+            arming,
+            radio,
+            ..
+        } = configuration;
         // The controller checks what follows from these and assumes that each is in its range.
         let parameters = &airframe.parameters;
         parameters.validate()?;
@@ -56,6 +67,7 @@ impl<const N: usize> Prepared<N> {
         gains.validate()?;
         imu.validate()?;
         calibration.validate()?;
+        radio.validate()?;
         let bounds = Bounds::new(gains, parameters, settings);
         let controller = Guarded::new(*airframe, *settings, *gains, bounds)?;
         Ok(Prepared {

@@ -125,6 +125,9 @@ pub struct CrsfDecoder {
 impl CrsfDecoder {
     /// Takes bytes that came one after the other, the last of them at `now_us`, and gives each frame that is of use.
     pub fn feed(&mut self, bytes: &[u8], now_us: u64, mut take: impl FnMut(CrsfFrame)) {
+        if bytes.is_empty() {
+            return;
+        }
         if now_us.saturating_sub(self.last_us) >= CRSF_GAP_US && !self.held.is_empty() {
             self.bad_frames = self.bad_frames.saturating_add(1);
             self.held.clear();

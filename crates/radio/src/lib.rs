@@ -41,5 +41,5 @@ pub use crsf::{CRSF_GAP_US, CRSF_MICROSECONDS, CrsfDecoder, CrsfFrame, LinkStati
 pub use link::{ACQUIRE_FRAMES, RECOVERY_US, RadioLink, SILENT_US};
 pub use pilot::{PilotInputs, PilotNotice, PilotOutput, RadioPilot};
 pub use sbus::{SBUS_GAP_US, SbusDecoder, SbusFrame};
-pub use settings::{ChannelCalibration, RadioFunctions, RadioSettings, SwitchModes};
+pub use settings::{ChannelCalibration, RadioFunctions, RadioProtocol, RadioReceiver, RadioSettings, SwitchModes};
 pub use telemetry::CrsfTelemetry;

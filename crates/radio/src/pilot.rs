@@ -3,7 +3,7 @@
 //! * The arming switch arms when it is switched on, with the throttle not above its centre, and disarms when it is
 //!   switched off. That it is on when the pilot is first heard, or is heard again, arms nothing.
 //! * The kill switch stops the motors as long as it is on, before anything else.
-//! * The mode changes when its switch is moved, or one of those for return and hold, or, in a mode that flies by
+//! * The mode is that of the switches when it arms, and changes when one of them is moved, or, in a mode that flies by
 //!   itself, when a stick is moved. A pilot who is heard again takes nothing over by that alone.
 
 use crate::channels::Channels;
@@ -140,11 +140,12 @@ impl RadioPilot {
             inputs,
             &sticks,
             [on(return_home, settings.functions.return_share), on(hold, settings.functions.hold_share)],
+            output.request == Some(Request::Arm),
         );
         output
     }
 
-    /// Returns an order if a switch or a stick was moved that changes the mode.
+    /// Returns an order if a switch or a stick was moved that changes the mode, or if it arms.
     fn select(
         &mut self,
         settings: &RadioSettings,
@@ -152,15 +153,15 @@ impl RadioPilot {
         inputs: &PilotInputs,
         sticks: &Sticks,
         [return_home, hold]: [bool; 2],
+        arms: bool,
     ) -> Option<Order> {
         let position = settings.channel(channels, settings.functions.mode);
         let mode = position.and_then(|(calibration, us)| settings.modes.mode(calibration.centred(us)));
         let changes = [self.return_home.put(return_home), self.hold.put(hold)];
         let is_moved = changes.iter().any(|change| matches!(change, Some((Some(_), _))));
-        // A switch that is heard for the first time says how a vehicle on the ground will fly.
-        let is_selected =
-            mode.and_then(|mode| self.mode.put(mode)).is_some_and(|(old, _)| old.is_some() || !inputs.armed);
-        let mode = match (is_moved || is_selected, self.return_home.get(), self.hold.get()) {
+        let is_selected = matches!(mode.and_then(|mode| self.mode.put(mode)), Some((Some(_), _)));
+        // A vehicle that arms flies as the switches say.
+        let mode = match (is_moved || is_selected || arms, self.return_home.get(), self.hold.get()) {
             (false, ..) => self.taken_over(settings, inputs, sticks),
             (true, Some(true), _) => Some(FlightMode::Return),
             (true, _, Some(true)) => Some(FlightMode::Hold),

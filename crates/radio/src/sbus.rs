@@ -74,6 +74,9 @@ pub struct SbusDecoder {
 impl SbusDecoder {
     /// Takes bytes that came one after the other, the last of them at `now_us`, and gives each frame.
     pub fn feed(&mut self, bytes: &[u8], now_us: u64, mut take: impl FnMut(SbusFrame)) {
+        if bytes.is_empty() {
+            return;
+        }
         if now_us.saturating_sub(self.last_us) >= SBUS_GAP_US {
             if !self.held.is_empty() {
                 self.bad_frames = self.bad_frames.saturating_add(1);

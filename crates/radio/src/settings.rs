@@ -1,8 +1,8 @@
 //! Parameters of radio control, with PX4's names and meanings.
 
-use crate::channels::{CHANNELS, Channels};
+use crate::channels::Channels;
 use afbc_guidance::FlightMode;
-use afbc_types::{Range, parameters};
+use afbc_types::{Choice, Range, parameters};
 
 parameters! {
     /// Calibration of a channel.
@@ -128,10 +128,41 @@ parameters! {
     }
 }
 
+/// A protocol of receivers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RadioProtocol {
+    /// CRSF: Crossfire, ExpressLRS.
+    Crsf,
+    /// SBUS: Futaba, FrSky and others.
+    Sbus,
+}
+
+impl Choice for RadioProtocol {
+    const ALL: &'static [Self] = &[RadioProtocol::Crsf, RadioProtocol::Sbus];
+    const WORDS: &'static [&'static str] = &["crsf", "sbus"];
+}
+
+parameters! {
+    /// The receiver.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct RadioReceiver {
+        /// Link that the receiver is on in place of MAVLink, counted from 1; 0 for none, from the next start on. The
+        /// first one never has it.
+        #[parameter(RC_PORT, "number", 0.0..=4.0)]
+        pub port: u32 = 0,
+        /// Its protocol, from the next start on.
+        #[choice(RC_PROTOCOL)]
+        pub protocol: RadioProtocol = RadioProtocol::Crsf,
+    }
+}
+
 parameters! {
     /// All parameters of radio control.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct RadioSettings {
+        /// The receiver.
+        #[group("")]
+        pub receiver: RadioReceiver = RadioReceiver::DEFAULT,
         /// Which channel does what.
         #[group("")]
         pub functions: RadioFunctions = RadioFunctions::DEFAULT,
@@ -162,30 +193,6 @@ parameters! {
         /// Channel 8.
         #[group("RC8_")]
         pub channel_8: ChannelCalibration = ChannelCalibration::DEFAULT,
-        /// Channel 9.
-        #[group("RC9_")]
-        pub channel_9: ChannelCalibration = ChannelCalibration::DEFAULT,
-        /// Channel 10.
-        #[group("RC10_")]
-        pub channel_10: ChannelCalibration = ChannelCalibration::DEFAULT,
-        /// Channel 11.
-        #[group("RC11_")]
-        pub channel_11: ChannelCalibration = ChannelCalibration::DEFAULT,
-        /// Channel 12.
-        #[group("RC12_")]
-        pub channel_12: ChannelCalibration = ChannelCalibration::DEFAULT,
-        /// Channel 13.
-        #[group("RC13_")]
-        pub channel_13: ChannelCalibration = ChannelCalibration::DEFAULT,
-        /// Channel 14.
-        #[group("RC14_")]
-        pub channel_14: ChannelCalibration = ChannelCalibration::DEFAULT,
-        /// Channel 15.
-        #[group("RC15_")]
-        pub channel_15: ChannelCalibration = ChannelCalibration::DEFAULT,
-        /// Channel 16.
-        #[group("RC16_")]
-        pub channel_16: ChannelCalibration = ChannelCalibration::DEFAULT,
     }
 }
 
@@ -251,7 +258,7 @@ impl ChannelCalibration {
 }
 
 impl RadioSettings {
-    fn calibrations(&self) -> [&ChannelCalibration; CHANNELS] {
+    fn calibrations(&self) -> [&ChannelCalibration; 8] {
         [
             &self.channel_1,
             &self.channel_2,
@@ -261,21 +268,15 @@ impl RadioSettings {
             &self.channel_6,
             &self.channel_7,
             &self.channel_8,
-            &self.channel_9,
-            &self.channel_10,
-            &self.channel_11,
-            &self.channel_12,
-            &self.channel_13,
-            &self.channel_14,
-            &self.channel_15,
-            &self.channel_16,
         ]
     }
 
     /// Returns a channel's calibration and pulse.
     pub(crate) fn channel(&self, channels: &Channels, number: u32) -> Option<(&ChannelCalibration, u16)> {
         let index = usize::try_from(number).ok()?.checked_sub(1)?;
-        Some((self.calibrations().get(index).copied()?, channels.channel(number)?))
+        // Further ones are for switches, which need no calibration.
+        let calibration = self.calibrations().get(index).copied().unwrap_or(&ChannelCalibration::DEFAULT);
+        Some((calibration, channels.channel(number)?))
     }
 
     /// True if the receiver shows by a channel that it hears nothing.

@@ -161,8 +161,13 @@ fn one_frame_moves_no_switch() {
 #[test]
 fn switches_select_modes() {
     let mut rig = Rig::new();
-    // On the ground the switch is as good as moved when it is heard.
-    assert_eq!(orders(&rig.frames(20)), [Order::Select(FlightMode::Stabilised)]);
+    assert_eq!(orders(&rig.frames(20)), []);
+    // It flies as the switch says when it arms.
+    let outputs = rig.switch(ARM, true);
+    assert_eq!(requests(&outputs), [Request::Arm]);
+    assert_eq!(orders(&outputs), [Order::Select(FlightMode::Stabilised)]);
+    rig.inputs.armed = true;
+    rig.inputs.mode = FlightMode::Stabilised;
     for (us, mode) in [(1420, FlightMode::Altitude), (2000, FlightMode::Mission), (1000, FlightMode::Stabilised)] {
         rig.channels.us[MODE] = us;
         assert_eq!(orders(&rig.frames(5)), [Order::Select(mode)]);
