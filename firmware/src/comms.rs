@@ -3,6 +3,7 @@
 use crate::aux_sensors;
 use crate::board::{Board, Links, Receiver as _, Transmitter as _};
 use crate::control;
+use crate::indication;
 use crate::parameters;
 use crate::radio::{self, RadioLine};
 use crate::recording::{self, ExactLog};
@@ -11,13 +12,18 @@ use crate::ticks::{self, Tick};
 use crate::vehicle::ParameterTable;
 use afbc_onboard::ControlInputs;
 pub use afbc_station::Comms;
-use afbc_station::{Calibrator, REPORT_MAX, Reboot, Setup};
+use afbc_station::services::imus::{self, ImuNews};
+use afbc_station::services::status::SensorBits;
+use afbc_station::{AuxSensors, Calibrator, REPORT_MAX, Reboot, Setup};
 use core::array;
+use core::cell::RefCell;
 use core::future::poll_fn;
 use core::pin::pin;
 use core::sync::atomic::{AtomicU32, Ordering};
 use core::task::Poll;
 use embassy_futures::select::{Either, select};
+use embassy_sync::blocking_mutex::Mutex;
+use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use heapless::Vec;
 use static_cell::StaticCell;
 
@@ -90,10 +96,17 @@ pub async fn run<B: Board, const OTHERS: usize>((comms, table, log, radio): &mut
                 BAD_FRAMES.store(comms.bad_frames(), Ordering::Relaxed);
             }
             Either::Second(tick) => {
+                if B::INDICATES {
+                    indication::put(&tick.report);
+                }
                 if B::Sampler::SENSES {
                     let net = &table.configuration().guidance.net;
                     let told = [net.divider, net.current_a_v];
-                    comms.set_aux_sensors(aux_sensors::known(tick.report.time_us, told));
+                    let mut aux = aux_sensors::known(tick.report.time_us, told);
+                    if B::Sampler::IS_REDUNDANT {
+                        report_imus(comms, &mut aux, tick.report.time_us);
+                    }
+                    comms.set_aux_sensors(aux);
                     // Also that there is none any more.
                     let battery = comms.battery();
                     control::with_mail(|inputs| inputs.battery = battery);
@@ -171,6 +184,20 @@ fn report(comms: &mut Comms, tick: &Tick, core_hz: u32, outgoing: &mut Vec<u8, R
     let tick_us = tick.cycles as f32 / (core_hz / 1_000_000) as f32;
     // There is room for every frame.
     comms.report(&tick.report, tick_us, |frame| drop(outgoing.extend_from_slice(frame)));
+}
+
+/// Reports two inertial sensors. Out of line like the report, and what has been told is no part of the task: boards
+/// with one sensor do not have its memory.
+#[inline(never)]
+fn report_imus(comms: &mut Comms, aux: &mut AuxSensors, now_us: u64) {
+    static NEWS: Mutex<CriticalSectionRawMutex, RefCell<ImuNews>> = Mutex::new(RefCell::new(ImuNews::NEW));
+    let pair = samples::imu_pair(now_us);
+    let SensorBits { present, healthy } = imus::bits(&pair);
+    aux.sensors.present |= present;
+    aux.sensors.healthy |= healthy;
+    if let Some(text) = NEWS.lock(|news| news.try_borrow_mut().ok()?.look(now_us, &pair)) {
+        comms.warn(text);
+    }
 }
 
 /// Creates what calibrates, to be called once, by a board with sensors: the others do not have its memory.

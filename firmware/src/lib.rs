@@ -22,7 +22,7 @@
 //! | 6 | end of the motors' DMA | 1 us per millisecond |
 //! | 7 | [`aux_sensors`]: reading the slow ones, whose drivers may wait for their bus | |
 //! | 8 | [`comms`]: the link's messages | |
-//! | 12 | [`housekeeping`]: logging, stack monitoring; [`parameters`]: writing to flash; USB | |
+//! | 12 | [`housekeeping`]: logging, stack monitoring; [`parameters`]: writing to flash; [`indication`]: LED and buzzer; USB | |
 //!
 //! The links precede the control tick because a UART may buffer one byte only, and the next comes within 11 us. USB
 //! comes last: its host waits, whatever it sends.
@@ -35,6 +35,7 @@ pub mod control;
 pub mod executors;
 pub mod housekeeping;
 mod image;
+pub mod indication;
 pub mod parameters;
 pub mod radio;
 pub mod recording;

@@ -5,7 +5,7 @@
 
 use afbc_calibration::RawSample;
 use afbc_estimator::Measurement;
-use afbc_onboard::{Aged, ImuSelector, RawReadings, Readings};
+use afbc_onboard::{Aged, ImuPair, ImuSelector, RawReadings, Readings};
 use core::cell::RefCell;
 use core::future::ready;
 use core::sync::atomic::{AtomicBool, Ordering};
@@ -39,6 +39,8 @@ pub enum SampleValue {
 pub trait Sampler {
     /// True if there are any.
     const SENSES: bool = true;
+    /// True if there are two inertial sensors, of which one flies.
+    const IS_REDUNDANT: bool = false;
 
     /// Reads them for ever, at a higher priority than the control tick, and [`put`]s what they have read.
     fn run(self) -> impl Future<Output = ()>;
@@ -103,6 +105,11 @@ fn put_selected(at_us: u64, select: impl FnOnce(&mut ImuSelector) -> Option<[Vec
     if let Some(sample) = flies {
         put(SampleTime::At(at_us), SampleValue::Imu(sample));
     }
+}
+
+/// Returns which of two inertial sensors flies at `now_us`, and which work.
+pub(crate) fn imu_pair(now_us: u64) -> ImuPair {
+    SELECTOR.lock(|selector| selector.try_borrow().map(|selector| selector.pair(now_us)).unwrap_or_default())
 }
 
 /// Returns the next sample for a calibration; collects readings, or not, from now on.

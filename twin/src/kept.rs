@@ -1,4 +1,4 @@
-//! The parameters' flash of a board, as if a station had set one of them before.
+//! The parameters' flash of a board, as if a station had set some of them before.
 
 use afbc_store::{Ram, RecordName, Store, hash};
 use embedded_storage::nor_flash::ReadNorFlash;
@@ -8,13 +8,18 @@ use std::error::Error;
 const SECTOR: usize = 16 * 1024;
 const VEHICLE: &[u8] = b"paper";
 
-/// Returns the content of the flash in which a parameter has this value. A word of four bytes takes `stride` bytes of
+/// `MOT_PROTOCOL` of PWM at 400 Hz.
+pub const PWM400: f32 = 4.0;
+
+/// Returns the content of the flash in which parameters have these values. A word of four bytes takes `stride` bytes of
 /// the chip's, the rest of which is not written.
-pub fn parameters(name: &str, value: f32, stride: usize) -> Result<Vec<u8>, Box<dyn Error>> {
+pub fn parameters(values: &[(&str, f32)], stride: usize) -> Result<Vec<u8>, Box<dyn Error>> {
     let mut store = Store::open(Ram::<SECTOR>::BLANK, 0, hash(VEHICLE)).map_err(|error| error.reason())?;
     store.make_room().map_err(|error| error.reason())?;
-    let name = RecordName::new(name).ok_or("a name")?;
-    store.set(name, 0, Some(value.to_bits())).map_err(|error| error.reason())?;
+    for (name, value) in values {
+        let name = RecordName::new(name).ok_or("a name")?;
+        store.set(name, 0, Some(value.to_bits())).map_err(|error| error.reason())?;
+    }
     let mut bytes = vec![0; 2 * SECTOR];
     store.into_flash().read(0, &mut bytes).map_err(|error| format!("{error:?}"))?;
     let words = bytes.as_chunks::<4>().0.iter();

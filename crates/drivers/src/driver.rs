@@ -36,6 +36,11 @@ pub trait PartTiming {
         self.wait(us).await;
         true
     }
+
+    /// Returns the time of the interrupt for which [`ready`](Self::ready) has waited \[us\]; none if there was none.
+    fn ready_us(&self) -> Option<u64> {
+        None
+    }
 }
 
 /// A part on a bus.
@@ -51,6 +56,8 @@ pub struct Driver<P, B, T> {
     /// Cycles since the last look, and number of registers looked at.
     cycles: u32,
     looks: usize,
+    /// Time of the interrupt of this cycle \[us\].
+    ready_us: Option<u64>,
     last: [u8; READ_MAX],
     /// Equal answers in a row.
     equals: u32,
@@ -59,7 +66,8 @@ pub struct Driver<P, B, T> {
 impl<P: SensorPart, B: Registers, T: PartTiming> Driver<P, B, T> {
     /// A part that is yet to be set up, by the first [`Driver::reading`].
     pub fn new(part: P, bus: B, timing: T) -> Self {
-        Driver { part, bus, timing, is_up: false, faults: 0, cycles: 0, looks: 0, last: [0; READ_MAX], equals: 0 }
+        let (last, ready_us) = ([0; READ_MAX], None);
+        Driver { part, bus, timing, is_up: false, faults: 0, cycles: 0, looks: 0, ready_us, last, equals: 0 }
     }
 
     /// True if it has been set up and reads without a fault.
@@ -113,6 +121,7 @@ impl<P: SensorPart, B: Registers, T: PartTiming> Driver<P, B, T> {
     }
 
     async fn cycle(&mut self) -> Result<Option<Stamped<P::Reading>>, PartFault> {
+        self.ready_us = None;
         self.cycles += 1;
         if self.cycles >= CYCLES_A_LOOK {
             let at = (self.looks + 1) % P::SETUP.len().max(1);
@@ -177,6 +186,7 @@ impl<P: SensorPart, B: Registers, T: PartTiming> Driver<P, B, T> {
                 if !self.timing.ready(us).await {
                     return Err(PartFault::Late);
                 }
+                self.ready_us = self.timing.ready_us();
             }
         }
         Ok(None)
@@ -194,7 +204,7 @@ impl<P: SensorPart, B: Registers, T: PartTiming> Driver<P, B, T> {
     }
 
     async fn read(&mut self, register: u8, length: usize) -> Result<Option<Stamped<P::Reading>>, PartFault> {
-        let at_us = self.timing.now_us();
+        let at_us = self.ready_us.unwrap_or_else(|| self.timing.now_us());
         let mut answer = [0; READ_MAX];
         let answer = answer.get_mut(..length).ok_or(PartFault::Bus)?;
         transfer(&self.timing, length, self.bus.read(register, answer)).await?;

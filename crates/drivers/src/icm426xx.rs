@@ -1,8 +1,8 @@
 //! TDK ICM-42688-P and ICM-42605, by SPI (DS-000347 and DS-000292, both with the same registers).
 //!
 //! +-2000 deg/s and +-16 g, each behind the part's own second-order filter of 250 Hz, which is also the anti-alias
-//! filter for readings at 1 kHz. With the interrupt INT1, a pulse, active high, for each sample, the part measures at
-//! 1 kHz; one that is read without it, by the board's clock, at 4 kHz, so that a reading is never older than 0.25 ms.
+//! filter for readings at 1 kHz. The interrupt INT1 is a pulse, active high, for each sample. The part measures at 1 kHz
+//! or, for readings by the board's clock, at 4 kHz, so that a reading is never older than 0.25 ms.
 
 use crate::bus::SpiFormat;
 use crate::part::{PartFault, SensorPart, Step};
@@ -13,7 +13,7 @@ pub type Icm42688p<const POLLED: bool = false> = Icm426xx<0x47, POLLED>;
 /// ICM-42605.
 pub type Icm42605<const POLLED: bool = false> = Icm426xx<0x42, POLLED>;
 
-/// A part of the family, by what its register WHO_AM_I says and whether it is read without its interrupt.
+/// A part of the family, by what its register WHO_AM_I says and whether it is read by the board's clock.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Icm426xx<const IDENTITY: u8, const POLLED: bool>;
 
@@ -60,7 +60,7 @@ impl<const IDENTITY: u8, const POLLED: bool> SensorPart for Icm426xx<IDENTITY, P
         Step::Set(PWR_MGMT0, 0x0F), // both in low-noise mode
         Step::Wait(45_000),         // until the gyroscope turns steadily
     ];
-    const CYCLE: &'static [Step] = &[Step::Ready(2_000), Step::Read(TEMP_DATA1, LENGTH)];
+    const CYCLE: &'static [Step] = &[Step::Ready(if POLLED { 500 } else { 2_000 }), Step::Read(TEMP_DATA1, LENGTH)];
 
     fn take(&mut self, _: u8, answer: &[u8]) -> Result<Option<InertialReading>, PartFault> {
         let &[t1, t0, ref force @ .., r5, r4, r3, r2, r1, r0] = answer else { return Err(PartFault::Bus) };

@@ -142,6 +142,7 @@ fn there_is_a_reading_every_millisecond_at_its_interrupt() {
     let (readings, _) = run(&mut driver, &rig, 1_000_000);
     let times: Vec<u64> = readings.iter().map(|reading| reading.at_us).collect();
     assert!(times.len() > 900 && times.windows(2).all(|pair| pair[1] - pair[0] == 1_000), "{times:?}");
+    assert!(times.iter().all(|at_us| at_us % 1_000 == 0), "of the interrupt, not of the transfer: {times:?}");
 }
 
 #[test]

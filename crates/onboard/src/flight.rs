@@ -187,7 +187,7 @@ impl<const N: usize> Flight<N> {
         let (mode, airborne, rested) = (self.memory.mode(), self.memory.airborne(), self.memory.rested());
         self.front_end.set_on_ground(!mode.armed() || self.idle_on_ground && !airborne);
         let estimate = self.front_end.tick(now_us, readings, &mut inputs.inbox);
-        let observed = if self.observes { self.memory.state().copied() } else { None };
+        let observed = self.memory.state().filter(|_| self.observes);
         let core = Core { mode, airborne, rested, sensors, observed };
         let guided = self.guide.tick(now_us, inputs, &core);
         self.idle_on_ground = inputs.inbox.idle_on_ground();
