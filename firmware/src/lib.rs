@@ -37,6 +37,7 @@ pub mod housekeeping;
 mod image;
 pub mod indication;
 pub mod parameters;
+pub mod radio;
 pub mod recording;
 pub mod samples;
 pub mod ticks;
@@ -67,7 +68,8 @@ pub fn run<B: Board>(
     let flight = control::make(table.configuration());
     // Before the watchdog: it looks at each parameter.
     let log = if recording::is_possible::<B>() { recording::ExactLog::begin::<B>(&table) } else { None };
-    let desk = comms::make::<B>(table, log);
+    let radio = if radio::is_possible::<B>() { radio::RadioLine::begin::<B>(&table, &mut links) } else { None };
+    let desk = comms::make::<B>(table, log, radio);
     board.unleash_watchdog();
     time::start(core.SYST, B::CORE_HZ);
     comms(executors.comms, desk, links);

@@ -9,7 +9,7 @@ use afbc_onboard::{Configuration, ControlInputs, Flight, Link, Prepare, RawReadi
 use afbc_recorder::{Given, Recorder, TickRecord};
 use afbc_scenario::OtherLaw;
 use afbc_scenario::contender::{ControllerKind, Law};
-use afbc_station::{Calibrator, Comms, Setup};
+use afbc_station::{Calibrator, Comms, RadioControl, Setup};
 use afbc_store::Store;
 use afbc_types::{OutOfRange, ROTORS_MAX, with_rotors};
 use afbc_vehicles::Vehicle;
@@ -24,6 +24,7 @@ pub struct Host {
     /// What the last tick took of it.
     taken: ControlInputs,
     readings: Readings,
+    radio: Box<RadioControl>,
     calibrator: Box<Calibrator>,
     /// What the sensors have read while somebody wants to know.
     raw: RawReadings,
@@ -68,6 +69,9 @@ trait Core {
         send: &mut dyn FnMut(&[u8]),
     );
 
+    /// Takes bytes of a radio receiver; returns what the pilot wants.
+    fn pilot(&mut self, comms: &mut Comms, radio: &mut RadioControl, bytes: &[u8]) -> Option<ControlInputs>;
+
     /// Does what stations want of the parameters, and flies what has changed.
     fn parameters(&mut self, comms: &mut Comms, send: &mut dyn FnMut(&[u8])) -> Option<RecordChange>;
 
@@ -110,6 +114,10 @@ impl<P: Prepare<N>, const N: usize> Core for Aircraft<P, N> {
         send: &mut dyn FnMut(&[u8]),
     ) {
         comms.calibrate(calibrator, sample, &self.table, send);
+    }
+
+    fn pilot(&mut self, comms: &mut Comms, radio: &mut RadioControl, bytes: &[u8]) -> Option<ControlInputs> {
+        comms.pilot(radio, bytes, &self.table.configuration().radio)
     }
 
     fn parameters(&mut self, comms: &mut Comms, send: &mut dyn FnMut(&[u8])) -> Option<RecordChange> {
@@ -241,6 +249,7 @@ impl Host {
             inputs: ControlInputs::EMPTY,
             taken: ControlInputs::EMPTY,
             readings: Readings::NONE,
+            radio: Box::default(),
             calibrator: Box::default(),
             raw: RawReadings::NONE,
             time_us: 0,
@@ -289,6 +298,13 @@ impl Host {
         self.comms.exchange(decoder);
     }
 
+    /// Receives, for the next tick, the next bytes of a radio receiver.
+    pub fn hear_radio(&mut self, bytes: &[u8]) {
+        if let Some(news) = self.flight.pilot(&mut self.comms, &mut self.radio, bytes) {
+            self.merge(&news);
+        }
+    }
+
     /// Sets what the vehicle's own sensors read for the next tick alone.
     pub fn sense(&mut self, readings: &Readings) {
         self.readings = *readings;
@@ -322,6 +338,8 @@ impl Host {
             self.flight.record(log, &self.names, change);
         }
         self.number = self.number.wrapping_add(1);
+        // Notices that there are none.
+        self.hear_radio(&[]);
         self.time_us = time_us;
         HostTick { report, bytes, change }
     }

@@ -77,7 +77,9 @@ impl<const N: usize, C: FlightLaw<N>> Prepared<N, C> {
     /// start-up twice.
     #[inline(always)]
     fn around(configuration: &Configuration<N>, controller: C) -> Result<Self, OutOfRange> {
-        let Configuration { airframe, curve, response, imu, calibration, estimation, arming, .. } = configuration;
+        let Configuration { airframe, curve, response, imu, calibration, estimation, arming, radio, .. } =
+            configuration;
+        radio.validate()?;
         let parameters = &airframe.parameters;
         Ok(Prepared {
             vehicle: FlightCore::with_rotors(*parameters, response, *arming, controller)?,
