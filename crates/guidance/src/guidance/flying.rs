@@ -119,7 +119,7 @@ impl Memory {
         let setpoint = match output.shaping {
             Shaping::Limited(aim) => {
                 (self.aim, self.trim) = (aim, Trim::default());
-                self.limiter.advance(&aim, dt_s);
+                self.limiter.advance(&self.aim, dt_s);
                 self.limiter.setpoint().filter(|setpoint| abs_max(&setpoint.position_m) <= 1e5)
             }
             Shaping::Leaning(aim, [x, y]) => {
