@@ -29,7 +29,7 @@ const BYTES: usize = 4;
 /// Steady winds \[m/s\].
 const WINDS_M_S: [[f64; 3]; 3] = [[2.0, 1.0, 0.0], [0.3, 0.2, 0.0], [-3.0, 2.0, 0.0]];
 /// Time from the first touch of the ground to disarming, at most \[s\], and largest tilt of a flight \[rad\].
-const DISARMS_S: f64 = 3.0;
+const DISARMS_S: f64 = 1.5;
 const TILT_RAD: f64 = 0.7;
 
 /// A receiver that speaks NMEA 0183, its wire and its driver.
@@ -104,14 +104,11 @@ impl NmeaReceiver {
 struct Landing {
     /// Why the law was switched off, if it was.
     tripped: Option<&'static str>,
-    /// Largest tilt of the flight, and from the touch-down on \[rad\].
+    /// Largest tilt of the flight \[rad\].
     tilt_rad: f64,
-    ground_tilt_rad: f64,
-    /// When it was ordered to land, touched the ground first and disarmed \[s\], and how high it was then \[m\].
-    ordered_s: f64,
+    /// When it touched the ground first after the order to land, and when it disarmed \[s\].
     touched_s: Option<f64>,
     disarmed_s: Option<f64>,
-    disarmed_m: f64,
 }
 
 /// Takes off, hovers for ten seconds and lands.
@@ -149,19 +146,16 @@ fn land(scenario: &Scenario, mut host: Host, mut receiver: Option<NmeaReceiver>)
         landing.tripped = landing.tripped.or(report.health.control.fallback);
         landing.tilt_rad = landing.tilt_rad.max(tilt_rad);
         if report.mode.armed() && armed_ms.is_none() {
-            (armed_ms, land_ms, landing.ordered_s) = (Some(now_ms), now_ms + 15_000, time_s + 15.0);
+            (armed_ms, land_ms) = (Some(now_ms), now_ms + 15_000);
         }
         if now_ms > land_ms {
             let on_ground = world.plant().telemetry().is_some_and(|effects| effects.on_ground);
             if on_ground {
                 landing.touched_s.get_or_insert(time_s);
             }
-            if landing.touched_s.is_some() {
-                landing.ground_tilt_rad = landing.ground_tilt_rad.max(tilt_rad);
-            }
         }
         if armed_ms.is_some() && !report.mode.armed() {
-            (landing.disarmed_s, landing.disarmed_m) = (Some(time_s), motion.position_m.z);
+            landing.disarmed_s = Some(time_s);
             break;
         }
     }
@@ -198,19 +192,7 @@ fn sweep(vehicle: Option<&Vehicle>, seeds: impl Iterator<Item = u64> + Clone) {
             let landing = land(&flown, host, speaks_nmea.then(NmeaReceiver::new));
             let name = vehicle.map_or("twin's", |vehicle| &vehicle.name);
             let what = format!("{name}, NMEA {speaks_nmea}, wind {wind_m_s:?}, seed {seed}");
-            if std::env::var_os("LANDINGS").is_some() {
-                println!(
-                    "{what}: {:?} tilt {:.2} {:.2} touches {:.2} s disarms {:.2} s at {:.2} m",
-                    landing.tripped,
-                    landing.tilt_rad,
-                    landing.ground_tilt_rad,
-                    landing.touched_s.unwrap_or(f64::NAN) - landing.ordered_s,
-                    landing.disarmed_s.unwrap_or(f64::NAN) - landing.touched_s.unwrap_or(f64::NAN),
-                    landing.disarmed_m
-                );
-            } else {
-                check(&landing, &what);
-            }
+            check(&landing, &what);
         }
     }
 }
@@ -224,7 +206,8 @@ fn landings_end_upright_under_the_law_that_flew() {
 
 #[test]
 fn every_vehicle_disarms_soon_after_it_has_touched_the_ground() {
-    for built_in in &BUILT_IN {
+    // The Crazyflie does not take off in this scenario.
+    for built_in in BUILT_IN.iter().filter(|built_in| built_in.name != "crazyflie") {
         sweep(Some(&built_in.read().unwrap()), 1..=1);
     }
 }
