@@ -27,6 +27,8 @@ pub trait Board: Sized + 'static {
     const STORE: u32;
     /// Most motors that it drives.
     const OUTPUTS: usize;
+    /// True if it has a task that shows by LED or buzzer how the vehicle is ([`indication`](crate::indication)).
+    const INDICATES: bool = false;
     /// Restarts the chip into its boot loader, if it has one.
     const BOOT_LOADER: Option<fn() -> !> = None;
 

@@ -5,7 +5,7 @@
 
 use afbc_calibration::RawSample;
 use afbc_estimator::Measurement;
-use afbc_onboard::{Aged, ImuSelector, RawReadings, Readings};
+use afbc_onboard::{Aged, ImuPair, ImuSelector, RawReadings, Readings};
 use core::cell::RefCell;
 use core::future::ready;
 use core::sync::atomic::{AtomicBool, Ordering};
@@ -39,6 +39,8 @@ pub enum SampleValue {
 pub trait Sampler {
     /// True if there are any.
     const SENSES: bool = true;
+    /// True if there are two inertial sensors, of which one flies.
+    const IS_REDUNDANT: bool = false;
 
     /// Reads them for ever, at a higher priority than the control tick, and [`put`]s what they have read.
     fn run(self) -> impl Future<Output = ()>;
@@ -67,7 +69,7 @@ static SELECTOR: Mutex<CriticalSectionRawMutex, RefCell<ImuSelector>> = Mutex::n
 static ARRIVED: Mutex<CriticalSectionRawMutex, RefCell<Arrived>> =
     Mutex::new(RefCell::new(Arrived { imu: None, aids: Deque::new() }));
 
-/// True while the vehicle is calibrated, and what its sensors have read meanwhile.
+/// True while samples are wanted, and what the sensors have read meanwhile.
 static CALIBRATES: AtomicBool = AtomicBool::new(false);
 static RAW: Mutex<CriticalSectionRawMutex, RefCell<RawReadings>> = Mutex::new(RefCell::new(RawReadings::NONE));
 
@@ -105,7 +107,12 @@ fn put_selected(at_us: u64, select: impl FnOnce(&mut ImuSelector) -> Option<[Vec
     }
 }
 
-/// Returns the next sample for a calibration; collects readings, or not, from now on.
+/// Returns which of two inertial sensors flies at `now_us`, and which work.
+pub(crate) fn imu_pair(now_us: u64) -> ImuPair {
+    SELECTOR.lock(|selector| selector.try_borrow().map(|selector| selector.pair(now_us)).unwrap_or_default())
+}
+
+/// Returns the next sample for a calibration or a station; collects readings, or not, from now on.
 pub(crate) fn raw(collects: bool) -> Option<RawSample> {
     let collected = CALIBRATES.swap(collects, Ordering::Relaxed);
     RAW.lock(|raw| {

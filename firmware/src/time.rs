@@ -26,7 +26,7 @@ struct State {
     alarms: Mutex<RefCell<[Option<Alarm>; ALARMS]>>,
 }
 
-/// Number of tasks that can wait at the same time; five do. Further ones are woken at once and wait again.
+/// Number of tasks that can wait at the same time; six do. Further ones are woken at once and wait again.
 const ALARMS: usize = 8;
 
 /// A task waiting for a time.

@@ -5,6 +5,7 @@
 //! campaign's finished flights are kept.
 
 mod cli;
+mod network;
 mod serial;
 
 use clap::Parser;

@@ -57,6 +57,28 @@ fn every_board_is_a_folder_and_meets_the_firmware_once() {
     }
 }
 
+/// A page for each, listed in the book, with what its owner needs.
+#[test]
+fn every_board_has_a_page() {
+    let contents = fs::read_to_string(root().join("docs/SUMMARY.md")).unwrap();
+    let folders = fs::read_dir(root().join("boards")).unwrap().map(|entry| entry.unwrap().path());
+    for folder in folders.filter(|path| path.is_dir() && !path.ends_with("emulated")) {
+        let name = folder.file_name().unwrap().to_str().unwrap();
+        assert!(contents.contains(&format!("(boards/{name}.md)")), "{name}");
+        let page = fs::read_to_string(root().join(format!("docs/boards/{name}.md"))).unwrap();
+        for wanted in [
+            "\n## What works\n".to_owned(),
+            "\n## First steps, propellers off\n".to_owned(),
+            format!("cargo xtask flash {name} --vehicle "),
+            "bring-up --connect serial:/dev/tty".to_owned(),
+            "\n## What has run where\n".to_owned(),
+            "run on silicon yet".to_owned(),
+        ] {
+            assert!(page.contains(&wanted), "{name}: {wanted}");
+        }
+    }
+}
+
 /// No board is selected by `#[path]` or conditional compilation, and no chip is named.
 #[test]
 fn the_firmware_knows_no_board() {
@@ -86,8 +108,8 @@ fn the_firmware_knows_no_board() {
 fn the_wiring_is_what_the_board_uses() {
     for (board, page, heading, count) in [
         ("stm32f405", "firmware.md", "\n## Wiring", 8),
-        ("stm32h743", "firmware.md", "\n### Matek H743", 30),
-        ("pixracer", "boards/pixracer.md", "\n## Wiring", 28),
+        ("stm32h743", "boards/stm32h743.md", "\n## Wiring", 34),
+        ("pixracer", "boards/pixracer.md", "\n## Wiring", 32),
     ] {
         let text = fs::read_to_string(root().join("docs").join(page)).unwrap();
         let table = text.split_once(heading).unwrap().1.split("\n#").next().unwrap();
@@ -153,7 +175,8 @@ fn nothing_is_used_twice() {
         motors.sort_unstable();
         assert_eq!(motors, (1..=table.outputs).collect::<Vec<_>>(), "{}", board.display());
         let streams = table.streams().into_iter().map(|stream| stream.line.clone());
-        let lines = streams.chain(i2c.lines.clone()).chain([link.name.clone(), gnss.name.clone()]);
+        let lines =
+            streams.chain(i2c.lines.clone()).chain([&link.name, &gnss.name, &imu.ready.line].map(String::clone));
         assert_once(lines.chain(executors(&board)).collect(), &board);
     }
     for board in kinds().1 {
@@ -162,6 +185,43 @@ fn nothing_is_used_twice() {
         let lines = bound.lines().filter_map(|line| line.split_once(" => ")).map(|(line, _)| line.trim().to_owned());
         assert_once(lines.chain(executors(&board)).collect(), &board);
     }
+}
+
+/// Pins of one number on all ports have one line of external interrupts: no board uses a line twice, each is that of
+/// its pin, and has the interrupt that the chips' manuals give it (RM0090, RM0433).
+#[test]
+fn every_line_of_external_interrupts_is_that_of_one_pin() {
+    let interrupt = |line: usize| match line {
+        0..=4 => format!("EXTI{line}"),
+        5..=9 => "EXTI9_5".to_owned(),
+        _ => "EXTI15_10".to_owned(),
+    };
+    let mut count = 0;
+    let mut assert_lines = |board: &Path, wired: &[(String, String)], bound: &BTreeSet<String>| {
+        let mut interrupts = BTreeSet::new();
+        for (pin, channel) in wired {
+            let number: usize = channel.strip_prefix("EXTI").unwrap().parse().unwrap();
+            assert_eq!(pin[2..], number.to_string(), "{}: {pin} on {channel}", board.display());
+            interrupts.insert(interrupt(number));
+        }
+        assert_once(wired.iter().map(|(_, channel)| channel).collect(), board);
+        assert_eq!(interrupts, *bound, "{}", board.display());
+        count += wired.len();
+    };
+    for (board, table) in kinds().0 {
+        let ready = &table.imu.ready;
+        assert_lines(&board, &[(ready.pin.clone(), ready.channel.clone())], &[ready.line.clone()].into());
+    }
+    for board in kinds().1 {
+        let code = code_of(&board);
+        let wired = code.split("InterruptPin::new(p.").skip(1).map(|rest| {
+            let (pin, rest) = rest.split_once(", p.").unwrap();
+            (pin.to_owned(), rest.split_once(',').unwrap().0.to_owned())
+        });
+        let bound = handlers(&code).into_iter().filter(|(_, handler)| handler.contains("exti::InterruptHandler"));
+        assert_lines(&board, &wired.collect::<Vec<_>>(), &bound.map(|(line, _)| line).collect());
+    }
+    assert_eq!(count, 6 + 2 + 2);
 }
 
 /// What a table says twice, it says alike.
@@ -202,7 +262,7 @@ fn streams_have_their_interrupts_and_motors_their_pins() {
     }
 }
 
-/// Bytes of serial ports come first, then the IMU's transfers, the motors', the slow sensors'.
+/// Bytes of serial ports come first, then the IMU's interrupt and transfers, the motors', the slow sensors'.
 #[test]
 fn every_interrupt_has_the_priority_of_its_purpose() {
     let table = fs::read_to_string(root().join("chips/stm32f4/src/flight_controller.rs")).unwrap();
@@ -211,6 +271,7 @@ fn every_interrupt_has_the_priority_of_its_purpose() {
         ("$gnss", "UART"),
         ("$spi_tx_line", "SAMPLING"),
         ("$spi_rx_line", "SAMPLING"),
+        ("$exti_line", "SAMPLING"),
         ("$event", "AIDING"),
         ("$error", "AIDING"),
         ("$i2c_tx_line", "AIDING"),
@@ -232,6 +293,7 @@ fn every_interrupt_has_the_priority_of_its_purpose() {
             let fits = match handler.split("::").next().unwrap() {
                 "usart" => priority == "UART",
                 "i2c" => priority == "AIDING",
+                "StampHandler<EXTI2>" | "StampHandler<EXTI15_10>" => priority == "SAMPLING",
                 _ if motors.iter().any(|motor| handler.contains(motor)) => priority == "MOTOR_DMA",
                 _ => ["SAMPLING", "AIDING"].contains(&priority),
             };
@@ -280,28 +342,55 @@ fn prioritised(code: &str) -> BTreeMap<String, String> {
     found
 }
 
-/// From Betaflight's descriptions of the boards (`betaflight/config`): the gyroscope's data in, select and alignment,
-/// motors 1 to 4, clock and data of the barometer's bus.
+/// From Betaflight's descriptions of the boards (`betaflight/config`): the gyroscope's data in, select, interrupt and
+/// alignment, motors 1 to 4, clock and data of the barometer's bus, first LED but for those at the
+/// debugger's pins, buzzer.
 #[test]
 fn boards_are_as_betaflight_describes_them() {
     let tables: BTreeMap<_, _> = kinds().0.into_iter().collect();
     let described = [
-        ("speedybee-f405-v3", ["PA6", "PA4", "CW0"], ["PB6", "PB7", "PB8", "PB9"], ["PB10", "PB11"]),
-        ("speedybee-f405-v4", ["PA6", "PA4", "CW90"], ["PB6", "PB7", "PB0", "PB1"], ["PB8", "PB9"]),
-        ("speedybee-f405-mini", ["PA6", "PA4", "CW270"], ["PB6", "PB7", "PB1", "PB0"], ["PB8", "PB9"]),
-        ("matek-f405-se", ["PA6", "PA4", "CW270"], ["PB7", "PB6", "PB0", "PB1"], ["PB8", "PB9"]),
-        ("matek-f405-std", ["PA6", "PC2", "CW180"], ["PC6", "PC7", "PC8", "PC9"], ["PB6", "PB7"]),
-        ("kakute-f4-v2", ["PA6", "PC4", "CW270"], ["PB0", "PB1", "PA3", "PA2"], ["PB8", "PB9"]),
+        (
+            "speedybee-f405-v3",
+            ["PA6", "PA4", "PC4", "CW0"],
+            ["PB6", "PB7", "PB8", "PB9"],
+            ["PB10", "PB11"],
+            ["PC8", "PC5"],
+        ),
+        (
+            "speedybee-f405-v4",
+            ["PA6", "PA4", "PC4", "CW90"],
+            ["PB6", "PB7", "PB0", "PB1"],
+            ["PB8", "PB9"],
+            ["PC13", "PC15"],
+        ),
+        (
+            "speedybee-f405-mini",
+            ["PA6", "PA4", "PC4", "CW270"],
+            ["PB6", "PB7", "PB1", "PB0"],
+            ["PB8", "PB9"],
+            ["PC13", "PC15"],
+        ),
+        ("matek-f405-se", ["PA6", "PA4", "PC4", "CW270"], ["PB7", "PB6", "PB0", "PB1"], ["PB8", "PB9"], ["", "PC15"]),
+        (
+            "matek-f405-std",
+            ["PA6", "PC2", "PC3", "CW180"],
+            ["PC6", "PC7", "PC8", "PC9"],
+            ["PB6", "PB7"],
+            ["PB9", "PC13"],
+        ),
+        ("kakute-f4-v2", ["PA6", "PC4", "PC5", "CW270"], ["PB0", "PB1", "PA3", "PA2"], ["PB8", "PB9"], ["PB5", "PC9"]),
     ];
     assert_eq!(tables.len(), described.len());
-    for (name, gyroscope, motors, bus) in described {
+    for (name, gyroscope, motors, bus, indicator) in described {
         let table = &tables[&root().join("boards").join(name)];
-        assert_eq!([&*table.imu.into, &table.imu.select, &table.imu.alignment], gyroscope, "{name}");
+        let imu = &table.imu;
+        assert_eq!([&*imu.into, &imu.select, &imu.ready.pin, &imu.alignment], gyroscope, "{name}");
         assert_eq!([&*table.imu.clock, &table.imu.out], ["PA5", "PA7"], "{name}");
         for (number, pin) in (1..).zip(motors) {
             assert!(table.motors().any(|motor| motor.number == number && motor.pin == pin), "{name}: motor {number}");
         }
         assert_eq!([&*table.i2c.clock, &table.i2c.data], bus, "{name}");
+        assert_eq!([table.led.as_deref().unwrap_or_default(), &table.buzzer], indicator, "{name}");
         assert_eq!((table.crystal_hz, table.numbering.as_str()), (8_000_000, "BETAFLIGHT"), "{name}");
     }
 }

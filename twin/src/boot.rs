@@ -2,7 +2,7 @@
 //! ticks at 1 kHz, feeds its watchdog, drives its motor outputs and talks.
 
 use crate::check::check;
-use crate::kept::parameters;
+use crate::kept::{PWM400, parameters};
 use crate::machine::{Machine, Signal};
 use crate::wire::Wire;
 use afbc_link::telemetry::Telemetry;
@@ -15,8 +15,6 @@ use rigless::time::VirtualNanos;
 use std::error::Error;
 use std::path::Path;
 
-/// The wire of the first link.
-const LINK: &str = "serial1";
 /// The key that feeds the watchdog.
 const FEED: u64 = 0xAAAA;
 /// The station, as in [`Decoder::new`].
@@ -67,8 +65,8 @@ impl<M: Machine> Driver<M> for Seen {
             *count += 1;
             let [width, period] = [pulse.width.0, pulse.period.0];
             let (expected, count_ns) = match M::SIGNAL {
-                Signal::Dshot600 => ([PULSE_NS, BIT_NS], COUNT_NS),
-                Signal::Pwm400(_) => ([STOPPED_NS, PERIOD_NS], DIVIDED_COUNT_NS),
+                Signal::Dshot600(_) => ([PULSE_NS, BIT_NS], COUNT_NS),
+                Signal::Pwm400 => ([STOPPED_NS, PERIOD_NS], DIVIDED_COUNT_NS),
             };
             if width.abs_diff(expected[0]) > count_ns || period.abs_diff(expected[1]) > count_ns {
                 self.wrong.push(format!("{}: {width} of {period} ns", output.name));
@@ -83,11 +81,12 @@ impl<M: Machine> Driver<M> for Seen {
 pub fn boot<M: Machine>(image: &Path) -> Result<(), Box<dyn Error>> {
     let mut board = M::built()?;
     let wire = Wire::default();
-    check(board.attach_host(LINK, Box::new(wire.clone())), "the link is wired")?;
+    check(board.attach_link(wire.clone()), "the link is wired")?;
     let seen = Seen { feeds: Vec::new(), pulses: vec![0; M::MOTORS.len()], looks: 0, wrong: Vec::new(), store: 0 };
     let mut images = vec![Image::read(image, None)?];
-    if let Signal::Pwm400(protocol) = M::SIGNAL {
-        images.push(Image::new(Path::new("parameters"), parameters("MOT_PROTOCOL", protocol, 4)?, Some(M::STORE))?);
+    if M::SIGNAL == Signal::Pwm400 {
+        let kept = parameters(&[("MOT_PROTOCOL", PWM400)], M::STORE_WORD)?;
+        images.push(Image::new(Path::new("parameters"), kept, Some(M::STORE))?);
     }
     let finished = run(Session::new(board, 0, VirtualNanos(LOOK_FROM))?, &Start::new(&images), seen)?;
 
@@ -120,14 +119,14 @@ pub fn boot<M: Machine>(image: &Path) -> Result<(), Box<dyn Error>> {
 
     // A frame for each tick of the looks; PWM repeats its pulses.
     let carried = match M::SIGNAL {
-        Signal::Dshot600 => looks * LOOK_EVERY / TICK * BITS * BIT_NS / LOOK_EVERY,
-        Signal::Pwm400(_) => *looks,
+        Signal::Dshot600(_) => looks * LOOK_EVERY / TICK * BITS * BIT_NS / LOOK_EVERY,
+        Signal::Pwm400 => *looks,
     };
     println!("pulses at {pulses:?} of {looks} looks at the motors' pins; stopped motors have {carried}");
     check(wrong.is_empty(), &format!("{:?}: {wrong:?}", M::SIGNAL))?;
     check(pulses.iter().all(|pulses| pulses.abs_diff(carried) * 10 <= carried), "every motor has its pulses")?;
 
-    check(*store & 0xFFFF_FFFF != 0xFFFF_FFFF, "the parameters' store has a header")?;
+    check(!M::STORES || *store & 0xFFFF_FFFF != 0xFFFF_FFFF, "the parameters' store has a header")?;
     check(heartbeats >= 2, "a heartbeat every second")?;
     println!("battery: {battery_mv:?} mV");
     let close = |expected_mv: u16| battery_mv.is_some_and(|voltage_mv: u16| voltage_mv.abs_diff(expected_mv) < 50);

@@ -1,32 +1,105 @@
-//! The boards that `rigless` models, and what of each is to be known to look at it from outside.
+//! The boards: what of each is to be known to look at it from outside, and to put a world around it.
 
+use crate::wire::Wire;
+use rigless::chip::nmea;
+use rigless::chip::uart::Peer;
 use rigless::edge::Edge;
 use rigless::machine::Board;
-use rigless::machine::flight::{Actuate, Actuator};
+use rigless::machine::flight::{Actuate, Actuator, Signals};
 use rigless::machine::matekh743::MatekH743;
 use rigless::machine::pixracer::Pixracer;
-use rigless::soc::Error;
+use rigless::mcu::Operate;
+use rigless::session::Session;
+use rigless::soc::{Error, Width};
+use rigless::time::VirtualNanos;
 use std::ops::Range;
+
+/// The boards.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MachineName {
+    MatekH743,
+    Pixracer,
+    SpeedyBeeF405V4,
+}
+
+impl MachineName {
+    /// All of them.
+    pub const ALL: [Self; 3] = [MachineName::MatekH743, MachineName::Pixracer, MachineName::SpeedyBeeF405V4];
+
+    /// Returns its name on the command line.
+    pub const fn name(self) -> &'static str {
+        match self {
+            MachineName::MatekH743 => "matekh743",
+            MachineName::Pixracer => "pixracer",
+            MachineName::SpeedyBeeF405V4 => "speedybeef405v4",
+        }
+    }
+}
+
+/// Evaluates an expression in which a type's name stands for the machine of this name.
+#[macro_export]
+macro_rules! with_machine {
+    ($name:expr, $machine:ident => $call:expr) => {
+        match $name {
+            $crate::machine::MachineName::MatekH743 => {
+                type $machine = rigless::machine::matekh743::MatekH743;
+                $call
+            }
+            $crate::machine::MachineName::Pixracer => {
+                type $machine = rigless::machine::pixracer::Pixracer;
+                $call
+            }
+            $crate::machine::MachineName::SpeedyBeeF405V4 => {
+                type $machine = $crate::speedybee::SpeedyBeeF405V4;
+                $call
+            }
+        }
+    };
+}
 
 /// What the motors' outputs carry.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Signal {
-    /// DSHOT600, the default.
-    Dshot600,
-    /// PWM at 400 Hz, since no DMA of the models serves a timer; the value of `MOT_PROTOCOL`.
-    Pwm400(f32),
+    /// DSHOT600, the default, by the DMA of these timers.
+    Dshot600(&'static [FrameTimer]),
+    /// PWM at 400 Hz, since no DMA of the models serves a timer.
+    Pwm400,
+}
+
+/// A timer whose frames DMA sends.
+#[derive(Debug, PartialEq)]
+pub struct FrameTimer {
+    /// Control register of the stream; its lowest bit starts a frame.
+    pub stream: u64,
+    /// Its motors, from 0.
+    pub motors: Range<usize>,
+}
+
+/// A UART's divider and its clock.
+#[derive(Clone, Copy, Debug)]
+pub struct Divider {
+    /// Address of the register.
+    pub register: u64,
+    /// The clock \[Hz\].
+    pub clock_hz: u64,
 }
 
 /// A board.
-pub trait Machine: Board + Sized + 'static {
+pub trait Machine: Board + Edge<Signals = Signals> + Sized + 'static {
     /// Key register of the watchdog.
     const WATCHDOG: u64;
     /// First word of the parameters' flash.
     const STORE: u64;
+    /// Bytes of the flash that a word of four bytes takes.
+    const STORE_WORD: usize;
+    /// True if the models have a flash that can be written.
+    const STORES: bool;
     /// The outputs of its motors.
     const MOTORS: Range<usize>;
     /// What they carry.
     const SIGNAL: Signal;
+    /// The divider of the GNSS receiver's UART.
+    const RECEIVER: Divider;
 
     /// What sensors, at a higher priority, may delay a tick by \[ns\]: most while an IMU is set up.
     const JITTER: u64;
@@ -34,24 +107,53 @@ pub trait Machine: Board + Sized + 'static {
     const BATTERY_MV: Option<u16>;
     /// Registers that the chip has and the models do not.
     const UNMAPPED: &[u64];
+    /// Interrupt status of the USB core, if the models have it as a register only.
+    const USB_STATUS: Option<u64> = None;
 
     /// Returns the board as it is built.
     fn built() -> Result<Box<Self>, Error>;
 
     /// Returns the pins of its motors.
     fn motors(&mut self) -> Vec<Actuator>;
+
+    /// Hangs a wire on the first link.
+    fn attach_link(&mut self, wire: Wire) -> bool {
+        self.attach_host("serial1", Box::new(wire))
+    }
+
+    /// Hangs a wire on the second link; false if that is by USB.
+    fn attach_second_link(&mut self, wire: Wire) -> bool;
+
+    /// Hangs a GNSS receiver on its UART, in the place of the one that was there.
+    fn attach_receiver(&mut self, receiver: Box<dyn Peer>);
+
+    /// Feels the world, with a receiver of its own kind, which the board tells what it feels.
+    fn sense_with_own_receiver(&mut self, signals: &Signals) {
+        self.attach_receiver(Box::new(nmea::Receiver::new()));
+        self.sense(signals);
+    }
 }
 
 impl Machine for MatekH743 {
     /// RM0433, 45.4.
     const WATCHDOG: u64 = 0x5800_4800;
     const STORE: u64 = 0x0810_0000;
+    const STORE_WORD: usize = 32;
+    const STORES: bool = true;
     /// PWM3 to PWM10.
     const MOTORS: Range<usize> = 2..10;
-    const SIGNAL: Signal = Signal::Dshot600;
+    /// DMA1's streams 0 and 1, for TIM5 and TIM4 (RM0433, 15.5.5).
+    const SIGNAL: Signal = Signal::Dshot600(&[
+        FrameTimer { stream: 0x4002_0010, motors: 0..4 },
+        FrameTimer { stream: 0x4002_0028, motors: 4..8 },
+    ]);
+    /// USART2 (RM0433, 48.8.5).
+    const RECEIVER: Divider = Divider { register: 0x4000_440C, clock_hz: 100_000_000 };
     const JITTER: u64 = 150_000;
     const BATTERY_MV: Option<u16> = Some(16_800);
     const UNMAPPED: &[u64] = &[];
+    /// RM0433, 57.14.6.
+    const USB_STATUS: Option<u64> = Some(0x4008_0014);
 
     fn built() -> Result<Box<Self>, Error> {
         MatekH743::new().map(Box::new)
@@ -60,14 +162,29 @@ impl Machine for MatekH743 {
     fn motors(&mut self) -> Vec<Actuator> {
         self.drive().actuators().get(Self::MOTORS).unwrap_or_default().to_vec()
     }
+
+    /// USART1.
+    fn attach_second_link(&mut self, wire: Wire) -> bool {
+        self.mcu.usart[0].attach(wire);
+        true
+    }
+
+    /// USART2.
+    fn attach_receiver(&mut self, receiver: Box<dyn Peer>) {
+        self.mcu.usart[1].attach_boxed(receiver);
+    }
 }
 
 impl Machine for Pixracer {
     /// RM0090, 21.4.
     const WATCHDOG: u64 = 0x4000_3000;
     const STORE: u64 = 0x0800_4000;
+    const STORE_WORD: usize = 4;
+    const STORES: bool = false;
     const MOTORS: Range<usize> = 0..6;
-    const SIGNAL: Signal = Signal::Pwm400(4.0);
+    const SIGNAL: Signal = Signal::Pwm400;
+    /// UART4 (RM0090, 30.6.3), on APB1.
+    const RECEIVER: Divider = Divider { register: 0x4000_4C08, clock_hz: 42_000_000 };
     const JITTER: u64 = 300_000;
     const BATTERY_MV: Option<u16> = None;
     /// USB: the core's fourth hardware configuration register.
@@ -79,5 +196,25 @@ impl Machine for Pixracer {
 
     fn motors(&mut self) -> Vec<Actuator> {
         self.drive().actuators().get(Self::MOTORS).unwrap_or_default().to_vec()
+    }
+
+    /// USART3.
+    fn attach_second_link(&mut self, wire: Wire) -> bool {
+        self.mcu.usart[2].attach(wire);
+        true
+    }
+
+    /// UART4.
+    fn attach_receiver(&mut self, receiver: Box<dyn Peer>) {
+        self.mcu.usart[6].attach_boxed(receiver);
+    }
+}
+
+/// Keeps USB still where the models have registers of it, but not what they do: a flag that is cleared by writing a one
+/// stays set, and the driver, which looks at it, would never end, and nothing else of its priority begin.
+pub fn quiet_usb<M: Machine>(session: &mut Session<M>, at: VirtualNanos) {
+    if let Some(status) = M::USB_STATUS {
+        // Nothing to be done about a core that is not clocked.
+        let _ = session.mcu().write(at, status, Width::W32, 0);
     }
 }

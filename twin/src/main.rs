@@ -3,53 +3,139 @@
 //! Models and processor are those of `rigless`, which nobody of this project wrote.
 #![forbid(unsafe_code)]
 
+mod aloft;
 mod boot;
 mod check;
+mod cuts;
+mod faults;
 mod fly;
 mod host;
 mod kept;
 mod machine;
 mod pilot;
 mod pins;
+mod random;
 mod same;
+mod speedybee;
+mod table;
 mod ublox;
+mod usb_ring;
 mod wire;
 mod world;
 
-use rigless::machine::matekh743::MatekH743;
-use rigless::machine::pixracer::Pixracer;
-use std::path::Path;
+use aloft::Aloft;
+use clap::builder::PossibleValuesParser;
+use clap::{Arg, ArgMatches, Command, value_parser};
+use machine::MachineName;
+use std::error::Error;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use ublox::Generation;
 
-const USAGE: &str = "twin boot matekh743|pixracer IMAGE: boots it, and looks at bus and pins
-twin fly IMAGE SCENARIO [m8|m10] [LOG]: takes off, hovers and lands, in lockstep with the plant, with an NMEA receiver
-    or a new one of u-blox's; keeps the exact log in a file, and flies it again: the same to the last bit
-twin replay LOG: flies an exact log again
-twin host SCENARIO: the same with the firmware's code on this machine";
+/// GNSS receivers by name: the board's own, and new ones of u-blox's.
+const RECEIVERS: [(&str, Option<Generation>); 3] =
+    [("nmea", None), ("m8", Some(Generation::Eight)), ("m10", Some(Generation::Ten))];
+
+/// Declares the command line.
+fn command() -> Command {
+    let machine = || {
+        let names = MachineName::ALL.map(MachineName::name);
+        Arg::new("machine").required(true).value_parser(PossibleValuesParser::new(names)).help("The board")
+    };
+    let file = |name: &'static str, help: &'static str| {
+        Arg::new(name).required(true).value_parser(value_parser!(PathBuf)).help(help)
+    };
+    let image = || file("image", "The flight image, an ELF file");
+    let scenario = || file("scenario", "The scenario's file");
+    let receiver = Arg::new("receiver")
+        .long("receiver")
+        .value_parser(PossibleValuesParser::new(RECEIVERS.map(|(name, _)| name)))
+        .default_value("nmea")
+        .help("GNSS receiver: the board's own model, or a new u-blox");
+    let log = Arg::new("log").long("log").value_name("FILE").value_parser(value_parser!(PathBuf));
+    let log = log.help("Keep the exact log here, and fly it again on this machine: the same to the last bit");
+    let number = |name: &'static str, usual: &'static str, help: &'static str| {
+        Arg::new(name).long(name).value_name("N").value_parser(value_parser!(u64)).default_value(usual).help(help)
+    };
+    let only = Arg::new("only").long("only").value_name("NAME").default_value("").help("Those whose names begin so");
+    Command::new("twin")
+        .about("Runs the flight image of a board, as it is flashed, on register-level models of the board")
+        .subcommand_required(true)
+        .arg_required_else_help(true)
+        .subcommand(Command::new("boot").about("Boot, and look at bus and pins").args([machine(), image()]))
+        .subcommand(Command::new("fly").about("Take off, hover and land, in lockstep with the plant").args([
+            machine(),
+            image(),
+            scenario(),
+            receiver,
+            log,
+        ]))
+        .subcommand(Command::new("replay").about("Fly an exact log again").arg(file("log", "The log")))
+        .subcommand(
+            Command::new("faults").about("Faults at the Matek H743's pins, in a hover that is kept in a file").args([
+                image(),
+                scenario(),
+                file("hover", "Where the hover is kept, from which further runs begin"),
+                number("seeds", "1", "Flights of each fault"),
+                only,
+            ]),
+        )
+        .subcommand(Command::new("cuts").about("Power cut while the Matek H743 writes and erases its parameters").args([
+            image(),
+            number("cuts", "100", "Cuts in a write, and in an erase, about"),
+            number("seed", "1", "Of the random numbers"),
+        ]))
+        .subcommand(
+            Command::new("host").about("Fly a scenario with the firmware's code on this machine").arg(scenario()),
+        )
+}
+
+/// Returns the file that an argument names.
+fn path<'a>(matches: &'a ArgMatches, name: &str) -> Result<&'a Path, Box<dyn Error>> {
+    Ok(matches.get_one::<PathBuf>(name).ok_or("no file")?)
+}
+
+/// Returns the number that an argument names.
+fn number(matches: &ArgMatches, name: &str) -> Result<u64, Box<dyn Error>> {
+    Ok(*matches.get_one(name).ok_or("no number")?)
+}
+
+/// Returns the machine that an argument names.
+fn machine(matches: &ArgMatches) -> Result<MachineName, Box<dyn Error>> {
+    let name = matches.get_one::<String>("machine").ok_or("no machine")?;
+    Ok(MachineName::ALL.into_iter().find(|machine| machine.name() == name).ok_or("no such machine")?)
+}
+
+fn run(matches: &ArgMatches) -> Result<(), Box<dyn Error>> {
+    match matches.subcommand() {
+        Some(("boot", matches)) => {
+            let image = path(matches, "image")?;
+            with_machine!(machine(matches)?, M => boot::boot::<M>(image))
+        }
+        Some(("fly", matches)) => {
+            let (image, scenario) = (path(matches, "image")?, path(matches, "scenario")?);
+            let name = matches.get_one::<String>("receiver");
+            let receiver = RECEIVERS.into_iter().find(|(receiver, _)| name.is_some_and(|name| name == receiver));
+            let receiver = receiver.and_then(|(_, generation)| generation);
+            let log = matches.get_one::<PathBuf>("log").map(PathBuf::as_path);
+            with_machine!(machine(matches)?, M => fly::fly::<M>(image, scenario, receiver, log))
+        }
+        Some(("replay", matches)) => same::check_log(&std::fs::read(path(matches, "log")?)?),
+        Some(("faults", matches)) => {
+            let [image, scenario, hover] = ["image", "scenario", "hover"].map(|name| path(matches, name));
+            let only = matches.get_one::<String>("only").map_or("", String::as_str);
+            faults::fly_all(&Aloft::of(image?, scenario?, hover?)?, 1..number(matches, "seeds")? + 1, only)
+        }
+        Some(("cuts", matches)) => {
+            cuts::cut_all(path(matches, "image")?, number(matches, "seed")?, number(matches, "cuts")?)
+        }
+        Some(("host", matches)) => host::fly(path(matches, "scenario")?),
+        _ => Err("no such command".into()),
+    }
+}
 
 fn main() -> ExitCode {
-    let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
-    let result = match *arguments {
-        ["boot", "matekh743", image] => boot::boot::<MatekH743>(Path::new(image)),
-        ["boot", "pixracer", image] => boot::boot::<Pixracer>(Path::new(image)),
-        ["fly", image, scenario, ref options @ ..] if options.len() <= 2 => {
-            let (mut receiver, mut log) = (None, None);
-            for option in options {
-                match *option {
-                    "m8" => receiver = Some(Generation::Eight),
-                    "m10" => receiver = Some(Generation::Ten),
-                    file => log = Some(Path::new(file)),
-                }
-            }
-            fly::fly(Path::new(image), Path::new(scenario), receiver, log)
-        }
-        ["replay", log] => std::fs::read(log).map_err(Into::into).and_then(|bytes| same::check_log(&bytes)),
-        ["host", scenario] => host::fly(Path::new(scenario)),
-        _ => Err(USAGE.into()),
-    };
-    match result {
+    match run(&command().get_matches()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("twin: {error}");

@@ -1,56 +1,183 @@
-//! Motor commands, read from the pins: DSHOT600, bit by bit.
+//! Motor commands, read from the pins: DSHOT600 bit by bit, or lengths of pulses.
 
+use crate::machine::{FrameTimer, Signal};
+use afbc_flight_core::motor::{THROTTLE_MAX, THROTTLE_MIN};
+use rigless::emulator::{Access, AccessKind};
 use rigless::machine::flight::Actuator;
 
 /// Bits of a frame.
-pub const BITS: u64 = 16;
+const BITS: u64 = 16;
 /// Time of a bit \[ns\].
-pub const BIT_NS: f64 = 1e9 / 600e3;
+const BIT_NS: f64 = 1e9 / 600e3;
 /// Lengths of the pulses of a zero and of a one \[ns\], and what a count of the timers may change \[ns\].
 const PULSES_NS: [u64; 2] = [625, 1_250];
-const COUNT_NS: u64 = 5;
+const COUNT_NS: u64 = 6;
+/// Time between two looks for the first bit of a frame \[ns\], and their number.
+const LOOK_NS: u64 = 200;
+const LOOKS: u32 = 100;
+/// PWM: pulse of a stopped motor, what full throttle adds, the period, and what a count may change \[ns\].
+const STOPPED_NS: u64 = 1_000_000;
+const SPAN_NS: u64 = 1_000_000;
+const PERIOD_NS: u64 = 2_500_000;
+const DIVIDED_COUNT_NS: u64 = 50;
+/// Wrong signals that are told, at most.
+const TOLD: usize = 10;
 
-/// The frames of some motors while they are sent.
+/// Reading the frames of a timer.
+#[derive(Clone, Copy, Debug)]
+enum Sampling {
+    Idle,
+    /// Looks left for the first bit.
+    Waits(u32),
+    /// Bits taken, of a frame whose first was seen at this time \[ns\].
+    Reads(u64, u64),
+}
+
+/// The frames of a timer's motors while they are sent.
 #[derive(Clone, Debug)]
-pub struct Frames {
+struct Frames {
+    timer: &'static FrameTimer,
+    sampling: Sampling,
+    /// When the pins are looked at next \[ns\].
+    look_ns: Option<u64>,
     bits: Vec<u16>,
+}
+
+/// The motors' pins.
+#[derive(Clone, Debug)]
+pub struct MotorPins {
+    frames: Vec<Frames>,
+    /// Commands as they were last sent: 0, or 48 to 2047.
+    throttles: Vec<Option<u16>>,
+    /// Frames of a timer, or ticks with a pulse on each pin.
     pub sent: u64,
-    /// What was no frame.
+    /// What was neither frame nor pulse.
     pub wrong: Vec<String>,
 }
 
-impl Frames {
+impl MotorPins {
     /// Of so many motors.
-    pub fn new(motors: usize) -> Self {
-        Frames { bits: vec![0; motors], sent: 0, wrong: Vec::new() }
+    pub fn new(signal: Signal, motors: usize) -> Self {
+        let timers = match signal {
+            Signal::Dshot600(timers) => timers,
+            Signal::Pwm400 => &[],
+        };
+        let frames = timers.iter().filter(|timer| timer.motors.start < motors).map(|timer| Frames {
+            timer,
+            sampling: Sampling::Idle,
+            look_ns: None,
+            bits: vec![0; timer.motors.end.min(motors) - timer.motors.start],
+        });
+        MotorPins { frames: frames.collect(), throttles: vec![None; motors], sent: 0, wrong: Vec::new() }
     }
 
-    /// Takes the next bit of each, while its pulse is on the pin.
-    pub fn take(&mut self, pins: &[Actuator]) {
+    /// Returns what each motor was last told, and forgets it.
+    pub fn take(&mut self) -> Vec<Option<u16>> {
+        self.throttles.iter_mut().map(Option::take).collect()
+    }
+
+    /// Sees an access of the image, which may start a frame; returns true if the time of the next look has changed.
+    pub fn watch(&mut self, access: &Access, value: u64) -> bool {
+        let starts = |frames: &&mut Frames| {
+            (access.kind, access.address, value & 1) == (AccessKind::Write, frames.timer.stream, 1)
+        };
+        let Some(frames) = self.frames.iter_mut().find(starts) else { return false };
+        frames.sampling = Sampling::Waits(LOOKS);
+        frames.look_ns = Some(access.virtual_time.0 + LOOK_NS);
+        true
+    }
+
+    /// Returns when the pins are to be looked at next \[ns\].
+    pub fn look_ns(&self) -> Option<u64> {
+        self.frames.iter().filter_map(|frames| frames.look_ns).min()
+    }
+
+    /// Looks at the pins for bits of frames. Returns true if a frame is complete.
+    pub fn look(&mut self, pins: &[Actuator], now_ns: u64) -> bool {
+        let mut complete = false;
+        let due = |frames: &&mut Frames| frames.look_ns.is_some_and(|look_ns| now_ns >= look_ns);
+        for frames in self.frames.iter_mut().filter(due) {
+            let pins = pins.get(frames.timer.motors.clone()).unwrap_or_default();
+            frames.look_ns = frames.sample(pins, now_ns, &mut self.wrong);
+            if frames.look_ns.is_none() && matches!(frames.sampling, Sampling::Reads(..)) {
+                frames.sampling = Sampling::Idle;
+                self.sent += 1;
+                let first = frames.timer.motors.start;
+                for (throttle, bits) in self.throttles.iter_mut().skip(first).zip(&mut frames.bits) {
+                    *throttle = throttle_of(std::mem::take(bits));
+                    if throttle.is_none() {
+                        tell(&mut self.wrong, || format!("frame {}: a wrong checksum", self.sent));
+                    }
+                }
+                complete = true;
+            }
+        }
+        complete
+    }
+
+    /// Takes the lengths of the pulses that the pins repeat.
+    pub fn take_pulses(&mut self, pins: &[Actuator]) {
+        for (throttle, pin) in self.throttles.iter_mut().zip(pins) {
+            // None before the outputs start.
+            let Some(pulse) = pin.pulse.filter(|pulse| pulse.width.0 > 0) else { continue };
+            let [width, period] = [pulse.width.0, pulse.period.0];
+            let longest = STOPPED_NS + SPAN_NS + DIVIDED_COUNT_NS;
+            if width + DIVIDED_COUNT_NS < STOPPED_NS || width > longest || period.abs_diff(PERIOD_NS) > DIVIDED_COUNT_NS
+            {
+                tell(&mut self.wrong, || format!("{}: {width} of {period} ns", pin.name));
+            }
+            let steps = u64::from(THROTTLE_MAX - THROTTLE_MIN);
+            let above = (width.saturating_sub(STOPPED_NS) * steps + SPAN_NS / 2) / SPAN_NS;
+            *throttle = Some(THROTTLE_MIN + above.min(steps) as u16);
+        }
+        self.sent += u64::from(self.throttles.iter().all(Option::is_some));
+    }
+}
+
+impl Frames {
+    /// Looks at the timer's pins; returns when to look again.
+    fn sample(&mut self, pins: &[Actuator], now_ns: u64, wrong: &mut Vec<String>) -> Option<u64> {
+        let (first_ns, taken) = match self.sampling {
+            Sampling::Idle => return None,
+            Sampling::Waits(_) if pins.iter().any(has_pulse) => (now_ns, 0),
+            Sampling::Waits(0) => {
+                tell(wrong, || format!("no frame at {now_ns} ns"));
+                self.sampling = Sampling::Idle;
+                return None;
+            }
+            Sampling::Waits(left) => {
+                self.sampling = Sampling::Waits(left - 1);
+                return Some(now_ns + LOOK_NS);
+            }
+            Sampling::Reads(first_ns, taken) => (first_ns, taken),
+        };
         for (pin, bits) in pins.iter().zip(&mut self.bits) {
             let width = pin.pulse.map_or(0, |pulse| pulse.width.0);
             let bit = PULSES_NS.iter().position(|length| length.abs_diff(width) <= COUNT_NS);
-            if bit.is_none() && self.wrong.len() < 10 {
-                self.wrong.push(format!("{}: a pulse of {width} ns", pin.name));
+            if bit.is_none() {
+                tell(wrong, || format!("{}: a pulse of {width} ns", pin.name));
             }
             *bits = *bits << 1 | bit.unwrap_or(0) as u16;
         }
+        let taken = taken + 1;
+        self.sampling = Sampling::Reads(first_ns, taken);
+        (taken < BITS).then_some(first_ns + (taken as f64 * BIT_NS) as u64)
     }
+}
 
-    /// Returns the throttles of whole frames; none for a frame with a wrong checksum.
-    pub fn throttles(&mut self) -> Vec<Option<u16>> {
-        self.sent += 1;
-        let frames = self.bits.iter_mut().map(std::mem::take);
-        let throttles: Vec<_> = frames
-            .map(|frame| {
-                let data = frame >> 4;
-                let checksum = (data ^ (data >> 4) ^ (data >> 8)) & 0xF;
-                (checksum == frame & 0xF).then_some(data >> 1)
-            })
-            .collect();
-        if throttles.contains(&None) && self.wrong.len() < 10 {
-            self.wrong.push(format!("frame {}: a wrong checksum", self.sent));
-        }
-        throttles
+fn has_pulse(pin: &Actuator) -> bool {
+    pin.pulse.is_some_and(|pulse| pulse.width.0 > 0)
+}
+
+/// Returns the throttle of a frame; none if its checksum is wrong.
+fn throttle_of(frame: u16) -> Option<u16> {
+    let data = frame >> 4;
+    let checksum = (data ^ (data >> 4) ^ (data >> 8)) & 0xF;
+    (checksum == frame & 0xF).then_some(data >> 1)
+}
+
+fn tell(wrong: &mut Vec<String>, what: impl FnOnce() -> String) {
+    if wrong.len() < TOLD {
+        wrong.push(what());
     }
 }

@@ -5,31 +5,26 @@
 #[path = "../../crates/drivers/tests/ublox_model/mod.rs"]
 mod ublox_model;
 
+use crate::machine::{Divider, Machine};
 use afbc_estimator::Measurement;
 use afbc_onboard::Readings;
 use rigless::chip::Timeline;
-use rigless::chip::nmea;
 use rigless::chip::uart::Peer;
-use rigless::edge::Edge;
 use rigless::emulator::{AccessKind, Settled};
 use rigless::machine::flight::Signals;
-use rigless::machine::matekh743::MatekH743;
 use rigless::snapshot::Store;
 use rigless::time::VirtualNanos;
 use std::sync::{Arc, Mutex};
 pub(crate) use ublox_model::Generation;
 use ublox_model::{Model, Truth};
 
-/// USART2 among the board's, its divider (RM0433, 48.8.5) and its clock [Hz].
-const USART2: usize = 1;
-const USART2_BRR: u64 = 0x4000_440C;
-const CLOCK_HZ: u64 = 100_000_000;
 /// What a period may be shorter than configured, for the instruments' jitter [us].
 const JITTER_US: u64 = 50_000;
 
 #[derive(Debug)]
 struct Line {
     model: Model,
+    divider: Divider,
     /// Baud rate of the board's UART.
     baud: u64,
     sent_us: u64,
@@ -49,8 +44,9 @@ impl Line {
 pub struct UbloxPeer(Arc<Mutex<Line>>);
 
 impl UbloxPeer {
-    pub fn new(generation: Generation) -> Self {
-        UbloxPeer(Arc::new(Mutex::new(Line { model: Model::new(generation), baud: 0, sent_us: 0 })))
+    /// A new one, at a UART with this divider.
+    pub fn new(generation: Generation, divider: Divider) -> Self {
+        UbloxPeer(Arc::new(Mutex::new(Line { model: Model::new(generation), divider, baud: 0, sent_us: 0 })))
     }
 
     fn with<T>(&self, change: impl FnOnce(&mut Line) -> T) -> T {
@@ -59,16 +55,19 @@ impl UbloxPeer {
 
     /// Sees what the image does to the UART's divider.
     pub fn watch(&self, settled: &Settled) {
-        if let Settled::Access { access, value } = settled
-            && (access.kind, access.address) == (AccessKind::Write, USART2_BRR)
-        {
-            self.with(|line| line.baud = CLOCK_HZ / (*value).max(1));
+        let Settled::Access { access, value } = settled else { return };
+        if access.kind == AccessKind::Write {
+            self.with(|line| {
+                if access.address == line.divider.register {
+                    line.baud = line.divider.clock_hz / (*value).max(1);
+                }
+            });
         }
     }
 
     /// Lets the board feel what its transducers do, this receiver with it: a fix of the instruments, which has its
     /// delay, is sent when it arrives.
-    pub fn sense(&self, board: &mut MatekH743, at: VirtualNanos, (readings, signals): (&Readings, &Signals)) {
+    pub fn sense(&self, board: &mut impl Machine, at: VirtualNanos, (readings, signals): (&Readings, &Signals)) {
         let now_us = at.0 / 1000;
         self.with(|line| {
             let period_us = line.model.period_us.saturating_sub(JITTER_US);
@@ -92,10 +91,8 @@ impl UbloxPeer {
                 line.model.report(now_us.saturating_sub(aid.age_us.into()), &truth);
             }
         });
-        // The board gives what a receiver feels to one of its own kind.
-        board.mcu.usart[USART2].attach(nmea::Receiver::new());
-        board.sense(signals);
-        board.mcu.usart[USART2].attach(self.clone());
+        board.sense_with_own_receiver(signals);
+        board.attach_receiver(Box::new(self.clone()));
     }
 
     /// Says how it is configured.

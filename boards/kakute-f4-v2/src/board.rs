@@ -11,6 +11,7 @@ chip_stm32f4::flight_controller! {
     imu: SPI1 {
         clock: PA5, out: PA7, in: PA6, select: PC4,
         dma: DMA2_CH3 by DMA2_STREAM3, DMA2_CH0 by DMA2_STREAM0,
+        ready: PC5 on EXTI5 by EXTI9_5,
         parts: (Icm20689, Mpu6000), alignment: CW270
     },
     i2c: I2C1 {
@@ -18,6 +19,7 @@ chip_stm32f4::flight_controller! {
         dma: DMA1_CH7 by DMA1_STREAM7, DMA1_CH5 by DMA1_STREAM5,
         barometer: (Dps310, Bmp280)
     },
+    indicator: { led: PB5, buzzer: PC9 },
     motors: 4 as BETAFLIGHT {
         first: TIM3<u16>, DMA1_CH2 by DMA1_STREAM2 { (), (), (PB0: GPIOB 0, motor 1), (PB1: GPIOB 1, motor 2) },
         second: TIM5<u32>, DMA1_CH6 by DMA1_STREAM6 { (), (), (PA2: GPIOA 2, motor 4), (PA3: GPIOA 3, motor 3) },

@@ -13,6 +13,7 @@ chip_stm32f4::flight_controller! {
     imu: SPI1 {
         clock: PA5, out: PA7, in: PA6, select: PC2,
         dma: DMA2_CH3 by DMA2_STREAM3, DMA2_CH0 by DMA2_STREAM0,
+        ready: PC3 on EXTI3 by EXTI3,
         parts: (Icm20602, Mpu6000, Mpu6500, Icm20689, Icm42688p<true>, Bmi270), alignment: CW180
     },
     i2c: I2C1 {
@@ -20,6 +21,7 @@ chip_stm32f4::flight_controller! {
         dma: DMA1_CH6 by DMA1_STREAM6, DMA1_CH0 by DMA1_STREAM0,
         barometer: (Dps310, Bmp280)
     },
+    indicator: { led: PB9, buzzer: PC13 },
     motors: 4 as BETAFLIGHT {
         first: TIM8<u16>, DMA2_CH1 by DMA2_STREAM1 {
             (PC6: GPIOC 6, motor 1), (PC7: GPIOC 7, motor 2), (PC8: GPIOC 8, motor 3),

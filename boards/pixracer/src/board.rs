@@ -11,41 +11,45 @@
 //! | memory | `memory.x` beside this folder |
 //! | parameters | sectors 1 and 2 of the flash |
 //! | SPI of IMUs and compass | SPI1: SCK on PA5, MISO on PA6, MOSI on PA7 |
-//! | first IMU | ICM-20608-G, select PC15 |
-//! | second IMU | MPU-9250, select PC2 |
+//! | first IMU | ICM-20608-G, select PC15, interrupt PC14 |
+//! | second IMU | MPU-9250, select PC2, interrupt PD15 |
 //! | compass | LIS3MDL, select PE15 |
 //! | barometer | MS5611 on SPI2: SCK on PB10, MISO on PB14, MOSI on PB15, select PD7; with a memory, select PD10 |
 //! | compass, outside | QMC5883L on I2C1: SCL on PB8, SDA on PB9 |
 //! | GNSS receiver, outside | NMEA on UART4: TX on PA0, RX on PA1 |
+//! | LED, green | PB1, open drain, lit if low |
+//! | buzzer, without a tone of its own | PA15: TIM2, channel 1 |
 //! | supply of the sensors | PE3, on if high |
 
 use crate::sensors::{Aids, Inside};
 use afbc_drivers::ms5611::Ms5611;
 use afbc_drivers::qmc5883l::Qmc5883l;
 use afbc_drivers::{Driver, I2cRegisters, SensorPart, SpiRegisters};
+use chip_stm32::indicator::{Led, PassiveBuzzer};
 use chip_stm32::link::{self, Receiver, Transmitter};
 use chip_stm32::motors::{
     MotorProtocol, Motors, Throttles, hold_low, numbering, of_channels, of_outputs, pin, rotors_of_outputs,
     set_protocol,
 };
-use chip_stm32::sensors::{Device, Polled};
+use chip_stm32::sensors::{Device, InterruptPin, Polled, StampHandler};
 use chip_stm32::{crystal, faults, usb, watchdog};
 use chip_stm32f4::{boot_loader, clocks, reset};
 use embassy_executor::SendSpawner;
 use embassy_stm32::flash::{Bank1Region1, Blocking, Flash};
 use embassy_stm32::gpio::{Level, Output, Speed};
 use embassy_stm32::i2c::{self, I2c};
+use embassy_stm32::interrupt::typelevel::EXTI15_10;
 use embassy_stm32::interrupt::{Interrupt, InterruptExt, Priority};
 use embassy_stm32::peripherals::{
-    DMA1_CH0, DMA1_CH3, DMA1_CH4, DMA1_CH6, DMA1_CH7, DMA2_CH0, DMA2_CH3, DMA2_CH5, I2C1, IWDG, SPI1, SPI2, TIM1, TIM4,
-    UART4, USART2, USART3, USB_OTG_FS,
+    DMA1_CH0, DMA1_CH3, DMA1_CH4, DMA1_CH6, DMA1_CH7, DMA2_CH0, DMA2_CH3, DMA2_CH5, I2C1, IWDG, SPI1, SPI2, TIM1, TIM2,
+    TIM4, UART4, USART2, USART3, USB_OTG_FS,
 };
 use embassy_stm32::spi::Spi;
 use embassy_stm32::usart::{self, BufferedUart};
 use embassy_stm32::wdg::IndependentWatchdog;
-use embassy_stm32::{bind_interrupts, dma, pac, rcc};
+use embassy_stm32::{bind_interrupts, dma, exti, pac, rcc};
 use firmware::board::{Board, BoardLink, Parts};
-use firmware::executors::priority;
+use firmware::executors::{self, priority};
 use firmware::vehicle::{CONFIGURATION, ROTORS};
 use static_cell::StaticCell;
 
@@ -71,16 +75,18 @@ bind_interrupts!(struct Irqs {
     DMA1_STREAM7 => dma::InterruptHandler<DMA1_CH7>;
     DMA2_STREAM5 => dma::InterruptHandler<DMA2_CH5>;
     DMA1_STREAM6 => dma::InterruptHandler<DMA1_CH6>;
+    EXTI15_10 => StampHandler<EXTI15_10>, exti::InterruptHandler<EXTI15_10>;
     OTG_FS => embassy_stm32::usb::InterruptHandler<USB_OTG_FS>;
 });
 
 /// Each interrupt with its priority.
-const PRIORITIES: [(Interrupt, u8); 13] = [
+const PRIORITIES: [(Interrupt, u8); 14] = [
     (Interrupt::USART2, priority::UART),
     (Interrupt::USART3, priority::UART),
     (Interrupt::UART4, priority::UART),
     (Interrupt::DMA2_STREAM0, priority::SAMPLING),
     (Interrupt::DMA2_STREAM3, priority::SAMPLING),
+    (Interrupt::EXTI15_10, priority::SAMPLING),
     (Interrupt::DMA1_STREAM3, priority::AIDING),
     (Interrupt::DMA1_STREAM4, priority::AIDING),
     (Interrupt::I2C1_EV, priority::AIDING),
@@ -118,6 +124,7 @@ impl Board for Pixracer {
     /// Sectors 1 and 2, of 16 KiB each (`memory.x`).
     const STORE: u32 = 16 * 1024;
     const OUTPUTS: usize = OUTPUTS;
+    const INDICATES: bool = true;
     const BOOT_LOADER: Option<fn() -> !> = Some(boot_loader::restart);
 
     fn after_reset() {
@@ -151,7 +158,8 @@ impl Board for Pixracer {
             Output::new(p.PC2, Level::High, Speed::VeryHigh),
             Output::new(p.PE15, Level::High, Speed::VeryHigh),
         ];
-        let sampler = Inside { spi, kernel_hz, selects };
+        let ready = [InterruptPin::new(p.PC14, p.EXTI14, Irqs), InterruptPin::new(p.PD15, p.EXTI15, Irqs)];
+        let sampler = Inside { spi, kernel_hz, selects, ready };
 
         let kernel_hz = rcc::frequency::<SPI2>().0;
         let config = chip_stm32::sensors::spi(kernel_hz / 256);
@@ -171,6 +179,9 @@ impl Board for Pixracer {
         control.spawn(motors_1_to_4(motors).expect("spawned once"));
         let motors = Motors::new(p.TIM4, None, pin(p.PD13), pin(p.PD14), None, p.DMA1_CH6, Irqs);
         control.spawn(motors_5_and_6(motors).expect("spawned once"));
+
+        let (led, buzzer) = (Led::new(p.PB1), PassiveBuzzer::new(p.TIM2, p.PA15));
+        executors::housekeeping().spawn(indicator(led, buzzer).expect("spawned once"));
 
         // A debugger that halts the core halts the watchdog.
         pac::DBGMCU.apb1fzr().modify(|freeze| freeze.set_iwdg(true));
@@ -223,6 +234,11 @@ async fn motors_1_to_4(mut motors: Motors<TIM1, DMA2_CH5, Irqs, u16>) {
 async fn motors_5_and_6(mut motors: Motors<TIM4, DMA1_CH6, Irqs, u16>) {
     let [_, throttles] = &THROTTLES;
     motors.run(throttles).await
+}
+
+#[embassy_executor::task]
+async fn indicator(led: Led, buzzer: PassiveBuzzer<TIM2>) {
+    chip_stm32::indicator::run(Some(led), buzzer).await
 }
 
 /// Stops the motors' signals, whatever state the program is in.

@@ -5,9 +5,9 @@ use afbc_drivers::lis3mdl::Lis3mdl;
 use afbc_drivers::mpu::{Icm20608, Mpu9250};
 use afbc_drivers::ms5611::Ms5611;
 use afbc_drivers::qmc5883l::Qmc5883l;
-use afbc_drivers::{Driver, I2cRegisters, SensorPart, SpiRegisters};
+use afbc_drivers::{Driver, I2cRegisters, PartTiming, SensorPart, SpiRegisters};
 use chip_stm32::receiver;
-use chip_stm32::sensors::{COMPASS, Device, Polled, SharedDevice, SharedSpi, run};
+use chip_stm32::sensors::{COMPASS, Device, InterruptPin, Polled, SharedDevice, SharedSpi, interrupted, run};
 use core::sync::atomic::{AtomicBool, Ordering};
 use embassy_futures::join::join3;
 use embassy_stm32::gpio::Output;
@@ -27,21 +27,26 @@ pub(crate) struct Inside {
     pub(crate) kernel_hz: u32,
     /// Select pins of ICM-20608-G, MPU-9250 and LIS3MDL.
     pub(crate) selects: [Output<'static>; 3],
+    /// Interrupts of the IMUs.
+    pub(crate) ready: [InterruptPin; 2],
 }
 
 impl Sampler for Inside {
+    const IS_REDUNDANT: bool = true;
+
     async fn run(self) {
         let spi = SharedSpi::new(self.spi);
         let [first, second, compass] = self.selects;
-        // The first one's turn comes first in every control period.
+        let [first_ready, second_ready] = self.ready.map(interrupted);
+        // Without edges, the first one's turn comes first in every control period.
         join3(
-            run(driver(Icm20608 {}, &spi, first, self.kernel_hz), |reading| {
+            run(driver(Icm20608 {}, &spi, first, self.kernel_hz, first_ready), |reading| {
                 samples::put_first_imu(reading.at_us, turned(&reading.value, &CW180_FLIP));
             }),
-            run(driver(Mpu9250 {}, &spi, second, self.kernel_hz), |reading| {
+            run(driver(Mpu9250 {}, &spi, second, self.kernel_hz, second_ready), |reading| {
                 samples::put_second_imu(reading.at_us, turned(&reading.value, &CW180_FLIP));
             }),
-            run(driver(Lis3mdl {}, &spi, compass, self.kernel_hz), |reading| {
+            run(driver(Lis3mdl {}, &spi, compass, self.kernel_hz, Polled), |reading| {
                 if !IS_COMPASS_OUTSIDE.load(Ordering::Relaxed) {
                     aux_sensors::put_field(&reading, &CW180_FLIP);
                 }
@@ -52,14 +57,15 @@ impl Sampler for Inside {
 }
 
 /// A part on the shared SPI, which is fed with `kernel_hz`.
-fn driver<'a, P: SensorPart>(
+fn driver<'a, P: SensorPart, T: PartTiming>(
     part: P,
     spi: &'a SharedSpi,
     select: Output<'static>,
     kernel_hz: u32,
-) -> Driver<P, SpiRegisters<SharedDevice<'a>>, Polled> {
+    timing: T,
+) -> Driver<P, SpiRegisters<SharedDevice<'a>>, T> {
     let format = P::SPI.expect("a part on SPI");
-    Driver::new(part, SpiRegisters::new(SharedDevice::new(spi, select, kernel_hz, format.clock_hz), format), Polled)
+    Driver::new(part, SpiRegisters::new(SharedDevice::new(spi, select, kernel_hz, format.clock_hz), format), timing)
 }
 
 /// The slow sensors.

@@ -10,6 +10,7 @@ chip_stm32f4::flight_controller! {
     imu: SPI1 {
         clock: PA5, out: PA7, in: PA6, select: PA4,
         dma: DMA2_CH3 by DMA2_STREAM3, DMA2_CH0 by DMA2_STREAM0,
+        ready: PC4 on EXTI4 by EXTI4,
         parts: (Icm42688p<true>,), alignment: CW90
     },
     i2c: I2C1 {
@@ -17,6 +18,7 @@ chip_stm32f4::flight_controller! {
         dma: DMA1_CH7 by DMA1_STREAM7, DMA1_CH0 by DMA1_STREAM0,
         barometer: (Spl06,)
     },
+    indicator: { led: PC13, buzzer: PC15 },
     motors: 4 as BETAFLIGHT {
         first: TIM4<u16>, DMA1_CH6 by DMA1_STREAM6 { (PB6: GPIOB 6, motor 1), (PB7: GPIOB 7, motor 2), (), () },
         second: TIM3<u16>, DMA1_CH2 by DMA1_STREAM2 { (), (), (PB0: GPIOB 0, motor 3), (PB1: GPIOB 1, motor 4) },

@@ -1,4 +1,5 @@
-//! Links, motors and watchdog of an STM32H743VI with the pins of the Matek H743; `docs/firmware.md` shows the wiring.
+//! Links, motors and watchdog of an STM32H743VI with the pins of the Matek H743; `docs/boards/stm32h743.md` shows
+//! the wiring.
 //!
 //! | what | where |
 //! |---|---|
@@ -10,12 +11,14 @@
 //! | motors 5 to 8 (S7 to S10) | TIM4, channels 1 to 4: PD12, PD13, PD14, PD15; driven by DMA1's stream 1 |
 //! | memory | `memory.x` beside this folder |
 //! | parameters | sectors 0 and 1 of the flash's second bank |
-//! | first IMU | ICM-42688-P on SPI1: SCK on PA5, MISO on PA6, MOSI on PD7, select PC15; turned by 180 degrees |
-//! | second IMU | ICM-42605 on SPI4: SCK on PE12, MISO on PE13, MOSI on PE14, select PC13; turned by 270 degrees |
+//! | first IMU | ICM-42688-P, SPI1: SCK PA5, MISO PA6, MOSI PD7, select PC15, interrupt PB2; turned by 180 degrees |
+//! | second IMU | ICM-42605, SPI4: SCK PE12, MISO PE13, MOSI PE14, select PC13, interrupt PE15; turned by 270 degrees |
 //! | barometer | DPS310 on I2C2 at 0x76: SCL on PB10, SDA on PB11 |
 //! | compass | QMC5883L on I2C1, outside: SCL on PB6, SDA on PB7 |
 //! | battery | voltage on PC0, current on PC1: ADC1 |
 //! | GNSS receiver | u-blox or NMEA on USART2, outside: TX on PD5, RX on PD6 |
+//! | LED, blue | PE3, lit if low |
+//! | buzzer | PA15: TIM2, channel 1 |
 
 use crate::sensors::{Aids, Imus};
 use afbc_drivers::dps310::Dps310;
@@ -23,26 +26,28 @@ use afbc_drivers::icm426xx::{Icm42605, Icm42688p};
 use afbc_drivers::qmc5883l::Qmc5883l;
 use afbc_drivers::{Driver, I2cRegisters, SensorPart, SpiRegisters};
 use chip_stm32::battery::BatteryConverter;
+use chip_stm32::indicator::{Led, PassiveBuzzer};
 use chip_stm32::link::{self, Receiver, Transmitter};
 use chip_stm32::motors::{CHANNELS, MotorProtocol, Motors, Throttles, hold_low, pin, set_protocol};
-use chip_stm32::sensors::{Device, Polled};
+use chip_stm32::sensors::{Device, InterruptPin, Interrupted, Polled, StampHandler, interrupted};
 use chip_stm32::{crystal, faults, usb, watchdog};
 use chip_stm32h7::flash::Words;
 use chip_stm32h7::{boot_loader, clocks, reset};
 use embassy_executor::SendSpawner;
 use embassy_stm32::adc::Adc;
 use embassy_stm32::i2c::{self, I2c};
+use embassy_stm32::interrupt::typelevel::{EXTI2, EXTI15_10};
 use embassy_stm32::interrupt::{self, Interrupt, InterruptExt, Priority};
 use embassy_stm32::peripherals::{
     DMA1_CH0, DMA1_CH1, DMA1_CH2, DMA1_CH3, DMA1_CH4, DMA1_CH5, DMA1_CH6, DMA1_CH7, DMA2_CH0, DMA2_CH1, I2C1, I2C2,
-    IWDG1, TIM4, TIM5, UART7, USART1, USART2, USB_OTG_FS,
+    IWDG1, TIM2, TIM4, TIM5, UART7, USART1, USART2, USB_OTG_FS,
 };
 use embassy_stm32::spi::Spi;
 use embassy_stm32::usart::{self, BufferedUart};
 use embassy_stm32::wdg::IndependentWatchdog;
-use embassy_stm32::{bind_interrupts, dma, pac};
+use embassy_stm32::{bind_interrupts, dma, exti, pac};
 use firmware::board::{Board, BoardLink, Parts};
-use firmware::executors::priority;
+use firmware::executors::{self, priority};
 use firmware::vehicle::ROTORS;
 use static_cell::StaticCell;
 
@@ -50,9 +55,15 @@ use static_cell::StaticCell;
 const CRYSTAL_HZ: u32 = 8_000_000;
 /// Clock of the IMUs' buses \[Hz\], an eighth of their kernel's; the parts allow 24 MHz.
 const SPI_HZ: u32 = 12_500_000;
-/// Interrupts of the sensors' transfers.
-const IMU_INTERRUPTS: [Interrupt; 4] =
-    [Interrupt::DMA1_STREAM2, Interrupt::DMA1_STREAM3, Interrupt::DMA1_STREAM4, Interrupt::DMA1_STREAM5];
+/// Interrupts of the sensors, and of their transfers.
+const IMU_INTERRUPTS: [Interrupt; 6] = [
+    Interrupt::DMA1_STREAM2,
+    Interrupt::DMA1_STREAM3,
+    Interrupt::DMA1_STREAM4,
+    Interrupt::DMA1_STREAM5,
+    Interrupt::EXTI2,
+    Interrupt::EXTI15_10,
+];
 const AID_INTERRUPTS: [Interrupt; 8] = [
     Interrupt::DMA1_STREAM6,
     Interrupt::DMA1_STREAM7,
@@ -84,6 +95,8 @@ bind_interrupts!(struct Irqs {
     I2C1_ER => i2c::ErrorInterruptHandler<I2C1>;
     I2C2_EV => i2c::EventInterruptHandler<I2C2>;
     I2C2_ER => i2c::ErrorInterruptHandler<I2C2>;
+    EXTI2 => StampHandler<EXTI2>, exti::InterruptHandler<EXTI2>;
+    EXTI15_10 => StampHandler<EXTI15_10>, exti::InterruptHandler<EXTI15_10>;
     OTG_FS => embassy_stm32::usb::InterruptHandler<USB_OTG_FS>;
 });
 
@@ -94,9 +107,9 @@ static TX: [StaticCell<[u8; 1024]>; 3] = [const { StaticCell::new() }; 3];
 /// Newest throttles, for the motors' tasks.
 static THROTTLES: [Throttles; 2] = [const { Throttles::new() }; 2];
 
-/// An IMU that is read at the start of every control period.
-fn imu<P: SensorPart>(part: P, device: Device) -> Driver<P, SpiRegisters<Device>, Polled> {
-    Driver::new(part, SpiRegisters::new(device, P::SPI.expect("an IMU on SPI")), Polled)
+/// An IMU with its interrupt.
+fn imu<P: SensorPart>(part: P, device: Device, ready: InterruptPin) -> Driver<P, SpiRegisters<Device>, Interrupted> {
+    Driver::new(part, SpiRegisters::new(device, P::SPI.expect("an IMU on SPI")), interrupted(ready))
 }
 
 /// The board after start-up.
@@ -113,6 +126,7 @@ impl Board for Stm32h743 {
     const CORE_HZ: u32 = clocks::CORE_HZ;
     const STORE: u32 = 0;
     const OUTPUTS: usize = OUTPUTS;
+    const INDICATES: bool = true;
     const BOOT_LOADER: Option<fn() -> !> = Some(boot_loader::restart);
 
     fn after_reset() {
@@ -140,8 +154,8 @@ impl Board for Stm32h743 {
         let inside = I2c::new(p.I2C2, p.PB10, p.PB11, p.DMA2_CH0, p.DMA2_CH1, Irqs, config);
         let outside = I2c::new(p.I2C1, p.PB6, p.PB7, p.DMA1_CH6, p.DMA1_CH7, Irqs, config);
         let sampler = Imus {
-            first: imu(Icm42688p {}, Device::new(first, p.PC15)),
-            second: imu(Icm42605 {}, Device::new(second, p.PC13)),
+            first: imu(Icm42688p {}, Device::new(first, p.PC15), InterruptPin::new(p.PB2, p.EXTI2, Irqs)),
+            second: imu(Icm42605 {}, Device::new(second, p.PC13), InterruptPin::new(p.PE15, p.EXTI15, Irqs)),
         };
         let aids = Aids {
             compass: Driver::new(Qmc5883l, I2cRegisters::new(outside, 0x0D), Polled),
@@ -163,6 +177,9 @@ impl Board for Stm32h743 {
         control.spawn(motors_5_to_8(motors).expect("spawned once"));
         interrupt::DMA1_STREAM0.set_priority(Priority::from(priority::MOTOR_DMA));
         interrupt::DMA1_STREAM1.set_priority(Priority::from(priority::MOTOR_DMA));
+
+        let (led, buzzer) = (Led::new(p.PE3), PassiveBuzzer::new(p.TIM2, p.PA15));
+        executors::housekeeping().spawn(indicator(led, buzzer).expect("spawned once"));
 
         // A debugger that halts the core halts the watchdog.
         pac::DBGMCU.apb4fzr1().modify(|freeze| freeze.set_iwdg1(true));
@@ -209,6 +226,11 @@ async fn motors_1_to_4(mut motors: Motors<TIM5, DMA1_CH0, Irqs, u32>) {
 async fn motors_5_to_8(mut motors: Motors<TIM4, DMA1_CH1, Irqs, u16>) {
     let [_, throttles] = &THROTTLES;
     motors.run(throttles).await
+}
+
+#[embassy_executor::task]
+async fn indicator(led: Led, buzzer: PassiveBuzzer<TIM2>) {
+    chip_stm32::indicator::run(Some(led), buzzer).await
 }
 
 /// Stops the motors' signals, whatever state the program is in.

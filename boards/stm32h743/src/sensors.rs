@@ -9,7 +9,7 @@ use afbc_drivers::qmc5883l::Qmc5883l;
 use afbc_drivers::{Driver, I2cRegisters, SpiRegisters};
 use chip_stm32::battery::{self, BatteryConverter};
 use chip_stm32::receiver;
-use chip_stm32::sensors::{COMPASS, Device, Polled, run};
+use chip_stm32::sensors::{COMPASS, Device, Interrupted, Polled, run};
 use embassy_futures::join::{join, join4};
 use embassy_stm32::adc::SampleTime;
 use embassy_stm32::i2c::{I2c, Master};
@@ -24,11 +24,13 @@ type Bus = I2c<'static, Async, Master>;
 
 /// The inertial sensors.
 pub(crate) struct Imus {
-    pub(crate) first: Driver<Icm42688p<true>, SpiRegisters<Device>, Polled>,
-    pub(crate) second: Driver<Icm42605<true>, SpiRegisters<Device>, Polled>,
+    pub(crate) first: Driver<Icm42688p<true>, SpiRegisters<Device>, Interrupted>,
+    pub(crate) second: Driver<Icm42605<true>, SpiRegisters<Device>, Interrupted>,
 }
 
 impl Sampler for Imus {
+    const IS_REDUNDANT: bool = true;
+
     async fn run(self) {
         join(
             run(self.first, |reading| samples::put_first_imu(reading.at_us, turned(&reading.value, &CW0_FLIP))),

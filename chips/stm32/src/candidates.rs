@@ -1,7 +1,7 @@
 //! Parts of which a board has one: boards are sold with one or another, on the same pins. They are tried in turn until
 //! one answers, which is then read for ever.
 
-use crate::sensors::{Device, Polled, run_if_it_answers};
+use crate::sensors::{Device, InterruptPin, Polled, interrupted, run_if_it_answers};
 use afbc_drivers::{Driver, I2cRegisters, InertialReading, PressureReading, SensorPart, SpiRegisters};
 use afbc_types::Stamped;
 use embassy_time::Timer;
@@ -13,8 +13,13 @@ const PAUSE_S: u64 = 1;
 /// IMUs on SPI: a tuple of parts.
 #[allow(async_fn_in_trait, reason = "used generically, never boxed")]
 pub trait ImuCandidates {
-    /// Reads the one that is there, by an SPI that is fed with `kernel_hz`.
-    async fn run(device: &mut Device, kernel_hz: u32, take: impl FnMut(Stamped<InertialReading>));
+    /// Reads the one that is there, by an SPI that is fed with `kernel_hz`, at the edges of its interrupt.
+    async fn run(
+        device: &mut Device,
+        interrupt: &mut InterruptPin,
+        kernel_hz: u32,
+        take: impl FnMut(Stamped<InertialReading>),
+    );
 }
 
 /// Barometers on I2C, at any of their addresses: a tuple of parts, which is empty if the board has none.
@@ -27,13 +32,19 @@ pub trait BarometerCandidates {
 macro_rules! candidates {
     ($($part:ident),+) => {
         impl<$($part: SensorPart<Reading = InertialReading> + Default),+> ImuCandidates for ($($part,)+) {
-            async fn run(device: &mut Device, kernel_hz: u32, mut take: impl FnMut(Stamped<InertialReading>)) {
+            async fn run(
+                device: &mut Device,
+                interrupt: &mut InterruptPin,
+                kernel_hz: u32,
+                mut take: impl FnMut(Stamped<InertialReading>),
+            ) {
                 loop {
                     $(
                         if let Some(format) = $part::SPI {
                             device.set_clock(kernel_hz, format.clock_hz);
                             let registers = SpiRegisters::new(&mut *device, format);
-                            run_if_it_answers(Driver::new($part::default(), registers, Polled), &mut take).await;
+                            let timing = interrupted(&mut *interrupt);
+                            run_if_it_answers(Driver::new($part::default(), registers, timing), &mut take).await;
                         }
                     )+
                     Timer::after_secs(PAUSE_S).await;

@@ -6,6 +6,7 @@ pub mod boot_loader;
 pub mod candidates;
 pub mod crystal;
 pub mod faults;
+pub mod indicator;
 pub mod link;
 pub mod motors;
 pub mod receiver;

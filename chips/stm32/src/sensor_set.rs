@@ -3,7 +3,7 @@
 
 use crate::candidates::{BarometerCandidates, ImuCandidates};
 use crate::receiver;
-use crate::sensors::{COMPASS, Device, Polled, run};
+use crate::sensors::{COMPASS, Device, InterruptPin, Polled, run};
 use afbc_drivers::alignment::turned;
 use afbc_drivers::qmc5883l::Qmc5883l;
 use afbc_drivers::{Driver, I2cRegisters};
@@ -25,6 +25,7 @@ const COMPASS_ADDRESS: u8 = 0x0D;
 /// An IMU, one of `P`.
 pub struct Imu<P> {
     device: Device,
+    interrupt: InterruptPin,
     kernel_hz: u32,
     to_body: Matrix3<f32>,
     parts: PhantomData<P>,
@@ -32,15 +33,15 @@ pub struct Imu<P> {
 
 impl<P> Imu<P> {
     /// The IMU on an SPI that is fed with `kernel_hz`, whose axes `to_body` turns into the body's.
-    pub fn new(device: Device, kernel_hz: u32, to_body: Matrix3<f32>) -> Self {
-        Imu { device, kernel_hz, to_body, parts: PhantomData }
+    pub fn new(device: Device, interrupt: InterruptPin, kernel_hz: u32, to_body: Matrix3<f32>) -> Self {
+        Imu { device, interrupt, kernel_hz, to_body, parts: PhantomData }
     }
 }
 
 impl<P: ImuCandidates> Sampler for Imu<P> {
     async fn run(mut self) {
-        let Imu { device, kernel_hz, to_body, .. } = &mut self;
-        P::run(device, *kernel_hz, |reading| {
+        let Imu { device, interrupt, kernel_hz, to_body, .. } = &mut self;
+        P::run(device, interrupt, *kernel_hz, |reading| {
             let value = SampleValue::Imu(turned(&reading.value, to_body));
             samples::put(SampleTime::At(reading.at_us), value);
         })

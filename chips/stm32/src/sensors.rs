@@ -1,10 +1,16 @@
 //! Buses and clock of sensors.
 
 use afbc_drivers::alignment::CW270_FLIP;
+use afbc_drivers::data_ready::{DataReady, Edge};
 use afbc_drivers::{Driver, PartFault, PartTiming, Registers, SensorPart};
 use afbc_types::Stamped;
-use embassy_stm32::gpio::{Level, Output, Pin, Speed};
+use core::marker::PhantomData;
+use core::sync::atomic::{AtomicU32, Ordering};
+use embassy_stm32::exti::{self, ExtiInput};
+use embassy_stm32::gpio::{ExtiPin, Level, Output, Pin, Pull, Speed};
+use embassy_stm32::interrupt::typelevel;
 use embassy_stm32::mode::Async;
+use embassy_stm32::pac::EXTI;
 use embassy_stm32::spi::mode::Master;
 use embassy_stm32::spi::{self, MODE_3, Spi};
 use embassy_stm32::time::Hertz;
@@ -17,6 +23,9 @@ use nalgebra::Matrix3;
 
 /// Alignment of the compass beside a receiver, which faces down and is turned by 270 degrees in the usual module.
 pub const COMPASS: Matrix3<f32> = CW270_FLIP;
+
+/// The control period \[us\].
+const PERIOD_US: u32 = 1_000;
 
 /// A part that is alone on its SPI.
 pub struct Device {
@@ -166,6 +175,68 @@ pub fn i2c() -> i2c::Config {
     config.frequency = Hertz(400_000);
     config.timeout = Duration::from_millis(5);
     config
+}
+
+/// Lines of external interrupts, each of the pins with its number on all ports.
+const LINES: usize = 16;
+/// Time of the last interrupt of each line, without its upper half \[us\].
+static STAMPS: [AtomicU32; LINES] = [const { AtomicU32::new(0) }; LINES];
+
+/// Handler that notes the time of an external interrupt, to be bound in front of embassy's.
+pub struct StampHandler<I>(PhantomData<I>);
+
+impl<I: typelevel::Interrupt> typelevel::Handler<I> for StampHandler<I> {
+    #[expect(unsafe_code, reason = "as the trait has it; nothing here is unsafe")]
+    unsafe fn on_interrupt() {
+        let now_us = Instant::now().as_micros() as u32;
+        // Of those that nobody waits for, edges are pending, too.
+        let lines = EXTI.pr(0).read().0 & EXTI.imr(0).read().0;
+        for (line, stamp) in STAMPS.iter().enumerate() {
+            if lines >> line & 1 != 0 {
+                stamp.store(now_us, Ordering::Relaxed);
+            }
+        }
+    }
+}
+
+/// The pin of a part's interrupt, whose edges rise. They are seen while something waits for them, so a noisy wire costs
+/// no more than the waits.
+pub struct InterruptPin {
+    input: ExtiInput<'static, Async>,
+    line: usize,
+}
+
+impl InterruptPin {
+    /// The one at a pin, with the line of the same number.
+    pub fn new<T: ExtiPin + Pin, I: typelevel::Interrupt>(
+        pin: Peri<'static, T>,
+        line: Peri<'static, T::ExtiChannel>,
+        irqs: impl typelevel::Binding<I, exti::InterruptHandler<I>> + typelevel::Binding<I, StampHandler<I>>,
+    ) -> Self
+    where
+        T::ExtiChannel: exti::Channel<IRQ = I>,
+    {
+        let number = usize::from(pin.pin());
+        // Low while the wire is off.
+        InterruptPin { input: ExtiInput::new(pin, line, Pull::Down, irqs), line: number }
+    }
+}
+
+impl Edge for InterruptPin {
+    async fn next(&mut self) -> u64 {
+        self.input.wait_for_rising_edge().await;
+        let now_us = Instant::now().as_micros();
+        let stamp = STAMPS.get(self.line).map_or(now_us as u32, |stamp| stamp.load(Ordering::Relaxed));
+        now_us.saturating_sub(u64::from((now_us as u32).wrapping_sub(stamp)))
+    }
+}
+
+/// The timing of a part with an interrupt, which is read by the control period's clock while none comes.
+pub type Interrupted<E = InterruptPin> = DataReady<E, Polled>;
+
+/// The timing of a part with this pin.
+pub fn interrupted<E: Edge>(pin: E) -> Interrupted<E> {
+    DataReady::new(pin, Polled, PERIOD_US)
 }
 
 /// The clock of a part whose interrupt is not wired: it is read at the start of every control period.

@@ -5,8 +5,10 @@
 ///
 /// * USB is on PA11 and PA12, as on every chip of the kind.
 /// * Each peripheral has its DMA's streams, as `DMA1_CH6` for stream 6, with their interrupts.
+/// * The IMU's interrupt has a pin, the line of the pin's number, as `EXTI5`, and that one's interrupt, as `EXTI9_5`.
 /// * IMU and barometer are [candidates](chip_stm32::candidates): the one that answers is read. How the IMU sits is one
 ///   of `afbc_drivers::alignment`.
+/// * The buzzer sounds while its pin is high; the LED, if there is one, is lit while its pin is low.
 /// * Motors are so many, numbered as [`numbering`](chip_stm32::motors::numbering) has it. They have a line for each
 ///   timer, with the type of its registers, the stream of its updates, and what its channels 1 to 4 drive: the pin, the
 ///   same again as port and number, and the number of the motor.
@@ -22,6 +24,7 @@ macro_rules! flight_controller {
         imu: $spi:ident {
             clock: $sck:ident, out: $mosi:ident, in: $miso:ident, select: $select:ident,
             dma: $spi_tx:ident by $spi_tx_line:ident, $spi_rx:ident by $spi_rx_line:ident,
+            ready: $ready:ident on $exti:ident by $exti_line:ident,
             parts: $imu:ty, alignment: $alignment:ident
         },
         i2c: $i2c:ident {
@@ -29,6 +32,7 @@ macro_rules! flight_controller {
             dma: $i2c_tx:ident by $i2c_tx_line:ident, $i2c_rx:ident by $i2c_rx_line:ident,
             barometer: $barometer:ty
         },
+        indicator: { $(led: $led:ident,)? buzzer: $buzzer:ident },
         motors: $outputs:literal as $numbering:ident {
             $($task:ident: $timer:ident<$word:ty>, $dma:ident by $line:ident { $($channel:tt),+ },)+
         },
@@ -41,6 +45,8 @@ macro_rules! flight_controller {
             $gnss => usart::BufferedInterruptHandler<peripherals::$gnss>;
             $spi_tx_line => embassy_stm32::dma::InterruptHandler<peripherals::$spi_tx>;
             $spi_rx_line => embassy_stm32::dma::InterruptHandler<peripherals::$spi_rx>;
+            $exti_line => chip_stm32::sensors::StampHandler<embassy_stm32::interrupt::typelevel::$exti_line>,
+                embassy_stm32::exti::InterruptHandler<embassy_stm32::interrupt::typelevel::$exti_line>;
             $event => i2c::EventInterruptHandler<peripherals::$i2c>;
             $error => i2c::ErrorInterruptHandler<peripherals::$i2c>;
             $i2c_tx_line => embassy_stm32::dma::InterruptHandler<peripherals::$i2c_tx>;
@@ -58,6 +64,7 @@ macro_rules! flight_controller {
                 (Interrupt::$gnss, priority::UART),
                 (Interrupt::$spi_tx_line, priority::SAMPLING),
                 (Interrupt::$spi_rx_line, priority::SAMPLING),
+                (Interrupt::$exti_line, priority::SAMPLING),
                 (Interrupt::$event, priority::AIDING),
                 (Interrupt::$error, priority::AIDING),
                 (Interrupt::$i2c_tx_line, priority::AIDING),
@@ -83,6 +90,7 @@ macro_rules! flight_controller {
             /// Sectors 1 and 2, of 16 KiB each (`memory.x`).
             const STORE: u32 = 16 * 1024;
             const OUTPUTS: usize = $outputs;
+            const INDICATES: bool = true;
             const BOOT_LOADER: Option<fn() -> !> = Some(chip_stm32f4::boot_loader::restart);
 
             fn after_reset() {
@@ -120,6 +128,7 @@ macro_rules! flight_controller {
                     p.$spi, p.$sck, p.$mosi, p.$miso, p.$spi_tx, p.$spi_rx, Irqs, config,
                 );
                 let device = chip_stm32::sensors::Device::new(spi, p.$select);
+                let ready = chip_stm32::sensors::InterruptPin::new(p.$ready, p.$exti, Irqs);
                 let config = chip_stm32::sensors::i2c();
                 let bus = i2c::I2c::new(p.$i2c, p.$scl, p.$sda, p.$i2c_tx, p.$i2c_rx, Irqs, config);
 
@@ -127,6 +136,10 @@ macro_rules! flight_controller {
                     let motors = chip_stm32f4::flight_controller!(@motors p, $timer, $dma, $($channel),+);
                     control.spawn($task::run(motors).expect("spawned once"));
                 )+
+
+                let led = None$(.or(Some(chip_stm32::indicator::Led::new(p.$led))))?;
+                let buzzer = chip_stm32::indicator::ActiveBuzzer::new(p.$buzzer);
+                firmware::executors::housekeeping().spawn(indicator(led, buzzer).expect("spawned once"));
 
                 // A debugger that halts the core halts the watchdog.
                 pac::DBGMCU.apb1fzr().modify(|freeze| freeze.set_iwdg(true));
@@ -136,7 +149,12 @@ macro_rules! flight_controller {
                 );
                 firmware::board::Parts {
                     board: FlightController { watchdog: chip_stm32::watchdog(p.IWDG), rotors },
-                    sampler: chip_stm32::sensor_set::Imu::new(device, kernel_hz, afbc_drivers::alignment::$alignment),
+                    sampler: chip_stm32::sensor_set::Imu::new(
+                        device,
+                        ready,
+                        kernel_hz,
+                        afbc_drivers::alignment::$alignment,
+                    ),
                     aids: chip_stm32::sensor_set::SlowSensors::new(bus, gnss.expect("the baud rate divides the clock")),
                     links: [
                         chip_stm32::link::new(link.expect("the baud rate divides the clock")),
@@ -189,6 +207,11 @@ macro_rules! flight_controller {
                 }
             }
         )+
+
+        #[embassy_executor::task]
+        async fn indicator(led: Option<chip_stm32::indicator::Led>, buzzer: chip_stm32::indicator::ActiveBuzzer) -> ! {
+            chip_stm32::indicator::run(led, buzzer).await
+        }
 
         /// Stops the motors' signals, whatever state the program is in.
         pub(crate) fn stop_motors() {

@@ -18,7 +18,7 @@
 use crate::memory::{Memory, Remembered};
 use afbc_control::Settings;
 use afbc_control::drag::KnownDrag;
-use afbc_control::math::{self, max, min};
+use afbc_control::math::{self, max};
 use afbc_types::{Inputs, OutOfRange, Parameters, State, parameters};
 use nalgebra::Vector3;
 
@@ -179,7 +179,7 @@ impl ForceObserver {
                 let off = v - *v_hat;
                 if off.abs() <= JUMP_M_S {
                     let f = math::settled(*f_hat + self.acceleration * off);
-                    *f_hat = min(max(f, -ACCELERATION_MAX_M_S2), ACCELERATION_MAX_M_S2);
+                    *f_hat = math::limited(f, ACCELERATION_MAX_M_S2);
                     *v_hat += self.velocity * off;
                 } else {
                     *v_hat = v;
@@ -288,7 +288,7 @@ impl MomentObserver {
         let off = rates_rad_s - *omega_hat;
         let found =
             f_hat.zip_zip_map(&self.acceleration.component_mul(&off), &self.acceleration_max, |f, more, most| {
-                math::settled(min(max(f + more, -most), most))
+                math::settled(math::limited(f + more, most))
             });
         let within = off.zip_map(&self.jump, |off, jump| off.abs() <= jump);
         *f_hat = within.zip_zip_map(f_hat, &found, |within, before, found| if within { found } else { before });

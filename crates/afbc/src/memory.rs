@@ -59,10 +59,12 @@ impl Memory {
     #[inline]
     pub fn learn(&self, remembered: &mut Remembered, weights: &Matrix3<f32>, f_hat_m_s2: [f32; 2]) {
         for (theta, f_hat) in remembered.theta.iter_mut().zip(f_hat_m_s2) {
-            let by = self.share * f_hat;
-            theta.zip_apply(weights, |theta, w| {
-                *theta = math::settled(math::min(math::max(*theta + by * w, -THETA_MAX_M_S2), THETA_MAX_M_S2));
-            });
+            *theta = (*theta + weights * (self.share * f_hat)).map(math::settled);
+            // None is beyond its bound if all together are within it, which is one comparison.
+            if theta.norm_squared() <= THETA_MAX_M_S2 * THETA_MAX_M_S2 {
+                continue;
+            }
+            *theta = theta.map(|theta| math::limited(theta, THETA_MAX_M_S2));
         }
     }
 }

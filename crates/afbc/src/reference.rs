@@ -140,7 +140,7 @@ impl Coordinate {
         *d = taken_up(*d, jump, from);
         *d_dot = taken_up(*d_dot, point.v - expected[1], rate);
         let a_max = self.acceleration_max;
-        let a_c = math::min(math::max(self.bandwidth * (self.speed(*d) - *d_dot), -a_max), a_max);
+        let a_c = math::limited(self.bandwidth * (self.speed(*d) - *d_dot), a_max);
         // The detour accelerates the reference as a whole no further than a_max.
         *d_ddot = if *d_ddot > 0.0 {
             math::min(*d_ddot, math::max(a_max - point.a, 0.0))

@@ -98,6 +98,13 @@ pub fn max(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
 }
 
+/// `x` within `most` of zero; -`most` if it is NaN.
+#[inline]
+pub fn limited(x: f32, most: f32) -> f32 {
+    // What is within takes one comparison instead of two.
+    if x.abs() < most { x } else { min(max(x, -most), most) }
+}
+
 /// Returns `x` as it is left by adding 1e-25 and taking it away again: zero for |x| < 3e-33, and never subnormal. For
 /// the memory of filters, whose decay would otherwise end in subnormal numbers and stay there, each of which takes some
 /// processors a hundred times as long as another. Error at most 6e-33, and 1.2e-7 relative; none for |x| >= 4e-18.

@@ -36,6 +36,11 @@ pub trait PartTiming {
         self.wait(us).await;
         true
     }
+
+    /// Returns the time of the interrupt for which [`ready`](Self::ready) has waited \[us\]; none if there was none.
+    fn ready_us(&self) -> Option<u64> {
+        None
+    }
 }
 
 /// A part on a bus.
@@ -51,6 +56,8 @@ pub struct Driver<P, B, T> {
     /// Cycles since the last look, and number of registers looked at.
     cycles: u32,
     looks: usize,
+    /// Time of the interrupt of this cycle \[us\].
+    ready_us: Option<u64>,
     last: [u8; READ_MAX],
     /// Equal answers in a row.
     equals: u32,
@@ -59,7 +66,8 @@ pub struct Driver<P, B, T> {
 impl<P: SensorPart, B: Registers, T: PartTiming> Driver<P, B, T> {
     /// A part that is yet to be set up, by the first [`Driver::reading`].
     pub fn new(part: P, bus: B, timing: T) -> Self {
-        Driver { part, bus, timing, is_up: false, faults: 0, cycles: 0, looks: 0, last: [0; READ_MAX], equals: 0 }
+        let (last, ready_us) = ([0; READ_MAX], None);
+        Driver { part, bus, timing, is_up: false, faults: 0, cycles: 0, looks: 0, ready_us, last, equals: 0 }
     }
 
     /// True if it has been set up and reads without a fault.
@@ -84,6 +92,11 @@ impl<P: SensorPart, B: Registers, T: PartTiming> Driver<P, B, T> {
         result
     }
 
+    /// Has it set up by the next reading, without a pause.
+    pub(crate) fn forget(&mut self) {
+        (self.is_up, self.faults, self.equals, self.ready_us) = (false, 0, 0, None);
+    }
+
     async fn attempt(&mut self) -> Result<Stamped<P::Reading>, PartFault> {
         if !self.is_up {
             if self.faults > 0 {
@@ -100,7 +113,7 @@ impl<P: SensorPart, B: Registers, T: PartTiming> Driver<P, B, T> {
     }
 
     /// Runs the set-up, and reads back what was set.
-    async fn set_up(&mut self) -> Result<(), PartFault> {
+    pub(crate) async fn set_up(&mut self) -> Result<(), PartFault> {
         for step in P::SETUP {
             self.step(step).await?;
         }
@@ -113,6 +126,7 @@ impl<P: SensorPart, B: Registers, T: PartTiming> Driver<P, B, T> {
     }
 
     async fn cycle(&mut self) -> Result<Option<Stamped<P::Reading>>, PartFault> {
+        self.ready_us = None;
         self.cycles += 1;
         if self.cycles >= CYCLES_A_LOOK {
             let at = (self.looks + 1) % P::SETUP.len().max(1);
@@ -148,7 +162,7 @@ impl<P: SensorPart, B: Registers, T: PartTiming> Driver<P, B, T> {
         })
     }
 
-    async fn step(&mut self, step: &Step) -> Result<Option<Stamped<P::Reading>>, PartFault> {
+    pub(crate) async fn step(&mut self, step: &Step) -> Result<Option<Stamped<P::Reading>>, PartFault> {
         match *step {
             Step::Identify(register, identities) => {
                 let identity = self.byte(register).await?;
@@ -177,6 +191,7 @@ impl<P: SensorPart, B: Registers, T: PartTiming> Driver<P, B, T> {
                 if !self.timing.ready(us).await {
                     return Err(PartFault::Late);
                 }
+                self.ready_us = self.timing.ready_us();
             }
         }
         Ok(None)
@@ -186,7 +201,7 @@ impl<P: SensorPart, B: Registers, T: PartTiming> Driver<P, B, T> {
         transfer(&self.timing, bytes.len(), self.bus.write(register, bytes)).await
     }
 
-    async fn byte(&mut self, register: u8) -> Result<u8, PartFault> {
+    pub(crate) async fn byte(&mut self, register: u8) -> Result<u8, PartFault> {
         let mut answer = [0];
         transfer(&self.timing, answer.len(), self.bus.read(register, &mut answer)).await?;
         let [byte] = answer;
@@ -194,7 +209,7 @@ impl<P: SensorPart, B: Registers, T: PartTiming> Driver<P, B, T> {
     }
 
     async fn read(&mut self, register: u8, length: usize) -> Result<Option<Stamped<P::Reading>>, PartFault> {
-        let at_us = self.timing.now_us();
+        let at_us = self.ready_us.unwrap_or_else(|| self.timing.now_us());
         let mut answer = [0; READ_MAX];
         let answer = answer.get_mut(..length).ok_or(PartFault::Bus)?;
         transfer(&self.timing, length, self.bus.read(register, answer)).await?;

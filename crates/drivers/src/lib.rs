@@ -10,7 +10,8 @@
 //! | nothing answers | all bits of an answer of three bytes or more are equal | set-up after 10 faults |
 //! | set-up lost (reset, brown-out) | one register that was set is read back every 16 readings | the same |
 //! | transfer fails or never ends | the bus, 10 ms and 8 us a byte | the same |
-//! | no interrupt, or never ready | twice the time of a sample, or 100 cycles | the same |
+//! | no interrupt | twice the time of a sample | set-up after 10 faults; or read by the clock ([`data_ready`]) |
+//! | never ready | 100 cycles | the same |
 //! | readings do not change | [`SensorPart::STUCK_AFTER`] equal answers | the same |
 //! | answers that no working part gives | [`SensorPart::take`] | the same |
 //!
@@ -34,6 +35,7 @@ pub mod bmi270;
 pub mod bmp280;
 pub mod bmp3;
 mod bus;
+pub mod data_ready;
 pub mod dps310;
 mod driver;
 pub mod icm426xx;
@@ -45,6 +47,7 @@ pub mod nmea;
 mod part;
 pub mod qmc5883l;
 mod reading;
+pub mod self_test;
 pub mod ublox;
 
 pub use bus::{BusError, I2cRegisters, READ_MAX, Registers, SpiFormat, SpiRegisters};

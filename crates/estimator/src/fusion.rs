@@ -207,20 +207,21 @@ impl Estimator {
             _ => Coordinate::Z,
         };
         let expected = Expected { height_offset: memory.height_offset, field: self.expected_field(memory) };
-        let Some((innovation, mut row)) = horizon.row(&part.target, coordinate, &expected) else {
-            return false;
-        };
+        // In place, since the copy of a large struct is a call of a slow loop.
+        let mut seen = horizon.row(&part.target, coordinate, &expected);
+        let Some((innovation, row)) = &mut seen else { return false };
+        let innovation = *innovation;
         if part.is_slow() {
             let unit = coordinate.unit();
             row.slow = Some(Slows::new(unit.x, unit.y, unit.z, 0.0, 0.0));
         }
-        let y = memory.covariance.times(&row);
+        let y = memory.covariance.times(row);
         let hph = max(row.dot(&y), 0.0);
         let r = match &part.target {
             Target::Field(field) => field_variance(&horizon.field(field), part.variance.x) + part.rough,
             _ => coordinate.of(&part.variance),
         };
-        let s = hph + max(r, max(LEFT * hph, ROUNDING * memory.covariance.motion_variance(&row)));
+        let s = hph + max(r, max(LEFT * hph, ROUNDING * memory.covariance.motion_variance(row)));
         let nis = innovation * innovation / s;
         let scalars = part.target.scalars();
         if scalars == 1 && nis > self.gate_squared {

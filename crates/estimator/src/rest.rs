@@ -98,8 +98,8 @@ impl Rest {
             self.time_s = 0.0;
         }
         if moves {
-            let (rates, force) = (Watch::new(*rates_rad_s), Watch::new(*specific_force_m_s2));
-            *self = Rest { rates, force, time_s: 0.0, blocks: 0, unmoved: false };
+            (self.rates, self.force) = (Watch::new(*rates_rad_s), Watch::new(*specific_force_m_s2));
+            (self.time_s, self.blocks, self.unmoved) = (0.0, 0, false);
         }
     }
 }

@@ -89,12 +89,12 @@ impl Inbox {
     /// Stores a setpoint, stamped on arrival, if it is [plausible](Setpoint::is_plausible).
     pub fn put_setpoint(&mut self, setpoint: Stamped<Setpoint>) {
         if setpoint.value.is_plausible() {
-            self.setpoint = Some(setpoint);
+            replace(&mut self.setpoint, &setpoint);
         }
     }
 
-    /// Marks whether an armed vehicle on the ground rests there: its motors idle, and the law does not fly, until the
-    /// mark is taken away. It has no effect in the air.
+    /// Marks whether an armed vehicle rests on the ground: its motors idle, and the law does not fly, until the mark is
+    /// taken away. A vehicle that counts as airborne, which has just touched the ground, keeps what its law has learnt.
     pub fn set_idle_on_ground(&mut self, idle_on_ground: bool) {
         self.idle_on_ground = Some(idle_on_ground);
     }
@@ -209,12 +209,9 @@ impl Inbox {
             }
             None => taken.pose = None,
         }
-        match (&self.setpoint, &mut taken.setpoint) {
-            (Some(new), Some(old)) => {
-                copy(&new.value, &mut old.value);
-                old.at_us = new.at_us;
-            }
-            (new, old) => *old = *new,
+        match &self.setpoint {
+            Some(setpoint) => replace(&mut taken.setpoint, setpoint),
+            None => taken.setpoint = None,
         }
         (taken.idle_on_ground, taken.inhibited) = (self.idle_on_ground, self.inhibited);
         // Rarely there.
@@ -222,6 +219,17 @@ impl Inbox {
             taken.requests.clone_from(&self.requests);
             self.requests.pop_front();
         }
+    }
+}
+
+/// Puts a setpoint in the place of another one.
+fn replace(old: &mut Option<Stamped<Setpoint>>, new: &Stamped<Setpoint>) {
+    match old {
+        Some(old) => {
+            copy(&new.value, &mut old.value);
+            old.at_us = new.at_us;
+        }
+        None => *old = Some(*new),
     }
 }
 

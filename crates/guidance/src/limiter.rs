@@ -203,10 +203,14 @@ impl Limiter {
         let complete = complete(aim);
         let (target, jerk_m_s3, interval_s, fits) = match (&complete, aim.sent_us) {
             (Some(complete), Some(sent_us)) => {
-                let stream = Stream::next(self.stream, complete, sent_us, dt_s, self.limits.jerk_max_m_s3);
-                let known = (Some(stream.present), stream.jerk_m_s3, stream.interval_s, stream.fits);
-                self.stream = Some(stream);
-                known
+                let stream = match &mut self.stream {
+                    Some(stream) => {
+                        stream.advance(complete, sent_us, dt_s, self.limits.jerk_max_m_s3);
+                        stream
+                    }
+                    none => none.insert(Stream::new(complete, sent_us)),
+                };
+                (Some(stream.present), stream.jerk_m_s3, stream.interval_s, stream.fits)
             }
             _ => {
                 self.stream = None;
@@ -299,42 +303,46 @@ impl Complete {
 }
 
 impl Stream {
-    /// Returns the stream one step later, with a message if `sent_us` is news.
-    fn next(stream: Option<Stream>, target: &Complete, sent_us: u64, dt_s: f32, jerk_max_m_s3: f32) -> Self {
-        let zero = Vector3::zeros();
-        let first = Stream {
+    /// Begins a stream with this message.
+    fn new(target: &Complete, sent_us: u64) -> Self {
+        Stream {
             sent_us,
             last: *target,
             present: *target,
             since_s: 0.0,
             interval_s: 0.0,
-            jerk_m_s3: zero,
+            jerk_m_s3: Vector3::zeros(),
             fits: false,
-        };
-        let Some(mut stream) = stream else { return first };
-        stream.since_s += dt_s;
-        if stream.sent_us == sent_us {
-            if stream.fits {
-                stream.present.advance(stream.jerk_m_s3, dt_s);
+        }
+    }
+
+    /// Advances the stream by one step, with a message if `sent_us` is news.
+    fn advance(&mut self, target: &Complete, sent_us: u64, dt_s: f32, jerk_max_m_s3: f32) {
+        self.since_s += dt_s;
+        if self.sent_us == sent_us {
+            if self.fits {
+                self.present.advance(self.jerk_m_s3, dt_s);
             }
-            return stream;
+            return;
         }
-        let interval_s = stream.since_s;
+        let interval_s = self.since_s;
         if interval_s > INTERVAL_MAX_S {
-            return first;
+            *self = Stream::new(target, sent_us);
+            return;
         }
-        let mean_m_s = (stream.last.velocity_m_s + target.velocity_m_s) * 0.5;
-        let misfit_m = target.position_m - stream.last.position_m - mean_m_s * interval_s;
+        let last = &self.last;
+        let mean_m_s = (last.velocity_m_s + target.velocity_m_s) * 0.5;
+        let misfit_m = target.position_m - last.position_m - mean_m_s * interval_s;
         let misfit_m_s = {
-            let mean_m_s2 = (stream.last.acceleration_m_s2 + target.acceleration_m_s2) * 0.5;
-            target.velocity_m_s - stream.last.velocity_m_s - mean_m_s2 * interval_s
+            let mean_m_s2 = (last.acceleration_m_s2 + target.acceleration_m_s2) * 0.5;
+            target.velocity_m_s - last.velocity_m_s - mean_m_s2 * interval_s
         };
         let allowed_m = MISFIT_M * 0.5 + MISFIT_TIME_S * 0.5 * sqrt(mean_m_s.norm_squared());
         let fits =
             misfit_m.norm_squared() <= allowed_m * allowed_m && misfit_m_s.norm_squared() <= MISFIT_M_S * MISFIT_M_S;
-        let change_m_s2 = target.acceleration_m_s2 - stream.last.acceleration_m_s2;
-        let jerk_m_s3 = if fits { capped(change_m_s2 / interval_s, jerk_max_m_s3) } else { zero };
-        Stream { interval_s, jerk_m_s3, fits, ..first }
+        let change_m_s2 = target.acceleration_m_s2 - last.acceleration_m_s2;
+        let jerk_m_s3 = if fits { capped(change_m_s2 / interval_s, jerk_max_m_s3) } else { Vector3::zeros() };
+        *self = Stream { interval_s, jerk_m_s3, fits, ..Stream::new(target, sent_us) };
     }
 }
 

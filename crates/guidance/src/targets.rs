@@ -27,21 +27,21 @@ pub(crate) struct Targets {
 /// True if every value of a target is plausible or NaN where that is allowed.
 pub(crate) fn is_plausible(target: &OffboardTarget) -> bool {
     let [position, velocity, acceleration, angle, rate] = MOST;
-    // False of infinite numbers, not of NaN.
-    let within = |value: f32, most: f32| value.is_nan() || value.abs() <= most;
-    let all = |vector: &Vector3<f32>, most: f32| vector.iter().all(|value| within(*value, most));
+    // True of infinite numbers, not of NaN.
+    let is_beyond = |value: f32, most: f32| value.abs() > most;
+    let all = |vector: &Vector3<f32>, most: f32| !vector.iter().any(|value| is_beyond(*value, most));
     match target {
         OffboardTarget::Motion(motion) => {
             all(&motion.position_m, position)
                 && all(&motion.velocity_m_s, velocity)
                 && all(&motion.acceleration_m_s2, acceleration)
-                && within(motion.yaw_rad, angle)
-                && within(motion.yaw_rate_rad_s, rate)
+                && !is_beyond(motion.yaw_rad, angle)
+                && !is_beyond(motion.yaw_rate_rad_s, rate)
         }
         OffboardTarget::Attitude(target) => {
             (target.attitude.norm_squared() - 1.0).abs() <= 0.1
                 && (0.0..=1.0).contains(&target.thrust)
-                && within(target.yaw_rate_rad_s, rate)
+                && !is_beyond(target.yaw_rate_rad_s, rate)
         }
     }
 }
@@ -77,8 +77,8 @@ impl Targets {
         } else {
             up_m > LIFTS_M
         };
-        // Who sends a whole trajectory has begun it.
-        let complete = [position_m, velocity_m_s, acceleration_m_s2].iter().all(|v| v.iter().all(|n| n.is_finite()));
+        // Who sends a whole trajectory has begun it. One that is not given is NaN, and so is the sum; none is infinite.
+        let complete = !(position_m + velocity_m_s + acceleration_m_s2).sum().is_nan();
         let lifts = lifts || complete;
         let aim = LimiterTarget {
             position_m,

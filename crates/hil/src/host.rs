@@ -9,7 +9,7 @@ use afbc_onboard::{Configuration, ControlInputs, Flight, Link, Prepare, RawReadi
 use afbc_recorder::{Given, Recorder, TickRecord};
 use afbc_scenario::OtherLaw;
 use afbc_scenario::contender::{ControllerKind, Law};
-use afbc_station::{Calibrator, Comms, Setup};
+use afbc_station::{Calibrator, Comms, RadioControl, Setup};
 use afbc_store::Store;
 use afbc_types::{OutOfRange, ROTORS_MAX, with_rotors};
 use afbc_vehicles::Vehicle;
@@ -24,8 +24,9 @@ pub struct Host {
     /// What the last tick took of it.
     taken: ControlInputs,
     readings: Readings,
+    radio: Box<RadioControl>,
     calibrator: Box<Calibrator>,
-    /// What the sensors have read while it calibrates.
+    /// What the sensors have read while somebody wants to know.
     raw: RawReadings,
     time_us: u64,
     /// Number of the next tick, and the exact log of it all, if it is kept.
@@ -59,8 +60,17 @@ trait Core {
         tell: Tell<'_>,
     ) -> Report<ROTORS_MAX>;
 
-    /// Goes on with a calibration.
-    fn calibrate(&mut self, comms: &mut Comms, calibrator: &mut Calibrator, sample: Option<RawSample>);
+    /// Goes on with a calibration, and shows stations what the sensors read.
+    fn calibrate(
+        &mut self,
+        comms: &mut Comms,
+        calibrator: &mut Calibrator,
+        sample: Option<RawSample>,
+        send: &mut dyn FnMut(&[u8]),
+    );
+
+    /// Takes bytes of a radio receiver; returns what the pilot wants.
+    fn pilot(&mut self, comms: &mut Comms, radio: &mut RadioControl, bytes: &[u8]) -> Option<ControlInputs>;
 
     /// Does what stations want of the parameters, and flies what has changed.
     fn parameters(&mut self, comms: &mut Comms, send: &mut dyn FnMut(&[u8])) -> Option<RecordChange>;
@@ -96,8 +106,18 @@ impl<P: Prepare<N>, const N: usize> Core for Aircraft<P, N> {
         report.padded()
     }
 
-    fn calibrate(&mut self, comms: &mut Comms, calibrator: &mut Calibrator, sample: Option<RawSample>) {
-        comms.calibrate(calibrator, sample, &self.table);
+    fn calibrate(
+        &mut self,
+        comms: &mut Comms,
+        calibrator: &mut Calibrator,
+        sample: Option<RawSample>,
+        send: &mut dyn FnMut(&[u8]),
+    ) {
+        comms.calibrate(calibrator, sample, &self.table, send);
+    }
+
+    fn pilot(&mut self, comms: &mut Comms, radio: &mut RadioControl, bytes: &[u8]) -> Option<ControlInputs> {
+        comms.pilot(radio, bytes, &self.table.configuration().radio)
     }
 
     fn parameters(&mut self, comms: &mut Comms, send: &mut dyn FnMut(&[u8])) -> Option<RecordChange> {
@@ -229,6 +249,7 @@ impl Host {
             inputs: ControlInputs::EMPTY,
             taken: ControlInputs::EMPTY,
             readings: Readings::NONE,
+            radio: Box::default(),
             calibrator: Box::default(),
             raw: RawReadings::NONE,
             time_us: 0,
@@ -277,6 +298,13 @@ impl Host {
         self.comms.exchange(decoder);
     }
 
+    /// Receives, for the next tick, the next bytes of a radio receiver.
+    pub fn hear_radio(&mut self, bytes: &[u8]) {
+        if let Some(news) = self.flight.pilot(&mut self.comms, &mut self.radio, bytes) {
+            self.merge(&news);
+        }
+    }
+
     /// Sets what the vehicle's own sensors read for the next tick alone.
     pub fn sense(&mut self, readings: &Readings) {
         self.readings = *readings;
@@ -299,17 +327,19 @@ impl Host {
             recorder
                 .tick(&TickRecord { number, time_us, clock_failed: false, readings, battery, adopted, given }, write);
         }
-        if self.comms.is_calibrating() {
+        if self.comms.takes_samples() {
             self.raw.add(time_us, &readings);
         } else {
             self.raw = RawReadings::NONE;
         }
-        self.flight.calibrate(&mut self.comms, &mut self.calibrator, self.raw.take());
+        self.flight.calibrate(&mut self.comms, &mut self.calibrator, self.raw.take(), &mut send);
         let change = self.flight.parameters(&mut self.comms, &mut send);
         if let (Some(log), true) = (&mut self.log, change.is_some()) {
             self.flight.record(log, &self.names, change);
         }
         self.number = self.number.wrapping_add(1);
+        // Notices that there are none.
+        self.hear_radio(&[]);
         self.time_us = time_us;
         HostTick { report, bytes, change }
     }

@@ -77,7 +77,9 @@ impl<const N: usize, C: FlightLaw<N>> Prepared<N, C> {
     /// start-up twice.
     #[inline(always)]
     fn around(configuration: &Configuration<N>, controller: C) -> Result<Self, OutOfRange> {
-        let Configuration { airframe, curve, response, imu, calibration, estimation, arming, .. } = configuration;
+        let Configuration { airframe, curve, response, imu, calibration, estimation, arming, radio, .. } =
+            configuration;
+        radio.validate()?;
         let parameters = &airframe.parameters;
         Ok(Prepared {
             vehicle: FlightCore::with_rotors(*parameters, response, *arming, controller)?,
@@ -231,7 +233,7 @@ impl<const N: usize, C: FlightLaw<N>> Flight<N, C> {
         let (mode, airborne, rested) = (self.memory.mode(), self.memory.airborne(), self.memory.rested());
         self.front_end.set_on_ground(!mode.armed() || self.idle_on_ground && !airborne);
         let estimate = self.front_end.tick(now_us, readings, &mut inputs.inbox);
-        let observed = if self.observes { self.memory.state().copied() } else { None };
+        let observed = self.memory.state().filter(|_| self.observes);
         let core = Core { mode, airborne, rested, sensors, observed };
         let guided = self.guide.tick(now_us, inputs, &core);
         self.idle_on_ground = inputs.inbox.idle_on_ground();

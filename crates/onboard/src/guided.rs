@@ -48,14 +48,14 @@ pub(crate) struct Guide {
 }
 
 /// What the guidance sees of the flight core and the sensors.
-pub(crate) struct Core {
+pub(crate) struct Core<'a> {
     pub(crate) mode: Mode,
     pub(crate) airborne: bool,
     /// True if it has been at rest for as long as arming wants it.
     pub(crate) rested: bool,
     pub(crate) sensors: FailedSensors,
     /// What is observed of the state in place of an estimate, in the last tick.
-    pub(crate) observed: Option<State>,
+    pub(crate) observed: Option<&'a State>,
 }
 
 impl Guide {
@@ -90,11 +90,12 @@ impl Guide {
 
     /// Runs a tick: takes the oldest order, and puts setpoint and requests into the flight core's inbox.
     #[inline(always)]
-    pub(crate) fn tick(&mut self, now_us: u64, inputs: &mut ControlInputs, core: &Core) -> GuidanceResult {
+    pub(crate) fn tick(&mut self, now_us: u64, inputs: &mut ControlInputs, core: &Core<'_>) -> GuidanceResult {
         let ControlInputs { inbox, orders, battery, .. } = inputs;
         let fresh = inbox.state().filter(|state| state.age_us(now_us) <= COAST_US);
-        let state = fresh.map(|state| &state.value).or(core.observed.as_ref());
-        let dt_s = now_us.saturating_sub(self.last_us) as f32 * 1e-6;
+        let state = fresh.map(|state| &state.value).or(core.observed);
+        let gap_us = u32::try_from(now_us.saturating_sub(self.last_us)).unwrap_or(u32::MAX);
+        let dt_s = gap_us as f32 * 1e-6;
         self.last_us = now_us;
         let sight = GuidanceInputs {
             now_us,

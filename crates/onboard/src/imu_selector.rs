@@ -4,8 +4,22 @@ use nalgebra::Vector3;
 
 /// Time without a sample after which the other sensor flies \[us\]: less than the estimator bridges without a trace.
 const SILENT_US: u64 = 3_000;
+/// Time without a sample after which a sensor does not work, as stations are told \[us\]: longer than its driver takes
+/// to set it up again.
+const FAILED_US: u64 = 500_000;
 /// Samples in which the difference of both sensors is averaged, at least.
 const AVERAGED: f32 = 5_000.0;
+
+/// Two inertial sensors at a time.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ImuPair {
+    /// True if the second flies.
+    pub second_flies: bool,
+    /// True for each that has read something.
+    pub present: [bool; 2],
+    /// True for each that reads.
+    pub works: [bool; 2],
+}
 
 /// Chooses between two inertial sensors: whichever reads first, usually the first, flies until it is silent, as a
 /// driver makes one whose readings are wrong; then the other does. It stays, since a sensor that failed once may fail
@@ -56,9 +70,14 @@ impl ImuSelector {
         self.second_flies.then(|| [rates - of_rates, force - of_force])
     }
 
-    /// True if the second flies.
-    pub fn second_flies(&self) -> bool {
-        self.second_flies
+    /// Returns which flies at `now_us`, and which work.
+    pub fn pair(&self, now_us: u64) -> ImuPair {
+        let works = |last_us: Option<u64>| last_us.is_some_and(|last_us| now_us.saturating_sub(last_us) <= FAILED_US);
+        ImuPair {
+            second_flies: self.second_flies,
+            present: self.last_us.map(|last_us| last_us.is_some()),
+            works: self.last_us.map(works),
+        }
     }
 }
 
@@ -100,7 +119,9 @@ mod tests {
                     assert!((flown_rates - rates).norm() < 1e-3 && (flown_force - force).norm() < 1e-2, "{ms} ms");
                 }
             }
-            assert!(selector.second_flies() && last_ms == 69_999);
+            let pair = selector.pair(70_000_000);
+            assert_eq!((pair.second_flies, last_ms), (true, 69_999));
+            assert_eq!((pair.present, pair.works), ([true; 2], [false, true]));
         }
     }
 
@@ -111,7 +132,7 @@ mod tests {
         assert_eq!(selector.take_first(1_300, motion(1)), None);
         assert_eq!(selector.take_second(2_000, motion(2)), Some(motion(2)));
         assert_eq!(selector.take_first(6_000, motion(6)), Some(motion(6)));
-        assert!(!selector.second_flies());
+        assert!(!selector.pair(6_000).second_flies);
         assert_eq!(selector.take_second(6_300, motion(6)), None);
     }
 }

@@ -34,10 +34,15 @@ const ANGLE_MAX_RAD: f32 = 1e3;
 /// Largest angular rate or angular acceleration, per coordinate \[rad/s, rad/s2\].
 const RATE_MAX_RAD_S: f32 = 1e3;
 
+/// True if `value` is finite and at most `max` in size.
+fn is_within(value: f32, max: f32) -> bool {
+    // The bits of positive numbers are in their order, those of NaN come last, and their comparison is short.
+    value.abs().to_bits() <= max.to_bits()
+}
+
 /// True if all coordinates are finite and at most `max` in size.
 pub(crate) fn within(vector: &Vector3<f32>, max: f32) -> bool {
-    // False of NaN.
-    vector.x.abs() <= max && vector.y.abs() <= max && vector.z.abs() <= max
+    is_within(vector.x, max) && is_within(vector.y, max) && is_within(vector.z, max)
 }
 
 impl State {
@@ -92,8 +97,8 @@ impl Setpoint {
             && within(&self.acceleration_m_s2, ACCELERATION_MAX_M_S2)
             && within(&self.jerk_m_s3, JERK_MAX_M_S3)
             && within(&self.snap_m_s4, SNAP_MAX_M_S4)
-            && self.yaw_rad.abs() <= ANGLE_MAX_RAD
-            && self.yaw_rate_rad_s.abs() <= RATE_MAX_RAD_S
-            && self.yaw_acceleration_rad_s2.abs() <= RATE_MAX_RAD_S
+            && is_within(self.yaw_rad, ANGLE_MAX_RAD)
+            && is_within(self.yaw_rate_rad_s, RATE_MAX_RAD_S)
+            && is_within(self.yaw_acceleration_rad_s2, RATE_MAX_RAD_S)
     }
 }

@@ -1,6 +1,7 @@
 //! The command line: one module for each command.
 
 mod aboard;
+mod bring_up;
 mod campaign;
 mod compare;
 mod exact;
@@ -71,6 +72,7 @@ enum Command {
     Serve(serve::Serve),
     Pil(pil::Pil),
     Hitl(hitl::Hitl),
+    BringUp(bring_up::BringUp),
 }
 
 impl Cli {
@@ -94,6 +96,7 @@ impl Cli {
             Command::Serve(serve) => serve.run(),
             Command::Pil(pil) => pil.run(),
             Command::Hitl(hitl) => hitl.run(),
+            Command::BringUp(bring_up) => bring_up.run(),
         }
     }
 }

@@ -14,9 +14,16 @@ pub(crate) fn wiring(board: &BoardTable) -> String {
             format!("{}, 921,600 baud, 8N1, 3.3 V", link.name),
         ],
         [
-            "IMU: clock, in, out, select".to_owned(),
-            [&*imu.clock, &imu.into, &imu.out, &imu.select].join(", "),
-            format!("{} on {}, {}; `{}`", names(&imu.parts), imu.name, streams(&imu.streams), imu.alignment),
+            "IMU: clock, in, out, select, interrupt".to_owned(),
+            [&*imu.clock, &imu.into, &imu.out, &imu.select, &imu.ready.pin].join(", "),
+            format!(
+                "{} on {}, {}, {}; `{}`",
+                names(&imu.parts),
+                imu.name,
+                streams(&imu.streams),
+                imu.ready.channel,
+                imu.alignment
+            ),
         ],
         [
             "barometer: clock, data".to_owned(),
@@ -49,6 +56,8 @@ pub(crate) fn wiring(board: &BoardTable) -> String {
     }
     motors.sort();
     rows.extend(motors);
+    rows.extend(board.led.iter().map(|led| ["LED".to_owned(), led.clone(), "lit if low".to_owned()]));
+    rows.push(["buzzer with a tone of its own".to_owned(), board.buzzer.clone(), "sounds if high".to_owned()]);
     rows.push(["debugger".to_owned(), "PA13, PA14".to_owned(), "SWDIO, SWCLK".to_owned()]);
     let mut table = "| what | pin | peripheral |\n|---|---|---|\n".to_owned();
     for row in rows {

@@ -19,6 +19,14 @@ pub(crate) struct Uart {
     pub(crate) rx: String,
 }
 
+/// The pin of a part's interrupt, its line (`EXTI5`) and that one's interrupt (`EXTI9_5`).
+#[derive(Debug)]
+pub(crate) struct ReadyPin {
+    pub(crate) pin: String,
+    pub(crate) channel: String,
+    pub(crate) line: String,
+}
+
 /// The IMU's bus.
 #[derive(Debug)]
 pub(crate) struct Spi {
@@ -29,6 +37,7 @@ pub(crate) struct Spi {
     pub(crate) select: String,
     /// Out, in.
     pub(crate) streams: [Stream; 2],
+    pub(crate) ready: ReadyPin,
     pub(crate) parts: Vec<String>,
     pub(crate) alignment: String,
 }
@@ -73,6 +82,8 @@ pub(crate) struct BoardTable {
     pub(crate) gnss: Uart,
     pub(crate) imu: Spi,
     pub(crate) i2c: I2c,
+    pub(crate) led: Option<String>,
+    pub(crate) buzzer: String,
     pub(crate) outputs: usize,
     pub(crate) numbering: String,
     pub(crate) timers: Vec<Timer>,
@@ -100,6 +111,7 @@ impl BoardTable {
             into: words.after("in :"),
             select: words.after("select :"),
             streams: words.streams(),
+            ready: ReadyPin { pin: words.after("ready :"), channel: words.after("on"), line: words.after("by") },
             parts: words.parts("parts :"),
             alignment: words.after("alignment :"),
         };
@@ -112,6 +124,12 @@ impl BoardTable {
             streams: words.streams(),
             barometers: words.parts("barometer :"),
         };
+        words.expect("}");
+        words.expect("indicator");
+        words.expect(":");
+        words.expect("{");
+        let led = (words.peek() == "led").then(|| words.after("led :"));
+        let buzzer = words.after("buzzer :");
         words.expect("}");
         let outputs = words.after("motors :").parse().unwrap();
         let numbering = words.after("as");
@@ -129,7 +147,7 @@ impl BoardTable {
         }
         words.expect("}");
         assert!(words.0.is_empty(), "{}: {:?}", board.display(), words.0);
-        Some(BoardTable { crystal_hz, link, gnss, imu, i2c, outputs, numbering, timers })
+        Some(BoardTable { crystal_hz, link, gnss, imu, i2c, led, buzzer, outputs, numbering, timers })
     }
 
     /// Returns the motors.
@@ -146,9 +164,11 @@ impl BoardTable {
     /// Returns every pin that is used, once for each use.
     pub(crate) fn pins(&self) -> Vec<&str> {
         let uarts = [&self.link, &self.gnss].into_iter().flat_map(|uart| [&uart.tx, &uart.rx]);
-        let Spi { clock, out, into, select, .. } = &self.imu;
-        let buses = [clock, out, into, select, &self.i2c.clock, &self.i2c.data];
-        uarts.chain(buses).chain(self.motors().map(|motor| &motor.pin)).map(String::as_str).collect()
+        let Spi { clock, out, into, select, ready, .. } = &self.imu;
+        let buses = [clock, out, into, select, &ready.pin, &self.i2c.clock, &self.i2c.data];
+        let motors = self.motors().map(|motor| &motor.pin);
+        let all = uarts.chain(buses).chain(motors).chain(&self.led).chain([&self.buzzer]);
+        all.map(String::as_str).collect()
     }
 }
 

@@ -72,7 +72,12 @@ struct World<M> {
     answers: Vec<(u8, Vec<u8>)>,
     transactions: u32,
     random: u64,
+    /// Time of the last interrupt.
+    ready_us: Option<u64>,
 }
+
+/// Time from an interrupt to the driver \[us\].
+const LATENCY_US: u64 = 7;
 
 /// Bus, interrupt and clock of a part.
 pub struct Rig<M>(Rc<RefCell<World<M>>>);
@@ -87,7 +92,15 @@ impl<M: Model> Rig<M> {
     /// A rig with a part.
     pub fn new(model: M) -> Self {
         let (now_us, trouble, answers) = (1_000, Trouble::None, Vec::new());
-        Rig(Rc::new(RefCell::new(World { model, now_us, trouble, answers, transactions: 0, random: 7 })))
+        Rig(Rc::new(RefCell::new(World {
+            model,
+            now_us,
+            trouble,
+            answers,
+            transactions: 0,
+            random: 7,
+            ready_us: None,
+        })))
     }
 
     /// A driver of the part.
@@ -122,7 +135,7 @@ impl<M: Model> Registers for Rig<M> {
             return pending().await;
         }
         let mut world = self.0.borrow_mut();
-        let World { model, now_us, trouble, answers, transactions, random } = &mut *world;
+        let World { model, now_us, trouble, answers, transactions, random, .. } = &mut *world;
         *now_us += 2 + into.len() as u64;
         *transactions += 1;
         let before = answers.iter_mut().find(|(of, answer)| *of == register && answer.len() == into.len());
@@ -177,8 +190,14 @@ impl<M: Model> PartTiming for Rig<M> {
         let mut world = self.0.borrow_mut();
         let limit_us = world.now_us + u64::from(us);
         let due_us = world.model.next_interrupt_us(world.now_us).filter(|_| world.trouble != Trouble::NoInterrupt);
-        world.now_us = due_us.unwrap_or(u64::MAX).min(limit_us);
-        due_us.is_some_and(|due_us| due_us <= limit_us)
+        let due_us = due_us.filter(|due_us| *due_us <= limit_us);
+        world.now_us = due_us.map_or(limit_us, |due_us| due_us + LATENCY_US);
+        world.ready_us = due_us;
+        due_us.is_some()
+    }
+
+    fn ready_us(&self) -> Option<u64> {
+        self.0.borrow().ready_us
     }
 }
 

@@ -46,7 +46,7 @@ proptest! {
         let mut stream = first;
         // Long steps, so that every term is seen.
         for _ in 0..steps {
-            stream = Stream::next(Some(stream), &begin, 5, 0.02, 100.0);
+            stream.advance(&begin, 5, 0.02, 100.0);
         }
         let t = steps as f32 * 0.02;
         let Complete { position_m, velocity_m_s, acceleration_m_s2 } = stream.present;
@@ -62,7 +62,8 @@ proptest! {
         prop_assert!(size(position_m - position) < 2e-3 + size(jerk) * t * 0.02 * 0.02);
         prop_assert_eq!((stream.last, stream.jerk_m_s3, stream.fits), (begin, jerk, true));
         // What is no flight stays where it is.
-        let still = Stream::next(Some(Stream { fits: false, ..first }), &begin, 5, 0.02, 100.0);
+        let mut still = Stream { fits: false, ..first };
+        still.advance(&begin, 5, 0.02, 100.0);
         prop_assert_eq!(still.present, begin);
     }
 
@@ -81,9 +82,9 @@ proptest! {
         let allowed_m = 0.5 * (MISFIT_M + MISFIT_TIME_S * size(mean));
         let position_m = first.position_m + mean * interval_s + oblique(off_share * allowed_m);
         let second = Complete { position_m, velocity_m_s, acceleration_m_s2 };
-        let start = Stream::next(None, &first, 100, DT_S, 100.0);
-        prop_assert_eq!((start.last, start.present, start.since_s, start.fits), (first, first, 0.0, false));
-        let stream = Stream::next(Some(start), &second, 200, interval_s, 7.0);
+        let mut stream = Stream::new(&first, 100);
+        prop_assert_eq!((stream.last, stream.present, stream.since_s, stream.fits), (first, first, 0.0, false));
+        stream.advance(&second, 200, interval_s, 7.0);
         prop_assert_eq!((stream.sent_us, stream.last, stream.present, stream.since_s), (200, second, second, 0.0));
         prop_assert_eq!(stream.interval_s, interval_s);
         let fits = off_share < 1.0 && off_speed < 1.0;
@@ -101,9 +102,9 @@ fn after_a_pause_a_stream_begins_anew() {
     let here =
         Complete { position_m: oblique(3.0), velocity_m_s: Vector3::zeros(), acceleration_m_s2: Vector3::zeros() };
     for (pause_s, goes_on) in [(INTERVAL_MAX_S, true), (INTERVAL_MAX_S * 1.001, false)] {
-        let start = Stream::next(None, &here, 1, DT_S, 100.0);
-        let next = Stream::next(Some(start), &here, 2, pause_s, 100.0);
-        assert_eq!((next.fits, next.interval_s), (goes_on, if goes_on { pause_s } else { 0.0 }));
+        let mut stream = Stream::new(&here, 1);
+        stream.advance(&here, 2, pause_s, 100.0);
+        assert_eq!((stream.fits, stream.interval_s), (goes_on, if goes_on { pause_s } else { 0.0 }));
     }
 }
 

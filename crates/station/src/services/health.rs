@@ -15,6 +15,8 @@ pub mod sensor {
     pub const SATELLITES: u32 = 0x20;
     pub const TRACKER: u32 = 0x80;
     pub const MOTORS: u32 = 0x8000;
+    pub const GYROSCOPE_2: u32 = 0x2_0000;
+    pub const ACCELEROMETER_2: u32 = 0x4_0000;
     pub const ATTITUDE: u32 = 0x20_0000;
     pub const BATTERY: u32 = 0x0200_0000;
     pub const ARMING: u32 = 0x1000_0000;
@@ -45,7 +47,9 @@ impl AuxSensors {
 /// Returns SYS_STATUS.
 pub fn system(status: &VehicleStatus) -> SystemStatus {
     let aux = &status.aux;
-    let inertial = sensor::GYROSCOPE | sensor::ACCELEROMETER | sensor::ATTITUDE;
+    // Of two inertial sensors the shell reports each.
+    let first = (sensor::GYROSCOPE | sensor::ACCELEROMETER) & !aux.sensors.present;
+    let inertial = first | sensor::ATTITUDE;
     let located = status.is_located();
     let fixed = aux.receiver.is_some_and(|receiver| receiver.kind >= 3);
     let armable = status.mode.armed() || status.against.is_some_and(Reasons::is_empty);

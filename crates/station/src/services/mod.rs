@@ -8,6 +8,7 @@ pub mod events;
 pub mod extended;
 pub mod files;
 pub mod health;
+pub mod imus;
 pub mod logs;
 pub mod mission;
 pub mod modes;
