@@ -187,8 +187,8 @@ fn nothing_is_used_twice() {
     }
 }
 
-/// Pins of one number on all ports have one line of external interrupts: no board uses a line twice, each is that of its
-/// pin, and has the interrupt that the chips' manuals give it (RM0090, RM0433).
+/// Pins of one number on all ports have one line of external interrupts: no board uses a line twice, each is that of
+/// its pin, and has the interrupt that the chips' manuals give it (RM0090, RM0433).
 #[test]
 fn every_line_of_external_interrupts_is_that_of_one_pin() {
     let interrupt = |line: usize| match line {
@@ -343,7 +343,8 @@ fn prioritised(code: &str) -> BTreeMap<String, String> {
 }
 
 /// From Betaflight's descriptions of the boards (`betaflight/config`): the gyroscope's data in, select, interrupt and
-/// alignment, motors 1 to 4, clock and data of the barometer's bus, first LED but for those at the debugger's pins, buzzer.
+/// alignment, motors 1 to 4, clock and data of the barometer's bus, first LED but for those at the
+/// debugger's pins, buzzer.
 #[test]
 fn boards_are_as_betaflight_describes_them() {
     let tables: BTreeMap<_, _> = kinds().0.into_iter().collect();

@@ -3,7 +3,7 @@
 
 use crate::check::check;
 use crate::kept::{PWM400, parameters};
-use crate::machine::{Machine, Signal};
+use crate::machine::{Machine, Signal, quiet_usb};
 use crate::pilot::Pilot;
 use crate::pins::MotorPins;
 use crate::same;
@@ -18,10 +18,10 @@ use rigless::time::VirtualNanos;
 use std::error::Error;
 use std::path::Path;
 
-const TICK_NS: u64 = 1_000_000;
+pub(crate) const TICK_NS: u64 = 1_000_000;
 
 /// Who hears the exact log on the second link.
-enum Hearer {
+pub(crate) enum Hearer {
     Uart(Wire),
     Usb(UsbRing),
 }
@@ -35,12 +35,12 @@ impl Hearer {
     }
 }
 
-struct Flight {
-    pilot: Pilot,
-    hearer: Option<Hearer>,
+pub(crate) struct Flight {
+    pub(crate) pilot: Pilot,
+    pub(crate) hearer: Option<Hearer>,
     /// In place of the board's own one.
-    receiver: Option<UbloxPeer>,
-    pins: MotorPins,
+    pub(crate) receiver: Option<UbloxPeer>,
+    pub(crate) pins: MotorPins,
 }
 
 /// Flies a scenario, with a receiver of u-blox's if one is given. The exact log, if it is to be kept in a file, must be
@@ -129,6 +129,7 @@ impl<M: Machine> Driver<M> for Flight {
             self.pins.take_pulses(&session.board_mut().motors());
             self.pilot.command(self.pins.take());
         }
+        quiet_usb(session, stop.at);
         let (readings, signals) = self.pilot.advance(stop.at.0 / TICK_NS)?;
         match &self.receiver {
             Some(receiver) => receiver.sense(session.board_mut(), stop.at, (&readings, &signals)),

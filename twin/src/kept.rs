@@ -14,14 +14,35 @@ pub const PWM400: f32 = 4.0;
 /// Returns the content of the flash in which parameters have these values. A word of four bytes takes `stride` bytes of
 /// the chip's, the rest of which is not written.
 pub fn parameters(values: &[(&str, f32)], stride: usize) -> Result<Vec<u8>, Box<dyn Error>> {
-    let mut store = Store::open(Ram::<SECTOR>::BLANK, 0, hash(VEHICLE)).map_err(|error| error.reason())?;
-    store.make_room().map_err(|error| error.reason())?;
+    let mut changes = Changes::new()?;
     for (name, value) in values {
-        let name = RecordName::new(name).ok_or("a name")?;
-        store.set(name, 0, Some(value.to_bits())).map_err(|error| error.reason())?;
+        changes.set(name, *value)?;
     }
-    let mut bytes = vec![0; 2 * SECTOR];
-    store.into_flash().read(0, &mut bytes).map_err(|error| format!("{error:?}"))?;
-    let words = bytes.as_chunks::<4>().0.iter();
-    Ok(words.flat_map(|word| word.iter().copied().chain(std::iter::repeat_n(0xFF, stride - 4))).collect())
+    changes.bytes(stride)
+}
+
+/// Parameters that are set one after another.
+pub struct Changes(Store<Ram<SECTOR>>);
+
+impl Changes {
+    /// None yet.
+    pub fn new() -> Result<Self, Box<dyn Error>> {
+        let mut store = Store::open(Ram::<SECTOR>::BLANK, 0, hash(VEHICLE)).map_err(|error| error.reason())?;
+        store.make_room().map_err(|error| error.reason())?;
+        Ok(Changes(store))
+    }
+
+    /// Sets a parameter.
+    pub fn set(&mut self, name: &str, value: f32) -> Result<(), Box<dyn Error>> {
+        let name = RecordName::new(name).ok_or("a name")?;
+        Ok(self.0.set(name, 0, Some(value.to_bits())).map_err(|error| error.reason())?)
+    }
+
+    /// Returns the content of the flash.
+    pub fn bytes(self, stride: usize) -> Result<Vec<u8>, Box<dyn Error>> {
+        let mut bytes = vec![0; 2 * SECTOR];
+        self.0.into_flash().read(0, &mut bytes).map_err(|error| format!("{error:?}"))?;
+        let words = bytes.as_chunks::<4>().0.iter();
+        Ok(words.flat_map(|word| word.iter().copied().chain(std::iter::repeat_n(0xFF, stride - 4))).collect())
+    }
 }

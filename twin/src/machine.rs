@@ -8,7 +8,10 @@ use rigless::machine::Board;
 use rigless::machine::flight::{Actuate, Actuator, Signals};
 use rigless::machine::matekh743::MatekH743;
 use rigless::machine::pixracer::Pixracer;
-use rigless::soc::Error;
+use rigless::mcu::Operate;
+use rigless::session::Session;
+use rigless::soc::{Error, Width};
+use rigless::time::VirtualNanos;
 use std::ops::Range;
 
 /// The boards.
@@ -104,6 +107,8 @@ pub trait Machine: Board + Edge<Signals = Signals> + Sized + 'static {
     const BATTERY_MV: Option<u16>;
     /// Registers that the chip has and the models do not.
     const UNMAPPED: &[u64];
+    /// Interrupt status of the USB core, if the models have it as a register only.
+    const USB_STATUS: Option<u64> = None;
 
     /// Returns the board as it is built.
     fn built() -> Result<Box<Self>, Error>;
@@ -147,6 +152,8 @@ impl Machine for MatekH743 {
     const JITTER: u64 = 150_000;
     const BATTERY_MV: Option<u16> = Some(16_800);
     const UNMAPPED: &[u64] = &[];
+    /// RM0433, 57.14.6.
+    const USB_STATUS: Option<u64> = Some(0x4008_0014);
 
     fn built() -> Result<Box<Self>, Error> {
         MatekH743::new().map(Box::new)
@@ -200,5 +207,14 @@ impl Machine for Pixracer {
     /// UART4.
     fn attach_receiver(&mut self, receiver: Box<dyn Peer>) {
         self.mcu.usart[6].attach_boxed(receiver);
+    }
+}
+
+/// Keeps USB still where the models have registers of it, but not what they do: a flag that is cleared by writing a one
+/// stays set, and the driver, which looks at it, would never end, and nothing else of its priority begin.
+pub fn quiet_usb<M: Machine>(session: &mut Session<M>, at: VirtualNanos) {
+    if let Some(status) = M::USB_STATUS {
+        // Nothing to be done about a core that is not clocked.
+        let _ = session.mcu().write(at, status, Width::W32, 0);
     }
 }

@@ -3,21 +3,27 @@
 //! Models and processor are those of `rigless`, which nobody of this project wrote.
 #![forbid(unsafe_code)]
 
+mod aloft;
 mod boot;
 mod check;
+mod cuts;
+mod faults;
 mod fly;
 mod host;
 mod kept;
 mod machine;
 mod pilot;
 mod pins;
+mod random;
 mod same;
 mod speedybee;
+mod table;
 mod ublox;
 mod usb_ring;
 mod wire;
 mod world;
 
+use aloft::Aloft;
 use clap::builder::PossibleValuesParser;
 use clap::{Arg, ArgMatches, Command, value_parser};
 use machine::MachineName;
@@ -48,6 +54,10 @@ fn command() -> Command {
         .help("GNSS receiver: the board's own model, or a new u-blox");
     let log = Arg::new("log").long("log").value_name("FILE").value_parser(value_parser!(PathBuf));
     let log = log.help("Keep the exact log here, and fly it again on this machine: the same to the last bit");
+    let number = |name: &'static str, usual: &'static str, help: &'static str| {
+        Arg::new(name).long(name).value_name("N").value_parser(value_parser!(u64)).default_value(usual).help(help)
+    };
+    let only = Arg::new("only").long("only").value_name("NAME").default_value("").help("Those whose names begin so");
     Command::new("twin")
         .about("Runs the flight image of a board, as it is flashed, on register-level models of the board")
         .subcommand_required(true)
@@ -62,6 +72,20 @@ fn command() -> Command {
         ]))
         .subcommand(Command::new("replay").about("Fly an exact log again").arg(file("log", "The log")))
         .subcommand(
+            Command::new("faults").about("Faults at the Matek H743's pins, in a hover that is kept in a file").args([
+                image(),
+                scenario(),
+                file("hover", "Where the hover is kept, from which further runs begin"),
+                number("seeds", "1", "Flights of each fault"),
+                only,
+            ]),
+        )
+        .subcommand(Command::new("cuts").about("Power cut while the Matek H743 writes and erases its parameters").args([
+            image(),
+            number("cuts", "100", "Cuts in a write, and in an erase, about"),
+            number("seed", "1", "Of the random numbers"),
+        ]))
+        .subcommand(
             Command::new("host").about("Fly a scenario with the firmware's code on this machine").arg(scenario()),
         )
 }
@@ -69,6 +93,11 @@ fn command() -> Command {
 /// Returns the file that an argument names.
 fn path<'a>(matches: &'a ArgMatches, name: &str) -> Result<&'a Path, Box<dyn Error>> {
     Ok(matches.get_one::<PathBuf>(name).ok_or("no file")?)
+}
+
+/// Returns the number that an argument names.
+fn number(matches: &ArgMatches, name: &str) -> Result<u64, Box<dyn Error>> {
+    Ok(*matches.get_one(name).ok_or("no number")?)
 }
 
 /// Returns the machine that an argument names.
@@ -92,6 +121,14 @@ fn run(matches: &ArgMatches) -> Result<(), Box<dyn Error>> {
             with_machine!(machine(matches)?, M => fly::fly::<M>(image, scenario, receiver, log))
         }
         Some(("replay", matches)) => same::check_log(&std::fs::read(path(matches, "log")?)?),
+        Some(("faults", matches)) => {
+            let [image, scenario, hover] = ["image", "scenario", "hover"].map(|name| path(matches, name));
+            let only = matches.get_one::<String>("only").map_or("", String::as_str);
+            faults::fly_all(&Aloft::of(image?, scenario?, hover?)?, 1..number(matches, "seeds")? + 1, only)
+        }
+        Some(("cuts", matches)) => {
+            cuts::cut_all(path(matches, "image")?, number(matches, "seed")?, number(matches, "cuts")?)
+        }
         Some(("host", matches)) => host::fly(path(matches, "scenario")?),
         _ => Err("no such command".into()),
     }

@@ -6,6 +6,7 @@ use crate::world::Transducers;
 use afbc_flight_core::motor::{THROTTLE_MAX, THROTTLE_MIN};
 use afbc_link::{Address, Command, Datum, Decoder, Downlink, FRAME_MAX, Height, Sender, Uplink};
 use afbc_onboard::Readings;
+use afbc_plant::Motion;
 use afbc_scenario::Scenario;
 use afbc_sim::flight::World;
 use afbc_types::{ROTORS_MAX, RotorSpeeds};
@@ -51,6 +52,9 @@ pub struct Pilot {
     off_m: (f64, u64),
     tilt_rad: f64,
     error: Option<String>,
+    /// What the vehicle has said, with the time [ms], and whether it is printed.
+    heard: Vec<(u64, String)>,
+    prints: bool,
 }
 
 impl Pilot {
@@ -72,7 +76,40 @@ impl Pilot {
             off_m: (0.0, 0),
             tilt_rad: 0.0,
             error: None,
+            heard: Vec::new(),
+            prints: true,
         })
+    }
+
+    /// Prints nothing on the way.
+    #[must_use]
+    pub fn quiet(self) -> Self {
+        Pilot { prints: false, ..self }
+    }
+
+    /// Returns what the motors' wires said last.
+    pub fn throttles(&self) -> &[u16] {
+        &self.throttles
+    }
+
+    /// Returns the vehicle's true motion.
+    pub fn motion(&self) -> Motion {
+        self.world.plant().motion()
+    }
+
+    /// True if the vehicle has said so last.
+    pub fn armed(&self) -> bool {
+        self.armed
+    }
+
+    /// Returns what the vehicle has said, with the times [ms].
+    pub fn heard(&self) -> &[(u64, String)] {
+        &self.heard
+    }
+
+    /// Returns for how long it has hovered [ms].
+    pub fn hovers_ms(&self) -> Option<u64> {
+        (self.phase == Phase::Hovers).then(|| self.now_ms - self.since_ms)
     }
 
     /// Takes what the motors' wires say; none keeps what was said before.
@@ -84,6 +121,13 @@ impl Pilot {
 
     /// Advances to this millisecond, and returns what the transducers feel there; none at the end.
     pub fn advance(&mut self, now_ms: u64) -> Option<(Readings, Signals)> {
+        let felt = self.watch(now_ms);
+        self.supervise();
+        (self.error.is_none() && self.phase != Phase::Done).then_some(felt)
+    }
+
+    /// The same, but leaves the vehicle to itself, whatever it does.
+    pub fn watch(&mut self, now_ms: u64) -> (Readings, Signals) {
         self.now_ms = now_ms;
         let mut speeds = RotorSpeeds::<ROTORS_MAX>::default();
         for (speed, throttle) in speeds.0.iter_mut().zip(&self.throttles) {
@@ -95,8 +139,7 @@ impl Pilot {
         let readings = self.world.readings().copied().unwrap_or_default();
         let signals = self.transducers.feel(&readings);
         self.talk();
-        self.supervise();
-        (self.error.is_none() && self.phase != Phase::Done).then_some((readings, signals))
+        (readings, signals)
     }
 
     /// Prints how the flight was, and fails if it was not well flown.
@@ -121,10 +164,16 @@ impl Pilot {
     fn talk(&mut self) {
         let bytes = self.wire.take();
         let now_ms = self.now_ms;
-        let armed = &mut self.armed;
+        let (armed, heard, prints) = (&mut self.armed, &mut self.heard, self.prints);
         self.decoder.feed(&bytes, |_, message| match message {
             Downlink::Heartbeat { armed: is_armed, .. } => *armed = is_armed,
-            Downlink::Text { text, .. } => println!("{:7.3} s: {}", now_ms as f64 * 1e-3, text.to_str().unwrap_or("?")),
+            Downlink::Text { text, .. } => {
+                let text = text.to_str().unwrap_or("?");
+                if prints {
+                    println!("{:7.3} s: {text}", now_ms as f64 * 1e-3);
+                }
+                heard.push((now_ms, text.to_owned()));
+            }
             _ => {}
         });
         if self.now_ms % 1000 == 0 {
@@ -140,7 +189,7 @@ impl Pilot {
         self.tilt_rad = self.tilt_rad.max(tilt_rad);
         let passed_ms = self.now_ms - self.since_ms;
         let second = passed_ms % 1000 == 999;
-        if self.now_ms % 5000 == 0 {
+        if self.prints && self.now_ms % 5000 == 0 {
             let [east, north, up] = self.transducers.fix_m();
             println!(
                 "{:7.3} s: {:?}, {x:.2} {y:.2} {z:.2} m; fix off by {:.2} {:.2} {:.2} m, height by {:.2} m",

@@ -2,7 +2,7 @@
 
 use rigless::chip::Timeline;
 use rigless::chip::uart::Peer;
-use rigless::snapshot::Store;
+use rigless::snapshot::{Error, Reader, Store, Writer};
 use rigless::time::VirtualNanos;
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex};
@@ -42,7 +42,17 @@ impl Wire {
     }
 }
 
-impl Store for Wire {}
+impl Store for Wire {
+    fn store(&self, to: &mut Writer) -> Result<(), Error> {
+        self.with(|wire| to.put(&(&wire.to_board, &wire.from_board)))
+    }
+
+    fn load(&mut self, from: &mut Reader) -> Result<(), Error> {
+        let (to_board, from_board) = from.take()?;
+        self.with(|wire| *wire = Bytes { to_board, from_board });
+        Ok(())
+    }
+}
 
 impl Peer for Wire {
     fn receive(&mut self, word: u16, _: &mut Timeline<'_, '_>) {

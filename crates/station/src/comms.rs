@@ -53,7 +53,7 @@ const ROTORS: u64 = 10;
 pub struct Comms {
     decoder: Decoder<Uplink>,
     sender: Sender,
-    dispatcher: Dispatcher,
+    pub(crate) dispatcher: Dispatcher,
     tracker: Tracker,
     tick: u64,
     tick_us_max: f32,

@@ -1,0 +1,167 @@
+//! A flight that is in the air already: the board as a snapshot of its models, and what the plant was told until then,
+//! to be told again. So many faults begin in the same instant of one flight.
+
+use crate::check::check;
+use crate::fly::{Flight, TICK_NS};
+use crate::machine::{Machine, quiet_usb};
+use crate::pilot::Pilot;
+use crate::pins::MotorPins;
+use crate::wire::Wire;
+use afbc_scenario::{Scenario, load};
+use rigless::edge::Edge;
+use rigless::emulator::{Driver, Finished, Host, Settled, Start, Stop, run};
+use rigless::image::{Image, digest};
+use rigless::machine::matekh743::MatekH743;
+use rigless::session::Session;
+use rigless::snapshot::{Error as SnapshotError, Reader, Snapshot, Store, Writer, take};
+use rigless::time::VirtualNanos;
+use std::error::Error;
+use std::path::Path;
+
+/// How long it has hovered [ms].
+const HOVERED_MS: u64 = 5_000;
+
+/// What the vehicle did in each millisecond: the throttles, and the bytes of its link.
+#[derive(Clone, Debug, Default)]
+struct Past(Vec<(Vec<u16>, Vec<u8>)>);
+
+impl Store for Past {
+    fn store(&self, to: &mut Writer) -> Result<(), SnapshotError> {
+        to.put(&self.0)
+    }
+
+    fn load(&mut self, from: &mut Reader) -> Result<(), SnapshotError> {
+        self.0 = from.take()?;
+        Ok(())
+    }
+}
+
+/// Both ends of the link: the bytes of a millisecond are passed on at its end.
+#[derive(Clone, Debug, Default)]
+pub struct Link {
+    board: Wire,
+    pilot: Wire,
+}
+
+impl Link {
+    /// Passes on what has been said, and returns what the board said.
+    pub fn pass(&self) -> Vec<u8> {
+        let from_board = self.board.take();
+        self.board.send(&self.pilot.exchange(&from_board));
+        from_board
+    }
+
+    /// Puts bytes on the wire to the board.
+    pub fn flood(&self, bytes: &[u8]) {
+        self.board.send(bytes);
+    }
+}
+
+/// A vehicle in hover.
+pub struct Aloft {
+    images: Vec<Image>,
+    scenario: Scenario,
+    snapshot: Snapshot,
+    past: Past,
+}
+
+/// Flies until the vehicle hovers.
+struct Climb {
+    flight: Flight,
+    link: Link,
+    past: Past,
+    firmware: [u8; 32],
+    taken: Option<Result<Vec<u8>, SnapshotError>>,
+}
+
+impl Driver<MatekH743> for Climb {
+    fn on_settled(&mut self, session: &mut Session<MatekH743>, host: &mut dyn Host, settled: Settled) {
+        self.flight.on_settled(session, host, settled);
+    }
+
+    fn on_stop(&mut self, session: &mut Session<MatekH743>, stop: Stop, host: &mut dyn Host) -> Option<VirtualNanos> {
+        quiet_usb(session, stop.at);
+        let pilot = &mut self.flight.pilot;
+        self.past.0.push((pilot.throttles().to_vec(), self.link.pass()));
+        let (_, signals) = pilot.advance(stop.at.0 / TICK_NS)?;
+        session.board_mut().sense(&signals);
+        let is_there = pilot.hovers_ms().is_some_and(|hovers_ms| hovers_ms >= HOVERED_MS);
+        if is_there && self.flight.pins.look_ns().is_none() {
+            self.taken = Some(take(session, host, stop, &self.firmware, &self.past).map(|taken| taken.file));
+            return None;
+        }
+        Some(VirtualNanos(stop.at.0 + TICK_NS))
+    }
+}
+
+fn flight(scenario: &Scenario, link: &Link, prints: bool) -> Result<Flight, Box<dyn Error>> {
+    let pilot = Pilot::new(scenario, link.pilot.clone())?;
+    Ok(Flight {
+        pilot: if prints { pilot } else { pilot.quiet() },
+        hearer: None,
+        receiver: None,
+        pins: MotorPins::new(MatekH743::SIGNAL, scenario.rotors.len()),
+    })
+}
+
+fn board(link: &Link) -> Result<Box<MatekH743>, Box<dyn Error>> {
+    let mut board = Box::new(MatekH743::new()?);
+    check(board.attach_link(link.board.clone()), "the link is wired")?;
+    Ok(board)
+}
+
+impl Aloft {
+    /// Flies a scenario until the vehicle hovers, and keeps that in a file; or takes it from there, if it is of this
+    /// image.
+    pub fn of(image: &Path, scenario: &Path, kept: &Path) -> Result<Self, Box<dyn Error>> {
+        let images = vec![Image::read(image, None)?];
+        let scenario = load(scenario)?;
+        if let Ok(snapshot) = Snapshot::read(kept) {
+            let mut aloft = Aloft { images, scenario, snapshot, past: Past::default() };
+            let mut session = Session::new(board(&Link::default())?, 0, VirtualNanos(0))?;
+            let firmware = digest(&aloft.images, None);
+            if aloft.snapshot.restore(&mut session, &firmware, &mut aloft.past).is_ok() {
+                return Ok(aloft);
+            }
+            return Err(format!("{}: of another image or program; remove it", kept.display()).into());
+        }
+        let link = Link::default();
+        let climb = Climb {
+            flight: flight(&scenario, &link, true)?,
+            link: link.clone(),
+            past: Past::default(),
+            firmware: digest(&images, None),
+            taken: None,
+        };
+        let session = Session::new(board(&link)?, 0, VirtualNanos(TICK_NS))?;
+        let Climb { flight, taken, past, .. } = run(session, &Start::new(&images), climb)?.driver;
+        let Some(taken) = taken else {
+            flight.pilot.verdict()?;
+            return Err("it does not hover".into());
+        };
+        std::fs::write(kept, taken?)?;
+        Ok(Aloft { images, scenario, snapshot: Snapshot::read(kept)?, past })
+    }
+
+    /// Goes on from there with what `driver` makes of the flight and its link.
+    pub fn resume<R: Driver<MatekH743> + 'static>(
+        &self,
+        driver: impl FnOnce(Flight, Link, u64) -> R,
+    ) -> Result<Finished<MatekH743, R>, Box<dyn Error>> {
+        let link = Link::default();
+        let mut flight = flight(&self.scenario, &link, false)?;
+        for (ms, (throttles, bytes)) in (1..).zip(&self.past.0) {
+            flight.pilot.command(throttles.iter().copied().map(Some));
+            link.pilot.exchange(bytes);
+            check(flight.pilot.advance(ms).is_some(), "the plant's past is as it was")?;
+        }
+        let mut session = Session::new(board(&link)?, 0, VirtualNanos(0))?;
+        let firmware = digest(&self.images, None);
+        let resume = self.snapshot.restore(&mut session, &firmware, &mut Past::default())?;
+        let now_ns = self.snapshot.stop().at.0;
+        session.run_until(VirtualNanos(now_ns + TICK_NS));
+        let mut start = Start::new(&self.images);
+        start.resume = Some(&resume);
+        Ok(run(session, &start, driver(flight, link, now_ns))?)
+    }
+}

@@ -1,0 +1,339 @@
+//! Power cut at any instant while parameters are written or their flash is erased, at the chip's flash as it is: the
+//! next start must find each parameter as it was or as it was to be, whatever the interrupted word or sector holds.
+
+use crate::check::check;
+use crate::kept::Changes;
+use crate::machine::{Machine, quiet_usb};
+use crate::random::Random;
+use crate::wire::Wire;
+use afbc_link::{Address, Decoder, Downlink, FRAME_MAX, ParameterName, ParameterRequest, Sender, Uplink};
+use rigless::emulator::{AccessKind, Driver, Host, Settled, Start, Stop, run};
+use rigless::image::Image;
+use rigless::machine::matekh743::MatekH743;
+use rigless::session::Session;
+use rigless::soc::Width;
+use rigless::time::VirtualNanos;
+use std::error::Error;
+use std::path::Path;
+
+const STATION: Address = Address { system: 255, component: 190 };
+/// What is written, from which value to which, and what must stay as it is.
+const WRITTEN: (&str, f32, f32) = ("MIS_TAKEOFF_ALT", 3.0, 4.5);
+const OTHER: (&str, f32) = ("RTL_RETURN_ALT", 22.0);
+/// MAV_PARAM_TYPE_REAL32.
+const REAL32: u8 = 9;
+
+/// The parameters' two sectors (RM0433, 4.3.4): bytes of each, and of a word that is programmed at once.
+const SECTOR: u64 = 128 * 1024;
+const BYTES: u64 = 2 * SECTOR;
+const WORD: u64 = 32;
+/// Control register of the second bank (RM0433, 4.9.25), its bits START and SNB.
+const CR2: u64 = 0x5200_210C;
+const START: u64 = 1 << 7;
+const SECTOR_AT: u32 = 8;
+/// Times of the run [ns].
+const MS: u64 = 1_000_000;
+/// When the parameter is set, and when it is over.
+const SET_NS: u64 = 150 * MS;
+const WRITES_NS: u64 = 30 * MS;
+/// Longest start: two erases.
+const START_NS: u64 = 3_000 * MS;
+
+/// What a run is cut in.
+#[derive(Clone, Copy, PartialEq)]
+enum During {
+    /// A parameter that is set over the link.
+    Write,
+    /// A start that erases and copies.
+    Erase,
+}
+
+/// An operation of the flash that may not have ended.
+#[derive(Clone, Copy)]
+enum Pending {
+    Program(u64, [u32; 8]),
+    Erase(u64),
+}
+
+/// A board whose power is cut now and then: what its flash holds is kept, and it goes on.
+struct Cut {
+    during: During,
+    wire: Wire,
+    random: Random,
+    /// Mean time between two cuts in a program operation, and in an erase [ns].
+    apart_ns: [u64; 2],
+    pending: Option<Pending>,
+    begun: bool,
+    is_set: bool,
+    last_ns: u64,
+    /// Time, and what the flash holds.
+    kept: Vec<(u64, Vec<u8>)>,
+}
+
+impl Cut {
+    fn note(&mut self, address: u64, value: u64) {
+        if address == CR2 && value & START != 0 {
+            self.pending = Some(Pending::Erase(MatekH743::STORE + (value >> SECTOR_AT & 7) * SECTOR));
+        } else if (MatekH743::STORE..MatekH743::STORE + BYTES).contains(&address) {
+            let (word, place) = (address / WORD * WORD, address % WORD / 4);
+            let mut data = match self.pending {
+                Some(Pending::Program(at, data)) if at == word => data,
+                _ => [u32::MAX; 8],
+            };
+            if let Some(part) = data.get_mut(place as usize) {
+                *part = value as u32;
+            }
+            self.pending = Some(Pending::Program(word, data));
+        } else {
+            return;
+        }
+        self.begun = true;
+    }
+
+    /// Keeps what the flash holds if the power is cut now: of an operation that has not ended, some of its bits.
+    fn cut(&mut self, host: &mut dyn Host, now_ns: u64) -> Result<(), rigless::emulator::Error> {
+        let mut bytes = Vec::with_capacity(BYTES as usize);
+        for address in (MatekH743::STORE..MatekH743::STORE + BYTES).step_by(8) {
+            bytes.extend(host.read(address, Width::W64)?.to_le_bytes());
+        }
+        let share = self.random.next() as u8;
+        match self.pending {
+            Some(Pending::Program(word, data)) => {
+                let at = (word - MatekH743::STORE) as usize;
+                let cells = &mut bytes[at..at + WORD as usize];
+                let whole: Vec<u8> = data.iter().flat_map(|part| part.to_le_bytes()).collect();
+                let has_ended = cells.iter().zip(&whole).all(|(cell, byte)| cell == byte);
+                // The firmware reads a word whose checksum is wrong as zero.
+                let is_refused = self.random.next() % 2 == 0;
+                if !has_ended && is_refused {
+                    cells.fill(0);
+                } else if !has_ended {
+                    for (cell, byte) in cells.iter_mut().zip(&whole) {
+                        *cell &= byte | self.some_bits(share);
+                    }
+                }
+            }
+            Some(Pending::Erase(sector)) => {
+                let at = (sector - MatekH743::STORE) as usize;
+                for cell in bytes[at..at + SECTOR as usize].iter_mut() {
+                    *cell |= self.some_bits(share);
+                }
+            }
+            None => (),
+        }
+        self.kept.push((now_ns, bytes));
+        Ok(())
+    }
+
+    /// Returns each bit with the probability of this share of 255.
+    fn some_bits(&mut self, share: u8) -> u8 {
+        (0..8).fold(0, |bits, _| bits << 1 | u8::from((self.random.next() >> 16) as u8 <= share))
+    }
+}
+
+impl Driver<MatekH743> for Cut {
+    fn on_settled(&mut self, session: &mut Session<MatekH743>, host: &mut dyn Host, settled: Settled) {
+        let now_ns = match settled {
+            Settled::Access { access, value } => {
+                if access.kind == AccessKind::Write {
+                    self.note(access.address, value);
+                }
+                access.virtual_time.0
+            }
+            Settled::Stop(stop) => stop.at.0,
+            _ => return,
+        };
+        if !self.begun {
+            return;
+        }
+        if now_ns >= self.last_ns {
+            if self.last_ns > 0 && self.cut(host, now_ns).is_err() {
+                self.begun = false;
+            }
+            let [program_ns, erase_ns] = self.apart_ns;
+            let apart_ns = if let Some(Pending::Erase(_)) = self.pending { erase_ns } else { program_ns };
+            self.last_ns = now_ns + 1 + self.random.below(2 * apart_ns);
+        }
+        if session.pause().is_none() {
+            session.pause_at(Some(VirtualNanos(self.last_ns)));
+        }
+    }
+
+    fn on_stop(&mut self, session: &mut Session<MatekH743>, stop: Stop, _: &mut dyn Host) -> Option<VirtualNanos> {
+        let now_ns = stop.at.0;
+        quiet_usb(session, stop.at);
+        match self.during {
+            During::Write if now_ns < SET_NS => Some(VirtualNanos(now_ns + MS)),
+            During::Write if !self.is_set => {
+                let (name, _, new) = WRITTEN;
+                let request = ParameterRequest::Set { name: padded(name), value: new.to_le_bytes(), kind: REAL32 };
+                say(&self.wire, &[Uplink::Heartbeat, Uplink::Parameter(request)]);
+                self.is_set = true;
+                Some(VirtualNanos(now_ns + MS))
+            }
+            During::Write => (now_ns < SET_NS + WRITES_NS).then_some(VirtualNanos(now_ns + MS)),
+            During::Erase => (now_ns < START_NS).then_some(VirtualNanos(now_ns + MS)),
+        }
+    }
+}
+
+/// Starts with what the cuts have left, one after another, each asked for the parameters.
+struct Starts {
+    wire: Wire,
+    random: Random,
+    decoder: Decoder<Downlink>,
+    left: std::vec::IntoIter<(u64, Vec<u8>)>,
+    /// When the cut was, and when it was started again [ns].
+    cut_ns: u64,
+    started_ns: u64,
+    /// Of [`WRITTEN`] and [`OTHER`].
+    values: [Option<f32>; 2],
+    /// When a cut was, and what was there at the next start.
+    found: Vec<(u64, [Option<f32>; 2])>,
+}
+
+impl Starts {
+    /// Starts with the next flash, and with noise in all memories; none after the last.
+    fn next(&mut self, session: &mut Session<MatekH743>, stop: Stop, host: &mut dyn Host) -> Option<VirtualNanos> {
+        let (cut_ns, bytes) = self.left.next()?;
+        for (address, cells) in (MatekH743::STORE..).step_by(8).zip(bytes.as_chunks::<8>().0) {
+            let value = u64::from_le_bytes(*cells);
+            if host.read(address, Width::W64).ok()? != value {
+                host.program(address, Width::W64, value).ok()?;
+            }
+        }
+        lose_memory(session, host, &mut self.random);
+        session.reset_by_pin(stop.at, stop.instruction_count, host);
+        self.wire.exchange(&[]);
+        self.wire.take();
+        (self.cut_ns, self.started_ns, self.values) = (cut_ns, stop.at.0, [None; 2]);
+        self.decoder = Decoder::new(STATION);
+        Some(VirtualNanos(stop.at.0 + MS))
+    }
+}
+
+impl Driver<MatekH743> for Starts {
+    fn on_stop(&mut self, session: &mut Session<MatekH743>, stop: Stop, host: &mut dyn Host) -> Option<VirtualNanos> {
+        quiet_usb(session, stop.at);
+        if self.started_ns == 0 {
+            return self.next(session, stop, host);
+        }
+        let values = &mut self.values;
+        self.decoder.feed(&self.wire.take(), |_, message: Downlink| {
+            if let Downlink::Parameter(value) = message {
+                for (name, known) in [WRITTEN.0, OTHER.0].iter().zip(values.iter_mut()) {
+                    if padded(name) == value.name {
+                        *known = Some(f32::from_le_bytes(value.value));
+                    }
+                }
+            }
+        });
+        if self.values.iter().all(Option::is_some) || stop.at.0 > self.started_ns + START_NS {
+            self.found.push((self.cut_ns, self.values));
+            return self.next(session, stop, host);
+        }
+        if (stop.at.0 - self.started_ns) % (20 * MS) != 0 {
+            return Some(VirtualNanos(stop.at.0 + MS));
+        }
+        let names = [WRITTEN.0, OTHER.0].map(|name| Uplink::Parameter(ParameterRequest::ReadName(padded(name))));
+        say(&self.wire, &names);
+        Some(VirtualNanos(stop.at.0 + MS))
+    }
+}
+
+/// Fills the memories with noise, as they are after a start.
+pub fn lose_memory(session: &mut Session<MatekH743>, host: &mut dyn Host, random: &mut Random) {
+    let memory = session.mcu().bus().memory().to_vec();
+    for region in memory.iter().filter(|region| region.kind.is_writable()) {
+        for offset in (0..region.size).step_by(8) {
+            let _ = host.write(region.base + offset, Width::W64, random.next());
+        }
+    }
+}
+
+fn padded(name: &str) -> ParameterName {
+    std::array::from_fn(|at| name.as_bytes().get(at).copied().unwrap_or(0))
+}
+
+fn say(wire: &Wire, messages: &[Uplink]) {
+    let mut sender = Sender::new(STATION);
+    for message in messages {
+        wire.send(sender.send(message, &mut [0; FRAME_MAX]));
+    }
+}
+
+fn board(wire: &Wire) -> Result<Box<MatekH743>, Box<dyn Error>> {
+    let mut board = Box::new(MatekH743::new()?);
+    check(board.attach_link(wire.clone()), "the link is wired")?;
+    Ok(board)
+}
+
+fn flash(bytes: Vec<u8>) -> Result<Image, Box<dyn Error>> {
+    Ok(Image::new(Path::new("parameters"), bytes, Some(MatekH743::STORE))?)
+}
+
+/// Starts with each flash, and returns when the power was cut, and the values that are there then.
+fn ask(image: &Image, left: Vec<(u64, Vec<u8>)>, seed: u64) -> Result<Vec<(u64, [Option<f32>; 2])>, Box<dyn Error>> {
+    let wire = Wire::default();
+    let session = Session::new(board(&wire)?, 0, VirtualNanos(MS))?;
+    let starts = Starts {
+        wire,
+        random: Random::new(seed, "starts"),
+        decoder: Decoder::new(STATION),
+        left: left.into_iter(),
+        cut_ns: 0,
+        started_ns: 0,
+        values: [None; 2],
+        found: Vec::new(),
+    };
+    Ok(run(session, &Start::new(std::slice::from_ref(image)), starts)?.driver.found)
+}
+
+/// Cuts the power about so many times in each of a write and a start that erases.
+pub fn cut_all(image: &Path, seed: u64, cuts: u64) -> Result<(), Box<dyn Error>> {
+    let image = Image::read(image, None)?;
+    let (name, old, new) = WRITTEN;
+    for (during, apart_ns, what) in [
+        (During::Write, [1_000_000 / cuts.max(1), MS], "a parameter is written"),
+        (During::Erase, [2_000_000 / cuts.max(1), 2_000 * MS / cuts.max(1)], "a start erases"),
+    ] {
+        let mut before = Changes::new()?;
+        before.set(OTHER.0, OTHER.1)?;
+        // A sector that is nearly full is copied and erased at the start.
+        for change in 0..if during == During::Erase { 500 } else { 0 } {
+            before.set(name, 1.0 + change as f32 * 1e-3)?;
+        }
+        before.set(name, old)?;
+        let wire = Wire::default();
+        let session = Session::new(board(&wire)?, 0, VirtualNanos(MS))?;
+        let cut = Cut {
+            during,
+            wire,
+            random: Random::new(seed, what),
+            apart_ns,
+            pending: None,
+            begun: false,
+            is_set: false,
+            last_ns: 0,
+            kept: Vec::new(),
+        };
+        let images = [image.clone(), flash(before.bytes(WORD as usize)?)?];
+        let kept = run(session, &Start::new(&images), cut)?.driver.kept;
+        println!("{what}: {} instants", kept.len());
+        let instants = kept.len();
+        let (mut olds, mut news, mut wrong) = (0, 0, Vec::new());
+        for (now_ns, found) in ask(&image, kept, seed)? {
+            match found {
+                [Some(value), Some(other)] if value == old && other == OTHER.1 => olds += 1,
+                [Some(value), Some(other)] if value == new && other == OTHER.1 => news += 1,
+                values => wrong.push(format!("cut at {now_ns} ns: {values:?}")),
+            }
+        }
+        check(olds + news + wrong.len() == instants, "a start after each cut")?;
+        println!("{what}: {olds} times the old value, {news} times the new one, {} times another", wrong.len());
+        check(wrong.is_empty(), &wrong.join("\n"))?;
+        check(during == During::Erase || news > 0 && olds > 0, "cuts before and after the write")?;
+        check(during == During::Write || olds > 0, "cuts in a start that erases")?;
+    }
+    Ok(())
+}

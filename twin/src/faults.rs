@@ -1,0 +1,224 @@
+//! Faults at the pins, in flight: what the vehicle makes of each, from the same instant of one flight.
+
+use crate::aloft::{Aloft, Link};
+use crate::check::check;
+use crate::fly::{Flight, TICK_NS};
+use crate::machine::quiet_usb;
+use crate::random::Random;
+use crate::table::{ROWS, Row};
+use rigless::edge::Edge;
+use rigless::emulator::{Driver, Host, Settled, Stop};
+use rigless::machine::matekh743::{Conditions, MatekH743};
+use rigless::session::Session;
+use rigless::time::VirtualNanos;
+use std::error::Error;
+use std::fmt;
+
+/// When a fault begins, after the flight goes on: at a random time in between [ns].
+const BEGINS_NS: [u64; 2] = [50_000_000, 250_000_000];
+/// What a vehicle that flies on may be off from where it was [m].
+const OFF_M: f64 = 6.0;
+/// Fastest touch-down that is a landing [m/s].
+const TOUCH_M_S: f64 = 2.0;
+/// Time after which a vehicle that descends must have landed [ms].
+const LANDS_MS: u64 = 45_000;
+
+/// What became of a vehicle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Outcome {
+    /// It fell, or turned over.
+    Lost,
+    /// It came down, upright and slowly, and disarmed.
+    Lands,
+    /// It went on as it was ordered.
+    FliesOn,
+}
+
+impl fmt::Display for Outcome {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(match self {
+            Outcome::Lost => "lost",
+            Outcome::Lands => "lands",
+            Outcome::FliesOn => "flies on",
+        })
+    }
+}
+
+/// The models while a fault is there.
+pub struct Trouble<'a> {
+    pub session: &'a mut Session<MatekH743>,
+    pub host: &'a mut dyn Host,
+    pub link: &'a Link,
+    pub conditions: &'a mut Conditions,
+    pub random: &'a mut Random,
+    pub at: VirtualNanos,
+    pub instructions: u64,
+    /// Time since the fault began.
+    pub since_ns: u64,
+    /// Times that the fault has looked at the models before, and what it keeps.
+    pub looks: u64,
+    pub kept: &'a mut u64,
+}
+
+/// A flight with a fault.
+struct Watched {
+    flight: Flight,
+    link: Link,
+    row: &'static Row,
+    conditions: Conditions,
+    random: Random,
+    begins_ns: u64,
+    ends_ns: u64,
+    /// What a flight that does not end is given up at.
+    last_ns: u64,
+    looks: u64,
+    kept: u64,
+    start_m: [f64; 3],
+    off_m: f64,
+    tilt_rad: f64,
+    /// Speed at touch-down, downwards.
+    touch_m_s: Option<f64>,
+    outcome: Option<Outcome>,
+}
+
+impl Watched {
+    fn new(flight: Flight, link: Link, now_ns: u64, row: &'static Row, seed: u64) -> Self {
+        let mut random = Random::new(seed, row.name);
+        let begins_ns = now_ns + BEGINS_NS[0] + random.below(BEGINS_NS[1] - BEGINS_NS[0]);
+        let start_m = flight.pilot.motion().position_m.into();
+        Watched {
+            flight,
+            link,
+            row,
+            conditions: Conditions::default(),
+            random,
+            begins_ns,
+            ends_ns: begins_ns + row.watch_ms * TICK_NS,
+            last_ns: begins_ns + LANDS_MS * TICK_NS,
+            looks: 0,
+            kept: 0,
+            start_m,
+            off_m: 0.0,
+            tilt_rad: 0.0,
+            touch_m_s: None,
+            outcome: None,
+        }
+    }
+
+    /// Looks at the vehicle from outside; true when its fate is decided.
+    fn judge(&mut self, now_ns: u64) -> bool {
+        let pilot = &self.flight.pilot;
+        let motion = pilot.motion();
+        let [x, y, z]: [f64; 3] = motion.position_m.into();
+        let [start_x, start_y, start_z] = self.start_m;
+        self.off_m = self.off_m.max((x - start_x).hypot(y - start_y).hypot(z - start_z));
+        self.tilt_rad = self.tilt_rad.max(motion.attitude_rad.x.hypot(motion.attitude_rad.y));
+        if z < 0.1 {
+            self.touch_m_s.get_or_insert(-motion.velocity_m_s.z);
+        }
+        let touched_hard = self.touch_m_s.is_some_and(|touch_m_s| touch_m_s > TOUCH_M_S);
+        self.outcome = if self.tilt_rad > 1.5 || touched_hard || self.off_m > 50.0 {
+            Some(Outcome::Lost)
+        } else if self.touch_m_s.is_some() && !pilot.armed() {
+            Some(Outcome::Lands)
+        } else if now_ns < self.ends_ns {
+            None
+        } else if (z - start_z).abs() < 2.0 && self.off_m < OFF_M && pilot.armed() {
+            Some(Outcome::FliesOn)
+        } else if now_ns > self.last_ns {
+            Some(Outcome::Lost)
+        } else {
+            None
+        };
+        self.outcome.is_some()
+    }
+}
+
+impl Driver<MatekH743> for Watched {
+    fn on_settled(&mut self, session: &mut Session<MatekH743>, host: &mut dyn Host, settled: Settled) {
+        self.flight.on_settled(session, host, settled);
+        let (at, instructions) = match settled {
+            Settled::Access { access, .. } => (access.virtual_time, access.instruction_count),
+            Settled::Stop(stop) => (stop.at, stop.instruction_count),
+            _ => return,
+        };
+        let Some(since_ns) = at.0.checked_sub(self.begins_ns) else { return };
+        let before = self.conditions;
+        (self.row.act)(&mut Trouble {
+            session,
+            host,
+            link: &self.link,
+            conditions: &mut self.conditions,
+            random: &mut self.random,
+            at,
+            instructions,
+            since_ns,
+            looks: self.looks,
+            kept: &mut self.kept,
+        });
+        self.looks += 1;
+        if self.conditions != before {
+            session.board_mut().condition(&self.conditions);
+        }
+    }
+
+    fn on_stop(&mut self, session: &mut Session<MatekH743>, stop: Stop, _: &mut dyn Host) -> Option<VirtualNanos> {
+        quiet_usb(session, stop.at);
+        self.link.pass();
+        let (_, signals) = self.flight.pilot.watch(stop.at.0 / TICK_NS);
+        let board = session.board_mut();
+        board.draw(self.begins_ns, stop.at.0 / TICK_NS);
+        board.sense(&signals);
+        (!self.judge(stop.at.0)).then_some(VirtualNanos(stop.at.0 + TICK_NS))
+    }
+}
+
+/// Flies one fault, and returns whether the outcome is at least as good as expected.
+fn fly(aloft: &Aloft, row: &'static Row, seed: u64) -> Result<bool, Box<dyn Error>> {
+    let finished = aloft.resume(|flight, link, now_ns| Watched::new(flight, link, now_ns, row, seed))?;
+    let session = &finished.session;
+    let Watched { flight, begins_ns, off_m, tilt_rad, touch_m_s, outcome, .. } = finished.driver;
+    let begins_ms = begins_ns / TICK_NS;
+    let heard: Vec<_> = flight.pilot.heard().iter().filter(|(ms, _)| *ms >= begins_ms).collect();
+    let outcome = outcome.unwrap_or(Outcome::Lost);
+    let is_well = outcome >= row.expected;
+    let touch = touch_m_s.map_or(String::new(), |touch_m_s| format!(", touches the ground at {touch_m_s:.1} m/s"));
+    println!(
+        "{} {}, {}, at {:.6} s: {outcome}, expected {}; off by {off_m:.2} m, tilt {tilt_rad:.2} rad{touch}",
+        if is_well { "pass" } else { "FAIL" },
+        row.name,
+        row.what,
+        begins_ns as f64 * 1e-9,
+        row.expected
+    );
+    for (ms, text) in heard {
+        println!("     {:.3} s: {text}", *ms as f64 * 1e-3);
+    }
+    for reset in session.resets() {
+        println!("     reset at {:.6} s: {:?}", reset.at.0 as f64 * 1e-9, reset.cause);
+    }
+    for told in session.told() {
+        println!("     the models say: {} {}: {}", told.instance, told.register, told.reason);
+    }
+    let wrong = &flight.pins.wrong;
+    if !wrong.is_empty() {
+        println!("     motors: {wrong:?}");
+    }
+    Ok(is_well)
+}
+
+/// Flies the faults whose names begin with `only`, and fails if one becomes worse than expected.
+pub fn fly_all(aloft: &Aloft, seeds: std::ops::Range<u64>, only: &str) -> Result<(), Box<dyn Error>> {
+    let (mut flown, mut failed) = (0, Vec::new());
+    for seed in seeds {
+        for row in ROWS.iter().filter(|row| row.name.starts_with(only)) {
+            flown += 1;
+            if !fly(aloft, row, seed)? {
+                failed.push(format!("{} with seed {seed}", row.name));
+            }
+        }
+    }
+    println!("{flown} flights with a fault");
+    check(flown > 0, "a fault of this name")?;
+    check(failed.is_empty(), &failed.join(", "))
+}

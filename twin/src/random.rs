@@ -1,0 +1,32 @@
+//! Random numbers of a seed.
+
+/// A generator: Marsaglia's xorshift.
+#[derive(Clone, Copy, Debug)]
+pub struct Random(u64);
+
+impl Random {
+    /// With a seed, and what it is for.
+    pub fn new(seed: u64, name: &str) -> Self {
+        let mix = name.bytes().fold(seed ^ 0x9E37_79B9_7F4A_7C15, |hash, byte| {
+            (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01B3)
+        });
+        let mut random = Random(mix | 1);
+        for _ in 0..16 {
+            random.next();
+        }
+        random
+    }
+
+    /// Returns 64 bits.
+    pub fn next(&mut self) -> u64 {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 7;
+        self.0 ^= self.0 << 17;
+        self.0
+    }
+
+    /// Returns a number below `end`.
+    pub fn below(&mut self, end: u64) -> u64 {
+        self.next() % end.max(1)
+    }
+}
