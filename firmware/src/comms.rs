@@ -5,10 +5,12 @@ use crate::board::{Board, Links, Receiver as _, Transmitter as _};
 use crate::control;
 use crate::indication;
 use crate::parameters;
+use crate::radio::{self, RadioLine};
 use crate::recording::{self, ExactLog};
 use crate::samples::{self, Sampler as _};
 use crate::ticks::{self, Tick};
 use crate::vehicle::ParameterTable;
+use afbc_onboard::ControlInputs;
 pub use afbc_station::Comms;
 use afbc_station::services::imus::{self, ImuNews};
 use afbc_station::services::status::SensorBits;
@@ -40,25 +42,29 @@ const FAREWELL: u32 = 100;
 /// Text to the station when more changes of parameters are waiting for the flash than there is room for.
 const NOT_KEPT: &str = "parameter not kept: set it again";
 
-/// What the links' task has: the services for stations, the parameters, and the exact log if there is one.
-pub type Desk = (Comms, ParameterTable, Option<&'static mut ExactLog>);
+/// What the links' task has: the services for stations, the parameters, and exact log and radio if there are any.
+pub type Desk = (Comms, ParameterTable, Option<&'static mut ExactLog>, Option<&'static mut RadioLine>);
 
 /// Creates it, with nothing received, to be called once: in place, since a task would store a value twice and take the
 /// stack for it.
 #[inline(never)]
-pub fn make<B: Board>(table: ParameterTable, log: Option<&'static mut ExactLog>) -> &'static mut Desk {
+pub fn make<B: Board>(
+    table: ParameterTable,
+    log: Option<&'static mut ExactLog>,
+    radio: Option<&'static mut RadioLine>,
+) -> &'static mut Desk {
     static DESK: StaticCell<Desk> = StaticCell::new();
     DESK.init_with(|| {
         let boot_loader = B::BOOT_LOADER.is_some();
         let reboots: &[_] = if boot_loader { &[Reboot::Program, Reboot::BootLoader] } else { &[Reboot::Program] };
         let calibrates = B::Sampler::SENSES;
         let setup = Setup { reboots, calibrates, ..Setup::of(&table.configuration().link) };
-        (Comms::with(setup), table, log)
+        (Comms::with(setup), table, log, radio)
     })
 }
 
 /// Receives messages, and reports every tick on every link, of which there are `OTHERS` beside the first.
-pub async fn run<B: Board, const OTHERS: usize>((comms, table, log): &mut Desk, links: &mut B::Links) -> ! {
+pub async fn run<B: Board, const OTHERS: usize>((comms, table, log, radio): &mut Desk, links: &mut B::Links) -> ! {
     // The first link's is in `comms`.
     let mut decoders: [_; OTHERS] = array::from_fn(|_| comms.decoder());
     let mut incoming = [0; READ_MAX];
@@ -69,6 +75,14 @@ pub async fn run<B: Board, const OTHERS: usize>((comms, table, log): &mut Desk, 
         match select(receive(links, &mut incoming), ticks::next()).await {
             Either::First((link, length)) => {
                 let bytes = incoming.get(..length).unwrap_or_default();
+                if radio::is_possible::<B>()
+                    && let Some(radio) = radio.as_deref_mut().filter(|radio| radio.link() == link)
+                {
+                    if let Some(news) = radio.receive(comms, bytes, table) {
+                        pass_on::<B>(&news, log);
+                    }
+                    continue;
+                }
                 let news = match link.checked_sub(1).and_then(|other| decoders.get_mut(other)) {
                     Some(decoder) => {
                         comms.exchange(decoder);
@@ -78,12 +92,7 @@ pub async fn run<B: Board, const OTHERS: usize>((comms, table, log): &mut Desk, 
                     }
                     None => comms.receive(bytes),
                 };
-                let tick = control::with_mail(|inputs| inputs.merge(&news));
-                if recording::is_possible::<B>()
-                    && let Some(log) = log
-                {
-                    log.inputs(tick, &news);
-                }
+                pass_on::<B>(&news, log);
                 BAD_FRAMES.store(comms.bad_frames(), Ordering::Relaxed);
             }
             Either::Second(tick) => {
@@ -107,22 +116,26 @@ pub async fn run<B: Board, const OTHERS: usize>((comms, table, log): &mut Desk, 
                 if B::Sampler::SENSES
                     && let Some(calibrator) = &mut calibrator
                 {
-                    calibrate(comms, calibrator, table);
+                    calibrate(comms, calibrator, table, &mut outgoing);
                 }
                 // A constant here, too, as below.
                 let kept = if recording::is_possible::<B>() { log.as_deref_mut() } else { None };
-                let logs = kept.as_ref().map(|log| log.link());
+                let others = [kept.as_ref().map(|log| log.link()), radio.as_ref().map(|radio| radio.link())];
                 serve(comms, table, kept, &mut outgoing);
-                let told = links.each().iter_mut().enumerate().filter(|(index, _)| Some(*index) != logs);
+                let told = links.each().iter_mut().enumerate().filter(|(index, _)| !others.contains(&Some(*index)));
                 told.for_each(|(_, link)| link.transmitter.transmit(&tick, &outgoing));
                 if comms.has_mail() {
                     let news = comms.receive(&[]);
-                    let tick = control::with_mail(|inputs| inputs.merge(&news));
-                    if recording::is_possible::<B>()
-                        && let Some(log) = log
-                    {
-                        log.inputs(tick, &news);
+                    pass_on::<B>(&news, log);
+                }
+                if radio::is_possible::<B>()
+                    && let Some(radio) = radio
+                {
+                    // Notices that nothing comes.
+                    if let Some(news) = radio.receive(comms, &[], table) {
+                        pass_on::<B>(&news, log);
                     }
+                    radio.send(comms, &tick, links);
                 }
                 if recording::is_possible::<B>()
                     && let Some(log) = log
@@ -139,6 +152,16 @@ pub async fn run<B: Board, const OTHERS: usize>((comms, table, log): &mut Desk, 
                 }
             }
         }
+    }
+}
+
+/// Passes on what has come to the control tick.
+fn pass_on<B: Board>(news: &ControlInputs, log: &mut Option<&'static mut ExactLog>) {
+    let tick = control::with_mail(|inputs| inputs.merge(news));
+    if recording::is_possible::<B>()
+        && let Some(log) = log
+    {
+        log.inputs(tick, news);
     }
 }
 
@@ -184,11 +207,16 @@ fn calibrator() -> &'static mut Calibrator {
     CALIBRATOR.init_with(Calibrator::new)
 }
 
-/// Goes on with a calibration. Out of line like the report.
+/// Goes on with a calibration, and shows stations what the sensors read. Out of line like the report.
 #[inline(never)]
-fn calibrate(comms: &mut Comms, calibrator: &mut Calibrator, table: &ParameterTable) {
-    let sample = samples::raw(comms.is_calibrating());
-    comms.calibrate(calibrator, sample, table);
+fn calibrate(
+    comms: &mut Comms,
+    calibrator: &mut Calibrator,
+    table: &ParameterTable,
+    outgoing: &mut Vec<u8, REPORT_MAX>,
+) {
+    let sample = samples::raw(comms.takes_samples());
+    comms.calibrate(calibrator, sample, table, |frame| drop(outgoing.extend_from_slice(frame)));
 }
 
 /// Sends values of parameters, and passes on what has changed. Out of line like the report.

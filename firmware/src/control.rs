@@ -69,15 +69,16 @@ pub fn make(configuration: &Configuration) -> &'static mut Flight {
 
 /// Runs the ticks.
 pub async fn run<B: Board>(flight: &mut Flight, board: &mut B) -> ! {
-    let (mut inputs, mut readings, mut number, mut adopted) = (ControlInputs::EMPTY, Readings::NONE, 0, None);
+    let (mut inputs, mut readings, mut seen, mut adopted) =
+        (ControlInputs::EMPTY, Readings::NONE, Seen::default(), None);
     loop {
         // Not a ticker, whose periods begin when it is created: just after the start of a control period, when alarms
         // are due, it would tick twice in every second period.
         Timer::at(time::next_period()).await;
         let stopwatch = Stopwatch::start();
-        let report = tick(flight, &mut inputs, &mut readings, &mut number, board);
+        let report = tick(flight, &mut inputs, &mut readings, &mut seen, board);
         if recording::is_possible::<B>() && recording::records() {
-            let clock_failed = board.clock_has_failed();
+            let Seen { number, clock_failed } = seen;
             recording::push(&RecordedTick { number, clock_failed, adopted, readings, battery: inputs.battery, report });
         }
         adopted = None;
@@ -90,6 +91,15 @@ pub async fn run<B: Board>(flight: &mut Flight, board: &mut B) -> ! {
         CYCLES_MAX.fetch_max(cycles, Ordering::Relaxed);
         ticks::push(Tick { report, cycles });
     }
+}
+
+/// What a tick saw that is recorded only, by boards that record.
+#[derive(Clone, Copy, Default)]
+struct Seen {
+    /// Number of the tick.
+    number: u32,
+    /// True if its clock was not trusted.
+    clock_failed: bool,
 }
 
 /// Takes over a configuration, if there is one, and returns its number. Out of line, since it is rare.
@@ -110,7 +120,7 @@ fn tick<B: Board>(
     flight: &mut Flight,
     inputs: &mut ControlInputs,
     readings: &mut Readings,
-    number: &mut u32,
+    seen: &mut Seen,
     board: &mut B,
 ) -> Report {
     let now_us = Instant::now().as_micros();
@@ -120,12 +130,16 @@ fn tick<B: Board>(
         let (mail, next) = &mut *shared;
         mail.take_into(inputs);
         if recording::is_possible::<B>() {
-            *number = *next;
+            seen.number = *next;
             *next = next.wrapping_add(1);
         }
     });
 
-    if board.clock_has_failed() {
+    let clock_failed = board.clock_has_failed();
+    if recording::is_possible::<B>() {
+        seen.clock_failed = clock_failed;
+    }
+    if clock_failed {
         flight.distrust_clock();
     }
     if B::Sampler::SENSES {

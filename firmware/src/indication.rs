@@ -1,4 +1,5 @@
-//! What LED and buzzer show, from the links' task, which sees every tick's report, to the board's task that drives them.
+//! What LED and buzzer show, from the links' task, which sees every tick's report, to the board's task that drives
+//! them.
 
 pub use afbc_onboard::indicator::IndicatorSignals;
 

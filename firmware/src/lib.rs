@@ -22,7 +22,7 @@
 //! | 6 | end of the motors' DMA | 1 us per millisecond |
 //! | 7 | [`aux_sensors`]: reading the slow ones, whose drivers may wait for their bus | |
 //! | 8 | [`comms`]: the link's messages | |
-//! | 12 | [`housekeeping`]: logging, stack monitoring; [`parameters`]: writing to flash; [`indication`]: LED and buzzer; USB | |
+//! | 12 | [`housekeeping`]: logging, stack monitoring; [`parameters`]: to flash; [`indication`]: LED, buzzer; USB | |
 //!
 //! The links precede the control tick because a UART may buffer one byte only, and the next comes within 11 us. USB
 //! comes last: its host waits, whatever it sends.
@@ -37,6 +37,7 @@ pub mod housekeeping;
 mod image;
 pub mod indication;
 pub mod parameters;
+pub mod radio;
 pub mod recording;
 pub mod samples;
 pub mod ticks;
@@ -67,7 +68,8 @@ pub fn run<B: Board>(
     let flight = control::make(table.configuration());
     // Before the watchdog: it looks at each parameter.
     let log = if recording::is_possible::<B>() { recording::ExactLog::begin::<B>(&table) } else { None };
-    let desk = comms::make::<B>(table, log);
+    let radio = if radio::is_possible::<B>() { radio::RadioLine::begin::<B>(&table, &mut links) } else { None };
+    let desk = comms::make::<B>(table, log, radio);
     board.unleash_watchdog();
     time::start(core.SYST, B::CORE_HZ);
     comms(executors.comms, desk, links);

@@ -4,7 +4,7 @@
 use crate::board::{Board, Links, Transmitter};
 use crate::samples::Sampler;
 use crate::ticks::Tick;
-use crate::vehicle::{ParameterTable, Report};
+use crate::vehicle::{NAME, ParameterTable, Report};
 use afbc_guidance::BatteryReading;
 use afbc_onboard::parameters::RecordChange;
 use afbc_onboard::{ControlInputs, Readings};
@@ -61,6 +61,9 @@ pub const fn is_possible<B: Board>() -> bool {
 /// Bytes of the log that wait for the end of a tick, at most; further frames are missing.
 const BYTES: usize = 1024;
 
+/// The law that every image flies: AFBC under its monitor.
+const LAW: &str = "afbc";
+
 /// The exact log on one of the links.
 pub struct ExactLog {
     recorder: Recorder,
@@ -80,7 +83,7 @@ impl ExactLog {
         }
         let log = LOG.init_with(|| ExactLog { recorder: Recorder::default(), bytes: Vec::new(), link });
         let ExactLog { recorder, bytes, .. } = log;
-        recorder.start(table, &mut |frame| drop(bytes.extend_from_slice(frame)));
+        recorder.start([NAME, LAW], table, &mut |frame| drop(bytes.extend_from_slice(frame)));
         RECORDS.store(true, Ordering::Relaxed);
         Some(log)
     }

@@ -69,7 +69,7 @@ static SELECTOR: Mutex<CriticalSectionRawMutex, RefCell<ImuSelector>> = Mutex::n
 static ARRIVED: Mutex<CriticalSectionRawMutex, RefCell<Arrived>> =
     Mutex::new(RefCell::new(Arrived { imu: None, aids: Deque::new() }));
 
-/// True while the vehicle is calibrated, and what its sensors have read meanwhile.
+/// True while samples are wanted, and what the sensors have read meanwhile.
 static CALIBRATES: AtomicBool = AtomicBool::new(false);
 static RAW: Mutex<CriticalSectionRawMutex, RefCell<RawReadings>> = Mutex::new(RefCell::new(RawReadings::NONE));
 
@@ -112,7 +112,7 @@ pub(crate) fn imu_pair(now_us: u64) -> ImuPair {
     SELECTOR.lock(|selector| selector.try_borrow().map(|selector| selector.pair(now_us)).unwrap_or_default())
 }
 
-/// Returns the next sample for a calibration; collects readings, or not, from now on.
+/// Returns the next sample for a calibration or a station; collects readings, or not, from now on.
 pub(crate) fn raw(collects: bool) -> Option<RawSample> {
     let collected = CALIBRATES.swap(collects, Ordering::Relaxed);
     RAW.lock(|raw| {

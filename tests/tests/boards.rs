@@ -57,6 +57,28 @@ fn every_board_is_a_folder_and_meets_the_firmware_once() {
     }
 }
 
+/// A page for each, listed in the book, with what its owner needs.
+#[test]
+fn every_board_has_a_page() {
+    let contents = fs::read_to_string(root().join("docs/SUMMARY.md")).unwrap();
+    let folders = fs::read_dir(root().join("boards")).unwrap().map(|entry| entry.unwrap().path());
+    for folder in folders.filter(|path| path.is_dir() && !path.ends_with("emulated")) {
+        let name = folder.file_name().unwrap().to_str().unwrap();
+        assert!(contents.contains(&format!("(boards/{name}.md)")), "{name}");
+        let page = fs::read_to_string(root().join(format!("docs/boards/{name}.md"))).unwrap();
+        for wanted in [
+            "\n## What works\n".to_owned(),
+            "\n## First steps, propellers off\n".to_owned(),
+            format!("cargo xtask flash {name} --vehicle "),
+            "bring-up --connect serial:/dev/tty".to_owned(),
+            "\n## What has run where\n".to_owned(),
+            "run on silicon yet".to_owned(),
+        ] {
+            assert!(page.contains(&wanted), "{name}: {wanted}");
+        }
+    }
+}
+
 /// No board is selected by `#[path]` or conditional compilation, and no chip is named.
 #[test]
 fn the_firmware_knows_no_board() {
@@ -86,7 +108,7 @@ fn the_firmware_knows_no_board() {
 fn the_wiring_is_what_the_board_uses() {
     for (board, page, heading, count) in [
         ("stm32f405", "firmware.md", "\n## Wiring", 8),
-        ("stm32h743", "firmware.md", "\n### Matek H743", 34),
+        ("stm32h743", "boards/stm32h743.md", "\n## Wiring", 34),
         ("pixracer", "boards/pixracer.md", "\n## Wiring", 32),
     ] {
         let text = fs::read_to_string(root().join("docs").join(page)).unwrap();
@@ -165,8 +187,8 @@ fn nothing_is_used_twice() {
     }
 }
 
-/// Pins of one number on all ports have one line of external interrupts: no board uses a line twice, each is that of its
-/// pin, and has the interrupt that the chips' manuals give it (RM0090, RM0433).
+/// Pins of one number on all ports have one line of external interrupts: no board uses a line twice, each is that of
+/// its pin, and has the interrupt that the chips' manuals give it (RM0090, RM0433).
 #[test]
 fn every_line_of_external_interrupts_is_that_of_one_pin() {
     let interrupt = |line: usize| match line {
@@ -321,7 +343,8 @@ fn prioritised(code: &str) -> BTreeMap<String, String> {
 }
 
 /// From Betaflight's descriptions of the boards (`betaflight/config`): the gyroscope's data in, select, interrupt and
-/// alignment, motors 1 to 4, clock and data of the barometer's bus, first LED but for those at the debugger's pins, buzzer.
+/// alignment, motors 1 to 4, clock and data of the barometer's bus, first LED but for those at the
+/// debugger's pins, buzzer.
 #[test]
 fn boards_are_as_betaflight_describes_them() {
     let tables: BTreeMap<_, _> = kinds().0.into_iter().collect();

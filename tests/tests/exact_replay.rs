@@ -7,89 +7,15 @@
     reason = "a test that cannot go on should say why"
 )]
 
-use afbc_hil::Host;
-use afbc_link::telemetry::BatteryStatus;
-use afbc_link::{Address, Command, Datum, FRAME_MAX, Height, ParameterRequest, Sender, Uplink};
+mod exact_flights;
+
 use afbc_onboard::Configuration;
-use afbc_recorder::{FRAME_MAX as RECORD_MAX, Frames, Record, ReplayDifference, ReplayStep, Replayer, write};
-use afbc_scenario::{Scenario, load};
-use afbc_sim::flight::World;
-use afbc_station::AuxSensors;
-use afbc_types::{ROTORS_MAX, RotorSpeeds, State};
+use afbc_recorder::{FRAME_MAX as RECORD_MAX, Frames, Record, ReplayDifference, ReplayStep, Replayer};
+use afbc_scenario::load;
+use exact_flights::{SCENARIO, fly, log_of, records};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
-use std::cell::RefCell;
 use std::path::Path;
-use std::rc::Rc;
-
-const STATION: Address = Address { system: 255, component: 190 };
-/// Types of parameters, as MAV_PARAM_TYPE.
-const INT32: u8 = 6;
-const REAL32: u8 = 9;
-/// From the ground, outdoors.
-const SCENARIO: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../twin/scenarios/hover.toml");
-
-/// What a station sends in this millisecond, if anything: a flight with whatever comes to a tester's mind.
-fn sends(ms: u64, random: &mut Xoshiro256PlusPlus) -> Option<Uplink> {
-    let command = |command| Some(Uplink::Command(command));
-    match ms {
-        500 => return Some(set(b"BAT1_N_CELLS", 3_i32.to_le_bytes(), INT32)),
-        6_000 | 7_000 | 8_000 | 9_000 => return command(Command::Arm),
-        6_300 | 7_300 | 8_300 | 9_300 => return command(Command::TakeOff(Height { metres: 4.0, above: Datum::Home })),
-        18_000 => return command(Command::Land),
-        _ if ms.is_multiple_of(1_000) => return Some(Uplink::Heartbeat),
-        _ => {}
-    }
-    match random.next_u32() % 300 {
-        // Parameters alone before it flies.
-        number if ms < 9_500 && number != 4 => None,
-        0 => command(Command::Speed(1.0 + (random.next_u32() % 5) as f32)),
-        1 => command(Command::Engage),
-        2 => command(Command::SelectStandardMode((random.next_u32() % 8) as u8)),
-        3 => command(Command::Home(None)),
-        4 => {
-            let speed_m_s = 2.0_f32 + (random.next_u32() % 9) as f32;
-            Some(set(b"MPC_XY_VEL_MAX", speed_m_s.to_le_bytes(), REAL32))
-        }
-        5 => Some(Uplink::State { sent_us: ms * 1_000, state: State::default(), sigmas: Default::default() }),
-        6 if ms > 12_000 => command(Command::Return),
-        _ => None,
-    }
-}
-
-/// Sets a parameter.
-fn set(name: &[u8], value: [u8; 4], kind: u8) -> Uplink {
-    let mut letters = [0; 16];
-    letters.iter_mut().zip(name).for_each(|(to, from)| *to = *from);
-    Uplink::Parameter(ParameterRequest::Set { name: letters, value, kind })
-}
-
-/// Flies, with noise on the link, and returns the log.
-fn fly(scenario: &Scenario, seed: u64, ticks: u64) -> Vec<u8> {
-    let (log, mut host) = (Rc::new(RefCell::new(Vec::new())), Host::new().unwrap());
-    let sink = Rc::clone(&log);
-    host.record(move |frame| sink.borrow_mut().extend_from_slice(frame));
-    let battery = BatteryStatus { voltage_mv: 12_500, current_ca: 500, ..BatteryStatus::default() };
-    host.comms().set_aux_sensors(AuxSensors { battery: Some(battery), ..AuxSensors::default() });
-    let mut world = World::released(&Scenario { seed, ..scenario.clone() }, 1e-3).unwrap();
-    let (mut random, mut sender) = (Xoshiro256PlusPlus::seed_from_u64(seed), Sender::new(STATION));
-    let (mut speeds, mut buffer) = (RotorSpeeds::<ROTORS_MAX>::default(), [0; FRAME_MAX]);
-    for ms in 0..ticks {
-        world.advance(&speeds);
-        world.look();
-        host.sense(&world.readings().copied().unwrap_or_default());
-        let mut bytes =
-            sends(ms, &mut random).map_or(Vec::new(), |message| sender.send(&message, &mut buffer).to_vec());
-        if random.next_u32() % 50 == 0 {
-            bytes.extend((0..random.next_u32() % 40).map(|_| random.next_u32() as u8));
-        }
-        // Late ticks, too.
-        let tick = host.tick(&bytes, 1_000 * (ms + 1) + u64::from(random.next_u32() % 20), 50.0);
-        speeds = tick.report.motors;
-    }
-    drop(host);
-    Rc::try_unwrap(log).unwrap().into_inner()
-}
 
 /// Flies again; returns the number of ticks and the first difference.
 fn replay(log: &[u8]) -> (u32, Option<ReplayDifference>) {
@@ -104,17 +30,6 @@ fn replay(log: &[u8]) -> (u32, Option<ReplayDifference>) {
     }
     assert!(armed || ticks < 10_000, "it flew");
     (ticks, None)
-}
-
-fn records(log: &[u8]) -> Vec<Record> {
-    let mut frames = Frames::default();
-    let records = log.iter().filter_map(|byte| frames.take(*byte)).collect();
-    assert_eq!(frames.damaged(), 0);
-    records
-}
-
-fn log_of(records: &[Record]) -> Vec<u8> {
-    records.iter().flat_map(|record| write(record, &mut [0; RECORD_MAX]).unwrap().to_vec()).collect()
 }
 
 #[test]
@@ -158,7 +73,7 @@ fn what_differs_is_named() {
                 let (ticks, difference) = replay(&log_of(&changed));
                 assert_eq!(ticks, number);
                 let named =
-                    matches!(difference, Some(ReplayDifference::Given { number: named, .. }) if named == number);
+                    matches!(&difference, Some(ReplayDifference::Given { number: named, .. }) if *named == number);
                 assert!(named, "{difference:?}");
             }
             _ => {

@@ -28,6 +28,8 @@ use rigless::machine::{Board, HostWire, Target};
 use rigless::mcu::Mcu;
 use rigless::snapshot::Store;
 use rigless::soc::stm32f427::Stm32f427;
+use rigless::soc::stm32f427::generated::dma2::{self, s0cr};
+use rigless::soc::stm32f427::generated::i2c3::{self, cr1, cr2};
 use rigless::soc::stm32f427::peripherals::CONTROLLERS;
 use rigless::soc::stm32f427::peripherals::dma::Dma;
 use rigless::soc::stm32f427::peripherals::gpio::Pin;
@@ -64,43 +66,69 @@ static DMA1: LazyLock<Vec<Wiring>> = LazyLock::new(|| {
     CONTROLLERS[0].wiring.iter().copied().chain(timers).collect()
 });
 
-/// The microcontroller, in which DMA serves the motors' timers.
+/// The microcontroller, with what the models of its relative leave out: DMA serves the motors' timers, and an I2C does
+/// not acknowledge the last byte that DMA reads (`LAST`: RM0090, 27.3.7), without which it reads one byte more, which
+/// the next transfer takes for its first.
 #[derive(Debug)]
-pub struct Part(Stm32f427);
+pub struct Part {
+    stm32: Stm32f427,
+    /// Where I2C1 and DMA1 are on its bus.
+    i2c: usize,
+    dma: usize,
+}
 
 impl Part {
     fn new() -> Result<Self, Error> {
-        let mut part = Part(Stm32f427::new()?);
+        let stm32 = Stm32f427::new()?;
+        let [i2c, dma] = [stm32.bus().slot("I2C1")?, stm32.bus().slot("DMA1")?];
+        let mut part = Part { stm32, i2c, dma };
         part.wire();
         Ok(part)
     }
 
+    /// Withholds the acknowledgement of the byte that I2C1 is reading, if it is the last for the stream that DMA1 has
+    /// for it, 0. Asked for before the model is told that the byte has come.
+    fn withhold_acknowledgement(&mut self, slot: usize) {
+        if slot != self.i2c {
+            return;
+        }
+        let bus = self.stm32.bus_mut();
+        let stream = bus.slots()[self.dma].registers();
+        let is_last = s0cr::EN.is_set(stream.get(dma2::Register::S0cr)) && stream.get(dma2::Register::S0ndtr) == 1;
+        let registers = bus.slot_mut(self.i2c).registers_mut();
+        let control = registers.get(i2c3::Register::Cr2);
+        if is_last && cr2::LAST.is_set(control) && cr2::DMAEN.is_set(control) {
+            let control = registers.get(i2c3::Register::Cr1);
+            registers.set(i2c3::Register::Cr1, cr1::ACK.set(control, 0));
+        }
+    }
+
     fn wire(&mut self) {
-        let Part(part) = self;
-        part.dma[0] = Dma::new(&DMA1, CONTROLLERS[0].last_data, CONTROLLERS[0].reaches_memory);
+        self.stm32.dma[0] = Dma::new(&DMA1, CONTROLLERS[0].last_data, CONTROLLERS[0].reaches_memory);
     }
 }
 
 impl Mcu for Part {
     fn bus(&self) -> &Bus {
-        self.0.bus()
+        self.stm32.bus()
     }
 
     fn bus_mut(&mut self) -> &mut Bus {
-        self.0.bus_mut()
+        self.stm32.bus_mut()
     }
 
     fn reset(&mut self, at: VirtualNanos, cause: ResetCause) {
-        self.0.reset(at, cause);
+        self.stm32.reset(at, cause);
         self.wire();
     }
 
     fn poll(&mut self, now: VirtualNanos) {
-        self.0.poll(now);
+        self.stm32.poll(now);
     }
 
     fn split(&mut self, slot: usize) -> (&mut Bus, Option<&mut dyn ErasedDevice>) {
-        self.0.split(slot)
+        self.withhold_acknowledgement(slot);
+        self.stm32.split(slot)
     }
 }
 
@@ -146,7 +174,7 @@ impl SpeedyBeeF405V4 {
             handed: Handed::default(),
             sensed: AT_REST,
         };
-        let Part(part) = &mut board.mcu;
+        let part = &mut board.mcu.stm32;
         part.rcc.attach_crystals(CRYSTAL_HZ, 0);
         part.set_supply(RAIL_MV);
         let (port, pin) = SELECT;
@@ -206,13 +234,13 @@ impl Board for SpeedyBeeF405V4 {
     fn attach_host(&mut self, name: &str, peer: Box<dyn Peer>) -> bool {
         let is_link = name == LINK_WIRE.name;
         if is_link {
-            self.mcu.0.usart[LINK].attach_boxed(peer);
+            self.mcu.stm32.usart[LINK].attach_boxed(peer);
         }
         is_link
     }
 
     fn host_mut(&mut self, name: &str) -> Option<&mut dyn Peer> {
-        if name == LINK_WIRE.name { self.mcu.0.usart[LINK].peer_mut() } else { None }
+        if name == LINK_WIRE.name { self.mcu.stm32.usart[LINK].peer_mut() } else { None }
     }
 }
 
@@ -237,15 +265,15 @@ impl Edge for SpeedyBeeF405V4 {
 
     fn place(&mut self, chip: usize) -> Option<&mut dyn Placed> {
         match chip {
-            0 => self.mcu.0.spi[IMU].place_mut(0),
-            1 => self.mcu.0.usart[RECEIVER].place_mut(),
+            0 => self.mcu.stm32.spi[IMU].place_mut(0),
+            1 => self.mcu.stm32.usart[RECEIVER].place_mut(),
             _ => None,
         }
     }
 
     fn sense(&mut self, signals: &Signals) {
         self.sensed = *signals;
-        let SpeedyBeeF405V4 { mcu: Part(part), conditions, handed, .. } = self;
+        let SpeedyBeeF405V4 { mcu: Part { stm32: part, .. }, conditions, handed, .. } = self;
         let imu: &mut Icm42688p = part.spi[IMU].chip_mut(0).expect("attached");
         let [x, y, z] = of_imu(handed.rate.hand(signals.angular_rate, &conditions.icm42688p_rate));
         imu.set_rate(x, y, z);
@@ -268,7 +296,7 @@ impl Edge for SpeedyBeeF405V4 {
 
     fn condition(&mut self, conditions: &Conditions) {
         self.conditions = *conditions;
-        let Part(part) = &mut self.mcu;
+        let part = &mut self.mcu.stm32;
         let are_there = [
             part.spi[IMU].silence(0, conditions.icm42688p_silent),
             part.i2c[I2C].silence(BAROMETER, conditions.dps310_silent),
@@ -283,7 +311,7 @@ impl Edge for SpeedyBeeF405V4 {
     }
 
     fn drive(&mut self) -> Outputs<4> {
-        let Part(part) = &mut self.mcu;
+        let part = &mut self.mcu.stm32;
         Outputs(MOTORS.map(|(name, timer, channel)| {
             let (timer, registers) = part.timer(timer);
             Actuator::on(name, timer.pulse(Channel::new(channel).expect("one of four"), registers), CURVE)
@@ -324,6 +352,6 @@ impl Machine for SpeedyBeeF405V4 {
     }
 
     fn attach_receiver(&mut self, receiver: Box<dyn Peer>) {
-        self.mcu.0.usart[RECEIVER].attach_boxed(receiver);
+        self.mcu.stm32.usart[RECEIVER].attach_boxed(receiver);
     }
 }

@@ -1,4 +1,5 @@
-//! Links, motors and watchdog of an STM32H743VI with the pins of the Matek H743; `docs/firmware.md` shows the wiring.
+//! Links, motors and watchdog of an STM32H743VI with the pins of the Matek H743; `docs/boards/stm32h743.md` shows
+//! the wiring.
 //!
 //! | what | where |
 //! |---|---|
@@ -10,8 +11,8 @@
 //! | motors 5 to 8 (S7 to S10) | TIM4, channels 1 to 4: PD12, PD13, PD14, PD15; driven by DMA1's stream 1 |
 //! | memory | `memory.x` beside this folder |
 //! | parameters | sectors 0 and 1 of the flash's second bank |
-//! | first IMU | ICM-42688-P on SPI1: SCK on PA5, MISO on PA6, MOSI on PD7, select PC15, interrupt PB2; turned by 180 degrees |
-//! | second IMU | ICM-42605 on SPI4: SCK on PE12, MISO on PE13, MOSI on PE14, select PC13, interrupt PE15; turned by 270 degrees |
+//! | first IMU | ICM-42688-P, SPI1: SCK PA5, MISO PA6, MOSI PD7, select PC15, interrupt PB2; turned by 180 degrees |
+//! | second IMU | ICM-42605, SPI4: SCK PE12, MISO PE13, MOSI PE14, select PC13, interrupt PE15; turned by 270 degrees |
 //! | barometer | DPS310 on I2C2 at 0x76: SCL on PB10, SDA on PB11 |
 //! | compass | QMC5883L on I2C1, outside: SCL on PB6, SDA on PB7 |
 //! | battery | voltage on PC0, current on PC1: ADC1 |

@@ -197,3 +197,14 @@ fn what_has_settled_is_zero_or_normal_and_else_as_it_was() {
         assert!(error <= 6e-33 + 1.2e-7 * x, "{x:e}: {error:e}");
     }
 }
+
+#[test]
+fn what_is_limited_is_as_it_was_within_the_limit_and_else_on_it() {
+    let clamped = |x: f32, most: f32| f64::from(x).clamp(-f64::from(most), f64::from(most)) as f32;
+    for x in bit_sweep(997).chain([f32::INFINITY, f32::NEG_INFINITY]) {
+        for most in [0.1, 10.0, 1e5_f32.next_down(), x.abs(), x.abs().next_up().min(f32::MAX)] {
+            assert_eq!(math::limited(x, most), clamped(x, most), "{x:e} within {most:e}");
+        }
+    }
+    assert_eq!(math::limited(f32::NAN, 3.0), -3.0);
+}

@@ -23,9 +23,9 @@ impl<E: Edge> Edge for &mut E {
 /// once in a period of the board's clock, at the first edge after its beginning: so no reading is left out and none is
 /// there twice. Either reading has the time of its edge.
 ///
-/// When no edge comes within two periods, the part is read by the clock, at the beginning of each period, without a time
-/// of its own, until there is an edge again. An edge that comes within a quarter of the time of a sample after the last
-/// one is noise on the wire, and counts as none.
+/// When no edge comes within two periods, the part is read by the clock, at the beginning of each period, without a
+/// time of its own, until there is an edge again. An edge that comes within a quarter of the time of a sample after the
+/// last one is noise on the wire, and counts as none.
 #[derive(Debug)]
 pub struct DataReady<E, C> {
     edge: E,

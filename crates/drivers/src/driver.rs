@@ -92,6 +92,11 @@ impl<P: SensorPart, B: Registers, T: PartTiming> Driver<P, B, T> {
         result
     }
 
+    /// Has it set up by the next reading, without a pause.
+    pub(crate) fn forget(&mut self) {
+        (self.is_up, self.faults, self.equals, self.ready_us) = (false, 0, 0, None);
+    }
+
     async fn attempt(&mut self) -> Result<Stamped<P::Reading>, PartFault> {
         if !self.is_up {
             if self.faults > 0 {
@@ -108,7 +113,7 @@ impl<P: SensorPart, B: Registers, T: PartTiming> Driver<P, B, T> {
     }
 
     /// Runs the set-up, and reads back what was set.
-    async fn set_up(&mut self) -> Result<(), PartFault> {
+    pub(crate) async fn set_up(&mut self) -> Result<(), PartFault> {
         for step in P::SETUP {
             self.step(step).await?;
         }
@@ -157,7 +162,7 @@ impl<P: SensorPart, B: Registers, T: PartTiming> Driver<P, B, T> {
         })
     }
 
-    async fn step(&mut self, step: &Step) -> Result<Option<Stamped<P::Reading>>, PartFault> {
+    pub(crate) async fn step(&mut self, step: &Step) -> Result<Option<Stamped<P::Reading>>, PartFault> {
         match *step {
             Step::Identify(register, identities) => {
                 let identity = self.byte(register).await?;
@@ -196,7 +201,7 @@ impl<P: SensorPart, B: Registers, T: PartTiming> Driver<P, B, T> {
         transfer(&self.timing, bytes.len(), self.bus.write(register, bytes)).await
     }
 
-    async fn byte(&mut self, register: u8) -> Result<u8, PartFault> {
+    pub(crate) async fn byte(&mut self, register: u8) -> Result<u8, PartFault> {
         let mut answer = [0];
         transfer(&self.timing, answer.len(), self.bus.read(register, &mut answer)).await?;
         let [byte] = answer;

@@ -1,12 +1,13 @@
 //! TDK ICM-42688-P and ICM-42605, by SPI (DS-000347 and DS-000292, both with the same registers).
 //!
 //! +-2000 deg/s and +-16 g, each behind the part's own second-order filter of 250 Hz, which is also the anti-alias
-//! filter for readings at 1 kHz. The interrupt INT1 is a pulse, active high, for each sample. The part measures at 1 kHz
-//! or, for readings by the board's clock, at 4 kHz, so that a reading is never older than 0.25 ms.
+//! filter for readings at 1 kHz. The interrupt INT1 is a pulse, active high, for each sample. The part measures at 1
+//! kHz or, for readings by the board's clock, at 4 kHz, so that a reading is never older than 0.25 ms.
 
 use crate::bus::SpiFormat;
 use crate::part::{PartFault, SensorPart, Step};
 use crate::reading::{InertialReading, big};
+use crate::self_test::{SelfTestResponse, SelfTestScript, SelfTested, as_at_the_factory, numbers};
 
 /// ICM-42688-P.
 pub type Icm42688p<const POLLED: bool = false> = Icm426xx<0x47, POLLED>;
@@ -28,8 +29,12 @@ const ACCEL_CONFIG0: u8 = 0x50;
 const GYRO_ACCEL_CONFIG0: u8 = 0x52;
 const INT_CONFIG1: u8 = 0x64;
 const INT_SOURCE0: u8 = 0x65;
+const SELF_TEST_CONFIG: u8 = 0x70;
 const WHO_AM_I: u8 = 0x75;
 const REG_BANK_SEL: u8 = 0x76;
+/// Of bank 1 and of bank 2.
+const XG_ST_DATA: u8 = 0x5F;
+const XA_ST_DATA: u8 = 0x3B;
 
 /// Length of temperature, specific force and rates.
 const LENGTH: usize = 14;
@@ -37,6 +42,31 @@ const LENGTH: usize = 14;
 const INVALID: f32 = -32768.0;
 const RAD_S_PER_LSB: f32 = 2000.0 / 32768.0 * core::f32::consts::PI / 180.0;
 const M_S2_PER_LSB: f32 = 16.0 / 32768.0 * 9.806_65;
+
+/// Self-test, by TDK's own driver for the family: 250 deg/s and 2 g, all six axes at once; what the factory has
+/// written is in banks 1 and 2.
+impl<const IDENTITY: u8, const POLLED: bool> SelfTested for Icm426xx<IDENTITY, POLLED> {
+    const SELF_TEST: SelfTestScript = SelfTestScript {
+        quiet: &[
+            Step::Write(GYRO_CONFIG0, if POLLED { 0x64 } else { 0x66 }),
+            Step::Write(ACCEL_CONFIG0, if POLLED { 0x64 } else { 0x66 }),
+            Step::Wait(60_000),
+        ],
+        trims: &[(Step::Write(REG_BANK_SEL, 1), XG_ST_DATA), (Step::Write(REG_BANK_SEL, 2), XA_ST_DATA)],
+        between: &[Step::Write(REG_BANK_SEL, 0)],
+        stimulated: &[Step::Write(SELF_TEST_CONFIG, 0x7F), Step::Wait(200_000)],
+        skipped: 2,
+        averaged: 100,
+    };
+
+    fn axes(reading: &InertialReading) -> [f32; 6] {
+        numbers(reading)
+    }
+
+    fn passes(response: &SelfTestResponse) -> bool {
+        as_at_the_factory(response, [0.05, 1.2])
+    }
+}
 
 impl<const IDENTITY: u8, const POLLED: bool> SensorPart for Icm426xx<IDENTITY, POLLED> {
     type Reading = InertialReading;

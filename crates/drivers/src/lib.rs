@@ -47,6 +47,7 @@ pub mod nmea;
 mod part;
 pub mod qmc5883l;
 mod reading;
+pub mod self_test;
 pub mod ublox;
 
 pub use bus::{BusError, I2cRegisters, READ_MAX, Registers, SpiFormat, SpiRegisters};

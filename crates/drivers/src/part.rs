@@ -25,8 +25,8 @@ pub enum Step {
     Await(u8, u8, u8, u32),
     /// Waits so long \[us\].
     Wait(u32),
-    /// Waits for the part's interrupt, at most so long \[us\], which is twice the time of a sample; without one, for that
-    /// time.
+    /// Waits for the part's interrupt, at most so long \[us\], which is twice the time of a sample; without one, for
+    /// that time.
     Ready(u32),
 }
 

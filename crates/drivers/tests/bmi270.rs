@@ -31,6 +31,8 @@ struct Registers {
     rates_deg_s: [f64; 3],
     force_g: [f64; 3],
     temperature_c: f64,
+    /// How far the self-test pushes each axis to a side \[g\].
+    pushes_g: [f64; 3],
 }
 
 impl Registers {
@@ -48,6 +50,7 @@ impl Registers {
             rates_deg_s: [10.0, -250.0, 500.0],
             force_g: [0.1, -0.2, 1.0],
             temperature_c: 31.0,
+            pushes_g: [8.6, -8.1, 5.4],
         };
         part.reset(0);
         part
@@ -75,7 +78,12 @@ impl Registers {
         let gyr = 32768.0 / (2000.0 / f64::from(1 << (self.registers[0x43] & 7)));
         for axis in 0..3 {
             if on(1, 2_000) {
-                let lsb = self.force_g[axis] * acc + 6.0 * noise(now_us, axis as u64);
+                let push = match self.registers[0x6D] & 0b1101 {
+                    0b1101 => self.pushes_g[axis],
+                    0b1001 => -self.pushes_g[axis],
+                    _ => 0.0,
+                };
+                let lsb = (self.force_g[axis] + push) * acc + 6.0 * noise(now_us, axis as u64);
                 numbers[axis] = lsb.round().clamp(-32768.0, 32767.0) as i16;
             }
             if on(0, 45_000) {
@@ -178,6 +186,27 @@ impl Model for Registers {
             self.registers[0x58] & 4 != 0 && self.registers[0x53] & 0b1110 == 0b1010 && self.registers[0x55] == 0;
         let on = self.status(now_us) == 1 && self.on_us.iter().any(Option::is_some);
         (routed && on).then(|| (now_us / self.period_us() + 1) * self.period_us())
+    }
+}
+
+/// The least differences of the data sheet: 16, -15 and 10 g.
+#[test]
+fn its_self_test_passes_when_it_is_pushed_far_enough() {
+    for (pushes_g, passes) in [
+        ([8.1, -7.6, 5.1], true),
+        ([7.9, -7.6, 5.1], false),
+        ([8.1, -7.4, 5.1], false),
+        ([8.1, -7.6, 4.9], false),
+        ([8.1, 7.6, 5.1], false),
+        ([0.0; 3], false),
+    ] {
+        let rig = Rig::new(Registers::new(0x24));
+        rig.with(|part| part.pushes_g = pushes_g);
+        let mut driver = rig.driver(Bmi270::default());
+        let result = block_on(driver.self_test());
+        assert_eq!(result, if passes { Ok(()) } else { Err(PartFault::SelfTest) }, "{pushes_g:?}");
+        let (readings, faults) = run(&mut driver, &rig, 300_000);
+        assert!(faults.is_empty() && readings.len() > 200 && readings.iter().all(|reading| right(&reading.value)));
     }
 }
 

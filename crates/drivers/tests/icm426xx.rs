@@ -3,9 +3,10 @@
 
 mod rig;
 
-use afbc_drivers::InertialReading;
 use afbc_drivers::icm426xx::{Icm42605, Icm42688p};
-use rig::{Model, Rig, noise, reads, refuses_another, run, survives_all_troubles};
+use afbc_drivers::{InertialReading, PartFault};
+use embassy_futures::block_on;
+use rig::{Model, Rig, Trouble, noise, reads, refuses_another, run, survives_all_troubles};
 
 /// Bank 0; other banks are selected and then left alone.
 struct Registers {
@@ -16,12 +17,17 @@ struct Registers {
     on_us: [Option<u64>; 2],
     rates_deg_s: [f64; 3],
     force_g: [f64; 3],
+    /// What the factory has written of the self-test, and how much of it each axis responds.
+    trims: [[u8; 3]; 2],
+    responds: [f64; 6],
 }
 
 impl Registers {
     fn new(identity: u8) -> Self {
         let (rates_deg_s, force_g) = ([10.0, -250.0, 0.5], [0.1, -0.2, 1.0]);
-        let mut part = Registers { identity, bank: 0, registers: [0; 128], on_us: [None; 2], rates_deg_s, force_g };
+        let (trims, responds) = ([[110, 97, 130], [140, 1, 120]], [1.0; 6]);
+        let (registers, on_us) = ([0; 128], [None; 2]);
+        let mut part = Registers { identity, bank: 0, registers, on_us, rates_deg_s, force_g, trims, responds };
         part.reset(0);
         part
     }
@@ -49,11 +55,17 @@ impl Registers {
         let on = |at: usize, start_us: u64| self.on_us[at].is_some_and(|on_us| now_us >= on_us + start_us);
         for axis in 0..3 {
             if on(1, 10_000) {
-                let lsb = self.force_g[axis] * Self::scale(self.registers[0x50], 16.0);
+                let responds = self.registers[0x70] & 0x40 != 0 && self.registers[0x70] >> (3 + axis) & 1 != 0;
+                let more_g =
+                    if responds { self.responds[3 + axis] * factory(self.trims[1][axis]) / 16384.0 } else { 0.0 };
+                let lsb = (self.force_g[axis] + more_g) * Self::scale(self.registers[0x50], 16.0);
                 numbers[1 + axis] = (lsb + 8.0 * noise(now_us, axis as u64)).round().clamp(-32767.0, 32767.0) as i16;
             }
             if on(0, 30_000) {
-                let lsb = self.rates_deg_s[axis] * Self::scale(self.registers[0x4F], 2000.0);
+                let responds = self.registers[0x70] >> axis & 1 != 0;
+                let more_deg_s =
+                    if responds { self.responds[axis] * factory(self.trims[0][axis]) / 131.0 } else { 0.0 };
+                let lsb = (self.rates_deg_s[axis] + more_deg_s) * Self::scale(self.registers[0x4F], 2000.0);
                 numbers[4 + axis] =
                     (lsb + 2.0 * noise(now_us, 4 + axis as u64)).round().clamp(-32767.0, 32767.0) as i16;
             }
@@ -78,6 +90,8 @@ impl Model for Registers {
                 (0x75, 0) => self.identity,
                 (0x1D..=0x2A, 0) => self.data(now_us)[register - 0x1D],
                 (_, 0) => self.registers[register],
+                (0x5F..=0x61, 1) => self.trims[0][register - 0x5F],
+                (0x3B..=0x3D, 2) => self.trims[1][register - 0x3B],
                 _ => 0,
             };
         }
@@ -116,6 +130,42 @@ impl Model for Registers {
         let on = self.on_us.iter().any(Option::is_some);
         (routed && on).then(|| (now_us / self.period_us() + 1) * self.period_us())
     }
+}
+
+/// The response, in numbers at 250 deg/s and 2 g, that a byte of the factory's stands for.
+fn factory(trim: u8) -> f64 {
+    2620.0 * 1.01_f64.powi(i32::from(trim) - 1)
+}
+
+#[test]
+fn its_self_test_passes_as_at_the_factory_and_the_part_reads_on() {
+    // A rate responds by half at least, a force by half to one and a half.
+    for (axis, response, passes) in [
+        (0, 1.0, true),
+        (1, -0.55, true),
+        (2, 0.45, false),
+        (2, 1.9, true),
+        (3, 0.45, false),
+        (4, -0.55, true),
+        (5, 1.45, true),
+        (5, 1.55, false),
+        (3, 0.0, false),
+    ] {
+        let rig = Rig::new(Registers::new(0x47));
+        rig.with(|part| (part.rates_deg_s, part.responds[axis]) = ([1.0, -19.0, 0.5], response));
+        let mut driver = rig.driver(Icm42688p::<false> {});
+        let result = block_on(driver.self_test());
+        assert_eq!(result, if passes { Ok(()) } else { Err(PartFault::SelfTest) }, "{axis}: {response}");
+        let (readings, faults) = run(&mut driver, &rig, 200_000);
+        let right = |reading: &InertialReading| reads(reading, [1.0, -19.0, 0.5], [0.1, -0.2, 1.0], 31.0);
+        assert!(faults.is_empty() && readings.len() > 100 && readings.iter().all(|reading| right(&reading.value)));
+    }
+    // One that turns, and one that does not answer.
+    let rig = Rig::new(Registers::new(0x47));
+    rig.with(|part| part.rates_deg_s = [0.0, 0.0, 25.0]);
+    assert_eq!(block_on(rig.driver(Icm42688p::<true> {}).self_test()), Err(PartFault::SelfTest));
+    rig.set(Trouble::Reads(0xFF));
+    assert_eq!(block_on(rig.driver(Icm42688p::<true> {}).self_test()), Err(PartFault::Silent));
 }
 
 fn right(reading: &InertialReading) -> bool {

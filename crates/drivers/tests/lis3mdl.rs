@@ -5,6 +5,7 @@ mod rig;
 
 use afbc_drivers::lis3mdl::Lis3mdl;
 use afbc_drivers::{MagneticReading, PartFault};
+use embassy_futures::block_on;
 use nalgebra::Vector3;
 use rig::{Model, Rig, noise, refuses_another, run, survives_all_troubles};
 
@@ -16,11 +17,20 @@ struct Registers {
     since_us: u64,
     measured: u64,
     field_ut: [f64; 3],
+    /// The field of the self-test.
+    own_ut: [f64; 3],
 }
 
 impl Registers {
     fn new() -> Self {
-        let mut part = Registers { identity: 0x3D, registers: [0; 64], since_us: 0, measured: 0, field_ut: FIELD_UT };
+        let mut part = Registers {
+            identity: 0x3D,
+            registers: [0; 64],
+            since_us: 0,
+            measured: 0,
+            field_ut: FIELD_UT,
+            own_ut: [200.0, 200.0, 50.0],
+        };
         part.reset(0);
         part
     }
@@ -41,7 +51,8 @@ impl Registers {
             // Worse modes are noisier.
             let mode = if axis == 2 { self.registers[0x23] >> 2 } else { self.registers[0x20] >> 5 } & 3;
             let noise_ut = 0.4 * f64::from(4 - mode) * noise(now_us, axis as u64);
-            let lsb = ((self.field_ut[axis] + noise_ut) / 100.0 * lsb_per_gauss).round();
+            let own_ut = if self.registers[0x20] & 1 != 0 { self.own_ut[axis] } else { 0.0 };
+            let lsb = ((self.field_ut[axis] + own_ut + noise_ut) / 100.0 * lsb_per_gauss).round();
             let lsb = lsb.clamp(-32768.0, 32767.0) as i16;
             let bytes = if self.registers[0x23] & 2 == 0 { lsb.to_le_bytes() } else { lsb.to_be_bytes() };
             self.registers[0x28 + 2 * axis..0x2A + 2 * axis].copy_from_slice(&bytes);
@@ -88,6 +99,28 @@ impl Model for Registers {
 
 fn is_field(reading: &MagneticReading, field_ut: [f64; 3]) -> bool {
     (reading.field_ut - Vector3::from(field_ut.map(|ut| ut as f32))).amax() < 0.45
+}
+
+/// The data sheet's: 1 to 3 gauss along x and y, 0.1 to 1 along z.
+#[test]
+fn its_self_test_passes_within_the_bounds() {
+    for (own_ut, passes) in [
+        ([110.0, 290.0, 12.0], true),
+        ([-110.0, 290.0, 95.0], true),
+        ([90.0, 200.0, 50.0], false),
+        ([200.0, 310.0, 50.0], false),
+        ([200.0, 200.0, 8.0], false),
+        ([200.0, 200.0, 105.0], false),
+        ([0.0; 3], false),
+    ] {
+        let rig = Rig::new(Registers::new());
+        rig.with(|part| part.own_ut = own_ut);
+        let mut driver = rig.driver(Lis3mdl);
+        let result = block_on(driver.self_test());
+        assert_eq!(result, if passes { Ok(()) } else { Err(PartFault::SelfTest) }, "{own_ut:?}");
+        let (readings, faults) = run(&mut driver, &rig, 500_000);
+        assert!(faults.is_empty() && readings.len() > 30 && readings.iter().all(|reading| right(&reading.value)));
+    }
 }
 
 fn right(reading: &MagneticReading) -> bool {

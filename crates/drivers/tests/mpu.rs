@@ -4,7 +4,9 @@
 mod rig;
 
 use afbc_drivers::mpu::{Icm20602, Icm20608, Icm20689, Mpu, Mpu6000, Mpu6500, Mpu9250};
-use afbc_drivers::{InertialReading, SensorPart};
+use afbc_drivers::self_test::SelfTested;
+use afbc_drivers::{InertialReading, PartFault, SensorPart};
+use embassy_futures::block_on;
 use nalgebra::Vector3;
 use rig::mpu_registers::Registers;
 use rig::{Rig, reads, refuses_another, run, survives_all_troubles};
@@ -75,4 +77,61 @@ fn icm_20608() {
 fn icm_20689() {
     is_right::<0x98>();
     assert_eq!((Icm20689::NAME, Icm20689::SPI.map(|spi| spi.clock_hz)), ("ICM-20689", Some(8_000_000)));
+}
+
+fn tested<P: SelfTested>(part: P, identity: u8, trims: [[u8; 4]; 2], responses: [f64; 6]) -> Result<(), PartFault> {
+    let rig = Rig::new(Registers::new(identity));
+    rig.with(|part| (part.trims, part.responses, part.rates_deg_s) = (trims, responses, [1.0, -19.0, 0.5]));
+    let mut driver = rig.driver(part);
+    let result = block_on(driver.self_test());
+    let (readings, faults) = run(&mut driver, &rig, 500_000);
+    assert!(faults.is_empty() && readings.len() > 100, "it reads on: {faults:?}");
+    result
+}
+
+/// RM-MPU-6000A: 25 deg/s and 0.34 g, times powers; y of the rates is negative.
+#[test]
+fn the_self_test_of_the_mpu_6000_passes_within_14_percent() {
+    // XG 17, YG 1, ZG 31; XA 22 = 0b10110, YA 9 = 0b01001, ZA 31.
+    let trims = [[0; 4], [0b101 << 5 | 17, 0b010 << 5 | 1, 0b111 << 5 | 31, 0b10 << 4 | 0b01 << 2 | 0b11]];
+    let force = |number: i32| 0.34 * (0.92_f64 / 0.34).powf(f64::from(number - 1) / 30.0);
+    let expected = [25.0 * 1.046_f64.powi(16), -25.0, 25.0 * 1.046_f64.powi(30), force(22), force(9), force(31)];
+    let with = |axis: usize, factor: f64| {
+        let mut responses = expected;
+        responses[axis] *= factor;
+        tested(Mpu6000 {}, 0x68, trims, responses)
+    };
+    for axis in 0..6 {
+        for (factor, passes) in [(1.0, true), (0.87, true), (1.13, true), (0.85, false), (1.15, false), (0.0, false)] {
+            let result = with(axis, factor);
+            assert_eq!(result, if passes { Ok(()) } else { Err(PartFault::SelfTest) }, "{axis}: {factor}");
+        }
+    }
+}
+
+/// AN-MPU-9250A-03: a rate by more than half of what the factory found, a force by half to one and a half; without what
+/// the factory found, 60 deg/s, and 0.225 to 0.675 g.
+#[test]
+fn the_self_test_of_the_mpu_6500_and_mpu_9250_passes_as_at_the_factory() {
+    let number = |trim: i32| 2620.0 * 1.01_f64.powi(trim - 1);
+    let trims = [[150, 99, 200, 0], [60, 1, 120, 0]];
+    let [x, y, z] = [150, 99, 200].map(|trim| number(trim) / 131.0);
+    let [fx, fy, fz] = [60, 1, 120].map(|trim| number(trim) / 16384.0);
+    let expected = [x, y, z, fx, fy, fz];
+    for axis in 0..6 {
+        for (factor, passes) in [(1.0, true), (0.55, true), (0.45, false), (1.45, true), (1.55, axis < 3), (0.0, false)]
+        {
+            let mut responses = expected;
+            responses[axis] *= factor;
+            let result = tested(Mpu9250 {}, 0x71, trims, responses);
+            assert_eq!(result, if passes { Ok(()) } else { Err(PartFault::SelfTest) }, "{axis}: {factor}");
+        }
+    }
+    for (rate, force, passes) in
+        [(62.0, 0.23, true), (58.0, 0.5, false), (62.0, 0.22, false), (62.0, 0.68, false), (-90.0, -0.67, true)]
+    {
+        let responses = [rate, rate, rate, force, force, force];
+        let result = tested(Mpu6500 {}, 0x70, [[0; 4]; 2], responses);
+        assert_eq!(result, if passes { Ok(()) } else { Err(PartFault::SelfTest) }, "{rate}, {force}");
+    }
 }

@@ -131,9 +131,7 @@ impl Estimator {
         }
         let any = parts.iter().any(Option::is_some);
         if any {
-            // Each by itself, since the copy of a large array is a call of a slow loop.
-            let [first, second] = parts;
-            memory.fix = Some(Fix { at_us, past, parts: [first, second], next: 0, nis: 0.0 });
+            memory.fix = Some(Fix { at_us, past, parts, next: 0, nis: 0.0 });
         }
         any
     }

@@ -93,8 +93,8 @@ impl Inbox {
         }
     }
 
-    /// Marks whether an armed vehicle on the ground rests there: its motors idle, and the law does not fly, until the
-    /// mark is taken away. It has no effect in the air.
+    /// Marks whether an armed vehicle rests on the ground: its motors idle, and the law does not fly, until the mark is
+    /// taken away. A vehicle that counts as airborne, which has just touched the ground, keeps what its law has learnt.
     pub fn set_idle_on_ground(&mut self, idle_on_ground: bool) {
         self.idle_on_ground = Some(idle_on_ground);
     }

@@ -277,8 +277,13 @@ impl<C: FlightController<N>, const N: usize> FlightCore<C, N> {
 
         // Controls.
         let action = match flight {
-            Some(flight) if mode.armed() && !arms && inbox.idle_on_ground() && !observed.airborne => {
-                flight.rest(&self.dead_reckoning, fresh.or(position_lost.as_ref()));
+            Some(flight) if mode.armed() && !arms && inbox.idle_on_ground() => {
+                if observed.airborne {
+                    // It touches the ground, or the law goes on with what it knows.
+                    flight.applied = Inputs::default();
+                } else {
+                    flight.rest(&self.dead_reckoning, fresh.or(position_lost.as_ref()));
+                }
                 self.open_loop(flight, Inputs::default())
             }
             Some(flight) if mode.armed() && !arms => {

@@ -52,7 +52,7 @@ pub struct GuidanceInputs<'a> {
 pub struct Guided {
     /// Setpoint for the flight core; none without a state.
     pub setpoint: Option<Setpoint>,
-    /// True if the vehicle is armed and stays on the ground: its motors idle.
+    /// True if the vehicle is armed and stays on the ground, or touches it to land: its motors idle.
     pub idle_on_ground: bool,
     /// A request to the flight core, repeated until it is granted.
     pub request: Option<Request>,

@@ -211,70 +211,47 @@ fn a_takeoff_without_lift_is_given_up() {
     assert!(takes_off(false, None, 1.1 * LEFT_M).0.is_some());
 }
 
-/// A landing vehicle that stays above its setpoint stands on the ground: for a while it is asked for less thrust where
-/// it stands, level. Without an inertial sensor its motion follows from its thrust, and this is left out.
+/// A landing vehicle that stays above its setpoint stands on the ground: its motors idle for a while, unless it falls.
+/// Without an inertial sensor its motion follows from its thrust, and a descent of the flight core has a setpoint of
+/// its own: then this is left out.
 #[test]
-fn a_touch_settles_a_landing_vehicle() {
-    // Ticks after which it settles and after which this ends, of a vehicle that stops sinking and then has this
-    // velocity.
-    let settles = |inertial: bool, velocity_z: f32, mode: FlightMode| {
+fn a_touch_idles_the_motors_of_a_landing_vehicle() {
+    // Ticks after which the motors idle, and number of ticks for which they do, of a vehicle that stops sinking, has
+    // this velocity until they idle, and then that one.
+    let idles = |inertial: bool, core: Mode, [before, after]: [f32; 2], mode: FlightMode| {
         let mut fixture = Fixture::flying(Settings::DEFAULT);
         fixture.sensors.inertial = inertial;
         fixture.select(mode).unwrap();
         fixture.run(4000);
+        fixture.core = core;
         fixture.follows = false;
         let mut state = fixture.state.unwrap();
-        state.velocity_m_s = Vector3::new(0.1, 0.2, velocity_z);
-        state.attitude_rad.z = 0.3;
-        fixture.state = Some(state);
-        let settled = Setpoint {
-            position_m: state.position_m,
-            velocity_m_s: state.velocity_m_s,
-            acceleration_m_s2: Vector3::new(0.0, 0.0, -0.7 * G),
-            yaw_rad: 0.3,
-            ..Setpoint::default()
-        };
-        let is_settled: Vec<bool> = (0..5000)
-            .map(|_| {
-                let found = fixture.setpoint();
-                // What the rotors give beyond it is subtracted.
-                let [[x, y, z]] = found.acceleration_m_s2.data.0;
-                let is_level = x.hypot(y) < 1e-4 && z <= settled.acceleration_m_s2.z;
-                is_level && Setpoint { acceleration_m_s2: settled.acceleration_m_s2, ..found } == settled
-            })
-            .collect();
-        let first = is_settled.iter().position(|settled| *settled);
-        (first, is_settled.iter().filter(|settled| **settled).count())
+        state.attitude_rad = Vector3::new(0.4, -0.3, 0.3);
+        state.velocity_m_s = Vector3::new(0.1, 0.2, before);
+        let (mut first, mut count) = (None, 0);
+        for tick in 0..5000 {
+            state.velocity_m_s.z = if first.is_some() { after } else { before };
+            fixture.state = Some(state);
+            let guided = fixture.tick();
+            if guided.idle_on_ground {
+                first.get_or_insert(tick);
+                count += 1;
+            }
+        }
+        (first, count)
     };
+    let land = |velocities: [f32; 2]| idles(false, Mode::Flying, velocities, FlightMode::Land);
     // It falls behind by 0.3 m within some 0.4 s at 0.7 m/s, and 0.1 s count.
-    let (first, count) = settles(false, 0.0, FlightMode::Land);
+    let (first, count) = land([0.0; 2]);
     assert!(first.is_some_and(|first| (450..700).contains(&first)), "{first:?}");
     assert!((2990..=3010).contains(&count), "{count}");
-    assert!(settles(false, -0.55, FlightMode::Land).0.is_some());
-    assert_eq!(settles(false, -0.57, FlightMode::Land).0, None, "it sinks");
-    assert_eq!(settles(true, 0.0, FlightMode::Land).0, None, "without the sensor");
-    assert_eq!(settles(false, 0.0, FlightMode::Hold).0, None, "no landing");
-}
-
-/// A vehicle that leans when it touches the ground is levelled.
-#[test]
-fn a_touch_levels_a_landing_vehicle() {
-    for [roll_rad, pitch_rad] in [[0.3, 0.0], [-0.3, 0.0], [0.0, 0.3], [0.2, -0.2]] {
-        let mut fixture = Fixture::flying(Settings::DEFAULT);
-        fixture.sensors.inertial = false;
-        fixture.select(FlightMode::Land).unwrap();
-        fixture.run(4000);
-        fixture.follows = false;
-        let mut state = fixture.state.unwrap();
-        state.velocity_m_s = Vector3::zeros();
-        state.attitude_rad = Vector3::new(roll_rad, pitch_rad, 0.0);
-        fixture.state = Some(state);
-        fixture.run(1000);
-        // Towards +y a vehicle leans by a negative roll, towards +x by a positive pitch.
-        let [[x, y, _]] = fixture.setpoint().acceleration_m_s2.data.0;
-        assert!(y * roll_rad > 0.0 || roll_rad == 0.0, "{roll_rad}: {y}");
-        assert!(x * pitch_rad < 0.0 || pitch_rad == 0.0, "{pitch_rad}: {x}");
-    }
+    assert!(land([-0.55; 2]).0.is_some());
+    assert_eq!(land([-0.57; 2]).0, None, "it sinks");
+    assert!(land([0.0, -0.95]).1 > 2990, "it drops from an edge");
+    assert_eq!(land([0.0, -1.05]).1, 1, "it falls");
+    assert_eq!(idles(true, Mode::Flying, [0.0; 2], FlightMode::Land).0, None, "without the sensor");
+    assert_eq!(idles(false, Mode::Descending, [0.0; 2], FlightMode::Land).0, None, "another descent");
+    assert_eq!(idles(false, Mode::Flying, [0.0; 2], FlightMode::Hold).0, None, "no landing");
 }
 
 /// What a mode has reached, hold keeps: the end of a take-off, or the last waypoint.

@@ -5,9 +5,11 @@ use afbc_calibration::RawSample;
 use afbc_flight_core::rate::PERIOD_US;
 use afbc_link::{Decoder, Uplink};
 use afbc_onboard::parameters::{Kept, ParameterTable, Reason, RecordChange};
-use afbc_onboard::{Configuration, ControlInputs, Flight, Link, Prepared, RawReadings, Readings, Report};
+use afbc_onboard::{Configuration, ControlInputs, Flight, Link, Prepare, RawReadings, Readings, Report};
 use afbc_recorder::{Given, Recorder, TickRecord};
-use afbc_station::{Calibrator, Comms, Setup};
+use afbc_scenario::OtherLaw;
+use afbc_scenario::contender::{ControllerKind, Law};
+use afbc_station::{Calibrator, Comms, RadioControl, Setup};
 use afbc_store::Store;
 use afbc_types::{OutOfRange, ROTORS_MAX, with_rotors};
 use afbc_vehicles::Vehicle;
@@ -22,14 +24,20 @@ pub struct Host {
     /// What the last tick took of it.
     taken: ControlInputs,
     readings: Readings,
+    radio: Box<RadioControl>,
     calibrator: Box<Calibrator>,
-    /// What the sensors have read while it calibrates.
+    /// What the sensors have read while somebody wants to know.
     raw: RawReadings,
     time_us: u64,
     /// Number of the next tick, and the exact log of it all, if it is kept.
     number: u32,
     log: Option<ExactLog>,
+    /// Names of vehicle and law.
+    names: [String; 2],
 }
+
+/// Name of the vehicle of a host without a vehicle file.
+const PAPER: &str = "paper";
 
 /// What takes the bytes of a log.
 type Sink = Box<dyn FnMut(&[u8])>;
@@ -52,14 +60,30 @@ trait Core {
         tell: Tell<'_>,
     ) -> Report<ROTORS_MAX>;
 
-    /// Goes on with a calibration.
-    fn calibrate(&mut self, comms: &mut Comms, calibrator: &mut Calibrator, sample: Option<RawSample>);
+    /// Goes on with a calibration, and shows stations what the sensors read.
+    fn calibrate(
+        &mut self,
+        comms: &mut Comms,
+        calibrator: &mut Calibrator,
+        sample: Option<RawSample>,
+        send: &mut dyn FnMut(&[u8]),
+    );
+
+    /// Takes bytes of a radio receiver; returns what the pilot wants.
+    fn pilot(&mut self, comms: &mut Comms, radio: &mut RadioControl, bytes: &[u8]) -> Option<ControlInputs>;
 
     /// Does what stations want of the parameters, and flies what has changed.
     fn parameters(&mut self, comms: &mut Comms, send: &mut dyn FnMut(&[u8])) -> Option<RecordChange>;
 
     /// Records the start, or a change.
-    fn record(&self, log: &mut ExactLog, change: Option<RecordChange>);
+    fn record(&self, log: &mut ExactLog, names: &[String; 2], change: Option<RecordChange>);
+}
+
+/// A vehicle under a law, its parameters, and what makes it of them.
+struct Aircraft<P: Prepare<N>, const N: usize> {
+    flight: Flight<N, P::Law>,
+    table: ParameterTable<N>,
+    prepare: P,
 }
 
 /// What reports a tick that took so long.
@@ -69,7 +93,7 @@ struct Tell<'a> {
     send: &'a mut dyn FnMut(&[u8]),
 }
 
-impl<const N: usize> Core for (Flight<N>, ParameterTable<N>) {
+impl<P: Prepare<N>, const N: usize> Core for Aircraft<P, N> {
     fn tick(
         &mut self,
         now_us: u64,
@@ -77,29 +101,59 @@ impl<const N: usize> Core for (Flight<N>, ParameterTable<N>) {
         readings: &Readings,
         tell: Tell<'_>,
     ) -> Report<ROTORS_MAX> {
-        let report = self.0.tick(now_us, inputs, readings);
+        let report = self.flight.tick(now_us, inputs, readings);
         tell.comms.report(&report, tell.tick_us, tell.send);
         report.padded()
     }
 
-    fn calibrate(&mut self, comms: &mut Comms, calibrator: &mut Calibrator, sample: Option<RawSample>) {
-        comms.calibrate(calibrator, sample, &self.1);
+    fn calibrate(
+        &mut self,
+        comms: &mut Comms,
+        calibrator: &mut Calibrator,
+        sample: Option<RawSample>,
+        send: &mut dyn FnMut(&[u8]),
+    ) {
+        comms.calibrate(calibrator, sample, &self.table, send);
+    }
+
+    fn pilot(&mut self, comms: &mut Comms, radio: &mut RadioControl, bytes: &[u8]) -> Option<ControlInputs> {
+        comms.pilot(radio, bytes, &self.table.configuration().radio)
     }
 
     fn parameters(&mut self, comms: &mut Comms, send: &mut dyn FnMut(&[u8])) -> Option<RecordChange> {
-        let (flight, table) = self;
+        let Aircraft { flight, table, prepare } = self;
         let change = comms.parameters(table, send)?;
         // Disarmed, and each change has been checked.
-        let adopted = Prepared::new(table.configuration()).is_ok_and(|prepared| flight.adopt(&prepared));
+        let adopted = prepare.prepare(table.configuration()).is_ok_and(|prepared| flight.adopt(&prepared));
         debug_assert!(adopted, "a change that is not flown");
         Some(change)
     }
 
-    fn record(&self, ExactLog { recorder, write, adopted }: &mut ExactLog, change: Option<RecordChange>) {
+    fn record(
+        &self,
+        ExactLog { recorder, write, adopted }: &mut ExactLog,
+        [vehicle, law]: &[String; 2],
+        change: Option<RecordChange>,
+    ) {
         match change {
-            None => recorder.start(&self.1, write),
-            Some(change) => *adopted = Some(recorder.change(&self.1, change, write)),
+            None => recorder.start([vehicle, law], &self.as_built(), write),
+            Some(change) => *adopted = Some(recorder.change(&self.table, change, write)),
         }
+    }
+}
+
+impl<P: Prepare<N>, const N: usize> Aircraft<P, N> {
+    /// Returns the parameters beside those of an image, whose link has its declared defaults.
+    fn as_built(&self) -> ParameterTable<N> {
+        let mut image = self.table.clone();
+        image.restore();
+        let image = Configuration { link: Link::DEFAULT, ..image.configuration().clone() };
+        let mut table = ParameterTable::new(image);
+        for parameter in self.table.iter() {
+            // They are in their ranges already.
+            let _ = table.put(parameter.name, parameter.value);
+        }
+        table
     }
 }
 
@@ -137,10 +191,21 @@ impl Host {
     /// As of [`for_vehicle`](Self::for_vehicle).
     pub fn linked(vehicle: Option<&Vehicle>, link: Link) -> Result<Self, OutOfRange> {
         let Some(vehicle) = vehicle else {
-            return Self::of(ParameterTable::new(Configuration { link, ..Configuration::default() }));
+            return Self::image(ParameterTable::new(Configuration { link, ..Configuration::default() }), PAPER);
         };
         with_rotors!(vehicle.rotors.len(), N => {
-            Self::of(ParameterTable::<N>::new(Configuration { link, ..vehicle.configuration()? }))
+            Self::image(ParameterTable::<N>::new(Configuration { link, ..vehicle.configuration()? }), &vehicle.name)
+        })
+    }
+
+    /// The firmware of this vehicle under another law, without a monitor: no image has it, but it is the same code.
+    ///
+    /// # Errors
+    /// The first parameter or gain out of range.
+    pub fn under(vehicle: &Vehicle, law: Law) -> Result<Self, OutOfRange> {
+        with_rotors!(vehicle.rotors.len(), N => {
+            let table = ParameterTable::<N>::new(vehicle.configuration()?);
+            Self::of(table, OtherLaw(law), [&vehicle.name, law.kind().name()])
         })
     }
 
@@ -156,28 +221,41 @@ impl Host {
         mut notice: impl FnMut(&str),
     ) -> Result<Self, OutOfRange> {
         let Some(vehicle) = vehicle else {
-            return Self::of(loaded(Configuration { link, ..Configuration::default() }, store, &mut notice));
+            let table = loaded(Configuration { link, ..Configuration::default() }, store, &mut notice);
+            return Self::image(table, PAPER);
         };
         with_rotors!(vehicle.rotors.len(), N => {
-            Self::of(loaded::<F, N>(Configuration { link, ..vehicle.configuration()? }, store, &mut notice))
+            let table = loaded::<F, N>(Configuration { link, ..vehicle.configuration()? }, store, &mut notice);
+            Self::image(table, &vehicle.name)
         })
     }
 
-    fn of<const N: usize>(table: ParameterTable<N>) -> Result<Self, OutOfRange> {
+    /// Creates what an image is.
+    fn image<const N: usize>(table: ParameterTable<N>, vehicle: &str) -> Result<Self, OutOfRange> {
+        Self::of(table, (), [vehicle, ControllerKind::Afbc.name()])
+    }
+
+    fn of<P: Prepare<N> + 'static, const N: usize>(
+        table: ParameterTable<N>,
+        prepare: P,
+        names: [&str; 2],
+    ) -> Result<Self, OutOfRange> {
         let setup = Setup { calibrates: true, ..Setup::of(&table.configuration().link) };
-        let flight = Flight::new(table.configuration())?;
+        let flight = Flight::of(prepare.prepare(table.configuration())?);
         Ok(Host {
-            flight: Box::new((flight, table)),
+            flight: Box::new(Aircraft { flight, table, prepare }),
             setup,
             comms: Comms::with(setup),
             inputs: ControlInputs::EMPTY,
             taken: ControlInputs::EMPTY,
             readings: Readings::NONE,
+            radio: Box::default(),
             calibrator: Box::default(),
             raw: RawReadings::NONE,
             time_us: 0,
             number: 0,
             log: None,
+            names: names.map(str::to_owned),
         })
     }
 
@@ -200,7 +278,7 @@ impl Host {
     /// Keeps an exact log ([`afbc_recorder`]) from now on, before the first tick; `write` takes its bytes.
     pub fn record(&mut self, write: impl FnMut(&[u8]) + 'static) {
         let mut log = ExactLog { recorder: Recorder::default(), write: Box::new(write), adopted: None };
-        self.flight.record(&mut log, None);
+        self.flight.record(&mut log, &self.names, None);
         self.log = Some(log);
     }
 
@@ -218,6 +296,13 @@ impl Host {
         let news = self.comms.receive(bytes);
         self.merge(&news);
         self.comms.exchange(decoder);
+    }
+
+    /// Receives, for the next tick, the next bytes of a radio receiver.
+    pub fn hear_radio(&mut self, bytes: &[u8]) {
+        if let Some(news) = self.flight.pilot(&mut self.comms, &mut self.radio, bytes) {
+            self.merge(&news);
+        }
     }
 
     /// Sets what the vehicle's own sensors read for the next tick alone.
@@ -242,17 +327,19 @@ impl Host {
             recorder
                 .tick(&TickRecord { number, time_us, clock_failed: false, readings, battery, adopted, given }, write);
         }
-        if self.comms.is_calibrating() {
+        if self.comms.takes_samples() {
             self.raw.add(time_us, &readings);
         } else {
             self.raw = RawReadings::NONE;
         }
-        self.flight.calibrate(&mut self.comms, &mut self.calibrator, self.raw.take());
+        self.flight.calibrate(&mut self.comms, &mut self.calibrator, self.raw.take(), &mut send);
         let change = self.flight.parameters(&mut self.comms, &mut send);
         if let (Some(log), true) = (&mut self.log, change.is_some()) {
-            self.flight.record(log, change);
+            self.flight.record(log, &self.names, change);
         }
         self.number = self.number.wrapping_add(1);
+        // Notices that there are none.
+        self.hear_radio(&[]);
         self.time_us = time_us;
         HostTick { report, bytes, change }
     }

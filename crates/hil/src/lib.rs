@@ -15,6 +15,7 @@
 
 mod autopilot;
 mod error;
+mod exact_log_file;
 mod extremes;
 mod flight;
 mod host;
@@ -28,6 +29,7 @@ mod tests;
 
 pub use autopilot::Autopilot;
 pub use error::Error;
+pub use exact_log_file::ExactLogFile;
 pub use extremes::Extremes;
 pub use flight::{LoopEnd, check, firmware, fly};
 pub use host::{Host, HostTick};

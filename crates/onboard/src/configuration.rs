@@ -8,6 +8,7 @@ use afbc_estimator::Settings as Estimation;
 use afbc_flight_core::ArmingLimits;
 use afbc_flight_core::motor::{Curve, Response};
 use afbc_flight_core::protocol::MotorOutputs;
+use afbc_radio::RadioSettings;
 use afbc_types::{Airframe, Mounting, Parameters, PerAxis, SensorCalibration};
 
 /// What the firmware knows of the vehicle that it flies; `vehicles/` has one for each.
@@ -35,6 +36,8 @@ pub struct Configuration<const N: usize = 4> {
     pub arming: ArmingLimits,
     /// Settings of modes, limits and safety net.
     pub guidance: afbc_guidance::Settings,
+    /// Settings of radio control.
+    pub radio: RadioSettings,
     /// Parameters of the link.
     pub link: Link,
 }
@@ -56,6 +59,7 @@ impl<const N: usize> Configuration<N> {
             estimation: Estimation::DEFAULT,
             arming: ArmingLimits::DEFAULT,
             guidance: afbc_guidance::Settings::DEFAULT,
+            radio: RadioSettings::DEFAULT,
             link: Link::DEFAULT,
         }
     }

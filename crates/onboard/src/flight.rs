@@ -4,20 +4,22 @@ use crate::configuration::Configuration;
 use crate::control_inputs::ControlInputs;
 use crate::front_end::{Corrections, EstimatorFrontEnd};
 use crate::guided::{Core, GuidanceResult, Guide};
+use crate::law::FlightLaw;
 use crate::readings::Readings;
 use crate::sensor_timeouts::SensorTimeouts;
+use afbc::Guarded;
 use afbc::monitor::{Bounds, Norm};
-use afbc::{Guarded, guarded};
+use afbc_control::Trace;
 use afbc_estimator::{Estimator, OutputFilter};
 use afbc_flight_core::{EndReason, FlightCore, FlightCoreMemory, Mode, Motor, Reasons, RequestAnswer, TickHealth};
 use afbc_types::{Axis, Declared, OutOfRange, ROTORS_MAX, RotorSpeeds, State};
 use core::array;
 
-/// A vehicle under AFBC with its monitor.
+/// A vehicle under a law: AFBC with its monitor, unless it is simulated or replayed under another.
 #[derive(Clone, Debug)]
-pub struct Flight<const N: usize = 4> {
-    vehicle: FlightCore<Guarded<N>, N>,
-    memory: FlightCoreMemory<guarded::Memory<N>>,
+pub struct Flight<const N: usize = 4, C: FlightLaw<N> = Guarded<N>> {
+    vehicle: FlightCore<C, N>,
+    memory: FlightCoreMemory<C::Memory>,
     front_end: EstimatorFrontEnd,
     motor: Motor,
     guide: Guide,
@@ -31,8 +33,8 @@ pub struct Flight<const N: usize = 4> {
 
 /// All that follows from a [`Configuration`], so that [`Flight::adopt`] takes a copy's time.
 #[derive(Clone, Debug)]
-pub struct Prepared<const N: usize = 4> {
-    vehicle: FlightCore<Guarded<N>, N>,
+pub struct Prepared<const N: usize = 4, C: FlightLaw<N> = Guarded<N>> {
+    vehicle: FlightCore<C, N>,
     estimator: Estimator,
     output_filter: OutputFilter,
     corrections: Corrections,
@@ -47,8 +49,7 @@ impl<const N: usize> Prepared<N> {
     /// The first parameter, setting or gain out of range, or the first that leaves the vehicle without a margin to
     /// hover.
     pub fn new(configuration: &Configuration<N>) -> Result<Self, OutOfRange> {
-        let Configuration { airframe, settings, gains, curve, response, imu, calibration, estimation, arming, .. } =
-            configuration;
+        let Configuration { airframe, settings, gains, imu, calibration, .. } = configuration;
         // The controller checks what follows from these and assumes that each is in its range.
         let parameters = &airframe.parameters;
         parameters.validate()?;
@@ -57,7 +58,29 @@ impl<const N: usize> Prepared<N> {
         imu.validate()?;
         calibration.validate()?;
         let bounds = Bounds::new(gains, parameters, settings);
-        let controller = Guarded::new(*airframe, *settings, *gains, bounds)?;
+        Self::around(configuration, Guarded::new(*airframe, *settings, *gains, bounds)?)
+    }
+}
+
+impl<const N: usize, C: FlightLaw<N>> Prepared<N, C> {
+    /// Prepares a flight under `controller`, which must be built for this vehicle.
+    ///
+    /// # Errors
+    /// The first of the other parameters and settings out of range.
+    pub fn under(configuration: &Configuration<N>, controller: C) -> Result<Self, OutOfRange> {
+        configuration.imu.validate()?;
+        configuration.calibration.validate()?;
+        Self::around(configuration, controller)
+    }
+
+    /// Puts everything around a controller. Always inline: out of line, its result is on the stack of the firmware's
+    /// start-up twice.
+    #[inline(always)]
+    fn around(configuration: &Configuration<N>, controller: C) -> Result<Self, OutOfRange> {
+        let Configuration { airframe, curve, response, imu, calibration, estimation, arming, radio, .. } =
+            configuration;
+        radio.validate()?;
+        let parameters = &airframe.parameters;
         Ok(Prepared {
             vehicle: FlightCore::with_rotors(*parameters, response, *arming, controller)?,
             estimator: Estimator::new(*estimation)?,
@@ -67,6 +90,18 @@ impl<const N: usize> Prepared<N> {
             guide: Guide::new(configuration)?,
         })
     }
+}
+
+/// What makes a flight of a configuration, under a law of its choice.
+pub trait Prepare<const N: usize> {
+    /// The law.
+    type Law: FlightLaw<N>;
+
+    /// Prepares a flight.
+    ///
+    /// # Errors
+    /// The first parameter out of range.
+    fn prepare(&self, configuration: &Configuration<N>) -> Result<Prepared<N, Self::Law>, OutOfRange>;
 }
 
 /// Result of a control tick.
@@ -124,14 +159,32 @@ impl<const N: usize> Report<N> {
     }
 }
 
+/// The firmware's own law.
+impl<const N: usize> Prepare<N> for () {
+    type Law = Guarded<N>;
+
+    fn prepare(&self, configuration: &Configuration<N>) -> Result<Prepared<N>, OutOfRange> {
+        Prepared::new(configuration)
+    }
+}
+
 impl<const N: usize> Flight<N> {
     /// Creates the vehicle, disarmed.
     ///
     /// # Errors
     /// Those of [`Prepared::new`].
     pub fn new(configuration: &Configuration<N>) -> Result<Self, OutOfRange> {
-        let Prepared { vehicle, estimator, output_filter, corrections, motor, guide } = Prepared::new(configuration)?;
-        Ok(Flight {
+        Ok(Self::of(Prepared::new(configuration)?))
+    }
+}
+
+impl<const N: usize, C: FlightLaw<N>> Flight<N, C> {
+    /// Creates the vehicle, disarmed, from what is prepared.
+    // Always: the firmware's start-up has it on its stack once.
+    #[inline(always)]
+    pub fn of(prepared: Prepared<N, C>) -> Self {
+        let Prepared { vehicle, estimator, output_filter, corrections, motor, guide } = prepared;
+        Flight {
             vehicle,
             memory: FlightCoreMemory::default(),
             front_end: EstimatorFrontEnd::corrected(estimator, output_filter, corrections),
@@ -141,13 +194,13 @@ impl<const N: usize> Flight<N> {
             observes: false,
             idle_on_ground: false,
             saturated_ticks: 0,
-        })
+        }
     }
 
     /// Flies with another configuration from the next tick on; what the estimator knows stays, unless the inertial
     /// sensor is mounted otherwise, or a sensor is corrected otherwise. False, and without effect, while armed.
     #[must_use = "an armed vehicle keeps its configuration"]
-    pub fn adopt(&mut self, prepared: &Prepared<N>) -> bool {
+    pub fn adopt(&mut self, prepared: &Prepared<N, C>) -> bool {
         let disarmed = !self.memory.mode().armed();
         if disarmed {
             let Prepared { vehicle, estimator, output_filter, corrections, motor, guide } = prepared;
@@ -162,6 +215,11 @@ impl<const N: usize> Flight<N> {
     /// Records that the clock has failed and another has taken over: the vehicle is not armed again.
     pub fn distrust_clock(&mut self) {
         self.memory.distrust_clock();
+    }
+
+    /// Returns the law's internal signals of the last tick: only inputs while blind, zeros while disarmed.
+    pub fn trace(&self) -> Trace {
+        self.memory.trace::<C, N>()
     }
 
     /// Runs one control tick, to be called every millisecond, with what the link brought and the vehicle's own sensors
@@ -194,7 +252,7 @@ impl<const N: usize> Flight<N> {
             estimate: observed.or(estimate.map(|estimate| estimate.state)),
             health: outcome.health,
             saturated_ticks: self.saturated_ticks,
-            norms: self.memory.control().map(|control| control.figures().latest()),
+            norms: self.memory.control().and_then(C::norms),
             answer: outcome.answer,
             ended: outcome.ended,
             against: outcome.against,

@@ -4,8 +4,8 @@ use nalgebra::Vector3;
 
 /// Time without a sample after which the other sensor flies \[us\]: less than the estimator bridges without a trace.
 const SILENT_US: u64 = 3_000;
-/// Time without a sample after which a sensor does not work, as stations are told \[us\]: longer than its driver takes to
-/// set it up again.
+/// Time without a sample after which a sensor does not work, as stations are told \[us\]: longer than its driver takes
+/// to set it up again.
 const FAILED_US: u64 = 500_000;
 /// Samples in which the difference of both sensors is averaged, at least.
 const AVERAGED: f32 = 5_000.0;

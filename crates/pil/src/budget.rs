@@ -10,14 +10,14 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::path::Path;
 
 /// Share of the guidance in a control tick: modes, trajectory limiter, safety net, and the link's orders.
-pub const GUIDANCE_INSTRUCTIONS_MAX: u32 = 2_800;
+pub const GUIDANCE_INSTRUCTIONS_MAX: u32 = 2_300;
 /// Largest number of instructions of a control tick: the worst found by the search ([`crate::worst`]) and a margin. At
-/// 2.5 cycles each, 130 us of the 1000.
-pub const TICK_INSTRUCTIONS_MAX: u32 = 6_000 + GUIDANCE_INSTRUCTIONS_MAX;
+/// 2.5 cycles each, 125 us of the 1000.
+pub const TICK_INSTRUCTIONS_MAX: u32 = 6_100 + GUIDANCE_INSTRUCTIONS_MAX;
 /// The same of a vehicle that flies on its own estimate.
-pub const ESTIMATING_INSTRUCTIONS_MAX: u32 = 15_500 + GUIDANCE_INSTRUCTIONS_MAX;
+pub const ESTIMATING_INSTRUCTIONS_MAX: u32 = 15_350 + GUIDANCE_INSTRUCTIONS_MAX;
 /// Largest mean of these.
-pub const ESTIMATING_INSTRUCTIONS_MEAN: u32 = 9_500 + 2_200;
+pub const ESTIMATING_INSTRUCTIONS_MEAN: u32 = 9_000 + 2_100;
 
 /// Address range of the flash.
 const FLASH: std::ops::Range<u64> = 0x0800_0000..0x0810_0000;

@@ -4,24 +4,26 @@
 mod boards;
 mod bus;
 mod cycles;
+mod known;
 mod work;
 
-pub use boards::{BOARDS, BoardTimes, RateOfUart};
+pub use boards::{BOARDS, BoardTimes, RateOfUart, default_baud};
 pub use bus::{Script, i2c_ns, spi_clock_hz, spi_ns};
 pub use cycles::{CORTEX_M4F, CORTEX_M7, CoreCycles, CycleLimit, Mix};
+pub use known::{KnownLateness, verdicts};
 pub use work::{Section, TimingRow, Work};
 
 use crate::Error;
 use crate::response::load;
 use std::fmt::Write as _;
 
-/// The tables of one board, and what exceeds its deadline in them.
+/// The tables of one board, and what is wrong with them.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct BoardReport {
     /// Markdown.
     pub text: String,
-    /// Names of the rows that are over.
-    pub over: Vec<String>,
+    /// Rows that are late without being known to be, later than that, or known and in time, each in a line.
+    pub wrong: Vec<String>,
 }
 
 /// Returns the tables of all boards, with the instructions that the page `budgets` has.
@@ -34,7 +36,7 @@ pub fn reports(budgets: &str) -> Result<Vec<BoardReport>, Error> {
 }
 
 fn report(board: &BoardTimes, work: &Work) -> BoardReport {
-    let (mut text, mut over) = (String::new(), Vec::new());
+    let mut text = String::new();
     let core = board.core;
     let _ = writeln!(text, "### {}\n", board.names);
     let [best, bound] = [CycleLimit::Best, CycleLimit::Bound].map(|limit| core.per_instruction(limit));
@@ -46,7 +48,7 @@ fn report(board: &BoardTimes, work: &Work) -> BoardReport {
     );
     let _ = writeln!(text, "| | period | C, best | C, most | blocked | R, best | R, most | deadline | share |");
     let _ = writeln!(text, "|---|--:|--:|--:|--:|--:|--:|--:|--:|");
-    let [best, bound] = [CycleLimit::Best, CycleLimit::Bound].map(|limit| work.rows(board, limit));
+    let [best, bound] = [CycleLimit::Best, CycleLimit::Bound].map(|limit| work.rows(board, limit, default_baud()));
     for (best, bound) in best.iter().zip(&bound) {
         let deadline = bound.deadline_ns.map_or_else(String::new, us);
         let share = match (bound.deadline_ns, bound.response_ns) {
@@ -54,12 +56,8 @@ fn report(board: &BoardTimes, work: &Work) -> BoardReport {
             (Some(deadline), Some(response)) if response <= deadline => {
                 format!("{} %", (response * 100).div_ceil(deadline))
             }
-            _ => {
-                let name = bound.name;
-                over.push(format!("{}: {name}", board.names));
-                let misses = best.response_ns.is_none_or(|response| Some(response) > best.deadline_ns);
-                if misses { "**over, at best too**".into() } else { "**over**".into() }
-            }
+            _ if best.is_late() => "**late**, at best too".into(),
+            _ => "**late**".into(),
         };
         let none = || "none".into();
         let _ = writeln!(
@@ -80,6 +78,11 @@ fn report(board: &BoardTimes, work: &Work) -> BoardReport {
     };
     let _ = writeln!(text, "| load | | {} | {} | | | | | |\n", share(&best), share(&bound));
 
+    let _ = writeln!(text, "| known to be late | at most | borne, because |\n|---|--:|---|");
+    for known in board.known {
+        let _ = writeln!(text, "{known}");
+    }
+    text.push('\n');
     let _ = writeln!(text, "| transfer | bytes | clock | time |\n|---|--:|--:|--:|");
     for script in board.scripts() {
         let _ = writeln!(
@@ -99,7 +102,8 @@ fn report(board: &BoardTimes, work: &Work) -> BoardReport {
         let _ =
             writeln!(text, "| {} | {count} | {} | {} |", section.what, time(CycleLimit::Best), time(CycleLimit::Bound));
     }
-    BoardReport { text, over }
+    let wrong = verdicts(board.known, &best, &bound);
+    BoardReport { text, wrong: wrong.iter().map(|wrong| format!("{}: {wrong}", board.names)).collect() }
 }
 
 /// A time in microseconds, rounded up to a tenth.

@@ -1,8 +1,10 @@
 //! Times on the buses by hand, boards as `boards/` has them, and the tables of `docs/timing.md`.
 #![allow(clippy::unwrap_used, clippy::expect_used, missing_docs)] // a file that cannot be read must stop the test
 
+use pil::response::PeriodicTask;
 use pil::timing::{
-    BOARDS, CORTEX_M4F, CORTEX_M7, CycleLimit, RateOfUart, Work, i2c_ns, page, reports, spi_clock_hz, spi_ns,
+    BOARDS, CORTEX_M4F, CORTEX_M7, CycleLimit, KnownLateness, RateOfUart, TimingRow, Work, default_baud, i2c_ns, page,
+    reports, spi_clock_hz, spi_ns, verdicts,
 };
 use std::collections::BTreeSet;
 use std::fs;
@@ -30,7 +32,7 @@ fn the_tick_is_in_time() {
     let work = Work::read(&read("docs/budgets.md")).unwrap();
     for board in &BOARDS {
         for limit in [CycleLimit::Best, CycleLimit::Bound] {
-            let rows = work.rows(board, limit);
+            let rows = work.rows(board, limit, default_baud());
             let tick = rows.iter().find(|row| row.name.starts_with("control tick")).unwrap();
             let is_in_time = tick.response_ns.is_some_and(|response| Some(response) <= tick.deadline_ns);
             assert_eq!(
@@ -41,6 +43,53 @@ fn the_tick_is_in_time() {
             );
         }
     }
+}
+
+/// What the page says of half the baud rate: only the links' task may be late then.
+#[test]
+fn half_the_baud_rate_is_slow_enough() {
+    let work = Work::read(&read("docs/budgets.md")).unwrap();
+    for board in &BOARDS {
+        let rows = work.rows(board, CycleLimit::Bound, 460_800);
+        let late: Vec<_> = rows.iter().filter(|row| row.is_late()).map(|row| row.name).collect();
+        assert!(late.iter().all(|name| *name == "links' task"), "{}: {late:?}", board.names);
+    }
+}
+
+fn row(name: &'static str, response_us: Option<u64>) -> TimingRow {
+    let task = PeriodicTask { priority: 1, period_ns: 10_000, jitter_ns: 0, cost_ns: 1_000, blocking_ns: 0 };
+    TimingRow { name, task, deadline_ns: Some(10_000), response_ns: response_us.map(|response_us| 1000 * response_us) }
+}
+
+/// Late rows fail the check unless they are known, and no later than known; what is known and in time does, too.
+#[test]
+fn what_is_known_is_not_loosened() {
+    let known = |most_us, at_best| KnownLateness { row: "byte", most_us, at_best, reason: "" };
+    for (listed, best_us, most_us, wrong) in [
+        (None, 5, Some(10), None),
+        (None, 5, Some(11), Some("byte: over its deadline")),
+        (None, 5, None, Some("byte: over its deadline")),
+        (Some(known(Some(12), false)), 5, Some(12), None),
+        (Some(known(Some(12), false)), 5, Some(13), Some("byte: later than is known")),
+        (Some(known(Some(12), false)), 5, None, Some("byte: later than is known")),
+        (Some(known(None, false)), 5, None, None),
+        (Some(known(None, false)), 11, None, Some("byte: over its deadline at best, too")),
+        (Some(known(None, true)), 11, None, None),
+        (Some(known(Some(12), false)), 5, Some(10), Some("byte: known to be late, and is in time: delete that")),
+    ] {
+        let listed: Vec<_> = listed.into_iter().collect();
+        let found = verdicts(&listed, &[row("byte", Some(best_us))], &[row("byte", most_us)]);
+        assert_eq!(found, wrong.into_iter().collect::<Vec<_>>(), "{listed:?} {best_us} {most_us:?}");
+    }
+    let gone = verdicts(&[known(None, false)], &[], &[]);
+    assert_eq!(gone, ["byte: known to be late, and no row"]);
+}
+
+/// A UART of the STM32F4 keeps one byte (RM0090, 30.3.3), of the STM32H743 sixteen (RM0433, 48.3).
+#[test]
+fn uarts_keep_what_their_manuals_say() {
+    let kept: Vec<_> = BOARDS.iter().map(|board| (board.names.split(',').next().unwrap(), board.uart_keeps)).collect();
+    assert_eq!(kept, [("stm32f405", 1), ("kakute-f4-v2", 1), ("pixracer", 1), ("stm32h743", 16)]);
 }
 
 #[test]
@@ -55,7 +104,7 @@ fn a_page_that_lacks_a_row_is_refused() {
 fn buses_by_hand() {
     // Data sheets' examples: 14 bytes and a register at 1 MHz; a byte of 921,600 baud.
     assert_eq!(spi_ns(15, 1_000_000), 120_000);
-    assert_eq!(RateOfUart::Link.byte_ns(), 10_850);
+    assert_eq!(RateOfUart::Link.byte_ns(921_600), 10_850);
     // UM10204: start, address, register, start, address, one byte, stop: 39 bits of 2.5 us.
     assert_eq!(i2c_ns(4, 3), 97_500);
     // RM0090's baud rates: f/2 to f/256.

@@ -1,6 +1,6 @@
 //! Frames: records on a wire or in a file, with a checksum.
 
-use crate::record::Record;
+use crate::record::{Record, VERSION};
 use crc::{CRC_32_ISO_HDLC, Crc};
 use postcard::ser_flavors::crc::CrcModifier;
 use postcard::ser_flavors::{Cobs, Slice};
@@ -14,6 +14,40 @@ pub const FRAME_MAX: usize = 1024;
 pub fn write<'b>(record: &Record, buffer: &'b mut [u8]) -> Option<&'b mut [u8]> {
     let cobs = Cobs::try_new(Slice::new(buffer)).ok()?;
     postcard::serialize_with_flavor(record, CrcModifier::new(cobs, CRC.digest())).ok()
+}
+
+/// Why bytes are no record.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FrameError {
+    /// They are damaged, cut off, or something else.
+    Damaged,
+    /// They are whole, but of another version of the format: this one, if they say so.
+    Foreign(Option<u16>),
+}
+
+/// Reads a frame, without the zero at its end; its bytes are overwritten.
+///
+/// # Errors
+/// Why it is no record.
+pub fn decode(frame: &mut [u8]) -> Result<Record, FrameError> {
+    let length = cobs::decode_in_place(frame).map_err(|_| FrameError::Damaged)?;
+    let (body, sum) = frame.get(..length).and_then(<[u8]>::split_last_chunk::<4>).ok_or(FrameError::Damaged)?;
+    if CRC.checksum(body) != u32::from_le_bytes(*sum) {
+        return Err(FrameError::Damaged);
+    }
+    let foreign = || FrameError::Foreign(version(body).filter(|version| *version != VERSION));
+    match postcard::take_from_bytes(body) {
+        Ok((Record::Start(start), _)) if start.version != VERSION => Err(foreign()),
+        Ok((record, [])) => Ok(record),
+        _ => Err(foreign()),
+    }
+}
+
+/// Returns the version that a start of any version says.
+fn version(body: &[u8]) -> Option<u16> {
+    // The first kind of record, and its first field.
+    let (kind, rest): (u8, _) = postcard::take_from_bytes(body).ok()?;
+    if kind == 0 { postcard::take_from_bytes(rest).ok().map(|(version, _)| version) } else { None }
 }
 
 /// Takes frames from bytes as they come, and counts those that are damaged.
@@ -50,10 +84,7 @@ impl Frames {
         if length == 0 {
             return None;
         }
-        let record = self.bytes.get_mut(..length).and_then(|frame| {
-            let length = cobs::decode_in_place(frame).ok()?;
-            postcard::from_bytes_crc32(frame.get(..length)?, CRC.digest()).ok()
-        });
+        let record = self.bytes.get_mut(..length).and_then(|frame| decode(frame).ok());
         self.damaged = self.damaged.saturating_add(u32::from(record.is_none()));
         record
     }

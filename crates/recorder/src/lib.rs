@@ -15,7 +15,7 @@ mod record;
 mod recorder;
 mod replayer;
 
-pub use frame::{FRAME_MAX, Frames, write};
-pub use record::{Given, Record, StartRecord, TickRecord, VERSION};
+pub use frame::{FRAME_MAX, FrameError, Frames, decode, write};
+pub use record::{Given, Record, StartRecord, TickRecord, VERSION, WORD_MAX};
 pub use recorder::Recorder;
 pub use replayer::{ReplayDifference, ReplayStep, Replayer};

@@ -1,14 +1,16 @@
 //! What is recorded.
 
 use afbc_guidance::BatteryReading;
+use afbc_onboard::parameters::ParameterTable;
 use afbc_onboard::{ControlInputs, Readings, Report};
 use afbc_store::RecordName;
 use afbc_types::ROTORS_MAX;
 use crc::{CRC_32_ISO_HDLC, Crc};
+use heapless::String;
 use serde::{Deserialize, Serialize};
 
 /// Version of the format, and of what the records mean.
-pub const VERSION: u16 = 1;
+pub const VERSION: u16 = 2;
 
 const CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 
@@ -44,15 +46,52 @@ pub enum Record {
     Tick(TickRecord),
 }
 
+/// Longest name of a vehicle, or of a law, that is written; of a longer one the beginning is \[bytes\].
+pub const WORD_MAX: usize = 24;
+
 /// What was started.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct StartRecord {
-    /// [`VERSION`] of the writer.
+    /// [`VERSION`] of the writer. First, so that a reader of another version can say which one it is.
     pub version: u16,
     /// Motors of the vehicle.
     pub rotors: u8,
     /// Parameters in the vehicle's table.
     pub parameters: u16,
+    /// CRC-32 of their values at the start, and of the places of the rotors.
+    pub digest: u32,
+    /// Name of the vehicle, or its beginning.
+    pub vehicle: String<WORD_MAX>,
+    /// Name of the law, or its beginning.
+    pub law: String<WORD_MAX>,
+}
+
+impl StartRecord {
+    /// Returns the start of a vehicle with these names and parameters.
+    pub fn of<const N: usize>(vehicle: &str, law: &str, table: &ParameterTable<N>) -> Self {
+        let mut digest = CRC.digest();
+        table.iter().for_each(|parameter| digest.update(&parameter.value.to_le_bytes()));
+        for rotor in &table.configuration().airframe.rotors {
+            digest.update(&rotor.x.to_le_bytes());
+            digest.update(&rotor.y.to_le_bytes());
+            digest.update(&[u8::from(rotor.pushes_left)]);
+        }
+        StartRecord {
+            version: VERSION,
+            rotors: u8::try_from(N).unwrap_or(u8::MAX),
+            parameters: table.count(),
+            digest: digest.finalize(),
+            vehicle: word(vehicle),
+            law: word(law),
+        }
+    }
+}
+
+/// Returns as much of a text as is written.
+fn word(text: &str) -> String<WORD_MAX> {
+    let mut word = String::new();
+    let _ = text.chars().try_for_each(|letter| word.push(letter));
+    word
 }
 
 /// A tick: what it took, and what it gave.
@@ -79,8 +118,12 @@ pub struct TickRecord {
 pub struct Given {
     /// The motors' throttles: 0, or 48 to 2047.
     pub throttles: [u16; ROTORS_MAX],
-    /// CRC-32 of mode, estimate and rotor speeds.
-    pub digest: u32,
+    /// Number of the flight core's mode.
+    pub mode: u8,
+    /// Half of the CRC-32 of the estimate.
+    pub estimate: u16,
+    /// Half of the CRC-32 of the rotor speeds.
+    pub speeds: u16,
 }
 
 impl Given {
@@ -88,15 +131,20 @@ impl Given {
     pub fn of<const N: usize>(report: &Report<N>) -> Self {
         let mut throttles = [0; ROTORS_MAX];
         throttles.iter_mut().zip(report.throttles).for_each(|(to, from)| *to = from);
-        let mut digest = CRC.digest();
-        digest.update(&[report.mode as u8, u8::from(report.estimate.is_some())]);
-        for state in report.estimate.iter() {
-            let vectors = [&state.position_m, &state.velocity_m_s, &state.attitude_rad, &state.rates_rad_s];
-            vectors.into_iter().flatten().for_each(|value| digest.update(&value.to_le_bytes()));
-        }
-        report.motors.padded().0.iter().for_each(|speed| digest.update(&speed.to_le_bytes()));
-        Given { throttles, digest: digest.finalize() }
+        let state = report.estimate.as_ref();
+        let vectors =
+            state.map(|state| [&state.position_m, &state.velocity_m_s, &state.attitude_rad, &state.rates_rad_s]);
+        let estimate = half_crc(vectors.into_iter().flatten().flatten());
+        let speeds = half_crc(report.motors.padded().0.iter());
+        Given { throttles, mode: report.mode as u8, estimate, speeds }
     }
+}
+
+/// Returns the lower half of the CRC-32 of these values.
+fn half_crc<'a>(values: impl Iterator<Item = &'a f32>) -> u16 {
+    let mut digest = CRC.digest();
+    values.for_each(|value| digest.update(&value.to_le_bytes()));
+    digest.finalize() as u16
 }
 
 /// A parameter's name as text.

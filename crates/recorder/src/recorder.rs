@@ -1,7 +1,7 @@
 //! The writing side.
 
 use crate::frame::{FRAME_MAX, write};
-use crate::record::{Record, StartRecord, TickRecord, VERSION};
+use crate::record::{Record, StartRecord, TickRecord};
 use afbc_onboard::ControlInputs;
 use afbc_onboard::parameters::{ParameterTable, RecordChange};
 
@@ -19,12 +19,16 @@ impl Default for Recorder {
 }
 
 impl Recorder {
-    /// Records the start of a processor, with the parameters that are not as its image has them; calls `send` with each
-    /// frame.
-    pub fn start<const N: usize>(&mut self, table: &ParameterTable<N>, send: &mut impl FnMut(&[u8])) {
+    /// Records the start of a processor that flies the vehicle and the law of these names, with the parameters that are
+    /// not as its image has them; calls `send` with each frame.
+    pub fn start<const N: usize>(
+        &mut self,
+        [vehicle, law]: [&str; 2],
+        table: &ParameterTable<N>,
+        send: &mut impl FnMut(&[u8]),
+    ) {
         self.configuration = 0;
-        let rotors = u8::try_from(N).unwrap_or(u8::MAX);
-        self.frame(&Record::Start(StartRecord { version: VERSION, rotors, parameters: table.count() }), send);
+        self.frame(&Record::Start(StartRecord::of(vehicle, law, table)), send);
         for parameter in table.iter() {
             let image = table.default_of(parameter.name).map(|parameter| parameter.value.to_bits());
             if image != Some(parameter.value.to_bits()) {

@@ -1,28 +1,35 @@
 //! The reading side: the flight again.
 
-use crate::record::{Given, Record, StartRecord, TickRecord, VERSION};
-use afbc_onboard::parameters::ParameterTable;
-use afbc_onboard::{Configuration, ControlInputs, Flight, Prepared, Report};
+use crate::record::{Given, Record, StartRecord, TickRecord};
+use afbc_control::Trace;
+use afbc_onboard::parameters::{ParameterTable, Reason};
+use afbc_onboard::{Configuration, ControlInputs, Flight, Prepare, Report};
+use afbc_store::RecordName;
 use afbc_types::OutOfRange;
-use heapless::Deque;
+use heapless::{Deque, Vec};
 
 /// Configurations that may wait to be flown, and inputs that may wait for their tick.
 const WAITING: usize = 16;
+/// Parameters that may be changed.
+const CHANGES_MAX: usize = 64;
 
-/// Runs the ticks of a log.
+/// Runs the ticks of a log, under the firmware's law or that of `P`.
 #[derive(Debug)]
-pub struct Replayer<const N: usize> {
+pub struct Replayer<const N: usize, P: Prepare<N> = ()> {
+    prepare: P,
     image: Configuration<N>,
     table: ParameterTable<N>,
-    flight: Flight<N>,
+    /// Parameters that are not as in the log.
+    changes: Vec<(RecordName, f32), CHANGES_MAX>,
+    /// The start whose parameters are being read.
+    start: Option<StartRecord>,
+    flight: Flight<N, P::Law>,
     inputs: ControlInputs,
     taken: ControlInputs,
     /// Configurations that were made and not flown yet.
     waiting: Deque<(u16, Configuration<N>), WAITING>,
     /// Inputs with the number of the tick that took them.
     coming: Deque<(u32, ControlInputs), WAITING>,
-    /// True if the parameters are those of the start, and the flight is not made of them yet.
-    starts: bool,
     /// True from a start on; number of the next tick.
     began: bool,
     next: u32,
@@ -41,14 +48,18 @@ pub enum ReplayStep<const N: usize> {
 }
 
 /// What differs.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub enum ReplayDifference {
-    /// The log is of another version of this software, or of a vehicle with other rotors or parameters.
+    /// The log is of a vehicle with other rotors or parameters.
     Start(StartRecord),
     /// A parameter has a name, a value, or makes a vehicle that this software does not know.
     Parameter,
-    /// The log lacks the ticks from this number on, or the configuration that one of them flew.
+    /// The parameters of the start are not those of the log: it is another vehicle, or some of them are lost.
+    Parameters(StartRecord),
+    /// The log lacks the ticks from this number on.
     Missing(u32),
+    /// The log lacks the configuration that the tick of this number was the first to fly.
+    Configuration(u32),
     /// The tick of this number gave this, and gives this again.
     Given {
         /// Number of the tick.
@@ -66,19 +77,64 @@ impl<const N: usize> Replayer<N> {
     /// # Errors
     /// The first parameter out of range.
     pub fn new(image: Configuration<N>) -> Result<Self, OutOfRange> {
-        let flight = Flight::new(&image)?;
+        Self::under((), image)
+    }
+}
+
+impl<const N: usize, P: Prepare<N>> Replayer<N, P> {
+    /// The same under the law of `prepare`.
+    ///
+    /// # Errors
+    /// The first parameter out of range.
+    pub fn under(prepare: P, image: Configuration<N>) -> Result<Self, OutOfRange> {
+        let flight = Flight::of(prepare.prepare(&image)?);
         Ok(Replayer {
             table: ParameterTable::new(image.clone()),
+            prepare,
             image,
+            changes: Vec::new(),
+            start: None,
             flight,
             inputs: ControlInputs::EMPTY,
             taken: ControlInputs::EMPTY,
             waiting: Deque::new(),
             coming: Deque::new(),
-            starts: false,
             began: false,
             next: 0,
         })
+    }
+
+    /// Flies with this parameter from the next start on, whatever the log says of it: what it commands then is not what
+    /// the log says, of course.
+    ///
+    /// # Errors
+    /// The reason: no such parameter, a value out of its range, or too many changes.
+    pub fn change(&mut self, name: RecordName, value: f32) -> Result<(), Reason> {
+        self.table.clone().put(name, value)?;
+        self.changes.push((name, value)).map_err(|_| Reason::on(name, "too many changes"))
+    }
+
+    /// Returns the law's internal signals of the last tick.
+    pub fn trace(&self) -> Trace {
+        self.flight.trace()
+    }
+
+    /// Returns the parameters as the log has them.
+    pub fn parameters(&self) -> &ParameterTable<N> {
+        &self.table
+    }
+
+    /// Returns the configuration that is flown with the changes.
+    fn configuration(&self) -> Configuration<N> {
+        if self.changes.is_empty() {
+            return self.table.configuration().clone();
+        }
+        let mut table = self.table.clone();
+        for (name, value) in &self.changes {
+            // Each has been checked alone.
+            let _ = table.put(*name, *value);
+        }
+        table.configuration().clone()
     }
 
     /// Takes the next record of the log; a tick is run again.
@@ -109,13 +165,12 @@ impl<const N: usize> Replayer<N> {
 
     fn start(&mut self, start: &StartRecord) -> Result<(), ReplayDifference> {
         self.table = ParameterTable::new(self.image.clone());
-        let is_mine =
-            start.version == VERSION && usize::from(start.rotors) == N && start.parameters == self.table.count();
+        let is_mine = usize::from(start.rotors) == N && start.parameters == self.table.count();
         (self.inputs, self.taken) = (ControlInputs::EMPTY, ControlInputs::EMPTY);
         self.waiting.clear();
         self.coming.clear();
-        (self.starts, self.began, self.next) = (true, is_mine, 0);
-        if is_mine { Ok(()) } else { Err(ReplayDifference::Start(*start)) }
+        (self.start, self.began, self.next) = (Some(start.clone()), is_mine, 0);
+        if is_mine { Ok(()) } else { Err(ReplayDifference::Start(start.clone())) }
     }
 
     /// Notes a configuration; that of the start is flown at once.
@@ -124,7 +179,7 @@ impl<const N: usize> Replayer<N> {
             if self.waiting.is_full() {
                 self.waiting.pop_front();
             }
-            let _ = self.waiting.push_back((number, self.table.configuration().clone()));
+            let _ = self.waiting.push_back((number, self.configuration()));
         }
         if known { ReplayStep::Nothing } else { ReplayStep::Differs(ReplayDifference::Parameter, None) }
     }
@@ -138,10 +193,17 @@ impl<const N: usize> Replayer<N> {
             return ReplayStep::Differs(ReplayDifference::Missing(self.next), None);
         }
         self.next = self.next.wrapping_add(1);
-        if core::mem::take(&mut self.starts) {
-            match Flight::new(self.table.configuration()) {
-                Ok(flight) => self.flight = flight,
-                Err(_) => return ReplayStep::Differs(ReplayDifference::Parameter, None),
+        if let Some(start) = self.start.take() {
+            if StartRecord::of(&start.vehicle, &start.law, &self.table) != start {
+                self.began = false;
+                return ReplayStep::Differs(ReplayDifference::Parameters(start), None);
+            }
+            match self.prepare.prepare(&self.configuration()) {
+                Ok(prepared) => self.flight = Flight::of(prepared),
+                Err(_) => {
+                    self.began = false;
+                    return ReplayStep::Differs(ReplayDifference::Parameter, None);
+                }
             }
         }
         while let Some((_, inputs)) = self.coming.front().filter(|(number, _)| *number <= tick.number) {
@@ -157,7 +219,8 @@ impl<const N: usize> Replayer<N> {
         if let Some(number) = tick.adopted
             && !self.adopt(number)
         {
-            return ReplayStep::Differs(ReplayDifference::Missing(tick.number), None);
+            self.began = false;
+            return ReplayStep::Differs(ReplayDifference::Configuration(tick.number), None);
         }
         let report = self.flight.tick(tick.time_us, &mut self.taken, &tick.readings);
         let (number, then, now) = (tick.number, tick.given, Given::of(&report));
@@ -172,7 +235,9 @@ impl<const N: usize> Replayer<N> {
     fn adopt(&mut self, number: u16) -> bool {
         while let Some((waiting, configuration)) = self.waiting.pop_front() {
             if waiting == number {
-                return Prepared::new(&configuration).is_ok_and(|prepared| self.flight.adopt(&prepared));
+                let prepared = self.prepare.prepare(&configuration);
+                // With changes it may be armed where it was not.
+                return prepared.is_ok_and(|prepared| self.flight.adopt(&prepared) || !self.changes.is_empty());
             }
         }
         false

@@ -2,7 +2,7 @@
 //!
 //! [`read`] makes a [`Recording`] of a PX4 ULog or a PX4-ECL CSV, in this project's frames; [`fly`] runs the estimator
 //! over it, a step a millisecond, and compares. Whatever is in a file, nothing here panics: what cannot be used is
-//! skipped, counted and reported.
+//! skipped, counted and reported. [`exact`] runs a log of this firmware through all of its code.
 #![forbid(unsafe_code)]
 
 mod aids;
@@ -10,6 +10,7 @@ mod compare;
 mod compass;
 mod earth;
 mod ecl;
+pub mod exact;
 mod order;
 mod recording;
 mod run;
@@ -32,6 +33,9 @@ pub fn read(path: &Path) -> Result<Recording, FileError> {
     let shown = path.display().to_string();
     let failed = |problem: String| FileError::whole(&shown, problem);
     let bytes = fs::read(path).map_err(|error| failed(format!("cannot be read ({error}); give the path of a log")))?;
+    if exact::is_exact(&bytes) {
+        return Err(failed("this is an exact log; replay it with --exact".into()));
+    }
     let recording = match ulog::is_ulog(&bytes) {
         true => ulog::read(&bytes),
         false => ecl::read(&bytes, path),

@@ -1,6 +1,6 @@
 //! Results of flights: tables for the terminal, and in a folder CSV, JSON, figures and a page.
 //!
-//! [`flights`], [`compare`], [`campaign`] and [`replay`] each have a function `write` for a folder and a function
+//! [`flights`], [`compare`], [`campaign`], [`replay`] and [`exact`] each have a function `write` for a folder and a function
 //! `table`. The same flights give the same bytes: nothing depends on the time of day or the machine.
 #![forbid(unsafe_code)]
 
@@ -8,6 +8,7 @@ pub mod campaign;
 pub mod claims;
 pub mod compare;
 mod csv;
+pub mod exact;
 mod figures;
 pub mod flights;
 mod groups;

@@ -12,5 +12,7 @@ pub trait Task {
     ///
     /// # Errors
     /// A further value out of range.
-    fn with<C: FlightController<N>, const N: usize>(self, controller: C) -> Result<Self::Output, OutOfRange>;
+    fn with<C, const N: usize>(self, controller: C) -> Result<Self::Output, OutOfRange>
+    where
+        C: FlightController<N> + Clone + 'static;
 }

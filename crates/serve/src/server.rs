@@ -4,6 +4,7 @@ use crate::ParameterFile;
 use crate::command::{COMMANDS, Line, ServerCommand, WorldChange, parse};
 use crate::systems::listed;
 use crate::vehicle::ServedVehicle;
+use afbc_hil::ExactLogFile;
 use afbc_scenario::Scenario;
 use afbc_types::OutOfRange;
 
@@ -59,6 +60,11 @@ impl Server {
         let vehicles = scenarios.iter().zip(first..).zip(keepers);
         let vehicles = vehicles.map(|((scenario, system), keeper)| ServedVehicle::new(scenario, system, Some(keeper)));
         Ok(Server { vehicles: vehicles.collect::<Result<_, _>>()?, now_ms: 0, agenda: Vec::new() })
+    }
+
+    /// Keeps the exact log of each vehicle in one of `files`, in order, from now on, before the first step.
+    pub fn record(&mut self, files: Vec<ExactLogFile>) {
+        self.vehicles.iter_mut().zip(files).for_each(|(vehicle, file)| vehicle.record(file));
     }
 
     /// Returns the time since the start \[s\].

@@ -7,7 +7,7 @@ use crate::hand::Hand;
 use crate::reported_sensors::ReportedSensors;
 use crate::world_changes::WorldChanges;
 use afbc_flight_core::Mode;
-use afbc_hil::{Host, HostTick};
+use afbc_hil::{ExactLogFile, Host, HostTick};
 use afbc_link::{Address, Decoder, Reboot, Uplink};
 use afbc_onboard::Link;
 use afbc_reader::words::out_of_range;
@@ -41,6 +41,7 @@ pub struct ServedVehicle {
     reported: ReportedSensors,
     scenario: Scenario,
     keeper: Option<ParameterFile>,
+    exact_log: Option<ExactLogFile>,
     /// What is to be reported of the parameters that were stored.
     notices: Vec<String>,
 }
@@ -67,6 +68,7 @@ impl ServedVehicle {
             reported: ReportedSensors::new(scenario),
             scenario: scenario.clone(),
             keeper,
+            exact_log: None,
             notices,
         })
     }
@@ -74,6 +76,12 @@ impl ServedVehicle {
     /// Returns its MAVLink system id.
     pub fn system(&self) -> u8 {
         self.address.system
+    }
+
+    /// Keeps an exact log in this file, from now on, before the first step.
+    pub fn record(&mut self, file: ExactLogFile) {
+        self.host.record(file.sink());
+        self.exact_log = Some(file);
     }
 
     /// Returns its world.
@@ -118,6 +126,9 @@ impl ServedVehicle {
             // The reason is a text to the stations, and reported with it.
             self.host.comms().warn(error.reason());
         }
+        if let Some(failure) = self.exact_log.as_ref().and_then(ExactLogFile::take_failure) {
+            log(&format!("the exact log has ended: {failure}"));
+        }
         // What was sent before has left.
         if self.host.comms().wants_reboot().is_some() {
             self.restart();
@@ -133,6 +144,9 @@ impl ServedVehicle {
             Ok(host) => {
                 self.address = address(&host);
                 self.host = host;
+                if let Some(file) = &self.exact_log {
+                    self.host.record(file.sink());
+                }
                 // Nothing of a frame outlasts it.
                 self.peers.values_mut().for_each(|peer| *peer = Decoder::new(self.address));
             }

@@ -20,11 +20,11 @@ use afbc_flight_core::tracker::{POSE_AGE_MAX_US, Refused, Sighting};
 use afbc_flight_core::{Mode, Stamped, Tracker};
 use afbc_guidance::{BatteryReading, Cause, ModeReason, Notice};
 use afbc_link::{
-    Address, Decoder, Downlink, FRAME_MAX, MavSeverity, PositionTarget, Reboot, Sender, StatesRefused, Uplink,
+    Address, Decoder, Downlink, FRAME_MAX, InertialSample, MavSeverity, Message, PositionTarget, Reboot, Sender,
+    StatesRefused, Uplink,
 };
-use afbc_onboard::ControlInputs;
-use afbc_onboard::Report;
 use afbc_onboard::parameters::{ParameterTable, RecordChange};
+use afbc_onboard::{Configuration, ControlInputs, Report};
 use afbc_types::{PerAxis, Pose};
 
 /// Component of the vehicle: autopilot.
@@ -34,6 +34,8 @@ pub const REPORT_MAX: usize = 768;
 /// Longest frame of a text, and of a reply: a value of an extended parameter \[bytes\].
 const TEXT_MAX: usize = 12 + 54;
 const REPLY_MAX: usize = 12 + 149;
+/// Length of the frame of a sample \[bytes\].
+const SAMPLE_MAX: usize = 12 + 62;
 /// Replies sent per tick.
 const REPLIES_PER_TICK: usize = 2;
 
@@ -51,7 +53,7 @@ const ROTORS: u64 = 10;
 pub struct Comms {
     decoder: Decoder<Uplink>,
     sender: Sender,
-    dispatcher: Dispatcher,
+    pub(crate) dispatcher: Dispatcher,
     tracker: Tracker,
     tick: u64,
     tick_us_max: f32,
@@ -64,6 +66,8 @@ pub struct Comms {
     rate: rate::RateReport,
     /// Bytes that may still be sent after this tick.
     left: usize,
+    /// True if HIGHRES_IMU is due: it is sent with the sensors' next sample.
+    sample_is_due: bool,
 }
 
 impl Default for Comms {
@@ -95,6 +99,7 @@ impl Comms {
             fallback: None,
             rate: rate::RateReport::default(),
             left: 0,
+            sample_is_due: false,
         }
     }
 
@@ -271,22 +276,35 @@ impl Comms {
         change
     }
 
-    /// True while the vehicle is calibrated: [`calibrate`](Self::calibrate) needs what the sensors read.
-    pub fn is_calibrating(&self) -> bool {
-        self.dispatcher.calibration.active.is_some()
+    /// True while the vehicle is calibrated, or a station wants to see its sensors' samples:
+    /// [`calibrate`](Self::calibrate) needs them.
+    pub fn takes_samples(&self) -> bool {
+        let Dispatcher { calibration, streams, .. } = &self.dispatcher;
+        calibration.active.is_some() || self.sample_is_due || streams.interval_us(id::HIGHRES_IMU) > 0
     }
 
-    /// Goes on with a calibration that a station has asked for, to be called before each
-    /// [`parameters`](Self::parameters), which sets what is found; only in a shell that
-    /// [has sensors](Setup::calibrates). `sample` is what [`RawReadings`](afbc_onboard::RawReadings) have come to, if
-    /// they have since the last call.
+    /// Goes on with a calibration that a station has asked for, and sends the sample if it is due, to be called after
+    /// each [`report`](Self::report) and before [`parameters`](Self::parameters), which sets what is found; only in a
+    /// shell that [has sensors](Setup::calibrates). `sample` is what [`RawReadings`](afbc_onboard::RawReadings) have
+    /// come to, if they have since the last call.
     pub fn calibrate<const N: usize>(
         &mut self,
         calibrator: &mut Calibrator,
         sample: Option<RawSample>,
         table: &ParameterTable<N>,
+        send: impl FnMut(&[u8]),
     ) {
         self.dispatcher.calibrate(calibrator, sample, table);
+        if let Some(sample) = sample
+            && self.sample_is_due
+            && self.left >= SAMPLE_MAX
+        {
+            self.sample_is_due = false;
+            let mut outlet = Outlet { sender: self.sender, buffer: [0; FRAME_MAX], left: self.left, send };
+            let bytes = outlet.say(&corrected(&sample, table.configuration()));
+            (self.sender, self.left) = (outlet.sender, outlet.left);
+            self.dispatcher.streams.spend(bytes);
+        }
     }
 
     /// Queues what is to be announced of a tick.
@@ -345,6 +363,10 @@ impl Comms {
                 modes::available(place).map(Downlink::AvailableMode)
             }
             id::DEBUG_FLOAT_ARRAY => Some(Downlink::Health(self.health())),
+            id::HIGHRES_IMU => {
+                self.sample_is_due = true;
+                None
+            }
             message => compose(message, status),
         }
     }
@@ -389,11 +411,23 @@ struct Outlet<F> {
 
 impl<F: FnMut(&[u8])> Outlet<F> {
     /// Sends a message; returns its length.
-    fn say(&mut self, message: &Downlink) -> usize {
+    fn say(&mut self, message: &impl Message) -> usize {
         let frame = self.sender.send(message, &mut self.buffer);
         (self.send)(frame);
         self.left = self.left.saturating_sub(frame.len());
         frame.len()
+    }
+}
+
+/// Returns what the sensors' readings mean for the vehicle: corrected by what calibration has found, in the body frame.
+fn corrected<const N: usize>(sample: &RawSample, configuration: &Configuration<N>) -> InertialSample {
+    let Configuration { imu, calibration, .. } = configuration;
+    let r_body_sensor = imu.r_body_sensor();
+    InertialSample {
+        time_us: sample.at_us,
+        specific_force_m_s2: r_body_sensor * calibration.specific_force(&sample.specific_force_m_s2),
+        rates_rad_s: r_body_sensor * (sample.rates_rad_s - calibration.gyro_offset_rad_s),
+        field_ut: sample.field_ut.map(|field_ut| calibration.field(&field_ut)),
     }
 }
 

@@ -74,6 +74,8 @@ pub(crate) struct Dispatcher {
     reached: Option<u16>,
     /// When the guidance last learned that the station in control is there \[us\].
     heard_us: Option<u64>,
+    /// When a pilot's sticks last came by radio \[us\].
+    pub(crate) radio_us: Option<u64>,
     /// Wish to know what speaks against arming, and whether one of the stations that have it may arm.
     checks: Option<bool>,
     /// What the shell can reboot into.
@@ -101,6 +103,7 @@ impl Dispatcher {
             given: None,
             reached: None,
             heard_us: None,
+            radio_us: None,
             checks: None,
             reboots: setup.reboots,
             reboot: None,

@@ -23,11 +23,13 @@ mod comms;
 mod dispatcher;
 mod failsafes;
 pub mod parameters;
+mod radio;
 pub mod services;
 mod setup;
 
 pub use afbc_link::Reboot;
 pub use comms::{CLOCK_FAILED, Comms, REPORT_MAX, TICK_OFF};
+pub use radio::{RADIO_FRAME_MAX, RadioControl};
 pub use services::calibration::Calibrator;
 pub use services::commands::{
     ANSWERS_MAX, ANSWERS_PER_TICK, BUSY, CALIBRATES, FORGOTTEN_US, NO_ORIGIN, NOT_IN_CONTROL, NOT_KNOWN,

@@ -10,6 +10,7 @@ use afbc_flight_core::motor::{Curve, Response};
 use afbc_flight_core::protocol::MotorOutputs;
 use afbc_onboard::{Configuration, Link};
 use afbc_plant::Realism;
+use afbc_radio::RadioSettings;
 use afbc_reader::{FileError, Table};
 use afbc_types::{Airframe, Mounting, OutOfRange, Parameters, PerAxis, Rotor, SensorCalibration, with_rotors};
 
@@ -102,6 +103,7 @@ impl Vehicle {
             estimation: self.estimation,
             arming: self.arming,
             guidance: self.guidance,
+            radio: RadioSettings::DEFAULT,
             link: Link::DEFAULT,
         })
     }

@@ -1,15 +1,17 @@
 //! `sitl fly`.
 
+use super::aboard::aboard;
 use super::flying::{Flying, report};
 use super::json::Json;
 use super::place::Place;
 use super::target::Target;
-use super::terminal::Failure;
+use super::terminal::{Failure, say};
 use super::vehicle::OnVehicle;
 use afbc::Profile;
 use afbc_scenario::Scenario;
 use afbc_scenario::contender::{Contender, ControllerKind};
 use clap::Args;
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 /// Fly a built-in scenario or a scenario file; exits with 1 if a vehicle is lost
@@ -22,6 +24,11 @@ pub(crate) struct Fly {
     /// default gains
     #[arg(long = "controller", value_name = "NAME")]
     controllers: Vec<String>,
+
+    /// Also fly it by the firmware's own code, as `sitl pil` does, under the first of the controllers, and keep the
+    /// exact log of that flight, for `sitl replay --exact`, in this file
+    #[arg(long, value_name = "FILE")]
+    exact_log: Option<PathBuf>,
 
     #[command(flatten)]
     on: OnVehicle,
@@ -45,8 +52,12 @@ impl Fly {
         }
         let scenario = self.on.put(scenario)?;
         let name = scenario.name.clone();
+        let firmware = self.exact_log.as_ref().map(|_| aboard(&scenario, self.flying.duration)).transpose()?;
         let (folder, flown) = self.flying.fly(vec![scenario], || self.place.open("fly", &name))?;
+        let logged = firmware.zip(self.exact_log.as_deref());
+        let logged = logged.map(|(firmware, path)| firmware.fly(path)).transpose()?;
         report(&folder, &flown, &[], self.json)?;
+        logged.iter().for_each(|line| say(line));
         Ok(ExitCode::from(u8::from(flown.iter().any(|flown| flown.run.lost.is_some()))))
     }
 }

@@ -1,7 +1,10 @@
 //! The command line: one module for each command.
 
+mod aboard;
+mod bring_up;
 mod campaign;
 mod compare;
+mod exact;
 mod fleet;
 mod fly;
 mod flying;
@@ -40,7 +43,8 @@ use terminal::Failure;
 #[derive(Debug, Parser)]
 #[command(version, args_conflicts_with_subcommands = true, max_term_width = 110)]
 #[command(
-    after_help = "Exit codes: 0 success; 1 a vehicle was lost; 2 wrong input, or nothing written; 130 interrupted"
+    after_help = "Exit codes: 0 success; 1 a vehicle was lost, or a replay differs; 2 wrong input, or nothing written; \
+                  130 interrupted"
 )]
 pub(crate) struct Cli {
     #[command(subcommand)]
@@ -69,6 +73,7 @@ enum Command {
     Serve(serve::Serve),
     Pil(pil::Pil),
     Hitl(hitl::Hitl),
+    BringUp(bring_up::BringUp),
 }
 
 impl Cli {
@@ -92,6 +97,7 @@ impl Cli {
             Command::Serve(serve) => serve.run(),
             Command::Pil(pil) => pil.run(),
             Command::Hitl(hitl) => hitl.run(),
+            Command::BringUp(bring_up) => bring_up.run(),
         }
     }
 }

@@ -1,5 +1,6 @@
 //! `sitl replay`.
 
+use super::exact::Exact;
 use super::interrupt;
 use super::json::Json;
 use super::place::Place;
@@ -13,23 +14,28 @@ use clap::Args;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-/// Run a recorded flight through the estimator, and compare with the estimate in the log
+/// Run a recorded flight through the estimator, and compare with the estimate in the log; or, with --exact, through all
+/// of the firmware's code, to the last bit
 ///
 /// The log is a PX4 ULog, or the CSV of PX4-ECL's replay tests with its estimate beside it in <name>_ekf2.csv. What it
-/// lacks is reported; only the inertial sensor's samples must be there.
+/// lacks is reported; only the inertial sensor's samples must be there. With --exact it is an exact log of this
+/// firmware, see docs/exact-log.md; exits with 1 if a tick gives something else than in the log.
 #[derive(Args, Debug)]
 pub(crate) struct Replay {
     /// Path of the log
     log: PathBuf,
 
     /// Compare from this time of the log on [default: 10 s after the estimator has started, or half of a shorter rest]
-    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    #[arg(long, value_name = "SECONDS", value_parser = seconds, conflicts_with = "exact")]
     from: Option<f64>,
 
     /// Error of the heading that the vehicle's own field makes, as a standard deviation; 0 for a magnetometer that is
     /// calibrated perfectly [default: what the log's field shows]
-    #[arg(long, value_name = "RAD", value_parser = compass_error)]
+    #[arg(long, value_name = "RAD", value_parser = compass_error, conflicts_with = "exact")]
     compass_error: Option<f32>,
+
+    #[command(flatten)]
+    exact: Exact,
 
     #[command(flatten)]
     place: Place,
@@ -53,6 +59,9 @@ impl Replay {
     /// Reads, runs, writes, prints.
     pub(super) fn run(self) -> Result<ExitCode, Failure> {
         interrupt::ends_it()?;
+        if self.exact.exact {
+            return self.exact.run(&self.log, &self.place, self.json);
+        }
         let shown = self.log.display().to_string();
         let mut recording = afbc_replay::read(&self.log)?;
         recording.mag_slow_rad = self.compass_error.or(recording.mag_slow_rad);

@@ -3,11 +3,12 @@
 use super::target::Target;
 use super::terminal::{Failure, INTERRUPTED, print};
 use super::vehicle::OnVehicle;
+use afbc_hil::ExactLogFile;
 use afbc_serve::{
     Addresses, Lines, ParameterFile, Ports, RunEnd, Server, Then, TimeRate, VEHICLES_MAX, fleet, guide, run,
 };
 use clap::{Args, value_parser};
-use std::io::{BufReader, Write, stdin, stdout};
+use std::io::{self, BufReader, Write, stdin, stdout};
 use std::net::{IpAddr, SocketAddr, ToSocketAddrs};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -72,6 +73,11 @@ pub(crate) struct Serve {
     #[arg(long, value_name = "FILE")]
     parameters: Option<PathBuf>,
 
+    /// Keep the exact log, for `sitl replay --exact`, in this file; of several vehicles each has its own, which ends in
+    /// its system id
+    #[arg(long, value_name = "FILE")]
+    exact_log: Option<PathBuf>,
+
     /// Times real time; 0 for as fast as possible
     #[arg(long, value_name = "FACTOR", default_value_t = 1.0, value_parser = speed, allow_negative_numbers = true)]
     speed: f64,
@@ -111,6 +117,8 @@ impl Serve {
             )
             .into());
         }
+        let logs = self.exact_logs()?;
+        server.record(logs.iter().map(|(_, log)| log.clone()).collect());
         for line in &self.lines {
             let reply = server.line(line);
             let answer = reply.lines.last().map_or("ok", String::as_str);
@@ -141,7 +149,21 @@ impl Serve {
             let mut out = stdout().lock();
             let _ = writeln!(out, "{line}").and_then(|()| out.flush());
         });
+        for (path, log) in logs {
+            log.finish().map_err(|error| unwritten(&path, &error))?;
+        }
         Ok(ExitCode::from(if end == RunEnd::Stopped { INTERRUPTED } else { 0 }))
+    }
+
+    /// Creates the files of the exact logs, if they are wanted.
+    fn exact_logs(&self) -> Result<Vec<(PathBuf, ExactLogFile)>, Failure> {
+        let Some(path) = &self.exact_log else { return Ok(Vec::new()) };
+        let paths = (self.system..).take(self.vehicles.into()).map(|system| file(path, system, self.vehicles));
+        let open = |path: PathBuf| match ExactLogFile::create(&path) {
+            Ok(log) => Ok((path, log)),
+            Err(error) => Err(unwritten(&path, &error).into()),
+        };
+        paths.map(open).collect()
     }
 
     fn addresses(&self) -> Result<Addresses, Failure> {
@@ -159,7 +181,12 @@ impl Serve {
     }
 }
 
-/// Returns the file of the parameters of one of so many vehicles.
+/// Returns the line on an exact log that cannot be written.
+pub(super) fn unwritten(path: &Path, error: &io::Error) -> String {
+    format!("{}: cannot be written ({error}); choose another file for --exact-log", path.display())
+}
+
+/// Returns the file of one of so many vehicles.
 fn file(path: &Path, system: u8, vehicles: u8) -> PathBuf {
     if vehicles == 1 {
         return path.into();

@@ -257,9 +257,12 @@ fn every_value_of_a_vehicles_file_counts() {
 /// What a station may set is in a vehicle's file, but for what follows from another key, or is not the vehicle's.
 #[test]
 fn every_parameter_of_a_station_is_in_the_file() {
-    const ELSEWHERE: [(&str, &str); 9] = [
+    const ELSEWHERE: [(&str, &str); 12] = [
         ("CAL_", "those of calibrations: of each vehicle's own sensors"),
+        ("COM_FLTMODE", "the pilot's"),
+        ("COM_RC_", "the pilot's"),
         ("LOG_PORT", "the link's"),
+        ("RC", "the pilot's and the receiver's"),
         ("MOT_PROTOCOL", "what its motor controllers understand"),
         ("MOT_LAG", "time_constant_s of [rotors]"),
         ("C_FORCE_MAX", "force_max_n of [rotors]"),
@@ -283,7 +286,8 @@ fn every_parameter_of_a_station_is_in_the_file() {
     let seen: BTreeSet<String> = with_rotors!(base.rotors.len(), N => {
         ParameterTable::<N>::new(base.configuration().unwrap()).iter().map(|it| it.name.to_string()).collect()
     });
-    let group = |name| if str::starts_with(name, "CAL_") { "CAL_" } else { name };
+    let groups = ["CAL_", "COM_FLTMODE", "COM_RC_", "RC"];
+    let group = |name: &str| groups.into_iter().find(|group| name.starts_with(group)).unwrap_or(name);
     let mut missing: Vec<_> = seen.difference(&in_file).map(|name| group(name.as_str())).collect();
     missing.dedup();
     let mut elsewhere = ELSEWHERE.map(|(name, _)| name).to_vec();

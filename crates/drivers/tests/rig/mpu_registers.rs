@@ -15,6 +15,10 @@ pub(crate) struct Registers {
     pub(crate) force_g: [f64; 3],
     pub(crate) temperature_c: f64,
     pub(crate) magnetometer: Option<Magnetometer>,
+    /// What the factory has written of the self-test, from register 0 and 13 on, and what the axes respond
+    /// \[deg/s, g\].
+    pub(crate) trims: [[u8; 4]; 2],
+    pub(crate) responses: [f64; 6],
     /// Samples that the master of the auxiliary bus has seen.
     samples: u64,
     external: [u8; 24],
@@ -34,6 +38,8 @@ impl Registers {
             force_g: [0.1, -0.2, 1.0],
             temperature_c: 31.0,
             magnetometer: None,
+            trims: [[0; 4]; 2],
+            responses: [0.0; 6],
             samples: 0,
             external: [0; 24],
             slots: [None; 4],
@@ -99,12 +105,15 @@ impl Registers {
         for axis in 0..3 {
             // Not in any data sheet: what ArduPilot's driver found about a register without a name.
             let is_off = axis == 1 && matches!(self.identity, 0x12 | 0xAF) && self.registers[0x11] != 0xC9;
-            let force_g = self.force_g[axis] + if is_off { 0.275 } else { 0.0 };
+            let is_pushed = |register: usize| f64::from(self.registers[register] >> (7 - axis) & 1);
+            let pushed_g = self.responses[3 + axis] * is_pushed(0x1C);
+            let force_g = self.force_g[axis] + pushed_g + if is_off { 0.275 } else { 0.0 };
+            let rate_deg_s = self.rates_deg_s[axis] + self.responses[axis] * is_pushed(0x1B);
             if on(30_000) && self.registers[0x6C] >> (5 - axis) & 1 == 0 {
                 numbers[axis] = clamp(force_g * acc + 7.0 * noise(now_us, axis as u64));
             }
             if on(35_000) && self.registers[0x6C] >> (2 - axis) & 1 == 0 {
-                numbers[4 + axis] = clamp(self.rates_deg_s[axis] * gyr + 2.0 * noise(now_us, 4 + axis as u64));
+                numbers[4 + axis] = clamp(rate_deg_s * gyr + 2.0 * noise(now_us, 4 + axis as u64));
             }
         }
         let mut bytes = [0; 14];
@@ -176,6 +185,8 @@ impl Model for Registers {
         for (register, byte) in (usize::from(register)..).zip(into) {
             *byte = match register {
                 0x75 => self.identity,
+                0x00..=0x02 if self.identity != 0x68 => self.trims[0][register],
+                0x0D..=0x10 => self.trims[1][register - 0x0D],
                 0x3B..=0x48 => self.data(now_us)[register - 0x3B],
                 0x49..=0x60 => self.external[register - 0x49],
                 0x36 => std::mem::take(&mut self.registers[0x36]),

@@ -10,9 +10,9 @@ use crate::order::{OffboardTarget, Orders, Sticks};
 use crate::settings::Settings;
 use crate::sticks;
 use crate::targets::Targets;
-use afbc_control::math::{abs_max, max, min};
-use afbc_flight_core::Stamped;
+use afbc_control::math::{abs_max, max};
 use afbc_flight_core::landing::LEFT_M;
+use afbc_flight_core::{Mode, Stamped};
 use afbc_types::{Setpoint, State};
 use nalgebra::Vector3;
 
@@ -26,14 +26,15 @@ const ANEW_M: f32 = 1.0;
 const ANEW_M_S: f32 = 1.5;
 /// A landing vehicle touches the ground once it has been above its setpoint by this much \[m\], for this long \[s\],
 /// and does not sink faster than this \[m/s\], or than this share of its setpoint's speed: an estimated vertical speed
-/// may be off by tenths. Then the rotors give this share of gravity less, for so long \[s\]: by then it has been found
-/// on the ground, or its velocity is not what it seems.
+/// may be off by tenths. Then its motors idle for so long at most \[s\]: by then it has been found on the ground, or
+/// its velocity is not what it seems. In the air it falls, and soon sinks faster than this \[m/s\], which ends it; a
+/// vehicle that drops from the edge of its feet does not.
 const TOUCHES_M: f32 = 0.3;
 const TOUCHES_S: f32 = 0.1;
 const TOUCHES_M_S: f32 = 0.25;
 const TOUCHES_SHARE: f32 = 0.8;
 const SETTLES_S: f32 = 3.0;
-const SETTLES_SHARE: f32 = 0.7;
+const FALLS_M_S: f32 = 1.0;
 
 impl Memory {
     /// Flies the mode; returns the setpoint, and whether the vehicle rests on the ground.
@@ -109,13 +110,11 @@ impl Memory {
             }
         }
         // What is observed without an inertial sensor follows from the thrust, so that it would fall.
-        if output.lands && !given.sensors.inertial && self.touches(state, &present, dt_s) {
-            // Level, whatever the law has learnt of the wind, and with little thrust, so that it does not push itself
-            // about.
-            let thrust_m_s2 = (1.0 - SETTLES_SHARE) * given.lift.gravity_m_s2;
-            let level = given.lift.setpoint(state, Vector3::z(), thrust_m_s2);
-            let level = self.trim.advance(&given.lift, state, &level, dt_s);
-            return Some((Some(level).filter(Setpoint::is_plausible), false));
+        let lands = output.lands && !given.sensors.inertial && given.core == Mode::Flying;
+        if lands && self.touches(state, &present, dt_s) {
+            // A law would push itself about: the moments for a level attitude, which the ground resists, have priority
+            // over little thrust.
+            return Some((Some(present), true));
         }
         let setpoint = match output.shaping {
             Shaping::Limited(aim) => {
@@ -150,10 +149,13 @@ impl Memory {
 
     /// True if a landing vehicle stands on the ground. In the air it would sink, and this would end.
     fn touches(&mut self, state: &State, present: &Setpoint, dt_s: f32) -> bool {
-        let sinks = state.velocity_m_s.z < min(-TOUCHES_M_S, TOUCHES_SHARE * present.velocity_m_s.z);
+        let touches = |time_s: f32| (TOUCHES_S..TOUCHES_S + SETTLES_S).contains(&time_s);
+        let slow_m_s = max(TOUCHES_M_S, -TOUCHES_SHARE * present.velocity_m_s.z);
+        let most_m_s = if touches(self.touch_s) { max(FALLS_M_S, slow_m_s) } else { slow_m_s };
+        let sinks = state.velocity_m_s.z < -most_m_s;
         let presses = state.position_m.z - present.position_m.z > TOUCHES_M;
         self.touch_s = if presses && !sinks { self.touch_s + dt_s } else { 0.0 };
-        (TOUCHES_S..TOUCHES_S + SETTLES_S).contains(&self.touch_s)
+        touches(self.touch_s)
     }
 
     /// Lets the limiter begin at the vehicle, if it is far from it.

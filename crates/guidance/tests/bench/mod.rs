@@ -167,7 +167,7 @@ impl Bench {
 
     fn fly(&mut self, guided: &Guided) {
         let State { position_m, velocity_m_s, .. } = self.state;
-        let idles = !self.core.armed() || guided.idle_on_ground && !self.landing.airborne();
+        let idles = !self.core.armed() || guided.idle_on_ground;
         let wanted_m_s2 = match &guided.setpoint {
             _ if idles => Vector3::new(0.0, 0.0, -G_M_S2),
             None => Vector3::zeros(),

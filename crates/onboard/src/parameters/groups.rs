@@ -56,11 +56,12 @@ macro_rules! each_group {
             estimation,
             arming,
             guidance,
+            radio,
             link,
         } = $configuration;
         let Airframe { parameters, rotors: _ } = airframe;
         each_group!(@ $prefix, $group, $show, ["V_" parameters, "MOT_" curve, "MOT_" response,
-            "MOT_" outputs, "IMU_" imu, "CAL_" calibration, "ARM_" arming, "EST_" estimation, "" guidance, "" link,
+            "MOT_" outputs, "IMU_" imu, "CAL_" calibration, "ARM_" arming, "EST_" estimation, "" guidance, "" radio, "" link,
             "C_" settings, "A_" gains]);
     }};
     (@ $prefix:pat_param, $group:ident, $show:expr, [$($name:literal $field:ident),*]) => {

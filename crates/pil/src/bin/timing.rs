@@ -1,5 +1,5 @@
-//! Computes the worst response times of every board and writes the tables of `docs/timing.md`; with `--check`, writes
-//! nothing. Fails if one exceeds its deadline.
+//! Computes the worst response times of every board and writes the tables of `docs/timing.md`; with `--check`, compares
+//! them. Fails if one exceeds its deadline and is not known to, or is worse than known.
 
 use pil::Error;
 use pil::timing::{page, reports};
@@ -21,20 +21,23 @@ fn main() -> ExitCode {
     }
 }
 
-/// True if every response is within its deadline.
+/// True if every response is within its deadline, or known not to be.
 fn run() -> Result<bool, Error> {
     let reports = reports(&std::fs::read_to_string(BUDGETS)?)?;
-    for report in &reports {
-        println!("{}", report.text);
-    }
+    let mut wrong: Vec<_> = reports.iter().flat_map(|report| report.wrong.iter().cloned()).collect();
+    let path = Path::new(DOCUMENT);
+    let text = std::fs::read_to_string(path)?;
+    let written = page(&text, &reports)?;
     if !std::env::args().any(|argument| argument == "--check") {
-        let path = Path::new(DOCUMENT);
-        let text = std::fs::read_to_string(path)?;
-        std::fs::write(path, page(&text, &reports)?)?;
+        std::fs::write(path, written)?;
+    } else if written != text {
+        wrong.push("docs/timing.md has other tables; cargo run --release -p pil --bin timing writes them".into());
     }
-    let over: Vec<_> = reports.iter().flat_map(|report| &report.over).collect();
-    for name in &over {
-        eprintln!("timing: over its deadline: {name}");
+    for wrong in &wrong {
+        eprintln!("timing: {wrong}");
     }
-    Ok(over.is_empty())
+    if wrong.is_empty() {
+        println!("timing: {} kinds of boards, every response in time or known not to be", reports.len());
+    }
+    Ok(wrong.is_empty())
 }

@@ -3,6 +3,7 @@
 
 use super::bus::{Script, Wire, script};
 use super::cycles::{CORTEX_M4F, CORTEX_M7, CoreCycles};
+use super::known::{self, KnownLateness};
 use afbc_drivers::bmi270::Bmi270;
 use afbc_drivers::bmp280::Bmp280;
 use afbc_drivers::dps310::{Dps310, Spl06};
@@ -16,26 +17,34 @@ use afbc_drivers::qmc5883l::Qmc5883l;
 const GNSS_BAUD: u64 = 230_400;
 /// Bits of a byte on a line: start, eight, stop.
 const BYTE_BITS: u64 = 10;
+/// Bytes that a UART of the STM32H743 keeps in its FIFO (RM0433, 48.3), which `embassy-stm32` turns on.
+const FIFO_H743: u64 = 16;
 
 /// Bytes of a UART, each with an interrupt.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RateOfUart {
-    /// A link, at the default of SER_TEL1_BAUD.
+    /// A link, at the baud rate of SER_TEL1_BAUD.
     Link,
     /// A GNSS receiver.
     Gnss,
 }
 
 impl RateOfUart {
-    /// Returns the time of a byte \[ns\].
+    /// Returns the time of a byte \[ns\], where links have this baud rate.
     #[must_use]
-    pub fn byte_ns(self) -> u64 {
+    pub fn byte_ns(self, link_baud: u64) -> u64 {
         let baud = match self {
-            RateOfUart::Link => u64::from(afbc_onboard::Link::default().baud),
+            RateOfUart::Link => link_baud,
             RateOfUart::Gnss => GNSS_BAUD,
         };
-        BYTE_BITS * 1_000_000_000 / baud
+        BYTE_BITS * 1_000_000_000 / baud.max(1)
     }
+}
+
+/// Returns the links' default baud rate.
+#[must_use]
+pub fn default_baud() -> u64 {
+    afbc_onboard::Link::default().baud.into()
 }
 
 /// A kind of board.
@@ -47,6 +56,8 @@ pub struct BoardTimes {
     pub core: &'static CoreCycles,
     /// Links by UART.
     pub links: usize,
+    /// Bytes that a UART keeps until its interrupt has run, beside the one that arrives.
+    pub uart_keeps: u64,
     /// True if it has sensors.
     pub senses: bool,
     /// Timers of motors.
@@ -61,6 +72,8 @@ pub struct BoardTimes {
     pub sampled: usize,
     /// True if only one of the sampled parts is there.
     pub is_one: bool,
+    /// Rows that may be late.
+    pub known: &'static [KnownLateness],
 }
 
 impl BoardTimes {
@@ -88,6 +101,7 @@ pub static BOARDS: [BoardTimes; 4] = [
         names: "stm32f405",
         core: &CORTEX_M4F,
         links: 1,
+        uart_keeps: 1,
         senses: false,
         timers: 1,
         sampling: 0,
@@ -95,11 +109,13 @@ pub static BOARDS: [BoardTimes; 4] = [
         parts: &[],
         sampled: 0,
         is_one: false,
+        known: &known::STM32F405,
     },
     BoardTimes {
         names: "kakute-f4-v2, matek-f405-se, matek-f405-std, speedybee-f405-mini, speedybee-f405-v3, speedybee-f405-v4",
         core: &CORTEX_M4F,
         links: 1,
+        uart_keeps: 1,
         senses: true,
         timers: 2,
         sampling: 7_096,
@@ -118,11 +134,13 @@ pub static BOARDS: [BoardTimes; 4] = [
         ],
         sampled: 6,
         is_one: true,
+        known: &known::FLIGHT_CONTROLLERS,
     },
     BoardTimes {
         names: "pixracer",
         core: &CORTEX_M4F,
         links: 2,
+        uart_keeps: 1,
         senses: true,
         timers: 2,
         sampling: 12_624,
@@ -136,11 +154,13 @@ pub static BOARDS: [BoardTimes; 4] = [
         ],
         sampled: 3,
         is_one: false,
+        known: &known::PIXRACER,
     },
     BoardTimes {
         names: "stm32h743",
         core: &CORTEX_M7,
         links: 2,
+        uart_keeps: FIFO_H743,
         senses: true,
         timers: 2,
         sampling: 7_552,
@@ -153,5 +173,6 @@ pub static BOARDS: [BoardTimes; 4] = [
         ],
         sampled: 2,
         is_one: false,
+        known: &known::STM32H743,
     },
 ];

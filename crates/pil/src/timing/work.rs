@@ -74,6 +74,14 @@ pub struct TimingRow {
     pub response_ns: Option<u64>,
 }
 
+impl TimingRow {
+    /// True if it may exceed its deadline, or has one and no bound.
+    #[must_use]
+    pub fn is_late(&self) -> bool {
+        self.deadline_ns.is_some_and(|deadline| self.response_ns.is_none_or(|response| response > deadline))
+    }
+}
+
 /// What a row begins with: priority, period, instructions, times of interrupts, time on a bus that follows, deadline.
 struct Entry {
     name: &'static str,
@@ -132,12 +140,12 @@ impl Work {
         sections
     }
 
-    /// Returns the lines of a board's table.
+    /// Returns the lines of a board's table, with links of this baud rate.
     #[must_use]
-    pub fn rows(&self, board: &BoardTimes, limit: CycleLimit) -> Vec<TimingRow> {
+    pub fn rows(&self, board: &BoardTimes, limit: CycleLimit, link_baud: u64) -> Vec<TimingRow> {
         let core = board.core;
         let sections = self.sections(board);
-        let entries = self.entries(board);
+        let entries = self.entries(board, link_baud);
         let tasks: Vec<_> = entries
             .iter()
             .map(|entry| {
@@ -167,7 +175,7 @@ impl Work {
         entries.iter().enumerate().filter_map(row).collect()
     }
 
-    fn entries(&self, board: &BoardTimes) -> Vec<Entry> {
+    fn entries(&self, board: &BoardTimes, link_baud: u64) -> Vec<Entry> {
         let tick = if board.senses { self.estimating } else { self.tick };
         let mut entries = vec![Entry {
             name: "SysTick",
@@ -182,12 +190,12 @@ impl Work {
         let byte = |name, rate: RateOfUart, is_heard: bool| Entry {
             name,
             priority: priority::UART,
-            period_ns: rate.byte_ns(),
+            period_ns: rate.byte_ns(link_baud),
             instructions: self.byte,
             interrupts: 1,
             bus_ns: 0,
-            // Then the next byte takes its place; the line waits for those sent.
-            deadline_ns: is_heard.then(|| rate.byte_ns()),
+            // Then the one that arrives finds no place; the line waits for those sent.
+            deadline_ns: is_heard.then(|| board.uart_keeps * rate.byte_ns(link_baud)),
         };
         let links = [
             ["first link: byte received", "first link: byte sent"],

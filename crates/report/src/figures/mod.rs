@@ -6,6 +6,7 @@
 pub(super) mod campaign;
 mod canvas;
 pub(super) mod compare;
+pub(super) mod exact;
 pub(super) mod flights;
 mod marks;
 mod palette;

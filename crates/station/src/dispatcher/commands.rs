@@ -147,6 +147,7 @@ impl Dispatcher {
     fn request(&mut self, message: u32, index: u32) -> Answer {
         let known = match message {
             id::HEARTBEAT | id::DEBUG_FLOAT_ARRAY | id::MISSION_CURRENT => true,
+            id::HIGHRES_IMU => self.calibrates,
             id::POSITION_TARGET_LOCAL_NED => self.followed().is_some(),
             id::AVAILABLE_MODES => index <= modes::COUNT.into(),
             _ => compose(message, &self.status).is_some(),

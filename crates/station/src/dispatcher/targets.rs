@@ -5,6 +5,7 @@ use afbc_flight_core::Stamped;
 use afbc_guidance::{AttitudeTarget, MotionTarget};
 use afbc_link::{Address, Axes, ExternalTarget, PositionTarget};
 use afbc_onboard::ControlInputs;
+use afbc_radio::SILENT_US;
 use afbc_types::Setpoint;
 use nalgebra::{Quaternion, UnitQuaternion};
 
@@ -40,6 +41,10 @@ impl Dispatcher {
                 afbc_guidance::OffboardTarget::Attitude(AttitudeTarget { attitude, yaw_rate_rad_s, thrust })
             }
             ExternalTarget::Sticks(sticks) => {
+                // The pilot's own sticks go first.
+                if self.radio_us.is_some_and(|radio_us| at_us.saturating_sub(radio_us) <= SILENT_US) {
+                    return;
+                }
                 let afbc_link::ManualControl { roll, pitch, throttle, yaw } = sticks;
                 let value = afbc_guidance::Sticks { roll, pitch, throttle, yaw };
                 inputs.order().sticks = Some(Stamped { value, at_us });

@@ -23,6 +23,7 @@ pub mod id {
     pub const VFR_HUD: u32 = 74;
     pub const POSITION_TARGET_LOCAL_NED: u32 = 85;
     pub const HIL_ACTUATOR_CONTROLS: u32 = 93;
+    pub const HIGHRES_IMU: u32 = 105;
     pub const BATTERY_STATUS: u32 = 147;
     pub const AUTOPILOT_VERSION: u32 = 148;
     pub const ESTIMATOR_STATUS: u32 = 230;
@@ -36,7 +37,7 @@ pub mod id {
 }
 
 /// Streams with their default intervals; 0: off \[us\]. `docs/station.md` has the same list.
-pub const DEFAULTS: [(u32, u32); 18] = [
+pub const DEFAULTS: [(u32, u32); 19] = [
     (id::SYS_STATUS, 1_000_000),
     (id::SYSTEM_TIME, 1_000_000),
     (id::GPS_RAW_INT, 1_000_000),
@@ -55,6 +56,7 @@ pub const DEFAULTS: [(u32, u32); 18] = [
     (id::DEBUG_FLOAT_ARRAY, 100_000),
     (id::ACTUATOR_OUTPUT_STATUS, 1_000_000),
     (id::CURRENT_MODE, 1_000_000),
+    (id::HIGHRES_IMU, 0),
 ];
 /// Shortest interval: a tick \[us\].
 pub const INTERVAL_MIN_US: u32 = 1_000;

@@ -1,0 +1,48 @@
+//! Why there is no log.
+
+use std::fmt;
+
+/// Why there is no log; displayed as one line.
+#[derive(Debug)]
+#[non_exhaustive]
+pub enum Error {
+    /// Nothing has come.
+    Silent,
+    /// Bytes have come, so many, and no heartbeat of an autopilot.
+    Nonsense(u64),
+    /// It speaks MAVLink and is not this firmware.
+    Stranger,
+    /// The vehicle is armed.
+    Armed,
+    /// The connection has failed.
+    Connection(afbc_hil::Error),
+}
+
+impl fmt::Display for Error {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Error::Silent => write!(
+                f,
+                "the board sends nothing: check its power, the port, and that TX and RX are crossed; is it flashed?"
+            ),
+            Error::Nonsense(bytes) => write!(
+                f,
+                "the board sends {bytes} bytes and no MAVLink heartbeat among them: check the baud rate, and that this \
+                 firmware is flashed"
+            ),
+            Error::Stranger => {
+                write!(f, "what answers speaks MAVLink, but is not this firmware: no health array within 5 s")
+            }
+            Error::Armed => write!(f, "the vehicle is armed: disarm it, and take the propellers off"),
+            Error::Connection(error) => error.fmt(f),
+        }
+    }
+}
+
+impl std::error::Error for Error {}
+
+impl From<afbc_hil::Error> for Error {
+    fn from(error: afbc_hil::Error) -> Self {
+        Error::Connection(error)
+    }
+}

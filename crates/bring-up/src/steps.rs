@@ -1,0 +1,349 @@
+//! Steps in which the board does not move.
+
+use crate::conversation::Conversation;
+use crate::error::Error;
+use crate::log::BringUpStep;
+use crate::statistics::VectorStatistics;
+use afbc_link::{Command, InertialSample, MavCmd};
+use nalgebra::Vector3;
+
+/// Messages that are asked for.
+const HIGHRES_IMU: u32 = 105;
+/// Shorter than the 20 ms of a sample, so that each is sent \[us\].
+const SAMPLE_US: i32 = 10_000;
+/// Time of a sample, over which the board takes means \[s\].
+const SAMPLE_S: f64 = 0.02;
+const GRAVITY_M_S2: f64 = 9.81;
+
+/// `MAV_SYS_STATUS_SENSOR`, of those that this firmware reports.
+const SENSORS: [(u32, &str); 9] = [
+    (1, "gyroscope"),
+    (2, "accelerometer"),
+    (4, "magnetometer"),
+    (8, "barometer"),
+    (0x20, "GNSS receiver"),
+    (0x80, "tracker"),
+    (0x8000, "motor outputs"),
+    (0x20_0000, "attitude"),
+    (0x0200_0000, "battery"),
+];
+/// Those whose health depends on the place: outside, or a tracker's sight.
+const ELSEWHERE: u32 = 0x20 | 0x80;
+const GYROSCOPE: u32 = 1;
+
+/// Version of the firmware.
+pub(crate) fn version(talk: &mut Conversation<'_>) -> Result<BringUpStep, Error> {
+    let mut step = BringUpStep::new("version");
+    let number = MavCmd::MAV_CMD_REQUEST_MESSAGE as u16;
+    talk.command(Command::RequestMessage { message: 148, index: 0 }, number)?;
+    talk.wait(1_000, |heard| heard.version.is_some())?;
+    match talk.heard.version {
+        Some(version) => {
+            let [major, minor, patch, _] = version.software;
+            step.found("firmware", format!("{major}.{minor}.{patch}"));
+            step.found("capabilities", format!("{:#x}", version.capabilities));
+            if version.uid != 0 {
+                step.found("number of the board", format!("{:#x}", version.uid));
+            }
+        }
+        None => step.check(false, "no AUTOPILOT_VERSION"),
+    }
+    Ok(step)
+}
+
+/// All parameters.
+pub(crate) fn parameters(talk: &mut Conversation<'_>) -> Result<BringUpStep, Error> {
+    let mut step = BringUpStep::new("parameters");
+    talk.parameters()?;
+    let (known, count) = (talk.heard.parameters.len(), talk.heard.parameter_count.unwrap_or(0));
+    step.found("read", format!("{known} of {count}"));
+    step.check(talk.heard.has_all_parameters() && count > 0, "not all could be read");
+    Ok(step)
+}
+
+/// What is there, and whether it is well.
+pub(crate) fn sensors(talk: &mut Conversation<'_>) -> Result<BringUpStep, Error> {
+    let mut step = BringUpStep::new("sensors");
+    talk.wait(3_000, |heard| heard.system.is_some())?;
+    // Again, after what was unwell at the start.
+    talk.heard.system = None;
+    talk.wait(3_000, |heard| heard.system.is_some())?;
+    let Some(system) = talk.heard.system else {
+        step.check(false, "no SYS_STATUS");
+        return Ok(step);
+    };
+    for (bit, name) in SENSORS {
+        let (is_there, is_well) = (system.present & bit != 0, system.healthy & bit != 0);
+        step.found(
+            name,
+            if is_well {
+                "well"
+            } else if is_there {
+                "not well"
+            } else {
+                "not there"
+            },
+        );
+        step.check(!is_there || is_well || bit & ELSEWHERE != 0, format_args!("{name} not well"));
+    }
+    Ok(step)
+}
+
+/// Ticks, and noise at rest.
+pub(crate) fn at_rest(talk: &mut Conversation<'_>, rest_s: u32, add: &mut dyn FnMut(BringUpStep)) -> Result<(), Error> {
+    let senses = senses(talk);
+    show_samples(talk, true)?;
+    let before = talk.heard.health.unwrap_or_default();
+    let (restarts, attitudes) = (talk.heard.restarts, talk.heard.attitudes);
+    talk.heard.samples.clear();
+    talk.heard.altitudes_m.clear();
+    talk.listen(1_000 * u64::from(rest_s))?;
+    let after = talk.heard.health.unwrap_or_default();
+    let samples = std::mem::take(&mut talk.heard.samples);
+
+    let mut ticks = BringUpStep::new("ticks");
+    let elapsed_s = after.time_us.saturating_sub(before.time_us) as f64 * 1e-6;
+    ticks.found("measured for", format!("{elapsed_s:.1} s of the board's clock"));
+    ticks.found("rate", format!("{:.0} Hz", after.rate_hz));
+    ticks.found("duration of the last", format!("{:.1} us", after.tick_us));
+    ticks.found("longest since power-up", format!("{:.1} us", after.tick_max_us));
+    ticks.found("late or early meanwhile", after.late_ticks.wrapping_sub(before.late_ticks));
+    ticks.found("late or early since power-up", after.late_ticks);
+    ticks.found("attitudes", format!("{:.1} Hz", rate(talk.heard.attitudes - attitudes, elapsed_s)));
+    ticks.found("stack", "not told by telemetry; computed: docs/budgets.md");
+    ticks.check(talk.heard.restarts == restarts, "the board has restarted");
+    ticks.check((997.0..=1003.0).contains(&after.rate_hz), "the rate is not 1000 Hz");
+    ticks.check(after.late_ticks == before.late_ticks, "ticks late or early");
+    ticks.check(after.tick_max_us < 1_000.0, "a tick longer than its period");
+    ticks.check(elapsed_s > 0.0, "no health array");
+    add(ticks);
+
+    let mut noise = BringUpStep::new("noise at rest");
+    noise.found("temperature", "not told by telemetry");
+    if !senses {
+        add(noise.skipped("no inertial sensor"));
+        return Ok(());
+    }
+    inertial_noise(&mut noise, &samples, elapsed_s);
+    let altitudes = talk.heard.altitudes_m.iter().map(|&altitude_m| Vector3::new(altitude_m, 0.0, 0.0));
+    let altitude_m = VectorStatistics::of(altitudes).deviation().x;
+    noise.found("altitude, deviation", format!("{altitude_m:.2} m"));
+    add(noise);
+    add(level(&samples));
+    add(field(&samples));
+    Ok(())
+}
+
+/// True if the vehicle has an inertial sensor.
+pub(crate) fn senses(talk: &Conversation<'_>) -> bool {
+    talk.heard.system.is_some_and(|system| system.present & GYROSCOPE != 0)
+}
+
+/// Asks for samples, or for no more.
+pub(crate) fn show_samples(talk: &mut Conversation<'_>, shows: bool) -> Result<(), Error> {
+    let interval_us = if shows { SAMPLE_US } else { 0 };
+    let number = MavCmd::MAV_CMD_SET_MESSAGE_INTERVAL as u16;
+    talk.command(Command::SetInterval { message: HIGHRES_IMU, interval_us }, number)?;
+    Ok(())
+}
+
+fn rate(count: u32, elapsed_s: f64) -> f64 {
+    if elapsed_s > 0.0 { f64::from(count) / elapsed_s } else { 0.0 }
+}
+
+/// What a sensor at rest shows. The limits are some ten times what the parts' data sheets say, and a hand's tremor.
+fn inertial_noise(step: &mut BringUpStep, samples: &[InertialSample], elapsed_s: f64) {
+    const RATES_MAX_RAD_S: f64 = 0.02;
+    const FORCE_MAX_M_S2: f64 = 0.2;
+    const BIAS_MAX_RAD_S: f64 = 0.2;
+    let rates = VectorStatistics::of(samples.iter().map(|sample| sample.rates_rad_s));
+    let force = VectorStatistics::of(samples.iter().map(|sample| sample.specific_force_m_s2));
+    step.found(
+        "samples, means over 20 ms",
+        format!("{}, {:.1} Hz", samples.len(), rate(samples.len() as u32, elapsed_s)),
+    );
+    step.found("gyroscope, mean [rad/s]", three(rates.mean()));
+    step.found("gyroscope, deviation [rad/s]", three(rates.deviation()));
+    // White noise of density n has the deviation n / sqrt(2 T) in means over T.
+    let density = |deviation: Vector3<f64>| deviation * (2.0 * SAMPLE_S).sqrt();
+    step.found("gyroscope, density [rad/s/sqrt(Hz)]", three(density(rates.deviation())));
+    step.found("accelerometer, mean [m/s2]", three(force.mean()));
+    step.found("accelerometer, deviation [m/s2]", three(force.deviation()));
+    step.found("accelerometer, density [m/s2/sqrt(Hz)]", three(density(force.deviation())));
+    step.check(rate(samples.len() as u32, elapsed_s) > 25.0, "fewer than half of the samples");
+    for (name, deviation, most) in
+        [("gyroscope", rates.deviation(), RATES_MAX_RAD_S), ("accelerometer", force.deviation(), FORCE_MAX_M_S2)]
+    {
+        step.check(deviation.iter().all(|it| *it > 0.0), format_args!("{name}: an axis is stuck"));
+        step.check(deviation.max() < most, format_args!("{name}: more than {most}; did it move?"));
+    }
+    step.check(rates.mean().norm() < BIAS_MAX_RAD_S, "the gyroscope's offset is above 0.2 rad/s: calibrate it");
+}
+
+/// True gravity, upward.
+fn level(samples: &[InertialSample]) -> BringUpStep {
+    const TILT_MAX_RAD: f64 = 0.26;
+    let mut step = BringUpStep::new("level");
+    let force = VectorStatistics::of(samples.iter().map(|sample| sample.specific_force_m_s2)).mean();
+    let tilt_rad = force.angle(&Vector3::z());
+    step.found("specific force", format!("{:.2} m/s2", force.norm()));
+    step.found("tilt", format!("{:.1} degrees", tilt_rad.to_degrees()));
+    step.check((force.norm() - GRAVITY_M_S2).abs() < 0.5, "it is not 9.81 m/s2: calibrate the accelerometer");
+    step.check(tilt_rad < TILT_MAX_RAD, "it does not stand level, or its alignment or IMU_ATT_* is wrong");
+    step
+}
+
+/// The magnetometer at rest.
+fn field(samples: &[InertialSample]) -> BringUpStep {
+    let mut step = BringUpStep::new("magnetic field");
+    let fields: Vec<_> = samples.iter().filter_map(|sample| sample.field_ut).collect();
+    if fields.is_empty() {
+        return step.skipped("no readings of a magnetometer");
+    }
+    let field = VectorStatistics::of(fields.iter().copied());
+    step.found("readings", fields.len());
+    step.found("mean, body frame [uT]", three(field.mean()));
+    step.found("strength", format!("{:.1} uT", field.mean().norm()));
+    step.found("deviation [uT]", three(field.deviation()));
+    // The earth's is 22 to 67 uT.
+    step.check((15.0..=80.0).contains(&field.mean().norm()), "not the earth's: take it away from iron, and calibrate");
+    step
+}
+
+fn three(vector: Vector3<f64>) -> String {
+    let [x, y, z]: [f64; 3] = vector.into();
+    format!("{x:.6} {y:.6} {z:.6}")
+}
+
+/// How the gyroscope's offset changes with the temperature.
+pub(crate) fn warmth(
+    talk: &mut Conversation<'_>,
+    is_attended: bool,
+    tell: &mut dyn FnMut(&str),
+) -> Result<BringUpStep, Error> {
+    const WARMED_S: u64 = 30;
+    const DRIFT_MAX_RAD_S: f64 = 0.02;
+    let step = BringUpStep::new("warmth");
+    if !is_attended || !senses(talk) {
+        return Ok(step.skipped("nobody to warm it, or nothing to be warmed"));
+    }
+    let mean = |talk: &mut Conversation<'_>| -> Result<_, Error> {
+        talk.heard.samples.clear();
+        talk.listen(3_000)?;
+        let samples = std::mem::take(&mut talk.heard.samples);
+        Ok(VectorStatistics::of(samples.iter().map(|sample| sample.rates_rad_s)).mean())
+    };
+    let mut step = step;
+    tell("leave it at rest, level");
+    talk.listen(5_000)?;
+    let cold = mean(talk)?;
+    tell(&format!("warm the sensors by a finger on the chip, without moving the board, for {WARMED_S} s"));
+    talk.listen(1_000 * WARMED_S)?;
+    tell("take the finger off");
+    talk.listen(3_000)?;
+    let drift = mean(talk)? - cold;
+    step.found("gyroscope, change of the offset [rad/s]", three(drift));
+    step.check(drift.norm() < DRIFT_MAX_RAD_S, "the offset moves by more than 0.02 rad/s");
+    Ok(step)
+}
+
+/// The GNSS receiver.
+pub(crate) fn position(
+    talk: &mut Conversation<'_>,
+    is_attended: bool,
+    tell: &mut dyn FnMut(&str),
+) -> Result<BringUpStep, Error> {
+    let mut step = BringUpStep::new("GNSS fix");
+    if talk.heard.fix.is_none() {
+        return Ok(step.skipped("no receiver"));
+    }
+    let patience_s = if is_attended { 300 } else { 10 };
+    tell(&format!("waiting for a fix under open sky, {patience_s} s at most"));
+    let began_ms = talk.now_ms();
+    let is_fixed = talk.wait(1_000 * patience_s, |heard| heard.fix.is_some_and(|fix| fix.kind >= 3))?;
+    if let Some(fix) = talk.heard.fix {
+        let [horizontal_mm, vertical_mm] = fix.sigma_mm;
+        step.found("kind of fix", fix.kind);
+        step.found("satellites", fix.satellites);
+        step.found("uncertainty", format!("{horizontal_mm} mm across, {vertical_mm} mm in height"));
+        step.found("waited", format!("{:.0} s", (talk.now_ms() - began_ms) as f64 * 1e-3));
+    }
+    if !is_fixed && !is_attended {
+        return Ok(step.skipped("no fix, and nobody to take it outside"));
+    }
+    step.check(is_fixed, "no fix in three dimensions");
+    Ok(step)
+}
+
+/// The battery's converter.
+pub(crate) fn battery(talk: &Conversation<'_>) -> BringUpStep {
+    let mut step = BringUpStep::new("battery");
+    let Some(battery) = talk.heard.battery else { return step.skipped("no reading of a battery") };
+    step.found("voltage, to be compared with a meter", format!("{:.2} V", f64::from(battery.voltage_mv) * 1e-3));
+    if battery.current_ca >= 0 {
+        step.found("current", format!("{:.2} A", f64::from(battery.current_ca) * 1e-2));
+    }
+    step
+}
+
+/// What the motors are told while disarmed: nothing.
+pub(crate) fn motors(talk: &Conversation<'_>) -> BringUpStep {
+    let mut step = BringUpStep::new("motors, disarmed");
+    match talk.heard.outputs {
+        Some(outputs) => {
+            let throttles: Vec<_> = outputs.throttles.iter().take(outputs.active as usize).collect();
+            step.found("outputs", outputs.active);
+            step.check(throttles.iter().all(|throttle| **throttle == 0.0), "a throttle is not zero");
+        }
+        None => step.check(false, "no ACTUATOR_OUTPUT_STATUS"),
+    }
+    step
+}
+
+/// What speaks against arming, which is not tried.
+pub(crate) fn arming(talk: &mut Conversation<'_>) -> Result<BringUpStep, Error> {
+    let mut step = BringUpStep::new("checks before arming");
+    let texts = talk.heard.texts.len();
+    let answer = talk.command(Command::CheckArming, MavCmd::MAV_CMD_RUN_PREARM_CHECKS as u16)?;
+    talk.listen(1_500)?;
+    step.check(answer.is_some(), "not answered");
+    let said: Vec<_> = talk.heard.texts.iter().skip(texts).map(|(_, text)| text.clone()).collect();
+    for text in &said {
+        step.found("it says", text);
+    }
+    step.check(!said.is_empty(), "it says nothing");
+    Ok(step)
+}
+
+/// The line.
+pub(crate) fn link(talk: &mut Conversation<'_>) -> Result<BringUpStep, Error> {
+    /// A command that no vehicle knows, so that it is answered at once and changes nothing.
+    const PING: u16 = MavCmd::MAV_CMD_USER_5 as u16;
+    const PINGS: u32 = 20;
+    let mut step = BringUpStep::new("link");
+    show_samples(talk, false)?;
+    let (mut worst_ms, mut sum_ms, mut answered) = (0, 0, 0);
+    for _ in 0..PINGS {
+        if let Some((_, after_ms)) = talk.command(Command::Other(PING), PING)? {
+            (worst_ms, sum_ms, answered) = (worst_ms.max(after_ms), sum_ms + after_ms, answered + 1);
+        }
+        talk.listen(20)?;
+    }
+    let elapsed_s = talk.now_ms() as f64 * 1e-3;
+    let heard = *talk.counters();
+    step.found("bytes", format!("{}, {:.0} per second", talk.bytes(), talk.bytes() as f64 / elapsed_s));
+    step.found("messages here", format!("{}, {} lost, {} corrupt", heard.received, heard.lost, heard.bad_checksum));
+    if let Some(there) = talk.heard.health.map(|health| health.link) {
+        let counts = format!("{}, {} lost, {} corrupt", there.received, there.lost, there.bad_checksum);
+        step.found("messages there, on one of its links", counts);
+        step.check(there.bad_checksum == 0, "corrupt messages there");
+    }
+    step.found("heartbeats", format!("{} in {elapsed_s:.1} s", talk.heard.heartbeats));
+    if answered > 0 {
+        step.found("round trip", format!("mean {}, worst {worst_ms} ms", sum_ms / u64::from(answered)));
+    }
+    step.check(answered == PINGS, format_args!("{} questions unanswered", PINGS - answered));
+    step.check(heard.bad_checksum == 0, "corrupt messages here");
+    step.check(f64::from(talk.heard.heartbeats) > 0.8 * elapsed_s - 1.0, "heartbeats are missing");
+    Ok(step)
+}

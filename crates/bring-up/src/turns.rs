@@ -1,0 +1,98 @@
+//! Turning the board by hand: signs of gyroscope, accelerometer and attitude.
+
+use crate::conversation::Conversation;
+use crate::error::Error;
+use crate::heard::Heard;
+use crate::log::BringUpStep;
+use crate::steps::senses;
+use nalgebra::Vector3;
+
+/// Longest wait for a hand \[ms\].
+const PATIENCE_MS: u64 = 60_000;
+/// Largest angle between gravity and the axis that is to be vertical \[rad\]: 30 degrees.
+const ASIDE_MAX_RAD: f32 = 0.52;
+/// Longest time between two samples that is counted \[s\].
+const GAP_MAX_S: f64 = 0.1;
+
+/// A side, what to do, the axis that points up then (x forward, y left, z up), and the turn from level, whose sign the
+/// gyroscope and the attitude have to show.
+struct Turn {
+    name: &'static str,
+    order: &'static str,
+    up: [f32; 3],
+    axis: usize,
+    sign: f64,
+}
+
+const TURNS: [Turn; 4] = [
+    Turn { name: "right side down", order: "turn it onto its right side", up: [0.0, 1.0, 0.0], axis: 0, sign: 1.0 },
+    Turn { name: "left side down", order: "turn it onto its left side", up: [0.0, -1.0, 0.0], axis: 0, sign: -1.0 },
+    Turn { name: "nose down", order: "turn its nose straight down", up: [-1.0, 0.0, 0.0], axis: 1, sign: 1.0 },
+    Turn { name: "nose up", order: "turn its nose straight up", up: [1.0, 0.0, 0.0], axis: 1, sign: -1.0 },
+];
+
+/// All turns.
+pub(crate) fn turns(
+    talk: &mut Conversation<'_>,
+    is_attended: bool,
+    tell: &mut dyn FnMut(&str),
+    add: &mut dyn FnMut(BringUpStep),
+) -> Result<(), Error> {
+    for turn in &TURNS {
+        let mut step = BringUpStep::new(turn.name);
+        if !is_attended || !senses(talk) {
+            add(step.skipped("nobody to turn it, or nothing that feels it"));
+            continue;
+        }
+        tell("hold it level");
+        let mut level = Turned::default();
+        let is_level = talk.wait(PATIENCE_MS, |heard| level.follow(heard, &Vector3::z()))?;
+        step.check(is_level, "it was not held level");
+        tell(turn.order);
+        let mut turned = Turned::default();
+        let is_done = talk.wait(PATIENCE_MS, |heard| turned.follow(heard, &turn.up.into()))?;
+        let angle_rad = turned.angle_rad.get(turn.axis).copied().unwrap_or_default() * turn.sign;
+        let attitude_rad = talk.heard.attitude_rad.and_then(|attitude_rad| attitude_rad.get(turn.axis).copied());
+        let attitude_rad = f64::from(attitude_rad.unwrap_or_default()) * turn.sign;
+        step.found("specific force, forward, left, up [m/s2]", three(turned.force_m_s2));
+        step.found("turned by the gyroscope, expected 90", format!("{:.0} degrees", angle_rad.to_degrees()));
+        step.found("by the estimate, expected 90", format!("{:.0} degrees", attitude_rad.to_degrees()));
+        step.check(is_done, "the accelerometer has not shown that side up which should be");
+        // Half a right angle and one and a half.
+        step.check((0.78..2.36).contains(&angle_rad), "the gyroscope has not shown this turn");
+        step.check(attitude_rad > 0.5, "the attitude has not shown this turn");
+        add(step);
+    }
+    Ok(())
+}
+
+/// What the samples have shown of a turn.
+#[derive(Default)]
+struct Turned {
+    force_m_s2: Vector3<f32>,
+    angle_rad: Vector3<f64>,
+    last_us: Option<u64>,
+    /// Samples in the attitude that is waited for, one after the other.
+    held: u32,
+}
+
+impl Turned {
+    /// Takes the samples that have come; true once this axis has been up for half a second.
+    fn follow(&mut self, heard: &mut Heard, up: &Vector3<f32>) -> bool {
+        const HELD: u32 = 25;
+        for sample in heard.samples.drain(..) {
+            let elapsed_s = sample.time_us.saturating_sub(self.last_us.unwrap_or(sample.time_us)) as f64 * 1e-6;
+            self.last_us = Some(sample.time_us);
+            self.angle_rad += sample.rates_rad_s.cast::<f64>() * elapsed_s.min(GAP_MAX_S);
+            self.force_m_s2 = sample.specific_force_m_s2;
+            let is_up = sample.specific_force_m_s2.angle(up) < ASIDE_MAX_RAD;
+            self.held = if is_up { self.held + 1 } else { 0 };
+        }
+        self.held >= HELD
+    }
+}
+
+fn three(vector: Vector3<f32>) -> String {
+    let [x, y, z]: [f32; 3] = vector.into();
+    format!("{x:.2} {y:.2} {z:.2}")
+}

@@ -1,0 +1,151 @@
+//! The list with the firmware's code on simulated sensors, in lockstep, and with what is no board.
+#![allow(clippy::unwrap_used, missing_docs, reason = "tests")]
+
+use afbc_bring_up::{BringUpLog, BringUpOptions, Error, Verdict, bring_up};
+use afbc_hil::{Autopilot, Error as HilError};
+use afbc_link::{Address, Command, Downlink, FRAME_MAX, Sender, Uplink};
+use afbc_scenario::built_in;
+use afbc_serve::{Server, fleet};
+
+/// A vehicle, at the other end of a line in lockstep.
+struct Served(Server);
+
+impl Served {
+    fn new(scenario: &str) -> Self {
+        let scenario = built_in(scenario).unwrap().read().unwrap();
+        let mut served = Served(Server::new(&fleet(&scenario, 1).unwrap(), 1).unwrap());
+        for _ in 0..3_000 {
+            served.exchange(&[], &mut |_| ()).unwrap();
+        }
+        served
+    }
+}
+
+impl Autopilot for Served {
+    fn exchange(&mut self, uplink: &[u8], hear: &mut dyn FnMut(&[u8])) -> Result<(), HilError> {
+        self.0.hear(0, 1, uplink);
+        let _ = self.0.step(|_, bytes| hear(bytes), |_| ());
+        Ok(())
+    }
+}
+
+/// A vehicle in the hands of somebody who does what is asked: `tell` writes the order, and the next millisecond obeys.
+struct Held<'a>(Served, &'a std::cell::RefCell<Vec<String>>);
+
+impl Autopilot for Held<'_> {
+    fn exchange(&mut self, uplink: &[u8], hear: &mut dyn FnMut(&[u8])) -> Result<(), HilError> {
+        for line in self.1.borrow_mut().drain(..) {
+            let reply = self.0.0.line(&line);
+            assert!(reply.lines.iter().all(|line| !line.starts_with("error")), "{reply:?}");
+        }
+        self.0.exchange(uplink, hear)
+    }
+}
+
+/// What a hand does when it is told this.
+fn obeyed(told: &str, wrong: bool) -> Option<String> {
+    let (right, left) = if wrong { ("left", "right") } else { ("right", "left") };
+    let side = [("level", "down"), ("right side", right), ("left side", left), ("down", "front"), ("up", "back")]
+        .into_iter()
+        .find(|(word, _)| told.ends_with(word));
+    let asked = told.starts_with("hold") || told.starts_with("turn");
+    side.filter(|_| asked).map(|(_, side)| format!("hold {side}"))
+}
+
+fn with_a_hand(wrong: bool) -> BringUpLog {
+    let orders = std::cell::RefCell::new(Vec::new());
+    let mut held = Held(Served::new("outdoor"), &orders);
+    let options = BringUpOptions { rest_s: 10, is_attended: true };
+    bring_up(&mut held, options, &mut |told| orders.borrow_mut().extend(obeyed(told, wrong))).unwrap()
+}
+
+fn verdict(log: &BringUpLog, name: &str) -> (Verdict, String) {
+    let step = log.steps.iter().find(|step| step.name == name).unwrap();
+    (step.verdict, step.reasons.join("; "))
+}
+
+#[test]
+fn a_vehicle_in_good_hands_passes_every_step() {
+    let log = with_a_hand(false);
+    for step in &log.steps {
+        assert_eq!(step.verdict, Verdict::Passed, "{}: {:?}\n{}", step.name, step.reasons, log.page());
+    }
+    let names: Vec<_> = log.steps.iter().map(|step| step.name).collect();
+    for wanted in ["noise at rest", "right side down", "nose up", "warmth", "GNSS fix", "battery", "link"] {
+        assert!(names.contains(&wanted), "{names:?}");
+    }
+    assert!(log.parameters.iter().any(|(name, value)| name == "SER_TEL1_BAUD" && value == "921600"));
+}
+
+/// A board whose y axis is wrong looks like one that is turned to the other side.
+#[test]
+fn a_turn_to_the_other_side_fails() {
+    let log = with_a_hand(true);
+    for name in ["right side down", "left side down"] {
+        let (verdict, reasons) = verdict(&log, name);
+        assert_eq!(verdict, Verdict::Failed, "{name}");
+        assert!(reasons.contains("the gyroscope has not shown"), "{reasons}");
+    }
+    assert_eq!(verdict(&log, "nose down").0, Verdict::Passed);
+    assert!(!log.is_well());
+}
+
+/// Alone it does what needs no hand, in the same way each time, and shows what is wrong.
+#[test]
+fn alone_it_does_what_needs_no_hand() {
+    let run = |fault: &str| {
+        let mut served = Served::new("outdoor");
+        if !fault.is_empty() {
+            served.0.line(fault);
+        }
+        bring_up(&mut served, BringUpOptions { rest_s: 5, is_attended: false }, &mut |_| ()).unwrap()
+    };
+    let log = run("");
+    assert!(log.is_well(), "{}", log.page());
+    assert_eq!(log.page(), run("").page());
+    for name in ["right side down", "warmth"] {
+        assert_eq!(verdict(&log, name).0, Verdict::Skipped, "{name}");
+    }
+    let (stuck, reasons) = verdict(&run("fault imu stuck"), "noise at rest");
+    assert_eq!(stuck, Verdict::Failed, "{reasons}");
+    assert!(reasons.contains("stuck"), "{reasons}");
+    let (noisy, reasons) = verdict(&run("fault imu noisy 0.5 5"), "noise at rest");
+    assert_eq!(noisy, Verdict::Failed, "{reasons}");
+    let (silent, reasons) = verdict(&run("fault magnetometer lost"), "sensors");
+    assert_eq!(silent, Verdict::Failed, "{reasons}");
+}
+
+/// Something else at the other end, which sends the same bytes each millisecond.
+struct Other(Vec<u8>);
+
+impl Autopilot for Other {
+    fn exchange(&mut self, _: &[u8], hear: &mut dyn FnMut(&[u8])) -> Result<(), HilError> {
+        hear(&self.0);
+        Ok(())
+    }
+}
+
+#[test]
+fn what_is_no_board_is_named() {
+    let beat = |armed| {
+        let beat = Downlink::Heartbeat { armed, failsafe: false, mode: 0 };
+        Sender::new(Address { system: 1, component: 1 }).send(&beat, &mut [0; FRAME_MAX]).to_vec()
+    };
+    let arm = Sender::new(Address { system: 255, component: 190 });
+    let mut own = arm;
+    let mut uplink = own.send(&Uplink::Command(Command::Disarm), &mut [0; FRAME_MAX]).to_vec();
+    uplink.extend_from_slice(own.send(&Uplink::Heartbeat, &mut [0; FRAME_MAX]));
+    for (bytes, wanted) in [
+        (Vec::new(), "sends nothing"),
+        (vec![0x24, 0x4d, 0x3c, 0xfd, 0x09, 0x00], "bytes and no MAVLink heartbeat"),
+        // Its own words, sent back by a wire from TX to RX.
+        (uplink, "bytes and no MAVLink heartbeat"),
+        (beat(false), "not this firmware"),
+        (beat(true), "is armed"),
+    ] {
+        let options = BringUpOptions { rest_s: 1, is_attended: false };
+        let error: Error = bring_up(&mut Other(bytes), options, &mut |_| ()).unwrap_err();
+        let text = error.to_string();
+        assert!(text.contains(wanted) && text.lines().count() == 1, "{text}");
+    }
+}

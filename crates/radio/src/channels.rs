@@ -1,0 +1,56 @@
+//! Channels of a transmitter.
+
+/// Number of channels that are read.
+pub const CHANNELS: usize = 16;
+/// Bits of a channel in both protocols.
+const BITS: usize = 11;
+/// Bytes of sixteen of them.
+pub(crate) const PACKED: usize = CHANNELS * BITS / 8;
+
+/// Channels of a frame, as lengths of a servo's pulse: 1500 us is the centre.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Channels {
+    /// Length of the pulse \[us\].
+    pub us: [u16; CHANNELS],
+}
+
+impl Channels {
+    /// Reads channels of eleven bits each, the lowest bits first; `to_us` scales one.
+    pub(crate) fn unpack(bytes: &[u8; PACKED], to_us: fn(u16) -> u16) -> Self {
+        let mut us = [0; CHANNELS];
+        let (mut bits, mut held, mut bytes) = (0u32, 0, bytes.iter());
+        for channel in &mut us {
+            while held < BITS {
+                bits |= u32::from(bytes.next().copied().unwrap_or_default()) << held;
+                held += 8;
+            }
+            *channel = to_us((bits & ((1 << BITS) - 1)) as u16);
+            bits >>= BITS;
+            held -= BITS;
+        }
+        Channels { us }
+    }
+
+    /// Writes them, the inverse of [`unpack`](Self::unpack).
+    pub(crate) fn pack(&self, from_us: fn(u16) -> u16) -> [u8; PACKED] {
+        let mut packed = [0; PACKED];
+        let (mut bits, mut held, mut channels) = (0u32, 0, self.us.iter());
+        for byte in &mut packed {
+            while held < 8 {
+                let channel = channels.next().map_or(0, |us| from_us(*us));
+                bits |= u32::from(channel & ((1 << BITS) - 1)) << held;
+                held += BITS;
+            }
+            *byte = bits as u8;
+            bits >>= 8;
+            held -= 8;
+        }
+        packed
+    }
+
+    /// Returns a channel, counted from 1 as parameters count them; none for 0, which is no channel.
+    pub fn channel(&self, number: u32) -> Option<u16> {
+        let index = usize::try_from(number).ok()?.checked_sub(1)?;
+        self.us.get(index).copied()
+    }
+}

@@ -1,0 +1,45 @@
+//! Radio control: from a receiver's bytes to what the pilot wants.
+//!
+//! * [`CrsfDecoder`] and [`SbusDecoder`] find the frames of a receiver in its bytes; a frame has [`Channels`].
+//! * [`RadioLink`] decides from frames and time whether the pilot is heard.
+//! * [`RadioPilot`] turns channels into sticks, requests and orders, by [`RadioSettings`], which have PX4's names.
+//! * [`CrsfTelemetry`] is what goes back to the pilot's transmitter.
+//!
+//! No input and output, no clock: the caller brings bytes and times. Nothing here fails on any bytes; what is no frame
+//! is left out.
+//!
+//! ```
+//! use afbc_radio::{CRSF_MICROSECONDS, Channels, CrsfDecoder, CrsfFrame, RadioLink};
+//!
+//! // Sixteen channels at their centre, as an ExpressLRS receiver sends them.
+//! let frame = CrsfFrame::Channels(Channels { us: [1500; 16] }).encode();
+//! let (mut decoder, mut link) = (CrsfDecoder::default(), RadioLink::default());
+//! for number in 0..20 {
+//!     decoder.feed(&frame, number * 4_000, |frame| {
+//!         if let CrsfFrame::Channels(channels) = frame {
+//!             link.take(&channels, number * 4_000);
+//!         }
+//!     });
+//! }
+//! assert!(link.heard(80_000).is_some_and(|channels| channels.us[0] == 1500));
+//! assert!(link.heard(800_000).is_none());
+//! assert_eq!(CRSF_MICROSECONDS, 988..=2012);
+//! ```
+#![no_std]
+
+mod channels;
+mod crsf;
+mod link;
+mod pilot;
+mod sbus;
+mod settings;
+mod switches;
+mod telemetry;
+
+pub use channels::{CHANNELS, Channels};
+pub use crsf::{CRSF_GAP_US, CRSF_MICROSECONDS, CrsfDecoder, CrsfFrame, LinkStatistics};
+pub use link::{ACQUIRE_FRAMES, RECOVERY_US, RadioLink, SILENT_US};
+pub use pilot::{PilotInputs, PilotNotice, PilotOutput, RadioPilot};
+pub use sbus::{SBUS_GAP_US, SbusDecoder, SbusFrame};
+pub use settings::{ChannelCalibration, RadioFunctions, RadioProtocol, RadioReceiver, RadioSettings, SwitchModes};
+pub use telemetry::CrsfTelemetry;

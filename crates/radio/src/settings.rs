@@ -1,0 +1,292 @@
+//! Parameters of radio control, with PX4's names and meanings.
+
+use crate::channels::Channels;
+use afbc_guidance::FlightMode;
+use afbc_types::{Choice, Range, parameters};
+
+parameters! {
+    /// Calibration of a channel.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct ChannelCalibration {
+        /// Shortest pulse.
+        #[parameter(MIN, "us", 800.0..=1500.0)]
+        pub min_us: f32 = 1000.0,
+        /// Pulse at the centre; of the throttle, the centre is between the two ends.
+        #[parameter(TRIM, "us", 800.0..=2200.0)]
+        pub trim_us: f32 = 1500.0,
+        /// Longest pulse.
+        #[parameter(MAX, "us", 1500.0..=2200.0)]
+        pub max_us: f32 = 2000.0,
+        /// Distance from the centre up to which it counts as centred.
+        #[parameter(DZ, "us", 0.0..=100.0)]
+        pub dead_band_us: f32 = 10.0,
+        /// Direction: below 0 it is reversed.
+        #[parameter(REV, "number", -1.0..=1.0)]
+        pub direction: f32 = 1.0,
+    }
+    together(channel) {
+        let ChannelCalibration { min_us, max_us, .. } = *channel;
+        // Half the room of a stick on either side at least, so that nothing is divided by zero.
+        Range { max: (max_us - 300.0).into(), ..ChannelCalibration::MIN.range }.check(min_us)?;
+        let room = Range { min: min_us.into(), max: max_us.into(), ..ChannelCalibration::TRIM.range };
+        room.check(channel.trim_us)
+    }
+}
+
+parameters! {
+    /// Which channel does what, counted from 1; 0: none.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct RadioFunctions {
+        /// Roll.
+        #[parameter(RC_MAP_ROLL, "number", 0.0..=16.0)]
+        pub roll: u32 = 1,
+        /// Pitch.
+        #[parameter(RC_MAP_PITCH, "number", 0.0..=16.0)]
+        pub pitch: u32 = 2,
+        /// Throttle.
+        #[parameter(RC_MAP_THROTTLE, "number", 0.0..=16.0)]
+        pub throttle: u32 = 3,
+        /// Yaw.
+        #[parameter(RC_MAP_YAW, "number", 0.0..=16.0)]
+        pub yaw: u32 = 4,
+        /// Switch that arms and disarms.
+        #[parameter(RC_MAP_ARM_SW, "number", 0.0..=16.0)]
+        pub arm: u32 = 5,
+        /// Switch of six positions that selects the mode.
+        #[parameter(RC_MAP_FLTMODE, "number", 0.0..=16.0)]
+        pub mode: u32 = 6,
+        /// Switch that stops the motors, also in flight.
+        #[parameter(RC_MAP_KILL_SW, "number", 0.0..=16.0)]
+        pub kill: u32 = 0,
+        /// Switch that lets it return.
+        #[parameter(RC_MAP_RETURN_SW, "number", 0.0..=16.0)]
+        pub return_home: u32 = 0,
+        /// Switch that lets it hold.
+        #[parameter(RC_MAP_LOITER_SW, "number", 0.0..=16.0)]
+        pub hold: u32 = 0,
+        /// Channel by which a receiver that has no other way shows that it hears nothing; 0: the throttle.
+        #[parameter(RC_MAP_FAILSAFE, "number", 0.0..=16.0)]
+        pub failsafe: u32 = 0,
+        /// Where the arming switch is on, as a share of its way; negative: below that share.
+        #[parameter(RC_ARMSWITCH_TH, "share", -1.0..=1.0)]
+        pub arm_share: f32 = 0.75,
+        /// The same of the switch that stops the motors.
+        #[parameter(RC_KILLSWITCH_TH, "share", -1.0..=1.0)]
+        pub kill_share: f32 = 0.75,
+        /// The same of the switch for the return.
+        #[parameter(RC_RETURN_TH, "share", -1.0..=1.0)]
+        pub return_share: f32 = 0.75,
+        /// The same of the switch for holding.
+        #[parameter(RC_LOITER_TH, "share", -1.0..=1.0)]
+        pub hold_share: f32 = 0.75,
+        /// Pulse of that channel below its shortest, or above its longest, that means that the receiver hears nothing;
+        /// 0: none does.
+        #[parameter(RC_FAILS_THR, "us", 0.0..=2200.0)]
+        pub failsafe_us: f32 = 0.0,
+    }
+}
+
+parameters! {
+    /// Modes of the six positions of the mode's switch, by PX4's numbers: 0 and 8 stabilised, 1 altitude, 2 position,
+    /// 3 mission, 4 hold, 5 return, 7 offboard, 10 takeoff, 11 land.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct SwitchModes {
+        /// First position.
+        #[parameter(COM_FLTMODE1, "number", 0.0..=11.0)]
+        pub first: u32 = 2,
+        /// Second position.
+        #[parameter(COM_FLTMODE2, "number", 0.0..=11.0)]
+        pub second: u32 = 2,
+        /// Third position.
+        #[parameter(COM_FLTMODE3, "number", 0.0..=11.0)]
+        pub third: u32 = 2,
+        /// Fourth position.
+        #[parameter(COM_FLTMODE4, "number", 0.0..=11.0)]
+        pub fourth: u32 = 2,
+        /// Fifth position.
+        #[parameter(COM_FLTMODE5, "number", 0.0..=11.0)]
+        pub fifth: u32 = 4,
+        /// Sixth position.
+        #[parameter(COM_FLTMODE6, "number", 0.0..=11.0)]
+        pub sixth: u32 = 4,
+        /// True if the sticks, moved, end a mode that flies by itself.
+        #[switch(COM_RC_OVERRIDE)]
+        pub overrides: bool = true,
+        /// How far they must move for it, of their way from the centre.
+        #[parameter(COM_RC_STICK_OV, "share", 0.05..=0.8)]
+        pub override_share: f32 = 0.3,
+    }
+    together(modes) {
+        for (declaration, number) in SwitchModes::DECLARED.iter().zip(modes.numbers()) {
+            if mode_of(number).is_none() {
+                // Acro (6) and slow position (9) there are none of.
+                let next = f64::from(number) + 1.0;
+                Range { min: next, ..declaration.range }.check(number as f32)?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// A protocol of receivers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RadioProtocol {
+    /// CRSF: Crossfire, ExpressLRS.
+    Crsf,
+    /// SBUS: Futaba, FrSky and others.
+    Sbus,
+}
+
+impl Choice for RadioProtocol {
+    const ALL: &'static [Self] = &[RadioProtocol::Crsf, RadioProtocol::Sbus];
+    const WORDS: &'static [&'static str] = &["crsf", "sbus"];
+}
+
+parameters! {
+    /// The receiver.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct RadioReceiver {
+        /// Link that the receiver is on in place of MAVLink, counted from 1; 0 for none, from the next start on. The
+        /// first one never has it.
+        #[parameter(RC_PORT, "number", 0.0..=4.0)]
+        pub port: u32 = 0,
+        /// Its protocol, from the next start on.
+        #[choice(RC_PROTOCOL)]
+        pub protocol: RadioProtocol = RadioProtocol::Crsf,
+    }
+}
+
+parameters! {
+    /// All parameters of radio control.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct RadioSettings {
+        /// The receiver.
+        #[group("")]
+        pub receiver: RadioReceiver = RadioReceiver::DEFAULT,
+        /// Which channel does what.
+        #[group("")]
+        pub functions: RadioFunctions = RadioFunctions::DEFAULT,
+        /// Modes.
+        #[group("")]
+        pub modes: SwitchModes = SwitchModes::DEFAULT,
+        /// Channel 1.
+        #[group("RC1_")]
+        pub channel_1: ChannelCalibration = ChannelCalibration::DEFAULT,
+        /// Channel 2.
+        #[group("RC2_")]
+        pub channel_2: ChannelCalibration = ChannelCalibration::DEFAULT,
+        /// Channel 3.
+        #[group("RC3_")]
+        pub channel_3: ChannelCalibration = ChannelCalibration::DEFAULT,
+        /// Channel 4.
+        #[group("RC4_")]
+        pub channel_4: ChannelCalibration = ChannelCalibration::DEFAULT,
+        /// Channel 5.
+        #[group("RC5_")]
+        pub channel_5: ChannelCalibration = ChannelCalibration::DEFAULT,
+        /// Channel 6.
+        #[group("RC6_")]
+        pub channel_6: ChannelCalibration = ChannelCalibration::DEFAULT,
+        /// Channel 7.
+        #[group("RC7_")]
+        pub channel_7: ChannelCalibration = ChannelCalibration::DEFAULT,
+        /// Channel 8.
+        #[group("RC8_")]
+        pub channel_8: ChannelCalibration = ChannelCalibration::DEFAULT,
+    }
+}
+
+/// Returns the mode of a number of PX4's.
+fn mode_of(number: u32) -> Option<FlightMode> {
+    Some(match number {
+        0 | 8 => FlightMode::Stabilised,
+        1 => FlightMode::Altitude,
+        2 => FlightMode::Position,
+        3 => FlightMode::Mission,
+        4 => FlightMode::Hold,
+        5 => FlightMode::Return,
+        7 => FlightMode::Offboard,
+        10 => FlightMode::Takeoff,
+        11 => FlightMode::Land,
+        _ => return None,
+    })
+}
+
+impl SwitchModes {
+    const DECLARED: [afbc_types::Declaration; 6] = [
+        Self::COM_FLTMODE1,
+        Self::COM_FLTMODE2,
+        Self::COM_FLTMODE3,
+        Self::COM_FLTMODE4,
+        Self::COM_FLTMODE5,
+        Self::COM_FLTMODE6,
+    ];
+
+    fn numbers(&self) -> [u32; 6] {
+        [self.first, self.second, self.third, self.fourth, self.fifth, self.sixth]
+    }
+
+    /// Returns the mode of a switch that is `stick` of its way from the centre, -1 to 1.
+    pub(crate) fn mode(&self, stick: f32) -> Option<FlightMode> {
+        let position = ((stick + 1.0) * 3.0) as usize;
+        self.numbers().get(position.min(5)).copied().and_then(mode_of)
+    }
+}
+
+impl ChannelCalibration {
+    /// Returns a pulse as a share of the way from `trim_us`, -1 to 1.
+    fn share(&self, us: u16, trim_us: f32) -> f32 {
+        let off_us = f32::from(us) - trim_us;
+        let outside_us = off_us.abs() - self.dead_band_us;
+        let room_us = (if off_us > 0.0 { self.max_us - trim_us } else { trim_us - self.min_us }) - self.dead_band_us;
+        if outside_us <= 0.0 || room_us <= 0.0 {
+            return 0.0;
+        }
+        let share = if outside_us < room_us { outside_us / room_us } else { 1.0 };
+        if (off_us < 0.0) == (self.direction < 0.0) { share } else { -share }
+    }
+
+    /// Returns a stick, -1 to 1.
+    pub(crate) fn stick(&self, us: u16) -> f32 {
+        self.share(us, self.trim_us)
+    }
+
+    /// Returns a stick or switch whose centre is between its ends, -1 to 1.
+    pub(crate) fn centred(&self, us: u16) -> f32 {
+        self.share(us, 0.5 * (self.min_us + self.max_us))
+    }
+}
+
+impl RadioSettings {
+    fn calibrations(&self) -> [&ChannelCalibration; 8] {
+        [
+            &self.channel_1,
+            &self.channel_2,
+            &self.channel_3,
+            &self.channel_4,
+            &self.channel_5,
+            &self.channel_6,
+            &self.channel_7,
+            &self.channel_8,
+        ]
+    }
+
+    /// Returns a channel's calibration and pulse.
+    pub(crate) fn channel(&self, channels: &Channels, number: u32) -> Option<(&ChannelCalibration, u16)> {
+        let index = usize::try_from(number).ok()?.checked_sub(1)?;
+        // Further ones are for switches, which need no calibration.
+        let calibration = self.calibrations().get(index).copied().unwrap_or(&ChannelCalibration::DEFAULT);
+        Some((calibration, channels.channel(number)?))
+    }
+
+    /// True if the receiver shows by a channel that it hears nothing.
+    pub(crate) fn has_failed(&self, channels: &Channels) -> bool {
+        let RadioFunctions { failsafe, throttle, failsafe_us, .. } = self.functions;
+        let number = if failsafe == 0 { throttle } else { failsafe };
+        let Some((calibration, us)) = self.channel(channels, number).filter(|_| failsafe_us > 0.0) else {
+            return false;
+        };
+        let us = f32::from(us);
+        failsafe_us < calibration.min_us && us < failsafe_us || failsafe_us > calibration.max_us && us > failsafe_us
+    }
+}

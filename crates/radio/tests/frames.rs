@@ -1,0 +1,189 @@
+//! Frames of receivers, beside other people's encoders and decoders, and bytes that are none.
+#![allow(clippy::unwrap_used, clippy::indexing_slicing, clippy::panic)]
+
+use afbc_radio::{
+    CHANNELS, CRSF_GAP_US, Channels, CrsfDecoder, CrsfFrame, CrsfTelemetry, LinkStatistics, SbusDecoder, SbusFrame,
+};
+use proptest::prelude::*;
+
+/// Pulses that eleven bits of CRSF can say.
+fn channels() -> impl Strategy<Value = Channels> {
+    prop::array::uniform16(880u16..=2154).prop_map(|us| Channels { us })
+}
+
+fn crsf(bytes: &[u8]) -> Vec<CrsfFrame> {
+    let (mut decoder, mut frames) = (CrsfDecoder::default(), Vec::new());
+    decoder.feed(bytes, 0, |frame| frames.push(frame));
+    frames
+}
+
+/// Returns the frames of bytes in pieces, each with the pause before it.
+fn sbus(pieces: &[(u64, &[u8])]) -> Vec<SbusFrame> {
+    let (mut decoder, mut frames, mut now_us) = (SbusDecoder::default(), Vec::new(), 0);
+    for (pause_us, piece) in pieces {
+        now_us += pause_us;
+        decoder.feed(piece, now_us, |frame| frames.push(frame));
+    }
+    frames
+}
+
+proptest! {
+    /// As `crsf`, another implementation, writes them.
+    #[test]
+    fn crsf_channels_are_those_of_another_encoder(ticks in prop::array::uniform16(0u16..=2047)) {
+        let packet = crsf::Packet::RcChannels(crsf::RcChannels(ticks));
+        let raw = packet.into_raw(crsf::PacketAddress::Controller);
+        let us = ticks.map(|ticks| ((i32::from(ticks) - 992) * 5 / 8 + 1500) as u16);
+        prop_assert_eq!(crsf(raw.data()), [CrsfFrame::Channels(Channels { us })]);
+    }
+
+    #[test]
+    fn crsf_channels_are_read_as_they_were_written(channels in channels()) {
+        let frame = CrsfFrame::Channels(channels);
+        prop_assert_eq!(crsf(&frame.encode()), [frame]);
+        // And by the other implementation.
+        let mut parser = crsf::PacketParser::<64>::new();
+        parser.push_bytes(&frame.encode());
+        let Some(Ok((_, crsf::Packet::RcChannels(read)))) = parser.next_packet() else { panic!("no packet") };
+        for (ticks, us) in read.0.iter().zip(channels.us) {
+            prop_assert_eq!((i32::from(*ticks) - 992) * 5 / 8 + 1500, i32::from(us));
+        }
+    }
+
+    /// A checksum of eight bits finds one wrong bit, and any that lie within eight.
+    #[test]
+    fn a_spoilt_crsf_frame_is_none(channels in channels(), at in 16usize..200, burst in 1u8..) {
+        let mut bytes = CrsfFrame::Channels(channels).encode();
+        let pattern = u16::from(burst) << (at % 8);
+        bytes[at / 8] ^= pattern as u8;
+        bytes[at / 8 + 1] ^= (pattern >> 8) as u8;
+        prop_assert_eq!(crsf(&bytes), []);
+    }
+
+    /// Every frame is found, in whatever pieces it comes, after anything that begins no frame.
+    #[test]
+    fn crsf_frames_are_found_in_noise(
+        frames in prop::collection::vec((channels(), prop::collection::vec(0u8..0xC8, 0..80)), 1..6),
+        piece in 1usize..70,
+    ) {
+        let (mut bytes, mut expected) = (Vec::new(), Vec::new());
+        for (channels, noise) in &frames {
+            bytes.extend_from_slice(noise);
+            bytes.extend_from_slice(&CrsfFrame::Channels(*channels).encode());
+            expected.push(CrsfFrame::Channels(*channels));
+        }
+        let (mut decoder, mut found) = (CrsfDecoder::default(), Vec::new());
+        bytes.chunks(piece).for_each(|piece| decoder.feed(piece, 0, |frame| found.push(frame)));
+        prop_assert_eq!(found, expected);
+        prop_assert_eq!(decoder.good_frames() as usize, frames.len());
+    }
+
+    /// What was cut short costs no frame after the pause.
+    #[test]
+    fn a_cut_crsf_frame_costs_no_other(first in channels(), second in channels(), kept in 1usize..26) {
+        let [first, second] = [first, second].map(CrsfFrame::Channels);
+        let (mut decoder, mut found) = (CrsfDecoder::default(), Vec::new());
+        decoder.feed(&first.encode()[..kept], 0, |frame| found.push(frame));
+        decoder.feed(&second.encode(), CRSF_GAP_US, |frame| found.push(frame));
+        prop_assert_eq!(found, [second]);
+        prop_assert_eq!(decoder.bad_frames(), 1);
+    }
+
+    /// Bytes that are nothing are no trouble, and no more than a few are taken for frames.
+    #[test]
+    fn any_bytes_are_read(bytes in prop::collection::vec(any::<u8>(), 0..2000), piece in 1usize..90) {
+        let (mut crsf, mut sbus) = (CrsfDecoder::default(), SbusDecoder::default());
+        for (number, piece) in bytes.chunks(piece).enumerate() {
+            crsf.feed(piece, number as u64 * 3_000, |_| ());
+            sbus.feed(piece, number as u64 * 3_000, |_| ());
+        }
+        prop_assert!(crsf.good_frames() as usize <= bytes.len() / 4);
+    }
+
+    /// As `sbus-rs`, another implementation, reads them.
+    #[test]
+    fn sbus_frames_are_those_of_another_decoder(
+        us in prop::array::uniform16(875u16..=2154), frame_lost: bool, failsafe: bool,
+    ) {
+        let frame = SbusFrame { channels: Channels { us }, frame_lost, failsafe };
+        let bytes = frame.encode();
+        prop_assert_eq!(sbus(&[(7_000, &bytes)]), [frame]);
+        let read = sbus_rs::SbusPacket::from_array(&bytes).unwrap();
+        prop_assert_eq!((read.flags.frame_lost, read.flags.failsafe), (frame_lost, failsafe));
+        for (ticks, us) in read.channels.iter().zip(us) {
+            prop_assert_eq!(u32::from(*ticks) * 5 / 8 + 875, u32::from(us));
+        }
+    }
+
+    /// A frame begins after a pause alone: the same bytes elsewhere are none.
+    #[test]
+    fn sbus_frames_begin_after_a_pause(us in prop::array::uniform16(1000u16..=2000), early in 1usize..24) {
+        let frame = SbusFrame { channels: Channels { us }, frame_lost: false, failsafe: false };
+        let bytes = frame.encode();
+        let (head, tail) = bytes.split_at(early);
+        prop_assert_eq!(sbus(&[(7_000, head), (500, tail)]), [frame]);
+        prop_assert_eq!(sbus(&[(7_000, head), (7_000, tail), (500, &bytes)]), []);
+        prop_assert_eq!(sbus(&[(7_000, &bytes), (0, &bytes), (7_000, &bytes)]), [frame, frame]);
+    }
+}
+
+#[test]
+fn a_footer_or_flag_that_is_none_spoils_a_frame() {
+    let good = SbusFrame { channels: Channels { us: [1500; CHANNELS] }, frame_lost: false, failsafe: false }.encode();
+    for (at, value, is_frame) in
+        [(24, 0x00, true), (24, 0x34, true), (24, 0x01, false), (23, 0x03, true), (23, 0x10, false), (0, 0x0E, false)]
+    {
+        let mut bytes = good;
+        bytes[at] = value;
+        assert_eq!(sbus(&[(7_000, &bytes)]).len(), usize::from(is_frame), "byte {at} = {value}");
+    }
+}
+
+/// Values by hand, by the specification's table.
+#[test]
+fn link_statistics_are_read() {
+    let payload = [80, 70, 99, (-5i8) as u8, 1, 2, 3, 90, 98, 4];
+    let packet = crsf::Packet::LinkStatistics(crsf::LinkStatistics {
+        uplink_rssi_1: payload[0],
+        uplink_rssi_2: payload[1],
+        uplink_link_quality: payload[2],
+        uplink_snr: -5,
+        active_antenna: payload[4],
+        rf_mode: payload[5],
+        uplink_tx_power: payload[6],
+        downlink_rssi: payload[7],
+        downlink_link_quality: payload[8],
+        downlink_snr: 4,
+    });
+    let raw = packet.into_raw(crsf::PacketAddress::Controller);
+    let expected = LinkStatistics { rssi_dbm: -70, quality_percent: 99, snr_db: -5 };
+    assert_eq!(crsf(raw.data()), [CrsfFrame::LinkStatistics(expected)]);
+}
+
+/// Payloads by the specification: big-endian, its units, pitch before roll.
+#[test]
+fn telemetry_is_laid_out_as_specified() {
+    let payload = |telemetry: CrsfTelemetry<'_>| {
+        let bytes = telemetry.encode();
+        assert_eq!((bytes[0], usize::from(bytes[1])), (0xC8, bytes.len() - 2));
+        bytes[2..bytes.len() - 1].to_vec()
+    };
+    let battery = CrsfTelemetry::Battery { voltage_v: 16.24, current_a: 25.6, drawn_mah: 66_051.0, left: 0.755 };
+    assert_eq!(payload(battery), [0x08, 0, 162, 1, 0, 1, 2, 3, 76]);
+    let attitude = CrsfTelemetry::Attitude { angles_rad: [0.0256, -0.0001, 3.1] };
+    assert_eq!(payload(attitude), [0x1E, 0xFF, 0xFF, 0x01, 0x00, 0x79, 0x18]);
+    assert_eq!(payload(CrsfTelemetry::Mode("position")), b"\x21position\0");
+    assert_eq!(payload(CrsfTelemetry::Mode("a name that no transmitter shows")), b"\x21anamethatnotra\0");
+    let gps = CrsfTelemetry::Gps {
+        place_1e7deg: [471_000_000, -85_000_000],
+        speed_m_s: 10.0,
+        course_rad: -core::f32::consts::FRAC_PI_2,
+        height_m: 456.7,
+        satellites: 17,
+    };
+    let expected = [0x02, 0x1C, 0x12, 0xE3, 0xC0, 0xFA, 0xEF, 0x00, 0xC0, 0x01, 0x68, 0x69, 0x78, 0x05, 0xB0, 17];
+    assert_eq!(payload(gps), expected);
+    // Numbers that are none, or too large, say the nearest that can be said.
+    let odd = CrsfTelemetry::Battery { voltage_v: f32::NAN, current_a: -1.0, drawn_mah: f32::INFINITY, left: 7.0 };
+    assert_eq!(payload(odd), [0x08, 0, 0, 0, 0, 0xFF, 0xFF, 0xFF, 100]);
+}

@@ -1,0 +1,46 @@
+//! A setting that is not as it was.
+
+use afbc_scenario::contender::ControllerKind;
+use afbc_store::RecordName;
+use std::fmt;
+use std::str::FromStr;
+
+/// The key that names the law.
+const LAW: &str = "law";
+
+/// A setting in place of the one that was flown.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum SettingChange {
+    /// A parameter, as stations know it, from the start on.
+    Parameter(RecordName, f32),
+    /// The law: AFBC under its monitor, as in every image, or another with its gains of the profile `flight`.
+    Law(ControllerKind),
+}
+
+impl FromStr for SettingChange {
+    type Err = String;
+
+    /// Reads `KEY=VALUE`: the name of a parameter and a number, or `law` and the name of a law.
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (key, value) = text.split_once('=').ok_or("it must be KEY=VALUE, as in MPC_XY_VEL_MAX=4 or law=pid")?;
+        let (key, value) = (key.trim(), value.trim());
+        if key == LAW {
+            let kind = ControllerKind::ALL.into_iter().find(|kind| kind.name() == value);
+            return kind.map(SettingChange::Law).ok_or_else(|| {
+                format!("no such law; they are {}", ControllerKind::ALL.map(ControllerKind::name).join(", "))
+            });
+        }
+        let name = RecordName::new(key).ok_or("no such parameter; `sitl params export` lists them")?;
+        let value: Option<f32> = value.parse().ok().filter(|value: &f32| value.is_finite());
+        Ok(SettingChange::Parameter(name, value.ok_or("its value must be a number")?))
+    }
+}
+
+impl fmt::Display for SettingChange {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            SettingChange::Parameter(name, value) => write!(f, "{name}={value}"),
+            SettingChange::Law(kind) => write!(f, "{LAW}={}", kind.name()),
+        }
+    }
+}

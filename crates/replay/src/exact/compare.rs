@@ -1,0 +1,119 @@
+//! The flight of a log beside the same one under other settings.
+
+use super::change::SettingChange;
+use super::quantities::{QUANTITIES, ReplayQuantity, Values, values};
+use afbc_control::Trace;
+use afbc_onboard::Report;
+use afbc_types::ROTORS_MAX;
+use core::f64::consts::{PI, TAU};
+
+/// Ticks for each row: 100 Hz.
+const EVERY: u64 = 10;
+
+/// Difference of one quantity.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct QuantityFigure {
+    /// Ticks at which both flights have it.
+    pub count: u64,
+    squares: f64,
+    /// The largest difference, without its sign.
+    pub largest: f64,
+    /// When that was, from the first tick of the log on \[s\].
+    pub largest_at_s: f64,
+}
+
+impl QuantityFigure {
+    /// Root mean square; none if nothing could be compared.
+    #[must_use]
+    pub fn rms(&self) -> Option<f64> {
+        (self.count > 0).then(|| libm::sqrt(self.squares / self.count as f64))
+    }
+
+    fn add(&mut self, difference: f64, at_s: f64) {
+        self.count += 1;
+        self.squares += difference * difference;
+        if difference.abs() > self.largest {
+            (self.largest, self.largest_at_s) = (difference.abs(), at_s);
+        }
+    }
+}
+
+/// Values of one tick in the order of [`QUANTITIES`], not a number where there is none.
+#[derive(Clone, Copy, Debug)]
+pub struct ChangeRow {
+    /// Time from the first tick of the log on \[s\].
+    pub time_s: f64,
+    /// As it was.
+    pub flown: Values,
+    /// Under the other settings.
+    pub changed: Values,
+}
+
+/// What other settings would have commanded from the same inputs. The vehicle flew as it did: what it would have done
+/// under them is not known.
+#[derive(Clone, Debug)]
+pub struct ChangeComparison {
+    /// The other settings.
+    pub changes: Vec<SettingChange>,
+    /// Differences in the order of [`QUANTITIES`], of the ticks in which both are armed.
+    pub figures: [QuantityFigure; QUANTITIES.len()],
+    /// Every hundredth of a second.
+    pub rows: Vec<ChangeRow>,
+    /// Ticks in which the flight core's modes are different.
+    pub other_mode: u64,
+    /// When that began, from the first tick of the log on \[s\].
+    pub other_mode_s: Option<f64>,
+    ticks: u64,
+}
+
+impl ChangeComparison {
+    pub(super) fn new(changes: &[SettingChange]) -> Self {
+        ChangeComparison {
+            changes: changes.to_vec(),
+            figures: [QuantityFigure::default(); QUANTITIES.len()],
+            rows: Vec::new(),
+            other_mode: 0,
+            other_mode_s: None,
+            ticks: 0,
+        }
+    }
+
+    /// Adds a tick of both.
+    pub(super) fn add(
+        &mut self,
+        time_s: f64,
+        flown: (&Report<ROTORS_MAX>, &Trace),
+        changed: (&Report<ROTORS_MAX>, &Trace),
+    ) {
+        let row = ChangeRow { time_s, flown: values(flown.0, flown.1), changed: values(changed.0, changed.1) };
+        if flown.0.mode != changed.0.mode {
+            self.other_mode += 1;
+            self.other_mode_s.get_or_insert(time_s);
+        }
+        if flown.0.mode.armed() && changed.0.mode.armed() {
+            for (figure, difference) in self.figures.iter_mut().zip(row.differences()) {
+                if let Some(difference) = difference {
+                    figure.add(difference, time_s);
+                }
+            }
+        }
+        if self.ticks.is_multiple_of(EVERY) {
+            self.rows.push(row);
+        }
+        self.ticks += 1;
+    }
+}
+
+impl ChangeRow {
+    /// Returns how far both are apart, in the order of [`QUANTITIES`]; none where one of them is not known.
+    pub fn differences(&self) -> impl Iterator<Item = Option<f64>> {
+        let both = self.flown.iter().zip(&self.changed);
+        QUANTITIES.iter().zip(both).map(|(quantity, (flown, changed))| difference(quantity, *flown, *changed))
+    }
+}
+
+fn difference(quantity: &ReplayQuantity, flown: f32, changed: f32) -> Option<f64> {
+    let difference = f64::from(changed) - f64::from(flown);
+    let difference = if quantity.wraps { libm::remainder(difference, TAU).clamp(-PI, PI) } else { difference };
+    difference.is_finite().then_some(difference)
+}

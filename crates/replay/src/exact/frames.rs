@@ -1,0 +1,71 @@
+//! Frames of an exact log in a file.
+
+use afbc_recorder::{FRAME_MAX, FrameError, Record, StartRecord, VERSION, decode};
+
+/// What was looked for in a file.
+pub(super) enum Found {
+    /// Its first start.
+    Start(StartRecord),
+    /// None: why not, and what to do.
+    Refused(String),
+}
+
+/// A frame, without the zero at its end.
+pub(super) struct FileFrame<'b> {
+    /// Its place in the file \[bytes\].
+    pub(super) at: usize,
+    pub(super) bytes: &'b mut [u8],
+    /// False for what is left at the end of the file, without a zero.
+    pub(super) is_whole: bool,
+}
+
+/// Returns every frame of a file.
+pub(super) fn each(bytes: &mut [u8]) -> impl Iterator<Item = FileFrame<'_>> {
+    let length = bytes.len();
+    let mut at = 0;
+    bytes.split_mut(|byte| *byte == 0).filter_map(move |bytes| {
+        let frame = FileFrame { at, is_whole: at + bytes.len() < length, bytes };
+        at += frame.bytes.len() + 1;
+        (!frame.bytes.is_empty()).then_some(frame)
+    })
+}
+
+/// Returns what a copy of a frame says; none longer than any is read.
+fn read(frame: &[u8]) -> Result<Record, FrameError> {
+    let mut copy = [0; FRAME_MAX];
+    let copy = copy.get_mut(..frame.len()).ok_or(FrameError::Damaged)?;
+    copy.copy_from_slice(frame);
+    decode(copy)
+}
+
+/// Looks for the first start.
+pub(super) fn look(bytes: &[u8]) -> Found {
+    let refused = |problem: &str| Found::Refused(problem.into());
+    if bytes.is_empty() {
+        return refused("it is empty; was a log sent to the link that LOG_PORT names, and its baud rate set?");
+    }
+    let mut records = 0_u64;
+    for frame in bytes.split(|byte| *byte == 0).filter(|frame| !frame.is_empty()) {
+        match read(frame) {
+            Ok(Record::Start(start)) => return Found::Start(start),
+            Ok(_) => records += 1,
+            Err(FrameError::Foreign(Some(version))) => {
+                return Found::Refused(format!(
+                    "it is of version {version} of the exact log, and this program reads version {VERSION}; replay it \
+                     with the program of the version that flew it"
+                ));
+            }
+            Err(_) => {}
+        }
+    }
+    match records {
+        0 => refused("nothing in it is an exact log; give one, as of LOG_PORT or of --exact-log"),
+        _ => refused("it has no start; record from before the vehicle is powered up"),
+    }
+}
+
+/// True if the first whole frame is one.
+pub(super) fn begins(bytes: &[u8]) -> bool {
+    let first = bytes.split(|byte| *byte == 0).find(|frame| !frame.is_empty());
+    first.is_some_and(|frame| frame.len() < bytes.len() && !matches!(read(frame), Err(FrameError::Damaged)))
+}

@@ -1,0 +1,70 @@
+//! The exact log of a flight: the firmware's own code over what every tick took, beside what it gave; and what it would
+//! have given under other settings.
+
+mod change;
+mod compare;
+mod frames;
+mod outcome;
+mod player;
+mod quantities;
+mod run;
+
+pub use change::SettingChange;
+pub use compare::{ChangeComparison, ChangeRow, QuantityFigure};
+pub use outcome::{ExactReplay, FirstDifference, GivenSignal, LoggedParameter, ReplayFinding};
+pub use quantities::{QUANTITIES, ReplayQuantity};
+
+use crate::ulog;
+use afbc_reader::FileError;
+use afbc_vehicles::{Vehicle, built_in};
+use frames::Found;
+use std::fs;
+use std::path::Path;
+
+/// Replays the log at `path`, and calls `progress` with the number of bytes done since the last call. The vehicle is
+/// the built-in one that the log names, unless another is given. With `changes`, the flight is also run with them.
+///
+/// # Errors
+/// One line, if the log cannot be read, is none, is of another version or of another vehicle; or if a change is
+/// refused.
+pub fn replay(
+    path: &Path,
+    vehicle: Option<&Vehicle>,
+    changes: &[SettingChange],
+    mut progress: impl FnMut(u64),
+) -> Result<ExactReplay, FileError> {
+    let shown = path.display().to_string();
+    let failed = |problem: String| FileError::whole(&shown, problem);
+    let mut bytes =
+        fs::read(path).map_err(|error| failed(format!("cannot be read ({error}); give the path of an exact log")))?;
+    if ulog::is_ulog(&bytes) {
+        return Err(failed("this is a PX4 ULog; replay it without --exact".into()));
+    }
+    let start = match frames::look(&bytes) {
+        Found::Start(start) => start,
+        Found::Refused(problem) => return Err(failed(problem)),
+    };
+    let known = match vehicle {
+        Some(_) => None,
+        None => Some(named(&start.vehicle).map_err(failed)??),
+    };
+    let Some(vehicle) = vehicle.or(known.as_ref()) else { return Err(failed("it names no vehicle".into())) };
+    let players = player::Players::of(vehicle, &start, changes).map_err(|problem| problem.of(&shown))?;
+    run::run(&mut bytes, start, players, &mut progress).map_err(failed)
+}
+
+/// Reads the built-in vehicle of this name.
+fn named(name: &str) -> Result<Result<Vehicle, FileError>, String> {
+    let known = built_in(name).ok_or_else(|| {
+        format!(
+            "it was flown by the vehicle '{}', which is not built in; give its file by --vehicle",
+            name.escape_debug()
+        )
+    })?;
+    Ok(known.read())
+}
+
+/// True if these bytes begin as an exact log does.
+pub(crate) fn is_exact(bytes: &[u8]) -> bool {
+    frames::begins(bytes)
+}

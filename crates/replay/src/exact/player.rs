@@ -1,0 +1,131 @@
+//! The firmware's code, of a vehicle with any number of rotors and under any law.
+
+use super::change::SettingChange;
+use afbc::Profile;
+use afbc_control::Trace;
+use afbc_onboard::Prepare;
+use afbc_reader::FileError;
+use afbc_reader::words::out_of_range;
+use afbc_recorder::{Record, ReplayStep, Replayer, StartRecord};
+use afbc_scenario::OtherLaw;
+use afbc_scenario::contender::{ControllerKind, Law};
+use afbc_store::RecordName;
+use afbc_types::{OutOfRange, ROTORS_MAX, with_rotors};
+use afbc_vehicles::Vehicle;
+
+/// Runs the ticks of a log.
+pub(super) trait Player {
+    /// Takes the next record.
+    fn take(&mut self, record: &Record) -> ReplayStep<ROTORS_MAX>;
+
+    /// Returns the law's internal signals of the last tick.
+    fn trace(&self) -> Trace;
+
+    /// Flies with another parameter.
+    fn change(&mut self, name: RecordName, value: f32) -> Result<(), String>;
+}
+
+impl<P: Prepare<N>, const N: usize> Player for Replayer<N, P> {
+    fn take(&mut self, record: &Record) -> ReplayStep<ROTORS_MAX> {
+        match Replayer::take(self, record) {
+            ReplayStep::Nothing => ReplayStep::Nothing,
+            ReplayStep::Same(report) => ReplayStep::Same(report.padded()),
+            ReplayStep::Differs(difference, report) => {
+                ReplayStep::Differs(difference, report.map(|report| report.padded()))
+            }
+        }
+    }
+
+    fn trace(&self) -> Trace {
+        Replayer::trace(self)
+    }
+
+    fn change(&mut self, name: RecordName, value: f32) -> Result<(), String> {
+        if self.parameters().get(name).is_none() {
+            return Err(format!("--change {name}: no such parameter; `sitl params export` lists them"));
+        }
+        Replayer::change(self, name, value).map_err(|reason| format!("--change {reason}"))
+    }
+}
+
+/// The flight of a log, and the same under other settings.
+pub(super) struct Players {
+    pub(super) flown: Box<dyn Player>,
+    pub(super) changed: Option<Box<dyn Player>>,
+    pub(super) changes: Vec<SettingChange>,
+}
+
+/// Why there are no players.
+pub(super) enum Refusal {
+    /// A line on the log.
+    Log(String),
+    /// A line of its own.
+    Whole(String),
+    /// A line on the vehicle's file.
+    File(FileError),
+}
+
+impl Refusal {
+    /// Returns the line for the log that is shown as `log`.
+    pub(super) fn of(self, log: &str) -> FileError {
+        match self {
+            Refusal::Log(problem) => FileError::whole(log, problem),
+            Refusal::Whole(line) => match line.split_once(": ") {
+                Some((what, problem)) => FileError::whole(what, problem),
+                None => FileError::whole(log, line),
+            },
+            Refusal::File(error) => error,
+        }
+    }
+}
+
+impl Players {
+    /// Makes those of a log of this start.
+    pub(super) fn of(vehicle: &Vehicle, start: &StartRecord, changes: &[SettingChange]) -> Result<Self, Refusal> {
+        let flown = ControllerKind::ALL.into_iter().find(|kind| kind.name() == start.law.as_str());
+        let Some(flown) = flown else {
+            let law = start.law.escape_debug();
+            return Err(Refusal::Log(format!("it was flown under the law '{law}', which this program does not have")));
+        };
+        if usize::from(start.rotors) != vehicle.rotors.len() {
+            return Err(Refusal::Log(format!(
+                "it was flown with {} rotors, and the vehicle {} has {}; give the vehicle's file by --vehicle",
+                start.rotors,
+                vehicle.name,
+                vehicle.rotors.len()
+            )));
+        }
+        let changed = if changes.is_empty() {
+            None
+        } else {
+            let law = changes.iter().filter_map(|change| match change {
+                SettingChange::Law(kind) => Some(*kind),
+                SettingChange::Parameter(..) => None,
+            });
+            let mut player = player(vehicle, law.last().unwrap_or(flown))?;
+            for change in changes {
+                if let SettingChange::Parameter(name, value) = change {
+                    player.change(*name, *value).map_err(Refusal::Whole)?;
+                }
+            }
+            Some(player)
+        };
+        Ok(Players { flown: player(vehicle, flown)?, changed, changes: changes.to_vec() })
+    }
+}
+
+/// Makes the player of a vehicle under a law.
+fn player(vehicle: &Vehicle, kind: ControllerKind) -> Result<Box<dyn Player>, Refusal> {
+    let refused = |error: OutOfRange| Refusal::Log(format!("the vehicle {}: {}", vehicle.name, out_of_range(&error)));
+    if kind == ControllerKind::Afbc {
+        return with_rotors!(vehicle.rotors.len(), N => {
+            let image = vehicle.configuration::<N>().map_err(refused)?;
+            Ok(Box::new(Replayer::<N>::new(image).map_err(refused)?))
+        });
+    }
+    let law = Law::on(kind, vehicle, Profile::Flight).map_err(Refusal::File)?;
+    with_rotors!(vehicle.rotors.len(), N => {
+        let image = vehicle.configuration::<N>().map_err(refused)?;
+        Ok(Box::new(Replayer::<N, _>::under(OtherLaw(law), image).map_err(refused)?))
+    })
+}

@@ -1,0 +1,90 @@
+//! What was commanded, and what other settings would have commanded.
+
+use super::canvas::Ink;
+use super::marks::moments;
+use super::picture::Picture;
+use super::plotted::{LINE_PX, REFERENCE};
+use super::time_chart::{COLUMNS, Chart, Line, PLOT_PX, Panel};
+use super::{palette, reduce};
+use afbc_replay::exact::{ChangeRow, ExactReplay, QUANTITIES};
+use std::io;
+
+/// A panel: its label, the column's name, and the factor to its unit.
+type Pane = (&'static str, &'static str, f64);
+
+const DEGREES: f64 = 180.0 / core::f64::consts::PI;
+const MOTORS: [Pane; 8] = [
+    ("ω⟨1⟩ [rad/s]", "omega1_rad_s", 1.0),
+    ("ω⟨2⟩ [rad/s]", "omega2_rad_s", 1.0),
+    ("ω⟨3⟩ [rad/s]", "omega3_rad_s", 1.0),
+    ("ω⟨4⟩ [rad/s]", "omega4_rad_s", 1.0),
+    ("ω⟨5⟩ [rad/s]", "omega5_rad_s", 1.0),
+    ("ω⟨6⟩ [rad/s]", "omega6_rad_s", 1.0),
+    ("ω⟨7⟩ [rad/s]", "omega7_rad_s", 1.0),
+    ("ω⟨8⟩ [rad/s]", "omega8_rad_s", 1.0),
+];
+const DEMANDS: [Pane; 7] = [
+    ("φ⟨d⟩ [°]", "roll_setpoint_rad", DEGREES),
+    ("θ⟨d⟩ [°]", "pitch_setpoint_rad", DEGREES),
+    ("ψ⟨d⟩ [°]", "yaw_setpoint_rad", DEGREES),
+    ("U⟨4⟩ [N]", "u4_n", 1.0),
+    ("U⟨1⟩ [N]", "u1_n", 1.0),
+    ("U⟨2⟩ [N]", "u2_n", 1.0),
+    ("U⟨3⟩ [N]", "u3_n", 1.0),
+];
+const ESTIMATE: [Pane; 6] = [
+    ("x [m]", "x_m", 1.0),
+    ("y [m]", "y_m", 1.0),
+    ("z [m]", "z_m", 1.0),
+    ("φ [°]", "roll_rad", DEGREES),
+    ("θ [°]", "pitch_rad", DEGREES),
+    ("ψ [°]", "yaw_rad", DEGREES),
+];
+
+/// Draws every figure that has something to show.
+pub(crate) fn draw(replay: &ExactReplay) -> io::Result<Vec<Picture>> {
+    let Some(comparison) = &replay.comparison else { return Ok(Vec::new()) };
+    let rows = &comparison.rows;
+    let end_s = rows.last().map_or(0.0, |row| row.time_s);
+    let own = Ink::new(palette::color("afbc"), LINE_PX);
+    let line = |ink: Ink, is_reference: bool, value: &dyn Fn(&ChangeRow) -> Option<f64>| {
+        let points = rows.iter().filter_map(|row| Some((row.time_s, value(row)?)));
+        Line { ink, points: reduce::envelope(points, end_s, COLUMNS), lost_s: None, is_reference }
+    };
+    let panel = |(label, name, factor): &Pane| {
+        let index = QUANTITIES.iter().position(|quantity| quantity.name == *name)?;
+        let scaled =
+            |value: Option<&f32>| value.filter(|value| value.is_finite()).map(|value| f64::from(*value) * factor);
+        let panel = Panel {
+            label,
+            zero: false,
+            lines: vec![
+                line(REFERENCE, true, &|row| scaled(row.flown.get(index))),
+                line(own, false, &|row| scaled(row.changed.get(index))),
+            ],
+        };
+        panel.lines.iter().any(|line| line.points.len() > 1).then_some(panel)
+    };
+    let conditions = format!("{} under {}", replay.vehicle, replay.law);
+    let mut pictures = Vec::new();
+    for (name, title, caption, panes) in [
+        ("motors", "Rotor speeds", "Rotor speeds, commanded.", MOTORS.get(..replay.rotors).unwrap_or(&MOTORS)),
+        ("demands", "Demands", "Attitude that the law wants, heading, and its inputs before rotor limits.", &DEMANDS),
+        ("estimate", "Estimate", "Estimated position and attitude.", &ESTIMATE),
+    ] {
+        let panels: Vec<Panel> = panes.iter().filter_map(panel).collect();
+        if end_s <= 0.0 || panels.is_empty() {
+            continue;
+        }
+        let marks = moments(
+            comparison.other_mode_s.map(|at_s| ("other mode".to_owned(), at_s)).into_iter(),
+            end_s,
+            PLOT_PX,
+            " Thin line: the flight core is in another mode.",
+        );
+        let legend = vec![("as flown".to_owned(), REFERENCE), ("changed".to_owned(), own)];
+        let (svg, seen) = Chart { title, conditions: &conditions, marks, end_s, legend, panels }.draw()?;
+        pictures.push(Picture { name, caption: format!("{caption}{seen}"), svg });
+    }
+    Ok(pictures)
+}

@@ -1,0 +1,157 @@
+//! Radio control, beside the stations.
+//!
+//! The pilot needs no leave of theirs: arming, kill and mode switches count whoever is in control.
+
+use crate::comms::Comms;
+use crate::services::streams::id;
+use crate::services::telemetry::compose;
+use afbc_control::math::sqrt;
+use afbc_flight_core::{Stamped, Ticketed};
+use afbc_link::{Downlink, MavSeverity, Telemetry};
+use afbc_onboard::{ControlInputs, give};
+use afbc_radio::{
+    CrsfDecoder, CrsfFrame, CrsfTelemetry, LinkStatistics, PilotInputs, PilotNotice, PilotOutput, RadioLink,
+    RadioPilot, RadioProtocol, RadioSettings, SbusDecoder,
+};
+use heapless::Vec;
+
+/// Ticket of the pilot's requests and orders: refusals are announced to everyone, nobody waits for an answer.
+const PILOT: u8 = 254;
+
+/// Time between two frames to the transmitter \[us\]: each of four kinds two and a half times a second.
+const TELEMETRY_US: u64 = 100_000;
+/// Bytes of the longest of them.
+pub const RADIO_FRAME_MAX: usize = 64;
+
+/// A receiver, and the pilot behind it.
+#[derive(Clone, Debug, Default)]
+pub struct RadioControl {
+    crsf: CrsfDecoder,
+    sbus: SbusDecoder,
+    link: RadioLink,
+    pilot: RadioPilot,
+    statistics: LinkStatistics,
+    /// When the transmitter is told next \[us\], and what.
+    next_us: u64,
+    turn: u8,
+}
+
+impl RadioControl {
+    /// Takes bytes of the receiver; `act` is called with what the pilot wants after each frame. Without bytes, it
+    /// notices that there are none.
+    fn receive(
+        &mut self,
+        bytes: &[u8],
+        settings: &RadioSettings,
+        inputs: &PilotInputs,
+        mut act: impl FnMut(PilotOutput),
+    ) {
+        let RadioControl { crsf, sbus, link, pilot, statistics, .. } = self;
+        let (now_us, bad) = (inputs.now_us, crsf.bad_frames() + sbus.bad_frames());
+        match settings.receiver.protocol {
+            RadioProtocol::Crsf => crsf.feed(bytes, now_us, |frame| match frame {
+                CrsfFrame::Channels(channels) => {
+                    link.take(&channels, now_us);
+                    act(pilot.step(settings, link, inputs));
+                }
+                CrsfFrame::LinkStatistics(read) => *statistics = read,
+            }),
+            RadioProtocol::Sbus => sbus.feed(bytes, now_us, |frame| {
+                match (frame.failsafe, frame.frame_lost) {
+                    (true, _) => link.lose(),
+                    (_, true) => link.refuse(),
+                    _ => link.take(&frame.channels, now_us),
+                }
+                act(pilot.step(settings, link, inputs));
+            }),
+        }
+        if crsf.bad_frames() + sbus.bad_frames() != bad {
+            link.refuse();
+        }
+        act(pilot.step(settings, link, inputs));
+    }
+
+    /// How well the receiver hears the pilot.
+    pub fn statistics(&self) -> &LinkStatistics {
+        &self.statistics
+    }
+}
+
+impl Comms {
+    /// Takes bytes of a radio receiver that have come since the last tick, to be called after each tick also without
+    /// any; returns new inputs for the control tick, if there are any, to be [merged](ControlInputs::merge).
+    pub fn pilot(&mut self, radio: &mut RadioControl, bytes: &[u8], settings: &RadioSettings) -> Option<ControlInputs> {
+        let dispatcher = &mut self.dispatcher;
+        let (now_us, status) = (dispatcher.now_us, &dispatcher.status);
+        let inputs = PilotInputs { now_us, armed: status.mode.armed(), mode: status.guided.mode };
+        let mut update = None;
+        let (texts, radio_us) = (&mut dispatcher.texts, &mut dispatcher.radio_us);
+        radio.receive(bytes, settings, &inputs, |output| {
+            let PilotOutput { sticks, request, order, notice } = output;
+            if let Some(notice) = notice {
+                let severity = match notice {
+                    PilotNotice::Heard => MavSeverity::MAV_SEVERITY_INFO,
+                    _ => MavSeverity::MAV_SEVERITY_WARNING,
+                };
+                texts.put(severity, notice.text());
+            }
+            if (sticks, request, order) == (None, None, None) {
+                return;
+            }
+            if sticks.is_some() {
+                *radio_us = Some(now_us);
+            }
+            let update = update.get_or_insert(ControlInputs::EMPTY);
+            if let Some(value) = request {
+                update.inbox.request(Ticketed { value, ticket: PILOT });
+            }
+            if sticks.is_some() || order.is_some() {
+                let orders = update.order();
+                orders.sticks = sticks.map(|value| Stamped { value, at_us: now_us }).or(orders.sticks);
+                order.into_iter().for_each(|value| give(orders, Ticketed { value, ticket: PILOT }));
+            }
+        });
+        update
+    }
+
+    /// Returns a frame for the pilot's transmitter, if one is due: battery, attitude, mode and place in turn.
+    pub fn radio_telemetry(&self, radio: &mut RadioControl) -> Option<Vec<u8, RADIO_FRAME_MAX>> {
+        let status = &self.dispatcher.status;
+        if status.time_us < radio.next_us {
+            return None;
+        }
+        radio.next_us = status.time_us + TELEMETRY_US;
+        radio.turn = (radio.turn + 1) % 4;
+        let telemetry = match radio.turn {
+            0 => {
+                let battery = status.aux.battery?;
+                CrsfTelemetry::Battery {
+                    voltage_v: f32::from(battery.voltage_mv) * 1e-3,
+                    current_a: f32::from(battery.current_ca.max(0)) * 1e-2,
+                    drawn_mah: battery.consumed_mah.max(0) as f32,
+                    left: status.guided.charge.unwrap_or_default(),
+                }
+            }
+            1 => {
+                let attitude_rad = status.state?.attitude_rad;
+                CrsfTelemetry::Attitude { angles_rad: [attitude_rad.x, -attitude_rad.y, -attitude_rad.z] }
+            }
+            2 => CrsfTelemetry::Mode(status.flight_mode().name()),
+            _ => {
+                let Some(Downlink::Telemetry(Telemetry::Global(global))) = compose(id::GLOBAL_POSITION_INT, status)
+                else {
+                    return None;
+                };
+                let [north, east, _] = global.velocity_ned_cm_s.map(|cm_s| f32::from(cm_s) * 1e-2);
+                CrsfTelemetry::Gps {
+                    place_1e7deg: global.place_e7,
+                    speed_m_s: sqrt(north * north + east * east),
+                    course_rad: libm::atan2f(east, north),
+                    height_m: global.altitude_mm as f32 * 1e-3,
+                    satellites: status.aux.receiver.map_or(0, |receiver| receiver.satellites),
+                }
+            }
+        };
+        Some(telemetry.encode())
+    }
+}

@@ -1,0 +1,70 @@
+//! `sitl replay --exact`.
+
+use super::interrupt;
+use super::json::{self, Json};
+use super::place::Place;
+use super::progress::Progress;
+use super::terminal::{Failure, print, say};
+use super::vehicle::named;
+use super::written::show;
+use afbc_replay::exact::{SettingChange, replay};
+use afbc_report::exact as report;
+use afbc_report::exact::{ReplayedLog, problem, table, write};
+use clap::Args;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+/// Unit of progress \[bytes\].
+const KB: u64 = 1024;
+/// Logs of up to this many of them show none: three minutes.
+const QUIET_KB: u64 = 16 * 1024;
+
+/// Options of an exact replay.
+#[derive(Args, Debug)]
+pub(super) struct Exact {
+    /// The log is an exact log: run the firmware's own code over it, and compare every motor command
+    #[arg(long)]
+    pub(super) exact: bool,
+
+    /// Show what another setting would have commanded from the same inputs: a parameter as stations know it, or law and
+    /// the name of a law; may be repeated
+    #[arg(long = "change", value_name = "KEY=VALUE", requires = "exact")]
+    changes: Vec<SettingChange>,
+
+    /// Vehicle that the log is of, if it is none of the built-in ones: path of its file
+    #[arg(long, value_name = "VEHICLE", requires = "exact")]
+    vehicle: Option<PathBuf>,
+}
+
+impl Exact {
+    /// Replays, writes, prints.
+    pub(super) fn run(&self, path: &Path, place: &Place, json: Json) -> Result<ExitCode, Failure> {
+        let vehicle = self.vehicle.as_deref().map(named).transpose()?;
+        let name = path.file_stem().map_or(String::new(), |stem| stem.to_string_lossy().into_owned());
+        let all = path.metadata().map_or(0, |metadata| metadata.len()) / KB;
+        let progress = if all > QUIET_KB { Progress::new(&name, "KB", all, 0) } else { Progress::hidden() };
+        let mut rest = 0;
+        let replayed = replay(path, vehicle.as_ref(), &self.changes, |bytes| {
+            rest += bytes;
+            progress.add(rest / KB);
+            rest %= KB;
+        })?;
+        drop(progress);
+        let log = ReplayedLog { name: &name, replay: &replayed };
+        if replayed.comparison.is_some() {
+            let folder = place.open("replay", &afbc_report::replay::folder_name(&name))?;
+            interrupt::is_too_late();
+            let written = write(&folder, &log)?;
+            show(&folder, written.len(), json, |out| report::json(out, &log), || table(&log))?;
+        } else if json.json {
+            json::print_written(|out| report::json(out, &log))?;
+        } else {
+            print(&table(&log))?;
+        }
+        let problem = problem(&log);
+        if let Some(problem) = &problem {
+            say(&format!("{}: {problem}", path.display()));
+        }
+        Ok(ExitCode::from(u8::from(problem.is_some())))
+    }
+}

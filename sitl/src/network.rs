@@ -1,0 +1,128 @@
+//! A vehicle reached over a network, in real time.
+
+use afbc_hil::{Autopilot, Error};
+use std::io::{self, Read, Write};
+use std::net::{SocketAddr, TcpStream, ToSocketAddrs, UdpSocket};
+use std::thread;
+use std::time::{Duration, Instant};
+
+/// Duration of one exchange.
+const PERIOD: Duration = Duration::from_millis(1);
+/// Longest wait between two reads.
+const NAP: Duration = Duration::from_micros(200);
+/// Longest time for a TCP connection to be made, and for it to accept what is written.
+const PATIENCE: Duration = Duration::from_secs(5);
+
+/// A vehicle at a UDP or TCP port.
+pub(crate) struct Network {
+    socket: Socket,
+    /// End of the present millisecond.
+    deadline: Option<Instant>,
+}
+
+enum Socket {
+    Udp(UdpSocket),
+    Tcp(TcpStream),
+}
+
+impl Network {
+    /// Sends to the UDP port of `address`, HOST:PORT, and hears what comes from there.
+    ///
+    /// # Errors
+    /// A message for the user.
+    pub(crate) fn udp(address: &str) -> Result<Self, String> {
+        let to = resolved(address)?;
+        let from: SocketAddr = if to.is_ipv4() { ([0, 0, 0, 0], 0).into() } else { ([0_u16; 8], 0).into() };
+        let connect = || {
+            let socket = UdpSocket::bind(from)?;
+            socket.connect(to)?;
+            socket.set_nonblocking(true)?;
+            Ok(socket)
+        };
+        let socket = connect().map_err(|error: io::Error| format!("udp:{address}: cannot be reached ({error})"))?;
+        Ok(Network { socket: Socket::Udp(socket), deadline: None })
+    }
+
+    /// Connects to the TCP port of `address`, HOST:PORT.
+    ///
+    /// # Errors
+    /// A message for the user.
+    pub(crate) fn tcp(address: &str) -> Result<Self, String> {
+        let to = resolved(address)?;
+        let connect = || {
+            let stream = TcpStream::connect_timeout(&to, PATIENCE)?;
+            stream.set_nodelay(true)?;
+            stream.set_write_timeout(Some(PATIENCE))?;
+            Ok(stream)
+        };
+        let stream = connect().map_err(|error: io::Error| format!("tcp:{address}: cannot be reached ({error})"))?;
+        Ok(Network { socket: Socket::Tcp(stream), deadline: None })
+    }
+}
+
+fn resolved(address: &str) -> Result<SocketAddr, String> {
+    let found = address.to_socket_addrs().ok().and_then(|mut addresses| addresses.next());
+    found.ok_or_else(|| format!("{address}: no such address; write HOST:PORT, as in 127.0.0.1:18570"))
+}
+
+impl Socket {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<()> {
+        match self {
+            _ if bytes.is_empty() => Ok(()),
+            Socket::Udp(socket) => socket.send(bytes).map(drop),
+            Socket::Tcp(stream) => {
+                stream.set_nonblocking(false)?;
+                stream.write_all(bytes)
+            }
+        }
+    }
+
+    /// Reads what has come; nothing if nothing has.
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let read = match self {
+            Socket::Udp(socket) => socket.recv(buffer),
+            Socket::Tcp(stream) => {
+                stream.set_nonblocking(true)?;
+                match stream.read(buffer) {
+                    Ok(0) => return Err(io::ErrorKind::ConnectionReset.into()),
+                    read => read,
+                }
+            }
+        };
+        match read {
+            Err(error) if error.kind() == io::ErrorKind::WouldBlock => Ok(0),
+            read => read,
+        }
+    }
+}
+
+impl Autopilot for Network {
+    fn exchange(&mut self, uplink: &[u8], hear: &mut dyn FnMut(&[u8])) -> Result<(), Error> {
+        let deadline = *self.deadline.get_or_insert_with(Instant::now);
+        let mut buffer = [0; 65_536];
+        loop {
+            let length = self.socket.read(&mut buffer).map_err(failed)?;
+            if length > 0 {
+                hear(buffer.get(..length).unwrap_or_default());
+                continue;
+            }
+            let left = deadline.saturating_duration_since(Instant::now());
+            if left.is_zero() {
+                break;
+            }
+            thread::sleep(left.min(NAP));
+        }
+        // From deadline to deadline, so that delays are caught up with.
+        self.deadline = Some(deadline + PERIOD);
+        self.socket.write(uplink).map_err(failed)
+    }
+}
+
+fn failed(error: io::Error) -> Error {
+    let reason = if error.kind() == io::ErrorKind::ConnectionRefused {
+        "nobody listens at this port".into()
+    } else {
+        format!("the connection failed ({error})")
+    };
+    Error::Autopilot(reason.into())
+}
