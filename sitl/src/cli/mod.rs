@@ -43,7 +43,8 @@ use terminal::Failure;
 #[derive(Debug, Parser)]
 #[command(version, args_conflicts_with_subcommands = true, max_term_width = 110)]
 #[command(
-    after_help = "Exit codes: 0 success; 1 a vehicle was lost, or a replay differs; 2 wrong input, or nothing written; 130 interrupted"
+    after_help = "Exit codes: 0 success; 1 a vehicle was lost, or a replay differs; 2 wrong input, or nothing written; \
+                  130 interrupted"
 )]
 pub(crate) struct Cli {
     #[command(subcommand)]

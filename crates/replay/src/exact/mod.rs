@@ -25,7 +25,8 @@ use std::path::Path;
 /// the built-in one that the log names, unless another is given. With `changes`, the flight is also run with them.
 ///
 /// # Errors
-/// One line, if the log cannot be read, is none, is of another version or of another vehicle; or if a change is refused.
+/// One line, if the log cannot be read, is none, is of another version or of another vehicle; or if a change is
+/// refused.
 pub fn replay(
     path: &Path,
     vehicle: Option<&Vehicle>,
