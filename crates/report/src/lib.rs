@@ -1,7 +1,7 @@
 //! Results of flights: tables for the terminal, and in a folder CSV, JSON, figures and a page.
 //!
-//! [`flights`], [`compare`], [`campaign`], [`replay`] and [`exact`] each have a function `write` for a folder and a function
-//! `table`. The same flights give the same bytes: nothing depends on the time of day or the machine.
+//! [`flights`], [`compare`], [`campaign`], [`replay`] and [`exact`] each have a function `write` for a folder and a
+//! function `table`. The same flights give the same bytes: nothing depends on the time of day or the machine.
 #![forbid(unsafe_code)]
 
 pub mod campaign;

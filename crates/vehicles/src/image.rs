@@ -25,7 +25,8 @@ impl Vehicle {
     fn values<const N: usize>(&self) -> Value {
         // As many rotors as there are: with_rotors.
         let Ok(configuration) = self.configuration::<N>() else { return Value::Null };
-        // Errors of sensors are one vehicle's, not its kind's, and so are motor controllers; link and radio are the board's.
+        // Errors of sensors are one vehicle's, not its kind's, and so are motor controllers; link and radio are the
+        // board's.
         let Configuration {
             airframe,
             settings,

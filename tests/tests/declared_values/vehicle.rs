@@ -287,8 +287,10 @@ fn every_parameter_of_a_station_is_in_the_file() {
         ParameterTable::<N>::new(base.configuration().unwrap()).iter().map(|it| it.name.to_string()).collect()
     });
     let groups = ["CAL_", "COM_FLTMODE", "COM_RC_", "RC"];
-    let group = |name: &str| groups.into_iter().find(|group| name.starts_with(group)).unwrap_or(name);
-    let mut missing: Vec<_> = seen.difference(&in_file).map(|name| group(name.as_str())).collect();
+    let mut missing: Vec<&str> = seen
+        .difference(&in_file)
+        .map(|name| groups.into_iter().find(|group| name.starts_with(group)).unwrap_or(name))
+        .collect();
     missing.dedup();
     let mut elsewhere = ELSEWHERE.map(|(name, _)| name).to_vec();
     elsewhere.sort_unstable();

@@ -98,11 +98,11 @@ impl Players {
         let changed = if changes.is_empty() {
             None
         } else {
-            let law = changes.iter().filter_map(|change| match change {
+            let mut law = changes.iter().filter_map(|change| match change {
                 SettingChange::Law(kind) => Some(*kind),
                 SettingChange::Parameter(..) => None,
             });
-            let mut player = player(vehicle, law.last().unwrap_or(flown))?;
+            let mut player = player(vehicle, law.next_back().unwrap_or(flown))?;
             for change in changes {
                 if let SettingChange::Parameter(name, value) = change {
                     player.change(*name, *value).map_err(Refusal::Whole)?;
