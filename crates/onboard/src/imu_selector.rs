@@ -119,6 +119,7 @@ fn is_silent(last_us: Option<u64>, now_us: u64) -> bool {
 }
 
 #[cfg(test)]
+#[allow(clippy::indexing_slicing, reason = "tests")]
 mod tests {
     extern crate std;
 

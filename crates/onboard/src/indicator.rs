@@ -97,6 +97,7 @@ impl Indicator {
 }
 
 #[cfg(test)]
+#[allow(clippy::expect_used, reason = "tests")]
 mod tests {
     extern crate std;
 
