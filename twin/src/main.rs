@@ -80,11 +80,13 @@ fn command() -> Command {
                 only,
             ]),
         )
-        .subcommand(Command::new("cuts").about("Power cut while the Matek H743 writes and erases its parameters").args([
-            image(),
-            number("cuts", "100", "Cuts in a write, and in an erase, about"),
-            number("seed", "1", "Of the random numbers"),
-        ]))
+        .subcommand(Command::new("cuts").about("Power cut while the Matek H743 writes and erases its parameters").args(
+            [
+                image(),
+                number("cuts", "100", "Cuts in a write, and in an erase, about"),
+                number("seed", "1", "Of the random numbers"),
+            ],
+        ))
         .subcommand(
             Command::new("host").about("Fly a scenario with the firmware's code on this machine").arg(scenario()),
         )

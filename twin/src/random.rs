@@ -7,9 +7,9 @@ pub struct Random(u64);
 impl Random {
     /// With a seed, and what it is for.
     pub fn new(seed: u64, name: &str) -> Self {
-        let mix = name.bytes().fold(seed ^ 0x9E37_79B9_7F4A_7C15, |hash, byte| {
-            (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01B3)
-        });
+        let mix = name
+            .bytes()
+            .fold(seed ^ 0x9E37_79B9_7F4A_7C15, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01B3));
         let mut random = Random(mix | 1);
         for _ in 0..16 {
             random.next();

@@ -95,10 +95,16 @@ pub const ROWS: &[Row] = &[
     row("imu-1-force-biased", "0.2 g on the first accelerometer", FliesOn, 3_000, |t| {
         t.conditions.icm42688p_acceleration.bias = [200_000, -200_000, 200_000];
     }),
-    row("imus-in-turn", "the first IMU silent for 0.5 s, and a second later the second for good", FliesOn, 3_000, |t| {
-        t.conditions.icm42688p_silent = t.since_ns < 500 * MS;
-        t.conditions.icm42605_silent = t.since_ns > 1_500 * MS;
-    }),
+    row(
+        "imus-in-turn",
+        "the first IMU silent for 0.5 s, and a second later the second for good",
+        FliesOn,
+        3_000,
+        |t| {
+            t.conditions.icm42688p_silent = t.since_ns < 500 * MS;
+            t.conditions.icm42605_silent = t.since_ns > 1_500 * MS;
+        },
+    ),
     row("imus-silent", "neither IMU answers", Lost, 3_000, |t| {
         (t.conditions.icm42688p_silent, t.conditions.icm42605_silent) = (true, true);
     }),

@@ -9,6 +9,9 @@ use embassy_futures::select::{Either, select};
 pub const FAULTS_MAX: u32 = 10;
 /// Pause before a part is set up again \[us\].
 pub const PAUSE_US: u32 = 100_000;
+/// Pause after the second fault in a row and each further one \[us\]: the next attempt would follow at once, and a task
+/// of the sensors' priority leaves the others no time.
+const RETRY_US: u32 = 1_000;
 /// Longest transfer \[us\], and what each of its bytes adds \[us\]: 1 MHz.
 const TRANSFER_US: u32 = 10_000;
 const BYTE_US: u32 = 8;
@@ -103,6 +106,9 @@ impl<P: SensorPart, B: Registers, T: PartTiming> Driver<P, B, T> {
                 self.timing.wait(PAUSE_US).await;
             }
             self.set_up().await?;
+        }
+        if self.faults > 1 {
+            self.timing.wait(RETRY_US).await;
         }
         for _ in 0..CYCLES_MAX {
             if let Some(reading) = self.cycle().await? {
