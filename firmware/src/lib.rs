@@ -60,16 +60,10 @@ pub fn run<B: Board>(
 ) -> ! {
     let executors = executors::start(&mut core, lines);
     let Parts { mut board, sampler, aids, mut links, memory } = B::start(&mut core, executors.control);
-    let (kept, table) = parameters::read(memory, B::STORE);
-    for link in links.each() {
-        link.transmitter.set_baud(table.configuration().link.baud);
-    }
+    let (kept, desk) = read::<B>(memory, &mut links);
+    let (_, table, ..) = desk;
     board.set_motor_protocol(table.configuration().outputs.protocol);
     let flight = control::make(table.configuration());
-    // Before the watchdog: it looks at each parameter.
-    let log = if recording::is_possible::<B>() { recording::ExactLog::begin::<B>(&table) } else { None };
-    let radio = if radio::is_possible::<B>() { radio::RadioLine::begin::<B>(&table, &mut links) } else { None };
-    let desk = comms::make::<B>(table, log, radio);
     board.unleash_watchdog();
     time::start(core.SYST, B::CORE_HZ);
     comms(executors.comms, desk, links);
@@ -85,4 +79,20 @@ pub fn run<B: Board>(
     loop {
         B::idle();
     }
+}
+
+/// Reads the parameters, sets the links up by them, and creates what the links' task has. Out of line, so that the stack
+/// of the start does not hold the parameters beside the flight. Before the watchdog: it looks at each of them.
+#[inline(never)]
+fn read<B: Board>(
+    memory: B::Memory,
+    links: &mut B::Links,
+) -> (parameters::Keeper<B::Memory>, &'static mut comms::Desk) {
+    let (kept, table) = parameters::read(memory, B::STORE);
+    for link in links.each() {
+        link.transmitter.set_baud(table.configuration().link.baud);
+    }
+    let log = if recording::is_possible::<B>() { recording::ExactLog::begin::<B>(&table) } else { None };
+    let radio = if radio::is_possible::<B>() { radio::RadioLine::begin::<B>(&table, links) } else { None };
+    (kept, comms::make::<B>(table, log, radio))
 }

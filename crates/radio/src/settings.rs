@@ -181,18 +181,6 @@ parameters! {
         /// Channel 4.
         #[group("RC4_")]
         pub channel_4: ChannelCalibration = ChannelCalibration::DEFAULT,
-        /// Channel 5.
-        #[group("RC5_")]
-        pub channel_5: ChannelCalibration = ChannelCalibration::DEFAULT,
-        /// Channel 6.
-        #[group("RC6_")]
-        pub channel_6: ChannelCalibration = ChannelCalibration::DEFAULT,
-        /// Channel 7.
-        #[group("RC7_")]
-        pub channel_7: ChannelCalibration = ChannelCalibration::DEFAULT,
-        /// Channel 8.
-        #[group("RC8_")]
-        pub channel_8: ChannelCalibration = ChannelCalibration::DEFAULT,
     }
 }
 
@@ -258,17 +246,8 @@ impl ChannelCalibration {
 }
 
 impl RadioSettings {
-    fn calibrations(&self) -> [&ChannelCalibration; 8] {
-        [
-            &self.channel_1,
-            &self.channel_2,
-            &self.channel_3,
-            &self.channel_4,
-            &self.channel_5,
-            &self.channel_6,
-            &self.channel_7,
-            &self.channel_8,
-        ]
+    fn calibrations(&self) -> [&ChannelCalibration; 4] {
+        [&self.channel_1, &self.channel_2, &self.channel_3, &self.channel_4]
     }
 
     /// Returns a channel's calibration and pulse.
