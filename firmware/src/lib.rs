@@ -81,8 +81,8 @@ pub fn run<B: Board>(
     }
 }
 
-/// Reads the parameters, sets the links up by them, and creates what the links' task has. Out of line, so that the stack
-/// of the start does not hold the parameters beside the flight. Before the watchdog: it looks at each of them.
+/// Reads the parameters, sets the links up by them, and creates what the links' task has. Out of line, so that the
+/// stack of the start does not hold the parameters beside the flight. Before the watchdog: it looks at each of them.
 #[inline(never)]
 fn read<B: Board>(
     memory: B::Memory,

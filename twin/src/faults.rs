@@ -6,13 +6,13 @@ use crate::fly::{Flight, TICK_NS};
 use crate::machine::quiet_usb;
 use crate::random::Random;
 use crate::table::{ROWS, Row};
+use crate::trouble::{Outcome, Trouble};
 use rigless::edge::Edge;
 use rigless::emulator::{Driver, Host, Settled, Stop};
 use rigless::machine::matekh743::{Conditions, MatekH743};
 use rigless::session::Session;
 use rigless::time::VirtualNanos;
 use std::error::Error;
-use std::fmt;
 
 /// When a fault begins, after the flight goes on: at a random time in between [ns].
 const BEGINS_NS: [u64; 2] = [50_000_000, 250_000_000];
@@ -22,43 +22,6 @@ const OFF_M: f64 = 6.0;
 const TOUCH_M_S: f64 = 2.0;
 /// Time after which a vehicle that descends must have landed [ms].
 const LANDS_MS: u64 = 45_000;
-
-/// What became of a vehicle.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Outcome {
-    /// It fell, or turned over.
-    Lost,
-    /// It came down, upright and slowly, and disarmed.
-    Lands,
-    /// It went on as it was ordered.
-    FliesOn,
-}
-
-impl fmt::Display for Outcome {
-    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        formatter.write_str(match self {
-            Outcome::Lost => "lost",
-            Outcome::Lands => "lands",
-            Outcome::FliesOn => "flies on",
-        })
-    }
-}
-
-/// The models while a fault is there.
-pub struct Trouble<'a> {
-    pub session: &'a mut Session<MatekH743>,
-    pub host: &'a mut dyn Host,
-    pub link: &'a Link,
-    pub conditions: &'a mut Conditions,
-    pub random: &'a mut Random,
-    pub at: VirtualNanos,
-    pub instructions: u64,
-    /// Time since the fault began.
-    pub since_ns: u64,
-    /// Times that the fault has looked at the models before, and what it keeps.
-    pub looks: u64,
-    pub kept: &'a mut u64,
-}
 
 /// A flight with a fault.
 struct Watched {

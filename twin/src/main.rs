@@ -12,12 +12,14 @@ mod fly;
 mod host;
 mod kept;
 mod machine;
+mod machines;
 mod pilot;
 mod pins;
 mod random;
 mod same;
 mod speedybee;
 mod table;
+mod trouble;
 mod ublox;
 mod usb_ring;
 mod wire;
@@ -26,7 +28,7 @@ mod world;
 use aloft::Aloft;
 use clap::builder::PossibleValuesParser;
 use clap::{Arg, ArgMatches, Command, value_parser};
-use machine::MachineName;
+use machines::MachineName;
 use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -103,7 +105,7 @@ fn number(matches: &ArgMatches, name: &str) -> Result<u64, Box<dyn Error>> {
 }
 
 /// Returns the machine that an argument names.
-fn machine(matches: &ArgMatches) -> Result<MachineName, Box<dyn Error>> {
+fn chosen(matches: &ArgMatches) -> Result<MachineName, Box<dyn Error>> {
     let name = matches.get_one::<String>("machine").ok_or("no machine")?;
     Ok(MachineName::ALL.into_iter().find(|machine| machine.name() == name).ok_or("no such machine")?)
 }
@@ -112,7 +114,7 @@ fn run(matches: &ArgMatches) -> Result<(), Box<dyn Error>> {
     match matches.subcommand() {
         Some(("boot", matches)) => {
             let image = path(matches, "image")?;
-            with_machine!(machine(matches)?, M => boot::boot::<M>(image))
+            with_machine!(chosen(matches)?, M => boot::boot::<M>(image))
         }
         Some(("fly", matches)) => {
             let (image, scenario) = (path(matches, "image")?, path(matches, "scenario")?);
@@ -120,7 +122,7 @@ fn run(matches: &ArgMatches) -> Result<(), Box<dyn Error>> {
             let receiver = RECEIVERS.into_iter().find(|(receiver, _)| name.is_some_and(|name| name == receiver));
             let receiver = receiver.and_then(|(_, generation)| generation);
             let log = matches.get_one::<PathBuf>("log").map(PathBuf::as_path);
-            with_machine!(machine(matches)?, M => fly::fly::<M>(image, scenario, receiver, log))
+            with_machine!(chosen(matches)?, M => fly::fly::<M>(image, scenario, receiver, log))
         }
         Some(("replay", matches)) => same::check_log(&std::fs::read(path(matches, "log")?)?),
         Some(("faults", matches)) => {

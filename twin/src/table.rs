@@ -1,7 +1,7 @@
 //! The faults.
 
 use crate::cuts::lose_memory;
-use crate::faults::{Outcome, Trouble};
+use crate::trouble::{Outcome, Trouble};
 use rigless::chip::uart::Rate;
 use rigless::edge::Edge;
 use rigless::emulator::InterruptLine;

@@ -5,12 +5,14 @@ mod boards;
 mod bus;
 mod cycles;
 mod known;
+mod verdict;
 mod work;
 
 pub use boards::{BOARDS, BoardTimes, RateOfUart, default_baud};
 pub use bus::{Script, i2c_ns, spi_clock_hz, spi_ns};
 pub use cycles::{CORTEX_M4F, CORTEX_M7, CoreCycles, CycleLimit, Mix};
-pub use known::{KnownLateness, verdicts};
+pub use known::KnownLateness;
+pub use verdict::verdicts;
 pub use work::{Section, TimingRow, Work};
 
 use crate::Error;

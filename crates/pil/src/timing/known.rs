@@ -1,6 +1,5 @@
 //! Rows that are known to be late in the worst case, how late at most, and why that is borne.
 
-use super::work::TimingRow;
 use core::fmt::{Display, Formatter, Result};
 
 /// A row that may be late in the worst case.
@@ -49,35 +48,6 @@ pub(super) static PIXRACER: [KnownLateness; 7] = [
 
 /// Of the STM32H743.
 pub(super) static STM32H743: [KnownLateness; 1] = [late("links' task", None, LINKS)];
-
-/// Returns a line on each row that is late without being known, later than known, or known and in time.
-#[must_use]
-pub fn verdicts(known: &[KnownLateness], best: &[TimingRow], bound: &[TimingRow]) -> Vec<String> {
-    let mut wrong = Vec::new();
-    for (best, bound) in best.iter().zip(bound) {
-        let name = bound.name;
-        match (bound.is_late(), known.iter().find(|known| known.row == name)) {
-            (false, None) => (),
-            (false, Some(_)) => wrong.push(format!("{name}: known to be late, and is in time: delete that")),
-            (true, None) => wrong.push(format!("{name}: over its deadline")),
-            (true, Some(known)) => {
-                // Without a bound it is later than any.
-                let is_later = known
-                    .most_us
-                    .is_some_and(|most_us| bound.response_ns.is_none_or(|response_ns| response_ns > 1000 * most_us));
-                if is_later {
-                    wrong.push(format!("{name}: later than is known"));
-                }
-                if best.is_late() && !known.at_best {
-                    wrong.push(format!("{name}: over its deadline at best, too"));
-                }
-            }
-        }
-    }
-    let rows = |known: &&KnownLateness| bound.iter().all(|row| row.name != known.row);
-    wrong.extend(known.iter().filter(rows).map(|known| format!("{}: known to be late, and no row", known.row)));
-    wrong
-}
 
 impl Display for KnownLateness {
     fn fmt(&self, to: &mut Formatter<'_>) -> Result {

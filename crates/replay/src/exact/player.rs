@@ -85,7 +85,9 @@ impl Players {
         let flown = ControllerKind::ALL.into_iter().find(|kind| kind.name() == start.law.as_str());
         let Some(flown) = flown else {
             let law = start.law.escape_debug();
-            return Err(Refusal::Log(format!("it was flown under the law '{law}', which this program does not have")));
+            return Err(Refusal::Log(format!(
+                "it was flown under the law '{law}', which this program does not have; read it by one that has"
+            )));
         };
         if usize::from(start.rotors) != vehicle.rotors.len() {
             return Err(Refusal::Log(format!(

@@ -1,6 +1,6 @@
 //! Numbers and words about an exact log, for page and terminal.
 
-use super::ReplayedLog;
+use super::replayed::ReplayedLog;
 use crate::table::wrap;
 use afbc_replay::exact::{
     ChangeComparison, ExactReplay, FirstDifference, GivenSignal, LoggedParameter, QUANTITIES, ReplayFinding,

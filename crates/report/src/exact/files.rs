@@ -1,7 +1,7 @@
 //! `change.csv` and `summary.json`.
 
-use super::ReplayedLog;
 use super::cells::{problem, quantities};
+use super::replayed::ReplayedLog;
 use afbc_replay::exact::{ChangeComparison, ExactReplay, SettingChange};
 use serde::Serialize;
 use std::io::{self, Write};

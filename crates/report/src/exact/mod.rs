@@ -4,23 +4,15 @@
 mod cells;
 mod files;
 mod page;
+mod replayed;
 
 pub use cells::{problem, table};
 pub use files::json;
+pub use replayed::ReplayedLog;
 
 use crate::figures;
 use afbc_files::{Error, Folder};
-use afbc_replay::exact::ExactReplay;
 use std::path::PathBuf;
-
-/// An exact log, replayed.
-#[derive(Clone, Copy, Debug)]
-pub struct ReplayedLog<'a> {
-    /// Name of the log.
-    pub name: &'a str,
-    /// What was found.
-    pub replay: &'a ExactReplay,
-}
 
 /// Writes what other settings would have commanded into `folder`, replacing all earlier files of its command, and
 /// returns the paths written:

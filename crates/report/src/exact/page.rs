@@ -1,6 +1,7 @@
 //! The report of an exact log under other settings.
 
-use super::{ReplayedLog, cells};
+use super::cells;
+use super::replayed::ReplayedLog;
 use crate::figures::Picture;
 use crate::report::{picture, sheet};
 use maud::html;

@@ -1,0 +1,33 @@
+//! What of the rows is late, and not known to be.
+
+use super::known::KnownLateness;
+use super::work::TimingRow;
+
+/// Returns a line on each row that is late without being known, later than known, or known and in time.
+#[must_use]
+pub fn verdicts(known: &[KnownLateness], best: &[TimingRow], bound: &[TimingRow]) -> Vec<String> {
+    let mut wrong = Vec::new();
+    for (best, bound) in best.iter().zip(bound) {
+        let name = bound.name;
+        match (bound.is_late(), known.iter().find(|known| known.row == name)) {
+            (false, None) => (),
+            (false, Some(_)) => wrong.push(format!("{name}: known to be late, and is in time: delete that")),
+            (true, None) => wrong.push(format!("{name}: over its deadline")),
+            (true, Some(known)) => {
+                // Without a bound it is later than any.
+                let is_later = known
+                    .most_us
+                    .is_some_and(|most_us| bound.response_ns.is_none_or(|response_ns| response_ns > 1000 * most_us));
+                if is_later {
+                    wrong.push(format!("{name}: later than is known"));
+                }
+                if best.is_late() && !known.at_best {
+                    wrong.push(format!("{name}: over its deadline at best, too"));
+                }
+            }
+        }
+    }
+    let rows = |known: &&KnownLateness| bound.iter().all(|row| row.name != known.row);
+    wrong.extend(known.iter().filter(rows).map(|known| format!("{}: known to be late, and no row", known.row)));
+    wrong
+}
