@@ -92,7 +92,9 @@ fn read<B: Board>(
     for link in links.each() {
         link.transmitter.set_baud(table.configuration().link.baud);
     }
-    let log = if recording::is_possible::<B>() { recording::ExactLog::begin::<B>(&table) } else { None };
     let radio = if radio::is_possible::<B>() { radio::RadioLine::begin::<B>(&table, links) } else { None };
+    // On one link, the pilot goes before the log.
+    let is_free = table.configuration().link.log_port != table.configuration().radio.receiver.port;
+    let log = if recording::is_possible::<B>() && is_free { recording::ExactLog::begin::<B>(&table) } else { None };
     (kept, comms::make::<B>(table, log, radio))
 }

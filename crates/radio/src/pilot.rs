@@ -186,6 +186,11 @@ impl RadioPilot {
             sticks.throttle - began.throttle,
             sticks.yaw - began.yaw,
         ];
-        off.iter().any(|off| off.abs() > settings.modes.override_share).then_some(FlightMode::Position)
+        let is_moved = off.iter().any(|off| off.abs() > settings.modes.override_share);
+        if is_moved {
+            // Once: refused, it is not asked for in every frame.
+            self.by_itself = Some((inputs.mode, *sticks));
+        }
+        is_moved.then_some(FlightMode::Position)
     }
 }

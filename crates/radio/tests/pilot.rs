@@ -203,8 +203,9 @@ fn moved_sticks_end_a_mode_that_flies_by_itself() {
     assert_eq!(orders(&rig.frames(20)), []);
     rig.channels.us[1] = 1600;
     assert_eq!(orders(&rig.frames(20)), []);
+    // Once, also if it is refused.
     rig.channels.us[1] = 1700;
-    assert_eq!(orders(&rig.frames(1)), [Order::Select(FlightMode::Position)]);
+    assert_eq!(orders(&rig.frames(50)), [Order::Select(FlightMode::Position)]);
     rig.inputs.mode = FlightMode::Position;
     assert_eq!(orders(&rig.frames(20)), []);
     rig.settings.modes.overrides = false;
