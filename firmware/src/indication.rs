@@ -11,23 +11,14 @@ use embassy_time::{Instant, Timer};
 /// Without a report for so long, a task has failed \[ms\].
 const SILENT_MS: u32 = 500;
 
-/// What was reported last, as its index in [`ALL`] plus 1, and in the bits above when \[ms\]; 0 for nothing.
+/// What was reported last, as its index in [`Indication::ALL`] plus 1, and in the bits above when \[ms\]; 0 for
+/// nothing.
 static LAST: AtomicU32 = AtomicU32::new(0);
-
-/// All of them.
-const ALL: [Indication; 6] = [
-    Indication::Starting,
-    Indication::NotReady,
-    Indication::Ready,
-    Indication::Armed,
-    Indication::Failsafe,
-    Indication::Fault,
-];
 
 /// Notes a tick's report.
 pub(crate) fn put(report: &Report) {
     let indication = Indication::of(report);
-    let number = ALL.iter().position(|one| *one == indication).map_or(0, |at| at as u32 + 1);
+    let number = Indication::ALL.iter().position(|one| *one == indication).map_or(0, |at| at as u32 + 1);
     LAST.store(milliseconds(report.time_us) << 3 | number, Ordering::Relaxed);
 }
 
@@ -40,7 +31,7 @@ fn indication(now_us: u64) -> Indication {
     if age_ms > SILENT_MS {
         return Indication::Fault;
     }
-    ALL.get(at as usize).copied().unwrap_or_default()
+    Indication::ALL.get(at as usize).copied().unwrap_or_default()
 }
 
 fn milliseconds(us: u64) -> u32 {

@@ -46,6 +46,16 @@ pub struct IndicatorSignals {
 }
 
 impl Indication {
+    /// All of them.
+    pub const ALL: [Indication; 6] = [
+        Indication::Starting,
+        Indication::NotReady,
+        Indication::Ready,
+        Indication::Armed,
+        Indication::Failsafe,
+        Indication::Fault,
+    ];
+
     /// Returns what a tick's report comes to.
     pub fn of<const N: usize>(report: &Report<N>) -> Self {
         let clock_failed = report.health.rate.clock_failed;
@@ -108,15 +118,6 @@ mod tests {
     use crate::readings::Readings;
     use std::string::String;
     use std::vec::Vec;
-
-    const ALL: [Indication; 6] = [
-        Indication::Starting,
-        Indication::NotReady,
-        Indication::Ready,
-        Indication::Armed,
-        Indication::Failsafe,
-        Indication::Fault,
-    ];
 
     /// A report of a disarmed vehicle.
     fn report() -> Report {
@@ -194,8 +195,8 @@ mod tests {
             let [lit, _] = shown(indication, 32);
             String::from(&lit[by..by + 16])
         };
-        for (at, one) in ALL.into_iter().enumerate() {
-            for other in ALL.into_iter().skip(at + 1) {
+        for (at, one) in Indication::ALL.into_iter().enumerate() {
+            for other in Indication::ALL.into_iter().skip(at + 1) {
                 assert!((0..16).all(|by| turned(one, 0) != turned(other, by)), "{one:?} {other:?}");
             }
         }
@@ -205,7 +206,7 @@ mod tests {
     fn any_time_is_a_step() {
         let mut indicator = Indicator::default();
         for now_us in [0, 1, u64::MAX, 5] {
-            for indication in ALL {
+            for indication in Indication::ALL {
                 indicator.signals(now_us, indication);
             }
         }
