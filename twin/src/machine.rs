@@ -26,6 +26,8 @@ pub enum Signal {
 /// A timer whose frames DMA sends.
 #[derive(Debug, PartialEq)]
 pub struct FrameTimer {
+    /// Its control register, whose lowest bit lets it count.
+    pub counter: u64,
     /// Control register of the stream; its lowest bit starts a frame.
     pub stream: u64,
     /// Its motors, from 0.
@@ -101,8 +103,8 @@ impl Machine for MatekH743 {
     const MOTORS: Range<usize> = 2..10;
     /// DMA1's streams 0 and 1, for TIM5 and TIM4 (RM0433, 15.5.5).
     const SIGNAL: Signal = Signal::Dshot600(&[
-        FrameTimer { stream: 0x4002_0010, motors: 0..4 },
-        FrameTimer { stream: 0x4002_0028, motors: 4..8 },
+        FrameTimer { counter: 0x4000_0C00, stream: 0x4002_0010, motors: 0..4 },
+        FrameTimer { counter: 0x4000_0800, stream: 0x4002_0028, motors: 4..8 },
     ]);
     /// USART2 (RM0433, 48.8.5).
     const RECEIVER: Divider = Divider { register: 0x4000_440C, clock_hz: 100_000_000 };
