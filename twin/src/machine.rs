@@ -60,7 +60,8 @@ pub trait Machine: Board + Edge<Signals = Signals> + Sized + 'static {
     /// The divider of the GNSS receiver's UART.
     const RECEIVER: Divider;
 
-    /// What sensors, at a higher priority, may delay a tick by \[ns\]: most while an IMU is set up.
+    /// What sensors, at a higher priority, may delay a tick by \[ns\]: most while IMUs are set up, at the start, and
+    /// after a second in which nothing moves, as in `boot`, again.
     const JITTER: u64;
     /// Voltage of the battery that the models have at rest, if the image measures it \[mV\].
     const BATTERY_MV: Option<u16>;
@@ -144,7 +145,8 @@ impl Machine for Pixracer {
     const SIGNAL: Signal = Signal::Pwm400;
     /// UART4 (RM0090, 30.6.3), on APB1.
     const RECEIVER: Divider = Divider { register: 0x4000_4C08, clock_hz: 42_000_000 };
-    const JITTER: u64 = 300_000;
+    /// Two IMUs on one SPI.
+    const JITTER: u64 = 350_000;
     const BATTERY_MV: Option<u16> = None;
     /// USB: the core's fourth hardware configuration register.
     const UNMAPPED: &[u64] = &[0x5000_0050];
