@@ -1,7 +1,7 @@
 //! Motor commands, read from the pins: DSHOT600 bit by bit, or lengths of pulses.
 //!
-//! Between two frames the timers' counters are held: their updates, 600,000 a second, change no pin and would take half
-//! of the emulator's time.
+//! Between two frames the timers' counters are held: their updates, 600,000 a second, change no pin and would take a
+//! quarter of the emulator's time.
 
 use crate::machine::{FrameTimer, Signal};
 use afbc_flight_core::motor::{THROTTLE_MAX, THROTTLE_MIN};
