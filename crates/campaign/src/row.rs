@@ -1,10 +1,9 @@
 //! Result of one flight of one contender.
 
 use crate::plan::Campaign;
-use afbc_scenario::Scenario;
 use afbc_scenario::contender::Contender;
-use afbc_sim::flight::{Lost, fly};
-use afbc_sim::metrics::{Accumulator, Metrics, is_settled, tracking_error};
+use afbc_sim::flight::{Lost, Start};
+use afbc_sim::metrics::{Accumulator, Metrics, is_settled};
 use afbc_types::OutOfRange;
 
 /// Result of one flight of one contender: a row of the results.
@@ -53,7 +52,6 @@ struct Tally {
     metrics: Metrics,
     /// Number of steps in which errors were evaluated.
     settled: u64,
-    max_position_m: f64,
     /// Number of steps, and of those with a rotor at its limit.
     steps: u64,
     saturated: u64,
@@ -90,7 +88,7 @@ pub static FIGURES: [Figure; 21] = [
     figure("max_y_m", "largest error along y", |o| o.measured(o.metrics.max_abs.y)),
     figure("max_z_m", "largest error along z", |o| o.measured(o.metrics.max_abs.z)),
     figure("max_psi_rad", "largest error of yaw", |o| o.measured(o.metrics.max_abs.w)),
-    figure("max_position_m", "largest distance from the reference", |o| o.measured(o.max_position_m)),
+    figure("max_position_m", "largest distance from the reference", |o| o.measured(o.metrics.max_distance_m)),
     figure("mean_abs_du1_n", "mean |change of U1| per step", |o| o.changed(o.metrics.mean_abs_delta_u.x)),
     figure("mean_abs_du2_n", "mean |change of U2| per step", |o| o.changed(o.metrics.mean_abs_delta_u.y)),
     figure("mean_abs_du3_n", "mean |change of U3| per step", |o| o.changed(o.metrics.mean_abs_delta_u.z)),
@@ -121,8 +119,9 @@ impl Campaign {
         let draw = self.draw(flight);
         let scenario = self.with(flight, &draw)?;
         let trajectory = self.trajectory(flight).map(|trajectory| trajectory.name.as_str()).unwrap_or_default();
+        let mut start = Start::of(&scenario);
         let row = |contender: &Contender| {
-            let outcome = Tally::of(&scenario, contender)?;
+            let outcome = Tally::of(&mut start, contender)?;
             let figures = FIGURES.iter().map(|figure| (figure.value)(&outcome));
             Ok(Row {
                 flight,
@@ -140,19 +139,16 @@ impl Campaign {
 
 impl Tally {
     /// Flies, and keeps only sums.
-    fn of(scenario: &Scenario, contender: &Contender) -> Result<Self, OutOfRange> {
+    fn of(start: &mut Start, contender: &Contender) -> Result<Self, OutOfRange> {
         let mut outcome = Tally::default();
         let mut metrics = Accumulator::default();
-        outcome.lost = fly(scenario, contender, |sample| {
+        outcome.lost = start.fly(contender, |sample| {
             metrics.add(sample);
             outcome.steps += 1;
             let health = &sample.action.health;
             outcome.saturated += u64::from(health.saturated);
             outcome.tripped = outcome.tripped.or(health.fallback.map(|reason| (sample.time_s, reason)));
-            if is_settled(sample.time_s) {
-                outcome.settled += 1;
-                outcome.max_position_m = outcome.max_position_m.max(tracking_error(sample).xyz().norm());
-            }
+            outcome.settled += u64::from(is_settled(sample.time_s));
         })?;
         outcome.metrics = metrics.finish();
         Ok(outcome)

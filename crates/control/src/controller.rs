@@ -71,7 +71,7 @@ pub trait FlightController<const N: usize = 4> {
         let Some((state, setpoint)) = screen.pass(measured, setpoint, &mut screened) else {
             return Action { health: screened, ..Action::default() };
         };
-        let mut action = self.decide(control, &state, &setpoint, !screened.state_rejected);
+        let mut action = self.decide(control, state, setpoint, !screened.state_rejected);
         action.health.state_rejected = screened.state_rejected;
         action.health.setpoint_rejected = screened.setpoint_rejected;
         action

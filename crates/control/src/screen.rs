@@ -38,7 +38,7 @@ impl Screen {
         measured: Option<&State>,
         setpoint: &Setpoint,
         health: &mut Health,
-    ) -> Option<(State, Setpoint)> {
+    ) -> Option<(&State, &Setpoint)> {
         let measured = measured.filter(|state| state.is_plausible());
         health.state_rejected = measured.is_none();
         health.setpoint_rejected = !setpoint.is_plausible();
@@ -48,7 +48,7 @@ impl Screen {
         if !health.setpoint_rejected {
             self.setpoint = Some(*setpoint);
         }
-        let state = self.state?;
-        Some((state, *self.setpoint.get_or_insert(Setpoint::hold(&state))))
+        let state = self.state.as_ref()?;
+        Some((state, self.setpoint.get_or_insert_with(|| Setpoint::hold(state))))
     }
 }

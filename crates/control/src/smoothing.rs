@@ -81,7 +81,8 @@ impl Smoother {
     }
 
     /// Returns the filtered inputs; the first, and those that are not finite, are returned as they are.
-    #[inline]
+    // Always inlined: what is returned in memory is read back before it has been written.
+    #[inline(always)]
     pub fn advance(&self, last: &mut Option<Smoothed>, inputs: &Inputs) -> Inputs {
         let Some([tilt, yaw, lift]) = self.shares else { return *inputs };
         let towards = |from: f32, to: f32, share: f32| math::settled(from + (to - from) * share);

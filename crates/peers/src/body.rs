@@ -65,7 +65,8 @@ impl<const N: usize> Body<N> {
     }
 
     /// Returns the action for `demand`, filtered, its trace, and the unallocated part of U1..U3 \[N\].
-    #[inline]
+    // Always inlined: what is returned in memory is read back before it has been written.
+    #[inline(always)]
     pub(crate) fn act(&self, demand: &Demand, smoothed: &mut Option<Smoothed>) -> (Action<N>, Trace, Vector3<f32>) {
         let wanted = demand.angular_acceleration_rad_s2.component_div(&self.effectiveness);
         let inputs = Inputs { roll_n: wanted.x, pitch_n: wanted.y, yaw_n: wanted.z, thrust_n: demand.thrust_n };

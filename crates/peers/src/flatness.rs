@@ -61,7 +61,8 @@ impl Frame {
 
 /// Returns the attitude along a specific force, given with its two derivatives \[m/s2\], \[m/s3\], \[m/s4\], at the
 /// setpoint's heading. The specific force must point up.
-#[inline]
+// Always inlined: what is returned in memory is read back before it has been written.
+#[inline(always)]
 pub fn flat(specific_force: [Vector3<f32>; 3], setpoint: &Setpoint) -> Desired {
     let [s, s_dot, s_ddot] = specific_force;
     let frame = Frame::new(&s, setpoint.yaw_rad);

@@ -118,7 +118,8 @@ impl AttitudeLoop {
     }
 
     /// Computes one step in the attitude `r`, towards `desired` with the rates `feed_forward_rad_s` in the body frame.
-    #[inline]
+    // Always inlined: what is returned in memory is read back before it has been written.
+    #[inline(always)]
     pub(crate) fn output(
         &self,
         r: &Matrix3<f32>,

@@ -16,10 +16,11 @@ impl BodyAxes {
     /// Returns the axes of a body with this unit quaternion, body to earth.
     #[inline]
     pub(crate) fn of_quaternion(w: f64, x: f64, y: f64, z: f64) -> Self {
+        let (x2, y2, z2) = (2.0 * x, 2.0 * y, 2.0 * z);
         BodyAxes {
-            forward: Vector3::new(1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y)),
-            left: Vector3::new(2.0 * (x * y - w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z + w * x)),
-            up: Vector3::new(2.0 * (w * y + x * z), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)),
+            forward: Vector3::new(1.0 - (y * y2 + z * z2), x * y2 + w * z2, x * z2 - w * y2),
+            left: Vector3::new(x * y2 - w * z2, 1.0 - (x * x2 + z * z2), y * z2 + w * x2),
+            up: Vector3::new(w * y2 + x * z2, y * z2 - w * x2, 1.0 - (x * x2 + y * y2)),
         }
     }
 

@@ -1,6 +1,7 @@
 //! External disturbances, and changes of the vehicle's parameters over time.
 
 use crate::frame::Frame;
+use crate::ratios::Ratios;
 use afbc_types::{Axis, Declared, OutOfRange, Parameters, PerAxis, Range};
 use alloc::vec::Vec;
 use nalgebra::{Vector2, Vector3};
@@ -155,6 +156,7 @@ impl Rig {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Segment {
     pub(crate) parameters: Parameters<f64>,
+    pub(crate) ratios: Ratios,
     pub(crate) rig: Rig,
     /// \[A_x, A_y, A_z\], earth frame \[m/s2\].
     pub(crate) a_force: Vector3<f64>,
@@ -162,6 +164,18 @@ pub(crate) struct Segment {
     pub(crate) a_moment: Vector3<f64>,
     /// Time of the next change \[s\].
     pub(crate) until_s: f64,
+}
+
+impl Segment {
+    /// A vehicle with these parameters, and the paper's disturbances of it, until a time.
+    pub(crate) fn new(
+        parameters: Parameters<f64>,
+        rig: Rig,
+        [a_force, a_moment]: [Vector3<f64>; 2],
+        until_s: f64,
+    ) -> Self {
+        Segment { parameters, ratios: Ratios::new(&parameters), rig, a_force, a_moment, until_s }
+    }
 }
 
 impl Environment {
@@ -283,12 +297,7 @@ impl Environment {
         let payloads = self.payloads.iter().flat_map(|p| [p.start_s, p.end_s]);
         let until_s =
             changes.chain(gusts).chain(payloads).filter(|&edge| edge > t + TIME_SLACK_S).fold(f64::INFINITY, f64::min);
-        Segment {
-            parameters,
-            rig,
-            a_force: Vector3::new(a.x, a.y, a.z),
-            a_moment: Vector3::new(a.roll, a.pitch, a.yaw),
-            until_s: until_s - TIME_SLACK_S,
-        }
+        let disturbances = [Vector3::new(a.x, a.y, a.z), Vector3::new(a.roll, a.pitch, a.yaw)];
+        Segment::new(parameters, rig, disturbances, until_s - TIME_SLACK_S)
     }
 }

@@ -126,10 +126,13 @@ impl Frame {
     /// Returns the commanded speeds; a rotor without a command stands still.
     #[inline]
     pub(crate) fn speeds<const N: usize>(&self, speeds: &RotorSpeeds<N>) -> Lanes {
-        let mut lanes = Lanes::zeros();
-        let present = lanes.iter_mut().take(self.count);
-        present.zip(speeds.0.iter()).for_each(|(lane, speed)| *lane = f64::from(*speed));
-        lanes
+        let of = |count| {
+            let mut lanes = Lanes::zeros();
+            let present = lanes.as_mut_slice().iter_mut().zip(speeds.0.as_slice()).take(count);
+            present.for_each(|(lane, speed)| *lane = f64::from(*speed));
+            lanes
+        };
+        if self.count == FEW { of(FEW) } else { of(self.count) }
     }
 
     /// Sums `values`, which must be 0 beyond the number of rotors, in the order of the rotors.

@@ -42,6 +42,7 @@ pub mod integrate;
 mod load;
 mod motion;
 pub mod noise;
+mod ratios;
 mod realism;
 pub mod rigid_body;
 pub mod rotors;

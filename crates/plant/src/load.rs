@@ -1,6 +1,6 @@
 //! Forces and moments over one step.
 
-use crate::environment::Rig;
+use crate::environment::{Rig, Segment};
 use crate::frame::{Frame, Lanes, Sums};
 use afbc_types::Parameters;
 use nalgebra::Vector3;
@@ -35,36 +35,24 @@ impl Load {
     ) -> Self {
         let [w1, w2, w3, w4] = speeds_rad_s;
         let speeds = Lanes::from([w1, w2, w3, w4, 0.0, 0.0, 0.0, 0.0]);
-        Self::ideal(parameters, &Rig::intact(), &Frame::default(), &speeds, a_force, a_moment)
+        let segment = Segment::new(*parameters, Rig::intact(), [a_force, a_moment], f64::INFINITY);
+        Self::ideal(&segment, &Frame::default(), &speeds)
     }
 
     /// The same on any frame, however its rotors act on the body.
     #[inline]
-    pub(crate) fn ideal(
-        parameters: &Parameters<f64>,
-        rig: &Rig,
-        frame: &Frame,
-        speeds_rad_s: &Lanes,
-        a_force: Vector3<f64>,
-        a_moment: Vector3<f64>,
-    ) -> Self {
+    pub(crate) fn ideal(segment: &Segment, frame: &Frame, speeds_rad_s: &Lanes) -> Self {
         let squares = speeds_rad_s.map(|w| w * w);
         let [speeds, squares] = [speeds_rad_s, &squares].map(|values| frame.sums(values));
-        Self::of_rotors(parameters, rig, [&speeds, &squares], 1.0, a_force, a_moment)
+        Self::of_rotors(segment, [&speeds, &squares], 1.0)
     }
 
     /// Computes the load of rotors from sums over their `speeds` \[rad/s\] and over the `squares` of these \[rad2/s2\],
     /// already multiplied by their efficiency, from which drag moments and thrusts follow; thrusts are also multiplied
     /// by `thrust_ratio`.
     #[inline]
-    pub(crate) fn of_rotors(
-        parameters: &Parameters<f64>,
-        rig: &Rig,
-        [speeds, squares]: [&Sums; 2],
-        thrust_ratio: f64,
-        a_force: Vector3<f64>,
-        a_moment: Vector3<f64>,
-    ) -> Self {
+    pub(crate) fn of_rotors(segment: &Segment, [speeds, squares]: [&Sums; 2], thrust_ratio: f64) -> Self {
+        let Segment { parameters, ratios, rig, a_force, a_moment, .. } = segment;
         let Parameters { mass_kg, arm_m, inertia_kg_m2: i, rotor_inertia_kg_m2, .. } = *parameters;
         let Sums { all, x, y, spin, .. } = *squares;
         let (b, d) = (thrust_ratio * parameters.thrust_factor_n_s2, parameters.drag_factor_n_m_s2);
@@ -78,9 +66,9 @@ impl Load {
                 moments.y * (arm_m * b * -x / i.y) - lever_m.y * thrust_n / i.y,
                 moments.z * (d * spin / i.z),
             ),
-            a_force,
-            a_moment,
-            coupling: Vector3::new((i.y - i.z) / i.x, (i.z - i.x) / i.y, (i.x - i.y) / i.z),
+            a_force: *a_force,
+            a_moment: *a_moment,
+            coupling: ratios.coupling,
             gyroscopic: [momentum / i.x, momentum / i.y],
         }
     }

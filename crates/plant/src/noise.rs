@@ -87,12 +87,11 @@ impl Noise {
         // A copy that no call takes the address of stays in registers.
         let mut stream = self.clone();
         let numbers = core::array::from_fn(|_| {
-            const STEP: f64 = 1.0 / (1_u64 << 52) as f64;
             loop {
                 let bits = stream.bits.next_u64();
                 // The lowest eight bits select the layer, the highest 53 the position in it, so no bit is used twice.
                 let Some(layer) = LAYERS.get((bits & 0xff) as usize) else { continue };
-                let x = (bits.cast_signed() >> 11) as f64 * STEP * layer.width;
+                let x = (bits.cast_signed() >> 11) as f64 * layer.step;
                 if x.abs() < layer.width_above {
                     return x;
                 }
@@ -140,15 +139,19 @@ const AREA: f64 = 4.928_673_233_974_655e-3;
 /// One horizontal layer under exp(-x^2/2).
 #[derive(Clone, Copy)]
 struct Layer {
-    /// Half width: the curve's abscissa at the lower edge. The lowest layer is widened to include the tail's area.
-    width: f64,
+    /// Half width over 2^52, one step of the position. The half width is the curve's abscissa at the lower edge; the
+    /// lowest layer is widened to include the tail's area.
+    step: f64,
     /// Half width of the next layer up; within it, every height of this layer is under the curve.
     width_above: f64,
-    /// The curve's height at `width`.
+    /// The curve's height at the half width.
     height: f64,
     /// The curve's height at `width_above`.
     height_above: f64,
 }
+
+/// Positions between the middle of a layer and its edge.
+const STEPS: f64 = (1_u64 << 52) as f64;
 
 /// Height of the lowest layer, whose lower edge is not on the curve.
 const LAYERS_BASE_HEIGHT: f64 = 0.0;
@@ -158,13 +161,13 @@ static LAYERS: [Layer; 256] = layers();
 #[expect(clippy::indexing_slicing, reason = "evaluated when compiled")]
 const fn layers() -> [Layer; 256] {
     let (mut x, mut y) = (R, gauss(R));
-    let base = Layer { width: AREA / y, width_above: R, height: LAYERS_BASE_HEIGHT, height_above: y };
+    let base = Layer { step: AREA / y / STEPS, width_above: R, height: LAYERS_BASE_HEIGHT, height_above: y };
     let mut layers = [base; 256];
     let mut i = 1;
     while i < 256 {
         // Each layer has the same area, x (y_above - y). The topmost ends at the peak.
         let (x_above, y_above) = if i == 255 { (0.0, 1.0) } else { (gauss_inverse(y + AREA / x, x), y + AREA / x) };
-        layers[i] = Layer { width: x, width_above: x_above, height: y, height_above: y_above };
+        layers[i] = Layer { step: x / STEPS, width_above: x_above, height: y, height_above: y_above };
         (x, y) = (x_above, y_above);
         i += 1;
     }
@@ -207,11 +210,12 @@ mod tests {
         let close = |a: f64, b: f64, what| assert!((a - b).abs() < 1e-13, "{what}: {a} != {b}");
         for pair in LAYERS.windows(2) {
             let [below, above] = pair else { unreachable!() };
-            assert!(above.width < below.width && above.height > below.height);
-            close(below.width_above, above.width, "width");
+            let width = above.step * STEPS;
+            assert!(above.step < below.step && above.height > below.height);
+            close(below.width_above, width, "width");
             close(below.height_above, above.height, "height");
-            close(exp(-0.5 * above.width * above.width), above.height, "curve");
-            close(above.width * (above.height_above - above.height), AREA, "area");
+            close(exp(-0.5 * width * width), above.height, "curve");
+            close(width * (above.height_above - above.height), AREA, "area");
         }
         assert_eq!(LAYERS.last().map(|top| top.height_above), Some(1.0));
         // The lowest layer: R exp(-R^2/2), and the tail sqrt(pi/2) erfc(R / sqrt 2).

@@ -8,10 +8,11 @@ use crate::environment::{Environment, Segment};
 use crate::frame::{Frame, Lanes};
 use crate::ground_effect::GroundEffect;
 use crate::load::Load;
+use crate::ratios::Ratios;
 use crate::rotors::{RotorFault, Rotors, Spin};
 use crate::surroundings::Surroundings;
 use crate::wind::{Weather, Wind};
-use afbc_types::{Declared, OutOfRange, Parameters, Range};
+use afbc_types::{Declared, OutOfRange, Range};
 use alloc::vec::Vec;
 use nalgebra::Vector3;
 
@@ -131,16 +132,16 @@ impl Effects {
 
     /// Computes forces for the step that begins at `time_s` with the vehicle at this position and velocity.
     #[inline]
-    pub(crate) fn begin_step(
-        &mut self,
+    pub(crate) fn begin_step<'a>(
+        &'a mut self,
         speeds: &Lanes,
-        segment: &Segment,
+        segment: &'a Segment,
         time_s: f64,
         position_m: &Vector3<f64>,
         velocity_m_s: &Vector3<f64>,
         axes: impl FnOnce() -> BodyAxes,
-    ) -> (Load, Surroundings<'_>) {
-        let Segment { parameters, rig, a_force, a_moment, .. } = segment;
+    ) -> (Load, Surroundings<'a>) {
+        let Segment { parameters, ratios, .. } = segment;
         let drive = self.spin.advance(&self.frame, speeds, time_s, parameters.drag_factor_n_m_s2);
         self.wind_m_s = self.weather.advance(time_s, position_m.z, velocity_m_s);
         if let Some(effect) = &self.ground_effect {
@@ -150,21 +151,20 @@ impl Effects {
         self.held = self.drag.as_ref().map(|drag| drag.held(&speeds, parameters.arm_m));
         let ground = self.near(position_m.z, velocity_m_s.z);
         self.on_ground = ground.is_some_and(|ground| ground.touches(position_m.z, &axes()));
-        let load = Load::of_rotors(parameters, rig, [&speeds, &squares], self.thrust_ratio, *a_force, *a_moment);
-        (load, self.surroundings(parameters, position_m.z, velocity_m_s.z))
+        let load = Load::of_rotors(segment, [&speeds, &squares], self.thrust_ratio);
+        (load, self.surroundings(ratios, position_m.z, velocity_m_s.z))
     }
 
     /// Returns the load of the rotors at their present speeds, before the first step.
     pub(crate) fn start(&self, segment: &Segment) -> Load {
-        let Segment { parameters, rig, a_force, a_moment, .. } = segment;
         let [speeds, squares] = [self.spin.speeds_rad_s, self.spin.squares()].map(|values| self.frame.sums(&values));
-        Load::of_rotors(parameters, rig, [&speeds, &squares], self.thrust_ratio, *a_force, *a_moment)
+        Load::of_rotors(segment, [&speeds, &squares], self.thrust_ratio)
     }
 
     /// Returns air and ground for a vehicle at this height and climb rate, with the wind and rotors of the last step.
     #[inline]
-    pub(crate) fn surroundings(&self, parameters: &Parameters<f64>, height_m: f64, climb_m_s: f64) -> Surroundings<'_> {
-        Surroundings::new(parameters, self.held, self.wind_m_s, self.near(height_m, climb_m_s))
+    pub(crate) fn surroundings<'a>(&'a self, ratios: &'a Ratios, height_m: f64, climb_m_s: f64) -> Surroundings<'a> {
+        Surroundings::new(ratios, self.held.as_ref(), self.wind_m_s, self.near(height_m, climb_m_s))
     }
 
     /// Returns the ground, unless a step cannot reach it.

@@ -3,30 +3,27 @@
 use crate::body_axes::BodyAxes;
 use crate::contact::Ground;
 use crate::drag::HeldDrag;
-use afbc_types::Parameters;
+use crate::ratios::Ratios;
 use nalgebra::Vector3;
 
 /// Air and ground over one step: the wind is constant, drag and contact follow the motion.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Surroundings<'a> {
-    drag: Option<HeldDrag>,
+    drag: Option<&'a HeldDrag>,
     /// Velocity of the air, earth frame \[m/s\].
     wind_m_s: Vector3<f64>,
     ground: Option<&'a Ground>,
-    /// 1/m and diag(I)^-1, since divisions are slow.
-    per_mass: f64,
-    per_inertia: Vector3<f64>,
+    ratios: &'a Ratios,
 }
 
 impl<'a> Surroundings<'a> {
     pub(crate) fn new(
-        vehicle: &Parameters<f64>,
-        drag: Option<HeldDrag>,
+        ratios: &'a Ratios,
+        drag: Option<&'a HeldDrag>,
         wind_m_s: Vector3<f64>,
         ground: Option<&'a Ground>,
     ) -> Self {
-        let per_inertia = vehicle.inertia_kg_m2.map(|i| 1.0 / i);
-        Surroundings { drag, wind_m_s, ground, per_mass: 1.0 / vehicle.mass_kg, per_inertia }
+        Surroundings { drag, wind_m_s, ground, ratios }
     }
 
     /// True if there are no such forces.
@@ -58,6 +55,6 @@ impl<'a> Surroundings<'a> {
             force += ground_force;
             moment += ground_moment;
         }
-        (force * self.per_mass, moment.component_mul(&self.per_inertia))
+        (force * self.ratios.per_mass, moment.component_mul(&self.ratios.per_inertia))
     }
 }

@@ -131,10 +131,9 @@ impl Plant {
     pub fn new(model: PlantModel, initial: Motion, environment: Environment) -> Self {
         let body = Body::new(model, &initial);
         let segment = environment.segment(0.0);
-        let Segment { parameters, rig, a_force, a_moment, .. } = &segment;
         let speeds_rad_s = environment.frame().hover_rad_s(environment.nominal());
         let hover_rad_s = speeds_rad_s.max();
-        let load = Load::ideal(parameters, rig, environment.frame(), &speeds_rad_s, *a_force, *a_moment);
+        let load = Load::ideal(&segment, environment.frame(), &speeds_rad_s);
         Plant { body, environment, segment, effects: None, load, speeds_rad_s, hover_rad_s, steps: 0, time_s: 0.0 }
     }
 
@@ -165,8 +164,7 @@ impl Plant {
         if self.effects.is_some() {
             self.advance_in_effect(speeds, dt_s);
         } else {
-            let Segment { parameters, rig, a_force, a_moment, .. } = &self.segment;
-            self.load = Load::ideal(parameters, rig, self.environment.frame(), speeds, *a_force, *a_moment);
+            self.load = Load::ideal(&self.segment, self.environment.frame(), speeds);
             self.speeds_rad_s = *speeds;
             self.body.advance(&self.load, dt_s);
         }
@@ -186,9 +184,9 @@ impl Plant {
             effects.begin_step(speeds, &self.segment, self.time_s, &position, &velocity, || body.axes());
         self.load = load;
         if surroundings.are_empty() {
-            self.body.advance(&load, dt_s);
+            self.body.advance(&self.load, dt_s);
         } else {
-            self.body.advance_in(&load, &surroundings, dt_s);
+            self.body.advance_in(&self.load, &surroundings, dt_s);
         }
     }
 
@@ -203,10 +201,10 @@ impl Plant {
 
     /// Returns what instruments feel now: the motion with its accelerations under the forces of the last step.
     pub fn truth(&self) -> Truth {
-        let parameters = &self.segment.parameters;
+        let Segment { parameters, ratios, .. } = &self.segment;
         let (position_m, velocity_m_s) = self.body.place();
         let surroundings =
-            self.effects.as_ref().map(|effects| effects.surroundings(parameters, position_m.z, velocity_m_s.z));
+            self.effects.as_ref().map(|effects| effects.surroundings(ratios, position_m.z, velocity_m_s.z));
         let (acceleration_m_s2, angular) = self.body.accelerations(&self.load, surroundings.as_ref());
         let (attitude, rates_rad_s, angular_acceleration_rad_s2) = match &self.body {
             Body::RigidBody(x) => ([x[6], x[7], x[8], x[9]], Vector3::new(x[10], x[11], x[12]), angular),

@@ -1,6 +1,6 @@
 //! Figures of merit of one flight.
 
-use crate::flight::{Innovation, Sample};
+use crate::flight::{Estimated, Innovation, Sample};
 pub use afbc_estimator::Aid;
 
 use nalgebra::{Vector3, Vector4};
@@ -72,6 +72,7 @@ pub struct Accumulator {
 }
 
 /// Returns reference minus vehicle: \[x, y, z, psi\], with the yaw error wrapped to +-pi.
+#[inline]
 pub fn tracking_error(sample: &Sample) -> Vector4<f64> {
     use core::f64::consts::TAU;
     let position = sample.reference.position_m - sample.motion.position_m;
@@ -80,12 +81,14 @@ pub fn tracking_error(sample: &Sample) -> Vector4<f64> {
 }
 
 /// Returns U1..U4 as produced by the rotors \[N\].
+#[inline]
 pub fn inputs(sample: &Sample) -> Vector4<f64> {
     let u = sample.action.given;
     Vector4::new(u.roll_n, u.pitch_n, u.yaw_n, u.thrust_n).cast()
 }
 
 /// True if errors are evaluated at this time.
+#[inline]
 pub fn is_settled(time_s: f64) -> bool {
     // A tolerance of half a microsecond, since times are decimal and steps binary.
     time_s >= SETTLED_S - 5e-7
@@ -93,31 +96,42 @@ pub fn is_settled(time_s: f64) -> bool {
 
 impl Accumulator {
     /// Adds one step.
+    // Inlined, so that of a sample only what is read is ever made.
+    #[inline(always)]
     pub fn add(&mut self, sample: &Sample) {
-        let error = tracking_error(sample);
-        self.last_error = error;
-        if !is_settled(sample.time_s) {
-            return;
+        self.last_error = tracking_error(sample);
+        if is_settled(sample.time_s) {
+            self.add_error(inputs(sample));
+            if let Some(estimated) = &sample.estimated {
+                self.add_estimate(estimated);
+            }
         }
+    }
+
+    /// Adds the last error, and the inputs of the same step.
+    #[inline(never)]
+    fn add_error(&mut self, u: Vector4<f64>) {
+        let error = self.last_error;
         self.errors += 1;
         self.sum_squares += error.component_mul(&error);
         self.max_abs = self.max_abs.sup(&error.abs());
         self.max_distance_m = self.max_distance_m.max(error.xyz().norm());
-        let u = inputs(sample);
         if let Some(last) = self.last_u.replace(u) {
             self.changes += 1;
             self.sum_abs_delta_u += (u - last).abs();
         }
-        if let Some(estimated) = &sample.estimated {
-            let square = |error: &Vector3<f32>| error.cast::<f64>().map(|x| x * x);
-            self.estimates += 1;
-            self.estimate.position_m += square(&estimated.position_error_m);
-            self.estimate.velocity_m_s += square(&estimated.velocity_error_m_s);
-            self.estimate.attitude_rad += square(&estimated.attitude_error_rad);
-            self.estimate.nees += f64::from(estimated.nees);
-            self.estimate.valid_ratio += f64::from(u8::from(estimated.valid));
-            estimated.innovation.iter().for_each(|innovation| self.add_innovation(innovation));
-        }
+    }
+
+    #[inline(never)]
+    fn add_estimate(&mut self, estimated: &Estimated) {
+        let square = |error: &Vector3<f32>| error.cast::<f64>().map(|x| x * x);
+        self.estimates += 1;
+        self.estimate.position_m += square(&estimated.position_error_m);
+        self.estimate.velocity_m_s += square(&estimated.velocity_error_m_s);
+        self.estimate.attitude_rad += square(&estimated.attitude_error_rad);
+        self.estimate.nees += f64::from(estimated.nees);
+        self.estimate.valid_ratio += f64::from(u8::from(estimated.valid));
+        estimated.innovation.iter().for_each(|innovation| self.add_innovation(innovation));
     }
 
     fn add_innovation(&mut self, innovation: &Innovation) {

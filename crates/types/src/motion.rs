@@ -31,28 +31,35 @@ const JERK_MAX_M_S3: f32 = 1e5;
 const SNAP_MAX_M_S4: f32 = 1e7;
 /// Largest angle \[rad\]. Larger than a turn, because yaw may be unwrapped.
 const ANGLE_MAX_RAD: f32 = 1e3;
-/// Largest angular rate or angular acceleration, per coordinate \[rad/s, rad/s2\].
+/// Largest angular rate, per coordinate \[rad/s\].
 const RATE_MAX_RAD_S: f32 = 1e3;
+/// Largest heading and derivatives of it \[rad, rad/s, rad/s2\].
+const HEADING_MAX: f32 = 1e3;
 
-/// True if `value` is finite and at most `max` in size.
-fn is_within(value: f32, max: f32) -> bool {
-    // The bits of positive numbers are in their order, those of NaN come last, and their comparison is short.
-    value.abs().to_bits() <= max.to_bits()
+/// A number whose highest bit is set if a coordinate is larger than `max` in size or not a number.
+fn excess(vector: &Vector3<f32>, max: f32) -> u32 {
+    // The bits of positive numbers are in their order, those of NaN come last, and a difference below zero borrows the
+    // highest bit: one branch for all of a state.
+    let excess = vector.map(|value| max.to_bits().wrapping_sub(value.abs().to_bits()));
+    excess.x | excess.y | excess.z
 }
 
-/// True if all coordinates are finite and at most `max` in size.
-pub(crate) fn within(vector: &Vector3<f32>, max: f32) -> bool {
-    is_within(vector.x, max) && is_within(vector.y, max) && is_within(vector.z, max)
+/// True if each vector is finite and within its bound, by coordinate.
+#[inline]
+pub(crate) fn within<const N: usize>(vectors: [(&Vector3<f32>, f32); N]) -> bool {
+    vectors.into_iter().fold(0, |any, (vector, max)| any | excess(vector, max)) >> 31 == 0
 }
 
 impl State {
     /// True if every value is finite and physically possible: at most 1e5 m, 1e3 m/s, 1e3 rad and 1e3 rad/s in size.
     /// Controllers must reject any other state.
     pub fn is_plausible(&self) -> bool {
-        within(&self.position_m, POSITION_MAX_M)
-            && within(&self.velocity_m_s, VELOCITY_MAX_M_S)
-            && within(&self.attitude_rad, ANGLE_MAX_RAD)
-            && within(&self.rates_rad_s, RATE_MAX_RAD_S)
+        within([
+            (&self.position_m, POSITION_MAX_M),
+            (&self.velocity_m_s, VELOCITY_MAX_M_S),
+            (&self.attitude_rad, ANGLE_MAX_RAD),
+            (&self.rates_rad_s, RATE_MAX_RAD_S),
+        ])
     }
 }
 
@@ -92,13 +99,14 @@ impl Setpoint {
     /// True if every value is finite and within the bounds of [`State::is_plausible`], accelerations at most 1e3 m/s2
     /// and 1e3 rad/s2, jerk at most 1e5 m/s3, snap at most 1e7 m/s4.
     pub fn is_plausible(&self) -> bool {
-        within(&self.position_m, POSITION_MAX_M)
-            && within(&self.velocity_m_s, VELOCITY_MAX_M_S)
-            && within(&self.acceleration_m_s2, ACCELERATION_MAX_M_S2)
-            && within(&self.jerk_m_s3, JERK_MAX_M_S3)
-            && within(&self.snap_m_s4, SNAP_MAX_M_S4)
-            && is_within(self.yaw_rad, ANGLE_MAX_RAD)
-            && is_within(self.yaw_rate_rad_s, RATE_MAX_RAD_S)
-            && is_within(self.yaw_acceleration_rad_s2, RATE_MAX_RAD_S)
+        let heading = Vector3::new(self.yaw_rad, self.yaw_rate_rad_s, self.yaw_acceleration_rad_s2);
+        within([
+            (&self.position_m, POSITION_MAX_M),
+            (&self.velocity_m_s, VELOCITY_MAX_M_S),
+            (&self.acceleration_m_s2, ACCELERATION_MAX_M_S2),
+            (&self.jerk_m_s3, JERK_MAX_M_S3),
+            (&self.snap_m_s4, SNAP_MAX_M_S4),
+            (&heading, HEADING_MAX),
+        ])
     }
 }

@@ -8,6 +8,7 @@ use nalgebra::Vector3;
 /// half the sampling rate is no filter for the samples.
 #[derive(Clone, Debug)]
 pub(super) struct LowPass {
+    /// Infinite without a filter.
     cutoff_hz: f64,
     /// b0 = b2 = b1/2, a1, a2; none lets everything pass.
     weights: Option<[f64; 3]>,
@@ -23,7 +24,7 @@ impl LowPass {
             let scale = 1.0 / (1.0 + SQRT_2 * k + k * k);
             [k * k * scale, 2.0 * (k * k - 1.0) * scale, (1.0 - SQRT_2 * k + k * k) * scale]
         });
-        LowPass { cutoff_hz, weights, state: None }
+        LowPass { cutoff_hz: if cutoff_hz > 0.0 { cutoff_hz } else { f64::INFINITY }, weights, state: None }
     }
 
     /// Returns the filtered value; the first one counts as having stood for ever.
@@ -36,10 +37,8 @@ impl LowPass {
     }
 
     /// Returns the share of an oscillation of this frequency that the analogue filter lets pass to the samples.
+    #[inline]
     pub(super) fn share(&self, frequency_hz: f64) -> f64 {
-        if self.cutoff_hz == 0.0 {
-            return 1.0;
-        }
         let ratio = frequency_hz / self.cutoff_hz;
         1.0 / sqrt(1.0 + ratio * ratio * ratio * ratio)
     }

@@ -1,7 +1,6 @@
 //! Sampling and delay of fixes.
 
 use alloc::vec::Vec;
-use libm::floor;
 
 /// Tolerance when comparing times, far below any step \[s\].
 const TIME_SLACK_S: f64 = 1e-9;
@@ -22,7 +21,7 @@ impl Clock {
 
     /// Returns whether this step is one of them; to be called in every step.
     pub(super) fn ticks(&mut self) -> bool {
-        let due = floor(self.steps as f64 * self.per_step + TIME_SLACK_S) as u64 + 1;
+        let due = (self.steps as f64 * self.per_step + TIME_SLACK_S) as u64 + 1;
         self.steps += 1;
         let ticks = due > self.taken;
         self.taken = due;

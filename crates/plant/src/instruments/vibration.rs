@@ -60,7 +60,7 @@ impl Vibration {
                 continue;
             }
             let turned = *angle + mean * self.step_s;
-            *angle = turned - TAU * floor(turned / TAU);
+            *angle = if (0.0..TAU).contains(&turned) { turned } else { turned - TAU * floor(turned / TAU) };
             let (s, c) = sincos(*angle);
             let growth = (speed / truth.hover_rad_s) * (speed / truth.hover_rad_s);
             // Cosine and sine of k theta.

@@ -21,20 +21,52 @@ pub fn fly(
     contender: &Contender,
     observe: impl FnMut(&Sample),
 ) -> Result<Option<Lost>, OutOfRange> {
-    contender.build(&scenario.vehicle, &scenario.rotors, Fly { scenario, observe })
+    Start::of(scenario).fly(contender, observe)
 }
 
-struct Fly<'a, O> {
+/// The start of a scenario, which every contender flies from. A vehicle's own estimate settles before it, once for all.
+pub struct Start<'a> {
     scenario: &'a Scenario,
+    /// The world there, once it has been made.
+    world: Option<World>,
+}
+
+impl<'a> Start<'a> {
+    /// The one of `scenario`.
+    pub fn of(scenario: &'a Scenario) -> Self {
+        Start { scenario, world: None }
+    }
+
+    /// Flies under one contender, as [`fly`] does.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn fly(&mut self, contender: &Contender, observe: impl FnMut(&Sample)) -> Result<Option<Lost>, OutOfRange> {
+        let scenario = self.scenario;
+        contender.build(&scenario.vehicle, &scenario.rotors, Fly { start: self, observe })
+    }
+
+    /// Returns the world for steps of `dt_s`.
+    fn world(&mut self, dt_s: f64) -> Result<World, OutOfRange> {
+        let world = match self.world.take().filter(|world| world.dt_s() == dt_s) {
+            Some(world) => world,
+            None => World::new(self.scenario, dt_s)?,
+        };
+        Ok(self.world.insert(world).clone())
+    }
+}
+
+struct Fly<'a, 'b, O> {
+    start: &'a mut Start<'b>,
     observe: O,
 }
 
-impl<O: FnMut(&Sample)> Task for Fly<'_, O> {
+impl<O: FnMut(&Sample)> Task for Fly<'_, '_, O> {
     type Output = Option<Lost>;
 
     fn with<C: FlightController<N>, const N: usize>(self, controller: C) -> Result<Option<Lost>, OutOfRange> {
-        let Fly { scenario, mut observe } = self;
-        let mut world = World::new(scenario, decimal(controller.dt_s()))?;
+        let Fly { start, mut observe } = self;
+        let (scenario, mut world) = (start.scenario, start.world(decimal(controller.dt_s()))?);
         let observe = |sample: &Sample| {
             observe(sample);
             ControlFlow::Continue(())

@@ -59,6 +59,7 @@ pub struct Innovation {
 }
 
 /// Instruments and estimator of a vehicle.
+#[derive(Clone)]
 pub(super) struct SimulatedEstimator {
     sensing: Sensing,
     front_end: EstimatorFrontEnd,
@@ -68,12 +69,13 @@ pub(super) struct SimulatedEstimator {
     /// Steps since the beginning of settling, and how many of these there are before t = 0.
     steps: u64,
     settling: u64,
-    /// Time and result of the last look \[s\].
-    last: Option<(f64, Look)>,
+    /// Time of the last look \[s\], if there was one, and what it saw.
+    last_s: Option<f64>,
+    seen: Look,
 }
 
 /// What reaches the pilot.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Look {
     /// The state, if it is valid.
     pub(super) state: Option<State>,
@@ -120,7 +122,8 @@ impl SimulatedEstimator {
             step_s,
             steps: 0,
             settling: ((REST_S + waits_s + CARRIED_S) / step_s).round() as u64,
-            last: None,
+            last_s: None,
+            seen: Look::default(),
         })))
     }
 
@@ -148,18 +151,22 @@ impl SimulatedEstimator {
     }
 
     /// Returns what reaches the pilot, and how good it is. The same again as long as the vehicle is held.
-    pub(super) fn look(&mut self, truth: &Truth) -> Look {
-        if let Some((time_s, look)) = self.last
-            && time_s == truth.time_s
-        {
-            return look;
+    pub(super) fn look(&mut self, truth: &Truth) -> &Look {
+        if self.last_s != Some(truth.time_s) {
+            self.seen = self.see(truth);
+            self.last_s = Some(truth.time_s);
         }
+        &self.seen
+    }
+
+    fn see(&mut self, truth: &Truth) -> Look {
         let judged = self.judged();
         let estimate = self.step(truth);
         let valid = is_valid(&estimate);
-        let nees = match self.last {
-            Some((_, last)) if !self.steps.is_multiple_of(NEES_EVERY) => last.estimated.nees,
-            _ => self.nees(&estimate, truth) as f32,
+        let nees = if self.last_s.is_some() && !self.steps.is_multiple_of(NEES_EVERY) {
+            self.seen.estimated.nees
+        } else {
+            self.nees(&estimate, truth) as f32
         };
         let errors = errors(&estimate, truth).cast::<f32>();
         let part = |i: usize| Vector3::from(errors.fixed_rows::<3>(i));
@@ -179,9 +186,7 @@ impl SimulatedEstimator {
         let pose = inbox.pose().map(|pose| Aged { value: pose.value, age_us: pose.age_us(now_us) });
         let state = inbox.state().map(|state| state.value);
         let position_lost = inbox.position_lost().map(|state| state.value);
-        let look = Look { state, position_lost, missing: inbox.missing(), pose, estimated };
-        self.last = Some((truth.time_s, look));
-        look
+        Look { state, position_lost, missing: inbox.missing(), pose, estimated }
     }
 
     /// Returns the numbers of measurements fused and rejected, by aid.

@@ -57,11 +57,17 @@ impl Watch {
     }
 
     /// Returns why the vehicle counts as lost, if it does. `descends` is true if its flight core brings it down.
+    // Inlined, so that of a sample only what is read is ever made.
+    #[inline(always)]
     pub(super) fn lost(&mut self, sample: &Sample, descends: bool) -> Option<&'static str> {
-        uncontrolled(sample).or_else(|| self.idle(sample, descends))
+        match uncontrolled(sample) {
+            None => self.idle(sample, descends),
+            reason => reason,
+        }
     }
 
     /// Returns why a vehicle that should fly counts as lost, if it does.
+    #[inline(always)]
     fn idle(&mut self, sample: &Sample, descends: bool) -> Option<&'static str> {
         let (motion, reference, time_s) = (&sample.motion, &sample.reference, sample.time_s);
         let height_m = motion.position_m.z;
@@ -76,6 +82,10 @@ impl Watch {
         }
         // A law that lets the vehicle fall does so above its reference, or to end a climb.
         let falls = off && !touches && below_m > 0.0 && motion.velocity_m_s.z < reference.velocity_m_s.z;
+        if !falls && !touches && self.grounded.is_none() {
+            self.off_since_s = None;
+            return None;
+        }
         self.off_since_s = falls.then(|| self.off_since_s.unwrap_or(time_s));
         self.grounded = self.grounded.filter(|grounded| height_m < grounded.lowest_m + CLEAR_M);
         if touches {
@@ -98,6 +108,7 @@ impl Watch {
 }
 
 /// Returns why the vehicle counts as out of control, if it does. Assumption A3 excludes a tilt of 90 degrees.
+#[inline]
 fn uncontrolled(sample: &Sample) -> Option<&'static str> {
     let eta = &sample.motion.attitude_rad;
     let distance_m = (sample.motion.position_m - sample.reference.position_m).norm();

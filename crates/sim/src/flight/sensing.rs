@@ -13,6 +13,7 @@ use std::collections::VecDeque;
 pub const STANDS_S: f64 = 4.0;
 
 /// Instruments of a vehicle, and what of their readings has not reached a tick yet.
+#[derive(Clone)]
 pub(super) struct Sensing {
     instruments: Instruments,
     suite: InstrumentSuite,
@@ -97,6 +98,7 @@ fn steps(step_s: f64) -> u64 {
 }
 
 /// Sensors wired to a vehicle that runs its own estimator.
+#[derive(Clone)]
 pub(super) struct Wired {
     sensing: Sensing,
     step_s: f64,

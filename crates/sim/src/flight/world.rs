@@ -17,6 +17,7 @@ use afbc_types::{OutOfRange, PerAxis, Pose, ROTORS_MAX, RotorSpeeds, State};
 use nalgebra::Vector3;
 
 /// Plant, sensors, link and reference of a scenario.
+#[derive(Clone)]
 pub struct World {
     plant: Plant,
     /// What the vehicle flies on if it has an inertial sensor; the sensors otherwise.
@@ -153,10 +154,14 @@ impl World {
         if let Some(estimator) = &mut self.estimator {
             return estimated(estimator, &self.plant, motion, self.trajectory.at(time_s));
         }
-        let (state, measurement) = match &mut self.sensors {
-            None => (Some(motion.measure()), None),
-            Some(sensors) if self.faults.are_none() => measure(sensors, &motion),
-            Some(sensors) => measure(sensors, &self.faults.seen(&motion, time_s)),
+        let measurement = match &mut self.sensors {
+            None => None,
+            Some(sensors) if self.faults.are_none() => Some(measure(sensors, &motion)),
+            Some(sensors) => Some(measure(sensors, &self.faults.seen(&motion, time_s))),
+        };
+        let state = match &measurement {
+            None => Some(motion.measure()),
+            Some(measurement) => measurement.fresh.then_some(measurement.state),
         };
         let reference = self.trajectory.at(time_s);
         let lost = !self.outages.is_empty() && is_lost(&self.outages, time_s);
@@ -212,7 +217,7 @@ impl View {
 #[inline(never)]
 fn estimated(estimator: &mut SimulatedEstimator, plant: &Plant, motion: Motion, reference: Reference) -> View {
     let (time_s, telemetry) = (plant.time_s(), plant.telemetry());
-    let Look { state, position_lost, missing, pose, estimated } = estimator.look(&plant.truth());
+    let Look { state, position_lost, missing, pose, estimated } = *estimator.look(&plant.truth());
     View {
         time_s,
         motion,
@@ -234,10 +239,9 @@ fn is_lost(outages: &[Outage], time_s: f64) -> bool {
     outages.iter().any(|outage| (outage.start_s..outage.end_s).contains(&time_s))
 }
 
-/// Returns the state for a pilot, unless there is a dropout, and the measurement.
+/// Measures.
 // Not inlined, so that the step of an ideal flight stays short.
 #[inline(never)]
-fn measure(sensors: &mut StateSensor, motion: &Motion) -> (Option<State>, Option<StateMeasurement>) {
-    let measurement = sensors.measure(motion);
-    (Some(measurement.state).filter(|_| measurement.fresh), Some(measurement))
+fn measure(sensors: &mut StateSensor, motion: &Motion) -> StateMeasurement {
+    sensors.measure(motion)
 }

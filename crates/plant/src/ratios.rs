@@ -1,0 +1,25 @@
+//! What the equations of motion need of a vehicle in every step, computed once.
+
+use afbc_types::Parameters;
+use nalgebra::Vector3;
+
+/// Ratios of a vehicle's parameters that hold until these change, since divisions are slow.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Ratios {
+    /// 1/m and diag(I)^-1.
+    pub(crate) per_mass: f64,
+    pub(crate) per_inertia: Vector3<f64>,
+    /// a_1, a_3, a_5 of (6).
+    pub(crate) coupling: Vector3<f64>,
+}
+
+impl Ratios {
+    pub(crate) fn new(vehicle: &Parameters<f64>) -> Self {
+        let i = &vehicle.inertia_kg_m2;
+        Ratios {
+            per_mass: 1.0 / vehicle.mass_kg,
+            per_inertia: i.map(|i| 1.0 / i),
+            coupling: Vector3::new((i.y - i.z) / i.x, (i.z - i.x) / i.y, (i.x - i.y) / i.z),
+        }
+    }
+}
