@@ -187,8 +187,10 @@ impl Topics<'_, '_> {
         }
         let Some(message) = make() else { return };
         // On time it keeps its phase.
-        let next_us = due_us.saturating_add(topic.period_us.into());
-        *due_us = if next_us > self.now_us { next_us } else { self.now_us.saturating_add(topic.period_us.into()) };
+        let period_us = u64::from(topic.period_us);
+        let next_us = due_us.saturating_add(period_us);
+        let is_on_time = *due_us > 0 && next_us > self.now_us;
+        *due_us = if is_on_time { next_us } else { self.now_us.saturating_add(period_us) };
         self.at_once(&message);
     }
 

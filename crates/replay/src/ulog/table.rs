@@ -95,8 +95,27 @@ pub(super) const VEHICLE_LOCAL_POSITION: Topic = (
 pub(super) const VEHICLE_LAND_DETECTED: Topic = ("vehicle_land_detected", &["timestamp", "landed"]);
 
 pub(super) const ACTUATOR_ARMED: Topic = ("actuator_armed", &["timestamp", "armed"]);
+pub(super) const AFBC_ESTIMATOR: Topic = ("afbc_estimator", &["timestamp", "on_ground"]);
+pub(super) const AFBC_AID: Topic = (
+    "afbc_aid",
+    &[
+        "timestamp",
+        "timestamp_sample",
+        "kind",
+        "numbers[0]",
+        "numbers[1]",
+        "numbers[2]",
+        "numbers[3]",
+        "numbers[4]",
+        "numbers[5]",
+        "numbers[6]",
+        "numbers[7]",
+        "numbers[8]",
+        "numbers[9]",
+    ],
+);
 
-const TOPICS: [Topic; 11] = [
+const TOPICS: [Topic; 13] = [
     SENSOR_COMBINED,
     VEHICLE_GPS_POSITION,
     SENSOR_GPS,
@@ -108,6 +127,8 @@ const TOPICS: [Topic; 11] = [
     VEHICLE_LOCAL_POSITION,
     VEHICLE_LAND_DETECTED,
     ACTUATOR_ARMED,
+    AFBC_ESTIMATOR,
+    AFBC_AID,
 ];
 
 /// A message: its fields in the order of its [`Topic`]; not a number where its layout lacks one.
@@ -157,6 +178,11 @@ impl Tables {
         let mut instances: Vec<_> = of.map(|((_, instance), rows)| (*instance, rows.as_slice())).collect();
         instances.sort_by_key(|(instance, _)| *instance);
         instances
+    }
+
+    /// Returns all parameters, in no order.
+    pub(super) fn parameters(&self) -> impl Iterator<Item = (&str, f64)> {
+        self.parameters.iter().map(|(name, value)| (name.as_str(), *value))
     }
 
     /// Returns the messages of a topic's lowest instance.
