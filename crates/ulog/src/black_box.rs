@@ -8,8 +8,8 @@ use crate::ring::{LogRing, RingView};
 use crate::topics::{
     ActuatorArmed, ActuatorMotors, ActuatorOutputs, AidOffered, Aiding, BatteryVoltage, EstimatorFigures,
     EstimatorFlags, EstimatorVector, LandDetected, LawSignals, Listed, ManualControl, SensorCombined, TOPICS,
-    VehicleAngularVelocity, VehicleAttitude, VehicleAttitudeSetpoint, VehicleGlobalPosition, VehicleLocalPosition,
-    VehicleLocalPositionSetpoint, VehicleRatesSetpoint, VehicleState,
+    ThrustDemand, TorqueDemand, VehicleAngularVelocity, VehicleAttitude, VehicleAttitudeSetpoint,
+    VehicleGlobalPosition, VehicleLocalPosition, VehicleLocalPositionSetpoint, VehicleRatesSetpoint, VehicleState,
 };
 use afbc_estimator::{ImuSample, Measurement};
 use afbc_onboard::parameters::{ParameterTable, RecordChange};
@@ -287,6 +287,8 @@ impl Last {
         topics.at_rate(|| VehicleAngularVelocity::of(moment));
         topics.at_rate(|| VehicleAttitudeSetpoint::of(moment));
         topics.at_rate(|| VehicleRatesSetpoint::of(moment));
+        topics.at_rate(|| ThrustDemand::of(moment));
+        topics.at_rate(|| TorqueDemand::of(moment));
         topics.at_rate(|| Some(ActuatorMotors::of(moment)));
         topics.at_rate(|| VehicleLocalPosition::of(moment));
         topics.at_rate(|| VehicleLocalPositionSetpoint::of(moment));

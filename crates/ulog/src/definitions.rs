@@ -17,6 +17,8 @@ const SYSTEM: &str = "AFBC";
 const VERSION: &str = env!("CARGO_PKG_VERSION");
 /// A release, in the lowest byte of the version's number.
 const RELEASE: u32 = 255;
+/// PX4's number of the layouts of version 1.15, which readers ask for.
+const DATA_FORMAT: u32 = 2;
 /// Default of a parameter: the system's.
 const SYSTEM_DEFAULT: u8 = 1;
 
@@ -169,10 +171,12 @@ impl Definitions {
             1 => text(ring, "ver_hw", &self.hardware),
             2 => text(ring, "ver_sw", VERSION),
             3 => number(ring, "uint32_t ver_sw_release", release(VERSION).to_le_bytes()),
-            4 => text(ring, "sys_uuid", self.unique.as_deref().unwrap_or_default()),
-            5 => number(ring, "int32_t time_ref_utc", self.utc_offset_s.to_le_bytes()),
-            6 => text(ring, "afbc_vehicle", &self.vehicle),
-            7 => text(ring, "afbc_law", &self.law),
+            // Which layouts of topics they are.
+            4 => number(ring, "uint32_t ver_data_format", DATA_FORMAT.to_le_bytes()),
+            5 => text(ring, "sys_uuid", self.unique.as_deref().unwrap_or_default()),
+            6 => number(ring, "int32_t time_ref_utc", self.utc_offset_s.to_le_bytes()),
+            7 => text(ring, "afbc_vehicle", &self.vehicle),
+            8 => text(ring, "afbc_law", &self.law),
             _ => return None,
         })
     }

@@ -14,6 +14,8 @@ use afbc_ulog::{BlackBox, LogRing, LogStart, LoggedTick, TOPICS, TakenInputs};
 use nalgebra::{SVector, Vector3};
 use proptest::prelude::*;
 use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
 use strict::{StrictLog, read};
 
 /// Time between two ticks \[us\].
@@ -278,7 +280,7 @@ fn values_are_px4s() {
         rates_rad_s: Vector3::new(0.7, 0.8, 0.9),
     });
     view.trace.errors.pitch.e2 = 0.25;
-    view.trace.inputs.thrust_n = 2.0;
+    (view.trace.inputs.thrust_n, view.trace.inputs.pitch_n) = (2.0, 0.5);
     view.trace.filtered[1].angle = 0.1;
     let mut inputs = ControlInputs::EMPTY;
     inputs.battery = Some(BatteryReading { voltage_v: 11.1, current_a: 4.5 });
@@ -315,6 +317,8 @@ fn values_are_px4s() {
     // The largest thrust of four rotors, and b omega^2 of the fourth.
     let force_max_n = f64::from(logged_force_max());
     near("vehicle_attitude_setpoint", "thrust_body[2]", -2.0 / (4.0 * force_max_n));
+    near("vehicle_thrust_setpoint", "xyz[2]", -2.0 / (4.0 * force_max_n));
+    near("vehicle_torque_setpoint", "xyz[1]", -0.5 / (4.0 * force_max_n));
     near("actuator_motors", "control[3]", 2.984e-5 * 400.0 * 400.0 / force_max_n);
     assert!(log.field("actuator_motors", "control[4]").last().unwrap().is_nan());
     near("actuator_outputs", "output[2]", 300.0);
@@ -366,5 +370,46 @@ fn parameters_and_information_are_there() {
         ("AFBC".into(), "test".into(), "paper".into())
     );
     assert_eq!(log.information["ver_sw_release"], [255, 0, 1, 0]);
+    assert_eq!(log.information["ver_data_format"], [2, 0, 0, 0]);
     assert_eq!(log.start_us, TICK_US);
+}
+
+/// Writes logs for other readers (`scripts/check-ulog`), through rings that are full and cut short, and what is in each.
+#[test]
+fn logs_for_other_readers() {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("ulog");
+    fs::create_dir_all(&folder).unwrap();
+    let steps = |seed: usize| -> Vec<Step> {
+        let one = |index: usize| match (index * 7 + seed) % 5 {
+            0 | 3 => Step::Ticks(40),
+            1 => Step::Keep(6_000 + 500 * seed),
+            2 => Step::Change(3.0 + (index % 6) as f32),
+            _ => Step::Text(index as u8 % 8),
+        };
+        [Step::Ticks(3), Step::Keep(usize::MAX)].into_iter().cycle().take(20).chain((0..60).map(one)).collect()
+    };
+    let mut expected = String::from("log,messages,samples,dropouts_ms,texts,initial,changes\n");
+    let mut told = 0;
+    for seed in 0..4 {
+        for (ring, whole) in [
+            (2_000, run::<2_000>(&steps(seed)).0),
+            (6_000, run::<6_000>(&steps(seed)).0),
+            (20_000, run::<20_000>(&steps(seed)).0),
+        ] {
+            for cut in [whole.len(), whole.len() * 3 / 4, whole.len() / 2 + seed] {
+                let bytes = &whole[..cut];
+                let (name, log) = (format!("{ring}-{seed}-{cut}.ulg"), read(bytes));
+                fs::write(folder.join(&name), bytes).unwrap();
+                let count: usize = log.messages.values().map(Vec::len).sum();
+                let dropouts: Vec<_> = log.dropouts.iter().map(|(ms, _)| ms.to_string()).collect();
+                let (samples, changes) = (log.times("sensor_combined").len(), log.parameters.len() - log.initial);
+                let numbers = [count, samples].map(|number| number.to_string()).join(",");
+                let (texts, initial) = (log.texts.len(), log.initial);
+                expected += &format!("{name},{numbers},{},{texts},{initial},{changes}\n", dropouts.join(" "));
+                told += dropouts.len();
+            }
+        }
+    }
+    assert!(told > 50, "{told} dropouts");
+    fs::write(folder.join("expected.csv"), expected).unwrap();
 }

@@ -2,6 +2,7 @@
 
 mod attitude;
 mod battery;
+mod demand;
 mod estimator;
 mod global;
 mod law;
@@ -14,6 +15,7 @@ mod vehicle;
 
 pub(crate) use attitude::{VehicleAttitude, VehicleAttitudeSetpoint};
 pub(crate) use battery::BatteryVoltage;
+pub(crate) use demand::{ThrustDemand, TorqueDemand};
 pub(crate) use estimator::{AidOffered, EstimatorFigures, EstimatorFlags, EstimatorVector};
 pub(crate) use global::VehicleGlobalPosition;
 pub(crate) use law::LawSignals;
@@ -81,6 +83,8 @@ topics! {
     VehicleLocalPosition: 20_000;
     VehicleLocalPositionSetpoint: 20_000;
     VehicleGlobalPosition: 100_000;
+    ThrustDemand: 4_000;
+    TorqueDemand: 4_000;
     ActuatorMotors: 4_000;
     ActuatorOutputs: 20_000;
     SensorCombined: 0;
