@@ -378,6 +378,9 @@ fn parameters_and_information_are_there() {
 #[test]
 fn logs_for_other_readers() {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("ulog");
+    if folder.exists() {
+        fs::remove_dir_all(&folder).unwrap();
+    }
     fs::create_dir_all(&folder).unwrap();
     let steps = |seed: usize| -> Vec<Step> {
         let one = |index: usize| match (index * 7 + seed) % 5 {
