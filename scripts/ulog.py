@@ -12,11 +12,13 @@ from pyulog.px4 import PX4ULog
 
 sitl, programs, hostile = sys.argv[1], pathlib.Path(sys.argv[2]), pathlib.Path(sys.argv[3])
 # What Flight Review loads of a log, as far as the vehicle has it.
-FLIGHT_REVIEW = """actuator_motors actuator_outputs battery_status estimator_status manual_control_setpoint sensor_combined
+FLIGHT_REVIEW = """
+    actuator_motors actuator_outputs battery_status estimator_status manual_control_setpoint sensor_combined
     vehicle_air_data vehicle_angular_velocity vehicle_attitude vehicle_attitude_setpoint vehicle_global_position
     vehicle_gps_position vehicle_land_detected vehicle_local_position vehicle_local_position_setpoint
     vehicle_magnetometer vehicle_rates_setpoint vehicle_status vehicle_thrust_setpoint vehicle_torque_setpoint
-    vehicle_visual_odometry""".split()
+    vehicle_visual_odometry
+""".split()
 SERVE = ["serve", "--port", "0", "--station", "none", "--companion", "none", "--fast"]
 
 

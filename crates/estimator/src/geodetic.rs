@@ -68,7 +68,8 @@ impl Origin {
     /// ```
     /// let origin = afbc_estimator::Origin::new(47.0, 8.0, 500.0).unwrap();
     /// let [latitude, longitude, altitude] = origin.global(&origin.local(47.001, 8.001, 510.0));
-    /// assert!((latitude - 47.001).abs() < 1e-9 && (longitude - 8.001).abs() < 1e-9 && (altitude - 510.0).abs() < 1e-5);
+    /// assert!((latitude - 47.001).abs() < 1e-9 && (longitude - 8.001).abs() < 1e-9);
+    /// assert!((altitude - 510.0).abs() < 1e-5);
     /// ```
     #[must_use]
     pub fn global(&self, position_m: &Vector3<f32>) -> [f64; 3] {

@@ -109,7 +109,7 @@ impl BlackBox {
         }
         let end = (0..=TEXT_MAX.min(text.len())).rfind(|end| text.is_char_boundary(*end)).unwrap_or_default();
         let text = text.get(..end).unwrap_or_default();
-        self.dropouts.put(now_us, &mut ring.view(), |ring| {
+        let _ = self.dropouts.put(now_us, &mut ring.view(), |ring| {
             ring.record(b'L', |content| {
                 content.put(&[b'0' + severity.min(7)]);
                 content.put(&now_us.to_le_bytes());
@@ -137,9 +137,8 @@ impl BlackBox {
                 self.synced_us = now_us;
             }
         }
-        let known = self.known.clone();
         let report = report.padded();
-        let moment = Moment { report: &report, readings, taken, view, origin, known: &known };
+        let moment = Moment { report: &report, readings, taken, view, origin, known: &self.known };
         let mut topics =
             Topics { now_us, writes, due_us: &mut self.due_us, dropouts: &mut self.dropouts, ring: &mut ring };
         self.last.sensors(&moment, &mut topics);
@@ -181,7 +180,7 @@ impl Topics<'_, '_> {
     /// Writes a message at its topic's rate.
     fn at_rate<T: Listed>(&mut self, make: impl FnOnce() -> Option<T>) {
         let place = usize::from(T::ID);
-        let (Some(due_us), Some(topic)) = (self.due_us.get_mut(place), TOPICS.get(place)) else { return };
+        let (Some(due_us), Some(topic)) = (self.due_us.get(place), TOPICS.get(place)) else { return };
         if self.now_us < *due_us {
             return;
         }
@@ -190,21 +189,21 @@ impl Topics<'_, '_> {
         let period_us = u64::from(topic.period_us);
         let next_us = due_us.saturating_add(period_us);
         let is_on_time = *due_us > 0 && next_us > self.now_us;
-        *due_us = if is_on_time { next_us } else { self.now_us.saturating_add(period_us) };
-        self.at_once(&message);
+        let next_us = if is_on_time { next_us } else { self.now_us.saturating_add(period_us) };
+        // One that is missing is made up for.
+        let next_us = if self.at_once(&message) { next_us } else { 0 };
+        self.due_us.get_mut(place).into_iter().for_each(|due_us| *due_us = next_us);
     }
 
-    /// Writes a message.
-    fn at_once<T: Listed>(&mut self, message: &T) {
-        if !self.writes {
-            return;
-        }
-        self.dropouts.put(self.now_us, self.ring, |ring| {
-            ring.record(b'D', |content| {
-                content.put(&T::ID.to_le_bytes());
-                message.write(content);
+    /// Writes a message; false if it is missing.
+    fn at_once<T: Listed>(&mut self, message: &T) -> bool {
+        self.writes
+            && self.dropouts.put(self.now_us, self.ring, |ring| {
+                ring.record(b'D', |content| {
+                    content.put(&T::ID.to_le_bytes());
+                    message.write(content);
+                })
             })
-        });
     }
 
     /// Writes a message at its topic's rate, or at once if it is not `like` the last one.
@@ -225,7 +224,7 @@ impl Last {
             let read = ImuSample { at_us: now_us.saturating_sub(age_us.into()), rates_rad_s, specific_force_m_s2 };
             let sample = known.imu.apply(&mut self.sample, read);
             let clips = moment.view.estimate.is_some_and(|estimate| estimate.imu.clipped);
-            topics.at_once(&SensorCombined::of(&sample, self.sampled_us, clips));
+            let _ = topics.at_once(&SensorCombined::of(&sample, self.sampled_us, clips));
             self.sampled_us = Some(sample.at_us);
         }
         let pose = moment.taken.pose.filter(|pose| self.pose_us != Some(pose.at_us));
@@ -236,17 +235,17 @@ impl Last {
         });
         for read in moment.readings.aids.iter().flatten().chain(&brought) {
             let aid = Aged { value: corrected(&read.value, &known.calibration), ..*read };
-            match Aiding::of(moment, &aid) {
+            let _ = match Aiding::of(moment, &aid) {
                 Some(Aiding::Air(message)) => topics.at_once(&message),
                 Some(Aiding::Field(message)) => topics.at_once(&message),
                 Some(Aiding::Gnss(message)) => topics.at_once(&message),
                 Some(Aiding::Pose(message)) => topics.at_once(&message),
-                None => {}
-            }
+                None => true,
+            };
             let offered = self.local(moment, aid.value).filter(|_| moment.view.estimate.is_some() && !self.is_blind);
             if let Some(offered) = offered {
                 let at_us = now_us.saturating_sub(aid.age_us.into());
-                topics.at_once(&AidOffered::of(now_us, at_us, &offered));
+                let _ = topics.at_once(&AidOffered::of(now_us, at_us, &offered));
             }
         }
     }

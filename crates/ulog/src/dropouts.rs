@@ -15,15 +15,19 @@ pub(crate) struct Dropouts {
 }
 
 impl Dropouts {
-    /// Writes a record by `write`, after the dropout before it. Once one does not fit, all others of the same time
-    /// are missing, too.
-    pub(crate) fn put(&mut self, now_us: u64, ring: &mut RingView<'_>, write: impl FnOnce(&mut RingView<'_>) -> bool) {
-        if self.since_us == Some(now_us) {
-            return;
-        }
-        if !(self.settle(now_us, ring) && write(ring)) {
+    /// Writes a record by `write`, after the dropout before it; false if it is missing. Once one does not fit, all
+    /// others of the same time are missing, too.
+    pub(crate) fn put(
+        &mut self,
+        now_us: u64,
+        ring: &mut RingView<'_>,
+        write: impl FnOnce(&mut RingView<'_>) -> bool,
+    ) -> bool {
+        let fits = self.since_us != Some(now_us) && self.settle(now_us, ring) && write(ring);
+        if !fits {
             self.since_us = Some(now_us);
         }
+        fits
     }
 
     /// Writes what is over; false if there is no room.

@@ -374,7 +374,8 @@ fn parameters_and_information_are_there() {
     assert_eq!(log.start_us, TICK_US);
 }
 
-/// Writes logs for other readers (`scripts/check-ulog`), through rings that are full and cut short, and what is in each.
+/// Writes logs for other readers (`scripts/check-ulog`), through rings that are full and cut short, and what is in
+/// each.
 #[test]
 fn logs_for_other_readers() {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("ulog");

@@ -30,8 +30,8 @@ pub(crate) struct Fly {
     #[arg(long, value_name = "FILE")]
     exact_log: Option<PathBuf>,
 
-    /// The same for the black box: PX4's ULog of that flight, for PX4's tools and `sitl replay`, in this file, which must
-    /// not exist
+    /// The same for the black box: PX4's ULog of that flight, for PX4's tools and `sitl replay`, in this file, which
+    /// must not exist
     #[arg(long, value_name = "FILE")]
     ulog: Option<PathBuf>,
 

@@ -1,7 +1,7 @@
 //! Logs of this project's own black box, which have more than PX4's: each measurement as the estimator was offered it,
 //! and the estimator's settings. Over them it does again what it did in flight.
 
-use super::table::{AFBC_AID, AFBC_ESTIMATOR, Row, Tables, VEHICLE_LOCAL_POSITION};
+use super::table::{AFBC_AID, AFBC_ESTIMATOR, Row, SENSOR_COMBINED, Tables, VEHICLE_LOCAL_POSITION};
 use super::topics;
 use crate::order::rising;
 use crate::recording::{Aiding, LoggedState, Recording, SampleSource, Sensor, flip};
@@ -22,9 +22,13 @@ const ESTIMATOR: &str = "EST_";
 /// # Errors
 /// If there is no inertial sensor.
 pub(super) fn recording(tables: &Tables) -> Result<Option<Recording>, String> {
-    let figures = tables.first(AFBC_ESTIMATOR);
-    if figures.is_empty() {
+    if !tables.announces(AFBC_ESTIMATOR) {
         return Ok(None);
+    }
+    if tables.first(SENSOR_COMBINED).is_empty() && tables.notes.is_empty() {
+        return Err("no samples of an inertial sensor: the vehicle flew on states from outside; log one that has an \
+                    inertial sensor, as in sitl fly mocap"
+            .into());
     }
     let settings = settings(tables);
     let mut recording = Recording {
@@ -52,7 +56,8 @@ pub(super) fn recording(tables: &Tables) -> Result<Option<Recording>, String> {
     recording.sources.push(source);
     recording.states = states::merged(attitudes, motions);
     recording.resets = topics::resets(tables);
-    let on_ground = figures.iter().map(|row| (row.timestamp_us(), row.get("on_ground") > 0.0)).collect();
+    let on_ground =
+        tables.first(AFBC_ESTIMATOR).iter().map(|row| (row.timestamp_us(), row.get("on_ground") > 0.0)).collect();
     recording.landed = rising(on_ground, |(at_us, _)| *at_us).0;
     Ok(Some(recording))
 }
