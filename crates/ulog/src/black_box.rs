@@ -61,7 +61,7 @@ struct Last {
     /// True once the estimator runs.
     runs: bool,
     sample: Option<ImuSample>,
-    sampled_us: Option<u64>,
+    sampled: Option<(SensorCombined, u64)>,
     pose_us: Option<u64>,
     norms: PerAxis<[f32; 2]>,
     state: Option<VehicleState>,
@@ -224,8 +224,10 @@ impl Last {
             let read = ImuSample { at_us: now_us.saturating_sub(age_us.into()), rates_rad_s, specific_force_m_s2 };
             let sample = known.imu.apply(&mut self.sample, read);
             let clips = moment.view.estimate.is_some_and(|estimate| estimate.imu.clipped);
-            let _ = topics.at_once(&SensorCombined::of(&sample, self.sampled_us, clips));
-            self.sampled_us = Some(sample.at_us);
+            let last = self.sampled.as_ref().map(|(message, at_us)| (message, *at_us));
+            let message = SensorCombined::of(&sample, last, clips);
+            let _ = topics.at_once(&message);
+            self.sampled = Some((message, sample.at_us));
         }
         let pose = moment.taken.pose.filter(|pose| self.pose_us != Some(pose.at_us));
         self.pose_us = pose.map(|pose| pose.at_us).or(self.pose_us);

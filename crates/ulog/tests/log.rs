@@ -254,6 +254,25 @@ fn topics_have_their_rates() {
     }
 }
 
+/// However irregular the samples of the inertial sensor are, no message is before the last one, and each says when its
+/// sample was true.
+#[test]
+fn samples_have_their_times() {
+    let mut logged = Logged::<65_536>::new();
+    let mut wanted = Vec::new();
+    for (tick, missing) in [0, 0, 1, 0, 3, 0, 0, 9, 0, 0, 0, 20, 0, 1, 0, 300, 0, 0].into_iter().enumerate() {
+        logged.now_us += 1_000 * missing + 7 * tick as u64;
+        logged.tick(false);
+        wanted.push(logged.now_us as f64);
+        logged.keep(usize::MAX);
+    }
+    let log = read(&logged.end());
+    let times = log.times("sensor_combined");
+    let halves = log.field("sensor_combined", "gyro_integral_dt").into_iter().map(|dt_us| (0.5 * dt_us).floor());
+    let found: Vec<_> = times.iter().zip(halves).map(|(at_us, half_us)| *at_us as f64 - half_us).collect();
+    assert_eq!(found, wanted);
+}
+
 /// The values of a tick, in PX4's frames and units.
 #[test]
 fn values_are_px4s() {

@@ -6,9 +6,9 @@ use afbc_estimator::{ImuSample, Measurement};
 use afbc_onboard::Aged;
 use nalgebra::Vector3;
 
-/// Time of integration of a sample if it is the first, and the longest \[us\].
+/// Time of integration of a sample after none, or after a gap longer than this \[us\].
 const USUAL_US: u64 = 1_000;
-const LONGEST_US: u64 = 100_000;
+const GAP_US: u64 = 10_000;
 /// Tesla's millionths per gauss.
 const UT_PER_GAUSS: f32 = 100.0;
 /// Kind of a fix in three dimensions.
@@ -32,10 +32,13 @@ message! {
 }
 
 impl SensorCombined {
-    /// `last_us` is the time of the sample before.
-    pub(crate) fn of(sample: &ImuSample, last_us: Option<u64>, clips: bool) -> Self {
-        let since_us = last_us.and_then(|last_us| sample.at_us.checked_sub(last_us));
-        let dt_us = since_us.filter(|since_us| (1..=LONGEST_US).contains(since_us)).unwrap_or(USUAL_US) as u32;
+    /// `last` is the message before, and the time of its sample.
+    pub(crate) fn of(sample: &ImuSample, last: Option<(&Self, u64)>, clips: bool) -> Self {
+        let since_us = last.and_then(|(_, last_us)| sample.at_us.checked_sub(last_us));
+        let since_us = since_us.filter(|since_us| (1..=GAP_US).contains(since_us)).unwrap_or(USUAL_US);
+        // Longer after a longer one, so that no message is before the last, and each says when its sample was true.
+        let behind_us = last.map_or(0, |(message, _)| message.timestamp.saturating_sub(sample.at_us));
+        let dt_us = since_us.max(2 * behind_us.min(GAP_US)) as u32;
         let clipping = if clips { 7 } else { 0 };
         SensorCombined {
             timestamp: sample.at_us.saturating_add(u64::from(dt_us / 2)),
