@@ -22,6 +22,7 @@ use strict::{StrictLog, read};
 const TICK_US: u64 = 1_000;
 
 /// A vehicle that ticks, its log, and what was kept of it.
+#[derive(Clone)]
 struct Logged<const R: usize> {
     flight: Flight,
     table: ParameterTable,
@@ -109,7 +110,10 @@ fn run<const R: usize>(steps: &[Step]) -> (Vec<u8>, Logged<R>) {
                 let _ = logged.tick(tick % 20 == 0);
             }),
             Step::Keep(bytes) => logged.keep(bytes),
-            Step::Change(value) => logged.change("EST_GATE", value),
+            Step::Change(value) => {
+                let name = if value < 6.0 { "EST_GATE" } else { "EST_REACQUIRE" };
+                logged.change(name, value);
+            }
             Step::Restore => {
                 logged.table.restore();
                 logged.log.change(&logged.table, RecordChange::Restored, &mut logged.ring);
@@ -254,6 +258,12 @@ fn topics_have_their_rates() {
     }
 }
 
+/// Returns when each sample of the inertial sensor was true: in the middle of its integration.
+fn sampled_us(log: &StrictLog) -> Vec<u64> {
+    let dts_us = log.field("sensor_combined", "gyro_integral_dt");
+    log.times("sensor_combined").iter().zip(dts_us).map(|(at_us, dt_us)| at_us - dt_us as u64 / 2).collect()
+}
+
 /// However irregular the samples of the inertial sensor are, no message is before the last one, and each says when its
 /// sample was true.
 #[test]
@@ -263,14 +273,96 @@ fn samples_have_their_times() {
     for (tick, missing) in [0, 0, 1, 0, 3, 0, 0, 9, 0, 0, 0, 20, 0, 1, 0, 300, 0, 0].into_iter().enumerate() {
         logged.now_us += 1_000 * missing + 7 * tick as u64;
         logged.tick(false);
-        wanted.push(logged.now_us as f64);
+        wanted.push(logged.now_us);
         logged.keep(usize::MAX);
     }
-    let log = read(&logged.end());
-    let times = log.times("sensor_combined");
-    let halves = log.field("sensor_combined", "gyro_integral_dt").into_iter().map(|dt_us| (0.5 * dt_us).floor());
-    let found: Vec<_> = times.iter().zip(halves).map(|(at_us, half_us)| *at_us as f64 - half_us).collect();
-    assert_eq!(found, wanted);
+    assert_eq!(sampled_us(&read(&logged.end())), wanted);
+}
+
+/// With room for a part of a tick only, what is missing is told, and comes with the next tick if its topic has a rate.
+#[test]
+fn what_is_missing_is_told_and_made_up_for() {
+    const RING: usize = 4_096;
+    /// Bytes of a text's record without the text, and the longest text.
+    const TEXT: (usize, usize) = (12, 128);
+    let mut logged = Logged::<RING>::new();
+    while !read(&logged.kept).messages.contains_key("actuator_armed") {
+        logged.tick(false);
+        logged.keep(usize::MAX);
+    }
+    // Most topics are due two seconds later; what they were before does not matter.
+    let (beginning, before) = (logged.kept.len(), read(&logged.kept).dropouts.len());
+    (0..1_999).for_each(|_| {
+        logged.tick(false);
+        logged.keep(usize::MAX);
+    });
+    logged.kept.truncate(beginning);
+    let at_us = logged.now_us + TICK_US;
+    let of = |log: &StrictLog, at_us: u64| -> Vec<String> {
+        let is_there = |topic: &&String| log.times(topic).iter().any(|time_us| time_us.abs_diff(at_us) < TICK_US);
+        log.messages.keys().filter(is_there).cloned().collect()
+    };
+    let after = |free: usize| {
+        let mut logged = logged.clone();
+        loop {
+            let left = RING - logged.ring.len() - free;
+            if left < TEXT.0 {
+                break;
+            }
+            let length = if left >= 2 * TEXT.0 + TEXT.1 { TEXT.1 } else { (left - TEXT.0).min(TEXT.1) };
+            logged.log.text(logged.now_us, 6, &"x".repeat(length), &mut logged.ring);
+        }
+        for _ in 0..2 {
+            logged.tick(true);
+            logged.keep(usize::MAX);
+        }
+        read(&logged.end())
+    };
+    let all = of(&after(RING), at_us);
+    assert!(all.len() >= 10 && all.iter().any(|topic| topic == "vehicle_air_data"), "{all:?}");
+    let mut partly = 0;
+    for free in 0..1_400 {
+        let log = after(free);
+        let (now, next) = (of(&log, at_us), of(&log, at_us + TICK_US));
+        let missing: Vec<_> = all.iter().filter(|topic| !now.contains(topic)).collect();
+        let told: Vec<_> = log.dropouts[before..].iter().map(|(ms, _)| *ms).collect();
+        assert_eq!(told, if missing.is_empty() { vec![] } else { vec![1] }, "{free} bytes, {missing:?} missing");
+        assert!(missing.iter().all(|topic| next.contains(topic)), "{free} bytes, {missing:?} missing, then {next:?}");
+        partly += usize::from(!missing.is_empty() && missing.len() < all.len());
+    }
+    assert!(partly > 500, "{partly}");
+}
+
+/// A dropout that is longer than a record can say, and one that is not of whole milliseconds.
+#[test]
+fn long_and_odd_dropouts_add_up() {
+    let mut logged = Logged::<2_000>::new();
+    while !read(&logged.kept).messages.contains_key("sensor_combined") {
+        logged.tick(false);
+        logged.keep(usize::MAX);
+    }
+    let (mut told_us, mut wanted_us) = (0, 0);
+    for pause_us in [70_000_000, 400, 1_700, 900, 140_000_600] {
+        // Full.
+        (0..100).for_each(|_| {
+            logged.tick(false);
+        });
+        logged.now_us += pause_us;
+        logged.keep(usize::MAX);
+        (0..3).for_each(|_| {
+            logged.tick(false);
+            logged.keep(usize::MAX);
+        });
+        wanted_us = 0;
+        let log = read(&logged.kept);
+        for pair in sampled_us(&log).windows(2) {
+            wanted_us += (pair[1] - pair[0]).saturating_sub(TICK_US);
+        }
+        told_us = 1_000 * log.dropouts.iter().map(|(ms, _)| ms).sum::<u64>();
+        // Each begins in the tick of the first missing record, of which some are there.
+        assert!(told_us <= wanted_us + 5 * TICK_US && told_us + 2 * TICK_US > wanted_us, "{told_us}, {wanted_us} us");
+    }
+    assert!(told_us > 210_000_000 && wanted_us > 210_000_000);
 }
 
 /// The values of a tick, in PX4's frames and units.
