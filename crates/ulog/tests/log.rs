@@ -333,6 +333,28 @@ fn what_is_missing_is_told_and_made_up_for() {
     assert!(partly > 500, "{partly}");
 }
 
+/// Changes that find no room wait until there is some, however many there are.
+#[test]
+fn no_change_of_a_parameter_is_lost() {
+    let mut logged = Logged::<4_096>::new();
+    while !read(&logged.kept).messages.contains_key("sensor_combined") {
+        logged.tick(false);
+        logged.keep(usize::MAX);
+    }
+    (0..100).for_each(|_| {
+        logged.tick(false);
+    });
+    for (name, value) in [("EST_GATE", 4.0), ("EST_REACQUIRE", 3.0), ("EST_GATE", 5.0), ("EST_COAST", 2.0)] {
+        logged.change(name, value);
+    }
+    (0..20).for_each(|_| {
+        logged.keep(usize::MAX);
+        logged.tick(false);
+    });
+    let table = logged.table.clone();
+    parameters_agree(&read(&logged.end()), &table);
+}
+
 /// A dropout that is longer than a record can say, and one that is not of whole milliseconds.
 #[test]
 fn long_and_odd_dropouts_add_up() {
