@@ -87,6 +87,7 @@ impl Driver<MatekH743> for Climb {
         session.board_mut().sense(&signals);
         let is_there = pilot.hovers_ms().is_some_and(|hovers_ms| hovers_ms >= HOVERED_MS);
         if is_there && self.flight.pins.look_ns().is_none() {
+            self.flight.pins.release(session.mcu(), stop.at);
             self.taken = Some(take(session, host, stop, &self.firmware, &self.past).map(|taken| taken.file));
             return None;
         }

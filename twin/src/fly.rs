@@ -86,7 +86,7 @@ pub fn fly<M: Machine>(
         Signal::Dshot600(_) => println!("{} frames of DSHOT600", pins.sent),
         Signal::Pwm400 => println!("{} ticks with PWM's pulses", pins.sent),
     }
-    if let Some(receiver) = receiver {
+    if let Some(receiver) = &receiver {
         println!("{}", receiver.told());
     }
     let verdict = pilot.verdict();
@@ -96,6 +96,7 @@ pub fn fly<M: Machine>(
         same::check_log(&bytes)?;
     }
     verdict?;
+    check(receiver.is_none_or(|receiver| receiver.is_configured()), "the receiver is configured")?;
     check(pins.wrong.is_empty(), &format!("{:?}: {:?}", M::SIGNAL, pins.wrong))?;
     check(
         unmapped.iter().all(|address| M::UNMAPPED.contains(address)) && refused == 0,
@@ -110,9 +111,10 @@ impl<M: Machine> Driver<M> for Flight {
             receiver.watch(&settled);
         }
         match settled {
-            Settled::Access { access, value } if self.pins.watch(&access, value) => {}
+            Settled::Access { access, value } if self.pins.watch(&access, value, session.mcu()) => {}
             Settled::Stop(stop) if self.pins.look_ns().is_some_and(|look_ns| stop.at.0 >= look_ns) => {
-                if self.pins.look(&session.board_mut().motors(), stop.at.0) {
+                let motors = session.board_mut().motors();
+                if self.pins.look(&motors, session.mcu(), stop.at) {
                     self.pilot.command(self.pins.take());
                 }
             }

@@ -26,6 +26,8 @@ pub enum Signal {
 /// A timer whose frames DMA sends.
 #[derive(Debug, PartialEq)]
 pub struct FrameTimer {
+    /// Its control register, whose lowest bit lets it count.
+    pub counter: u64,
     /// Control register of the stream; its lowest bit starts a frame.
     pub stream: u64,
     /// Its motors, from 0.
@@ -58,7 +60,8 @@ pub trait Machine: Board + Edge<Signals = Signals> + Sized + 'static {
     /// The divider of the GNSS receiver's UART.
     const RECEIVER: Divider;
 
-    /// What sensors, at a higher priority, may delay a tick by \[ns\]: most while an IMU is set up.
+    /// What sensors, at a higher priority, may delay a tick by \[ns\]: most while IMUs are set up, at the start, and
+    /// after a second in which nothing moves, as in `boot`, again.
     const JITTER: u64;
     /// Voltage of the battery that the models have at rest, if the image measures it \[mV\].
     const BATTERY_MV: Option<u16>;
@@ -101,8 +104,8 @@ impl Machine for MatekH743 {
     const MOTORS: Range<usize> = 2..10;
     /// DMA1's streams 0 and 1, for TIM5 and TIM4 (RM0433, 15.5.5).
     const SIGNAL: Signal = Signal::Dshot600(&[
-        FrameTimer { stream: 0x4002_0010, motors: 0..4 },
-        FrameTimer { stream: 0x4002_0028, motors: 4..8 },
+        FrameTimer { counter: 0x4000_0C00, stream: 0x4002_0010, motors: 0..4 },
+        FrameTimer { counter: 0x4000_0800, stream: 0x4002_0028, motors: 4..8 },
     ]);
     /// USART2 (RM0433, 48.8.5).
     const RECEIVER: Divider = Divider { register: 0x4000_440C, clock_hz: 100_000_000 };
@@ -142,7 +145,8 @@ impl Machine for Pixracer {
     const SIGNAL: Signal = Signal::Pwm400;
     /// UART4 (RM0090, 30.6.3), on APB1.
     const RECEIVER: Divider = Divider { register: 0x4000_4C08, clock_hz: 42_000_000 };
-    const JITTER: u64 = 300_000;
+    /// Two IMUs on one SPI.
+    const JITTER: u64 = 350_000;
     const BATTERY_MV: Option<u16> = None;
     /// USB: the core's fourth hardware configuration register.
     const UNMAPPED: &[u64] = &[0x5000_0050];

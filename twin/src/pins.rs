@@ -1,9 +1,15 @@
 //! Motor commands, read from the pins: DSHOT600 bit by bit, or lengths of pulses.
+//!
+//! Between two frames the timers' counters are held: their updates, 600,000 a second, change no pin and would take a
+//! quarter of the emulator's time.
 
 use crate::machine::{FrameTimer, Signal};
 use afbc_flight_core::motor::{THROTTLE_MAX, THROTTLE_MIN};
 use rigless::emulator::{Access, AccessKind};
 use rigless::machine::flight::Actuator;
+use rigless::mcu::{Mcu, Operate};
+use rigless::soc::Width;
+use rigless::time::VirtualNanos;
 
 /// Bits of a frame.
 const BITS: u64 = 16;
@@ -29,7 +35,7 @@ enum Sampling {
     Idle,
     /// Looks left for the first bit.
     Waits(u32),
-    /// Bits taken, of a frame whose first was seen at this time \[ns\].
+    /// Bits taken, of a frame whose first was seen at this time \[ns\]. After the last the line is looked at once more.
     Reads(u64, u64),
 }
 
@@ -41,6 +47,8 @@ struct Frames {
     /// When the pins are looked at next \[ns\].
     look_ns: Option<u64>,
     bits: Vec<u16>,
+    /// The counter is held.
+    held: bool,
 }
 
 /// The motors' pins.
@@ -67,6 +75,7 @@ impl MotorPins {
             sampling: Sampling::Idle,
             look_ns: None,
             bits: vec![0; timer.motors.end.min(motors) - timer.motors.start],
+            held: false,
         });
         MotorPins { frames: frames.collect(), throttles: vec![None; motors], sent: 0, wrong: Vec::new() }
     }
@@ -77,14 +86,20 @@ impl MotorPins {
     }
 
     /// Sees an access of the image, which may start a frame; returns true if the time of the next look has changed.
-    pub fn watch(&mut self, access: &Access, value: u64) -> bool {
+    pub fn watch(&mut self, access: &Access, value: u64, mcu: &mut dyn Mcu) -> bool {
         let starts = |frames: &&mut Frames| {
             (access.kind, access.address, value & 1) == (AccessKind::Write, frames.timer.stream, 1)
         };
         let Some(frames) = self.frames.iter_mut().find(starts) else { return false };
         frames.sampling = Sampling::Waits(LOOKS);
         frames.look_ns = Some(access.virtual_time.0 + LOOK_NS);
+        frames.hold(mcu, access.virtual_time, false);
         true
+    }
+
+    /// Lets all counters count, as the image has them.
+    pub fn release(&mut self, mcu: &mut dyn Mcu, at: VirtualNanos) {
+        self.frames.iter_mut().for_each(|frames| frames.hold(mcu, at, false));
     }
 
     /// Returns when the pins are to be looked at next \[ns\].
@@ -93,14 +108,22 @@ impl MotorPins {
     }
 
     /// Looks at the pins for bits of frames. Returns true if a frame is complete.
-    pub fn look(&mut self, pins: &[Actuator], now_ns: u64) -> bool {
+    pub fn look(&mut self, pins: &[Actuator], mcu: &mut dyn Mcu, at: VirtualNanos) -> bool {
         let mut complete = false;
-        let due = |frames: &&mut Frames| frames.look_ns.is_some_and(|look_ns| now_ns >= look_ns);
+        let due = |frames: &&mut Frames| frames.look_ns.is_some_and(|look_ns| at.0 >= look_ns);
         for frames in self.frames.iter_mut().filter(due) {
             let pins = pins.get(frames.timer.motors.clone()).unwrap_or_default();
-            frames.look_ns = frames.sample(pins, now_ns, &mut self.wrong);
-            if frames.look_ns.is_none() && matches!(frames.sampling, Sampling::Reads(..)) {
-                frames.sampling = Sampling::Idle;
+            if frames.is_complete() {
+                (frames.sampling, frames.look_ns) = (Sampling::Idle, None);
+                if pins.iter().any(has_pulse) {
+                    tell(&mut self.wrong, || format!("frame {}: more than {BITS} bits", self.sent));
+                } else {
+                    frames.hold(mcu, at, true);
+                }
+                continue;
+            }
+            frames.look_ns = frames.sample(pins, at.0, &mut self.wrong);
+            if frames.is_complete() {
                 self.sent += 1;
                 let first = frames.timer.motors.start;
                 for (throttle, bits) in self.throttles.iter_mut().skip(first).zip(&mut frames.bits) {
@@ -161,7 +184,24 @@ impl Frames {
         }
         let taken = taken + 1;
         self.sampling = Sampling::Reads(first_ns, taken);
-        (taken < BITS).then_some(first_ns + (taken as f64 * BIT_NS) as u64)
+        Some(first_ns + (taken as f64 * BIT_NS) as u64)
+    }
+
+    /// True if all bits are taken.
+    fn is_complete(&self) -> bool {
+        matches!(self.sampling, Sampling::Reads(_, BITS))
+    }
+
+    /// Holds the counter, if it counts, or lets one that was held go on.
+    fn hold(&mut self, mcu: &mut dyn Mcu, at: VirtualNanos, held: bool) {
+        let Ok(control) = mcu.read(at, self.timer.counter, Width::W32) else { return };
+        if held == self.held || (held && control & 1 == 0) {
+            return;
+        }
+        self.held = held;
+        let control = if held { control & !1 } else { control | 1 };
+        // The timer is clocked, since its register was read.
+        let _ = mcu.write(at, self.timer.counter, Width::W32, control);
     }
 }
 

@@ -328,8 +328,8 @@ impl Machine for SpeedyBeeF405V4 {
     const MOTORS: Range<usize> = 0..4;
     /// DMA1's streams 6 and 2, for TIM4 and TIM3 (RM0090, 10.5.5).
     const SIGNAL: Signal = Signal::Dshot600(&[
-        FrameTimer { stream: 0x4002_60A0, motors: 0..2 },
-        FrameTimer { stream: 0x4002_6040, motors: 2..4 },
+        FrameTimer { counter: 0x4000_0800, stream: 0x4002_60A0, motors: 0..2 },
+        FrameTimer { counter: 0x4000_0400, stream: 0x4002_6040, motors: 2..4 },
     ]);
     /// USART6 (RM0090, 30.6.3), on APB2.
     const RECEIVER: Divider = Divider { register: 0x4001_1408, clock_hz: 84_000_000 };

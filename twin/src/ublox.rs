@@ -95,6 +95,11 @@ impl UbloxPeer {
         board.attach_receiver(Box::new(self.clone()));
     }
 
+    /// True if it was told to send solutions alone, often.
+    pub fn is_configured(&self) -> bool {
+        self.with(|line| line.model.solves && !line.model.nmea && line.model.period_us <= 200_000)
+    }
+
     /// Says how it is configured.
     pub fn told(&self) -> String {
         self.with(|line| {

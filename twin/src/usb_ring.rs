@@ -9,7 +9,7 @@ use std::path::Path;
 
 /// Part of the ring's name in the image.
 const NAME: &str = "chip_stm323usb4SENT";
-/// Words before the ring's bytes: the state of an `embassy_sync::pipe::Pipe` that nobody waits for. All are zero but
+/// Words behind the ring's bytes: the state of an `embassy_sync::pipe::Pipe` that nobody waits for. All are zero but
 /// the end of what is in it, if that begins at the start.
 const WORDS: u64 = 8;
 const LENGTH: u64 = 1024;
@@ -37,14 +37,13 @@ impl UsbRing {
     /// Empties it, unless the image is about to write.
     pub fn drain(&mut self, host: &mut dyn Host) {
         let mut set = (0..WORDS).filter_map(|word| {
-            let address = self.address + 4 * word;
+            let address = self.address + LENGTH + 4 * word;
             host.read(address, Width::W32).ok().filter(|value| *value != 0).map(|value| (address, value))
         });
         let (Some((address, end @ 1..LENGTH)), None) = (set.next(), set.next()) else { return };
         drop(set);
-        let first = self.address + 4 * WORDS;
         for at in 0..end {
-            self.bytes.push(host.read(first + at, Width::W8).unwrap_or_default() as u8);
+            self.bytes.push(host.read(self.address + at, Width::W8).unwrap_or_default() as u8);
         }
         let _ = host.write(address, Width::W32, 0);
     }

@@ -16,7 +16,7 @@
 //! | compass | LIS3MDL, select PE15 |
 //! | barometer | MS5611 on SPI2: SCK on PB10, MISO on PB14, MOSI on PB15, select PD7; with a memory, select PD10 |
 //! | compass, outside | QMC5883L on I2C1: SCL on PB8, SDA on PB9 |
-//! | GNSS receiver, outside | NMEA on UART4: TX on PA0, RX on PA1 |
+//! | GNSS receiver, outside | u-blox or NMEA on UART4: TX on PA0, RX on PA1 |
 //! | LED, green | PB1, open drain, lit if low |
 //! | buzzer, without a tone of its own | PA15: TIM2, channel 1 |
 //! | supply of the sensors | PE3, on if high |
@@ -31,6 +31,7 @@ use chip_stm32::motors::{
     MotorProtocol, Motors, Throttles, hold_low, numbering, of_channels, of_outputs, pin, rotors_of_outputs,
     set_protocol,
 };
+use chip_stm32::receiver::TX_RING;
 use chip_stm32::sensors::{Device, InterruptPin, Polled, StampHandler};
 use chip_stm32::{crystal, faults, usb, watchdog};
 use chip_stm32f4::{boot_loader, clocks, reset};
@@ -97,10 +98,10 @@ const PRIORITIES: [(Interrupt, u8); 14] = [
     (Interrupt::DMA1_STREAM6, priority::MOTOR_DMA),
 ];
 
-/// Ring buffers of the links, and of the receiver, which is told nothing.
+/// Ring buffers of the links and of the GNSS receiver.
 static RX: [StaticCell<[u8; 1024]>; 3] = [const { StaticCell::new() }; 3];
 static TX: [StaticCell<[u8; 1024]>; 2] = [const { StaticCell::new() }; 2];
-static GNSS_TX: StaticCell<[u8; 16]> = StaticCell::new();
+static GNSS_TX: StaticCell<[u8; TX_RING]> = StaticCell::new();
 
 /// Newest throttles, for the motors' tasks.
 static THROTTLES: [Throttles; 2] = [const { Throttles::new() }; 2];
@@ -147,7 +148,7 @@ impl Board for Pixracer {
         let second = BufferedUart::new(p.USART3, p.PD9, p.PD8, tx2, rx2, Irqs, link::config());
         let [first, second] = [first, second].map(|uart| link::new(uart.expect("the baud rate divides the clock")));
         let links = [first, second, link::of_usb(usb::start(p.USB_OTG_FS, p.PA12, p.PA11, Irqs))];
-        let tx = GNSS_TX.init([0; 16]);
+        let tx = GNSS_TX.init([0; TX_RING]);
         let receiver = BufferedUart::new(p.UART4, p.PA1, p.PA0, tx, rx3, Irqs, usart::Config::default());
 
         let kernel_hz = rcc::frequency::<SPI1>().0;

@@ -1,11 +1,14 @@
 //! A GNSS receiver on a UART.
 
 use afbc_drivers::FixReading;
-use afbc_drivers::ublox::{ReceiverAction, UbxReceiver};
+use afbc_drivers::ublox::{ReceiverAction, UbxCommand, UbxReceiver};
 use embassy_futures::select::{Either, select};
 use embassy_stm32::usart::BufferedUart;
 use embassy_time::{Duration, Instant, Timer, with_timeout};
 use embedded_io_async::{Read, Write};
+
+/// Size of the UART's ring for what is sent: its driver refuses a command that does not fit in whole.
+pub const TX_RING: usize = UbxCommand::LENGTH_MAX;
 
 /// Time between two looks at what is to be done, at most, and for a command to leave, of which the longest takes 46 ms
 /// at 9,600 baud \[ms\].

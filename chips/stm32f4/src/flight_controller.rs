@@ -104,10 +104,12 @@ macro_rules! flight_controller {
                 use embassy_stm32::usart::BufferedUart;
                 use static_cell::StaticCell;
 
-                // Ring buffers: of the link, and of the receiver, which is told nothing.
+                use chip_stm32::receiver::TX_RING;
+
+                // Ring buffers of the link and of the receiver.
                 static RINGS: [StaticCell<[u8; 1024]>; 2] = [const { StaticCell::new() }; 2];
                 static GNSS_RX: StaticCell<[u8; 512]> = StaticCell::new();
-                static GNSS_TX: StaticCell<[u8; 16]> = StaticCell::new();
+                static GNSS_TX: StaticCell<[u8; TX_RING]> = StaticCell::new();
 
                 let p = chip_stm32f4::clocks::start::<$crystal_hz>();
                 chip_stm32f4::reset::log();
@@ -118,7 +120,7 @@ macro_rules! flight_controller {
                 let [tx, rx] = RINGS.each_ref().map(|ring| ring.init([0; 1024]));
                 let config = chip_stm32::link::config();
                 let link = BufferedUart::new(p.$link, p.$link_rx, p.$link_tx, tx, rx, Irqs, config);
-                let (tx, rx) = (GNSS_TX.init([0; 16]), GNSS_RX.init([0; 512]));
+                let (tx, rx) = (GNSS_TX.init([0; TX_RING]), GNSS_RX.init([0; 512]));
                 let config = usart::Config::default();
                 let gnss = BufferedUart::new(p.$gnss, p.$gnss_rx, p.$gnss_tx, tx, rx, Irqs, config);
 

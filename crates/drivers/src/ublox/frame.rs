@@ -16,11 +16,13 @@ pub(super) type MessageId = [u8; 2];
 /// A frame to be sent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct UbxCommand {
-    bytes: [u8; UbxCommand::PAYLOAD_MAX + AROUND],
+    bytes: [u8; UbxCommand::LENGTH_MAX],
     length: usize,
 }
 
 impl UbxCommand {
+    /// Longest command \[bytes\].
+    pub const LENGTH_MAX: usize = Self::PAYLOAD_MAX + AROUND;
     /// Longest payload.
     const PAYLOAD_MAX: usize = 36;
 
@@ -29,7 +31,7 @@ impl UbxCommand {
         let length = payload.len().min(Self::PAYLOAD_MAX) as u16;
         let summed = id.into_iter().chain(length.to_le_bytes()).chain(payload.iter().copied().take(length.into()));
         let sum = checksum(summed.clone());
-        let mut command = UbxCommand { bytes: [0; Self::PAYLOAD_MAX + AROUND], length: usize::from(length) + AROUND };
+        let mut command = UbxCommand { bytes: [0; Self::LENGTH_MAX], length: usize::from(length) + AROUND };
         command.bytes.iter_mut().zip(BEGIN.into_iter().chain(summed).chain(sum)).for_each(|(to, from)| *to = from);
         command
     }
