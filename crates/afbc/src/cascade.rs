@@ -1,7 +1,7 @@
 //! Six subsystems in one cascade: position gives thrust and desired attitude, attitude gives U1..U3, and all give rotor
 //! speeds. Section III-D, Fig. 2.
 
-use crate::desired::{Desired, DesiredAttitude, DesiredMemory};
+use crate::desired::{DesiredAttitude, DesiredMemory, DesiredRollPitch};
 use crate::disturbance::{ForceObserver, ForceObserverMemory, MomentObserver, Turning};
 use crate::effort::Effort;
 use crate::law::{Context, Law, Tracking};
@@ -345,7 +345,7 @@ impl<L: Law, const N: usize> Controller<L, N> {
 
     /// Returns what roll, pitch and yaw track.
     #[inline(always)]
-    fn turn(&self, desired: &Desired, reference: &Setpoint, attitude: &Attitude, state: &State) -> Turn {
+    fn turn(&self, desired: &DesiredRollPitch, reference: &Setpoint, attitude: &Attitude, state: &State) -> Turn {
         let [roll, pitch] = &desired.filtered;
         let [roll_ddot, pitch_ddot] = desired.accelerations_rad_s2;
         let rates = Vector3::new(roll.rate, pitch.rate, reference.yaw_rate_rad_s);

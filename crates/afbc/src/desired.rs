@@ -73,7 +73,7 @@ impl DesiredMemory {
 
 /// Desired roll and pitch in one step.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Desired {
+pub struct DesiredRollPitch {
     /// Roll and pitch with their first derivatives, by the command filter.
     pub filtered: [Filtered; 2],
     /// Second derivatives \[rad/s2\].
@@ -135,7 +135,7 @@ impl DesiredAttitude {
         hover_n: f32,
         attitude: &Attitude,
         [reference, setpoint]: [&Setpoint; 2],
-    ) -> Desired {
+    ) -> DesiredRollPitch {
         let thrust_n = math::min(u4, self.thrust_max_n);
         let (vertical, inverse_vertical) = self.vertical(thrust_n * attitude.roll_pitch.tilt_cosine(), hover_n);
         // In the same direction.
@@ -173,7 +173,7 @@ impl DesiredAttitude {
             }
         };
         memory.last = Some(LastAngles { rad: tilt.rad, commanded, filtered });
-        Desired { filtered, accelerations_rad_s2, heading, beyond_limits_m_s2: [u5 - a5, u6 - a6] }
+        DesiredRollPitch { filtered, accelerations_rad_s2, heading, beyond_limits_m_s2: [u5 - a5, u6 - a6] }
     }
 
     /// Returns the vertical part of the thrust per mass \[m/s2\], g in hover as in (39), and its inverse.

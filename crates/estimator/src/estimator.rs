@@ -116,6 +116,12 @@ impl Estimator {
         self.report(memory, now_us)
     }
 
+    /// Returns the estimate that the last [step](Self::step), at `now_us`, has returned.
+    #[must_use]
+    pub fn estimate(&self, memory: &Memory, now_us: u64) -> Estimate {
+        self.report(memory, now_us)
+    }
+
     /// Takes a sample, and predicts or fuses.
     #[inline(never)]
     fn advance(&self, memory: &mut Memory, now_us: u64, imu: Option<&ImuSample>) {

@@ -61,4 +61,27 @@ impl Origin {
             (altitude_m - self.altitude_m) as f32,
         )
     }
+
+    /// Returns latitude and longitude \[degrees\] and altitude \[m\] of a position in the local frame: the inverse of
+    /// [`local`](Self::local).
+    ///
+    /// ```
+    /// let origin = afbc_estimator::Origin::new(47.0, 8.0, 500.0).unwrap();
+    /// let [latitude, longitude, altitude] = origin.global(&origin.local(47.001, 8.001, 510.0));
+    /// assert!((latitude - 47.001).abs() < 1e-9 && (longitude - 8.001).abs() < 1e-9);
+    /// assert!((altitude - 510.0).abs() < 1e-5);
+    /// ```
+    #[must_use]
+    pub fn global(&self, position_m: &Vector3<f32>) -> [f64; 3] {
+        let [[x, y, z]] = position_m.cast::<f64>().data.0;
+        let longitude_deg = self.longitude_deg - y / self.east_m_per_deg;
+        let turns = if longitude_deg > 180.0 {
+            1.0
+        } else if longitude_deg < -180.0 {
+            -1.0
+        } else {
+            0.0
+        };
+        [self.latitude_deg + x / self.north_m_per_deg, longitude_deg - 360.0 * turns, self.altitude_m + z]
+    }
 }

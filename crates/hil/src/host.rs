@@ -1,7 +1,9 @@
 //! The firmware's code in this process.
 
 use super::{Autopilot, Error};
+use crate::host_black_box::HostBlackBox;
 use afbc_calibration::RawSample;
+use afbc_estimator::Origin;
 use afbc_flight_core::rate::PERIOD_US;
 use afbc_link::{Decoder, Uplink};
 use afbc_onboard::parameters::{Kept, ParameterTable, Reason, RecordChange};
@@ -12,6 +14,7 @@ use afbc_scenario::contender::{ControllerKind, Law};
 use afbc_station::{Calibrator, Comms, RadioControl, Setup};
 use afbc_store::Store;
 use afbc_types::{OutOfRange, ROTORS_MAX, with_rotors};
+use afbc_ulog::{BlackBox, LogStart, TakenInputs};
 use afbc_vehicles::Vehicle;
 use embedded_storage::nor_flash::NorFlash;
 
@@ -32,12 +35,16 @@ pub struct Host {
     /// Number of the next tick, and the exact log of it all, if it is kept.
     number: u32,
     log: Option<ExactLog>,
+    black_box: Option<HostBlackBox>,
     /// Names of vehicle and law.
     names: [String; 2],
 }
 
 /// Name of the vehicle of a host without a vehicle file.
 const PAPER: &str = "paper";
+
+/// Name of the hardware in the black box's log.
+const HARDWARE: &str = "SITL";
 
 /// What takes the bytes of a log.
 type Sink = Box<dyn FnMut(&[u8])>;
@@ -74,6 +81,19 @@ trait Core {
 
     /// Does what stations want of the parameters, and flies what has changed.
     fn parameters(&mut self, comms: &mut Comms, send: &mut dyn FnMut(&[u8])) -> Option<RecordChange>;
+
+    /// Begins the black box's log.
+    fn black_box(&self, start: &LogStart<'_>) -> BlackBox;
+
+    /// Logs the last tick, and a change of the parameters after it.
+    fn log(
+        &self,
+        black_box: &mut HostBlackBox,
+        report: &Report<ROTORS_MAX>,
+        readings: &Readings,
+        taken: TakenInputs,
+        change: Option<RecordChange>,
+    );
 
     /// Records the start, or a change.
     fn record(&self, log: &mut ExactLog, names: &[String; 2], change: Option<RecordChange>);
@@ -127,6 +147,25 @@ impl<P: Prepare<N>, const N: usize> Core for Aircraft<P, N> {
         let adopted = prepare.prepare(table.configuration()).is_ok_and(|prepared| flight.adopt(&prepared));
         debug_assert!(adopted, "a change that is not flown");
         Some(change)
+    }
+
+    fn black_box(&self, start: &LogStart<'_>) -> BlackBox {
+        BlackBox::new(start, &self.table)
+    }
+
+    fn log(
+        &self,
+        black_box: &mut HostBlackBox,
+        report: &Report<ROTORS_MAX>,
+        readings: &Readings,
+        taken: TakenInputs,
+        change: Option<RecordChange>,
+    ) {
+        let view = self.flight.view(report.time_us);
+        black_box.tick(report, readings, taken, &view, &self.table);
+        if let Some(change) = change {
+            black_box.change(&self.table, change);
+        }
     }
 
     fn record(
@@ -255,6 +294,7 @@ impl Host {
             time_us: 0,
             number: 0,
             log: None,
+            black_box: None,
             names: names.map(str::to_owned),
         })
     }
@@ -280,6 +320,14 @@ impl Host {
         let mut log = ExactLog { recorder: Recorder::default(), write: Box::new(write), adopted: None };
         self.flight.record(&mut log, &self.names, None);
         self.log = Some(log);
+    }
+
+    /// Keeps a black box's log ([`afbc_ulog`]) from now on, before the first tick; `write` takes its bytes. Fixes of a
+    /// GNSS receiver are measured from `origin`, if that is known.
+    pub fn log(&mut self, origin: Option<Origin>, write: impl FnMut(&[u8]) + 'static) {
+        let [vehicle, law] = &self.names;
+        let log = self.flight.black_box(&LogStart { vehicle, law, hardware: HARDWARE, ..LogStart::default() });
+        self.black_box = Some(HostBlackBox::new(log, origin, write));
     }
 
     /// Takes what messages have brought.
@@ -317,6 +365,7 @@ impl Host {
         self.merge(&news);
         self.inputs.take_into(&mut self.taken);
         let readings = core::mem::take(&mut self.readings);
+        let taken = TakenInputs::of(&self.taken);
         let mut bytes = Vec::new();
         let mut send = |frame: &[u8]| bytes.extend_from_slice(frame);
         let tell = Tell { comms: &mut self.comms, tick_us, send: &mut send };
@@ -336,6 +385,10 @@ impl Host {
         let change = self.flight.parameters(&mut self.comms, &mut send);
         if let (Some(log), true) = (&mut self.log, change.is_some()) {
             self.flight.record(log, &self.names, change);
+        }
+        if let Some(black_box) = &mut self.black_box {
+            self.flight.log(black_box, &report, &readings, taken, change);
+            black_box.sent(time_us, &bytes);
         }
         self.number = self.number.wrapping_add(1);
         // Notices that there are none.

@@ -15,25 +15,30 @@
 
 mod autopilot;
 mod error;
-mod exact_log_file;
 mod extremes;
 mod flight;
 mod host;
+mod host_black_box;
 mod log;
+mod log_file;
 mod pace;
+mod place;
 mod report;
 mod station;
+mod ulog_files;
 
 #[cfg(test)]
 mod tests;
 
 pub use autopilot::Autopilot;
 pub use error::Error;
-pub use exact_log_file::ExactLogFile;
 pub use extremes::Extremes;
 pub use flight::{LoopEnd, check, firmware, fly};
 pub use host::{Host, HostTick};
 pub use log::Log;
+pub use log_file::LogFile;
 pub use pace::MessagePeriods;
+pub use place::place;
 pub use report::tracking;
 pub use station::{ReceivedMessages, Station};
+pub use ulog_files::UlogFiles;

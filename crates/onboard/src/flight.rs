@@ -2,6 +2,7 @@
 
 use crate::configuration::Configuration;
 use crate::control_inputs::ControlInputs;
+use crate::flight_view::FlightView;
 use crate::front_end::{Corrections, EstimatorFrontEnd};
 use crate::guided::{Core, GuidanceResult, Guide};
 use crate::law::FlightLaw;
@@ -220,6 +221,19 @@ impl<const N: usize, C: FlightLaw<N>> Flight<N, C> {
     /// Returns the law's internal signals of the last tick: only inputs while blind, zeros while disarmed.
     pub fn trace(&self) -> Trace {
         self.memory.trace::<C, N>()
+    }
+
+    /// Returns what is known after a tick at `now_us`, for logs: beside the tick, not in it.
+    pub fn view(&self, now_us: u64) -> FlightView {
+        let front_end = &self.front_end;
+        FlightView {
+            trace: self.trace(),
+            estimate: front_end.estimate(now_us),
+            aids: *front_end.memory().aids(),
+            origin_m: front_end.origin_m(),
+            state: self.memory.state().copied(),
+            idle_on_ground: self.idle_on_ground,
+        }
     }
 
     /// Runs one control tick, to be called every millisecond, with what the link brought and the vehicle's own sensors

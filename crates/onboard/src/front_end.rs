@@ -102,6 +102,18 @@ impl EstimatorFrontEnd {
         &self.memory
     }
 
+    /// Returns the estimate after a tick at `now_us`, as that tick had it; none before the first sample. For logs.
+    #[must_use]
+    pub fn estimate(&self, now_us: u64) -> Option<Estimate> {
+        self.senses.then(|| self.estimator.estimate(&self.memory, now_us))
+    }
+
+    /// Returns the local frame's origin in the receiver's frame, from the first usable fix on \[m\].
+    #[must_use]
+    pub fn origin_m(&self) -> Option<Vector3<f32>> {
+        if self.origin_is_known { Some(Vector3::zeros()) } else { self.origin_m }
+    }
+
     /// Sets whether the motors cannot carry the vehicle ([`Memory::set_on_ground`]).
     pub fn set_on_ground(&mut self, on_ground: bool) {
         self.memory.set_on_ground(on_ground);
@@ -137,7 +149,7 @@ impl EstimatorFrontEnd {
             }
         }
         if let Some(Stamped { value, at_us }) = inbox.pose().filter(|_| self.works) {
-            self.memory.offer(&Stamped { value: measurement(value), at_us: *at_us });
+            self.memory.offer(&Stamped { value: tracker_aid(value), at_us: *at_us });
             inbox.clear_pose();
         }
         let estimate = self.estimator.step(&mut self.memory, now_us, sample.as_ref());
@@ -236,7 +248,9 @@ fn pose(measurement: &Measurement) -> Option<Pose> {
     Some(Pose { position_m, attitude, sigmas })
 }
 
-fn measurement(pose: &Pose) -> Measurement {
+/// Returns the measurement that the estimator makes of a tracker's pose.
+#[must_use]
+pub fn tracker_aid(pose: &Pose) -> Measurement {
     let (position_sigma_m, attitude_sigma_rad) = TRACKER;
     Measurement::Pose {
         position_m: pose.position_m,

@@ -19,6 +19,7 @@
 mod configuration;
 mod control_inputs;
 mod flight;
+mod flight_view;
 mod front_end;
 mod guided;
 mod imu_selector;
@@ -37,7 +38,8 @@ pub use afbc_flight_core::ArmingLimits;
 pub use configuration::Configuration;
 pub use control_inputs::{ControlInputs, give};
 pub use flight::{Flight, Prepare, Prepared, Report};
-pub use front_end::EstimatorFrontEnd;
+pub use flight_view::FlightView;
+pub use front_end::{EstimatorFrontEnd, tracker_aid};
 pub use guided::GuidanceResult;
 pub use imu_selector::{ImuPair, ImuSelector};
 pub use law::FlightLaw;

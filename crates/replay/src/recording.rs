@@ -1,6 +1,6 @@
 //! What a log contains, in this project's frames and units.
 
-use afbc_estimator::{ImuSample, Measurement, Origin, Stamped};
+use afbc_estimator::{ImuSample, Measurement, Origin, Settings, Stamped};
 use nalgebra::Vector3;
 
 /// A sensor, or a part of the log's own estimate.
@@ -8,6 +8,8 @@ use nalgebra::Vector3;
 pub enum Sensor {
     /// Gyroscope and accelerometer.
     Imu,
+    /// Motion-capture system, or another tracker.
+    Tracker,
     /// GNSS receiver.
     Gnss,
     /// Barometer.
@@ -26,6 +28,7 @@ impl Sensor {
     pub const fn title(self) -> &'static str {
         match self {
             Sensor::Imu => "inertial sensor",
+            Sensor::Tracker => "tracker",
             Sensor::Gnss => "GNSS",
             Sensor::Barometer => "barometer",
             Sensor::Magnetometer => "magnetometer",
@@ -109,6 +112,8 @@ pub struct Recording {
     /// What the vehicle's own field makes of the heading, where that is known: standard deviation along each of body x
     /// and y \[rad\].
     pub mag_slow_rad: Option<f32>,
+    /// Settings of the estimator that flew, if the log has them.
+    pub settings: Option<Settings>,
     /// Where everything comes from.
     pub sources: Vec<SampleSource>,
     /// What else is to be reported, a sentence each.

@@ -85,13 +85,13 @@ pub struct Replayed {
 /// # Errors
 /// A setting out of range.
 pub fn fly(recording: &Recording, from_s: Option<f64>) -> Result<Replayed, OutOfRange> {
-    // White noise is all that EKF2 knows of a receiver.
-    let settings = Settings {
+    let flown = recording.settings.unwrap_or(Settings {
         declination_rad: recording.declination_rad,
+        // White noise is all that EKF2 knows of a receiver.
         gnss_noise_m: Settings::GNSS_NOISE.range.max as f32,
-        mag_slow_rad: recording.mag_slow_rad.unwrap_or(Settings::DEFAULT.mag_slow_rad),
         ..Settings::DEFAULT
-    };
+    });
+    let settings = Settings { mag_slow_rad: recording.mag_slow_rad.unwrap_or(flown.mag_slow_rad), ..flown };
     let first_us = recording.imu.first().map_or(0, |sample| sample.at_us);
     let mut run = Run {
         estimator: Estimator::new(settings)?,

@@ -4,7 +4,7 @@ use crate::ParameterFile;
 use crate::command::{COMMANDS, Line, ServerCommand, WorldChange, parse};
 use crate::systems::listed;
 use crate::vehicle::ServedVehicle;
-use afbc_hil::ExactLogFile;
+use afbc_hil::{LogFile, UlogFiles};
 use afbc_scenario::Scenario;
 use afbc_types::OutOfRange;
 
@@ -63,8 +63,18 @@ impl Server {
     }
 
     /// Keeps the exact log of each vehicle in one of `files`, in order, from now on, before the first step.
-    pub fn record(&mut self, files: Vec<ExactLogFile>) {
+    pub fn record(&mut self, files: Vec<LogFile>) {
         self.vehicles.iter_mut().zip(files).for_each(|(vehicle, file)| vehicle.record(file));
+    }
+
+    /// Keeps the black box of each vehicle in one of `logs`, in order, from now on, before the first step.
+    pub fn log(&mut self, logs: Vec<UlogFiles>) {
+        self.vehicles.iter_mut().zip(logs).for_each(|(vehicle, files)| vehicle.log(files));
+    }
+
+    /// Ends the black boxes; returns a line on each that has ended early and was not reported.
+    pub fn end_logs(&mut self) -> Vec<String> {
+        self.vehicles.iter_mut().filter_map(|vehicle| vehicle.end_log().err()).collect()
     }
 
     /// Returns the time since the start \[s\].

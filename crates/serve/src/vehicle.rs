@@ -7,7 +7,7 @@ use crate::hand::Hand;
 use crate::reported_sensors::ReportedSensors;
 use crate::world_changes::WorldChanges;
 use afbc_flight_core::Mode;
-use afbc_hil::{ExactLogFile, Host, HostTick};
+use afbc_hil::{Host, HostTick, LogFile, UlogFiles, place};
 use afbc_link::{Address, Decoder, Reboot, Uplink};
 use afbc_onboard::Link;
 use afbc_reader::words::out_of_range;
@@ -41,7 +41,8 @@ pub struct ServedVehicle {
     reported: ReportedSensors,
     scenario: Scenario,
     keeper: Option<ParameterFile>,
-    exact_log: Option<ExactLogFile>,
+    exact_log: Option<LogFile>,
+    black_box: Option<UlogFiles>,
     /// What is to be reported of the parameters that were stored.
     notices: Vec<String>,
 }
@@ -69,6 +70,7 @@ impl ServedVehicle {
             scenario: scenario.clone(),
             keeper,
             exact_log: None,
+            black_box: None,
             notices,
         })
     }
@@ -79,9 +81,23 @@ impl ServedVehicle {
     }
 
     /// Keeps an exact log in this file, from now on, before the first step.
-    pub fn record(&mut self, file: ExactLogFile) {
+    pub fn record(&mut self, file: LogFile) {
         self.host.record(file.sink());
         self.exact_log = Some(file);
+    }
+
+    /// Keeps the black box in these files, from now on, before the first step.
+    pub fn log(&mut self, files: UlogFiles) {
+        self.host.log(place(&self.scenario), files.sink());
+        self.black_box = Some(files);
+    }
+
+    /// Ends the black box.
+    ///
+    /// # Errors
+    /// A line on why it has ended early, unless that was reported.
+    pub fn end_log(&mut self) -> Result<(), String> {
+        self.black_box.take().map_or(Ok(()), UlogFiles::finish)
     }
 
     /// Returns its world.
@@ -126,8 +142,11 @@ impl ServedVehicle {
             // The reason is a text to the stations, and reported with it.
             self.host.comms().warn(error.reason());
         }
-        if let Some(failure) = self.exact_log.as_ref().and_then(ExactLogFile::take_failure) {
+        if let Some(failure) = self.exact_log.as_ref().and_then(LogFile::take_failure) {
             log(&format!("the exact log has ended: {failure}"));
+        }
+        if let Some(failure) = self.black_box.as_mut().and_then(UlogFiles::take_failure) {
+            log(&failure);
         }
         // What was sent before has left.
         if self.host.comms().wants_reboot().is_some() {
@@ -146,6 +165,10 @@ impl ServedVehicle {
                 self.host = host;
                 if let Some(file) = &self.exact_log {
                     self.host.record(file.sink());
+                }
+                if let Some(files) = &mut self.black_box {
+                    files.next_start();
+                    self.host.log(place(&self.scenario), files.sink());
                 }
                 // Nothing of a frame outlasts it.
                 self.peers.values_mut().for_each(|peer| *peer = Decoder::new(self.address));

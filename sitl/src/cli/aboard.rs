@@ -1,16 +1,19 @@
-//! `sitl fly --exact-log`: the same flight by the firmware's own code.
+//! `sitl fly --exact-log` and `--ulog`: the same flight by the firmware's own code.
 
 use super::serve::unwritten;
-use super::terminal::Failure;
+use super::terminal::{Failure, say};
 use afbc::Profile;
-use afbc_hil::{ExactLogFile, Host, MessagePeriods, Station};
+use afbc_hil::{Host, LogFile, MessagePeriods, Station, UlogFiles, place};
 use afbc_onboard::Link;
 use afbc_scenario::Scenario;
 use afbc_scenario::contender::{ControllerKind, Law};
+use afbc_sim::flight::Lost;
 use afbc_vehicles::Vehicle;
 use std::ops::ControlFlow;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
+/// The options that are about it.
+const OPTIONS: &str = "--exact-log and --ulog";
 /// Vehicle of a scenario without a vehicle file.
 const PAPER: &str = "paper";
 
@@ -28,7 +31,7 @@ pub(super) fn aboard(scenario: &Scenario, duration_s: Option<f64>) -> Result<Abo
     let contenders = vec![afbc_hil::firmware(scenario)?];
     let duration_s = duration_s.unwrap_or(scenario.duration_s);
     let scenario = Scenario { contenders, duration_s, ..scenario.clone() };
-    afbc_hil::check(&scenario).map_err(|error| format!("--exact-log: {}: {error}", scenario.name))?;
+    afbc_hil::check(&scenario).map_err(|error| format!("{OPTIONS}: {}: {error}", scenario.name))?;
     let file = scenario.vehicle_file.as_ref();
     let host = match kind {
         ControllerKind::Afbc => Host::linked(file, Link::DEFAULT)?,
@@ -44,16 +47,54 @@ pub(super) fn aboard(scenario: &Scenario, duration_s: Option<f64>) -> Result<Abo
 }
 
 impl AboardFlight {
-    /// Flies, and writes the log; returns a line on it.
-    pub(super) fn fly(mut self, path: &Path) -> Result<String, Failure> {
-        let file = ExactLogFile::create(path).map_err(|error| unwritten(path, &error))?;
-        self.host.record(file.sink());
+    /// Flies, and writes the logs; returns a line on each.
+    pub(super) fn fly(mut self, logs: AboardLogs) -> Result<Vec<String>, Failure> {
+        let AboardLogs { exact, ulog } = logs;
+        if let Some((_, file)) = &exact {
+            self.host.record(file.sink());
+        }
+        if let Some((_, files)) = &ulog {
+            self.host.log(place(&self.scenario), files.sink());
+        }
         let Self { scenario, kind, host } = &mut self;
         let flown =
             afbc_hil::fly(scenario, &mut Station::new(), host, MessagePeriods::LOCKSTEP, |_| ControlFlow::Continue(()));
-        file.finish().map_err(|error| unwritten(path, &error))?;
-        let end = flown.map_err(|error| format!("--exact-log: {}: {error}", scenario.name))?;
-        let lost = end.lost.map_or(String::new(), |lost| format!("; lost at {:.3} s: {}", lost.time_s, lost.reason));
-        Ok(format!("{}: exact log of the firmware's code under {}{lost}", path.display(), kind.name()))
+        let mut lines = Vec::new();
+        let mut logged = |path: &Path, what: &str, lost: &str| {
+            lines.push(format!("{}: {what} of the firmware's code under {}{lost}", path.display(), kind.name()));
+        };
+        let lost = |lost: &Lost| format!("; lost at {:.3} s: {}", lost.time_s, lost.reason);
+        let lost = flown.as_ref().ok().and_then(|end| end.lost.as_ref()).map_or(String::new(), lost);
+        if let Some((path, file)) = exact {
+            file.finish().map_err(|error| unwritten(&path, &error))?;
+            logged(&path, "exact log", &lost);
+        }
+        if let Some((path, files)) = ulog {
+            // A log that has ended early costs no flight.
+            match files.finish() {
+                Ok(()) => logged(&path, "ULog", &lost),
+                Err(line) => say(&line),
+            }
+        }
+        flown.map_err(|error| format!("{OPTIONS}: {}: {error}", scenario.name))?;
+        Ok(lines)
+    }
+}
+
+/// The files of its logs.
+pub(super) struct AboardLogs {
+    exact: Option<(PathBuf, LogFile)>,
+    ulog: Option<(PathBuf, UlogFiles)>,
+}
+
+impl AboardLogs {
+    /// Creates the files that are wanted.
+    pub(super) fn create(exact: Option<PathBuf>, ulog: Option<PathBuf>) -> Result<Self, Failure> {
+        let exact = exact.map(|path| match LogFile::create(&path) {
+            Ok(file) => Ok((path, file)),
+            Err(error) => Err(unwritten(&path, &error)),
+        });
+        let ulog = ulog.map(|path| UlogFiles::create(&path).map(|files| (path, files)));
+        Ok(AboardLogs { exact: exact.transpose()?, ulog: ulog.transpose()? })
     }
 }

@@ -1,6 +1,6 @@
 //! `sitl fly`.
 
-use super::aboard::aboard;
+use super::aboard::{AboardLogs, aboard};
 use super::flying::{Flying, report};
 use super::json::Json;
 use super::place::Place;
@@ -30,6 +30,11 @@ pub(crate) struct Fly {
     #[arg(long, value_name = "FILE")]
     exact_log: Option<PathBuf>,
 
+    /// The same for the black box: PX4's ULog of that flight, for PX4's tools and `sitl replay`, in this file, which
+    /// must not exist
+    #[arg(long, value_name = "FILE")]
+    ulog: Option<PathBuf>,
+
     #[command(flatten)]
     on: OnVehicle,
 
@@ -52,12 +57,14 @@ impl Fly {
         }
         let scenario = self.on.put(scenario)?;
         let name = scenario.name.clone();
-        let firmware = self.exact_log.as_ref().map(|_| aboard(&scenario, self.flying.duration)).transpose()?;
+        let is_logged = self.exact_log.is_some() || self.ulog.is_some();
+        let firmware = is_logged.then(|| aboard(&scenario, self.flying.duration)).transpose()?;
+        // Before the flights, so that a file that cannot be costs none.
+        let logs = AboardLogs::create(self.exact_log, self.ulog)?;
         let (folder, flown) = self.flying.fly(vec![scenario], || self.place.open("fly", &name))?;
-        let logged = firmware.zip(self.exact_log.as_deref());
-        let logged = logged.map(|(firmware, path)| firmware.fly(path)).transpose()?;
+        let logged = firmware.map(|firmware| firmware.fly(logs)).transpose()?;
         report(&folder, &flown, &[], self.json)?;
-        logged.iter().for_each(|line| say(line));
+        logged.iter().flatten().for_each(|line| say(line));
         Ok(ExitCode::from(u8::from(flown.iter().any(|flown| flown.run.lost.is_some()))))
     }
 }

@@ -1,13 +1,14 @@
 //! `sitl serve`.
 
 use super::target::Target;
-use super::terminal::{Failure, INTERRUPTED, print};
+use super::terminal::{Failure, INTERRUPTED, print, say};
 use super::vehicle::OnVehicle;
-use afbc_hil::ExactLogFile;
+use afbc_hil::{LogFile, UlogFiles};
 use afbc_serve::{
     Addresses, Lines, ParameterFile, Ports, RunEnd, Server, Then, TimeRate, VEHICLES_MAX, fleet, guide, run,
 };
 use clap::{Args, value_parser};
+use std::ffi::OsString;
 use std::io::{self, BufReader, Write, stdin, stdout};
 use std::net::{IpAddr, SocketAddr, ToSocketAddrs};
 use std::path::{Path, PathBuf};
@@ -78,6 +79,11 @@ pub(crate) struct Serve {
     #[arg(long, value_name = "FILE")]
     exact_log: Option<PathBuf>,
 
+    /// Keep the black box, PX4's ULog, in this file, which must not exist; of several vehicles each has its own, with
+    /// its system id before the extension; after a restart in another one, with the number of the start
+    #[arg(long, value_name = "FILE")]
+    ulog: Option<PathBuf>,
+
     /// Times real time; 0 for as fast as possible
     #[arg(long, value_name = "FACTOR", default_value_t = 1.0, value_parser = speed, allow_negative_numbers = true)]
     speed: f64,
@@ -119,6 +125,7 @@ impl Serve {
         }
         let logs = self.exact_logs()?;
         server.record(logs.iter().map(|(_, log)| log.clone()).collect());
+        server.log(self.black_boxes()?);
         for line in &self.lines {
             let reply = server.line(line);
             let answer = reply.lines.last().map_or("ok", String::as_str);
@@ -149,6 +156,7 @@ impl Serve {
             let mut out = stdout().lock();
             let _ = writeln!(out, "{line}").and_then(|()| out.flush());
         });
+        server.end_logs().iter().for_each(|line| say(line));
         for (path, log) in logs {
             log.finish().map_err(|error| unwritten(&path, &error))?;
         }
@@ -156,14 +164,25 @@ impl Serve {
     }
 
     /// Creates the files of the exact logs, if they are wanted.
-    fn exact_logs(&self) -> Result<Vec<(PathBuf, ExactLogFile)>, Failure> {
+    fn exact_logs(&self) -> Result<Vec<(PathBuf, LogFile)>, Failure> {
         let Some(path) = &self.exact_log else { return Ok(Vec::new()) };
         let paths = (self.system..).take(self.vehicles.into()).map(|system| file(path, system, self.vehicles));
-        let open = |path: PathBuf| match ExactLogFile::create(&path) {
+        let open = |path: PathBuf| match LogFile::create(&path) {
             Ok(log) => Ok((path, log)),
             Err(error) => Err(unwritten(&path, &error).into()),
         };
         paths.map(open).collect()
+    }
+
+    /// Creates the files of the black boxes, if they are wanted.
+    fn black_boxes(&self) -> Result<Vec<UlogFiles>, Failure> {
+        let Some(path) = &self.ulog else { return Ok(Vec::new()) };
+        let of = |system: u8| match self.vehicles {
+            1 => path.clone(),
+            _ => path.with_extension(extension(path, system)),
+        };
+        let open = |system| Ok(UlogFiles::create(&of(system))?);
+        (self.system..).take(self.vehicles.into()).map(open).collect()
     }
 
     fn addresses(&self) -> Result<Addresses, Failure> {
@@ -194,6 +213,16 @@ fn file(path: &Path, system: u8, vehicles: u8) -> PathBuf {
     let mut name = path.file_name().unwrap_or_default().to_os_string();
     name.push(format!(".{system}"));
     path.with_file_name(name)
+}
+
+/// Returns a file's extension after a system id.
+fn extension(path: &Path, system: u8) -> OsString {
+    let mut extension = OsString::from(system.to_string());
+    if let Some(own) = path.extension() {
+        extension.push(".");
+        extension.push(own);
+    }
+    extension
 }
 
 /// Finds the address of a peer, of the same family as the one to serve at.

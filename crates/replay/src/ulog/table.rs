@@ -95,8 +95,27 @@ pub(super) const VEHICLE_LOCAL_POSITION: Topic = (
 pub(super) const VEHICLE_LAND_DETECTED: Topic = ("vehicle_land_detected", &["timestamp", "landed"]);
 
 pub(super) const ACTUATOR_ARMED: Topic = ("actuator_armed", &["timestamp", "armed"]);
+pub(super) const AFBC_ESTIMATOR: Topic = ("afbc_estimator", &["timestamp", "on_ground"]);
+pub(super) const AFBC_AID: Topic = (
+    "afbc_aid",
+    &[
+        "timestamp",
+        "timestamp_sample",
+        "kind",
+        "numbers[0]",
+        "numbers[1]",
+        "numbers[2]",
+        "numbers[3]",
+        "numbers[4]",
+        "numbers[5]",
+        "numbers[6]",
+        "numbers[7]",
+        "numbers[8]",
+        "numbers[9]",
+    ],
+);
 
-const TOPICS: [Topic; 11] = [
+const TOPICS: [Topic; 13] = [
     SENSOR_COMBINED,
     VEHICLE_GPS_POSITION,
     SENSOR_GPS,
@@ -108,6 +127,8 @@ const TOPICS: [Topic; 11] = [
     VEHICLE_LOCAL_POSITION,
     VEHICLE_LAND_DETECTED,
     ACTUATOR_ARMED,
+    AFBC_ESTIMATOR,
+    AFBC_AID,
 ];
 
 /// A message: its fields in the order of its [`Topic`]; not a number where its layout lacks one.
@@ -146,6 +167,8 @@ pub(super) struct Tables {
     /// Messages by topic and instance, in the order of the file.
     rows: HashMap<(&'static str, u8), Vec<Row>>,
     parameters: HashMap<String, f64>,
+    /// Topics that the log announces, whether there are messages or not.
+    announced: HashSet<&'static str>,
     /// What is to be reported of the file.
     pub(super) notes: Vec<String>,
 }
@@ -157,6 +180,16 @@ impl Tables {
         let mut instances: Vec<_> = of.map(|((_, instance), rows)| (*instance, rows.as_slice())).collect();
         instances.sort_by_key(|(instance, _)| *instance);
         instances
+    }
+
+    /// True if the log announces a topic.
+    pub(super) fn announces(&self, topic: Topic) -> bool {
+        self.announced.contains(topic.0)
+    }
+
+    /// Returns all parameters, in no order.
+    pub(super) fn parameters(&self) -> impl Iterator<Item = (&str, f64)> {
+        self.parameters.iter().map(|(name, value)| (name.as_str(), *value))
     }
 
     /// Returns the messages of a topic's lowest instance.
@@ -209,20 +242,22 @@ fn number(data: &[u8], (kind, offset): &(Type, u16)) -> Option<f64> {
 #[derive(Default)]
 struct Wanted {
     ids: HashSet<[u8; 2]>,
+    announced: HashSet<&'static str>,
 }
 
 impl Wanted {
     fn has(&mut self, record: &[u8]) -> bool {
-        let is_topic = |name: &[u8]| TOPICS.iter().any(|(topic, _)| topic.as_bytes() == name);
+        let topic = |name: &[u8]| TOPICS.iter().map(|(topic, _)| *topic).find(|topic| topic.as_bytes() == name);
         match record.get(2..) {
             Some([b'B' | b'P' | b'O', ..]) => true,
-            Some([b'F', format @ ..]) => format.split(|byte| *byte == b':').next().is_some_and(is_topic),
+            Some([b'F', format @ ..]) => format.split(|byte| *byte == b':').next().and_then(topic).is_some(),
             Some([b'A', _, low, high, name @ ..]) => {
-                let wanted = is_topic(name);
-                if wanted {
+                let wanted = topic(name);
+                if let Some(topic) = wanted {
                     self.ids.insert([*low, *high]);
+                    self.announced.insert(topic);
                 }
-                wanted
+                wanted.is_some()
             }
             Some([b'D', low, high, ..]) => self.ids.contains(&[*low, *high]),
             _ => false,
@@ -284,6 +319,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Tables, String> {
     });
     drop(parser);
     let mut tables = tables.into_inner();
+    tables.announced = wanted.announced;
     match end {
         End::Whole => {}
         End::Cut(at) => tables.notes.push(format!("The file ends within the record at byte {at}: it is cut.")),

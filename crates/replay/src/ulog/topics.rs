@@ -63,7 +63,7 @@ pub(super) fn recording(tables: &Tables) -> Result<Recording, String> {
 
 /// Reads the samples of the inertial sensor. Each is the mean over its time of integration, so it was true in the
 /// middle of that.
-fn imu(tables: &Tables, samples: &mut Vec<ImuSample>) -> Result<SampleSource, String> {
+pub(super) fn imu(tables: &Tables, samples: &mut Vec<ImuSample>) -> Result<SampleSource, String> {
     let (topic, rows) = (SENSOR_COMBINED.0, tables.first(SENSOR_COMBINED));
     let sample = |row: &Row| {
         let integral = row.get("gyro_integral_dt");
@@ -262,7 +262,7 @@ fn declination(tables: &Tables, earth: Option<&Field>, notes: &mut Vec<String>) 
     })
 }
 
-fn attitudes(tables: &Tables) -> (Vec<LoggedState>, SampleSource) {
+pub(super) fn attitudes(tables: &Tables) -> (Vec<LoggedState>, SampleSource) {
     let rows = tables.first(VEHICLE_ATTITUDE);
     let state = |row: &Row| {
         let q = flip_rotation(["q[0]", "q[1]", "q[2]", "q[3]"].map(|name| row.get(name)))?;
@@ -304,7 +304,7 @@ const COUNTERS: [Counter; 4] = [
 ];
 
 /// Returns the jumps of the log's own estimate.
-fn resets(tables: &Tables) -> Vec<LoggedReset> {
+pub(super) fn resets(tables: &Tables) -> Vec<LoggedReset> {
     let mut resets = Vec::new();
     let mut count = |rows: &[Row], counter: &str, what, unit, by: &dyn Fn(&Row) -> f64| {
         for (before, row) in rows.iter().zip(rows.iter().skip(1)) {

@@ -1,4 +1,4 @@
-//! A file for the exact log of a host.
+//! A file for the log of a host.
 
 use std::cell::RefCell;
 use std::fs::File;
@@ -6,13 +6,13 @@ use std::io::{self, BufWriter, Write};
 use std::path::Path;
 use std::rc::Rc;
 
-/// Bytes after which the file has all that was recorded: about a second.
+/// Bytes after which the file has all that was logged: about a second.
 const FLUSH_BYTES: usize = 1 << 16;
 
-/// A file with the exact log of one host after another: of a vehicle that may be restarted. After a failure nothing
-/// more is written.
+/// A file with the log of one host after another: of a vehicle that may be restarted. After a failure nothing more is
+/// written.
 #[derive(Clone, Debug)]
-pub struct ExactLogFile(Rc<RefCell<Open>>);
+pub struct LogFile(Rc<RefCell<Open>>);
 
 #[derive(Debug)]
 struct Open {
@@ -22,17 +22,29 @@ struct Open {
     is_told: bool,
 }
 
-impl ExactLogFile {
+impl LogFile {
     /// Creates the file at `path`, overwriting an existing one.
     ///
     /// # Errors
     /// If it cannot be created.
     pub fn create(path: &Path) -> io::Result<Self> {
-        let out = BufWriter::with_capacity(FLUSH_BYTES, File::create(path)?);
-        Ok(ExactLogFile(Rc::new(RefCell::new(Open { out, failed: Ok(()), is_told: false }))))
+        Ok(Self::of(File::create(path)?))
     }
 
-    /// Returns what takes the bytes of a host ([`Host::record`](crate::Host::record)).
+    /// Creates the file at `path`, where there must be none.
+    ///
+    /// # Errors
+    /// If it cannot be created, or is there.
+    pub fn create_new(path: &Path) -> io::Result<Self> {
+        Ok(Self::of(File::create_new(path)?))
+    }
+
+    fn of(file: File) -> Self {
+        let out = BufWriter::with_capacity(FLUSH_BYTES, file);
+        LogFile(Rc::new(RefCell::new(Open { out, failed: Ok(()), is_told: false })))
+    }
+
+    /// Returns what takes the bytes of a host ([`Host::record`](crate::Host::record), [`Host::log`](crate::Host::log)).
     pub fn sink(&self) -> impl FnMut(&[u8]) + 'static {
         let open = Rc::clone(&self.0);
         move |bytes| {

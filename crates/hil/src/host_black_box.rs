@@ -1,0 +1,67 @@
+//! The black box of a host: its ring, emptied after every tick.
+
+use afbc_estimator::Origin;
+use afbc_link::{Address, Decoder, Downlink};
+use afbc_onboard::parameters::{ParameterTable, RecordChange};
+use afbc_onboard::{FlightView, Readings, Report};
+use afbc_types::ROTORS_MAX;
+use afbc_ulog::{BlackBox, LogRing, LoggedTick, TakenInputs};
+
+/// Bytes that wait for the end of a tick, at most: more than a log's beginning and a tick.
+const RING: usize = 1 << 16;
+/// Who reads the vehicle's texts: a listener that sends nothing.
+const LISTENER: Address = Address { system: 255, component: 190 };
+
+/// What takes the bytes of a log.
+type Sink = Box<dyn FnMut(&[u8])>;
+
+/// Makes the log of a host, and hands its bytes over.
+pub(crate) struct HostBlackBox {
+    log: BlackBox,
+    ring: Box<LogRing<RING>>,
+    write: Sink,
+    /// Where fixes of a GNSS receiver are measured from.
+    origin: Option<Origin>,
+    /// Reads the texts that the vehicle sends.
+    decoder: Decoder<Downlink>,
+}
+
+impl HostBlackBox {
+    pub(crate) fn new(log: BlackBox, origin: Option<Origin>, write: impl FnMut(&[u8]) + 'static) -> Self {
+        HostBlackBox { log, ring: Box::default(), write: Box::new(write), origin, decoder: Decoder::new(LISTENER) }
+    }
+
+    /// Logs a tick.
+    pub(crate) fn tick<const N: usize>(
+        &mut self,
+        report: &Report<ROTORS_MAX>,
+        readings: &Readings,
+        taken: TakenInputs,
+        view: &FlightView,
+        table: &ParameterTable<N>,
+    ) {
+        let tick = LoggedTick { report, readings, taken, view, origin: self.origin };
+        self.log.tick(&tick, table, &mut self.ring);
+    }
+
+    /// Logs a change of the parameters.
+    pub(crate) fn change<const N: usize>(&mut self, table: &ParameterTable<N>, change: RecordChange) {
+        self.log.change(table, change, &mut self.ring);
+    }
+
+    /// Logs the texts among what was sent after a tick, and hands over all that waits.
+    pub(crate) fn sent(&mut self, now_us: u64, bytes: &[u8]) {
+        let Self { log, ring, write, decoder, .. } = self;
+        decoder.feed(bytes, |_, message| {
+            if let Downlink::Text { severity, text } = message {
+                log.text(now_us, severity as u8, text.to_str().unwrap_or_default(), ring);
+            }
+        });
+        while !ring.is_empty() {
+            let front = ring.front();
+            write(front);
+            let length = front.len();
+            ring.consume(length);
+        }
+    }
+}

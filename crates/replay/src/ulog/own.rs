@@ -1,0 +1,136 @@
+//! Logs of this project's own black box, which have more than PX4's: each measurement as the estimator was offered it,
+//! and the estimator's settings. Over them it does again what it did in flight.
+
+use super::table::{AFBC_AID, AFBC_ESTIMATOR, Row, SENSOR_COMBINED, Tables, VEHICLE_LOCAL_POSITION};
+use super::topics;
+use crate::order::rising;
+use crate::recording::{Aiding, LoggedState, Recording, SampleSource, Sensor, flip};
+use crate::states;
+use afbc_estimator::{Measurement, Settings, Stamped};
+use afbc_onboard::Configuration;
+use afbc_onboard::parameters::ParameterTable;
+use afbc_store::RecordName;
+use nalgebra::Vector3;
+
+/// Numbers of a measurement.
+const NUMBERS: usize = 10;
+/// Prefix of the estimator's parameters.
+const ESTIMATOR: &str = "EST_";
+
+/// Returns what the tables of such a log contain; none if they are another's.
+///
+/// # Errors
+/// If there is no inertial sensor.
+pub(super) fn recording(tables: &Tables) -> Result<Option<Recording>, String> {
+    if !tables.announces(AFBC_ESTIMATOR) {
+        return Ok(None);
+    }
+    if tables.first(SENSOR_COMBINED).is_empty() && tables.notes.is_empty() {
+        return Err("no samples of an inertial sensor: the vehicle flew on states from outside; log one that has an \
+                    inertial sensor, as in sitl fly mocap"
+            .into());
+    }
+    let settings = settings(tables);
+    let mut recording = Recording {
+        format: "ULog of this firmware",
+        notes: tables.notes.clone(),
+        knows_origin: true,
+        declination_rad: settings.declination_rad,
+        settings: Some(settings),
+        ..Recording::default()
+    };
+    recording.sources.push(topics::imu(tables, &mut recording.imu)?);
+    let rows = tables.first(AFBC_AID);
+    recording.aiding = rows.iter().filter_map(aiding).collect();
+    recording.aiding.sort_by_key(|aiding| aiding.arrived_us);
+    for sensor in [Sensor::Tracker, Sensor::Gnss, Sensor::Barometer, Sensor::Magnetometer] {
+        let of = |aiding: &&Aiding| sensor_of(&aiding.measurement.value) == sensor;
+        let used = recording.aiding.iter().filter(of).count();
+        if used > 0 {
+            recording.sources.push(SampleSource { sensor, topic: AFBC_AID.0.into(), used, skipped: 0 });
+        }
+    }
+    let (attitudes, source) = topics::attitudes(tables);
+    recording.sources.push(source);
+    let (motions, source) = motions(tables);
+    recording.sources.push(source);
+    recording.states = states::merged(attitudes, motions);
+    recording.resets = topics::resets(tables);
+    let on_ground =
+        tables.first(AFBC_ESTIMATOR).iter().map(|row| (row.timestamp_us(), row.get("on_ground") > 0.0)).collect();
+    recording.landed = rising(on_ground, |(at_us, _)| *at_us).0;
+    Ok(Some(recording))
+}
+
+/// Returns the estimator's settings by the log's parameters.
+fn settings(tables: &Tables) -> Settings {
+    let mut table = ParameterTable::<4>::new(Configuration::default());
+    for (name, value) in tables.parameters().filter(|(name, _)| name.starts_with(ESTIMATOR)) {
+        // One that this version does not have leaves it at its default.
+        let _ = RecordName::new(name).map(|name| table.put(name, value as f32));
+    }
+    table.configuration().estimation
+}
+
+/// Returns a measurement as it was offered; none of an unknown kind.
+fn aiding(row: &Row) -> Option<Aiding> {
+    let names: [&str; NUMBERS] = [
+        "numbers[0]",
+        "numbers[1]",
+        "numbers[2]",
+        "numbers[3]",
+        "numbers[4]",
+        "numbers[5]",
+        "numbers[6]",
+        "numbers[7]",
+        "numbers[8]",
+        "numbers[9]",
+    ];
+    let [a, b, c, d, e, f, g, h, i, j] = names.map(|name| row.get(name) as f32);
+    let first = Vector3::new(a, b, c);
+    let value = match row.get("kind") as u8 {
+        1 => {
+            Measurement::Pose { position_m: first, attitude: [d, e, f, g], position_sigma_m: h, attitude_sigma_rad: i }
+        }
+        2 => Measurement::Position { position_m: first, sigma_m: d },
+        3 => Measurement::Gnss {
+            position_m: first,
+            velocity_m_s: Vector3::new(d, e, f),
+            horizontal_sigma_m: g,
+            vertical_sigma_m: h,
+            speed_sigma_m_s: i,
+            climb_sigma_m_s: j,
+        },
+        4 => Measurement::Height { height_m: a, sigma_m: b },
+        5 => Measurement::MagneticField { field: first, sigma: d },
+        6 => Measurement::Heading { heading_rad: a, sigma_rad: b },
+        _ => return None,
+    };
+    let at_us = row.get("timestamp_sample") as u64;
+    Some(Aiding { arrived_us: row.timestamp_us(), measurement: Stamped { value, at_us } })
+}
+
+fn sensor_of(measurement: &Measurement) -> Sensor {
+    match measurement {
+        Measurement::Pose { .. } | Measurement::Position { .. } => Sensor::Tracker,
+        Measurement::Gnss { .. } => Sensor::Gnss,
+        Measurement::Height { .. } => Sensor::Barometer,
+        Measurement::MagneticField { .. } | Measurement::Heading { .. } => Sensor::Magnetometer,
+    }
+}
+
+/// Returns velocities and positions, in the local frame of the measurements.
+fn motions(tables: &Tables) -> (Vec<LoggedState>, SampleSource) {
+    let rows = tables.first(VEHICLE_LOCAL_POSITION);
+    let state = |row: &Row| {
+        let valid = |names: [&str; 2]| names.iter().all(|name| row.get(name) > 0.0);
+        let of = |names, valid| Some(flip(row.vector(names))).filter(|_| valid);
+        states::motion(
+            row.sampled_us(),
+            of(["vx", "vy", "vz"], valid(["v_xy_valid", "v_z_valid"])),
+            of(["x", "y", "z"], valid(["xy_valid", "z_valid"])),
+        )
+    };
+    let states = rows.iter().filter_map(state).collect();
+    states::collect(states, rows.len(), Sensor::Motion, VEHICLE_LOCAL_POSITION.0)
+}

@@ -1,0 +1,66 @@
+//! `--ulog` of `sitl fly` and `sitl serve`: the files, what is refused, and a disc that is full.
+
+#![expect(clippy::unwrap_used, reason = "tests")]
+
+mod common;
+
+use common::{folder, refused, sitl, succeeds};
+use std::fs;
+use std::path::Path;
+
+/// Serves at free ports, without sending anything to anyone.
+const SERVE: [&str; 8] = ["serve", "--port", "0", "--station", "none", "--companion", "none", "--fast"];
+
+fn is_log(path: &Path) -> bool {
+    fs::read(path).is_ok_and(|bytes| bytes.starts_with(b"ULog\x01\x12\x35\x01") && bytes.len() > 50_000)
+}
+
+#[test]
+fn a_flight_is_logged_and_replayed() {
+    let folder = folder("flown");
+    let fly = ["fly", "mocap", "--controller", "pid", "--duration", "1", "--ulog", "flight.ulg"];
+    let output = sitl(&folder, &fly);
+    succeeds(&output);
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(said.contains("flight.ulg: ULog of the firmware's code under pid"), "{said}");
+    assert!(is_log(&folder.join("flight.ulg")));
+    let said = succeeds(&sitl(&folder, &["replay", "flight.ulg"]));
+    assert!(said.contains("ULog of this firmware") && said.contains("tracker (afbc_aid)"), "{said}");
+    // A log is not overwritten, and nothing is flown for one that cannot be.
+    let out = folder.join("out");
+    fs::remove_dir_all(&out).unwrap();
+    for (path, cure) in [("flight.ulg", "remove that one"), ("no/such/folder.ulg", "choose another file for --ulog")] {
+        let said = refused(&sitl(&folder, &["fly", "mocap", "--duration", "1", "--ulog", path]));
+        assert!(said.starts_with(&format!("{path}: ")) && said.contains(cure) && said.lines().count() == 1, "{said}");
+    }
+    assert!(!out.exists());
+}
+
+#[test]
+fn served_vehicles_have_a_log_each() {
+    let folder = folder("served");
+    succeeds(&sitl(&folder, &[&SERVE[..], &["--ulog", "one.ulg", "--do", "at 2 quit"]].concat()));
+    assert!(is_log(&folder.join("one.ulg")));
+    let two = ["--vehicles", "2", "--system", "7", "--ulog", "two.ulg", "--do", "at 2 quit"];
+    succeeds(&sitl(&folder, &[&SERVE[..], &two].concat()));
+    assert!(is_log(&folder.join("two.7.ulg")) && is_log(&folder.join("two.8.ulg")) && !folder.join("two.ulg").exists());
+    let again = [&SERVE[..], &["--ulog", "one.ulg", "--do", "at 2 quit"]].concat();
+    let said = refused(&sitl(&folder, &again));
+    assert!(said.starts_with("one.ulg: exists already") && said.lines().count() == 1, "{said}");
+}
+
+/// A file that cannot grow, as on a full disc, costs the log and not the vehicle, and is told once.
+#[cfg(unix)]
+#[test]
+fn a_full_disc_costs_the_log_alone() {
+    let folder = folder("full");
+    let sitl = env!("CARGO_BIN_EXE_sitl");
+    let serve = [&SERVE[..], &["--ulog", "full.ulg", "--do", "'at 6 quit'"]].concat().join(" ");
+    let script = format!("trap '' XFSZ; ulimit -f 400; exec {sitl} {serve}");
+    let output = std::process::Command::new("sh").current_dir(&folder).args(["-c", &script]).output().unwrap();
+    let said = succeeds(&output);
+    let told: Vec<_> = said.lines().filter(|line| line.contains("full.ulg: the log has ended early")).collect();
+    assert!(told.len() == 1 && said.contains("6.000 ok at 6 quit"), "{said}");
+    assert!(output.stderr.is_empty(), "{}", String::from_utf8_lossy(&output.stderr));
+    assert!(is_log(&folder.join("full.ulg")));
+}
