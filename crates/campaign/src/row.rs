@@ -2,7 +2,7 @@
 
 use crate::plan::Campaign;
 use afbc_scenario::contender::Contender;
-use afbc_sim::flight::{Lost, Start};
+use afbc_sim::flight::{FlightStart, Lost};
 use afbc_sim::metrics::{Accumulator, Metrics, is_settled};
 use afbc_types::OutOfRange;
 
@@ -119,7 +119,7 @@ impl Campaign {
         let draw = self.draw(flight);
         let scenario = self.with(flight, &draw)?;
         let trajectory = self.trajectory(flight).map(|trajectory| trajectory.name.as_str()).unwrap_or_default();
-        let mut start = Start::of(&scenario);
+        let mut start = FlightStart::of(&scenario);
         let row = |contender: &Contender| {
             let outcome = Tally::of(&mut start, contender)?;
             let figures = FIGURES.iter().map(|figure| (figure.value)(&outcome));
@@ -139,7 +139,7 @@ impl Campaign {
 
 impl Tally {
     /// Flies, and keeps only sums.
-    fn of(start: &mut Start, contender: &Contender) -> Result<Self, OutOfRange> {
+    fn of(start: &mut FlightStart, contender: &Contender) -> Result<Self, OutOfRange> {
         let mut outcome = Tally::default();
         let mut metrics = Accumulator::default();
         outcome.lost = start.fly(contender, |sample| {

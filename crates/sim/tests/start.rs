@@ -5,7 +5,7 @@ use afbc::Profile;
 use afbc_plant::Motion;
 use afbc_scenario::contender::{Contender, ControllerKind};
 use afbc_scenario::parse;
-use afbc_sim::flight::{Estimated, Start, fly};
+use afbc_sim::flight::{Estimated, FlightStart, fly};
 
 const FLIGHT: &str = r#"
 duration_s = 0.3
@@ -26,7 +26,7 @@ const ON_SENSORS: &str = "[sensors]\nnoise = 0.001\n";
 fn contenders_do_not_feel_who_flew_before() {
     for (name, sensors) in [("estimate", ON_THE_ESTIMATE), ("sensors", ON_SENSORS)] {
         let scenario = parse(name, &format!("{FLIGHT}{sensors}"), name).unwrap();
-        let mut start = Start::of(&scenario);
+        let mut start = FlightStart::of(&scenario);
         let mut ends: Vec<Motion> = Vec::new();
         for kind in [ControllerKind::Afbc, ControllerKind::Pid, ControllerKind::Afbc] {
             let contender = Contender::of(kind, Profile::Flight);

@@ -21,20 +21,20 @@ pub fn fly(
     contender: &Contender,
     observe: impl FnMut(&Sample),
 ) -> Result<Option<Lost>, OutOfRange> {
-    Start::of(scenario).fly(contender, observe)
+    FlightStart::of(scenario).fly(contender, observe)
 }
 
 /// The start of a scenario, which every contender flies from. A vehicle's own estimate settles before it, once for all.
-pub struct Start<'a> {
+pub struct FlightStart<'a> {
     scenario: &'a Scenario,
     /// The world there, once it has been made.
     world: Option<World>,
 }
 
-impl<'a> Start<'a> {
+impl<'a> FlightStart<'a> {
     /// The one of `scenario`.
     pub fn of(scenario: &'a Scenario) -> Self {
-        Start { scenario, world: None }
+        FlightStart { scenario, world: None }
     }
 
     /// Flies under one contender, as [`fly`] does.
@@ -57,7 +57,7 @@ impl<'a> Start<'a> {
 }
 
 struct Fly<'a, 'b, O> {
-    start: &'a mut Start<'b>,
+    start: &'a mut FlightStart<'b>,
     observe: O,
 }
 

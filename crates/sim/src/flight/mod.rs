@@ -17,7 +17,7 @@ mod sensing;
 mod sensor_model;
 mod world;
 
-pub use contender::{Start, fly};
+pub use contender::{FlightStart, fly};
 pub use estimation::{CARRIED_S, Estimated, Innovation, REST_S};
 pub use in_flight_core::InFlightCore;
 pub use law_only::LawOnly;
