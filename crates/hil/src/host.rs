@@ -5,7 +5,7 @@ use afbc_calibration::RawSample;
 use afbc_flight_core::rate::PERIOD_US;
 use afbc_link::{Decoder, Uplink};
 use afbc_onboard::parameters::{Kept, ParameterTable, Reason, RecordChange};
-use afbc_onboard::{Configuration, ControlInputs, Flight, Link, Prepare, RawReadings, Readings, Report};
+use afbc_onboard::{Configuration, ControlInputs, Flight, ImuSelector, Link, Prepare, RawReadings, Readings, Report};
 use afbc_recorder::{Given, Recorder, TickRecord};
 use afbc_scenario::OtherLaw;
 use afbc_scenario::contender::{ControllerKind, Law};
@@ -60,6 +60,8 @@ trait Core {
         tell: Tell<'_>,
     ) -> Report<ROTORS_MAX>;
 
+    fn tell(&self, selector: &mut ImuSelector, readings: &Readings);
+
     /// Goes on with a calibration, and shows stations what the sensors read.
     fn calibrate(
         &mut self,
@@ -104,6 +106,10 @@ impl<P: Prepare<N>, const N: usize> Core for Aircraft<P, N> {
         let report = self.flight.tick(now_us, inputs, readings);
         tell.comms.report(&report, tell.tick_us, tell.send);
         report.padded()
+    }
+
+    fn tell(&self, selector: &mut ImuSelector, readings: &Readings) {
+        self.flight.tell(selector, readings);
     }
 
     fn calibrate(
@@ -308,6 +314,11 @@ impl Host {
     /// Sets what the vehicle's own sensors read for the next tick alone.
     pub fn sense(&mut self, readings: &Readings) {
         self.readings = *readings;
+    }
+
+    /// Has a selection of inertial sensors heed the last tick, which took these readings ([`sense`](Self::sense)).
+    pub fn tell(&self, selector: &mut ImuSelector, readings: &Readings) {
+        self.flight.tell(selector, readings);
     }
 
     /// Runs one control tick at `time_us` since power-up, after `uplink` has reached the link. The tick reports a

@@ -4,6 +4,7 @@ use crate::configuration::Configuration;
 use crate::control_inputs::ControlInputs;
 use crate::front_end::{Corrections, EstimatorFrontEnd};
 use crate::guided::{Core, GuidanceResult, Guide};
+use crate::imu_selector::ImuSelector;
 use crate::law::FlightLaw;
 use crate::readings::Readings;
 use crate::sensor_timeouts::SensorTimeouts;
@@ -220,6 +221,13 @@ impl<const N: usize, C: FlightLaw<N>> Flight<N, C> {
     /// Returns the law's internal signals of the last tick: only inputs while blind, zeros while disarmed.
     pub fn trace(&self) -> Trace {
         self.memory.trace::<C, N>()
+    }
+
+    /// Has a selection of inertial sensors heed the tick that took these readings.
+    pub fn tell(&self, selector: &mut ImuSelector, readings: &Readings) {
+        if let Some(inertial) = self.front_end.inertial() {
+            selector.heed(&inertial, &self.front_end.witness(readings));
+        }
     }
 
     /// Runs one control tick, to be called every millisecond, with what the link brought and the vehicle's own sensors

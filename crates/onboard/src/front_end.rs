@@ -1,9 +1,12 @@
 //! What stands around the filter, on board and in simulation: which readings it gets when, the inertial sensor's
 //! mounting, the ground, the local frame's origin, and what of the estimate reaches the flight core.
 
+use crate::imu_lanes::Witness;
 use crate::readings::{Aged, Readings};
 use afbc_control::math::{max, min};
-use afbc_estimator::{Estimate, Estimator, ImuCalibration, ImuSample, Measurement, Memory, OutputFilter, Stamped};
+use afbc_estimator::{
+    Estimate, Estimator, ImuCalibration, ImuSample, Inertial, Measurement, Memory, OutputFilter, Stamped,
+};
 use afbc_flight_core::{Inbox, Refusal};
 use afbc_types::{Mounting, Pose, PoseSigmas, SensorCalibration, State};
 use nalgebra::Vector3;
@@ -100,6 +103,29 @@ impl EstimatorFrontEnd {
     /// Returns what the filter knows, for whoever judges it.
     pub fn memory(&self) -> &Memory {
         &self.memory
+    }
+
+    /// Returns what the estimate is at the time of the last sample, once there is one.
+    pub fn inertial(&self) -> Option<Inertial> {
+        self.memory.inertial(self.estimator.settings(), self.corrections.imu.to_body())
+    }
+
+    /// Returns what is measured beside the inertial sensor in a tick with these readings, corrected.
+    pub fn witness(&self, readings: &Readings) -> Witness {
+        let mut witness = Witness::default();
+        for Aged { value, age_us } in readings.aids.iter().flatten() {
+            match value {
+                Measurement::Gnss { velocity_m_s, speed_sigma_m_s: sigma, climb_sigma_m_s, .. } => {
+                    witness.velocity = Some(([*velocity_m_s, Vector3::new(*sigma, *sigma, *climb_sigma_m_s)], *age_us));
+                }
+                Measurement::MagneticField { field, .. } => {
+                    let errors = self.corrections.field.as_ref();
+                    witness.field = Some(errors.map_or(*field, |errors| corrected(field, errors)));
+                }
+                _ => (),
+            }
+        }
+        witness
     }
 
     /// Sets whether the motors cannot carry the vehicle ([`Memory::set_on_ground`]).
