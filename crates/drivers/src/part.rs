@@ -1,6 +1,7 @@
 //! What a part is: scripts of register accesses, and arithmetic on what they read. No I/O.
 
 use crate::bus::SpiFormat;
+use crate::self_test::SelfTest;
 use core::fmt;
 
 /// A step of a script.
@@ -46,6 +47,8 @@ pub trait SensorPart {
     const CYCLE: &'static [Step];
     /// So many equal readings in a row are a stuck part.
     const STUCK_AFTER: u32;
+    /// Its own test, if it has one that is run here.
+    const SELF_TEST: Option<SelfTest<Self::Reading>> = None;
 
     /// Takes the answer to a [`Step::Read`] of `register`, and returns the reading that it completes.
     ///

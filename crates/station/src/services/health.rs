@@ -1,5 +1,6 @@
 //! The vehicle's health as stations read it.
 
+use crate::services::sensors;
 use crate::services::status::{AuxSensors, VehicleStatus};
 use afbc_flight_core::{Mode, Reasons};
 use afbc_guidance::FlightMode;
@@ -52,7 +53,8 @@ pub fn system(status: &VehicleStatus) -> SystemStatus {
     let inertial = first | sensor::ATTITUDE;
     let located = status.is_located();
     let fixed = aux.receiver.is_some_and(|receiver| receiver.kind >= 3);
-    let armable = status.mode.armed() || status.against.is_some_and(Reasons::is_empty);
+    let ready = status.against.is_some_and(Reasons::is_empty) && sensors::faulty(aux).is_none();
+    let armable = status.mode.armed() || ready;
     let sets = [
         (status.senses, true, inertial),
         (!status.senses, located, sensor::TRACKER),
@@ -139,7 +141,7 @@ mod tests {
     fn each_fault_takes_its_bit() {
         type Case = (fn(&mut VehicleStatus), u32);
         let cases: [Case; 4] = [
-            (|status| status.aux.sensors.healthy = sensor::BAROMETER, sensor::MAGNETOMETER),
+            (|status| status.aux.sensors.healthy = sensor::BAROMETER, sensor::MAGNETOMETER | sensor::ARMING),
             (|status| status.aux.receiver = Some(GnssReceiver::default()), sensor::SATELLITES),
             (|status| status.against = Some(Refusal::NotAtRest.into()), sensor::ARMING),
             (|status| status.against = None, sensor::ARMING),
