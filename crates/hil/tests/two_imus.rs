@@ -1,10 +1,16 @@
 //! Flights on two inertial sensors, of which one is wrong: the other one carries the vehicle.
-#![allow(clippy::unwrap_used, clippy::panic, missing_docs, reason = "a test that cannot go on should say why")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    clippy::indexing_slicing,
+    missing_docs,
+    reason = "a test that cannot go on should say why"
+)]
 
 use afbc::Profile;
 use afbc_estimator::Measurement;
 use afbc_hil::Host;
-use afbc_link::{Address, Command, Datum, FRAME_MAX, Height, Sender, Uplink};
+use afbc_link::{Address, Command, Datum, ExternalTarget, FRAME_MAX, Height, ManualControl, Sender, Uplink};
 use afbc_onboard::{Aged, ImuSelector};
 use afbc_scenario::{Scenario, load};
 use afbc_sim::flight::World;
@@ -56,7 +62,13 @@ fn normal(random: &mut Xoshiro256PlusPlus) -> f32 {
     (0..12).map(|_| random.next_u64() as f32 / u64::MAX as f32).sum::<f32>() - 6.0
 }
 
-/// Takes off and hovers; at `at_ms` a sensor fails, the second if `of_second`.
+/// Sticks from stop to stop, each at a pace of its own.
+fn jerky(now_ms: u64) -> ManualControl {
+    let stick = |period_ms: u64| if (now_ms / period_ms).is_multiple_of(2) { 1.0 } else { -1.0 };
+    ManualControl { roll: stick(2_600), pitch: stick(3_700), throttle: 0.3 * stick(1_100), yaw: stick(1_900) }
+}
+
+/// Takes off and hovers; without a fault it is flown by jerky sticks from `at_ms` on; at `at_ms` a sensor fails, the second if `of_second`.
 fn fly(
     scenario: &Scenario,
     mut host: Host,
@@ -112,7 +124,14 @@ fn fly(
             }
             _ => None,
         };
-        let message = command.map(Uplink::Command).or((now_ms % 1_000 == 0).then_some(Uplink::Heartbeat));
+        let message = match fault {
+            // MAV_STANDARD_MODE_POSITION_HOLD, once the sticks are heard.
+            Fault::None if now_ms == at_ms + 100 => Some(Uplink::Command(Command::SelectStandardMode(1))),
+            Fault::None if now_ms > at_ms && now_ms % 1_000 > 0 => {
+                Some(Uplink::Target(ExternalTarget::Sticks(jerky(now_ms))))
+            }
+            _ => command.map(Uplink::Command).or((now_ms % 1_000 == 0).then_some(Uplink::Heartbeat)),
+        };
         let bytes = message.map_or(Vec::new(), |message| sender.send(&message, &mut buffer).to_vec());
         let report = host.next_tick(&bytes).report;
         speeds = report.motors;
@@ -181,6 +200,26 @@ fn the_right_one_flies_of_two_that_disagree() {
     }
 }
 
+/// The same of every vehicle.
+#[test]
+fn every_vehicle_is_carried_by_the_right_one() {
+    let faults = [
+        Fault::Bias(0, Vector3::x() * 0.17, 0),
+        Fault::Bias(0, Vector3::y() * -0.5, 0),
+        Fault::Bias(0, Vector3::z() * 0.3, 0),
+        Fault::Bias(1, Vector3::new(2.0, -2.0, 2.0), 0),
+    ];
+    for (index, built_in) in BUILT_IN.iter().filter(|built_in| built_in.name != "crazyflie").enumerate() {
+        for fault in faults {
+            let vehicle = built_in.read().unwrap();
+            let flown = scenario(index as u64 + 1).on(&vehicle, Profile::Flight).unwrap();
+            let host = Host::for_vehicle(&vehicle).unwrap();
+            let flown = fly(&flown, host, false, fault, 14_000, 22_000, true);
+            check(&flown, true, [false, true], &format!("{} {fault:?}", built_in.name));
+        }
+    }
+}
+
 /// A quantity that repeats itself while the other sensor's changes is no sample, and the other sensor flies.
 #[test]
 fn a_quantity_that_is_stuck_does_not_fly() {
@@ -191,7 +230,7 @@ fn a_quantity_that_is_stuck_does_not_fly() {
     }
 }
 
-/// Nothing changes in flights without a fault, of every vehicle, in calm air and in a strong and turbulent wind.
+/// Nothing changes in flights without a fault, of every vehicle, by jerky sticks, in calm air and in a strong wind.
 #[test]
 fn without_a_fault_the_first_flies() {
     let vehicles = BUILT_IN.iter().filter(|built_in| built_in.name != "crazyflie");
@@ -203,6 +242,7 @@ fn without_a_fault_the_first_flies() {
             let host = Host::for_vehicle(&vehicle).unwrap();
             let flown = flown.on(&vehicle, Profile::Flight).unwrap();
             let flown = fly(&flown, host, false, Fault::None, 13_000, 30_000, true);
+            assert!(flown.off_m > 5.0, "it is flown about: {flown:?}");
             assert!(flown.changes.is_empty() && flown.works == [true; 2], "{} {wind_m_s:?}: {flown:?}", built_in.name);
         }
     }
