@@ -9,7 +9,7 @@
 
 use afbc::adaptive::{Gains, Subsystem};
 use afbc::backstepping::{self, ideal, proportional};
-use afbc::cascade::desired_attitude;
+use afbc::desired::desired_attitude;
 use afbc::fuzzy::{Basis, Membership};
 use afbc::law::Tracking;
 use afbc::model::Dynamics;

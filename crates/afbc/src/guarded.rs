@@ -2,7 +2,7 @@
 //! over with the last inputs; AFBC is engaged again on command only.
 
 use crate::adaptive::{self, Adaptive, AdaptiveEstimate};
-use crate::cascade::{Cascade, Controller, Settings};
+use crate::cascade::{Cascade, Controller, LastStep, Settings};
 use crate::integral::{Integral, IntegralBackstepping};
 use crate::model::ModelConstants;
 use crate::monitor::{Bounds, Monitor, MonitorFigures};
@@ -122,7 +122,7 @@ impl<const N: usize> Guarded<N> {
     ) -> &'a Action<N> {
         let StandIn { cascade, action } = memory.get_or_insert_with(|| {
             let hover_thrust_n = Some(self.adaptive.hover_thrust_n(afbc));
-            let resume = |axis| Integral { value: 0.0, resume: Some(afbc.inputs[axis]), hover_thrust_n };
+            let resume = |axis| Integral { value: 0.0, resume: Some(afbc.last.inputs[axis]), hover_thrust_n };
             let cascade = afbc.handed_over(PerAxis::from_fn(resume), tripped.rotor_residual_rad_s);
             StandIn { cascade, action: Action::default() }
         });
@@ -138,7 +138,7 @@ impl<const N: usize> Guarded<N> {
         cascade: &Cascade<E>,
         learnt: impl Fn(Axis, [f32; 2], &Errors, &E) -> f32,
     ) -> Cascade<AdaptiveEstimate> {
-        let Cascade { inputs, errors, turning: [eta, eta_dot], .. } = cascade;
+        let LastStep { inputs, errors, turning: [eta, eta_dot], .. } = &cascade.last;
         let law = self.adaptive.law();
         let estimates = PerAxis::from_fn(|axis| {
             let x = match axis {

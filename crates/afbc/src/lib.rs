@@ -39,7 +39,9 @@
 pub mod adaptive;
 pub mod backstepping;
 pub mod cascade;
+pub mod desired;
 pub mod disturbance;
+pub mod effort;
 pub mod forward;
 pub mod fuzzy;
 pub mod guarded;

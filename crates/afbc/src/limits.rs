@@ -1,5 +1,6 @@
 //! Limits of the cascade on the demands of position control. Not in the paper.
 
+use crate::law::Tracking;
 use afbc_control::command_filter::RATE_MAX;
 use afbc_types::parameters;
 
@@ -30,4 +31,32 @@ parameters! {
 impl Limits {
     /// No limits.
     pub const NONE: Self = Self::DEFAULT;
+}
+
+/// Speed limit of x, y or z: an error of position is no larger than the one that demands the largest speed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Approach {
+    /// Largest e_1 \[m\].
+    e1_max_m: f32,
+    /// Speed of approach per e_1 \[1/s\].
+    approach_1_s: f32,
+}
+
+impl Approach {
+    /// Limits the speed of approach of a law that approaches at `approach_1_s` times the error.
+    pub fn new(speed_max_m_s: f32, approach_1_s: f32) -> Self {
+        Approach { e1_max_m: speed_max_m_s / approach_1_s, approach_1_s }
+    }
+
+    /// Returns what the law tracks, at x_1, x_2, of the reference with two derivatives: (9) within the limit.
+    #[inline(always)]
+    pub fn tracking(&self, [x1, x2]: [f32; 2], [x1d, x1d_dot, x1d_ddot]: [f32; 3]) -> Tracking {
+        let distance = x1d - x1;
+        let (e1, approach_1_s) = if distance.abs() > self.e1_max_m {
+            (self.e1_max_m.copysign(distance), Some(self.approach_1_s))
+        } else {
+            (distance, None)
+        };
+        Tracking { x1, x2, e1, x1d_dot, x1d_ddot, approach_1_s }
+    }
 }

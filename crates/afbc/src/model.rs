@@ -99,6 +99,42 @@ impl RollPitch {
     }
 }
 
+/// Attitude of the vehicle in one step, with what a step computes of it once.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Attitude {
+    /// phi, theta \[rad\].
+    pub roll_pitch_rad: [f32; 2],
+    /// Their sines and cosines.
+    pub roll_pitch: RollPitch,
+    /// Sine and cosine of psi.
+    pub heading: [f32; 2],
+    /// R, from the body to the earth.
+    pub r_earth_body: Matrix3<f32>,
+}
+
+impl Attitude {
+    /// Computes it for a state.
+    #[inline(always)]
+    pub fn of(state: &State) -> Self {
+        let [phi, theta, psi] = state.attitude_rad.into();
+        let (roll_pitch, heading) = (RollPitch::of(phi, theta), [math::sin(psi), math::cos(psi)]);
+        let r_earth_body = roll_pitch.r_earth_body(heading);
+        Attitude { roll_pitch_rad: [phi, theta], roll_pitch, heading, r_earth_body }
+    }
+
+    /// Returns the direction of the thrust, R e_z.
+    #[inline(always)]
+    pub fn up(&self) -> Vector3<f32> {
+        self.r_earth_body.column(2).into()
+    }
+
+    /// Returns a vector of the earth's axes in those of the body.
+    #[inline(always)]
+    pub fn in_body(&self, earth: &Vector3<f32>) -> Vector3<f32> {
+        self.r_earth_body.tr_mul(earth)
+    }
+}
+
 /// Returns d eta/dt for the rates of the body, which (6) takes for equal:
 ///
 /// ```text

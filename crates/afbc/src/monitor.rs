@@ -196,14 +196,14 @@ impl Monitor {
 
         let error = &mut figures.error[axis];
         // Each subsystem is updated every sixth step.
-        *error = math::settled(*error + 6.0 * self.forget * (cascade.distances[axis].abs() - *error));
+        *error = math::settled(*error + 6.0 * self.forget * (cascade.last.distances[axis].abs() - *error));
 
         let (saturated, share) = (if saturated { 1.0 } else { 0.0 }, figures.saturation_share);
         figures.saturation_share = math::settled(share + self.forget * (saturated - share));
 
         let [roll, pitch, yaw, thrust] = &mut figures.swings;
         let Bounds { swing_n, swings_hz, .. } = self.bounds;
-        let asked = &cascade.asked;
+        let asked = &cascade.last.asked;
         roll.advance(asked.roll_n, swing_n, self.forget);
         pitch.advance(asked.pitch_n, swing_n, self.forget);
         yaw.advance(asked.yaw_n, swing_n, self.forget);

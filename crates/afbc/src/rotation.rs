@@ -49,6 +49,18 @@ impl Turn {
         let rates = to_body * omega_d;
         Turn { error: error(&to_body), rates, accelerations: to_body * omega_d_dot - omega.cross(&rates) }
     }
+
+    /// Returns the same as differences of Euler angles (9), yaw the shorter way, as the paper has it.
+    #[inline(always)]
+    pub fn of_angles(
+        eta_d: &Vector3<f32>,
+        eta: &Vector3<f32>,
+        eta_d_dot: Vector3<f32>,
+        eta_d_ddot: Vector3<f32>,
+    ) -> Self {
+        let error = Vector3::new(eta_d.x - eta.x, eta_d.y - eta.y, math::wrap_angle(eta_d.z - eta.z));
+        Turn { error, rates: eta_d_dot, accelerations: eta_d_ddot }
+    }
 }
 
 /// Returns e_1 for R_e: in rad for small angles, and at most 2.

@@ -4,7 +4,7 @@
 
 mod common;
 
-use afbc::cascade::desired_attitude;
+use afbc::desired::desired_attitude;
 use afbc::integral::IntegralBackstepping;
 use afbc::law::{Context, Tracking};
 use afbc::model::{ModelConstants, RollPitch};
@@ -265,7 +265,7 @@ fn compose<L: Law + Copy>(
         check(Axis::Yaw, tracking, slack)?;
 
         // Distances are those from the setpoint, and errors of the attitude.
-        let (distances, errors) = (&memory.control.distances, &trace.errors);
+        let (distances, errors) = (&memory.control.last.distances, &trace.errors);
         let away = setpoint.position_m - state.position_m;
         prop_assert_eq!([distances.x, distances.y, distances.z], [away.x, away.y, away.z]);
         prop_assert_eq!(
@@ -354,7 +354,7 @@ fn a_controller_reports_what_others_need() {
     let mut memory = Validated::default();
     let setpoint = Setpoint { position_m: Vector3::new(30.0, -20.0, 10.0), ..Setpoint::default() };
     let trace = step(&controller, &mut memory, &State::default(), &setpoint).trace;
-    let distances = memory.control.distances;
+    let distances = memory.control.last.distances;
     assert_eq!([distances.x, distances.y, distances.z], [30.0, -20.0, 10.0]);
     assert!(trace.errors.x.e1 < 2.0 && trace.errors.y.e1 > -2.0 && trace.errors.z.e1 < 2.0);
     assert!(Axis::ALL.iter().any(|axis| memory.control.estimates[*axis].delta > 0.0));

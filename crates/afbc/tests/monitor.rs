@@ -41,8 +41,8 @@ fn look(
 ) -> Option<Trip> {
     let mut cascade = Cascade::default();
     let PerAxis { roll, pitch, yaw, z, .. } = seen.inputs;
-    cascade.asked = Inputs { roll_n: roll, pitch_n: pitch, yaw_n: yaw, thrust_n: z };
-    (cascade.estimates, cascade.distances) = (estimates, seen.distances);
+    cascade.last.asked = Inputs { roll_n: roll, pitch_n: pitch, yaw_n: yaw, thrust_n: z };
+    (cascade.estimates, cascade.last.distances) = (estimates, seen.distances);
     monitor.watch(figures, &cascade, seen.saturated)
 }
 

@@ -6,7 +6,7 @@
 //!
 //! # Reading order
 //!
-//! 1. [`tick`]: the control tick.
+//! 1. [`tick`]: the control tick; [`memory`]: what persists between ticks.
 //! 2. [`supervisor`]: the four modes and their transitions; [`refusal`], [`reasons`]: what speaks
 //!    against a request, and against arming.
 //! 3. [`inbox`]: the inputs of a tick and their ages; [`tracker`], [`clock`]: selection of states, and the time of
@@ -18,6 +18,7 @@
 //! 7. [`motor`]: throttle curve; [`protocol`]: the way to the motor controllers, by [`dshot`] or [`pulse`].
 #![no_std]
 
+mod armed;
 pub mod clock;
 pub mod dead_reckoning;
 pub mod descent;
@@ -26,6 +27,7 @@ pub mod fall_check;
 pub mod frozen_tracker;
 pub mod inbox;
 pub mod landing;
+pub mod memory;
 pub mod motor;
 pub mod numbering;
 pub mod observer;
@@ -43,10 +45,11 @@ pub mod tumble;
 pub use afbc_types::Stamped;
 pub use clock::SourceClock;
 pub use inbox::{Inbox, Queue, Ticketed};
+pub use memory::FlightCoreMemory;
 pub use motor::Motor;
 pub use reasons::Reasons;
 pub use supervisor::{ArmingLimits, EndReason, Mode, Refusal, Request};
-pub use tick::{FlightCore, FlightCoreMemory, RequestAnswer, TickHealth, TickOutcome};
+pub use tick::{FlightCore, RequestAnswer, TickHealth, TickOutcome};
 pub use tracker::Tracker;
 
 #[cfg(test)]

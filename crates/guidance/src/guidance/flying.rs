@@ -77,14 +77,7 @@ impl Memory {
         };
         let output = self.output(settings, &inputs, orders, target, sticks, &given.lift, reached, notices);
         if output.done {
-            // What it has reached, it holds.
-            let at_m = match (&self.plan, &output.shaping) {
-                (Plan::Takeoff(takeoff), _) => Some(takeoff.to_m),
-                (_, Shaping::Limited(aim)) if is_finite(&aim.position_m) => Some(aim.position_m),
-                _ => None,
-            };
-            self.change(FlightMode::Hold, ModeReason::Done, notices);
-            (self.plan, self.enters) = (Plan::Hold(Hold { at_m, ..Hold::default() }), false);
+            self.hold_what_is_reached(&output.shaping, notices);
         }
         let idle_on_ground = !airborne && !output.lifts;
         if idle_on_ground {
@@ -92,16 +85,7 @@ impl Memory {
             (self.lift_s, self.left, self.stood_m) = (0.0, false, state.position_m);
             return Some((self.limiter.setpoint(), true));
         }
-        // Rotors that carry a share of the weight make the flight core report that the vehicle is airborne. It is not
-        // if the thrust is exhausted or it does not follow its setpoint.
-        let off_m = abs_max(&(state.position_m - self.stood_m));
-        let behind = |to: Setpoint| abs_max(&(to.position_m - state.position_m)) > ANEW_M;
-        self.left |= airborne && off_m > LEFT_M;
-        let lifts =
-            !self.left && (!airborne || given.lift.is_exhausted() || self.limiter.setpoint().is_some_and(behind));
-        self.lift_s = if lifts { self.lift_s + dt_s } else { 0.0 };
-        if self.lift_s > NO_LIFT_S {
-            self.left = true;
+        if self.cannot_lift(given, state, airborne, dt_s) {
             let next = if airborne { FlightMode::Land } else { FlightMode::Hold };
             self.change(next, ModeReason::NoLift, notices);
             if !airborne {
@@ -116,7 +100,47 @@ impl Memory {
             // over little thrust.
             return Some((Some(present), true));
         }
-        let setpoint = match output.shaping {
+        Some((self.shaped(output.shaping, settings, &inputs, &given.lift), false))
+    }
+
+    /// Changes to hold, where what was wanted has been reached.
+    fn hold_what_is_reached(&mut self, shaping: &Shaping, notices: &mut Notices) {
+        let at_m = match (&self.plan, shaping) {
+            (Plan::Takeoff(takeoff), _) => Some(takeoff.to_m),
+            (_, Shaping::Limited(aim)) if is_finite(&aim.position_m) => Some(aim.position_m),
+            _ => None,
+        };
+        self.change(FlightMode::Hold, ModeReason::Done, notices);
+        (self.plan, self.enters) = (Plan::Hold(Hold { at_m, ..Hold::default() }), false);
+    }
+
+    /// True once a take-off has not left the ground for [`NO_LIFT_S`]. Rotors that carry a share of the weight make the
+    /// flight core report that the vehicle is airborne. It is not if the thrust is exhausted or it does not follow its
+    /// setpoint.
+    fn cannot_lift(&mut self, given: &GuidanceInputs<'_>, state: &State, airborne: bool, dt_s: f32) -> bool {
+        let off_m = abs_max(&(state.position_m - self.stood_m));
+        let behind = |to: Setpoint| abs_max(&(to.position_m - state.position_m)) > ANEW_M;
+        self.left |= airborne && off_m > LEFT_M;
+        let lifts =
+            !self.left && (!airborne || given.lift.is_exhausted() || self.limiter.setpoint().is_some_and(behind));
+        self.lift_s = if lifts { self.lift_s + dt_s } else { 0.0 };
+        let gives_up = self.lift_s > NO_LIFT_S;
+        self.left |= gives_up;
+        gives_up
+    }
+
+    /// Returns the setpoint for what the mode wants, within the limits; none if it is not plausible.
+    // Always: copying the setpoint out of a call costs the tick sixty instructions.
+    #[inline(always)]
+    fn shaped(
+        &mut self,
+        shaping: Shaping,
+        settings: &Settings,
+        inputs: &ModeInputs<'_>,
+        lift: &Lift,
+    ) -> Option<Setpoint> {
+        let ModeInputs { state, dt_s, .. } = *inputs;
+        match shaping {
             Shaping::Limited(aim) => {
                 (self.aim, self.trim) = (aim, Trim::default());
                 self.limiter.advance(&self.aim, dt_s);
@@ -127,24 +151,23 @@ impl Memory {
                 self.limiter.advance(&aim, dt_s);
                 self.limiter.follow(state);
                 // The height is held by feedback.
-                let lift = Lift { given_m_s2: None, ..given.lift };
+                let lift = &Lift { given_m_s2: None, ..*lift };
                 let leaning = self.limiter.setpoint().map(|setpoint| Setpoint {
                     position_m: Vector3::new(state.position_m.x, state.position_m.y, setpoint.position_m.z),
                     velocity_m_s: Vector3::new(state.velocity_m_s.x, state.velocity_m_s.y, setpoint.velocity_m_s.z),
                     acceleration_m_s2: Vector3::new(x, y, setpoint.acceleration_m_s2.z),
                     ..setpoint
                 });
-                leaning.map(|setpoint| self.trim.advance(&lift, state, &setpoint, dt_s)).filter(Setpoint::is_plausible)
+                leaning.map(|setpoint| self.trim.advance(lift, state, &setpoint, dt_s)).filter(Setpoint::is_plausible)
             }
             Shaping::Direct(setpoint) => {
                 self.limiter.anchor(state);
                 self.aim = inputs.stop();
-                let setpoint = given.lift.limited(&setpoint, state, &settings.limits);
-                let setpoint = self.trim.advance(&given.lift, state, &setpoint, dt_s);
+                let setpoint = lift.limited(&setpoint, state, &settings.limits);
+                let setpoint = self.trim.advance(lift, state, &setpoint, dt_s);
                 Some(setpoint).filter(Setpoint::is_plausible)
             }
-        };
-        Some((setpoint, false))
+        }
     }
 
     /// True if a landing vehicle stands on the ground. In the air it would sink, and this would end.

@@ -1,0 +1,222 @@
+//! Desired roll and pitch: (40) within the limits, behind the command filter, with the derivatives for (12) and (16).
+//! Section III-D.
+//!
+//! The paper takes the derivatives from the filter. With feed-forward they are those of the reference, and the angles
+//! given to the filter are ahead by its lag: its output is then the angle that was meant.
+
+use crate::forward::{Followed, Forward};
+use crate::model::Attitude;
+use crate::settings::Settings;
+use crate::tilt::Tilt;
+use afbc_control::command_filter::{CommandFilter, Filtered};
+use afbc_control::drag::KnownDrag;
+use afbc_control::math;
+use afbc_types::{OutOfRange, Setpoint};
+use nalgebra::Vector3;
+
+/// Smallest vertical thrust over weight that the tilt is computed with, since a sinking vehicle must not tilt further.
+/// Not in the paper.
+pub const VERTICAL_MIN: f32 = 0.3;
+
+/// The computation with its constants; everything that changes in flight is in [`DesiredMemory`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DesiredAttitude {
+    filter: CommandFilter,
+    /// Lag 1/w of the command filter \[s\].
+    lag_s: f32,
+    forward: Forward,
+    drag: KnownDrag,
+    gravity_m_s2: f32,
+    inverse_gravity: f32,
+    /// Largest thrust of all rotors together \[N\].
+    thrust_max_n: f32,
+    tilt_max_rad: f32,
+    tilt_max_tan: f32,
+    acceleration_max_m_s2: f32,
+    tilt_by_thrust: bool,
+    by_rotation: bool,
+    feed_forward: bool,
+    bumpless: bool,
+}
+
+/// Memory of the desired attitude.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct DesiredMemory {
+    /// None before the first step.
+    last: Option<LastAngles>,
+    /// None before the first step.
+    followed: Option<Followed>,
+}
+
+/// Angles of the last step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct LastAngles {
+    /// phi_d, theta_d of (40) \[rad\].
+    rad: [f32; 2],
+    /// The same as given to the command filter.
+    commanded: [f32; 2],
+    /// What came out of it.
+    filtered: [Filtered; 2],
+}
+
+impl DesiredMemory {
+    /// True before the first step.
+    pub(crate) fn is_first(&self) -> bool {
+        self.last.is_none()
+    }
+
+    /// Returns phi_d and theta_d of (40) \[rad\] in the last step, and the same behind the command filter.
+    pub(crate) fn trace(&self) -> ([f32; 2], [Filtered; 2]) {
+        self.last.map_or_else(Default::default, |LastAngles { rad, filtered, .. }| (rad, filtered))
+    }
+}
+
+/// Desired roll and pitch in one step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Desired {
+    /// Roll and pitch with their first derivatives, by the command filter.
+    pub filtered: [Filtered; 2],
+    /// Second derivatives \[rad/s2\].
+    pub accelerations_rad_s2: [f32; 2],
+    /// Sine and cosine of the yaw that they are meant for.
+    pub heading: [f32; 2],
+    /// Part of u5, u6 beyond the limits of tilt and acceleration \[m/s2\].
+    pub beyond_limits_m_s2: [f32; 2],
+}
+
+/// Returns desired roll and pitch (40) \[rad\] for the horizontal accelerations u5, u6 \[m/s2\] at yaw psi \[rad\].
+/// `inverse_vertical` is mass over vertical thrust: 1/g in hover, as in (39).
+pub fn desired_attitude(u5: f32, u6: f32, yaw_rad: f32, inverse_vertical: f32) -> [f32; 2] {
+    Tilt::new(u5, u6, [math::sin(yaw_rad), math::cos(yaw_rad)], inverse_vertical).rad
+}
+
+/// Returns a vector reduced to a norm of `max` in the same direction.
+#[inline]
+fn within([x, y]: [f32; 2], max: f32) -> [f32; 2] {
+    let square = x * x + y * y;
+    let scale = if square > max * max { max / math::sqrt(square) } else { 1.0 };
+    [x * scale, y * scale]
+}
+
+impl DesiredAttitude {
+    /// Makes it from valid settings for a vehicle whose rotors give at most `thrust_max_n` together.
+    ///
+    /// # Errors
+    /// The first bandwidth or rate out of range.
+    pub fn new(settings: &Settings, gravity_m_s2: f32, thrust_max_n: f32) -> Result<Self, OutOfRange> {
+        let Settings { command_filter_rad_s, limits, tilt_by_thrust, by_rotation, feed_forward, bumpless, .. } =
+            *settings;
+        let dt_s = settings.common.dt_s;
+        Ok(DesiredAttitude {
+            forward: Forward::new(settings.forward_rad_s, dt_s)?,
+            filter: CommandFilter::new(command_filter_rad_s, dt_s)?.limited(limits.tilt_rate_max_rad_s)?,
+            lag_s: 1.0 / command_filter_rad_s,
+            drag: settings.common.drag,
+            gravity_m_s2,
+            inverse_gravity: 1.0 / gravity_m_s2,
+            thrust_max_n,
+            tilt_max_rad: limits.tilt_max_rad,
+            tilt_max_tan: math::tan(limits.tilt_max_rad),
+            acceleration_max_m_s2: limits.acceleration_max_m_s2,
+            tilt_by_thrust,
+            by_rotation,
+            feed_forward,
+            bumpless,
+        })
+    }
+
+    /// Returns roll and pitch for u5, u6 \[m/s2\] and U4 \[N\], `demanded` of a vehicle with this attitude and hover
+    /// thrust, and advances the memory by one step.
+    #[inline(always)]
+    pub fn advance(
+        &self,
+        memory: &mut DesiredMemory,
+        [u5, u6, u4]: [f32; 3],
+        hover_n: f32,
+        attitude: &Attitude,
+        [reference, setpoint]: [&Setpoint; 2],
+    ) -> Desired {
+        let thrust_n = math::min(u4, self.thrust_max_n);
+        let (vertical, inverse_vertical) = self.vertical(thrust_n * attitude.roll_pitch.tilt_cosine(), hover_n);
+        // In the same direction.
+        let [a5, a6] = within([u5, u6], math::min(vertical * self.tilt_max_tan, self.acceleration_max_m_s2));
+        let heading = if self.by_rotation {
+            [math::sin(reference.yaw_rad), math::cos(reference.yaw_rad)]
+        } else {
+            attitude.heading
+        };
+        let tilt = Tilt::new(a5, a6, heading, inverse_vertical);
+        let (share, up) = (thrust_n / hover_n, attitude.up());
+        let forward = if self.feed_forward {
+            Some(self.derivatives(&mut memory.followed, &tilt, share, &up, [reference, setpoint]))
+        } else {
+            None
+        };
+        let commanded = match forward {
+            Some(derivatives) => self.ahead(tilt.rad, derivatives),
+            None => tilt.rad,
+        };
+        let filtered = match &memory.last {
+            Some(LastAngles { commanded: [phi_d, theta_d], filtered: [roll, pitch], .. }) => {
+                [self.filter.advance(roll, *phi_d), self.filter.advance(pitch, *theta_d)]
+            }
+            None => {
+                let start = if self.bumpless { attitude.roll_pitch_rad } else { tilt.rad };
+                start.map(|angle| Filtered { angle, rate: 0.0 })
+            }
+        };
+        let accelerations_rad_s2 = match forward {
+            Some([_, accelerations]) => accelerations,
+            None => {
+                let ([roll, pitch], [phi_d, theta_d]) = (&filtered, commanded);
+                [self.filter.acceleration(roll, phi_d), self.filter.acceleration(pitch, theta_d)]
+            }
+        };
+        memory.last = Some(LastAngles { rad: tilt.rad, commanded, filtered });
+        Desired { filtered, accelerations_rad_s2, heading, beyond_limits_m_s2: [u5 - a5, u6 - a6] }
+    }
+
+    /// Returns the vertical part of the thrust per mass \[m/s2\], g in hover as in (39), and its inverse.
+    #[inline(always)]
+    fn vertical(&self, upward_n: f32, hover_n: f32) -> (f32, f32) {
+        if self.tilt_by_thrust {
+            let share = math::max(upward_n / hover_n, VERTICAL_MIN);
+            (self.gravity_m_s2 * share, self.inverse_gravity / share)
+        } else {
+            (self.gravity_m_s2, self.inverse_gravity)
+        }
+    }
+
+    /// Returns the first and second derivatives of roll and pitch \[rad/s, rad/s2\] that follow from the reference, at
+    /// `share` of the hover thrust along `up`.
+    #[inline(always)]
+    fn derivatives(
+        &self,
+        followed: &mut Option<Followed>,
+        tilt: &Tilt,
+        share: f32,
+        up: &Vector3<f32>,
+        [reference, setpoint]: [&Setpoint; 2],
+    ) -> [[f32; 2]; 2] {
+        let Setpoint { velocity_m_s: v, acceleration_m_s2: a, jerk_m_s3: jerk, .. } = reference;
+        // Drag turns the thrust as it changes with the velocity.
+        let [by_drag, by_drag_dot] = [self.drag.change(v, up, share, a), self.drag.change(v, up, share, jerk)];
+        let turn = [reference.yaw_rate_rad_s, reference.yaw_acceleration_rad_s2];
+        // Corners of the setpoint are turned gradually; the reference model has none.
+        let [followed, snap] = self.forward.advance(followed, setpoint);
+        let gradual = followed + (jerk - setpoint.jerk_m_s3);
+        let snap = snap - by_drag_dot;
+        let [rates, _] = tilt.turned(&(jerk - by_drag), &snap, turn);
+        let [_, accelerations] = tilt.turned(&(gradual - by_drag), &snap, turn);
+        [rates, accelerations]
+    }
+
+    /// Returns angles that are ahead of these by the lag of the command filter; no tilt exceeds the norm of both.
+    #[inline(always)]
+    fn ahead(&self, mut rad: [f32; 2], [rates, accelerations]: [[f32; 2]; 2]) -> [f32; 2] {
+        for ((angle, rate), acceleration) in rad.iter_mut().zip(rates).zip(accelerations) {
+            *angle += self.lag_s * (2.0 * rate + self.lag_s * acceleration);
+        }
+        within(rad, self.tilt_max_rad)
+    }
+}

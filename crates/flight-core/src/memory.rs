@@ -1,0 +1,226 @@
+//! What persists between ticks: the newest state, how long it has been fresh, steady and at rest, and the flight.
+
+use crate::armed::Armed;
+use crate::dead_reckoning::DeadReckoning;
+use crate::fall_check::FallCheck;
+use crate::inbox::Inbox;
+use crate::landing::LandDetector;
+use crate::observer::{HOLD_US, PoseObserver};
+use crate::rate;
+use crate::supervisor::{ArmingLimits, COAST_US, Mode, REST_US};
+use afbc_control::{FlightController, Trace};
+use afbc_types::{Pose, Stamped, State};
+
+/// State of a vehicle that persists between ticks.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct FlightCoreMemory<M> {
+    pub(crate) mode: Mode,
+    pub(crate) rate: rate::Counter,
+    /// The newest plausible state.
+    pub(crate) state: Option<Stamped<State>>,
+    /// Time of the newest attitude, with or without a position \[us\].
+    pub(crate) oriented_us: Option<u64>,
+    /// Time for which no state has been stale \[us\].
+    pub(crate) steady_us: u32,
+    /// Time for which the vehicle has been at rest, with fresh states \[us\].
+    pub(crate) rest_us: u32,
+    /// Number of states refused because they repeated the last one in flight, or came from a distrusted tracker.
+    pub(crate) frozen_states: u32,
+    pub(crate) flight: Option<Armed<M>>,
+}
+
+impl<M> FlightCoreMemory<M> {
+    /// Returns the flight mode.
+    pub fn mode(&self) -> Mode {
+        self.mode
+    }
+
+    /// Returns the newest plausible state.
+    pub fn state(&self) -> Option<&State> {
+        self.state.as_ref().map(|state| &state.value)
+    }
+
+    /// True if the vehicle is armed and in the air.
+    pub fn airborne(&self) -> bool {
+        self.mode.armed() && self.flight.as_ref().is_some_and(|flight| flight.landing.airborne())
+    }
+
+    /// True if the vehicle has been at rest for as long as arming wants it.
+    pub fn rested(&self) -> bool {
+        self.rest_us >= REST_US
+    }
+
+    /// Records that the clock has failed and another has taken over: the vehicle is not armed again.
+    pub fn distrust_clock(&mut self) {
+        self.rate.distrust();
+    }
+
+    /// Returns the controller's memory of this or the last flight; none before the first.
+    pub fn control(&self) -> Option<&M> {
+        self.flight.as_ref().map(|flight| &flight.control)
+    }
+
+    /// Returns the trace of the last tick with the controller `C`: only inputs while blind, zeros while disarmed.
+    pub fn trace<C: FlightController<N, Memory = M>, const N: usize>(&self) -> Trace {
+        match &self.flight {
+            Some(Armed { open_loop: Some(inputs), .. }) if self.mode.armed() => {
+                let mut trace = Trace::default();
+                trace.inputs = *inputs;
+                trace
+            }
+            Some(Armed { control, .. }) if self.mode.armed() => C::trace(control),
+            _ => Trace::default(),
+        }
+    }
+}
+
+/// Extrapolates the state by `age_us` with its velocities and rates; as in the paper's model, body rates replace the
+/// derivatives of the angles.
+pub(crate) fn extrapolated(state: &State, age_us: u32) -> State {
+    // The vehicle's own estimate always has age 0.
+    if age_us == 0 {
+        return *state;
+    }
+    let age_s = age_us as f32 * 1e-6;
+    State {
+        position_m: state.position_m + state.velocity_m_s * age_s,
+        attitude_rad: state.attitude_rad + state.rates_rad_s * age_s,
+        ..*state
+    }
+}
+
+impl<M> FlightCoreMemory<M> {
+    /// Stores the inbox's state if it is newer than the present one, not already stale (states that are always late do
+    /// not count as states), and not from a frozen tracker. True if it was stored.
+    pub(crate) fn take_state(&mut self, inbox: &Inbox, now_us: u64) -> bool {
+        // What is observed is stamped now, and gives way to the link's states, which are always a little older.
+        let gives_way = self.is_observing() && !inbox.is_own();
+        let newer = |state: &&Stamped<State>| {
+            state.age_us(now_us) <= COAST_US && (gives_way || self.state.is_none_or(|held| state.at_us > held.at_us))
+        };
+        let Some(state) = inbox.state().filter(newer) else { return false };
+        let armed = self.mode.armed();
+        // An estimate watches its trackers itself, and may approach what they say faster than it moves.
+        let watched = armed && !inbox.is_own();
+        if let Some(flight) = self.flight.as_mut().filter(|flight| watched && flight.landing.airborne()) {
+            let repeated = self.state.is_some_and(|held| held.value == state.value);
+            flight.distrusts |= flight.witness.contradicts(&state.value, state.at_us);
+            if repeated || flight.distrusts {
+                self.frozen_states = self.frozen_states.saturating_add(1);
+                return false;
+            }
+        }
+        self.state = Some(*state);
+        true
+    }
+
+    /// True if an armed vehicle has an observer.
+    fn is_observing(&self) -> bool {
+        self.mode.armed() && self.flight.as_ref().is_some_and(|flight| flight.observer.is_some())
+    }
+
+    /// Stores the state that is observed from poses which no estimator has taken, unless the inbox had a newer one
+    /// (`is_new`). True if there is one.
+    #[inline]
+    pub(crate) fn observe(&mut self, dead_reckoning: &DeadReckoning, inbox: &Inbox, now_us: u64, is_new: bool) -> bool {
+        // As long as an estimator works, it takes all poses.
+        (inbox.pose().is_some() || self.is_observing()) && self.observe_pose(dead_reckoning, inbox, now_us, is_new)
+    }
+
+    /// The same, if there is a pose or an observer.
+    #[cold]
+    #[inline(never)]
+    fn observe_pose(&mut self, dead_reckoning: &DeadReckoning, inbox: &Inbox, now_us: u64, is_new: bool) -> bool {
+        let armed = self.mode.armed();
+        let (Some(flight), Some(held)) = (self.flight.as_mut().filter(|_| armed), self.state) else { return false };
+        let age_us = held.age_us(now_us);
+        let is_linked = is_new || flight.observer.is_none() && !inbox.is_own() && age_us <= COAST_US;
+        if is_linked || flight.distrusts {
+            flight.observer = None;
+            return false;
+        }
+        let Armed { observer, reckoning, applied, .. } = flight;
+        let news = |pose: &&Stamped<Pose>| {
+            PoseObserver::takes(pose, now_us) && observer.as_ref().is_none_or(|observer| observer.is_news(pose))
+        };
+        let pose = inbox.pose().filter(news);
+        let observer = match (observer.as_mut().filter(|observer| observer.age_us(now_us) <= HOLD_US), pose) {
+            (Some(running), pose) => {
+                running.advance(dead_reckoning, reckoning, applied);
+                if let Some(pose) = pose {
+                    running.correct(pose, now_us);
+                }
+                running
+            }
+            (None, Some(pose)) => {
+                let state = reckoning.between(&extrapolated(&held.value, age_us));
+                let new = observer.insert(PoseObserver::new(&state, applied, held.at_us));
+                new.correct(pose, now_us);
+                new
+            }
+            (None, None) => return false,
+        };
+        let state = observer.state();
+        if let Some(value) = state {
+            self.state = Some(Stamped { value, at_us: now_us });
+        }
+        state.is_some()
+    }
+
+    /// Notes the time of the newest attitude.
+    pub(crate) fn orient(&mut self, inbox: &Inbox) {
+        let newest = inbox.position_lost().map(|state| state.at_us).max(self.state.map(|state| state.at_us));
+        self.oriented_us = self.oriented_us.max(newest);
+    }
+
+    /// Updates the detectors with a fresh state, or with that of a vehicle without a position, or none, and with the
+    /// inbox's marks.
+    pub(crate) fn watch(
+        &mut self,
+        fresh: Option<&State>,
+        position_lost: Option<&State>,
+        inbox: &Inbox,
+        limits: &ArmingLimits,
+        dt_s: f32,
+    ) {
+        let gap_us = self.rate.gap_us();
+        let longer = |time_us: u32, lasts| if lasts { time_us.saturating_add(gap_us) } else { 0 };
+        self.steady_us = longer(self.steady_us, fresh.is_some());
+        self.rest_us = longer(self.rest_us, fresh.is_some_and(|state| limits.at_rest(state)));
+        let armed = self.mode.armed();
+        let Some(flight) = self.flight.as_mut().filter(|_| armed) else { return };
+        if inbox.idle_on_ground() && !flight.landing.airborne() {
+            flight.landing.rest(fresh.or(position_lost));
+            return match fresh.or(position_lost) {
+                Some(state) => flight.tumble.advance(state, gap_us),
+                None => flight.tumble.advance_blind(gap_us),
+            };
+        }
+        match (fresh, position_lost) {
+            (Some(state), _) => {
+                flight.tumble.advance(state, gap_us);
+                flight.landing.advance(state, flight.applied.thrust_n, gap_us, dt_s);
+                if inbox.is_own() {
+                    check_fall(&mut flight.fall, &mut flight.landing, flight.applied.thrust_n, state, dt_s);
+                }
+                flight.distrusts |= flight.landing.contradicts();
+            }
+            (None, Some(state)) => {
+                flight.tumble.advance(state, gap_us);
+                flight.landing.advance_adrift(state, flight.applied.thrust_n, gap_us, dt_s);
+            }
+            (None, None) => {
+                flight.tumble.advance_blind(gap_us);
+                flight.landing.advance_blind(gap_us);
+            }
+        }
+    }
+}
+
+/// Looks for the ground by an inertial sensor's estimate. Out of line, for the ticks without one.
+#[inline(never)]
+fn check_fall(fall: &mut FallCheck, landing: &mut LandDetector, thrust_n: f32, state: &State, dt_s: f32) {
+    if fall.stands(&state.velocity_m_s, landing.thrust_share(thrust_n), dt_s) {
+        landing.touch_down(state);
+    }
+}
