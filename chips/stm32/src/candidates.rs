@@ -45,7 +45,8 @@ macro_rules! candidates {
                             device.set_clock(kernel_hz, format.clock_hz);
                             let registers = SpiRegisters::new(&mut *device, format);
                             let timing = interrupted(&mut *interrupt);
-                            run_if_it_answers(Driver::new($part::default(), registers, timing), FIRST_IMU, &mut take).await;
+                            let driver = Driver::new($part::default(), registers, timing);
+                            run_if_it_answers(driver, FIRST_IMU, &mut take).await;
                         }
                     )+
                     Timer::after_secs(PAUSE_S).await;
@@ -59,8 +60,8 @@ macro_rules! candidates {
                     $(
                         for address in $part::I2C {
                             let registers = I2cRegisters::new(bus.clone(), *address);
-                            run_if_it_answers(Driver::new($part::default(), registers, Polled), sensor::BAROMETER, &mut take)
-                                .await;
+                            let driver = Driver::new($part::default(), registers, Polled);
+                            run_if_it_answers(driver, sensor::BAROMETER, &mut take).await;
                         }
                     )+
                     Timer::after_secs(PAUSE_S).await;

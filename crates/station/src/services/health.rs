@@ -1,6 +1,5 @@
 //! The vehicle's health as stations read it.
 
-use crate::services::sensors;
 use crate::services::status::{AuxSensors, VehicleStatus};
 use afbc_flight_core::{Mode, Reasons};
 use afbc_guidance::FlightMode;
@@ -22,6 +21,10 @@ pub mod sensor {
     pub const BATTERY: u32 = 0x0200_0000;
     pub const ARMING: u32 = 0x1000_0000;
 }
+
+/// Sensors with which a vehicle that has them does not start unless they are well.
+const NEEDED: u32 =
+    sensor::GYROSCOPE | sensor::ACCELEROMETER | sensor::GYROSCOPE_2 | sensor::ACCELEROMETER_2 | sensor::MAGNETOMETER;
 
 /// `MAV_LANDED_STATE`.
 const ON_GROUND: u8 = 1;
@@ -53,7 +56,8 @@ pub fn system(status: &VehicleStatus) -> SystemStatus {
     let inertial = first | sensor::ATTITUDE;
     let located = status.is_located();
     let fixed = aux.receiver.is_some_and(|receiver| receiver.kind >= 3);
-    let ready = status.against.is_some_and(Reasons::is_empty) && sensors::faulty(aux).is_none();
+    let faulty = aux.sensors.present & !aux.sensors.healthy & NEEDED;
+    let ready = status.against.is_some_and(Reasons::is_empty) && faulty == 0;
     let armable = status.mode.armed() || ready;
     let sets = [
         (status.senses, true, inertial),
