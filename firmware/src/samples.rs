@@ -108,8 +108,8 @@ fn put_selected(at_us: u64, select: impl FnOnce(&mut ImuSelector) -> Option<[Vec
     }
 }
 
-/// Has the selection of two inertial sensors heed a tick that took these readings. Out of line, so that the tick's stack
-/// and instructions stay as they are counted.
+/// Has the selection of two inertial sensors heed a tick that took these readings. Out of line, so that the tick's
+/// stack and instructions stay as they are counted.
 #[inline(never)]
 pub(crate) fn heed(flight: &Flight, readings: &Readings) {
     SELECTOR.lock(|selector| selector.try_borrow_mut().ok().map(|mut selector| flight.tell(&mut selector, readings)));

@@ -11,9 +11,9 @@
 //! The axis x of the gyroscope senses a little of z; the part tells how much (GYR_CAS), and the reading is corrected.
 
 use crate::bus::SpiFormat;
-use crate::part::{PartFault, SensorPart, Step};
+use crate::part::{PartFault, SelfTest, SensorPart, Step};
 use crate::reading::{InertialReading, little};
-use crate::self_test::{SelfTest, numbers};
+use crate::self_test::numbers;
 use bmi2::config::BMI270_CONFIG_FILE;
 
 /// BMI270.

@@ -5,9 +5,9 @@
 //! kHz or, for readings by the board's clock, at 4 kHz, so that a reading is never older than 0.25 ms.
 
 use crate::bus::SpiFormat;
-use crate::part::{PartFault, SensorPart, Step};
+use crate::part::{PartFault, SelfTest, SensorPart, Step};
 use crate::reading::{InertialReading, big};
-use crate::self_test::{SelfTest, as_at_the_factory, numbers};
+use crate::self_test::{as_at_the_factory, numbers};
 
 /// ICM-42688-P.
 pub type Icm42688p<const POLLED: bool = false> = Icm426xx<0x47, POLLED>;

@@ -4,9 +4,8 @@
 //! the flag of its register is. A field beyond the range is a fault ([`PartFault::Range`]).
 
 use crate::bus::SpiFormat;
-use crate::part::{PartFault, SensorPart, Step};
+use crate::part::{PartFault, SelfTest, SensorPart, Step};
 use crate::reading::{MagneticReading, little};
-use crate::self_test::SelfTest;
 
 /// The part.
 #[derive(Clone, Copy, Debug, Default)]

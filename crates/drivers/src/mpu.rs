@@ -19,9 +19,9 @@
 //! ICM-20602 in I2C_IF. Early MPU-6000 (revision C, of 2011) read half of the force and are not told from others.
 
 use crate::bus::SpiFormat;
-use crate::part::{PartFault, SensorPart, Step};
+use crate::part::{PartFault, SelfTest, SelfTestResponse, SensorPart, Step};
 use crate::reading::{InertialReading, big};
-use crate::self_test::{SelfTest, SelfTestResponse, as_at_the_factory, numbers};
+use crate::self_test::{as_at_the_factory, numbers};
 
 /// MPU-6000.
 pub type Mpu6000 = Mpu<0x68>;

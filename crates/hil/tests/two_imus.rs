@@ -28,8 +28,8 @@ const SCENARIO: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../twin/scenario
 const NOISE: [f32; 2] = [0.02, 1.0];
 /// When the vehicle has hovered, and when a flight ends \[ms\].
 const HOVERS_MS: u64 = 12_000;
-/// What a flight may be off from where it was \[m\], and its largest tilt \[rad\]: 30 deg/s or 0.5 g are hidden for half
-/// a second, and what they have led to is braked.
+/// What a flight may be off from where it was \[m\], and its largest tilt \[rad\]: 30 deg/s or 0.5 g are hidden for
+/// half a second, and what they have led to is braked.
 const OFF_M: f64 = 3.0;
 const TILT_RAD: f64 = 1.1;
 /// Flights with a wrong sensor.
@@ -68,7 +68,8 @@ fn jerky(now_ms: u64) -> ManualControl {
     ManualControl { roll: stick(2_600), pitch: stick(3_700), throttle: 0.3 * stick(1_100), yaw: stick(1_900) }
 }
 
-/// Takes off and hovers; without a fault it is flown by jerky sticks from `at_ms` on; at `at_ms` a sensor fails, the second if `of_second`.
+/// Takes off and hovers. At `at_ms` a sensor fails, the second if `of_second`; without a fault it is flown by jerky
+/// sticks from then on.
 fn fly(
     scenario: &Scenario,
     mut host: Host,
