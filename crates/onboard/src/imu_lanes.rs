@@ -32,8 +32,8 @@ pub struct Witness {
     pub field: Option<Vector3<f32>>,
 }
 
-/// Two lanes from one estimate: what the vehicle does by the sensor that flies, and by the other, both without aids from
-/// the beginning on.
+/// Two lanes from one estimate: what the vehicle does by the sensor that flies, and by the other, both without aids
+/// from the beginning on.
 ///
 /// ```text
 /// d theta/dt = R (w_other - w)                                    the other lane, seen from the one that flies

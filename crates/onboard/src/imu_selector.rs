@@ -23,8 +23,8 @@ const STUCK: u16 = 15;
 
 /// Share of a sample in the mean disagreement of both sensors: a time constant of 50 ms.
 const SHARE: f32 = 0.02;
-/// Disagreement that is none \[rad/s, m/s2\], and the share of a quantity that two sensors may differ by, as of scale and
-/// alignment.
+/// Disagreement that is none \[rad/s, m/s2\], and the share of a quantity that two sensors may differ by, as of scale
+/// and alignment.
 const APART: [f32; 2] = [0.026, 0.8];
 const APART_SHARE: f32 = 0.03;
 /// Share of a field in its mean: about a second.
@@ -67,16 +67,16 @@ struct Imu {
 /// difference from the other while both worked. A sample that jumps and that the other sensor does not confirm, as of a
 /// garbled wire, is none; nor is one whose rates or force have repeated themselves while the other's changed.
 ///
-/// Of two that disagree, [whatever else is measured](Witness) tells which is right. When that is the other one, it flies
-/// from then on; turn and velocity that the wrong one has hidden are made up for as a rate and a force, so that the
-/// estimate goes to where the vehicle is as smoothly as the vehicle can follow.
+/// Of two that disagree, [whatever else is measured](Witness) tells which is right. When that is the other one, it
+/// flies from then on; turn and velocity that the wrong one has hidden are made up for as a rate and a force, so that
+/// the estimate goes to where the vehicle is as smoothly as the vehicle can follow.
 #[derive(Clone, Debug)]
 pub struct ImuSelector {
     second_flies: bool,
     first: Imu,
     second: Imu,
-    /// Samples of which the offset of the one that does not fly is the mean, and how far it is from that, on average and
-    /// now \[rad/s, m/s2\].
+    /// Samples of which the offset of the one that does not fly is the mean, and how far it is from that, on average
+    /// and now \[rad/s, m/s2\].
     averaged: f32,
     apart: [Vector3<f32>; 2],
     apart_now: [Vector3<f32>; 2],
@@ -209,8 +209,8 @@ impl ImuSelector {
         })
     }
 
-    /// Takes what the estimator has made of the samples that fly and what else has been measured, in every tick that has
-    /// an estimate, and changes to the other sensor if that one is right.
+    /// Takes what the estimator has made of the samples that fly and what else has been measured, in every tick that
+    /// has an estimate, and changes to the other sensor if that one is right.
     pub fn heed(&mut self, now: &Inertial, witness: &Witness) {
         let works = !self.first.is_silent(now.at_us) && !self.second.is_silent(now.at_us);
         if !works {
