@@ -8,6 +8,7 @@ use crate::parameters;
 use crate::radio::{self, RadioLine};
 use crate::recording::{self, ExactLog};
 use crate::samples::{self, Sampler as _};
+use crate::self_tests;
 use crate::ticks::{self, Tick};
 use crate::vehicle::ParameterTable;
 use afbc_onboard::ControlInputs;
@@ -106,6 +107,7 @@ pub async fn run<B: Board, const OTHERS: usize>((comms, table, log, radio): &mut
                     if B::Sampler::IS_REDUNDANT {
                         report_imus(comms, &mut aux, tick.report.time_us);
                     }
+                    report_self_tests(comms, &mut aux);
                     comms.set_aux_sensors(aux);
                     // Also that there is none any more.
                     let battery = comms.battery();
@@ -197,6 +199,19 @@ fn report_imus(comms: &mut Comms, aux: &mut AuxSensors, now_us: u64) {
     aux.sensors.healthy |= healthy;
     if let Some(text) = NEWS.lock(|news| news.try_borrow_mut().ok()?.look(now_us, &pair)) {
         comms.warn(text);
+    }
+}
+
+/// Passes on a request for the sensors' own tests, and tells their results. Out of line like the report.
+#[inline(never)]
+fn report_self_tests(comms: &mut Comms, aux: &mut AuxSensors) {
+    if comms.wants_self_tests() {
+        self_tests::ask();
+    }
+    match self_tests::report(&mut aux.sensors) {
+        Some((text, true)) => comms.inform(text),
+        Some((text, false)) => comms.warn(text),
+        None => (),
     }
 }
 

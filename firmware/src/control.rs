@@ -81,6 +81,9 @@ pub async fn run<B: Board>(flight: &mut Flight, board: &mut B) -> ! {
             let Seen { number, clock_failed } = seen;
             recording::push(&RecordedTick { number, clock_failed, adopted, readings, battery: inputs.battery, report });
         }
+        if B::Sampler::IS_REDUNDANT {
+            samples::cross_check(flight, &readings);
+        }
         adopted = None;
         ARMED.store(report.mode.armed(), Ordering::Relaxed);
         if !report.mode.armed() {

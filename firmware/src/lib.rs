@@ -40,6 +40,7 @@ pub mod parameters;
 pub mod radio;
 pub mod recording;
 pub mod samples;
+pub mod self_tests;
 pub mod ticks;
 pub mod time;
 pub mod vehicle;

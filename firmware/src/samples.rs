@@ -3,6 +3,7 @@
 //! The task runs at a higher priority than the tick, so that a sample's time is that of its interrupt, and a transfer
 //! from a sensor goes on while the tick runs. The tick takes what has arrived.
 
+use crate::vehicle::Flight;
 use afbc_calibration::RawSample;
 use afbc_estimator::Measurement;
 use afbc_onboard::{Aged, ImuPair, ImuSelector, RawReadings, Readings};
@@ -105,6 +106,15 @@ fn put_selected(at_us: u64, select: impl FnOnce(&mut ImuSelector) -> Option<[Vec
     if let Some(sample) = flies {
         put(SampleTime::At(at_us), SampleValue::Imu(sample));
     }
+}
+
+/// Cross-checks two inertial sensors after a tick that took these readings. Out of line, so that the tick's
+/// stack and instructions stay as they are counted.
+#[inline(never)]
+pub(crate) fn cross_check(flight: &Flight, readings: &Readings) {
+    SELECTOR.lock(|selector| {
+        selector.try_borrow_mut().ok().map(|mut selector| flight.cross_check(&mut selector, readings))
+    });
 }
 
 /// Returns which of two inertial sensors flies at `now_us`, and which work.

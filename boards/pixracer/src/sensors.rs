@@ -16,6 +16,7 @@ use embassy_stm32::mode::Async;
 use embassy_stm32::spi::{self, Spi};
 use embassy_stm32::usart::BufferedUart;
 use firmware::samples::Sampler;
+use firmware::self_tests::{FIRST_IMU, SECOND_IMU, sensor};
 use firmware::{aux_sensors, samples};
 
 /// True once a compass outside has been read: then the one inside, beside the currents, is not used.
@@ -40,13 +41,13 @@ impl Sampler for Inside {
         let [first_ready, second_ready] = self.ready.map(interrupted);
         // Without edges, the first one's turn comes first in every control period.
         join3(
-            run(driver(Icm20608 {}, &spi, first, self.kernel_hz, first_ready), |reading| {
+            run(driver(Icm20608 {}, &spi, first, self.kernel_hz, first_ready), FIRST_IMU, |reading| {
                 samples::put_first_imu(reading.at_us, turned(&reading.value, &CW180_FLIP));
             }),
-            run(driver(Mpu9250 {}, &spi, second, self.kernel_hz, second_ready), |reading| {
+            run(driver(Mpu9250 {}, &spi, second, self.kernel_hz, second_ready), SECOND_IMU, |reading| {
                 samples::put_second_imu(reading.at_us, turned(&reading.value, &CW180_FLIP));
             }),
-            run(driver(Lis3mdl {}, &spi, compass, self.kernel_hz, Polled), |reading| {
+            run(driver(Lis3mdl {}, &spi, compass, self.kernel_hz, Polled), sensor::MAGNETOMETER, |reading| {
                 if !IS_COMPASS_OUTSIDE.load(Ordering::Relaxed) {
                     aux_sensors::put_field(&reading, &CW180_FLIP);
                 }
@@ -78,8 +79,8 @@ pub(crate) struct Aids {
 impl Sampler for Aids {
     async fn run(self) {
         join3(
-            run(self.barometer, |reading| aux_sensors::put_pressure(&reading)),
-            run(self.compass, |reading| {
+            run(self.barometer, sensor::BAROMETER, |reading| aux_sensors::put_pressure(&reading)),
+            run(self.compass, sensor::MAGNETOMETER, |reading| {
                 IS_COMPASS_OUTSIDE.store(true, Ordering::Relaxed);
                 aux_sensors::put_field(&reading, &COMPASS);
             }),

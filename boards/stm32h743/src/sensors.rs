@@ -17,6 +17,7 @@ use embassy_stm32::mode::Async;
 use embassy_stm32::peripherals::ADC1;
 use embassy_stm32::usart::BufferedUart;
 use firmware::samples::Sampler;
+use firmware::self_tests::{FIRST_IMU, SECOND_IMU, sensor};
 use firmware::{aux_sensors, samples};
 
 /// A bus of sensors.
@@ -33,8 +34,12 @@ impl Sampler for Imus {
 
     async fn run(self) {
         join(
-            run(self.first, |reading| samples::put_first_imu(reading.at_us, turned(&reading.value, &CW0_FLIP))),
-            run(self.second, |reading| samples::put_second_imu(reading.at_us, turned(&reading.value, &CW90_FLIP))),
+            run(self.first, FIRST_IMU, |reading| {
+                samples::put_first_imu(reading.at_us, turned(&reading.value, &CW0_FLIP));
+            }),
+            run(self.second, SECOND_IMU, |reading| {
+                samples::put_second_imu(reading.at_us, turned(&reading.value, &CW90_FLIP));
+            }),
         )
         .await;
     }
@@ -56,8 +61,8 @@ pub(crate) struct Aids {
 impl Sampler for Aids {
     async fn run(self) {
         join4(
-            run(self.compass, |reading| aux_sensors::put_field(&reading, &COMPASS)),
-            run(self.barometer, |reading| aux_sensors::put_pressure(&reading)),
+            run(self.compass, sensor::MAGNETOMETER, |reading| aux_sensors::put_field(&reading, &COMPASS)),
+            run(self.barometer, sensor::BAROMETER, |reading| aux_sensors::put_pressure(&reading)),
             battery::run(
                 self.battery,
                 ADC_END,

@@ -6,6 +6,7 @@ use afbc_drivers::{Driver, I2cRegisters, InertialReading, PressureReading, Senso
 use afbc_types::Stamped;
 use embassy_time::Timer;
 use embedded_hal_async::i2c::I2c;
+use firmware::self_tests::{FIRST_IMU, sensor};
 
 /// Pause after each part has been tried \[s\].
 const PAUSE_S: u64 = 1;
@@ -44,7 +45,8 @@ macro_rules! candidates {
                             device.set_clock(kernel_hz, format.clock_hz);
                             let registers = SpiRegisters::new(&mut *device, format);
                             let timing = interrupted(&mut *interrupt);
-                            run_if_it_answers(Driver::new($part::default(), registers, timing), &mut take).await;
+                            let driver = Driver::new($part::default(), registers, timing);
+                            run_if_it_answers(driver, FIRST_IMU, &mut take).await;
                         }
                     )+
                     Timer::after_secs(PAUSE_S).await;
@@ -58,7 +60,8 @@ macro_rules! candidates {
                     $(
                         for address in $part::I2C {
                             let registers = I2cRegisters::new(bus.clone(), *address);
-                            run_if_it_answers(Driver::new($part::default(), registers, Polled), &mut take).await;
+                            let driver = Driver::new($part::default(), registers, Polled);
+                            run_if_it_answers(driver, sensor::BAROMETER, &mut take).await;
                         }
                     )+
                     Timer::after_secs(PAUSE_S).await;

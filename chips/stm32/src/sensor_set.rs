@@ -16,6 +16,7 @@ use embassy_stm32::usart::BufferedUart;
 use embassy_sync::blocking_mutex::raw::NoopRawMutex;
 use embassy_sync::mutex::Mutex;
 use firmware::samples::{SampleTime, SampleValue, Sampler};
+use firmware::self_tests::sensor;
 use firmware::{aux_sensors, samples};
 use nalgebra::Matrix3;
 
@@ -69,7 +70,9 @@ impl<P: BarometerCandidates> Sampler for SlowSensors<P> {
         let compass = I2cRegisters::new(I2cDevice::new(&bus), COMPASS_ADDRESS);
         join3(
             P::run(I2cDevice::new(&bus), |reading| aux_sensors::put_pressure(&reading)),
-            run(Driver::new(Qmc5883l, compass, Polled), |reading| aux_sensors::put_field(&reading, &COMPASS)),
+            run(Driver::new(Qmc5883l, compass, Polled), sensor::MAGNETOMETER, |reading| {
+                aux_sensors::put_field(&reading, &COMPASS)
+            }),
             receiver::run(self.receiver, aux_sensors::put_fix),
         )
         .await;

@@ -19,6 +19,7 @@ use embassy_sync::blocking_mutex::raw::NoopRawMutex;
 use embassy_sync::mutex::Mutex;
 use embassy_time::{Duration, Instant, Timer};
 use embedded_hal_async::spi::{ErrorType, Operation, SpiDevice};
+use firmware::self_tests::{self, Asked};
 use nalgebra::Matrix3;
 
 /// Alignment of the compass beside a receiver, which faces down and is turned by 270 degrees in the usual module.
@@ -124,25 +125,37 @@ async fn operate(
 /// Reads a part as [`run`] does if it answers; returns if its first reading fails.
 pub async fn run_if_it_answers<P: SensorPart, B: Registers, T: PartTiming>(
     mut driver: Driver<P, B, T>,
+    bits: u32,
     mut take: impl FnMut(Stamped<P::Reading>),
 ) {
     match driver.reading().await {
         Ok(reading) => {
             defmt::info!("{=str}: works", P::NAME);
             take(reading);
-            run(driver, take).await;
+            run(driver, bits, take).await;
         }
         Err(fault) => defmt::warn!("{=str}: {}", P::NAME, defmt::Display2Format(&fault)),
     }
 }
 
-/// Reads a part for ever, passes on each reading with its time, and logs when it fails and when it works again.
+/// Reads a part for ever, passes on each reading with its time, and logs when it fails and when it works again. Between
+/// two readings it runs the part's own test when that is asked for, if it has one, and puts the result for the sensor
+/// with these bits (`MAV_SYS_STATUS_SENSOR`).
 pub async fn run<P: SensorPart, B: Registers, T: PartTiming>(
     mut driver: Driver<P, B, T>,
+    bits: u32,
     mut take: impl FnMut(Stamped<P::Reading>),
 ) {
     let mut last: Option<PartFault> = None;
+    let mut asked = Asked::default();
     loop {
+        if P::SELF_TEST.is_some() && asked.is_new() {
+            let result = driver.self_test().await;
+            if let Err(fault) = result {
+                defmt::warn!("{=str}: {}", P::NAME, defmt::Display2Format(&fault));
+            }
+            self_tests::put(bits, result.is_ok());
+        }
         match driver.reading().await {
             Ok(reading) => {
                 if last.take().is_some() {

@@ -11,9 +11,9 @@
 //! The axis x of the gyroscope senses a little of z; the part tells how much (GYR_CAS), and the reading is corrected.
 
 use crate::bus::SpiFormat;
-use crate::part::{PartFault, SensorPart, Step};
+use crate::part::{PartFault, SelfTest, SensorPart, Step};
 use crate::reading::{InertialReading, little};
-use crate::self_test::{SelfTestResponse, SelfTestScript, SelfTested, numbers};
+use crate::self_test::numbers;
 use bmi2::config::BMI270_CONFIG_FILE;
 
 /// BMI270.
@@ -52,10 +52,15 @@ const INVALID: i16 = i16::MIN;
 const RAD_S_PER_LSB: f32 = 2000.0 / 32768.0 * core::f32::consts::PI / 180.0;
 const M_S2_PER_LSB: f32 = 16.0 / 32768.0 * 9.806_65;
 
-/// Self-test of the accelerometer, as the data sheet has it: pushed to either side in turn, at 16 g and 1.6 kHz. The
-/// gyroscope's needs another feature of the configuration, and is not run.
-impl SelfTested for Bmi270 {
-    const SELF_TEST: SelfTestScript = SelfTestScript {
+impl SensorPart for Bmi270 {
+    type Reading = InertialReading;
+    const NAME: &'static str = "BMI270";
+    const SPI: Option<SpiFormat> = Some(SpiFormat { read: 0x80, write: 0, dummies: 1, clock_hz: 10_000_000 });
+    const I2C: &'static [u8] = &[];
+    const STUCK_AFTER: u32 = 20;
+    /// Of the accelerometer, as the data sheet has it: pushed to either side in turn, at 16 g and 1.6 kHz. The
+    /// gyroscope's needs another feature of the configuration, and is not run.
+    const SELF_TEST: Option<SelfTest<InertialReading>> = Some(SelfTest {
         // Enabled, large, to the negative side.
         quiet: &[Step::Write(ACC_SELF_TEST, 0b1001), Step::Wait(50_000)],
         trims: &[],
@@ -63,24 +68,12 @@ impl SelfTested for Bmi270 {
         stimulated: &[Step::Write(ACC_SELF_TEST, 0b1101), Step::Wait(50_000)],
         skipped: 1,
         averaged: 16,
-    };
-
-    fn axes(reading: &InertialReading) -> [f32; 6] {
-        numbers(reading)
-    }
-
-    fn passes(response: &SelfTestResponse) -> bool {
-        let [.., x, y, z] = response.change.map(|change| change * 16.0 / 32768.0);
-        x > 16.0 && y < -15.0 && z > 10.0
-    }
-}
-
-impl SensorPart for Bmi270 {
-    type Reading = InertialReading;
-    const NAME: &'static str = "BMI270";
-    const SPI: Option<SpiFormat> = Some(SpiFormat { read: 0x80, write: 0, dummies: 1, clock_hz: 10_000_000 });
-    const I2C: &'static [u8] = &[];
-    const STUCK_AFTER: u32 = 20;
+        axes: numbers,
+        passes: |response| {
+            let [.., x, y, z] = response.change.map(|change| change * 16.0 / 32768.0);
+            x > 16.0 && y < -15.0 && z > 10.0
+        },
+    });
     const SETUP: &'static [Step] = &[
         Step::Await(CHIP_ID, 0, 0, 0), // reads once: the edge of the select line turns I2C into SPI
         Step::Wait(450),

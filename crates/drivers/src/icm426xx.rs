@@ -5,9 +5,9 @@
 //! kHz or, for readings by the board's clock, at 4 kHz, so that a reading is never older than 0.25 ms.
 
 use crate::bus::SpiFormat;
-use crate::part::{PartFault, SensorPart, Step};
+use crate::part::{PartFault, SelfTest, SensorPart, Step};
 use crate::reading::{InertialReading, big};
-use crate::self_test::{SelfTestResponse, SelfTestScript, SelfTested, as_at_the_factory, numbers};
+use crate::self_test::{as_at_the_factory, numbers};
 
 /// ICM-42688-P.
 pub type Icm42688p<const POLLED: bool = false> = Icm426xx<0x47, POLLED>;
@@ -43,10 +43,15 @@ const INVALID: f32 = -32768.0;
 const RAD_S_PER_LSB: f32 = 2000.0 / 32768.0 * core::f32::consts::PI / 180.0;
 const M_S2_PER_LSB: f32 = 16.0 / 32768.0 * 9.806_65;
 
-/// Self-test, by TDK's own driver for the family: 250 deg/s and 2 g, all six axes at once; what the factory has
-/// written is in banks 1 and 2.
-impl<const IDENTITY: u8, const POLLED: bool> SelfTested for Icm426xx<IDENTITY, POLLED> {
-    const SELF_TEST: SelfTestScript = SelfTestScript {
+impl<const IDENTITY: u8, const POLLED: bool> SensorPart for Icm426xx<IDENTITY, POLLED> {
+    type Reading = InertialReading;
+    const NAME: &'static str = if IDENTITY == 0x47 { "ICM-42688-P" } else { "ICM-42605" };
+    const SPI: Option<SpiFormat> = Some(SpiFormat { read: 0x80, write: 0, dummies: 0, clock_hz: 24_000_000 });
+    const I2C: &'static [u8] = &[];
+    const STUCK_AFTER: u32 = 20;
+    /// By TDK's own driver for the family: 250 deg/s and 2 g, all six axes at once; what the factory has written is in
+    /// banks 1 and 2.
+    const SELF_TEST: Option<SelfTest<InertialReading>> = Some(SelfTest {
         quiet: &[
             Step::Write(GYRO_CONFIG0, if POLLED { 0x64 } else { 0x66 }),
             Step::Write(ACCEL_CONFIG0, if POLLED { 0x64 } else { 0x66 }),
@@ -57,23 +62,9 @@ impl<const IDENTITY: u8, const POLLED: bool> SelfTested for Icm426xx<IDENTITY, P
         stimulated: &[Step::Write(SELF_TEST_CONFIG, 0x7F), Step::Wait(200_000)],
         skipped: 2,
         averaged: 100,
-    };
-
-    fn axes(reading: &InertialReading) -> [f32; 6] {
-        numbers(reading)
-    }
-
-    fn passes(response: &SelfTestResponse) -> bool {
-        as_at_the_factory(response, [0.05, 1.2])
-    }
-}
-
-impl<const IDENTITY: u8, const POLLED: bool> SensorPart for Icm426xx<IDENTITY, POLLED> {
-    type Reading = InertialReading;
-    const NAME: &'static str = if IDENTITY == 0x47 { "ICM-42688-P" } else { "ICM-42605" };
-    const SPI: Option<SpiFormat> = Some(SpiFormat { read: 0x80, write: 0, dummies: 0, clock_hz: 24_000_000 });
-    const I2C: &'static [u8] = &[];
-    const STUCK_AFTER: u32 = 20;
+        axes: numbers,
+        passes: |response| as_at_the_factory(response, [0.05, 1.2]),
+    });
     const SETUP: &'static [Step] = &[
         Step::Write(REG_BANK_SEL, 0),
         Step::Write(DEVICE_CONFIG, 1), // soft reset, of which the mode of SPI stays

@@ -4,9 +4,8 @@
 //! the flag of its register is. A field beyond the range is a fault ([`PartFault::Range`]).
 
 use crate::bus::SpiFormat;
-use crate::part::{PartFault, SensorPart, Step};
+use crate::part::{PartFault, SelfTest, SensorPart, Step};
 use crate::reading::{MagneticReading, little};
-use crate::self_test::{SelfTestResponse, SelfTestScript, SelfTested};
 
 /// The part.
 #[derive(Clone, Copy, Debug, Default)]
@@ -30,34 +29,29 @@ const UT_PER_LSB: f32 = 100.0 / 6842.0;
 const UT_PER_LSB_12: f32 = 100.0 / 2281.0;
 const RANGE_UT: f32 = 400.0;
 
-/// Self-test, as the data sheet has it: at 12 gauss and 80 Hz, a field of the part's own on each axis.
-impl SelfTested for Lis3mdl {
-    const SELF_TEST: SelfTestScript = SelfTestScript {
-        quiet: &[Step::Write(CTRL_REG1, 0x1C), Step::Write(CTRL_REG2, 0x40), Step::Wait(20_000)],
-        trims: &[],
-        between: &[],
-        stimulated: &[Step::Write(CTRL_REG1, 0x1D), Step::Wait(60_000)],
-        skipped: 1,
-        averaged: 5,
-    };
-
-    fn axes(reading: &MagneticReading) -> [f32; 6] {
-        let field = reading.field_ut * (UT_PER_LSB_12 / UT_PER_LSB);
-        [field.x, field.y, field.z, 0.0, 0.0, 0.0]
-    }
-
-    fn passes(response: &SelfTestResponse) -> bool {
-        let [x, y, z, ..] = response.change.map(f32::abs);
-        [x, y].iter().all(|ut| (100.0..=300.0).contains(ut)) && (10.0..=100.0).contains(&z)
-    }
-}
-
 impl SensorPart for Lis3mdl {
     type Reading = MagneticReading;
     const NAME: &'static str = "LIS3MDL";
     const SPI: Option<SpiFormat> = Some(SpiFormat { read: 0xC0, write: 0x40, dummies: 0, clock_hz: 10_000_000 });
     const I2C: &'static [u8] = &[0x1E, 0x1C];
     const STUCK_AFTER: u32 = 20;
+    /// As the data sheet has it: at 12 gauss and 80 Hz, a field of the part's own on each axis.
+    const SELF_TEST: Option<SelfTest<MagneticReading>> = Some(SelfTest {
+        quiet: &[Step::Write(CTRL_REG1, 0x1C), Step::Write(CTRL_REG2, 0x40), Step::Wait(20_000)],
+        trims: &[],
+        between: &[],
+        stimulated: &[Step::Write(CTRL_REG1, 0x1D), Step::Wait(60_000)],
+        skipped: 1,
+        averaged: 5,
+        axes: |reading| {
+            let field = reading.field_ut * (UT_PER_LSB_12 / UT_PER_LSB);
+            [field.x, field.y, field.z, 0.0, 0.0, 0.0]
+        },
+        passes: |response| {
+            let [x, y, z, ..] = response.change.map(f32::abs);
+            [x, y].iter().all(|ut| (100.0..=300.0).contains(ut)) && (10.0..=100.0).contains(&z)
+        },
+    });
     const SETUP: &'static [Step] = &[
         Step::Write(CTRL_REG2, SOFT_RST),
         Step::Wait(10_000),

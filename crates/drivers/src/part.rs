@@ -30,6 +30,38 @@ pub enum Step {
     Ready(u32),
 }
 
+/// The test of a part that reads `R`.
+#[derive(Clone, Copy, Debug)]
+pub struct SelfTest<R> {
+    /// Sets the part up for readings without the stimulus, or with the opposite one; after [`SensorPart::SETUP`].
+    pub quiet: &'static [Step],
+    /// Before the stimulus: the register of the first of three bytes that the factory has written, after a step.
+    pub trims: &'static [(Step, u8)],
+    /// After these.
+    pub between: &'static [Step],
+    /// Applies the stimulus.
+    pub stimulated: &'static [Step],
+    /// Readings of each kind that are left out, and those that are averaged.
+    pub skipped: u32,
+    /// See above.
+    pub averaged: u32,
+    /// Returns a reading as the test counts it: rates and specific force in the part's numbers, or a field \[uT\].
+    pub axes: fn(&R) -> [f32; 6],
+    /// True if the response is one that the data sheet allows.
+    pub passes: fn(&SelfTestResponse) -> bool,
+}
+
+/// What a test has found.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SelfTestResponse {
+    /// Mean reading without the stimulus.
+    pub quiet: [f32; 6],
+    /// By how much it changes with the stimulus.
+    pub change: [f32; 6],
+    /// What the factory has written.
+    pub trims: [[u8; 3]; 2],
+}
+
 /// A part of a data sheet.
 pub trait SensorPart {
     /// What it reads.
@@ -46,6 +78,8 @@ pub trait SensorPart {
     const CYCLE: &'static [Step];
     /// So many equal readings in a row are a stuck part.
     const STUCK_AFTER: u32;
+    /// Its own test, if it has one that is run here.
+    const SELF_TEST: Option<SelfTest<Self::Reading>> = None;
 
     /// Takes the answer to a [`Step::Read`] of `register`, and returns the reading that it completes.
     ///

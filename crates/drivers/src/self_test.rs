@@ -6,62 +6,23 @@
 
 use crate::bus::Registers;
 use crate::driver::{Driver, PartTiming};
-use crate::part::{PartFault, SensorPart, Step};
+use crate::part::{PartFault, SelfTest, SelfTestResponse, SensorPart, Step};
 use crate::reading::InertialReading;
 
-/// A part with a test.
-pub trait SelfTested: SensorPart {
-    /// The test.
-    const SELF_TEST: SelfTestScript;
-
-    /// Returns a reading as the test counts it: rates and specific force in the part's numbers, or a field \[uT\].
-    fn axes(reading: &Self::Reading) -> [f32; 6];
-
-    /// True if the response is one that the data sheet allows.
-    fn passes(response: &SelfTestResponse) -> bool;
-}
-
-/// A test.
-#[derive(Clone, Copy, Debug)]
-pub struct SelfTestScript {
-    /// Sets the part up for readings without the stimulus, or with the opposite one; after [`SensorPart::SETUP`].
-    pub quiet: &'static [Step],
-    /// Before the stimulus: the register of the first of three bytes that the factory has written, after a step.
-    pub trims: &'static [(Step, u8)],
-    /// After these.
-    pub between: &'static [Step],
-    /// Applies the stimulus.
-    pub stimulated: &'static [Step],
-    /// Readings of each kind that are left out, and those that are averaged.
-    pub skipped: u32,
-    /// See above.
-    pub averaged: u32,
-}
-
-/// What a test has found.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct SelfTestResponse {
-    /// Mean reading without the stimulus.
-    pub quiet: [f32; 6],
-    /// By how much it changes with the stimulus.
-    pub change: [f32; 6],
-    /// What the factory has written.
-    pub trims: [[u8; 3]; 2],
-}
-
-impl<P: SelfTested, B: Registers, T: PartTiming> Driver<P, B, T> {
-    /// Sets the part up and runs its test. The next reading sets it up again.
+impl<P: SensorPart, B: Registers, T: PartTiming> Driver<P, B, T> {
+    /// Sets the part up and runs its test, if it has one. The next reading sets it up again.
     ///
     /// # Errors
     /// [`PartFault::SelfTest`] if it fails, or what has kept it from being run.
     pub async fn self_test(&mut self) -> Result<(), PartFault> {
-        let result = self.respond().await;
+        let Some(test) = &P::SELF_TEST else { return Ok(()) };
+        let result = self.respond(test).await;
         self.forget();
-        if P::passes(&result?) { Ok(()) } else { Err(PartFault::SelfTest) }
+        if (test.passes)(&result?) { Ok(()) } else { Err(PartFault::SelfTest) }
     }
 
-    async fn respond(&mut self) -> Result<SelfTestResponse, PartFault> {
-        let SelfTestScript { quiet, trims, between, stimulated, .. } = P::SELF_TEST;
+    async fn respond(&mut self, test: &SelfTest<P::Reading>) -> Result<SelfTestResponse, PartFault> {
+        let SelfTest { quiet, trims, between, stimulated, .. } = *test;
         let mut response = SelfTestResponse::default();
         self.set_up().await?;
         self.run(quiet).await?;
@@ -72,9 +33,9 @@ impl<P: SelfTested, B: Registers, T: PartTiming> Driver<P, B, T> {
             }
         }
         self.run(between).await?;
-        response.quiet = self.mean().await?;
+        response.quiet = self.mean(test).await?;
         self.run(stimulated).await?;
-        let excited = self.mean().await?;
+        let excited = self.mean(test).await?;
         for ((change, excited), quiet) in response.change.iter_mut().zip(excited).zip(response.quiet) {
             *change = excited - quiet;
         }
@@ -88,8 +49,8 @@ impl<P: SelfTested, B: Registers, T: PartTiming> Driver<P, B, T> {
         Ok(())
     }
 
-    async fn mean(&mut self) -> Result<[f32; 6], PartFault> {
-        let SelfTestScript { skipped, averaged, .. } = P::SELF_TEST;
+    async fn mean(&mut self, test: &SelfTest<P::Reading>) -> Result<[f32; 6], PartFault> {
+        let SelfTest { skipped, averaged, axes, .. } = *test;
         let (mut sums, mut taken) = ([0.0; 6], 0);
         // A part may need several cycles for a reading.
         for _ in 0..4 * (skipped + averaged) {
@@ -102,7 +63,7 @@ impl<P: SelfTested, B: Registers, T: PartTiming> Driver<P, B, T> {
             if taken <= skipped {
                 continue;
             }
-            sums.iter_mut().zip(P::axes(&reading.value)).for_each(|(sum, axis): (&mut f32, f32)| *sum += axis);
+            sums.iter_mut().zip(axes(&reading.value)).for_each(|(sum, axis): (&mut f32, f32)| *sum += axis);
             if taken == skipped + averaged {
                 return Ok(sums.map(|sum| sum / averaged as f32));
             }

@@ -4,7 +4,6 @@
 mod rig;
 
 use afbc_drivers::mpu::{Icm20602, Icm20608, Icm20689, Mpu, Mpu6000, Mpu6500, Mpu9250};
-use afbc_drivers::self_test::SelfTested;
 use afbc_drivers::{InertialReading, PartFault, SensorPart};
 use embassy_futures::block_on;
 use nalgebra::Vector3;
@@ -79,7 +78,7 @@ fn icm_20689() {
     assert_eq!((Icm20689::NAME, Icm20689::SPI.map(|spi| spi.clock_hz)), ("ICM-20689", Some(8_000_000)));
 }
 
-fn tested<P: SelfTested>(part: P, identity: u8, trims: [[u8; 4]; 2], responses: [f64; 6]) -> Result<(), PartFault> {
+fn tested<P: SensorPart>(part: P, identity: u8, trims: [[u8; 4]; 2], responses: [f64; 6]) -> Result<(), PartFault> {
     let rig = Rig::new(Registers::new(identity));
     rig.with(|part| (part.trims, part.responses, part.rates_deg_s) = (trims, responses, [1.0, -19.0, 0.5]));
     let mut driver = rig.driver(part);

@@ -52,6 +52,12 @@ impl ImuCalibration {
         }))
     }
 
+    /// Returns the rotation from the sensor's axes to the body's.
+    #[must_use]
+    pub fn to_body(&self) -> Matrix3<f32> {
+        self.0.as_ref().map_or_else(Matrix3::identity, |mounted| mounted.to_body)
+    }
+
     /// Returns what a sensor at the centre of mass would have measured. `last` is what it returned for the sample
     /// before, none at first, and becomes what it returns.
     #[inline(always)]

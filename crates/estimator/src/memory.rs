@@ -7,11 +7,13 @@ use crate::errors::Interval;
 use crate::estimate::{Dropped, Resets};
 use crate::history::History;
 use crate::imu::{Monitor, Smoothed};
+use crate::inertial::Inertial;
 use crate::measurement::Measurement;
 use crate::nominal::Nominal;
 use crate::queue::{Fix, Queue};
 use crate::rest::Rest;
 use crate::rotation::identity;
+use crate::settings::Settings;
 use afbc_types::Stamped;
 use nalgebra::{Matrix3, Quaternion, Vector3};
 
@@ -173,6 +175,16 @@ impl Memory {
     #[must_use]
     pub fn runs(&self) -> bool {
         self.runs
+    }
+
+    /// Returns what the estimate is at the time of the last sample; none before the filter runs. `to_body` is that of
+    /// the inertial sensor ([`ImuCalibration::to_body`](crate::ImuCalibration::to_body)).
+    #[must_use]
+    pub fn inertial(&self, settings: &Settings, to_body: Matrix3<f32>) -> Option<Inertial> {
+        let Nominal { rotation, velocity, rates, force, gyro_bias, accel_bias, .. } = self.nominal;
+        let at_us = self.monitor.at_us().filter(|_| self.runs)?;
+        let gravity = settings.gravity_m_s2;
+        Some(Inertial { at_us, rotation, velocity, rates, force, gyro_bias, accel_bias, gravity, to_body })
     }
 
     /// Returns the covariance of the errors as rows, symmetric, in the order: rotation in the earth frame \[rad\],

@@ -32,7 +32,7 @@ pub(crate) struct Nominal {
     /// Rates of the last sample without bias, body frame \[rad/s\].
     pub(crate) rates: Vector3<f32>,
     /// Specific force of the last sample without bias, body frame \[m/s2\].
-    force: Vector3<f32>,
+    pub(crate) force: Vector3<f32>,
 }
 
 impl Default for Nominal {

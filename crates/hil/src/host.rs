@@ -7,7 +7,7 @@ use afbc_estimator::Origin;
 use afbc_flight_core::rate::PERIOD_US;
 use afbc_link::{Decoder, Uplink};
 use afbc_onboard::parameters::{Kept, ParameterTable, Reason, RecordChange};
-use afbc_onboard::{Configuration, ControlInputs, Flight, Link, Prepare, RawReadings, Readings, Report};
+use afbc_onboard::{Configuration, ControlInputs, Flight, ImuSelector, Link, Prepare, RawReadings, Readings, Report};
 use afbc_recorder::{Given, Recorder, TickRecord};
 use afbc_scenario::OtherLaw;
 use afbc_scenario::contender::{ControllerKind, Law};
@@ -67,6 +67,8 @@ trait Core {
         tell: Tell<'_>,
     ) -> Report<ROTORS_MAX>;
 
+    fn cross_check(&self, selector: &mut ImuSelector, readings: &Readings);
+
     /// Goes on with a calibration, and shows stations what the sensors read.
     fn calibrate(
         &mut self,
@@ -124,6 +126,10 @@ impl<P: Prepare<N>, const N: usize> Core for Aircraft<P, N> {
         let report = self.flight.tick(now_us, inputs, readings);
         tell.comms.report(&report, tell.tick_us, tell.send);
         report.padded()
+    }
+
+    fn cross_check(&self, selector: &mut ImuSelector, readings: &Readings) {
+        self.flight.cross_check(selector, readings);
     }
 
     fn calibrate(
@@ -356,6 +362,11 @@ impl Host {
     /// Sets what the vehicle's own sensors read for the next tick alone.
     pub fn sense(&mut self, readings: &Readings) {
         self.readings = *readings;
+    }
+
+    /// Cross-checks the inertial sensors after the last tick, which took these readings ([`sense`](Self::sense)).
+    pub fn cross_check(&self, selector: &mut ImuSelector, readings: &Readings) {
+        self.flight.cross_check(selector, readings);
     }
 
     /// Runs one control tick at `time_us` since power-up, after `uplink` has reached the link. The tick reports a

@@ -14,6 +14,8 @@ use afbc_onboard::Report;
 use afbc_radio::{Channels, CrsfFrame, SbusFrame};
 use afbc_scenario::load;
 use afbc_sim::flight::World;
+use afbc_station::AuxSensors;
+use afbc_station::services::{health::sensor, status::SensorBits};
 use afbc_types::{ROTORS_MAX, RotorSpeeds};
 use nalgebra::Vector3;
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -189,6 +191,14 @@ fn arming_is_refused_with_a_reason() {
     flier.channels.us[THROTTLE] = 1000;
     flier.fly(1_000);
     assert!(!flier.armed(), "the switch was not moved");
+
+    let faulty = SensorBits { present: sensor::GYROSCOPE_2, healthy: 0 };
+    flier.host.comms().set_aux_sensors(AuxSensors { sensors: faulty, ..AuxSensors::default() });
+    flier.channels.us[ARM] = 1000;
+    flier.fly(200);
+    flier.channels.us[ARM] = 2000;
+    flier.fly(1_500);
+    assert!(!flier.armed() && flier.says("arming refused: IMU 2 is faulty"));
 }
 
 /// Within 20 ms, whoever is in control and whatever it does.

@@ -378,6 +378,7 @@ fn commands() {
             assert_eq!(read(reboot, param1, 0.0), Command::Denied(246));
         }
         assert_eq!(read(MavCmd::MAV_CMD_USER_1, 0.5, f32::NAN), Command::Engage);
+        assert_eq!(read(MavCmd::MAV_CMD_USER_2, 0.0, f32::NAN), Command::SelfTest);
         assert_eq!(read(MavCmd::MAV_CMD_NAV_LAND, 1.0, 0.0), Command::Land);
         assert_eq!(read(MavCmd::MAV_CMD_DO_SET_SERVO, 1.0, 0.0), Command::Other(183));
     }
@@ -535,6 +536,7 @@ proptest! {
             Uplink::Command(Command::Arm),
             Uplink::Command(Command::Disarm),
             Uplink::Command(Command::Engage),
+            Uplink::Command(Command::SelfTest),
             Uplink::Command(Command::Kill),
             Uplink::Command(Command::Denied(MavCmd::MAV_CMD_COMPONENT_ARM_DISARM as u16)),
             Uplink::Command(Command::Other(command)),

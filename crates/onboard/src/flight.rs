@@ -5,6 +5,7 @@ use crate::control_inputs::ControlInputs;
 use crate::flight_view::FlightView;
 use crate::front_end::{Corrections, EstimatorFrontEnd};
 use crate::guided::{Core, GuidanceResult, Guide};
+use crate::imu_selector::ImuSelector;
 use crate::law::FlightLaw;
 use crate::readings::Readings;
 use crate::sensor_timeouts::SensorTimeouts;
@@ -233,6 +234,13 @@ impl<const N: usize, C: FlightLaw<N>> Flight<N, C> {
             origin_m: front_end.origin_m(),
             state: self.memory.state().copied(),
             idle_on_ground: self.idle_on_ground,
+        }
+    }
+
+    /// Cross-checks the inertial sensors after the tick that took these readings.
+    pub fn cross_check(&self, selector: &mut ImuSelector, readings: &Readings) {
+        if let Some(inertial) = self.front_end.inertial() {
+            selector.cross_check(&inertial, &self.front_end.other_sensors(readings));
         }
     }
 

@@ -1,9 +1,12 @@
 //! What stands around the filter, on board and in simulation: which readings it gets when, the inertial sensor's
 //! mounting, the ground, the local frame's origin, and what of the estimate reaches the flight core.
 
+use crate::imu_lanes::OtherSensors;
 use crate::readings::{Aged, Readings};
 use afbc_control::math::{max, min};
-use afbc_estimator::{Estimate, Estimator, ImuCalibration, ImuSample, Measurement, Memory, OutputFilter, Stamped};
+use afbc_estimator::{
+    Estimate, Estimator, ImuCalibration, ImuSample, Inertial, Measurement, Memory, OutputFilter, Stamped,
+};
 use afbc_flight_core::{Inbox, Refusal};
 use afbc_types::{Mounting, Pose, PoseSigmas, SensorCalibration, State};
 use nalgebra::Vector3;
@@ -112,6 +115,29 @@ impl EstimatorFrontEnd {
     #[must_use]
     pub fn origin_m(&self) -> Option<Vector3<f32>> {
         if self.origin_is_known { Some(Vector3::zeros()) } else { self.origin_m }
+    }
+
+    /// Returns what the estimate is at the time of the last sample, once there is one.
+    pub fn inertial(&self) -> Option<Inertial> {
+        self.memory.inertial(self.estimator.settings(), self.corrections.imu.to_body())
+    }
+
+    /// Returns what is measured beside the inertial sensor in a tick with these readings, corrected.
+    pub fn other_sensors(&self, readings: &Readings) -> OtherSensors {
+        let mut others = OtherSensors::default();
+        for Aged { value, age_us } in readings.aids.iter().flatten() {
+            match value {
+                Measurement::Gnss { velocity_m_s, speed_sigma_m_s: sigma, climb_sigma_m_s, .. } => {
+                    others.velocity = Some(([*velocity_m_s, Vector3::new(*sigma, *sigma, *climb_sigma_m_s)], *age_us));
+                }
+                Measurement::MagneticField { field, .. } => {
+                    let errors = self.corrections.field.as_ref();
+                    others.field = Some(errors.map_or(*field, |errors| corrected(field, errors)));
+                }
+                _ => (),
+            }
+        }
+        others
     }
 
     /// Sets whether the motors cannot carry the vehicle ([`Memory::set_on_ground`]).

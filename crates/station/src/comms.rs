@@ -108,7 +108,12 @@ impl Comms {
         self.dispatcher.status.aux = aux;
     }
 
-    /// Tells everyone what a shell has to say about the parameters.
+    /// Tells everyone what a shell has to say.
+    pub fn inform(&mut self, text: &str) {
+        self.dispatcher.texts.put(MavSeverity::MAV_SEVERITY_INFO, text);
+    }
+
+    /// The same as a warning.
     pub fn warn(&mut self, text: &str) {
         self.dispatcher.texts.put(MavSeverity::MAV_SEVERITY_WARNING, text);
     }
@@ -116,6 +121,11 @@ impl Comms {
     /// Returns what a station has asked the disarmed vehicle to reboot into: what has been sent should leave first.
     pub fn wants_reboot(&self) -> Option<Reboot> {
         self.dispatcher.reboot
+    }
+
+    /// True once if a station has asked the disarmed vehicle for its sensors' own tests.
+    pub fn wants_self_tests(&mut self) -> bool {
+        core::mem::take(&mut self.dispatcher.tests)
     }
 
     /// True if [`receive`](Self::receive) has something for the next tick even without bytes.

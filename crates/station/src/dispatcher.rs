@@ -68,6 +68,8 @@ pub(crate) struct Dispatcher {
     pub(crate) calibration: CalibrationState,
     /// True if the shell can calibrate.
     calibrates: bool,
+    /// True if a station has asked for the sensors' own tests.
+    pub(crate) tests: bool,
     /// The item and upload that the guidance has been given last.
     given: Option<(u16, u16)>,
     /// The item that was reached last.
@@ -100,6 +102,7 @@ impl Dispatcher {
             parameters: Service::default(),
             calibration: CalibrationState::default(),
             calibrates: setup.calibrates,
+            tests: false,
             given: None,
             reached: None,
             heard_us: None,

@@ -3,10 +3,11 @@
 //! The pilot needs no leave of theirs: arming, kill and mode switches count whoever is in control.
 
 use crate::comms::Comms;
+use crate::services::sensors;
 use crate::services::streams::id;
 use crate::services::telemetry::compose;
 use afbc_control::math::sqrt;
-use afbc_flight_core::{Stamped, Ticketed};
+use afbc_flight_core::{Request, Stamped, Ticketed};
 use afbc_link::{Downlink, MavSeverity, Telemetry};
 use afbc_onboard::{ControlInputs, give};
 use afbc_radio::{
@@ -84,6 +85,7 @@ impl Comms {
         let dispatcher = &mut self.dispatcher;
         let (now_us, status) = (dispatcher.now_us, &dispatcher.status);
         let inputs = PilotInputs { now_us, armed: status.mode.armed(), mode: status.guided.mode };
+        let faulty = sensors::faulty(&status.aux);
         let mut update = None;
         let (texts, radio_us) = (&mut dispatcher.texts, &mut dispatcher.radio_us);
         radio.receive(bytes, settings, &inputs, |output| {
@@ -94,6 +96,13 @@ impl Comms {
                     _ => MavSeverity::MAV_SEVERITY_WARNING,
                 };
                 texts.put(severity, notice.text());
+            }
+            let mut request = request;
+            if request == Some(Request::Arm)
+                && let Some(text) = faulty
+            {
+                texts.put(MavSeverity::MAV_SEVERITY_WARNING, text);
+                request = None;
             }
             if (sticks, request, order) == (None, None, None) {
                 return;

@@ -7,10 +7,10 @@ use afbc_estimator::Measurement;
 use afbc_flight_core::Refusal;
 use afbc_guidance::{FlightMode, Net, Settings};
 use afbc_link::telemetry::BatteryStatus;
-use afbc_link::{Address, Answer, Command, Downlink, ParameterRequest, Telemetry, Text, Uplink};
+use afbc_link::{Address, Answer, CalibrationRequest, Command, Downlink, ParameterRequest, Telemetry, Text, Uplink};
 use afbc_onboard::{Aged, Configuration, Flight, Readings};
-use afbc_station::services::{health::sensor, modes};
-use afbc_station::{AuxSensors, Comms, Setup};
+use afbc_station::services::{health::sensor, modes, status::SensorBits};
+use afbc_station::{AuxSensors, CALIBRATES, Comms, Setup};
 use afbc_types::State;
 use common::{Bench, STATION};
 use nalgebra::Vector3;
@@ -42,6 +42,14 @@ fn stand(bench: &mut Bench, ticks: u32, state: &State, readings: &Readings) -> V
         .collect()
 }
 
+/// A shell with sensors of which some are not well.
+fn report(bench: &mut Bench, present: u32, healthy: u32) {
+    let sensors = SensorBits { present, healthy };
+    let battery =
+        BatteryStatus { voltage_mv: 12_000, current_ca: -1, remaining_percent: -1, consumed_mah: -1, charge: 0 };
+    bench.comms.set_aux_sensors(AuxSensors { battery: Some(battery), sensors, ..AuxSensors::default() });
+}
+
 /// Returns the answer to the wish to arm, and what SYS_STATUS said of it just before.
 fn arm(bench: &mut Bench, state: &State) -> (Answer, bool) {
     bench.hear(Uplink::Command(Command::RequestMessage { message: 1, index: 0 }));
@@ -58,6 +66,50 @@ fn arm(bench: &mut Bench, state: &State) -> (Answer, bool) {
         _ => None,
     });
     (answer.expect("answered"), armable)
+}
+
+/// A sensor that has failed its own test, or is faulty in flight, is not started with, whatever flies instead of it.
+#[test]
+fn a_faulty_sensor_is_not_started_with() {
+    let here = State::default();
+    let imus = [sensor::GYROSCOPE | sensor::ACCELEROMETER, sensor::GYROSCOPE_2 | sensor::ACCELEROMETER_2];
+    let all = imus[0] | imus[1] | sensor::MAGNETOMETER;
+    for faulty in [imus[0], imus[1], sensor::MAGNETOMETER, sensor::GYROSCOPE_2] {
+        let mut bench = bench();
+        report(&mut bench, all, all & !faulty);
+        stand(&mut bench, 1500, &here, &Readings::NONE);
+        assert_eq!(arm(&mut bench, &here), refused(Refusal::SensorFailed), "{faulty:#x}");
+        report(&mut bench, all, all);
+        assert_eq!(arm(&mut bench, &here), (Answer::Accepted, true), "{faulty:#x}");
+    }
+}
+
+/// The sensors' own tests are asked for once, of a vehicle that has some, disarmed and not being calibrated.
+#[test]
+fn self_tests_are_for_a_disarmed_vehicle() {
+    const SELF_TEST: u16 = 31_011;
+    let here = State::default();
+    let ask = |bench: &mut Bench| {
+        bench.hear(Uplink::Command(Command::SelfTest));
+        let said = stand(bench, 3, &here, &Readings::NONE);
+        let answer = said.iter().find_map(|message| match message {
+            Downlink::Answer { command: SELF_TEST, answer, .. } => Some(*answer),
+            _ => None,
+        });
+        (answer.expect("answered"), [(); 2].map(|()| bench.comms.wants_self_tests()))
+    };
+    let mut without = bench();
+    assert_eq!(ask(&mut without), (Answer::Unsupported, [false; 2]));
+    let mut bench = bench();
+    bench.comms = Comms::with(Setup { calibrates: true, ..Setup::default() });
+    charge(&mut bench, 12_000);
+    stand(&mut bench, 1500, &here, &Readings::NONE);
+    assert_eq!(ask(&mut bench), (Answer::Accepted, [true, false]));
+    bench.hear(Uplink::Command(Command::Calibrate(CalibrationRequest::Gyroscope)));
+    assert_eq!(ask(&mut bench), (Answer::Refused(CALIBRATES), [false; 2]));
+    bench.hear(Uplink::Command(Command::Calibrate(CalibrationRequest::Cancel)));
+    assert_eq!(arm(&mut bench, &here).0, Answer::Accepted);
+    assert_eq!(ask(&mut bench), (Answer::Refused(Refusal::AlreadyArmed as i32), [false; 2]));
 }
 
 fn refused(refusal: Refusal) -> (Answer, bool) {

@@ -267,6 +267,7 @@ fn orders_are_for_the_station_in_control() {
         Command::Reboot(Reboot::BootLoader),
         Command::Arm,
         Command::Engage,
+        Command::SelfTest,
         Command::Storage(Storage::Reset),
         Command::TakeOff(Height { metres: 2.0, above: Datum::Here }),
     ] {

@@ -200,7 +200,7 @@ fn commands_that_do_not_need_control() {
         Command::Other(1),
     ];
     assert!(free.into_iter().all(|command| !is_needed_for(command)));
-    let bound = [Command::Arm, Command::Engage, Command::Land, Command::Return, Command::Reboot(Reboot::BootLoader)];
+    let bound = [Command::Arm, Command::Engage, Command::SelfTest, Command::Land, Command::Reboot(Reboot::BootLoader)];
     assert!(bound.into_iter().all(is_needed_for));
     let page = include_str!("../../../docs/security.md");
     for word in ["disarm", "kill", "message", "interval"] {

@@ -19,6 +19,8 @@ pub enum Command {
     Kill,
     /// MAV_CMD_USER_1 (31010): engage AFBC again after its monitor has tripped.
     Engage,
+    /// MAV_CMD_USER_2 (31011): run the sensors' own tests.
+    SelfTest,
     /// MAV_CMD_NAV_TAKEOFF (22). The height is above where the vehicle stands in COMMAND_LONG, which has no frame, and
     /// NaN or 0 stand for that of the parameters; heading and place are ignored.
     TakeOff(Height),
@@ -138,6 +140,7 @@ pub(crate) const REQUEST_MESSAGE: u16 = 512;
 pub(crate) const REQUEST_PROTOCOL: u16 = 519;
 pub(crate) const REQUEST_CAPABILITIES: u16 = 520;
 pub(crate) const ENGAGE: u16 = 31_010;
+pub(crate) const SELF_TEST: u16 = 31_011;
 
 /// Value of param2 of MAV_CMD_COMPONENT_ARM_DISARM that forces it.
 pub(crate) const FORCED: f32 = 21196.0;
@@ -148,7 +151,7 @@ pub(crate) const USUAL: f32 = -1.0;
 
 impl Command {
     /// Numbers of the commands that are understood.
-    pub const KNOWN: [u16; 21] = [
+    pub const KNOWN: [u16; 22] = [
         RETURN,
         LAND,
         TAKE_OFF,
@@ -170,6 +173,7 @@ impl Command {
         REQUEST_PROTOCOL,
         REQUEST_CAPABILITIES,
         ENGAGE,
+        SELF_TEST,
     ];
 
     /// Returns the MAVLink command's number, for its answer.
@@ -177,6 +181,7 @@ impl Command {
         match self {
             Command::Arm | Command::Disarm | Command::Kill => ARM_DISARM,
             Command::Engage => ENGAGE,
+            Command::SelfTest => SELF_TEST,
             Command::TakeOff(_) => TAKE_OFF,
             Command::Land => LAND,
             Command::Return => RETURN,

@@ -3,7 +3,8 @@
 use super::{
     ARM_DISARM, CALIBRATE, CHECK_ARMING, CUSTOM_MODE, CalibrationRequest, Command, ENGAGE, FORCED, GET_INTERVAL, HOME,
     LAND, REBOOT, REPOSITION, REQUEST_CAPABILITIES, REQUEST_MESSAGE, REQUEST_PROTOCOL, RETURN, Reboot, SELECT_MODE,
-    SELECT_STANDARD_MODE, SET_CURRENT, SET_INTERVAL, SPEED, START_MISSION, STORAGE, Storage, TAKE_OFF, USUAL,
+    SELECT_STANDARD_MODE, SELF_TEST, SET_CURRENT, SET_INTERVAL, SPEED, START_MISSION, STORAGE, Storage, TAKE_OFF,
+    USUAL,
 };
 use crate::address::Address;
 use crate::message::{Fault, MessageFormat};
@@ -87,6 +88,7 @@ fn known(id: u16, [p1, p2, p3, p4]: [f32; 4], place: Option<Place>) -> Option<Co
         ARM_DISARM if p1 == 0.0 && forced => Command::Kill,
         ARM_DISARM if p1 == 0.0 => Command::Disarm,
         ENGAGE => Command::Engage,
+        SELF_TEST => Command::SelfTest,
         TAKE_OFF => Command::TakeOff(take_off(place?.height)?),
         LAND => Command::Land,
         RETURN => Command::Return,

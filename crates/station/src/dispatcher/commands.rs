@@ -6,7 +6,7 @@ use crate::services::origin::resolve;
 use crate::services::streams::{Requested, Streams, id};
 use crate::services::telemetry::compose;
 use crate::services::texts::Words;
-use crate::services::{control, modes};
+use crate::services::{control, modes, sensors};
 use afbc_flight_core::{Refusal, Request};
 use afbc_guidance::{FlightMode, Order, OrderRefusal};
 use afbc_link::{Address, Answer, Command, Height, Interval, MavSeverity, Place};
@@ -24,6 +24,17 @@ impl Dispatcher {
             Command::Arm if self.calibration.active.is_some() => {
                 self.texts.put(MavSeverity::MAV_SEVERITY_WARNING, "arming refused: calibrating");
                 Answer::Refused(CALIBRATES)
+            }
+            Command::Arm if let Some(text) = sensors::faulty(&self.status.aux) => {
+                self.texts.put(MavSeverity::MAV_SEVERITY_WARNING, text);
+                Answer::Refused(Refusal::SensorFailed as i32)
+            }
+            Command::SelfTest if !self.calibrates => Answer::Unsupported,
+            Command::SelfTest if self.status.mode.armed() => Answer::Refused(Refusal::AlreadyArmed as i32),
+            Command::SelfTest if self.calibration.active.is_some() => Answer::Refused(CALIBRATES),
+            Command::SelfTest => {
+                self.tests = true;
+                Answer::Accepted
             }
             Command::Arm => return self.ask(Request::Arm, id, from, inputs),
             Command::Disarm => return self.ask(Request::Disarm, id, from, inputs),
@@ -178,7 +189,11 @@ impl Dispatcher {
         if calibrates {
             self.texts.put(MavSeverity::MAV_SEVERITY_WARNING, "arming refused: calibrating");
         }
-        if may && !calibrates && against.is_empty() {
+        let faulty = sensors::faulty(&self.status.aux);
+        if let Some(text) = faulty {
+            self.texts.put(MavSeverity::MAV_SEVERITY_WARNING, text);
+        }
+        if may && !calibrates && faulty.is_none() && against.is_empty() {
             self.texts.put(MavSeverity::MAV_SEVERITY_INFO, "ready to arm");
         }
         for reason in against.iter() {

@@ -109,6 +109,7 @@ pub fn is_needed_for(command: Command) -> bool {
     match command {
         Command::Arm
         | Command::Engage
+        | Command::SelfTest
         | Command::TakeOff(_)
         | Command::Land
         | Command::Return

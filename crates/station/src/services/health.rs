@@ -22,6 +22,10 @@ pub mod sensor {
     pub const ARMING: u32 = 0x1000_0000;
 }
 
+/// Sensors with which a vehicle that has them does not start unless they are well.
+const NEEDED: u32 =
+    sensor::GYROSCOPE | sensor::ACCELEROMETER | sensor::GYROSCOPE_2 | sensor::ACCELEROMETER_2 | sensor::MAGNETOMETER;
+
 /// `MAV_LANDED_STATE`.
 const ON_GROUND: u8 = 1;
 const IN_AIR: u8 = 2;
@@ -52,7 +56,9 @@ pub fn system(status: &VehicleStatus) -> SystemStatus {
     let inertial = first | sensor::ATTITUDE;
     let located = status.is_located();
     let fixed = aux.receiver.is_some_and(|receiver| receiver.kind >= 3);
-    let armable = status.mode.armed() || status.against.is_some_and(Reasons::is_empty);
+    let faulty = aux.sensors.present & !aux.sensors.healthy & NEEDED;
+    let ready = status.against.is_some_and(Reasons::is_empty) && faulty == 0;
+    let armable = status.mode.armed() || ready;
     let sets = [
         (status.senses, true, inertial),
         (!status.senses, located, sensor::TRACKER),
@@ -139,7 +145,7 @@ mod tests {
     fn each_fault_takes_its_bit() {
         type Case = (fn(&mut VehicleStatus), u32);
         let cases: [Case; 4] = [
-            (|status| status.aux.sensors.healthy = sensor::BAROMETER, sensor::MAGNETOMETER),
+            (|status| status.aux.sensors.healthy = sensor::BAROMETER, sensor::MAGNETOMETER | sensor::ARMING),
             (|status| status.aux.receiver = Some(GnssReceiver::default()), sensor::SATELLITES),
             (|status| status.against = Some(Refusal::NotAtRest.into()), sensor::ARMING),
             (|status| status.against = None, sensor::ARMING),

@@ -13,6 +13,7 @@ pub mod logs;
 pub mod mission;
 pub mod modes;
 pub mod origin;
+pub mod sensors;
 pub mod serial;
 pub mod status;
 pub mod streams;
