@@ -3,7 +3,7 @@
 use afbc_estimator::Inertial;
 use nalgebra::{Matrix3, Vector3};
 
-/// Distance of the lanes from which on a witness tells: of a magnetic field its share, and of a velocity \[m/s\], to
+/// Distance of the lanes from which on another sensor decides: of a magnetic field its share, and of a velocity \[m/s\], to
 /// which twice its standard deviation along the axis is added. A vehicle's own field and the lanes' common errors stay
 /// below half of these.
 const FIELD: f32 = 0.12;
@@ -43,7 +43,7 @@ pub struct OtherSensors {
 /// ```
 ///
 /// with the attitude R, rates w and specific force f of the estimate, and its biases b and a, b_0 and a_0 at the
-/// beginning. Three witnesses say how far on the way from the lane that flies, 0, to the other one, 1, the vehicle is,
+/// beginning. Three measurements show how far on the way from the lane that flies, 0, to the other one, 1, the vehicle is,
 /// once the lanes are far enough apart:
 ///
 /// * the earth's magnetic field, which stays where it was before the beginning;
