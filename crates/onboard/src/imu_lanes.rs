@@ -3,9 +3,9 @@
 use afbc_estimator::Inertial;
 use nalgebra::{Matrix3, Vector3};
 
-/// Distance of the lanes from which on another sensor decides: of a magnetic field its share, and of a velocity \[m/s\], to
-/// which twice its standard deviation along the axis is added. A vehicle's own field and the lanes' common errors stay
-/// below half of these.
+/// Distance of the lanes from which on another sensor decides: of a magnetic field its share, and of a velocity
+/// \[m/s\], to which twice its standard deviation along the axis is added. A vehicle's own field and the lanes' common
+/// errors stay below half of these.
 const FIELD: f32 = 0.12;
 const SPEED_M_S: f32 = 0.5;
 /// Measurements in a row of each that must say the same.
