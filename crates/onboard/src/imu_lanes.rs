@@ -43,8 +43,8 @@ pub struct OtherSensors {
 /// ```
 ///
 /// with the attitude R, rates w and specific force f of the estimate, and its biases b and a, b_0 and a_0 at the
-/// beginning. Three measurements show how far on the way from the lane that flies, 0, to the other one, 1, the vehicle is,
-/// once the lanes are far enough apart:
+/// beginning. Three measurements show how far the vehicle is on the way from the lane that flies, 0, to the other one,
+/// 1, once the lanes are far enough apart:
 ///
 /// * the earth's magnetic field, which stays where it was before the beginning;
 /// * a GNSS receiver's velocity;
