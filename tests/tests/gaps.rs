@@ -202,7 +202,7 @@ fn chatter_mn(delta: f32, epsilon: f32) -> f64 {
     let (mut last, mut sum) = (0.0, 0.0);
     for step in 0..5000 {
         let command = controller.step(&mut memory, Some(&plant.motion().measure()), &Setpoint::default());
-        let roll_n = memory.control.inputs.roll;
+        let roll_n = memory.control.last.inputs.roll;
         if step >= 4000 {
             sum += f64::from(roll_n - last).abs();
         }
