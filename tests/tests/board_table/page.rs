@@ -34,7 +34,7 @@ pub(crate) fn wiring(board: &BoardTable) -> String {
         [
             "GNSS receiver, outside: out, in".to_owned(),
             format!("{}, {}", gnss.tx, gnss.rx),
-            format!("NMEA on {}", gnss.name),
+            format!("u-blox or NMEA on {}", gnss.name),
         ],
     ];
     let corners = match board.numbering.as_str() {

@@ -14,6 +14,14 @@ use afbc_onboard::{ControlInputs, give};
 use nalgebra::Vector3;
 
 impl Dispatcher {
+    /// Returns what speaks against arming beside the flight core's own reasons.
+    fn against_arming(&self) -> Option<(&'static str, i32)> {
+        if self.calibration.active.is_some() {
+            return Some(("arming refused: calibrating", CALIBRATES));
+        }
+        sensors::faulty(&self.status.aux).map(|text| (text, Refusal::SensorFailed as i32))
+    }
+
     /// Carries out a command, or leads to its being carried out: it is answered once, to `from`.
     pub(super) fn command(&mut self, command: Command, from: Address, inputs: &mut ControlInputs) {
         let id = command.id();
@@ -21,14 +29,13 @@ impl Dispatcher {
             return self.commands.answer(id, Answer::Refused(NOT_IN_CONTROL), from);
         }
         let answer = match command {
-            Command::Arm if self.calibration.active.is_some() => {
-                self.texts.put(MavSeverity::MAV_SEVERITY_WARNING, "arming refused: calibrating");
-                Answer::Refused(CALIBRATES)
-            }
-            Command::Arm if let Some(text) = sensors::faulty(&self.status.aux) => {
-                self.texts.put(MavSeverity::MAV_SEVERITY_WARNING, text);
-                Answer::Refused(Refusal::SensorFailed as i32)
-            }
+            Command::Arm => match self.against_arming() {
+                Some((text, reason)) => {
+                    self.texts.put(MavSeverity::MAV_SEVERITY_WARNING, text);
+                    Answer::Refused(reason)
+                }
+                None => return self.ask(Request::Arm, id, from, inputs),
+            },
             Command::SelfTest if !self.calibrates => Answer::Unsupported,
             Command::SelfTest if self.status.mode.armed() => Answer::Refused(Refusal::AlreadyArmed as i32),
             Command::SelfTest if self.calibration.active.is_some() => Answer::Refused(CALIBRATES),
@@ -36,7 +43,6 @@ impl Dispatcher {
                 self.tests = true;
                 Answer::Accepted
             }
-            Command::Arm => return self.ask(Request::Arm, id, from, inputs),
             Command::Disarm => return self.ask(Request::Disarm, id, from, inputs),
             Command::Kill => return self.ask(Request::Kill, id, from, inputs),
             Command::Engage => return self.ask(Request::Engage, id, from, inputs),
