@@ -113,6 +113,68 @@ impl ImuSample {
 }
 
 impl Measurement {
+    /// Numbers of which any of them is made, at most.
+    pub const NUMBERS: usize = 10;
+
+    /// Returns its kind (1 pose, 2 position, 3 GNSS, 4 height, 5 magnetic field, 6 heading) and its numbers in the
+    /// order of its fields, with zeros up to the end, for logs and wires.
+    pub fn numbers(&self) -> (u8, [f32; Self::NUMBERS]) {
+        let (kind, [first, second], [g, h, i, j]): (u8, [Vector3<f32>; 2], [f32; 4]) = match *self {
+            Measurement::Pose { position_m, attitude: [w, x, y, z], position_sigma_m, attitude_sigma_rad } => {
+                (1, [position_m, Vector3::new(w, x, y)], [z, position_sigma_m, attitude_sigma_rad, 0.0])
+            }
+            Measurement::Position { position_m, sigma_m } => {
+                (2, [position_m, Vector3::new(sigma_m, 0.0, 0.0)], [0.0; 4])
+            }
+            Measurement::Gnss {
+                position_m,
+                velocity_m_s,
+                horizontal_sigma_m,
+                vertical_sigma_m,
+                speed_sigma_m_s,
+                climb_sigma_m_s,
+            } => (
+                3,
+                [position_m, velocity_m_s],
+                [horizontal_sigma_m, vertical_sigma_m, speed_sigma_m_s, climb_sigma_m_s],
+            ),
+            Measurement::Height { height_m, sigma_m } => {
+                (4, [Vector3::new(height_m, sigma_m, 0.0), Vector3::zeros()], [0.0; 4])
+            }
+            Measurement::MagneticField { field, sigma } => (5, [field, Vector3::new(sigma, 0.0, 0.0)], [0.0; 4]),
+            Measurement::Heading { heading_rad, sigma_rad } => {
+                (6, [Vector3::new(heading_rad, sigma_rad, 0.0), Vector3::zeros()], [0.0; 4])
+            }
+        };
+        (kind, [first.x, first.y, first.z, second.x, second.y, second.z, g, h, i, j])
+    }
+
+    /// Returns the measurement of this kind and these [numbers](Self::numbers); none of an unknown kind.
+    pub fn of_numbers(kind: u8, [a, b, c, d, e, f, g, h, i, j]: [f32; Self::NUMBERS]) -> Option<Self> {
+        let first = Vector3::new(a, b, c);
+        Some(match kind {
+            1 => Measurement::Pose {
+                position_m: first,
+                attitude: [d, e, f, g],
+                position_sigma_m: h,
+                attitude_sigma_rad: i,
+            },
+            2 => Measurement::Position { position_m: first, sigma_m: d },
+            3 => Measurement::Gnss {
+                position_m: first,
+                velocity_m_s: Vector3::new(d, e, f),
+                horizontal_sigma_m: g,
+                vertical_sigma_m: h,
+                speed_sigma_m_s: i,
+                climb_sigma_m_s: j,
+            },
+            4 => Measurement::Height { height_m: a, sigma_m: b },
+            5 => Measurement::MagneticField { field: first, sigma: d },
+            6 => Measurement::Heading { heading_rad: a, sigma_rad: b },
+            _ => return None,
+        })
+    }
+
     /// True if every value is finite and possible: positions up to 50 km, velocities up to 150 m/s per coordinate,
     /// rotations that are ones, fields that are not zero, standard deviations above 0 and up to 1e4.
     #[must_use]

@@ -35,7 +35,7 @@ pub struct Readings {
 }
 
 /// Numbers of a measurement on the wire.
-const NUMBERS: usize = 10;
+const NUMBERS: usize = Measurement::NUMBERS;
 /// Bytes of a measurement on the wire: kind, age, numbers.
 const AID_LEN: usize = 1 + 4 + 4 * NUMBERS;
 /// Bytes of a sample: whether there is one, age, six numbers.
@@ -81,7 +81,7 @@ impl Readings {
         let mut free = readings.aids.iter_mut();
         for _ in 0..AIDS_MAX {
             let (kind, age_us, numbers) = fields(&mut rest);
-            if let (Some(value), true) = (measurement(kind, numbers), free.len() > 0) {
+            if let (Some(value), true) = (Measurement::of_numbers(kind, numbers), free.len() > 0) {
                 free.next().into_iter().for_each(|slot| *slot = Some(Aged { value, age_us }));
             }
         }
@@ -106,51 +106,8 @@ fn fields<const N: usize>(rest: &mut impl Iterator<Item = u8>) -> (u8, u32, [f32
 }
 
 fn aid_to_bytes(aid: &Aged<Measurement>) -> [u8; AID_LEN] {
-    let (kind, vectors, numbers): (u8, [Vector3<f32>; 2], [f32; 4]) = match aid.value {
-        Measurement::Pose { position_m, attitude: [w, x, y, z], position_sigma_m, attitude_sigma_rad } => {
-            (1, [position_m, Vector3::new(w, x, y)], [z, position_sigma_m, attitude_sigma_rad, 0.0])
-        }
-        Measurement::Position { position_m, sigma_m } => (2, [position_m, Vector3::new(sigma_m, 0.0, 0.0)], [0.0; 4]),
-        Measurement::Gnss {
-            position_m,
-            velocity_m_s,
-            horizontal_sigma_m,
-            vertical_sigma_m,
-            speed_sigma_m_s,
-            climb_sigma_m_s,
-        } => (3, [position_m, velocity_m_s], [horizontal_sigma_m, vertical_sigma_m, speed_sigma_m_s, climb_sigma_m_s]),
-        Measurement::Height { height_m, sigma_m } => {
-            (4, [Vector3::new(height_m, sigma_m, 0.0), Vector3::zeros()], [0.0; 4])
-        }
-        Measurement::MagneticField { field, sigma } => (5, [field, Vector3::new(sigma, 0.0, 0.0)], [0.0; 4]),
-        Measurement::Heading { heading_rad, sigma_rad } => {
-            (6, [Vector3::new(heading_rad, sigma_rad, 0.0), Vector3::zeros()], [0.0; 4])
-        }
-    };
-    let [first, second] = vectors;
-    record(kind, aid.age_us, first.iter().copied().chain(second.iter().copied()).chain(numbers))
-}
-
-fn measurement(kind: u8, [a, b, c, d, e, f, g, h, i, j]: [f32; NUMBERS]) -> Option<Measurement> {
-    let first = Vector3::new(a, b, c);
-    Some(match kind {
-        1 => {
-            Measurement::Pose { position_m: first, attitude: [d, e, f, g], position_sigma_m: h, attitude_sigma_rad: i }
-        }
-        2 => Measurement::Position { position_m: first, sigma_m: d },
-        3 => Measurement::Gnss {
-            position_m: first,
-            velocity_m_s: Vector3::new(d, e, f),
-            horizontal_sigma_m: g,
-            vertical_sigma_m: h,
-            speed_sigma_m_s: i,
-            climb_sigma_m_s: j,
-        },
-        4 => Measurement::Height { height_m: a, sigma_m: b },
-        5 => Measurement::MagneticField { field: first, sigma: d },
-        6 => Measurement::Heading { heading_rad: a, sigma_rad: b },
-        _ => return None,
-    })
+    let (kind, numbers) = aid.value.numbers();
+    record(kind, aid.age_us, numbers.into_iter())
 }
 
 #[cfg(test)]

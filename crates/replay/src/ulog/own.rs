@@ -10,10 +10,9 @@ use afbc_estimator::{Measurement, Settings, Stamped};
 use afbc_onboard::Configuration;
 use afbc_onboard::parameters::ParameterTable;
 use afbc_store::RecordName;
-use nalgebra::Vector3;
 
 /// Numbers of a measurement.
-const NUMBERS: usize = 10;
+const NUMBERS: usize = Measurement::NUMBERS;
 /// Prefix of the estimator's parameters.
 const ESTIMATOR: &str = "EST_";
 
@@ -86,26 +85,7 @@ fn aiding(row: &Row) -> Option<Aiding> {
         "numbers[8]",
         "numbers[9]",
     ];
-    let [a, b, c, d, e, f, g, h, i, j] = names.map(|name| row.get(name) as f32);
-    let first = Vector3::new(a, b, c);
-    let value = match row.get("kind") as u8 {
-        1 => {
-            Measurement::Pose { position_m: first, attitude: [d, e, f, g], position_sigma_m: h, attitude_sigma_rad: i }
-        }
-        2 => Measurement::Position { position_m: first, sigma_m: d },
-        3 => Measurement::Gnss {
-            position_m: first,
-            velocity_m_s: Vector3::new(d, e, f),
-            horizontal_sigma_m: g,
-            vertical_sigma_m: h,
-            speed_sigma_m_s: i,
-            climb_sigma_m_s: j,
-        },
-        4 => Measurement::Height { height_m: a, sigma_m: b },
-        5 => Measurement::MagneticField { field: first, sigma: d },
-        6 => Measurement::Heading { heading_rad: a, sigma_rad: b },
-        _ => return None,
-    };
+    let value = Measurement::of_numbers(row.get("kind") as u8, names.map(|name| row.get(name) as f32))?;
     let at_us = row.get("timestamp_sample") as u64;
     Some(Aiding { arrived_us: row.timestamp_us(), measurement: Stamped { value, at_us } })
 }

@@ -23,7 +23,7 @@ pub mod sensor {
 }
 
 /// Sensors with which a vehicle that has them does not start unless they are well.
-const NEEDED: u32 =
+pub(super) const NEEDED: u32 =
     sensor::GYROSCOPE | sensor::ACCELEROMETER | sensor::GYROSCOPE_2 | sensor::ACCELEROMETER_2 | sensor::MAGNETOMETER;
 
 /// `MAV_LANDED_STATE`.

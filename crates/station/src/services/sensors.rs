@@ -49,6 +49,7 @@ mod tests {
     fn each_sensor_is_named() {
         let aux = |present, healthy| AuxSensors { sensors: SensorBits { present, healthy }, ..AuxSensors::default() };
         let all = SENSORS.iter().fold(0, |all, (bits, _)| all | bits);
+        assert_eq!(all, super::super::health::NEEDED, "those without which it does not start");
         assert_eq!(faulty(&aux(all, all)), None);
         assert_eq!(faulty(&aux(0, 0)), None);
         // A barometer is the guidance's.

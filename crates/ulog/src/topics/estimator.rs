@@ -3,10 +3,8 @@
 use crate::layout::message;
 use crate::moment::{Moment, flip, flip_turn};
 use afbc_estimator::{Aid, Estimate, Measurement};
-use nalgebra::Vector3;
 
-/// Numbers of a measurement.
-const NUMBERS: usize = 10;
+const NUMBERS: usize = Measurement::NUMBERS;
 /// Kinds of aid.
 const AIDS: usize = Aid::ALL.len();
 /// States that it has, and places for them in PX4's message.
@@ -150,36 +148,7 @@ message! {
 
 impl AidOffered {
     pub(crate) fn of(timestamp: u64, timestamp_sample: u64, measurement: &Measurement) -> Self {
-        let (kind, [first, second], rest): (_, [Vector3<f32>; 2], [f32; 4]) = match *measurement {
-            Measurement::Pose { position_m, attitude: [w, x, y, z], position_sigma_m, attitude_sigma_rad } => {
-                (1, [position_m, Vector3::new(w, x, y)], [z, position_sigma_m, attitude_sigma_rad, 0.0])
-            }
-            Measurement::Position { position_m, sigma_m } => {
-                (2, [position_m, Vector3::new(sigma_m, 0.0, 0.0)], [0.0; 4])
-            }
-            Measurement::Gnss {
-                position_m,
-                velocity_m_s,
-                horizontal_sigma_m,
-                vertical_sigma_m,
-                speed_sigma_m_s,
-                climb_sigma_m_s,
-            } => (
-                3,
-                [position_m, velocity_m_s],
-                [horizontal_sigma_m, vertical_sigma_m, speed_sigma_m_s, climb_sigma_m_s],
-            ),
-            Measurement::Height { height_m, sigma_m } => {
-                (4, [Vector3::new(height_m, sigma_m, 0.0), Vector3::zeros()], [0.0; 4])
-            }
-            Measurement::MagneticField { field, sigma } => (5, [field, Vector3::new(sigma, 0.0, 0.0)], [0.0; 4]),
-            Measurement::Heading { heading_rad, sigma_rad } => {
-                (6, [Vector3::new(heading_rad, sigma_rad, 0.0), Vector3::zeros()], [0.0; 4])
-            }
-        };
-        let [a, b, c] = [first.x, first.y, first.z];
-        let [d, e, f] = [second.x, second.y, second.z];
-        let [g, h, i, j] = rest;
-        AidOffered { timestamp, timestamp_sample, numbers: [a, b, c, d, e, f, g, h, i, j], kind }
+        let (kind, numbers) = measurement.numbers();
+        AidOffered { timestamp, timestamp_sample, numbers, kind }
     }
 }
