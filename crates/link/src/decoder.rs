@@ -178,6 +178,11 @@ impl<M: Message> Decoder<M> {
 
     /// Takes the next bytes of the stream and delivers every message that they complete, with its sender.
     pub fn feed(&mut self, bytes: &[u8], mut deliver: impl FnMut(Address, M)) {
+        self.feed_whole(bytes, |from, message, _| deliver(from, message));
+    }
+
+    /// The same, and delivers the payload with each message.
+    pub fn feed_whole(&mut self, bytes: &[u8], mut deliver: impl FnMut(Address, M, &[u8])) {
         for &byte in bytes {
             // There is room, since `advance` always removes something from a full buffer.
             if let Some(next) = self.buffer.get_mut(self.length) {
@@ -196,7 +201,7 @@ impl<M: Message> Decoder<M> {
     }
 
     /// Handles everything in the buffer that can be decided.
-    fn advance(&mut self, deliver: &mut impl FnMut(Address, M)) {
+    fn advance(&mut self, deliver: &mut impl FnMut(Address, M, &[u8])) {
         loop {
             match self.front() {
                 Front::Incomplete(needed) => {
@@ -214,15 +219,17 @@ impl<M: Message> Decoder<M> {
                 }
                 Front::Intact { skipped, header, message } => {
                     add(&mut self.counters.skipped_bytes, skipped as u32);
-                    self.remove(skipped + header.frame_length());
                     self.count_lost(&header);
                     match message {
                         Ok(message) => {
                             add(&mut self.counters.received, 1);
-                            deliver(header.from, message);
+                            let begin = skipped + HEADER;
+                            let payload = self.buffer.get(begin..begin + usize::from(header.length));
+                            deliver(header.from, message, payload.unwrap_or_default());
                         }
                         Err(fault) => self.counters.count(fault),
                     }
+                    self.remove(skipped + header.frame_length());
                 }
             }
         }

@@ -7,10 +7,12 @@ use crate::services::calibration::Calibrator;
 use crate::services::commands::ANSWERS_PER_TICK;
 use crate::services::modes;
 use crate::services::status::AuxSensors;
+use crate::services::storage::{FileStore, LogStore};
 use crate::services::streams::{Requested, id};
 use crate::services::telemetry::compose;
 use crate::services::texts::{Words, reason, urgency};
 use crate::setup::Setup;
+use crate::transfers::{Outcome, TransferRequests, Transfers};
 use afbc::monitor::Norm;
 use afbc_calibration::RawSample;
 use afbc_control::math::sqrt;
@@ -138,10 +140,15 @@ impl Comms {
     ///
     /// A vehicle without an estimate of its own ignores poses, since a law needs velocities and rates.
     pub fn receive(&mut self, bytes: &[u8]) -> ControlInputs {
+        self.receive_beside(bytes, &mut ())
+    }
+
+    /// The same beside `requests`, which take what stations want of files and logs.
+    pub fn receive_beside(&mut self, bytes: &[u8], requests: &mut impl TransferRequests) -> ControlInputs {
         let mut update = ControlInputs::EMPTY;
         let Comms { decoder, dispatcher, tracker, state_is_news, .. } = self;
         let estimates = dispatcher.status.senses;
-        decoder.feed(bytes, |from, message| match message {
+        decoder.feed_whole(bytes, |from, message, payload| match message {
             Uplink::State { sent_us, state: value, sigmas } => {
                 let age_max_us = if estimates { POSE_AGE_MAX_US } else { COAST_US.into() };
                 let sighting = Sighting::State(value);
@@ -162,6 +169,7 @@ impl Comms {
                     update.inbox.put_pose(Stamped { value, at_us });
                 }
             }
+            other if requests.wants(&other) => dispatcher.hand_to(requests, (from, &other, payload), &mut update),
             other => dispatcher.hear(from, other, &mut update),
         });
         dispatcher.hand_over(&mut update);
@@ -284,6 +292,36 @@ impl Comms {
         }
         (self.sender, self.left) = (outlet.sender, outlet.left);
         change
+    }
+
+    /// Goes on with what stations want of files and logs, to be called after everything else that sends: it takes what
+    /// telemetry and parameters leave of the link, and a fifth of it at least. Together they send at most
+    /// [`REPORT_MAX`] bytes.
+    pub fn transfer<S: FileStore + LogStore>(
+        &mut self,
+        transfers: &mut Transfers<S::File>,
+        store: &mut S,
+        send: impl FnMut(&[u8]),
+    ) {
+        let Dispatcher { streams, texts, status, now_us, .. } = &mut self.dispatcher;
+        status.has_files = true;
+        transfers.tick(streams.bytes_per_s());
+        let mut outlet = Outlet { sender: self.sender, buffer: [0; FRAME_MAX], left: self.left, send };
+        while outlet.left >= FRAME_MAX
+            && (transfers.has_room() || streams.spares(transfers.frame_max()))
+            && let Some(outcome) = transfers.next(store, *now_us, status.mode.armed())
+        {
+            match outcome {
+                Outcome::Send(message) => {
+                    let bytes = outlet.say(&message);
+                    streams.spend(bytes);
+                    transfers.spend(bytes);
+                }
+                Outcome::Say(text, true) => texts.put(MavSeverity::MAV_SEVERITY_WARNING, text),
+                Outcome::Say(text, false) => texts.put(MavSeverity::MAV_SEVERITY_INFO, text),
+            }
+        }
+        (self.sender, self.left) = (outlet.sender, outlet.left);
     }
 
     /// True while the vehicle is calibrated, or a station wants to see its sensors' samples:
