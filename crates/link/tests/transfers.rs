@@ -104,7 +104,7 @@ proptest! {
         let mut decoder = Decoder::<Uplink>::new(VEHICLE);
         let mut heard = Vec::new();
         for piece in stream.chunks(usize::from(cut).max(1)) {
-            decoder.feed_whole(piece, |_, message, payload| heard.push((message, payload.to_vec())));
+            decoder.feed_whole(piece, |_| true, |_, message, payload| heard.push((message, payload.to_vec())));
         }
         prop_assert_eq!(heard.len(), 4);
         for (message, payload) in &heard {

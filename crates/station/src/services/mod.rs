@@ -17,6 +17,7 @@ pub mod modes;
 pub mod origin;
 pub mod sensors;
 pub mod serial;
+pub mod signing;
 pub mod status;
 pub mod storage;
 pub mod streams;
