@@ -1,6 +1,6 @@
 //! Files and logs of a vehicle with storage, on the link that telemetry and commands share.
 
-use crate::services::ftp::{Ftp, Terms, changes};
+use crate::services::ftp::{FileTerms, Ftp, changes};
 use crate::services::log_transfer::{LogMessage, LogTransfer};
 use crate::services::storage::{FileStore, LogStore};
 use afbc_link::{Address, Command, ComponentMetadata, FilePacket, LogRequest, Question, Transfer, Uplink};
@@ -26,8 +26,8 @@ pub trait TransferRequests {
     /// True if the message is one.
     fn wants(&self, message: &Uplink) -> bool;
 
-    /// Takes a message that it [wants](Self::wants); `may_change` is false if the station may not change anything. False
-    /// if too many wait.
+    /// Takes a message that it [wants](Self::wants); `may_change` is false if the station may not change anything.
+    /// False if too many wait.
     fn take(&mut self, from: Address, message: &Uplink, payload: &[u8], may_change: bool) -> bool;
 }
 
@@ -128,7 +128,7 @@ impl<F: Copy> Transfers<F> {
             }
         }
         while let Some(FileRequest { from, packet, may_change }) = self.files.pop_front() {
-            let terms = Terms { now_us, may_write: may_change && !armed };
+            let terms = FileTerms { now_us, may_write: may_change && !armed };
             if let Some(packet) = self.ftp.answer(from, &packet, store, terms) {
                 return Some(Outcome::Send(Transfer::File { packet, to: from }));
             }

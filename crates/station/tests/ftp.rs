@@ -4,7 +4,7 @@
 mod memory;
 
 use afbc_link::{Address, FILE_DATA_MAX, FileOpcode, FilePacket, FtpError};
-use afbc_station::services::ftp::{Ftp, SESSIONS, Terms, changes, crc32};
+use afbc_station::services::ftp::{FileTerms, Ftp, SESSIONS, changes, crc32};
 use memory::{Memory, bytes};
 use proptest::collection::vec;
 use proptest::prelude::*;
@@ -28,7 +28,7 @@ impl Bench {
 
     /// Sends a packet; returns its answer, of a burst the first packet, if there is one.
     fn send(&mut self, from: Address, packet: &FilePacket) -> Option<FilePacket> {
-        let terms = Terms { now_us: self.now_us, may_write: self.may_write };
+        let terms = FileTerms { now_us: self.now_us, may_write: self.may_write };
         let answer = self.ftp.answer(from, packet, &mut self.store, terms);
         answer.or_else(|| {
             self.packet().map(|(packet, to)| {
@@ -346,7 +346,7 @@ proptest! {
         for (who, packet) in &packets {
             let from = if *who { A } else { B };
             bench.now_us += 300_000;
-            let terms = Terms { now_us: bench.now_us, may_write };
+            let terms = FileTerms { now_us: bench.now_us, may_write };
             let answer = bench.ftp.answer(from, packet, &mut bench.store, terms);
             if let Some(answer) = answer {
                 prop_assert_eq!(answer.sequence, packet.sequence.wrapping_add(1));

@@ -140,8 +140,8 @@ impl<const N: usize> Configuration<N> {
 }
 
 impl<const N: usize> Configuration<N> {
-    /// Shows the declaration of every parameter, in the order of the list, with the words of a choice: of a vector three
-    /// times. For whoever describes them to a station; no image needs it.
+    /// Shows the declaration of every parameter, in the order of the list, with the words of a choice: of a vector
+    /// three times. For whoever describes them to a station; no image needs it.
     pub(crate) fn show_declarations(&self, show: &mut dyn FnMut(&Declaration, &'static [&'static str])) {
         let mut visit = |declaration: &Declaration, value: Value<'_>| {
             let (length, words): (_, &'static [&'static str]) = match value {

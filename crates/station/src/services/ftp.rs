@@ -22,7 +22,7 @@ const CHECKSUM_BLOCKS: usize = 16;
 
 /// On what terms a request is answered.
 #[derive(Clone, Copy, Debug)]
-pub struct Terms {
+pub struct FileTerms {
     /// Time since power-up \[us\].
     pub now_us: u64,
     /// True if the station may change files.
@@ -88,7 +88,7 @@ impl<F: Copy> Ftp<F> {
         from: Address,
         request: &FilePacket,
         store: &mut impl FileStore<File = F>,
-        terms: Terms,
+        terms: FileTerms,
     ) -> Option<FilePacket> {
         if request.opcode.0 >= FileOpcode::ACK.0 {
             return None;
@@ -139,7 +139,7 @@ impl<F: Copy> Ftp<F> {
         from: Address,
         request: &FilePacket,
         store: &mut impl FileStore<File = F>,
-        terms: Terms,
+        terms: FileTerms,
     ) -> Result<Option<FilePacket>, FtpError> {
         let wanted = usize::from(request.size);
         if wanted > FILE_DATA_MAX {
@@ -248,7 +248,7 @@ impl<F: Copy> Ftp<F> {
         request: &FilePacket,
         (path, access): (&FilePath, FileAccess),
         store: &mut impl FileStore<File = F>,
-        Terms { now_us, .. }: Terms,
+        FileTerms { now_us, .. }: FileTerms,
     ) -> Result<FilePacket, FtpError> {
         let place = match self.sessions.iter().position(Option::is_none) {
             Some(free) => free,
