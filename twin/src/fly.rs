@@ -43,15 +43,23 @@ pub(crate) struct Flight {
     pub(crate) pins: MotorPins,
 }
 
-/// Flies a scenario, with a receiver of u-blox's if one is given. The exact log, if it is to be kept in a file, must be
-/// flown again with the same result to the last bit.
-pub fn fly<M: Machine>(
-    image: &Path,
-    file: &Path,
-    receiver: Option<Generation>,
-    log: Option<&Path>,
-) -> Result<(), Box<dyn Error>> {
-    let scenario = load(file)?;
+/// What is to be flown.
+pub struct Order<'a> {
+    /// The scenario's file.
+    pub scenario: &'a Path,
+    /// A mission in the place of a hover.
+    pub is_mission: bool,
+    /// A receiver of u-blox's, in the place of the board's own.
+    pub receiver: Option<Generation>,
+    /// Where the exact log is kept.
+    pub log: Option<&'a Path>,
+}
+
+/// Flies what is ordered. The exact log, if it is to be kept in a file, must be flown again with the same result to the
+/// last bit.
+pub fn fly<M: Machine>(image: &Path, order: &Order<'_>) -> Result<(), Box<dyn Error>> {
+    let &Order { scenario, is_mission, receiver, log } = order;
+    let scenario = load(scenario)?;
     let mut board = M::built()?;
     let wire = Wire::default();
     check(board.attach_link(wire.clone()), "the link is wired")?;
@@ -68,7 +76,9 @@ pub fn fly<M: Machine>(
     }
     let receiver = receiver.map(|generation| UbloxPeer::new(generation, M::RECEIVER));
     let pins = MotorPins::new(M::SIGNAL, scenario.rotors.len());
-    let flight = Flight { pilot: Pilot::new(&scenario, wire)?, hearer, receiver, pins };
+    let pilot = Pilot::new(&scenario, wire)?;
+    let pilot = if is_mission { pilot.touring() } else { pilot };
+    let flight = Flight { pilot, hearer, receiver, pins };
     let mut images = vec![Image::read(image, None)?];
     if !kept.is_empty() {
         let kept = parameters(&kept, M::STORE_WORD)?;

@@ -17,10 +17,11 @@ use rigless::time::VirtualNanos;
 use std::error::Error;
 use std::path::Path;
 
-/// Flies a scenario.
-pub fn fly(file: &Path) -> Result<(), Box<dyn Error>> {
+/// Flies a scenario, with a mission if wanted.
+pub fn fly(file: &Path, is_mission: bool) -> Result<(), Box<dyn Error>> {
     let wire = Wire::default();
-    let mut pilot = Pilot::new(&load(file)?, wire.clone())?;
+    let pilot = Pilot::new(&load(file)?, wire.clone())?;
+    let mut pilot = if is_mission { pilot.touring() } else { pilot };
     let (mut host, mut gnss) = (Host::new()?, Gnss::new());
     let (mut now_ms, mut bytes) = (0, Vec::new());
     while let Some((mut readings, signals)) = pilot.advance(now_ms) {

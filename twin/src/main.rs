@@ -19,6 +19,7 @@ mod random;
 mod same;
 mod speedybee;
 mod table;
+mod tour;
 mod trouble;
 mod ublox;
 mod usb_ring;
@@ -27,7 +28,8 @@ mod world;
 
 use aloft::Aloft;
 use clap::builder::PossibleValuesParser;
-use clap::{Arg, ArgMatches, Command, value_parser};
+use clap::{Arg, ArgAction, ArgMatches, Command, value_parser};
+use fly::Order;
 use machines::MachineName;
 use std::error::Error;
 use std::path::{Path, PathBuf};
@@ -56,6 +58,10 @@ fn command() -> Command {
         .help("GNSS receiver: the board's own model, or a new u-blox");
     let log = Arg::new("log").long("log").value_name("FILE").value_parser(value_parser!(PathBuf));
     let log = log.help("Keep the exact log here, and fly it again on this machine: the same to the last bit");
+    let mission = || {
+        let mission = Arg::new("mission").long("mission").action(ArgAction::SetTrue);
+        mission.help("Fly a mission of two minutes, uploaded over the link, in the place of the hover")
+    };
     let number = |name: &'static str, usual: &'static str, help: &'static str| {
         Arg::new(name).long(name).value_name("N").value_parser(value_parser!(u64)).default_value(usual).help(help)
     };
@@ -71,6 +77,7 @@ fn command() -> Command {
             scenario(),
             receiver,
             log,
+            mission(),
         ]))
         .subcommand(Command::new("replay").about("Fly an exact log again").arg(file("log", "The log")))
         .subcommand(
@@ -90,7 +97,9 @@ fn command() -> Command {
             ],
         ))
         .subcommand(
-            Command::new("host").about("Fly a scenario with the firmware's code on this machine").arg(scenario()),
+            Command::new("host")
+                .about("Fly a scenario with the firmware's code on this machine")
+                .args([scenario(), mission()]),
         )
 }
 
@@ -122,7 +131,8 @@ fn run(matches: &ArgMatches) -> Result<(), Box<dyn Error>> {
             let receiver = RECEIVERS.into_iter().find(|(receiver, _)| name.is_some_and(|name| name == receiver));
             let receiver = receiver.and_then(|(_, generation)| generation);
             let log = matches.get_one::<PathBuf>("log").map(PathBuf::as_path);
-            with_machine!(chosen(matches)?, M => fly::fly::<M>(image, scenario, receiver, log))
+            let order = Order { scenario, is_mission: matches.get_flag("mission"), receiver, log };
+            with_machine!(chosen(matches)?, M => fly::fly::<M>(image, &order))
         }
         Some(("replay", matches)) => same::check_log(&std::fs::read(path(matches, "log")?)?),
         Some(("faults", matches)) => {
@@ -133,7 +143,7 @@ fn run(matches: &ArgMatches) -> Result<(), Box<dyn Error>> {
         Some(("cuts", matches)) => {
             cuts::cut_all(path(matches, "image")?, number(matches, "seed")?, number(matches, "cuts")?)
         }
-        Some(("host", matches)) => host::fly(path(matches, "scenario")?),
+        Some(("host", matches)) => host::fly(path(matches, "scenario")?, matches.get_flag("mission")),
         _ => Err("no such command".into()),
     }
 }
