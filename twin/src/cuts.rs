@@ -5,6 +5,7 @@ use crate::check::check;
 use crate::kept::Changes;
 use crate::machine::{Machine, quiet_usb};
 use crate::random::Random;
+use crate::trouble::Patient;
 use crate::wire::Wire;
 use afbc_link::{Address, Decoder, Downlink, FRAME_MAX, ParameterName, ParameterRequest, Sender, Uplink};
 use rigless::emulator::{AccessKind, Driver, Host, Settled, Start, Stop, run};
@@ -202,7 +203,7 @@ impl Starts {
                 host.program(address, Width::W64, value).ok()?;
             }
         }
-        lose_memory(session, host, &mut self.random);
+        session.lose_memory(host, &mut self.random);
         session.reset_by_pin(stop.at, stop.instruction_count, host);
         self.wire.exchange(&[]);
         self.wire.take();
@@ -238,16 +239,6 @@ impl Driver<MatekH743> for Starts {
         let names = [WRITTEN.0, OTHER.0].map(|name| Uplink::Parameter(ParameterRequest::ReadName(padded(name))));
         say(&self.wire, &names);
         Some(VirtualNanos(stop.at.0 + MS))
-    }
-}
-
-/// Fills the memories with noise, as they are after a start.
-pub fn lose_memory(session: &mut Session<MatekH743>, host: &mut dyn Host, random: &mut Random) {
-    let memory = session.mcu().bus().memory().to_vec();
-    for region in memory.iter().filter(|region| region.kind.is_writable()) {
-        for offset in (0..region.size).step_by(8) {
-            let _ = host.write(region.base + offset, Width::W64, random.next());
-        }
     }
 }
 

@@ -7,9 +7,11 @@ mod aloft;
 mod boot;
 mod check;
 mod cuts;
+mod f405;
 mod faults;
 mod fly;
 mod host;
+mod impairments;
 mod kept;
 mod machine;
 mod machines;
@@ -17,7 +19,6 @@ mod pilot;
 mod pins;
 mod random;
 mod same;
-mod speedybee;
 mod table;
 mod tour;
 mod trouble;
@@ -65,7 +66,8 @@ fn command() -> Command {
     let number = |name: &'static str, usual: &'static str, help: &'static str| {
         Arg::new(name).long(name).value_name("N").value_parser(value_parser!(u64)).default_value(usual).help(help)
     };
-    let only = Arg::new("only").long("only").value_name("NAME").default_value("").help("Those whose names begin so");
+    let only = Arg::new("only").long("only").value_name("NAME").action(ArgAction::Append);
+    let only = only.help("Those whose names begin so; may be given again");
     Command::new("twin")
         .about("Runs the flight image of a board, as it is flashed, on register-level models of the board")
         .subcommand_required(true)
@@ -80,15 +82,15 @@ fn command() -> Command {
             mission(),
         ]))
         .subcommand(Command::new("replay").about("Fly an exact log again").arg(file("log", "The log")))
-        .subcommand(
-            Command::new("faults").about("Faults at the Matek H743's pins, in a hover that is kept in a file").args([
-                image(),
-                scenario(),
-                file("hover", "Where the hover is kept, from which further runs begin"),
-                number("seeds", "1", "Flights of each fault"),
-                only,
-            ]),
-        )
+        .subcommand(Command::new("faults").about("Faults at a board's pins, in a hover that is kept in a file").args([
+            machine(),
+            image(),
+            scenario(),
+            file("hover", "Where the hover is kept, from which further runs begin"),
+            number("seeds", "1", "Flights of each fault"),
+            number("first", "1", "The first one's seed"),
+            only,
+        ]))
         .subcommand(Command::new("cuts").about("Power cut while the Matek H743 writes and erases its parameters").args(
             [
                 image(),
@@ -137,8 +139,13 @@ fn run(matches: &ArgMatches) -> Result<(), Box<dyn Error>> {
         Some(("replay", matches)) => same::check_log(&std::fs::read(path(matches, "log")?)?),
         Some(("faults", matches)) => {
             let [image, scenario, hover] = ["image", "scenario", "hover"].map(|name| path(matches, name));
-            let only = matches.get_one::<String>("only").map_or("", String::as_str);
-            faults::fly_all(&Aloft::of(image?, scenario?, hover?)?, 1..number(matches, "seeds")? + 1, only)
+            let (image, scenario, hover) = (image?, scenario?, hover?);
+            let first = number(matches, "first")?;
+            let seeds = first..first + number(matches, "seeds")?;
+            let names: Vec<_> = matches.get_many::<String>("only").into_iter().flatten().map(String::as_str).collect();
+            with_machine!(chosen(matches)?, M => {
+                faults::fly_all(&Aloft::<M>::of(image, scenario, hover)?, seeds, &names)
+            })
         }
         Some(("cuts", matches)) => {
             cuts::cut_all(path(matches, "image")?, number(matches, "seed")?, number(matches, "cuts")?)

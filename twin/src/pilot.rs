@@ -10,7 +10,7 @@ use afbc_onboard::Readings;
 use afbc_plant::Motion;
 use afbc_scenario::Scenario;
 use afbc_sim::flight::World;
-use afbc_types::{ROTORS_MAX, RotorSpeeds};
+use afbc_types::{PoseSigmas, ROTORS_MAX, RotorSpeeds};
 use rigless::machine::flight::Signals;
 use std::error::Error;
 
@@ -27,6 +27,9 @@ const TOUR_MS: u64 = 160_000;
 const OFF_M: f64 = 2.5;
 const TILT_RAD: f64 = 0.7;
 const TOUR_TILT_RAD: f64 = 0.9;
+
+/// Time between two states of a tracker [ms].
+const TRACKED_MS: u64 = 10;
 
 /// Parts of the flight.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -150,8 +153,12 @@ impl Pilot {
             *speed = share * self.speed_max_rad_s;
         }
         self.world.advance(&speeds);
-        self.world.look();
+        let view = self.world.look();
         let readings = self.world.readings().copied().unwrap_or_default();
+        // A vehicle without instruments has a tracker.
+        if let Some(state) = view.state.filter(|_| self.world.readings().is_none() && now_ms % TRACKED_MS == 0) {
+            self.say(&Uplink::State { sent_us: now_ms * 1000, state, sigmas: PoseSigmas::UNKNOWN });
+        }
         let signals = self.transducers.feel(&readings);
         self.talk();
         (readings, signals)
