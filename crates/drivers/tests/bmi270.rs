@@ -147,7 +147,7 @@ impl SpiDevice for Sent {
 fn a_byte_is_skipped_in_front_of_its_answers_and_the_configuration_is_one_block() {
     let spi = Bmi270::SPI.expect("SPI");
     let mut byte = [0];
-    block_on(Spipart(Sent(Vec::new()), spi).read(0x00, &mut byte)).expect("a read");
+    block_on(SpiRegisters::new(Sent(Vec::new()), spi).read(0x00, &mut byte)).expect("a read");
     assert_eq!(byte, [2], "command and dummy are sent before it is read");
     let blocks = Bmi270::SETUP.iter().filter(|step| matches!(step, Step::WriteAll(0x5E, bytes) if bytes.len() == 8192));
     assert_eq!(blocks.count(), 1);
