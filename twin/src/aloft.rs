@@ -7,6 +7,7 @@ use crate::machine::{Machine, quiet_usb};
 use crate::pilot::Pilot;
 use crate::pins::MotorPins;
 use crate::wire::Wire;
+use crate::world::at_the_place;
 use afbc_scenario::{Scenario, load};
 use rigless::emulator::{Driver, Finished, Host, Settled, Start, Stop, run};
 use rigless::image::{Image, digest};
@@ -108,6 +109,7 @@ fn flight<M: Machine>(scenario: &Scenario, link: &Link, prints: bool) -> Result<
 
 fn board<M: Machine>(link: &Link) -> Result<Box<M>, Box<dyn Error>> {
     let mut board = M::built()?;
+    board.sense(&at_the_place());
     check(board.attach_link(link.board.clone()), "the link is wired")?;
     Ok(board)
 }

@@ -10,6 +10,7 @@ use crate::same;
 use crate::ublox::{Generation, UbloxPeer};
 use crate::usb_ring::UsbRing;
 use crate::wire::Wire;
+use crate::world::at_the_place;
 use afbc_scenario::load;
 use rigless::emulator::{Driver, Host, Settled, Start, Stop, run};
 use rigless::image::Image;
@@ -61,6 +62,7 @@ pub fn fly<M: Machine>(image: &Path, order: &Order<'_>) -> Result<(), Box<dyn Er
     let &Order { scenario, is_mission, receiver, log } = order;
     let scenario = load(scenario)?;
     let mut board = M::built()?;
+    board.sense(&at_the_place());
     let wire = Wire::default();
     check(board.attach_link(wire.clone()), "the link is wired")?;
     let mut hearer = None;

@@ -228,15 +228,16 @@ impl Pilot {
         let passed_ms = self.now_ms - self.since_ms;
         let second = passed_ms % 1000 == 999;
         if self.prints && self.now_ms % 5000 == 0 {
-            let [east, north, up] = self.transducers.fix_m();
+            let mut errors = String::new();
+            if self.world.readings().is_some() {
+                let ([east, north, up], height_m) = (self.transducers.fix_m(), self.transducers.height_m());
+                let fix = format!("{:.2} {:.2} {:.2} m", east - x, north - y, up - z);
+                errors = format!("; fix off by {fix}, height by {:.2} m", height_m - z);
+            }
             println!(
-                "{:7.3} s: {:?}, {x:.2} {y:.2} {z:.2} m; fix off by {:.2} {:.2} {:.2} m, height by {:.2} m",
+                "{:7.3} s: {:?}, {x:.2} {y:.2} {z:.2} m{errors}",
                 self.now_ms as f64 * 1e-3,
-                self.phase,
-                east - x,
-                north - y,
-                up - z,
-                self.transducers.height_m() - z
+                self.phase
             );
         }
         let next = match self.phase {
