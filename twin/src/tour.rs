@@ -42,7 +42,7 @@ const LEGS: [Leg; 11] = [
     Leg::Land([0.0, 0.0]),
 ];
 
-/// What the vehicle may be off, by the truth, when it says that it has reached a place [m]: the distance at which a place
+/// What the vehicle may be off, by the truth, when it says that it has reached a place [m]: the distance at which it
 /// counts as reached, and what position and its frame are off, of which the first fix is the origin.
 const OFF_M: f64 = 4.0;
 
