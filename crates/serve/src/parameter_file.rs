@@ -43,7 +43,7 @@ impl ParameterFile {
         if let Err(error) = self.0.make_room() {
             notice(error.reason());
         }
-        Host::stored(scenario.vehicle_file.as_ref(), link, &mut self.0, notice)
+        Host::stored(scenario.vehicle_file.as_ref(), link, &mut self.0, &mut notice)
     }
 
     /// Writes a change.
