@@ -234,11 +234,7 @@ impl Pilot {
                 let fix = format!("{:.2} {:.2} {:.2} m", east - x, north - y, up - z);
                 errors = format!("; fix off by {fix}, height by {:.2} m", height_m - z);
             }
-            println!(
-                "{:7.3} s: {:?}, {x:.2} {y:.2} {z:.2} m{errors}",
-                self.now_ms as f64 * 1e-3,
-                self.phase
-            );
+            println!("{:7.3} s: {:?}, {x:.2} {y:.2} {z:.2} m{errors}", self.now_ms as f64 * 1e-3, self.phase);
         }
         let next = match self.phase {
             Phase::Wakes => {
