@@ -12,6 +12,7 @@ use afbc_onboard::{Configuration, ControlInputs, Flight, ImuSelector, Link, Prep
 use afbc_recorder::{Given, Recorder, TickRecord};
 use afbc_scenario::contender::{ControllerKind, Law};
 use afbc_scenario::{AnyController, FlownLaw};
+use afbc_station::services::signing::{Signing, SigningRecord};
 use afbc_station::{Calibrator, Comms, RadioControl, Setup};
 use afbc_store::Store;
 use afbc_types::{OutOfRange, ROTORS_MAX, with_rotors};
@@ -211,6 +212,8 @@ pub struct HostTick {
     pub bytes: Vec<u8>,
     /// A parameter that has changed, to be kept.
     pub change: Option<RecordChange>,
+    /// What of the link's signatures is to be kept.
+    pub signing: Option<SigningRecord>,
 }
 
 impl Host {
@@ -254,7 +257,7 @@ impl Host {
         })
     }
 
-    /// The same with the parameters that are in `store`; `notice` is called with a line on each that is not used.
+    /// The same with the parameters and the key of signatures that are in `store`; `notice` is called with a line on each that is not used.
     /// Without a store that can be read, they are at their defaults.
     ///
     /// # Errors
@@ -265,14 +268,16 @@ impl Host {
         store: &mut Store<Flash>,
         notice: &mut dyn FnMut(&str),
     ) -> Result<Self, OutOfRange> {
-        let Some(vehicle) = vehicle else {
-            let table = loaded(Configuration { link, ..Configuration::default() }, store, notice);
-            return Self::image(table, PAPER);
+        let signing = Signing::kept(|name| store.get(name).ok().flatten().map(|(_, bits)| bits));
+        let mut host = match vehicle {
+            None => Self::image(loaded(Configuration { link, ..Configuration::default() }, store, notice), PAPER)?,
+            Some(vehicle) => with_rotors!(vehicle.rotors.len(), N => {
+                let table = loaded::<N>(Configuration { link, ..vehicle.configuration()? }, store, notice);
+                Self::image(table, &vehicle.name)
+            })?,
         };
-        with_rotors!(vehicle.rotors.len(), N => {
-            let table = loaded::<N>(Configuration { link, ..vehicle.configuration()? }, store, notice);
-            Self::image(table, &vehicle.name)
-        })
+        host.comms.set_signing(signing);
+        Ok(host)
     }
 
     /// Creates what an image is.
@@ -401,7 +406,7 @@ impl Host {
         // Notices that there are none.
         self.hear_radio(&[]);
         self.time_us = time_us;
-        HostTick { report, bytes, change }
+        HostTick { report, bytes, change, signing: self.comms.signing_record() }
     }
 
     /// Runs the tick a millisecond after the previous one, with a duration of zero.

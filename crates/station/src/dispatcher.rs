@@ -113,7 +113,7 @@ impl Dispatcher {
         }
     }
 
-    /// Handles a message, except states and poses.
+    /// Handles a message, except states, poses and keys of signatures.
     pub(crate) fn hear(&mut self, from: Address, message: Uplink, inputs: &mut ControlInputs) {
         if from == self.me {
             // Its own, sent back.
@@ -142,7 +142,7 @@ impl Dispatcher {
                 self.reply(Reply::Control(answer));
                 self.warn_not_in_control(from, claim);
             }
-            Uplink::Heartbeat | Uplink::State { .. } | Uplink::Pose { .. } => (),
+            Uplink::Heartbeat | Uplink::State { .. } | Uplink::Pose { .. } | Uplink::Signing(_) => (),
         }
     }
 
