@@ -103,6 +103,11 @@ impl Return {
         Return { height_m, hold: Hold::default(), stage: Stage::Climbs }
     }
 
+    /// True once it has stopped and climbed.
+    pub(crate) fn is_on_its_way(&self) -> bool {
+        self.stage != Stage::Climbs
+    }
+
     pub(crate) fn fly(&mut self, inputs: &ModeInputs<'_>) -> ModeOutput {
         let home_m = Vector3::new(inputs.home_m.x, inputs.home_m.y, self.height_m);
         match self.stage {

@@ -18,6 +18,7 @@ use afbc_flight_core::rate;
 use afbc_flight_core::supervisor::COAST_US;
 use afbc_flight_core::tracker::{POSE_AGE_MAX_US, Refused, Sighting};
 use afbc_flight_core::{Mode, Stamped, Tracker};
+use afbc_guidance::fence::Braking;
 use afbc_guidance::{BatteryReading, Cause, ModeReason, Notice};
 use afbc_link::{
     Address, Decoder, Downlink, FRAME_MAX, InertialSample, MavSeverity, Message, PositionTarget, Reboot, Sender,
@@ -130,7 +131,7 @@ impl Comms {
 
     /// True if [`receive`](Self::receive) has something for the next tick even without bytes.
     pub fn has_mail(&self) -> bool {
-        self.dispatcher.wanted_leg().is_some()
+        self.dispatcher.wanted_leg().is_some() || self.dispatcher.has_fence_news()
     }
 
     /// Processes the next bytes of the stream; returns new inputs for the control tick, to be
@@ -275,6 +276,7 @@ impl Comms {
         // COM_DL_LOSS_T, which is in range.
         let silent_us = (table.configuration().guidance.net.station_lost_s * 1e6) as u64;
         self.dispatcher.control.set_silence(silent_us);
+        self.dispatcher.braking = Braking::of(&table.configuration().guidance.limits);
         let mut outlet = Outlet { sender: self.sender, buffer: [0; FRAME_MAX], left: self.left, send };
         let Dispatcher { parameters, streams, now_us, .. } = &mut self.dispatcher;
         while outlet.left >= VALUE_BYTES as usize

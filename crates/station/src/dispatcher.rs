@@ -2,6 +2,7 @@
 
 mod calibration;
 mod commands;
+mod fence;
 mod parameters;
 mod targets;
 
@@ -9,13 +10,15 @@ use crate::parameters::Service;
 use crate::services::calibration::CalibrationState;
 use crate::services::commands::Commands;
 use crate::services::control::{ControlClaim, OperatorControl};
+use crate::services::fence::FenceWatch;
 use crate::services::mission::Missions;
 use crate::services::status::VehicleStatus;
 use crate::services::streams::{Requested, Streams, id};
 use crate::services::texts::{Texts, Words};
 use crate::services::{events, extended, files, logs, serial, timesync};
 use crate::setup::Setup;
-use afbc_guidance::Order;
+use afbc_guidance::fence::Braking;
+use afbc_guidance::{FenceView, Order};
 use afbc_link::{
     Address, Clock, ControlAnswer, DataStream, Downlink, Interval, MavSeverity, Mission, ParameterError,
     ParameterRequest, Question, QuestionRefusal, Reboot, Uplink,
@@ -59,6 +62,10 @@ pub(crate) struct Dispatcher {
     pub(crate) commands: Commands,
     pub(crate) control: OperatorControl,
     pub(crate) missions: Missions,
+    /// What is seen of the geofence, with which limits, and what the guidance knows of it.
+    fence: FenceWatch,
+    pub(crate) braking: Braking,
+    fence_given: FenceView,
     pub(crate) streams: Streams,
     pub(crate) texts: Texts,
     replies: Deque<Reply, REPLIES_MAX>,
@@ -95,6 +102,9 @@ impl Dispatcher {
             commands: Commands::default(),
             control: OperatorControl::default(),
             missions: Missions::default(),
+            fence: FenceWatch::default(),
+            braking: Braking::default(),
+            fence_given: FenceView::default(),
             streams: Streams::new(setup.bytes_per_s),
             texts: Texts::default(),
             replies: Deque::new(),
@@ -152,20 +162,27 @@ impl Dispatcher {
             self.given = Some((leg.number, leg.upload));
             inputs.order().leg = Some(leg);
         }
+        if self.has_fence_news() {
+            self.fence_given = self.fence.view();
+            inputs.order().fence = Some(self.fence_given);
+        }
     }
 
     /// Returns the item of the mission that the guidance wants and does not have.
     pub(crate) fn wanted_leg(&self) -> Option<afbc_guidance::Leg> {
         let wanted = self.status.guided.wanted;
+        if self.given == Some((wanted, self.missions.number())) {
+            return None;
+        }
         let home_m = self.status.guided.home_m.map_or(0.0, |home| home.z);
-        let leg = self.missions.leg(wanted, self.status.aux.origin.as_ref(), home_m)?;
-        (self.given != Some((leg.number, leg.upload))).then_some(leg)
+        self.missions.leg(wanted, self.status.aux.origin.as_ref(), home_m).map(|leg| self.fenced(leg))
     }
 
     /// Does what is due after a tick.
     pub(crate) fn tick(&mut self) {
         self.streams.tick();
         self.report_checks();
+        self.watch_fence();
         if let Some(words) = self.missions.tick(self.now_us) {
             self.texts.say(MavSeverity::MAV_SEVERITY_WARNING, &words);
         }
@@ -260,7 +277,11 @@ impl Dispatcher {
     fn mission(&mut self, message: Mission, from: Address, inputs: &mut ControlInputs) {
         let changes = matches!(message, Mission::Count(..) | Mission::Clear(_) | Mission::SetCurrent(_));
         let in_control = changes && self.may(from, inputs);
-        let heard = self.missions.hear(message, from, in_control, self.now_us);
+        let around = self.surroundings();
+        let heard = self.missions.hear(message, from, in_control, self.now_us, &around);
+        if heard.fence {
+            self.fence.renew();
+        }
         if matches!(message, Mission::SetCurrent(_)) {
             // After the tick in which the guidance takes it up.
             self.streams.request(Requested { message: id::MISSION_CURRENT, index: 0 });

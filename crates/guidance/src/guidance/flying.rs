@@ -216,11 +216,12 @@ impl Memory {
     ) -> ModeOutput {
         match self.mode {
             FlightMode::Hold => {
-                if !matches!(self.plan, Plan::Hold(_)) || !inputs.airborne {
+                if !matches!(self.plan, Plan::Hold(_) | Plan::Orbit(_)) || !inputs.airborne {
                     self.plan = Plan::Hold(Hold::default());
                 }
                 match &mut self.plan {
                     Plan::Hold(hold) => ModeOutput::fly(hold.fly(inputs)),
+                    Plan::Orbit(orbit) => orbit.fly(inputs),
                     _ => ModeOutput::fly(inputs.stop()),
                 }
             }

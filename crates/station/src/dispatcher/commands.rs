@@ -5,7 +5,7 @@ use crate::services::commands::{BUSY, CALIBRATES, NO_ORIGIN, NOT_IN_CONTROL, NOT
 use crate::services::origin::resolve;
 use crate::services::streams::{Requested, Streams, id};
 use crate::services::telemetry::compose;
-use crate::services::texts::Words;
+use crate::services::texts::{Words, reason};
 use crate::services::{control, modes, sensors};
 use afbc_flight_core::{Refusal, Request};
 use afbc_guidance::{FlightMode, Order, OrderRefusal};
@@ -75,6 +75,10 @@ impl Dispatcher {
                 Answer::Accepted
             }
             _ => match self.order_of(command) {
+                Ok(order) if !self.fence_allows(&order) => {
+                    self.texts.put(MavSeverity::MAV_SEVERITY_WARNING, reason(OrderRefusal::OutsideFence));
+                    Answer::Refused(OrderRefusal::OutsideFence as i32)
+                }
                 Ok(order) => {
                     if let Command::Home(_) = command {
                         // MAVLink wants it reported whether it has changed or not.

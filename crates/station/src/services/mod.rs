@@ -6,6 +6,7 @@ pub mod commands;
 pub mod control;
 pub mod events;
 pub mod extended;
+pub mod fence;
 pub mod files;
 pub mod health;
 pub mod imus;

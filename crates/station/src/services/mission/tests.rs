@@ -16,6 +16,7 @@ use std::vec::Vec as List;
 const A: Address = Address { system: 255, component: 190 };
 const B: Address = Address { system: 245, component: 190 };
 const PLAN: Plan = Plan::MISSION;
+const NOWHERE: Surroundings = Surroundings { chart: None, here_m: None };
 
 fn waypoint(number: u16) -> MissionItem {
     MissionItem {
@@ -37,10 +38,10 @@ fn said(missions: &mut Missions) -> List<(Mission, Address)> {
 
 /// Uploads items without a loss; returns what was said last.
 fn upload(missions: &mut Missions, items: &[MissionItem]) -> List<(Mission, Address)> {
-    missions.hear(Mission::Count(items.len() as u16, PLAN), A, true, 0);
+    missions.hear(Mission::Count(items.len() as u16, PLAN), A, true, 0, &NOWHERE);
     for item in items {
         assert_eq!(said(missions), [(Mission::Request(item.number, PLAN), A)]);
-        missions.hear(Mission::Item(*item, PLAN), A, true, 0);
+        missions.hear(Mission::Item(*item, PLAN), A, true, 0, &NOWHERE);
     }
     said(missions)
 }
@@ -50,26 +51,26 @@ fn what_was_uploaded_can_be_downloaded() {
     let mut missions = Missions::default();
     let items: List<_> = (0..ITEMS_MAX as u16).map(waypoint).collect();
     assert_eq!(upload(&mut missions, &items), [(Mission::Ack(MissionResult::ACCEPTED, PLAN), A)]);
-    missions.hear(Mission::List(PLAN), B, false, 0);
+    missions.hear(Mission::List(PLAN), B, false, 0, &NOWHERE);
     assert_eq!(said(&mut missions), [(Mission::Count(64, PLAN), B)]);
     for item in &items {
-        missions.hear(Mission::Request(item.number, PLAN), B, false, 0);
+        missions.hear(Mission::Request(item.number, PLAN), B, false, 0, &NOWHERE);
         let reported = said(&mut missions);
         // A heading that is not given is NaN, which differs from itself.
         assert_eq!(std::format!("{reported:?}"), std::format!("{:?}", [(Mission::Item(*item, PLAN), B)]));
     }
-    missions.hear(Mission::Request(64, PLAN), B, false, 0);
+    missions.hear(Mission::Request(64, PLAN), B, false, 0, &NOWHERE);
     assert_eq!(said(&mut missions), [(Mission::Ack(MissionResult::INVALID_SEQUENCE, PLAN), B)]);
 }
 
 #[test]
-fn fences_and_rally_points_are_empty() {
+fn rally_points_are_empty() {
     let mut missions = Missions::default();
-    for plan in [Plan::FENCE, Plan::RALLY] {
-        missions.hear(Mission::List(plan), A, false, 0);
-        missions.hear(Mission::Count(0, plan), A, true, 0);
-        missions.hear(Mission::Count(1, plan), A, true, 0);
-        missions.hear(Mission::Clear(plan), A, true, 0);
+    for plan in [Plan::RALLY] {
+        missions.hear(Mission::List(plan), A, false, 0, &NOWHERE);
+        missions.hear(Mission::Count(0, plan), A, true, 0, &NOWHERE);
+        missions.hear(Mission::Count(1, plan), A, true, 0, &NOWHERE);
+        missions.hear(Mission::Clear(plan), A, true, 0, &NOWHERE);
         let [accepted, unsupported] =
             [MissionResult::ACCEPTED, MissionResult::UNSUPPORTED].map(|it| (Mission::Ack(it, plan), A));
         assert_eq!(said(&mut missions), [(Mission::Count(0, plan), A), accepted, unsupported, accepted]);
@@ -81,10 +82,10 @@ fn fences_and_rally_points_are_empty() {
 fn a_broken_upload_changes_nothing() {
     let mut missions = Missions::default();
     upload(&mut missions, &[waypoint(0), waypoint(1)]);
-    missions.hear(Mission::Count(3, PLAN), A, true, 0);
-    missions.hear(Mission::Item(waypoint(0), PLAN), A, true, 0);
+    missions.hear(Mission::Count(3, PLAN), A, true, 0, &NOWHERE);
+    missions.hear(Mission::Item(waypoint(0), PLAN), A, true, 0, &NOWHERE);
     let bad = MissionItem { command: 205, ..waypoint(1) };
-    let heard = missions.hear(Mission::Item(bad, PLAN), A, true, 0);
+    let heard = missions.hear(Mission::Item(bad, PLAN), A, true, 0, &NOWHERE);
     assert_eq!(heard.text, Some(Words::of("mission item 1: command is not supported")));
     assert_eq!(said(&mut missions).last(), Some(&(Mission::Ack(MissionResult::UNSUPPORTED, PLAN), A)));
     assert_eq!(missions.items().len(), 2);
@@ -94,7 +95,7 @@ fn a_broken_upload_changes_nothing() {
 #[test]
 fn lost_messages_are_repeated_and_a_silent_station_is_given_up() {
     let mut missions = Missions::default();
-    missions.hear(Mission::Count(2, PLAN), A, true, 0);
+    missions.hear(Mission::Count(2, PLAN), A, true, 0, &NOWHERE);
     said(&mut missions);
     let mut asked = 0;
     for now_us in (0..10 * PATIENCE_US).step_by(1000) {
@@ -111,7 +112,7 @@ fn lost_messages_are_repeated_and_a_silent_station_is_given_up() {
     assert!(missions.upload.is_none());
     // Another one works, and its last item may come twice.
     upload(&mut missions, &[waypoint(0)]);
-    missions.hear(Mission::Item(waypoint(0), PLAN), A, true, 0);
+    missions.hear(Mission::Item(waypoint(0), PLAN), A, true, 0, &NOWHERE);
     assert_eq!(said(&mut missions), [(Mission::Ack(MissionResult::ACCEPTED, PLAN), A)]);
 }
 
@@ -119,15 +120,15 @@ fn lost_messages_are_repeated_and_a_silent_station_is_given_up() {
 fn only_the_station_in_control_changes_it() {
     let mut missions = Missions::default();
     upload(&mut missions, &[waypoint(0)]);
-    missions.hear(Mission::Count(1, PLAN), B, false, 0);
-    missions.hear(Mission::Clear(Plan::ALL), B, false, 0);
-    assert_eq!(missions.hear(Mission::SetCurrent(0), B, false, 0), Heard::default());
+    missions.hear(Mission::Count(1, PLAN), B, false, 0, &NOWHERE);
+    missions.hear(Mission::Clear(Plan::ALL), B, false, 0, &NOWHERE);
+    assert_eq!(missions.hear(Mission::SetCurrent(0), B, false, 0, &NOWHERE), Heard::default());
     let denied = |plan| (Mission::Ack(MissionResult::DENIED, plan), B);
     assert_eq!(said(&mut missions), [denied(PLAN), denied(Plan::ALL)]);
     // Nor does another one put items into its upload.
-    missions.hear(Mission::Count(2, PLAN), A, true, 0);
+    missions.hear(Mission::Count(2, PLAN), A, true, 0, &NOWHERE);
     said(&mut missions);
-    missions.hear(Mission::Item(waypoint(0), PLAN), B, false, 0);
+    missions.hear(Mission::Item(waypoint(0), PLAN), B, false, 0, &NOWHERE);
     assert_eq!(said(&mut missions), [(Mission::Ack(MissionResult::INVALID_SEQUENCE, PLAN), B)]);
     assert_eq!(missions.upload.as_ref().map(Upload::wanted), Some(0));
 }
@@ -135,8 +136,8 @@ fn only_the_station_in_control_changes_it() {
 #[test]
 fn too_many_items_are_refused() {
     let mut missions = Missions::default();
-    let heard = missions.hear(Mission::Count(65, PLAN), A, true, 0);
-    assert_eq!(heard.text, Some(Words::of("mission refused: more than 64 items")));
+    let heard = missions.hear(Mission::Count(65, PLAN), A, true, 0, &NOWHERE);
+    assert_eq!(heard.text, Some(Words::of("mission refused: room for 64 items")));
     assert_eq!(said(&mut missions), [(Mission::Ack(MissionResult::NO_SPACE, PLAN), A)]);
 }
 
@@ -341,7 +342,7 @@ fn every_message_is_answered_by_what_it_is_about() {
         let mut missions = Missions::default();
         upload(&mut missions, &[waypoint(0), waypoint(1)]);
         let mut ask = |message, may| {
-            let heard = missions.hear(message, A, may, 0);
+            let heard = missions.hear(message, A, may, 0, &NOWHERE);
             (said(&mut missions), heard, missions.items().len())
         };
         let ack = |result| std::vec![(Mission::Ack(result, plan), A)];
@@ -386,7 +387,7 @@ fn an_item_is_chosen_that_there_is() {
         (2, true, None, Some(Words::of("no mission item 2"))),
         (1, false, None, None),
     ] {
-        assert_eq!(missions.hear(Mission::SetCurrent(number), A, may, 0), Heard { text, resume });
+        assert_eq!(missions.hear(Mission::SetCurrent(number), A, may, 0, &NOWHERE), Heard { text, resume, fence: false });
     }
 }
 
@@ -394,24 +395,24 @@ fn an_item_is_chosen_that_there_is() {
 #[test]
 fn an_upload_is_its_stations_own() {
     let mut missions = Missions::default();
-    missions.hear(Mission::Count(2, PLAN), A, true, 0);
+    missions.hear(Mission::Count(2, PLAN), A, true, 0, &NOWHERE);
     said(&mut missions);
-    missions.hear(Mission::Count(1, PLAN), B, true, 0);
+    missions.hear(Mission::Count(1, PLAN), B, true, 0, &NOWHERE);
     assert_eq!(said(&mut missions), [(Mission::Ack(MissionResult::DENIED, PLAN), B)]);
-    missions.hear(Mission::Ack(MissionResult::CANCELLED, PLAN), B, true, 0);
+    missions.hear(Mission::Ack(MissionResult::CANCELLED, PLAN), B, true, 0, &NOWHERE);
     assert!(missions.upload.is_some());
     // Items too early, twice or of another plan are not taken.
     for item in [waypoint(1), waypoint(5)] {
-        missions.hear(Mission::Item(item, PLAN), A, true, 0);
+        missions.hear(Mission::Item(item, PLAN), A, true, 0, &NOWHERE);
         assert_eq!(said(&mut missions), []);
     }
-    missions.hear(Mission::Item(waypoint(0), Plan::FENCE), A, true, 0);
+    missions.hear(Mission::Item(waypoint(0), Plan::FENCE), A, true, 0, &NOWHERE);
     assert_eq!(said(&mut missions), [(Mission::Ack(MissionResult::INVALID_SEQUENCE, Plan::FENCE), A)]);
-    missions.hear(Mission::Item(waypoint(0), PLAN), A, true, 0);
+    missions.hear(Mission::Item(waypoint(0), PLAN), A, true, 0, &NOWHERE);
     assert_eq!(said(&mut missions), [(Mission::Request(1, PLAN), A)]);
-    missions.hear(Mission::Item(waypoint(0), PLAN), A, true, 0);
+    missions.hear(Mission::Item(waypoint(0), PLAN), A, true, 0, &NOWHERE);
     assert_eq!(said(&mut missions), []);
-    missions.hear(Mission::Ack(MissionResult::CANCELLED, PLAN), A, true, 0);
+    missions.hear(Mission::Ack(MissionResult::CANCELLED, PLAN), A, true, 0, &NOWHERE);
     assert!(missions.upload.is_none());
     // It may begin anew, and only its last item may come twice.
     upload(&mut missions, &[waypoint(0), waypoint(1)]);
@@ -421,7 +422,7 @@ fn an_upload_is_its_stations_own() {
         (waypoint(1), B, PLAN, MissionResult::INVALID_SEQUENCE),
         (waypoint(1), A, Plan::RALLY, MissionResult::INVALID_SEQUENCE),
     ] {
-        missions.hear(Mission::Item(item, plan), from, true, 0);
+        missions.hear(Mission::Item(item, plan), from, true, 0, &NOWHERE);
         assert_eq!(said(&mut missions), [(Mission::Ack(result, plan), from)]);
     }
 }
