@@ -187,7 +187,7 @@ impl Mission {
                 if !inside(&centre_m) {
                     return Progress { refused: true, ..none };
                 }
-                let radius = if radius_m == 0.0 { orbit::USUAL_RADIUS_M } else { radius_m.abs() };
+                let radius = if radius_m == 0.0 { orbit::ORBIT_RADIUS_M } else { radius_m.abs() };
                 let fast_m_s = min(orbit::speed_max_m_s(inputs.limits, radius), inputs.stop().speed_m_s);
                 let begun = self.begin(leg, inputs, from_ground);
                 if let Some(output) = begun.climb(inputs) {

@@ -10,7 +10,7 @@ use nalgebra::Vector3;
 /// Radii that are flown \[m\].
 pub(crate) const RADIUS_M: core::ops::RangeInclusive<f32> = 1.0..=1000.0;
 /// Radius of a circle that has none of its own \[m\].
-pub(crate) const USUAL_RADIUS_M: f32 = 10.0;
+pub const ORBIT_RADIUS_M: f32 = 10.0;
 /// Share of the acceleration of an approach that the circle may need.
 const SHARE: f32 = 0.8;
 /// Distance from the circle, horizontally and vertically, at which the vehicle begins to go around \[m\].

@@ -27,9 +27,9 @@ pub enum Order {
     Orbit {
         /// Its centre, at its height; NaN keeps a coordinate \[m\].
         centre_m: Vector3<f32>,
-        /// Its radius; NaN for the usual one \[m\].
+        /// Its radius, positive if it goes to the left \[m\].
         radius_m: f32,
-        /// Speed along it, positive if it goes to the left; NaN for the usual one, to the right \[m/s\].
+        /// Speed along it; NaN for that of the parameters \[m/s\].
         speed_m_s: f32,
         /// Angle to fly; 0 for ever \[deg\].
         angle_deg: u16,

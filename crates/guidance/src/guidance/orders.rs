@@ -74,16 +74,16 @@ impl Memory {
                 Ok(())
             }
             Order::Orbit { centre_m, radius_m, speed_m_s, angle_deg, heading } => {
-                let radius_m = if radius_m.is_nan() { orbit::USUAL_RADIUS_M } else { radius_m };
-                let limits = &settings.limits;
-                let most_m_s = orbit::speed_max_m_s(limits, radius_m);
-                let usual_m_s = -min(most_m_s, settings.flying.cruise_m_s);
+                let (left, radius_m) = (radius_m > 0.0, radius_m.abs());
+                let most_m_s = orbit::speed_max_m_s(&settings.limits, radius_m);
+                let usual_m_s = min(most_m_s, settings.flying.cruise_m_s);
                 let speed_m_s = if speed_m_s.is_nan() { usual_m_s } else { speed_m_s };
                 // False of NaN.
-                let flown = orbit::RADIUS_M.contains(&radius_m) && (0.05..=most_m_s).contains(&speed_m_s.abs());
+                let flown = orbit::RADIUS_M.contains(&radius_m) && (0.05..=most_m_s).contains(&speed_m_s);
                 if !flown || !is_place(&centre_m) {
                     return Err(OrderRefusal::OutOfRange);
                 }
+                let speed_m_s = if left { speed_m_s } else { -speed_m_s };
                 let present_m = self.can_go(seen)?;
                 let centre_m = centre_m.zip_map(&present_m, |new, old| if new.is_nan() { old } else { new });
                 let radius = Vector3::new(radius_m, 0.0, 0.0);

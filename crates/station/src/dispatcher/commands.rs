@@ -8,7 +8,7 @@ use crate::services::telemetry::compose;
 use crate::services::texts::{Words, reason};
 use crate::services::{control, modes, sensors};
 use afbc_flight_core::{Refusal, Request};
-use afbc_guidance::{FlightMode, Order, OrderRefusal};
+use afbc_guidance::{FlightMode, ORBIT_RADIUS_M, OrbitHeading, Order, OrderRefusal};
 use afbc_link::{Address, Answer, Command, Height, Interval, MavSeverity, Place};
 use afbc_onboard::{ControlInputs, give};
 use nalgebra::Vector3;
@@ -118,6 +118,16 @@ impl Dispatcher {
             Command::SelectStandardMode(mode) => Order::Select(modes::of_standard(mode).ok_or(Answer::Denied)?),
             Command::Reposition { place, yaw_rad, speed_m_s } => {
                 Order::GoTo { position_m: self.local(&place)?, yaw_rad, speed_m_s }
+            }
+            Command::Orbit { place, radius_m, speed_m_s, angle_deg, heading } => {
+                let heading = match heading {
+                    0 => OrbitHeading::Centre,
+                    3 => OrbitHeading::Along,
+                    _ => OrbitHeading::Kept,
+                };
+                // To the left is positive in the local frame.
+                let radius_m = if radius_m.is_nan() { -ORBIT_RADIUS_M } else { -radius_m };
+                Order::Orbit { centre_m: self.local(&place)?, radius_m, speed_m_s, angle_deg, heading }
             }
             Command::Speed(speed_m_s) => Order::Speed(speed_m_s),
             Command::Home(place) => Order::Home(place.map(|place| self.local(&place)).transpose()?),

@@ -21,8 +21,9 @@ const CIRCLE: [u16; 2] = [5003, 5004];
 const FAR_M: f32 = 20_000.0;
 /// Boundaries looked at after a tick.
 const LOOKS: usize = 2;
-/// Speed below which a vehicle that was about to leave has stopped \[m/s\].
+/// Speed below which a vehicle that was about to leave has stopped \[m/s\], and for how long it must have \[ticks\].
 const SLOW_M_S: f32 = 0.5;
+const STOPPED_TICKS: u16 = 500;
 
 /// Checks an item by itself.
 ///
@@ -176,6 +177,8 @@ pub struct FenceWatch {
     /// What has been found since the first boundary.
     nears: bool,
     outside: bool,
+    /// Ticks for which it has stopped without being about to leave.
+    stopped_ticks: u16,
     view: FenceView,
 }
 
@@ -192,6 +195,8 @@ impl FenceWatch {
 
     /// Looks at the next boundaries.
     pub fn look(&mut self, items: &[MissionItem], chart: &LocalChart, motion: &FenceMotion) {
+        let stopped = motion.speed_m_s < SLOW_M_S;
+        self.stopped_ticks = if stopped { self.stopped_ticks.saturating_add(1) } else { 0 };
         for _ in 0..LOOKS.min(items.len()) {
             self.look_at_next(items, chart, motion);
         }
@@ -199,7 +204,7 @@ impl FenceWatch {
 
     fn look_at_next(&mut self, items: &[MissionItem], chart: &LocalChart, motion: &FenceMotion) {
         let next = usize::from(self.next);
-        let Some(item) = items.get(next) else { return self.end(motion) };
+        let Some(item) = items.get(next) else { return self.end() };
         if self.next >= self.end {
             self.first = self.next;
             self.end = self.next.saturating_add(vertices(item).unwrap_or(1));
@@ -208,7 +213,9 @@ impl FenceWatch {
         if let Some(boundary) = boundary(items.get(begin..end).unwrap_or_default(), next.saturating_sub(begin), chart) {
             let nears = motion.stops.iter().any(|path| boundary.is_neared(path));
             self.nears |= nears;
-            self.view.leaves |= nears;
+            if nears {
+                (self.view.leaves, self.stopped_ticks) = (true, 0);
+            }
             match boundary {
                 Boundary::Circle { .. } => self.outside |= !boundary.allows(motion.here_m),
                 Boundary::Edge(a_m, b_m) => {
@@ -222,15 +229,16 @@ impl FenceWatch {
         }
         self.next = self.next.saturating_add(1);
         if usize::from(self.next) >= items.len() {
-            self.end(motion);
+            self.end();
         }
     }
 
     /// Ends with the last boundary.
-    fn end(&mut self, motion: &FenceMotion) {
-        let lasts = self.view.leaves && motion.speed_m_s > SLOW_M_S;
-        let view = FenceView { leaves: self.nears || self.outside || lasts, outside: self.outside };
-        *self = FenceWatch { view, ..FenceWatch::default() };
+    fn end(&mut self) {
+        let FenceWatch { nears, outside, stopped_ticks, .. } = *self;
+        let lasts = self.view.leaves && stopped_ticks < STOPPED_TICKS;
+        let view = FenceView { leaves: nears || outside || lasts, outside };
+        *self = FenceWatch { view, stopped_ticks, ..FenceWatch::default() };
     }
 }
 
