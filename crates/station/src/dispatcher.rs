@@ -183,11 +183,15 @@ impl Dispatcher {
         self.streams.tick();
         self.report_checks();
         self.watch_fence();
+        if !self.status.mode.armed() {
+            self.missions.restart();
+        }
         if let Some(words) = self.missions.tick(self.now_us) {
             self.texts.say(MavSeverity::MAV_SEVERITY_WARNING, &words);
         }
         if let Some(reached) = self.status.guided.reached {
             self.reached = Some(reached);
+            self.missions.reached(reached);
             self.reply(Reply::Reached(reached));
         }
     }

@@ -36,7 +36,7 @@ pub fn check_item(item: &MissionItem) -> Result<(), Invalid> {
     }
     let circle = CIRCLE.contains(&item.command);
     if !circle && !VERTEX.contains(&item.command) {
-        return refuse(MissionResult::UNSUPPORTED, "command is not supported");
+        return Err(Invalid::COMMAND);
     }
     // Heights do not matter.
     if ![0, 3, 5, 6].contains(&item.frame) {

@@ -257,7 +257,7 @@ fn a_fence_that_is_none_is_refused_by_name() {
         (with(&|item| item.parameters[0] = f32::NAN), Is::INVALID_PARAM1, "fence item 0: radius is not 0 to 20000 m"),
         (with(&|item| item.frame = 1), Is::UNSUPPORTED_FRAME, "fence item 0: frame is not supported"),
         (with(&|item| item.command = 5000), Is::UNSUPPORTED, "fence item 0: return point is not supported"),
-        (with(&|item| item.command = 16), Is::UNSUPPORTED, "fence item 0: command is not supported"),
+        (with(&|item| item.command = 16), Is::UNSUPPORTED, "fence item 0: command 16 unsupported"),
         (with(&|item| item.x = 900_000_001), Is::INVALID_X, "fence item 0: latitude is out of range"),
         (with(&|item| item.x = 0), Is::INVALID_X, "fence item 0: farther away than 20 km"),
     ];

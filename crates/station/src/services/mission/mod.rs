@@ -5,6 +5,7 @@
 //! number of stations may read at once. The plans share [`ITEMS_MAX`] items.
 
 mod items;
+mod jumps;
 mod plans;
 mod upload;
 
@@ -13,9 +14,11 @@ pub use items::{ITEMS_MAX, Invalid, check, to_guidance};
 use crate::services::fence;
 use crate::services::origin::{EarthOrigin, LocalChart};
 use crate::services::texts::Words;
-use afbc_guidance::Leg;
+use afbc_guidance::{Item, Leg};
 use afbc_link::{Address, Mission, MissionCurrent, MissionItem, MissionResult, Plan};
 use heapless::Deque;
+use items::{check_jumps, check_rally, stop_m};
+use jumps::Jumps;
 use nalgebra::Vector2;
 use plans::PlanItems;
 use upload::Upload;
@@ -38,6 +41,7 @@ pub struct Missions {
     plans: PlanItems,
     /// Which upload of the mission it is.
     number: u16,
+    jumps: Jumps,
     upload: Option<Upload>,
     /// Station, plan and last item of the last upload, in case its answer is lost.
     done: Option<(Address, Plan, u16)>,
@@ -130,8 +134,26 @@ impl Missions {
     /// Returns the item that the guidance wants, in the local frame.
     pub fn leg(&self, number: u16, origin: Option<&EarthOrigin>, home_m: f32) -> Option<Leg> {
         let items = self.items();
-        let item = to_guidance(items.get(usize::from(number))?, origin, home_m)?;
-        Some(Leg { number, upload: self.number, item, is_last: usize::from(number) + 1 == items.len() })
+        let of_station = items.get(usize::from(number))?;
+        let mut item = to_guidance(of_station, origin, home_m)?;
+        let mut is_last = usize::from(number) + 1 == items.len();
+        if let Item::Jump(target) = &mut item {
+            *target = self.jumps.next(of_station, *target);
+            is_last &= usize::from(*target) == items.len();
+        }
+        Some(Leg { number, upload: self.number, item, is_last })
+    }
+
+    /// Notes that the guidance has done an item.
+    pub fn reached(&mut self, number: u16) {
+        if let Some(item) = self.plans.of(Plan::MISSION).get(usize::from(number)) {
+            self.jumps.made(item);
+        }
+    }
+
+    /// Notes that the mission begins anew.
+    pub fn restart(&mut self) {
+        self.jumps.clear();
     }
 
     /// Returns the items of the mission.
@@ -176,7 +198,7 @@ impl Missions {
         let known = [Plan::MISSION, Plan::FENCE, Plan::RALLY].contains(&plan);
         let room = self.plans.room(plan);
         let result = match count {
-            _ if !known || plan == Plan::RALLY && count > 0 => MissionResult::UNSUPPORTED,
+            _ if !known => MissionResult::UNSUPPORTED,
             _ if self.upload.as_ref().is_some_and(|upload| upload.from != from) => MissionResult::DENIED,
             0 => {
                 self.clear(plan);
@@ -218,6 +240,7 @@ impl Missions {
         }
         let mut checked = match plan {
             Plan::FENCE => fence::check_item(&item),
+            Plan::RALLY => check_rally(&item),
             _ => check(&item),
         }
         .map_err(|invalid| (item.number, invalid));
@@ -226,20 +249,23 @@ impl Missions {
             self.say(Mission::Request(number, plan), from);
             return (None, false);
         }
-        if checked.is_ok() && plan == Plan::FENCE {
-            checked = fence::check(&upload.items, around.chart.as_ref(), around.here_m);
+        if checked.is_ok() {
+            checked = match plan {
+                Plan::FENCE => fence::check(&upload.items, around.chart.as_ref(), around.here_m),
+                Plan::MISSION => check_jumps(&upload.items).and_then(|()| check_places(&upload.items, &self.plans, around)),
+                _ => Ok(()),
+            };
         }
-        if let Err((number, Invalid { result, reason })) = checked {
+        if let Err((number, invalid)) = checked {
             self.upload = None;
-            self.acknowledge(result, plan, from);
-            let words = Words::of(name(plan)).and(" item ").number(number.into()).and(": ").and(reason);
-            return (Some(words), false);
+            self.acknowledge(invalid.result, plan, from);
+            return (Some(invalid.text(name(plan), number, item.command)), false);
         }
         // In place: a copy would take much of the stack.
         let fits = self.plans.replace(plan, &upload.items);
         self.upload = None;
         if plan == Plan::MISSION && fits {
-            self.number = self.number.wrapping_add(1);
+            self.renew();
         }
         self.done = fits.then_some((from, plan, item.number));
         self.acknowledge(if fits { MissionResult::ACCEPTED } else { MissionResult::NO_SPACE }, plan, from);
@@ -251,9 +277,14 @@ impl Missions {
         self.plans.replace(plan, &[]);
         (self.upload, self.done) = (None, None);
         if plan == Plan::MISSION {
-            // Another mission.
-            self.number = self.number.wrapping_add(1);
+            self.renew();
         }
+    }
+
+    /// Notes that there is another mission.
+    fn renew(&mut self) {
+        self.number = self.number.wrapping_add(1);
+        self.jumps.clear();
     }
 
     fn acknowledge(&mut self, result: MissionResult, plan: Plan, to: Address) {
@@ -262,6 +293,16 @@ impl Missions {
 
     fn say(&mut self, message: Mission, to: Address) {
         self.out.push_back((message, to)).ok();
+    }
+}
+
+/// Checks that the places of a mission are inside the fence, where both are known.
+fn check_places(items: &[MissionItem], plans: &PlanItems, around: &Surroundings) -> Result<(), (u16, Invalid)> {
+    let (areas, Some(chart)) = (plans.of(Plan::FENCE), &around.chart) else { return Ok(()) };
+    let outside = |item: &&MissionItem| stop_m(item, chart).is_some_and(|stop_m| !fence::holds(areas, chart, stop_m));
+    match items.iter().find(outside).filter(|_| !areas.is_empty()) {
+        Some(item) => Err((item.number, Invalid { result: MissionResult::DENIED, reason: "outside the geofence" })),
+        None => Ok(()),
     }
 }
 
