@@ -374,6 +374,7 @@ impl Comms {
                 }
                 modes::available(place).map(Downlink::AvailableMode)
             }
+            id::ORBIT_EXECUTION_STATUS => self.dispatcher.orbit_status(),
             id::DEBUG_FLOAT_ARRAY => Some(Downlink::Health(self.health())),
             id::HIGHRES_IMU => {
                 self.sample_is_due = true;

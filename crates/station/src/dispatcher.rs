@@ -15,17 +15,20 @@ use crate::services::mission::Missions;
 use crate::services::status::VehicleStatus;
 use crate::services::streams::{Requested, Streams, id};
 use crate::services::texts::{Texts, Words};
+use crate::services::unanswered::Unanswered;
 use crate::services::{events, extended, files, logs, serial, timesync};
 use crate::setup::Setup;
 use afbc_guidance::fence::Braking;
 use afbc_guidance::{FenceView, Order};
+use afbc_link::telemetry::OrbitStatus;
 use afbc_link::{
     Address, Clock, ControlAnswer, DataStream, Downlink, Interval, MavSeverity, Mission, ParameterError,
-    ParameterRequest, Question, QuestionRefusal, Reboot, Uplink,
+    ParameterRequest, Question, QuestionRefusal, Reboot, Telemetry, Uplink,
 };
 use afbc_onboard::ControlInputs;
 use afbc_types::Setpoint;
 use heapless::Deque;
+use nalgebra::Vector3;
 
 /// Most replies that wait, besides answers to commands. Further ones are dropped: askers repeat.
 const REPLIES_MAX: usize = 16;
@@ -66,8 +69,11 @@ pub(crate) struct Dispatcher {
     fence: FenceWatch,
     pub(crate) braking: Braking,
     fence_given: FenceView,
+    /// The circle that was ordered last: its centre and radius \[m\].
+    orbit_m: Option<(Vector3<f32>, f32)>,
     pub(crate) streams: Streams,
     pub(crate) texts: Texts,
+    unanswered: Unanswered,
     replies: Deque<Reply, REPLIES_MAX>,
     /// What stations want of the parameters.
     wishes: Deque<ParameterTask, WISHES_MAX>,
@@ -105,8 +111,10 @@ impl Dispatcher {
             fence: FenceWatch::default(),
             braking: Braking::default(),
             fence_given: FenceView::default(),
+            orbit_m: None,
             streams: Streams::new(setup.bytes_per_s),
             texts: Texts::default(),
+            unanswered: Unanswered::default(),
             replies: Deque::new(),
             wishes: Deque::new(),
             parameters: Service::default(),
@@ -227,6 +235,16 @@ impl Dispatcher {
         Downlink::Mission { message: Mission::Current(current), to: Address::default() }
     }
 
+    /// Returns ORBIT_EXECUTION_STATUS, while a circle is flown that was ordered.
+    pub(crate) fn orbit_status(&self) -> Option<Downlink> {
+        let ((centre_m, radius_m), origin) = (self.orbit_m.filter(|_| self.status.guided.orbits)?, self.status.aux.origin?);
+        let centre = origin.global(&centre_m);
+        let (time_us, place_e7, altitude_m) = (self.status.time_us, centre.e7(), centre.altitude_m as f32);
+        // To the left is positive in the local frame.
+        let status = OrbitStatus { time_us, radius_m: -radius_m, place_e7, altitude_m };
+        Some(Downlink::Telemetry(Telemetry::Orbit(status)))
+    }
+
     /// True if `from` is in control, from now on if nobody was. Another one is informed.
     fn may(&mut self, from: Address, inputs: &mut ControlInputs) -> bool {
         let claim = self.control.claim(from, self.now_us);
@@ -268,6 +286,12 @@ impl Dispatcher {
             Question::Serial(asked) => QuestionRefusal::Serial(serial::answer(asked)),
             // The same place, with nothing known of it.
             Question::Terrain(place) => QuestionRefusal::Terrain(place),
+            Question::Unanswered(wish) => {
+                if let Some(text) = self.unanswered.text(wish, self.now_us) {
+                    self.texts.put(MavSeverity::MAV_SEVERITY_WARNING, text);
+                }
+                return;
+            }
             Question::Origin => {
                 // It is where the shell has it, or nowhere.
                 self.texts.put(MavSeverity::MAV_SEVERITY_WARNING, "the origin is not set by stations");

@@ -84,6 +84,11 @@ impl Dispatcher {
                         // MAVLink wants it reported whether it has changed or not.
                         self.streams.request(Requested { message: id::HOME_POSITION, index: 0 });
                     }
+                    if let Order::Orbit { centre_m, radius_m, .. } = order {
+                        let here_m = self.here();
+                        let or_here = |to: f32, here: f32| if to.is_nan() { here } else { to };
+                        self.orbit_m = Some((centre_m.zip_map(&here_m, or_here), radius_m));
+                    }
                     if let Command::StartMission(number @ 1..) = command {
                         self.order(Order::Resume(number), None, from, inputs);
                     }
@@ -179,6 +184,7 @@ impl Dispatcher {
         let known = match message {
             id::HEARTBEAT | id::DEBUG_FLOAT_ARRAY | id::MISSION_CURRENT => true,
             id::HIGHRES_IMU => self.calibrates,
+            id::ORBIT_EXECUTION_STATUS => self.orbit_status().is_some(),
             id::POSITION_TARGET_LOCAL_NED => self.followed().is_some(),
             id::AVAILABLE_MODES => index <= modes::COUNT.into(),
             _ => compose(message, &self.status).is_some(),

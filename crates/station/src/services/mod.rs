@@ -21,3 +21,4 @@ pub mod streams;
 pub mod telemetry;
 pub(crate) mod texts;
 pub mod timesync;
+pub mod unanswered;
