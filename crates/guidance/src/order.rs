@@ -4,7 +4,7 @@ use crate::fence::FenceView;
 use crate::mode::FlightMode;
 use crate::orbit::OrbitHeading;
 use afbc_flight_core::{Queue, Stamped};
-use nalgebra::{UnitQuaternion, Vector3};
+use nalgebra::{UnitQuaternion, Vector2, Vector3};
 
 /// Something to be done, answered once.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -213,6 +213,8 @@ pub struct Orders {
     pub heard_us: Option<u64>,
     /// What is known of the uploaded geofence; none if there is none.
     pub fence: Option<FenceView>,
+    /// Where a return lands: the nearest of home and rally points; none for home \[m\].
+    pub safe_m: Option<Vector2<f32>>,
     /// Orders; a tick of the guidance answers the oldest.
     pub given: Queue<Order>,
 }

@@ -203,6 +203,10 @@ proptest! {
                     sticks: sticks.map(|value| Stamped { value, at_us }),
                     leg: spell.item.map(|(number, upload, item, is_last)| Leg { number, upload, item, is_last }),
                     heard_us: Some(at_us),
+                    safe_m: spell.target.and_then(|target| match target {
+                        OffboardTarget::Motion(motion) => Some(motion.velocity_m_s.xy()),
+                        OffboardTarget::Attitude(_) => None,
+                    }),
                     fence: spell.fence.map(|(leaves, outside)| FenceView { leaves, outside }),
                     given: Queue::new(),
                 };

@@ -282,3 +282,18 @@ fn outside_the_uploaded_fence_nothing_takes_off() {
     assert!(bench.last.unwrap().against.iter().count() == 0);
     bench.aim(OffboardTarget::Motion(motion(Vector3::new(1.0, 0.0, 5.0))));
 }
+
+/// The nearest safe place is where a return lands, once begun whatever is nearer then.
+#[test]
+fn a_return_lands_at_the_nearest_safe_place() {
+    let mut bench = Bench::hovering(settings());
+    bench.order(go(40.0)).unwrap();
+    bench.run(20.0);
+    bench.orders.safe_m = Some(nalgebra::Vector2::new(50.0, 10.0));
+    bench.select(FlightMode::Return).unwrap();
+    bench.run(1.0);
+    bench.orders.safe_m = Some(nalgebra::Vector2::new(0.0, 0.0));
+    bench.run(80.0);
+    assert_eq!(bench.core, Mode::Disarmed);
+    assert!((bench.state.position_m.xy() - nalgebra::Vector2::new(50.0, 10.0)).norm() < 0.3, "{}", bench.state.position_m);
+}

@@ -170,3 +170,19 @@ fn what_the_vehicle_refuses_is_named() {
     );
     assert_eq!(refused(&|plan| plan["mission"]["items"] = json!([])), "the mission has no items; add some");
 }
+
+/// A return lands at a rally point that is nearer than home.
+#[test]
+fn a_return_lands_at_the_nearest_rally_point() {
+    let mut plan = plan();
+    let point = at(10.0, 20.0);
+    plan["rallyPoints"]["points"] = json!([[point[0], point[1], 20.0], [HOME[0] + 1.0, HOME[1], 20.0]]);
+    let plan = read(&plan).unwrap();
+    let scenario = built_in("outdoor").unwrap().read().unwrap();
+    let mut vehicle = ServedVehicle::new(&fleet(&scenario, 1).unwrap()[0], 1, None).unwrap();
+    assert!(vehicle.move_origin(HOME, 30.0));
+    let end = fly_plan(&mut vehicle, &plan, 600.0, &mut |_| ()).unwrap();
+    let place = vehicle.world().plant().motion().position_m;
+    // x is north, y west; the receiver is off by a metre or two.
+    assert!(end.disarmed && (place.x - 10.0).hypot(place.y + 20.0) < 3.0, "{place}");
+}

@@ -28,7 +28,7 @@ use afbc_link::{
 use afbc_onboard::ControlInputs;
 use afbc_types::Setpoint;
 use heapless::Deque;
-use nalgebra::Vector3;
+use nalgebra::{Vector2, Vector3};
 
 /// Most replies that wait, besides answers to commands. Further ones are dropped: askers repeat.
 const REPLIES_MAX: usize = 16;
@@ -69,6 +69,10 @@ pub(crate) struct Dispatcher {
     fence: FenceWatch,
     pub(crate) braking: Braking,
     fence_given: FenceView,
+    /// Where a return lands, where the guidance has it, and when that was last looked at \[m, us\].
+    safe_m: Option<Vector2<f32>>,
+    safe_given_m: Option<Vector2<f32>>,
+    safe_us: u64,
     /// The circle that was ordered last: its centre and radius \[m\].
     orbit_m: Option<(Vector3<f32>, f32)>,
     pub(crate) streams: Streams,
@@ -111,6 +115,9 @@ impl Dispatcher {
             fence: FenceWatch::default(),
             braking: Braking::default(),
             fence_given: FenceView::default(),
+            safe_m: None,
+            safe_given_m: None,
+            safe_us: 0,
             orbit_m: None,
             streams: Streams::new(setup.bytes_per_s),
             texts: Texts::default(),
@@ -174,6 +181,10 @@ impl Dispatcher {
             self.fence_given = self.fence.view();
             inputs.order().fence = Some(self.fence_given);
         }
+        if self.safe_m != self.safe_given_m {
+            self.safe_given_m = self.safe_m;
+            inputs.order().safe_m = self.safe_m;
+        }
     }
 
     /// Returns the item of the mission that the guidance wants and does not have.
@@ -191,6 +202,7 @@ impl Dispatcher {
         self.streams.tick();
         self.report_checks();
         self.watch_fence();
+        self.find_safe_place();
         if !self.status.mode.armed() {
             self.missions.restart();
         }

@@ -8,10 +8,28 @@ use afbc_guidance::fence::StopPath;
 use afbc_guidance::{FlightMode, Item, Leg, Order};
 use nalgebra::{Vector2, Vector3};
 
+/// Time between two looks for the nearest rally point \[us\].
+const SAFE_EVERY_US: u64 = 500_000;
+
 impl Dispatcher {
     /// True if the guidance does not know what there is to know of the fence.
     pub(crate) fn has_fence_news(&self) -> bool {
-        self.fence.view() != self.fence_given
+        self.fence.view() != self.fence_given || self.safe_m != self.safe_given_m
+    }
+
+    /// Finds the nearest of home and rally points, now and then, unless a return is on its way there.
+    pub(super) fn find_safe_place(&mut self) {
+        let rally = self.missions.rally();
+        let returns = self.status.guided.mode == FlightMode::Return;
+        if self.now_us.saturating_sub(self.safe_us) < SAFE_EVERY_US || returns || rally.is_empty() && self.safe_m.is_none() {
+            return;
+        }
+        self.safe_us = self.now_us;
+        let Surroundings { chart: Some(chart), here_m: Some(here_m) } = self.surroundings() else { return };
+        let Some(home_m) = self.status.guided.home_m.map(|home_m| home_m.xy()) else { return };
+        let off = |place_m: &Vector2<f32>| (place_m - here_m).norm_squared();
+        let points = rally.iter().map(|item| chart.local([item.x, item.y]));
+        self.safe_m = Some(points.fold(home_m, |best, point| if off(&point) < off(&best) { point } else { best }));
     }
 
     /// Returns what plans are checked against.
@@ -54,7 +72,7 @@ impl Dispatcher {
             }
             Order::Orbit { centre_m, radius_m, .. } => holds_circle(items, &chart, or_here(centre_m), radius_m.abs()),
             Order::Select(FlightMode::Return) if self.status.is_airborne() => {
-                self.status.guided.home_m.map(|home_m| home_m.xy()).is_none_or(|home_m| {
+                self.safe_m.or(self.status.guided.home_m.map(|home_m| home_m.xy())).is_none_or(|home_m| {
                     contains(items, &chart, home_m) && is_clear(items, &chart, here_m, home_m)
                 })
             }

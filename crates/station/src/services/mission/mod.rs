@@ -166,6 +166,11 @@ impl Missions {
         self.plans.of(Plan::FENCE)
     }
 
+    /// Returns the rally points.
+    pub fn rally(&self) -> &[MissionItem] {
+        self.plans.of(Plan::RALLY)
+    }
+
     /// Returns which upload of the mission it is.
     pub fn number(&self) -> u16 {
         self.number
