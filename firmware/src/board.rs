@@ -113,6 +113,12 @@ pub trait Receiver {
     /// Reads the next bytes and returns their number; waits for at least one. Nothing is lost if the future is dropped
     /// before it is ready.
     fn receive(&mut self, buffer: &mut [u8]) -> impl Future<Output = usize> + Send;
+
+    /// True for a link that only somebody with the vehicle in their hands can have plugged in. If no link is, the first
+    /// one counts as such.
+    fn is_wired(&self) -> bool {
+        false
+    }
 }
 
 /// Sending side of a link.

@@ -14,6 +14,7 @@ use crate::vehicle::ParameterTable;
 use afbc_onboard::ControlInputs;
 pub use afbc_station::Comms;
 use afbc_station::services::imus::{self, ImuNews};
+use afbc_station::services::signing::Signing;
 use afbc_station::services::status::SensorBits;
 use afbc_station::{AuxSensors, Calibrator, REPORT_MAX, Reboot, Setup};
 use core::array;
@@ -51,6 +52,7 @@ pub type Desk = (Comms, ParameterTable, Option<&'static mut ExactLog>, Option<&'
 #[inline(never)]
 pub fn make<B: Board>(
     table: ParameterTable,
+    signing: Signing,
     log: Option<&'static mut ExactLog>,
     radio: Option<&'static mut RadioLine>,
 ) -> &'static mut Desk {
@@ -60,7 +62,9 @@ pub fn make<B: Board>(
         let reboots: &[_] = if boot_loader { &[Reboot::Program, Reboot::BootLoader] } else { &[Reboot::Program] };
         let calibrates = B::Sampler::SENSES;
         let setup = Setup { reboots, calibrates, ..Setup::of(&table.configuration().link) };
-        (Comms::with(setup), table, log, radio)
+        let mut comms = Comms::with(setup);
+        comms.set_signing(signing);
+        (comms, table, log, radio)
     })
 }
 
@@ -68,6 +72,12 @@ pub fn make<B: Board>(
 pub async fn run<B: Board, const OTHERS: usize>((comms, table, log, radio): &mut Desk, links: &mut B::Links) -> ! {
     // The first link's is in `comms`.
     let mut decoders: [_; OTHERS] = array::from_fn(|_| comms.decoder());
+    let wired = links.each().iter().position(|link| link.receiver.is_wired()).unwrap_or(0);
+    let decoder = comms.decoder().wired();
+    match wired.checked_sub(1).and_then(|other| decoders.get_mut(other)) {
+        Some(other) => *other = decoder,
+        None => comms.exchange(&mut { decoder }),
+    }
     let mut incoming = [0; READ_MAX];
     let mut outgoing = Vec::<u8, REPORT_MAX>::new();
     let mut leaving = 0;
@@ -234,7 +244,7 @@ fn calibrate(
     comms.calibrate(calibrator, sample, table, |frame| drop(outgoing.extend_from_slice(frame)));
 }
 
-/// Sends values of parameters, and passes on what has changed. Out of line like the report.
+/// Sends values of parameters, and passes on what has changed, of the signatures too. Out of line like the report.
 #[inline(never)]
 fn serve(
     comms: &mut Comms,
@@ -243,9 +253,11 @@ fn serve(
     outgoing: &mut Vec<u8, REPORT_MAX>,
 ) {
     let change = comms.parameters(table, |frame| drop(outgoing.extend_from_slice(frame)));
-    let Some(change) = change else { return };
-    let number = log.map_or(0, |log| log.change(table, change));
-    if !parameters::change(table, change, number) {
-        comms.warn(NOT_KEPT);
+    if let Some(change) = change {
+        let number = log.map_or(0, |log| log.change(table, change));
+        if !parameters::change(table, change, number) {
+            comms.warn(NOT_KEPT);
+        }
     }
+    parameters::keep_signing(|| comms.signing_record());
 }

@@ -89,7 +89,7 @@ fn read<B: Board>(
     memory: B::Memory,
     links: &mut B::Links,
 ) -> (parameters::Keeper<B::Memory>, &'static mut comms::Desk) {
-    let (kept, table) = parameters::read(memory, B::STORE);
+    let (kept, table, signing) = parameters::read(memory, B::STORE);
     for link in links.each() {
         link.transmitter.set_baud(table.configuration().link.baud);
     }
@@ -97,5 +97,5 @@ fn read<B: Board>(
     // On one link, the pilot goes before the log.
     let is_free = table.configuration().link.log_port != table.configuration().radio.receiver.port;
     let log = if recording::is_possible::<B>() && is_free { recording::ExactLog::begin::<B>(&table) } else { None };
-    (kept, comms::make::<B>(table, log, radio))
+    (kept, comms::make::<B>(table, signing, log, radio))
 }

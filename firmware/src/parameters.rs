@@ -1,4 +1,5 @@
-//! The vehicle's parameters: read from the board's flash at the start, written to it while disarmed.
+//! The vehicle's parameters, and its key of signatures: read from the board's flash at the start, written to it while
+//! disarmed.
 //!
 //! Sectors are erased at the start only, before the watchdog and the control tick run: while a sector of a chip's own
 //! flash is erased, half a second and more, an access to the flash may stop the core. Writing may stop it for a word at
@@ -8,7 +9,8 @@
 use crate::control;
 use crate::vehicle::{CONFIGURATION, NAME, ParameterTable, Prepared};
 use afbc_onboard::parameters::{Kept, RecordChange};
-use afbc_store::{Error, Store, hash};
+use afbc_station::services::signing::{Signing, SigningRecord};
+use afbc_store::{Error, RecordName, Store, hash};
 use core::cell::RefCell;
 use core::future::poll_fn;
 use core::pin::pin;
@@ -20,9 +22,17 @@ use embassy_time::{Instant, Timer};
 use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash};
 use heapless::Deque;
 
+/// What is to be written.
+#[derive(Clone, Copy)]
+enum Unwritten {
+    /// A change of the parameters.
+    Parameters(RecordChange),
+    /// A part of the key of signatures.
+    Signing(SigningRecord),
+}
+
 /// Changes to be written, and a signal that there are some.
-static CHANGES: Mutex<CriticalSectionRawMutex, RefCell<Deque<RecordChange, 8>>> =
-    Mutex::new(RefCell::new(Deque::new()));
+static CHANGES: Mutex<CriticalSectionRawMutex, RefCell<Deque<Unwritten, 8>>> = Mutex::new(RefCell::new(Deque::new()));
 static CHANGED: Signal<CriticalSectionRawMutex, ()> = Signal::new();
 /// Time between two looks at whether the vehicle is still armed \[us\].
 const PATIENCE_US: u64 = 100_000;
@@ -85,11 +95,13 @@ impl<M: NorFlash> NorFlash for Gate<M> {
 /// Writes the changes; none without a store.
 pub struct Keeper<M>(Option<Store<Gate<M>>>);
 
-/// Reads the parameters from `memory`, whose sectors begin at `start`, and makes room for changes. Without a store that
+/// Reads the parameters, and the key of signatures, from `memory`, whose sectors begin at `start`, and makes room for changes. Without a store that
 /// can be read, the parameters are the image's.
-pub fn read<M: NorFlash>(memory: M, start: u32) -> (Keeper<M>, ParameterTable) {
+pub fn read<M: NorFlash>(memory: M, start: u32) -> (Keeper<M>, ParameterTable, Signing) {
     let mut table = ParameterTable::new(CONFIGURATION);
-    let Ok(mut store) = Store::open(Gate(memory), start, hash(NAME.as_bytes())) else { return (Keeper(None), table) };
+    let Ok(mut store) = Store::open(Gate(memory), start, hash(NAME.as_bytes())) else {
+        return (Keeper(None), table, Signing::default());
+    };
     if store.make_room().is_err() {
         defmt::warn!("the parameters' flash cannot be erased");
     }
@@ -97,7 +109,14 @@ pub fn read<M: NorFlash>(memory: M, start: u32) -> (Keeper<M>, ParameterTable) {
     if Kept::NOW.load(&mut table, &mut store, notice).is_err() {
         defmt::warn!("the parameters' flash cannot be read");
     }
-    (Keeper(Some(store)), table)
+    let signing = Signing::kept(|name| word(&mut store, name));
+    (Keeper(Some(store)), table, signing)
+}
+
+/// Returns the bits of a record. Out of line: for each of a key.
+#[inline(never)]
+fn word<M: NorFlash>(store: &mut Store<Gate<M>>, name: RecordName) -> Option<u32> {
+    store.get(name).ok().flatten().map(|(_, bits)| bits)
 }
 
 /// Takes a change over to flight and flash: the next tick of the disarmed vehicle flies `table`, the configuration of
@@ -107,9 +126,26 @@ pub fn change(table: &ParameterTable, change: RecordChange, number: u16) -> bool
     if let Ok(prepared) = Prepared::new(table.configuration()) {
         control::fly(prepared, number);
     }
-    let queued = CHANGES.lock(|changes| changes.try_borrow_mut().ok()?.push_back(change).ok()).is_some();
-    CHANGED.signal(());
-    queued
+    put(|| Some(Unwritten::Parameters(change)))
+}
+
+/// Has `record` written, if there is one, once there is room for it.
+pub fn keep_signing(record: impl FnOnce() -> Option<SigningRecord>) {
+    put(|| record().map(Unwritten::Signing));
+}
+
+/// Queues what is to be written; false if there was no room to ask for it.
+fn put(change: impl FnOnce() -> Option<Unwritten>) -> bool {
+    CHANGES.lock(|changes| {
+        let Some(mut changes) = changes.try_borrow_mut().ok().filter(|changes| !changes.is_full()) else {
+            return false;
+        };
+        if let Some(change) = change() {
+            changes.push_back(change).ok();
+            CHANGED.signal(());
+        }
+        true
+    })
 }
 
 /// Writes changes while the vehicle is disarmed.
@@ -132,12 +168,15 @@ pub async fn run<M: NorFlash>(keeper: &mut Keeper<M>) -> ! {
 
 /// Writes a change. Out of line, to be identified in the image.
 #[inline(never)]
-fn keep<M: NorFlash>(store: &mut Store<Gate<M>>, change: RecordChange) -> Result<(), Error<Shut>> {
-    Kept::NOW.keep(store, change)
+fn keep<M: NorFlash>(store: &mut Store<Gate<M>>, change: Unwritten) -> Result<(), Error<Shut>> {
+    match change {
+        Unwritten::Parameters(change) => Kept::NOW.keep(store, change),
+        Unwritten::Signing(SigningRecord { name, bits }) => store.set(name, 0, bits),
+    }
 }
 
 /// Waits for a change.
-fn next() -> impl Future<Output = RecordChange> {
+fn next() -> impl Future<Output = Unwritten> {
     poll_fn(|context| {
         // Registered before looking, so that no change is missed.
         let _ = pin!(CHANGED.wait()).poll(context);

@@ -32,7 +32,7 @@ fn numbers(sample: &Sample) -> impl Iterator<Item = u64> {
     );
     let u = &t.inputs;
     let learnt = Axis::ALL.into_iter().flat_map(|axis| {
-        let (e, estimate) = (&t.errors[axis], &sample.estimates[axis]);
+        let (e, estimate) = (&t.errors[axis], sample.estimates.unwrap_or_default()[axis]);
         let theta: [[f32; 3]; 3] = estimate.theta.into();
         [e.e1, e.e1_dot, e.e2, estimate.delta].into_iter().chain(theta.into_iter().flatten())
     });

@@ -245,7 +245,7 @@ fn chatter_by_delta(scenario: &Scenario) -> [f64; 2] {
     let mut last: Option<Sample> = None;
     afbc_sim::flight::fly(scenario, &afbc(), |sample| {
         if let Some(last) = last.replace(*sample).filter(|last| last.time_s >= 5.0) {
-            let above = usize::from(sample.estimates.roll.delta > 0.030);
+            let above = usize::from(sample.estimates.unwrap().roll.delta > 0.030);
             sums[above] += 1000.0 * f64::from(sample.trace.inputs.roll_n - last.trace.inputs.roll_n).abs();
             counts[above] += 1;
         }

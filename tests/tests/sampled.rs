@@ -11,9 +11,9 @@ use afbc::Profile;
 use afbc_control::FlightController;
 use afbc_flight_core::{ArmingLimits, FlightCore, FlightCoreMemory, Inbox, Mode, Request, Stamped, Ticketed};
 use afbc_plant::Sensing;
-use afbc_scenario::contender::{Contender, ControllerKind, Task};
+use afbc_scenario::contender::{Contender, ControllerKind};
 use afbc_scenario::{Scenario, built_in};
-use afbc_types::{OutOfRange, State};
+use afbc_types::State;
 use std::collections::VecDeque;
 
 /// Time since power-up at which the vehicle is armed and released \[ms\].
@@ -38,20 +38,6 @@ impl Tracker {
         }
         let arrives = |state: &Stamped<State>| state.at_us + self.late_ms * 1000 <= now_ms * 1000;
         if self.under_way.front().is_some_and(arrives) { self.under_way.pop_front() } else { None }
-    }
-}
-
-/// A flight on a tracker.
-struct OnTracker<'a> {
-    scenario: &'a Scenario,
-    tracker: Tracker,
-}
-
-impl Task for OnTracker<'_> {
-    type Output = (f64, bool);
-
-    fn with<C: FlightController<N>, const N: usize>(self, controller: C) -> Result<(f64, bool), OutOfRange> {
-        Ok(fly(self.scenario, controller, self.tracker))
     }
 }
 
@@ -90,7 +76,8 @@ fn fly<C: FlightController<N>, const N: usize>(
 
 fn flown(scenario: &Scenario, kind: ControllerKind, tracker: Tracker) -> (f64, bool) {
     let contender = Contender::of(kind, Profile::Flight).monitored();
-    contender.build(&scenario.vehicle, &scenario.rotors, OnTracker { scenario, tracker }).unwrap()
+    let controller = contender.controller::<4>(&scenario.vehicle, &scenario.rotors).unwrap();
+    fly(scenario, controller, tracker)
 }
 
 /// Nearly as accurate as with a state every millisecond, due to extrapolation. Without it PID and AFBC lose the

@@ -57,6 +57,10 @@ impl board::Receiver for Receiver {
             Poll::Ready(length)
         })
     }
+
+    fn is_wired(&self) -> bool {
+        matches!(self, Receiver::Usb)
+    }
 }
 
 /// Sending side.

@@ -48,6 +48,8 @@ pub fn bring_up(
     tell("reading parameters");
     add(steps::parameters(&mut talk)?);
     add(steps::sensors(&mut talk)?);
+    tell("self-tests of the sensors: leave it at rest");
+    add(steps::self_tests(&mut talk)?);
     tell(&format!("leave it at rest, level, for {} s", options.rest_s));
     steps::at_rest(&mut talk, options.rest_s, &mut add)?;
     turns::turns(&mut talk, options.is_attended, tell, &mut add)?;

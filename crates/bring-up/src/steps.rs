@@ -2,9 +2,10 @@
 
 use crate::conversation::Conversation;
 use crate::error::Error;
+use crate::heard::Heard;
 use crate::log::BringUpStep;
 use crate::statistics::VectorStatistics;
-use afbc_link::{Command, InertialSample, MavCmd};
+use afbc_link::{Answer, Command, InertialSample, MavCmd};
 use nalgebra::Vector3;
 
 /// Messages that are asked for.
@@ -30,6 +31,12 @@ const SENSORS: [(u32, &str); 9] = [
 /// Those whose health depends on the place: outside, or a tracker's sight.
 const ELSEWHERE: u32 = 0x20 | 0x80;
 const GYROSCOPE: u32 = 1;
+
+/// What the texts with the results of self-tests contain, and of those that have failed.
+const SELF_TEST: &str = "its self-test";
+const FAILED_TEST: &str = "failed its self-test";
+/// Longest wait for a result, or for a further one \[ms\].
+const SELF_TEST_MS: u64 = 3_000;
 
 /// Version of the firmware.
 pub(crate) fn version(talk: &mut Conversation<'_>) -> Result<BringUpStep, Error> {
@@ -85,6 +92,40 @@ pub(crate) fn sensors(talk: &mut Conversation<'_>) -> Result<BringUpStep, Error>
             },
         );
         step.check(!is_there || is_well || bit & ELSEWHERE != 0, format_args!("{name} not well"));
+    }
+    Ok(step)
+}
+
+/// The sensors' own tests, of those that have one.
+pub(crate) fn self_tests(talk: &mut Conversation<'_>) -> Result<BringUpStep, Error> {
+    let mut step = BringUpStep::new("self-tests");
+    let told = talk.heard.texts.len();
+    let results = |heard: &Heard| -> Vec<String> {
+        let texts = heard.texts.iter().skip(told).map(|(_, text)| text.clone());
+        texts.filter(|text| text.contains(SELF_TEST)).collect()
+    };
+    let answer = talk.command(Command::SelfTest, MavCmd::MAV_CMD_USER_2 as u16)?;
+    match answer {
+        Some((Answer::Accepted, _)) => (),
+        Some((Answer::Unsupported, _)) => return Ok(step.skipped("this vehicle has none")),
+        Some((answer, _)) => return Ok(step.skipped(format_args!("refused: {answer:?}"))),
+        None => {
+            step.check(false, "no answer");
+            return Ok(step);
+        }
+    }
+    // Until there is no further one.
+    let mut count = 0;
+    while talk.wait(SELF_TEST_MS, |heard| results(heard).len() > count)? {
+        count = results(&talk.heard).len();
+    }
+    let results = results(&talk.heard);
+    if results.is_empty() {
+        return Ok(step.skipped("no sensor has told of one"));
+    }
+    for (number, text) in (1..).zip(&results) {
+        step.found(&format!("result {number}"), text);
+        step.check(!text.contains(FAILED_TEST), text);
     }
     Ok(step)
 }

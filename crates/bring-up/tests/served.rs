@@ -111,8 +111,11 @@ fn alone_it_does_what_needs_no_hand() {
     assert!(reasons.contains("stuck"), "{reasons}");
     let (noisy, reasons) = verdict(&run("fault imu noisy 0.5 5"), "noise at rest");
     assert_eq!(noisy, Verdict::Failed, "{reasons}");
-    let (silent, reasons) = verdict(&run("fault magnetometer lost"), "sensors");
+    let lost = run("fault magnetometer lost");
+    let (silent, reasons) = verdict(&lost, "sensors");
     assert_eq!(silent, Verdict::Failed, "{reasons}");
+    let (fails, reasons) = verdict(&lost, "self-tests");
+    assert_eq!((fails, reasons.as_str()), (Verdict::Failed, "the compass failed its self-test"));
 }
 
 /// Something else at the other end, which sends the same bytes each millisecond.

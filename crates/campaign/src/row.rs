@@ -142,7 +142,7 @@ impl Tally {
     fn of(start: &mut FlightStart, contender: &Contender) -> Result<Self, OutOfRange> {
         let mut outcome = Tally::default();
         let mut metrics = Accumulator::default();
-        outcome.lost = start.fly(contender, |sample| {
+        outcome.lost = start.fly(contender, &mut |sample| {
             metrics.add(sample);
             outcome.steps += 1;
             let health = &sample.action.health;

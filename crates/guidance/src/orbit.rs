@@ -104,7 +104,8 @@ impl Orbit {
             ..inputs.to(place(at_rad))
         };
         // It catches up with its place on the circle.
-        let aim = LimiterTarget { speed_m_s: max(aim.speed_m_s, min(speed_m_s.abs() + 1.0, inputs.limits.speed_m_s)), ..aim };
+        let aim =
+            LimiterTarget { speed_m_s: max(aim.speed_m_s, min(speed_m_s.abs() + 1.0, inputs.limits.speed_m_s)), ..aim };
         ModeOutput { done: self.round.turned_rad >= self.angle_rad, ..ModeOutput::fly(aim) }
     }
 

@@ -98,10 +98,16 @@ fn item() -> impl Strategy<Value = Item> {
         Just(Item::Return),
         any_number().prop_map(Item::Speed),
         any_number().prop_map(Item::Wait),
-        (vector(), any_number(), any_number())
-            .prop_map(|(centre_m, radius_m, turns)| Item::Turns { centre_m, radius_m, turns }),
-        (any_number(), any::<bool>(), any::<i8>())
-            .prop_map(|(yaw_rad, relative, direction)| Item::Yaw { yaw_rad, relative, direction }),
+        (vector(), any_number(), any_number()).prop_map(|(centre_m, radius_m, turns)| Item::Turns {
+            centre_m,
+            radius_m,
+            turns
+        }),
+        (any_number(), any::<bool>(), any::<i8>()).prop_map(|(yaw_rad, relative, direction)| Item::Yaw {
+            yaw_rad,
+            relative,
+            direction
+        }),
         vector().prop_map(|at_m| Item::Look { at_m }),
         (0_u16..4).prop_map(Item::Jump),
     ]
@@ -144,12 +150,34 @@ fn spell() -> impl Strategy<Value = Spell> {
         proptest::option::of(order()),
         proptest::option::of(target()),
         proptest::option::of([any_number(), any_number(), any_number(), any_number()]),
-        (proptest::option::of((0_u16..3, 0_u16..2, item(), any::<bool>())), proptest::option::of(any::<(bool, bool)>())),
+        (
+            proptest::option::of((0_u16..3, 0_u16..2, item(), any::<bool>())),
+            proptest::option::of(any::<(bool, bool)>()),
+        ),
         any::<bool>(),
     );
     (clock, seen, asked).prop_map(
-        |((ticks, step_us, dt_s), (state, core, airborne, battery, lift), (order, target, sticks, (item, fence), fresh))| {
-            Spell { ticks, step_us, dt_s, state, core, airborne, battery, order, target, sticks, item, fence, lift, fresh }
+        |(
+            (ticks, step_us, dt_s),
+            (state, core, airborne, battery, lift),
+            (order, target, sticks, (item, fence), fresh),
+        )| {
+            Spell {
+                ticks,
+                step_us,
+                dt_s,
+                state,
+                core,
+                airborne,
+                battery,
+                order,
+                target,
+                sticks,
+                item,
+                fence,
+                lift,
+                fresh,
+            }
         },
     )
 }

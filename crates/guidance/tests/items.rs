@@ -66,7 +66,10 @@ fn a_circle_ends_after_its_angle() {
     let near = -centre.xy().normalize();
     let end = centre.xy() + nalgebra::Vector2::new(-near.y, near.x) * 10.0;
     assert!(took > 7.0 && (bench.state.position_m.xy() - end).norm() < 0.3, "{took} s, {}", bench.state.position_m);
-    assert!(bench.said.contains(&Notice::Mode(FlightMode::Hold, ModeReason::Done)) || bench.guidance.mode() == FlightMode::Hold);
+    assert!(
+        bench.said.contains(&Notice::Mode(FlightMode::Hold, ModeReason::Done))
+            || bench.guidance.mode() == FlightMode::Hold
+    );
 }
 
 #[test]
@@ -77,7 +80,9 @@ fn a_circle_that_cannot_be_flown_is_refused() {
     bench.arm();
     assert_eq!(bench.order(orbit(10.0, 2.0, 0, OrbitHeading::Centre)), Err(OrderRefusal::OnGround));
     let mut bench = Bench::hovering(settings());
-    for (radius, speed) in [(0.5, 0.2), (1001.0, 2.0), (f32::NAN, 2.0), (10.0, 0.0), (10.0, -2.0), (10.0, 5.0), (2.0, 2.5)] {
+    for (radius, speed) in
+        [(0.5, 0.2), (1001.0, 2.0), (f32::NAN, 2.0), (10.0, 0.0), (10.0, -2.0), (10.0, 5.0), (2.0, 2.5)]
+    {
         let refused = bench.order(orbit(radius, speed, 0, OrbitHeading::Centre));
         assert_eq!(refused, Err(OrderRefusal::OutOfRange), "{radius} m, {speed} m/s");
     }
@@ -295,5 +300,9 @@ fn a_return_lands_at_the_nearest_safe_place() {
     bench.orders.safe_m = Some(nalgebra::Vector2::new(0.0, 0.0));
     bench.run(80.0);
     assert_eq!(bench.core, Mode::Disarmed);
-    assert!((bench.state.position_m.xy() - nalgebra::Vector2::new(50.0, 10.0)).norm() < 0.3, "{}", bench.state.position_m);
+    assert!(
+        (bench.state.position_m.xy() - nalgebra::Vector2::new(50.0, 10.0)).norm() < 0.3,
+        "{}",
+        bench.state.position_m
+    );
 }

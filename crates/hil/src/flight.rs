@@ -8,7 +8,7 @@ use afbc_reader::FileError;
 use afbc_scenario::Scenario;
 use afbc_scenario::contender::{Contender, ControllerKind};
 use afbc_sim::flight::{Lost, Pilot, Sample, View, World, lockstep};
-use afbc_types::{Inputs, Parameters, PerAxis, Rotor, RotorForces, Setpoint};
+use afbc_types::{Inputs, Parameters, Rotor, RotorForces, Setpoint};
 use core::ops::ControlFlow;
 use nalgebra::Vector3;
 
@@ -133,7 +133,7 @@ impl<A: Autopilot> Pilot for Line<'_, A> {
         let speeds = self.station.heard().speeds;
         let forces = RotorForces(speeds.0.map(|speed| self.thrust_factor_n_s2 * speed * speed));
         let given = Inputs::of(&self.rotors, forces.0.as_slice());
-        Ok(view.sample(Action::new(speeds, forces, given, false), Trace::default(), PerAxis::default()))
+        Ok(view.sample(Action::new(speeds, forces, given, false), Trace::default(), None))
     }
 
     fn gave_up(&self) -> Option<&'static str> {

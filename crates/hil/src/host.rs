@@ -4,19 +4,20 @@ use super::{Autopilot, Error};
 use crate::host_black_box::HostBlackBox;
 use afbc_calibration::RawSample;
 use afbc_estimator::Origin;
+use afbc_files::Flash;
 use afbc_flight_core::rate::PERIOD_US;
 use afbc_link::{Decoder, Uplink};
 use afbc_onboard::parameters::{Kept, ParameterTable, Reason, RecordChange};
 use afbc_onboard::{Configuration, ControlInputs, Flight, ImuSelector, Link, Prepare, RawReadings, Readings, Report};
 use afbc_recorder::{Given, Recorder, TickRecord};
-use afbc_scenario::OtherLaw;
 use afbc_scenario::contender::{ControllerKind, Law};
+use afbc_scenario::{AnyController, FlownLaw};
+use afbc_station::services::signing::{Signing, SigningRecord};
 use afbc_station::{Calibrator, Comms, RadioControl, Setup};
 use afbc_store::Store;
 use afbc_types::{OutOfRange, ROTORS_MAX, with_rotors};
 use afbc_ulog::{BlackBox, LogStart, TakenInputs};
 use afbc_vehicles::Vehicle;
-use embedded_storage::nor_flash::NorFlash;
 
 /// The firmware without its hardware, ticked in lockstep.
 pub struct Host {
@@ -102,10 +103,10 @@ trait Core {
 }
 
 /// A vehicle under a law, its parameters, and what makes it of them.
-struct Aircraft<P: Prepare<N>, const N: usize> {
-    flight: Flight<N, P::Law>,
+struct Aircraft<const N: usize> {
+    flight: Flight<N, AnyController<N>>,
     table: ParameterTable<N>,
-    prepare: P,
+    law: FlownLaw,
 }
 
 /// What reports a tick that took so long.
@@ -115,7 +116,7 @@ struct Tell<'a> {
     send: &'a mut dyn FnMut(&[u8]),
 }
 
-impl<P: Prepare<N>, const N: usize> Core for Aircraft<P, N> {
+impl<const N: usize> Core for Aircraft<N> {
     fn tick(
         &mut self,
         now_us: u64,
@@ -147,10 +148,10 @@ impl<P: Prepare<N>, const N: usize> Core for Aircraft<P, N> {
     }
 
     fn parameters(&mut self, comms: &mut Comms, send: &mut dyn FnMut(&[u8])) -> Option<RecordChange> {
-        let Aircraft { flight, table, prepare } = self;
+        let Aircraft { flight, table, law } = self;
         let change = comms.parameters(table, send)?;
         // Disarmed, and each change has been checked.
-        let adopted = prepare.prepare(table.configuration()).is_ok_and(|prepared| flight.adopt(&prepared));
+        let adopted = law.prepare(table.configuration()).is_ok_and(|prepared| flight.adopt(&prepared));
         debug_assert!(adopted, "a change that is not flown");
         Some(change)
     }
@@ -187,7 +188,7 @@ impl<P: Prepare<N>, const N: usize> Core for Aircraft<P, N> {
     }
 }
 
-impl<P: Prepare<N>, const N: usize> Aircraft<P, N> {
+impl<const N: usize> Aircraft<N> {
     /// Returns the parameters beside those of an image, whose link has its declared defaults.
     fn as_built(&self) -> ParameterTable<N> {
         let mut image = self.table.clone();
@@ -211,6 +212,8 @@ pub struct HostTick {
     pub bytes: Vec<u8>,
     /// A parameter that has changed, to be kept.
     pub change: Option<RecordChange>,
+    /// What of the link's signatures is to be kept.
+    pub signing: Option<SigningRecord>,
 }
 
 impl Host {
@@ -250,45 +253,43 @@ impl Host {
     pub fn under(vehicle: &Vehicle, law: Law) -> Result<Self, OutOfRange> {
         with_rotors!(vehicle.rotors.len(), N => {
             let table = ParameterTable::<N>::new(vehicle.configuration()?);
-            Self::of(table, OtherLaw(law), [&vehicle.name, law.kind().name()])
+            Self::of(table, FlownLaw(Some(law)), [&vehicle.name, law.kind().name()])
         })
     }
 
-    /// The same with the parameters that are in `store`; `notice` is called with a line on each that is not used.
+    /// The same with the parameters and the key of signatures that are in `store`; `notice` is called with a line on each that is not used.
     /// Without a store that can be read, they are at their defaults.
     ///
     /// # Errors
     /// As of [`for_vehicle`](Self::for_vehicle).
-    pub fn stored<F: NorFlash>(
+    pub fn stored(
         vehicle: Option<&Vehicle>,
         link: Link,
-        store: &mut Store<F>,
-        mut notice: impl FnMut(&str),
+        store: &mut Store<Flash>,
+        notice: &mut dyn FnMut(&str),
     ) -> Result<Self, OutOfRange> {
-        let Some(vehicle) = vehicle else {
-            let table = loaded(Configuration { link, ..Configuration::default() }, store, &mut notice);
-            return Self::image(table, PAPER);
+        let signing = Signing::kept(|name| store.get(name).ok().flatten().map(|(_, bits)| bits));
+        let mut host = match vehicle {
+            None => Self::image(loaded(Configuration { link, ..Configuration::default() }, store, notice), PAPER)?,
+            Some(vehicle) => with_rotors!(vehicle.rotors.len(), N => {
+                let table = loaded::<N>(Configuration { link, ..vehicle.configuration()? }, store, notice);
+                Self::image(table, &vehicle.name)
+            })?,
         };
-        with_rotors!(vehicle.rotors.len(), N => {
-            let table = loaded::<F, N>(Configuration { link, ..vehicle.configuration()? }, store, &mut notice);
-            Self::image(table, &vehicle.name)
-        })
+        host.comms.set_signing(signing);
+        Ok(host)
     }
 
     /// Creates what an image is.
     fn image<const N: usize>(table: ParameterTable<N>, vehicle: &str) -> Result<Self, OutOfRange> {
-        Self::of(table, (), [vehicle, ControllerKind::Afbc.name()])
+        Self::of(table, FlownLaw(None), [vehicle, ControllerKind::Afbc.name()])
     }
 
-    fn of<P: Prepare<N> + 'static, const N: usize>(
-        table: ParameterTable<N>,
-        prepare: P,
-        names: [&str; 2],
-    ) -> Result<Self, OutOfRange> {
+    fn of<const N: usize>(table: ParameterTable<N>, law: FlownLaw, names: [&str; 2]) -> Result<Self, OutOfRange> {
         let setup = Setup { calibrates: true, ..Setup::of(&table.configuration().link) };
-        let flight = Flight::of(prepare.prepare(table.configuration())?);
+        let flight = Flight::of(law.prepare(table.configuration())?);
         Ok(Host {
-            flight: Box::new(Aircraft { flight, table, prepare }),
+            flight: Box::new(Aircraft { flight, table, law }),
             setup,
             comms: Comms::with(setup),
             inputs: ControlInputs::EMPTY,
@@ -405,7 +406,7 @@ impl Host {
         // Notices that there are none.
         self.hear_radio(&[]);
         self.time_us = time_us;
-        HostTick { report, bytes, change }
+        HostTick { report, bytes, change, signing: self.comms.signing_record() }
     }
 
     /// Runs the tick a millisecond after the previous one, with a duration of zero.
@@ -415,10 +416,10 @@ impl Host {
 }
 
 /// Returns the parameters with what is in `store`.
-fn loaded<F: NorFlash, const N: usize>(
+fn loaded<const N: usize>(
     image: Configuration<N>,
-    store: &mut Store<F>,
-    notice: &mut impl FnMut(&str),
+    store: &mut Store<Flash>,
+    notice: &mut dyn FnMut(&str),
 ) -> ParameterTable<N> {
     let mut table = ParameterTable::new(image);
     let loaded = Kept::NOW.load(&mut table, store, |unused: Reason| notice(unused.as_str()));

@@ -1,8 +1,9 @@
 //! Decodes a stream of bytes into messages.
 
 use crate::address::Address;
-use crate::framing::{HEADER, Header, SIGNED_MAX, START, checksum};
+use crate::framing::{HEADER, Header, SIGNED, SIGNED_FRAME_MAX, START, checksum};
 use crate::message::{Fault, Message};
+use crate::signature::ReceivedFrame;
 use core::marker::PhantomData;
 use mavlink::Message as _;
 use mavlink::dialects::common::MavMessage;
@@ -100,7 +101,8 @@ fn add(counter: &mut u32, count: u32) {
 /// Decodes the messages of one direction from a stream.
 ///
 /// # What is delivered
-/// Unsigned frames of a message that the direction carries, no longer than the message, with the right checksum.
+/// Frames of a message that the direction carries, no longer than the message, with the right checksum, which the
+/// receiver accepts: [`Decoder::feed`] those without a signature.
 ///
 /// # Frames within frames
 /// Frames may contain other frames that are addressed to other systems: TUNNEL, FILE_TRANSFER_PROTOCOL, LOG_DATA.
@@ -143,11 +145,12 @@ pub struct Decoder<M> {
     /// Sender and sequence number of the last frame.
     last: Option<(Address, u8)>,
     counters: Counters,
+    is_wired: bool,
     messages: PhantomData<fn() -> M>,
 }
 
 /// Size of the longest frame and the byte behind it.
-const HELD_MAX: usize = SIGNED_MAX + 1;
+const HELD_MAX: usize = SIGNED_FRAME_MAX + 1;
 
 /// What the buffer begins with.
 enum Front<M> {
@@ -172,12 +175,36 @@ impl<M: Message> Decoder<M> {
             sealed: 0,
             last: None,
             counters: Counters::default(),
+            is_wired: false,
             messages: PhantomData,
         }
     }
 
-    /// Takes the next bytes of the stream and delivers every message that they complete, with its sender.
-    pub fn feed(&mut self, bytes: &[u8], mut deliver: impl FnMut(Address, M)) {
+    /// The same of a stream that comes over a wire, from somebody who holds the vehicle.
+    #[must_use]
+    pub fn wired(self) -> Self {
+        Decoder { is_wired: true, ..self }
+    }
+
+    /// True if its stream comes over a wire.
+    pub fn is_wired(&self) -> bool {
+        self.is_wired
+    }
+
+    /// Takes the next bytes of the stream and delivers every message that they complete, with its sender, unless its
+    /// frame is signed.
+    pub fn feed(&mut self, bytes: &[u8], deliver: impl FnMut(Address, M)) {
+        self.feed_accepted(bytes, |frame| frame.stamp().is_none(), deliver);
+    }
+
+    /// The same for frames that `accept` accepts, which is asked once about each frame of a message that the direction
+    /// carries; others count as [`Fault::Unsupported`].
+    pub fn feed_accepted(
+        &mut self,
+        bytes: &[u8],
+        mut accept: impl FnMut(&ReceivedFrame<'_>) -> bool,
+        mut deliver: impl FnMut(Address, M),
+    ) {
         for &byte in bytes {
             // There is room, since `advance` always removes something from a full buffer.
             if let Some(next) = self.buffer.get_mut(self.length) {
@@ -185,7 +212,7 @@ impl<M: Message> Decoder<M> {
                 self.length += 1;
             }
             if self.length >= self.needed {
-                self.advance(&mut deliver);
+                self.advance(&mut accept, &mut deliver);
             }
         }
     }
@@ -196,7 +223,7 @@ impl<M: Message> Decoder<M> {
     }
 
     /// Handles everything in the buffer that can be decided.
-    fn advance(&mut self, deliver: &mut impl FnMut(Address, M)) {
+    fn advance(&mut self, accept: &mut impl FnMut(&ReceivedFrame<'_>) -> bool, deliver: &mut impl FnMut(Address, M)) {
         loop {
             match self.front() {
                 Front::Incomplete(needed) => {
@@ -214,6 +241,11 @@ impl<M: Message> Decoder<M> {
                 }
                 Front::Intact { skipped, header, message } => {
                     add(&mut self.counters.skipped_bytes, skipped as u32);
+                    let message = message.and_then(|message| {
+                        let frame = self.buffer.get(skipped..skipped + header.frame_length()).unwrap_or_default();
+                        let frame = ReceivedFrame::new(header.from, header.id, frame, header.unsigned_length());
+                        if accept(&frame) { Ok(message) } else { Err(Fault::Unsupported) }
+                    });
                     self.remove(skipped + header.frame_length());
                     self.count_lost(&header);
                     match message {
@@ -278,7 +310,7 @@ impl<M: Message> Decoder<M> {
         let extra_crc = format.map(|format| format.extra_crc).or_else(|| dialect_extra_crc(header.id))?;
         (checksum(summed, extra_crc) == sent).then(|| match format {
             None => Err(Fault::Unknown),
-            Some(_) if header.incompatible != 0 => Err(Fault::Unsupported),
+            Some(_) if header.incompatible & !SIGNED != 0 => Err(Fault::Unsupported),
             Some(format) if payload.len() > format.length_max => Err(Fault::Oversized),
             Some(_) => M::read(header.id, payload, self.receiver),
         })

@@ -5,11 +5,12 @@
 //! payload (length)  checksum (2)  [signature (13)]
 //! ```
 //!
-//! <https://mavlink.io/en/guide/serialization.html>. Frames with incompatibility flags are not supported; the flag for
-//! a signature is only used to find the frame's length.
+//! <https://mavlink.io/en/guide/serialization.html>. Frames with incompatibility flags other than that for a signature
+//! are not supported.
 
 use crate::address::Address;
 use crate::message::{Message, PAYLOAD_MAX};
+use crate::signature::{Key, SIGNATURE, Stamp};
 
 /// First byte of a frame.
 pub(crate) const START: u8 = 0xFD;
@@ -17,14 +18,12 @@ pub(crate) const START: u8 = 0xFD;
 pub(crate) const HEADER: usize = 10;
 /// Bytes after the payload.
 pub(crate) const CHECKSUM: usize = 2;
-/// Bytes after the checksum of a frame with the flag [`SIGNED`].
-const SIGNATURE: usize = 13;
 /// Incompatibility flag: a signature follows the checksum.
-const SIGNED: u8 = 1;
+pub(crate) const SIGNED: u8 = 1;
 /// Longest frame without a signature \[bytes\].
 pub const FRAME_MAX: usize = HEADER + PAYLOAD_MAX + CHECKSUM;
 /// Longest frame with a signature \[bytes\].
-pub(crate) const SIGNED_MAX: usize = FRAME_MAX + SIGNATURE;
+pub const SIGNED_FRAME_MAX: usize = FRAME_MAX + SIGNATURE;
 
 /// A frame's header.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -43,10 +42,14 @@ impl Header {
         Header { length, incompatible, sequence, from: Address { system, component }, id }
     }
 
+    /// Returns the number of bytes of the frame without a signature.
+    pub(crate) fn unsigned_length(&self) -> usize {
+        HEADER + usize::from(self.length) + CHECKSUM
+    }
+
     /// Returns the number of bytes of the whole frame.
     pub(crate) fn frame_length(&self) -> usize {
-        let signature = if self.incompatible & SIGNED != 0 { SIGNATURE } else { 0 };
-        HEADER + usize::from(self.length) + CHECKSUM + signature
+        self.unsigned_length() + if self.incompatible & SIGNED != 0 { SIGNATURE } else { 0 }
     }
 
     fn write(&self) -> [u8; HEADER] {
@@ -82,10 +85,36 @@ impl Sender {
     /// Writes `message` as a frame to the beginning of `buffer` and returns it.
     #[must_use = "the bytes are yet to be sent"]
     pub fn send<'a>(&mut self, message: &impl Message, buffer: &'a mut [u8; FRAME_MAX]) -> &'a [u8] {
+        let length = self.write(message, 0, buffer);
+        buffer.get(..length).unwrap_or_default()
+    }
+
+    /// The same with a signature, if there is a key and a stamp for it.
+    #[must_use = "the bytes are yet to be sent"]
+    pub fn send_signed<'a>(
+        &mut self,
+        message: &impl Message,
+        signer: Option<(&Key, Stamp)>,
+        buffer: &'a mut [u8; SIGNED_FRAME_MAX],
+    ) -> &'a [u8] {
+        let Some((frame, _)) = buffer.split_first_chunk_mut() else { return &[] };
+        let mut length = self.write(message, if signer.is_some() { SIGNED } else { 0 }, frame);
+        if let Some((key, stamp)) = signer {
+            let signature = key.sign(frame.get(..length).unwrap_or_default(), stamp);
+            if let Some(tail) = buffer.get_mut(length..length + SIGNATURE) {
+                tail.copy_from_slice(&signature);
+                length += SIGNATURE;
+            }
+        }
+        buffer.get(..length).unwrap_or_default()
+    }
+
+    /// Writes a frame with these incompatibility flags, without a signature; returns its length.
+    fn write(&mut self, message: &impl Message, incompatible: u8, buffer: &mut [u8; FRAME_MAX]) -> usize {
         let (head, rest) = buffer.split_at_mut(HEADER);
-        let Some((payload, _)) = rest.split_first_chunk_mut::<PAYLOAD_MAX>() else { return &[] };
+        let Some((payload, _)) = rest.split_first_chunk_mut::<PAYLOAD_MAX>() else { return 0 };
         let (id, length) = message.write(payload);
-        let header = Header { length, incompatible: 0, sequence: self.sequence, from: self.from, id };
+        let header = Header { length, incompatible, sequence: self.sequence, from: self.from, id };
         self.sequence = self.sequence.wrapping_add(1);
         head.copy_from_slice(&header.write());
 
@@ -95,6 +124,6 @@ impl Sender {
         if let Some(tail) = buffer.get_mut(end..end + CHECKSUM) {
             tail.copy_from_slice(&crc.to_le_bytes());
         }
-        buffer.get(..end + CHECKSUM).unwrap_or_default()
+        end + CHECKSUM
     }
 }

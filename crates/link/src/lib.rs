@@ -9,7 +9,7 @@
 //!    counts what it drops in [`Counters`].
 //!
 //! Layouts, checksum seeds and enumerations come from the `mavlink` crate's `common` dialect; only the messages named
-//! here reach the image. Signed frames are not supported and are dropped.
+//! here reach the image. Signatures are SHA-256's, by the `hmac-sha256` crate: [`Key`], [`ReceivedFrame`].
 //!
 //! No input makes the crate panic or block; memory is one frame.
 //!
@@ -47,6 +47,7 @@ mod operator;
 mod parameter;
 mod place;
 mod question;
+mod signature;
 mod target;
 pub mod telemetry;
 mod uplink;
@@ -58,7 +59,7 @@ pub use clocks::Clock;
 pub use command::{CalibrationRequest, Command, Reboot, Storage};
 pub use decoder::{Counters, Decoder};
 pub use downlink::{Downlink, Text};
-pub use framing::{FRAME_MAX, Sender};
+pub use framing::{FRAME_MAX, SIGNED_FRAME_MAX, Sender};
 pub use health::{HealthArray, StatesRefused};
 pub use inertial::InertialSample;
 pub use interval::{DataStream, Interval};
@@ -73,6 +74,7 @@ pub use question::{
     EventError, EventRequest, ExtendedAnswer, ExtendedName, ExtendedRequest, FileOperation, FileRefusal, FtpError,
     LogAnswer, LogRequest, Question, QuestionRefusal, Serial, Terrain, UnansweredWish,
 };
+pub use signature::{Key, ReceivedFrame, SetupSigning, Stamp, TIME_MAX};
 pub use target::{AttitudeAndThrust, Axes, ExternalTarget, ManualControl, PositionTarget};
 pub use telemetry::Telemetry;
 pub use uplink::Uplink;

@@ -10,6 +10,7 @@ use crate::mission::Mission;
 use crate::operator::{CHANGE_ID, ControlRequest};
 use crate::parameter::ParameterRequest;
 use crate::question::Question;
+use crate::signature::SetupSigning;
 use crate::target::{ExternalTarget, PositionTarget, write_motion};
 use afbc_types::{Pose, PoseSigmas, Setpoint, State};
 use mavlink::MessageData;
@@ -66,6 +67,8 @@ pub enum Uplink {
     Stream(DataStream),
     /// CHANGE_OPERATOR_CONTROL (5).
     Control(ControlRequest),
+    /// SETUP_SIGNING (256).
+    Signing(SetupSigning),
     /// A question about what the vehicle may not have.
     Question(Question),
 }
@@ -81,6 +84,7 @@ impl Message for Uplink {
             ATT_POS_MOCAP_DATA::ID => Some(MessageFormat::of::<ATT_POS_MOCAP_DATA>(COVARIANCE)),
             REQUEST_DATA_STREAM_DATA::ID => Some(DataStream::format()),
             CHANGE_ID => Some(ControlRequest::format()),
+            SetupSigning::ID => Some(SetupSigning::format()),
             _ => ExternalTarget::format(id)
                 .or_else(|| command::format(id))
                 .or_else(|| Mission::format(id))
@@ -103,6 +107,10 @@ impl Message for Uplink {
             CHANGE_ID => {
                 let (control, system) = ControlRequest::read(payload)?;
                 meant_for(receiver, Address { system, component: 0 }).map(|()| Uplink::Control(control))
+            }
+            SetupSigning::ID => {
+                let (setup, to) = SetupSigning::read(payload);
+                meant_for(receiver, to).map(|()| Uplink::Signing(setup))
             }
             _ if ExternalTarget::format(id).is_some() => {
                 match ExternalTarget::read(id, payload, |to| receiver.is_meant_by(to))? {
@@ -159,6 +167,7 @@ impl Message for Uplink {
             Uplink::Clock(clock) => clock.write(payload),
             Uplink::Stream(stream) => stream.write(payload),
             Uplink::Control(control) => control.write(payload),
+            Uplink::Signing(setup) => setup.write(payload),
             Uplink::Question(question) => question.write(payload),
         }
     }

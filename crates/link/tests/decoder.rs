@@ -357,6 +357,7 @@ fn each_cause_has_its_count() {
     let not_carried = raw(30, 0, &[1; 28], 39);
     let foreign = raw(42_000, 0, &[1; 28], 39);
     let signed = [raw(0, 1, &[1; 9], 50), vec![7; 13]].concat();
+    let flagged = raw(0, 2, &[1; 9], 50);
     let malformed = raw(331, 0, &[[0; 228].as_slice(), &[99, 12]].concat(), 91);
     let implausible = raw(331, 0, &[[0; 228].as_slice(), &[1, 12]].concat(), 91);
     let unsupported = raw(331, 0, &[0; 230], 91);
@@ -368,6 +369,7 @@ fn each_cause_has_its_count() {
         (&not_carried, Counters { unknown: 1, ..one }),
         (&foreign, Counters { unknown: 1, ..skipped(&foreign) }),
         (&signed, Counters { unsupported: 1, ..one }),
+        (&flagged, Counters { unsupported: 1, ..one }),
         (&malformed, Counters { malformed: 1, ..one }),
         (&implausible, Counters { implausible: 1, ..one }),
         (&unsupported, Counters { unsupported: 1, ..one }),

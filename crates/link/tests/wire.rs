@@ -10,9 +10,9 @@
 
 use afbc_link::telemetry::OrbitStatus;
 use afbc_link::{
-    Address, Answer, Axes, CalibrationRequest, Command, Counters, Decoder, Downlink, ExternalTarget, FRAME_MAX,
-    Datum, HealthArray, Height, MavCmd, MavSeverity, Message, Place, PositionTarget, Reboot, Sender, StatesRefused,
-    Telemetry, Uplink,
+    Address, Answer, Axes, CalibrationRequest, Command, Counters, Datum, Decoder, Downlink, ExternalTarget, FRAME_MAX,
+    HealthArray, Height, MavCmd, MavSeverity, Message, Place, PositionTarget, Reboot, Sender, StatesRefused, Telemetry,
+    Uplink,
 };
 use afbc_types::{Axis, PerAxis, PoseSigmas, RotorSpeeds, Setpoint, State};
 use mavlink::dialects::common::{
@@ -498,7 +498,8 @@ fn circles_are_read_and_reported() {
     };
     let height = Height { metres: z, above: Datum::Home };
     let place = Place { latitude_e7: x, longitude_e7: y, height };
-    let flown = |radius_m, speed_m_s, heading, angle_deg| Command::Orbit { place, radius_m, speed_m_s, angle_deg, heading };
+    let flown =
+        |radius_m, speed_m_s, heading, angle_deg| Command::Orbit { place, radius_m, speed_m_s, angle_deg, heading };
     assert_eq!(orbit(10.0, 2.0, 0.0, 0.0), flown(10.0, 2.0, 0, 0));
     assert_eq!(orbit(-10.0, 2.0, 3.0, 4.712_389), flown(-10.0, 2.0, 3, 270));
     assert_eq!(orbit(10.0, -2.0, 5.0, nan), flown(-10.0, 2.0, 5, 0));

@@ -2,14 +2,15 @@
 
 use crate::link::Link;
 use afbc::adaptive::Gains;
-use afbc::{Profile, Settings};
+use afbc::monitor::Bounds;
+use afbc::{Guarded, Profile, Settings};
 use afbc_control::drag::KnownDrag;
 use afbc_estimator::Settings as Estimation;
 use afbc_flight_core::ArmingLimits;
 use afbc_flight_core::motor::{Curve, Response};
 use afbc_flight_core::protocol::MotorOutputs;
 use afbc_radio::RadioSettings;
-use afbc_types::{Airframe, Mounting, Parameters, PerAxis, SensorCalibration};
+use afbc_types::{Airframe, Declared, Mounting, OutOfRange, Parameters, PerAxis, SensorCalibration};
 
 /// What the firmware knows of the vehicle that it flies; `vehicles/` has one for each.
 #[derive(Clone, Debug, PartialEq)]
@@ -62,6 +63,23 @@ impl<const N: usize> Configuration<N> {
             radio: RadioSettings::DEFAULT,
             link: Link::DEFAULT,
         }
+    }
+
+    /// Returns the firmware's own law for this vehicle: AFBC under its monitor.
+    ///
+    /// # Errors
+    /// The first parameter, setting or gain out of range.
+    // Always: out of line, the controller is on the stack of the firmware's start-up twice.
+    #[inline(always)]
+    pub fn controller(&self) -> Result<Guarded<N>, OutOfRange> {
+        let Configuration { airframe, settings, gains, .. } = self;
+        let parameters = &airframe.parameters;
+        // The controller checks what follows from these and assumes that each is in its range.
+        parameters.validate()?;
+        settings.validate()?;
+        gains.validate()?;
+        let bounds = Bounds::new(gains, parameters, settings);
+        Guarded::new(*airframe, *settings, *gains, bounds)
     }
 }
 

@@ -27,8 +27,7 @@ impl ControlInputs {
     /// Nothing.
     pub const EMPTY: Self = {
         let given = Queue::new();
-        let orders =
-            Orders { target: None, sticks: None, leg: None, heard_us: None, fence: None, safe_m: None, given };
+        let orders = Orders { target: None, sticks: None, leg: None, heard_us: None, fence: None, safe_m: None, given };
         ControlInputs { inbox: Inbox::EMPTY, orders, battery: None, fresh: false }
     };
 

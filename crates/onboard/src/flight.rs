@@ -10,7 +10,7 @@ use crate::law::FlightLaw;
 use crate::readings::Readings;
 use crate::sensor_timeouts::SensorTimeouts;
 use afbc::Guarded;
-use afbc::monitor::{Bounds, Norm};
+use afbc::monitor::Norm;
 use afbc_control::Trace;
 use afbc_estimator::{Estimator, OutputFilter};
 use afbc_flight_core::{EndReason, FlightCore, FlightCoreMemory, Mode, Motor, Reasons, RequestAnswer, TickHealth};
@@ -51,16 +51,9 @@ impl<const N: usize> Prepared<N> {
     /// The first parameter, setting or gain out of range, or the first that leaves the vehicle without a margin to
     /// hover.
     pub fn new(configuration: &Configuration<N>) -> Result<Self, OutOfRange> {
-        let Configuration { airframe, settings, gains, imu, calibration, .. } = configuration;
-        // The controller checks what follows from these and assumes that each is in its range.
-        let parameters = &airframe.parameters;
-        parameters.validate()?;
-        settings.validate()?;
-        gains.validate()?;
-        imu.validate()?;
-        calibration.validate()?;
-        let bounds = Bounds::new(gains, parameters, settings);
-        Self::around(configuration, Guarded::new(*airframe, *settings, *gains, bounds)?)
+        configuration.imu.validate()?;
+        configuration.calibration.validate()?;
+        Self::around(configuration, configuration.controller()?)
     }
 }
 

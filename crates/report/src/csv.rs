@@ -117,7 +117,7 @@ fn columns(scenario: &Scenario, contender: &Contender) -> Vec<Column> {
             add(format!("e2_{name}_{e2}"), Box::new(move |row| Single(row.sample.trace.errors[axis].e2)));
         }
         if adaptive {
-            let estimate = move |row: &Row| row.sample.estimates[axis];
+            let estimate = move |row: &Row| row.sample.estimates.unwrap_or_default()[axis];
             add(format!("delta_hat_{name}_{u}"), Box::new(move |row| Single(estimate(row).delta)));
             add(format!("theta_norm_{name}_{u}"), Box::new(move |row| Single(estimate(row).theta.norm())));
         }

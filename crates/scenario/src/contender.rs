@@ -1,8 +1,8 @@
 //! A contender: a named control law with its gains and settings.
 
 pub use crate::laws::{ControllerKind, Law};
-pub use crate::task::Task;
 
+use crate::AnyController;
 use crate::laws::law_gains;
 use afbc::monitor::Bounds;
 use afbc::{Guarded, LAG_S, Profile, Settings, adaptive, by_rule, slowness};
@@ -154,26 +154,23 @@ impl Contender {
         Contender { law, settings, ..self }
     }
 
-    /// Runs `task` with the controller of a vehicle with these nominal parameters and rotors.
+    /// Returns the controller of a vehicle with these nominal parameters and rotors.
     ///
     /// # Errors
-    /// The first parameter, gain or setting out of range, or the error of `task`.
-    pub fn build<T: Task>(
+    /// The first parameter, gain or setting out of range.
+    pub fn controller<const N: usize>(
         &self,
         parameters: &Parameters<f64>,
         rotors: &[Rotor<f64>],
-        task: T,
-    ) -> Result<T::Output, OutOfRange> {
-        with_rotors!(rotors.len(), N => {
-            let vehicle = Airframe::<N>::new(parameters, rotors)?;
-            match &self.law {
-                Law::Afbc(gains) if self.monitored => {
-                    let bounds = Bounds::new(gains, &vehicle.parameters, &self.settings);
-                    task.with(Guarded::new(vehicle, self.settings, *gains, bounds)?)
-                }
-                law => law.build(vehicle, self.settings, task),
+    ) -> Result<AnyController<N>, OutOfRange> {
+        let vehicle = Airframe::<N>::new(parameters, rotors)?;
+        match &self.law {
+            Law::Afbc(gains) if self.monitored => {
+                let bounds = Bounds::new(gains, &vehicle.parameters, &self.settings);
+                Ok(AnyController::Monitored(Guarded::new(vehicle, self.settings, *gains, bounds)?))
             }
-        })
+            law => law.controller(vehicle, self.settings),
+        }
     }
 
     /// Builds the controller, as a flight would, to check it.
@@ -182,24 +179,13 @@ impl Contender {
     /// The first parameter, gain or setting out of range; also if the rotors cannot lift the vehicle [with a
     /// margin](afbc_control::mixer::HOVER_MARGIN).
     pub fn check(&self, parameters: &Parameters<f64>, rotors: &[Rotor<f64>]) -> Result<(), OutOfRange> {
-        self.build(parameters, rotors, Check { weight_n: parameters.to_f32().weight_n() })
+        with_rotors!(rotors.len(), N => {
+            self.controller::<N>(parameters, rotors)?.mixer().check_hover(parameters.to_f32().weight_n())
+        })
     }
 }
 
 /// Returns a time step rounded to remove the error of `f32` decimals \[s\].
 pub fn decimal(dt_s: f32) -> f64 {
     (f64::from(dt_s) * 1e7).round() / 1e7
-}
-
-/// A task that checks only: the controller can be built, and its rotors lift the vehicle.
-struct Check {
-    weight_n: f32,
-}
-
-impl Task for Check {
-    type Output = ();
-
-    fn with<C: FlightController<N>, const N: usize>(self, controller: C) -> Result<(), OutOfRange> {
-        controller.mixer().check_hover(self.weight_n)
-    }
 }

@@ -9,13 +9,13 @@ pub mod case;
 pub mod contender;
 mod definition;
 mod file;
+mod flown_law;
 mod laws;
-mod other_law;
 pub mod paper;
-mod task;
 pub mod trajectory;
 
 pub use built_in::{BUILT_IN, built_in, similar_built_in};
 pub use definition::{DURATION, Outage, Scenario};
 pub use file::{load, parse, read};
-pub use other_law::{AnyController, AnyControllerMemory, OtherLaw};
+pub use flown_law::FlownLaw;
+pub use laws::{AnyController, AnyControllerMemory};

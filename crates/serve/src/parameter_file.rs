@@ -5,6 +5,7 @@ use afbc_hil::Host;
 use afbc_onboard::Link;
 use afbc_onboard::parameters::{Kept, RecordChange};
 use afbc_scenario::Scenario;
+use afbc_station::services::signing::SigningRecord;
 use afbc_store::{Error, Store, hash};
 use afbc_types::OutOfRange;
 use std::io::ErrorKind;
@@ -43,16 +44,28 @@ impl ParameterFile {
         if let Err(error) = self.0.make_room() {
             notice(error.reason());
         }
-        Host::stored(scenario.vehicle_file.as_ref(), link, &mut self.0, notice)
+        Host::stored(scenario.vehicle_file.as_ref(), link, &mut self.0, &mut notice)
     }
 
     /// Writes a change.
     pub(crate) fn keep(&mut self, change: RecordChange) -> Result<(), Error<FlashError>> {
-        match Kept::NOW.keep(&mut self.0, change) {
+        self.write(|store| Kept::NOW.keep(store, change))
+    }
+
+    /// Writes a part of the key of signatures.
+    pub(crate) fn keep_signing(&mut self, record: SigningRecord) -> Result<(), Error<FlashError>> {
+        self.write(|store| store.set(record.name, 0, record.bits))
+    }
+
+    fn write(
+        &mut self,
+        write: impl Fn(&mut Store<Flash>) -> Result<(), Error<FlashError>>,
+    ) -> Result<(), Error<FlashError>> {
+        match write(&mut self.0) {
             // Nothing stands still meanwhile, as it would on the board.
             Err(Error::NeedsErase) => {
                 self.0.make_room()?;
-                Kept::NOW.keep(&mut self.0, change)
+                write(&mut self.0)
             }
             done => done,
         }

@@ -99,6 +99,11 @@ impl Server {
         &self.vehicles
     }
 
+    /// Sets whether those that connect from now on count as holding the vehicles: they may set the key of signatures.
+    pub fn set_wired(&mut self, wired: bool) {
+        self.vehicles.iter_mut().for_each(|vehicle| vehicle.set_wired(wired));
+    }
+
     /// Receives, for the next step, what `peer` of the vehicle at this place has sent.
     pub fn hear(&mut self, vehicle: usize, peer: u32, bytes: &[u8]) {
         self.vehicles.get_mut(vehicle).into_iter().for_each(|it| it.hear(peer, bytes));

@@ -9,12 +9,15 @@ use crate::world_changes::WorldChanges;
 use afbc_flight_core::Mode;
 use afbc_hil::{Host, HostTick, LogFile, UlogFiles, place};
 use afbc_link::{Address, Decoder, Reboot, Uplink};
-use afbc_onboard::Link;
+use afbc_onboard::{Link, Readings};
 use afbc_reader::words::out_of_range;
 use afbc_scenario::Scenario;
 use afbc_sim::flight::World;
-use afbc_station::Setup;
+use afbc_station::services::health::sensor;
 use afbc_station::services::origin::{EarthOrigin, Global};
+use afbc_station::services::sensors::tested;
+use afbc_station::services::status::SensorBits;
+use afbc_station::{AuxSensors, Setup};
 use afbc_types::OutOfRange;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -38,6 +41,8 @@ pub struct ServedVehicle {
     hand: Option<Hand>,
     /// A decoder for each peer: no stream's bytes complete a frame of another's.
     peers: BTreeMap<u32, Decoder<Uplink>>,
+    /// True if new peers count as holding the vehicle.
+    wired: bool,
     mode: Mode,
     reported: ReportedSensors,
     scenario: Scenario,
@@ -66,6 +71,7 @@ impl ServedVehicle {
             changes: WorldChanges::new(scenario),
             hand: None,
             peers: BTreeMap::new(),
+            wired: false,
             mode: Mode::Disarmed,
             reported: ReportedSensors::new(scenario),
             scenario: scenario.clone(),
@@ -113,10 +119,15 @@ impl ServedVehicle {
         origin.map(|origin| self.reported.move_origin(origin)).is_some()
     }
 
+    /// Sets whether those that connect from now on count as holding the vehicle: they may set the key of signatures.
+    pub fn set_wired(&mut self, wired: bool) {
+        self.wired = wired;
+    }
+
     /// Receives, for the next step, what `peer` has sent.
     pub fn hear(&mut self, peer: u32, bytes: &[u8]) {
-        let decoder = self.peers.entry(peer).or_insert_with(|| Decoder::new(self.address));
-        self.host.hear(decoder, bytes);
+        let (address, wired) = (self.address, self.wired);
+        self.host.hear(self.peers.entry(peer).or_insert_with(|| decoder(address, wired)), bytes);
     }
 
     /// Forgets what is left of a peer that is gone.
@@ -135,8 +146,12 @@ impl ServedVehicle {
             self.host.sense(readings);
         }
         let readings = self.world.readings().copied().unwrap_or_default();
-        self.host.comms().set_aux_sensors(self.reported.look(&self.world, &readings));
-        let HostTick { report, bytes, change } = self.host.next_tick(&[]);
+        let aux = self.reported.look(&self.world, &readings);
+        self.host.comms().set_aux_sensors(aux);
+        if self.host.comms().wants_self_tests() {
+            self.test_sensors(&aux, &readings);
+        }
+        let HostTick { report, bytes, change, signing } = self.host.next_tick(&[]);
         self.world.advance(&report.motors);
         self.hold();
         if report.mode.armed() != self.mode.armed() {
@@ -144,11 +159,13 @@ impl ServedVehicle {
         }
         self.mode = report.mode;
         frames(&bytes).filter_map(|frame| frame.text()).for_each(|text| log(&text));
-        if let (Some(keeper), Some(change)) = (&mut self.keeper, change)
-            && let Err(error) = keeper.keep(change)
-        {
-            // The reason is a text to the stations, and reported with it.
-            self.host.comms().warn(error.reason());
+        if let Some(keeper) = &mut self.keeper {
+            let change = change.map_or(Ok(()), |change| keeper.keep(change));
+            let signing = signing.map_or(Ok(()), |record| keeper.keep_signing(record));
+            if let Err(error) = change.and(signing) {
+                // The reason is a text to the stations, and reported with it.
+                self.host.comms().warn(error.reason());
+            }
         }
         if let Some(failure) = self.exact_log.as_ref().and_then(LogFile::take_failure) {
             log(&format!("the exact log has ended: {failure}"));
@@ -161,6 +178,22 @@ impl ServedVehicle {
             self.restart();
         }
         bytes
+    }
+
+    /// Tells the results of the sensors' own tests, which sensors pass that read something.
+    fn test_sensors(&mut self, aux: &AuxSensors, readings: &Readings) {
+        let SensorBits { present, healthy } = aux.sensors;
+        let imu = sensor::GYROSCOPE | sensor::ACCELEROMETER;
+        let compass = (present & sensor::MAGNETOMETER != 0).then_some(healthy & sensor::MAGNETOMETER != 0);
+        let imu_passes = self.scenario.instruments.imu.map(|_| readings.imu.is_some());
+        for (bits, passes) in [(imu, imu_passes), (sensor::MAGNETOMETER, compass)] {
+            let told = passes.and_then(|passes| Some((passes, tested(bits, passes)?)));
+            match told {
+                Some((true, (text, _))) => self.host.comms().inform(text),
+                Some((false, (text, _))) => self.host.comms().warn(text),
+                None => (),
+            }
+        }
     }
 
     /// Powers the firmware down and up again; the world goes on.
@@ -179,7 +212,7 @@ impl ServedVehicle {
                     self.host.log(place(&self.scenario), files.sink());
                 }
                 // Nothing of a frame outlasts it.
-                self.peers.values_mut().for_each(|peer| *peer = Decoder::new(self.address));
+                self.peers.values_mut().for_each(|peer| *peer = decoder(self.address, self.wired));
             }
             Err(error) => self.notices.push(out_of_range(&error)),
         }
@@ -260,6 +293,12 @@ fn power_up(
     };
     let setup = Setup { bytes_per_s: BYTES_PER_S, reboots: &[Reboot::Program], ..host.setup() };
     Ok(host.with(setup))
+}
+
+/// Returns the decoder of a new peer.
+fn decoder(receiver: Address, wired: bool) -> Decoder<Uplink> {
+    let decoder = Decoder::new(receiver);
+    if wired { decoder.wired() } else { decoder }
 }
 
 fn address(host: &Host) -> Address {

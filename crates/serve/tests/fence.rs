@@ -63,9 +63,8 @@ impl Shape {
                     let share = ((place - a).dot(&line) / line.norm_squared()).clamp(0.0, 1.0);
                     (place - a - line * share).norm()
                 });
-                let seen: f32 = edges()
-                    .map(|(a, b)| (a - place).perp(&(b - place)).atan2((a - place).dot(&(b - place))))
-                    .sum();
+                let seen: f32 =
+                    edges().map(|(a, b)| (a - place).perp(&(b - place)).atan2((a - place).dot(&(b - place)))).sum();
                 near.fold(f32::MAX, f32::min) * if seen.abs() > 3.0 { 1.0 } else { -1.0 }
             }
         }

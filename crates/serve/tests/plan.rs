@@ -127,10 +127,7 @@ fn what_is_wrong_is_named() {
             &|plan| plan["geoFence"]["breachReturn"] = json!([1, 2, 3]),
             "my.plan: geoFence.breachReturn: return points are not supported; remove it, the vehicle returns home",
         ),
-        (
-            &|plan| plan["rallyPoints"]["points"] = json!(7),
-            "my.plan: rally point: it must be a list",
-        ),
+        (&|plan| plan["rallyPoints"]["points"] = json!(7), "my.plan: rally point: it must be a list"),
     ];
     for (change, line) in cases {
         assert_eq!(changed(change), *line);

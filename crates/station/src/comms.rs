@@ -6,6 +6,7 @@ use crate::parameters::VALUE_BYTES;
 use crate::services::calibration::Calibrator;
 use crate::services::commands::ANSWERS_PER_TICK;
 use crate::services::modes;
+use crate::services::signing::{SetupOutcome, Signing, SigningRecord};
 use crate::services::status::AuxSensors;
 use crate::services::streams::{Requested, id};
 use crate::services::telemetry::compose;
@@ -21,8 +22,8 @@ use afbc_flight_core::{Mode, Stamped, Tracker};
 use afbc_guidance::fence::Braking;
 use afbc_guidance::{BatteryReading, Cause, ModeReason, Notice};
 use afbc_link::{
-    Address, Decoder, Downlink, FRAME_MAX, InertialSample, MavSeverity, Message, PositionTarget, Reboot, Sender,
-    StatesRefused, Uplink,
+    Address, Decoder, Downlink, InertialSample, MavSeverity, Message, PositionTarget, Reboot, ReceivedFrame,
+    SIGNED_FRAME_MAX, Sender, SetupSigning, StatesRefused, Uplink,
 };
 use afbc_onboard::parameters::{ParameterTable, RecordChange};
 use afbc_onboard::{Configuration, ControlInputs, Report};
@@ -32,13 +33,19 @@ use afbc_types::{PerAxis, Pose};
 const AUTOPILOT: u8 = 1;
 /// Largest size of all messages after one tick \[bytes\].
 pub const REPORT_MAX: usize = 768;
+/// Bytes of a signature, and of a frame beside its payload.
+const SIGNATURE: usize = 13;
+const FRAME: usize = 12 + SIGNATURE;
 /// Longest frame of a text, and of a reply: a value of an extended parameter \[bytes\].
-const TEXT_MAX: usize = 12 + 54;
-const REPLY_MAX: usize = 12 + 149;
+const TEXT_MAX: usize = FRAME + 54;
+const REPLY_MAX: usize = FRAME + 149;
 /// Length of the frame of a sample \[bytes\].
-const SAMPLE_MAX: usize = 12 + 62;
+const SAMPLE_MAX: usize = FRAME + 62;
 /// Replies sent per tick.
 const REPLIES_PER_TICK: usize = 2;
+
+/// Text to stations whose signing key is not taken.
+const KEY_OVER_WIRE: &str = "signing key refused: over a wire or signed only";
 
 /// Text to the pilot when the clock has failed.
 pub const CLOCK_FAILED: &str = "clock failed, using the internal one: land";
@@ -54,6 +61,7 @@ const ROTORS: u64 = 10;
 pub struct Comms {
     decoder: Decoder<Uplink>,
     sender: Sender,
+    signing: Signing,
     pub(crate) dispatcher: Dispatcher,
     tracker: Tracker,
     tick: u64,
@@ -89,6 +97,7 @@ impl Comms {
         Comms {
             decoder: Decoder::new(me),
             sender: Sender::new(me),
+            signing: Signing::default(),
             dispatcher: Dispatcher::new(me, &setup),
             tracker: Tracker::default(),
             tick: 0,
@@ -140,9 +149,12 @@ impl Comms {
     /// A vehicle without an estimate of its own ignores poses, since a law needs velocities and rates.
     pub fn receive(&mut self, bytes: &[u8]) -> ControlInputs {
         let mut update = ControlInputs::EMPTY;
-        let Comms { decoder, dispatcher, tracker, state_is_news, .. } = self;
+        let Comms { decoder, dispatcher, tracker, state_is_news, signing, .. } = self;
         let estimates = dispatcher.status.senses;
-        decoder.feed(bytes, |from, message| match message {
+        let (wired, now_us) = (decoder.is_wired(), dispatcher.now_us);
+        let mut setup = None;
+        let accept = |frame: &ReceivedFrame<'_>| signing.accepts(now_us, frame, wired);
+        decoder.feed_accepted(bytes, accept, |from, message| match message {
             Uplink::State { sent_us, state: value, sigmas } => {
                 let age_max_us = if estimates { POSE_AGE_MAX_US } else { COAST_US.into() };
                 let sighting = Sighting::State(value);
@@ -163,11 +175,39 @@ impl Comms {
                     update.inbox.put_pose(Stamped { value, at_us });
                 }
             }
+            Uplink::Signing(wanted) => setup = Some(wanted),
             other => dispatcher.hear(from, other, &mut update),
         });
+        if let Some(setup) = setup {
+            self.set_key(&setup);
+        }
+        let Comms { dispatcher, signing, .. } = self;
+        if signing.has_refused() {
+            dispatcher.texts.put(MavSeverity::MAV_SEVERITY_WARNING, KEY_OVER_WIRE);
+        }
         dispatcher.hand_over(&mut update);
         update.battery = self.battery();
         update
+    }
+
+    /// Sets or removes the key of signatures.
+    fn set_key(&mut self, setup: &SetupSigning) {
+        let Dispatcher { now_us, status, texts, .. } = &mut self.dispatcher;
+        match self.signing.set(*now_us, setup, status.mode.armed()) {
+            SetupOutcome::Done(text) => texts.put(MavSeverity::MAV_SEVERITY_INFO, text),
+            SetupOutcome::Refused(reason) => texts.put(MavSeverity::MAV_SEVERITY_WARNING, reason),
+        }
+    }
+
+    /// Begins with the key and clock of signatures that were kept.
+    pub fn set_signing(&mut self, signing: Signing) {
+        self.signing = signing;
+    }
+
+    /// Returns what of the signatures is to be kept, a record at a time, once.
+    pub fn signing_record(&mut self) -> Option<SigningRecord> {
+        let Dispatcher { now_us, status, .. } = &self.dispatcher;
+        self.signing.record(*now_us, status.mode.armed())
     }
 
     /// Returns what is known of the battery, for the control tick.
@@ -185,7 +225,8 @@ impl Comms {
         core::mem::swap(&mut self.decoder, decoder);
     }
 
-    /// Returns the decoder of another stream, to be [exchanged](Self::exchange).
+    /// Returns the decoder of another stream, to be [exchanged](Self::exchange). None [comes over a wire](Decoder::wired)
+    /// unless the shell says so.
     pub fn decoder(&self) -> Decoder<Uplink> {
         Decoder::new(self.dispatcher.me)
     }
@@ -218,46 +259,46 @@ impl Comms {
         self.saturated_ticks = report.saturated_ticks;
         self.watch(report);
 
-        let mut outlet = Outlet { sender: self.sender, buffer: [0; FRAME_MAX], left: REPORT_MAX, send };
+        let mut outlet = self.outlet(REPORT_MAX, send);
         let (now_us, armed) = (report.time_us, report.mode.armed());
         if self.dispatcher.streams.rotors() && (self.state_is_news || self.tick.is_multiple_of(ROTORS)) {
             self.state_is_news = false;
             // Not from the budget: whoever asks for them leaves room.
-            outlet.say(&Downlink::Rotors { time_us: now_us, armed, speeds: report.motors.padded() });
+            outlet.say(&Downlink::Rotors { time_us: now_us, armed, speeds: report.motors.padded() }, &mut self.signing);
         }
         let Dispatcher { commands, streams, texts, .. } = &mut self.dispatcher;
         let settled = report.answer.and_then(|answer| commands.settle(answer));
         let ordered = report.guided.answer.and_then(|(ticket, result)| commands.settle_order(ticket, result));
         for answer in settled.into_iter().chain(ordered) {
-            streams.spend(outlet.say(&answer));
+            streams.spend(outlet.say(&answer, &mut self.signing));
         }
         for answer in core::iter::from_fn(|| commands.next(now_us)).take(ANSWERS_PER_TICK) {
-            streams.spend(outlet.say(&answer));
+            streams.spend(outlet.say(&answer, &mut self.signing));
         }
         while streams.has_room()
             && outlet.left >= TEXT_MAX
             && let Some(text) = texts.next()
         {
-            streams.spend(outlet.say(&text));
+            streams.spend(outlet.say(&text, &mut self.signing));
         }
         let (period, phase) = HEARTBEAT;
         if self.tick % period == phase && outlet.left >= TEXT_MAX {
             let heartbeat = self.heartbeat();
-            self.dispatcher.streams.spend(outlet.say(&heartbeat));
+            self.dispatcher.streams.spend(outlet.say(&heartbeat, &mut self.signing));
         }
         for _ in 0..REPLIES_PER_TICK {
             if self.dispatcher.streams.has_room()
                 && outlet.left >= REPLY_MAX
                 && let Some(reply) = self.dispatcher.next_reply()
             {
-                self.dispatcher.streams.spend(outlet.say(&reply));
+                self.dispatcher.streams.spend(outlet.say(&reply, &mut self.signing));
             }
         }
-        while outlet.left >= FRAME_MAX
+        while outlet.left >= SIGNED_FRAME_MAX
             && let Some(requested) = self.dispatcher.streams.next(now_us)
         {
             if let Some(message) = self.compose(requested) {
-                self.dispatcher.streams.spend(outlet.say(&message));
+                self.dispatcher.streams.spend(outlet.say(&message, &mut self.signing));
             }
         }
         (self.sender, self.left) = (outlet.sender, outlet.left);
@@ -277,12 +318,12 @@ impl Comms {
         let silent_us = (table.configuration().guidance.net.station_lost_s * 1e6) as u64;
         self.dispatcher.control.set_silence(silent_us);
         self.dispatcher.braking = Braking::of(&table.configuration().guidance.limits);
-        let mut outlet = Outlet { sender: self.sender, buffer: [0; FRAME_MAX], left: self.left, send };
+        let mut outlet = self.outlet(self.left, send);
         let Dispatcher { parameters, streams, now_us, .. } = &mut self.dispatcher;
-        while outlet.left >= VALUE_BYTES as usize
+        while outlet.left >= VALUE_BYTES as usize + SIGNATURE
             && let Some(value) = parameters.next_value(*now_us, streams.bytes_per_s(), table)
         {
-            streams.spend(outlet.say(&Downlink::Parameter(value)));
+            streams.spend(outlet.say(&Downlink::Parameter(value), &mut self.signing));
         }
         (self.sender, self.left) = (outlet.sender, outlet.left);
         change
@@ -312,11 +353,16 @@ impl Comms {
             && self.left >= SAMPLE_MAX
         {
             self.sample_is_due = false;
-            let mut outlet = Outlet { sender: self.sender, buffer: [0; FRAME_MAX], left: self.left, send };
-            let bytes = outlet.say(&corrected(&sample, table.configuration()));
+            let mut outlet = self.outlet(self.left, send);
+            let bytes = outlet.say(&corrected(&sample, table.configuration()), &mut self.signing);
             (self.sender, self.left) = (outlet.sender, outlet.left);
             self.dispatcher.streams.spend(bytes);
         }
+    }
+
+    /// Returns what sends so many bytes.
+    fn outlet<F: FnMut(&[u8])>(&self, left: usize, send: F) -> Outlet<F> {
+        Outlet { sender: self.sender, now_us: self.dispatcher.now_us, buffer: [0; SIGNED_FRAME_MAX], left, send }
     }
 
     /// Queues what is to be announced of a tick.
@@ -416,16 +462,18 @@ impl Comms {
 /// What is sent after a tick.
 struct Outlet<F> {
     sender: Sender,
-    buffer: [u8; FRAME_MAX],
+    now_us: u64,
+    buffer: [u8; SIGNED_FRAME_MAX],
     /// Bytes that may still be sent.
     left: usize,
     send: F,
 }
 
 impl<F: FnMut(&[u8])> Outlet<F> {
-    /// Sends a message; returns its length.
-    fn say(&mut self, message: &impl Message) -> usize {
-        let frame = self.sender.send(message, &mut self.buffer);
+    /// Sends a message; returns its length. Out of line: it is sent from many places.
+    #[inline(never)]
+    fn say(&mut self, message: &impl Message, signing: &mut Signing) -> usize {
+        let frame = self.sender.send_signed(message, signing.stamp(self.now_us), &mut self.buffer);
         (self.send)(frame);
         self.left = self.left.saturating_sub(frame.len());
         frame.len()

@@ -138,7 +138,7 @@ impl Dispatcher {
         }
     }
 
-    /// Handles a message, except states and poses.
+    /// Handles a message, except states, poses and keys of signatures.
     pub(crate) fn hear(&mut self, from: Address, message: Uplink, inputs: &mut ControlInputs) {
         if from == self.me {
             // Its own, sent back.
@@ -167,7 +167,7 @@ impl Dispatcher {
                 self.reply(Reply::Control(answer));
                 self.warn_not_in_control(from, claim);
             }
-            Uplink::Heartbeat | Uplink::State { .. } | Uplink::Pose { .. } => (),
+            Uplink::Heartbeat | Uplink::State { .. } | Uplink::Pose { .. } | Uplink::Signing(_) => (),
         }
     }
 
@@ -249,7 +249,8 @@ impl Dispatcher {
 
     /// Returns ORBIT_EXECUTION_STATUS, while a circle is flown that was ordered.
     pub(crate) fn orbit_status(&self) -> Option<Downlink> {
-        let ((centre_m, radius_m), origin) = (self.orbit_m.filter(|_| self.status.guided.orbits)?, self.status.aux.origin?);
+        let ((centre_m, radius_m), origin) =
+            (self.orbit_m.filter(|_| self.status.guided.orbits)?, self.status.aux.origin?);
         let centre = origin.global(&centre_m);
         let (time_us, place_e7, altitude_m) = (self.status.time_us, centre.e7(), centre.altitude_m as f32);
         // To the left is positive in the local frame.

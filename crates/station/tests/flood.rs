@@ -1,14 +1,15 @@
 //! Very many random frames of several stations, nested and damaged, through all services: `FRAMES` of them, as many as
 //! `scripts/flood` says. No panic, every command answered exactly once to its sender, no order of a station that is not
-//! in control. The flight core and the guidance are played: they answer at random.
+//! in control. The flight core and the guidance are played: they answer at random. The same with a key, which none of
+//! the senders has.
 #![allow(clippy::expect_used, clippy::indexing_slicing, reason = "a test that cannot go on should say why")]
 
 use afbc_flight_core::inbox::QUEUE_MAX;
 use afbc_flight_core::{Refusal, Request, Ticketed};
 use afbc_guidance::{FlightMode, Order, OrderRefusal};
 use afbc_link::{
-    Address, Answer, Command, ControlRequest, Counters, Decoder, Downlink, ExternalTarget, Message, Mission,
-    ParameterRequest, Uplink,
+    Address, Answer, Command, ControlRequest, Counters, Decoder, Downlink, ExternalTarget, FRAME_MAX, Key, Message,
+    Mission, ParameterRequest, SIGNED_FRAME_MAX, Sender, SetupSigning, Stamp, Uplink,
 };
 use afbc_onboard::parameters::ParameterTable;
 use afbc_onboard::{Configuration, ControlInputs, Flight, GuidanceResult, Readings, Report};
@@ -246,4 +247,96 @@ fn every_command_is_answered_once_to_its_sender() {
     let counters = *station.counters();
     assert_eq!(counters, Counters { received: counters.received, ..Counters::default() }, "all can be read");
     assert!(given > 0 && commands > frames / 8);
+}
+
+/// Returns the frame with the flag of a signature, and these bytes behind it.
+fn flagged(from: Address, id: u32, payload: &[u8], seed: u8, signature: &[u8]) -> Vec<u8> {
+    let mut signed = frame(from, 0, id, payload, seed);
+    signed[2] = 1;
+    let end = signed.len() - 2;
+    let sum = crc(&signed[1..end], seed);
+    signed[end..].copy_from_slice(&sum.to_le_bytes());
+    signed.extend_from_slice(signature);
+    signed
+}
+
+/// Frames without a signature, with a random one, with one of another key, and genuine ones that were captured: nothing
+/// reaches the control tick, no command is answered, and nothing is asked of the parameters.
+#[test]
+fn nothing_commands_without_the_key() {
+    let frames = std::env::var("FRAMES").map_or(FRAMES, |number| number.parse().expect("FRAMES: a number"));
+    let seed = std::env::var("SEED").map_or(7, |number| number.parse().expect("SEED: a number"));
+    let mut random = Random(seed);
+    let ids: Vec<(u32, u8, usize)> = (0..500)
+        .filter_map(|id| Uplink::format(id).map(|format| (id, format.extra_crc, format.length_max)))
+        // A key over a link that is no wire is refused with a text.
+        .filter(|(id, ..)| *id != SetupSigning::ID)
+        .collect();
+    let (key, other, mut time_10us) = (Key([1; 32]), Key([2; 32]), 37_000_000_000_000);
+    let mut comms = Comms::new();
+    let mut wired = comms.decoder().wired();
+    comms.exchange(&mut wired);
+    let setup = Uplink::Signing(SetupSigning { key: Some(key), time_10us });
+    let _ = comms.receive(Sender::new(STATIONS[0]).send(&setup, &mut [0; FRAME_MAX]));
+    comms.exchange(&mut wired);
+    let mut table: ParameterTable = ParameterTable::new(Configuration::default());
+    let mut flight: Flight = Flight::new(&Configuration::default()).expect("valid");
+    let mut taken = ControlInputs::EMPTY;
+    let mut report = flight.tick(1_000, &mut taken, &Readings::NONE);
+    let mut listener = Decoder::<Downlink>::new(STATIONS[0]);
+    // Genuine frames, each heard once: heartbeats, which ask for nothing.
+    let mut captured = Vec::new();
+    for from in STATIONS {
+        for _ in 0..50 {
+            time_10us += 1;
+            let stamp = Stamp { link: 0, time_10us };
+            let mut buffer = [0; SIGNED_FRAME_MAX];
+            let frame = Sender::new(from).send_signed(&Uplink::Heartbeat, Some((&key, stamp)), &mut buffer).to_vec();
+            let _ = comms.receive(&frame);
+            captured.push(frame);
+        }
+    }
+    for sent in 0..frames {
+        let from = random.of(&STATIONS);
+        let (id, seed, length) = random.of(&ids);
+        let mut payload: Vec<u8> = (0..length.div_ceil(4)).flat_map(|_| random.word()).collect();
+        payload.truncate(length);
+        time_10us += random.below(3) as u64;
+        let bytes = match random.below(4) {
+            0 => frame(from, 0, id, &payload, seed),
+            1 => {
+                let mut signature = [0; 13];
+                signature[1..7].copy_from_slice(&time_10us.to_le_bytes()[..6]);
+                signature[7..].copy_from_slice(&random.next().to_le_bytes()[..6]);
+                flagged(from, id, &payload, seed, &signature)
+            }
+            2 => {
+                let Ok(message) = Uplink::read(id, &payload, VEHICLE) else { continue };
+                let (stamp, mut buffer) = (Stamp { link: 0, time_10us }, [0; SIGNED_FRAME_MAX]);
+                Sender::new(from).send_signed(&message, Some((&other, stamp)), &mut buffer).to_vec()
+            }
+            _ => captured[random.below(captured.len())].clone(),
+        };
+        let update = comms.receive(&bytes);
+        assert_eq!(update.orders, afbc_guidance::Orders::default(), "frame {sent}");
+        assert!(update.inbox.setpoint().is_none() && update.inbox.asked().is_none(), "frame {sent}");
+        assert!(update.inbox.pose().is_none(), "frame {sent}");
+        if sent % 100 == 0 {
+            report.time_us += 1000;
+            let mut send = |frame: &[u8]| {
+                listener.feed_accepted(
+                    frame,
+                    |frame| frame.is_signed_by(&key),
+                    |_, message| {
+                        let asked = matches!(message, Downlink::Answer { .. } | Downlink::Parameter(_));
+                        assert!(!asked, "frame {sent}: {message:?}");
+                    },
+                );
+            };
+            comms.report(&report, 0.0, &mut send);
+            assert_eq!(comms.parameters(&mut table, &mut send), None, "frame {sent}");
+        }
+    }
+    assert_eq!(listener.counters().unsupported, 0, "all that is sent is signed");
+    assert!(listener.counters().received > 10);
 }

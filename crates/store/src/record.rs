@@ -38,6 +38,12 @@ impl RecordName {
         (length > 0).then_some(RecordName(bytes))
     }
 
+    /// True if values of this name, which begins with an underscore, belong to the board: they outlast a
+    /// [reset](crate::Store::reset) and another owner.
+    pub const fn outlasts(&self) -> bool {
+        matches!(self.0, [b'_', ..])
+    }
+
     /// Returns the name with zeros behind it.
     pub const fn to_bytes(self) -> [u8; NAME_MAX] {
         self.0

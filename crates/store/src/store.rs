@@ -164,14 +164,15 @@ impl<F: NorFlash> Store<F> {
         }
     }
 
-    /// Calls `visit` with the name, edition and bits of every value that counts.
+    /// Calls `visit` with the name, edition and bits of every value that counts, except for those that
+    /// [outlast](RecordName::outlasts) the owner.
     ///
     /// # Errors
     /// Of the flash.
     pub fn visit(&mut self, mut visit: impl FnMut(RecordName, u16, u32)) -> Result<(), Error<F::Error>> {
         let Some(active) = self.active.filter(|active| active.owner == Some(self.owner)) else { return Ok(()) };
         for place in active.first..active.next {
-            if let Some((name, edition, bits)) = self.counts(active, place)? {
+            if let Some((name, edition, bits)) = self.counts(active, place)?.filter(|(name, ..)| !name.outlasts()) {
                 visit(name, edition, bits);
             }
         }
@@ -183,8 +184,10 @@ impl<F: NorFlash> Store<F> {
     /// # Errors
     /// Of the flash.
     pub fn get(&mut self, name: RecordName) -> Result<Option<(u16, u32)>, Error<F::Error>> {
-        let Some(active) = self.active.filter(|active| active.owner == Some(self.owner)) else { return Ok(None) };
-        for place in (active.first..active.next).rev() {
+        let mine = |active: &Active| name.outlasts() || active.owner == Some(self.owner);
+        let Some(active) = self.active.filter(mine) else { return Ok(None) };
+        let first = if name.outlasts() { 1 } else { active.first };
+        for place in (first..active.next).rev() {
             match self.read(active.sector, place)? {
                 Place::Holds(Record::Value { name: at, edition, bits }) if at == name => {
                     return Ok(bits.map(|bits| (edition, bits)));
@@ -215,7 +218,7 @@ impl<F: NorFlash> Store<F> {
         self.add(Record::Value { name, edition, bits })
     }
 
-    /// Takes back all values, in one record.
+    /// Takes back all values, in one record, except for those that [outlast](RecordName::outlasts) it.
     ///
     /// # Errors
     /// If it was not written; then all values still count.
@@ -284,22 +287,21 @@ impl<F: NorFlash> Store<F> {
             return Err(Error::NeedsErase);
         }
         let sector = other(active.sector);
-        let filling = match record {
-            Some(Record::Begin { owner }) => self.begin(sector, owner)?,
-            _ => {
-                let mut filling = self.begin(sector, active.owner.unwrap_or(self.owner))?;
-                for place in active.first..active.next {
-                    let Some((name, edition, bits)) = self.counts(active, place)? else { continue };
-                    if !matches!(record, Some(Record::Value { name: new, .. }) if new == name) {
-                        self.append(&mut filling, Record::Value { name, edition, bits: Some(bits) })?;
-                    }
-                }
-                if let Some(record) = record {
-                    self.append(&mut filling, record)?;
-                }
-                filling
-            }
+        let begins = match record {
+            Some(Record::Begin { owner }) => Some(owner),
+            _ => None,
         };
+        let mut filling = self.begin(sector, begins.or(active.owner).unwrap_or(self.owner))?;
+        for place in 1..active.next {
+            let Some((name, edition, bits)) = self.counts(active, place)? else { continue };
+            let stays = name.outlasts() || place >= active.first && begins.is_none();
+            if stays && !matches!(record, Some(Record::Value { name: new, .. }) if new == name) {
+                self.append(&mut filling, Record::Value { name, edition, bits: Some(bits) })?;
+            }
+        }
+        if let Some(record @ Record::Value { .. }) = record {
+            self.append(&mut filling, record)?;
+        }
         self.finish(filling, active.sequence.wrapping_add(1))
     }
 
@@ -337,8 +339,9 @@ impl<F: NorFlash> Store<F> {
     fn live(&mut self) -> Result<u32, Error<F::Error>> {
         let Some(active) = self.active else { return Ok(0) };
         let mut live = 0;
-        for place in active.first..active.next {
-            live += u32::from(self.counts(active, place)?.is_some());
+        for place in 1..active.next {
+            let held = self.counts(active, place)?;
+            live += u32::from(held.is_some_and(|(name, ..)| name.outlasts() || place >= active.first));
         }
         Ok(live)
     }

@@ -139,6 +139,7 @@ impl Serve {
             }
         }
         let addresses = self.addresses()?;
+        server.set_wired(addresses.bind.is_loopback());
         let mut ports = Ports::open(&addresses, server.vehicles().len())?;
         let stop = Arc::new(AtomicBool::new(false));
         let stopper = Arc::clone(&stop);

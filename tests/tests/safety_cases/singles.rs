@@ -115,11 +115,7 @@ fn fence() -> Vec<Case> {
             .lasts(4.0)
             .never(&["geofence"])
             .flies(),
-        out("fence-warn", "flown out at 5 m/s by targets")
-            .fenced(1.0)
-            .lasts(4.0)
-            .hears(&["at the geofence"])
-            .flies(),
+        out("fence-warn", "flown out at 5 m/s by targets").fenced(1.0).lasts(4.0).hears(&["at the geofence"]).flies(),
         out("fence-hold", "flown out at 5 m/s by targets")
             .fenced(2.0)
             .hears(&["hold: at the geofence"])

@@ -162,9 +162,7 @@ proptest! {
 
 #[test]
 fn what_is_no_area_is_refused() {
-    let check = |corners: &[[f32; 2]]| {
-        check_polygon(corners.len(), |place| Vector2::from(corners[place])).err()
-    };
+    let check = |corners: &[[f32; 2]]| check_polygon(corners.len(), |place| Vector2::from(corners[place])).err();
     assert_eq!(check(&[[0.0, 0.0], [9.0, 0.0]]), Some(PolygonFault::TooFew));
     assert_eq!(check(&[]), Some(PolygonFault::TooFew));
     assert_eq!(check(&[[0.0, 0.0], [9.0, 0.0], [9.0, 9.0]]), None);
@@ -196,4 +194,3 @@ fn only_what_leads_to_the_boundary_counts() {
     assert!(nears(20.0, [0.0, -10.0]) && !nears(32.0, [0.0, -10.0]));
     assert!(nears(0.05, [0.0, -0.02]), "nor slowly");
 }
-

@@ -3,11 +3,10 @@
 use super::change::SettingChange;
 use afbc::Profile;
 use afbc_control::Trace;
-use afbc_onboard::Prepare;
 use afbc_reader::FileError;
 use afbc_reader::words::out_of_range;
 use afbc_recorder::{Record, ReplayStep, Replayer, StartRecord};
-use afbc_scenario::OtherLaw;
+use afbc_scenario::FlownLaw;
 use afbc_scenario::contender::{ControllerKind, Law};
 use afbc_store::RecordName;
 use afbc_types::{OutOfRange, ROTORS_MAX, with_rotors};
@@ -25,7 +24,7 @@ pub(super) trait Player {
     fn change(&mut self, name: RecordName, value: f32) -> Result<(), String>;
 }
 
-impl<P: Prepare<N>, const N: usize> Player for Replayer<N, P> {
+impl<const N: usize> Player for Replayer<N, FlownLaw> {
     fn take(&mut self, record: &Record) -> ReplayStep<ROTORS_MAX> {
         match Replayer::take(self, record) {
             ReplayStep::Nothing => ReplayStep::Nothing,
@@ -119,15 +118,12 @@ impl Players {
 /// Makes the player of a vehicle under a law.
 fn player(vehicle: &Vehicle, kind: ControllerKind) -> Result<Box<dyn Player>, Refusal> {
     let refused = |error: OutOfRange| Refusal::Log(format!("the vehicle {}: {}", vehicle.name, out_of_range(&error)));
-    if kind == ControllerKind::Afbc {
-        return with_rotors!(vehicle.rotors.len(), N => {
-            let image = vehicle.configuration::<N>().map_err(refused)?;
-            Ok(Box::new(Replayer::<N>::new(image).map_err(refused)?))
-        });
-    }
-    let law = Law::on(kind, vehicle, Profile::Flight).map_err(Refusal::File)?;
+    let law = match kind {
+        ControllerKind::Afbc => None,
+        kind => Some(Law::on(kind, vehicle, Profile::Flight).map_err(Refusal::File)?),
+    };
     with_rotors!(vehicle.rotors.len(), N => {
         let image = vehicle.configuration::<N>().map_err(refused)?;
-        Ok(Box::new(Replayer::<N, _>::under(OtherLaw(law), image).map_err(refused)?))
+        Ok(Box::new(Replayer::<N, _>::under(FlownLaw(law), image).map_err(refused)?))
     })
 }

@@ -8,7 +8,7 @@
 /// * `gains`: their type;
 /// * `tuned`: the tuned gains, given AFBC's;
 /// * `by_hand`: the hand-tuned gains, from which a search starts;
-/// * `controller`: its controller.
+/// * `controller`: its controller's type, and how it is made.
 macro_rules! laws {
     ($(
         #[doc = $doc:literal]
@@ -20,7 +20,7 @@ macro_rules! laws {
             gains: $Gains:ty,
             tuned: |$afbc:pat_param| $tuned:expr,
             by_hand: $by_hand:expr,
-            controller: |$vehicle:ident, $settings:ident, $gains:ident| $controller:expr,
+            controller: $Controller:ty, |$vehicle:ident, $settings:ident, $gains:ident| $controller:expr,
         }
     )*) => {
         /// A kind of control law.
@@ -84,20 +84,19 @@ macro_rules! laws {
                 match self { $( Law::$Law(_) => ControllerKind::$Law, )* }
             }
 
-            /// Runs `task` with the law's controller for this vehicle.
+            /// Returns the law's controller for this vehicle, without a monitor.
             ///
             /// # Errors
-            /// The first parameter, gain or setting out of range, or the error of `task`.
-            pub fn build<T: crate::task::Task, const N: usize>(
+            /// The first parameter, gain or setting out of range.
+            pub fn controller<const N: usize>(
                 &self,
                 vehicle: afbc_types::Airframe<N>,
                 settings: afbc::Settings,
-                task: T,
-            ) -> Result<T::Output, afbc_types::OutOfRange> {
+            ) -> Result<AnyController<N>, afbc_types::OutOfRange> {
                 match *self {
                     $( Law::$Law($gains) => {
                         let ($vehicle, $settings) = (vehicle, settings);
-                        task.with($controller?)
+                        Ok(AnyController::$Law($controller?))
                     } )*
                 }
             }
@@ -116,6 +115,12 @@ macro_rules! laws {
             fn together(&self) -> Result<(), afbc_types::OutOfRange> {
                 match self { $( Law::$Law(gains) => gains.together(), )* }
             }
+        }
+
+        any_controller::any_controller! {
+            /// AFBC under its monitor, as on board.
+            Monitored(Guarded<N>),
+            $( #[doc = concat!("See [`ControllerKind::", stringify!($Law), "`].")] $Law($Controller), )*
         }
     };
 }

@@ -1,5 +1,6 @@
 //! The one list of control laws.
 
+mod any_controller;
 mod declare;
 mod gains;
 #[cfg(test)]
@@ -7,10 +8,10 @@ mod tests;
 
 pub(crate) use gains::{law_gains, per_axis, whole};
 
-use afbc::{Adaptive, Backstepping, Controller, Profile, Safeguards, adaptive, backstepping};
-use afbc_control::Smoothing;
+use afbc::{Adaptive, Backstepping, Controller, Guarded, Profile, Safeguards, adaptive, backstepping};
+use afbc_control::{Action, FlightController, Mixer, Smoothing, Trace};
 use afbc_peers::{Dfbc, Geometric, Indi, L1, Mpc, Pid, dfbc, geometric, indi, l1, mpc, pid};
-use afbc_types::{Axis, PerAxis};
+use afbc_types::{Axis, PerAxis, Setpoint, State};
 
 declare::laws! {
     /// Adaptive fuzzy backstepping (20)-(22).
@@ -22,7 +23,7 @@ declare::laws! {
         gains: PerAxis<adaptive::Gains>,
         tuned: |afbc| *afbc,
         by_hand: by_hand(),
-        controller: |vehicle, settings, gains| Controller::new(vehicle, settings, Adaptive::new(gains)?),
+        controller: Controller<Adaptive, N>, |vehicle, settings, gains| Controller::new(vehicle, settings, Adaptive::new(gains)?),
     }
     /// Classical backstepping (16), (21).
     Backstepping {
@@ -33,7 +34,7 @@ declare::laws! {
         gains: PerAxis<backstepping::Gains>,
         tuned: |afbc| afbc.map(|gains| gains.backstepping),
         by_hand: by_hand().map(|gains| gains.backstepping),
-        controller: |vehicle, settings, gains| {
+        controller: Controller<Backstepping, N>, |vehicle, settings, gains| {
             Controller::new(vehicle, settings, Backstepping::new(&vehicle.parameters, gains)?)
         },
     }
@@ -46,7 +47,7 @@ declare::laws! {
         gains: pid::Gains,
         tuned: |_| pid::Gains::TUNED,
         by_hand: pid::Gains { smoothing: Smoothing::BY_HAND, ..pid::Gains::PAPER_VEHICLE },
-        controller: |vehicle, settings, gains| Pid::new(vehicle, settings.common, gains),
+        controller: Pid<N>, |vehicle, settings, gains| Pid::new(vehicle, settings.common, gains),
     }
     /// Geometric tracking on SE(3) with integral terms.
     Geometric {
@@ -57,7 +58,7 @@ declare::laws! {
         gains: geometric::Gains,
         tuned: |_| geometric::Gains::TUNED,
         by_hand: geometric::Gains { smoothing: Smoothing::BY_HAND, ..geometric::Gains::GOODARZI_2013 },
-        controller: |vehicle, settings, gains| Geometric::new(vehicle, settings.common, gains),
+        controller: Geometric<N>, |vehicle, settings, gains| Geometric::new(vehicle, settings.common, gains),
     }
     /// Incremental nonlinear dynamic inversion.
     Indi {
@@ -68,7 +69,7 @@ declare::laws! {
         gains: indi::Gains,
         tuned: |_| indi::Gains::TUNED,
         by_hand: indi::Gains { smoothing: Smoothing::BY_HAND, ..indi::Gains::PAPER_VEHICLE },
-        controller: |vehicle, settings, gains| Indi::new(vehicle, settings.common, gains),
+        controller: Indi<N>, |vehicle, settings, gains| Indi::new(vehicle, settings.common, gains),
     }
     /// Geometric tracking with L1-adaptive compensation of thrust and moments.
     L1 {
@@ -82,7 +83,7 @@ declare::laws! {
             geometric: geometric::Gains { smoothing: Smoothing::BY_HAND, ..l1::Gains::BY_HAND.geometric },
             ..l1::Gains::BY_HAND
         },
-        controller: |vehicle, settings, gains| L1::new(vehicle, settings.common, gains),
+        controller: L1<N>, |vehicle, settings, gains| L1::new(vehicle, settings.common, gains),
     }
     /// Differential-flatness-based control with incremental inversion of the moments.
     Dfbc {
@@ -93,7 +94,7 @@ declare::laws! {
         gains: dfbc::Gains,
         tuned: |_| dfbc::Gains::TUNED,
         by_hand: dfbc::Gains { smoothing: Smoothing::BY_HAND, ..dfbc::Gains::PAPER_VEHICLE },
-        controller: |vehicle, settings, gains| Dfbc::new(vehicle, settings.common, gains),
+        controller: Dfbc<N>, |vehicle, settings, gains| Dfbc::new(vehicle, settings.common, gains),
     }
     /// Linear model-predictive control of the position, incremental inversion of the moments.
     Mpc {
@@ -104,7 +105,7 @@ declare::laws! {
         gains: mpc::Gains,
         tuned: |_| mpc::Gains::TUNED,
         by_hand: mpc::Gains { smoothing: Smoothing::BY_HAND, ..mpc::Gains::PAPER_VEHICLE },
-        controller: |vehicle, settings, gains| Mpc::new(vehicle, settings.common, gains),
+        controller: Mpc<N>, |vehicle, settings, gains| Mpc::new(vehicle, settings.common, gains),
     }
 }
 

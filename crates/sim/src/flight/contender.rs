@@ -6,9 +6,9 @@ use super::lockstep::{Lost, lockstep};
 use super::sample::Sample;
 use super::world::World;
 use afbc_control::FlightController;
-use afbc_scenario::Scenario;
-use afbc_scenario::contender::{Contender, Task, decimal};
-use afbc_types::OutOfRange;
+use afbc_scenario::contender::{Contender, decimal};
+use afbc_scenario::{AnyController, Scenario};
+use afbc_types::{OutOfRange, with_rotors};
 use core::ops::ControlFlow;
 
 /// Flies `scenario` under one contender, and passes every step from t = 0 to the end to `observe`; returns when and why
@@ -19,9 +19,9 @@ use core::ops::ControlFlow;
 pub fn fly(
     scenario: &Scenario,
     contender: &Contender,
-    observe: impl FnMut(&Sample),
+    mut observe: impl FnMut(&Sample),
 ) -> Result<Option<Lost>, OutOfRange> {
-    FlightStart::of(scenario).fly(contender, observe)
+    FlightStart::of(scenario).fly(contender, &mut observe)
 }
 
 /// The start of a scenario, which every contender flies from. A vehicle's own estimate settles before it, once for all.
@@ -41,32 +41,20 @@ impl<'a> FlightStart<'a> {
     ///
     /// # Errors
     /// As there.
-    pub fn fly(&mut self, contender: &Contender, observe: impl FnMut(&Sample)) -> Result<Option<Lost>, OutOfRange> {
+    pub fn fly(&mut self, contender: &Contender, observe: &mut dyn FnMut(&Sample)) -> Result<Option<Lost>, OutOfRange> {
         let scenario = self.scenario;
-        contender.build(&scenario.vehicle, &scenario.rotors, Fly { start: self, observe })
+        with_rotors!(scenario.rotors.len(), N => {
+            let controller = contender.controller::<N>(&scenario.vehicle, &scenario.rotors)?;
+            self.fly_under(controller, observe)
+        })
     }
 
-    /// Returns the world for steps of `dt_s`.
-    fn world(&mut self, dt_s: f64) -> Result<World, OutOfRange> {
-        let world = match self.world.take().filter(|world| world.dt_s() == dt_s) {
-            Some(world) => world,
-            None => World::new(self.scenario, dt_s)?,
-        };
-        Ok(self.world.insert(world).clone())
-    }
-}
-
-struct Fly<'a, 'b, O> {
-    start: &'a mut FlightStart<'b>,
-    observe: O,
-}
-
-impl<O: FnMut(&Sample)> Task for Fly<'_, '_, O> {
-    type Output = Option<Lost>;
-
-    fn with<C: FlightController<N>, const N: usize>(self, controller: C) -> Result<Option<Lost>, OutOfRange> {
-        let Fly { start, mut observe } = self;
-        let (scenario, mut world) = (start.scenario, start.world(decimal(controller.dt_s()))?);
+    fn fly_under<const N: usize>(
+        &mut self,
+        controller: AnyController<N>,
+        observe: &mut dyn FnMut(&Sample),
+    ) -> Result<Option<Lost>, OutOfRange> {
+        let (scenario, mut world) = (self.scenario, self.world(decimal(controller.dt_s()))?);
         let observe = |sample: &Sample| {
             observe(sample);
             ControlFlow::Continue(())
@@ -78,5 +66,14 @@ impl<O: FnMut(&Sample)> Task for Fly<'_, '_, O> {
             lockstep(&mut world, &mut LawOnly::new(controller), scenario.duration_s, observe)
         };
         Ok(end.lost)
+    }
+
+    /// Returns the world for steps of `dt_s`.
+    fn world(&mut self, dt_s: f64) -> Result<World, OutOfRange> {
+        let world = match self.world.take().filter(|world| world.dt_s() == dt_s) {
+            Some(world) => world,
+            None => World::new(self.scenario, dt_s)?,
+        };
+        Ok(self.world.insert(world).clone())
     }
 }

@@ -82,7 +82,7 @@ impl<C: FlightController<N>, const N: usize> Pilot for InFlightCore<C, N> {
         let mut action = if self.now_us > 0 { self.tick(&view, setpoint) } else { Action::default() };
         action.health.state_rejected = state.is_none();
         action.health.setpoint_rejected = !setpoint.is_plausible();
-        let estimates = self.memory.control().map(|control| estimates::<N>(control)).unwrap_or_default();
+        let estimates = self.memory.control().and_then(|control| estimates::<N>(control));
         Ok(view.sample(action, self.memory.trace::<C, N>(), estimates))
     }
 

@@ -1,9 +1,10 @@
 //! Record of one step of a flight.
 
 use super::estimation::Estimated;
-use afbc::{AdaptiveEstimate, Cascade, guarded};
+use afbc::AdaptiveEstimate;
 use afbc_control::{Action, Trace};
 use afbc_plant::{EffectsState, Motion, StateMeasurement};
+use afbc_scenario::AnyControllerMemory;
 use afbc_scenario::trajectory::Reference;
 use afbc_types::{PerAxis, ROTORS_MAX};
 use core::any::Any;
@@ -27,14 +28,12 @@ pub struct Sample {
     pub action: Action<ROTORS_MAX>,
     /// The controller's trace.
     pub trace: Trace,
-    /// AFBC's estimates; zero for other laws.
-    pub estimates: PerAxis<AdaptiveEstimate>,
+    /// AFBC's estimates; none for other laws.
+    pub estimates: Option<PerAxis<AdaptiveEstimate>>,
 }
 
-/// Returns the estimates in a law's memory, if the law is AFBC, with or without its monitor; zero for another.
+/// Returns AFBC's estimates in the memory of a law of the list; none for another.
 #[inline(always)]
-pub(super) fn estimates<const N: usize>(memory: &dyn Any) -> PerAxis<AdaptiveEstimate> {
-    let alone = || memory.downcast_ref().map(|cascade: &Cascade<AdaptiveEstimate>| cascade.estimates);
-    let guarded = memory.downcast_ref().map(|memory: &guarded::Memory<N>| memory.estimates());
-    guarded.or_else(alone).unwrap_or_default()
+pub(super) fn estimates<const N: usize>(memory: &dyn Any) -> Option<PerAxis<AdaptiveEstimate>> {
+    memory.downcast_ref().and_then(AnyControllerMemory::<N>::estimates)
 }

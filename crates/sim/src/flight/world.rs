@@ -204,7 +204,7 @@ impl View {
         self,
         action: Action<N>,
         trace: Trace,
-        estimates: PerAxis<AdaptiveEstimate>,
+        estimates: Option<PerAxis<AdaptiveEstimate>>,
     ) -> Sample {
         let View { time_s, motion, measurement, estimated, telemetry, reference, .. } = self;
         let action = action.padded();

@@ -21,7 +21,10 @@ impl Dispatcher {
     pub(super) fn find_safe_place(&mut self) {
         let rally = self.missions.rally();
         let returns = self.status.guided.mode == FlightMode::Return;
-        if self.now_us.saturating_sub(self.safe_us) < SAFE_EVERY_US || returns || rally.is_empty() && self.safe_m.is_none() {
+        if self.now_us.saturating_sub(self.safe_us) < SAFE_EVERY_US
+            || returns
+            || rally.is_empty() && self.safe_m.is_none()
+        {
             return;
         }
         self.safe_us = self.now_us;
@@ -71,11 +74,10 @@ impl Dispatcher {
                 holds(items, &chart, to_m) && is_clear(items, &chart, here_m, to_m)
             }
             Order::Orbit { centre_m, radius_m, .. } => holds_circle(items, &chart, or_here(centre_m), radius_m.abs()),
-            Order::Select(FlightMode::Return) if self.status.is_airborne() => {
-                self.safe_m.or(self.status.guided.home_m.map(|home_m| home_m.xy())).is_none_or(|home_m| {
-                    contains(items, &chart, home_m) && is_clear(items, &chart, here_m, home_m)
-                })
-            }
+            Order::Select(FlightMode::Return) if self.status.is_airborne() => self
+                .safe_m
+                .or(self.status.guided.home_m.map(|home_m| home_m.xy()))
+                .is_none_or(|home_m| contains(items, &chart, home_m) && is_clear(items, &chart, here_m, home_m)),
             _ => true,
         }
     }

@@ -65,7 +65,11 @@ pub fn check_item(item: &MissionItem) -> Result<(), Invalid> {
 ///
 /// # Errors
 /// The number of an item, and what is wrong with it.
-pub fn check(items: &[MissionItem], chart: Option<&LocalChart>, here_m: Option<Vector2<f32>>) -> Result<(), (u16, Invalid)> {
+pub fn check(
+    items: &[MissionItem],
+    chart: Option<&LocalChart>,
+    here_m: Option<Vector2<f32>>,
+) -> Result<(), (u16, Invalid)> {
     let refuse = |item: &MissionItem, result, reason| Err((item.number, Invalid { result, reason }));
     let Some(first) = items.first() else { return Ok(()) };
     let Some(chart) = chart else {
@@ -275,7 +279,11 @@ fn boundary(area: &[MissionItem], place: usize, chart: &LocalChart) -> Option<Bo
     let begin_m = chart.local([item.x, item.y]);
     if vertices(item).is_none() {
         let [radius_m, ..] = item.parameters;
-        return (!is_none(item)).then_some(Boundary::Circle { centre_m: begin_m, radius_m, included: is_inclusion(item) });
+        return (!is_none(item)).then_some(Boundary::Circle {
+            centre_m: begin_m,
+            radius_m,
+            included: is_inclusion(item),
+        });
     }
     let next = area.get(place + 1).or(area.first())?;
     Some(Boundary::Edge(begin_m, chart.local([next.x, next.y])))

@@ -16,6 +16,7 @@ pub mod modes;
 pub mod origin;
 pub mod sensors;
 pub mod serial;
+pub mod signing;
 pub mod status;
 pub mod streams;
 pub mod telemetry;

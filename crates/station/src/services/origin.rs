@@ -122,7 +122,14 @@ impl LocalChart {
         const TURN: i64 = 3_600_000_000;
         let [at_latitude, at_longitude] = self.at_e7;
         let off = i64::from(longitude_e7) - i64::from(at_longitude);
-        let off = off - if off > TURN / 2 { TURN } else if off < -TURN / 2 { -TURN } else { 0 };
+        let off = off
+            - if off > TURN / 2 {
+                TURN
+            } else if off < -TURN / 2 {
+                -TURN
+            } else {
+                0
+            };
         // The origin's own fraction is far below a centimetre.
         let north_m = (i64::from(latitude_e7) - i64::from(at_latitude)) as f32 * self.north_m;
         let east_m = off as f32 * self.east_m;

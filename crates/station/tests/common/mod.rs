@@ -105,7 +105,7 @@ impl Bench {
         let Bench { flight, comms, table, changes, decoder, .. } = self;
         let mut send = |bytes: &[u8]| {
             (length, frames) = (length + bytes.len(), frames + 1);
-            decoder.feed(bytes, |_, message| messages.push(message));
+            decoder.feed_accepted(bytes, |_| true, |_, message| messages.push(message));
         };
         comms.report(report, 0.0, &mut send);
         if let Some(change) = comms.parameters(table, &mut send) {

@@ -77,11 +77,12 @@ fn stars() -> impl Strategy<Value = Vec<[f32; 2]>> {
 
 /// Polygons and circles, of inclusion and exclusion.
 fn fences() -> impl Strategy<Value = Vec<MissionItem>> {
-    let area = prop_oneof![
-        (0..2_usize, stars()).prop_map(|(kind, corners)| polygon(VERTEX[kind], &corners)),
-        (0..2_usize, 0.0_f32..300.0, -200.0_f32..200.0, -200.0_f32..200.0)
-            .prop_map(|(kind, radius, x, y)| vec![item(CIRCLE[kind], radius, [x, y])]),
-    ];
+    let area =
+        prop_oneof![
+            (0..2_usize, stars()).prop_map(|(kind, corners)| polygon(VERTEX[kind], &corners)),
+            (0..2_usize, 0.0_f32..300.0, -200.0_f32..200.0, -200.0_f32..200.0)
+                .prop_map(|(kind, radius, x, y)| vec![item(CIRCLE[kind], radius, [x, y])]),
+        ];
     prop::collection::vec(area, 0..5).prop_map(|areas| numbered(areas.concat()))
 }
 
@@ -296,9 +297,13 @@ fn places_ways_and_circles_are_inside_or_not() {
     assert!(holds(&fence, &chart, m(0.0, 0.0)) && holds(&fence, &chart, m(48.9, 0.0)));
     assert!(!holds(&fence, &chart, m(49.1, 0.0)) && !holds(&fence, &chart, m(60.0, 0.0)));
     assert!(!holds(&fence, &chart, m(20.0, 0.0)) && !holds(&fence, &chart, m(14.5, 0.0)));
-    assert!(!is_clear(&fence, &chart, m(0.0, 0.0), m(40.0, 0.0)) && is_clear(&fence, &chart, m(0.0, 0.0), m(40.0, 20.0)));
+    assert!(
+        !is_clear(&fence, &chart, m(0.0, 0.0), m(40.0, 0.0)) && is_clear(&fence, &chart, m(0.0, 0.0), m(40.0, 20.0))
+    );
     // Along the boundary, and in from outside.
-    assert!(is_clear(&fence, &chart, m(49.5, -40.0), m(49.5, 40.0)) && is_clear(&fence, &chart, m(60.0, 0.0), m(40.0, 0.0)));
+    assert!(
+        is_clear(&fence, &chart, m(49.5, -40.0), m(49.5, 40.0)) && is_clear(&fence, &chart, m(60.0, 0.0), m(40.0, 0.0))
+    );
     assert!(holds_circle(&fence, &chart, m(0.0, 0.0), 10.0), "beside the exclusion");
     assert!(!holds_circle(&fence, &chart, m(0.0, 0.0), 20.0), "through it");
     assert!(holds_circle(&fence, &chart, m(20.0, 0.0), 20.0), "around it");

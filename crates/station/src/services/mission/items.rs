@@ -108,7 +108,9 @@ pub fn check(item: &MissionItem) -> Result<(), Invalid> {
         YAW => {
             return match item.parameters {
                 // False of NaN.
-                [angle, ..] if !(angle.abs() <= 3600.0) => refuse(MissionResult::INVALID_PARAM1, "angle is out of range"),
+                [angle, ..] if !(angle.abs() <= 3600.0) => {
+                    refuse(MissionResult::INVALID_PARAM1, "angle is out of range")
+                }
                 [_, _, -1.0 | 0.0 | 1.0, 0.0 | 1.0] => Ok(()),
                 [_, _, -1.0 | 0.0 | 1.0, _] => refuse(MissionResult(9), "neither absolute nor relative"),
                 _ => refuse(MissionResult(8), "direction is not -1, 0 or 1"),

@@ -257,7 +257,9 @@ impl Missions {
         if checked.is_ok() {
             checked = match plan {
                 Plan::FENCE => fence::check(&upload.items, around.chart.as_ref(), around.here_m),
-                Plan::MISSION => check_jumps(&upload.items).and_then(|()| check_places(&upload.items, &self.plans, around)),
+                Plan::MISSION => {
+                    check_jumps(&upload.items).and_then(|()| check_places(&upload.items, &self.plans, around))
+                }
                 _ => Ok(()),
             };
         }

@@ -542,7 +542,10 @@ fn an_item_is_chosen_that_there_is() {
         (2, true, None, Some(Words::of("no mission item 2"))),
         (1, false, None, None),
     ] {
-        assert_eq!(missions.hear(Mission::SetCurrent(number), A, may, 0, &NOWHERE), Heard { text, resume, fence: false });
+        assert_eq!(
+            missions.hear(Mission::SetCurrent(number), A, may, 0, &NOWHERE),
+            Heard { text, resume, fence: false }
+        );
     }
 }
 

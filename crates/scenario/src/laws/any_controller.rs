@@ -1,46 +1,21 @@
-//! Any law in the place of the firmware's own.
+//! One type for the controllers of all laws.
 
-use crate::contender::{Law, Task};
+use super::{AnyController, AnyControllerMemory};
+use afbc::AdaptiveEstimate;
+use afbc::Guarded;
 use afbc::monitor::Norm;
-use afbc::{Adaptive, Backstepping, Controller};
-use afbc_control::{Action, FlightController, Mixer, Trace};
-use afbc_onboard::{Configuration, FlightLaw, Prepare, Prepared};
-use afbc_peers::{Dfbc, Geometric, Indi, L1, Mpc, Pid};
-use afbc_types::{Axis, Declared, OutOfRange, Range, Setpoint, State};
-use core::any::Any;
-
-/// Prepares flights of the firmware's code under a law of the list, without a monitor: its gains stay, vehicle and
-/// settings are those of the configuration.
-#[derive(Clone, Copy, Debug)]
-pub struct OtherLaw(pub Law);
-
-impl<const N: usize> Prepare<N> for OtherLaw {
-    type Law = AnyController<N>;
-
-    fn prepare(&self, configuration: &Configuration<N>) -> Result<Prepared<N, AnyController<N>>, OutOfRange> {
-        let Configuration { airframe, settings, .. } = configuration;
-        airframe.parameters.validate()?;
-        settings.validate()?;
-        let controller = self.0.build(*airframe, *settings, Collect::<N>)?;
-        Prepared::under(configuration, controller)
-    }
-}
-
-/// Puts a controller among those of any law.
-struct Collect<const N: usize>;
-
-/// The error on a controller that is not listed below: a defect.
-const UNLISTED: OutOfRange = OutOfRange { value: 0.0, range: Range::new("listed_law", 1.0, 1.0) };
+use afbc_onboard::FlightLaw;
+use afbc_types::{Axis, PerAxis};
 
 /// Defines the controller of any law, and its memory, from one line per law.
 macro_rules! any_controller {
-    ($($Name:ident($Controller:ty)),* $(,)?) => {
+    ($($(#[$doc:meta])* $Name:ident($Controller:ty)),* $(,)?) => {
         /// The controller of any law, so that what flies is compiled once for all of them.
         #[derive(Clone, Debug)]
         #[allow(clippy::large_enum_variant, reason = "one per vehicle")]
         pub enum AnyController<const N: usize> {
             $(
-                /// Of this law.
+                $(#[$doc])*
                 $Name($Controller),
             )*
         }
@@ -53,7 +28,7 @@ macro_rules! any_controller {
             #[default]
             None,
             $(
-                /// Of this law.
+                $(#[$doc])*
                 $Name(<$Controller as FlightController<N>>::Memory),
             )*
         }
@@ -97,6 +72,7 @@ macro_rules! any_controller {
                 }
             }
 
+            #[inline(always)]
             fn trace(memory: &Self::Memory) -> Trace {
                 match memory {
                     AnyControllerMemory::None => Trace::default(),
@@ -127,39 +103,28 @@ macro_rules! any_controller {
                 };
             }
         }
-
-        impl<const N: usize> Task for Collect<N> {
-            type Output = AnyController<N>;
-
-            fn with<C, const M: usize>(self, controller: C) -> Result<AnyController<N>, OutOfRange>
-            where
-                C: FlightController<M> + Clone + 'static,
-            {
-                let any: &dyn Any = &controller;
-                $(
-                    if let Some(found) = any.downcast_ref::<$Controller>() {
-                        return Ok(AnyController::$Name(found.clone()));
-                    }
-                )*
-                Err(UNLISTED)
-            }
-        }
     };
 }
 
-any_controller! {
-    Afbc(Controller<Adaptive, N>),
-    Backstepping(Controller<Backstepping, N>),
-    Pid(Pid<N>),
-    Geometric(Geometric<N>),
-    Indi(Indi<N>),
-    L1(L1<N>),
-    Dfbc(Dfbc<N>),
-    Mpc(Mpc<N>),
+pub(super) use any_controller;
+
+impl<const N: usize> AnyControllerMemory<N> {
+    /// Returns AFBC's estimates, with or without its monitor; none of another law.
+    #[inline(always)]
+    pub fn estimates(&self) -> Option<PerAxis<AdaptiveEstimate>> {
+        match self {
+            AnyControllerMemory::Monitored(memory) => Some(memory.estimates()),
+            AnyControllerMemory::Afbc(memory) => Some(memory.estimates),
+            _ => None,
+        }
+    }
 }
 
 impl<const N: usize> FlightLaw<N> for AnyController<N> {
-    fn norms(_: &AnyControllerMemory<N>) -> Option<(Axis, Norm)> {
-        None
+    fn norms(memory: &AnyControllerMemory<N>) -> Option<(Axis, Norm)> {
+        match memory {
+            AnyControllerMemory::Monitored(memory) => Guarded::norms(memory),
+            _ => None,
+        }
     }
 }
