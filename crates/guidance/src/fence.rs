@@ -1,8 +1,8 @@
 //! Geofence by prediction: the way on which the vehicle would stop, against the boundaries of areas. Horizontal, in the
 //! local frame.
 //!
-//! The areas themselves are the link's, which looks at a few of their boundaries after each tick, and tells the guidance
-//! what it has found ([`FenceView`]).
+//! The areas themselves are the link's, which looks at a few of their boundaries after each tick, and tells the
+//! guidance what it has found ([`FenceView`]).
 
 use crate::settings::Limits;
 use crate::shaper::Shape;

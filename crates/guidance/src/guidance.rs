@@ -348,8 +348,8 @@ impl Memory {
         self.lands_item = None;
     }
 
-    /// Stops a vehicle that is about to leave the uploaded fence, in a mode that is strong enough not to be replaced: in
-    /// hold it flies no further to where it was ordered, and a return across the fence lands.
+    /// Stops a vehicle that is about to leave the uploaded fence, in a mode that is strong enough not to be replaced:
+    /// in hold it flies no further to where it was ordered, and a return across the fence lands.
     fn stop_at_fence(&mut self, action: FailsafeAction, notices: &mut Notices) {
         if action < FailsafeAction::Hold {
             return;

@@ -177,7 +177,12 @@ proptest! {
 
     /// The chart agrees with the exact conversion.
     #[test]
-    fn the_chart_is_the_earth(latitude in -70.0_f64..70.0, longitude in -180.0_f64..180.0, x in -1.0_f32..1.0, y in -1.0_f32..1.0) {
+    fn the_chart_is_the_earth(
+        latitude in -70.0_f64..70.0,
+        longitude in -180.0_f64..180.0,
+        x in -1.0_f32..1.0,
+        y in -1.0_f32..1.0,
+    ) {
         let at = Global { latitude_deg: latitude, longitude_deg: longitude, altitude_m: 300.0 };
         let origin = EarthOrigin::new(at).unwrap();
         for (reach, most) in [(1000.0, 0.03), (10_000.0, 0.4), (20_000.0, 2.0)] {
@@ -196,7 +201,10 @@ proptest! {
     /// Neither bytes of items nor numbers in them stop anything.
     #[test]
     fn any_items_are_answered(
-        items in prop::collection::vec((4999..5006_u16, any::<f32>(), -3.0_f32..70.0, any::<i32>(), any::<i32>(), any::<bool>()), 1..30),
+        items in prop::collection::vec(
+            (4999..5006_u16, any::<f32>(), -3.0_f32..70.0, any::<i32>(), any::<i32>(), any::<bool>()),
+            1..30,
+        ),
     ) {
         let items = items.into_iter().map(|(command, wild, tame, x, y, tamed)| MissionItem {
             command,
