@@ -73,7 +73,7 @@ pub use parameter::{ParameterError, ParameterName, ParameterRequest, ParameterVa
 pub use place::{Datum, Height, Place};
 pub use question::{
     EventError, EventRequest, ExtendedAnswer, ExtendedName, ExtendedRequest, FileOperation, FileRefusal, FtpError,
-    LogAnswer, LogRequest, Question, QuestionRefusal, Serial, Terrain,
+    LogAnswer, LogRequest, Question, QuestionRefusal, Serial, Terrain, UnansweredWish,
 };
 pub use signature::{Key, ReceivedFrame, SetupSigning, Stamp, TIME_MAX};
 pub use target::{AttitudeAndThrust, Axes, ExternalTarget, ManualControl, PositionTarget};

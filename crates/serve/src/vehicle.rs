@@ -14,6 +14,7 @@ use afbc_reader::words::out_of_range;
 use afbc_scenario::Scenario;
 use afbc_sim::flight::World;
 use afbc_station::services::health::sensor;
+use afbc_station::services::origin::{EarthOrigin, Global};
 use afbc_station::services::sensors::tested;
 use afbc_station::services::status::SensorBits;
 use afbc_station::{AuxSensors, Setup};
@@ -111,6 +112,13 @@ impl ServedVehicle {
     /// Returns its world.
     pub fn world(&self) -> &World {
         &self.world
+    }
+
+    /// Puts the local frame's origin at this latitude and longitude \[deg\], and altitude above the sea \[m\]; false
+    /// within a kilometre of a pole.
+    pub fn move_origin(&mut self, [latitude_deg, longitude_deg]: [f64; 2], altitude_m: f64) -> bool {
+        let origin = EarthOrigin::new(Global { latitude_deg, longitude_deg, altitude_m });
+        origin.map(|origin| self.reported.move_origin(origin)).is_some()
     }
 
     /// Sets whether those that connect from now on count as holding the vehicle: they may set the key of signatures.

@@ -21,6 +21,7 @@ use afbc_flight_core::rate;
 use afbc_flight_core::supervisor::COAST_US;
 use afbc_flight_core::tracker::{POSE_AGE_MAX_US, Refused, Sighting};
 use afbc_flight_core::{Mode, Stamped, Tracker};
+use afbc_guidance::fence::Braking;
 use afbc_guidance::{BatteryReading, Cause, ModeReason, Notice};
 use afbc_link::{
     Address, Decoder, Downlink, InertialSample, MavSeverity, Message, PositionTarget, Reboot, ReceivedFrame,
@@ -141,7 +142,7 @@ impl Comms {
 
     /// True if [`receive`](Self::receive) has something for the next tick even without bytes.
     pub fn has_mail(&self) -> bool {
-        self.dispatcher.wanted_leg().is_some()
+        self.dispatcher.wanted_leg().is_some() || self.dispatcher.has_fence_news()
     }
 
     /// Processes the next bytes of the stream; returns new inputs for the control tick, to be
@@ -324,6 +325,7 @@ impl Comms {
         // COM_DL_LOSS_T, which is in range.
         let silent_us = (table.configuration().guidance.net.station_lost_s * 1e6) as u64;
         self.dispatcher.control.set_silence(silent_us);
+        self.dispatcher.braking = Braking::of(&table.configuration().guidance.limits);
         let mut outlet = self.outlet(self.left, send);
         let Dispatcher { parameters, streams, now_us, .. } = &mut self.dispatcher;
         while outlet.left >= VALUE_BYTES as usize + SIGNATURE
@@ -456,6 +458,7 @@ impl Comms {
                 }
                 modes::available(place).map(Downlink::AvailableMode)
             }
+            id::ORBIT_EXECUTION_STATUS => self.dispatcher.orbit_status(),
             id::DEBUG_FLOAT_ARRAY => Some(Downlink::Health(self.health())),
             id::HIGHRES_IMU => {
                 self.sample_is_due = true;

@@ -8,6 +8,7 @@ mod file;
 mod log;
 mod serial;
 mod terrain;
+mod unanswered;
 
 use crate::address::Address;
 use crate::message::{Fault, MessageFormat, PAYLOAD_MAX};
@@ -20,6 +21,7 @@ use mavlink::MessageData;
 use mavlink::dialects::common::SET_GPS_GLOBAL_ORIGIN_DATA;
 pub use serial::Serial;
 pub use terrain::Terrain;
+pub use unanswered::UnansweredWish;
 
 /// A question.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,6 +40,8 @@ pub enum Question {
     Terrain(Terrain),
     /// SET_GPS_GLOBAL_ORIGIN (48), without the place: it is answered with GPS_GLOBAL_ORIGIN.
     Origin,
+    /// GPS_RTCM_DATA, PLAY_TUNE, FOLLOW_TARGET and the like, which no message answers.
+    Unanswered(UnansweredWish),
 }
 
 /// The answer to a [`Question`].
@@ -71,7 +75,7 @@ impl Question {
             serial::ID => serial::format(),
             terrain::CHECK_ID => terrain::check_format(),
             ORIGIN_ID => ORIGIN.format(),
-            _ => return None,
+            _ => return UnansweredWish::format(id),
         })
     }
 
@@ -103,6 +107,10 @@ impl Question {
                 let (_, system, _) = ORIGIN.read(payload);
                 (Question::Origin, Address { system, component: 0 })
             }
+            _ if UnansweredWish::format(id).is_some() => {
+                let (wish, to) = UnansweredWish::read(id, payload);
+                (Question::Unanswered(wish), to)
+            }
             _ => return Err(Fault::Unknown),
         })
     }
@@ -116,6 +124,7 @@ impl Question {
             Question::Serial(serial) => serial.write(serial::RESPOND, Address::default(), payload),
             Question::Terrain(terrain) => terrain.write_check(payload),
             Question::Origin => ORIGIN.write(&(Unused, 0, Unused), payload),
+            Question::Unanswered(wish) => wish.write(payload),
         }
     }
 }
