@@ -108,7 +108,7 @@ pub fn check(item: &MissionItem) -> Result<(), Invalid> {
         YAW => {
             return match item.parameters {
                 // False of NaN.
-                [angle, ..] if !(angle.abs() <= 3600.0) => {
+                [angle, ..] if !(-3600.0..=3600.0).contains(&angle) => {
                     refuse(MissionResult::INVALID_PARAM1, "angle is out of range")
                 }
                 [_, _, -1.0 | 0.0 | 1.0, 0.0 | 1.0] => Ok(()),
