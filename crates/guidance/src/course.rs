@@ -3,7 +3,7 @@
 use crate::limiter::LimiterTarget;
 use crate::mode_io::{ModeInputs, ModeOutput};
 use afbc_control::math::{max, min};
-use nalgebra::Vector3;
+use nalgebra::{Vector2, Vector3};
 
 /// Distance from home at which it descends \[m\].
 const OVER_HOME_M: f32 = 1.0;
@@ -76,10 +76,11 @@ impl Land {
     }
 }
 
-/// Climbs, flies home and lands.
+/// Climbs, flies home, or to another place that is nearer, and lands.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Return {
     height_m: f32,
+    to_m: Vector2<f32>,
     /// Where it climbs; none while it stops.
     hold: Hold,
     stage: Stage,
@@ -94,17 +95,22 @@ enum Stage {
 }
 
 impl Return {
-    pub(crate) fn new(inputs: &ModeInputs<'_>) -> Self {
+    pub(crate) fn new(inputs: &ModeInputs<'_>, to_m: Vector2<f32>) -> Self {
         let position_m = inputs.present.position_m;
-        let off_m = (inputs.home_m - position_m).xy();
+        let off_m = to_m - position_m.xy();
         let near = off_m.norm_squared() <= inputs.flying.near_home_m * inputs.flying.near_home_m;
         let safe_m = inputs.home_m.z + inputs.flying.return_height_m;
         let height_m = if near { position_m.z } else { min(max(position_m.z, safe_m), inputs.ceiling_m) };
-        Return { height_m, hold: Hold::default(), stage: Stage::Climbs }
+        Return { height_m, to_m, hold: Hold::default(), stage: Stage::Climbs }
+    }
+
+    /// True once it has stopped and climbed.
+    pub(crate) fn is_on_its_way(&self) -> bool {
+        self.stage != Stage::Climbs
     }
 
     pub(crate) fn fly(&mut self, inputs: &ModeInputs<'_>) -> ModeOutput {
-        let home_m = Vector3::new(inputs.home_m.x, inputs.home_m.y, self.height_m);
+        let home_m = Vector3::new(self.to_m.x, self.to_m.y, self.height_m);
         match self.stage {
             Stage::Climbs => {
                 let mut aim = self.hold.fly(inputs);

@@ -11,6 +11,7 @@ use crate::mission::Mission;
 use crate::mode::FlightMode;
 use crate::net::{self, FailedSensors, Findings, Watch};
 use crate::notice::{Cause, ModeReason, Notice, Notices};
+use crate::orbit::Orbit;
 use crate::order::{OrderRefusal, Orders};
 use crate::settings::Settings;
 use crate::sticks;
@@ -75,6 +76,8 @@ pub struct Guided {
     pub against: Reasons,
     /// Charge of the battery, 0 to 1.
     pub charge: Option<f32>,
+    /// True while it flies a circle that was ordered.
+    pub orbits: bool,
 }
 
 /// The guidance of one vehicle.
@@ -131,6 +134,7 @@ enum Plan {
     /// Not begun.
     New,
     Hold(Hold),
+    Orbit(Orbit),
     Takeoff(Takeoff),
     Land(Land),
     Return(Return),
@@ -237,6 +241,7 @@ impl Memory {
                 .map(|heard_us| u32::try_from(given.now_us.saturating_sub(heard_us)).unwrap_or(u32::MAX)),
             targets: target.is_some(),
             sticks: sticks.is_some(),
+            fence: orders.fence.unwrap_or_default(),
             dt_s,
         };
         let (held, cause, new) = self.watch.look(&settings.net, &findings, &mut notices);
@@ -261,6 +266,10 @@ impl Memory {
             self.change(next, ModeReason::Failsafe(cause), &mut notices);
             (self.failsafe, announced) = (Some(cause), Some(cause));
         }
+        let leaves = findings.fence.leaves && net::is_new(new, Cause::Fence);
+        if leaves && airborne {
+            self.stop_at_fence(settings.net.fence_action.action(), &mut notices);
+        }
         if new != 0 {
             net::announce(&settings.net, new, announced, &mut notices);
         }
@@ -283,7 +292,7 @@ impl Memory {
         };
         let (setpoint, idle_on_ground) = flight.unwrap_or((None, armed && !airborne));
         if !armed {
-            self.against = self.against(settings, given, state);
+            self.against = self.against(settings, given, state, findings.fence.outside);
         }
         let request = self.disarms(settings, armed, airborne, idle_on_ground, held, dt_s, &mut reached, &mut notices);
         Guided {
@@ -299,6 +308,7 @@ impl Memory {
             failsafe: self.failsafe,
             against: self.against,
             charge: self.watch.charge(),
+            orbits: matches!(self.plan, Plan::Orbit(_)),
         }
     }
 
@@ -336,6 +346,21 @@ impl Memory {
         (self.mode, self.plan, self.enters, self.lift_s) = (next, Plan::New, true, 0.0);
         self.trim = Trim::default();
         self.lands_item = None;
+    }
+
+    /// Stops a vehicle that is about to leave the uploaded fence, in a mode that is strong enough not to be replaced:
+    /// in hold it flies no further to where it was ordered, and a return across the fence lands.
+    fn stop_at_fence(&mut self, action: FailsafeAction, notices: &mut Notices) {
+        if action < FailsafeAction::Hold {
+            return;
+        }
+        let next = match &self.plan {
+            Plan::Return(home) if home.is_on_its_way() => FlightMode::Land,
+            Plan::Hold(_) | Plan::Orbit(_) if self.mode == FlightMode::Hold => FlightMode::Hold,
+            _ => return,
+        };
+        self.change(next, ModeReason::Failsafe(Cause::Fence), notices);
+        self.failsafe = Some(Cause::Fence);
     }
 
     /// Returns the request that stops the motors of a vehicle on the ground.
@@ -378,7 +403,13 @@ impl Memory {
     }
 
     /// Returns what speaks against arming that the flight core does not see itself.
-    fn against(&self, settings: &Settings, given: &GuidanceInputs<'_>, state: Option<&State>) -> Reasons {
+    fn against(
+        &self,
+        settings: &Settings,
+        given: &GuidanceInputs<'_>,
+        state: Option<&State>,
+        outside_fence: bool,
+    ) -> Reasons {
         let mut reasons = Reasons::NONE;
         // Without a number of cells the battery is not watched.
         let watched = settings.net.cells > 0;
@@ -386,7 +417,7 @@ impl Memory {
         reasons.note(watched && (!known || self.watch.holds(Cause::BatteryLow)), Refusal::BatteryLow);
         reasons.note(given.sensors.any(), Refusal::SensorFailed);
         let outside = state.is_some_and(|state| !self.is_inside(settings, &state.position_m));
-        reasons.note(outside, Refusal::OutsideFence);
+        reasons.note(outside || outside_fence, Refusal::OutsideFence);
         reasons.note(matches!(self.mode, FlightMode::Land | FlightMode::Return), Refusal::WrongMode);
         reasons
     }

@@ -9,13 +9,14 @@
 //! 1. [`guidance`]: the tick.
 //! 2. [`mode`], [`order`]: what may be asked for; [`table`]: the transitions between modes.
 //! 3. [`limiter`]: how any target becomes a smooth flight.
-//! 4. [`net`], [`battery`], [`notice`]: what is watched and announced.
+//! 4. [`net`], [`fence`], [`battery`], [`notice`]: what is watched and announced.
 //! 5. [`settings`]: the parameters.
 #![no_std]
 
 pub mod actions;
 pub mod battery;
 mod course;
+pub mod fence;
 pub mod guidance;
 mod heading;
 pub mod lift;
@@ -25,6 +26,7 @@ pub mod mode;
 mod mode_io;
 pub mod net;
 pub mod notice;
+mod orbit;
 pub mod order;
 pub mod settings;
 mod shaper;
@@ -34,12 +36,14 @@ mod targets;
 
 pub use actions::{BatteryAction, FenceAction, SensorsAction, StationAction, SticksAction, TargetsAction};
 pub use battery::BatteryReading;
+pub use fence::FenceView;
 pub use guidance::{Guidance, GuidanceInputs, Guided};
 pub use lift::Lift;
 pub use limiter::{Limiter, LimiterTarget};
 pub use mode::FlightMode;
 pub use net::{FailedSensors, Net};
 pub use notice::{Cause, ModeReason, Notice, Notices, Severity};
+pub use orbit::{ORBIT_RADIUS_M, OrbitHeading};
 pub use order::{AttitudeTarget, Item, Leg, MotionTarget, OffboardTarget, Order, OrderRefusal, Orders, Sticks};
 pub use settings::{Flying, Limits, Settings};
 pub use table::{FailsafeAction, TransitionInputs};

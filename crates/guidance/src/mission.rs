@@ -3,13 +3,20 @@
 use crate::course::{Hold, Takeoff};
 use crate::limiter::LimiterTarget;
 use crate::mode::FlightMode;
-use crate::mode_io::{ModeInputs, ModeOutput};
+use crate::mode_io::{ModeInputs, ModeOutput, Shaping};
+use crate::orbit::{self, Orbit, OrbitHeading, Round};
 use crate::order::{Item, Leg};
-use afbc_control::math::{max, min};
-use nalgebra::Vector3;
+use afbc_control::math::{max, min, wrap_angle};
+use core::f32::consts::{PI, TAU};
+use nalgebra::{Vector2, Vector3};
 
 /// Speed of the setpoint at which it has stopped at a waypoint \[m/s\].
 const STOPPED_M_S: f32 = 0.3;
+/// Angle to go \[rad\], and rate \[rad/s\], at which a turn is done.
+const TURNED_RAD: f32 = 0.03;
+const TURNED_RAD_S: f32 = 0.05;
+/// Angle by which the heading is led on \[rad\].
+const LED_RAD: f32 = 2.0;
 
 /// A mission in progress.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -22,14 +29,34 @@ pub(crate) struct Mission {
     /// Speed of the last item that changes it \[m/s\].
     speed_m_s: Option<f32>,
     hold: Hold,
+    /// Where it heads \[m\].
+    looks_at_m: Option<Vector2<f32>>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Begun {
     number: u16,
+    /// Heading, or the angle that is left to turn \[rad\].
     yaw_rad: f32,
-    takeoff: Option<Takeoff>,
+    course: Course,
     stayed_s: f32,
+}
+
+/// How an item in progress is flown.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Course {
+    Straight,
+    Takeoff(Takeoff),
+    Circle(Round),
+}
+
+impl Course {
+    fn takeoff(&self) -> Option<Takeoff> {
+        match self {
+            Course::Takeoff(takeoff) => Some(*takeoff),
+            _ => None,
+        }
+    }
 }
 
 /// What a mission does in a tick.
@@ -80,33 +107,43 @@ impl Mission {
         if !is_plausible(&leg.item) {
             return Progress { refused: true, ..none };
         }
+        let mut progress = self.fly_item(leg, inputs, inside, none);
+        if let (Some(at_m), Shaping::Limited(aim)) = (self.looks_at_m, &mut progress.output.shaping)
+            && !matches!(leg.item, Item::Yaw { .. })
+        {
+            (aim.yaw_rad, aim.yaw_rate_rad_s) = (inputs.towards(&Vector3::new(at_m.x, at_m.y, 0.0)), f32::NAN);
+        }
+        progress
+    }
+
+    /// Flies an item that is plausible.
+    fn fly_item(
+        &mut self,
+        leg: &Leg,
+        inputs: &ModeInputs<'_>,
+        inside: impl Fn(&Vector3<f32>) -> bool,
+        none: Progress,
+    ) -> Progress {
         match leg.item {
             Item::TakeOff { height_m } => {
                 if !inside(&Vector3::new(inputs.home_m.x, inputs.home_m.y, height_m)) {
                     return Progress { refused: true, ..none };
                 }
                 let begun = self.begin(leg, inputs, |inputs| {
-                    Some(Takeoff::new(inputs, max(height_m - inputs.present.position_m.z, 0.0)))
+                    Course::Takeoff(Takeoff::new(inputs, max(height_m - inputs.present.position_m.z, 0.0)))
                 });
-                let output = begun.takeoff.map_or(none.output, |takeoff| takeoff.fly(inputs));
-                let at_m = begun.takeoff.map(|takeoff| takeoff.to_m);
+                let takeoff = begun.course.takeoff();
+                let output = takeoff.map_or(none.output, |takeoff| takeoff.fly(inputs));
+                let at_m = takeoff.map(|takeoff| takeoff.to_m);
                 self.go_on(leg, output, at_m, none)
             }
             Item::Waypoint { position_m, yaw_rad, hold_s, within_m, fly_through } => {
                 if !inside(&position_m) {
                     return Progress { refused: true, ..none };
                 }
-                let on_ground = !inputs.airborne;
-                let room_m = max(inputs.ceiling_m - inputs.present.position_m.z, 0.0);
-                let height_m = min(inputs.flying.takeoff_height_m, room_m);
-                let begun = self.begin(leg, inputs, |inputs| on_ground.then(|| Takeoff::new(inputs, height_m)));
-                // From the ground it climbs first.
-                if let Some(takeoff) = begun.takeoff {
-                    let output = takeoff.fly(inputs);
-                    if output.done {
-                        begun.takeoff = None;
-                    }
-                    return Progress { output: ModeOutput { done: false, ..output }, ..none };
+                let begun = self.begin(leg, inputs, from_ground);
+                if let Some(output) = begun.climb(inputs) {
+                    return Progress { output, ..none };
                 }
                 let yaw_rad = if yaw_rad.is_nan() { begun.yaw_rad } else { yaw_rad };
                 let aim = LimiterTarget { yaw_rad, ..inputs.to(position_m) };
@@ -127,8 +164,8 @@ impl Mission {
                     return Progress { refused: true, ..none };
                 }
                 let height_m = inputs.present.position_m.z;
-                let begun = self.begin(leg, inputs, |inputs| Some(Takeoff::new(inputs, 0.0)));
-                let height_m = begun.takeoff.map_or(height_m, |start| start.to_m.z);
+                let begun = self.begin(leg, inputs, |inputs| Course::Takeoff(Takeoff::new(inputs, 0.0)));
+                let height_m = begun.course.takeoff().map_or(height_m, |start| start.to_m.z);
                 let over_m = Vector3::new(position_m.x, position_m.y, height_m);
                 let slow = inputs.present.velocity_m_s.norm_squared() < STOPPED_M_S * STOPPED_M_S;
                 let there = inputs.is_at(&over_m, 1.0) && slow;
@@ -138,11 +175,73 @@ impl Mission {
             Item::Return => Progress { then: Some((FlightMode::Return, leg.number)), ..none },
             Item::Speed(speed_m_s) => {
                 self.speed_m_s = Some(speed_m_s);
-                let output = ModeOutput { done: true, ..ModeOutput::fly(self.hold.fly(inputs)) };
-                let at_m = self.hold.at_m;
-                self.go_on(leg, output, at_m, none)
+                self.stay(leg, inputs, true, none)
+            }
+            Item::Wait(time_s) => {
+                let begun = self.begin(leg, inputs, |_| Course::Straight);
+                begun.stayed_s += inputs.dt_s;
+                let done = begun.stayed_s >= time_s;
+                self.stay(leg, inputs, done, none)
+            }
+            Item::Turns { centre_m, radius_m, turns } => {
+                if !inside(&centre_m) {
+                    return Progress { refused: true, ..none };
+                }
+                let radius = if radius_m == 0.0 { orbit::ORBIT_RADIUS_M } else { radius_m.abs() };
+                let fast_m_s = min(orbit::speed_max_m_s(inputs.limits, radius), inputs.stop().speed_m_s);
+                let begun = self.begin(leg, inputs, from_ground);
+                if let Some(output) = begun.climb(inputs) {
+                    return Progress { output, ..none };
+                }
+                let round = if let Course::Circle(round) = begun.course { round } else { Round::default() };
+                let mut orbit = Orbit {
+                    centre_m,
+                    radius_m: radius,
+                    speed_m_s: if radius_m > 0.0 { fast_m_s } else { -fast_m_s },
+                    heading: OrbitHeading::Centre,
+                    angle_rad: turns * TAU,
+                    round,
+                };
+                let output = orbit.fly(inputs);
+                begun.course = Course::Circle(orbit.round);
+                self.go_on(leg, output, None, none)
+            }
+            Item::Yaw { yaw_rad, relative, direction } => {
+                let first = self.begun.is_none_or(|begun| begun.number != leg.number);
+                let present = inputs.present;
+                let begun = self.begin(leg, inputs, |_| Course::Straight);
+                begun.yaw_rad = if first {
+                    to_turn(yaw_rad, relative, direction, present.yaw_rad)
+                } else {
+                    begun.yaw_rad - present.yaw_rate_rad_s * inputs.dt_s
+                };
+                let left_rad = begun.yaw_rad;
+                let turned = left_rad.abs() < TURNED_RAD && present.yaw_rate_rad_s.abs() < TURNED_RAD_S;
+                let mut progress = self.stay(leg, inputs, turned || !inputs.airborne, none);
+                if let Shaping::Limited(aim) = &mut progress.output.shaping {
+                    aim.yaw_rad = wrap_angle(present.yaw_rad + min(max(left_rad, -LED_RAD), LED_RAD));
+                }
+                progress
+            }
+            Item::Look { at_m } => {
+                self.looks_at_m = Some(at_m.xy()).filter(|at_m| !at_m.x.is_nan());
+                self.stay(leg, inputs, true, none)
+            }
+            Item::Jump(number) => {
+                let progress = self.stay(leg, inputs, true, none);
+                if !leg.is_last {
+                    self.wanted = number;
+                }
+                progress
             }
         }
+    }
+
+    /// Stays where it is, until it is `done`.
+    fn stay(&mut self, leg: &Leg, inputs: &ModeInputs<'_>, done: bool, none: Progress) -> Progress {
+        let output = ModeOutput { done, ..ModeOutput::fly(self.hold.fly(inputs)) };
+        let at_m = self.hold.at_m;
+        self.go_on(leg, output, at_m, none)
     }
 
     /// Returns the item in progress, begun if it was another one.
@@ -150,7 +249,7 @@ impl Mission {
         &mut self,
         leg: &Leg,
         inputs: &ModeInputs<'_>,
-        takeoff: impl FnOnce(&ModeInputs<'_>) -> Option<Takeoff>,
+        course: impl FnOnce(&ModeInputs<'_>) -> Course,
     ) -> &mut Begun {
         if self.begun.is_some_and(|begun| begun.number != leg.number) {
             self.begun = None;
@@ -160,7 +259,7 @@ impl Mission {
                 Item::Waypoint { position_m, .. } => inputs.towards(&position_m),
                 _ => f32::NAN,
             };
-            Begun { number: leg.number, yaw_rad, takeoff: takeoff(inputs), stayed_s: 0.0 }
+            Begun { number: leg.number, yaw_rad, course: course(inputs), stayed_s: 0.0 }
         })
     }
 
@@ -173,6 +272,43 @@ impl Mission {
             self.wanted = if leg.is_last { 0 } else { leg.number.saturating_add(1) };
         }
         Progress { output: ModeOutput { done, ..output }, reached, ..none }
+    }
+}
+
+impl Begun {
+    /// Climbs, if it began on the ground.
+    fn climb(&mut self, inputs: &ModeInputs<'_>) -> Option<ModeOutput> {
+        let output = self.course.takeoff()?.fly(inputs);
+        if output.done {
+            self.course = Course::Straight;
+        }
+        Some(ModeOutput { done: false, ..output })
+    }
+}
+
+/// From the ground it climbs first.
+fn from_ground(inputs: &ModeInputs<'_>) -> Course {
+    if inputs.airborne {
+        return Course::Straight;
+    }
+    let room_m = max(inputs.ceiling_m - inputs.present.position_m.z, 0.0);
+    Course::Takeoff(Takeoff::new(inputs, min(inputs.flying.takeoff_height_m, room_m)))
+}
+
+/// Returns the angle to turn by from `present_rad`, positive to the left \[rad\].
+fn to_turn(yaw_rad: f32, relative: bool, direction: i8, present_rad: f32) -> f32 {
+    if relative {
+        return match direction {
+            0 => yaw_rad,
+            _ => yaw_rad.abs() * f32::from(direction.signum()),
+        };
+    }
+    let shorter_rad = wrap_angle(yaw_rad - present_rad);
+    // Half a degree the wrong way is not a whole turn the other way.
+    match direction {
+        1.. if shorter_rad < -PI / 360.0 => shorter_rad + TAU,
+        ..=-1 if shorter_rad > PI / 360.0 => shorter_rad - TAU,
+        _ => shorter_rad,
     }
 }
 
@@ -193,5 +329,13 @@ fn is_plausible(item: &Item) -> bool {
         Item::Land { position_m } => position_m.xy().iter().all(|value| value.is_nan() || within(*value)),
         Item::Return => true,
         Item::Speed(speed_m_s) => *speed_m_s > 0.0,
+        Item::Wait(time_s) => !time_s.is_nan(),
+        Item::Turns { centre_m, radius_m, turns } => {
+            let round = *radius_m == 0.0 || orbit::RADIUS_M.contains(&radius_m.abs());
+            centre_m.iter().all(|value| within(*value)) && round && *turns >= 0.0
+        }
+        Item::Yaw { yaw_rad, .. } => yaw_rad.abs() <= 1e3,
+        Item::Look { at_m } => at_m.xy().iter().all(|value| value.is_nan() || within(*value)),
+        Item::Jump(_) => true,
     }
 }

@@ -5,6 +5,7 @@
 
 use crate::actions::{BatteryAction, FenceAction, SensorsAction, StationAction, SticksAction, TargetsAction};
 use crate::battery::{BatteryReading, Cells};
+use crate::fence::FenceView;
 use crate::mode::FlightMode;
 use crate::notice::{Cause, Notice, Notices};
 use crate::table::FailsafeAction;
@@ -118,6 +119,8 @@ pub(crate) struct Findings<'a> {
     pub(crate) silent_us: Option<u32>,
     pub(crate) targets: bool,
     pub(crate) sticks: bool,
+    /// The uploaded geofence.
+    pub(crate) fence: FenceView,
     pub(crate) dt_s: f32,
 }
 
@@ -164,7 +167,8 @@ impl Watch {
         note(Cause::BatteryEmergency, below(net.emergency) || was(Cause::BatteryEmergency));
         note(Cause::BatteryCritical, below(net.critical) || was(Cause::BatteryCritical));
         note(Cause::BatteryLow, below(net.low) || was(Cause::BatteryLow));
-        note(Cause::Fence, seen.armed && net.is_outside(seen, was(Cause::Fence)));
+        let FenceView { leaves, outside } = seen.fence;
+        note(Cause::Fence, seen.armed && (leaves || outside || net.is_outside(seen, was(Cause::Fence))));
         note(Cause::Sensors, seen.sensors.any());
         let lost = |silent_us: u32| silent_us as f32 * 1e-6 > net.station_lost_s;
         note(Cause::Station, seen.armed && seen.silent_us.is_some_and(lost));
@@ -193,6 +197,11 @@ impl Watch {
             if action > strongest { (action, cause) } else { (strongest, of) }
         })
     }
+}
+
+/// True if the cause is in the set.
+pub(crate) fn is_new(new: u16, cause: Cause) -> bool {
+    new & bit(cause) != 0
 }
 
 /// Announces the causes in the set `new` that have an action, but one.

@@ -15,7 +15,7 @@ pub enum Cause {
     BatteryCritical,
     /// Charge below the first threshold.
     BatteryLow,
-    /// Outside the geofence.
+    /// Outside the geofence, or about to leave it.
     Fence,
     /// A sensor has failed.
     Sensors,
@@ -48,7 +48,7 @@ impl Cause {
             Cause::BatteryEmergency => "battery almost empty",
             Cause::BatteryCritical => "battery critical",
             Cause::BatteryLow => "battery low",
-            Cause::Fence => "outside the geofence",
+            Cause::Fence => "at the geofence",
             Cause::Sensors => "sensor fault",
             Cause::Station => "station lost",
             Cause::Targets => "no targets",

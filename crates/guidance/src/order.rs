@@ -1,8 +1,10 @@
 //! What a station, a companion computer or a pilot may ask for.
 
+use crate::fence::FenceView;
 use crate::mode::FlightMode;
+use crate::orbit::OrbitHeading;
 use afbc_flight_core::{Queue, Stamped};
-use nalgebra::{UnitQuaternion, Vector3};
+use nalgebra::{UnitQuaternion, Vector2, Vector3};
 
 /// Something to be done, answered once.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -20,6 +22,19 @@ pub enum Order {
         yaw_rad: f32,
         /// Horizontal speed; none for that of the parameters \[m/s\].
         speed_m_s: Option<f32>,
+    },
+    /// Fly a circle in mode hold.
+    Orbit {
+        /// Its centre, at its height; NaN keeps a coordinate \[m\].
+        centre_m: Vector3<f32>,
+        /// Its radius, positive if it goes to the left \[m\].
+        radius_m: f32,
+        /// Speed along it; NaN for that of the parameters \[m/s\].
+        speed_m_s: f32,
+        /// Angle to fly; 0 for ever \[deg\].
+        angle_deg: u16,
+        /// Where the vehicle heads.
+        heading: OrbitHeading,
     },
     /// Fly at most at this horizontal speed, until the mode changes \[m/s\].
     Speed(f32),
@@ -141,6 +156,33 @@ pub enum Item {
     Return,
     /// Change the horizontal speed \[m/s\].
     Speed(f32),
+    /// Stay where it is for a time \[s\].
+    Wait(f32),
+    /// Fly circles around a place.
+    Turns {
+        /// Their centre in the local frame \[m\].
+        centre_m: Vector3<f32>,
+        /// Their radius, positive if they go to the left; 0 for the usual one \[m\].
+        radius_m: f32,
+        /// Their number.
+        turns: f32,
+    },
+    /// Turn where it is.
+    Yaw {
+        /// Heading, or the angle to turn by, positive to the left \[rad\].
+        yaw_rad: f32,
+        /// True if it is an angle to turn by.
+        relative: bool,
+        /// Direction to turn in: to the left if positive, to the right if negative, the shorter one if 0.
+        direction: i8,
+    },
+    /// Head for a place from now on, in whatever follows; NaN: no longer \[m\].
+    Look {
+        /// Place in the local frame \[m\].
+        at_m: Vector3<f32>,
+    },
+    /// Go on with the item of this number.
+    Jump(u16),
 }
 
 /// The item of a mission that the guidance [wants](crate::Order::Resume), and what follows.
@@ -169,6 +211,10 @@ pub struct Orders {
     pub leg: Option<Leg>,
     /// Time at which the station in control was last heard; none before \[us\].
     pub heard_us: Option<u64>,
+    /// What is known of the uploaded geofence; none if there is none.
+    pub fence: Option<FenceView>,
+    /// Where a return lands: the nearest of home and rally points; none for home \[m\].
+    pub safe_m: Option<Vector2<f32>>,
     /// Orders; a tick of the guidance answers the oldest.
     pub given: Queue<Order>,
 }

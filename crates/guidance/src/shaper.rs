@@ -129,6 +129,24 @@ impl Shape {
         }
     }
 
+    /// Returns the deceleration with which it stops from this speed: g up to A.
+    pub(crate) fn braking(&self, speed: f32) -> f32 {
+        min(sqrt(self.d * self.d + 2.0 * self.settling * speed) - self.d, self.acceleration)
+    }
+
+    /// Returns the distance in which it stops from this speed, when it decelerates by `braking` already: the speed goes
+    /// down with A as far as g allows, and the deceleration builds up with J.
+    pub(crate) fn stop(&self, speed: f32, braking: f32) -> f32 {
+        let Shape { acceleration, jerk, settling, d, .. } = *self;
+        let missing = max(acceleration - braking, 0.0);
+        let builds_up_s = missing * missing / (2.0 * acceleration * jerk);
+        // Where g is A; below it, the integral of x/g(x).
+        let gentle = min((acceleration + 2.0 * d) * acceleration / (2.0 * settling), speed);
+        let root = sqrt(d * d + 2.0 * settling * gentle);
+        let end = (root * root * root - d * d * d) / (6.0 * settling * settling) + d * gentle / (2.0 * settling);
+        speed * builds_up_s + (speed * speed - gentle * gentle) / (2.0 * acceleration) + end
+    }
+
     /// Advances `motion` by one step towards `goal`.
     pub(crate) fn advance<const D: usize>(&self, motion: &mut Motion<D>, goal: &Goal<D>, reach: &Reach, dt_s: f32) {
         let (wanted, change) = self.wanted(motion, goal, reach);

@@ -42,9 +42,22 @@ fn order() -> impl Strategy<Value = Order> {
         2 => (vector(), any_number(), proptest::option::of(any_number()))
             .prop_map(|(position_m, yaw_rad, speed_m_s)| Order::GoTo { position_m, yaw_rad, speed_m_s }),
         1 => any_number().prop_map(Order::Speed),
+        2 => (vector(), any_number(), any_number(), any::<u16>(), heading()).prop_map(
+            |(centre_m, radius_m, speed_m_s, angle_deg, heading)| Order::Orbit {
+                centre_m,
+                radius_m,
+                speed_m_s,
+                angle_deg,
+                heading
+            }
+        ),
         1 => proptest::option::of(vector()).prop_map(Order::Home),
         1 => any::<u16>().prop_map(Order::Resume),
     ]
+}
+
+fn heading() -> impl Strategy<Value = OrbitHeading> {
+    proptest::sample::select(vec![OrbitHeading::Centre, OrbitHeading::Kept, OrbitHeading::Along])
 }
 
 fn target() -> impl Strategy<Value = OffboardTarget> {
@@ -84,6 +97,19 @@ fn item() -> impl Strategy<Value = Item> {
         vector().prop_map(|position_m| Item::Land { position_m }),
         Just(Item::Return),
         any_number().prop_map(Item::Speed),
+        any_number().prop_map(Item::Wait),
+        (vector(), any_number(), any_number()).prop_map(|(centre_m, radius_m, turns)| Item::Turns {
+            centre_m,
+            radius_m,
+            turns
+        }),
+        (any_number(), any::<bool>(), any::<i8>()).prop_map(|(yaw_rad, relative, direction)| Item::Yaw {
+            yaw_rad,
+            relative,
+            direction
+        }),
+        vector().prop_map(|at_m| Item::Look { at_m }),
+        (0_u16..4).prop_map(Item::Jump),
     ]
 }
 
@@ -101,6 +127,7 @@ struct Spell {
     target: Option<OffboardTarget>,
     sticks: Option<[f32; 4]>,
     item: Option<(u16, u16, Item, bool)>,
+    fence: Option<(bool, bool)>,
     lift: (f32, f32),
     fresh: bool,
 }
@@ -123,12 +150,34 @@ fn spell() -> impl Strategy<Value = Spell> {
         proptest::option::of(order()),
         proptest::option::of(target()),
         proptest::option::of([any_number(), any_number(), any_number(), any_number()]),
-        proptest::option::of((0_u16..3, 0_u16..2, item(), any::<bool>())),
+        (
+            proptest::option::of((0_u16..3, 0_u16..2, item(), any::<bool>())),
+            proptest::option::of(any::<(bool, bool)>()),
+        ),
         any::<bool>(),
     );
     (clock, seen, asked).prop_map(
-        |((ticks, step_us, dt_s), (state, core, airborne, battery, lift), (order, target, sticks, item, fresh))| {
-            Spell { ticks, step_us, dt_s, state, core, airborne, battery, order, target, sticks, item, lift, fresh }
+        |(
+            (ticks, step_us, dt_s),
+            (state, core, airborne, battery, lift),
+            (order, target, sticks, (item, fence), fresh),
+        )| {
+            Spell {
+                ticks,
+                step_us,
+                dt_s,
+                state,
+                core,
+                airborne,
+                battery,
+                order,
+                target,
+                sticks,
+                item,
+                fence,
+                lift,
+                fresh,
+            }
         },
     )
 }
@@ -182,6 +231,11 @@ proptest! {
                     sticks: sticks.map(|value| Stamped { value, at_us }),
                     leg: spell.item.map(|(number, upload, item, is_last)| Leg { number, upload, item, is_last }),
                     heard_us: Some(at_us),
+                    safe_m: spell.target.and_then(|target| match target {
+                        OffboardTarget::Motion(motion) => Some(motion.velocity_m_s.xy()),
+                        OffboardTarget::Attitude(_) => None,
+                    }),
+                    fence: spell.fence.map(|(leaves, outside)| FenceView { leaves, outside }),
                     given: Queue::new(),
                 };
                 orders.given.extend(given);

@@ -8,14 +8,16 @@
     reason = "a test that cannot go on should say why"
 )]
 
+use afbc_link::telemetry::OrbitStatus;
 use afbc_link::{
-    Address, Answer, Axes, CalibrationRequest, Command, Counters, Decoder, Downlink, ExternalTarget, FRAME_MAX,
-    HealthArray, MavCmd, MavSeverity, Message, PositionTarget, Reboot, Sender, StatesRefused, Uplink,
+    Address, Answer, Axes, CalibrationRequest, Command, Counters, Datum, Decoder, Downlink, ExternalTarget, FRAME_MAX,
+    HealthArray, Height, MavCmd, MavSeverity, Message, Place, PositionTarget, Reboot, Sender, StatesRefused, Telemetry,
+    Uplink,
 };
 use afbc_types::{Axis, PerAxis, PoseSigmas, RotorSpeeds, Setpoint, State};
 use mavlink::dialects::common::{
     ATTITUDE_DATA, COMMAND_INT_DATA, COMMAND_LONG_DATA, HIL_ACTUATOR_CONTROLS_DATA, MavFrame, ODOMETRY_DATA,
-    PositionTargetTypemask, SET_POSITION_TARGET_LOCAL_NED_DATA,
+    ORBIT_EXECUTION_STATUS_DATA, PositionTargetTypemask, SET_POSITION_TARGET_LOCAL_NED_DATA,
 };
 use mavlink::{MAVLinkV2MessageRaw, MavHeader, MessageData};
 use nalgebra::{SVector, Vector3};
@@ -479,6 +481,55 @@ fn every_command_is_read() {
             assert_eq!(expected.id(), id);
         }
     }
+}
+
+/// Radius and speed give the direction together; NaN is the usual one, and what cannot be flown is denied.
+#[test]
+fn circles_are_read_and_reported() {
+    let (x, y, z, nan) = (473_977_420, 85_455_940, 12.5, f32::NAN);
+    let orbit = |param1, param2, param3, param4| {
+        let (command, frame) = (MavCmd::MAV_CMD_DO_ORBIT, MavFrame::MAV_FRAME_GLOBAL_RELATIVE_ALT);
+        let data =
+            COMMAND_INT_DATA { command, frame, param1, param2, param3, param4, x, y, z, ..COMMAND_INT_DATA::DEFAULT };
+        match read(&theirs(&data)) {
+            Ok(Uplink::Command(command)) => command,
+            other => panic!("{other:?}"),
+        }
+    };
+    let height = Height { metres: z, above: Datum::Home };
+    let place = Place { latitude_e7: x, longitude_e7: y, height };
+    let flown =
+        |radius_m, speed_m_s, heading, angle_deg| Command::Orbit { place, radius_m, speed_m_s, angle_deg, heading };
+    assert_eq!(orbit(10.0, 2.0, 0.0, 0.0), flown(10.0, 2.0, 0, 0));
+    assert_eq!(orbit(-10.0, 2.0, 3.0, 4.712_389), flown(-10.0, 2.0, 3, 270));
+    assert_eq!(orbit(10.0, -2.0, 5.0, nan), flown(-10.0, 2.0, 5, 0));
+    assert_eq!(orbit(-10.0, -2.0, nan, 0.0), flown(10.0, 2.0, 0, 0));
+    let Command::Orbit { radius_m, speed_m_s, .. } = orbit(nan, nan, nan, nan) else { panic!("another") };
+    assert!(radius_m.is_nan() && speed_m_s.is_nan());
+    for [p1, p2, p3, p4] in [
+        [f32::INFINITY, 2.0, 0.0, 0.0],
+        [10.0, f32::INFINITY, 0.0, 0.0],
+        // By the sticks, and by nothing there is.
+        [10.0, 2.0, 4.0, 0.0],
+        [10.0, 2.0, 6.0, 0.0],
+        [10.0, 2.0, 0.5, 0.0],
+        [10.0, 2.0, 0.0, -1.0],
+        [10.0, 2.0, 0.0, 1144.0],
+    ] {
+        assert_eq!(orbit(p1, p2, p3, p4), Command::Denied(34), "{p1} {p2} {p3} {p4}");
+    }
+    let status = OrbitStatus { time_us: 77, radius_m: -9.5, place_e7: [x, y], altitude_m: 500.25 };
+    let data = ORBIT_EXECUTION_STATUS_DATA {
+        time_usec: 77,
+        radius: -9.5,
+        x,
+        y,
+        z: 500.25,
+        frame: MavFrame::MAV_FRAME_GLOBAL_INT,
+    };
+    let report = Downlink::Telemetry(Telemetry::Orbit(status));
+    assert_eq!(bytes(&report), theirs(&data));
+    assert_eq!(read(&theirs(&data)).ok(), Some(report));
 }
 
 #[test]

@@ -26,7 +26,8 @@ impl Default for ControlInputs {
 impl ControlInputs {
     /// Nothing.
     pub const EMPTY: Self = {
-        let orders = Orders { target: None, sticks: None, leg: None, heard_us: None, given: Queue::new() };
+        let given = Queue::new();
+        let orders = Orders { target: None, sticks: None, leg: None, heard_us: None, fence: None, safe_m: None, given };
         ControlInputs { inbox: Inbox::EMPTY, orders, battery: None, fresh: false }
     };
 
@@ -44,12 +45,14 @@ impl ControlInputs {
             return;
         }
         self.fresh = true;
-        let Orders { target, sticks, leg, heard_us, given } = &update.orders;
+        let Orders { target, sticks, leg, heard_us, fence, safe_m, given } = &update.orders;
         let mine = &mut self.orders;
         mine.target = target.or(mine.target);
         mine.sticks = sticks.or(mine.sticks);
         mine.leg = leg.or(mine.leg);
         mine.heard_us = heard_us.or(mine.heard_us);
+        mine.fence = fence.or(mine.fence);
+        mine.safe_m = safe_m.or(mine.safe_m);
         for given in given {
             give(mine, *given);
         }
@@ -69,11 +72,13 @@ impl ControlInputs {
     /// Copies what is new, and keeps nothing: the tick has it.
     #[inline(never)]
     fn move_orders(&mut self, taken: &mut Orders) {
-        let Orders { target, sticks, leg, heard_us, given } = &mut self.orders;
+        let Orders { target, sticks, leg, heard_us, fence, safe_m, given } = &mut self.orders;
         replace(&mut taken.target, target);
         replace(&mut taken.sticks, sticks);
         replace(&mut taken.leg, leg);
         replace(&mut taken.heard_us, heard_us);
+        replace(&mut taken.fence, fence);
+        replace(&mut taken.safe_m, safe_m);
         // Those that the tick has not answered yet stay.
         while let Some(given) = given.pop_front() {
             give(taken, given);

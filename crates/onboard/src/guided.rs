@@ -36,6 +36,8 @@ pub struct GuidanceResult {
     pub notices: Notices,
     /// Charge of the battery, 0 to 1.
     pub charge: Option<f32>,
+    /// True while it flies a circle that was ordered.
+    pub orbits: bool,
 }
 
 /// The guidance of a vehicle, and what it knows of it.
@@ -134,6 +136,7 @@ impl Guide {
             failsafe: guided.failsafe.is_some(),
             notices: guided.notices,
             charge: guided.charge,
+            orbits: guided.orbits,
         }
     }
 }

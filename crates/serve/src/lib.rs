@@ -7,7 +7,8 @@
 //!    in, bytes out, a millisecond at a time.
 //! 2. [`Server`]: several vehicles, and [commands](command) that change weather and faults while they fly. Neither has
 //!    a clock or a socket: the same lines and bytes at the same milliseconds give the same bytes.
-//! 3. [`Ports`]: their UDP and TCP ports. [`Pace`]: real time. [`run`]: all of it together.
+//! 3. [`QgcPlan`]: a file of QGroundControl, and [`fly_plan`], a station that flies it.
+//! 4. [`Ports`]: their UDP and TCP ports. [`Pace`]: real time. [`run`]: all of it together.
 #![forbid(unsafe_code)]
 
 pub mod command;
@@ -17,6 +18,8 @@ mod hand;
 mod pace;
 mod parameter_file;
 mod peer;
+mod plan_file;
+mod plan_flight;
 mod ports;
 mod reported_sensors;
 mod run;
@@ -31,6 +34,8 @@ mod world_changes;
 pub use guide::guide;
 pub use pace::{BEHIND_MAX, Pace, Wait};
 pub use parameter_file::ParameterFile;
+pub use plan_file::QgcPlan;
+pub use plan_flight::{PlanEnd, fly_plan};
 pub use ports::{Addresses, Ports};
 pub use run::{Lines, RunEnd, TimeRate, run};
 pub use server::{Reply, Server, Then};

@@ -34,6 +34,11 @@ impl ReportedSensors {
         ReportedSensors { suite, origin, silent_ms: [SILENT_MS; 3], sigma_mm: [0; 2] }
     }
 
+    /// Puts the local frame's origin elsewhere, where the vehicle knows where on the earth it is.
+    pub(crate) fn move_origin(&mut self, origin: EarthOrigin) {
+        self.origin = self.origin.map(|_| origin);
+    }
+
     /// Returns what is known after these readings.
     pub(crate) fn look(&mut self, world: &World, readings: &Readings) -> AuxSensors {
         for silent_ms in &mut self.silent_ms {

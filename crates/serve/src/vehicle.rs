@@ -14,6 +14,7 @@ use afbc_reader::words::out_of_range;
 use afbc_scenario::Scenario;
 use afbc_sim::flight::World;
 use afbc_station::services::health::sensor;
+use afbc_station::services::origin::{EarthOrigin, Global};
 use afbc_station::services::sensors::tested;
 use afbc_station::services::status::SensorBits;
 use afbc_station::{AuxSensors, Setup};
@@ -61,7 +62,8 @@ impl ServedVehicle {
     pub fn new(scenario: &Scenario, system: u8, mut keeper: Option<ParameterFile>) -> Result<Self, OutOfRange> {
         let link = Link { system: system.into(), ..Link::DEFAULT };
         let mut notices = Vec::new();
-        let host = power_up(scenario, link, keeper.as_mut(), &mut notices)?;
+        let mut host = power_up(scenario, link, keeper.as_mut(), &mut notices)?;
+        host.serve_files(None);
         Ok(ServedVehicle {
             link,
             address: address(&host),
@@ -92,9 +94,10 @@ impl ServedVehicle {
         self.exact_log = Some(file);
     }
 
-    /// Keeps the black box in these files, from now on, before the first step.
+    /// Keeps the black box in these files, from now on, before the first step, and lets stations download them.
     pub fn log(&mut self, files: UlogFiles) {
         self.host.log(place(&self.scenario), files.sink());
+        self.host.serve_files(Some(files.stored()));
         self.black_box = Some(files);
     }
 
@@ -109,6 +112,13 @@ impl ServedVehicle {
     /// Returns its world.
     pub fn world(&self) -> &World {
         &self.world
+    }
+
+    /// Puts the local frame's origin at this latitude and longitude \[deg\], and altitude above the sea \[m\]; false
+    /// within a kilometre of a pole.
+    pub fn move_origin(&mut self, [latitude_deg, longitude_deg]: [f64; 2], altitude_m: f64) -> bool {
+        let origin = EarthOrigin::new(Global { latitude_deg, longitude_deg, altitude_m });
+        origin.map(|origin| self.reported.move_origin(origin)).is_some()
     }
 
     /// Sets whether those that connect from now on count as holding the vehicle: they may set the key of signatures.
@@ -203,6 +213,7 @@ impl ServedVehicle {
                     files.next_start();
                     self.host.log(place(&self.scenario), files.sink());
                 }
+                self.host.serve_files(self.black_box.as_ref().map(UlogFiles::stored));
                 // Nothing of a frame outlasts it.
                 self.peers.values_mut().for_each(|peer| *peer = decoder(self.address, self.wired));
             }

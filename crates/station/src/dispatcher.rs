@@ -2,27 +2,34 @@
 
 mod calibration;
 mod commands;
+mod fence;
 mod parameters;
 mod targets;
 
 use crate::parameters::Service;
 use crate::services::calibration::CalibrationState;
-use crate::services::commands::Commands;
+use crate::services::commands::{BUSY, Commands};
 use crate::services::control::{ControlClaim, OperatorControl};
+use crate::services::fence::FenceWatch;
 use crate::services::mission::Missions;
 use crate::services::status::VehicleStatus;
 use crate::services::streams::{Requested, Streams, id};
 use crate::services::texts::{Texts, Words};
+use crate::services::unanswered::Unanswered;
 use crate::services::{events, extended, files, logs, serial, timesync};
 use crate::setup::Setup;
-use afbc_guidance::Order;
+use crate::transfers::{TransferRequests, is_change};
+use afbc_guidance::fence::Braking;
+use afbc_guidance::{FenceView, Order};
+use afbc_link::telemetry::OrbitStatus;
 use afbc_link::{
-    Address, Clock, ControlAnswer, DataStream, Downlink, Interval, MavSeverity, Mission, ParameterError,
-    ParameterRequest, Question, QuestionRefusal, Reboot, Uplink,
+    Address, Answer, Clock, ControlAnswer, DataStream, Downlink, Interval, MavSeverity, Mission, ParameterError,
+    ParameterRequest, Question, QuestionRefusal, Reboot, Telemetry, Uplink,
 };
 use afbc_onboard::ControlInputs;
 use afbc_types::Setpoint;
 use heapless::Deque;
+use nalgebra::{Vector2, Vector3};
 
 /// Most replies that wait, besides answers to commands. Further ones are dropped: askers repeat.
 const REPLIES_MAX: usize = 16;
@@ -59,8 +66,19 @@ pub(crate) struct Dispatcher {
     pub(crate) commands: Commands,
     pub(crate) control: OperatorControl,
     pub(crate) missions: Missions,
+    /// What is seen of the geofence, with which limits, and what the guidance knows of it.
+    fence: FenceWatch,
+    pub(crate) braking: Braking,
+    fence_given: FenceView,
+    /// Where a return lands, where the guidance has it, and when that was last looked at \[m, us\].
+    safe_m: Option<Vector2<f32>>,
+    safe_given_m: Option<Vector2<f32>>,
+    safe_us: u64,
+    /// The circle that was ordered last: its centre and radius \[m\].
+    orbit_m: Option<(Vector3<f32>, f32)>,
     pub(crate) streams: Streams,
     pub(crate) texts: Texts,
+    unanswered: Unanswered,
     replies: Deque<Reply, REPLIES_MAX>,
     /// What stations want of the parameters.
     wishes: Deque<ParameterTask, WISHES_MAX>,
@@ -95,8 +113,16 @@ impl Dispatcher {
             commands: Commands::default(),
             control: OperatorControl::default(),
             missions: Missions::default(),
+            fence: FenceWatch::default(),
+            braking: Braking::default(),
+            fence_given: FenceView::default(),
+            safe_m: None,
+            safe_given_m: None,
+            safe_us: 0,
+            orbit_m: None,
             streams: Streams::new(setup.bytes_per_s),
             texts: Texts::default(),
+            unanswered: Unanswered::default(),
             replies: Deque::new(),
             wishes: Deque::new(),
             parameters: Service::default(),
@@ -146,31 +172,65 @@ impl Dispatcher {
         }
     }
 
+    /// Hands a message to `requests`, which wants it.
+    pub(crate) fn hand_to(
+        &mut self,
+        requests: &mut impl TransferRequests,
+        (from, message, payload): (Address, &Uplink, &[u8]),
+        inputs: &mut ControlInputs,
+    ) {
+        if self.control.hear(from, self.now_us) {
+            self.report_heard(inputs);
+        }
+        let may_change = !is_change(message) || self.may(from, inputs);
+        let taken = requests.take(from, message, payload, may_change);
+        if let Uplink::Command(command) = message {
+            let answer = if taken { Answer::Accepted } else { Answer::Refused(BUSY) };
+            self.commands.answer(command.id(), answer, from);
+        }
+    }
+
     /// Hands the guidance the item of the mission that it wants, if it does not have it.
     pub(crate) fn hand_over(&mut self, inputs: &mut ControlInputs) {
         if let Some(leg) = self.wanted_leg() {
             self.given = Some((leg.number, leg.upload));
             inputs.order().leg = Some(leg);
         }
+        if self.has_fence_news() {
+            self.fence_given = self.fence.view();
+            inputs.order().fence = Some(self.fence_given);
+        }
+        if self.safe_m != self.safe_given_m {
+            self.safe_given_m = self.safe_m;
+            inputs.order().safe_m = self.safe_m;
+        }
     }
 
     /// Returns the item of the mission that the guidance wants and does not have.
     pub(crate) fn wanted_leg(&self) -> Option<afbc_guidance::Leg> {
         let wanted = self.status.guided.wanted;
+        if self.given == Some((wanted, self.missions.number())) {
+            return None;
+        }
         let home_m = self.status.guided.home_m.map_or(0.0, |home| home.z);
-        let leg = self.missions.leg(wanted, self.status.aux.origin.as_ref(), home_m)?;
-        (self.given != Some((leg.number, leg.upload))).then_some(leg)
+        self.missions.leg(wanted, self.status.aux.origin.as_ref(), home_m).map(|leg| self.fenced(leg))
     }
 
     /// Does what is due after a tick.
     pub(crate) fn tick(&mut self) {
         self.streams.tick();
         self.report_checks();
+        self.watch_fence();
+        self.find_safe_place();
+        if !self.status.mode.armed() {
+            self.missions.restart();
+        }
         if let Some(words) = self.missions.tick(self.now_us) {
             self.texts.say(MavSeverity::MAV_SEVERITY_WARNING, &words);
         }
         if let Some(reached) = self.status.guided.reached {
             self.reached = Some(reached);
+            self.missions.reached(reached);
             self.reply(Reply::Reached(reached));
         }
     }
@@ -204,6 +264,17 @@ impl Dispatcher {
         let flies = guided.mode == afbc_guidance::FlightMode::Mission && self.status.mode.armed();
         let current = self.missions.current(Some(guided.wanted), self.reached, flies);
         Downlink::Mission { message: Mission::Current(current), to: Address::default() }
+    }
+
+    /// Returns ORBIT_EXECUTION_STATUS, while a circle is flown that was ordered.
+    pub(crate) fn orbit_status(&self) -> Option<Downlink> {
+        let ((centre_m, radius_m), origin) =
+            (self.orbit_m.filter(|_| self.status.guided.orbits)?, self.status.aux.origin?);
+        let centre = origin.global(&centre_m);
+        let (time_us, place_e7, altitude_m) = (self.status.time_us, centre.e7(), centre.altitude_m as f32);
+        // To the left is positive in the local frame.
+        let status = OrbitStatus { time_us, radius_m: -radius_m, place_e7, altitude_m };
+        Some(Downlink::Telemetry(Telemetry::Orbit(status)))
     }
 
     /// True if `from` is in control, from now on if nobody was. Another one is informed.
@@ -240,13 +311,22 @@ impl Dispatcher {
     /// Answers a question about what the vehicle does not have.
     fn question(&mut self, question: Question, from: Address) {
         let refusal = match question {
-            Question::Log(request) => QuestionRefusal::Log(logs::answer(request)),
+            Question::Log(request) => {
+                let Some(answer) = logs::answer(request) else { return };
+                QuestionRefusal::Log(answer)
+            }
             Question::File(operation) => QuestionRefusal::File(files::answer(operation)),
             Question::Extended(request) => QuestionRefusal::Extended(extended::answer(request)),
             Question::Event(request) => QuestionRefusal::Event(events::answer(request)),
             Question::Serial(asked) => QuestionRefusal::Serial(serial::answer(asked)),
             // The same place, with nothing known of it.
             Question::Terrain(place) => QuestionRefusal::Terrain(place),
+            Question::Unanswered(wish) => {
+                if let Some(text) = self.unanswered.text(wish, self.now_us) {
+                    self.texts.put(MavSeverity::MAV_SEVERITY_WARNING, text);
+                }
+                return;
+            }
             Question::Origin => {
                 // It is where the shell has it, or nowhere.
                 self.texts.put(MavSeverity::MAV_SEVERITY_WARNING, "the origin is not set by stations");
@@ -260,7 +340,11 @@ impl Dispatcher {
     fn mission(&mut self, message: Mission, from: Address, inputs: &mut ControlInputs) {
         let changes = matches!(message, Mission::Count(..) | Mission::Clear(_) | Mission::SetCurrent(_));
         let in_control = changes && self.may(from, inputs);
-        let heard = self.missions.hear(message, from, in_control, self.now_us);
+        let around = self.surroundings();
+        let heard = self.missions.hear(message, from, in_control, self.now_us, &around);
+        if heard.fence {
+            self.fence.renew();
+        }
         if matches!(message, Mission::SetCurrent(_)) {
             // After the tick in which the guidance takes it up.
             self.streams.request(Requested { message: id::MISSION_CURRENT, index: 0 });

@@ -4,6 +4,7 @@ use super::aboard::{AboardLogs, aboard};
 use super::flying::{Flying, report};
 use super::json::Json;
 use super::place::Place;
+use super::plan::{PlanFlight, is_plan};
 use super::target::Target;
 use super::terminal::{Failure, say};
 use super::vehicle::OnVehicle;
@@ -15,9 +16,13 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 /// Fly a built-in scenario or a scenario file; exits with 1 if a vehicle is lost
+///
+/// A plan of QGroundControl, a file that ends in `.plan`, is flown by the firmware's own code as `sitl serve` flies,
+/// outdoors in a breeze, from its planned home on: mission, geofence and rally points, for an hour at most. Of the
+/// options then --vehicle, --duration, --exact-log and --ulog apply. It exits with 1 if the mission is not completed.
 #[derive(Args, Debug)]
 pub(crate) struct Fly {
-    /// Name of a built-in scenario, or path of a scenario file
+    /// Name of a built-in scenario, or path of a scenario file or of a plan
     scenario: Target,
 
     /// Fly only this law or contender; may be given more than once. A law that the scenario lacks flies with its
@@ -51,6 +56,9 @@ pub(crate) struct Fly {
 impl Fly {
     /// Flies, writes, prints.
     pub(super) fn run(self) -> Result<ExitCode, Failure> {
+        if is_plan(self.scenario.path()) {
+            return self.fly_plan();
+        }
         let mut scenario = self.scenario.scenario()?;
         if !self.controllers.is_empty() {
             choose(&mut scenario, &self.controllers)?;
@@ -66,6 +74,18 @@ impl Fly {
         report(&folder, &flown, &[], self.json)?;
         logged.iter().flatten().for_each(|line| say(line));
         Ok(ExitCode::from(u8::from(flown.iter().any(|flown| flown.run.lost.is_some()))))
+    }
+}
+
+impl Fly {
+    fn fly_plan(self) -> Result<ExitCode, Failure> {
+        let Fly { scenario, controllers, exact_log, ulog, on, flying, json, .. } = self;
+        let path = scenario.path().to_path_buf();
+        if !controllers.is_empty() || json.json || flying.log_hz.is_some() {
+            let options = "--controller, --log-hz and --json";
+            return Err(format!("{}: {options} do not apply to a plan; leave them out", path.display()).into());
+        }
+        PlanFlight { path, on, duration: flying.duration, exact_log, ulog }.run()
     }
 }
 

@@ -18,6 +18,7 @@ mod paper;
 mod params;
 mod pil;
 mod place;
+mod plan;
 mod progress;
 mod random;
 mod replay;

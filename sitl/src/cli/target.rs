@@ -6,7 +6,7 @@ use afbc_campaign::Campaign;
 use afbc_scenario::Scenario;
 use std::ffi::OsString;
 use std::fmt;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// The name of a built-in one, or the path of a file.
 #[derive(Clone, Debug)]
@@ -25,6 +25,11 @@ impl fmt::Display for Target {
 }
 
 impl Target {
+    /// Returns what was given, as a path.
+    pub(crate) fn path(&self) -> &Path {
+        &self.0
+    }
+
     /// Reads and checks the scenario.
     pub(crate) fn scenario(&self) -> Result<Scenario, Failure> {
         Ok(subject::scenario(&self.0)?)

@@ -431,6 +431,7 @@ fn needs_control(command: &Command) -> bool {
             | Command::SelectMode(_)
             | Command::SelectStandardMode(_)
             | Command::Reposition { .. }
+            | Command::Orbit { .. }
             | Command::Speed(_)
             | Command::Home(_)
             | Command::StartMission(_)

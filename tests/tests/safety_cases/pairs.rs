@@ -15,7 +15,7 @@ pub(super) fn cases() -> Vec<Case> {
             .offboard(velocity(5.0, 0.0, 0.0))
             .at(5.0, silent())
             .lasts(30.0)
-            .hears(&["hold: outside the geofence", "return: station lost", "no longer: outside the geofence"])
+            .hears(&["hold: at the geofence", "return: station lost", "no longer: at the geofence"])
             .bound(|bounds| bounds.radius_m = 16.5)
             .lands()
             .near(0.0, 0.0, 0.7),
@@ -76,7 +76,7 @@ pub(super) fn cases() -> Vec<Case> {
             .on(Start::Ground)
             .offboard(velocity(4.0, 0.0, 3.0))
             .lasts(25.0)
-            .hears(&["return: outside the geofence", "on the ground: disarming"])
+            .hears(&["return: at the geofence", "on the ground: disarming"])
             .bound(|bounds| (bounds.radius_m, bounds.height_m) = (15.5, 10.5))
             .lands()
             .near(0.0, 0.0, 0.7),
@@ -149,14 +149,14 @@ pub(super) fn cases() -> Vec<Case> {
             .offboard(velocity(4.0, 0.0, 0.0))
             .at(4.0, Do::Stream(None))
             .lasts(8.0)
-            .hears(&["outside the geofence", "hold: no targets"]),
+            .hears(&["at the geofence", "hold: no targets"]),
         case("fence-and-battery", "outside the fence, held; the battery becomes critical")
             .watched()
             .fenced(2.0)
             .offboard(velocity(5.0, 0.0, 0.0))
             .at(3.0, line("battery 0.06"))
             .lasts(32.0)
-            .hears(&["hold: outside the geofence", "return: battery critical", "on the ground: disarming"])
+            .hears(&["hold: at the geofence", "return: battery critical", "on the ground: disarming"])
             .bound(|bounds| bounds.radius_m = 16.5)
             .lands()
             .near(0.0, 0.0, 0.7),
@@ -193,7 +193,7 @@ pub(super) fn cases() -> Vec<Case> {
             .at(1.0, Do::Say(COMPANION, velocity(-5.0, 0.0, 0.0)))
             .at(2.0, Do::Say(COMPANION, Uplink::Command(select(FlightMode::Offboard))))
             .lasts(8.0)
-            .hears(&["ignored: 255/190 is in control", "hold: outside the geofence"])
+            .hears(&["ignored: 255/190 is in control", "hold: at the geofence"])
             .bound(|bounds| bounds.radius_m = 16.5),
         case("sticks-lost-and-station-lost", "the pilot's sticks end, then the station is lost")
             .at(0.0, Do::Stream(Some(sticks(0.6, 0.0))))

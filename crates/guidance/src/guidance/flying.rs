@@ -14,7 +14,7 @@ use afbc_control::math::{abs_max, max};
 use afbc_flight_core::landing::LEFT_M;
 use afbc_flight_core::{Mode, Stamped};
 use afbc_types::{Setpoint, State};
-use nalgebra::Vector3;
+use nalgebra::{Vector2, Vector3};
 
 /// Time after which a take-off that has not left the ground is given up \[s\].
 const NO_LIFT_S: f32 = 10.0;
@@ -216,11 +216,12 @@ impl Memory {
     ) -> ModeOutput {
         match self.mode {
             FlightMode::Hold => {
-                if !matches!(self.plan, Plan::Hold(_)) || !inputs.airborne {
+                if !matches!(self.plan, Plan::Hold(_) | Plan::Orbit(_)) || !inputs.airborne {
                     self.plan = Plan::Hold(Hold::default());
                 }
                 match &mut self.plan {
                     Plan::Hold(hold) => ModeOutput::fly(hold.fly(inputs)),
+                    Plan::Orbit(orbit) => orbit.fly(inputs),
                     _ => ModeOutput::fly(inputs.stop()),
                 }
             }
@@ -244,7 +245,9 @@ impl Memory {
             }
             FlightMode::Return => {
                 if !matches!(self.plan, Plan::Return(_)) {
-                    self.plan = Plan::Return(Return::new(inputs));
+                    let plausible = |to_m: &Vector2<f32>| to_m.iter().all(|value| value.abs() <= 9e4);
+                    let to_m = orders.safe_m.filter(plausible).unwrap_or(inputs.home_m.xy());
+                    self.plan = Plan::Return(Return::new(inputs, to_m));
                 }
                 match &mut self.plan {
                     Plan::Return(home) => home.fly(inputs),

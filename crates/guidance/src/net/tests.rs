@@ -16,6 +16,7 @@ fn calm() -> Findings<'static> {
         sensors: FailedSensors::default(),
         silent_us: Some(0),
         targets: true,
+        fence: FenceView::default(),
         sticks: true,
         dt_s: 1e-3,
     }

@@ -42,6 +42,19 @@ pub enum Command {
         /// Horizontal speed; none for the usual \[m/s\].
         speed_m_s: Option<f32>,
     },
+    /// MAV_CMD_DO_ORBIT (34).
+    Orbit {
+        /// Its centre, at the height that is flown.
+        place: Place,
+        /// Radius, positive if it goes to the right; NaN for the usual one \[m\].
+        radius_m: f32,
+        /// Speed along it; NaN for the usual one \[m/s\].
+        speed_m_s: f32,
+        /// Angle to fly; 0 for ever \[deg\].
+        angle_deg: u16,
+        /// `ORBIT_YAW_BEHAVIOUR`, without control by radio.
+        heading: u8,
+    },
     /// MAV_CMD_DO_CHANGE_SPEED (178) of the horizontal speed \[m/s\].
     Speed(f32),
     /// MAV_CMD_DO_SET_HOME (179): here, or at a place; or SET_HOME_POSITION.
@@ -122,6 +135,7 @@ pub enum CalibrationRequest {
 pub(crate) const RETURN: u16 = 20;
 pub(crate) const LAND: u16 = 21;
 pub(crate) const TAKE_OFF: u16 = 22;
+pub(crate) const ORBIT: u16 = 34;
 pub(crate) const SELECT_MODE: u16 = 176;
 pub(crate) const SPEED: u16 = 178;
 pub(crate) const HOME: u16 = 179;
@@ -151,10 +165,11 @@ pub(crate) const USUAL: f32 = -1.0;
 
 impl Command {
     /// Numbers of the commands that are understood.
-    pub const KNOWN: [u16; 22] = [
+    pub const KNOWN: [u16; 23] = [
         RETURN,
         LAND,
         TAKE_OFF,
+        ORBIT,
         SELECT_MODE,
         SPEED,
         HOME,
@@ -188,6 +203,7 @@ impl Command {
             Command::SelectMode(_) => SELECT_MODE,
             Command::SelectStandardMode(_) => SELECT_STANDARD_MODE,
             Command::Reposition { .. } => REPOSITION,
+            Command::Orbit { .. } => ORBIT,
             Command::Speed(_) => SPEED,
             Command::Home(_) => HOME,
             Command::StartMission(_) => START_MISSION,

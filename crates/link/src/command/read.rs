@@ -2,9 +2,9 @@
 
 use super::{
     ARM_DISARM, CALIBRATE, CHECK_ARMING, CUSTOM_MODE, CalibrationRequest, Command, ENGAGE, FORCED, GET_INTERVAL, HOME,
-    LAND, REBOOT, REPOSITION, REQUEST_CAPABILITIES, REQUEST_MESSAGE, REQUEST_PROTOCOL, RETURN, Reboot, SELECT_MODE,
-    SELECT_STANDARD_MODE, SELF_TEST, SET_CURRENT, SET_INTERVAL, SPEED, START_MISSION, STORAGE, Storage, TAKE_OFF,
-    USUAL,
+    LAND, ORBIT, REBOOT, REPOSITION, REQUEST_CAPABILITIES, REQUEST_MESSAGE, REQUEST_PROTOCOL, RETURN, Reboot,
+    SELECT_MODE, SELECT_STANDARD_MODE, SELF_TEST, SET_CURRENT, SET_INTERVAL, SPEED, START_MISSION, STORAGE, Storage,
+    TAKE_OFF, USUAL,
 };
 use crate::address::Address;
 use crate::message::{Fault, MessageFormat};
@@ -105,6 +105,7 @@ fn known(id: u16, [p1, p2, p3, p4]: [f32; 4], place: Option<Place>) -> Option<Co
             let yaw_rad = if p4.is_nan() { p4 } else { Some(-p4).filter(|yaw| yaw.abs() <= 1e3)? };
             Command::Reposition { place: plausible?, yaw_rad, speed_m_s }
         }
+        ORBIT => orbit([p1, p2, p3, p4], plausible?)?,
         // 0 and 1: through the air and above the ground; climb and descent have limits of their own.
         SPEED if p1 == 0.0 || p1 == 1.0 => Command::Speed(speed(p2)?),
         HOME if p1 == 1.0 => Command::Home(None),
@@ -124,6 +125,18 @@ fn known(id: u16, [p1, p2, p3, p4]: [f32; 4], place: Option<Place>) -> Option<Co
         CHECK_ARMING => Command::CheckArming,
         _ => return None,
     })
+}
+
+/// Returns a circle: only one that the sticks would turn on is none.
+fn orbit([radius, speed, heading, angle_rad]: [f32; 4], place: Place) -> Option<Command> {
+    let within = |number: f32, most: f32| number.is_nan() || number.abs() <= most;
+    // Backwards is the other way round.
+    let radius_m = if speed < 0.0 { -radius } else { radius };
+    let angle_deg = or_zero(angle_rad).to_degrees();
+    let heading = u8::try_from(whole(or_zero(heading))?).ok().filter(|heading| [0, 1, 2, 3, 5].contains(heading))?;
+    let flown = within(radius, 1e5) && within(speed, 1e3) && (0.0..=65_535.0).contains(&angle_deg);
+    let angle_deg = (angle_deg + 0.5) as u16;
+    flown.then_some(Command::Orbit { place, radius_m, speed_m_s: speed.abs(), angle_deg, heading })
 }
 
 /// Returns what is calibrated: a single parameter says it, and all others are 0 or NaN.

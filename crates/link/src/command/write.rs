@@ -38,6 +38,10 @@ pub(crate) fn write(command: Command, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, 
         Command::Reposition { place, yaw_rad, speed_m_s } => {
             ([speed_m_s.unwrap_or(USUAL), 1.0, 0.0, -yaw_rad], Some(place))
         }
+        Command::Orbit { place, radius_m, speed_m_s, angle_deg, heading } => {
+            let angle_rad = f32::from(angle_deg).to_radians();
+            ([radius_m, speed_m_s, f32::from(heading), angle_rad], Some(place))
+        }
         Command::Speed(speed_m_s) => ([1.0, speed_m_s, USUAL, 0.0], None),
         Command::Home(place) => ([f32::from(u8::from(place.is_none())), 0.0, 0.0, 0.0], place),
         Command::StartMission(number) | Command::SetCurrent(number) => ([f32::from(number), 0.0, 0.0, 0.0], None),

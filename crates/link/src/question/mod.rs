@@ -8,6 +8,7 @@ mod file;
 mod log;
 mod serial;
 mod terrain;
+mod unanswered;
 
 use crate::address::Address;
 use crate::message::{Fault, MessageFormat, PAYLOAD_MAX};
@@ -20,11 +21,12 @@ use mavlink::MessageData;
 use mavlink::dialects::common::SET_GPS_GLOBAL_ORIGIN_DATA;
 pub use serial::Serial;
 pub use terrain::Terrain;
+pub use unanswered::UnansweredWish;
 
 /// A question.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Question {
-    /// LOG_REQUEST_LIST (117), LOG_REQUEST_DATA (119).
+    /// LOG_REQUEST_LIST (117), LOG_REQUEST_DATA (119), LOG_ERASE (121), LOG_REQUEST_END (122).
     Log(LogRequest),
     /// FILE_TRANSFER_PROTOCOL (110).
     File(FileOperation),
@@ -38,6 +40,8 @@ pub enum Question {
     Terrain(Terrain),
     /// SET_GPS_GLOBAL_ORIGIN (48), without the place: it is answered with GPS_GLOBAL_ORIGIN.
     Origin,
+    /// GPS_RTCM_DATA, PLAY_TUNE, FOLLOW_TARGET and the like, which no message answers.
+    Unanswered(UnansweredWish),
 }
 
 /// The answer to a [`Question`].
@@ -64,21 +68,21 @@ const ORIGIN: Layout<SET_GPS_GLOBAL_ORIGIN_DATA, (Unused<12>, u8, Unused<8>)> = 
 impl Question {
     pub(crate) fn format(id: u32) -> Option<MessageFormat> {
         Some(match id {
-            log::LIST_ID | log::DATA_REQUEST_ID => return LogRequest::format(id),
+            log::LIST_ID | log::DATA_REQUEST_ID | log::ERASE_ID | log::END_ID => return LogRequest::format(id),
             file::ID => file::format(),
             extended::READ_ID | extended::LIST_ID | extended::SET_ID => return ExtendedRequest::format(id),
             event::REQUEST_ID => EventRequest::format(),
             serial::ID => serial::format(),
             terrain::CHECK_ID => terrain::check_format(),
             ORIGIN_ID => ORIGIN.format(),
-            _ => return None,
+            _ => return UnansweredWish::format(id),
         })
     }
 
     /// Returns the question and its receiver.
     pub(crate) fn read(id: u32, payload: &[u8]) -> Result<(Self, Address), Fault> {
         Ok(match id {
-            log::LIST_ID | log::DATA_REQUEST_ID => {
+            log::LIST_ID | log::DATA_REQUEST_ID | log::ERASE_ID | log::END_ID => {
                 let (request, to) = LogRequest::read(id, payload);
                 (Question::Log(request), to)
             }
@@ -103,6 +107,10 @@ impl Question {
                 let (_, system, _) = ORIGIN.read(payload);
                 (Question::Origin, Address { system, component: 0 })
             }
+            _ if UnansweredWish::format(id).is_some() => {
+                let (wish, to) = UnansweredWish::read(id, payload);
+                (Question::Unanswered(wish), to)
+            }
             _ => return Err(Fault::Unknown),
         })
     }
@@ -116,6 +124,7 @@ impl Question {
             Question::Serial(serial) => serial.write(serial::RESPOND, Address::default(), payload),
             Question::Terrain(terrain) => terrain.write_check(payload),
             Question::Origin => ORIGIN.write(&(Unused, 0, Unused), payload),
+            Question::Unanswered(wish) => wish.write(payload),
         }
     }
 }

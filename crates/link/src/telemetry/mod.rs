@@ -1,6 +1,7 @@
 //! What a station shows of the vehicle, in the frames of [`afbc_types`] unless a field says otherwise.
 
 mod motion;
+mod orbit;
 mod place;
 mod system;
 
@@ -9,9 +10,10 @@ use mavlink::MessageData;
 use mavlink::dialects::common::{
     ACTUATOR_OUTPUT_STATUS_DATA, ATTITUDE_QUATERNION_DATA, AUTOPILOT_VERSION_DATA, BATTERY_STATUS_DATA,
     ESTIMATOR_STATUS_DATA, EXTENDED_SYS_STATE_DATA, GLOBAL_POSITION_INT_DATA, GPS_GLOBAL_ORIGIN_DATA, GPS_RAW_INT_DATA,
-    HOME_POSITION_DATA, PROTOCOL_VERSION_DATA, SYS_STATUS_DATA, VFR_HUD_DATA,
+    HOME_POSITION_DATA, ORBIT_EXECUTION_STATUS_DATA, PROTOCOL_VERSION_DATA, SYS_STATUS_DATA, VFR_HUD_DATA,
 };
 pub use motion::{AttitudeQuaternion, VfrHud};
+pub use orbit::OrbitStatus;
 pub use place::{Fix, GlobalOrigin, GlobalPosition, Home};
 pub use system::{ActuatorOutputs, BatteryStatus, EstimatorStatus, SystemStatus, Version};
 
@@ -43,13 +45,15 @@ pub enum Telemetry {
     Outputs(ActuatorOutputs),
     /// AUTOPILOT_VERSION (148).
     Version(Version),
+    /// ORBIT_EXECUTION_STATUS (360).
+    Orbit(OrbitStatus),
     /// PROTOCOL_VERSION (300): MAVLink 2 alone.
     Protocol,
 }
 
 impl Telemetry {
     pub(crate) fn format(id: u32) -> Option<MessageFormat> {
-        motion::format(id).or_else(|| place::format(id)).or_else(|| system::format(id))
+        motion::format(id).or_else(|| orbit::format(id)).or_else(|| place::format(id)).or_else(|| system::format(id))
     }
 
     pub(crate) fn read(id: u32, payload: &[u8]) -> Result<Self, Fault> {
@@ -66,6 +70,7 @@ impl Telemetry {
             ESTIMATOR_STATUS_DATA::ID => Telemetry::Estimator(EstimatorStatus::read(payload)),
             ACTUATOR_OUTPUT_STATUS_DATA::ID => Telemetry::Outputs(ActuatorOutputs::read(payload)),
             AUTOPILOT_VERSION_DATA::ID => Telemetry::Version(Version::read(payload)),
+            ORBIT_EXECUTION_STATUS_DATA::ID => Telemetry::Orbit(OrbitStatus::read(payload)),
             PROTOCOL_VERSION_DATA::ID => Telemetry::Protocol,
             _ => return Err(Fault::Unknown),
         })
@@ -85,6 +90,7 @@ impl Telemetry {
             Telemetry::Estimator(status) => status.write(payload),
             Telemetry::Outputs(outputs) => outputs.write(payload),
             Telemetry::Version(version) => version.write(payload),
+            Telemetry::Orbit(orbit) => orbit.write(payload),
             Telemetry::Protocol => system::write_protocol(payload),
         }
     }

@@ -5,10 +5,10 @@ use crate::services::commands::{BUSY, CALIBRATES, NO_ORIGIN, NOT_IN_CONTROL, NOT
 use crate::services::origin::resolve;
 use crate::services::streams::{Requested, Streams, id};
 use crate::services::telemetry::compose;
-use crate::services::texts::Words;
+use crate::services::texts::{Words, reason};
 use crate::services::{control, modes, sensors};
 use afbc_flight_core::{Refusal, Request};
-use afbc_guidance::{FlightMode, Order, OrderRefusal};
+use afbc_guidance::{FlightMode, ORBIT_RADIUS_M, OrbitHeading, Order, OrderRefusal};
 use afbc_link::{Address, Answer, Command, Height, Interval, MavSeverity, Place};
 use afbc_onboard::{ControlInputs, give};
 use nalgebra::Vector3;
@@ -75,10 +75,19 @@ impl Dispatcher {
                 Answer::Accepted
             }
             _ => match self.order_of(command) {
+                Ok(order) if !self.fence_allows(&order) => {
+                    self.texts.put(MavSeverity::MAV_SEVERITY_WARNING, reason(OrderRefusal::OutsideFence));
+                    Answer::Refused(OrderRefusal::OutsideFence as i32)
+                }
                 Ok(order) => {
                     if let Command::Home(_) = command {
                         // MAVLink wants it reported whether it has changed or not.
                         self.streams.request(Requested { message: id::HOME_POSITION, index: 0 });
+                    }
+                    if let Order::Orbit { centre_m, radius_m, .. } = order {
+                        let here_m = self.here();
+                        let or_here = |to: f32, here: f32| if to.is_nan() { here } else { to };
+                        self.orbit_m = Some((centre_m.zip_map(&here_m, or_here), radius_m));
                     }
                     if let Command::StartMission(number @ 1..) = command {
                         self.order(Order::Resume(number), None, from, inputs);
@@ -114,6 +123,16 @@ impl Dispatcher {
             Command::SelectStandardMode(mode) => Order::Select(modes::of_standard(mode).ok_or(Answer::Denied)?),
             Command::Reposition { place, yaw_rad, speed_m_s } => {
                 Order::GoTo { position_m: self.local(&place)?, yaw_rad, speed_m_s }
+            }
+            Command::Orbit { place, radius_m, speed_m_s, angle_deg, heading } => {
+                let heading = match heading {
+                    0 => OrbitHeading::Centre,
+                    3 => OrbitHeading::Along,
+                    _ => OrbitHeading::Kept,
+                };
+                // To the left is positive in the local frame.
+                let radius_m = if radius_m.is_nan() { -ORBIT_RADIUS_M } else { -radius_m };
+                Order::Orbit { centre_m: self.local(&place)?, radius_m, speed_m_s, angle_deg, heading }
             }
             Command::Speed(speed_m_s) => Order::Speed(speed_m_s),
             Command::Home(place) => Order::Home(place.map(|place| self.local(&place)).transpose()?),
@@ -165,6 +184,7 @@ impl Dispatcher {
         let known = match message {
             id::HEARTBEAT | id::DEBUG_FLOAT_ARRAY | id::MISSION_CURRENT => true,
             id::HIGHRES_IMU => self.calibrates,
+            id::ORBIT_EXECUTION_STATUS => self.orbit_status().is_some(),
             id::POSITION_TARGET_LOCAL_NED => self.followed().is_some(),
             id::AVAILABLE_MODES => index <= modes::COUNT.into(),
             _ => compose(message, &self.status).is_some(),

@@ -116,6 +116,7 @@ pub fn is_needed_for(command: Command) -> bool {
         | Command::SelectMode(_)
         | Command::SelectStandardMode(_)
         | Command::Reposition { .. }
+        | Command::Orbit { .. }
         | Command::Speed(_)
         | Command::Home(_)
         | Command::StartMission(_)

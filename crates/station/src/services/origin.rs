@@ -4,7 +4,7 @@
 //! in altitude, along the curvature of the earth. Exact but for rounding, in either direction.
 
 use afbc_link::Place;
-use nalgebra::Vector3;
+use nalgebra::{Vector2, Vector3};
 
 /// Semi-major axis \[m\] and square of the eccentricity of WGS 84.
 const AXIS_M: f64 = 6_378_137.0;
@@ -70,6 +70,21 @@ impl EarthOrigin {
         place
     }
 
+    /// Returns what converts places near the origin without trigonometry.
+    pub fn chart(&self) -> LocalChart {
+        let Global { latitude_deg, longitude_deg, altitude_m } = self.at;
+        let flattened = 1.0 - ECCENTRICITY_2 * self.sine * self.sine;
+        let normal_m = AXIS_M / libm::sqrt(flattened);
+        let meridian_m = normal_m * (1.0 - ECCENTRICITY_2) / flattened;
+        let e7_rad = DEG * 1e-7;
+        LocalChart {
+            at_e7: Global { latitude_deg, longitude_deg, altitude_m }.e7(),
+            north_m: ((meridian_m + altitude_m) * e7_rad) as f32,
+            east_m: ((normal_m + altitude_m) * self.cosine * e7_rad) as f32,
+            bend_1_m: (self.sine / (self.cosine * (normal_m + altitude_m))) as f32,
+        }
+    }
+
     /// Returns the distances to the north and to the east in the tangent plane at the origin's altitude \[m\].
     fn tangent(&self, place: &Global) -> [f64; 2] {
         let (sine, cosine) = libm::sincos(place.latitude_deg * DEG);
@@ -87,6 +102,39 @@ impl EarthOrigin {
         let north = self.cosine * (from_equator_m - self.from_equator_m)
             - self.sine * (from_axis_m * turn_cosine - self.from_axis_m);
         [north, from_axis_m * turn_sine]
+    }
+}
+
+/// Places near an origin: to a centimetre within a kilometre, to 0.2 m within 10 km, to 1 m within 20 km.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LocalChart {
+    at_e7: [i32; 2],
+    /// Metres of a ten-millionth of a degree.
+    north_m: f32,
+    east_m: f32,
+    /// Curvature of the parallel \[1/m\].
+    bend_1_m: f32,
+}
+
+impl LocalChart {
+    /// Returns a place of this latitude and longitude in the local frame \[m\].
+    pub fn local(&self, [latitude_e7, longitude_e7]: [i32; 2]) -> Vector2<f32> {
+        const TURN: i64 = 3_600_000_000;
+        let [at_latitude, at_longitude] = self.at_e7;
+        let off = i64::from(longitude_e7) - i64::from(at_longitude);
+        let off = off
+            - if off > TURN / 2 {
+                TURN
+            } else if off < -TURN / 2 {
+                -TURN
+            } else {
+                0
+            };
+        // The origin's own fraction is far below a centimetre.
+        let north_m = (i64::from(latitude_e7) - i64::from(at_latitude)) as f32 * self.north_m;
+        let east_m = off as f32 * self.east_m;
+        let bent_m = east_m * self.bend_1_m;
+        Vector2::new(north_m + 0.5 * bent_m * east_m, bent_m * north_m - east_m)
     }
 }
 

@@ -31,13 +31,14 @@ pub mod id {
     pub const EXTENDED_SYS_STATE: u32 = 245;
     pub const PROTOCOL_VERSION: u32 = 300;
     pub const DEBUG_FLOAT_ARRAY: u32 = 350;
+    pub const ORBIT_EXECUTION_STATUS: u32 = 360;
     pub const ACTUATOR_OUTPUT_STATUS: u32 = 375;
     pub const AVAILABLE_MODES: u32 = 435;
     pub const CURRENT_MODE: u32 = 436;
 }
 
 /// Streams with their default intervals; 0: off \[us\]. `docs/station.md` has the same list.
-pub const DEFAULTS: [(u32, u32); 19] = [
+pub const DEFAULTS: [(u32, u32); 20] = [
     (id::SYS_STATUS, 1_000_000),
     (id::SYSTEM_TIME, 1_000_000),
     (id::GPS_RAW_INT, 1_000_000),
@@ -56,6 +57,7 @@ pub const DEFAULTS: [(u32, u32); 19] = [
     (id::DEBUG_FLOAT_ARRAY, 100_000),
     (id::ACTUATOR_OUTPUT_STATUS, 1_000_000),
     (id::CURRENT_MODE, 1_000_000),
+    (id::ORBIT_EXECUTION_STATUS, 500_000),
     (id::HIGHRES_IMU, 0),
 ];
 /// Shortest interval: a tick \[us\].
@@ -200,6 +202,11 @@ impl Streams {
     /// streams have taken that.
     pub fn has_room(&self) -> bool {
         self.room > -BURST
+    }
+
+    /// True if so many bytes may be sent without keeping back what falls due next.
+    pub(crate) fn spares(&self, bytes: usize) -> bool {
+        self.room >= 1000 * bytes as i64
     }
 
     /// Notes that so many bytes were sent, of a stream or not.

@@ -68,7 +68,7 @@ fn a_return_climbs_flies_and_descends() {
     let safe = home.z + return_height_m;
     let climbs = |place: Vector3<f32>, ceiling_m: f32| {
         let stage = Stage { ceiling_m, ..Stage::at(place) };
-        let output = stage.see(|inputs| Return::new(inputs).fly(inputs));
+        let output = stage.see(|inputs| Return::new(inputs, inputs.home_m.xy()).fly(inputs));
         assert_eq!((output.lands, output.lifts, output.done), (false, false, false));
         assert_eq!(limited(&output).position_m.xy(), place.xy());
         limited(&output).position_m.z
@@ -81,12 +81,12 @@ fn a_return_climbs_flies_and_descends() {
     assert_eq!(climbs(near(3.0), f32::INFINITY), 3.0);
 
     // While it stops it climbs already.
-    let mut back = Stage::at(far(3.0)).see(Return::new);
+    let mut back = Stage::at(far(3.0)).see(|inputs| Return::new(inputs, inputs.home_m.xy()));
     let stops = Stage::at(far(3.0)).moving(Vector3::new(2.0, 0.0, 0.0)).see(|inputs| back.fly(inputs));
     assert!(same(&limited(&stops).position_m, &Vector3::new(f32::NAN, f32::NAN, safe)));
     // The climb is over if the setpoint is nearly there, and the vehicle within a metre.
     for (setpoint, vehicle, over) in [(0.29, 0.99, true), (0.31, 0.9, false), (0.2, 1.01, false), (-3.0, -3.0, true)] {
-        let mut back = Stage::at(far(3.0)).see(Return::new);
+        let mut back = Stage::at(far(3.0)).see(|inputs| Return::new(inputs, inputs.home_m.xy()));
         let stage = Stage::at(far(safe - vehicle)).apart(along(2, vehicle - setpoint));
         let _ = stage.see(|inputs| back.fly(inputs));
         let aim = limited(&stage.see(|inputs| back.fly(inputs)));

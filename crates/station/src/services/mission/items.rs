@@ -1,50 +1,131 @@
 //! Items of a mission: what is valid, and what the guidance makes of it.
 
-use crate::services::origin::{EarthOrigin, resolve};
+use crate::services::origin::{EarthOrigin, LocalChart, resolve};
+use crate::services::texts::Words;
 use afbc_guidance::Item;
 use afbc_link::{Datum, Height, MissionItem, MissionResult, Place};
-use nalgebra::Vector3;
+use nalgebra::{Vector2, Vector3};
 
-/// Most items of a mission.
+/// Most items of all plans together.
 pub const ITEMS_MAX: usize = 64;
 
 const WAYPOINT: u16 = 16;
+const LOITER: u16 = 17;
+const LOITER_TURNS: u16 = 18;
 const LOITER_TIME: u16 = 19;
 const RETURN: u16 = 20;
 const LAND: u16 = 21;
 const TAKE_OFF: u16 = 22;
+const LOITER_TO_ALTITUDE: u16 = 31;
+const DELAY: u16 = 93;
+const YAW: u16 = 115;
+pub(super) const JUMP: u16 = 177;
 const SPEED: u16 = 178;
+const LOOK: u16 = 195;
+const LOOK_NOWHERE: u16 = 197;
+const OLD_LOOK: u16 = 201;
+const RALLY_POINT: u16 = 5100;
+
+/// Commands that stations put into missions and that are refused, with their names.
+const NAMES: [(u16, &str); 19] = [
+    (82, "NAV_SPLINE_WAYPOINT"),
+    (84, "NAV_VTOL_TAKEOFF"),
+    (85, "NAV_VTOL_LAND"),
+    (94, "NAV_PAYLOAD_PLACE"),
+    (112, "CONDITION_DELAY"),
+    (114, "CONDITION_DISTANCE"),
+    (179, "DO_SET_HOME"),
+    (181, "DO_SET_RELAY"),
+    (183, "DO_SET_SERVO"),
+    (189, "DO_LAND_START"),
+    (203, "DO_DIGICAM_CONTROL"),
+    (205, "DO_MOUNT_CONTROL"),
+    (206, "DO_SET_CAM_TRIGG_DIST"),
+    (211, "DO_GRIPPER"),
+    (530, "SET_CAMERA_MODE"),
+    (2000, "IMAGE_START_CAPTURE"),
+    (2001, "IMAGE_STOP_CAPTURE"),
+    (2500, "VIDEO_START_CAPTURE"),
+    (2501, "VIDEO_STOP_CAPTURE"),
+];
+/// Reason that follows the name of a command.
+const UNSUPPORTED: &str = " unsupported";
+/// Most repetitions of a jump.
+const REPEATS_MAX: f32 = 1000.0;
 
 /// Why an item is refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Invalid {
     /// As the protocol has it.
     pub result: MissionResult,
-    /// In words.
+    /// In words; for a command that is not supported, what follows its name.
     pub reason: &'static str,
 }
 
-/// Checks an item.
+impl Invalid {
+    /// A command that is not supported.
+    pub const COMMAND: Self = Invalid { result: MissionResult::UNSUPPORTED, reason: UNSUPPORTED };
+
+    /// Returns a text on the item of this number and command in a plan.
+    pub(super) fn text(self, plan: &str, number: u16, command: u16) -> Words {
+        let words = Words::of(plan).and(" item ").number(number.into()).and(": ");
+        if self != Invalid::COMMAND {
+            return words.and(self.reason);
+        }
+        let words = match NAMES.iter().find(|(known, _)| *known == command) {
+            Some((_, name)) => words.and(name),
+            None => words.and("command ").number(command.into()),
+        };
+        words.and(self.reason)
+    }
+}
+
+/// Checks an item of a mission.
 ///
 /// # Errors
 /// The first thing that is wrong with it.
 pub fn check(item: &MissionItem) -> Result<(), Invalid> {
     let refuse = |result, reason| Err(Invalid { result, reason });
     let within = |number: f32, max: f32| number.is_nan() || (0.0..=max).contains(&number);
-    let [first, second, _, fourth] = item.parameters;
-    if ![WAYPOINT, LOITER_TIME, RETURN, LAND, TAKE_OFF, SPEED].contains(&item.command) {
-        return refuse(MissionResult::UNSUPPORTED, "command is not supported");
-    }
-    if item.command == SPEED {
-        return match item.parameters {
-            // -1: no change.
-            [0.0 | 1.0, speed, ..] if speed == -1.0 || (speed > 0.0 && speed <= 1e3) => Ok(()),
-            [0.0 | 1.0, ..] => refuse(MissionResult(7), "speed is out of range"),
-            _ => refuse(MissionResult::INVALID_PARAM1, "kind of speed is not supported"),
-        };
-    }
-    if item.command == RETURN {
-        return Ok(());
+    let [first, second, third, fourth] = item.parameters;
+    match item.command {
+        WAYPOINT | LOITER | LOITER_TURNS | LOITER_TIME | LAND | TAKE_OFF | LOITER_TO_ALTITUDE | LOOK => (),
+        OLD_LOOK if first == 3.0 => (),
+        OLD_LOOK if first == 0.0 => return Ok(()),
+        OLD_LOOK => return refuse(MissionResult::INVALID_PARAM1, "kind of region is not supported"),
+        RETURN | LOOK_NOWHERE => return Ok(()),
+        SPEED => {
+            return match item.parameters {
+                // -1: no change.
+                [0.0 | 1.0, speed, ..] if speed == -1.0 || (speed > 0.0 && speed <= 1e3) => Ok(()),
+                [0.0 | 1.0, ..] => refuse(MissionResult(7), "speed is out of range"),
+                _ => refuse(MissionResult::INVALID_PARAM1, "kind of speed is not supported"),
+            };
+        }
+        DELAY if (0.0..=86_400.0).contains(&first) => return Ok(()),
+        DELAY if first < 0.0 => return refuse(MissionResult::INVALID_PARAM1, "a time of day is not known"),
+        DELAY => return refuse(MissionResult::INVALID_PARAM1, "delay is out of range"),
+        YAW => {
+            return match item.parameters {
+                // False of NaN.
+                [angle, ..] if !(angle.abs() <= 3600.0) => {
+                    refuse(MissionResult::INVALID_PARAM1, "angle is out of range")
+                }
+                [_, _, -1.0 | 0.0 | 1.0, 0.0 | 1.0] => Ok(()),
+                [_, _, -1.0 | 0.0 | 1.0, _] => refuse(MissionResult(9), "neither absolute nor relative"),
+                _ => refuse(MissionResult(8), "direction is not -1, 0 or 1"),
+            };
+        }
+        JUMP => {
+            return if whole(first, f32::from(u8::MAX)).is_none() {
+                refuse(MissionResult::INVALID_PARAM1, "there is no such item")
+            } else if second != -1.0 && whole(second, REPEATS_MAX).is_none() {
+                refuse(MissionResult(7), "repetitions are not -1, 0 to 1000")
+            } else {
+                Ok(())
+            };
+        }
+        _ => return Err(Invalid::COMMAND),
     }
     let Some(place) = place(item) else {
         return refuse(MissionResult::UNSUPPORTED_FRAME, "frame is not supported");
@@ -52,40 +133,146 @@ pub fn check(item: &MissionItem) -> Result<(), Invalid> {
     if item.command != TAKE_OFF {
         // A landing may be where the vehicle is.
         let anywhere = item.command == LAND && place.latitude_e7 == 0 && place.longitude_e7 == 0;
-        if !anywhere && place.latitude_e7.unsigned_abs() > 900_000_000 {
-            return refuse(MissionResult::INVALID_X, "latitude is out of range");
-        }
-        if !anywhere && place.longitude_e7.unsigned_abs() > 1_800_000_000 {
-            return refuse(MissionResult::INVALID_Y, "longitude is out of range");
+        if !anywhere {
+            on_earth(&place)?;
         }
     }
-    // A landing's height does not matter.
-    let any_height = item.command == LAND && item.z.is_nan();
+    // Heights of a landing and of a region do not matter.
+    let any_height = item.z.is_nan() && [LAND, LOOK, OLD_LOOK].contains(&item.command);
     if !any_height && !(-1e5..=1e5).contains(&item.z) {
         return refuse(MissionResult::INVALID_Z, "altitude is out of range");
     }
-    if [WAYPOINT, LOITER_TIME].contains(&item.command) {
-        if !within(first, 3600.0) {
-            return refuse(MissionResult::INVALID_PARAM1, "time to stay is out of range");
+    if [WAYPOINT, LOITER_TIME].contains(&item.command) && !within(first, 3600.0) {
+        return refuse(MissionResult::INVALID_PARAM1, "time to stay is out of range");
+    }
+    if item.command == WAYPOINT && !within(second, 1000.0) {
+        return refuse(MissionResult(7), "radius is out of range");
+    }
+    if item.command == LOITER_TURNS {
+        if !(0.0..=1000.0).contains(&first) {
+            return refuse(MissionResult::INVALID_PARAM1, "number of turns is out of range");
         }
-        if item.command == WAYPOINT && !within(second, 1000.0) {
-            return refuse(MissionResult(7), "radius is out of range");
+        if !(third.is_nan() || third == 0.0 || (1.0..=1000.0).contains(&third.abs())) {
+            return refuse(MissionResult(8), "radius is not 1 to 1000 m");
         }
-        if !(fourth.is_nan() || fourth.abs() <= 3600.0) {
-            return refuse(MissionResult(9), "heading is out of range");
+    }
+    if [WAYPOINT, LOITER, LOITER_TIME].contains(&item.command) && !(fourth.is_nan() || fourth.abs() <= 3600.0) {
+        return refuse(MissionResult(9), "heading is out of range");
+    }
+    Ok(())
+}
+
+/// Checks a rally point.
+///
+/// # Errors
+/// The first thing that is wrong with it.
+pub(super) fn check_rally(item: &MissionItem) -> Result<(), Invalid> {
+    if item.command != RALLY_POINT {
+        return Err(Invalid::COMMAND);
+    }
+    let global = place(item).filter(|_| item.frame != LOCAL_NED);
+    let Some(place) = global else {
+        return Err(Invalid { result: MissionResult::UNSUPPORTED_FRAME, reason: "frame is not supported" });
+    };
+    on_earth(&place)
+}
+
+fn on_earth(place: &Place) -> Result<(), Invalid> {
+    if place.latitude_e7.unsigned_abs() > 900_000_000 {
+        return Err(Invalid { result: MissionResult::INVALID_X, reason: "latitude is out of range" });
+    }
+    if place.longitude_e7.unsigned_abs() > 1_800_000_000 {
+        return Err(Invalid { result: MissionResult::INVALID_Y, reason: "longitude is out of range" });
+    }
+    Ok(())
+}
+
+/// Checks the jumps of a whole mission, whose items are valid by themselves: each leads to another item, and none goes
+/// around for ever without an item that takes time.
+///
+/// # Errors
+/// The number of a jump, and what is wrong with it.
+pub(super) fn check_jumps(items: &[MissionItem]) -> Result<(), (u16, Invalid)> {
+    let at = |place: usize| items.get(place);
+    let takes_time = |item: &MissionItem| ![JUMP, SPEED, LOOK, LOOK_NOWHERE, OLD_LOOK].contains(&item.command);
+    let mut jumps = 0;
+    for (place, item) in items.iter().enumerate().filter(|(_, item)| item.command == JUMP) {
+        let refuse = |result, reason| Err((item.number, Invalid { result, reason }));
+        jumps += 1;
+        if jumps > JUMPS_MAX {
+            return refuse(MissionResult::NO_SPACE, "more than 8 jumps");
+        }
+        let [target, ..] = item.parameters;
+        if target as usize >= items.len() || target as usize == place {
+            return refuse(MissionResult::INVALID_PARAM1, "there is no such item");
+        }
+        // Jumps that end are over some time.
+        let mut next = place;
+        let ends = (0..=items.len()).any(|_| {
+            let Some(item) = at(next).filter(|item| !takes_time(item)) else { return true };
+            let [target, repeats, ..] = item.parameters;
+            next = if item.command == JUMP && repeats == -1.0 { target as usize } else { next + 1 };
+            false
+        });
+        if !ends {
+            return refuse(MissionResult::INVALID_PARAM1, "goes around for ever without a flight");
         }
     }
     Ok(())
 }
 
+/// Most jumps of a mission.
+pub(super) const JUMPS_MAX: usize = 8;
+
+/// Returns a whole number up to `most`.
+fn whole(number: f32, most: f32) -> Option<u16> {
+    let whole = number as u16;
+    ((0.0..=most).contains(&number) && f32::from(whole) == number).then_some(whole)
+}
+
+/// Returns where an item wants the vehicle to be, horizontally \[m\]; none of an item without a place.
+pub(super) fn stop_m(item: &MissionItem, chart: &LocalChart) -> Option<Vector2<f32>> {
+    let here = item.command == LAND && item.x == 0 && item.y == 0;
+    if here || ![WAYPOINT, LOITER, LOITER_TURNS, LOITER_TIME, LOITER_TO_ALTITUDE, LAND].contains(&item.command) {
+        return None;
+    }
+    if item.frame == LOCAL_NED {
+        return Some(Vector2::new(item.x as f32 * 1e-4, item.y as f32 * -1e-4));
+    }
+    Some(chart.local([item.x, item.y]))
+}
+
 /// Returns the item in the local frame; none for a place on the earth while the origin is unknown, or an invalid item.
 /// `home_m` is the height of home.
 pub fn to_guidance(item: &MissionItem, origin: Option<&EarthOrigin>, home_m: f32) -> Option<Item> {
-    let [first, second, _, fourth] = item.parameters;
+    let [first, second, third, fourth] = item.parameters;
     let or_zero = |number: f32| if number.is_nan() { 0.0 } else { number };
     let position_m = || resolve_item(item, origin, home_m);
     Some(match item.command {
         TAKE_OFF => Item::TakeOff { height_m: position_m()?.z },
+        // 0 repetitions are none, and -1 are any number: see `Jumps`.
+        JUMP => Item::Jump(whole(first, f32::from(u8::MAX))?),
+        LOITER => Item::Waypoint {
+            position_m: position_m()?,
+            yaw_rad: -fourth.to_radians(),
+            hold_s: f32::INFINITY,
+            within_m: 0.0,
+            fly_through: false,
+        },
+        LOITER_TURNS => Item::Turns { centre_m: position_m()?, radius_m: -or_zero(third), turns: first },
+        LOITER_TO_ALTITUDE => Item::Waypoint {
+            position_m: position_m()?,
+            yaw_rad: f32::NAN,
+            hold_s: 0.0,
+            within_m: 0.0,
+            fly_through: false,
+        },
+        DELAY => Item::Wait(first),
+        // Directions are to the right.
+        YAW => Item::Yaw { yaw_rad: -first.to_radians(), relative: fourth == 1.0, direction: -(third as i8) },
+        LOOK_NOWHERE => Item::Look { at_m: Vector3::repeat(f32::NAN) },
+        OLD_LOOK if first == 0.0 => Item::Look { at_m: Vector3::repeat(f32::NAN) },
+        LOOK | OLD_LOOK => Item::Look { at_m: position_m()? },
         WAYPOINT => Item::Waypoint {
             position_m: position_m()?,
             yaw_rad: -fourth.to_radians(),

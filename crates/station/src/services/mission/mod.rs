@@ -1,32 +1,50 @@
-//! The mission: upload, download and deletion by MAVLink's mission protocol, and what the guidance gets of it.
+//! Plans: mission, geofence and rally points. Upload, download and deletion by MAVLink's mission protocol, and what the
+//! guidance gets of the mission.
 //!
-//! An upload takes the place of the mission only once it is complete and every item is valid. Downloads have no state:
-//! any number of stations may read at once. Fences and rally points are always empty.
+//! An upload takes the place of the plan only once it is complete and every item is valid. Downloads have no state: any
+//! number of stations may read at once. The plans share [`ITEMS_MAX`] items.
 
 mod items;
+mod jumps;
+mod plans;
 mod upload;
 
 pub use items::{ITEMS_MAX, Invalid, check, to_guidance};
 
-use crate::services::origin::EarthOrigin;
+use crate::services::fence;
+use crate::services::origin::{EarthOrigin, LocalChart};
 use crate::services::texts::Words;
-use afbc_guidance::Leg;
+use afbc_guidance::{Item, Leg};
 use afbc_link::{Address, Mission, MissionCurrent, MissionItem, MissionResult, Plan};
-use heapless::{Deque, Vec};
+use heapless::Deque;
+use items::{check_jumps, check_rally, stop_m};
+use jumps::Jumps;
+use nalgebra::Vector2;
+use plans::PlanItems;
 use upload::Upload;
 
 /// Most messages that wait to be sent; the protocol repeats what is lost.
 const OUT_MAX: usize = 8;
 
-/// The mission and its transfer.
+/// What plans are checked against.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Surroundings {
+    /// What converts places, if the origin is known.
+    pub chart: Option<LocalChart>,
+    /// Where the vehicle is, if that is known \[m\].
+    pub here_m: Option<Vector2<f32>>,
+}
+
+/// The plans and their transfer.
 #[derive(Clone, Debug, Default)]
 pub struct Missions {
-    items: Vec<MissionItem, ITEMS_MAX>,
-    /// Which upload it is.
+    plans: PlanItems,
+    /// Which upload of the mission it is.
     number: u16,
+    jumps: Jumps,
     upload: Option<Upload>,
-    /// Station, number of items and outcome of the last upload, in case its answer is lost.
-    done: Option<(Address, u16)>,
+    /// Station, plan and last item of the last upload, in case its answer is lost.
+    done: Option<(Address, Plan, u16)>,
     out: Deque<(Mission, Address), OUT_MAX>,
 }
 
@@ -37,11 +55,20 @@ pub struct Heard {
     pub text: Option<Words>,
     /// The item to go on with.
     pub resume: Option<u16>,
+    /// True if there is another geofence.
+    pub fence: bool,
 }
 
 impl Missions {
     /// Handles a message of `from`, which is `in_control` or not.
-    pub fn hear(&mut self, message: Mission, from: Address, in_control: bool, now_us: u64) -> Heard {
+    pub fn hear(
+        &mut self,
+        message: Mission,
+        from: Address,
+        in_control: bool,
+        now_us: u64,
+        around: &Surroundings,
+    ) -> Heard {
         let mut heard = Heard::default();
         match message {
             Mission::List(plan) => self.say(Mission::Count(self.count(plan), plan), from),
@@ -52,20 +79,23 @@ impl Missions {
             Mission::Count(_, plan) | Mission::Clear(plan) if !in_control => {
                 self.acknowledge(MissionResult::DENIED, plan, from);
             }
-            Mission::Count(count, plan) => heard.text = self.begin(count, plan, from, now_us),
-            Mission::Item(item, plan) => heard.text = self.take(item, plan, from, now_us),
+            Mission::Count(count, plan) => (heard.text, heard.fence) = self.begin(count, plan, from, now_us),
+            Mission::Item(item, plan) => (heard.text, heard.fence) = self.take(item, plan, from, now_us, around),
             // A part of a list, which hardly any station wants any more.
             Mission::Part(_, plan) => self.acknowledge(MissionResult::UNSUPPORTED, plan, from),
             Mission::Clear(plan) => {
-                if plan == Plan::MISSION || plan == Plan::ALL {
-                    self.clear();
+                for each in [Plan::MISSION, Plan::FENCE, Plan::RALLY] {
+                    if plan == each || plan == Plan::ALL {
+                        self.clear(each);
+                        heard.fence |= each == Plan::FENCE;
+                    }
                 }
                 let known = [Plan::MISSION, Plan::FENCE, Plan::RALLY, Plan::ALL].contains(&plan);
                 let result = if known { MissionResult::ACCEPTED } else { MissionResult::UNSUPPORTED };
                 self.acknowledge(result, plan, from);
             }
             Mission::SetCurrent(number) if in_control => {
-                if usize::from(number) < self.items.len() {
+                if usize::from(number) < self.items().len() {
                     heard.resume = Some(number);
                 } else {
                     heard.text = Some(Words::of("no mission item ").number(number.into()));
@@ -81,17 +111,17 @@ impl Missions {
     /// Repeats what is unanswered for too long at `now_us`; returns a text if an upload is given up.
     pub fn tick(&mut self, now_us: u64) -> Option<Words> {
         let upload = self.upload.as_mut()?;
-        let from = upload.from;
+        let (from, plan) = (upload.from, upload.plan);
         match upload.remind(now_us) {
             upload::Reminder::None => None,
             upload::Reminder::Ask(number) => {
-                self.say(Mission::Request(number, Plan::MISSION), from);
+                self.say(Mission::Request(number, plan), from);
                 None
             }
             upload::Reminder::GiveUp => {
                 self.upload = None;
-                self.acknowledge(MissionResult::CANCELLED, Plan::MISSION, from);
-                Some(Words::of("mission upload given up: no answer"))
+                self.acknowledge(MissionResult::CANCELLED, plan, from);
+                Some(Words::of(name(plan)).and(" upload given up: no answer"))
             }
         }
     }
@@ -103,18 +133,52 @@ impl Missions {
 
     /// Returns the item that the guidance wants, in the local frame.
     pub fn leg(&self, number: u16, origin: Option<&EarthOrigin>, home_m: f32) -> Option<Leg> {
-        let item = to_guidance(self.items.get(usize::from(number))?, origin, home_m)?;
-        Some(Leg { number, upload: self.number, item, is_last: usize::from(number) + 1 == self.items.len() })
+        let items = self.items();
+        let of_station = items.get(usize::from(number))?;
+        let mut item = to_guidance(of_station, origin, home_m)?;
+        let mut is_last = usize::from(number) + 1 == items.len();
+        if let Item::Jump(target) = &mut item {
+            *target = self.jumps.next(of_station, *target);
+            is_last &= usize::from(*target) == items.len();
+        }
+        Some(Leg { number, upload: self.number, item, is_last })
     }
 
-    /// Returns the items.
+    /// Notes that the guidance has done an item.
+    pub fn reached(&mut self, number: u16) {
+        if let Some(item) = self.plans.of(Plan::MISSION).get(usize::from(number)) {
+            self.jumps.made(item);
+        }
+    }
+
+    /// Notes that the mission begins anew.
+    pub fn restart(&mut self) {
+        self.jumps.clear();
+    }
+
+    /// Returns the items of the mission.
     pub fn items(&self) -> &[MissionItem] {
-        &self.items
+        self.plans.of(Plan::MISSION)
+    }
+
+    /// Returns the items of the geofence.
+    pub fn fence(&self) -> &[MissionItem] {
+        self.plans.of(Plan::FENCE)
+    }
+
+    /// Returns the rally points.
+    pub fn rally(&self) -> &[MissionItem] {
+        self.plans.of(Plan::RALLY)
+    }
+
+    /// Returns which upload of the mission it is.
+    pub fn number(&self) -> u16 {
+        self.number
     }
 
     /// Returns MISSION_CURRENT, when the guidance flies, or flew last, `item`, in mission mode or not.
     pub fn current(&self, item: Option<u16>, reached: Option<u16>, flies: bool) -> MissionCurrent {
-        let total = self.items.len() as u16;
+        let total = self.items().len() as u16;
         let last = total.checked_sub(1);
         let state = match (last, item) {
             (None, _) => 1,
@@ -127,75 +191,107 @@ impl Missions {
     }
 
     fn count(&self, plan: Plan) -> u16 {
-        if plan == Plan::MISSION { self.items.len() as u16 } else { 0 }
+        self.plans.of(plan).len() as u16
     }
 
     fn item(&self, number: u16, plan: Plan) -> Option<MissionItem> {
-        self.items.get(usize::from(number)).filter(|_| plan == Plan::MISSION).copied()
+        self.plans.of(plan).get(usize::from(number)).copied()
     }
 
-    fn begin(&mut self, count: u16, plan: Plan, from: Address, now_us: u64) -> Option<Words> {
-        let result = match plan {
-            Plan::MISSION if self.upload.as_ref().is_some_and(|upload| upload.from != from) => MissionResult::DENIED,
-            Plan::MISSION if usize::from(count) > ITEMS_MAX => MissionResult::NO_SPACE,
-            Plan::MISSION if count == 0 => {
-                self.clear();
+    /// Begins an upload; returns a text, and true if there is another fence.
+    fn begin(&mut self, count: u16, plan: Plan, from: Address, now_us: u64) -> (Option<Words>, bool) {
+        let known = [Plan::MISSION, Plan::FENCE, Plan::RALLY].contains(&plan);
+        let room = self.plans.room(plan);
+        let result = match count {
+            _ if !known => MissionResult::UNSUPPORTED,
+            _ if self.upload.as_ref().is_some_and(|upload| upload.from != from) => MissionResult::DENIED,
+            0 => {
+                self.clear(plan);
                 MissionResult::ACCEPTED
             }
-            Plan::MISSION => {
-                (self.upload, self.done) = (Some(Upload::new(count, from, now_us)), None);
+            _ if usize::from(count) > room => MissionResult::NO_SPACE,
+            _ => {
+                (self.upload, self.done) = (Some(Upload::new(plan, count, from, now_us)), None);
                 self.say(Mission::Request(0, plan), from);
-                return None;
+                return (None, false);
             }
-            // Empty lists, as they are.
-            Plan::FENCE | Plan::RALLY if count == 0 => MissionResult::ACCEPTED,
-            _ => MissionResult::UNSUPPORTED,
         };
         self.acknowledge(result, plan, from);
-        let room = Words::of("mission refused: more than ").number(ITEMS_MAX as u32).and(" items");
-        (result == MissionResult::NO_SPACE).then_some(room)
+        let text = Words::of(name(plan)).and(" refused: room for ").number(room as u32).and(" items");
+        let cleared = result == MissionResult::ACCEPTED && plan == Plan::FENCE;
+        ((result == MissionResult::NO_SPACE).then_some(text), cleared)
     }
 
-    fn take(&mut self, item: MissionItem, plan: Plan, from: Address, now_us: u64) -> Option<Words> {
-        let uploads = self.upload.as_mut().filter(|upload| upload.from == from && plan == Plan::MISSION);
+    /// Takes an item of an upload; returns a text, and true if there is another fence.
+    fn take(
+        &mut self,
+        item: MissionItem,
+        plan: Plan,
+        from: Address,
+        now_us: u64,
+        around: &Surroundings,
+    ) -> (Option<Words>, bool) {
+        let uploads = self.upload.as_mut().filter(|upload| upload.from == from && upload.plan == plan);
         let Some(upload) = uploads else {
             // The last item again: the answer to it was lost.
-            let is_done = plan == Plan::MISSION && self.done == Some((from, item.number));
+            let is_done = self.done == Some((from, plan, item.number));
             let result = if is_done { MissionResult::ACCEPTED } else { MissionResult::INVALID_SEQUENCE };
             self.acknowledge(result, plan, from);
-            return None;
+            return (None, false);
         };
         if item.number != upload.wanted() {
             // An item twice, or one too early. The one that is wanted was asked for, and will be again.
-            return None;
+            return (None, false);
         }
-        if let Err(Invalid { result, reason }) = check(&item) {
+        let mut checked = match plan {
+            Plan::FENCE => fence::check_item(&item),
+            Plan::RALLY => check_rally(&item),
+            _ => check(&item),
+        }
+        .map_err(|invalid| (item.number, invalid));
+        let next = if checked.is_ok() { upload.put(item, now_us) } else { None };
+        if let Some(number) = next {
+            self.say(Mission::Request(number, plan), from);
+            return (None, false);
+        }
+        if checked.is_ok() {
+            checked = match plan {
+                Plan::FENCE => fence::check(&upload.items, around.chart.as_ref(), around.here_m),
+                Plan::MISSION => {
+                    check_jumps(&upload.items).and_then(|()| check_places(&upload.items, &self.plans, around))
+                }
+                _ => Ok(()),
+            };
+        }
+        if let Err((number, invalid)) = checked {
             self.upload = None;
-            self.acknowledge(result, plan, from);
-            return Some(Words::of("mission item ").number(item.number.into()).and(": ").and(reason));
+            self.acknowledge(invalid.result, plan, from);
+            return (Some(invalid.text(name(plan), number, item.command)), false);
         }
-        match upload.put(item, now_us) {
-            Some(number) => self.say(Mission::Request(number, plan), from),
-            None => {
-                // In place: a copy would take much of the stack.
-                self.items.clear();
-                self.items.extend_from_slice(&upload.items).ok();
-                self.renew();
-                self.done = Some((from, item.number));
-                self.acknowledge(MissionResult::ACCEPTED, plan, from);
-            }
+        // In place: a copy would take much of the stack.
+        let fits = self.plans.replace(plan, &upload.items);
+        self.upload = None;
+        if plan == Plan::MISSION && fits {
+            self.renew();
         }
-        None
+        self.done = fits.then_some((from, plan, item.number));
+        self.acknowledge(if fits { MissionResult::ACCEPTED } else { MissionResult::NO_SPACE }, plan, from);
+        (None, fits && plan == Plan::FENCE)
+    }
+
+    /// Removes the items of a plan, and ends an upload.
+    fn clear(&mut self, plan: Plan) {
+        self.plans.replace(plan, &[]);
+        (self.upload, self.done) = (None, None);
+        if plan == Plan::MISSION {
+            self.renew();
+        }
     }
 
     /// Notes that there is another mission.
     fn renew(&mut self) {
-        (self.number, self.upload, self.done) = (self.number.wrapping_add(1), None, None);
-    }
-
-    fn clear(&mut self) {
-        self.items.clear();
-        self.renew();
+        self.number = self.number.wrapping_add(1);
+        self.jumps.clear();
     }
 
     fn acknowledge(&mut self, result: MissionResult, plan: Plan, to: Address) {
@@ -204,6 +300,25 @@ impl Missions {
 
     fn say(&mut self, message: Mission, to: Address) {
         self.out.push_back((message, to)).ok();
+    }
+}
+
+/// Checks that the places of a mission are inside the fence, where both are known.
+fn check_places(items: &[MissionItem], plans: &PlanItems, around: &Surroundings) -> Result<(), (u16, Invalid)> {
+    let (areas, Some(chart)) = (plans.of(Plan::FENCE), &around.chart) else { return Ok(()) };
+    let outside = |item: &&MissionItem| stop_m(item, chart).is_some_and(|stop_m| !fence::holds(areas, chart, stop_m));
+    match items.iter().find(outside).filter(|_| !areas.is_empty()) {
+        Some(item) => Err((item.number, Invalid { result: MissionResult::DENIED, reason: "outside the geofence" })),
+        None => Ok(()),
+    }
+}
+
+/// Returns the name of a plan.
+fn name(plan: Plan) -> &'static str {
+    match plan {
+        Plan::FENCE => "fence",
+        Plan::RALLY => "rally",
+        _ => "mission",
     }
 }
 

@@ -16,6 +16,7 @@ use std::vec::Vec as List;
 const A: Address = Address { system: 255, component: 190 };
 const B: Address = Address { system: 245, component: 190 };
 const PLAN: Plan = Plan::MISSION;
+const NOWHERE: Surroundings = Surroundings { chart: None, here_m: None };
 
 fn waypoint(number: u16) -> MissionItem {
     MissionItem {
@@ -37,10 +38,10 @@ fn said(missions: &mut Missions) -> List<(Mission, Address)> {
 
 /// Uploads items without a loss; returns what was said last.
 fn upload(missions: &mut Missions, items: &[MissionItem]) -> List<(Mission, Address)> {
-    missions.hear(Mission::Count(items.len() as u16, PLAN), A, true, 0);
+    missions.hear(Mission::Count(items.len() as u16, PLAN), A, true, 0, &NOWHERE);
     for item in items {
         assert_eq!(said(missions), [(Mission::Request(item.number, PLAN), A)]);
-        missions.hear(Mission::Item(*item, PLAN), A, true, 0);
+        missions.hear(Mission::Item(*item, PLAN), A, true, 0, &NOWHERE);
     }
     said(missions)
 }
@@ -50,30 +51,42 @@ fn what_was_uploaded_can_be_downloaded() {
     let mut missions = Missions::default();
     let items: List<_> = (0..ITEMS_MAX as u16).map(waypoint).collect();
     assert_eq!(upload(&mut missions, &items), [(Mission::Ack(MissionResult::ACCEPTED, PLAN), A)]);
-    missions.hear(Mission::List(PLAN), B, false, 0);
+    missions.hear(Mission::List(PLAN), B, false, 0, &NOWHERE);
     assert_eq!(said(&mut missions), [(Mission::Count(64, PLAN), B)]);
     for item in &items {
-        missions.hear(Mission::Request(item.number, PLAN), B, false, 0);
+        missions.hear(Mission::Request(item.number, PLAN), B, false, 0, &NOWHERE);
         let reported = said(&mut missions);
         // A heading that is not given is NaN, which differs from itself.
         assert_eq!(std::format!("{reported:?}"), std::format!("{:?}", [(Mission::Item(*item, PLAN), B)]));
     }
-    missions.hear(Mission::Request(64, PLAN), B, false, 0);
+    missions.hear(Mission::Request(64, PLAN), B, false, 0, &NOWHERE);
     assert_eq!(said(&mut missions), [(Mission::Ack(MissionResult::INVALID_SEQUENCE, PLAN), B)]);
 }
 
+/// Rally points, which are kept beside the mission, and what is none.
 #[test]
-fn fences_and_rally_points_are_empty() {
+fn rally_points_are_kept() {
     let mut missions = Missions::default();
-    for plan in [Plan::FENCE, Plan::RALLY] {
-        missions.hear(Mission::List(plan), A, false, 0);
-        missions.hear(Mission::Count(0, plan), A, true, 0);
-        missions.hear(Mission::Count(1, plan), A, true, 0);
-        missions.hear(Mission::Clear(plan), A, true, 0);
-        let [accepted, unsupported] =
-            [MissionResult::ACCEPTED, MissionResult::UNSUPPORTED].map(|it| (Mission::Ack(it, plan), A));
-        assert_eq!(said(&mut missions), [(Mission::Count(0, plan), A), accepted, unsupported, accepted]);
+    upload(&mut missions, &[waypoint(0)]);
+    let point = |number| MissionItem { command: 5100, frame: 3, parameters: [0.0; 4], ..waypoint(number) };
+    let plan = Plan::RALLY;
+    for bad in [waypoint(1), MissionItem { frame: 1, ..point(1) }, MissionItem { x: i32::MAX, ..point(1) }] {
+        missions.hear(Mission::Count(2, plan), A, true, 0, &NOWHERE);
+        missions.hear(Mission::Item(point(0), plan), A, true, 0, &NOWHERE);
+        let heard = missions.hear(Mission::Item(bad, plan), A, true, 0, &NOWHERE);
+        assert!(heard.text.is_some_and(|text| std::format!("{text:?}").contains("rally item 1: ")));
+        assert!(matches!(said(&mut missions).last(), Some((Mission::Ack(result, Plan::RALLY), A)) if result.0 != 0));
     }
+    missions.hear(Mission::Count(2, plan), A, true, 0, &NOWHERE);
+    missions.hear(Mission::Item(point(0), plan), A, true, 0, &NOWHERE);
+    missions.hear(Mission::Item(point(1), plan), A, true, 0, &NOWHERE);
+    assert_eq!(said(&mut missions).last(), Some(&(Mission::Ack(MissionResult::ACCEPTED, plan), A)));
+    missions.hear(Mission::List(plan), B, false, 0, &NOWHERE);
+    missions.hear(Mission::Request(1, plan), B, false, 0, &NOWHERE);
+    assert_eq!(said(&mut missions), [(Mission::Count(2, plan), B), (Mission::Item(point(1), plan), B)]);
+    assert_eq!(missions.items().len(), 1);
+    missions.hear(Mission::Clear(plan), A, true, 0, &NOWHERE);
+    assert_eq!((missions.count(plan), missions.items().len()), (0, 1));
 }
 
 /// The mission stays as it was until the last item is there.
@@ -81,11 +94,11 @@ fn fences_and_rally_points_are_empty() {
 fn a_broken_upload_changes_nothing() {
     let mut missions = Missions::default();
     upload(&mut missions, &[waypoint(0), waypoint(1)]);
-    missions.hear(Mission::Count(3, PLAN), A, true, 0);
-    missions.hear(Mission::Item(waypoint(0), PLAN), A, true, 0);
+    missions.hear(Mission::Count(3, PLAN), A, true, 0, &NOWHERE);
+    missions.hear(Mission::Item(waypoint(0), PLAN), A, true, 0, &NOWHERE);
     let bad = MissionItem { command: 205, ..waypoint(1) };
-    let heard = missions.hear(Mission::Item(bad, PLAN), A, true, 0);
-    assert_eq!(heard.text, Some(Words::of("mission item 1: command is not supported")));
+    let heard = missions.hear(Mission::Item(bad, PLAN), A, true, 0, &NOWHERE);
+    assert_eq!(heard.text, Some(Words::of("mission item 1: DO_MOUNT_CONTROL unsupported")));
     assert_eq!(said(&mut missions).last(), Some(&(Mission::Ack(MissionResult::UNSUPPORTED, PLAN), A)));
     assert_eq!(missions.items().len(), 2);
     assert_eq!(missions.number, 1);
@@ -94,7 +107,7 @@ fn a_broken_upload_changes_nothing() {
 #[test]
 fn lost_messages_are_repeated_and_a_silent_station_is_given_up() {
     let mut missions = Missions::default();
-    missions.hear(Mission::Count(2, PLAN), A, true, 0);
+    missions.hear(Mission::Count(2, PLAN), A, true, 0, &NOWHERE);
     said(&mut missions);
     let mut asked = 0;
     for now_us in (0..10 * PATIENCE_US).step_by(1000) {
@@ -111,7 +124,7 @@ fn lost_messages_are_repeated_and_a_silent_station_is_given_up() {
     assert!(missions.upload.is_none());
     // Another one works, and its last item may come twice.
     upload(&mut missions, &[waypoint(0)]);
-    missions.hear(Mission::Item(waypoint(0), PLAN), A, true, 0);
+    missions.hear(Mission::Item(waypoint(0), PLAN), A, true, 0, &NOWHERE);
     assert_eq!(said(&mut missions), [(Mission::Ack(MissionResult::ACCEPTED, PLAN), A)]);
 }
 
@@ -119,15 +132,15 @@ fn lost_messages_are_repeated_and_a_silent_station_is_given_up() {
 fn only_the_station_in_control_changes_it() {
     let mut missions = Missions::default();
     upload(&mut missions, &[waypoint(0)]);
-    missions.hear(Mission::Count(1, PLAN), B, false, 0);
-    missions.hear(Mission::Clear(Plan::ALL), B, false, 0);
-    assert_eq!(missions.hear(Mission::SetCurrent(0), B, false, 0), Heard::default());
+    missions.hear(Mission::Count(1, PLAN), B, false, 0, &NOWHERE);
+    missions.hear(Mission::Clear(Plan::ALL), B, false, 0, &NOWHERE);
+    assert_eq!(missions.hear(Mission::SetCurrent(0), B, false, 0, &NOWHERE), Heard::default());
     let denied = |plan| (Mission::Ack(MissionResult::DENIED, plan), B);
     assert_eq!(said(&mut missions), [denied(PLAN), denied(Plan::ALL)]);
     // Nor does another one put items into its upload.
-    missions.hear(Mission::Count(2, PLAN), A, true, 0);
+    missions.hear(Mission::Count(2, PLAN), A, true, 0, &NOWHERE);
     said(&mut missions);
-    missions.hear(Mission::Item(waypoint(0), PLAN), B, false, 0);
+    missions.hear(Mission::Item(waypoint(0), PLAN), B, false, 0, &NOWHERE);
     assert_eq!(said(&mut missions), [(Mission::Ack(MissionResult::INVALID_SEQUENCE, PLAN), B)]);
     assert_eq!(missions.upload.as_ref().map(Upload::wanted), Some(0));
 }
@@ -135,8 +148,8 @@ fn only_the_station_in_control_changes_it() {
 #[test]
 fn too_many_items_are_refused() {
     let mut missions = Missions::default();
-    let heard = missions.hear(Mission::Count(65, PLAN), A, true, 0);
-    assert_eq!(heard.text, Some(Words::of("mission refused: more than 64 items")));
+    let heard = missions.hear(Mission::Count(65, PLAN), A, true, 0, &NOWHERE);
+    assert_eq!(heard.text, Some(Words::of("mission refused: room for 64 items")));
     assert_eq!(said(&mut missions), [(Mission::Ack(MissionResult::NO_SPACE, PLAN), A)]);
 }
 
@@ -157,7 +170,7 @@ fn each_invalid_number_is_named() {
         (MissionItem { parameters: [0.0, 0.0, 0.0, 1e9], ..good }, MissionResult(9)),
         (MissionItem { command: 178, parameters: [1.0, 0.0, 0.0, 0.0], ..good }, MissionResult(7)),
         (MissionItem { command: 178, parameters: [3.0, 5.0, 0.0, 0.0], ..good }, MissionResult::INVALID_PARAM1),
-        (MissionItem { command: 93, ..good }, MissionResult::UNSUPPORTED),
+        (MissionItem { command: 92, ..good }, MissionResult::UNSUPPORTED),
     ];
     for (item, result) in cases {
         assert_eq!(check(&item).map_err(|invalid| invalid.result), Err(result), "{item:?}");
@@ -241,6 +254,39 @@ fn items_reach_up_to_their_limits() {
     ] {
         assert_eq!(check(&item).err().map(|invalid| invalid.result), expected, "{item:?}");
     }
+    let item = |command, parameters| MissionItem { command, parameters, ..good };
+    let (eighth, nan) = (Some(MissionResult(8)), f32::NAN);
+    for (item, expected) in [
+        (item(93, [86_400.0, 0.0, 0.0, 0.0]), OK),
+        (item(93, [86_401.0, 0.0, 0.0, 0.0]), first),
+        (item(93, [-1.0, 12.0, 0.0, 0.0]), first),
+        (item(93, [nan; 4]), first),
+        (item(115, [90.0, 0.0, -1.0, 1.0]), OK),
+        (item(115, [90.0, 0.0, 2.0, 1.0]), eighth),
+        (item(115, [90.0, 0.0, 0.0, 0.5]), fourth),
+        (item(115, [nan, 0.0, 0.0, 0.0]), first),
+        (item(18, [1000.0, 0.0, -1000.0, nan]), OK),
+        (item(18, [1.5, 0.0, nan, nan]), OK),
+        (item(18, [1001.0, 0.0, 10.0, nan]), first),
+        (item(18, [nan, 0.0, 10.0, nan]), first),
+        (item(18, [1.0, 0.0, 0.5, nan]), eighth),
+        (item(177, [0.0, -1.0, 0.0, 0.0]), OK),
+        (item(177, [63.0, 1000.0, 0.0, 0.0]), OK),
+        (item(177, [0.5, 1.0, 0.0, 0.0]), first),
+        (item(177, [256.0, 1.0, 0.0, 0.0]), first),
+        (item(177, [0.0, -2.0, 0.0, 0.0]), second),
+        (item(177, [0.0, 1001.0, 0.0, 0.0]), second),
+        (item(177, [0.0, nan, 0.0, 0.0]), second),
+        (item(201, [0.0, 0.0, 0.0, 0.0]), OK),
+        (item(201, [3.0, 0.0, 0.0, 0.0]), OK),
+        (item(201, [1.0, 0.0, 0.0, 0.0]), first),
+        (MissionItem { z: nan, ..item(195, [0.0; 4]) }, OK),
+        (MissionItem { x: i32::MAX, ..item(195, [0.0; 4]) }, x),
+        (MissionItem { z: nan, ..item(17, [0.0; 4]) }, z),
+        (MissionItem { z: nan, ..item(31, [0.0; 4]) }, z),
+    ] {
+        assert_eq!(check(&item).err().map(|invalid| invalid.result), expected, "{item:?}");
+    }
     for frame in 0..=u8::MAX {
         let known = [0, 1, 3, 5, 6].contains(&frame);
         for command in [16, 19, 21, 22] {
@@ -249,7 +295,7 @@ fn items_reach_up_to_their_limits() {
         }
     }
     for command in 0..1000 {
-        let known = [16, 19, 20, 21, 22, 178].contains(&command);
+        let known = [16, 17, 18, 19, 20, 21, 22, 31, 93, 115, 177, 178, 195, 197].contains(&command);
         let item = MissionItem { command, parameters: [1.0, 1.0, 0.0, 0.0], ..good };
         assert_eq!(check(&item).is_ok(), known, "{command}");
     }
@@ -301,11 +347,121 @@ fn each_item_is_one_of_the_guidance() {
     assert_eq!(there(&MissionItem { command: 20, ..full }), Some(Item::Return));
     let speed = MissionItem { command: 178, parameters: [1.0, 4.5, 0.0, 0.0], ..full };
     assert_eq!(there(&speed), Some(Item::Speed(4.5)));
+    let item = |command, parameters| there(&MissionItem { command, parameters, ..place(30.0, -20.0) });
+    assert_eq!(item(93, [7.0, -1.0, -1.0, -1.0]), Some(Item::Wait(7.0)));
+    assert_eq!(item(177, [3.0, 2.0, 0.0, 0.0]), Some(Item::Jump(3)));
+    assert_eq!(
+        item(115, [90.0, 20.0, 1.0, 1.0]),
+        Some(Item::Yaw { yaw_rad: -core::f32::consts::FRAC_PI_2, relative: true, direction: -1 })
+    );
+    let Some(Item::Turns { centre_m, radius_m, turns }) = item(18, [2.0, 0.0, 15.0, 1.0]) else { panic!("no turns") };
+    near(centre_m, 30.0, -20.0, 9.0);
+    assert_eq!((radius_m, turns), (-15.0, 2.0), "to the right");
+    let Some(Item::Waypoint { hold_s, yaw_rad, .. }) = item(17, [0.0, 0.0, 20.0, 180.0]) else { panic!("no stay") };
+    assert_eq!((hold_s, yaw_rad), (f32::INFINITY, -core::f32::consts::PI));
+    let Some(Item::Waypoint { position_m, hold_s, .. }) = item(31, [0.0; 4]) else { panic!("no climb") };
+    near(position_m, 30.0, -20.0, 9.0);
+    assert_eq!(hold_s, 0.0);
+    for (command, kind, to) in [(195, 0.0, true), (197, 0.0, false), (201, 3.0, true), (201, 0.0, false)] {
+        let Some(Item::Look { at_m }) = item(command, [kind, 0.0, 0.0, 0.0]) else { panic!("no region") };
+        assert_eq!((at_m.xy() - nalgebra::Vector2::new(30.0, -20.0)).norm() < 0.02, to, "{command}");
+        assert_eq!(at_m.x.is_nan(), !to);
+    }
     assert_eq!(there(&MissionItem { command: 205, ..full }), None);
     assert_eq!(there(&MissionItem { frame: 99, ..full }), None);
     // Without an origin there are no places on the earth, but a landing here, a return and a speed.
     for (command, known) in [(16, false), (19, false), (21, false), (22, false), (20, true), (178, true)] {
         assert_eq!(to_guidance(&MissionItem { command, ..full }, None, 0.0).is_some(), known, "{command}");
+    }
+}
+
+/// Items flown, one by one, as a guidance does that does each at once.
+fn flown(missions: &mut Missions, most: usize) -> List<u16> {
+    let (mut wanted, mut done) = (0, List::new());
+    let origin = EarthOrigin::new(EarthOrigin::SIMULATED).expect("possible");
+    while let Some(leg) = missions.leg(wanted, Some(&origin), 0.0).filter(|_| done.len() < most) {
+        done.push(leg.number);
+        missions.reached(leg.number);
+        if leg.is_last {
+            break;
+        }
+        wanted = if let Item::Jump(to) = leg.item { to } else { leg.number + 1 };
+    }
+    done
+}
+
+fn jump(number: u16, to: u16, repeats: f32) -> MissionItem {
+    MissionItem { command: 177, parameters: [f32::from(to), repeats, 0.0, 0.0], ..waypoint(number) }
+}
+
+/// Each jump is made as often as it says, again in each round of an outer one, and from the start once disarmed.
+#[test]
+fn jumps_are_repeated() {
+    let mut missions = Missions::default();
+    upload(&mut missions, &[waypoint(0), waypoint(1), jump(2, 1, 2.0), waypoint(3)]);
+    assert_eq!(flown(&mut missions, 99), [0, 1, 2, 1, 2, 1, 2, 3]);
+    assert_eq!(flown(&mut missions, 4), [0, 1, 2, 1]);
+    missions.restart();
+    assert_eq!(flown(&mut missions, 99), [0, 1, 2, 1, 2, 1, 2, 3]);
+    upload(&mut missions, &[waypoint(0), jump(1, 0, 1.0), jump(2, 0, 1.0)]);
+    assert_eq!(flown(&mut missions, 99), [0, 1, 0, 1, 2, 0, 1, 0, 1, 2], "one within the other");
+    upload(&mut missions, &[waypoint(0), jump(1, 0, -1.0)]);
+    assert_eq!(flown(&mut missions, 1001).len(), 1001, "for ever");
+    upload(&mut missions, &[jump(0, 2, 1.0), waypoint(1), waypoint(2)]);
+    assert_eq!(flown(&mut missions, 99), [0, 2], "ahead");
+    upload(&mut missions, &[waypoint(0), jump(1, 0, 0.0)]);
+    assert_eq!(flown(&mut missions, 99), [0, 1], "never");
+}
+
+/// A mission that would jump to nowhere, or go around without a flight, is refused as a whole.
+#[test]
+fn jumps_without_an_end_are_refused() {
+    let speed = |number| MissionItem { command: 178, parameters: [1.0, 2.0, 0.0, 0.0], ..waypoint(number) };
+    let nine: List<_> = (0..10).map(|number| if number == 0 { waypoint(0) } else { jump(number, 0, 1.0) }).collect();
+    let cases: &[(&[MissionItem], u16, &str)] = &[
+        (&[waypoint(0), jump(1, 2, 1.0)], 1, "there is no such item"),
+        (&[waypoint(0), jump(1, 1, 1.0), waypoint(2)], 1, "there is no such item"),
+        (&[waypoint(0), speed(1), jump(2, 1, -1.0)], 2, "goes around for ever without a flight"),
+        (&[jump(0, 2, -1.0), waypoint(1), jump(2, 0, -1.0)], 0, "goes around for ever without a flight"),
+        (&nine, 9, "more than 8 jumps"),
+    ];
+    for (items, number, reason) in cases {
+        let mut missions = Missions::default();
+        missions.hear(Mission::Count(items.len() as u16, PLAN), A, true, 0, &NOWHERE);
+        let heard = items.iter().map(|item| missions.hear(Mission::Item(*item, PLAN), A, true, 0, &NOWHERE)).last();
+        let text = Words::of("mission item ").number((*number).into()).and(": ").and(reason);
+        assert_eq!(heard.expect("an item").text, Some(text));
+        assert!(missions.items().is_empty());
+    }
+    // Which end, or take time.
+    for items in [
+        &[waypoint(0), speed(1), jump(2, 1, 1000.0)][..],
+        &[waypoint(0), jump(1, 0, -1.0)],
+        &[jump(0, 2, 1.0), waypoint(1), jump(2, 0, -1.0)],
+    ] {
+        let mut missions = Missions::default();
+        assert_eq!(upload(&mut missions, items), [(Mission::Ack(MissionResult::ACCEPTED, PLAN), A)], "{items:?}");
+    }
+}
+
+/// A mission whose places are outside the fence is refused, if both are known.
+#[test]
+fn a_mission_outside_the_fence_is_refused() {
+    let origin = EarthOrigin::new(EarthOrigin::SIMULATED).expect("possible");
+    let around = Surroundings { chart: Some(origin.chart()), here_m: None };
+    let [x, y] = origin.at().e7();
+    let circle = MissionItem { command: 5003, frame: 5, parameters: [30.0, 0.0, 0.0, 0.0], x, y, ..waypoint(0) };
+    for (command, north, outside) in
+        [(16, 100, false), (16, 2600, false), (16, 2650, true), (17, 2650, true), (21, 2650, true), (195, 2650, false)]
+    {
+        let mut missions = Missions::default();
+        missions.hear(Mission::Count(1, Plan::FENCE), A, true, 0, &around);
+        missions.hear(Mission::Item(circle, Plan::FENCE), A, true, 0, &around);
+        missions.hear(Mission::Count(1, PLAN), A, true, 0, &around);
+        let item = MissionItem { command, x: x + north, y, ..waypoint(0) };
+        let heard = missions.hear(Mission::Item(item, PLAN), A, true, 0, &around);
+        let text = outside.then(|| Words::of("mission item 0: outside the geofence"));
+        assert_eq!((heard.text, missions.items().len()), (text, usize::from(!outside)), "{command} {north}");
     }
 }
 
@@ -341,7 +497,7 @@ fn every_message_is_answered_by_what_it_is_about() {
         let mut missions = Missions::default();
         upload(&mut missions, &[waypoint(0), waypoint(1)]);
         let mut ask = |message, may| {
-            let heard = missions.hear(message, A, may, 0);
+            let heard = missions.hear(message, A, may, 0, &NOWHERE);
             (said(&mut missions), heard, missions.items().len())
         };
         let ack = |result| std::vec![(Mission::Ack(result, plan), A)];
@@ -386,7 +542,10 @@ fn an_item_is_chosen_that_there_is() {
         (2, true, None, Some(Words::of("no mission item 2"))),
         (1, false, None, None),
     ] {
-        assert_eq!(missions.hear(Mission::SetCurrent(number), A, may, 0), Heard { text, resume });
+        assert_eq!(
+            missions.hear(Mission::SetCurrent(number), A, may, 0, &NOWHERE),
+            Heard { text, resume, fence: false }
+        );
     }
 }
 
@@ -394,24 +553,24 @@ fn an_item_is_chosen_that_there_is() {
 #[test]
 fn an_upload_is_its_stations_own() {
     let mut missions = Missions::default();
-    missions.hear(Mission::Count(2, PLAN), A, true, 0);
+    missions.hear(Mission::Count(2, PLAN), A, true, 0, &NOWHERE);
     said(&mut missions);
-    missions.hear(Mission::Count(1, PLAN), B, true, 0);
+    missions.hear(Mission::Count(1, PLAN), B, true, 0, &NOWHERE);
     assert_eq!(said(&mut missions), [(Mission::Ack(MissionResult::DENIED, PLAN), B)]);
-    missions.hear(Mission::Ack(MissionResult::CANCELLED, PLAN), B, true, 0);
+    missions.hear(Mission::Ack(MissionResult::CANCELLED, PLAN), B, true, 0, &NOWHERE);
     assert!(missions.upload.is_some());
     // Items too early, twice or of another plan are not taken.
     for item in [waypoint(1), waypoint(5)] {
-        missions.hear(Mission::Item(item, PLAN), A, true, 0);
+        missions.hear(Mission::Item(item, PLAN), A, true, 0, &NOWHERE);
         assert_eq!(said(&mut missions), []);
     }
-    missions.hear(Mission::Item(waypoint(0), Plan::FENCE), A, true, 0);
+    missions.hear(Mission::Item(waypoint(0), Plan::FENCE), A, true, 0, &NOWHERE);
     assert_eq!(said(&mut missions), [(Mission::Ack(MissionResult::INVALID_SEQUENCE, Plan::FENCE), A)]);
-    missions.hear(Mission::Item(waypoint(0), PLAN), A, true, 0);
+    missions.hear(Mission::Item(waypoint(0), PLAN), A, true, 0, &NOWHERE);
     assert_eq!(said(&mut missions), [(Mission::Request(1, PLAN), A)]);
-    missions.hear(Mission::Item(waypoint(0), PLAN), A, true, 0);
+    missions.hear(Mission::Item(waypoint(0), PLAN), A, true, 0, &NOWHERE);
     assert_eq!(said(&mut missions), []);
-    missions.hear(Mission::Ack(MissionResult::CANCELLED, PLAN), A, true, 0);
+    missions.hear(Mission::Ack(MissionResult::CANCELLED, PLAN), A, true, 0, &NOWHERE);
     assert!(missions.upload.is_none());
     // It may begin anew, and only its last item may come twice.
     upload(&mut missions, &[waypoint(0), waypoint(1)]);
@@ -421,7 +580,7 @@ fn an_upload_is_its_stations_own() {
         (waypoint(1), B, PLAN, MissionResult::INVALID_SEQUENCE),
         (waypoint(1), A, Plan::RALLY, MissionResult::INVALID_SEQUENCE),
     ] {
-        missions.hear(Mission::Item(item, plan), from, true, 0);
+        missions.hear(Mission::Item(item, plan), from, true, 0, &NOWHERE);
         assert_eq!(said(&mut missions), [(Mission::Ack(result, plan), from)]);
     }
 }

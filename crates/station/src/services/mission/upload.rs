@@ -1,7 +1,7 @@
 //! An upload in progress.
 
 use super::items::ITEMS_MAX;
-use afbc_link::{Address, MissionItem};
+use afbc_link::{Address, MissionItem, Plan};
 use heapless::Vec;
 
 /// Time after which an item is asked for again \[us\].
@@ -11,6 +11,7 @@ pub(super) const TRIES: u8 = 6;
 
 #[derive(Clone, Debug)]
 pub(super) struct Upload {
+    pub(super) plan: Plan,
     pub(super) from: Address,
     pub(super) items: Vec<MissionItem, ITEMS_MAX>,
     count: u16,
@@ -28,8 +29,8 @@ pub(super) enum Reminder {
 
 impl Upload {
     /// An upload of `count` items, the first of which is asked for now.
-    pub(super) fn new(count: u16, from: Address, now_us: u64) -> Self {
-        Upload { from, items: Vec::new(), count, asked_us: now_us, tries: 1 }
+    pub(super) fn new(plan: Plan, count: u16, from: Address, now_us: u64) -> Self {
+        Upload { plan, from, items: Vec::new(), count, asked_us: now_us, tries: 1 }
     }
 
     /// Returns the number of the item that is wanted.

@@ -1,0 +1,60 @@
+//! Messages that nothing answers and that the vehicle has no use for, so that it can say so.
+
+use crate::address::Address;
+use crate::message::{MessageFormat, PAYLOAD_MAX, put};
+use crate::wire::{Layout, Unused};
+use mavlink::MessageData;
+use mavlink::dialects::common::{FOLLOW_TARGET_DATA, GPS_INJECT_DATA_DATA, GPS_RTCM_DATA_DATA, PLAY_TUNE_DATA};
+use mavlink::dialects::common::{PLAY_TUNE_V2_DATA, TuneFormat};
+
+/// What a message without an answer asks for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum UnansweredWish {
+    /// Corrections for the satellite receiver: GPS_RTCM_DATA (233), GPS_INJECT_DATA (123).
+    Corrections,
+    /// A tune: PLAY_TUNE (258), PLAY_TUNE_V2 (400).
+    Tune,
+    /// Following a target: FOLLOW_TARGET (144).
+    Follow,
+}
+
+const INJECT: Layout<GPS_INJECT_DATA_DATA, (Address, Unused<111>)> = Layout::NEW;
+/// Receiver, tune; the rest of it, which is an extension.
+const TUNE: Layout<PLAY_TUNE_DATA, (Address, Unused<30>, Unused<200>)> = Layout::NEW;
+/// Kind of tune, receiver, tune.
+const TUNE_V2: Layout<PLAY_TUNE_V2_DATA, (u32, Address, Unused<248>)> = Layout::NEW;
+
+impl UnansweredWish {
+    pub(super) fn format(id: u32) -> Option<MessageFormat> {
+        Some(match id {
+            GPS_RTCM_DATA_DATA::ID => MessageFormat::of::<GPS_RTCM_DATA_DATA>(0),
+            GPS_INJECT_DATA_DATA::ID => INJECT.format(),
+            FOLLOW_TARGET_DATA::ID => MessageFormat::of::<FOLLOW_TARGET_DATA>(0),
+            PLAY_TUNE_DATA::ID => TUNE.format(),
+            PLAY_TUNE_V2_DATA::ID => TUNE_V2.format(),
+            _ => return None,
+        })
+    }
+
+    /// Returns the wish and its receiver.
+    pub(super) fn read(id: u32, payload: &[u8]) -> (Self, Address) {
+        match id {
+            GPS_INJECT_DATA_DATA::ID => (UnansweredWish::Corrections, INJECT.read(payload).0),
+            FOLLOW_TARGET_DATA::ID => (UnansweredWish::Follow, Address::default()),
+            PLAY_TUNE_DATA::ID => (UnansweredWish::Tune, TUNE.read(payload).0),
+            PLAY_TUNE_V2_DATA::ID => (UnansweredWish::Tune, TUNE_V2.read(payload).1),
+            _ => (UnansweredWish::Corrections, Address::default()),
+        }
+    }
+
+    pub(super) fn write(self, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
+        match self {
+            UnansweredWish::Corrections => put(&GPS_RTCM_DATA_DATA::DEFAULT, payload),
+            UnansweredWish::Tune => {
+                let kind = TuneFormat::TUNE_FORMAT_QBASIC1_1 as u32;
+                TUNE_V2.write(&(kind, Address::default(), Unused), payload)
+            }
+            UnansweredWish::Follow => put(&FOLLOW_TARGET_DATA::DEFAULT, payload),
+        }
+    }
+}

@@ -1,0 +1,204 @@
+//! Plans of QGroundControl: `.plan` files, with mission, geofence and rally points.
+
+use afbc_link::MissionItem;
+use afbc_reader::FileError;
+use serde_json::Value;
+
+/// MAV_FRAME_GLOBAL and MAV_FRAME_LOCAL_NED.
+const GLOBAL: u8 = 0;
+const LOCAL_NED: u8 = 1;
+/// MAV_CMD_DO_JUMP, whose first parameter is not a number of an item in these files, but its `doJumpId`.
+const JUMP: u16 = 177;
+/// Commands of the geofence, of inclusion; those of exclusion follow each.
+const VERTEX: u16 = 5001;
+const CIRCLE: u16 = 5003;
+const RALLY_POINT: u16 = 5100;
+
+/// A plan.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct QgcPlan {
+    /// Items of the mission.
+    pub mission: Vec<MissionItem>,
+    /// Items of the geofence.
+    pub fence: Vec<MissionItem>,
+    /// Rally points.
+    pub rally: Vec<MissionItem>,
+    /// Where it begins: latitude, longitude \[deg\], and the altitude above the sea, if it is known \[m\].
+    pub home: Option<([f64; 2], Option<f64>)>,
+}
+
+/// A part of the file, and where it is.
+struct Part<'a> {
+    file: &'a str,
+    place: String,
+    value: &'a Value,
+}
+
+impl<'a> Part<'a> {
+    fn wrong(&self, problem: &str) -> FileError {
+        FileError::whole(self.file, format!("{}: {problem}", self.place))
+    }
+
+    fn at(&self, key: &str) -> Option<Part<'a>> {
+        let value = self.value.get(key).filter(|value| !value.is_null())?;
+        Some(Part { file: self.file, place: format!("{}.{key}", self.place), value })
+    }
+
+    fn get(&self, key: &str) -> Result<Part<'a>, FileError> {
+        self.at(key).ok_or_else(|| self.wrong(&format!("{key} is missing; save the plan again in QGroundControl")))
+    }
+
+    fn list(&self) -> Result<Vec<Part<'a>>, FileError> {
+        let list = self.value.as_array().ok_or_else(|| self.wrong("it must be a list"))?;
+        let part = |(number, value)| Part { file: self.file, place: format!("{} {number}", self.place), value };
+        Ok(list.iter().enumerate().map(part).collect())
+    }
+
+    fn number(&self) -> Result<f64, FileError> {
+        self.value.as_f64().ok_or_else(|| self.wrong("it must be a number"))
+    }
+
+    fn whole(&self, most: u16) -> Result<u16, FileError> {
+        let whole = self.value.as_u64().and_then(|number| u16::try_from(number).ok()).filter(|number| *number <= most);
+        whole.ok_or_else(|| self.wrong(&format!("it must be a whole number up to {most}")))
+    }
+
+    fn truth(&self) -> Result<bool, FileError> {
+        self.value.as_bool().ok_or_else(|| self.wrong("it must be true or false"))
+    }
+
+    /// Returns latitude and longitude \[deg\], and what follows them.
+    fn coordinates(&self) -> Result<([f64; 2], Option<f64>), FileError> {
+        let list = self.list()?;
+        let [latitude, longitude, rest @ ..] = list.as_slice() else {
+            return Err(self.wrong("it must be a list of latitude and longitude"));
+        };
+        let place = [latitude.number()?, longitude.number()?];
+        let [latitude, longitude] = place;
+        if latitude.abs() > 90.0 || longitude.abs() > 180.0 {
+            return Err(self.wrong("there is no such place; latitude and longitude are in degrees"));
+        }
+        Ok((place, rest.first().and_then(|altitude| altitude.value.as_f64())))
+    }
+}
+
+impl QgcPlan {
+    /// Reads a plan from the `text` of `file`.
+    ///
+    /// # Errors
+    /// One line that names the file, the item, what is wrong and what helps.
+    pub fn read(file: &str, text: &str) -> Result<Self, FileError> {
+        let value: Value = serde_json::from_str(text)
+            .map_err(|error| FileError::whole(file, format!("no JSON: {error}; save the plan again")))?;
+        let whole = Part { file, place: "plan".into(), value: &value };
+        if value.get("fileType").and_then(Value::as_str) != Some("Plan") {
+            return Err(FileError::whole(file, "no plan of QGroundControl: its fileType is not Plan"));
+        }
+        let part = |key: &str| whole.at(key).map(|part| Part { place: key.into(), ..part });
+        let mission = part("mission");
+        Ok(QgcPlan {
+            mission: mission.as_ref().map_or(Ok(Vec::new()), read_mission)?,
+            fence: part("geoFence").as_ref().map_or(Ok(Vec::new()), read_fence)?,
+            rally: part("rallyPoints").as_ref().map_or(Ok(Vec::new()), read_rally)?,
+            home: mission.and_then(|it| it.at("plannedHomePosition")).map(|home| home.coordinates()).transpose()?,
+        })
+    }
+}
+
+/// Returns the items of the mission, those of complex ones as they were worked out.
+fn read_mission(mission: &Part<'_>) -> Result<Vec<MissionItem>, FileError> {
+    let items = Part { place: "mission item".into(), ..mission.get("items")? };
+    let mut simple = Vec::new();
+    for item in items.list()? {
+        match item.value.get("type").and_then(Value::as_str) {
+            Some("SimpleItem") => simple.push(item),
+            Some("ComplexItem") => match item.at("TransectStyleComplexItem").and_then(|style| style.at("Items")) {
+                Some(worked_out) => simple.extend(worked_out.list()?),
+                None => return Err(item.wrong("complex items without a list of Items cannot be flown; remove it")),
+            },
+            _ => return Err(item.wrong("its type must be SimpleItem or ComplexItem")),
+        }
+    }
+    let names: Vec<_> = simple.iter().map(|item| item.value.get("doJumpId").and_then(Value::as_u64)).collect();
+    simple.iter().zip(0..).map(|(item, number)| simple_item(item, number, &names)).collect()
+}
+
+fn simple_item(item: &Part<'_>, number: u16, names: &[Option<u64>]) -> Result<MissionItem, FileError> {
+    let command = item.get("command")?.whole(u16::MAX)?;
+    let frame = item.get("frame")?.whole(u8::MAX.into())? as u8;
+    let params = item.get("params")?;
+    let numbers = params.list()?;
+    let number_of = |part: &Part<'_>| if part.value.is_null() { Ok(f64::NAN) } else { part.number() };
+    let numbers = numbers.iter().map(number_of).collect::<Result<Vec<_>, _>>()?;
+    let [first, second, third, fourth, x, y, z] = numbers.as_slice() else {
+        return Err(params.wrong("it must have seven numbers; save the plan again in QGroundControl"));
+    };
+    let mut parameters = [*first, *second, *third, *fourth].map(|number| number as f32);
+    if command == JUMP {
+        let place = names.iter().position(|name| name.is_some_and(|name| name as f64 == *first));
+        let place = place.ok_or_else(|| item.wrong("no item has the doJumpId that it jumps to; correct it"))?;
+        let [target, ..] = &mut parameters;
+        *target = place as f32;
+    }
+    let units = if frame == LOCAL_NED { 1e4 } else { 1e7 };
+    // Saturates, so that what is out of range remains so.
+    let in_units = |coordinate: f64| (coordinate * units).round() as i32;
+    Ok(MissionItem {
+        number,
+        command,
+        frame,
+        is_current: number == 0,
+        goes_on: true,
+        parameters,
+        x: in_units(*x),
+        y: in_units(*y),
+        z: *z as f32,
+    })
+}
+
+fn read_fence(fence: &Part<'_>) -> Result<Vec<MissionItem>, FileError> {
+    if let Some(point) = fence.at("breachReturn") {
+        return Err(point.wrong("return points are not supported; remove it, the vehicle returns home"));
+    }
+    let mut items = Vec::new();
+    let kind = |area: &Part<'_>, command: u16| Ok(command + u16::from(!area.get("inclusion")?.truth()?));
+    let named = |key: &str, name: &str| match fence.at(key) {
+        Some(list) => Part { place: name.into(), ..list }.list(),
+        None => Ok(Vec::new()),
+    };
+    for polygon in named("polygons", "geoFence polygon")? {
+        let command = kind(&polygon, VERTEX)?;
+        let corners = polygon.get("polygon")?.list()?;
+        for corner in &corners {
+            items.push(point(command, corners.len() as f32, corner.coordinates()?.0));
+        }
+    }
+    for circle in named("circles", "geoFence circle")? {
+        let command = kind(&circle, CIRCLE)?;
+        let shape = circle.get("circle")?;
+        let (centre, radius) = (shape.get("center")?.coordinates()?.0, shape.get("radius")?.number()?);
+        items.push(point(command, radius as f32, centre));
+    }
+    Ok(numbered(items))
+}
+
+fn read_rally(rally: &Part<'_>) -> Result<Vec<MissionItem>, FileError> {
+    let points = Part { place: "rally point".into(), ..rally.get("points")? };
+    let points = points.list()?;
+    let items = points.iter().map(|part| {
+        let (place, height) = part.coordinates()?;
+        // Heights are above home.
+        Ok(MissionItem { z: height.unwrap_or(0.0) as f32, frame: 3, ..point(RALLY_POINT, 0.0, place) })
+    });
+    Ok(numbered(items.collect::<Result<_, _>>()?))
+}
+
+fn point(command: u16, first: f32, [latitude, longitude]: [f64; 2]) -> MissionItem {
+    let [x, y] = [latitude, longitude].map(|degrees| (degrees * 1e7).round() as i32);
+    let parameters = [first, 0.0, 0.0, 0.0];
+    MissionItem { command, frame: GLOBAL, goes_on: true, parameters, x, y, ..MissionItem::default() }
+}
+
+fn numbered(items: Vec<MissionItem>) -> Vec<MissionItem> {
+    items.into_iter().zip(0..).map(|(item, number)| MissionItem { number, ..item }).collect()
+}

@@ -1,0 +1,185 @@
+//! Plans of QGroundControl: what is read, what is refused, and a flight.
+#![allow(clippy::indexing_slicing, clippy::unwrap_used, missing_docs, reason = "tests")]
+
+use afbc_scenario::built_in;
+use afbc_serve::{PlanEnd, QgcPlan, ServedVehicle, fleet, fly_plan};
+use serde_json::{Value, json};
+
+/// Where it is planned: not where served vehicles usually are.
+const HOME: [f64; 2] = [-33.9, 18.4];
+
+/// A place so many metres to the north and to the east of home.
+fn at(north: f64, east: f64) -> [f64; 2] {
+    [HOME[0] + north / 110_923.0, HOME[1] + east / 92_469.0]
+}
+
+fn item(name: u32, command: u16, [a, b, c, d]: [Value; 4], place: [f64; 2], z: f64) -> Value {
+    json!({
+        "type": "SimpleItem", "autoContinue": true, "doJumpId": name, "command": command, "frame": 3,
+        "params": [a, b, c, d, place[0], place[1], z],
+    })
+}
+
+fn zeros() -> [Value; 4] {
+    [json!(0), json!(0), json!(0), json!(null)]
+}
+
+/// A mission with a loop, a fence with an area to stay out of, and rally points.
+fn plan() -> Value {
+    let square = [at(-60.0, -60.0), at(60.0, -60.0), at(60.0, 60.0), at(-60.0, 60.0)];
+    json!({
+        "fileType": "Plan", "version": 1, "groundStation": "QGroundControl",
+        "mission": {
+            "version": 2, "plannedHomePosition": [HOME[0], HOME[1], 30.0], "hoverSpeed": 5,
+            "items": [
+                item(1, 22, zeros(), at(0.0, 0.0), 5.0),
+                item(2, 178, [json!(1), json!(4), json!(-1), json!(0)], [0.0; 2], 0.0),
+                item(3, 16, zeros(), at(25.0, 0.0), 8.0),
+                item(4, 93, [json!(2), json!(-1), json!(-1), json!(-1)], [0.0; 2], 0.0),
+                item(5, 16, zeros(), at(25.0, 20.0), 8.0),
+                item(9, 177, [json!(3), json!(1), json!(0), json!(0)], [0.0; 2], 0.0),
+                {
+                    "type": "ComplexItem", "complexItemType": "survey",
+                    "TransectStyleComplexItem": { "Items": [item(11, 16, zeros(), at(0.0, 20.0), 8.0)] },
+                },
+                item(12, 20, zeros(), [0.0; 2], 0.0),
+            ],
+        },
+        "geoFence": {
+            "version": 2,
+            "polygons": [{ "version": 1, "inclusion": true, "polygon": square }],
+            "circles": [{ "version": 1, "inclusion": false, "circle": { "center": at(-30.0, 0.0), "radius": 10.0 } }],
+        },
+        "rallyPoints": { "version": 2, "points": [[HOME[0], HOME[1], 20.0]] },
+    })
+}
+
+fn read(plan: &Value) -> Result<QgcPlan, String> {
+    QgcPlan::read("my.plan", &plan.to_string()).map_err(|error| error.to_string())
+}
+
+fn fly(plan: &QgcPlan) -> (Result<PlanEnd, String>, Vec<String>) {
+    let scenario = built_in("outdoor").unwrap().read().unwrap();
+    let mut vehicle = ServedVehicle::new(&fleet(&scenario, 1).unwrap()[0], 1, None).unwrap();
+    let (place, altitude_m) = plan.home.unwrap();
+    assert!(vehicle.move_origin(place, altitude_m.unwrap()));
+    let mut lines = Vec::new();
+    let end = fly_plan(&mut vehicle, plan, 600.0, &mut |line| lines.push(line.into()));
+    (end, lines)
+}
+
+#[test]
+fn a_plan_is_read() {
+    let plan = read(&plan()).unwrap();
+    assert_eq!((plan.mission.len(), plan.fence.len(), plan.rally.len()), (8, 5, 1));
+    assert_eq!(plan.home, Some((HOME, Some(30.0))));
+    let commands: Vec<_> = plan.mission.iter().map(|item| (item.number, item.command)).collect();
+    assert_eq!(commands, [(0, 22), (1, 178), (2, 16), (3, 93), (4, 16), (5, 177), (6, 16), (7, 20)]);
+    let waypoint = plan.mission[2];
+    assert_eq!((waypoint.frame, waypoint.x, waypoint.z), (3, (at(25.0, 0.0)[0] * 1e7).round() as i32, 8.0));
+    assert!(waypoint.parameters[3].is_nan());
+    // The item called 3 is the third.
+    assert_eq!(plan.mission[5].parameters, [2.0, 1.0, 0.0, 0.0]);
+    let fence: Vec<_> = plan.fence.iter().map(|item| (item.command, item.parameters[0])).collect();
+    assert_eq!(fence, [(5001, 4.0), (5001, 4.0), (5001, 4.0), (5001, 4.0), (5004, 10.0)]);
+    assert_eq!((plan.rally[0].command, plan.rally[0].frame, plan.rally[0].z), (5100, 3, 20.0));
+}
+
+/// Each error names the file, the item, what is wrong and what helps.
+#[test]
+fn what_is_wrong_is_named() {
+    let changed = |change: &dyn Fn(&mut Value)| {
+        let mut plan = plan();
+        change(&mut plan);
+        read(&plan).unwrap_err()
+    };
+    let cases: &[(&dyn Fn(&mut Value), &str)] = &[
+        (&|plan| plan["fileType"] = json!("Mission"), "my.plan: no plan of QGroundControl: its fileType is not Plan"),
+        (
+            &|plan| plan["mission"]["items"][2]["command"] = json!("fly"),
+            "my.plan: mission item 2.command: it must be a whole number up to 65535",
+        ),
+        (
+            &|plan| plan["mission"]["items"][2]["params"] = json!([1, 2]),
+            "my.plan: mission item 2.params: it must have seven numbers; save the plan again in QGroundControl",
+        ),
+        (
+            &|plan| plan["mission"]["items"][5]["params"][0] = json!(77),
+            "my.plan: mission item 5: no item has the doJumpId that it jumps to; correct it",
+        ),
+        (
+            &|plan| plan["mission"]["items"][6] = json!({ "type": "ComplexItem", "complexItemType": "StructureScan" }),
+            "my.plan: mission item 6: complex items without a list of Items cannot be flown; remove it",
+        ),
+        (
+            &|plan| plan["mission"]["items"][0]["type"] = json!(null),
+            "my.plan: mission item 0: its type must be SimpleItem or ComplexItem",
+        ),
+        (
+            &|plan| plan["geoFence"]["circles"][0]["circle"] = json!({ "center": [0, 0] }),
+            "my.plan: geoFence circle 0.circle: radius is missing; save the plan again in QGroundControl",
+        ),
+        (
+            &|plan| plan["geoFence"]["polygons"][0]["polygon"][1] = json!([91, 0]),
+            "my.plan: geoFence polygon 0.polygon 1: there is no such place; latitude and longitude are in degrees",
+        ),
+        (
+            &|plan| plan["geoFence"]["breachReturn"] = json!([1, 2, 3]),
+            "my.plan: geoFence.breachReturn: return points are not supported; remove it, the vehicle returns home",
+        ),
+        (&|plan| plan["rallyPoints"]["points"] = json!(7), "my.plan: rally point: it must be a list"),
+    ];
+    for (change, line) in cases {
+        assert_eq!(changed(change), *line);
+    }
+    let torn = QgcPlan::read("my.plan", "{\"fileType\": ").unwrap_err().to_string();
+    assert!(torn.starts_with("my.plan: no JSON: ") && torn.ends_with("; save the plan again"), "{torn}");
+}
+
+/// From take-off to the landing at home, with the loop flown twice, inside the fence.
+#[test]
+fn a_plan_is_flown() {
+    let (end, lines) = fly(&read(&plan()).unwrap());
+    let end = end.unwrap();
+    assert_eq!(end.reached, [0, 1, 2, 3, 4, 5, 2, 3, 4, 5, 6, 7], "{lines:#?}");
+    assert!(end.disarmed, "{lines:#?}");
+}
+
+/// What the vehicle refuses is named, with the item.
+#[test]
+fn what_the_vehicle_refuses_is_named() {
+    let refused = |change: &dyn Fn(&mut Value)| {
+        let mut plan = plan();
+        change(&mut plan);
+        fly(&read(&plan).unwrap()).0.unwrap_err()
+    };
+    assert_eq!(
+        refused(&|plan| plan["mission"]["items"][3]["command"] = json!(183)),
+        "mission: the vehicle refuses it: mission item 3: DO_SET_SERVO unsupported; change it in QGroundControl"
+    );
+    assert_eq!(
+        refused(&|plan| plan["mission"]["items"][4]["params"][5] = json!(at(0.0, 70.0)[1])),
+        "mission: the vehicle refuses it: mission item 4: outside the geofence; change it in QGroundControl"
+    );
+    assert_eq!(
+        refused(&|plan| plan["geoFence"]["circles"][0]["circle"]["center"] = json!(HOME)),
+        "geoFence: the vehicle refuses it: fence item 4: the vehicle is outside; change it in QGroundControl"
+    );
+    assert_eq!(refused(&|plan| plan["mission"]["items"] = json!([])), "the mission has no items; add some");
+}
+
+/// A return lands at a rally point that is nearer than home.
+#[test]
+fn a_return_lands_at_the_nearest_rally_point() {
+    let mut plan = plan();
+    let point = at(10.0, 20.0);
+    plan["rallyPoints"]["points"] = json!([[point[0], point[1], 20.0], [HOME[0] + 1.0, HOME[1], 20.0]]);
+    let plan = read(&plan).unwrap();
+    let scenario = built_in("outdoor").unwrap().read().unwrap();
+    let mut vehicle = ServedVehicle::new(&fleet(&scenario, 1).unwrap()[0], 1, None).unwrap();
+    assert!(vehicle.move_origin(HOME, 30.0));
+    let end = fly_plan(&mut vehicle, &plan, 600.0, &mut |_| ()).unwrap();
+    let place = vehicle.world().plant().motion().position_m;
+    // x is north, y west; the receiver is off by a metre or two.
+    assert!(end.disarmed && (place.x - 10.0).hypot(place.y + 20.0) < 3.0, "{place}");
+}

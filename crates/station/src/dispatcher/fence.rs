@@ -1,0 +1,105 @@
+//! The geofence: what commands, the mission and the guidance see of it.
+
+use super::Dispatcher;
+use crate::services::fence::{FenceMotion, contains, holds, holds_circle, is_clear};
+use crate::services::mission::Surroundings;
+use afbc_control::math::sqrt;
+use afbc_guidance::fence::StopPath;
+use afbc_guidance::{FlightMode, Item, Leg, Order};
+use nalgebra::{Vector2, Vector3};
+
+/// Time between two looks for the nearest rally point \[us\].
+const SAFE_EVERY_US: u64 = 500_000;
+
+impl Dispatcher {
+    /// True if the guidance does not know what there is to know of the fence.
+    pub(crate) fn has_fence_news(&self) -> bool {
+        self.fence.view() != self.fence_given || self.safe_m != self.safe_given_m
+    }
+
+    /// Finds the nearest of home and rally points, now and then, unless a return is on its way there.
+    pub(super) fn find_safe_place(&mut self) {
+        let rally = self.missions.rally();
+        let returns = self.status.guided.mode == FlightMode::Return;
+        if self.now_us.saturating_sub(self.safe_us) < SAFE_EVERY_US
+            || returns
+            || rally.is_empty() && self.safe_m.is_none()
+        {
+            return;
+        }
+        self.safe_us = self.now_us;
+        let Surroundings { chart: Some(chart), here_m: Some(here_m) } = self.surroundings() else { return };
+        let Some(home_m) = self.status.guided.home_m.map(|home_m| home_m.xy()) else { return };
+        let off = |place_m: &Vector2<f32>| (place_m - here_m).norm_squared();
+        let points = rally.iter().map(|item| chart.local([item.x, item.y]));
+        self.safe_m = Some(points.fold(home_m, |best, point| if off(&point) < off(&best) { point } else { best }));
+    }
+
+    /// Returns what plans are checked against.
+    pub(super) fn surroundings(&self) -> Surroundings {
+        let here_m = self.status.state.filter(|_| self.status.is_located()).map(|state| state.position_m.xy());
+        Surroundings { chart: self.status.aux.origin.map(|origin| origin.chart()), here_m }
+    }
+
+    /// Looks at a part of the fence.
+    pub(super) fn watch_fence(&mut self) {
+        let items = self.missions.fence();
+        let (Some(origin), Some(state)) = (&self.status.aux.origin, &self.status.state) else { return };
+        if items.is_empty() {
+            return;
+        }
+        let setpoint = self.status.guided.setpoint.filter(|_| self.status.mode.armed());
+        let (here_m, velocity_m_s) = (state.position_m.xy(), state.velocity_m_s.xy());
+        let acceleration_m_s2 = setpoint.map_or(Vector2::zeros(), |setpoint| setpoint.acceleration_m_s2.xy());
+        let vehicle = StopPath::of_vehicle(&self.braking, here_m, velocity_m_s, acceleration_m_s2);
+        let planned = setpoint.map_or(vehicle, |setpoint| {
+            let (position_m, velocity_m_s) = (setpoint.position_m.xy(), setpoint.velocity_m_s.xy());
+            StopPath::of_setpoint(&self.braking, position_m, velocity_m_s, acceleration_m_s2)
+        });
+        let speed_m_s = sqrt(velocity_m_s.norm_squared());
+        let motion = FenceMotion { here_m, speed_m_s, stops: [vehicle, planned] };
+        self.fence.look(items, &origin.chart(), &motion);
+    }
+
+    /// True if an order would not leave the fence: its place and the straight way there.
+    pub(super) fn fence_allows(&self, order: &Order) -> bool {
+        let items = self.missions.fence();
+        let Surroundings { chart: Some(chart), here_m } = self.surroundings() else { return true };
+        let (Some(here_m), false) = (here_m, items.is_empty()) else { return true };
+        let or_here =
+            |place_m: &Vector3<f32>| place_m.xy().zip_map(&here_m, |to, here| if to.is_nan() { here } else { to });
+        match order {
+            Order::GoTo { position_m, .. } => {
+                let to_m = or_here(position_m);
+                holds(items, &chart, to_m) && is_clear(items, &chart, here_m, to_m)
+            }
+            Order::Orbit { centre_m, radius_m, .. } => holds_circle(items, &chart, or_here(centre_m), radius_m.abs()),
+            Order::Select(FlightMode::Return) if self.status.is_airborne() => self
+                .safe_m
+                .or(self.status.guided.home_m.map(|home_m| home_m.xy()))
+                .is_none_or(|home_m| contains(items, &chart, home_m) && is_clear(items, &chart, here_m, home_m)),
+            _ => true,
+        }
+    }
+
+    /// Returns an item of the mission, without its place if that is outside the fence: so the guidance refuses it.
+    pub(super) fn fenced(&self, mut leg: Leg) -> Leg {
+        let items = self.missions.fence();
+        let Some(chart) = self.status.aux.origin.filter(|_| !items.is_empty()).map(|origin| origin.chart()) else {
+            return leg;
+        };
+        match &mut leg.item {
+            Item::Waypoint { position_m: place_m, .. } | Item::Turns { centre_m: place_m, .. }
+                if !holds(items, &chart, place_m.xy()) =>
+            {
+                *place_m = Vector3::repeat(f32::NAN);
+            }
+            // A landing without a place would be here.
+            Item::Land { position_m } if !position_m.x.is_nan() && !holds(items, &chart, position_m.xy()) => {
+                *position_m = Vector3::repeat(f32::INFINITY);
+            }
+            _ => (),
+        }
+        leg
+    }
+}

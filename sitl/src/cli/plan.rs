@@ -1,0 +1,75 @@
+//! `sitl fly PLAN.plan`: a plan of QGroundControl.
+
+use super::serve::unwritten;
+use super::terminal::{Failure, print, say};
+use super::vehicle::OnVehicle;
+use afbc_hil::{LogFile, UlogFiles};
+use afbc_serve::{QgcPlan, ServedVehicle, fleet, fly_plan};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+/// What it is flown in: place, weather and instruments.
+const SCENARIO: &str = "outdoor";
+/// Longest flight \[s\].
+const LONGEST_S: f64 = 3600.0;
+
+/// A plan to be flown.
+pub(super) struct PlanFlight {
+    pub(super) path: PathBuf,
+    pub(super) on: OnVehicle,
+    pub(super) duration: Option<f64>,
+    pub(super) exact_log: Option<PathBuf>,
+    pub(super) ulog: Option<PathBuf>,
+}
+
+/// True if a path names a plan of QGroundControl.
+pub(super) fn is_plan(path: &Path) -> bool {
+    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("plan"))
+}
+
+impl PlanFlight {
+    /// Flies it, with mission, geofence and rally points; exits with 1 if the mission has not been completed.
+    pub(super) fn run(self) -> Result<ExitCode, Failure> {
+        let file = self.path.display().to_string();
+        let text = std::fs::read_to_string(&self.path).map_err(|error| format!("{file}: {error}"))?;
+        let plan = QgcPlan::read(&file, &text)?;
+        let scenario = afbc_scenario::built_in(SCENARIO).ok_or("the scenario is missing")?.read()?;
+        let scenario = self.on.put(scenario)?;
+        // On the ground.
+        let stands = fleet(&scenario, 1)?.pop().ok_or("there is no vehicle")?;
+        let mut vehicle = ServedVehicle::new(&stands, 1, None)?;
+        if let Some((place, altitude_m)) = plan.home
+            && !vehicle.move_origin(place, altitude_m.unwrap_or(0.0))
+        {
+            return Err(format!("{file}: plannedHomePosition: it is at a pole; plan elsewhere").into());
+        }
+        if let Some(path) = &self.exact_log {
+            vehicle.record(LogFile::create(path).map_err(|error| unwritten(path, &error))?);
+        }
+        if let Some(path) = &self.ulog {
+            vehicle.log(UlogFiles::create(path)?);
+        }
+        let end = fly_plan(&mut vehicle, &plan, self.duration.unwrap_or(LONGEST_S), &mut |line| say(line));
+        vehicle.end_log()?;
+        let end = end.map_err(|problem| format!("{file}: {problem}"))?;
+        let how = match (end.complete || end.reached.contains(&last(&plan)), end.disarmed) {
+            (true, true) => "complete, on the ground",
+            (true, false) => "complete, in hold",
+            (false, true) => "not complete: it has landed",
+            (false, false) => "not complete within the time; give it more by --duration",
+        };
+        let (items, reached) = (plan.mission.len(), end.reached.len());
+        let fence = plan.fence.len();
+        print(&format!(
+            "{file}: {items} items, {fence} of the geofence, {} rally points; {reached} items reached in {:.1} s: {how}\n",
+            plan.rally.len(),
+            end.flight_s
+        ))?;
+        Ok(ExitCode::from(u8::from(how.starts_with("not"))))
+    }
+}
+
+/// Returns the number of the last item.
+fn last(plan: &QgcPlan) -> u16 {
+    plan.mission.len().saturating_sub(1) as u16
+}
