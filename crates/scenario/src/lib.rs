@@ -4,6 +4,7 @@
 //! control law of the one list of laws, with its gains. Nothing flies here: that is `afbc-sim`.
 #![forbid(unsafe_code)]
 
+mod any_controller;
 mod built_in;
 pub mod case;
 pub mod contender;

@@ -244,7 +244,7 @@ fn whatever_is_ordered_the_vehicle_stays_inside() {
         }
         flown.upload(areas);
         for _ in 0..15 {
-            if !flown.server.vehicles()[0].world().plant().telemetry().is_some_and(|it| !it.on_ground) {
+            if flown.server.vehicles()[0].world().plant().telemetry().is_none_or(|it| it.on_ground) {
                 flown.take_off(2_000);
             }
             flown.ask_for_anything(&mut random);

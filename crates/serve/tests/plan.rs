@@ -1,5 +1,5 @@
 //! Plans of QGroundControl: what is read, what is refused, and a flight.
-#![allow(clippy::indexing_slicing, clippy::unwrap_used, missing_docs, reason = "tests")]
+#![allow(clippy::indexing_slicing, clippy::type_complexity, clippy::unwrap_used, missing_docs, reason = "tests")]
 
 use afbc_scenario::built_in;
 use afbc_serve::{PlanEnd, QgcPlan, ServedVehicle, fleet, fly_plan};

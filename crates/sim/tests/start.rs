@@ -33,7 +33,7 @@ fn contenders_do_not_feel_who_flew_before() {
             let (mut alone, mut after): (Vec<_>, Vec<_>) = (Vec::new(), Vec::new());
             let of = |motion: Motion, estimated: Option<Estimated>| (motion, estimated);
             fly(&scenario, &contender, |sample| alone.push(of(sample.motion, sample.estimated))).unwrap();
-            start.fly(&contender, |sample| after.push(of(sample.motion, sample.estimated))).unwrap();
+            start.fly(&contender, &mut |sample| after.push(of(sample.motion, sample.estimated))).unwrap();
             assert_eq!(alone, after, "{name}, {kind:?}");
             assert_eq!(alone.len(), 301);
             ends.extend(alone.last().map(|(motion, _)| *motion));

@@ -117,7 +117,7 @@ macro_rules! laws {
             }
         }
 
-        any_controller::any_controller! {
+        controllers::any_controller! {
             /// AFBC under its monitor, as on board.
             Monitored(Guarded<N>),
             $( #[doc = concat!("See [`ControllerKind::", stringify!($Law), "`].")] $Law($Controller), )*

@@ -1,6 +1,6 @@
 //! The one list of control laws.
 
-mod any_controller;
+mod controllers;
 mod declare;
 mod gains;
 #[cfg(test)]
@@ -23,7 +23,9 @@ declare::laws! {
         gains: PerAxis<adaptive::Gains>,
         tuned: |afbc| *afbc,
         by_hand: by_hand(),
-        controller: Controller<Adaptive, N>, |vehicle, settings, gains| Controller::new(vehicle, settings, Adaptive::new(gains)?),
+        controller: Controller<Adaptive, N>, |vehicle, settings, gains| {
+            Controller::new(vehicle, settings, Adaptive::new(gains)?)
+        },
     }
     /// Classical backstepping (16), (21).
     Backstepping {

@@ -1,11 +1,4 @@
-//! One type for the controllers of all laws.
-
-use super::{AnyController, AnyControllerMemory};
-use afbc::AdaptiveEstimate;
-use afbc::Guarded;
-use afbc::monitor::Norm;
-use afbc_onboard::FlightLaw;
-use afbc_types::{Axis, PerAxis};
+//! The macro that makes one type of the controllers of all laws.
 
 /// Defines the controller of any law, and its memory, from one line per law.
 macro_rules! any_controller {
@@ -107,24 +100,3 @@ macro_rules! any_controller {
 }
 
 pub(super) use any_controller;
-
-impl<const N: usize> AnyControllerMemory<N> {
-    /// Returns AFBC's estimates, with or without its monitor; none of another law.
-    #[inline(always)]
-    pub fn estimates(&self) -> Option<PerAxis<AdaptiveEstimate>> {
-        match self {
-            AnyControllerMemory::Monitored(memory) => Some(memory.estimates()),
-            AnyControllerMemory::Afbc(memory) => Some(memory.estimates),
-            _ => None,
-        }
-    }
-}
-
-impl<const N: usize> FlightLaw<N> for AnyController<N> {
-    fn norms(memory: &AnyControllerMemory<N>) -> Option<(Axis, Norm)> {
-        match memory {
-            AnyControllerMemory::Monitored(memory) => Guarded::norms(memory),
-            _ => None,
-        }
-    }
-}
