@@ -5,6 +5,7 @@ there. Their package `mavsdk` is `mavsdk_grpc` here, which has the same API; por
 a time. Without arguments the quick ones run, those in QUICK; `all` takes every one, names some."""
 
 import asyncio
+import contextlib
 import os
 import pathlib
 import signal
@@ -101,7 +102,8 @@ async def run(name):
         if name not in ENDLESS:
             printed.append("ENDED AFTER ITS TIME")
     reading.cancel()
-    os.killpg(process.pid, signal.SIGKILL)
+    with contextlib.suppress(ProcessLookupError):
+        os.killpg(process.pid, signal.SIGKILL)
     texts = [line for line in served.said if "vehicle 1: " in line]
     code = served.quit()
     told = "\n".join(printed)
