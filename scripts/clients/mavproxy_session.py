@@ -1,6 +1,7 @@
 """MAVProxy without its windows: parameters, modes, arm, takeoff, land, all typed at its prompt."""
 
 import os
+import pathlib
 import queue
 import subprocess
 import sys
@@ -12,7 +13,9 @@ from served import PATIENCE, Served, Session
 
 OPTIONS = os.environ.get("SERVE_OPTIONS", "").split()
 # Those that need neither windows nor numerical libraries.
-MODULES = "param,cmdlong,arm,mode,link,output,signing,wp,fence,rally"
+MODULES = "param,cmdlong,arm,mode,link,output,signing,wp,fence,rally,log,ftp"
+# A log of an earlier flight, of no even number of messages.
+LOG = bytes(place * 7919 >> 3 & 0xFF for place in range(50_001))
 
 
 class Prompt:
@@ -68,7 +71,10 @@ class Prompt:
 
 
 def main():
-    session, served = Session("mavproxy"), Served(*OPTIONS)
+    logs, down = pathlib.Path(tempfile.mkdtemp()), pathlib.Path(tempfile.mkdtemp())
+    (logs / "log001.ulg").write_bytes(LOG)
+    os.utime(logs / "log001.ulg", (1_700_000_000, 1_700_000_000))
+    session, served = Session("mavproxy"), Served("--ulog", str(logs), *OPTIONS)
     prompt = Prompt(served.station)
 
     def typed(line, *words, seconds=15, refused=("UNSUPPORTED", "DENIED", "FAILED", "Unknown")):
@@ -94,6 +100,18 @@ def main():
     # Silent if it is done.
     prompt.type("param set MIS_TAKEOFF_ALT 3")
     repeated("param show MIS_TAKEOFF_ALT", "MIS_TAKEOFF_ALT  3")
+    typed("log list", "Log 0  numLogs 2 lastLog 1 size 50001")
+    typed(f"log download 0 {down / 'log'}", "Finished downloading", seconds=30)
+    typed("ftp list /log", "log001.ulg")
+    typed(f"ftp get /log/log001.ulg {down / 'file'}", "Wrote 50001", "bytes in", seconds=30)
+    for name in ("log", "file"):
+        # It is written a little later than it is told.
+        for _ in range(20):
+            if (down / name).read_bytes() == LOG:
+                break
+            time.sleep(0.1)
+        else:
+            session.fail("downloads", f"{name} is not what the log is")
     # Modes by number: hold, main mode 4 and sub mode 3, in parts and whole. ArduPilot's names mean nothing here.
     typed("long DO_SET_MODE 1 4 3 0 0 0 0", "DO_SET_MODE: ACCEPTED")
     typed("mode 50593792", "DO_SET_MODE: ACCEPTED")

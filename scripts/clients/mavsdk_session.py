@@ -187,7 +187,6 @@ async def run():
     await session.step("health all ok", first(drone.telemetry.health_all_ok(), lambda ok: ok), 60)
     await session.step("parameters", read_all(drone), 30)
     await session.step("logs", refused(drone.log_files.get_entries()), 2)
-    await session.step("files", refused(drone.ftp.list_directory("/")), 2)
     await session.step("a file", refused(drone.ftp.are_files_identical(__file__, "/none")), 2)
     await session.step("set a parameter", set_one(drone, "MIS_TAKEOFF_ALT", 4.0))
     served.quit()

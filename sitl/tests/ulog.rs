@@ -49,6 +49,21 @@ fn served_vehicles_have_a_log_each() {
     assert!(said.starts_with("one.ulg: exists already") && said.lines().count() == 1, "{said}");
 }
 
+/// In a folder, each start has the next file, and each of several vehicles a folder.
+#[test]
+fn a_folder_gathers_the_logs() {
+    let folder = folder("gathered");
+    let logs = folder.join("logs");
+    fs::create_dir(&logs).unwrap();
+    fs::write(logs.join("log007.ulg"), b"an older one").unwrap();
+    let serve = [&SERVE[..], &["--ulog", "logs", "--do", "at 1 quit"]].concat();
+    (0..2).for_each(|_| drop(succeeds(&sitl(&folder, &serve))));
+    assert!(is_log(&logs.join("log008.ulg")) && is_log(&logs.join("log009.ulg")));
+    assert_eq!(fs::read(logs.join("log007.ulg")).unwrap(), b"an older one");
+    succeeds(&sitl(&folder, &[&serve[..], &["--vehicles", "2"]].concat()));
+    assert!(is_log(&logs.join("1/log001.ulg")) && is_log(&logs.join("2/log001.ulg")));
+}
+
 /// A file that cannot grow, as on a full disc, costs the log and not the vehicle, and is told once.
 #[cfg(unix)]
 #[test]

@@ -2,20 +2,20 @@
 //! to be told again. So many faults begin in the same instant of one flight.
 
 use crate::check::check;
-use crate::fly::{Flight, TICK_NS};
+use crate::fly::{Flight, TICK_NS, images};
 use crate::machine::{Machine, quiet_usb};
 use crate::pilot::Pilot;
 use crate::pins::MotorPins;
 use crate::wire::Wire;
+use crate::world::at_the_place;
 use afbc_scenario::{Scenario, load};
-use rigless::edge::Edge;
 use rigless::emulator::{Driver, Finished, Host, Settled, Start, Stop, run};
 use rigless::image::{Image, digest};
-use rigless::machine::matekh743::MatekH743;
 use rigless::session::Session;
 use rigless::snapshot::{Error as SnapshotError, Reader, Snapshot, Store, Writer, take};
 use rigless::time::VirtualNanos;
 use std::error::Error;
+use std::marker::PhantomData;
 use std::path::Path;
 
 /// How long it has hovered [ms].
@@ -58,11 +58,12 @@ impl Link {
 }
 
 /// A vehicle in hover.
-pub struct Aloft {
+pub struct Aloft<M> {
     images: Vec<Image>,
     scenario: Scenario,
     snapshot: Snapshot,
     past: Past,
+    machine: PhantomData<M>,
 }
 
 /// Flies until the vehicle hovers.
@@ -74,12 +75,13 @@ struct Climb {
     taken: Option<Result<Vec<u8>, SnapshotError>>,
 }
 
-impl Driver<MatekH743> for Climb {
-    fn on_settled(&mut self, session: &mut Session<MatekH743>, host: &mut dyn Host, settled: Settled) {
+impl<M: Machine> Driver<M> for Climb {
+    fn on_settled(&mut self, session: &mut Session<M>, host: &mut dyn Host, settled: Settled) {
         self.flight.on_settled(session, host, settled);
     }
 
-    fn on_stop(&mut self, session: &mut Session<MatekH743>, stop: Stop, host: &mut dyn Host) -> Option<VirtualNanos> {
+    fn on_stop(&mut self, session: &mut Session<M>, stop: Stop, host: &mut dyn Host) -> Option<VirtualNanos> {
+        self.flight.hear_pulses(session);
         quiet_usb(session, stop.at);
         let pilot = &mut self.flight.pilot;
         self.past.0.push((pilot.throttles().to_vec(), self.link.pass()));
@@ -95,31 +97,32 @@ impl Driver<MatekH743> for Climb {
     }
 }
 
-fn flight(scenario: &Scenario, link: &Link, prints: bool) -> Result<Flight, Box<dyn Error>> {
+fn flight<M: Machine>(scenario: &Scenario, link: &Link, prints: bool) -> Result<Flight, Box<dyn Error>> {
     let pilot = Pilot::new(scenario, link.pilot.clone())?;
     Ok(Flight {
         pilot: if prints { pilot } else { pilot.quiet() },
         hearer: None,
         receiver: None,
-        pins: MotorPins::new(MatekH743::SIGNAL, scenario.rotors.len()),
+        pins: MotorPins::new(M::SIGNAL, scenario.rotors.len()),
     })
 }
 
-fn board(link: &Link) -> Result<Box<MatekH743>, Box<dyn Error>> {
-    let mut board = Box::new(MatekH743::new()?);
+fn board<M: Machine>(link: &Link) -> Result<Box<M>, Box<dyn Error>> {
+    let mut board = M::built()?;
+    board.sense(&at_the_place());
     check(board.attach_link(link.board.clone()), "the link is wired")?;
     Ok(board)
 }
 
-impl Aloft {
+impl<M: Machine> Aloft<M> {
     /// Flies a scenario until the vehicle hovers, and keeps that in a file; or takes it from there, if it is of this
     /// image.
     pub fn of(image: &Path, scenario: &Path, kept: &Path) -> Result<Self, Box<dyn Error>> {
-        let images = vec![Image::read(image, None)?];
+        let images = images::<M>(image, &[])?;
         let scenario = load(scenario)?;
         if let Ok(snapshot) = Snapshot::read(kept) {
-            let mut aloft = Aloft { images, scenario, snapshot, past: Past::default() };
-            let mut session = Session::new(board(&Link::default())?, 0, VirtualNanos(0))?;
+            let mut aloft = Aloft { images, scenario, snapshot, past: Past::default(), machine: PhantomData };
+            let mut session = Session::new(board::<M>(&Link::default())?, 0, VirtualNanos(0))?;
             let firmware = digest(&aloft.images, None);
             if aloft.snapshot.restore(&mut session, &firmware, &mut aloft.past).is_ok() {
                 return Ok(aloft);
@@ -128,35 +131,35 @@ impl Aloft {
         }
         let link = Link::default();
         let climb = Climb {
-            flight: flight(&scenario, &link, true)?,
+            flight: flight::<M>(&scenario, &link, true)?,
             link: link.clone(),
             past: Past::default(),
             firmware: digest(&images, None),
             taken: None,
         };
-        let session = Session::new(board(&link)?, 0, VirtualNanos(TICK_NS))?;
+        let session = Session::new(board::<M>(&link)?, 0, VirtualNanos(TICK_NS))?;
         let Climb { flight, taken, past, .. } = run(session, &Start::new(&images), climb)?.driver;
         let Some(taken) = taken else {
             flight.pilot.verdict()?;
             return Err("it does not hover".into());
         };
         std::fs::write(kept, taken?)?;
-        Ok(Aloft { images, scenario, snapshot: Snapshot::read(kept)?, past })
+        Ok(Aloft { images, scenario, snapshot: Snapshot::read(kept)?, past, machine: PhantomData })
     }
 
     /// Goes on from there with what `driver` makes of the flight and its link.
-    pub fn resume<R: Driver<MatekH743> + 'static>(
+    pub fn resume<R: Driver<M> + 'static>(
         &self,
         driver: impl FnOnce(Flight, Link, u64) -> R,
-    ) -> Result<Finished<MatekH743, R>, Box<dyn Error>> {
+    ) -> Result<Finished<M, R>, Box<dyn Error>> {
         let link = Link::default();
-        let mut flight = flight(&self.scenario, &link, false)?;
+        let mut flight = flight::<M>(&self.scenario, &link, false)?;
         for (ms, (throttles, bytes)) in (1..).zip(&self.past.0) {
             flight.pilot.command(throttles.iter().copied().map(Some));
             link.pilot.exchange(bytes);
             check(flight.pilot.advance(ms).is_some(), "the plant's past is as it was")?;
         }
-        let mut session = Session::new(board(&link)?, 0, VirtualNanos(0))?;
+        let mut session = Session::new(board::<M>(&link)?, 0, VirtualNanos(0))?;
         let firmware = digest(&self.images, None);
         let resume = self.snapshot.restore(&mut session, &firmware, &mut Past::default())?;
         let now_ns = self.snapshot.stop().at.0;

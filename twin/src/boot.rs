@@ -2,13 +2,12 @@
 //! ticks at 1 kHz, feeds its watchdog, drives its motor outputs and talks.
 
 use crate::check::check;
-use crate::kept::{PWM400, parameters};
+use crate::fly::images;
 use crate::machine::{Machine, Signal};
 use crate::wire::Wire;
 use afbc_link::telemetry::Telemetry;
 use afbc_link::{Address, Decoder, Downlink};
 use rigless::emulator::{AccessKind, Driver, Host, Settled, Start, Stop, run};
-use rigless::image::Image;
 use rigless::session::Session;
 use rigless::soc::Width;
 use rigless::time::VirtualNanos;
@@ -83,11 +82,7 @@ pub fn boot<M: Machine>(image: &Path) -> Result<(), Box<dyn Error>> {
     let wire = Wire::default();
     check(board.attach_link(wire.clone()), "the link is wired")?;
     let seen = Seen { feeds: Vec::new(), pulses: vec![0; M::MOTORS.len()], looks: 0, wrong: Vec::new(), store: 0 };
-    let mut images = vec![Image::read(image, None)?];
-    if M::SIGNAL == Signal::Pwm400 {
-        let kept = parameters(&[("MOT_PROTOCOL", PWM400)], M::STORE_WORD)?;
-        images.push(Image::new(Path::new("parameters"), kept, Some(M::STORE))?);
-    }
+    let images = images::<M>(image, &[])?;
     let finished = run(Session::new(board, 0, VirtualNanos(LOOK_FROM))?, &Start::new(&images), seen)?;
 
     for told in finished.session.told() {

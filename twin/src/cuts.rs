@@ -5,6 +5,7 @@ use crate::check::check;
 use crate::kept::Changes;
 use crate::machine::{Machine, quiet_usb};
 use crate::random::Random;
+use crate::trouble::Patient;
 use crate::wire::Wire;
 use afbc_link::{Address, Decoder, Downlink, FRAME_MAX, ParameterName, ParameterRequest, Sender, Uplink};
 use rigless::emulator::{AccessKind, Driver, Host, Settled, Start, Stop, run};
@@ -33,6 +34,10 @@ const START: u64 = 1 << 7;
 const SECTOR_AT: u32 = 8;
 /// Times of the run [ns].
 const MS: u64 = 1_000_000;
+/// Mean time between two cuts while a word is programmed, most of which are not kept.
+const PROGRAM_APART_NS: u64 = 2_000;
+/// Time after which a word is programmed.
+const PROGRAMS_NS: u64 = 150_000;
 /// When the parameter is set, and when it is over.
 const SET_NS: u64 = 150 * MS;
 const WRITES_NS: u64 = 30 * MS;
@@ -60,18 +65,25 @@ struct Cut {
     during: During,
     wire: Wire,
     random: Random,
-    /// Mean time between two cuts in a program operation, and in an erase [ns].
-    apart_ns: [u64; 2],
+    /// Mean time between two cuts in an erase [ns].
+    erase_apart_ns: u64,
     pending: Option<Pending>,
-    begun: bool,
+    /// When the pending operation began, and when the next cut is [ns].
+    since_ns: u64,
+    next_ns: u64,
     is_set: bool,
-    last_ns: u64,
-    /// Time, and what the flash holds.
-    kept: Vec<(u64, Vec<u8>)>,
+    kept: Vec<Kept>,
+}
+
+/// What the flash held when the power was cut.
+struct Kept {
+    at_ns: u64,
+    in_erase: bool,
+    bytes: Vec<u8>,
 }
 
 impl Cut {
-    fn note(&mut self, address: u64, value: u64) {
+    fn note(&mut self, address: u64, value: u64, now_ns: u64) {
         if address == CR2 && value & START != 0 {
             self.pending = Some(Pending::Erase(MatekH743::STORE + (value >> SECTOR_AT & 7) * SECTOR));
         } else if (MatekH743::STORE..MatekH743::STORE + BYTES).contains(&address) {
@@ -87,7 +99,16 @@ impl Cut {
         } else {
             return;
         }
-        self.begun = true;
+        self.since_ns = now_ns;
+    }
+
+    /// True while an operation may not have ended.
+    fn is_busy(&self, now_ns: u64) -> bool {
+        match self.pending {
+            None => false,
+            Some(Pending::Program(..)) => now_ns < self.since_ns + PROGRAMS_NS,
+            Some(Pending::Erase(_)) => true,
+        }
     }
 
     /// Keeps what the flash holds if the power is cut now: of an operation that has not ended, some of its bits.
@@ -121,7 +142,8 @@ impl Cut {
             }
             None => (),
         }
-        self.kept.push((now_ns, bytes));
+        let in_erase = matches!(self.pending, Some(Pending::Erase(_)));
+        self.kept.push(Kept { at_ns: now_ns, in_erase, bytes });
         Ok(())
     }
 
@@ -136,26 +158,26 @@ impl Driver<MatekH743> for Cut {
         let now_ns = match settled {
             Settled::Access { access, value } => {
                 if access.kind == AccessKind::Write {
-                    self.note(access.address, value);
+                    self.note(access.address, value, access.virtual_time.0);
                 }
                 access.virtual_time.0
             }
             Settled::Stop(stop) => stop.at.0,
             _ => return,
         };
-        if !self.begun {
+        if !self.is_busy(now_ns) {
             return;
         }
-        if now_ns >= self.last_ns {
-            if self.last_ns > 0 && self.cut(host, now_ns).is_err() {
-                self.begun = false;
+        if now_ns >= self.next_ns {
+            if self.cut(host, now_ns).is_err() {
+                self.pending = None;
             }
-            let [program_ns, erase_ns] = self.apart_ns;
-            let apart_ns = if let Some(Pending::Erase(_)) = self.pending { erase_ns } else { program_ns };
-            self.last_ns = now_ns + 1 + self.random.below(2 * apart_ns);
+            let in_erase = matches!(self.pending, Some(Pending::Erase(_)));
+            let apart_ns = if in_erase { self.erase_apart_ns } else { PROGRAM_APART_NS };
+            self.next_ns = now_ns + 1 + self.random.below(2 * apart_ns);
         }
         if session.pause().is_none() {
-            session.pause_at(Some(VirtualNanos(self.last_ns)));
+            session.pause_at(Some(VirtualNanos(self.next_ns)));
         }
     }
 
@@ -182,7 +204,7 @@ struct Starts {
     wire: Wire,
     random: Random,
     decoder: Decoder<Downlink>,
-    left: std::vec::IntoIter<(u64, Vec<u8>)>,
+    left: std::vec::IntoIter<Kept>,
     /// When the cut was, and when it was started again [ns].
     cut_ns: u64,
     started_ns: u64,
@@ -195,18 +217,18 @@ struct Starts {
 impl Starts {
     /// Starts with the next flash, and with noise in all memories; none after the last.
     fn next(&mut self, session: &mut Session<MatekH743>, stop: Stop, host: &mut dyn Host) -> Option<VirtualNanos> {
-        let (cut_ns, bytes) = self.left.next()?;
+        let Kept { at_ns, bytes, .. } = self.left.next()?;
         for (address, cells) in (MatekH743::STORE..).step_by(8).zip(bytes.as_chunks::<8>().0) {
             let value = u64::from_le_bytes(*cells);
             if host.read(address, Width::W64).ok()? != value {
                 host.program(address, Width::W64, value).ok()?;
             }
         }
-        lose_memory(session, host, &mut self.random);
+        session.lose_memory(host, &mut self.random);
         session.reset_by_pin(stop.at, stop.instruction_count, host);
         self.wire.exchange(&[]);
         self.wire.take();
-        (self.cut_ns, self.started_ns, self.values) = (cut_ns, stop.at.0, [None; 2]);
+        (self.cut_ns, self.started_ns, self.values) = (at_ns, stop.at.0, [None; 2]);
         self.decoder = Decoder::new(STATION);
         Some(VirtualNanos(stop.at.0 + MS))
     }
@@ -241,16 +263,6 @@ impl Driver<MatekH743> for Starts {
     }
 }
 
-/// Fills the memories with noise, as they are after a start.
-pub fn lose_memory(session: &mut Session<MatekH743>, host: &mut dyn Host, random: &mut Random) {
-    let memory = session.mcu().bus().memory().to_vec();
-    for region in memory.iter().filter(|region| region.kind.is_writable()) {
-        for offset in (0..region.size).step_by(8) {
-            let _ = host.write(region.base + offset, Width::W64, random.next());
-        }
-    }
-}
-
 fn padded(name: &str) -> ParameterName {
     std::array::from_fn(|at| name.as_bytes().get(at).copied().unwrap_or(0))
 }
@@ -273,7 +285,7 @@ fn flash(bytes: Vec<u8>) -> Result<Image, Box<dyn Error>> {
 }
 
 /// Starts with each flash, and returns when the power was cut, and the values that are there then.
-fn ask(image: &Image, left: Vec<(u64, Vec<u8>)>, seed: u64) -> Result<Vec<(u64, [Option<f32>; 2])>, Box<dyn Error>> {
+fn ask(image: &Image, left: Vec<Kept>, seed: u64) -> Result<Vec<(u64, [Option<f32>; 2])>, Box<dyn Error>> {
     let wire = Wire::default();
     let session = Session::new(board(&wire)?, 0, VirtualNanos(MS))?;
     let starts = Starts {
@@ -289,14 +301,19 @@ fn ask(image: &Image, left: Vec<(u64, Vec<u8>)>, seed: u64) -> Result<Vec<(u64, 
     Ok(run(session, &Start::new(std::slice::from_ref(image)), starts)?.driver.found)
 }
 
-/// Cuts the power about so many times in each of a write and a start that erases.
+/// Leaves so many of the cuts, as far apart as they were.
+fn thinned(kept: Vec<Kept>, cuts: u64) -> Vec<Kept> {
+    let (all, cuts) = (kept.len(), usize::try_from(cuts).unwrap_or(usize::MAX).clamp(1, kept.len().max(1)));
+    let is_left = |at: usize| (at + 1) * cuts / all > at * cuts / all;
+    kept.into_iter().enumerate().filter(|(at, _)| is_left(*at)).map(|(_, kept)| kept).collect()
+}
+
+/// Cuts the power so many times while the words of a parameter are programmed, and so many times in each of words and
+/// erases of a start that copies and erases.
 pub fn cut_all(image: &Path, seed: u64, cuts: u64) -> Result<(), Box<dyn Error>> {
     let image = Image::read(image, None)?;
     let (name, old, new) = WRITTEN;
-    for (during, apart_ns, what) in [
-        (During::Write, [1_000_000 / cuts.max(1), MS], "a parameter is written"),
-        (During::Erase, [2_000_000 / cuts.max(1), 2_000 * MS / cuts.max(1)], "a start erases"),
-    ] {
+    for (during, what) in [(During::Write, "a parameter is written"), (During::Erase, "a start erases")] {
         let mut before = Changes::new()?;
         before.set(OTHER.0, OTHER.1)?;
         // A sector that is nearly full is copied and erased at the start.
@@ -310,16 +327,18 @@ pub fn cut_all(image: &Path, seed: u64, cuts: u64) -> Result<(), Box<dyn Error>>
             during,
             wire,
             random: Random::new(seed, what),
-            apart_ns,
+            erase_apart_ns: 1_000 * MS / cuts.max(1),
             pending: None,
-            begun: false,
+            since_ns: 0,
+            next_ns: 0,
             is_set: false,
-            last_ns: 0,
             kept: Vec::new(),
         };
         let images = [image.clone(), flash(before.bytes(WORD as usize)?)?];
         let kept = run(session, &Start::new(&images), cut)?.driver.kept;
-        println!("{what}: {} instants", kept.len());
+        let (erases, programs): (Vec<_>, Vec<_>) = kept.into_iter().partition(|kept| kept.in_erase);
+        println!("{what}: {} instants of words, {} of erases", programs.len(), erases.len());
+        let kept: Vec<_> = thinned(programs, cuts).into_iter().chain(thinned(erases, cuts)).collect();
         let instants = kept.len();
         let (mut olds, mut news, mut wrong) = (0, 0, Vec::new());
         for (now_ns, found) in ask(&image, kept, seed)? {

@@ -2,7 +2,7 @@
 //! board's sensors, motor commands from its pins, a station at its telemetry UART.
 
 use crate::check::check;
-use crate::kept::{PWM400, parameters};
+use crate::kept::{self, PWM400};
 use crate::machine::{Machine, Signal, quiet_usb};
 use crate::pilot::Pilot;
 use crate::pins::MotorPins;
@@ -10,6 +10,7 @@ use crate::same;
 use crate::ublox::{Generation, UbloxPeer};
 use crate::usb_ring::UsbRing;
 use crate::wire::Wire;
+use crate::world::at_the_place;
 use afbc_scenario::load;
 use rigless::emulator::{Driver, Host, Settled, Start, Stop, run};
 use rigless::image::Image;
@@ -43,37 +44,40 @@ pub(crate) struct Flight {
     pub(crate) pins: MotorPins,
 }
 
-/// Flies a scenario, with a receiver of u-blox's if one is given. The exact log, if it is to be kept in a file, must be
-/// flown again with the same result to the last bit.
-pub fn fly<M: Machine>(
-    image: &Path,
-    file: &Path,
-    receiver: Option<Generation>,
-    log: Option<&Path>,
-) -> Result<(), Box<dyn Error>> {
-    let scenario = load(file)?;
+/// What is to be flown.
+pub struct Order<'a> {
+    /// The scenario's file.
+    pub scenario: &'a Path,
+    /// A mission in the place of a hover.
+    pub is_mission: bool,
+    /// A receiver of u-blox's, in the place of the board's own.
+    pub receiver: Option<Generation>,
+    /// Where the exact log is kept.
+    pub log: Option<&'a Path>,
+}
+
+/// Flies what is ordered. The exact log, if it is to be kept in a file, must be flown again with the same result to the
+/// last bit.
+pub fn fly<M: Machine>(image: &Path, order: &Order<'_>) -> Result<(), Box<dyn Error>> {
+    let &Order { scenario, is_mission, receiver, log } = order;
+    let scenario = load(scenario)?;
     let mut board = M::built()?;
+    board.sense(&at_the_place());
     let wire = Wire::default();
     check(board.attach_link(wire.clone()), "the link is wired")?;
-    let mut kept = Vec::new();
-    if M::SIGNAL == Signal::Pwm400 {
-        kept.push(("MOT_PROTOCOL", PWM400));
-    }
     let mut hearer = None;
     if log.is_some() {
-        kept.push(("LOG_PORT", 2.0));
         let wire = Wire::default();
         let is_uart = board.attach_second_link(wire.clone());
         hearer = Some(if is_uart { Hearer::Uart(wire) } else { Hearer::Usb(UsbRing::find(image)?) });
     }
     let receiver = receiver.map(|generation| UbloxPeer::new(generation, M::RECEIVER));
     let pins = MotorPins::new(M::SIGNAL, scenario.rotors.len());
-    let flight = Flight { pilot: Pilot::new(&scenario, wire)?, hearer, receiver, pins };
-    let mut images = vec![Image::read(image, None)?];
-    if !kept.is_empty() {
-        let kept = parameters(&kept, M::STORE_WORD)?;
-        images.push(Image::new(Path::new("parameters"), kept, Some(M::STORE))?);
-    }
+    let pilot = Pilot::new(&scenario, wire)?;
+    let pilot = if is_mission { pilot.touring() } else { pilot };
+    let flight = Flight { pilot, hearer, receiver, pins };
+    let to_log: &[_] = if log.is_some() { &[("LOG_PORT", 2.0)] } else { &[] };
+    let images = images::<M>(image, to_log)?;
     let session = Session::new(board, 0, VirtualNanos(TICK_NS))?;
     let finished = run(session, &Start::new(&images), flight)?;
     for told in finished.session.told() {
@@ -105,6 +109,28 @@ pub fn fly<M: Machine>(
     check(finished.session.resets().is_empty(), "no reset")
 }
 
+impl Flight {
+    /// Takes what pulses say that the pins repeat, if they carry such.
+    pub(crate) fn hear_pulses<M: Machine>(&mut self, session: &mut Session<M>) {
+        if M::SIGNAL == Signal::Pwm400 {
+            self.pins.take_pulses(&session.board_mut().motors());
+            self.pilot.command(self.pins.take());
+        }
+    }
+}
+
+/// Returns the image, and the parameters with these values in the flash beside what the board's motors need.
+pub(crate) fn images<M: Machine>(image: &Path, parameters: &[(&str, f32)]) -> Result<Vec<Image>, Box<dyn Error>> {
+    let pwm = (M::SIGNAL == Signal::Pwm400).then_some(("MOT_PROTOCOL", PWM400));
+    let kept: Vec<_> = pwm.into_iter().chain(parameters.iter().copied()).collect();
+    let mut images = vec![Image::read(image, None)?];
+    if !kept.is_empty() {
+        let kept = kept::parameters(&kept, M::STORE_WORD)?;
+        images.push(Image::new(Path::new("parameters"), kept, Some(M::STORE))?);
+    }
+    Ok(images)
+}
+
 impl<M: Machine> Driver<M> for Flight {
     fn on_settled(&mut self, session: &mut Session<M>, _: &mut dyn Host, settled: Settled) {
         if let Some(receiver) = &self.receiver {
@@ -127,10 +153,7 @@ impl<M: Machine> Driver<M> for Flight {
         if let Some(Hearer::Usb(ring)) = &mut self.hearer {
             ring.drain(host);
         }
-        if M::SIGNAL == Signal::Pwm400 {
-            self.pins.take_pulses(&session.board_mut().motors());
-            self.pilot.command(self.pins.take());
-        }
+        self.hear_pulses(session);
         quiet_usb(session, stop.at);
         let (readings, signals) = self.pilot.advance(stop.at.0 / TICK_NS)?;
         match &self.receiver {

@@ -3,6 +3,7 @@
 
 use crate::pilot::Pilot;
 use crate::wire::Wire;
+use crate::world::at_the_place;
 use afbc_drivers::nmea::NmeaDecoder;
 use afbc_drivers::ublox::DELAY_US;
 use afbc_estimator::Measurement;
@@ -12,15 +13,16 @@ use afbc_onboard::{Aged, Readings};
 use afbc_scenario::load;
 use rigless::chip::nmea::Receiver;
 use rigless::chip::uart::Peer;
-use rigless::machine::flight::{AT_REST, Signals};
+use rigless::machine::flight::Signals;
 use rigless::time::VirtualNanos;
 use std::error::Error;
 use std::path::Path;
 
-/// Flies a scenario.
-pub fn fly(file: &Path) -> Result<(), Box<dyn Error>> {
+/// Flies a scenario, with a mission if wanted.
+pub fn fly(file: &Path, is_mission: bool) -> Result<(), Box<dyn Error>> {
     let wire = Wire::default();
-    let mut pilot = Pilot::new(&load(file)?, wire.clone())?;
+    let pilot = Pilot::new(&load(file)?, wire.clone())?;
+    let mut pilot = if is_mission { pilot.touring() } else { pilot };
     let (mut host, mut gnss) = (Host::new()?, Gnss::new());
     let (mut now_ms, mut bytes) = (0, Vec::new());
     while let Some((mut readings, signals)) = pilot.advance(now_ms) {
@@ -57,7 +59,7 @@ impl Gnss {
         let mut aids: Vec<_> = readings.aids.into_iter().flatten().collect();
         aids.retain(|aid| !matches!(aid.value, Measurement::Gnss { .. }));
         // None before the first position.
-        for _ in 0..if signals.position == AT_REST.position { 0 } else { 4 } {
+        for _ in 0..if signals.position == at_the_place().position { 0 } else { 4 } {
             let Some(byte) = self.receiver.transmit(VirtualNanos(now_ms * 1_000_000)) else { break };
             if now_ms - self.last_ms > 20 {
                 self.began_ms = now_ms;

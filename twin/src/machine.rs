@@ -1,13 +1,14 @@
 //! The boards: what of each is to be known to look at it from outside, and to put a world around it.
 
+use crate::impairments::Impairments;
 use crate::wire::Wire;
 use rigless::chip::nmea;
-use rigless::chip::uart::Peer;
+use rigless::chip::uart::{Errors, Peer};
 use rigless::edge::Edge;
 use rigless::machine::Board;
 use rigless::machine::flight::{Actuate, Actuator, Signals};
-use rigless::machine::matekh743::MatekH743;
-use rigless::machine::pixracer::Pixracer;
+use rigless::machine::matekh743::{self, MatekH743};
+use rigless::machine::pixracer::{self, Pixracer};
 use rigless::mcu::Operate;
 use rigless::session::Session;
 use rigless::soc::{Error, Width};
@@ -59,6 +60,10 @@ pub trait Machine: Board + Edge<Signals = Signals> + Sized + 'static {
     const SIGNAL: Signal;
     /// The divider of the GNSS receiver's UART.
     const RECEIVER: Divider;
+    /// Its inertial sensors, in the order of the firmware, by their places among [`Edge::CHIPS`].
+    const IMUS: &'static [usize];
+    /// Interrupts of the UARTs of the first link and the GNSS receiver.
+    const UART_INTERRUPTS: [u16; 2];
 
     /// What sensors, at a higher priority, may delay a tick by \[ns\]: most while IMUs are set up, at the start, and
     /// after a second in which nothing moves, as in `boot`, again.
@@ -87,6 +92,12 @@ pub trait Machine: Board + Edge<Signals = Signals> + Sized + 'static {
     /// Hangs a GNSS receiver on its UART, in the place of the one that was there.
     fn attach_receiver(&mut self, receiver: Box<dyn Peer>);
 
+    /// Lets this be wrong with its parts, and nothing else.
+    fn impair(&mut self, impairments: &Impairments);
+
+    /// Returns what is wrong with the wire of the first link to the board.
+    fn link_errors(&mut self) -> &mut Errors;
+
     /// Feels the world, with a receiver of its own kind, which the board tells what it feels.
     fn sense_with_own_receiver(&mut self, signals: &Signals) {
         self.attach_receiver(Box::new(nmea::Receiver::new()));
@@ -109,6 +120,9 @@ impl Machine for MatekH743 {
     ]);
     /// USART2 (RM0433, 48.8.5).
     const RECEIVER: Divider = Divider { register: 0x4000_440C, clock_hz: 100_000_000 };
+    const IMUS: &'static [usize] = &[0, 1];
+    /// UART7 and USART2 (RM0433, table 147).
+    const UART_INTERRUPTS: [u16; 2] = [82, 38];
     const JITTER: u64 = 150_000;
     const BATTERY_MV: Option<u16> = Some(16_800);
     const UNMAPPED: &[u64] = &[];
@@ -133,6 +147,30 @@ impl Machine for MatekH743 {
     fn attach_receiver(&mut self, receiver: Box<dyn Peer>) {
         self.mcu.usart[1].attach_boxed(receiver);
     }
+
+    fn impair(&mut self, impairments: &Impairments) {
+        let Impairments { imus: [first, second], barometer, compass, receiver } = *impairments;
+        self.condition(&matekh743::Conditions {
+            icm42688p_silent: first.silent,
+            icm42688p_rate: first.rate,
+            icm42688p_acceleration: first.force,
+            icm42605_silent: second.silent,
+            icm42605_rate: second.rate,
+            icm42605_acceleration: second.force,
+            dps310_silent: barometer.silent,
+            dps310_pressure: barometer.pressure,
+            qmc5883l_silent: compass.silent,
+            qmc5883l_field: compass.field,
+            gps_silent: receiver.silent,
+            gps_noise_errors: receiver.noise_errors,
+            gps_framing_errors: receiver.framing_errors,
+        });
+    }
+
+    /// UART7.
+    fn link_errors(&mut self) -> &mut Errors {
+        self.mcu.usart[6].errors_mut()
+    }
 }
 
 impl Machine for Pixracer {
@@ -145,6 +183,10 @@ impl Machine for Pixracer {
     const SIGNAL: Signal = Signal::Pwm400;
     /// UART4 (RM0090, 30.6.3), on APB1.
     const RECEIVER: Divider = Divider { register: 0x4000_4C08, clock_hz: 42_000_000 };
+    /// ICM-20608-G and MPU-9250.
+    const IMUS: &'static [usize] = &[0, 1];
+    /// USART2 and UART4 (RM0090, table 63).
+    const UART_INTERRUPTS: [u16; 2] = [38, 52];
     /// Two IMUs on one SPI.
     const JITTER: u64 = 350_000;
     const BATTERY_MV: Option<u16> = None;
@@ -168,6 +210,31 @@ impl Machine for Pixracer {
     /// UART4.
     fn attach_receiver(&mut self, receiver: Box<dyn Peer>) {
         self.mcu.usart[6].attach_boxed(receiver);
+    }
+
+    fn impair(&mut self, impairments: &Impairments) {
+        let Impairments { imus: [first, second], barometer, compass, receiver } = *impairments;
+        self.condition(&pixracer::Conditions {
+            icm20608_silent: first.silent,
+            icm20608_rate: first.rate,
+            icm20608_acceleration: first.force,
+            mpu9250_silent: second.silent,
+            mpu9250_rate: second.rate,
+            mpu9250_acceleration: second.force,
+            lis3mdl_silent: compass.silent,
+            lis3mdl_field: compass.field,
+            ms5611_silent: barometer.silent,
+            ms5611_pressure: barometer.pressure,
+            gps_silent: receiver.silent,
+            gps_noise_errors: receiver.noise_errors,
+            gps_framing_errors: receiver.framing_errors,
+            ..pixracer::Conditions::default()
+        });
+    }
+
+    /// USART2.
+    fn link_errors(&mut self) -> &mut Errors {
+        self.mcu.usart[1].errors_mut()
     }
 }
 

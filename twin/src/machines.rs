@@ -1,44 +1,58 @@
 //! The list of machines.
 
-/// The boards.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum MachineName {
-    MatekH743,
-    Pixracer,
-    SpeedyBeeF405V4,
+/// Declares the boards: name on the command line, and type.
+macro_rules! machines {
+    ($count:literal: $($name:ident $text:literal $machine:ty,)+) => {
+        /// The boards.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        pub enum MachineName {
+            $($name,)+
+        }
+
+        impl MachineName {
+            /// All of them.
+            pub const ALL: [Self; $count] = [$(MachineName::$name),+];
+
+            /// Returns its name on the command line.
+            pub const fn name(self) -> &'static str {
+                match self {
+                    $(MachineName::$name => $text,)+
+                }
+            }
+        }
+
+        $(pub type $name = $machine;)+
+    };
 }
 
-impl MachineName {
-    /// All of them.
-    pub const ALL: [Self; 3] = [MachineName::MatekH743, MachineName::Pixracer, MachineName::SpeedyBeeF405V4];
-
-    /// Returns its name on the command line.
-    pub const fn name(self) -> &'static str {
-        match self {
-            MachineName::MatekH743 => "matekh743",
-            MachineName::Pixracer => "pixracer",
-            MachineName::SpeedyBeeF405V4 => "speedybeef405v4",
-        }
-    }
+machines! {
+    9:
+    MatekH743 "matekh743" rigless::machine::matekh743::MatekH743,
+    Pixracer "pixracer" rigless::machine::pixracer::Pixracer,
+    SpeedyBeeF405V3 "speedybeef405v3" crate::f405::F405<0>,
+    SpeedyBeeF405V4 "speedybeef405v4" crate::f405::F405<1>,
+    SpeedyBeeF405Mini "speedybeef405mini" crate::f405::F405<2>,
+    MatekF405Se "matekf405se" crate::f405::F405<3>,
+    MatekF405Std "matekf405std" crate::f405::F405<4>,
+    KakuteF4V2 "kakutef4v2" crate::f405::F405<5>,
+    Stm32f405 "stm32f405" crate::f405::F405<6>,
 }
 
 /// Evaluates an expression in which a type's name stands for the machine of this name.
 #[macro_export]
 macro_rules! with_machine {
     ($name:expr, $machine:ident => $call:expr) => {
+        $crate::with_machine!(
+            @of $name, $machine => $call; MatekH743 Pixracer SpeedyBeeF405V3 SpeedyBeeF405V4 SpeedyBeeF405Mini
+            MatekF405Se MatekF405Std KakuteF4V2 Stm32f405
+        )
+    };
+    (@of $name:expr, $machine:ident => $call:expr; $($each:ident)+) => {
         match $name {
-            $crate::machines::MachineName::MatekH743 => {
-                type $machine = rigless::machine::matekh743::MatekH743;
+            $($crate::machines::MachineName::$each => {
+                type $machine = $crate::machines::$each;
                 $call
-            }
-            $crate::machines::MachineName::Pixracer => {
-                type $machine = rigless::machine::pixracer::Pixracer;
-                $call
-            }
-            $crate::machines::MachineName::SpeedyBeeF405V4 => {
-                type $machine = $crate::speedybee::SpeedyBeeF405V4;
-                $call
-            }
+            })+
         }
     };
 }

@@ -7,9 +7,11 @@ mod aloft;
 mod boot;
 mod check;
 mod cuts;
+mod f405;
 mod faults;
 mod fly;
 mod host;
+mod impairments;
 mod kept;
 mod machine;
 mod machines;
@@ -17,8 +19,8 @@ mod pilot;
 mod pins;
 mod random;
 mod same;
-mod speedybee;
 mod table;
+mod tour;
 mod trouble;
 mod ublox;
 mod usb_ring;
@@ -27,7 +29,8 @@ mod world;
 
 use aloft::Aloft;
 use clap::builder::PossibleValuesParser;
-use clap::{Arg, ArgMatches, Command, value_parser};
+use clap::{Arg, ArgAction, ArgMatches, Command, value_parser};
+use fly::Order;
 use machines::MachineName;
 use std::error::Error;
 use std::path::{Path, PathBuf};
@@ -56,10 +59,15 @@ fn command() -> Command {
         .help("GNSS receiver: the board's own model, or a new u-blox");
     let log = Arg::new("log").long("log").value_name("FILE").value_parser(value_parser!(PathBuf));
     let log = log.help("Keep the exact log here, and fly it again on this machine: the same to the last bit");
+    let mission = || {
+        let mission = Arg::new("mission").long("mission").action(ArgAction::SetTrue);
+        mission.help("Fly a mission of two minutes, uploaded over the link, in the place of the hover")
+    };
     let number = |name: &'static str, usual: &'static str, help: &'static str| {
         Arg::new(name).long(name).value_name("N").value_parser(value_parser!(u64)).default_value(usual).help(help)
     };
-    let only = Arg::new("only").long("only").value_name("NAME").default_value("").help("Those whose names begin so");
+    let only = Arg::new("only").long("only").value_name("NAME").action(ArgAction::Append);
+    let only = only.help("Those whose names begin so; may be given again");
     Command::new("twin")
         .about("Runs the flight image of a board, as it is flashed, on register-level models of the board")
         .subcommand_required(true)
@@ -71,17 +79,18 @@ fn command() -> Command {
             scenario(),
             receiver,
             log,
+            mission(),
         ]))
         .subcommand(Command::new("replay").about("Fly an exact log again").arg(file("log", "The log")))
-        .subcommand(
-            Command::new("faults").about("Faults at the Matek H743's pins, in a hover that is kept in a file").args([
-                image(),
-                scenario(),
-                file("hover", "Where the hover is kept, from which further runs begin"),
-                number("seeds", "1", "Flights of each fault"),
-                only,
-            ]),
-        )
+        .subcommand(Command::new("faults").about("Faults at a board's pins, in a hover that is kept in a file").args([
+            machine(),
+            image(),
+            scenario(),
+            file("hover", "Where the hover is kept, from which further runs begin"),
+            number("seeds", "1", "Flights of each fault"),
+            number("first", "1", "The first one's seed"),
+            only,
+        ]))
         .subcommand(Command::new("cuts").about("Power cut while the Matek H743 writes and erases its parameters").args(
             [
                 image(),
@@ -90,7 +99,9 @@ fn command() -> Command {
             ],
         ))
         .subcommand(
-            Command::new("host").about("Fly a scenario with the firmware's code on this machine").arg(scenario()),
+            Command::new("host")
+                .about("Fly a scenario with the firmware's code on this machine")
+                .args([scenario(), mission()]),
         )
 }
 
@@ -122,18 +133,24 @@ fn run(matches: &ArgMatches) -> Result<(), Box<dyn Error>> {
             let receiver = RECEIVERS.into_iter().find(|(receiver, _)| name.is_some_and(|name| name == receiver));
             let receiver = receiver.and_then(|(_, generation)| generation);
             let log = matches.get_one::<PathBuf>("log").map(PathBuf::as_path);
-            with_machine!(chosen(matches)?, M => fly::fly::<M>(image, scenario, receiver, log))
+            let order = Order { scenario, is_mission: matches.get_flag("mission"), receiver, log };
+            with_machine!(chosen(matches)?, M => fly::fly::<M>(image, &order))
         }
         Some(("replay", matches)) => same::check_log(&std::fs::read(path(matches, "log")?)?),
         Some(("faults", matches)) => {
             let [image, scenario, hover] = ["image", "scenario", "hover"].map(|name| path(matches, name));
-            let only = matches.get_one::<String>("only").map_or("", String::as_str);
-            faults::fly_all(&Aloft::of(image?, scenario?, hover?)?, 1..number(matches, "seeds")? + 1, only)
+            let (image, scenario, hover) = (image?, scenario?, hover?);
+            let first = number(matches, "first")?;
+            let seeds = first..first + number(matches, "seeds")?;
+            let names: Vec<_> = matches.get_many::<String>("only").into_iter().flatten().map(String::as_str).collect();
+            with_machine!(chosen(matches)?, M => {
+                faults::fly_all(&Aloft::<M>::of(image, scenario, hover)?, seeds, &names)
+            })
         }
         Some(("cuts", matches)) => {
             cuts::cut_all(path(matches, "image")?, number(matches, "seed")?, number(matches, "cuts")?)
         }
-        Some(("host", matches)) => host::fly(path(matches, "scenario")?),
+        Some(("host", matches)) => host::fly(path(matches, "scenario")?, matches.get_flag("mission")),
         _ => Err("no such command".into()),
     }
 }

@@ -1,6 +1,7 @@
 //! A flight seen from outside: the plant with its instruments, a station at the telemetry UART, and what must hold.
 
 use crate::check::check;
+use crate::tour::Tour;
 use crate::wire::Wire;
 use crate::world::Transducers;
 use afbc_flight_core::motor::{THROTTLE_MAX, THROTTLE_MIN};
@@ -9,7 +10,7 @@ use afbc_onboard::Readings;
 use afbc_plant::Motion;
 use afbc_scenario::Scenario;
 use afbc_sim::flight::World;
-use afbc_types::{ROTORS_MAX, RotorSpeeds};
+use afbc_types::{PoseSigmas, ROTORS_MAX, RotorSpeeds};
 use rigless::machine::flight::Signals;
 use std::error::Error;
 
@@ -19,9 +20,16 @@ const HEIGHT_M: f32 = 5.0;
 const HOVER_MS: u64 = 30_000;
 /// Time within which it must arm, climb, and land and disarm [ms].
 const PATIENCE_MS: [u64; 3] = [40_000, 15_000, 40_000];
-/// What the hover may be off on average, and the vehicle be tilted by at any time, in gusts [m, rad].
+/// Time within which it must fly the mission, and have disarmed [ms].
+const TOUR_MS: u64 = 160_000;
+/// What the hover may be off on average, and the vehicle be tilted by at any time, in gusts, and on a mission, which
+/// begins each leg with an acceleration [m, rad].
 const OFF_M: f64 = 2.5;
 const TILT_RAD: f64 = 0.7;
+const TOUR_TILT_RAD: f64 = 0.9;
+
+/// Time between two states of a tracker [ms].
+const TRACKED_MS: u64 = 10;
 
 /// Parts of the flight.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,6 +37,7 @@ enum Phase {
     Wakes,
     Climbs,
     Hovers,
+    Tours,
     Lands,
     Done,
 }
@@ -50,6 +59,8 @@ pub struct Pilot {
     /// Where it hovers, by the truth [m].
     start_m: [f64; 3],
     off_m: (f64, u64),
+    /// The mission that is flown in the place of a hover.
+    tour: Option<Tour>,
     tilt_rad: f64,
     error: Option<String>,
     /// What the vehicle has said, with the time [ms], and whether it is printed.
@@ -74,6 +85,7 @@ impl Pilot {
             armed: false,
             start_m: [0.0; 3],
             off_m: (0.0, 0),
+            tour: None,
             tilt_rad: 0.0,
             error: None,
             heard: Vec::new(),
@@ -85,6 +97,12 @@ impl Pilot {
     #[must_use]
     pub fn quiet(self) -> Self {
         Pilot { prints: false, ..self }
+    }
+
+    /// Has it fly a mission, from take-off to landing, in the place of a hover.
+    #[must_use]
+    pub fn touring(self) -> Self {
+        Pilot { tour: Some(Tour::new()), ..self }
     }
 
     /// Returns what the motors' wires said last.
@@ -135,8 +153,12 @@ impl Pilot {
             *speed = share * self.speed_max_rad_s;
         }
         self.world.advance(&speeds);
-        self.world.look();
+        let view = self.world.look();
         let readings = self.world.readings().copied().unwrap_or_default();
+        // A vehicle without instruments has a tracker.
+        if let Some(state) = view.state.filter(|_| self.world.readings().is_none() && now_ms % TRACKED_MS == 0) {
+            self.say(&Uplink::State { sent_us: now_ms * 1000, state, sigmas: PoseSigmas::UNKNOWN });
+        }
         let signals = self.transducers.feel(&readings);
         self.talk();
         (readings, signals)
@@ -144,13 +166,21 @@ impl Pilot {
 
     /// Prints how the flight was, and fails if it was not well flown.
     pub fn verdict(self) -> Result<(), Box<dyn Error>> {
-        let Pilot { error, off_m: (sum, count), tilt_rad, now_ms, phase, .. } = self;
+        let Pilot { error, off_m: (sum, count), tour, tilt_rad, now_ms, phase, .. } = self;
         let off_m = sum / count.max(1) as f64;
-        println!("{:.1} s; hover off by {off_m:.2} m on average, largest tilt {tilt_rad:.2} rad", now_ms as f64 * 1e-3);
+        let how = match &tour {
+            Some(tour) => tour.told(),
+            None => format!("hover off by {off_m:.2} m on average"),
+        };
+        println!("{:.1} s; {how}, largest tilt {tilt_rad:.2} rad", now_ms as f64 * 1e-3);
         if let Some(error) = error {
             return Err(error.into());
         }
         check(phase == Phase::Done, "the flight ends")?;
+        if let Some(tour) = &tour {
+            tour.verdict()?;
+            return check(tilt_rad < TOUR_TILT_RAD, "it flies well");
+        }
         check(off_m < OFF_M && tilt_rad < TILT_RAD, "it flies well")
     }
 
@@ -165,8 +195,13 @@ impl Pilot {
         let bytes = self.wire.take();
         let now_ms = self.now_ms;
         let (armed, heard, prints) = (&mut self.armed, &mut self.heard, self.prints);
+        let (tour, position_m) = (&mut self.tour, self.world.plant().motion().position_m.into());
+        let mut answers = Vec::new();
         self.decoder.feed(&bytes, |_, message| match message {
             Downlink::Heartbeat { armed: is_armed, .. } => *armed = is_armed,
+            Downlink::Mission { message, .. } => {
+                answers.extend(tour.as_mut().and_then(|tour| tour.hear(&message, now_ms, position_m)));
+            }
             Downlink::Text { text, .. } => {
                 let text = text.to_str().unwrap_or("?");
                 if prints {
@@ -177,7 +212,10 @@ impl Pilot {
             _ => {}
         });
         if self.now_ms % 1000 == 0 {
-            self.say(&Uplink::Heartbeat);
+            answers.push(Uplink::Heartbeat);
+        }
+        for answer in &answers {
+            self.say(answer);
         }
     }
 
@@ -190,23 +228,22 @@ impl Pilot {
         let passed_ms = self.now_ms - self.since_ms;
         let second = passed_ms % 1000 == 999;
         if self.prints && self.now_ms % 5000 == 0 {
-            let [east, north, up] = self.transducers.fix_m();
-            println!(
-                "{:7.3} s: {:?}, {x:.2} {y:.2} {z:.2} m; fix off by {:.2} {:.2} {:.2} m, height by {:.2} m",
-                self.now_ms as f64 * 1e-3,
-                self.phase,
-                east - x,
-                north - y,
-                up - z,
-                self.transducers.height_m() - z
-            );
+            let mut errors = String::new();
+            if self.world.readings().is_some() {
+                let ([east, north, up], height_m) = (self.transducers.fix_m(), self.transducers.height_m());
+                let fix = format!("{:.2} {:.2} {:.2} m", east - x, north - y, up - z);
+                errors = format!("; fix off by {fix}, height by {:.2} m", height_m - z);
+            }
+            println!("{:7.3} s: {:?}, {x:.2} {y:.2} {z:.2} m{errors}", self.now_ms as f64 * 1e-3, self.phase);
         }
         let next = match self.phase {
             Phase::Wakes => {
+                let is_ready = self.tour.as_ref().is_none_or(Tour::is_aboard);
                 if second && self.now_ms > 3000 {
-                    self.say(&Uplink::Command(Command::Arm));
+                    let upload = self.tour.as_ref().filter(|_| !is_ready).map(Tour::offer);
+                    self.say(&upload.unwrap_or(Uplink::Command(Command::Arm)));
                 }
-                self.armed.then_some(Phase::Climbs)
+                self.armed.then_some(if self.tour.is_some() { Phase::Tours } else { Phase::Climbs })
             }
             Phase::Climbs => {
                 if passed_ms == 0 {
@@ -225,6 +262,12 @@ impl Pilot {
                 }
                 (passed_ms >= HOVER_MS).then_some(Phase::Lands)
             }
+            Phase::Tours => {
+                if passed_ms % 2000 == 0 && z < 0.5 && self.tour.as_ref().is_some_and(|tour| !tour.has_begun()) {
+                    self.say(&Uplink::Command(Command::StartMission(0)));
+                }
+                (!self.armed).then_some(Phase::Done)
+            }
             Phase::Lands => {
                 if passed_ms % 2000 == 0 && self.armed {
                     self.say(&Uplink::Command(Command::Land));
@@ -237,6 +280,7 @@ impl Pilot {
             Phase::Wakes => PATIENCE_MS[0],
             Phase::Climbs => PATIENCE_MS[1],
             Phase::Lands => PATIENCE_MS[2],
+            Phase::Tours => TOUR_MS,
             _ => u64::MAX,
         };
         if let Some(next) = next {

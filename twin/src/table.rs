@@ -1,29 +1,29 @@
 //! The faults.
 
-use crate::cuts::lose_memory;
 use crate::trouble::{Outcome, Trouble};
 use rigless::chip::uart::Rate;
-use rigless::edge::Edge;
-use rigless::emulator::InterruptLine;
+use rigless::time::VirtualNanos;
 
 /// A fault.
 pub struct Row {
     pub name: &'static str,
     pub what: &'static str,
-    /// The worst that it may lead to.
-    pub expected: Outcome,
+    /// What a board must have for it: so many inertial sensors.
+    pub imus: usize,
+    /// The worst that it may lead to on a board with no inertial sensor, with one, and with two.
+    expected: [Outcome; 3],
     /// For how long the vehicle is watched at least [ms].
     pub watch_ms: u64,
     /// What it does, from its beginning on, at every access and stop of the models.
     pub act: fn(&mut Trouble<'_>),
 }
 
-/// The chips that have places: as in `MatekH743::CHIPS`.
+/// Inertial sensors.
 const FIRST: usize = 0;
 const SECOND: usize = 1;
-/// UARTs among the chip's, and their interrupt lines (RM0433, table 147).
-const TELEMETRY: (usize, u16) = (6, 82);
-const GNSS: (usize, u16) = (1, 38);
+/// UARTs, as in `Machine::UART_INTERRUPTS`.
+const TELEMETRY: usize = 0;
+const GNSS: usize = 1;
 
 const MS: u64 = 1_000_000;
 
@@ -34,35 +34,71 @@ const fn row(
     watch_ms: u64,
     act: fn(&mut Trouble<'_>),
 ) -> Row {
-    Row { name, what, expected, watch_ms, act }
+    Row { name, what, imus: 1, expected: [expected; 3], watch_ms, act }
+}
+
+impl Row {
+    /// The same, for boards with two inertial sensors alone.
+    const fn of_two(self) -> Self {
+        Row { imus: 2, ..self }
+    }
+
+    /// The same, also for boards without sensors.
+    const fn of_any(self) -> Self {
+        Row { imus: 0, ..self }
+    }
+
+    /// The same, but a board with one inertial sensor may become this: nothing else could save it.
+    const fn with_one(self, expected: Outcome) -> Self {
+        let [none, _, two] = self.expected;
+        Row { expected: [none, expected, two], ..self }
+    }
+
+    /// The same, but a board without sensors may be lost, whose state comes over the link.
+    const fn lost_without(self) -> Self {
+        let [_, one, two] = self.expected;
+        Row { expected: [Outcome::Lost, one, two], ..self }
+    }
+
+    /// Returns the worst that it may lead to on a board with so many inertial sensors.
+    pub fn expected(&self, imus: usize) -> Outcome {
+        self.expected[imus.min(2)]
+    }
 }
 
 use Outcome::{FliesOn, Lands, Lost};
 
 /// All.
 pub const ROWS: &[Row] = &[
-    row("none", "nothing", FliesOn, 3_000, |_| ()),
-    row("imu-1-silent", "the first IMU answers no more", FliesOn, 3_000, |t| t.conditions.icm42688p_silent = true),
-    row("imu-2-silent", "the second IMU answers no more", FliesOn, 3_000, |t| t.conditions.icm42605_silent = true),
+    row("none", "nothing", FliesOn, 3_000, |_| ()).of_any(),
+    row("imu-1-silent", "the first IMU answers no more", FliesOn, 3_000, |t| t.impairments.imus[FIRST].silent = true)
+        .with_one(Lost),
+    row("imu-2-silent", "the second IMU answers no more", FliesOn, 3_000, |t| t.impairments.imus[SECOND].silent = true)
+        .of_two(),
     row("imu-1-stuck", "the first IMU repeats itself", FliesOn, 3_000, |t| {
-        (t.conditions.icm42688p_rate.stuck, t.conditions.icm42688p_acceleration.stuck) = (true, true);
-    }),
+        (t.impairments.imus[FIRST].rate.stuck, t.impairments.imus[FIRST].force.stuck) = (true, true);
+    })
+    .with_one(Lost),
     row("imu-1-rate-stuck", "the first IMU's gyroscope alone repeats itself", FliesOn, 3_000, |t| {
-        t.conditions.icm42688p_rate.stuck = true;
-    }),
+        t.impairments.imus[FIRST].rate.stuck = true;
+    })
+    .with_one(Lost),
     row("imu-1-force-stuck", "the first IMU's accelerometer alone repeats itself", FliesOn, 3_000, |t| {
-        t.conditions.icm42688p_acceleration.stuck = true;
-    }),
+        t.impairments.imus[FIRST].force.stuck = true;
+    })
+    .with_one(Lost),
     row("imu-2-stuck", "the second IMU repeats itself", FliesOn, 3_000, |t| {
-        (t.conditions.icm42605_rate.stuck, t.conditions.icm42605_acceleration.stuck) = (true, true);
-    }),
-    row("imu-1-garbled", "every byte of the first IMU is random", FliesOn, 3_000, |t| t.garble(FIRST)),
-    row("imu-2-garbled", "every byte of the second IMU is random", FliesOn, 3_000, |t| t.garble(SECOND)),
+        (t.impairments.imus[SECOND].rate.stuck, t.impairments.imus[SECOND].force.stuck) = (true, true);
+    })
+    .of_two(),
+    row("imu-1-garbled", "every byte of the first IMU is random", FliesOn, 3_000, |t| t.garble(FIRST)).with_one(Lost),
+    row("imu-2-garbled", "every byte of the second IMU is random", FliesOn, 3_000, |t| t.garble(SECOND)).of_two(),
     row("imu-1-garbled-0-3-s", "the same of the first for 0.3 s", FliesOn, 3_000, |t| {
         if t.since_ns < 300 * MS {
             t.garble(FIRST);
         }
-    }),
+    })
+    .with_one(Lost),
     row("imu-1-flip", "one bit of one byte of the first IMU, 20 times in 2 s", FliesOn, 3_000, |t| {
         if t.now_and_then(100 * MS) && t.since_ns < 2_000 * MS {
             t.flip_a_bit(FIRST);
@@ -73,105 +109,113 @@ pub const ROWS: &[Row] = &[
             t.flip_a_bit(FIRST);
         }
     }),
-    row("imu-1-drops", "the first IMU loses every third transfer", FliesOn, 3_000, |t| {
-        if t.now_and_then(3 * MS)
-            && let Some(place) = t.session.board_mut().place(FIRST)
-        {
-            place.drop_next();
-        }
-    }),
+    row("imu-1-drops", "the first IMU loses every third transfer", FliesOn, 3_000, |t| t.drop_every_third(FIRST)),
     row("imu-1-intermittent", "the first IMU comes and goes every 10 ms", FliesOn, 3_000, |t| {
         if t.now_and_then(10 * MS) {
-            t.conditions.icm42688p_silent = t.random.next() % 2 == 0;
+            t.impairments.imus[FIRST].silent = t.random.next() % 2 == 0;
         }
-    }),
+    })
+    // Of a part that is silent for 20 ms and set up again nothing comes for 0.15 s.
+    .with_one(Lost),
     row("imu-1-noisy", "noise of 20 deg/s and 0.3 g on the first IMU", FliesOn, 3_000, |t| {
-        t.conditions.icm42688p_rate.noise = [20_000; 3];
-        t.conditions.icm42688p_acceleration.noise = [300_000; 3];
+        t.impairments.imus[FIRST].rate.noise = [20_000; 3];
+        t.impairments.imus[FIRST].force.noise = [300_000; 3];
     }),
     row("imu-1-rate-biased", "10 deg/s on the first gyroscope", FliesOn, 3_000, |t| {
-        t.conditions.icm42688p_rate.bias = [10_000, -10_000, 10_000];
-    }),
+        t.impairments.imus[FIRST].rate.bias = [10_000, -10_000, 10_000];
+    })
+    .with_one(Lost),
     row("imu-1-force-biased", "0.2 g on the first accelerometer", FliesOn, 3_000, |t| {
-        t.conditions.icm42688p_acceleration.bias = [200_000, -200_000, 200_000];
-    }),
+        t.impairments.imus[FIRST].force.bias = [200_000, -200_000, 200_000];
+    })
+    .with_one(Lost),
     row(
         "imus-in-turn",
         "the first IMU silent for 0.5 s, and a second later the second for good",
         FliesOn,
         3_000,
         |t| {
-            t.conditions.icm42688p_silent = t.since_ns < 500 * MS;
-            t.conditions.icm42605_silent = t.since_ns > 1_500 * MS;
+            t.impairments.imus[FIRST].silent = t.since_ns < 500 * MS;
+            t.impairments.imus[SECOND].silent = t.since_ns > 1_500 * MS;
         },
-    ),
+    )
+    .of_two(),
     row("imus-silent", "neither IMU answers", Lost, 3_000, |t| {
-        (t.conditions.icm42688p_silent, t.conditions.icm42605_silent) = (true, true);
-    }),
-    row("barometer-silent", "the barometer answers no more", FliesOn, 4_000, |t| t.conditions.dps310_silent = true),
+        (t.impairments.imus[FIRST].silent, t.impairments.imus[SECOND].silent) = (true, true);
+    })
+    .of_two(),
+    row("barometer-silent", "the barometer answers no more", FliesOn, 4_000, |t| t.impairments.barometer.silent = true),
     row("barometer-stuck", "the barometer repeats itself", FliesOn, 4_000, |t| {
-        t.conditions.dps310_pressure.stuck = true;
+        t.impairments.barometer.pressure.stuck = true;
     }),
     row("barometer-wild", "noise of 500 Pa (40 m) on the barometer", FliesOn, 4_000, |t| {
-        t.conditions.dps310_pressure.noise = [500];
+        t.impairments.barometer.pressure.noise = [500];
     }),
     row("barometer-jumps", "300 Pa (25 m) on the barometer", FliesOn, 4_000, |t| {
-        t.conditions.dps310_pressure.bias = [300];
+        t.impairments.barometer.pressure.bias = [300];
     }),
     row("barometer-intermittent", "the barometer comes and goes every 3 ms", FliesOn, 4_000, |t| {
         if t.now_and_then(3 * MS) {
-            t.conditions.dps310_silent = t.random.next() % 2 == 0;
+            t.impairments.barometer.silent = t.random.next() % 2 == 0;
         }
     }),
-    row("compass-silent", "the compass answers no more", FliesOn, 4_000, |t| t.conditions.qmc5883l_silent = true),
+    row("compass-silent", "the compass answers no more", FliesOn, 4_000, |t| t.impairments.compass.silent = true),
     row("compass-stuck", "the compass repeats itself", FliesOn, 4_000, |t| {
-        t.conditions.qmc5883l_field.stuck = true;
+        t.impairments.compass.field.stuck = true;
     }),
     row("compass-wild", "noise of 50 uT on the compass", FliesOn, 4_000, |t| {
-        t.conditions.qmc5883l_field.noise = [50_000; 3];
+        t.impairments.compass.field.noise = [50_000; 3];
     }),
     row("compass-intermittent", "the compass comes and goes every 3 ms", FliesOn, 4_000, |t| {
         if t.now_and_then(3 * MS) {
-            t.conditions.qmc5883l_silent = t.random.next() % 2 == 0;
+            t.impairments.compass.silent = t.random.next() % 2 == 0;
         }
     }),
     row("i2c-silent", "neither barometer nor compass answers", FliesOn, 4_000, |t| {
-        (t.conditions.dps310_silent, t.conditions.qmc5883l_silent) = (true, true);
+        (t.impairments.barometer.silent, t.impairments.compass.silent) = (true, true);
     }),
-    row("gnss-silent", "the GNSS receiver is silent", Lands, 12_000, |t| t.conditions.gps_silent = true),
+    row("gnss-silent", "the GNSS receiver is silent", Lands, 12_000, |t| t.impairments.receiver.silent = true),
     row("gnss-garbled", "every fiftieth byte of the GNSS receiver is wrong", Lands, 12_000, |t| {
-        t.conditions.gps_noise_errors = 20_000;
+        t.impairments.receiver.noise_errors = 20_000;
     }),
     row("gnss-wire-broken", "every byte of the GNSS receiver is wrong", Lands, 12_000, |t| {
-        t.conditions.gps_framing_errors = Rate::EVERY_WORD;
+        t.impairments.receiver.framing_errors = Rate::EVERY_WORD;
     }),
-    row("telemetry-garbled", "every fiftieth byte to the vehicle is wrong", FliesOn, 4_000, |t| t.garble_link(20_000)),
+    row("telemetry-garbled", "every fiftieth byte to the vehicle is wrong", FliesOn, 4_000, |t| {
+        t.patient.garble_link(20_000)
+    })
+    .of_any(),
     row("telemetry-broken", "noise at full rate in place of the station", FliesOn, 3_000, |t| {
-        t.garble_link(Rate::EVERY_WORD);
+        t.patient.garble_link(Rate::EVERY_WORD);
         t.flood();
-    }),
+    })
+    .of_any()
+    .lost_without(),
     row("uart-storm", "an interrupt of the telemetry's UART every 5 us for 2 s", FliesOn, 3_000, |t| {
-        t.storm(TELEMETRY.1);
-    }),
-    row("uart-storm-gnss", "the same of the GNSS receiver's UART", FliesOn, 3_000, |t| t.storm(GNSS.1)),
+        t.storm(TELEMETRY);
+    })
+    .of_any(),
+    row("uart-storm-gnss", "the same of the GNSS receiver's UART", FliesOn, 3_000, |t| t.storm(GNSS)),
     row("reset", "a reset, as of the watchdog", Lost, 3_000, |t| {
         if t.looks == 0 {
-            t.session.reset_by_pin(t.at, t.instructions, t.host);
+            t.patient.reset(t.at, t.instructions, t.host);
         }
-    }),
+    })
+    .of_any(),
     row("brown-out", "the supply drops for a moment: the memory's content is random", Lost, 3_000, |t| {
         if t.looks == 0 {
-            lose_memory(t.session, t.host, t.random);
-            t.session.reset_by_pin(t.at, t.instructions, t.host);
+            t.patient.lose_memory(t.host, t.random);
+            t.patient.reset(t.at, t.instructions, t.host);
         }
-    }),
+    })
+    .of_any(),
 ];
 
 impl Trouble<'_> {
     /// Makes the next byte of a chip random.
     fn garble(&mut self, chip: usize) {
         let mask = self.random.next() & 0xFF;
-        if let Some(place) = self.session.board_mut().place(chip) {
+        if let Some(place) = self.patient.imu(chip) {
             place.flip(mask);
         }
     }
@@ -179,8 +223,18 @@ impl Trouble<'_> {
     /// Changes one bit of the next byte of a chip.
     fn flip_a_bit(&mut self, chip: usize) {
         let bit = self.random.below(8);
-        if let Some(place) = self.session.board_mut().place(chip) {
+        if let Some(place) = self.patient.imu(chip) {
             place.flip(1 << bit);
+        }
+    }
+
+    /// Loses every third transfer of a chip.
+    fn drop_every_third(&mut self, chip: usize) {
+        if let Some(place) = self.patient.imu(chip)
+            && place.ended() > *self.kept + 2
+        {
+            *self.kept = place.ended();
+            place.drop_next();
         }
     }
 
@@ -193,12 +247,6 @@ impl Trouble<'_> {
         is_due
     }
 
-    /// Lets so many of a million bytes to the vehicle arrive wrong.
-    fn garble_link(&mut self, per_million: u32) {
-        let errors = self.session.board_mut().mcu.usart[TELEMETRY.0].errors_mut();
-        errors.noise = Rate { name: "telemetry.noise_errors", per_million };
-    }
-
     /// Keeps the wire to the vehicle busy.
     fn flood(&mut self) {
         if self.now_and_then(MS) {
@@ -208,16 +256,12 @@ impl Trouble<'_> {
     }
 
     /// Raises an interrupt every 5 us for two seconds, at the accesses and stops that there are.
-    fn storm(&mut self, line: u16) {
+    fn storm(&mut self, uart: usize) {
         if self.since_ns > 2_000 * MS || self.since_ns < *self.kept {
             return;
         }
         *self.kept = self.since_ns + 5_000;
-        if let Some(line) = InterruptLine::new(line) {
-            self.session.pulse(line, self.host);
-        }
-        if self.session.pause().is_none() {
-            self.session.pause_at(Some(rigless::time::VirtualNanos(self.at.0 + 5_000)));
-        }
+        self.patient.raise(uart, self.host);
+        self.patient.stop_at(VirtualNanos(self.at.0 + 5_000));
     }
 }

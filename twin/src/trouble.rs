@@ -1,10 +1,14 @@
 //! What a fault sees of the models, and what became of a vehicle.
 
 use crate::aloft::Link;
+use crate::impairments::Impairments;
+use crate::machine::Machine;
 use crate::random::Random;
-use rigless::emulator::Host;
-use rigless::machine::matekh743::{Conditions, MatekH743};
+use rigless::chip::Placed;
+use rigless::chip::uart::Rate;
+use rigless::emulator::{Host, InterruptLine};
 use rigless::session::Session;
+use rigless::soc::Width;
 use rigless::time::VirtualNanos;
 use std::fmt;
 
@@ -29,12 +33,68 @@ impl fmt::Display for Outcome {
     }
 }
 
+/// What a fault may do to a board, whichever it is.
+pub trait Patient {
+    /// Returns an inertial sensor's place on its bus, if the board has so many.
+    fn imu(&mut self, number: usize) -> Option<&mut dyn Placed>;
+
+    /// Lets so many of a million bytes to the board arrive wrong.
+    fn garble_link(&mut self, per_million: u32);
+
+    /// Raises the interrupt of the first link's UART (0) or of the receiver's (1).
+    fn raise(&mut self, uart: usize, host: &mut dyn Host);
+
+    /// Stops the models at a time, if nothing else does before.
+    fn stop_at(&mut self, at: VirtualNanos);
+
+    /// Resets the chip.
+    fn reset(&mut self, at: VirtualNanos, instructions: u64, host: &mut dyn Host);
+
+    /// Fills the memories with noise, as they are after a start.
+    fn lose_memory(&mut self, host: &mut dyn Host, random: &mut Random);
+}
+
+impl<M: Machine> Patient for Session<M> {
+    fn imu(&mut self, number: usize) -> Option<&mut dyn Placed> {
+        self.board_mut().place(*M::IMUS.get(number)?)
+    }
+
+    fn garble_link(&mut self, per_million: u32) {
+        self.board_mut().link_errors().noise = Rate { name: "telemetry.noise_errors", per_million };
+    }
+
+    fn raise(&mut self, uart: usize, host: &mut dyn Host) {
+        if let Some(line) = M::UART_INTERRUPTS.get(uart).copied().and_then(InterruptLine::new) {
+            self.pulse(line, host);
+        }
+    }
+
+    fn stop_at(&mut self, at: VirtualNanos) {
+        if self.pause().is_none() {
+            self.pause_at(Some(at));
+        }
+    }
+
+    fn reset(&mut self, at: VirtualNanos, instructions: u64, host: &mut dyn Host) {
+        self.reset_by_pin(at, instructions, host);
+    }
+
+    fn lose_memory(&mut self, host: &mut dyn Host, random: &mut Random) {
+        let memory = self.mcu().bus().memory().to_vec();
+        for region in memory.iter().filter(|region| region.kind.is_writable()) {
+            for offset in (0..region.size).step_by(8) {
+                let _ = host.write(region.base + offset, Width::W64, random.next());
+            }
+        }
+    }
+}
+
 /// The models while a fault is there.
 pub struct Trouble<'a> {
-    pub session: &'a mut Session<MatekH743>,
+    pub patient: &'a mut dyn Patient,
     pub host: &'a mut dyn Host,
     pub link: &'a Link,
-    pub conditions: &'a mut Conditions,
+    pub impairments: &'a mut Impairments,
     pub random: &'a mut Random,
     pub at: VirtualNanos,
     pub instructions: u64,

@@ -12,6 +12,15 @@ const PLACE: [f64; 3] = [47.397_742, 8.545_594, 488.0];
 const SEA_LEVEL_PA: f64 = 101_325.0;
 const GRAVITY_M_S2: f64 = 9.806_65;
 
+/// Returns what the transducers feel at the start, where the vehicle stands: a receiver's first fix is the origin of
+/// the local frame.
+pub fn at_the_place() -> Signals {
+    let [latitude, longitude, altitude] = PLACE;
+    let [latitude, longitude] = [latitude, longitude].map(|degrees| (degrees * 1e7).round() as i32);
+    let position = Position { latitude, longitude, altitude: (altitude * 1e3).round() as i32 };
+    Signals { position, ..AT_REST }
+}
+
 /// Keeps what the transducers feel between two readings of an instrument.
 pub struct Transducers {
     signals: Signals,
@@ -26,7 +35,8 @@ impl Transducers {
         let [latitude, longitude, altitude] = PLACE;
         let origin = Origin::new(latitude, longitude, altitude).expect("a place");
         let step = origin.local(latitude + 1e-3, longitude + 1e-3, altitude) * 1e-4;
-        Transducers { signals: AT_REST, scale: [step.x.into(), (-step.y).into()], fix_m: [0.0; 3], height_m: 0.0 }
+        let scale = [step.x.into(), (-step.y).into()];
+        Transducers { signals: at_the_place(), scale, fix_m: [0.0; 3], height_m: 0.0 }
     }
 
     /// Returns the newest fix, in the world's frame [m].

@@ -4,7 +4,8 @@ use crate::error::Error;
 use crate::heard::Heard;
 use afbc_hil::Autopilot;
 use afbc_link::{
-    Address, Answer, Command, Counters, Decoder, Downlink, FRAME_MAX, InertialSample, ParameterRequest, Sender, Uplink,
+    Address, Answer, Command, Counters, Decoder, Downlink, FRAME_MAX, InertialSample, ParameterRequest, ReceivedFrame,
+    Sender, Uplink,
 };
 
 /// Usual address of a ground station.
@@ -66,9 +67,14 @@ impl<'a> Conversation<'a> {
             self.say(&Uplink::Heartbeat);
         }
         let Conversation { port, decoder, samples, outgoing, now_ms, bytes, heard, .. } = self;
+        let mut signed = false;
         port.exchange(outgoing, &mut |piece| {
             *bytes += piece.len() as u64;
-            decoder.feed(piece, |from, message| heard.take(from, message, *now_ms));
+            let accept = |frame: &ReceivedFrame<'_>| {
+                signed |= frame.stamp().is_some();
+                true
+            };
+            decoder.feed_accepted(piece, accept, |from, message| heard.take(from, message, *now_ms));
             samples.feed(piece, |from, sample| {
                 if heard.vehicle.is_some_and(|(vehicle, _)| vehicle == from) {
                     heard.samples.push(sample);
@@ -77,7 +83,7 @@ impl<'a> Conversation<'a> {
         })?;
         outgoing.clear();
         self.now_ms += 1;
-        Ok(())
+        if signed { Err(Error::Signed) } else { Ok(()) }
     }
 
     /// Lets this time go by.

@@ -14,6 +14,8 @@ pub enum Error {
     Stranger,
     /// The vehicle is armed.
     Armed,
+    /// Its frames are signed.
+    Signed,
     /// The connection has failed.
     Connection(afbc_hil::Error),
 }
@@ -34,6 +36,11 @@ impl fmt::Display for Error {
                 write!(f, "what answers speaks MAVLink, but is not this firmware: no health array within 5 s")
             }
             Error::Armed => write!(f, "the vehicle is armed: disarm it, and take the propellers off"),
+            Error::Signed => write!(
+                f,
+                "the vehicle has a key of signatures and hears nothing without it: take the key back first, by a \
+                 station's SETUP_SIGNING"
+            ),
             Error::Connection(error) => error.fmt(f),
         }
     }

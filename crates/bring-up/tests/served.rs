@@ -3,7 +3,7 @@
 
 use afbc_bring_up::{BringUpLog, BringUpOptions, Error, Verdict, bring_up};
 use afbc_hil::{Autopilot, Error as HilError};
-use afbc_link::{Address, Command, Downlink, FRAME_MAX, Sender, Uplink};
+use afbc_link::{Address, Command, Downlink, FRAME_MAX, Key, SIGNED_FRAME_MAX, Sender, Stamp, Uplink};
 use afbc_scenario::built_in;
 use afbc_serve::{Server, fleet};
 
@@ -134,6 +134,12 @@ fn what_is_no_board_is_named() {
         let beat = Downlink::Heartbeat { armed, failsafe: false, mode: 0 };
         Sender::new(Address { system: 1, component: 1 }).send(&beat, &mut [0; FRAME_MAX]).to_vec()
     };
+    let signed = {
+        let beat = Downlink::Heartbeat { armed: false, failsafe: false, mode: 0 };
+        let (stamp, mut buffer) = (Stamp { link: 0, time_10us: 1 }, [0; SIGNED_FRAME_MAX]);
+        let mut vehicle = Sender::new(Address { system: 1, component: 1 });
+        vehicle.send_signed(&beat, Some((&Key([1; 32]), stamp)), &mut buffer).to_vec()
+    };
     let arm = Sender::new(Address { system: 255, component: 190 });
     let mut own = arm;
     let mut uplink = own.send(&Uplink::Command(Command::Disarm), &mut [0; FRAME_MAX]).to_vec();
@@ -145,6 +151,7 @@ fn what_is_no_board_is_named() {
         (uplink, "bytes and no MAVLink heartbeat"),
         (beat(false), "not this firmware"),
         (beat(true), "is armed"),
+        (signed, "key of signatures"),
     ] {
         let options = BringUpOptions { rest_s: 1, is_attended: false };
         let error: Error = bring_up(&mut Other(bytes), options, &mut |_| ()).unwrap_err();

@@ -46,7 +46,11 @@ impl fmt::Display for Error {
                 write!(f, "{given} baud is too slow for a state every 10 ms; take at least {least}")
             }
             Error::Silent => {
-                write!(f, "the vehicle sends nothing; check its power, the port, the baud rate and the wires")
+                write!(
+                    f,
+                    "the vehicle sends nothing that is understood; check its power, the port, the baud rate and the wires; \
+                     one with a key of signatures hears nobody without it"
+                )
             }
             Error::NotArmed(reason) => write!(f, "the vehicle did not arm: {reason}"),
             Error::OutOfRange(error) => error.fmt(f),

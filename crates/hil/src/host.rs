@@ -2,6 +2,9 @@
 
 use super::{Autopilot, Error};
 use crate::host_black_box::HostBlackBox;
+use crate::metadata::MetadataFiles;
+use crate::served_files::{OpenFile, ServedFiles};
+use crate::ulog_files::StoredLogs;
 use afbc_calibration::RawSample;
 use afbc_estimator::Origin;
 use afbc_files::Flash;
@@ -13,7 +16,7 @@ use afbc_recorder::{Given, Recorder, TickRecord};
 use afbc_scenario::contender::{ControllerKind, Law};
 use afbc_scenario::{AnyController, FlownLaw};
 use afbc_station::services::signing::{Signing, SigningRecord};
-use afbc_station::{Calibrator, Comms, RadioControl, Setup};
+use afbc_station::{Calibrator, Comms, RadioControl, Setup, Transfers};
 use afbc_store::Store;
 use afbc_types::{OutOfRange, ROTORS_MAX, with_rotors};
 use afbc_ulog::{BlackBox, LogStart, TakenInputs};
@@ -37,6 +40,8 @@ pub struct Host {
     number: u32,
     log: Option<ExactLog>,
     black_box: Option<HostBlackBox>,
+    /// What it serves of files, if it does.
+    files: Option<Box<(Transfers<OpenFile>, ServedFiles)>>,
     /// Names of vehicle and law.
     names: [String; 2],
 }
@@ -87,6 +92,9 @@ trait Core {
 
     /// Begins the black box's log.
     fn black_box(&self, start: &LogStart<'_>) -> BlackBox;
+
+    /// Returns the metadata of the vehicle called so.
+    fn metadata(&self, vehicle: &str) -> MetadataFiles;
 
     /// Logs the last tick, and a change of the parameters after it.
     fn log(
@@ -158,6 +166,10 @@ impl<const N: usize> Core for Aircraft<N> {
 
     fn black_box(&self, start: &LogStart<'_>) -> BlackBox {
         BlackBox::new(start, &self.table)
+    }
+
+    fn metadata(&self, vehicle: &str) -> MetadataFiles {
+        MetadataFiles::new(vehicle, &self.table)
     }
 
     fn log(
@@ -302,6 +314,7 @@ impl Host {
             number: 0,
             log: None,
             black_box: None,
+            files: None,
             names: names.map(str::to_owned),
         })
     }
@@ -337,6 +350,13 @@ impl Host {
         self.black_box = Some(HostBlackBox::new(log, origin, write));
     }
 
+    /// Serves its metadata and these logs to stations, from now on.
+    pub fn serve_files(&mut self, logs: Option<StoredLogs>) {
+        let [vehicle, _] = &self.names;
+        let MetadataFiles { files, general } = self.flight.metadata(vehicle);
+        self.files = Some(Box::new((Transfers::new(Some(general)), ServedFiles::new(logs, files))));
+    }
+
     /// Takes what messages have brought.
     fn merge(&mut self, news: &ControlInputs) {
         self.inputs.merge(news);
@@ -348,9 +368,16 @@ impl Host {
     /// Receives, for the next tick, the next bytes of one of several streams, each with a decoder of its own.
     pub fn hear(&mut self, decoder: &mut Decoder<Uplink>, bytes: &[u8]) {
         self.comms.exchange(decoder);
-        let news = self.comms.receive(bytes);
+        let news = self.receive(bytes);
         self.merge(&news);
         self.comms.exchange(decoder);
+    }
+
+    fn receive(&mut self, bytes: &[u8]) -> ControlInputs {
+        match &mut self.files {
+            Some(files) => self.comms.receive_beside(bytes, &mut files.0),
+            None => self.comms.receive(bytes),
+        }
     }
 
     /// Receives, for the next tick, the next bytes of a radio receiver.
@@ -373,7 +400,7 @@ impl Host {
     /// Runs one control tick at `time_us` since power-up, after `uplink` has reached the link. The tick reports a
     /// duration of `tick_us`.
     pub fn tick(&mut self, uplink: &[u8], time_us: u64, tick_us: f32) -> HostTick {
-        let news = self.comms.receive(uplink);
+        let news = self.receive(uplink);
         self.merge(&news);
         self.inputs.take_into(&mut self.taken);
         let readings = core::mem::take(&mut self.readings);
@@ -395,6 +422,10 @@ impl Host {
         }
         self.flight.calibrate(&mut self.comms, &mut self.calibrator, self.raw.take(), &mut send);
         let change = self.flight.parameters(&mut self.comms, &mut send);
+        if let Some(files) = &mut self.files {
+            let (transfers, store) = &mut **files;
+            self.comms.transfer(transfers, store, &mut send);
+        }
         if let (Some(log), true) = (&mut self.log, change.is_some()) {
             self.flight.record(log, &self.names, change);
         }

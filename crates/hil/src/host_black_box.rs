@@ -52,11 +52,15 @@ impl HostBlackBox {
     /// Logs the texts among what was sent after a tick, and hands over all that waits.
     pub(crate) fn sent(&mut self, now_us: u64, bytes: &[u8]) {
         let Self { log, ring, write, decoder, .. } = self;
-        decoder.feed(bytes, |_, message| {
-            if let Downlink::Text { severity, text } = message {
-                log.text(now_us, severity as u8, text.to_str().unwrap_or_default(), ring);
-            }
-        });
+        decoder.feed_accepted(
+            bytes,
+            |_| true,
+            |_, message| {
+                if let Downlink::Text { severity, text } = message {
+                    log.text(now_us, severity as u8, text.to_str().unwrap_or_default(), ring);
+                }
+            },
+        );
         while !ring.is_empty() {
             let front = ring.front();
             write(front);

@@ -1,12 +1,16 @@
 //! The black box in files: one for each start of the vehicle.
 
 use crate::log_file::LogFile;
+use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
+use std::time::SystemTime;
 
 /// The ULog of a vehicle. A log that cannot be written any more ends, and the flight goes on.
 #[derive(Clone, Debug)]
 pub struct UlogFiles {
+    place: LogPlace,
+    /// That of the last start.
     path: PathBuf,
     /// Number of starts.
     starts: u32,
@@ -15,15 +19,35 @@ pub struct UlogFiles {
     failure: Option<String>,
 }
 
+/// Where the logs of a vehicle are.
+#[derive(Clone, Debug)]
+enum LogPlace {
+    /// In a file for the first start; the others are beside it.
+    File(PathBuf),
+    /// In a folder, with those of all earlier runs.
+    Folder(PathBuf),
+}
+
+/// The logs of a vehicle that are there, for stations to download.
+#[derive(Clone, Debug)]
+pub struct StoredLogs {
+    place: LogPlace,
+    starts: u32,
+    /// The one that is being written.
+    current: PathBuf,
+}
+
 impl UlogFiles {
     /// Creates the file at `path`, where there must be none; that of the second start has `-2` behind its name, and so
-    /// on.
+    /// on. In a folder, each start has the next file that is free: `log001.ulg`, `log002.ulg` ...
     ///
     /// # Errors
     /// One line on why it cannot be created.
     pub fn create(path: &Path) -> Result<Self, String> {
-        let file = create(path)?;
-        Ok(UlogFiles { path: path.into(), starts: 1, file: Some(file), failure: None })
+        let place = if path.is_dir() { LogPlace::Folder(path.into()) } else { LogPlace::File(path.into()) };
+        let path = place.of_start(1);
+        let file = create(&path)?;
+        Ok(UlogFiles { place, path, starts: 1, file: Some(file), failure: None })
     }
 
     /// Returns what takes the bytes of a host ([`Host::log`](crate::Host::log)).
@@ -36,11 +60,17 @@ impl UlogFiles {
         }
     }
 
+    /// Returns the logs that there are.
+    pub fn stored(&self) -> StoredLogs {
+        StoredLogs { place: self.place.clone(), starts: self.starts, current: self.path.clone() }
+    }
+
     /// Ends the file, and creates that of the next start.
     pub fn next_start(&mut self) {
         let ended = self.end();
         self.starts += 1;
-        match create(&numbered(&self.path, self.starts)) {
+        self.path = self.place.of_start(self.starts);
+        match create(&self.path) {
             Ok(file) => self.file = Some(file),
             Err(error) => self.failure = Some(error),
         }
@@ -51,7 +81,7 @@ impl UlogFiles {
     pub fn take_failure(&mut self) -> Option<String> {
         if let Some(failure) = self.file.as_ref().and_then(LogFile::take_failure) {
             self.file = None;
-            self.failure = Some(ended(&self.last_path(), &failure));
+            self.failure = Some(ended(&self.path, &failure));
         }
         self.failure.take()
     }
@@ -67,12 +97,50 @@ impl UlogFiles {
 
     fn end(&mut self) -> Result<(), String> {
         let finished = self.file.take().map_or(Ok(()), |file| file.finish());
-        finished.map_err(|error| ended(&self.last_path(), &error.to_string()))
+        finished.map_err(|error| ended(&self.path, &error.to_string()))
+    }
+}
+
+impl LogPlace {
+    /// Returns the path of a start's file.
+    fn of_start(&self, start: u32) -> PathBuf {
+        match self {
+            LogPlace::File(path) => numbered(path, start),
+            LogPlace::Folder(folder) => {
+                let number = |path: &PathBuf| path.file_stem()?.to_str()?.strip_prefix("log")?.parse::<u32>().ok();
+                let last = logs_in(folder).iter().filter_map(number).max().unwrap_or(0);
+                folder.join(format!("log{:03}.ulg", last.saturating_add(1)))
+            }
+        }
+    }
+}
+
+impl StoredLogs {
+    /// Returns the logs, the oldest first.
+    pub fn list(&self) -> Vec<PathBuf> {
+        match &self.place {
+            LogPlace::File(path) => {
+                (1..=self.starts).map(|start| numbered(path, start)).filter(|path| path.is_file()).collect()
+            }
+            LogPlace::Folder(folder) => logs_in(folder),
+        }
     }
 
-    fn last_path(&self) -> PathBuf {
-        numbered(&self.path, self.starts)
+    /// True of the log that is being written.
+    pub fn is_current(&self, path: &Path) -> bool {
+        path == self.current
     }
+}
+
+/// Returns the logs in a folder, the oldest first.
+fn logs_in(folder: &Path) -> Vec<PathBuf> {
+    let Ok(entries) = fs::read_dir(folder) else { return Vec::new() };
+    let paths = entries.filter_map(|entry| Some(entry.ok()?.path()));
+    let is_log = |path: &PathBuf| path.extension().is_some_and(|extension| extension == "ulg") && path.is_file();
+    let written = |path: &PathBuf| path.metadata().and_then(|data| data.modified()).unwrap_or(SystemTime::UNIX_EPOCH);
+    let mut logs: Vec<_> = paths.filter(is_log).map(|path| (written(&path), path)).collect();
+    logs.sort();
+    logs.into_iter().map(|(_, path)| path).collect()
 }
 
 fn create(path: &Path) -> Result<LogFile, String> {

@@ -202,8 +202,18 @@ impl<M: Message> Decoder<M> {
     pub fn feed_accepted(
         &mut self,
         bytes: &[u8],
-        mut accept: impl FnMut(&ReceivedFrame<'_>) -> bool,
+        accept: impl FnMut(&ReceivedFrame<'_>) -> bool,
         mut deliver: impl FnMut(Address, M),
+    ) {
+        self.feed_whole(bytes, accept, |from, message, _| deliver(from, message));
+    }
+
+    /// The same, and delivers the payload with each message.
+    pub fn feed_whole(
+        &mut self,
+        bytes: &[u8],
+        mut accept: impl FnMut(&ReceivedFrame<'_>) -> bool,
+        mut deliver: impl FnMut(Address, M, &[u8]),
     ) {
         for &byte in bytes {
             // There is room, since `advance` always removes something from a full buffer.
@@ -223,7 +233,11 @@ impl<M: Message> Decoder<M> {
     }
 
     /// Handles everything in the buffer that can be decided.
-    fn advance(&mut self, accept: &mut impl FnMut(&ReceivedFrame<'_>) -> bool, deliver: &mut impl FnMut(Address, M)) {
+    fn advance(
+        &mut self,
+        accept: &mut impl FnMut(&ReceivedFrame<'_>) -> bool,
+        deliver: &mut impl FnMut(Address, M, &[u8]),
+    ) {
         loop {
             match self.front() {
                 Front::Incomplete(needed) => {
@@ -246,15 +260,17 @@ impl<M: Message> Decoder<M> {
                         let frame = ReceivedFrame::new(header.from, header.id, frame, header.unsigned_length());
                         if accept(&frame) { Ok(message) } else { Err(Fault::Unsupported) }
                     });
-                    self.remove(skipped + header.frame_length());
                     self.count_lost(&header);
                     match message {
                         Ok(message) => {
                             add(&mut self.counters.received, 1);
-                            deliver(header.from, message);
+                            let begin = skipped + HEADER;
+                            let payload = self.buffer.get(begin..begin + usize::from(header.length));
+                            deliver(header.from, message, payload.unwrap_or_default());
                         }
                         Err(fault) => self.counters.count(fault),
                     }
+                    self.remove(skipped + header.frame_length());
                 }
             }
         }

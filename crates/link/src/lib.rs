@@ -4,7 +4,7 @@
 //!
 //! 1. [`frames`]: conversion between the wire's frames (z down) and the workspace's (z up).
 //! 2. [`Uplink`]: messages to the vehicle. [`Downlink`]: messages from it. Both can be written and read, since the
-//!    simulator is the other end.
+//!    simulator is the other end. [`Transfer`]: files and logs of vehicles with storage.
 //! 3. [`Sender`]: encodes messages. [`Decoder`]: decodes bytes, in any pieces and with anything between the frames, and
 //!    counts what it drops in [`Counters`].
 //!
@@ -50,6 +50,7 @@ mod question;
 mod signature;
 mod target;
 pub mod telemetry;
+mod transfer;
 mod uplink;
 mod wire;
 
@@ -77,4 +78,7 @@ pub use question::{
 pub use signature::{Key, ReceivedFrame, SetupSigning, Stamp, TIME_MAX};
 pub use target::{AttitudeAndThrust, Axes, ExternalTarget, ManualControl, PositionTarget};
 pub use telemetry::Telemetry;
+pub use transfer::{
+    ComponentMetadata, FILE_DATA_MAX, FileOpcode, FilePacket, LOG_DATA_MAX, LogData, LogEntry, Transfer,
+};
 pub use uplink::Uplink;

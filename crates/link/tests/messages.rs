@@ -1,7 +1,7 @@
 //! Every message of both directions: whatever payload is understood, what was understood of it can be sent on.
 #![allow(clippy::expect_used, clippy::indexing_slicing, reason = "a test that cannot go on should say why")]
 
-use afbc_link::{Address, Command, Decoder, Downlink, FRAME_MAX, Message, Sender, Uplink};
+use afbc_link::{Address, Command, Decoder, Downlink, FRAME_MAX, Message, Sender, Transfer, Uplink};
 use core::fmt::Debug;
 use proptest::prelude::*;
 
@@ -85,7 +85,8 @@ fn the_messages_are_these() {
         ids::<Uplink>(),
         [
             0, 2, 4, 5, 11, 20, 21, 23, 37, 38, 39, 40, 41, 42, 43, 44, 45, 46, 47, 48, 51, 66, 69, 73, 75, 76, 82, 84,
-            86, 102, 110, 111, 117, 119, 123, 126, 135, 138, 144, 233, 243, 256, 258, 320, 321, 323, 331, 400, 412
+            86, 102, 110, 111, 117, 119, 121, 122, 123, 126, 135, 138, 144, 233, 243, 256, 258, 320, 321, 323, 331,
+            400, 412
         ]
     );
     assert_eq!(
@@ -96,4 +97,5 @@ fn the_messages_are_these() {
             413, 435, 436
         ]
     );
+    assert_eq!(ids::<Transfer>(), [110, 118, 120, 395, 397]);
 }

@@ -2,6 +2,9 @@
 
 /// Bytes of a MAVLink 2 frame besides its payload: header and checksum.
 const OVERHEAD: usize = 12;
+/// Bytes of a signature, and the incompatibility flag that tells of it.
+const SIGNATURE: usize = 13;
+const SIGNED: u8 = 1;
 /// Length of the header \[bytes\].
 const HEADER: usize = 10;
 /// Number of HEARTBEAT.
@@ -14,10 +17,11 @@ const TEXT_MAX: usize = 50;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Frame<'a>(&'a [u8]);
 
-/// Returns the frames of `bytes`, which are whole unsigned frames one after the other.
+/// Returns the frames of `bytes`, which are whole frames one after the other.
 pub(crate) fn frames(mut bytes: &[u8]) -> impl Iterator<Item = Frame<'_>> {
     core::iter::from_fn(move || {
-        let length = OVERHEAD + usize::from(*bytes.get(1)?);
+        let [_, payload, flags, ..] = bytes else { return None };
+        let length = OVERHEAD + usize::from(*payload) + if flags & SIGNED == 0 { 0 } else { SIGNATURE };
         let (frame, rest) = bytes.split_at_checked(length)?;
         bytes = rest;
         Some(Frame(frame))
@@ -42,9 +46,34 @@ impl<'a> Frame<'a> {
 
     /// Returns the text of a STATUSTEXT.
     pub(crate) fn text(self) -> Option<String> {
-        let payload = self.0.get(HEADER..self.0.len() - 2).filter(|_| self.id() == STATUSTEXT)?;
+        let end = HEADER + usize::from(*self.0.get(1)?);
+        let payload = self.0.get(HEADER..end).filter(|_| self.id() == STATUSTEXT)?;
         let text = payload.get(1..)?;
         let end = text.iter().take(TEXT_MAX).take_while(|&&byte| byte != 0).count();
         Some(String::from_utf8_lossy(text.get(..end)?).into_owned())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use afbc_link::{Address, Downlink, Key, SIGNED_FRAME_MAX, Sender, Stamp};
+
+    #[test]
+    fn signed_frames_stay_whole() {
+        let mut sender = Sender::new(Address { system: 1, component: 1 });
+        let beat = Downlink::Heartbeat { armed: false, failsafe: false, mode: 0 };
+        let text = Downlink::Text { severity: afbc_link::MavSeverity::MAV_SEVERITY_INFO, text: "on".into() };
+        let (key, stamp) = (Key([1; 32]), Stamp { link: 0, time_10us: 5 });
+        let sent: Vec<Vec<u8>> = [(&beat, false), (&text, true), (&beat, true), (&text, false), (&beat, true)]
+            .map(|(message, signed)| {
+                let signer = signed.then_some((&key, stamp));
+                sender.send_signed(message, signer, &mut [0; SIGNED_FRAME_MAX]).to_vec()
+            })
+            .into();
+        let bytes = sent.concat();
+        assert!(frames(&bytes).map(Frame::bytes).eq(sent.iter().map(Vec::as_slice)));
+        assert!(frames(&bytes).filter_map(Frame::text).eq(["on", "on"]));
+        assert_eq!(frames(&bytes).filter(|frame| frame.is_heartbeat()).count(), 3);
     }
 }

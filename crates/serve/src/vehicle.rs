@@ -62,7 +62,8 @@ impl ServedVehicle {
     pub fn new(scenario: &Scenario, system: u8, mut keeper: Option<ParameterFile>) -> Result<Self, OutOfRange> {
         let link = Link { system: system.into(), ..Link::DEFAULT };
         let mut notices = Vec::new();
-        let host = power_up(scenario, link, keeper.as_mut(), &mut notices)?;
+        let mut host = power_up(scenario, link, keeper.as_mut(), &mut notices)?;
+        host.serve_files(None);
         Ok(ServedVehicle {
             link,
             address: address(&host),
@@ -93,9 +94,10 @@ impl ServedVehicle {
         self.exact_log = Some(file);
     }
 
-    /// Keeps the black box in these files, from now on, before the first step.
+    /// Keeps the black box in these files, from now on, before the first step, and lets stations download them.
     pub fn log(&mut self, files: UlogFiles) {
         self.host.log(place(&self.scenario), files.sink());
+        self.host.serve_files(Some(files.stored()));
         self.black_box = Some(files);
     }
 
@@ -211,6 +213,7 @@ impl ServedVehicle {
                     files.next_start();
                     self.host.log(place(&self.scenario), files.sink());
                 }
+                self.host.serve_files(self.black_box.as_ref().map(UlogFiles::stored));
                 // Nothing of a frame outlasts it.
                 self.peers.values_mut().for_each(|peer| *peer = decoder(self.address, self.wired));
             }

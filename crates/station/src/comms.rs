@@ -8,10 +8,12 @@ use crate::services::commands::ANSWERS_PER_TICK;
 use crate::services::modes;
 use crate::services::signing::{SetupOutcome, Signing, SigningRecord};
 use crate::services::status::AuxSensors;
+use crate::services::storage::{FileStore, LogStore};
 use crate::services::streams::{Requested, id};
 use crate::services::telemetry::compose;
 use crate::services::texts::{Words, reason, urgency};
 use crate::setup::Setup;
+use crate::transfers::{Outcome, TransferRequests, Transfers};
 use afbc::monitor::Norm;
 use afbc_calibration::RawSample;
 use afbc_control::math::sqrt;
@@ -148,13 +150,18 @@ impl Comms {
     ///
     /// A vehicle without an estimate of its own ignores poses, since a law needs velocities and rates.
     pub fn receive(&mut self, bytes: &[u8]) -> ControlInputs {
+        self.receive_beside(bytes, &mut ())
+    }
+
+    /// The same beside `requests`, which take what stations want of files and logs.
+    pub fn receive_beside(&mut self, bytes: &[u8], requests: &mut impl TransferRequests) -> ControlInputs {
         let mut update = ControlInputs::EMPTY;
         let Comms { decoder, dispatcher, tracker, state_is_news, signing, .. } = self;
         let estimates = dispatcher.status.senses;
         let (wired, now_us) = (decoder.is_wired(), dispatcher.now_us);
         let mut setup = None;
         let accept = |frame: &ReceivedFrame<'_>| signing.accepts(now_us, frame, wired);
-        decoder.feed_accepted(bytes, accept, |from, message| match message {
+        decoder.feed_whole(bytes, accept, |from, message, payload| match message {
             Uplink::State { sent_us, state: value, sigmas } => {
                 let age_max_us = if estimates { POSE_AGE_MAX_US } else { COAST_US.into() };
                 let sighting = Sighting::State(value);
@@ -176,6 +183,7 @@ impl Comms {
                 }
             }
             Uplink::Signing(wanted) => setup = Some(wanted),
+            other if requests.wants(&other) => dispatcher.hand_to(requests, (from, &other, payload), &mut update),
             other => dispatcher.hear(from, other, &mut update),
         });
         if let Some(setup) = setup {
@@ -327,6 +335,36 @@ impl Comms {
         }
         (self.sender, self.left) = (outlet.sender, outlet.left);
         change
+    }
+
+    /// Goes on with what stations want of files and logs, to be called after everything else that sends: it takes what
+    /// telemetry and parameters leave of the link, and a fifth of it at least. Together they send at most
+    /// [`REPORT_MAX`] bytes.
+    pub fn transfer<S: FileStore + LogStore>(
+        &mut self,
+        transfers: &mut Transfers<S::File>,
+        store: &mut S,
+        send: impl FnMut(&[u8]),
+    ) {
+        let mut outlet = self.outlet(self.left, send);
+        let Dispatcher { streams, texts, status, now_us, .. } = &mut self.dispatcher;
+        status.has_files = true;
+        transfers.tick(streams.bytes_per_s());
+        while outlet.left >= SIGNED_FRAME_MAX
+            && (transfers.has_room() || streams.spares(transfers.frame_max()))
+            && let Some(outcome) = transfers.next(store, *now_us, status.mode.armed())
+        {
+            match outcome {
+                Outcome::Send(message) => {
+                    let bytes = outlet.say(&message, &mut self.signing);
+                    streams.spend(bytes);
+                    transfers.spend(bytes);
+                }
+                Outcome::Say(text, true) => texts.put(MavSeverity::MAV_SEVERITY_WARNING, text),
+                Outcome::Say(text, false) => texts.put(MavSeverity::MAV_SEVERITY_INFO, text),
+            }
+        }
+        (self.sender, self.left) = (outlet.sender, outlet.left);
     }
 
     /// True while the vehicle is calibrated, or a station wants to see its sensors' samples:

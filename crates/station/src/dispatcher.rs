@@ -8,7 +8,7 @@ mod targets;
 
 use crate::parameters::Service;
 use crate::services::calibration::CalibrationState;
-use crate::services::commands::Commands;
+use crate::services::commands::{BUSY, Commands};
 use crate::services::control::{ControlClaim, OperatorControl};
 use crate::services::fence::FenceWatch;
 use crate::services::mission::Missions;
@@ -18,11 +18,12 @@ use crate::services::texts::{Texts, Words};
 use crate::services::unanswered::Unanswered;
 use crate::services::{events, extended, files, logs, serial, timesync};
 use crate::setup::Setup;
+use crate::transfers::{TransferRequests, is_change};
 use afbc_guidance::fence::Braking;
 use afbc_guidance::{FenceView, Order};
 use afbc_link::telemetry::OrbitStatus;
 use afbc_link::{
-    Address, Clock, ControlAnswer, DataStream, Downlink, Interval, MavSeverity, Mission, ParameterError,
+    Address, Answer, Clock, ControlAnswer, DataStream, Downlink, Interval, MavSeverity, Mission, ParameterError,
     ParameterRequest, Question, QuestionRefusal, Reboot, Telemetry, Uplink,
 };
 use afbc_onboard::ControlInputs;
@@ -171,6 +172,24 @@ impl Dispatcher {
         }
     }
 
+    /// Hands a message to `requests`, which wants it.
+    pub(crate) fn hand_to(
+        &mut self,
+        requests: &mut impl TransferRequests,
+        (from, message, payload): (Address, &Uplink, &[u8]),
+        inputs: &mut ControlInputs,
+    ) {
+        if self.control.hear(from, self.now_us) {
+            self.report_heard(inputs);
+        }
+        let may_change = !is_change(message) || self.may(from, inputs);
+        let taken = requests.take(from, message, payload, may_change);
+        if let Uplink::Command(command) = message {
+            let answer = if taken { Answer::Accepted } else { Answer::Refused(BUSY) };
+            self.commands.answer(command.id(), answer, from);
+        }
+    }
+
     /// Hands the guidance the item of the mission that it wants, if it does not have it.
     pub(crate) fn hand_over(&mut self, inputs: &mut ControlInputs) {
         if let Some(leg) = self.wanted_leg() {
@@ -292,7 +311,10 @@ impl Dispatcher {
     /// Answers a question about what the vehicle does not have.
     fn question(&mut self, question: Question, from: Address) {
         let refusal = match question {
-            Question::Log(request) => QuestionRefusal::Log(logs::answer(request)),
+            Question::Log(request) => {
+                let Some(answer) = logs::answer(request) else { return };
+                QuestionRefusal::Log(answer)
+            }
             Question::File(operation) => QuestionRefusal::File(files::answer(operation)),
             Question::Extended(request) => QuestionRefusal::Extended(extended::answer(request)),
             Question::Event(request) => QuestionRefusal::Event(events::answer(request)),

@@ -26,6 +26,7 @@ pub mod parameters;
 mod radio;
 pub mod services;
 mod setup;
+mod transfers;
 
 pub use afbc_link::Reboot;
 pub use comms::{CLOCK_FAILED, Comms, REPORT_MAX, TICK_OFF};
@@ -36,3 +37,4 @@ pub use services::commands::{
 };
 pub use services::status::AuxSensors;
 pub use setup::Setup;
+pub use transfers::{TransferRequests, Transfers};

@@ -9,6 +9,7 @@ use afbc_serve::{
 };
 use clap::{Args, value_parser};
 use std::ffi::OsString;
+use std::fs::create_dir_all;
 use std::io::{self, BufReader, Write, stdin, stdout};
 use std::net::{IpAddr, SocketAddr, ToSocketAddrs};
 use std::path::{Path, PathBuf};
@@ -80,8 +81,10 @@ pub(crate) struct Serve {
     exact_log: Option<PathBuf>,
 
     /// Keep the black box, PX4's ULog, in this file, which must not exist; of several vehicles each has its own, with
-    /// its system id before the extension; after a restart in another one, with the number of the start
-    #[arg(long, value_name = "FILE")]
+    /// its system id before the extension; after a restart in another one, with the number of the start. In a folder,
+    /// each start has the next file, log001.ulg and so on; of several vehicles each has a folder in it. Stations
+    /// download them
+    #[arg(long, value_name = "FILE|FOLDER")]
     ulog: Option<PathBuf>,
 
     /// Times real time; 0 for as fast as possible
@@ -179,10 +182,16 @@ impl Serve {
     fn black_boxes(&self) -> Result<Vec<UlogFiles>, Failure> {
         let Some(path) = &self.ulog else { return Ok(Vec::new()) };
         let of = |system: u8| match self.vehicles {
-            1 => path.clone(),
-            _ => path.with_extension(extension(path, system)),
+            1 => Ok(path.clone()),
+            _ if path.is_dir() => {
+                let folder = path.join(system.to_string());
+                let cure = "choose another one for --ulog";
+                let failed = |error| format!("{}: cannot be made ({error}); {cure}", folder.display());
+                create_dir_all(&folder).map_err(failed).map(|()| folder)
+            }
+            _ => Ok(path.with_extension(extension(path, system))),
         };
-        let open = |system| Ok(UlogFiles::create(&of(system))?);
+        let open = |system| Ok(UlogFiles::create(&of(system)?)?);
         (self.system..).take(self.vehicles.into()).map(open).collect()
     }
 

@@ -38,9 +38,17 @@ pub struct FileRefusal {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FtpError(pub u8);
 
+#[allow(missing_docs, reason = "the names of the protocol")]
 impl FtpError {
-    /// The operation is not known.
+    pub const FAIL: Self = FtpError(1);
+    pub const INVALID_DATA_SIZE: Self = FtpError(3);
+    pub const INVALID_SESSION: Self = FtpError(4);
+    pub const NO_SESSIONS_AVAILABLE: Self = FtpError(5);
+    pub const EOF: Self = FtpError(6);
     pub const UNKNOWN_COMMAND: Self = FtpError(7);
+    pub const FILE_EXISTS: Self = FtpError(8);
+    pub const FILE_PROTECTED: Self = FtpError(9);
+    pub const FILE_NOT_FOUND: Self = FtpError(10);
 }
 
 impl FileOperation {

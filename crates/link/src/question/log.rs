@@ -1,10 +1,12 @@
-//! Logs: LOG_REQUEST_LIST and LOG_REQUEST_DATA, with LOG_ENTRY and LOG_DATA.
+//! Logs: LOG_REQUEST_LIST, LOG_REQUEST_DATA, LOG_ERASE and LOG_REQUEST_END, with LOG_ENTRY and LOG_DATA.
 
 use crate::address::Address;
 use crate::message::{MessageFormat, PAYLOAD_MAX};
 use crate::wire::{Layout, Unused};
 use mavlink::MessageData;
-use mavlink::dialects::common::{LOG_DATA_DATA, LOG_ENTRY_DATA, LOG_REQUEST_DATA_DATA, LOG_REQUEST_LIST_DATA};
+use mavlink::dialects::common::{
+    LOG_DATA_DATA, LOG_ENTRY_DATA, LOG_ERASE_DATA, LOG_REQUEST_DATA_DATA, LOG_REQUEST_END_DATA, LOG_REQUEST_LIST_DATA,
+};
 
 /// What is asked of the logs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -25,6 +27,10 @@ pub enum LogRequest {
         /// Number of bytes.
         bytes: u32,
     },
+    /// LOG_ERASE (121): of all logs. Not answered.
+    Erase,
+    /// LOG_REQUEST_END (122): nothing more is to be sent. Not answered.
+    End,
 }
 
 /// What is reported of the logs.
@@ -50,27 +56,42 @@ pub enum LogAnswer {
 
 pub(super) const LIST_ID: u32 = LOG_REQUEST_LIST_DATA::ID;
 pub(super) const DATA_REQUEST_ID: u32 = LOG_REQUEST_DATA_DATA::ID;
+pub(super) const ERASE_ID: u32 = LOG_ERASE_DATA::ID;
+pub(super) const END_ID: u32 = LOG_REQUEST_END_DATA::ID;
 pub(super) const ENTRY_ID: u32 = LOG_ENTRY_DATA::ID;
 pub(super) const DATA_ID: u32 = LOG_DATA_DATA::ID;
 
 const LIST: Layout<LOG_REQUEST_LIST_DATA, (u16, u16, Address)> = Layout::NEW;
 const DATA_REQUEST: Layout<LOG_REQUEST_DATA_DATA, (u32, u32, u16, Address)> = Layout::NEW;
+const ERASE: Layout<LOG_ERASE_DATA, (Address,)> = Layout::NEW;
+const END: Layout<LOG_REQUEST_END_DATA, (Address,)> = Layout::NEW;
 /// Time, size; number of the log, number of logs, last number.
 const ENTRY: Layout<LOG_ENTRY_DATA, (Unused<8>, u16, [u16; 2])> = Layout::NEW;
 const DATA: Layout<LOG_DATA_DATA, (u32, u16, u8, Unused<90>)> = Layout::NEW;
 
 impl LogRequest {
     pub(super) fn format(id: u32) -> Option<MessageFormat> {
-        Some(if id == LIST_ID { LIST.format() } else { DATA_REQUEST.format() })
+        Some(match id {
+            LIST_ID => LIST.format(),
+            DATA_REQUEST_ID => DATA_REQUEST.format(),
+            ERASE_ID => ERASE.format(),
+            END_ID => END.format(),
+            _ => return None,
+        })
     }
 
     pub(super) fn read(id: u32, payload: &[u8]) -> (Self, Address) {
-        if id == LIST_ID {
-            let (first, last, to) = LIST.read(payload);
-            (LogRequest::List { first, last }, to)
-        } else {
-            let (offset, bytes, log, to) = DATA_REQUEST.read(payload);
-            (LogRequest::Data { log, offset, bytes }, to)
+        match id {
+            LIST_ID => {
+                let (first, last, to) = LIST.read(payload);
+                (LogRequest::List { first, last }, to)
+            }
+            ERASE_ID => (LogRequest::Erase, ERASE.read(payload).0),
+            END_ID => (LogRequest::End, END.read(payload).0),
+            _ => {
+                let (offset, bytes, log, to) = DATA_REQUEST.read(payload);
+                (LogRequest::Data { log, offset, bytes }, to)
+            }
         }
     }
 
@@ -79,6 +100,8 @@ impl LogRequest {
         match self {
             LogRequest::List { first, last } => LIST.write(&(first, last, to), payload),
             LogRequest::Data { log, offset, bytes } => DATA_REQUEST.write(&(offset, bytes, log, to), payload),
+            LogRequest::Erase => ERASE.write(&(to,), payload),
+            LogRequest::End => END.write(&(to,), payload),
         }
     }
 }

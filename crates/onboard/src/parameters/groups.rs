@@ -5,6 +5,7 @@ use super::reason::Reason;
 use crate::configuration::Configuration;
 use afbc_store::RecordName;
 use afbc_types::{Airframe, Declaration, Declared, Range, Value, ValueMut};
+use core::convert::Infallible;
 
 /// A parameter: one number of a configuration.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -135,6 +136,29 @@ impl<const N: usize> Configuration<N> {
         };
         each_group!(self, |_, group| group.visit_mut(&mut show));
         Ok(())
+    }
+}
+
+impl<const N: usize> Configuration<N> {
+    /// Shows the declaration of every parameter, in the order of the list, with the words of a choice: of a vector
+    /// three times. For whoever describes them to a station; no image needs it.
+    pub(crate) fn show_declarations(&self, show: &mut dyn FnMut(&Declaration, &'static [&'static str])) {
+        let mut visit = |declaration: &Declaration, value: Value<'_>| {
+            let (length, words): (_, &'static [&'static str]) = match value {
+                Value::Single(numbers) => (numbers.len(), &[]),
+                Value::Double(numbers) => (numbers.len(), &[]),
+                Value::Choice(_, words) => (1, words),
+                Value::Whole(_) => (1, &[]),
+                Value::Switch(_) => (1, &["off", "on"]),
+            };
+            (0..length).for_each(|_| show(declaration, words));
+            Ok::<(), Infallible>(())
+        };
+        let mut all = || -> Result<(), Infallible> {
+            each_group!(self, |_, group| group.visit(&mut visit));
+            Ok(())
+        };
+        let Ok(()) = all();
     }
 }
 

@@ -5,7 +5,7 @@ use super::reason::Reason;
 use crate::configuration::Configuration;
 use crate::flight::Prepared;
 use afbc_store::RecordName;
-use afbc_types::OutOfRange;
+use afbc_types::{Declaration, OutOfRange};
 
 /// The parameters of a vehicle: as its image has them, and as they are now.
 ///
@@ -52,6 +52,12 @@ impl<const N: usize> ParameterTable<N> {
     /// Returns the parameter called `name` as the image has it.
     pub fn default_of(&self, name: RecordName) -> Option<Parameter> {
         self.image.parameter(Key::Name(name))
+    }
+
+    /// Shows the declaration of every parameter, in the order of [`iter`](Self::iter), with the words of a choice or a
+    /// switch, from the smallest number of its range on.
+    pub fn show_declarations(&self, mut show: impl FnMut(&Declaration, &'static [&'static str])) {
+        self.image.show_declarations(&mut show);
     }
 
     /// Changes a parameter; returns it as it is then.

@@ -1,4 +1,5 @@
-//! Files, of which the vehicle has none: each operation is refused as an unknown one, so that clients stop at once.
+//! Files, of which a vehicle without storage has none: each operation is refused as an unknown one, so that clients
+//! stop at once.
 
 use afbc_link::{FileOperation, FileRefusal, FtpError};
 

@@ -1,11 +1,12 @@
-//! Logs, of which the vehicle has none: downloads end at once.
+//! Logs, of which a vehicle without storage has none: downloads end at once.
 
 use afbc_link::{LogAnswer, LogRequest};
 
-/// Returns the answer to a request: no log, or no data.
-pub fn answer(request: LogRequest) -> LogAnswer {
-    match request {
+/// Returns the answer to a request, if it expects one: no log, or no data.
+pub fn answer(request: LogRequest) -> Option<LogAnswer> {
+    Some(match request {
         LogRequest::List { .. } => LogAnswer::Entry { log: 0, logs: [0; 2] },
         LogRequest::Data { log, offset, .. } => LogAnswer::Data { log, offset, bytes: 0 },
-    }
+        LogRequest::Erase | LogRequest::End => return None,
+    })
 }

@@ -64,6 +64,8 @@ pub struct VehicleStatus {
     pub state: Option<State>,
     /// True if the vehicle has an inertial sensor.
     pub senses: bool,
+    /// True if it serves files.
+    pub has_files: bool,
     /// Health of the flight core.
     pub health: TickHealth,
     /// What spoke against arming in the tick; none before the first.

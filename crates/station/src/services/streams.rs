@@ -204,6 +204,11 @@ impl Streams {
         self.room > -BURST
     }
 
+    /// True if so many bytes may be sent without keeping back what falls due next.
+    pub(crate) fn spares(&self, bytes: usize) -> bool {
+        self.room >= 1000 * bytes as i64
+    }
+
     /// Notes that so many bytes were sent, of a stream or not.
     pub fn spend(&mut self, bytes: usize) {
         self.room -= 1000 * bytes as i64;

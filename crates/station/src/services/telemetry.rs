@@ -14,6 +14,8 @@ use nalgebra::Vector3;
 /// `MAV_PROTOCOL_CAPABILITY`: commands and items with integers, encoding of parameters by bytes, targets of attitude
 /// and position, MAVLink 2, missions.
 const CAPABILITIES: u64 = 4 | 8 | 16 | 64 | 128 | 256 | 8192;
+/// FTP.
+const FILES: u64 = 32;
 const TAU: f32 = core::f32::consts::TAU;
 
 /// Returns the telemetry message numbered `message`, if its content is known.
@@ -62,7 +64,8 @@ pub fn compose(message: u32, status: &VehicleStatus) -> Option<Downlink> {
             let software = [version(env!("CARGO_PKG_VERSION_MAJOR")), version(env!("CARGO_PKG_VERSION_MINOR"))];
             let [major, minor] = software;
             let software = [major, minor, version(env!("CARGO_PKG_VERSION_PATCH")), 255];
-            telemetry(Telemetry::Version(Version { capabilities: CAPABILITIES, uid: 0, software, commit: [0; 8] }))
+            let capabilities = CAPABILITIES | if status.has_files { FILES } else { 0 };
+            telemetry(Telemetry::Version(Version { capabilities, uid: 0, software, commit: [0; 8] }))
         }
         id::PROTOCOL_VERSION => telemetry(Telemetry::Protocol),
         id::CURRENT_MODE => Some(Downlink::CurrentMode(modes::current(status.flight_mode(), status.guided.mode))),
@@ -293,9 +296,12 @@ mod tests {
         assert_eq!(compose(id::SYSTEM_TIME, &status), time(0));
         let Telemetry::Version(version) = reported(id::AUTOPILOT_VERSION, &status) else { panic!("another") };
         // MISSION_INT, COMMAND_INT, PARAM_ENCODE_BYTEWISE; SET_ATTITUDE_TARGET, both SET_POSITION_TARGET; MAVLINK2; and
-        // neither FTP nor logs.
+        // FTP where there is storage.
         let bits = [2, 3, 4, 6, 7, 8, 13];
         assert_eq!(version.capabilities, bits.into_iter().map(|bit| 1 << bit).sum::<u64>());
+        let stored = VehicleStatus { has_files: true, ..status };
+        let Telemetry::Version(with_files) = reported(id::AUTOPILOT_VERSION, &stored) else { panic!("another") };
+        assert_eq!(with_files.capabilities, version.capabilities | 1 << 5);
         let text = |part: u8| crate::services::texts::Words::default().number(part.into());
         let parts = [env!("CARGO_PKG_VERSION_MAJOR"), env!("CARGO_PKG_VERSION_MINOR"), env!("CARGO_PKG_VERSION_PATCH")];
         for (part, digits) in version.software.into_iter().zip(parts) {

@@ -1,0 +1,178 @@
+//! What a host serves of files and tells of itself.
+#![allow(clippy::expect_used, clippy::indexing_slicing, clippy::panic, missing_docs, reason = "tests")]
+
+use afbc_hil::{MetadataFiles, ServedFiles, UlogFiles};
+use afbc_link::FtpError;
+use afbc_onboard::Configuration;
+use afbc_onboard::parameters::{Kind, ParameterTable};
+use afbc_station::services::ftp::crc32;
+use afbc_station::services::storage::{FileAccess, FileChange, FilePath, FileStore, LogStore};
+use serde_json::Value;
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::PathBuf;
+use std::time::{Duration, SystemTime};
+
+fn folder(name: &str) -> PathBuf {
+    let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(name);
+    let _ = fs::remove_dir_all(&folder);
+    fs::create_dir_all(&folder).expect("made");
+    folder
+}
+
+fn path(text: &str) -> FilePath {
+    FilePath::of(text.as_bytes()).expect("a path")
+}
+
+fn names(files: &mut ServedFiles, directory: &str) -> Vec<(String, Option<u32>)> {
+    let entry = |place| files.entry(&path(directory), place).expect("listed");
+    (0..).map_while(entry).map(|entry| (entry.name.as_str().to_owned(), entry.size)).collect()
+}
+
+fn read(files: &mut ServedFiles, name: &str) -> Result<Vec<u8>, FtpError> {
+    let (file, size) = files.open(&path(name), FileAccess::Read)?;
+    let (mut read, mut block) = (Vec::new(), [0; 100]);
+    loop {
+        let count = files.read(file, read.len() as u32, &mut block)?;
+        if count == 0 {
+            break;
+        }
+        read.extend_from_slice(&block[..count]);
+    }
+    assert_eq!(read.len(), size as usize);
+    files.close(file);
+    assert_eq!(files.read(file, 0, &mut block), Err(FtpError::INVALID_SESSION));
+    Ok(read)
+}
+
+#[test]
+fn a_folders_logs_are_served_and_nothing_else_of_it() {
+    let folder = folder("logs");
+    let old: Vec<u8> = (0..1000_u32).map(|it| (it * 7) as u8).collect();
+    fs::write(folder.join("old.ulg"), &old).expect("written");
+    let written = SystemTime::UNIX_EPOCH + Duration::from_secs(1_700_000_001);
+    let file = fs::File::options().write(true).open(folder.join("old.ulg")).expect("open");
+    file.set_modified(written).expect("set");
+    fs::write(folder.join("secret.txt"), "not served").expect("written");
+    fs::create_dir(folder.join("sub.ulg")).expect("made");
+    let mut logs = UlogFiles::create(&folder).expect("created");
+    let mut files = ServedFiles::new(Some(logs.stored()), vec![("general.json".into(), b"{}".to_vec())]);
+    assert_eq!(names(&mut files, "/"), [("etc".into(), None), ("log".into(), None)]);
+    assert_eq!(names(&mut files, "/etc"), [("general.json".into(), Some(2))]);
+    assert_eq!(names(&mut files, "/log"), [("old.ulg".into(), Some(1000)), ("log001.ulg".into(), Some(0))]);
+    assert_eq!(read(&mut files, "/log/old.ulg"), Ok(old.clone()));
+    assert_eq!(read(&mut files, "etc/general.json"), Ok(b"{}".to_vec()));
+    for name in ["log/secret.txt", "log/sub.ulg", "log", "etc", "", "secret.txt", "log/none.ulg", "etc/none"] {
+        assert_eq!(read(&mut files, name), Err(FtpError::FILE_NOT_FOUND), "{name}");
+    }
+    // By number, and out of any range.
+    assert_eq!(files.count_logs(), 2);
+    assert_eq!(files.log(0).map(|log| (log.size, log.utc_s)), Some((1000, 1_700_000_001)));
+    assert_eq!(files.log(2), None);
+    let mut block = [0; 90];
+    assert_eq!((files.read_log(0, 950, &mut block), &block[..50]), (50, &old[950..]));
+    assert_eq!([files.read_log(0, 1000, &mut block), files.read_log(7, 0, &mut block)], [0; 2]);
+    // Nothing can be changed, except that old logs can be removed.
+    assert!(matches!(files.open(&path("log/new.ulg"), FileAccess::Create), Err(FtpError::FILE_PROTECTED)));
+    assert!(matches!(files.open(&path("log/old.ulg"), FileAccess::Write), Err(FtpError::FILE_PROTECTED)));
+    for change in [FileChange::CreateDirectory(&path("log/x")), FileChange::Truncate(&path("log/old.ulg"), 1)] {
+        assert_eq!(files.change(change), Err(FtpError::FILE_PROTECTED));
+    }
+    for name in ["log/log001.ulg", "etc/general.json"] {
+        assert_eq!(files.change(FileChange::Remove(&path(name))), Err(FtpError::FILE_PROTECTED));
+    }
+    assert_eq!(files.change(FileChange::Remove(&path("log/secret.txt"))), Err(FtpError::FILE_NOT_FOUND));
+    files.change(FileChange::Remove(&path("log/old.ulg"))).expect("removed");
+    assert!(!folder.join("old.ulg").exists());
+    // All that are not being written.
+    logs.next_start();
+    let mut files = ServedFiles::new(Some(logs.stored()), Vec::new());
+    assert_eq!(names(&mut files, "log").len(), 2);
+    assert!(files.erase_logs());
+    assert_eq!(names(&mut files, "log"), [("log002.ulg".into(), Some(0))]);
+    assert!(folder.join("secret.txt").exists() && folder.join("sub.ulg").exists());
+    assert!(!ServedFiles::new(None, Vec::new()).erase_logs());
+}
+
+/// Of a file for each start, those of this run alone.
+#[test]
+fn a_files_starts_are_served() {
+    let folder = folder("starts");
+    fs::write(folder.join("other.ulg"), b"of somebody else").expect("written");
+    let mut logs = UlogFiles::create(&folder.join("flight.ulg")).expect("created");
+    logs.next_start();
+    let mut files = ServedFiles::new(Some(logs.stored()), Vec::new());
+    let listed: Vec<_> = names(&mut files, "log").into_iter().map(|(name, _)| name).collect();
+    assert_eq!(listed, ["flight.ulg", "flight-2.ulg"]);
+    assert!(files.erase_logs() && folder.join("other.ulg").exists() && !folder.join("flight.ulg").exists());
+}
+
+/// The metadata as the published schemas and QGroundControl want it, and each number as it is declared.
+#[test]
+fn metadata_describes_every_parameter() {
+    let table = ParameterTable::<4>::new(Configuration::default());
+    let MetadataFiles { files, general } = MetadataFiles::new("paper", &table);
+    let [(general_name, general_bytes), (name, bytes)] = files.as_slice() else { panic!("two files") };
+    assert_eq!(general.crc, crc32(0, general_bytes));
+    assert!(general.uri.starts_with(format!("mftp://etc/{general_name}\0").as_bytes()));
+    let told: Value = serde_json::from_slice(general_bytes).expect("JSON");
+    assert_eq!((&told["version"], &told["modelName"]), (&1.into(), &"paper".into()));
+    let kind = &told["metadataTypes"][0];
+    assert_eq!((&kind["type"], &kind["uri"]), (&1.into(), &format!("mftp://etc/{name}").into()));
+    assert_eq!(kind["fileCrc"], crc32(0, bytes));
+
+    let told: Value = serde_json::from_slice(bytes).expect("JSON");
+    assert_eq!(told["version"], 1);
+    let described = told["parameters"].as_array().expect("an array");
+    assert_eq!(described.len(), usize::from(table.count()));
+    let keys = [
+        "name",
+        "type",
+        "default",
+        "min",
+        "max",
+        "group",
+        "shortDesc",
+        "longDesc",
+        "units",
+        "decimalPlaces",
+        "rebootRequired",
+        "values",
+    ];
+    let keys: BTreeSet<_> = keys.into_iter().collect();
+    let (mut choices, mut switches, mut restarts) = (0, 0, BTreeSet::new());
+    for (parameter, told) in table.iter().zip(described) {
+        let name = parameter.name.as_str();
+        assert!(told.as_object().expect("an object").keys().all(|key| keys.contains(key.as_str())), "{told}");
+        assert_eq!(told["name"], name);
+        assert_eq!(told["type"], if parameter.kind == Kind::Int32 { "Int32" } else { "Float" }, "{name}");
+        assert_eq!(told["default"].as_f64().expect("a number") as f32, parameter.value, "{name}");
+        assert_eq!(
+            (told["min"].as_f64(), told["max"].as_f64()),
+            (Some(parameter.range.min), Some(parameter.range.max))
+        );
+        assert!(!told["shortDesc"].as_str().expect("text").is_empty(), "{name}");
+        if let Some(values) = told.get("values").and_then(Value::as_array) {
+            let numbers = parameter.range.min as i64..=parameter.range.max as i64;
+            assert!(values.iter().map(|value| value["value"].as_i64()).eq(numbers.map(Some)), "{told}");
+            choices += usize::from(values.len() > 2);
+            switches += usize::from(values.len() == 2);
+        }
+        if told.get("rebootRequired").is_some() {
+            restarts.insert(name.to_owned());
+        }
+        if let Some(places) = told["decimalPlaces"].as_i64() {
+            // What is shown of the default is the default, to four digits.
+            let default = f64::from(parameter.value);
+            let shown: f64 = format!("{default:.*}", places as usize).parse().expect("a number");
+            assert!((shown - default).abs() <= 5e-4 * default.abs(), "{name}: {shown} for {default}");
+        }
+    }
+    assert!(choices > 0 && switches > 0, "{choices} choices, {switches} switches");
+    for name in ["MAV_SYS_ID", "SER_TEL1_BAUD", "MOT_PROTOCOL"] {
+        assert!(restarts.contains(name), "{restarts:?}");
+    }
+    let mass = described.iter().find(|it| it["name"] == "V_MASS").expect("there");
+    assert_eq!((&mass["units"], &mass["min"], &mass["max"]), (&"kg".into(), &0.01.into(), &500.0.into()));
+    assert_eq!((&mass["shortDesc"], &mass["default"]), (&"m: mass of the vehicle".into(), &0.486.into()));
+}

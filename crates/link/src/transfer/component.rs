@@ -1,0 +1,51 @@
+//! Where a component's metadata is: COMPONENT_METADATA, and COMPONENT_INFORMATION before it.
+
+use crate::message::PAYLOAD_MAX;
+use crate::wire::{Layout, Unused};
+use mavlink::dialects::common::{COMPONENT_INFORMATION_DATA, COMPONENT_METADATA_DATA};
+
+/// Longest address of a file \[bytes\].
+const URI_MAX: usize = 100;
+
+/// Where the general metadata is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ComponentMetadata {
+    /// Time since power-up \[ms\].
+    pub time_ms: u32,
+    /// CRC-32 of the file, as the file protocol calculates it.
+    pub crc: u32,
+    /// Address of the file, with zeros behind it.
+    pub uri: [u8; URI_MAX],
+}
+
+pub(super) const METADATA: Layout<COMPONENT_METADATA_DATA, ([u32; 2], [u8; URI_MAX])> = Layout::NEW;
+/// Time, checksum, checksum of the peripherals' file; address, address of the peripherals' file.
+pub(super) const INFORMATION: Layout<COMPONENT_INFORMATION_DATA, ([u32; 3], [u8; URI_MAX], Unused<URI_MAX>)> =
+    Layout::NEW;
+
+impl ComponentMetadata {
+    /// Metadata at an address of up to 100 bytes.
+    pub fn at(uri: &str, crc: u32) -> Self {
+        let mut metadata = ComponentMetadata { time_ms: 0, crc, uri: [0; URI_MAX] };
+        metadata.uri.iter_mut().zip(uri.bytes()).for_each(|(to, byte)| *to = byte);
+        metadata
+    }
+
+    pub(super) fn read(payload: &[u8]) -> Self {
+        let ([time_ms, crc], uri) = METADATA.read(payload);
+        ComponentMetadata { time_ms, crc, uri }
+    }
+
+    pub(super) fn write(&self, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
+        METADATA.write(&([self.time_ms, self.crc], self.uri), payload)
+    }
+
+    pub(super) fn read_information(payload: &[u8]) -> Self {
+        let ([time_ms, crc, _], uri, _) = INFORMATION.read(payload);
+        ComponentMetadata { time_ms, crc, uri }
+    }
+
+    pub(super) fn write_information(&self, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
+        INFORMATION.write(&([self.time_ms, self.crc, 0], self.uri, Unused), payload)
+    }
+}

@@ -1,0 +1,75 @@
+//! Files and logs with their data: what vehicles with storage send beside [`Downlink`](crate::Downlink).
+//!
+//! A type of its own, so that the messages of a vehicle without storage stay small.
+
+mod component;
+mod file;
+mod log;
+
+use crate::address::Address;
+use crate::message::{Fault, Message, MessageFormat, PAYLOAD_MAX};
+pub use component::ComponentMetadata;
+pub use file::{FILE_DATA_MAX, FileOpcode, FilePacket};
+pub use log::{LOG_DATA_MAX, LogData, LogEntry};
+use mavlink::MessageData;
+use mavlink::dialects::common::{
+    COMPONENT_INFORMATION_DATA, COMPONENT_METADATA_DATA, FILE_TRANSFER_PROTOCOL_DATA, LOG_DATA_DATA, LOG_ENTRY_DATA,
+};
+
+/// A message with data from storage.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[allow(clippy::large_enum_variant, reason = "one at a time, on the stack of whoever sends it")]
+pub enum Transfer {
+    /// FILE_TRANSFER_PROTOCOL (110).
+    File {
+        /// The packet.
+        packet: FilePacket,
+        /// Who asked.
+        to: Address,
+    },
+    /// LOG_ENTRY (118).
+    LogEntry(LogEntry),
+    /// LOG_DATA (120).
+    LogData(LogData),
+    /// COMPONENT_METADATA (397).
+    Metadata(ComponentMetadata),
+    /// COMPONENT_INFORMATION (395), its predecessor, with nothing of peripherals.
+    Information(ComponentMetadata),
+}
+
+impl Message for Transfer {
+    fn format(id: u32) -> Option<MessageFormat> {
+        Some(match id {
+            FILE_TRANSFER_PROTOCOL_DATA::ID => file::LAYOUT.format(),
+            LOG_ENTRY_DATA::ID => log::ENTRY.format(),
+            LOG_DATA_DATA::ID => log::DATA.format(),
+            COMPONENT_METADATA_DATA::ID => component::METADATA.format(),
+            COMPONENT_INFORMATION_DATA::ID => component::INFORMATION.format(),
+            _ => return None,
+        })
+    }
+
+    fn read(id: u32, payload: &[u8], _: Address) -> Result<Self, Fault> {
+        Ok(match id {
+            FILE_TRANSFER_PROTOCOL_DATA::ID => {
+                let (packet, to) = FilePacket::read(payload);
+                Transfer::File { packet, to }
+            }
+            LOG_ENTRY_DATA::ID => Transfer::LogEntry(LogEntry::read(payload)),
+            LOG_DATA_DATA::ID => Transfer::LogData(LogData::read(payload)),
+            COMPONENT_METADATA_DATA::ID => Transfer::Metadata(ComponentMetadata::read(payload)),
+            COMPONENT_INFORMATION_DATA::ID => Transfer::Information(ComponentMetadata::read_information(payload)),
+            _ => return Err(Fault::Unknown),
+        })
+    }
+
+    fn write(&self, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
+        match self {
+            Transfer::File { packet, to } => packet.write(*to, payload),
+            Transfer::LogEntry(entry) => entry.write(payload),
+            Transfer::LogData(data) => data.write(payload),
+            Transfer::Metadata(metadata) => metadata.write(payload),
+            Transfer::Information(metadata) => metadata.write_information(payload),
+        }
+    }
+}

@@ -1,0 +1,183 @@
+//! Files and logs in memory, which check what they are asked for.
+#![allow(dead_code, unreachable_pub, clippy::expect_used, clippy::indexing_slicing, reason = "shared by tests")]
+
+use afbc_link::FtpError;
+use afbc_station::services::storage::{DirectoryEntry, FileAccess, FileChange, FilePath, FileStore, LogInfo, LogStore};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// A store of files, all of which may be changed, and of logs.
+#[derive(Default)]
+pub struct Memory {
+    pub files: BTreeMap<String, Vec<u8>>,
+    pub directories: BTreeSet<String>,
+    /// The file of each handle, while it is open.
+    pub open: Vec<Option<String>>,
+    pub logs: Vec<Vec<u8>>,
+    /// Changes carried out.
+    pub changes: usize,
+}
+
+fn is_in(path: &str, directory: &str) -> bool {
+    let folder = path.rsplit_once('/').map_or("", |(folder, _)| folder);
+    folder == directory
+}
+
+/// Everything that a store is asked for is below its root.
+fn checked(path: &FilePath) -> &str {
+    let path = path.as_str();
+    let parts = || path.split('/');
+    assert!(path.is_empty() || parts().all(|part| !["", ".", ".."].contains(&part)), "{path:?}");
+    assert!(!path.contains(['\\', ':', '\0']), "{path:?}");
+    path
+}
+
+impl Memory {
+    /// With these files, and the directories that they are in.
+    pub fn with(files: &[(&str, Vec<u8>)]) -> Self {
+        let mut memory = Memory::default();
+        memory.directories.insert(String::new());
+        for (path, bytes) in files {
+            for (place, _) in path.match_indices('/') {
+                memory.directories.insert(path[..place].into());
+            }
+            memory.files.insert((*path).into(), bytes.clone());
+        }
+        memory
+    }
+
+    pub fn open_count(&self) -> usize {
+        self.open.iter().flatten().count()
+    }
+
+    fn file(&self, handle: usize) -> &str {
+        self.open[handle].as_ref().expect("open")
+    }
+
+    fn exists(&self, path: &str) -> bool {
+        self.files.contains_key(path) || self.directories.contains(path)
+    }
+}
+
+impl FileStore for Memory {
+    type File = usize;
+
+    fn open(&mut self, path: &FilePath, access: FileAccess) -> Result<(usize, u32), FtpError> {
+        let path = checked(path);
+        if access == FileAccess::Create {
+            if self.exists(path) {
+                return Err(FtpError::FILE_EXISTS);
+            }
+            self.changes += 1;
+            self.files.insert(path.into(), Vec::new());
+        }
+        let size = self.files.get(path).ok_or(FtpError::FILE_NOT_FOUND)?.len() as u32;
+        self.open.push(Some(path.into()));
+        Ok((self.open.len() - 1, size))
+    }
+
+    fn close(&mut self, file: usize) {
+        assert!(self.open[file].take().is_some(), "closed twice");
+    }
+
+    fn read(&mut self, file: usize, offset: u32, into: &mut [u8]) -> Result<usize, FtpError> {
+        assert!(!into.is_empty());
+        let bytes = self.files.get(self.file(file)).ok_or(FtpError::FAIL)?;
+        let rest = bytes.get(offset as usize..).unwrap_or_default();
+        let count = rest.len().min(into.len());
+        into[..count].copy_from_slice(&rest[..count]);
+        Ok(count)
+    }
+
+    fn entry(&mut self, directory: &FilePath, place: u32) -> Result<Option<DirectoryEntry>, FtpError> {
+        let directory = checked(directory);
+        if !self.directories.contains(directory) {
+            return Err(FtpError::FILE_NOT_FOUND);
+        }
+        let name = |path: &str| path.rsplit('/').next().expect("a name").try_into().expect("short");
+        let folders = self.directories.iter().filter(|path| !path.is_empty() && is_in(path, directory));
+        let folders = folders.map(|path| DirectoryEntry { name: name(path), size: None });
+        let files = self.files.iter().filter(|(path, _)| is_in(path, directory));
+        let files = files.map(|(path, bytes)| DirectoryEntry { name: name(path), size: Some(bytes.len() as u32) });
+        Ok(folders.chain(files).nth(place as usize))
+    }
+
+    fn write(&mut self, file: usize, offset: u32, bytes: &[u8]) -> Result<(), FtpError> {
+        self.changes += 1;
+        let path = self.file(file).to_owned();
+        let held = self.files.get_mut(&path).ok_or(FtpError::FAIL)?;
+        let end = offset as usize + bytes.len();
+        if end > 1 << 20 {
+            return Err(FtpError::FAIL);
+        }
+        held.resize(held.len().max(end), 0);
+        held[offset as usize..end].copy_from_slice(bytes);
+        Ok(())
+    }
+
+    fn change(&mut self, change: FileChange<'_>) -> Result<(), FtpError> {
+        self.changes += 1;
+        match change {
+            FileChange::Remove(path) => self.files.remove(checked(path)).map(drop).ok_or(FtpError::FILE_NOT_FOUND),
+            FileChange::CreateDirectory(path) if self.exists(checked(path)) => Err(FtpError::FILE_EXISTS),
+            FileChange::CreateDirectory(path) => {
+                self.directories.insert(checked(path).into());
+                Ok(())
+            }
+            FileChange::RemoveDirectory(path) => {
+                let path = checked(path);
+                let is_empty = !self.files.keys().chain(&self.directories).any(|it| !it.is_empty() && is_in(it, path));
+                let removed = !path.is_empty() && is_empty && self.directories.remove(path);
+                if removed { Ok(()) } else { Err(FtpError::FAIL) }
+            }
+            FileChange::Truncate(path, length) => {
+                let held = self.files.get_mut(checked(path)).ok_or(FtpError::FILE_NOT_FOUND)?;
+                held.truncate(length as usize);
+                Ok(())
+            }
+            FileChange::Rename(from, to) => {
+                let bytes = self.files.remove(checked(from)).ok_or(FtpError::FILE_NOT_FOUND)?;
+                self.files.insert(checked(to).into(), bytes);
+                Ok(())
+            }
+        }
+    }
+}
+
+impl LogStore for Memory {
+    fn count_logs(&mut self) -> u16 {
+        self.logs.len() as u16
+    }
+
+    fn log(&mut self, place: u16) -> Option<LogInfo> {
+        let size = self.logs.get(usize::from(place))?.len() as u32;
+        Some(LogInfo { size, utc_s: 1_700_000_000 + u32::from(place) })
+    }
+
+    fn read_log(&mut self, place: u16, offset: u32, into: &mut [u8]) -> usize {
+        let bytes = self.logs.get(usize::from(place)).and_then(|bytes| bytes.get(offset as usize..));
+        let bytes = bytes.unwrap_or_default();
+        let count = bytes.len().min(into.len());
+        into[..count].copy_from_slice(&bytes[..count]);
+        count
+    }
+
+    fn erase_logs(&mut self) -> bool {
+        self.logs.clear();
+        true
+    }
+}
+
+/// Bytes that are like no others.
+pub fn bytes(count: usize, seed: u32) -> Vec<u8> {
+    let next = |state: &mut u32| {
+        *state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        Some((*state >> 24) as u8)
+    };
+    std::iter::successors(Some(seed), |_| None)
+        .flat_map(|seed| {
+            let mut state = seed;
+            std::iter::from_fn(move || next(&mut state))
+        })
+        .take(count)
+        .collect()
+}

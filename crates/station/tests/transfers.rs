@@ -1,0 +1,312 @@
+//! Files and logs on the link that telemetry and commands share.
+#![allow(clippy::expect_used, clippy::indexing_slicing, clippy::panic, missing_docs, reason = "tests")]
+
+mod common;
+mod memory;
+
+use afbc_link::{
+    Address, Answer, Command, ComponentMetadata, Decoder, Downlink, FRAME_MAX, Fault, FileOpcode, FilePacket,
+    LogRequest, Message, MessageFormat, Question, Sender, Telemetry, Transfer, Uplink,
+};
+use afbc_onboard::{Configuration, Link, Readings, parameters::ParameterTable};
+use afbc_station::services::streams::{DEFAULTS, id};
+use afbc_station::{Comms, REPORT_MAX, Setup, Transfers};
+use afbc_types::State;
+use common::{Bench, STATION};
+use memory::{Memory, bytes};
+
+const OTHER: Address = Address { system: 245, component: 191 };
+const URI: &str = "mftp://etc/general.json";
+
+/// Everything that a vehicle with storage sends.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[allow(clippy::large_enum_variant, reason = "a test")]
+enum Sent {
+    Usual(Downlink),
+    Transfer(Transfer),
+}
+
+impl Message for Sent {
+    fn format(id: u32) -> Option<MessageFormat> {
+        Transfer::format(id).or_else(|| Downlink::format(id))
+    }
+
+    fn read(id: u32, payload: &[u8], receiver: Address) -> Result<Self, Fault> {
+        match Transfer::format(id) {
+            Some(_) => Transfer::read(id, payload, receiver).map(Sent::Transfer),
+            None => Downlink::read(id, payload, receiver).map(Sent::Usual),
+        }
+    }
+
+    fn write(&self, _: &mut [u8; 255]) -> (u32, u8) {
+        panic!("it is only read")
+    }
+}
+
+struct Vehicle {
+    bench: Bench,
+    transfers: Transfers<usize>,
+    store: Memory,
+    decoder: Decoder<Sent>,
+    /// Bytes sent so far, and those of them that transfers took.
+    bytes: [usize; 2],
+}
+
+impl Vehicle {
+    /// On a line of so many baud, with every stream at its default.
+    fn on(baud: u32) -> Self {
+        let mut bench = Bench::new();
+        bench.table =
+            ParameterTable::new(Configuration { link: Link { baud, ..Link::DEFAULT }, ..Configuration::default() });
+        bench.comms = Comms::with(Setup::of(&bench.table.configuration().link));
+        let mut store = Memory::with(&[("log/a.ulg", bytes(100_000, 4)), ("etc/general.json", b"{}".to_vec())]);
+        store.logs = vec![bytes(100_000, 4), bytes(50, 5)];
+        let transfers = Transfers::new(Some(ComponentMetadata::at(URI, 77)));
+        Vehicle { bench, transfers, store, decoder: Decoder::new(STATION), bytes: [0; 2] }
+    }
+
+    fn fills_the_line(mut self) -> Self {
+        for (message, _) in DEFAULTS {
+            self.hear(STATION, &Uplink::Command(Command::SetInterval { message, interval_us: 1_000 }));
+            self.step();
+        }
+        (0..100).for_each(|_| drop(self.step()));
+        self
+    }
+
+    fn hear(&mut self, from: Address, message: &impl Message) {
+        let mut buffer = [0; FRAME_MAX];
+        let frame = Sender::new(from).send(message, &mut buffer);
+        let update = self.bench.comms.receive_beside(frame, &mut self.transfers);
+        self.bench.inputs.merge(&update);
+    }
+
+    fn file(&mut self, from: Address, packet: FilePacket) {
+        self.hear(from, &Transfer::File { packet, to: Address { system: 1, component: 1 } });
+    }
+
+    fn log(&mut self, from: Address, request: LogRequest) {
+        self.hear(from, &Uplink::Question(Question::Log(request)));
+    }
+
+    fn step(&mut self) -> Vec<Sent> {
+        if self.bench.now_us.is_multiple_of(10_000) {
+            self.bench.measure(&State::default());
+        }
+        self.bench.now_us += 1000;
+        let Bench { flight, comms, table, inputs, taken, now_us, .. } = &mut self.bench;
+        inputs.take_into(taken);
+        let report = flight.tick(*now_us, taken, &Readings::NONE);
+        let (mut sent, mut count, mut transferred) = (Vec::new(), 0, 0);
+        let mut send = |frame: &[u8]| {
+            count += frame.len();
+            let id = u32::from_le_bytes([frame[7], frame[8], frame[9], 0]);
+            transferred += if Transfer::format(id).is_some() { frame.len() } else { 0 };
+            self.decoder.feed(frame, |_, message| sent.push(message));
+        };
+        comms.report(&report, 0.0, &mut send);
+        comms.parameters(table, &mut send);
+        comms.transfer(&mut self.transfers, &mut self.store, &mut send);
+        assert!(count <= REPORT_MAX, "{count} bytes");
+        self.bytes[0] += count;
+        self.bytes[1] += transferred;
+        sent
+    }
+
+    /// Steps until a message is what is wanted; returns it and the ticks that it took.
+    fn until<T>(&mut self, ticks: usize, wanted: impl Fn(&Sent) -> Option<T>) -> (T, usize) {
+        for tick in 1..=ticks {
+            if let Some(found) = self.step().iter().find_map(&wanted) {
+                return (found, tick);
+            }
+        }
+        panic!("not within {ticks} ticks")
+    }
+}
+
+fn file(sent: &Sent) -> Option<(FilePacket, Address)> {
+    match sent {
+        Sent::Transfer(Transfer::File { packet, to }) => Some((*packet, *to)),
+        _ => None,
+    }
+}
+
+fn text(sent: &Sent) -> Option<String> {
+    match sent {
+        Sent::Usual(Downlink::Text { text, .. }) => text.to_str().ok().map(str::to_owned),
+        _ => None,
+    }
+}
+
+/// On a full line as on an idle one, and to the station that asks.
+#[test]
+fn requests_are_answered_in_time() {
+    for baud in [57_600, 921_600] {
+        for full in [false, true] {
+            let mut vehicle = Vehicle::on(baud);
+            if full {
+                vehicle = vehicle.fills_the_line();
+            }
+            for (from, sequence) in [(STATION, 3), (OTHER, 3)] {
+                vehicle.file(from, FilePacket::request(sequence, FileOpcode::LIST_DIRECTORY, 0, 0, 0).with(b"/"));
+                let ((packet, to), _) = vehicle.until(250, file);
+                assert_eq!((packet.data(), to), (Some(&b"Detc\0Dlog\0"[..]), from));
+                (0..100).for_each(|_| drop(vehicle.step()));
+            }
+            vehicle.log(STATION, LogRequest::List { first: 0, last: 0xFFFF });
+            let entry = |sent: &Sent| match sent {
+                Sent::Transfer(Transfer::LogEntry(entry)) => Some(*entry),
+                _ => None,
+            };
+            let (first, _) = vehicle.until(250, entry);
+            assert_eq!((first.log, first.count, first.size), (0, 2, 100_000));
+        }
+    }
+}
+
+/// A download takes what is left of the line and a fifth of it at least: it takes no more of a full line, and answers
+/// to commands wait for none of it.
+#[test]
+fn a_download_shares_the_line() {
+    for baud in [57_600, 921_600] {
+        for full in [false, true] {
+            let mut vehicle = Vehicle::on(baud);
+            if full {
+                vehicle = vehicle.fills_the_line();
+            }
+            let measure = |vehicle: &mut Vehicle| {
+                let [all_before, transferred_before] = vehicle.bytes;
+                let mut waited = 0;
+                for second in 0..5 {
+                    let command = 30_000 + second;
+                    vehicle.hear(STATION, &Uplink::Command(Command::Other(command)));
+                    let is_answer = |sent: &Sent| match sent {
+                        Sent::Usual(Downlink::Answer { command: answered, .. }) => (*answered == command).then_some(()),
+                        _ => None,
+                    };
+                    let ((), ticks) = vehicle.until(1000, is_answer);
+                    waited = waited.max(ticks);
+                    (ticks..1000).for_each(|_| drop(vehicle.step()));
+                }
+                let transferred = vehicle.bytes[1] - transferred_before;
+                (vehicle.bytes[0] - all_before - transferred, transferred, waited)
+            };
+            // All that may be sent in five seconds.
+            let budget = 5 * baud as usize / 10 * 9 / 10;
+            let (before, none, _) = measure(&mut vehicle);
+            vehicle.store.logs[0] = bytes(1_000_000, 4);
+            vehicle.log(STATION, LogRequest::Data { log: 0, offset: 0, bytes: u32::MAX });
+            let (during, transferred, waited) = measure(&mut vehicle);
+            assert_eq!(none, 0);
+            assert!(during + transferred <= budget + 700, "{during} and {transferred} of {budget} bytes");
+            assert!(waited <= 2, "answered after {waited} ms");
+            // A fifth at least, and all that telemetry leaves; telemetry keeps the rest.
+            let spare = budget.saturating_sub(before).max(budget / 5);
+            assert!(transferred * 100 >= spare * 90, "{transferred} of {spare} bytes");
+            let kept = before.min(budget * 4 / 5);
+            assert!(during * 100 >= kept * 97, "{during} of {kept} bytes");
+        }
+    }
+}
+
+#[test]
+fn a_file_is_downloaded_in_bursts() {
+    let mut vehicle = Vehicle::on(921_600);
+    vehicle.file(STATION, FilePacket::request(1, FileOpcode::OPEN_FILE_RO, 0, 0, 0).with(b"/log/a.ulg"));
+    let ((opened, _), _) = vehicle.until(250, file);
+    assert_eq!(opened.opcode, FileOpcode::ACK);
+    let mut read: Vec<u8> = Vec::new();
+    let mut sequence = 100;
+    'file: loop {
+        sequence += 1000;
+        let offset = read.len() as u32;
+        vehicle.file(STATION, FilePacket::request(sequence, FileOpcode::BURST_READ_FILE, opened.session, offset, 239));
+        let mut complete = false;
+        while !complete {
+            for (packet, to) in vehicle.step().iter().filter_map(file) {
+                assert_eq!(to, STATION);
+                if packet.opcode == FileOpcode::NAK {
+                    break 'file;
+                }
+                read.extend(packet.data().expect("data"));
+                complete = packet.burst_complete;
+            }
+        }
+    }
+    assert!(read == vehicle.store.files["log/a.ulg"]);
+}
+
+/// MAVProxy asks for twenty gaps of a log at once.
+#[test]
+fn many_requests_at_once_are_kept() {
+    let mut vehicle = Vehicle::on(921_600);
+    let gaps: Vec<u32> = (0..20).map(|gap| 450 * gap).collect();
+    for offset in &gaps {
+        vehicle.log(STATION, LogRequest::Data { log: 0, offset: *offset, bytes: 90 });
+    }
+    let sent: Vec<_> = (0..250).flat_map(|_| vehicle.step()).collect();
+    let filled = sent.iter().filter_map(|sent| match sent {
+        Sent::Transfer(Transfer::LogData(part)) => Some(part.offset),
+        _ => None,
+    });
+    assert_eq!(filled.collect::<Vec<_>>(), gaps);
+}
+
+#[test]
+fn metadata_is_told_on_request() {
+    let mut vehicle = Vehicle::on(57_600).fills_the_line();
+    for message in [397, 395] {
+        vehicle.hear(STATION, &Uplink::Command(Command::RequestMessage { message, index: 0 }));
+        let (mut answered, mut told) = (None, None);
+        for _ in 0..250 {
+            for sent in vehicle.step() {
+                match sent {
+                    Sent::Usual(Downlink::Answer { command: 512, answer, to }) => answered = Some((answer, to)),
+                    Sent::Transfer(Transfer::Metadata(metadata)) => told = Some((397, metadata)),
+                    Sent::Transfer(Transfer::Information(metadata)) => told = Some((395, metadata)),
+                    _ => (),
+                }
+            }
+        }
+        assert_eq!(answered, Some((Answer::Accepted, STATION)));
+        let (kind, metadata) = told.expect("told");
+        assert_eq!((kind, metadata.crc, metadata.time_ms > 0), (message, 77, true));
+        assert!(metadata.uri.starts_with(URI.as_bytes()) && metadata.uri[URI.len()] == 0);
+    }
+    // Others are requested as ever, and it is told that there are files.
+    vehicle.hear(STATION, &Uplink::Command(Command::RequestMessage { message: id::AUTOPILOT_VERSION, index: 0 }));
+    let (capabilities, _) = vehicle.until(250, |sent| match sent {
+        Sent::Usual(Downlink::Telemetry(Telemetry::Version(version))) => Some(version.capabilities),
+        _ => None,
+    });
+    assert_eq!(capabilities & 32, 32);
+}
+
+#[test]
+fn logs_are_erased_while_disarmed_and_by_the_station_in_control() {
+    let mut vehicle = Vehicle::on(921_600);
+    vehicle.bench = Bench::flying();
+    vehicle.log(STATION, LogRequest::Erase);
+    let (refused, _) = vehicle.until(50, text);
+    assert_eq!((refused.as_str(), vehicle.store.logs.len()), ("logs are erased while disarmed only", 2));
+    let remove = FilePacket::request(1, FileOpcode::REMOVE_FILE, 0, 0, 0).with(b"/log/a.ulg");
+    vehicle.file(STATION, remove);
+    let ((packet, _), _) = vehicle.until(50, file);
+    assert_eq!((packet.opcode, packet.data()), (FileOpcode::NAK, Some(&[9][..])));
+
+    let mut vehicle = Vehicle::on(921_600);
+    vehicle.step();
+    // Whoever commands something is in control; others may look, but not erase.
+    vehicle.hear(STATION, &Uplink::Command(Command::Speed(1.0)));
+    vehicle.log(OTHER, LogRequest::Erase);
+    vehicle.file(OTHER, remove);
+    let ((packet, to), _) = vehicle.until(50, file);
+    assert_eq!((packet.opcode, packet.data(), to), (FileOpcode::NAK, Some(&[9][..]), OTHER));
+    assert_eq!((vehicle.store.logs.len(), vehicle.store.changes), (2, 0));
+    vehicle.log(STATION, LogRequest::Erase);
+    vehicle.until(50, |sent| text(sent).filter(|text| text == "logs erased"));
+    assert!(vehicle.store.logs.is_empty());
+    vehicle.file(STATION, FilePacket { sequence: 2, ..remove });
+    let ((packet, _), _) = vehicle.until(50, file);
+    assert_eq!((packet.opcode, vehicle.store.changes), (FileOpcode::ACK, 1));
+}

@@ -1,0 +1,108 @@
+//! A BMI270 on SPI: the registers that its driver is tested against, and the bytes on the wire around them.
+
+#[allow(dead_code, reason = "shared with the driver's tests, which use all of it")]
+#[path = "../../../crates/drivers/tests/bmi270_model/mod.rs"]
+mod bmi270_model;
+
+use bmi270_model::Bmi270Registers;
+use rigless::chip::Timeline;
+use rigless::chip::spi::Peer;
+use rigless::snapshot::{Error, Reader, Store, Writer};
+
+/// Of CHIP_ID.
+const IDENTITY: u8 = 0x24;
+/// Registers.
+const REGISTERS: usize = 128;
+/// Bit of the first byte that asks for a reading, which begins after one byte of no meaning (5.2 of the data sheet's
+/// section on its interfaces).
+const READS: u8 = 0x80;
+
+/// Where a transfer is.
+#[derive(Debug, Default)]
+enum Phase {
+    #[default]
+    Idle,
+    Address,
+    Dummy(u8),
+    /// What is read, and the next byte of it.
+    Reads(Vec<u8>, usize),
+    /// What is written from this register on.
+    Writes(u8, Vec<u8>),
+}
+
+/// A BMI270.
+#[derive(Debug)]
+pub struct Bmi270 {
+    registers: Bmi270Registers,
+    phase: Phase,
+}
+
+impl Bmi270 {
+    pub fn new() -> Self {
+        // Its words have the plant's noise.
+        let mut registers = Bmi270Registers::new(IDENTITY, |_, _| 0.0);
+        registers.rates_deg_s = [0.0; 3];
+        registers.force_g = [0.0, 0.0, 1.0];
+        Bmi270 { registers, phase: Phase::Idle }
+    }
+
+    /// Feels rates [mdeg/s], specific force [1e-6 g] and a temperature [0.01 degrees C], on its own axes.
+    pub fn feel(&mut self, rate: [i32; 3], force: [i32; 3], temperature: i32) {
+        self.registers.rates_deg_s = rate.map(|rate| f64::from(rate) * 1e-3);
+        self.registers.force_g = force.map(|force| f64::from(force) * 1e-6);
+        self.registers.temperature_c = f64::from(temperature) * 1e-2;
+    }
+}
+
+impl Peer for Bmi270 {
+    fn transfer(&mut self, mosi: u32, _: u8, context: &mut Timeline<'_, '_>) -> u32 {
+        let now_us = context.now().0 / 1000;
+        let byte = mosi as u8;
+        let (phase, answer) = match std::mem::take(&mut self.phase) {
+            Phase::Idle => (Phase::Idle, 0xFF),
+            Phase::Address if byte & READS != 0 => (Phase::Dummy(byte & !READS), 0),
+            Phase::Address => (Phase::Writes(byte, Vec::new()), 0),
+            Phase::Dummy(register) => {
+                let mut bytes = vec![0; REGISTERS - usize::from(register)];
+                self.registers.read(now_us, register, &mut bytes);
+                (Phase::Reads(bytes, 0), 0)
+            }
+            Phase::Reads(bytes, at) => {
+                let answer = bytes.get(at).copied().unwrap_or_default();
+                (Phase::Reads(bytes, at + 1), answer)
+            }
+            Phase::Writes(register, mut bytes) => {
+                bytes.push(byte);
+                (Phase::Writes(register, bytes), 0)
+            }
+        };
+        self.phase = phase;
+        answer.into()
+    }
+
+    fn select(&mut self, _: &mut Timeline<'_, '_>) {
+        self.phase = Phase::Address;
+    }
+
+    fn deselect(&mut self, context: &mut Timeline<'_, '_>) {
+        if let Phase::Writes(register, bytes) = std::mem::take(&mut self.phase) {
+            self.registers.write(context.now().0 / 1000, register, &bytes);
+        }
+    }
+}
+
+/// A snapshot is taken between two transfers.
+impl Store for Bmi270 {
+    fn store(&self, to: &mut Writer) -> Result<(), Error> {
+        let Bmi270Registers { registers, is_spi, reset_us, awake_us, loaded, started_us, on_us, .. } = &self.registers;
+        to.put(&(registers.to_vec(), is_spi, reset_us, awake_us, loaded, started_us, on_us))
+    }
+
+    fn load(&mut self, from: &mut Reader) -> Result<(), Error> {
+        let part = &mut self.registers;
+        let values: Vec<u8>;
+        (values, part.is_spi, part.reset_us, part.awake_us, part.loaded, part.started_us, part.on_us) = from.take()?;
+        part.registers.iter_mut().zip(values).for_each(|(register, value)| *register = value);
+        Ok(())
+    }
+}

@@ -1,0 +1,350 @@
+//! Boards with an STM32F405, of the models of an STM32F427, which has nearly the STM32F405's map and shares its manual.
+//! What each has, and where, is a row of [`wiring::WIRINGS`]; at its I2C and its receiver's UART there is the usual
+//! module with receiver and compass. Where the models differ from all of these boards:
+//!
+//! | here | on the board |
+//! |---|---|
+//! | 2 MiB of flash, 256 KiB of RAM, 91 interrupts | 1 MiB, 192 KiB, 82 |
+//! | identity of an STM32F42x (`DBGMCU_IDCODE`) | of an STM32F405 |
+//! | DPS310 | SPL06-001 on two of them, with the same registers |
+//! | no USB | USB on PA11 and PA12 |
+//! | no line from the IMU's interrupt | a pin, by which it is read |
+
+mod bmi270;
+mod part;
+mod relabelled;
+mod wiring;
+
+use crate::impairments::Impairments;
+use crate::machine::{Divider, Machine, Signal};
+use crate::wire::Wire;
+use bmi270::Bmi270;
+use part::Part;
+use relabelled::Relabelled;
+use rigless::chip::dps310::{Dps310, Sdo};
+use rigless::chip::icm42688p::Icm42688p;
+use rigless::chip::nmea;
+use rigless::chip::qmc5883l::Qmc5883l;
+use rigless::chip::uart::Peer;
+use rigless::chip::{Placed, uart};
+use rigless::cpu;
+use rigless::device::Level;
+use rigless::edge::{Edge, Field, Sensed};
+use rigless::machine::armv7m;
+use rigless::machine::flight::{AT_REST, Actuate, Actuator, Curve, Outputs, SIGNAL_FIELDS, Signals};
+use rigless::machine::{Board, HostWire, Target};
+use rigless::mcu::Mcu;
+use rigless::snapshot::{Error as SnapshotError, Reader, Store, Writer};
+use rigless::soc::Error;
+use rigless::soc::stm32f427::peripherals::gpio::Pin;
+use rigless::soc::stm32f427::peripherals::spi::Select;
+use rigless::soc::stm32f427::peripherals::tim::Channel;
+use rigless::time::VirtualNanos;
+use serde::{Deserialize, Serialize};
+use std::num::{NonZeroU32, NonZeroU64};
+use std::ops::Range;
+use wiring::{Inertial, Sensors, Timer, UART4, WIRINGS, Wiring};
+
+const CRYSTAL_HZ: u64 = 8_000_000;
+const RAIL_MV: u32 = 3_300;
+const LINK_WIRE: HostWire = HostWire { name: "serial1", port: 5760 };
+/// SPI1, and the place of the IMU on it.
+const SPI: usize = 0;
+const IMU: usize = 0;
+/// Places on the I2C.
+const BAROMETER: usize = 0;
+const COMPASS: usize = 1;
+const CURVE: Curve = Curve { zero: VirtualNanos(1_000_000), full: VirtualNanos(2_000_000) };
+/// The names of the noise on each quantity, by which it is drawn.
+const RATE_NOISE: [&str; 3] = ["rate.noise.x", "rate.noise.y", "rate.noise.z"];
+const FORCE_NOISE: [&str; 3] = ["force.noise.x", "force.noise.y", "force.noise.z"];
+const FIELD_NOISE: [&str; 3] = ["field.noise.x", "field.noise.y", "field.noise.z"];
+const PRESSURE_NOISE: [&str; 1] = ["pressure.noise"];
+
+/// What the chips were given last, on the body's axes.
+#[derive(Debug, Default, Serialize, Deserialize)]
+struct Handed {
+    rate: Sensed<i32, 3>,
+    force: Sensed<i32, 3>,
+    field: Sensed<i32, 3>,
+    pressure: Sensed<u32, 1>,
+}
+
+/// The board of a row of [`WIRINGS`].
+#[derive(Debug)]
+pub struct F405<const ROW: usize> {
+    mcu: Part,
+    impairments: Impairments,
+    handed: Handed,
+    sensed: Signals,
+}
+
+impl<const ROW: usize> F405<ROW> {
+    const WIRING: Wiring = WIRINGS[ROW];
+
+    /// Returns the board as it is built, at rest.
+    fn new() -> Result<Self, Error> {
+        let mut board = F405 {
+            mcu: Part::new(&Self::WIRING)?,
+            impairments: Impairments::default(),
+            handed: Handed::default(),
+            sensed: AT_REST,
+        };
+        let part = &mut board.mcu.stm32;
+        part.rcc.attach_crystals(CRYSTAL_HZ, 0);
+        part.set_supply(RAIL_MV);
+        if let Some(Sensors { imu, select: (port, pin), i2c, receiver, .. }) = Self::WIRING.sensors {
+            let select = Select { port, pin: Pin::new(pin).expect("one of sixteen pins"), active: Level::Low };
+            match imu {
+                Inertial::Icm42688p => part.spi[SPI].attach_selected(Icm42688p::new(), select),
+                Inertial::Bmi270 => part.spi[SPI].attach_selected(Bmi270::new(), select),
+                Inertial::Relabelled(identity) => {
+                    part.spi[SPI].attach_selected(Relabelled::new(identity), select);
+                }
+            }
+            part.i2c[i2c].attach(Dps310::new(Sdo::Low));
+            part.i2c[i2c].attach(Qmc5883l::new());
+            part.usart[receiver.index].attach(nmea::Receiver::new());
+        }
+        board.sense(&AT_REST);
+        Ok(board)
+    }
+
+    /// The core, as that of every STM32F4 (PM0214).
+    fn config(&self) -> armv7m::Config {
+        let bus = self.mcu.bus();
+        let core = armv7m::Core {
+            variant: armv7m::Variant::M4,
+            clock_hz: NonZeroU64::new(168_000_000).expect("a clock"),
+            interrupt_lines: NonZeroU32::new(bus.cpu().interrupt_lines.into()).expect("interrupts"),
+            priority_bits: 4,
+            refclk_divider: NonZeroU32::new(8).expect("a divider"),
+            instructions_per_second: armv7m::INSTRUCTIONS_PER_SECOND,
+            boot: "flash",
+        };
+        let mut config = armv7m::Config::new(core, &cpu::armv7m::windows(bus));
+        config.fpu = armv7m::Fpu::FpV4Sp;
+        config.mpu_regions = armv7m::MpuRegions::Eight;
+        config
+    }
+}
+
+impl<const ROW: usize> Store for F405<ROW> {
+    fn store(&self, to: &mut Writer) -> Result<(), SnapshotError> {
+        to.put(&self.impairments)?;
+        to.put(&self.handed)?;
+        to.put(&self.sensed)?;
+        self.mcu.stm32.store(to)
+    }
+
+    fn load(&mut self, from: &mut Reader) -> Result<(), SnapshotError> {
+        self.impairments = from.take()?;
+        self.handed = from.take()?;
+        self.sensed = from.take()?;
+        self.mcu.stm32.load(from)
+    }
+}
+
+impl<const ROW: usize> Board for F405<ROW> {
+    fn name(&self) -> &'static str {
+        Self::WIRING.name
+    }
+
+    fn target_names(&self) -> Vec<&'static str> {
+        vec!["stm32f405"]
+    }
+
+    fn mcu(&mut self, target: usize) -> Option<&mut dyn Mcu> {
+        (target == 0).then_some(&mut self.mcu)
+    }
+
+    fn targets(&mut self) -> Vec<Target<'_>> {
+        let core = self.config().spec();
+        vec![Target::new("stm32f405", &mut self.mcu, core)]
+    }
+
+    fn hosts(&self) -> Vec<HostWire> {
+        vec![LINK_WIRE]
+    }
+
+    fn attach_host(&mut self, name: &str, peer: Box<dyn Peer>) -> bool {
+        let is_link = name == LINK_WIRE.name;
+        if is_link {
+            self.mcu.stm32.usart[Self::WIRING.link.index].attach_boxed(peer);
+        }
+        is_link
+    }
+
+    fn host_mut(&mut self, name: &str) -> Option<&mut dyn Peer> {
+        if name == LINK_WIRE.name { self.mcu.stm32.usart[Self::WIRING.link.index].peer_mut() } else { None }
+    }
+}
+
+/// The body's axes (forward, right, down) as an inertial sensor (x, y to the left of x, z up) has them that is turned
+/// clockwise by so many quarters, seen from above.
+fn of_imu([x, y, z]: [i32; 3], quarter_turns: u8) -> [i32; 3] {
+    let turn = |[x, y]: [i32; 2], _| [y, x.saturating_neg()];
+    let [x, y] = (0..quarter_turns).fold([x, y], turn);
+    [x, y.saturating_neg(), z.saturating_neg()]
+}
+
+/// The body's axes as the compass of the module has them: its x points to the right, its z down.
+fn of_compass([x, y, z]: [i32; 3]) -> [i32; 3] {
+    [y, x.saturating_neg(), z]
+}
+
+impl<const ROW: usize> Edge for F405<ROW> {
+    type Signals = Signals;
+    type Outputs = Outputs<4>;
+    type Conditions = Impairments;
+    const FIELDS: &'static [Field] = SIGNAL_FIELDS;
+    const OUTPUT_FIELDS: &'static [Field] = Outputs::<4>::FIELDS;
+    const REST: Signals = AT_REST;
+    const CHIPS: &'static [&'static str] = &["imu"];
+
+    fn place(&mut self, chip: usize) -> Option<&mut dyn Placed> {
+        if chip == 0 { self.mcu.stm32.spi[SPI].place_mut(IMU) } else { None }
+    }
+
+    fn sense(&mut self, signals: &Signals) {
+        self.sensed = *signals;
+        let Some(Sensors { imu, quarter_turns, i2c, receiver, .. }) = Self::WIRING.sensors else { return };
+        let F405 { mcu: Part { stm32: part, .. }, impairments, handed, .. } = self;
+        let rate = of_imu(handed.rate.hand(signals.angular_rate, &impairments.imus[0].rate), quarter_turns);
+        let force = of_imu(handed.force.hand(signals.specific_force, &impairments.imus[0].force), quarter_turns);
+        match imu {
+            Inertial::Icm42688p => {
+                let chip: &mut Icm42688p = part.spi[SPI].chip_mut(IMU).expect("attached");
+                chip.set_rate(rate[0], rate[1], rate[2]);
+                chip.set_acceleration(force[0], force[1], force[2]);
+                chip.set_temperature(signals.temperature);
+            }
+            Inertial::Bmi270 => {
+                let chip: &mut Bmi270 = part.spi[SPI].chip_mut(IMU).expect("attached");
+                chip.feel(rate, force, signals.temperature);
+            }
+            Inertial::Relabelled(_) => {
+                let chip: &mut Relabelled = part.spi[SPI].chip_mut(IMU).expect("attached");
+                chip.inner.set_rate(rate[0], rate[1], rate[2]);
+                chip.inner.set_acceleration(force[0], force[1], force[2]);
+                chip.inner.set_temperature(signals.temperature);
+            }
+        }
+        let barometer: &mut Dps310 = part.i2c[i2c].chip_mut(BAROMETER).expect("attached");
+        let [pressure] = handed.pressure.hand([signals.pressure], &impairments.barometer.pressure);
+        barometer.set_pressure(pressure);
+        barometer.set_temperature(signals.temperature);
+        let compass: &mut Qmc5883l = part.i2c[i2c].chip_mut(COMPASS).expect("attached");
+        let [x, y, z] = of_compass(handed.field.hand(signals.magnetic_field, &impairments.compass.field));
+        compass.set_field(x, y, z);
+        compass.set_temperature(signals.temperature);
+        let receiver: &mut nmea::Receiver = part.usart[receiver.index].chip_mut().expect("attached");
+        receiver.set_position(signals.position);
+        receiver.set_velocity(signals.velocity);
+    }
+
+    fn condition(&mut self, impairments: &Impairments) {
+        self.impairments = *impairments;
+        let Some(Sensors { i2c, receiver, .. }) = Self::WIRING.sensors else { return };
+        let part = &mut self.mcu.stm32;
+        let are_there = [
+            part.spi[SPI].silence(IMU, impairments.imus[0].silent),
+            part.i2c[i2c].silence(BAROMETER, impairments.barometer.silent),
+            part.i2c[i2c].silence(COMPASS, impairments.compass.silent),
+            part.usart[receiver.index].silence(impairments.receiver.silent),
+        ];
+        assert_eq!(are_there, [true; 4]);
+        let errors = part.usart[receiver.index].errors_mut();
+        errors.noise = uart::Rate { name: "gps.noise_errors", per_million: impairments.receiver.noise_errors };
+        errors.framing = uart::Rate { name: "gps.framing_errors", per_million: impairments.receiver.framing_errors };
+        let sensed = self.sensed;
+        self.sense(&sensed);
+    }
+
+    fn draw(&mut self, seed: u64, index: u64) {
+        let F405 { impairments, handed, .. } = self;
+        let moved = [
+            handed.rate.draw(&impairments.imus[0].rate, &RATE_NOISE, seed, index),
+            handed.force.draw(&impairments.imus[0].force, &FORCE_NOISE, seed, index),
+            handed.field.draw(&impairments.compass.field, &FIELD_NOISE, seed, index),
+            handed.pressure.draw(&impairments.barometer.pressure, &PRESSURE_NOISE, seed, index),
+        ];
+        if let Some(Sensors { receiver, .. }) = Self::WIRING.sensors {
+            self.mcu.stm32.usart[receiver.index].errors_mut().seed = seed;
+        }
+        if moved.contains(&true) {
+            let sensed = self.sensed;
+            self.sense(&sensed);
+        }
+    }
+
+    fn drive(&mut self) -> Outputs<4> {
+        let part = &mut self.mcu.stm32;
+        Outputs(Self::WIRING.motors.map(|(name, timer, channel)| {
+            let channel = Channel::new(channel).expect("one of four");
+            let pulse = match timer {
+                Timer::General(nth) => {
+                    let (timer, registers) = part.timer(nth);
+                    timer.pulse(channel, registers)
+                }
+                Timer::Advanced(nth) => {
+                    let (timer, registers) = part.advanced_timer(nth);
+                    timer.pulse(channel, registers)
+                }
+            };
+            Actuator::on(name, pulse, CURVE)
+        }))
+    }
+}
+
+impl<const ROW: usize> Machine for F405<ROW> {
+    /// RM0090, 21.4.
+    const WATCHDOG: u64 = 0x4000_3000;
+    const STORE: u64 = 0x0800_4000;
+    const STORE_WORD: usize = 4;
+    const STORES: bool = false;
+    const MOTORS: Range<usize> = 0..4;
+    const SIGNAL: Signal = Signal::Dshot600(Self::WIRING.timers);
+    const IMUS: &'static [usize] = if Self::WIRING.sensors.is_some() { &[0] } else { &[] };
+    const UART_INTERRUPTS: [u16; 2] = [Self::WIRING.link.interrupt, Self::WIRING.receiver().interrupt];
+    const RECEIVER: Divider = Self::WIRING.receiver().divider;
+    const JITTER: u64 = 300_000;
+    const BATTERY_MV: Option<u16> = None;
+    /// USB: the core's fourth hardware configuration register.
+    const UNMAPPED: &[u64] = &[0x5000_0050];
+
+    fn built() -> Result<Box<Self>, Error> {
+        F405::new().map(Box::new)
+    }
+
+    fn motors(&mut self) -> Vec<Actuator> {
+        self.drive().actuators().to_vec()
+    }
+
+    /// The second link is by USB.
+    fn attach_second_link(&mut self, _: Wire) -> bool {
+        false
+    }
+
+    fn attach_receiver(&mut self, receiver: Box<dyn Peer>) {
+        self.mcu.stm32.usart[Self::WIRING.receiver().index].attach_boxed(receiver);
+    }
+
+    fn impair(&mut self, impairments: &Impairments) {
+        self.condition(impairments);
+    }
+
+    fn link_errors(&mut self) -> &mut uart::Errors {
+        self.mcu.stm32.usart[Self::WIRING.link.index].errors_mut()
+    }
+}
+
+impl Wiring {
+    /// Its receiver's UART; where there is none, one that it has no pads of.
+    const fn receiver(&self) -> wiring::Uart {
+        match self.sensors {
+            Some(sensors) => sensors.receiver,
+            None => UART4,
+        }
+    }
+}

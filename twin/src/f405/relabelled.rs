@@ -1,0 +1,65 @@
+//! An ICM-20608-G that calls itself another part of its family, which shares its registers of readings, of ranges and
+//! of power. Where the MPU-6000 differs, it is not that part: no ACCEL_CONFIG_2, another thermometer, another filter.
+
+use rigless::chip::Timeline;
+use rigless::chip::icm20608::Icm20608;
+use rigless::chip::spi::Peer;
+use rigless::snapshot::{Error, Reader, Store, Writer};
+
+const WHO_AM_I: u8 = 0x75;
+const READS: u8 = 0x80;
+
+#[derive(Debug)]
+pub struct Relabelled {
+    pub inner: Icm20608,
+    identity: u8,
+    /// The register that the next byte of a reading is from; none outside a reading.
+    register: Option<u8>,
+    /// The next byte is the first.
+    is_first: bool,
+}
+
+impl Relabelled {
+    /// A part with this identity.
+    pub fn new(identity: u8) -> Self {
+        Relabelled { inner: Icm20608::new(), identity, register: None, is_first: false }
+    }
+}
+
+impl Peer for Relabelled {
+    fn transfer(&mut self, mosi: u32, bits: u8, context: &mut Timeline<'_, '_>) -> u32 {
+        let answer = self.inner.transfer(mosi, bits, context);
+        if std::mem::take(&mut self.is_first) {
+            let byte = mosi as u8;
+            self.register = (byte & READS != 0).then_some(byte & !READS);
+            return answer;
+        }
+        let register = self.register;
+        self.register = register.map(|register| register.wrapping_add(1));
+        if register == Some(WHO_AM_I) { self.identity.into() } else { answer }
+    }
+
+    fn select(&mut self, context: &mut Timeline<'_, '_>) {
+        (self.register, self.is_first) = (None, true);
+        self.inner.select(context);
+    }
+
+    fn deselect(&mut self, context: &mut Timeline<'_, '_>) {
+        self.inner.deselect(context);
+    }
+
+    fn restarted(&mut self, context: &mut Timeline<'_, '_>) {
+        self.inner.restarted(context);
+    }
+}
+
+/// A snapshot is taken between two transfers.
+impl Store for Relabelled {
+    fn store(&self, to: &mut Writer) -> Result<(), Error> {
+        self.inner.store(to)
+    }
+
+    fn load(&mut self, from: &mut Reader) -> Result<(), Error> {
+        self.inner.load(from)
+    }
+}
