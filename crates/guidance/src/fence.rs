@@ -4,7 +4,6 @@
 //! The areas themselves are the link's, which looks at a few of their boundaries after each tick, and tells the
 //! guidance what it has found ([`FenceView`]).
 
-use crate::settings::Limits;
 use crate::shaper::Shape;
 use afbc_control::math::{max, min, sqrt};
 use nalgebra::Vector2;
@@ -41,15 +40,9 @@ pub struct Braking {
 }
 
 impl Braking {
-    /// Returns it of the limits, which it is flown with.
-    pub fn of(limits: &Limits) -> Self {
-        Braking { acceleration_m_s2: limits.acceleration_m_s2, jerk_m_s3: limits.jerk_m_s3 }
-    }
-}
-
-impl Default for Braking {
-    fn default() -> Self {
-        Braking::of(&Limits::DEFAULT)
+    /// With these largest values.
+    pub const fn new(acceleration_m_s2: f32, jerk_m_s3: f32) -> Self {
+        Braking { acceleration_m_s2, jerk_m_s3 }
     }
 }
 

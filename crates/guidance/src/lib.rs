@@ -43,7 +43,9 @@ pub use limiter::{Limiter, LimiterTarget};
 pub use mode::FlightMode;
 pub use net::{FailedSensors, Net};
 pub use notice::{Cause, ModeReason, Notice, Notices, Severity};
-pub use orbit::{ORBIT_RADIUS_M, OrbitHeading};
-pub use order::{AttitudeTarget, Item, Leg, MotionTarget, OffboardTarget, Order, OrderRefusal, Orders, Sticks};
+pub use orbit::ORBIT_RADIUS_M;
+pub use order::{
+    AttitudeTarget, Item, Leg, MotionTarget, OffboardTarget, OrbitHeading, Order, OrderRefusal, Orders, Sticks,
+};
 pub use settings::{Flying, Limits, Settings};
 pub use table::{FailsafeAction, TransitionInputs};

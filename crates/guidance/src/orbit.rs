@@ -2,6 +2,7 @@
 
 use crate::limiter::LimiterTarget;
 use crate::mode_io::{ModeInputs, ModeOutput};
+use crate::order::OrbitHeading;
 use crate::settings::Limits;
 use afbc_control::math::{cos, max, min, sin, sqrt, wrap_angle};
 use core::f32::consts::{FRAC_PI_2, PI};
@@ -18,19 +19,6 @@ const ALONG: f32 = 0.3;
 const NEAR_M: f32 = 0.5;
 /// Distance from where it should be on the circle at which it waits for the vehicle \[m\].
 const LATE_M: f32 = 2.0;
-
-/// Where the vehicle heads on a circle: `ORBIT_YAW_BEHAVIOUR` of MAVLink.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub enum OrbitHeading {
-    /// To the centre.
-    #[default]
-    Centre,
-    /// Where it headed before.
-    Kept,
-    /// Along the circle.
-    Along,
-}
 
 /// A circle, and how far it has been flown.
 #[derive(Clone, Copy, Debug, PartialEq)]

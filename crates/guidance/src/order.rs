@@ -2,9 +2,21 @@
 
 use crate::fence::FenceView;
 use crate::mode::FlightMode;
-use crate::orbit::OrbitHeading;
 use afbc_flight_core::{Queue, Stamped};
 use nalgebra::{UnitQuaternion, Vector2, Vector3};
+
+/// Where the vehicle heads on a circle: `ORBIT_YAW_BEHAVIOUR` of MAVLink.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum OrbitHeading {
+    /// To the centre.
+    #[default]
+    Centre,
+    /// Where it headed before.
+    Kept,
+    /// Along the circle.
+    Along,
+}
 
 /// Something to be done, answered once.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,5 +1,6 @@
 //! Parameters of the guidance. Those whose meaning is that of PX4's have PX4's name, numbers of actions included.
 
+use crate::fence::Braking;
 use crate::net::Net;
 use afbc_types::{Range, parameters};
 
@@ -43,6 +44,13 @@ parameters! {
         let least = |range: Range, least: f32| Range { min: least.into(), ..range };
         least(Limits::MPC_ACC_HOR_MAX.range, limits.acceleration_m_s2).check(limits.acceleration_max_m_s2)?;
         least(Limits::MPC_JERK_MAX.range, limits.jerk_m_s3).check(limits.jerk_max_m_s3)
+    }
+}
+
+impl Limits {
+    /// Returns with what the vehicle stops before a geofence.
+    pub const fn braking(&self) -> Braking {
+        Braking::new(self.acceleration_m_s2, self.jerk_m_s3)
     }
 }
 

@@ -21,7 +21,6 @@ use afbc_flight_core::rate;
 use afbc_flight_core::supervisor::COAST_US;
 use afbc_flight_core::tracker::{POSE_AGE_MAX_US, Refused, Sighting};
 use afbc_flight_core::{Mode, Stamped, Tracker};
-use afbc_guidance::fence::Braking;
 use afbc_guidance::{BatteryReading, Cause, ModeReason, Notice};
 use afbc_link::{
     Address, Decoder, Downlink, InertialSample, MavSeverity, Message, PositionTarget, Reboot, ReceivedFrame,
@@ -325,7 +324,7 @@ impl Comms {
         // COM_DL_LOSS_T, which is in range.
         let silent_us = (table.configuration().guidance.net.station_lost_s * 1e6) as u64;
         self.dispatcher.control.set_silence(silent_us);
-        self.dispatcher.braking = Braking::of(&table.configuration().guidance.limits);
+        self.dispatcher.braking = table.configuration().guidance.limits.braking();
         let mut outlet = self.outlet(self.left, send);
         let Dispatcher { parameters, streams, now_us, .. } = &mut self.dispatcher;
         while outlet.left >= VALUE_BYTES as usize + SIGNATURE

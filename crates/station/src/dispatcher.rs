@@ -20,7 +20,7 @@ use crate::services::{events, extended, files, logs, serial, timesync};
 use crate::setup::Setup;
 use crate::transfers::{TransferRequests, is_change};
 use afbc_guidance::fence::Braking;
-use afbc_guidance::{FenceView, Order};
+use afbc_guidance::{FenceView, Limits, Order};
 use afbc_link::telemetry::OrbitStatus;
 use afbc_link::{
     Address, Answer, Clock, ControlAnswer, DataStream, Downlink, Interval, MavSeverity, Mission, ParameterError,
@@ -114,7 +114,7 @@ impl Dispatcher {
             control: OperatorControl::default(),
             missions: Missions::default(),
             fence: FenceWatch::default(),
-            braking: Braking::default(),
+            braking: Limits::DEFAULT.braking(),
             fence_given: FenceView::default(),
             safe_m: None,
             safe_given_m: None,

@@ -61,7 +61,8 @@ impl PlanFlight {
         let (items, reached) = (plan.mission.len(), end.reached.len());
         let fence = plan.fence.len();
         print(&format!(
-            "{file}: {items} items, {fence} of the geofence, {} rally points; {reached} items reached in {:.1} s: {how}\n",
+            "{file}: {items} items, {fence} of the geofence, {} rally points; {reached} items reached in {:.1} s: \
+             {how}\n",
             plan.rally.len(),
             end.flight_s
         ))?;

@@ -4,6 +4,7 @@
 extern crate std;
 use super::*;
 use crate::limiter::{Limiter, LimiterTarget};
+use crate::settings::Limits;
 use afbc_types::State;
 use nalgebra::Vector3;
 use proptest::prelude::*;
@@ -75,7 +76,7 @@ proptest! {
         }
         let begun = limiter.setpoint().unwrap();
         let (p, v, a) = (begun.position_m.xy(), begun.velocity_m_s.xy(), begun.acceleration_m_s2.xy());
-        let path = StopPath::of_setpoint(&Braking::of(&limits), p, v, a);
+        let path = StopPath::of_setpoint(&limits.braking(), p, v, a);
         for _ in 0..40_000 {
             limiter.advance(&stop, DT_S);
             let now = limiter.setpoint().unwrap();
@@ -181,7 +182,7 @@ fn what_is_no_area_is_refused() {
 #[test]
 fn only_what_leads_to_the_boundary_counts() {
     let (a, b) = (Vector2::new(-50.0, 0.0), Vector2::new(50.0, 0.0));
-    let braking = Braking::default();
+    let braking = Limits::DEFAULT.braking();
     let nears = |y: f32, velocity: [f32; 2]| {
         let path = StopPath::of_vehicle(&braking, Vector2::new(0.0, y), velocity.into(), Vector2::zeros());
         path.nears_edge(a, b)

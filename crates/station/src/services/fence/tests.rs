@@ -6,7 +6,7 @@ use super::*;
 use crate::services::mission::{Missions, Surroundings};
 use crate::services::origin::{EarthOrigin, Global};
 use crate::services::texts::Words;
-use afbc_guidance::fence::Braking;
+use afbc_guidance::Limits;
 use afbc_link::{Address, Mission, Plan};
 use nalgebra::Vector3;
 use proptest::prelude::*;
@@ -163,7 +163,7 @@ proptest! {
         }));
         let truth = inside(&items, [x.into(), y.into()]);
         prop_assert_eq!(contains(&items, &chart, here_m), truth);
-        let stop = StopPath::of_vehicle(&Braking::default(), here_m, Vector2::zeros(), Vector2::zeros());
+        let stop = StopPath::of_vehicle(&Limits::DEFAULT.braking(), here_m, Vector2::zeros(), Vector2::zeros());
         let motion = FenceMotion { here_m, speed_m_s: 0.0, stops: [stop; 2] };
         let mut watch = FenceWatch::default();
         for _ in 0..items.len() {
@@ -223,7 +223,7 @@ proptest! {
         // As a fence, too, whatever it is.
         let chart = origin().chart();
         let _ = contains(&items, &chart, Vector2::zeros());
-        let stop = StopPath::of_vehicle(&Braking::default(), Vector2::zeros(), Vector2::zeros(), Vector2::zeros());
+        let stop = StopPath::of_vehicle(&Limits::DEFAULT.braking(), Vector2::zeros(), Vector2::zeros(), Vector2::zeros());
         let motion = FenceMotion { here_m: Vector2::zeros(), speed_m_s: 0.0, stops: [stop; 2] };
         let mut watch = FenceWatch::default();
         for _ in 0..80 {
