@@ -33,8 +33,8 @@ class Station:
     def __init__(self, port, key=None):
         self.mav = mavutil.mavlink_connection(f"udpin:127.0.0.1:{port}", dialect="common")
         self.captured = []
-        send = self.mav.write
-        self.mav.write = lambda buffer: (self.captured.append(bytes(buffer)), send(buffer))[1]
+        self.send = self.mav.write
+        self.mav.write = lambda buffer: (self.captured.append(bytes(buffer)), self.send(buffer))[1]
         self.use(key)
         # The address to answer to.
         while self.mav.recv_msg() is None:
@@ -46,6 +46,11 @@ class Station:
             self.mav.disable_signing()
         else:
             self.mav.setup_signing(key, sign_outgoing=True, initial_timestamp=now_10us())
+
+    def replay(self, frames):
+        """Sends frames that were captured, as they are."""
+        for frame in frames:
+            self.send(frame)
 
     def set_key(self, key):
         self.mav.mav.setup_signing_send(1, 1, list(key), now_10us())
@@ -90,8 +95,7 @@ def main():
         station.captured.clear()
         check(session, "with the key, it is", station.heard())
         check(session, "everything is signed with the key", station.flags() == {(1, True)})
-        for frame in station.captured:
-            station.mav.port.sendto(frame, station.mav.last_address)
+        station.replay(station.captured)
         check(session, "captured frames are not heard", not station.answered(1.0))
         # Later: the vehicle keeps its clock every two minutes.
         station.mav.mav.signing.timestamp += LATER_10US
@@ -105,11 +109,9 @@ def main():
         captured = station.captured
         station = Station(served.station, KEY)
         station.mav.mav.signing.timestamp += LATER_10US
-        for frame in captured:
-            station.mav.port.sendto(frame, station.mav.last_address)
+        station.replay(captured)
         check(session, "after a restart, the key is needed", not station.answered(1.0) and station.heard())
-        for frame in captured:
-            station.mav.port.sendto(frame, station.mav.last_address)
+        station.replay(captured)
         check(session, "captured frames are not heard then, either", not station.answered(1.0))
         station.set_key(bytes(32))
         time.sleep(0.2)

@@ -327,7 +327,9 @@ impl Host {
     /// The same firmware, freshly powered up, with this setup of its link.
     #[must_use]
     pub fn with(self, setup: Setup) -> Self {
-        Host { setup, comms: Comms::with(setup), ..self }
+        let mut comms = Comms::with(setup);
+        comms.set_signing(self.comms.signing().clone());
+        Host { setup, comms, ..self }
     }
 
     /// Returns the half that communicates.

@@ -2,7 +2,8 @@
 #![allow(clippy::unwrap_used, missing_docs, reason = "tests")]
 
 use afbc_link::{
-    Address, Command, Decoder, Downlink, FRAME_MAX, ParameterName, ParameterRequest, Reboot, Sender, Storage, Uplink,
+    Address, Command, Decoder, Downlink, FRAME_MAX, Key, ParameterName, ParameterRequest, Reboot, ReceivedFrame,
+    SIGNED_FRAME_MAX, Sender, SetupSigning, Stamp, Storage, Uplink,
 };
 use afbc_scenario::built_in;
 use afbc_serve::{ParameterFile, Server, fleet};
@@ -154,4 +155,49 @@ fn the_system_id_is_a_parameter() {
     assert_eq!((server.systems(), server.ambiguous()), (vec![7, 6, 7], Some(7)));
     drop(server);
     assert_eq!(Server::kept(&scenarios, 5, keepers()).unwrap().systems(), [7, 6, 7]);
+}
+
+/// Returns how many messages come in a tenth of a second, and how many of them are signed with this key.
+fn signed(server: &mut Server, key: &Key) -> [usize; 2] {
+    let (mut count, mut genuine) = (0, 0);
+    let mut decoder = Decoder::<Downlink>::new(STATION);
+    for _ in 0..100 {
+        let hear = |_, bytes: &[u8]| {
+            let accept = |frame: &ReceivedFrame<'_>| {
+                genuine += usize::from(frame.is_signed_by(key));
+                true
+            };
+            decoder.feed_accepted(bytes, accept, |_, _| count += 1);
+        };
+        let _ = server.step(hear, |_| ());
+    }
+    [count, genuine]
+}
+
+/// Over a restart of the server, and of the vehicle, which a signed command asks for.
+#[test]
+fn a_key_of_signatures_is_kept() {
+    let (file, key) = (fresh("signing"), Key([7; 32]));
+    let mut server = served(&file);
+    server.set_wired(true);
+    let setup = SetupSigning { key: Some(key), time_10us: 37_000_000_000_000 };
+    exchange(&mut server, Uplink::Signing(setup));
+    let [count, genuine] = signed(&mut server, &key);
+    assert!(count > 0 && genuine == count, "{genuine} of {count}");
+    drop(server);
+
+    let mut server = served(&file);
+    let [count, genuine] = signed(&mut server, &key);
+    assert!(count > 0 && genuine == count, "after a restart: {genuine} of {count}");
+    let stamp = Stamp { link: 0, time_10us: 37_000_100_000_000 };
+    let reboot = Uplink::Command(Command::Reboot(Reboot::Program));
+    let mut buffer = [0; SIGNED_FRAME_MAX];
+    server.hear(0, 1, Sender::new(STATION).send_signed(&reboot, Some((&key, stamp)), &mut buffer));
+    let mut lines = Vec::new();
+    for _ in 0..300 {
+        let _ = server.step(|_, _| (), |line| lines.push(line.to_owned()));
+    }
+    assert!(lines.iter().any(|line| line.contains("restarted")), "{lines:?}");
+    let [count, genuine] = signed(&mut server, &key);
+    assert!(count > 0 && genuine == count, "after the vehicle's restart: {genuine} of {count}");
 }

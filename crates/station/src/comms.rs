@@ -211,6 +211,11 @@ impl Comms {
         self.signing = signing;
     }
 
+    /// Returns the state of the signatures.
+    pub fn signing(&self) -> &Signing {
+        &self.signing
+    }
+
     /// Returns what of the signatures is to be kept, a record at a time, once.
     pub fn signing_record(&mut self) -> Option<SigningRecord> {
         let Dispatcher { now_us, status, .. } = &self.dispatcher;
