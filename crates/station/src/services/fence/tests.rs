@@ -223,7 +223,8 @@ proptest! {
         // As a fence, too, whatever it is.
         let chart = origin().chart();
         let _ = contains(&items, &chart, Vector2::zeros());
-        let stop = StopPath::of_vehicle(&Limits::DEFAULT.braking(), Vector2::zeros(), Vector2::zeros(), Vector2::zeros());
+        let (braking, none) = (Limits::DEFAULT.braking(), Vector2::zeros());
+        let stop = StopPath::of_vehicle(&braking, none, none, none);
         let motion = FenceMotion { here_m: Vector2::zeros(), speed_m_s: 0.0, stops: [stop; 2] };
         let mut watch = FenceWatch::default();
         for _ in 0..80 {
