@@ -95,8 +95,8 @@ impl<M: NorFlash> NorFlash for Gate<M> {
 /// Writes the changes; none without a store.
 pub struct Keeper<M>(Option<Store<Gate<M>>>);
 
-/// Reads the parameters, and the key of signatures, from `memory`, whose sectors begin at `start`, and makes room for changes. Without a store that
-/// can be read, the parameters are the image's.
+/// Reads the parameters, and the key of signatures, from `memory`, whose sectors begin at `start`, and makes room for
+/// changes. Without a store that can be read, the parameters are the image's.
 pub fn read<M: NorFlash>(memory: M, start: u32) -> (Keeper<M>, ParameterTable, Signing) {
     let mut table = ParameterTable::new(CONFIGURATION);
     let Ok(mut store) = Store::open(Gate(memory), start, hash(NAME.as_bytes())) else {

@@ -48,8 +48,8 @@ impl fmt::Display for Error {
             Error::Silent => {
                 write!(
                     f,
-                    "the vehicle sends nothing that is understood; check its power, the port, the baud rate and the wires; \
-                     one with a key of signatures hears nobody without it"
+                    "the vehicle sends nothing that is understood; check its power, the port, the baud rate and the \
+                     wires; one with a key of signatures hears nobody without it"
                 )
             }
             Error::NotArmed(reason) => write!(f, "the vehicle did not arm: {reason}"),

@@ -269,8 +269,8 @@ impl Host {
         })
     }
 
-    /// The same with the parameters and the key of signatures that are in `store`; `notice` is called with a line on each that is not used.
-    /// Without a store that can be read, they are at their defaults.
+    /// The same with the parameters and the key of signatures that are in `store`; `notice` is called with a line on
+    /// each that is not used. Without a store that can be read, they are at their defaults.
     ///
     /// # Errors
     /// As of [`for_vehicle`](Self::for_vehicle).

@@ -1,6 +1,7 @@
 //! MAVLink 2 signatures: link, time and the first 48 bits of SHA-256 over key, frame, link and time.
 //!
-//! <https://mavlink.io/en/guide/message_signing.html>. What is accepted is the receiver's to decide: it keeps the times.
+//! <https://mavlink.io/en/guide/message_signing.html>. What is accepted is the receiver's to decide: it keeps the
+//! times.
 
 use crate::address::Address;
 use crate::message::{MessageFormat, PAYLOAD_MAX};
@@ -33,7 +34,8 @@ impl Key {
         first(&Hash::hash(&self.0))
     }
 
-    /// Returns the code of a signature over `frame`, from its first byte to its checksum. Out of line: once in an image.
+    /// Returns the code of a signature over `frame`, from its first byte to its checksum. Out of line: once in an
+    /// image.
     #[inline(never)]
     fn code(&self, frame: &[u8], stamp: &[u8]) -> [u8; SIGNATURE - STAMP] {
         let mut hash = Hash::new();
@@ -62,8 +64,8 @@ fn first<const N: usize>(digest: &[u8]) -> [u8; N] {
 pub struct Stamp {
     /// Number of the sender's link.
     pub link: u8,
-    /// Time since the beginning of 2015 UTC \[10 us\], up to [`TIME_MAX`]. Larger than that of any frame that the sender
-    /// has sent by this link before.
+    /// Time since the beginning of 2015 UTC \[10 us\], up to [`TIME_MAX`]. Larger than that of any frame that the
+    /// sender has sent by this link before.
     pub time_10us: u64,
 }
 

@@ -237,8 +237,8 @@ impl Comms {
         core::mem::swap(&mut self.decoder, decoder);
     }
 
-    /// Returns the decoder of another stream, to be [exchanged](Self::exchange). None [comes over a wire](Decoder::wired)
-    /// unless the shell says so.
+    /// Returns the decoder of another stream, to be [exchanged](Self::exchange). None [comes over a
+    /// wire](Decoder::wired) unless the shell says so.
     pub fn decoder(&self) -> Decoder<Uplink> {
         Decoder::new(self.dispatcher.me)
     }

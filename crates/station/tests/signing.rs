@@ -265,7 +265,12 @@ proptest! {
     #[test]
     fn the_rule_holds(
         sent in prop::collection::vec(
-            (0..3_u8, 0..2_u8, 0..5 * MINUTE_10US, prop_oneof![4 => Just(Some(KEY)), 1 => Just(Some(OTHER)), 1 => Just(None)]),
+            (
+                0..3_u8,
+                0..2_u8,
+                0..5 * MINUTE_10US,
+                prop_oneof![4 => Just(Some(KEY)), 1 => Just(Some(OTHER)), 1 => Just(None)],
+            ),
             1..40,
         ),
     ) {
@@ -276,7 +281,10 @@ proptest! {
             let time_10us = TODAY_10US - MINUTE_10US + later;
             let mut buffer = [0; SIGNED_FRAME_MAX];
             let frame = match &key {
-                Some(key) => Sender::new(from).send_signed(&command(), Some((key, Stamp { link, time_10us })), &mut buffer).to_vec(),
+                Some(key) => {
+                    let stamp = Stamp { link, time_10us };
+                    Sender::new(from).send_signed(&command(), Some((key, stamp)), &mut buffer).to_vec()
+                }
                 None => Sender::new(from).send(&command(), &mut [0; FRAME_MAX]).to_vec(),
             };
             // The vehicle's clock runs on between two frames.
