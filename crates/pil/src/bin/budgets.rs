@@ -122,7 +122,7 @@ fn run() -> Result<bool, Error> {
         line("double arithmetic that the control tick can reach", "", tick.doubles.len() as u64, Some(0)),
         line("panics that other interrupts needed in flight can reach", "", vital.len() as u64, Some(VITAL_PANICS)),
         line("panics that link, housekeeping and USB can reach, contained", "", dispensable.len() as u64, None),
-        line("flash", "bytes", flight.flash_bytes, Some(480 * 1024)),
+        line("flash", "bytes", flight.flash_bytes, Some(464 * 1024)),
         line("static RAM without the stack", "bytes", flight.ram_bytes, Some(46 * 1024 + 512)),
     ];
     let table = table(&budgets);
