@@ -126,26 +126,23 @@ pub fn change(table: &ParameterTable, change: RecordChange, number: u16) -> bool
     if let Ok(prepared) = Prepared::new(table.configuration()) {
         control::fly(prepared, number);
     }
-    put(|| Some(Unwritten::Parameters(change)))
+    put(Unwritten::Parameters(change))
 }
 
-/// Has `record` written, if there is one, once there is room for it.
+/// Has `record` written, if there is one, once there is room for it. It is made outside of the queue's lock, during
+/// which no interrupt runs.
 pub fn keep_signing(record: impl FnOnce() -> Option<SigningRecord>) {
-    put(|| record().map(Unwritten::Signing));
+    let has_room = CHANGES.lock(|changes| changes.try_borrow().is_ok_and(|changes| !changes.is_full()));
+    if has_room && let Some(record) = record() {
+        put(Unwritten::Signing(record));
+    }
 }
 
-/// Queues what is to be written; false if there was no room to ask for it.
-fn put(change: impl FnOnce() -> Option<Unwritten>) -> bool {
-    CHANGES.lock(|changes| {
-        let Some(mut changes) = changes.try_borrow_mut().ok().filter(|changes| !changes.is_full()) else {
-            return false;
-        };
-        if let Some(change) = change() {
-            changes.push_back(change).ok();
-            CHANGED.signal(());
-        }
-        true
-    })
+/// Queues what is to be written; false if there is no room for it.
+fn put(change: Unwritten) -> bool {
+    let queued = CHANGES.lock(|changes| changes.try_borrow_mut().ok()?.push_back(change).ok()).is_some();
+    CHANGED.signal(());
+    queued
 }
 
 /// Writes changes while the vehicle is disarmed.

@@ -37,8 +37,14 @@ class Station:
         self.mav.write = lambda buffer: (self.captured.append(bytes(buffer)), self.send(buffer))[1]
         self.use(key)
         # The address to answer to.
-        while self.mav.recv_msg() is None:
-            self.mav.select(0.1)
+        self.next()
+
+    def next(self):
+        """Returns the next message."""
+        message = self.mav.recv_match(blocking=True, timeout=10 * PATIENCE)
+        if message is None:
+            sys.exit(f"signing: nothing from the vehicle within {10 * PATIENCE} s")
+        return message
 
     def use(self, key):
         """Signs with this key from now on, and accepts what is signed with it only; none signs nothing."""
@@ -72,10 +78,7 @@ class Station:
         """Returns the incompatibility flags of the next frames, and whether each was signed with the key."""
         seen = set()
         for _ in range(count):
-            message = self.mav.recv_msg()
-            while message is None:
-                self.mav.select(0.1)
-                message = self.mav.recv_msg()
+            message = self.next()
             seen.add((message.get_header().incompat_flags & 1, message.get_type() != "BAD_DATA"))
         return seen
 

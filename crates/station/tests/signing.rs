@@ -220,6 +220,33 @@ fn a_start_forgets_neither_key_nor_clock() {
     assert!(!locked.hears(&at_last), "replayed");
 }
 
+/// A station whose clock is decades ahead, and over a restart.
+#[test]
+fn a_clock_that_was_set_wrong_is_set_right_by_another_key() {
+    for restarts in [false, true] {
+        let mut locked = Locked::new();
+        let right_10us = locked.time_10us;
+        locked.time_10us = afbc_link::TIME_MAX - 10;
+        let ahead = locked.signed(&command(), &KEY);
+        assert!(locked.hears(&ahead));
+        locked.keep(3);
+        if restarts {
+            locked.restart();
+        }
+        locked.time_10us = right_10us;
+        let genuine = locked.signed(&command(), &KEY);
+        assert!(!locked.hears(&genuine), "older than what was heard");
+        locked.set(Some(OTHER), true);
+        locked.keep(12);
+        for starts in 0..2 {
+            locked.time_10us += 10 * MINUTE_10US;
+            let genuine = locked.signed(&command(), &OTHER);
+            assert!(locked.hears(&genuine), "{restarts}, after {starts} starts");
+            locked.restart();
+        }
+    }
+}
+
 /// The power is cut between any two records: the key is the old one, the new one, or none that anybody has; a cut never
 /// opens a vehicle that is to stay locked.
 #[test]

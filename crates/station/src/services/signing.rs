@@ -181,9 +181,9 @@ impl Signing {
         }
         let lock = setup.key.map_or(Lock::Open, Lock::Signed);
         if lock != self.lock {
-            self.lock = lock;
-            self.streams.clear();
-            self.unkept = Some(0);
+            // Nothing that was signed before counts, and a clock that was set wrong does not stay so.
+            let started_10us = setup.time_10us.saturating_sub(now_us / 10);
+            *self = Signing { lock, started_10us, unkept: Some(0), was_armed: self.was_armed, ..Signing::default() };
         }
         self.set_clock(now_us, setup.time_10us);
         SetupOutcome::Done(if self.is_on() { "signing: on, key set" } else { "signing: off, no key" })
