@@ -100,10 +100,13 @@ impl Question {
                 let (request, to) = EventRequest::read(payload);
                 (Question::Event(request), to)
             }
-            serial::ID => {
-                let (serial, to) = Serial::read(payload, serial::RESPOND)?;
-                (Question::Serial(serial), to)
-            }
+            serial::ID => match Serial::read_line(payload) {
+                Some(to) => (Question::Unanswered(UnansweredWish::Shell), to),
+                None => {
+                    let (serial, to) = Serial::read(payload, serial::RESPOND)?;
+                    (Question::Serial(serial), to)
+                }
+            },
             terrain::CHECK_ID => (Question::Terrain(Terrain::read_check(payload)), Address::default()),
             ORIGIN_ID => {
                 let (_, system, _) = ORIGIN.read(payload);
