@@ -31,6 +31,11 @@ impl FixFrame {
     /// Before the first fix.
     pub const NEW: Self = FixFrame(None);
 
+    /// Returns the place of the first fix.
+    pub fn origin(&self) -> Option<Origin> {
+        self.0
+    }
+
     /// Returns a fix as the estimator takes it, and whether it is the first; none for an impossible one.
     pub fn measure(&mut self, fix: &FixReading) -> Option<(Measurement, bool)> {
         let FixReading { latitude_deg, longitude_deg, altitude_m, .. } = *fix;
