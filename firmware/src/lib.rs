@@ -52,6 +52,7 @@ use embassy_executor::SendSpawner;
 
 /// Starts everything; the core then idles between interrupts. The functions start the tasks that use the board.
 /// [`image!`] defines all of them.
+#[expect(clippy::too_many_arguments, reason = "a function for each task, each of a type of its own")]
 pub fn run<B: Board>(
     mut core: cortex_m::Peripherals,
     lines: executors::InterruptLines<B::Interrupt>,

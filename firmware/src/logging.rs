@@ -9,6 +9,7 @@ use afbc_logger::{BlockSink, CardError, CardState, LogBlock, LogCard, LogKeeper,
 use afbc_onboard::parameters::RecordChange;
 use afbc_onboard::{ControlInputs, FlightView};
 use afbc_ulog::{LogStart, LoggedTick, TakenInputs};
+use core::array;
 use core::cell::RefCell;
 use core::sync::atomic::{AtomicBool, AtomicU8, Ordering};
 use embassy_futures::select::{Either, select};
@@ -127,7 +128,7 @@ impl CardLog {
         static VIEW_CHANNEL: StaticCell<Views> = StaticCell::new();
         let empty =
             || TickView { number: 0, taken: TakenInputs::of(&ControlInputs::EMPTY), view: FlightView::default() };
-        let views = VIEWS_HELD.init_with(|| [const { () }; VIEWS].map(|()| empty()));
+        let views = VIEWS_HELD.init_with(|| array::from_fn(|_| empty()));
         let (sender, views) = VIEW_CHANNEL.init_with(|| Channel::new(views)).split();
         SENDER.lock(|place| place.try_borrow_mut().ok().map(|mut place| *place = Some(sender)));
         let blocks = BLOCKS_HELD.init_with(|| [const { LogBlock::EMPTY }; BLOCKS]);
@@ -146,7 +147,8 @@ impl CardLog {
         table: &ParameterTable,
     ) -> Option<(&'static str, bool)> {
         let wanted = self.writer.wants(now_us, armed, table.configuration().link.log_mode);
-        WANTED.store(wanted, Ordering::Relaxed);
+        // Without a card that takes it, the ticks are not even passed on.
+        WANTED.store(wanted && card() == CardState::Ready, Ordering::Relaxed);
         self.writer.news(card())
     }
 

@@ -49,8 +49,32 @@ impl Seek for CardVolume<'_> {
     }
 }
 
-/// Writes the logs of a card into a folder, and returns their names with their sizes.
-pub fn save(card: &MemoryCard, folder: &Path) -> Result<Vec<(String, usize)>, Box<dyn Error>> {
+/// A log that was on a card.
+#[derive(Debug)]
+pub struct CardLog {
+    pub name: String,
+    pub bytes: usize,
+    /// What its dropouts say [ms].
+    pub missing_ms: u64,
+    /// Bytes behind the last whole record.
+    pub rest: usize,
+}
+
+/// Walks over the records of a log (PX4 User Guide, "ULog File Format"): length, kind, content.
+fn walk(name: String, log: &[u8]) -> CardLog {
+    let (mut rest, mut missing_ms) = (log.get(16..).unwrap_or_default(), 0);
+    while let Some(([low, high, kind], behind)) = rest.split_first_chunk() {
+        let Some((content, behind)) = behind.split_at_checked(u16::from_le_bytes([*low, *high]).into()) else { break };
+        if let (b'O', [low, high]) = (kind, content) {
+            missing_ms += u64::from(u16::from_le_bytes([*low, *high]));
+        }
+        rest = behind;
+    }
+    CardLog { name, bytes: log.len(), missing_ms, rest: rest.len() }
+}
+
+/// Writes the logs of a card into a folder, and returns them.
+pub fn save(card: &MemoryCard, folder: &Path) -> Result<Vec<CardLog>, Box<dyn Error>> {
     let first = card.stored(0);
     let start = u32::from_le_bytes(first[FIRST..FIRST + 4].try_into()?).into();
     let options = fatfs::FsOptions::new().update_accessed_date(false);
@@ -64,7 +88,7 @@ pub fn save(card: &MemoryCard, folder: &Path) -> Result<Vec<(String, usize)>, Bo
             let mut bytes = Vec::new();
             entry.to_file().read_to_end(&mut bytes)?;
             fs::write(folder.join(&name), &bytes)?;
-            saved.push((name, bytes.len()));
+            saved.push(walk(name, &bytes));
         }
     }
     Ok(saved)

@@ -22,6 +22,8 @@ use std::error::Error;
 use std::path::Path;
 
 pub(crate) const TICK_NS: u64 = 1_000_000;
+/// Most that may be missing of a log on a card with which nothing is wrong: its beginning fills the queue [ms].
+const DROPOUTS_MS: u64 = 100;
 
 /// Who hears the exact log on the second link.
 pub(crate) enum Hearer {
@@ -112,7 +114,9 @@ pub fn fly<M: Machine>(image: &Path, order: &Order<'_>) -> Result<(), Box<dyn Er
         let slot = finished.session.board_mut().card().ok_or("this machine has no memory card")?;
         let logs = card_logs::save(slot.card(), folder)?;
         println!("{} blocks written to the card; its logs: {logs:?}", slot.written());
-        check(!logs.is_empty(), "the card has a log")?;
+        let is_sound = card_trouble != CardTrouble::default()
+            || logs.iter().all(|log| log.rest == 0 && log.missing_ms <= DROPOUTS_MS);
+        check(!logs.is_empty() && is_sound, "the card has a whole log of the flight")?;
     }
     verdict?;
     check(receiver.is_none_or(|receiver| receiver.is_configured()), "the receiver is configured")?;
