@@ -81,7 +81,10 @@ pub fn run<B: Board>(
     control(executors.control, flight, board);
     keeper(executors.housekeeping, kept);
     housekeeping::spawn(executors.housekeeping);
-    if let (Some(spawner), Some(blocks)) = (executors.logging, blocks) {
+    // A constant, so that a board without a card has none of it.
+    if B::HAS_CARD
+        && let (Some(spawner), Some(blocks)) = (executors.logging, blocks)
+    {
         logging(spawner, blocks, card);
     }
     loop {

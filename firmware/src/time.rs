@@ -26,8 +26,9 @@ struct State {
     alarms: Mutex<RefCell<[Option<Alarm>; ALARMS]>>,
 }
 
-/// Number of tasks that can wait at the same time; six do. Further ones are woken at once and wait again.
-const ALARMS: usize = 8;
+/// Number of tasks that can wait at the same time: nine do, on a board with a card and two timers of motors. A further
+/// one is woken at once and waits again, which keeps what is below it from running.
+const ALARMS: usize = 10;
 
 /// A task waiting for a time.
 struct Alarm {

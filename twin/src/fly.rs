@@ -113,7 +113,13 @@ pub fn fly<M: Machine>(image: &Path, order: &Order<'_>) -> Result<(), Box<dyn Er
     if let Some(folder) = card {
         let slot = finished.session.board_mut().card().ok_or("this machine has no memory card")?;
         let logs = card_logs::save(slot.card(), folder)?;
-        println!("{} blocks written to the card; its logs: {logs:?}", slot.written());
+        println!("{} blocks written to the card", slot.written());
+        for log in &logs {
+            println!(
+                "{}: {} bytes, of them {} no record; {} ms missing",
+                log.name, log.bytes, log.rest, log.missing_ms
+            );
+        }
         let is_sound = card_trouble != CardTrouble::default()
             || logs.iter().all(|log| log.rest == 0 && log.missing_ms <= DROPOUTS_MS);
         check(!logs.is_empty() && is_sound, "the card has a whole log of the flight")?;

@@ -244,11 +244,16 @@ impl Machine for Pixracer {
     }
 }
 
+/// What the register before the interrupt status, which resets the core, reads like once that is done.
+const USB_IDLE: u64 = 1 << 31;
+
 /// Keeps USB still where the models have registers of it, but not what they do: a flag that is cleared by writing a one
-/// stays set, and the driver, which looks at it, would never end, and nothing else of its priority begin.
+/// stays set, and a reset never ends; the driver, which looks at them, would never end, and nothing else of its priority
+/// or below begin.
 pub fn quiet_usb<M: Machine>(session: &mut Session<M>, at: VirtualNanos) {
     if let Some(status) = M::USB_STATUS {
         // Nothing to be done about a core that is not clocked.
         let _ = session.mcu().write(at, status, Width::W32, 0);
+        let _ = session.mcu().write(at, status - 4, Width::W32, USB_IDLE);
     }
 }

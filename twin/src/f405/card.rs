@@ -5,9 +5,11 @@ use rigless::chip::memory_card::MemoryCard;
 use rigless::chip::spi::Peer;
 use rigless::snapshot::{Error, Reader, Store, Writer};
 use serde::{Deserialize, Serialize};
+use std::io::Cursor;
 
-/// Four gigabytes.
-const BLOCKS: usize = 1 << 23;
+/// Blocks of the card, as its registers can tell them, and the first one of its volume.
+const BLOCKS: usize = 70 * 1024;
+const VOLUME: usize = 63;
 /// Commands that write a block, as frames begin with them, and bytes of a frame (SD Physical Layer Simplified
 /// Specification 6.00, 7.3.1.1).
 const WRITE_BLOCK: u8 = 0x40 | 24;
@@ -56,10 +58,23 @@ pub struct CardSlot {
     written: u64,
 }
 
+/// Returns a card with an empty FAT32 in its first partition. The models' own has no partitions.
+fn formatted() -> MemoryCard {
+    let mut bytes = vec![0; BLOCKS * 512];
+    let options = fatfs::FormatVolumeOptions::new().fat_type(fatfs::FatType::Fat32).bytes_per_cluster(512);
+    let volume = &mut Cursor::new(&mut bytes[VOLUME * 512..]);
+    fatfs::format_volume(volume, options).expect("it is large enough");
+    bytes[450] = 0x0C;
+    bytes[454..458].copy_from_slice(&(VOLUME as u32).to_le_bytes());
+    bytes[458..462].copy_from_slice(&((BLOCKS - VOLUME) as u32).to_le_bytes());
+    bytes[510..512].copy_from_slice(&[0x55, 0xAA]);
+    MemoryCard::holding(&bytes)
+}
+
 impl CardSlot {
     pub fn new() -> Self {
         CardSlot {
-            card: MemoryCard::formatted(BLOCKS),
+            card: formatted(),
             trouble: CardTrouble::default(),
             heard: Heard::Nothing,
             busy_until_ns: 0,

@@ -320,6 +320,8 @@ impl<const ROW: usize> Machine for F405<ROW> {
     const BATTERY_MV: Option<u16> = None;
     /// USB: the core's fourth hardware configuration register.
     const UNMAPPED: &[u64] = &[0x5000_0050];
+    /// RM0090, 34.16.2.
+    const USB_STATUS: Option<u64> = Some(0x5000_0014);
 
     fn built() -> Result<Box<Self>, Error> {
         F405::new().map(Box::new)
