@@ -133,7 +133,7 @@ impl RadioPilot {
         if !is_steady {
             return output;
         }
-        output.sticks = Some(sticks);
+        output.sticks = settings.receiver.takes_receiver().then_some(sticks);
         output.order = self.select(
             settings,
             channels,
@@ -172,7 +172,7 @@ impl RadioPilot {
 
     /// Returns the mode in which the sticks take over from one that flies by itself.
     fn taken_over(&mut self, settings: &RadioSettings, inputs: &PilotInputs, sticks: &Sticks) -> Option<FlightMode> {
-        if inputs.mode.is_manual() || !inputs.armed || !settings.modes.overrides {
+        if inputs.mode.is_manual() || !inputs.armed || !settings.overrides() {
             self.by_itself = None;
             return None;
         }
