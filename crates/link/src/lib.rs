@@ -81,6 +81,7 @@ pub use signature::{Key, ReceivedFrame, SetupSigning, Stamp, TIME_MAX};
 pub use target::{AttitudeAndThrust, Axes, ExternalTarget, ManualControl, PositionTarget};
 pub use telemetry::Telemetry;
 pub use transfer::{
-    ComponentMetadata, FILE_DATA_MAX, FileOpcode, FilePacket, LOG_DATA_MAX, LogData, LogEntry, Transfer,
+    ComponentMetadata, FILE_DATA_MAX, FileOpcode, FilePacket, LOG_DATA_MAX, LogData, LogEntry, STREAM_DATA_MAX,
+    StreamedLog, Transfer,
 };
 pub use uplink::Uplink;
