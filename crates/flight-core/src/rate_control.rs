@@ -96,15 +96,15 @@ impl RateControl {
         let wanted_rad_s2 = error * k_1 - *given * k_2 + *learnt + gyroscopic;
         let [roll_n, pitch_n, yaw_n] = wanted_rad_s2.component_mul(&self.inputs_per).into();
         let thrust_n = target.thrust * mixer.thrust_max_n();
-        let allocation = mixer.allocate(&Inputs { roll_n, pitch_n, yaw_n, thrust_n });
-        if !allocation.saturated {
+        let action = mixer.action(&Inputs { roll_n, pitch_n, yaw_n, thrust_n });
+        if !action.health.saturated {
             let size = error.norm_squared() / (LEARNS_RAD_S * LEARNS_RAD_S);
             let more = error * (k_i * self.dt_s * math::max(1.0 - size, 0.0));
             *learnt = (*learnt + more).map(|learnt| math::max(math::min(learnt, LEARNT_MAX), -LEARNT_MAX));
         }
-        let Inputs { roll_n, pitch_n, yaw_n, .. } = allocation.given;
+        let Inputs { roll_n, pitch_n, yaw_n, .. } = action.given;
         let reached = Vector3::new(roll_n, pitch_n, yaw_n).component_div(&self.inputs_per) - *learnt - gyroscopic;
         *given += (reached - *given) * self.follows;
-        mixer.carry_out(&allocation)
+        action
     }
 }

@@ -84,6 +84,8 @@ pub struct RadioPilot {
 
 impl RadioPilot {
     /// Looks at a receiver, after each frame and every 20 ms at least.
+    // Out of line: called in five places, it would take a kilobyte of flash in each.
+    #[inline(never)]
     pub fn step(&mut self, settings: &RadioSettings, link: &mut RadioLink, inputs: &PilotInputs) -> PilotOutput {
         let now_us = inputs.now_us;
         if link.heard(now_us).is_some_and(|channels| settings.has_failed(channels)) {

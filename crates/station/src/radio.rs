@@ -61,7 +61,7 @@ impl RadioControl {
         bytes: &[u8],
         settings: &RadioSettings,
         inputs: &PilotInputs,
-        act: &mut impl FnMut(PilotOutput),
+        act: &mut dyn FnMut(PilotOutput),
     ) {
         let RadioControl { crsf, sbus, link, pilot, statistics, .. } = self;
         let (now_us, bad) = (inputs.now_us, crsf.bad_frames() + sbus.bad_frames());
@@ -95,7 +95,7 @@ impl RadioControl {
         news: Option<ChannelsOverride>,
         settings: &RadioSettings,
         inputs: &PilotInputs,
-        act: &mut impl FnMut(PilotOutput),
+        act: &mut dyn FnMut(PilotOutput),
     ) {
         let now_us = inputs.now_us;
         let Override { us, link, pilot } = &mut self.overrides;
@@ -148,7 +148,7 @@ impl Comms {
         let mut update = None;
         let news = dispatcher.overrides.take();
         let (texts, radio_us) = (&mut dispatcher.texts, &mut dispatcher.radio_us);
-        let mut act = |output| {
+        let mut act = |output: PilotOutput| {
             let PilotOutput { sticks, request, order, notice } = output;
             let sticks = sticks.map(|sticks| settings.curves.shape(inputs.mode, &sticks));
             if let Some(notice) = notice {
