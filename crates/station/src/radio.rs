@@ -108,9 +108,10 @@ impl RadioControl {
                 *us = [0; CHANNELS];
             }
             news.apply(us);
-            match us.iter().any(|us| *us != 0) {
-                true => link.take(&Channels { us: *us }, now_us),
-                false => link.lose(),
+            if us.iter().any(|us| *us != 0) {
+                link.take(&Channels { us: *us }, now_us);
+            } else {
+                link.lose();
             }
         }
         let output = pilot.step(settings, link, inputs);
