@@ -4,6 +4,7 @@
 pub mod battery;
 pub mod boot_loader;
 pub mod candidates;
+pub mod card;
 pub mod crystal;
 pub mod faults;
 pub mod indicator;

@@ -45,7 +45,7 @@ pub use guided::GuidanceResult;
 pub use imu_lanes::OtherSensors;
 pub use imu_selector::{ImuPair, ImuSelector};
 pub use law::FlightLaw;
-pub use link::Link;
+pub use link::{Link, LogMode};
 pub use lockstep::ReplyHead;
 pub use raw_readings::RawReadings;
 pub use readings::{AIDS_MAX, Aged, Readings};

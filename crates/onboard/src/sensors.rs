@@ -39,6 +39,11 @@ impl FixFrame {
     /// Before the first fix.
     pub const NEW: Self = FixFrame { near: None };
 
+    /// Returns the place of the frame, once fixes are believed.
+    pub fn origin(&self) -> Option<Origin> {
+        self.near.filter(|(_, count)| *count >= BELIEVED).map(|(origin, _)| origin)
+    }
+
     /// Returns a fix as the estimator takes it, and whether it is the first; none for an impossible one, and until
     /// five in a row are each within 200 m of the one before.
     pub fn measure(&mut self, fix: &FixReading) -> Option<(Measurement, bool)> {
