@@ -36,6 +36,8 @@ pub trait Board: Sized + 'static {
     const OUTPUTS: usize;
     /// True if it has a task that shows by LED or buzzer how the vehicle is ([`indication`](crate::indication)).
     const INDICATES: bool = false;
+    /// Index of the link that is meant for a radio receiver, if one is.
+    const RADIO_LINK: Option<usize> = None;
     /// Restarts the chip into its boot loader, if it has one.
     const BOOT_LOADER: Option<fn() -> !> = None;
 
@@ -134,6 +136,9 @@ pub trait Receiver {
 pub trait Transmitter {
     /// Sets the baud rate of the line in both directions, before anything is sent; nothing if there is no such line.
     fn set_baud(&mut self, _baud: u32) {}
+
+    /// Sets the line up for SBUS: 100,000 baud, 8E2, and inverted if the chip can; nothing if there is no such line.
+    fn set_sbus(&mut self) {}
 
     /// Sends the messages after `tick`, without waiting for the line.
     fn transmit(&mut self, tick: &Tick, bytes: &[u8]);

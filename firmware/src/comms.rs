@@ -100,7 +100,7 @@ pub async fn run<B: Board, const OTHERS: usize>(
             Either::First((link, length)) => {
                 let bytes = incoming.get(..length).unwrap_or_default();
                 if radio::is_possible::<B>()
-                    && let Some(radio) = radio.as_deref_mut().filter(|radio| radio.link() == link)
+                    && let Some(radio) = radio.as_deref_mut().filter(|radio| radio.link() == Some(link))
                 {
                     if let Some(news) = radio.receive(comms, bytes, table) {
                         pass_on::<B>(&news, log);
@@ -155,7 +155,7 @@ pub async fn run<B: Board, const OTHERS: usize>(
                 }
                 // A constant here, too, as below.
                 let kept = if recording::is_possible::<B>() { log.as_deref_mut() } else { None };
-                let others = [kept.as_ref().map(|log| log.link()), radio.as_ref().map(|radio| radio.link())];
+                let others = [kept.as_ref().map(|log| log.link()), radio.as_ref().and_then(|radio| radio.link())];
                 let changed = serve(comms, table, kept, &mut outgoing);
                 let told = links.each().iter_mut().enumerate().filter(|(index, _)| !others.contains(&Some(*index)));
                 told.for_each(|(_, link)| link.transmitter.transmit(&tick, &outgoing));
@@ -170,7 +170,7 @@ pub async fn run<B: Board, const OTHERS: usize>(
                     if let Some(news) = radio.receive(comms, &[], table) {
                         pass_on::<B>(&news, log);
                     }
-                    radio.send(comms, &tick, links);
+                    radio.send(comms, &tick, links, table);
                 }
                 if recording::is_possible::<B>() {
                     record::<B>(log, black_box, table);

@@ -105,7 +105,7 @@ fn read<B: Board>(
     }
     let radio = if radio::is_possible::<B>() { radio::RadioLine::begin::<B>(&table, links) } else { None };
     // On one link, the pilot goes before the log.
-    let is_free = table.configuration().link.log_port != table.configuration().radio.receiver.port;
+    let is_free = radio::leaves_log::<B>(&table);
     let log = if recording::is_possible::<B>() && is_free { recording::ExactLog::begin::<B>(&table) } else { None };
     let (black_box, blocks) = if B::HAS_CARD { Some(logging::CardLog::begin::<B>()) } else { None }.unzip();
     (kept, comms::make::<B>(table, signing, log, radio, black_box), blocks)

@@ -167,18 +167,19 @@ fn assert_once<T: Ord + std::fmt::Debug>(what: Vec<T>, board: &Path) {
 #[test]
 fn nothing_is_used_twice() {
     for (board, table) in kinds().0 {
-        let BoardTable { link, gnss, imu, i2c, timers, card, .. } = &table;
+        let BoardTable { link, gnss, radio, imu, i2c, timers, card, .. } = &table;
+        let radio = radio.as_ref().map(|(uart, _)| &uart.name);
         assert_once(table.pins(), &board);
         let names = [&link.name, &gnss.name, &imu.name, &i2c.name];
         let others = timers.iter().map(|timer| &timer.name).chain(card.iter().map(|card| &card.name));
-        assert_once(names.into_iter().chain(others).collect(), &board);
+        assert_once(names.into_iter().chain(radio).chain(others).collect(), &board);
         let mut motors: Vec<_> = table.motors().map(|motor| motor.number).collect();
         motors.sort_unstable();
         assert_eq!(motors, (1..=table.outputs).collect::<Vec<_>>(), "{}", board.display());
         let streams = table.streams().into_iter().map(|stream| stream.line.clone());
         let lines =
             streams.chain(i2c.lines.clone()).chain([&link.name, &gnss.name, &imu.ready.line].map(String::clone));
-        assert_once(lines.chain(executors(&board)).collect(), &board);
+        assert_once(lines.chain(radio.cloned()).chain(executors(&board)).collect(), &board);
     }
     for board in kinds().1 {
         let code = code_of(&board);
@@ -270,6 +271,7 @@ fn every_interrupt_has_the_priority_of_its_purpose() {
     let purposes: BTreeMap<_, _> = [
         ("$link", "UART"),
         ("$gnss", "UART"),
+        ("$radio", "UART"),
         ("$spi_tx_line", "SAMPLING"),
         ("$spi_rx_line", "SAMPLING"),
         ("$exti_line", "SAMPLING"),

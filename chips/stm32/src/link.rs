@@ -5,7 +5,7 @@ use core::future::poll_fn;
 use core::pin::pin;
 use core::task::{Poll, ready};
 use embassy_futures::poll_once;
-use embassy_stm32::usart::{BufferedUart, BufferedUartRx, BufferedUartTx, Config};
+use embassy_stm32::usart::{BufferedUart, BufferedUartRx, BufferedUartTx, Config, Parity, StopBits};
 use embedded_io_async::{BufRead, Write};
 use firmware::board::{self, BoardLink};
 use firmware::ticks::Tick;
@@ -14,10 +14,26 @@ use firmware::ticks::Tick;
 /// and it also runs after every control tick. Waking it for every byte would take most of the processor's time.
 const READ_MIN: usize = 32;
 
+/// Bytes of the rings of a radio receiver's UART: what goes to it, and what comes within 10 ms.
+pub const RADIO_RINGS: [usize; 2] = [128, 512];
+
 /// Returns how the UART of a link is set up; its baud rate is a parameter.
 pub fn config() -> Config {
     let mut config = Config::default();
     config.eager_reads = Some(READ_MIN);
+    config
+}
+
+/// Returns how it is set up for SBUS. Without registers that invert, the board has an inverter before the pin.
+fn sbus() -> Config {
+    let mut config = config();
+    config.baudrate = 100_000;
+    config.parity = Parity::ParityEven;
+    config.stop_bits = StopBits::STOP2;
+    #[cfg(feature = "inverting-uart")]
+    {
+        config.invert_rx = true;
+    }
     config
 }
 
@@ -77,6 +93,14 @@ impl board::Transmitter for Transmitter {
             && uart.set_baudrate(baud).is_err()
         {
             defmt::warn!("{=u32} baud do not divide the clock", baud);
+        }
+    }
+
+    fn set_sbus(&mut self) {
+        if let Transmitter::Uart(uart) = self
+            && uart.set_config(&sbus()).is_err()
+        {
+            defmt::warn!("SBUS does not divide the clock");
         }
     }
 

@@ -6,6 +6,8 @@
 /// * USB is on PA11 and PA12, as on every chip of the kind.
 /// * Each peripheral has its DMA's streams, as `DMA1_CH6` for stream 6, with their interrupts.
 /// * The IMU's interrupt has a pin, the line of the pin's number, as `EXTI5`, and that one's interrupt, as `EXTI9_5`.
+/// * A radio receiver has a UART of its own, if there is one to spare, as the last link. A receiver of SBUS is on the
+///   pad named there, before which the board has an inverter: the chip has none.
 /// * IMU and barometer are [candidates](chip_stm32::candidates): the one that answers is read. How the IMU sits is one
 ///   of `afbc_drivers::alignment`.
 /// * The buzzer sounds while its pin is high; the LED, if there is one, is lit while its pin is low.
@@ -22,6 +24,7 @@ macro_rules! flight_controller {
         crystal_hz: $crystal_hz:literal,
         link: $link:ident { tx: $link_tx:ident, rx: $link_rx:ident },
         gnss: $gnss:ident { tx: $gnss_tx:ident, rx: $gnss_rx:ident },
+        $(radio: $radio:ident { tx: $radio_tx:ident, rx: $radio_rx:ident, sbus: $sbus:literal },)?
         imu: $spi:ident {
             clock: $sck:ident, out: $mosi:ident, in: $miso:ident, select: $select:ident,
             dma: $spi_tx:ident by $spi_tx_line:ident, $spi_rx:ident by $spi_rx_line:ident,
@@ -48,6 +51,7 @@ macro_rules! flight_controller {
         embassy_stm32::bind_interrupts!(struct Irqs {
             $link => usart::BufferedInterruptHandler<peripherals::$link>;
             $gnss => usart::BufferedInterruptHandler<peripherals::$gnss>;
+            $($radio => usart::BufferedInterruptHandler<peripherals::$radio>;)?
             $spi_tx_line => embassy_stm32::dma::InterruptHandler<peripherals::$spi_tx>;
             $spi_rx_line => embassy_stm32::dma::InterruptHandler<peripherals::$spi_rx>;
             $exti_line => chip_stm32::sensors::StampHandler<embassy_stm32::interrupt::typelevel::$exti_line>,
@@ -67,6 +71,7 @@ macro_rules! flight_controller {
             &[
                 (Interrupt::$link, priority::UART),
                 (Interrupt::$gnss, priority::UART),
+                $((Interrupt::$radio, priority::UART),)?
                 (Interrupt::$spi_tx_line, priority::SAMPLING),
                 (Interrupt::$spi_rx_line, priority::SAMPLING),
                 (Interrupt::$exti_line, priority::SAMPLING),
@@ -77,6 +82,9 @@ macro_rules! flight_controller {
                 $((Interrupt::$line, priority::MOTOR_DMA),)+
             ]
         };
+
+        /// Number of links: a UART, USB, and the radio receiver's UART if there is one.
+        const LINKS: usize = 2 $(+ { let _ = stringify!($radio); 1 })?;
 
         /// The board after start-up.
         pub(crate) struct FlightController {
@@ -89,7 +97,7 @@ macro_rules! flight_controller {
             type Interrupt = pac::Interrupt;
             type Sampler = chip_stm32::sensor_set::Imu<$imu>;
             type Aids = chip_stm32::sensor_set::SlowSensors<$barometer>;
-            type Links = [firmware::board::BoardLink<chip_stm32::link::Receiver, chip_stm32::link::Transmitter>; 2];
+            type Links = [firmware::board::BoardLink<chip_stm32::link::Receiver, chip_stm32::link::Transmitter>; LINKS];
             type Card = chip_stm32f4::flight_controller!(@card $($card)?);
             type Memory = embassy_stm32::flash::Bank1Region1<'static, embassy_stm32::flash::Blocking>;
             const CORE_HZ: u32 = chip_stm32f4::clocks::CORE_HZ;
@@ -97,6 +105,7 @@ macro_rules! flight_controller {
             const STORE: u32 = 16 * 1024;
             const OUTPUTS: usize = $outputs;
             const INDICATES: bool = true;
+            const RADIO_LINK: Option<usize> = if LINKS > 2 { Some(2) } else { None };
             const HARDWARE: &'static str = env!("CARGO_PKG_NAME");
             const HAS_CARD: bool = chip_stm32f4::flight_controller!(@has_card $($card)?);
             const BOOT_LOADER: Option<fn() -> !> = Some(chip_stm32f4::boot_loader::restart);
@@ -131,6 +140,16 @@ macro_rules! flight_controller {
                 let (tx, rx) = (GNSS_TX.init([0; TX_RING]), GNSS_RX.init([0; 512]));
                 let config = usart::Config::default();
                 let gnss = BufferedUart::new(p.$gnss, p.$gnss_rx, p.$gnss_tx, tx, rx, Irqs, config);
+
+                $(
+                    use chip_stm32::link::RADIO_RINGS;
+
+                    static RADIO_TX: StaticCell<[u8; RADIO_RINGS[0]]> = StaticCell::new();
+                    static RADIO_RX: StaticCell<[u8; RADIO_RINGS[1]]> = StaticCell::new();
+                    let (tx, rx) = (RADIO_TX.init([0; RADIO_RINGS[0]]), RADIO_RX.init([0; RADIO_RINGS[1]]));
+                    let config = chip_stm32::link::config();
+                    let radio = BufferedUart::new(p.$radio, p.$radio_rx, p.$radio_tx, tx, rx, Irqs, config);
+                )?
 
                 let kernel_hz = embassy_stm32::rcc::frequency::<peripherals::$spi>().0;
                 let config = chip_stm32::sensors::spi(kernel_hz / 256);
@@ -173,6 +192,10 @@ macro_rules! flight_controller {
                     links: [
                         chip_stm32::link::new(link.expect("the baud rate divides the clock")),
                         chip_stm32::link::of_usb(chip_stm32::usb::start(p.USB_OTG_FS, p.PA12, p.PA11, Irqs)),
+                        $({
+                            let _: &str = $sbus;
+                            chip_stm32::link::new(radio.expect("the baud rate divides the clock"))
+                        },)?
                     ],
                     memory: embassy_stm32::flash::Flash::new_blocking(p.FLASH).into_blocking_regions().bank1_region1,
                     card,

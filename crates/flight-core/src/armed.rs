@@ -6,6 +6,7 @@ use crate::fall_check::FallCheck;
 use crate::frozen_tracker::FrozenTrackerCheck;
 use crate::landing::LandDetector;
 use crate::observer::PoseObserver;
+use crate::rate_control::RateMemory;
 use crate::supervisor::Mode;
 use crate::tumble::Tumble;
 use afbc_types::{Inputs, Setpoint, State};
@@ -21,6 +22,8 @@ pub(crate) struct Armed<M> {
     pub(crate) applied: Inputs,
     /// Inputs of the last tick, if it had no step of the law.
     pub(crate) open_loop: Option<Inputs>,
+    /// What is remembered of turning at a pilot's rates.
+    pub(crate) turning: RateMemory,
     /// True if it rests on the ground, and the controller's memory is as at take-off.
     pub(crate) idle_on_ground: bool,
     pub(crate) guide: Guide,
@@ -61,6 +64,7 @@ impl<M: Default> Armed<M> {
             observer: None,
             applied: Inputs::default(),
             open_loop: None,
+            turning: RateMemory::default(),
             idle_on_ground: true,
             guide: Guide::default(),
             landing: LandDetector::new(state, weight_n),

@@ -1,5 +1,6 @@
 //! Inputs of a tick: the newest state, pose and setpoint, with their times, and requests.
 
+use crate::rate_control::RateTarget;
 use crate::reasons::Reasons;
 use crate::supervisor::{Refusal, Request};
 use afbc_types::{Pose, Setpoint, Stamped, State};
@@ -35,6 +36,9 @@ pub struct Inbox {
     setpoint: Option<Stamped<Setpoint>>,
     /// True if the vehicle rests on the ground.
     idle_on_ground: Option<bool>,
+    /// Of this tick alone, from the guidance: not merged, taken or recorded.
+    #[cfg_attr(feature = "serde", serde(skip))]
+    rates: Option<RateTarget>,
     inhibited: Reasons,
     requests: Queue<Request>,
 }
@@ -49,6 +53,7 @@ impl Inbox {
         pose: None,
         setpoint: None,
         idle_on_ground: None,
+        rates: None,
         inhibited: Reasons::NONE,
         requests: Queue::new(),
     };
@@ -102,6 +107,21 @@ impl Inbox {
     /// True if an armed vehicle on the ground [rests](Self::set_idle_on_ground) there.
     pub fn idle_on_ground(&self) -> bool {
         self.idle_on_ground == Some(true)
+    }
+
+    /// Sets the rates that a pilot commands in this tick in place of the setpoint, if any: a flying vehicle whose state
+    /// is known turns by them, and is not found tumbling. Implausible ones count as none.
+    #[inline]
+    pub fn command_rates(&mut self, target: Option<&RateTarget>) {
+        self.rates = None;
+        if let Some(target) = target {
+            self.rates = Some(*target).filter(RateTarget::is_plausible);
+        }
+    }
+
+    /// Returns the rates that a pilot [commands](Self::command_rates).
+    pub fn rates(&self) -> Option<&RateTarget> {
+        self.rates.as_ref()
     }
 
     /// Sets what speaks against arming besides what the flight core checks itself.

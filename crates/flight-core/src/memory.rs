@@ -8,6 +8,7 @@ use crate::landing::LandDetector;
 use crate::observer::{HOLD_US, PoseObserver};
 use crate::rate;
 use crate::supervisor::{ArmingLimits, COAST_US, Mode, REST_US};
+use crate::tumble::Tumble;
 use afbc_control::{FlightController, Trace};
 use afbc_types::{Pose, Stamped, State};
 
@@ -198,7 +199,11 @@ impl<M> FlightCoreMemory<M> {
         }
         match (fresh, position_lost) {
             (Some(state), _) => {
-                flight.tumble.advance(state, gap_us);
+                match inbox.rates() {
+                    None => flight.tumble.advance(state, gap_us),
+                    // A pilot who commands rates turns it over.
+                    Some(_) => flight.tumble = Tumble::default(),
+                }
                 flight.landing.advance(state, flight.applied.thrust_n, gap_us, dt_s);
                 if inbox.is_own() {
                     check_fall(&mut flight.fall, &mut flight.landing, flight.applied.thrust_n, state, dt_s);

@@ -5,3 +5,4 @@ extern crate std;
 mod detectors;
 mod law_inputs;
 mod reckoning;
+mod turning;

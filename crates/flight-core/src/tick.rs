@@ -6,6 +6,7 @@ use crate::inbox::Inbox;
 use crate::memory::{FlightCoreMemory, extrapolated};
 use crate::motor::Response;
 use crate::rate;
+use crate::rate_control::{RateControl, RateMemory, RateTarget};
 use crate::reasons::Reasons;
 use crate::supervisor::{
     ArmingInputs, ArmingLimits, COAST_US, EndReason, Mode, Refusal, Request, SETPOINT_STALE_US, SupervisorInputs,
@@ -22,6 +23,7 @@ pub const DT: Range = Range::new("dt_s", 0.001, 0.001);
 pub struct FlightCore<C, const N: usize = 4> {
     controller: C,
     dead_reckoning: DeadReckoning,
+    rate_control: RateControl,
     limits: ArmingLimits,
     weight_n: f32,
 }
@@ -121,6 +123,7 @@ impl<C: FlightController<N>, const N: usize> FlightCore<C, N> {
         controller.mixer().check_hover(weight_n)?;
         Ok(FlightCore {
             dead_reckoning: DeadReckoning::new(&parameters, rotors, controller.dt_s()),
+            rate_control: RateControl::new(&parameters, rotors, controller.dt_s()),
             controller,
             limits,
             weight_n,
@@ -243,6 +246,9 @@ impl<C: FlightController<N>, const N: usize> FlightCore<C, N> {
             // The tick of engaging has no step: the rotors keep their inputs.
             return self.open_loop(flight, flight.applied);
         }
+        if let (Some(target), Some(state), Mode::Flying) = (inbox.rates(), fresh, mode) {
+            return self.turn(flight, state, target);
+        }
         let action = match (fresh, position_lost) {
             (Some(state), _) => {
                 let between = (!measured).then(|| flight.reckoning.between(state));
@@ -266,6 +272,20 @@ impl<C: FlightController<N>, const N: usize> FlightCore<C, N> {
         flight.open_loop = None;
         flight.applied = action.given;
         self.dead_reckoning.trim(&mut flight.reckoning, &flight.applied);
+        action
+    }
+
+    /// Returns the action that turns the vehicle as a pilot commands. The law begins afresh afterwards.
+    // Out of line, for the ticks of the law.
+    #[cold]
+    #[inline(never)]
+    fn turn(&self, flight: &mut Armed<C::Memory>, state: &State, target: &RateTarget) -> Action<N> {
+        if flight.open_loop.is_none() {
+            flight.forget();
+            flight.turning = RateMemory::default();
+        }
+        let action = self.rate_control.advance(self.controller.mixer(), &mut flight.turning, state, target);
+        (flight.open_loop, flight.applied) = (Some(action.given), action.given);
         action
     }
 

@@ -18,7 +18,7 @@ use crate::sticks;
 use crate::table::{self, FailsafeAction, TransitionInputs};
 use crate::targets::{self, Targets};
 use afbc_control::math::{max, min};
-use afbc_flight_core::{Mode, Reasons, Refusal, Request, Stamped};
+use afbc_flight_core::{Mode, RateTarget, Reasons, Refusal, Request, Stamped};
 use afbc_types::{Declared, OutOfRange, Setpoint, State};
 use nalgebra::Vector3;
 
@@ -104,6 +104,8 @@ struct Memory {
     aim: LimiterTarget,
     /// Correction of attitude and thrust while these are flown.
     trim: Trim,
+    /// Rates that the sticks command in mode acro.
+    rates: Option<RateTarget>,
     was_armed: bool,
     /// True if there was a state in the last tick.
     was_seen: bool,
@@ -159,6 +161,7 @@ impl Guidance {
             speed_m_s: f32::INFINITY,
             aim: LimiterTarget::stop(1.0, 1.0, 1.0),
             trim: Trim::default(),
+            rates: None,
             was_armed: false,
             was_seen: false,
             enters: false,
@@ -191,6 +194,11 @@ impl Guidance {
     /// Returns the parameters.
     pub fn settings(&self) -> &Settings {
         &self.settings
+    }
+
+    /// Returns the rates that the flight core flies in place of the setpoint, in mode acro.
+    pub fn rates(&self) -> Option<&RateTarget> {
+        self.memory.rates.as_ref()
     }
 
     /// Returns the flight mode.
@@ -344,7 +352,7 @@ impl Memory {
         self.speed_m_s = f32::INFINITY;
         self.mission.pause();
         (self.mode, self.plan, self.enters, self.lift_s) = (next, Plan::New, true, 0.0);
-        self.trim = Trim::default();
+        (self.trim, self.rates) = (Trim::default(), None);
         self.lands_item = None;
     }
 

@@ -23,11 +23,13 @@ pub enum FlightMode {
     Altitude,
     /// The sticks give roll, pitch, thrust and rate of the heading.
     Stabilised,
+    /// The sticks give the rates about the body's axes, and the thrust.
+    Acro,
 }
 
 impl FlightMode {
     /// Every mode.
-    pub const ALL: [FlightMode; 9] = [
+    pub const ALL: [FlightMode; 10] = [
         FlightMode::Hold,
         FlightMode::Takeoff,
         FlightMode::Land,
@@ -37,6 +39,7 @@ impl FlightMode {
         FlightMode::Position,
         FlightMode::Altitude,
         FlightMode::Stabilised,
+        FlightMode::Acro,
     ];
 
     /// Returns the name that people know.
@@ -51,11 +54,12 @@ impl FlightMode {
             FlightMode::Position => "position",
             FlightMode::Altitude => "altitude",
             FlightMode::Stabilised => "stabilised",
+            FlightMode::Acro => "acro",
         }
     }
 
     /// True if a pilot's sticks fly it.
     pub const fn is_manual(self) -> bool {
-        matches!(self, FlightMode::Position | FlightMode::Altitude | FlightMode::Stabilised)
+        matches!(self, FlightMode::Position | FlightMode::Altitude | FlightMode::Stabilised | FlightMode::Acro)
     }
 }

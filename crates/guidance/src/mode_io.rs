@@ -3,6 +3,7 @@
 use crate::limiter::LimiterTarget;
 use crate::settings::{Flying, Limits};
 use afbc_control::math::{max, min};
+use afbc_flight_core::RateTarget;
 use afbc_types::{Setpoint, State};
 use nalgebra::Vector3;
 
@@ -87,6 +88,8 @@ pub(crate) enum Shaping {
     Leaning(LimiterTarget, [f32; 2]),
     /// As it is, from the vehicle's own position and velocity.
     Direct(Setpoint),
+    /// Rates in place of a setpoint.
+    Turning(RateTarget),
 }
 
 impl ModeOutput {

@@ -86,6 +86,15 @@ parameters! {
         /// Largest tilt by the sticks.
         #[parameter(MAN_TILT_MAX, "rad", 0.05..=1.2)]
         pub stick_tilt_rad: f32 = 0.6,
+        /// Rate of roll at the end of the stick's way in mode acro.
+        #[parameter(MC_ACRO_R_MAX, "deg/s", 0.0..=1800.0)]
+        pub acro_roll_deg_s: f32 = 100.0,
+        /// Rate of pitch at the end of the stick's way in mode acro.
+        #[parameter(MC_ACRO_P_MAX, "deg/s", 0.0..=1800.0)]
+        pub acro_pitch_deg_s: f32 = 100.0,
+        /// Rate of yaw at the end of the stick's way in mode acro.
+        #[parameter(MC_ACRO_Y_MAX, "deg/s", 0.0..=1800.0)]
+        pub acro_yaw_deg_s: f32 = 100.0,
         /// Time after which the targets of a companion computer count as lost.
         #[parameter(COM_OF_LOSS_T, "s", 0.05..=60.0)]
         pub targets_lost_s: f32 = 0.5,

@@ -5,7 +5,9 @@ use crate::limiter::LimiterTarget;
 use crate::mode::FlightMode;
 use crate::mode_io::{ModeInputs, ModeOutput, Shaping};
 use crate::order::Sticks;
+use crate::settings::Flying;
 use afbc_control::math::{cos, max, min, sin, tan};
+use afbc_flight_core::RateTarget;
 use afbc_types::Setpoint;
 use nalgebra::Vector3;
 
@@ -32,6 +34,11 @@ pub(crate) fn fly(mode: FlightMode, sticks: &Sticks, inputs: &ModeInputs<'_>, li
     let aim = LimiterTarget { yaw_rate_rad_s, ..inputs.stop() };
     let lifts = throttle > LIFTS;
     let tilt_m_s2 = |stick: f32| lift.gravity_m_s2 * tan(stick * inputs.flying.stick_tilt_rad);
+    let thrust_m_s2 = || {
+        let hover_m_s2 = lift.gravity_m_s2;
+        let room_m_s2 = if throttle > 0.0 { max(lift.most_m_s2 - hover_m_s2, 0.0) } else { hover_m_s2 };
+        min(hover_m_s2 + throttle * room_m_s2, lift.most_m_s2)
+    };
     let shaping = match mode {
         FlightMode::Position => {
             let [x, y] = turned(forward * aim.speed_m_s, left * aim.speed_m_s);
@@ -41,13 +48,18 @@ pub(crate) fn fly(mode: FlightMode, sticks: &Sticks, inputs: &ModeInputs<'_>, li
             let velocity_m_s = Vector3::new(f32::NAN, f32::NAN, climb_m_s);
             Shaping::Leaning(LimiterTarget { velocity_m_s, ..aim }, turned(tilt_m_s2(forward), tilt_m_s2(left)))
         }
+        FlightMode::Acro => {
+            let Flying { acro_roll_deg_s, acro_pitch_deg_s, acro_yaw_deg_s, .. } = inputs.flying;
+            // Not centred: the pilot's curves have what dead zone they want.
+            let rates_deg_s =
+                [sticks.roll * acro_roll_deg_s, sticks.pitch * acro_pitch_deg_s, -sticks.yaw * acro_yaw_deg_s];
+            let thrust = thrust_m_s2() / lift.most_m_s2;
+            Shaping::Turning(RateTarget { rates_rad_s: Vector3::from(rates_deg_s).map(f32::to_radians), thrust })
+        }
         _ => {
             let [x, y] = turned(tan(forward * inputs.flying.stick_tilt_rad), tan(left * inputs.flying.stick_tilt_rad));
             let up = Vector3::new(x, y, 1.0).normalize();
-            let hover_m_s2 = lift.gravity_m_s2;
-            let room_m_s2 = if throttle > 0.0 { max(lift.most_m_s2 - hover_m_s2, 0.0) } else { hover_m_s2 };
-            let thrust_m_s2 = min(hover_m_s2 + throttle * room_m_s2, lift.most_m_s2);
-            Shaping::Direct(Setpoint { yaw_rate_rad_s, ..lift.setpoint(inputs.state, up, thrust_m_s2) })
+            Shaping::Direct(Setpoint { yaw_rate_rad_s, ..lift.setpoint(inputs.state, up, thrust_m_s2()) })
         }
     };
     ModeOutput { shaping, lifts, lands: false, done: false }

@@ -76,7 +76,7 @@ impl TransitionInputs {
 /// # Errors
 /// The first reason against it.
 pub fn select(mode: FlightMode, seen: &TransitionInputs) -> Result<(), OrderRefusal> {
-    use FlightMode::{Altitude, Hold, Land, Mission, Offboard, Position, Return, Stabilised, Takeoff};
+    use FlightMode::{Acro, Altitude, Hold, Land, Mission, Offboard, Position, Return, Stabilised, Takeoff};
     let unless = |holds: bool, declined: OrderRefusal| if holds { Err(declined) } else { Ok(()) };
     unless(!seen.demanded().is_done_by(mode), OrderRefusal::Failsafe)?;
     unless(mode != Land && !seen.positioned, OrderRefusal::NoPosition)?;
@@ -86,7 +86,7 @@ pub fn select(mode: FlightMode, seen: &TransitionInputs) -> Result<(), OrderRefu
         Return => unless(seen.armed && !seen.airborne, OrderRefusal::OnGround),
         Mission => unless(!seen.mission, OrderRefusal::NoMission),
         Offboard => unless(!seen.targets, OrderRefusal::NoTargets),
-        Position | Altitude | Stabilised => unless(!seen.sticks, OrderRefusal::NoSticks),
+        Position | Altitude | Stabilised | Acro => unless(!seen.sticks, OrderRefusal::NoSticks),
     }
 }
 

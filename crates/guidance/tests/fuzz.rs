@@ -195,7 +195,8 @@ fn check(
     prop_assert!(guided.home_m.is_none_or(|home_m| home_m.iter().all(|value| value.is_finite())));
     let Some(setpoint) = &guided.setpoint else { return Ok(()) };
     prop_assert!(setpoint.is_plausible(), "{:?}", setpoint);
-    let direct = matches!(guided.mode, FlightMode::Altitude | FlightMode::Stabilised | FlightMode::Offboard);
+    let direct =
+        matches!(guided.mode, FlightMode::Altitude | FlightMode::Stabilised | FlightMode::Acro | FlightMode::Offboard);
     if direct || !sight.core.armed() {
         return Ok(());
     }

@@ -204,6 +204,33 @@ fn attitude_and_thrust_become_an_acceleration() {
     assert!(bench.state.velocity_m_s.norm() < 0.05, "{:?}", bench.state);
 }
 
+/// Rates are commanded in acro mode alone, and in the air.
+#[test]
+fn acro_commands_rates() {
+    let mut bench = Bench::hovering(settings());
+    let sticks = Sticks { pitch: 0.5, roll: -1.0, throttle: 0.0, yaw: 0.25 };
+    let mut fly = |bench: &mut Bench, ticks: u32| {
+        for _ in 0..ticks {
+            bench.orders.sticks = Some(afbc_flight_core::Stamped { value: sticks, at_us: bench.now_us });
+            bench.tick();
+        }
+    };
+    fly(&mut bench, 10);
+    assert_eq!(bench.guidance.rates(), None);
+    assert_eq!(bench.select(FlightMode::Acro), Ok(()));
+    fly(&mut bench, 10);
+    let target = *bench.guidance.rates().unwrap();
+    let expected = Vector3::new(-100.0f32, 50.0, -25.0).map(f32::to_radians);
+    assert!((target.rates_rad_s - expected).norm() < 1e-4, "{target:?}");
+    assert_eq!(bench.select(FlightMode::Position), Ok(()));
+    fly(&mut bench, 1);
+    assert_eq!(bench.guidance.rates(), None);
+    assert_eq!(bench.select(FlightMode::Acro), Ok(()));
+    // Without sticks it holds, by the setpoint.
+    bench.run(1.0);
+    assert_eq!((bench.guidance.mode(), bench.guidance.rates()), (FlightMode::Hold, None));
+}
+
 #[test]
 fn sticks_fly_the_manual_modes() {
     for mode in [FlightMode::Position, FlightMode::Altitude, FlightMode::Stabilised] {

@@ -42,7 +42,7 @@ fn needs(mode: FlightMode, seen: &TransitionInputs) -> Vec<(bool, OrderRefusal)>
         FlightMode::Return => vec![position, (!seen.armed || seen.airborne, OrderRefusal::OnGround)],
         FlightMode::Mission => vec![position, (seen.mission, OrderRefusal::NoMission)],
         FlightMode::Offboard => vec![position, (seen.targets, OrderRefusal::NoTargets)],
-        FlightMode::Position | FlightMode::Altitude | FlightMode::Stabilised => {
+        FlightMode::Position | FlightMode::Altitude | FlightMode::Stabilised | FlightMode::Acro => {
             vec![position, (seen.sticks, OrderRefusal::NoSticks)]
         }
     }

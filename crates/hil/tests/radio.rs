@@ -7,151 +7,15 @@
     reason = "a test that cannot go on should say why"
 )]
 
+mod flier;
+
 use afbc_guidance::FlightMode;
-use afbc_hil::Host;
-use afbc_link::{Address, Command, ExternalTarget, FRAME_MAX, ManualControl, ParameterRequest, Sender, Uplink};
-use afbc_onboard::Report;
+use afbc_link::{ChannelsOverride, Command, ExternalTarget, ManualControl, Uplink};
 use afbc_radio::{Channels, CrsfFrame, SbusFrame};
-use afbc_scenario::load;
-use afbc_sim::flight::World;
 use afbc_station::AuxSensors;
 use afbc_station::services::{health::sensor, status::SensorBits};
-use afbc_types::{ROTORS_MAX, RotorSpeeds};
-use nalgebra::Vector3;
-use rand_xoshiro::Xoshiro256PlusPlus;
-use rand_xoshiro::rand_core::{Rng, SeedableRng};
-use std::path::Path;
-
-/// From the ground, outdoors, on the estimate.
-const SCENARIO: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../twin/scenarios/hover.toml");
-/// Types of parameters, as MAV_PARAM_TYPE.
-const INT32: u8 = 6;
-const STATION: Address = Address { system: 255, component: 190 };
-
-const ROLL: usize = 0;
-const PITCH: usize = 1;
-const THROTTLE: usize = 2;
-const ARM: usize = 4;
-const MODE: usize = 5;
-const KILL: usize = 6;
-
-/// What a receiver makes of a frame: its bytes, or nothing.
-type Receiver = Box<dyn FnMut(&Channels, &mut Xoshiro256PlusPlus) -> Vec<u8>>;
-
-struct Flier {
-    host: Host,
-    world: World,
-    speeds: RotorSpeeds<ROTORS_MAX>,
-    channels: Channels,
-    receiver: Receiver,
-    /// Time between two frames \[ms\].
-    every_ms: u64,
-    ms: u64,
-    random: Xoshiro256PlusPlus,
-    report: Option<Report<ROTORS_MAX>>,
-    sender: Sender,
-    texts: Vec<u8>,
-}
-
-/// Every frame arrives.
-fn crsf() -> Receiver {
-    Box::new(|channels, _| CrsfFrame::Channels(*channels).encode().to_vec())
-}
-
-impl Flier {
-    /// On the ground, its estimate ready; the pilot is heard, sticks centred, switches off.
-    fn new(seed: u64, receiver: Receiver, every_ms: u64, sbus: bool) -> Self {
-        let scenario = load(Path::new(SCENARIO)).unwrap();
-        let mut us = [1000; 16];
-        us[..4].fill(1500);
-        let mut flier = Flier {
-            host: Host::new().unwrap(),
-            world: World::released(&afbc_scenario::Scenario { seed, ..scenario }, 1e-3).unwrap(),
-            speeds: RotorSpeeds::default(),
-            channels: Channels { us },
-            receiver,
-            every_ms,
-            ms: 0,
-            random: Xoshiro256PlusPlus::seed_from_u64(seed),
-            report: None,
-            sender: Sender::new(STATION),
-            texts: Vec::new(),
-        };
-        for (name, value) in
-            [("RC_MAP_KILL_SW", KILL as i32 + 1), ("RC_PROTOCOL", i32::from(sbus)), ("COM_FLTMODE1", 2)]
-        {
-            let mut letters = [0; 16];
-            letters[..name.len()].copy_from_slice(name.as_bytes());
-            let request = ParameterRequest::Set { name: letters, value: value.to_le_bytes(), kind: INT32 };
-            flier.tick(Some(&Uplink::Parameter(request)));
-        }
-        flier.fly(8_000);
-        flier
-    }
-
-    fn tick(&mut self, message: Option<&Uplink>) {
-        self.world.advance(&self.speeds);
-        self.world.look();
-        self.host.sense(&self.world.readings().copied().unwrap_or_default());
-        self.ms += 1;
-        if self.ms.is_multiple_of(self.every_ms) {
-            let bytes = (self.receiver)(&self.channels, &mut self.random);
-            self.host.hear_radio(&bytes);
-        }
-        let mut buffer = [0; FRAME_MAX];
-        // A station that was heard is missed when it is silent.
-        let message = message.or((self.ms % 1_000 == 500).then_some(&Uplink::Heartbeat));
-        let bytes = message.map_or(Vec::new(), |message| self.sender.send(message, &mut buffer).to_vec());
-        let tick = self.host.next_tick(&bytes);
-        self.speeds = tick.report.motors;
-        self.report = Some(tick.report);
-        self.texts.extend(tick.bytes);
-    }
-
-    fn fly(&mut self, ms: u64) {
-        (0..ms).for_each(|_| self.tick(None));
-    }
-
-    fn mode(&self) -> FlightMode {
-        self.report.as_ref().unwrap().guided.mode
-    }
-
-    fn armed(&self) -> bool {
-        self.report.as_ref().unwrap().mode.armed()
-    }
-
-    fn position_m(&self) -> Vector3<f64> {
-        self.world.plant().motion().position_m
-    }
-
-    /// Largest tilt from now on for a time \[rad\].
-    fn tilt_rad(&mut self, ms: u64) -> f64 {
-        (0..ms).fold(0.0, |most: f64, _| {
-            self.tick(None);
-            let attitude_rad = self.world.plant().motion().attitude_rad;
-            most.max((attitude_rad.x.cos() * attitude_rad.y.cos()).acos())
-        })
-    }
-
-    /// Arms, takes off by the throttle and hovers some metres up.
-    fn up(&mut self) {
-        self.channels.us[THROTTLE] = 1000;
-        self.fly(200);
-        self.channels.us[ARM] = 2000;
-        self.fly(300);
-        assert!(self.armed(), "armed by its switch");
-        assert_eq!(self.mode(), FlightMode::Position);
-        self.channels.us[THROTTLE] = 1900;
-        self.fly(5_000);
-        self.channels.us[THROTTLE] = 1500;
-        self.fly(3_000);
-        assert!(self.position_m().z > 2.0, "took off: {:?}", self.position_m());
-    }
-
-    fn says(&self, text: &str) -> bool {
-        self.texts.windows(text.len()).any(|window| window == text.as_bytes())
-    }
-}
+use flier::{ARM, Flier, KILL, MODE, PITCH, ROLL, Receiver, THROTTLE, crsf};
+use rand_xoshiro::rand_core::Rng;
 
 #[test]
 fn a_flight_by_radio() {
@@ -285,7 +149,7 @@ fn a_receiver_that_gives_up_is_a_loss() {
     );
     flier.up();
     flier.receiver = Box::new(|_, _| {
-        let channels = Channels { us: [1000; 16] };
+        let channels = Channels::of([1000; 16]);
         SbusFrame { channels, frame_lost: true, failsafe: true }.encode().to_vec()
     });
     flier.fly(1_500);
@@ -313,4 +177,92 @@ fn the_pilots_sticks_go_first() {
         flier.tick(Some(&Uplink::Target(ExternalTarget::Sticks(sticks))));
     }
     assert!((flier.position_m() - place_m).norm() > 4.0);
+}
+
+/// Channels of a station in place of a receiver's, as many times per second.
+fn relayed(flier: &mut Flier, ms: u64) {
+    for _ in 0..ms {
+        let message = Uplink::Target(ExternalTarget::Channels(ChannelsOverride::new(flier.channels.us)));
+        let is_due = flier.ms.is_multiple_of(40);
+        flier.tick(is_due.then_some(&message));
+    }
+}
+
+fn silent() -> Receiver {
+    Box::new(|_, _| Vec::new())
+}
+
+/// RC_CHANNELS_OVERRIDE arms, flies and kills by the same switches; when it stops, that is a loss; a receiver that hears
+/// its pilot goes first.
+#[test]
+fn a_flight_by_a_stations_channels() {
+    let mut flier = Flier::new(9, silent(), 4, false);
+    flier.channels.us[THROTTLE] = 1000;
+    relayed(&mut flier, 1_000);
+    flier.channels.us[ARM] = 2000;
+    relayed(&mut flier, 300);
+    assert!(flier.armed());
+    flier.channels.us[THROTTLE] = 1900;
+    relayed(&mut flier, 5_000);
+    flier.channels.us[THROTTLE] = 1500;
+    relayed(&mut flier, 3_000);
+    assert!(flier.position_m().z > 2.0, "took off: {:?}", flier.position_m());
+    let before_m = flier.position_m();
+    flier.channels.us[PITCH] = 1800;
+    relayed(&mut flier, 4_000);
+    flier.channels.us[PITCH] = 1500;
+    relayed(&mut flier, 3_000);
+    assert!(flier.position_m().x - before_m.x > 3.0, "{:?}", flier.position_m());
+
+    // The pilot's receiver hears its transmitter, which has its switches off: that disarms nothing in the air.
+    flier.receiver = crsf();
+    flier.channels.us[ARM] = 1000;
+    flier.fly(500);
+    let place_m = flier.position_m();
+    flier.channels.us[ROLL] = 2000;
+    let stations = flier.channels;
+    flier.channels.us[ROLL] = 1500;
+    for ms in 0..3_000 {
+        let message = Uplink::Target(ExternalTarget::Channels(ChannelsOverride::new(stations.us)));
+        flier.tick((ms % 40 == 0).then_some(&message));
+    }
+    assert!(flier.armed() && (flier.position_m() - place_m).norm() < 2.0, "{:?}", flier.position_m() - place_m);
+
+    // Both are silent: lost, and held.
+    flier.receiver = silent();
+    flier.fly(1_200);
+    assert_eq!((flier.mode(), flier.armed()), (FlightMode::Hold, true));
+    assert!(flier.says("radio: lost"));
+
+    // A station that comes back kills within two messages.
+    relayed(&mut flier, 1_000);
+    assert!(flier.armed());
+    flier.channels.us[KILL] = 2000;
+    relayed(&mut flier, 100);
+    assert!(!flier.armed());
+}
+
+/// Two receivers on one transmitter, of which either falls silent in turn, or both at once for a while.
+#[test]
+fn a_receiver_that_switches_is_flown_with() {
+    let mut frames = 0;
+    let switching: Receiver = Box::new(move |channels, random| {
+        frames += 1;
+        // One in CRSF's full range, the other with what it heard last and some noise of its own.
+        let heard = match frames / 200 % 3 {
+            0 => true,
+            1 => random.next_u32() % 3 == 0,
+            _ => frames % 20 == 0,
+        };
+        let frame = CrsfFrame::Channels(*channels).encode();
+        let cut = if heard { frame.len() } else { random.next_u32() as usize % frame.len() };
+        frame[..cut].to_vec()
+    });
+    let mut flier = Flier::new(10, crsf(), 4, false);
+    flier.up();
+    flier.receiver = switching;
+    let place_m = flier.position_m();
+    assert!(flier.tilt_rad(20_000) < 0.5 && flier.armed());
+    assert_eq!(flier.mode(), FlightMode::Position);
+    assert!((flier.position_m() - place_m).norm() < 3.0);
 }

@@ -31,6 +31,7 @@
 
 mod address;
 mod answer;
+mod channels;
 mod clocks;
 mod command;
 mod decoder;
@@ -57,6 +58,7 @@ mod wire;
 
 pub use address::Address;
 pub use answer::Answer;
+pub use channels::{ChannelsOverride, RADIO_CHANNELS, RadioChannels};
 pub use clocks::Clock;
 pub use command::{CalibrationRequest, Command, Reboot, Storage};
 pub use decoder::{Counters, Decoder};

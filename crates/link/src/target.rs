@@ -1,6 +1,7 @@
 //! Targets of a companion computer, and a pilot's sticks.
 
 use crate::address::Address;
+use crate::channels::ChannelsOverride;
 use crate::frames::{flip, flip_turn};
 use crate::message::{Fault, MessageFormat, PAYLOAD_MAX};
 use crate::place::{Height, Place, datum, frame};
@@ -8,8 +9,8 @@ use crate::wire::Layout;
 use afbc_types::Setpoint;
 use mavlink::MessageData;
 use mavlink::dialects::common::{
-    MANUAL_CONTROL_DATA, POSITION_TARGET_LOCAL_NED_DATA, SET_ATTITUDE_TARGET_DATA, SET_POSITION_TARGET_GLOBAL_INT_DATA,
-    SET_POSITION_TARGET_LOCAL_NED_DATA,
+    MANUAL_CONTROL_DATA, POSITION_TARGET_LOCAL_NED_DATA, RC_CHANNELS_OVERRIDE_DATA, SET_ATTITUDE_TARGET_DATA,
+    SET_POSITION_TARGET_GLOBAL_INT_DATA, SET_POSITION_TARGET_LOCAL_NED_DATA,
 };
 use nalgebra::Vector3;
 
@@ -180,6 +181,8 @@ pub enum ExternalTarget {
     Attitude(AttitudeAndThrust),
     /// MANUAL_CONTROL (69).
     Sticks(ManualControl),
+    /// RC_CHANNELS_OVERRIDE (70).
+    Channels(ChannelsOverride),
 }
 
 /// Time, nine numbers, heading and its rate, mask, receiver, frame.
@@ -206,6 +209,7 @@ impl ExternalTarget {
             SET_POSITION_TARGET_GLOBAL_INT_DATA::ID => PLACE.format(),
             SET_ATTITUDE_TARGET_DATA::ID => ATTITUDE.format(),
             MANUAL_CONTROL_DATA::ID => STICKS.format(),
+            RC_CHANNELS_OVERRIDE_DATA::ID => ChannelsOverride::format(),
             _ => return None,
         })
     }
@@ -276,6 +280,11 @@ impl ExternalTarget {
                 let [pitch, roll, up, yaw] = axes.map(|axis| (f32::from(axis) / 1000.0).clamp(-1.0, 1.0));
                 Ok(ExternalTarget::Sticks(ManualControl { roll, pitch, throttle: 2.0 * up.max(0.0) - 1.0, yaw }))
             }
+            RC_CHANNELS_OVERRIDE_DATA::ID => {
+                let (channels, to) = ChannelsOverride::read(payload);
+                mine(to)?;
+                Ok(ExternalTarget::Channels(channels))
+            }
             _ => Err(Fault::Unknown),
         }
     }
@@ -301,6 +310,7 @@ impl ExternalTarget {
                 let rates = [0.0, 0.0, rate];
                 ATTITUDE.write(&(0, flip_turn(*attitude), rates, *thrust, to, mask, [0.0; 3]), payload)
             }
+            ExternalTarget::Channels(channels) => channels.write(payload),
             ExternalTarget::Sticks(ManualControl { roll, pitch, throttle, yaw }) => {
                 let up = (throttle + 1.0) / 2.0;
                 // To the nearest, without the platform's rounding.

@@ -115,6 +115,7 @@ impl Guide {
             inbox.put_setpoint(Stamped { value, at_us: now_us });
         }
         inbox.set_idle_on_ground(guided.idle_on_ground);
+        inbox.command_rates(self.guidance.rates());
         inbox.inhibit(guided.against);
         if let Some(request) = guided.request {
             // A station's request goes first.

@@ -1,23 +1,32 @@
 //! Channels of a transmitter.
 
-/// Number of channels that are read.
-pub const CHANNELS: usize = 16;
+/// Number of channels: sixteen of a receiver, eighteen of a station.
+pub const CHANNELS: usize = 18;
+/// Number of them in a frame of either protocol.
+pub(crate) const FRAMED: usize = 16;
 /// Bits of a channel in both protocols.
 const BITS: usize = 11;
-/// Bytes of sixteen of them.
-pub(crate) const PACKED: usize = CHANNELS * BITS / 8;
+/// Bytes of those of a frame.
+pub(crate) const PACKED: usize = FRAMED * BITS / 8;
 
 /// Channels of a frame, as lengths of a servo's pulse: 1500 us is the centre.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Channels {
-    /// Length of the pulse \[us\].
+    /// Length of the pulse; 0 where there is no channel \[us\].
     pub us: [u16; CHANNELS],
 }
 
 impl Channels {
+    /// The channels of a receiver.
+    pub fn of(framed_us: [u16; FRAMED]) -> Self {
+        let mut us = [0; CHANNELS];
+        us.iter_mut().zip(framed_us).for_each(|(to, from)| *to = from);
+        Channels { us }
+    }
+
     /// Reads channels of eleven bits each, the lowest bits first; `to_us` scales one.
     pub(crate) fn unpack(bytes: &[u8; PACKED], to_us: fn(u16) -> u16) -> Self {
-        let mut us = [0; CHANNELS];
+        let mut us = [0; FRAMED];
         let (mut bits, mut held, mut bytes) = (0u32, 0, bytes.iter());
         for channel in &mut us {
             while held < BITS {
@@ -28,13 +37,13 @@ impl Channels {
             bits >>= BITS;
             held -= BITS;
         }
-        Channels { us }
+        Channels::of(us)
     }
 
     /// Writes them, the inverse of [`unpack`](Self::unpack).
     pub(crate) fn pack(&self, from_us: fn(u16) -> u16) -> [u8; PACKED] {
         let mut packed = [0; PACKED];
-        let (mut bits, mut held, mut channels) = (0u32, 0, self.us.iter());
+        let (mut bits, mut held, mut channels) = (0u32, 0, self.us.iter().take(FRAMED));
         for byte in &mut packed {
             while held < 8 {
                 let channel = channels.next().map_or(0, |us| from_us(*us));
@@ -48,9 +57,9 @@ impl Channels {
         packed
     }
 
-    /// Returns a channel, counted from 1 as parameters count them; none for 0, which is no channel.
+    /// Returns a channel, counted from 1 as parameters count them; none for 0, and where there is no channel.
     pub fn channel(&self, number: u32) -> Option<u16> {
         let index = usize::try_from(number).ok()?.checked_sub(1)?;
-        self.us.get(index).copied()
+        self.us.get(index).copied().filter(|us| *us != 0)
     }
 }

@@ -12,7 +12,7 @@
 //! use afbc_radio::{CRSF_MICROSECONDS, Channels, CrsfDecoder, CrsfFrame, RadioLink};
 //!
 //! // Sixteen channels at their centre, as an ExpressLRS receiver sends them.
-//! let frame = CrsfFrame::Channels(Channels { us: [1500; 16] }).encode();
+//! let frame = CrsfFrame::Channels(Channels::of([1500; 16])).encode();
 //! let (mut decoder, mut link) = (CrsfDecoder::default(), RadioLink::default());
 //! for number in 0..20 {
 //!     decoder.feed(&frame, number * 4_000, |frame| {
@@ -29,6 +29,7 @@
 
 mod channels;
 mod crsf;
+mod curves;
 mod link;
 mod pilot;
 mod sbus;
@@ -38,6 +39,7 @@ mod telemetry;
 
 pub use channels::{CHANNELS, Channels};
 pub use crsf::{CRSF_GAP_US, CRSF_MICROSECONDS, CrsfDecoder, CrsfFrame, LinkStatistics};
+pub use curves::StickCurves;
 pub use link::{ACQUIRE_FRAMES, RECOVERY_US, RadioLink, SILENT_US};
 pub use pilot::{PilotInputs, PilotNotice, PilotOutput, RadioPilot};
 pub use sbus::{SBUS_GAP_US, SbusDecoder, SbusFrame};

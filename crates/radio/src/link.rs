@@ -28,7 +28,7 @@ pub struct RadioLink {
 impl RadioLink {
     /// Takes a frame's channels.
     pub fn take(&mut self, channels: &Channels, now_us: u64) {
-        if !channels.us.iter().all(|us| PLAUSIBLE_US.contains(us)) {
+        if !channels.us.iter().all(|us| *us == 0 || PLAUSIBLE_US.contains(us)) {
             return self.refuse();
         }
         if self.newest.is_none_or(|(_, at_us)| now_us.saturating_sub(at_us) > SILENT_US) {

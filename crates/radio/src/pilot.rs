@@ -84,6 +84,8 @@ pub struct RadioPilot {
 
 impl RadioPilot {
     /// Looks at a receiver, after each frame and every 20 ms at least.
+    // Out of line: called in five places, it would take a kilobyte of flash in each.
+    #[inline(never)]
     pub fn step(&mut self, settings: &RadioSettings, link: &mut RadioLink, inputs: &PilotInputs) -> PilotOutput {
         let now_us = inputs.now_us;
         if link.heard(now_us).is_some_and(|channels| settings.has_failed(channels)) {
@@ -133,7 +135,7 @@ impl RadioPilot {
         if !is_steady {
             return output;
         }
-        output.sticks = Some(sticks);
+        output.sticks = settings.receiver.takes_receiver().then_some(sticks);
         output.order = self.select(
             settings,
             channels,
@@ -172,7 +174,7 @@ impl RadioPilot {
 
     /// Returns the mode in which the sticks take over from one that flies by itself.
     fn taken_over(&mut self, settings: &RadioSettings, inputs: &PilotInputs, sticks: &Sticks) -> Option<FlightMode> {
-        if inputs.mode.is_manual() || !inputs.armed || !settings.modes.overrides {
+        if inputs.mode.is_manual() || !inputs.armed || !settings.overrides() {
             self.by_itself = None;
             return None;
         }

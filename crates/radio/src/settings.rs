@@ -1,6 +1,7 @@
 //! Parameters of radio control, with PX4's names and meanings.
 
 use crate::channels::Channels;
+use crate::curves::StickCurves;
 use afbc_guidance::FlightMode;
 use afbc_types::{Choice, Range, parameters};
 
@@ -38,34 +39,34 @@ parameters! {
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct RadioFunctions {
         /// Roll.
-        #[parameter(RC_MAP_ROLL, "number", 0.0..=16.0)]
+        #[parameter(RC_MAP_ROLL, "number", 0.0..=18.0)]
         pub roll: u32 = 1,
         /// Pitch.
-        #[parameter(RC_MAP_PITCH, "number", 0.0..=16.0)]
+        #[parameter(RC_MAP_PITCH, "number", 0.0..=18.0)]
         pub pitch: u32 = 2,
         /// Throttle.
-        #[parameter(RC_MAP_THROTTLE, "number", 0.0..=16.0)]
+        #[parameter(RC_MAP_THROTTLE, "number", 0.0..=18.0)]
         pub throttle: u32 = 3,
         /// Yaw.
-        #[parameter(RC_MAP_YAW, "number", 0.0..=16.0)]
+        #[parameter(RC_MAP_YAW, "number", 0.0..=18.0)]
         pub yaw: u32 = 4,
         /// Switch that arms and disarms.
-        #[parameter(RC_MAP_ARM_SW, "number", 0.0..=16.0)]
+        #[parameter(RC_MAP_ARM_SW, "number", 0.0..=18.0)]
         pub arm: u32 = 5,
         /// Switch of six positions that selects the mode.
-        #[parameter(RC_MAP_FLTMODE, "number", 0.0..=16.0)]
+        #[parameter(RC_MAP_FLTMODE, "number", 0.0..=18.0)]
         pub mode: u32 = 6,
         /// Switch that stops the motors, also in flight.
-        #[parameter(RC_MAP_KILL_SW, "number", 0.0..=16.0)]
+        #[parameter(RC_MAP_KILL_SW, "number", 0.0..=18.0)]
         pub kill: u32 = 0,
         /// Switch that lets it return.
-        #[parameter(RC_MAP_RETURN_SW, "number", 0.0..=16.0)]
+        #[parameter(RC_MAP_RETURN_SW, "number", 0.0..=18.0)]
         pub return_home: u32 = 0,
         /// Switch that lets it hold.
-        #[parameter(RC_MAP_LOITER_SW, "number", 0.0..=16.0)]
+        #[parameter(RC_MAP_LOITER_SW, "number", 0.0..=18.0)]
         pub hold: u32 = 0,
         /// Channel by which a receiver that has no other way shows that it hears nothing; 0: the throttle.
-        #[parameter(RC_MAP_FAILSAFE, "number", 0.0..=16.0)]
+        #[parameter(RC_MAP_FAILSAFE, "number", 0.0..=18.0)]
         pub failsafe: u32 = 0,
         /// Where the arming switch is on, as a share of its way; negative: below that share.
         #[parameter(RC_ARMSWITCH_TH, "share", -1.0..=1.0)]
@@ -88,7 +89,7 @@ parameters! {
 
 parameters! {
     /// Modes of the six positions of the mode's switch, by PX4's numbers: 0 and 8 stabilised, 1 altitude, 2 position,
-    /// 3 mission, 4 hold, 5 return, 7 offboard, 10 takeoff, 11 land.
+    /// 3 mission, 4 hold, 5 return, 6 acro, 7 offboard, 10 takeoff, 11 land.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct SwitchModes {
         /// First position.
@@ -119,7 +120,7 @@ parameters! {
     together(modes) {
         for (declaration, number) in SwitchModes::DECLARED.iter().zip(modes.numbers()) {
             if mode_of(number).is_none() {
-                // Acro (6) and slow position (9) there are none of.
+                // Slow position (9) there is none of.
                 let next = f64::from(number) + 1.0;
                 Range { min: next, ..declaration.range }.check(number as f32)?;
             }
@@ -146,13 +147,37 @@ parameters! {
     /// The receiver.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct RadioReceiver {
-        /// Link that the receiver is on in place of MAVLink, counted from 1; 0 for none, from the next start on. The
-        /// first one never has it.
+        /// Link that the receiver is on in place of MAVLink, counted from 1; 0 for the board's own for it, if it has one;
+        /// from the next start on. The first one never has it.
         #[parameter(RC_PORT, "number", 0.0..=4.0)]
         pub port: u32 = 0,
         /// Its protocol, from the next start on.
         #[choice(RC_PROTOCOL)]
         pub protocol: RadioProtocol = RadioProtocol::Crsf,
+        /// Whose sticks count: 0 the receiver's, 1 a station's joystick (MANUAL_CONTROL), 4 none, 5 the receiver's, and
+        /// the joystick while the receiver is silent. The receiver's switches always count.
+        #[parameter(COM_RC_IN_MODE, "number", 0.0..=5.0)]
+        pub source: u32 = 5,
+    }
+    together(receiver) {
+        let least = match receiver.source {
+            // PX4's first come, first served there is none of.
+            2 | 3 => 4.0,
+            _ => 0.0,
+        };
+        Range { min: least, ..RadioReceiver::COM_RC_IN_MODE.range }.check(receiver.source as f32)
+    }
+}
+
+impl RadioReceiver {
+    /// True if the sticks of the receiver count.
+    pub fn takes_receiver(&self) -> bool {
+        matches!(self.source, 0 | 5)
+    }
+
+    /// True if the sticks of a station count, where the receiver's do not go first.
+    pub fn takes_joystick(&self) -> bool {
+        matches!(self.source, 1 | 5)
     }
 }
 
@@ -169,6 +194,9 @@ parameters! {
         /// Modes.
         #[group("")]
         pub modes: SwitchModes = SwitchModes::DEFAULT,
+        /// Curves of the sticks.
+        #[group("")]
+        pub curves: StickCurves = StickCurves::DEFAULT,
         /// Channel 1.
         #[group("RC1_")]
         pub channel_1: ChannelCalibration = ChannelCalibration::DEFAULT,
@@ -193,6 +221,7 @@ fn mode_of(number: u32) -> Option<FlightMode> {
         3 => FlightMode::Mission,
         4 => FlightMode::Hold,
         5 => FlightMode::Return,
+        6 => FlightMode::Acro,
         7 => FlightMode::Offboard,
         10 => FlightMode::Takeoff,
         11 => FlightMode::Land,
@@ -256,6 +285,11 @@ impl RadioSettings {
         // Further ones are for switches, which need no calibration.
         let calibration = self.calibrations().get(index).copied().unwrap_or(&ChannelCalibration::DEFAULT);
         Some((calibration, channels.channel(number)?))
+    }
+
+    /// True if the sticks, moved, end a mode that flies by itself.
+    pub(crate) fn overrides(&self) -> bool {
+        self.modes.overrides && self.receiver.takes_receiver()
     }
 
     /// True if the receiver shows by a channel that it hears nothing.

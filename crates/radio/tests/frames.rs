@@ -2,13 +2,13 @@
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, clippy::panic)]
 
 use afbc_radio::{
-    CHANNELS, CRSF_GAP_US, Channels, CrsfDecoder, CrsfFrame, CrsfTelemetry, LinkStatistics, SbusDecoder, SbusFrame,
+    CRSF_GAP_US, Channels, CrsfDecoder, CrsfFrame, CrsfTelemetry, LinkStatistics, SbusDecoder, SbusFrame,
 };
 use proptest::prelude::*;
 
 /// Pulses that eleven bits of CRSF can say.
 fn channels() -> impl Strategy<Value = Channels> {
-    prop::array::uniform16(880u16..=2154).prop_map(|us| Channels { us })
+    prop::array::uniform16(880u16..=2154).prop_map(Channels::of)
 }
 
 fn crsf(bytes: &[u8]) -> Vec<CrsfFrame> {
@@ -34,7 +34,7 @@ proptest! {
         let packet = crsf::Packet::RcChannels(crsf::RcChannels(ticks));
         let raw = packet.into_raw(crsf::PacketAddress::Controller);
         let us = ticks.map(|ticks| ((i32::from(ticks) - 992) * 5 / 8 + 1500) as u16);
-        prop_assert_eq!(crsf(raw.data()), [CrsfFrame::Channels(Channels { us })]);
+        prop_assert_eq!(crsf(raw.data()), [CrsfFrame::Channels(Channels::of(us))]);
     }
 
     #[test]
@@ -105,7 +105,7 @@ proptest! {
     fn sbus_frames_are_those_of_another_decoder(
         us in prop::array::uniform16(875u16..=2154), frame_lost: bool, failsafe: bool,
     ) {
-        let frame = SbusFrame { channels: Channels { us }, frame_lost, failsafe };
+        let frame = SbusFrame { channels: Channels::of(us), frame_lost, failsafe };
         let bytes = frame.encode();
         prop_assert_eq!(sbus(&[(7_000, &bytes)]), [frame]);
         let read = sbus_rs::SbusPacket::from_array(&bytes).unwrap();
@@ -118,7 +118,7 @@ proptest! {
     /// A frame begins after a pause alone: the same bytes elsewhere are none.
     #[test]
     fn sbus_frames_begin_after_a_pause(us in prop::array::uniform16(1000u16..=2000), early in 1usize..24) {
-        let frame = SbusFrame { channels: Channels { us }, frame_lost: false, failsafe: false };
+        let frame = SbusFrame { channels: Channels::of(us), frame_lost: false, failsafe: false };
         let bytes = frame.encode();
         let (head, tail) = bytes.split_at(early);
         prop_assert_eq!(sbus(&[(7_000, head), (500, tail)]), [frame]);
@@ -129,7 +129,7 @@ proptest! {
 
 #[test]
 fn a_footer_or_flag_that_is_none_spoils_a_frame() {
-    let good = SbusFrame { channels: Channels { us: [1500; CHANNELS] }, frame_lost: false, failsafe: false }.encode();
+    let good = SbusFrame { channels: Channels::of([1500; 16]), frame_lost: false, failsafe: false }.encode();
     for (at, value, is_frame) in
         [(24, 0x00, true), (24, 0x34, true), (24, 0x01, false), (23, 0x03, true), (23, 0x10, false), (0, 0x0E, false)]
     {

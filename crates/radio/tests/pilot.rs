@@ -4,8 +4,8 @@
 use afbc_flight_core::Request;
 use afbc_guidance::{FlightMode, Order, Sticks};
 use afbc_radio::{
-    Channels, CrsfDecoder, CrsfFrame, PilotInputs, PilotNotice, PilotOutput, RadioLink, RadioPilot, RadioSettings,
-    SbusDecoder, SbusFrame, SwitchModes,
+    CHANNELS, Channels, CrsfDecoder, CrsfFrame, PilotInputs, PilotNotice, PilotOutput, RadioLink, RadioPilot,
+    RadioSettings, SbusDecoder, SbusFrame, SwitchModes,
 };
 use afbc_types::Declared;
 use proptest::prelude::*;
@@ -34,7 +34,7 @@ impl Rig {
         let mut us = [1000; 16];
         us[..4].copy_from_slice(&[1500, 1500, 1000, 1500]);
         let inputs = PilotInputs { now_us: 0, armed: false, mode: FlightMode::Hold };
-        Rig { settings, link: RadioLink::default(), pilot: RadioPilot::default(), channels: Channels { us }, inputs }
+        Rig { settings, link: RadioLink::default(), pilot: RadioPilot::default(), channels: Channels::of(us), inputs }
     }
 
     fn heard() -> Self {
@@ -245,12 +245,42 @@ fn a_failsafe_by_the_throttle_is_a_loss() {
     assert!(outputs.iter().all(|output| output.sticks.is_none()));
 }
 
+/// COM_RC_IN_MODE: whose sticks count; switches always do.
+#[test]
+fn sticks_count_by_their_source() {
+    for (source, receivers, joysticks) in [(0, true, false), (1, false, true), (4, false, false), (5, true, true)] {
+        let mut rig = Rig::heard();
+        rig.settings.receiver.source = source;
+        rig.settings.validate().unwrap();
+        assert_eq!(rig.frames(1)[0].sticks.is_some(), receivers, "{source}");
+        assert_eq!(rig.settings.receiver.takes_joystick(), joysticks, "{source}");
+        rig.channels.us[ARM] = 2000;
+        assert_eq!(requests(&rig.frames(3)), [Request::Arm], "{source}");
+    }
+    for source in [2, 3] {
+        let mut settings = RadioSettings::DEFAULT;
+        settings.receiver.source = source;
+        assert!(settings.validate().is_err(), "{source}");
+    }
+}
+
+/// A channel that is not there centres its stick, holds the height, and switches nothing.
+#[test]
+fn missing_channels_command_nothing() {
+    let mut rig = Rig::heard();
+    rig.channels.us = [0; CHANNELS];
+    rig.channels.us[MODE] = 1500;
+    rig.settings.functions.arm_share = -0.75;
+    let outputs = rig.frames(20);
+    assert_eq!(outputs.iter().filter_map(|output| output.request).count(), 0);
+    assert_eq!(outputs.last().unwrap().sticks, Some(Sticks::default()));
+}
+
 #[test]
 fn modes_that_there_are_none_of_are_refused() {
-    for number in [6, 9] {
-        let modes = SwitchModes { fourth: number, ..SwitchModes::DEFAULT };
-        assert!(modes.validate().unwrap_err().to_string().starts_with("fourth"));
-    }
+    let modes = SwitchModes { fourth: 9, ..SwitchModes::DEFAULT };
+    assert!(modes.validate().unwrap_err().to_string().starts_with("fourth"));
+    assert_eq!(SwitchModes { fourth: 6, ..SwitchModes::DEFAULT }.validate(), Ok(()));
 }
 
 /// Bytes of a receiver for so many frames of this flight, arming included.
@@ -339,7 +369,7 @@ proptest! {
         rig.inputs.armed = armed;
         for (us, pause_us) in frames {
             rig.inputs.now_us += pause_us;
-            rig.link.take(&Channels { us }, rig.inputs.now_us);
+            rig.link.take(&Channels::of(us), rig.inputs.now_us);
             let output = rig.pilot.step(&rig.settings, &mut rig.link, &rig.inputs);
             if let Some(Sticks { roll, pitch, throttle, yaw }) = output.sticks {
                 prop_assert!([roll, pitch, throttle, yaw].iter().all(|stick| (-1.0..=1.0).contains(stick)));

@@ -330,6 +330,8 @@ impl Comms {
         let silent_us = (table.configuration().guidance.net.station_lost_s * 1e6) as u64;
         self.dispatcher.control.set_silence(silent_us);
         self.dispatcher.braking = table.configuration().guidance.limits.braking();
+        let radio = &table.configuration().radio;
+        (self.dispatcher.curves, self.dispatcher.takes_joystick) = (radio.curves, radio.receiver.takes_joystick());
         let mut outlet = self.outlet(self.left, send);
         let Dispatcher { parameters, streams, now_us, .. } = &mut self.dispatcher;
         while outlet.left >= VALUE_BYTES as usize + SIGNATURE

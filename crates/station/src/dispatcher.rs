@@ -23,10 +23,11 @@ use afbc_guidance::fence::Braking;
 use afbc_guidance::{FenceView, Limits, Order};
 use afbc_link::telemetry::OrbitStatus;
 use afbc_link::{
-    Address, Answer, Clock, ControlAnswer, DataStream, Downlink, Interval, MavSeverity, Mission, ParameterError,
-    ParameterRequest, Question, QuestionRefusal, Reboot, Telemetry, Uplink,
+    Address, Answer, ChannelsOverride, Clock, ControlAnswer, DataStream, Downlink, Interval, MavSeverity, Mission,
+    ParameterError, ParameterRequest, Question, QuestionRefusal, Reboot, Telemetry, Uplink,
 };
 use afbc_onboard::ControlInputs;
+use afbc_radio::StickCurves;
 use afbc_types::Setpoint;
 use heapless::Deque;
 use nalgebra::{Vector2, Vector3};
@@ -69,6 +70,11 @@ pub(crate) struct Dispatcher {
     /// What is seen of the geofence, with which limits, and what the guidance knows of it.
     fence: FenceWatch,
     pub(crate) braking: Braking,
+    /// Curves of a station's sticks, and whether these count.
+    pub(crate) curves: StickCurves,
+    pub(crate) takes_joystick: bool,
+    /// Channels that a station sends in place of a receiver's; none once they are taken.
+    pub(crate) overrides: Option<ChannelsOverride>,
     fence_given: FenceView,
     /// Where a return lands, where the guidance has it, and when that was last looked at \[m, us\].
     safe_m: Option<Vector2<f32>>,
@@ -115,6 +121,9 @@ impl Dispatcher {
             missions: Missions::default(),
             fence: FenceWatch::default(),
             braking: Limits::DEFAULT.braking(),
+            curves: StickCurves::DEFAULT,
+            takes_joystick: true,
+            overrides: None,
             fence_given: FenceView::default(),
             safe_m: None,
             safe_given_m: None,

@@ -1,18 +1,21 @@
 //! Radio control, beside the stations.
 //!
-//! The pilot needs no leave of theirs: arming, kill and mode switches count whoever is in control.
+//! The pilot needs no leave of theirs: arming, kill and mode switches count whoever is in control. While no receiver
+//! hears one, the station in control may send channels in place of a receiver (RC_CHANNELS_OVERRIDE), which are read
+//! alike.
 
 use crate::comms::Comms;
 use crate::services::sensors;
+use crate::services::status::RadioStatus;
 use crate::services::streams::id;
 use crate::services::telemetry::compose;
 use afbc_control::math::sqrt;
 use afbc_flight_core::{Request, Stamped, Ticketed};
-use afbc_link::{Downlink, MavSeverity, Telemetry};
+use afbc_link::{ChannelsOverride, Downlink, MavSeverity, Telemetry};
 use afbc_onboard::{ControlInputs, give};
 use afbc_radio::{
-    CrsfDecoder, CrsfFrame, CrsfTelemetry, LinkStatistics, PilotInputs, PilotNotice, PilotOutput, RadioLink,
-    RadioPilot, RadioProtocol, RadioSettings, SbusDecoder,
+    CHANNELS, Channels, CrsfDecoder, CrsfFrame, CrsfTelemetry, LinkStatistics, PilotInputs, PilotNotice, PilotOutput,
+    RadioLink, RadioPilot, RadioProtocol, RadioSettings, SILENT_US, SbusDecoder,
 };
 use heapless::Vec;
 
@@ -24,9 +27,22 @@ const TELEMETRY_US: u64 = 100_000;
 /// Bytes of the longest of them.
 pub const RADIO_FRAME_MAX: usize = 64;
 
+/// RSSI of a receiver that does not say how well it hears.
+const RSSI_UNKNOWN: u8 = 255;
+
+/// Channels of a station in place of a receiver's.
+#[derive(Clone, Debug, Default)]
+struct Override {
+    us: [u16; CHANNELS],
+    link: RadioLink,
+    pilot: RadioPilot,
+}
+
 /// A receiver, and the pilot behind it.
 #[derive(Clone, Debug, Default)]
 pub struct RadioControl {
+    overrides: Override,
+
     crsf: CrsfDecoder,
     sbus: SbusDecoder,
     link: RadioLink,
@@ -45,7 +61,7 @@ impl RadioControl {
         bytes: &[u8],
         settings: &RadioSettings,
         inputs: &PilotInputs,
-        mut act: impl FnMut(PilotOutput),
+        act: &mut dyn FnMut(PilotOutput),
     ) {
         let RadioControl { crsf, sbus, link, pilot, statistics, .. } = self;
         let (now_us, bad) = (inputs.now_us, crsf.bad_frames() + sbus.bad_frames());
@@ -72,6 +88,50 @@ impl RadioControl {
         act(pilot.step(settings, link, inputs));
     }
 
+    /// Takes channels of the station in control, to be called after each [`receive`](Self::receive). They are lost like
+    /// a receiver's, and a pilot whom the receiver hears goes first.
+    fn relay(
+        &mut self,
+        news: Option<ChannelsOverride>,
+        settings: &RadioSettings,
+        inputs: &PilotInputs,
+        act: &mut dyn FnMut(PilotOutput),
+    ) {
+        let now_us = inputs.now_us;
+        let Override { us, link, pilot } = &mut self.overrides;
+        if self.link.heard(now_us).is_some() {
+            self.overrides = Override::default();
+            return;
+        }
+        if let Some(news) = news {
+            if link.at_us().is_none_or(|at_us| now_us.saturating_sub(at_us) > SILENT_US) {
+                *us = [0; CHANNELS];
+            }
+            news.apply(us);
+            if us.iter().any(|us| *us != 0) {
+                link.take(&Channels { us: *us }, now_us);
+            } else {
+                link.lose();
+            }
+        }
+        let output = pilot.step(settings, link, inputs);
+        // Who sends them knows it.
+        let notice = output.notice.filter(|notice| *notice != PilotNotice::Heard);
+        act(PilotOutput { notice, ..output });
+    }
+
+    /// Returns the channels that count.
+    fn status(&self, settings: &RadioSettings, now_us: u64) -> Option<RadioStatus> {
+        if let Some(channels) = self.link.heard(now_us) {
+            let rssi = match settings.receiver.protocol {
+                RadioProtocol::Crsf => (u32::from(self.statistics.quality_percent.min(100)) * 254 / 100) as u8,
+                RadioProtocol::Sbus => RSSI_UNKNOWN,
+            };
+            return Some(RadioStatus { channels: *channels, rssi });
+        }
+        self.overrides.link.heard(now_us).map(|channels| RadioStatus { channels: *channels, rssi: RSSI_UNKNOWN })
+    }
+
     /// How well the receiver hears the pilot.
     pub fn statistics(&self) -> &LinkStatistics {
         &self.statistics
@@ -87,9 +147,11 @@ impl Comms {
         let inputs = PilotInputs { now_us, armed: status.mode.armed(), mode: status.guided.mode };
         let faulty = sensors::faulty(&status.aux);
         let mut update = None;
+        let news = dispatcher.overrides.take();
         let (texts, radio_us) = (&mut dispatcher.texts, &mut dispatcher.radio_us);
-        radio.receive(bytes, settings, &inputs, |output| {
+        let mut act = |output: PilotOutput| {
             let PilotOutput { sticks, request, order, notice } = output;
+            let sticks = sticks.map(|sticks| settings.curves.shape(inputs.mode, &sticks));
             if let Some(notice) = notice {
                 let severity = match notice {
                     PilotNotice::Heard => MavSeverity::MAV_SEVERITY_INFO,
@@ -119,7 +181,10 @@ impl Comms {
                 orders.sticks = sticks.map(|value| Stamped { value, at_us: now_us }).or(orders.sticks);
                 order.into_iter().for_each(|value| give(orders, Ticketed { value, ticket: PILOT }));
             }
-        });
+        };
+        radio.receive(bytes, settings, &inputs, &mut act);
+        radio.relay(news, settings, &inputs, &mut act);
+        dispatcher.status.radio = radio.status(settings, now_us);
         update
     }
 

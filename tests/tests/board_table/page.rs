@@ -37,6 +37,13 @@ pub(crate) fn wiring(board: &BoardTable) -> String {
             format!("u-blox or NMEA on {}", gnss.name),
         ],
     ];
+    if let Some((uart, pad)) = &board.radio {
+        rows.push([
+            "radio receiver, outside: out, in".to_owned(),
+            format!("{}, {}", uart.tx, uart.rx),
+            format!("CRSF on {}; SBUS by the pad {pad}, which has an inverter before {}", uart.name, uart.rx),
+        ]);
+    }
     let corners = match board.numbering.as_str() {
         "BETAFLIGHT" => ["rear right", "front right", "rear left", "front left"],
         "ARDUPILOT" => ["front right", "rear left", "front left", "rear right"],

@@ -92,6 +92,8 @@ pub(crate) struct BoardTable {
     pub(crate) crystal_hz: u32,
     pub(crate) link: Uart,
     pub(crate) gnss: Uart,
+    /// The radio receiver's UART, and the pad of its inverter.
+    pub(crate) radio: Option<(Uart, String)>,
     pub(crate) imu: Spi,
     pub(crate) i2c: I2c,
     pub(crate) led: Option<String>,
@@ -117,6 +119,7 @@ impl BoardTable {
         let crystal_hz = words.after("crystal_hz :").parse().unwrap();
         let link = words.uart("link");
         let gnss = words.uart("gnss");
+        let radio = (words.peek() == "radio").then(|| words.radio());
         let imu = Spi {
             name: words.after("imu :"),
             clock: words.after("{ clock :"),
@@ -172,7 +175,7 @@ impl BoardTable {
         }
         words.expect("}");
         assert!(words.0.is_empty(), "{}: {:?}", board.display(), words.0);
-        Some(BoardTable { crystal_hz, link, gnss, imu, i2c, led, buzzer, card, outputs, numbering, timers })
+        Some(BoardTable { crystal_hz, link, gnss, radio, imu, i2c, led, buzzer, card, outputs, numbering, timers })
     }
 
     /// Returns the motors.
@@ -188,7 +191,8 @@ impl BoardTable {
 
     /// Returns every pin that is used, once for each use.
     pub(crate) fn pins(&self) -> Vec<&str> {
-        let uarts = [&self.link, &self.gnss].into_iter().flat_map(|uart| [&uart.tx, &uart.rx]);
+        let radio = self.radio.as_ref().map(|(uart, _)| uart);
+        let uarts = [&self.link, &self.gnss].into_iter().chain(radio).flat_map(|uart| [&uart.tx, &uart.rx]);
         let Spi { clock, out, into, select, ready, .. } = &self.imu;
         let buses = [clock, out, into, select, &ready.pin, &self.i2c.clock, &self.i2c.data];
         let motors = self.motors().map(|motor| &motor.pin);
@@ -228,6 +232,13 @@ impl Words {
         let uart = Uart { name: self.after(&format!("{key} :")), tx: self.after("{ tx :"), rx: self.after("rx :") };
         self.expect("}");
         uart
+    }
+
+    fn radio(&mut self) -> (Uart, String) {
+        let uart = Uart { name: self.after("radio :"), tx: self.after("{ tx :"), rx: self.after("rx :") };
+        let pad = self.after("sbus :").replace('"', "");
+        self.expect("}");
+        (uart, pad)
     }
 
     fn stream(&mut self) -> Stream {

@@ -167,6 +167,11 @@ impl Memory {
                 let setpoint = self.trim.advance(lift, state, &setpoint, dt_s);
                 Some(setpoint).filter(Setpoint::is_plausible)
             }
+            Shaping::Turning(target) => {
+                self.limiter.anchor(state);
+                (self.aim, self.rates) = (inputs.stop(), Some(target));
+                Some(Setpoint::hold(state))
+            }
         }
     }
 
@@ -264,7 +269,7 @@ impl Memory {
                     _ => ModeOutput::fly(inputs.stop()),
                 }
             }
-            FlightMode::Position | FlightMode::Altitude | FlightMode::Stabilised => {
+            FlightMode::Position | FlightMode::Altitude | FlightMode::Stabilised | FlightMode::Acro => {
                 let sticks = sticks.copied().unwrap_or_default();
                 sticks::fly(self.mode, &sticks, inputs, lift)
             }

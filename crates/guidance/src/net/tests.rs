@@ -58,7 +58,7 @@ fn each_cause_is_found_by_itself_in_flight() {
         let blind = Findings { mode, targets: false, sticks: false, ..calm() };
         let expected: &[Cause] = match mode {
             FlightMode::Offboard => &[Cause::Targets],
-            FlightMode::Position | FlightMode::Altitude | FlightMode::Stabilised => &[Cause::Sticks],
+            FlightMode::Position | FlightMode::Altitude | FlightMode::Stabilised | FlightMode::Acro => &[Cause::Sticks],
             _ => &[],
         };
         assert_eq!(found(&net, &blind), expected);

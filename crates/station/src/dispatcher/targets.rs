@@ -40,13 +40,20 @@ impl Dispatcher {
                 let (yaw_rate_rad_s, thrust) = (target.yaw_rate_rad_s, target.thrust);
                 afbc_guidance::OffboardTarget::Attitude(AttitudeTarget { attitude, yaw_rate_rad_s, thrust })
             }
+            ExternalTarget::Channels(channels) => {
+                // The newest counts, as of a receiver.
+                self.overrides = Some(channels);
+                return;
+            }
             ExternalTarget::Sticks(sticks) => {
                 // The pilot's own sticks go first.
-                if self.radio_us.is_some_and(|radio_us| at_us.saturating_sub(radio_us) <= SILENT_US) {
+                let radio_us = self.radio_us.filter(|radio_us| at_us.saturating_sub(*radio_us) <= SILENT_US);
+                if !self.takes_joystick || radio_us.is_some() {
                     return;
                 }
                 let afbc_link::ManualControl { roll, pitch, throttle, yaw } = sticks;
-                let value = afbc_guidance::Sticks { roll, pitch, throttle, yaw };
+                let sticks = afbc_guidance::Sticks { roll, pitch, throttle, yaw };
+                let value = self.curves.shape(self.status.guided.mode, &sticks);
                 inputs.order().sticks = Some(Stamped { value, at_us });
                 return;
             }

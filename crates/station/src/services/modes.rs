@@ -21,6 +21,7 @@ pub const fn custom(mode: FlightMode) -> u32 {
         FlightMode::Mission => custom_of(AUTO, 4),
         FlightMode::Return => custom_of(AUTO, 5),
         FlightMode::Land => custom_of(AUTO, 6),
+        FlightMode::Acro => custom_of(5, 0),
         FlightMode::Offboard => custom_of(6, 0),
         FlightMode::Stabilised => custom_of(7, 0),
     }
@@ -40,7 +41,7 @@ pub const fn standard(mode: FlightMode) -> u8 {
         FlightMode::Mission => 6,
         FlightMode::Land => 7,
         FlightMode::Takeoff => 8,
-        FlightMode::Hold | FlightMode::Offboard | FlightMode::Stabilised => 0,
+        FlightMode::Hold | FlightMode::Offboard | FlightMode::Stabilised | FlightMode::Acro => 0,
     }
 }
 
@@ -62,6 +63,7 @@ pub fn available(place: u8) -> Option<AvailableMode> {
     let mode = *FlightMode::ALL.get(usize::from(place.checked_sub(1)?))?;
     let properties = match mode {
         FlightMode::Offboard => AUTOMATIC | ADVANCED,
+        FlightMode::Acro => ADVANCED,
         _ if mode.is_manual() => 0,
         _ => AUTOMATIC,
     };
@@ -107,6 +109,7 @@ mod tests {
             (FlightMode::Position, 0x0003_0000),
             (FlightMode::Altitude, 0x0002_0000),
             (FlightMode::Stabilised, 0x0007_0000),
+            (FlightMode::Acro, 0x0005_0000),
         ];
         assert_eq!(expected.len(), FlightMode::ALL.len());
         for (mode, number) in expected {
@@ -130,7 +133,8 @@ mod tests {
         assert_eq!(of_standard(0), None);
     }
 
-    /// MAV_MODE_PROPERTY: what a pilot flies has none, offboard is for the advanced, all others fly by themselves.
+    /// MAV_MODE_PROPERTY: what a pilot flies has none, acro and offboard are for the advanced, all others fly by
+    /// themselves.
     #[test]
     fn properties_and_names_are_the_modes() {
         for (mode, place) in FlightMode::ALL.into_iter().zip(1..) {
@@ -138,6 +142,7 @@ mod tests {
             let properties = match mode {
                 FlightMode::Position | FlightMode::Altitude | FlightMode::Stabilised => 0,
                 FlightMode::Offboard => 5,
+                FlightMode::Acro => 1,
                 _ => 4,
             };
             assert_eq!((reported.place, reported.properties), (place, properties), "{mode:?}");

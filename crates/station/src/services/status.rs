@@ -7,6 +7,7 @@ use afbc_guidance::FlightMode;
 use afbc_link::telemetry::BatteryStatus;
 use afbc_onboard::GuidanceResult;
 use afbc_onboard::Report;
+use afbc_radio::Channels;
 use afbc_types::{ROTORS_MAX, State};
 
 /// What the shell reports, since the control tick does not know it.
@@ -78,8 +79,19 @@ pub struct VehicleStatus {
     pub tick_us: f32,
     /// Frames dropped since power-up.
     pub dropped_frames: u32,
+    /// The pilot's channels, if one is heard.
+    pub radio: Option<RadioStatus>,
     /// What the shell has reported.
     pub aux: AuxSensors,
+}
+
+/// A pilot's channels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct RadioStatus {
+    /// The channels.
+    pub channels: Channels,
+    /// How well the pilot is received, 0 to 254; 255 if unknown.
+    pub rssi: u8,
 }
 
 impl VehicleStatus {

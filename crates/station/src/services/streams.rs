@@ -20,6 +20,7 @@ pub mod id {
     pub const GLOBAL_POSITION_INT: u32 = 33;
     pub const MISSION_CURRENT: u32 = 42;
     pub const GPS_GLOBAL_ORIGIN: u32 = 49;
+    pub const RC_CHANNELS: u32 = 65;
     pub const VFR_HUD: u32 = 74;
     pub const POSITION_TARGET_LOCAL_NED: u32 = 85;
     pub const HIL_ACTUATOR_CONTROLS: u32 = 93;
@@ -38,7 +39,7 @@ pub mod id {
 }
 
 /// Streams with their default intervals; 0: off \[us\]. `docs/station.md` has the same list.
-pub const DEFAULTS: [(u32, u32); 20] = [
+pub const DEFAULTS: [(u32, u32); 21] = [
     (id::SYS_STATUS, 1_000_000),
     (id::SYSTEM_TIME, 1_000_000),
     (id::GPS_RAW_INT, 1_000_000),
@@ -59,6 +60,7 @@ pub const DEFAULTS: [(u32, u32); 20] = [
     (id::CURRENT_MODE, 1_000_000),
     (id::ORBIT_EXECUTION_STATUS, 500_000),
     (id::HIGHRES_IMU, 0),
+    (id::RC_CHANNELS, 500_000),
 ];
 /// Shortest interval: a tick \[us\].
 pub const INTERVAL_MIN_US: u32 = 1_000;
@@ -156,6 +158,7 @@ impl Streams {
         let interval_us = 1_000_000_i32.checked_div(request.rate_hz.into()).unwrap_or(-1);
         let group: &[u32] = match request.group {
             2 => &[id::SYS_STATUS, id::BATTERY_STATUS, id::GPS_RAW_INT, id::MISSION_CURRENT],
+            3 => &[id::RC_CHANNELS],
             6 => &[id::LOCAL_POSITION_NED, id::GLOBAL_POSITION_INT],
             10 => &[id::ATTITUDE, id::ATTITUDE_QUATERNION],
             11 => &[id::VFR_HUD],
@@ -343,7 +346,7 @@ mod tests {
     #[test]
     fn each_group_has_its_messages() {
         use id::*;
-        let groups: [(u8, &[u32]); 6] = [
+        let groups: [(u8, &[u32]); 7] = [
             (
                 0,
                 &[
@@ -357,6 +360,7 @@ mod tests {
                 ],
             ),
             (2, &[SYS_STATUS, BATTERY_STATUS, GPS_RAW_INT, MISSION_CURRENT]),
+            (3, &[RC_CHANNELS]),
             (6, &[LOCAL_POSITION_NED, GLOBAL_POSITION_INT]),
             (10, &[ATTITUDE, ATTITUDE_QUATERNION]),
             (11, &[VFR_HUD]),

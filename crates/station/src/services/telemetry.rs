@@ -3,11 +3,11 @@
 use crate::services::health;
 use crate::services::modes;
 use crate::services::origin::{EarthOrigin, Global};
-use crate::services::status::VehicleStatus;
+use crate::services::status::{RadioStatus, VehicleStatus};
 use crate::services::streams::id;
 use afbc_control::math::sqrt;
 use afbc_link::telemetry::{self, ActuatorOutputs, AttitudeQuaternion, Fix, GlobalPosition, Home, Version, VfrHud};
-use afbc_link::{Clock, Downlink, Telemetry};
+use afbc_link::{Clock, Downlink, RadioChannels, Telemetry};
 use micromath::F32Ext;
 use nalgebra::Vector3;
 
@@ -50,6 +50,10 @@ pub fn compose(message: u32, status: &VehicleStatus) -> Option<Downlink> {
             let at = status.aux.origin?.at();
             let (place_e7, altitude_mm) = (at.e7(), at.altitude_mm());
             telemetry(Telemetry::Origin(telemetry::GlobalOrigin { place_e7, altitude_mm, time_us }))
+        }
+        id::RC_CHANNELS => {
+            let RadioStatus { channels, rssi } = status.radio?;
+            telemetry(Telemetry::Channels(RadioChannels { time_ms, us: channels.us, rssi }))
         }
         id::VFR_HUD => telemetry(Telemetry::Summary(summary(status)?)),
         id::BATTERY_STATUS => telemetry(Telemetry::Battery(status.aux.battery?)),
@@ -186,6 +190,7 @@ mod tests {
             id::BATTERY_STATUS,
             id::HOME_POSITION,
             id::VFR_HUD,
+            id::RC_CHANNELS,
         ] {
             assert_eq!(compose(message, &status), None, "message {message}");
         }

@@ -60,6 +60,7 @@ fn nav_state(core: Mode, mode: FlightMode) -> u8 {
         FlightMode::Mission => 3,
         FlightMode::Hold => 4,
         FlightMode::Return => 5,
+        FlightMode::Acro => 10,
         FlightMode::Offboard => 14,
         FlightMode::Stabilised => 15,
         FlightMode::Takeoff => 17,

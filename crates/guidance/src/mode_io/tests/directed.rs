@@ -65,7 +65,14 @@ proptest! {
         prop_assert!((setpoint.yaw_rate_rad_s + yaw * 1.5).abs() < 1e-5);
         prop_assert_eq!((setpoint.position_m, setpoint.velocity_m_s), (here(), stage.state.velocity_m_s));
 
-        for output in [position, altitude, stabilised] {
+        // Body axes: to the right and nose down are positive turns about forward and left, clockwise a negative one.
+        let acro = output(FlightMode::Acro);
+        let Shaping::Turning(target) = acro.shaping else { panic!("{acro:?}") };
+        let full = Vector3::new(all.roll * 100.0, all.pitch * 100.0, -all.yaw * 100.0).map(f32::to_radians);
+        prop_assert!(near(target.rates_rad_s, full), "{target:?}");
+        prop_assert!((target.thrust - thrust / 25.0).abs() < 1e-5, "{target:?}");
+
+        for output in [position, altitude, stabilised, acro] {
             prop_assert_eq!((output.lifts, output.lands, output.done), (throttle > 0.1, false, false));
         }
     }

@@ -1,0 +1,90 @@
+//! Channels of radio control on the wire, beside the generated dialect.
+#![allow(
+    clippy::unwrap_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    reason = "a test that cannot go on should say why"
+)]
+
+use afbc_link::{
+    Address, ChannelsOverride, Decoder, Downlink, ExternalTarget, FRAME_MAX, RADIO_CHANNELS, RadioChannels, Sender,
+    Telemetry, Uplink,
+};
+use proptest::prelude::*;
+
+const VEHICLE: Address = Address { system: 1, component: 1 };
+const STATION: Address = Address { system: 255, component: 190 };
+
+fn sent(message: &Uplink) -> Vec<Uplink> {
+    let mut buffer = [0; FRAME_MAX];
+    let (mut decoder, mut heard) = (Decoder::new(VEHICLE), Vec::new());
+    decoder.feed(Sender::new(STATION).send(message, &mut buffer), |_, message| heard.push(message));
+    heard
+}
+
+/// What the specification says of a raw value of a channel, from 0.
+fn expected(place: usize, raw: u16, before: u16) -> u16 {
+    match (place < 8, raw) {
+        (_, 65_535) => before,
+        (true, raw) => raw,
+        (false, 0) => before,
+        (false, 65_534) => 0,
+        (false, raw) => raw,
+    }
+}
+
+proptest! {
+    #[test]
+    fn an_override_arrives(us in prop::array::uniform18(prop_oneof![Just(0u16), 800u16..2200])) {
+        let message = Uplink::Target(ExternalTarget::Channels(ChannelsOverride::new(us)));
+        let heard = sent(&message);
+        prop_assert_eq!(&heard, &[message]);
+        let [Uplink::Target(ExternalTarget::Channels(channels))] = heard[..] else { panic!("{heard:?}") };
+        let mut found = [1234; RADIO_CHANNELS];
+        channels.apply(&mut found);
+        prop_assert_eq!(found, us);
+    }
+
+    /// Frames of the generated dialect, with channels that are left alone or given back.
+    #[test]
+    fn others_overrides_are_read(
+        raw in prop::array::uniform18(prop_oneof![
+            Just(0u16), Just(u16::MAX), Just(u16::MAX - 1), 800u16..2200,
+        ]),
+        before in prop::array::uniform18(0u16..2200),
+    ) {
+        // Channels 1 to 8, receiver, channels 9 to 18: the order of the wire.
+        let mut payload = Vec::new();
+        raw[..8].iter().for_each(|us| payload.extend(us.to_le_bytes()));
+        payload.extend([1, 1]);
+        raw[8..].iter().for_each(|us| payload.extend(us.to_le_bytes()));
+        let read = <Uplink as afbc_link::Message>::read(70, &payload, VEHICLE);
+        let Ok(Uplink::Target(ExternalTarget::Channels(channels))) = read else { panic!("{read:?}") };
+        let mut us = before;
+        channels.apply(&mut us);
+        for place in 0..RADIO_CHANNELS {
+            prop_assert_eq!(us[place], expected(place, raw[place], before[place]), "channel {}", place + 1);
+        }
+        let elsewhere = <Uplink as afbc_link::Message>::read(70, &{
+            payload[16] = 9;
+            payload
+        }, VEHICLE);
+        prop_assert!(elsewhere.is_err());
+    }
+
+    #[test]
+    fn channels_are_shown(
+        us in prop::array::uniform18(prop_oneof![Just(0u16), 800u16..2200]), time_ms: u32, rssi: u8,
+    ) {
+        let message = Downlink::Telemetry(Telemetry::Channels(RadioChannels { time_ms, us, rssi }));
+        let mut buffer = [0; FRAME_MAX];
+        let (mut decoder, mut heard) = (Decoder::new(STATION), Vec::new());
+        let frame = Sender::new(VEHICLE).send(&message, &mut buffer).to_vec();
+        decoder.feed(&frame, |_, message: Downlink| heard.push(message));
+        prop_assert_eq!(&heard, &[message]);
+        // Number of channels, after time and eighteen of them; trailing zeros are not sent.
+        let payload = &frame[10..frame.len() - 2];
+        let count = us.iter().rposition(|us| *us != 0).map_or(0, |last| last + 1);
+        prop_assert_eq!(payload.get(40).copied().unwrap_or(0), count as u8);
+    }
+}

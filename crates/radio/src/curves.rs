@@ -1,0 +1,79 @@
+//! Curves of the sticks, with PX4's names and formulae: from the way of a stick to the share of what it commands.
+
+use afbc_guidance::{FlightMode, Sticks};
+use afbc_types::parameters;
+
+parameters! {
+    /// Curves of the sticks. Altitude and position mode have a dead zone and an expo, acro mode an expo and a super
+    /// expo; stabilised mode is linear, and so are roll and pitch in altitude mode and the throttle in acro mode.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct StickCurves {
+        /// Roll and pitch in position mode: 0 linear, 1 cubic.
+        #[parameter(MPC_XY_MAN_EXPO, "share", 0.0..=1.0)]
+        pub horizontal_expo: f32 = 0.6,
+        /// Throttle in altitude and position mode: 0 linear, 1 cubic.
+        #[parameter(MPC_Z_MAN_EXPO, "share", 0.0..=1.0)]
+        pub vertical_expo: f32 = 0.6,
+        /// Yaw in altitude and position mode: 0 linear, 1 cubic.
+        #[parameter(MPC_YAW_EXPO, "share", 0.0..=1.0)]
+        pub yaw_expo: f32 = 0.6,
+        /// Share of the way of these sticks that commands nothing.
+        #[parameter(MPC_HOLD_DZ, "share", 0.0..=1.0)]
+        pub dead_zone: f32 = 0.1,
+        /// Roll and pitch in acro mode: 0 linear, 1 cubic.
+        #[parameter(MC_ACRO_EXPO, "share", 0.0..=1.0)]
+        pub acro_expo: f32 = 0.0,
+        /// Yaw in acro mode: 0 linear, 1 cubic.
+        #[parameter(MC_ACRO_EXPO_Y, "share", 0.0..=1.0)]
+        pub acro_yaw_expo: f32 = 0.0,
+        /// How far roll and pitch in acro mode are held back before the end of their way.
+        #[parameter(MC_ACRO_SUPEXPO, "share", 0.0..=0.95)]
+        pub acro_super_expo: f32 = 0.0,
+        /// The same of the yaw.
+        #[parameter(MC_ACRO_SUPEXPOY, "share", 0.0..=0.95)]
+        pub acro_yaw_super_expo: f32 = 0.0,
+    }
+}
+
+impl StickCurves {
+    /// Returns what sticks command in a mode, -1 to 1, of their ways, -1 to 1. Modes that fly by themselves take no
+    /// sticks; for them nothing is changed.
+    #[must_use]
+    pub fn shape(&self, mode: FlightMode, sticks: &Sticks) -> Sticks {
+        let Sticks { roll, pitch, throttle, yaw } = *sticks;
+        let held = |stick, expo| expo_dead_zone(stick, expo, self.dead_zone);
+        let lean = |stick| held(stick, self.horizontal_expo);
+        let (climb, turn) = (held(throttle, self.vertical_expo), held(yaw, self.yaw_expo));
+        match mode {
+            FlightMode::Position => Sticks { roll: lean(roll), pitch: lean(pitch), throttle: climb, yaw: turn },
+            FlightMode::Altitude => Sticks { throttle: climb, yaw: turn, ..*sticks },
+            FlightMode::Acro => {
+                let rate = |stick| super_expo(stick, self.acro_expo, self.acro_super_expo);
+                let yaw = super_expo(yaw, self.acro_yaw_expo, self.acro_yaw_super_expo);
+                Sticks { roll: rate(roll), pitch: rate(pitch), throttle, yaw }
+            }
+            _ => *sticks,
+        }
+    }
+}
+
+/// Mixes a line and a cubic curve: `expo` of the latter.
+fn expo(stick: f32, expo: f32) -> f32 {
+    (1.0 - expo) * stick + expo * stick * stick * stick
+}
+
+/// [`expo`] of the way beyond `dead_zone`.
+fn expo_dead_zone(stick: f32, share: f32, dead_zone: f32) -> f32 {
+    // As in PX4, some of the way is left.
+    let dead_zone = dead_zone.min(0.99);
+    let beyond = stick.abs() - dead_zone;
+    if beyond > 0.0 { expo((beyond / (1.0 - dead_zone)).min(1.0), share).copysign(stick) } else { 0.0 }
+}
+
+/// [`expo`], bent further: it reaches 1 at the end of the way only.
+fn super_expo(stick: f32, share: f32, bend: f32) -> f32 {
+    expo(stick, share) * (1.0 - bend) / (1.0 - stick.abs() * bend)
+}
+
+#[cfg(test)]
+mod tests;
