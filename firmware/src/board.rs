@@ -29,6 +29,8 @@ pub trait Board: Sized + 'static {
     const OUTPUTS: usize;
     /// True if it has a task that shows by LED or buzzer how the vehicle is ([`indication`](crate::indication)).
     const INDICATES: bool = false;
+    /// True if it has a line for the telemetry of its motor controllers ([`escs`](crate::escs)).
+    const ESCS: bool = false;
     /// Restarts the chip into its boot loader, if it has one.
     const BOOT_LOADER: Option<fn() -> !> = None;
 

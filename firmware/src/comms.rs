@@ -3,6 +3,7 @@
 use crate::aux_sensors;
 use crate::board::{Board, Links, Receiver as _, Transmitter as _};
 use crate::control;
+use crate::escs;
 use crate::indication;
 use crate::parameters;
 use crate::radio::{self, RadioLine};
@@ -16,7 +17,7 @@ pub use afbc_station::Comms;
 use afbc_station::services::imus::{self, ImuNews};
 use afbc_station::services::signing::Signing;
 use afbc_station::services::status::SensorBits;
-use afbc_station::{AuxSensors, Calibrator, REPORT_MAX, Reboot, Setup};
+use afbc_station::{AuxSensors, Calibrator, EscAction, EscDesk, REPORT_MAX, Reboot, Setup};
 use core::array;
 use core::cell::RefCell;
 use core::future::poll_fn;
@@ -82,6 +83,7 @@ pub async fn run<B: Board, const OTHERS: usize>((comms, table, log, radio): &mut
     let mut outgoing = Vec::<u8, REPORT_MAX>::new();
     let mut leaving = 0;
     let mut calibrator = B::Sampler::SENSES.then(calibrator);
+    let mut esc_desk = B::ESCS.then(|| escs::desk(table));
     loop {
         match select(receive(links, &mut incoming), ticks::next()).await {
             Either::First((link, length)) => {
@@ -133,7 +135,17 @@ pub async fn run<B: Board, const OTHERS: usize>((comms, table, log, radio): &mut
                 // A constant here, too, as below.
                 let kept = if recording::is_possible::<B>() { log.as_deref_mut() } else { None };
                 let others = [kept.as_ref().map(|log| log.link()), radio.as_ref().map(|radio| radio.link())];
-                serve(comms, table, kept, &mut outgoing);
+                let changed = serve(comms, table, kept, &mut outgoing);
+                if B::ESCS
+                    && let Some(desk) = &mut esc_desk
+                {
+                    if changed {
+                        desk.adopt(table.configuration());
+                    }
+                    if let Some(news) = listen_to_escs(comms, desk, &tick) {
+                        pass_on::<B>(&news, log);
+                    }
+                }
                 let told = links.each().iter_mut().enumerate().filter(|(index, _)| !others.contains(&Some(*index)));
                 told.for_each(|(_, link)| link.transmitter.transmit(&tick, &outgoing));
                 if comms.has_mail() {
@@ -225,6 +237,23 @@ fn report_self_tests(comms: &mut Comms, aux: &mut AuxSensors) {
     }
 }
 
+/// Takes what the motor controllers have told, asks the next one and moves the notch; returns what the vehicle is to do
+/// about a rotor's failure. Out of line like the report.
+#[inline(never)]
+fn listen_to_escs(comms: &mut Comms, desk: &mut EscDesk, tick: &Tick) -> Option<ControlInputs> {
+    let mut heard = Vec::<u8, 32>::new();
+    while !heard.is_full()
+        && let Some(byte) = escs::heard()
+    {
+        // There is room.
+        let _ = heard.push(byte);
+    }
+    let EscAction { ask, notch, inputs } = comms.escs(desk, &heard, &tick.report);
+    ask.into_iter().for_each(escs::ask);
+    notch.into_iter().for_each(escs::move_notch);
+    inputs
+}
+
 /// Creates what calibrates, to be called once, by a board with sensors: the others do not have its memory.
 #[inline(never)]
 fn calibrator() -> &'static mut Calibrator {
@@ -244,14 +273,15 @@ fn calibrate(
     comms.calibrate(calibrator, sample, table, |frame| drop(outgoing.extend_from_slice(frame)));
 }
 
-/// Sends values of parameters, and passes on what has changed, of the signatures too. Out of line like the report.
+/// Sends values of parameters, and passes on what has changed, of the signatures too; true if a parameter has. Out of
+/// line like the report.
 #[inline(never)]
 fn serve(
     comms: &mut Comms,
     table: &mut ParameterTable,
     log: Option<&mut ExactLog>,
     outgoing: &mut Vec<u8, REPORT_MAX>,
-) {
+) -> bool {
     let change = comms.parameters(table, |frame| drop(outgoing.extend_from_slice(frame)));
     if let Some(change) = change {
         let number = log.map_or(0, |log| log.change(table, change));
@@ -260,4 +290,5 @@ fn serve(
         }
     }
     parameters::keep_signing(|| comms.signing_record());
+    change.is_some()
 }

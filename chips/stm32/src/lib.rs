@@ -5,6 +5,7 @@ pub mod battery;
 pub mod boot_loader;
 pub mod candidates;
 pub mod crystal;
+pub mod escs;
 pub mod faults;
 pub mod indicator;
 pub mod link;

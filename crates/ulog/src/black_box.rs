@@ -6,9 +6,9 @@ use crate::known::Known;
 use crate::moment::{LoggedTick, Moment};
 use crate::ring::{LogRing, RingView};
 use crate::topics::{
-    ActuatorArmed, ActuatorMotors, ActuatorOutputs, AidOffered, Aiding, BatteryVoltage, EstimatorFigures,
-    EstimatorFlags, EstimatorVector, LandDetected, LawSignals, Listed, ManualControl, SensorCombined, TOPICS,
-    ThrustDemand, TorqueDemand, VehicleAngularVelocity, VehicleAttitude, VehicleAttitudeSetpoint,
+    ActuatorArmed, ActuatorMotors, ActuatorOutputs, AidOffered, Aiding, BatteryVoltage, EscStatusReport,
+    EstimatorFigures, EstimatorFlags, EstimatorVector, LandDetected, LawSignals, Listed, ManualControl, SensorCombined,
+    TOPICS, ThrustDemand, TorqueDemand, VehicleAngularVelocity, VehicleAttitude, VehicleAttitudeSetpoint,
     VehicleGlobalPosition, VehicleLocalPosition, VehicleLocalPositionSetpoint, VehicleRatesSetpoint, VehicleState,
 };
 use afbc_estimator::{ImuSample, Measurement};
@@ -126,7 +126,7 @@ impl BlackBox {
         table: &ParameterTable<N>,
         ring: &mut LogRing<R>,
     ) {
-        let LoggedTick { report, readings, ref taken, view, origin } = *tick;
+        let LoggedTick { report, readings, ref taken, view, escs, origin } = *tick;
         let now_us = report.time_us;
         let mut ring = ring.view();
         self.definitions.write(now_us, table, &mut ring);
@@ -138,7 +138,7 @@ impl BlackBox {
             }
         }
         let report = report.padded();
-        let moment = Moment { report: &report, readings, taken, view, origin, known: &self.known };
+        let moment = Moment { report: &report, readings, taken, view, escs, origin, known: &self.known };
         let mut topics =
             Topics { now_us, writes, due_us: &mut self.due_us, dropouts: &mut self.dropouts, ring: &mut ring };
         self.last.sensors(&moment, &mut topics);
@@ -300,6 +300,7 @@ impl Last {
         topics.at_rate(|| EstimatorVector::of(moment));
         topics.at_rate(|| EstimatorFlags::of(moment));
         topics.at_rate(|| BatteryVoltage::of(moment));
+        topics.at_rate(|| EscStatusReport::of(moment));
         if let Some(figures) = EstimatorFigures::of(moment, on_ground) {
             topics.on_change(&mut self.figures, figures, EstimatorFigures::is_like);
         }

@@ -80,6 +80,8 @@ pub(crate) struct BoardTable {
     pub(crate) crystal_hz: u32,
     pub(crate) link: Uart,
     pub(crate) gnss: Uart,
+    /// Where the motor controllers' telemetry comes in.
+    pub(crate) escs: Option<Uart>,
     pub(crate) imu: Spi,
     pub(crate) i2c: I2c,
     pub(crate) led: Option<String>,
@@ -104,6 +106,7 @@ impl BoardTable {
         let crystal_hz = words.after("crystal_hz :").parse().unwrap();
         let link = words.uart("link");
         let gnss = words.uart("gnss");
+        let escs = (words.peek() == "escs").then(|| words.uart("escs"));
         let imu = Spi {
             name: words.after("imu :"),
             clock: words.after("{ clock :"),
@@ -147,7 +150,7 @@ impl BoardTable {
         }
         words.expect("}");
         assert!(words.0.is_empty(), "{}: {:?}", board.display(), words.0);
-        Some(BoardTable { crystal_hz, link, gnss, imu, i2c, led, buzzer, outputs, numbering, timers })
+        Some(BoardTable { crystal_hz, link, gnss, escs, imu, i2c, led, buzzer, outputs, numbering, timers })
     }
 
     /// Returns the motors.
@@ -163,7 +166,7 @@ impl BoardTable {
 
     /// Returns every pin that is used, once for each use.
     pub(crate) fn pins(&self) -> Vec<&str> {
-        let uarts = [&self.link, &self.gnss].into_iter().flat_map(|uart| [&uart.tx, &uart.rx]);
+        let uarts = [&self.link, &self.gnss].into_iter().chain(&self.escs).flat_map(|uart| [&uart.tx, &uart.rx]);
         let Spi { clock, out, into, select, ready, .. } = &self.imu;
         let buses = [clock, out, into, select, &ready.pin, &self.i2c.clock, &self.i2c.data];
         let motors = self.motors().map(|motor| &motor.pin);

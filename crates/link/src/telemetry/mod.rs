@@ -1,16 +1,19 @@
 //! What a station shows of the vehicle, in the frames of [`afbc_types`] unless a field says otherwise.
 
+mod esc;
 mod motion;
 mod orbit;
 mod place;
 mod system;
 
 use crate::message::{Fault, MessageFormat, PAYLOAD_MAX};
+pub use esc::{ESCS_PER_MESSAGE, EscInfo, EscStatus};
 use mavlink::MessageData;
 use mavlink::dialects::common::{
-    ACTUATOR_OUTPUT_STATUS_DATA, ATTITUDE_QUATERNION_DATA, AUTOPILOT_VERSION_DATA, BATTERY_STATUS_DATA,
-    ESTIMATOR_STATUS_DATA, EXTENDED_SYS_STATE_DATA, GLOBAL_POSITION_INT_DATA, GPS_GLOBAL_ORIGIN_DATA, GPS_RAW_INT_DATA,
-    HOME_POSITION_DATA, ORBIT_EXECUTION_STATUS_DATA, PROTOCOL_VERSION_DATA, SYS_STATUS_DATA, VFR_HUD_DATA,
+    ACTUATOR_OUTPUT_STATUS_DATA, ATTITUDE_QUATERNION_DATA, AUTOPILOT_VERSION_DATA, BATTERY_STATUS_DATA, ESC_INFO_DATA,
+    ESC_STATUS_DATA, ESTIMATOR_STATUS_DATA, EXTENDED_SYS_STATE_DATA, GLOBAL_POSITION_INT_DATA, GPS_GLOBAL_ORIGIN_DATA,
+    GPS_RAW_INT_DATA, HOME_POSITION_DATA, ORBIT_EXECUTION_STATUS_DATA, PROTOCOL_VERSION_DATA, SYS_STATUS_DATA,
+    VFR_HUD_DATA,
 };
 pub use motion::{AttitudeQuaternion, VfrHud};
 pub use orbit::OrbitStatus;
@@ -47,13 +50,21 @@ pub enum Telemetry {
     Version(Version),
     /// ORBIT_EXECUTION_STATUS (360).
     Orbit(OrbitStatus),
+    /// ESC_STATUS (291).
+    EscStatus(EscStatus),
+    /// ESC_INFO (290).
+    EscInfo(EscInfo),
     /// PROTOCOL_VERSION (300): MAVLink 2 alone.
     Protocol,
 }
 
 impl Telemetry {
     pub(crate) fn format(id: u32) -> Option<MessageFormat> {
-        motion::format(id).or_else(|| orbit::format(id)).or_else(|| place::format(id)).or_else(|| system::format(id))
+        motion::format(id)
+            .or_else(|| orbit::format(id))
+            .or_else(|| place::format(id))
+            .or_else(|| system::format(id))
+            .or_else(|| esc::format(id))
     }
 
     pub(crate) fn read(id: u32, payload: &[u8]) -> Result<Self, Fault> {
@@ -71,6 +82,8 @@ impl Telemetry {
             ACTUATOR_OUTPUT_STATUS_DATA::ID => Telemetry::Outputs(ActuatorOutputs::read(payload)),
             AUTOPILOT_VERSION_DATA::ID => Telemetry::Version(Version::read(payload)),
             ORBIT_EXECUTION_STATUS_DATA::ID => Telemetry::Orbit(OrbitStatus::read(payload)),
+            ESC_STATUS_DATA::ID => Telemetry::EscStatus(EscStatus::read(payload)),
+            ESC_INFO_DATA::ID => Telemetry::EscInfo(EscInfo::read(payload)),
             PROTOCOL_VERSION_DATA::ID => Telemetry::Protocol,
             _ => return Err(Fault::Unknown),
         })
@@ -91,6 +104,8 @@ impl Telemetry {
             Telemetry::Outputs(outputs) => outputs.write(payload),
             Telemetry::Version(version) => version.write(payload),
             Telemetry::Orbit(orbit) => orbit.write(payload),
+            Telemetry::EscStatus(status) => status.write(payload),
+            Telemetry::EscInfo(info) => info.write(payload),
             Telemetry::Protocol => system::write_protocol(payload),
         }
     }

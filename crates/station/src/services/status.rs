@@ -5,8 +5,7 @@ use afbc_flight_core::supervisor::COAST_US;
 use afbc_flight_core::{Mode, Reasons, TickHealth};
 use afbc_guidance::FlightMode;
 use afbc_link::telemetry::BatteryStatus;
-use afbc_onboard::GuidanceResult;
-use afbc_onboard::Report;
+use afbc_onboard::{EscTelemetry, GuidanceResult, Report};
 use afbc_types::{ROTORS_MAX, State};
 
 /// What the shell reports, since the control tick does not know it.
@@ -80,6 +79,8 @@ pub struct VehicleStatus {
     pub dropped_frames: u32,
     /// What the shell has reported.
     pub aux: AuxSensors,
+    /// What the motor controllers have told.
+    pub escs: EscTelemetry,
 }
 
 impl VehicleStatus {
