@@ -4,6 +4,7 @@
 use crate::samples::{self, SampleTime, SampleValue};
 use afbc_drivers::battery::{BatteryPins, BatteryScale};
 use afbc_drivers::{FixReading, MagneticReading, PressureReading};
+use afbc_estimator::Origin;
 use afbc_onboard::sensors::{FixFrame, field, height};
 use afbc_station::AuxSensors;
 use afbc_station::services::health::sensor;
@@ -80,6 +81,11 @@ pub fn put_fix(at_us: u64, fix: Option<FixReading>) {
     if let Some((_, (measurement, _))) = measured {
         samples::put(SampleTime::At(at_us), SampleValue::Aid(measurement));
     }
+}
+
+/// Returns the place from which fixes are measured, once there is one.
+pub(crate) fn frame_origin() -> Option<Origin> {
+    with(|known| known.frame.origin()).flatten()
 }
 
 /// Puts what a battery's pins have read, which mean `scale` on this board; none if it is none of a battery.

@@ -5,6 +5,7 @@ use crate::board::{Board, Links, Receiver as _, Transmitter as _};
 use crate::control;
 use crate::escs;
 use crate::indication;
+use crate::logging::CardLog;
 use crate::parameters;
 use crate::radio::{self, RadioLine};
 use crate::recording::{self, ExactLog};
@@ -12,7 +13,8 @@ use crate::samples::{self, Sampler as _};
 use crate::self_tests;
 use crate::ticks::{self, Tick};
 use crate::vehicle::ParameterTable;
-use afbc_onboard::ControlInputs;
+use afbc_onboard::parameters::RecordChange;
+use afbc_onboard::{ControlInputs, EscTelemetry};
 pub use afbc_station::Comms;
 use afbc_station::services::imus::{self, ImuNews};
 use afbc_station::services::signing::Signing;
@@ -45,8 +47,15 @@ const FAREWELL: u32 = 100;
 /// Text to the station when more changes of parameters are waiting for the flash than there is room for.
 const NOT_KEPT: &str = "parameter not kept: set it again";
 
-/// What the links' task has: the services for stations, the parameters, and exact log and radio if there are any.
-pub type Desk = (Comms, ParameterTable, Option<&'static mut ExactLog>, Option<&'static mut RadioLine>);
+/// What the links' task has: the services for stations, the parameters, and exact log, radio and black box if there are
+/// any.
+pub type Desk = (
+    Comms,
+    ParameterTable,
+    Option<&'static mut ExactLog>,
+    Option<&'static mut RadioLine>,
+    Option<&'static mut CardLog>,
+);
 
 /// Creates it, with nothing received, to be called once: in place, since a task would store a value twice and take the
 /// stack for it.
@@ -56,6 +65,7 @@ pub fn make<B: Board>(
     signing: Signing,
     log: Option<&'static mut ExactLog>,
     radio: Option<&'static mut RadioLine>,
+    black_box: Option<&'static mut CardLog>,
 ) -> &'static mut Desk {
     static DESK: StaticCell<Desk> = StaticCell::new();
     DESK.init_with(|| {
@@ -65,12 +75,15 @@ pub fn make<B: Board>(
         let setup = Setup { reboots, calibrates, ..Setup::of(&table.configuration().link) };
         let mut comms = Comms::with(setup);
         comms.set_signing(signing);
-        (comms, table, log, radio)
+        (comms, table, log, radio, black_box)
     })
 }
 
 /// Receives messages, and reports every tick on every link, of which there are `OTHERS` beside the first.
-pub async fn run<B: Board, const OTHERS: usize>((comms, table, log, radio): &mut Desk, links: &mut B::Links) -> ! {
+pub async fn run<B: Board, const OTHERS: usize>(
+    (comms, table, log, radio, black_box): &mut Desk,
+    links: &mut B::Links,
+) -> ! {
     // The first link's is in `comms`.
     let mut decoders: [_; OTHERS] = array::from_fn(|_| comms.decoder());
     let wired = links.each().iter().position(|link| link.receiver.is_wired()).unwrap_or(0);
@@ -125,6 +138,16 @@ pub async fn run<B: Board, const OTHERS: usize>((comms, table, log, radio): &mut
                     let battery = comms.battery();
                     control::with_mail(|inputs| inputs.battery = battery);
                 }
+                if B::HAS_CARD
+                    && let Some(black_box) = black_box
+                {
+                    let (now_us, armed) = (tick.report.time_us, tick.report.mode.armed());
+                    match black_box.begin_tick(now_us, armed, table) {
+                        Some((text, true)) => comms.warn(text),
+                        Some((text, false)) => comms.inform(text),
+                        None => (),
+                    }
+                }
                 report(comms, &tick, B::CORE_HZ, &mut outgoing);
                 // A constant, so that a board without sensors has none of it.
                 if B::Sampler::SENSES
@@ -139,7 +162,7 @@ pub async fn run<B: Board, const OTHERS: usize>((comms, table, log, radio): &mut
                 if B::ESCS
                     && let Some(desk) = &mut esc_desk
                 {
-                    if changed {
+                    if changed.is_some() {
                         desk.adopt(table.configuration());
                     }
                     if let Some(news) = listen_to_escs(comms, desk, &tick) {
@@ -161,10 +184,19 @@ pub async fn run<B: Board, const OTHERS: usize>((comms, table, log, radio): &mut
                     }
                     radio.send(comms, &tick, links);
                 }
-                if recording::is_possible::<B>()
-                    && let Some(log) = log
+                if recording::is_possible::<B>() {
+                    record::<B>(log, black_box, table, comms.esc_telemetry());
+                    if let Some(log) = log {
+                        log.send(&tick, links);
+                    }
+                }
+                if B::HAS_CARD
+                    && let Some(black_box) = black_box
                 {
-                    log.send(&tick, links);
+                    if let Some(change) = changed {
+                        black_box.change(table, change);
+                    }
+                    black_box.send(tick.report.time_us, &outgoing);
                 }
                 let wanted = comms.wants_reboot();
                 leaving += u32::from(wanted.is_some());
@@ -186,6 +218,25 @@ fn pass_on<B: Board>(news: &ControlInputs, log: &mut Option<&'static mut ExactLo
         && let Some(log) = log
     {
         log.inputs(tick, news);
+    }
+}
+
+/// Writes what ticks have left for exact log and black box.
+fn record<B: Board>(
+    log: &mut Option<&'static mut ExactLog>,
+    black_box: &mut Option<&'static mut CardLog>,
+    table: &ParameterTable,
+    escs: &EscTelemetry,
+) {
+    while let Some(tick) = recording::pop() {
+        if let Some(log) = log {
+            log.tick(&tick);
+        }
+        if B::HAS_CARD
+            && let Some(black_box) = black_box
+        {
+            black_box.tick(&tick, table, escs);
+        }
     }
 }
 
@@ -273,15 +324,15 @@ fn calibrate(
     comms.calibrate(calibrator, sample, table, |frame| drop(outgoing.extend_from_slice(frame)));
 }
 
-/// Sends values of parameters, and passes on what has changed, of the signatures too; true if a parameter has. Out of
-/// line like the report.
+/// Sends values of parameters, passes on what has changed, of the signatures too, and returns it. Out of line like the
+/// report.
 #[inline(never)]
 fn serve(
     comms: &mut Comms,
     table: &mut ParameterTable,
     log: Option<&mut ExactLog>,
     outgoing: &mut Vec<u8, REPORT_MAX>,
-) -> bool {
+) -> Option<RecordChange> {
     let change = comms.parameters(table, |frame| drop(outgoing.extend_from_slice(frame)));
     if let Some(change) = change {
         let number = log.map_or(0, |log| log.change(table, change));
@@ -290,5 +341,5 @@ fn serve(
         }
     }
     parameters::keep_signing(|| comms.signing_record());
-    change.is_some()
+    change
 }

@@ -2,12 +2,14 @@
 
 use crate::board::Board;
 use crate::escs;
+use crate::logging::{self, TickViews};
 use crate::recording::{self, RecordedTick};
 use crate::samples::{self, Sampler as _};
 use crate::ticks::{self, Tick};
 use crate::time::{self, Stopwatch};
 use crate::vehicle::{Configuration, Flight, Prepared, Report};
 use afbc_onboard::{ControlInputs, Readings};
+use afbc_ulog::TakenInputs;
 use core::cell::RefCell;
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use embassy_sync::blocking_mutex::Mutex;
@@ -72,14 +74,19 @@ pub fn make(configuration: &Configuration) -> &'static mut Flight {
 pub async fn run<B: Board>(flight: &mut Flight, board: &mut B) -> ! {
     let (mut inputs, mut readings, mut seen) = (ControlInputs::EMPTY, Readings::NONE, Seen::default());
     let (mut adopted, mut notch_rad_s) = (None, None);
+    let mut views = if B::HAS_CARD { TickViews::take() } else { None };
     loop {
         // Not a ticker, whose periods begin when it is created: just after the start of a control period, when alarms
         // are due, it would tick twice in every second period.
         Timer::at(time::next_period()).await;
         let stopwatch = Stopwatch::start();
         let report = tick(flight, &mut inputs, &mut readings, &mut seen, board);
-        if recording::is_possible::<B>() && recording::records() {
-            let Seen { number, clock_failed } = seen;
+        let is_logged = B::HAS_CARD && logging::is_wanted();
+        if recording::is_possible::<B>() && (recording::records() || is_logged) {
+            let Seen { number, clock_failed, taken } = seen;
+            if is_logged && let Some(views) = &mut views {
+                views.push(number, report.time_us, &taken, flight);
+            }
             let battery = inputs.battery;
             recording::push(&RecordedTick { number, clock_failed, adopted, notch_rad_s, readings, battery, report });
         }
@@ -108,6 +115,8 @@ struct Seen {
     number: u32,
     /// True if its clock was not trusted.
     clock_failed: bool,
+    /// What messages had brought for it.
+    taken: TakenInputs,
 }
 
 /// Moves the notch, if it is to be moved; returns where to \[rad/s\]. Out of line, as below.
@@ -151,6 +160,9 @@ fn tick<B: Board>(
         }
     });
 
+    if B::HAS_CARD && logging::is_wanted() {
+        seen.taken = TakenInputs::of(inputs);
+    }
     let clock_failed = board.clock_has_failed();
     if recording::is_possible::<B>() {
         seen.clock_failed = clock_failed;

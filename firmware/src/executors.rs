@@ -27,6 +27,8 @@ pub mod priority {
     pub const COMMS: u8 = 8 << 4;
     /// [`crate::housekeeping`], and USB, whose hosts wait.
     pub const HOUSEKEEPING: u8 = 12 << 4;
+    /// [`crate::logging`], which waits for a memory card.
+    pub const LOGGING: u8 = 14 << 4;
 }
 
 static SAMPLING: InterruptExecutor = InterruptExecutor::new();
@@ -34,9 +36,11 @@ static CONTROL: InterruptExecutor = InterruptExecutor::new();
 static AIDING: InterruptExecutor = InterruptExecutor::new();
 static COMMS: InterruptExecutor = InterruptExecutor::new();
 static HOUSEKEEPING: InterruptExecutor = InterruptExecutor::new();
+static LOGGING: InterruptExecutor = InterruptExecutor::new();
 
-/// Interrupt lines of the tasks without which a flight goes on: the links', housekeeping, slow sensors', and USB's.
-static DISPENSABLE: [AtomicU16; 4] = [const { AtomicU16::new(u16::MAX) }; 4];
+/// Interrupt lines of the tasks without which a flight goes on: the links', housekeeping, slow sensors', the log's, and
+/// USB's.
+static DISPENSABLE: [AtomicU16; 5] = [const { AtomicU16::new(u16::MAX) }; 5];
 
 /// Declares that a flight goes on without the driver that has the interrupt `usb`, of a priority below the motors'.
 pub fn dispense_with(usb: impl InterruptNumber) {
@@ -44,7 +48,7 @@ pub fn dispense_with(usb: impl InterruptNumber) {
     last.store(usb.number(), Ordering::Relaxed);
 }
 
-/// Returns the spawner of the executor with the lowest priority, which has started.
+/// Returns the spawner of housekeeping's executor, which has started.
 ///
 /// # Panics
 /// If it has not.
@@ -70,6 +74,8 @@ pub struct Executors {
     pub control: SendSpawner,
     pub comms: SendSpawner,
     pub housekeeping: SendSpawner,
+    /// None on a board without a memory card.
+    pub logging: Option<SendSpawner>,
 }
 
 /// Returns the spawner of the executor whose task calls this, for tasks that stay on it. Only tasks may call it.
@@ -89,13 +95,16 @@ pub struct InterruptLines<I> {
     pub sampling: Option<I>,
     /// None on a board without slow sensors.
     pub aiding: Option<I>,
+    /// None on a board without a memory card.
+    pub logging: Option<I>,
 }
 
 /// Starts the executors and sets the time base's priority. To be called once.
 #[expect(unsafe_code, reason = "priorities are set by hand")]
 pub(crate) fn start<I: InterruptNumber>(core: &mut cortex_m::Peripherals, lines: InterruptLines<I>) -> Executors {
-    let InterruptLines { control, comms, housekeeping, sampling, aiding } = lines;
-    for (line, dispensable) in [Some(comms), Some(housekeeping), aiding].into_iter().flatten().zip(&DISPENSABLE) {
+    let InterruptLines { control, comms, housekeeping, sampling, aiding, logging } = lines;
+    let dispensable = [Some(comms), Some(housekeeping), aiding, logging];
+    for (line, dispensable) in dispensable.into_iter().flatten().zip(&DISPENSABLE) {
         dispensable.store(line.number(), Ordering::Relaxed);
     }
     let all = [
@@ -104,6 +113,7 @@ pub(crate) fn start<I: InterruptNumber>(core: &mut cortex_m::Peripherals, lines:
         (aiding, priority::AIDING),
         (Some(comms), priority::COMMS),
         (Some(housekeeping), priority::HOUSEKEEPING),
+        (logging, priority::LOGGING),
     ];
     // SAFETY: none of them runs yet, and no critical section relies on a priority.
     unsafe {
@@ -120,6 +130,7 @@ pub(crate) fn start<I: InterruptNumber>(core: &mut cortex_m::Peripherals, lines:
         aiding: aiding.map(|line| AIDING.start(line)),
         comms: COMMS.start(comms),
         housekeeping: HOUSEKEEPING.start(housekeeping),
+        logging: logging.map(|line| LOGGING.start(line)),
     }
 }
 
@@ -171,4 +182,14 @@ pub unsafe fn on_comms() {
 pub unsafe fn on_housekeeping() {
     // SAFETY: as for `on_control`.
     unsafe { HOUSEKEEPING.on_interrupt() }
+}
+
+/// Polls the log's executor.
+///
+/// # Safety
+/// As for [`on_control`].
+#[expect(unsafe_code, reason = "an executor must be polled from its own interrupt")]
+pub unsafe fn on_logging() {
+    // SAFETY: as for `on_control`.
+    unsafe { LOGGING.on_interrupt() }
 }

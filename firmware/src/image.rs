@@ -4,13 +4,13 @@
 /// executors' interrupts and the tasks whose type depends on the board. The board handles panics and faults.
 ///
 /// `control`, `comms` and `housekeeping` name an interrupt line each that the board leaves unused, and so do `sampling`
-/// if it has inertial sensors and `aiding` if it has slow ones:
+/// if it has inertial sensors, `aiding` if it has slow ones and `logging` if it has a memory card:
 /// `image!(board::Mine, control: LINE_A, comms: LINE_B, housekeeping: LINE_C, sampling: LINE_D, aiding: LINE_E)`.
 #[macro_export]
 macro_rules! image {
     (
         $board:ty, control: $control:ident, comms: $comms:ident, housekeeping: $housekeeping:ident
-        $(, sampling: $sampling:ident)? $(, aiding: $aiding:ident)? $(,)?
+        $(, sampling: $sampling:ident)? $(, aiding: $aiding:ident)? $(, logging: $logging:ident)? $(,)?
     ) => {
         const _: () = assert!(
             $crate::vehicle::ROTORS <= <$board as $crate::board::Board>::OUTPUTS,
@@ -20,6 +20,11 @@ macro_rules! image {
         const _: () = {
             let sampling: &[&str] = &[$(stringify!($sampling))?];
             let aiding: &[&str] = &[$(stringify!($aiding))?];
+            let logging: &[&str] = &[$(stringify!($logging))?];
+            assert!(
+                <$board as $crate::board::Board>::HAS_CARD != logging.is_empty(),
+                "a board with a memory card, and no other, names an interrupt line for its executor: logging"
+            );
             assert!(
                 <<$board as $crate::board::Board>::Sampler as $crate::samples::Sampler>::SENSES != sampling.is_empty()
                     && <<$board as $crate::board::Board>::Aids as $crate::samples::Sampler>::SENSES
@@ -68,6 +73,31 @@ macro_rules! image {
         async fn start_aiding(aids: <$board as $crate::board::Board>::Aids) {
             let task = aiding(aids).expect("spawned once");
             $crate::executors::spawner().await.spawn(task);
+        }
+
+        #[embassy_executor::task]
+        async fn logging(
+            blocks: $crate::logging::BlockReceiver,
+            mut card: <$board as $crate::board::Board>::Card,
+        ) -> ! {
+            $crate::logging::run(blocks, &mut card).await
+        }
+
+        #[embassy_executor::task]
+        async fn start_logging(
+            blocks: $crate::logging::BlockReceiver,
+            card: <$board as $crate::board::Board>::Card,
+        ) {
+            let task = logging(blocks, card).expect("spawned once");
+            $crate::executors::spawner().await.spawn(task);
+        }
+
+        fn spawn_logging(
+            spawner: embassy_executor::SendSpawner,
+            blocks: $crate::logging::BlockReceiver,
+            card: <$board as $crate::board::Board>::Card,
+        ) {
+            spawner.spawn(start_logging(blocks, card).expect("spawned once"));
         }
 
         fn spawn_aiding(spawner: embassy_executor::SendSpawner, aids: <$board as $crate::board::Board>::Aids) {
@@ -137,6 +167,14 @@ macro_rules! image {
                 }
             )?
 
+            $(
+                #[unsafe(no_mangle)]
+                extern "C" fn $logging() {
+                    // SAFETY: as above.
+                    unsafe { $crate::executors::on_logging() }
+                }
+            )?
+
             #[unsafe(no_mangle)]
             extern "C" fn $comms() {
                 // SAFETY: as above.
@@ -161,8 +199,18 @@ macro_rules! image {
                 housekeeping: Line::$housekeeping,
                 sampling: None::<Line>$(.or(Some(Line::$sampling)))?,
                 aiding: None::<Line>$(.or(Some(Line::$aiding)))?,
+                logging: None::<Line>$(.or(Some(Line::$logging)))?,
             };
-            $crate::run(core, lines, spawn_sampling, spawn_aiding, spawn_control, spawn_comms, spawn_parameters)
+            $crate::run(
+                core,
+                lines,
+                spawn_sampling,
+                spawn_aiding,
+                spawn_control,
+                spawn_comms,
+                spawn_parameters,
+                spawn_logging,
+            )
         }
     };
 }

@@ -22,7 +22,8 @@
 //! | 6 | end of the motors' DMA | 1 us per millisecond |
 //! | 7 | [`aux_sensors`]: reading the slow ones, whose drivers may wait for their bus | |
 //! | 8 | [`comms`]: the link's messages | |
-//! | 12 | [`housekeeping`]: logging, stack monitoring; [`parameters`]: to flash; [`indication`]: LED, buzzer; USB | |
+//! | 12 | [`housekeeping`]: debugger's log, stack; [`parameters`]: to flash; [`indication`]: LED, buzzer; USB | |
+//! | 14 | [`logging`]: the black box to a memory card, for which it waits | |
 //!
 //! The links precede the control tick because a UART may buffer one byte only, and the next comes within 11 us. USB
 //! comes last: its host waits, whatever it sends.
@@ -37,6 +38,7 @@ pub mod executors;
 pub mod housekeeping;
 mod image;
 pub mod indication;
+pub mod logging;
 pub mod parameters;
 pub mod radio;
 pub mod recording;
@@ -51,6 +53,7 @@ use embassy_executor::SendSpawner;
 
 /// Starts everything; the core then idles between interrupts. The functions start the tasks that use the board.
 /// [`image!`] defines all of them.
+#[expect(clippy::too_many_arguments, reason = "a function for each task, each of a type of its own")]
 pub fn run<B: Board>(
     mut core: cortex_m::Peripherals,
     lines: executors::InterruptLines<B::Interrupt>,
@@ -59,10 +62,11 @@ pub fn run<B: Board>(
     control: impl FnOnce(SendSpawner, &'static mut vehicle::Flight, B),
     comms: impl FnOnce(SendSpawner, &'static mut comms::Desk, B::Links),
     keeper: impl FnOnce(SendSpawner, parameters::Keeper<B::Memory>),
+    logging: impl FnOnce(SendSpawner, logging::BlockReceiver, B::Card),
 ) -> ! {
     let executors = executors::start(&mut core, lines);
-    let Parts { mut board, sampler, aids, mut links, memory } = B::start(&mut core, executors.control);
-    let (kept, desk) = read::<B>(memory, &mut links);
+    let Parts { mut board, sampler, aids, mut links, memory, card } = B::start(&mut core, executors.control);
+    let (kept, desk, blocks) = read::<B>(memory, &mut links);
     let (_, table, ..) = desk;
     board.set_motor_protocol(table.configuration().outputs.protocol);
     let flight = control::make(table.configuration());
@@ -78,6 +82,9 @@ pub fn run<B: Board>(
     control(executors.control, flight, board);
     keeper(executors.housekeeping, kept);
     housekeeping::spawn(executors.housekeeping);
+    if let (Some(spawner), Some(blocks)) = (executors.logging, blocks) {
+        logging(spawner, blocks, card);
+    }
     loop {
         B::idle();
     }
@@ -89,7 +96,7 @@ pub fn run<B: Board>(
 fn read<B: Board>(
     memory: B::Memory,
     links: &mut B::Links,
-) -> (parameters::Keeper<B::Memory>, &'static mut comms::Desk) {
+) -> (parameters::Keeper<B::Memory>, &'static mut comms::Desk, Option<logging::BlockReceiver>) {
     let (kept, table, signing) = parameters::read(memory, B::STORE);
     for link in links.each() {
         link.transmitter.set_baud(table.configuration().link.baud);
@@ -98,5 +105,6 @@ fn read<B: Board>(
     // On one link, the pilot goes before the log.
     let is_free = table.configuration().link.log_port != table.configuration().radio.receiver.port;
     let log = if recording::is_possible::<B>() && is_free { recording::ExactLog::begin::<B>(&table) } else { None };
-    (kept, comms::make::<B>(table, signing, log, radio))
+    let (black_box, blocks) = if B::HAS_CARD { Some(logging::CardLog::begin::<B>()) } else { None }.unzip();
+    (kept, comms::make::<B>(table, signing, log, radio, black_box), blocks)
 }

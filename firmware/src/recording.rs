@@ -1,5 +1,5 @@
-//! What ticks took and gave, from the control task to the links' task, for the exact log ([`afbc_recorder`]). Nothing
-//! is kept unless a link carries it.
+//! What ticks took and gave, from the control task to the links' task, for the exact log ([`afbc_recorder`]) and the
+//! black box ([`crate::logging`]). Nothing is kept unless one of them is written.
 
 use crate::board::{Board, Links, Transmitter};
 use crate::samples::Sampler;
@@ -42,7 +42,7 @@ static RECORDS: AtomicBool = AtomicBool::new(false);
 static TICKS: Mutex<CriticalSectionRawMutex, RefCell<Deque<RecordedTick, WAITING>>> =
     Mutex::new(RefCell::new(Deque::new()));
 
-/// True if ticks are kept.
+/// True if ticks are kept for the exact log.
 pub fn records() -> bool {
     RECORDS.load(Ordering::Relaxed)
 }
@@ -103,16 +103,20 @@ impl ExactLog {
         recorder.change(table, change, &mut |frame| drop(bytes.extend_from_slice(frame)))
     }
 
-    /// Sends what is recorded, the ticks that are kept included.
+    /// Records a tick.
+    #[inline(never)]
+    pub fn tick(&mut self, tick: &RecordedTick) {
+        let ExactLog { recorder, bytes, .. } = self;
+        let RecordedTick { number, clock_failed, adopted, notch_rad_s, readings, battery, report } = *tick;
+        let (time_us, given) = (report.time_us, Given::of(&report));
+        let record = TickRecord { number, time_us, clock_failed, readings, battery, adopted, notch_rad_s, given };
+        recorder.tick(&record, &mut |frame| drop(bytes.extend_from_slice(frame)));
+    }
+
+    /// Sends what is recorded.
     #[inline(never)]
     pub fn send(&mut self, tick: &Tick, links: &mut impl Links) {
-        let ExactLog { recorder, bytes, link } = self;
-        while let Some(tick) = pop() {
-            let RecordedTick { number, clock_failed, adopted, notch_rad_s, readings, battery, report } = tick;
-            let (time_us, given) = (report.time_us, Given::of(&report));
-            let record = TickRecord { number, time_us, clock_failed, readings, battery, adopted, notch_rad_s, given };
-            recorder.tick(&record, &mut |frame| drop(bytes.extend_from_slice(frame)));
-        }
+        let ExactLog { bytes, link, .. } = self;
         if let Some(link) = links.each().get_mut(*link) {
             link.transmitter.transmit(tick, bytes);
         }
@@ -126,6 +130,6 @@ impl ExactLog {
 }
 
 /// Returns the oldest tick that is kept.
-fn pop() -> Option<RecordedTick> {
+pub fn pop() -> Option<RecordedTick> {
     TICKS.lock(|ticks| ticks.try_borrow_mut().ok()?.pop_front())
 }

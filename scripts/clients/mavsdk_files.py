@@ -1,5 +1,6 @@
 """Logs, files and metadata by MAVSDK's Python API of the examples (mavsdk-grpc): those of its logfile_download.py,
-ftp_list_dir.py and ftp_download_file.py, and of its component metadata."""
+ftp_list_dir.py and ftp_download_file.py, and of its component metadata; and its shell, which the vehicle does not
+have."""
 
 import asyncio
 import json
@@ -11,6 +12,7 @@ from mavsdk_grpc import System
 from mavsdk_grpc.component_metadata import MetadataType
 from mavsdk_grpc.ftp import FtpError
 from mavsdk_grpc.log_files import LogFilesError
+from mavsdk_grpc.shell import Device
 
 from served import Served, Session, free_port
 from socket import SOCK_STREAM
@@ -87,6 +89,18 @@ async def component(drone):
             return f"{len(json.loads(update.json_metadata)['parameters'])} parameters"
 
 
+async def shell(drone):
+    answers = drone.shell.receive()
+    answer = asyncio.ensure_future(anext(answers))
+    # The client wants an answer once it listens for one.
+    await asyncio.sleep(0.5)
+    await drone.shell.send("help\n", Device.SHELL)
+    told = str(await answer)
+    if "no shell" not in told:
+        raise ValueError(told)
+    return "refused, no shell"
+
+
 async def run():
     session, folder = Session("mavsdk files"), pathlib.Path(tempfile.mkdtemp())
     logs, down = folder / "logs", folder / "down"
@@ -105,6 +119,7 @@ async def run():
     for burst in (False, True):
         await session.step(f"download, burst {burst}", download_file(drone, f"/log/{OLD}", down, burst), 30)
     await session.step("checksum", identical(drone, down / OLD, f"/log/{OLD}"))
+    await session.step("a line for the shell", shell(drone), 5)
     await session.step("metadata of the component", component(drone), 20)
     # What is not there, what must not be changed, and the log that is being written.
     none = drone.ftp.list_directory("/none")

@@ -167,11 +167,12 @@ fn assert_once<T: Ord + std::fmt::Debug>(what: Vec<T>, board: &Path) {
 #[test]
 fn nothing_is_used_twice() {
     for (board, table) in kinds().0 {
-        let BoardTable { link, gnss, escs, imu, i2c, timers, .. } = &table;
+        let BoardTable { link, gnss, escs, imu, i2c, timers, card, .. } = &table;
         let escs = escs.as_ref().map(|escs| &escs.name);
         assert_once(table.pins(), &board);
         let names = [&link.name, &gnss.name, &imu.name, &i2c.name].into_iter().chain(escs);
-        assert_once(names.chain(timers.iter().map(|timer| &timer.name)).collect(), &board);
+        let others = timers.iter().map(|timer| &timer.name).chain(card.iter().map(|card| &card.name));
+        assert_once(names.chain(others).collect(), &board);
         let mut motors: Vec<_> = table.motors().map(|motor| motor.number).collect();
         motors.sort_unstable();
         assert_eq!(motors, (1..=table.outputs).collect::<Vec<_>>(), "{}", board.display());

@@ -1,7 +1,9 @@
 //! A flight of the image as flashed, in lockstep with the plant: the instruments' readings at the registers of the
 //! board's sensors, motor commands from its pins, a station at its telemetry UART.
 
+use crate::card_logs;
 use crate::check::check;
+use crate::f405::CardTrouble;
 use crate::kept::{self, PWM400};
 use crate::machine::{Machine, Signal, quiet_usb};
 use crate::pilot::Pilot;
@@ -20,6 +22,8 @@ use std::error::Error;
 use std::path::Path;
 
 pub(crate) const TICK_NS: u64 = 1_000_000;
+/// Most that may be missing of a log on a card with which nothing is wrong: its beginning fills the queue [ms].
+const DROPOUTS_MS: u64 = 100;
 
 /// Who hears the exact log on the second link.
 pub(crate) enum Hearer {
@@ -54,15 +58,22 @@ pub struct Order<'a> {
     pub receiver: Option<Generation>,
     /// Where the exact log is kept.
     pub log: Option<&'a Path>,
+    /// The folder where the logs of the memory card are kept.
+    pub card: Option<&'a Path>,
+    /// What goes wrong with that card.
+    pub card_trouble: CardTrouble,
 }
 
 /// Flies what is ordered. The exact log, if it is to be kept in a file, must be flown again with the same result to the
 /// last bit.
 pub fn fly<M: Machine>(image: &Path, order: &Order<'_>) -> Result<(), Box<dyn Error>> {
-    let &Order { scenario, is_mission, receiver, log } = order;
+    let &Order { scenario, is_mission, receiver, log, card, card_trouble } = order;
     let scenario = load(scenario)?;
     let mut board = M::built()?;
     board.sense(&at_the_place());
+    if let Some(slot) = board.card() {
+        slot.trouble(card_trouble);
+    }
     let wire = Wire::default();
     check(board.attach_link(wire.clone()), "the link is wired")?;
     let mut hearer = None;
@@ -79,7 +90,7 @@ pub fn fly<M: Machine>(image: &Path, order: &Order<'_>) -> Result<(), Box<dyn Er
     let to_log: &[_] = if log.is_some() { &[("LOG_PORT", 2.0)] } else { &[] };
     let images = images::<M>(image, to_log)?;
     let session = Session::new(board, 0, VirtualNanos(TICK_NS))?;
-    let finished = run(session, &Start::new(&images), flight)?;
+    let mut finished = run(session, &Start::new(&images), flight)?;
     for told in finished.session.told() {
         println!("the models say: {} {}: {}", told.instance, told.register, told.reason);
     }
@@ -98,6 +109,14 @@ pub fn fly<M: Machine>(image: &Path, order: &Order<'_>) -> Result<(), Box<dyn Er
         let bytes = hearer.take();
         std::fs::write(log, &bytes)?;
         same::check_log(&bytes)?;
+    }
+    if let Some(folder) = card {
+        let slot = finished.session.board_mut().card().ok_or("this machine has no memory card")?;
+        let logs = card_logs::save(slot.card(), folder)?;
+        println!("{} blocks written to the card; its logs: {logs:?}", slot.written());
+        let is_sound = card_trouble != CardTrouble::default()
+            || logs.iter().all(|log| log.rest == 0 && log.missing_ms <= DROPOUTS_MS);
+        check(!logs.is_empty() && is_sound, "the card has a whole log of the flight")?;
     }
     verdict?;
     check(receiver.is_none_or(|receiver| receiver.is_configured()), "the receiver is configured")?;

@@ -1,5 +1,6 @@
 //! The boards: what of each is to be known to look at it from outside, and to put a world around it.
 
+use crate::f405::CardSlot;
 use crate::impairments::Impairments;
 use crate::wire::Wire;
 use rigless::chip::nmea;
@@ -91,6 +92,11 @@ pub trait Machine: Board + Edge<Signals = Signals> + Sized + 'static {
 
     /// Hangs a GNSS receiver on its UART, in the place of the one that was there.
     fn attach_receiver(&mut self, receiver: Box<dyn Peer>);
+
+    /// Returns the slot of its memory card, if that is on SPI.
+    fn card(&mut self) -> Option<&mut CardSlot> {
+        None
+    }
 
     /// Lets this be wrong with its parts, and nothing else.
     fn impair(&mut self, impairments: &Impairments);

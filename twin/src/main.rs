@@ -5,6 +5,7 @@
 
 mod aloft;
 mod boot;
+mod card_logs;
 mod check;
 mod cuts;
 mod f405;
@@ -30,6 +31,7 @@ mod world;
 use aloft::Aloft;
 use clap::builder::PossibleValuesParser;
 use clap::{Arg, ArgAction, ArgMatches, Command, value_parser};
+use f405::CardTrouble;
 use fly::Order;
 use machines::MachineName;
 use std::error::Error;
@@ -59,6 +61,12 @@ fn command() -> Command {
         .help("GNSS receiver: the board's own model, or a new u-blox");
     let log = Arg::new("log").long("log").value_name("FILE").value_parser(value_parser!(PathBuf));
     let log = log.help("Keep the exact log here, and fly it again on this machine: the same to the last bit");
+    let card = Arg::new("card").long("card").value_name("FOLDER").value_parser(value_parser!(PathBuf));
+    let card = card.help("Keep the logs of the memory card here; a log of the whole flight must be among them");
+    let times = |name: &'static str, help: &'static str| {
+        let times = Arg::new(name).long(name).num_args(2).value_names(["MS", "MS"]).value_parser(value_parser!(u64));
+        times.help(help)
+    };
     let mission = || {
         let mission = Arg::new("mission").long("mission").action(ArgAction::SetTrue);
         mission.help("Fly a mission of two minutes, uploaded over the link, in the place of the hover")
@@ -80,6 +88,9 @@ fn command() -> Command {
             receiver,
             log,
             mission(),
+            card,
+            times("card-stall", "The card stalls: when, and for how long"),
+            times("card-out", "The card is out: from when, and until when"),
         ]))
         .subcommand(Command::new("replay").about("Fly an exact log again").arg(file("log", "The log")))
         .subcommand(Command::new("faults").about("Faults at a board's pins, in a hover that is kept in a file").args([
@@ -133,7 +144,14 @@ fn run(matches: &ArgMatches) -> Result<(), Box<dyn Error>> {
             let receiver = RECEIVERS.into_iter().find(|(receiver, _)| name.is_some_and(|name| name == receiver));
             let receiver = receiver.and_then(|(_, generation)| generation);
             let log = matches.get_one::<PathBuf>("log").map(PathBuf::as_path);
-            let order = Order { scenario, is_mission: matches.get_flag("mission"), receiver, log };
+            let card = matches.get_one::<PathBuf>("card").map(PathBuf::as_path);
+            let times = |name| {
+                let mut times = matches.get_many::<u64>(name)?.copied();
+                Some([times.next()?, times.next()?])
+            };
+            let card_trouble = CardTrouble { stall_ms: times("card-stall"), out_ms: times("card-out") };
+            let is_mission = matches.get_flag("mission");
+            let order = Order { scenario, is_mission, receiver, log, card, card_trouble };
             with_machine!(chosen(matches)?, M => fly::fly::<M>(image, &order))
         }
         Some(("replay", matches)) => same::check_log(&std::fs::read(path(matches, "log")?)?),

@@ -40,10 +40,12 @@ impl Board for Emulated {
     type Aids = NoSensors;
     type Links = [BoardLink<Receiver, Transmitter>; 1];
     /// In RAM: QEMU's flash cannot be written, and every flight begins with the image's parameters.
+    type Card = firmware::logging::NoCard;
     type Memory = Ram<1024>;
     /// As QEMU's STM32F405 counts it: the host derives instructions from it.
     const CORE_HZ: u32 = 168_000_000;
     const STORE: u32 = 0;
+    const HARDWARE: &'static str = env!("CARGO_PKG_NAME");
     const OUTPUTS: usize = ROTORS_MAX;
 
     /// Opens the FIFOs and waits for the first tick's bytes.
@@ -59,6 +61,7 @@ impl Board for Emulated {
             aids: NoSensors,
             links: [BoardLink { receiver: Receiver, transmitter }],
             memory: Ram::BLANK,
+            card: firmware::logging::NoCard,
         }
     }
 

@@ -120,10 +120,12 @@ impl Board for Pixracer {
     type Sampler = Inside;
     type Aids = Aids;
     type Links = [BoardLink<Receiver, Transmitter>; 3];
+    type Card = firmware::logging::NoCard;
     type Memory = Bank1Region1<'static, Blocking>;
     const CORE_HZ: u32 = clocks::CORE_HZ;
     /// Sectors 1 and 2, of 16 KiB each (`memory.x`).
     const STORE: u32 = 16 * 1024;
+    const HARDWARE: &'static str = env!("CARGO_PKG_NAME");
     const OUTPUTS: usize = OUTPUTS;
     const INDICATES: bool = true;
     const BOOT_LOADER: Option<fn() -> !> = Some(boot_loader::restart);
@@ -193,6 +195,7 @@ impl Board for Pixracer {
             aids,
             links,
             memory: Flash::new_blocking(p.FLASH).into_blocking_regions().bank1_region1,
+            card: firmware::logging::NoCard,
         }
     }
 

@@ -127,9 +127,11 @@ impl Board for Stm32h743 {
     type Sampler = Imus;
     type Aids = Aids;
     type Links = [BoardLink<Receiver, Transmitter>; 3];
+    type Card = firmware::logging::NoCard;
     type Memory = Words;
     const CORE_HZ: u32 = clocks::CORE_HZ;
     const STORE: u32 = 0;
+    const HARDWARE: &'static str = env!("CARGO_PKG_NAME");
     const OUTPUTS: usize = OUTPUTS;
     const INDICATES: bool = true;
     const ESCS: bool = true;
@@ -196,7 +198,7 @@ impl Board for Stm32h743 {
         // A debugger that halts the core halts the watchdog.
         pac::DBGMCU.apb4fzr1().modify(|freeze| freeze.set_iwdg1(true));
         let board = Stm32h743 { watchdog: watchdog(p.IWDG1) };
-        Parts { board, sampler, aids, links, memory: Words::new(p.FLASH) }
+        Parts { board, sampler, aids, links, memory: Words::new(p.FLASH), card: firmware::logging::NoCard }
     }
 
     fn set_motor_protocol(&mut self, protocol: MotorProtocol) {

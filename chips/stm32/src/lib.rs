@@ -4,6 +4,7 @@
 pub mod battery;
 pub mod boot_loader;
 pub mod candidates;
+pub mod card;
 pub mod crystal;
 pub mod escs;
 pub mod faults;

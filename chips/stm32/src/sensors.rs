@@ -48,7 +48,7 @@ impl Device {
 }
 
 /// Returns the fastest clock that a prescaler of 2, 4 ... 256 makes of `kernel_hz`, not above `most_hz` if possible.
-fn divided(kernel_hz: u32, most_hz: u32) -> u32 {
+pub(crate) fn divided(kernel_hz: u32, most_hz: u32) -> u32 {
     (1..8).map(|power| kernel_hz >> power).find(|hz| *hz <= most_hz).unwrap_or(kernel_hz >> 8)
 }
 

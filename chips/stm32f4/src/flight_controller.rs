@@ -10,6 +10,7 @@
 /// * IMU and barometer are [candidates](chip_stm32::candidates): the one that answers is read. How the IMU sits is one
 ///   of `afbc_drivers::alignment`.
 /// * The buzzer sounds while its pin is high; the LED, if there is one, is lit while its pin is low.
+/// * The memory card, if there is one, has an SPI of its own; `quiet` are the select pins of whatever else is there.
 /// * Motors are so many, numbered as [`numbering`](chip_stm32::motors::numbering) has it. They have a line for each
 ///   timer, with the type of its registers, the stream of its updates, and what its channels 1 to 4 drive: the pin, the
 ///   same again as port and number, and the number of the motor.
@@ -35,6 +36,10 @@ macro_rules! flight_controller {
             barometer: $barometer:ty
         },
         indicator: { $(led: $led:ident,)? buzzer: $buzzer:ident },
+        $(card: $card:ident {
+            clock: $card_sck:ident, out: $card_mosi:ident, in: $card_miso:ident, select: $card_select:ident,
+            quiet: [$($quiet:ident),*]
+        },)?
         motors: $outputs:literal as $numbering:ident {
             $($task:ident: $timer:ident<$word:ty>, $dma:ident by $line:ident { $($channel:tt),+ },)+
         },
@@ -89,6 +94,7 @@ macro_rules! flight_controller {
             type Sampler = chip_stm32::sensor_set::Imu<$imu>;
             type Aids = chip_stm32::sensor_set::SlowSensors<$barometer>;
             type Links = [firmware::board::BoardLink<chip_stm32::link::Receiver, chip_stm32::link::Transmitter>; 2];
+            type Card = chip_stm32f4::flight_controller!(@card $($card)?);
             type Memory = embassy_stm32::flash::Bank1Region1<'static, embassy_stm32::flash::Blocking>;
             const CORE_HZ: u32 = chip_stm32f4::clocks::CORE_HZ;
             /// Sectors 1 and 2, of 16 KiB each (`memory.x`).
@@ -99,6 +105,8 @@ macro_rules! flight_controller {
                 let escs: &[&str] = &[$(stringify!($escs))?];
                 !escs.is_empty()
             };
+            const HARDWARE: &'static str = env!("CARGO_PKG_NAME");
+            const HAS_CARD: bool = chip_stm32f4::flight_controller!(@has_card $($card)?);
             const BOOT_LOADER: Option<fn() -> !> = Some(chip_stm32f4::boot_loader::restart);
 
             fn after_reset() {
@@ -153,6 +161,10 @@ macro_rules! flight_controller {
                 let config = chip_stm32::sensors::i2c();
                 let bus = i2c::I2c::new(p.$i2c, p.$scl, p.$sda, p.$i2c_tx, p.$i2c_rx, Irqs, config);
 
+                let card = chip_stm32f4::flight_controller!(
+                    @new_card p $(, $card, $card_sck, $card_mosi, $card_miso, $card_select, $($quiet),*)?
+                );
+
                 $(
                     let motors = chip_stm32f4::flight_controller!(@motors p, $timer, $dma, $($channel),+);
                     control.spawn($task::run(motors).expect("spawned once"));
@@ -182,6 +194,7 @@ macro_rules! flight_controller {
                         chip_stm32::link::of_usb(chip_stm32::usb::start(p.USB_OTG_FS, p.PA12, p.PA11, Irqs)),
                     ],
                     memory: embassy_stm32::flash::Flash::new_blocking(p.FLASH).into_blocking_regions().bank1_region1,
+                    card,
                 }
             }
 
@@ -245,6 +258,25 @@ macro_rules! flight_controller {
             $($(chip_stm32f4::flight_controller!(@stop $channel);)+)+
         }
     };
+    (@card) => { firmware::logging::NoCard };
+    (@card $card:ident) => { chip_stm32::card::SpiCard };
+    (@has_card) => { false };
+    (@has_card $card:ident) => { true };
+    (@new_card $p:ident) => { firmware::logging::NoCard };
+    (@new_card $p:ident, $card:ident, $sck:ident, $mosi:ident, $miso:ident, $select:ident, $($quiet:ident),*) => {{
+        $(
+            // For ever: a pin that is dropped is an input again.
+            core::mem::forget(embassy_stm32::gpio::Output::new(
+                $p.$quiet,
+                embassy_stm32::gpio::Level::High,
+                embassy_stm32::gpio::Speed::Low,
+            ));
+        )*
+        let kernel_hz = embassy_stm32::rcc::frequency::<peripherals::$card>().0;
+        let config = chip_stm32::card::config(kernel_hz / 256);
+        let spi = embassy_stm32::spi::Spi::new_blocking($p.$card, $p.$sck, $p.$mosi, $p.$miso, config);
+        chip_stm32::card::SpiCard::new(spi, $p.$select, kernel_hz, chip_stm32f4::clocks::CORE_HZ)
+    }};
     (@motors $p:ident, $timer:ident, $dma:ident, $first:tt, $second:tt, $third:tt, $fourth:tt) => {
         chip_stm32::motors::Motors::new(
             $p.$timer,

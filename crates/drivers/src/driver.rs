@@ -9,6 +9,8 @@ use embassy_futures::select::{Either, select};
 pub const FAULTS_MAX: u32 = 10;
 /// Pause before a part is set up again \[us\].
 pub const PAUSE_US: u32 = 100_000;
+/// Time between two looks whether a part that did not answer does again \[us\].
+const LOOK_US: u32 = 2_000;
 /// Pause after the second fault in a row and each further one \[us\]: the next attempt would follow at once, and a task
 /// of the sensors' priority leaves the others no time.
 const RETRY_US: u32 = 1_000;
@@ -54,8 +56,11 @@ pub struct Driver<P, B, T> {
     timing: T,
     /// True if it has been set up.
     is_up: bool,
-    /// Faults in a row.
+    /// True if it was, to the end, and nothing has been set since.
+    was_set_up: bool,
+    /// Faults in a row, and the last one.
     faults: u32,
+    last_fault: Option<PartFault>,
     /// Cycles since the last look, and number of registers looked at.
     cycles: u32,
     looks: usize,
@@ -69,8 +74,20 @@ pub struct Driver<P, B, T> {
 impl<P: SensorPart, B: Registers, T: PartTiming> Driver<P, B, T> {
     /// A part that is yet to be set up, by the first [`Driver::reading`].
     pub fn new(part: P, bus: B, timing: T) -> Self {
-        let (last, ready_us) = ([0; READ_MAX], None);
-        Driver { part, bus, timing, is_up: false, faults: 0, cycles: 0, looks: 0, ready_us, last, equals: 0 }
+        Driver {
+            part,
+            bus,
+            timing,
+            is_up: false,
+            was_set_up: false,
+            faults: 0,
+            last_fault: None,
+            cycles: 0,
+            looks: 0,
+            ready_us: None,
+            last: [0; READ_MAX],
+            equals: 0,
+        }
     }
 
     /// True if it has been set up and reads without a fault.
@@ -79,7 +96,8 @@ impl<P: SensorPart, B: Registers, T: PartTiming> Driver<P, B, T> {
     }
 
     /// Returns the next reading, with the time of the part's interrupt or, without one, of the beginning of the
-    /// transfer. Sets the part up before the first one and, after a pause, after [`FAULTS_MAX`] faults in a row.
+    /// transfer. Sets the part up before the first one and, after a pause, after [`FAULTS_MAX`] faults in a row, unless
+    /// it only did not answer and is found as it was set up.
     ///
     /// # Errors
     /// The fault that this cycle, or the set-up, met. Call it again.
@@ -87,7 +105,8 @@ impl<P: SensorPart, B: Registers, T: PartTiming> Driver<P, B, T> {
         let result = self.attempt().await;
         match &result {
             Ok(_) => self.faults = 0,
-            Err(_) => {
+            Err(fault) => {
+                self.last_fault = Some(*fault);
                 self.faults = self.faults.saturating_add(1);
                 self.is_up &= self.faults < FAULTS_MAX;
             }
@@ -97,14 +116,11 @@ impl<P: SensorPart, B: Registers, T: PartTiming> Driver<P, B, T> {
 
     /// Has it set up by the next reading, without a pause.
     pub(crate) fn forget(&mut self) {
-        (self.is_up, self.faults, self.equals, self.ready_us) = (false, 0, 0, None);
+        (self.is_up, self.was_set_up, self.faults, self.equals, self.ready_us) = (false, false, 0, 0, None);
     }
 
     async fn attempt(&mut self) -> Result<Stamped<P::Reading>, PartFault> {
-        if !self.is_up {
-            if self.faults > 0 {
-                self.timing.wait(PAUSE_US).await;
-            }
+        if !self.is_up && !self.comes_back().await {
             self.set_up().await?;
         }
         if self.faults > 1 {
@@ -118,8 +134,50 @@ impl<P: SensorPart, B: Registers, T: PartTiming> Driver<P, B, T> {
         Err(PartFault::Late)
     }
 
+    /// Pauses after faults. A part that did not answer is looked at meanwhile: if it answers again with everything as
+    /// it was set, its wire had failed and not the part, and true is returned at once.
+    async fn comes_back(&mut self) -> bool {
+        if self.faults == 0 {
+            return false;
+        }
+        let did_not_answer = matches!(
+            self.last_fault,
+            Some(
+                PartFault::Bus | PartFault::Silent | PartFault::Identity(_) | PartFault::Register(_) | PartFault::Range
+            )
+        );
+        if !self.was_set_up || !did_not_answer {
+            self.timing.wait(PAUSE_US).await;
+            return false;
+        }
+        let end_us = self.timing.now_us().saturating_add(PAUSE_US.into());
+        while self.timing.now_us() < end_us {
+            self.timing.wait(LOOK_US).await;
+            if self.is_as_set().await.unwrap_or(false) {
+                (self.is_up, self.faults, self.cycles) = (true, 1, 0);
+                return true;
+            }
+        }
+        false
+    }
+
+    /// True if it is the part, and everything is as it was set; false if neither can be read.
+    async fn is_as_set(&mut self) -> Result<bool, PartFault> {
+        let mut is_seen = false;
+        for (at, step) in P::SETUP.iter().enumerate() {
+            if let Step::Identify(..) = step {
+                self.step(step).await?;
+                is_seen = true;
+            }
+            self.look(at).await?;
+            is_seen |= register_set_by(step).is_some();
+        }
+        Ok(is_seen)
+    }
+
     /// Runs the set-up, and reads back what was set.
     pub(crate) async fn set_up(&mut self) -> Result<(), PartFault> {
+        self.was_set_up = false;
         for step in P::SETUP {
             self.step(step).await?;
         }
@@ -127,7 +185,7 @@ impl<P: SensorPart, B: Registers, T: PartTiming> Driver<P, B, T> {
             self.look(at).await?;
         }
         // It works when it reads. What has stuck stays so until its reading changes.
-        (self.is_up, self.faults, self.cycles) = (true, self.faults.min(1), 0);
+        (self.is_up, self.was_set_up, self.faults, self.cycles) = (true, true, self.faults.min(1), 0);
         Ok(())
     }
 

@@ -10,7 +10,7 @@ use bmi270_model::Bmi270Registers;
 use embassy_futures::block_on;
 use embedded_hal_async::spi::{ErrorType, Operation, SpiDevice};
 use nalgebra::Vector3;
-use rig::{Model, Rig, noise, reads, refuses_another, run, survives_all_troubles};
+use rig::{Model, Rig, comes_back_at_once, noise, reads, refuses_another, run, survives_all_troubles};
 
 impl Model for Bmi270Registers {
     fn read(&mut self, now_us: u64, register: u8, into: &mut [u8]) {
@@ -62,6 +62,7 @@ fn right(reading: &InertialReading) -> bool {
 #[test]
 fn every_fault_is_noticed_and_survived() {
     survives_all_troubles(Bmi270::default, || part(0x24), true, 60_000, right);
+    comes_back_at_once(Bmi270::default, || part(0x24), right);
 }
 
 #[test]

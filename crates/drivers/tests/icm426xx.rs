@@ -6,7 +6,7 @@ mod rig;
 use afbc_drivers::icm426xx::{Icm42605, Icm42688p};
 use afbc_drivers::{InertialReading, PartFault};
 use embassy_futures::block_on;
-use rig::{Model, Rig, Trouble, noise, reads, refuses_another, run, survives_all_troubles};
+use rig::{Model, Rig, Trouble, comes_back_at_once, noise, reads, refuses_another, run, survives_all_troubles};
 
 /// Bank 0; other banks are selected and then left alone.
 struct Registers {
@@ -177,6 +177,12 @@ fn every_fault_is_noticed_and_survived() {
     survives_all_troubles(|| Icm42688p::<false> {}, || Registers::new(0x47), true, 60_000, right);
     survives_all_troubles(|| Icm42605::<false> {}, || Registers::new(0x42), true, 60_000, right);
     survives_all_troubles(|| Icm42688p::<true> {}, || Registers::new(0x47), true, 60_000, right);
+}
+
+#[test]
+fn a_wire_that_comes_and_goes_costs_little() {
+    comes_back_at_once(|| Icm42688p::<false> {}, || Registers::new(0x47), right);
+    comes_back_at_once(|| Icm42605::<true> {}, || Registers::new(0x42), right);
 }
 
 #[test]

@@ -8,7 +8,7 @@ use afbc_drivers::{InertialReading, PartFault, SensorPart};
 use embassy_futures::block_on;
 use nalgebra::Vector3;
 use rig::mpu_registers::Registers;
-use rig::{Rig, reads, refuses_another, run, survives_all_troubles};
+use rig::{Rig, comes_back_at_once, reads, refuses_another, run, survives_all_troubles};
 
 fn right(reading: &InertialReading) -> bool {
     reads(reading, [10.0, -250.0, 0.5], [0.1, -0.2, 1.0], 31.0)
@@ -17,6 +17,7 @@ fn right(reading: &InertialReading) -> bool {
 fn is_right<const IDENTITY: u8>() {
     let part = || Mpu::<IDENTITY> {};
     survives_all_troubles(part, || Registers::new(IDENTITY), true, 60_000, right);
+    comes_back_at_once(part, || Registers::new(IDENTITY), right);
     refuses_another(part(), Registers::new(IDENTITY ^ 0x55), IDENTITY ^ 0x55);
 
     let rig = Rig::new(Registers::new(IDENTITY));

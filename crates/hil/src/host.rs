@@ -1,7 +1,7 @@
 //! The firmware's code in this process.
 
 use super::{Autopilot, Error};
-use crate::host_black_box::HostBlackBox;
+use crate::host_black_box::{HostBlackBox, Sink};
 use crate::metadata::MetadataFiles;
 use crate::served_files::{OpenFile, ServedFiles};
 use crate::simulated_escs::SimulatedEscs;
@@ -49,6 +49,8 @@ pub struct Host {
     number: u32,
     log: Option<ExactLog>,
     black_box: Option<HostBlackBox>,
+    /// Where fixes of a GNSS receiver are measured from, for logs.
+    origin: Option<Origin>,
     /// What it serves of files, if it does.
     files: Option<Box<(Transfers<OpenFile>, ServedFiles)>>,
     /// Names of vehicle and law.
@@ -60,9 +62,6 @@ const PAPER: &str = "paper";
 
 /// Name of the hardware in the black box's log.
 const HARDWARE: &str = "SITL";
-
-/// What takes the bytes of a log.
-type Sink = Box<dyn FnMut(&[u8])>;
 
 /// Makes the exact log, and what takes its bytes.
 struct ExactLog {
@@ -338,6 +337,7 @@ impl Host {
             number: 0,
             log: None,
             black_box: None,
+            origin: None,
             files: None,
             names: names.map(str::to_owned),
         })
@@ -372,13 +372,18 @@ impl Host {
     /// Keeps a black box's log ([`afbc_ulog`]) from now on, before the first tick; `write` takes its bytes. Fixes of a
     /// GNSS receiver are measured from `origin`, if that is known.
     pub fn log(&mut self, origin: Option<Origin>, write: impl FnMut(&[u8]) + 'static) {
-        let [vehicle, law] = &self.names;
-        let log = self.flight.black_box(&LogStart { vehicle, law, hardware: HARDWARE, ..LogStart::default() });
-        self.black_box = Some(HostBlackBox::new(log, origin, write));
+        self.origin = origin;
+        self.black_box = Some(self.new_black_box(Some(Box::new(write))));
     }
 
-    /// Serves its metadata and these logs to stations, from now on.
-    pub fn serve_files(&mut self, logs: Option<StoredLogs>) {
+    fn new_black_box(&self, write: Option<Sink>) -> HostBlackBox {
+        new_black_box(&*self.flight, &self.names, self.origin, write)
+    }
+
+    /// Serves its metadata, these logs, and the log of a black box while it is made, to stations, from now on. Fixes
+    /// are measured from `origin`, as for [`log`](Self::log).
+    pub fn serve_files(&mut self, origin: Option<Origin>, logs: Option<StoredLogs>) {
+        self.origin = origin;
         let [vehicle, _] = &self.names;
         let MetadataFiles { files, general } = self.flight.metadata(vehicle);
         self.files = Some(Box::new((Transfers::new(Some(general)), ServedFiles::new(logs, files))));
@@ -479,6 +484,12 @@ impl Host {
             self.flight.log(black_box, &report, (&readings, taken), self.comms.esc_telemetry(), change);
             black_box.sent(time_us, &bytes);
         }
+        if let Some(files) = &mut self.files
+            && let Some(stream) = files.1.streamed(|| new_black_box(&*self.flight, &self.names, self.origin, None))
+        {
+            self.flight.log(stream, &report, (&readings, taken), self.comms.esc_telemetry(), change);
+            stream.sent(time_us, &bytes);
+        }
         self.number = self.number.wrapping_add(1);
         if let Some(news) = &action.inputs {
             self.merge(news);
@@ -494,6 +505,12 @@ impl Host {
     pub fn next_tick(&mut self, uplink: &[u8]) -> HostTick {
         self.tick(uplink, self.time_us + PERIOD_US, 0.0)
     }
+}
+
+fn new_black_box(flight: &dyn Core, names: &[String; 2], origin: Option<Origin>, write: Option<Sink>) -> HostBlackBox {
+    let [vehicle, law] = names;
+    let log = flight.black_box(&LogStart { vehicle, law, hardware: HARDWARE, ..LogStart::default() });
+    HostBlackBox::new(log, origin, write)
 }
 
 /// Returns the parameters with what is in `store`.

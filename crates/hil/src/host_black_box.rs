@@ -1,4 +1,4 @@
-//! The black box of a host: its ring, emptied after every tick.
+//! The black box of a host: its ring, emptied after every tick, or by whoever streams it.
 
 use afbc_estimator::Origin;
 use afbc_link::{Address, Decoder, Downlink};
@@ -13,13 +13,14 @@ const RING: usize = 1 << 16;
 const LISTENER: Address = Address { system: 255, component: 190 };
 
 /// What takes the bytes of a log.
-type Sink = Box<dyn FnMut(&[u8])>;
+pub(crate) type Sink = Box<dyn FnMut(&[u8])>;
 
-/// Makes the log of a host, and hands its bytes over.
+/// Makes the log of a host, and hands its bytes over, or keeps them for a station that gets them as a stream.
 pub(crate) struct HostBlackBox {
     log: BlackBox,
     ring: Box<LogRing<RING>>,
-    write: Sink,
+    /// None: they stay in the ring.
+    write: Option<Sink>,
     /// Where fixes of a GNSS receiver are measured from.
     origin: Option<Origin>,
     /// Reads the texts that the vehicle sends.
@@ -27,8 +28,8 @@ pub(crate) struct HostBlackBox {
 }
 
 impl HostBlackBox {
-    pub(crate) fn new(log: BlackBox, origin: Option<Origin>, write: impl FnMut(&[u8]) + 'static) -> Self {
-        HostBlackBox { log, ring: Box::default(), write: Box::new(write), origin, decoder: Decoder::new(LISTENER) }
+    pub(crate) fn new(log: BlackBox, origin: Option<Origin>, write: Option<Sink>) -> Self {
+        HostBlackBox { log, ring: Box::default(), write, origin, decoder: Decoder::new(LISTENER) }
     }
 
     /// Logs a tick.
@@ -61,11 +62,21 @@ impl HostBlackBox {
                 }
             },
         );
+        let Some(write) = write else { return };
         while !ring.is_empty() {
             let front = ring.front();
             write(front);
             let length = front.len();
             ring.consume(length);
         }
+    }
+
+    /// Returns bytes that wait, and removes so many of them.
+    pub(crate) fn waiting(&self) -> &[u8] {
+        self.ring.front()
+    }
+
+    pub(crate) fn consume(&mut self, bytes: usize) {
+        self.ring.consume(bytes);
     }
 }

@@ -1,8 +1,11 @@
-//! What a host serves of files: the component's metadata in `/etc`, its logs in `/log`.
+//! What a host serves of files: the component's metadata in `/etc`, its logs in `/log`, and the log that is streamed.
 
+use crate::host_black_box::HostBlackBox;
 use crate::ulog_files::StoredLogs;
 use afbc_link::FtpError;
-use afbc_station::services::storage::{DirectoryEntry, FileAccess, FileChange, FilePath, FileStore, LogInfo, LogStore};
+use afbc_station::services::storage::{
+    DirectoryEntry, FileAccess, FileChange, FilePath, FileStore, LogInfo, LogSource, LogStore,
+};
 use std::fs::{self, File};
 use std::io::{ErrorKind, Read, Seek, SeekFrom};
 use std::path::PathBuf;
@@ -13,7 +16,7 @@ const ETC: &str = "etc";
 const LOG: &str = "log";
 
 /// The files of a host. Nothing of them can be written; logs can be removed, except the one that is being written.
-#[derive(Debug, Default)]
+#[derive(Default)]
 pub struct ServedFiles {
     /// Files in `/etc`: name, contents.
     etc: Vec<(String, Vec<u8>)>,
@@ -24,6 +27,9 @@ pub struct ServedFiles {
     /// The logs as they were counted last, and the one that is read.
     counted: Vec<PathBuf>,
     reading: Option<(u16, File)>,
+    /// True while a log is to be streamed; the black box that makes it, once there is one.
+    streams: bool,
+    stream: Option<HostBlackBox>,
 }
 
 #[derive(Debug)]
@@ -41,6 +47,11 @@ impl ServedFiles {
     /// The logs, or none, and files in `/etc` by name.
     pub fn new(logs: Option<StoredLogs>, etc: Vec<(String, Vec<u8>)>) -> Self {
         ServedFiles { etc, logs, ..ServedFiles::default() }
+    }
+
+    /// Returns the black box of the log that is streamed, made by `begin` if it is a new one.
+    pub(crate) fn streamed(&mut self, begin: impl FnOnce() -> HostBlackBox) -> Option<&mut HostBlackBox> {
+        self.streams.then(|| self.stream.get_or_insert_with(begin))
     }
 
     fn list_logs(&self) -> Vec<PathBuf> {
@@ -173,6 +184,27 @@ impl LogStore for ServedFiles {
         (self.reading, self.counted) = (None, Vec::new());
         let old = logs.list().into_iter().filter(|path| !logs.is_current(path));
         old.filter(|path| fs::remove_file(path).is_err()).count() == 0
+    }
+}
+
+impl LogSource for ServedFiles {
+    fn start_log(&mut self) -> bool {
+        (self.streams, self.stream) = (true, None);
+        true
+    }
+
+    fn stop_log(&mut self) {
+        (self.streams, self.stream) = (false, None);
+    }
+
+    fn log_bytes(&self) -> &[u8] {
+        self.stream.as_ref().map_or(&[], HostBlackBox::waiting)
+    }
+
+    fn consume_log(&mut self, bytes: usize) {
+        if let Some(stream) = &mut self.stream {
+            stream.consume(bytes);
+        }
     }
 }
 

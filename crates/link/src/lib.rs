@@ -50,6 +50,7 @@ mod question;
 mod signature;
 mod target;
 pub mod telemetry;
+mod texts;
 mod transfer;
 mod uplink;
 mod wire;
@@ -78,7 +79,9 @@ pub use question::{
 pub use signature::{Key, ReceivedFrame, SetupSigning, Stamp, TIME_MAX};
 pub use target::{AttitudeAndThrust, Axes, ExternalTarget, ManualControl, PositionTarget};
 pub use telemetry::Telemetry;
+pub use texts::sent_texts;
 pub use transfer::{
-    ComponentMetadata, FILE_DATA_MAX, FileOpcode, FilePacket, LOG_DATA_MAX, LogData, LogEntry, Transfer,
+    ComponentMetadata, FILE_DATA_MAX, FileOpcode, FilePacket, LOG_DATA_MAX, LogData, LogEntry, STREAM_DATA_MAX,
+    StreamedLog, Transfer,
 };
 pub use uplink::Uplink;

@@ -13,6 +13,9 @@ use nalgebra::Vector3;
 
 /// Number of fixes whose mean the local frame's origin is, at rest.
 const FIXES: f32 = 10.0;
+/// Fixes so many standard deviations off, of a vehicle at rest, and so many in a row, tell that its origin is wrong.
+const ELSEWHERE: f32 = 20.0;
+const MISLED: u8 = 5;
 /// Standard deviations of a tracker's pose that does not say how good it is: a motion-capture system's \[m, rad\].
 const TRACKER: (f32, f32) = (0.003, 0.01);
 
@@ -44,7 +47,8 @@ impl Corrections {
 /// first usable fix of its GNSS receiver: one that comes when the estimator runs, and is good enough for a valid
 /// position. All fixes are told in that frame; with a tracker, so that the first one agrees with the estimate. While
 /// the vehicle is at rest, further fixes tell where the origin is, not where the vehicle is: their error wanders by
-/// metres within minutes, which would be a motion of a vehicle that stands.
+/// metres within minutes, which would be a motion of a vehicle that stands. If the first was wild, the fifth in a row
+/// that is far from it moves the origin to where they are.
 #[derive(Clone, Debug)]
 pub struct EstimatorFrontEnd {
     estimator: Estimator,
@@ -63,6 +67,8 @@ pub struct EstimatorFrontEnd {
     origin_is_known: bool,
     /// Number of fixes that have told it, up to [`FIXES`].
     fixes: f32,
+    /// Number of fixes in a row that are elsewhere, of a vehicle at rest.
+    elsewhere: u8,
     /// Estimated position and velocity until then, zero as long as nobody has told a position \[m, m/s\].
     told: [Vector3<f32>; 2],
     /// Estimated position of a vehicle at rest \[m\].
@@ -89,6 +95,7 @@ impl EstimatorFrontEnd {
             origin_m: None,
             origin_is_known: false,
             fixes: 0.0,
+            elsewhere: 0,
             told: [Vector3::zeros(); 2],
             stands_m: None,
         }
@@ -222,10 +229,18 @@ impl EstimatorFrontEnd {
         let origin_m = self.origin_m.as_mut()?;
         *position_m -= *origin_m;
         if let (Some(sigmas_m), Some(stands_m)) = (sigmas_m, self.stands_m) {
-            // A wild one moves it no more than others.
-            let by_m = (*position_m - stands_m).zip_map(&sigmas_m, |by_m, sigma_m| max(-sigma_m, min(by_m, sigma_m)));
-            self.fixes = (self.fixes + 1.0).min(FIXES);
-            *origin_m += by_m / self.fixes;
+            let off_m = *position_m - stands_m;
+            self.elsewhere = if off_m.amax() > ELSEWHERE * sigmas_m.amax() { self.elsewhere + 1 } else { 0 };
+            if self.elsewhere == MISLED {
+                // The origin was that of a wild one.
+                *origin_m += off_m;
+                (self.fixes, self.elsewhere) = (1.0, 0);
+            } else {
+                // A wild one moves it no more than others.
+                let by_m = off_m.zip_map(&sigmas_m, |by_m, sigma_m| max(-sigma_m, min(by_m, sigma_m)));
+                self.fixes = (self.fixes + 1.0).min(FIXES);
+                *origin_m += by_m / self.fixes;
+            }
             *position_m = stands_m;
         }
         Some(aid)

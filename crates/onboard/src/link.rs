@@ -1,6 +1,22 @@
-//! Parameters of the link.
+//! Parameters of the link, and of the log.
 
-use afbc_types::parameters;
+use afbc_types::{Choice, parameters};
+
+/// When the black box is written, numbered as PX4 numbers it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LogMode {
+    /// From arming until a second after disarming, each time.
+    Armed,
+    /// From power-up until then, and from then on as above.
+    BootUntilDisarm,
+    /// From power-up until power-down.
+    Boot,
+}
+
+impl Choice for LogMode {
+    const ALL: &'static [Self] = &[LogMode::Armed, LogMode::BootUntilDisarm, LogMode::Boot];
+    const WORDS: &'static [&'static str] = &["armed", "boot_until_disarm", "boot"];
+}
 
 parameters! {
     /// Parameters of the link. A change counts from the next start on.
@@ -16,5 +32,8 @@ parameters! {
         /// first one never does.
         #[parameter(LOG_PORT, "number", 0.0..=4.0)]
         pub log_port: u32 = 0,
+        /// When the black box is written, by boards with a memory card.
+        #[choice(SDLOG_MODE)]
+        pub log_mode: LogMode = LogMode::Armed,
     }
 }

@@ -23,29 +23,53 @@ pub fn field(reading: &MagneticReading, to_body: &Matrix3<f32>) -> Measurement {
     Measurement::MagneticField { field: to_body * reading.field_ut, sigma: FIELD_SIGMA_UT }
 }
 
-/// The frame in which a receiver's fixes are told: that of the first one.
+/// Fixes in a row, near one another, that are believed: a single one may be on another continent.
+const BELIEVED: u8 = 5;
+/// How near the one before \[m\].
+const NEAR_M: f32 = 200.0;
+
+/// The frame in which a receiver's fixes are told: that of the first that is believed.
 #[derive(Clone, Copy, Debug)]
-pub struct FixFrame(Option<Origin>);
+pub struct FixFrame {
+    /// Where the last fix was, and how many in a row were near; once they are believed, the frame's origin.
+    near: Option<(Origin, u8)>,
+}
 
 impl FixFrame {
     /// Before the first fix.
-    pub const NEW: Self = FixFrame(None);
+    pub const NEW: Self = FixFrame { near: None };
 
-    /// Returns a fix as the estimator takes it, and whether it is the first; none for an impossible one.
+    /// Returns the place of the frame, once fixes are believed.
+    pub fn origin(&self) -> Option<Origin> {
+        self.near.filter(|(_, count)| *count >= BELIEVED).map(|(origin, _)| origin)
+    }
+
+    /// Returns a fix as the estimator takes it, and whether it is the first; none for an impossible one, and until
+    /// five in a row are each within 200 m of the one before.
     pub fn measure(&mut self, fix: &FixReading) -> Option<(Measurement, bool)> {
         let FixReading { latitude_deg, longitude_deg, altitude_m, .. } = *fix;
         let here = Origin::new(latitude_deg, longitude_deg, altitude_m)?;
-        let is_first = self.0.is_none();
+        let (origin, mut count) = self.near.unwrap_or((here, 0));
+        let known = count >= BELIEVED;
+        let mut position_m = origin.local(latitude_deg, longitude_deg, altitude_m);
+        if !known {
+            count = if position_m.norm() > NEAR_M { 1 } else { count + 1 };
+            position_m = Vector3::zeros();
+            self.near = Some((here, count));
+            if count < BELIEVED {
+                return None;
+            }
+        }
         let [north, east, down] = fix.velocity_ned_m_s.into();
         let measurement = Measurement::Gnss {
-            position_m: self.0.get_or_insert(here).local(latitude_deg, longitude_deg, altitude_m),
+            position_m,
             velocity_m_s: Vector3::new(north, -east, -down),
             horizontal_sigma_m: fix.horizontal_sigma_m,
             vertical_sigma_m: fix.vertical_sigma_m,
             speed_sigma_m_s: fix.speed_sigma_m_s,
             climb_sigma_m_s: fix.climb_sigma_m_s,
         };
-        Some((measurement, is_first))
+        Some((measurement, !known))
     }
 }
 
@@ -83,6 +107,11 @@ mod tests {
         };
         let mut frame = FixFrame::NEW;
         assert_eq!(frame.measure(&FixReading { latitude_deg: 91.0, ..first }), None);
+        // A wild one before them, or among them, has no say.
+        let wild = FixReading { latitude_deg: -20.0, longitude_deg: 100.0, ..first };
+        for fix in [wild, first, first, wild, first, first, first, first] {
+            assert_eq!(frame.measure(&fix), None);
+        }
         let (measurement, is_first) = frame.measure(&first).expect("possible");
         let velocity = Vector3::new(1.0, -2.0, -3.0);
         assert!(is_first);

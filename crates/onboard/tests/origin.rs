@@ -112,6 +112,30 @@ proptest! {
         prop_assert!((state.position_m - by_m).amax() < 0.15, "{}, not {by_m}", state.position_m);
     }
 
+    /// A first fix from anywhere, and single ones among the others, do not mislead it.
+    #[test]
+    fn a_wild_fix_does_no_harm(place_m in place(), wild_m in place(), later in 100_u64..3000, x in -8.0_f32..8.0) {
+        prop_assume!((place_m - wild_m).norm() > 200.0);
+        let mut bench = Bench::new();
+        bench.stand(2000, Vector3::repeat(f32::NAN), 0.5);
+        bench.tick(Vector3::zeros(), Some(fix(wild_m, Vector3::zeros(), 0.5)), 0);
+        bench.stand(later, place_m, 0.5);
+        bench.tick(Vector3::zeros(), Some(fix(wild_m, Vector3::zeros(), 0.5)), 0);
+        bench.stand(2000, place_m, 0.5);
+        prop_assert_eq!(bench.missing, None);
+        let push = Vector3::new(x, 0.0, 0.0);
+        let (mut velocity, mut moved) = (Vector3::zeros(), Vector3::zeros());
+        let mut state = State::default();
+        for ms in 0..2000 {
+            let acceleration = if ms < 1000 { push } else { -push };
+            velocity += acceleration * 1e-3;
+            moved += velocity * 1e-3;
+            let fix = (ms % 100 == 0).then(|| fix(place_m + moved, velocity, 0.5));
+            state = bench.tick(acceleration, fix, 0);
+        }
+        prop_assert!((state.position_m - push).amax() < 0.25, "{}, not {push}", state.position_m);
+    }
+
     /// With a tracker the local frame is the tracker's, wherever the receiver's is; also if the vehicle moves when the
     /// first fix comes, late.
     #[test]

@@ -3,6 +3,7 @@
 //! [`read`] makes a [`Recording`] of a PX4 ULog or a PX4-ECL CSV, in this project's frames; [`fly`] runs the estimator
 //! over it, a step a millisecond, and compares. Whatever is in a file, nothing here panics: what cannot be used is
 //! skipped, counted and reported. [`exact`] runs a log of this firmware through all of its code.
+//! [`mcap`] converts a ULog for other tools.
 #![forbid(unsafe_code)]
 
 mod aids;
@@ -11,6 +12,7 @@ mod compass;
 mod earth;
 mod ecl;
 pub mod exact;
+pub mod mcap;
 mod order;
 mod recording;
 mod run;

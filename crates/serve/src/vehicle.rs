@@ -63,7 +63,7 @@ impl ServedVehicle {
         let link = Link { system: system.into(), ..Link::DEFAULT };
         let mut notices = Vec::new();
         let mut host = power_up(scenario, link, keeper.as_mut(), &mut notices)?;
-        host.serve_files(None);
+        host.serve_files(place(scenario), None);
         Ok(ServedVehicle {
             link,
             address: address(&host),
@@ -97,7 +97,7 @@ impl ServedVehicle {
     /// Keeps the black box in these files, from now on, before the first step, and lets stations download them.
     pub fn log(&mut self, files: UlogFiles) {
         self.host.log(place(&self.scenario), files.sink());
-        self.host.serve_files(Some(files.stored()));
+        self.host.serve_files(place(&self.scenario), Some(files.stored()));
         self.black_box = Some(files);
     }
 
@@ -214,7 +214,7 @@ impl ServedVehicle {
                     files.next_start();
                     self.host.log(place(&self.scenario), files.sink());
                 }
-                self.host.serve_files(self.black_box.as_ref().map(UlogFiles::stored));
+                self.host.serve_files(place(&self.scenario), self.black_box.as_ref().map(UlogFiles::stored));
                 // Nothing of a frame outlasts it.
                 self.peers.values_mut().for_each(|peer| *peer = decoder(self.address, self.wired));
             }

@@ -9,7 +9,7 @@ use crate::services::escs;
 use crate::services::modes;
 use crate::services::signing::{SetupOutcome, Signing, SigningRecord};
 use crate::services::status::AuxSensors;
-use crate::services::storage::{FileStore, LogStore};
+use crate::services::storage::{FileStore, LogSource, LogStore};
 use crate::services::streams::{Requested, id};
 use crate::services::telemetry::compose;
 use crate::services::texts::{Words, reason, urgency};
@@ -351,7 +351,7 @@ impl Comms {
     /// Goes on with what stations want of files and logs, to be called after everything else that sends: it takes what
     /// telemetry and parameters leave of the link, and a fifth of it at least. Together they send at most
     /// [`REPORT_MAX`] bytes.
-    pub fn transfer<S: FileStore + LogStore>(
+    pub fn transfer<S: FileStore + LogStore + LogSource>(
         &mut self,
         transfers: &mut Transfers<S::File>,
         store: &mut S,

@@ -1,8 +1,9 @@
 //! Files and logs of a vehicle with storage, on the link that telemetry and commands share.
 
 use crate::services::ftp::{FileTerms, Ftp, changes};
+use crate::services::log_stream::{LogStream, StreamEvent};
 use crate::services::log_transfer::{LogMessage, LogTransfer};
-use crate::services::storage::{FileStore, LogStore};
+use crate::services::storage::{FileStore, LogSource, LogStore};
 use afbc_link::{Address, Command, ComponentMetadata, FilePacket, LogRequest, Question, Transfer, Uplink};
 use heapless::Deque;
 
@@ -15,9 +16,9 @@ const OTHERS_MAX: usize = 24;
 const SHARE: i64 = 5;
 /// Bytes of that part that may be saved up: less than a frame \[1e-3 bytes\].
 const SAVED: i64 = 250_000;
-/// Longest frames with a part of a log, and of a file \[bytes\].
+/// Longest frames with a part of a log, and with one of a file or of a streamed log \[bytes\].
 const LOG_FRAME: usize = 12 + 97;
-const FILE_FRAME: usize = 12 + 254;
+const FILE_FRAME: usize = 12 + 255;
 /// COMPONENT_INFORMATION and COMPONENT_METADATA.
 const METADATA: [u32; 2] = [395, 397];
 
@@ -47,6 +48,7 @@ pub struct Transfers<F> {
     others: Deque<OtherRequest, OTHERS_MAX>,
     ftp: Ftp<F>,
     logs: LogTransfer,
+    stream: LogStream,
     metadata: Option<ComponentMetadata>,
     /// What transfers may send of their own part \[1e-3 bytes\].
     saved: i64,
@@ -62,9 +64,12 @@ struct FileRequest {
 
 enum OtherRequest {
     Log {
+        from: Address,
         request: LogRequest,
         may_change: bool,
     },
+    /// Begins to stream the log, or ends.
+    Stream(Address, bool),
     /// The message numbered so.
     Metadata(u32),
 }
@@ -89,8 +94,16 @@ pub(crate) fn is_change(message: &Uplink) -> bool {
 impl<F: Copy> Transfers<F> {
     /// With the address of the vehicle's metadata, if there is some.
     pub fn new(metadata: Option<ComponentMetadata>) -> Self {
-        let (ftp, logs) = (Ftp::default(), LogTransfer::default());
-        Transfers { files: Deque::new(), others: Deque::new(), ftp, logs, metadata, saved: SAVED, logs_turn: false }
+        Transfers {
+            files: Deque::new(),
+            others: Deque::new(),
+            ftp: Ftp::default(),
+            logs: LogTransfer::default(),
+            stream: LogStream::default(),
+            metadata,
+            saved: SAVED,
+            logs_turn: false,
+        }
     }
 
     /// Begins a tick on a link of so many bytes per second.
@@ -106,7 +119,8 @@ impl<F: Copy> Transfers<F> {
 
     /// Returns the longest frame that may be next \[bytes\].
     pub(crate) fn frame_max(&self) -> usize {
-        let logs_alone = self.files.is_empty() && self.others.is_empty() && !self.ftp.is_busy();
+        let logs_alone =
+            self.files.is_empty() && self.others.is_empty() && !self.ftp.is_busy() && !self.stream.is_active();
         if logs_alone { LOG_FRAME } else { FILE_FRAME }
     }
 
@@ -116,7 +130,7 @@ impl<F: Copy> Transfers<F> {
     }
 
     /// Returns what is to be done next.
-    pub(crate) fn next<S: FileStore<File = F> + LogStore>(
+    pub(crate) fn next<S: FileStore<File = F> + LogStore + LogSource>(
         &mut self,
         store: &mut S,
         now_us: u64,
@@ -143,27 +157,50 @@ impl<F: Copy> Transfers<F> {
                 LogMessage::Data(data) => Transfer::LogData(data),
             }));
         }
-        let (packet, to) = self.ftp.next_packet(store, now_us)?;
-        Some(Outcome::Send(Transfer::File { packet, to }))
+        if let Some((packet, to)) = self.ftp.next_packet(store, now_us) {
+            return Some(Outcome::Send(Transfer::File { packet, to }));
+        }
+        Some(match self.stream.next(store, now_us)? {
+            StreamEvent::Part(part) => Outcome::Send(Transfer::LogPart(part)),
+            StreamEvent::Unheard => Outcome::Say("log stream ended: not acknowledged", true),
+        })
     }
 }
 
 impl<F: Copy> Transfers<F> {
     /// Does what a request asks for that is not about files, or begins it.
-    fn begin(&mut self, request: OtherRequest, store: &mut impl LogStore, now_us: u64, armed: bool) -> Option<Outcome> {
+    fn begin<S: LogStore + LogSource>(
+        &mut self,
+        request: OtherRequest,
+        store: &mut S,
+        now_us: u64,
+        armed: bool,
+    ) -> Option<Outcome> {
         match request {
             OtherRequest::Log { request: LogRequest::Erase, .. } if armed => {
                 Some(Outcome::Say("logs are erased while disarmed only", true))
             }
             // Whoever is not in control has been told.
-            OtherRequest::Log { request: LogRequest::Erase, may_change: false } => None,
+            OtherRequest::Log { request: LogRequest::Erase, may_change: false, .. } => None,
             OtherRequest::Log { request: LogRequest::Erase, .. } => {
                 self.logs.hear(LogRequest::Erase, store);
                 let erased = store.erase_logs();
                 Some(Outcome::Say(if erased { "logs erased" } else { "logs cannot be erased" }, !erased))
             }
+            OtherRequest::Log { from, request: LogRequest::Received(sequence), .. } => {
+                self.stream.acknowledge(from, sequence);
+                None
+            }
             OtherRequest::Log { request, .. } => {
                 self.logs.hear(request, store);
+                None
+            }
+            OtherRequest::Stream(to, true) => {
+                let starts = self.stream.start(to, store);
+                (!starts).then_some(Outcome::Say("there is no log to stream", true))
+            }
+            OtherRequest::Stream(_, false) => {
+                self.stream.stop(store);
                 None
             }
             OtherRequest::Metadata(message) => {
@@ -183,6 +220,7 @@ impl<F: Copy> TransferRequests for Transfers<F> {
             Uplink::Command(Command::RequestMessage { message, .. }) => {
                 self.metadata.is_some() && METADATA.contains(message)
             }
+            Uplink::Command(Command::StartLogStream | Command::StopLogStream) => true,
             _ => false,
         }
     }
@@ -193,8 +231,10 @@ impl<F: Copy> TransferRequests for Transfers<F> {
                 let packet = FilePacket::read(payload).0;
                 return self.files.push_back(FileRequest { from, packet, may_change }).is_ok();
             }
-            Uplink::Question(Question::Log(request)) => OtherRequest::Log { request: *request, may_change },
+            Uplink::Question(Question::Log(request)) => OtherRequest::Log { from, request: *request, may_change },
             Uplink::Command(Command::RequestMessage { message, .. }) => OtherRequest::Metadata(*message),
+            Uplink::Command(Command::StartLogStream) => OtherRequest::Stream(from, true),
+            Uplink::Command(Command::StopLogStream) => OtherRequest::Stream(from, false),
             _ => return false,
         };
         self.others.push_back(other).is_ok()

@@ -196,6 +196,8 @@ fn commands_that_do_not_need_control() {
         Command::RequestProtocol,
         Command::RequestCapabilities,
         Command::CheckArming,
+        Command::StartLogStream,
+        Command::StopLogStream,
         Command::Denied(400),
         Command::Other(1),
     ];

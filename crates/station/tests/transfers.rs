@@ -310,3 +310,58 @@ fn logs_are_erased_while_disarmed_and_by_the_station_in_control() {
     let ((packet, _), _) = vehicle.until(50, file);
     assert_eq!((packet.opcode, vehicle.store.changes), (FileOpcode::ACK, 1));
 }
+
+/// Started and stopped by command, beside everything else; a vehicle that makes no log says so.
+#[test]
+fn the_log_is_streamed() {
+    let part = |sent: &Sent| match sent {
+        Sent::Transfer(Transfer::LogPart(part)) => Some(*part),
+        _ => None,
+    };
+    let mut vehicle = Vehicle::on(921_600).fills_the_line();
+    vehicle.hear(OTHER, &Uplink::Command(Command::StartLogStream));
+    let (said, _) = vehicle.until(100, text);
+    assert_eq!(said, "there is no log to stream");
+
+    // Definitions of 1 kB, then data without end.
+    let mut log = vec![0; 16];
+    for (kind, length, count) in [(b'P', 97_u16, 10), (b'D', 247, 4000)] {
+        for _ in 0..count {
+            log.extend_from_slice(&length.to_le_bytes());
+            log.push(kind);
+            log.extend(bytes(length.into(), 9));
+        }
+    }
+    vehicle.store.made = Some(log.clone());
+    vehicle.hear(OTHER, &Uplink::Command(Command::StartLogStream));
+    let answer = |sent: &Sent| match sent {
+        Sent::Usual(Downlink::Answer { command: 2510, answer, .. }) => Some(*answer),
+        _ => None,
+    };
+    let mut read: Vec<u8> = Vec::new();
+    let mut answers = Vec::new();
+    for _ in 0..3000 {
+        for sent in vehicle.step() {
+            answers.extend(answer(&sent));
+            let Some(part) = part(&sent) else { continue };
+            assert_eq!(part.to, OTHER);
+            assert_eq!(part.to_be_acknowledged, read.len() < 16 + 1000);
+            read.extend_from_slice(&part.data[..part.length.into()]);
+            if part.to_be_acknowledged {
+                vehicle.log(OTHER, LogRequest::Received(part.sequence));
+            }
+        }
+    }
+    assert_eq!(answers, [Answer::Accepted]);
+    assert_eq!(read, log[..read.len()]);
+    // Telemetry takes all of the line, but for a fifth: 3 s of 92 kB/s.
+    assert!((40_000..80_000).contains(&read.len()), "{}", read.len());
+    // A file of somebody else comes first, and in time.
+    vehicle.file(STATION, FilePacket::request(1, FileOpcode::LIST_DIRECTORY, 0, 0, 0).with(b"log"));
+    vehicle.until(100, file);
+
+    vehicle.hear(OTHER, &Uplink::Command(Command::StopLogStream));
+    vehicle.step();
+    assert!((0..200).all(|_| vehicle.step().iter().all(|sent| part(sent).is_none())));
+    assert!(!vehicle.store.makes);
+}

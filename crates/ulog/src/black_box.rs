@@ -15,7 +15,7 @@ use afbc_estimator::{ImuSample, Measurement};
 use afbc_onboard::parameters::{ParameterTable, RecordChange};
 use afbc_onboard::{Aged, tracker_aid};
 use afbc_store::RecordName;
-use afbc_types::{PerAxis, SensorCalibration, Stamped};
+use afbc_types::{PerAxis, ROTORS_MAX, SensorCalibration, Stamped};
 use nalgebra::Vector3;
 
 /// Bytes by which a damaged log is found again, and the time between two of them \[us\].
@@ -109,13 +109,20 @@ impl BlackBox {
         }
         let end = (0..=TEXT_MAX.min(text.len())).rfind(|end| text.is_char_boundary(*end)).unwrap_or_default();
         let text = text.get(..end).unwrap_or_default();
-        let _ = self.dropouts.put(now_us, &mut ring.view(), |ring| {
-            ring.record(b'L', |content| {
+        let _ = self.dropouts.put(now_us, &mut ring.view(), &mut |ring| {
+            ring.record(b'L', &mut |content| {
                 content.put(&[b'0' + severity.min(7)]);
                 content.put(&now_us.to_le_bytes());
                 content.put(text.as_bytes());
             })
         });
+    }
+
+    /// Notes that ticks are missing from a time on, up to the next one that is written: a dropout.
+    pub fn miss(&mut self, since_us: u64) {
+        if self.definitions.is_done() {
+            self.dropouts.miss(since_us);
+        }
     }
 
     /// Writes a tick, after what is left of the log's beginning. Without room for all of that, nothing of the tick is
@@ -133,14 +140,23 @@ impl BlackBox {
         let writes = self.definitions.is_done();
         if writes {
             self.write_parameters(table, &mut ring);
-            if now_us.saturating_sub(self.synced_us) >= SYNC_US && ring.record(b'S', |content| content.put(&SYNC)) {
+            if now_us.saturating_sub(self.synced_us) >= SYNC_US && ring.record(b'S', &mut |content| content.put(&SYNC))
+            {
                 self.synced_us = now_us;
             }
         }
         let report = report.padded();
-        let moment = Moment { report: &report, readings, taken, view, escs, origin, known: &self.known };
-        let mut topics =
-            Topics { now_us, writes, due_us: &mut self.due_us, dropouts: &mut self.dropouts, ring: &mut ring };
+        let tick = LoggedTick { report: &report, readings, taken: *taken, view, escs, origin };
+        self.topics(&tick, writes, &mut ring);
+    }
+
+    /// Writes the topics of a tick, or only remembers it. Once, for vehicles with any number of rotors.
+    #[inline(never)]
+    fn topics(&mut self, tick: &LoggedTick<'_, ROTORS_MAX>, writes: bool, ring: &mut RingView<'_>) {
+        let LoggedTick { report, readings, ref taken, view, escs, origin } = *tick;
+        let moment = Moment { report, readings, taken, view, escs, origin, known: &self.known };
+        let now_us = report.time_us;
+        let mut topics = Topics { now_us, writes, due_us: &mut self.due_us, dropouts: &mut self.dropouts, ring };
         self.last.sensors(&moment, &mut topics);
         self.last.states(&moment, &mut topics);
         self.last.advance(&moment);
@@ -198,8 +214,8 @@ impl Topics<'_, '_> {
     /// Writes a message; false if it is missing.
     fn at_once<T: Listed>(&mut self, message: &T) -> bool {
         self.writes
-            && self.dropouts.put(self.now_us, self.ring, |ring| {
-                ring.record(b'D', |content| {
+            && self.dropouts.put(self.now_us, self.ring, &mut |ring| {
+                ring.record(b'D', &mut |content| {
                     content.put(&T::ID.to_le_bytes());
                     message.write(content);
                 })

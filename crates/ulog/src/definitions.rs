@@ -89,6 +89,7 @@ impl Definitions {
     }
 
     /// Writes what there is room for.
+    #[inline(never)]
     pub(crate) fn write<const N: usize>(&mut self, now_us: u64, table: &ParameterTable<N>, ring: &mut RingView<'_>) {
         while self.part != Part::Done {
             match self.one(now_us, table, ring) {
@@ -105,7 +106,7 @@ impl Definitions {
         Some(match self.part {
             Part::Header => match index {
                 // Both at once: a log without flags is an old one.
-                0 => ring.bytes(|content| {
+                0 => ring.bytes(&mut |content| {
                     content.put(&MAGIC);
                     content.put(&now_us.to_le_bytes());
                     content.put(&[FLAGS.len() as u8, 0, b'B']);
@@ -120,7 +121,7 @@ impl Definitions {
                     None => (EscReport::KIND, ESC_REPORT),
                     Some(index) => TOPICS.get(index).map(|topic| (topic.name, topic.fields))?,
                 };
-                ring.record(b'F', |content| {
+                ring.record(b'F', &mut |content| {
                     content.put(name.as_bytes());
                     content.put(b":");
                     fields.iter().for_each(|field| field.format(content));
@@ -131,7 +132,7 @@ impl Definitions {
                 let parameter = table.at(self.next)?;
                 match table.default_of(parameter.name) {
                     Some(default) if default.value.to_bits() != parameter.value.to_bits() => {
-                        ring.record(b'Q', |content| {
+                        ring.record(b'Q', &mut |content| {
                             content.put(&[SYSTEM_DEFAULT]);
                             put_parameter(&default, content);
                         })
@@ -141,7 +142,7 @@ impl Definitions {
             }
             Part::Subscriptions => {
                 let topic = TOPICS.get(index)?;
-                ring.record(b'A', |content| {
+                ring.record(b'A', &mut |content| {
                     content.put(&[0]);
                     content.put(&self.next.to_le_bytes());
                     content.put(topic.name.as_bytes());
@@ -155,7 +156,7 @@ impl Definitions {
     fn information(&self, index: usize, ring: &mut RingView<'_>) -> Option<bool> {
         let text = |ring: &mut RingView<'_>, name: &str, text: &str| match text {
             "" => true,
-            text => ring.record(b'I', |content| {
+            text => ring.record(b'I', &mut |content| {
                 keyed(content, |key| {
                     key.put(b"char[");
                     key.number(text.len());
@@ -166,7 +167,7 @@ impl Definitions {
             }),
         };
         let number = |ring: &mut RingView<'_>, name: &str, bytes: [u8; 4]| {
-            ring.record(b'I', |content| {
+            ring.record(b'I', &mut |content| {
                 keyed(content, |key| key.put(name.as_bytes()));
                 content.put(&bytes);
             })
@@ -216,7 +217,7 @@ fn keyed(content: &mut Content<'_>, key: impl Fn(&mut Content<'_>)) {
 
 /// Writes a parameter; false if there is no room.
 pub(crate) fn parameter(parameter: &Parameter, ring: &mut RingView<'_>) -> bool {
-    ring.record(b'P', |content| put_parameter(parameter, content))
+    ring.record(b'P', &mut |content| put_parameter(parameter, content))
 }
 
 fn put_parameter(parameter: &Parameter, content: &mut Content<'_>) {

@@ -8,7 +8,8 @@ impl<'a> Content<'a> {
         Content(take)
     }
 
-    /// Appends bytes.
+    /// Appends bytes. Out of line: there are hundreds of fields.
+    #[inline(never)]
     pub(crate) fn put(&mut self, bytes: &[u8]) {
         bytes.iter().for_each(|byte| (self.0)(*byte));
     }

@@ -56,7 +56,8 @@ const HEAD: usize = 3;
 
 impl RingView<'_> {
     /// Appends bytes; false, and nothing is appended, if they do not fit.
-    pub(crate) fn bytes(&mut self, write: impl FnOnce(&mut Content<'_>)) -> bool {
+    #[inline(never)]
+    pub(crate) fn bytes(&mut self, write: &mut dyn FnMut(&mut Content<'_>)) -> bool {
         let start = self.0.storage_len();
         let mut overflows = false;
         write(&mut Content::new(&mut |byte| overflows |= self.0.push_back(byte).is_err()));
@@ -67,9 +68,10 @@ impl RingView<'_> {
     }
 
     /// Appends a record of this kind; false, and nothing is appended, if it does not fit.
-    pub(crate) fn record(&mut self, kind: u8, write: impl FnOnce(&mut Content<'_>)) -> bool {
+    #[inline(never)]
+    pub(crate) fn record(&mut self, kind: u8, write: &mut dyn FnMut(&mut Content<'_>)) -> bool {
         let start = self.0.storage_len();
-        let whole = self.bytes(|content| {
+        let whole = self.bytes(&mut |content| {
             content.put(&[0, 0, kind]);
             write(content);
         });

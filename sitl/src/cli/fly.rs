@@ -3,6 +3,7 @@
 use super::aboard::{AboardLogs, aboard};
 use super::flying::{Flying, report};
 use super::json::Json;
+use super::mcap::FlightMcap;
 use super::place::Place;
 use super::plan::{PlanFlight, is_plan};
 use super::target::Target;
@@ -19,7 +20,7 @@ use std::process::ExitCode;
 ///
 /// A plan of QGroundControl, a file that ends in `.plan`, is flown by the firmware's own code as `sitl serve` flies,
 /// outdoors in a breeze, from its planned home on: mission, geofence and rally points, for an hour at most. Of the
-/// options then --vehicle, --duration, --exact-log and --ulog apply. It exits with 1 if the mission is not completed.
+/// options then --vehicle, --duration, --exact-log, --ulog and --mcap apply. It exits with 1 if the mission is not completed.
 #[derive(Args, Debug)]
 pub(crate) struct Fly {
     /// Name of a built-in scenario, or path of a scenario file or of a plan
@@ -40,6 +41,10 @@ pub(crate) struct Fly {
     #[arg(long, value_name = "FILE")]
     ulog: Option<PathBuf>,
 
+    /// The same as MCAP, for Foxglove, PlotJuggler and ROS 2's tools, in this file, which must not exist
+    #[arg(long, value_name = "FILE")]
+    mcap: Option<PathBuf>,
+
     #[command(flatten)]
     on: OnVehicle,
 
@@ -55,7 +60,7 @@ pub(crate) struct Fly {
 
 impl Fly {
     /// Flies, writes, prints.
-    pub(super) fn run(self) -> Result<ExitCode, Failure> {
+    pub(super) fn run(mut self) -> Result<ExitCode, Failure> {
         if is_plan(self.scenario.path()) {
             return self.fly_plan();
         }
@@ -65,27 +70,29 @@ impl Fly {
         }
         let scenario = self.on.put(scenario)?;
         let name = scenario.name.clone();
-        let is_logged = self.exact_log.is_some() || self.ulog.is_some();
+        let is_logged = self.mcap.is_some() || self.exact_log.is_some() || self.ulog.is_some();
         let firmware = is_logged.then(|| aboard(&scenario, self.flying.duration)).transpose()?;
         // Before the flights, so that a file that cannot be costs none.
+        let mcap = FlightMcap::create(self.mcap, &mut self.ulog)?;
         let logs = AboardLogs::create(self.exact_log, self.ulog)?;
         let (folder, flown) = self.flying.fly(vec![scenario], || self.place.open("fly", &name))?;
         let logged = firmware.map(|firmware| firmware.fly(logs)).transpose()?;
         report(&folder, &flown, &[], self.json)?;
         logged.iter().flatten().for_each(|line| say(line));
+        mcap.map(FlightMcap::finish).transpose()?;
         Ok(ExitCode::from(u8::from(flown.iter().any(|flown| flown.run.lost.is_some()))))
     }
 }
 
 impl Fly {
     fn fly_plan(self) -> Result<ExitCode, Failure> {
-        let Fly { scenario, controllers, exact_log, ulog, on, flying, json, .. } = self;
+        let Fly { scenario, controllers, exact_log, ulog, mcap, on, flying, json, .. } = self;
         let path = scenario.path().to_path_buf();
         if !controllers.is_empty() || json.json || flying.log_hz.is_some() {
             let options = "--controller, --log-hz and --json";
             return Err(format!("{}: {options} do not apply to a plan; leave them out", path.display()).into());
         }
-        PlanFlight { path, on, duration: flying.duration, exact_log, ulog }.run()
+        PlanFlight { path, on, duration: flying.duration, exact_log, ulog, mcap }.run()
     }
 }
 

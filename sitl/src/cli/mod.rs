@@ -13,6 +13,7 @@ mod in_the_loop;
 mod interrupt;
 mod json;
 mod log_rate;
+mod mcap;
 mod page;
 mod paper;
 mod params;
@@ -71,6 +72,7 @@ enum Command {
     Params(params::Params),
     Results(results::Results),
     Replay(replay::Replay),
+    Mcap(mcap::Mcap),
     Serve(serve::Serve),
     Pil(pil::Pil),
     Hitl(hitl::Hitl),
@@ -95,6 +97,7 @@ impl Cli {
             Command::Params(params) => params.run(),
             Command::Results(results) => results.run(),
             Command::Replay(replay) => replay.run(),
+            Command::Mcap(mcap) => mcap.run(),
             Command::Serve(serve) => serve.run(),
             Command::Pil(pil) => pil.run(),
             Command::Hitl(hitl) => hitl.run(),

@@ -1,5 +1,6 @@
 //! `sitl fly PLAN.plan`: a plan of QGroundControl.
 
+use super::mcap::FlightMcap;
 use super::serve::unwritten;
 use super::terminal::{Failure, print, say};
 use super::vehicle::OnVehicle;
@@ -20,6 +21,7 @@ pub(super) struct PlanFlight {
     pub(super) duration: Option<f64>,
     pub(super) exact_log: Option<PathBuf>,
     pub(super) ulog: Option<PathBuf>,
+    pub(super) mcap: Option<PathBuf>,
 }
 
 /// True if a path names a plan of QGroundControl.
@@ -29,7 +31,7 @@ pub(super) fn is_plan(path: &Path) -> bool {
 
 impl PlanFlight {
     /// Flies it, with mission, geofence and rally points; exits with 1 if the mission has not been completed.
-    pub(super) fn run(self) -> Result<ExitCode, Failure> {
+    pub(super) fn run(mut self) -> Result<ExitCode, Failure> {
         let file = self.path.display().to_string();
         let text = std::fs::read_to_string(&self.path).map_err(|error| format!("{file}: {error}"))?;
         let plan = QgcPlan::read(&file, &text)?;
@@ -46,11 +48,13 @@ impl PlanFlight {
         if let Some(path) = &self.exact_log {
             vehicle.record(LogFile::create(path).map_err(|error| unwritten(path, &error))?);
         }
+        let mcap = FlightMcap::create(self.mcap, &mut self.ulog)?;
         if let Some(path) = &self.ulog {
             vehicle.log(UlogFiles::create(path)?);
         }
         let end = fly_plan(&mut vehicle, &plan, self.duration.unwrap_or(LONGEST_S), &mut |line| say(line));
         vehicle.end_log()?;
+        mcap.map(FlightMcap::finish).transpose()?;
         let end = end.map_err(|problem| format!("{file}: {problem}"))?;
         let how = match (end.complete || end.reached.contains(&last(&plan)), end.disarmed) {
             (true, true) => "complete, on the ground",

@@ -60,6 +60,12 @@ pub(crate) fn wiring(board: &BoardTable) -> String {
     }
     motors.sort();
     rows.extend(motors);
+    rows.extend(board.card.iter().map(|card| {
+        let pins = [&*card.clock, &card.into, &card.out, &card.select].join(", ");
+        let quiet =
+            if card.quiet.is_empty() { String::new() } else { format!("; {} stays high", card.quiet.join(", ")) };
+        ["memory card: clock, in, out, select".to_owned(), pins, format!("{}, up to 21 MHz{quiet}", card.name)]
+    }));
     rows.extend(board.led.iter().map(|led| ["LED".to_owned(), led.clone(), "lit if low".to_owned()]));
     rows.push(["buzzer with a tone of its own".to_owned(), board.buzzer.clone(), "sounds if high".to_owned()]);
     rows.push(["debugger".to_owned(), "PA13, PA14".to_owned(), "SWDIO, SWCLK".to_owned()]);

@@ -55,6 +55,18 @@ pub(crate) struct I2c {
     pub(crate) barometers: Vec<String>,
 }
 
+/// The memory card's bus.
+#[derive(Debug)]
+pub(crate) struct CardBus {
+    pub(crate) name: String,
+    pub(crate) clock: String,
+    pub(crate) out: String,
+    pub(crate) into: String,
+    pub(crate) select: String,
+    /// Select pins of what else is there.
+    pub(crate) quiet: Vec<String>,
+}
+
 /// What a channel of a timer drives.
 #[derive(Debug)]
 pub(crate) struct Motor {
@@ -86,6 +98,7 @@ pub(crate) struct BoardTable {
     pub(crate) i2c: I2c,
     pub(crate) led: Option<String>,
     pub(crate) buzzer: String,
+    pub(crate) card: Option<CardBus>,
     pub(crate) outputs: usize,
     pub(crate) numbering: String,
     pub(crate) timers: Vec<Timer>,
@@ -134,6 +147,18 @@ impl BoardTable {
         let led = (words.peek() == "led").then(|| words.after("led :"));
         let buzzer = words.after("buzzer :");
         words.expect("}");
+        let card = (words.peek() == "card").then(|| {
+            let card = CardBus {
+                name: words.after("card :"),
+                clock: words.after("{ clock :"),
+                out: words.after("out :"),
+                into: words.after("in :"),
+                select: words.after("select :"),
+                quiet: words.list("quiet :"),
+            };
+            words.expect("}");
+            card
+        });
         let outputs = words.after("motors :").parse().unwrap();
         let numbering = words.after("as");
         words.expect("{");
@@ -150,7 +175,7 @@ impl BoardTable {
         }
         words.expect("}");
         assert!(words.0.is_empty(), "{}: {:?}", board.display(), words.0);
-        Some(BoardTable { crystal_hz, link, gnss, escs, imu, i2c, led, buzzer, outputs, numbering, timers })
+        Some(BoardTable { crystal_hz, link, gnss, escs, imu, i2c, led, buzzer, card, outputs, numbering, timers })
     }
 
     /// Returns the motors.
@@ -170,7 +195,10 @@ impl BoardTable {
         let Spi { clock, out, into, select, ready, .. } = &self.imu;
         let buses = [clock, out, into, select, &ready.pin, &self.i2c.clock, &self.i2c.data];
         let motors = self.motors().map(|motor| &motor.pin);
-        let all = uarts.chain(buses).chain(motors).chain(&self.led).chain([&self.buzzer]);
+        let card = self.card.iter().flat_map(|CardBus { clock, out, into, select, quiet, .. }| {
+            [clock, out, into, select].into_iter().chain(quiet)
+        });
+        let all = uarts.chain(buses).chain(motors).chain(&self.led).chain([&self.buzzer]).chain(card);
         all.map(String::as_str).collect()
     }
 }
@@ -230,6 +258,17 @@ impl Words {
             word = self.after("");
         }
         parts
+    }
+
+    /// Returns the words of a list.
+    fn list(&mut self, key: &str) -> Vec<String> {
+        let mut list = Vec::new();
+        let mut word = self.after(&format!("{key} ["));
+        while word != "]" {
+            list.push(word);
+            word = self.after("");
+        }
+        list
     }
 
     fn channel(&mut self) -> Option<Motor> {

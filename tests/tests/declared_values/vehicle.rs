@@ -257,12 +257,13 @@ fn every_value_of_a_vehicles_file_counts() {
 /// What a station may set is in a vehicle's file, but for what follows from another key, or is not the vehicle's.
 #[test]
 fn every_parameter_of_a_station_is_in_the_file() {
-    const ELSEWHERE: [(&str, &str); 12] = [
+    const ELSEWHERE: [(&str, &str); 13] = [
         ("CAL_", "those of calibrations: of each vehicle's own sensors"),
         ("COM_FLTMODE", "the pilot's"),
         ("COM_RC_", "the pilot's"),
         ("LOG_PORT", "the link's"),
         ("RC", "the pilot's and the receiver's"),
+        ("SDLOG_MODE", "the log's"),
         ("MOT_PROTOCOL", "what its motor controllers understand"),
         ("MOT_LAG", "time_constant_s of [rotors]"),
         ("C_FORCE_MAX", "force_max_n of [rotors]"),

@@ -11,6 +11,7 @@
 //! | no line from the IMU's interrupt | a pin, by which it is read |
 
 mod bmi270;
+mod card;
 mod part;
 mod relabelled;
 mod wiring;
@@ -19,6 +20,7 @@ use crate::impairments::Impairments;
 use crate::machine::{Divider, Machine, Signal};
 use crate::wire::Wire;
 use bmi270::Bmi270;
+pub use card::{CardSlot, CardTrouble};
 use part::Part;
 use relabelled::Relabelled;
 use rigless::chip::dps310::{Dps310, Sdo};
@@ -43,7 +45,7 @@ use rigless::time::VirtualNanos;
 use serde::{Deserialize, Serialize};
 use std::num::{NonZeroU32, NonZeroU64};
 use std::ops::Range;
-use wiring::{Inertial, Sensors, Timer, UART4, WIRINGS, Wiring};
+use wiring::{CardWiring, Inertial, Sensors, Timer, UART4, WIRINGS, Wiring};
 
 const CRYSTAL_HZ: u64 = 8_000_000;
 const RAIL_MV: u32 = 3_300;
@@ -51,6 +53,8 @@ const LINK_WIRE: HostWire = HostWire { name: "serial1", port: 5760 };
 /// SPI1, and the place of the IMU on it.
 const SPI: usize = 0;
 const IMU: usize = 0;
+/// Place of the memory card on its SPI.
+const CARD: usize = 0;
 /// Places on the I2C.
 const BAROMETER: usize = 0;
 const COMPASS: usize = 1;
@@ -105,6 +109,10 @@ impl<const ROW: usize> F405<ROW> {
             part.i2c[i2c].attach(Dps310::new(Sdo::Low));
             part.i2c[i2c].attach(Qmc5883l::new());
             part.usart[receiver.index].attach(nmea::Receiver::new());
+        }
+        if let Some(CardWiring { spi, select: (port, pin) }) = Self::WIRING.card {
+            let select = Select { port, pin: Pin::new(pin).expect("one of sixteen pins"), active: Level::Low };
+            part.spi[spi].attach_selected(CardSlot::new(), select);
         }
         board.sense(&AT_REST);
         Ok(board)
@@ -328,6 +336,10 @@ impl<const ROW: usize> Machine for F405<ROW> {
 
     fn attach_receiver(&mut self, receiver: Box<dyn Peer>) {
         self.mcu.stm32.usart[Self::WIRING.receiver().index].attach_boxed(receiver);
+    }
+
+    fn card(&mut self) -> Option<&mut CardSlot> {
+        self.mcu.stm32.spi[Self::WIRING.card?.spi].chip_mut(CARD)
     }
 
     fn impair(&mut self, impairments: &Impairments) {

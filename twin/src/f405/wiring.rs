@@ -12,6 +12,8 @@ pub struct Wiring {
     pub link: Uart,
     /// None has sensors of its own: its state comes over the link.
     pub sensors: Option<Sensors>,
+    /// The slot of its memory card.
+    pub card: Option<CardWiring>,
     /// The timers of its motors, with DMA.
     pub timers: &'static [FrameTimer],
     /// Name, timer and channel of motors 1 to 4.
@@ -39,6 +41,13 @@ pub struct Sensors {
     pub i2c: usize,
     pub i2c_stream: usize,
     pub receiver: Uart,
+}
+
+/// A memory card on an SPI: its place among the part's, and port and pin that select it.
+#[derive(Clone, Copy, Debug)]
+pub struct CardWiring {
+    pub spi: usize,
+    pub select: (&'static str, u8),
 }
 
 /// An inertial sensor.
@@ -99,6 +108,7 @@ const SPEEDYBEE_V3: Wiring = Wiring {
         i2c_stream: 3,
         receiver: USART6,
     }),
+    card: Some(CardWiring { spi: 1, select: ("GPIOA", 15) }),
     timers: &[TIM4_ALL],
     motors: [("M1", TIM4, 1), ("M2", TIM4, 2), ("M3", TIM4, 3), ("M4", TIM4, 4)],
 };
@@ -115,6 +125,7 @@ const SPEEDYBEE_V4: Wiring = Wiring {
         i2c_stream: 0,
         receiver: USART6,
     }),
+    card: Some(CardWiring { spi: 2, select: ("GPIOC", 14) }),
     timers: TIM4_TIM3,
     motors: [("M1", TIM4, 1), ("M2", TIM4, 2), ("M3", TIM3, 3), ("M4", TIM3, 4)],
 };
@@ -130,6 +141,7 @@ const SPEEDYBEE_MINI: Wiring = Wiring {
         i2c_stream: 0,
         receiver: USART6,
     }),
+    card: None,
     motors: [("M1", TIM4, 1), ("M2", TIM4, 2), ("M3", TIM3, 4), ("M4", TIM3, 3)],
     ..SPEEDYBEE_V4
 };
@@ -146,6 +158,7 @@ const MATEK_SE: Wiring = Wiring {
         i2c_stream: 0,
         receiver: USART6,
     }),
+    card: Some(CardWiring { spi: 2, select: ("GPIOC", 14) }),
     timers: TIM4_TIM3,
     motors: [("M1", TIM4, 2), ("M2", TIM4, 1), ("M3", TIM3, 3), ("M4", TIM3, 4)],
 };
@@ -162,6 +175,7 @@ const MATEK_STD: Wiring = Wiring {
         i2c_stream: 0,
         receiver: USART3,
     }),
+    card: Some(CardWiring { spi: 2, select: ("GPIOC", 1) }),
     timers: &[TIM8_ALL],
     motors: ALL_OF_TIM8,
 };
@@ -178,13 +192,14 @@ const KAKUTE: Wiring = Wiring {
         i2c_stream: 5,
         receiver: UART4,
     }),
+    card: None,
     timers: &[tim3([0, 2]), TIM5_LAST],
     motors: [("M1", TIM3, 3), ("M2", TIM3, 4), ("M3", TIM5, 4), ("M4", TIM5, 3)],
 };
 
 /// `boards/stm32f405`: no sensors.
 const PLAIN: Wiring =
-    Wiring { name: "stm32f405", link: USART1, sensors: None, timers: &[TIM8_ALL], motors: ALL_OF_TIM8 };
+    Wiring { name: "stm32f405", link: USART1, sensors: None, card: None, timers: &[TIM8_ALL], motors: ALL_OF_TIM8 };
 
 /// All.
 pub const WIRINGS: [Wiring; 7] = [SPEEDYBEE_V3, SPEEDYBEE_V4, SPEEDYBEE_MINI, MATEK_SE, MATEK_STD, KAKUTE, PLAIN];

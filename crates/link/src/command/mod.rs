@@ -91,6 +91,10 @@ pub enum Command {
     Calibrate(CalibrationRequest),
     /// MAV_CMD_RUN_PREARM_CHECKS (401).
     CheckArming,
+    /// MAV_CMD_LOGGING_START (2510) of a ULog (param1 = 0).
+    StartLogStream,
+    /// MAV_CMD_LOGGING_STOP (2511).
+    StopLogStream,
     /// One of these commands, by number, with an invalid parameter: answered with "denied".
     Denied(u16),
     /// Any other command, by number, of any dialect: answered with "unsupported".
@@ -153,6 +157,8 @@ pub(crate) const SET_INTERVAL: u16 = 511;
 pub(crate) const REQUEST_MESSAGE: u16 = 512;
 pub(crate) const REQUEST_PROTOCOL: u16 = 519;
 pub(crate) const REQUEST_CAPABILITIES: u16 = 520;
+pub(crate) const START_LOG_STREAM: u16 = 2_510;
+pub(crate) const STOP_LOG_STREAM: u16 = 2_511;
 pub(crate) const ENGAGE: u16 = 31_010;
 pub(crate) const SELF_TEST: u16 = 31_011;
 
@@ -165,7 +171,7 @@ pub(crate) const USUAL: f32 = -1.0;
 
 impl Command {
     /// Numbers of the commands that are understood.
-    pub const KNOWN: [u16; 23] = [
+    pub const KNOWN: [u16; 25] = [
         RETURN,
         LAND,
         TAKE_OFF,
@@ -187,6 +193,8 @@ impl Command {
         REQUEST_MESSAGE,
         REQUEST_PROTOCOL,
         REQUEST_CAPABILITIES,
+        START_LOG_STREAM,
+        STOP_LOG_STREAM,
         ENGAGE,
         SELF_TEST,
     ];
@@ -217,6 +225,8 @@ impl Command {
             Command::Storage(_) => STORAGE,
             Command::Calibrate(_) => CALIBRATE,
             Command::CheckArming => CHECK_ARMING,
+            Command::StartLogStream => START_LOG_STREAM,
+            Command::StopLogStream => STOP_LOG_STREAM,
             Command::Denied(id) | Command::Other(id) => id,
         }
     }

@@ -3,8 +3,8 @@
 use super::{
     ARM_DISARM, CALIBRATE, CHECK_ARMING, CUSTOM_MODE, CalibrationRequest, Command, ENGAGE, FORCED, GET_INTERVAL, HOME,
     LAND, ORBIT, REBOOT, REPOSITION, REQUEST_CAPABILITIES, REQUEST_MESSAGE, REQUEST_PROTOCOL, RETURN, Reboot,
-    SELECT_MODE, SELECT_STANDARD_MODE, SELF_TEST, SET_CURRENT, SET_INTERVAL, SPEED, START_MISSION, STORAGE, Storage,
-    TAKE_OFF, USUAL,
+    SELECT_MODE, SELECT_STANDARD_MODE, SELF_TEST, SET_CURRENT, SET_INTERVAL, SPEED, START_LOG_STREAM, START_MISSION,
+    STOP_LOG_STREAM, STORAGE, Storage, TAKE_OFF, USUAL,
 };
 use crate::address::Address;
 use crate::message::{Fault, MessageFormat};
@@ -123,6 +123,8 @@ fn known(id: u16, [p1, p2, p3, p4]: [f32; 4], place: Option<Place>) -> Option<Co
         STORAGE if p1 == 1.0 => Command::Storage(Storage::Save),
         STORAGE if p1 == 2.0 => Command::Storage(Storage::Reset),
         CHECK_ARMING => Command::CheckArming,
+        START_LOG_STREAM if p1 == 0.0 => Command::StartLogStream,
+        STOP_LOG_STREAM => Command::StopLogStream,
         _ => return None,
     })
 }

@@ -26,9 +26,14 @@ pub(crate) fn write(command: Command, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, 
         }
         // No parameter of any command may be infinite.
         Command::Denied(id) => return LONG.write(&([f32::INFINITY; 7], id, Address::default(), 0), payload),
-        Command::Disarm | Command::Engage | Command::SelfTest | Command::Land | Command::Return | Command::Other(_) => {
-            ([0.0; 4], None)
-        }
+        Command::Disarm
+        | Command::Engage
+        | Command::SelfTest
+        | Command::Land
+        | Command::Return
+        | Command::StartLogStream
+        | Command::StopLogStream
+        | Command::Other(_) => ([0.0; 4], None),
         Command::TakeOff(height) => ([0.0; 4], Some(nowhere(height))),
         Command::SelectMode(mode) => {
             let [_, _, main, sub] = mode.to_le_bytes();

@@ -1,4 +1,4 @@
-//! Logs: LOG_REQUEST_LIST, LOG_REQUEST_DATA, LOG_ERASE and LOG_REQUEST_END, with LOG_ENTRY and LOG_DATA.
+//! Logs: LOG_REQUEST_LIST, LOG_REQUEST_DATA, LOG_ERASE and LOG_REQUEST_END, with LOG_ENTRY and LOG_DATA; LOGGING_ACK.
 
 use crate::address::Address;
 use crate::message::{MessageFormat, PAYLOAD_MAX};
@@ -6,6 +6,7 @@ use crate::wire::{Layout, Unused};
 use mavlink::MessageData;
 use mavlink::dialects::common::{
     LOG_DATA_DATA, LOG_ENTRY_DATA, LOG_ERASE_DATA, LOG_REQUEST_DATA_DATA, LOG_REQUEST_END_DATA, LOG_REQUEST_LIST_DATA,
+    LOGGING_ACK_DATA,
 };
 
 /// What is asked of the logs.
@@ -31,6 +32,8 @@ pub enum LogRequest {
     Erase,
     /// LOG_REQUEST_END (122): nothing more is to be sent. Not answered.
     End,
+    /// LOGGING_ACK (268): the part of a streamed log with this number has arrived. Not answered.
+    Received(u16),
 }
 
 /// What is reported of the logs.
@@ -58,6 +61,7 @@ pub(super) const LIST_ID: u32 = LOG_REQUEST_LIST_DATA::ID;
 pub(super) const DATA_REQUEST_ID: u32 = LOG_REQUEST_DATA_DATA::ID;
 pub(super) const ERASE_ID: u32 = LOG_ERASE_DATA::ID;
 pub(super) const END_ID: u32 = LOG_REQUEST_END_DATA::ID;
+pub(super) const RECEIVED_ID: u32 = LOGGING_ACK_DATA::ID;
 pub(super) const ENTRY_ID: u32 = LOG_ENTRY_DATA::ID;
 pub(super) const DATA_ID: u32 = LOG_DATA_DATA::ID;
 
@@ -65,6 +69,7 @@ const LIST: Layout<LOG_REQUEST_LIST_DATA, (u16, u16, Address)> = Layout::NEW;
 const DATA_REQUEST: Layout<LOG_REQUEST_DATA_DATA, (u32, u32, u16, Address)> = Layout::NEW;
 const ERASE: Layout<LOG_ERASE_DATA, (Address,)> = Layout::NEW;
 const END: Layout<LOG_REQUEST_END_DATA, (Address,)> = Layout::NEW;
+const RECEIVED: Layout<LOGGING_ACK_DATA, (u16, Address)> = Layout::NEW;
 /// Time, size; number of the log, number of logs, last number.
 const ENTRY: Layout<LOG_ENTRY_DATA, (Unused<8>, u16, [u16; 2])> = Layout::NEW;
 const DATA: Layout<LOG_DATA_DATA, (u32, u16, u8, Unused<90>)> = Layout::NEW;
@@ -76,6 +81,7 @@ impl LogRequest {
             DATA_REQUEST_ID => DATA_REQUEST.format(),
             ERASE_ID => ERASE.format(),
             END_ID => END.format(),
+            RECEIVED_ID => RECEIVED.format(),
             _ => return None,
         })
     }
@@ -88,6 +94,10 @@ impl LogRequest {
             }
             ERASE_ID => (LogRequest::Erase, ERASE.read(payload).0),
             END_ID => (LogRequest::End, END.read(payload).0),
+            RECEIVED_ID => {
+                let (sequence, to) = RECEIVED.read(payload);
+                (LogRequest::Received(sequence), to)
+            }
             _ => {
                 let (offset, bytes, log, to) = DATA_REQUEST.read(payload);
                 (LogRequest::Data { log, offset, bytes }, to)
@@ -102,6 +112,7 @@ impl LogRequest {
             LogRequest::Data { log, offset, bytes } => DATA_REQUEST.write(&(offset, bytes, log, to), payload),
             LogRequest::Erase => ERASE.write(&(to,), payload),
             LogRequest::End => END.write(&(to,), payload),
+            LogRequest::Received(sequence) => RECEIVED.write(&(sequence, to), payload),
         }
     }
 }

@@ -68,7 +68,9 @@ const ORIGIN: Layout<SET_GPS_GLOBAL_ORIGIN_DATA, (Unused<12>, u8, Unused<8>)> = 
 impl Question {
     pub(crate) fn format(id: u32) -> Option<MessageFormat> {
         Some(match id {
-            log::LIST_ID | log::DATA_REQUEST_ID | log::ERASE_ID | log::END_ID => return LogRequest::format(id),
+            log::LIST_ID | log::DATA_REQUEST_ID | log::ERASE_ID | log::END_ID | log::RECEIVED_ID => {
+                return LogRequest::format(id);
+            }
             file::ID => file::format(),
             extended::READ_ID | extended::LIST_ID | extended::SET_ID => return ExtendedRequest::format(id),
             event::REQUEST_ID => EventRequest::format(),
@@ -82,7 +84,7 @@ impl Question {
     /// Returns the question and its receiver.
     pub(crate) fn read(id: u32, payload: &[u8]) -> Result<(Self, Address), Fault> {
         Ok(match id {
-            log::LIST_ID | log::DATA_REQUEST_ID | log::ERASE_ID | log::END_ID => {
+            log::LIST_ID | log::DATA_REQUEST_ID | log::ERASE_ID | log::END_ID | log::RECEIVED_ID => {
                 let (request, to) = LogRequest::read(id, payload);
                 (Question::Log(request), to)
             }
@@ -98,10 +100,13 @@ impl Question {
                 let (request, to) = EventRequest::read(payload);
                 (Question::Event(request), to)
             }
-            serial::ID => {
-                let (serial, to) = Serial::read(payload, serial::RESPOND)?;
-                (Question::Serial(serial), to)
-            }
+            serial::ID => match Serial::read_line(payload) {
+                Some(to) => (Question::Unanswered(UnansweredWish::Shell), to),
+                None => {
+                    let (serial, to) = Serial::read(payload, serial::RESPOND)?;
+                    (Question::Serial(serial), to)
+                }
+            },
             terrain::CHECK_ID => (Question::Terrain(Terrain::read_check(payload)), Address::default()),
             ORIGIN_ID => {
                 let (_, system, _) = ORIGIN.read(payload);

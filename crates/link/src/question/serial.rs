@@ -44,9 +44,20 @@ impl Serial {
         Ok((Serial { device, bytes }, to))
     }
 
+    /// Returns the receiver of a line for the shell that wants no reply, if it is one.
+    pub(super) fn read_line(payload: &[u8]) -> Option<Address> {
+        let (_, _, device, flags, bytes, _, _, to) = SERIAL.read(payload);
+        (device == Self::SHELL && flags & (REPLY | RESPOND) == 0 && bytes > 0).then_some(to)
+    }
+
     pub(super) fn write(self, flag: u8, to: Address, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
         let says = flag == REPLY && self.bytes > 0;
         let data = if says { Self::NO_SHELL } else { [0; LENGTH] };
         SERIAL.write(&(0, 0, self.device, flag, self.bytes, data, Unused, to), payload)
     }
+}
+
+/// Writes a line for the shell that wants no reply.
+pub(super) fn write_line(payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
+    SERIAL.write(&(0, 0, Serial::SHELL, 0, 1, [b'\n'; LENGTH], Unused, Address::default()), payload)
 }

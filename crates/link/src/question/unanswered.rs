@@ -1,5 +1,6 @@
 //! Messages that nothing answers and that the vehicle has no use for, so that it can say so.
 
+use super::serial;
 use crate::address::Address;
 use crate::message::{MessageFormat, PAYLOAD_MAX, put};
 use crate::wire::{Layout, Unused};
@@ -16,6 +17,8 @@ pub enum UnansweredWish {
     Tune,
     /// Following a target: FOLLOW_TARGET (144).
     Follow,
+    /// A line for the shell, without the flag that wants a reply: SERIAL_CONTROL (126).
+    Shell,
 }
 
 const INJECT: Layout<GPS_INJECT_DATA_DATA, (Address, Unused<111>)> = Layout::NEW;
@@ -55,6 +58,7 @@ impl UnansweredWish {
                 TUNE_V2.write(&(kind, Address::default(), Unused), payload)
             }
             UnansweredWish::Follow => put(&FOLLOW_TARGET_DATA::DEFAULT, payload),
+            UnansweredWish::Shell => serial::write_line(payload),
         }
     }
 }

@@ -5,6 +5,7 @@
 mod component;
 mod file;
 mod log;
+mod stream;
 
 use crate::address::Address;
 use crate::message::{Fault, Message, MessageFormat, PAYLOAD_MAX};
@@ -14,7 +15,9 @@ pub use log::{LOG_DATA_MAX, LogData, LogEntry};
 use mavlink::MessageData;
 use mavlink::dialects::common::{
     COMPONENT_INFORMATION_DATA, COMPONENT_METADATA_DATA, FILE_TRANSFER_PROTOCOL_DATA, LOG_DATA_DATA, LOG_ENTRY_DATA,
+    LOGGING_DATA_ACKED_DATA, LOGGING_DATA_DATA,
 };
+pub use stream::{STREAM_DATA_MAX, StreamedLog};
 
 /// A message with data from storage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -31,6 +34,8 @@ pub enum Transfer {
     LogEntry(LogEntry),
     /// LOG_DATA (120).
     LogData(LogData),
+    /// LOGGING_DATA (266) or LOGGING_DATA_ACKED (267).
+    LogPart(StreamedLog),
     /// COMPONENT_METADATA (397).
     Metadata(ComponentMetadata),
     /// COMPONENT_INFORMATION (395), its predecessor, with nothing of peripherals.
@@ -43,6 +48,8 @@ impl Message for Transfer {
             FILE_TRANSFER_PROTOCOL_DATA::ID => file::LAYOUT.format(),
             LOG_ENTRY_DATA::ID => log::ENTRY.format(),
             LOG_DATA_DATA::ID => log::DATA.format(),
+            LOGGING_DATA_DATA::ID => stream::SENT.format(),
+            LOGGING_DATA_ACKED_DATA::ID => stream::ACKED.format(),
             COMPONENT_METADATA_DATA::ID => component::METADATA.format(),
             COMPONENT_INFORMATION_DATA::ID => component::INFORMATION.format(),
             _ => return None,
@@ -57,6 +64,8 @@ impl Message for Transfer {
             }
             LOG_ENTRY_DATA::ID => Transfer::LogEntry(LogEntry::read(payload)),
             LOG_DATA_DATA::ID => Transfer::LogData(LogData::read(payload)),
+            LOGGING_DATA_DATA::ID => Transfer::LogPart(StreamedLog::read(payload, false)),
+            LOGGING_DATA_ACKED_DATA::ID => Transfer::LogPart(StreamedLog::read(payload, true)),
             COMPONENT_METADATA_DATA::ID => Transfer::Metadata(ComponentMetadata::read(payload)),
             COMPONENT_INFORMATION_DATA::ID => Transfer::Information(ComponentMetadata::read_information(payload)),
             _ => return Err(Fault::Unknown),
@@ -68,6 +77,7 @@ impl Message for Transfer {
             Transfer::File { packet, to } => packet.write(*to, payload),
             Transfer::LogEntry(entry) => entry.write(payload),
             Transfer::LogData(data) => data.write(payload),
+            Transfer::LogPart(part) => part.write(payload),
             Transfer::Metadata(metadata) => metadata.write(payload),
             Transfer::Information(metadata) => metadata.write_information(payload),
         }

@@ -7,7 +7,7 @@ mod records;
 mod table;
 mod topics;
 
-pub(crate) use records::is_ulog;
+pub(crate) use records::{HEADER, Piece, each, is_ulog};
 
 use crate::recording::Recording;
 

@@ -3,7 +3,7 @@
 /// First bytes of every log, before its version.
 const MAGIC: [u8; 7] = *b"ULog\x01\x12\x35";
 /// Length of the header: magic, version, time.
-pub(super) const HEADER: usize = 16;
+pub(crate) const HEADER: usize = 16;
 /// Number of records one after the other that are no accident.
 const CHAIN: usize = 4;
 
@@ -14,7 +14,7 @@ pub(crate) fn is_ulog(bytes: &[u8]) -> bool {
 
 /// Where records end before the file does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum End {
+pub(crate) enum End {
     /// With the last byte.
     Whole,
     /// Within the record that begins at this byte.
@@ -24,7 +24,7 @@ pub(super) enum End {
 }
 
 /// A piece of a file.
-pub(super) enum Piece<'a> {
+pub(crate) enum Piece<'a> {
     /// A record, with length and kind.
     Record(&'a [u8]),
     /// So many bytes that are none.
@@ -64,7 +64,7 @@ fn chains(mut rest: &[u8]) -> bool {
 }
 
 /// Calls `take` with every piece after the header, and the byte at which it begins.
-pub(super) fn each(bytes: &[u8], mut take: impl FnMut(Piece<'_>, usize)) -> End {
+pub(crate) fn each(bytes: &[u8], mut take: impl FnMut(Piece<'_>, usize)) -> End {
     let mut at = HEADER;
     loop {
         let rest = bytes.get(at..).unwrap_or_default();

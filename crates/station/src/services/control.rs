@@ -132,6 +132,8 @@ pub fn is_needed_for(command: Command) -> bool {
         | Command::RequestProtocol
         | Command::RequestCapabilities
         | Command::CheckArming
+        | Command::StartLogStream
+        | Command::StopLogStream
         | Command::Denied(_)
         | Command::Other(_) => false,
     }

@@ -62,6 +62,8 @@ impl LogTransfer {
                 }
             }
             LogRequest::End | LogRequest::Erase => *self = LogTransfer::default(),
+            // Of a streamed log.
+            LogRequest::Received(_) => {}
         }
     }
 

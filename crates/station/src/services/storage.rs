@@ -140,6 +140,25 @@ pub trait LogStore {
     fn erase_logs(&mut self) -> bool;
 }
 
+/// The black box's log, made while it is sent. A vehicle that has none keeps the methods as they are.
+pub trait LogSource {
+    /// Begins a log; false if there is none.
+    fn start_log(&mut self) -> bool {
+        false
+    }
+
+    /// Ends it.
+    fn stop_log(&mut self) {}
+
+    /// Returns bytes of the log that wait; none if there are none now.
+    fn log_bytes(&self) -> &[u8] {
+        &[]
+    }
+
+    /// Removes so many of them.
+    fn consume_log(&mut self, _bytes: usize) {}
+}
+
 #[cfg(test)]
 #[allow(clippy::expect_used, reason = "a test that cannot go on should say why")]
 mod tests {

@@ -21,6 +21,7 @@ impl Unanswered {
             UnansweredWish::Corrections => "refused: RTK corrections are not used",
             UnansweredWish::Tune => "refused: there is no buzzer",
             UnansweredWish::Follow => "refused: targets are not followed",
+            UnansweredWish::Shell => "refused: there is no shell",
         })
     }
 }
@@ -31,9 +32,9 @@ mod tests {
 
     #[test]
     fn each_is_told_now_and_then() {
-        use UnansweredWish::{Corrections, Follow, Tune};
+        use UnansweredWish::{Corrections, Follow, Shell, Tune};
         let mut unanswered = Unanswered::default();
-        for (wish, word) in [(Corrections, "RTK"), (Tune, "buzzer"), (Follow, "followed")] {
+        for (wish, word) in [(Corrections, "RTK"), (Tune, "buzzer"), (Follow, "followed"), (Shell, "shell")] {
             assert!(unanswered.text(wish, 5).is_some_and(|text| text.contains(word)));
             assert_eq!(unanswered.text(wish, QUIET_US + 4), None);
             assert!(unanswered.text(wish, QUIET_US + 5).is_some());

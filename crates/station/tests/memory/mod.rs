@@ -2,7 +2,9 @@
 #![allow(dead_code, unreachable_pub, clippy::expect_used, clippy::indexing_slicing, reason = "shared by tests")]
 
 use afbc_link::FtpError;
-use afbc_station::services::storage::{DirectoryEntry, FileAccess, FileChange, FilePath, FileStore, LogInfo, LogStore};
+use afbc_station::services::storage::{
+    DirectoryEntry, FileAccess, FileChange, FilePath, FileStore, LogInfo, LogSource, LogStore,
+};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// A store of files, all of which may be changed, and of logs.
@@ -13,6 +15,9 @@ pub struct Memory {
     /// The file of each handle, while it is open.
     pub open: Vec<Option<String>>,
     pub logs: Vec<Vec<u8>>,
+    /// The log that is made while it is sent, if the vehicle makes one, and whether it does now.
+    pub made: Option<Vec<u8>>,
+    pub makes: bool,
     /// Changes carried out.
     pub changes: usize,
 }
@@ -180,4 +185,23 @@ pub fn bytes(count: usize, seed: u32) -> Vec<u8> {
         })
         .take(count)
         .collect()
+}
+
+impl LogSource for Memory {
+    fn start_log(&mut self) -> bool {
+        self.makes = self.made.is_some();
+        self.makes
+    }
+
+    fn stop_log(&mut self) {
+        self.makes = false;
+    }
+
+    fn log_bytes(&self) -> &[u8] {
+        self.made.as_ref().filter(|_| self.makes).map_or(&[], |made| made.as_slice())
+    }
+
+    fn consume_log(&mut self, bytes: usize) {
+        self.made.as_mut().expect("a log").drain(..bytes);
+    }
 }

@@ -1,0 +1,145 @@
+//! A memory card by SPI.
+
+use afbc_logger::embedded_sdmmc::sdcard::spi::AcquireOpts;
+use afbc_logger::embedded_sdmmc::{Block, BlockDevice, BlockIdx, SdCard, SdCardError};
+use afbc_logger::{CardError, LogCard};
+use core::slice;
+use embassy_stm32::Peri;
+use embassy_stm32::gpio::{Level, Output, Pin, Pull, Speed};
+use embassy_stm32::mode::Blocking;
+use embassy_stm32::spi::mode::Master;
+use embassy_stm32::spi::{self, MODE_0, Spi};
+use embassy_stm32::time::Hertz;
+use embedded_hal::delay::DelayNs;
+use embedded_hal::spi::{ErrorType, Operation, SpiDevice};
+
+/// Clock while a card starts, at most, and then \[Hz\] (SD Physical Layer Simplified Specification, 4.2.1 and 6.6.6).
+const START_HZ: u32 = 400_000;
+const MOST_HZ: u32 = 25_000_000;
+/// Bytes of clock before the first command: at least 74 bits (6.4.1).
+const WAKING: usize = 10;
+
+/// Returns the settings of an SPI with a card, whose answers rest high.
+pub fn config(hz: u32) -> spi::Config {
+    let mut config = spi::Config::default();
+    config.mode = MODE_0;
+    config.frequency = Hertz(hz);
+    config.miso_pull = Pull::Up;
+    config
+}
+
+/// A card that is alone on its SPI. Every call waits for it, by polling: the task must be below all others.
+pub struct SpiCard {
+    card: SdCard<CardBus, CoreDelay>,
+    kernel_hz: u32,
+}
+
+impl SpiCard {
+    /// The card behind a select pin, of an SPI fed with `kernel_hz`, by a core of `core_hz`.
+    pub fn new(
+        spi: Spi<'static, Blocking, Master>,
+        select: Peri<'static, impl Pin>,
+        kernel_hz: u32,
+        core_hz: u32,
+    ) -> Self {
+        let bus = CardBus { spi, select: Output::new(select, Level::High, Speed::VeryHigh) };
+        let delay = CoreDelay { cycles_per_us: core_hz / 1_000_000 };
+        // A card that is there answers the first of them, or the second.
+        let options = AcquireOpts { use_crc: true, acquire_retries: 1 };
+        SpiCard { card: SdCard::new_with_options(bus, delay, options), kernel_hz }
+    }
+
+    fn call<T>(
+        &self,
+        call: impl FnOnce(&SdCard<CardBus, CoreDelay>) -> Result<T, SdCardError>,
+    ) -> Result<T, CardError> {
+        let done = call(&self.card);
+        self.card.spi(CardBus::release);
+        done.map_err(|error| match error {
+            SdCardError::CardNotFound | SdCardError::TimeoutCommand(_) => CardError::Absent,
+            _ => CardError::Failed,
+        })
+    }
+}
+
+impl LogCard for SpiCard {
+    fn start(&mut self) -> Result<u32, CardError> {
+        self.card.mark_card_uninit();
+        let slow_hz = super::sensors::divided(self.kernel_hz, START_HZ);
+        self.card.spi(|bus| bus.wake(slow_hz));
+        let blocks = self.call(|card| card.num_blocks())?;
+        let fast_hz = super::sensors::divided(self.kernel_hz, MOST_HZ);
+        self.card.spi(|bus| bus.set_clock(fast_hz));
+        Ok(blocks.0)
+    }
+
+    fn read(&mut self, number: u32, block: &mut Block) -> Result<(), CardError> {
+        self.call(|card| card.read(slice::from_mut(block), BlockIdx(number)))
+    }
+
+    fn write(&mut self, number: u32, block: &Block) -> Result<(), CardError> {
+        self.call(|card| card.write(slice::from_ref(block), BlockIdx(number)))
+    }
+}
+
+/// The bus. The card stays selected from one transfer to the next: a command, its answer and its data are several, and
+/// belong together (7.2).
+struct CardBus {
+    spi: Spi<'static, Blocking, Master>,
+    select: Output<'static>,
+}
+
+impl CardBus {
+    fn set_clock(&mut self, hz: u32) {
+        // Nothing can be wrong with it.
+        let _ = self.spi.set_config(&config(hz));
+    }
+
+    /// Gives a card that has just got its supply the clock that it needs.
+    fn wake(&mut self, hz: u32) {
+        self.set_clock(hz);
+        self.select.set_high();
+        let _ = self.spi.blocking_write(&[0xFF_u8; WAKING]);
+    }
+
+    /// Ends a call; a card lets go of its line with the next byte of clock.
+    fn release(&mut self) {
+        self.select.set_high();
+        let _ = self.spi.blocking_write(&[0xFF_u8]);
+    }
+}
+
+impl ErrorType for CardBus {
+    type Error = spi::Error;
+}
+
+impl SpiDevice for CardBus {
+    fn transaction(&mut self, operations: &mut [Operation<'_, u8>]) -> Result<(), spi::Error> {
+        self.select.set_low();
+        for operation in operations {
+            match operation {
+                Operation::Read(into) => {
+                    // A card takes zeros for a command.
+                    into.fill(0xFF);
+                    self.spi.blocking_transfer_in_place(into)?;
+                }
+                Operation::Write(bytes) => self.spi.blocking_write(bytes)?,
+                Operation::Transfer(into, bytes) => self.spi.blocking_transfer(into, bytes)?,
+                Operation::TransferInPlace(bytes) => self.spi.blocking_transfer_in_place(bytes)?,
+                Operation::DelayNs(_) => (),
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Waits by counting; longer, when something else runs meanwhile.
+struct CoreDelay {
+    cycles_per_us: u32,
+}
+
+impl DelayNs for CoreDelay {
+    fn delay_ns(&mut self, ns: u32) {
+        cortex_m::asm::delay(ns.div_ceil(1000).saturating_mul(self.cycles_per_us));
+    }
+}

@@ -1,0 +1,225 @@
+//! The files on the card.
+
+use crate::block::LogBlock;
+use crate::card::{CardError, CardState, LogCard};
+use crate::volume::{Device, NoClock};
+use core::ops::ControlFlow;
+use embedded_sdmmc::{DirEntry, Error, Mode, RawDirectory, RawFile, ShortFileName, VolumeIdx, VolumeManager};
+
+/// Time after which what is written can be read, even if the power is cut \[us\].
+const SYNC_US: u64 = 500_000;
+/// Time between two attempts to start a card \[us\].
+const RETRY_US: u64 = 1_000_000;
+/// Beginning and extension of a log's name.
+const PREFIX: &[u8] = b"LOG";
+const EXTENSION: &[u8] = b"ULG";
+/// Digits of the least number, and the largest number whose name FAT can have.
+const DIGITS: usize = 3;
+const NUMBER_MAX: u32 = 99_999;
+
+type Volumes<'a> = VolumeManager<Device<'a>, NoClock, 1, 1, 1>;
+
+/// Keeps logs on a card.
+pub struct LogKeeper<'a> {
+    /// None only while it is exchanged.
+    volumes: Option<Volumes<'a>>,
+    root: Option<RawDirectory>,
+    file: Option<RawFile>,
+    state: CardState,
+    /// Number of the next log.
+    next: u32,
+    /// When it was called last, and when the card is tried again \[us\].
+    now_us: u64,
+    retry_us: u64,
+    /// When the file was written so that it can be read \[us\].
+    synced_us: u64,
+}
+
+impl<'a> LogKeeper<'a> {
+    /// Creates it, with nothing known of the card.
+    pub fn new(card: &'a mut dyn LogCard) -> Self {
+        LogKeeper {
+            volumes: Some(volumes(Device::new(card))),
+            root: None,
+            file: None,
+            state: CardState::Unknown,
+            next: 1,
+            now_us: 0,
+            retry_us: 0,
+            synced_us: 0,
+        }
+    }
+
+    /// Returns what is known of the card.
+    pub fn state(&self) -> CardState {
+        self.state
+    }
+
+    /// Looks after a card that is not ready, to be called several times a second while there is no block.
+    pub fn poll(&mut self, now_us: u64) {
+        self.now_us = now_us;
+        if self.root.is_none() && now_us >= self.retry_us {
+            self.retry_us = now_us.saturating_add(RETRY_US);
+            self.start();
+        }
+        self.sync(now_us);
+    }
+
+    /// Keeps a block. Without a file those up to the beginning of the next log are lost.
+    pub fn take(&mut self, now_us: u64, block: &LogBlock) {
+        self.now_us = now_us;
+        if block.begins() {
+            self.close();
+            self.synced_us = now_us;
+            if self.state == CardState::Ready {
+                self.attempt(Self::create);
+            }
+        }
+        if self.file.is_some() {
+            self.attempt(|keeper| {
+                let (volumes, file) = keeper.open()?;
+                volumes.write(file, block.bytes())
+            });
+        }
+        if block.ends() {
+            self.close();
+        }
+        self.sync(now_us);
+    }
+
+    /// Writes where the file ends, if it is time to.
+    fn sync(&mut self, now_us: u64) {
+        if self.file.is_some() && now_us.saturating_sub(self.synced_us) >= SYNC_US {
+            self.synced_us = now_us;
+            self.attempt(|keeper| {
+                let (volumes, file) = keeper.open()?;
+                volumes.flush_file(file)
+            });
+        }
+    }
+
+    /// Ends the file.
+    fn close(&mut self) {
+        if self.file.is_some() {
+            self.attempt(|keeper| {
+                let (volumes, file) = keeper.open()?;
+                let closed = volumes.close_file(file);
+                keeper.file = None;
+                closed
+            });
+        }
+    }
+
+    /// Starts the card, and counts its logs.
+    fn start(&mut self) {
+        let Some(volumes) = &self.volumes else { return };
+        // A full one stays so while it is there.
+        let started = volumes.device(|device| device.start());
+        let was_full = self.state == CardState::Full;
+        self.state = match started {
+            Ok(_) if was_full => CardState::Full,
+            Ok(true) => CardState::Ready,
+            Ok(false) => CardState::Foreign,
+            Err(CardError::Absent) => CardState::Absent,
+            Err(_) => CardState::Failed,
+        };
+        if self.state == CardState::Ready {
+            self.attempt(Self::open_root);
+        }
+    }
+
+    fn open_root(&mut self) -> Result<(), Error<CardError>> {
+        let volumes = self.volumes.as_ref().ok_or(Error::BadHandle)?;
+        let root = volumes.open_root_dir(volumes.open_raw_volume(VolumeIdx(0))?)?;
+        let mut last = 0;
+        volumes.iterate_dir(root, |entry| {
+            last = number(entry).unwrap_or(0).max(last);
+            ControlFlow::Continue(())
+        })?;
+        (self.root, self.next) = (Some(root), last.saturating_add(1));
+        Ok(())
+    }
+
+    /// Creates the next file.
+    fn create(&mut self) -> Result<(), Error<CardError>> {
+        let (Some(volumes), Some(root)) = (&self.volumes, self.root) else { return Err(Error::BadHandle) };
+        let name = log_name(self.next).ok_or(Error::DiskFull)?;
+        self.file = Some(volumes.open_file_in_dir(root, name, Mode::ReadWriteCreate)?);
+        self.next = self.next.saturating_add(1);
+        Ok(())
+    }
+
+    fn open(&self) -> Result<(&Volumes<'a>, RawFile), Error<CardError>> {
+        self.volumes.as_ref().zip(self.file).ok_or(Error::BadHandle)
+    }
+
+    /// Calls what needs the card; if that fails, gives up file and volume.
+    fn attempt(&mut self, call: impl FnOnce(&mut Self) -> Result<(), Error<CardError>>) {
+        if let Some(volumes) = &self.volumes {
+            volumes.device(|device| device.begin());
+        }
+        let done = call(self);
+        // Of some blocks that the card does not give, the library does not tell.
+        let failure = self.volumes.as_ref().and_then(|volumes| volumes.device(|device| device.failure()));
+        self.state = match (failure, done) {
+            (None, Ok(())) => return,
+            (Some(CardError::Absent), _) => CardState::Absent,
+            (Some(_), _) => CardState::Failed,
+            (None, Err(Error::DiskFull | Error::NotEnoughSpace)) => {
+                // What there is of it can be read.
+                self.end_full();
+                CardState::Full
+            }
+            (None, Err(_)) => CardState::Foreign,
+        };
+        (self.root, self.file) = (None, None);
+        // Not at once: the writer must see it, so that it begins anew.
+        self.retry_us = self.now_us.saturating_add(RETRY_US);
+        // With nothing open: what was is not to be written any more.
+        let device = self.volumes.take().map(|volumes| volumes.free().0);
+        self.volumes = device.map(volumes);
+    }
+
+    /// Ends the file of a full card.
+    fn end_full(&mut self) {
+        if let Ok((volumes, file)) = self.open() {
+            volumes.device(|device| device.begin());
+            let _ = volumes.close_file(file);
+        }
+    }
+}
+
+fn volumes(device: Device<'_>) -> Volumes<'_> {
+    VolumeManager::new_with_limits(device, NoClock, 1)
+}
+
+/// Returns the name of a log, `LOG001.ULG` of the first; none if FAT can have no name for that.
+pub fn log_name(number: u32) -> Option<ShortFileName> {
+    if number > NUMBER_MAX {
+        return None;
+    }
+    let mut name = *b"LOG00000.ULG";
+    let mut left = number;
+    for place in name.get_mut(PREFIX.len()..PREFIX.len() + 5)?.iter_mut().rev() {
+        *place = b'0' + (left % 10) as u8;
+        left /= 10;
+    }
+    let unneeded = match number {
+        0..=999 => 2,
+        1_000..=9_999 => 1,
+        _ => 0,
+    };
+    name.get_mut(PREFIX.len()..)?.rotate_left(unneeded);
+    let name = name.get(..name.len() - unneeded)?;
+    ShortFileName::create_from_str(core::str::from_utf8(name).ok()?).ok()
+}
+
+/// Returns the number of a log; none of any other entry.
+fn number(entry: &DirEntry) -> Option<u32> {
+    let digits = entry.name.base_name().strip_prefix(PREFIX)?;
+    let is_log = entry.name.extension() == EXTENSION && digits.len() >= DIGITS;
+    if !is_log || !digits.iter().all(u8::is_ascii_digit) {
+        return None;
+    }
+    core::str::from_utf8(digits).ok()?.parse().ok()
+}

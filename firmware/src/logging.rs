@@ -1,0 +1,215 @@
+//! The black box: ticks to blocks, in the links' task, and blocks to a memory card, in a task below all others, which
+//! may wait for the card. See [`afbc_logger`].
+
+use crate::aux_sensors;
+use crate::board::Board;
+use crate::recording::RecordedTick;
+use crate::vehicle::{Flight, NAME, ParameterTable};
+use afbc_logger::{BlockSink, CardError, CardState, LogBlock, LogCard, LogKeeper, LogWriter, embedded_sdmmc::Block};
+use afbc_onboard::parameters::RecordChange;
+use afbc_onboard::{ControlInputs, EscTelemetry, FlightView};
+use afbc_ulog::{LogStart, LoggedTick, TakenInputs};
+use core::array;
+use core::cell::RefCell;
+use core::sync::atomic::{AtomicBool, AtomicU8, Ordering};
+use embassy_futures::select::{Either, select};
+use embassy_sync::blocking_mutex::Mutex;
+use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
+use embassy_sync::zerocopy_channel::{Channel, Receiver, Sender};
+use embassy_time::{Instant, Timer};
+use static_cell::StaticCell;
+
+/// Blocks that wait for the card, at most: of a log of 140 kB/s those of 70 ms.
+const BLOCKS: usize = 20;
+/// Ticks whose views wait for the links' task, at most.
+const VIEWS: usize = 3;
+/// Time between two looks at a card without a log \[us\].
+const LOOK_US: u64 = 100_000;
+/// The control period \[us\].
+const PERIOD_US: u64 = 1_000;
+/// The law that every image flies: AFBC under its monitor.
+const LAW: &str = "afbc";
+
+/// The slot of a board without one.
+pub struct NoCard;
+
+impl LogCard for NoCard {
+    fn start(&mut self) -> Result<u32, CardError> {
+        Err(CardError::Absent)
+    }
+
+    fn read(&mut self, _: u32, _: &mut Block) -> Result<(), CardError> {
+        Err(CardError::Absent)
+    }
+
+    fn write(&mut self, _: u32, _: &Block) -> Result<(), CardError> {
+        Err(CardError::Absent)
+    }
+}
+
+/// What only the black box takes of a tick.
+#[derive(Clone)]
+pub struct TickView {
+    number: u32,
+    taken: TakenInputs,
+    view: FlightView,
+}
+
+type Views = Channel<'static, CriticalSectionRawMutex, TickView>;
+type ViewSender = Sender<'static, CriticalSectionRawMutex, TickView>;
+type Blocks = Channel<'static, CriticalSectionRawMutex, LogBlock>;
+
+/// What the log's task receives.
+pub type BlockReceiver = Receiver<'static, CriticalSectionRawMutex, LogBlock>;
+
+static WANTED: AtomicBool = AtomicBool::new(false);
+static CARD: AtomicU8 = AtomicU8::new(CardState::Unknown as u8);
+/// The control task's end of the views.
+static SENDER: Mutex<CriticalSectionRawMutex, RefCell<Option<ViewSender>>> = Mutex::new(RefCell::new(None));
+
+/// True if there is a log to be written.
+pub(crate) fn is_wanted() -> bool {
+    WANTED.load(Ordering::Relaxed)
+}
+
+fn card() -> CardState {
+    CardState::of(CARD.load(Ordering::Relaxed))
+}
+
+/// The control task's part.
+pub(crate) struct TickViews(ViewSender);
+
+impl TickViews {
+    /// Returns it, to be called once; none if there is no log.
+    pub(crate) fn take() -> Option<Self> {
+        SENDER.lock(|sender| sender.try_borrow_mut().ok()?.take()).map(TickViews)
+    }
+
+    /// Passes on what the flight knows after a tick. Out of line, since only boards with a card do.
+    #[cold]
+    #[inline(never)]
+    pub(crate) fn push(&mut self, number: u32, now_us: u64, taken: &TakenInputs, flight: &Flight) {
+        // Written in place, with interrupts on.
+        if let Some(slot) = self.0.try_send() {
+            *slot = TickView { number, taken: *taken, view: flight.view(now_us) };
+            self.0.send_done();
+        }
+    }
+}
+
+struct Queue(Sender<'static, CriticalSectionRawMutex, LogBlock>);
+
+impl BlockSink for Queue {
+    fn free(&mut self) -> Option<&mut LogBlock> {
+        self.0.try_send()
+    }
+
+    fn done(&mut self) {
+        self.0.send_done();
+    }
+}
+
+/// The links' task's part.
+pub struct CardLog {
+    writer: LogWriter,
+    queue: Queue,
+    views: Receiver<'static, CriticalSectionRawMutex, TickView>,
+    hardware: &'static str,
+}
+
+impl CardLog {
+    /// Creates it, before the first tick, and what the log's task receives; to be called once.
+    #[inline(never)]
+    pub(crate) fn begin<B: Board>() -> (&'static mut Self, BlockReceiver) {
+        static LOG: StaticCell<CardLog> = StaticCell::new();
+        static BLOCKS_HELD: StaticCell<[LogBlock; BLOCKS]> = StaticCell::new();
+        static VIEWS_HELD: StaticCell<[TickView; VIEWS]> = StaticCell::new();
+        static BLOCK_CHANNEL: StaticCell<Blocks> = StaticCell::new();
+        static VIEW_CHANNEL: StaticCell<Views> = StaticCell::new();
+        let empty =
+            || TickView { number: 0, taken: TakenInputs::of(&ControlInputs::EMPTY), view: FlightView::default() };
+        let views = VIEWS_HELD.init_with(|| array::from_fn(|_| empty()));
+        let (sender, views) = VIEW_CHANNEL.init_with(|| Channel::new(views)).split();
+        SENDER.lock(|place| place.try_borrow_mut().ok().map(|mut place| *place = Some(sender)));
+        let blocks = BLOCKS_HELD.init_with(|| [const { LogBlock::EMPTY }; BLOCKS]);
+        let (queue, receiver) = BLOCK_CHANNEL.init_with(|| Channel::new(blocks)).split();
+        let hardware = B::HARDWARE.strip_prefix("board-").unwrap_or(B::HARDWARE);
+        let log = LOG.init_with(|| CardLog { writer: LogWriter::new(), queue: Queue(queue), views, hardware });
+        (log, receiver)
+    }
+
+    /// Begins a tick of the links' task, of which this is the newest report. Returns a text for stations about the card
+    /// when there is something new, and whether it is a warning.
+    pub(crate) fn begin_tick(
+        &mut self,
+        now_us: u64,
+        armed: bool,
+        table: &ParameterTable,
+    ) -> Option<(&'static str, bool)> {
+        let wanted = self.writer.wants(now_us, armed, table.configuration().link.log_mode);
+        // Without a card that takes it, the ticks are not even passed on.
+        WANTED.store(wanted && card() == CardState::Ready, Ordering::Relaxed);
+        self.writer.news(card())
+    }
+
+    /// Writes a tick.
+    #[inline(never)]
+    pub(crate) fn tick(&mut self, tick: &RecordedTick, table: &ParameterTable, escs: &EscTelemetry) {
+        let CardLog { writer, views, hardware, .. } = self;
+        let RecordedTick { number, ref readings, ref report, .. } = *tick;
+        while let Some(view) = views.try_receive() {
+            // Of a tick that was dropped here.
+            let is_older = view.number.wrapping_sub(number) > u32::MAX / 2;
+            if view.number == number {
+                let origin = aux_sensors::frame_origin();
+                let start = LogStart { vehicle: NAME, law: LAW, hardware, ..LogStart::default() };
+                let tick =
+                    LoggedTick { report, readings, taken: view.taken, view: &view.view, escs: Some(escs), origin };
+                writer.tick(&tick, table, &start, card(), PERIOD_US);
+            }
+            if view.number == number || is_older {
+                views.receive_done();
+            }
+            if !is_older {
+                return;
+            }
+        }
+    }
+
+    /// Writes a change of the parameters.
+    pub(crate) fn change(&mut self, table: &ParameterTable, change: RecordChange) {
+        self.writer.change(table, change);
+    }
+
+    /// Writes the texts among the messages of a tick, and passes full blocks on.
+    #[inline(never)]
+    pub(crate) fn send(&mut self, now_us: u64, messages: &[u8]) {
+        let CardLog { writer, queue, .. } = self;
+        for (severity, text) in afbc_link::sent_texts(messages) {
+            writer.text(now_us, severity, text);
+        }
+        writer.send(queue, card());
+    }
+}
+
+/// Keeps logs on a card, for ever. Calls of the card wait for it: nothing else may be on this executor.
+pub async fn run(mut blocks: BlockReceiver, card: &mut dyn LogCard) -> ! {
+    let mut keeper = LogKeeper::new(card);
+    loop {
+        let look = Timer::at(Instant::from_micros(Instant::now().as_micros().wrapping_add(LOOK_US)));
+        let is_block = match select(blocks.receive(), look).await {
+            Either::First(block) => {
+                keeper.take(Instant::now().as_micros(), block);
+                true
+            }
+            Either::Second(()) => {
+                keeper.poll(Instant::now().as_micros());
+                false
+            }
+        };
+        if is_block {
+            blocks.receive_done();
+        }
+        CARD.store(keeper.state() as u8, Ordering::Relaxed);
+    }
+}
