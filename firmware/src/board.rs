@@ -38,6 +38,8 @@ pub trait Board: Sized + 'static {
     const INDICATES: bool = false;
     /// Index of the link that is meant for a radio receiver, if one is.
     const RADIO_LINK: Option<usize> = None;
+    /// True if it has a line for the telemetry of its motor controllers ([`escs`](crate::escs)).
+    const ESCS: bool = false;
     /// Restarts the chip into its boot loader, if it has one.
     const BOOT_LOADER: Option<fn() -> !> = None;
 

@@ -3,6 +3,7 @@
 use crate::aux_sensors;
 use crate::board::{Board, Links, Receiver as _, Transmitter as _};
 use crate::control;
+use crate::escs;
 use crate::indication;
 use crate::logging::CardLog;
 use crate::parameters;
@@ -12,13 +13,13 @@ use crate::samples::{self, Sampler as _};
 use crate::self_tests;
 use crate::ticks::{self, Tick};
 use crate::vehicle::ParameterTable;
-use afbc_onboard::ControlInputs;
 use afbc_onboard::parameters::RecordChange;
+use afbc_onboard::{ControlInputs, EscTelemetry};
 pub use afbc_station::Comms;
 use afbc_station::services::imus::{self, ImuNews};
 use afbc_station::services::signing::Signing;
 use afbc_station::services::status::SensorBits;
-use afbc_station::{AuxSensors, Calibrator, REPORT_MAX, Reboot, Setup};
+use afbc_station::{AuxSensors, Calibrator, EscAction, EscDesk, REPORT_MAX, Reboot, Setup};
 use core::array;
 use core::cell::RefCell;
 use core::future::poll_fn;
@@ -95,6 +96,7 @@ pub async fn run<B: Board, const OTHERS: usize>(
     let mut outgoing = Vec::<u8, REPORT_MAX>::new();
     let mut leaving = 0;
     let mut calibrator = B::Sampler::SENSES.then(calibrator);
+    let mut esc_desk = B::ESCS.then(|| escs::desk(table));
     loop {
         match select(receive(links, &mut incoming), ticks::next()).await {
             Either::First((link, length)) => {
@@ -157,6 +159,16 @@ pub async fn run<B: Board, const OTHERS: usize>(
                 let kept = if recording::is_possible::<B>() { log.as_deref_mut() } else { None };
                 let others = [kept.as_ref().map(|log| log.link()), radio.as_ref().and_then(|radio| radio.link())];
                 let changed = serve(comms, table, kept, &mut outgoing);
+                if B::ESCS
+                    && let Some(desk) = &mut esc_desk
+                {
+                    if changed.is_some() {
+                        desk.adopt(table.configuration());
+                    }
+                    if let Some(news) = listen_to_escs(comms, desk, &tick) {
+                        pass_on::<B>(&news, log);
+                    }
+                }
                 let told = links.each().iter_mut().enumerate().filter(|(index, _)| !others.contains(&Some(*index)));
                 told.for_each(|(_, link)| link.transmitter.transmit(&tick, &outgoing));
                 if comms.has_mail() {
@@ -173,7 +185,7 @@ pub async fn run<B: Board, const OTHERS: usize>(
                     radio.send(comms, &tick, links, table);
                 }
                 if recording::is_possible::<B>() {
-                    record::<B>(log, black_box, table);
+                    record::<B>(log, black_box, table, comms.esc_telemetry());
                     if let Some(log) = log {
                         log.send(&tick, links);
                     }
@@ -214,6 +226,7 @@ fn record<B: Board>(
     log: &mut Option<&'static mut ExactLog>,
     black_box: &mut Option<&'static mut CardLog>,
     table: &ParameterTable,
+    escs: &EscTelemetry,
 ) {
     while let Some(tick) = recording::pop() {
         if let Some(log) = log {
@@ -222,7 +235,7 @@ fn record<B: Board>(
         if B::HAS_CARD
             && let Some(black_box) = black_box
         {
-            black_box.tick(&tick, table);
+            black_box.tick(&tick, table, escs);
         }
     }
 }
@@ -273,6 +286,23 @@ fn report_self_tests(comms: &mut Comms, aux: &mut AuxSensors) {
         Some((text, false)) => comms.warn(text),
         None => (),
     }
+}
+
+/// Takes what the motor controllers have told, asks the next one and moves the notch; returns what the vehicle is to do
+/// about a rotor's failure. Out of line like the report.
+#[inline(never)]
+fn listen_to_escs(comms: &mut Comms, desk: &mut EscDesk, tick: &Tick) -> Option<ControlInputs> {
+    let mut heard = Vec::<u8, 32>::new();
+    while !heard.is_full()
+        && let Some(byte) = escs::heard()
+    {
+        // There is room.
+        let _ = heard.push(byte);
+    }
+    let EscAction { ask, notch, inputs } = comms.escs(desk, &heard, &tick.report);
+    ask.into_iter().for_each(escs::ask);
+    notch.into_iter().for_each(escs::move_notch);
+    inputs
 }
 
 /// Creates what calibrates, to be called once, by a board with sensors: the others do not have its memory.

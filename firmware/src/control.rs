@@ -1,6 +1,7 @@
 //! The control tick, 1000 times per second.
 
 use crate::board::Board;
+use crate::escs;
 use crate::logging::{self, TickViews};
 use crate::recording::{self, RecordedTick};
 use crate::samples::{self, Sampler as _};
@@ -71,8 +72,8 @@ pub fn make(configuration: &Configuration) -> &'static mut Flight {
 
 /// Runs the ticks.
 pub async fn run<B: Board>(flight: &mut Flight, board: &mut B) -> ! {
-    let (mut inputs, mut readings, mut seen, mut adopted) =
-        (ControlInputs::EMPTY, Readings::NONE, Seen::default(), None);
+    let (mut inputs, mut readings, mut seen) = (ControlInputs::EMPTY, Readings::NONE, Seen::default());
+    let (mut adopted, mut notch_rad_s) = (None, None);
     let mut views = if B::HAS_CARD { TickViews::take() } else { None };
     loop {
         // Not a ticker, whose periods begin when it is created: just after the start of a control period, when alarms
@@ -86,12 +87,16 @@ pub async fn run<B: Board>(flight: &mut Flight, board: &mut B) -> ! {
             if is_logged && let Some(views) = &mut views {
                 views.push(number, report.time_us, &taken, flight);
             }
-            recording::push(&RecordedTick { number, clock_failed, adopted, readings, battery: inputs.battery, report });
+            let battery = inputs.battery;
+            recording::push(&RecordedTick { number, clock_failed, adopted, notch_rad_s, readings, battery, report });
         }
         if B::Sampler::IS_REDUNDANT {
             samples::cross_check(flight, &readings);
         }
-        adopted = None;
+        (adopted, notch_rad_s) = (None, None);
+        if B::ESCS {
+            notch_rad_s = move_notch(flight);
+        }
         ARMED.store(report.mode.armed(), Ordering::Relaxed);
         if !report.mode.armed() {
             adopted = adopt(flight);
@@ -112,6 +117,14 @@ struct Seen {
     clock_failed: bool,
     /// What messages had brought for it.
     taken: TakenInputs,
+}
+
+/// Moves the notch, if it is to be moved; returns where to \[rad/s\]. Out of line, as below.
+#[inline(never)]
+fn move_notch(flight: &mut Flight) -> Option<f32> {
+    let notch = escs::moved_notch()?;
+    flight.move_notch(&notch);
+    Some(notch.centre_rad_s())
 }
 
 /// Takes over a configuration, if there is one, and returns its number. Out of line, since it is rare.

@@ -33,6 +33,7 @@ pub mod aux_sensors;
 pub mod board;
 pub mod comms;
 pub mod control;
+pub mod escs;
 pub mod executors;
 pub mod housekeeping;
 mod image;

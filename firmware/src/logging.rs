@@ -7,7 +7,7 @@ use crate::recording::RecordedTick;
 use crate::vehicle::{Flight, NAME, ParameterTable};
 use afbc_logger::{BlockSink, CardError, CardState, LogBlock, LogCard, LogKeeper, LogWriter, embedded_sdmmc::Block};
 use afbc_onboard::parameters::RecordChange;
-use afbc_onboard::{ControlInputs, FlightView};
+use afbc_onboard::{ControlInputs, EscTelemetry, FlightView};
 use afbc_ulog::{LogStart, LoggedTick, TakenInputs};
 use core::array;
 use core::cell::RefCell;
@@ -154,7 +154,7 @@ impl CardLog {
 
     /// Writes a tick.
     #[inline(never)]
-    pub(crate) fn tick(&mut self, tick: &RecordedTick, table: &ParameterTable) {
+    pub(crate) fn tick(&mut self, tick: &RecordedTick, table: &ParameterTable, escs: &EscTelemetry) {
         let CardLog { writer, views, hardware, .. } = self;
         let RecordedTick { number, ref readings, ref report, .. } = *tick;
         while let Some(view) = views.try_receive() {
@@ -163,7 +163,8 @@ impl CardLog {
             if view.number == number {
                 let origin = aux_sensors::frame_origin();
                 let start = LogStart { vehicle: NAME, law: LAW, hardware, ..LogStart::default() };
-                let tick = LoggedTick { report, readings, taken: view.taken, view: &view.view, origin };
+                let tick =
+                    LoggedTick { report, readings, taken: view.taken, view: &view.view, escs: Some(escs), origin };
                 writer.tick(&tick, table, &start, card(), PERIOD_US);
             }
             if view.number == number || is_older {

@@ -28,6 +28,8 @@ pub struct RecordedTick {
     pub clock_failed: bool,
     /// Number of the configuration that it was the first to fly, if any.
     pub adopted: Option<u16>,
+    /// Rotor speed at which the notch stands from it on, if it has moved \[rad/s\].
+    pub notch_rad_s: Option<f32>,
     /// What it took of the sensors.
     pub readings: Readings,
     /// What it took of the battery.
@@ -105,9 +107,9 @@ impl ExactLog {
     #[inline(never)]
     pub fn tick(&mut self, tick: &RecordedTick) {
         let ExactLog { recorder, bytes, .. } = self;
-        let RecordedTick { number, clock_failed, adopted, readings, battery, report } = *tick;
+        let RecordedTick { number, clock_failed, adopted, notch_rad_s, readings, battery, report } = *tick;
         let (time_us, given) = (report.time_us, Given::of(&report));
-        let record = TickRecord { number, time_us, clock_failed, readings, battery, adopted, given };
+        let record = TickRecord { number, time_us, clock_failed, readings, battery, adopted, notch_rad_s, given };
         recorder.tick(&record, &mut |frame| drop(bytes.extend_from_slice(frame)));
     }
 

@@ -108,7 +108,7 @@ fn the_firmware_knows_no_board() {
 fn the_wiring_is_what_the_board_uses() {
     for (board, page, heading, count) in [
         ("stm32f405", "firmware.md", "\n## Wiring", 8),
-        ("stm32h743", "boards/stm32h743.md", "\n## Wiring", 34),
+        ("stm32h743", "boards/stm32h743.md", "\n## Wiring", 36),
         ("pixracer", "boards/pixracer.md", "\n## Wiring", 32),
     ] {
         let text = fs::read_to_string(root().join("docs").join(page)).unwrap();
@@ -167,18 +167,20 @@ fn assert_once<T: Ord + std::fmt::Debug>(what: Vec<T>, board: &Path) {
 #[test]
 fn nothing_is_used_twice() {
     for (board, table) in kinds().0 {
-        let BoardTable { link, gnss, radio, imu, i2c, timers, card, .. } = &table;
+        let BoardTable { link, gnss, radio, escs, imu, i2c, timers, card, .. } = &table;
         let radio = radio.as_ref().map(|(uart, _)| &uart.name);
+        let escs = escs.as_ref().map(|escs| &escs.name);
         assert_once(table.pins(), &board);
-        let names = [&link.name, &gnss.name, &imu.name, &i2c.name];
+        let names = [&link.name, &gnss.name, &imu.name, &i2c.name].into_iter().chain(escs);
         let others = timers.iter().map(|timer| &timer.name).chain(card.iter().map(|card| &card.name));
-        assert_once(names.into_iter().chain(radio).chain(others).collect(), &board);
+        assert_once(names.chain(radio).chain(others).collect(), &board);
         let mut motors: Vec<_> = table.motors().map(|motor| motor.number).collect();
         motors.sort_unstable();
         assert_eq!(motors, (1..=table.outputs).collect::<Vec<_>>(), "{}", board.display());
         let streams = table.streams().into_iter().map(|stream| stream.line.clone());
         let lines =
             streams.chain(i2c.lines.clone()).chain([&link.name, &gnss.name, &imu.ready.line].map(String::clone));
+        let lines = lines.chain(escs.cloned());
         assert_once(lines.chain(radio.cloned()).chain(executors(&board)).collect(), &board);
     }
     for board in kinds().1 {
@@ -272,6 +274,7 @@ fn every_interrupt_has_the_priority_of_its_purpose() {
         ("$link", "UART"),
         ("$gnss", "UART"),
         ("$radio", "UART"),
+        ("$escs", "UART"),
         ("$spi_tx_line", "SAMPLING"),
         ("$spi_rx_line", "SAMPLING"),
         ("$exti_line", "SAMPLING"),

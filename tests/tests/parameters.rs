@@ -10,7 +10,7 @@ use afbc_flight_core::ArmingLimits;
 use afbc_flight_core::motor::{Curve, Response};
 use afbc_flight_core::protocol::MotorOutputs;
 use afbc_onboard::parameters::ParameterTable;
-use afbc_onboard::{Configuration, Link};
+use afbc_onboard::{Configuration, EscSettings, Link};
 use afbc_plant::instruments::{Accelerometer, Barometer, Gnss, Gyroscope, Imu, Magnetometer, TrackerModel};
 use afbc_plant::{Battery, Contact, Deviations, Drag, Dropouts, GroundEffect, Rotors, Sensing, Turbulence, Wind};
 use afbc_reader::words::{self, number};
@@ -133,6 +133,7 @@ fn groups() -> Vec<Group> {
         group("Motors: `[motor]` of a vehicle file", "MOT_", Curve::DEFAULT),
         group("Rotors, as flight software knows them", "MOT_", Response::DEFAULT),
         group("Outputs to the motor controllers", "MOT_", MotorOutputs::DEFAULT),
+        group("Telemetry of the motor controllers", "", EscSettings::DEFAULT),
         group("Inertial sensor: `[imu]` of a vehicle file", "IMU_", Mounting::DEFAULT),
         group("Calibration of the sensors, by the vehicle itself", "CAL_", SensorCalibration::DEFAULT),
         group("Arming: `[arming]` of a vehicle file", "ARM_", ArmingLimits::DEFAULT),

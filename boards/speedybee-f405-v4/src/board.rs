@@ -8,6 +8,7 @@ chip_stm32f4::flight_controller! {
     link: USART3 { tx: PC10, rx: PC11 },
     gnss: USART6 { tx: PC6, rx: PC7 },
     radio: USART2 { tx: PA2, rx: PA3, sbus: "SBUS" },
+    escs: UART5 { tx: PC12, rx: PD2 },
     imu: SPI1 {
         clock: PA5, out: PA7, in: PA6, select: PA4,
         dma: DMA2_CH3 by DMA2_STREAM3, DMA2_CH0 by DMA2_STREAM0,

@@ -124,7 +124,8 @@ impl Board for Stm32f405 {
 
 #[embassy_executor::task]
 async fn motors(mut motors: Motors<TIM8, DMA2_CH1, Irqs, u16>) {
-    motors.run(&THROTTLES).await
+    // No line for their telemetry.
+    motors.run(&THROTTLES, [None; CHANNELS]).await
 }
 
 /// Stops the motors' signals, whatever state the program is in.

@@ -17,6 +17,7 @@
 //! | compass | QMC5883L on I2C1, outside: SCL on PB6, SDA on PB7 |
 //! | battery | voltage on PC0, current on PC1: ADC1 |
 //! | GNSS receiver | u-blox or NMEA on USART2, outside: TX on PD5, RX on PD6 |
+//! | motor controllers' telemetry | RX of UART8: PE0 (pad Rx8); its TX, PE1, sends nothing |
 //! | LED, blue | PE3, lit if low |
 //! | buzzer | PA15: TIM2, channel 1 |
 
@@ -30,7 +31,7 @@ use chip_stm32::indicator::{Led, PassiveBuzzer};
 use chip_stm32::link::{self, Receiver, Transmitter};
 use chip_stm32::motors::{CHANNELS, MotorProtocol, Motors, Throttles, hold_low, pin, set_protocol};
 use chip_stm32::sensors::{Device, InterruptPin, Interrupted, Polled, StampHandler, interrupted};
-use chip_stm32::{crystal, faults, usb, watchdog};
+use chip_stm32::{crystal, escs, faults, usb, watchdog};
 use chip_stm32h7::flash::Words;
 use chip_stm32h7::{boot_loader, clocks, reset};
 use embassy_executor::SendSpawner;
@@ -40,7 +41,7 @@ use embassy_stm32::interrupt::typelevel::{EXTI2, EXTI15_10};
 use embassy_stm32::interrupt::{self, Interrupt, InterruptExt, Priority};
 use embassy_stm32::peripherals::{
     DMA1_CH0, DMA1_CH1, DMA1_CH2, DMA1_CH3, DMA1_CH4, DMA1_CH5, DMA1_CH6, DMA1_CH7, DMA2_CH0, DMA2_CH1, I2C1, I2C2,
-    IWDG1, TIM2, TIM4, TIM5, UART7, USART1, USART2, USB_OTG_FS,
+    IWDG1, TIM2, TIM4, TIM5, UART7, UART8, USART1, USART2, USB_OTG_FS,
 };
 use embassy_stm32::spi::Spi;
 use embassy_stm32::usart::{self, BufferedUart};
@@ -80,6 +81,7 @@ const OUTPUTS: usize = 2 * CHANNELS;
 bind_interrupts!(struct Irqs {
     UART7 => usart::BufferedInterruptHandler<UART7>;
     USART1 => usart::BufferedInterruptHandler<USART1>;
+    UART8 => usart::BufferedInterruptHandler<UART8>;
     DMA1_STREAM0 => dma::InterruptHandler<DMA1_CH0>;
     DMA1_STREAM1 => dma::InterruptHandler<DMA1_CH1>;
     USART2 => usart::BufferedInterruptHandler<USART2>;
@@ -103,6 +105,9 @@ bind_interrupts!(struct Irqs {
 /// Ring buffers of the links and of the GNSS receiver.
 static RX: [StaticCell<[u8; 1024]>; 3] = [const { StaticCell::new() }; 3];
 static TX: [StaticCell<[u8; 1024]>; 3] = [const { StaticCell::new() }; 3];
+/// The same of the motor controllers' line.
+static ESCS_RX: StaticCell<[u8; escs::RX_RING]> = StaticCell::new();
+static ESCS_TX: StaticCell<[u8; escs::TX_RING]> = StaticCell::new();
 
 /// Newest throttles, for the motors' tasks.
 static THROTTLES: [Throttles; 2] = [const { Throttles::new() }; 2];
@@ -129,6 +134,7 @@ impl Board for Stm32h743 {
     const HARDWARE: &'static str = env!("CARGO_PKG_NAME");
     const OUTPUTS: usize = OUTPUTS;
     const INDICATES: bool = true;
+    const ESCS: bool = true;
     const BOOT_LOADER: Option<fn() -> !> = Some(boot_loader::restart);
 
     fn after_reset() {
@@ -147,6 +153,12 @@ impl Board for Stm32h743 {
         let links = [first, second, link::of_usb(usb::start(p.USB_OTG_FS, p.PA12, p.PA11, Irqs))];
         interrupt::UART7.set_priority(Priority::from(priority::UART));
         interrupt::USART1.set_priority(Priority::from(priority::UART));
+
+        let (tx, rx) = (ESCS_TX.init([0; escs::TX_RING]), ESCS_RX.init([0; escs::RX_RING]));
+        let line = BufferedUart::new(p.UART8, p.PE0, p.PE1, tx, rx, Irqs, escs::config());
+        let line = line.expect("the baud rate divides the clock");
+        interrupt::UART8.set_priority(Priority::from(priority::UART));
+        executors::housekeeping().spawn(escs::listen(line).expect("spawned once"));
 
         let config = chip_stm32::sensors::spi(SPI_HZ);
         let first = Spi::new(p.SPI1, p.PA5, p.PD7, p.PA6, p.DMA1_CH3, p.DMA1_CH2, Irqs, config);
@@ -221,13 +233,13 @@ impl Board for Stm32h743 {
 #[embassy_executor::task]
 async fn motors_1_to_4(mut motors: Motors<TIM5, DMA1_CH0, Irqs, u32>) {
     let [throttles, _] = &THROTTLES;
-    motors.run(throttles).await
+    motors.run(throttles, [0, 1, 2, 3].map(Some)).await
 }
 
 #[embassy_executor::task]
 async fn motors_5_to_8(mut motors: Motors<TIM4, DMA1_CH1, Irqs, u16>) {
     let [_, throttles] = &THROTTLES;
-    motors.run(throttles).await
+    motors.run(throttles, [4, 5, 6, 7].map(Some)).await
 }
 
 #[embassy_executor::task]

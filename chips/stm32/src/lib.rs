@@ -6,6 +6,7 @@ pub mod boot_loader;
 pub mod candidates;
 pub mod card;
 pub mod crystal;
+pub mod escs;
 pub mod faults;
 pub mod indicator;
 pub mod link;

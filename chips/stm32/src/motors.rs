@@ -23,6 +23,7 @@ use embassy_sync::blocking_mutex::CriticalSectionMutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
 use embassy_time::{Instant, with_deadline};
+use firmware::escs;
 
 /// Most motors of a timer.
 pub const CHANNELS: usize = 4;
@@ -101,12 +102,13 @@ where
         Motors { timer, _pins: (first, second, third, fourth), clock, dma, irqs, rows }
     }
 
-    /// Sends each new set of throttles.
-    pub async fn run(&mut self, throttles: &Throttles) -> ! {
+    /// Sends each new set of throttles, and with a frame the question to the motor controller of a rotor that is
+    /// [asked](firmware::escs::asked), if one of the channels drives it: `rotors` are their rotors.
+    pub async fn run(&mut self, throttles: &Throttles, rotors: [Option<usize>; CHANNELS]) -> ! {
         // The protocol has been set when the first come.
         let first = throttles.wait().await;
         match PROTOCOL.lock(Cell::get).signal() {
-            MotorSignal::Frames(rate) => self.send_frames(rate, first, throttles).await,
+            MotorSignal::Frames(rate) => self.send_frames(rate, first, throttles, &rotors).await,
             MotorSignal::Pulses(format) => self.send_pulses(format, first, throttles).await,
         }
     }
@@ -124,19 +126,27 @@ where
         self.timer.start();
     }
 
-    async fn send_frames(&mut self, rate: DshotRate, first: [u16; CHANNELS], throttles: &Throttles) -> ! {
+    async fn send_frames(
+        &mut self,
+        rate: DshotRate,
+        first: [u16; CHANNELS],
+        throttles: &Throttles,
+        rotors: &[Option<usize>; CHANNELS],
+    ) -> ! {
         let timing = Timing::new(self.clock, rate);
         self.start(1, timing.period());
         let mut newest = first;
         loop {
-            self.send_frame(&timing, newest).await;
+            let channel = |rotor| rotors.iter().position(|other| *other == Some(rotor));
+            let asked = escs::asked(|rotor| channel(rotor).is_some()).and_then(channel);
+            self.send_frame(&timing, newest, asked).await;
             newest = throttles.wait().await;
         }
     }
 
     /// Sends one frame to each motor; takes 28 us at 600 kbit/s.
-    async fn send_frame(&mut self, timing: &Timing, throttles: [u16; CHANNELS]) {
-        encode(timing, throttles, &mut self.rows);
+    async fn send_frame(&mut self, timing: &Timing, throttles: [u16; CHANNELS], asked: Option<usize>) {
+        encode(timing, throttles, asked, &mut self.rows);
         let rows = self.rows.0.as_flattened();
         let dma = self.dma.reborrow();
         self.timer.enable_update_dma(true);
@@ -190,10 +200,15 @@ pub fn of_channels(motors: [usize; CHANNELS], outputs: &[u16]) -> [u16; CHANNELS
     motors.map(|motor| motor.checked_sub(1).and_then(|at| outputs.get(at)).copied().unwrap_or(0))
 }
 
+/// Returns the rotors of the channels of a timer: what the outputs with these numbers drive, none for the number 0.
+pub fn rotors_of_channels(motors: [usize; CHANNELS], rotors: &[usize]) -> [Option<usize>; CHANNELS] {
+    motors.map(|motor| motor.checked_sub(1).and_then(|at| rotors.get(at)).copied())
+}
+
 /// Encodes a frame for each channel. Out of line, like the control tick, to be counted.
 #[inline(never)]
-fn encode<W: Copy + From<u16>>(timing: &Timing, throttles: [u16; CHANNELS], rows: &mut Rows<W>) {
-    timing.rows(throttles, &mut rows.0);
+fn encode<W: Copy + From<u16>>(timing: &Timing, throttles: [u16; CHANNELS], asked: Option<usize>, rows: &mut Rows<W>) {
+    timing.rows(throttles, asked, &mut rows.0);
 }
 
 /// Holds pins of a port low, whatever state the program is in. Motor controllers then stop by themselves.

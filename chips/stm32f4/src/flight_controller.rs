@@ -3,6 +3,7 @@
 /// Implements [`Board`](firmware::board::Board) for `FlightController`, a usual flight controller with a STM32F405 or a
 /// relative, and defines `stop_motors`. The crate names all of its dependencies.
 ///
+/// * `escs` is the UART whose RX is wired to the motor controllers' telemetry, if one is; its TX sends nothing.
 /// * USB is on PA11 and PA12, as on every chip of the kind.
 /// * Each peripheral has its DMA's streams, as `DMA1_CH6` for stream 6, with their interrupts.
 /// * The IMU's interrupt has a pin, the line of the pin's number, as `EXTI5`, and that one's interrupt, as `EXTI9_5`.
@@ -25,6 +26,7 @@ macro_rules! flight_controller {
         link: $link:ident { tx: $link_tx:ident, rx: $link_rx:ident },
         gnss: $gnss:ident { tx: $gnss_tx:ident, rx: $gnss_rx:ident },
         $(radio: $radio:ident { tx: $radio_tx:ident, rx: $radio_rx:ident, sbus: $sbus:literal },)?
+        $(escs: $escs:ident { tx: $escs_tx:ident, rx: $escs_rx:ident },)?
         imu: $spi:ident {
             clock: $sck:ident, out: $mosi:ident, in: $miso:ident, select: $select:ident,
             dma: $spi_tx:ident by $spi_tx_line:ident, $spi_rx:ident by $spi_rx_line:ident,
@@ -52,6 +54,7 @@ macro_rules! flight_controller {
             $link => usart::BufferedInterruptHandler<peripherals::$link>;
             $gnss => usart::BufferedInterruptHandler<peripherals::$gnss>;
             $($radio => usart::BufferedInterruptHandler<peripherals::$radio>;)?
+            $($escs => usart::BufferedInterruptHandler<peripherals::$escs>;)?
             $spi_tx_line => embassy_stm32::dma::InterruptHandler<peripherals::$spi_tx>;
             $spi_rx_line => embassy_stm32::dma::InterruptHandler<peripherals::$spi_rx>;
             $exti_line => chip_stm32::sensors::StampHandler<embassy_stm32::interrupt::typelevel::$exti_line>,
@@ -72,6 +75,7 @@ macro_rules! flight_controller {
                 (Interrupt::$link, priority::UART),
                 (Interrupt::$gnss, priority::UART),
                 $((Interrupt::$radio, priority::UART),)?
+                $((Interrupt::$escs, priority::UART),)?
                 (Interrupt::$spi_tx_line, priority::SAMPLING),
                 (Interrupt::$spi_rx_line, priority::SAMPLING),
                 (Interrupt::$exti_line, priority::SAMPLING),
@@ -106,6 +110,10 @@ macro_rules! flight_controller {
             const OUTPUTS: usize = $outputs;
             const INDICATES: bool = true;
             const RADIO_LINK: Option<usize> = if LINKS > 2 { Some(2) } else { None };
+            const ESCS: bool = {
+                let escs: &[&str] = &[$(stringify!($escs))?];
+                !escs.is_empty()
+            };
             const HARDWARE: &'static str = env!("CARGO_PKG_NAME");
             const HAS_CARD: bool = chip_stm32f4::flight_controller!(@has_card $($card)?);
             const BOOT_LOADER: Option<fn() -> !> = Some(chip_stm32f4::boot_loader::restart);
@@ -149,6 +157,16 @@ macro_rules! flight_controller {
                     let (tx, rx) = (RADIO_TX.init([0; RADIO_RINGS[0]]), RADIO_RX.init([0; RADIO_RINGS[1]]));
                     let config = chip_stm32::link::config();
                     let radio = BufferedUart::new(p.$radio, p.$radio_rx, p.$radio_tx, tx, rx, Irqs, config);
+                )?
+                $(
+                    static ESCS_RX: StaticCell<[u8; chip_stm32::escs::RX_RING]> = StaticCell::new();
+                    static ESCS_TX: StaticCell<[u8; chip_stm32::escs::TX_RING]> = StaticCell::new();
+                    let tx = ESCS_TX.init([0; chip_stm32::escs::TX_RING]);
+                    let rx = ESCS_RX.init([0; chip_stm32::escs::RX_RING]);
+                    let config = chip_stm32::escs::config();
+                    let line = BufferedUart::new(p.$escs, p.$escs_rx, p.$escs_tx, tx, rx, Irqs, config);
+                    let line = line.expect("the baud rate divides the clock");
+                    firmware::executors::housekeeping().spawn(chip_stm32::escs::listen(line).expect("spawned once"));
                 )?
 
                 let kernel_hz = embassy_stm32::rcc::frequency::<peripherals::$spi>().0;
@@ -241,10 +259,16 @@ macro_rules! flight_controller {
 
                 #[embassy_executor::task]
                 pub(super) async fn run(mut motors: chip_stm32::motors::Motors<$timer, $dma, super::Irqs, $word>) {
-                    motors.run(&THROTTLES).await
+                    let numbers = [$(chip_stm32f4::flight_controller!(@motor $channel)),+];
+                    let rotors: [usize; $outputs] = chip_stm32::motors::rotors_of_outputs(
+                        chip_stm32::motors::numbering::$numbering,
+                        &firmware::vehicle::CONFIGURATION.airframe.rotors,
+                    );
+                    motors.run(&THROTTLES, chip_stm32::motors::rotors_of_channels(numbers, &rotors)).await
                 }
             }
         )+
+
 
         #[embassy_executor::task]
         async fn indicator(led: Option<chip_stm32::indicator::Led>, buzzer: chip_stm32::indicator::ActiveBuzzer) -> ! {

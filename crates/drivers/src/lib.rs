@@ -25,6 +25,7 @@
 //! | magnetometer | [`ist8310`], [`lis3mdl`], [`qmc5883l`] |
 //! | GNSS receiver | [`ublox`], [`nmea`] |
 //! | battery | [`battery`] |
+//! | motor controllers | [`esc_telemetry`] |
 #![no_std]
 #![forbid(unsafe_code)]
 
@@ -38,6 +39,7 @@ mod bus;
 pub mod data_ready;
 pub mod dps310;
 mod driver;
+pub mod esc_telemetry;
 pub mod icm426xx;
 pub mod ist8310;
 pub mod lis3mdl;

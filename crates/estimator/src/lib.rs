@@ -139,7 +139,7 @@ pub use imu::{ImuHealth, MISSING_US};
 pub use inertial::Inertial;
 pub use measurement::{ImuSample, Measurement};
 pub use memory::Memory;
-pub use output_filter::OutputFilter;
+pub use output_filter::{OutputFilter, VelocityNotch};
 pub use settings::Settings;
 
 #[cfg(test)]

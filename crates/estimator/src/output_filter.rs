@@ -28,7 +28,7 @@ const NOTCH_MAX_RAD_S: f32 = 100.0 * TAU;
 /// The default has no notch, and is that before the first estimate.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct OutputFilter {
-    notch: Option<Notch>,
+    notch: Option<VelocityNotch>,
     /// Time of the last estimate, if its position was valid \[us\].
     last_us: Option<u64>,
     /// Estimate less the state that was output.
@@ -38,9 +38,10 @@ pub struct OutputFilter {
     sums: Option<(Vector3<f32>, Vector3<f32>)>,
 }
 
-/// Notch filter of second order (bilinear transform) for one kilohertz.
+/// Notch of second order (bilinear transform) at one kilohertz, in the velocity that a controller gets.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Notch {
+pub struct VelocityNotch {
+    centre_rad_s: f32,
     /// b0 = b2.
     b0: f32,
     /// b1 = a1.
@@ -48,17 +49,37 @@ struct Notch {
     a2: f32,
 }
 
-impl Notch {
-    fn new(centre_rad_s: f32) -> Self {
-        let k = tan(0.5e-3 * centre_rad_s);
-        let norm = 1.0 / (1.0 + k / QUALITY + k * k);
-        Notch { b0: (1.0 + k * k) * norm, b1: 2.0 * (k * k - 1.0) * norm, a2: (1.0 - k / QUALITY + k * k) * norm }
+impl VelocityNotch {
+    /// Creates the one at this rotor speed; none outside of 10 to 100 Hz \[rad/s\].
+    #[must_use]
+    pub fn at(centre_rad_s: f32) -> Option<Self> {
+        (NOTCH_MIN_RAD_S..=NOTCH_MAX_RAD_S).contains(&centre_rad_s).then(|| {
+            let k = tan(0.5e-3 * centre_rad_s);
+            let norm = 1.0 / (1.0 + k / QUALITY + k * k);
+            let (b0, b1) = ((1.0 + k * k) * norm, 2.0 * (k * k - 1.0) * norm);
+            VelocityNotch { centre_rad_s, b0, b1, a2: (1.0 - k / QUALITY + k * k) * norm }
+        })
+    }
+
+    /// Returns the rotor speed that it removes \[rad/s\].
+    #[must_use]
+    pub fn centre_rad_s(&self) -> f32 {
+        self.centre_rad_s
+    }
+
+    /// Returns what the sums of `from`, which it follows, become: for a constant velocity both sums are b0 - a2 times
+    /// that velocity, which so goes on without a step.
+    fn take_over(&self, from: &Self, sums: &mut Option<(Vector3<f32>, Vector3<f32>)>) {
+        let ratio = (self.b0 - self.a2) / (from.b0 - from.a2);
+        if let Some((first, second)) = sums {
+            (*first, *second) = (*first * ratio, *second * ratio);
+        }
     }
 
     /// Filters one more value; the first one passes as it is.
     #[inline]
     fn pass(&self, sums: &mut Option<(Vector3<f32>, Vector3<f32>)>, input: &Vector3<f32>) -> Vector3<f32> {
-        let Notch { b0, b1, a2 } = *self;
+        let VelocityNotch { b0, b1, a2, .. } = *self;
         let (first, second) = sums.unwrap_or_else(|| (input * (b0 - a2), input * (b0 - a2)));
         let output = input * b0 + first;
         *sums = Some(((input - output) * b1 + second, input * b0 - output * a2));
@@ -75,8 +96,23 @@ impl OutputFilter {
 
     /// Creates the one for rotors that turn at this speed in hover \[rad/s\].
     fn new(hover_rad_s: f32) -> Self {
-        let has_notch = (NOTCH_MIN_RAD_S..=NOTCH_MAX_RAD_S).contains(&hover_rad_s);
-        OutputFilter { notch: has_notch.then(|| Notch::new(hover_rad_s)), ..OutputFilter::default() }
+        OutputFilter { notch: VelocityNotch::at(hover_rad_s), ..OutputFilter::default() }
+    }
+
+    /// Returns the notch, if there is one.
+    #[must_use]
+    pub fn notch(&self) -> Option<&VelocityNotch> {
+        self.notch.as_ref()
+    }
+
+    /// Moves the notch from the next step on, without a step in a constant velocity; nothing without one. Beside
+    /// [`step`](Self::step), and seldom: what the sums know of the vibration is that of the old place for a period or
+    /// two.
+    pub fn move_notch(&mut self, to: &VelocityNotch) {
+        if let Some(notch) = &mut self.notch {
+            to.take_over(notch, &mut self.sums);
+            *notch = *to;
+        }
     }
 
     /// Returns the state to output for this estimate; to be called every millisecond. Nothing is hidden of an estimate
@@ -110,7 +146,7 @@ impl OutputFilter {
 
 #[cfg(test)]
 mod tests {
-    use super::{NOTCH_MAX_RAD_S, OutputFilter};
+    use super::{NOTCH_MAX_RAD_S, OutputFilter, VelocityNotch};
     use crate::estimate::{Estimate, Validity};
     use afbc_types::Parameters;
 
@@ -206,5 +242,39 @@ mod tests {
         for hover_rad_s in [0.0, 30.0, NOTCH_MAX_RAD_S + 1.0, f32::NAN] {
             assert_eq!(OutputFilter::new(hover_rad_s), OutputFilter::default());
         }
+    }
+
+    /// A notch that moves with the rotors hides them as well as one that stands where they are; a constant velocity
+    /// passes unchanged, however often and far it moves.
+    #[test]
+    fn a_notch_that_moves_follows_and_makes_no_step() {
+        let (from, to) = (150.0_f32, 250.0_f32);
+        let (mut filter, mut phase, mut worst) = (OutputFilter::new(from), 0.0_f32, 0.0_f32);
+        for ms in 0..10_000 {
+            let speed = from + (to - from) * (ms as f32 * 1e-4).min(1.0);
+            phase = (phase + 1e-3 * speed) % core::f32::consts::TAU;
+            if ms % 10 == 0 {
+                filter.move_notch(&VelocityNotch::at(speed).expect("in range"));
+            }
+            let mut estimate = estimate(ms, 0.0, 0.0);
+            estimate.state.velocity_m_s.x = phase.sin();
+            let told = filter.step(&estimate).velocity_m_s.x;
+            worst = if ms > 500 { worst.max(told.abs()) } else { 0.0 };
+        }
+        assert!(worst < 0.03, "{worst}");
+        let stood = told(OutputFilter::new(from), to);
+        assert!(stood > 0.4, "{stood}");
+
+        let mut filter = OutputFilter::new(200.0);
+        for ms in 0..5_000_u64 {
+            let speed = if ms % 7 == 0 { 65.0 } else { 600.0 };
+            filter.move_notch(&VelocityNotch::at(speed).expect("in range"));
+            let mut estimate = estimate(ms, 0.0, 0.0);
+            estimate.state.velocity_m_s.x = 5.0;
+            assert!((filter.step(&estimate).velocity_m_s.x - 5.0).abs() < 1e-3, "{ms}");
+        }
+        let mut none = OutputFilter::default();
+        none.move_notch(&VelocityNotch::at(200.0).expect("in range"));
+        assert_eq!(none, OutputFilter::default());
     }
 }

@@ -16,7 +16,7 @@ pub enum DshotRate {
     Dshot600 = 600_000,
 }
 
-/// A frame: 11 bits of throttle, the telemetry request (always off), 4 bits of checksum; sent from the highest bit.
+/// A frame: 11 bits of throttle, the telemetry request, 4 bits of checksum; sent from the highest bit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct DshotFrame(u16);
 
@@ -28,7 +28,25 @@ impl DshotFrame {
             crate::motor::THROTTLE_MIN..=crate::motor::THROTTLE_MAX => throttle,
             _ => 0,
         };
-        let data = throttle << 1;
+        Self::of(throttle << 1)
+    }
+
+    /// Returns the same frame with the request that the motor controller sends its telemetry, once, over the serial
+    /// line.
+    #[must_use]
+    pub const fn asking(self) -> Self {
+        Self::of(self.0 >> 4 | 1)
+    }
+
+    /// Returns the same frame for bidirectional DSHOT: with a complemented checksum, on which a motor controller
+    /// recognises it. The whole frame is sent with the line inverted.
+    #[must_use]
+    pub const fn bidirectional(self) -> Self {
+        DshotFrame(self.0 ^ 0xF)
+    }
+
+    /// Adds the checksum to the twelve bits before it.
+    const fn of(data: u16) -> Self {
         let checksum = (data ^ (data >> 4) ^ (data >> 8)) & 0xF;
         DshotFrame(data << 4 | checksum)
     }
@@ -66,9 +84,18 @@ impl Timing {
     }
 
     /// Computes the compare values of several motors: a row for each bit, a column for each motor, each column a
-    /// [waveform](Self::waveform).
-    pub fn rows<const N: usize, W: Copy + From<u16>>(&self, throttles: [u16; N], rows: &mut [[W; N]; 17]) {
-        let mut frames = throttles.map(|throttle| DshotFrame::new(throttle).bits());
+    /// [waveform](Self::waveform). The motor controller with the index `asked` is asked for its telemetry.
+    pub fn rows<const N: usize, W: Copy + From<u16>>(
+        &self,
+        throttles: [u16; N],
+        asked: Option<usize>,
+        rows: &mut [[W; N]; 17],
+    ) {
+        let mut frames = throttles.map(DshotFrame::new);
+        if let Some(frame) = asked.and_then(|asked| frames.get_mut(asked)) {
+            *frame = frame.asking();
+        }
+        let mut frames = frames.map(DshotFrame::bits);
         let [bits @ .., last] = rows;
         for row in bits {
             *row = frames.map(|bits| W::from(self.pulse(bits & 0x8000 != 0)));

@@ -15,7 +15,8 @@
 //! 5. [`dead_reckoning`]: flight without measurements; [`observer`]: flight on poses alone; [`descent`]: descent with
 //!    measurements.
 //! 6. [`rate`]: supervision of the tick rate.
-//! 7. [`motor`]: throttle curve; [`protocol`]: the way to the motor controllers, by [`dshot`] or [`pulse`].
+//! 7. [`motor`]: throttle curve; [`protocol`]: the way to the motor controllers, by [`dshot`] or [`pulse`], and
+//!    back, by [`dshot_reply`].
 #![no_std]
 
 mod armed;
@@ -23,6 +24,7 @@ pub mod clock;
 pub mod dead_reckoning;
 pub mod descent;
 pub mod dshot;
+pub mod dshot_reply;
 pub mod fall_check;
 pub mod frozen_tracker;
 pub mod inbox;

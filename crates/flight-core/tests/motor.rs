@@ -77,6 +77,12 @@ fn frames_by_hand() {
     ] {
         assert_eq!(DshotFrame::new(throttle).bits(), bits, "{throttle}");
     }
+    // 1046 with telemetry: 0x82D, checksum 8 ^ 2 ^ D = 7. A stopped motor's controller can be asked, too.
+    assert_eq!(DshotFrame::new(1046).asking().bits(), 0x82D7);
+    assert_eq!(DshotFrame::new(1046).asking().asking().bits(), 0x82D7);
+    assert_eq!(DshotFrame::new(0).asking().bits(), 0x0011);
+    // 1046 on bidirectional DSHOT: checksum not 6 but 9.
+    assert_eq!(DshotFrame::new(1046).bidirectional().bits(), 0x82C9);
 }
 
 #[test]
@@ -143,21 +149,28 @@ proptest! {
 
     /// Frames pass a receiver's check, and the waveform has the frame's bits.
     #[test]
-    fn waveforms_decode(throttle in 48u16..=2047) {
+    fn waveforms_decode(throttle in 48u16..=2047, asks in any::<bool>()) {
         let timing = timing(84_000_000, DshotRate::Dshot600);
-        let pulses = timing.waveform(DshotFrame::new(throttle));
+        let frame = DshotFrame::new(throttle);
+        let pulses = timing.waveform(if asks { frame.asking() } else { frame });
         let bits = pulses.iter().take(16).fold(0u16, |bits, &pulse| bits << 1 | u16::from(pulse > 79));
-        prop_assert_eq!(bits >> 5, throttle);
+        prop_assert_eq!((bits >> 5, bits >> 4 & 1), (throttle, u16::from(asks)));
         prop_assert_eq!((bits ^ bits >> 4 ^ bits >> 8 ^ bits >> 12) & 0xF, 0);
     }
 
     /// The four columns of a burst are the motors' waveforms, whatever the rows contained before.
     #[test]
-    fn rows_are_waveforms_side_by_side(throttles in any::<[u16; 4]>(), before in any::<u16>()) {
+    fn rows_are_waveforms_side_by_side(
+        throttles in any::<[u16; 4]>(), before in any::<u16>(), asked in proptest::option::of(0..6_usize),
+    ) {
         let timing = timing(168_000_000, DshotRate::Dshot600);
         let mut rows = [[before; 4]; 17];
-        timing.rows(throttles, &mut rows);
-        let waveforms = throttles.map(|throttle| timing.waveform(DshotFrame::new(throttle)));
+        timing.rows(throttles, asked, &mut rows);
+        let mut frames = throttles.map(DshotFrame::new);
+        for (_, frame) in frames.iter_mut().enumerate().filter(|(at, _)| asked == Some(*at)) {
+            *frame = frame.asking();
+        }
+        let waveforms = frames.map(|frame| timing.waveform(frame));
         for (column, waveform) in waveforms.iter().enumerate() {
             let played = rows.map(|row| row.get(column).copied().unwrap_or_default());
             prop_assert_eq!(&played, waveform);

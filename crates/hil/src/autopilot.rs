@@ -2,6 +2,7 @@
 
 use super::Error;
 use afbc_onboard::Readings;
+use afbc_plant::Plant;
 
 /// Receives the link's bytes and answers with bytes.
 pub trait Autopilot {
@@ -10,6 +11,9 @@ pub trait Autopilot {
     fn sense(&mut self, _readings: &Readings) -> bool {
         false
     }
+
+    /// Lets the motor controllers of `plant` answer before the next [`exchange`](Self::exchange), if they reach it.
+    fn turn_rotors(&mut self, _plant: &Plant) {}
 
     /// Runs one millisecond of the loop: sends `uplink`, and passes the bytes received to `hear`, in pieces of any
     /// size.

@@ -170,6 +170,7 @@ impl<A: Autopilot> Line<'_, A> {
         }
         *now_ms += 1;
 
+        autopilot.turn_rotors(world.plant());
         let (uplink, heard_before) = (station.take(), station.heard().rotor_commands);
         autopilot.exchange(&uplink, &mut |bytes| station.hear(bytes))?;
         *silent_ms = if station.heard().rotor_commands == heard_before { *silent_ms + 1 } else { 0 };

@@ -4,6 +4,7 @@ use super::{Autopilot, Error};
 use crate::host_black_box::{HostBlackBox, Sink};
 use crate::metadata::MetadataFiles;
 use crate::served_files::{OpenFile, ServedFiles};
+use crate::simulated_escs::SimulatedEscs;
 use crate::ulog_files::StoredLogs;
 use afbc_calibration::RawSample;
 use afbc_estimator::Origin;
@@ -11,12 +12,15 @@ use afbc_files::Flash;
 use afbc_flight_core::rate::PERIOD_US;
 use afbc_link::{Decoder, Uplink};
 use afbc_onboard::parameters::{Kept, ParameterTable, Reason, RecordChange};
-use afbc_onboard::{Configuration, ControlInputs, Flight, ImuSelector, Link, Prepare, RawReadings, Readings, Report};
+use afbc_onboard::{
+    Configuration, ControlInputs, EscTelemetry, Flight, ImuSelector, Link, Prepare, RawReadings, Readings, Report,
+};
+use afbc_plant::Plant;
 use afbc_recorder::{Given, Recorder, TickRecord};
 use afbc_scenario::contender::{ControllerKind, Law};
 use afbc_scenario::{AnyController, FlownLaw};
 use afbc_station::services::signing::{Signing, SigningRecord};
-use afbc_station::{Calibrator, Comms, RadioControl, Setup, Transfers};
+use afbc_station::{Calibrator, Comms, EscAction, EscDesk, RadioControl, Setup, Transfers};
 use afbc_store::Store;
 use afbc_types::{OutOfRange, ROTORS_MAX, with_rotors};
 use afbc_ulog::{BlackBox, LogStart, TakenInputs};
@@ -32,6 +36,11 @@ pub struct Host {
     taken: ControlInputs,
     readings: Readings,
     radio: Box<RadioControl>,
+    /// What has come over the motor controllers' line since the last tick.
+    escs: Vec<u8>,
+    /// Rotor whose motor controller the last tick has asked.
+    asks_esc: Option<u8>,
+    simulated_escs: SimulatedEscs,
     calibrator: Box<Calibrator>,
     /// What the sensors have read while somebody wants to know.
     raw: RawReadings,
@@ -60,6 +69,8 @@ struct ExactLog {
     write: Sink,
     /// Number of the configuration that the next tick flies, if it is another.
     adopted: Option<u16>,
+    /// Where the notch stands from the next tick on, if it has moved \[rad/s\].
+    notch_rad_s: Option<f32>,
 }
 
 /// The half that decides, of a vehicle with any number of rotors, and its parameters.
@@ -70,7 +81,7 @@ trait Core {
         inputs: &mut ControlInputs,
         readings: &Readings,
         tell: Tell<'_>,
-    ) -> Report<ROTORS_MAX>;
+    ) -> (Report<ROTORS_MAX>, EscAction);
 
     fn cross_check(&self, selector: &mut ImuSelector, readings: &Readings);
 
@@ -100,8 +111,8 @@ trait Core {
         &self,
         black_box: &mut HostBlackBox,
         report: &Report<ROTORS_MAX>,
-        readings: &Readings,
-        taken: TakenInputs,
+        took: (&Readings, TakenInputs),
+        escs: &EscTelemetry,
         change: Option<RecordChange>,
     );
 
@@ -114,6 +125,8 @@ struct Aircraft<const N: usize> {
     flight: Flight<N, AnyController<N>>,
     table: ParameterTable<N>,
     law: FlownLaw,
+    /// The motor controllers' line.
+    escs: EscDesk,
 }
 
 /// What reports a tick that took so long.
@@ -121,6 +134,8 @@ struct Tell<'a> {
     comms: &'a mut Comms,
     tick_us: f32,
     send: &'a mut dyn FnMut(&[u8]),
+    /// What has come over the motor controllers' line.
+    escs: &'a [u8],
 }
 
 impl<const N: usize> Core for Aircraft<N> {
@@ -130,10 +145,12 @@ impl<const N: usize> Core for Aircraft<N> {
         inputs: &mut ControlInputs,
         readings: &Readings,
         tell: Tell<'_>,
-    ) -> Report<ROTORS_MAX> {
+    ) -> (Report<ROTORS_MAX>, EscAction) {
         let report = self.flight.tick(now_us, inputs, readings);
         tell.comms.report(&report, tell.tick_us, tell.send);
-        report.padded()
+        let action = tell.comms.escs(&mut self.escs, tell.escs, &report);
+        action.notch.iter().for_each(|notch| self.flight.move_notch(notch));
+        (report.padded(), action)
     }
 
     fn cross_check(&self, selector: &mut ImuSelector, readings: &Readings) {
@@ -155,8 +172,9 @@ impl<const N: usize> Core for Aircraft<N> {
     }
 
     fn parameters(&mut self, comms: &mut Comms, send: &mut dyn FnMut(&[u8])) -> Option<RecordChange> {
-        let Aircraft { flight, table, law } = self;
+        let Aircraft { flight, table, law, escs } = self;
         let change = comms.parameters(table, send)?;
+        escs.adopt(table.configuration());
         // Disarmed, and each change has been checked.
         let adopted = law.prepare(table.configuration()).is_ok_and(|prepared| flight.adopt(&prepared));
         debug_assert!(adopted, "a change that is not flown");
@@ -175,12 +193,12 @@ impl<const N: usize> Core for Aircraft<N> {
         &self,
         black_box: &mut HostBlackBox,
         report: &Report<ROTORS_MAX>,
-        readings: &Readings,
-        taken: TakenInputs,
+        (readings, taken): (&Readings, TakenInputs),
+        escs: &EscTelemetry,
         change: Option<RecordChange>,
     ) {
         let view = self.flight.view(report.time_us);
-        black_box.tick(report, readings, taken, &view, &self.table);
+        black_box.tick(report, readings, taken, (&view, escs), &self.table);
         if let Some(change) = change {
             black_box.change(&self.table, change);
         }
@@ -188,7 +206,7 @@ impl<const N: usize> Core for Aircraft<N> {
 
     fn record(
         &self,
-        ExactLog { recorder, write, adopted }: &mut ExactLog,
+        ExactLog { recorder, write, adopted, .. }: &mut ExactLog,
         [vehicle, law]: &[String; 2],
         change: Option<RecordChange>,
     ) {
@@ -225,6 +243,8 @@ pub struct HostTick {
     pub change: Option<RecordChange>,
     /// What of the link's signatures is to be kept.
     pub signing: Option<SigningRecord>,
+    /// Rotor, from 0, whose motor controller is asked for its telemetry with this tick's frames.
+    pub asks_esc: Option<u8>,
 }
 
 impl Host {
@@ -299,8 +319,12 @@ impl Host {
     fn of<const N: usize>(table: ParameterTable<N>, law: FlownLaw, names: [&str; 2]) -> Result<Self, OutOfRange> {
         let setup = Setup { calibrates: true, ..Setup::of(&table.configuration().link) };
         let flight = Flight::of(law.prepare(table.configuration())?);
+        let escs = EscDesk::new(table.configuration());
         Ok(Host {
-            flight: Box::new(Aircraft { flight, table, law }),
+            escs: Vec::new(),
+            asks_esc: None,
+            simulated_escs: SimulatedEscs::new(table.configuration().escs.poles),
+            flight: Box::new(Aircraft { flight, table, law, escs }),
             setup,
             comms: Comms::with(setup),
             inputs: ControlInputs::EMPTY,
@@ -339,7 +363,8 @@ impl Host {
 
     /// Keeps an exact log ([`afbc_recorder`]) from now on, before the first tick; `write` takes its bytes.
     pub fn record(&mut self, write: impl FnMut(&[u8]) + 'static) {
-        let mut log = ExactLog { recorder: Recorder::default(), write: Box::new(write), adopted: None };
+        let mut log =
+            ExactLog { recorder: Recorder::default(), write: Box::new(write), adopted: None, notch_rad_s: None };
         self.flight.record(&mut log, &self.names, None);
         self.log = Some(log);
     }
@@ -394,6 +419,20 @@ impl Host {
         }
     }
 
+    /// Receives, for the next tick, the next bytes of the motor controllers' line ([`HostTick::asks_esc`]); they count
+    /// while `DSHOT_TEL_CFG` is set.
+    pub fn hear_escs(&mut self, bytes: &[u8]) {
+        self.escs.extend_from_slice(bytes);
+    }
+
+    /// Lets simulated motor controllers answer the question of the last tick, which the rotors of `plant` have turned
+    /// for; in place of [`hear_escs`](Self::hear_escs).
+    pub fn hear_simulated_escs(&mut self, plant: &Plant) {
+        if let Some(answer) = self.simulated_escs.step(self.asks_esc.take(), plant) {
+            self.hear_escs(&answer);
+        }
+    }
+
     /// Sets what the vehicle's own sensors read for the next tick alone.
     pub fn sense(&mut self, readings: &Readings) {
         self.readings = *readings;
@@ -414,13 +453,18 @@ impl Host {
         let taken = TakenInputs::of(&self.taken);
         let mut bytes = Vec::new();
         let mut send = |frame: &[u8]| bytes.extend_from_slice(frame);
-        let tell = Tell { comms: &mut self.comms, tick_us, send: &mut send };
-        let report = self.flight.tick(time_us, &mut self.taken, &readings, tell);
-        if let Some(ExactLog { recorder, write, adopted }) = &mut self.log {
-            let (number, given, battery) = (self.number, Given::of(&report), self.taken.battery);
-            let adopted = adopted.take();
-            recorder
-                .tick(&TickRecord { number, time_us, clock_failed: false, readings, battery, adopted, given }, write);
+        let escs = core::mem::take(&mut self.escs);
+        let tell = Tell { comms: &mut self.comms, tick_us, send: &mut send, escs: &escs };
+        let (report, action) = self.flight.tick(time_us, &mut self.taken, &readings, tell);
+        if let Some(ExactLog { recorder, write, adopted, notch_rad_s }) = &mut self.log {
+            let (number, given, battery, clock_failed) = (self.number, Given::of(&report), self.taken.battery, false);
+            let (adopted, moved) = (adopted.take(), notch_rad_s.take());
+            *notch_rad_s = action.notch.map(|notch| notch.centre_rad_s());
+            let notch_rad_s = moved;
+            recorder.tick(
+                &TickRecord { number, time_us, clock_failed, readings, battery, adopted, notch_rad_s, given },
+                write,
+            );
         }
         if self.comms.takes_samples() {
             self.raw.add(time_us, &readings);
@@ -437,20 +481,24 @@ impl Host {
             self.flight.record(log, &self.names, change);
         }
         if let Some(black_box) = &mut self.black_box {
-            self.flight.log(black_box, &report, &readings, taken, change);
+            self.flight.log(black_box, &report, (&readings, taken), self.comms.esc_telemetry(), change);
             black_box.sent(time_us, &bytes);
         }
         if let Some(files) = &mut self.files
             && let Some(stream) = files.1.streamed(|| new_black_box(&*self.flight, &self.names, self.origin, None))
         {
-            self.flight.log(stream, &report, &readings, taken, change);
+            self.flight.log(stream, &report, (&readings, taken), self.comms.esc_telemetry(), change);
             stream.sent(time_us, &bytes);
         }
         self.number = self.number.wrapping_add(1);
+        if let Some(news) = &action.inputs {
+            self.merge(news);
+        }
         // Notices that there are none.
         self.hear_radio(&[]);
+        self.asks_esc = action.ask;
         self.time_us = time_us;
-        HostTick { report, bytes, change, signing: self.comms.signing_record() }
+        HostTick { report, bytes, change, signing: self.comms.signing_record(), asks_esc: action.ask }
     }
 
     /// Runs the tick a millisecond after the previous one, with a duration of zero.
@@ -481,6 +529,10 @@ impl Autopilot for Host {
     fn sense(&mut self, readings: &Readings) -> bool {
         Host::sense(self, readings);
         true
+    }
+
+    fn turn_rotors(&mut self, plant: &Plant) {
+        self.hear_simulated_escs(plant);
     }
 
     fn exchange(&mut self, uplink: &[u8], hear: &mut dyn FnMut(&[u8])) -> Result<(), Error> {

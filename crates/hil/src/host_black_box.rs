@@ -3,7 +3,7 @@
 use afbc_estimator::Origin;
 use afbc_link::{Address, Decoder, Downlink};
 use afbc_onboard::parameters::{ParameterTable, RecordChange};
-use afbc_onboard::{FlightView, Readings, Report};
+use afbc_onboard::{EscTelemetry, FlightView, Readings, Report};
 use afbc_types::ROTORS_MAX;
 use afbc_ulog::{BlackBox, LogRing, LoggedTick, TakenInputs};
 
@@ -38,10 +38,10 @@ impl HostBlackBox {
         report: &Report<ROTORS_MAX>,
         readings: &Readings,
         taken: TakenInputs,
-        view: &FlightView,
+        (view, escs): (&FlightView, &EscTelemetry),
         table: &ParameterTable<N>,
     ) {
-        let tick = LoggedTick { report, readings, taken, view, origin: self.origin };
+        let tick = LoggedTick { report, readings, taken, view, escs: Some(escs), origin: self.origin };
         self.log.tick(&tick, table, &mut self.ring);
     }
 

@@ -26,6 +26,7 @@ mod pace;
 mod place;
 mod report;
 mod served_files;
+mod simulated_escs;
 mod station;
 mod ulog_files;
 
@@ -44,5 +45,6 @@ pub use pace::MessagePeriods;
 pub use place::place;
 pub use report::tracking;
 pub use served_files::{OpenFile, ServedFiles};
+pub use simulated_escs::SimulatedEscs;
 pub use station::{ReceivedMessages, Station};
 pub use ulog_files::{StoredLogs, UlogFiles};

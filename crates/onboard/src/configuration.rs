@@ -1,5 +1,6 @@
 //! What makes the firmware that of one vehicle.
 
+use crate::esc_settings::EscSettings;
 use crate::link::Link;
 use afbc::adaptive::Gains;
 use afbc::monitor::Bounds;
@@ -27,6 +28,8 @@ pub struct Configuration<const N: usize = 4> {
     pub response: Response,
     /// The outputs to the motor controllers.
     pub outputs: MotorOutputs,
+    /// Telemetry of the motor controllers.
+    pub escs: EscSettings,
     /// Mounting of the inertial sensor.
     pub imu: Mounting,
     /// Errors of the sensors, found by calibration on the vehicle.
@@ -55,6 +58,7 @@ impl<const N: usize> Configuration<N> {
             curve: Curve::DEFAULT,
             response: Response::DEFAULT,
             outputs: MotorOutputs::DEFAULT,
+            escs: EscSettings::DEFAULT,
             imu: Mounting::PLAIN,
             calibration: SensorCalibration::DEFAULT,
             estimation: Estimation::DEFAULT,

@@ -12,7 +12,7 @@ use crate::sensor_timeouts::SensorTimeouts;
 use afbc::Guarded;
 use afbc::monitor::Norm;
 use afbc_control::Trace;
-use afbc_estimator::{Estimator, OutputFilter};
+use afbc_estimator::{Estimator, OutputFilter, VelocityNotch};
 use afbc_flight_core::{EndReason, FlightCore, FlightCoreMemory, Mode, Motor, Reasons, RequestAnswer, TickHealth};
 use afbc_types::{Axis, Declared, OutOfRange, ROTORS_MAX, RotorSpeeds, State};
 use core::array;
@@ -205,6 +205,17 @@ impl<const N: usize, C: FlightLaw<N>> Flight<N, C> {
             self.guide.adopt(guide);
         }
         disarmed
+    }
+
+    /// Moves the notch in the velocity that the law gets, from the next tick on, beside the tick; nothing if the
+    /// vehicle has none.
+    pub fn move_notch(&mut self, to: &VelocityNotch) {
+        self.front_end.move_notch(to);
+    }
+
+    /// Returns the notch in the velocity that the law gets, if there is one.
+    pub fn notch(&self) -> Option<&VelocityNotch> {
+        self.front_end.notch()
     }
 
     /// Records that the clock has failed and another has taken over: the vehicle is not armed again.

@@ -5,7 +5,7 @@ use crate::imu_lanes::OtherSensors;
 use crate::readings::{Aged, Readings};
 use afbc_control::math::{max, min};
 use afbc_estimator::{
-    Estimate, Estimator, ImuCalibration, ImuSample, Inertial, Measurement, Memory, OutputFilter, Stamped,
+    Estimate, Estimator, ImuCalibration, ImuSample, Inertial, Measurement, Memory, OutputFilter, Stamped, VelocityNotch,
 };
 use afbc_flight_core::{Inbox, Refusal};
 use afbc_types::{Mounting, Pose, PoseSigmas, SensorCalibration, State};
@@ -145,6 +145,16 @@ impl EstimatorFrontEnd {
             }
         }
         others
+    }
+
+    /// Moves the output's notch from the next tick on ([`OutputFilter::move_notch`]).
+    pub fn move_notch(&mut self, to: &VelocityNotch) {
+        self.output_filter.move_notch(to);
+    }
+
+    /// Returns the output's notch, if there is one.
+    pub fn notch(&self) -> Option<&VelocityNotch> {
+        self.output_filter.notch()
     }
 
     /// Sets whether the motors cannot carry the vehicle ([`Memory::set_on_ground`]).

@@ -18,6 +18,8 @@
 
 mod configuration;
 mod control_inputs;
+mod esc_settings;
+mod esc_telemetry;
 mod flight;
 mod flight_view;
 mod front_end;
@@ -28,9 +30,11 @@ pub mod indicator;
 mod law;
 mod link;
 mod lockstep;
+mod notch_follower;
 pub mod parameters;
 mod raw_readings;
 mod readings;
+mod rotor_monitor;
 mod sensor_timeouts;
 pub mod sensors;
 
@@ -38,6 +42,8 @@ pub use afbc_estimator::Settings as Estimation;
 pub use afbc_flight_core::ArmingLimits;
 pub use configuration::Configuration;
 pub use control_inputs::{ControlInputs, give};
+pub use esc_settings::EscSettings;
+pub use esc_telemetry::EscTelemetry;
 pub use flight::{Flight, Prepare, Prepared, Report};
 pub use flight_view::FlightView;
 pub use front_end::{EstimatorFrontEnd, tracker_aid};
@@ -47,5 +53,7 @@ pub use imu_selector::{ImuPair, ImuSelector};
 pub use law::FlightLaw;
 pub use link::{Link, LogMode};
 pub use lockstep::ReplyHead;
+pub use notch_follower::NotchFollower;
 pub use raw_readings::RawReadings;
 pub use readings::{AIDS_MAX, Aged, Readings};
+pub use rotor_monitor::{RotorFailure, RotorMonitor, RotorNews};

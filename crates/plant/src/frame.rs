@@ -86,12 +86,6 @@ impl Frame {
         self.weights.iter().fold(0.0, |most, [.., square, _]| square.max(most))
     }
 
-    /// 1 for each rotor.
-    #[inline]
-    pub(crate) fn present(&self) -> &Lanes {
-        &self.present
-    }
-
     /// Returns `values` with 0 beyond the number of rotors.
     #[inline]
     pub(crate) fn masked(&self, values: &Lanes) -> Lanes {

@@ -58,7 +58,8 @@ impl Choice for Start {
     const WORDS: &'static [&'static str] = &["hover", "idle"];
 }
 
-/// A worn or broken rotor, whose thrust and drag moment are multiplied by `efficiency`.
+/// A worn or broken rotor, whose thrust and drag moment are multiplied by `efficiency`. One without any is dead: its
+/// motor does not turn it any more, and it slows down with the rotors' time constant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct RotorFault {
@@ -116,6 +117,11 @@ pub(crate) struct Drive {
     pub(crate) squares: Lanes,
 }
 
+/// Returns 1 for each rotor that its motor turns; those that the vehicle does not have, have no efficiency either.
+fn driven(efficiency: &Lanes) -> Lanes {
+    efficiency.map(|share| if share > 0.0 { 1.0 } else { 0.0 })
+}
+
 /// Checks faults of rotors of a vehicle with this frame.
 fn check(faults: &[RotorFault], frame: &Frame) -> Result<(), OutOfRange> {
     faults.iter().try_for_each(|fault| {
@@ -135,6 +141,8 @@ pub(crate) struct Spin {
     pub(crate) speeds_rad_s: Lanes,
     efficiency: Lanes,
     efficiency_until_s: f64,
+    /// 1 for each rotor that its motor turns.
+    driven: Lanes,
     battery: Option<Discharge>,
 }
 
@@ -165,6 +173,7 @@ impl Spin {
             speeds_rad_s: start_rad_s,
             efficiency,
             efficiency_until_s,
+            driven: driven(&efficiency),
             battery: rotors.battery.map(|battery| Discharge::new(battery, step_s)),
             rotors,
         })
@@ -178,6 +187,7 @@ impl Spin {
     pub(crate) fn advance(&mut self, frame: &Frame, command_rad_s: &Lanes, t: f64, drag_factor_n_m_s2: f64) -> Drive {
         if t >= self.efficiency_until_s {
             (self.efficiency, self.efficiency_until_s) = self.rotors.efficiency(frame, t);
+            self.driven = driven(&self.efficiency);
         }
         let (mut scale, mut ceiling) = (1.0, self.rotors.max_rad_s);
         if let Some(battery) = &self.battery {
@@ -192,9 +202,9 @@ impl Spin {
         let command = self.commands.pass(*command_rad_s);
         let target = |w: f64| (w * scale).max(floor).min(ceiling);
         let drive = if frame.count() == frame::FEW {
-            self.follow::<{ frame::FEW }>(frame, &command, target)
+            self.follow::<{ frame::FEW }>(&command, target)
         } else {
-            self.follow::<ROTORS_MAX>(frame, &command, target)
+            self.follow::<ROTORS_MAX>(&command, target)
         };
         if let Some(battery) = &mut self.battery {
             // Drag moment times speed; the energy that accelerates the rotors is returned when they slow down.
@@ -205,13 +215,14 @@ impl Spin {
 
     /// Advances the speeds of the first `N` rotors toward `target` of their commands; there are no others.
     #[inline]
-    fn follow<const N: usize>(&mut self, frame: &Frame, command: &Lanes, target: impl Fn(f64) -> f64) -> Drive {
+    fn follow<const N: usize>(&mut self, command: &Lanes, target: impl Fn(f64) -> f64) -> Drive {
         let mut drive = Drive { speeds_rad_s: Lanes::zeros(), squares: Lanes::zeros() };
-        let present = command.as_slice().iter().zip(frame.present().as_slice());
+        let driven_commands = command.as_slice().iter().zip(self.driven.as_slice());
         let speeds = self.speeds_rad_s.as_mut_slice().iter_mut().zip(self.efficiency.as_slice());
         let driven = drive.speeds_rad_s.as_mut_slice().iter_mut().zip(drive.squares.as_mut_slice());
-        for (((command, present), (speed, efficiency)), (middle, square)) in present.zip(speeds).zip(driven).take(N) {
-            let target = present * target(*command);
+        let rotors = driven_commands.zip(speeds).zip(driven).take(N);
+        for (((command, driven), (speed, efficiency)), (middle, square)) in rotors {
+            let target = driven * target(*command);
             *middle = target + (*speed - target) * self.half_step;
             *speed = target + (*middle - target) * self.half_step;
             *square = *middle * *middle * efficiency;

@@ -127,9 +127,25 @@ fn faults_of_one_rotor_multiply_and_a_dead_rotor_is_dead() {
         ideal.step(&RotorSpeeds(Vector4::new(200.0, 200.0, 0.0, 200.0)), STEP_S);
     });
     assert_eq!(twice.motion(), once.motion());
-    // The dead rotor still turns: its gyroscopic moment is the only difference to a stopped one.
-    let (dead, ideal) = (dead.motion().rates_rad_s, ideal.motion().rates_rad_s);
-    assert!((dead - ideal).amax() < 0.02 * ideal.amax(), "{dead} {ideal}");
+    assert_eq!(dead.motion(), ideal.motion());
+}
+
+/// A rotor that its motor does not turn any more slows down like one that is commanded to stop, its smallest speed
+/// notwithstanding, and turns again when it is mended.
+#[test]
+fn a_dead_rotor_slows_down() {
+    let fault = RotorFault { rotor: 2, efficiency: 0.0, start_s: 0.02 };
+    let rotors = Rotors { time_constant_s: 0.05, min_rad_s: 30.0, faults: vec![fault], ..Rotors::default() };
+    let mut plant = plant(rotors);
+    (0..20).for_each(|_| plant.step(&command(200.0), STEP_S));
+    let before = speeds(&plant);
+    (0..50).for_each(|_| plant.step(&command(200.0), STEP_S));
+    let after = speeds(&plant);
+    assert!((after.y - before.y * (-1.0_f64).exp()).abs() < 1e-9, "{after}");
+    assert_eq!((after.x > 190.0, after.z > 190.0), (true, true));
+    plant.set_rotor_faults(Vec::new()).unwrap();
+    (0..1_000).for_each(|_| plant.step(&command(200.0), STEP_S));
+    assert!((speeds(&plant).y - 200.0).abs() < 1e-3);
 }
 
 fn battery_of(plant: &Plant) -> Charge {

@@ -10,7 +10,7 @@ use heapless::String;
 use serde::{Deserialize, Serialize};
 
 /// Version of the format, and of what the records mean.
-pub const VERSION: u16 = 3;
+pub const VERSION: u16 = 4;
 
 const CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 
@@ -109,6 +109,8 @@ pub struct TickRecord {
     pub battery: Option<BatteryReading>,
     /// Number of the configuration that is flown from this tick on, if it is another.
     pub adopted: Option<u16>,
+    /// Rotor speed at which the notch stands from this tick on, if it has moved \[rad/s\].
+    pub notch_rad_s: Option<f32>,
     /// What it gave.
     pub given: Given,
 }

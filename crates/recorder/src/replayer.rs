@@ -2,6 +2,7 @@
 
 use crate::record::{Given, Record, StartRecord, TickRecord};
 use afbc_control::Trace;
+use afbc_estimator::VelocityNotch;
 use afbc_onboard::parameters::{ParameterTable, Reason};
 use afbc_onboard::{Configuration, ControlInputs, Flight, Prepare, Report};
 use afbc_store::RecordName;
@@ -215,6 +216,10 @@ impl<const N: usize, P: Prepare<N>> Replayer<N, P> {
         self.taken.battery = tick.battery;
         if tick.clock_failed {
             self.flight.distrust_clock();
+        }
+        // Before what follows from another configuration, as it was.
+        if let Some(notch) = tick.notch_rad_s.and_then(VelocityNotch::at) {
+            self.flight.move_notch(&notch);
         }
         if let Some(number) = tick.adopted
             && !self.adopt(number)

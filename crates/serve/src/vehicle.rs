@@ -153,7 +153,8 @@ impl ServedVehicle {
         if self.host.comms().wants_self_tests() {
             self.test_sensors(&aux, &readings);
         }
-        let HostTick { report, bytes, change, signing } = self.host.next_tick(&[]);
+        self.host.hear_simulated_escs(self.world.plant());
+        let HostTick { report, bytes, change, signing, .. } = self.host.next_tick(&[]);
         self.world.advance(&report.motors);
         self.hold();
         if report.mode.armed() != self.mode.armed() {

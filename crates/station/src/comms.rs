@@ -5,6 +5,7 @@ use crate::failsafes::Failsafes;
 use crate::parameters::VALUE_BYTES;
 use crate::services::calibration::Calibrator;
 use crate::services::commands::ANSWERS_PER_TICK;
+use crate::services::escs;
 use crate::services::modes;
 use crate::services::signing::{SetupOutcome, Signing, SigningRecord};
 use crate::services::status::AuxSensors;
@@ -22,12 +23,13 @@ use afbc_flight_core::supervisor::COAST_US;
 use afbc_flight_core::tracker::{POSE_AGE_MAX_US, Refused, Sighting};
 use afbc_flight_core::{Mode, Stamped, Tracker};
 use afbc_guidance::{BatteryReading, Cause, ModeReason, Notice};
+use afbc_link::telemetry::ESCS_PER_MESSAGE;
 use afbc_link::{
     Address, Decoder, Downlink, InertialSample, MavSeverity, Message, PositionTarget, Reboot, ReceivedFrame,
-    SIGNED_FRAME_MAX, Sender, SetupSigning, StatesRefused, Uplink,
+    SIGNED_FRAME_MAX, Sender, SetupSigning, StatesRefused, Telemetry, Uplink,
 };
 use afbc_onboard::parameters::{ParameterTable, RecordChange};
-use afbc_onboard::{Configuration, ControlInputs, Report};
+use afbc_onboard::{Configuration, ControlInputs, EscTelemetry, Report};
 use afbc_types::{PerAxis, Pose};
 
 /// Component of the vehicle: autopilot.
@@ -117,6 +119,11 @@ impl Comms {
     /// Tells what the control tick does not know: origin, satellite receiver, battery, time of day.
     pub fn set_aux_sensors(&mut self, aux: AuxSensors) {
         self.dispatcher.status.aux = aux;
+    }
+
+    /// Returns what the motor controllers have told.
+    pub fn esc_telemetry(&self) -> &EscTelemetry {
+        &self.dispatcher.status.escs
     }
 
     /// Tells everyone what a shell has to say.
@@ -465,6 +472,14 @@ impl Comms {
                 modes::available(place).map(Downlink::AvailableMode)
             }
             id::ORBIT_EXECUTION_STATUS => self.dispatcher.orbit_status(),
+            id::ESC_INFO => {
+                let info = escs::info(status, self.esc_page(requested))?;
+                Some(Downlink::Telemetry(Telemetry::EscInfo(info)))
+            }
+            id::ESC_STATUS => {
+                let measured = escs::status(status, self.esc_page(requested))?;
+                Some(Downlink::Telemetry(Telemetry::EscStatus(measured)))
+            }
             id::DEBUG_FLOAT_ARRAY => Some(Downlink::Health(self.health())),
             id::HIGHRES_IMU => {
                 self.sample_is_due = true;
@@ -472,6 +487,15 @@ impl Comms {
             }
             message => compose(message, status),
         }
+    }
+
+    /// Returns which four motor controllers a message is of: its request's number, from 1, or all fours in turn.
+    fn esc_page(&self, requested: Requested) -> u8 {
+        let Dispatcher { status, streams, .. } = &self.dispatcher;
+        let interval_us = u64::try_from(streams.interval_us(requested.message)).unwrap_or(1).max(1);
+        let pages = status.rotors.div_ceil(ESCS_PER_MESSAGE as u8).max(1);
+        let page = u64::from(requested.index).checked_sub(1).unwrap_or(status.time_us / interval_us);
+        (page % u64::from(pages)) as u8
     }
 
     fn heartbeat(&self) -> Downlink {

@@ -21,6 +21,7 @@
 
 mod comms;
 mod dispatcher;
+mod escs;
 mod failsafes;
 pub mod parameters;
 mod radio;
@@ -30,6 +31,7 @@ mod transfers;
 
 pub use afbc_link::Reboot;
 pub use comms::{CLOCK_FAILED, Comms, REPORT_MAX, TICK_OFF};
+pub use escs::{EscAction, EscDesk};
 pub use radio::{RADIO_FRAME_MAX, RadioControl};
 pub use services::calibration::Calibrator;
 pub use services::commands::{

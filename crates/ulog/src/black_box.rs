@@ -6,9 +6,9 @@ use crate::known::Known;
 use crate::moment::{LoggedTick, Moment};
 use crate::ring::{LogRing, RingView};
 use crate::topics::{
-    ActuatorArmed, ActuatorMotors, ActuatorOutputs, AidOffered, Aiding, BatteryVoltage, EstimatorFigures,
-    EstimatorFlags, EstimatorVector, LandDetected, LawSignals, Listed, ManualControl, SensorCombined, TOPICS,
-    ThrustDemand, TorqueDemand, VehicleAngularVelocity, VehicleAttitude, VehicleAttitudeSetpoint,
+    ActuatorArmed, ActuatorMotors, ActuatorOutputs, AidOffered, Aiding, BatteryVoltage, EscStatusReport,
+    EstimatorFigures, EstimatorFlags, EstimatorVector, LandDetected, LawSignals, Listed, ManualControl, SensorCombined,
+    TOPICS, ThrustDemand, TorqueDemand, VehicleAngularVelocity, VehicleAttitude, VehicleAttitudeSetpoint,
     VehicleGlobalPosition, VehicleLocalPosition, VehicleLocalPositionSetpoint, VehicleRatesSetpoint, VehicleState,
 };
 use afbc_estimator::{ImuSample, Measurement};
@@ -133,7 +133,7 @@ impl BlackBox {
         table: &ParameterTable<N>,
         ring: &mut LogRing<R>,
     ) {
-        let LoggedTick { report, readings, ref taken, view, origin } = *tick;
+        let LoggedTick { report, readings, ref taken, view, escs, origin } = *tick;
         let now_us = report.time_us;
         let mut ring = ring.view();
         self.definitions.write(now_us, table, &mut ring);
@@ -146,14 +146,15 @@ impl BlackBox {
             }
         }
         let report = report.padded();
-        self.topics(&LoggedTick { report: &report, readings, taken: *taken, view, origin }, writes, &mut ring);
+        let tick = LoggedTick { report: &report, readings, taken: *taken, view, escs, origin };
+        self.topics(&tick, writes, &mut ring);
     }
 
     /// Writes the topics of a tick, or only remembers it. Once, for vehicles with any number of rotors.
     #[inline(never)]
     fn topics(&mut self, tick: &LoggedTick<'_, ROTORS_MAX>, writes: bool, ring: &mut RingView<'_>) {
-        let LoggedTick { report, readings, ref taken, view, origin } = *tick;
-        let moment = Moment { report, readings, taken, view, origin, known: &self.known };
+        let LoggedTick { report, readings, ref taken, view, escs, origin } = *tick;
+        let moment = Moment { report, readings, taken, view, escs, origin, known: &self.known };
         let now_us = report.time_us;
         let mut topics = Topics { now_us, writes, due_us: &mut self.due_us, dropouts: &mut self.dropouts, ring };
         self.last.sensors(&moment, &mut topics);
@@ -315,6 +316,7 @@ impl Last {
         topics.at_rate(|| EstimatorVector::of(moment));
         topics.at_rate(|| EstimatorFlags::of(moment));
         topics.at_rate(|| BatteryVoltage::of(moment));
+        topics.at_rate(|| EscStatusReport::of(moment));
         if let Some(figures) = EstimatorFigures::of(moment, on_ground) {
             topics.on_change(&mut self.figures, figures, EstimatorFigures::is_like);
         }

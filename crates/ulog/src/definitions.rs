@@ -1,8 +1,9 @@
 //! The log's beginning: what it is of, formats, parameters, subscriptions.
 
+use crate::layout::Wire;
 use crate::record::Content;
 use crate::ring::RingView;
-use crate::topics::TOPICS;
+use crate::topics::{ESC_REPORT, EscReport, TOPICS};
 use afbc_onboard::parameters::{Kind, Parameter, ParameterTable};
 use heapless::String;
 
@@ -115,11 +116,15 @@ impl Definitions {
             },
             Part::Information => self.information(index, ring)?,
             Part::Formats => {
-                let topic = TOPICS.get(index)?;
+                // What a topic is made of comes before it.
+                let (name, fields) = match index.checked_sub(1) {
+                    None => (EscReport::KIND, ESC_REPORT),
+                    Some(index) => TOPICS.get(index).map(|topic| (topic.name, topic.fields))?,
+                };
                 ring.record(b'F', &mut |content| {
-                    content.put(topic.name.as_bytes());
+                    content.put(name.as_bytes());
                     content.put(b":");
-                    topic.fields.iter().for_each(|field| field.format(content));
+                    fields.iter().for_each(|field| field.format(content));
                 })
             }
             Part::Parameters => parameter(&table.at(self.next)?, ring),

@@ -21,8 +21,8 @@
 //! let taken = TakenInputs::of(&inputs);
 //! let report = flight.tick(1_000, &mut inputs, &Readings::NONE);
 //! let view = flight.view(1_000);
-//! log.tick(&LoggedTick { report: &report, readings: &Readings::NONE, taken, view: &view, origin: None }, &table,
-//!     &mut ring);
+//! log.tick(&LoggedTick { report: &report, readings: &Readings::NONE, taken, view: &view, escs: None, origin: None },
+//!     &table, &mut ring);
 //! assert!(ring.front().starts_with(b"ULog"));
 //! # Ok::<(), afbc_types::OutOfRange>(())
 //! ```

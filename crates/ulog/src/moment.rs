@@ -3,7 +3,7 @@
 use crate::known::Known;
 use afbc_estimator::Origin;
 use afbc_guidance::{BatteryReading, Sticks};
-use afbc_onboard::{ControlInputs, FlightView, Readings, Report};
+use afbc_onboard::{ControlInputs, EscTelemetry, FlightView, Readings, Report};
 use afbc_types::{Pose, ROTORS_MAX, Stamped, State};
 use nalgebra::Vector3;
 
@@ -33,6 +33,8 @@ pub struct LoggedTick<'a, const N: usize = 4> {
     pub taken: TakenInputs,
     /// What the flight knows after it.
     pub view: &'a FlightView,
+    /// What the motor controllers have told, if there is a line for it.
+    pub escs: Option<&'a EscTelemetry>,
     /// Place on the earth from which fixes of a GNSS receiver are measured, once it is known.
     pub origin: Option<Origin>,
 }
@@ -44,6 +46,7 @@ pub(crate) struct Moment<'a> {
     pub(crate) readings: &'a Readings,
     pub(crate) taken: &'a TakenInputs,
     pub(crate) view: &'a FlightView,
+    pub(crate) escs: Option<&'a EscTelemetry>,
     pub(crate) origin: Option<Origin>,
     pub(crate) known: &'a Known,
 }

@@ -19,7 +19,7 @@ fn every_field_is_px4s() {
     let own = TOPICS.iter().filter(|topic| topic.name.starts_with("afbc_")).count();
     assert_eq!(formats.len() + own, TOPICS.len());
     for topic in TOPICS.iter().filter(|topic| !topic.name.starts_with("afbc_")) {
-        for field in topic.fields {
+        for field in topic.fields.iter().filter(|field| !field.name.starts_with("_padding")) {
             let wanted = FieldFormat { kind: field.kind.into(), values: field.values, name: field.name.to_owned() };
             assert!(formats[topic.name].contains(&wanted), "{}: {wanted:?}", topic.name);
         }
@@ -39,12 +39,14 @@ fn layouts_are_sound() {
         for field in topic.fields {
             let size = match field.kind {
                 "uint64_t" | "double" => 8,
+                // Of these, and padded to whole words of eight.
+                "esc_report" => 40,
                 "uint32_t" | "int32_t" | "float" => 4,
                 "uint16_t" => 2,
                 "uint8_t" | "int8_t" | "bool" => 1,
                 other => panic!("{other}"),
             };
-            assert_eq!(at % size, 0, "{}: {}", topic.name, field.name);
+            assert_eq!(at % size.min(8), 0, "{}: {}", topic.name, field.name);
             at += size * field.values.unwrap_or(1);
         }
     }

@@ -17,7 +17,8 @@ fn field(field: &LoggedField) -> String {
 fn row(topic: &LoggedTopic) -> String {
     let change = if topic.on_change { ", change" } else { "" };
     // The time is in each.
-    let fields: Vec<_> = topic.fields.iter().skip(1).map(field).collect();
+    let told = topic.fields.iter().skip(1).filter(|field| !field.name.starts_with("_padding"));
+    let fields: Vec<_> = told.map(field).collect();
     format!("| `{}` | {} ms{change} | {} |\n", topic.name, topic.period_us / 1000, fields.join(", "))
 }
 

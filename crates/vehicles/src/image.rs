@@ -34,6 +34,7 @@ impl Vehicle {
             curve,
             response,
             outputs: _,
+            escs: _,
             imu,
             calibration: _,
             estimation,

@@ -8,7 +8,7 @@ use afbc_estimator::Settings as Estimation;
 use afbc_flight_core::ArmingLimits;
 use afbc_flight_core::motor::{Curve, Response};
 use afbc_flight_core::protocol::MotorOutputs;
-use afbc_onboard::{Configuration, Link};
+use afbc_onboard::{Configuration, EscSettings, Link};
 use afbc_plant::Realism;
 use afbc_radio::RadioSettings;
 use afbc_reader::{FileError, Table};
@@ -98,6 +98,7 @@ impl Vehicle {
             curve: self.curve,
             response: self.response(),
             outputs: MotorOutputs::DEFAULT,
+            escs: EscSettings::DEFAULT,
             imu: self.imu.to_f32(),
             calibration: SensorCalibration::DEFAULT,
             estimation: self.estimation,

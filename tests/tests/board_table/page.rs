@@ -5,7 +5,7 @@ use std::fmt::Write;
 
 /// Returns the table.
 pub(crate) fn wiring(board: &BoardTable) -> String {
-    let BoardTable { link, gnss, imu, i2c, .. } = board;
+    let BoardTable { link, gnss, escs, imu, i2c, .. } = board;
     let mut rows = vec![
         [format!("crystal, {} MHz", board.crystal_hz / 1_000_000), "PH0, PH1".to_owned(), "HSE".to_owned()],
         [
@@ -44,6 +44,10 @@ pub(crate) fn wiring(board: &BoardTable) -> String {
             format!("CRSF on {}; SBUS by the pad {pad}, which has an inverter before {}", uart.name, uart.rx),
         ]);
     }
+    rows.extend(escs.as_ref().map(|escs| {
+        let what = format!("KISS telemetry on {}, 115,200 baud; its TX, {}, sends nothing", escs.name, escs.tx);
+        ["motor controllers: in".to_owned(), escs.rx.clone(), what]
+    }));
     let corners = match board.numbering.as_str() {
         "BETAFLIGHT" => ["rear right", "front right", "rear left", "front left"],
         "ARDUPILOT" => ["front right", "rear left", "front left", "rear right"],

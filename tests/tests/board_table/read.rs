@@ -94,6 +94,8 @@ pub(crate) struct BoardTable {
     pub(crate) gnss: Uart,
     /// The radio receiver's UART, and the pad of its inverter.
     pub(crate) radio: Option<(Uart, String)>,
+    /// Where the motor controllers' telemetry comes in.
+    pub(crate) escs: Option<Uart>,
     pub(crate) imu: Spi,
     pub(crate) i2c: I2c,
     pub(crate) led: Option<String>,
@@ -120,6 +122,7 @@ impl BoardTable {
         let link = words.uart("link");
         let gnss = words.uart("gnss");
         let radio = (words.peek() == "radio").then(|| words.radio());
+        let escs = (words.peek() == "escs").then(|| words.uart("escs"));
         let imu = Spi {
             name: words.after("imu :"),
             clock: words.after("{ clock :"),
@@ -175,7 +178,21 @@ impl BoardTable {
         }
         words.expect("}");
         assert!(words.0.is_empty(), "{}: {:?}", board.display(), words.0);
-        Some(BoardTable { crystal_hz, link, gnss, radio, imu, i2c, led, buzzer, card, outputs, numbering, timers })
+        Some(BoardTable {
+            crystal_hz,
+            link,
+            gnss,
+            radio,
+            escs,
+            imu,
+            i2c,
+            led,
+            buzzer,
+            card,
+            outputs,
+            numbering,
+            timers,
+        })
     }
 
     /// Returns the motors.
@@ -192,7 +209,8 @@ impl BoardTable {
     /// Returns every pin that is used, once for each use.
     pub(crate) fn pins(&self) -> Vec<&str> {
         let radio = self.radio.as_ref().map(|(uart, _)| uart);
-        let uarts = [&self.link, &self.gnss].into_iter().chain(radio).flat_map(|uart| [&uart.tx, &uart.rx]);
+        let uarts =
+            [&self.link, &self.gnss].into_iter().chain(radio).chain(&self.escs).flat_map(|uart| [&uart.tx, &uart.rx]);
         let Spi { clock, out, into, select, ready, .. } = &self.imu;
         let buses = [clock, out, into, select, &ready.pin, &self.i2c.clock, &self.i2c.data];
         let motors = self.motors().map(|motor| &motor.pin);

@@ -1,5 +1,6 @@
 //! What a station shows of the vehicle, in the frames of [`afbc_types`] unless a field says otherwise.
 
+mod esc;
 mod motion;
 mod orbit;
 mod place;
@@ -7,12 +8,13 @@ mod system;
 
 use crate::channels::{self, RadioChannels};
 use crate::message::{Fault, MessageFormat, PAYLOAD_MAX};
+pub use esc::{ESCS_PER_MESSAGE, EscInfo, EscStatus};
 use mavlink::MessageData;
 use mavlink::dialects::common::{
-    ACTUATOR_OUTPUT_STATUS_DATA, ATTITUDE_QUATERNION_DATA, AUTOPILOT_VERSION_DATA, BATTERY_STATUS_DATA,
-    ESTIMATOR_STATUS_DATA, EXTENDED_SYS_STATE_DATA, GLOBAL_POSITION_INT_DATA, GPS_GLOBAL_ORIGIN_DATA, GPS_RAW_INT_DATA,
-    HOME_POSITION_DATA, ORBIT_EXECUTION_STATUS_DATA, PROTOCOL_VERSION_DATA, RC_CHANNELS_DATA, SYS_STATUS_DATA,
-    VFR_HUD_DATA,
+    ACTUATOR_OUTPUT_STATUS_DATA, ATTITUDE_QUATERNION_DATA, AUTOPILOT_VERSION_DATA, BATTERY_STATUS_DATA, ESC_INFO_DATA,
+    ESC_STATUS_DATA, ESTIMATOR_STATUS_DATA, EXTENDED_SYS_STATE_DATA, GLOBAL_POSITION_INT_DATA, GPS_GLOBAL_ORIGIN_DATA,
+    GPS_RAW_INT_DATA, HOME_POSITION_DATA, ORBIT_EXECUTION_STATUS_DATA, PROTOCOL_VERSION_DATA, RC_CHANNELS_DATA,
+    SYS_STATUS_DATA, VFR_HUD_DATA,
 };
 pub use motion::{AttitudeQuaternion, VfrHud};
 pub use orbit::OrbitStatus;
@@ -51,6 +53,10 @@ pub enum Telemetry {
     Orbit(OrbitStatus),
     /// RC_CHANNELS (65).
     Channels(RadioChannels),
+    /// ESC_STATUS (291).
+    EscStatus(EscStatus),
+    /// ESC_INFO (290).
+    EscInfo(EscInfo),
     /// PROTOCOL_VERSION (300): MAVLink 2 alone.
     Protocol,
 }
@@ -62,6 +68,7 @@ impl Telemetry {
             .or_else(|| place::format(id))
             .or_else(|| system::format(id))
             .or_else(|| channels::format(id))
+            .or_else(|| esc::format(id))
     }
 
     pub(crate) fn read(id: u32, payload: &[u8]) -> Result<Self, Fault> {
@@ -80,6 +87,8 @@ impl Telemetry {
             AUTOPILOT_VERSION_DATA::ID => Telemetry::Version(Version::read(payload)),
             ORBIT_EXECUTION_STATUS_DATA::ID => Telemetry::Orbit(OrbitStatus::read(payload)),
             RC_CHANNELS_DATA::ID => Telemetry::Channels(RadioChannels::read(payload)),
+            ESC_STATUS_DATA::ID => Telemetry::EscStatus(EscStatus::read(payload)),
+            ESC_INFO_DATA::ID => Telemetry::EscInfo(EscInfo::read(payload)),
             PROTOCOL_VERSION_DATA::ID => Telemetry::Protocol,
             _ => return Err(Fault::Unknown),
         })
@@ -101,6 +110,8 @@ impl Telemetry {
             Telemetry::Version(version) => version.write(payload),
             Telemetry::Orbit(orbit) => orbit.write(payload),
             Telemetry::Channels(channels) => channels.write(payload),
+            Telemetry::EscStatus(status) => status.write(payload),
+            Telemetry::EscInfo(info) => info.write(payload),
             Telemetry::Protocol => system::write_protocol(payload),
         }
     }

@@ -236,7 +236,7 @@ impl Room {
         let taken = TakenInputs::of(&inputs);
         let report = self.flight.tick(now_us, &mut inputs, &readings);
         let view = self.flight.view(now_us);
-        let tick = LoggedTick { report: &report, readings: &readings, taken, view: &view, origin: None };
+        let tick = LoggedTick { report: &report, readings: &readings, taken, view: &view, escs: None, origin: None };
         let start = LogStart { vehicle: "paper", law: "afbc", hardware: "test", ..LogStart::default() };
         let Room { writer, table, state, queue, .. } = self;
         if writer.wants(now_us, self.armed, self.mode) {

@@ -52,6 +52,7 @@ macro_rules! each_group {
             curve,
             response,
             outputs,
+            escs,
             imu,
             calibration,
             estimation,
@@ -62,8 +63,8 @@ macro_rules! each_group {
         } = $configuration;
         let Airframe { parameters, rotors: _ } = airframe;
         each_group!(@ $prefix, $group, $show, ["V_" parameters, "MOT_" curve, "MOT_" response,
-            "MOT_" outputs, "IMU_" imu, "CAL_" calibration, "ARM_" arming, "EST_" estimation, "" guidance, "" radio,
-            "" link, "C_" settings, "A_" gains]);
+            "MOT_" outputs, "" escs, "IMU_" imu, "CAL_" calibration, "ARM_" arming, "EST_" estimation, "" guidance,
+            "" radio, "" link, "C_" settings, "A_" gains]);
     }};
     (@ $prefix:pat_param, $group:ident, $show:expr, [$($name:literal $field:ident),*]) => {
         $(

@@ -186,6 +186,7 @@ impl Dispatcher {
             id::HIGHRES_IMU => self.calibrates,
             id::ORBIT_EXECUTION_STATUS => self.orbit_status().is_some(),
             id::POSITION_TARGET_LOCAL_NED => self.followed().is_some(),
+            id::ESC_INFO | id::ESC_STATUS => self.status.escs.is_known(),
             id::AVAILABLE_MODES => index <= modes::COUNT.into(),
             _ => compose(message, &self.status).is_some(),
         };

@@ -64,7 +64,7 @@ pub fn system(status: &VehicleStatus) -> SystemStatus {
         (!status.senses, located, sensor::TRACKER),
         (aux.receiver.is_some(), fixed && located, sensor::SATELLITES),
         (aux.battery.is_some(), true, sensor::BATTERY),
-        (true, true, sensor::MOTORS),
+        (true, status.escs.failures.iter().all(Option::is_none), sensor::MOTORS),
         (true, armable, sensor::ARMING),
     ];
     let reported = aux.sensors;

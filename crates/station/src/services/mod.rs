@@ -4,6 +4,7 @@
 pub mod calibration;
 pub mod commands;
 pub mod control;
+pub mod escs;
 pub mod events;
 pub mod extended;
 pub mod fence;

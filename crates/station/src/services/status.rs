@@ -5,8 +5,7 @@ use afbc_flight_core::supervisor::COAST_US;
 use afbc_flight_core::{Mode, Reasons, TickHealth};
 use afbc_guidance::FlightMode;
 use afbc_link::telemetry::BatteryStatus;
-use afbc_onboard::GuidanceResult;
-use afbc_onboard::Report;
+use afbc_onboard::{EscTelemetry, GuidanceResult, Report};
 use afbc_radio::Channels;
 use afbc_types::{ROTORS_MAX, State};
 
@@ -83,6 +82,8 @@ pub struct VehicleStatus {
     pub radio: Option<RadioStatus>,
     /// What the shell has reported.
     pub aux: AuxSensors,
+    /// What the motor controllers have told.
+    pub escs: EscTelemetry,
 }
 
 /// A pilot's channels.

@@ -30,6 +30,8 @@ pub mod id {
     pub const ESTIMATOR_STATUS: u32 = 230;
     pub const HOME_POSITION: u32 = 242;
     pub const EXTENDED_SYS_STATE: u32 = 245;
+    pub const ESC_INFO: u32 = 290;
+    pub const ESC_STATUS: u32 = 291;
     pub const PROTOCOL_VERSION: u32 = 300;
     pub const DEBUG_FLOAT_ARRAY: u32 = 350;
     pub const ORBIT_EXECUTION_STATUS: u32 = 360;
@@ -39,7 +41,7 @@ pub mod id {
 }
 
 /// Streams with their default intervals; 0: off \[us\]. `docs/station.md` has the same list.
-pub const DEFAULTS: [(u32, u32); 21] = [
+pub const DEFAULTS: [(u32, u32); 23] = [
     (id::SYS_STATUS, 1_000_000),
     (id::SYSTEM_TIME, 1_000_000),
     (id::GPS_RAW_INT, 1_000_000),
@@ -61,6 +63,8 @@ pub const DEFAULTS: [(u32, u32); 21] = [
     (id::ORBIT_EXECUTION_STATUS, 500_000),
     (id::HIGHRES_IMU, 0),
     (id::RC_CHANNELS, 500_000),
+    (id::ESC_INFO, 1_000_000),
+    (id::ESC_STATUS, 100_000),
 ];
 /// Shortest interval: a tick \[us\].
 pub const INTERVAL_MIN_US: u32 = 1_000;

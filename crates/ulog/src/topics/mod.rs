@@ -3,6 +3,7 @@
 mod attitude;
 mod battery;
 mod demand;
+mod escs;
 mod estimator;
 mod global;
 mod law;
@@ -16,6 +17,7 @@ mod vehicle;
 pub(crate) use attitude::{VehicleAttitude, VehicleAttitudeSetpoint};
 pub(crate) use battery::BatteryVoltage;
 pub(crate) use demand::{ThrustDemand, TorqueDemand};
+pub(crate) use escs::{ESC_REPORT, EscReport, EscStatusReport};
 pub(crate) use estimator::{AidOffered, EstimatorFigures, EstimatorFlags, EstimatorVector};
 pub(crate) use global::VehicleGlobalPosition;
 pub(crate) use law::LawSignals;
@@ -102,4 +104,5 @@ topics! {
     LawSignals: 20_000;
     EstimatorFigures: 100_000, on_change;
     AidOffered: 0;
+    EscStatusReport: 20_000;
 }

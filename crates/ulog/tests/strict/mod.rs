@@ -101,10 +101,26 @@ pub(crate) fn fields(format: &str) -> Vec<FieldFormat> {
             Some((kind, values)) => (kind, Some(values.strip_suffix(']').unwrap().parse().unwrap())),
             None => (kind, None),
         };
-        size(kind);
         FieldFormat { kind: kind.to_owned(), values, name: name(called).to_owned() }
     };
     parts.map(field).collect()
+}
+
+/// Returns the fields with those of other formats in the place of one that is made of them: the second of `esc` has
+/// `esc.1.esc_rpm`.
+fn flat(fields: Vec<FieldFormat>, formats: &BTreeMap<String, Vec<FieldFormat>>) -> Vec<FieldFormat> {
+    let flat = |field: FieldFormat| {
+        let Some(inner) = formats.get(&field.kind) else {
+            size(&field.kind);
+            return vec![field];
+        };
+        let one = |at: usize| {
+            let named = |part: &FieldFormat| format!("{}.{at}.{}", field.name, part.name);
+            inner.iter().map(|part| FieldFormat { name: named(part), ..part.clone() }).collect::<Vec<_>>()
+        };
+        (0..field.values.unwrap_or(1)).flat_map(one).collect()
+    };
+    fields.into_iter().flat_map(flat).collect()
 }
 
 /// Returns name and value of a parameter.
@@ -149,7 +165,7 @@ pub(crate) fn read(bytes: &[u8]) -> StrictLog {
             }
             b'F' => {
                 let (topic, format) = std::str::from_utf8(content).unwrap().split_once(':').unwrap();
-                let fields = fields(format);
+                let fields = flat(fields(format), &log.formats);
                 assert_eq!((fields[0].kind.as_str(), fields[0].name.as_str()), ("uint64_t", "timestamp"), "{topic}");
                 assert!(log.formats.insert(name(topic).to_owned(), fields).is_none(), "{topic} twice");
             }

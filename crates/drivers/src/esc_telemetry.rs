@@ -1,0 +1,174 @@
+//! Telemetry of motor controllers (ESCs) over one serial line that all of them share: KISS's protocol, which BLHeli_32
+//! and AM32 speak too.
+//!
+//! A controller answers a DSHOT frame whose telemetry bit is set with ten bytes at [`BAUD`], high bytes first:
+//! temperature, voltage, current, charge, electrical speed and a CRC-8. Nothing in them says which controller it was:
+//! one is asked at a time ([`EscLine`]).
+
+use heapless::Vec;
+
+/// Baud rate of the line; 8 bits, no parity, one stop bit.
+pub const BAUD: u32 = 115_200;
+/// Bytes of an answer.
+pub const ANSWER_LEN: usize = 10;
+/// Longest time from a question to the end of its answer \[us\]: the answer takes 870, and controllers begin it within
+/// a millisecond or two.
+const ANSWER_US: u64 = 10_000;
+/// Longest pause between two bytes of an answer \[us\]: 20 bytes' time.
+const PAUSE_US: u64 = 2_000;
+
+/// What a motor controller has told.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct EscReading {
+    /// Temperature \[deg C\].
+    pub temperature_c: i8,
+    /// Voltage of the supply \[0.01 V\].
+    pub voltage_cv: u16,
+    /// Current \[0.01 A\].
+    pub current_ca: u16,
+    /// Charge drawn since power-up \[mA h\].
+    pub consumed_mah: u16,
+    /// Electrical speed \[100 rev/min\]: a motor's times its pairs of poles.
+    pub erpm_hundreds: u16,
+}
+
+impl EscReading {
+    /// Reads an answer; none if its checksum is wrong.
+    #[must_use]
+    pub fn from_bytes(bytes: &[u8; ANSWER_LEN]) -> Option<Self> {
+        let [temperature, v1, v0, i1, i0, q1, q0, n1, n0, checksum] = *bytes;
+        let reading = EscReading {
+            temperature_c: i8::from_le_bytes([temperature]),
+            voltage_cv: u16::from_be_bytes([v1, v0]),
+            current_ca: u16::from_be_bytes([i1, i0]),
+            consumed_mah: u16::from_be_bytes([q1, q0]),
+            erpm_hundreds: u16::from_be_bytes([n1, n0]),
+        };
+        let [content @ .., _] = bytes;
+        (crc8(content) == checksum).then_some(reading)
+    }
+
+    /// Returns the answer as a controller sends it.
+    #[must_use]
+    pub fn to_bytes(&self) -> [u8; ANSWER_LEN] {
+        let EscReading { temperature_c, voltage_cv, current_ca, consumed_mah, erpm_hundreds } = *self;
+        let [temperature] = temperature_c.to_le_bytes();
+        let [[v1, v0], [i1, i0], [q1, q0], [n1, n0]] =
+            [voltage_cv, current_ca, consumed_mah, erpm_hundreds].map(u16::to_be_bytes);
+        let checksum = crc8(&[temperature, v1, v0, i1, i0, q1, q0, n1, n0]);
+        [temperature, v1, v0, i1, i0, q1, q0, n1, n0, checksum]
+    }
+
+    /// Returns the speed of the rotor of a motor with so many magnetic poles \[rad/s\].
+    #[must_use]
+    pub fn speed_rad_s(&self, poles: u32) -> f32 {
+        // 100 rev/min in rad/s, and two poles a pair.
+        const RAD_S: f32 = 100.0 * core::f32::consts::TAU / 60.0;
+        f32::from(self.erpm_hundreds) * (2.0 * RAD_S) / poles.max(2) as f32
+    }
+
+    /// Returns the electrical speed of a rotor that turns with `speed_rad_s`, as a controller tells it: rounded down to
+    /// 100 rev/min, and no more than the largest that it can tell.
+    #[must_use]
+    pub fn erpm_hundreds_of(speed_rad_s: f32, poles: u32) -> u16 {
+        (speed_rad_s * (0.3 / core::f32::consts::TAU) * poles as f32) as u16
+    }
+}
+
+/// CRC-8 with polynomial x^8 + x^2 + x + 1, from 0, the highest bit first.
+fn crc8(bytes: &[u8]) -> u8 {
+    bytes.iter().fold(0, |crc, byte| {
+        (0..8).fold(crc ^ byte, |crc, _| if crc & 0x80 != 0 { (crc << 1) ^ 0x07 } else { crc << 1 })
+    })
+}
+
+/// The line of several controllers: says whom to ask, and whose answer it was.
+///
+/// ```
+/// use afbc_drivers::esc_telemetry::{EscLine, EscReading};
+///
+/// let mut line = EscLine::new(4);
+/// assert_eq!(line.ask(1_000), Some(0)); // set the telemetry bit in the next frame to the first
+/// let answer = EscReading { erpm_hundreds: 1337, ..EscReading::default() }.to_bytes();
+/// let heard: Vec<_> = answer.iter().filter_map(|byte| line.take(2_500, *byte)).collect();
+/// assert_eq!(heard.first().map(|(controller, reading)| (*controller, reading.erpm_hundreds)), Some((0, 1337)));
+/// assert_eq!(line.ask(3_000), Some(1));
+/// ```
+#[derive(Clone, Debug)]
+pub struct EscLine {
+    controllers: u8,
+    /// The one that is asked next.
+    next: u8,
+    /// The one that has been asked, and when \[us\].
+    asked: Option<(u8, u64)>,
+    answer: Vec<u8, ANSWER_LEN>,
+    /// When the last byte came \[us\].
+    heard_us: u64,
+    bad_answers: u32,
+    missing_answers: u32,
+}
+
+impl EscLine {
+    /// A line of so many controllers, of which none has been asked.
+    #[must_use]
+    pub const fn new(controllers: u8) -> Self {
+        EscLine {
+            controllers,
+            next: 0,
+            asked: None,
+            answer: Vec::new(),
+            heard_us: 0,
+            bad_answers: 0,
+            missing_answers: 0,
+        }
+    }
+
+    /// Returns whom to ask now, each in turn: none while an answer is expected. To be called before each frame; a frame
+    /// that is sent without the question loses an answer, nothing more.
+    pub fn ask(&mut self, now_us: u64) -> Option<u8> {
+        if let Some((_, asked_us)) = self.asked {
+            if now_us.saturating_sub(asked_us) < ANSWER_US {
+                return None;
+            }
+            self.missing_answers = self.missing_answers.saturating_add(1);
+        }
+        if self.controllers == 0 {
+            return None;
+        }
+        let controller = self.next;
+        self.next = if controller + 1 < self.controllers { controller + 1 } else { 0 };
+        self.asked = Some((controller, now_us));
+        self.answer.clear();
+        Some(controller)
+    }
+
+    /// Takes a byte that came at `now_us`; returns what a controller has told, once its answer is whole. Bytes that
+    /// nobody asked for are dropped, and so is an answer whose checksum is wrong: the next controller is asked then.
+    pub fn take(&mut self, now_us: u64, byte: u8) -> Option<(u8, EscReading)> {
+        let (controller, _) = self.asked?;
+        if now_us.saturating_sub(self.heard_us) > PAUSE_US {
+            self.answer.clear();
+        }
+        self.heard_us = now_us;
+        let _ = self.answer.push(byte);
+        let answer: &[u8; ANSWER_LEN] = self.answer.as_slice().try_into().ok()?;
+        let reading = EscReading::from_bytes(answer);
+        self.asked = None;
+        if reading.is_none() {
+            self.bad_answers = self.bad_answers.saturating_add(1);
+        }
+        reading.map(|reading| (controller, reading))
+    }
+
+    /// Number of answers since power-up whose checksum was wrong.
+    #[must_use]
+    pub fn bad_answers(&self) -> u32 {
+        self.bad_answers
+    }
+
+    /// Number of questions since power-up that were not answered in time.
+    #[must_use]
+    pub fn missing_answers(&self) -> u32 {
+        self.missing_answers
+    }
+}

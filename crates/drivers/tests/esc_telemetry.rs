@@ -1,0 +1,160 @@
+//! Telemetry of motor controllers: bytes, checksums, turns.
+#![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs, reason = "tests")]
+
+use afbc_drivers::esc_telemetry::{ANSWER_LEN, EscLine, EscReading};
+use proptest::collection::vec;
+use proptest::prelude::*;
+
+/// CRC-8 by division of polynomials, a bit at a time, as KISS's description has it.
+fn remainder(bytes: &[u8]) -> u8 {
+    let mut register: u16 = 0;
+    for bit in bytes.iter().flat_map(|byte| (0..8).rev().map(move |at| byte >> at & 1)).chain([0; 8]) {
+        register = register << 1 | u16::from(bit);
+        if register & 0x100 != 0 {
+            register ^= 0x107;
+        }
+    }
+    register as u8
+}
+
+/// The fields of an answer by their places, apart from the code under test.
+fn encode(temperature: i8, words: [u16; 4]) -> [u8; ANSWER_LEN] {
+    let mut bytes = vec![temperature as u8];
+    for word in words {
+        bytes.extend([(word / 256) as u8, (word % 256) as u8]);
+    }
+    bytes.push(remainder(&bytes));
+    bytes.try_into().unwrap()
+}
+
+prop_compose! {
+    fn any_answer()(temperature in any::<i8>(), words in any::<[u16; 4]>()) -> (EscReading, [u8; ANSWER_LEN]) {
+        let [voltage_cv, current_ca, consumed_mah, erpm_hundreds] = words;
+        let reading =
+            EscReading { temperature_c: temperature, voltage_cv, current_ca, consumed_mah, erpm_hundreds };
+        (reading, encode(temperature, words))
+    }
+}
+
+proptest! {
+    #[test]
+    fn answers_are_read_and_written((reading, bytes) in any_answer()) {
+        prop_assert_eq!(EscReading::from_bytes(&bytes), Some(reading));
+        prop_assert_eq!(reading.to_bytes(), bytes);
+    }
+
+    /// A CRC of eight bits finds every single flipped bit, every two in ten bytes, and every burst of up to eight.
+    #[test]
+    fn flipped_bits_are_found(
+        (_, bytes) in any_answer(), first in 0..80_usize, second in 0..80_usize, burst in 1..=255_u16,
+    ) {
+        let flip = |bytes: &mut [u8; ANSWER_LEN], bit: usize| bytes[bit / 8] ^= 0x80 >> (bit % 8);
+        let mut once = bytes;
+        flip(&mut once, first);
+        prop_assert_eq!(EscReading::from_bytes(&once), None);
+        let mut twice = once;
+        flip(&mut twice, second);
+        prop_assert_eq!(EscReading::from_bytes(&twice).is_some(), first == second);
+        let mut burnt = bytes;
+        (0..8).filter(|at| burst >> at & 1 != 0 && first + at < 80).for_each(|at| flip(&mut burnt, first + at));
+        prop_assert!(burnt == bytes || EscReading::from_bytes(&burnt).is_none());
+    }
+
+    /// Whatever comes, no answer is another controller's, and none is made of noise but by a checksum that fits.
+    #[test]
+    fn noise_is_no_answer(bytes in vec(any::<u8>(), 0..400), pauses in vec(0..3_000_u64, 400)) {
+        let (mut line, mut now_us, mut fits) = (EscLine::new(4), 0, 0);
+        let (mut since, mut asked) = (Vec::new(), None);
+        for (byte, pause_us) in bytes.iter().zip(pauses) {
+            now_us += pause_us;
+            if let Some(controller) = line.ask(now_us) {
+                asked = Some(controller);
+                since.clear();
+            }
+            since.push(*byte);
+            if let Some((controller, reading)) = line.take(now_us, *byte) {
+                prop_assert_eq!(Some(controller), asked);
+                prop_assert!(since.ends_with(&reading.to_bytes()));
+                fits += 1;
+            }
+        }
+        prop_assert!(fits <= bytes.len() / ANSWER_LEN);
+    }
+
+    /// The speed of any motor comes back within what the telemetry resolves, and never faster.
+    #[test]
+    fn speeds_come_back(speed_rad_s in 0.0..4_000.0_f32, pairs in 1..=20_u32) {
+        let poles = 2 * pairs;
+        let erpm_hundreds = EscReading::erpm_hundreds_of(speed_rad_s, poles);
+        let told = EscReading { erpm_hundreds, ..EscReading::default() };
+        let resolution = 100.0 * core::f32::consts::TAU / 60.0 / pairs as f32;
+        let limit = 65_535.0 * resolution;
+        let back = told.speed_rad_s(poles);
+        prop_assert!(back <= speed_rad_s * 1.000_01);
+        prop_assert!(back >= speed_rad_s.min(limit) - 1.001 * resolution, "{} {}", back, speed_rad_s);
+    }
+}
+
+/// The check value over "123456789" in catalogues of CRCs.
+#[test]
+fn the_checksum_is_crc_8_smbus() {
+    let mut bytes = [0; ANSWER_LEN];
+    bytes[..9].copy_from_slice(b"123456789");
+    bytes[9] = 0xF4;
+    let reading = EscReading::from_bytes(&bytes).unwrap();
+    assert_eq!((reading.temperature_c, reading.voltage_cv, reading.erpm_hundreds), (0x31, 0x3233, 0x3839));
+}
+
+/// 14 poles at 10,000 rev/min: 70,000 electrical.
+#[test]
+fn a_usual_motor() {
+    let reading = EscReading { erpm_hundreds: 700, ..EscReading::default() };
+    assert!((reading.speed_rad_s(14) - 1047.2).abs() < 0.1);
+}
+
+/// Each controller in turn; one that does not answer costs ten milliseconds, a wrong answer its own turn.
+#[test]
+fn each_is_asked_in_turn() {
+    let mut line = EscLine::new(3);
+    let answer = EscReading { erpm_hundreds: 7, ..EscReading::default() }.to_bytes();
+    let mut heard = Vec::new();
+    for tick in 0..1_000_u64 {
+        let now_us = 1_000 * tick;
+        // The second is dead.
+        let asked = line.ask(now_us);
+        if let Some(controller) = asked.filter(|controller| *controller != 1) {
+            let mut answer = answer;
+            if tick % 10 == 7 {
+                answer[3] ^= 4;
+            }
+            heard.extend(answer.iter().filter_map(|byte| line.take(now_us + 900, *byte)).map(|(who, _)| {
+                assert_eq!(who, controller);
+                who
+            }));
+        }
+    }
+    let count = |who| heard.iter().filter(|other| **other == who).count();
+    assert_eq!(count(1), 0);
+    // A round takes 12 ms; a fifth of the answers at most are spoilt.
+    assert!(count(0) >= 60 && count(2) >= 60, "{} {}", count(0), count(2));
+    assert!(line.missing_answers() >= 80 && line.bad_answers() > 0);
+}
+
+#[test]
+fn a_line_without_controllers_asks_nobody() {
+    let mut line = EscLine::new(0);
+    assert_eq!(line.ask(0), None);
+    assert_eq!(line.take(5, 1), None);
+}
+
+/// Half an answer, then a pause: the next bytes begin another.
+#[test]
+fn half_an_answer_is_forgotten() {
+    let mut line = EscLine::new(1);
+    let answer = EscReading { voltage_cv: 1_480, ..EscReading::default() }.to_bytes();
+    assert_eq!(line.ask(0), Some(0));
+    assert!(answer[..5].iter().all(|byte| line.take(1_000, *byte).is_none()));
+    let heard: Vec<_> = answer.iter().filter_map(|byte| line.take(4_000, *byte)).collect();
+    assert_eq!(heard.len(), 1);
+    assert_eq!(heard[0].1.voltage_cv, 1_480);
+}

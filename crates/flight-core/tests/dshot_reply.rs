@@ -1,0 +1,141 @@
+//! Replies on bidirectional DSHOT, against an encoder of their description: bits, codes, edges and samples.
+#![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs, reason = "tests")]
+
+use afbc_flight_core::dshot_reply::{DshotReply, EDGES_MAX, REPLY_BITS, ReplyError};
+use proptest::collection::vec;
+use proptest::prelude::*;
+
+/// The sixteen bits of twelve: the checksum is the complement of the exclusive or of three groups.
+fn checked(content: u16) -> u16 {
+    content << 4 | (15 - (content % 16 ^ content / 16 % 16 ^ content / 256))
+}
+
+/// Levels of the 21 bits on the wire, by the code's table as its description prints it: 0 to F.
+fn levels(bits: u16) -> Vec<bool> {
+    let table = [
+        "11001", "11011", "10010", "10011", "11101", "10101", "10110", "10111", "11010", "01001", "01010", "01011",
+        "11110", "01101", "01110", "01111",
+    ];
+    let code =
+        format!("{bits:04X}").chars().map(|digit| table[digit.to_digit(16).unwrap() as usize]).collect::<String>();
+    let mut level = false;
+    let mut levels = vec![level];
+    for change in code.chars() {
+        level ^= change == '1';
+        levels.push(level);
+    }
+    levels
+}
+
+/// Times of the changes, with bits of `counts` each, from the start bit on.
+fn edges(levels: &[bool], counts: f64) -> Vec<f64> {
+    let before = std::iter::once(true).chain(levels.iter().copied());
+    let line: Vec<bool> = before.chain([true]).collect();
+    (0..line.len() - 1).filter(|at| line[*at] != line[at + 1]).map(|at| at as f64 * counts).collect()
+}
+
+fn samples(levels: &[bool], per_bit: usize, before: usize, after: usize) -> Vec<bool> {
+    let bits = levels.iter().flat_map(|level| std::iter::repeat_n(*level, per_bit));
+    std::iter::repeat_n(true, before).chain(bits).chain(std::iter::repeat_n(true, after)).collect()
+}
+
+/// Content as motor controllers write a period: nine bits, shifted as far as it takes.
+fn period_content(period_us: u32) -> (u16, u32) {
+    let exponent = (0..8).find(|exponent| period_us >> exponent < 512).unwrap();
+    ((exponent << 9 | period_us >> exponent) as u16, period_us >> exponent << exponent)
+}
+
+proptest! {
+    #[test]
+    fn periods_come_back(period_us in 1_u32..=65_024) {
+        let (content, told_us) = period_content(period_us);
+        prop_assert_eq!(DshotReply::from_bits(checked(content)), Ok(DshotReply::Period(Some(told_us))));
+        prop_assert!(period_us - told_us <= period_us / 256);
+    }
+
+    /// A reply is read from edges that are up to a third of a bit off, at a rate that is up to 4 % off, wherever the
+    /// timer's count stands; and from samples.
+    #[test]
+    fn replies_are_read(
+        content in 0_u16..4_096, rate in 0.96..1.04_f64, bit in 20_u16..1_000, start in any::<u16>(),
+        off in vec(-0.16..0.16_f64, EDGES_MAX), per_bit in 3_usize..=8, before in 0_usize..60, after in 0_usize..60,
+    ) {
+        let wanted = DshotReply::from_bits(checked(content)).unwrap();
+        let levels = levels(checked(content));
+        prop_assert_eq!(levels.len() as u32, REPLY_BITS);
+        let times = edges(&levels, f64::from(bit) * rate);
+        let times: Vec<u16> = times.iter().zip(&off).map(|(time, off)| {
+            start.wrapping_add((time + off * f64::from(bit)).round() as i64 as u16)
+        }).collect();
+        prop_assert!(times.len() <= EDGES_MAX);
+        prop_assert_eq!(DshotReply::from_edges(&times, bit), Ok(wanted));
+        let taken = samples(&levels, per_bit, before, after);
+        prop_assert_eq!(DshotReply::from_samples(taken, per_bit as u16), Ok(wanted));
+    }
+
+    /// Noise is read without harm; what passes has a checksum that fits.
+    #[test]
+    fn noise_does_no_harm(
+        edges in vec(any::<u16>(), 0..40), levels in vec(any::<bool>(), 0..300), bit in any::<u16>(),
+    ) {
+        let _ = DshotReply::from_edges(&edges, bit);
+        let _ = DshotReply::from_samples(levels, bit);
+    }
+}
+
+/// Every single wrong bit of the code is refused, in every reply. A single wrong level between right ones is two wrong
+/// bits of the code; of 1000 of those, five make other groups whose checksum fits, which no receiver can tell.
+#[test]
+fn every_wrong_level_is_noticed() {
+    let (mut tried, mut missed) = (0, 0);
+    let code = |levels: &[bool]| levels.windows(2).fold(0_u32, |code, pair| code << 1 | u32::from(pair[0] != pair[1]));
+    for content in 0..4_096 {
+        let right = levels(checked(content));
+        let wanted = DshotReply::from_bits(checked(content));
+        assert_eq!(DshotReply::from_code(code(&right)), wanted);
+        for bit in 0..REPLY_BITS - 1 {
+            assert!(DshotReply::from_code(code(&right) ^ 1 << bit).is_err(), "{content:#x} {bit}");
+        }
+        for wrong in 1..right.len() {
+            let mut line = right.clone();
+            line[wrong] = !line[wrong];
+            let times: Vec<u16> = edges(&line, 100.0).iter().map(|time| *time as u16).collect();
+            tried += 1;
+            let read = DshotReply::from_edges(&times, 100);
+            missed += u32::from(read.is_ok() && read != wanted);
+        }
+    }
+    assert_eq!((tried, missed), (81_920, 384));
+}
+
+#[test]
+fn extended_telemetry_is_told_from_periods() {
+    for (content, wanted) in [
+        (0x000, DshotReply::Other(0, 0)),
+        (0x22D, DshotReply::Temperature(45)),
+        (0x43C, DshotReply::Voltage(60)),
+        (0x611, DshotReply::Current(17)),
+        (0x8AB, DshotReply::Other(4, 0xAB)),
+        (0xE03, DshotReply::Other(7, 3)),
+        (0xFFF, DshotReply::Period(None)),
+        (0xFFE, DshotReply::Period(Some(510 << 7))),
+        (0x1FF, DshotReply::Period(Some(511))),
+        (0x300, DshotReply::Period(Some(256 << 1))),
+    ] {
+        assert_eq!(DshotReply::from_bits(checked(content)), Ok(wanted), "{content:#x}");
+    }
+}
+
+#[test]
+fn what_is_no_reply_is_refused() {
+    assert_eq!(DshotReply::from_edges(&[], 100), Err(ReplyError::Timing));
+    assert_eq!(DshotReply::from_edges(&[5], 100), Err(ReplyError::Group));
+    assert_eq!(DshotReply::from_edges(&[5, 5], 100), Err(ReplyError::Timing));
+    assert_eq!(DshotReply::from_edges(&[5, 105], 0), Err(ReplyError::Timing));
+    assert_eq!(DshotReply::from_samples([true; 100], 5), Err(ReplyError::Timing));
+    assert_eq!(DshotReply::from_samples((0..100).map(|at| at % 2 == 0), 1), Err(ReplyError::Timing));
+    assert_eq!(DshotReply::from_bits(0), Err(ReplyError::Checksum));
+    // A plain checksum is that of a frame to a motor controller, not of its reply.
+    assert_eq!(DshotReply::from_bits(0x1230), Err(ReplyError::Checksum));
+    assert_eq!(DshotReply::from_code(0), Err(ReplyError::Group));
+}

@@ -1,0 +1,133 @@
+//! Motor controllers that answer, beside the stations: who is asked, and what follows from what they tell.
+
+use crate::comms::Comms;
+use crate::services::texts::Words;
+use afbc_drivers::esc_telemetry::EscLine;
+use afbc_estimator::{OutputFilter, VelocityNotch};
+use afbc_flight_core::{Stamped, Ticketed};
+use afbc_guidance::{FlightMode, Order};
+use afbc_link::MavSeverity;
+use afbc_onboard::{
+    Configuration, ControlInputs, EscSettings, NotchFollower, Report, RotorFailure, RotorMonitor, RotorNews, give,
+};
+
+/// Ticket of the orders after a rotor's failure: nobody waits for an answer.
+const FAILURE: u8 = 253;
+
+/// The line of the motor controllers, and who watches what comes over it.
+#[derive(Clone, Debug)]
+pub struct EscDesk {
+    line: EscLine,
+    monitor: RotorMonitor,
+    follower: NotchFollower,
+    settings: EscSettings,
+}
+
+/// What is to be done after a tick.
+#[derive(Clone, Debug, Default)]
+pub struct EscAction {
+    /// Rotor, from 0, whose motor controller is to be asked in the next frame.
+    pub ask: Option<u8>,
+    /// Where the notch stands from the next tick on, if it moves.
+    pub notch: Option<VelocityNotch>,
+    /// What the vehicle is to do about a rotor's failure, to be [merged](ControlInputs::merge).
+    pub inputs: Option<ControlInputs>,
+}
+
+impl EscDesk {
+    /// Creates it for a vehicle with this configuration, whose parameters are in their ranges.
+    #[must_use]
+    pub fn new<const N: usize>(configuration: &Configuration<N>) -> Self {
+        let Configuration { airframe, response, curve, escs, .. } = configuration;
+        EscDesk {
+            line: EscLine::new(u8::try_from(N).unwrap_or(u8::MAX)),
+            monitor: RotorMonitor::new(response, curve),
+            follower: NotchFollower::new(OutputFilter::of(&airframe.parameters, N).notch().copied()),
+            settings: *escs,
+        }
+    }
+
+    /// Goes on with another configuration, of a disarmed vehicle.
+    pub fn adopt<const N: usize>(&mut self, configuration: &Configuration<N>) {
+        let Configuration { airframe, response, curve, escs, .. } = configuration;
+        (self.monitor, self.settings) = (RotorMonitor::new(response, curve), *escs);
+        self.follower.adopt(OutputFilter::of(&airframe.parameters, N).notch().copied());
+    }
+
+    /// Returns the line, with its counts.
+    #[must_use]
+    pub fn line(&self) -> &EscLine {
+        &self.line
+    }
+}
+
+/// What a tick has come to.
+struct EscTick<'a> {
+    now_us: u64,
+    armed: bool,
+    airborne: bool,
+    /// Commanded speeds \[rad/s\].
+    speeds: &'a [f32],
+}
+
+impl Comms {
+    /// Takes what has come over the motor controllers' line since the last tick, to be called after each
+    /// [`report`](Self::report), also without any bytes.
+    pub fn escs<const N: usize>(&mut self, desk: &mut EscDesk, bytes: &[u8], report: &Report<N>) -> EscAction {
+        let (armed, airborne) = (report.mode.armed(), report.guided.airborne);
+        let tick = EscTick { now_us: report.time_us, armed, airborne, speeds: report.motors.0.as_slice() };
+        self.listen(desk, bytes, &tick)
+    }
+
+    /// Not generic, so that it is compiled for size.
+    #[inline(never)]
+    fn listen(&mut self, desk: &mut EscDesk, bytes: &[u8], tick: &EscTick<'_>) -> EscAction {
+        let EscDesk { line, monitor, follower, settings } = desk;
+        let EscTick { now_us, armed, airborne, speeds } = *tick;
+        let (dispatcher, mut action) = (&mut self.dispatcher, EscAction::default());
+        let escs = &mut dispatcher.status.escs;
+        escs.poles = u16::try_from(settings.poles).unwrap_or(u16::MAX);
+        monitor.commanded(now_us, armed && settings.serial, speeds);
+        // Nobody is asked while they are not wanted, so that all bytes are dropped.
+        for byte in bytes {
+            let Some((rotor, value)) = line.take(now_us, *byte) else { continue };
+            if let Some(place) = escs.readings.get_mut(usize::from(rotor)) {
+                *place = Some(Stamped { value, at_us: now_us });
+            }
+            escs.counter = escs.counter.wrapping_add(1);
+            let speed = Stamped { value: value.speed_rad_s(settings.poles), at_us: now_us };
+            let Some(news) = monitor.measured(rotor, speed).filter(|_| settings.detects) else { continue };
+            let (severity, words) = words(news);
+            dispatcher.texts.say(severity, &words);
+            if let Some(mode) = mode_after(settings.action).filter(|_| news.failure.is_some() && airborne) {
+                let update = action.inputs.get_or_insert(ControlInputs::EMPTY);
+                give(update.order(), Ticketed { value: Order::Select(mode), ticket: FAILURE });
+            }
+        }
+        escs.failures = if settings.detects { monitor.failures() } else { Default::default() };
+        let follows = armed && settings.serial && settings.follows;
+        action.notch = follower.look(now_us, follows, escs.speeds().take(speeds.len()));
+        action.ask = if settings.serial { line.ask(now_us) } else { None };
+        action
+    }
+}
+
+/// Returns the mode that `COM_ACT_FAIL_ACT` stands for; none for a warning alone.
+fn mode_after(action: u32) -> Option<FlightMode> {
+    match action {
+        1 => Some(FlightMode::Hold),
+        2 => Some(FlightMode::Land),
+        3 => Some(FlightMode::Return),
+        _ => None,
+    }
+}
+
+/// Returns how a change of a rotor is announced, which people count from 1.
+fn words(news: RotorNews) -> (MavSeverity, Words) {
+    let (severity, what) = match news.failure {
+        Some(RotorFailure::Stopped) => (MavSeverity::MAV_SEVERITY_CRITICAL, " has stopped"),
+        Some(RotorFailure::Desynchronised) => (MavSeverity::MAV_SEVERITY_CRITICAL, " does not turn as commanded"),
+        None => (MavSeverity::MAV_SEVERITY_NOTICE, " turns as commanded again"),
+    };
+    (severity, Words::of("rotor ").number(u32::from(news.rotor) + 1).and(what))
+}

@@ -1,0 +1,72 @@
+//! The motor controllers' line, between the board's tasks and the links'.
+
+use crate::vehicle::ParameterTable;
+use afbc_estimator::VelocityNotch;
+use afbc_station::EscDesk;
+use core::cell::{Cell, RefCell};
+use core::sync::atomic::{AtomicBool, AtomicU8, Ordering};
+use embassy_sync::blocking_mutex::Mutex;
+use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
+use heapless::Deque;
+use static_cell::StaticCell;
+
+/// Bytes that wait for the links' task, at most: six answers.
+const WAITING: usize = 64;
+
+static HEARD: Mutex<CriticalSectionRawMutex, RefCell<Deque<u8, WAITING>>> = Mutex::new(RefCell::new(Deque::new()));
+/// Rotor that is to be asked, from 1; 0 for none.
+static ASKED: AtomicU8 = AtomicU8::new(0);
+/// Where the notch is to stand, and whether that is news.
+static NOTCH: Mutex<CriticalSectionRawMutex, Cell<Option<VelocityNotch>>> = Mutex::new(Cell::new(None));
+static MOVES: AtomicBool = AtomicBool::new(false);
+
+/// Puts what has come over the line; what there is no room for is lost.
+pub fn put(bytes: &[u8]) {
+    HEARD.lock(|heard| {
+        // Not borrowed elsewhere while it is locked; no panic in any case.
+        let Ok(mut heard) = heard.try_borrow_mut() else { return };
+        for byte in bytes {
+            let _ = heard.push_back(*byte);
+        }
+    });
+}
+
+/// Returns the rotor, from 0, whose motor controller is to be asked in the next frame, if `is_mine` says so of it:
+/// once.
+pub fn asked(is_mine: impl FnOnce(usize) -> bool) -> Option<usize> {
+    let rotor = usize::from(ASKED.load(Ordering::Relaxed)).checked_sub(1)?;
+    is_mine(rotor).then(|| ASKED.store(0, Ordering::Relaxed))?;
+    Some(rotor)
+}
+
+/// Sets whom to ask in the next frame.
+pub(crate) fn ask(rotor: u8) {
+    ASKED.store(rotor.wrapping_add(1), Ordering::Relaxed);
+}
+
+/// Returns a byte that has come.
+pub(crate) fn heard() -> Option<u8> {
+    HEARD.lock(|heard| heard.try_borrow_mut().ok()?.pop_front())
+}
+
+/// Creates what listens to the line, to be called once, by a board that has it: the others do not have its memory.
+#[inline(never)]
+pub(crate) fn desk(table: &ParameterTable) -> &'static mut EscDesk {
+    static DESK: StaticCell<EscDesk> = StaticCell::new();
+    DESK.init_with(|| EscDesk::new(table.configuration()))
+}
+
+/// Moves the notch before the next tick.
+pub(crate) fn move_notch(notch: VelocityNotch) {
+    NOTCH.lock(|cell| cell.set(Some(notch)));
+    MOVES.store(true, Ordering::Relaxed);
+}
+
+/// Returns where the notch is to stand from the next tick on, if it moves.
+pub(crate) fn moved_notch() -> Option<VelocityNotch> {
+    // Looked at after every tick, and seldom true.
+    MOVES.load(Ordering::Relaxed).then(|| {
+        MOVES.store(false, Ordering::Relaxed);
+        NOTCH.lock(Cell::take)
+    })?
+}
