@@ -72,7 +72,9 @@ pub fn fly<M: Machine>(image: &Path, order: &Order<'_>) -> Result<(), Box<dyn Er
     let mut board = M::built()?;
     board.sense(&at_the_place());
     if let Some(slot) = board.card() {
-        slot.trouble(card_trouble);
+        // Without a place for its logs, the slot is empty.
+        let empty = CardTrouble { out_ms: Some([0, u64::MAX]), ..CardTrouble::default() };
+        slot.trouble(if card.is_some() { card_trouble } else { empty });
     }
     let wire = Wire::default();
     check(board.attach_link(wire.clone()), "the link is wired")?;
