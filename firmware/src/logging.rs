@@ -19,8 +19,8 @@ use embassy_sync::zerocopy_channel::{Channel, Receiver, Sender};
 use embassy_time::{Instant, Timer};
 use static_cell::StaticCell;
 
-/// Blocks that wait for the card, at most: of a log of 140 kB/s those of 70 ms.
-const BLOCKS: usize = 20;
+/// Blocks that wait for the card, at most: of a log of 140 kB/s those of 58 ms.
+const BLOCKS: usize = 16;
 /// Ticks whose views wait for the links' task, at most.
 const VIEWS: usize = 3;
 /// Time between two looks at a card without a log \[us\].

@@ -247,9 +247,9 @@ impl Machine for Pixracer {
 /// What the register before the interrupt status, which resets the core, reads like once that is done.
 const USB_IDLE: u64 = 1 << 31;
 
-/// Keeps USB still where the models have registers of it, but not what they do: a flag that is cleared by writing a one
-/// stays set, and a reset never ends; the driver, which looks at them, would never end, and nothing else of its priority
-/// or below begin.
+/// Keeps USB still where the models have registers of it, but not what they do: a flag that is cleared by writing a
+/// one stays set, and a reset never ends; the driver, which looks at them, would never end, and nothing else of its
+/// priority or below begin.
 pub fn quiet_usb<M: Machine>(session: &mut Session<M>, at: VirtualNanos) {
     if let Some(status) = M::USB_STATUS {
         // Nothing to be done about a core that is not clocked.

@@ -107,7 +107,9 @@ async fn port(driver: Driver<'static, USB_OTG_FS>) {
     join3(device.run(), pass_on(sender), take_in(receiver)).await;
 }
 
-/// True if the core is there, and clears flags by ones: the driver would wait forever for one that does not.
+/// True if the core is there, and clears flags by ones: the driver would wait forever for one that does not. Out of
+/// line, to be identified in the image.
+#[inline(never)]
 fn answers() -> bool {
     rcc::enable_and_reset::<USB_OTG_FS>();
     let (core, ones) = (pac::USB_OTG_FS, Gintsts(u32::MAX));

@@ -76,7 +76,7 @@ const EXECUTORS: [(&str, &[&str]); 3] = [
             "firmware::housekeeping::deepest_stack",
             "firmware::parameters::keep",
             "chip_stm32::usb::claim",
-            "chip_stm32::usb::__port_task::__port_task_inner_function::{{closure}}",
+            "chip_stm32::usb::answers",
         ],
     ),
 ];
@@ -159,8 +159,17 @@ impl Linked {
     /// # Errors
     /// If there is no such function, or it can call itself.
     pub fn reach(&self, name: &str) -> Result<Reach, Error> {
+        self.reach_without(name, &[])
+    }
+
+    /// The same as long as none of the functions `omitted` is called.
+    ///
+    /// # Errors
+    /// As of [`reach`](Self::reach).
+    pub fn reach_without(&self, name: &str, omitted: &[&str]) -> Result<Reach, Error> {
         let root = self.find(name).ok_or_else(|| Error::Protocol(format!("the image has no function {name}")))?;
-        let mut walk = Walk { linked: self, depths: BTreeMap::new(), open: BTreeSet::new() };
+        let omitted = omitted.iter().filter_map(|name| self.find(name)).collect();
+        let mut walk = Walk { linked: self, omitted, depths: BTreeMap::new(), open: BTreeSet::new() };
         let (stack_bytes, deepest) = walk.depth(root)?;
         let reached = walk.depths.keys().filter_map(|address| self.functions.get(address));
         let indirect = reached.filter(|function| function.is_indirect).map(|function| function.name.clone()).collect();
@@ -250,6 +259,8 @@ type Depth = (u32, Vec<(String, u32)>);
 
 struct Walk<'a> {
     linked: &'a Linked,
+    /// Functions that are not called.
+    omitted: BTreeSet<u32>,
     depths: BTreeMap<u32, Depth>,
     /// Functions on the current path.
     open: BTreeSet<u32>,
@@ -266,7 +277,7 @@ impl Walk<'_> {
         }
         let (mut below, mut chain) = Depth::default();
         let callees = if function.panics() { BTreeSet::new() } else { self.linked.callees(address)? };
-        for callee in callees {
+        for callee in callees.difference(&self.omitted.clone()).copied() {
             let (bytes, names) = self.depth(callee)?;
             if bytes > below {
                 (below, chain) = (bytes, names);

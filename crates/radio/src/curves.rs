@@ -9,28 +9,28 @@ parameters! {
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct StickCurves {
         /// Roll and pitch in position mode: 0 linear, 1 cubic.
-        #[parameter(MPC_XY_MAN_EXPO, "share", 0.0..=1.0)]
+        #[parameter(MPC_XY_MAN_EXPO, "1", 0.0..=1.0)]
         pub horizontal_expo: f32 = 0.6,
         /// Throttle in altitude and position mode: 0 linear, 1 cubic.
-        #[parameter(MPC_Z_MAN_EXPO, "share", 0.0..=1.0)]
+        #[parameter(MPC_Z_MAN_EXPO, "1", 0.0..=1.0)]
         pub vertical_expo: f32 = 0.6,
         /// Yaw in altitude and position mode: 0 linear, 1 cubic.
-        #[parameter(MPC_YAW_EXPO, "share", 0.0..=1.0)]
+        #[parameter(MPC_YAW_EXPO, "1", 0.0..=1.0)]
         pub yaw_expo: f32 = 0.6,
         /// Share of the way of these sticks that commands nothing.
-        #[parameter(MPC_HOLD_DZ, "share", 0.0..=1.0)]
+        #[parameter(MPC_HOLD_DZ, "1", 0.0..=1.0)]
         pub dead_zone: f32 = 0.1,
         /// Roll and pitch in acro mode: 0 linear, 1 cubic.
-        #[parameter(MC_ACRO_EXPO, "share", 0.0..=1.0)]
+        #[parameter(MC_ACRO_EXPO, "1", 0.0..=1.0)]
         pub acro_expo: f32 = 0.0,
         /// Yaw in acro mode: 0 linear, 1 cubic.
-        #[parameter(MC_ACRO_EXPO_Y, "share", 0.0..=1.0)]
+        #[parameter(MC_ACRO_EXPO_Y, "1", 0.0..=1.0)]
         pub acro_yaw_expo: f32 = 0.0,
         /// How far roll and pitch in acro mode are held back before the end of their way.
-        #[parameter(MC_ACRO_SUPEXPO, "share", 0.0..=0.95)]
+        #[parameter(MC_ACRO_SUPEXPO, "1", 0.0..=0.95)]
         pub acro_super_expo: f32 = 0.0,
         /// The same of the yaw.
-        #[parameter(MC_ACRO_SUPEXPOY, "share", 0.0..=0.95)]
+        #[parameter(MC_ACRO_SUPEXPOY, "1", 0.0..=0.95)]
         pub acro_yaw_super_expo: f32 = 0.0,
     }
 }

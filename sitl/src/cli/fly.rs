@@ -20,7 +20,8 @@ use std::process::ExitCode;
 ///
 /// A plan of QGroundControl, a file that ends in `.plan`, is flown by the firmware's own code as `sitl serve` flies,
 /// outdoors in a breeze, from its planned home on: mission, geofence and rally points, for an hour at most. Of the
-/// options then --vehicle, --duration, --exact-log, --ulog and --mcap apply. It exits with 1 if the mission is not completed.
+/// options then --vehicle, --duration, --exact-log, --ulog and --mcap apply. It exits with 1 if the mission is not
+/// completed.
 #[derive(Args, Debug)]
 pub(crate) struct Fly {
     /// Name of a built-in scenario, or path of a scenario file or of a plan

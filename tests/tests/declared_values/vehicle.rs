@@ -223,6 +223,10 @@ const IDLE: &[(&str, &[&str])] = &[
     ("what a board's converter measures of a battery", &["guidance.current_a_v", "guidance.divider"]),
     ("it lands by the mode return, which disarms at once", &["guidance.disarm_after_s"]),
     (
+        "acro is flown by the tests of afbc-hil",
+        &["guidance.acro_pitch_deg_s", "guidance.acro_roll_deg_s", "guidance.acro_yaw_deg_s"],
+    ),
+    (
         "a served vehicle begins with its rotors at rest, and flies on faster ones",
         &["rotors.min_rad_s", "rotors.start"],
     ),
@@ -257,8 +261,21 @@ fn every_value_of_a_vehicles_file_counts() {
 /// What a station may set is in a vehicle's file, but for what follows from another key, or is not the vehicle's.
 #[test]
 fn every_parameter_of_a_station_is_in_the_file() {
-    const ELSEWHERE: [(&str, &str); 13] = [
+    const ELSEWHERE: [(&str, &str); 26] = [
         ("CAL_", "those of calibrations: of each vehicle's own sensors"),
+        ("COM_ACT_FAIL_ACT", "the motor controllers'"),
+        ("DSHOT_TEL_CFG", "the motor controllers'"),
+        ("FD_ACT_EN", "the motor controllers'"),
+        ("MOT_NOTCH_FOLLOW", "the motor controllers'"),
+        ("MOT_POLE_COUNT", "the motors'"),
+        ("MC_ACRO_EXPO", "the pilot's"),
+        ("MC_ACRO_EXPO_Y", "the pilot's"),
+        ("MC_ACRO_SUPEXPO", "the pilot's"),
+        ("MC_ACRO_SUPEXPOY", "the pilot's"),
+        ("MPC_HOLD_DZ", "the pilot's"),
+        ("MPC_XY_MAN_EXPO", "the pilot's"),
+        ("MPC_YAW_EXPO", "the pilot's"),
+        ("MPC_Z_MAN_EXPO", "the pilot's"),
         ("COM_FLTMODE", "the pilot's"),
         ("COM_RC_", "the pilot's"),
         ("LOG_PORT", "the link's"),
