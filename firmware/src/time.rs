@@ -125,7 +125,10 @@ fn SysTick() {
         STATE.period_us.borrow(cs).set(period_us);
         STATE.with_alarms(cs, |alarms| {
             for slot in alarms {
-                if let Some(due) = slot.take_if(|alarm| alarm.at_us <= period_us) {
+                // Most are not due: not moved until then.
+                if slot.as_ref().is_some_and(|alarm| alarm.at_us <= period_us)
+                    && let Some(due) = slot.take()
+                {
                     due.waker.wake();
                 }
             }

@@ -1,4 +1,5 @@
-//! The decoders of radio receivers on arbitrary bytes and pauses, and the pilot behind them: they do not panic, bytes in
+//! The decoders of radio receivers on arbitrary bytes and pauses, and the pilot behind them: they do not panic, bytes
+//! in
 //! one piece and one by one give the same frames, a frame that is written is read again, sticks are between their ends,
 //! and nothing arms before enough frames in a row.
 #![no_main]

@@ -7,7 +7,8 @@
 //! ```
 //!
 //! a is what the rotors give by now, as far as their nominal lag tau tells, and z learns what the nominal model does
-//! not know, with s = 1 - (e/E)^2 that ends at 0. With e and a alone the loop is s^2 + (1 + k_2)/tau s + k_1/tau, whose poles are put at w with damping D by
+//! not know, with s = 1 - (e/E)^2 that ends at 0. With e and a alone the loop is s^2 + (1 + k_2)/tau s + k_1/tau,
+//! whose poles are put at w with damping D by
 //! k_1 = w^2 tau and k_2 = 2 D w tau - 1. It is a loop of its own, like PX4's: an attitude to track, which the laws
 //! need, is what a pilot in acro mode does not command.
 

@@ -192,7 +192,8 @@ fn silent() -> Receiver {
     Box::new(|_, _| Vec::new())
 }
 
-/// RC_CHANNELS_OVERRIDE arms, flies and kills by the same switches; when it stops, that is a loss; a receiver that hears
+/// RC_CHANNELS_OVERRIDE arms, flies and kills by the same switches; when it stops, that is a loss; a receiver that
+/// hears
 /// its pilot goes first.
 #[test]
 fn a_flight_by_a_stations_channels() {

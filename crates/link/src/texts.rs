@@ -4,7 +4,8 @@ use crate::framing::{HEADER, Header, START};
 use mavlink::MessageData as _;
 use mavlink::dialects::common::STATUSTEXT_DATA;
 
-/// Returns severity (0 emergency to 7 debug) and content of each STATUSTEXT among the whole frames that a [`Sender`] has
+/// Returns severity (0 emergency to 7 debug) and content of each STATUSTEXT among the whole frames that a [`Sender`]
+/// has
 /// written, one behind the other. For whoever writes a log beside the link: checksums are not looked at.
 ///
 /// [`Sender`]: crate::Sender

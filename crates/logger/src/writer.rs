@@ -6,7 +6,8 @@ use afbc_onboard::LogMode;
 use afbc_onboard::parameters::{ParameterTable, RecordChange};
 use afbc_ulog::{BlackBox, LogRing, LogStart, LoggedTick};
 
-/// Bytes that wait for a block, at most: more than a tick in which every topic is due writes, beside what does not fill one.
+/// Bytes that wait for a block, at most: more than a tick in which every topic is due writes, beside what does not
+/// fill one.
 pub const STAGING: usize = 2560;
 /// Time for which a log goes on once the vehicle is disarmed \[us\].
 const TAIL_US: u64 = 1_000_000;

@@ -147,7 +147,8 @@ parameters! {
     /// The receiver.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct RadioReceiver {
-        /// Link that the receiver is on in place of MAVLink, counted from 1; 0 for the board's own for it, if it has one;
+        /// Link that the receiver is on in place of MAVLink, counted from 1; 0 for the board's own for it, if it has
+        /// one;
         /// from the next start on. The first one never has it.
         #[parameter(RC_PORT, "number", 0.0..=4.0)]
         pub port: u32 = 0,

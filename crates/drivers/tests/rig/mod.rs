@@ -296,7 +296,8 @@ pub fn survives_all_troubles<P: SensorPart, M: Model>(
     }
 }
 
-/// A part whose wire comes and goes reads again within 5 ms each time, and right; one that was reset meanwhile is set up
+/// A part whose wire comes and goes reads again within 5 ms each time, and right; one that was reset meanwhile is set
+/// up
 /// again.
 pub fn comes_back_at_once<P: SensorPart, M: Model>(
     part: impl Fn() -> P,
