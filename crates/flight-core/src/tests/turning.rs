@@ -40,7 +40,8 @@ proptest! {
         thrust in 0.35f32..0.6,
     ) {
         let (rates, push) = (Vector3::from(rates), Vector3::from(push));
-        let (wanted, push) = (Vector3::new(rates.x, rates.y, 0.1 * rates.z), Vector3::new(push.x, push.y, 0.1 * push.z));
+        let wanted = Vector3::new(rates.x, rates.y, 0.1 * rates.z);
+        let push = Vector3::new(push.x, push.y, 0.1 * push.z);
         let target = RateTarget { rates_rad_s: wanted, thrust };
         let (state, most) = turn(lag_s, ratio * lag_s, push, &target, 4_000);
         prop_assert!((state.rates_rad_s - wanted).amax() < 0.05, "{:?}", state);
@@ -49,7 +50,11 @@ proptest! {
     }
 
     #[test]
-    fn what_is_no_number_is_no_target(rates in prop::array::uniform3(-2e3f32..2e3), thrust in -0.5f32..1.5, place in 0usize..5) {
+    fn what_is_no_number_is_no_target(
+        rates in prop::array::uniform3(-2e3f32..2e3),
+        thrust in -0.5f32..1.5,
+        place in 0usize..5,
+    ) {
         let mut target = RateTarget { rates_rad_s: rates.into(), thrust };
         let expected = rates.iter().all(|rate| rate.abs() <= 1e3) && (0.0..=1.0).contains(&thrust);
         prop_assert_eq!(target.is_plausible(), expected);
