@@ -73,7 +73,7 @@ proptest! {
         ways in prop::collection::vec(-1.0f32..=1.0, 2..20),
     ) {
         let curves: [&dyn Fn(f32) -> f32; 3] =
-            [&|way| expo(way, share), &|way| expo_dead_zone(way, share, dead_zone), &|way| super_expo(way, share, bend)];
+            [&|x| expo(x, share), &|x| expo_dead_zone(x, share, dead_zone), &|x| super_expo(x, share, bend)];
         let mut ways = ways;
         ways.sort_by(f32::total_cmp);
         for curve in curves {
