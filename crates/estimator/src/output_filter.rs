@@ -145,6 +145,7 @@ impl OutputFilter {
 }
 
 #[cfg(test)]
+#[allow(clippy::expect_used, reason = "a test that cannot go on should say why")]
 mod tests {
     use super::{NOTCH_MAX_RAD_S, OutputFilter, VelocityNotch};
     use crate::estimate::{Estimate, Validity};

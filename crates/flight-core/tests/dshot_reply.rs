@@ -7,7 +7,7 @@ use proptest::prelude::*;
 
 /// The sixteen bits of twelve: the checksum is the complement of the exclusive or of three groups.
 fn checked(content: u16) -> u16 {
-    content << 4 | (15 - (content % 16 ^ content / 16 % 16 ^ content / 256))
+    content << 4 | (15 - ((content % 16) ^ (content / 16 % 16) ^ (content / 256)))
 }
 
 /// Levels of the 21 bits on the wire, by the code's table as its description prints it: 0 to F.

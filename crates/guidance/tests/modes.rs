@@ -209,7 +209,7 @@ fn attitude_and_thrust_become_an_acceleration() {
 fn acro_commands_rates() {
     let mut bench = Bench::hovering(settings());
     let sticks = Sticks { pitch: 0.5, roll: -1.0, throttle: 0.0, yaw: 0.25 };
-    let mut fly = |bench: &mut Bench, ticks: u32| {
+    let fly = |bench: &mut Bench, ticks: u32| {
         for _ in 0..ticks {
             bench.orders.sticks = Some(afbc_flight_core::Stamped { value: sticks, at_us: bench.now_us });
             bench.tick();

@@ -1,10 +1,10 @@
 //! Rotors that do not turn as commanded, and the notch that follows those that do.
-#![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs, reason = "tests")]
+#![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, missing_docs, reason = "tests")]
 
 use afbc_estimator::VelocityNotch;
 use afbc_flight_core::motor::{Curve, Response};
 use afbc_onboard::{EscSettings, NotchFollower, RotorFailure, RotorMonitor};
-use afbc_types::{Declared, Stamped};
+use afbc_types::Stamped;
 use proptest::prelude::*;
 
 const TICK_US: u64 = 1_000;

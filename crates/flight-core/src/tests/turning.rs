@@ -1,4 +1,5 @@
 //! Turning at a pilot's rates.
+#![allow(clippy::expect_used, reason = "a test that cannot go on should say why")]
 
 use crate::motor::Response;
 use crate::rate_control::{RateControl, RateMemory, RateTarget};

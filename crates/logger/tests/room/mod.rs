@@ -145,7 +145,7 @@ pub(crate) fn card(fat: fatfs::FatType, blocks: usize) -> Card {
     bytes[510..512].copy_from_slice(&[0x55, 0xAA]);
     let options = fatfs::FormatVolumeOptions::new().fat_type(fat);
     let options = if fat == fatfs::FatType::Fat32 { options.bytes_per_cluster(512) } else { options };
-    fatfs::format_volume(&mut Partition(Cursor::new(&mut bytes[VOLUME * 512..])), options).unwrap();
+    fatfs::format_volume(Partition(Cursor::new(&mut bytes[VOLUME * 512..])), options).unwrap();
     Card(Rc::new(RefCell::new(Disk {
         bytes,
         written: Vec::new(),
@@ -231,7 +231,7 @@ impl Room {
         let noise = 1e-3 * (now_us / TICK_US % 7) as f32;
         let imu = Some(Aged { value: [Vector3::new(0.0, noise, 0.0), Vector3::new(noise, 0.0, 9.81)], age_us: 0 });
         let aid = Aged { value: Measurement::Height { height_m: 1.5, sigma_m: 0.5 }, age_us: 300 };
-        let readings = Readings { imu, aids: [(now_us % 20_000 == 0).then_some(aid), None] };
+        let readings = Readings { imu, aids: [now_us.is_multiple_of(20_000).then_some(aid), None] };
         let mut inputs = ControlInputs::EMPTY;
         let taken = TakenInputs::of(&inputs);
         let report = self.flight.tick(now_us, &mut inputs, &readings);

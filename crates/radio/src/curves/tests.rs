@@ -1,3 +1,5 @@
+#![allow(clippy::indexing_slicing, reason = "tests")]
+
 extern crate std;
 use super::*;
 use afbc_types::Declared;
