@@ -59,7 +59,7 @@ struct WatchedRotor {
 
 /// Compares measured speeds with the commanded ones, as rotors of the vehicle's time constant follow them. A rotor is
 /// judged while the vehicle is armed and it is commanded more than its idle speed. From the time at which a rotor turns
-/// half as fast as it should, a failure is told within [`PERSISTS_US`] and the time between two readings.
+/// half as fast as it should, a failure is told within 15 ms and the time between two readings.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RotorMonitor {
     /// Share of the way to their commands that rotors go in a tick.

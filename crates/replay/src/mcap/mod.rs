@@ -1,7 +1,7 @@
 //! A ULog as [MCAP](https://mcap.dev), for Foxglove, PlotJuggler, Rerun and ROS 2's tools.
 //!
 //! Each topic of the log is one of the file, with the same fields, units and frames, as ROS 2 writes messages (CDR,
-//! schema in `ros2msg`). [`ros`] adds what such tools draw by themselves: the vehicle and its setpoint as frames, its
+//! schema in `ros2msg`). Added is what such tools draw by themselves: the vehicle and its setpoint as frames, its
 //! place on a map, its texts.
 
 mod ros;
