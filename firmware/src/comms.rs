@@ -19,7 +19,7 @@ pub use afbc_station::Comms;
 use afbc_station::services::imus::{self, ImuNews};
 use afbc_station::services::signing::Signing;
 use afbc_station::services::status::SensorBits;
-use afbc_station::{AuxSensors, Calibrator, EscAction, EscDesk, REPORT_MAX, Reboot, Setup};
+use afbc_station::{AuxSensors, Calibrator, EscAction, EscReports, REPORT_MAX, Reboot, Setup};
 use core::array;
 use core::cell::RefCell;
 use core::future::poll_fn;
@@ -291,7 +291,7 @@ fn report_self_tests(comms: &mut Comms, aux: &mut AuxSensors) {
 /// Takes what the motor controllers have told, asks the next one and moves the notch; returns what the vehicle is to do
 /// about a rotor's failure. Out of line like the report.
 #[inline(never)]
-fn listen_to_escs(comms: &mut Comms, desk: &mut EscDesk, tick: &Tick) -> Option<ControlInputs> {
+fn listen_to_escs(comms: &mut Comms, desk: &mut EscReports, tick: &Tick) -> Option<ControlInputs> {
     let mut heard = Vec::<u8, 32>::new();
     while !heard.is_full()
         && let Some(byte) = escs::heard()

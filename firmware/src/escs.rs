@@ -2,7 +2,7 @@
 
 use crate::vehicle::ParameterTable;
 use afbc_estimator::VelocityNotch;
-use afbc_station::EscDesk;
+use afbc_station::EscReports;
 use core::cell::{Cell, RefCell};
 use core::sync::atomic::{AtomicBool, AtomicU8, Ordering};
 use embassy_sync::blocking_mutex::Mutex;
@@ -51,9 +51,9 @@ pub(crate) fn heard() -> Option<u8> {
 
 /// Creates what listens to the line, to be called once, by a board that has it: the others do not have its memory.
 #[inline(never)]
-pub(crate) fn desk(table: &ParameterTable) -> &'static mut EscDesk {
-    static DESK: StaticCell<EscDesk> = StaticCell::new();
-    DESK.init_with(|| EscDesk::new(table.configuration()))
+pub(crate) fn desk(table: &ParameterTable) -> &'static mut EscReports {
+    static DESK: StaticCell<EscReports> = StaticCell::new();
+    DESK.init_with(|| EscReports::new(table.configuration()))
 }
 
 /// Moves the notch before the next tick.

@@ -124,7 +124,7 @@ fn run() -> Result<bool, Error> {
             Some(ESTIMATING_INSTRUCTIONS_MAX.into()),
         ),
         line("DSHOT frames of four motors", "instructions", beside.dshot.into(), Some(1_500)),
-        line("SysTick's interrupt", "instructions", beside.systick.into(), Some(250)),
+        line("SysTick's interrupt", "instructions", beside.systick.into(), Some(200)),
         line("USART1's interrupt, for a byte", "instructions", beside.byte.into(), Some(250)),
         line("link's task, woken once, most seen", "instructions", beside.wake.into(), None),
         line("control tick, mean", "instructions", mean, None),

@@ -22,8 +22,6 @@ const LINKS: &str = "every line full in both directions, and no fetch of any tas
 const BYTE_OF_TWO: &str = "as on the other boards, with two links full in both directions at once";
 const FULL: &str = "no fetch of any task a hit, in the same period in which two links are full in both directions. \
      With `SER_TEL1_BAUD` = 460800 it is in time";
-const FIX: &str =
-    "as for the links: a fix that lacks a byte is dropped by its checksum, and the next comes within 0.2 s";
 const BELOW: &str = "as for the sampling, which is above it";
 
 const fn late(row: &'static str, most_us: Option<u64>, reason: &'static str) -> KnownLateness {
@@ -32,18 +30,17 @@ const fn late(row: &'static str, most_us: Option<u64>, reason: &'static str) -> 
 
 /// Of the bare STM32F405.
 pub(super) static STM32F405: [KnownLateness; 2] =
-    [late("first link: byte received", Some(18), BYTE), late("links' task", None, LINKS)];
+    [late("first link: byte received", Some(16), BYTE), late("links' task", None, LINKS)];
 
 /// Of the flight controllers with an STM32F405.
 pub(super) static FLIGHT_CONTROLLERS: [KnownLateness; 2] =
-    [late("first link: byte received", Some(20), BYTE), late("links' task", None, LINKS)];
+    [late("first link: byte received", Some(18), BYTE), late("links' task", None, LINKS)];
 
 /// Of the Pixracer.
-pub(super) static PIXRACER: [KnownLateness; 8] = [
-    KnownLateness { at_best: true, ..late("first link: byte received", Some(42), BYTE_OF_TWO) },
-    KnownLateness { at_best: true, ..late("second link: byte received", Some(42), BYTE_OF_TWO) },
-    late("GNSS receiver: byte", Some(65), FIX),
-    late("sampling, with its transfers", None, FULL),
+pub(super) static PIXRACER: [KnownLateness; 7] = [
+    KnownLateness { at_best: true, ..late("first link: byte received", Some(30), BYTE_OF_TWO) },
+    KnownLateness { at_best: true, ..late("second link: byte received", Some(30), BYTE_OF_TWO) },
+    late("sampling, with its transfers", Some(1100), FULL),
     late("control tick, to the motors' DMA", None, BELOW),
     late("end of the motors' DMA", None, BELOW),
     late("slow sensors, with their transfers", None, BELOW),
