@@ -49,7 +49,7 @@ const NOT_KEPT: &str = "parameter not kept: set it again";
 
 /// What the links' task has: the services for stations, the parameters, and exact log, radio and black box if there are
 /// any.
-pub type Desk = (
+pub type CommsParts = (
     Comms,
     ParameterTable,
     Option<&'static mut ExactLog>,
@@ -66,9 +66,9 @@ pub fn make<B: Board>(
     log: Option<&'static mut ExactLog>,
     radio: Option<&'static mut RadioLine>,
     black_box: Option<&'static mut CardLog>,
-) -> &'static mut Desk {
-    static DESK: StaticCell<Desk> = StaticCell::new();
-    DESK.init_with(|| {
+) -> &'static mut CommsParts {
+    static PARTS: StaticCell<CommsParts> = StaticCell::new();
+    PARTS.init_with(|| {
         let boot_loader = B::BOOT_LOADER.is_some();
         let reboots: &[_] = if boot_loader { &[Reboot::Program, Reboot::BootLoader] } else { &[Reboot::Program] };
         let calibrates = B::Sampler::SENSES;
@@ -81,7 +81,7 @@ pub fn make<B: Board>(
 
 /// Receives messages, and reports every tick on every link, of which there are `OTHERS` beside the first.
 pub async fn run<B: Board, const OTHERS: usize>(
-    (comms, table, log, radio, black_box): &mut Desk,
+    (comms, table, log, radio, black_box): &mut CommsParts,
     links: &mut B::Links,
 ) -> ! {
     // The first link's is in `comms`.
@@ -96,7 +96,7 @@ pub async fn run<B: Board, const OTHERS: usize>(
     let mut outgoing = Vec::<u8, REPORT_MAX>::new();
     let mut leaving = 0;
     let mut calibrator = B::Sampler::SENSES.then(calibrator);
-    let mut esc_desk = B::ESCS.then(|| escs::desk(table));
+    let mut esc_reports = B::ESCS.then(|| escs::reports(table));
     loop {
         match select(receive(links, &mut incoming), ticks::next()).await {
             Either::First((link, length)) => {
@@ -160,12 +160,12 @@ pub async fn run<B: Board, const OTHERS: usize>(
                 let others = [kept.as_ref().map(|log| log.link()), radio.as_ref().and_then(|radio| radio.link())];
                 let changed = serve(comms, table, kept, &mut outgoing);
                 if B::ESCS
-                    && let Some(desk) = &mut esc_desk
+                    && let Some(reports) = &mut esc_reports
                 {
                     if changed.is_some() {
-                        desk.adopt(table.configuration());
+                        reports.adopt(table.configuration());
                     }
-                    if let Some(news) = listen_to_escs(comms, desk, &tick) {
+                    if let Some(news) = listen_to_escs(comms, reports, &tick) {
                         pass_on::<B>(&news, log);
                     }
                 }
@@ -291,7 +291,7 @@ fn report_self_tests(comms: &mut Comms, aux: &mut AuxSensors) {
 /// Takes what the motor controllers have told, asks the next one and moves the notch; returns what the vehicle is to do
 /// about a rotor's failure. Out of line like the report.
 #[inline(never)]
-fn listen_to_escs(comms: &mut Comms, desk: &mut EscReports, tick: &Tick) -> Option<ControlInputs> {
+fn listen_to_escs(comms: &mut Comms, reports: &mut EscReports, tick: &Tick) -> Option<ControlInputs> {
     let mut heard = Vec::<u8, 32>::new();
     while !heard.is_full()
         && let Some(byte) = escs::heard()
@@ -299,7 +299,7 @@ fn listen_to_escs(comms: &mut Comms, desk: &mut EscReports, tick: &Tick) -> Opti
         // There is room.
         let _ = heard.push(byte);
     }
-    let EscAction { ask, notch, inputs } = comms.escs(desk, &heard, &tick.report);
+    let EscAction { ask, notch, inputs } = comms.escs(reports, &heard, &tick.report);
     ask.into_iter().for_each(escs::ask);
     notch.into_iter().for_each(escs::move_notch);
     inputs

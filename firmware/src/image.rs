@@ -45,11 +45,11 @@ macro_rules! image {
 
         #[embassy_executor::task]
         async fn comms(
-            desk: &'static mut $crate::comms::Desk,
+            parts: &'static mut $crate::comms::CommsParts,
             mut links: <$board as $crate::board::Board>::Links,
         ) -> ! {
             const OTHERS: usize = <<$board as $crate::board::Board>::Links as $crate::board::Links>::COUNT - 1;
-            $crate::comms::run::<$board, OTHERS>(desk, &mut links).await
+            $crate::comms::run::<$board, OTHERS>(parts, &mut links).await
         }
 
         #[embassy_executor::task]
@@ -124,10 +124,10 @@ macro_rules! image {
         #[inline(never)]
         fn spawn_comms(
             spawner: embassy_executor::SendSpawner,
-            desk: &'static mut $crate::comms::Desk,
+            parts: &'static mut $crate::comms::CommsParts,
             links: <$board as $crate::board::Board>::Links,
         ) {
-            spawner.spawn(comms(desk, links).expect("spawned once"));
+            spawner.spawn(comms(parts, links).expect("spawned once"));
         }
 
         #[inline(never)]

@@ -60,19 +60,19 @@ pub fn run<B: Board>(
     sample: impl FnOnce(SendSpawner, B::Sampler),
     aid: impl FnOnce(SendSpawner, B::Aids),
     control: impl FnOnce(SendSpawner, &'static mut vehicle::Flight, B),
-    comms: impl FnOnce(SendSpawner, &'static mut comms::Desk, B::Links),
+    comms: impl FnOnce(SendSpawner, &'static mut comms::CommsParts, B::Links),
     keeper: impl FnOnce(SendSpawner, parameters::Keeper<B::Memory>),
     logging: impl FnOnce(SendSpawner, logging::BlockReceiver, B::Card),
 ) -> ! {
     let executors = executors::start(&mut core, lines);
     let Parts { mut board, sampler, aids, mut links, memory, card } = B::start(&mut core, executors.control);
-    let (kept, desk, blocks) = read::<B>(memory, &mut links);
-    let (_, table, ..) = desk;
+    let (kept, parts, blocks) = read::<B>(memory, &mut links);
+    let (_, table, ..) = parts;
     board.set_motor_protocol(table.configuration().outputs.protocol);
     let flight = control::make(table.configuration());
     board.unleash_watchdog();
     time::start(core.SYST, B::CORE_HZ);
-    comms(executors.comms, desk, links);
+    comms(executors.comms, parts, links);
     if let Some(spawner) = executors.sampling {
         sample(spawner, sampler);
     }
@@ -99,7 +99,7 @@ pub fn run<B: Board>(
 fn read<B: Board>(
     memory: B::Memory,
     links: &mut B::Links,
-) -> (parameters::Keeper<B::Memory>, &'static mut comms::Desk, Option<logging::BlockReceiver>) {
+) -> (parameters::Keeper<B::Memory>, &'static mut comms::CommsParts, Option<logging::BlockReceiver>) {
     let (kept, table, signing) = parameters::read(memory, B::STORE);
     for link in links.each() {
         link.transmitter.set_baud(table.configuration().link.baud);

@@ -20,7 +20,7 @@ use afbc_recorder::{Given, Recorder, TickRecord};
 use afbc_scenario::contender::{ControllerKind, Law};
 use afbc_scenario::{AnyController, FlownLaw};
 use afbc_station::services::signing::{Signing, SigningRecord};
-use afbc_station::{Calibrator, Comms, EscAction, EscDesk, RadioControl, Setup, Transfers};
+use afbc_station::{Calibrator, Comms, EscAction, EscReports, RadioControl, Setup, Transfers};
 use afbc_store::Store;
 use afbc_types::{OutOfRange, ROTORS_MAX, with_rotors};
 use afbc_ulog::{BlackBox, LogStart, TakenInputs};
@@ -126,7 +126,7 @@ struct Aircraft<const N: usize> {
     table: ParameterTable<N>,
     law: FlownLaw,
     /// The motor controllers' line.
-    escs: EscDesk,
+    escs: EscReports,
 }
 
 /// What reports a tick that took so long.
@@ -319,7 +319,7 @@ impl Host {
     fn of<const N: usize>(table: ParameterTable<N>, law: FlownLaw, names: [&str; 2]) -> Result<Self, OutOfRange> {
         let setup = Setup { calibrates: true, ..Setup::of(&table.configuration().link) };
         let flight = Flight::of(law.prepare(table.configuration())?);
-        let escs = EscDesk::new(table.configuration());
+        let escs = EscReports::new(table.configuration());
         Ok(Host {
             escs: Vec::new(),
             asks_esc: None,

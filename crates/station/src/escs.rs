@@ -16,7 +16,7 @@ const FAILURE: u8 = 253;
 
 /// The line of the motor controllers, and who watches what comes over it.
 #[derive(Clone, Debug)]
-pub struct EscDesk {
+pub struct EscReports {
     line: EscLine,
     monitor: RotorMonitor,
     follower: NotchFollower,
@@ -34,12 +34,12 @@ pub struct EscAction {
     pub inputs: Option<ControlInputs>,
 }
 
-impl EscDesk {
+impl EscReports {
     /// Creates it for a vehicle with this configuration, whose parameters are in their ranges.
     #[must_use]
     pub fn new<const N: usize>(configuration: &Configuration<N>) -> Self {
         let Configuration { airframe, response, curve, escs, .. } = configuration;
-        EscDesk {
+        EscReports {
             line: EscLine::new(u8::try_from(N).unwrap_or(u8::MAX)),
             monitor: RotorMonitor::new(response, curve),
             follower: NotchFollower::new(OutputFilter::of(&airframe.parameters, N).notch().copied()),
@@ -73,16 +73,16 @@ struct EscTick<'a> {
 impl Comms {
     /// Takes what has come over the motor controllers' line since the last tick, to be called after each
     /// [`report`](Self::report), also without any bytes.
-    pub fn escs<const N: usize>(&mut self, desk: &mut EscDesk, bytes: &[u8], report: &Report<N>) -> EscAction {
+    pub fn escs<const N: usize>(&mut self, reports: &mut EscReports, bytes: &[u8], report: &Report<N>) -> EscAction {
         let (armed, airborne) = (report.mode.armed(), report.guided.airborne);
         let tick = EscTick { now_us: report.time_us, armed, airborne, speeds: report.motors.0.as_slice() };
-        self.listen(desk, bytes, &tick)
+        self.listen(reports, bytes, &tick)
     }
 
     /// Not generic, so that it is compiled for size.
     #[inline(never)]
-    fn listen(&mut self, desk: &mut EscDesk, bytes: &[u8], tick: &EscTick<'_>) -> EscAction {
-        let EscDesk { line, monitor, follower, settings } = desk;
+    fn listen(&mut self, reports: &mut EscReports, bytes: &[u8], tick: &EscTick<'_>) -> EscAction {
+        let EscReports { line, monitor, follower, settings } = reports;
         let EscTick { now_us, armed, airborne, speeds } = *tick;
         let (dispatcher, mut action) = (&mut self.dispatcher, EscAction::default());
         let escs = &mut dispatcher.status.escs;

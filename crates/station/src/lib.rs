@@ -31,7 +31,7 @@ mod transfers;
 
 pub use afbc_link::Reboot;
 pub use comms::{CLOCK_FAILED, Comms, REPORT_MAX, TICK_OFF};
-pub use escs::{EscAction, EscDesk};
+pub use escs::{EscAction, EscReports};
 pub use radio::{RADIO_FRAME_MAX, RadioControl};
 pub use services::calibration::Calibrator;
 pub use services::commands::{
