@@ -52,8 +52,8 @@ pub(crate) fn heard() -> Option<u8> {
 /// Creates what listens to the line, to be called once, by a board that has it: the others do not have its memory.
 #[inline(never)]
 pub(crate) fn reports(table: &ParameterTable) -> &'static mut EscReports {
-    static DESK: StaticCell<EscReports> = StaticCell::new();
-    DESK.init_with(|| EscReports::new(table.configuration()))
+    static REPORTS: StaticCell<EscReports> = StaticCell::new();
+    REPORTS.init_with(|| EscReports::new(table.configuration()))
 }
 
 /// Moves the notch before the next tick.

@@ -115,12 +115,12 @@ fn a_lost_vehicle_is_part_of_the_comparison() {
 fn compare_refuses_what_it_cannot_fly() {
     let folder = soft("refused");
     let line = refused(&sitl(&folder, &["compare", "soft.toml", "--controllers", "sof"]));
-    assert!(line.starts_with("--controllers sof: no such controller; there are afbc, afbc-as-printed,"), "{line}");
+    assert!(line.starts_with("controllers sof: no such controller; there are afbc, afbc-as-printed,"), "{line}");
     assert_eq!(line.lines().count(), 1);
     let line = refused(&sitl(&folder, &["compare", "hardwear"]));
     assert_eq!(line, "hardwear: no such scenario; did you mean hardware?\n");
     let line = refused(&sitl(&folder, &["compare", "hover", "--controllers", "pid,pid"]));
-    assert_eq!(line, "--controllers pid: named twice; once is enough\n");
+    assert_eq!(line, "controllers pid: named twice; once is enough\n");
     refused(&sitl(&folder, &["compare", "hover", "--seeds", "0"]));
     assert!(!folder.join("out").exists());
 }
@@ -210,7 +210,7 @@ fn a_suite_that_cannot_be_flown_is_refused_in_one_line() {
         (&["--suite", "feild"][..], "feild: no such suite; did you mean field?"),
         (&["--suite", "./nothing.toml"], "./nothing.toml: no such file; `sitl suites` lists the built-in ones"),
         (&["--suite", "bad.toml"], "bad.toml:19: flight.like: no flight above is called \"nobody\""),
-        (&["--suite", "faults", "--controllers", "sof"], "--controllers sof: no such controller; there are afbc,"),
+        (&["--suite", "faults", "--controllers", "sof"], "controllers sof: no such controller; there are afbc,"),
     ] {
         let line = refused(&sitl(&folder, &[&["compare"], arguments].concat()));
         assert!(line.starts_with(expected) && line.lines().count() == 1, "{line}");
@@ -264,7 +264,7 @@ fn random_flights_that_cannot_be_drawn_are_refused_in_one_line() {
     let own = "drawn from a seed, not a file; fly it with `sitl compare --suite random --seed N`";
     for (arguments, expected) in [
         (&["suites", "random"][..], &*format!("random: {own}")),
-        (&["compare", "--suite", "random", "--vehicle", "raser"], "--vehicle: \"raser\" is no built-in vehicle"),
+        (&["compare", "--suite", "random", "--vehicle", "raser"], "vehicle: \"raser\" is no built-in vehicle"),
         (&["compare", "--suite", "random", "--vehicle", "./no.toml"], "./no.toml: no such file"),
         (&["compare", "--suite", "random", "--against", "sof"], "--against sof: does not fly; name one of afbc, "),
         (&["compare", "--suite", "field", "--seed", "2"], "--seed: only --suite random takes it"),

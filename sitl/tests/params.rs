@@ -79,7 +79,7 @@ fn a_bad_line_gets_one_line_and_changes_nothing() {
         (&["params", "export", "--store", "short.store"], "short.store: no store of parameters: 8 bytes, not 32768"),
         (&["params", "import", "none.params", "--store", "a.store"], "none.params: cannot be read"),
         (&["params", "import", "none.params"], "--store: missing"),
-        (&["params", "export", "--vehicle", "racr"], "--vehicle: \"racr\" is no built-in vehicle"),
+        (&["params", "export", "--vehicle", "racr"], "vehicle: \"racr\" is no built-in vehicle"),
     ] {
         let error = refused(&sitl(&folder, arguments));
         assert!(error.starts_with(expected) && error.lines().count() == 1, "{error}, not {expected}");

@@ -15,8 +15,8 @@ use rayon::prelude::*;
 pub fn standard() -> Vec<Contender> {
     let flying = |kind| Contender::of(kind, Profile::Flight);
     let printed = Contender { name: "afbc-as-printed".into(), ..Contender::of(ControllerKind::Afbc, Profile::Paper) };
-    let [afbc, others @ ..] = ControllerKind::ALL;
-    [flying(afbc), printed].into_iter().chain(others.map(flying)).collect()
+    let others = ControllerKind::all().into_iter().filter(|kind| *kind != ControllerKind::Afbc);
+    [flying(ControllerKind::Afbc), printed].into_iter().chain(others.map(flying)).collect()
 }
 
 /// Returns the contenders of a suite: the default ones, and AFBC under its monitor.
@@ -24,6 +24,33 @@ pub fn standard_and_monitored() -> Vec<Contender> {
     let guarded = Contender::of(ControllerKind::Afbc, Profile::Flight).monitored();
     let guarded = Contender { name: "afbc-monitored".into(), ..guarded };
     standard().into_iter().chain([guarded]).collect()
+}
+
+/// Returns the contenders `names`, in that order: of `own`, or else the standard ones.
+///
+/// # Errors
+/// One line on a name that is unknown, or named twice.
+pub fn choose(own: &[Contender], names: &[String]) -> Result<Vec<Contender>, FileError> {
+    let standard = standard();
+    let mut chosen: Vec<Contender> = Vec::new();
+    for name in names {
+        let Some(contender) = own.iter().chain(&standard).find(|contender| &contender.name == name) else {
+            let mut known: Vec<_> = own.iter().chain(&standard).map(|contender| contender.name.as_str()).collect();
+            known.sort_unstable();
+            known.dedup();
+            let problem = format!("no such controller; there are {}", known.join(", "));
+            return Err(unchosen(name, problem));
+        };
+        if chosen.iter().any(|other| other.name == contender.name) {
+            return Err(unchosen(name, "named twice; once is enough".into()));
+        }
+        chosen.push(contender.clone());
+    }
+    Ok(chosen)
+}
+
+fn unchosen(name: &str, problem: String) -> FileError {
+    FileError::whole(&format!("controllers {}", name.escape_debug()), problem)
 }
 
 /// Gives `scenario` these contenders, each with its gains for the scenario's vehicle, and checks them.

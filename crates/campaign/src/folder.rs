@@ -172,7 +172,7 @@ impl CampaignFolder {
     }
 
     /// Returns all rows, if they are already in one file.
-    pub(super) fn results(&self) -> Result<Option<Rows>, Error> {
+    pub fn results(&self) -> Result<Option<Rows>, Error> {
         let rows = Rows::open(&self.path().join(RESULTS))?;
         match rows {
             Some(rows) if !self.manifest.is_same(rows.manifest()) => Err(Error::Changed(self.path().into())),
@@ -237,7 +237,7 @@ fn write(out: &mut (dyn Write + Send), manifest: &Manifest, mut rows: impl Itera
 }
 
 /// The rows of one file, with errors that name it.
-pub(super) struct Rows {
+pub struct Rows {
     path: PathBuf,
     rows: Reader<OnDisk>,
 }

@@ -19,6 +19,7 @@ mod quantity;
 pub mod random;
 mod row;
 pub mod statistics;
+pub mod subject;
 pub mod suite;
 mod summary;
 
@@ -27,7 +28,7 @@ pub use draw::Draw;
 pub use error::Error;
 pub use file::parse;
 pub use fly::{fly, merge};
-pub use folder::CampaignFolder;
+pub use folder::{CampaignFolder, Rows};
 pub use manifest::{Drawn, Manifest, Shard, hash_of};
 pub use plan::{Campaign, NamedTrajectory, Spread};
 pub use quantity::{QUANTITIES, Quantity};

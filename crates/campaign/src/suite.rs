@@ -6,6 +6,7 @@ use afbc_reader::{BuiltIn, FileError, LIKE, Table};
 use afbc_scenario::Scenario;
 use afbc_scenario::contender::Contender;
 use afbc_types::Range;
+use std::ffi::OsStr;
 use std::path::Path;
 
 /// A suite of flights.
@@ -105,6 +106,33 @@ pub fn parse(file: &str, text: &str, name: &str, folder: &Path) -> Result<Suite,
         root.finish()?;
         Ok(Suite { name, description, sources, flights })
     })
+}
+
+/// Returns the error that no suite is called `name`.
+pub fn unknown(name: &str) -> FileError {
+    let cure = match BuiltIn::similar(&SUITES, name) {
+        Some(known) => format!("did you mean {}?", known.name),
+        None => "`sitl suites` lists the built-in ones; a file needs its path, as in ./my.toml".into(),
+    };
+    FileError::whole(name, format!("no such suite; {cure}"))
+}
+
+/// Reads and checks the suite at `path`: a plain name is first a built-in one, then a file.
+///
+/// # Errors
+/// The first mistake, as one line.
+pub fn suite_at(path: &Path) -> Result<Suite, FileError> {
+    let plain = path.to_str().filter(|text| !text.contains(['/', '\\', '.']));
+    if let Some(name) = plain {
+        match BuiltIn::named(&SUITES, name) {
+            Some(known) => return known.read(),
+            None if !path.exists() => return Err(unknown(name)),
+            None => {}
+        }
+    }
+    let text = afbc_reader::text(path, "suite")?;
+    let stem = path.file_stem().map_or("".into(), OsStr::to_string_lossy);
+    parse(&path.display().to_string(), &text, &stem, path.parent().unwrap_or(Path::new("")))
 }
 
 /// Reads a built-in suite.

@@ -7,7 +7,7 @@ use afbc_scenario::contender::Contender;
 use afbc_sim::columns::{ESTIMATE, MOTION};
 use afbc_sim::flight::Sample;
 use afbc_sim::flown::Flown;
-use afbc_types::{Axis, Parameters, PerAxis, State};
+use afbc_types::{Axis, PerAxis, State};
 use csv::ByteRecord;
 use nalgebra::Vector4;
 use std::io::{self, Write};
@@ -191,17 +191,38 @@ fn real(scenario: &Scenario) -> Vec<Column> {
     columns
 }
 
+/// Returns every row of a flight's log for its columns.
+fn rows<'a>(Flown { scenario, run }: &'a Flown) -> impl Iterator<Item = Row<'a>> {
+    let model = ModelConstants::new(&scenario.vehicle.to_f32());
+    let row =
+        move |(sample, extremes): (&'a Sample, &'a _)| Row { sample, extremes, lyapunov: lyapunov(&model, sample) };
+    run.log.iter().zip(&run.input_extremes).map(row)
+}
+
+/// Returns the columns of the flight's CSV file, names that end in the unit and values; flags are 0 and 1.
+pub fn values(flown: &Flown) -> Vec<(String, Vec<f64>)> {
+    let columns = columns(&flown.scenario, &flown.run.contender);
+    let mut values = vec![Vec::with_capacity(flown.run.log.len()); columns.len()];
+    for row in rows(flown) {
+        for (values, column) in values.iter_mut().zip(&columns) {
+            values.push(match (column.value)(&row) {
+                Single(value) => value.into(),
+                Double(value) => value,
+                Flag(value) => u8::from(value).into(),
+            });
+        }
+    }
+    columns.into_iter().map(|column| column.name).zip(values).collect()
+}
+
 /// Writes the header and one line for each logged step.
-pub(super) fn write(out: &mut dyn Write, Flown { scenario, run }: &Flown) -> io::Result<()> {
-    let vehicle: Parameters = scenario.vehicle.to_f32();
-    let model = ModelConstants::new(&vehicle);
-    let columns = columns(scenario, &run.contender);
+pub(super) fn write(out: &mut dyn Write, flown: &Flown) -> io::Result<()> {
+    let columns = columns(&flown.scenario, &flown.run.contender);
     let mut writer = csv::Writer::from_writer(out);
     writer.write_record(columns.iter().map(|column| &column.name))?;
     let mut digits = ryu::Buffer::new();
     let mut record = ByteRecord::new();
-    for (sample, extremes) in run.log.iter().zip(&run.input_extremes) {
-        let row = Row { sample, extremes, lyapunov: lyapunov(&model, sample) };
+    for row in rows(flown) {
         record.clear();
         for column in &columns {
             let field = match (column.value)(&row) {

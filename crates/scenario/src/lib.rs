@@ -7,6 +7,7 @@
 mod any_controller;
 mod built_in;
 pub mod case;
+mod choice;
 pub mod contender;
 mod definition;
 mod file;
@@ -14,9 +15,14 @@ mod flown_law;
 mod laws;
 pub mod paper;
 pub mod trajectory;
+mod vehicle_named;
 
 pub use built_in::{BUILT_IN, built_in, similar_built_in};
 pub use definition::{DURATION, Outage, Scenario};
 pub use file::{load, parse, read};
 pub use flown_law::FlownLaw;
-pub use laws::{AnyController, AnyControllerMemory};
+pub use laws::{
+    AnyController, AnyControllerMemory, OWN_GAINS_MAX, OwnController, OwnFlight, OwnGain, OwnGains, OwnKind, OwnLaw,
+    OwnMemory, OwnVehicle,
+};
+pub use vehicle_named::vehicle_named;

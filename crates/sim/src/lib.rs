@@ -4,5 +4,8 @@
 pub mod columns;
 pub mod flight;
 pub mod flown;
+mod log_rate;
 pub mod metrics;
 pub mod run;
+
+pub use log_rate::LogRate;

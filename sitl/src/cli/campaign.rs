@@ -2,17 +2,17 @@
 
 use super::flying::{Flying, report};
 use super::json::Json;
-use super::log_rate::LogRate;
 use super::place::Place;
 use super::progress::Progress;
-use super::subject::Kind;
 use super::target::Target;
 use super::terminal::{Failure, print, say};
 use super::vehicle::OnVehicle;
 use super::{interrupt, json};
+use afbc_campaign::subject::SubjectKind;
 use afbc_campaign::{self as campaign, BUILT_IN, Campaign as Plan, CampaignFolder, Manifest, Shard, Summary, built_in};
 use afbc_reader::BuiltIn;
 use afbc_report::campaign as report;
+use afbc_sim::LogRate;
 use clap::Args;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -200,7 +200,7 @@ impl Campaigns {
     /// Prints the list or the file.
     pub(super) fn run(self) -> Result<ExitCode, Failure> {
         match self.name {
-            Some(name) => print(built_in(&name).ok_or_else(|| Kind::Campaign.unknown(&name))?.text)?,
+            Some(name) => print(built_in(&name).ok_or_else(|| SubjectKind::Campaign.unknown(&name))?.text)?,
             None => {
                 let all = BUILT_IN.iter().map(BuiltIn::read).collect::<Result<Vec<_>, _>>()?;
                 match self.json.json {

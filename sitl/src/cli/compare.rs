@@ -1,15 +1,15 @@
 //! `sitl compare`.
 
-use super::log_rate::LogRate;
 use super::progress::Progress;
 use super::target::Target;
 use super::terminal::Failure;
 use super::vehicle::OnVehicle;
 use super::written::{Output, show};
 use super::{interrupt, random, suite};
-use afbc_campaign::compare::{self, standard};
+use afbc_campaign::compare::{self, choose, standard};
+use afbc_campaign::suite::suite_at;
 use afbc_report::compare as report;
-use afbc_scenario::contender::Contender;
+use afbc_sim::LogRate;
 use clap::Args;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -68,7 +68,7 @@ impl Compare {
                 }
                 return random.run(self.on.vehicle()?, [&contenders, &own], seeds, &output);
             }
-            let suite = suite::named(path)?;
+            let suite = suite_at(path)?;
             if let Some(option) = self.on.vehicle()?.map(|_| "--vehicle").or_else(|| random.given()) {
                 let cure = "only --suite random takes it, this suite's flights are in its file; leave it out";
                 return Err(format!("{option}: {cure}").into());
@@ -101,24 +101,4 @@ impl Compare {
         show(&folder, written.len(), json, object, || report::table(&comparisons))?;
         Ok(ExitCode::SUCCESS)
     }
-}
-
-/// Returns the contenders `names`, in that order: of the scenarios, or else the standard ones.
-fn choose(own: &[Contender], names: &[String]) -> Result<Vec<Contender>, Failure> {
-    let standard = standard();
-    let mut chosen: Vec<Contender> = Vec::new();
-    for name in names {
-        let Some(contender) = own.iter().chain(&standard).find(|contender| &contender.name == name) else {
-            let mut known: Vec<_> = own.iter().chain(&standard).map(|contender| contender.name.as_str()).collect();
-            known.sort_unstable();
-            known.dedup();
-            let problem = format!("no such controller; there are {}", known.join(", "));
-            return Err(format!("--controllers {}: {problem}", name.escape_debug()).into());
-        };
-        if chosen.iter().any(|other| other.name == contender.name) {
-            return Err(format!("--controllers {name}: named twice; once is enough").into());
-        }
-        chosen.push(contender.clone());
-    }
-    Ok(chosen)
 }

@@ -5,11 +5,11 @@ use super::json::{self, Json};
 use super::place::Place;
 use super::progress::Progress;
 use super::terminal::{Failure, print, say};
-use super::vehicle::named;
 use super::written::show;
 use afbc_replay::exact::{SettingChange, replay};
 use afbc_report::exact as report;
 use afbc_report::exact::{ReplayedLog, problem, table, write};
+use afbc_scenario::vehicle_named;
 use clap::Args;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -39,7 +39,7 @@ pub(super) struct Exact {
 impl Exact {
     /// Replays, writes, prints.
     pub(super) fn run(&self, path: &Path, place: &Place, json: Json) -> Result<ExitCode, Failure> {
-        let vehicle = self.vehicle.as_deref().map(named).transpose()?;
+        let vehicle = self.vehicle.as_deref().map(vehicle_named).transpose()?;
         let name = path.file_stem().map_or(String::new(), |stem| stem.to_string_lossy().into_owned());
         let all = path.metadata().map_or(0, |metadata| metadata.len()) / KB;
         let progress = if all > QUIET_KB { Progress::new(&name, "KB", all, 0) } else { Progress::hidden() };

@@ -101,12 +101,12 @@ fn written(vehicles: &[Vehicle]) -> impl Iterator<Item = &Vehicle> {
 
 /// Returns the laws of these names; without names all but backstepping, which flies with AFBC's gains.
 fn laws(names: &[String]) -> Result<Vec<ControllerKind>, Failure> {
-    let all = ControllerKind::ALL.into_iter();
+    let all = ControllerKind::all().into_iter();
     if names.is_empty() {
         return Ok(all.filter(|kind| *kind != ControllerKind::Backstepping).collect());
     }
-    if let Some(unknown) = names.iter().find(|name| !ControllerKind::ALL.iter().any(|kind| kind.name() == **name)) {
-        let laws = ControllerKind::ALL.map(ControllerKind::name).join(", ");
+    if let Some(unknown) = names.iter().find(|name| ControllerKind::named(name).is_none()) {
+        let laws = ControllerKind::names();
         return Err(format!("{}: no such law; the laws are {laws}", unknown.escape_debug()).into());
     }
     Ok(all.filter(|kind| names.iter().any(|name| kind.name() == name)).collect())

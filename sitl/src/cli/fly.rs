@@ -9,9 +9,6 @@ use super::plan::{PlanFlight, is_plan};
 use super::target::Target;
 use super::terminal::{Failure, say};
 use super::vehicle::OnVehicle;
-use afbc::Profile;
-use afbc_scenario::Scenario;
-use afbc_scenario::contender::{Contender, ControllerKind};
 use clap::Args;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -67,7 +64,7 @@ impl Fly {
         }
         let mut scenario = self.scenario.scenario()?;
         if !self.controllers.is_empty() {
-            choose(&mut scenario, &self.controllers)?;
+            scenario.choose(&self.controllers)?;
         }
         let scenario = self.on.put(scenario)?;
         let name = scenario.name.clone();
@@ -95,33 +92,4 @@ impl Fly {
         }
         PlanFlight { path, on, duration: flying.duration, exact_log, ulog, mcap }.run()
     }
-}
-
-/// Keeps the contenders named in `names`, or whose law is, in their order, and adds the laws named that no contender
-/// flies.
-fn choose(scenario: &mut Scenario, names: &[String]) -> Result<(), Failure> {
-    let called = |contender: &Contender, name: &str| contender.name == name || contender.kind().name() == name;
-    for name in names {
-        if scenario.contenders.iter().any(|contender| called(contender, name)) {
-            continue;
-        }
-        let Some(kind) = ControllerKind::ALL.into_iter().find(|kind| kind.name() == name) else {
-            let laws = ControllerKind::ALL.map(ControllerKind::name).join(", ");
-            let own: Vec<_> = scenario.contenders.iter().map(|contender| contender.name.as_str()).collect();
-            let problem =
-                format!("no such controller; the laws are {laws}, the scenario's contenders {}", own.join(", "));
-            return Err(format!("--controller {}: {problem}", name.escape_debug()).into());
-        };
-        let mut contender = Contender::of(kind, Profile::Paper);
-        contender = match &scenario.vehicle_file {
-            Some(vehicle) => contender.on(vehicle, Profile::Flight)?,
-            None => contender.for_vehicle(&scenario.vehicle),
-        };
-        if let Some(other) = scenario.contenders.first() {
-            contender.settings = other.settings;
-        }
-        scenario.contenders.push(contender);
-    }
-    scenario.contenders.retain(|contender| names.iter().any(|name| called(contender, name)));
-    Ok(scenario.check()?)
 }

@@ -2,7 +2,6 @@
 
 use super::interrupt;
 use super::json::Json;
-use super::log_rate::LogRate;
 use super::progress::Progress;
 use super::terminal::{Failure, say};
 use super::written::show;
@@ -10,6 +9,7 @@ use afbc_files::Folder;
 use afbc_report::claims::Claim;
 use afbc_report::flights;
 use afbc_scenario::{DURATION, Scenario};
+use afbc_sim::LogRate;
 use afbc_sim::flown::Flown;
 use afbc_sim::run::Run;
 use clap::Args;

@@ -1,12 +1,12 @@
 //! `sitl params`: the parameters of a vehicle, as ground stations' files.
 
 use super::terminal::{Failure, print, say};
-use super::vehicle::named;
 use afbc_files::{Flash, place};
 use afbc_onboard::parameters::{Kept, Parameter, ParameterTable, RecordChange};
 use afbc_reader::params::{Format, ParameterEntry, read, written};
 use afbc_reader::words::out_of_range;
 use afbc_reader::{FileError, Source};
+use afbc_scenario::vehicle_named;
 use afbc_store::{Error, RecordName, Store, hash};
 use afbc_types::with_rotors;
 use afbc_vehicles::Vehicle;
@@ -74,7 +74,7 @@ impl Params {
     /// Does what was asked.
     pub(super) fn run(self) -> Result<ExitCode, Failure> {
         let (Action::Export { of, .. } | Action::Import { of, .. } | Action::Diff { of, .. }) = &self.action;
-        let vehicle = named(&of.vehicle)?;
+        let vehicle = vehicle_named(&of.vehicle)?;
         with_rotors!(vehicle.rotors.len(), N => act::<N>(&self.action, &vehicle))?;
         Ok(ExitCode::SUCCESS)
     }

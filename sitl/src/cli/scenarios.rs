@@ -2,10 +2,10 @@
 
 use super::json;
 use super::json::Json;
-use super::subject::{Kind, Subject};
 use super::target::Target;
 use super::terminal::{Failure, print};
 use afbc_campaign::Campaign;
+use afbc_campaign::subject::{Subject, SubjectKind};
 use afbc_reader::BuiltIn;
 use afbc_scenario::contender::Contender;
 use afbc_scenario::{BUILT_IN, Scenario, built_in};
@@ -29,7 +29,7 @@ impl Scenarios {
     /// Prints the list or the file.
     pub(super) fn run(self) -> Result<ExitCode, Failure> {
         match self.name {
-            Some(name) => print(built_in(&name).ok_or_else(|| Kind::Scenario.unknown(&name))?.text)?,
+            Some(name) => print(built_in(&name).ok_or_else(|| SubjectKind::Scenario.unknown(&name))?.text)?,
             None => {
                 let all = BUILT_IN.iter().map(BuiltIn::read).collect::<Result<Vec<_>, _>>()?;
                 match self.json.json {

@@ -1,19 +1,17 @@
 //! `sitl compare --suite` and `sitl suites`: named lists of flights.
 
-use super::log_rate::LogRate;
 use super::progress::Progress;
 use super::terminal::{Failure, print};
 use super::written::{Output, show};
 use super::{interrupt, page, random};
 use afbc_campaign::compare::{self, Comparison};
 use afbc_campaign::random::NAME;
-use afbc_campaign::suite::{SUITES, Suite, parse};
+use afbc_campaign::suite::{self, SUITES, Suite};
 use afbc_reader::{BuiltIn, FileError};
 use afbc_report::suite::{self as report, FlownSuite};
 use afbc_scenario::contender::Contender;
+use afbc_sim::LogRate;
 use clap::Args;
-use std::ffi::OsStr;
-use std::path::Path;
 use std::process::ExitCode;
 
 /// List the built-in suites of flights, or print one of them to start from
@@ -33,7 +31,7 @@ impl Suites {
                 let cure = "fly it with `sitl compare --suite random --seed N`; docs/suites.md says what is drawn";
                 return Err(FileError::whole(&name, format!("drawn from a seed, not a file; {cure}")).into());
             }
-            Some(name) => print(BuiltIn::named(&SUITES, &name).ok_or_else(|| unknown(&name))?.text)?,
+            Some(name) => print(BuiltIn::named(&SUITES, &name).ok_or_else(|| suite::unknown(&name))?.text)?,
             None => {
                 let all = SUITES.iter().map(BuiltIn::read).collect::<Result<Vec<_>, _>>()?;
                 let mut lines: String =
@@ -48,29 +46,6 @@ impl Suites {
 
 fn line(name: &str, flights: usize, description: &str) -> String {
     format!("{name:<12}{flights:>4} flights  {description}\n")
-}
-
-fn unknown(name: &str) -> FileError {
-    let cure = match BuiltIn::similar(&SUITES, name) {
-        Some(known) => format!("did you mean {}?", known.name),
-        None => "`sitl suites` lists the built-in ones; a file needs its path, as in ./my.toml".into(),
-    };
-    FileError::whole(name, format!("no such suite; {cure}"))
-}
-
-/// Reads the suite at `path`: a plain name is first a built-in one, then a file.
-pub(super) fn named(path: &Path) -> Result<Suite, FileError> {
-    let plain = path.to_str().filter(|text| !text.contains(['/', '\\', '.']));
-    if let Some(name) = plain {
-        match BuiltIn::named(&SUITES, name) {
-            Some(known) => return known.read(),
-            None if !path.exists() => return Err(unknown(name)),
-            None => {}
-        }
-    }
-    let text = afbc_reader::text(path, "suite")?;
-    let stem = path.file_stem().map_or("".into(), OsStr::to_string_lossy);
-    parse(&path.display().to_string(), &text, &stem, path.parent().unwrap_or(Path::new("")))
 }
 
 /// Flies `suite` under `contenders`; then writes the folder and prints, or writes the table into a page.

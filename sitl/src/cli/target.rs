@@ -1,8 +1,8 @@
 //! A scenario or campaign named on the command line.
 
-use super::subject::{self, Subject};
 use super::terminal::Failure;
 use afbc_campaign::Campaign;
+use afbc_campaign::subject::{self, Subject};
 use afbc_scenario::Scenario;
 use std::ffi::OsString;
 use std::fmt;

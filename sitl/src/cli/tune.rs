@@ -6,11 +6,10 @@ use super::json::Json;
 use super::progress::Progress;
 use super::target::Target;
 use super::terminal::{Failure, print};
-use super::vehicle::named;
 use afbc::Profile;
 use afbc_files::Error;
-use afbc_scenario::Scenario;
 use afbc_scenario::contender::{Contender, ControllerKind};
+use afbc_scenario::{Scenario, vehicle_named};
 use afbc_tune::{self as tune, SearchOptions, SearchResult};
 use afbc_vehicles::Vehicle;
 use clap::Args;
@@ -83,7 +82,7 @@ impl Tune {
     pub(super) fn run(self) -> Result<ExitCode, Failure> {
         let scenarios = self.scenarios.iter().map(Target::scenario).collect::<Result<Vec<_>, _>>()?;
         let from = self.from.as_ref().map(Target::scenario).transpose()?;
-        let mut vehicles = self.vehicles.iter().map(|path| named(path)).collect::<Result<Vec<_>, _>>()?;
+        let mut vehicles = self.vehicles.iter().map(|path| vehicle_named(path)).collect::<Result<Vec<_>, _>>()?;
         let course = SearchOptions { budget: self.budget as usize, step: self.step, seed: self.seed };
         if let Some(folder) = &self.fleet {
             let (laws, write) = (&self.contenders, self.write.as_deref());
@@ -159,10 +158,10 @@ fn start(name: &str, scenario: Option<&Scenario>, vehicle: Option<&Vehicle>) -> 
             None => contender,
         });
     }
-    let law = ControllerKind::ALL.into_iter().find(|kind| kind.name() == name);
+    let law = ControllerKind::named(name);
     let by_hand = |kind| vehicle.map_or_else(|| tune::by_hand(kind), |vehicle| tune::by_hand_on(kind, vehicle));
     law.map(by_hand).ok_or_else(|| {
-        let laws = ControllerKind::ALL.map(ControllerKind::name).join(", ");
+        let laws = ControllerKind::names();
         let own: Vec<_> = own.iter().map(|contender| contender.name.as_str()).collect();
         let own =
             if own.is_empty() { String::new() } else { format!("; the scenario's contenders {}", own.join(", ")) };

@@ -6,11 +6,10 @@ use afbc::Profile;
 use afbc_campaign::Campaign;
 use afbc_reader::words::out_of_range;
 use afbc_reader::{BuiltIn, FileError};
-use afbc_scenario::Scenario;
-use afbc_scenario::contender::{ControllerKind, Law};
+use afbc_scenario::{Scenario, vehicle_named};
 use afbc_vehicles::{BUILT_IN, Vehicle, built_in, unknown};
 use clap::Args;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 /// Of every command that flies.
@@ -25,7 +24,7 @@ pub(crate) struct OnVehicle {
 impl OnVehicle {
     /// The vehicle that was asked for, checked.
     pub(crate) fn vehicle(&self) -> Result<Option<Vehicle>, Failure> {
-        Ok(self.vehicle.as_deref().map(named).transpose()?)
+        Ok(self.vehicle.as_deref().map(vehicle_named).transpose()?)
     }
 
     /// The scenario on the vehicle that was asked for, or as it is.
@@ -57,22 +56,6 @@ impl OnVehicle {
     pub(crate) fn arguments(&self, target: &Target) -> String {
         self.vehicle.as_ref().map_or(target.to_string(), |path| format!("{target} --vehicle {}", path.display()))
     }
-}
-
-/// The vehicle that `path` stands for, checked: a plain name is a built-in one first, then a file.
-pub(super) fn named(path: &Path) -> Result<Vehicle, FileError> {
-    let plain = path.to_str().filter(|text| !text.contains(['/', '\\', '.']));
-    let vehicle = match plain {
-        Some(name) => match built_in(name) {
-            Some(known) => known.read(),
-            None if !path.exists() => Err(FileError::whole("--vehicle", unknown(name))),
-            None => afbc_vehicles::load(path),
-        },
-        None => afbc_vehicles::load(path),
-    }?;
-    // Gains of every law, so that a slip in a table's name is reported whoever flies.
-    Law::on(ControllerKind::Afbc, &vehicle, Profile::Flight)?;
-    Ok(vehicle)
 }
 
 /// List the built-in vehicles, or print one of them to start from

@@ -25,10 +25,10 @@ impl FromStr for SettingChange {
         let (key, value) = text.split_once('=').ok_or("it must be KEY=VALUE, as in MPC_XY_VEL_MAX=4 or law=pid")?;
         let (key, value) = (key.trim(), value.trim());
         if key == LAW {
-            let kind = ControllerKind::ALL.into_iter().find(|kind| kind.name() == value);
-            return kind.map(SettingChange::Law).ok_or_else(|| {
-                format!("no such law; they are {}", ControllerKind::ALL.map(ControllerKind::name).join(", "))
-            });
+            let kind = ControllerKind::named(value);
+            return kind
+                .map(SettingChange::Law)
+                .ok_or_else(|| format!("no such law; they are {}", ControllerKind::names()));
         }
         let name = RecordName::new(key).ok_or("no such parameter; `sitl params export` lists them")?;
         let value: Option<f32> = value.parse().ok().filter(|value: &f32| value.is_finite());

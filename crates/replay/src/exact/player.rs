@@ -81,7 +81,7 @@ impl Refusal {
 impl Players {
     /// Makes those of a log of this start.
     pub(super) fn of(vehicle: &Vehicle, start: &StartRecord, changes: &[SettingChange]) -> Result<Self, Refusal> {
-        let flown = ControllerKind::ALL.into_iter().find(|kind| kind.name() == start.law.as_str());
+        let flown = ControllerKind::named(start.law.as_str());
         let Some(flown) = flown else {
             let law = start.law.escape_debug();
             return Err(Refusal::Log(format!(

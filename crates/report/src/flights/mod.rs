@@ -3,6 +3,7 @@
 #[cfg(test)]
 mod tests;
 
+pub use crate::csv::values as columns;
 pub use crate::summary::write as json;
 pub use crate::table::table;
 

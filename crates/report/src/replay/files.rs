@@ -2,7 +2,7 @@
 
 use super::{Replay, cells};
 use afbc_estimator::Estimate;
-use afbc_replay::{EstimatorStart, Figures, LoggedState};
+use afbc_replay::{EstimatorStart, Figures, LoggedState, ReplayRow};
 use afbc_types::State;
 use nalgebra::{Quaternion, Vector3};
 use serde::Serialize;
@@ -24,17 +24,35 @@ const SIGMAS: [&str; 9] = [
     "rz_sigma_rad",
 ];
 
+/// Names of the columns beside the time: ours, its standard deviations, the log's.
+fn head() -> impl Iterator<Item = String> {
+    let logged = PARTS.iter().map(|part| format!("logged_{part}"));
+    PARTS.iter().chain(&SIGMAS).map(|name| (*name).to_owned()).chain(logged)
+}
+
+/// The values under them.
+fn fields(row: &ReplayRow) -> impl Iterator<Item = Option<f32>> {
+    let ours = row.ours.as_ref();
+    ours_of(ours).into_iter().chain(sigmas_of(ours)).chain(logged_of(&row.logged))
+}
+
+/// Returns the columns of the CSV file, names and values: NaN where there is none.
+pub fn columns(rows: &[ReplayRow]) -> Vec<(String, Vec<f64>)> {
+    let time_s = ("time_s".to_owned(), rows.iter().map(|row| row.time_s).collect());
+    let column = |(i, name)| {
+        let value = |row| fields(row).nth(i).flatten().map_or(f64::NAN, f64::from);
+        (name, rows.iter().map(value).collect())
+    };
+    std::iter::once(time_s).chain(head().enumerate().map(column)).collect()
+}
+
 /// Writes both estimates over time; a field is empty where there is none.
 pub(super) fn csv(out: &mut dyn Write, replay: &Replay<'_>) -> io::Result<()> {
     let mut csv = csv::Writer::from_writer(out);
-    let logged = PARTS.iter().map(|part| format!("logged_{part}"));
-    let head = PARTS.iter().chain(&SIGMAS).map(|name| (*name).to_owned()).chain(logged);
-    csv.write_record(std::iter::once("time_s".to_owned()).chain(head))?;
+    csv.write_record(std::iter::once("time_s".to_owned()).chain(head()))?;
     for row in &replay.replayed.rows {
-        let ours = row.ours.as_ref();
-        let fields = ours_of(ours).into_iter().chain(sigmas_of(ours)).chain(logged_of(&row.logged));
         let text = |value: Option<f32>| value.map_or(String::new(), |value| value.to_string());
-        csv.write_record(std::iter::once(format!("{:.6}", row.time_s)).chain(fields.map(text)))?;
+        csv.write_record(std::iter::once(format!("{:.6}", row.time_s)).chain(fields(row).map(text)))?;
     }
     csv.flush()
 }

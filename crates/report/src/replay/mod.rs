@@ -5,7 +5,7 @@ mod files;
 mod log;
 mod page;
 
-pub use files::json;
+pub use files::{columns, json};
 pub use log::Replay;
 
 use crate::figures;

@@ -76,7 +76,7 @@ impl Defaults<'_> {
 
 /// Reads all contenders, those of `controllers` first.
 pub(super) fn read(root: &mut Table<'_>, flown: Flown<'_>) -> Result<Vec<Contender>, FileError> {
-    let controllers = root.choices("controllers", &ControllerKind::ALL, ControllerKind::name)?;
+    let controllers = root.choices("controllers", &ControllerKind::all(), ControllerKind::name)?;
     let profile = root.choice("profile", &Profile::ALL, Profile::name)?.unwrap_or(flown.profile());
     let mut axes = flown.gains(profile);
     per_axis(root.table("gains")?, &mut axes)?;
@@ -102,7 +102,7 @@ fn contender(mut table: Table<'_>, file: Defaults<'_>, others: &[Contender]) -> 
     if others.iter().any(|other| other.name == name) {
         return Err(table.fault_at("name", format!("\"{name}\" is the name of another contender; choose another")));
     }
-    let kind = table.need_choice("controller", &ControllerKind::ALL, ControllerKind::name)?;
+    let kind = table.need_choice("controller", &ControllerKind::all(), ControllerKind::name)?;
     let mut defaults = match table.choice("profile", &Profile::ALL, Profile::name)? {
         Some(profile) => Defaults {
             profile,

@@ -27,31 +27,45 @@ macro_rules! laws {
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         pub enum ControllerKind {
             $( #[doc = $doc] $Law, )*
+            /// A law from outside the list.
+            Own(OwnKind),
         }
 
         impl ControllerKind {
-            /// Every law.
+            /// Every law of the list.
             pub const ALL: [ControllerKind; [$($name),*].len()] = [$( ControllerKind::$Law ),*];
 
             /// Returns the lower-case name, as in scenario files and logs.
             pub const fn name(self) -> &'static str {
-                match self { $( ControllerKind::$Law => $name, )* }
+                match self {
+                    $( ControllerKind::$Law => $name, )*
+                    ControllerKind::Own(kind) => kind.name(),
+                }
             }
 
             /// Returns the name for tables and figures.
             pub const fn title(self) -> &'static str {
-                match self { $( ControllerKind::$Law => $title, )* }
+                match self {
+                    $( ControllerKind::$Law => $title, )*
+                    ControllerKind::Own(kind) => kind.title(),
+                }
             }
 
             /// Returns the prefix of its gains' names on a ground station.
             pub const fn prefix(self) -> &'static str {
-                match self { $( ControllerKind::$Law => $prefix, )* }
+                match self {
+                    $( ControllerKind::$Law => $prefix, )*
+                    ControllerKind::Own(_) => "OWN_",
+                }
             }
 
             /// True for a law of AFBC's cascade, with gains for each axis; the others have one set for the whole
             /// vehicle.
             pub const fn in_cascade(self) -> bool {
-                match self { $( ControllerKind::$Law => $in_cascade, )* }
+                match self {
+                    $( ControllerKind::$Law => $in_cascade, )*
+                    ControllerKind::Own(_) => false,
+                }
             }
         }
 
@@ -60,6 +74,8 @@ macro_rules! laws {
         #[expect(clippy::large_enum_variant, reason = "a law flies with its controller; this is copied before")]
         pub enum Law {
             $( #[doc = concat!("See [`ControllerKind::", stringify!($Law), "`].")] $Law($Gains), )*
+            /// See [`ControllerKind::Own`].
+            Own(OwnGains),
         }
 
         impl Law {
@@ -71,17 +87,24 @@ macro_rules! laws {
                         let $afbc = afbc;
                         Law::$Law($tuned)
                     } )*
+                    ControllerKind::Own(kind) => Law::Own(OwnGains::of(kind)),
                 }
             }
 
             /// Returns the law of this kind with hand-tuned gains, from which a search starts.
             pub fn by_hand(kind: ControllerKind) -> Self {
-                match kind { $( ControllerKind::$Law => Law::$Law($by_hand), )* }
+                match kind {
+                    $( ControllerKind::$Law => Law::$Law($by_hand), )*
+                    ControllerKind::Own(kind) => Law::Own(OwnGains::of(kind)),
+                }
             }
 
             /// Returns the kind of the law.
             pub const fn kind(&self) -> ControllerKind {
-                match self { $( Law::$Law(_) => ControllerKind::$Law, )* }
+                match self {
+                    $( Law::$Law(_) => ControllerKind::$Law, )*
+                    Law::Own(gains) => ControllerKind::Own(gains.kind()),
+                }
             }
 
             /// Returns the law's controller for this vehicle, without a monitor.
@@ -98,6 +121,7 @@ macro_rules! laws {
                         let ($vehicle, $settings) = (vehicle, settings);
                         Ok(AnyController::$Law($controller?))
                     } )*
+                    Law::Own(gains) => Ok(AnyController::Own(gains.controller(vehicle, &settings.common)?)),
                 }
             }
         }
@@ -105,15 +129,24 @@ macro_rules! laws {
         impl afbc_types::Declared for Law {
             /// Visits each gain; those of a law in the cascade in a group for each axis.
             fn visit<E>(&self, visit: &mut impl afbc_types::Visit<E>) -> Result<(), E> {
-                match self { $( Law::$Law(gains) => gains.visit(visit), )* }
+                match self {
+                    $( Law::$Law(gains) => gains.visit(visit), )*
+                    Law::Own(gains) => gains.visit(visit),
+                }
             }
 
             fn visit_mut<E>(&mut self, visit: &mut impl afbc_types::VisitMut<E>) -> Result<(), E> {
-                match self { $( Law::$Law(gains) => gains.visit_mut(visit), )* }
+                match self {
+                    $( Law::$Law(gains) => gains.visit_mut(visit), )*
+                    Law::Own(gains) => gains.visit_mut(visit),
+                }
             }
 
             fn together(&self) -> Result<(), afbc_types::OutOfRange> {
-                match self { $( Law::$Law(gains) => gains.together(), )* }
+                match self {
+                    $( Law::$Law(gains) => gains.together(), )*
+                    Law::Own(gains) => gains.together(),
+                }
             }
         }
 
@@ -121,6 +154,8 @@ macro_rules! laws {
             /// AFBC under its monitor, as on board.
             Monitored(Guarded<N>),
             $( #[doc = concat!("See [`ControllerKind::", stringify!($Law), "`].")] $Law($Controller), )*
+            /// See [`ControllerKind::Own`].
+            Own(OwnFlight<N>),
         }
     };
 }

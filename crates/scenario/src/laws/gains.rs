@@ -42,7 +42,7 @@ pub(crate) fn law_gains(vehicle: &Vehicle, mut law: Law) -> Result<Law, FileErro
     vehicle.law_gains(|mut laws| {
         // Settings of the cascade are not a law's own.
         laws.table(afbc_vehicles::CASCADE)?;
-        for kind in ControllerKind::ALL {
+        for kind in ControllerKind::all() {
             let table = laws.table(kind.name())?;
             match kind == law.kind() {
                 true if kind.in_cascade() => per_axis(table, &mut law)?,

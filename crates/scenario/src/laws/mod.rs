@@ -3,10 +3,12 @@
 mod controllers;
 mod declare;
 mod gains;
+mod own;
 #[cfg(test)]
 mod tests;
 
 pub(crate) use gains::{law_gains, per_axis, whole};
+pub use own::{OWN_GAINS_MAX, OwnController, OwnFlight, OwnGain, OwnGains, OwnKind, OwnLaw, OwnMemory, OwnVehicle};
 
 use afbc::{Adaptive, Backstepping, Controller, Guarded, Profile, Safeguards, adaptive, backstepping};
 use afbc_control::{Action, FlightController, Mixer, Smoothing, Trace};
@@ -112,6 +114,22 @@ declare::laws! {
 }
 
 impl ControllerKind {
+    /// Returns every law that can fly: those of the list, then those from outside.
+    pub fn all() -> Vec<ControllerKind> {
+        ControllerKind::ALL.into_iter().chain(OwnKind::all().into_iter().map(ControllerKind::Own)).collect()
+    }
+
+    /// Returns the law called `name`.
+    pub fn named(name: &str) -> Option<ControllerKind> {
+        ControllerKind::all().into_iter().find(|kind| kind.name() == name)
+    }
+
+    /// Returns the names of every law, for a message: `afbc, backstepping, pid`.
+    pub fn names() -> String {
+        let names: Vec<_> = ControllerKind::all().into_iter().map(ControllerKind::name).collect();
+        names.join(", ")
+    }
+
     /// The two that the paper compares.
     pub const PAPER: [ControllerKind; 2] = [ControllerKind::Afbc, ControllerKind::Backstepping];
 }

@@ -1,14 +1,15 @@
-//! Resolves a name on the command line to a scenario or a campaign, built in or in a file.
+//! What a name stands for: a scenario or a campaign, built in or in a file.
 
-use afbc_campaign::{self as campaign, Campaign};
+use crate::built_in;
+use crate::plan::Campaign;
 use afbc_reader::FileError;
 use afbc_scenario::Scenario;
 use std::path::{Path, PathBuf};
 use toml::de::DeTable;
 
-/// Kind of a file.
+/// SubjectKind of a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Kind {
+pub enum SubjectKind {
     /// Flown by `sitl fly`.
     Scenario,
     /// Flown by `sitl campaign`.
@@ -17,7 +18,7 @@ pub(crate) enum Kind {
 
 /// A scenario or a campaign, read.
 #[derive(Clone, Debug)]
-pub(crate) enum Subject {
+pub enum Subject {
     /// Flown by `sitl fly`.
     Scenario(Scenario),
     /// Flown by `sitl campaign`.
@@ -26,7 +27,7 @@ pub(crate) enum Subject {
 
 /// A file found, but not parsed.
 struct Found {
-    kind: Kind,
+    kind: SubjectKind,
     /// The name as given.
     shown: String,
     /// File name for errors.
@@ -43,35 +44,35 @@ const CAMPAIGN: [&str; 4] = ["flights", "spread", "scenario", "trajectories"];
 /// Top-level key that every scenario and no campaign has.
 const SCENARIO: &str = "trajectory";
 
-impl Kind {
+impl SubjectKind {
     const fn name(self) -> &'static str {
         match self {
-            Kind::Scenario => "scenario",
-            Kind::Campaign => "campaign",
+            SubjectKind::Scenario => "scenario",
+            SubjectKind::Campaign => "campaign",
         }
     }
 
-    const fn other(self) -> Kind {
+    const fn other(self) -> SubjectKind {
         match self {
-            Kind::Scenario => Kind::Campaign,
-            Kind::Campaign => Kind::Scenario,
+            SubjectKind::Scenario => SubjectKind::Campaign,
+            SubjectKind::Campaign => SubjectKind::Scenario,
         }
     }
 
     /// Returns the kind of file by its `text`; none if it could be either.
-    fn of(text: &str) -> Option<Kind> {
+    fn of(text: &str) -> Option<SubjectKind> {
         let document = DeTable::parse(text).ok()?;
         let has = |key: &str| document.get_ref().contains_key(key);
         match has(SCENARIO) {
-            true => Some(Kind::Scenario),
-            false => CAMPAIGN.into_iter().any(has).then_some(Kind::Campaign),
+            true => Some(SubjectKind::Scenario),
+            false => CAMPAIGN.into_iter().any(has).then_some(SubjectKind::Campaign),
         }
     }
 
     fn built_in(self, name: &str) -> Option<Found> {
         let text = match self {
-            Kind::Scenario => afbc_scenario::built_in(name)?.text,
-            Kind::Campaign => campaign::built_in(name)?.text,
+            SubjectKind::Scenario => afbc_scenario::built_in(name)?.text,
+            SubjectKind::Campaign => built_in::built_in(name)?.text,
         };
         let file = format!("built-in {name}");
         let [shown, name] = [name; 2].map(str::to_owned);
@@ -80,13 +81,13 @@ impl Kind {
 
     fn similar(self, name: &str) -> Option<&'static str> {
         match self {
-            Kind::Scenario => afbc_scenario::similar_built_in(name).map(|known| known.name),
-            Kind::Campaign => campaign::similar_built_in(name).map(|known| known.name),
+            SubjectKind::Scenario => afbc_scenario::similar_built_in(name).map(|known| known.name),
+            SubjectKind::Campaign => built_in::similar_built_in(name).map(|known| known.name),
         }
     }
 
     /// Returns the error that `name` is neither built in nor a file.
-    pub(crate) fn unknown(self, name: &str) -> FileError {
+    pub fn unknown(self, name: &str) -> FileError {
         if let Some(Err(refused)) = self.other().built_in(name).map(|found| found.only(self)) {
             return refused;
         }
@@ -102,7 +103,7 @@ impl Kind {
 impl Found {
     /// Finds `path`: a plain name is first a built-in one of this `kind`, then a file, then a built-in one of the other
     /// kind.
-    fn at(path: &Path, kind: Kind) -> Result<Self, FileError> {
+    fn at(path: &Path, kind: SubjectKind) -> Result<Self, FileError> {
         let plain = path.to_str().filter(|text| !text.contains(['/', '\\', '.']));
         if let Some(found) = plain.and_then(|name| kind.built_in(name)) {
             return Ok(found);
@@ -113,7 +114,7 @@ impl Found {
         let text = afbc_reader::text(path, kind.name())?;
         let shown = path.display().to_string();
         Ok(Found {
-            kind: Kind::of(&text).unwrap_or(kind),
+            kind: SubjectKind::of(&text).unwrap_or(kind),
             file: shown.clone(),
             shown,
             text,
@@ -123,14 +124,14 @@ impl Found {
     }
 
     /// Returns the file if it is of this kind.
-    fn only(self, kind: Kind) -> Result<Self, FileError> {
+    fn only(self, kind: SubjectKind) -> Result<Self, FileError> {
         let Found { kind: found, shown, .. } = &self;
         let problem = match found {
             _ if *found == kind => return Ok(self),
-            Kind::Scenario => format!(
+            SubjectKind::Scenario => format!(
                 "this is a scenario: sitl fly {shown}; `sitl campaigns robustness` prints a campaign to start from"
             ),
-            Kind::Campaign => format!("this is a campaign: sitl campaign {shown}"),
+            SubjectKind::Campaign => format!("this is a campaign: sitl campaign {shown}"),
         };
         Err(FileError::whole(shown, problem))
     }
@@ -140,7 +141,7 @@ impl Found {
     }
 
     fn campaign(&self) -> Result<Campaign, FileError> {
-        campaign::parse(&self.file, &self.text, &self.name, &self.folder)
+        crate::file::parse(&self.file, &self.text, &self.name, &self.folder)
     }
 }
 
@@ -148,27 +149,27 @@ impl Found {
 ///
 /// # Errors
 /// The first error, as one line, also if it is a campaign.
-pub(crate) fn scenario(path: &Path) -> Result<Scenario, FileError> {
-    Found::at(path, Kind::Scenario)?.only(Kind::Scenario)?.scenario()
+pub fn scenario(path: &Path) -> Result<Scenario, FileError> {
+    Found::at(path, SubjectKind::Scenario)?.only(SubjectKind::Scenario)?.scenario()
 }
 
 /// Reads and checks the campaign at `path`.
 ///
 /// # Errors
 /// The first error, as one line, also if it is a scenario.
-pub(crate) fn campaign(path: &Path) -> Result<Campaign, FileError> {
-    Found::at(path, Kind::Campaign)?.only(Kind::Campaign)?.campaign()
+pub fn campaign(path: &Path) -> Result<Campaign, FileError> {
+    Found::at(path, SubjectKind::Campaign)?.only(SubjectKind::Campaign)?.campaign()
 }
 
 /// Reads and checks the scenario or campaign at `path`.
 ///
 /// # Errors
 /// The first error, as one line.
-pub(crate) fn either(path: &Path) -> Result<Subject, FileError> {
-    let found = Found::at(path, Kind::Scenario)?;
+pub fn either(path: &Path) -> Result<Subject, FileError> {
+    let found = Found::at(path, SubjectKind::Scenario)?;
     match found.kind {
-        Kind::Scenario => found.scenario().map(Subject::Scenario),
-        Kind::Campaign => found.campaign().map(Subject::Campaign),
+        SubjectKind::Scenario => found.scenario().map(Subject::Scenario),
+        SubjectKind::Campaign => found.campaign().map(Subject::Campaign),
     }
 }
 
@@ -179,12 +180,12 @@ mod tests {
     #[test]
     fn every_built_in_file_is_recognised_by_its_text() {
         for known in &afbc_scenario::BUILT_IN {
-            assert_eq!(Kind::of(known.text), Some(Kind::Scenario), "{}", known.name);
+            assert_eq!(SubjectKind::of(known.text), Some(SubjectKind::Scenario), "{}", known.name);
         }
-        for known in &campaign::BUILT_IN {
-            assert_eq!(Kind::of(known.text), Some(Kind::Campaign), "{}", known.name);
+        for known in &built_in::BUILT_IN {
+            assert_eq!(SubjectKind::of(known.text), Some(SubjectKind::Campaign), "{}", known.name);
         }
-        assert_eq!(Kind::of(""), None);
-        assert_eq!(Kind::of("[trajectory"), None);
+        assert_eq!(SubjectKind::of(""), None);
+        assert_eq!(SubjectKind::of("[trajectory"), None);
     }
 }

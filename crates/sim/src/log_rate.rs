@@ -1,4 +1,4 @@
-//! `--log-hz`: the rate of a flight's log.
+//! The rate of a flight's log.
 
 use afbc_scenario::Scenario;
 use afbc_scenario::contender::Contender;
@@ -13,7 +13,7 @@ const USUAL: [u16; 11] = [100, 50, 40, 25, 20, 10, 8, 5, 4, 2, 1];
 
 /// Log rows per second.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct LogRate(u16);
+pub struct LogRate(u16);
 
 impl FromStr for LogRate {
     type Err = &'static str;
@@ -28,13 +28,13 @@ impl FromStr for LogRate {
 
 impl LogRate {
     /// Returns 100 Hz, or the largest lower rate with at most [`PLENTY`] rows in `duration_s`.
-    pub(crate) fn usual(duration_s: f64) -> Self {
+    pub fn usual(duration_s: f64) -> Self {
         let fits = |hz: &u16| f64::from(*hz) * duration_s <= PLENTY;
         LogRate(USUAL.into_iter().find(fits).unwrap_or(1))
     }
 
-    /// Returns a message if the default rate is reduced.
-    pub(crate) fn thinned(duration_s: f64) -> Option<String> {
+    /// Returns a message if the default rate is reduced for a flight of `duration_s`.
+    pub fn thinned(duration_s: f64) -> Option<String> {
         let [full, ..] = USUAL;
         let LogRate(hz) = Self::usual(duration_s);
         (hz < full).then(|| format!("logs of {duration_s} s keep {hz} rows per second; --log-hz {full} keeps more"))
@@ -44,7 +44,7 @@ impl LogRate {
     ///
     /// # Errors
     /// If the log of one run would be too long.
-    pub(crate) fn common(scenarios: &[Scenario]) -> Result<u64, String> {
+    pub fn common(scenarios: &[Scenario]) -> Result<u64, String> {
         let every = |scenario: &Scenario| {
             let usual = Self::usual(scenario.duration_s);
             let steps = scenario.contenders.iter().map(|contender| usual.steps(scenario, contender));
@@ -58,7 +58,7 @@ impl LogRate {
     ///
     /// # Errors
     /// If the log of one run would be too long.
-    pub(crate) fn steps(self, scenario: &Scenario, contender: &Contender) -> Result<u64, String> {
+    pub fn steps(self, scenario: &Scenario, contender: &Contender) -> Result<u64, String> {
         let LogRate(hz) = self;
         let steps = (1.0 / (f64::from(hz) * contender.step_s())).round().max(1.0);
         let rows = scenario.duration_s / (contender.step_s() * steps);

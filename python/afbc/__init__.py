@@ -1,0 +1,213 @@
+"""Adaptive fuzzy backstepping control (AFBC) of a quadrotor, its peers, and the plant they fly.
+
+The same compiled code as `sitl` flies: a flight has the same bits here, there and on a board.
+
+Frames: earth z up, body x forward, y left, z up; attitudes are Euler angles roll, pitch, yaw (z-y-x). Units are SI and
+stand in every name.
+
+    >>> import afbc
+    >>> flight = afbc.fly("hover", ["afbc"])["afbc"]
+    >>> flight.lost is None, len(flight["z_m"]) == len(flight)
+    (True, True)
+"""
+
+from __future__ import annotations
+
+import inspect
+from contextlib import contextmanager
+
+from . import _afbc
+from ._afbc import (
+    Action,
+    AfbcError,
+    Batch,
+    Controller,
+    Flight,
+    OwnVehicle,
+    Plant,
+    Scenario,
+    Setpoint,
+    State,
+    Vehicle,
+    __version__,
+    campaigns,
+    laws,
+    scenarios,
+    vehicles,
+)
+
+__all__ = [
+    "Action",
+    "AfbcError",
+    "Batch",
+    "Controller",
+    "Flight",
+    "OwnVehicle",
+    "Plant",
+    "Scenario",
+    "Setpoint",
+    "State",
+    "Vehicle",
+    "campaign",
+    "campaigns",
+    "compare",
+    "fly",
+    "frame",
+    "laws",
+    "register",
+    "replay",
+    "scenarios",
+    "tune",
+    "vehicles",
+]
+
+
+@contextmanager
+def _bar(shown, total, unit):
+    """Yields what is called with the number done: a bar of tqdm, if that is installed and wanted."""
+    try:
+        from tqdm.auto import tqdm
+    except ImportError:
+        tqdm = None
+    if not shown or tqdm is None:
+        yield None
+        return
+    with tqdm(total=total, unit=unit) as bar:
+        yield lambda done: bar.update(done - bar.n)
+
+
+def frame(columns):
+    """Returns columns as a data frame: of polars or else of pandas, whichever is installed; the columns otherwise.
+
+    A flight's log (`frame(flight.columns)`), or what `compare`, `campaign` and `replay` made.
+    """
+    try:
+        import polars
+    except ImportError:
+        pass
+    else:
+        return polars.DataFrame(dict(columns))
+    try:
+        import pandas
+    except ImportError:
+        return columns
+    return pandas.DataFrame(dict(columns))
+
+
+def register(name, make, *, title=None, gains=None):
+    """Makes a law of one's own fly wherever a built-in one does: in `fly`, `compare`, `campaign` and `tune`, and in
+    scenario and vehicle files.
+
+    `make(vehicle)` is called at the start of each flight with an `OwnVehicle`; a class with that constructor will do.
+    It returns an object whose `step(state, setpoint, fresh)` returns the demanded U1, U2, U3, U4 [N] once a time step:
+    U1 and U2 are the moments about body x and y over the arm, U3 the moment about body z over d/b, U4 the thrust. A
+    state that is not `fresh` repeats the last one. `gains` maps a name to (default, smallest, largest) or to a default;
+    the range is where `tune` searches. A law of the same name is replaced.
+    """
+    ranges = []
+    for gain, value in (gains or {}).items():
+        if isinstance(value, (int, float)):
+            low, high = sorted((value / 20, value * 20))
+            value = (value, low, high)
+        ranges.append((gain, tuple(float(number) for number in value)))
+    _afbc.register(name, make, title=title, gains=ranges)
+
+
+def _controllers(controllers):
+    """Registers the laws in a mapping of names, and returns the names."""
+    if controllers is None or isinstance(controllers, str):
+        return [controllers] if controllers else None
+    if hasattr(controllers, "items"):
+        for name, make in controllers.items():
+            if make is not None:
+                register(name, make)
+    return list(controllers)
+
+
+def fly(
+    scenario, controllers=None, *, vehicle=None, seed=None, duration_s=None, log_hz=None, threads=None, progress=False
+):
+    """Flies a scenario, and returns the flights by contender: the same as `sitl fly`, in every bit.
+
+    `scenario` is a `Scenario`, the name of a built-in one, or the path of a file. `controllers` are names of its
+    contenders or of laws; a mapping of names to laws of one's own registers these (None for a built-in one). By default
+    all of its contenders fly.
+    """
+    names = _controllers(controllers)
+    with _bar(progress, len(names) if names else None, "flight") as shown:
+        return _afbc.fly(
+            scenario,
+            names,
+            vehicle=vehicle,
+            seed=seed,
+            duration_s=duration_s,
+            log_hz=log_hz,
+            threads=threads,
+            progress=shown,
+        )
+
+
+def compare(scenarios, controllers=None, *, vehicle=None, seeds=1, threads=None, progress=False):
+    """Flies scenarios under the same contenders, each with `seeds` consecutive seeds on all cores.
+
+    Returns a data frame (see `frame`) with a row for each flight: scenario, contender, seed, lost_at_s, lost_reason and
+    the figures of merit.
+    """
+    if isinstance(scenarios, (str, Scenario)) or hasattr(scenarios, "__fspath__"):
+        scenarios = [scenarios]
+    with _bar(progress, None, "flight") as shown:
+        return frame(
+            _afbc.compare(
+                list(scenarios),
+                _controllers(controllers),
+                vehicle=vehicle,
+                seeds=seeds,
+                threads=threads,
+                progress=shown,
+            )
+        )
+
+
+def campaign(campaign, *, flights=None, vehicle=None, out=None, threads=None, progress=False):
+    """Flies a campaign, built in or of a file: one scenario, many times, with drawn vehicles, weather and faults.
+
+    Returns a data frame with a row for each flight of each contender: what was drawn, and the figures of merit. With
+    `out`, results and report are kept in this folder as `sitl campaign` keeps them, and the same call resumes.
+    """
+    with _bar(progress, flights, "flight") as shown:
+        return frame(
+            _afbc.campaign(campaign, flights=flights, vehicle=vehicle, out=out, threads=threads, progress=shown)
+        )
+
+
+def tune(law, scenarios=None, *, vehicle=None, budget=1000, seed=1, step=0.3, flying=False, threads=None, progress=False):
+    """Searches for gains of a law by CMA-ES, as `sitl tune` does: on the training flights, or on these scenarios.
+
+    Returns a dict: cost `before` and `after`, the number of `evaluations`, the `gains` found, and the `text` for a
+    scenario file. `flying` starts from the gains that fly instead of hand-tuned ones.
+    """
+    if scenarios is not None and (isinstance(scenarios, (str, Scenario)) or hasattr(scenarios, "__fspath__")):
+        scenarios = [scenarios]
+    with _bar(progress, budget, "try") as shown:
+        return _afbc.tune(
+            law,
+            None if scenarios is None else list(scenarios),
+            vehicle=vehicle,
+            budget=budget,
+            seed=seed,
+            step=step,
+            flying=flying,
+            threads=threads,
+            progress=shown,
+        )
+
+
+def replay(log):
+    """Runs the estimator over a recorded flight (ULog of PX4 or of this firmware, or a CSV of PX4-ECL).
+
+    Returns a data frame: our estimate, its standard deviations, and the log's own estimate.
+    """
+    return frame(_afbc.replay(log))
+
+
+__doc__ = inspect.cleandoc(__doc__)

@@ -1,0 +1,93 @@
+//! Campaigns.
+
+use crate::error::error;
+use crate::vehicle::VehicleArgument;
+use crate::work::watched;
+use afbc::Profile;
+use afbc_campaign::{self as campaigns, BUILT_IN, Campaign, CampaignFolder, Manifest, Row, Shard, subject};
+use numpy::{PyArray1, ToPyArray};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use rayon::prelude::*;
+use std::path::PathBuf;
+
+/// Flies a campaign, built in or of a file: one scenario, many times, with drawn vehicles, weather and faults. Returns a
+/// row for each flight of each contender, by columns.
+///
+/// With `out`, results and report are written into this folder as `sitl campaign` does, finished flights are kept, and
+/// the same call resumes. `flights` flies only the first ones.
+#[pyfunction]
+#[pyo3(signature = (campaign, *, flights=None, vehicle=None, out=None, threads=None, progress=None))]
+pub(crate) fn campaign<'py>(
+    py: Python<'py>,
+    campaign: PathBuf,
+    flights: Option<u64>,
+    vehicle: Option<VehicleArgument<'py>>,
+    out: Option<PathBuf>,
+    threads: Option<usize>,
+    progress: Option<Bound<'py, PyAny>>,
+) -> PyResult<Bound<'py, PyDict>> {
+    let mut plan = subject::campaign(&campaign).map_err(error)?;
+    if let Some(vehicle) = vehicle {
+        plan.scenario = plan.scenario.on(&vehicle.vehicle()?, Profile::Flight).map_err(error)?;
+    }
+    plan.flights = flights.unwrap_or(plan.flights).min(plan.flights);
+    plan.check().map_err(error)?;
+    let manifest = Manifest::new(&plan, Shard::WHOLE);
+    let rows = match out {
+        Some(out) => {
+            let folder = CampaignFolder::open(&out, manifest.clone(), false).map_err(error)?;
+            watched(py, threads, progress.as_ref(), |watch| kept(&plan, &folder, watch))?
+        }
+        None => watched(py, threads, progress.as_ref(), |watch| {
+            let fly = |flight| {
+                if watch.is_over() {
+                    return Err("interrupted".to_owned());
+                }
+                let rows = plan.rows(flight).map_err(|error| format!("flight {flight} cannot be flown: {error}"))?;
+                watch.add(1);
+                Ok(rows)
+            };
+            Ok((0..plan.flights)
+                .into_par_iter()
+                .map(fly)
+                .collect::<Result<Vec<_>, _>>()?
+                .into_iter()
+                .flatten()
+                .collect())
+        })?,
+    };
+    columns(py, &manifest, &rows.map_err(error)?)
+}
+
+/// Flies in a folder, and returns what is there then.
+fn kept(plan: &Campaign, folder: &CampaignFolder, watch: &crate::work::Watch) -> Result<Vec<Row>, String> {
+    // The number of flights flown now: of earlier ones only the sum is reported.
+    let summary = campaigns::fly(plan, folder, watch.stop(), &|done| watch.add(done));
+    let summary = summary.map_err(|error| error.to_string())?.ok_or("interrupted; the same call resumes")?;
+    afbc_report::campaign::write(folder.place(), &summary).map_err(|error| error.to_string())?;
+    let rows = folder.results().map_err(|error| error.to_string())?.ok_or("the results are gone")?;
+    rows.collect::<Result<_, _>>().map_err(|error| error.to_string())
+}
+
+fn columns<'py>(py: Python<'py>, manifest: &Manifest, rows: &[Row]) -> PyResult<Bound<'py, PyDict>> {
+    let dict = PyDict::new(py);
+    dict.set_item("flight", rows.iter().map(|row| row.flight).collect::<Vec<_>>().to_pyarray(py))?;
+    dict.set_item("seed", rows.iter().map(|row| row.seed).collect::<Vec<_>>().to_pyarray(py))?;
+    dict.set_item("contender", rows.iter().map(|row| row.contender.as_str()).collect::<Vec<_>>())?;
+    dict.set_item("trajectory", rows.iter().map(|row| row.trajectory.as_str()).collect::<Vec<_>>())?;
+    dict.set_item("lost_reason", rows.iter().map(|row| row.lost_reason.as_deref()).collect::<Vec<_>>())?;
+    dict.set_item("trip_reason", rows.iter().map(|row| row.trip_reason.as_deref()).collect::<Vec<_>>())?;
+    for (i, column) in manifest.columns().into_iter().enumerate() {
+        let value = |row: &Row| row.numbers.get(i).copied().flatten().unwrap_or(f64::NAN);
+        dict.set_item(column.name, PyArray1::from_iter(py, rows.iter().map(value)))?;
+    }
+    Ok(dict)
+}
+
+/// Names of the built-in campaigns.
+#[pyfunction]
+#[pyo3(name = "campaigns")]
+pub(crate) fn campaigns_() -> Vec<&'static str> {
+    BUILT_IN.iter().map(|known| known.name).collect()
+}

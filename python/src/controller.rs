@@ -1,0 +1,247 @@
+//! A controller, step by step.
+
+use crate::error::error;
+use crate::motion::{PySetpoint, PyState};
+use crate::vehicle::VehicleArgument;
+use afbc::Profile;
+use afbc_control::{Action, FlightController, Trace, Validated};
+use afbc_scenario::contender::{Contender, ControllerKind};
+use afbc_scenario::{AnyController, AnyControllerMemory};
+use afbc_types::{Axis, Declaration, Declared, Inputs, PLUS, Parameters, ROTORS_MAX, Value, with_rotors};
+use core::convert::Infallible;
+use numpy::{PyArray1, ToPyArray};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+/// What a step decided.
+#[pyclass(name = "Action", module = "afbc", frozen)]
+pub(crate) struct PyAction {
+    action: Action<ROTORS_MAX>,
+    rotors: usize,
+}
+
+#[pymethods]
+impl PyAction {
+    /// Rotor speeds [rad/s], shape (rotors,).
+    #[getter]
+    fn speeds_rad_s<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_iter(py, self.action.speeds.0.iter().take(self.rotors).map(|speed| f64::from(*speed)))
+    }
+
+    /// Rotor forces [N], shape (rotors,).
+    #[getter]
+    fn forces_n<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_iter(py, self.action.forces.0.iter().take(self.rotors).map(|force| f64::from(*force)))
+    }
+
+    /// U1, U2, U3, U4 of those forces [N], shape (4,).
+    #[getter]
+    fn inputs_n<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        inputs(py, &self.action.given)
+    }
+
+    /// True if a rotor force was limited.
+    #[getter]
+    fn saturated(&self) -> bool {
+        self.action.health.saturated
+    }
+
+    /// True if the state was missing or implausible, and the last one was used.
+    #[getter]
+    fn state_rejected(&self) -> bool {
+        self.action.health.state_rejected
+    }
+
+    /// True if the setpoint was implausible.
+    #[getter]
+    fn setpoint_rejected(&self) -> bool {
+        self.action.health.setpoint_rejected
+    }
+
+    /// Why a fallback law flies, if one does.
+    #[getter]
+    fn fallback(&self) -> Option<&'static str> {
+        self.action.health.fallback
+    }
+}
+
+fn inputs<'py>(py: Python<'py>, u: &Inputs) -> Bound<'py, PyArray1<f64>> {
+    [u.roll_n, u.pitch_n, u.yaw_n, u.thrust_n].map(f64::from).to_pyarray(py)
+}
+
+/// A controller whose number of rotors is known when it is made.
+trait AnyRotors: Send + Sync {
+    fn step(&mut self, state: Option<&PyState>, setpoint: &PySetpoint) -> Action<ROTORS_MAX>;
+    fn reset(&mut self);
+    fn trace(&self) -> Trace;
+    fn memory(&self) -> Option<afbc_types::PerAxis<afbc::AdaptiveEstimate>>;
+}
+
+struct OfRotors<const N: usize> {
+    controller: std::sync::Mutex<AnyController<N>>,
+    memory: Validated<AnyControllerMemory<N>>,
+}
+
+impl<const N: usize> AnyRotors for OfRotors<N> {
+    fn step(&mut self, state: Option<&PyState>, setpoint: &PySetpoint) -> Action<ROTORS_MAX> {
+        let controller = self.controller.get_mut().unwrap_or_else(std::sync::PoisonError::into_inner);
+        controller.step(&mut self.memory, state.map(|state| &state.0), &setpoint.0).padded()
+    }
+
+    fn reset(&mut self) {
+        self.memory = Validated::default();
+    }
+
+    fn trace(&self) -> Trace {
+        AnyController::<N>::trace(&self.memory.control)
+    }
+
+    fn memory(&self) -> Option<afbc_types::PerAxis<afbc::AdaptiveEstimate>> {
+        self.memory.control.estimates()
+    }
+}
+
+/// A law on a vehicle, to be stepped: the very code that flies on a board.
+#[pyclass(name = "Controller", module = "afbc")]
+pub(crate) struct PyController {
+    contender: Contender,
+    rotors: usize,
+    law: Box<dyn AnyRotors>,
+}
+
+#[pymethods]
+impl PyController {
+    /// Makes the law `law` for this vehicle, or for the paper's: with the gains of the vehicle's file in the profile
+    /// "flight", or as printed in the profile "paper". `gains` sets some by name, "x.alpha1" or "kp".
+    #[new]
+    #[pyo3(signature = (law="afbc", vehicle=None, *, profile="flight", monitored=false, gains=None))]
+    fn new(
+        law: &str,
+        vehicle: Option<VehicleArgument<'_>>,
+        profile: &str,
+        monitored: bool,
+        gains: Option<Vec<(String, f64)>>,
+    ) -> PyResult<Self> {
+        let kind = ControllerKind::named(law)
+            .ok_or_else(|| error(format!("{law}: no such law; the laws are {}", ControllerKind::names())))?;
+        let profile = Profile::ALL.into_iter().find(|known| known.name() == profile).ok_or_else(|| {
+            let known = Profile::ALL.map(Profile::name).join(", ");
+            error(format!("{profile}: no such profile; they are {known}"))
+        })?;
+        let mut contender = Contender::of(kind, profile);
+        let (mut parameters, mut rotors) = (Parameters::PAPER, PLUS.map(|rotor| rotor.to_f64()).to_vec());
+        if let Some(vehicle) = vehicle {
+            let vehicle = vehicle.vehicle()?;
+            contender = contender.on(&vehicle, profile).map_err(error)?;
+            (parameters, rotors) = (vehicle.parameters, vehicle.rotors);
+        }
+        for (name, value) in gains.unwrap_or_default() {
+            set(&mut contender, &name, value)?;
+        }
+        if monitored {
+            contender = contender.monitored();
+        }
+        contender.check(&parameters, &rotors).map_err(error)?;
+        let law: Box<dyn AnyRotors> = with_rotors!(rotors.len(), N => {
+            let controller = contender.controller::<N>(&parameters, &rotors).map_err(error)?;
+            Ok::<Box<dyn AnyRotors>, PyErr>(Box::new(OfRotors {
+                controller: std::sync::Mutex::new(controller),
+                memory: Validated::default(),
+            }))
+        })?;
+        Ok(PyController { contender, rotors: rotors.len(), law })
+    }
+
+    /// Name of the law.
+    #[getter]
+    fn law(&self) -> &'static str {
+        self.contender.kind().name()
+    }
+
+    /// Time between steps [s].
+    #[getter]
+    fn dt_s(&self) -> f64 {
+        self.contender.step_s()
+    }
+
+    /// Its gains by name.
+    #[getter]
+    fn gains<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let dict = PyDict::new(py);
+        gains(&self.contender).into_iter().try_for_each(|(name, value)| dict.set_item(name, value))?;
+        Ok(dict)
+    }
+
+    /// Performs a step; without a state the last one is used, and nothing is learnt.
+    fn step(&mut self, state: Option<PyRef<'_, PyState>>, setpoint: PyRef<'_, PySetpoint>) -> PyResult<PyAction> {
+        let action = self.law.step(state.as_deref(), &setpoint);
+        match crate::law::take_error() {
+            Some(error) => Err(error),
+            None => Ok(PyAction { action, rotors: self.rotors }),
+        }
+    }
+
+    /// Forgets everything, as before the first step.
+    fn reset(&mut self) {
+        self.law.reset();
+    }
+
+    /// Internal signals of the last step by name: demanded inputs and angles, errors and, of AFBC, estimates.
+    #[getter]
+    fn trace<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let (trace, dict) = (self.law.trace(), PyDict::new(py));
+        dict.set_item("inputs_n", inputs(py, &trace.inputs))?;
+        dict.set_item("virtual_m_s2", trace.virtual_m_s2.map(f64::from).to_pyarray(py))?;
+        dict.set_item("desired_rad", trace.desired_rad.map(f64::from).to_pyarray(py))?;
+        let estimates = self.law.memory();
+        for axis in Axis::ALL {
+            let errors = &trace.errors[axis];
+            dict.set_item(format!("{}.e1", axis.name()), errors.e1)?;
+            dict.set_item(format!("{}.e1_dot", axis.name()), errors.e1_dot)?;
+            dict.set_item(format!("{}.e2", axis.name()), errors.e2)?;
+            if let Some(estimates) = &estimates {
+                dict.set_item(format!("{}.delta_hat", axis.name()), estimates[axis].delta)?;
+                let theta: Vec<f64> = estimates[axis].theta.iter().map(|theta| f64::from(*theta)).collect();
+                dict.set_item(format!("{}.theta_hat", axis.name()), theta.to_pyarray(py))?;
+            }
+        }
+        Ok(dict)
+    }
+}
+
+/// The gains of a contender by name.
+pub(crate) fn gains(contender: &Contender) -> Vec<(String, f64)> {
+    let mut gains = Vec::new();
+    let Ok(()) = contender.law.visit(&mut |declaration: &Declaration, value: Value<'_>| {
+        gains.extend(value.numbers().map(|number| (full(declaration), number)));
+        Ok::<(), Infallible>(())
+    });
+    gains
+}
+
+/// The name of a gain: its axis, if it is one of an axis, and its key in files.
+fn full(declaration: &Declaration) -> String {
+    match declaration.group {
+        "" => declaration.range.name.into(),
+        group => format!("{group}.{}", declaration.range.name),
+    }
+}
+
+/// Sets a gain by name.
+fn set(contender: &mut Contender, name: &str, value: f64) -> PyResult<()> {
+    let (mut found, mut known) = (false, Vec::new());
+    let Ok(()) = contender.law.visit_mut(&mut |declaration: &Declaration, of: afbc_types::ValueMut<'_>| {
+        if let afbc_types::ValueMut::Single([gain]) = of {
+            if full(declaration) == name {
+                *gain = value as f32;
+                found = true;
+            }
+            known.push(full(declaration));
+        }
+        Ok::<(), Infallible>(())
+    });
+    match found {
+        true => contender.law.validate().map_err(error),
+        false => Err(error(format!("{name}: no such gain; there are {}", known.join(", ")))),
+    }
+}

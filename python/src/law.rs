@@ -1,0 +1,171 @@
+//! Laws of one's own, in Python.
+
+use crate::error::error;
+use crate::motion::{PySetpoint, PyState};
+use afbc_scenario::contender::ControllerKind;
+use afbc_scenario::{OwnController, OwnGain, OwnLaw, OwnVehicle};
+use afbc_types::{Inputs, Setpoint, State};
+use pyo3::exceptions::PyTypeError;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use std::collections::BTreeSet;
+use std::sync::{Mutex, PoisonError};
+
+/// What a law raised, until it is raised again where the flight was asked for.
+static RAISED: Mutex<Option<PyErr>> = Mutex::new(None);
+/// Names that live as long as the program.
+static NAMES: Mutex<BTreeSet<&'static str>> = Mutex::new(BTreeSet::new());
+
+pub(crate) fn forget_error() {
+    take_error();
+}
+
+pub(crate) fn has_error() -> bool {
+    RAISED.lock().unwrap_or_else(PoisonError::into_inner).is_some()
+}
+
+pub(crate) fn take_error() -> Option<PyErr> {
+    RAISED.lock().unwrap_or_else(PoisonError::into_inner).take()
+}
+
+fn raise(error: PyErr) {
+    RAISED.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
+}
+
+/// The same text for the rest of the program.
+fn kept(name: &str) -> &'static str {
+    let mut names = NAMES.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some(known) = names.get(name) {
+        return known;
+    }
+    let name: &'static str = Box::leak(name.to_owned().into_boxed_str());
+    names.insert(name);
+    name
+}
+
+/// What a law knows of the vehicle that it flies.
+#[pyclass(name = "OwnVehicle", module = "afbc", frozen)]
+pub(crate) struct PyOwnVehicle {
+    vehicle: OwnVehicle,
+    gains: Vec<&'static str>,
+}
+
+#[pymethods]
+impl PyOwnVehicle {
+    #[getter]
+    fn mass_kg(&self) -> f32 {
+        self.vehicle.parameters.mass_kg
+    }
+
+    #[getter]
+    fn gravity_m_s2(&self) -> f32 {
+        self.vehicle.parameters.gravity_m_s2
+    }
+
+    /// Distance from the centre of mass to a rotor shaft [m].
+    #[getter]
+    fn arm_m(&self) -> f32 {
+        self.vehicle.parameters.arm_m
+    }
+
+    /// Inertia about the body axes [kg m2], shape (3,).
+    #[getter]
+    fn inertia_kg_m2<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
+        crate::motion::array(py, &self.vehicle.parameters.inertia_kg_m2).into_any()
+    }
+
+    /// Angular acceleration about each body axis per newton of U1, U2, U3 [rad/s2 per N], shape (3,).
+    #[getter]
+    fn effectiveness<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
+        crate::motion::array(py, &self.vehicle.parameters.effectiveness()).into_any()
+    }
+
+    /// Number of rotors.
+    #[getter]
+    fn rotors(&self) -> usize {
+        self.vehicle.rotors
+    }
+
+    /// Largest force of one rotor [N].
+    #[getter]
+    fn rotor_force_max_n(&self) -> f32 {
+        self.vehicle.rotor_force_max_n
+    }
+
+    /// Time between steps [s].
+    #[getter]
+    fn dt_s(&self) -> f32 {
+        self.vehicle.dt_s
+    }
+
+    /// The law's gains by name.
+    #[getter]
+    fn gains<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let dict = PyDict::new(py);
+        self.gains.iter().zip(self.vehicle.gains).try_for_each(|(name, value)| dict.set_item(name, value))?;
+        Ok(dict)
+    }
+}
+
+/// A Python object that flies.
+struct PythonLaw(Option<Py<PyAny>>);
+
+impl PythonLaw {
+    fn inputs(&self, state: &State, setpoint: &Setpoint, fresh: bool) -> PyResult<Inputs> {
+        let Some(law) = &self.0 else { return Ok(Inputs::default()) };
+        Python::attach(|py| {
+            let given = law.bind(py).call_method1("step", (PyState(*state), PySetpoint(*setpoint), fresh))?;
+            let given: [f64; 4] = given.extract().map_err(|_| {
+                let kind = given.get_type();
+                PyTypeError::new_err(format!("step must return the four numbers U1, U2, U3, U4 [N], not {kind}"))
+            })?;
+            let [roll_n, pitch_n, yaw_n, thrust_n] = given.map(|input| input as f32);
+            if given.iter().any(|input| !input.is_finite()) {
+                return Err(error(format!("step returned {given:?}: U1, U2, U3, U4 must be finite")));
+            }
+            Ok(Inputs { roll_n, pitch_n, yaw_n, thrust_n })
+        })
+    }
+}
+
+impl OwnController for PythonLaw {
+    fn step(&mut self, state: &State, setpoint: &Setpoint, fresh: bool) -> Inputs {
+        self.inputs(state, setpoint, fresh).unwrap_or_else(|error| {
+            raise(error);
+            // It flies no more: the vehicle falls, and the flight ends soon.
+            self.0 = None;
+            Inputs::default()
+        })
+    }
+}
+
+/// Makes a law of one's own fly wherever a built-in one does: `fly`, `compare`, `campaign`, `tune`, scenario files.
+///
+/// `make(vehicle)` is called at the start of each flight, with an `OwnVehicle`, and returns an object whose
+/// `step(state, setpoint, fresh)` returns the demanded U1, U2, U3, U4 [N] every millisecond. `gains` maps a name to its
+/// default, smallest and largest value; `tune` searches them. A law of the same name is replaced.
+#[pyfunction]
+#[pyo3(signature = (name, make, *, title=None, gains=None))]
+pub(crate) fn register(
+    name: &str,
+    make: Py<PyAny>,
+    title: Option<&str>,
+    gains: Option<Vec<(String, (f64, f64, f64))>>,
+) -> PyResult<()> {
+    let gains = gains.unwrap_or_default();
+    let names: Vec<&'static str> = gains.iter().map(|(name, _)| kept(name)).collect();
+    let own = names.iter().zip(&gains);
+    let gains: Vec<OwnGain> =
+        own.map(|(name, (_, (value, min, max)))| OwnGain::new(name, "1", *value as f32, [*min, *max])).collect();
+    let law = OwnLaw::new(kept(name), move |vehicle| {
+        let vehicle = PyOwnVehicle { vehicle: *vehicle, gains: names.clone() };
+        PythonLaw(Python::attach(|py| make.call1(py, (vehicle,))).map_err(raise).ok())
+    });
+    law.title(kept(title.unwrap_or(name))).gains(gains).register().map(drop).map_err(error)
+}
+
+/// Names of the laws: the built-in ones, then those registered.
+#[pyfunction]
+pub(crate) fn laws() -> Vec<&'static str> {
+    ControllerKind::all().into_iter().map(ControllerKind::name).collect()
+}

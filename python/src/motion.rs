@@ -1,0 +1,158 @@
+//! State and setpoint.
+
+use afbc_types::{Setpoint, State};
+use nalgebra::Vector3;
+use numpy::{PyArray1, ToPyArray};
+use pyo3::prelude::*;
+
+type Array<'py> = Bound<'py, PyArray1<f64>>;
+
+/// The three numbers as an array, which hold a single's value exactly.
+pub(crate) fn array<'py>(py: Python<'py>, vector: &Vector3<f32>) -> Array<'py> {
+    [vector.x, vector.y, vector.z].map(f64::from).to_pyarray(py)
+}
+
+fn vector(numbers: [f64; 3]) -> Vector3<f32> {
+    Vector3::from(numbers.map(|number| number as f32))
+}
+
+/// Measured motion of the vehicle: position and velocity in the earth frame (z up), Euler angles roll, pitch, yaw
+/// (z-y-x), and body rates (x forward, y left, z up).
+#[pyclass(name = "State", module = "afbc", frozen, from_py_object)]
+#[derive(Clone, Copy)]
+pub(crate) struct PyState(pub(crate) State);
+
+#[pymethods]
+impl PyState {
+    #[new]
+    #[pyo3(signature = (position_m=[0.0; 3], velocity_m_s=[0.0; 3], attitude_rad=[0.0; 3], rates_rad_s=[0.0; 3]))]
+    fn new(position_m: [f64; 3], velocity_m_s: [f64; 3], attitude_rad: [f64; 3], rates_rad_s: [f64; 3]) -> Self {
+        PyState(State {
+            position_m: vector(position_m),
+            velocity_m_s: vector(velocity_m_s),
+            attitude_rad: vector(attitude_rad),
+            rates_rad_s: vector(rates_rad_s),
+        })
+    }
+
+    #[getter]
+    fn position_m<'py>(&self, py: Python<'py>) -> Array<'py> {
+        array(py, &self.0.position_m)
+    }
+
+    #[getter]
+    fn velocity_m_s<'py>(&self, py: Python<'py>) -> Array<'py> {
+        array(py, &self.0.velocity_m_s)
+    }
+
+    #[getter]
+    fn attitude_rad<'py>(&self, py: Python<'py>) -> Array<'py> {
+        array(py, &self.0.attitude_rad)
+    }
+
+    #[getter]
+    fn rates_rad_s<'py>(&self, py: Python<'py>) -> Array<'py> {
+        array(py, &self.0.rates_rad_s)
+    }
+
+    /// All twelve numbers in this order, as for an optimiser or a neural network.
+    #[getter]
+    fn vector<'py>(&self, py: Python<'py>) -> Array<'py> {
+        numbers(&self.0).to_pyarray(py)
+    }
+
+    fn __repr__(&self) -> String {
+        let State { position_m: x, velocity_m_s: v, attitude_rad: eta, rates_rad_s: omega } = &self.0;
+        let list = |v: &Vector3<f32>| format!("[{}, {}, {}]", v.x, v.y, v.z);
+        format!(
+            "State(position_m={}, velocity_m_s={}, attitude_rad={}, rates_rad_s={})",
+            list(x),
+            list(v),
+            list(eta),
+            list(omega)
+        )
+    }
+}
+
+/// The twelve numbers of a state.
+pub(crate) fn numbers(state: &State) -> [f64; 12] {
+    let parts = [&state.position_m, &state.velocity_m_s, &state.attitude_rad, &state.rates_rad_s];
+    let mut numbers = parts.into_iter().flat_map(|part| part.iter().map(|number| f64::from(*number)));
+    core::array::from_fn(|_| numbers.next().unwrap_or_default())
+}
+
+/// Desired motion, earth frame: position with four derivatives, heading with two.
+#[pyclass(name = "Setpoint", module = "afbc", frozen, from_py_object)]
+#[derive(Clone, Copy)]
+pub(crate) struct PySetpoint(pub(crate) Setpoint);
+
+#[pymethods]
+impl PySetpoint {
+    #[new]
+    #[pyo3(signature = (
+        position_m=[0.0; 3], velocity_m_s=[0.0; 3], acceleration_m_s2=[0.0; 3], jerk_m_s3=[0.0; 3],
+        snap_m_s4=[0.0; 3], yaw_rad=0.0, yaw_rate_rad_s=0.0, yaw_acceleration_rad_s2=0.0
+    ))]
+    #[expect(clippy::too_many_arguments, reason = "each by its name")]
+    fn new(
+        position_m: [f64; 3],
+        velocity_m_s: [f64; 3],
+        acceleration_m_s2: [f64; 3],
+        jerk_m_s3: [f64; 3],
+        snap_m_s4: [f64; 3],
+        yaw_rad: f64,
+        yaw_rate_rad_s: f64,
+        yaw_acceleration_rad_s2: f64,
+    ) -> Self {
+        PySetpoint(Setpoint {
+            position_m: vector(position_m),
+            velocity_m_s: vector(velocity_m_s),
+            acceleration_m_s2: vector(acceleration_m_s2),
+            jerk_m_s3: vector(jerk_m_s3),
+            snap_m_s4: vector(snap_m_s4),
+            yaw_rad: yaw_rad as f32,
+            yaw_rate_rad_s: yaw_rate_rad_s as f32,
+            yaw_acceleration_rad_s2: yaw_acceleration_rad_s2 as f32,
+        })
+    }
+
+    #[getter]
+    fn position_m<'py>(&self, py: Python<'py>) -> Array<'py> {
+        array(py, &self.0.position_m)
+    }
+
+    #[getter]
+    fn velocity_m_s<'py>(&self, py: Python<'py>) -> Array<'py> {
+        array(py, &self.0.velocity_m_s)
+    }
+
+    #[getter]
+    fn acceleration_m_s2<'py>(&self, py: Python<'py>) -> Array<'py> {
+        array(py, &self.0.acceleration_m_s2)
+    }
+
+    #[getter]
+    fn jerk_m_s3<'py>(&self, py: Python<'py>) -> Array<'py> {
+        array(py, &self.0.jerk_m_s3)
+    }
+
+    #[getter]
+    fn snap_m_s4<'py>(&self, py: Python<'py>) -> Array<'py> {
+        array(py, &self.0.snap_m_s4)
+    }
+
+    #[getter]
+    fn yaw_rad(&self) -> f32 {
+        self.0.yaw_rad
+    }
+
+    #[getter]
+    fn yaw_rate_rad_s(&self) -> f32 {
+        self.0.yaw_rate_rad_s
+    }
+
+    #[getter]
+    fn yaw_acceleration_rad_s2(&self) -> f32 {
+        self.0.yaw_acceleration_rad_s2
+    }
+}

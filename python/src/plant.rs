@@ -1,0 +1,138 @@
+//! The plant, step by step.
+
+use crate::error::error;
+use crate::motion::{PySetpoint, PyState};
+use crate::scenario::{ScenarioArgument, changed};
+use crate::vehicle::VehicleArgument;
+use afbc_scenario::Scenario;
+use afbc_sim::flight::{View, World};
+use afbc_types::{ROTORS_MAX, RotorSpeeds};
+use nalgebra::SVector;
+use numpy::{PyArray1, PyReadonlyArray1, ToPyArray};
+use pyo3::prelude::*;
+
+/// The world of a scenario without its controllers: plant with rotors, air, ground and battery, sensors, link and
+/// reference; faults and gusts come as the scenario says. It is read by `look`, and moved by `step`.
+#[pyclass(name = "Plant", module = "afbc")]
+pub(crate) struct PyPlant {
+    scenario: Scenario,
+    world: World,
+    view: View,
+    dt_s: f64,
+}
+
+/// The world of `scenario`, and what is seen of it at its start.
+pub(crate) fn start(scenario: &Scenario, dt_s: f64) -> PyResult<(World, View)> {
+    let mut world = World::new(scenario, dt_s).map_err(error)?;
+    let view = world.look();
+    Ok((world, view))
+}
+
+/// Commands of as many rotors as the vehicle has.
+pub(crate) fn commands(speeds: &[f64], rotors: usize) -> PyResult<RotorSpeeds<ROTORS_MAX>> {
+    if speeds.len() != rotors || !speeds.iter().all(|speed| speed.is_finite() && *speed >= 0.0) {
+        let given = speeds.len();
+        return Err(error(format!("speeds_rad_s: {given} given; {rotors} finite numbers, 0 or more, are needed")));
+    }
+    let speed = |i: usize| speeds.get(i).copied().unwrap_or_default() as f32;
+    Ok(RotorSpeeds(SVector::from_fn(|i, _| speed(i))))
+}
+
+#[pymethods]
+impl PyPlant {
+    /// Makes the world of a scenario, "hover" if none is given, for steps of `dt_s` [s].
+    #[new]
+    #[pyo3(signature = (scenario=None, *, vehicle=None, seed=None, dt_s=0.001))]
+    fn new(
+        scenario: Option<ScenarioArgument<'_>>,
+        vehicle: Option<VehicleArgument<'_>>,
+        seed: Option<u64>,
+        dt_s: f64,
+    ) -> PyResult<Self> {
+        let scenario = scenario.unwrap_or(ScenarioArgument::Path("hover".into())).scenario()?;
+        let scenario = changed(scenario, vehicle.as_ref(), seed, None)?;
+        let (world, view) = start(&scenario, dt_s)?;
+        Ok(PyPlant { scenario, world, view, dt_s })
+    }
+
+    /// Starts again, with another seed if one is given.
+    #[pyo3(signature = (seed=None))]
+    fn reset(&mut self, seed: Option<u64>) -> PyResult<()> {
+        self.scenario.seed = seed.unwrap_or(self.scenario.seed);
+        (self.world, self.view) = start(&self.scenario, self.dt_s)?;
+        Ok(())
+    }
+
+    /// Moves the vehicle by one step with these commanded rotor speeds [rad/s], shape (rotors,).
+    fn step(&mut self, speeds_rad_s: PyReadonlyArray1<'_, f64>) -> PyResult<()> {
+        let speeds: Vec<f64> = speeds_rad_s.as_array().iter().copied().collect();
+        self.world.advance(&commands(&speeds, self.scenario.rotors.len())?);
+        self.view = self.world.look();
+        Ok(())
+    }
+
+    /// Time [s].
+    #[getter]
+    fn time_s(&self) -> f64 {
+        self.view.time_s
+    }
+
+    /// Time between steps [s].
+    #[getter]
+    fn dt_s(&self) -> f64 {
+        self.dt_s
+    }
+
+    /// What reaches the controller: the state measured by the scenario's sensors or estimated by the vehicle, held
+    /// between samples; None in a dropout or an outage.
+    #[getter]
+    fn state(&self) -> Option<PyState> {
+        self.view.state.map(PyState)
+    }
+
+    /// The true state, as a perfect sensor would measure it.
+    #[getter]
+    fn true_state(&self) -> PyState {
+        PyState(self.view.motion.measure())
+    }
+
+    /// The twelve numbers of the true state in double precision.
+    #[getter]
+    fn true_vector<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        let motion = &self.view.motion;
+        let parts = [&motion.position_m, &motion.velocity_m_s, &motion.attitude_rad, &motion.rates_rad_s];
+        PyArray1::from_iter(py, parts.into_iter().flat_map(|part| part.iter().copied()))
+    }
+
+    /// The scenario's reference at this time.
+    #[getter]
+    fn setpoint(&self) -> PySetpoint {
+        PySetpoint(self.view.reference.setpoint())
+    }
+
+    /// True rotor speeds [rad/s], shape (rotors,); zero before the first step of an ideal plant.
+    #[getter]
+    fn rotor_speeds_rad_s<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        let truth = self.world.plant().truth();
+        PyArray1::from_iter(py, truth.rotor_speeds_rad_s.iter().take(self.scenario.rotors.len()).copied())
+    }
+
+    /// What an accelerometer at the centre of mass feels, body frame [m/s2], shape (3,).
+    #[getter]
+    fn specific_force_m_s2<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        <[f64; 3]>::from(self.world.plant().truth().specific_force_m_s2()).to_pyarray(py)
+    }
+
+    /// Wind at the vehicle, earth frame [m/s], shape (3,).
+    #[getter]
+    fn wind_m_s<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        let wind = self.view.telemetry.map_or([0.0; 3], |telemetry| telemetry.wind_m_s.into());
+        wind.to_pyarray(py)
+    }
+
+    /// True if it stands on the ground.
+    #[getter]
+    fn on_ground(&self) -> bool {
+        self.view.telemetry.is_some_and(|telemetry| telemetry.on_ground)
+    }
+}

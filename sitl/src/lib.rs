@@ -1,0 +1,49 @@
+//! The command line of the simulator, for programs that bring laws of their own.
+//!
+//! ```no_run
+//! use afbc_scenario::{OwnController, OwnLaw, OwnVehicle};
+//! use afbc_types::{Inputs, Setpoint, State};
+//!
+//! /// Carries the weight and does nothing else.
+//! struct Float(OwnVehicle);
+//!
+//! impl OwnController for Float {
+//!     fn step(&mut self, _: &State, _: &Setpoint, _fresh: bool) -> Inputs {
+//!         Inputs { thrust_n: self.0.parameters.weight_n(), ..Inputs::default() }
+//!     }
+//! }
+//!
+//! fn main() -> std::process::ExitCode {
+//!     // `cargo run --release -- fly hover --controller float`, `-- compare --suite field`, `-- tune float` and so on.
+//!     sitl::main_with([OwnLaw::new("float", |vehicle| Float(*vehicle))])
+//! }
+//! ```
+#![forbid(unsafe_code)]
+
+mod cli;
+mod network;
+mod serial;
+
+use afbc_scenario::OwnLaw;
+use clap::Parser;
+use std::process::ExitCode;
+
+/// Runs the command line with these laws beside the built-in ones: in every command that flies, in scenario and vehicle
+/// files, in suites, campaigns and searches for gains.
+///
+/// Exit codes: 0 for success; 1 if a vehicle was lost unexpectedly, or an exact replay differs; 2 if a law cannot be
+/// registered, nothing was flown or the results could not be written, with one line on stderr; 130 if interrupted, with
+/// one line that says whether nothing was written or a campaign's finished flights are kept.
+pub fn main_with(laws: impl IntoIterator<Item = OwnLaw>) -> ExitCode {
+    if let Some(problem) = laws.into_iter().find_map(|law| law.register().err()) {
+        eprintln!("{problem}");
+        return ExitCode::from(2);
+    }
+    match cli::Cli::parse().run() {
+        Ok(code) => code,
+        Err(failure) => {
+            eprintln!("{failure}");
+            ExitCode::from(2)
+        }
+    }
+}
