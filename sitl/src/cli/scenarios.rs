@@ -6,10 +6,13 @@ use super::target::Target;
 use super::terminal::{Failure, print};
 use afbc_campaign::Campaign;
 use afbc_campaign::subject::{Subject, SubjectKind};
+use afbc_files::Error;
 use afbc_reader::BuiltIn;
 use afbc_scenario::contender::Contender;
+use afbc_scenario::trajectory::{Trajectory, polynomial};
 use afbc_scenario::{BUILT_IN, Scenario, built_in};
 use clap::Args;
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 /// List the built-in scenarios, or print one of them to start from
@@ -53,6 +56,11 @@ pub(crate) struct Check {
     /// Name of a built-in scenario or campaign, or path of a file
     scenario: Target,
 
+    /// Also write the polynomials of a scenario's minimum-snap path, or of a path from a file, into this file, as the
+    /// Crazyflie's tools do
+    #[arg(long, value_name = "FILE")]
+    polynomials: Option<PathBuf>,
+
     #[command(flatten)]
     json: Json,
 }
@@ -60,6 +68,18 @@ pub(crate) struct Check {
 impl Check {
     /// Prints a summary of the file.
     pub(super) fn run(self) -> Result<ExitCode, Failure> {
+        if let Some(path) = self.polynomials {
+            let scenario = self.scenario.scenario()?;
+            let Trajectory::Polynomials(pieces) = &scenario.trajectory else {
+                let cure = "a trajectory of kind \"minimum-snap\" or \"file\" has some";
+                return Err(format!("--polynomials: {} has none; {cure}", scenario.name).into());
+            };
+            let text = polynomial::written(pieces);
+            return match std::fs::write(&path, text) {
+                Ok(()) => Ok(ExitCode::SUCCESS),
+                Err(source) => Err(Error::Write { path, source }.into()),
+            };
+        }
         match (self.scenario.either()?, self.json.json) {
             (Subject::Scenario(scenario), true) => json::print_value(&json::scenario(&scenario))?,
             (Subject::Campaign(campaign), true) => json::print_value(&json::campaign(&campaign))?,

@@ -5,6 +5,7 @@ mod control;
 mod environment;
 mod instruments;
 mod motion;
+mod path;
 mod realism;
 mod sensors;
 mod trajectory;

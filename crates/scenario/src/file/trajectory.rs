@@ -1,6 +1,9 @@
 //! `[trajectory]`: the reference, a table whose `kind` determines its keys.
 
 use super::motion::POSITION;
+use super::path;
+use crate::trajectory::minimum_snap::{PaceLimits, Place, minimum_snap};
+use crate::trajectory::polynomial::peaks;
 use crate::trajectory::{Sine, Trajectory, Waypoint};
 use afbc_reader::{FileError, Table};
 use afbc_types::{Range, Setpoint};
@@ -30,6 +33,12 @@ const TURN: Range = Range::new("turn_rad", -100.0, 100.0);
 const STEP_TIME: Range = Range::new("at_s", 0.0, 36_000.0);
 /// Accepted time of a waypoint \[s\].
 const WAYPOINT_TIME: Range = Range::new("time_s", 0.0, 36_000.0);
+/// Accepted start of a path \[s\].
+pub(super) const START: Range = Range::new("start_s", 0.0, 36_000.0);
+/// Accepted largest speed through waypoints \[m/s\].
+const SPEED_MAX: Range = Range::new("speed_max_m_s", 0.01, 100.0);
+/// Accepted largest acceleration there \[m/s2\].
+const ACCELERATION_MAX: Range = Range::new("acceleration_max_m_s2", 0.01, 100.0);
 
 #[derive(Clone, Copy)]
 enum Kind {
@@ -40,11 +49,22 @@ enum Kind {
     Lemniscate,
     Lissajous,
     Waypoints,
+    MinimumSnap,
+    File,
 }
 
 impl Kind {
-    const ALL: [Kind; 7] =
-        [Kind::Paper, Kind::Hover, Kind::Step, Kind::Circle, Kind::Lemniscate, Kind::Lissajous, Kind::Waypoints];
+    const ALL: [Kind; 9] = [
+        Kind::Paper,
+        Kind::Hover,
+        Kind::Step,
+        Kind::Circle,
+        Kind::Lemniscate,
+        Kind::Lissajous,
+        Kind::Waypoints,
+        Kind::MinimumSnap,
+        Kind::File,
+    ];
 
     const fn name(self) -> &'static str {
         match self {
@@ -55,6 +75,8 @@ impl Kind {
             Kind::Lemniscate => "lemniscate",
             Kind::Lissajous => "lissajous",
             Kind::Waypoints => "waypoints",
+            Kind::MinimumSnap => "minimum-snap",
+            Kind::File => "file",
         }
     }
 }
@@ -76,6 +98,8 @@ pub(super) fn read(mut table: Table<'_>) -> Result<Trajectory, FileError> {
         Kind::Lemniscate => lemniscate(&mut table)?,
         Kind::Lissajous => lissajous(&mut table)?,
         Kind::Waypoints => waypoints(&mut table)?,
+        Kind::MinimumSnap => through_places(&mut table)?,
+        Kind::File => path::read(&mut table)?,
     };
     table.finish()?;
     Ok(trajectory)
@@ -157,9 +181,36 @@ fn waypoints(table: &mut Table<'_>) -> Result<Trajectory, FileError> {
     Ok(Trajectory::Waypoints(waypoints))
 }
 
+/// Minimum-snap motion through places, from rest to rest, within limits of speed and acceleration.
+fn through_places(table: &mut Table<'_>) -> Result<Trajectory, FileError> {
+    let start_s = table.number(&START)?.unwrap_or(0.0);
+    let limits = PaceLimits {
+        speed_m_s: table.need_number(&SPEED_MAX)?,
+        acceleration_m_s2: table.need_number(&ACCELERATION_MAX)?,
+    };
+    let mut places: Vec<Place> = Vec::new();
+    for mut table in table.few_tables("waypoint")? {
+        let position_m = table.need_vector("position_m", &POSITION)?;
+        let place = [position_m.x, position_m.y, position_m.z, yaw(&mut table)?];
+        if places.last().is_some_and(|before| before[..3] == place[..3]) {
+            return Err(table.fault_at("position_m", "it is that of the waypoint before; leave one out"));
+        }
+        table.finish()?;
+        places.push(place);
+    }
+    if places.len() < 2 {
+        return Err(table.missing("waypoint", "add two or more [[trajectory.waypoint]] with position_m"));
+    }
+    let pieces = minimum_snap(&places, start_s, limits).ok_or_else(|| {
+        table.fault_at("waypoint", "no smooth path goes through them; make their distances more alike")
+    })?;
+    slow_enough(table, SPEED_MAX.name, peaks(&pieces))?;
+    Ok(Trajectory::Polynomials(pieces))
+}
+
 /// Returns an error if the reference is too fast for a controller to accept; `peaks` are those of its derivatives from
 /// the speed to the snap, in m and s.
-fn slow_enough(table: &Table<'_>, key: &str, peaks: [f64; 4]) -> Result<(), FileError> {
+pub(super) fn slow_enough(table: &Table<'_>, key: &str, peaks: [f64; 4]) -> Result<(), FileError> {
     let [velocity_m_s, acceleration_m_s2, jerk_m_s3, snap_m_s4] = peaks.map(|size| Vector3::new(size as f32, 0.0, 0.0));
     let fastest = Setpoint { velocity_m_s, acceleration_m_s2, jerk_m_s3, snap_m_s4, ..Setpoint::default() };
     if fastest.is_plausible() {

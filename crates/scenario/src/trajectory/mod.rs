@@ -2,10 +2,15 @@
 //!
 //! Trigonometry comes from `libm`, so a flight gives the same bits on every host.
 
+pub mod minimum_snap;
+pub mod polynomial;
+pub mod spline;
+
 use afbc_types::Setpoint;
 use core::f64::consts::{PI, TAU};
 use libm::{cos, sin, sincos};
 use nalgebra::Vector3;
+pub use polynomial::PolynomialPiece;
 
 /// The reference at one time, earth frame, with the quantities of [`Setpoint`] in `f64`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -132,6 +137,8 @@ pub enum Trajectory {
     /// Minimum-jerk motion from rest to rest between waypoints with increasing times; at rest before the first and
     /// after the last. Position, velocity and acceleration are continuous; the jerk jumps at each waypoint.
     Waypoints(Vec<Waypoint>),
+    /// Polynomial pieces, each beginning where the one before ends; at rest before the first and after the last.
+    Polynomials(Vec<PolynomialPiece>),
 }
 
 impl Trajectory {
@@ -169,6 +176,7 @@ impl Trajectory {
                 }
             }
             Trajectory::Waypoints(waypoints) => between(waypoints, t),
+            Trajectory::Polynomials(pieces) => polynomial::at(pieces, t),
         }
     }
 }

@@ -1,0 +1,213 @@
+//! `kind = "file"`: a path of one's own, from a file of comma-separated values.
+//!
+//! Either samples over time, with the columns of a flight's log, or the polynomials of the Crazyflie's tools
+//! (`duration,x^0,...,x^7,y^0,...,yaw^7`).
+
+use super::trajectory::{START, slow_enough};
+use crate::trajectory::polynomial::{COEFFICIENTS, Coefficients, PolynomialPiece, peaks, through};
+use crate::trajectory::spline::PathSamples;
+use crate::trajectory::{Reference, Trajectory};
+use afbc_reader::{FileError, Source, Table};
+use afbc_types::Range;
+use core::f64::consts::TAU;
+use csv::{ReaderBuilder, StringRecord};
+use std::path::Path;
+
+/// Key of the file's path.
+const FILE: &str = "file";
+/// Accepted factor of the speed.
+const PACE: Range = Range::new("pace", 0.01, 100.0);
+/// Most lines of a path.
+const LINES: usize = 200_000;
+/// Largest coordinate, and largest angle \[m, rad\].
+const LARGEST: f64 = 10_000.0;
+/// First column of a file of polynomials.
+const DURATION: &str = "duration";
+/// Coordinates, with the names of their columns: value, first and second derivative.
+const COLUMNS: [[&[&str]; 3]; 4] = [
+    [&["x_m"], &["vx_m_s"], &["ax_m_s2"]],
+    [&["y_m"], &["vy_m_s"], &["ay_m_s2"]],
+    [&["z_m"], &["vz_m_s"], &["az_m_s2"]],
+    [&["yaw_rad", "psi_rad"], &["yaw_rate_rad_s"], &["yaw_acceleration_rad_s2"]],
+];
+
+/// Reads the path that the table names, relative to the folder of its own file.
+pub(super) fn read(table: &mut Table<'_>) -> Result<Trajectory, FileError> {
+    let named = table.need_text(FILE, "give the path of a file of comma-separated values")?;
+    let start_s = table.number(&START)?;
+    let pace = table.number(&PACE)?.unwrap_or(1.0);
+    let path = Path::new(table.file()).parent().unwrap_or(Path::new("")).join(named);
+    let shown = path.display().to_string();
+    let text = std::fs::read_to_string(&path)
+        .map_err(|error| table.fault_at(FILE, format!("{shown} cannot be read ({error}); name a file of text")))?;
+    let file = Lines { source: Source { file: &shown, text: &text } };
+    let mut pieces = file.pieces()?;
+    let first_s = pieces.first().map_or(0.0, |piece| piece.start_s);
+    let start_s = start_s.unwrap_or(first_s);
+    for piece in &mut pieces {
+        *piece = paced(piece, first_s, start_s, pace);
+    }
+    if start_s < 0.0 {
+        return Err(table.fault_at(FILE, format!("it begins at {start_s} s; set start_s, such as 0")));
+    }
+    slow_enough(table, FILE, peaks(&pieces))?;
+    Ok(Trajectory::Polynomials(pieces))
+}
+
+/// The piece `pace` times as fast, of a path that begins at `start_s` instead of `first_s`.
+fn paced(piece: &PolynomialPiece, first_s: f64, start_s: f64, pace: f64) -> PolynomialPiece {
+    let mut coefficients = piece.coefficients;
+    for axis in &mut coefficients {
+        let mut factor = 1.0;
+        for coefficient in axis {
+            *coefficient *= factor;
+            factor *= pace;
+        }
+    }
+    let start_s = start_s + (piece.start_s - first_s) / pace;
+    PolynomialPiece { start_s, duration_s: piece.duration_s / pace, coefficients }
+}
+
+/// The file.
+struct Lines<'a> {
+    source: Source<'a>,
+}
+
+impl Lines<'_> {
+    fn pieces(&self) -> Result<Vec<PolynomialPiece>, FileError> {
+        let mut reader = ReaderBuilder::new().trim(csv::Trim::All).from_reader(self.source.text.as_bytes());
+        let head = reader.headers().map_err(|error| self.broken(&error))?.clone();
+        let mut rows = Vec::new();
+        for record in reader.records() {
+            let record = record.map_err(|error| self.broken(&error))?;
+            if rows.len() >= LINES {
+                return Err(self.fault(&record, "", format!("more than {LINES} lines; keep fewer")));
+            }
+            rows.push(record);
+        }
+        match head.get(0) {
+            Some(DURATION) => self.polynomials(&head, &rows),
+            _ => self.samples(&head, &rows),
+        }
+    }
+
+    /// Reads samples over time.
+    fn samples(&self, head: &StringRecord, rows: &[StringRecord]) -> Result<Vec<PolynomialPiece>, FileError> {
+        let place = |names: &[&str]| head.iter().position(|column| names.contains(&column));
+        let need = |names: &[&str]| {
+            let first = names.first().copied().unwrap_or_default();
+            place(names).ok_or_else(|| self.whole(format!("no column {first}; it needs time_s, x_m, y_m and z_m")))
+        };
+        let time = need(&["time_s"])?;
+        let mut samples = PathSamples { time_s: self.column(rows, time, head)?, ..PathSamples::default() };
+        let later = samples.time_s.iter().zip(rows).skip(1);
+        for (before, (time_s, row)) in samples.time_s.iter().zip(later).filter(|(before, (time_s, _))| before >= time_s)
+        {
+            return Err(self.fault(row, "time_s", format!("{time_s} is not after {before}; make times rise")));
+        }
+        if samples.time_s.len() < 2 {
+            return Err(self.whole("fewer than two lines of numbers; a path needs two"));
+        }
+        for (axis, [value, rate, acceleration]) in COLUMNS.into_iter().enumerate() {
+            let known = |names| place(names).map(|place| self.column(rows, place, head)).transpose();
+            let values = match (axis, place(value)) {
+                (3, None) => vec![0.0; rows.len()],
+                _ => self.column(rows, need(value)?, head)?,
+            };
+            if let (Some(slot), Some(rates), Some(accelerations)) =
+                (samples.values.get_mut(axis), samples.rates.get_mut(axis), samples.accelerations.get_mut(axis))
+            {
+                *slot = if axis == 3 { unwrapped(values) } else { values };
+                (*rates, *accelerations) = (known(rate)?, known(acceleration)?);
+            }
+        }
+        Ok(through(&samples.knots()))
+    }
+
+    /// Reads polynomials, one after the other.
+    fn polynomials(&self, head: &StringRecord, rows: &[StringRecord]) -> Result<Vec<PolynomialPiece>, FileError> {
+        let names = ["x", "y", "z", "yaw"].map(|axis| (0..COEFFICIENTS).map(move |power| format!("{axis}^{power}")));
+        let expected: Vec<String> = core::iter::once(DURATION.to_owned()).chain(names.into_iter().flatten()).collect();
+        if !head.iter().filter(|column| !column.is_empty()).eq(expected.iter().map(String::as_str)) {
+            return Err(self.whole("its columns must be duration, x^0 to x^7, y^0 to y^7, z^0 to z^7, yaw^0 to yaw^7"));
+        }
+        let (mut pieces, mut start_s): (Vec<PolynomialPiece>, f64) = (Vec::new(), 0.0);
+        for row in rows {
+            let duration_s = self.number(row, 0, head)?;
+            if duration_s <= 0.0 {
+                return Err(self.fault(row, DURATION, "a piece must last longer than 0 s".into()));
+            }
+            let mut coefficients: [Coefficients; 4] = Default::default();
+            for (i, coefficient) in coefficients.iter_mut().flatten().enumerate() {
+                *coefficient = self.number(row, i + 1, head)?;
+            }
+            let piece = PolynomialPiece { start_s, duration_s, coefficients };
+            if let Some(before) = pieces.last() {
+                self.joined(row, before, &piece)?;
+            }
+            start_s = piece.end_s();
+            pieces.push(piece);
+        }
+        if pieces.is_empty() {
+            return Err(self.whole("no line of numbers; a path needs one"));
+        }
+        Ok(pieces)
+    }
+
+    /// Checks that a piece begins where and as fast as the one before ends.
+    fn joined(&self, row: &StringRecord, before: &PolynomialPiece, piece: &PolynomialPiece) -> Result<(), FileError> {
+        let [end, begin]: [Reference; 2] = [before.at(before.end_s()), piece.at(piece.start_s)];
+        let jump_m = (end.position_m - begin.position_m).norm();
+        let jump_m_s = (end.velocity_m_s - begin.velocity_m_s).norm();
+        if jump_m > 0.01 || jump_m_s > 0.1 {
+            let problem = format!("it begins {jump_m:.3} m and {jump_m_s:.3} m/s from the end of the piece before");
+            return Err(self.fault(row, DURATION, format!("{problem}; pieces must join")));
+        }
+        Ok(())
+    }
+
+    fn column(&self, rows: &[StringRecord], place: usize, head: &StringRecord) -> Result<Vec<f64>, FileError> {
+        rows.iter().map(|row| self.number(row, place, head)).collect()
+    }
+
+    fn number(&self, row: &StringRecord, place: usize, head: &StringRecord) -> Result<f64, FileError> {
+        let (text, column) = (row.get(place).unwrap_or_default(), head.get(place).unwrap_or_default());
+        let number = text.parse().ok().filter(|number: &f64| number.is_finite() && number.abs() <= 1e3 * LARGEST);
+        let number = number.filter(|number| !column.ends_with("_m") || number.abs() <= LARGEST);
+        number.ok_or_else(|| {
+            self.fault(row, column, format!("\"{}\" is no number that a path may have", text.escape_debug()))
+        })
+    }
+
+    fn whole(&self, problem: impl Into<String>) -> FileError {
+        FileError::whole(self.source.file, problem)
+    }
+
+    fn fault(&self, row: &StringRecord, column: &str, problem: String) -> FileError {
+        let at = row.position().map_or(0, |position| position.byte() as usize);
+        FileError::at(self.source, at, column, problem)
+    }
+
+    fn broken(&self, error: &csv::Error) -> FileError {
+        let at = error.position().map_or(0, |position| position.byte() as usize);
+        let problem = match error.kind() {
+            csv::ErrorKind::UnequalLengths { expected_len, len, .. } => {
+                format!("{len} values, where the first line names {expected_len} columns")
+            }
+            _ => "not comma-separated values".into(),
+        };
+        FileError::at(self.source, at, "", problem)
+    }
+}
+
+/// Returns angles without the jumps of a turn.
+fn unwrapped(mut angles: Vec<f64>) -> Vec<f64> {
+    let mut before = None;
+    for angle in &mut angles {
+        if let Some(before) = before {
+            *angle -= TAU * libm::rint((*angle - before) / TAU);
+        }
+        before = Some(*angle);
+    }
+    angles
+}

@@ -1,0 +1,137 @@
+//! Minimum-snap motion through waypoints: D. Mellinger and V. Kumar, "Minimum Snap Trajectory Generation and Control for
+//! Quadrotors", ICRA 2011.
+//!
+//! The integral of the squared snap over given times is least for pieces of degree seven with six continuous
+//! derivatives at the waypoints, at rest at both ends. Unknown are velocity, acceleration and jerk at the waypoints
+//! between; the continuity of the fourth to sixth derivative makes a block-tridiagonal system of them.
+
+use super::polynomial::{COEFFICIENTS, PolynomialPiece, peaks};
+use nalgebra::{Matrix3, SMatrix};
+
+/// A matrix with a column for each of x, y, z, yaw, and a row for each of velocity, acceleration, jerk.
+type Unknown = SMatrix<f64, 3, 4>;
+
+/// A waypoint without a time: x, y, z \[m\] and yaw \[rad\].
+pub type Place = [f64; 4];
+
+/// Largest speed and acceleration that a path may ask for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PaceLimits {
+    /// Speed \[m/s\].
+    pub speed_m_s: f64,
+    /// Acceleration \[m/s2\].
+    pub acceleration_m_s2: f64,
+}
+
+/// Returns the motion through `places` from rest at `start_s` to rest, as fast as one scale of all times allows within
+/// `limits`; none if two places that follow each other are one, or there are fewer than two.
+pub fn minimum_snap(places: &[Place], start_s: f64, limits: PaceLimits) -> Option<Vec<PolynomialPiece>> {
+    let legs = || places.iter().zip(places.iter().skip(1));
+    let length = |(a, b): (&Place, &Place)| {
+        let [x, y, z] = [0, 1, 2].map(|i| b[i] - a[i]);
+        libm::sqrt(x * x + y * y + z * z)
+    };
+    // In proportion to the square root of the length, as at constant acceleration: a first guess of the proportions.
+    let durations_s: Vec<f64> = legs()
+        .map(|leg| libm::sqrt(length(leg)) + length(leg) * limits.acceleration_m_s2.sqrt() / limits.speed_m_s)
+        .collect();
+    if durations_s.is_empty() || !durations_s.iter().all(|duration_s| *duration_s > 0.0) {
+        return None;
+    }
+    let first = timed(places, &durations_s, start_s)?;
+    // Derivatives of order n scale by the power -n of all times; a thousandth for what lies between the samples.
+    let [speed, acceleration, ..] = peaks(&first);
+    let scale = 1.001 * (speed / limits.speed_m_s).max(libm::sqrt(acceleration / limits.acceleration_m_s2));
+    let durations_s: Vec<f64> = durations_s.iter().map(|duration_s| duration_s * scale).collect();
+    timed(places, &durations_s, start_s)
+}
+
+/// Returns the motion through `places` in these times; none if they are too different for the arithmetic.
+fn timed(places: &[Place], durations_s: &[f64], start_s: f64) -> Option<Vec<PolynomialPiece>> {
+    let between = between(places, durations_s)?;
+    let rest = Unknown::zeros();
+    let knots: Vec<&Unknown> = core::iter::once(&rest).chain(&between).chain([&rest]).collect();
+    let mut pieces = Vec::with_capacity(durations_s.len());
+    let mut begin_s = start_s;
+    for (i, duration_s) in durations_s.iter().copied().enumerate() {
+        let (from, to) = (places.get(i)?, places.get(i + 1)?);
+        let (a, b) = (*knots.get(i)?, *knots.get(i + 1)?);
+        let mut coefficients = [[0.0; COEFFICIENTS]; 4];
+        for (axis, coefficients) in coefficients.iter_mut().enumerate() {
+            let [start, end] = [(from, a), (to, b)]
+                .map(|(place, knot)| [place[axis], knot[(0, axis)], knot[(1, axis)], knot[(2, axis)]]);
+            *coefficients = septic(start, end, duration_s);
+        }
+        pieces.push(PolynomialPiece { start_s: begin_s, duration_s, coefficients });
+        begin_s += duration_s;
+    }
+    Some(pieces)
+}
+
+/// The septic from value and three derivatives at 0 to those at `t`.
+fn septic([p0, v0, a0, j0]: [f64; 4], [p1, v1, a1, j1]: [f64; 4], t: f64) -> [f64; COEFFICIENTS] {
+    let (t2, t3) = (t * t, t * t * t);
+    let p = p1 - (p0 + v0 * t + a0 * t2 / 2.0 + j0 * t3 / 6.0);
+    let v = (v1 - (v0 + a0 * t + j0 * t2 / 2.0)) * t;
+    let a = (a1 - (a0 + j0 * t)) * t2;
+    let j = (j1 - j0) * t3;
+    let t4 = t2 * t2;
+    [
+        p0,
+        v0,
+        a0 / 2.0,
+        j0 / 6.0,
+        (35.0 * p - 15.0 * v + 2.5 * a - j / 6.0) / t4,
+        (-84.0 * p + 39.0 * v - 7.0 * a + j / 2.0) / (t4 * t),
+        (70.0 * p - 34.0 * v + 6.5 * a - j / 2.0) / (t4 * t2),
+        (-20.0 * p + 10.0 * v - 2.0 * a + j / 6.0) / (t4 * t3),
+    ]
+}
+
+/// How the fourth to sixth derivative at an end of a piece depend on the difference of places, and on velocity,
+/// acceleration and jerk at the same end and at the other one. At the start; at the end, time runs backwards.
+fn ends(t: f64) -> ([f64; 3], Matrix3<f64>, Matrix3<f64>) {
+    // Columns of `septic`: the response to one of its arguments.
+    let response = |argument: usize| {
+        let mut arguments = [[0.0; 4]; 2];
+        arguments[argument / 4][argument % 4] = 1.0;
+        let [start, end] = arguments;
+        let [.., c4, c5, c6, _] = septic(start, end, t);
+        [24.0 * c4, 120.0 * c5, 720.0 * c6]
+    };
+    let place = response(4);
+    let block = |first: usize| Matrix3::from_columns(&[0, 1, 2].map(|i| response(first + i).into()));
+    (place, block(1), block(5))
+}
+
+/// Solves for velocity, acceleration and jerk at the places between: Thomas' algorithm on blocks.
+fn between(places: &[Place], durations_s: &[f64]) -> Option<Vec<Unknown>> {
+    // Time reversed, odd derivatives change their sign: of unknowns (1, 2, 3) and of equations (4, 5, 6).
+    let odd = Matrix3::from_diagonal(&[-1.0, 1.0, -1.0].into());
+    let even = Matrix3::from_diagonal(&[1.0, -1.0, 1.0].into());
+    let mut solved: Vec<(Matrix3<f64>, Unknown)> = Vec::new();
+    for (i, place) in places.iter().enumerate().skip(1).take(places.len().saturating_sub(2)) {
+        let (before, after) = (places.get(i - 1)?, places.get(i + 1)?);
+        let ([left_t, right_t], zero) = ([*durations_s.get(i - 1)?, *durations_s.get(i)?], Matrix3::zeros());
+        let (left_place, left_own, left_other) = ends(left_t);
+        let (right_place, right_own, right_other) = ends(right_t);
+        let mut wanted = Unknown::zeros();
+        for axis in 0..4 {
+            let left = nalgebra::Vector3::from(left_place) * (before[axis] - place[axis]);
+            let right = nalgebra::Vector3::from(right_place) * (after[axis] - place[axis]);
+            wanted.set_column(axis, &(even * left - right));
+        }
+        let (lower, own, upper) = (-even * left_other * odd, right_own - even * left_own * odd, right_other);
+        let (factor, known) = solved.last().copied().unwrap_or((zero, Unknown::zeros()));
+        let inverse = (own - lower * factor).try_inverse()?;
+        solved.push((inverse * upper, inverse * (wanted - lower * known)));
+    }
+    let mut next = Unknown::zeros();
+    let mut found: Vec<Unknown> = Vec::with_capacity(solved.len());
+    for (factor, known) in solved.into_iter().rev() {
+        next = known - factor * next;
+        found.push(next);
+    }
+    found.reverse();
+    found.iter().all(|knot| knot.iter().all(|value| value.is_finite())).then_some(found)
+}

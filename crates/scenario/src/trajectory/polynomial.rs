@@ -1,0 +1,138 @@
+//! References of polynomial pieces: paths that people bring, and smooth ones through waypoints.
+
+use super::Reference;
+use nalgebra::Vector3;
+
+/// Number of coefficients: degree 7.
+pub const COEFFICIENTS: usize = 8;
+
+/// A polynomial over a time, c0 + c1 s + ... + c7 s^7, s from its start on \[s\].
+pub type Coefficients = [f64; COEFFICIENTS];
+
+/// A piece of a reference: x, y, z \[m\] and yaw \[rad\] as polynomials.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct PolynomialPiece {
+    /// Start \[s\].
+    pub start_s: f64,
+    /// Length \[s\].
+    pub duration_s: f64,
+    /// x, y, z and yaw.
+    pub coefficients: [Coefficients; 4],
+}
+
+/// Value and four derivatives of a polynomial at `s`, by Horner's rule.
+pub fn derivatives(coefficients: &Coefficients, s: f64) -> [f64; 5] {
+    let mut value = [0.0; 5];
+    for coefficient in coefficients.iter().rev() {
+        for order in (1..5).rev() {
+            if let [lower, higher] = &mut value[order - 1..=order] {
+                *higher = *higher * s + *lower;
+            }
+        }
+        value[0] = value[0] * s + coefficient;
+    }
+    // Horner's rule gives the Taylor coefficients.
+    let [value, first, second, third, fourth] = value;
+    [value, first, 2.0 * second, 6.0 * third, 24.0 * fourth]
+}
+
+impl PolynomialPiece {
+    /// Returns the end \[s\].
+    pub fn end_s(&self) -> f64 {
+        self.start_s + self.duration_s
+    }
+
+    /// Returns the reference at time `t` \[s\], which is moved into the piece.
+    pub fn at(&self, t: f64) -> Reference {
+        let s = (t - self.start_s).clamp(0.0, self.duration_s);
+        let [x, y, z, yaw] = self.coefficients.each_ref().map(|coefficients| derivatives(coefficients, s));
+        let part = |order: usize| Vector3::new(x[order], y[order], z[order]);
+        Reference {
+            position_m: part(0),
+            velocity_m_s: part(1),
+            acceleration_m_s2: part(2),
+            jerk_m_s3: part(3),
+            snap_m_s4: part(4),
+            yaw_rad: yaw[0],
+            yaw_rate_rad_s: yaw[1],
+            yaw_acceleration_rad_s2: yaw[2],
+        }
+    }
+}
+
+/// Returns the reference of pieces at time `t`: at rest before the first and after the last.
+pub(super) fn at(pieces: &[PolynomialPiece], t: f64) -> Reference {
+    let next = pieces.partition_point(|piece| piece.start_s <= t);
+    let Some(piece) = pieces.get(next.saturating_sub(1)) else { return Reference::default() };
+    let reference = piece.at(t);
+    let flies = (piece.start_s..=piece.end_s()).contains(&t);
+    if flies { reference } else { Reference::rest(reference.position_m, reference.yaw_rad) }
+}
+
+/// Samples of each piece, for [`peaks`].
+const SAMPLES: u32 = 64;
+
+/// Returns the largest speed, acceleration, jerk and snap of pieces \[m, s\], as sampled.
+pub fn peaks(pieces: &[PolynomialPiece]) -> [f64; 4] {
+    let mut peaks = [0.0_f64; 4];
+    for piece in pieces {
+        for sample in 0..=SAMPLES {
+            let at = piece.at(piece.start_s + piece.duration_s * f64::from(sample) / f64::from(SAMPLES));
+            let parts = [at.velocity_m_s, at.acceleration_m_s2, at.jerk_m_s3, at.snap_m_s4];
+            for (peak, part) in peaks.iter_mut().zip(parts) {
+                *peak = peak.max(part.norm());
+            }
+        }
+    }
+    peaks
+}
+
+/// Writes pieces as the Crazyflie's tools do: `duration,x^0,...,x^7,y^0,...,yaw^7`, a line for each.
+pub fn written(pieces: &[PolynomialPiece]) -> String {
+    let powers = |axis: &str| (0..COEFFICIENTS).map(|power| format!(",{axis}^{power}")).collect::<String>();
+    let mut text = format!("duration{}\n", ["x", "y", "z", "yaw"].map(powers).concat());
+    for piece in pieces {
+        text += &piece.duration_s.to_string();
+        text.extend(piece.coefficients.iter().flatten().map(|coefficient| format!(",{coefficient:?}")));
+        text.push('\n');
+    }
+    text
+}
+
+/// A knot: value, first and second derivative of x, y, z, yaw at a time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Knot {
+    /// Time \[s\].
+    pub time_s: f64,
+    /// Of x, y, z and yaw: value, first derivative, second derivative.
+    pub values: [[f64; 3]; 4],
+}
+
+/// Returns the pieces of degree five between knots, which have their values and two derivatives.
+pub fn through(knots: &[Knot]) -> Vec<PolynomialPiece> {
+    let piece = |(a, b): (&Knot, &Knot)| {
+        let duration_s = b.time_s - a.time_s;
+        let mut coefficients = [[0.0; COEFFICIENTS]; 4];
+        for ((coefficients, from), to) in coefficients.iter_mut().zip(&a.values).zip(&b.values) {
+            *coefficients = quintic(*from, *to, duration_s);
+        }
+        PolynomialPiece { start_s: a.time_s, duration_s, coefficients }
+    };
+    knots.iter().zip(knots.iter().skip(1)).map(piece).collect()
+}
+
+/// The quintic from value and two derivatives at 0 to those at `t`.
+fn quintic([p0, v0, a0]: [f64; 3], [p1, v1, a1]: [f64; 3], t: f64) -> Coefficients {
+    let (d, v, a) = (p1 - p0 - v0 * t - 0.5 * a0 * t * t, v1 - v0 - a0 * t, a1 - a0);
+    let (t2, t3) = (t * t, t * t * t);
+    [
+        p0,
+        v0,
+        0.5 * a0,
+        (10.0 * d - 4.0 * v * t + 0.5 * a * t2) / t3,
+        (-15.0 * d + 7.0 * v * t - a * t2) / (t3 * t),
+        (6.0 * d - 3.0 * v * t + 0.5 * a * t2) / (t3 * t2),
+        0.0,
+        0.0,
+    ]
+}

@@ -1,0 +1,230 @@
+//! Paths of one's own: minimum snap through waypoints, samples and polynomials from files.
+#![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "tests")]
+
+use afbc_scenario::trajectory::minimum_snap::{PaceLimits, minimum_snap};
+use afbc_scenario::trajectory::polynomial::{Coefficients, PolynomialPiece, peaks};
+use afbc_scenario::trajectory::{Reference, Trajectory};
+use proptest::prelude::*;
+use std::fs;
+use std::path::PathBuf;
+
+const LIMITS: PaceLimits = PaceLimits { speed_m_s: 3.0, acceleration_m_s2: 4.0 };
+
+fn places() -> impl Strategy<Value = Vec<[f64; 4]>> {
+    let place = (-20.0..20.0, -20.0..20.0, 0.5..20.0, -3.0..3.0)
+        .prop_map(|(x, y, z, yaw): (f64, f64, f64, f64)| [x, y, z, yaw]);
+    prop::collection::vec(place, 2..12).prop_filter("not too near", |places| {
+        places.windows(2).all(|pair| (0..3).map(|i| f64::abs(pair[0][i] - pair[1][i])).sum::<f64>() > 0.5)
+    })
+}
+
+/// Value of the derivative of this order at `s`, term by term.
+fn derivative(coefficients: &Coefficients, order: i32, s: f64) -> f64 {
+    let falling = |power: i32| (0..order).map(|k| f64::from(power - k)).product::<f64>();
+    (order..8).map(|power| coefficients[power as usize] * falling(power) * s.powi(power - order)).sum()
+}
+
+/// Integral of the squared snap of x, y, z, by Simpson's rule.
+fn cost(pieces: &[PolynomialPiece]) -> f64 {
+    let of_piece = |piece: &PolynomialPiece| {
+        let snap = |s: f64| (0..3).map(|i| derivative(&piece.coefficients[i], 4, s).powi(2)).sum::<f64>();
+        let h = piece.duration_s / 32.0;
+        (0..16)
+            .map(|i| f64::from(2 * i) * h)
+            .map(|s| h / 3.0 * (snap(s) + 4.0 * snap(s + h) + snap(s + 2.0 * h)))
+            .sum::<f64>()
+    };
+    pieces.iter().map(of_piece).sum()
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    /// From rest to rest, through every place, six derivatives continuous, and at one of the limits.
+    #[test]
+    fn minimum_snap_is_smooth_and_as_fast_as_allowed(places in places()) {
+        let pieces = minimum_snap(&places, 2.0, LIMITS).unwrap();
+        prop_assert_eq!(pieces.len(), places.len() - 1);
+        let trajectory = Trajectory::Polynomials(pieces.clone());
+        let (first, last) = (pieces[0], pieces[pieces.len() - 1]);
+        for (t, place) in [(first.start_s - 1.0, places[0]), (last.end_s() + 1.0, places[places.len() - 1])] {
+            let at = trajectory.at(t);
+            prop_assert_eq!(at, Reference::rest(at.position_m, at.yaw_rad));
+            prop_assert!((at.position_m - nalgebra::Vector3::new(place[0], place[1], place[2])).norm() < 1e-6);
+        }
+        for (piece, place) in pieces.iter().zip(&places) {
+            for (axis, value) in place.iter().enumerate() {
+                prop_assert!((piece.coefficients[axis][0] - value).abs() < 1e-9);
+            }
+        }
+        for pair in pieces.windows(2) {
+            for axis in 0..4 {
+                for order in 0..7 {
+                    let end = derivative(&pair[0].coefficients[axis], order, pair[0].duration_s);
+                    let begin = derivative(&pair[1].coefficients[axis], order, 0.0);
+                    let scale = pair[0].coefficients[axis].iter().fold(1.0, |most: f64, c| most.max(c.abs())) * 1e3;
+                    prop_assert!((end - begin).abs() < 1e-6 * scale, "{axis} {order}: {end} {begin}");
+                }
+            }
+        }
+        let [speed, acceleration, ..] = peaks(&pieces);
+        prop_assert!(speed <= LIMITS.speed_m_s && acceleration <= LIMITS.acceleration_m_s2);
+        prop_assert!(speed > 0.99 * LIMITS.speed_m_s || acceleration > 0.99 * LIMITS.acceleration_m_s2);
+    }
+
+    /// No other motion through the same places at the same times has less snap: a bump that moves one piece and keeps
+    /// its ends, with three derivatives, costs more.
+    #[test]
+    fn no_bump_lessens_the_snap(places in places(), at in 0_usize..12, size in prop_oneof![-0.3..-0.01, 0.01..0.3_f64]) {
+        let pieces = minimum_snap(&places, 0.0, LIMITS).unwrap();
+        let mut bumped = pieces.clone();
+        let at = at % bumped.len();
+        // (s (T - s))^4 needs degree eight; two neighbours' knots are moved instead: velocity at the knot between.
+        prop_assume!(at + 1 < bumped.len());
+        let [left, right] = [bumped[at].duration_s, bumped[at + 1].duration_s];
+        let knot = |t: f64| -> Coefficients {
+            // A septic with velocity 1 at 0, all else zero at both ends.
+            [0.0, 1.0, 0.0, 0.0, -20.0 / t.powi(3), 45.0 / t.powi(4), -36.0 / t.powi(5), 10.0 / t.powi(6)]
+        };
+        for (i, c) in knot(right).iter().enumerate() {
+            bumped[at + 1].coefficients[0][i] += size * c;
+        }
+        // The same, mirrored in time, for the piece before.
+        let mirrored = knot(left);
+        let shifted = |power: i32| {
+            let binomial = |n: i32, k: i32| (0..k).map(|i| f64::from(n - i) / f64::from(i + 1)).product::<f64>();
+            (power..8).map(|n| -mirrored[n as usize] * (-1.0_f64).powi(power) * binomial(n, power) * left.powi(n - power)).sum::<f64>()
+        };
+        for power in 0..8 {
+            bumped[at].coefficients[0][power as usize] += size * shifted(power);
+        }
+        prop_assert!(cost(&bumped) > cost(&pieces), "{} {}", cost(&bumped), cost(&pieces));
+    }
+}
+
+/// A folder for a test's files.
+fn folder(name: &str) -> PathBuf {
+    let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(name);
+    fs::create_dir_all(&folder).unwrap();
+    folder
+}
+
+fn scenario(folder: &std::path::Path, path: &str, keys: &str) -> Result<Trajectory, String> {
+    fs::write(folder.join("path.csv"), path).unwrap();
+    let text = format!("[trajectory]\nkind = \"file\"\nfile = \"path.csv\"\n{keys}");
+    fs::write(folder.join("scenario.toml"), text).unwrap();
+    let scenario = afbc_scenario::load(&folder.join("scenario.toml"));
+    scenario.map(|scenario| scenario.trajectory).map_err(|error| error.to_string())
+}
+
+/// Samples of a known path, with and without derivatives, become a path that follows it, the better the more is known.
+#[test]
+fn samples_become_the_path_that_they_come_from() {
+    let folder = folder("samples");
+    let known = Trajectory::Paper;
+    let write = |columns: &str, every_s: f64| {
+        let mut text = format!("time_s,x_m,y_m,z_m{columns},note\n");
+        for i in 0..=(20.0 / every_s) as u32 {
+            let t = f64::from(i) * every_s;
+            let Reference { position_m: x, velocity_m_s: v, acceleration_m_s2: a, yaw_rad, .. } = known.at(t);
+            text += &format!("{t},{},{},{}", x.x, x.y, x.z);
+            if columns.contains("vx") {
+                text += &format!(",{},{},{}", v.x, v.y, v.z);
+            }
+            if columns.contains("ax") {
+                text += &format!(",{},{},{}", a.x, a.y, a.z);
+            }
+            text += &format!(",{yaw_rad},free\n");
+        }
+        text
+    };
+    let mut errors = Vec::new();
+    for columns in
+        [",psi_rad", ",vx_m_s,vy_m_s,vz_m_s,psi_rad", ",vx_m_s,vy_m_s,vz_m_s,ax_m_s2,ay_m_s2,az_m_s2,yaw_rad"]
+    {
+        let read = scenario(&folder, &write(columns, 1.0), "").unwrap();
+        let error = |t: f64| {
+            let (own, known) = (read.at(t), known.at(t));
+            assert!((own.velocity_m_s - known.velocity_m_s).norm() < 0.02, "{t}");
+            assert!((own.yaw_rad - known.yaw_rad).abs() < 1e-2);
+            (own.position_m - known.position_m).norm()
+        };
+        errors.push((20..180).map(|i| error(0.1 * f64::from(i) + 0.05)).fold(0.0, f64::max));
+    }
+    assert!(errors[0] < 1e-3 && errors.is_sorted_by(|a, b| a > b), "{errors:?}");
+    // Twice as fast, from another time on: the same places, twice the speed.
+    let slow = scenario(&folder, &write(",psi_rad", 1.0), "").unwrap();
+    let fast = scenario(&folder, &write(",psi_rad", 1.0), "start_s = 3.0\npace = 2.0").unwrap();
+    for t in [0.5, 4.25, 9.75] {
+        let (slow, fast) = (slow.at(2.0 * t), fast.at(3.0 + t));
+        assert!((slow.position_m - fast.position_m).norm() < 1e-9);
+        assert!((2.0 * slow.velocity_m_s - fast.velocity_m_s).norm() < 1e-9);
+        assert!((4.0 * slow.acceleration_m_s2 - fast.acceleration_m_s2).norm() < 1e-9);
+    }
+}
+
+/// A heading that wraps turns on.
+#[test]
+fn headings_do_not_jump() {
+    let folder = folder("headings");
+    let rows: String = (0..40)
+        .map(|i| {
+            let yaw = 0.4 * f64::from(i);
+            let wrapped = libm::atan2(libm::sin(yaw), libm::cos(yaw));
+            format!("{},0,0,1,{wrapped}\n", f64::from(i) * 0.5)
+        })
+        .collect();
+    let read = scenario(&folder, &format!("time_s,x_m,y_m,z_m,yaw_rad\n{rows}"), "").unwrap();
+    for i in 10..190 {
+        assert!((read.at(0.1 * f64::from(i)).yaw_rate_rad_s - 0.8).abs() < 0.05, "{i}");
+    }
+}
+
+/// The Crazyflie's polynomials, in its tools' own columns.
+#[test]
+fn polynomials_are_flown_as_they_are() {
+    let folder = folder("polynomials");
+    let head = std::iter::once("duration".to_owned())
+        .chain(["x", "y", "z", "yaw"].iter().flat_map(|axis| (0..8).map(move |n| format!("{axis}^{n}"))))
+        .collect::<Vec<_>>()
+        .join(",");
+    let row = |duration: f64, x: [f64; 3]| {
+        format!("{duration},{},{},{},0,0,0,0,0,{}1{}\n", x[0], x[1], x[2], "0,".repeat(8), ",0".repeat(15))
+    };
+    // 0.5 t^2 for 2 s, then on at 2 m/s: 2 + 2 t.
+    let text = format!("{head}\n{}{}", row(2.0, [0.0, 0.0, 0.5]), row(1.0, [2.0, 2.0, 0.0]));
+    let read = scenario(&folder, &text, "").unwrap();
+    assert_eq!(
+        (read.at(1.0).position_m.x, read.at(1.0).velocity_m_s.x, read.at(1.0).acceleration_m_s2.x),
+        (0.5, 1.0, 1.0)
+    );
+    assert_eq!((read.at(2.5).position_m.x, read.at(2.5).velocity_m_s.x, read.at(2.5).position_m.z), (3.0, 2.0, 1.0));
+    let broken = format!("{head}\n{}{}", row(2.0, [0.0, 0.0, 0.5]), row(1.0, [2.5, 2.0, 0.0]));
+    let refused = scenario(&folder, &broken, "").unwrap_err();
+    assert!(refused.contains("path.csv:3: duration: it begins 0.500 m"), "{refused}");
+}
+
+/// Whatever is wrong with a file is told in one line with its name, line and column.
+#[test]
+fn what_is_wrong_is_told_in_one_line() {
+    let folder = folder("wrong");
+    for (path, problem) in [
+        ("", "path.csv"),
+        ("time_s,x_m,y_m\n0,0,0\n1,0,0\n", "no column z_m"),
+        ("time_s,x_m,y_m,z_m\n0,0,0,1\n", "fewer than two lines"),
+        ("time_s,x_m,y_m,z_m\n0,0,0,1\n1,a,0,1\n", "path.csv:3: x_m: \"a\" is no number"),
+        ("time_s,x_m,y_m,z_m\n0,0,0,1\n1,nan,0,1\n", "path.csv:3: x_m: \"nan\""),
+        ("time_s,x_m,y_m,z_m\n0,0,0,1\n1,1e9,0,1\n", "path.csv:3: x_m: \"1e9\""),
+        ("time_s,x_m,y_m,z_m\n0,0,0,1\n1,0,0\n", "path.csv:3: 3 values, where the first line names 4"),
+        ("time_s,x_m,y_m,z_m\n1,0,0,1\n1,0,0,1\n", "path.csv:3: time_s: 1 is not after 1"),
+        ("time_s,x_m,y_m,z_m\n-1,0,0,1\n1,0,0,1\n", "it begins at -1 s; set start_s"),
+        ("time_s,x_m,y_m,z_m\n0,0,0,1\n0.001,9000,0,1\n", "more than a controller accepts"),
+        ("duration,x^0\n1,0\n", "its columns must be duration"),
+    ] {
+        let refused = scenario(&folder, path, "").unwrap_err();
+        assert!(refused.contains(problem) && !refused.contains('\n'), "{refused}");
+    }
+    fs::write(folder.join("scenario.toml"), "[trajectory]\nkind = \"file\"\nfile = \"none.csv\"\n").unwrap();
+    let refused = afbc_scenario::load(&folder.join("scenario.toml")).unwrap_err().to_string();
+    assert!(refused.contains("scenario.toml:3: trajectory.file:") && refused.contains("none.csv"), "{refused}");
+}
