@@ -13,8 +13,12 @@ stand in every name.
 
 from __future__ import annotations
 
-import inspect
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from os import PathLike
+from typing import Any, Protocol
+
+from numpy.typing import ArrayLike
 
 from . import _afbc
 from ._afbc import (
@@ -42,6 +46,7 @@ __all__ = [
     "Batch",
     "Controller",
     "Flight",
+    "Law",
     "OwnVehicle",
     "Plant",
     "Scenario",
@@ -61,9 +66,23 @@ __all__ = [
     "vehicles",
 ]
 
+_Path = str | PathLike[str]
+_Named = Scenario | _Path
+
+
+class Law(Protocol):
+    """A law of one's own."""
+
+    def step(self, state: State, setpoint: Setpoint, fresh: bool) -> ArrayLike:
+        """Returns the demanded U1, U2, U3, U4 [N]; a state that is not `fresh` repeats the last one."""
+
+
+_Make = Callable[[OwnVehicle], Law]
+_Controllers = str | Sequence[str] | Mapping[str, _Make | None] | None
+
 
 @contextmanager
-def _bar(shown, total, unit):
+def _bar(shown: bool, total: int | None, unit: str) -> Iterator[Callable[[int], object] | None]:
     """Yields what is called with the number done: a bar of tqdm, if that is installed and wanted."""
     try:
         from tqdm.auto import tqdm
@@ -76,7 +95,7 @@ def _bar(shown, total, unit):
         yield lambda done: bar.update(done - bar.n)
 
 
-def frame(columns):
+def frame(columns: Mapping[str, Any]) -> Any:
     """Returns columns as a data frame: of polars or else of pandas, whichever is installed; the columns otherwise.
 
     A flight's log (`frame(flight.columns)`), or what `compare`, `campaign` and `replay` made.
@@ -94,7 +113,13 @@ def frame(columns):
     return pandas.DataFrame(dict(columns))
 
 
-def register(name, make, *, title=None, gains=None):
+def register(
+    name: str,
+    make: _Make,
+    *,
+    title: str | None = None,
+    gains: Mapping[str, float | tuple[float, float, float]] | None = None,
+) -> None:
     """Makes a law of one's own fly wherever a built-in one does: in `fly`, `compare`, `campaign` and `tune`, and in
     scenario and vehicle files.
 
@@ -106,14 +131,13 @@ def register(name, make, *, title=None, gains=None):
     """
     ranges = []
     for gain, value in (gains or {}).items():
-        if isinstance(value, (int, float)):
-            low, high = sorted((value / 20, value * 20))
-            value = (value, low, high)
-        ranges.append((gain, tuple(float(number) for number in value)))
+        default, *ends = (value,) if isinstance(value, (int, float)) else value
+        low, high = ends or sorted((default / 20, default * 20))
+        ranges.append((gain, (float(default), float(low), float(high))))
     _afbc.register(name, make, title=title, gains=ranges)
 
 
-def _controllers(controllers):
+def _controllers(controllers: _Controllers) -> list[str] | None:
     """Registers the laws in a mapping of names, and returns the names."""
     if controllers is None or isinstance(controllers, str):
         return [controllers] if controllers else None
@@ -124,9 +148,24 @@ def _controllers(controllers):
     return list(controllers)
 
 
+def _list(scenarios: _Named | Sequence[_Named]) -> list[_Named]:
+    """Returns one scenario, or several, as a list."""
+    if isinstance(scenarios, (str, Scenario, PathLike)):
+        return [scenarios]
+    return list(scenarios)
+
+
 def fly(
-    scenario, controllers=None, *, vehicle=None, seed=None, duration_s=None, log_hz=None, threads=None, progress=False
-):
+    scenario: _Named,
+    controllers: _Controllers = None,
+    *,
+    vehicle: Vehicle | _Path | None = None,
+    seed: int | None = None,
+    duration_s: float | None = None,
+    log_hz: int | None = None,
+    threads: int | None = None,
+    progress: bool = False,
+) -> dict[str, Flight]:
     """Flies a scenario, and returns the flights by contender: the same as `sitl fly`, in every bit.
 
     `scenario` is a `Scenario`, the name of a built-in one, or the path of a file. `controllers` are names of its
@@ -147,18 +186,24 @@ def fly(
         )
 
 
-def compare(scenarios, controllers=None, *, vehicle=None, seeds=1, threads=None, progress=False):
+def compare(
+    scenarios: _Named | Sequence[_Named],
+    controllers: _Controllers = None,
+    *,
+    vehicle: Vehicle | _Path | None = None,
+    seeds: int = 1,
+    threads: int | None = None,
+    progress: bool = False,
+) -> Any:
     """Flies scenarios under the same contenders, each with `seeds` consecutive seeds on all cores.
 
     Returns a data frame (see `frame`) with a row for each flight: scenario, contender, seed, lost_at_s, lost_reason and
     the figures of merit.
     """
-    if isinstance(scenarios, (str, Scenario)) or hasattr(scenarios, "__fspath__"):
-        scenarios = [scenarios]
     with _bar(progress, None, "flight") as shown:
         return frame(
             _afbc.compare(
-                list(scenarios),
+                _list(scenarios),
                 _controllers(controllers),
                 vehicle=vehicle,
                 seeds=seeds,
@@ -168,7 +213,15 @@ def compare(scenarios, controllers=None, *, vehicle=None, seeds=1, threads=None,
         )
 
 
-def campaign(campaign, *, flights=None, vehicle=None, out=None, threads=None, progress=False):
+def campaign(
+    campaign: _Path,
+    *,
+    flights: int | None = None,
+    vehicle: Vehicle | _Path | None = None,
+    out: _Path | None = None,
+    threads: int | None = None,
+    progress: bool = False,
+) -> Any:
     """Flies a campaign, built in or of a file: one scenario, many times, with drawn vehicles, weather and faults.
 
     Returns a data frame with a row for each flight of each contender: what was drawn, and the figures of merit. With
@@ -180,18 +233,27 @@ def campaign(campaign, *, flights=None, vehicle=None, out=None, threads=None, pr
         )
 
 
-def tune(law, scenarios=None, *, vehicle=None, budget=1000, seed=1, step=0.3, flying=False, threads=None, progress=False):
+def tune(
+    law: str,
+    scenarios: _Named | Sequence[_Named] | None = None,
+    *,
+    vehicle: Vehicle | _Path | None = None,
+    budget: int = 1000,
+    seed: int = 1,
+    step: float = 0.3,
+    flying: bool = False,
+    threads: int | None = None,
+    progress: bool = False,
+) -> dict[str, Any]:
     """Searches for gains of a law by CMA-ES, as `sitl tune` does: on the training flights, or on these scenarios.
 
     Returns a dict: cost `before` and `after`, the number of `evaluations`, the `gains` found, and the `text` for a
     scenario file. `flying` starts from the gains that fly instead of hand-tuned ones.
     """
-    if scenarios is not None and (isinstance(scenarios, (str, Scenario)) or hasattr(scenarios, "__fspath__")):
-        scenarios = [scenarios]
     with _bar(progress, budget, "try") as shown:
         return _afbc.tune(
             law,
-            None if scenarios is None else list(scenarios),
+            None if scenarios is None else _list(scenarios),
             vehicle=vehicle,
             budget=budget,
             seed=seed,
@@ -202,12 +264,9 @@ def tune(law, scenarios=None, *, vehicle=None, budget=1000, seed=1, step=0.3, fl
         )
 
 
-def replay(log):
+def replay(log: _Path) -> Any:
     """Runs the estimator over a recorded flight (ULog of PX4 or of this firmware, or a CSV of PX4-ECL).
 
     Returns a data frame: our estimate, its standard deviations, and the log's own estimate.
     """
     return frame(_afbc.replay(log))
-
-
-__doc__ = inspect.cleandoc(__doc__)

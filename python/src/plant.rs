@@ -4,6 +4,7 @@ use crate::error::error;
 use crate::motion::{PySetpoint, PyState};
 use crate::scenario::{ScenarioArgument, changed};
 use crate::vehicle::VehicleArgument;
+use afbc_control::Settings;
 use afbc_scenario::Scenario;
 use afbc_sim::flight::{View, World};
 use afbc_types::{ROTORS_MAX, RotorSpeeds};
@@ -23,6 +24,7 @@ pub(crate) struct PyPlant {
 
 /// The world of `scenario`, and what is seen of it at its start.
 pub(crate) fn start(scenario: &Scenario, dt_s: f64) -> PyResult<(World, View)> {
+    Settings::DT.range.check(dt_s).map_err(error)?;
     let mut world = World::new(scenario, dt_s).map_err(error)?;
     let view = world.look();
     Ok((world, view))

@@ -4,10 +4,11 @@ use crate::error::error;
 use crate::vehicle::VehicleArgument;
 use afbc::Profile;
 use afbc_campaign::subject;
-use afbc_scenario::trajectory::Reference;
+use afbc_scenario::trajectory::polynomial::COEFFICIENTS;
+use afbc_scenario::trajectory::{PolynomialPiece, Reference, Trajectory};
 use afbc_scenario::{BUILT_IN, DURATION, Scenario};
 use nalgebra::Vector3;
-use numpy::{PyArray1, PyReadonlyArray1};
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::path::PathBuf;
@@ -113,6 +114,19 @@ impl PyScenario {
     #[getter]
     fn parameters<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         crate::vehicle::parameters(py, &self.0.vehicle)
+    }
+
+    /// The polynomials of a path of minimum snap, or of one from a file: for each piece its start [s], its length [s] and
+    /// the coefficients of x, y, z, yaw, lowest power first, over the time since its start. None for other trajectories.
+    #[getter]
+    fn polynomials<'py>(&self, py: Python<'py>) -> PyResult<Option<Vec<(f64, f64, Bound<'py, PyArray2<f64>>)>>> {
+        let Trajectory::Polynomials(pieces) = &self.0.trajectory else { return Ok(None) };
+        let piece = |piece: &PolynomialPiece| {
+            let coefficients: Vec<f64> = piece.coefficients.iter().flatten().copied().collect();
+            let coefficients = PyArray1::from_vec(py, coefficients).reshape([4, COEFFICIENTS])?;
+            Ok((piece.start_s, piece.duration_s, coefficients))
+        };
+        pieces.iter().map(piece).collect::<PyResult<_>>().map(Some)
     }
 
     /// The reference at these times [s]: a column for each coordinate and derivative, named as in a flight's log.

@@ -96,7 +96,9 @@ def test_a_campaign_writes_the_same_bytes_and_resumes(sitl, tmp_path):
 
 
 def test_a_replay_is_the_same_as_on_the_command_line(sitl, tmp_path):
-    sitl("fly", "hover", "--ulog", "flight.ulg", "--out", "flown", cwd=tmp_path)
+    sitl(
+        "fly", "mocap", "--duration", 20, "--controller", "afbc", "--ulog", "flight.ulg", "--out", "flown", cwd=tmp_path
+    )
     sitl("replay", "flight.ulg", "--out", "replayed", cwd=tmp_path)
     frame = afbc.replay(tmp_path / "flight.ulg")
     with open(tmp_path / "replayed/replay.csv", newline="") as file:

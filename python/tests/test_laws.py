@@ -193,7 +193,7 @@ def test_other_threads_run_meanwhile():
 
     thread = threading.Thread(target=count)
     thread.start()
-    afbc.campaign("robustness", flights=20, threads=1)
+    afbc.campaign("robustness", flights=2, threads=1)
     stop.set()
     thread.join()
     assert len(counted) > 5

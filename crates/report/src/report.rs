@@ -389,5 +389,6 @@ fn trajectory(trajectory: &Trajectory) -> String {
             z.period_s
         ),
         Trajectory::Waypoints(waypoints) => format!("{} waypoints", waypoints.len()),
+        Trajectory::Polynomials(pieces) => format!("a path of {} pieces", pieces.len()),
     }
 }

@@ -3,6 +3,7 @@
 use super::bisection::largest;
 use super::change::Change;
 use afbc_plant::Battery;
+use afbc_scenario::trajectory::polynomial::peaks;
 use afbc_scenario::trajectory::{Reference, Trajectory};
 use afbc_types::Rotor;
 use afbc_vehicles::Vehicle;
@@ -158,6 +159,11 @@ fn fastest_rad_s(trajectory: &Trajectory) -> f64 {
         Trajectory::Waypoints(waypoints) => {
             let legs = waypoints.iter().zip(waypoints.iter().skip(1));
             legs.map(|(from, to)| TAU / (to.time_s - from.time_s)).fold(0.0, f64::max)
+        }
+        // As if the largest jerk and acceleration were of one sine.
+        Trajectory::Polynomials(pieces) => {
+            let [_, acceleration, jerk, _] = peaks(pieces);
+            if acceleration > 0.0 { jerk / acceleration } else { 0.0 }
         }
         Trajectory::Paper | Trajectory::Hover { .. } | Trajectory::Step { .. } => 0.0,
     }

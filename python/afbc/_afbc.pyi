@@ -1,0 +1,346 @@
+"""Types of the compiled part. Frames: earth z up, body x forward, y left, z up. Units are SI and stand in every name."""
+
+from collections.abc import Callable, Mapping, Sequence
+from os import PathLike
+from typing import Any, Self, final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+__all__ = [
+    "AfbcError",
+    "__version__",
+    "State",
+    "Setpoint",
+    "Vehicle",
+    "Scenario",
+    "Flight",
+    "Controller",
+    "Action",
+    "Plant",
+    "Batch",
+    "OwnVehicle",
+    "fly",
+    "compare",
+    "campaign",
+    "tune",
+    "replay",
+    "register",
+    "laws",
+    "vehicles",
+    "scenarios",
+    "campaigns",
+]
+
+__version__: str
+
+_Array = NDArray[np.float64]
+_Path = str | PathLike[str]
+_Progress = Callable[[int], object] | None
+
+class AfbcError(ValueError):
+    """Bad input, in the one line that the command line would say: file, place, cure."""
+
+@final
+class State:
+    """Measured motion: position, velocity (earth), Euler angles roll, pitch, yaw (z-y-x), body rates."""
+
+    def __new__(
+        cls,
+        position_m: ArrayLike = ...,
+        velocity_m_s: ArrayLike = ...,
+        attitude_rad: ArrayLike = ...,
+        rates_rad_s: ArrayLike = ...,
+    ) -> Self: ...
+    @property
+    def position_m(self) -> _Array: ...
+    @property
+    def velocity_m_s(self) -> _Array: ...
+    @property
+    def attitude_rad(self) -> _Array: ...
+    @property
+    def rates_rad_s(self) -> _Array: ...
+    @property
+    def vector(self) -> _Array:
+        """All twelve numbers in this order, shape (12,)."""
+
+@final
+class Setpoint:
+    """Desired motion, earth frame: position with four derivatives, heading with two."""
+
+    def __new__(
+        cls,
+        position_m: ArrayLike = ...,
+        velocity_m_s: ArrayLike = ...,
+        acceleration_m_s2: ArrayLike = ...,
+        jerk_m_s3: ArrayLike = ...,
+        snap_m_s4: ArrayLike = ...,
+        yaw_rad: float = 0.0,
+        yaw_rate_rad_s: float = 0.0,
+        yaw_acceleration_rad_s2: float = 0.0,
+    ) -> Self: ...
+    @property
+    def position_m(self) -> _Array: ...
+    @property
+    def velocity_m_s(self) -> _Array: ...
+    @property
+    def acceleration_m_s2(self) -> _Array: ...
+    @property
+    def jerk_m_s3(self) -> _Array: ...
+    @property
+    def snap_m_s4(self) -> _Array: ...
+    @property
+    def yaw_rad(self) -> float: ...
+    @property
+    def yaw_rate_rad_s(self) -> float: ...
+    @property
+    def yaw_acceleration_rad_s2(self) -> float: ...
+
+@final
+class Vehicle:
+    """A vehicle: a built-in one by name, or of a file by path."""
+
+    def __new__(cls, name: _Path) -> Self: ...
+    @staticmethod
+    def from_toml(text: str, name: str = "vehicle") -> Vehicle: ...
+    @property
+    def name(self) -> str: ...
+    @property
+    def description(self) -> str: ...
+    @property
+    def rotors(self) -> int: ...
+    @property
+    def rotor_force_max_n(self) -> float: ...
+    @property
+    def lag_s(self) -> float: ...
+    @property
+    def parameters(self) -> dict[str, Any]: ...
+
+@final
+class Scenario:
+    """One vehicle, one trajectory, one environment, the contenders to compare: built in, or of a file by path."""
+
+    def __new__(cls, name: _Path) -> Self: ...
+    @staticmethod
+    def from_toml(text: str, name: str = "scenario") -> Scenario: ...
+    def replace(
+        self, *, vehicle: Vehicle | _Path | None = None, seed: int | None = None, duration_s: float | None = None
+    ) -> Scenario: ...
+    @property
+    def name(self) -> str: ...
+    @property
+    def description(self) -> str: ...
+    @property
+    def duration_s(self) -> float: ...
+    @property
+    def seed(self) -> int: ...
+    @property
+    def rotors(self) -> int: ...
+    @property
+    def contenders(self) -> list[str]: ...
+    @property
+    def parameters(self) -> dict[str, Any]: ...
+    @property
+    def polynomials(self) -> list[tuple[float, float, _Array]] | None:
+        """Start [s], length [s] and coefficients, shape (4, 8), of each piece of a path of polynomials."""
+    def reference(self, time_s: _Array) -> dict[str, _Array]:
+        """The reference at these times [s], a column for each coordinate and derivative."""
+
+@final
+class Flight:
+    """One flight under one contender."""
+
+    @property
+    def contender(self) -> str: ...
+    @property
+    def scenario(self) -> str: ...
+    @property
+    def lost(self) -> tuple[float, str] | None: ...
+    @property
+    def tripped(self) -> tuple[float, str] | None: ...
+    @property
+    def metrics(self) -> dict[str, float | None]: ...
+    @property
+    def columns(self) -> dict[str, _Array]: ...
+    def __getitem__(self, column: str, /) -> _Array: ...
+    def __len__(self) -> int: ...
+
+@final
+class Action:
+    """What a step decided."""
+
+    @property
+    def speeds_rad_s(self) -> _Array: ...
+    @property
+    def forces_n(self) -> _Array: ...
+    @property
+    def inputs_n(self) -> _Array: ...
+    @property
+    def saturated(self) -> bool: ...
+    @property
+    def state_rejected(self) -> bool: ...
+    @property
+    def setpoint_rejected(self) -> bool: ...
+    @property
+    def fallback(self) -> str | None: ...
+
+@final
+class Controller:
+    """A law on a vehicle, to be stepped: the very code that flies on a board."""
+
+    def __new__(
+        cls,
+        law: str = "afbc",
+        vehicle: Vehicle | _Path | None = None,
+        *,
+        profile: str = "flight",
+        monitored: bool = False,
+        gains: Mapping[str, float] | Sequence[tuple[str, float]] | None = None,
+    ) -> Self: ...
+    @property
+    def law(self) -> str: ...
+    @property
+    def dt_s(self) -> float: ...
+    @property
+    def gains(self) -> dict[str, float]: ...
+    @property
+    def trace(self) -> dict[str, Any]: ...
+    def step(self, state: State | None, setpoint: Setpoint) -> Action: ...
+    def reset(self) -> None: ...
+
+@final
+class Plant:
+    """The world of a scenario without its controllers."""
+
+    def __new__(
+        cls,
+        scenario: Scenario | _Path | None = None,
+        *,
+        vehicle: Vehicle | _Path | None = None,
+        seed: int | None = None,
+        dt_s: float = 0.001,
+    ) -> Self: ...
+    def step(self, speeds_rad_s: _Array) -> None: ...
+    def reset(self, seed: int | None = None) -> None: ...
+    @property
+    def time_s(self) -> float: ...
+    @property
+    def dt_s(self) -> float: ...
+    @property
+    def state(self) -> State | None: ...
+    @property
+    def true_state(self) -> State: ...
+    @property
+    def true_vector(self) -> _Array: ...
+    @property
+    def setpoint(self) -> Setpoint: ...
+    @property
+    def rotor_speeds_rad_s(self) -> _Array: ...
+    @property
+    def specific_force_m_s2(self) -> _Array: ...
+    @property
+    def wind_m_s(self) -> _Array: ...
+    @property
+    def on_ground(self) -> bool: ...
+
+@final
+class Batch:
+    """Worlds of one scenario with consecutive seeds, stepped together on all cores without the GIL."""
+
+    def __new__(
+        cls,
+        count: int,
+        scenario: Scenario | _Path | None = None,
+        *,
+        vehicle: Vehicle | _Path | None = None,
+        seed: int | None = None,
+        dt_s: float = 0.001,
+    ) -> Self: ...
+    def __len__(self) -> int: ...
+    def step(self, speeds_rad_s: _Array, steps: int = 1) -> None: ...
+    def reset(self, index: int, seed: int) -> None: ...
+    @property
+    def time_s(self) -> _Array: ...
+    @property
+    def states(self) -> _Array: ...
+    @property
+    def true_states(self) -> _Array: ...
+    @property
+    def references(self) -> _Array: ...
+
+@final
+class OwnVehicle:
+    """What a law of one's own knows of the vehicle that it flies."""
+
+    @property
+    def mass_kg(self) -> float: ...
+    @property
+    def gravity_m_s2(self) -> float: ...
+    @property
+    def arm_m(self) -> float: ...
+    @property
+    def inertia_kg_m2(self) -> _Array: ...
+    @property
+    def effectiveness(self) -> _Array: ...
+    @property
+    def rotors(self) -> int: ...
+    @property
+    def rotor_force_max_n(self) -> float: ...
+    @property
+    def dt_s(self) -> float: ...
+    @property
+    def gains(self) -> dict[str, float]: ...
+
+def laws() -> list[str]: ...
+def vehicles() -> list[str]: ...
+def scenarios() -> list[str]: ...
+def campaigns() -> list[str]: ...
+def register(
+    name: str,
+    make: Callable[[OwnVehicle], Any],
+    *,
+    title: str | None = None,
+    gains: Sequence[tuple[str, tuple[float, float, float]]] | None = None,
+) -> None: ...
+def fly(
+    scenario: Scenario | _Path,
+    controllers: Sequence[str] | None = None,
+    *,
+    vehicle: Vehicle | _Path | None = None,
+    seed: int | None = None,
+    duration_s: float | None = None,
+    log_hz: int | None = None,
+    threads: int | None = None,
+    progress: _Progress = None,
+) -> dict[str, Flight]: ...
+def compare(
+    scenarios: Sequence[Scenario | _Path],
+    controllers: Sequence[str] | None = None,
+    *,
+    vehicle: Vehicle | _Path | None = None,
+    seeds: int = 1,
+    threads: int | None = None,
+    progress: _Progress = None,
+) -> dict[str, Any]: ...
+def campaign(
+    campaign: _Path,
+    *,
+    flights: int | None = None,
+    vehicle: Vehicle | _Path | None = None,
+    out: _Path | None = None,
+    threads: int | None = None,
+    progress: _Progress = None,
+) -> dict[str, Any]: ...
+def tune(
+    law: str,
+    scenarios: Sequence[Scenario | _Path] | None = None,
+    *,
+    vehicle: Vehicle | _Path | None = None,
+    budget: int = 1000,
+    seed: int = 1,
+    step: float = ...,
+    flying: bool = False,
+    threads: int | None = None,
+    progress: _Progress = None,
+) -> dict[str, Any]: ...
+def replay(log: _Path) -> dict[str, _Array]: ...
