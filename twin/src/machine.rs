@@ -90,6 +90,11 @@ pub trait Machine: Board + Edge<Signals = Signals> + Sized + 'static {
     /// Hangs a wire on the second link; false if that is by USB.
     fn attach_second_link(&mut self, wire: Wire) -> bool;
 
+    /// Hangs a radio receiver on a UART, and returns its `RC_PORT`; none if there is no such UART here.
+    fn attach_radio(&mut self, wire: Wire) -> Option<f32> {
+        self.attach_second_link(wire).then_some(2.0)
+    }
+
     /// Hangs a GNSS receiver on its UART, in the place of the one that was there.
     fn attach_receiver(&mut self, receiver: Box<dyn Peer>);
 

@@ -18,6 +18,7 @@ mod machine;
 mod machines;
 mod pilot;
 mod pins;
+mod radio;
 mod random;
 mod same;
 mod table;
@@ -92,6 +93,11 @@ fn command() -> Command {
             times("card-stall", "The card stalls: when, and for how long"),
             times("card-out", "The card is out: from when, and until when"),
         ]))
+        .subcommand(Command::new("radio").about("Fly by radio, and stop the motors by the kill switch").args([
+            machine(),
+            image(),
+            scenario(),
+        ]))
         .subcommand(Command::new("replay").about("Fly an exact log again").arg(file("log", "The log")))
         .subcommand(Command::new("faults").about("Faults at a board's pins, in a hover that is kept in a file").args([
             machine(),
@@ -153,6 +159,10 @@ fn run(matches: &ArgMatches) -> Result<(), Box<dyn Error>> {
             let is_mission = matches.get_flag("mission");
             let order = Order { scenario, is_mission, receiver, log, card, card_trouble };
             with_machine!(chosen(matches)?, M => fly::fly::<M>(image, &order))
+        }
+        Some(("radio", matches)) => {
+            let (image, scenario) = (path(matches, "image")?, path(matches, "scenario")?);
+            with_machine!(chosen(matches)?, M => radio::fly::<M>(image, scenario))
         }
         Some(("replay", matches)) => same::check_log(&std::fs::read(path(matches, "log")?)?),
         Some(("faults", matches)) => {
