@@ -1,6 +1,7 @@
 """A flight by pymavlink's RC_CHANNELS_OVERRIDE: armed, flown and stopped by channels, which RC_CHANNELS shows."""
 
 import os
+import struct
 import sys
 import time
 
@@ -23,7 +24,7 @@ class Transmitter:
         self.mav = mavutil.mavlink_connection(f"udpin:127.0.0.1:{port}", dialect="common")
         self.channels = [1500, 1500, 1000, 1500, 1000, 1000, 1000, 1000]
         self.armed, self.height_m, self.shown = False, 0.0, None
-        self.beat_s = 0.0
+        self.beat_s, self.known = 0.0, {}
         if self.mav.recv_match(blocking=True, timeout=10 * PATIENCE) is None:
             sys.exit("radio: nothing from the vehicle")
 
@@ -56,6 +57,21 @@ class Transmitter:
             self.height_m = -message.z
         elif kind == "RC_CHANNELS":
             self.shown = message
+        elif kind == "PARAM_VALUE":
+            # A whole number's bytes, as a float.
+            raw = struct.pack("<f", message.param_value)
+            is_real = message.param_type == MAVLINK.MAV_PARAM_TYPE_REAL32
+            self.known[message.param_id] = struct.unpack("<f" if is_real else "<i", raw)[0]
+
+    def set(self, name, value):
+        """Sets a parameter until the vehicle says so."""
+
+        def is_known():
+            if self.known.get(name) != value:
+                self.mav.mav.param_set_send(1, 1, name.encode(), value, MAVLINK.MAV_PARAM_TYPE_REAL32)
+            return self.known.get(name) == value
+
+        return self.hold(is_known, 10)
 
     def shows(self):
         """True if RC_CHANNELS has what was sent."""
@@ -76,7 +92,7 @@ def main():
         else:
             session.fail(what, f"armed {station.armed}, {station.height_m:.1f} m, {station.shown}")
 
-    station.mav.mav.param_set_send(1, 1, b"RC_MAP_KILL_SW", KILL + 1, MAVLINK.MAV_PARAM_TYPE_REAL32)
+    step("RC_MAP_KILL_SW set", station.set("RC_MAP_KILL_SW", KILL + 1))
     step("RC_CHANNELS shows what is sent", station.hold(station.shows, 10))
     station.shown = None
     station.mav.mav.command_long_send(
