@@ -95,6 +95,11 @@ pub trait Machine: Board + Edge<Signals = Signals> + Sized + 'static {
         self.attach_second_link(wire).then_some(2.0)
     }
 
+    /// Hangs a wire on the UART that hears the motor controllers, if there is one.
+    fn attach_escs(&mut self, wire: Wire) {
+        drop(wire);
+    }
+
     /// Hangs a GNSS receiver on its UART, in the place of the one that was there.
     fn attach_receiver(&mut self, receiver: Box<dyn Peer>);
 
@@ -152,6 +157,11 @@ impl Machine for MatekH743 {
     fn attach_second_link(&mut self, wire: Wire) -> bool {
         self.mcu.usart[0].attach(wire);
         true
+    }
+
+    /// UART8.
+    fn attach_escs(&mut self, wire: Wire) {
+        self.mcu.usart[7].attach(wire);
     }
 
     /// USART2.
