@@ -1,22 +1,15 @@
-//! Motor controllers that answer: KISS's telemetry over the board's UART for it, when the telemetry bit of a frame on
-//! their pin asks for it. What the vehicle tells of them must be the plant's rotors, and a rotor that stops must be
-//! told in time.
+//! Flights with motor controllers that answer: what the vehicle tells of them must be the plant's rotors, and a rotor
+//! that stops must be told in time.
 
 use crate::check::check;
+use crate::esc_line::voltage_cv;
 use crate::hands::Climb;
 use crate::led::{FRAME_NS, Hand, Hover, Next, Vehicle};
 use crate::machine::Machine;
-use crate::wire::Wire;
-use afbc_drivers::esc_telemetry::EscReading;
 use std::collections::VecDeque;
 use std::error::Error;
 use std::path::Path;
 
-/// Magnetic poles of the motors, the vehicle's default.
-const POLES: u32 = 14;
-/// Voltage that the first tells, and what each further one tells more, to be told apart \[0.01 V\].
-const VOLTAGE_CV: u16 = 1500;
-const STEP_CV: u16 = 10;
 /// How long the vehicle is listened to \[ms\], and how many messages must come in that time.
 const LISTENED_MS: u64 = 3_000;
 const MESSAGES: u32 = 20;
@@ -28,37 +21,6 @@ const TOLD_MS: u64 = 100;
 /// Times of its stop for each rotor, so far apart \[ms\].
 const STOPS: u64 = 3;
 const APART_MS: u64 = 4;
-
-/// The controllers on their line.
-pub struct Escs {
-    wire: Wire,
-    asked: Vec<usize>,
-}
-
-impl Escs {
-    pub fn new(wire: Wire) -> Self {
-        Escs { wire, asked: Vec::new() }
-    }
-
-    /// Takes who has been asked.
-    pub fn ask(&mut self, motors: Vec<usize>) {
-        self.asked.extend(motors);
-    }
-
-    /// Lets those who were asked answer what the rotors do \[rad/s\].
-    pub fn answer(&mut self, speeds_rad_s: &[f64]) {
-        for motor in self.asked.drain(..) {
-            let speed_rad_s = speeds_rad_s.get(motor).copied().unwrap_or_default();
-            let answer = EscReading {
-                temperature_c: 40,
-                voltage_cv: VOLTAGE_CV + motor as u16 * STEP_CV,
-                erpm_hundreds: EscReading::erpm_hundreds_of(speed_rad_s as f32, POLES),
-                ..EscReading::default()
-            };
-            self.wire.send(&answer.to_bytes());
-        }
-    }
-}
 
 /// Compares what the vehicle tells with the plant.
 #[derive(Debug, Default)]
@@ -93,7 +55,7 @@ impl Hand for Listens {
                 if off_rad_s > COARSE_RAD_S + 0.1 {
                     return Err(format!("rotor {rotor}: {told_rad_s:.1} rad/s told of {least:.1} to {most:.1}"));
                 }
-                let expected_v = f32::from(VOLTAGE_CV + rotor as u16 * STEP_CV) * 0.01;
+                let expected_v = f32::from(voltage_cv(rotor)) * 0.01;
                 if (voltage_v - expected_v).abs() > 0.005 {
                     return Err(format!("rotor {rotor}: {voltage_v} V told of {expected_v} V"));
                 }

@@ -1,7 +1,7 @@
 //! Flights by somebody's hand, at the sticks of a transmitter, and a hover from which many of them go on.
 
 use crate::check::check;
-use crate::escs::Escs;
+use crate::esc_line::Escs;
 use crate::fly::{TICK_NS, images};
 use crate::machine::{Machine, Signal, quiet_usb};
 use crate::pilot::Pilot;

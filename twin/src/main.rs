@@ -8,6 +8,7 @@ mod boot;
 mod card_logs;
 mod check;
 mod cuts;
+mod esc_line;
 mod escs;
 mod f405;
 mod faults;
