@@ -1,6 +1,7 @@
 """A vehicle that `sitl serve` serves at free ports, and steps of a session with it, each on a line."""
 
 import asyncio
+import atexit
 import itertools
 import os
 import queue
@@ -38,6 +39,8 @@ class Served:
         command = [SITL, "serve", "--port", "0", "--station", f"127.0.0.1:{self.station}"]
         command += ["--companion", f"127.0.0.1:{self.companion}", *options]
         self.process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        # Also after a step that failed.
+        atexit.register(self.process.kill)
         self.lines, self.said = queue.Queue(), []
         threading.Thread(target=self._listen, daemon=True).start()
 

@@ -90,6 +90,16 @@ pub trait Machine: Board + Edge<Signals = Signals> + Sized + 'static {
     /// Hangs a wire on the second link; false if that is by USB.
     fn attach_second_link(&mut self, wire: Wire) -> bool;
 
+    /// Hangs a radio receiver on a UART, and returns its `RC_PORT`; none if there is no such UART here.
+    fn attach_radio(&mut self, wire: Wire) -> Option<f32> {
+        self.attach_second_link(wire).then_some(2.0)
+    }
+
+    /// Hangs a wire on the UART that hears the motor controllers, if there is one.
+    fn attach_escs(&mut self, wire: Wire) {
+        drop(wire);
+    }
+
     /// Hangs a GNSS receiver on its UART, in the place of the one that was there.
     fn attach_receiver(&mut self, receiver: Box<dyn Peer>);
 
@@ -147,6 +157,11 @@ impl Machine for MatekH743 {
     fn attach_second_link(&mut self, wire: Wire) -> bool {
         self.mcu.usart[0].attach(wire);
         true
+    }
+
+    /// UART8.
+    fn attach_escs(&mut self, wire: Wire) {
+        self.mcu.usart[7].attach(wire);
     }
 
     /// USART2.

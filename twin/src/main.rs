@@ -8,20 +8,26 @@ mod boot;
 mod card_logs;
 mod check;
 mod cuts;
+mod esc_line;
+mod escs;
 mod f405;
 mod faults;
 mod fly;
+mod hands;
 mod host;
 mod impairments;
 mod kept;
+mod led;
 mod machine;
 mod machines;
 mod pilot;
 mod pins;
+mod radio;
 mod random;
 mod same;
 mod table;
 mod tour;
+mod transmitter;
 mod trouble;
 mod ublox;
 mod usb_ring;
@@ -34,6 +40,7 @@ use clap::{Arg, ArgAction, ArgMatches, Command, value_parser};
 use f405::CardTrouble;
 use fly::Order;
 use machines::MachineName;
+use radio::Order as RadioOrder;
 use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -91,6 +98,22 @@ fn command() -> Command {
             card,
             times("card-stall", "The card stalls: when, and for how long"),
             times("card-out", "The card is out: from when, and until when"),
+        ]))
+        .subcommand(
+            Command::new("radio").about("Fly by radio, and stop the motors by the kill switch").args([
+                machine(),
+                image(),
+                scenario(),
+                number("rate", "250", "Frames per second at which the kill switch is tried; may be given again")
+                    .value_parser(value_parser!(u64).range(1..=1000))
+                    .action(ArgAction::Append),
+                number("phases", "40", "Times within a control period at which the kill switch's frames come"),
+            ]),
+        )
+        .subcommand(Command::new("escs").about("Fly with motor controllers that answer, and stop rotors").args([
+            machine(),
+            image(),
+            scenario(),
         ]))
         .subcommand(Command::new("replay").about("Fly an exact log again").arg(file("log", "The log")))
         .subcommand(Command::new("faults").about("Faults at a board's pins, in a hover that is kept in a file").args([
@@ -153,6 +176,16 @@ fn run(matches: &ArgMatches) -> Result<(), Box<dyn Error>> {
             let is_mission = matches.get_flag("mission");
             let order = Order { scenario, is_mission, receiver, log, card, card_trouble };
             with_machine!(chosen(matches)?, M => fly::fly::<M>(image, &order))
+        }
+        Some(("radio", matches)) => {
+            let (image, scenario) = (path(matches, "image")?, path(matches, "scenario")?);
+            let rates: Vec<u64> = matches.get_many("rate").into_iter().flatten().copied().collect();
+            let order = RadioOrder { scenario, rates: &rates, phases: number(matches, "phases")? };
+            with_machine!(chosen(matches)?, M => radio::fly::<M>(image, &order))
+        }
+        Some(("escs", matches)) => {
+            let (image, scenario) = (path(matches, "image")?, path(matches, "scenario")?);
+            with_machine!(chosen(matches)?, M => escs::fly::<M>(image, scenario))
         }
         Some(("replay", matches)) => same::check_log(&std::fs::read(path(matches, "log")?)?),
         Some(("faults", matches)) => {

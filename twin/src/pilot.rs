@@ -5,7 +5,8 @@ use crate::tour::Tour;
 use crate::wire::Wire;
 use crate::world::Transducers;
 use afbc_flight_core::motor::{THROTTLE_MAX, THROTTLE_MIN};
-use afbc_link::{Address, Command, Datum, Decoder, Downlink, FRAME_MAX, Height, Sender, Uplink};
+use afbc_link::telemetry::EscStatus;
+use afbc_link::{Address, Command, Datum, Decoder, Downlink, FRAME_MAX, Height, Sender, Telemetry, Uplink};
 use afbc_onboard::Readings;
 use afbc_plant::Motion;
 use afbc_scenario::Scenario;
@@ -47,6 +48,9 @@ pub struct Pilot {
     world: World,
     transducers: Transducers,
     throttles: Vec<u16>,
+    /// True speeds of the rotors [rad/s], and the one that is not driven any more.
+    rotor_speeds_rad_s: Vec<f64>,
+    stopped_rotor: Option<usize>,
     speed_max_rad_s: f32,
     wire: Wire,
     sender: Sender,
@@ -63,6 +67,8 @@ pub struct Pilot {
     tour: Option<Tour>,
     tilt_rad: f64,
     error: Option<String>,
+    /// What it has said of its motor controllers last, with the time [ms].
+    escs: Option<(u64, EscStatus)>,
     /// What the vehicle has said, with the time [ms], and whether it is printed.
     heard: Vec<(u64, String)>,
     prints: bool,
@@ -75,6 +81,8 @@ impl Pilot {
             world: World::released(scenario, 1e-3)?,
             transducers: Transducers::new(),
             throttles: vec![0; scenario.rotors.len()],
+            rotor_speeds_rad_s: vec![0.0; scenario.rotors.len()],
+            stopped_rotor: None,
             speed_max_rad_s: 1000.0,
             wire,
             sender: Sender::new(STATION),
@@ -88,6 +96,7 @@ impl Pilot {
             tour: None,
             tilt_rad: 0.0,
             error: None,
+            escs: None,
             heard: Vec::new(),
             prints: true,
         })
@@ -99,6 +108,24 @@ impl Pilot {
         Pilot { prints: false, ..self }
     }
 
+    /// Returns one in the same world, at the other end of another wire, who is quiet and has heard nothing yet.
+    pub fn again(&self, wire: Wire) -> Self {
+        Pilot {
+            world: self.world.clone(),
+            transducers: self.transducers.clone(),
+            throttles: self.throttles.clone(),
+            rotor_speeds_rad_s: self.rotor_speeds_rad_s.clone(),
+            wire,
+            decoder: Decoder::new(STATION),
+            tour: None,
+            error: None,
+            escs: None,
+            heard: Vec::new(),
+            prints: false,
+            ..*self
+        }
+    }
+
     /// Has it fly a mission, from take-off to landing, in the place of a hover.
     #[must_use]
     pub fn touring(self) -> Self {
@@ -108,6 +135,21 @@ impl Pilot {
     /// Returns what the motors' wires said last.
     pub fn throttles(&self) -> &[u16] {
         &self.throttles
+    }
+
+    /// Returns the rotors' true speeds [rad/s].
+    pub fn rotor_speeds_rad_s(&self) -> &[f64] {
+        &self.rotor_speeds_rad_s
+    }
+
+    /// Drives a rotor no more.
+    pub fn stop_rotor(&mut self, rotor: usize) {
+        self.stopped_rotor = Some(rotor);
+    }
+
+    /// Returns what the vehicle has said of its motor controllers last, and when [ms].
+    pub fn escs(&self) -> Option<(u64, EscStatus)> {
+        self.escs
     }
 
     /// Returns the vehicle's true motion.
@@ -152,8 +194,14 @@ impl Pilot {
             let share = throttle.saturating_sub(THROTTLE_MIN) as f32 / f32::from(THROTTLE_MAX - THROTTLE_MIN);
             *speed = share * self.speed_max_rad_s;
         }
+        if let Some(speed) = self.stopped_rotor.and_then(|rotor| speeds.0.get_mut(rotor)) {
+            *speed = 0.0;
+        }
         self.world.advance(&speeds);
         let view = self.world.look();
+        if let Some(effects) = view.telemetry {
+            self.rotor_speeds_rad_s.iter_mut().zip(&effects.rotor_speeds_rad_s).for_each(|(known, new)| *known = *new);
+        }
         let readings = self.world.readings().copied().unwrap_or_default();
         // A vehicle without instruments has a tracker.
         if let Some(state) = view.state.filter(|_| self.world.readings().is_none() && now_ms % TRACKED_MS == 0) {
@@ -194,11 +242,12 @@ impl Pilot {
     fn talk(&mut self) {
         let bytes = self.wire.take();
         let now_ms = self.now_ms;
-        let (armed, heard, prints) = (&mut self.armed, &mut self.heard, self.prints);
+        let (armed, heard, prints, escs) = (&mut self.armed, &mut self.heard, self.prints, &mut self.escs);
         let (tour, position_m) = (&mut self.tour, self.world.plant().motion().position_m.into());
         let mut answers = Vec::new();
         self.decoder.feed(&bytes, |_, message| match message {
             Downlink::Heartbeat { armed: is_armed, .. } => *armed = is_armed,
+            Downlink::Telemetry(Telemetry::EscStatus(status)) => *escs = Some((now_ms, status)),
             Downlink::Mission { message, .. } => {
                 answers.extend(tour.as_mut().and_then(|tour| tour.hear(&message, now_ms, position_m)));
             }

@@ -57,6 +57,8 @@ pub struct MotorPins {
     frames: Vec<Frames>,
     /// Commands as they were last sent: 0, or 48 to 2047.
     throttles: Vec<Option<u16>>,
+    /// Motors whose telemetry bit was set.
+    asked: Vec<usize>,
     /// Frames of a timer, or ticks with a pulse on each pin.
     pub sent: u64,
     /// What was neither frame nor pulse.
@@ -77,7 +79,18 @@ impl MotorPins {
             bits: vec![0; timer.motors.end.min(motors) - timer.motors.start],
             held: false,
         });
-        MotorPins { frames: frames.collect(), throttles: vec![None; motors], sent: 0, wrong: Vec::new() }
+        MotorPins {
+            frames: frames.collect(),
+            throttles: vec![None; motors],
+            asked: Vec::new(),
+            sent: 0,
+            wrong: Vec::new(),
+        }
+    }
+
+    /// Returns the motors whose controllers were asked for their telemetry since the last time.
+    pub fn take_asked(&mut self) -> Vec<usize> {
+        std::mem::take(&mut self.asked)
     }
 
     /// Returns what each motor was last told, and forgets it.
@@ -126,8 +139,11 @@ impl MotorPins {
             if frames.is_complete() {
                 self.sent += 1;
                 let first = frames.timer.motors.start;
-                for (throttle, bits) in self.throttles.iter_mut().skip(first).zip(&mut frames.bits) {
-                    *throttle = throttle_of(std::mem::take(bits));
+                for (motor, bits) in (first..).zip(&mut frames.bits) {
+                    let Some(throttle) = self.throttles.get_mut(motor) else { continue };
+                    let read = frame_of(std::mem::take(bits));
+                    *throttle = read.map(|(throttle, _)| throttle);
+                    self.asked.extend(read.filter(|(_, asks)| *asks).map(|_| motor));
                     if throttle.is_none() {
                         tell(&mut self.wrong, || format!("frame {}: a wrong checksum", self.sent));
                     }
@@ -209,11 +225,11 @@ fn has_pulse(pin: &Actuator) -> bool {
     pin.pulse.is_some_and(|pulse| pulse.width.0 > 0)
 }
 
-/// Returns the throttle of a frame; none if its checksum is wrong.
-fn throttle_of(frame: u16) -> Option<u16> {
+/// Returns the throttle of a frame, and whether its telemetry bit is set; none if its checksum is wrong.
+fn frame_of(frame: u16) -> Option<(u16, bool)> {
     let data = frame >> 4;
     let checksum = (data ^ (data >> 4) ^ (data >> 8)) & 0xF;
-    (checksum == frame & 0xF).then_some(data >> 1)
+    (checksum == frame & 0xF).then_some((data >> 1, data & 1 == 1))
 }
 
 fn tell(wrong: &mut Vec<String>, what: impl FnOnce() -> String) {

@@ -12,6 +12,8 @@ use std::sync::{Arc, Mutex};
 struct Bytes {
     to_board: VecDeque<u8>,
     from_board: Vec<u8>,
+    /// When the last byte to the board was begun, since one was sent; not kept in a snapshot \[ns\].
+    emptied_ns: Option<u64>,
 }
 
 /// A wire, whose bytes move at the pace of the board's UART. Clones are the same wire.
@@ -25,7 +27,15 @@ impl Wire {
 
     /// Sends bytes to the board.
     pub fn send(&self, bytes: &[u8]) {
-        self.with(|wire| wire.to_board.extend(bytes));
+        self.with(|wire| {
+            wire.to_board.extend(bytes);
+            wire.emptied_ns = None;
+        });
+    }
+
+    /// When the last byte of what was sent last was begun; none while some are on their way \[ns\].
+    pub fn emptied_ns(&self) -> Option<u64> {
+        self.with(|wire| wire.emptied_ns)
     }
 
     /// Takes what the board has sent.
@@ -49,7 +59,7 @@ impl Store for Wire {
 
     fn load(&mut self, from: &mut Reader) -> Result<(), Error> {
         let (to_board, from_board) = from.take()?;
-        self.with(|wire| *wire = Bytes { to_board, from_board });
+        self.with(|wire| *wire = Bytes { to_board, from_board, emptied_ns: None });
         Ok(())
     }
 }
@@ -59,7 +69,14 @@ impl Peer for Wire {
         self.with(|wire| wire.from_board.push(word as u8));
     }
 
-    fn transmit(&mut self, _: VirtualNanos) -> Option<u16> {
-        self.with(|wire| wire.to_board.pop_front()).map(u16::from)
+    fn transmit(&mut self, at: VirtualNanos) -> Option<u16> {
+        self.with(|wire| {
+            let byte = wire.to_board.pop_front();
+            if byte.is_some() && wire.to_board.is_empty() {
+                wire.emptied_ns = Some(at.0);
+            }
+            byte
+        })
+        .map(u16::from)
     }
 }

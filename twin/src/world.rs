@@ -22,6 +22,7 @@ pub fn at_the_place() -> Signals {
 }
 
 /// Keeps what the transducers feel between two readings of an instrument.
+#[derive(Clone)]
 pub struct Transducers {
     signals: Signals,
     /// Metres per ten-millionth of a degree to the north and to the east.

@@ -3,7 +3,9 @@
 //!
 //! A controller answers a DSHOT frame whose telemetry bit is set with ten bytes at [`BAUD`], high bytes first:
 //! temperature, voltage, current, charge, electrical speed and a CRC-8. Nothing in them says which controller it was:
-//! one is asked at a time ([`EscLine`]).
+//! one is asked at a time ([`EscLine`]). An answer that comes after the next one has been asked would be taken for that
+//! one's, and so would all that follow: after a question without an answer, and now and then in any case, nobody is
+//! asked until the line is silent.
 
 use heapless::Vec;
 
@@ -11,9 +13,13 @@ use heapless::Vec;
 pub const BAUD: u32 = 115_200;
 /// Bytes of an answer.
 pub const ANSWER_LEN: usize = 10;
-/// Longest time from a question to the end of its answer \[us\]: the answer takes 870, and controllers begin it within
-/// a millisecond or two.
-const ANSWER_US: u64 = 10_000;
+/// Longest time from a question to the end of its answer \[us\]: the answer takes 870, controllers begin it within
+/// a millisecond or two, and the question waits for the next frame.
+const ANSWER_US: u64 = 6_000;
+/// Time without a byte after which no answer is on its way any more \[us\], and the number of questions after which the
+/// line must have been silent for so long.
+const SILENCE_US: u64 = 4_000;
+const QUESTIONS: u8 = 64;
 /// Longest pause between two bytes of an answer \[us\]: 20 bytes' time.
 const PAUSE_US: u64 = 2_000;
 
@@ -104,6 +110,10 @@ pub struct EscLine {
     answer: Vec<u8, ANSWER_LEN>,
     /// When the last byte came \[us\].
     heard_us: u64,
+    /// Since when the line is silent, while that is waited for \[us\].
+    silent_us: Option<u64>,
+    /// Questions since the last silence.
+    questions: u8,
     bad_answers: u32,
     missing_answers: u32,
 }
@@ -118,23 +128,34 @@ impl EscLine {
             asked: None,
             answer: Vec::new(),
             heard_us: 0,
+            silent_us: None,
+            questions: 0,
             bad_answers: 0,
             missing_answers: 0,
         }
     }
 
-    /// Returns whom to ask now, each in turn: none while an answer is expected. To be called before each frame; a frame
-    /// that is sent without the question loses an answer, nothing more.
+    /// Returns whom to ask now, each in turn: none while an answer is expected, or silence. To be called before each
+    /// frame; a frame that is sent without the question loses an answer, nothing more.
     pub fn ask(&mut self, now_us: u64) -> Option<u8> {
         if let Some((_, asked_us)) = self.asked {
             if now_us.saturating_sub(asked_us) < ANSWER_US {
                 return None;
             }
             self.missing_answers = self.missing_answers.saturating_add(1);
+            (self.asked, self.silent_us) = (None, Some(now_us));
         }
-        if self.controllers == 0 {
+        if self.silent_us.is_some_and(|silent_us| now_us.saturating_sub(silent_us) < SILENCE_US)
+            || self.controllers == 0
+        {
             return None;
         }
+        self.silent_us = None;
+        if self.questions == QUESTIONS {
+            (self.questions, self.silent_us) = (0, Some(now_us));
+            return None;
+        }
+        self.questions = self.questions.saturating_add(1);
         let controller = self.next;
         self.next = if controller + 1 < self.controllers { controller + 1 } else { 0 };
         self.asked = Some((controller, now_us));
@@ -143,9 +164,13 @@ impl EscLine {
     }
 
     /// Takes a byte that came at `now_us`; returns what a controller has told, once its answer is whole. Bytes that
-    /// nobody asked for are dropped, and so is an answer whose checksum is wrong: the next controller is asked then.
+    /// nobody asked for are dropped, and the next question waits for silence; an answer whose checksum is wrong is
+    /// dropped too.
     pub fn take(&mut self, now_us: u64, byte: u8) -> Option<(u8, EscReading)> {
-        let (controller, _) = self.asked?;
+        let Some((controller, _)) = self.asked else {
+            self.silent_us = Some(now_us);
+            return None;
+        };
         if now_us.saturating_sub(self.heard_us) > PAUSE_US {
             self.answer.clear();
         }

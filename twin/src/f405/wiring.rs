@@ -10,6 +10,8 @@ use crate::machine::{Divider, FrameTimer};
 pub struct Wiring {
     pub name: &'static str,
     pub link: Uart,
+    /// True if USART2 is left to a radio receiver.
+    pub has_radio: bool,
     /// None has sensors of its own: its state comes over the link.
     pub sensors: Option<Sensors>,
     /// The slot of its memory card.
@@ -100,6 +102,7 @@ const ALL_OF_TIM8: [(&str, Timer, u8); 4] = [("M1", TIM8, 1), ("M2", TIM8, 2), (
 const SPEEDYBEE_V3: Wiring = Wiring {
     name: "speedybeef405v3",
     link: USART3,
+    has_radio: true,
     sensors: Some(Sensors {
         imu: Inertial::Bmi270,
         select: ("GPIOA", 4),
@@ -117,6 +120,7 @@ const SPEEDYBEE_V3: Wiring = Wiring {
 const SPEEDYBEE_V4: Wiring = Wiring {
     name: "speedybeef405v4",
     link: USART3,
+    has_radio: true,
     sensors: Some(Sensors {
         imu: Inertial::Icm42688p,
         select: ("GPIOA", 4),
@@ -150,6 +154,7 @@ const SPEEDYBEE_MINI: Wiring = Wiring {
 const MATEK_SE: Wiring = Wiring {
     name: "matekf405se",
     link: USART1,
+    has_radio: true,
     sensors: Some(Sensors {
         imu: Inertial::Relabelled(0x68),
         select: ("GPIOA", 4),
@@ -167,6 +172,7 @@ const MATEK_SE: Wiring = Wiring {
 const MATEK_STD: Wiring = Wiring {
     name: "matekf405std",
     link: USART1,
+    has_radio: true,
     sensors: Some(Sensors {
         imu: Inertial::Icm42688p,
         select: ("GPIOC", 2),
@@ -184,6 +190,7 @@ const MATEK_STD: Wiring = Wiring {
 const KAKUTE: Wiring = Wiring {
     name: "kakutef4v2",
     link: USART1,
+    has_radio: false,
     sensors: Some(Sensors {
         imu: Inertial::Relabelled(0x98),
         select: ("GPIOC", 4),
@@ -198,8 +205,15 @@ const KAKUTE: Wiring = Wiring {
 };
 
 /// `boards/stm32f405`: no sensors.
-const PLAIN: Wiring =
-    Wiring { name: "stm32f405", link: USART1, sensors: None, card: None, timers: &[TIM8_ALL], motors: ALL_OF_TIM8 };
+const PLAIN: Wiring = Wiring {
+    name: "stm32f405",
+    link: USART1,
+    has_radio: false,
+    sensors: None,
+    card: None,
+    timers: &[TIM8_ALL],
+    motors: ALL_OF_TIM8,
+};
 
 /// All.
 pub const WIRINGS: [Wiring; 7] = [SPEEDYBEE_V3, SPEEDYBEE_V4, SPEEDYBEE_MINI, MATEK_SE, MATEK_STD, KAKUTE, PLAIN];

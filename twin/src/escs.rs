@@ -1,0 +1,115 @@
+//! Flights with motor controllers that answer: what the vehicle tells of them must be the plant's rotors, and a rotor
+//! that stops must be told in time.
+
+use crate::check::check;
+use crate::esc_line::voltage_cv;
+use crate::hands::Climb;
+use crate::led::{FRAME_NS, Hand, Hover, Next, Vehicle};
+use crate::machine::Machine;
+use std::collections::VecDeque;
+use std::error::Error;
+use std::path::Path;
+
+/// How long the vehicle is listened to \[ms\], and how many messages must come in that time.
+const LISTENED_MS: u64 = 3_000;
+const MESSAGES: u32 = 20;
+/// Longest time between a measurement and the message that tells it \[ms\], and the smallest step of a speed \[rad/s\].
+const OLD_MS: usize = 60;
+const COARSE_RAD_S: f64 = 1.5;
+/// Time within which a rotor that has stopped must be told \[ms\].
+const TOLD_MS: u64 = 100;
+/// Times of its stop for each rotor, so far apart \[ms\].
+const STOPS: u64 = 3;
+const APART_MS: u64 = 4;
+
+/// Compares what the vehicle tells with the plant.
+#[derive(Debug, Default)]
+struct Listens {
+    since_ms: Option<u64>,
+    /// The rotors' speeds of late \[rad/s\].
+    past: VecDeque<Vec<f64>>,
+    heard_ms: Option<u64>,
+    messages: u32,
+    most_rad_s: f64,
+}
+
+impl Hand for Listens {
+    fn lead(&mut self, vehicle: &mut Vehicle, now_ms: u64) -> Result<Next, String> {
+        let since_ms = *self.since_ms.get_or_insert(now_ms);
+        self.past.push_back(vehicle.pilot.rotor_speeds_rad_s().to_vec());
+        if self.past.len() > OLD_MS {
+            self.past.pop_front();
+        }
+        if let Some((at_ms, status)) = vehicle.pilot.escs().filter(|(at_ms, _)| self.heard_ms != Some(*at_ms))
+            && self.past.len() == OLD_MS
+        {
+            self.heard_ms = Some(at_ms);
+            self.messages += 1;
+            for (rotor, (rpm, voltage_v)) in status.speeds_rpm.iter().zip(status.voltages_v).enumerate() {
+                let told_rad_s = f64::from(*rpm) * std::f64::consts::TAU / 60.0;
+                let speeds = self.past.iter().filter_map(|speeds| speeds.get(rotor).copied());
+                let (least, most) =
+                    speeds.fold((f64::MAX, 0.0_f64), |(least, most), speed| (least.min(speed), most.max(speed)));
+                let off_rad_s = (least - told_rad_s).max(told_rad_s - most).max(0.0);
+                self.most_rad_s = self.most_rad_s.max(off_rad_s);
+                if off_rad_s > COARSE_RAD_S + 0.1 {
+                    return Err(format!("rotor {rotor}: {told_rad_s:.1} rad/s told of {least:.1} to {most:.1}"));
+                }
+                let expected_v = f32::from(voltage_cv(rotor)) * 0.01;
+                if (voltage_v - expected_v).abs() > 0.005 {
+                    return Err(format!("rotor {rotor}: {voltage_v} V told of {expected_v} V"));
+                }
+            }
+        }
+        Ok(if now_ms > since_ms + LISTENED_MS { Next::Ends } else { Next::GoesOn })
+    }
+}
+
+/// Stops a rotor.
+#[derive(Debug)]
+struct Stops {
+    rotor: usize,
+    late_ms: u64,
+    began_ms: Option<u64>,
+    /// Time until the vehicle has said so \[ms\].
+    told_ms: Option<u64>,
+}
+
+impl Hand for Stops {
+    fn lead(&mut self, vehicle: &mut Vehicle, now_ms: u64) -> Result<Next, String> {
+        let stops_ms = *self.began_ms.get_or_insert(now_ms) + 500 + self.late_ms;
+        let says = format!("rotor {} has stopped", self.rotor + 1);
+        if let Some((_, text)) = vehicle.pilot.heard().iter().find(|(_, text)| text.starts_with("rotor"))
+            && (now_ms < stops_ms || *text != says)
+        {
+            return Err(format!("it says \"{text}\" in place of \"{says}\""));
+        }
+        if now_ms == stops_ms {
+            vehicle.pilot.stop_rotor(self.rotor);
+        }
+        self.told_ms = vehicle.pilot.heard().iter().find(|(_, text)| *text == says).map(|(ms, _)| ms - stops_ms);
+        let is_over = self.told_ms.is_some() || now_ms > stops_ms + 2 * TOLD_MS;
+        Ok(if is_over { Next::Ends } else { Next::GoesOn })
+    }
+}
+
+/// Flies with motor controllers that answer, and lets each rotor stop in the air.
+pub fn fly<M: Machine>(image: &Path, scenario: &Path) -> Result<(), Box<dyn Error>> {
+    let hover = Hover::<M>::of(image, scenario, &[("DSHOT_TEL_CFG", 1.0)], Climb::default())?;
+    let Listens { messages, most_rad_s, .. } = hover.goes_on(FRAME_NS, 0, Listens::default())?.hand;
+    println!(
+        "{messages} messages ESC_STATUS, at most {most_rad_s:.1} rad/s beside the rotors' speeds of the last 60 ms"
+    );
+    check(messages >= MESSAGES, "the motor controllers are heard")?;
+    let mut all_ms = Vec::new();
+    for rotor in 0..hover.vehicle().pilot.throttles().len() {
+        for late_ms in (0..STOPS).map(|nth| nth * APART_MS) {
+            let hand = Stops { rotor, late_ms, began_ms: None, told_ms: None };
+            let told_ms = hover.goes_on(FRAME_NS, 0, hand)?.hand.told_ms;
+            all_ms.push(told_ms.ok_or_else(|| format!("rotor {rotor}: its stop is not told"))?);
+        }
+    }
+    let (least_ms, most_ms) = (all_ms.iter().min().ok_or("no rotor")?, all_ms.iter().max().ok_or("no rotor")?);
+    println!("{} stopped rotors are told {least_ms} to {most_ms} ms after they stop being driven", all_ms.len());
+    check(*most_ms <= TOLD_MS, "a stopped rotor is told within 100 ms")
+}

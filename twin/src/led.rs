@@ -1,0 +1,261 @@
+//! Flights by somebody's hand, at the sticks of a transmitter, and a hover from which many of them go on.
+
+use crate::check::check;
+use crate::esc_line::Escs;
+use crate::fly::{TICK_NS, images};
+use crate::machine::{Machine, Signal, quiet_usb};
+use crate::pilot::Pilot;
+use crate::pins::MotorPins;
+use crate::transmitter::Transmitter;
+use crate::wire::Wire;
+use crate::world::at_the_place;
+use afbc_flight_core::motor::THROTTLE_MIN;
+use afbc_scenario::load;
+use rigless::emulator::{Driver, Finished, Host, Settled, Start, Stop, run};
+use rigless::image::{Image, digest};
+use rigless::session::Session;
+use rigless::snapshot::{Error as SnapshotError, Reader, Snapshot, Store, Writer, take};
+use rigless::time::VirtualNanos;
+use std::error::Error;
+use std::marker::PhantomData;
+use std::path::Path;
+
+/// Time between two frames of the receiver, as ExpressLRS usually has it \[ns\].
+pub const FRAME_NS: u64 = 4_000_000;
+/// Time between two looks at pins that repeat their pulses, where that is asked for \[ns\].
+const PULSES_NS: u64 = 50_000;
+
+/// Whether a flight goes on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Next {
+    GoesOn,
+    Ends,
+}
+
+/// A pilot's hand.
+pub trait Hand: Send {
+    /// True if pins that repeat their pulses are to be looked at more than once per millisecond.
+    const LOOKS: bool = false;
+
+    /// Moves sticks and switches, once per millisecond.
+    fn lead(&mut self, vehicle: &mut Vehicle, now_ms: u64) -> Result<Next, String>;
+
+    /// Sees what the motors were told at a time \[ns\].
+    fn see(&mut self, _: &Vehicle, _: u64) {}
+}
+
+/// The vehicle, and what the pilot has in hand.
+pub struct Vehicle {
+    pub pilot: Pilot,
+    pub pins: MotorPins,
+    pub transmitter: Transmitter,
+    pub escs: Escs,
+    signal: Signal,
+    /// When the plant goes on \[ns\].
+    tick_ns: u64,
+}
+
+/// A flight by somebody's hand.
+pub struct Led<H> {
+    pub vehicle: Vehicle,
+    pub hand: H,
+    /// Of what a snapshot is taken at its end.
+    firmware: Option<[u8; 32]>,
+    taken: Option<Result<Vec<u8>, SnapshotError>>,
+    error: Option<String>,
+}
+
+/// Snapshots keep the board alone.
+struct Nothing;
+
+impl Store for Nothing {
+    fn store(&self, _: &mut Writer) -> Result<(), SnapshotError> {
+        Ok(())
+    }
+
+    fn load(&mut self, _: &mut Reader) -> Result<(), SnapshotError> {
+        Ok(())
+    }
+}
+
+/// What is wired to a board.
+#[derive(Default)]
+struct Wires {
+    link: Wire,
+    receiver: Wire,
+    escs: Wire,
+}
+
+impl Wires {
+    /// Returns the board between them, and the `RC_PORT` of the receiver.
+    fn board<M: Machine>(&self) -> Result<(Box<M>, f32), Box<dyn Error>> {
+        let mut board = M::built()?;
+        board.sense(&at_the_place());
+        check(board.attach_link(self.link.clone()), "the link is wired")?;
+        let port = board.attach_radio(self.receiver.clone());
+        board.attach_escs(self.escs.clone());
+        Ok((board, port.ok_or("this board has no UART for a radio receiver here")?))
+    }
+}
+
+/// Returns how a flight ended, or what was wrong with it.
+fn flown<M: Machine, H>(finished: Finished<M, Led<H>>) -> Result<Led<H>, Box<dyn Error>> {
+    let led = finished.driver;
+    if let Some(error) = led.error {
+        return Err(error.into());
+    }
+    let wrong = &led.vehicle.pins.wrong;
+    check(wrong.is_empty(), &format!("{:?}: {wrong:?}", M::SIGNAL))?;
+    let session = finished.session;
+    let unmapped = session.unmapped().into_iter().map(|access| access.address);
+    let unmapped: Vec<_> = unmapped.filter(|address| !M::UNMAPPED.contains(address)).collect();
+    check(unmapped.is_empty() && session.refused().is_empty(), &format!("unmapped accesses {unmapped:x?}"))?;
+    check(session.resets().is_empty(), "no reset")?;
+    Ok(led)
+}
+
+/// A hover, from which flights go on.
+pub struct Hover<M> {
+    images: Vec<Image>,
+    snapshot: Snapshot,
+    vehicle: Vehicle,
+    machine: PhantomData<M>,
+}
+
+impl<M: Machine> Hover<M> {
+    /// Flies a scenario with these parameters by a hand that ends in a hover.
+    pub fn of<H: Hand + 'static>(
+        image: &Path,
+        scenario: &Path,
+        parameters: &[(&str, f32)],
+        hand: H,
+    ) -> Result<Self, Box<dyn Error>> {
+        let (scenario, wires) = (load(scenario)?, Wires::default());
+        let (board, port) = wires.board::<M>()?;
+        let parameters: Vec<_> = [("RC_PORT", port)].iter().chain(parameters).copied().collect();
+        let images = images::<M>(image, &parameters)?;
+        let vehicle = Vehicle {
+            pilot: Pilot::new(&scenario, wires.link)?,
+            pins: MotorPins::new(M::SIGNAL, scenario.rotors.len()),
+            transmitter: Transmitter::new(wires.receiver, FRAME_NS, TICK_NS),
+            escs: Escs::new(wires.escs),
+            signal: M::SIGNAL,
+            tick_ns: TICK_NS,
+        };
+        let mut led = Led::of(vehicle, hand);
+        led.firmware = Some(digest(&images, None));
+        let session = Session::new(board, 0, VirtualNanos(TICK_NS))?;
+        let finished = run(session, &Start::new(&images), led)?;
+        let Led { vehicle, taken, .. } = flown(finished)?;
+        // Snapshots are read from files.
+        let path = std::env::temp_dir().join(format!("twin-hover-{}", std::process::id()));
+        std::fs::write(&path, taken.ok_or("it does not hover")??)?;
+        let snapshot = Snapshot::read(&path);
+        std::fs::remove_file(&path)?;
+        Ok(Hover { images, snapshot: snapshot?, vehicle, machine: PhantomData })
+    }
+
+    /// Returns the vehicle there.
+    pub fn vehicle(&self) -> &Vehicle {
+        &self.vehicle
+    }
+
+    /// Goes on from there by somebody's hand, with frames of the receiver so far apart, and so much after a
+    /// millisecond.
+    pub fn goes_on<H: Hand + 'static>(&self, period_ns: u64, late_ns: u64, hand: H) -> Result<Led<H>, Box<dyn Error>> {
+        let wires = Wires::default();
+        let (board, _) = wires.board::<M>()?;
+        let mut session = Session::new(board, 0, VirtualNanos(0))?;
+        let resume = self.snapshot.restore(&mut session, &digest(&self.images, None), &mut Nothing)?;
+        let next_ns = self.snapshot.stop().at.0 + TICK_NS;
+        session.run_until(VirtualNanos(next_ns));
+        let vehicle = Vehicle {
+            pilot: self.vehicle.pilot.again(wires.link),
+            pins: self.vehicle.pins.clone(),
+            transmitter: self.vehicle.transmitter.again(wires.receiver, period_ns, next_ns + late_ns),
+            escs: Escs::new(wires.escs),
+            signal: M::SIGNAL,
+            tick_ns: next_ns,
+        };
+        let mut start = Start::new(&self.images);
+        start.resume = Some(&resume);
+        flown(run(session, &start, Led::of(vehicle, hand))?)
+    }
+}
+
+impl Vehicle {
+    /// True if the motors' wires said last that none is to turn.
+    pub fn is_stopped(&self) -> bool {
+        let stopped = match self.signal {
+            Signal::Dshot600(_) => 0,
+            Signal::Pwm400 => THROTTLE_MIN,
+        };
+        self.pilot.throttles().iter().all(|throttle| *throttle == stopped)
+    }
+}
+
+impl<H: Hand> Led<H> {
+    fn of(vehicle: Vehicle, hand: H) -> Self {
+        Led { vehicle, hand, firmware: None, taken: None, error: None }
+    }
+
+    /// Takes what the motors' wires say.
+    fn command(&mut self, at: VirtualNanos) {
+        self.vehicle.pilot.command(self.vehicle.pins.take());
+        self.vehicle.escs.ask(self.vehicle.pins.take_asked());
+        self.hand.see(&self.vehicle, at.0);
+    }
+}
+
+impl<M: Machine, H: Hand> Driver<M> for Led<H> {
+    fn on_settled(&mut self, session: &mut Session<M>, _: &mut dyn Host, settled: Settled) {
+        let pins = &mut self.vehicle.pins;
+        match settled {
+            Settled::Access { access, value } if pins.watch(&access, value, session.mcu()) => {}
+            Settled::Stop(stop) if pins.look_ns().is_some_and(|look_ns| stop.at.0 >= look_ns) => {
+                let motors = session.board_mut().motors();
+                if pins.look(&motors, session.mcu(), stop.at) {
+                    self.command(stop.at);
+                }
+            }
+            _ => return,
+        }
+        session.pause_at(self.vehicle.pins.look_ns().map(VirtualNanos));
+    }
+
+    fn on_stop(&mut self, session: &mut Session<M>, stop: Stop, host: &mut dyn Host) -> Option<VirtualNanos> {
+        let mut next_ns = u64::MAX;
+        if M::SIGNAL == Signal::Pwm400 {
+            self.vehicle.pins.take_pulses(&session.board_mut().motors());
+            self.command(stop.at);
+            if H::LOOKS {
+                next_ns = stop.at.0 + PULSES_NS;
+            }
+        }
+        if stop.at.0 >= self.vehicle.tick_ns {
+            self.vehicle.tick_ns += TICK_NS;
+            quiet_usb(session, stop.at);
+            let (_, signals) = self.vehicle.pilot.watch(stop.at.0 / TICK_NS);
+            session.board_mut().sense(&signals);
+            self.vehicle.escs.answer(self.vehicle.pilot.rotor_speeds_rad_s());
+            match self.hand.lead(&mut self.vehicle, stop.at.0 / TICK_NS) {
+                Ok(Next::GoesOn) => {}
+                // Not while a frame is read from the pins.
+                Ok(Next::Ends) if self.vehicle.pins.look_ns().is_some() => {}
+                Ok(Next::Ends) => {
+                    if let Some(firmware) = &self.firmware {
+                        self.vehicle.pins.release(session.mcu(), stop.at);
+                        self.taken = Some(take(session, host, stop, firmware, &Nothing).map(|taken| taken.file));
+                    }
+                    return None;
+                }
+                Err(error) => {
+                    self.error = Some(error);
+                    return None;
+                }
+            }
+        }
+        self.vehicle.transmitter.step(stop.at.0);
+        Some(VirtualNanos(next_ns.min(self.vehicle.tick_ns).min(self.vehicle.transmitter.next_ns())))
+    }
+}

@@ -1,0 +1,60 @@
+//! Flights by radio of the image as flashed: a CRSF receiver at a UART of the board. The pilot arms by a switch, climbs
+//! and hovers by the sticks. From that hover on, again and again: the kill switch, at times that are spread over a
+//! control period, which the motors' pins must show in time; and a receiver that falls silent and comes back.
+
+use crate::check::check;
+use crate::fly::TICK_NS;
+use crate::hands::{Climb, Kill, Loss};
+use crate::led::{FRAME_NS, Hover, Led};
+use crate::machine::Machine;
+use std::error::Error;
+use std::path::Path;
+
+/// Time from the last byte of the first frame with the switch on until no motor is driven, at most \[ns\].
+const KILL_NS: u64 = 20_000_000;
+
+/// What is flown, the frames per second at which the kill switch is tried, and at how many times each.
+pub struct Order<'a> {
+    pub scenario: &'a Path,
+    pub rates: &'a [u64],
+    pub phases: u64,
+}
+
+/// Flies by radio, and checks all of it.
+pub fn fly<M: Machine>(image: &Path, order: &Order<'_>) -> Result<(), Box<dyn Error>> {
+    let hover = Hover::<M>::of(image, order.scenario, &[("RC_MAP_KILL_SW", 7.0)], Climb::default())?;
+    let (shown, wrong) = hover.vehicle().transmitter.shown();
+    println!("the transmitter shows {}", shown.join(", "));
+    check(["place", "attitude", "mode"].iter().all(|it| shown.contains(it)) && wrong == 0, "telemetry comes back")?;
+
+    let mut most_ns = 0;
+    for rate in order.rates {
+        most_ns = most_ns.max(kill(&hover, *rate, order.phases)?);
+    }
+    let Led { hand, .. } = hover.goes_on(FRAME_NS, 0, Loss::default())?;
+    println!("{}", hand.told());
+    check(most_ns <= KILL_NS, "the motors stop within 20 ms")
+}
+
+/// Kills at this many times of a control period; returns the longest time until the motors were told \[ns\].
+fn kill<M: Machine>(hover: &Hover<M>, rate: u64, phases: u64) -> Result<u64, Box<dyn Error>> {
+    let mut took_ns = Vec::new();
+    for phase in 0..phases {
+        let late_ns = phase * TICK_NS / phases;
+        let Led { hand, vehicle, .. } = hover.goes_on(1_000_000_000 / rate, late_ns, Kill::default())?;
+        let killed_ns = vehicle.transmitter.killed_ns.ok_or("the switch was not sent")?;
+        let stopped_ns = hand.stopped_ns.ok_or("the motors are not stopped")?;
+        took_ns.push((stopped_ns.saturating_sub(killed_ns), late_ns));
+    }
+    let ms = |ns: u64| ns as f64 * 1e-6;
+    let mean_ms = took_ns.iter().map(|(took_ns, _)| ms(*took_ns)).sum::<f64>() / phases as f64;
+    let (least, most) = (took_ns.iter().min().ok_or("no phase")?, took_ns.iter().max().ok_or("no phase")?);
+    println!(
+        "kill, {rate} frames per second: the motors are told to stop {:.2} to {:.2} ms after the last byte of the \
+         first frame, {mean_ms:.2} ms on average of {phases} phases; the latest {:.3} ms after a millisecond",
+        ms(least.0),
+        ms(most.0),
+        ms(most.1)
+    );
+    Ok(most.0)
+}

@@ -1,0 +1,95 @@
+//! The pilot's transmitter, with its receiver at a UART of the board: CRSF.
+
+use crate::wire::Wire;
+use afbc_radio::{Channels, CrsfDecoder, CrsfFrame};
+use std::collections::BTreeSet;
+
+/// Time of a byte on the line, of ten bits at 420,000 baud \[ns\].
+const BYTE_NS: u64 = 10 * 1_000_000_000 / 420_000;
+
+/// Channels, from 0.
+pub const PITCH: usize = 1;
+pub const THROTTLE: usize = 2;
+pub const ARM: usize = 4;
+pub const KILL: usize = 6;
+
+/// Frames with telemetry, by type.
+const NAMES: [(u8, &str); 4] = [(0x02, "place"), (0x08, "battery"), (0x1E, "attitude"), (0x21, "mode")];
+
+/// A transmitter, and the receiver's wire to the board.
+pub struct Transmitter {
+    wire: Wire,
+    pub channels: Channels,
+    /// True if the receiver sends what it is told.
+    pub is_heard: bool,
+    /// Time between two frames, and when the next is sent \[ns\].
+    period_ns: u64,
+    next_ns: u64,
+    /// When the last byte of the first frame with the kill switch on was on the wire \[ns\].
+    pub killed_ns: Option<u64>,
+    kills: bool,
+    /// What comes back: the bytes of a frame that is not complete, and types of those that were.
+    back: Vec<u8>,
+    checker: CrsfDecoder,
+    shown: BTreeSet<u8>,
+}
+
+impl Transmitter {
+    /// With sticks centred, the throttle down and all switches off.
+    pub fn new(wire: Wire, period_ns: u64, next_ns: u64) -> Self {
+        let mut us = [1000; 16];
+        us[..4].fill(1500);
+        us[THROTTLE] = 1000;
+        Transmitter {
+            wire,
+            channels: Channels::of(us),
+            is_heard: true,
+            period_ns,
+            next_ns,
+            killed_ns: None,
+            kills: false,
+            back: Vec::new(),
+            checker: CrsfDecoder::default(),
+            shown: BTreeSet::new(),
+        }
+    }
+
+    /// Returns one whose sticks and switches are as these, at another receiver's wire.
+    pub fn again(&self, wire: Wire, period_ns: u64, next_ns: u64) -> Self {
+        Transmitter { channels: self.channels, ..Transmitter::new(wire, period_ns, next_ns) }
+    }
+
+    /// When it is to be looked at next \[ns\].
+    pub fn next_ns(&self) -> u64 {
+        self.next_ns
+    }
+
+    /// Sends what is due, and takes what has come back.
+    pub fn step(&mut self, now_ns: u64) {
+        if self.kills && self.killed_ns.is_none() {
+            self.killed_ns = self.wire.emptied_ns().map(|begun_ns| begun_ns + BYTE_NS);
+        }
+        if now_ns >= self.next_ns {
+            self.next_ns += self.period_ns;
+            if self.is_heard {
+                self.wire.send(&CrsfFrame::Channels(self.channels).encode());
+                self.kills |= self.channels.us[KILL] > 1500;
+            }
+        }
+        let bytes = self.wire.take();
+        self.checker.feed(&bytes, now_ns / 1000, |_| ());
+        self.back.extend(bytes);
+        while let [_, length, kind, ..] = *self.back
+            && self.back.len() >= usize::from(length) + 2
+        {
+            self.shown.insert(kind);
+            self.back.drain(..usize::from(length) + 2);
+        }
+    }
+
+    /// Returns what the transmitter shows, and in how many frames a checksum was wrong.
+    pub fn shown(&self) -> (Vec<&'static str>, u32) {
+        let shown = NAMES.into_iter().filter(|(kind, _)| self.shown.contains(kind)).map(|(_, name)| name).collect();
+        (shown, self.checker.bad_frames())
+    }
+}
