@@ -170,7 +170,10 @@ pub async fn run<B: Board, const OTHERS: usize>(
                     }
                 }
                 let told = links.each().iter_mut().enumerate().filter(|(index, _)| !others.contains(&Some(*index)));
-                told.for_each(|(_, link)| link.transmitter.transmit(&tick, &outgoing));
+                // Of telemetry, what a line does not take is lost.
+                told.for_each(|(_, link)| {
+                    link.transmitter.transmit(&tick, &outgoing);
+                });
                 if comms.has_mail() {
                     let news = comms.receive(&[]);
                     pass_on::<B>(&news, log);
