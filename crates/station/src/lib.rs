@@ -23,6 +23,8 @@ mod comms;
 mod dispatcher;
 mod escs;
 mod failsafes;
+mod link_share;
+mod log_desk;
 pub mod parameters;
 mod radio;
 pub mod services;
@@ -32,6 +34,7 @@ mod transfers;
 pub use afbc_link::Reboot;
 pub use comms::{CLOCK_FAILED, Comms, REPORT_MAX, TICK_OFF};
 pub use escs::{EscAction, EscDesk};
+pub use log_desk::LogDesk;
 pub use radio::{RADIO_FRAME_MAX, RadioControl};
 pub use services::calibration::Calibrator;
 pub use services::commands::{
