@@ -6,7 +6,7 @@ use crate::board::Board;
 use crate::recording::RecordedTick;
 use crate::vehicle::{Flight, NAME, ParameterTable};
 use afbc_logger::{
-    BlockSink, CardError, CardState, LogBlock, LogCard, LogKeeper, LogPage, LogPages, LogQuery, LogWriter, StoredLogs,
+    BlockSink, CardError, CardLogs, CardState, LogBlock, LogCard, LogKeeper, LogPage, LogPages, LogQuery, LogWriter,
     embedded_sdmmc::Block,
 };
 use afbc_onboard::parameters::RecordChange;
@@ -140,7 +140,7 @@ impl LogPages for Pages {
 pub struct CardLog {
     /// What stations ask of the logs.
     pub(crate) desk: LogDesk,
-    stored: StoredLogs<Pages>,
+    stored: CardLogs<Pages>,
     writer: LogWriter,
     queue: Queue,
     views: Receiver<'static, CriticalSectionRawMutex, TickView>,
@@ -169,7 +169,7 @@ impl CardLog {
         let hardware = B::HARDWARE.strip_prefix("board-").unwrap_or(B::HARDWARE);
         let log = LOG.init_with(|| CardLog {
             desk: LogDesk::default(),
-            stored: StoredLogs::new(Pages(page)),
+            stored: CardLogs::new(Pages(page)),
             writer: LogWriter::new(),
             queue: Queue(queue),
             views,

@@ -2,7 +2,6 @@
 
 use crate::block::LogBlock;
 use crate::card::{CardError, CardState, LogCard};
-use crate::reader::Reader;
 use crate::volume::{Device, NoClock};
 use core::ops::ControlFlow;
 use embedded_sdmmc::{DirEntry, Error, Mode, RawDirectory, RawFile, ShortFileName, VolumeIdx, VolumeManager};
@@ -20,6 +19,22 @@ const NUMBER_MAX: u32 = 99_999;
 
 /// A file that is written, and one that is read.
 type Volumes<'a> = VolumeManager<Device<'a>, NoClock, 1, 2, 1>;
+
+/// What is read.
+#[derive(Debug, Default)]
+pub(crate) struct Reader {
+    /// Number of the first log that was not there, or not whole, when they were counted.
+    pub(crate) bound: Option<u32>,
+    /// The file that is open, and its place.
+    pub(crate) open: Option<(u16, RawFile)>,
+}
+
+impl Reader {
+    /// True while a file is open.
+    fn is_open(&self) -> bool {
+        self.open.is_some()
+    }
+}
 
 /// Keeps logs on a card.
 pub struct LogKeeper<'a> {

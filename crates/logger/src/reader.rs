@@ -2,38 +2,22 @@
 
 use crate::card::{CardError, CardState};
 use crate::keeper::{LogKeeper, log_name};
-use crate::query::{LogAnswer, LogPage, LogQuery};
+use crate::query::{CardAnswer, LogPage, LogQuery};
 use core::ops::ControlFlow;
-use embedded_sdmmc::{Error, Mode, RawFile};
-
-/// What is read.
-#[derive(Debug, Default)]
-pub(crate) struct Reader {
-    /// Number of the first log that was not there, or not whole, when they were counted.
-    bound: Option<u32>,
-    /// The file that is open, and its place.
-    open: Option<(u16, RawFile)>,
-}
-
-impl Reader {
-    /// True while a file is open.
-    pub(crate) fn is_open(&self) -> bool {
-        self.open.is_some()
-    }
-}
+use embedded_sdmmc::{Error, Mode};
 
 impl LogKeeper<'_> {
     /// Answers a question about the logs but the one that is being written, on a page. It waits for the card.
     pub fn answer(&mut self, now_us: u64, query: LogQuery, page: &mut LogPage) {
         self.now_us = now_us;
-        (page.query, page.answer) = (query, LogAnswer::Failed);
+        (page.query, page.answer) = (query, CardAnswer::Failed);
         if self.root.is_some() {
             self.attempt(&mut |keeper| {
                 page.answer = match query {
-                    LogQuery::Nothing => LogAnswer::None,
+                    LogQuery::Nothing => CardAnswer::None,
                     LogQuery::Count => keeper.count()?,
                     LogQuery::Size(place) => {
-                        keeper.find(place)?.map_or(LogAnswer::None, |(_, size)| LogAnswer::Is(size))
+                        keeper.find(place)?.map_or(CardAnswer::None, |(_, size)| CardAnswer::Is(size))
                     }
                     LogQuery::Read(place, offset) => keeper.read(place, offset, &mut page.bytes)?,
                     LogQuery::Erase => keeper.erase_one()?,
@@ -43,7 +27,7 @@ impl LogKeeper<'_> {
         }
         // Of some blocks that the card does not give, the library does not tell.
         if self.root.is_none() {
-            page.answer = LogAnswer::Failed;
+            page.answer = CardAnswer::Failed;
         }
     }
 
@@ -52,7 +36,7 @@ impl LogKeeper<'_> {
         self.next.saturating_sub(u32::from(self.file.is_some()))
     }
 
-    fn count(&mut self) -> Result<LogAnswer, Error<CardError>> {
+    fn count(&mut self) -> Result<CardAnswer, Error<CardError>> {
         self.close_read()?;
         let bound = self.bound();
         self.reader.bound = Some(bound);
@@ -61,7 +45,7 @@ impl LogKeeper<'_> {
             count += u32::from(number < bound && size.is_some());
             ControlFlow::Continue(())
         })?;
-        Ok(LogAnswer::Is(count))
+        Ok(CardAnswer::Is(count))
     }
 
     /// Returns number and size of the log at a place among those that were counted.
@@ -79,28 +63,28 @@ impl LogKeeper<'_> {
         Ok(found)
     }
 
-    fn read(&mut self, place: u16, offset: u32, page: &mut [u8]) -> Result<LogAnswer, Error<CardError>> {
+    fn read(&mut self, place: u16, offset: u32, page: &mut [u8]) -> Result<CardAnswer, Error<CardError>> {
         if self.reader.open.is_none_or(|(open, _)| open != place) {
             self.close_read()?;
-            let Some((number, _)) = self.find(place)? else { return Ok(LogAnswer::None) };
+            let Some((number, _)) = self.find(place)? else { return Ok(CardAnswer::None) };
             let (Some(volumes), Some(root)) = (&self.volumes, self.root) else { return Err(Error::BadHandle) };
             let name = log_name(number).ok_or(Error::NotFound)?;
             self.reader.open = Some((place, volumes.open_file_in_dir(root, name, Mode::ReadOnly)?));
         }
         let (Some(volumes), Some((_, file))) = (&self.volumes, self.reader.open) else { return Err(Error::BadHandle) };
         if offset > volumes.file_length(file)? {
-            return Ok(LogAnswer::Is(0));
+            return Ok(CardAnswer::Is(0));
         }
         volumes.file_seek_from_start(file, offset)?;
         let length = volumes.read(file, page)?;
-        Ok(LogAnswer::Is(length as u32))
+        Ok(CardAnswer::Is(length as u32))
     }
 
     /// Erases the first of the logs: first what it occupies, then its name.
-    fn erase_one(&mut self) -> Result<LogAnswer, Error<CardError>> {
+    fn erase_one(&mut self) -> Result<CardAnswer, Error<CardError>> {
         self.close_read()?;
         self.reader.bound = None;
-        let Some((number, _)) = self.find(0)? else { return Ok(LogAnswer::None) };
+        let Some((number, _)) = self.find(0)? else { return Ok(CardAnswer::None) };
         let (Some(volumes), Some(root)) = (&self.volumes, self.root) else { return Err(Error::BadHandle) };
         let name = log_name(number).ok_or(Error::NotFound)?;
         let emptied = volumes.open_file_in_dir(root, name, Mode::ReadWriteTruncate)?;
@@ -110,7 +94,7 @@ impl LogKeeper<'_> {
         if self.state == CardState::Full {
             self.state = CardState::Ready;
         }
-        Ok(LogAnswer::Is(1))
+        Ok(CardAnswer::Is(1))
     }
 
     /// Closes the file that is read.

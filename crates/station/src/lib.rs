@@ -29,6 +29,7 @@ pub mod parameters;
 mod radio;
 pub mod services;
 mod setup;
+mod transferring;
 mod transfers;
 
 pub use afbc_link::Reboot;
@@ -42,4 +43,5 @@ pub use services::commands::{
 };
 pub use services::status::AuxSensors;
 pub use setup::Setup;
-pub use transfers::{TransferRequests, Transfers};
+pub use transferring::TransferRequests;
+pub use transfers::Transfers;

@@ -2,7 +2,7 @@
 
 use crate::services::log_transfer::LogTransfer;
 use crate::services::storage::LogStore;
-use crate::transfers::{Outcome, TransferRequests};
+use crate::transferring::{Outcome, TransferRequests, Transferring};
 use afbc_link::{Address, LogMessage, LogRequest, Question, Uplink};
 use core::task::Poll;
 
@@ -55,5 +55,18 @@ impl TransferRequests for LogDesk {
             _ => return false,
         }
         true
+    }
+}
+
+impl Transferring for (&mut LogDesk, &mut dyn LogStore) {
+    type Sent = LogMessage;
+
+    fn frame_max(&self) -> usize {
+        LOG_FRAME
+    }
+
+    fn next(&mut self, _: u64, armed: bool) -> Option<Outcome<LogMessage>> {
+        let (desk, store) = self;
+        desk.next(*store, armed)
     }
 }

@@ -4,9 +4,8 @@ use crate::log_desk::{LOG_FRAME, LogDesk};
 use crate::services::ftp::{FileTerms, Ftp, changes};
 use crate::services::log_stream::{LogStream, StreamEvent};
 use crate::services::storage::{FileStore, LogSource, LogStore};
-use afbc_link::{
-    Address, Command, ComponentMetadata, FilePacket, LogMessage, LogRequest, Message, Question, Transfer, Uplink,
-};
+use crate::transferring::{Outcome, TransferRequests, Transferring};
+use afbc_link::{Address, Command, ComponentMetadata, FilePacket, LogRequest, Question, Transfer, Uplink};
 use heapless::Deque;
 
 /// Requests for files that wait, and others. Further ones are dropped: stations repeat them.
@@ -16,26 +15,6 @@ const OTHERS_MAX: usize = 24;
 const FILE_FRAME: usize = 12 + 255;
 /// COMPONENT_INFORMATION and COMPONENT_METADATA.
 const METADATA: [u32; 2] = [395, 397];
-
-/// Takes requests for files and logs out of what stations send. `()` takes none: they are refused.
-pub trait TransferRequests {
-    /// True if the message is one.
-    fn wants(&self, message: &Uplink) -> bool;
-
-    /// Takes a message that it [wants](Self::wants); `may_change` is false if the station may not change anything.
-    /// False if too many wait.
-    fn take(&mut self, from: Address, message: &Uplink, payload: &[u8], may_change: bool) -> bool;
-}
-
-impl TransferRequests for () {
-    fn wants(&self, _: &Uplink) -> bool {
-        false
-    }
-
-    fn take(&mut self, _: Address, _: &Uplink, _: &[u8], _: bool) -> bool {
-        false
-    }
-}
 
 /// What of files and logs is asked for and sent; `F` is an open file.
 pub struct Transfers<F> {
@@ -64,18 +43,6 @@ enum OtherRequest {
     Metadata(u32),
 }
 
-/// What transfers, over some storage.
-pub(crate) trait Transferring {
-    /// What it sends.
-    type Sent: Message;
-
-    /// Returns the longest frame that may be next \[bytes\].
-    fn frame_max(&self) -> usize;
-
-    /// Returns what is to be done next, at this time since power-up; none if there is nothing now.
-    fn next(&mut self, now_us: u64, armed: bool) -> Option<Outcome<Self::Sent>>;
-}
-
 impl<F: Copy, S: FileStore<File = F> + LogStore + LogSource> Transferring for (&mut Transfers<F>, &mut S) {
     type Sent = Transfer;
 
@@ -87,27 +54,6 @@ impl<F: Copy, S: FileStore<File = F> + LogStore + LogSource> Transferring for (&
         let (transfers, store) = self;
         transfers.next(*store, now_us, armed)
     }
-}
-
-impl Transferring for (&mut LogDesk, &mut dyn LogStore) {
-    type Sent = LogMessage;
-
-    fn frame_max(&self) -> usize {
-        LOG_FRAME
-    }
-
-    fn next(&mut self, _: u64, armed: bool) -> Option<Outcome<LogMessage>> {
-        let (desk, store) = self;
-        desk.next(*store, armed)
-    }
-}
-
-/// What is to be sent or said.
-#[allow(clippy::large_enum_variant, reason = "one at a time, on the stack of whoever sends it")]
-pub(crate) enum Outcome<M> {
-    Send(M),
-    /// To everyone, as a warning if it is one.
-    Say(&'static str, bool),
 }
 
 /// True of requests that change what is stored.

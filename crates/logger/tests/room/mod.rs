@@ -6,8 +6,8 @@ pub(crate) mod ulog;
 use afbc_estimator::Measurement;
 use afbc_logger::embedded_sdmmc::Block;
 use afbc_logger::{
-    BlockSink, CardError, CardState, LogBlock, LogCard, LogKeeper, LogMode, LogPage, LogPages, LogQuery, LogWriter,
-    StoredLogs,
+    BlockSink, CardError, CardLogs, CardState, LogBlock, LogCard, LogKeeper, LogMode, LogPage, LogPages, LogQuery,
+    LogWriter,
 };
 use afbc_onboard::parameters::{ParameterTable, RecordChange};
 use afbc_onboard::{Aged, Configuration, ControlInputs, Flight, Readings};
@@ -221,7 +221,7 @@ impl LogPages for Pages {
 /// A vehicle that logs.
 pub(crate) struct Room {
     between: Rc<RefCell<Between>>,
-    pub(crate) stored: StoredLogs<Pages>,
+    pub(crate) stored: CardLogs<Pages>,
 
     pub(crate) card: Card,
     pub(crate) keeper: LogKeeper<'static>,
@@ -247,7 +247,7 @@ impl Room {
         let keeper = LogKeeper::new(Box::leak(Box::new(card.clone())));
         let between = Between { page: LogPage::EMPTY, is_full: false, asked: LogQuery::Nothing };
         let between = Rc::new(RefCell::new(between));
-        let stored = StoredLogs::new(Pages { between: between.clone(), page: LogPage::EMPTY });
+        let stored = CardLogs::new(Pages { between: between.clone(), page: LogPage::EMPTY });
         Room {
             between,
             stored,
