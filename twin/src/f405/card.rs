@@ -10,6 +10,8 @@ use std::io::{Cursor, Write};
 /// Blocks of the card, as its registers can tell them, and the first one of its volume.
 const BLOCKS: usize = 70 * 1024;
 const VOLUME: usize = 63;
+/// Bytes of a cluster: with one of a block, each block of a file takes seven writes of the table beside its own.
+const CLUSTER: u32 = 8 * 1024;
 /// Commands that write a block, as frames begin with them, and bytes of a frame (SD Physical Layer Simplified
 /// Specification 6.00, 7.3.1.1).
 const WRITE_BLOCK: u8 = 0x40 | 24;
@@ -58,17 +60,17 @@ pub struct CardSlot {
     written: u64,
 }
 
-/// Returns a card with an empty FAT32 in its first partition, or one with so many bytes of room. The models' own has no
+/// Returns a card with an empty FAT16 in its first partition, or one with so many bytes of room. The models' own has no
 /// partitions.
 fn formatted(room: Option<u64>) -> MemoryCard {
     let mut bytes = vec![0; BLOCKS * 512];
-    let options = fatfs::FormatVolumeOptions::new().fat_type(fatfs::FatType::Fat32).bytes_per_cluster(512);
+    let options = fatfs::FormatVolumeOptions::new().fat_type(fatfs::FatType::Fat16).bytes_per_cluster(CLUSTER);
     let volume = &mut Cursor::new(&mut bytes[VOLUME * 512..]);
     fatfs::format_volume(volume, options).expect("it is large enough");
     if let Some(room) = room {
         fill(&mut bytes[VOLUME * 512..], room).expect("it has room");
     }
-    bytes[450] = 0x0C;
+    bytes[450] = 0x06;
     bytes[454..458].copy_from_slice(&(VOLUME as u32).to_le_bytes());
     bytes[458..462].copy_from_slice(&((BLOCKS - VOLUME) as u32).to_le_bytes());
     bytes[510..512].copy_from_slice(&[0x55, 0xAA]);
