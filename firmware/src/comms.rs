@@ -112,11 +112,11 @@ pub async fn run<B: Board, const OTHERS: usize>(
                 let news = match link.checked_sub(1).and_then(|other| decoders.get_mut(other)) {
                     Some(decoder) => {
                         comms.exchange(decoder);
-                        let news = comms.receive(bytes);
+                        let news = hear::<B>(comms, black_box, bytes);
                         comms.exchange(decoder);
                         news
                     }
-                    None => comms.receive(bytes),
+                    None => hear::<B>(comms, black_box, bytes),
                 };
                 pass_on::<B>(&news, log);
                 BAD_FRAMES.store(comms.bad_frames(), Ordering::Relaxed);
@@ -169,10 +169,18 @@ pub async fn run<B: Board, const OTHERS: usize>(
                         pass_on::<B>(&news, log);
                     }
                 }
+                if B::HAS_CARD
+                    && let Some(black_box) = black_box
+                {
+                    black_box.transfer(comms, &mut outgoing);
+                }
                 let told = links.each().iter_mut().enumerate().filter(|(index, _)| !others.contains(&Some(*index)));
-                told.for_each(|(_, link)| link.transmitter.transmit(&tick, &outgoing));
+                // Of telemetry, what a line does not take is lost.
+                told.for_each(|(_, link)| {
+                    link.transmitter.transmit(&tick, &outgoing);
+                });
                 if comms.has_mail() {
-                    let news = comms.receive(&[]);
+                    let news = hear::<B>(comms, black_box, &[]);
                     pass_on::<B>(&news, log);
                 }
                 if radio::is_possible::<B>()
@@ -208,6 +216,16 @@ pub async fn run<B: Board, const OTHERS: usize>(
                 }
             }
         }
+    }
+}
+
+/// Receives bytes, and what stations ask of the logs on a card.
+fn hear<B: Board>(comms: &mut Comms, black_box: &mut Option<&'static mut CardLog>, bytes: &[u8]) -> ControlInputs {
+    match black_box {
+        Some(black_box) if B::HAS_CARD => comms.receive_with_logs(bytes, &mut black_box.server),
+        // Never on a board with a card, so that no image has both.
+        _ if B::HAS_CARD => ControlInputs::EMPTY,
+        _ => comms.receive(bytes),
     }
 }
 

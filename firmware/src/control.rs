@@ -30,14 +30,25 @@ pub fn cycles() -> [u32; 2] {
     [&CYCLES, &CYCLES_MAX].map(|cycles| cycles.load(Ordering::Relaxed))
 }
 
-/// Configuration to be flown from the next disarmed tick on, with its number.
-static NEXT: Mutex<CriticalSectionRawMutex, RefCell<Option<(Prepared, u16)>>> = Mutex::new(RefCell::new(None));
+/// Configuration to be flown from the next disarmed tick on.
+///
+/// Not an [`Option`], of which nothing is not all zeros: the flash would have 3.6 kB for it.
+#[repr(u8)]
+#[allow(clippy::large_enum_variant, reason = "there is one")]
+enum NextConfiguration {
+    Nothing = 0,
+    /// With its number.
+    Is(Prepared, u16),
+}
+
+static NEXT: Mutex<CriticalSectionRawMutex, RefCell<NextConfiguration>> =
+    Mutex::new(RefCell::new(NextConfiguration::Nothing));
 /// True if the vehicle was armed in the last tick.
 static ARMED: AtomicBool = AtomicBool::new(false);
 
 /// Flies another configuration, of this number, from the next disarmed tick on.
 pub fn fly(prepared: Prepared, number: u16) {
-    NEXT.lock(|next| next.try_borrow_mut().ok().map(|mut next| *next = Some((prepared, number))));
+    NEXT.lock(|next| next.try_borrow_mut().ok().map(|mut next| *next = NextConfiguration::Is(prepared, number)));
 }
 
 /// True if the vehicle is armed.
@@ -131,9 +142,12 @@ fn move_notch(flight: &mut Flight) -> Option<f32> {
 #[inline(never)]
 fn adopt(flight: &mut Flight) -> Option<u16> {
     NEXT.lock(|next| {
-        let (prepared, number) = next.try_borrow_mut().ok().and_then(|mut next| next.take())?;
+        let mut next = next.try_borrow_mut().ok()?;
+        let NextConfiguration::Is(prepared, number) = &*next else { return None };
         // Disarmed: the caller has looked.
-        flight.adopt(&prepared).then_some(number)
+        let adopted = flight.adopt(prepared).then_some(*number);
+        *next = NextConfiguration::Nothing;
+        adopted
     })
 }
 

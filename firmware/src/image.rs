@@ -77,7 +77,7 @@ macro_rules! image {
 
         #[embassy_executor::task]
         async fn logging(
-            blocks: $crate::logging::BlockReceiver,
+            blocks: $crate::logging::LogEnds,
             mut card: <$board as $crate::board::Board>::Card,
         ) -> ! {
             $crate::logging::run(blocks, &mut card).await
@@ -85,7 +85,7 @@ macro_rules! image {
 
         #[embassy_executor::task]
         async fn start_logging(
-            blocks: $crate::logging::BlockReceiver,
+            blocks: $crate::logging::LogEnds,
             card: <$board as $crate::board::Board>::Card,
         ) {
             let task = logging(blocks, card).expect("spawned once");
@@ -94,7 +94,7 @@ macro_rules! image {
 
         fn spawn_logging(
             spawner: embassy_executor::SendSpawner,
-            blocks: $crate::logging::BlockReceiver,
+            blocks: $crate::logging::LogEnds,
             card: <$board as $crate::board::Board>::Card,
         ) {
             spawner.spawn(start_logging(blocks, card).expect("spawned once"));

@@ -62,7 +62,7 @@ pub fn run<B: Board>(
     control: impl FnOnce(SendSpawner, &'static mut vehicle::Flight, B),
     comms: impl FnOnce(SendSpawner, &'static mut comms::CommsParts, B::Links),
     keeper: impl FnOnce(SendSpawner, parameters::Keeper<B::Memory>),
-    logging: impl FnOnce(SendSpawner, logging::BlockReceiver, B::Card),
+    logging: impl FnOnce(SendSpawner, logging::LogEnds, B::Card),
 ) -> ! {
     let executors = executors::start(&mut core, lines);
     let Parts { mut board, sampler, aids, mut links, memory, card } = B::start(&mut core, executors.control);
@@ -99,7 +99,7 @@ pub fn run<B: Board>(
 fn read<B: Board>(
     memory: B::Memory,
     links: &mut B::Links,
-) -> (parameters::Keeper<B::Memory>, &'static mut comms::CommsParts, Option<logging::BlockReceiver>) {
+) -> (parameters::Keeper<B::Memory>, &'static mut comms::CommsParts, Option<logging::LogEnds>) {
     let (kept, table, signing) = parameters::read(memory, B::STORE);
     for link in links.each() {
         link.transmitter.set_baud(table.configuration().link.baud);

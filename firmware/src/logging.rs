@@ -5,22 +5,28 @@ use crate::aux_sensors;
 use crate::board::Board;
 use crate::recording::RecordedTick;
 use crate::vehicle::{Flight, NAME, ParameterTable};
-use afbc_logger::{BlockSink, CardError, CardState, LogBlock, LogCard, LogKeeper, LogWriter, embedded_sdmmc::Block};
+use afbc_logger::{
+    BlockSink, CardError, CardLogs, CardState, LogBlock, LogCard, LogKeeper, LogPage, LogPages, LogQuery, LogWriter,
+    embedded_sdmmc::Block,
+};
 use afbc_onboard::parameters::RecordChange;
 use afbc_onboard::{ControlInputs, EscTelemetry, FlightView};
+use afbc_station::{Comms, LogServer, REPORT_MAX};
 use afbc_ulog::{LogStart, LoggedTick, TakenInputs};
 use core::array;
 use core::cell::RefCell;
 use core::sync::atomic::{AtomicBool, AtomicU8, Ordering};
-use embassy_futures::select::{Either, select};
+use embassy_futures::select::{Either3, select3};
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
+use embassy_sync::signal::Signal;
 use embassy_sync::zerocopy_channel::{Channel, Receiver, Sender};
 use embassy_time::{Instant, Timer};
+use heapless::Vec;
 use static_cell::StaticCell;
 
-/// Blocks that wait for the card, at most: of a log of 140 kB/s those of 58 ms.
-const BLOCKS: usize = 16;
+/// Blocks that wait for the card, at most: of a log of 140 kB/s those of 51 ms.
+const BLOCKS: usize = 14;
 /// Ticks whose views wait for the links' task, at most.
 const VIEWS: usize = 3;
 /// Time between two looks at a card without a log \[us\].
@@ -59,11 +65,16 @@ type Views = Channel<'static, CriticalSectionRawMutex, TickView>;
 type ViewSender = Sender<'static, CriticalSectionRawMutex, TickView>;
 type Blocks = Channel<'static, CriticalSectionRawMutex, LogBlock>;
 
-/// What the log's task receives.
-pub type BlockReceiver = Receiver<'static, CriticalSectionRawMutex, LogBlock>;
+/// What the log's task has of the links': blocks to be kept, and where it puts what is asked of the logs.
+pub struct LogEnds {
+    blocks: Receiver<'static, CriticalSectionRawMutex, LogBlock>,
+    pages: Sender<'static, CriticalSectionRawMutex, LogPage>,
+}
 
 static WANTED: AtomicBool = AtomicBool::new(false);
 static CARD: AtomicU8 = AtomicU8::new(CardState::Unknown as u8);
+/// What is asked of the logs on the card.
+static ASKED: Signal<CriticalSectionRawMutex, LogQuery> = Signal::new();
 /// The control task's end of the views.
 static SENDER: Mutex<CriticalSectionRawMutex, RefCell<Option<ViewSender>>> = Mutex::new(RefCell::new(None));
 
@@ -109,8 +120,27 @@ impl BlockSink for Queue {
     }
 }
 
+struct Pages(Receiver<'static, CriticalSectionRawMutex, LogPage>);
+
+impl LogPages for Pages {
+    fn page(&mut self) -> Option<&LogPage> {
+        self.0.try_receive().map(|page| &*page)
+    }
+
+    fn done(&mut self) {
+        self.0.receive_done();
+    }
+
+    fn ask(&mut self, query: LogQuery) {
+        ASKED.signal(query);
+    }
+}
+
 /// The links' task's part.
 pub struct CardLog {
+    /// What stations ask of the logs.
+    pub(crate) server: LogServer,
+    stored: CardLogs<Pages>,
     writer: LogWriter,
     queue: Queue,
     views: Receiver<'static, CriticalSectionRawMutex, TickView>,
@@ -120,22 +150,32 @@ pub struct CardLog {
 impl CardLog {
     /// Creates it, before the first tick, and what the log's task receives; to be called once.
     #[inline(never)]
-    pub(crate) fn begin<B: Board>() -> (&'static mut Self, BlockReceiver) {
+    pub(crate) fn begin<B: Board>() -> (&'static mut Self, LogEnds) {
         static LOG: StaticCell<CardLog> = StaticCell::new();
         static BLOCKS_HELD: StaticCell<[LogBlock; BLOCKS]> = StaticCell::new();
         static VIEWS_HELD: StaticCell<[TickView; VIEWS]> = StaticCell::new();
         static BLOCK_CHANNEL: StaticCell<Blocks> = StaticCell::new();
         static VIEW_CHANNEL: StaticCell<Views> = StaticCell::new();
+        static PAGE: StaticCell<[LogPage; 1]> = StaticCell::new();
+        static PAGE_CHANNEL: StaticCell<Channel<'static, CriticalSectionRawMutex, LogPage>> = StaticCell::new();
         let empty =
             || TickView { number: 0, taken: TakenInputs::of(&ControlInputs::EMPTY), view: FlightView::default() };
         let views = VIEWS_HELD.init_with(|| array::from_fn(|_| empty()));
         let (sender, views) = VIEW_CHANNEL.init_with(|| Channel::new(views)).split();
         SENDER.lock(|place| place.try_borrow_mut().ok().map(|mut place| *place = Some(sender)));
         let blocks = BLOCKS_HELD.init_with(|| [const { LogBlock::EMPTY }; BLOCKS]);
-        let (queue, receiver) = BLOCK_CHANNEL.init_with(|| Channel::new(blocks)).split();
+        let (pages, page) = PAGE_CHANNEL.init_with(|| Channel::new(PAGE.init_with(|| [LogPage::EMPTY]))).split();
+        let (queue, blocks) = BLOCK_CHANNEL.init_with(|| Channel::new(blocks)).split();
         let hardware = B::HARDWARE.strip_prefix("board-").unwrap_or(B::HARDWARE);
-        let log = LOG.init_with(|| CardLog { writer: LogWriter::new(), queue: Queue(queue), views, hardware });
-        (log, receiver)
+        let log = LOG.init_with(|| CardLog {
+            server: LogServer::default(),
+            stored: CardLogs::new(Pages(page)),
+            writer: LogWriter::new(),
+            queue: Queue(queue),
+            views,
+            hardware,
+        });
+        (log, LogEnds { blocks, pages })
     }
 
     /// Begins a tick of the links' task, of which this is the newest report. Returns a text for stations about the card
@@ -181,6 +221,16 @@ impl CardLog {
         self.writer.change(table, change);
     }
 
+    /// Goes on with what stations ask of the logs.
+    #[inline(never)]
+    pub(crate) fn transfer(&mut self, comms: &mut Comms, outgoing: &mut Vec<u8, REPORT_MAX>) {
+        if self.server.is_busy() {
+            // There is room.
+            let send = &mut |frame: &[u8]| drop(outgoing.extend_from_slice(frame));
+            comms.transfer_logs(&mut self.server, &mut self.stored, send);
+        }
+    }
+
     /// Writes the texts among the messages of a tick, and passes full blocks on.
     #[inline(never)]
     pub(crate) fn send(&mut self, now_us: u64, messages: &[u8]) {
@@ -193,22 +243,36 @@ impl CardLog {
 }
 
 /// Keeps logs on a card, for ever. Calls of the card wait for it: nothing else may be on this executor.
-pub async fn run(mut blocks: BlockReceiver, card: &mut dyn LogCard) -> ! {
+pub async fn run(LogEnds { mut blocks, mut pages }: LogEnds, card: &mut dyn LogCard) -> ! {
     let mut keeper = LogKeeper::new(card);
+    let mut asked = LogQuery::Nothing;
     loop {
         let look = Timer::at(Instant::from_micros(Instant::now().as_micros().wrapping_add(LOOK_US)));
-        let is_block = match select(blocks.receive(), look).await {
-            Either::First(block) => {
+        // Blocks come first.
+        let is_block = match select3(blocks.receive(), ASKED.wait(), look).await {
+            Either3::First(block) => {
                 keeper.take(Instant::now().as_micros(), block);
                 true
             }
-            Either::Second(()) => {
+            Either3::Second(query) => {
+                asked = query;
+                false
+            }
+            Either3::Third(()) => {
                 keeper.poll(Instant::now().as_micros());
                 false
             }
         };
         if is_block {
             blocks.receive_done();
+        }
+        // The log that is written has the right of way. The page may still be with the links' task.
+        if asked != LogQuery::Nothing
+            && blocks.try_receive().is_none()
+            && let Some(page) = pages.try_send()
+        {
+            keeper.answer(Instant::now().as_micros(), core::mem::take(&mut asked), page);
+            pages.send_done();
         }
         CARD.store(keeper.state() as u8, Ordering::Relaxed);
     }

@@ -8,12 +8,12 @@ use crate::vehicle::{NAME, ParameterTable, Report};
 use afbc_guidance::BatteryReading;
 use afbc_onboard::parameters::RecordChange;
 use afbc_onboard::{ControlInputs, Readings};
-use afbc_recorder::{Given, Recorder, TickRecord};
+use afbc_recorder::{Given, RecordQueue, TickRecord};
 use core::cell::RefCell;
 use core::sync::atomic::{AtomicBool, Ordering};
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
-use heapless::{Deque, Vec};
+use heapless::Deque;
 use static_cell::StaticCell;
 
 /// Ticks that wait, at most; further ones are missing in the log.
@@ -60,16 +60,12 @@ pub const fn is_possible<B: Board>() -> bool {
     B::Sampler::SENSES && B::Links::COUNT > 1
 }
 
-/// Bytes of the log that wait for the end of a tick, at most; further frames are missing.
-const BYTES: usize = 1024;
-
 /// The law that every image flies: AFBC under its monitor.
 const LAW: &str = "afbc";
 
 /// The exact log on one of the links.
 pub struct ExactLog {
-    recorder: Recorder,
-    bytes: Vec<u8, BYTES>,
+    queue: RecordQueue,
     /// Index of the link.
     link: usize,
 }
@@ -83,44 +79,45 @@ impl ExactLog {
         if !is_possible::<B>() || link == 0 || link >= B::Links::COUNT {
             return None;
         }
-        let log = LOG.init_with(|| ExactLog { recorder: Recorder::default(), bytes: Vec::new(), link });
-        let ExactLog { recorder, bytes, .. } = log;
-        recorder.start([NAME, LAW], table, &mut |frame| drop(bytes.extend_from_slice(frame)));
-        RECORDS.store(true, Ordering::Relaxed);
+        let log = LOG.init_with(|| ExactLog { queue: RecordQueue::default(), link });
+        log.start(table);
         Some(log)
+    }
+
+    // Not for each board anew: what only depends on it is compiled to be fast.
+    #[inline(never)]
+    fn start(&mut self, table: &ParameterTable) {
+        self.queue.start([NAME, LAW], table);
+        RECORDS.store(true, Ordering::Relaxed);
     }
 
     /// Records what messages have brought for the tick of this number.
     #[inline(never)]
     pub fn inputs(&mut self, tick: u32, inputs: &ControlInputs) {
-        let ExactLog { recorder, bytes, .. } = self;
-        recorder.inputs(tick, inputs, &mut |frame| drop(bytes.extend_from_slice(frame)));
+        self.queue.inputs(tick, inputs);
     }
 
     /// Records a change of the parameters, and returns the number of the configuration.
+    #[inline(never)]
     pub fn change(&mut self, table: &ParameterTable, change: RecordChange) -> u16 {
-        let ExactLog { recorder, bytes, .. } = self;
-        recorder.change(table, change, &mut |frame| drop(bytes.extend_from_slice(frame)))
+        self.queue.change(table, change)
     }
 
     /// Records a tick.
     #[inline(never)]
     pub fn tick(&mut self, tick: &RecordedTick) {
-        let ExactLog { recorder, bytes, .. } = self;
         let RecordedTick { number, clock_failed, adopted, notch_rad_s, readings, battery, report } = *tick;
         let (time_us, given) = (report.time_us, Given::of(&report));
-        let record = TickRecord { number, time_us, clock_failed, readings, battery, adopted, notch_rad_s, given };
-        recorder.tick(&record, &mut |frame| drop(bytes.extend_from_slice(frame)));
+        self.queue.tick(&TickRecord { number, time_us, clock_failed, readings, battery, adopted, notch_rad_s, given });
     }
 
-    /// Sends what is recorded.
+    /// Sends what is recorded, as far as the link takes it.
     #[inline(never)]
     pub fn send(&mut self, tick: &Tick, links: &mut impl Links) {
-        let ExactLog { bytes, link, .. } = self;
+        let ExactLog { queue, link } = self;
         if let Some(link) = links.each().get_mut(*link) {
-            link.transmitter.transmit(tick, bytes);
+            queue.send(&mut |frame| link.transmitter.transmit(tick, frame));
         }
-        bytes.clear();
     }
 
     /// Index of the link that carries it.

@@ -104,6 +104,8 @@ fn flight<M: Machine>(scenario: &Scenario, link: &Link, prints: bool) -> Result<
         hearer: None,
         receiver: None,
         pins: MotorPins::new(M::SIGNAL, scenario.rotors.len()),
+        cuts: None,
+        fetched: None,
     })
 }
 

@@ -1,7 +1,7 @@
 //! A flight of the image as flashed, in lockstep with the plant: the instruments' readings at the registers of the
 //! board's sensors, motor commands from its pins, a station at its telemetry UART.
 
-use crate::card_logs;
+use crate::card_logs::{self, CardLog};
 use crate::check::check;
 use crate::f405::CardTrouble;
 use crate::kept::{self, PWM400};
@@ -19,7 +19,7 @@ use rigless::image::Image;
 use rigless::session::Session;
 use rigless::time::VirtualNanos;
 use std::error::Error;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 pub(crate) const TICK_NS: u64 = 1_000_000;
 /// Most that may be missing of a log on a card with which nothing is wrong: its beginning fills the queue [ms].
@@ -46,6 +46,16 @@ pub(crate) struct Flight {
     /// In place of the board's own one.
     pub(crate) receiver: Option<UbloxPeer>,
     pub(crate) pins: MotorPins,
+    /// Where what the card holds at some times is kept.
+    pub(crate) cuts: Option<Cuts>,
+    /// The logs as they were before they were erased.
+    pub(crate) fetched: Option<Result<Vec<CardLog>, String>>,
+}
+
+/// When what the card holds is kept, as if the power was cut then.
+pub(crate) struct Cuts {
+    folder: PathBuf,
+    at_ms: Vec<u64>,
 }
 
 /// What is to be flown.
@@ -62,12 +72,18 @@ pub struct Order<'a> {
     pub card: Option<&'a Path>,
     /// What goes wrong with that card.
     pub card_trouble: CardTrouble,
+    /// Its room, if it is nearly full [kB].
+    pub full_kb: Option<u64>,
+    /// When what it holds is kept, as if the power was cut then [ms].
+    pub cuts_ms: &'a [u64],
+    /// True if the logs are downloaded and erased after the flight.
+    pub fetches: bool,
 }
 
 /// Flies what is ordered. The exact log, if it is to be kept in a file, must be flown again with the same result to the
 /// last bit.
 pub fn fly<M: Machine>(image: &Path, order: &Order<'_>) -> Result<(), Box<dyn Error>> {
-    let &Order { scenario, is_mission, receiver, log, card, card_trouble } = order;
+    let &Order { scenario, is_mission, receiver, log, card, card_trouble, full_kb, cuts_ms, fetches } = order;
     let scenario = load(scenario)?;
     let mut board = M::built()?;
     board.sense(&at_the_place());
@@ -75,6 +91,9 @@ pub fn fly<M: Machine>(image: &Path, order: &Order<'_>) -> Result<(), Box<dyn Er
         // Without a place for its logs, the slot is empty.
         let empty = CardTrouble { out_ms: Some([0, u64::MAX]), ..CardTrouble::default() };
         slot.trouble(if card.is_some() { card_trouble } else { empty });
+        if let Some(kb) = full_kb {
+            slot.fill(kb * 1024);
+        }
     }
     let wire = Wire::default();
     check(board.attach_link(wire.clone()), "the link is wired")?;
@@ -88,7 +107,9 @@ pub fn fly<M: Machine>(image: &Path, order: &Order<'_>) -> Result<(), Box<dyn Er
     let pins = MotorPins::new(M::SIGNAL, scenario.rotors.len());
     let pilot = Pilot::new(&scenario, wire)?;
     let pilot = if is_mission { pilot.touring() } else { pilot };
-    let flight = Flight { pilot, hearer, receiver, pins };
+    let pilot = if fetches { pilot.fetching() } else { pilot };
+    let cuts = card.map(|folder| Cuts { folder: folder.into(), at_ms: cuts_ms.to_vec() });
+    let flight = Flight { pilot, hearer, receiver, pins, cuts, fetched: None };
     let to_log: &[_] = if log.is_some() { &[("LOG_PORT", 2.0)] } else { &[] };
     let images = images::<M>(image, to_log)?;
     let session = Session::new(board, 0, VirtualNanos(TICK_NS))?;
@@ -98,7 +119,7 @@ pub fn fly<M: Machine>(image: &Path, order: &Order<'_>) -> Result<(), Box<dyn Er
     }
     let unmapped: Vec<_> = finished.session.unmapped().iter().map(|access| access.address).collect();
     let refused = finished.session.refused().len();
-    let Flight { pilot, hearer, receiver, pins } = finished.driver;
+    let Flight { pilot, hearer, receiver, pins, fetched, .. } = finished.driver;
     match M::SIGNAL {
         Signal::Dshot600(_) => println!("{} frames of DSHOT600", pins.sent),
         Signal::Pwm400 => println!("{} ticks with PWM's pulses", pins.sent),
@@ -107,14 +128,19 @@ pub fn fly<M: Machine>(image: &Path, order: &Order<'_>) -> Result<(), Box<dyn Er
         println!("{}", receiver.told());
     }
     let verdict = pilot.verdict();
+    let mut same = Ok(());
     if let (Some(log), Some(mut hearer)) = (log, hearer) {
         let bytes = hearer.take();
         std::fs::write(log, &bytes)?;
-        same::check_log(&bytes)?;
+        same = same::check_log(&bytes);
     }
     if let Some(folder) = card {
         let slot = finished.session.board_mut().card().ok_or("this machine has no memory card")?;
-        let logs = card_logs::save(slot.card(), folder)?;
+        let mut logs = card_logs::save(slot.card(), folder)?;
+        if let Some(fetched) = fetched {
+            check(logs.is_empty(), "the logs are erased")?;
+            logs = fetched?;
+        }
         println!("{} blocks written to the card", slot.written());
         for log in &logs {
             println!(
@@ -123,9 +149,11 @@ pub fn fly<M: Machine>(image: &Path, order: &Order<'_>) -> Result<(), Box<dyn Er
             );
         }
         let is_sound = card_trouble != CardTrouble::default()
+            || full_kb.is_some()
             || logs.iter().all(|log| log.rest == 0 && log.missing_ms <= DROPOUTS_MS);
         check(!logs.is_empty() && is_sound, "the card has a whole log of the flight")?;
     }
+    same?;
     verdict?;
     check(receiver.is_none_or(|receiver| receiver.is_configured()), "the receiver is configured")?;
     check(pins.wrong.is_empty(), &format!("{:?}: {:?}", M::SIGNAL, pins.wrong))?;
@@ -142,6 +170,29 @@ impl Flight {
         if M::SIGNAL == Signal::Pwm400 {
             self.pins.take_pulses(&session.board_mut().motors());
             self.pilot.command(self.pins.take());
+        }
+    }
+}
+
+impl Flight {
+    /// Keeps what the card holds when it is time to.
+    fn look_at_card<M: Machine>(&mut self, session: &mut Session<M>, now_ms: u64) {
+        let (Some(cuts), Some(slot)) = (&self.cuts, session.board_mut().card()) else { return };
+        if cuts.at_ms.contains(&now_ms) {
+            match card_logs::save(slot.card(), &cuts.folder.join(format!("cut-{now_ms}"))) {
+                Ok(logs) => println!("{:8.3} s  cut here, there are {logs:?}", now_ms as f64 * 1e-3),
+                Err(error) => println!("{:8.3} s  cut here: {error}", now_ms as f64 * 1e-3),
+            }
+        }
+        if self.fetched.is_none()
+            && let Some(fetch) = self.pilot.fetched()
+        {
+            let saved = card_logs::save(slot.card(), &cuts.folder).and_then(|logs| {
+                let read = |log: &CardLog| std::fs::read(cuts.folder.join(&log.name));
+                let bytes: Vec<_> = logs.iter().map(read).collect::<Result<_, _>>()?;
+                fetch.compare(&bytes).map(|()| logs)
+            });
+            self.fetched = Some(saved.map_err(|error| error.to_string()));
         }
     }
 }
@@ -182,6 +233,7 @@ impl<M: Machine> Driver<M> for Flight {
         }
         self.hear_pulses(session);
         quiet_usb(session, stop.at);
+        self.look_at_card(session, stop.at.0 / TICK_NS);
         let (readings, signals) = self.pilot.advance(stop.at.0 / TICK_NS)?;
         match &self.receiver {
             Some(receiver) => receiver.sense(session.board_mut(), stop.at, (&readings, &signals)),

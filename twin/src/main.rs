@@ -12,6 +12,7 @@ mod esc_line;
 mod escs;
 mod f405;
 mod faults;
+mod fetch;
 mod fly;
 mod hands;
 mod host;
@@ -88,17 +89,35 @@ fn command() -> Command {
         .subcommand_required(true)
         .arg_required_else_help(true)
         .subcommand(Command::new("boot").about("Boot, and look at bus and pins").args([machine(), image()]))
-        .subcommand(Command::new("fly").about("Take off, hover and land, in lockstep with the plant").args([
-            machine(),
-            image(),
-            scenario(),
-            receiver,
-            log,
-            mission(),
-            card,
-            times("card-stall", "The card stalls: when, and for how long"),
-            times("card-out", "The card is out: from when, and until when"),
-        ]))
+        .subcommand(
+            Command::new("fly").about("Take off, hover and land, in lockstep with the plant").args([
+                machine(),
+                image(),
+                scenario(),
+                receiver,
+                log,
+                mission(),
+                card,
+                times("card-stall", "The card stalls: when, and for how long"),
+                times("card-out", "The card is out: from when, and until when"),
+                Arg::new("card-full")
+                    .long("card-full")
+                    .value_name("KB")
+                    .value_parser(value_parser!(u64))
+                    .help("Room on the card"),
+                Arg::new("card-cut")
+                    .long("card-cut")
+                    .value_name("MS")
+                    .action(ArgAction::Append)
+                    .value_parser(value_parser!(u64))
+                    .help("Keep what the card holds at this time, as if the power was cut then; may be given again"),
+                Arg::new("fetch")
+                    .long("fetch")
+                    .action(ArgAction::SetTrue)
+                    .requires("card")
+                    .help("After the flight, list the logs over the link, download parts of one, and erase all"),
+            ]),
+        )
         .subcommand(
             Command::new("radio").about("Fly by radio, and stop the motors by the kill switch").args([
                 machine(),
@@ -173,8 +192,11 @@ fn run(matches: &ArgMatches) -> Result<(), Box<dyn Error>> {
                 Some([times.next()?, times.next()?])
             };
             let card_trouble = CardTrouble { stall_ms: times("card-stall"), out_ms: times("card-out") };
-            let is_mission = matches.get_flag("mission");
-            let order = Order { scenario, is_mission, receiver, log, card, card_trouble };
+            let (is_mission, fetches) = (matches.get_flag("mission"), matches.get_flag("fetch"));
+            let full_kb = matches.get_one("card-full").copied();
+            let cuts_ms: Vec<u64> = matches.get_many("card-cut").into_iter().flatten().copied().collect();
+            let order =
+                Order { scenario, is_mission, receiver, log, card, card_trouble, full_kb, cuts_ms: &cuts_ms, fetches };
             with_machine!(chosen(matches)?, M => fly::fly::<M>(image, &order))
         }
         Some(("radio", matches)) => {

@@ -1,6 +1,7 @@
 //! A flight seen from outside: the plant with its instruments, a station at the telemetry UART, and what must hold.
 
 use crate::check::check;
+use crate::fetch::{self, Fetch};
 use crate::tour::Tour;
 use crate::wire::Wire;
 use crate::world::Transducers;
@@ -19,6 +20,8 @@ const STATION: Address = Address { system: 255, component: 190 };
 /// Height of the hover above where it stood [m], and its time [ms].
 const HEIGHT_M: f32 = 5.0;
 const HOVER_MS: u64 = 30_000;
+/// Time of the hover before logs are fetched [ms].
+const SHORT_HOVER_MS: u64 = 6_000;
 /// Time within which it must arm, climb, and land and disarm [ms].
 const PATIENCE_MS: [u64; 3] = [40_000, 15_000, 40_000];
 /// Time within which it must fly the mission, and have disarmed [ms].
@@ -40,6 +43,7 @@ enum Phase {
     Hovers,
     Tours,
     Lands,
+    Fetches,
     Done,
 }
 
@@ -63,8 +67,14 @@ pub struct Pilot {
     /// Where it hovers, by the truth [m].
     start_m: [f64; 3],
     off_m: (f64, u64),
+    /// Durations of armed ticks, as the vehicle tells them: sum, number; the longest since power-up [us]; late ones.
+    ticks_us: (f64, u64),
+    longest_us: f32,
+    late: u32,
     /// The mission that is flown in the place of a hover.
     tour: Option<Tour>,
+    /// Fetches the logs afterwards.
+    fetch: Option<Fetch>,
     tilt_rad: f64,
     error: Option<String>,
     /// What it has said of its motor controllers last, with the time [ms].
@@ -93,7 +103,11 @@ impl Pilot {
             armed: false,
             start_m: [0.0; 3],
             off_m: (0.0, 0),
+            ticks_us: (0.0, 0),
+            longest_us: 0.0,
+            late: 0,
             tour: None,
+            fetch: None,
             tilt_rad: 0.0,
             error: None,
             escs: None,
@@ -130,6 +144,17 @@ impl Pilot {
     #[must_use]
     pub fn touring(self) -> Self {
         Pilot { tour: Some(Tour::new()), ..self }
+    }
+
+    /// Has it list, download and erase the vehicle's logs after the flight.
+    #[must_use]
+    pub fn fetching(self) -> Self {
+        Pilot { fetch: Some(Fetch::new(Decoder::new(STATION))), ..self }
+    }
+
+    /// Returns what has been downloaded, once all is, and before it is erased.
+    pub fn fetched(&self) -> Option<&Fetch> {
+        self.fetch.as_ref().filter(|fetch| fetch.has_all())
     }
 
     /// Returns what the motors' wires said last.
@@ -215,6 +240,13 @@ impl Pilot {
     /// Prints how the flight was, and fails if it was not well flown.
     pub fn verdict(self) -> Result<(), Box<dyn Error>> {
         let Pilot { error, off_m: (sum, count), tour, tilt_rad, now_ms, phase, .. } = self;
+        let (ticks_us, ticks) = self.ticks_us;
+        println!(
+            "armed ticks take {:.1} us on average, the longest {:.1} us; {} late or lost",
+            ticks_us / ticks.max(1) as f64,
+            self.longest_us,
+            self.late
+        );
         let off_m = sum / count.max(1) as f64;
         let how = match &tour {
             Some(tour) => tour.told(),
@@ -243,8 +275,12 @@ impl Pilot {
         let bytes = self.wire.take();
         let now_ms = self.now_ms;
         let (armed, heard, prints, escs) = (&mut self.armed, &mut self.heard, self.prints, &mut self.escs);
+        let (ticks_us, longest_us, late) = (&mut self.ticks_us, &mut self.longest_us, &mut self.late);
         let (tour, position_m) = (&mut self.tour, self.world.plant().motion().position_m.into());
         let mut answers = Vec::new();
+        if let Some(fetch) = self.fetch.as_mut().filter(|_| self.phase == Phase::Fetches) {
+            fetch.hear(&bytes, now_ms);
+        }
         self.decoder.feed(&bytes, |_, message| match message {
             Downlink::Heartbeat { armed: is_armed, .. } => *armed = is_armed,
             Downlink::Telemetry(Telemetry::EscStatus(status)) => *escs = Some((now_ms, status)),
@@ -257,6 +293,12 @@ impl Pilot {
                     println!("{:7.3} s: {text}", now_ms as f64 * 1e-3);
                 }
                 heard.push((now_ms, text.to_owned()));
+            }
+            Downlink::Health(health) => {
+                if *armed {
+                    (ticks_us.0, ticks_us.1) = (ticks_us.0 + f64::from(health.tick_us), ticks_us.1 + 1);
+                }
+                (*longest_us, *late) = (health.tick_max_us, health.late_ticks);
             }
             _ => {}
         });
@@ -285,6 +327,7 @@ impl Pilot {
             }
             println!("{:7.3} s: {:?}, {x:.2} {y:.2} {z:.2} m{errors}", self.now_ms as f64 * 1e-3, self.phase);
         }
+        let after = if self.fetch.is_some() { Phase::Fetches } else { Phase::Done };
         let next = match self.phase {
             Phase::Wakes => {
                 let is_ready = self.tour.as_ref().is_none_or(Tour::is_aboard);
@@ -309,19 +352,27 @@ impl Pilot {
                     self.off_m.0 += (x - self.start_m[0]).hypot(y - self.start_m[1]).hypot(z - self.start_m[2] - 5.0);
                     self.off_m.1 += 1;
                 }
-                (passed_ms >= HOVER_MS).then_some(Phase::Lands)
+                let hover_ms = if self.fetch.is_some() { SHORT_HOVER_MS } else { HOVER_MS };
+                (passed_ms >= hover_ms).then_some(Phase::Lands)
             }
             Phase::Tours => {
                 if passed_ms % 2000 == 0 && z < 0.5 && self.tour.as_ref().is_some_and(|tour| !tour.has_begun()) {
                     self.say(&Uplink::Command(Command::StartMission(0)));
                 }
-                (!self.armed).then_some(Phase::Done)
+                (!self.armed).then_some(after)
             }
             Phase::Lands => {
                 if passed_ms % 2000 == 0 && self.armed {
                     self.say(&Uplink::Command(Command::Land));
                 }
-                (!self.armed).then_some(Phase::Done)
+                (!self.armed).then_some(after)
+            }
+            Phase::Fetches => {
+                let now_ms = self.now_ms;
+                if let Some(request) = self.fetch.as_mut().and_then(|fetch| fetch.next(now_ms)) {
+                    self.say(&request);
+                }
+                self.fetch.as_ref().is_none_or(Fetch::is_done).then_some(Phase::Done)
             }
             Phase::Done => None,
         };
@@ -330,6 +381,7 @@ impl Pilot {
             Phase::Climbs => PATIENCE_MS[1],
             Phase::Lands => PATIENCE_MS[2],
             Phase::Tours => TOUR_MS,
+            Phase::Fetches => fetch::PATIENCE_MS,
             _ => u64::MAX,
         };
         if let Some(next) = next {

@@ -129,7 +129,7 @@ pub(crate) struct Transmitter {
 
 impl board::Transmitter for Transmitter {
     /// Sends the reply, and waits for the next tick's bytes.
-    fn transmit(&mut self, tick: &Tick, bytes: &[u8]) {
+    fn transmit(&mut self, tick: &Tick, bytes: &[u8]) -> bool {
         let head = ReplyHead {
             time_us: tick.report.time_us,
             cycles: tick.cycles,
@@ -140,6 +140,7 @@ impl board::Transmitter for Transmitter {
         self.from_firmware.write_all(&head.to_bytes()).expect("the host reads");
         self.from_firmware.write_all(bytes).expect("the host reads");
         self.take_bytes();
+        true
     }
 }
 

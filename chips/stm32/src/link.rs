@@ -104,12 +104,13 @@ impl board::Transmitter for Transmitter {
         }
     }
 
-    /// Drops the bytes if the line is too far behind.
-    fn transmit(&mut self, _tick: &Tick, bytes: &[u8]) {
+    fn transmit(&mut self, _tick: &Tick, bytes: &[u8]) -> bool {
         match self {
             // Accepts all bytes or, if the ring is full, none; the driver does not wake those who wait for room.
-            Transmitter::Uart(uart) if !bytes.is_empty() => drop(poll_once(uart.write(bytes))),
-            Transmitter::Uart(_) => (),
+            Transmitter::Uart(uart) if !bytes.is_empty() => {
+                matches!(poll_once(uart.write(bytes)), Poll::Ready(Ok(_)))
+            }
+            Transmitter::Uart(_) => true,
             Transmitter::Usb => usb::send(bytes),
         }
     }

@@ -63,15 +63,16 @@ pub fn start(
 /// Bytes that are copied at once into the ring for the host.
 pub const PIECE: usize = 64;
 
-/// Queues bytes for the host, all of them or, if it is too far behind, none.
-pub(crate) fn send(mut bytes: &[u8]) {
+/// Queues bytes for the host, all of them or, if it is too far behind, none; returns whether it has.
+pub(crate) fn send(mut bytes: &[u8]) -> bool {
     if SENT.free_capacity() < bytes.len() {
-        return;
+        return false;
     }
     // A piece at a time: all interrupts wait for one to be copied. The ring accepts bytes up to its end, then the rest.
     while let Ok(length @ 1..) = SENT.try_write(bytes.get(..PIECE).unwrap_or(bytes)) {
         bytes = bytes.get(length..).unwrap_or_default();
     }
+    true
 }
 
 /// Spawns the port's task from within its executor, where it need not be Send, when the vehicle runs already: nothing

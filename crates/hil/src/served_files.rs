@@ -9,6 +9,7 @@ use afbc_station::services::storage::{
 use std::fs::{self, File};
 use std::io::{ErrorKind, Read, Seek, SeekFrom};
 use std::path::PathBuf;
+use std::task::Poll;
 use std::time::UNIX_EPOCH;
 
 /// Directory of the metadata, and of the logs.
@@ -152,38 +153,39 @@ impl FileStore for ServedFiles {
 }
 
 impl LogStore for ServedFiles {
-    fn count_logs(&mut self) -> u16 {
+    fn count_logs(&mut self) -> Poll<u16> {
         self.counted = self.list_logs();
         self.counted.truncate(u16::MAX.into());
         self.reading = None;
-        self.counted.len() as u16
+        Poll::Ready(self.counted.len() as u16)
     }
 
-    fn log(&mut self, place: u16) -> Option<LogInfo> {
-        let data = self.counted.get(usize::from(place))?.metadata().ok()?;
-        let written = data.modified().ok().and_then(|at| at.duration_since(UNIX_EPOCH).ok());
-        let utc_s = written.map_or(0, |since| u32::try_from(since.as_secs()).unwrap_or(0));
-        Some(LogInfo { size: u32::try_from(data.len()).unwrap_or(u32::MAX), utc_s })
+    fn log(&mut self, place: u16) -> Poll<Option<LogInfo>> {
+        let data = self.counted.get(usize::from(place)).and_then(|path| path.metadata().ok());
+        Poll::Ready(data.map(|data| {
+            let written = data.modified().ok().and_then(|at| at.duration_since(UNIX_EPOCH).ok());
+            let utc_s = written.map_or(0, |since| u32::try_from(since.as_secs()).unwrap_or(0));
+            LogInfo { size: u32::try_from(data.len()).unwrap_or(u32::MAX), utc_s }
+        }))
     }
 
-    fn read_log(&mut self, place: u16, offset: u32, into: &mut [u8]) -> usize {
+    fn read_log(&mut self, place: u16, offset: u32, into: &mut [u8]) -> Poll<usize> {
         if self.counted.is_empty() {
             // Whoever has not asked for the list knows it from an earlier time.
-            self.count_logs();
+            let _ = self.count_logs();
         }
         if !matches!(&self.reading, Some((open, _)) if *open == place) {
             let file = self.counted.get(usize::from(place)).and_then(|path| File::open(path).ok());
             self.reading = file.map(|file| (place, file));
         }
-        let Some((_, file)) = &mut self.reading else { return 0 };
-        read(file, offset, into).unwrap_or(0)
+        Poll::Ready(self.reading.as_mut().map_or(0, |(_, file)| read(file, offset, into).unwrap_or(0)))
     }
 
-    fn erase_logs(&mut self) -> bool {
-        let Some(logs) = &self.logs else { return false };
+    fn erase_logs(&mut self) -> Poll<bool> {
+        let Some(logs) = &self.logs else { return Poll::Ready(false) };
         (self.reading, self.counted) = (None, Vec::new());
         let old = logs.list().into_iter().filter(|path| !logs.is_current(path));
-        old.filter(|path| fs::remove_file(path).is_err()).count() == 0
+        Poll::Ready(old.filter(|path| fs::remove_file(path).is_err()).count() == 0)
     }
 }
 

@@ -6,11 +6,12 @@ use afbc_link::FtpError;
 use afbc_onboard::Configuration;
 use afbc_onboard::parameters::{Kind, ParameterTable};
 use afbc_station::services::ftp::crc32;
-use afbc_station::services::storage::{FileAccess, FileChange, FilePath, FileStore, LogStore};
+use afbc_station::services::storage::{FileAccess, FileChange, FilePath, FileStore, LogInfo, LogStore};
 use serde_json::Value;
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::PathBuf;
+use std::task::Poll;
 use std::time::{Duration, SystemTime};
 
 fn folder(name: &str) -> PathBuf {
@@ -66,12 +67,12 @@ fn a_folders_logs_are_served_and_nothing_else_of_it() {
         assert_eq!(read(&mut files, name), Err(FtpError::FILE_NOT_FOUND), "{name}");
     }
     // By number, and out of any range.
-    assert_eq!(files.count_logs(), 2);
-    assert_eq!(files.log(0).map(|log| (log.size, log.utc_s)), Some((1000, 1_700_000_001)));
-    assert_eq!(files.log(2), None);
+    assert_eq!(files.count_logs(), Poll::Ready(2));
+    assert_eq!(files.log(0), Poll::Ready(Some(LogInfo { size: 1000, utc_s: 1_700_000_001 })));
+    assert_eq!(files.log(2), Poll::Ready(None));
     let mut block = [0; 90];
-    assert_eq!((files.read_log(0, 950, &mut block), &block[..50]), (50, &old[950..]));
-    assert_eq!([files.read_log(0, 1000, &mut block), files.read_log(7, 0, &mut block)], [0; 2]);
+    assert_eq!((files.read_log(0, 950, &mut block), &block[..50]), (Poll::Ready(50), &old[950..]));
+    assert_eq!([files.read_log(0, 1000, &mut block), files.read_log(7, 0, &mut block)], [Poll::Ready(0); 2]);
     // Nothing can be changed, except that old logs can be removed.
     assert!(matches!(files.open(&path("log/new.ulg"), FileAccess::Create), Err(FtpError::FILE_PROTECTED)));
     assert!(matches!(files.open(&path("log/old.ulg"), FileAccess::Write), Err(FtpError::FILE_PROTECTED)));
@@ -88,10 +89,10 @@ fn a_folders_logs_are_served_and_nothing_else_of_it() {
     logs.next_start();
     let mut files = ServedFiles::new(Some(logs.stored()), Vec::new());
     assert_eq!(names(&mut files, "log").len(), 2);
-    assert!(files.erase_logs());
+    assert_eq!(files.erase_logs(), Poll::Ready(true));
     assert_eq!(names(&mut files, "log"), [("log002.ulg".into(), Some(0))]);
     assert!(folder.join("secret.txt").exists() && folder.join("sub.ulg").exists());
-    assert!(!ServedFiles::new(None, Vec::new()).erase_logs());
+    assert_eq!(ServedFiles::new(None, Vec::new()).erase_logs(), Poll::Ready(false));
 }
 
 /// Of a file for each start, those of this run alone.
@@ -104,7 +105,8 @@ fn a_files_starts_are_served() {
     let mut files = ServedFiles::new(Some(logs.stored()), Vec::new());
     let listed: Vec<_> = names(&mut files, "log").into_iter().map(|(name, _)| name).collect();
     assert_eq!(listed, ["flight.ulg", "flight-2.ulg"]);
-    assert!(files.erase_logs() && folder.join("other.ulg").exists() && !folder.join("flight.ulg").exists());
+    assert!(files.erase_logs() == Poll::Ready(true));
+    assert!(folder.join("other.ulg").exists() && !folder.join("flight.ulg").exists());
 }
 
 /// The metadata as the published schemas and QGroundControl want it, and each number as it is declared.

@@ -83,7 +83,7 @@ pub use target::{AttitudeAndThrust, Axes, ExternalTarget, ManualControl, Positio
 pub use telemetry::Telemetry;
 pub use texts::sent_texts;
 pub use transfer::{
-    ComponentMetadata, FILE_DATA_MAX, FileOpcode, FilePacket, LOG_DATA_MAX, LogData, LogEntry, STREAM_DATA_MAX,
-    StreamedLog, Transfer,
+    ComponentMetadata, FILE_DATA_MAX, FileOpcode, FilePacket, LOG_DATA_MAX, LogData, LogEntry, LogMessage,
+    STREAM_DATA_MAX, StreamedLog, Transfer,
 };
 pub use uplink::Uplink;

@@ -3,8 +3,8 @@
 #![allow(deprecated, reason = "messages that stations still send")]
 
 use afbc_link::{
-    Address, ComponentMetadata, Decoder, FRAME_MAX, FileOpcode, FilePacket, LogData, LogEntry, LogRequest, Question,
-    Sender, Transfer, Uplink,
+    Address, ComponentMetadata, Decoder, FRAME_MAX, FileOpcode, FilePacket, LogData, LogEntry, LogMessage, LogRequest,
+    Question, Sender, Transfer, Uplink,
 };
 use mavlink::dialects::common::{MavCmd, MavMessage};
 use mavlink::{MavlinkVersion, Message as _};
@@ -47,12 +47,14 @@ fn files_have_the_protocols_payload() {
 #[test]
 fn logs_have_their_fields() {
     let entry = LogEntry { log: 3, count: 5, last: 4, utc_s: 1_700_000_000, size: 123_456 };
-    let MavMessage::LOG_ENTRY(read) = as_others_read(&Transfer::LogEntry(entry)) else { panic!("another") };
+    let MavMessage::LOG_ENTRY(read) = as_others_read(&Transfer::Log(LogMessage::Entry(entry))) else {
+        panic!("another")
+    };
     assert_eq!((read.id, read.num_logs, read.last_log_num), (3, 5, 4));
     assert_eq!((read.time_utc, read.size), (1_700_000_000, 123_456));
     let data = core::array::from_fn(|place| place as u8 + 1);
     let part = LogData { log: 3, offset: 90_000, count: 90, data };
-    let MavMessage::LOG_DATA(read) = as_others_read(&Transfer::LogData(part)) else { panic!("another") };
+    let MavMessage::LOG_DATA(read) = as_others_read(&Transfer::Log(LogMessage::Data(part))) else { panic!("another") };
     assert_eq!((read.id, read.ofs, read.count, read.data), (3, 90_000, 90, data));
 }
 

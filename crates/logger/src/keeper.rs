@@ -17,19 +17,37 @@ const EXTENSION: &[u8] = b"ULG";
 const DIGITS: usize = 3;
 const NUMBER_MAX: u32 = 99_999;
 
-type Volumes<'a> = VolumeManager<Device<'a>, NoClock, 1, 1, 1>;
+/// A file that is written, and one that is read.
+type Volumes<'a> = VolumeManager<Device<'a>, NoClock, 1, 2, 1>;
+
+/// What is read.
+#[derive(Debug, Default)]
+pub(crate) struct Reader {
+    /// Number of the first log that was not there, or not whole, when they were counted.
+    pub(crate) bound: Option<u32>,
+    /// The file that is open, and its place.
+    pub(crate) open: Option<(u16, RawFile)>,
+}
+
+impl Reader {
+    /// True while a file is open.
+    fn is_open(&self) -> bool {
+        self.open.is_some()
+    }
+}
 
 /// Keeps logs on a card.
 pub struct LogKeeper<'a> {
     /// None only while it is exchanged.
-    volumes: Option<Volumes<'a>>,
-    root: Option<RawDirectory>,
-    file: Option<RawFile>,
-    state: CardState,
+    pub(crate) volumes: Option<Volumes<'a>>,
+    pub(crate) root: Option<RawDirectory>,
+    pub(crate) file: Option<RawFile>,
+    pub(crate) reader: Reader,
+    pub(crate) state: CardState,
     /// Number of the next log.
-    next: u32,
+    pub(crate) next: u32,
     /// When it was called last, and when the card is tried again \[us\].
-    now_us: u64,
+    pub(crate) now_us: u64,
     retry_us: u64,
     /// When the file was written so that it can be read \[us\].
     synced_us: u64,
@@ -42,6 +60,7 @@ impl<'a> LogKeeper<'a> {
             volumes: Some(volumes(Device::new(card))),
             root: None,
             file: None,
+            reader: Reader::default(),
             state: CardState::Unknown,
             next: 1,
             now_us: 0,
@@ -58,7 +77,9 @@ impl<'a> LogKeeper<'a> {
     /// Looks after a card that is not ready, to be called several times a second while there is no block.
     pub fn poll(&mut self, now_us: u64) {
         self.now_us = now_us;
-        if self.root.is_none() && now_us >= self.retry_us {
+        // A full one may be another now.
+        let is_waited_for = self.root.is_none() || self.state == CardState::Full && !self.reader.is_open();
+        if is_waited_for && now_us >= self.retry_us {
             self.retry_us = now_us.saturating_add(RETRY_US);
             self.start();
         }
@@ -72,11 +93,11 @@ impl<'a> LogKeeper<'a> {
             self.close();
             self.synced_us = now_us;
             if self.state == CardState::Ready {
-                self.attempt(Self::create);
+                self.attempt(&mut Self::create);
             }
         }
         if self.file.is_some() {
-            self.attempt(|keeper| {
+            self.attempt(&mut |keeper| {
                 let (volumes, file) = keeper.open()?;
                 volumes.write(file, block.bytes())
             });
@@ -91,7 +112,7 @@ impl<'a> LogKeeper<'a> {
     fn sync(&mut self, now_us: u64) {
         if self.file.is_some() && now_us.saturating_sub(self.synced_us) >= SYNC_US {
             self.synced_us = now_us;
-            self.attempt(|keeper| {
+            self.attempt(&mut |keeper| {
                 let (volumes, file) = keeper.open()?;
                 volumes.flush_file(file)
             });
@@ -101,7 +122,7 @@ impl<'a> LogKeeper<'a> {
     /// Ends the file.
     fn close(&mut self) {
         if self.file.is_some() {
-            self.attempt(|keeper| {
+            self.attempt(&mut |keeper| {
                 let (volumes, file) = keeper.open()?;
                 let closed = volumes.close_file(file);
                 keeper.file = None;
@@ -123,21 +144,37 @@ impl<'a> LogKeeper<'a> {
             Err(CardError::Absent) => CardState::Absent,
             Err(_) => CardState::Failed,
         };
-        if self.state == CardState::Ready {
-            self.attempt(Self::open_root);
+        match self.state {
+            // Also of a full one, logs are read and erased.
+            CardState::Ready | CardState::Full if self.root.is_none() => self.attempt(&mut Self::open_root),
+            CardState::Ready | CardState::Full => (),
+            _ => self.forget(),
         }
     }
 
     fn open_root(&mut self) -> Result<(), Error<CardError>> {
         let volumes = self.volumes.as_ref().ok_or(Error::BadHandle)?;
         let root = volumes.open_root_dir(volumes.open_raw_volume(VolumeIdx(0))?)?;
+        self.root = Some(root);
         let mut last = 0;
-        volumes.iterate_dir(root, |entry| {
-            last = number(entry).unwrap_or(0).max(last);
+        self.each_log(&mut |number, _| {
+            last = number.max(last);
             ControlFlow::Continue(())
         })?;
-        (self.root, self.next) = (Some(root), last.saturating_add(1));
+        self.next = last.saturating_add(1);
         Ok(())
+    }
+
+    /// Calls `see` with number and size of each log, and whatever else has the name of one, without a size.
+    pub(crate) fn each_log(
+        &self,
+        see: &mut dyn FnMut(u32, Option<u32>) -> ControlFlow<()>,
+    ) -> Result<(), Error<CardError>> {
+        let (Some(volumes), Some(root)) = (&self.volumes, self.root) else { return Err(Error::BadHandle) };
+        volumes.iterate_dir(root, |entry| match number(entry) {
+            Some(number) => see(number, (!entry.attributes.is_directory()).then_some(entry.size)),
+            None => ControlFlow::Continue(()),
+        })
     }
 
     /// Creates the next file.
@@ -154,7 +191,8 @@ impl<'a> LogKeeper<'a> {
     }
 
     /// Calls what needs the card; if that fails, gives up file and volume.
-    fn attempt(&mut self, call: impl FnOnce(&mut Self) -> Result<(), Error<CardError>>) {
+    #[inline(never)]
+    pub(crate) fn attempt(&mut self, call: &mut dyn FnMut(&mut Self) -> Result<(), Error<CardError>>) {
         if let Some(volumes) = &self.volumes {
             volumes.device(|device| device.begin());
         }
@@ -172,10 +210,14 @@ impl<'a> LogKeeper<'a> {
             }
             (None, Err(_)) => CardState::Foreign,
         };
-        (self.root, self.file) = (None, None);
         // Not at once: the writer must see it, so that it begins anew.
         self.retry_us = self.now_us.saturating_add(RETRY_US);
-        // With nothing open: what was is not to be written any more.
+        self.forget();
+    }
+
+    /// Has nothing open any more, and writes nothing of what was.
+    fn forget(&mut self) {
+        (self.root, self.file, self.reader) = (None, None, Reader::default());
         let device = self.volumes.take().map(|volumes| volumes.free().0);
         self.volumes = device.map(volumes);
     }
@@ -194,6 +236,7 @@ fn volumes(device: Device<'_>) -> Volumes<'_> {
 }
 
 /// Returns the name of a log, `LOG001.ULG` of the first; none if FAT can have no name for that.
+#[inline(never)]
 pub fn log_name(number: u32) -> Option<ShortFileName> {
     if number > NUMBER_MAX {
         return None;
@@ -217,9 +260,13 @@ pub fn log_name(number: u32) -> Option<ShortFileName> {
 /// Returns the number of a log; none of any other entry.
 fn number(entry: &DirEntry) -> Option<u32> {
     let digits = entry.name.base_name().strip_prefix(PREFIX)?;
-    let is_log = entry.name.extension() == EXTENSION && digits.len() >= DIGITS;
-    if !is_log || !digits.iter().all(u8::is_ascii_digit) {
+    // No other zeros before the number than its name has.
+    let is_longer = digits.len() > DIGITS && digits.first() == Some(&b'0');
+    if entry.name.extension() != EXTENSION || digits.len() < DIGITS || is_longer {
         return None;
     }
-    core::str::from_utf8(digits).ok()?.parse().ok()
+    digits.iter().try_fold(0_u32, |number, digit| match digit {
+        b'0'..=b'9' => number.checked_mul(10)?.checked_add(u32::from(digit - b'0')),
+        _ => None,
+    })
 }

@@ -9,6 +9,9 @@ use afbc_ulog::{BlackBox, LogRing, LogStart, LoggedTick};
 /// Bytes that wait for a block, at most: more than a tick in which every topic is due writes, beside what does not
 /// fill one.
 pub const STAGING: usize = 2560;
+/// Entries of a log's beginning that are looked at in a tick, at most: each is searched for in the vehicle's table, and
+/// the task that hears of ticks has other things to do.
+const PACE: u16 = 2;
 /// Time for which a log goes on once the vehicle is disarmed \[us\].
 const TAIL_US: u64 = 1_000_000;
 
@@ -74,7 +77,7 @@ impl LogWriter {
         if self.log.is_none() && card == CardState::Ready && !self.ends {
             (self.begins, self.ticked_us) = (true, None);
             self.ring = LogRing::new();
-            self.log = Some(BlackBox::new(start, table));
+            self.log = Some(BlackBox::new(start, table).paced(PACE));
         }
         let Some(log) = self.log.as_mut().filter(|_| !self.ends) else { return };
         let now_us = tick.report.time_us;

@@ -11,11 +11,13 @@
 #![no_std]
 
 mod frame;
+mod queue;
 mod record;
 mod recorder;
 mod replayer;
 
 pub use frame::{FRAME_MAX, FrameError, Frames, decode, write};
+pub use queue::RecordQueue;
 pub use record::{Given, Record, StartRecord, TickRecord, VERSION, WORD_MAX};
 pub use recorder::Recorder;
 pub use replayer::{ReplayDifference, ReplayStep, Replayer};

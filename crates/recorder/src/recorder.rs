@@ -25,7 +25,7 @@ impl Recorder {
         &mut self,
         [vehicle, law]: [&str; 2],
         table: &ParameterTable<N>,
-        send: &mut impl FnMut(&[u8]),
+        send: &mut dyn FnMut(&[u8]),
     ) {
         self.configuration = 0;
         self.frame(&Record::Start(StartRecord::of(vehicle, law, table)), send);
@@ -42,7 +42,7 @@ impl Recorder {
         &mut self,
         table: &ParameterTable<N>,
         change: RecordChange,
-        send: &mut impl FnMut(&[u8]),
+        send: &mut dyn FnMut(&[u8]),
     ) -> u16 {
         self.configuration = self.configuration.wrapping_add(1);
         let configuration = self.configuration;
@@ -59,7 +59,7 @@ impl Recorder {
 
     /// Records what messages have brought for the tick of this number, if they have brought anything. The battery is
     /// recorded with the tick.
-    pub fn inputs(&mut self, tick: u32, inputs: &ControlInputs, send: &mut impl FnMut(&[u8])) {
+    pub fn inputs(&mut self, tick: u32, inputs: &ControlInputs, send: &mut dyn FnMut(&[u8])) {
         let mut inputs = inputs.clone();
         inputs.battery = None;
         if inputs != ControlInputs::EMPTY {
@@ -68,11 +68,11 @@ impl Recorder {
     }
 
     /// Records a tick.
-    pub fn tick(&mut self, record: &TickRecord, send: &mut impl FnMut(&[u8])) {
+    pub fn tick(&mut self, record: &TickRecord, send: &mut dyn FnMut(&[u8])) {
         self.frame(&Record::Tick(*record), send);
     }
 
-    fn frame(&mut self, record: &Record, send: &mut impl FnMut(&[u8])) {
+    fn frame(&mut self, record: &Record, send: &mut dyn FnMut(&[u8])) {
         if let Some(frame) = write(record, &mut self.buffer) {
             send(frame);
         }

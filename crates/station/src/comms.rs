@@ -2,6 +2,8 @@
 
 use crate::dispatcher::Dispatcher;
 use crate::failsafes::Failsafes;
+use crate::link_share::LinkShare;
+use crate::log_server::LogServer;
 use crate::parameters::VALUE_BYTES;
 use crate::services::calibration::Calibrator;
 use crate::services::commands::ANSWERS_PER_TICK;
@@ -14,7 +16,8 @@ use crate::services::streams::{Requested, id};
 use crate::services::telemetry::compose;
 use crate::services::texts::{Words, reason, urgency};
 use crate::setup::Setup;
-use crate::transfers::{Outcome, TransferRequests, Transfers};
+use crate::transferring::{Outcome, TransferRequests, Transferring};
+use crate::transfers::Transfers;
 use afbc::monitor::Norm;
 use afbc_calibration::RawSample;
 use afbc_control::math::sqrt;
@@ -80,6 +83,7 @@ pub struct Comms {
     left: usize,
     /// True if HIGHRES_IMU is due: it is sent with the sensors' next sample.
     sample_is_due: bool,
+    share: LinkShare,
 }
 
 impl Default for Comms {
@@ -113,6 +117,7 @@ impl Comms {
             rate: rate::RateReport::default(),
             left: 0,
             sample_is_due: false,
+            share: LinkShare::NEW,
         }
     }
 
@@ -157,6 +162,12 @@ impl Comms {
     /// A vehicle without an estimate of its own ignores poses, since a law needs velocities and rates.
     pub fn receive(&mut self, bytes: &[u8]) -> ControlInputs {
         self.receive_beside(bytes, &mut ())
+    }
+
+    /// The same for a vehicle that has logs and no other files.
+    #[inline(never)]
+    pub fn receive_with_logs(&mut self, bytes: &[u8], server: &mut LogServer) -> ControlInputs {
+        self.receive_beside(bytes, server)
     }
 
     /// The same beside `requests`, which take what stations want of files and logs.
@@ -359,19 +370,29 @@ impl Comms {
         store: &mut S,
         send: impl FnMut(&[u8]),
     ) {
+        self.dispatcher.status.has_files = true;
+        self.go_on(&mut (transfers, store), send);
+    }
+
+    /// The same for a vehicle that has logs and no other files.
+    #[inline(never)]
+    pub fn transfer_logs(&mut self, server: &mut LogServer, store: &mut dyn LogStore, send: &mut dyn FnMut(&[u8])) {
+        self.go_on(&mut (server, store), send);
+    }
+
+    fn go_on(&mut self, transfers: &mut impl Transferring, send: impl FnMut(&[u8])) {
         let mut outlet = self.outlet(self.left, send);
         let Dispatcher { streams, texts, status, now_us, .. } = &mut self.dispatcher;
-        status.has_files = true;
-        transfers.tick(streams.bytes_per_s());
+        self.share.tick(streams.bytes_per_s());
         while outlet.left >= SIGNED_FRAME_MAX
-            && (transfers.has_room() || streams.spares(transfers.frame_max()))
-            && let Some(outcome) = transfers.next(store, *now_us, status.mode.armed())
+            && (self.share.has_room() || streams.spares(transfers.frame_max()))
+            && let Some(outcome) = transfers.next(*now_us, status.mode.armed())
         {
             match outcome {
                 Outcome::Send(message) => {
                     let bytes = outlet.say(&message, &mut self.signing);
                     streams.spend(bytes);
-                    transfers.spend(bytes);
+                    self.share.spend(bytes);
                 }
                 Outcome::Say(text, true) => texts.put(MavSeverity::MAV_SEVERITY_WARNING, text),
                 Outcome::Say(text, false) => texts.put(MavSeverity::MAV_SEVERITY_INFO, text),

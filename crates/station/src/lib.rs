@@ -23,15 +23,19 @@ mod comms;
 mod dispatcher;
 mod escs;
 mod failsafes;
+mod link_share;
+mod log_server;
 pub mod parameters;
 mod radio;
 pub mod services;
 mod setup;
+mod transferring;
 mod transfers;
 
 pub use afbc_link::Reboot;
 pub use comms::{CLOCK_FAILED, Comms, REPORT_MAX, TICK_OFF};
 pub use escs::{EscAction, EscReports};
+pub use log_server::LogServer;
 pub use radio::{RADIO_FRAME_MAX, RadioControl};
 pub use services::calibration::Calibrator;
 pub use services::commands::{
@@ -39,4 +43,5 @@ pub use services::commands::{
 };
 pub use services::status::AuxSensors;
 pub use setup::Setup;
-pub use transfers::{TransferRequests, Transfers};
+pub use transferring::TransferRequests;
+pub use transfers::Transfers;

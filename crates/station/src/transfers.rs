@@ -1,57 +1,29 @@
 //! Files and logs of a vehicle with storage, on the link that telemetry and commands share.
 
+use crate::log_server::{LOG_FRAME, LogServer};
 use crate::services::ftp::{FileTerms, Ftp, changes};
 use crate::services::log_stream::{LogStream, StreamEvent};
-use crate::services::log_transfer::{LogMessage, LogTransfer};
 use crate::services::storage::{FileStore, LogSource, LogStore};
+use crate::transferring::{Outcome, TransferRequests, Transferring};
 use afbc_link::{Address, Command, ComponentMetadata, FilePacket, LogRequest, Question, Transfer, Uplink};
 use heapless::Deque;
 
-/// Requests for files that wait, and others: MAVProxy asks for twenty parts of a log at once. Further ones are dropped:
-/// stations repeat them.
+/// Requests for files that wait, and others. Further ones are dropped: stations repeat them.
 const FILES_MAX: usize = 4;
 const OTHERS_MAX: usize = 24;
-/// Part of the link that transfers get even when telemetry takes all of it: one in so many bytes. What telemetry
-/// leaves, they get anyway.
-const SHARE: i64 = 5;
-/// Bytes of that part that may be saved up: less than a frame \[1e-3 bytes\].
-const SAVED: i64 = 250_000;
-/// Longest frames with a part of a log, and with one of a file or of a streamed log \[bytes\].
-const LOG_FRAME: usize = 12 + 97;
+/// Longest frame with a part of a file or of a streamed log \[bytes\].
 const FILE_FRAME: usize = 12 + 255;
 /// COMPONENT_INFORMATION and COMPONENT_METADATA.
 const METADATA: [u32; 2] = [395, 397];
-
-/// Takes requests for files and logs out of what stations send. `()` takes none: they are refused.
-pub trait TransferRequests {
-    /// True if the message is one.
-    fn wants(&self, message: &Uplink) -> bool;
-
-    /// Takes a message that it [wants](Self::wants); `may_change` is false if the station may not change anything.
-    /// False if too many wait.
-    fn take(&mut self, from: Address, message: &Uplink, payload: &[u8], may_change: bool) -> bool;
-}
-
-impl TransferRequests for () {
-    fn wants(&self, _: &Uplink) -> bool {
-        false
-    }
-
-    fn take(&mut self, _: Address, _: &Uplink, _: &[u8], _: bool) -> bool {
-        false
-    }
-}
 
 /// What of files and logs is asked for and sent; `F` is an open file.
 pub struct Transfers<F> {
     files: Deque<FileRequest, FILES_MAX>,
     others: Deque<OtherRequest, OTHERS_MAX>,
     ftp: Ftp<F>,
-    logs: LogTransfer,
+    logs: LogServer,
     stream: LogStream,
     metadata: Option<ComponentMetadata>,
-    /// What transfers may send of their own part \[1e-3 bytes\].
-    saved: i64,
     /// True if the next packet is one of a log.
     logs_turn: bool,
 }
@@ -63,23 +35,25 @@ struct FileRequest {
 }
 
 enum OtherRequest {
-    Log {
-        from: Address,
-        request: LogRequest,
-        may_change: bool,
-    },
+    /// A station has the part of the streamed log with this number.
+    Received(Address, u16),
     /// Begins to stream the log, or ends.
     Stream(Address, bool),
     /// The message numbered so.
     Metadata(u32),
 }
 
-/// What is to be sent or said.
-#[allow(clippy::large_enum_variant, reason = "one at a time, on the stack of whoever sends it")]
-pub(crate) enum Outcome {
-    Send(Transfer),
-    /// To everyone, as a warning if it is one.
-    Say(&'static str, bool),
+impl<F: Copy, S: FileStore<File = F> + LogStore + LogSource> Transferring for (&mut Transfers<F>, &mut S) {
+    type Sent = Transfer;
+
+    fn frame_max(&self) -> usize {
+        self.0.frame_max()
+    }
+
+    fn next(&mut self, now_us: u64, armed: bool) -> Option<Outcome<Transfer>> {
+        let (transfers, store) = self;
+        transfers.next(*store, now_us, armed)
+    }
 }
 
 /// True of requests that change what is stored.
@@ -98,23 +72,11 @@ impl<F: Copy> Transfers<F> {
             files: Deque::new(),
             others: Deque::new(),
             ftp: Ftp::default(),
-            logs: LogTransfer::default(),
+            logs: LogServer::default(),
             stream: LogStream::default(),
             metadata,
-            saved: SAVED,
             logs_turn: false,
         }
-    }
-
-    /// Begins a tick on a link of so many bytes per second.
-    pub(crate) fn tick(&mut self, bytes_per_s: u32) {
-        // Bytes per second are thousandths of bytes per millisecond.
-        self.saved = (self.saved + i64::from(bytes_per_s) / SHARE).min(SAVED);
-    }
-
-    /// True if its own part of the link has room.
-    pub(crate) fn has_room(&self) -> bool {
-        self.saved > 0
     }
 
     /// Returns the longest frame that may be next \[bytes\].
@@ -124,20 +86,15 @@ impl<F: Copy> Transfers<F> {
         if logs_alone { LOG_FRAME } else { FILE_FRAME }
     }
 
-    /// Notes that so many bytes were sent.
-    pub(crate) fn spend(&mut self, bytes: usize) {
-        self.saved = self.saved.saturating_sub(1000 * bytes as i64).max(-SAVED);
-    }
-
     /// Returns what is to be done next.
     pub(crate) fn next<S: FileStore<File = F> + LogStore + LogSource>(
         &mut self,
         store: &mut S,
         now_us: u64,
         armed: bool,
-    ) -> Option<Outcome> {
+    ) -> Option<Outcome<Transfer>> {
         while let Some(request) = self.others.pop_front() {
-            if let Some(outcome) = self.begin(request, store, now_us, armed) {
+            if let Some(outcome) = self.begin(request, store, now_us) {
                 return Some(outcome);
             }
         }
@@ -150,12 +107,12 @@ impl<F: Copy> Transfers<F> {
         // In turn, if both are under way.
         self.logs_turn = !self.logs_turn;
         if (self.logs_turn || !self.ftp.is_busy())
-            && let Some(message) = self.logs.next(store)
+            && let Some(outcome) = self.logs.next(store, armed)
         {
-            return Some(Outcome::Send(match message {
-                LogMessage::Entry(entry) => Transfer::LogEntry(entry),
-                LogMessage::Data(data) => Transfer::LogData(data),
-            }));
+            return Some(match outcome {
+                Outcome::Send(message) => Outcome::Send(Transfer::Log(message)),
+                Outcome::Say(text, is_warning) => Outcome::Say(text, is_warning),
+            });
         }
         if let Some((packet, to)) = self.ftp.next_packet(store, now_us) {
             return Some(Outcome::Send(Transfer::File { packet, to }));
@@ -169,30 +126,10 @@ impl<F: Copy> Transfers<F> {
 
 impl<F: Copy> Transfers<F> {
     /// Does what a request asks for that is not about files, or begins it.
-    fn begin<S: LogStore + LogSource>(
-        &mut self,
-        request: OtherRequest,
-        store: &mut S,
-        now_us: u64,
-        armed: bool,
-    ) -> Option<Outcome> {
+    fn begin<S: LogSource>(&mut self, request: OtherRequest, store: &mut S, now_us: u64) -> Option<Outcome<Transfer>> {
         match request {
-            OtherRequest::Log { request: LogRequest::Erase, .. } if armed => {
-                Some(Outcome::Say("logs are erased while disarmed only", true))
-            }
-            // Whoever is not in control has been told.
-            OtherRequest::Log { request: LogRequest::Erase, may_change: false, .. } => None,
-            OtherRequest::Log { request: LogRequest::Erase, .. } => {
-                self.logs.hear(LogRequest::Erase, store);
-                let erased = store.erase_logs();
-                Some(Outcome::Say(if erased { "logs erased" } else { "logs cannot be erased" }, !erased))
-            }
-            OtherRequest::Log { from, request: LogRequest::Received(sequence), .. } => {
+            OtherRequest::Received(from, sequence) => {
                 self.stream.acknowledge(from, sequence);
-                None
-            }
-            OtherRequest::Log { request, .. } => {
-                self.logs.hear(request, store);
                 None
             }
             OtherRequest::Stream(to, true) => {
@@ -231,7 +168,8 @@ impl<F: Copy> TransferRequests for Transfers<F> {
                 let packet = FilePacket::read(payload).0;
                 return self.files.push_back(FileRequest { from, packet, may_change }).is_ok();
             }
-            Uplink::Question(Question::Log(request)) => OtherRequest::Log { from, request: *request, may_change },
+            Uplink::Question(Question::Log(LogRequest::Received(sequence))) => OtherRequest::Received(from, *sequence),
+            Uplink::Question(Question::Log(_)) => return self.logs.take(from, message, payload, may_change),
             Uplink::Command(Command::RequestMessage { message, .. }) => OtherRequest::Metadata(*message),
             Uplink::Command(Command::StartLogStream) => OtherRequest::Stream(from, true),
             Uplink::Command(Command::StopLogStream) => OtherRequest::Stream(from, false),

@@ -6,7 +6,7 @@ mod memory;
 
 use afbc_link::{
     Address, Answer, Command, ComponentMetadata, Decoder, Downlink, FRAME_MAX, Fault, FileOpcode, FilePacket,
-    LogRequest, Message, MessageFormat, Question, Sender, Telemetry, Transfer, Uplink,
+    LogMessage, LogRequest, Message, MessageFormat, Question, Sender, Telemetry, Transfer, Uplink,
 };
 use afbc_onboard::{Configuration, Link, Readings, parameters::ParameterTable};
 use afbc_station::services::streams::{DEFAULTS, id};
@@ -155,7 +155,7 @@ fn requests_are_answered_in_time() {
             }
             vehicle.log(STATION, LogRequest::List { first: 0, last: 0xFFFF });
             let entry = |sent: &Sent| match sent {
-                Sent::Transfer(Transfer::LogEntry(entry)) => Some(*entry),
+                Sent::Transfer(Transfer::Log(LogMessage::Entry(entry))) => Some(*entry),
                 _ => None,
             };
             let (first, _) = vehicle.until(250, entry);
@@ -246,7 +246,7 @@ fn many_requests_at_once_are_kept() {
     }
     let sent: Vec<_> = (0..250).flat_map(|_| vehicle.step()).collect();
     let filled = sent.iter().filter_map(|sent| match sent {
-        Sent::Transfer(Transfer::LogData(part)) => Some(part.offset),
+        Sent::Transfer(Transfer::Log(LogMessage::Data(part))) => Some(part.offset),
         _ => None,
     });
     assert_eq!(filled.collect::<Vec<_>>(), gaps);

@@ -29,6 +29,8 @@ const TEXT_MAX: usize = 128;
 pub struct BlackBox {
     known: Known,
     definitions: Definitions,
+    /// Entries of the beginning, and changed parameters, that are written in a tick, at most.
+    pace: u16,
     unwritten: Unwritten,
     dropouts: Dropouts,
     /// When each topic is due \[us\].
@@ -76,12 +78,21 @@ impl BlackBox {
         BlackBox {
             known: Known::of(table.configuration()),
             definitions: Definitions::new(start),
+            pace: u16::MAX,
             unwritten: Unwritten::None,
             dropouts: Dropouts::default(),
             due_us: [0; TOPICS.len()],
             synced_us: 0,
             last: Last::default(),
         }
+    }
+
+    /// Looks at so many entries of the log's beginning in a tick, at most, one at least: formats, parameters and the
+    /// like, some hundreds in all, each looked up in the vehicle's table. So it is also with parameters that have
+    /// changed all at once. Without that it is as many as there is room for.
+    #[must_use]
+    pub fn paced(self, entries: u16) -> Self {
+        BlackBox { pace: entries.max(1), ..self }
     }
 
     /// Writes a change of the table, to be called after it.
@@ -97,7 +108,8 @@ impl BlackBox {
             // There is place for one.
             _ => Unwritten::From(0),
         };
-        if self.definitions.is_done() {
+        // All of them go at their pace.
+        if self.definitions.is_done() && matches!(self.unwritten, Unwritten::One(_)) {
             self.write_parameters(table, &mut ring.view());
         }
     }
@@ -136,7 +148,7 @@ impl BlackBox {
         let LoggedTick { report, readings, ref taken, view, escs, origin } = *tick;
         let now_us = report.time_us;
         let mut ring = ring.view();
-        self.definitions.write(now_us, table, &mut ring);
+        self.definitions.write(now_us, table, self.pace, &mut ring);
         let writes = self.definitions.is_done();
         if writes {
             self.write_parameters(table, &mut ring);
@@ -162,9 +174,9 @@ impl BlackBox {
         self.last.advance(&moment);
     }
 
-    /// Writes what has changed of the parameters, as far as there is room.
+    /// Writes what has changed of the parameters, as far as there is room, and at its pace.
     fn write_parameters<const N: usize>(&mut self, table: &ParameterTable<N>, ring: &mut RingView<'_>) {
-        loop {
+        for _ in 0..self.pace {
             let (found, next) = match self.unwritten {
                 Unwritten::None => return,
                 Unwritten::One(name) => (table.get(name), Unwritten::None),

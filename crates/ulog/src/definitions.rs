@@ -88,12 +88,19 @@ impl Definitions {
         self.part == Part::Done
     }
 
-    /// Writes what there is room for.
+    /// Writes what there is room for, of at most `pace` entries: one that needs no record counts, too.
     #[inline(never)]
-    pub(crate) fn write<const N: usize>(&mut self, now_us: u64, table: &ParameterTable<N>, ring: &mut RingView<'_>) {
-        while self.part != Part::Done {
+    pub(crate) fn write<const N: usize>(
+        &mut self,
+        now_us: u64,
+        table: &ParameterTable<N>,
+        pace: u16,
+        ring: &mut RingView<'_>,
+    ) {
+        let mut left = pace;
+        while self.part != Part::Done && left > 0 {
             match self.one(now_us, table, ring) {
-                Some(true) => self.next += 1,
+                Some(true) => (self.next, left) = (self.next + 1, left - 1),
                 Some(false) => return,
                 None => (self.part, self.next) = (self.part.after(), 0),
             }
@@ -130,7 +137,7 @@ impl Definitions {
             Part::Parameters => parameter(&table.at(self.next)?, ring),
             Part::Defaults => {
                 let parameter = table.at(self.next)?;
-                match table.default_of(parameter.name) {
+                match table.default_at(self.next) {
                     Some(default) if default.value.to_bits() != parameter.value.to_bits() => {
                         ring.record(b'Q', &mut |content| {
                             content.put(&[SYSTEM_DEFAULT]);

@@ -5,11 +5,13 @@ use rigless::chip::memory_card::MemoryCard;
 use rigless::chip::spi::Peer;
 use rigless::snapshot::{Error, Reader, Store, Writer};
 use serde::{Deserialize, Serialize};
-use std::io::Cursor;
+use std::io::{Cursor, Write};
 
 /// Blocks of the card, as its registers can tell them, and the first one of its volume.
 const BLOCKS: usize = 70 * 1024;
 const VOLUME: usize = 63;
+/// Bytes of a cluster: with one of a block, each block of a file takes seven writes of the table beside its own.
+const CLUSTER: u32 = 8 * 1024;
 /// Commands that write a block, as frames begin with them, and bytes of a frame (SD Physical Layer Simplified
 /// Specification 6.00, 7.3.1.1).
 const WRITE_BLOCK: u8 = 0x40 | 24;
@@ -58,23 +60,35 @@ pub struct CardSlot {
     written: u64,
 }
 
-/// Returns a card with an empty FAT32 in its first partition. The models' own has no partitions.
-fn formatted() -> MemoryCard {
+/// Returns a card with an empty FAT16 in its first partition, or one with so many bytes of room. The models' own has no
+/// partitions.
+fn formatted(room: Option<u64>) -> MemoryCard {
     let mut bytes = vec![0; BLOCKS * 512];
-    let options = fatfs::FormatVolumeOptions::new().fat_type(fatfs::FatType::Fat32).bytes_per_cluster(512);
+    let options = fatfs::FormatVolumeOptions::new().fat_type(fatfs::FatType::Fat16).bytes_per_cluster(CLUSTER);
     let volume = &mut Cursor::new(&mut bytes[VOLUME * 512..]);
     fatfs::format_volume(volume, options).expect("it is large enough");
-    bytes[450] = 0x0C;
+    if let Some(room) = room {
+        fill(&mut bytes[VOLUME * 512..], room).expect("it has room");
+    }
+    bytes[450] = 0x06;
     bytes[454..458].copy_from_slice(&(VOLUME as u32).to_le_bytes());
     bytes[458..462].copy_from_slice(&((BLOCKS - VOLUME) as u32).to_le_bytes());
     bytes[510..512].copy_from_slice(&[0x55, 0xAA]);
     MemoryCard::holding(&bytes)
 }
 
+/// Fills a volume with a file, up to so many bytes.
+fn fill(volume: &mut [u8], room: u64) -> std::io::Result<()> {
+    let volume = fatfs::FileSystem::new(Cursor::new(volume), fatfs::FsOptions::new())?;
+    let free = u64::from(volume.stats()?.free_clusters()) * u64::from(volume.cluster_size());
+    let mut file = volume.root_dir().create_file("OTHER.BIN")?;
+    file.write_all(&vec![0xA5; free.saturating_sub(room) as usize])
+}
+
 impl CardSlot {
     pub fn new() -> Self {
         CardSlot {
-            card: formatted(),
+            card: formatted(None),
             trouble: CardTrouble::default(),
             heard: Heard::Nothing,
             busy_until_ns: 0,
@@ -85,6 +99,11 @@ impl CardSlot {
 
     pub fn trouble(&mut self, trouble: CardTrouble) {
         self.trouble = trouble;
+    }
+
+    /// Leaves so many bytes of room.
+    pub fn fill(&mut self, room: u64) {
+        self.card = formatted(Some(room));
     }
 
     pub fn card(&self) -> &MemoryCard {

@@ -1,7 +1,9 @@
 //! Logs: LOG_ENTRY and LOG_DATA with their contents.
 
-use crate::message::PAYLOAD_MAX;
+use crate::address::Address;
+use crate::message::{Fault, Message, MessageFormat, PAYLOAD_MAX};
 use crate::wire::Layout;
+use mavlink::MessageData;
 use mavlink::dialects::common::{LOG_DATA_DATA, LOG_ENTRY_DATA};
 
 /// Most bytes in one LOG_DATA.
@@ -59,5 +61,40 @@ impl LogData {
 
     pub(super) fn write(&self, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
         DATA.write(&(self.offset, self.log, self.count, self.data), payload)
+    }
+}
+
+/// A message about logs: what a vehicle sends that has logs and no other files.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[allow(clippy::large_enum_variant, reason = "one at a time")]
+pub enum LogMessage {
+    /// One of the logs.
+    Entry(LogEntry),
+    /// A part of one.
+    Data(LogData),
+}
+
+impl Message for LogMessage {
+    fn format(id: u32) -> Option<MessageFormat> {
+        match id {
+            LOG_ENTRY_DATA::ID => Some(ENTRY.format()),
+            LOG_DATA_DATA::ID => Some(DATA.format()),
+            _ => None,
+        }
+    }
+
+    fn read(id: u32, payload: &[u8], _: Address) -> Result<Self, Fault> {
+        match id {
+            LOG_ENTRY_DATA::ID => Ok(LogMessage::Entry(LogEntry::read(payload))),
+            LOG_DATA_DATA::ID => Ok(LogMessage::Data(LogData::read(payload))),
+            _ => Err(Fault::Unknown),
+        }
+    }
+
+    fn write(&self, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
+        match self {
+            LogMessage::Entry(entry) => entry.write(payload),
+            LogMessage::Data(data) => data.write(payload),
+        }
     }
 }

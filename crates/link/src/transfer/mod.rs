@@ -11,7 +11,7 @@ use crate::address::Address;
 use crate::message::{Fault, Message, MessageFormat, PAYLOAD_MAX};
 pub use component::ComponentMetadata;
 pub use file::{FILE_DATA_MAX, FileOpcode, FilePacket};
-pub use log::{LOG_DATA_MAX, LogData, LogEntry};
+pub use log::{LOG_DATA_MAX, LogData, LogEntry, LogMessage};
 use mavlink::MessageData;
 use mavlink::dialects::common::{
     COMPONENT_INFORMATION_DATA, COMPONENT_METADATA_DATA, FILE_TRANSFER_PROTOCOL_DATA, LOG_DATA_DATA, LOG_ENTRY_DATA,
@@ -30,10 +30,8 @@ pub enum Transfer {
         /// Who asked.
         to: Address,
     },
-    /// LOG_ENTRY (118).
-    LogEntry(LogEntry),
-    /// LOG_DATA (120).
-    LogData(LogData),
+    /// LOG_ENTRY (118) or LOG_DATA (120).
+    Log(LogMessage),
     /// LOGGING_DATA (266) or LOGGING_DATA_ACKED (267).
     LogPart(StreamedLog),
     /// COMPONENT_METADATA (397).
@@ -46,8 +44,7 @@ impl Message for Transfer {
     fn format(id: u32) -> Option<MessageFormat> {
         Some(match id {
             FILE_TRANSFER_PROTOCOL_DATA::ID => file::LAYOUT.format(),
-            LOG_ENTRY_DATA::ID => log::ENTRY.format(),
-            LOG_DATA_DATA::ID => log::DATA.format(),
+            LOG_ENTRY_DATA::ID | LOG_DATA_DATA::ID => return LogMessage::format(id),
             LOGGING_DATA_DATA::ID => stream::SENT.format(),
             LOGGING_DATA_ACKED_DATA::ID => stream::ACKED.format(),
             COMPONENT_METADATA_DATA::ID => component::METADATA.format(),
@@ -56,14 +53,13 @@ impl Message for Transfer {
         })
     }
 
-    fn read(id: u32, payload: &[u8], _: Address) -> Result<Self, Fault> {
+    fn read(id: u32, payload: &[u8], receiver: Address) -> Result<Self, Fault> {
         Ok(match id {
             FILE_TRANSFER_PROTOCOL_DATA::ID => {
                 let (packet, to) = FilePacket::read(payload);
                 Transfer::File { packet, to }
             }
-            LOG_ENTRY_DATA::ID => Transfer::LogEntry(LogEntry::read(payload)),
-            LOG_DATA_DATA::ID => Transfer::LogData(LogData::read(payload)),
+            LOG_ENTRY_DATA::ID | LOG_DATA_DATA::ID => Transfer::Log(LogMessage::read(id, payload, receiver)?),
             LOGGING_DATA_DATA::ID => Transfer::LogPart(StreamedLog::read(payload, false)),
             LOGGING_DATA_ACKED_DATA::ID => Transfer::LogPart(StreamedLog::read(payload, true)),
             COMPONENT_METADATA_DATA::ID => Transfer::Metadata(ComponentMetadata::read(payload)),
@@ -75,8 +71,7 @@ impl Message for Transfer {
     fn write(&self, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
         match self {
             Transfer::File { packet, to } => packet.write(*to, payload),
-            Transfer::LogEntry(entry) => entry.write(payload),
-            Transfer::LogData(data) => data.write(payload),
+            Transfer::Log(message) => message.write(payload),
             Transfer::LogPart(part) => part.write(payload),
             Transfer::Metadata(metadata) => metadata.write(payload),
             Transfer::Information(metadata) => metadata.write_information(payload),

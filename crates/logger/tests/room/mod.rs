@@ -1,10 +1,14 @@
 //! A vehicle, a queue of blocks, a task that waits for its card, and a card in memory: all in the time of the card.
+#![allow(dead_code, reason = "shared by tests")]
 
 pub(crate) mod ulog;
 
 use afbc_estimator::Measurement;
 use afbc_logger::embedded_sdmmc::Block;
-use afbc_logger::{BlockSink, CardError, CardState, LogBlock, LogCard, LogKeeper, LogMode, LogWriter};
+use afbc_logger::{
+    BlockSink, CardError, CardLogs, CardState, LogBlock, LogCard, LogKeeper, LogMode, LogPage, LogPages, LogQuery,
+    LogWriter,
+};
 use afbc_onboard::parameters::{ParameterTable, RecordChange};
 use afbc_onboard::{Aged, Configuration, ControlInputs, Flight, Readings};
 use afbc_store::RecordName;
@@ -183,8 +187,42 @@ impl BlockSink for Queue {
     }
 }
 
+/// The page between the tasks, and what is asked.
+struct Between {
+    page: LogPage,
+    is_full: bool,
+    asked: LogQuery,
+}
+
+/// The links' task's end of it.
+pub(crate) struct Pages {
+    between: Rc<RefCell<Between>>,
+    page: LogPage,
+}
+
+impl LogPages for Pages {
+    fn page(&mut self) -> Option<&LogPage> {
+        let between = self.between.borrow();
+        if between.is_full {
+            self.page = between.page.clone();
+        }
+        between.is_full.then_some(&self.page)
+    }
+
+    fn done(&mut self) {
+        self.between.borrow_mut().is_full = false;
+    }
+
+    fn ask(&mut self, query: LogQuery) {
+        self.between.borrow_mut().asked = query;
+    }
+}
+
 /// A vehicle that logs.
 pub(crate) struct Room {
+    between: Rc<RefCell<Between>>,
+    pub(crate) stored: CardLogs<Pages>,
+
     pub(crate) card: Card,
     pub(crate) keeper: LogKeeper<'static>,
     pub(crate) writer: LogWriter,
@@ -207,7 +245,12 @@ impl Room {
     pub(crate) fn new(card: &Card) -> Self {
         let configuration = Configuration::default();
         let keeper = LogKeeper::new(Box::leak(Box::new(card.clone())));
+        let between = Between { page: LogPage::EMPTY, is_full: false, asked: LogQuery::Nothing };
+        let between = Rc::new(RefCell::new(between));
+        let stored = CardLogs::new(Pages { between: between.clone(), page: LogPage::EMPTY });
         Room {
+            between,
+            stored,
             card: card.clone(),
             keeper,
             writer: LogWriter::new(),
@@ -266,6 +309,15 @@ impl Room {
             match self.queue.filled.pop_front() {
                 Some(block) => self.keeper.take(began_us, &block),
                 None => self.keeper.poll(began_us),
+            }
+            {
+                let mut between = self.between.borrow_mut();
+                let is_free = !between.is_full && self.queue.filled.is_empty();
+                if between.asked != LogQuery::Nothing && is_free {
+                    let query = std::mem::take(&mut between.asked);
+                    self.keeper.answer(began_us, query, &mut between.page);
+                    between.is_full = true;
+                }
             }
             let took_us = self.card.0.borrow().taken_us;
             // Without a block, it looks again in the next tick.

@@ -54,6 +54,11 @@ impl<const N: usize> ParameterTable<N> {
         self.image.parameter(Key::Name(name))
     }
 
+    /// Returns the parameter at `place` as the image has it.
+    pub fn default_at(&self, place: u16) -> Option<Parameter> {
+        self.image.parameter(Key::Place(place))
+    }
+
     /// Shows the declaration of every parameter, in the order of [`iter`](Self::iter), with the words of a choice or a
     /// switch, from the smallest number of its range on.
     pub fn show_declarations(&self, mut show: impl FnMut(&Declaration, &'static [&'static str])) {

@@ -1,6 +1,7 @@
 //! What the services of files and logs need of storage: a shell implements it.
 
 use afbc_link::{FILE_DATA_MAX, FtpError};
+use core::task::Poll;
 use heapless::String;
 
 /// Longest name of a file or directory that is listed \[bytes\].
@@ -126,18 +127,21 @@ pub struct LogInfo {
 }
 
 /// Logs, each at a place that it keeps until they are counted again.
+///
+/// Storage that has to be waited for answers [`Poll::Pending`], and is asked for the same again a little later, until
+/// it answers or something else is asked for.
 pub trait LogStore {
     /// Counts the logs.
-    fn count_logs(&mut self) -> u16;
+    fn count_logs(&mut self) -> Poll<u16>;
 
     /// Returns what is known of the log at a place.
-    fn log(&mut self, place: u16) -> Option<LogInfo>;
+    fn log(&mut self, place: u16) -> Poll<Option<LogInfo>>;
 
     /// Reads from `offset` on as much as there is and fits; returns how much.
-    fn read_log(&mut self, place: u16, offset: u32, into: &mut [u8]) -> usize;
+    fn read_log(&mut self, place: u16, offset: u32, into: &mut [u8]) -> Poll<usize>;
 
     /// Erases all logs but one that is being written; false if it cannot.
-    fn erase_logs(&mut self) -> bool;
+    fn erase_logs(&mut self) -> Poll<bool>;
 }
 
 /// The black box's log, made while it is sent. A vehicle that has none keeps the methods as they are.

@@ -6,6 +6,7 @@ use afbc_station::services::storage::{
     DirectoryEntry, FileAccess, FileChange, FilePath, FileStore, LogInfo, LogSource, LogStore,
 };
 use std::collections::{BTreeMap, BTreeSet};
+use std::task::Poll;
 
 /// A store of files, all of which may be changed, and of logs.
 #[derive(Default)]
@@ -20,6 +21,9 @@ pub struct Memory {
     pub makes: bool,
     /// Changes carried out.
     pub changes: usize,
+    /// Times that whoever asks for something of a log has to ask again, and how often somebody has asked.
+    pub slow: u32,
+    pub asked: u32,
 }
 
 fn is_in(path: &str, directory: &str) -> bool {
@@ -48,6 +52,12 @@ impl Memory {
             memory.files.insert((*path).into(), bytes.clone());
         }
         memory
+    }
+
+    /// True if what is asked for of a log is not there yet.
+    fn not_yet(&mut self) -> bool {
+        self.asked += 1;
+        !self.asked.is_multiple_of(self.slow + 1)
     }
 
     pub fn open_count(&self) -> usize {
@@ -149,26 +159,33 @@ impl FileStore for Memory {
 }
 
 impl LogStore for Memory {
-    fn count_logs(&mut self) -> u16 {
-        self.logs.len() as u16
+    fn count_logs(&mut self) -> Poll<u16> {
+        if self.not_yet() { Poll::Pending } else { Poll::Ready(self.logs.len() as u16) }
     }
 
-    fn log(&mut self, place: u16) -> Option<LogInfo> {
-        let size = self.logs.get(usize::from(place))?.len() as u32;
-        Some(LogInfo { size, utc_s: 1_700_000_000 + u32::from(place) })
+    fn log(&mut self, place: u16) -> Poll<Option<LogInfo>> {
+        let size = self.logs.get(usize::from(place)).map(|log| log.len() as u32);
+        let info = size.map(|size| LogInfo { size, utc_s: 1_700_000_000 + u32::from(place) });
+        if self.not_yet() { Poll::Pending } else { Poll::Ready(info) }
     }
 
-    fn read_log(&mut self, place: u16, offset: u32, into: &mut [u8]) -> usize {
+    fn read_log(&mut self, place: u16, offset: u32, into: &mut [u8]) -> Poll<usize> {
+        if self.not_yet() {
+            return Poll::Pending;
+        }
         let bytes = self.logs.get(usize::from(place)).and_then(|bytes| bytes.get(offset as usize..));
         let bytes = bytes.unwrap_or_default();
         let count = bytes.len().min(into.len());
         into[..count].copy_from_slice(&bytes[..count]);
-        count
+        Poll::Ready(count)
     }
 
-    fn erase_logs(&mut self) -> bool {
+    fn erase_logs(&mut self) -> Poll<bool> {
+        if self.not_yet() {
+            return Poll::Pending;
+        }
         self.logs.clear();
-        true
+        Poll::Ready(true)
     }
 }
 
