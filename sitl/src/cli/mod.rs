@@ -25,6 +25,7 @@ mod replay;
 mod results;
 mod scenarios;
 mod serve;
+mod shell;
 mod suite;
 mod target;
 mod terminal;
@@ -75,6 +76,8 @@ enum Command {
     Pil(pil::Pil),
     Hitl(hitl::Hitl),
     BringUp(bring_up::BringUp),
+    Completions(shell::Completions),
+    Man(shell::Man),
 }
 
 impl Cli {
@@ -100,6 +103,8 @@ impl Cli {
             Command::Pil(pil) => pil.run(),
             Command::Hitl(hitl) => hitl.run(),
             Command::BringUp(bring_up) => bring_up.run(),
+            Command::Completions(completions) => completions.run(),
+            Command::Man(man) => man.run(),
         }
     }
 }
