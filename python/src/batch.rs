@@ -6,7 +6,7 @@ use crate::scenario::{ScenarioArgument, changed};
 use crate::vehicle::VehicleArgument;
 use afbc_scenario::Scenario;
 use afbc_sim::flight::{View, World};
-use numpy::{PyArray2, PyArrayMethods, PyReadonlyArray2};
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2};
 use pyo3::prelude::*;
 use rayon::prelude::*;
 
@@ -36,7 +36,7 @@ impl PyBatch {
         row: impl Fn(&(World, View)) -> Vec<f64>,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let numbers: Vec<f64> = self.worlds.iter().flat_map(row).collect();
-        numpy::PyArray1::from_vec(py, numbers).reshape([self.worlds.len(), width])
+        PyArray1::from_vec(py, numbers).reshape([self.worlds.len(), width])
     }
 }
 
@@ -98,8 +98,8 @@ impl PyBatch {
 
     /// Time of each vehicle [s], shape (count,).
     #[getter]
-    fn time_s<'py>(&self, py: Python<'py>) -> Bound<'py, numpy::PyArray1<f64>> {
-        numpy::PyArray1::from_iter(py, self.worlds.iter().map(|(_, view)| view.time_s))
+    fn time_s<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_iter(py, self.worlds.iter().map(|(_, view)| view.time_s))
     }
 
     /// What reaches the controllers, shape (count, 12): position, velocity, attitude, rates; NaN in an outage.

@@ -3,15 +3,18 @@
 use crate::error::error;
 use crate::motion::{PySetpoint, PyState};
 use crate::vehicle::VehicleArgument;
-use afbc::Profile;
+use afbc::{AdaptiveEstimate, Profile};
 use afbc_control::{Action, FlightController, Trace, Validated};
 use afbc_scenario::contender::{Contender, ControllerKind};
 use afbc_scenario::{AnyController, AnyControllerMemory};
-use afbc_types::{Axis, Declaration, Declared, Inputs, PLUS, Parameters, ROTORS_MAX, Value, with_rotors};
+use afbc_types::{
+    Axis, Declaration, Declared, Inputs, PLUS, Parameters, PerAxis, ROTORS_MAX, Value, ValueMut, with_rotors,
+};
 use core::convert::Infallible;
 use numpy::{PyArray1, ToPyArray};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use std::sync::{Mutex, PoisonError};
 
 /// What a step decided.
 #[pyclass(name = "Action", module = "afbc", frozen)]
@@ -74,17 +77,18 @@ trait AnyRotors: Send + Sync {
     fn step(&mut self, state: Option<&PyState>, setpoint: &PySetpoint) -> Action<ROTORS_MAX>;
     fn reset(&mut self);
     fn trace(&self) -> Trace;
-    fn memory(&self) -> Option<afbc_types::PerAxis<afbc::AdaptiveEstimate>>;
+    fn estimates(&self) -> Option<PerAxis<AdaptiveEstimate>>;
 }
 
 struct OfRotors<const N: usize> {
-    controller: std::sync::Mutex<AnyController<N>>,
+    /// A law of one's own is not shared between threads.
+    controller: Mutex<AnyController<N>>,
     memory: Validated<AnyControllerMemory<N>>,
 }
 
 impl<const N: usize> AnyRotors for OfRotors<N> {
     fn step(&mut self, state: Option<&PyState>, setpoint: &PySetpoint) -> Action<ROTORS_MAX> {
-        let controller = self.controller.get_mut().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let controller = self.controller.get_mut().unwrap_or_else(PoisonError::into_inner);
         controller.step(&mut self.memory, state.map(|state| &state.0), &setpoint.0).padded()
     }
 
@@ -96,7 +100,7 @@ impl<const N: usize> AnyRotors for OfRotors<N> {
         AnyController::<N>::trace(&self.memory.control)
     }
 
-    fn memory(&self) -> Option<afbc_types::PerAxis<afbc::AdaptiveEstimate>> {
+    fn estimates(&self) -> Option<PerAxis<AdaptiveEstimate>> {
         self.memory.control.estimates()
     }
 }
@@ -145,7 +149,7 @@ impl PyController {
         let law: Box<dyn AnyRotors> = with_rotors!(rotors.len(), N => {
             let controller = contender.controller::<N>(&parameters, &rotors).map_err(error)?;
             Ok::<Box<dyn AnyRotors>, PyErr>(Box::new(OfRotors {
-                controller: std::sync::Mutex::new(controller),
+                controller: Mutex::new(controller),
                 memory: Validated::default(),
             }))
         })?;
@@ -193,7 +197,7 @@ impl PyController {
         dict.set_item("inputs_n", inputs(py, &trace.inputs))?;
         dict.set_item("virtual_m_s2", trace.virtual_m_s2.map(f64::from).to_pyarray(py))?;
         dict.set_item("desired_rad", trace.desired_rad.map(f64::from).to_pyarray(py))?;
-        let estimates = self.law.memory();
+        let estimates = self.law.estimates();
         for axis in Axis::ALL {
             let errors = &trace.errors[axis];
             dict.set_item(format!("{}.e1", axis.name()), errors.e1)?;
@@ -230,8 +234,8 @@ fn full(declaration: &Declaration) -> String {
 /// Sets a gain by name.
 fn set(contender: &mut Contender, name: &str, value: f64) -> PyResult<()> {
     let (mut found, mut known) = (false, Vec::new());
-    let Ok(()) = contender.law.visit_mut(&mut |declaration: &Declaration, of: afbc_types::ValueMut<'_>| {
-        if let afbc_types::ValueMut::Single([gain]) = of {
+    let Ok(()) = contender.law.visit_mut(&mut |declaration: &Declaration, of: ValueMut<'_>| {
+        if let ValueMut::Single([gain]) = of {
             if full(declaration) == name {
                 *gain = value as f32;
                 found = true;

@@ -107,6 +107,9 @@ impl PyOwnVehicle {
     }
 }
 
+/// Default, smallest and largest value of a gain.
+type Ranged = (f64, f64, f64);
+
 /// A Python object that flies.
 struct PythonLaw(Option<Py<PyAny>>);
 
@@ -150,7 +153,7 @@ pub(crate) fn register(
     name: &str,
     make: Py<PyAny>,
     title: Option<&str>,
-    gains: Option<Vec<(String, (f64, f64, f64))>>,
+    gains: Option<Vec<(String, Ranged)>>,
 ) -> PyResult<()> {
     let gains = gains.unwrap_or_default();
     let names: Vec<&'static str> = gains.iter().map(|(name, _)| kept(name)).collect();

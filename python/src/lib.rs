@@ -7,6 +7,7 @@ mod batch;
 mod campaign;
 mod controller;
 mod error;
+mod estimator;
 mod flight;
 mod law;
 mod motion;
@@ -33,6 +34,7 @@ fn _afbc(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<plant::PyPlant>()?;
     module.add_class::<batch::PyBatch>()?;
     module.add_class::<law::PyOwnVehicle>()?;
+    module.add_class::<estimator::PyEstimator>()?;
     for function in [
         wrap_pyfunction!(flight::fly, module)?,
         wrap_pyfunction!(flight::compare, module)?,

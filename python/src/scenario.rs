@@ -18,6 +18,9 @@ use std::path::PathBuf;
 #[pyclass(name = "Scenario", module = "afbc", frozen)]
 pub(crate) struct PyScenario(pub(crate) Scenario);
 
+/// Start and length [s] of a piece of a path, and its coefficients.
+type Piece<'py> = (f64, f64, Bound<'py, PyArray2<f64>>);
+
 /// A scenario, or what names one.
 #[derive(FromPyObject)]
 pub(crate) enum ScenarioArgument<'py> {
@@ -119,7 +122,7 @@ impl PyScenario {
     /// The polynomials of a path of minimum snap, or of one from a file: for each piece its start [s], its length [s] and
     /// the coefficients of x, y, z, yaw, lowest power first, over the time since its start. None for other trajectories.
     #[getter]
-    fn polynomials<'py>(&self, py: Python<'py>) -> PyResult<Option<Vec<(f64, f64, Bound<'py, PyArray2<f64>>)>>> {
+    fn polynomials<'py>(&self, py: Python<'py>) -> PyResult<Option<Vec<Piece<'py>>>> {
         let Trajectory::Polynomials(pieces) = &self.0.trajectory else { return Ok(None) };
         let piece = |piece: &PolynomialPiece| {
             let coefficients: Vec<f64> = piece.coefficients.iter().flatten().copied().collect();

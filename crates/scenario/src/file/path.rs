@@ -101,7 +101,8 @@ impl Lines<'_> {
         let time = need(&["time_s"])?;
         let mut samples = PathSamples { time_s: self.column(rows, time, head)?, ..PathSamples::default() };
         let later = samples.time_s.iter().zip(rows).skip(1);
-        for (before, (time_s, row)) in samples.time_s.iter().zip(later).filter(|(before, (time_s, _))| before >= time_s)
+        if let Some((before, (time_s, row))) =
+            samples.time_s.iter().zip(later).find(|(before, (time_s, _))| before >= time_s)
         {
             return Err(self.fault(row, "time_s", format!("{time_s} is not after {before}; make times rise")));
         }

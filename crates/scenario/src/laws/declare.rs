@@ -71,7 +71,6 @@ macro_rules! laws {
 
         /// A control law with its gains.
         #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
-        #[expect(clippy::large_enum_variant, reason = "a law flies with its controller; this is copied before")]
         pub enum Law {
             $( #[doc = concat!("See [`ControllerKind::", stringify!($Law), "`].")] $Law($Gains), )*
             /// See [`ControllerKind::Own`].

@@ -4,9 +4,10 @@
 //! The integral of the squared snap over given times is least for pieces of degree seven with six continuous
 //! derivatives at the waypoints, at rest at both ends. Unknown are velocity, acceleration and jerk at the waypoints
 //! between; the continuity of the fourth to sixth derivative makes a block-tridiagonal system of them.
+#![allow(clippy::indexing_slicing, reason = "coordinates of four, derivatives of three")]
 
 use super::polynomial::{COEFFICIENTS, PolynomialPiece, peaks};
-use nalgebra::{Matrix3, SMatrix};
+use nalgebra::{Matrix3, SMatrix, Vector3};
 
 /// A matrix with a column for each of x, y, z, yaw, and a row for each of velocity, acceleration, jerk.
 type Unknown = SMatrix<f64, 3, 4>;
@@ -117,8 +118,8 @@ fn between(places: &[Place], durations_s: &[f64]) -> Option<Vec<Unknown>> {
         let (right_place, right_own, right_other) = ends(right_t);
         let mut wanted = Unknown::zeros();
         for axis in 0..4 {
-            let left = nalgebra::Vector3::from(left_place) * (before[axis] - place[axis]);
-            let right = nalgebra::Vector3::from(right_place) * (after[axis] - place[axis]);
+            let left = Vector3::from(left_place) * (before[axis] - place[axis]);
+            let right = Vector3::from(right_place) * (after[axis] - place[axis]);
             wanted.set_column(axis, &(even * left - right));
         }
         let (lower, own, upper) = (-even * left_other * odd, right_own - even * left_own * odd, right_other);

@@ -22,17 +22,15 @@ pub struct PolynomialPiece {
 
 /// Value and four derivatives of a polynomial at `s`, by Horner's rule.
 pub fn derivatives(coefficients: &Coefficients, s: f64) -> [f64; 5] {
-    let mut value = [0.0; 5];
+    let [mut value, mut first, mut second, mut third, mut fourth] = [0.0; 5];
     for coefficient in coefficients.iter().rev() {
-        for order in (1..5).rev() {
-            if let [lower, higher] = &mut value[order - 1..=order] {
-                *higher = *higher * s + *lower;
-            }
-        }
-        value[0] = value[0] * s + coefficient;
+        fourth = fourth * s + third;
+        third = third * s + second;
+        second = second * s + first;
+        first = first * s + value;
+        value = value * s + coefficient;
     }
-    // Horner's rule gives the Taylor coefficients.
-    let [value, first, second, third, fourth] = value;
+    // Horner's rule gives the coefficients about s.
     [value, first, 2.0 * second, 6.0 * third, 24.0 * fourth]
 }
 
@@ -46,16 +44,17 @@ impl PolynomialPiece {
     pub fn at(&self, t: f64) -> Reference {
         let s = (t - self.start_s).clamp(0.0, self.duration_s);
         let [x, y, z, yaw] = self.coefficients.each_ref().map(|coefficients| derivatives(coefficients, s));
-        let part = |order: usize| Vector3::new(x[order], y[order], z[order]);
+        let ([x, vx, ax, jx, sx], [y, vy, ay, jy, sy], [z, vz, az, jz, sz]) = (x, y, z);
+        let [yaw_rad, yaw_rate_rad_s, yaw_acceleration_rad_s2, ..] = yaw;
         Reference {
-            position_m: part(0),
-            velocity_m_s: part(1),
-            acceleration_m_s2: part(2),
-            jerk_m_s3: part(3),
-            snap_m_s4: part(4),
-            yaw_rad: yaw[0],
-            yaw_rate_rad_s: yaw[1],
-            yaw_acceleration_rad_s2: yaw[2],
+            position_m: Vector3::new(x, y, z),
+            velocity_m_s: Vector3::new(vx, vy, vz),
+            acceleration_m_s2: Vector3::new(ax, ay, az),
+            jerk_m_s3: Vector3::new(jx, jy, jz),
+            snap_m_s4: Vector3::new(sx, sy, sz),
+            yaw_rad,
+            yaw_rate_rad_s,
+            yaw_acceleration_rad_s2,
         }
     }
 }
