@@ -1,6 +1,7 @@
 //! The beginning of a log, and parameters that change all at once, at a pace: few records of each tick.
-#![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs, reason = "tests")]
+#![allow(clippy::unwrap_used, clippy::indexing_slicing, clippy::panic, missing_docs, reason = "tests")]
 
+#[allow(dead_code, reason = "other tests need the rest")]
 mod strict;
 
 use afbc_onboard::parameters::{ParameterTable, RecordChange};
