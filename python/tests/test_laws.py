@@ -173,14 +173,16 @@ def test_implausible_input_is_reported_not_flown():
 
 
 def test_ctrl_c_ends_long_work(tmp_path):
-    def interrupt():
-        signal.raise_signal(signal.SIGINT)
-
-    timer = threading.Timer(0.5, interrupt)
+    # A process in the background of a shell ignores it.
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    timer = threading.Timer(0.5, lambda: signal.raise_signal(signal.SIGINT))
     timer.start()
-    with pytest.raises(KeyboardInterrupt):
-        afbc.campaign("robustness", out=tmp_path / "out")
-    timer.cancel()
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            afbc.campaign("robustness", out=tmp_path / "out")
+    finally:
+        timer.cancel()
+        signal.signal(signal.SIGINT, before)
 
 
 def test_other_threads_run_meanwhile():
