@@ -45,7 +45,9 @@ fn scenario_file(text: &str) -> Result<String, String> {
     let added = if text.contains("[trajectory]") { "" } else { hover };
     let alone = text.contains("[instruments.") && !text.contains("[instruments.imu");
     let imu = if alone { "\n[instruments.imu]\n" } else { "" };
-    let scenario = afbc_scenario::parse("f", &format!("{text}{added}{imu}"), "f").map_err(|error| error.to_string())?;
+    // Beside the path that an example names.
+    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../scenario/tests/f");
+    let scenario = afbc_scenario::parse(file, &format!("{text}{added}{imu}"), "f").map_err(|error| error.to_string())?;
     Ok(fingerprint(&of(scenario)))
 }
 

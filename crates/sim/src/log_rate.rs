@@ -27,7 +27,7 @@ impl FromStr for LogRate {
 }
 
 impl LogRate {
-    /// Returns 100 Hz, or the largest lower rate with at most [`PLENTY`] rows in `duration_s`.
+    /// Returns 100 Hz, or the largest lower rate with at most 60,000 rows in `duration_s`.
     pub fn usual(duration_s: f64) -> Self {
         let fits = |hz: &u16| f64::from(*hz) * duration_s <= PLENTY;
         LogRate(USUAL.into_iter().find(fits).unwrap_or(1))
