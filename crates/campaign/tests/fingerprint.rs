@@ -47,7 +47,8 @@ fn scenario_file(text: &str) -> Result<String, String> {
     let imu = if alone { "\n[instruments.imu]\n" } else { "" };
     // Beside the path that an example names.
     let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../scenario/tests/f");
-    let scenario = afbc_scenario::parse(file, &format!("{text}{added}{imu}"), "f").map_err(|error| error.to_string())?;
+    let scenario =
+        afbc_scenario::parse(file, &format!("{text}{added}{imu}"), "f").map_err(|error| error.to_string())?;
     Ok(fingerprint(&of(scenario)))
 }
 
