@@ -2,7 +2,7 @@
 
 use super::motion::POSITION;
 use super::path;
-use crate::trajectory::minimum_snap::{PaceLimits, Place, minimum_snap};
+use crate::trajectory::minimum_snap::{FlatOutput, PaceLimits, minimum_snap};
 use crate::trajectory::polynomial::peaks;
 use crate::trajectory::{Sine, Trajectory, Waypoint};
 use afbc_reader::{FileError, Table};
@@ -188,7 +188,7 @@ fn through_places(table: &mut Table<'_>) -> Result<Trajectory, FileError> {
         speed_m_s: table.need_number(&SPEED_MAX)?,
         acceleration_m_s2: table.need_number(&ACCELERATION_MAX)?,
     };
-    let mut places: Vec<Place> = Vec::new();
+    let mut places: Vec<FlatOutput> = Vec::new();
     for mut table in table.few_tables("waypoint")? {
         let position_m = table.need_vector("position_m", &POSITION)?;
         let place = [position_m.x, position_m.y, position_m.z, yaw(&mut table)?];

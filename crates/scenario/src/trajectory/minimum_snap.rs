@@ -12,8 +12,8 @@ use nalgebra::{Matrix3, SMatrix, Vector3};
 /// A matrix with a column for each of x, y, z, yaw, and a row for each of velocity, acceleration, jerk.
 type Unknown = SMatrix<f64, 3, 4>;
 
-/// A waypoint without a time: x, y, z \[m\] and yaw \[rad\].
-pub type Place = [f64; 4];
+/// A quadrotor's flat output, a waypoint without a time: x, y, z \[m\] and yaw \[rad\].
+pub type FlatOutput = [f64; 4];
 
 /// Largest speed and acceleration that a path may ask for.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -26,9 +26,9 @@ pub struct PaceLimits {
 
 /// Returns the motion through `places` from rest at `start_s` to rest, as fast as one scale of all times allows within
 /// `limits`; none if two places that follow each other are one, or there are fewer than two.
-pub fn minimum_snap(places: &[Place], start_s: f64, limits: PaceLimits) -> Option<Vec<PolynomialPiece>> {
+pub fn minimum_snap(places: &[FlatOutput], start_s: f64, limits: PaceLimits) -> Option<Vec<PolynomialPiece>> {
     let legs = || places.iter().zip(places.iter().skip(1));
-    let length = |(a, b): (&Place, &Place)| {
+    let length = |(a, b): (&FlatOutput, &FlatOutput)| {
         let [x, y, z] = [0, 1, 2].map(|i| b[i] - a[i]);
         libm::sqrt(x * x + y * y + z * z)
     };
@@ -48,7 +48,7 @@ pub fn minimum_snap(places: &[Place], start_s: f64, limits: PaceLimits) -> Optio
 }
 
 /// Returns the motion through `places` in these times; none if they are too different for the arithmetic.
-fn timed(places: &[Place], durations_s: &[f64], start_s: f64) -> Option<Vec<PolynomialPiece>> {
+fn timed(places: &[FlatOutput], durations_s: &[f64], start_s: f64) -> Option<Vec<PolynomialPiece>> {
     let between = between(places, durations_s)?;
     let rest = Unknown::zeros();
     let knots: Vec<&Unknown> = core::iter::once(&rest).chain(&between).chain([&rest]).collect();
@@ -106,7 +106,7 @@ fn ends(t: f64) -> ([f64; 3], Matrix3<f64>, Matrix3<f64>) {
 }
 
 /// Solves for velocity, acceleration and jerk at the places between: Thomas' algorithm on blocks.
-fn between(places: &[Place], durations_s: &[f64]) -> Option<Vec<Unknown>> {
+fn between(places: &[FlatOutput], durations_s: &[f64]) -> Option<Vec<Unknown>> {
     // Time reversed, odd derivatives change their sign: of unknowns (1, 2, 3) and of equations (4, 5, 6).
     let odd = Matrix3::from_diagonal(&[-1.0, 1.0, -1.0].into());
     let even = Matrix3::from_diagonal(&[1.0, -1.0, 1.0].into());
