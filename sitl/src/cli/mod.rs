@@ -33,7 +33,7 @@ mod tune;
 mod vehicle;
 mod written;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 use std::process::ExitCode;
 use terminal::Failure;
 
@@ -103,8 +103,8 @@ impl Cli {
             Command::Pil(pil) => pil.run(),
             Command::Hitl(hitl) => hitl.run(),
             Command::BringUp(bring_up) => bring_up.run(),
-            Command::Completions(completions) => completions.run(),
-            Command::Man(man) => man.run(),
+            Command::Completions(completions) => completions.run(Self::command()),
+            Command::Man(man) => man.run(Self::command()),
         }
     }
 }

@@ -1,8 +1,7 @@
 //! `sitl completions` and `sitl man`: what a shell and a reader of manuals want.
 
-use super::Cli;
 use super::terminal::{Failure, print};
-use clap::{Args, CommandFactory};
+use clap::{Args, Command};
 use clap_complete::Shell;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -21,10 +20,10 @@ pub(crate) struct Completions {
 }
 
 impl Completions {
-    /// Prints the script.
-    pub(super) fn run(self) -> Result<ExitCode, Failure> {
+    /// Prints the script for the whole command line.
+    pub(super) fn run(self, mut program: Command) -> Result<ExitCode, Failure> {
         let mut script = Vec::new();
-        clap_complete::generate(self.shell, &mut Cli::command(), NAME, &mut script);
+        clap_complete::generate(self.shell, &mut program, NAME, &mut script);
         print(&String::from_utf8(script)?)?;
         Ok(ExitCode::SUCCESS)
     }
@@ -41,14 +40,14 @@ pub(crate) struct Man {
 }
 
 impl Man {
-    /// Writes the pages.
-    pub(super) fn run(self) -> Result<ExitCode, Failure> {
+    /// Writes the pages of the whole command line.
+    pub(super) fn run(self, program: Command) -> Result<ExitCode, Failure> {
         let Man { folder } = self;
         let failed = |problem: &dyn std::fmt::Display| format!("{}: {problem}; name a folder", folder.display());
         if !folder.is_dir() {
             return Err(failed(&"no such folder").into());
         }
-        clap_mangen::generate_to(Cli::command(), &folder).map_err(|error| failed(&error))?;
+        clap_mangen::generate_to(program, &folder).map_err(|error| failed(&error))?;
         print(&format!("{}\n", folder.join("sitl.1").display()))?;
         Ok(ExitCode::SUCCESS)
     }
