@@ -256,7 +256,8 @@ const BAD_FILES: [(&str, &str); 28] = [
     (
         "[trajectory]\nkind = \"spiral\"",
         ":2: trajectory.kind: \"spiral\" is unknown; \
-         it must be \"paper\", \"hover\", \"step\", \"circle\", \"lemniscate\", \"lissajous\" or \"waypoints\"",
+         it must be \"paper\", \"hover\", \"step\", \"circle\", \"lemniscate\", \"lissajous\", \
+         \"waypoints\", \"minimum-snap\" or \"file\"",
     ),
     ("[trajectory]\nkind = \"paper\"\nradius_m = 1", ":3: trajectory.radius_m: unknown key; known here: kind"),
     (
