@@ -83,10 +83,19 @@ async def refused(doing, name):
 
 
 async def component(drone):
-    await drone.component_metadata.request_autopilot_component()
-    async for update in drone.component_metadata.metadata_available():
-        if update.type == MetadataType.PARAMETER:
-            return f"{len(json.loads(update.json_metadata)['parameters'])} parameters"
+    async def ask():
+        # MAVSDK asks once, and waits for ever if a datagram is lost.
+        while True:
+            await drone.component_metadata.request_autopilot_component()
+            await asyncio.sleep(10)
+
+    asking = asyncio.ensure_future(ask())
+    try:
+        async for update in drone.component_metadata.metadata_available():
+            if update.type == MetadataType.PARAMETER:
+                return f"{len(json.loads(update.json_metadata)['parameters'])} parameters"
+    finally:
+        asking.cancel()
 
 
 async def shell(drone):
