@@ -1,4 +1,4 @@
-"""Types of the compiled part. Frames: earth z up, body x forward, y left, z up. Units are SI and stand in every name."""
+"""Types of the compiled part. Frames: earth z up; body x forward, y left, z up. SI units stand in every name."""
 
 from collections.abc import Callable, Mapping, Sequence
 from os import PathLike

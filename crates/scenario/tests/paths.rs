@@ -75,7 +75,11 @@ proptest! {
     /// No other motion through the same places at the same times has less snap: a bump that moves one piece and keeps
     /// its ends, with three derivatives, costs more.
     #[test]
-    fn no_bump_lessens_the_snap(places in places(), at in 0_usize..12, size in prop_oneof![-0.3..-0.01, 0.01..0.3_f64]) {
+    fn no_bump_lessens_the_snap(
+        places in places(),
+        at in 0_usize..12,
+        size in prop_oneof![-0.3..-0.01, 0.01..0.3_f64],
+    ) {
         let pieces = minimum_snap(&places, 0.0, LIMITS).unwrap();
         let mut bumped = pieces.clone();
         let at = at % bumped.len();
@@ -93,7 +97,9 @@ proptest! {
         let mirrored = knot(left);
         let shifted = |power: i32| {
             let binomial = |n: i32, k: i32| (0..k).map(|i| f64::from(n - i) / f64::from(i + 1)).product::<f64>();
-            (power..8).map(|n| -mirrored[n as usize] * (-1.0_f64).powi(power) * binomial(n, power) * left.powi(n - power)).sum::<f64>()
+            let sign = -(-1.0_f64).powi(power);
+            let part = |n: i32| sign * mirrored[n as usize] * binomial(n, power) * left.powi(n - power);
+            (power..8).map(part).sum::<f64>()
         };
         for power in 0..8 {
             bumped[at].coefficients[0][power as usize] += size * shifted(power);

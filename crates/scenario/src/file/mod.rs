@@ -7,6 +7,7 @@ mod instruments;
 mod motion;
 mod path;
 mod realism;
+mod reference;
 mod sensors;
 mod trajectory;
 mod vehicle;

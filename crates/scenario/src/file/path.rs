@@ -3,7 +3,7 @@
 //! Either samples over time, with the columns of a flight's log, or the polynomials of the Crazyflie's tools
 //! (`duration,x^0,...,x^7,y^0,...,yaw^7`).
 
-use super::trajectory::{START, slow_enough};
+use super::reference::{START, slow_enough};
 use crate::trajectory::polynomial::{COEFFICIENTS, Coefficients, PolynomialPiece, peaks, through};
 use crate::trajectory::spline::PathSamples;
 use crate::trajectory::{Reference, Trajectory};

@@ -2,11 +2,12 @@
 
 use super::motion::POSITION;
 use super::path;
+use super::reference::{START, slow_enough};
 use crate::trajectory::minimum_snap::{FlatOutput, PaceLimits, minimum_snap};
 use crate::trajectory::polynomial::peaks;
 use crate::trajectory::{Sine, Trajectory, Waypoint};
 use afbc_reader::{FileError, Table};
-use afbc_types::{Range, Setpoint};
+use afbc_types::Range;
 use core::f64::consts::{SQRT_2, TAU};
 use libm::sqrt;
 use nalgebra::Vector3;
@@ -33,8 +34,6 @@ const TURN: Range = Range::new("turn_rad", -100.0, 100.0);
 const STEP_TIME: Range = Range::new("at_s", 0.0, 36_000.0);
 /// Accepted time of a waypoint \[s\].
 const WAYPOINT_TIME: Range = Range::new("time_s", 0.0, 36_000.0);
-/// Accepted start of a path \[s\].
-pub(super) const START: Range = Range::new("start_s", 0.0, 36_000.0);
 /// Accepted largest speed through waypoints \[m/s\].
 const SPEED_MAX: Range = Range::new("speed_max_m_s", 0.01, 100.0);
 /// Accepted largest acceleration there \[m/s2\].
@@ -206,18 +205,4 @@ fn through_places(table: &mut Table<'_>) -> Result<Trajectory, FileError> {
     })?;
     slow_enough(table, SPEED_MAX.name, peaks(&pieces))?;
     Ok(Trajectory::Polynomials(pieces))
-}
-
-/// Returns an error if the reference is too fast for a controller to accept; `peaks` are those of its derivatives from
-/// the speed to the snap, in m and s.
-pub(super) fn slow_enough(table: &Table<'_>, key: &str, peaks: [f64; 4]) -> Result<(), FileError> {
-    let [velocity_m_s, acceleration_m_s2, jerk_m_s3, snap_m_s4] = peaks.map(|size| Vector3::new(size as f32, 0.0, 0.0));
-    let fastest = Setpoint { velocity_m_s, acceleration_m_s2, jerk_m_s3, snap_m_s4, ..Setpoint::default() };
-    if fastest.is_plausible() {
-        return Ok(());
-    }
-    let [speed, acceleration, jerk, snap] = peaks;
-    let peak = format!("it asks for {speed:.3e} m/s, {acceleration:.3e} m/s2, {jerk:.3e} m/s3 and {snap:.3e} m/s4");
-    let accepted = "more than a controller accepts (1e3, 1e3, 1e5 and 1e7 of these)";
-    Err(table.fault_at(key, format!("{peak}, {accepted}; allow more time")))
 }

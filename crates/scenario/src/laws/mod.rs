@@ -113,6 +113,16 @@ declare::laws! {
     }
 }
 
+impl OwnLaw {
+    /// Makes it one of the laws that fly. A law of the same name is replaced.
+    ///
+    /// # Errors
+    /// One line on a name that cannot be one or is a built-in law's, or on a gain out of its range.
+    pub fn register(self) -> Result<ControllerKind, String> {
+        self.keep(&ControllerKind::ALL.map(ControllerKind::name)).map(ControllerKind::Own)
+    }
+}
+
 impl ControllerKind {
     /// Returns every law that can fly: those of the list, then those from outside.
     pub fn all() -> Vec<ControllerKind> {

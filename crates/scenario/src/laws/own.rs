@@ -1,6 +1,5 @@
 //! Laws from outside the list: registered once, they fly wherever a law of the list does.
 
-use super::ControllerKind;
 use afbc_control::{Action, FlightController, Mixer, Trace};
 use afbc_types::{
     Airframe, Declaration, Declared, Inputs, OutOfRange, Parameters, Range, Setpoint, State, Value, ValueMut, Visit,
@@ -101,18 +100,15 @@ impl OwnLaw {
         OwnLaw { gains: gains.into(), ..self }
     }
 
-    /// Makes it one of the laws that fly. A law of the same name is replaced.
-    ///
-    /// # Errors
-    /// One line on a name that cannot be one or is a built-in law's, or on a gain out of its range.
-    pub fn register(self) -> Result<ControllerKind, String> {
-        self.check().map_err(|problem| format!("law \"{}\": {problem}", self.name.escape_debug()))?;
+    /// Makes it one of the registered laws, if its name is none of those `taken`.
+    pub(super) fn keep(self, taken: &[&str]) -> Result<OwnKind, String> {
+        self.check(taken).map_err(|problem| format!("law \"{}\": {problem}", self.name.escape_debug()))?;
         let mut all = REGISTERED.lock().unwrap_or_else(PoisonError::into_inner);
         let known = all.iter_mut().find(|known| known.0.name == self.name);
         if let Some(OwnKind(same)) = known.as_deref().filter(|known| known.0.is_declared_as(&self)) {
             let make = self.make.into_inner().unwrap_or_else(PoisonError::into_inner);
             *same.make.write().unwrap_or_else(PoisonError::into_inner) = make;
-            return Ok(ControllerKind::Own(OwnKind(same)));
+            return Ok(OwnKind(same));
         }
         // Laws live as long as the program, like those of the list.
         let kind = OwnKind(Box::leak(Box::new(self)));
@@ -120,15 +116,15 @@ impl OwnLaw {
             Some(known) => *known = kind,
             None => all.push(kind),
         }
-        Ok(ControllerKind::Own(kind))
+        Ok(kind)
     }
 
-    fn check(&self) -> Result<(), String> {
+    fn check(&self, taken: &[&str]) -> Result<(), String> {
         let plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || "-_".contains(c);
         if !(1..=NAME_LENGTH).contains(&self.name.len()) || !self.name.chars().all(plain) {
             return Err(format!("a name has 1 to {NAME_LENGTH} characters: a to z, 0 to 9, - and _"));
         }
-        if TAKEN.contains(&self.name) || ControllerKind::ALL.iter().any(|kind| kind.name() == self.name) {
+        if TAKEN.contains(&self.name) || taken.contains(&self.name) {
             return Err("a built-in law has this name; choose another".into());
         }
         if self.gains.len() > OWN_GAINS_MAX {

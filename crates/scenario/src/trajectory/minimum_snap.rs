@@ -1,5 +1,5 @@
-//! Minimum-snap motion through waypoints: D. Mellinger and V. Kumar, "Minimum Snap Trajectory Generation and Control for
-//! Quadrotors", ICRA 2011.
+//! Minimum-snap motion through waypoints: D. Mellinger and V. Kumar, "Minimum Snap Trajectory Generation and Control
+//! for Quadrotors", ICRA 2011.
 //!
 //! The integral of the squared snap over given times is least for pieces of degree seven with six continuous
 //! derivatives at the waypoints, at rest at both ends. Unknown are velocity, acceleration and jerk at the waypoints
