@@ -10,7 +10,6 @@ use afbc_reader::{FileError, Table};
 use afbc_types::Range;
 use core::f64::consts::{SQRT_2, TAU};
 use libm::sqrt;
-use nalgebra::Vector3;
 
 /// Accepted heading \[rad\].
 const YAW: Range = Range::new("yaw_rad", -100.0, 100.0);
