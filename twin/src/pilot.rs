@@ -136,6 +136,7 @@ impl Pilot {
             escs: None,
             heard: Vec::new(),
             prints: false,
+            fetch: None,
             ..*self
         }
     }

@@ -1,5 +1,5 @@
-//! Logs on a card, listed, downloaded and erased while the vehicle goes on: beside a log that is written, on a card that
-//! stalls, is pulled, fills. What is read is compared with another FAT's.
+//! Logs on a card, listed, downloaded and erased while the vehicle goes on: beside a log that is written, on a card
+//! that stalls, is pulled, fills. What is read is compared with another FAT's.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, clippy::panic, missing_docs, reason = "tests")]
 
 mod room;

@@ -1,6 +1,6 @@
 //! References of polynomial pieces: paths that people bring, and smooth ones through waypoints.
 
-use super::Reference;
+use super::reference::Reference;
 use nalgebra::Vector3;
 
 /// Number of coefficients: degree 7.
