@@ -142,7 +142,7 @@ pub trait Transmitter {
     /// Sets the line up for SBUS: 100,000 baud, 8E2, and inverted if the chip can; nothing if there is no such line.
     fn set_sbus(&mut self) {}
 
-    /// Sends the messages after `tick`, without waiting for the line. False if that is too far behind: then none of them
-    /// is sent.
+    /// Sends the messages after `tick`, without waiting for the line. False if that is too far behind: then none of
+    /// them is sent.
     fn transmit(&mut self, tick: &Tick, bytes: &[u8]) -> bool;
 }

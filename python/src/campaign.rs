@@ -11,8 +11,8 @@ use pyo3::types::PyDict;
 use rayon::prelude::*;
 use std::path::PathBuf;
 
-/// Flies a campaign, built in or of a file: one scenario, many times, with drawn vehicles, weather and faults. Returns a
-/// row for each flight of each contender, by columns.
+/// Flies a campaign, built in or of a file: one scenario, many times, with drawn vehicles, weather and faults. Returns
+/// a row for each flight of each contender, by columns.
 ///
 /// With `out`, results and report are written into this folder as `sitl campaign` does, finished flights are kept, and
 /// the same call resumes. `flights` flies only the first ones.

@@ -119,8 +119,8 @@ impl PyScenario {
         crate::vehicle::parameters(py, &self.0.vehicle)
     }
 
-    /// The polynomials of a path of minimum snap, or of one from a file: for each piece its start [s], its length [s] and
-    /// the coefficients of x, y, z, yaw, lowest power first, over the time since its start. None for other trajectories.
+    /// The polynomials of a path of minimum snap, or of one from a file: for each piece its start [s], its length [s]
+    /// and the coefficients of x, y, z, yaw, lowest power first, over the time since its start. None for others.
     #[getter]
     fn polynomials<'py>(&self, py: Python<'py>) -> PyResult<Option<Vec<Piece<'py>>>> {
         let Trajectory::Polynomials(pieces) = &self.0.trajectory else { return Ok(None) };

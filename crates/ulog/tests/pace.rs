@@ -77,7 +77,8 @@ proptest! {
         prop_assert_eq!(log.whole, bytes.len());
         let (whole, _, _) = logged(None, 10, [0; 2]);
         let whole = read(&whole);
-        prop_assert_eq!((&log.formats, &log.information, log.initial), (&whole.formats, &whole.information, whole.initial));
+        let parts = [&log, &whole].map(|log| (&log.formats, &log.information, &log.initial));
+        prop_assert_eq!(&parts[0], &parts[1]);
         prop_assert!(log.dropouts.is_empty());
         for parameter in table.iter() {
             let last = log.parameters.iter().rev().find(|(name, _)| name == parameter.name.as_str());
