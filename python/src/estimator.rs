@@ -1,9 +1,8 @@
 //! The estimator, step by step.
 
 use crate::error::error;
-use crate::motion::{PyState, array};
+use crate::motion::{PyState, array, vector};
 use afbc_estimator::{Estimate, Estimator, ImuSample, Measurement, Memory, Settings, Stamped};
-use nalgebra::Vector3;
 use numpy::{PyArray1, ToPyArray};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -18,10 +17,6 @@ pub(crate) struct PyEstimator {
     estimator: Estimator,
     memory: Memory,
     estimate: Estimate,
-}
-
-fn vector(numbers: [f64; 3]) -> Vector3<f32> {
-    Vector3::from(numbers.map(|number| number as f32))
 }
 
 /// A time on the estimator's clock.

@@ -12,7 +12,8 @@ pub(crate) fn array<'py>(py: Python<'py>, vector: &Vector3<f32>) -> Array<'py> {
     [vector.x, vector.y, vector.z].map(f64::from).to_pyarray(py)
 }
 
-fn vector(numbers: [f64; 3]) -> Vector3<f32> {
+/// The three numbers in the controllers' precision.
+pub(crate) fn vector(numbers: [f64; 3]) -> Vector3<f32> {
     Vector3::from(numbers.map(|number| number as f32))
 }
 

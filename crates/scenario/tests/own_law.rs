@@ -79,6 +79,20 @@ fn what_cannot_be_registered_is_refused() {
     assert_eq!(ControllerKind::named("mine"), None);
 }
 
+/// A law may be registered anew while it is made for a flight, as by another thread.
+#[test]
+fn making_a_law_holds_up_no_one() {
+    let again = || OwnLaw::new("anew", |_| Counting { inputs: HOVER, steps: 0.0 }).register();
+    let kind = OwnLaw::new("anew", move |_| {
+        again().unwrap();
+        Counting { inputs: HOVER, steps: 0.0 }
+    });
+    let contender = Contender::of(kind.register().unwrap(), Profile::Flight);
+    let controller = contender.controller::<4>(&Parameters::PAPER, &PLUS.map(|rotor| rotor.to_f64())).unwrap();
+    let action = controller.step(&mut Validated::default(), Some(&State::default()), &Setpoint::default());
+    assert!(action.given.thrust_n > 0.0);
+}
+
 /// A scenario file flies it, under its own name or another, and sets its gains; a vehicle's file too.
 #[test]
 fn files_know_it() {

@@ -9,7 +9,7 @@ use core::cell::RefCell;
 use core::fmt;
 use core::slice;
 use serde::{Serialize, Serializer};
-use std::sync::{Mutex, PoisonError, RwLock};
+use std::sync::{Arc, Mutex, PoisonError, RwLock};
 
 /// Largest number of gains of such a law.
 pub const OWN_GAINS_MAX: usize = 32;
@@ -71,7 +71,7 @@ pub struct OwnLaw {
     name: &'static str,
     title: &'static str,
     gains: Vec<OwnGain>,
-    make: RwLock<Box<Maker>>,
+    make: RwLock<Arc<Maker>>,
 }
 
 /// Registered laws.
@@ -85,7 +85,7 @@ impl OwnLaw {
         make: impl Fn(&OwnVehicle) -> C + Send + Sync + 'static,
     ) -> Self {
         let make = move |vehicle: &OwnVehicle| Box::new(make(vehicle)) as Box<dyn OwnController>;
-        OwnLaw { name, title: name, gains: Vec::new(), make: RwLock::new(Box::new(make)) }
+        OwnLaw { name, title: name, gains: Vec::new(), make: RwLock::new(Arc::new(make)) }
     }
 
     /// Gives it a name for tables and figures.
@@ -163,7 +163,8 @@ impl OwnKind {
     }
 
     fn controller(self, vehicle: &OwnVehicle) -> Box<dyn OwnController> {
-        let make = self.0.make.read().unwrap_or_else(PoisonError::into_inner);
+        // Not called under the lock: it may wait for whoever registers a law.
+        let make = Arc::clone(&self.0.make.read().unwrap_or_else(PoisonError::into_inner));
         make(vehicle)
     }
 }
