@@ -11,7 +11,7 @@ version() {
 
 if [ "$(version)" -lt 802 ]; then
     # One at a time: two at once leave packages half installed. (apt locks each of its steps, but not all together.)
-    exec 9>"${TMPDIR:-/tmp}/qemu.sh.$(id -u).lock"
+    exec 9>"${TMPDIR:-/tmp}/debian.$(id -u).lock"
     flock 9
 fi
 if [ "$(version)" -lt 802 ]; then

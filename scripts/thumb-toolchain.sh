@@ -25,9 +25,8 @@ if [ -z "${FW_FORCE_DEBIAN:-}" ]; then
 fi
 
 if [ ! -x /usr/bin/clippy-driver ] || [ ! -x /usr/bin/cargo ] || [ ! -d /usr/lib/rustlib/src/rust/library ]; then
-    sudo=$([ "$(id -u)" = 0 ] || echo sudo)
-    $sudo apt-get update -qq >&2
-    $sudo apt-get install -y -qq --no-install-recommends rustc-web rust-web-src cargo-web rust-web-clippy lld >&2
+    . "$(dirname "$0")/install.sh"
+    debian rustc-web rust-web-src cargo-web rust-web-clippy lld
 fi
 
 version=$(/usr/bin/rustc -V)

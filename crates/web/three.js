@@ -14,6 +14,7 @@ export {
     DirectionalLight,
     DoubleSide,
     DynamicDrawUsage,
+    Euler,
     GridHelper,
     Group,
     HemisphereLight,

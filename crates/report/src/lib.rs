@@ -9,6 +9,7 @@ pub mod claims;
 pub mod compare;
 mod csv;
 pub mod exact;
+mod explore;
 mod figures;
 pub mod flights;
 mod groups;

@@ -1,9 +1,10 @@
 //! One self-contained page with tables, claims, figures and parameters.
 
 use crate::claims::Claim;
+use crate::explore::{Explorable, ExplorableScene};
 use crate::figures::Picture;
 use crate::groups::Group;
-use crate::{reality, table, words};
+use crate::{explore, reality, table, words};
 use afbc::reference::ReferenceModel;
 use afbc::{Limits, Settings};
 use afbc_control::Smoothing;
@@ -44,6 +45,10 @@ table:has(tr > :nth-child(8)) :is(th, td) { padding: .16rem .4rem; }
 tr:last-child > * { border-bottom: 1px solid var(--faint); }
 thead tr:last-child > * { border-color: var(--rule); }
 .lost { color: var(--bad); text-align: left; }
+.heat td { background: color-mix(in srgb, var(--bad) calc(0.55 * var(--heat, 0%)), var(--paper)); }
+.heat .best { background: color-mix(in srgb, var(--good) 30%, var(--paper)); font-weight: 600; }
+.heat .lost { text-align: right; }
+.heat a { color: inherit; text-underline-offset: .2em; }
 dl { margin: .4rem 0; }
 dl > div { display: grid; grid-template-columns: 8.5rem 1fr; margin: .7rem 0; }
 dt { font-weight: 600; }
@@ -62,7 +67,7 @@ figcaption { color: var(--quiet); font-size: .9rem; }
 .scroll::-webkit-scrollbar-thumb { background: var(--rule); border-radius: .3rem; }
 body > * { max-width: 900px; margin-inline: auto; }
 body > .scroll { width: fit-content; min-width: min(100%, 900px); max-width: 100%; }
-body > .scroll:has(.prose) { max-width: 900px; }
+body > .scroll:has(.prose) { max-width: min(100%, 900px); }
 @media (max-width: 34rem) {
   body { margin: 1.2rem auto; }
   dl > div { display: block; }
@@ -70,6 +75,7 @@ body > .scroll:has(.prose) { max-width: 900px; }
 }
 @page { margin: 15mm; }
 @media print {
+  .heat td { print-color-adjust: exact; -webkit-print-color-adjust: exact; }
   body { font-size: 10.5pt; margin: 0; padding: 0; }
   body > *, body > .scroll { max-width: none; width: auto; min-width: 0; }
   .scroll { overflow: visible; background: none; }
@@ -116,11 +122,12 @@ pub(super) fn sheet(title: &str, body: &Markup) -> String {
                 meta name="viewport" content="width=device-width, initial-scale=1";
                 meta name="color-scheme" content="light dark";
                 title { (title) }
-                style { (PreEscaped(STYLE)) }
+                style { (PreEscaped(STYLE)) (PreEscaped(explore::STYLE)) }
             }
             body {
                 h1 { (capitalised(title)) }
                 (body)
+                (explore::scripts(body))
             }
         }
     }
@@ -131,9 +138,29 @@ pub(super) fn sheet(title: &str, body: &Markup) -> String {
 pub(super) fn picture(figure: &Picture) -> Markup {
     html! {
         figure {
-            div.scroll { (PreEscaped(figure.svg.replacen(NAMESPACE, "", 1))) }
-            figcaption { (figure.caption) }
+            div.drawn {
+                div.scroll { (PreEscaped(explore::with_short_paths(&figure.svg.replacen(NAMESPACE, "", 1)))) }
+            }
+            @if let Some(explorable) = &figure.explorable { (explorable.markup()) }
+            figcaption { (caption(figure)) }
         }
+    }
+}
+
+/// Flights in space without a picture: seen on a screen with JavaScript alone.
+pub(super) fn space(scene: Option<ExplorableScene>, caption: &str) -> Markup {
+    html! {
+        @if let Some(scene) = scene {
+            figure.on-screen { (Explorable::Scene(scene).markup()) figcaption { (caption) } }
+        }
+    }
+}
+
+/// Returns the caption; what it says of a picture alone goes with the picture.
+fn caption(figure: &Picture) -> Markup {
+    match (&figure.explorable, figure.caption.split_once(". ")) {
+        (Some(Explorable::Scene(_)), Some((both, picture))) => html! { (both) "." span.drawn { " " (picture) } },
+        _ => html! { (figure.caption) },
     }
 }
 

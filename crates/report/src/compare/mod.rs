@@ -21,8 +21,8 @@ use std::path::PathBuf;
 ///
 /// * `comparison.csv`: a row for each flight;
 /// * `comparison.json`: mean and standard deviation over the seeds;
-/// * `errors.svg`, `rmse.svg`: errors over time, and their root mean squares; with several scenarios,
-///   `<scenario>-errors.svg` etc. for each;
+/// * `errors.svg`, `rmse.svg`, `trajectory.svg`: errors over time, their root mean squares, and the flights in space;
+///   with several scenarios, `<scenario>-errors.svg` etc. for each;
 /// * `report.html`: everything on one self-contained page.
 ///
 /// # Errors
@@ -54,5 +54,6 @@ pub fn write(folder: &Folder, comparisons: &[Comparison]) -> Result<Vec<PathBuf>
 
 fn draw(comparison: &Comparison) -> io::Result<Vec<Picture>> {
     let flights: Vec<&Flown> = comparison.entries.iter().map(|entry| &entry.first).collect();
-    Ok(vec![figures::compare::draw(comparison)?, figures::flights::errors(&flights)?].into_iter().flatten().collect())
+    let flown = figures::flights::named(&flights, &[("fig7-errors", "errors"), ("fig4-trajectory", "trajectory")])?;
+    Ok(figures::compare::draw(comparison)?.into_iter().chain(flown).collect())
 }

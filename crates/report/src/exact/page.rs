@@ -2,8 +2,8 @@
 
 use super::cells;
 use super::replayed::ReplayedLog;
-use crate::figures::Picture;
-use crate::report::{picture, sheet};
+use crate::figures::{self, Picture};
+use crate::report::{picture, sheet, space};
 use maud::html;
 
 pub(super) fn page(log: &ReplayedLog<'_>, pictures: &[Picture]) -> String {
@@ -27,6 +27,7 @@ pub(super) fn page(log: &ReplayedLog<'_>, pictures: &[Picture]) -> String {
                 }
             } }
             p.quiet { "Differences of the ticks in which the vehicle is armed under both settings." }
+            (space(figures::exact::space(replay), "The estimates, as flown and under the changed settings."))
             @for figure in pictures { (picture(figure)) }
         },
     )

@@ -52,7 +52,7 @@ pub(crate) fn draw(summary: &Summary) -> io::Result<Vec<Picture>> {
         Distribution {
             title: "Smoothness", label: "mean |ΔU₄| per step [N]", values: |tally| &tally.mean_abs_du4_n
         };
-    let figure = |name, caption, svg: Option<String>| svg.map(|svg| Picture { name, caption, svg });
+    let figure = |name, caption, svg: Option<String>| svg.map(|svg| Picture { name, caption, svg, explorable: None });
     let interval = "Pale: 95 % interval of the share. Mark: end of a curve.";
     let not_lost = if lost { " of the flights that were not lost" } else { " of the flights" };
     let spread = summary.manifest.drawn.iter().any(is_spread) && flights > 0;

@@ -1,6 +1,7 @@
 //! Drawing functions shared by all figures.
 
 use super::palette::{self, BLACK, GREY, WHITE};
+use crate::explore::Pen;
 use plotters::coord::Shift;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
@@ -18,7 +19,7 @@ pub(super) type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 pub(super) type Failure = DrawingAreaErrorKind<io::Error>;
 
 /// Style of a line.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, PartialEq)]
 pub(super) struct Ink {
     pub(super) color: RGBColor,
     pub(super) width_px: f64,
@@ -44,6 +45,19 @@ impl Ink {
         let opacity = if self.dash > 0 { 1.0 - DASH * self.dash.min(DASHES) as f64 } else { self.opacity };
         self.color.mix(opacity).stroke_width(units(self.width_px).unsigned_abs())
     }
+
+    /// Returns the number of columns that a line over an axis of `axis_px` is reduced to: each as wide as the line, and
+    /// at least a pixel.
+    pub(super) fn columns(self, axis_px: f64) -> f64 {
+        axis_px / self.width_px.max(1.0)
+    }
+
+    /// Returns the same style for a page's script.
+    pub(super) fn pen(self) -> Pen {
+        let dash_px = if self.dash > 0 { dash_lengths_px(self.dash.min(DASHES)) } else { Vec::new() };
+        let (colors, width_px) = (palette::both(self.color), self.width_px);
+        Pen { colors, width_px, opacity: self.opacity, dash_px }
+    }
 }
 
 /// Returns a line for each of the contenders `names`: of two that share a colour, the second is dashed.
@@ -58,11 +72,16 @@ fn dash_opacity(dash: usize) -> String {
 }
 
 /// Returns lengths on and off in pixels, longer for higher numbers.
-fn dash_pattern(dash: usize) -> String {
+fn dash_lengths_px(dash: usize) -> Vec<f64> {
     const PATTERNS: [&[f64]; 5] = [&[7.0, 3.0], &[2.0, 3.0], &[10.0, 3.0, 2.0, 3.0], &[14.0, 5.0], &[4.0, 7.0]];
     let (pattern, round) = ((dash - 1) % PATTERNS.len(), 1 + (dash - 1) / PATTERNS.len());
     let lengths = PATTERNS.get(pattern).copied().unwrap_or_default();
-    let lengths: Vec<_> = lengths.iter().map(|px| units(px * round as f64).to_string()).collect();
+    lengths.iter().map(|px| px * round as f64).collect()
+}
+
+/// Returns the attribute for a dash pattern.
+fn dash_pattern(dash: usize) -> String {
+    let lengths: Vec<_> = dash_lengths_px(dash).iter().map(|px| units(*px).to_string()).collect();
     format!(" stroke-dasharray=\"{}\"", lengths.join(" "))
 }
 

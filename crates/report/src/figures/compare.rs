@@ -45,7 +45,7 @@ pub(crate) fn draw(comparison: &Comparison) -> io::Result<Option<Picture>> {
     if comparison.entries.iter().any(lost) {
         caption += " A contender that lost a vehicle has no bar.";
     }
-    Ok(Some(Picture { name: "rmse", caption, svg }))
+    Ok(Some(Picture { name: "rmse", caption, svg, explorable: None }))
 }
 
 /// Draws one error of every contender, with the given top left corner.

@@ -4,9 +4,11 @@ use super::canvas::Ink;
 use super::marks::moments;
 use super::picture::Picture;
 use super::plotted::{LINE_PX, REFERENCE};
-use super::time_chart::{COLUMNS, Chart, Line, PLOT_PX, Panel};
+use super::time_chart::{Chart, FINE_PX, Line, PLOT_PX, Panel};
 use super::{palette, reduce};
+use crate::explore::{ExplorableScene, Place, rotors_on_a_circle_m};
 use afbc_replay::exact::{ChangeRow, ExactReplay, QUANTITIES};
+use nalgebra::Vector3;
 use std::io;
 
 /// A panel: its label, the column's name, and the factor to its unit.
@@ -49,7 +51,7 @@ pub(crate) fn draw(replay: &ExactReplay) -> io::Result<Vec<Picture>> {
     let own = Ink::new(palette::color("afbc"), LINE_PX);
     let line = |ink: Ink, is_reference: bool, value: &dyn Fn(&ChangeRow) -> Option<f64>| {
         let points = rows.iter().filter_map(|row| Some((row.time_s, value(row)?)));
-        Line { ink, points: reduce::envelope(points, end_s, COLUMNS), lost_s: None, is_reference }
+        Line { ink, points: reduce::envelope(points, end_s, ink.columns(FINE_PX)), lost_s: None, is_reference }
     };
     let panel = |(label, name, factor): &Pane| {
         let index = QUANTITIES.iter().position(|quantity| quantity.name == *name)?;
@@ -83,8 +85,28 @@ pub(crate) fn draw(replay: &ExactReplay) -> io::Result<Vec<Picture>> {
             " Thin line: the flight core is in another mode.",
         );
         let legend = vec![("as flown".to_owned(), REFERENCE), ("changed".to_owned(), own)];
-        let (svg, seen) = Chart { title, conditions: &conditions, marks, end_s, legend, panels }.draw()?;
-        pictures.push(Picture { name, caption: format!("{caption}{seen}"), svg });
+        let chart = Chart { title, conditions: &conditions, marks, end_s, legend, panels };
+        pictures.push(chart.picture(name, caption)?);
     }
     Ok(pictures)
+}
+
+/// The estimate in space, as flown and under the changed settings.
+pub(crate) fn space(replay: &ExactReplay) -> Option<ExplorableScene> {
+    let rows = &replay.comparison.as_ref()?.rows;
+    let index = |name: &str| QUANTITIES.iter().position(|quantity| quantity.name == name);
+    let position = [index("x_m")?, index("y_m")?, index("z_m")?];
+    let attitude = [index("roll_rad")?, index("pitch_rad")?, index("yaw_rad")?];
+    let places = |values: fn(&ChangeRow) -> &[f32]| -> Vec<Place> {
+        let three = |row: &ChangeRow, [x, y, z]: [usize; 3]| {
+            let value = |i: usize| values(row).get(i).filter(|value| value.is_finite()).map(|value| f64::from(*value));
+            Some(Vector3::new(value(x)?, value(y)?, value(z)?))
+        };
+        rows.iter().filter_map(|row| Some((row.time_s, three(row, position)?, three(row, attitude)?))).collect()
+    };
+    let (flown, changed) = (places(|row| &row.flown), places(|row| &row.changed));
+    let mut scene = ExplorableScene::around(flown.iter().chain(&changed), rotors_on_a_circle_m(replay.rotors))?;
+    scene.add("as flown".to_owned(), REFERENCE.pen(), &flown, false);
+    scene.add("changed".to_owned(), Ink::new(palette::color("afbc"), LINE_PX).pen(), &changed, false);
+    Some(scene)
 }

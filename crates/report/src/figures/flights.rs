@@ -54,10 +54,14 @@ const ESTIMATE: [Coordinate; 9] = [
 /// Fig. 8.
 const INPUTS: [(&str, Input); 4] = [("U₁ [N]", |u| u.x), ("U₂ [N]", |u| u.y), ("U₃ [N]", |u| u.z), ("U₄ [N]", |u| u.w)];
 
-/// Fig. 7 alone.
-pub(crate) fn errors(flights: &[&Flown]) -> io::Result<Option<Picture>> {
-    let fig7 = draw(flights)?.into_iter().find(|figure| figure.name == "fig7-errors");
-    Ok(fig7.map(|figure| Picture { name: "errors", ..figure }))
+/// The figures of some names, in their order, each under the name after it.
+pub(crate) fn named(flights: &[&Flown], names: &[(&str, &'static str)]) -> io::Result<Vec<Picture>> {
+    let mut figures = draw(flights)?;
+    let take = |(figure, name): &(&str, &'static str)| {
+        let index = figures.iter().position(|drawn| drawn.name == *figure)?;
+        Some(Picture { name, ..figures.swap_remove(index) })
+    };
+    Ok(names.iter().filter_map(take).collect())
 }
 
 /// Draws every figure of one scenario's flights; none without flights.
@@ -117,13 +121,11 @@ pub(crate) fn draw(flights: &[&Flown]) -> io::Result<Vec<Picture>> {
     let chatter = controls.iter().any(|panel| panel.has_chatter(end_s));
     let chart = |name, caption: &str, title, legend, panels| {
         let marks = marks(scenario, end_s, PLOT_PX);
-        let (svg, seen) = Chart { title, conditions: &conditions, marks, end_s, legend, panels }.draw()?;
-        Ok::<_, io::Error>(Picture { name, caption: format!("{caption}{seen}"), svg })
+        Chart { title, conditions: &conditions, marks, end_s, legend, panels }.picture(name, caption)
     };
     let jumps = if chatter { " Filled band: chatter, the input jumps between its edges." } else { "" };
-    let (trajectory, seen) = trajectory::draw(&laws, longest, &conditions, with_reference())?;
     let mut pictures = vec![
-        Picture { name: "fig4-trajectory", caption: format!("The flights in space.{seen}"), svg: trajectory },
+        trajectory::picture(&laws, longest, &conditions, with_reference())?,
         chart(
             "fig5-outputs",
             "Position and yaw against their reference.",

@@ -93,6 +93,13 @@ pub(super) fn repeats(names: &[&str]) -> Vec<usize> {
     names.iter().enumerate().map(before).collect()
 }
 
+/// Returns the colour as attributes: on white, and its variant in the dark.
+pub(super) fn both(color: RGBColor) -> [String; 2] {
+    let all = ROLES.iter().chain(KNOWN.iter().map(|(_, shades)| shades)).chain(&OTHERS);
+    let shades = all.into_iter().find(|[light, _]| *light == color);
+    shades.copied().unwrap_or([color; 2]).map(hex)
+}
+
 /// Formats a colour as an attribute.
 fn hex(RGBColor(r, g, b): RGBColor) -> String {
     format!("#{r:02X}{g:02X}{b:02X}")

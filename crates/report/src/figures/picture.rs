@@ -1,5 +1,7 @@
 //! A figure with its caption.
 
+use crate::explore::Explorable;
+
 /// A figure with its caption.
 pub(crate) struct Picture {
     /// File name without `.svg`.
@@ -8,6 +10,8 @@ pub(crate) struct Picture {
     pub(crate) caption: String,
     /// The picture as SVG.
     pub(crate) svg: String,
+    /// The same to be explored on a page.
+    pub(crate) explorable: Option<Explorable>,
 }
 
 /// Caption of figures with a cross.

@@ -64,7 +64,7 @@ impl Plotted<'_> {
     fn drawn(&self, ink: Ink, end_s: f64, values: impl Iterator<Item = (f64, f64)>) -> Line {
         Line {
             ink,
-            points: reduce::envelope(values, end_s, time_chart::COLUMNS),
+            points: reduce::envelope(values, end_s, ink.columns(time_chart::FINE_PX)),
             lost_s: self.lost_s(),
             is_reference: false,
         }

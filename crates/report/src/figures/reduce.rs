@@ -1,34 +1,38 @@
 //! Reduction of the number of points without a visible change.
 
-/// Returns at most four points per column of the time axis 0 to `end_s`, in time order: the first, the extremes and the
-/// last, so chatter within a column keeps its height. Values that are not finite are left out.
+/// Returns the extremes of each column of the time axis 0 to `end_s`, in time order, between the first and the last
+/// point: chatter within a column keeps its height. Values that are not finite are left out.
 pub(super) fn envelope(values: impl Iterator<Item = (f64, f64)>, end_s: f64, columns: f64) -> Vec<(f64, f64)> {
     let mut points = Vec::new();
-    let mut column: Option<(f64, [(f64, f64); 4])> = None;
-    let mut flush = |column: Option<(f64, [(f64, f64); 4])>| {
-        if let Some((_, mut four)) = column {
-            four.sort_by(|a, b| a.0.total_cmp(&b.0));
-            points.extend(four);
-        }
-    };
+    // Index, lowest and highest point of the column, and the line's last point.
+    let mut column: Option<(f64, [(f64, f64); 2])> = None;
+    let mut last = None;
     for point in values.filter(|(t, v)| t.is_finite() && v.is_finite()) {
         let index = (point.0 / end_s * columns).floor();
         match &mut column {
-            Some((current, [_, low, high, last])) if *current == index => {
+            Some((current, [low, high])) if *current == index => {
                 if point.1 < low.1 {
                     *low = point;
                 }
                 if point.1 > high.1 {
                     *high = point;
                 }
-                *last = point;
             }
-            _ => flush(column.replace((index, [point; 4]))),
+            _ => match column.replace((index, [point; 2])) {
+                Some((_, extremes)) => points.extend(in_time(extremes)),
+                None => points.push(point),
+            },
         }
+        last = Some(point);
     }
-    flush(column);
+    points.extend(column.into_iter().flat_map(|(_, extremes)| in_time(extremes)));
+    points.extend(last);
     points.dedup();
     points
+}
+
+fn in_time([a, b]: [(f64, f64); 2]) -> [(f64, f64); 2] {
+    if a.0 <= b.0 { [a, b] } else { [b, a] }
 }
 
 /// Simplifies a line: it deviates by at most `tolerance` after both coordinates are multiplied by `scale` (Ramer,

@@ -4,8 +4,9 @@ use super::canvas::Ink;
 use super::marks::moments;
 use super::picture::Picture;
 use super::plotted::{LINE_PX, REFERENCE};
-use super::time_chart::{COLUMNS, Chart, Line, PLOT_PX, Panel};
+use super::time_chart::{Chart, FINE_PX, Line, PLOT_PX, Panel};
 use super::{palette, reduce};
+use crate::explore::{ExplorableScene, Place, rotors_on_a_circle_m};
 use afbc_estimator::Estimate;
 use afbc_replay::{LoggedState, Recording, ReplayRow, Replayed};
 use afbc_types::State;
@@ -75,7 +76,7 @@ pub(crate) fn draw(recording: &Recording, replayed: &Replayed) -> io::Result<Vec
     let band = Ink { opacity: 1.0 / 3.0, ..Ink::new(palette::color("afbc"), REFERENCE.width_px) };
     let line = |ink: Ink, is_reference: bool, value: &dyn Fn(&ReplayRow) -> Option<f64>| {
         let points = rows.iter().filter_map(|row| Some((row.time_s, value(row)?)));
-        Line { ink, points: reduce::envelope(points, end_s, COLUMNS), lost_s: None, is_reference }
+        Line { ink, points: reduce::envelope(points, end_s, ink.columns(FINE_PX)), lost_s: None, is_reference }
     };
     let both = |(label, ours, theirs): Pair| Panel {
         label,
@@ -103,8 +104,7 @@ pub(crate) fn draw(recording: &Recording, replayed: &Replayed) -> io::Result<Vec
         let resets = recording.resets.iter().map(reset).filter(|(_, at_s)| *at_s >= 0.0).take(MARKS_MAX);
         let marks = moments(resets, end_s, PLOT_PX, " Thin line: reset of the log's own estimate.");
         let legend = legend.iter().map(|(name, ink)| ((*name).to_owned(), *ink)).collect();
-        let (svg, seen) = Chart { title, conditions, marks, end_s, legend, panels }.draw()?;
-        Ok::<_, io::Error>(Picture { name, caption: format!("{caption}{seen}"), svg })
+        Chart { title, conditions, marks, end_s, legend, panels }.picture(name, caption)
     };
     let both_legend = [("log", REFERENCE), ("estimate", own)];
     let lines_drawn = |panels: &[Panel]| {
@@ -131,4 +131,23 @@ pub(crate) fn draw(recording: &Recording, replayed: &Replayed) -> io::Result<Vec
         pictures.push(chart("difference", caption, "Difference", &legend, panels)?);
     }
     Ok(pictures)
+}
+
+/// The log's estimate and ours in space, where both have a position.
+pub(crate) fn space(replayed: &Replayed) -> Option<ExplorableScene> {
+    let ours = |row: &ReplayRow| {
+        let ours = row.ours.as_ref().filter(|ours| ours.validity.position && ours.validity.height)?;
+        Some((row.time_s, ours.state.position_m.cast(), ours.state.attitude_rad.cast()))
+    };
+    let logged = |row: &ReplayRow| {
+        let ([w, x, y, z], zero) = (row.logged.attitude?, Vector3::zeros());
+        let state = State::from_quaternion(zero, zero, &Quaternion::new(w, x, y, z), zero)?;
+        Some((row.time_s, row.logged.position_m?.cast(), state.attitude_rad.cast()))
+    };
+    let ours: Vec<Place> = replayed.rows.iter().filter_map(ours).collect();
+    let logged: Vec<Place> = replayed.rows.iter().filter_map(logged).collect();
+    let mut scene = ExplorableScene::around(ours.iter().chain(&logged), rotors_on_a_circle_m(4))?;
+    scene.add("log".to_owned(), REFERENCE.pen(), &logged, false);
+    scene.add("estimate".to_owned(), Ink::new(palette::color("afbc"), LINE_PX).pen(), &ours, false);
+    Some(scene)
 }

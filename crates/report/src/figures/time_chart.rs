@@ -2,9 +2,10 @@
 
 use super::canvas::{self, Area, Failure, Ink, WIDTH_PX, text, units};
 use super::marks::{LABEL_PX, Mark, Marks};
-use super::palette::{BLACK, EDGE, FRAME, GREY, GRID};
-use super::picture::CROSS;
-use super::reduce::{clip, simplify};
+use super::palette::{self, BLACK, EDGE, FRAME, GREY, GRID};
+use super::picture::{CROSS, Picture};
+use super::reduce::{clip, envelope, simplify};
+use crate::explore::{Explorable, ExplorableChart, LegendEntry, Span, TracePanel};
 use core::ops::Range;
 use plotters::coord::ranged1d::{BoldPoints, Ranged};
 use plotters::coord::types::RangedCoordf64;
@@ -30,8 +31,10 @@ pub(super) const PLOT_PX: f64 = WIDTH_PX - LEFT_PX - RIGHT_PX;
 const T_TICKS: usize = 13;
 const Y_TICKS: usize = 6;
 
-/// Columns of a panel, one per pixel.
-pub(super) const COLUMNS: f64 = PLOT_PX;
+/// How far a page's reader can zoom until points become visible.
+const ZOOM: f64 = 2.0;
+/// Width that lines are reduced for.
+pub(super) const FINE_PX: f64 = ZOOM * PLOT_PX;
 
 /// Smallest room below and above the values, in the panel's unit.
 const LEAST_ROOM: f64 = 5e-3;
@@ -44,7 +47,7 @@ const BAND_OPACITY: f64 = 0.6;
 /// A value over time.
 pub(super) struct Line {
     pub(super) ink: Ink,
-    /// Points with increasing time.
+    /// Points with increasing time, reduced for [`FINE_PX`].
     pub(super) points: Vec<(f64, f64)>,
     /// Time at which the vehicle was lost, if it was.
     pub(super) lost_s: Option<f64>,
@@ -67,7 +70,7 @@ impl Panel {
         let range = range(&self.lines, LEAST_ROOM);
         let tall = 4.0 / (PANEL_PX - GAP_PX) * (range.end - range.start);
         self.lines.iter().any(|line| {
-            let column = |t: f64| (t / end_s * COLUMNS).floor();
+            let column = |t: f64| (t / end_s * line.ink.columns(PLOT_PX)).floor();
             let columns = line.points.chunk_by(|a, b| column(a.0) == column(b.0));
             let height = |points: &[(f64, f64)]| {
                 let values = || points.iter().map(|(_, v)| v.clamp(range.start, range.end));
@@ -92,8 +95,15 @@ pub(super) struct Chart<'a> {
 }
 
 impl Chart<'_> {
-    /// Returns the figure as SVG, and an explanation of everything in it besides lines.
-    pub(super) fn draw(&self) -> io::Result<(String, String)> {
+    /// Returns the figure; to its caption, what is in it besides lines is added.
+    pub(super) fn picture(&self, name: &'static str, caption: &str) -> io::Result<Picture> {
+        let (svg, words) = (self.svg(&self.marks)?, self.words());
+        let explorable = Some(Explorable::Chart(self.explorable()));
+        Ok(Picture { name, caption: format!("{caption}{words}"), svg, explorable })
+    }
+
+    /// Explains everything in the figure besides lines.
+    fn words(&self) -> String {
         let marks = &self.marks;
         let mut all = marks.gusts.iter().chain(&marks.changes);
         let mut words = String::new();
@@ -116,7 +126,38 @@ impl Chart<'_> {
         if within.contains(&false) {
             words += " Arrow: a vehicle was lost beyond the panel.";
         }
-        Ok((self.svg(marks)?, words))
+        words
+    }
+
+    /// Returns the same chart for a page's script.
+    fn explorable(&self) -> ExplorableChart {
+        let legend = self.legend.iter().map(|(name, ink)| LegendEntry { name: name.clone(), pen: ink.pen() });
+        let panel = |panel: &Panel| {
+            let range = range(&panel.lines, LEAST_ROOM);
+            let label = panel.label.to_owned();
+            let mut traced = TracePanel { label, low: range.start, high: range.end, traces: Vec::new() };
+            let scale = (ZOOM * PLOT_PX / self.end_s, ZOOM * (PANEL_PX - GAP_PX) / (range.end - range.start));
+            for line in &panel.lines {
+                // A pale line without a name of its own belongs to the law of its colour.
+                let entry = self.legend.iter().position(|(_, ink)| *ink == line.ink);
+                let entry = entry.or_else(|| self.legend.iter().position(|(_, ink)| ink.color == line.ink.color));
+                traced.add(entry, line.ink.pen(), &simplify(&line.points, scale, 0.2), self.end_s);
+            }
+            traced
+        };
+        let span = |mark: &Mark| Span {
+            label: mark.label.clone(),
+            start_s: mark.start_s,
+            end_s: if mark.is_band { mark.end_s } else { mark.start_s },
+            colors: palette::both(mark.tint),
+        };
+        ExplorableChart {
+            title: self.title.to_owned(),
+            end_s: self.end_s,
+            legend: legend.collect(),
+            panels: self.panels.iter().map(panel).collect(),
+            spans: self.marks.changes.iter().chain(&self.marks.gusts).map(span).collect(),
+        }
     }
 
     fn svg(&self, marks: &Marks) -> io::Result<String> {
@@ -183,7 +224,7 @@ impl Chart<'_> {
 
         let scale = (PLOT_PX / self.end_s, plot_height_px / (high - low));
         for Line { ink, points, lost_s, is_reference } in &panel.lines {
-            let pieces = clip(points, low, high);
+            let pieces = clip(&envelope(points.iter().copied(), self.end_s, ink.columns(PLOT_PX)), low, high);
             chart.draw_series(pieces.iter().map(|piece| PathElement::new(simplify(piece, scale, 0.2), ink.style())))?;
             if let (Some(_), false, Some(&(t, v))) = (lost_s, is_reference, points.last()) {
                 let style = Ink::new(ink.color, 2.0).style();

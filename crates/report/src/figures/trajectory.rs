@@ -3,11 +3,13 @@
 use super::canvas::{self, Area, Failure, Ink, WIDTH_PX, text, units};
 use super::marks::{LABEL_PX, Mark, marks};
 use super::palette::{BLACK, FRAME, GREY, GRID};
-use super::picture::CROSS;
+use super::picture::{CROSS, Picture};
 use super::plotted::{Plotted, REFERENCE};
 use super::reduce::simplify;
 use super::time_chart::{Line, PLOT_PX, decimals, number, range};
 
+use crate::explore::{Explorable, ExplorableScene};
+use afbc_sim::flight::Sample;
 use afbc_sim::flown::Flown;
 use nalgebra::Vector3;
 use plotters::prelude::*;
@@ -72,14 +74,13 @@ impl View {
     }
 }
 
-/// Draws the flights of `laws` and the reference of the longest; returns an explanation of everything else in the
-/// picture.
-pub(super) fn draw(
+/// Draws the flights of `laws` and the reference of the longest.
+pub(super) fn picture(
     laws: &[Plotted],
     longest: &Flown,
     conditions: &str,
     mut legend: Vec<(String, Ink)>,
-) -> io::Result<(String, String)> {
+) -> io::Result<Picture> {
     let scenario = &longest.scenario;
     let end_s = longest.run.log.last().map_or(0.0, |last| last.time_s);
     let range_along = |axis: Vector3<f64>| {
@@ -137,17 +138,42 @@ pub(super) fn draw(
         dots = seen > usize::from(view.contains(&start));
         Ok(())
     })?;
-    let mut words = String::new();
+    let mut caption = "The flights in space.".to_owned();
     if dots {
-        words += " Dots: position of the reference at the onset of a gust.";
+        caption += " Dots: position of the reference at the onset of a gust.";
     }
     if bands {
-        words += " Shaded: its path during the event named in the legend.";
+        caption += " Shaded: its path during the event named in the legend.";
     }
     if crosses {
-        words += CROSS;
+        caption += CROSS;
     }
-    Ok((svg, words))
+    let explorable = Some(Explorable::Scene(scene(laws, longest, &view)));
+    Ok(Picture { name: "fig4-trajectory", caption, svg, explorable })
+}
+
+/// The same flights for a page's script.
+fn scene(laws: &[Plotted], longest: &Flown, view: &View) -> ExplorableScene {
+    let scenario = &longest.scenario;
+    let arm_m = scenario.vehicle.arm_m;
+    let end_s = longest.run.log.last().map_or(0.0, |last| last.time_s);
+    let mut scene = ExplorableScene {
+        title: "Trajectory".to_owned(),
+        end_s,
+        low_m: view.low_m.into(),
+        high_m: view.high_m.into(),
+        rotors_m: scenario.rotors.iter().map(|rotor| [arm_m * rotor.x, arm_m * rotor.y]).collect(),
+        tracks: Vec::new(),
+    };
+    let wanted = |s: &Sample| (s.time_s, s.reference.position_m, Vector3::zeros());
+    let places: Vec<_> = longest.run.log.iter().map(wanted).collect();
+    scene.add("reference".to_owned(), REFERENCE.pen(), &places, true);
+    for law in laws {
+        let place = |s: &Sample| (s.time_s, s.motion.position_m, s.motion.attitude_rad);
+        let places: Vec<_> = law.flight.run.log.iter().map(place).collect();
+        scene.add(law.title(), law.ink().pen(), &places, false);
+    }
+    scene
 }
 
 fn pixel((x, y): (f64, f64)) -> (i32, i32) {

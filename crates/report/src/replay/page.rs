@@ -1,8 +1,8 @@
 //! The report of a replay.
 
 use super::{Replay, cells};
-use crate::figures::Picture;
-use crate::report::{picture, sheet};
+use crate::figures::{self, Picture};
+use crate::report::{picture, sheet, space};
 use maud::html;
 
 pub(super) fn page(replay: &Replay<'_>, pictures: &[Picture]) -> String {
@@ -25,6 +25,7 @@ pub(super) fn page(replay: &Replay<'_>, pictures: &[Picture]) -> String {
                  deviations. Valid: share of the log's times at which the estimate was valid; only these are compared."
             }
             @for sentence in cells::sentences(replay) { p { (sentence) } }
+            (space(figures::replay::space(replay.replayed), "Both estimates where they are valid."))
             @for figure in pictures { (picture(figure)) }
         },
     )

@@ -3,6 +3,7 @@
 mod cells;
 mod files;
 mod flown;
+mod heat;
 mod markdown;
 mod page;
 mod table;
@@ -49,5 +50,6 @@ pub fn write(folder: &Folder, flown: FlownSuite<'_>) -> Result<Vec<PathBuf>, Err
 }
 
 fn draw(comparison: &Comparison) -> io::Result<Option<Picture>> {
-    figures::flights::errors(&comparison.entries.iter().map(|entry| &entry.first).collect::<Vec<_>>())
+    let flights: Vec<_> = comparison.entries.iter().map(|entry| &entry.first).collect();
+    Ok(figures::flights::named(&flights, &[("fig7-errors", "errors")])?.pop())
 }

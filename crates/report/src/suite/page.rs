@@ -2,6 +2,7 @@
 
 use super::FlownSuite;
 use super::cells::{FIGURES, Figure, lost, trip};
+use super::heat;
 use crate::figures::Picture;
 use crate::report::{picture, sheet};
 use crate::words;
@@ -19,10 +20,16 @@ pub(super) fn page(flown: FlownSuite<'_>, pictures: &[Option<Picture>]) -> Strin
                 "Every contender flies the same vehicle through the same noise and weather, with gains tuned for it by "
                 "the vehicle's rule. Figures are evaluated from " (SETTLED_S) " s to the end. *: best of its flight."
             }
+            h2 { "Where they stand" }
+            p.quiet {
+                "Root mean square distance from the reference as a multiple of the flight's best; the geometric mean "
+                "is over the flights that the contender did not lose."
+            }
+            div.scroll { (heat::map(flown)) }
             @for figure in &FIGURES { h2 { (figure.title) } div.scroll { (results(flown, figure)) } }
             @if flown.rows().any(|(flight, _)| !flight.published.is_empty()) { (published(flown)) }
             @for ((flight, comparison), drawn) in flown.rows().zip(pictures) {
-                h2 { (flight.scenario.name) }
+                h2 id=(heat::anchor(comparison)) { (flight.scenario.name) }
                 @if !comparison.scenario.description.is_empty() { p { (comparison.scenario.description) "." } }
                 p.quiet { (words::conditions(&comparison.scenario)) (tilt(flight)) "." }
                 @for entry in &comparison.entries {

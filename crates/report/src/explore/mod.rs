@@ -1,0 +1,63 @@
+//! Figures to explore: what the script of a page (`assets/explore.js`) draws anew in place of a figure, so that readers
+//! zoom, pan, hide contenders, read values under the cursor, and see flights again in space.
+//!
+//! Each figure carries its data, packed, beside its SVG, which is what is seen on paper and without JavaScript.
+
+mod chart;
+mod packed;
+mod paths;
+mod scene;
+
+pub(crate) use chart::{ExplorableChart, LegendEntry, Pen, Span, TracePanel};
+pub(crate) use paths::with_short_paths;
+pub(crate) use scene::{ExplorableScene, Place, rotors_on_a_circle_m};
+
+use maud::{Markup, PreEscaped, html};
+use serde::Serialize;
+
+/// What a page's script draws in place of a figure.
+#[derive(Serialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub(crate) enum Explorable {
+    /// Panels above each other with a common time axis.
+    Chart(ExplorableChart),
+    /// Flights in space, with a slider over time.
+    Scene(ExplorableScene),
+}
+
+const SCRIPT: &str = include_str!("../../assets/explore.js");
+/// Style of what the script draws.
+pub(crate) const STYLE: &str = include_str!("../../assets/explore.css");
+
+/// Attributes by which the script finds what it needs.
+const CHART: &str = "data-explore=\"chart\"";
+const SCENE: &str = "data-explore=\"scene\"";
+
+impl Explorable {
+    /// Returns the data of the figure, to be put beside its picture.
+    pub(crate) fn markup(&self) -> Markup {
+        let kind = match self {
+            Explorable::Chart(_) => "chart",
+            Explorable::Scene(_) => "scene",
+        };
+        // What is made of numbers and text alone can always be written.
+        let json = serde_json::to_vec(self).unwrap_or_default();
+        html! { script type="text/plain" data-explore=(kind) { (PreEscaped(packed::text(&json))) } }
+    }
+}
+
+/// Returns the scripts that a page with this body needs: none without a figure to explore.
+pub(crate) fn scripts(body: &Markup) -> Markup {
+    let (charts, scenes) = (body.0.contains(CHART), body.0.contains(SCENE));
+    let library = |name: &str, text: &str| {
+        html! { script type="text/plain" data-library=(name) { (PreEscaped(packed::text(text.as_bytes()))) } }
+    };
+    html! {
+        @if charts || scenes {
+            (library("uPlot", afbc_web::UPLOT_JS))
+            @if scenes { (library("THREE", afbc_web::THREE_JS)) }
+            style { (PreEscaped(afbc_web::UPLOT_CSS)) }
+            script { (PreEscaped(SCRIPT)) }
+        }
+    }
+}

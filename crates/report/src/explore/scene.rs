@@ -1,0 +1,98 @@
+//! Flights in space.
+
+use super::chart::Pen;
+use super::packed::deltas;
+use nalgebra::Vector3;
+use serde::Serialize;
+
+/// Largest number of points of a track.
+const POINTS_MAX: usize = 1500;
+/// Steps of the time axis, along an edge of the box, and in a whole turn.
+const TIME_STEPS: f64 = 1e6;
+const BOX_STEPS: f64 = 65_536.0;
+const TURN_STEPS: f64 = 65_536.0;
+
+/// Flights in space, in a frame with x forward (or north), y left (or west), z up, as the script draws them.
+#[derive(Serialize)]
+pub(crate) struct ExplorableScene {
+    pub(crate) title: String,
+    pub(crate) end_s: f64,
+    /// Corners of the box in which the tracks are \[m\].
+    pub(crate) low_m: [f64; 3],
+    pub(crate) high_m: [f64; 3],
+    /// Positions of the rotors in the body frame \[m\].
+    pub(crate) rotors_m: Vec<[f64; 2]>,
+    pub(crate) tracks: Vec<Track>,
+}
+
+/// Where a vehicle was, as differences on a grid: time in millionths of the scene's duration, positions in 2^-16 of
+/// the box's edges from its low corner, angles in 2^-16 of a turn.
+#[derive(Serialize)]
+pub(crate) struct Track {
+    name: String,
+    #[serde(flatten)]
+    pen: Pen,
+    times: Vec<i64>,
+    position: [Vec<i64>; 3],
+    /// Roll, pitch, yaw; none of a reference.
+    attitude: Option<[Vec<i64>; 3]>,
+}
+
+/// Time \[s\], position \[m\], roll, pitch and yaw \[rad\].
+pub(crate) type Place = (f64, Vector3<f64>, Vector3<f64>);
+
+/// Rotors of a vehicle of which nothing is known but how many it has: on a circle \[m\].
+pub(crate) fn rotors_on_a_circle_m(count: usize) -> Vec<[f64; 2]> {
+    let rotor = |i: usize| {
+        let (sin, cos) = libm::sincos(core::f64::consts::TAU * (i as f64 + 0.5) / count as f64);
+        [0.2 * cos, 0.2 * sin]
+    };
+    (0..count).map(rotor).collect()
+}
+
+impl ExplorableScene {
+    /// Returns a scene around all of these places, without a track yet; none if there are fewer than two.
+    pub(crate) fn around<'a>(places: impl Iterator<Item = &'a Place> + Clone, rotors_m: Vec<[f64; 2]>) -> Option<Self> {
+        places.clone().nth(1)?;
+        let end_s = places.clone().map(|place| place.0).fold(0.0, f64::max);
+        let limits = places.fold(None, |limits: Option<[Vector3<f64>; 2]>, place| {
+            let [low, high] = limits.unwrap_or([place.1; 2]);
+            Some([low.inf(&place.1), high.sup(&place.1)])
+        });
+        let [low, high] = limits?;
+        let room = Vector3::repeat(0.25 + 0.05 * (high - low).max());
+        let title = "In space".to_owned();
+        Some(ExplorableScene {
+            title,
+            end_s,
+            low_m: (low - room).into(),
+            high_m: (high + room).into(),
+            rotors_m,
+            tracks: Vec::new(),
+        })
+    }
+
+    /// Adds the way of a vehicle, or of its reference, which has no attitude.
+    pub(crate) fn add(&mut self, name: String, pen: Pen, places: &[Place], is_reference: bool) {
+        let stride = places.len().div_ceil(POINTS_MAX).max(1);
+        let last = places.last().filter(|_| places.len() % stride != 1 && stride > 1);
+        let few: Vec<&Place> = places.iter().step_by(stride).chain(last).collect();
+        let (low, high) = (Vector3::from(self.low_m), Vector3::from(self.high_m));
+        let along = |axis: usize| {
+            let [low, high] = [low, high].map(|corner| corner.get(axis).copied().unwrap_or_default());
+            let value = move |place: &&Place| place.1.get(axis).copied().unwrap_or_default();
+            deltas(few.iter().map(value), low, high, BOX_STEPS)
+        };
+        let about = |axis: usize| {
+            let value = move |place: &&Place| place.2.get(axis).copied().unwrap_or_default();
+            deltas(few.iter().map(value), 0.0, core::f64::consts::TAU, TURN_STEPS)
+        };
+        self.tracks.push(Track {
+            name,
+            pen,
+            times: deltas(few.iter().map(|place| place.0), 0.0, self.end_s, TIME_STEPS),
+            position: [0, 1, 2].map(along),
+            attitude: (!is_reference).then(|| [0, 1, 2].map(about)),
+        });
+    }
+}
