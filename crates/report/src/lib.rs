@@ -8,9 +8,11 @@ pub mod campaign;
 pub mod claims;
 pub mod compare;
 mod csv;
+mod differences;
 pub mod exact;
 mod figures;
 pub mod flights;
+mod grid;
 mod groups;
 pub mod markers;
 pub mod random;
@@ -22,3 +24,5 @@ pub mod suite;
 mod summary;
 mod table;
 mod words;
+
+pub use grid::TableFormat;

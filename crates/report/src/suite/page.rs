@@ -1,7 +1,7 @@
 //! The report of a suite.
 
-use super::FlownSuite;
 use super::cells::{FIGURES, Figure, lost, trip};
+use super::{FlownSuite, standing};
 use crate::figures::Picture;
 use crate::report::{picture, sheet};
 use crate::words;
@@ -19,6 +19,9 @@ pub(super) fn page(flown: FlownSuite<'_>, pictures: &[Option<Picture>]) -> Strin
                 "Every contender flies the same vehicle through the same noise and weather, with gains tuned for it by "
                 "the vehicle's rule. Figures are evaluated from " (SETTLED_S) " s to the end. *: best of its flight."
             }
+            @let standing = standing::grid(flown);
+            h2 { (standing.caption) }
+            (standing.section())
             @for figure in &FIGURES { h2 { (figure.title) } div.scroll { (results(flown, figure)) } }
             @if flown.rows().any(|(flight, _)| !flight.published.is_empty()) { (published(flown)) }
             @for ((flight, comparison), drawn) in flown.rows().zip(pictures) {
