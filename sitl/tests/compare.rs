@@ -58,7 +58,8 @@ fn soft(test: &str) -> PathBuf {
 #[test]
 fn compares_by_the_figures_of_fly() {
     let folder = soft("figures");
-    let table = succeeds(&sitl(&folder, &["compare", "soft.toml", "--controllers", "soft,backstepping,indi"]));
+    let once = ["compare", "soft.toml", "--seeds", "1", "--controllers", "soft,backstepping,indi"];
+    let table = succeeds(&sitl(&folder, &once));
     assert!(table.contains("soft ") && table.contains("INDI "), "{table}");
     let compared = json(&folder.join("out/compare/comparison.json"));
     succeeds(&sitl(&folder, &["fly", "soft.toml"]));
@@ -77,6 +78,128 @@ fn compares_by_the_figures_of_fly() {
     }
 }
 
+/// Ten seeds where a seed changes a flight, one where none does, unless a number is asked for.
+#[test]
+fn flies_several_seeds_where_they_matter() {
+    let folder = soft("usual-seeds");
+    let fly = |more: &[&str]| {
+        let table =
+            succeeds(&sitl(&folder, &[&["compare", "soft.toml", "hover", "--controllers", "pid"], more].concat()));
+        let compared = json(&folder.join("out/compare/comparison.json"));
+        let flown = |scenario: usize| compared[scenario]["contenders"][0]["seeds"].as_array().unwrap().len();
+        (table, [flown(0), flown(1)])
+    };
+    assert_eq!(fly(&["--seeds", "1"]).1, [1, 1]);
+    let (table, seeds) = fly(&[]);
+    assert_eq!(seeds, [10, 1]);
+    assert!(table.contains("over 10 seeds") && table.contains("Wilcoxon"), "{table}");
+}
+
+/// What the figures of the files say is what the flights of the same files say.
+#[test]
+fn medians_and_differences_are_those_of_the_flights() {
+    let folder = soft("statistics");
+    let fly = ["compare", "soft.toml", "--controllers", "pid,soft,afbc", "--seeds", "7", "--against", "pid"];
+    let table = succeeds(&sitl(&folder, &fly));
+    assert!(table.contains("less PID's"), "{table}");
+    let out = folder.join("out/compare");
+    let compared = &json(&out.join("comparison.json"))[0];
+    assert_eq!(compared["against"], "pid");
+    let text = fs::read_to_string(out.join("comparison.csv")).unwrap();
+    let rows: Vec<Vec<&str>> = text.lines().map(|line| line.split(',').collect()).collect();
+    let column = rows[0].iter().position(|head| *head == "rms_m").unwrap();
+    let of = |who: &str| -> Vec<f64> {
+        rows.iter().filter(|row| row[1] == who).map(|row| row[column].parse().unwrap()).collect()
+    };
+    let sorted = |mut values: Vec<f64>| {
+        values.sort_by(f64::total_cmp);
+        values
+    };
+    for contender in compared["contenders"].as_array().unwrap() {
+        let who = contender["name"].as_str().unwrap();
+        let figure = &contender["figures"][0];
+        assert_eq!(figure["name"], "rms_m");
+        let own = sorted(of(who));
+        // Of seven, the fourth, and between the ends 98 %.
+        for (key, expected) in [("median", own[3]), ("low_95", own[0]), ("high_95", own[6])] {
+            // Read from JSON to the last digit but one.
+            assert!((figure[key].as_f64().unwrap() / expected - 1.0).abs() < 1e-12, "{who} {key}");
+        }
+        if who == "pid" {
+            assert_eq!((&figure["difference"], &figure["p"]), (&Value::Null, &Value::Null));
+            continue;
+        }
+        let differences = sorted(of(who).iter().zip(of("pid")).map(|(own, pid)| own - pid).collect());
+        assert!((figure["difference"].as_f64().unwrap() / differences[3] - 1.0).abs() < 1e-9, "{who}");
+    }
+    // Seven of seven further than PID, and of two laws: 2/2^7, twice.
+    let soft = &compared["contenders"][1]["figures"][0];
+    assert_eq!((&soft["p"], &soft["rank_biserial"]), (&(1.0 / 64.0).into(), &1.0.into()));
+    assert_eq!(soft["p_holm"], 1.0 / 32.0);
+    let statistics = fs::read_to_string(out.join("statistics.csv")).unwrap();
+    assert_eq!(statistics.lines().count(), 1 + 3 * 7);
+    let row = statistics.lines().find(|row| row.starts_with("round,soft,7,0,rms_m,")).unwrap();
+    assert!(row.ends_with(",0.015625,0.03125,1.0"), "{row}");
+}
+
+#[test]
+fn prints_the_tables_of_its_folder_for_a_paper() {
+    let folder = soft("tables");
+    let fly = ["compare", "soft.toml", "--controllers", "pid,soft", "--seeds", "6", "--table"];
+    for (format, file, begins) in
+        [("latex", "tables.tex", "% \\usepackage{booktabs}\n"), ("markdown", "tables.md", "round: ")]
+    {
+        let printed = succeeds(&sitl(&folder, &[&fly[..], &[format]].concat()));
+        assert_eq!(printed, fs::read_to_string(folder.join("out/compare").join(file)).unwrap());
+        assert!(printed.starts_with(begins) && printed.contains("soft") && printed.contains("0.031"), "{printed}");
+    }
+    let suite = ["compare", "--suite", "two.toml", "--controllers", "pid,indi", "--table", "latex", "--seeds", "1"];
+    fs::write(folder.join("two.toml"), SUITE).unwrap();
+    let printed = succeeds(&sitl(&folder, &suite));
+    assert!(printed.contains("\\label{tab:two-2}") && printed.contains("racing"), "{printed}");
+    let random = ["compare", "--suite", "random", "--vehicle", "iris", "--flights", "2", "--controllers", "pid,indi"];
+    let printed = succeeds(&sitl(&folder, &[&random[..], &["--table", "markdown"]].concat()));
+    assert!(printed.contains("| law | best or level |"), "{printed}");
+}
+
+/// A manifest makes the same bytes again, and says so if they are others.
+#[test]
+fn a_manifest_makes_the_same_results_again() {
+    let folder = soft("again");
+    fs::write(folder.join("two.toml"), SUITE).unwrap();
+    for (name, command) in [
+        ("compare", &["compare", "soft.toml", "--controllers", "pid,soft", "--seeds", "2"][..]),
+        ("suite", &["compare", "--suite", "two.toml", "--controllers", "pid", "--seeds", "1"]),
+        ("random", &["compare", "--suite", "random", "--vehicle", "iris", "--flights", "1", "--controllers", "pid"]),
+        ("round", &["fly", "soft.toml", "--controller", "soft"]),
+    ] {
+        succeeds(&sitl(&folder, &[command, &["--out", &format!("mine/{name}"), "--force"]].concat()));
+        let manifest = format!("mine/{name}/manifest.json");
+        let written = json(&folder.join(&manifest));
+        assert_eq!(written["command"], serde_json::json!(command));
+        let flown = &written["flown"][0];
+        assert!(!flown["seeds"].as_array().unwrap().is_empty());
+        assert!(flown["scenario"]["contenders"][0]["law"].is_object(), "{flown}");
+        assert!(written["machine"]["cores"].as_u64().unwrap() > 0);
+        let said = succeeds(&sitl_on("1", &folder, &["again", &manifest]));
+        assert!(said.starts_with("the same bytes: "), "{said}");
+        assert!(folder.join(format!("mine/{name}-again/report.html")).exists());
+    }
+    // Other gains: another flight, and the reason.
+    fs::write(folder.join("soft.toml"), SOFT.replace("climb_p_1_s = 1.5", "climb_p_1_s = 1.6")).unwrap();
+    let output = sitl(&folder, &["again", "mine/round", "--out", "other"]);
+    let said = String::from_utf8(output.stdout).unwrap();
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert!(said.contains("round-soft.csv: differs\n") && said.contains("what was flown is not the same"), "{said}");
+    // A changed manifest, and one that is not there.
+    let path = folder.join("mine/round/manifest.json");
+    fs::write(&path, fs::read_to_string(&path).unwrap().replace("\"soft.toml\"", "\"hover\"")).unwrap();
+    let line = refused(&sitl(&folder, &["again", "mine/round"]));
+    assert!(line.starts_with("mine/round/manifest.json: damaged or no manifest (its checksum is wrong)"), "{line}");
+    let line = refused(&sitl(&folder, &["again", "nowhere.json"]));
+    assert!(line.starts_with("nowhere.json: cannot be read") && line.lines().count() == 1, "{line}");
+}
+
 #[test]
 fn compares_over_seeds_alike_on_any_number_of_threads() {
     let folder = soft("seeds");
@@ -86,11 +209,12 @@ fn compares_over_seeds_alike_on_any_number_of_threads() {
     };
     let table = fly("1", "one");
     fly("3", "three");
-    for file in ["comparison.csv", "comparison.json", "report.html", "round-errors.svg", "circle-rmse.svg"] {
+    for file in ["comparison.csv", "comparison.json", "statistics.csv", "tables.tex", "report.html", "round-errors.svg"]
+    {
         let [one, three] = ["one", "three"].map(|out| fs::read(folder.join(out).join(file)).unwrap());
         assert!(one == three, "{file}");
     }
-    assert!(table.contains(" ±"), "{table}");
+    assert!(table.contains("round: root mean square distance from the reference over 3 seeds:"), "{table}");
     let rows = fs::read_to_string(folder.join("one/comparison.csv")).unwrap();
     assert_eq!(rows.lines().count(), 1 + 2 * 2 * 3);
     let pid = &json(&folder.join("one/comparison.json"))[0]["contenders"][0];
@@ -211,6 +335,7 @@ fn a_suite_that_cannot_be_flown_is_refused_in_one_line() {
         (&["--suite", "./nothing.toml"], "./nothing.toml: no such file; `sitl suites` lists the built-in ones"),
         (&["--suite", "bad.toml"], "bad.toml:19: flight.like: no flight above is called \"nobody\""),
         (&["--suite", "faults", "--controllers", "sof"], "controllers sof: no such controller; there are afbc,"),
+        (&["hover", "--against", "sof"], "--against sof: does not fly; name one of afbc"),
     ] {
         let line = refused(&sitl(&folder, &[&["compare"], arguments].concat()));
         assert!(line.starts_with(expected) && line.lines().count() == 1, "{line}");

@@ -44,7 +44,8 @@ fn compared(name: &str, page: &str) {
         let (page, code) = (cells(page), cells(code));
         page.len() != code.len() || page.iter().zip(&code).any(|(page, code)| !agree(page, code))
     });
-    let cure = format!("run `cargo run --release -- compare --suite {name} --write docs/{name}.md`, or suites.md");
+    let cure =
+        format!("run `cargo run --release -- compare --suite {name} --seeds 1 --write docs/{name}.md`, or suites.md");
     assert_eq!(differ, None, "{cure}");
     assert_eq!(page.lines().count(), code.lines().count(), "{cure}");
 }

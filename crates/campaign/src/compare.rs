@@ -1,5 +1,6 @@
 //! Comparison of contenders: each of them in each scenario.
 
+use crate::statistics::Median;
 use afbc::Profile;
 use afbc_reader::FileError;
 use afbc_scenario::Scenario;
@@ -102,6 +103,16 @@ pub fn contenders(scenarios: &[Scenario]) -> Vec<Contender> {
     all
 }
 
+/// Number of seeds that a comparison flies, unless another is asked for, where a seed changes anything: the least round
+/// number with which eight laws that all differ from a ninth can be told from chance, by a signed rank test (2/2^10)
+/// under Holm's correction (times 8).
+pub const SEEDS: u64 = 10;
+
+/// Returns the number of seeds that `scenario` is flown with unless another is asked for: one, if no seed changes it.
+pub fn usual_seeds(scenario: &Scenario) -> u64 {
+    if scenario.is_random() { SEEDS } else { 1 }
+}
+
 /// Flights of one scenario under every contender.
 #[derive(Clone, Debug)]
 pub struct Comparison {
@@ -109,6 +120,8 @@ pub struct Comparison {
     pub scenario: Scenario,
     /// One entry for each of the scenario's contenders.
     pub entries: Vec<Entry>,
+    /// Place of the contender that the others are compared with.
+    pub against: usize,
 }
 
 /// One contender's flights of one scenario.
@@ -156,6 +169,10 @@ pub struct Measure {
     pub value: fn(&Metrics) -> f64,
 }
 
+/// The figure that differences between contenders are tested by.
+pub const DISTANCE: Measure =
+    Measure { name: "rms_m", title: "distance [m]", digits: 5, scale: 1.0, value: |m| m.rmse.xyz().norm() };
+
 /// Figures by which contenders are compared.
 pub const MEASURES: [Measure; 6] = [
     Measure { name: "rmse_x_m", title: "x [m]", digits: 4, scale: 1.0, value: |m| m.rmse.x },
@@ -190,6 +207,17 @@ impl Entry {
         self.flights.iter().filter(|flight| flight.lost.is_some()).count()
     }
 
+    /// Returns a figure of every flight; infinite for a vehicle that was lost, which is worse than any other.
+    pub fn values(&self, value: impl Fn(&Metrics) -> f64) -> Vec<f64> {
+        let of = |flight: &Outcome| if flight.lost.is_some() { f64::INFINITY } else { value(&flight.metrics) };
+        self.flights.iter().map(of).collect()
+    }
+
+    /// Returns the median of a figure over the flights, if that is not a lost one.
+    pub fn median(&self, value: impl Fn(&Metrics) -> f64) -> Option<Median> {
+        Median::of(&self.values(value)).filter(|median| median.value.is_finite())
+    }
+
     /// Returns mean and standard deviation of a figure over the flights; none if a vehicle was lost.
     pub fn average(&self, value: impl Fn(&Metrics) -> f64) -> Option<Average> {
         if self.lost() > 0 {
@@ -204,9 +232,18 @@ impl Entry {
 }
 
 impl Comparison {
-    /// Returns the root mean square distance of a contender divided by that of backstepping, if neither lost a vehicle.
+    /// Compares the others with the contender called `name`, or else with AFBC, or else with the first.
+    #[must_use]
+    pub fn against(mut self, name: Option<&str>) -> Self {
+        let place = |name| self.entries.iter().position(|entry| entry.contender().name == name);
+        self.against = name.and_then(place).or_else(|| place(ControllerKind::Afbc.name())).unwrap_or_default();
+        self
+    }
+
+    /// Returns the median root mean square distance of a contender divided by that of backstepping, if neither is a
+    /// lost one.
     pub fn ratio(&self, entry: &Entry) -> Option<f64> {
-        let distance = |entry: &Entry| entry.average(|metrics| metrics.rmse.xyz().norm()).map(|average| average.mean);
+        let distance = |entry: &Entry| entry.median(DISTANCE.value).map(|median| median.value);
         let classical = |entry: &&Entry| entry.contender().kind() == ControllerKind::Backstepping;
         let ratio = distance(entry)? / distance(self.entries.iter().find(classical)?)?;
         // Not defined for flights that ended before errors count.
@@ -218,17 +255,15 @@ impl Comparison {
         self.entries.iter().any(|entry| entry.flights.len() > 1)
     }
 
-    /// True if `entry` has the smallest mean of a figure among those that lost no vehicle.
+    /// True if `entry` has the smallest median of a figure among those that lost no vehicle.
     pub fn is_best(&self, entry: &Entry, figure: &Measure) -> bool {
-        let mean = |entry: &Entry| entry.average(figure.value).map(|average| average.mean);
-        let Some(own) = mean(entry) else { return false };
-        self.entries.iter().filter_map(mean).all(|other| own <= other)
+        let median =
+            |entry: &Entry| entry.median(figure.value).filter(|_| entry.lost() == 0).map(|median| median.value);
+        median(entry).is_some_and(|own| self.entries.iter().filter_map(median).all(|other| own <= other))
     }
 }
 
-/// Flies every scenario under each of its contenders, with `seeds` consecutive seeds from the scenario's own on, on the
-/// current rayon pool; logs every `log_every`-th step of the first flight. Calls `progress` after each flight. The
-/// result does not depend on the number of threads.
+/// Flies every scenario as [`fly_seeds`] does, all with the same number of `seeds`.
 ///
 /// # Errors
 /// The first parameter, gain or setting out of range.
@@ -238,25 +273,41 @@ pub fn fly(
     log_every: u64,
     progress: &(dyn Fn() + Sync),
 ) -> Result<Vec<Comparison>, OutOfRange> {
+    fly_seeds(scenarios.into_iter().map(|scenario| (scenario, seeds)).collect(), log_every, progress)
+}
+
+/// Flies every scenario under each of its contenders, with as many consecutive seeds, from the scenario's own on, on
+/// the current rayon pool; logs every `log_every`-th step of the first flight. Calls `progress` after each flight. The
+/// result does not depend on the number of threads.
+///
+/// # Errors
+/// The first parameter, gain or setting out of range.
+pub fn fly_seeds(
+    scenarios: Vec<(Scenario, u64)>,
+    log_every: u64,
+    progress: &(dyn Fn() + Sync),
+) -> Result<Vec<Comparison>, OutOfRange> {
     let outcome = |scenario: &Scenario, contender: &Contender, number: u64| {
         let scenario = Scenario { seed: scenario.seed + number, ..scenario.clone() };
         let run = Run::fly(&scenario, contender, if number == 0 { log_every } else { u64::MAX })?;
         progress();
-        Ok((Outcome::of(&scenario, &run), run))
+        Ok((Outcome::of(&scenario, &run), (number == 0).then_some(run)))
     };
-    let entry = |scenario: &Scenario, contender: &Contender| {
-        let flown: Vec<(Outcome, Run)> = (0..seeds.max(1))
+    let entry = |scenario: &Scenario, contender: &Contender, seeds: u64| {
+        let flown: Vec<(Outcome, Option<Run>)> = (0..seeds.max(1))
             .into_par_iter()
             .map(|number| outcome(scenario, contender, number))
             .collect::<Result<_, _>>()?;
         let flights = flown.iter().map(|(outcome, _)| *outcome).collect();
-        let first = flown.into_iter().next().map(|(_, run)| Flown { scenario: scenario.clone(), run });
+        let first = flown.into_iter().find_map(|(_, run)| Some(Flown { scenario: scenario.clone(), run: run? }));
         Ok(first.map(|first| Entry { first, flights }))
     };
-    let compare = |scenario: Scenario| {
+    let compare = |(scenario, seeds): (Scenario, u64)| {
+        let contenders = scenario.contenders.par_iter();
         let entries: Vec<Option<Entry>> =
-            scenario.contenders.par_iter().map(|contender| entry(&scenario, contender)).collect::<Result<_, _>>()?;
-        Ok(Comparison { scenario, entries: entries.into_iter().flatten().collect() })
+            contenders.map(|contender| entry(&scenario, contender, seeds)).collect::<Result<_, _>>()?;
+        let entries = entries.into_iter().flatten().collect();
+        Ok(Comparison { scenario, entries, against: 0 }.against(None))
     };
     scenarios.into_par_iter().map(compare).collect()
 }

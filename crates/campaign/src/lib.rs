@@ -22,6 +22,7 @@ pub mod statistics;
 pub mod subject;
 pub mod suite;
 mod summary;
+mod versus;
 
 pub use built_in::{BUILT_IN, built_in, similar_built_in};
 pub use draw::Draw;
@@ -34,3 +35,4 @@ pub use plan::{Campaign, NamedTrajectory, Spread};
 pub use quantity::{QUANTITIES, Quantity};
 pub use row::{Column, FIGURES, Figure, Row};
 pub use summary::{BINS, Bad, Count, Summary, Tally};
+pub use versus::Versus;

@@ -3,7 +3,9 @@
 //! Near its end the file holds `xxh64:` and 16 digits: its own XXH64, computed with 16 zeros in their place.
 
 use core::hash::Hasher;
+use std::fs;
 use std::io::{self, Read, Seek, SeekFrom, Write};
+use std::path::Path;
 use twox_hash::XxHash64;
 
 /// Tag in a file before it is sealed.
@@ -66,6 +68,16 @@ pub fn json(out: &mut dyn Write, value: &impl serde::Serialize) -> io::Result<()
     serde_json::to_writer_pretty(&mut out, value)?;
     writeln!(out)?;
     out.finish()
+}
+
+/// Returns the XXH64 of a file, as a tag like a seal's.
+///
+/// # Errors
+/// If it cannot be read.
+pub fn hash_of_file(path: &Path) -> io::Result<String> {
+    let mut hash = XxHash64::with_seed(0);
+    hash.write(&fs::read(path)?);
+    Ok(format!("xxh64:{:016x}", hash.finish()))
 }
 
 /// Checks that a sealed file is unchanged.

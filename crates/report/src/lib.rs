@@ -8,10 +8,12 @@ pub mod campaign;
 pub mod claims;
 pub mod compare;
 mod csv;
+mod differences;
 pub mod exact;
 mod explore;
 mod figures;
 pub mod flights;
+mod grid;
 mod groups;
 pub mod markers;
 pub mod random;
@@ -23,3 +25,5 @@ pub mod suite;
 mod summary;
 mod table;
 mod words;
+
+pub use grid::TableFormat;

@@ -9,8 +9,8 @@ use afbc_flight_core::ArmingLimits;
 use afbc_flight_core::motor::Response;
 use afbc_plant::instruments::{Imu, InstrumentFault};
 use afbc_plant::{
-    Environment, Frame, InstrumentSuite, Instruments, Motion, Plant, PlantModel, Realism, Rotors, Sensing, SensorFault,
-    StateSensor,
+    Deviations, Environment, Frame, InstrumentSuite, Instruments, Motion, Plant, PlantModel, Realism, Rotors, Sensing,
+    SensorFault, StateSensor,
 };
 use afbc_reader::FileError;
 use afbc_reader::words::out_of_range;
@@ -176,6 +176,13 @@ impl Scenario {
         let instruments = self.instrument_faults.iter().map(|fault| fault.start_s);
         let outages = self.outages.iter().map(|outage| outage.start_s);
         sensors.chain(instruments).chain(outages).fold(f64::INFINITY, f64::min)
+    }
+
+    /// True if another seed gives another flight: noise, biases, dropouts, turbulence or instruments draw from it.
+    pub fn is_random(&self) -> bool {
+        let Sensing { noise, bias, delay_s: _, period_s: _, gyro: _, dropouts } = self.sensing;
+        let exact = [noise, bias].iter().all(|spread| *spread == Deviations::default()) && dropouts.is_none();
+        !exact || self.realism.wind.turbulence.is_some() || self.instruments != InstrumentSuite::default()
     }
 
     /// True if rotors, air and ground are those of the paper's equations.

@@ -4,11 +4,13 @@ use super::progress::Progress;
 use super::target::Target;
 use super::terminal::Failure;
 use super::vehicle::OnVehicle;
-use super::written::{Output, show};
-use super::{interrupt, random, suite};
-use afbc_campaign::compare::{self, choose, standard};
+use super::written::Output;
+use super::{interrupt, manifest, random, suite};
+use afbc_campaign::compare::{self, Comparison, choose, standard};
 use afbc_campaign::suite::suite_at;
+use afbc_files::Folder;
 use afbc_report::compare as report;
+use afbc_scenario::Scenario;
 use afbc_sim::LogRate;
 use clap::Args;
 use std::path::PathBuf;
@@ -35,10 +37,14 @@ pub(crate) struct Compare {
     #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
     controllers: Vec<String>,
 
-    /// Fly each scenario with this many consecutive seeds, from its own on, and compare means; with `--suite random`,
-    /// draw flights from this many
-    #[arg(long, value_name = "N", default_value = "1", value_parser = clap::value_parser!(u64).range(1..=10_000))]
-    seeds: u64,
+    /// Fly each scenario with this many consecutive seeds, from its own on; with `--suite random`, draw flights from
+    /// this many [default: 10, or 1 where no seed changes a flight; 1 for the suite random]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=10_000))]
+    seeds: Option<u64>,
+
+    /// Contender that the others are compared with [default: afbc, or else the first]
+    #[arg(long, value_name = "NAME")]
+    against: Option<String>,
 
     #[command(flatten)]
     on: OnVehicle,
@@ -60,20 +66,23 @@ impl Compare {
                 [] if own.is_empty() => known,
                 names => choose(&known, names)?,
             };
-            let Compare { random, seeds, output, .. } = self;
+            let Compare { random, seeds, against, output, .. } = self;
+            let names = contenders.iter().chain(&own).map(|contender| contender.name.as_str());
+            flies(against.as_deref(), &names.collect::<Vec<_>>())?;
             if random::is_named(path) {
                 if let Some(twice) = own.iter().find(|own| contenders.iter().any(|other| other.name == own.name)) {
                     let name = &twice.name;
                     return Err(format!("--controllers {name}: --from has a contender of this name; rename it").into());
                 }
-                return random.run(self.on.vehicle()?, [&contenders, &own], seeds, &output);
+                let against = against.as_deref().unwrap_or("afbc");
+                return random.run(self.on.vehicle()?, [&contenders, &own], seeds.unwrap_or(1), against, &output);
             }
             let suite = suite_at(path)?;
             if let Some(option) = self.on.vehicle()?.map(|_| "--vehicle").or_else(|| random.given()) {
                 let cure = "only --suite random takes it, this suite's flights are in its file; leave it out";
                 return Err(format!("{option}: {cure}").into());
             }
-            return suite::run(&suite, &contenders, seeds, &output);
+            return suite::run(&suite, &contenders, seeds, against.as_deref(), &output);
         }
         if let Some(option) = self.random.given() {
             return Err(format!("{option}: only --suite random takes it; leave it out").into());
@@ -86,19 +95,56 @@ impl Compare {
             *scenario = self.on.put(scenario.clone())?;
             compare::fly_under(scenario, &contenders)?;
         }
+        flies(self.against.as_deref(), &contenders.iter().map(|own| own.name.as_str()).collect::<Vec<_>>())?;
         let log_every = LogRate::common(&scenarios)?;
         interrupt::ends_it()?;
-        let Output { place, json, .. } = self.output;
-        let folder = place.open("compare", "compare")?;
-        let flights: u64 = scenarios.iter().map(|scenario| scenario.contenders.len() as u64 * self.seeds).sum();
-        let progress = Progress::new("compare", "flights", flights, 0);
-        let comparisons = compare::fly(scenarios, self.seeds, log_every, &|| progress.add(1))?;
-        drop(progress);
+        let folder = self.output.place.open("compare", "compare")?;
+        let comparisons = fly(scenarios, self.seeds, self.against.as_deref(), log_every)?;
 
         interrupt::is_too_late();
         let written = report::write(&folder, &comparisons)?;
+        record(&folder, &written, &comparisons)?;
         let object = |out: &mut Vec<u8>| report::json(out, &comparisons);
-        show(&folder, written.len(), json, object, || report::table(&comparisons))?;
+        let tables = |format| report::tables(&comparisons, format);
+        self.output.show(&folder, written.len() + 1, object, tables, || report::table(&comparisons))?;
         Ok(ExitCode::SUCCESS)
     }
+}
+
+/// Checks that `against` is one of those who fly.
+fn flies(against: Option<&str>, names: &[&str]) -> Result<(), Failure> {
+    match against.filter(|against| !names.contains(against)) {
+        Some(against) => Err(format!("--against {against}: does not fly; name one of {}", names.join(", ")).into()),
+        None => Ok(()),
+    }
+}
+
+/// Flies the scenarios, with as many seeds as are asked for or usual, and shows the progress.
+pub(super) fn fly(
+    scenarios: Vec<Scenario>,
+    seeds: Option<u64>,
+    against: Option<&str>,
+    log_every: u64,
+) -> Result<Vec<Comparison>, Failure> {
+    let planned = scenarios.into_iter().map(|scenario| {
+        let seeds = seeds.unwrap_or_else(|| compare::usual_seeds(&scenario));
+        (scenario, seeds)
+    });
+    let planned: Vec<_> = planned.collect();
+    let flights = planned.iter().map(|(scenario, seeds)| scenario.contenders.len() as u64 * seeds).sum();
+    let progress = Progress::new("compare", "flights", flights, 0);
+    let comparisons = compare::fly_seeds(planned, log_every, &|| progress.add(1))?;
+    drop(progress);
+    Ok(comparisons.into_iter().map(|comparison| comparison.against(against)).collect())
+}
+
+/// Writes the manifest of a comparison's files.
+pub(super) fn record(folder: &Folder, files: &[PathBuf], comparisons: &[Comparison]) -> Result<(), Failure> {
+    let seeds = |comparison: &Comparison| {
+        let flights = comparison.entries.first().map_or(&[][..], |first| &first.flights);
+        flights.iter().map(|flight| flight.seed).collect()
+    };
+    let flown: Vec<manifest::Flown<'_>> =
+        comparisons.iter().map(|comparison| (&comparison.scenario, seeds(comparison))).collect();
+    manifest::write(folder, files, &flown, &flown)
 }

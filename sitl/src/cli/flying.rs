@@ -1,10 +1,10 @@
 //! Options, flights and output shared by `paper` and `fly`.
 
-use super::interrupt;
 use super::json::Json;
 use super::progress::Progress;
 use super::terminal::{Failure, say};
 use super::written::show;
+use super::{interrupt, manifest};
 use afbc_files::Folder;
 use afbc_report::claims::Claim;
 use afbc_report::flights;
@@ -86,5 +86,10 @@ fn progress(scenarios: &[Scenario]) -> Progress {
 pub(crate) fn report(folder: &Folder, flown: &[Flown], claims: &[Claim], json: Json) -> Result<(), Failure> {
     interrupt::is_too_late();
     let written = flights::write(folder, flown, claims)?;
-    show(folder, written.len(), json, |out| flights::json(out, flown), || flights::table(flown, claims))
+    let whole: Vec<manifest::Flown<'_>> =
+        flown.iter().map(|Flown { scenario, .. }| (scenario, vec![scenario.seed])).collect();
+    let mut first = whole.clone();
+    first.dedup_by(|a, b| a == b);
+    manifest::write(folder, &written, &whole, &first)?;
+    show(folder, written.len() + 1, json, |out| flights::json(out, flown), || flights::table(flown, claims))
 }

@@ -1,6 +1,7 @@
 //! The command line: one module for each command.
 
 mod aboard;
+mod again;
 mod bring_up;
 mod campaign;
 mod compare;
@@ -12,6 +13,7 @@ mod hitl;
 mod in_the_loop;
 mod interrupt;
 mod json;
+mod manifest;
 mod mcap;
 mod page;
 mod paper;
@@ -62,6 +64,7 @@ enum Command {
     Campaign(campaign::Campaign),
     Merge(campaign::Merge),
     Compare(compare::Compare),
+    Again(again::Again),
     Tune(tune::Tune),
     Check(scenarios::Check),
     Scenarios(scenarios::Scenarios),
@@ -89,6 +92,7 @@ impl Cli {
             Command::Campaign(campaign) => campaign.run(),
             Command::Merge(merge) => merge.run(),
             Command::Compare(compare) => compare.run(),
+            Command::Again(again) => again.run(),
             Command::Tune(tune) => tune.run(),
             Command::Check(check) => check.run(),
             Command::Scenarios(scenarios) => scenarios.run(),

@@ -3,16 +3,18 @@
 use super::progress::Progress;
 use super::target::Target;
 use super::terminal::Failure;
-use super::written::{Output, show};
-use super::{interrupt, page};
+use super::written::Output;
+use super::{interrupt, manifest, page};
 use afbc_campaign::random::{self, FLIGHTS, FlownDraw, NAME, Random, Seen};
+use afbc_files::Folder;
 use afbc_reader::BuiltIn;
 use afbc_report::random::{self as report, Judged};
 use afbc_report::suite::markers;
 use afbc_scenario::contender::Contender;
 use afbc_vehicles::{BUILT_IN, Vehicle};
 use clap::{Args, ValueEnum};
-use std::path::Path;
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 /// One line on the suite.
@@ -38,10 +40,6 @@ pub(super) struct Options {
     /// --controllers
     #[arg(long, value_name = "SCENARIO", requires = "suite")]
     from: Option<Target>,
-
-    /// Contender that the others are compared with [default: afbc, or else the first]
-    #[arg(long, value_name = "NAME", requires = "suite")]
-    against: Option<String>,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -65,13 +63,12 @@ pub(super) const fn flights() -> usize {
 impl Options {
     /// The first option that was given, by name.
     pub(super) fn given(&self) -> Option<&'static str> {
-        let Options { seed, flights, on_estimate, from, against } = self;
+        let Options { seed, flights, on_estimate, from } = self;
         let all = [
             (seed.is_some(), "--seed"),
             (flights.is_some(), "--flights"),
             (on_estimate.is_some(), "--on-estimate"),
             (from.is_some(), "--from"),
-            (against.is_some(), "--against"),
         ];
         all.into_iter().find_map(|(given, name)| given.then_some(name))
     }
@@ -87,13 +84,9 @@ impl Options {
         vehicle: Option<Vehicle>,
         contenders: [&[Contender]; 2],
         seeds: u64,
-        Output { write, place, json }: &Output,
+        against: &str,
+        output: &Output,
     ) -> Result<ExitCode, Failure> {
-        let against = self.against.as_deref().unwrap_or("afbc");
-        let names: Vec<_> = contenders.into_iter().flatten().map(|contender| contender.name.as_str()).collect();
-        if self.against.is_some() && !names.contains(&against) {
-            return Err(format!("--against {against}: does not fly; name one of {}", names.join(", ")).into());
-        }
         let seed = self.seed.unwrap_or(1);
         let random = Random {
             seeds: seed..seed + seeds,
@@ -108,7 +101,7 @@ impl Options {
                 None => BUILT_IN.iter().map(BuiltIn::read).collect::<Result<_, _>>()?,
             },
         };
-        if let Some(path) = write {
+        if let Some(path) = &output.write {
             let [begin, end] = markers(NAME);
             page::write(path, [&begin, &end], || {
                 let flown = fly(&random, contenders, || Ok(()))?;
@@ -118,15 +111,28 @@ impl Options {
         }
         let mut folder = None;
         let flown = fly(&random, contenders, || {
-            folder = Some(place.open(NAME, NAME)?);
+            folder = Some(output.place.open(NAME, NAME)?);
             Ok(())
         })?;
         let Some(folder) = folder else { return Ok(ExitCode::SUCCESS) };
         let judged = Judged::new(&random, &flown, against);
         let written = report::write(&folder, &judged)?;
-        show(&folder, written.len(), *json, |out| report::json(out, &judged), || report::table(&judged))?;
+        record(&folder, &written, &flown)?;
+        let object = |out: &mut Vec<u8>| report::json(out, &judged);
+        let tables = |format| report::tables(&judged, format);
+        output.show(&folder, written.len() + 1, object, tables, || report::table(&judged))?;
         Ok(ExitCode::SUCCESS)
     }
+}
+
+/// Writes the manifest of the files: every flight decides, and the first of each vehicle is written out.
+fn record(folder: &Folder, files: &[PathBuf], flown: &[FlownDraw]) -> Result<(), Failure> {
+    let all = flown.iter().map(|flown| (&flown.flight.scenario, vec![flown.flight.scenario.seed]));
+    let all: Vec<manifest::Flown<'_>> = all.collect();
+    let mut vehicles = BTreeSet::new();
+    let firsts = flown.iter().zip(&all).filter(|(flown, _)| vehicles.insert(flown.flight.vehicle.as_str()));
+    let firsts: Vec<manifest::Flown<'_>> = firsts.map(|(_, one)| one.clone()).collect();
+    manifest::write(folder, files, &all, &firsts)
 }
 
 /// Flies after `ready`, when all flights are known to be right.

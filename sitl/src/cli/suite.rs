@@ -1,10 +1,9 @@
 //! `sitl compare --suite` and `sitl suites`: named lists of flights.
 
-use super::progress::Progress;
 use super::terminal::{Failure, print};
-use super::written::{Output, show};
-use super::{interrupt, page, random};
-use afbc_campaign::compare::{self, Comparison};
+use super::written::Output;
+use super::{compare, interrupt, page, random};
+use afbc_campaign::compare::Comparison;
 use afbc_campaign::random::NAME;
 use afbc_campaign::suite::{self, SUITES, Suite};
 use afbc_reader::{BuiltIn, FileError};
@@ -52,26 +51,30 @@ fn line(name: &str, flights: usize, description: &str) -> String {
 pub(super) fn run(
     suite: &Suite,
     contenders: &[Contender],
-    seeds: u64,
-    Output { write, place, json }: &Output,
+    seeds: Option<u64>,
+    against: Option<&str>,
+    output: &Output,
 ) -> Result<ExitCode, Failure> {
-    if let Some(path) = write {
+    if let Some(path) = &output.write {
         let [begin, end] = report::markers(&suite.name);
         page::write(path, [&begin, &end], || {
-            let comparisons = fly(suite, contenders, seeds, || Ok(()))?;
+            let comparisons = fly(suite, contenders, seeds, against, || Ok(()))?;
             Ok(report::markdown(FlownSuite { suite, comparisons: &comparisons }))
         })?;
         return Ok(ExitCode::SUCCESS);
     }
     let mut folder = None;
-    let comparisons = fly(suite, contenders, seeds, || {
-        folder = Some(place.open("suite", "suite")?);
+    let comparisons = fly(suite, contenders, seeds, against, || {
+        folder = Some(output.place.open("suite", "suite")?);
         Ok(())
     })?;
     let Some(folder) = folder else { return Ok(ExitCode::SUCCESS) };
     let flown = FlownSuite { suite, comparisons: &comparisons };
     let written = report::write(&folder, flown)?;
-    show(&folder, written.len(), *json, |out| report::json(out, flown), || report::table(flown))?;
+    compare::record(&folder, &written, &comparisons)?;
+    let object = |out: &mut Vec<u8>| report::json(out, flown);
+    let tables = |format| report::tables(flown, format);
+    output.show(&folder, written.len() + 1, object, tables, || report::table(flown))?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -79,17 +82,15 @@ pub(super) fn run(
 fn fly(
     suite: &Suite,
     contenders: &[Contender],
-    seeds: u64,
+    seeds: Option<u64>,
+    against: Option<&str>,
     ready: impl FnOnce() -> Result<(), Failure>,
 ) -> Result<Vec<Comparison>, Failure> {
     let scenarios = suite.under(contenders)?;
     let log_every = LogRate::common(&scenarios)?;
     interrupt::ends_it()?;
     ready()?;
-    let flights: u64 = scenarios.iter().map(|scenario| scenario.contenders.len() as u64 * seeds).sum();
-    let progress = Progress::new("compare", "flights", flights, 0);
-    let comparisons = compare::fly(scenarios, seeds, log_every, &|| progress.add(1))?;
-    drop(progress);
+    let comparisons = compare::fly(scenarios, seeds, against, log_every)?;
     interrupt::is_too_late();
     Ok(comparisons)
 }

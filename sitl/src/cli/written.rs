@@ -4,7 +4,8 @@ use super::json::{self, Json};
 use super::place::Place;
 use super::terminal::{Failure, print};
 use afbc_files::Folder;
-use clap::Args;
+use afbc_report::TableFormat;
+use clap::{Args, ValueEnum};
 use std::io;
 use std::path::PathBuf;
 
@@ -15,11 +16,50 @@ pub(super) struct Output {
     #[arg(long, value_name = "PAGE", requires = "suite", conflicts_with_all = ["json", "out", "force"])]
     pub(super) write: Option<PathBuf>,
 
+    /// Print the tables for a paper instead; the folder has both as tables.md and tables.tex
+    #[arg(long, value_name = "FORMAT", conflicts_with_all = ["json", "write"])]
+    pub(super) table: Option<Format>,
+
     #[command(flatten)]
     pub(super) place: Place,
 
     #[command(flatten)]
     pub(super) json: Json,
+}
+
+/// Format of `--table`.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(super) enum Format {
+    /// For GitHub and the like
+    Markdown,
+    /// With the package booktabs
+    Latex,
+}
+
+impl Format {
+    fn of_report(self) -> TableFormat {
+        match self {
+            Format::Markdown => TableFormat::Markdown,
+            Format::Latex => TableFormat::Latex,
+        }
+    }
+}
+
+impl Output {
+    /// Prints the tables for a paper, if they are asked for; or else as [`show`] does.
+    pub(super) fn show(
+        &self,
+        folder: &Folder,
+        files: usize,
+        object: impl FnOnce(&mut Vec<u8>) -> io::Result<()>,
+        tables: impl FnOnce(TableFormat) -> String,
+        table: impl FnOnce() -> String,
+    ) -> Result<(), Failure> {
+        match self.table {
+            Some(format) => print(&tables(format.of_report())),
+            None => show(folder, files, self.json, object, table),
+        }
+    }
 }
 
 /// Prints the results of `files` files in `folder`: what `object` writes, if JSON is asked for, or the table and where

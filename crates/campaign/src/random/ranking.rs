@@ -1,6 +1,6 @@
 //! How the contenders stand: who is best, who loses what others keep, and paired differences with intervals.
 
-use crate::statistics::{clustered, percentile};
+use crate::statistics::{SignedRank, clustered, holm, percentile};
 use libm::{exp, log};
 use std::collections::BTreeMap;
 
@@ -48,6 +48,10 @@ pub struct Difference {
     pub mean: f64,
     /// Ends of its 95 % interval; none for a single cluster.
     pub interval: Option<[f64; 2]>,
+    /// Whether the clusters' mean differences are more than chance.
+    pub test: SignedRank,
+    /// Its probability, adjusted for as many contenders as are tested.
+    pub p_holm: f64,
 }
 
 /// True if a contender with distance `own_m` is best, or level with the `best_m`.
@@ -70,7 +74,13 @@ impl Score {
 /// Returns how each contender of `results` stands, compared with the one at place `against`.
 pub fn rankings(results: &[Score], against: usize) -> Vec<Ranking> {
     let contenders = results.first().map_or(0, |result| result.rms_m.len());
-    (0..contenders).map(|contender| ranking(results, contender, against)).collect()
+    let mut rankings: Vec<Ranking> = (0..contenders).map(|contender| ranking(results, contender, against)).collect();
+    let differences = || rankings.iter().enumerate().filter(|(place, _)| *place != against);
+    let p: Vec<f64> = differences().filter_map(|(_, ranking)| Some(ranking.difference?.test.p)).collect();
+    let tested = rankings.iter_mut().enumerate().filter(|(place, _)| *place != against);
+    let tested = tested.filter_map(|(_, ranking)| ranking.difference.as_mut());
+    tested.zip(holm(&p)).for_each(|(difference, adjusted)| difference.p_holm = adjusted);
+    rankings
 }
 
 fn ranking(results: &[Score], contender: usize, against: usize) -> Ranking {
@@ -106,7 +116,10 @@ fn difference(results: &[Score], contender: usize, against: usize) -> Option<Dif
     };
     let flights = clusters.iter().map(Vec::len).sum();
     let mean = clusters.iter().flatten().sum::<f64>() / flights as f64;
-    (flights > 0).then(|| Difference { flights, mean, interval: clustered(&clusters, RESAMPLES) })
+    let means: Vec<f64> = clusters.iter().map(|cluster| cluster.iter().sum::<f64>() / cluster.len() as f64).collect();
+    let test = SignedRank::of(&means);
+    let interval = clustered(&clusters, RESAMPLES);
+    (flights > 0).then_some(Difference { flights, mean, interval, test, p_holm: test.p })
 }
 
 fn logarithm(distance_m: f64) -> f64 {
@@ -144,7 +157,8 @@ mod tests {
         assert_eq!((a.median_m, b.median_m, c.median_m), (Some(0.04), Some(0.09), Some(0.05)));
         close(a.geometric_m.unwrap(), (0.01_f64 * 0.0003 * 0.04).cbrt());
         close(b.geometric_m.unwrap(), (0.04_f64 * 0.09 * 0.0001).cbrt());
-        let own = Difference { flights: 3, mean: 0.0, interval: Some([0.0; 2]) };
+        let test = SignedRank { p: 1.0, effect: 0.0 };
+        let own = Difference { flights: 3, mean: 0.0, interval: Some([0.0; 2]), test, p_holm: 1.0 };
         assert_eq!(a.difference, Some(own));
         // b and a both kept the first and the third.
         let b = b.difference.unwrap();
@@ -153,7 +167,10 @@ mod tests {
         let [low, high] = b.interval.unwrap();
         close(low, -(3.0_f64.ln()));
         close(high, 4.0_f64.ln());
-        assert_eq!(c.difference.unwrap().flights, 3);
+        // c is further in all of three seeds, b in one of two: 2/2^3, and as likely as not.
+        let c = c.difference.unwrap();
+        assert_eq!((c.flights, c.test, c.p_holm), (3, SignedRank { p: 0.25, effect: 1.0 }, 0.5));
+        assert_eq!((b.test.p, b.p_holm), (1.0, 1.0));
     }
 
     #[test]

@@ -1,27 +1,45 @@
 //! Contents of a comparison's table, for the page and the terminal.
 
+use crate::differences::{self, number};
+use crate::grid::{Grid, GridCell};
 use crate::words;
 use afbc_campaign::compare::{Comparison, Entry, MEASURES, Measure};
+use afbc_campaign::statistics::Median;
 use afbc_sim::metrics::SETTLED_S;
 
-/// Returns the figures of one contender, and whether each is the best of its column; none if it lost a vehicle.
-pub(super) fn cells(comparison: &Comparison, entry: &Entry) -> Option<Vec<(String, bool)>> {
+/// How medians are shown.
+type Shown = fn(&Median, &Measure) -> String;
+
+/// Shows a median alone.
+pub(super) fn alone(median: &Median, measure: &Measure) -> String {
+    number(median.value, measure)
+}
+
+/// Returns the medians of one contender, and whether each is the best of its column; none if that is a lost flight.
+pub(super) fn cells(comparison: &Comparison, entry: &Entry, shown: Shown) -> Option<Vec<GridCell>> {
     let cell = |figure: &Measure| {
-        let average = entry.average(figure.value)?;
-        let [mean, deviation] =
-            [average.mean, average.deviation].map(|value| number(figure.scale * value, figure.digits));
-        let text = if comparison.is_repeated() { format!("{mean} ±{deviation}") } else { mean };
-        Some((text, comparison.is_best(entry, figure)))
+        let text = shown(&entry.median(figure.value)?, figure);
+        Some(GridCell { text, best: comparison.is_best(entry, figure) })
     };
     let mut cells = MEASURES.iter().map(cell).collect::<Option<Vec<_>>>()?;
     if has_ratio(comparison) {
-        cells.push((comparison.ratio(entry).map_or("-".into(), |ratio| format!("{ratio:.2}")), false));
+        cells.push(comparison.ratio(entry).map_or("-".into(), |ratio| format!("{ratio:.2}")).into());
     }
     Some(cells)
 }
 
-pub(super) fn number(value: f64, digits: usize) -> String {
-    if value < 1e4 { format!("{value:.digits$}") } else { format!("{value:.2e}") }
+/// Returns the tables for a paper: medians of every figure, and differences of the distance.
+pub(super) fn grids(comparison: &Comparison) -> Vec<Grid> {
+    let row = |entry: &Entry| {
+        let cells = cells(comparison, entry, differences::median);
+        (entry.contender().title().to_owned(), cells.unwrap_or_else(|| vec!["lost".into()]))
+    };
+    let mut rows: Vec<_> = comparison.entries.iter().map(row).collect();
+    let heads: Vec<String> = ["law"].into_iter().chain(heads(comparison)).map(String::from).collect();
+    rows.iter_mut().for_each(|(_, cells)| cells.resize(heads.len() - 1, "".into()));
+    let caption = format!("{}: {}", comparison.scenario.name, words::conditions(&comparison.scenario));
+    let note = legend(core::slice::from_ref(comparison)).replace(" *: best of its column.", "");
+    [Grid { caption, heads, rows, note }].into_iter().chain(differences::grid(comparison)).collect()
 }
 
 /// True if backstepping flew, to compare others with.
@@ -50,7 +68,7 @@ pub(super) fn lost(entry: &Entry) -> String {
 
 /// Explains the columns.
 pub(super) fn legend(comparisons: &[Comparison]) -> String {
-    let kept = |comparison: &Comparison| comparison.entries.iter().any(|entry| entry.lost() == 0);
+    let kept = |comparison: &Comparison| comparison.entries.iter().any(|entry| entry.lost() < entry.flights.len());
     if !comparisons.iter().any(kept) {
         return "A contender that lost a vehicle has no figures.".into();
     }
@@ -63,7 +81,7 @@ pub(super) fn legend(comparisons: &[Comparison]) -> String {
     }
     words += " *: best of its column.";
     if comparisons.iter().any(Comparison::is_repeated) {
-        words += " ±: standard deviation over the seeds.";
+        words += " Medians over all seeds.";
     }
     words
 }

@@ -1,21 +1,28 @@
 //! `comparison.csv` and `comparison.json`.
 
-use afbc_campaign::compare::{Average, Comparison, Entry, MEASURES, Outcome};
+use crate::differences::{self, FigureOverSeeds};
+use afbc_campaign::compare::{Average, Comparison, DISTANCE, Entry, MEASURES, Measure, Outcome};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::io::{self, Write};
 
+/// The figures of `comparison.csv`, `comparison.json` and `statistics.csv`.
+pub(super) fn measures() -> Vec<&'static Measure> {
+    [&DISTANCE].into_iter().chain(&MEASURES).collect()
+}
+
 /// Writes a row for each flight. A lost flight's figures cover the time until the loss.
 pub(super) fn csv(out: &mut dyn Write, comparisons: &[Comparison]) -> io::Result<()> {
     let mut csv = csv::Writer::from_writer(out);
-    let head = ["scenario", "contender", "controller", "seed"].into_iter().chain(MEASURES.iter().map(|f| f.name));
+    let measures = measures();
+    let head = ["scenario", "contender", "controller", "seed"].into_iter().chain(measures.iter().map(|f| f.name));
     csv.write_record(head.chain(["lost_at_s"]))?;
     for comparison in comparisons {
         for entry in &comparison.entries {
             for Outcome { seed, lost, metrics, .. } in &entry.flights {
                 let contender = entry.contender();
                 let who = [comparison.scenario.name.clone(), contender.name.clone(), contender.kind().name().into()];
-                let figures = MEASURES.iter().map(|figure| (figure.value)(metrics).to_string());
+                let figures = measures.iter().map(|figure| (figure.value)(metrics).to_string());
                 let lost = lost.map_or(String::new(), |lost| lost.time_s.to_string());
                 csv.write_record(who.into_iter().chain([seed.to_string()]).chain(figures).chain([lost]))?;
             }
@@ -27,6 +34,7 @@ pub(super) fn csv(out: &mut dyn Write, comparisons: &[Comparison]) -> io::Result
 #[derive(Serialize)]
 struct Compared<'a> {
     scenario: &'a str,
+    against: &'a str,
     contenders: Vec<Contender<'a>>,
 }
 
@@ -41,23 +49,29 @@ struct Contender<'a> {
     standard_deviation: BTreeMap<&'a str, Option<f64>>,
     /// Root mean square distance divided by backstepping's.
     ratio: Option<f64>,
+    figures: Vec<FigureOverSeeds>,
 }
 
-/// Writes an array with one object for each scenario: mean and standard deviation over the seeds.
+/// Writes an array with one object for each scenario: means, medians and differences over the seeds.
 ///
 /// # Errors
 /// If writing to `out` fails.
 pub fn json(out: &mut dyn Write, comparisons: &[Comparison]) -> io::Result<()> {
-    let compared = comparisons.iter().map(|comparison| Compared {
-        scenario: &comparison.scenario.name,
-        contenders: comparison.entries.iter().map(|entry| contender(comparison, entry)).collect(),
+    let compared = comparisons.iter().map(|comparison| {
+        let figures = differences::figures(comparison, measures());
+        let entries = comparison.entries.iter().zip(figures);
+        Compared {
+            scenario: &comparison.scenario.name,
+            against: differences::against(comparison),
+            contenders: entries.map(|(entry, figures)| contender(comparison, entry, figures)).collect(),
+        }
     });
     serde_json::to_writer_pretty(&mut *out, &compared.collect::<Vec<_>>())?;
     writeln!(out)
 }
 
-fn contender<'a>(comparison: &Comparison, entry: &'a Entry) -> Contender<'a> {
-    let figures = |part: fn(Average) -> f64| {
+fn contender<'a>(comparison: &Comparison, entry: &'a Entry, figures: Vec<FigureOverSeeds>) -> Contender<'a> {
+    let averages = |part: fn(Average) -> f64| {
         MEASURES.iter().map(|figure| (figure.name, entry.average(figure.value).map(part))).collect()
     };
     Contender {
@@ -65,8 +79,9 @@ fn contender<'a>(comparison: &Comparison, entry: &'a Entry) -> Contender<'a> {
         controller: entry.contender().kind().name(),
         seeds: entry.flights.iter().map(|flight| flight.seed).collect(),
         lost: entry.lost(),
-        mean: figures(|average| average.mean),
-        standard_deviation: figures(|average| average.deviation),
+        mean: averages(|average| average.mean),
+        standard_deviation: averages(|average| average.deviation),
         ratio: comparison.ratio(entry),
+        figures,
     }
 }

@@ -8,7 +8,9 @@ mod table;
 pub use files::json;
 pub use table::table;
 
+use crate::differences;
 use crate::figures::{self, Picture};
+use crate::grid::{self, TableFormat};
 use crate::groups::groups;
 use afbc_campaign::compare::Comparison;
 use afbc_files::{Error, Folder};
@@ -20,7 +22,10 @@ use std::path::PathBuf;
 /// paths written:
 ///
 /// * `comparison.csv`: a row for each flight;
-/// * `comparison.json`: mean and standard deviation over the seeds;
+/// * `comparison.json`: means, medians and differences over the seeds;
+/// * `statistics.csv`: a row for each figure of each contender: its median, how it differs from another's, and whether
+///   by chance;
+/// * `tables.md`, `tables.tex`: the tables for a paper;
 /// * `errors.svg`, `rmse.svg`, `trajectory.svg`: errors over time, their root mean squares, and the flights in space;
 ///   with several scenarios, `<scenario>-errors.svg` etc. for each;
 /// * `report.html`: everything on one self-contained page.
@@ -37,19 +42,32 @@ pub fn write(folder: &Folder, comparisons: &[Comparison]) -> Result<Vec<PathBuf>
         figures.iter().map(move |figure| (format!("{prefix}{}.svg", figure.name), &figure.svg))
     });
     let svgs: Vec<_> = svgs.collect();
-    let names = ["comparison.csv", "comparison.json", "report.html"].into_iter();
+    let names = ["comparison.csv", "comparison.json", "statistics.csv", "tables.md", "tables.tex", "report.html"];
+    let names = names.into_iter();
     folder.only(&names.chain(svgs.iter().map(|(name, _)| name.as_str())).collect::<Vec<_>>())?;
 
     let mut paths = vec![
         folder.place("comparison.csv", |out| files::csv(out, comparisons))?,
         folder.place("comparison.json", |out| files::json(out, comparisons))?,
+        folder.place("statistics.csv", |out| differences::csv(out, comparisons, &files::measures()))?,
     ];
+    for (name, format) in [("tables.md", TableFormat::Markdown), ("tables.tex", TableFormat::Latex)] {
+        let text = tables(comparisons, format);
+        paths.push(folder.place(name, |out| out.write_all(text.as_bytes()))?);
+    }
     for (name, svg) in &svgs {
         paths.push(folder.place(name, |out| out.write_all(svg.as_bytes()))?);
     }
     let page = page::page(comparisons, &sets);
     paths.push(folder.place("report.html", |out| out.write_all(page.as_bytes()))?);
     Ok(paths)
+}
+
+/// Formats the tables for a paper: of each scenario the medians of every figure and, with several seeds, how the
+/// distances differ from one contender's.
+pub fn tables(comparisons: &[Comparison], format: TableFormat) -> String {
+    let of = |comparison: &Comparison| grid::tables(&cells::grids(comparison), &comparison.scenario.name, format);
+    comparisons.iter().map(of).collect::<Vec<_>>().join("\n")
 }
 
 fn draw(comparison: &Comparison) -> io::Result<Vec<Picture>> {

@@ -1,6 +1,7 @@
 //! The report of a comparison.
 
 use super::cells::{cells, heads, legend, lost};
+use crate::differences;
 use crate::figures::Picture;
 use crate::report::{parameters, picture, sheet};
 use crate::words;
@@ -18,6 +19,7 @@ pub(super) fn page(comparisons: &[Comparison], figures: &[Vec<Picture>]) -> Stri
                 p.quiet { (words::conditions(&comparison.scenario)) "." }
                 div.scroll { (results(comparison)) }
                 p.quiet { (legend(comparisons)) }
+                @if let Some(grid) = differences::grid(comparison) { h3 { (grid.caption) } (grid.section()) }
                 @for figure in figures { (picture(figure)) }
                 h3 { "Parameters" }
                 (parameters(&comparison.scenario))
@@ -35,12 +37,8 @@ fn results(comparison: &Comparison) -> Markup {
                 @for entry in &comparison.entries {
                     tr {
                         th scope="row" { (entry.contender().title()) }
-                        @match cells(comparison, entry) {
-                            Some(cells) => {
-                                @for (cell, best) in cells {
-                                    td { @if best { strong { (cell) } "*" } @else { (cell) } }
-                                }
-                            }
+                        @match cells(comparison, entry, differences::median) {
+                            Some(cells) => @for cell in cells { (cell) },
                             None => td.lost colspan=(heads.len()) { (lost(entry)) },
                         }
                     }

@@ -1,12 +1,11 @@
 //! The comparison's table for the terminal.
 
-use super::cells::{cells, heads, legend, lost};
+use super::cells::{alone, cells, heads, legend, lost};
+use crate::differences;
+use crate::grid::Grid;
 use crate::table::wrap;
 use crate::words;
-use afbc_campaign::compare::Comparison;
-
-/// Space between columns.
-const GAP: usize = 2;
+use afbc_campaign::compare::{Comparison, Entry};
 
 /// Formats one block for each scenario with one line for each contender.
 pub fn table(comparisons: &[Comparison]) -> String {
@@ -23,39 +22,31 @@ pub fn table(comparisons: &[Comparison]) -> String {
 }
 
 fn block(comparison: &Comparison, lines: &mut Vec<String>) {
-    let width = |text: &str| text.chars().count();
-    let marked = |(text, best): (String, bool)| text + if best { "*" } else { " " };
-    let rows: Vec<(&str, Result<Vec<String>, String>)> = comparison
-        .entries
-        .iter()
-        .map(|entry| {
-            let cells = cells(comparison, entry).map(|cells| cells.into_iter().map(marked).collect());
-            (entry.contender().title(), cells.ok_or_else(|| lost(entry)))
-        })
-        .collect();
-    let heads: Vec<String> = heads(comparison).into_iter().map(|head| format!("{head} ")).collect();
-    let widest = |(column, head): (usize, &String)| {
-        let cells = rows.iter().filter_map(|(_, cells)| cells.as_ref().ok()?.get(column)).map(|cell| width(cell));
-        cells.max().unwrap_or(0).max(width(head)) + GAP
+    let row = |entry: &Entry| {
+        let cells = cells(comparison, entry, alone).unwrap_or_default();
+        (entry.contender().title().to_owned(), cells)
     };
-    let widths: Vec<usize> = heads.iter().enumerate().map(widest).collect();
-    let name_width = rows.iter().map(|(name, _)| width(name)).max().unwrap_or(0);
-    let line = |name: &str, cells: &[String]| {
-        let right = |(cell, to): (&String, &usize)| " ".repeat(to.saturating_sub(width(cell))) + cell;
-        format!(
-            "{name}{}{}",
-            " ".repeat(name_width - width(name)),
-            cells.iter().zip(&widths).map(right).collect::<String>()
-        )
-    };
-    let head = line("", &heads);
-    let rule = "─".repeat(width(&head));
-    lines.extend([rule.clone(), head]);
-    for (name, cells) in &rows {
-        lines.push(match cells {
-            Ok(cells) => line(name, cells),
-            Err(lost) => format!("{name}{}  {lost}", " ".repeat(name_width - width(name))),
+    let heads = [""].into_iter().chain(heads(comparison)).map(String::from).collect();
+    let rows = comparison.entries.iter().map(row).collect();
+    let figures = Grid { caption: String::new(), heads, rows, note: String::new() }.lines();
+    let rule = "─".repeat(figures.iter().map(|line| line.chars().count()).max().unwrap_or_default());
+    lines.push(rule.clone());
+    let names = comparison.entries.iter().map(|entry| entry.contender().title().chars().count()).max();
+    lines.extend(figures.first().cloned());
+    for (entry, line) in comparison.entries.iter().zip(figures.into_iter().skip(1)) {
+        let name = entry.contender().title();
+        lines.push(match cells(comparison, entry, alone) {
+            Some(_) => line,
+            None => format!("{name:<0$}  {1}", names.unwrap_or_default(), lost(entry)),
         });
     }
     lines.push(rule);
+    if let Some(grid) = differences::grid(comparison) {
+        lines.extend([String::new(), format!("{}:", grid.caption)]);
+        lines.extend(grid.lines());
+        for entry in comparison.entries.iter().filter(|entry| 0 < entry.lost() && entry.lost() < entry.flights.len()) {
+            wrap(lines, "", &format!("{}: {}.", entry.contender().title(), lost(entry)));
+        }
+        wrap(lines, "", &grid.note);
+    }
 }

@@ -3,8 +3,9 @@
 use super::canvas::{self, Area, Failure, Ink, WIDTH_PX, text, text_width_px, units};
 use super::palette::{BLACK, FRAME, GREY, color};
 use super::picture::Picture;
+use crate::differences::number;
 use crate::words;
-use afbc_campaign::compare::{Average, Comparison, Entry, MEASURES};
+use afbc_campaign::compare::{Comparison, Entry, MEASURES};
 use afbc_sim::metrics::SETTLED_S;
 use plotters::prelude::*;
 use plotters::style::text_anchor::HPos;
@@ -18,7 +19,6 @@ const TITLE_PX: f64 = 26.0;
 const MARGIN_PX: f64 = 14.0;
 /// Width right of the longest bar, for its number.
 const NUMBER_PX: f64 = 60.0;
-const SPREAD_PX: f64 = 46.0;
 
 /// Draws bars of every contender's errors, two panels side by side; none without contenders.
 pub(crate) fn draw(comparison: &Comparison) -> io::Result<Option<Picture>> {
@@ -40,7 +40,7 @@ pub(crate) fn draw(comparison: &Comparison) -> io::Result<Option<Picture>> {
     let mut caption = format!("Root mean square errors from {SETTLED_S} s to the end; shorter is better.");
     let lost = |entry: &Entry| entry.lost() > 0;
     if comparison.is_repeated() && !comparison.entries.iter().all(lost) {
-        caption += " Mean over all seeds; thin bars: +-1 standard deviation.";
+        caption += " Median over all seeds; thin bars: its interval of at least 95 %.";
     }
     if comparison.entries.iter().any(lost) {
         caption += " A contender that lost a vehicle has no bar.";
@@ -51,14 +51,13 @@ pub(crate) fn draw(comparison: &Comparison) -> io::Result<Option<Picture>> {
 /// Draws one error of every contender, with the given top left corner.
 fn panel(area: &Area, comparison: &Comparison, index: usize, (left_px, top_px): (f64, f64)) -> Result<(), Failure> {
     let Some(figure) = MEASURES.get(index) else { return Ok(()) };
-    let repeated = comparison.is_repeated();
-    let average = |entry: &Entry| entry.average(figure.value);
-    let ends = comparison.entries.iter().filter_map(average).map(|average| average.mean + average.deviation);
-    let largest = ends.fold(1e-9, f64::max);
+    let median = |entry: &Entry| entry.median(figure.value);
+    let medians = || comparison.entries.iter().filter_map(median);
+    let ends = medians().flat_map(|median| [median.value].into_iter().chain(median.interval.into_iter().flatten()));
+    let largest = ends.filter(|end| end.is_finite()).fold(1e-9, f64::max);
     let names = comparison.entries.iter().map(|entry| text_width_px(entry.contender().title(), 12.0));
     let zero_px = left_px + names.fold(0.0, f64::max) + 8.0;
-    let number_px = NUMBER_PX + if repeated { SPREAD_PX } else { 0.0 };
-    let room_px = (left_px + WIDTH_PX / 2.0 - 2.0 * MARGIN_PX - number_px - zero_px).max(1.0);
+    let room_px = (left_px + WIDTH_PX / 2.0 - 2.0 * MARGIN_PX - NUMBER_PX - zero_px).max(1.0);
     let write = |words: String, x: f64, y: f64, style| area.draw(&Text::new(words, (units(x), units(y)), style));
 
     write(figure.title.into(), zero_px, top_px + 14.0, text(12.0, BLACK, HPos::Left))?;
@@ -66,21 +65,20 @@ fn panel(area: &Area, comparison: &Comparison, index: usize, (left_px, top_px): 
         let y_px = top_px + TITLE_PX + row as f64 * BAR_PX;
         let middle_px = y_px + 0.5 * BAR_PX;
         write(entry.contender().title().into(), zero_px - 8.0, middle_px, text(12.0, BLACK, HPos::Right))?;
-        let Some(Average { mean, deviation }) = average(entry) else {
+        let Some(median) = median(entry) else {
             write("lost".into(), zero_px + 6.0, middle_px, text(11.0, GREY, HPos::Left))?;
             continue;
         };
-        let x_px = |value: f64| zero_px + room_px * value.max(0.0) / largest;
-        let corners = [(units(zero_px), units(y_px + 2.0)), (units(x_px(mean)), units(y_px + BAR_PX - 2.0))];
+        let x_px = |value: f64| zero_px + room_px * value.clamp(0.0, largest) / largest;
+        let corners = [(units(zero_px), units(y_px + 2.0)), (units(x_px(median.value)), units(y_px + BAR_PX - 2.0))];
         area.draw(&Rectangle::new(corners, color(&entry.contender().name).filled()))?;
-        let (mut end_px, mut label) = (x_px(mean), format!("{mean:.digits$}", digits = figure.digits));
-        if repeated {
-            end_px = x_px(mean + deviation);
-            label += &format!(" ±{deviation:.digits$}", digits = figure.digits);
-            let ends = [x_px(mean - deviation), end_px].map(|x| (units(x), units(middle_px)));
+        let mut end_px = x_px(median.value);
+        if let Some([low, high]) = median.interval {
+            end_px = x_px(high);
+            let ends = [x_px(low), end_px].map(|x| (units(x), units(middle_px)));
             area.draw(&PathElement::new(ends, Ink::new(BLACK, 1.25).style()))?;
         }
-        write(label, end_px + 6.0, middle_px, text(11.0, GREY, HPos::Left))?;
+        write(number(median.value, figure), end_px + 6.0, middle_px, text(11.0, GREY, HPos::Left))?;
     }
     let axis = [
         (units(zero_px), units(top_px + TITLE_PX)),

@@ -115,6 +115,9 @@ struct Paired {
     flights: usize,
     mean: f64,
     interval_95: Option<[f64; 2]>,
+    p: f64,
+    p_holm: f64,
+    rank_biserial: f64,
 }
 
 /// Writes one object: how the contenders stand on each vehicle and in all.
@@ -152,6 +155,9 @@ fn of_group<'a>(judged: &Judged<'a>, group: &'a Group<'a>) -> GroupWords<'a> {
                 flights: difference.flights,
                 mean: difference.mean,
                 interval_95: difference.interval,
+                p: difference.test.p,
+                p_holm: difference.p_holm,
+                rank_biserial: difference.test.effect,
             }),
         }
     };

@@ -2,6 +2,7 @@
 
 mod cells;
 mod files;
+mod grids;
 mod judged;
 mod markdown;
 mod page;
@@ -12,6 +13,7 @@ pub use judged::Judged;
 pub use markdown::markdown;
 pub use table::table;
 
+use crate::grid::{self, TableFormat};
 use afbc_files::{Error, Folder};
 use std::path::PathBuf;
 
@@ -20,16 +22,25 @@ use std::path::PathBuf;
 ///
 /// * `flights.csv`: a row for each flight of each contender;
 /// * `random.json`: how the contenders stand;
+/// * `tables.md`, `tables.tex`: the tables for a paper;
 /// * `report.html`: the same on one self-contained page.
 ///
 /// # Errors
 /// The first file that could not be written, or is not the command's.
 pub fn write(folder: &Folder, judged: &Judged<'_>) -> Result<Vec<PathBuf>, Error> {
-    folder.only(&["flights.csv", "random.json", "report.html"])?;
+    folder.only(&["flights.csv", "random.json", "tables.md", "tables.tex", "report.html"])?;
     let page = page::page(judged);
+    let [md, tex] = [TableFormat::Markdown, TableFormat::Latex].map(|format| tables(judged, format));
     Ok(vec![
         folder.place("flights.csv", |out| files::csv(out, judged))?,
         folder.place("random.json", |out| files::json(out, judged))?,
+        folder.place("tables.md", |out| out.write_all(md.as_bytes()))?,
+        folder.place("tables.tex", |out| out.write_all(tex.as_bytes()))?,
         folder.place("report.html", |out| out.write_all(page.as_bytes()))?,
     ])
+}
+
+/// Formats the tables for a paper: how the contenders stand on each vehicle, and on all.
+pub fn tables(judged: &Judged<'_>, format: TableFormat) -> String {
+    grid::tables(&grids::grids(judged), "random", format)
 }

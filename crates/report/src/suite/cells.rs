@@ -1,58 +1,51 @@
 //! Contents of a suite's tables.
 
-use afbc_campaign::compare::{Comparison, Entry};
-use afbc_sim::metrics::Metrics;
+use afbc_campaign::compare::{Comparison, DISTANCE, Entry, Measure};
 use core::fmt::Write;
 
-/// A figure of merit; smaller is better.
+/// A figure of merit.
 pub(super) struct Figure {
-    /// Name in files.
-    pub(super) name: &'static str,
     /// Heading of its table.
     pub(super) title: &'static str,
-    /// Decimals in tables, in which it is multiplied by `scale`.
-    digits: usize,
-    scale: f64,
-    /// Computes it from the metrics of a flight.
-    pub(super) value: fn(&Metrics) -> f64,
+    pub(super) measure: Measure,
 }
 
 /// The figures of a suite, a table each.
 pub(super) const FIGURES: [Figure; 3] = [
+    Figure { title: "Root mean square distance from the reference [m]", measure: Measure { digits: 4, ..DISTANCE } },
     Figure {
-        name: "rms_m",
-        title: "Root mean square distance from the reference [m]",
-        digits: 4,
-        scale: 1.0,
-        value: |m| m.rmse.xyz().norm(),
-    },
-    Figure {
-        name: "largest_m",
         title: "Largest distance from the reference [m]",
-        digits: 3,
-        scale: 1.0,
-        value: |m| m.max_distance_m,
+        measure: Measure {
+            name: "largest_m",
+            title: "largest [m]",
+            digits: 3,
+            scale: 1.0,
+            value: |m| m.max_distance_m,
+        },
     },
     Figure {
-        name: "mean_abs_delta_u_n",
         title: "Mean absolute change of an input per step, over U₁ to U₄ [mN]",
-        digits: 1,
-        scale: 1000.0,
-        value: |m| m.mean_abs_delta_u.mean(),
+        measure: Measure {
+            name: "mean_abs_delta_u_n",
+            title: "|ΔU| [mN]",
+            digits: 1,
+            scale: 1000.0,
+            value: |m| m.mean_abs_delta_u.mean(),
+        },
     },
 ];
 
 impl Figure {
-    /// Returns the mean over a contender's flights as text; none if it lost a vehicle.
+    /// Returns the median over a contender's flights as text; none if that is a lost one.
     pub(super) fn text(&self, entry: &Entry) -> Option<String> {
-        let mean = self.scale * entry.average(self.value)?.mean;
-        Some(if mean < 1e4 { format!("{mean:.0$}", self.digits) } else { format!("{mean:.1e}") })
+        let Measure { digits, scale, value, .. } = self.measure;
+        let median = scale * entry.median(value)?.value;
+        Some(if median < 1e4 { format!("{median:.digits$}") } else { format!("{median:.1e}") })
     }
 
-    /// True if no other contender has a smaller mean.
+    /// True if no other contender has a smaller median.
     pub(super) fn is_best(&self, comparison: &Comparison, entry: &Entry) -> bool {
-        let mean = |entry: &Entry| entry.average(self.value).map(|average| average.mean);
-        mean(entry).is_some_and(|own| comparison.entries.iter().filter_map(mean).all(|other| own <= other))
+        comparison.is_best(entry, &self.measure)
     }
 }
 

@@ -1,8 +1,9 @@
 //! `suite.csv` and `suite.json`.
 
 use super::FlownSuite;
-use super::cells::FIGURES;
-use afbc_campaign::compare::{Entry, Outcome};
+use super::cells::{FIGURES, Figure};
+use crate::differences::{self, FigureOverSeeds};
+use afbc_campaign::compare::{Comparison, Entry, Measure, Outcome};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::io::{self, Write};
@@ -32,10 +33,15 @@ pub(super) fn csv(out: &mut dyn Write, flown: FlownSuite<'_>) -> io::Result<()> 
     csv.flush()
 }
 
+fn over_seeds(comparison: &Comparison) -> Vec<Vec<FigureOverSeeds>> {
+    differences::figures(comparison, FIGURES.iter().map(|figure| &figure.measure))
+}
+
 #[derive(Serialize)]
 struct Flight<'a> {
     flight: &'a str,
     description: &'a str,
+    against: &'a str,
     published: Vec<Published<'a>>,
     contenders: Vec<Contender<'a>>,
 }
@@ -60,9 +66,10 @@ struct Contender<'a> {
     first_trip: Option<&'a str>,
     /// Null if a vehicle was lost.
     mean: BTreeMap<&'a str, Option<f64>>,
+    figures: Vec<FigureOverSeeds>,
 }
 
-/// Writes an array with one object for each flight: means over the seeds, losses and trips.
+/// Writes an array with one object for each flight: means, medians and differences over the seeds, losses and trips.
 ///
 /// # Errors
 /// If writing to `out` fails.
@@ -71,6 +78,7 @@ pub fn json(out: &mut dyn Write, flown: FlownSuite<'_>) -> io::Result<()> {
     let flights = flown.rows().map(|(flight, comparison)| Flight {
         flight: &comparison.scenario.name,
         description: &comparison.scenario.description,
+        against: differences::against(comparison),
         published: flight
             .published
             .iter()
@@ -80,14 +88,15 @@ pub fn json(out: &mut dyn Write, flown: FlownSuite<'_>) -> io::Result<()> {
                 Some(Published { law: &figure.law, rms_m: figure.rms_m, source: citation, differs })
             })
             .collect(),
-        contenders: comparison.entries.iter().map(contender).collect(),
+        contenders: comparison.entries.iter().zip(over_seeds(comparison)).map(contender).collect(),
     });
     serde_json::to_writer_pretty(&mut *out, &flights.collect::<Vec<_>>())?;
     writeln!(out)
 }
 
-fn contender(entry: &Entry) -> Contender<'_> {
+fn contender((entry, figures): (&Entry, Vec<FigureOverSeeds>)) -> Contender<'_> {
     let lost = entry.flights.iter().find_map(|flight| flight.lost);
+    let mean = |measure: &Measure| entry.average(measure.value).map(|average| average.mean);
     let trips: Vec<_> = entry.flights.iter().filter_map(|flight| flight.tripped).collect();
     Contender {
         name: &entry.contender().name,
@@ -98,6 +107,7 @@ fn contender(entry: &Entry) -> Contender<'_> {
         tripped: trips.len(),
         first_tripped_at_s: trips.first().map(|trip| trip.time_s),
         first_trip: trips.first().map(|trip| trip.reason),
-        mean: FIGURES.iter().map(|f| (f.name, entry.average(f.value).map(|average| average.mean))).collect(),
+        mean: FIGURES.iter().map(|Figure { measure, .. }| (measure.name, mean(measure))).collect(),
+        figures,
     }
 }

@@ -41,11 +41,11 @@ pub(super) fn anchor(comparison: &Comparison) -> String {
     format!("flight-{}", comparison.scenario.name)
 }
 
-/// Returns a contender's mean as a multiple of the best contender's; none if it lost a vehicle.
+/// Returns a contender's median as a multiple of the best contender's; none if it lost a vehicle.
 fn ratio(figure: &Figure, comparison: &Comparison, entry: &Entry) -> Option<f64> {
-    let mean = |entry: &Entry| entry.average(figure.value).map(|average| average.mean);
-    let best = comparison.entries.iter().filter_map(mean).min_by(f64::total_cmp)?;
-    let own = mean(entry)?;
+    let median = |entry: &Entry| entry.median(figure.measure.value).map(|median| median.value);
+    let best = comparison.entries.iter().filter_map(median).min_by(f64::total_cmp)?;
+    let own = median(entry)?;
     Some(if own > best { own / best } else { 1.0 })
 }
 

@@ -6,6 +6,7 @@ mod flown;
 mod heat;
 mod markdown;
 mod page;
+mod standing;
 mod table;
 
 pub use files::json;
@@ -13,9 +14,12 @@ pub use flown::FlownSuite;
 pub use markdown::{markdown, markers};
 pub use table::table;
 
+use crate::differences;
 use crate::figures::{self, Picture};
+use crate::grid::{self, TableFormat};
 use afbc_campaign::compare::Comparison;
 use afbc_files::{Error, Folder};
+use cells::FIGURES;
 use std::io;
 use std::path::PathBuf;
 
@@ -23,7 +27,11 @@ use std::path::PathBuf;
 /// written:
 ///
 /// * `suite.csv`: a row for each flight of each contender;
-/// * `suite.json`: means over the seeds, losses and trips;
+/// * `suite.json`: means, medians and differences over the seeds, losses and trips;
+/// * `statistics.csv`: a row for each figure of each contender in each flight: its median, how it differs from another's,
+///   and whether by chance;
+/// * `standing.csv`: a row for each contender: how it stands over all flights;
+/// * `tables.md`, `tables.tex`: the tables for a paper;
 /// * `<flight>.svg`: errors of every contender over time, with the suite's own seed;
 /// * `report.html`: everything on one self-contained page.
 ///
@@ -34,19 +42,33 @@ pub fn write(folder: &Folder, flown: FlownSuite<'_>) -> Result<Vec<PathBuf>, Err
     let drawn = drawn.map_err(|source| folder.error("figures", source))?;
     let name = |comparison: &Comparison| format!("{}.svg", comparison.scenario.name);
     let svgs: Vec<_> = flown.comparisons.iter().zip(&drawn).filter_map(|(c, p)| Some((name(c), p.as_ref()?))).collect();
-    let names = ["suite.csv", "suite.json", "report.html"].into_iter();
+    let names = ["suite.csv", "suite.json", "statistics.csv", "standing.csv", "tables.md", "tables.tex", "report.html"];
+    let names = names.into_iter();
     folder.only(&names.chain(svgs.iter().map(|(name, _)| name.as_str())).collect::<Vec<_>>())?;
 
     let mut paths = vec![
         folder.place("suite.csv", |out| files::csv(out, flown))?,
         folder.place("suite.json", |out| files::json(out, flown))?,
+        folder.place("statistics.csv", |out| {
+            differences::csv(out, flown.comparisons, &FIGURES.each_ref().map(|figure| &figure.measure))
+        })?,
+        folder.place("standing.csv", |out| standing::csv(out, flown))?,
     ];
+    for (name, format) in [("tables.md", TableFormat::Markdown), ("tables.tex", TableFormat::Latex)] {
+        let text = tables(flown, format);
+        paths.push(folder.place(name, |out| out.write_all(text.as_bytes()))?);
+    }
     for (name, picture) in &svgs {
         paths.push(folder.place(name, |out| out.write_all(picture.svg.as_bytes()))?);
     }
     let page = page::page(flown, &drawn);
     paths.push(folder.place("report.html", |out| out.write_all(page.as_bytes()))?);
     Ok(paths)
+}
+
+/// Formats the tables for a paper: the distances of every flight, and how the contenders stand over all of them.
+pub fn tables(flown: FlownSuite<'_>, format: TableFormat) -> String {
+    grid::tables(&standing::grids(flown), &flown.suite.name, format)
 }
 
 fn draw(comparison: &Comparison) -> io::Result<Option<Picture>> {

@@ -1,8 +1,7 @@
 //! The report of a suite.
 
-use super::FlownSuite;
 use super::cells::{FIGURES, Figure, lost, trip};
-use super::heat;
+use super::{FlownSuite, heat, standing};
 use crate::figures::Picture;
 use crate::report::{picture, sheet};
 use crate::words;
@@ -22,10 +21,13 @@ pub(super) fn page(flown: FlownSuite<'_>, pictures: &[Option<Picture>]) -> Strin
             }
             h2 { "Where they stand" }
             p.quiet {
-                "Root mean square distance from the reference as a multiple of the flight's best; the geometric mean "
-                "is over the flights that the contender did not lose."
+                "Root mean square distance from the reference as a multiple of the flight's best, by medians over the "
+                "seeds; the geometric mean is over the flights that the contender did not lose."
             }
             div.scroll { (heat::map(flown)) }
+            @let standing = standing::grid(flown);
+            h2 { (standing.caption) }
+            (standing.section())
             @for figure in &FIGURES { h2 { (figure.title) } div.scroll { (results(flown, figure)) } }
             @if flown.rows().any(|(flight, _)| !flight.published.is_empty()) { (published(flown)) }
             @for ((flight, comparison), drawn) in flown.rows().zip(pictures) {

@@ -1,7 +1,7 @@
 //! The suite's table for the terminal.
 
-use super::FlownSuite;
 use super::cells::{FIGURES, lost, trip};
+use super::{FlownSuite, standing};
 use crate::table::wrap;
 use afbc_sim::metrics::SETTLED_S;
 
@@ -39,5 +39,9 @@ pub fn table(flown: FlownSuite<'_>) -> String {
     lines.extend(trips);
     let words = format!("{}, from {SETTLED_S} s to the end. *: best of its flight.", rms.title);
     wrap(&mut lines, "", &words);
+    let standing = standing::grid(flown);
+    lines.extend([String::new(), format!("{}:", standing.caption)]);
+    lines.extend(standing.lines());
+    wrap(&mut lines, "", &standing.note);
     lines.join("\n") + "\n"
 }

@@ -1,10 +1,18 @@
 //! Statistics of many flights.
 
+mod median;
+mod signed_rank;
+
+pub use median::Median;
+pub use signed_rank::{SignedRank, holm};
+
 use afbc_plant::noise::{Noise, Stream};
 use libm::sqrt;
 
 /// 97.5 % quantile of the standard normal distribution: two-sided 95 %.
 const Z: f64 = 1.959_963_984_540_054;
+/// Confidence of every interval, at least.
+const CONFIDENCE: f64 = 0.95;
 
 /// A share with Wilson's 95 % score interval, which is also valid near 0 and 1, where few flights are lost.
 #[derive(Clone, Copy, Debug, PartialEq)]

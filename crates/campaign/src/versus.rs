@@ -1,0 +1,42 @@
+//! How the contenders of a comparison differ over the same seeds.
+
+use crate::compare::{Comparison, Entry};
+use crate::statistics::{Median, SignedRank, holm};
+use afbc_sim::metrics::Metrics;
+
+/// How a figure of one contender differs from another's over the same seeds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Versus {
+    /// Number of seeds.
+    pub seeds: usize,
+    /// Median of the differences, this contender's less the other's. A vehicle that was lost is infinitely far.
+    pub difference: Median,
+    /// Whether they are more than chance.
+    pub test: SignedRank,
+    /// Its probability, adjusted for as many contenders of the comparison as are tested.
+    pub p_holm: f64,
+}
+
+impl Comparison {
+    /// Compares a figure of each contender with that of the one at [`Comparison::against`]; none for that one itself,
+    /// or with a single seed.
+    pub fn versus(&self, value: fn(&Metrics) -> f64) -> Vec<Option<Versus>> {
+        let Some(against) = self.entries.get(self.against) else { return Vec::new() };
+        let others = against.values(value);
+        let tested = |(place, entry): (usize, &Entry)| {
+            let differences: Vec<f64> =
+                entry.values(value).iter().zip(&others).map(|(own, other)| difference(*own, *other)).collect();
+            let difference = Median::of(&differences).filter(|_| place != self.against && differences.len() > 1)?;
+            Some((differences.len(), difference, SignedRank::of(&differences)))
+        };
+        let tested: Vec<_> = self.entries.iter().enumerate().map(tested).collect();
+        let mut adjusted = holm(&tested.iter().flatten().map(|(_, _, test)| test.p).collect::<Vec<_>>()).into_iter();
+        let mut versus = |(seeds, difference, test)| Some(Versus { seeds, difference, test, p_holm: adjusted.next()? });
+        tested.into_iter().map(|tested| tested.and_then(&mut versus)).collect()
+    }
+}
+
+/// Returns how much larger `own` is; both lost are level.
+fn difference(own: f64, other: f64) -> f64 {
+    if own == other { 0.0 } else { own - other }
+}

@@ -1,0 +1,105 @@
+//! Comparisons over seeds: when a seed matters, and how contenders differ over the same seeds.
+#![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs)]
+
+use afbc::Profile;
+use afbc_campaign::Versus;
+use afbc_campaign::compare::{self, Comparison, DISTANCE, MEASURES, SEEDS, usual_seeds};
+use afbc_campaign::statistics::{Median, SignedRank};
+use afbc_plant::{Deviations, Dropouts, RotorFault, Sensing};
+use afbc_scenario::contender::{Contender, ControllerKind};
+use afbc_scenario::{BUILT_IN, Scenario};
+
+fn named(name: &str) -> Scenario {
+    BUILT_IN.iter().find(|known| known.name == name).unwrap().read().unwrap()
+}
+
+fn under(scenario: Scenario, kinds: &[ControllerKind]) -> Scenario {
+    let contenders = kinds.iter().map(|kind| Contender::of(*kind, Profile::Flight)).collect();
+    Scenario { contenders, ..scenario }
+}
+
+fn fly(scenario: Scenario, seeds: u64) -> Comparison {
+    compare::fly(vec![scenario], seeds, u64::MAX, &|| ()).unwrap().remove(0)
+}
+
+/// A scenario is flown with several seeds if, and only if, two seeds give two flights.
+#[test]
+fn a_seed_is_said_to_matter_where_it_does() {
+    let still = Scenario { duration_s: 6.0, ..named("hover") };
+    let sensing = |sensing: Sensing| Scenario { sensing, ..still.clone() };
+    let some = Deviations { position_m: 0.01, ..Deviations::DEFAULT };
+    let lossy = Dropouts { rate_hz: 2.0, ..Dropouts::default() };
+    let one_by_one = [
+        sensing(Sensing { noise: some, ..Sensing::default() }),
+        sensing(Sensing { bias: some, ..Sensing::default() }),
+        sensing(Sensing { delay_s: 0.01, period_s: 0.02, gyro: true, ..Sensing::default() }),
+        Scenario { sensing: Sensing { dropouts: Some(lossy), ..Sensing::default() }, ..named("circle") },
+    ];
+    let built_in = BUILT_IN.iter().map(|known| known.read().unwrap());
+    let (mut random, mut fixed) = (0, 0);
+    for scenario in built_in.chain(one_by_one) {
+        let name = format!("{} {:?}", scenario.name, scenario.sensing);
+        let scenario = Scenario { duration_s: scenario.duration_s.min(6.0), ..scenario };
+        let matters = scenario.is_random();
+        let flown = fly(under(scenario.clone(), &[ControllerKind::Pid]), 2);
+        let [first, second] = [0, 1].map(|flight| flown.entries[0].flights[flight].metrics);
+        assert_eq!(matters, first != second, "{name}");
+        assert_eq!(usual_seeds(&scenario), if matters { SEEDS } else { 1 });
+        *(if matters { &mut random } else { &mut fixed }) += 1;
+    }
+    assert!(random >= 4 && fixed >= 4, "{random}, {fixed}");
+}
+
+#[test]
+fn differences_are_those_of_the_same_seeds() {
+    let kinds = [ControllerKind::Pid, ControllerKind::Afbc, ControllerKind::Indi, ControllerKind::Backstepping];
+    let flown = fly(under(Scenario { duration_s: 6.0, ..named("hardware") }, &kinds), 7);
+    // AFBC is the one compared with unless another is.
+    assert_eq!(flown.against, 1);
+    let flown = flown.against(Some("indi"));
+    assert_eq!((flown.against, flown.clone().against(Some("nobody")).against), (2, 1));
+    for value in [DISTANCE.value, MEASURES[5].value] {
+        let versus = flown.versus(value);
+        assert_eq!(versus[2], None, "not with itself");
+        let mut tested = Vec::new();
+        for (entry, versus) in flown.entries.iter().zip(&versus).filter(|(_, versus)| versus.is_some()) {
+            let pairs = entry.flights.iter().zip(&flown.entries[2].flights);
+            let differences: Vec<f64> = pairs
+                .map(|(own, other)| {
+                    assert_eq!(own.seed, other.seed);
+                    value(&own.metrics) - value(&other.metrics)
+                })
+                .collect();
+            let Versus { seeds, difference, test, p_holm } = versus.unwrap();
+            assert_eq!((seeds, Some(difference)), (7, Median::of(&differences)));
+            assert_eq!(test, SignedRank::of(&differences));
+            assert!(p_holm >= test.p);
+            tested.push((test.p, p_holm));
+        }
+        // The smallest of three counts three times.
+        let smallest = tested.iter().min_by(|a, b| a.0.total_cmp(&b.0)).unwrap();
+        assert_eq!(smallest.1, (3.0 * smallest.0).min(1.0));
+    }
+    // One seed tells nothing.
+    let single = fly(flown.scenario, 1);
+    assert!(single.versus(DISTANCE.value).iter().all(Option::is_none));
+}
+
+/// A vehicle that is lost is further from the reference than any that is not.
+#[test]
+fn a_lost_vehicle_is_the_worst() {
+    let mut falling = Scenario { duration_s: 8.0, ..named("hardware") };
+    falling.realism.rotors.faults = vec![RotorFault { rotor: 1, efficiency: 0.0, start_s: 1.0 }];
+    let mut flown = fly(under(falling, &[ControllerKind::Pid, ControllerKind::Indi]), 6);
+    let kept = fly(under(Scenario { duration_s: 8.0, ..named("hardware") }, &[ControllerKind::Indi]), 6);
+    flown.entries[1] = kept.entries[0].clone();
+    assert_eq!(flown.entries[0].lost(), 6);
+    assert_eq!(flown.entries[0].median(DISTANCE.value), None);
+    assert!(flown.is_best(&flown.entries[1], &DISTANCE) && !flown.is_best(&flown.entries[0], &DISTANCE));
+    let versus = flown.clone().against(Some("indi")).versus(DISTANCE.value)[0].unwrap();
+    assert_eq!((versus.test.effect, versus.difference.value), (1.0, f64::INFINITY));
+    // Both lost are level.
+    flown.entries[1] = flown.entries[0].clone();
+    let level = flown.versus(DISTANCE.value)[1].unwrap();
+    assert_eq!((level.difference.value, level.test), (0.0, SignedRank { p: 1.0, effect: 0.0 }));
+}

@@ -1,0 +1,193 @@
+//! Medians, and differences over the same seeds: as text, JSON and CSV.
+
+use crate::grid::{Grid, GridCell};
+use afbc_campaign::Versus;
+use afbc_campaign::compare::{Comparison, DISTANCE, Entry, Measure};
+use afbc_campaign::statistics::{Median, SignedRank};
+use serde::Serialize;
+use std::io::{self, Write};
+
+/// Formats a figure with the digits of its measure.
+pub(crate) fn number(value: f64, measure: &Measure) -> String {
+    let value = value * measure.scale;
+    match value {
+        // Of a lost flight.
+        f64::INFINITY => "∞".into(),
+        f64::NEG_INFINITY => "-∞".into(),
+        _ if value.abs() < 1e4 => format!("{value:.0$}", measure.digits),
+        _ => format!("{value:.2e}"),
+    }
+}
+
+/// Formats a median with its interval: "0.0012 [0.0011, 0.0014]".
+pub(crate) fn median(median: &Median, measure: &Measure) -> String {
+    let Median { value, interval } = median;
+    let ends = interval.map(|ends| ends.map(|end| number(end, measure)));
+    let ends = ends.map_or(String::new(), |[low, high]| format!(" [{low}, {high}]"));
+    number(*value, measure) + &ends
+}
+
+/// Formats a probability.
+pub(crate) fn probability(p: f64) -> String {
+    if p < 0.001 { "<0.001".into() } else { format!("{p:.3}") }
+}
+
+/// Formats probability and effect size.
+pub(crate) fn test(test: &SignedRank, p_holm: f64) -> [String; 2] {
+    [probability(p_holm), format!("{:+.2}", test.effect)]
+}
+
+/// Heads of [`test`].
+pub(crate) const TEST: [&str; 2] = ["p", "effect"];
+
+/// What they mean.
+pub(crate) const TEST_LEGEND: &str = "p: Wilcoxon's signed rank test, two-sided, exact up to 100 pairs, by Holm's \
+                                      correction for as many laws. effect: matched-pairs rank-biserial correlation, \
+                                      +1 where the law is always the further one, -1 where it is always the nearer.";
+
+/// Returns the distances of a comparison and how they differ from one contender's; none with a single seed.
+pub(crate) fn grid(comparison: &Comparison) -> Option<Grid> {
+    let against = comparison.entries.get(comparison.against).filter(|_| comparison.is_repeated())?.contender().title();
+    let row = |(entry, versus): (&Entry, Option<Versus>)| {
+        let own = entry.median(DISTANCE.value).map_or("lost".into(), |own| median(&own, &DISTANCE));
+        let best = comparison.is_best(entry, &DISTANCE);
+        let [difference, p, effect] = match versus {
+            None => [const { String::new() }; 3],
+            Some(Versus { difference, test: tested, p_holm, .. }) => {
+                let [p, effect] = test(&tested, p_holm);
+                [if difference.value.is_nan() { "-".into() } else { median(&difference, &DISTANCE) }, p, effect]
+            }
+        };
+        let lost = (entry.lost() > 0).then(|| format!("{} of {}", entry.lost(), entry.flights.len()));
+        let own = GridCell { text: own, best };
+        let cells = [own, difference.into(), p.into(), effect.into(), lost.unwrap_or_default().into()];
+        (entry.contender().title().to_owned(), cells.to_vec())
+    };
+    let versus = comparison.versus(DISTANCE.value);
+    let mut rows: Vec<(String, Vec<GridCell>)> = comparison.entries.iter().zip(versus).map(row).collect();
+    let less = format!("less {against}'s");
+    let mut heads: Vec<String> = ["law", DISTANCE.title, &less].into_iter().chain(TEST).map(String::from).collect();
+    if comparison.entries.iter().any(|entry| entry.lost() > 0) {
+        heads.push("lost".into());
+    } else {
+        rows.iter_mut().for_each(|(_, cells)| cells.truncate(heads.len() - 1));
+    }
+    let seeds = comparison.entries.iter().map(|entry| entry.flights.len()).max().unwrap_or_default();
+    let caption =
+        format!("{}: root mean square distance from the reference over {seeds} seeds", comparison.scenario.name);
+    let note = format!(
+        "Medians, and in brackets intervals of at least 95 %: order statistics, from six seeds on; a vehicle that was \
+         lost is infinitely far. less {against}'s: median of the differences over the same seeds. {TEST_LEGEND}"
+    );
+    Some(Grid { caption, heads, rows, note })
+}
+
+/// A figure of a contender over its seeds. A field is null where it does not apply, or would be infinite.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub(crate) struct FigureOverSeeds {
+    name: &'static str,
+    median: Option<f64>,
+    low_95: Option<f64>,
+    high_95: Option<f64>,
+    difference: Option<f64>,
+    difference_low_95: Option<f64>,
+    difference_high_95: Option<f64>,
+    p: Option<f64>,
+    p_holm: Option<f64>,
+    rank_biserial: Option<f64>,
+}
+
+/// Returns these figures of each contender.
+pub(crate) fn figures<'a>(
+    comparison: &Comparison,
+    measures: impl IntoIterator<Item = &'a Measure>,
+) -> Vec<Vec<FigureOverSeeds>> {
+    let mut all = vec![Vec::new(); comparison.entries.len()];
+    for measure in measures {
+        let versus = comparison.versus(measure.value);
+        for ((entry, versus), all) in comparison.entries.iter().zip(versus).zip(&mut all) {
+            all.push(figure(measure, Median::of(&entry.values(measure.value)), versus));
+        }
+    }
+    all
+}
+
+fn figure(measure: &Measure, median: Option<Median>, versus: Option<Versus>) -> FigureOverSeeds {
+    let ends = |median: Option<Median>| {
+        let interval = median.and_then(|median| median.interval);
+        [median.map(|median| median.value), interval.map(|[low, _]| low), interval.map(|[_, high]| high)]
+            .map(|number| number.filter(|number| number.is_finite()))
+    };
+    let [difference, difference_low_95, difference_high_95] = ends(versus.map(|versus| versus.difference));
+    let [median, low_95, high_95] = ends(median);
+    let name = measure.name;
+    let (p, p_holm) = (versus.map(|versus| versus.test.p), versus.map(|versus| versus.p_holm));
+    let rank_biserial = versus.map(|versus| versus.test.effect);
+    FigureOverSeeds {
+        name,
+        median,
+        low_95,
+        high_95,
+        difference,
+        difference_low_95,
+        difference_high_95,
+        p,
+        p_holm,
+        rank_biserial,
+    }
+}
+
+/// A row of `statistics.csv`.
+#[derive(Serialize)]
+struct StatisticsRow<'a> {
+    scenario: &'a str,
+    contender: &'a str,
+    seeds: usize,
+    lost: usize,
+    figure: &'static str,
+    median: Option<f64>,
+    low_95: Option<f64>,
+    high_95: Option<f64>,
+    against: &'a str,
+    difference: Option<f64>,
+    difference_low_95: Option<f64>,
+    difference_high_95: Option<f64>,
+    p: Option<f64>,
+    p_holm: Option<f64>,
+    rank_biserial: Option<f64>,
+}
+
+/// Writes a row for each figure of each contender in each scenario.
+pub(crate) fn csv(out: &mut dyn Write, comparisons: &[Comparison], measures: &[&Measure]) -> io::Result<()> {
+    let mut csv = csv::Writer::from_writer(out);
+    for comparison in comparisons {
+        let figures = figures(comparison, measures.iter().copied());
+        for (entry, figures) in comparison.entries.iter().zip(figures) {
+            for figure in figures {
+                csv.serialize(StatisticsRow {
+                    scenario: &comparison.scenario.name,
+                    contender: &entry.contender().name,
+                    seeds: entry.flights.len(),
+                    lost: entry.lost(),
+                    figure: figure.name,
+                    median: figure.median,
+                    low_95: figure.low_95,
+                    high_95: figure.high_95,
+                    against: against(comparison),
+                    difference: figure.difference,
+                    difference_low_95: figure.difference_low_95,
+                    difference_high_95: figure.difference_high_95,
+                    p: figure.p,
+                    p_holm: figure.p_holm,
+                    rank_biserial: figure.rank_biserial,
+                })?;
+            }
+        }
+    }
+    csv.flush()
+}
+
+/// Returns the name of the contender that the others are compared with.
+pub(crate) fn against(comparison: &Comparison) -> &str {
+    comparison.entries.get(comparison.against).map_or("", |entry| &entry.contender().name)
+}

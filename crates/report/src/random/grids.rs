@@ -1,0 +1,26 @@
+//! How the contenders stand, for a paper.
+
+use super::Judged;
+use super::cells::{cells, heads, legend};
+use crate::differences::{TEST, TEST_LEGEND, test};
+use crate::grid::{Grid, GridCell};
+
+/// Returns a table for each vehicle and one for all.
+pub(super) fn grids(judged: &Judged<'_>) -> Vec<Grid> {
+    let heads: Vec<String> = ["law".into()].into_iter().chain(heads(judged)).chain(TEST.map(String::from)).collect();
+    let grid = |group: &super::judged::Group<'_>| {
+        let rows = judged.contenders().iter().zip(&group.rankings).map(|(contender, ranking)| {
+            let tested = ranking.difference.filter(|_| contender.title() != judged.against());
+            let tested = tested.map(|difference| test(&difference.test, difference.p_holm)).unwrap_or_default();
+            let cells = cells(group, ranking).into_iter().chain(tested).map(GridCell::from);
+            (contender.title().to_owned(), cells.collect())
+        });
+        Grid {
+            caption: format!("{}, {} flights, {}", group.name(), group.flights, judged.words()),
+            heads: heads.clone(),
+            rows: rows.collect(),
+            note: format!("{} {TEST_LEGEND} Pairs are seeds, or the flights of a single seed.", legend(judged)),
+        }
+    };
+    judged.groups.iter().map(grid).collect()
+}
