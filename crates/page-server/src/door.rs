@@ -13,8 +13,9 @@ use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::thread;
 use std::time::Duration;
 
-/// Time between two frames.
+/// Time between two frames, and while time stands still.
 const FRAME: Duration = Duration::from_millis(33);
+const PAUSED: Duration = Duration::from_millis(250);
 /// Messages that wait for the flight.
 const EVENTS_MAX: usize = 32;
 /// Time for which a client may take nothing.
@@ -115,7 +116,9 @@ impl Door for WebDoor {
     fn turn(&mut self, server: &mut Server, flow: TimeFlow, now: Duration, log: &mut dyn FnMut(&str)) -> Then {
         let then = self.receive(server, now, log);
         self.cockpit.turn(server);
-        if now.saturating_sub(self.shown) >= FRAME && !self.pages.is_empty() {
+        // What somebody has done is seen at once.
+        let wait = if flow.paused && then == Then::Nothing { PAUSED } else { FRAME };
+        if now.saturating_sub(self.shown) >= wait && !self.pages.is_empty() {
             self.shown = now;
             self.show(server, flow, now);
         }

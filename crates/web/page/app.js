@@ -134,7 +134,9 @@ export function run(engine) {
     reply({ text }) {
       say(text);
     },
+    // Of the frames that come between two pictures, the newest is drawn: a slow browser does not fall behind.
     frame(now) {
+      if (!frame || frame.shown) requestAnimationFrame(() => this.picture(frame));
       frame = now;
       paused = now.paused;
       if (now.parameter_changes !== changes) {
@@ -145,6 +147,9 @@ export function run(engine) {
         seen = number;
         say(text, time);
       });
+    },
+    picture(now) {
+      now.shown = true;
       scene.show(now, draft);
       charts.show(now);
       const put = (id, text, alarm = false) => {

@@ -1,6 +1,7 @@
 // The engine in the page itself: the simulator as WebAssembly.
 const STEPS_MAX = 400;
 const FRAME_MS = 33;
+const PAUSED_MS = 250;
 
 export class WasmEngine {
   /** `Vehicle` is the class that WebAssembly exports; it is made anew by `restart`. */
@@ -30,7 +31,7 @@ export class WasmEngine {
         // A slow machine runs slower rather than later.
         owed = Math.min(owed, 50);
       }
-      if (this.core && now - shown >= FRAME_MS - 4) {
+      if (this.core && now - shown >= (this.paused ? PAUSED_MS : FRAME_MS - 4)) {
         shown = now;
         this.show();
       }
