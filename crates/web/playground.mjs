@@ -5,10 +5,17 @@ import { gzipSync } from "node:zlib";
 
 const [bindings, file] = process.argv.slice(2);
 const text = (path) => readFile(new URL(path, import.meta.url), "utf8");
-const { outputFiles: [script] } = await build({
+const {
+  outputFiles: [script],
+} = await build({
   entryPoints: [new URL("page/wasm-main.js", import.meta.url).pathname],
   alias: { bindings: `${bindings}/playground.js` },
-  bundle: true, minify: true, format: "esm", target: "es2022", write: false, logLevel: "error",
+  bundle: true,
+  minify: true,
+  format: "esm",
+  target: "es2022",
+  write: false,
+  logLevel: "error",
 });
 const simulator = gzipSync(await readFile(`${bindings}/playground_bg.wasm`), { level: 9 }).toString("base64");
 // A script ends at the first end tag, wherever it stands.
@@ -20,7 +27,9 @@ const head = `<!--\nthree.js and uPlot:\n${licences.join("\n")}-->\n<style>${sty
 const tail = `<script type="text/plain" id="simulator">${simulator}</script>
 ${scripts.map((source) => `<script>${inline(source)}</script>`).join("\n")}
 <script type="module">${inline(script.text)}</script>`;
-const page = (await text("page/index.html")).replace("<!-- head -->", () => head).replace("<!-- tail -->", () => tail);
+const page = (await text("page/index.html"))
+  .replace("<!-- head -->", () => head)
+  .replace("<!-- tail -->", () => tail);
 await writeFile(file, page);
 const megabytes = (length) => `${(length / 1e6).toFixed(2)} MB`;
 console.log(`${file}: ${megabytes(page.length)}, of which ${megabytes(simulator.length)} are the simulator`);

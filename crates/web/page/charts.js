@@ -7,9 +7,11 @@ const style = (name) => getComputedStyle(document.documentElement).getPropertyVa
 const minus = (a, b) => a.map((value, i) => value - b[i]);
 const three = (of) => ["x", "y", "z"].map((name, i) => [name, (frame) => of(frame)?.[i] ?? null]);
 const angles = (of) => ["roll", "pitch", "yaw"].map((name, i) => [name, (frame) => of(frame)?.[i] ?? null]);
-const axes = (of) => ["roll", "pitch", "yaw", "z", "x", "y"].map((name, i) => [
-  name, (frame) => of(frame.adaptation.axes[i] ?? {}) ?? null,
-]);
+const axes = (of) =>
+  ["roll", "pitch", "yaw", "z", "x", "y"].map((name, i) => [
+    name,
+    (frame) => of(frame.adaptation.axes[i] ?? {}) ?? null,
+  ]);
 
 /** Title, unit and series, each a name and what it shows of a frame. */
 const charts = (hello) => [
@@ -41,7 +43,10 @@ export class Charts {
 
   hello(hello) {
     this.shown = charts(hello).map(([title, unit, series]) => ({
-      title, unit, series, data: [[], ...series.map(() => [])],
+      title,
+      unit,
+      series,
+      data: [[], ...series.map(() => [])],
     }));
     this.last = -Infinity;
     this.draw();
@@ -60,21 +65,38 @@ export class Charts {
       title.append(unit);
       box.append(title);
       this.parent.append(box);
-      const axis = { stroke: style("quiet"), grid: { stroke: style("line"), width: 1 }, ticks: { stroke: style("line"), width: 1 } };
+      const axis = {
+        stroke: style("quiet"),
+        grid: { stroke: style("line"), width: 1 },
+        ticks: { stroke: style("line"), width: 1 },
+      };
       const value = (_, number) => (number === null || number === undefined ? "–" : number.toPrecision(3));
       chart.box = box;
-      chart.plot = new uPlot({
-        width: Math.max(box.clientWidth - 8, 200),
-        height: 150,
-        scales: { x: { time: false } },
-        cursor: { sync: { key: "time" }, drag: { x: false, y: false } },
-        legend: { live: true },
-        axes: [{ ...axis, size: 26 }, { ...axis, size: 52 }],
-        series: [
-          { label: "t", value: (_, t) => (t === null ? "–" : `${t.toFixed(1)} s`) },
-          ...chart.series.map(([label], i) => ({ label, stroke: style(`s${i + 1}`), width: 1.4, points: { show: false }, value })),
-        ],
-      }, chart.data, box);
+      chart.plot = new uPlot(
+        {
+          width: Math.max(box.clientWidth - 8, 200),
+          height: 150,
+          scales: { x: { time: false } },
+          cursor: { sync: { key: "time" }, drag: { x: false, y: false } },
+          legend: { live: true },
+          axes: [
+            { ...axis, size: 26 },
+            { ...axis, size: 52 },
+          ],
+          series: [
+            { label: "t", value: (_, t) => (t === null ? "–" : `${t.toFixed(1)} s`) },
+            ...chart.series.map(([label], i) => ({
+              label,
+              stroke: style(`s${i + 1}`),
+              width: 1.4,
+              points: { show: false },
+              value,
+            })),
+          ],
+        },
+        chart.data,
+        box,
+      );
     }
   }
 

@@ -1,6 +1,8 @@
 // The table of parameters: value, range, unit, meaning. Metadata is as ground stations download it.
-const number = (value) => (Math.abs(value) >= 1e5 || (value !== 0 && Math.abs(value) < 1e-3)
-  ? value.toExponential(2) : String(+value.toPrecision(6)));
+const number = (value) =>
+  Math.abs(value) >= 1e5 || (value !== 0 && Math.abs(value) < 1e-3)
+    ? value.toExponential(2)
+    : String(+value.toPrecision(6));
 
 export class Parameters {
   constructor(body, filter, onSet) {

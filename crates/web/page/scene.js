@@ -2,7 +2,8 @@
 const { THREE } = globalThis;
 
 const TRAIL = 3000;
-const colour = (name) => new THREE.Color(getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim());
+const colour = (name) =>
+  new THREE.Color(getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim());
 const line = (points, name, extra = {}) => {
   const geometry = new THREE.BufferGeometry().setFromPoints(points.map((at) => new THREE.Vector3(...at)));
   return new THREE.Line(geometry, new THREE.LineBasicMaterial({ color: colour(name), ...extra }));
@@ -51,7 +52,9 @@ export class VehicleScene {
     this.height = 2;
     this.wholeView();
     let down = null;
-    canvas.addEventListener("pointerdown", (event) => { down = [event.clientX, event.clientY]; });
+    canvas.addEventListener("pointerdown", (event) => {
+      down = [event.clientX, event.clientY];
+    });
     canvas.addEventListener("pointerup", (event) => {
       const moved = down && Math.hypot(event.clientX - down[0], event.clientY - down[1]);
       if (moved !== null && moved < 5) this.pick(event);
@@ -81,7 +84,10 @@ export class VehicleScene {
   /** Builds everything for a vehicle. */
   build(hello) {
     this.hello = hello;
-    this.scene?.traverse((object) => { object.geometry?.dispose(); object.material?.dispose?.(); });
+    this.scene?.traverse((object) => {
+      object.geometry?.dispose();
+      object.material?.dispose?.();
+    });
     const scene = new THREE.Scene();
     scene.background = colour("sky");
     scene.add(new THREE.HemisphereLight(0xffffff, 0x667788, 2.2));
@@ -89,14 +95,24 @@ export class VehicleScene {
     sun.position.set(-3, -4, 8);
     scene.add(sun);
     const floor = new THREE.Mesh(
-      new THREE.CircleGeometry(400, 64), new THREE.MeshBasicMaterial({ color: colour("floor") }),
+      new THREE.CircleGeometry(400, 64),
+      new THREE.MeshBasicMaterial({ color: colour("floor") }),
     );
     floor.position.z = -0.02;
     scene.add(floor);
     const grid = new THREE.GridHelper(80, 80, colour("grid-strong"), colour("grid"));
     grid.rotation.x = Math.PI / 2;
     scene.add(grid);
-    scene.add(new THREE.ArrowHelper(new THREE.Vector3(1, 0, 0), new THREE.Vector3(0, 0, 0.005), 1, colour("front"), 0.2, 0.12));
+    scene.add(
+      new THREE.ArrowHelper(
+        new THREE.Vector3(1, 0, 0),
+        new THREE.Vector3(0, 0, 0.005),
+        1,
+        colour("front"),
+        0.2,
+        0.12,
+      ),
+    );
     scene.add(this.letter("N", [1.2, 0, 0.05]));
 
     this.vehicle = new THREE.Group();
@@ -117,12 +133,22 @@ export class VehicleScene {
       const disc = new THREE.Mesh(
         new THREE.CircleGeometry(radius, 32),
         new THREE.MeshBasicMaterial({
-          color: colour(x > 0.3 * reach[i] ? "front" : "truth"), transparent: true, opacity: 0.35, side: THREE.DoubleSide,
+          color: colour(x > 0.3 * reach[i] ? "front" : "truth"),
+          transparent: true,
+          opacity: 0.35,
+          side: THREE.DoubleSide,
         }),
       );
       disc.position.set(x, y, 0.12 * size);
       this.vehicle.add(disc);
-      const thrust = new THREE.ArrowHelper(new THREE.Vector3(0, 0, 1), disc.position, 0.01, colour("thrust"), 0.05, 0.04);
+      const thrust = new THREE.ArrowHelper(
+        new THREE.Vector3(0, 0, 1),
+        disc.position,
+        0.01,
+        colour("thrust"),
+        0.05,
+        0.04,
+      );
       this.vehicle.add(thrust);
       return { disc, thrust };
     });
@@ -133,16 +159,25 @@ export class VehicleScene {
     this.led.line.material.transparent = true;
     this.led.line.material.opacity = 0.6;
     scene.add(this.trail.line, this.led.line);
-    const wire = (name, radius, opacity) => new THREE.Mesh(
-      new THREE.SphereGeometry(radius, 20, 14),
-      new THREE.MeshBasicMaterial({ color: colour(name), wireframe: true, transparent: true, opacity }),
-    );
+    const wire = (name, radius, opacity) =>
+      new THREE.Mesh(
+        new THREE.SphereGeometry(radius, 20, 14),
+        new THREE.MeshBasicMaterial({ color: colour(name), wireframe: true, transparent: true, opacity }),
+      );
     this.reference = wire("reference", 0.18 * size, 0.9);
     this.estimate = this.ellipsoid();
     this.believed = new THREE.Mesh(
-      new THREE.SphereGeometry(0.1 * size, 16, 10), new THREE.MeshBasicMaterial({ color: colour("estimate") }),
+      new THREE.SphereGeometry(0.1 * size, 16, 10),
+      new THREE.MeshBasicMaterial({ color: colour("estimate") }),
     );
-    this.windArrow = new THREE.ArrowHelper(new THREE.Vector3(1, 0, 0), new THREE.Vector3(), 1, colour("wind"), 0.2, 0.14);
+    this.windArrow = new THREE.ArrowHelper(
+      new THREE.Vector3(1, 0, 0),
+      new THREE.Vector3(),
+      1,
+      colour("wind"),
+      0.2,
+      0.14,
+    );
     this.home = new THREE.Mesh(
       new THREE.RingGeometry(0.35, 0.42, 40),
       new THREE.MeshBasicMaterial({ color: colour("mission"), side: THREE.DoubleSide }),
@@ -151,10 +186,25 @@ export class VehicleScene {
       new THREE.CircleGeometry(size, 32),
       new THREE.MeshBasicMaterial({ color: 0x000000, transparent: true, opacity: 0.18 }),
     );
-    this.drop = line([[0, 0, 0], [0, 0, 1]], "grid-strong");
+    this.drop = line(
+      [
+        [0, 0, 0],
+        [0, 0, 1],
+      ],
+      "grid-strong",
+    );
     this.plan = new THREE.Group();
     this.planned = "";
-    scene.add(this.reference, this.estimate, this.believed, this.windArrow, this.home, this.shadow, this.drop, this.plan);
+    scene.add(
+      this.reference,
+      this.estimate,
+      this.believed,
+      this.windArrow,
+      this.home,
+      this.shadow,
+      this.drop,
+      this.plan,
+    );
     this.scene = scene;
     this.resize();
   }
@@ -162,13 +212,28 @@ export class VehicleScene {
   /** Three circles and a faint skin, of radius 1. */
   ellipsoid() {
     const group = new THREE.Group();
-    const circle = (place) => line(Array.from({ length: 65 }, (_, i) => place(Math.cos((i * Math.PI) / 32),
-      Math.sin((i * Math.PI) / 32))), "estimate", { transparent: true, opacity: 0.75 });
-    group.add(circle((c, s) => [c, s, 0]), circle((c, s) => [c, 0, s]), circle((c, s) => [0, c, s]));
-    group.add(new THREE.Mesh(
-      new THREE.SphereGeometry(1, 32, 20),
-      new THREE.MeshBasicMaterial({ color: colour("estimate"), transparent: true, opacity: 0.05, depthWrite: false }),
-    ));
+    const circle = (place) =>
+      line(
+        Array.from({ length: 65 }, (_, i) => place(Math.cos((i * Math.PI) / 32), Math.sin((i * Math.PI) / 32))),
+        "estimate",
+        { transparent: true, opacity: 0.75 },
+      );
+    group.add(
+      circle((c, s) => [c, s, 0]),
+      circle((c, s) => [c, 0, s]),
+      circle((c, s) => [0, c, s]),
+    );
+    group.add(
+      new THREE.Mesh(
+        new THREE.SphereGeometry(1, 32, 20),
+        new THREE.MeshBasicMaterial({
+          color: colour("estimate"),
+          transparent: true,
+          opacity: 0.05,
+          depthWrite: false,
+        }),
+      ),
+    );
     return group;
   }
 
@@ -244,10 +309,16 @@ export class VehicleScene {
     const now = JSON.stringify([frame.mission, frame.fence, frame.item, draft]);
     if (now === this.planned) return;
     this.planned = now;
-    this.plan.traverse((object) => { object.geometry?.dispose(); object.material?.dispose?.(); });
+    this.plan.traverse((object) => {
+      object.geometry?.dispose();
+      object.material?.dispose?.();
+    });
     this.plan.clear();
     const ball = (at, name, radius) => {
-      const mesh = new THREE.Mesh(new THREE.SphereGeometry(radius, 16, 10), new THREE.MeshLambertMaterial({ color: colour(name) }));
+      const mesh = new THREE.Mesh(
+        new THREE.SphereGeometry(radius, 16, 10),
+        new THREE.MeshLambertMaterial({ color: colour(name) }),
+      );
       mesh.position.set(...at);
       this.plan.add(mesh);
     };
@@ -255,22 +326,50 @@ export class VehicleScene {
       points.forEach((at, i) => ball(at, name, frame.mission[i]?.number === frame.item ? 0.12 : 0.07));
       if (points.length > 1) this.plan.add(line(points, name));
     };
-    path(frame.mission.map(({ position_m: at }) => at), "mission");
+    path(
+      frame.mission.map(({ position_m: at }) => at),
+      "mission",
+    );
     path(draft.waypoints, "mission");
     const wall = (corners, height, name) => {
       if (corners.length < 2) return corners.forEach(([x, y]) => ball([x, y, 0], name, 0.07));
       const closed = [...corners, corners[0]];
-      for (const z of [0.01, height]) this.plan.add(line(closed.map(([x, y]) => [x, y, z]), name));
-      corners.forEach(([x, y]) => this.plan.add(line([[x, y, 0], [x, y, height]], name)));
+      for (const z of [0.01, height])
+        this.plan.add(
+          line(
+            closed.map(([x, y]) => [x, y, z]),
+            name,
+          ),
+        );
+      corners.forEach(([x, y]) =>
+        this.plan.add(
+          line(
+            [
+              [x, y, 0],
+              [x, y, height],
+            ],
+            name,
+          ),
+        ),
+      );
       const triangles = closed.slice(1).flatMap(([x, y], i) => {
         const [u, v] = closed[i];
         return [u, v, 0, x, y, 0, x, y, height, u, v, 0, x, y, height, u, v, height];
       });
       const geometry = new THREE.BufferGeometry();
       geometry.setAttribute("position", new THREE.BufferAttribute(new Float32Array(triangles), 3));
-      this.plan.add(new THREE.Mesh(geometry, new THREE.MeshBasicMaterial({
-        color: colour(name), transparent: true, opacity: 0.07, side: THREE.DoubleSide, depthWrite: false,
-      })));
+      this.plan.add(
+        new THREE.Mesh(
+          geometry,
+          new THREE.MeshBasicMaterial({
+            color: colour(name),
+            transparent: true,
+            opacity: 0.07,
+            side: THREE.DoubleSide,
+            depthWrite: false,
+          }),
+        ),
+      );
     };
     for (const { corners_m: corners, radius_m: radius } of frame.fence) {
       const [[x, y]] = corners;

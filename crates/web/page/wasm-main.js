@@ -26,7 +26,11 @@ field("vehicle").append(...bindings.vehicles().map((name) => new Option(name, na
 [field("scenario").value, field("seed").value] = [engine.choice.scenario, engine.choice.seed];
 field("vehicle").value = engine.choice.vehicle || "paper";
 field("restart").addEventListener("click", () => {
-  engine.restart({ scenario: field("scenario").value, vehicle: field("vehicle").value, seed: Number(field("seed").value) });
+  engine.restart({
+    scenario: field("scenario").value,
+    vehicle: field("vehicle").value,
+    seed: Number(field("seed").value),
+  });
 });
 // For tests: the same flights as on the command line.
 globalThis.fly = bindings.fly;

@@ -1,6 +1,6 @@
 //! The page that shows a vehicle: files to be served.
 
-use crate::{THREE_JS, UPLOT_CSS, UPLOT_JS};
+use crate::vendor::{THREE_JS, UPLOT_CSS, UPLOT_JS};
 
 /// A file of the page.
 #[derive(Clone, Debug)]

@@ -37,40 +37,51 @@ const step = async (name, act) => {
   passed += 1;
   console.log(`ok ${name} (${((Date.now() - begun) / 1000).toFixed(1)} s)`);
 };
-const until = (condition, what, ...given) => page.waitForFunction(condition, { timeout: 40000, polling: 50 }, ...given)
-  .catch(() => assert.fail(`waited in vain: ${what}`));
+const until = (condition, what, ...given) =>
+  page
+    .waitForFunction(condition, { timeout: 40000, polling: 50 }, ...given)
+    .catch(() => assert.fail(`waited in vain: ${what}`));
 const frame = () => page.evaluate(() => globalThis.page.frame);
 const media = (scheme) => page.emulateMediaFeatures([{ name: "prefers-color-scheme", value: scheme }]);
 const later = async (seconds) => {
   const { time_s: now } = await frame();
   await until((then) => globalThis.page.frame.time_s > then, `${seconds} s`, now + seconds);
 };
-const put = (id, value) => page.$eval(`#${id}`, (field, to) => {
-  field.value = to;
-  field.dispatchEvent(new Event("input", { bubbles: true }));
-  field.dispatchEvent(new Event("change", { bubbles: true }));
-}, String(value));
+const put = (id, value) =>
+  page.$eval(
+    `#${id}`,
+    (field, to) => {
+      field.value = to;
+      field.dispatchEvent(new Event("input", { bubbles: true }));
+      field.dispatchEvent(new Event("change", { bubbles: true }));
+    },
+    String(value),
+  );
 const click = (selector) => page.$eval(selector, (button) => button.click());
 /** Number of colours of the canvas. */
-const colours = () => page.$eval("#scene", (canvas) => {
-  const copy = Object.assign(document.createElement("canvas"), { width: 200, height: 120 });
-  const context = copy.getContext("2d");
-  context.drawImage(canvas, 0, 0, 200, 120);
-  return new Set(new Uint32Array(context.getImageData(0, 0, 200, 120).data.buffer)).size;
-});
+const colours = () =>
+  page.$eval("#scene", (canvas) => {
+    const copy = Object.assign(document.createElement("canvas"), { width: 200, height: 120 });
+    const context = copy.getContext("2d");
+    context.drawImage(canvas, 0, 0, 200, 120);
+    return new Set(new Uint32Array(context.getImageData(0, 0, 200, 120).data.buffer)).size;
+  });
 
 await media("light");
 await page.setViewport({ width: 1280, height: 800 });
 await step("the page opens and shows a vehicle", async () => {
   await page.goto(engine === "playground" ? pathToFileURL(address).href : address);
   await until(() => globalThis.page?.frame?.time_s > 0.2, "the first frame");
-  assert.ok(await colours() > 20, "the canvas is empty");
-  assert.ok(await page.$$eval(".uplot canvas", (all) => all.length) >= 8);
+  assert.ok((await colours()) > 20, "the canvas is empty");
+  assert.ok((await page.$$eval(".uplot canvas", (all) => all.length)) >= 8);
 });
 await step("it asks nobody but its own place", async () => {
   const own = engine === "playground" ? "file:" : new URL(address).origin;
   const asked = await page.evaluate(() => performance.getEntriesByType("resource").map(({ name }) => name));
-  assert.deepEqual(asked.filter((url) => !url.startsWith("data:") && !url.startsWith(own)), []);
+  assert.deepEqual(
+    asked.filter((url) => !url.startsWith("data:") && !url.startsWith(own)),
+    [],
+  );
 });
 if (csv) {
   await step("a whole flight of the command line, bit for bit", async () => {
@@ -79,7 +90,10 @@ if (csv) {
       return { names: log.names(), bits: [...new BigUint64Array(log.rows().buffer)].map(String) };
     });
     const rows = new Float64Array(BigUint64Array.from(bits, BigInt).buffer);
-    const [head, ...lines] = (await readFile(csv, "utf8")).trim().split("\n").map((line) => line.split(","));
+    const [head, ...lines] = (await readFile(csv, "utf8"))
+      .trim()
+      .split("\n")
+      .map((line) => line.split(","));
     assert.equal(rows.length, names.length * lines.length, "another number of rows");
     // The CSV writes single precision with the fewest digits that restore it.
     const single = (name) => /^omega|estimate/.test(name);
@@ -89,7 +103,10 @@ if (csv) {
       assert.ok(place >= 0, `${name} is no column`);
       lines.forEach((line, row) => {
         const [here, there] = [rows[row * names.length + column], Number(line[place])];
-        assert.ok(Object.is(here, single(name) ? Math.fround(there) : there), `${name}, row ${row}: ${here}, ${there}`);
+        assert.ok(
+          Object.is(here, single(name) ? Math.fround(there) : there),
+          `${name}, row ${row}: ${here}, ${there}`,
+        );
         compared += 1;
       });
     });
@@ -101,11 +118,18 @@ await step("it takes off by the keyboard", async () => {
   await until(() => globalThis.page.frame.time_s > 14, "the estimate");
   await page.focus("#scene");
   await page.keyboard.press("t");
-  await until(() => globalThis.page.frame.airborne && globalThis.page.frame.truth.position_m[2] > 3.5, "the take-off");
-  assert.ok(await colours() > 20, "the canvas is empty");
+  await until(
+    () => globalThis.page.frame.airborne && globalThis.page.frame.truth.position_m[2] > 3.5,
+    "the take-off",
+  );
+  assert.ok((await colours()) > 20, "the canvas is empty");
 });
 await step("it flies where it is told", async () => {
-  const { truth: { position_m: [x] } } = await frame();
+  const {
+    truth: {
+      position_m: [x],
+    },
+  } = await frame();
   await put("go-x", x + 3);
   await click("#go");
   await until((to) => Math.abs(globalThis.page.frame.truth.position_m[0] - to) < 0.8, "the way north", x + 3);
@@ -117,10 +141,14 @@ await step("it flies where somebody clicks", async () => {
   await canvas.scrollIntoView();
   const box = await canvas.boundingBox();
   await page.mouse.click(box.x + 0.25 * box.width, box.y + 0.62 * box.height);
-  await until(([x, y]) => {
-    const [u, v] = globalThis.page.frame.truth.position_m;
-    return Math.hypot(u - x, v - y) > 0.8;
-  }, "a move", before.truth.position_m);
+  await until(
+    ([x, y]) => {
+      const [u, v] = globalThis.page.frame.truth.position_m;
+      return Math.hypot(u - x, v - y) > 0.8;
+    },
+    "a move",
+    before.truth.position_m,
+  );
   await put("click", "look");
   await click('[data-command*="hold"]');
 });
@@ -128,12 +156,20 @@ await step("a gust shows and pushes", async () => {
   await later(4);
   const before = await frame();
   await click("#gust");
-  await until((wind) => Math.hypot(...globalThis.page.frame.wind_m_s) > wind + 3, "the gust", Math.hypot(...before.wind_m_s));
+  await until(
+    (wind) => Math.hypot(...globalThis.page.frame.wind_m_s) > wind + 3,
+    "the gust",
+    Math.hypot(...before.wind_m_s),
+  );
   await page.screenshot({ path: `${shots}/${engine}-light.png` });
-  await until(([x, y]) => {
-    const [u, v] = globalThis.page.frame.truth.position_m;
-    return Math.hypot(u - x, v - y) > 0.03;
-  }, "the push", before.truth.position_m);
+  await until(
+    ([x, y]) => {
+      const [u, v] = globalThis.page.frame.truth.position_m;
+      return Math.hypot(u - x, v - y) > 0.03;
+    },
+    "the push",
+    before.truth.position_m,
+  );
 });
 await step("every law takes over in mid-flight and holds", async () => {
   const laws = await page.$$eval("#laws option", (all) => all.map(({ value }) => value));
@@ -142,7 +178,12 @@ await step("every law takes over in mid-flight and holds", async () => {
     await put("laws", law);
     await until((name) => globalThis.page.frame.law === name, law, law);
     await later(2);
-    const { airborne, truth: { position_m: [, , z] } } = await frame();
+    const {
+      airborne,
+      truth: {
+        position_m: [, , z],
+      },
+    } = await frame();
     assert.ok(airborne && z > 0.8, `${law}: at ${z} m`);
   }
 });
@@ -151,8 +192,13 @@ await step("payload, rotor fault and outage show, and are cleared", async () => 
   await put("rotor-share", 0.85);
   await click("#rotor-fault");
   await click("#outages button");
-  await until(() => globalThis.page.frame.payload_kg > 0 && globalThis.page.frame.faults.length === 2
-    && /rotor/.test(document.getElementById("suffers").textContent), "what it suffers");
+  await until(
+    () =>
+      globalThis.page.frame.payload_kg > 0 &&
+      globalThis.page.frame.faults.length === 2 &&
+      /rotor/.test(document.getElementById("suffers").textContent),
+    "what it suffers",
+  );
   await click('[data-line="clear"]');
   await until(() => globalThis.page.frame.faults.length === 0, "a sound vehicle");
 });
@@ -168,7 +214,10 @@ await step("time stands still and goes on", async () => {
 });
 await step("a mission within a fence", async () => {
   await click("#square");
-  await until(() => globalThis.page.frame.mission.length === 6 && globalThis.page.frame.fence.length === 1, "the plan");
+  await until(
+    () => globalThis.page.frame.mission.length === 6 && globalThis.page.frame.fence.length === 1,
+    "the plan",
+  );
   await click('[data-command*="start_mission"]');
   await until(() => globalThis.page.frame.mode === "mission" && globalThis.page.frame.item > 1, "the mission");
   await media("dark");
@@ -192,14 +241,25 @@ await step("a parameter is filtered, changed and shown", async () => {
   const name = "A_ROLL_GAMMA";
   const before = await page.$eval(`[aria-label="${name}"]`, ({ value }) => Number(value));
   await put("speed", 1);
-  await page.$eval(`[aria-label="${name}"]`, (field, to) => {
-    field.value = to;
-    field.dispatchEvent(new Event("change"));
-  }, before * 1.1);
-  await until((label, from) => {
-    const { value } = document.querySelector(`[aria-label="${label}"]`);
-    return Number(value) > from && document.querySelector(`[aria-label="${label}"]`).parentElement.matches(".changed");
-  }, "the change", name, before);
+  await page.$eval(
+    `[aria-label="${name}"]`,
+    (field, to) => {
+      field.value = to;
+      field.dispatchEvent(new Event("change"));
+    },
+    before * 1.1,
+  );
+  await until(
+    (label, from) => {
+      const { value } = document.querySelector(`[aria-label="${label}"]`);
+      return (
+        Number(value) > from && document.querySelector(`[aria-label="${label}"]`).parentElement.matches(".changed")
+      );
+    },
+    "the change",
+    name,
+    before,
+  );
   assert.equal(await page.$$eval("#parameters tr:not([hidden])", (all) => all.length), 1);
   await put("filter", "");
 });
@@ -227,9 +287,12 @@ if (engine === "playground") {
       await media(scheme);
       await page.setViewport({ width: 390, height: 844, isMobile: true, hasTouch: true, deviceScaleFactor: 2 });
       await new Promise((done) => setTimeout(done, 500));
-      assert.ok(await page.evaluate(() => document.documentElement.scrollWidth) <= 390, "it is wider than the phone");
-      assert.ok(await colours() > 20, "the canvas is empty");
-      await page.screenshot({ path: `${shots}/${engine}-phone-${scheme}.png`, fullPage: true });
+      assert.ok(
+        (await page.evaluate(() => document.documentElement.scrollWidth)) <= 390,
+        "it is wider than the phone",
+      );
+      assert.ok((await colours()) > 20, "the canvas is empty");
+      await page.screenshot({ path: `${shots}/${engine}-phone-${scheme}.png`, clip: { x: 0, y: 0, width: 390, height: 1900 } });
     });
   }
 }
