@@ -230,7 +230,7 @@ fn hostile_clients_cost_the_flight_nothing() {
     let huge = [&[0x81, 0xff][..], &u64::MAX.to_be_bytes(), &[0; 4]].concat();
     let flood: Vec<u8> = (0..5000).flat_map(|_| frame(1, br#"{"do":"arm"}"#)).collect();
     let pings: Vec<u8> = (0..5000).flat_map(|_| frame(9, b"")).collect();
-    for bytes in [&long[..], &huge, &flood, &pings, b"\x81\x05hello", b"\xff\xff\xff", &frame(2, &[0; 100])] {
+    for bytes in [&long[..], &huge, &flood, &pings, b"\x81\x05hello", b"\xff\x80\0\0\0\0", &frame(2, &[0; 100])] {
         let mut socket = flight.socket("");
         let _ = socket.set_write_timeout(Some(Duration::from_millis(200)));
         let _ = socket.write_all(bytes);

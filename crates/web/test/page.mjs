@@ -292,7 +292,10 @@ if (engine === "playground") {
         "it is wider than the phone",
       );
       assert.ok((await colours()) > 20, "the canvas is empty");
-      await page.screenshot({ path: `${shots}/${engine}-phone-${scheme}.png`, clip: { x: 0, y: 0, width: 390, height: 1900 } });
+      await page.screenshot({
+        path: `${shots}/${engine}-phone-${scheme}.png`,
+        clip: { x: 0, y: 0, width: 390, height: 1900 },
+      });
     });
   }
 }
