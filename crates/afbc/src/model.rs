@@ -1,6 +1,6 @@
 //! The nominal model (7) that the baseline inverts: f_i, g_i without disturbances (A_F = A_T = 0).
 
-use afbc_control::math;
+use afbc_control::{Errors, math};
 use afbc_types::{Axis, Parameters, State};
 use nalgebra::{Matrix3, Vector3};
 
@@ -199,6 +199,14 @@ impl ModelConstants {
     /// Returns f_i, g_i and dg_i/dt of `axis`, with d eta/dt in place of Omega as in (6).
     pub fn dynamics(&self, axis: Axis, state: &State, rotor_residual_rad_s: f32) -> Dynamics {
         self.dynamics_at(axis, &state.rates_rad_s, &RollPitch::new(state), rotor_residual_rad_s)
+    }
+
+    /// Returns the computable terms of a subsystem's Lyapunov function (14), (27): e_1^2 / 2 + e_2^2 / (2 g_i), with the
+    /// paper's weight c = 1 of e_1. The terms of the estimates' errors are left out, since the optimal values are
+    /// unknown.
+    pub fn lyapunov(&self, axis: Axis, state: &State, errors: &Errors) -> f32 {
+        // g_i does not depend on the rotors.
+        0.5 * errors.e1 * errors.e1 + 0.5 * errors.e2 * errors.e2 / self.dynamics(axis, state, 0.0).g
     }
 
     /// The same, for given rates and angles.

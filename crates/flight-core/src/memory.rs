@@ -75,6 +75,15 @@ impl<M> FlightCoreMemory<M> {
     }
 }
 
+impl<M: Default> FlightCoreMemory<M> {
+    /// Lets a law begin afresh in flight, as after arming; for a change of the law.
+    pub fn forget_law(&mut self) {
+        if let Some(flight) = &mut self.flight {
+            flight.control = M::default();
+        }
+    }
+}
+
 /// Extrapolates the state by `age_us` with its velocities and rates; as in the paper's model, body rates replace the
 /// derivatives of the angles.
 pub(crate) fn extrapolated(state: &State, age_us: u32) -> State {

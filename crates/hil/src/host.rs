@@ -6,14 +6,16 @@ use crate::metadata::MetadataFiles;
 use crate::served_files::{OpenFile, ServedFiles};
 use crate::simulated_escs::SimulatedEscs;
 use crate::ulog_files::StoredLogs;
+use afbc::AdaptiveEstimate;
 use afbc_calibration::RawSample;
 use afbc_estimator::Origin;
 use afbc_files::Flash;
 use afbc_flight_core::rate::PERIOD_US;
-use afbc_link::{Decoder, Uplink};
+use afbc_link::{Decoder, MissionItem, Uplink};
 use afbc_onboard::parameters::{Kept, ParameterTable, Reason, RecordChange};
 use afbc_onboard::{
-    Configuration, ControlInputs, EscTelemetry, Flight, ImuSelector, Link, Prepare, RawReadings, Readings, Report,
+    Configuration, ControlInputs, EscTelemetry, Flight, FlightView, ImuSelector, Link, Prepare, RawReadings, Readings,
+    Report,
 };
 use afbc_plant::Plant;
 use afbc_recorder::{Given, Recorder, TickRecord};
@@ -21,8 +23,8 @@ use afbc_scenario::contender::{ControllerKind, Law};
 use afbc_scenario::{AnyController, FlownLaw};
 use afbc_station::services::signing::{Signing, SigningRecord};
 use afbc_station::{Calibrator, Comms, EscAction, EscReports, RadioControl, Setup, Transfers};
-use afbc_store::Store;
-use afbc_types::{OutOfRange, ROTORS_MAX, with_rotors};
+use afbc_store::{RecordName, Store};
+use afbc_types::{OutOfRange, PerAxis, ROTORS_MAX, with_rotors};
 use afbc_ulog::{BlackBox, LogStart, TakenInputs};
 use afbc_vehicles::Vehicle;
 
@@ -105,6 +107,14 @@ trait Core {
 
     /// Returns the metadata of the vehicle called so.
     fn metadata(&self, vehicle: &str) -> MetadataFiles;
+    /// Returns name and value of every parameter.
+    fn parameter_values(&self) -> Vec<(RecordName, f32)>;
+    /// Returns what is known after the tick at `now_us`.
+    fn view(&self, now_us: u64) -> FlightView;
+    /// Returns AFBC's estimates, if it flies.
+    fn estimates(&self) -> Option<PerAxis<AdaptiveEstimate>>;
+    /// Flies on under this law, or the image's.
+    fn change_law(&mut self, law: FlownLaw) -> Result<(), OutOfRange>;
 
     /// Logs the last tick, and a change of the parameters after it.
     fn log(
@@ -187,6 +197,25 @@ impl<const N: usize> Core for Aircraft<N> {
 
     fn metadata(&self, vehicle: &str) -> MetadataFiles {
         MetadataFiles::new(vehicle, &self.table)
+    }
+
+    fn parameter_values(&self) -> Vec<(RecordName, f32)> {
+        self.table.iter().map(|parameter| (parameter.name, parameter.value)).collect()
+    }
+
+    fn view(&self, now_us: u64) -> FlightView {
+        self.flight.view(now_us)
+    }
+
+    fn estimates(&self) -> Option<PerAxis<AdaptiveEstimate>> {
+        self.flight.law_memory()?.estimates()
+    }
+
+    fn change_law(&mut self, law: FlownLaw) -> Result<(), OutOfRange> {
+        let prepared = law.prepare(self.table.configuration())?;
+        self.flight.change_law(&prepared);
+        self.law = law;
+        Ok(())
     }
 
     fn log(
@@ -359,6 +388,44 @@ impl Host {
     /// Returns the half that communicates.
     pub fn comms(&mut self) -> &mut Comms {
         &mut self.comms
+    }
+
+    /// Returns the items of the mission and of the geofence, as stations have uploaded them.
+    pub fn plan(&self) -> [&[MissionItem]; 2] {
+        self.comms.plan()
+    }
+
+    /// Returns what is known after the last tick.
+    pub fn view(&self) -> FlightView {
+        self.flight.view(self.time_us)
+    }
+
+    /// Returns AFBC's estimates in this or the last flight, if it flies.
+    pub fn estimates(&self) -> Option<PerAxis<AdaptiveEstimate>> {
+        self.flight.estimates()
+    }
+
+    /// Flies on under this law, or under the image's own with its monitor, from the next tick on, armed or not: it
+    /// begins afresh, as after arming. An exact log does not know of it.
+    ///
+    /// # Errors
+    /// The first gain out of range; nothing has changed then.
+    pub fn change_law(&mut self, law: Option<Law>) -> Result<(), OutOfRange> {
+        self.flight.change_law(FlownLaw(law))?;
+        let [_, name] = &mut self.names;
+        law.map_or(ControllerKind::Afbc, |law| law.kind()).name().clone_into(name);
+        Ok(())
+    }
+
+    /// Returns name and value of every parameter.
+    pub fn parameter_values(&self) -> Vec<(RecordName, f32)> {
+        self.flight.parameter_values()
+    }
+
+    /// Returns the metadata of its parameters, as stations download it.
+    pub fn metadata(&self) -> MetadataFiles {
+        let [vehicle, _] = &self.names;
+        self.flight.metadata(vehicle)
     }
 
     /// Keeps an exact log ([`afbc_recorder`]) from now on, before the first tick; `write` takes its bytes.

@@ -207,6 +207,18 @@ impl<const N: usize, C: FlightLaw<N>> Flight<N, C> {
         disarmed
     }
 
+    /// Flies on under another law, from the next tick on, armed or not: it begins afresh, as after arming. `prepared`
+    /// is of the same configuration. For simulators: no image has several laws.
+    pub fn change_law(&mut self, prepared: &Prepared<N, C>) {
+        self.vehicle.clone_from(&prepared.vehicle);
+        self.memory.forget_law();
+    }
+
+    /// Returns the memory of the law in this or the last flight; none before the first.
+    pub fn law_memory(&self) -> Option<&C::Memory> {
+        self.memory.control()
+    }
+
     /// Moves the notch in the velocity that the law gets, from the next tick on, beside the tick; nothing if the
     /// vehicle has none.
     pub fn move_notch(&mut self, to: &VelocityNotch) {

@@ -39,15 +39,10 @@ struct Column {
     value: Box<dyn Fn(&Row) -> Number>,
 }
 
-/// Returns the computable terms of the Lyapunov functions (14), (27): e_1^2 / 2 + e_2^2 / (2 g_i), with g_i of the
-/// nominal vehicle. The terms of the estimate errors are left out, since the optimal values are unknown.
+/// Returns the computable terms of the Lyapunov functions, with g_i of the nominal vehicle.
 fn lyapunov(model: &ModelConstants, sample: &Sample) -> PerAxis<f32> {
     let state = sample.motion.measure();
-    // With the paper's weight c = 1 of e_1. g_i does not depend on the rotors.
-    PerAxis::from_fn(|axis| {
-        let errors = &sample.trace.errors[axis];
-        0.5 * errors.e1 * errors.e1 + 0.5 * errors.e2 * errors.e2 / model.dynamics(axis, &state, 0.0).g
-    })
+    PerAxis::from_fn(|axis| model.lyapunov(axis, &state, &sample.trace.errors[axis]))
 }
 
 /// Returns every column of a flight's log, left to right.

@@ -6,6 +6,7 @@ use afbc_plant::rotors::limits as rotor;
 use afbc_plant::wind::limits as gust;
 use afbc_plant::{Battery, GUST_SIZE, PAYLOAD_BELOW, PAYLOAD_MASS, PlantParameter, Turbulence, Wind};
 use afbc_reader::words::{nearest, out_of_range};
+use afbc_scenario::contender::ControllerKind;
 use afbc_types::Range;
 use nalgebra::Vector3;
 use std::str::SplitWhitespace;
@@ -32,6 +33,10 @@ pub enum ServerCommand {
     Step(u32),
     /// Run at so many times real time; 0: as fast as possible.
     Speed(f64),
+    /// Let time stand still, or go on.
+    Pause(bool),
+    /// Fly on under this law.
+    Law(ControllerKind),
     /// Say what commands there are.
     Help,
     /// End.
@@ -100,7 +105,7 @@ pub enum WorldChange {
 }
 
 /// What each command is called, what follows it, and what it does.
-pub const COMMANDS: [[&str; 3]; 17] = [
+pub const COMMANDS: [[&str; 3]; 20] = [
     ["wind", "X Y Z", "steady wind [m/s], towards north, west, up"],
     ["turbulence", "none|light|moderate|severe", "turbulence of the wind"],
     ["gust", "X Y Z [RISE [HOLD]]", "a gust with this peak [m/s], rising for 1 s, there for 2 s"],
@@ -119,9 +124,12 @@ pub const COMMANDS: [[&str; 3]; 17] = [
         "SIDE [DEG_S]|none",
         "by hand, this side down: down, up, left, right, front, back; turned so fast about the vertical",
     ],
+    ["law", "NAME", "another law from now on, also in flight: afbc (the firmware's), backstepping, pid, ..."],
     ["clear", "", "no faults; weather and load as the scenario has them"],
     ["status", "", "where each vehicle is and what it suffers"],
     ["speed", "FACTOR", "times real time; 0: as fast as possible"],
+    ["pause", "", "time stands still"],
+    ["resume", "", "and goes on"],
     ["step", "MILLISECONDS", "go on by so much, if started with --lockstep"],
     ["help", "", "this"],
     ["quit", "", "end"],
@@ -195,6 +203,9 @@ fn command(word: &str, words: &mut Words<'_>) -> Result<ServerCommand, String> {
         "quit" => ServerCommand::Quit,
         "step" => ServerCommand::Step(words.whole("milliseconds", STEP_MAX)?),
         "speed" => ServerCommand::Speed(words.number(&SPEED)?),
+        "pause" => ServerCommand::Pause(true),
+        "resume" => ServerCommand::Pause(false),
+        "law" => ServerCommand::Law(law(words)?),
         _ => ServerCommand::WorldChange(change(word, words)?),
     })
 }
@@ -241,6 +252,13 @@ fn change(word: &str, words: &mut Words<'_>) -> Result<WorldChange, String> {
             return Err(format!("{}: no such command; {cure}", shown(word)));
         }
     })
+}
+
+/// Reads the name of a law.
+fn law(words: &mut Words<'_>) -> Result<ControllerKind, String> {
+    let wanted = || format!("one of {}", ControllerKind::names());
+    let name = words.word(&wanted())?;
+    ControllerKind::named(name).ok_or_else(|| format!("law: {} is not {}", shown(name), wanted()))
 }
 
 /// Reads how a hand holds the vehicle, as `left 60`.

@@ -8,10 +8,12 @@
 //! 2. [`Server`]: several vehicles, and [commands](command) that change weather and faults while they fly. Neither has
 //!    a clock or a socket: the same lines and bytes at the same milliseconds give the same bytes.
 //! 3. [`QgcPlan`]: a file of QGroundControl, and [`fly_plan`], a station that flies it.
-//! 4. [`Ports`]: their UDP and TCP ports. [`Pace`]: real time. [`run`]: all of it together.
+//! 4. [`Ports`]: their UDP and TCP ports. [`Door`]: another way to them, such as a page. [`Pace`]: real time. [`run`]:
+//!    all of it together.
 #![forbid(unsafe_code)]
 
 pub mod command;
+mod door;
 mod frames;
 mod guide;
 mod hand;
@@ -31,13 +33,14 @@ mod udp;
 mod vehicle;
 mod world_changes;
 
+pub use door::{Door, TimeFlow, TimeRate};
 pub use guide::guide;
 pub use pace::{BEHIND_MAX, Pace, Wait};
 pub use parameter_file::ParameterFile;
 pub use plan_file::QgcPlan;
 pub use plan_flight::{PlanEnd, fly_plan};
 pub use ports::{Addresses, Ports};
-pub use run::{Lines, RunEnd, TimeRate, run};
+pub use run::{Lines, RunEnd, run};
 pub use server::{Reply, Server, Then};
 pub use stand::{VEHICLES_MAX, fleet};
 pub use vehicle::ServedVehicle;

@@ -34,6 +34,11 @@ impl ReportedSensors {
         ReportedSensors { suite, origin, silent_ms: [SILENT_MS; 3], sigma_mm: [0; 2] }
     }
 
+    /// Returns where the local frame's origin is on the earth, if that is known.
+    pub(crate) fn origin(&self) -> Option<EarthOrigin> {
+        self.origin
+    }
+
     /// Puts the local frame's origin elsewhere, where the vehicle knows where on the earth it is.
     pub(crate) fn move_origin(&mut self, origin: EarthOrigin) {
         self.origin = self.origin.map(|_| origin);

@@ -1,5 +1,6 @@
 //! Vehicles, ports, time and lines together.
 
+use crate::door::{Door, TimeFlow, TimeRate};
 use crate::pace::{Pace, Wait};
 use crate::ports::Ports;
 use crate::server::{Server, Then};
@@ -8,15 +9,6 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, TryRecvError, channel};
 use std::thread;
 use std::time::{Duration, Instant};
-
-/// How time goes on.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum TimeRate {
-    /// At so many times real time; 0: as fast as possible.
-    Times(f64),
-    /// By the command `step` alone.
-    Lockstep,
-}
 
 /// Why a run has ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -66,6 +58,10 @@ impl Lines {
 
     /// Waits a little for the next line.
     fn wait(&mut self) -> Option<String> {
+        if self.over {
+            thread::sleep(NAP);
+            return None;
+        }
         let line = self.lines.recv_timeout(NAP);
         self.over |= line == Err(RecvTimeoutError::Disconnected);
         line.ok()
@@ -75,42 +71,38 @@ impl Lines {
 /// Runs `server` until somebody says `quit` or `stop` is set; passes answers and events to `log`, a line each.
 pub fn run(
     server: &mut Server,
-    ports: &mut Ports,
-    mut rate: TimeRate,
+    (ports, door): (&mut Ports, &mut dyn Door),
+    rate: TimeRate,
     lines: &mut Lines,
     stop: &AtomicBool,
     mut log: impl FnMut(&str),
 ) -> RunEnd {
     let began = Instant::now();
-    let mut pace = Pace::new(factor(rate), began.elapsed());
+    let mut time =
+        RunningTime { flow: TimeFlow { rate, paused: false }, pace: Pace::new(factor(rate), Duration::ZERO) };
     let mut reported = None;
     loop {
-        // Lines first: in lockstep there is nothing else to do.
+        // Lines first: where time stands still there is nothing else to do.
         loop {
-            let line = if rate == TimeRate::Lockstep { lines.wait() } else { lines.next() };
+            let stands = time.stands();
+            let line = if stands { lines.wait() } else { lines.next() };
             if stop.load(Ordering::Relaxed) {
                 return RunEnd::Stopped;
             }
             let Some(line) = line else {
-                match rate {
-                    TimeRate::Lockstep if lines.over => return RunEnd::Silent,
-                    TimeRate::Lockstep => continue,
-                    TimeRate::Times(_) => break,
+                if rate == TimeRate::Lockstep && lines.over {
+                    return RunEnd::Silent;
                 }
+                break;
             };
             let mut reply = server.line(&line);
             match (reply.then, rate) {
-                (Then::Nothing, _) => {}
-                (Then::Quit, _) => {
-                    reply.lines.iter().for_each(|line| log(line));
-                    return RunEnd::Quit;
-                }
                 (Then::Step(steps), TimeRate::Lockstep) => {
                     for _ in 0..steps {
                         if stop.load(Ordering::Relaxed) {
                             return RunEnd::Stopped;
                         }
-                        if step(server, ports, began, &mut log) == Then::Quit {
+                        if step(server, ports, door, began, &mut log) == Then::Quit {
                             return RunEnd::Quit;
                         }
                     }
@@ -118,26 +110,29 @@ pub fn run(
                 (Then::Step(_), TimeRate::Times(_)) => {
                     reply.lines = vec!["error step: time goes on by itself; start with --lockstep".into()];
                 }
-                (Then::Speed(_), TimeRate::Lockstep) => {
-                    reply.lines = vec!["error speed: time goes on by step alone; start without --lockstep".into()];
+                (Then::Speed(_) | Then::Pause(_), TimeRate::Lockstep) => {
+                    let command = line.split_whitespace().next().unwrap_or_default();
+                    let problem = "time goes on by step alone; start without --lockstep";
+                    reply.lines = vec![format!("error {command}: {problem}")];
                 }
-                (Then::Speed(speed), TimeRate::Times(_)) => {
-                    rate = TimeRate::Times(speed);
-                    pace = Pace::new(speed, began.elapsed());
-                }
+                (then, _) => time.change(then, began.elapsed()),
             }
             reply.lines.iter().for_each(|line| log(line));
-        }
-        match step(server, ports, began, &mut log) {
-            Then::Quit => return RunEnd::Quit,
-            Then::Speed(speed) => {
-                rate = TimeRate::Times(speed);
-                pace = Pace::new(speed, began.elapsed());
+            if reply.then == Then::Quit {
+                return RunEnd::Quit;
             }
-            Then::Nothing | Then::Step(_) => {}
+        }
+        let then = door.turn(server, time.flow, began.elapsed(), &mut log);
+        time.change(then, began.elapsed());
+        if time.stands() {
+            continue;
+        }
+        match step(server, ports, door, began, &mut log) {
+            Then::Quit => return RunEnd::Quit,
+            then => time.change(then, began.elapsed()),
         }
         let now = began.elapsed();
-        match pace.step(now) {
+        match time.pace.step(now) {
             Wait::Not => {}
             Wait::For(ahead) => thread::sleep(ahead),
             Wait::Lost(lost) => {
@@ -151,10 +146,44 @@ pub fn run(
     }
 }
 
+/// Time as it goes on in a run.
+struct RunningTime {
+    flow: TimeFlow,
+    pace: Pace,
+}
+
+impl RunningTime {
+    /// True if it goes on by nothing but what somebody says.
+    fn stands(&self) -> bool {
+        self.flow.paused || self.flow.rate == TimeRate::Lockstep
+    }
+
+    /// Goes on otherwise, from `now` on.
+    fn change(&mut self, then: Then, now: Duration) {
+        match then {
+            Then::Nothing | Then::Step(_) | Then::Quit => return,
+            Then::Speed(speed) if self.flow.rate != TimeRate::Lockstep => self.flow.rate = TimeRate::Times(speed),
+            Then::Speed(_) => return,
+            Then::Pause(stands) => self.flow.paused = stands,
+        }
+        self.pace = Pace::new(factor(self.flow.rate), now);
+    }
+}
+
 /// Runs a millisecond.
-fn step(server: &mut Server, ports: &mut Ports, began: Instant, mut log: impl FnMut(&str)) -> Then {
+fn step(
+    server: &mut Server,
+    ports: &mut Ports,
+    door: &mut dyn Door,
+    began: Instant,
+    mut log: impl FnMut(&str),
+) -> Then {
     ports.receive(server, began.elapsed(), &mut log);
-    server.step(|vehicle, bytes| ports.send(vehicle, bytes), &mut log)
+    let send = |vehicle, bytes: &[u8]| {
+        ports.send(vehicle, bytes);
+        door.sent(vehicle, bytes);
+    };
+    server.step(send, &mut log)
 }
 
 fn factor(rate: TimeRate) -> f64 {

@@ -36,6 +36,8 @@ pub enum Then {
     Step(u32),
     /// To run at this speed.
     Speed(f64),
+    /// To let time stand still, or go on.
+    Pause(bool),
     /// To end.
     Quit,
 }
@@ -198,14 +200,25 @@ impl Server {
             }
             ServerCommand::Step(steps) => Reply { then: Then::Step(*steps), ..Reply::accepted(text) },
             ServerCommand::Speed(speed) => Reply { then: Then::Speed(*speed), ..Reply::accepted(text) },
+            ServerCommand::Pause(stands) => Reply { then: Then::Pause(*stands), ..Reply::accepted(text) },
+            ServerCommand::Law(kind) => {
+                match self.wanted(line.vehicle).try_for_each(|vehicle| vehicle.change_law(*kind)) {
+                    Ok(()) => Reply::accepted(text),
+                    Err(problem) => Reply::refused(&problem),
+                }
+            }
             ServerCommand::Quit => Reply { then: Then::Quit, ..Reply::accepted(text) },
         }
     }
 
     /// Changes weather or faults of one vehicle or all.
     fn apply(&mut self, system: Option<u8>, change: &WorldChange) -> Result<(), String> {
-        let mut wanted = self.vehicles.iter_mut().filter(|vehicle| system.is_none_or(|it| vehicle.system() == it));
-        wanted.try_for_each(|vehicle| vehicle.apply(change))
+        self.wanted(system).try_for_each(|vehicle| vehicle.apply(change))
+    }
+
+    /// Returns the vehicle of this system id, or all.
+    fn wanted(&mut self, system: Option<u8>) -> impl Iterator<Item = &mut ServedVehicle> {
+        self.vehicles.iter_mut().filter(move |vehicle| system.is_none_or(|it| vehicle.system() == it))
     }
 }
 

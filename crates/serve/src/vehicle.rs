@@ -6,19 +6,21 @@ use crate::frames::frames;
 use crate::hand::Hand;
 use crate::reported_sensors::ReportedSensors;
 use crate::world_changes::WorldChanges;
+use afbc::Profile;
 use afbc_flight_core::Mode;
 use afbc_hil::{Host, HostTick, LogFile, UlogFiles, place};
 use afbc_link::{Address, Decoder, Reboot, Uplink};
-use afbc_onboard::{Link, Readings};
+use afbc_onboard::{Link, Readings, Report};
 use afbc_reader::words::out_of_range;
 use afbc_scenario::Scenario;
+use afbc_scenario::contender::{ControllerKind, Law};
 use afbc_sim::flight::World;
 use afbc_station::services::health::sensor;
 use afbc_station::services::origin::{EarthOrigin, Global};
 use afbc_station::services::sensors::tested;
 use afbc_station::services::status::SensorBits;
 use afbc_station::{AuxSensors, Setup};
-use afbc_types::OutOfRange;
+use afbc_types::{OutOfRange, ROTORS_MAX};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
@@ -44,6 +46,10 @@ pub struct ServedVehicle {
     /// True if new peers count as holding the vehicle.
     wired: bool,
     mode: Mode,
+    /// Report of the last tick.
+    report: Option<Report<ROTORS_MAX>>,
+    /// The law that flies.
+    law: ControllerKind,
     reported: ReportedSensors,
     scenario: Scenario,
     keeper: Option<ParameterFile>,
@@ -74,6 +80,8 @@ impl ServedVehicle {
             peers: BTreeMap::new(),
             wired: false,
             mode: Mode::Disarmed,
+            report: None,
+            law: ControllerKind::Afbc,
             reported: ReportedSensors::new(scenario),
             scenario: scenario.clone(),
             keeper,
@@ -161,6 +169,7 @@ impl ServedVehicle {
             log(if report.mode.armed() { "armed" } else { "disarmed" });
         }
         self.mode = report.mode;
+        self.report = Some(report);
         frames(&bytes).filter_map(|frame| frame.text()).for_each(|text| log(&text));
         if let Some(keeper) = &mut self.keeper {
             let change = change.map_or(Ok(()), |change| keeper.keep(change));
@@ -206,7 +215,7 @@ impl ServedVehicle {
         match host {
             Ok(host) => {
                 self.address = address(&host);
-                self.host = host;
+                (self.host, self.law) = (host, ControllerKind::Afbc);
                 if let Some(file) = &self.exact_log {
                     self.host.record(file.sink());
                 }
@@ -247,6 +256,60 @@ impl ServedVehicle {
             self.hand.get_or_insert_with(|| Hand::new(&plant.motion(), now_s)).take(*grip, now_s);
         }
         self.changes.apply(change, &mut self.world)
+    }
+
+    /// Flies on under this law, from the next tick on, armed or not: it begins afresh, as after arming. AFBC is the
+    /// firmware's own, with its monitor.
+    ///
+    /// # Errors
+    /// One line on why it does not.
+    pub fn change_law(&mut self, kind: ControllerKind) -> Result<(), String> {
+        if self.exact_log.is_some() {
+            return Err("law: an exact log is of one law; serve without --exact-log".into());
+        }
+        let law = match (kind, &self.scenario.vehicle_file) {
+            (ControllerKind::Afbc, _) => None,
+            (kind, Some(vehicle)) => Some(Law::on(kind, vehicle, Profile::Flight).map_err(|error| error.to_string())?),
+            (kind, None) => Some(Law::of(kind, Profile::Flight)),
+        };
+        self.host.change_law(law).map_err(|error| out_of_range(&error))?;
+        self.law = kind;
+        Ok(())
+    }
+
+    /// Returns the law that flies.
+    pub fn law(&self) -> ControllerKind {
+        self.law
+    }
+
+    /// Returns the firmware's code that flies it, to look at.
+    pub fn host(&self) -> &Host {
+        &self.host
+    }
+
+    /// Returns the report of the last tick; none before the first.
+    pub fn report(&self) -> Option<&Report<ROTORS_MAX>> {
+        self.report.as_ref()
+    }
+
+    /// Returns the scenario that it was made of.
+    pub fn scenario(&self) -> &Scenario {
+        &self.scenario
+    }
+
+    /// Returns where on the earth the origin of its local frame is, if that is known.
+    pub fn origin(&self) -> Option<EarthOrigin> {
+        self.reported.origin()
+    }
+
+    /// Returns what it suffers now, in words.
+    pub fn faults(&self) -> Vec<String> {
+        self.changes.active_faults(self.world.plant().time_s())
+    }
+
+    /// Returns the share of its thrust that each rotor has now.
+    pub fn rotor_shares(&self) -> Vec<f64> {
+        self.changes.rotor_shares(self.scenario.rotors.len(), self.world.plant().time_s())
     }
 
     /// Returns its state in one line.

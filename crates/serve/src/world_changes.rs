@@ -110,6 +110,15 @@ impl WorldChanges {
         Ok(())
     }
 
+    /// Returns the share of its thrust that each of so many rotors has at `now_s`.
+    pub(crate) fn rotor_shares(&self, rotors: usize, now_s: f64) -> Vec<f64> {
+        let of = |rotor: usize| {
+            let faults = self.rotors.iter().filter(|fault| usize::from(fault.rotor) == rotor && fault.start_s <= now_s);
+            faults.map(|fault| fault.efficiency).product()
+        };
+        (1..=rotors).map(of).collect()
+    }
+
     /// Returns the faults at `now_s` in words.
     pub(crate) fn active_faults(&self, now_s: f64) -> Vec<String> {
         let failures = self.failures.iter().filter(|fault| (fault.start_s..fault.end_s).contains(&now_s));

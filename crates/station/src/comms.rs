@@ -28,8 +28,8 @@ use afbc_flight_core::{Mode, Stamped, Tracker};
 use afbc_guidance::{BatteryReading, Cause, ModeReason, Notice};
 use afbc_link::telemetry::ESCS_PER_MESSAGE;
 use afbc_link::{
-    Address, Decoder, Downlink, InertialSample, MavSeverity, Message, PositionTarget, Reboot, ReceivedFrame,
-    SIGNED_FRAME_MAX, Sender, SetupSigning, StatesRefused, Telemetry, Uplink,
+    Address, Decoder, Downlink, InertialSample, MavSeverity, Message, MissionItem, PositionTarget, Reboot,
+    ReceivedFrame, SIGNED_FRAME_MAX, Sender, SetupSigning, StatesRefused, Telemetry, Uplink,
 };
 use afbc_onboard::parameters::{ParameterTable, RecordChange};
 use afbc_onboard::{Configuration, ControlInputs, EscTelemetry, Report};
@@ -149,6 +149,12 @@ impl Comms {
     /// True once if a station has asked the disarmed vehicle for its sensors' own tests.
     pub fn wants_self_tests(&mut self) -> bool {
         core::mem::take(&mut self.dispatcher.tests)
+    }
+
+    /// Returns the items of the mission and of the geofence, as stations have uploaded them.
+    pub fn plan(&self) -> [&[MissionItem]; 2] {
+        let missions = &self.dispatcher.missions;
+        [missions.items(), missions.fence()]
     }
 
     /// True if [`receive`](Self::receive) has something for the next tick even without bytes.

@@ -4,14 +4,15 @@ use super::target::Target;
 use super::terminal::{Failure, INTERRUPTED, print, say};
 use super::vehicle::OnVehicle;
 use afbc_hil::{LogFile, UlogFiles};
+use afbc_page_server::{Admission, Token, WebDoor};
 use afbc_serve::{
-    Addresses, Lines, ParameterFile, Ports, RunEnd, Server, Then, TimeRate, VEHICLES_MAX, fleet, guide, run,
+    Addresses, Door, Lines, ParameterFile, Ports, RunEnd, Server, Then, TimeRate, VEHICLES_MAX, fleet, guide, run,
 };
 use clap::{Args, value_parser};
 use std::ffi::OsString;
-use std::fs::create_dir_all;
+use std::fs::{create_dir_all, read_to_string};
 use std::io::{self, BufReader, Write, stdin, stdout};
-use std::net::{IpAddr, SocketAddr, ToSocketAddrs};
+use std::net::{IpAddr, Ipv4Addr, SocketAddr, ToSocketAddrs};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -87,6 +88,16 @@ pub(crate) struct Serve {
     #[arg(long, value_name = "FILE|FOLDER")]
     ulog: Option<PathBuf>,
 
+    /// Serve a page to watch the first vehicle in a browser and to command it, at this address of this machine; any
+    /// other than 127.0.0.1 needs a token, which is printed unless --web-token gives one
+    #[arg(long, value_name = "ADDRESS", num_args = 0..=1, default_missing_value = "127.0.0.1:8590",
+        value_parser = web_address)]
+    web: Option<SocketAddr>,
+
+    /// Clients of the page must tell the token in this file
+    #[arg(long, value_name = "FILE", requires = "web")]
+    web_token: Option<PathBuf>,
+
     /// Times real time; 0 for as fast as possible
     #[arg(long, value_name = "FACTOR", default_value_t = 1.0, value_parser = speed, allow_negative_numbers = true)]
     speed: f64,
@@ -144,18 +155,26 @@ impl Serve {
         let addresses = self.addresses()?;
         server.set_wired(addresses.bind.is_loopback());
         let mut ports = Ports::open(&addresses, server.vehicles().len())?;
+        let mut door = self.web.map(|address| self.door(address)).transpose()?;
         let stop = Arc::new(AtomicBool::new(false));
         let stopper = Arc::clone(&stop);
         ctrlc::set_handler(move || stopper.store(true, Ordering::Relaxed))?;
         print(&format!("{}: {}", scenario.name, guide(&addresses, &ports.addresses()?, &server.systems())))?;
+        if let Some(door) = &door {
+            print(&format!("Open {} in a browser (docs/page.md).\n", door.url()))?;
+        }
 
         let rate = match self {
             Serve { lockstep: true, .. } => TimeRate::Lockstep,
             Serve { fast: true, .. } => TimeRate::Times(0.0),
             Serve { speed, .. } => TimeRate::Times(speed),
         };
+        let door: &mut dyn Door = match &mut door {
+            Some(door) => door,
+            None => &mut (),
+        };
         let mut lines = Lines::of(BufReader::new(stdin()));
-        let end = run(&mut server, &mut ports, rate, &mut lines, &stop, |line| {
+        let end = run(&mut server, (&mut ports, door), rate, &mut lines, &stop, |line| {
             // Whoever has closed the pipe reads nothing.
             let mut out = stdout().lock();
             let _ = writeln!(out, "{line}").and_then(|()| out.flush());
@@ -165,6 +184,20 @@ impl Serve {
             log.finish().map_err(|error| unwritten(&path, &error))?;
         }
         Ok(ExitCode::from(if end == RunEnd::Stopped { INTERRUPTED } else { 0 }))
+    }
+
+    /// Opens the page's port.
+    fn door(&self, address: SocketAddr) -> Result<WebDoor, Failure> {
+        let token = match &self.web_token {
+            Some(path) => {
+                let failed = |why: String| format!("{}: {why}; change it, or leave out --web-token", path.display());
+                let text = read_to_string(path).map_err(|error| failed(format!("cannot be read ({error})")))?;
+                Some(Token::chosen(&text).map_err(failed)?)
+            }
+            None if address.ip().is_loopback() => None,
+            None => Some(Token::random()?),
+        };
+        Ok(WebDoor::open(address, Admission::at(address.ip(), token)?)?)
     }
 
     /// Creates the files of the exact logs, if they are wanted.
@@ -242,6 +275,15 @@ fn address(text: &str, option: &str, bind: IpAddr) -> Result<SocketAddr, Failure
     })?;
     let same = found.into_iter().find(|address| address.is_ipv4() == bind.is_ipv4());
     Ok(same.ok_or_else(|| format!("{option} {text}: it cannot be reached from {bind}; choose another --bind"))?)
+}
+
+/// Reads where the page is served: an address with or without a port, or a port.
+fn web_address(text: &str) -> Result<SocketAddr, String> {
+    const PORT: u16 = 8590;
+    let whole = text.parse().ok();
+    let address = || text.parse().ok().map(|address: IpAddr| SocketAddr::new(address, PORT));
+    let port = || text.parse().ok().map(|port: u16| SocketAddr::new(Ipv4Addr::LOCALHOST.into(), port));
+    whole.or_else(address).or_else(port).ok_or_else(|| "write ADDRESS:PORT, as in 127.0.0.1:8590".into())
 }
 
 fn speed(text: &str) -> Result<f64, String> {

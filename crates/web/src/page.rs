@@ -1,0 +1,41 @@
+//! The page that shows a vehicle: files to be served.
+
+use crate::vendor::{THREE_JS, UPLOT_CSS, UPLOT_JS};
+
+/// A file of the page.
+#[derive(Clone, Debug)]
+pub struct PageFile {
+    /// Path below the page's address.
+    pub path: &'static str,
+    /// Media type.
+    pub media: &'static str,
+    /// Contents.
+    pub text: String,
+}
+
+const SCRIPT: &str = "text/javascript; charset=utf-8";
+const STYLE: &str = "text/css; charset=utf-8";
+const HEAD: &str = r#"<link rel="stylesheet" href="uplot.min.css"><link rel="stylesheet" href="style.css">"#;
+const TAIL: &str = r#"<script src="three.min.js"></script><script src="uplot.min.js"></script>
+<script type="module" src="socket-main.js"></script>"#;
+
+/// Returns the files of the page for a server, whose socket is at `/socket` (`scripts/build-playground` makes the page
+/// without one).
+pub fn page_files() -> Vec<PageFile> {
+    let index = include_str!("../page/index.html").replace("<!-- head -->", HEAD).replace("<!-- tail -->", TAIL);
+    let files = [
+        ("three.min.js", SCRIPT, THREE_JS),
+        ("uplot.min.js", SCRIPT, UPLOT_JS),
+        ("uplot.min.css", STYLE, UPLOT_CSS),
+        ("style.css", STYLE, include_str!("../page/style.css")),
+        ("app.js", SCRIPT, include_str!("../page/app.js")),
+        ("charts.js", SCRIPT, include_str!("../page/charts.js")),
+        ("parameters.js", SCRIPT, include_str!("../page/parameters.js")),
+        ("scene.js", SCRIPT, include_str!("../page/scene.js")),
+        ("socket-engine.js", SCRIPT, include_str!("../page/socket-engine.js")),
+        ("socket-main.js", SCRIPT, include_str!("../page/socket-main.js")),
+    ];
+    let index = PageFile { path: "", media: "text/html; charset=utf-8", text: index };
+    let files = files.map(|(path, media, text)| PageFile { path, media, text: text.to_owned() });
+    std::iter::once(index).chain(files).collect()
+}
