@@ -64,7 +64,9 @@
 
   /** What the figures of one section share: time under the cursor, the interval that is seen, who is hidden. */
   class Shared {
-    constructor() { this.views = []; this.end = 0; this.time = null; this.from = 0; this.to = 0; this.hidden = new Set(); }
+    constructor() {
+      Object.assign(this, { views: [], end: 0, time: null, from: 0, to: 0, hidden: new Set() });
+    }
     add(view, end) {
       this.views.push(view);
       if (end > this.end) { this.end = end; this.to = end; }
@@ -145,7 +147,8 @@
       const values = element("div", { class: "values", hidden: "" });
       box.append(values);
       this.host.append(box);
-      const made = { traces, box, values, panel, digits: Math.max(0, 4 - Math.ceil(Math.log10(panel.high - panel.low))) };
+      const digits = Math.max(0, 4 - Math.ceil(Math.log10(panel.high - panel.low)));
+      const made = { traces, box, values, panel, digits };
       // Lines have times of their own: one table with all of them, where a line has no value between.
       const table = this.uPlot.join(traces.map(({ times, values }) => [times, values]));
       const axis = { stroke: () => ink("--quiet"), grid: { stroke: () => ink("--faint"), width: 0.5 },
@@ -336,9 +339,11 @@
         "aria-label": "time", oninput: () => { this.stop(); shared.setTime(Number(this.slider.value), null); } });
       this.slider.value = 0;
       this.output = element("output", {}, seconds(0));
-      this.play = element("button", { type: "button", onclick: () => this.running ? this.stop() : this.start() }, "▶ play");
+      const play = () => this.running ? this.stop() : this.start();
+      this.play = element("button", { type: "button", onclick: play }, "▶ play");
       this.speed = element("select", { "aria-label": "speed" },
-        ...SPEEDS.map((speed) => element("option", { value: speed, ...(speed === 1 ? { selected: "" } : {}) }, `${speed}×`)));
+        ...SPEEDS.map((speed) => element("option", { value: speed }, `${speed}×`)));
+      this.speed.value = 1;
       this.space = element("div", { class: "space" });
       host.append(element("div", { class: "bar" }, element("strong", {}, data.title), ...this.legend.nodes), this.space,
         element("div", { class: "bar" }, this.play, this.speed, this.slider, this.output));
@@ -427,7 +432,8 @@
       if (!track.attitude) {
         group.add(new THREE.Mesh(new THREE.SphereGeometry(0.25 * arm), track.paint));
       } else {
-        const rotor = 0.45 * Math.min(arm, ...rotors.slice(1).map(([x, y]) => Math.hypot(x - rotors[0][0], y - rotors[0][1])));
+        const apart = rotors.slice(1).map(([x, y]) => Math.hypot(x - rotors[0][0], y - rotors[0][1]));
+        const rotor = 0.45 * Math.min(arm, ...apart);
         for (const [x, y] of rotors) {
           const length = Math.hypot(x, y);
           const beam = new THREE.Mesh(new THREE.BoxGeometry(length, 0.07 * arm, 0.07 * arm), track.paint);
@@ -489,7 +495,8 @@
         vehicle.position.set(...position.map((values) => between(times, values, at) ?? 0));
         if (!attitude || !times.length) continue;
         const i = before(times, at), next = Math.min(i + 1, times.length - 1);
-        const turn = (k) => new THREE.Quaternion().setFromEuler(new THREE.Euler(...attitude.map((values) => values[k]), "ZYX"));
+        const angles = (k) => new THREE.Euler(...attitude.map((values) => values[k]), "ZYX");
+        const turn = (k) => new THREE.Quaternion().setFromEuler(angles(k));
         const span = times[next] - times[i];
         vehicle.quaternion.copy(turn(i)).slerp(turn(next), span > 0 ? (at - times[i]) / span : 0);
       }
