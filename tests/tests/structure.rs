@@ -20,7 +20,7 @@ fn root() -> &'static Path {
 fn all_files(folder: &Path) -> Vec<PathBuf> {
     let entries = fs::read_dir(folder).into_iter().flatten().map(|entry| entry.unwrap().path());
     let of = |path: PathBuf| match path.file_name().and_then(|name| name.to_str()) {
-        Some("target" | "out" | ".git") | None => Vec::new(),
+        Some("target" | "out" | ".git" | "node_modules") | None => Vec::new(),
         _ if path.is_dir() => all_files(&path),
         _ => vec![path],
     };

@@ -201,8 +201,8 @@ impl ModelConstants {
         self.dynamics_at(axis, &state.rates_rad_s, &RollPitch::new(state), rotor_residual_rad_s)
     }
 
-    /// Returns the computable terms of a subsystem's Lyapunov function (14), (27): e_1^2 / 2 + e_2^2 / (2 g_i), with the
-    /// paper's weight c = 1 of e_1. The terms of the estimates' errors are left out, since the optimal values are
+    /// Returns the computable terms of a subsystem's Lyapunov function (14), (27): e_1^2 / 2 + e_2^2 / (2 g_i), with
+    /// the paper's weight c = 1 of e_1. The terms of the estimates' errors are left out, since the optimal values are
     /// unknown.
     pub fn lyapunov(&self, axis: Axis, state: &State, errors: &Errors) -> f32 {
         // g_i does not depend on the rotors.

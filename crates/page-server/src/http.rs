@@ -33,7 +33,8 @@ pub(crate) fn refuse(out: &mut impl Write, status: &str, problem: &str) -> io::R
 pub(crate) fn switch(out: &mut impl Write, key: &str) -> io::Result<()> {
     write!(
         out,
-        "HTTP/1.1 101 Switching Protocols\r\nUpgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Accept: {key}\r\n\r\n"
+        "HTTP/1.1 101 Switching Protocols\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n\
+         Sec-WebSocket-Accept: {key}\r\n\r\n"
     )?;
     out.flush()
 }

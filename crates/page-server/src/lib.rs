@@ -5,7 +5,8 @@
 //!
 //! On loopback, whoever is on this machine, but no page of another site: the request must name this machine
 //! ([`Admission`]), so that no other name can be made to point here (DNS rebinding), and a browser's must come from the
-//! page itself. At any other address a [`Token`] is needed too. There is no encryption: a network in between reads along.
+//! page itself. At any other address a [`Token`] is needed too. There is no encryption: a network in between reads
+//! along.
 //!
 //! # What clients cost the flight
 //!

@@ -1,9 +1,10 @@
-//! What a page in a browser sees of a [served vehicle](afbc_serve) and may do with it, as JSON. There is no socket, clock
-//! or thread here: `sitl serve --web` and WebAssembly run the same code.
+//! What a page in a browser sees of a [served vehicle](afbc_serve) and may do with it, as JSON. There is no socket,
+//! clock or thread here: `sitl serve --web` and WebAssembly run the same code.
 //!
 //! # Reading order
 //!
-//! 1. [`PageHello`]: what does not change while the vehicle flies. [`PageFrame`]: what does, some thirty times a second.
+//! 1. [`PageHello`]: what does not change while the vehicle flies. [`PageFrame`]: what does, some thirty times a
+//!    second.
 //! 2. [`PageCommand`]: what the page may do. Weather, faults, laws and time are the lines of [`afbc_serve::command`];
 //!    the rest is what ground stations do, by the same messages.
 //! 3. [`Cockpit`]: the end of all this at the vehicle.

@@ -63,23 +63,32 @@ export function run(engine) {
   on("take-off", () => send({ do: "take_off", height_m: value("take-off-height") }));
   on("go", () => send({ do: "go_to", position_m: [value("go-x"), value("go-y"), value("go-z")] }));
   on("square", () => {
-    const [x, y] = frame?.home_m ?? frame?.truth.position_m ?? [0, 0];
+    const here = frame?.truth.position_m ?? [0, 0, 0];
+    const [x, y] = frame?.home_m ?? here;
     const height = Math.max(value("go-z"), 0.5);
+    const side = 3;
+    // Around the square and where the vehicle is.
+    const [west, east, south, north] = [
+      Math.max(y + side, here[1]) + side,
+      Math.min(y, here[1]) - side,
+      Math.min(x, here[0]) - side,
+      Math.max(x + side, here[0]) + side,
+    ];
+    const corners = [
+      [south, east],
+      [north, east],
+      [north, west],
+      [south, west],
+    ];
+    const square = [
+      [x + side, y],
+      [x + side, y + side],
+      [x, y + side],
+      [x, y],
+    ];
     plan(
-      [
-        [3, 0],
-        [3, 3],
-        [0, 3],
-        [0, 0],
-      ].map(([u, v]) => [x + u, y + v, height]),
-      engine.fences === false
-        ? []
-        : [
-            [-3, -3],
-            [6, -3],
-            [6, 6],
-            [-3, 6],
-          ].map(([u, v]) => [x + u, y + v]),
+      square.map(([u, v]) => [u, v, height]),
+      engine.fences === false ? [] : corners,
     );
   });
   on("send-plan", () => plan(draft.waypoints, draft.corners));

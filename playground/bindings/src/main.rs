@@ -10,7 +10,9 @@ fn main() -> ExitCode {
         eprintln!("bindings IN.wasm FOLDER");
         return ExitCode::from(2);
     };
-    let written = Bindgen::new().input_path(input).web(true).and_then(|it| it.typescript(false).remove_name_section(true).generate(folder));
+    let mut bindgen = Bindgen::new();
+    bindgen.input_path(input).typescript(false).remove_name_section(true);
+    let written = bindgen.web(true).and_then(|it| it.generate(folder));
     match written {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
