@@ -1,0 +1,17 @@
+"""Crazyflow's controller on our plant."""
+
+import drone_controllers  # noqa: F401  Before anything that imports SciPy: it asks for its array API.
+import numpy as np
+import pytest
+
+import afbc
+import afbc.crazyflow
+
+
+@pytest.mark.parametrize("scenario, rms_m", [("hover", 0.05), ("circle", 0.2)])
+def test_its_mellinger_flies_our_crazyflie(scenario, rms_m):
+    law = {"mellinger": afbc.crazyflow.mellinger()}
+    flight = afbc.fly(scenario, law, vehicle="crazyflie", duration_s=12)["mellinger"]
+    print(flight.metrics)
+    assert flight.lost is None
+    assert flight.metrics["rmse_position_m"] < rms_m
