@@ -187,12 +187,17 @@ class Controller:
             )
         self._time_s = t
         action = self.controller.step(to_state(state), to_setpoint(flat_output))
-        inputs = action.inputs_n
+        inputs, unknown = action.inputs_n, np.full(3, np.nan)
         return {
             "cmd_motor_speeds": action.speeds_rad_s,
             "cmd_motor_thrusts": action.forces_n,
-            "cmd_thrust": np.array([inputs[3]]),
+            "cmd_thrust": float(inputs[3]),
             "cmd_moment": inputs[:3] * self._lever_m,
+            # Where RotorPy's figures look; no law here commands them as such.
+            "cmd_q": np.array([0.0, 0.0, 0.0, 1.0]),
+            "cmd_w": unknown,
+            "cmd_v": unknown,
+            "cmd_acc": unknown,
         }
 
 

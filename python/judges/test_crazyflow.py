@@ -8,10 +8,9 @@ import afbc
 import afbc.crazyflow
 
 
-@pytest.mark.parametrize("scenario, rms_m", [("hover", 0.05), ("circle", 0.2)])
+@pytest.mark.parametrize("scenario, rms_m", [("hover", 0.1), ("circle", 0.1)])
 def test_its_mellinger_flies_our_crazyflie(scenario, rms_m):
     law = {"mellinger": afbc.crazyflow.mellinger()}
-    flight = afbc.fly(scenario, law, vehicle="crazyflie", duration_s=12)["mellinger"]
-    print(flight.metrics)
+    flight = afbc.fly(scenario, law, vehicle="crazyflie", duration_s=10)["mellinger"]
     assert flight.lost is None
     assert flight.metrics["rmse_position_m"] < rms_m
