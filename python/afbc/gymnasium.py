@@ -59,9 +59,7 @@ class FlightEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self.task.reset(0, self.np_random)
         return self.task.observe()[0], {}
 
-    def step(
-        self, action: NDArray[np.float32]
-    ) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
+    def step(self, action: NDArray[np.float32]) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
         rewards, lost, over, distance_m = self.task.step(np.asarray(action)[np.newaxis])
         info = {"distance_m": float(distance_m[0])}
         return self.task.observe()[0], float(rewards[0]), bool(lost[0]), bool(over[0]), info
@@ -116,6 +114,4 @@ class FlightVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArra
         return self.task.observe(), rewards, lost, over, {"distance_m": distance_m, "_distance_m": ~again}
 
 
-gymnasium.register(
-    "afbc/Flight-v0", entry_point=FlightEnv, vector_entry_point=FlightVectorEnv, order_enforce=True
-)
+gymnasium.register("afbc/Flight-v0", entry_point=FlightEnv, vector_entry_point=FlightVectorEnv, order_enforce=True)

@@ -27,7 +27,17 @@ import numpy as np
 from . import _afbc
 from ._rotation import euler, quaternion
 
-__all__ = ["Controller", "Trajectory", "flat_output", "law", "parameters", "state", "to_setpoint", "to_state", "to_vehicle"]
+__all__ = [
+    "Controller",
+    "Trajectory",
+    "flat_output",
+    "law",
+    "parameters",
+    "state",
+    "to_setpoint",
+    "to_state",
+    "to_vehicle",
+]
 
 _Vehicle = _afbc.Vehicle | str | PathLike[str]
 
@@ -87,9 +97,9 @@ def to_vehicle(parameters: Mapping[str, Any], name: str = "rotorpy") -> _afbc.Ve
     positions = np.array([parameters["rotor_pos"][rotor] for rotor in parameters["rotor_pos"]], dtype=float)
     arm_m = np.mean(np.hypot(positions[:, 0], positions[:, 1]))
     fastest = float(parameters["rotor_speed_max"])
+    spins = ["cw" if sign > 0 else "ccw" for sign in parameters["rotor_directions"]]
     rotors = "".join(
-        f"[[rotor]]\nposition_m = {position.tolist()}\nspin = \"{'cw' if sign > 0 else 'ccw'}\"\n"
-        for position, sign in zip(positions, parameters["rotor_directions"])
+        f'[[rotor]]\nposition_m = {position.tolist()}\nspin = "{spin}"\n' for position, spin in zip(positions, spins)
     )
     # A drag area of 2 m2 in air of 1 kg/m3 gives 1 N s2/m2.
     area_m2 = [2.0 * float(parameters.get(f"c_D{axis}", 0.0)) for axis in "xyz"]

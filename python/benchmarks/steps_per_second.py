@@ -1,14 +1,16 @@
 """Vehicle-steps per second of this package's environments, beside other simulators: `steps_per_second.py [SECONDS]`.
 
-A step is one of 1 ms of a vehicle's physics, whatever the rate of control, on the clock of this machine. Of the others
-those are measured that are installed: `pip install rotorpy crazyflow` (Python 3.11 or later), and gym-pybullet-drones
-from its repository. Prints a table for docs/python.md.
+A step is one of 1 ms of a vehicle's physics, whatever the rate of control; a second is one of a processor, all threads
+added up, which other work on the machine does not change much. Of the others those are measured that are installed:
+`pip install rotorpy crazyflow` (Python 3.11 or later), and gym-pybullet-drones from its repository. Prints a table for
+docs/python.md.
 """
 
 import os
 import sys
 import time
 from collections.abc import Callable
+from functools import partial
 
 # Before SciPy is imported: Crazyflow's controllers ask for it.
 os.environ.setdefault("SCIPY_ARRAY_API", "1")
@@ -21,10 +23,10 @@ SECONDS = float(sys.argv[1]) if len(sys.argv) > 1 else 3.0
 
 
 def rate(step: Callable[[], object], steps: int) -> float:
-    """Steps per second of calls that make this many."""
+    """Steps per processor-second of calls that make this many."""
     step()
-    start, calls = time.perf_counter(), 0
-    while (spent := time.perf_counter() - start) < SECONDS:
+    start, calls = time.process_time(), 0
+    while (spent := time.process_time() - start) < SECONDS:
         step()
         calls += 1
     return calls * steps / spent
@@ -41,7 +43,7 @@ def ours() -> None:
         envs = FlightVectorEnv(count, "hover", "crazyflie")
         envs.reset(seed=1)
         actions = np.tile(hover, (count, 1))
-        row(f"`FlightVectorEnv`, {count}", "control at 100 Hz", rate(lambda: envs.step(actions), 10 * count))
+        row(f"`FlightVectorEnv`, {count}", "control at 100 Hz", rate(partial(envs.step, actions), 10 * count))
     batch = afbc.Batch(4096, "hover", vehicle="crazyflie")
     speeds = np.full((4096, 4), 1860.0)
     row("`Batch`, 4096", "10 steps a call", rate(lambda: batch.step(speeds, 10), 10 * 4096))
@@ -55,25 +57,28 @@ def rotorpy() -> None:
     vehicle = Multirotor(afbc.rotorpy.parameters("crazyflie"))
     states = [afbc.rotorpy.state(plant)]
     command = {"cmd_motor_speeds": np.full(4, 1860.0)}
-    row("RotorPy", "`Multirotor.step` at 1 kHz", rate(lambda: states.append(vehicle.step(states.pop(), command, 1e-3)), 1))
+    row(
+        "RotorPy",
+        "`Multirotor.step` at 1 kHz",
+        rate(lambda: states.append(vehicle.step(states.pop(), command, 1e-3)), 1),
+    )
 
 
 def crazyflow() -> None:
     import jax
     from crazyflow.control import Control
+    from crazyflow.drones import Drone
     from crazyflow.sim import Sim
 
     for count in (1, 256, 4096):
-        sim = Sim(n_worlds=count, n_drones=1, control=Control.force_torque, freq=1000, force_torque_freq=1000)
-        command = np.zeros((count, 1, 4))
-        command[..., 0] = 0.0282 * 9.81
-        sim.force_torque_control(command)
+        sim = Sim(n_worlds=count, drone=Drone.cf2x_L250, control=Control.rotor_vel, freq=1000)
+        sim.rotor_vel_control(np.full((count, 1, 4), 17_800.0, dtype=np.float32))
 
         def step(sim=sim):
-            sim.step(100)
+            sim.step(10)
             jax.block_until_ready(sim.data)
 
-        row(f"Crazyflow, {count}", "100 steps a call, force and torque held", rate(step, 100 * count))
+        row(f"Crazyflow, {count}", "10 steps a call, rotor speeds held, single precision", rate(step, 10 * count))
 
 
 def gym_pybullet_drones() -> None:
@@ -90,7 +95,7 @@ def row(what: str, how: str, rate_hz: float) -> None:
     print(f"| {what} | {how} | {rate_hz:,.0f} |", flush=True)
 
 
-print("| simulator | how | vehicle-steps of 1 ms per second |\n|---|---|--:|")
+print("| simulator | how | vehicle-steps of 1 ms per processor-second |\n|---|---|--:|")
 for simulator in (ours, rotorpy, crazyflow, gym_pybullet_drones):
     try:
         simulator()

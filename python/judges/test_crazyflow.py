@@ -1,7 +1,6 @@
 """Crazyflow's controller on our plant."""
 
 import drone_controllers  # noqa: F401  Before anything that imports SciPy: it asks for its array API.
-import numpy as np
 import pytest
 
 import afbc

@@ -25,7 +25,7 @@ def test_gymnasium_accepts_it(scenario, vehicle):
 
 @pytest.mark.parametrize("scenario, vehicle", FLIGHTS)
 def test_many_are_as_many_single_ones(scenario, vehicle):
-    """Gymnasium's own vector environment over single ones is the reference, in every bit: through ends and new starts."""
+    """The reference, in every bit, is Gymnasium's own vector environment of single ones: through ends and starts."""
     count, options = 3, {"duration_s": 0.25, "far_m": 0.7 if scenario == "wind" else 1.5}
     many = RecordEpisodeStatistics(FlightVectorEnv(count, scenario, vehicle, **options))
     single = RecordEpisodeStatistics(SyncVectorEnv([lambda: FlightEnv(scenario, vehicle, **options)] * count))
