@@ -75,8 +75,8 @@ class Case:
 # which the rotors' speeds are those of its middle (of second order, see the test below); RotorPy's integrator and its
 # tolerance move a flight by 1e-7 m. In calm flight that makes 1e-6 m, and a larger share of an error that is itself
 # millimetres (circle). Where rotors reach their limits (hover and step from a distance, minimum snap), or where the
-# paper's reference is a metre away at the start and a law turns the vehicle far over (geometric), differences grow on
-# the way. The ground's effect on thrust alone would change figures by 1e-3 at a height of ten rotor radii.
+# paper's reference is 1.5 m above the start and a law turns the vehicle far over (geometric), differences grow on the
+# way. The ground's effect on thrust alone would change figures by 1e-3 at a height of ten rotor radii.
 CASES = {
     "hover": Case(
         "[initial]\nposition_m = [0.5, 0.0, 1.0]\n[trajectory]\nkind = 'hover'\nposition_m = [0, 0, 1.2]",
