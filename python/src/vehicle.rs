@@ -80,8 +80,8 @@ impl PyVehicle {
         PyArray1::from_iter(py, numbers).reshape([self.0.rotors.len(), 3])
     }
 
-    /// Direction of the moment by which each rotor's drag turns the body, shape (rotors,): 1 to positive yaw, by a rotor
-    /// that turns clockwise seen from above; -1 by one that turns counter-clockwise.
+    /// Direction of the moment by which each rotor's drag turns the body, shape (rotors,): 1 to positive yaw, by a
+    /// rotor that turns clockwise seen from above; -1 by one that turns counter-clockwise.
     #[getter]
     fn rotor_yaw_signs<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         PyArray1::from_iter(py, self.0.rotors.iter().map(|rotor| if rotor.pushes_left { 1.0 } else { -1.0 }))
