@@ -61,6 +61,7 @@ __all__ = [
     "fly",
     "frame",
     "laws",
+    "merge",
     "register",
     "replay",
     "scenarios",
@@ -220,6 +221,7 @@ def campaign(
     *,
     flights: int | None = None,
     vehicle: Vehicle | _Path | None = None,
+    shard: str | None = None,
     out: _Path | None = None,
     threads: int | None = None,
     progress: bool = False,
@@ -227,12 +229,23 @@ def campaign(
     """Flies a campaign, built in or of a file: one scenario, many times, with drawn vehicles, weather and faults.
 
     Returns a data frame with a row for each flight of each contender: what was drawn, and the figures of merit. With
-    `out`, results and report are kept in this folder as `sitl campaign` keeps them, and the same call resumes.
+    `out`, results and report are kept in this folder as `sitl campaign` keeps them, and the same call resumes. `shard`,
+    "I/N" with I from 1 to N, flies every N-th flight only, from the I-th on; `merge` joins all shards.
     """
     with _bar(progress, flights, "flight") as shown:
         return frame(
-            _afbc.campaign(campaign, flights=flights, vehicle=vehicle, out=out, threads=threads, progress=shown)
+            _afbc.campaign(
+                campaign, flights=flights, vehicle=vehicle, shard=shard, out=out, threads=threads, progress=shown
+            )
         )
+
+
+def merge(shards: Sequence[_Path], out: _Path) -> Any:
+    """Joins all shards of a campaign, each in its folder, into the folder `out`: the same bytes as on one machine.
+
+    Returns a data frame as `campaign` does.
+    """
+    return frame(_afbc.merge(list(shards), out))
 
 
 def tune(

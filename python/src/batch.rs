@@ -1,7 +1,8 @@
 //! Many vehicles in one call.
 
 use crate::error::error;
-use crate::plant::{commands, start};
+use crate::motion::PyState;
+use crate::plant::{begun, commands, start};
 use crate::scenario::{ScenarioArgument, changed};
 use crate::vehicle::VehicleArgument;
 use afbc_scenario::Scenario;
@@ -87,12 +88,14 @@ impl PyBatch {
         Ok(())
     }
 
-    /// Starts vehicle `index` again, with this seed.
-    fn reset(&mut self, index: usize, seed: u64) -> PyResult<()> {
+    /// Starts vehicle `index` again, with this seed, from the scenario's start or this motion.
+    #[pyo3(signature = (index, seed, state=None))]
+    fn reset(&mut self, index: usize, seed: u64, state: Option<PyRef<'_, PyState>>) -> PyResult<()> {
         let count = self.worlds.len();
-        let begun = start(&Scenario { seed, ..self.scenario.clone() }, self.dt_s)?;
+        let scenario = begun(&self.scenario, state.as_deref())?;
+        let world = start(&Scenario { seed, ..scenario }, self.dt_s)?;
         let slot = self.worlds.get_mut(index);
-        *slot.ok_or_else(|| error(format!("index {index}: there are {count} vehicles")))? = begun;
+        *slot.ok_or_else(|| error(format!("index {index}: there are {count} vehicles")))? = world;
         Ok(())
     }
 

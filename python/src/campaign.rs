@@ -2,9 +2,9 @@
 
 use crate::error::error;
 use crate::vehicle::VehicleArgument;
-use crate::work::watched;
+use crate::work::{Watch, watched};
 use afbc::Profile;
-use afbc_campaign::{self as campaigns, BUILT_IN, Campaign, CampaignFolder, Manifest, Row, Shard, subject};
+use afbc_campaign::{self as campaigns, BUILT_IN, Campaign, CampaignFolder, Manifest, Row, Shard, Summary, subject};
 use numpy::{PyArray1, ToPyArray};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -15,14 +15,17 @@ use std::path::PathBuf;
 /// a row for each flight of each contender, by columns.
 ///
 /// With `out`, results and report are written into this folder as `sitl campaign` does, finished flights are kept, and
-/// the same call resumes. `flights` flies only the first ones.
+/// the same call resumes. `flights` flies only the first ones; `shard`, "I/N", every N-th from the I-th on: `merge` joins
+/// the shards.
 #[pyfunction]
-#[pyo3(signature = (campaign, *, flights=None, vehicle=None, out=None, threads=None, progress=None))]
+#[pyo3(signature = (campaign, *, flights=None, vehicle=None, shard=None, out=None, threads=None, progress=None))]
+#[expect(clippy::too_many_arguments, reason = "each by its name")]
 pub(crate) fn campaign<'py>(
     py: Python<'py>,
     campaign: PathBuf,
     flights: Option<u64>,
     vehicle: Option<VehicleArgument<'py>>,
+    shard: Option<&str>,
     out: Option<PathBuf>,
     threads: Option<usize>,
     progress: Option<Bound<'py, PyAny>>,
@@ -33,7 +36,14 @@ pub(crate) fn campaign<'py>(
     }
     plan.flights = flights.unwrap_or(plan.flights).min(plan.flights);
     plan.check().map_err(error)?;
-    let manifest = Manifest::new(&plan, Shard::WHOLE);
+    let shard = shard.map_or(Ok(Shard::WHOLE), |shard| {
+        let known: Result<Shard, _> = shard.parse();
+        known.map_err(|problem| error(format!("shard {shard}: {problem}")))
+    })?;
+    if shard.of > plan.flights {
+        return Err(error(format!("shard {shard}: there are only {} flights; use fewer parts", plan.flights)));
+    }
+    let manifest = Manifest::new(&plan, shard);
     let rows = match out {
         Some(out) => {
             let folder = CampaignFolder::open(&out, manifest.clone(), false).map_err(error)?;
@@ -48,9 +58,9 @@ pub(crate) fn campaign<'py>(
                 watch.add(1);
                 Ok(rows)
             };
-            Ok((0..plan.flights)
+            Ok((0..shard.count(plan.flights))
                 .into_par_iter()
-                .map(fly)
+                .map(|index| fly(shard.flight(index)))
                 .collect::<Result<Vec<_>, _>>()?
                 .into_iter()
                 .flatten()
@@ -61,11 +71,28 @@ pub(crate) fn campaign<'py>(
 }
 
 /// Flies in a folder, and returns what is there then.
-fn kept(plan: &Campaign, folder: &CampaignFolder, watch: &crate::work::Watch) -> Result<Vec<Row>, String> {
+fn kept(plan: &Campaign, folder: &CampaignFolder, watch: &Watch) -> Result<Vec<Row>, String> {
     // The number of flights flown now: of earlier ones only the sum is reported.
     let summary = campaigns::fly(plan, folder, watch.stop(), &|done| watch.add(done));
     let summary = summary.map_err(|error| error.to_string())?.ok_or("interrupted; the same call resumes")?;
-    afbc_report::campaign::write(folder.place(), &summary).map_err(|error| error.to_string())?;
+    concluded(folder, &summary)
+}
+
+/// Joins all shards of a campaign into the folder `out`, with the same bytes as on one machine, as `sitl merge` does.
+/// Returns a row for each flight of each contender, by columns.
+#[pyfunction]
+pub(crate) fn merge(py: Python<'_>, shards: Vec<PathBuf>, out: PathBuf) -> PyResult<Bound<'_, PyDict>> {
+    let merged = py.detach(|| {
+        let (folder, summary) = campaigns::merge(&shards, &out, false).map_err(|error| error.to_string())?;
+        Ok((folder.manifest().clone(), concluded(&folder, &summary)?))
+    });
+    let (manifest, rows) = merged.map_err(|problem: String| error(problem))?;
+    columns(py, &manifest, &rows)
+}
+
+/// Writes the report of a folder's flights, and returns them.
+fn concluded(folder: &CampaignFolder, summary: &Summary) -> Result<Vec<Row>, String> {
+    afbc_report::campaign::write(folder.place(), summary).map_err(|error| error.to_string())?;
     let rows = folder.results().map_err(|error| error.to_string())?.ok_or("the results are gone")?;
     rows.collect::<Result<_, _>>().map_err(|error| error.to_string())
 }

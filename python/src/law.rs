@@ -68,6 +68,18 @@ impl PyOwnVehicle {
         self.vehicle.parameters.arm_m
     }
 
+    /// Force of a rotor over the square of its speed [N s2].
+    #[getter]
+    fn thrust_factor_n_s2(&self) -> f32 {
+        self.vehicle.parameters.thrust_factor_n_s2
+    }
+
+    /// Drag moment of a rotor over the square of its speed [N m s2].
+    #[getter]
+    fn drag_factor_n_m_s2(&self) -> f32 {
+        self.vehicle.parameters.drag_factor_n_m_s2
+    }
+
     /// Inertia about the body axes [kg m2], shape (3,).
     #[getter]
     fn inertia_kg_m2<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {

@@ -39,6 +39,7 @@ fn _afbc(module: &Bound<'_, PyModule>) -> PyResult<()> {
         wrap_pyfunction!(flight::fly, module)?,
         wrap_pyfunction!(flight::compare, module)?,
         wrap_pyfunction!(campaign::campaign, module)?,
+        wrap_pyfunction!(campaign::merge, module)?,
         wrap_pyfunction!(tune::tune, module)?,
         wrap_pyfunction!(replay::replay, module)?,
         wrap_pyfunction!(law::register, module)?,

@@ -5,6 +5,7 @@ use crate::motion::{PySetpoint, PyState};
 use crate::scenario::{ScenarioArgument, changed};
 use crate::vehicle::VehicleArgument;
 use afbc_control::Settings;
+use afbc_plant::Motion;
 use afbc_scenario::Scenario;
 use afbc_sim::flight::{View, World};
 use afbc_types::{ROTORS_MAX, RotorSpeeds};
@@ -28,6 +29,24 @@ pub(crate) fn start(scenario: &Scenario, dt_s: f64) -> PyResult<(World, View)> {
     let mut world = World::new(scenario, dt_s).map_err(error)?;
     let view = world.look();
     Ok((world, view))
+}
+
+/// The scenario from this motion, if one is given.
+pub(crate) fn begun(scenario: &Scenario, state: Option<&PyState>) -> PyResult<Scenario> {
+    let mut scenario = scenario.clone();
+    if let Some(PyState(state)) = state {
+        if !state.is_plausible() {
+            return Err(error("state: finite numbers, within 1e5 m, 1e3 m/s, 1e3 rad and 1e3 rad/s, are needed"));
+        }
+        scenario.initial = Motion {
+            position_m: state.position_m.cast(),
+            velocity_m_s: state.velocity_m_s.cast(),
+            attitude_rad: state.attitude_rad.cast(),
+            rates_rad_s: state.rates_rad_s.cast(),
+        };
+        scenario.check().map_err(error)?;
+    }
+    Ok(scenario)
 }
 
 /// Commands of as many rotors as the vehicle has.
@@ -57,11 +76,13 @@ impl PyPlant {
         Ok(PyPlant { scenario, world, view, dt_s })
     }
 
-    /// Starts again, with another seed if one is given.
-    #[pyo3(signature = (seed=None))]
-    fn reset(&mut self, seed: Option<u64>) -> PyResult<()> {
-        self.scenario.seed = seed.unwrap_or(self.scenario.seed);
-        (self.world, self.view) = start(&self.scenario, self.dt_s)?;
+    /// Starts again, with another seed or from another motion if one is given.
+    #[pyo3(signature = (seed=None, state=None))]
+    fn reset(&mut self, seed: Option<u64>, state: Option<PyRef<'_, PyState>>) -> PyResult<()> {
+        let mut scenario = begun(&self.scenario, state.as_deref())?;
+        scenario.seed = seed.unwrap_or(scenario.seed);
+        (self.world, self.view) = start(&scenario, self.dt_s)?;
+        self.scenario = scenario;
         Ok(())
     }
 

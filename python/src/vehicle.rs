@@ -3,6 +3,7 @@
 use crate::error::error;
 use afbc_types::Parameters;
 use afbc_vehicles::{BUILT_IN, Vehicle};
+use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::path::PathBuf;
@@ -67,6 +68,42 @@ impl PyVehicle {
     #[getter]
     fn lag_s(&self) -> f32 {
         self.0.lag_s()
+    }
+
+    /// Positions of the rotors' hubs from the centre of mass, body frame [m], shape (rotors, 3).
+    #[getter]
+    fn rotor_positions_m<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let (realism, arm_m) = (&self.0.realism, self.0.parameters.arm_m);
+        let contact = realism.contact.map(|contact| contact.rotor_height_m);
+        let height_m = realism.drag.map(|drag| drag.rotor_height_m).or(contact).unwrap_or_default();
+        let numbers = self.0.rotors.iter().flat_map(|rotor| [rotor.x * arm_m, rotor.y * arm_m, height_m]);
+        PyArray1::from_iter(py, numbers).reshape([self.0.rotors.len(), 3])
+    }
+
+    /// Direction of the moment by which each rotor's drag turns the body, shape (rotors,): 1 to positive yaw, by a
+    /// rotor that turns clockwise seen from above; -1 by one that turns counter-clockwise.
+    #[getter]
+    fn rotor_yaw_signs<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_iter(py, self.0.rotors.iter().map(|rotor| if rotor.pushes_left { 1.0 } else { -1.0 }))
+    }
+
+    /// Smallest and largest speed of a rotor [rad/s].
+    #[getter]
+    fn rotor_speed_limits_rad_s(&self) -> (f64, f64) {
+        (self.0.realism.rotors.min_rad_s, self.0.realism.rotors.max_rad_s)
+    }
+
+    /// Drag by name, in SI, or None: `blade_n_s2_m`, the force of one rotor's blades per rotor speed and airspeed in
+    /// its plane; `body_n_s2_m2`, the body's force along x, y, z per square of the airspeed; `centre_m`, where that
+    /// acts.
+    #[getter]
+    fn drag<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
+        let Some(drag) = &self.0.realism.drag else { return Ok(None) };
+        let dict = PyDict::new(py);
+        dict.set_item("blade_n_s2_m", drag.blade_n_s2_m)?;
+        dict.set_item("body_n_s2_m2", <[f64; 3]>::from(drag.area_m2 * (0.5 * drag.air_density_kg_m3)))?;
+        dict.set_item("centre_m", <[f64; 3]>::from(drag.centre_m))?;
+        Ok(Some(dict))
     }
 
     /// Nominal masses, inertia, arm and rotor factors by name, in SI.

@@ -95,6 +95,33 @@ def test_a_campaign_writes_the_same_bytes_and_resumes(sitl, tmp_path):
     assert frame.equals(again) and frame.equals(in_memory)
 
 
+def test_shards_are_the_parts_of_the_whole(sitl, tmp_path):
+    path = tmp_path / "small.toml"
+    path.write_text(
+        'name = "small"\nflights = 7\nduration_s = 6\nscenario = "hover"\n[spread]\nmass_ratio = [0.8, 1.2]\n'
+    )
+    sitl("campaign", path, "--out", "whole", cwd=tmp_path)
+    frames = [afbc.campaign(path, shard=f"{i}/3", out=tmp_path / f"{i}") for i in (1, 2, 3)]
+    for i, frame in enumerate(frames):
+        assert frame.equals(afbc.campaign(path, shard=f"{i + 1}/3")) and set(frame["flight"]) == set(range(i, 7, 3))
+    merged = afbc.merge([tmp_path / f"{i}" for i in (3, 1, 2)], tmp_path / "merged")
+    assert merged.equals(afbc.campaign(path))
+    for name in ["results.parquet", "summary.json", "report.html"]:
+        assert (tmp_path / "merged" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes(), name
+
+
+def test_a_plant_begins_where_it_is_put():
+    state = afbc.State([3, 2, 1], [0.5, 0, 0], [0.1, 0.2, 0.3], [0, 0, 1])
+    plant, batch = afbc.Plant("hardware"), afbc.Batch(2, "hardware")
+    plant.reset(5, state)
+    batch.reset(1, 5, state)
+    np.testing.assert_allclose(plant.true_vector, state.vector, atol=1e-7)
+    assert np.array_equal(batch.true_states[1], plant.true_vector)
+    assert not np.array_equal(batch.true_states[0], plant.true_vector)
+    with pytest.raises(afbc.AfbcError):
+        batch.reset(1, 5, afbc.State([float("nan"), 0, 0]))
+
+
 def test_a_replay_is_the_same_as_on_the_command_line(sitl, tmp_path):
     sitl(
         "fly", "mocap", "--duration", 20, "--controller", "afbc", "--ulog", "flight.ulg", "--out", "flown", cwd=tmp_path

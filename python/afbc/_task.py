@@ -1,0 +1,113 @@
+"""What the environments for learning share: vehicles that follow the reference of a scenario, each in its own world."""
+
+from __future__ import annotations
+
+from os import PathLike
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import _afbc
+
+#: Numbers of an observation besides one for each rotor.
+MOTION = 15
+
+
+class Task:
+    """`count` vehicles of one kind, stepped together; what they observe, and what they get for it.
+
+    Actions, shape (count, rotors): the thrust of each rotor, from -1, none, to 1, the largest. Rotors lag and have
+    limits as the vehicle says.
+
+    Observations, shape (count, 15 + rotors), earth frame z up, body frame x forward, y left, z up:
+
+    | numbers | what | unit |
+    |---|---|---|
+    | 0 to 2 | position less the reference's | m |
+    | 3 to 5 | velocity less the reference's | m/s |
+    | 6 to 8 | roll, pitch, heading less the reference's, the last within -pi to pi | rad |
+    | 9 to 11 | body rates | rad/s |
+    | 12 to 14 | acceleration of the reference | m/s2 |
+    | 15 on | the last action | 1 |
+
+    They are what the scenario's sensors measure; in an outage the last ones stay. Reward of a step, from the true
+    motion: exp(-distance / 1 m) - 0.05 |heading error| / pi - 0.05 mean((action - last action)^2), so that 1 is the
+    most; 0 for the step in which a vehicle is lost. It is lost, and its episode terminated, when it tilts by 90 degrees
+    or is `far_m` away from its reference; an episode is truncated after `duration_s`.
+    """
+
+    def __init__(
+        self,
+        count: int,
+        scenario: _afbc.Scenario | str | PathLike[str] = "hover",
+        vehicle: _afbc.Vehicle | str | PathLike[str] = "crazyflie",
+        *,
+        control_hz: int = 100,
+        duration_s: float | None = None,
+        spread_m: float = 0.5,
+        spread_rad: float = 0.2,
+        far_m: float = 3.0,
+    ) -> None:
+        if count < 1:
+            raise _afbc.AfbcError(f"{count} vehicles: at least 1 is needed")
+        if not 1 <= control_hz <= 1000 or 1000 % control_hz:
+            raise _afbc.AfbcError(f"control_hz {control_hz}: a divisor of 1000 is needed")
+        vehicle = vehicle if isinstance(vehicle, _afbc.Vehicle) else _afbc.Vehicle(vehicle)
+        scenario = scenario if isinstance(scenario, _afbc.Scenario) else _afbc.Scenario(scenario)
+        self.scenario = scenario.replace(vehicle=vehicle)
+        self.batch = _afbc.Batch(count, self.scenario)
+        self.rotors = vehicle.rotors
+        self.steps = 1000 // control_hz
+        self.duration_s = scenario.duration_s if duration_s is None else duration_s
+        self.far_m, self.spread_m, self.spread_rad = far_m, spread_m, spread_rad
+        # Squares of the speeds over thrust.
+        self._per_share = vehicle.rotor_force_max_n / vehicle.parameters["thrust_factor_n_s2"]
+        self._start = self.batch.true_states[0]
+        self.actions = np.zeros((count, self.rotors))
+        self._seen = np.zeros((count, 12))
+
+    def reset(self, index: int, random: np.random.Generator) -> None:
+        """Starts a vehicle again: from the scenario's start, moved by up to `spread_m` along each axis and turned by up
+        to `spread_rad`, with noise and weather of a seed of their own."""
+        start = self._start.copy()
+        start[0:3] += random.uniform(-self.spread_m, self.spread_m, 3)
+        start[6:9] += random.uniform(-self.spread_rad, self.spread_rad, 3)
+        state = _afbc.State(start[0:3], start[3:6], start[6:9], start[9:12])
+        self.batch.reset(index, int(random.integers(2**53)), state)
+        self.actions[index] = 0.0
+
+    def observe(self) -> NDArray[np.float32]:
+        """Returns the observations."""
+        states, references = self.batch.states, self.batch.references
+        known = ~np.isnan(states[:, :1])
+        self._seen = np.where(known, states, self._seen)
+        seen = np.empty((len(states), MOTION + self.rotors), dtype=np.float32)
+        seen[:, 0:6] = self._seen[:, 0:6] - references[:, 0:6]
+        seen[:, 6:8] = self._seen[:, 6:8]
+        seen[:, 8] = _turn(self._seen[:, 8] - references[:, 9])
+        seen[:, 9:12] = self._seen[:, 9:12]
+        seen[:, 12:15] = references[:, 6:9]
+        seen[:, 15:] = self.actions
+        return seen
+
+    def step(
+        self, actions: NDArray[np.floating]
+    ) -> tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], NDArray[np.float64]]:
+        """Moves all vehicles by one action; returns rewards, which are lost, whose time is over, and distances [m]."""
+        shares = np.clip(np.asarray(actions, dtype=np.float64), -1.0, 1.0)
+        self.batch.step(np.sqrt((1.0 + shares) / 2 * self._per_share), self.steps)
+        states, references = self.batch.true_states, self.batch.references
+        distance_m = np.linalg.norm(states[:, 0:3] - references[:, 0:3], axis=1)
+        turn = np.abs(_turn(states[:, 8] - references[:, 9]))
+        effort = np.mean((shares - self.actions) ** 2, axis=1)
+        upright = np.all(np.abs(states[:, 6:8]) < np.pi / 2, axis=1)
+        lost = ~(upright & (distance_m < self.far_m))
+        rewards = np.where(lost, 0.0, np.exp(-distance_m) - 0.05 * turn / np.pi - 0.05 * effort)
+        self.actions = shares
+        over = ~lost & (self.batch.time_s >= self.duration_s - 1e-9)
+        return rewards, lost, over, distance_m
+
+
+def _turn(angle: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Returns angles [rad] within -pi to pi."""
+    return (angle + np.pi) % (2 * np.pi) - np.pi

@@ -1,0 +1,85 @@
+"""An environment for PettingZoo: several vehicles, an agent each, all in flight at once.
+
+    env = afbc.pettingzoo.FlightParallelEnv(4, "circle", "crazyflie")
+
+Each follows the reference of the scenario in a world of its own: they do not touch or see each other. Actions,
+observations, rewards and ends are those of `afbc.gymnasium.Task`. Tried with PettingZoo 1.27.
+"""
+
+from __future__ import annotations
+
+from os import PathLike
+from typing import Any
+
+import numpy as np
+from gymnasium.utils import seeding
+from numpy.typing import NDArray
+from pettingzoo import ParallelEnv
+
+from ._afbc import Scenario, Vehicle
+from .gymnasium import Task, spaces
+
+__all__ = ["FlightParallelEnv"]
+
+_Path = str | PathLike[str]
+_Each = dict[str, Any]
+
+
+class FlightParallelEnv(ParallelEnv):
+    """`count` vehicles, "vehicle_0" and so on. `options` are those of `Task`."""
+
+    metadata = {"name": "afbc_flight_v0", "render_modes": [], "is_parallelizable": True}
+    render_mode = None
+
+    def __init__(
+        self,
+        count: int = 4,
+        scenario: Scenario | _Path = "hover",
+        vehicle: Vehicle | _Path = "crazyflie",
+        **options: Any,
+    ) -> None:
+        self.task = Task(count, scenario, vehicle, **options)
+        self.possible_agents = [f"vehicle_{index}" for index in range(count)]
+        self.agents: list[str] = []
+        space = [spaces(self.task.rotors) for _ in range(count)]
+        self.observation_spaces = {agent: seen for agent, (seen, _) in zip(self.possible_agents, space)}
+        self.action_spaces = {agent: act for agent, (_, act) in zip(self.possible_agents, space)}
+        self._randoms = [seeding.np_random()[0] for _ in range(count)]
+
+    def observation_space(self, agent: str) -> Any:
+        return self.observation_spaces[agent]
+
+    def action_space(self, agent: str) -> Any:
+        return self.action_spaces[agent]
+
+    def reset(self, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[_Each, _Each]:
+        """Starts all vehicles again; vehicle i has `seed + i`."""
+        self.agents = list(self.possible_agents)
+        for index in range(len(self.agents)):
+            if seed is not None:
+                self._randoms[index] = seeding.np_random(seed + index)[0]
+            self.task.reset(index, self._randoms[index])
+        return self._of(self.task.observe()), {agent: {} for agent in self.agents}
+
+    def step(self, actions: dict[str, NDArray[np.float32]]) -> tuple[_Each, _Each, _Each, _Each, _Each]:
+        if not self.agents:
+            return {}, {}, {}, {}, {}
+        # One whose episode has ended is out: its rotors stand still.
+        still = np.full(self.task.rotors, -1.0)
+        rewards, lost, over, distance_m = self.task.step(
+            np.array([actions[agent] if agent in self.agents else still for agent in self.possible_agents])
+        )
+        each = (
+            self._of(self.task.observe()),
+            self._of(rewards.tolist()),
+            self._of(lost.tolist()),
+            self._of(over.tolist()),
+            {agent: {"distance_m": value} for agent, value in self._of(distance_m.tolist()).items()},
+        )
+        ended = self._of((lost | over).tolist())
+        self.agents = [agent for agent in self.agents if not ended[agent]]
+        return each
+
+    def _of(self, values: Any) -> _Each:
+        """Returns what belongs to each agent that flies."""
+        return {agent: value for agent, value in zip(self.possible_agents, values) if agent in self.agents}

@@ -1,0 +1,279 @@
+"""RotorPy beside this package: our laws fly its vehicles, winds and trajectories; its controllers fly our plant.
+
+    from rotorpy.environments import Environment
+    from rotorpy.vehicles.multirotor import Multirotor
+    import afbc, afbc.rotorpy
+
+    plant = afbc.Plant("hover", vehicle="hummingbird")
+    vehicle = Multirotor(afbc.rotorpy.parameters("hummingbird"), afbc.rotorpy.state(plant))
+    law = afbc.rotorpy.Controller("afbc", "hummingbird")
+    Environment(vehicle, law, afbc.rotorpy.Trajectory("hover"), sim_rate=1000).run(t_final=5)
+
+    from rotorpy.controllers.quadrotor_control import SE3Control
+    afbc.fly("hover", {"se3": afbc.rotorpy.law(SE3Control)}, vehicle="hummingbird")
+
+Both use the same axes: earth z up, body x forward, y left, z up. What follows needs numpy only; RotorPy is imported by
+whoever flies in it. Tried with RotorPy 3.0.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from os import PathLike
+from typing import Any
+
+import numpy as np
+
+from . import _afbc
+from ._rotation import euler, quaternion
+
+__all__ = [
+    "Controller",
+    "Trajectory",
+    "flat_output",
+    "law",
+    "parameters",
+    "state",
+    "to_setpoint",
+    "to_state",
+    "to_vehicle",
+]
+
+_Vehicle = _afbc.Vehicle | str | PathLike[str]
+
+#: RotorPy's gravity [m/s2], which cannot be changed.
+GRAVITY_M_S2 = 9.81
+#: Effects that our plant has not: products of inertia, induced inflow, translational lift, blade flapping.
+_OTHERS = ("Ixy", "Ixz", "Iyz", "k_z", "k_h", "k_flap")
+
+
+def _found(named: _Vehicle) -> _afbc.Vehicle:
+    return named if isinstance(named, _afbc.Vehicle) else _afbc.Vehicle(named)
+
+
+def parameters(vehicle: _Vehicle) -> dict[str, Any]:
+    """Returns a vehicle of ours as the dictionary that RotorPy's `Multirotor` and its controllers take.
+
+    Of four rotors that lag, since RotorPy's do. RotorPy has no inertia of the rotors, no battery, no centre of drag:
+    these are left out, and its ground, if enabled, is its own.
+    """
+    vehicle = _found(vehicle)
+    of, drag = vehicle.parameters, vehicle.drag or {"blade_n_s2_m": 0.0, "body_n_s2_m2": [0.0] * 3}
+    if vehicle.rotors != 4:
+        raise _afbc.AfbcError(f"{vehicle.name}: {vehicle.rotors} rotors; RotorPy flies vehicles of 4")
+    if vehicle.lag_s <= 0:
+        raise _afbc.AfbcError(f"{vehicle.name}: its rotors do not lag; RotorPy's do, time_constant_s must be positive")
+    if of["gravity_m_s2"] != GRAVITY_M_S2:
+        raise _afbc.AfbcError(f"{vehicle.name}: gravity_m_s2 {of['gravity_m_s2']}; RotorPy's is {GRAVITY_M_S2}")
+    slowest, fastest = vehicle.rotor_speed_limits_rad_s
+    return {
+        "mass": of["mass_kg"],
+        **dict(zip(("Ixx", "Iyy", "Izz"), of["inertia_kg_m2"])),
+        **dict.fromkeys(_OTHERS, 0.0),
+        "num_rotors": vehicle.rotors,
+        "rotor_pos": {f"r{i + 1}": position for i, position in enumerate(vehicle.rotor_positions_m)},
+        "rotor_directions": vehicle.rotor_yaw_signs,
+        "rI": np.zeros(3),
+        **dict(zip(("c_Dx", "c_Dy", "c_Dz"), drag["body_n_s2_m2"])),
+        "k_eta": of["thrust_factor_n_s2"],
+        "k_m": of["drag_factor_n_m_s2"],
+        "k_d": drag["blade_n_s2_m"],
+        "tau_m": float(vehicle.lag_s),
+        "rotor_speed_min": slowest,
+        "rotor_speed_max": fastest,
+        "motor_noise_std": 0.0,
+    }
+
+
+def to_vehicle(parameters: Mapping[str, Any], name: str = "rotorpy") -> _afbc.Vehicle:
+    """Returns a vehicle of RotorPy's, by its dictionary, as one of ours, with gains by rule (docs/vehicles.md).
+
+    Refused if it has effects that our plant has not: pass `params | {"k_z": 0, "k_h": 0}` to fly without them.
+    """
+    unknown = [key for key in _OTHERS if parameters.get(key, 0.0) != 0.0]
+    if unknown:
+        cure = ", ".join(f'"{key}": 0' for key in unknown)
+        raise _afbc.AfbcError(f"{name}: {', '.join(unknown)}: not in our plant; {{**parameters, {cure}}} flies without")
+    positions = np.array([parameters["rotor_pos"][rotor] for rotor in parameters["rotor_pos"]], dtype=float)
+    arm_m = np.mean(np.hypot(positions[:, 0], positions[:, 1]))
+    fastest = float(parameters["rotor_speed_max"])
+    spins = ["cw" if sign > 0 else "ccw" for sign in parameters["rotor_directions"]]
+    rotors = "".join(
+        f'[[rotor]]\nposition_m = {position.tolist()}\nspin = "{spin}"\n' for position, spin in zip(positions, spins)
+    )
+    # A drag area of 2 m2 in air of 1 kg/m3 gives 1 N s2/m2.
+    area_m2 = [2.0 * float(parameters.get(f"c_D{axis}", 0.0)) for axis in "xyz"]
+    return _afbc.Vehicle.from_toml(
+        f"""
+description = "RotorPy's {name}"
+[vehicle]
+mass_kg = {float(parameters["mass"])!r}
+arm_m = {float(arm_m)!r}
+inertia_kg_m2 = {[float(parameters[key]) for key in ("Ixx", "Iyy", "Izz")]}
+rotor_inertia_kg_m2 = 0.0
+thrust_factor_n_s2 = {float(parameters["k_eta"])!r}
+drag_factor_n_m_s2 = {float(parameters["k_m"])!r}
+{rotors}
+[rotors]
+time_constant_s = {float(parameters["tau_m"])!r}
+force_max_n = {float(parameters["k_eta"]) * fastest**2!r}
+min_rad_s = {float(parameters["rotor_speed_min"])!r}
+[motor]
+speed_max_rad_s = {fastest!r}
+linearity = 1.0
+idle = 0.0
+[drag]
+air_density_kg_m3 = 1.0
+blade_n_s2_m = {float(parameters.get("k_d", 0.0))!r}
+area_m2 = {area_m2}
+centre_m = [0.0, 0.0, 0.0]
+""",
+        name,
+    )
+
+
+def to_state(state: Mapping[str, Any]) -> _afbc.State:
+    """Returns a state of RotorPy's as one of ours."""
+    return _afbc.State(state["x"], state["v"], euler(state["q"]), state["w"])
+
+
+def to_setpoint(flat_output: Mapping[str, Any]) -> _afbc.Setpoint:
+    """Returns RotorPy's flat outputs as a setpoint."""
+    return _afbc.Setpoint(
+        *(flat_output[key] for key in ("x", "x_dot", "x_ddot", "x_dddot", "x_ddddot")),
+        *(float(flat_output.get(key, 0.0)) for key in ("yaw", "yaw_dot", "yaw_ddot")),
+    )
+
+
+def state(plant: _afbc.Plant) -> dict[str, Any]:
+    """Returns the true state of our plant as RotorPy's, with wind and rotor speeds: where its vehicle may begin."""
+    vector = plant.true_vector
+    return {
+        "x": vector[0:3],
+        "v": vector[3:6],
+        "q": quaternion(vector[6:9]),
+        "w": vector[9:12],
+        "wind": plant.wind_m_s,
+        "rotor_speeds": plant.rotor_speeds_rad_s,
+    }
+
+
+def flat_output(setpoint: _afbc.Setpoint) -> dict[str, Any]:
+    """Returns a setpoint as RotorPy's flat outputs."""
+    return {
+        "x": setpoint.position_m,
+        "x_dot": setpoint.velocity_m_s,
+        "x_ddot": setpoint.acceleration_m_s2,
+        "x_dddot": setpoint.jerk_m_s3,
+        "x_ddddot": setpoint.snap_m_s4,
+        "yaw": setpoint.yaw_rad,
+        "yaw_dot": setpoint.yaw_rate_rad_s,
+        "yaw_ddot": setpoint.yaw_acceleration_rad_s2,
+    }
+
+
+class Controller:
+    """A law of ours as a controller of RotorPy's, for `cmd_motor_speeds`, `cmd_motor_thrusts` or `cmd_ctbm`.
+
+    Takes what `afbc.Controller` takes. It is stepped once in `dt_s`, so that RotorPy must run with
+    `sim_rate=1 / dt_s`, which is 1000 Hz; another rate is refused. Time that starts again resets it.
+    """
+
+    def __init__(self, law: str = "afbc", vehicle: _Vehicle | None = None, **options: Any) -> None:
+        self.controller = _afbc.Controller(law, vehicle, **options)
+        of = _found("paper" if vehicle is None else vehicle).parameters
+        arm_m, per_thrust_m = of["arm_m"], of["drag_factor_n_m_s2"] / of["thrust_factor_n_s2"]
+        self._lever_m = np.array([arm_m, arm_m, per_thrust_m])
+        self._time_s: float | None = None
+
+    def update(self, t: float, state: Mapping[str, Any], flat_output: Mapping[str, Any]) -> dict[str, Any]:
+        """Returns rotor speeds [rad/s] and thrusts [N], shape (4,); their sum [N] and moment [N m], shape (3,)."""
+        before, dt_s = self._time_s, self.controller.dt_s
+        if before is not None and t <= before:
+            self.controller.reset()
+        elif before is not None and abs(t - before - dt_s) > 0.01 * dt_s:
+            raise _afbc.AfbcError(
+                f"RotorPy steps by {t - before:.6g} s, the law by {dt_s:g} s: sim_rate={1 / dt_s:g} is needed"
+            )
+        self._time_s = t
+        action = self.controller.step(to_state(state), to_setpoint(flat_output))
+        inputs, unknown = action.inputs_n, np.full(3, np.nan)
+        return {
+            "cmd_motor_speeds": action.speeds_rad_s,
+            "cmd_motor_thrusts": action.forces_n,
+            "cmd_thrust": float(inputs[3]),
+            "cmd_moment": inputs[:3] * self._lever_m,
+            # Where RotorPy's figures look; no law here commands them as such.
+            "cmd_q": np.array([0.0, 0.0, 0.0, 1.0]),
+            "cmd_w": unknown,
+            "cmd_v": unknown,
+            "cmd_acc": unknown,
+        }
+
+
+class Trajectory:
+    """The reference of a scenario as a trajectory of RotorPy's."""
+
+    def __init__(self, scenario: _afbc.Scenario | str | PathLike[str]) -> None:
+        self.scenario = scenario if isinstance(scenario, _afbc.Scenario) else _afbc.Scenario(scenario)
+
+    def update(self, t: float) -> dict[str, Any]:
+        """Returns the flat outputs at `t` [s]."""
+        at = {name: column[0] for name, column in self.scenario.reference(np.array([float(t)])).items()}
+        parts = {"x": ("", "m"), "x_dot": ("v", "m_s"), "x_ddot": ("a", "m_s2"), "x_dddot": ("j", "m_s3")}
+        parts["x_ddddot"] = ("s", "m_s4")
+        flat: dict[str, Any] = {
+            key: np.array([at[f"{letter}{axis}_d_{unit}"] for axis in "xyz"]) for key, (letter, unit) in parts.items()
+        }
+        flat["yaw"] = at["psi_d_rad"]
+        flat["yaw_dot"] = at["psi_d_rate_rad_s"]
+        flat["yaw_ddot"] = at["psi_d_acceleration_rad_s2"]
+        return flat
+
+
+class _Law:
+    """A controller of RotorPy's as a law of one's own."""
+
+    def __init__(self, make: Callable[[dict[str, Any]], Any], vehicle: _afbc.OwnVehicle) -> None:
+        arm_m, inertia, of_yaw = vehicle.arm_m, vehicle.inertia_kg_m2, float(vehicle.effectiveness[2])
+        # What a newton of U1, U2, U3 gives [N m].
+        self._lever_m = np.array([arm_m, arm_m, of_yaw * float(inertia[2])])
+        self._time_s, self._dt_s = 0.0, float(vehicle.dt_s)
+        # The harness allocates: any frame with these moments will do, here the paper's plus.
+        plus = ((0, -1), (1, 0), (0, 1), (-1, 0))
+        fastest = (vehicle.rotor_force_max_n / vehicle.thrust_factor_n_s2) ** 0.5
+        self.controller = make(
+            {
+                "mass": vehicle.mass_kg,
+                **{key: float(value) for key, value in zip(("Ixx", "Iyy", "Izz"), inertia)},
+                **dict.fromkeys((*_OTHERS, "c_Dx", "c_Dy", "c_Dz", "k_d", "tau_m"), 0.0),
+                "num_rotors": 4,
+                "rotor_pos": {f"r{i + 1}": arm_m * np.array([x, y, 0]) for i, (x, y) in enumerate(plus)},
+                "rotor_directions": np.array([1, -1, 1, -1]),
+                "rI": np.zeros(3),
+                "k_eta": vehicle.thrust_factor_n_s2,
+                "k_m": vehicle.drag_factor_n_m_s2,
+                "rotor_speed_min": 0.0,
+                "rotor_speed_max": fastest,
+            }
+        )
+
+    def step(self, state: _afbc.State, setpoint: _afbc.Setpoint, fresh: bool) -> list[float]:
+        seen = {
+            "x": state.position_m,
+            "v": state.velocity_m_s,
+            "q": quaternion(state.attitude_rad),
+            "w": state.rates_rad_s,
+        }
+        command = self.controller.update(self._time_s, seen, flat_output(setpoint))
+        self._time_s += self._dt_s
+        return [*(np.asarray(command["cmd_moment"]) / self._lever_m), float(np.squeeze(command["cmd_thrust"]))]
+
+
+def law(make: Callable[[dict[str, Any]], Any]) -> Callable[[_afbc.OwnVehicle], Any]:
+    """Returns a controller of RotorPy's as a law of one's own, for `afbc.register`, `afbc.fly` and the like.
+
+    `make(parameters)` makes the controller: a class of RotorPy's, or what sets its gains besides. Its `cmd_thrust` and
+    `cmd_moment` fly, allocated to the rotors by our harness.
+    """
+    return lambda vehicle: _Law(make, vehicle)
