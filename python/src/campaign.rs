@@ -15,8 +15,8 @@ use std::path::PathBuf;
 /// a row for each flight of each contender, by columns.
 ///
 /// With `out`, results and report are written into this folder as `sitl campaign` does, finished flights are kept, and
-/// the same call resumes. `flights` flies only the first ones; `shard`, "I/N", every N-th from the I-th on: `merge` joins
-/// the shards.
+/// the same call resumes. `flights` flies only the first ones; `shard`, "I/N", every N-th from the I-th on: `merge`
+/// joins the shards.
 #[pyfunction]
 #[pyo3(signature = (campaign, *, flights=None, vehicle=None, shard=None, out=None, threads=None, progress=None))]
 #[expect(clippy::too_many_arguments, reason = "each by its name")]
