@@ -25,4 +25,5 @@ mod summary;
 mod table;
 mod words;
 
+pub use figures::contender_color;
 pub use grid::TableFormat;

@@ -21,6 +21,7 @@ mod params;
 mod pil;
 mod place;
 mod plan;
+mod plot;
 mod progress;
 mod random;
 mod replay;
@@ -72,6 +73,7 @@ enum Command {
     Suites(suite::Suites),
     Vehicles(vehicle::Vehicles),
     Params(params::Params),
+    Plot(plot::Plot),
     Results(results::Results),
     Replay(replay::Replay),
     Mcap(mcap::Mcap),
@@ -100,6 +102,7 @@ impl Cli {
             Command::Suites(suites) => suites.run(),
             Command::Vehicles(vehicles) => vehicles.run(),
             Command::Params(params) => params.run(),
+            Command::Plot(plot) => plot.run(),
             Command::Results(results) => results.run(),
             Command::Replay(replay) => replay.run(),
             Command::Mcap(mcap) => mcap.run(),
