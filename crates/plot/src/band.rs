@@ -1,6 +1,6 @@
 //! A median with a band around it, of flights over seeds or of the rows of a campaign.
 
-use crate::columns::Points;
+use crate::table::Points;
 
 /// A median with a band around it.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -17,8 +17,8 @@ const GRID: usize = 400;
 const ROWS: usize = 25;
 const BINS: usize = 40;
 
-/// Returns the median of several flights over time, and the band that holds the middle `percent` of them, where at least
-/// half of them still fly. Between their samples flights are straight lines.
+/// Returns the median of several flights over time, and the band that holds the middle `percent` of them, where at
+/// least half of them still fly. Between their samples flights are straight lines.
 pub fn over_seeds(flights: &[Points], percent: f64) -> Band {
     let ends = |end: fn(&Points) -> Option<&(f64, f64)>| flights.iter().filter_map(end).map(|(x, _)| *x);
     let (start, end) =

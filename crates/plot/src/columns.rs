@@ -1,12 +1,10 @@
 //! The columns of a log, by name.
 
+use crate::table::{LogTable, Points};
 use afbc_reader::FileError;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
-
-/// Points of a line, x and y; none of them is NaN.
-pub type Points = Vec<(f64, f64)>;
 
 /// The columns of a log.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -15,34 +13,12 @@ pub struct LogColumns {
     tables: Vec<LogTable>,
 }
 
-/// Columns of the same length: a file of one table, or a topic of a log, with which its columns' names begin.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct LogTable {
-    /// Name of the topic; empty for a file of one table.
-    pub topic: String,
-    /// Numbers; NaN where there is none.
-    pub numbers: Vec<(String, Vec<f64>)>,
-    /// Words, such as the contender.
-    pub words: Vec<(String, Vec<String>)>,
-}
-
 /// Names of columns that lines are drawn over, the first that there is.
 const TIMES: [&str; 5] = ["time_s", "t_s", "t", "time", "timestamp"];
 /// Name of the column by which rows are of several contenders.
 const CONTENDER: &str = "contender";
 /// Fewest letters in common of a name that is suggested, of 1.
 const SIMILAR: f64 = 0.6;
-
-impl LogTable {
-    /// Returns the name of a column, with that of its topic.
-    fn full(&self, column: &str) -> String {
-        if self.topic.is_empty() { column.into() } else { format!("{}.{column}", self.topic) }
-    }
-
-    fn column(&self, full: &str) -> Option<&[f64]> {
-        self.numbers.iter().find(|(name, _)| self.full(name) == full).map(|(_, values)| values.as_slice())
-    }
-}
 
 impl LogColumns {
     /// Reads the log at `path`: Parquet, ULog or MCAP by its first bytes, otherwise CSV.

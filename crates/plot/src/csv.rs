@@ -1,6 +1,6 @@
 //! CSV files with a head.
 
-use crate::columns::LogTable;
+use crate::table::LogTable;
 
 /// Reads the only table of a file: a column of which no field is a number is one of words.
 pub(crate) fn read(bytes: &[u8]) -> Result<Vec<LogTable>, String> {

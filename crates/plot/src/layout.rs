@@ -1,6 +1,6 @@
 //! Where everything in a figure goes.
 
-use crate::figure::{Figure, FigurePanel, PanelLine};
+use crate::figure::{FigurePanel, PanelLine, PaperFigure};
 use crate::font::width_pt;
 use crate::shape::{Drawing, Place, Rgb, Shape, Stroke, TextAnchor};
 use crate::ticks::Ticks;
@@ -54,8 +54,8 @@ impl Axis {
 }
 
 /// Lays out a figure.
-pub(crate) fn laid_out(figure: &Figure) -> Result<Drawing, String> {
-    let Figure { font_pt, x_range, panels, is_logarithmic, .. } = figure;
+pub(crate) fn laid_out(figure: &PaperFigure) -> Result<Drawing, String> {
+    let PaperFigure { font_pt, x_range, panels, is_logarithmic, .. } = figure;
     let width_pt_all = figure.width_mm * PT_PER_MM;
     let [low, high] = match x_range {
         Some(range) => *range,
@@ -98,7 +98,7 @@ pub(crate) fn laid_out(figure: &Figure) -> Result<Drawing, String> {
 }
 
 /// Draws the legend, if there is more than one entry, and returns where the panels begin.
-fn legend(figure: &Figure, left_pt: f64, right_pt: f64, shapes: &mut Vec<Shape>) -> f64 {
+fn legend(figure: &PaperFigure, left_pt: f64, right_pt: f64, shapes: &mut Vec<Shape>) -> f64 {
     let font_pt = figure.font_pt;
     let mut entries: Vec<&PanelLine> = Vec::new();
     for line in figure.panels.iter().flat_map(|panel| &panel.lines) {
@@ -132,7 +132,7 @@ fn legend(figure: &Figure, left_pt: f64, right_pt: f64, shapes: &mut Vec<Shape>)
 
 /// Draws grid, frame, ticks and titles of a panel.
 fn frame(
-    figure: &Figure,
+    figure: &PaperFigure,
     panel: &FigurePanel,
     [x, y]: [&Axis; 2],
     y_ticks: &Ticks,
@@ -184,7 +184,7 @@ fn frame(
 }
 
 /// Draws bands, and then lines.
-fn lines(figure: &Figure, panel: &FigurePanel, [x, y]: [&Axis; 2], shapes: &mut Vec<Shape>) {
+fn lines(figure: &PaperFigure, panel: &FigurePanel, [x, y]: [&Axis; 2], shapes: &mut Vec<Shape>) {
     let within = Some([x.from_pt, y.to_pt, x.to_pt, y.from_pt]);
     let is_seen = |value: &f64| !y.is_logarithmic || *value > 0.0;
     for PanelLine { color, band, .. } in &panel.lines {
@@ -223,7 +223,7 @@ fn thinned(places: impl Iterator<Item = Place>) -> Vec<Place> {
     kept
 }
 
-fn stroke(figure: &Figure, line: &PanelLine) -> Stroke {
+fn stroke(figure: &PaperFigure, line: &PanelLine) -> Stroke {
     let dashes = DASHES.get(line.dash % DASHES.len()).copied().unwrap_or_default();
     Stroke { color: line.color, width_pt: figure.line_pt, dashes }
 }

@@ -1,6 +1,6 @@
 //! MCAP files whose messages are as ROS 2 writes them (CDR, schemas in `ros2msg`); ULogs by way of them.
 
-use crate::columns::LogTable;
+use crate::table::LogTable;
 use ::mcap::{Channel, MessageStream};
 use afbc_reader::FileError;
 use std::collections::BTreeMap;

@@ -1,6 +1,6 @@
 //! Parquet files without nested columns.
 
-use crate::columns::LogTable;
+use crate::table::LogTable;
 use ::parquet::errors::ParquetError;
 use ::parquet::file::reader::{FileReader, SerializedFileReader};
 use ::parquet::record::Field;

@@ -71,8 +71,8 @@ fn element(shape: &Shape, boxes: &[[f64; 4]]) -> String {
             };
             let turned = if *upwards { format!(" transform=\"rotate(-90 {x:.2} {y:.2})\"") } else { String::new() };
             format!(
-                "<text x=\"{x:.2}\" y=\"{y:.2}\" font-size=\"{size_pt}\" text-anchor=\"{anchor}\" fill=\"{}\"{turned}>{}\
-                 </text>",
+                "<text x=\"{x:.2}\" y=\"{y:.2}\" font-size=\"{size_pt}\" text-anchor=\"{anchor}\" \
+                 fill=\"{}\"{turned}>{}</text>",
                 hex(*color),
                 escaped(text)
             )

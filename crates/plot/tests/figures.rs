@@ -1,7 +1,7 @@
 //! Figures as they are written: of the size asked for, with everything within, and the same in every format.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs)]
 
-use afbc_plot::{Figure, FigureFormat, FigurePanel, LogColumns, PanelLine};
+use afbc_plot::{FigureFormat, FigurePanel, LogColumns, PanelLine, PaperFigure};
 use roxmltree::Document;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -16,12 +16,12 @@ fn sine(label: &str, color: [u8; 3], phase: f64) -> PanelLine {
     PanelLine { label: label.into(), color, dash: 0, lines: vec![points], band }
 }
 
-fn figure(width_mm: f64, panels: usize) -> Figure {
+fn figure(width_mm: f64, panels: usize) -> PaperFigure {
     let panel = |index: usize| FigurePanel {
         y_title: format!("x{index} & y [m]"),
         lines: vec![sine("afbc", RED, 0.0), sine("<pid>", [0, 0, 0xC0], 1.5 + index as f64)],
     };
-    Figure {
+    PaperFigure {
         width_mm,
         panel_mm: 30.0,
         font_pt: 8.0,
@@ -34,7 +34,7 @@ fn figure(width_mm: f64, panels: usize) -> Figure {
     }
 }
 
-fn svg(figure: &Figure) -> String {
+fn svg(figure: &PaperFigure) -> String {
     String::from_utf8(figure.write(FigureFormat::Svg).unwrap()).unwrap()
 }
 
@@ -85,7 +85,7 @@ fn values_lie_where_the_axis_says() {
     let points = vec![(0.0, 0.0), (5.0, 1.0), (10.0, 0.25)];
     let line = PanelLine { label: "a".into(), color: RED, dash: 1, lines: vec![points], band: Vec::new() };
     let panels = vec![FigurePanel { y_title: "y".into(), lines: vec![line] }];
-    let text = svg(&Figure { panels, ..figure(88.0, 0) });
+    let text = svg(&PaperFigure { panels, ..figure(88.0, 0) });
     let document = Document::parse(&text).unwrap();
     let drawn = document.descendants().find(|node| node.attribute("stroke-dasharray").is_some()).unwrap();
     let places: Vec<[f64; 2]> = drawn
@@ -150,13 +150,13 @@ fn a_png_has_its_pixels_and_shows_the_line() {
 
 #[test]
 fn what_cannot_be_drawn_is_refused() {
-    let empty = Figure { panels: Vec::new(), ..figure(88.0, 0) };
+    let empty = PaperFigure { panels: Vec::new(), ..figure(88.0, 0) };
     assert_eq!(empty.write(FigureFormat::Svg).unwrap_err(), "there are no numbers to draw");
     let narrow = figure(5.0, 1).write(FigureFormat::Svg).unwrap_err();
     assert!(narrow.contains("--width"), "{narrow}");
-    let beyond = Figure { x_range: Some([100.0, 200.0]), ..figure(88.0, 1) };
+    let beyond = PaperFigure { x_range: Some([100.0, 200.0]), ..figure(88.0, 1) };
     assert!(beyond.write(FigureFormat::Svg).unwrap_err().contains("no numbers"));
-    let mut negative = Figure { is_logarithmic: true, ..figure(88.0, 1) };
+    let mut negative = PaperFigure { is_logarithmic: true, ..figure(88.0, 1) };
     negative.panels[0].lines.iter_mut().for_each(|line| {
         line.band.clear();
         line.lines.iter_mut().flatten().for_each(|(_, y)| *y = -1.0);

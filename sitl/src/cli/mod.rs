@@ -15,6 +15,7 @@ mod interrupt;
 mod json;
 mod manifest;
 mod mcap;
+mod over_seeds;
 mod page;
 mod paper;
 mod params;

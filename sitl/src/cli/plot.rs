@@ -2,7 +2,9 @@
 
 use super::terminal::{Failure, print};
 use afbc_files::place;
-use afbc_plot::{Figure, FigureFormat, FigurePanel, LogColumns, PanelLine, Points, axis_title, binned, over_seeds};
+use afbc_plot::{
+    FigureFormat, FigurePanel, LogColumns, PanelLine, PaperFigure, Points, axis_title, binned, over_seeds,
+};
 use afbc_report::contender_color;
 use clap::Args;
 use std::path::{Path, PathBuf};
@@ -14,8 +16,8 @@ const POINT_MM: f64 = INCH_MM / 72.0;
 
 /// Draw a figure for a paper from logs: CSV, Parquet, ULog or MCAP
 ///
-/// A panel for each --y, over time or --x. Logs of the same name are seeds of one law: the figure shows their median and
-/// a band around it, and so it does for a campaign's results.parquet, over any quantity that it draws. See
+/// A panel for each --y, over time or --x. Logs of the same name are seeds of one law: the figure shows their median
+/// and a band around it, and so it does for a campaign's results.parquet, over any quantity that it draws. See
 /// docs/papers.md.
 #[derive(Args, Debug)]
 pub(crate) struct Plot {
@@ -138,7 +140,7 @@ impl Plot {
             Ok(FigurePanel { y_title, lines: self.lines(&logs, &columns)? })
         });
         let panels = panels.collect::<Result<Vec<_>, Failure>>()?;
-        let figure = Figure {
+        let figure = PaperFigure {
             width_mm: self.width,
             panel_mm: self.height,
             font_pt: self.font / POINT_MM,
