@@ -26,4 +26,5 @@ mod summary;
 mod table;
 mod words;
 
+pub use figures::contender_color;
 pub use grid::TableFormat;

@@ -11,8 +11,8 @@ use std::process::{Command, ExitCode, Stdio};
 
 /// Make results again from their manifest, and compare them byte by byte
 ///
-/// Runs the command that the manifest names, with the results in a folder of their own, and compares every file with the
-/// manifest's hash. Paths of the command are relative to the current folder. Exits with 1 if a file differs.
+/// Runs the command that the manifest names, with the results in a folder of their own, and compares every file with
+/// the manifest's hash. Paths of the command are relative to the current folder. Exits with 1 if a file differs.
 #[derive(Args, Debug)]
 pub(crate) struct Again {
     /// manifest.json of a folder of results, or the folder

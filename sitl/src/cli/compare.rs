@@ -1,16 +1,14 @@
 //! `sitl compare`.
 
-use super::progress::Progress;
+use super::over_seeds::{fly, record};
 use super::target::Target;
 use super::terminal::Failure;
 use super::vehicle::OnVehicle;
 use super::written::Output;
-use super::{interrupt, manifest, random, suite};
-use afbc_campaign::compare::{self, Comparison, choose, standard};
+use super::{interrupt, random, suite};
+use afbc_campaign::compare::{self, choose, standard};
 use afbc_campaign::suite::suite_at;
-use afbc_files::Folder;
 use afbc_report::compare as report;
-use afbc_scenario::Scenario;
 use afbc_sim::LogRate;
 use clap::Args;
 use std::path::PathBuf;
@@ -117,34 +115,4 @@ fn flies(against: Option<&str>, names: &[&str]) -> Result<(), Failure> {
         Some(against) => Err(format!("--against {against}: does not fly; name one of {}", names.join(", ")).into()),
         None => Ok(()),
     }
-}
-
-/// Flies the scenarios, with as many seeds as are asked for or usual, and shows the progress.
-pub(super) fn fly(
-    scenarios: Vec<Scenario>,
-    seeds: Option<u64>,
-    against: Option<&str>,
-    log_every: u64,
-) -> Result<Vec<Comparison>, Failure> {
-    let planned = scenarios.into_iter().map(|scenario| {
-        let seeds = seeds.unwrap_or_else(|| compare::usual_seeds(&scenario));
-        (scenario, seeds)
-    });
-    let planned: Vec<_> = planned.collect();
-    let flights = planned.iter().map(|(scenario, seeds)| scenario.contenders.len() as u64 * seeds).sum();
-    let progress = Progress::new("compare", "flights", flights, 0);
-    let comparisons = compare::fly_seeds(planned, log_every, &|| progress.add(1))?;
-    drop(progress);
-    Ok(comparisons.into_iter().map(|comparison| comparison.against(against)).collect())
-}
-
-/// Writes the manifest of a comparison's files.
-pub(super) fn record(folder: &Folder, files: &[PathBuf], comparisons: &[Comparison]) -> Result<(), Failure> {
-    let seeds = |comparison: &Comparison| {
-        let flights = comparison.entries.first().map_or(&[][..], |first| &first.flights);
-        flights.iter().map(|flight| flight.seed).collect()
-    };
-    let flown: Vec<manifest::Flown<'_>> =
-        comparisons.iter().map(|comparison| (&comparison.scenario, seeds(comparison))).collect();
-    manifest::write(folder, files, &flown, &flown)
 }

@@ -15,12 +15,14 @@ mod interrupt;
 mod json;
 mod manifest;
 mod mcap;
+mod over_seeds;
 mod page;
 mod paper;
 mod params;
 mod pil;
 mod place;
 mod plan;
+mod plot;
 mod progress;
 mod random;
 mod replay;
@@ -72,6 +74,7 @@ enum Command {
     Suites(suite::Suites),
     Vehicles(vehicle::Vehicles),
     Params(params::Params),
+    Plot(plot::Plot),
     Results(results::Results),
     Replay(replay::Replay),
     Mcap(mcap::Mcap),
@@ -100,6 +103,7 @@ impl Cli {
             Command::Suites(suites) => suites.run(),
             Command::Vehicles(vehicles) => vehicles.run(),
             Command::Params(params) => params.run(),
+            Command::Plot(plot) => plot.run(),
             Command::Results(results) => results.run(),
             Command::Replay(replay) => replay.run(),
             Command::Mcap(mcap) => mcap.run(),

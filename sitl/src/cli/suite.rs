@@ -2,7 +2,7 @@
 
 use super::terminal::{Failure, print};
 use super::written::Output;
-use super::{compare, interrupt, page, random};
+use super::{interrupt, over_seeds, page, random};
 use afbc_campaign::compare::Comparison;
 use afbc_campaign::random::NAME;
 use afbc_campaign::suite::{self, SUITES, Suite};
@@ -71,7 +71,7 @@ pub(super) fn run(
     let Some(folder) = folder else { return Ok(ExitCode::SUCCESS) };
     let flown = FlownSuite { suite, comparisons: &comparisons };
     let written = report::write(&folder, flown)?;
-    compare::record(&folder, &written, &comparisons)?;
+    over_seeds::record(&folder, &written, &comparisons)?;
     let object = |out: &mut Vec<u8>| report::json(out, flown);
     let tables = |format| report::tables(flown, format);
     output.show(&folder, written.len() + 1, object, tables, || report::table(flown))?;
@@ -90,7 +90,7 @@ fn fly(
     let log_every = LogRate::common(&scenarios)?;
     interrupt::ends_it()?;
     ready()?;
-    let comparisons = compare::fly(scenarios, seeds, against, log_every)?;
+    let comparisons = over_seeds::fly(scenarios, seeds, against, log_every)?;
     interrupt::is_too_late();
     Ok(comparisons)
 }

@@ -28,8 +28,8 @@ use std::path::PathBuf;
 ///
 /// * `suite.csv`: a row for each flight of each contender;
 /// * `suite.json`: means, medians and differences over the seeds, losses and trips;
-/// * `statistics.csv`: a row for each figure of each contender in each flight: its median, how it differs from another's,
-///   and whether by chance;
+/// * `statistics.csv`: a row for each figure of each contender in each flight: its median, how it differs from
+///   another's, and whether by chance;
 /// * `standing.csv`: a row for each contender: how it stands over all flights;
 /// * `tables.md`, `tables.tex`: the tables for a paper;
 /// * `<flight>.svg`: errors of every contender over time, with the suite's own seed;

@@ -1,0 +1,130 @@
+//! The font: widths and outlines.
+
+use crate::shape::{Place, TextAnchor};
+use ttf_parser::{Face, OutlineBuilder};
+
+/// Latin, Greek and mathematical characters of DejaVu Sans 2.37; its licence lies beside it.
+const BYTES: &[u8] = include_bytes!("../font/DejaVuSans-subset.ttf");
+
+/// A piece of an outline, y downwards \[pt\].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Stretch {
+    Move(Place),
+    Line(Place),
+    /// A cubic Bézier curve: two controls, end.
+    Curve(Place, Place, Place),
+    Close,
+}
+
+/// Returns the font; none if it is damaged, which a test excludes.
+fn face() -> Option<Face<'static>> {
+    Face::parse(BYTES, 0).ok()
+}
+
+/// Returns the width of a text \[pt\].
+pub(crate) fn width_pt(text: &str, size_pt: f64) -> f64 {
+    let Some(face) = face() else { return 0.0 };
+    let advance = |c: char| face.glyph_index(c).and_then(|glyph| face.glyph_hor_advance(glyph)).unwrap_or_default();
+    text.chars().map(|c| f64::from(advance(c))).sum::<f64>() * size_pt / f64::from(face.units_per_em())
+}
+
+/// Returns the outlines of a text on its base line.
+pub(crate) fn outlines(text: &str, (x, y): Place, size_pt: f64, anchor: TextAnchor, upwards: bool) -> Vec<Stretch> {
+    let Some(face) = face() else { return Vec::new() };
+    let scale = size_pt / f64::from(face.units_per_em());
+    let along = match anchor {
+        TextAnchor::Start => 0.0,
+        TextAnchor::Middle => -0.5 * width_pt(text, size_pt),
+        TextAnchor::End => -width_pt(text, size_pt),
+    };
+    let mut pen = Pen { x, y, upwards, along, scale, last: (0.0, 0.0), stretches: Vec::new() };
+    for c in text.chars() {
+        if let Some(glyph) = face.glyph_index(c) {
+            // A space has no outline.
+            let _ = face.outline_glyph(glyph, &mut pen);
+            pen.along += scale * f64::from(face.glyph_hor_advance(glyph).unwrap_or_default());
+        }
+    }
+    pen.stretches
+}
+
+/// Puts outlines in their place.
+struct Pen {
+    x: f64,
+    y: f64,
+    upwards: bool,
+    /// Where the glyph begins along the text \[pt\].
+    along: f64,
+    scale: f64,
+    /// Last point in the font's units.
+    last: (f32, f32),
+    stretches: Vec<Stretch>,
+}
+
+impl Pen {
+    fn place(&self, x: f32, y: f32) -> Place {
+        let (along, up) = (self.along + self.scale * f64::from(x), self.scale * f64::from(y));
+        if self.upwards { (self.x - up, self.y - along) } else { (self.x + along, self.y - up) }
+    }
+}
+
+impl OutlineBuilder for Pen {
+    fn move_to(&mut self, x: f32, y: f32) {
+        self.last = (x, y);
+        self.stretches.push(Stretch::Move(self.place(x, y)));
+    }
+
+    fn line_to(&mut self, x: f32, y: f32) {
+        self.last = (x, y);
+        self.stretches.push(Stretch::Line(self.place(x, y)));
+    }
+
+    /// The same curve with two controls, each two thirds of the way to the only one.
+    fn quad_to(&mut self, x1: f32, y1: f32, x: f32, y: f32) {
+        let (x0, y0) = self.last;
+        let towards = |from: f32, to: f32| from + 2.0 / 3.0 * (to - from);
+        self.curve_to(towards(x0, x1), towards(y0, y1), towards(x, x1), towards(y, y1), x, y);
+    }
+
+    fn curve_to(&mut self, x1: f32, y1: f32, x2: f32, y2: f32, x: f32, y: f32) {
+        self.last = (x, y);
+        self.stretches.push(Stretch::Curve(self.place(x1, y1), self.place(x2, y2), self.place(x, y)));
+    }
+
+    fn close(&mut self) {
+        self.stretches.push(Stretch::Close);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn it_has_every_character_of_titles_and_ticks() {
+        let face = face();
+        for c in "aZ09 [m/s²] µΔψ₁₀ −0.5·10⁻⁶ ±∞ %°".chars() {
+            assert!(face.as_ref().is_some_and(|face| face.glyph_index(c).is_some()), "{c}");
+        }
+        assert!((width_pt("mm", 10.0) - 2.0 * width_pt("m", 10.0)).abs() < 1e-9);
+        assert!((width_pt("10.0", 16.0) - 2.0 * width_pt("10.0", 8.0)).abs() < 1e-9);
+    }
+
+    /// A text lies where its anchor says, whichever way it runs.
+    #[test]
+    fn outlines_lie_at_their_anchor() {
+        for (anchor, from) in [(TextAnchor::Start, 0.0), (TextAnchor::Middle, -0.5), (TextAnchor::End, -1.0)] {
+            for upwards in [false, true] {
+                let stretches = outlines("HH", (100.0, 50.0), 10.0, anchor, upwards);
+                let width = width_pt("HH", 10.0);
+                for stretch in &stretches {
+                    let (Stretch::Move((x, y)) | Stretch::Line((x, y))) = stretch else { continue };
+                    let (along, up) = if upwards { (50.0 - y, 100.0 - x) } else { (x - 100.0, 50.0 - y) };
+                    assert!((from * width..=(from + 1.0) * width).contains(&along), "{along}");
+                    assert!((0.0..=8.0).contains(&up), "{up}");
+                }
+                assert_eq!(stretches.iter().filter(|stretch| **stretch == Stretch::Close).count(), 2);
+            }
+        }
+    }
+}

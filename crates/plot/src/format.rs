@@ -1,0 +1,49 @@
+//! The formats of a figure.
+
+use crate::figure::PaperFigure;
+use crate::layout::laid_out;
+use crate::pdf::pdf;
+use crate::png::png;
+use crate::svg::svg;
+use std::path::Path;
+
+/// How a figure is written.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum FigureFormat {
+    /// Vectors for pages and editors.
+    Svg,
+    /// Vectors for LaTeX.
+    Pdf,
+    /// Pixels.
+    Png {
+        /// Pixels to the inch.
+        dpi: f64,
+    },
+}
+
+impl FigureFormat {
+    /// Returns the format that a file's name asks for, if it is known.
+    pub fn of(path: &Path, dpi: f64) -> Option<Self> {
+        match path.extension()?.to_str()?.to_ascii_lowercase().as_str() {
+            "svg" => Some(FigureFormat::Svg),
+            "pdf" => Some(FigureFormat::Pdf),
+            "png" => Some(FigureFormat::Png { dpi }),
+            _ => None,
+        }
+    }
+}
+
+impl PaperFigure {
+    /// Returns the figure's file. The same figure gives the same bytes.
+    ///
+    /// # Errors
+    /// One line if there is nothing to draw, or no room for it.
+    pub fn write(&self, format: FigureFormat) -> Result<Vec<u8>, String> {
+        let drawing = laid_out(self)?;
+        Ok(match format {
+            FigureFormat::Svg => svg(&drawing, &self.title).into_bytes(),
+            FigureFormat::Pdf => pdf(&drawing, &self.title),
+            FigureFormat::Png { dpi } => png(&drawing, dpi)?,
+        })
+    }
+}

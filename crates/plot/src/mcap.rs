@@ -1,0 +1,254 @@
+//! MCAP files whose messages are as ROS 2 writes them (CDR, schemas in `ros2msg`); ULogs by way of them.
+
+use crate::table::LogTable;
+use ::mcap::{Channel, MessageStream};
+use afbc_reader::FileError;
+use std::collections::BTreeMap;
+use std::io::Cursor;
+use std::path::Path;
+use std::sync::Arc;
+
+/// Name of the column of a message's time since the first of the log \[s\].
+const TIME: &str = "time_s";
+/// Deepest nesting of messages, and longest sequence that becomes columns.
+const DEPTH: usize = 8;
+const LONGEST: usize = 64;
+
+/// Reads a ULog.
+pub(crate) fn read_ulog(path: &Path) -> Result<Vec<LogTable>, FileError> {
+    let mut bytes = Vec::new();
+    afbc_replay::mcap::convert(path, Cursor::new(&mut bytes))?;
+    read(&bytes).map_err(|problem| FileError::whole(&path.display().to_string(), problem))
+}
+
+/// Reads the topics of a file; those that are written otherwise are left out.
+pub(crate) fn read(bytes: &[u8]) -> Result<Vec<LogTable>, String> {
+    let damaged = |error: ::mcap::McapError| {
+        format!("cannot be read as MCAP ({error}); give an uncompressed one, as `sitl mcap` writes them")
+    };
+    let mut topics: BTreeMap<u16, Option<(Layout, Topic)>> = BTreeMap::new();
+    let mut start = None;
+    let mut others = Vec::new();
+    for message in MessageStream::new(bytes).map_err(damaged)? {
+        let message = message.map_err(damaged)?;
+        let start = *start.get_or_insert(message.log_time);
+        let channel = &message.channel;
+        let known = topics.entry(channel.id).or_insert_with(|| {
+            let layout = Layout::of(channel);
+            if layout.is_none() {
+                others.push(channel.topic.clone());
+            }
+            layout.map(|layout| (layout, Topic::default()))
+        });
+        if let Some((layout, topic)) = known {
+            let time_s = (message.log_time as f64 - start as f64) / 1e9;
+            topic.add(time_s, layout.values(&message.data));
+        }
+    }
+    let tables: Vec<LogTable> =
+        topics.into_values().flatten().map(|(layout, topic)| topic.table(layout.topic)).collect();
+    if tables.iter().all(|table| table.numbers.len() < 2) {
+        return Err(format!("has no topic in ROS 2's encoding (cdr, ros2msg); it has {}", others.join(", ")));
+    }
+    Ok(tables)
+}
+
+/// The columns of a topic while it is read.
+#[derive(Default)]
+struct Topic {
+    times_s: Vec<f64>,
+    columns: Vec<(String, Vec<f64>)>,
+}
+
+impl Topic {
+    fn add(&mut self, time_s: f64, values: Vec<(String, f64)>) {
+        let before = self.times_s.len();
+        self.times_s.push(time_s);
+        for (place, (name, value)) in values.into_iter().enumerate() {
+            // Usually each message has the same fields.
+            let known = self.columns.get(place).filter(|(known, _)| *known == name).map(|_| place);
+            let known = known.or_else(|| self.columns.iter().position(|(known, _)| *known == name));
+            let known = known.unwrap_or_else(|| {
+                self.columns.push((name, Vec::new()));
+                self.columns.len() - 1
+            });
+            if let Some((_, column)) = self.columns.get_mut(known) {
+                column.resize(before, f64::NAN);
+                column.push(value);
+            }
+        }
+    }
+
+    fn table(mut self, topic: String) -> LogTable {
+        let length = self.times_s.len();
+        self.columns.iter_mut().for_each(|(_, column)| column.resize(length, f64::NAN));
+        let numbers = [(TIME.to_owned(), self.times_s)].into_iter().chain(self.columns).collect();
+        LogTable { topic, numbers, words: Vec::new() }
+    }
+}
+
+/// How the messages of a topic are laid out.
+struct Layout {
+    topic: String,
+    /// Fields of the message, and of those in it by the last part of their names.
+    messages: BTreeMap<String, Vec<FieldLayout>>,
+}
+
+#[derive(Clone)]
+struct FieldLayout {
+    name: String,
+    kind: String,
+    /// How many of a fixed array, or 0 for a sequence; none for a single one.
+    many: Option<usize>,
+}
+
+impl Layout {
+    fn of(channel: &Arc<Channel<'_>>) -> Option<Self> {
+        let schema = channel.schema.as_ref()?;
+        if channel.message_encoding != "cdr" || schema.encoding != "ros2msg" {
+            return None;
+        }
+        let text = std::str::from_utf8(&schema.data).ok()?;
+        let mut messages = BTreeMap::from([(String::new(), Vec::new())]);
+        let mut current = String::new();
+        for line in text.lines() {
+            let line = line.split('#').next().unwrap_or_default().trim();
+            if let Some(name) = line.strip_prefix("MSG:") {
+                current = last(name.trim()).to_owned();
+                messages.insert(current.clone(), Vec::new());
+            } else if let Some((kind, rest)) = line.split_once(char::is_whitespace)
+                && let Some(fields) = messages.get_mut(&current)
+            {
+                // A constant has a value and no place; a default stands behind the name.
+                let name = rest.split_whitespace().next().unwrap_or_default();
+                if !rest.contains('=') && !name.is_empty() {
+                    fields.push(FieldLayout::new(kind, name));
+                }
+            }
+        }
+        Some(Layout { topic: channel.topic.trim_start_matches('/').to_owned(), messages })
+    }
+
+    /// Returns the numbers of a message with their names, up to where it ends too early or has what is not known.
+    fn values(&self, data: &[u8]) -> Vec<(String, f64)> {
+        let mut values = Vec::new();
+        // Behind the four bytes that say how it is encoded; the second is odd for the usual order of bytes.
+        if let Some((head, body)) = data.split_at_checked(4)
+            && head.get(1).is_some_and(|kind| kind % 2 == 1)
+        {
+            let mut reader = CdrReader { bytes: body, at: 0 };
+            let _partly = self.message("", "", &mut reader, &mut values, 0);
+        }
+        values
+    }
+
+    fn message(
+        &self,
+        kind: &str,
+        prefix: &str,
+        reader: &mut CdrReader<'_>,
+        values: &mut Vec<(String, f64)>,
+        depth: usize,
+    ) -> Option<()> {
+        for field in self.messages.get(kind).filter(|_| depth < DEPTH)? {
+            let count = match field.many {
+                Some(0) => reader.number("uint32")? as usize,
+                Some(count) => count,
+                None => 1,
+            };
+            for index in 0..count {
+                let name = match field.many {
+                    Some(_) => format!("{prefix}{}[{index}]", field.name),
+                    None => format!("{prefix}{}", field.name),
+                };
+                match field.kind.as_str() {
+                    "string" => reader.text()?,
+                    known if size(known).is_some() => {
+                        let value = reader.number(known)?;
+                        if index < LONGEST {
+                            values.push((name, value));
+                        }
+                    }
+                    other => self.message(last(other), &format!("{name}."), reader, values, depth + 1)?,
+                }
+            }
+        }
+        Some(())
+    }
+}
+
+impl FieldLayout {
+    fn new(kind: &str, name: &str) -> Self {
+        let (kind, many) = match kind.split_once('[') {
+            // `[3]` is an array, `[]` and `[<=3]` are sequences.
+            Some((kind, count)) => (kind, Some(count.trim_end_matches(']').parse().unwrap_or(0))),
+            None => (kind, None),
+        };
+        // A string may have a longest length.
+        let kind = if kind.starts_with("string") { "string" } else { kind };
+        FieldLayout { name: name.into(), kind: kind.into(), many }
+    }
+}
+
+/// Returns the last part of a message's name.
+fn last(name: &str) -> &str {
+    name.rsplit('/').next().unwrap_or(name)
+}
+
+/// Returns the length of a number \[bytes\].
+fn size(kind: &str) -> Option<usize> {
+    Some(match kind {
+        "bool" | "byte" | "char" | "int8" | "uint8" => 1,
+        "int16" | "uint16" => 2,
+        "int32" | "uint32" | "float32" => 4,
+        "int64" | "uint64" | "float64" => 8,
+        // Two 32-bit numbers, read as its seconds with their fraction.
+        "time" | "duration" | "builtin_interfaces/Time" | "builtin_interfaces/Duration" => 8,
+        _ => return None,
+    })
+}
+
+/// The body of a message in the Common Data Representation, version 1.
+struct CdrReader<'a> {
+    bytes: &'a [u8],
+    at: usize,
+}
+
+impl CdrReader<'_> {
+    /// Returns the next number, which begins at a multiple of its length.
+    fn number(&mut self, kind: &str) -> Option<f64> {
+        let length = size(kind)?;
+        let is_time = kind.ends_with("ime") || kind.ends_with("uration");
+        self.at = self.at.next_multiple_of(if is_time { 4 } else { length });
+        let from = self.bytes.get(self.at..self.at.checked_add(length)?)?;
+        self.at += length;
+        macro_rules! take {
+            ($type:ty) => {
+                <$type>::from_le_bytes(*from.first_chunk()?)
+            };
+        }
+        Some(match kind {
+            "bool" | "byte" | "char" | "uint8" => take!(u8).into(),
+            "int8" => take!(i8).into(),
+            "int16" => take!(i16).into(),
+            "uint16" => take!(u16).into(),
+            "int32" => take!(i32).into(),
+            "uint32" => take!(u32).into(),
+            "float32" => take!(f32).into(),
+            "int64" => take!(i64) as f64,
+            "uint64" => take!(u64) as f64,
+            "float64" => take!(f64),
+            _ => {
+                let (seconds, fraction) = from.split_first_chunk()?;
+                f64::from(i32::from_le_bytes(*seconds)) + f64::from(u32::from_le_bytes(*fraction.first_chunk()?)) / 1e9
+            }
+        })
+    }
+
+    /// Passes a text: its length, its bytes.
+    fn text(&mut self) -> Option<()> {
+        let length = self.number("uint32")? as usize;
+        self.at = self.at.checked_add(length).filter(|end| *end <= self.bytes.len())?;
+        Some(())
+    }
+}

@@ -1,0 +1,274 @@
+//! `sitl plot`.
+
+use super::terminal::{Failure, print};
+use afbc_files::place;
+use afbc_plot::{
+    FigureFormat, FigurePanel, LogColumns, PanelLine, PaperFigure, Points, axis_title, binned, over_seeds,
+};
+use afbc_report::contender_color;
+use clap::Args;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+/// Millimetres in an inch and in a point.
+const INCH_MM: f64 = 25.4;
+const POINT_MM: f64 = INCH_MM / 72.0;
+
+/// Draw a figure for a paper from logs: CSV, Parquet, ULog or MCAP
+///
+/// A panel for each --y, over time or --x. Logs of the same name are seeds of one law: the figure shows their median
+/// and a band around it, and so it does for a campaign's results.parquet, over any quantity that it draws. See
+/// docs/papers.md.
+#[derive(Args, Debug)]
+pub(crate) struct Plot {
+    /// Logs, each with its name for the legend before an equals sign [default: the file's name]
+    #[arg(required = true, value_name = "[NAME=]FILE")]
+    logs: Vec<String>,
+
+    /// Columns of a panel; once for each panel. Of ULog and MCAP, topic.field
+    #[arg(long, required = true, value_name = "COLUMN,...")]
+    y: Vec<String>,
+
+    /// Column that they are drawn over [default: the time]
+    #[arg(long, value_name = "COLUMN")]
+    x: Option<String>,
+
+    /// File to write: .pdf, .svg or .png
+    #[arg(long, value_name = "FILE", default_value = "figure.pdf")]
+    out: PathBuf,
+
+    /// Replace the file if it is there
+    #[arg(long)]
+    force: bool,
+
+    /// Width of the figure, in mm, cm, in or pt
+    #[arg(long, value_name = "LENGTH", default_value = "88mm", value_parser = length)]
+    width: f64,
+
+    /// Height of a panel
+    #[arg(long, value_name = "LENGTH", default_value = "34mm", value_parser = length)]
+    height: f64,
+
+    /// Size of the type
+    #[arg(long, value_name = "LENGTH", default_value = "8pt", value_parser = length)]
+    font: f64,
+
+    /// Width of the lines
+    #[arg(long, value_name = "LENGTH", default_value = "0.9pt", value_parser = length)]
+    line: f64,
+
+    /// Pixels to the inch of a .png
+    #[arg(long, value_name = "N", default_value = "300", value_parser = clap::value_parser!(u32).range(30..=2400))]
+    dpi: u32,
+
+    /// Share of the seeds, or of a campaign's rows, within the band, in percent
+    #[arg(long, value_name = "PERCENT", default_value = "80", value_parser = percent)]
+    band: f64,
+
+    /// Where the x-axis begins
+    #[arg(long, value_name = "X", requires = "to", allow_negative_numbers = true)]
+    from: Option<f64>,
+
+    /// Where the x-axis ends
+    #[arg(long, value_name = "X", requires = "from", allow_negative_numbers = true)]
+    to: Option<f64>,
+
+    /// Logarithmic y-axes
+    #[arg(long)]
+    log_y: bool,
+
+    /// Title of the x-axis [default: the column's name, with its unit]
+    #[arg(long, value_name = "TEXT")]
+    x_title: Option<String>,
+
+    /// Title of a panel's y-axis, in the order of --y [default: likewise]
+    #[arg(long, value_name = "TEXT")]
+    y_title: Vec<String>,
+}
+
+/// Reads a length \[mm\].
+fn length(text: &str) -> Result<f64, String> {
+    let units = [("mm", 1.0), ("cm", 10.0), ("in", INCH_MM), ("pt", POINT_MM)];
+    let number = units.iter().find_map(|(unit, mm)| Some(text.strip_suffix(unit)?.trim().parse::<f64>().ok()? * mm));
+    number
+        .filter(|mm| (0.01..=2000.0).contains(mm))
+        .ok_or_else(|| "it must be a length up to 2000 mm, such as 88mm, 3.5in or 8pt".into())
+}
+
+fn percent(text: &str) -> Result<f64, &'static str> {
+    text.parse().ok().filter(|percent| (0.0..=100.0).contains(percent)).ok_or("it must be from 0 to 100, such as 80")
+}
+
+/// A log with its name in the legend.
+struct Named {
+    name: String,
+    columns: LogColumns,
+}
+
+/// The lines of one name in a panel.
+struct Collected {
+    name: String,
+    column: usize,
+    /// Whether they are rows of flights rather than flights.
+    is_rows: bool,
+    all: Vec<Points>,
+}
+
+impl Plot {
+    /// Reads, draws, prints.
+    pub(super) fn run(self) -> Result<ExitCode, Failure> {
+        let out = self.out.display();
+        let Some(format) = FigureFormat::of(&self.out, self.dpi.into()) else {
+            return Err(format!("--out {out}: the end of the name says the format; use .pdf, .svg or .png").into());
+        };
+        if self.out.exists() && !self.force {
+            return Err(
+                format!("{out}: exists already; choose another file with --out, or replace it with --force").into()
+            );
+        }
+        let logs = self.logs()?;
+        let x = match (&self.x, logs.first(), self.columns().next()) {
+            (None, Some(first), Some(y)) => first.columns.usual_x(y)?,
+            (x, ..) => x.clone().unwrap_or_default(),
+        };
+        // The time of one topic stands for that of all.
+        let bare = x.rsplit('.').next().unwrap_or_default().to_owned();
+        let panels = self.y.iter().enumerate().map(|(index, columns)| {
+            let columns: Vec<&str> = columns.split(',').map(str::trim).collect();
+            let usual = || columns.iter().map(|column| axis_title(column)).collect::<Vec<_>>().join(", ");
+            let y_title = self.y_title.get(index).cloned().unwrap_or_else(usual);
+            Ok(FigurePanel { y_title, lines: self.lines(&logs, &columns)? })
+        });
+        let panels = panels.collect::<Result<Vec<_>, Failure>>()?;
+        let figure = PaperFigure {
+            width_mm: self.width,
+            panel_mm: self.height,
+            font_pt: self.font / POINT_MM,
+            line_pt: self.line / POINT_MM,
+            title: format!("{} over {x}", self.y.join(", ")),
+            x_title: self.x_title.clone().unwrap_or_else(|| axis_title(self.x.as_ref().unwrap_or(&bare))),
+            x_range: self.from.zip(self.to).map(|(from, to)| [from, to]),
+            is_logarithmic: self.log_y,
+            panels,
+        };
+        let bytes = figure.write(format).map_err(|problem| format!("--out {out}: {problem}"))?;
+        place(&self.out, |to| to.write_all(&bytes))
+            .map_err(|error| format!("{out}: cannot be written ({error}); choose another file with --out"))?;
+        print(&format!("{out}: {:.1} mm wide, {} panels\n", self.width, self.y.len()))?;
+        Ok(ExitCode::SUCCESS)
+    }
+
+    /// Every column of every panel.
+    fn columns(&self) -> impl Iterator<Item = &str> {
+        self.y.iter().flat_map(|columns| columns.split(',')).map(str::trim)
+    }
+
+    /// Reads the logs.
+    fn logs(&self) -> Result<Vec<Named>, Failure> {
+        let split = |log: &String| match log.split_once('=') {
+            Some((name, path)) if !Path::new(log).exists() => (Some(name.to_owned()), PathBuf::from(path)),
+            _ => (None, PathBuf::from(log)),
+        };
+        let split: Vec<_> = self.logs.iter().map(split).collect();
+        let stem = |path: &Path| path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        let stems: Vec<String> = split.iter().filter(|(name, _)| name.is_none()).map(|(_, path)| stem(path)).collect();
+        let common = common(&stems);
+        let read = |(name, path): (Option<String>, PathBuf)| {
+            let name = name.unwrap_or_else(|| stem(&path).split_at(common).1.to_owned());
+            Ok(Named { name, columns: LogColumns::read(&path)? })
+        };
+        split.into_iter().map(read).collect()
+    }
+
+    /// Returns the lines of a panel.
+    fn lines(&self, logs: &[Named], columns: &[&str]) -> Result<Vec<PanelLine>, Failure> {
+        let mut all: Vec<Collected> = Vec::new();
+        let is_one_log = logs.iter().all(|log| logs.first().is_some_and(|first| first.name == log.name));
+        for (column, y) in columns.iter().enumerate() {
+            for log in logs {
+                // Each topic of a log has its own time.
+                let x = self.x.clone().map_or_else(|| log.columns.usual_x(y), Ok)?;
+                for (contender, points) in log.columns.points(&x, y)? {
+                    let is_rows = contender.is_some();
+                    let name = match contender {
+                        Some(contender) if is_one_log => contender,
+                        Some(contender) => format!("{}, {contender}", log.name),
+                        None => log.name.clone(),
+                    };
+                    match all.iter_mut().find(|other| other.name == name && other.column == column) {
+                        Some(known) => known.all.push(points),
+                        None => all.push(Collected { name, column, is_rows, all: vec![points] }),
+                    }
+                }
+            }
+        }
+        let mut names: Vec<String> = Vec::new();
+        all.iter().for_each(|one| {
+            if !names.contains(&one.name) {
+                names.push(one.name.clone());
+            }
+        });
+        let line = |collected: Collected| {
+            let Collected { name, column, is_rows, all } = collected;
+            let place = names.iter().position(|other| *other == name).unwrap_or_default();
+            let title = columns.get(column).map(|column| axis_title(column)).unwrap_or_default();
+            // Of one log, its columns have a colour each; of several, a dash each.
+            let (label, color, dash) = match (columns.len(), names.len()) {
+                (1, _) if self.y.iter().any(|columns| columns.contains(',')) => {
+                    (name.clone(), contender_color(&name), 0)
+                }
+                (1, _) => (name.clone(), contender_color(&name), place),
+                (_, 1) => (title.clone(), contender_color(&title), column),
+                _ => (format!("{name}: {title}"), contender_color(&name), column),
+            };
+            let (lines, band) = summarised(all, is_rows, self.band);
+            PanelLine { label, color, dash, lines, band }
+        };
+        Ok(all.into_iter().map(line).collect())
+    }
+}
+
+/// Returns what is drawn of flights of one name: the only one; or the median and a band, of rows and of flights over
+/// time; or all of them.
+fn summarised(all: Vec<Points>, is_rows: bool, percent: f64) -> (Vec<Points>, Vec<(f64, [f64; 2])>) {
+    let rises = |points: &Points| points.windows(2).all(|two| matches!(two, [a, b] if a.0 < b.0));
+    let band = match all.len() {
+        _ if is_rows => binned(all.into_iter().flatten().collect(), percent),
+        2.. if all.iter().all(rises) => over_seeds(&all, percent),
+        _ => return (all, Vec::new()),
+    };
+    (vec![band.median], band.edges)
+}
+
+/// Returns the length of what names of files have in common up to a hyphen, if they are not all the same.
+fn common(stems: &[String]) -> usize {
+    let Some(first) = stems.first().filter(|first| stems.iter().any(|stem| stem != *first)) else { return 0 };
+    let ends = first.match_indices('-').map(|(at, _)| at + 1);
+    let shared = |end: &usize| first.get(..*end).is_some_and(|head| stems.iter().all(|stem| stem.starts_with(head)));
+    ends.filter(shared).max().unwrap_or(0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lengths_have_units() {
+        for (text, mm) in [("88mm", 88.0), ("8.8 cm", 88.0), ("3.5in", 88.9), ("72pt", 25.4)] {
+            assert!(length(text).is_ok_and(|read| (read - mm).abs() < 1e-9), "{text}");
+        }
+        for text in ["88", "mm", "-3mm", "NaNmm", "1e9in", "0mm"] {
+            assert!(length(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn names_lose_what_they_have_in_common() {
+        let common = |stems: &[&str]| common(&stems.iter().map(|stem| (*stem).to_owned()).collect::<Vec<_>>());
+        assert_eq!(common(&["paper-afbc", "paper-backstepping"]), 6);
+        assert_eq!(common(&["a-b-afbc", "a-b-pid", "a-b-p"]), 4);
+        assert_eq!(common(&["paper-afbc", "paper-afbc"]), 0);
+        assert_eq!(common(&["afbc", "pid"]), 0);
+        assert_eq!(common(&[]), 0);
+    }
+}
