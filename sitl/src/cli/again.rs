@@ -9,6 +9,9 @@ use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode, Stdio};
 
+/// Commands that leave a manifest.
+const WITH_MANIFEST: [&str; 3] = ["compare", "fly", "paper"];
+
 /// Make results again from their manifest, and compare them byte by byte
 ///
 /// Runs the command that the manifest names, with the results in a folder of their own, and compares every file with
@@ -27,8 +30,11 @@ impl Again {
     /// Runs the command, compares, prints.
     pub(super) fn run(self) -> Result<ExitCode, Failure> {
         let before = manifest::read(&self.manifest)?;
-        if before.command.first().is_some_and(|command| command == "again") {
-            return Err(format!("{}: names this command itself; name another", self.manifest.display()).into());
+        // Without a command, or with options first, it is `paper`.
+        let command = before.command.first().filter(|word| !word.starts_with('-')).map_or("paper", String::as_str);
+        if !WITH_MANIFEST.contains(&command) {
+            let (path, known) = (self.manifest.display(), WITH_MANIFEST.join(", "));
+            return Err(format!("{path}: its command is {command:?}, not one of {known}").into());
         }
         let out = self.out.clone().unwrap_or_else(|| beside(&self.manifest));
         for (what, then, now) in [

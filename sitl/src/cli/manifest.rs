@@ -88,7 +88,7 @@ pub(super) fn write(
     let manifest = ResultsManifest {
         version: version(),
         commit: commit(),
-        command: command(env::args().skip(1)),
+        command: command(env::args_os().skip(1).map(|argument| argument.to_string_lossy().into_owned())),
         fingerprint: hash_of(&(version(), flown)),
         flown: shown.iter().map(words).collect::<Result<_, serde_json::Error>>()?,
         machine: Machine {
