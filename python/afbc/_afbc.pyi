@@ -21,6 +21,9 @@ __all__ = [
     "Batch",
     "OwnVehicle",
     "Estimator",
+    "Instruments",
+    "FlightCore",
+    "Guidance",
     "fly",
     "compare",
     "campaign",
@@ -347,6 +350,80 @@ class Estimator:
     def valid(self) -> dict[str, bool]: ...
     @property
     def unready(self) -> str | None: ...
+
+@final
+class Instruments:
+    """The instruments of a scenario's vehicle, with their errors, delays and failures; they read any plant."""
+
+    def __new__(
+        cls,
+        scenario: Scenario | _Path | None = None,
+        *,
+        vehicle: Vehicle | _Path | None = None,
+        seed: int | None = None,
+        dt_s: float = 0.001,
+    ) -> Self: ...
+    def measure(self, plant: Plant) -> dict[str, Any]: ...
+
+@final
+class FlightCore:
+    """The flight core of the firmware around a law, tick by tick at 1 kHz: arming, flight, coasting, descent."""
+
+    def __new__(
+        cls,
+        law: str = "afbc",
+        vehicle: Vehicle | _Path | None = None,
+        *,
+        monitored: bool = True,
+        gains: Sequence[tuple[str, float]] | None = None,
+    ) -> Self: ...
+    def request(self, request: str) -> None: ...
+    def step(
+        self, state: State | None = None, setpoint: Setpoint | None = None, *, idle_on_ground: bool = False
+    ) -> Action: ...
+    @property
+    def time_s(self) -> float: ...
+    @property
+    def mode(self) -> str: ...
+    @property
+    def answer(self) -> str | None: ...
+    @property
+    def against(self) -> list[str]: ...
+    @property
+    def ended(self) -> str | None: ...
+    @property
+    def airborne(self) -> bool: ...
+    @property
+    def rested(self) -> bool: ...
+
+@final
+class Guidance:
+    """Flight modes, trajectory limiter and safety net of the firmware, step by step."""
+
+    def __new__(cls, vehicle: Vehicle | _Path | None = None, *, dt_s: float = 0.001) -> Self: ...
+    def take_off(self, height_m: float | None = None) -> None: ...
+    def go_to(self, position_m: ArrayLike, yaw_rad: float = ..., speed_m_s: float | None = None) -> None: ...
+    def select(self, mode: str) -> None: ...
+    def sticks(self, roll: float, pitch: float, yaw: float, throttle: float) -> None: ...
+    def step(
+        self,
+        state: State | None,
+        core: str = "flying",
+        *,
+        airborne: bool = True,
+        rested: bool = True,
+        thrust_m_s2: float | None = None,
+    ) -> Setpoint | None: ...
+    @property
+    def mode(self) -> str: ...
+    @property
+    def answer(self) -> str | None: ...
+    @property
+    def idle_on_ground(self) -> bool: ...
+    @property
+    def request(self) -> str | None: ...
+    @property
+    def failsafe(self) -> str | None: ...
 
 def laws() -> list[str]: ...
 def vehicles() -> list[str]: ...

@@ -8,8 +8,9 @@ use afbc_control::{Action, FlightController, Trace, Validated};
 use afbc_scenario::contender::{Contender, ControllerKind};
 use afbc_scenario::{AnyController, AnyControllerMemory};
 use afbc_types::{
-    Axis, Declaration, Declared, Inputs, PLUS, Parameters, PerAxis, ROTORS_MAX, Value, ValueMut, with_rotors,
+    Axis, Declaration, Declared, Inputs, PLUS, Parameters, PerAxis, ROTORS_MAX, Rotor, Value, ValueMut, with_rotors,
 };
+use afbc_vehicles::Vehicle;
 use core::convert::Infallible;
 use numpy::{PyArray1, ToPyArray};
 use pyo3::prelude::*;
@@ -21,6 +22,13 @@ use std::sync::{Mutex, PoisonError};
 pub(crate) struct PyAction {
     action: Action<ROTORS_MAX>,
     rotors: usize,
+}
+
+impl PyAction {
+    /// An action of so many rotors.
+    pub(crate) fn new(action: Action<ROTORS_MAX>, rotors: usize) -> Self {
+        PyAction { action, rotors }
+    }
 }
 
 #[pymethods]
@@ -126,26 +134,9 @@ impl PyController {
         monitored: bool,
         gains: Option<Vec<(String, f64)>>,
     ) -> PyResult<Self> {
-        let kind = ControllerKind::named(law)
-            .ok_or_else(|| error(format!("{law}: no such law; the laws are {}", ControllerKind::names())))?;
-        let profile = Profile::ALL.into_iter().find(|known| known.name() == profile).ok_or_else(|| {
-            let known = Profile::ALL.map(Profile::name).join(", ");
-            error(format!("{profile}: no such profile; they are {known}"))
-        })?;
-        let mut contender = Contender::of(kind, profile);
-        let (mut parameters, mut rotors) = (Parameters::PAPER, PLUS.map(|rotor| rotor.to_f64()).to_vec());
-        if let Some(vehicle) = vehicle {
-            let vehicle = vehicle.vehicle()?;
-            contender = contender.on(&vehicle, profile).map_err(error)?;
-            (parameters, rotors) = (vehicle.parameters, vehicle.rotors);
-        }
-        for (name, value) in gains.unwrap_or_default() {
-            set(&mut contender, &name, value)?;
-        }
-        if monitored {
-            contender = contender.monitored();
-        }
-        contender.check(&parameters, &rotors).map_err(error)?;
+        let vehicle = vehicle.map(|vehicle| vehicle.vehicle()).transpose()?;
+        let named = Named { law, profile, monitored, gains: gains.unwrap_or_default() };
+        let (contender, parameters, rotors) = made(&named, vehicle.as_ref())?;
         let law: Box<dyn AnyRotors> = with_rotors!(rotors.len(), N => {
             let controller = contender.controller::<N>(&parameters, &rotors).map_err(error)?;
             Ok::<Box<dyn AnyRotors>, PyErr>(Box::new(OfRotors {
@@ -211,6 +202,42 @@ impl PyController {
         }
         Ok(dict)
     }
+}
+
+/// What names a law with its gains.
+pub(crate) struct Named<'a> {
+    pub(crate) law: &'a str,
+    pub(crate) profile: &'a str,
+    pub(crate) monitored: bool,
+    pub(crate) gains: Vec<(String, f64)>,
+}
+
+/// The law, and parameters and rotors of the vehicle that it is for, the paper's if none is given.
+pub(crate) fn made(
+    named: &Named<'_>,
+    vehicle: Option<&Vehicle>,
+) -> PyResult<(Contender, Parameters<f64>, Vec<Rotor<f64>>)> {
+    let Named { law, profile, monitored, gains } = named;
+    let kind = ControllerKind::named(law)
+        .ok_or_else(|| error(format!("{law}: no such law; the laws are {}", ControllerKind::names())))?;
+    let profile = Profile::ALL.into_iter().find(|known| known.name() == *profile).ok_or_else(|| {
+        let known = Profile::ALL.map(Profile::name).join(", ");
+        error(format!("{profile}: no such profile; they are {known}"))
+    })?;
+    let mut contender = Contender::of(kind, profile);
+    let (mut parameters, mut rotors) = (Parameters::PAPER, PLUS.map(|rotor| rotor.to_f64()).to_vec());
+    if let Some(vehicle) = vehicle {
+        contender = contender.on(vehicle, profile).map_err(error)?;
+        (parameters, rotors) = (vehicle.parameters, vehicle.rotors.clone());
+    }
+    for (name, value) in gains {
+        set(&mut contender, name, *value)?;
+    }
+    if *monitored {
+        contender = contender.monitored();
+    }
+    contender.check(&parameters, &rotors).map_err(error)?;
+    Ok((contender, parameters, rotors))
 }
 
 /// The gains of a contender by name.

@@ -9,6 +9,9 @@ mod controller;
 mod error;
 mod estimator;
 mod flight;
+mod flight_core;
+mod guidance;
+mod instruments;
 mod law;
 mod motion;
 mod plant;
@@ -35,6 +38,9 @@ fn _afbc(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<batch::PyBatch>()?;
     module.add_class::<law::PyOwnVehicle>()?;
     module.add_class::<estimator::PyEstimator>()?;
+    module.add_class::<instruments::PyInstruments>()?;
+    module.add_class::<flight_core::PyFlightCore>()?;
+    module.add_class::<guidance::PyGuidance>()?;
     for function in [
         wrap_pyfunction!(flight::fly, module)?,
         wrap_pyfunction!(flight::compare, module)?,

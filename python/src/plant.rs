@@ -5,7 +5,7 @@ use crate::motion::{PySetpoint, PyState};
 use crate::scenario::{ScenarioArgument, changed};
 use crate::vehicle::VehicleArgument;
 use afbc_control::Settings;
-use afbc_plant::Motion;
+use afbc_plant::{Motion, Truth};
 use afbc_scenario::Scenario;
 use afbc_sim::flight::{View, World};
 use afbc_types::{ROTORS_MAX, RotorSpeeds};
@@ -57,6 +57,13 @@ pub(crate) fn commands(speeds: &[f64], rotors: usize) -> PyResult<RotorSpeeds<RO
     }
     let speed = |i: usize| speeds.get(i).copied().unwrap_or_default() as f32;
     Ok(RotorSpeeds(SVector::from_fn(|i, _| speed(i))))
+}
+
+impl PyPlant {
+    /// The truth that instruments measure.
+    pub(crate) fn truth(&self) -> Truth {
+        self.world.plant().truth()
+    }
 }
 
 #[pymethods]

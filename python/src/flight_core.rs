@@ -1,0 +1,203 @@
+//! The flight core around a law, tick by tick.
+
+use crate::controller::{Named, PyAction, made};
+use crate::error::error;
+use crate::motion::{PySetpoint, PyState};
+use crate::vehicle::VehicleArgument;
+use afbc_control::{Action, FlightController, Mixer};
+use afbc_flight_core::{FlightCore, FlightCoreMemory, Inbox, Mode, Request, RequestAnswer, Stamped, Ticketed};
+use afbc_scenario::AnyController;
+use afbc_types::{ROTORS_MAX, with_rotors};
+use core::fmt::Debug;
+use pyo3::prelude::*;
+use std::path::PathBuf;
+use std::sync::{Mutex, PoisonError};
+
+/// Time between ticks [us].
+const TICK_US: u64 = 1000;
+
+const REQUESTS: [(&str, Request); 4] =
+    [("arm", Request::Arm), ("disarm", Request::Disarm), ("kill", Request::Kill), ("engage", Request::Engage)];
+
+/// What a tick has brought, for any number of rotors.
+struct Ticked {
+    action: Action<ROTORS_MAX>,
+    mode: Mode,
+    answer: Option<RequestAnswer>,
+    against: Vec<String>,
+    ended: Option<String>,
+}
+
+/// A flight core whose number of rotors is known when it is made.
+trait AnyCore: Send + Sync {
+    fn tick(&mut self, now_us: u64, inbox: &Inbox) -> Ticked;
+    fn airborne(&self) -> bool;
+    fn rested(&self) -> bool;
+}
+
+struct OfRotors<const N: usize> {
+    /// A law of one's own is not shared between threads.
+    core: Mutex<FlightCore<AnyController<N>, N>>,
+    mixer: Mixer<N>,
+    memory: FlightCoreMemory<<AnyController<N> as FlightController<N>>::Memory>,
+}
+
+impl<const N: usize> AnyCore for OfRotors<N> {
+    fn tick(&mut self, now_us: u64, inbox: &Inbox) -> Ticked {
+        let core = self.core.get_mut().unwrap_or_else(PoisonError::into_inner);
+        let outcome = core.tick(&mut self.memory, now_us, inbox);
+        let inputs = self.mixer.inputs(&outcome.forces);
+        let mut action = Action::new(outcome.motors, outcome.forces, inputs, false);
+        action.health = outcome.health.control;
+        Ticked {
+            action: action.padded(),
+            mode: outcome.mode,
+            answer: outcome.answer,
+            against: outcome.against.iter().map(|reason| words(&reason)).collect(),
+            ended: outcome.ended.map(|reason| words(&reason)),
+        }
+    }
+
+    fn airborne(&self) -> bool {
+        self.memory.airborne()
+    }
+
+    fn rested(&self) -> bool {
+        self.memory.rested()
+    }
+}
+
+/// A name in the sources as words: "state stale" of `StateStale`.
+pub(crate) fn words(name: &impl Debug) -> String {
+    let mut words = String::new();
+    for letter in format!("{name:?}").chars() {
+        if letter.is_uppercase() && !words.is_empty() {
+            words.push(' ');
+        }
+        words.extend(letter.to_lowercase());
+    }
+    words
+}
+
+/// The flight core of the firmware around a law, tick by tick at 1 kHz: it arms, flies, coasts and descends without
+/// states, and disarms.
+#[pyclass(name = "FlightCore", module = "afbc")]
+pub(crate) struct PyFlightCore {
+    core: Box<dyn AnyCore>,
+    rotors: usize,
+    inbox: Inbox,
+    now_us: u64,
+    ticked: Option<Ticked>,
+}
+
+#[pymethods]
+impl PyFlightCore {
+    /// Makes a flight core around the law `law` for this vehicle, the paper's if none is given, with the arming limits
+    /// and gains of the vehicle's file. `gains` sets some by name, as for `Controller`.
+    #[new]
+    #[pyo3(signature = (law="afbc", vehicle=None, *, monitored=true, gains=None))]
+    fn new(
+        law: &str,
+        vehicle: Option<VehicleArgument<'_>>,
+        monitored: bool,
+        gains: Option<Vec<(String, f64)>>,
+    ) -> PyResult<Self> {
+        let vehicle = vehicle.unwrap_or(VehicleArgument::Path(PathBuf::from("paper"))).vehicle()?;
+        let named = Named { law, profile: "flight", monitored, gains: gains.unwrap_or_default() };
+        let (contender, parameters, rotors) = made(&named, Some(&vehicle))?;
+        let nominal = parameters.to_f32();
+        let core: Box<dyn AnyCore> = with_rotors!(rotors.len(), N => {
+            let controller = contender.controller::<N>(&parameters, &rotors).map_err(error)?;
+            let mixer = *controller.mixer();
+            let core = FlightCore::with_rotors(nominal, &vehicle.response(), vehicle.arming, controller);
+            Ok::<Box<dyn AnyCore>, PyErr>(Box::new(OfRotors {
+                core: Mutex::new(core.map_err(error)?),
+                mixer,
+                memory: FlightCoreMemory::default(),
+            }))
+        })?;
+        Ok(PyFlightCore { core, rotors: rotors.len(), inbox: Inbox::EMPTY, now_us: 0, ticked: None })
+    }
+
+    /// Asks for "arm", "disarm", "kill" or "engage" (a law that has handed over) in the next step, which answers.
+    fn request(&mut self, request: &str) -> PyResult<()> {
+        let known = REQUESTS.iter().find(|(name, _)| *name == request);
+        let (_, value) = known.ok_or_else(|| {
+            let names = REQUESTS.map(|(name, _)| name).join(", ");
+            error(format!("{request}: no such request; they are {names}"))
+        })?;
+        self.inbox.request(Ticketed { value: *value, ticket: 0 });
+        Ok(())
+    }
+
+    /// Performs a tick of 1 ms with a fresh state of the vehicle's own estimate, and a setpoint, if there are any. With
+    /// `idle_on_ground`, the motors of an armed vehicle on the ground idle.
+    #[pyo3(signature = (state=None, setpoint=None, *, idle_on_ground=false))]
+    fn step(
+        &mut self,
+        state: Option<PyRef<'_, PyState>>,
+        setpoint: Option<PyRef<'_, PySetpoint>>,
+        idle_on_ground: bool,
+    ) -> PyResult<PyAction> {
+        self.now_us += TICK_US;
+        let at_us = self.now_us;
+        if let Some(state) = state.filter(|state| state.0.is_plausible()) {
+            self.inbox.locate(Stamped { value: state.0, at_us });
+        }
+        if let Some(setpoint) = setpoint {
+            self.inbox.put_setpoint(Stamped { value: setpoint.0, at_us });
+        }
+        self.inbox.set_idle_on_ground(idle_on_ground);
+        let ticked = self.core.tick(at_us, &self.inbox.take());
+        let action = PyAction::new(ticked.action, self.rotors);
+        self.ticked = Some(ticked);
+        match crate::law::take_error() {
+            Some(error) => Err(error),
+            None => Ok(action),
+        }
+    }
+
+    /// Time since power-up [s].
+    #[getter]
+    fn time_s(&self) -> f64 {
+        self.now_us as f64 * 1e-6
+    }
+
+    /// "disarmed", "flying", "coasting" (without fresh states) or "descending".
+    #[getter]
+    fn mode(&self) -> String {
+        words(&self.ticked.as_ref().map_or(Mode::Disarmed, |ticked| ticked.mode))
+    }
+
+    /// The answer of the last step to a request: "arm: granted", or why not; None if nothing was asked.
+    #[getter]
+    fn answer(&self) -> Option<String> {
+        let answer = self.ticked.as_ref()?.answer.as_ref()?;
+        let result = answer.result.map_or_else(|refusal| words(&refusal), |()| "granted".into());
+        Some(format!("{}: {result}", words(&answer.request)))
+    }
+
+    /// What speaks against arming.
+    #[getter]
+    fn against(&self) -> Vec<String> {
+        self.ticked.as_ref().map_or(Vec::new(), |ticked| ticked.against.clone())
+    }
+
+    /// Why the flight ended, if it did in the last step.
+    #[getter]
+    fn ended(&self) -> Option<String> {
+        self.ticked.as_ref()?.ended.clone()
+    }
+
+    /// True if the vehicle is in the air, as far as its motion tells.
+    #[getter]
+    fn airborne(&self) -> bool {
+        self.core.airborne()
+    }
+
+    /// True if it has been at rest for as long as arming wants it.
+    #[getter]
+    fn rested(&self) -> bool {
+        self.core.rested()
+    }
+}

@@ -1,0 +1,96 @@
+//! Instruments, reading by reading.
+
+use crate::error::error;
+use crate::plant::PyPlant;
+use crate::scenario::{ScenarioArgument, changed};
+use crate::vehicle::VehicleArgument;
+use afbc_plant::Instruments;
+use afbc_plant::instruments::ImuReading;
+use nalgebra::Vector3;
+use numpy::{PyArray1, ToPyArray};
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyList};
+
+/// The instruments of a scenario's vehicle: inertial sensor, tracker, GNSS receiver, barometer and magnetometer, those
+/// that it has, with their errors, delays and failures. They read any plant.
+#[pyclass(name = "Instruments", module = "afbc")]
+pub(crate) struct PyInstruments {
+    instruments: Instruments,
+}
+
+fn three<'py>(py: Python<'py>, vector: &Vector3<f64>) -> Bound<'py, PyArray1<f64>> {
+    [vector.x, vector.y, vector.z].to_pyarray(py)
+}
+
+fn inertial<'py>(py: Python<'py>, sample: &ImuReading) -> PyResult<Bound<'py, PyDict>> {
+    let dict = PyDict::new(py);
+    dict.set_item("at_s", sample.at_s)?;
+    dict.set_item("rates_rad_s", three(py, &sample.rates_rad_s))?;
+    dict.set_item("specific_force_m_s2", three(py, &sample.specific_force_m_s2))?;
+    Ok(dict)
+}
+
+#[pymethods]
+impl PyInstruments {
+    /// Makes the instruments of a scenario, "outdoor" if none is given, that are read every `dt_s` [s].
+    #[new]
+    #[pyo3(signature = (scenario=None, *, vehicle=None, seed=None, dt_s=0.001))]
+    fn new(
+        scenario: Option<ScenarioArgument<'_>>,
+        vehicle: Option<VehicleArgument<'_>>,
+        seed: Option<u64>,
+        dt_s: f64,
+    ) -> PyResult<Self> {
+        let scenario = scenario.unwrap_or(ScenarioArgument::Path("outdoor".into())).scenario()?;
+        let scenario = changed(scenario, vehicle.as_ref(), seed, None)?;
+        let cure = "has no instruments; give it a table [instruments], or take mocap or outdoor";
+        let instruments = scenario.instruments(dt_s).map_err(error)?;
+        let instruments = instruments.ok_or_else(|| error(format!("{}: {cure}", scenario.name)))?;
+        Ok(PyInstruments { instruments })
+    }
+
+    /// Reads them once, in the plant as it is now. Returns what arrives: "imu", a sample or None, and lists of what
+    /// each of "tracker", "gnss", "barometer" and "magnetometer" has measured, with the times for which it was true.
+    fn measure<'py>(&mut self, py: Python<'py>, plant: PyRef<'_, PyPlant>) -> PyResult<Bound<'py, PyDict>> {
+        let readings = self.instruments.measure(&plant.truth());
+        let dict = PyDict::new(py);
+        dict.set_item("imu", readings.imu.map(|sample| inertial(py, &sample)).transpose()?)?;
+        let fixes =
+            |of: Vec<PyResult<Bound<'py, PyDict>>>| PyList::new(py, of.into_iter().collect::<PyResult<Vec<_>>>()?);
+        let tracker = readings.tracker.iter().map(|fix| {
+            let dict = PyDict::new(py);
+            dict.set_item("true_at_s", fix.true_at_s)?;
+            dict.set_item("position_m", three(py, &fix.position_m))?;
+            let [x, y, z, w]: [f64; 4] = fix.attitude.coords.into();
+            dict.set_item("attitude", [w, x, y, z].to_pyarray(py))?;
+            Ok(dict)
+        });
+        dict.set_item("tracker", fixes(tracker.collect())?)?;
+        let gnss = readings.gnss.iter().map(|fix| {
+            let dict = PyDict::new(py);
+            dict.set_item("true_at_s", fix.true_at_s)?;
+            dict.set_item("position_m", three(py, &fix.position_m))?;
+            dict.set_item("velocity_m_s", three(py, &fix.velocity_m_s))?;
+            dict.set_item("horizontal_sigma_m", fix.horizontal_sigma_m)?;
+            dict.set_item("vertical_sigma_m", fix.vertical_sigma_m)?;
+            dict.set_item("velocity_sigma_m_s", fix.velocity_sigma_m_s)?;
+            Ok(dict)
+        });
+        dict.set_item("gnss", fixes(gnss.collect())?)?;
+        let barometer = readings.barometer.iter().map(|fix| {
+            let dict = PyDict::new(py);
+            dict.set_item("true_at_s", fix.true_at_s)?;
+            dict.set_item("height_m", fix.height_m)?;
+            Ok(dict)
+        });
+        dict.set_item("barometer", fixes(barometer.collect())?)?;
+        let magnetometer = readings.magnetometer.iter().map(|fix| {
+            let dict = PyDict::new(py);
+            dict.set_item("true_at_s", fix.true_at_s)?;
+            dict.set_item("field_ut", three(py, &fix.field_ut))?;
+            Ok(dict)
+        });
+        dict.set_item("magnetometer", fixes(magnetometer.collect())?)?;
+        Ok(dict)
+    }
+}
