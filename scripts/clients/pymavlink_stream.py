@@ -62,11 +62,13 @@ def whole(log):
 
 
 def command(link, number):
-    link.mav.command_long_send(1, 1, number, 0, *[0.0] * 7)
-    while True:
-        answer = link.recv_match(type="COMMAND_ACK", blocking=True, timeout=PATIENCE)
-        if answer is None or answer.command == number:
-            return answer and answer.result
+    """Commands until it is answered, as MAVLink has it: beside a stream, answers get lost in the system's buffers."""
+    for confirmation in range(5):
+        link.mav.command_long_send(1, 1, number, confirmation, *[0.0] * 7)
+        while answer := link.recv_match(type="COMMAND_ACK", blocking=True, timeout=PATIENCE / 5):
+            if answer.command == number:
+                return answer.result
+    return None
 
 
 def stream(link):
