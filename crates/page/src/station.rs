@@ -1,8 +1,8 @@
 //! The page as a ground station: what it asks of the vehicle by messages, and what it hears.
 
 use afbc_link::{
-    Address, Answer, Command, Decoder, Downlink, ExternalTarget, FRAME_MAX, Mission, MissionItem, MissionResult,
-    ParameterRequest, Plan, PositionTarget, Sender, Uplink,
+    Address, Answer, Command, Decoder, Downlink, ExternalTarget, FRAME_MAX, MavCmd, Mission, MissionItem,
+    MissionResult, ParameterRequest, Plan, PositionTarget, Sender, Uplink,
 };
 use afbc_onboard::parameters::Kind;
 use afbc_serve::Server;
@@ -24,13 +24,13 @@ const PATIENCE_MS: u64 = 3_000;
 const HEARD: [u32; 7] = [77, 253, 40, 51, 47, 22, 345];
 /// Commands by number, in words.
 const NAMES: [(u16, &str); 8] = [
-    (400, "arm or disarm"),
-    (22, "take off"),
-    (21, "land"),
-    (20, "return"),
-    (176, "mode"),
-    (192, "go to"),
-    (300, "start mission"),
+    (MavCmd::MAV_CMD_COMPONENT_ARM_DISARM as u16, "arm or disarm"),
+    (MavCmd::MAV_CMD_NAV_TAKEOFF as u16, "take off"),
+    (MavCmd::MAV_CMD_NAV_LAND as u16, "land"),
+    (MavCmd::MAV_CMD_NAV_RETURN_TO_LAUNCH as u16, "return"),
+    (MavCmd::MAV_CMD_DO_SET_MODE as u16, "mode"),
+    (MavCmd::MAV_CMD_DO_REPOSITION as u16, "go to"),
+    (MavCmd::MAV_CMD_MISSION_START as u16, "start mission"),
     (31_010, "engage"),
 ];
 

@@ -157,6 +157,7 @@ impl Layout {
                 None => 1,
             };
             for index in 0..count {
+                let before = reader.at;
                 let name = match field.many {
                     Some(_) => format!("{prefix}{}[{index}]", field.name),
                     None => format!("{prefix}{}", field.name),
@@ -170,6 +171,10 @@ impl Layout {
                         }
                     }
                     other => self.message(last(other), &format!("{name}."), reader, values, depth + 1)?,
+                }
+                // However many there are said to be: what takes no room has no number.
+                if reader.at == before {
+                    break;
                 }
             }
         }
