@@ -1,6 +1,7 @@
 //! Six subsystems in one cascade: position gives thrust and desired attitude, attitude gives U1..U3, and all give rotor
 //! speeds. Section III-D, Fig. 2.
 
+use crate::ahead::Ahead;
 use crate::desired::{DesiredAttitude, DesiredMemory, DesiredRollPitch};
 use crate::disturbance::{ForceObserver, ForceObserverMemory, MomentObserver, Turning};
 use crate::effort::Effort;
@@ -29,10 +30,12 @@ pub struct Controller<L, const N: usize = 4> {
     approach: [Approach; 3],
     desired: DesiredAttitude,
     smoother: Smoother,
+    ahead: Ahead,
     effort: Effort,
     mixer: Mixer<N>,
     settings: Settings,
     weight_n: f32,
+    mass_kg: f32,
     /// Largest thrust of all rotors together \[N\].
     thrust_max_n: f32,
 }
@@ -74,6 +77,8 @@ pub(crate) struct Filters {
     moments: Option<Turning>,
     desired: DesiredMemory,
     smoothed: Option<Smoothed>,
+    /// See [`Ahead`].
+    late: Option<Vector3<f32>>,
     /// See [`Effort`].
     more_effort: f32,
     standstill: Standstill,
@@ -133,9 +138,11 @@ impl<L: Law, const N: usize> Controller<L, N> {
             reference: ReferenceFilter::new(&settings.reference, limits, dt_s),
             desired: DesiredAttitude::new(&settings, vehicle.parameters.gravity_m_s2, thrust_max_n)?,
             smoother: Smoother::new(&settings.smoothing, dt_s)?,
+            ahead: Ahead::new(disturbance.disturbance_lag_s, &settings.smoothing, settings.command_filter_rad_s, dt_s),
             effort: Effort::new(vehicle.parameters.weight_n(), dt_s),
             settings,
             weight_n: vehicle.parameters.weight_n(),
+            mass_kg: vehicle.parameters.mass_kg,
             thrust_max_n,
             mixer,
         })
@@ -186,7 +193,11 @@ impl<L: Law, const N: usize> Controller<L, N> {
         let attitude = Attitude::of(state);
         let share = math::max(last.asked.thrust_n, 0.0) / hover_n;
         let observed_m_s2 = self.observe_forces(&mut filters.forces, state, &attitude, hover_n, [fresh, stands]);
-        let observed_rad_s2 = self.observe_moments(&mut filters.moments, state, &attitude, share, [fresh, stands]);
+        let gyroscopic_rad_s2 = self.model.gyroscopic(&state.rates_rad_s, *rotor_residual_rad_s);
+        let velocity_body_m_s = attitude.in_body(&state.velocity_m_s);
+        let known_rad_s2 = gyroscopic_rad_s2 + self.drag_turns(&velocity_body_m_s, share);
+        let observed_rad_s2 =
+            self.observe_moments(&mut filters.moments, &state.rates_rad_s, &known_rad_s2, [fresh, stands]);
         let context = Context {
             state,
             roll_pitch: attitude.roll_pitch,
@@ -195,7 +206,6 @@ impl<L: Law, const N: usize> Controller<L, N> {
             adapt: fresh && !stands,
             unallocated: &last.unallocated,
             observed_m_s2,
-            turns_observed: self.moments.is_some(),
             known: self.settings.feed_forward.then_some(&self.model),
         };
         let eta_dot = self.eta_dot(state, &attitude);
@@ -206,13 +216,18 @@ impl<L: Law, const N: usize> Controller<L, N> {
         let followed = [&reference, setpoint];
         let desired = self.desired.advance(&mut filters.desired, [u5, u6, u4], hover_n, &attitude, followed);
         // Attitude: subsystems 1, 2, 3.
-        let turn = self.turn(&desired, &reference, &attitude, state);
+        let mut turn = self.turn(&desired, &reference, &attitude, state);
+        if self.settings.feed_forward {
+            turn.accelerations += self.ahead.advance(&mut filters.late, &turn.desired_accelerations);
+        }
         let [u1, u2, u3] = self.attitude(&turn, [&state.attitude_rad, &eta_dot], &context, estimates, &mut last.errors);
 
         // Rotors, which also make up for the moments as they will be when they have followed.
-        let ahead_m_s = state.velocity_m_s + reference.acceleration_m_s2 * self.settings.disturbance.disturbance_lag_s;
-        let against = self.make_up(&observed_rad_s2, &attitude, &ahead_m_s, share, stands);
-        let (asked, effort) = self.asked(filters, [u1, u2, u3, u4], against, hover_n, stands);
+        let change = attitude.in_body(&reference.acceleration_m_s2) - state.rates_rad_s.cross(&velocity_body_m_s);
+        let ahead_m_s = velocity_body_m_s + change * self.settings.disturbance.disturbance_lag_s;
+        let against = self.make_up(&observed_rad_s2, &ahead_m_s, share, stands);
+        let ahead_n = self.mass_kg * self.ahead.thrust_s * desired.thrust_m_s3;
+        let (asked, effort) = self.asked(filters, [u1, u2, u3, u4 + ahead_n], against, hover_n, stands);
         let allocation = self.mixer.allocate(&asked);
         let action = self.mixer.carry_out(&allocation);
 
@@ -272,21 +287,27 @@ impl<L: Law, const N: usize> Controller<L, N> {
         }
     }
 
-    /// Returns f of roll, pitch and yaw as observed \[rad/s2\] at `share` of the hover thrust; likewise.
+    /// Returns the angular acceleration by the drag of the rotors \[rad/s2\] at this velocity, in the body's axes, and
+    /// `share` of the hover thrust; zero without an observer of moments.
+    #[inline(always)]
+    fn drag_turns(&self, velocity_body_m_s: &Vector3<f32>, share: f32) -> Vector3<f32> {
+        match &self.moments {
+            Some(moments) => moments.turns(&self.settings.common.drag.moment(velocity_body_m_s, share)),
+            None => Vector3::zeros(),
+        }
+    }
+
+    /// Returns f of roll, pitch and yaw as observed \[rad/s2\], beside what is known; likewise.
     #[inline(always)]
     fn observe_moments(
         &self,
         observed: &mut Option<Turning>,
-        state: &State,
-        attitude: &Attitude,
-        share: f32,
+        rates_rad_s: &Vector3<f32>,
+        known_rad_s2: &Vector3<f32>,
         fresh_stands: [bool; 2],
     ) -> Vector3<f32> {
         match &self.moments {
-            Some(moments) => {
-                let known = self.settings.common.drag.moment(&attitude.in_body(&state.velocity_m_s), share);
-                moments.advance(observed, &state.rates_rad_s, &known, fresh_stands)
-            }
+            Some(moments) => moments.advance(observed, rates_rad_s, known_rad_s2, fresh_stands),
             None => {
                 *observed = None;
                 Vector3::zeros()
@@ -370,7 +391,7 @@ impl<L: Law, const N: usize> Controller<L, N> {
         estimates: &mut PerAxis<L::Estimate>,
         errors: &mut PerAxis<Errors>,
     ) -> [f32; 3] {
-        let Turn { error, rates, accelerations } = turn;
+        let Turn { error, rates, accelerations, .. } = turn;
         let track = |x1, x2, e1, x1d_dot, x1d_ddot| Tracking { x1, x2, e1, x1d_dot, x1d_ddot, approach_1_s: None };
         let roll = track(eta.x, eta_dot.x, error.x, rates.x, accelerations.x);
         let pitch = track(eta.y, eta_dot.y, error.y, rates.y, accelerations.y);
@@ -382,20 +403,19 @@ impl<L: Law, const N: usize> Controller<L, N> {
         ]
     }
 
-    /// Returns U1..U3 \[N\] that make up for the observed moments, and for that of the drag at this velocity.
+    /// Returns U1..U3 \[N\] that make up for the observed moments, and for that of the drag at this velocity in
+    /// the body's axes.
     #[inline(always)]
     fn make_up(
         &self,
         observed_rad_s2: &Vector3<f32>,
-        attitude: &Attitude,
-        velocity_m_s: &Vector3<f32>,
+        velocity_body_m_s: &Vector3<f32>,
         share: f32,
         stands: bool,
     ) -> [f32; 3] {
         let Some(moments) = &self.moments else { return [0.0; 3] };
-        let drag = &self.settings.common.drag;
-        let known = if stands { Vector3::zeros() } else { drag.moment(&attitude.in_body(velocity_m_s), share) };
-        moments.against(observed_rad_s2, &known)
+        let known = if stands { Vector3::zeros() } else { self.drag_turns(velocity_body_m_s, share) };
+        moments.against(&(observed_rad_s2 + known))
     }
 
     /// Returns U1..U4 \[N\] for the mixer: behind the filters, with what makes up for moments, and `effort` times as

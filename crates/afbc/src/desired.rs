@@ -22,8 +22,9 @@ pub const VERTICAL_MIN: f32 = 0.3;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DesiredAttitude {
     filter: CommandFilter,
-    /// Lag 1/w of the command filter \[s\].
+    /// Lag 1/w of the command filter \[s\], and that of its command, which is held for a step.
     lag_s: f32,
+    half_step_s: f32,
     forward: Forward,
     drag: KnownDrag,
     gravity_m_s2: f32,
@@ -80,6 +81,8 @@ pub struct DesiredRollPitch {
     pub accelerations_rad_s2: [f32; 2],
     /// Sine and cosine of the yaw that they are meant for.
     pub heading: [f32; 2],
+    /// How the thrust per mass changes as the reference does \[m/s3\].
+    pub thrust_m_s3: f32,
     /// Part of u5, u6 beyond the limits of tilt and acceleration \[m/s2\].
     pub beyond_limits_m_s2: [f32; 2],
 }
@@ -111,6 +114,7 @@ impl DesiredAttitude {
             forward: Forward::new(settings.forward_rad_s, dt_s)?,
             filter: CommandFilter::new(command_filter_rad_s, dt_s)?.limited(limits.tilt_rate_max_rad_s)?,
             lag_s: 1.0 / command_filter_rad_s,
+            half_step_s: 0.5 * dt_s,
             drag: settings.common.drag,
             gravity_m_s2,
             inverse_gravity: 1.0 / gravity_m_s2,
@@ -153,7 +157,7 @@ impl DesiredAttitude {
             None
         };
         let commanded = match forward {
-            Some(derivatives) => self.ahead(tilt.rad, derivatives),
+            Some((derivatives, _)) => self.ahead(tilt.rad, derivatives),
             None => tilt.rad,
         };
         let filtered = match &memory.last {
@@ -166,14 +170,21 @@ impl DesiredAttitude {
             }
         };
         let accelerations_rad_s2 = match forward {
-            Some([_, accelerations]) => accelerations,
+            Some(([_, accelerations], _)) => accelerations,
             None => {
                 let ([roll, pitch], [phi_d, theta_d]) = (&filtered, commanded);
                 [self.filter.acceleration(roll, phi_d), self.filter.acceleration(pitch, theta_d)]
             }
         };
         memory.last = Some(LastAngles { rad: tilt.rad, commanded, filtered });
-        DesiredRollPitch { filtered, accelerations_rad_s2, heading, beyond_limits_m_s2: [u5 - a5, u6 - a6] }
+        let thrust_m_s3 = forward.map_or(0.0, |(_, thrust_m_s3)| thrust_m_s3);
+        DesiredRollPitch {
+            filtered,
+            accelerations_rad_s2,
+            heading,
+            thrust_m_s3,
+            beyond_limits_m_s2: [u5 - a5, u6 - a6],
+        }
     }
 
     /// Returns the vertical part of the thrust per mass \[m/s2\], g in hover as in (39), and its inverse.
@@ -188,7 +199,7 @@ impl DesiredAttitude {
     }
 
     /// Returns the first and second derivatives of roll and pitch \[rad/s, rad/s2\] that follow from the reference, at
-    /// `share` of the hover thrust along `up`.
+    /// `share` of the hover thrust along `up`, and the first of the thrust per mass \[m/s3\].
     #[inline(always)]
     fn derivatives(
         &self,
@@ -197,25 +208,29 @@ impl DesiredAttitude {
         share: f32,
         up: &Vector3<f32>,
         [reference, setpoint]: [&Setpoint; 2],
-    ) -> [[f32; 2]; 2] {
+    ) -> ([[f32; 2]; 2], f32) {
         let Setpoint { velocity_m_s: v, acceleration_m_s2: a, jerk_m_s3: jerk, .. } = reference;
-        // Drag turns the thrust as it changes with the velocity.
-        let [by_drag, by_drag_dot] = [self.drag.change(v, up, share, a), self.drag.change(v, up, share, jerk)];
         let turn = [reference.yaw_rate_rad_s, reference.yaw_acceleration_rad_s2];
         // Corners of the setpoint are turned gradually; the reference model has none.
         let [followed, snap] = self.forward.advance(followed, setpoint);
         let gradual = followed + (jerk - setpoint.jerk_m_s3);
-        let snap = snap - by_drag_dot;
-        let [rates, _] = tilt.turned(&(jerk - by_drag), &snap, turn);
-        let [_, accelerations] = tilt.turned(&(gradual - by_drag), &snap, turn);
-        [rates, accelerations]
+        // Drag turns the thrust as it changes with the velocity.
+        let thrust = [share, share * self.gravity_m_s2];
+        let [turning, snap] = self.drag.followed(v, up, thrust, [a, jerk, &snap]);
+        let thrust_m_s3 = up.dot(&turning);
+        // What a step adds along z turns nothing: a_z may fall to little, and its snap is not known.
+        let turning = turning - Vector3::z() * (jerk.z - setpoint.jerk_m_s3.z);
+        let [rates, _] = tilt.turned(&turning, &snap, turn);
+        let [_, accelerations] = tilt.turned(&(turning + (gradual - jerk)), &snap, turn);
+        ([rates, accelerations], thrust_m_s3)
     }
 
     /// Returns angles that are ahead of these by the lag of the command filter; no tilt exceeds the norm of both.
     #[inline(always)]
     fn ahead(&self, mut rad: [f32; 2], [rates, accelerations]: [[f32; 2]; 2]) -> [f32; 2] {
         for ((angle, rate), acceleration) in rad.iter_mut().zip(rates).zip(accelerations) {
-            *angle += self.lag_s * (2.0 * rate + self.lag_s * acceleration);
+            let late_s = self.lag_s + self.half_step_s;
+            *angle += (self.lag_s + late_s) * rate + self.lag_s * late_s * acceleration;
         }
         within(rad, self.tilt_max_rad)
     }

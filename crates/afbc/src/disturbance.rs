@@ -215,8 +215,9 @@ pub struct MomentObserver {
     /// Corrections of Omega_hat \[1\] and f_hat \[1/s\] per step.
     rate: Vector3<f32>,
     acceleration: Vector3<f32>,
-    /// Share of the inputs that is replaced per step.
+    /// Share of the inputs that is replaced per step, and of what is known.
     lag: f32,
+    age: f32,
     dt_s: f32,
     /// g of roll, pitch and yaw.
     effectiveness: Vector3<f32>,
@@ -236,6 +237,8 @@ pub struct Turning {
     acceleration_rad_s2: Vector3<f32>,
     /// g U \[rad/s2\]
     given_rad_s2: Vector3<f32>,
+    /// What is known, as old as the rates \[rad/s2\].
+    known_rad_s2: Vector3<f32>,
 }
 
 impl MomentObserver {
@@ -253,6 +256,7 @@ impl MomentObserver {
             rate: rest * 2.0,
             acceleration: rest.map(|rest| rest * rest / dt_s),
             lag: 1.0 - math::exp(-dt_s / lag_s),
+            age: 1.0 - math::exp(-dt_s / AGE_S),
             dt_s,
             effectiveness,
             per_moment: vehicle.inertia_kg_m2.map(|inertia| vehicle.mass_kg / inertia),
@@ -263,8 +267,8 @@ impl MomentObserver {
         })
     }
 
-    /// Returns f_hat of roll, pitch and yaw \[rad/s2\] for these rates, beside a `known` moment per mass \[m2/s2\], and
-    /// advances it by one step if they are `fresh`; zero of a vehicle that `stands` on the ground.
+    /// Returns f_hat of roll, pitch and yaw \[rad/s2\] for these rates, beside what is `known` \[rad/s2\], and advances
+    /// it by one step if they are `fresh`; zero of a vehicle that `stands` on the ground.
     #[inline]
     pub fn advance(
         &self,
@@ -274,7 +278,8 @@ impl MomentObserver {
         [fresh, stands]: [bool; 2],
     ) -> Vector3<f32> {
         let zero = Vector3::zeros();
-        let start = Turning { rates_rad_s: *rates_rad_s, acceleration_rad_s2: zero, given_rad_s2: zero };
+        let start =
+            Turning { rates_rad_s: *rates_rad_s, acceleration_rad_s2: zero, given_rad_s2: zero, known_rad_s2: *known };
         let turning = turning.get_or_insert(start);
         if stands {
             *turning = start;
@@ -283,8 +288,8 @@ impl MomentObserver {
         if !fresh {
             return turning.acceleration_rad_s2;
         }
-        let known = known.component_mul(&self.per_moment);
-        let Turning { rates_rad_s: omega_hat, acceleration_rad_s2: f_hat, given_rad_s2: given } = turning;
+        let Turning { rates_rad_s: omega_hat, acceleration_rad_s2: f_hat, given_rad_s2: given, known_rad_s2 } = turning;
+        *known_rad_s2 = (*known_rad_s2 + (known - *known_rad_s2) * self.age).map(math::settled);
         let off = rates_rad_s - *omega_hat;
         let found =
             f_hat.zip_zip_map(&self.acceleration.component_mul(&off), &self.acceleration_max, |f, more, most| {
@@ -294,14 +299,20 @@ impl MomentObserver {
         *f_hat = within.zip_zip_map(f_hat, &found, |within, before, found| if within { found } else { before });
         let corrected = *omega_hat + self.rate.component_mul(&off);
         let start = within.zip_zip_map(&corrected, rates_rad_s, |within, to, jumped| if within { to } else { jumped });
-        *omega_hat = (start + (*given + known + *f_hat) * self.dt_s).map(math::settled);
+        *omega_hat = (start + (*given + *known_rad_s2 + *f_hat) * self.dt_s).map(math::settled);
         *f_hat
     }
 
-    /// Returns U1..U3 \[N\] that make up for f_hat and a known moment per mass.
+    /// Returns the angular acceleration by a moment per mass \[m2/s2\].
     #[inline]
-    pub fn against(&self, f_hat_rad_s2: &Vector3<f32>, known: &Vector3<f32>) -> [f32; 3] {
-        (f_hat_rad_s2 + known.component_mul(&self.per_moment)).component_mul(&self.ineffectiveness).into()
+    pub fn turns(&self, moment_m2_s2: &Vector3<f32>) -> Vector3<f32> {
+        moment_m2_s2.component_mul(&self.per_moment)
+    }
+
+    /// Returns U1..U3 \[N\] that make up for an angular acceleration.
+    #[inline]
+    pub fn against(&self, acceleration_rad_s2: &Vector3<f32>) -> [f32; 3] {
+        acceleration_rad_s2.component_mul(&self.ineffectiveness).into()
     }
 
     /// Notes U1..U3 that the rotors are commanded to give in this step \[N\], `effort` times as large as for the

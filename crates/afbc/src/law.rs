@@ -51,8 +51,6 @@ pub struct Context<'a> {
     /// f of x, y and z by drag and, of x and y, as observed by [`crate::disturbance`] \[m/s2\]; zero without an
     /// observer.
     pub observed_m_s2: Vector3<f32>,
-    /// True if f of roll, pitch and yaw is observed, and made up for behind the law.
-    pub turns_observed: bool,
     /// Nominal model that the law may use; none for the law as printed.
     pub known: Option<&'a ModelConstants>,
 }
@@ -64,8 +62,8 @@ impl Context<'_> {
         model.dynamics_at(axis, &self.state.rates_rad_s, &self.roll_pitch, self.rotor_residual_rad_s)
     }
 
-    /// Returns the same, with f as observed: of x and y, which the model takes for zero; that of roll, pitch and yaw is
-    /// left to the observer of moments.
+    /// Returns the same, with f of x, y and z as observed. What is observed of roll, pitch and yaw is made up for behind
+    /// the law.
     #[inline(always)]
     pub(crate) fn observed(&self, model: &ModelConstants, axis: Axis) -> Dynamics {
         let dynamics = self.dynamics(model, axis);
@@ -73,7 +71,6 @@ impl Context<'_> {
         match axis {
             Axis::X => Dynamics { f: x, ..dynamics },
             Axis::Y => Dynamics { f: y, ..dynamics },
-            Axis::Roll | Axis::Pitch | Axis::Yaw if self.turns_observed => Dynamics { f: 0.0, ..dynamics },
             Axis::Roll | Axis::Pitch | Axis::Yaw => dynamics,
             Axis::Z => Dynamics { f: dynamics.f + z, ..dynamics },
         }

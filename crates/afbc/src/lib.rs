@@ -37,6 +37,7 @@
 #![no_std]
 
 pub mod adaptive;
+pub mod ahead;
 pub mod backstepping;
 pub mod cascade;
 pub mod desired;

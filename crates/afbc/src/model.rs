@@ -209,14 +209,24 @@ impl ModelConstants {
         0.5 * errors.e1 * errors.e1 + 0.5 * errors.e2 * errors.e2 / self.dynamics(axis, state, 0.0).g
     }
 
-    /// The same, for given rates and angles.
+    /// Returns f of roll, pitch and yaw \[rad/s2\]: how a body with these rates, and its rotors, turn without a moment.
+    #[inline(always)]
+    pub(crate) fn gyroscopic(&self, rates: &Vector3<f32>, omega: f32) -> Vector3<f32> {
+        Vector3::new(
+            rates.y * rates.z * self.a1 + rates.y * self.a2 * omega,
+            rates.x * rates.z * self.a3 + rates.x * self.a4 * omega,
+            rates.x * rates.y * self.a5,
+        )
+    }
+
+    /// Returns the same as [`ModelConstants::dynamics`], for given rates and angles.
     #[inline(always)]
     pub(crate) fn dynamics_at(&self, axis: Axis, rates: &Vector3<f32>, at: &RollPitch, omega: f32) -> Dynamics {
         let constant = |f, g| Dynamics { f, g, g_dot: 0.0 };
         match axis {
-            Axis::Roll => constant(rates.y * rates.z * self.a1 + rates.y * self.a2 * omega, self.b1),
-            Axis::Pitch => constant(rates.x * rates.z * self.a3 + rates.x * self.a4 * omega, self.b2),
-            Axis::Yaw => constant(rates.x * rates.y * self.a5, self.b3),
+            Axis::Roll => constant(self.gyroscopic(rates, omega).x, self.b1),
+            Axis::Pitch => constant(self.gyroscopic(rates, omega).y, self.b2),
+            Axis::Yaw => constant(self.gyroscopic(rates, omega).z, self.b3),
             Axis::Z => {
                 let RollPitch { sin_phi, cos_phi, sin_theta, cos_theta } = *at;
                 let tilt_cosine_dot = -sin_phi * cos_theta * rates.x - cos_phi * sin_theta * rates.y;

@@ -30,6 +30,8 @@ pub struct Turn {
     pub rates: Vector3<f32>,
     /// d^2 x_1d/dt^2 \[rad/s2\].
     pub accelerations: Vector3<f32>,
+    /// What of it is R_e dOmega_d/dt, without the body's rates \[rad/s2\].
+    pub desired_accelerations: Vector3<f32>,
 }
 
 impl Turn {
@@ -47,7 +49,9 @@ impl Turn {
         let omega_d = desired.body_rates(eta_dot);
         let omega_d_dot = desired.body_accelerations(&omega_d, eta_dot, eta_ddot);
         let rates = to_body * omega_d;
-        Turn { error: error(&to_body), rates, accelerations: to_body * omega_d_dot - omega.cross(&rates) }
+        let desired_accelerations = to_body * omega_d_dot;
+        let accelerations = desired_accelerations - omega.cross(&rates);
+        Turn { error: error(&to_body), rates, accelerations, desired_accelerations }
     }
 
     /// Returns the same as differences of Euler angles (9), yaw the shorter way, as the paper has it.
@@ -59,7 +63,7 @@ impl Turn {
         eta_d_ddot: Vector3<f32>,
     ) -> Self {
         let error = Vector3::new(eta_d.x - eta.x, eta_d.y - eta.y, math::wrap_angle(eta_d.z - eta.z));
-        Turn { error, rates: eta_d_dot, accelerations: eta_d_ddot }
+        Turn { error, rates: eta_d_dot, accelerations: eta_d_ddot, desired_accelerations: eta_d_ddot }
     }
 }
 

@@ -51,8 +51,7 @@ impl Tilt {
         }
     }
 
-    /// Returns the first and second derivatives of roll and pitch for those of the acceleration and of yaw, with a_z
-    /// held: where it falls to little, as after a step, its derivatives would ask for more than rotors give.
+    /// Returns the first and second derivatives of roll and pitch for those of the acceleration and of yaw.
     ///
     /// `jerk` \[m/s3\] and `snap` \[m/s4\] are those of the acceleration, `turn` and `turn_dot` those of yaw \[rad/s,
     /// rad/s2\].
@@ -61,6 +60,10 @@ impl Tilt {
         let Tilt { sin_psi, cos_psi, slopes: [aside, ahead], tan_phi, cos2_phi, cos_theta, cos2_theta, .. } = *self;
         let heading = |v: &Vector3<f32>| [v.x * sin_psi - v.y * cos_psi, v.x * cos_psi + v.y * sin_psi];
         let ([j1, j2], [s1, s2], over) = (heading(jerk), heading(snap), self.inverse_vertical);
+        // a_z changes as well.
+        let [j1, j2] = [j1 - aside * jerk.z, j2 - ahead * jerk.z];
+        let twice = 2.0 * over * jerk.z;
+        let [s1, s2] = [s1 - aside * snap.z - twice * j1, s2 - ahead * snap.z - twice * j2];
         // The heading turns as well.
         let aside_dot = j1 * over + turn * ahead;
         let ahead_dot = j2 * over - turn * aside;

@@ -102,6 +102,8 @@ struct Carried {
     filtered: Option<[Filtered; 2]>,
     /// What is taken up of jumps of the jerk, along x and y, with its rate; and the jerk expected next.
     followed: Option<([[f64; 2]; 2], [f64; 2])>,
+    /// Second derivatives of roll, pitch and yaw behind the low-pass of what is ahead.
+    late: Option<[f64; 3]>,
     unallocated: PerAxis<f32>,
     rotor_residual_rad_s: f32,
 }
@@ -134,10 +136,19 @@ fn compose<L: Law + Copy>(
             adapt: true,
             unallocated: &carried.unallocated,
             observed_m_s2: Vector3::zeros(),
-            turns_observed: false,
             known: settings.feed_forward.then_some(&model),
         };
+        // The thrust is ahead by the rotors' lag, since there are no filters, as the reference changes it.
+        let lag_s = f64::from(settings.disturbance.disturbance_lag_s);
+        let up = Rotation3::from_euler_angles(
+            f64::from(state.attitude_rad.x),
+            f64::from(state.attitude_rad.y),
+            f64::from(state.attitude_rad.z),
+        ) * Vector3::z();
+        let along_thrust = up.dot(&setpoint.jerk_m_s3.cast());
+        let ahead_n = if settings.feed_forward { lag_s * along_thrust * WEIGHT_N / GRAVITY_M_S2 } else { 0.0 };
         let seen = command.per_axis();
+        let seen = PerAxis { z: (f64::from(seen.z) - ahead_n) as f32, ..seen };
         let mut check = |axis: Axis, tracking: Tracking, [error_slack, input_slack]: [f64; 2]| {
             let (u, errors) = law.input(axis, &tracking, &context, &mut estimates[axis]);
             let got = trace.errors[axis];
@@ -164,7 +175,9 @@ fn compose<L: Law + Copy>(
                 x1d_ddot: setpoint.acceleration_m_s2[index],
                 approach_1_s: None,
             };
-            check(axis, tracking, [0.0; 2])?;
+            let turned = ROTATION * lag_s * f64::from(setpoint.jerk_m_s3.norm());
+            let slack = if axis == Axis::Z && settings.feed_forward { turned } else { 0.0 };
+            check(axis, tracking, [0.0, slack])?;
         }
 
         // Desired attitude (39), (40), within the limits.
@@ -189,12 +202,13 @@ fn compose<L: Law + Copy>(
 
         // Ahead of the filter by its lag, with the derivatives that follow from jerk and snap.
         let w = f64::from(settings.command_filter_rad_s);
-        // (40) differentiated with the thrust held, along a path through jerk and snap, while yaw turns.
+        // (40) differentiated along a path through jerk and snap, while yaw turns.
         let along = |t: f64, [jerk, snap]: [[f64; 2]; 2]| {
             let by = |i: usize| jerk[i] * t + snap[i] * (0.5 * t * t);
             let turn =
                 f64::from(setpoint.yaw_rate_rad_s) * t + f64::from(setpoint.yaw_acceleration_rad_s2) * (0.5 * t * t);
-            leaning([ahead[0] + by(0), ahead[1] + by(1)], vertical, eta.z + turn)
+            let rising = f64::from(setpoint.jerk_m_s3.z) * t + f64::from(setpoint.snap_m_s4.z) * (0.5 * t * t);
+            leaning([ahead[0] + by(0), ahead[1] + by(1)], vertical + rising, eta.z + turn)
         };
         let of = |v: &Vector3<f32>| [0, 1].map(|i| f64::from(v[i]));
         let (j, s) = (of(&setpoint.jerk_m_s3), of(&setpoint.snap_m_s4));
@@ -216,7 +230,9 @@ fn compose<L: Law + Copy>(
         let mut commanded = angles;
         if settings.feed_forward {
             let rates = [0, 1].map(|i| (after[i] - before[i]) / (2.0 * STEP_S));
-            commanded = [0, 1].map(|i| angles[i] + 2.0 * rates[i] / w + forward[i] / (w * w));
+            // Its command is held for a step, which is half of one late.
+            let (lag, late) = (1.0 / w, 1.0 / w + 0.5e-3);
+            commanded = [0, 1].map(|i| angles[i] + (lag + late) * rates[i] + lag * late * forward[i]);
             let size = commanded[0].hypot(commanded[1]);
             commanded = commanded.map(|angle| angle * (tilt_max / size).min(1.0));
         }
@@ -240,6 +256,14 @@ fn compose<L: Law + Copy>(
             true => [2.0 * ROTATION, 2.0 * ROTATION * 12.0],
             false => [0.0, 4e-7 * w * w / 65.0],
         };
+        // Ahead of the rotors, too.
+        let yaw_acceleration = f64::from(setpoint.yaw_acceleration_rad_s2);
+        let wanted = [forward[0], forward[1], yaw_acceleration];
+        let before = carried.late.unwrap_or(wanted);
+        let share = 1.0 - (-w * 1e-3).exp();
+        let early = [0, 1, 2].map(|i| wanted[i] + lag_s * share / 1e-3 * (wanted[i] - before[i]));
+        let early = if settings.feed_forward { early } else { wanted };
+        carried.late = Some([0, 1, 2].map(|i| before[i] + (wanted[i] - before[i]) * share));
         for (i, axis) in [Axis::Roll, Axis::Pitch].into_iter().enumerate() {
             let Filtered { angle, rate } = trace.filtered[i];
             let filter = w * w * (commanded[i] - f64::from(angle)) - 2.0 * w * f64::from(rate);
@@ -248,7 +272,7 @@ fn compose<L: Law + Copy>(
                 x2: turning[i] as f32,
                 e1: angle - state.attitude_rad[i],
                 x1d_dot: rate,
-                x1d_ddot: if settings.feed_forward { forward[i] } else { filter } as f32,
+                x1d_ddot: if settings.feed_forward { early[i] } else { filter } as f32,
                 approach_1_s: None,
             };
             check(axis, tracking, slack)?;
@@ -259,7 +283,7 @@ fn compose<L: Law + Copy>(
             x2: turning.z as f32,
             e1: (turn - core::f64::consts::TAU * (turn / core::f64::consts::TAU).round()) as f32,
             x1d_dot: setpoint.yaw_rate_rad_s,
-            x1d_ddot: setpoint.yaw_acceleration_rad_s2,
+            x1d_ddot: early[2] as f32,
             approach_1_s: None,
         };
         check(Axis::Yaw, tracking, slack)?;

@@ -47,7 +47,6 @@ fn step(gains: Gains, tracking: &Tracking, unallocated: f32, adapt: bool, integr
         adapt,
         unallocated: &PerAxis { x: unallocated, ..PerAxis::default() },
         observed_m_s2: Vector3::zeros(),
-        turns_observed: false,
         known: None,
     };
     let (u, errors) = law.input(Axis::X, tracking, &context, integral);

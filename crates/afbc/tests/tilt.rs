@@ -23,10 +23,9 @@ proptest! {
         yaw in -3.0..3.0_f64, turn in -2.0..2.0_f64, turn_dot in -5.0..5.0_f64,
     ) {
         let force = Vector3::new(across.x, across.y, 9.81 + 0.4 * across.z);
-        // A path through them at t = 0, the vertical part held.
-        let across = |v: &Vector3<f64>| Vector3::new(v.x, v.y, 0.0);
+        // A path through them at t = 0.
         let at = |t: f64| {
-            let a = force + across(&jerk) * t + across(&snap) * (0.5 * t * t);
+            let a = force + jerk * t + snap * (0.5 * t * t);
             angles(&a, yaw + turn * t + 0.5 * turn_dot * t * t)
         };
         let dt = 1e-4;

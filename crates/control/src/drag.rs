@@ -15,6 +15,9 @@ use nalgebra::Vector3;
 
 /// Speed below which that of the body is none \[m/s\].
 const SPEED_MIN_M_S: f32 = 0.01;
+/// Smallest thrust that drag turns \[m/s2\], and smallest share of it left beside the drag along it.
+const THRUST_MIN_M_S2: f32 = 1.0;
+const SHARE_MIN: f32 = 0.3;
 
 parameters! {
     /// Drag per mass. The default is none.
@@ -59,21 +62,53 @@ impl KnownDrag {
         Vector3::new(lever * velocity_body_m_s.y, -lever * velocity_body_m_s.x, 0.0)
     }
 
-    /// Returns by what that acceleration changes \[m/s3\] while the velocity does at `change`, thrust and `up` held;
-    /// for a `change` of that change, the same of it.
+    /// Returns jerk and snap of the thrust per mass f \[m/s3, m/s4\] that give a vehicle a velocity with these three
+    /// derivatives; the thrust is `thrust_m_s2` along `up`, and `share` of that of hover.
+    ///
+    /// With u = f/|f| and k = k_r sqrt(T/T_h), f makes up for the blades' drag k P v = k (v - c u), c = u v, and for
+    /// that of the body, b(v), whose derivative along a is b'(a). So u, which turns with f, is in its derivatives:
+    ///
+    /// ```text
+    /// df/dt    =  q - k (c du/dt + w u) + dk/dt P v                 q = j + k a + b'(a)    w = v du/dt + u a
+    /// d2f/dt2  =  r - k (c d2u/dt2 + 2w du/dt) + 2 dk/dt (a - c du/dt - w u) + d2k/dt2 P v    r = s + k j + b'(j)
+    /// du/dt    =  P (q + dk/dt P v) / (|f| + k c)
+    /// d2u/dt2  =  P (d2f/dt2 - 2 d|f|/dt du/dt) / |f|
+    /// ```
+    ///
+    /// In the second, what is along u, which turns nothing, and the second derivative of b are left out.
     #[inline]
-    pub fn change(
+    pub fn followed(
         &self,
         velocity_m_s: &Vector3<f32>,
         up: &Vector3<f32>,
-        share: f32,
-        change: &Vector3<f32>,
-    ) -> Vector3<f32> {
-        let in_plane = change - up * up.dot(change);
+        [share, thrust_m_s2]: [f32; 2],
+        [a, jerk, snap]: [&Vector3<f32>; 3],
+    ) -> [Vector3<f32>; 2] {
         let rotors = self.rotor_drag_1_s * math::sqrt(math::max(share, 0.0));
         // d(|v| v) = |v| dv + v (v dv)/|v|
         let speed = math::sqrt(velocity_m_s.norm_squared());
-        let along = velocity_m_s * (velocity_m_s.dot(change) / math::max(speed, SPEED_MIN_M_S));
-        in_plane * -rotors - (change * speed + along) * self.body_drag_1_m
+        let along = velocity_m_s * (self.body_drag_1_m / math::max(speed, SPEED_MIN_M_S));
+        let more =
+            |change: &Vector3<f32>| change * (rotors + self.body_drag_1_m * speed) + along * velocity_m_s.dot(change);
+        let (q, r) = (jerk + more(a), snap + more(jerk));
+        let across = |of: Vector3<f32>| of - up * up.dot(&of);
+        let c = up.dot(velocity_m_s);
+        let force = math::max(thrust_m_s2, THRUST_MIN_M_S2);
+        let per_force = 1.0 / math::max(force + rotors * c, force * SHARE_MIN);
+        let turn = across(q) * per_force;
+        let w = velocity_m_s.dot(&turn) + up.dot(a);
+        // Blades drag by the root of the thrust, which changes, too.
+        let thrust_dot = up.dot(&q) - rotors * w;
+        let rotors_dot = 0.5 * rotors * thrust_dot / force;
+        let in_plane = across(*velocity_m_s);
+        let turn = turn + in_plane * (rotors_dot * per_force);
+        let w = velocity_m_s.dot(&turn) + up.dot(a);
+        let in_plane_dot = a - turn * c - up * w;
+        let jerk = q - (turn * c + up * w) * rotors + in_plane * rotors_dot;
+        let thrust_ddot = up.dot(&r) + force * turn.norm_squared() - 2.0 * rotors * turn.dot(a);
+        let rotors_ddot = 0.5 * rotors * (thrust_ddot - 0.5 * thrust_dot * thrust_dot / force) / force;
+        let r = r + in_plane_dot * (2.0 * rotors_dot) + in_plane * rotors_ddot;
+        let turn_dot = across(r - turn * (2.0 * (rotors * w + thrust_dot))) * per_force;
+        [jerk, r - (turn_dot * c + turn * (2.0 * w)) * rotors]
     }
 }

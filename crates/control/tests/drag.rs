@@ -1,10 +1,12 @@
-//! Known drag: its change is the derivative of its acceleration, and its moment that of a force above the centre of
-//! mass.
+//! Known drag: what it adds to the derivatives of the thrust, against finite differences, and its moment, against that
+//! of a force above the centre of mass.
 #![allow(missing_docs)]
 
 use afbc_control::drag::KnownDrag;
 use nalgebra::{Unit, Vector3};
 use proptest::prelude::*;
+
+const GRAVITY: f64 = 9.81;
 
 fn vector(size: f32) -> impl Strategy<Value = Vector3<f32>> {
     (-size..size, -size..size, -size..size).prop_map(|(x, y, z)| Vector3::new(x, y, z))
@@ -17,18 +19,6 @@ fn drag() -> impl Strategy<Value = KnownDrag> {
 }
 
 proptest! {
-    #[test]
-    fn change_is_the_derivative_of_the_acceleration(
-        drag in drag(), v in vector(8.0), by in vector(10.0), up in vector(1.0), share in 0.3_f32..2.0,
-    ) {
-        prop_assume!(up.norm() > 0.1 && v.norm() > 0.5);
-        let up = Unit::new_normalize(up).into_inner();
-        let at = |t: f32| drag.acceleration(&(v + by * t), &up, share);
-        let change = (at(0.01) - at(-0.01)) / 0.02;
-        let found = drag.change(&v, &up, share, &by);
-        prop_assert!((found - change).norm() < 0.02 + 0.01 * change.norm(), "{found:?}, not {change:?}");
-    }
-
     /// It takes energy, whatever the attitude, and the share of the blades acts in the plane of the rotors.
     #[test]
     fn it_slows_down(drag in drag(), v in vector(8.0), up in vector(1.0), share in 0.0_f32..2.0) {
@@ -45,4 +35,46 @@ proptest! {
         let moment = Vector3::new(0.0, 0.0, drag.rotor_height_m).cross(&blades);
         prop_assert!((drag.moment(&v, share) - moment).norm() < 1e-5);
     }
+}
+
+/// Against finite differences, in double precision, of the thrust that a vehicle needs on 2,000 paths: what drag adds to
+/// jerk and snap of the thrust is there but for a part. What is along the thrust in the second derivative turns nothing.
+#[test]
+fn jerk_and_snap_are_those_of_the_thrust_on_the_path() {
+    let mut seed = 1_u64;
+    let mut uniform = move || {
+        seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (seed >> 40) as f64 / f64::from(1 << 24)
+    };
+    let mut added = [0.0, 0.0];
+    let mut missed = [0.0, 0.0];
+    for _ in 0..2000 {
+        let (rotors, body) = (0.7 * uniform(), 0.05 * uniform());
+        let drag = KnownDrag { rotor_drag_1_s: rotors as f32, body_drag_1_m: body as f32, rotor_height_m: 0.0 };
+        let [v, a, jerk, snap] =
+            [8.0, 4.0, 6.0, 20.0].map(|size| Vector3::from_fn(|_, _| size * (2.0 * uniform() - 1.0)));
+        // Thrust and drag determine each other.
+        let thrust = |t: f64| {
+            let v = v + a * t + jerk * (t * t / 2.0) + snap * (t * t * t / 6.0);
+            let free = a + jerk * t + snap * (t * t / 2.0) + Vector3::z() * GRAVITY + v * (body * v.norm());
+            (0..60).fold(free, |f, _| {
+                let up = f.normalize();
+                free + (v - up * up.dot(&v)) * (rotors * (f.norm() / GRAVITY).sqrt())
+            })
+        };
+        let (f, h) = (thrust(0.0), 1e-3);
+        let exact = [(thrust(h) - thrust(-h)) / (2.0 * h), (thrust(h) + thrust(-h) - f * 2.0) / (h * h)];
+        let up = f.normalize();
+        let share = [(f.norm() / GRAVITY) as f32, f.norm() as f32];
+        let found = drag.followed(&v.cast(), &up.cast(), share, [&a.cast(), &jerk.cast(), &snap.cast()]);
+        let [first, second] = found.map(|found| found.cast::<f64>());
+        let across = |of: Vector3<f64>| (of - up * up.dot(&of)).norm();
+        added[0] += (exact[0] - jerk).norm();
+        missed[0] += (first - exact[0]).norm();
+        added[1] += across(exact[1] - snap);
+        missed[1] += across(second - exact[1]);
+    }
+    let [first, second] = [missed[0] / added[0], missed[1] / added[1]];
+    assert!(first < 0.02, "{first}");
+    assert!(second < 0.25, "{second}");
 }

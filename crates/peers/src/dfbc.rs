@@ -213,7 +213,7 @@ impl<const N: usize> FlightController<N> for Dfbc<N> {
         let share = 1.0 / up.z.max(SHARE_MIN);
         let setpoint = &Setpoint {
             acceleration_m_s2: setpoint.acceleration_m_s2 - self.drag.acceleration(&state.velocity_m_s, &up, share),
-            ..dragged(&self.drag, setpoint, &up, share)
+            ..dragged(&self.drag, setpoint, &up, [share, share * self.position.limits.gravity().z])
         };
         let position = self.position.output(state, setpoint, &memory.position_integral);
         let specific_force = position.specific_force_m_s2;

@@ -393,7 +393,8 @@ impl<const N: usize> FlightController<N> for Mpc<N> {
         memory.lagging = (a + (specific_force - balance - a).component_mul(&self.follows)).map(math::settled);
 
         // Attitude.
-        let thrust = specific_force.dot(&up) / self.limits.gravity().z;
+        let thrust_m_s2 = specific_force.dot(&up);
+        let thrust = [thrust_m_s2 / self.limits.gravity().z, thrust_m_s2];
         let flying = self.limits.apply(&(setpoint.acceleration_m_s2 - disturbance + self.limits.gravity()));
         let Attitude { desired, rates_rad_s, angular_acceleration_rad_s2, attitude_error, rate_error } =
             self.attitude.output(

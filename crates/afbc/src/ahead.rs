@@ -1,0 +1,52 @@
+//! What is known of the inputs, ahead by the lag that their filters leave. Not in the paper.
+//!
+//! The lead T of the [filters](afbc_control::smoothing) is chosen for what is fed back, whose noise it amplifies: of the
+//! rotors' lag and that of the filters themselves it leaves
+//!
+//! ```text
+//! d = lag + 2/w - T          at least 0; of U3, which has no lead, lag + 2/w
+//! ```
+//!
+//! What follows from the reference has little noise, and is commanded that much earlier: a = R_e dOmega_d/dt of
+//! [roll, pitch and yaw](crate::rotation) as a + d da/dt, with a low-pass for the derivative, and the thrust by how that
+//! of the reference changes.
+
+use afbc_control::{Smoothing, math};
+use nalgebra::Vector3;
+
+/// The constants.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ahead {
+    /// d of roll, pitch and yaw over what the low-pass trails by.
+    lead: Vector3<f32>,
+    /// Share of the low-pass that is replaced per step.
+    share: f32,
+    /// d of the thrust \[s\].
+    pub thrust_s: f32,
+}
+
+impl Ahead {
+    /// Makes it for rotors and filters with these lags, and a low-pass of bandwidth `bandwidth_rad_s`, advanced every
+    /// `dt_s` seconds.
+    pub fn new(lag_s: f32, smoothing: &Smoothing, bandwidth_rad_s: f32, dt_s: f32) -> Self {
+        let Smoothing { smooth_tilt_rad_s, smooth_yaw_rad_s, smooth_lift_rad_s, lead_s } = *smoothing;
+        let left = |w: f32, lead_s: f32| if w > 0.0 { math::max(lag_s + 2.0 / w - lead_s, 0.0) } else { lag_s };
+        let (tilt, yaw) = (left(smooth_tilt_rad_s, lead_s), left(smooth_yaw_rad_s, 0.0));
+        let share = 1.0 - math::exp(-bandwidth_rad_s * dt_s);
+        Ahead {
+            // What rises by s trails by s dt / share.
+            lead: Vector3::new(tilt, tilt, yaw) * (share / dt_s),
+            share,
+            thrust_s: left(smooth_lift_rad_s, lead_s),
+        }
+    }
+
+    /// Returns by what angular accelerations will have changed when they take effect \[rad/s2\], and advances the
+    /// low-pass by one step.
+    #[inline(always)]
+    pub fn advance(&self, late: &mut Option<Vector3<f32>>, accelerations_rad_s2: &Vector3<f32>) -> Vector3<f32> {
+        let before = late.unwrap_or(*accelerations_rad_s2);
+        *late = Some((before + (accelerations_rad_s2 - before) * self.share).map(math::settled));
+        self.lead.component_mul(&(accelerations_rad_s2 - before))
+    }
+}
