@@ -1,15 +1,16 @@
 //! What is known of the inputs, ahead by the lag that their filters leave. Not in the paper.
 //!
-//! The lead T of the [filters](afbc_control::smoothing) is chosen for what is fed back, whose noise it amplifies: of the
-//! rotors' lag and that of the filters themselves it leaves
+//! The lead T of the [filters](afbc_control::smoothing) is chosen for what is fed back, whose noise it amplifies. Of
+//! the rotors' lag and that of the filters themselves it leaves
 //!
 //! ```text
-//! d = lag + 2/w - T          at least 0; of U3, which has no lead, lag + 2/w
+//! d = lag + 2/w - T          at least 0
 //! ```
 //!
 //! What follows from the reference has little noise, and is commanded that much earlier: a = R_e dOmega_d/dt of
-//! [roll, pitch and yaw](crate::rotation) as a + d da/dt, with a low-pass for the derivative, and the thrust by how that
-//! of the reference changes.
+//! [roll and pitch](crate::rotation) as a + d da/dt, with a low-pass for the derivative, and the thrust by how that of
+//! the reference changes. Yaw, whose U3 has no lead and a lag to match, stays as it is: so much lead would drive its
+//! rotors in every step of the other two.
 
 use afbc_control::{Smoothing, math};
 use nalgebra::Vector3;
@@ -17,7 +18,7 @@ use nalgebra::Vector3;
 /// The constants.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ahead {
-    /// d of roll, pitch and yaw over what the low-pass trails by.
+    /// d of roll and pitch over what the low-pass trails by; 0 of yaw.
     lead: Vector3<f32>,
     /// Share of the low-pass that is replaced per step.
     share: f32,
@@ -29,15 +30,15 @@ impl Ahead {
     /// Makes it for rotors and filters with these lags, and a low-pass of bandwidth `bandwidth_rad_s`, advanced every
     /// `dt_s` seconds.
     pub fn new(lag_s: f32, smoothing: &Smoothing, bandwidth_rad_s: f32, dt_s: f32) -> Self {
-        let Smoothing { smooth_tilt_rad_s, smooth_yaw_rad_s, smooth_lift_rad_s, lead_s } = *smoothing;
-        let left = |w: f32, lead_s: f32| if w > 0.0 { math::max(lag_s + 2.0 / w - lead_s, 0.0) } else { lag_s };
-        let (tilt, yaw) = (left(smooth_tilt_rad_s, lead_s), left(smooth_yaw_rad_s, 0.0));
+        let Smoothing { smooth_tilt_rad_s, smooth_lift_rad_s, lead_s, .. } = *smoothing;
+        let left = |w: f32| if w > 0.0 { math::max(lag_s + 2.0 / w - lead_s, 0.0) } else { lag_s };
+        let tilt = left(smooth_tilt_rad_s);
         let share = 1.0 - math::exp(-bandwidth_rad_s * dt_s);
         Ahead {
             // What rises by s trails by s dt / share.
-            lead: Vector3::new(tilt, tilt, yaw) * (share / dt_s),
+            lead: Vector3::new(tilt, tilt, 0.0) * (share / dt_s),
             share,
-            thrust_s: left(smooth_lift_rad_s, lead_s),
+            thrust_s: left(smooth_lift_rad_s),
         }
     }
 

@@ -213,13 +213,15 @@ impl DesiredAttitude {
         let turn = [reference.yaw_rate_rad_s, reference.yaw_acceleration_rad_s2];
         // Corners of the setpoint are turned gradually; the reference model has none.
         let [followed, snap] = self.forward.advance(followed, setpoint);
-        let gradual = followed + (jerk - setpoint.jerk_m_s3);
+        let detour = jerk - setpoint.jerk_m_s3;
+        let gradual = followed + detour;
         // Drag turns the thrust as it changes with the velocity.
         let thrust = [share, share * self.gravity_m_s2];
         let [turning, snap] = self.drag.followed(v, up, thrust, [a, jerk, &snap]);
-        let thrust_m_s3 = up.dot(&turning);
-        // What a step adds along z turns nothing: a_z may fall to little, and its snap is not known.
-        let turning = turning - Vector3::z() * (jerk.z - setpoint.jerk_m_s3.z);
+        // What a step or a jump of the state adds is not ahead, since it begins at once. Along z, where a_z may fall to
+        // little, it turns nothing: its snap is not known.
+        let thrust_m_s3 = up.dot(&(turning - detour));
+        let turning = turning - Vector3::z() * detour.z;
         let [rates, _] = tilt.turned(&turning, &snap, turn);
         let [_, accelerations] = tilt.turned(&(turning + (gradual - jerk)), &snap, turn);
         ([rates, accelerations], thrust_m_s3)

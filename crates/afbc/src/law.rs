@@ -62,8 +62,8 @@ impl Context<'_> {
         model.dynamics_at(axis, &self.state.rates_rad_s, &self.roll_pitch, self.rotor_residual_rad_s)
     }
 
-    /// Returns the same, with f of x, y and z as observed. What is observed of roll, pitch and yaw is made up for behind
-    /// the law.
+    /// Returns the same, with f of x, y and z as observed. What is observed of roll, pitch and yaw is made up for
+    /// behind the law.
     #[inline(always)]
     pub(crate) fn observed(&self, model: &ModelConstants, axis: Axis) -> Dynamics {
         let dynamics = self.dynamics(model, axis);

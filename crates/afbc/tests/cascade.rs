@@ -261,7 +261,7 @@ fn compose<L: Law + Copy>(
         let wanted = [forward[0], forward[1], yaw_acceleration];
         let before = carried.late.unwrap_or(wanted);
         let share = 1.0 - (-w * 1e-3).exp();
-        let early = [0, 1, 2].map(|i| wanted[i] + lag_s * share / 1e-3 * (wanted[i] - before[i]));
+        let early = [0, 1, 2].map(|i| wanted[i] + [1.0, 1.0, 0.0][i] * lag_s * share / 1e-3 * (wanted[i] - before[i]));
         let early = if settings.feed_forward { early } else { wanted };
         carried.late = Some([0, 1, 2].map(|i| before[i] + (wanted[i] - before[i]) * share));
         for (i, axis) in [Axis::Roll, Axis::Pitch].into_iter().enumerate() {

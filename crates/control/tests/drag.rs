@@ -37,8 +37,9 @@ proptest! {
     }
 }
 
-/// Against finite differences, in double precision, of the thrust that a vehicle needs on 2,000 paths: what drag adds to
-/// jerk and snap of the thrust is there but for a part. What is along the thrust in the second derivative turns nothing.
+/// Against finite differences, in double precision, of the thrust that a vehicle needs on 2,000 paths: what drag adds
+/// to jerk and snap of the thrust is there but for a part. What is along the thrust in the second derivative turns
+/// nothing.
 #[test]
 fn jerk_and_snap_are_those_of_the_thrust_on_the_path() {
     let mut seed = 1_u64;

@@ -87,8 +87,8 @@ impl FlatAttitude {
     }
 }
 
-/// Returns the setpoint with jerk and snap of the thrust along `up`, `thrust` of it: its share of that of hover, and per
-/// mass \[m/s2\]. Drag turns it as the velocity changes.
+/// Returns the setpoint with jerk and snap of the thrust along `up`; `thrust` is its share of that of hover, and the
+/// thrust per mass \[m/s2\]. Drag turns it as the velocity changes.
 #[inline]
 pub(crate) fn dragged(drag: &KnownDrag, setpoint: &Setpoint, up: &Vector3<f32>, thrust: [f32; 2]) -> Setpoint {
     let Setpoint { velocity_m_s: v, acceleration_m_s2: a, jerk_m_s3: j, snap_m_s4: s, .. } = setpoint;
