@@ -309,10 +309,9 @@ impl Consistency {
     }
 }
 
-/// Bounds of 99 % of the mean over the flights of chi-square numbers with `degrees` of freedom, since several are
-/// looked at: normal, since many.
+/// Bounds of 95 % of the mean over the flights of chi-square numbers with `degrees` of freedom: normal, since many.
 fn is_consistent(mean: f64, degrees: f64) -> bool {
-    (mean - degrees).abs() <= 2.58 * (2.0 * degrees / FLIGHTS as f64).sqrt()
+    (mean - degrees).abs() <= 1.96 * (2.0 * degrees / FLIGHTS as f64).sqrt()
 }
 
 #[test]
