@@ -13,13 +13,13 @@
 //! rotors in every step of the other two.
 
 use afbc_control::{Smoothing, math};
-use nalgebra::Vector3;
+use nalgebra::Vector2;
 
 /// The constants.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ahead {
-    /// d of roll and pitch over what the low-pass trails by; 0 of yaw.
-    lead: Vector3<f32>,
+    /// d of roll and pitch over what the low-pass trails by.
+    lead: f32,
     /// Share of the low-pass that is replaced per step.
     share: f32,
     /// d of the thrust \[s\].
@@ -32,22 +32,21 @@ impl Ahead {
     pub fn new(lag_s: f32, smoothing: &Smoothing, bandwidth_rad_s: f32, dt_s: f32) -> Self {
         let Smoothing { smooth_tilt_rad_s, smooth_lift_rad_s, lead_s, .. } = *smoothing;
         let left = |w: f32| if w > 0.0 { math::max(lag_s + 2.0 / w - lead_s, 0.0) } else { lag_s };
-        let tilt = left(smooth_tilt_rad_s);
         let share = 1.0 - math::exp(-bandwidth_rad_s * dt_s);
         Ahead {
             // What rises by s trails by s dt / share.
-            lead: Vector3::new(tilt, tilt, 0.0) * (share / dt_s),
+            lead: left(smooth_tilt_rad_s) * share / dt_s,
             share,
             thrust_s: left(smooth_lift_rad_s),
         }
     }
 
-    /// Returns by what angular accelerations will have changed when they take effect \[rad/s2\], and advances the
-    /// low-pass by one step.
+    /// Returns by what the angular accelerations of roll and pitch will have changed when they take effect \[rad/s2\],
+    /// and advances the low-pass by one step.
     #[inline(always)]
-    pub fn advance(&self, late: &mut Option<Vector3<f32>>, accelerations_rad_s2: &Vector3<f32>) -> Vector3<f32> {
+    pub fn advance(&self, late: &mut Option<Vector2<f32>>, accelerations_rad_s2: &Vector2<f32>) -> Vector2<f32> {
         let before = late.unwrap_or(*accelerations_rad_s2);
         *late = Some((before + (accelerations_rad_s2 - before) * self.share).map(math::settled));
-        self.lead.component_mul(&(accelerations_rad_s2 - before))
+        (accelerations_rad_s2 - before) * self.lead
     }
 }

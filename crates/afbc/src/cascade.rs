@@ -15,7 +15,7 @@ use crate::standstill::Standstill;
 use afbc_control::mixer::Mixer;
 use afbc_control::{Action, Errors, FlightController, Smoothed, Smoother, Trace, math};
 use afbc_types::{Airframe, Axis, Declared, Inputs, OutOfRange, PerAxis, Setpoint, State};
-use nalgebra::Vector3;
+use nalgebra::{Vector2, Vector3};
 
 /// A controller. Constant; everything that changes in flight is in [`Cascade`].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -78,7 +78,7 @@ pub(crate) struct Filters {
     desired: DesiredMemory,
     smoothed: Option<Smoothed>,
     /// See [`Ahead`].
-    late: Option<Vector3<f32>>,
+    late: Option<Vector2<f32>>,
     /// See [`Effort`].
     more_effort: f32,
     standstill: Standstill,
@@ -188,22 +188,23 @@ impl<L: Law, const N: usize> Controller<L, N> {
             self.law.start(&mut memory.estimates, self.weight_n - self.known_weight_n());
         }
         let (hover_n, stands) = (self.hover_thrust_n(memory), self.stands(memory));
+        let touches = self.settings.freeze_on_ground && memory.filters.standstill.touches();
         let Cascade { estimates, last, filters, rotor_residual_rad_s } = memory;
         let reference = self.reference(&mut filters.detours, state, setpoint);
         let attitude = Attitude::of(state);
         let share = math::max(last.asked.thrust_n, 0.0) / hover_n;
-        let observed_m_s2 = self.observe_forces(&mut filters.forces, state, &attitude, hover_n, [fresh, stands]);
+        let observed_m_s2 = self.observe_forces(&mut filters.forces, state, &attitude, hover_n, [fresh, touches]);
         let gyroscopic_rad_s2 = self.model.gyroscopic(&state.rates_rad_s, *rotor_residual_rad_s);
         let velocity_body_m_s = attitude.in_body(&state.velocity_m_s);
         let known_rad_s2 = gyroscopic_rad_s2 + self.drag_turns(&velocity_body_m_s, share);
         let observed_rad_s2 =
-            self.observe_moments(&mut filters.moments, &state.rates_rad_s, &known_rad_s2, [fresh, stands]);
+            self.observe_moments(&mut filters.moments, &state.rates_rad_s, &known_rad_s2, [fresh, touches]);
         let context = Context {
             state,
             roll_pitch: attitude.roll_pitch,
             rotor_residual_rad_s: *rotor_residual_rad_s,
             dt_s: self.settings.common.dt_s,
-            adapt: fresh && !stands,
+            adapt: fresh && !touches,
             unallocated: &last.unallocated,
             observed_m_s2,
             known: self.settings.feed_forward.then_some(&self.model),
@@ -211,21 +212,23 @@ impl<L: Law, const N: usize> Controller<L, N> {
         let eta_dot = self.eta_dot(state, &attitude);
 
         // Position: subsystems 4, 5, 6.
-        let [u4, u5, u6] = self.position(&reference, &context, estimates, &mut last.errors);
+        let lift = Context { adapt: fresh && !stands, ..context };
+        let [u4, u5, u6] = self.position(&reference, [&lift, &context], estimates, &mut last.errors);
         // Desired roll and pitch (40), with the derivatives for (12) and (16).
         let followed = [&reference, setpoint];
-        let desired = self.desired.advance(&mut filters.desired, [u5, u6, u4], hover_n, &attitude, followed);
+        let desired = self.desired.advance(&mut filters.desired, [u5, u6, u4], (hover_n, touches), &attitude, followed);
         // Attitude: subsystems 1, 2, 3.
         let mut turn = self.turn(&desired, &reference, &attitude, state);
         if self.settings.feed_forward {
-            turn.accelerations += self.ahead.advance(&mut filters.late, &turn.desired_accelerations);
+            let more = self.ahead.advance(&mut filters.late, &turn.desired_accelerations.xy());
+            turn.accelerations += Vector3::new(more.x, more.y, 0.0);
         }
         let [u1, u2, u3] = self.attitude(&turn, [&state.attitude_rad, &eta_dot], &context, estimates, &mut last.errors);
 
         // Rotors, which also make up for the moments as they will be when they have followed.
         let change = attitude.in_body(&reference.acceleration_m_s2) - state.rates_rad_s.cross(&velocity_body_m_s);
         let ahead_m_s = velocity_body_m_s + change * self.settings.disturbance.disturbance_lag_s;
-        let against = self.make_up(&observed_rad_s2, &ahead_m_s, share, stands);
+        let against = self.make_up(&observed_rad_s2, &ahead_m_s, share, touches);
         let ahead_n = self.mass_kg * self.ahead.thrust_s * desired.thrust_m_s3;
         let (asked, effort) = self.asked(filters, [u1, u2, u3, u4 + ahead_n], against, hover_n, stands);
         let allocation = self.mixer.allocate(&asked);
@@ -238,7 +241,11 @@ impl<L: Law, const N: usize> Controller<L, N> {
         if let Some(moments) = &self.moments {
             moments.give(&mut filters.moments, &action.given, effort);
         }
-        filters.standstill.advance(u4, self.weight_n, &state.velocity_m_s, self.settings.common.dt_s);
+        filters.standstill.advance(u4, self.weight_n, state, self.settings.common.dt_s);
+        let leaves = touches && !filters.standstill.touches();
+        if let (true, Some(reference), Some(detours)) = (leaves, &self.reference, &mut filters.detours) {
+            reference.restart_level(detours, state, setpoint);
+        }
         if L::USES_ROTOR_RESIDUAL {
             *rotor_residual_rad_s = self.mixer.residual_rad_s(&action.speeds);
         }
@@ -268,7 +275,7 @@ impl<L: Law, const N: usize> Controller<L, N> {
         }
     }
 
-    /// Returns f of x, y and z as observed \[m/s2\]; `fresh` and `stands` as in [`ForceObserver::advance`].
+    /// Returns f of x, y and z as observed \[m/s2\]; `fresh` and `touches` as in [`ForceObserver::advance`].
     #[inline(always)]
     fn observe_forces(
         &self,
@@ -276,10 +283,10 @@ impl<L: Law, const N: usize> Controller<L, N> {
         state: &State,
         attitude: &Attitude,
         hover_n: f32,
-        fresh_stands: [bool; 2],
+        fresh_touches: [bool; 2],
     ) -> Vector3<f32> {
         match &self.forces {
-            Some(forces) => forces.advance(observed, state, &attitude.up(), hover_n, fresh_stands),
+            Some(forces) => forces.advance(observed, state, &attitude.up(), hover_n, fresh_touches),
             None => {
                 *observed = None;
                 Vector3::zeros()
@@ -304,10 +311,10 @@ impl<L: Law, const N: usize> Controller<L, N> {
         observed: &mut Option<Turning>,
         rates_rad_s: &Vector3<f32>,
         known_rad_s2: &Vector3<f32>,
-        fresh_stands: [bool; 2],
+        fresh_touches: [bool; 2],
     ) -> Vector3<f32> {
         match &self.moments {
-            Some(moments) => moments.advance(observed, rates_rad_s, known_rad_s2, fresh_stands),
+            Some(moments) => moments.advance(observed, rates_rad_s, known_rad_s2, fresh_touches),
             None => {
                 *observed = None;
                 Vector3::zeros()
@@ -341,12 +348,12 @@ impl<L: Law, const N: usize> Controller<L, N> {
         u
     }
 
-    /// Returns U4 \[N\], u5 and u6 \[m/s2\]: subsystems 4, 5, 6.
+    /// Returns U4 \[N\], u5 and u6 \[m/s2\]: subsystems 4, 5, 6, the first in the context `lift`.
     #[inline(always)]
     fn position(
         &self,
         reference: &Setpoint,
-        context: &Context,
+        [lift, context]: [&Context; 2],
         estimates: &mut PerAxis<L::Estimate>,
         errors: &mut PerAxis<Errors>,
     ) -> [f32; 3] {
@@ -358,7 +365,7 @@ impl<L: Law, const N: usize> Controller<L, N> {
             y.tracking([xi.y, xi_dot.y], [p.y, v.y, a.y]),
             z.tracking([xi.z, xi_dot.z], [p.z, v.z, a.z]),
         );
-        let u4 = self.input(Axis::Z, z, context, &mut estimates.z, &mut errors.z);
+        let u4 = self.input(Axis::Z, z, lift, &mut estimates.z, &mut errors.z);
         let u5 = self.input(Axis::X, x, context, &mut estimates.x, &mut errors.x);
         let u6 = self.input(Axis::Y, y, context, &mut estimates.y, &mut errors.y);
         [u4, u5, u6]
@@ -411,10 +418,10 @@ impl<L: Law, const N: usize> Controller<L, N> {
         observed_rad_s2: &Vector3<f32>,
         velocity_body_m_s: &Vector3<f32>,
         share: f32,
-        stands: bool,
+        touches: bool,
     ) -> [f32; 3] {
         let Some(moments) = &self.moments else { return [0.0; 3] };
-        let known = if stands { Vector3::zeros() } else { self.drag_turns(velocity_body_m_s, share) };
+        let known = if touches { Vector3::zeros() } else { self.drag_turns(velocity_body_m_s, share) };
         moments.against(&(observed_rad_s2 + known))
     }
 
@@ -460,6 +467,10 @@ impl<L: Law, const N: usize> FlightController<N> for Controller<L, N> {
     #[inline(always)]
     fn decide(&self, memory: &mut Self::Memory, state: &State, setpoint: &Setpoint, fresh: bool) -> Action<N> {
         self.cascade(memory, state, setpoint, fresh)
+    }
+
+    fn on_ground(&self, memory: &mut Self::Memory) {
+        memory.filters.standstill.land();
     }
 
     fn position_lost(&self, memory: &mut Self::Memory) {

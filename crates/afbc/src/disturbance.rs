@@ -135,7 +135,7 @@ impl ForceObserver {
     }
 
     /// Returns f \[m/s2\] of a vehicle in this state with its thrust along `up`: known drag and, along x and y, f_hat,
-    /// which is advanced by one step if the state is `fresh`, and zero of one that `stands` on the ground.
+    /// which is advanced by one step if the state is `fresh`, and zero of one that `touches` the ground.
     #[inline]
     pub fn advance(
         &self,
@@ -143,7 +143,7 @@ impl ForceObserver {
         state: &State,
         up: &Vector3<f32>,
         hover_n: f32,
-        [fresh, stands]: [bool; 2],
+        [fresh, touches]: [bool; 2],
     ) -> Vector3<f32> {
         let measured = [state.velocity_m_s.x, state.velocity_m_s.y];
         let start = |thrust_n, remembered| ForceObserverMemory {
@@ -154,7 +154,7 @@ impl ForceObserver {
             held: false,
         };
         let observed = observed.get_or_insert_with(|| start(self.weight_n, Remembered::default()));
-        if stands {
+        if touches {
             *observed = start(observed.thrust_n, observed.remembered);
             return Vector3::zeros();
         }
@@ -268,20 +268,20 @@ impl MomentObserver {
     }
 
     /// Returns f_hat of roll, pitch and yaw \[rad/s2\] for these rates, beside what is `known` \[rad/s2\], and advances
-    /// it by one step if they are `fresh`; zero of a vehicle that `stands` on the ground.
+    /// it by one step if they are `fresh`; zero of a vehicle that `touches` the ground.
     #[inline]
     pub fn advance(
         &self,
         turning: &mut Option<Turning>,
         rates_rad_s: &Vector3<f32>,
         known: &Vector3<f32>,
-        [fresh, stands]: [bool; 2],
+        [fresh, touches]: [bool; 2],
     ) -> Vector3<f32> {
         let zero = Vector3::zeros();
         let start =
             Turning { rates_rad_s: *rates_rad_s, acceleration_rad_s2: zero, given_rad_s2: zero, known_rad_s2: *known };
         let turning = turning.get_or_insert(start);
-        if stands {
+        if touches {
             *turning = start;
             return zero;
         }

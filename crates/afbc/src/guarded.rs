@@ -187,6 +187,10 @@ impl<const N: usize> FlightController<N> for Guarded<N> {
         action
     }
 
+    fn on_ground(&self, memory: &mut Memory<N>) {
+        self.adaptive.on_ground(&mut memory.afbc);
+    }
+
     fn position_lost(&self, memory: &mut Memory<N>) {
         self.adaptive.position_lost(&mut memory.afbc);
     }

@@ -199,6 +199,12 @@ impl ReferenceFilter {
         }
     }
 
+    /// Starts x and y at the vehicle again: one that has slid on the ground returns as after a jump.
+    pub fn restart_level(&self, detours: &mut Detours, state: &State, setpoint: &Setpoint) {
+        let Detours { x, y, .. } = self.start(state, setpoint);
+        (detours.x, detours.y) = (x, y);
+    }
+
     /// Adds the detour along one axis.
     #[inline(always)]
     fn along(&self, model: &Coordinate, detour: &mut Detour, x1: f32, x2: f32, [x, v, a, j]: [&mut f32; 4]) {

@@ -4,7 +4,7 @@
 use afbc::ahead::Ahead;
 use afbc_control::{Smoother, Smoothing};
 use afbc_types::Inputs;
-use nalgebra::Vector3;
+use nalgebra::{Vector2, Vector3};
 
 const DT_S: f32 = 0.001;
 const LAG_S: f32 = 0.033;
@@ -23,10 +23,10 @@ fn a_ramp_arrives_in_time() {
         let mut off = Vector3::zeros();
         for k in 0..2_000 {
             let now = slope * k as f32 * DT_S;
-            let more = ahead.map_or(Vector3::zeros(), |ahead| ahead.advance(&mut late, &Vector3::repeat(now)));
+            let more = ahead.map_or(Vector2::zeros(), |ahead| ahead.advance(&mut late, &Vector2::repeat(now)));
             let thrust_n = now + ahead.map_or(0.0, |ahead| ahead.thrust_s * slope);
-            let [roll_n, pitch_n, yaw_n] = (Vector3::repeat(now) + more).into();
-            let given = smoother.advance(&mut smoothed, &Inputs { roll_n, pitch_n, yaw_n, thrust_n });
+            let [roll_n, pitch_n] = (Vector2::repeat(now) + more).into();
+            let given = smoother.advance(&mut smoothed, &Inputs { roll_n, pitch_n, yaw_n: now, thrust_n });
             let share = 1.0 - (-DT_S / LAG_S).exp();
             let follow = |rotor: f32, given: f32| rotor + (given - rotor) * share;
             rotors = Inputs {
@@ -55,9 +55,9 @@ fn lags_are_not_negative() {
     let led = Ahead::new(0.01, &Smoothing { lead_s: 0.3, ..FILTERS }, 50.0, DT_S);
     assert_eq!(led.thrust_s, 0.0);
     let mut late = None;
-    led.advance(&mut late, &Vector3::zeros());
-    let more = led.advance(&mut late, &Vector3::repeat(1.0));
-    assert_eq!(more, Vector3::zeros());
+    led.advance(&mut late, &Vector2::zeros());
+    let more = led.advance(&mut late, &Vector2::repeat(1.0));
+    assert_eq!(more, Vector2::zeros());
     let bare = Ahead::new(LAG_S, &Smoothing { smooth_lift_rad_s: 0.0, ..FILTERS }, 50.0, DT_S);
     assert_eq!(bare.thrust_s, LAG_S);
 }
@@ -66,6 +66,6 @@ fn lags_are_not_negative() {
 #[test]
 fn the_first_is_no_change() {
     let mut late = None;
-    let more = Ahead::new(LAG_S, &FILTERS, 50.0, DT_S).advance(&mut late, &Vector3::repeat(7.0));
-    assert_eq!(more, Vector3::zeros());
+    let more = Ahead::new(LAG_S, &FILTERS, 50.0, DT_S).advance(&mut late, &Vector2::repeat(7.0));
+    assert_eq!(more, Vector2::zeros());
 }

@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, missing_docs)] // a controller that cannot be built must stop the test
 
 use afbc::reference::ReferenceModel;
-use afbc::standstill::{LIFT_SHARE, STILL_M_S, STILL_S, Standstill};
+use afbc::standstill::{IN_AIR_S, LEFT_M, LIFT_SHARE, STILL_M_S, STILL_S, Standstill};
 use afbc::{Adaptive, Controller, Profile, Settings};
 use afbc_control::Smoothing;
 use afbc_control::{FlightController, Validated};
@@ -13,11 +13,15 @@ use proptest::prelude::*;
 const DT_S: f32 = 0.001;
 const WEIGHT_N: f32 = 4.77;
 
+fn moving(velocity_m_s: Vector3<f32>) -> State {
+    State { velocity_m_s, ..State::default() }
+}
+
 /// Whether a vehicle with these values for `steps` counts as standing.
 fn stands(thrust_n: f32, velocity_m_s: Vector3<f32>, steps: usize) -> bool {
     let mut standstill = Standstill::default();
     for _ in 0..steps {
-        standstill.advance(thrust_n, WEIGHT_N, &velocity_m_s, DT_S);
+        standstill.advance(thrust_n, WEIGHT_N, &moving(velocity_m_s), DT_S);
     }
     standstill.stands()
 }
@@ -44,15 +48,15 @@ fn a_light_vehicle_that_hovers_does_not_stand_and_one_that_lifts_off_no_longer()
     assert!(!stands(0.6 * WEIGHT_N, Vector3::zeros(), 10_000));
     let mut standstill = Standstill::default();
     for _ in 0..1000 {
-        standstill.advance(0.0, WEIGHT_N, &Vector3::zeros(), DT_S);
+        standstill.advance(0.0, WEIGHT_N, &State::default(), DT_S);
     }
     assert!(standstill.stands());
-    let mut moving = standstill;
-    moving.advance(0.0, WEIGHT_N, &Vector3::new(0.0, -0.49, 0.0), DT_S);
-    assert!(moving.stands(), "it rocks");
-    moving.advance(0.0, WEIGHT_N, &Vector3::new(0.0, 0.0, -0.51), DT_S);
-    standstill.advance(0.5 * WEIGHT_N, WEIGHT_N, &Vector3::zeros(), DT_S);
-    assert!(!standstill.stands() && !moving.stands());
+    let mut rocking = standstill;
+    rocking.advance(0.0, WEIGHT_N, &moving(Vector3::new(0.0, -0.49, 0.0)), DT_S);
+    assert!(rocking.stands(), "it rocks");
+    rocking.advance(0.0, WEIGHT_N, &moving(Vector3::new(0.0, 0.0, -0.51)), DT_S);
+    standstill.advance(0.5 * WEIGHT_N, WEIGHT_N, &State::default(), DT_S);
+    assert!(!standstill.stands() && !rocking.stands());
 }
 
 /// A vehicle on the ground with its setpoint below it, until the setpoint is raised.
@@ -65,18 +69,22 @@ fn estimates_freeze_on_the_ground_and_thaw_on_lift() {
         let law = Adaptive::new(Profile::Flight.gains()).unwrap();
         let controller = Controller::new(Parameters::PAPER.to_f32(), settings, law).unwrap();
         let mut memory = Validated::default();
-        [(-1.0, 300), (-1.0, 3000), (1.0, 1), (1.0, 100)].map(|(z, steps)| {
-            for _ in 0..steps {
-                let _ = controller.step(&mut memory, Some(&State::default()), &setpoint(z));
-            }
-            memory.control.estimates
-        })
+        [(-1.0, 300, 0.0), (-1.0, 3000, 0.0), (1.0, 1, 0.0), (1.0, 100, 0.0), (1.0, 100, 0.06)].map(
+            |(z, steps, up_m)| {
+                let state = State { position_m: Vector3::z() * up_m, ..State::default() };
+                for _ in 0..steps {
+                    let _ = controller.step(&mut memory, Some(&state), &setpoint(z));
+                }
+                memory.control.estimates
+            },
+        )
     };
-    let [stood, still_standing, asked, lifted] = fly(true);
+    let [stood, still_standing, asked, lifted, left] = fly(true);
     assert_eq!(stood, still_standing);
     // The step that first demands lift still counts as standing; the next one does not.
     assert_eq!(asked, stood);
-    assert!(lifted.z != stood.z && lifted.x != stood.x);
+    assert!(lifted.z != stood.z && lifted.x == stood.x, "its feet still touch the ground");
+    assert_ne!(left.x, stood.x);
     let [stood, still_standing, ..] = fly(false);
     assert_ne!(stood, still_standing, "nothing to freeze");
 }
@@ -101,4 +109,27 @@ fn a_standing_vehicle_is_not_tipped_over() {
     assert_eq!(forces(-0.4, 200), Vector4::zeros());
     // The reference rises before the vehicle is to lift off.
     assert!(spread(forces(0.4, 400)) > 0.1);
+}
+
+/// From the ground a vehicle touches it until it has risen, rises fast, or has been carried for long.
+#[test]
+fn a_vehicle_touches_the_ground_until_it_leaves_it() {
+    let touches = |state: State, steps| {
+        let mut standstill = Standstill::default();
+        assert!(!standstill.touches(), "a law begins in the air");
+        standstill.land();
+        standstill.advance(WEIGHT_N, WEIGHT_N, &State::default(), DT_S);
+        for _ in 0..steps {
+            standstill.advance(WEIGHT_N, WEIGHT_N, &state, DT_S);
+        }
+        standstill.touches()
+    };
+    let at = |x, z| State { position_m: Vector3::new(x, 0.0, z), ..State::default() };
+    assert!(touches(at(3.0, 0.9 * LEFT_M), 100), "it slid");
+    assert!(!touches(at(0.0, 1.1 * LEFT_M), 1));
+    assert!(!touches(at(0.0, -1.1 * LEFT_M), 1));
+    assert!(touches(moving(Vector3::new(0.0, 0.6, 0.0)), 100), "it slides");
+    assert!(!touches(moving(Vector3::new(0.0, 0.0, 0.6)), 1));
+    let carried_steps = (IN_AIR_S / DT_S) as usize;
+    assert!(touches(at(0.0, 0.0), carried_steps - 100) && !touches(at(0.0, 0.0), carried_steps + 100));
 }

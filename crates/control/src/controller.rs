@@ -57,6 +57,10 @@ pub trait FlightController<const N: usize = 4> {
     /// measurements is updated. Does not fail or panic; the rotor speeds are finite and within their limits.
     fn decide(&self, memory: &mut Self::Memory, state: &State, setpoint: &Setpoint, fresh: bool) -> Action<N>;
 
+    /// Announces that the vehicle stands on the ground, from where it is to take off. What its feet hold against is not
+    /// to be learnt.
+    fn on_ground(&self, _memory: &mut Self::Memory) {}
+
     /// Announces that the horizontal motion of the next state is not measured: a vehicle that does not know where it is
     /// reckons it. Nothing may be observed from it.
     fn position_lost(&self, _memory: &mut Self::Memory) {}

@@ -13,6 +13,7 @@ use crate::supervisor::{
 };
 use afbc_control::{Action, FlightController};
 use afbc_types::{Declared, Inputs, OutOfRange, Parameters, Range, RotorForces, RotorSpeeds, Setpoint, Stamped, State};
+use core::mem;
 use nalgebra::Vector3;
 
 /// Accepted time step of a law: the tick's \[s\].
@@ -240,7 +241,9 @@ impl<C: FlightController<N>, const N: usize> FlightCore<C, N> {
             }
             return self.open_loop(flight, Inputs::default());
         }
-        flight.idle_on_ground = false;
+        if mem::take(&mut flight.idle_on_ground) && !airborne {
+            self.controller.on_ground(&mut flight.control);
+        }
         flight.reckon(&self.dead_reckoning, fresh.filter(|_| measured).or(position_lost));
         if engages && self.controller.engage(&mut flight.control) {
             // The tick of engaging has no step: the rotors keep their inputs.

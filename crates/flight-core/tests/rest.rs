@@ -86,8 +86,8 @@ fn motors_idle_and_it_stays_on_the_ground() {
     assert_eq!((outcome.mode, outcome.ended), (Mode::Disarmed, Some(EndReason::Disarmed)));
 }
 
-/// Without the mark the first step is that of a law that was never stepped, bit for bit; so it is after a rest between
-/// two flights.
+/// Without the mark the first step is that of a law that was never stepped, and is told that it stands, bit for bit; so
+/// it is after a rest between two flights.
 #[test]
 fn the_law_begins_afresh_when_it_takes_off() {
     for flown in [0, 300] {
@@ -98,6 +98,7 @@ fn the_law_begins_afresh_when_it_takes_off() {
         bench.run(50);
         bench.inbox.set_idle_on_ground(false);
         let (controller, mut memory) = (controller(), Validated::default());
+        controller.on_ground(&mut memory.control);
         let target = Setpoint { position_m: Vector3::new(0.3, -0.2, 0.5), ..Setpoint::default() };
         for tick in 0..200 {
             bench.state.attitude_rad.x = 0.02 * (tick as f32 * 0.1).sin();

@@ -31,6 +31,8 @@ struct Noted {
     /// Steps that were announced to be without a position, and true if the next one is.
     position_lost: u32,
     announced: bool,
+    /// Times that it was told to stand on the ground, before its first step and later.
+    on_ground: [u32; 2],
 }
 
 impl FlightController for Notes {
@@ -48,6 +50,11 @@ impl FlightController for Notes {
         let mut trace = Trace::default();
         trace.inputs.thrust_n = noted.steps as f32;
         trace
+    }
+
+    fn on_ground(&self, noted: &mut Noted) {
+        let [first, later] = &mut noted.on_ground;
+        *(if noted.steps == 0 { first } else { later }) += 1;
     }
 
     fn position_lost(&self, noted: &mut Noted) {
@@ -173,6 +180,33 @@ fn off(seen: &State, expected: &State) -> f32 {
         seen.rates_rad_s - expected.rates_rad_s,
     ];
     offs.iter().map(Vector3::amax).fold(0.0, f32::max)
+}
+
+/// A law that begins on the ground is told so, once, and again after a rest there; one that goes on in the air is not.
+#[test]
+fn the_law_is_told_where_it_begins() {
+    let mut bench = Bench::flying(asks(1.0), true);
+    assert_eq!(bench.noted().on_ground, [1, 0]);
+    for rests in [true, false] {
+        bench.inbox.set_idle_on_ground(rests);
+        for _ in 0..50 {
+            let _ = bench.own();
+        }
+    }
+    assert_eq!(bench.noted().on_ground, [1, 0], "it was in the air");
+    let mut bench = Bench::new(asks(1.0));
+    bench.inbox.set_idle_on_ground(true);
+    for tick in 0..2100 {
+        if tick == 1500 {
+            assert!(bench.inbox.request(Ticketed { value: Request::Arm, ticket: 0 }));
+        }
+        bench.inbox.set_idle_on_ground(tick < 2000);
+        let _ = bench.own();
+        if tick == 1900 {
+            assert_eq!((bench.noted().on_ground, bench.noted().steps), ([0, 0], 0));
+        }
+    }
+    assert_eq!((bench.noted().on_ground, bench.noted().steps), ([1, 0], 100));
 }
 
 /// A late state is carried on to the present by its velocity and rates; so a vehicle that moves steadily is told where

@@ -53,6 +53,18 @@ macro_rules! any_controller {
                 }
             }
 
+            fn on_ground(&self, memory: &mut Self::Memory) {
+                self.begin(memory);
+                match (self, memory) {
+                    $(
+                        (AnyController::$Name(controller), AnyControllerMemory::$Name(memory)) => {
+                            controller.on_ground(memory);
+                        }
+                    )*
+                    _ => {}
+                }
+            }
+
             fn position_lost(&self, memory: &mut Self::Memory) {
                 self.begin(memory);
                 match (self, memory) {
