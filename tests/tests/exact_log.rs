@@ -217,7 +217,8 @@ fn a_bit_of_the_file_is_named_by_its_frame() {
         let found = read("bit", &damaged, &[]).unwrap();
         let Some(said) = problem(&ReplayedLog { name: "bit", replay: &found }) else { panic!("byte {at} is accepted") };
         let (count, Some(place)) = found.damaged else { panic!("{said}") };
-        assert!(count <= 2 && place <= at && at < place + 400, "{at}: {place}");
+        // A frame whose mark of its end is spoilt ends with the next one, whose place may be named.
+        assert!(count <= 2 && place <= at + 1 && at < place + 400, "{at}: {place}");
         assert!(said.contains(&format!("byte {place}: ")) && said.contains("copy it again"), "{said}");
     }
 }

@@ -179,7 +179,7 @@ fn flight(axis: Axis, paper: adaptive::Gains) -> adaptive::Gains {
         Axis::Roll | Axis::Pitch => (2.792, 0.3081, 95.92, 0.6876, 0.5622, 4.0, 0.003794),
         Axis::Yaw => (2.334, 6.326, 8.959, 37.43, 0.01825, 12.0, 0.2665),
         Axis::Z => (2.467, 9.638, 11.81, 167.3, 0.1351, 10.0, 7.364),
-        Axis::X | Axis::Y => (1.0, 5.0, 12.0, 8.0, 0.07809, 25.0, 1.267),
+        Axis::X | Axis::Y => (1.0, 4.2, 18.0, 6.0, 0.07809, 25.0, 1.267),
     };
     let membership = match axis {
         Axis::Roll | Axis::Pitch | Axis::Yaw => Membership { centre: 3.0, width: 1.2 },

@@ -30,7 +30,7 @@ const BYTES: usize = 4;
 const WINDS_M_S: [[f64; 3]; 3] = [[2.0, 1.0, 0.0], [0.3, 0.2, 0.0], [-3.0, 2.0, 0.0]];
 /// Time from the first touch of the ground to disarming, at most \[s\], and largest tilt of a flight \[rad\].
 const DISARMS_S: f64 = 1.5;
-const TILT_RAD: f64 = 0.7;
+const TILT_RAD: f64 = 0.8;
 
 /// A receiver that speaks NMEA 0183, its wire and its driver.
 struct NmeaReceiver {
