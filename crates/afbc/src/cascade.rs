@@ -189,6 +189,8 @@ impl<L: Law, const N: usize> Controller<L, N> {
         }
         let (hover_n, stands) = (self.hover_thrust_n(memory), self.stands(memory));
         let touches = self.settings.freeze_on_ground && memory.filters.standstill.touches();
+        let low_tan =
+            if self.settings.freeze_on_ground { memory.filters.standstill.tilt_max_tan() } else { f32::INFINITY };
         let Cascade { estimates, last, filters, rotor_residual_rad_s } = memory;
         let reference = self.reference(&mut filters.detours, state, setpoint);
         let attitude = Attitude::of(state);
@@ -216,7 +218,7 @@ impl<L: Law, const N: usize> Controller<L, N> {
         let [u4, u5, u6] = self.position(&reference, [&lift, &context], estimates, &mut last.errors);
         // Desired roll and pitch (40), with the derivatives for (12) and (16).
         let followed = [&reference, setpoint];
-        let desired = self.desired.advance(&mut filters.desired, [u5, u6, u4], (hover_n, touches), &attitude, followed);
+        let desired = self.desired.advance(&mut filters.desired, [u5, u6, u4], [hover_n, low_tan], &attitude, followed);
         // Attitude: subsystems 1, 2, 3.
         let mut turn = self.turn(&desired, &reference, &attitude, state);
         if self.settings.feed_forward {

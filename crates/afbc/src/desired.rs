@@ -7,7 +7,6 @@
 use crate::forward::{Followed, Forward};
 use crate::model::Attitude;
 use crate::settings::Settings;
-use crate::standstill::TOUCHING_TAN;
 use crate::tilt::Tilt;
 use afbc_control::command_filter::{CommandFilter, Filtered};
 use afbc_control::drag::KnownDrag;
@@ -130,20 +129,20 @@ impl DesiredAttitude {
         })
     }
 
-    /// Returns roll and pitch for u5, u6 \[m/s2\] and U4 \[N\] of a vehicle with this attitude and hover thrust, which
-    /// may touch the ground, and advances the memory by one step.
+    /// Returns roll and pitch for u5, u6 \[m/s2\] and U4 \[N\] of a vehicle with this attitude, hover thrust, and
+    /// tangent of the tilt that it may have at its height, and advances the memory by one step.
     #[inline(always)]
     pub fn advance(
         &self,
         memory: &mut DesiredMemory,
         [u5, u6, u4]: [f32; 3],
-        (hover_n, touches): (f32, bool),
+        [hover_n, low_tan]: [f32; 2],
         attitude: &Attitude,
         [reference, setpoint]: [&Setpoint; 2],
     ) -> DesiredRollPitch {
         let thrust_n = math::min(u4, self.thrust_max_n);
         let (vertical, inverse_vertical) = self.vertical(thrust_n * attitude.roll_pitch.tilt_cosine(), hover_n);
-        let tilt_max_tan = if touches { math::min(self.tilt_max_tan, TOUCHING_TAN) } else { self.tilt_max_tan };
+        let tilt_max_tan = math::min(self.tilt_max_tan, low_tan);
         // In the same direction.
         let [a5, a6] = within([u5, u6], math::min(vertical * tilt_max_tan, self.acceleration_max_m_s2));
         let heading = if self.by_rotation {

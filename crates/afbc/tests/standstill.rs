@@ -133,3 +133,32 @@ fn a_vehicle_touches_the_ground_until_it_leaves_it() {
     let carried_steps = (IN_AIR_S / DT_S) as usize;
     assert!(touches(at(0.0, 0.0), carried_steps - 100) && !touches(at(0.0, 0.0), carried_steps + 100));
 }
+
+/// It may tilt as far as it has risen, until it is high, falls, or has been carried for long.
+#[test]
+fn a_vehicle_that_has_just_risen_tilts_little() {
+    let after = |z_m: f32, climb_m_s: f32, steps: u32| {
+        let mut standstill = Standstill::default();
+        assert_eq!(standstill.tilt_max_tan(), f32::INFINITY, "a law begins in the air");
+        standstill.land();
+        standstill.advance(WEIGHT_N, WEIGHT_N, &State::default(), DT_S);
+        let (position_m, velocity_m_s) = (Vector3::z() * z_m, Vector3::z() * climb_m_s);
+        let state = State { position_m, velocity_m_s, ..State::default() };
+        (0..steps).for_each(|_| standstill.advance(WEIGHT_N, WEIGHT_N, &state, DT_S));
+        standstill.tilt_max_tan()
+    };
+    let standing = after(0.0, 0.0, 1);
+    assert_eq!(after(0.9 * LEFT_M, 0.0, 1), standing);
+    let mut least = standing;
+    for z_m in [0.1, 0.2, 0.4, 0.8] {
+        for climb_m_s in [0.0, 0.6] {
+            let tan = after(z_m, climb_m_s, 1);
+            assert!(tan > least - 1e-6 && (tan - standing - z_m).abs() < 1e-6, "{z_m} m: {tan}");
+            least = tan;
+        }
+    }
+    assert!(after(0.02, 0.6, 1) > standing, "it rises fast");
+    for (z_m, climb_m_s, steps) in [(1.1, 0.0, 1), (0.3, -0.6, 1), (0.3, 0.0, (IN_AIR_S / DT_S) as u32 + 100)] {
+        assert_eq!(after(z_m, climb_m_s, steps), f32::INFINITY, "{z_m} m, {climb_m_s} m/s");
+    }
+}

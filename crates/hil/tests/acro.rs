@@ -107,7 +107,7 @@ fn flips_end_in_position_mode() {
             let flip = flip(&mut flier, stick, end);
             // Thrust that carries it drives it down while it is upside down: some g t^2 of 1 s, and the way to stop.
             // The Crazyflie, with the slowest rotors, leans by more than 0.5 rad again to stop where it is.
-            let (lost_m, upright_ms) = if name == "crazyflie" { (20.0, 2_500) } else { (15.0, 1_200) };
+            let (lost_m, upright_ms) = if name == "crazyflie" { (20.0, 3_000) } else { (15.0, 1_200) };
             assert!(flip.lost_m < lost_m && flip.upright_ms < upright_ms, "{name} {flip:?}");
             if stick != YAW {
                 // A turn less what it takes to turn up to the rate; to a fifth.
