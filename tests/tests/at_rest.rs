@@ -1,6 +1,5 @@
 //! Minutes at rest after a manoeuvre, under every law. What decays in a law's memory has to end at zero: a number below
 //! 1.2e-38 is subnormal, and many processors take a hundred times as long to compute with it.
-#![allow(clippy::unwrap_used, missing_docs, reason = "a controller that cannot be built must stop the test")]
 
 use afbc::integral::IntegralBackstepping;
 use afbc::monitor::Bounds;

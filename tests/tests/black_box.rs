@@ -1,6 +1,5 @@
 //! The black box of flights: replay of our own log does again what the estimator did, and a log that is cut is read up
 //! to there.
-#![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs, reason = "tests")]
 
 use afbc_hil::{Host, MessagePeriods, Station, place};
 use afbc_onboard::Link;

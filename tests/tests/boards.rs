@@ -6,9 +6,7 @@
 //! large.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, clippy::panic, missing_docs)] // what is unreadable must stop it
 
-mod board_table;
-
-use board_table::{BoardTable, Motor, Stream, Timer, wiring};
+use crate::board_table::{BoardTable, Motor, Stream, Timer, wiring};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -401,7 +399,7 @@ fn boards_are_as_betaflight_describes_them() {
     }
 }
 
-const BEGIN: &str = "<!-- wiring: written by WRITE=1 cargo test -p flight-tests --test boards -->\n";
+const BEGIN: &str = "<!-- wiring: written by WRITE=1 cargo test -p flight-tests --test all boards:: -->\n";
 const END: &str = "<!-- end -->";
 
 #[test]
@@ -416,7 +414,11 @@ fn every_board_that_is_a_table_has_its_page() {
         if std::env::var_os("WRITE").is_some() {
             fs::write(&path, &wired).unwrap();
         }
-        assert_eq!(fs::read_to_string(&path).unwrap(), wired, "run WRITE=1 cargo test -p flight-tests --test boards");
+        assert_eq!(
+            fs::read_to_string(&path).unwrap(),
+            wired,
+            "run WRITE=1 cargo test -p flight-tests --test all boards::"
+        );
         assert!(page.contains(&format!("cargo xtask fw {name}")), "{}", path.display());
     }
 }

@@ -1,10 +1,4 @@
 //! The paper's three claims, checked by flights with all four signs of the uncertainty and both models of the vehicle.
-#![allow(
-    clippy::indexing_slicing,
-    clippy::unwrap_used,
-    missing_docs,
-    reason = "a scenario that cannot be flown must stop the test"
-)]
 
 use afbc_plant::{Environment, Gust, GustKind, Motion, PlantModel};
 use afbc_report::claims::VANISHED;

@@ -1,5 +1,4 @@
 //! Ten hours of hover in noise: the estimates of the profile `flight` stay bounded, those of the law as printed drift.
-#![allow(clippy::unwrap_used, missing_docs, reason = "a flight that cannot begin must fail the test")]
 
 use afbc::{Adaptive, AdaptiveEstimate, Cascade, Controller, Profile};
 use afbc_control::{FlightController, Validated};

@@ -1,14 +1,6 @@
 //! An exact log in a file: what is in it, what differs and where, and what other settings would have commanded.
-#![allow(
-    clippy::unwrap_used,
-    clippy::panic,
-    clippy::indexing_slicing,
-    missing_docs,
-    reason = "a test that cannot go on should say why"
-)]
 
-mod exact_flights;
-
+use crate::exact_flights::{SCENARIO, fly, fly_with, log_of, records};
 use afbc::Profile;
 use afbc_hil::Host;
 use afbc_onboard::Configuration;
@@ -21,7 +13,6 @@ use afbc_report::exact::{ReplayedLog, problem, table};
 use afbc_scenario::contender::{ControllerKind, Law};
 use afbc_scenario::load;
 use afbc_vehicles::{Vehicle, built_in};
-use exact_flights::{SCENARIO, fly, fly_with, log_of, records};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 use std::fs;
@@ -166,7 +157,8 @@ fn a_bit_of_an_input_is_named_at_its_tick() {
         };
         let mut changed = whole.clone();
         let Record::Tick(tick) = &mut changed[at] else { panic!("a tick") };
-        let (number, bit) = (tick.number, random.next_u32() % 20 + 3);
+        // Of lower bits the rounding of a velocity leaves nothing at times.
+        let (number, bit) = (tick.number, random.next_u32() % 15 + 8);
         let [_, force] = &mut tick.readings.imu.as_mut().unwrap().value;
         force.z = f32::from_bits(force.z.to_bits() ^ 1 << bit);
         let found = read("input", &log_of(&changed), &[]).unwrap();

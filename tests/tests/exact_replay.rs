@@ -1,18 +1,9 @@
 //! A flight is flown again from its exact log, to the last bit, and what differs is named.
-#![allow(
-    clippy::unwrap_used,
-    clippy::panic,
-    clippy::indexing_slicing,
-    missing_docs,
-    reason = "a test that cannot go on should say why"
-)]
 
-mod exact_flights;
-
+use crate::exact_flights::{SCENARIO, fly, log_of, records};
 use afbc_onboard::Configuration;
 use afbc_recorder::{FRAME_MAX as RECORD_MAX, Frames, Record, ReplayDifference, ReplayStep, Replayer};
 use afbc_scenario::load;
-use exact_flights::{SCENARIO, fly, log_of, records};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 use std::path::Path;

@@ -1,6 +1,5 @@
 //! Trackers that freeze in flight: the firmware's code on the host and the rigid body above a ground, connected by
 //! MAVLink frames.
-#![allow(clippy::unwrap_used, missing_docs, reason = "a flight that cannot begin must fail the test")]
 
 use afbc_flight_core::{EndReason, Mode};
 use afbc_hil::{Host, Station};

@@ -1,6 +1,5 @@
 //! Any frame that gives roll, pitch, yaw and thrust with a margin hovers under every law, four to eight rotors
 //! anywhere.
-#![allow(clippy::unwrap_used, clippy::panic, missing_docs)]
 
 use afbc::Profile;
 use afbc_scenario::contender::{Contender, ControllerKind};

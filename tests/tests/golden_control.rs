@@ -1,11 +1,5 @@
 //! Every row of the control crate's golden data, in `f32`. Each tolerance is a bound on rounding, computed row by row,
 //! so it is also tight for small numbers.
-#![allow(
-    clippy::unwrap_used,
-    clippy::indexing_slicing,
-    missing_docs,
-    reason = "what cannot be built or is missing must stop the test"
-)]
 
 use afbc::adaptive::{Gains, Subsystem};
 use afbc::backstepping::{self, ideal, proportional};

@@ -1,5 +1,4 @@
 //! Every row of the plant's golden data, in `f64`, within 1e-9 relative.
-#![allow(missing_docs)]
 
 use afbc_plant::{Load, Motion, rigid_body, simplified};
 use afbc_types::Parameters;

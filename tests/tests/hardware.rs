@@ -1,5 +1,4 @@
 //! Limits of the profile `flight` in the paper's flight with real rotors and a noisy state.
-#![allow(clippy::unwrap_used, missing_docs, reason = "a flight that cannot begin must fail the test")]
 
 use afbc::Profile;
 use afbc_scenario::contender::{Contender, ControllerKind};

@@ -1,5 +1,4 @@
 //! The memory of the air: drag that the vehicle's file does not tell is learnt lap by lap.
-#![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs, reason = "a flight that cannot begin must fail")]
 
 use afbc::Profile;
 use afbc_plant::{Environment, Motion};

@@ -3,7 +3,6 @@
 //! faults without a plant, to the millisecond.)
 //!
 //! Times are in ms since the request to arm. Until then the vehicle is held at its start. There is a ground.
-#![allow(clippy::expect_used, clippy::indexing_slicing, reason = "a test that cannot go on should say why")]
 
 use afbc_flight_core::{Mode, Refusal, Request};
 use afbc_hil::{Host, Station};

@@ -1,11 +1,5 @@
 //! Margins of the profile `flight`, monitored as on board: fast curves, delay, sampled states, noise, and the vehicles
 //! that it was once lost with.
-#![allow(
-    clippy::unwrap_used,
-    clippy::indexing_slicing,
-    missing_docs,
-    reason = "a flight that cannot begin must fail the test"
-)]
 
 use afbc::Profile;
 use afbc_campaign::suite::SUITES;

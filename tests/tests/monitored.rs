@@ -1,5 +1,4 @@
 //! The monitor in flight: faults trip it for what they are and in time, hard flights do not.
-#![allow(clippy::unwrap_used, missing_docs, reason = "a flight that cannot begin must fail the test")]
 
 use afbc::Profile;
 use afbc::Trip;

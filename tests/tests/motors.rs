@@ -1,11 +1,4 @@
 //! Motor controllers that answer, from the plant's rotors to stations, notch and fault detection.
-#![allow(
-    clippy::unwrap_used,
-    clippy::panic,
-    clippy::indexing_slicing,
-    missing_docs,
-    reason = "a test that cannot go on should say why"
-)]
 
 use afbc::Profile;
 use afbc_campaign::random::{Random, Seen};

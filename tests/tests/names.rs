@@ -1,5 +1,4 @@
 //! One name, one meaning: a public type name stands in one crate, but for those listed here with the reason.
-#![allow(clippy::unwrap_used, missing_docs, reason = "tests")]
 
 use proc_macro2::{TokenStream, TokenTree};
 use std::collections::{BTreeMap, BTreeSet};

@@ -1,6 +1,5 @@
 //! Scenarios with `flight_core`: inside the flight core, a controller coasts through outages that it would not survive
 //! alone.
-#![allow(clippy::unwrap_used, missing_docs, reason = "what cannot be flown must stop the test")]
 
 use afbc_scenario::contender::ControllerKind;
 use afbc_scenario::{Outage, Scenario, built_in};

@@ -1,7 +1,7 @@
 //! Every declared parameter is listed in `docs/parameters.md`, with a name that suits ground stations and never
 //! changes, and those that scenario files take in `docs/scenarios.md`.
 //!
-//! `WRITE=1 cargo test -p flight-tests --test parameters` writes the first page and those rows of the other.
+//! `WRITE=1 cargo test -p flight-tests --test all parameters::` writes the first page and those rows of the other.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs)] // tests
 
 use afbc::Profile;
@@ -171,7 +171,7 @@ one: [ARCHITECTURE.md](../ARCHITECTURE.md#adding-things)). This page is generate
 `tests/tests/parameters.rs` compares it with them:
 
 ```sh
-WRITE=1 cargo test -p flight-tests --test parameters
+WRITE=1 cargo test -p flight-tests --test all parameters::
 ```
 
 **Name** is a parameter's name on a ground station and in flash: the prefix of its group, an axis or a part of the
@@ -294,9 +294,9 @@ fn compare(name: &str, declared: impl Fn(&str) -> String) {
         return fs::write(&path, &declared).unwrap();
     }
     for (written, declared) in written.lines().zip(declared.lines()) {
-        assert_eq!(written, declared, "run WRITE=1 cargo test -p flight-tests --test parameters");
+        assert_eq!(written, declared, "run WRITE=1 cargo test -p flight-tests --test all parameters::");
     }
-    assert_eq!(written, declared, "run WRITE=1 cargo test -p flight-tests --test parameters");
+    assert_eq!(written, declared, "run WRITE=1 cargo test -p flight-tests --test all parameters::");
 }
 
 #[test]

@@ -1,11 +1,4 @@
 //! The tables of docs/results.md agree with the code.
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::indexing_slicing,
-    missing_docs,
-    reason = "a page that cannot be read must stop the test"
-)]
 
 use afbc_campaign::compare;
 use afbc_report::results;

@@ -2,14 +2,11 @@
 //! at every tick. Compares the table of `docs/safety.md`, or writes it with `WRITE=1`; `CASE=fence` shows some alone.
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, missing_docs)] // what cannot fly stops the test
 
-mod airborne;
-mod safety_cases;
-
+use crate::airborne::checker::End;
+use crate::airborne::{Checker, STATION, Session, Tick, on_all_cores};
+use crate::safety_cases::{Case, Do, Start, cases};
 use afbc_guidance::FlightMode;
 use afbc_link::{Command, Datum, Height, Uplink};
-use airborne::checker::End;
-use airborne::{Checker, STATION, Session, Tick, on_all_cores};
-use safety_cases::{Case, Do, Start, cases};
 use std::{env, fs};
 
 const PAGE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/safety.md");

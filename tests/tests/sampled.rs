@@ -1,11 +1,5 @@
 //! Flights with a realistic tracker, 100 states per second, each 10 ms late: through the flight core, and as scenarios
 //! say it.
-#![allow(
-    clippy::unwrap_used,
-    clippy::indexing_slicing,
-    missing_docs,
-    reason = "a flight that cannot begin must fail the test"
-)]
 
 use afbc::Profile;
 use afbc_control::FlightController;

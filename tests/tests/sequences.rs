@@ -1,12 +1,10 @@
 //! Random sequences of modes, links, weather and faults in closed loop: what [`airborne::checker`] demands holds at
 //! every tick, and afterwards the vehicle stands disarmed or flies where it should.
 //!
-//! `SEQUENCES=1000 cargo test --release -p flight-tests --test sequences` flies a thousand; `FIRST=17 SEQUENCES=1` the
-//! seventeenth alone.
-#![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, missing_docs)] // what cannot fly stops the test
+//! `SEQUENCES=1000 cargo test --release -p flight-tests --test all sequences::` flies a thousand; `FIRST=17
+//! SEQUENCES=1` the seventeenth alone.
 
-mod airborne;
-
+use crate::airborne;
 use afbc_guidance::FlightMode;
 use afbc_link::{Address, Answer, Command, ControlRequest, Datum, Downlink, Height, Mission, Plan, Storage, Uplink};
 use afbc_station::services::modes;

@@ -1,5 +1,4 @@
 //! The built-in suites fly what they say, and docs/suites.md and docs/faults.md show what flew.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::indexing_slicing, clippy::panic, missing_docs)]
 
 use afbc::Profile;
 use afbc_campaign::compare::{self, standard_and_monitored};

@@ -1,10 +1,4 @@
 //! The costs of the gains that fly, in the training and the held-out flights, are those of docs/tuning.md.
-#![allow(
-    clippy::unwrap_used,
-    clippy::indexing_slicing,
-    missing_docs,
-    reason = "what cannot be flown must stop the test"
-)]
 
 use afbc::Profile;
 use afbc_scenario::contender::{Contender, ControllerKind};

@@ -1,12 +1,5 @@
 //! The files of `vehicles/`: each vehicle is physically possible and has enough thrust, each value has a source, and
 //! the figures of `docs/vehicles.md` follow from them.
-#![allow(
-    clippy::unwrap_used,
-    clippy::panic,
-    clippy::indexing_slicing,
-    missing_docs,
-    reason = "a broken file must stop the test"
-)]
 
 use afbc::guarded::HOVER_AUTHORITY;
 use afbc_control::mixer::HOVER_MARGIN;

@@ -1,5 +1,4 @@
 //! Vehicles of other sizes: each hovers under every law of the profile `flight`, or is refused by name.
-#![allow(clippy::unwrap_used, missing_docs, reason = "a flight that cannot begin must fail the test")]
 
 use afbc::{Guarded, Profile};
 use afbc_plant::Environment;

@@ -1,5 +1,4 @@
 //! What is known ahead makes up for the lag that the filters leave, through the filters themselves.
-#![allow(clippy::unwrap_used, missing_docs)]
 
 use afbc::ahead::Ahead;
 use afbc_control::{Smoother, Smoothing};

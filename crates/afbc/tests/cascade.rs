@@ -2,8 +2,7 @@
 //! the next step. The laws themselves are compared with their equations in `law.rs` and `integral.rs`.
 #![allow(clippy::indexing_slicing, clippy::unwrap_used, missing_docs)] // what cannot be built must stop the test
 
-mod common;
-
+use crate::common::step;
 use afbc::desired::desired_attitude;
 use afbc::integral::IntegralBackstepping;
 use afbc::law::{Context, Tracking};
@@ -12,7 +11,6 @@ use afbc::{Adaptive, Backstepping, Controller, Law, Limits, Profile, Settings};
 use afbc_control::command_filter::Filtered;
 use afbc_control::{FlightController, Validated};
 use afbc_types::{Axis, Inputs, Parameters, PerAxis, Setpoint, State};
-use common::step;
 use nalgebra::{Rotation3, Vector3};
 use proptest::prelude::*;
 

@@ -1,5 +1,4 @@
 //! The disturbance observer against its closed solution, and what it must not take for a disturbance.
-#![allow(clippy::unwrap_used, missing_docs, reason = "an observer that cannot be made must fail the test")]
 
 use afbc::Settings;
 use afbc::disturbance::{ACCELERATION_MAX_M_S2, DisturbanceObserver, ForceObserver, ForceObserverMemory, JUMP_M_S};

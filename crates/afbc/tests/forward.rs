@@ -1,5 +1,4 @@
 //! Jerk and snap to follow, against the derivatives of the setpoint and the filter in double precision.
-#![allow(clippy::unwrap_used, missing_docs)]
 
 use afbc::forward::{Followed, Forward};
 use afbc_types::Setpoint;

@@ -1,10 +1,4 @@
 //! Properties of the fuzzy basis (17)-(19), for every accepted membership and every finite input.
-#![allow(
-    clippy::indexing_slicing,
-    clippy::unwrap_used,
-    missing_docs,
-    reason = "a basis that cannot be built must stop the test"
-)]
 
 use afbc::fuzzy::{Basis, Membership, SPREAD};
 use afbc_types::{Declared, Range};

@@ -2,8 +2,7 @@
 //! leads back. `tests/tests/guarded.rs` has closed loops.
 #![allow(clippy::unwrap_used, missing_docs)] // what cannot be built must stop the test
 
-mod common;
-
+use crate::common::{Stepped, U, check_step, gains, plausible, setpoint, settings, state, step, value};
 use afbc::adaptive::Gains;
 use afbc::disturbance::DisturbanceObserver;
 use afbc::monitor::Bounds;
@@ -13,7 +12,6 @@ use afbc::{Adaptive, AdaptiveEstimate, Controller, Guarded, Profile, Settings, T
 use afbc_control::mixer::HOVER_MARGIN;
 use afbc_control::{FlightController, Health, Smoothing, Validated};
 use afbc_types::{Axis, Inputs, Parameters, PerAxis, Setpoint, State};
-use common::{Stepped, U, check_step, gains, plausible, setpoint, settings, state, step, value};
 use nalgebra::Vector3;
 use proptest::prelude::*;
 

@@ -1,8 +1,7 @@
 //! Limits on the demands of the cascade, for every accepted limit and every plausible state and setpoint.
 #![allow(clippy::indexing_slicing, clippy::unwrap_used, missing_docs)] // what cannot be built must stop the test
 
-mod common;
-
+use crate::common;
 use afbc::integral::IntegralBackstepping;
 use afbc::reference::ReferenceModel;
 use afbc::{Adaptive, Backstepping, Controller, Limits, Profile, Settings, backstepping};

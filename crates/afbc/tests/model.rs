@@ -1,13 +1,11 @@
 //! The nominal model (7) compared with rigid-body mechanics in `f64`, and d eta/dt with the rotation that it describes.
 #![allow(clippy::indexing_slicing, clippy::unwrap_used, missing_docs)] // what cannot be built must stop the test
 
-mod common;
-
+use crate::common::{U, spread, step};
 use afbc::model::{ModelConstants, RollPitch, TILT_COSINE_MIN};
 use afbc::{Adaptive, Controller, Profile, Settings};
 use afbc_control::Validated;
 use afbc_types::{Axis, Declaration, Parameters, Setpoint, State};
-use common::{U, spread, step};
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use proptest::prelude::*;
 

@@ -1,5 +1,4 @@
 //! The observer of moments against its closed solution, and what it must not take for a moment.
-#![allow(clippy::unwrap_used, missing_docs, reason = "an observer that cannot be made must fail the test")]
 
 use afbc::disturbance::{AGE_S, DisturbanceObserver, MomentObserver, Turning};
 use afbc_types::{Inputs, Parameters};

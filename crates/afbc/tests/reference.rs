@@ -1,10 +1,4 @@
 //! Properties of the reference model.
-#![allow(
-    clippy::unwrap_used,
-    clippy::indexing_slicing,
-    missing_docs,
-    reason = "what cannot be built must stop the test"
-)]
 
 use afbc::limits::Limits;
 use afbc::reference::{Detours, ReferenceFilter, ReferenceModel};

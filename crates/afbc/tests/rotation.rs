@@ -1,5 +1,4 @@
 //! Errors of the attitude by rotation, against quaternions and finite differences in double precision.
-#![allow(missing_docs)]
 
 use afbc::model::RollPitch;
 use afbc::rotation::{Turn, error};

@@ -1,8 +1,7 @@
 //! The safeguards compared with the equations in `safeguards.rs`, in `f64`, and their consequences.
 #![allow(clippy::indexing_slicing, clippy::unwrap_used, missing_docs)] // what cannot be built must stop the test
 
-mod common;
-
+use crate::common::{U, gains_of_one};
 use afbc::adaptive::Gains;
 use afbc::disturbance::DisturbanceObserver;
 use afbc::fuzzy::{Basis, Firing};
@@ -12,7 +11,6 @@ use afbc::model::RollPitch;
 use afbc::{Adaptive, AdaptiveEstimate, Controller, Law, Profile, Safeguards, Settings};
 use afbc_control::{FlightController, Validated};
 use afbc_types::{Axis, Parameters, PerAxis, Setpoint, State};
-use common::{U, gains_of_one};
 use nalgebra::{Matrix3, Vector3};
 use proptest::prelude::*;
 

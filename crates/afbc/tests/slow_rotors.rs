@@ -1,5 +1,4 @@
 //! Gains and settings for rotors that lag more than those of the paper's vehicle.
-#![allow(missing_docs)]
 
 use afbc::disturbance::DisturbanceObserver;
 use afbc::{LAG_S, Profile, Settings, slowness};

@@ -1,13 +1,11 @@
 //! Properties of one controller step, for every law: any input gives valid motor commands.
 #![allow(clippy::unwrap_used, missing_docs)] // a controller that cannot be built must stop the test
 
-mod common;
-
+use crate::common::{check_step, gains, plausible, setpoint, settings, state, step, value};
 use afbc::adaptive::Gains;
 use afbc::{Adaptive, AdaptiveEstimate, Backstepping, Cascade, Controller, Law, Profile, Settings};
 use afbc_control::{Health, Validated};
 use afbc_types::{Axis, Parameters, PerAxis, Setpoint, State};
-use common::{check_step, gains, plausible, setpoint, settings, state, step, value};
 use core::any::Any;
 use proptest::prelude::*;
 

@@ -1,6 +1,5 @@
 //! Desired roll and pitch turn the thrust along the acceleration, and their derivatives are those of finite differences
 //! in double precision.
-#![allow(clippy::indexing_slicing, missing_docs)]
 
 use afbc::tilt::Tilt;
 use nalgebra::{Rotation3, Vector3};

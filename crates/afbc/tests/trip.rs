@@ -1,5 +1,4 @@
 //! Reasons of a trip, as a station shows them.
-#![allow(missing_docs)]
 
 use afbc::Trip;
 use afbc_types::Axis;

@@ -1,6 +1,5 @@
 //! Known drag: what it adds to the derivatives of the thrust, against finite differences, and its moment, against that
 //! of a force above the centre of mass.
-#![allow(missing_docs)]
 
 use afbc_control::drag::KnownDrag;
 use nalgebra::{Unit, Vector3};

@@ -1,6 +1,5 @@
 //! Largest error of every function of `afbc_control::math` over its documented range, against `f64`. The bounds are
 //! the documented figures.
-#![allow(missing_docs)]
 
 use afbc_control::math;
 use afbc_control::nalgebra::Vector3;

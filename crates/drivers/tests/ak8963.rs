@@ -1,13 +1,10 @@
 //! MPU-9250 with AK8963 against their registers.
-#![allow(clippy::expect_used, clippy::panic, clippy::indexing_slicing, reason = "tests")]
 
-mod rig;
-
+use crate::rig::mpu_registers::{Magnetometer, Registers};
+use crate::rig::{Rig, reads, refuses_another, run, survives_all_troubles};
 use afbc_drivers::PartFault;
 use afbc_drivers::ak8963::{Mpu9250Ak8963, Mpu9250Reading};
 use nalgebra::Vector3;
-use rig::mpu_registers::{Magnetometer, Registers};
-use rig::{Rig, reads, refuses_another, run, survives_all_troubles};
 
 /// Along the IMU's axes.
 const FIELD_UT: [f64; 3] = [20.0, -7.0, 44.0];

@@ -1,6 +1,5 @@
 //! Whatever barometers and magnetometers answer, their drivers do not panic, and what they read is within the range of
 //! the part's data sheet.
-#![allow(clippy::expect_used, clippy::panic, clippy::indexing_slicing, reason = "tests")]
 
 use afbc_drivers::bmp3::{Bmp388, Bmp390};
 use afbc_drivers::bmp280::Bmp280;

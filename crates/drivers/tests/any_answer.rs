@@ -1,15 +1,12 @@
 //! No answer of an IMU, and nothing in its registers, makes a driver panic or read what the part cannot measure.
-#![allow(clippy::expect_used, clippy::panic, clippy::indexing_slicing, reason = "tests")]
 
-mod rig;
-
+use crate::rig::{Model, Rig, run};
 use afbc_drivers::ak8963::Mpu9250Ak8963;
 use afbc_drivers::bmi270::Bmi270;
 use afbc_drivers::icm426xx::{Icm42605, Icm42688p};
 use afbc_drivers::mpu::{Icm20602, Icm20608, Icm20689, Mpu6000, Mpu6500, Mpu9250};
 use afbc_drivers::{InertialReading, PartFault, READ_MAX, SensorPart, Step};
 use proptest::prelude::*;
-use rig::{Model, Rig, run};
 
 /// A part that passes its set-up; everything else in its registers is anything.
 struct Anything {

@@ -1,5 +1,4 @@
 //! A battery's voltage and current from a converter's numbers.
-#![allow(clippy::expect_used, reason = "a test that cannot go on should say why")]
 
 use afbc_drivers::PartFault;
 use afbc_drivers::battery::{BatteryPins, BatteryScale, BatterySensor, FILTER_S};

@@ -1,16 +1,12 @@
 //! BMI270 against its registers, as BST-BMI270-DS000 has them.
-#![allow(clippy::expect_used, clippy::panic, clippy::indexing_slicing, reason = "tests")]
 
-mod bmi270_model;
-mod rig;
-
+use crate::bmi270_model::Bmi270Registers;
+use crate::rig::{Model, Rig, comes_back_at_once, noise, reads, refuses_another, run, survives_all_troubles};
 use afbc_drivers::bmi270::Bmi270;
 use afbc_drivers::{InertialReading, PartFault, Registers as _, SensorPart, SpiRegisters, Step};
-use bmi270_model::Bmi270Registers;
 use embassy_futures::block_on;
 use embedded_hal_async::spi::{ErrorType, Operation, SpiDevice};
 use nalgebra::Vector3;
-use rig::{Model, Rig, comes_back_at_once, noise, reads, refuses_another, run, survives_all_troubles};
 
 impl Model for Bmi270Registers {
     fn read(&mut self, now_us: u64, register: u8, into: &mut [u8]) {

@@ -1,11 +1,8 @@
 //! BMP280 against its registers, as BST-BMP280-DS001 has them, and its whole-number compensation.
-#![allow(clippy::expect_used, clippy::panic, clippy::indexing_slicing, reason = "tests")]
 
-mod rig;
-
+use crate::rig::{Model, Rig, noise, refuses_another, run, survives_all_troubles};
 use afbc_drivers::PressureReading;
 use afbc_drivers::bmp280::Bmp280;
-use rig::{Model, Rig, noise, refuses_another, run, survives_all_troubles};
 
 /// dig_T1 to T3 and P1 to P9.
 type Trim = [i64; 12];

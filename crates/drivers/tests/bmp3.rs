@@ -1,11 +1,8 @@
 //! BMP388 and BMP390 against their registers, as BST-BMP388-DS001 has them.
-#![allow(clippy::expect_used, clippy::panic, clippy::indexing_slicing, reason = "tests")]
 
-mod rig;
-
+use crate::rig::{Model, Rig, noise, refuses_another, run, survives_all_troubles};
 use afbc_drivers::bmp3::{Bmp388, Bmp390};
 use afbc_drivers::{PartFault, PressureReading};
-use rig::{Model, Rig, noise, refuses_another, run, survives_all_troubles};
 
 /// NVM_PAR_T1 to T3 and P1 to P11.
 type Trim = [i64; 14];

@@ -1,5 +1,4 @@
 //! A part's interrupt on a wire that works, breaks, comes back, or is noisy, in a time of its own.
-#![allow(clippy::expect_used, clippy::indexing_slicing, reason = "tests")]
 
 use afbc_drivers::PartTiming;
 use afbc_drivers::data_ready::{DataReady, Edge};

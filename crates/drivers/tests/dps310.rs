@@ -1,11 +1,8 @@
 //! DPS310 and SPL06-001 against their registers, as Infineon's data sheet V1.2 has them.
-#![allow(clippy::expect_used, clippy::panic, clippy::indexing_slicing, reason = "tests")]
 
-mod rig;
-
+use crate::rig::{Model, Rig, noise, refuses_another, run, survives_all_troubles};
 use afbc_drivers::dps310::{Dps310, Spl06};
 use afbc_drivers::{PartFault, PressureReading};
-use rig::{Model, Rig, noise, refuses_another, run, survives_all_troubles};
 
 /// Table 16: time of a measurement of 1, 2, 4 ... 128 samples.
 const TIMES_US: [u64; 8] = [3_600, 5_200, 8_400, 14_800, 27_600, 53_200, 104_400, 206_800];

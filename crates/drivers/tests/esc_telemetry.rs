@@ -1,5 +1,4 @@
 //! Telemetry of motor controllers: bytes, checksums, turns.
-#![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs, reason = "tests")]
 
 use afbc_drivers::esc_telemetry::{ANSWER_LEN, EscLine, EscReading};
 use proptest::collection::vec;

@@ -1,5 +1,4 @@
 //! The bytes that cross SPI and I2C, as the parts' data sheets draw them.
-#![allow(clippy::expect_used, clippy::panic, clippy::indexing_slicing, reason = "tests")]
 
 use afbc_drivers::bmp3::Bmp388;
 use afbc_drivers::dps310::Dps310;

@@ -1,12 +1,9 @@
 //! ICM-42688-P and ICM-42605 against their registers, as DS-000347 has them.
-#![allow(clippy::expect_used, clippy::panic, clippy::indexing_slicing, reason = "tests")]
 
-mod rig;
-
+use crate::rig::{Model, Rig, Trouble, comes_back_at_once, noise, reads, refuses_another, run, survives_all_troubles};
 use afbc_drivers::icm426xx::{Icm42605, Icm42688p};
 use afbc_drivers::{InertialReading, PartFault};
 use embassy_futures::block_on;
-use rig::{Model, Rig, Trouble, comes_back_at_once, noise, reads, refuses_another, run, survives_all_troubles};
 
 /// Bank 0; other banks are selected and then left alone.
 struct Registers {

@@ -1,8 +1,6 @@
 //! IST8310 against its registers, as its data sheet has them.
-#![allow(clippy::expect_used, clippy::panic, clippy::indexing_slicing, reason = "tests")]
 
-mod rig;
-
+use crate::rig;
 use afbc_drivers::ist8310::Ist8310;
 use afbc_drivers::{MagneticReading, PartFault};
 use nalgebra::Vector3;

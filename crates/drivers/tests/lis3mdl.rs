@@ -1,13 +1,10 @@
 //! LIS3MDL against its registers, as DS9463 has them.
-#![allow(clippy::expect_used, clippy::panic, clippy::indexing_slicing, reason = "tests")]
 
-mod rig;
-
+use crate::rig::{Model, Rig, noise, refuses_another, run, survives_all_troubles};
 use afbc_drivers::lis3mdl::Lis3mdl;
 use afbc_drivers::{MagneticReading, PartFault};
 use embassy_futures::block_on;
 use nalgebra::Vector3;
-use rig::{Model, Rig, noise, refuses_another, run, survives_all_troubles};
 
 const FIELD_UT: [f64; 3] = [22.0, -3.0, -42.0];
 

@@ -1,14 +1,11 @@
 //! The family of the MPU-6000 against its registers.
-#![allow(clippy::expect_used, clippy::panic, clippy::indexing_slicing, reason = "tests")]
 
-mod rig;
-
+use crate::rig::mpu_registers::Registers;
+use crate::rig::{Rig, comes_back_at_once, reads, refuses_another, run, survives_all_troubles};
 use afbc_drivers::mpu::{Icm20602, Icm20608, Icm20689, Mpu, Mpu6000, Mpu6500, Mpu9250};
 use afbc_drivers::{InertialReading, PartFault, SensorPart};
 use embassy_futures::block_on;
 use nalgebra::Vector3;
-use rig::mpu_registers::Registers;
-use rig::{Rig, comes_back_at_once, reads, refuses_another, run, survives_all_troubles};
 
 fn right(reading: &InertialReading) -> bool {
     reads(reading, [10.0, -250.0, 0.5], [0.1, -0.2, 1.0], 31.0)

@@ -1,11 +1,8 @@
 //! MS5611 against its commands, as ENG_DS_MS5611-01BA03_B3 has them.
-#![allow(clippy::expect_used, clippy::panic, clippy::indexing_slicing, reason = "tests")]
 
-mod rig;
-
+use crate::rig::{Model, Rig, noise, run, survives_all_troubles};
 use afbc_drivers::ms5611::Ms5611;
 use afbc_drivers::{PartFault, PressureReading, SensorPart};
-use rig::{Model, Rig, noise, run, survives_all_troubles};
 
 /// C1 to C6: the example of figure 2, a common part's, small and large ones.
 const SETS: [[u16; 6]; 4] = [

@@ -1,10 +1,4 @@
 //! Fixes of a receiver, from sentences written by hand.
-#![allow(
-    clippy::expect_used,
-    clippy::panic,
-    clippy::indexing_slicing,
-    reason = "a test that cannot go on should say why"
-)]
 
 use afbc_drivers::FixReading;
 use afbc_drivers::nmea::{NmeaDecoder, RANGE_SIGMA_M};

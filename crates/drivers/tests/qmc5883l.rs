@@ -1,12 +1,9 @@
 //! QMC5883L against its registers, as its data sheet 1.0 has them.
-#![allow(clippy::expect_used, clippy::panic, clippy::indexing_slicing, reason = "tests")]
 
-mod rig;
-
+use crate::rig::{Model, Rig, noise, refuses_another, run, survives_all_troubles};
 use afbc_drivers::qmc5883l::Qmc5883l;
 use afbc_drivers::{MagneticReading, PartFault};
 use nalgebra::Vector3;
-use rig::{Model, Rig, noise, refuses_another, run, survives_all_troubles};
 
 const FIELD_UT: [f64; 3] = [22.0, -3.0, -42.0];
 

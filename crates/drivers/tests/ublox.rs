@@ -1,18 +1,10 @@
 //! u-blox receivers: found, configured and watched, on a line with faults; messages as another implementation has them.
-#![allow(
-    clippy::expect_used,
-    clippy::panic,
-    clippy::indexing_slicing,
-    reason = "a test that cannot go on should say why"
-)]
 
-mod ublox_model;
-
+use crate::ublox_model::{Generation, Model, Truth, frame, solution};
 use afbc_drivers::FixReading;
 use afbc_drivers::ublox::{BAUDS, ReceiverAction, UbxReceiver};
 use afbc_types::Stamped;
 use proptest::prelude::*;
-use ublox_model::{Generation, Model, Truth, frame, solution};
 
 const MS: u64 = 1000;
 const SECOND: u64 = 1000 * MS;

@@ -1,5 +1,4 @@
 //! Realistic clock faults of trackers, each in a minute of hover: the modes of the flight, and the ages of its states.
-#![allow(clippy::expect_used, reason = "a test that cannot go on should say why")]
 
 use afbc::{Adaptive, Controller, Profile};
 use afbc_flight_core::clock::{BACK_SPREAD_US, BACK_US, NEW_COUNT, SILENCE_US};

@@ -1,5 +1,4 @@
 //! Replies on bidirectional DSHOT, against an encoder of their description: bits, codes, edges and samples.
-#![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs, reason = "tests")]
 
 use afbc_flight_core::dshot_reply::{DshotReply, EDGES_MAX, REPLY_BITS, ReplyError};
 use proptest::collection::vec;

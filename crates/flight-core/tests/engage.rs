@@ -1,5 +1,4 @@
 //! The request to engage reaches the controller once, only in flight, and is answered.
-#![allow(clippy::expect_used, reason = "a test that cannot go on should say why")]
 
 use afbc_control::{Action, FlightController, Mixer, Trace};
 use afbc_flight_core::{

@@ -1,6 +1,5 @@
 //! A link that drops, delays, corrupts or reorders frames, one fault per case: MAVLink frames through decoder and tick.
 //! The vehicle rests at its setpoint; closed loops are tested elsewhere.
-#![allow(clippy::expect_used, clippy::indexing_slicing, reason = "a test that cannot go on should say why")]
 
 use afbc::{Adaptive, Controller, Profile};
 use afbc_flight_core::{

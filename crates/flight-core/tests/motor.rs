@@ -1,5 +1,4 @@
 //! Rotor speed to throttle, frame and waveform.
-#![allow(clippy::expect_used, reason = "a test that cannot go on should say why")]
 
 use afbc_flight_core::dshot::{DshotFrame, DshotRate, Timing};
 use afbc_flight_core::motor::{Curve, Motor};

@@ -1,5 +1,4 @@
 //! Which output drives which rotor, by corners as the pages of Betaflight and ArduPilot draw them.
-#![allow(clippy::indexing_slicing, reason = "tests")]
 
 use afbc_flight_core::numbering::{ARDUPILOT, BETAFLIGHT, rotors_of_outputs};
 use afbc_types::{PLUS, Rotor};

@@ -1,6 +1,5 @@
 //! The observer alone, and inside the flight core with whatever inputs. `crates/sim/tests/observer.rs` compares it with
 //! the plant.
-#![allow(clippy::expect_used, reason = "a test that cannot go on should say why")]
 
 use afbc::monitor::Bounds;
 use afbc::{Guarded, Profile, guarded};

@@ -1,5 +1,4 @@
 //! Pulses of PWM and OneShot125, by what motor controllers accept: 1000 to 2000 us and 125 to 250 us.
-#![allow(clippy::expect_used, reason = "a test that cannot go on should say why")]
 
 use afbc_flight_core::protocol::{MotorProtocol, MotorSignal};
 use afbc_flight_core::pulse::{PulseFormat, PulseTiming};

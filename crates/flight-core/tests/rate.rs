@@ -1,5 +1,4 @@
 //! Limits of the rate, and ticks at wrong times.
-#![allow(clippy::indexing_slicing, reason = "a test that cannot go on should say why")]
 
 use afbc_flight_core::rate::{Counter, EARLY_US, LATE_US, RateReport, TICKS_MAX, TICKS_MIN, WINDOW_US};
 use proptest::prelude::*;

@@ -1,5 +1,4 @@
 //! An armed vehicle that rests on the ground: its motors idle, it counts as on the ground, and the law begins afresh.
-#![allow(clippy::expect_used, reason = "a test that cannot go on should say why")]
 
 use afbc::reference::ReferenceModel;
 use afbc::{Adaptive, Controller, Profile, Settings};

@@ -1,6 +1,5 @@
 //! Detection of a vehicle that has tipped over, stands or falls, and of a frozen tracker, each with made-up states.
 //! `tests/tests/frozen.rs` has closed loops.
-#![allow(clippy::expect_used, clippy::indexing_slicing, reason = "a test that cannot go on should say why")]
 
 use afbc_control::{Action, FlightController, Mixer, Trace};
 use afbc_flight_core::landing::LandDetector;

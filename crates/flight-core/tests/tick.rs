@@ -1,5 +1,4 @@
 //! The control tick compared with the law's step, and blind flight with a plant.
-#![allow(clippy::expect_used, reason = "a test that cannot go on should say why")]
 
 use afbc::reference::ReferenceModel;
 use afbc::{Adaptive, Controller, Profile, Settings};

@@ -1,14 +1,11 @@
 //! How modes and flights end, what bars the next one, and where the setpoint begins: with a vehicle that is where the
 //! test puts it.
-#![allow(clippy::unwrap_used, reason = "tests")]
 
-mod fixture;
-
+use crate::fixture::*;
 use afbc_flight_core::landing::LEFT_M;
 use afbc_flight_core::{Mode, Refusal, Request, Stamped, Ticketed};
 use afbc_guidance::*;
 use afbc_types::{Setpoint, State};
-use fixture::*;
 use nalgebra::Vector3;
 
 /// When the motors stop, a mode that flies by itself becomes hold, and what was ordered is forgotten.

@@ -1,5 +1,4 @@
 //! Whatever comes in, setpoints are finite and within the limits.
-#![allow(clippy::unwrap_used, reason = "tests")]
 
 use afbc_flight_core::{Mode, Queue, Stamped, Ticketed};
 use afbc_guidance::*;

@@ -1,12 +1,9 @@
 //! Circles, waits, turns and jumps; and what the uploaded geofence stops.
-#![allow(clippy::unwrap_used, clippy::indexing_slicing, reason = "tests")]
 
-mod bench;
-
+use crate::bench::{Bench, motion, settings};
 use afbc_flight_core::Mode;
 use afbc_guidance::*;
 use afbc_types::Choice;
-use bench::{Bench, motion, settings};
 use nalgebra::Vector3;
 use std::f32::consts::{FRAC_PI_2, PI, TAU};
 

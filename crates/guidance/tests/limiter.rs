@@ -1,6 +1,5 @@
 //! The trajectory limiter: its limits hold, its outputs fit one another, it arrives without overshoot, and what is a
 //! flight already passes unchanged.
-#![allow(clippy::unwrap_used, reason = "tests")]
 
 use afbc_guidance::{Limiter, LimiterTarget, Limits};
 use afbc_types::{Setpoint, State};

@@ -1,11 +1,8 @@
 //! Every mode, flown by a point mass, ends where it should.
-#![allow(clippy::unwrap_used, reason = "tests")]
 
-mod bench;
-
+use crate::bench::{Bench, motion, settings};
 use afbc_flight_core::Mode;
 use afbc_guidance::*;
-use bench::{Bench, motion, settings};
 use nalgebra::{UnitQuaternion, Vector3};
 
 #[test]

@@ -1,12 +1,9 @@
 //! The safety net: every cause with every action, alone and in pairs; announcements; checks before arming.
-#![allow(clippy::unwrap_used, clippy::indexing_slicing, reason = "tests")]
 
-mod bench;
-
+use crate::bench::{Bench, motion, settings};
 use afbc_flight_core::{Mode, Refusal};
 use afbc_guidance::*;
 use afbc_types::{Choice, Declared, State};
-use bench::{Bench, motion, settings};
 use nalgebra::Vector3;
 
 /// Causes that a test can bring about in flight, with the numbers of their parameter and the mode of each.

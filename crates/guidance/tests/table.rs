@@ -1,13 +1,10 @@
 //! The table of docs/modes.md, written out once more, for every mode and all conditions; and random walks of a whole
 //! vehicle, whose every change of mode must be one of the table's and be announced.
-#![allow(clippy::unwrap_used, clippy::indexing_slicing, reason = "tests")]
 
-mod bench;
-
+use crate::bench::{Bench, motion, settings};
 use afbc_flight_core::{Mode, Stamped, Ticketed};
 use afbc_guidance::table::{forced, select};
 use afbc_guidance::*;
-use bench::{Bench, motion, settings};
 use nalgebra::{UnitQuaternion, Vector3};
 use proptest::prelude::*;
 use std::collections::BTreeSet;

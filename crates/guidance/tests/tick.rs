@@ -1,13 +1,10 @@
 //! The tick of the guidance with a vehicle that is where the test puts it: orders with their bounds, times, home, and
 //! gaps. What ends is in `endings.rs`.
-#![allow(clippy::unwrap_used, reason = "tests")]
 
-mod fixture;
-
+use crate::fixture::*;
 use afbc_flight_core::{Mode, Request, Stamped};
 use afbc_guidance::*;
 use afbc_types::State;
-use fixture::*;
 use nalgebra::Vector3;
 
 /// Numbers in their ranges only, to the ends of these.

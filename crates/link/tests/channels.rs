@@ -1,10 +1,4 @@
 //! Channels of radio control on the wire, beside the generated dialect.
-#![allow(
-    clippy::unwrap_used,
-    clippy::indexing_slicing,
-    clippy::panic,
-    reason = "a test that cannot go on should say why"
-)]
 
 use afbc_link::{
     Address, ChannelsOverride, Decoder, Downlink, ExternalTarget, FRAME_MAX, RADIO_CHANNELS, RadioChannels, Sender,

@@ -1,13 +1,6 @@
 //! Decoding of a stream: fragments, noise, corruption, truncation, frames within frames.
-#![allow(
-    clippy::expect_used,
-    clippy::indexing_slicing,
-    clippy::panic,
-    reason = "a test that cannot go on should say why"
-)]
 
-mod reference;
-
+use crate::reference;
 use afbc_link::{Address, Command, Counters, Decoder, FRAME_MAX, Message as _, Sender, Uplink};
 use afbc_types::{Pose, PoseSigmas, Setpoint, State};
 use mavlink::Message as _;

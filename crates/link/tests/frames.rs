@@ -1,5 +1,4 @@
 //! Conversion of frames: known attitudes, and `f64` rotation matrices as the oracle.
-#![allow(clippy::expect_used, reason = "a test that cannot go on should say why")]
 
 use afbc_link::frames::{Odometry, flip};
 use afbc_types::State;

@@ -1,5 +1,4 @@
 //! HIGHRES_IMU, against the `mavlink` crate's own reading of it.
-#![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs, reason = "tests")]
 
 use afbc_link::{Address, Decoder, Downlink, FRAME_MAX, InertialSample, Sender};
 use mavlink::dialects::common::HIGHRES_IMU_DATA;

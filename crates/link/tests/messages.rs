@@ -1,5 +1,4 @@
 //! Every message of both directions: whatever payload is understood, what was understood of it can be sent on.
-#![allow(clippy::expect_used, clippy::indexing_slicing, reason = "a test that cannot go on should say why")]
 
 use afbc_link::{Address, Command, Decoder, Downlink, FRAME_MAX, Message, Sender, Transfer, Uplink};
 use core::fmt::Debug;

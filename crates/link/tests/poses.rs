@@ -1,10 +1,4 @@
 //! Poses of a tracker: bytes from the specification, frames with `f64` rotation matrices as the oracle, covariances.
-#![allow(
-    clippy::expect_used,
-    clippy::indexing_slicing,
-    clippy::panic,
-    reason = "a test that cannot go on should say why"
-)]
 
 use afbc_link::{Address, Counters, Decoder, FRAME_MAX, Sender, Uplink};
 use afbc_types::{Pose, PoseSigmas, State};

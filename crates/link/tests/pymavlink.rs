@@ -1,6 +1,5 @@
 //! Frames of MAVLink's reference implementation (`reference/frames.py`): read as they should be, and written again
 //! with the same bytes.
-#![allow(clippy::expect_used, clippy::panic, clippy::indexing_slicing, reason = "a test that cannot go on says why")]
 
 use afbc_link::telemetry::{
     ActuatorOutputs, AttitudeQuaternion, BatteryStatus, EstimatorStatus, Fix, GlobalOrigin, GlobalPosition, Home,

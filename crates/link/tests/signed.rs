@@ -1,5 +1,4 @@
 //! Signatures: those of MAVLink's reference implementation (`reference/signed.py`), and what a changed bit does.
-#![allow(clippy::expect_used, clippy::panic, clippy::indexing_slicing, reason = "a test that cannot go on says why")]
 
 use afbc_link::{Address, Decoder, Downlink, Key, Message, SIGNED_FRAME_MAX, Sender, Stamp, Uplink};
 use proptest::prelude::*;

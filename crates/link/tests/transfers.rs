@@ -1,6 +1,4 @@
 //! Files and logs on the wire, beside the `mavlink` crate's own idea of them.
-#![allow(clippy::expect_used, clippy::indexing_slicing, clippy::panic, missing_docs, reason = "tests")]
-#![allow(deprecated, reason = "messages that stations still send")]
 
 use afbc_link::{
     Address, ComponentMetadata, Decoder, FRAME_MAX, FileOpcode, FilePacket, LogData, LogEntry, LogMessage, LogRequest,

@@ -1,12 +1,5 @@
 //! Bytes on the wire compared with the `mavlink` crate's own serialiser, and with the specification where that crate
 //! has none: extension fields, masks, frames, targets.
-#![allow(deprecated, reason = "frames that stations still use")]
-#![allow(
-    clippy::expect_used,
-    clippy::indexing_slicing,
-    clippy::panic,
-    reason = "a test that cannot go on should say why"
-)]
 
 use afbc_link::telemetry::OrbitStatus;
 use afbc_link::{

@@ -1,16 +1,13 @@
 //! The answer of a single step to an error: its direction, its symmetry, and its size by formulas in `f64`.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing, reason = "tests")]
 
-mod harness;
-
+use crate::harness::steps::{WEIGHT_N, after, dfbc, euler, goodarzi, indi, l1, lee, mpc, pid, vector};
+use crate::harness::{Random, vehicle};
 use afbc_control::{Action, Trace};
 use afbc_peers::attitude::{facing, tilt_and_yaw_error, tilt_prioritised_error};
 use afbc_peers::flatness::flat;
 use afbc_peers::limits::Limits;
 use afbc_peers::{dfbc, indi};
 use afbc_types::{Setpoint, State};
-use harness::steps::{WEIGHT_N, after, dfbc, euler, goodarzi, indi, l1, lee, mpc, pid, vector};
-use harness::{Random, vehicle};
 use nalgebra::{Rotation3, Vector3};
 
 /// Runs `check` on the first and on a later step of every controller.

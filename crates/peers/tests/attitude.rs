@@ -1,14 +1,11 @@
 //! Attitudes, their errors and their rates against formulas in `f64`.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing, reason = "tests")]
 
-mod harness;
-
+use crate::harness::Random;
+use crate::harness::steps::{euler, vector};
 use afbc_peers::attitude::{facing, geometric_error, quaternion, r_earth_body, roll_pitch, tilt_prioritised_error};
 use afbc_peers::flatness::flat;
 use afbc_peers::geometric;
 use afbc_types::Setpoint;
-use harness::Random;
-use harness::steps::{euler, vector};
 use nalgebra::{Matrix3, Rotation3, Unit, Vector3};
 
 /// Returns R = Rz Ry Rx in `f64`, from angles that an `f32` state can hold.

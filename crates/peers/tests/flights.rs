@@ -1,18 +1,15 @@
 //! Closed-loop flights of the rigid body with a rotor lag of 20 ms: convergence and accuracy of each controller.
 //!
 //! The bounds are about a fifth above the measured values, so that a deterioration fails the test.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing, reason = "tests")]
 
-mod harness;
-
+use crate::harness::{
+    Figures, Random, Rig, SETTINGS, at, calm, circle, disturbed, fly, fly_on, hover, paper, paper_start, vehicle,
+};
 use afbc_control::FlightController;
 use afbc_peers::{Dfbc, Geometric, Indi, L1, Mpc, Pid, dfbc, geometric, indi, l1, mpc, pid};
 use afbc_plant::{Environment, Gust, GustKind, Motion, ParameterChange, PlantParameter};
 use afbc_types::{Axis, Parameters, Setpoint};
 use core::f64::consts::FRAC_PI_2;
-use harness::{
-    Figures, Random, Rig, SETTINGS, at, calm, circle, disturbed, fly, fly_on, hover, paper, paper_start, vehicle,
-};
 use nalgebra::{Vector3, Vector4};
 
 fn pid() -> Pid {

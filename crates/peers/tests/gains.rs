@@ -1,12 +1,9 @@
 //! Gains: declared alike in all laws, and refused by name.
-#![allow(clippy::unwrap_used, reason = "tests")]
 
-mod harness;
-
+use crate::harness::{SETTINGS, vehicle};
 use afbc_peers::{Dfbc, Geometric, Indi, L1, Mpc, Pid, dfbc, geometric, indi, l1, mpc, pid};
 use afbc_types::{Declaration, Declared, OutOfRange, Range, Value, ValueMut};
 use core::convert::Infallible;
-use harness::{SETTINGS, vehicle};
 use std::collections::BTreeMap;
 
 /// Gains of the same key have the same name, unit and range in all controllers.

@@ -1,13 +1,10 @@
 //! Any input gives finite rotor speeds within their limits.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing, reason = "tests")]
 
-mod harness;
-
+use crate::harness::{SETTINGS, vehicle};
 use afbc_control::{FlightController, Settings, Validated};
 use afbc_peers::{Dfbc, Geometric, Indi, L1, Mpc, Pid, dfbc, geometric, indi, l1, mpc, pid};
 use afbc_types::{Declared, Range, Setpoint, State, ValueMut};
 use core::convert::Infallible;
-use harness::{SETTINGS, vehicle};
 use nalgebra::Vector3;
 use proptest::prelude::*;
 

@@ -1,14 +1,11 @@
 //! What the laws learn from step to step: integrals, L1's disturbances, INDI's increments.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing, reason = "tests")]
 
-mod harness;
-
+use crate::harness::steps::{WEIGHT_N, dfbc, goodarzi, indi, l1, pid, vector};
+use crate::harness::{Random, SETTINGS, vehicle};
 use afbc_control::{FlightController, Validated};
 use afbc_peers::attitude::r_earth_body;
 use afbc_peers::{L1, geometric, indi, l1, pid};
 use afbc_types::{Setpoint, State};
-use harness::steps::{WEIGHT_N, dfbc, goodarzi, indi, l1, pid, vector};
-use harness::{Random, SETTINGS, vehicle};
 use nalgebra::Vector3;
 
 #[test]

@@ -1,13 +1,10 @@
 //! MPC against the same problem solved in double precision by other means.
-#![allow(clippy::indexing_slicing, clippy::unwrap_used, missing_docs)]
 
-mod harness;
-
+use crate::harness::{Random, SETTINGS, vehicle};
 use afbc_control::{FlightController, Validated};
 use afbc_peers::mpc::Gains;
 use afbc_peers::{Mpc, mpc};
 use afbc_types::{Setpoint, State};
-use harness::{Random, SETTINGS, vehicle};
 use nalgebra::{Matrix3, Vector3};
 
 /// The model of one axis, integrated finely, and the weights of its cost.

@@ -1,5 +1,4 @@
 //! Gains for slower rotors: every gain by its power of time, told from its key rather than from its unit.
-#![allow(missing_docs)]
 
 use afbc_peers::{dfbc, geometric, indi, l1, mpc, pid, slowed};
 use afbc_types::Declared;

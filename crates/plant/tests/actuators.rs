@@ -1,5 +1,4 @@
 //! Rotors compared with closed forms, and the battery's energy balance.
-#![allow(clippy::unwrap_used, clippy::float_cmp, missing_docs)]
 
 use afbc_plant::{Battery, Charge, Environment, Motion, Plant, PlantModel, Realism, RotorFault, Rotors, Sag, Start};
 use afbc_types::{Parameters, RotorSpeeds};

@@ -1,10 +1,4 @@
 //! Conservation laws and closed-form solutions.
-#![allow(
-    clippy::indexing_slicing,
-    clippy::unwrap_used,
-    missing_docs,
-    reason = "a plant that cannot be built must stop the test"
-)]
 
 use afbc_plant::integrate::rk4;
 use afbc_plant::{Environment, Load, Motion, Plant, PlantModel, rigid_body, simplified};

@@ -1,5 +1,4 @@
 //! Ground contact: standing, landing, sliding; and ground effect.
-#![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs)]
 
 use afbc_plant::{
     Contact, Environment, GroundEffect, Motion, ParameterChange, Payload, Plant, PlantModel, PlantParameter, Realism,

@@ -1,5 +1,4 @@
 //! Drag compared with closed forms.
-#![allow(clippy::unwrap_used, missing_docs)]
 
 use afbc_plant::{Drag, Environment, Gust, GustKind, Motion, Plant, PlantModel, Realism, Wind};
 use afbc_types::{Axis, Parameters, RotorSpeeds};

@@ -1,10 +1,4 @@
 //! Gusts and parameter changes: size, exact onset and exact end.
-#![allow(
-    clippy::indexing_slicing,
-    clippy::unwrap_used,
-    missing_docs,
-    reason = "an environment that cannot be built must stop the test"
-)]
 
 use afbc_plant::{Environment, Gust, GustKind, Motion, ParameterChange, Plant, PlantModel, PlantParameter};
 use afbc_types::{Axis, Parameters, RotorSpeeds};

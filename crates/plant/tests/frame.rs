@@ -1,6 +1,5 @@
 //! Rotors anywhere: forces and moments of any frame against the sum of r x F, and the same vehicle turned about its z
 //! axis.
-#![allow(clippy::unwrap_used, missing_docs)]
 
 use afbc_plant::{Drag, Environment, Frame, Motion, Plant, PlantModel, Realism, RotorFault, Rotors};
 use afbc_types::{Parameters, Rotor, RotorSpeeds};

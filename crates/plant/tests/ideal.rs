@@ -1,5 +1,4 @@
 //! The ideal plant does not change when optional effects are added to the code.
-#![allow(clippy::unwrap_used, missing_docs)]
 
 use afbc_plant::integrate::rk4;
 use afbc_plant::{

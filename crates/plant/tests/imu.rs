@@ -1,8 +1,7 @@
 //! The inertial sensor compared with its declared properties, within five standard errors and with fixed seeds.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, clippy::float_cmp, missing_docs)] // tests
 
-mod common;
-
+use crate::common;
 use afbc_plant::instruments::{Accelerometer, Gyroscope, Imu, ImuReading};
 use afbc_plant::{
     Drag, Environment, InstrumentSuite, Motion, Plant, PlantModel, Realism, Rotors, Truth, Turbulence, Wind,

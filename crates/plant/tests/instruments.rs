@@ -1,8 +1,7 @@
 //! All instruments together: streams of random numbers, presets, refusals, failures.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, clippy::float_cmp, missing_docs)] // tests
 
-mod common;
-
+use crate::common;
 use afbc_plant::instruments::{
     Barometer, Failure, Gnss, Gyroscope, Imu, InstrumentFault, Magnetometer, Preset, TrackerModel,
 };

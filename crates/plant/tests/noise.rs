@@ -1,5 +1,4 @@
 //! Random numbers compared with their distribution, within five standard errors and with fixed seeds.
-#![allow(clippy::indexing_slicing, missing_docs)]
 
 use afbc_plant::noise::{Noise, Stream};
 

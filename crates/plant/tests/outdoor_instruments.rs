@@ -2,11 +2,9 @@
 //! with fixed seeds.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, clippy::float_cmp, missing_docs)] // tests
 
-mod common;
-
+use crate::common::{STEP_S, assert_correlation, assert_sigma, coordinates, mean, rest, run};
 use afbc_plant::instruments::{Barometer, Gnss, Magnetometer};
 use afbc_plant::{Dropouts, InstrumentSuite, Truth};
-use common::{STEP_S, assert_correlation, assert_sigma, coordinates, mean, rest, run};
 use nalgebra::{UnitQuaternion, Vector3};
 
 fn gnss(gnss: Gnss) -> InstrumentSuite {

@@ -1,5 +1,4 @@
 //! All effects together: reproducible by seed, and finite for any input.
-#![allow(clippy::unwrap_used, missing_docs)]
 
 use afbc_plant::{
     Battery, Contact, CosineGust, Deviations, Drag, Dropouts, Environment, GroundEffect, Motion, Plant, PlantModel,

@@ -1,5 +1,4 @@
 //! Faults of the measurement compared with their words.
-#![allow(clippy::float_cmp, missing_docs)]
 
 use afbc_plant::{Misreading, Motion, SensorFault, SensorFaults};
 use afbc_types::Axis;

@@ -1,5 +1,4 @@
 //! Sensors compared with their settings.
-#![allow(clippy::unwrap_used, clippy::float_cmp, clippy::indexing_slicing, missing_docs)]
 
 use afbc_plant::{Deviations, Dropouts, Motion, Sensing, StateMeasurement, StateSensor};
 use nalgebra::Vector3;

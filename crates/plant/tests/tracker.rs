@@ -1,8 +1,7 @@
 //! The tracker compared with its declared properties, within five standard errors and with fixed seeds.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, clippy::float_cmp, missing_docs)] // tests
 
-mod common;
-
+use crate::common;
 use afbc_plant::instruments::{TrackerFix, TrackerModel};
 use afbc_plant::{Dropouts, InstrumentSuite, Truth};
 use common::{STEP_S, assert_sigma, coordinates, mean, rest, rotation, run};

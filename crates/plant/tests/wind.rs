@@ -4,7 +4,6 @@
 //! a variance of at most 2/T times the integral of rho^2 over all lags (Bartlett 1946), in units of its own variance
 //! squared. That integral is L/V for the longitudinal velocity and 5/8 L/V for the others. Bounds are five standard
 //! errors.
-#![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs)]
 
 use afbc_plant::{CosineGust, Environment, Gust, GustKind, Motion, Plant, PlantModel, Realism, Turbulence, Wind};
 use afbc_types::{Axis, Parameters, RotorSpeeds};

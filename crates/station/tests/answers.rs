@@ -1,8 +1,6 @@
 //! Every command is answered to its sender.
-#![allow(clippy::expect_used, clippy::indexing_slicing, reason = "a test that cannot go on should say why")]
 
-mod common;
-
+use crate::common::{Bench, STATION};
 use afbc::Trip;
 use afbc_flight_core::inbox::QUEUE_MAX;
 use afbc_flight_core::{EndReason, Mode, Refusal, Request};
@@ -10,7 +8,6 @@ use afbc_link::{Address, Answer, Command, Downlink, FRAME_MAX, MavSeverity, Send
 use afbc_onboard::Report;
 use afbc_station::{ANSWERS_MAX, ANSWERS_PER_TICK, BUSY, Comms, FORGOTTEN_US, NOT_IN_CONTROL, Setup};
 use afbc_types::{Axis, State};
-use common::{Bench, STATION};
 use proptest::prelude::*;
 
 const STATIONS: [Address; 3] = [STATION, Address { system: 254, component: 1 }, Address { system: 1, component: 191 }];

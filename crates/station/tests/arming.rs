@@ -1,8 +1,6 @@
 //! Arming: what the guidance has against it, and what stations are told before.
-#![allow(clippy::expect_used, missing_docs, reason = "tests")]
 
-mod common;
-
+use crate::common::{Bench, STATION};
 use afbc_estimator::Measurement;
 use afbc_flight_core::Refusal;
 use afbc_guidance::{FlightMode, Net, Settings};
@@ -12,7 +10,6 @@ use afbc_onboard::{Aged, Configuration, Flight, Readings};
 use afbc_station::services::{health::sensor, modes, status::SensorBits};
 use afbc_station::{AuxSensors, CALIBRATES, Comms, Setup};
 use afbc_types::State;
-use common::{Bench, STATION};
 use nalgebra::Vector3;
 use proptest::prelude::*;
 

@@ -1,8 +1,6 @@
 //! What each command, target and mission leads to: orders of the guidance by their values, answers by their reasons.
-#![allow(clippy::expect_used, clippy::indexing_slicing, clippy::panic, missing_docs, reason = "tests")]
 
-mod common;
-
+use crate::common::{Bench, STATION};
 use afbc_flight_core::Refusal;
 use afbc_guidance::{FlightMode, Order, OrderRefusal};
 use afbc_link::telemetry::BatteryStatus;
@@ -18,7 +16,6 @@ use afbc_station::services::origin::{EarthOrigin, Global};
 use afbc_station::services::streams::id;
 use afbc_station::{AuxSensors, BUSY, Comms, NO_ORIGIN, NOT_IN_CONTROL, NOT_KNOWN, Setup};
 use afbc_types::{Setpoint, State};
-use common::{Bench, STATION};
 use nalgebra::Vector3;
 
 const OTHER: Address = Address { system: 245, component: 190 };

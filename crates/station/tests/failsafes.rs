@@ -1,13 +1,10 @@
 //! Failsafes are reported once as text, and in at least one heartbeat.
-#![allow(clippy::expect_used, reason = "a test that cannot go on should say why")]
 
-mod common;
-
+use crate::common::Bench;
 use afbc_flight_core::{EndReason, Mode};
 use afbc_link::{Downlink, MavSeverity, Uplink};
 use afbc_onboard::Report;
 use afbc_types::{Setpoint, State};
-use common::Bench;
 use proptest::prelude::*;
 
 const WARNING: MavSeverity = MavSeverity::MAV_SEVERITY_WARNING;

@@ -2,7 +2,6 @@
 //! `scripts/flood` says. No panic, every command answered exactly once to its sender, no order of a station that is not
 //! in control. The flight core and the guidance are played: they answer at random. The same with a key, which none of
 //! the senders has.
-#![allow(clippy::expect_used, clippy::indexing_slicing, reason = "a test that cannot go on should say why")]
 
 use afbc_flight_core::inbox::QUEUE_MAX;
 use afbc_flight_core::{Refusal, Request, Ticketed};

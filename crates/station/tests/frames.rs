@@ -1,16 +1,13 @@
 //! Random frames of several stations, damaged and nested ones among them, through the whole of the link: no panic,
 //! every command answered exactly once to its sender, and nothing that its sender may not do. `scripts/soak` draws
 //! others.
-#![allow(clippy::expect_used, clippy::indexing_slicing, reason = "a test that cannot go on should say why")]
 
-mod common;
-
+use crate::common::{Bench, STATION};
 use afbc_flight_core::Request;
 use afbc_guidance::Orders;
 use afbc_link::{Address, Answer, Command, Downlink, FRAME_MAX, Message, Mission, Plan, Reboot, Sender, Uplink};
 use afbc_station::services::control::is_needed_for;
 use afbc_types::State;
-use common::{Bench, STATION};
 use proptest::prelude::*;
 use std::collections::BTreeMap;
 

@@ -1,11 +1,8 @@
 //! The file protocol as <https://mavlink.io/en/services/ftp.html> describes it, over files in memory.
-#![allow(clippy::expect_used, clippy::indexing_slicing, clippy::panic, missing_docs, reason = "tests")]
 
-mod memory;
-
+use crate::memory::{Memory, bytes};
 use afbc_link::{Address, FILE_DATA_MAX, FileOpcode, FilePacket, FtpError};
 use afbc_station::services::ftp::{FileTerms, Ftp, SESSIONS, changes, crc32};
-use memory::{Memory, bytes};
 use proptest::collection::vec;
 use proptest::prelude::*;
 

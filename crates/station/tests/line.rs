@@ -1,8 +1,6 @@
 //! The serial line: what everything at full rate leaves of it.
-#![allow(clippy::expect_used, clippy::indexing_slicing, reason = "a test that cannot go on should say why")]
 
-mod common;
-
+use crate::common;
 use afbc_link::{Address, Command, Downlink, FRAME_MAX, ParameterRequest, Sender, Uplink};
 use afbc_onboard::parameters::ParameterTable;
 use afbc_onboard::{Configuration, Link};

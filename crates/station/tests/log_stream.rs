@@ -1,5 +1,4 @@
 //! The log while it is made, to a station that loses parts and acknowledgements.
-#![allow(clippy::expect_used, clippy::indexing_slicing, clippy::panic, missing_docs, reason = "tests")]
 
 use afbc_link::{Address, StreamedLog};
 use afbc_station::services::log_stream::{LogStream, StreamEvent};

@@ -1,11 +1,8 @@
 //! Logs by LOG_REQUEST_LIST, LOG_REQUEST_DATA and LOG_REQUEST_END.
-#![allow(clippy::expect_used, clippy::indexing_slicing, clippy::panic, missing_docs, reason = "tests")]
 
-mod memory;
-
+use crate::memory::{Memory, bytes};
 use afbc_link::{LOG_DATA_MAX, LogEntry, LogRequest};
 use afbc_station::services::log_transfer::{LogMessage, LogTransfer};
-use memory::{Memory, bytes};
 use proptest::prelude::*;
 
 fn sent(logs: &mut LogTransfer, store: &mut Memory) -> Vec<LogMessage> {

@@ -1,8 +1,7 @@
 //! The parameters of a vehicle that runs: table, protocol, and what is kept of it.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, clippy::panic, missing_docs)] // tests
 
-mod common;
-
+use crate::common::Bench;
 use afbc_guidance::{BatteryAction, FenceAction, SticksAction};
 use afbc_link::{ParameterError, ParameterName, ParameterRequest, ParameterValue};
 use afbc_onboard::parameters::{Kept, Kind, Parameter, ParameterTable, REASON_MAX, RecordChange};
@@ -10,7 +9,6 @@ use afbc_onboard::{Configuration, Flight, Prepared};
 use afbc_station::parameters::{LINK_SHARE, Service, VALUE_BYTES};
 use afbc_store::{Ram, RecordName, Store, hash};
 use afbc_types::State;
-use common::Bench;
 use proptest::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::LazyLock;

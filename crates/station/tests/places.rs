@@ -1,5 +1,4 @@
 //! Local and global coordinates, compared with the definition of geodetic coordinates.
-#![allow(clippy::expect_used, reason = "a test that cannot go on should say why")]
 
 use afbc_station::services::origin::{EarthOrigin, Global};
 use nalgebra::Vector3;

@@ -1,14 +1,11 @@
 //! Poses over the link to a vehicle with an inertial sensor, and to one without.
-#![allow(clippy::expect_used, reason = "a test that cannot go on should say why")]
 
-mod common;
-
+use crate::common::Bench;
 use afbc_estimator::Measurement;
 use afbc_flight_core::{Mode, Refusal};
 use afbc_link::{Answer, Command, Downlink, Uplink};
 use afbc_onboard::{Aged, Readings, Report};
 use afbc_types::{Pose, PoseSigmas, Setpoint, State};
-use common::Bench;
 use nalgebra::Vector3;
 
 /// Where the vehicle is, and its heading.

@@ -1,5 +1,4 @@
 //! Wrong rate or timing of the control tick, and a failing clock: the pilot is told once, and arming is refused.
-#![allow(clippy::expect_used, reason = "a test that cannot go on should say why")]
 
 use afbc_flight_core::{Mode, Refusal};
 use afbc_link::{Address, Answer, Command, Decoder, Downlink, FRAME_MAX, Sender, Uplink};

@@ -1,11 +1,8 @@
 //! Every message of MAVLink's common dialect that expects an answer gets one, on a full and narrow line too, and no
 //! other one does.
-#![allow(clippy::expect_used, clippy::indexing_slicing, clippy::panic, missing_docs, reason = "tests")]
-#![allow(deprecated, reason = "messages that stations still send")]
 
-mod common;
-mod dialect;
-
+use crate::common;
+use crate::dialect::{Expected, expected};
 use afbc_link::{Address, Command, Uplink};
 use afbc_onboard::{Configuration, Link, Readings, parameters::ParameterTable};
 use afbc_station::services::origin::{EarthOrigin, Global};
@@ -13,7 +10,6 @@ use afbc_station::services::streams::{DEFAULTS, id};
 use afbc_station::{AuxSensors, Comms, Setup};
 use afbc_types::State;
 use common::{Bench, STATION};
-use dialect::{Expected, expected};
 use mavlink::dialects::common::*;
 use mavlink::{MavlinkVersion, Message as _, MessageData};
 use std::collections::BTreeSet;

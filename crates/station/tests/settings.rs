@@ -1,14 +1,11 @@
 //! Parameters over the link: who may set them, when, and what everyone hears of it.
-#![allow(clippy::expect_used, clippy::indexing_slicing, reason = "a test that cannot go on should say why")]
 
-mod common;
-
+use crate::common::Bench;
 use afbc_link::{Address, Answer, Command, Downlink, ParameterName, ParameterRequest, ParameterValue, Storage, Uplink};
 use afbc_onboard::parameters::RecordChange;
 use afbc_station::parameters::{LINK_SHARE, VALUE_BYTES};
 use afbc_station::{Comms, Setup};
 use afbc_types::State;
-use common::Bench;
 use std::collections::BTreeSet;
 
 const SECOND: Address = Address { system: 245, component: 190 };

@@ -1,15 +1,12 @@
 //! With a key: what is heard, what is sent, and what is known after a start.
-#![allow(clippy::expect_used, clippy::indexing_slicing, reason = "a test that cannot go on should say why")]
 
-mod common;
-
+use crate::common::{Bench, STATION};
 use afbc_link::{
     Address, Command, Decoder, Downlink, FRAME_MAX, Key, ReceivedFrame, SIGNED_FRAME_MAX, Sender, SetupSigning, Stamp,
     Uplink,
 };
 use afbc_station::services::signing::{STREAMS_MAX, Signing, SigningRecord};
 use afbc_types::State;
-use common::{Bench, STATION};
 use proptest::prelude::*;
 use std::collections::BTreeMap;
 

@@ -1,12 +1,9 @@
 //! Telemetry of a vehicle that flies: what is told is what it does.
-#![allow(clippy::expect_used, missing_docs, reason = "tests")]
 
-mod common;
-
+use crate::common::Bench;
 use afbc_link::{Command, Downlink, PositionTarget, Uplink};
 use afbc_station::services::streams::id;
 use afbc_types::{Setpoint, State};
-use common::Bench;
 use nalgebra::Vector3;
 
 /// POSITION_TARGET_LOCAL_NED tells four times per second what the law is given, while the vehicle is armed.

@@ -1,9 +1,7 @@
 //! Files and logs on the link that telemetry and commands share.
-#![allow(clippy::expect_used, clippy::indexing_slicing, clippy::panic, missing_docs, reason = "tests")]
 
-mod common;
-mod memory;
-
+use crate::common::{Bench, STATION};
+use crate::memory::{Memory, bytes};
 use afbc_link::{
     Address, Answer, Command, ComponentMetadata, Decoder, Downlink, FRAME_MAX, Fault, FileOpcode, FilePacket,
     LogMessage, LogRequest, Message, MessageFormat, Question, Sender, Telemetry, Transfer, Uplink,
@@ -12,8 +10,6 @@ use afbc_onboard::{Configuration, Link, Readings, parameters::ParameterTable};
 use afbc_station::services::streams::{DEFAULTS, id};
 use afbc_station::{Comms, REPORT_MAX, Setup, Transfers};
 use afbc_types::State;
-use common::{Bench, STATION};
-use memory::{Memory, bytes};
 
 const OTHER: Address = Address { system: 245, component: 191 };
 const URI: &str = "mftp://etc/general.json";

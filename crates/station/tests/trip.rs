@@ -1,14 +1,11 @@
 //! A trip of the monitor: its reason is sent once, and a command engages AFBC again.
-#![allow(clippy::expect_used, reason = "a test that cannot go on should say why")]
 
-mod common;
-
+use crate::common::{Bench, STATION};
 use afbc::Trip;
 use afbc_flight_core::{Mode, Request};
 use afbc_link::{Answer, Command, Downlink, MavCmd, MavSeverity, Text, Uplink};
 use afbc_onboard::Report;
 use afbc_types::{Axis, State};
-use common::{Bench, STATION};
 
 fn text(reason: &str) -> Downlink {
     Downlink::Text { severity: MavSeverity::MAV_SEVERITY_WARNING, text: Text::from(reason) }

@@ -1,12 +1,4 @@
 //! Flights of the vehicle as the server has it, by what stations send, and what they hear of it.
-#![allow(
-    dead_code,
-    unused_imports,
-    unreachable_pub,
-    clippy::unwrap_used,
-    clippy::indexing_slicing,
-    reason = "shared by tests"
-)]
 
 pub mod checker;
 pub mod session;

@@ -1,7 +1,5 @@
 //! Flights of the firmware's code with their exact logs.
 
-#![allow(dead_code, reason = "each test file uses a part")]
-
 use afbc_hil::Host;
 use afbc_link::telemetry::BatteryStatus;
 use afbc_link::{Address, Command, Datum, FRAME_MAX, Height, ParameterRequest, Sender, Uplink};

@@ -1,9 +1,4 @@
 //! Shared by the tests of the law: arbitrary inputs and settings, and the checks of every step.
-#![allow(
-    dead_code,
-    clippy::unwrap_used,
-    reason = "each test uses its own share; what cannot be built must stop the test"
-)]
 
 use afbc::adaptive::Gains;
 use afbc::disturbance::DisturbanceObserver;

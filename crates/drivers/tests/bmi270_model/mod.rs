@@ -1,5 +1,4 @@
 //! The registers of a BMI270, as BST-BMI270-DS000 has them. The models of boards use it too.
-#![allow(clippy::panic, clippy::indexing_slicing, unreachable_pub, reason = "tests")]
 
 /// FNV-1a of `bmi270_config_file` in Bosch's `BMI270_SensorAPI`.
 const CONFIGURATION: u64 = 0xA3AB_E71B_91DB_4895;

@@ -1,13 +1,5 @@
 //! A bus with the register-level model of a part, whose time passes while a driver waits, and everything that can go
 //! wrong between them.
-#![allow(
-    clippy::expect_used,
-    clippy::panic,
-    clippy::indexing_slicing,
-    unreachable_pub,
-    reason = "a test that cannot go on should say why"
-)]
-#![allow(dead_code, reason = "not every test uses everything")]
 
 pub mod mpu_registers;
 

@@ -280,10 +280,10 @@ fn sentences(epoch_us: u64, truth: &Truth) -> String {
     let second = epoch_us / 1_000_000;
     let (h, m, s, hundredths) = (second / 3600 % 24, second / 60 % 60, second % 60, epoch_us / 10_000 % 100);
     let time = format!("{h:02}{m:02}{s:02}.{hundredths:02}");
-    let angle = |angle: i32, digits: usize, letters: [char; 2]| {
+    let angle = |angle: i32, digits: usize, [positive, negative]: [char; 2]| {
         let minutes = u64::from(angle.unsigned_abs()) * 60 / 100;
         let (whole, rest) = (minutes / 6_000_000, minutes % 6_000_000);
-        let letter = letters[usize::from(angle < 0)];
+        let letter = if angle < 0 { negative } else { positive };
         format!("{whole:0digits$}{:02}.{:05},{letter}", rest / 100_000, rest % 100_000)
     };
     let place = format!("{},{}", angle(latitude, 2, ['N', 'S']), angle(longitude, 3, ['E', 'W']));

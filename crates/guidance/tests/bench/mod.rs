@@ -1,5 +1,4 @@
 //! A point mass on flat ground that follows setpoints, with the flight core's land detector.
-#![allow(dead_code, clippy::unwrap_used, clippy::panic, reason = "each test uses a part; a test may stop")]
 
 use afbc_flight_core::landing::LandDetector;
 use afbc_flight_core::supervisor::REST_US;

@@ -1,7 +1,6 @@
 //! Reference decoder, to compare `afbc_link::Decoder` with: finds the frames of a whole stream at once. It was written
 //! from MAVLink's specification (<https://mavlink.io/en/guide/serialization.html>) and the rules in the decoder's
 //! documentation only.
-#![allow(clippy::indexing_slicing, unreachable_pub, reason = "shared by tests")]
 
 /// A frame with the right checksum.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -1,7 +1,5 @@
 //! Flights of any controller: a rigid body with rotor lag, delayed commands and measurement noise.
 
-#![allow(dead_code, reason = "each test file uses a part")]
-
 pub(crate) mod steps;
 
 use afbc_control::{Action, FlightController, Settings, Validated};
@@ -68,11 +66,8 @@ impl Random {
 pub(crate) struct Figures {
     pub(crate) rmse: Vector4<f64>,
     pub(crate) max_abs: Vector4<f64>,
-    pub(crate) last: Vector4<f64>,
     /// Mean |change of U4| per step \[N\].
     pub(crate) delta_u4_n: f64,
-    /// Share of steps with a rotor at its limit.
-    pub(crate) saturated: f64,
 }
 
 /// Flies `controller` along `reference` for `duration_s`.
@@ -104,8 +99,8 @@ pub(crate) fn fly_on<C: FlightController>(
     let mut queue: VecDeque<Action> = VecDeque::new();
     let mut random = Random(0x9e37_79b9_7f4a_7c15);
     let gain = if rig.lag_s > 0.0 { 1.0 - libm::exp(-dt_s / rig.lag_s) } else { 1.0 };
-    let (mut sum, mut max_abs, mut last) = (Vector4::zeros(), Vector4::<f64>::zeros(), Vector4::zeros());
-    let (mut count, mut delta, mut saturated, mut last_u4) = (0.0, 0.0, 0.0, None);
+    let (mut sum, mut max_abs) = (Vector4::zeros(), Vector4::<f64>::zeros());
+    let (mut count, mut delta, mut last_u4) = (0.0, 0.0, None);
     for step in 0..=(duration_s / dt_s).round() as u64 {
         let t = step as f64 * dt_s;
         let motion = plant.motion();
@@ -115,14 +110,13 @@ pub(crate) fn fly_on<C: FlightController>(
         assert!(command.speeds.0.iter().all(|speed| speed.is_finite() && *speed >= 0.0));
         let position = setpoint.position_m.cast::<f64>() - motion.position_m;
         let yaw = afbc_control::math::wrap_angle(setpoint.yaw_rad - motion.attitude_rad.z as f32);
-        last = Vector4::new(position.x, position.y, position.z, f64::from(yaw));
+        let error = Vector4::new(position.x, position.y, position.z, f64::from(yaw));
         if t > settled_s - 1e-9 {
             count += 1.0;
-            sum += last.component_mul(&last);
-            max_abs = max_abs.sup(&last.abs());
+            sum += error.component_mul(&error);
+            max_abs = max_abs.sup(&error.abs());
             let u4 = f64::from(command.forces.0.sum());
             delta += last_u4.replace(u4).map_or(0.0, |before: f64| (u4 - before).abs());
-            saturated += f64::from(u8::from(command.health.saturated));
         }
         queue.push_back(command);
         if queue.len() > rig.delay {
@@ -131,13 +125,7 @@ pub(crate) fn fly_on<C: FlightController>(
         }
         plant.step(&RotorSpeeds(rotors.cast()), dt_s);
     }
-    let figures = Figures {
-        rmse: (sum / count).map(libm::sqrt),
-        max_abs,
-        last,
-        delta_u4_n: delta / count,
-        saturated: saturated / count,
-    };
+    let figures = Figures { rmse: (sum / count).map(libm::sqrt), max_abs, delta_u4_n: delta / count };
     (figures, memory)
 }
 

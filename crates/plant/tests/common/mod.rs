@@ -1,5 +1,4 @@
 //! A vehicle as instruments see it, and statistics.
-#![allow(dead_code, reason = "each test uses its part")]
 
 use afbc_plant::instruments::InstrumentFault;
 use afbc_plant::{Environment, InstrumentReadings, InstrumentSuite, Instruments, Motion, Plant, PlantModel, Truth};

@@ -1,5 +1,4 @@
 //! The firmware without its hardware, and stations that communicate with it.
-#![allow(dead_code, unreachable_pub, clippy::expect_used, reason = "shared by tests")]
 
 use afbc_guidance::FlightMode;
 use afbc_link::{Address, Command, Decoder, Downlink, FRAME_MAX, Sender, Uplink};

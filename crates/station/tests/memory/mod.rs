@@ -1,5 +1,4 @@
 //! Files and logs in memory, which check what they are asked for.
-#![allow(dead_code, unreachable_pub, clippy::expect_used, clippy::indexing_slicing, reason = "shared by tests")]
 
 use afbc_link::FtpError;
 use afbc_station::services::storage::{

@@ -1,0 +1,18 @@
+//! All tests in one program: one each takes longer to build than to run.
+#![allow(
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a test that cannot go on should say why"
+)]
+
+mod bench;
+mod endings;
+mod fixture;
+mod fuzz;
+mod items;
+mod limiter;
+mod modes;
+mod net;
+mod table;
+mod tick;

@@ -1,0 +1,22 @@
+//! All tests in one program: one each takes longer to build than to run.
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    deprecated,
+    unreachable_pub,
+    reason = "a test that cannot go on should say why"
+)]
+
+mod channels;
+mod decoder;
+mod frames;
+mod inertial;
+mod messages;
+mod poses;
+mod pymavlink;
+mod reference;
+mod signed;
+mod transfers;
+mod wire;

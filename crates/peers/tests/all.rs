@@ -1,0 +1,18 @@
+//! All tests in one program: one each takes longer to build than to run.
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a test that cannot go on should say why"
+)]
+
+mod answers;
+mod attitude;
+mod flights;
+mod gains;
+mod harness;
+mod hostile;
+mod learning;
+mod mpc;
+mod slowed;

@@ -1,0 +1,33 @@
+//! All tests in one program: one each takes longer to build than to run.
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    deprecated,
+    unreachable_pub,
+    reason = "a test that cannot go on should say why"
+)]
+
+mod answers;
+mod arming;
+mod commands;
+mod common;
+mod dialect;
+mod failsafes;
+mod flood;
+mod frames;
+mod ftp;
+mod line;
+mod log_stream;
+mod log_transfer;
+mod memory;
+mod parameters;
+mod places;
+mod poses;
+mod rate;
+mod requests;
+mod settings;
+mod signing;
+mod telemetry;
+mod transfers;
+mod trip;
