@@ -1,13 +1,9 @@
-//! Structure of the code: no circular imports between modules, no crate larger than a fifth of the whole, no overlong
-//! lines.
+//! Structure of the code: no circular imports between modules, no crate larger than a fifth of the whole.
 
 use crate::imports::{Crate, circles, within};
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
-
-/// Largest width of a line, as `max_width` in `rustfmt.toml`.
-const WIDTH: usize = 120;
 
 fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap()
@@ -28,21 +24,6 @@ fn all_files(folder: &Path) -> Vec<PathBuf> {
 fn files(folder: &Path) -> Vec<PathBuf> {
     let rust = |path: &PathBuf| path.extension().is_some_and(|extension| extension == "rs");
     all_files(folder).into_iter().filter(rust).collect()
-}
-
-/// Returns the numbers of a file's overlong lines. Excepted are listings, tables and lines with an address in Markdown.
-fn overlong(path: &Path, text: &str) -> Vec<usize> {
-    let markdown = path.extension().is_some_and(|extension| extension == "md");
-    let mut listing = false;
-    let mut numbers = Vec::new();
-    for (number, line) in (1..).zip(text.lines()) {
-        listing ^= markdown && line.trim_start().starts_with("```");
-        let excepted = markdown && (listing || line.starts_with('|') || line.contains("://"));
-        if !excepted && line.chars().count() > WIDTH {
-            numbers.push(number);
-        }
-    }
-    numbers
 }
 
 /// Returns the folders of all crates.
@@ -273,24 +254,6 @@ fn no_crate_is_more_than_a_fifth_of_the_code() {
     for (folder, lines) in sizes {
         assert!(5 * lines <= whole, "{}: {lines} of {whole} lines", folder.display());
     }
-}
-
-#[test]
-fn lines_are_at_most_120_columns_wide() {
-    assert!(fs::read_to_string(root().join("rustfmt.toml")).unwrap().contains(&format!("max_width = {WIDTH}\n")));
-    let mut checked = 0;
-    for path in all_files(root()) {
-        let named = |name: &str| path.parent().and_then(Path::file_name).is_some_and(|folder| folder == name);
-        let script = named("scripts") || named(".ci");
-        let text = path.extension().is_some_and(|extension| ["rs", "md", "toml"].iter().any(|text| extension == *text));
-        if !script && !text {
-            continue;
-        }
-        let text = fs::read_to_string(&path).unwrap();
-        assert_eq!(overlong(&path, &text), [0; 0], "lines of {}", path.display());
-        checked += 1;
-    }
-    assert!(checked > 200, "{checked} files");
 }
 
 /// Decisions that go beyond the paper are marked "Not in the paper".

@@ -26,9 +26,9 @@ const NOTCH_MIN_RAD_S: f32 = 10.0 * TAU;
 const NOTCH_MAX_RAD_S: f32 = 100.0 * TAU;
 
 /// Hides the jumps of position and velocity that measurements make: the state goes on as the inertial sensor says, and
-/// approaches the estimate within 0.2 s (velocity 0.1 s), or at 1 m/s and 3 m/s2 from further away, as when an aid comes
-/// back. A law would answer each fix with a kick. A notch removes the rotors' vibration from the velocity, which a law
-/// would turn into commands of attitude and body rate. Attitude and rates pass unchanged.
+/// approaches the estimate within 0.2 s (velocity 0.1 s), or at 1 m/s and 3 m/s2 from further away, as when an aid
+/// comes back. A law would answer each fix with a kick. A notch removes the rotors' vibration from the velocity, which
+/// a law would turn into commands of attitude and body rate. Attitude and rates pass unchanged.
 ///
 /// The default has no notch, and is that before the first estimate.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
