@@ -96,14 +96,13 @@ impl VelocityNotch {
     fn pass(&self, passed: &mut Option<Passed>, input: &Vector3<f32>) -> Vector3<f32> {
         let VelocityNotch { b0, b1, a2, share, .. } = *self;
         let Passed { slow_m_s, sums: [first, second] } =
-            passed.unwrap_or_else(|| Passed { slow_m_s: *input, sums: [input * (b0 - a2); 2] });
-        let quick = input - slow_m_s;
+            passed.get_or_insert_with(|| Passed { slow_m_s: *input, sums: [input * (b0 - a2); 2] });
+        let quick = input - *slow_m_s;
+        *slow_m_s += quick * share;
         let led = input + quick * (LEAD / QUALITY);
-        let output = led * b0 + first;
-        *passed = Some(Passed {
-            slow_m_s: slow_m_s + quick * share,
-            sums: [(led - output) * b1 + second, led * b0 - output * a2],
-        });
+        let through = led * b0;
+        let output = through + *first;
+        (*first, *second) = ((led - output) * b1 + *second, through - output * a2);
         output
     }
 }
