@@ -133,7 +133,7 @@ macro_rules! flight_controller {
 
                 // Ring buffers of the link and of the receiver.
                 static RINGS: [StaticCell<[u8; 1024]>; 2] = [const { StaticCell::new() }; 2];
-                static GNSS_RX: StaticCell<[u8; 384]> = StaticCell::new();
+                static GNSS_RX: StaticCell<[u8; 352]> = StaticCell::new();
                 static GNSS_TX: StaticCell<[u8; TX_RING]> = StaticCell::new();
 
                 let p = chip_stm32f4::clocks::start::<$crystal_hz>();
@@ -145,7 +145,7 @@ macro_rules! flight_controller {
                 let [tx, rx] = RINGS.each_ref().map(|ring| ring.init([0; 1024]));
                 let config = chip_stm32::link::config();
                 let link = BufferedUart::new(p.$link, p.$link_rx, p.$link_tx, tx, rx, Irqs, config);
-                let (tx, rx) = (GNSS_TX.init([0; TX_RING]), GNSS_RX.init([0; 384]));
+                let (tx, rx) = (GNSS_TX.init([0; TX_RING]), GNSS_RX.init([0; 352]));
                 let config = usart::Config::default();
                 let gnss = BufferedUart::new(p.$gnss, p.$gnss_rx, p.$gnss_tx, tx, rx, Irqs, config);
 
