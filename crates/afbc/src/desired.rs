@@ -67,6 +67,7 @@ impl DesiredMemory {
     }
 
     /// Returns phi_d and theta_d of (40) \[rad\] in the last step, and the same behind the command filter.
+    #[inline]
     pub(crate) fn trace(&self) -> ([f32; 2], [Filtered; 2]) {
         self.last.map_or_else(Default::default, |LastAngles { rad, filtered, .. }| (rad, filtered))
     }

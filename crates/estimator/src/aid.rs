@@ -144,6 +144,7 @@ impl Aids {
     }
 
     /// True if position or velocity was fused within the last `time_us`.
+    #[inline]
     pub(crate) fn holds_velocity(&self, now_us: u64, time_us: u64) -> bool {
         [&self.tracker_position, &self.gnss_position, &self.gnss_velocity]
             .into_iter()
@@ -151,6 +152,7 @@ impl Aids {
     }
 
     /// True if position was fused within the last `time_us`.
+    #[inline]
     pub(crate) fn holds_position(&self, now_us: u64, time_us: u64) -> bool {
         [&self.tracker_position, &self.gnss_position].into_iter().any(|aid| aid.is_live(now_us, time_us))
     }

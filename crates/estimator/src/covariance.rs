@@ -406,6 +406,7 @@ impl Covariance {
     }
 
     /// Returns the variances.
+    #[inline]
     pub(crate) fn variances(&self) -> Errors {
         Errors {
             theta: self.tt.diagonal(),

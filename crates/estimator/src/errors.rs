@@ -108,6 +108,7 @@ impl Errors {
 
 impl Row {
     /// Returns the product with `errors`.
+    #[inline]
     pub(crate) fn dot(&self, errors: &Errors) -> f32 {
         self.theta.dot(&errors.theta)
             + self.velocity * self.coordinate.of(&errors.velocity)

@@ -113,6 +113,7 @@ impl Monitor {
         clipped
     }
 
+    #[inline]
     pub(crate) fn health(&self, now_us: u64, settings: &Settings, stuck_us: u64) -> ImuHealth {
         let at_us = self.at_us();
         let squared = |limit: f32| limit * limit;

@@ -19,6 +19,7 @@ pub struct Motion {
 
 impl Motion {
     /// Returns the measurement of a perfect sensor.
+    #[inline]
     pub fn measure(&self) -> State {
         State {
             position_m: self.position_m.cast(),

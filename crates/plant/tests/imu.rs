@@ -159,7 +159,7 @@ fn output_is_quantised_and_clipped() {
     let truth = |k: u32| Truth { rates_rad_s: Vector3::new(0.01, -0.01, 0.001) * f64::from(k), ..rest() };
     let samples = samples(with(Imu { gyro, accel, ..Imu::DEFAULT }), 4, 1000, truth);
     for (k, sample) in (0..).zip(&samples) {
-        let expected = truth(k).rates_rad_s.map(|rate| (rate.clamp(-3.0, 3.0) / 0.25).round() * 0.25);
+        let expected = truth(k).rates_rad_s.map(|rate| (rate.clamp(-3.0, 3.0) / 0.25).round_ties_even() * 0.25);
         assert_eq!(sample.rates_rad_s, expected);
         for value in &sample.specific_force_m_s2 {
             let steps = value / 0.01;

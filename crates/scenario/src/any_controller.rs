@@ -1,10 +1,28 @@
-//! What is known of any law's controller beside its interface.
+//! What is known of any law's controller beside its interface, and the one place where all of them are compiled.
 
+use crate::FlownLaw;
 use crate::laws::{AnyController, AnyControllerMemory};
 use afbc::monitor::Norm;
 use afbc::{AdaptiveEstimate, Guarded};
-use afbc_onboard::FlightLaw;
-use afbc_types::{Axis, PerAxis};
+use afbc_control::{Action, FlightController};
+use afbc_onboard::{Configuration, FlightLaw, Prepare, Prepared};
+use afbc_types::{Axis, OutOfRange, PerAxis, Setpoint, State};
+
+/// How a controller is made for the firmware's code, and what it decides.
+type Compiled<const N: usize> = (
+    fn(&FlownLaw, &Configuration<N>) -> Result<Prepared<N, AnyController<N>>, OutOfRange>,
+    fn(&AnyController<N>, &mut AnyControllerMemory<N>, &State, &Setpoint, bool) -> Action<N>,
+);
+
+const fn compiled<const N: usize>() -> Compiled<N> {
+    (<FlownLaw as Prepare<N>>::prepare, <AnyController<N> as FlightController<N>>::decide)
+}
+
+/// Makes the compiler compile them here, for every number of rotors, since crates that use this one share what is
+/// compiled and not inlined. A quarter of the first build went into copies of them.
+#[used]
+static COMPILED: (Compiled<4>, Compiled<5>, Compiled<6>, Compiled<7>, Compiled<8>) =
+    (compiled(), compiled(), compiled(), compiled(), compiled());
 
 impl<const N: usize> AnyControllerMemory<N> {
     /// Returns AFBC's estimates, with or without its monitor; none of another law.

@@ -13,6 +13,8 @@ pub struct FlownLaw(pub Option<Law>);
 impl<const N: usize> Prepare<N> for FlownLaw {
     type Law = AnyController<N>;
 
+    // Not inlined, like what flies.
+    #[inline(never)]
     fn prepare(&self, configuration: &Configuration<N>) -> Result<Prepared<N, AnyController<N>>, OutOfRange> {
         let Configuration { airframe, settings, .. } = configuration;
         let controller = match self.0 {

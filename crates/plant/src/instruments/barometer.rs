@@ -6,7 +6,7 @@ use crate::noise::{Noise, Stream};
 use crate::truth::Truth;
 use afbc_types::parameters;
 use alloc::vec::Vec;
-use libm::{exp, round};
+use libm::{exp, rint};
 use nalgebra::Vector3;
 
 parameters! {
@@ -100,6 +100,6 @@ impl Pressure {
         let height = truth.position_m.z;
         let wash = wash_m * truth.thrust_share * exp(-height.max(0.0) / wash_height_m);
         let sensed = height - wash + self.offset_m + self.drift.value.z + self.random.normal() * noise_m;
-        if lsb_m > 0.0 { round(sensed / lsb_m) * lsb_m } else { sensed }
+        if lsb_m > 0.0 { rint(sensed / lsb_m) * lsb_m } else { sensed }
     }
 }

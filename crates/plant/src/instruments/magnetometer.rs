@@ -7,7 +7,7 @@ use crate::truth::Truth;
 use afbc_types::parameters;
 use alloc::vec::Vec;
 use core::f64::consts::FRAC_PI_2;
-use libm::{cos, round, sin};
+use libm::{cos, rint, sin};
 use nalgebra::{Matrix3, Vector3};
 
 parameters! {
@@ -114,7 +114,7 @@ impl Compass {
         let sensed = outside + self.hard_ut + motor_ut * truth.thrust_share + draw(&mut self.random) * noise_ut;
         sensed.map(|value| {
             let value = value.clamp(-range_ut, range_ut);
-            if lsb_ut > 0.0 { round(value / lsb_ut) * lsb_ut } else { value }
+            if lsb_ut > 0.0 { rint(value / lsb_ut) * lsb_ut } else { value }
         })
     }
 }

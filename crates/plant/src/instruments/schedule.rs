@@ -48,6 +48,7 @@ impl<T> Transit<T> {
     }
 
     /// Returns the fixes that have arrived by `now_s`.
+    #[inline]
     pub(super) fn arrived(&mut self, now_s: f64) -> Vec<T> {
         let count = self.waiting.partition_point(|(arrives_s, _)| *arrives_s <= now_s + TIME_SLACK_S);
         // Without an allocation in most steps.

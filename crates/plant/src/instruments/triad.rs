@@ -3,7 +3,7 @@
 use super::low_pass::LowPass;
 use super::markov::{Markov, draw};
 use crate::noise::Noise;
-use libm::{round, sqrt};
+use libm::{rint, sqrt};
 use nalgebra::{Matrix3, Vector3};
 
 /// Properties of a triad, in the unit of what it measures. Zero is none.
@@ -80,7 +80,7 @@ impl Triad {
         let (range, lsb) = (self.range, self.lsb);
         (self.filter.pass(analogue) + vibration).map(|value| {
             let value = value.clamp(-range, range);
-            if lsb > 0.0 { round(value / lsb) * lsb } else { value }
+            if lsb > 0.0 { rint(value / lsb) * lsb } else { value }
         })
     }
 }

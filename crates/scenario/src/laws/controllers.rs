@@ -41,6 +41,8 @@ macro_rules! any_controller {
                 }
             }
 
+            // Not inlined: then it is compiled once, not in each crate that flies.
+            #[inline(never)]
             fn decide(&self, memory: &mut Self::Memory, state: &State, setpoint: &Setpoint, fresh: bool) -> Action<N> {
                 self.begin(memory);
                 match (self, memory) {

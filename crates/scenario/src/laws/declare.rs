@@ -110,6 +110,8 @@ macro_rules! laws {
             ///
             /// # Errors
             /// The first parameter, gain or setting out of range.
+            // Not inlined, like what flies.
+            #[inline(never)]
             pub fn controller<const N: usize>(
                 &self,
                 vehicle: afbc_types::Airframe<N>,

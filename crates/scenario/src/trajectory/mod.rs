@@ -37,6 +37,7 @@ pub struct Sine {
 
 impl Sine {
     /// Returns value and four derivatives at time `t`.
+    #[inline]
     fn at(&self, t: f64) -> [f64; 5] {
         let rate = TAU / self.period_s;
         let (s, c) = sincos(rate * t + self.phase_rad);

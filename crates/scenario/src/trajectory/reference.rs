@@ -26,6 +26,7 @@ pub struct Reference {
 
 impl Reference {
     /// Returns a reference at rest.
+    #[inline]
     pub fn rest(position_m: Vector3<f64>, yaw_rad: f64) -> Self {
         Reference { position_m, yaw_rad, ..Reference::default() }
     }
