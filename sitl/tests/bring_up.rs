@@ -37,7 +37,7 @@ fn a_served_vehicle_is_asked_everything() {
         "| gyroscope | well |",
         "| gyroscope, deviation [rad/s] | ",
         "| right side down | not done |",
-        "| SER_TEL1_BAUD | 921600 |",
+        "| SER_TEL1_BAUD | 460800 |",
     ] {
         assert!(log.contains(wanted), "{wanted}: {log}\n{error}");
     }

@@ -110,7 +110,7 @@ pub fn fly<M: Machine>(image: &Path, order: &Order<'_>) -> Result<(), Box<dyn Er
     let pilot = if fetches { pilot.fetching() } else { pilot };
     let cuts = card.map(|folder| Cuts { folder: folder.into(), at_ms: cuts_ms.to_vec() });
     let flight = Flight { pilot, hearer, receiver, pins, cuts, fetched: None };
-    let to_log: &[_] = if log.is_some() { &[("LOG_PORT", 2.0)] } else { &[] };
+    let to_log: &[_] = if log.is_some() { &[("LOG_PORT", 2.0), ("SER_TEL1_BAUD", 921_600.0)] } else { &[] };
     let images = images::<M>(image, to_log)?;
     let session = Session::new(board, 0, VirtualNanos(TICK_NS))?;
     let mut finished = run(session, &Start::new(&images), flight)?;

@@ -74,7 +74,7 @@ fn a_vehicle_in_good_hands_passes_every_step() {
     for wanted in ["noise at rest", "right side down", "nose up", "warmth", "GNSS fix", "battery", "link"] {
         assert!(names.contains(&wanted), "{names:?}");
     }
-    assert!(log.parameters.iter().any(|(name, value)| name == "SER_TEL1_BAUD" && value == "921600"));
+    assert!(log.parameters.iter().any(|(name, value)| name == "SER_TEL1_BAUD" && value == "460800"));
 }
 
 /// A board whose y axis is wrong looks like one that is turned to the other side.

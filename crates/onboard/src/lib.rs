@@ -51,7 +51,7 @@ pub use guided::GuidanceResult;
 pub use imu_lanes::OtherSensors;
 pub use imu_selector::{ImuPair, ImuSelector};
 pub use law::FlightLaw;
-pub use link::{Link, LogMode};
+pub use link::{BAUD, Link, LogMode};
 pub use lockstep::ReplyHead;
 pub use notch_follower::NotchFollower;
 pub use raw_readings::RawReadings;

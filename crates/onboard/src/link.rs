@@ -18,6 +18,10 @@ impl Choice for LogMode {
     const WORDS: &'static [&'static str] = &["armed", "boot_until_disarm", "boot"];
 }
 
+/// Baud rate of a link, unless a parameter says another: the highest at which no UART of these boards loses a byte
+/// (docs/timing.md).
+pub const BAUD: u32 = 460_800;
+
 parameters! {
     /// Parameters of the link. A change counts from the next start on.
     #[derive(Clone, Copy, Debug, PartialEq)]
@@ -27,7 +31,7 @@ parameters! {
         pub system: u32 = 1,
         /// Baud rate of the serial line, and so what telemetry may take of it, from the next start on.
         #[parameter(SER_TEL1_BAUD, "number", 9600.0..=921600.0)]
-        pub baud: u32 = 921_600,
+        pub baud: u32 = BAUD,
         /// Link that carries the exact log in place of MAVLink, counted from 1; 0 for none, from the next start on. The
         /// first one never does.
         #[parameter(LOG_PORT, "number", 0.0..=4.0)]

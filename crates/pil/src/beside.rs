@@ -45,7 +45,7 @@ impl Beside {
         let gdb = board.halt()?;
         gdb.run_to(encode, PATIENCE)?;
         let dshot = gdb.count_function()?;
-        // Only a few samples: single steps are slower than the processor's real time.
+        // Few samples: single steps are slower than the processor's real time.
         let mut most = |interrupt: u32, samples: u32| -> Result<u32, Error> {
             let mut most = 0;
             for _ in 0..samples {
@@ -54,6 +54,6 @@ impl Beside {
             }
             Ok(most)
         };
-        Ok(Beside { dshot, systick: most(systick, 4)?, byte: most(byte, 12)?, wake: most(wake, 4)? })
+        Ok(Beside { dshot, systick: most(systick, 4)?, byte: most(byte, 200)?, wake: most(wake, 4)? })
     }
 }

@@ -6,15 +6,13 @@ use crate::serial::Serial;
 use afbc_bring_up::{BringUpOptions, Verdict, bring_up};
 use afbc_files::place;
 use afbc_hil::Autopilot;
+use afbc_onboard::BAUD;
 use clap::{Args, value_parser};
 use std::io::stdin;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::str::FromStr;
 use std::time::{SystemTime, UNIX_EPOCH};
-
-/// The links' baud rate, unless another is given.
-const BAUD: u32 = 921_600;
 
 /// Take the first steps with a board, propellers off, and write a log that can be sent back
 ///
@@ -172,7 +170,7 @@ mod tests {
     #[test]
     fn connections_are_read() {
         for (text, shown) in [
-            ("serial:/dev/ttyACM0", "Serial(\"/dev/ttyACM0\", 921600)"),
+            ("serial:/dev/ttyACM0", "Serial(\"/dev/ttyACM0\", 460800)"),
             ("serial:COM3:57600", "Serial(\"COM3\", 57600)"),
             ("udp:127.0.0.1:18570", "Udp(\"127.0.0.1:18570\")"),
             ("tcp:[::1]:5760", "Tcp(\"[::1]:5760\")"),

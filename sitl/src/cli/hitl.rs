@@ -5,6 +5,7 @@ use super::target::Target;
 use super::terminal::{Failure, print};
 use crate::serial::{self, Serial};
 use afbc_hil::{LoopEnd, MessagePeriods, Station};
+use afbc_onboard::BAUD;
 use afbc_sim::flight::Sample;
 use clap::Args;
 use std::ops::ControlFlow;
@@ -26,8 +27,8 @@ pub(crate) struct Hitl {
     #[arg(long, value_name = "DEVICE", required_unless_present = "list")]
     port: Option<String>,
 
-    /// Baud rate of the port; the firmware's is 921600, unless its parameter SER_TEL1_BAUD says another
-    #[arg(long, value_name = "N", default_value_t = 921_600)]
+    /// Baud rate of the port; the firmware's is 460800, unless its parameter SER_TEL1_BAUD says another
+    #[arg(long, value_name = "N", default_value_t = BAUD)]
     baud: u32,
 
     /// List the serial ports instead

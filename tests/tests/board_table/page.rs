@@ -11,7 +11,7 @@ pub(crate) fn wiring(board: &BoardTable) -> String {
         [
             "link: out (TX), in (RX)".to_owned(),
             format!("{}, {}", link.tx, link.rx),
-            format!("{}, 921,600 baud, 8N1, 3.3 V", link.name),
+            format!("{}, 460,800 baud, 8N1, 3.3 V", link.name),
         ],
         [
             "IMU: clock, in, out, select, interrupt".to_owned(),

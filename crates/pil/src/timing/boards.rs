@@ -109,7 +109,7 @@ pub static BOARDS: [BoardTimes; 4] = [
         parts: &[],
         sampled: 0,
         is_one: false,
-        known: &known::STM32F405,
+        known: &known::COMMON,
     },
     BoardTimes {
         names: "kakute-f4-v2, matek-f405-se, matek-f405-std, speedybee-f405-mini, speedybee-f405-v3, speedybee-f405-v4",
@@ -134,7 +134,7 @@ pub static BOARDS: [BoardTimes; 4] = [
         ],
         sampled: 6,
         is_one: true,
-        known: &known::FLIGHT_CONTROLLERS,
+        known: &known::COMMON,
     },
     BoardTimes {
         names: "pixracer",
@@ -173,6 +173,6 @@ pub static BOARDS: [BoardTimes; 4] = [
         ],
         sampled: 2,
         is_one: false,
-        known: &known::STM32H743,
+        known: &known::COMMON,
     },
 ];
