@@ -1,5 +1,6 @@
-//! A minute on the vehicle's own estimate, flown by the firmware's machine code on an emulated Cortex-M4F with every
-//! preset of an instrument: no bit of estimate and rotor commands differs from the same code on the host.
+//! Flights on the vehicle's own estimate by the firmware's machine code on an emulated Cortex-M4F, with every preset of
+//! an instrument, one of them for a minute: no bit of estimate and rotor commands differs from the same code on the
+//! host.
 #![allow(clippy::expect_used, clippy::panic, reason = "a test that cannot go on should say why")]
 
 use afbc_hil::{Host, LoopEnd, MessagePeriods, Station, fly};
@@ -31,7 +32,12 @@ fn flights() -> Vec<Scenario> {
         (outdoors.instruments.barometer, outdoors.instruments.magnetometer) = (Some(barometer), Some(magnetometer));
         outdoors
     });
-    indoors.into_iter().chain(outdoors).collect()
+    // Who reads the most sensors flies longest: the emulator takes longer than a flight.
+    let mut flights: Vec<_> = outdoors.chain(indoors).collect();
+    for (index, flight) in flights.iter_mut().enumerate() {
+        flight.duration_s = if index == 0 { 60.0 } else { 20.0 };
+    }
+    flights
 }
 
 /// Returns board and host, or none, with a line, without the emulator or its image; never under CI.
@@ -61,7 +67,7 @@ fn compare(scenario: &Scenario) {
     assert_eq!(end.expect("flown"), LoopEnd { lost: None, interrupted: false, disarmed: true }, "{}", scenario.name);
     let comparison = twins.comparison();
     println!("{}: at most {off_m:.3} m off, {comparison:?}", scenario.name);
-    assert!(comparison.armed_ticks > 60_000, "{comparison:?}");
+    assert!(comparison.armed_ticks as f64 > 1e3 * scenario.duration_s, "{comparison:?}");
     assert_eq!(
         comparison.first_difference, None,
         "unless the image is older than the source (cargo fw-pil): {comparison:?}"
