@@ -62,6 +62,8 @@ pub(crate) struct Cuts {
 pub struct Order<'a> {
     /// The scenario's file.
     pub scenario: &'a Path,
+    /// How long it hovers [ms].
+    pub hover_ms: u64,
     /// A mission in the place of a hover.
     pub is_mission: bool,
     /// A receiver of u-blox's, in the place of the board's own.
@@ -83,7 +85,7 @@ pub struct Order<'a> {
 /// Flies what is ordered. The exact log, if it is to be kept in a file, must be flown again with the same result to the
 /// last bit.
 pub fn fly<M: Machine>(image: &Path, order: &Order<'_>) -> Result<(), Box<dyn Error>> {
-    let &Order { scenario, is_mission, receiver, log, card, card_trouble, full_kb, cuts_ms, fetches } = order;
+    let &Order { scenario, hover_ms, is_mission, receiver, log, card, card_trouble, full_kb, cuts_ms, fetches } = order;
     let scenario = load(scenario)?;
     let mut board = M::built()?;
     board.sense(&at_the_place());
@@ -105,7 +107,7 @@ pub fn fly<M: Machine>(image: &Path, order: &Order<'_>) -> Result<(), Box<dyn Er
     }
     let receiver = receiver.map(|generation| UbloxPeer::new(generation, M::RECEIVER));
     let pins = MotorPins::new(M::SIGNAL, scenario.rotors.len());
-    let pilot = Pilot::new(&scenario, wire)?;
+    let pilot = Pilot::new(&scenario, wire)?.hovering(hover_ms);
     let pilot = if is_mission { pilot.touring() } else { pilot };
     let pilot = if fetches { pilot.fetching() } else { pilot };
     let cuts = card.map(|folder| Cuts { folder: folder.into(), at_ms: cuts_ms.to_vec() });

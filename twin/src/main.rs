@@ -96,6 +96,8 @@ fn command() -> Command {
                 scenario(),
                 receiver,
                 log,
+                number("hover", "30", "Seconds of hover, of which the first three do not count")
+                    .value_parser(value_parser!(u64).range(4..=3600)),
                 mission(),
                 card,
                 times("card-stall", "The card stalls: when, and for how long"),
@@ -195,8 +197,18 @@ fn run(matches: &ArgMatches) -> Result<(), Box<dyn Error>> {
             let (is_mission, fetches) = (matches.get_flag("mission"), matches.get_flag("fetch"));
             let full_kb = matches.get_one("card-full").copied();
             let cuts_ms: Vec<u64> = matches.get_many("card-cut").into_iter().flatten().copied().collect();
-            let order =
-                Order { scenario, is_mission, receiver, log, card, card_trouble, full_kb, cuts_ms: &cuts_ms, fetches };
+            let order = Order {
+                scenario,
+                hover_ms: 1000 * number(matches, "hover")?,
+                is_mission,
+                receiver,
+                log,
+                card,
+                card_trouble,
+                full_kb,
+                cuts_ms: &cuts_ms,
+                fetches,
+            };
             with_machine!(chosen(matches)?, M => fly::fly::<M>(image, &order))
         }
         Some(("radio", matches)) => {

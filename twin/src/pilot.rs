@@ -17,7 +17,7 @@ use rigless::machine::flight::Signals;
 use std::error::Error;
 
 const STATION: Address = Address { system: 255, component: 190 };
-/// Height of the hover above where it stood [m], and its time [ms].
+/// Height of the hover above where it stood [m], and its time, if it is not said [ms].
 const HEIGHT_M: f32 = 5.0;
 const HOVER_MS: u64 = 30_000;
 /// Time of the hover before logs are fetched [ms].
@@ -71,6 +71,8 @@ pub struct Pilot {
     ticks_us: (f64, u64),
     longest_us: f32,
     late: u32,
+    /// How long it hovers [ms].
+    hover_ms: u64,
     /// The mission that is flown in the place of a hover.
     tour: Option<Tour>,
     /// Fetches the logs afterwards.
@@ -106,6 +108,7 @@ impl Pilot {
             ticks_us: (0.0, 0),
             longest_us: 0.0,
             late: 0,
+            hover_ms: HOVER_MS,
             tour: None,
             fetch: None,
             tilt_rad: 0.0,
@@ -141,6 +144,12 @@ impl Pilot {
         }
     }
 
+    /// Has it hover for so long [ms].
+    #[must_use]
+    pub fn hovering(self, hover_ms: u64) -> Self {
+        Pilot { hover_ms, ..self }
+    }
+
     /// Has it fly a mission, from take-off to landing, in the place of a hover.
     #[must_use]
     pub fn touring(self) -> Self {
@@ -150,7 +159,8 @@ impl Pilot {
     /// Has it list, download and erase the vehicle's logs after the flight.
     #[must_use]
     pub fn fetching(self) -> Self {
-        Pilot { fetch: Some(Fetch::new(Decoder::new(STATION))), ..self }
+        let fetch = Some(Fetch::new(Decoder::new(STATION)));
+        Pilot { fetch, hover_ms: self.hover_ms.min(SHORT_HOVER_MS), ..self }
     }
 
     /// Returns what has been downloaded, once all is, and before it is erased.
@@ -353,8 +363,7 @@ impl Pilot {
                     self.off_m.0 += (x - self.start_m[0]).hypot(y - self.start_m[1]).hypot(z - self.start_m[2] - 5.0);
                     self.off_m.1 += 1;
                 }
-                let hover_ms = if self.fetch.is_some() { SHORT_HOVER_MS } else { HOVER_MS };
-                (passed_ms >= hover_ms).then_some(Phase::Lands)
+                (passed_ms >= self.hover_ms).then_some(Phase::Lands)
             }
             Phase::Tours => {
                 if passed_ms % 2000 == 0 && z < 0.5 && self.tour.as_ref().is_some_and(|tour| !tour.has_begun()) {
