@@ -96,7 +96,7 @@ fn command() -> Command {
                 scenario(),
                 receiver,
                 log,
-                number("hover", "30", "Seconds of hover, of which the first three do not count")
+                number("hover", "30", "Seconds of hover, of which three do not count; with --fetch six at most")
                     .value_parser(value_parser!(u64).range(4..=3600)),
                 mission(),
                 card,
