@@ -1,31 +1,30 @@
 //! The firmware's code in this process.
 
 use super::{Autopilot, Error};
+use crate::aircraft::{Aircraft, Core, ExactLog, Exchange};
 use crate::host_black_box::{HostBlackBox, Sink};
 use crate::metadata::MetadataFiles;
 use crate::served_files::{OpenFile, ServedFiles};
 use crate::simulated_escs::SimulatedEscs;
 use crate::ulog_files::StoredLogs;
 use afbc::AdaptiveEstimate;
-use afbc_calibration::RawSample;
 use afbc_estimator::Origin;
 use afbc_files::Flash;
 use afbc_flight_core::rate::PERIOD_US;
 use afbc_link::{Decoder, MissionItem, Uplink};
 use afbc_onboard::parameters::{Kept, ParameterTable, Reason, RecordChange};
 use afbc_onboard::{
-    Configuration, ControlInputs, EscTelemetry, Flight, FlightView, ImuSelector, Link, Prepare, RawReadings, Readings,
-    Report,
+    Configuration, ControlInputs, Flight, FlightView, ImuSelector, Link, Prepare, RawReadings, Readings, Report,
 };
 use afbc_plant::Plant;
 use afbc_recorder::{Given, Recorder, TickRecord};
+use afbc_scenario::FlownLaw;
 use afbc_scenario::contender::{ControllerKind, Law};
-use afbc_scenario::{AnyController, FlownLaw};
 use afbc_station::services::signing::{Signing, SigningRecord};
-use afbc_station::{Calibrator, Comms, EscAction, EscReports, RadioControl, Setup, Transfers};
+use afbc_station::{Calibrator, Comms, EscReports, RadioControl, Setup, Transfers};
 use afbc_store::{RecordName, Store};
 use afbc_types::{OutOfRange, PerAxis, ROTORS_MAX, with_rotors};
-use afbc_ulog::{BlackBox, LogStart, TakenInputs};
+use afbc_ulog::{LogStart, TakenInputs};
 use afbc_vehicles::Vehicle;
 
 /// The firmware without its hardware, ticked in lockstep.
@@ -64,202 +63,6 @@ const PAPER: &str = "paper";
 
 /// Name of the hardware in the black box's log.
 const HARDWARE: &str = "SITL";
-
-/// Makes the exact log, and what takes its bytes.
-struct ExactLog {
-    recorder: Recorder,
-    write: Sink,
-    /// Number of the configuration that the next tick flies, if it is another.
-    adopted: Option<u16>,
-    /// Where the notch stands from the next tick on, if it has moved \[rad/s\].
-    notch_rad_s: Option<f32>,
-}
-
-/// The half that decides, of a vehicle with any number of rotors, and its parameters.
-trait Core {
-    fn tick(
-        &mut self,
-        now_us: u64,
-        inputs: &mut ControlInputs,
-        readings: &Readings,
-        tell: Tell<'_>,
-    ) -> (Report<ROTORS_MAX>, EscAction);
-
-    fn cross_check(&self, selector: &mut ImuSelector, readings: &Readings);
-
-    /// Goes on with a calibration, and shows stations what the sensors read.
-    fn calibrate(
-        &mut self,
-        comms: &mut Comms,
-        calibrator: &mut Calibrator,
-        sample: Option<RawSample>,
-        send: &mut dyn FnMut(&[u8]),
-    );
-
-    /// Takes bytes of a radio receiver; returns what the pilot wants.
-    fn pilot(&mut self, comms: &mut Comms, radio: &mut RadioControl, bytes: &[u8]) -> Option<ControlInputs>;
-
-    /// Does what stations want of the parameters, and flies what has changed.
-    fn parameters(&mut self, comms: &mut Comms, send: &mut dyn FnMut(&[u8])) -> Option<RecordChange>;
-
-    /// Begins the black box's log.
-    fn black_box(&self, start: &LogStart<'_>) -> BlackBox;
-
-    /// Returns the metadata of the vehicle called so.
-    fn metadata(&self, vehicle: &str) -> MetadataFiles;
-    /// Returns name and value of every parameter.
-    fn parameter_values(&self) -> Vec<(RecordName, f32)>;
-    /// Returns what is known after the tick at `now_us`.
-    fn view(&self, now_us: u64) -> FlightView;
-    /// Returns AFBC's estimates, if it flies.
-    fn estimates(&self) -> Option<PerAxis<AdaptiveEstimate>>;
-    /// Flies on under this law, or the image's.
-    fn change_law(&mut self, law: FlownLaw) -> Result<(), OutOfRange>;
-
-    /// Logs the last tick, and a change of the parameters after it.
-    fn log(
-        &self,
-        black_box: &mut HostBlackBox,
-        report: &Report<ROTORS_MAX>,
-        took: (&Readings, TakenInputs),
-        escs: &EscTelemetry,
-        change: Option<RecordChange>,
-    );
-
-    /// Records the start, or a change.
-    fn record(&self, log: &mut ExactLog, names: &[String; 2], change: Option<RecordChange>);
-}
-
-/// A vehicle under a law, its parameters, and what makes it of them.
-struct Aircraft<const N: usize> {
-    flight: Flight<N, AnyController<N>>,
-    table: ParameterTable<N>,
-    law: FlownLaw,
-    /// The motor controllers' line.
-    escs: EscReports,
-}
-
-/// What reports a tick that took so long.
-struct Tell<'a> {
-    comms: &'a mut Comms,
-    tick_us: f32,
-    send: &'a mut dyn FnMut(&[u8]),
-    /// What has come over the motor controllers' line.
-    escs: &'a [u8],
-}
-
-impl<const N: usize> Core for Aircraft<N> {
-    fn tick(
-        &mut self,
-        now_us: u64,
-        inputs: &mut ControlInputs,
-        readings: &Readings,
-        tell: Tell<'_>,
-    ) -> (Report<ROTORS_MAX>, EscAction) {
-        let report = self.flight.tick(now_us, inputs, readings);
-        tell.comms.report(&report, tell.tick_us, tell.send);
-        let action = tell.comms.escs(&mut self.escs, tell.escs, &report);
-        action.notch.iter().for_each(|notch| self.flight.move_notch(notch));
-        (report.padded(), action)
-    }
-
-    fn cross_check(&self, selector: &mut ImuSelector, readings: &Readings) {
-        self.flight.cross_check(selector, readings);
-    }
-
-    fn calibrate(
-        &mut self,
-        comms: &mut Comms,
-        calibrator: &mut Calibrator,
-        sample: Option<RawSample>,
-        send: &mut dyn FnMut(&[u8]),
-    ) {
-        comms.calibrate(calibrator, sample, &self.table, send);
-    }
-
-    fn pilot(&mut self, comms: &mut Comms, radio: &mut RadioControl, bytes: &[u8]) -> Option<ControlInputs> {
-        comms.pilot(radio, bytes, &self.table.configuration().radio)
-    }
-
-    fn parameters(&mut self, comms: &mut Comms, send: &mut dyn FnMut(&[u8])) -> Option<RecordChange> {
-        let Aircraft { flight, table, law, escs } = self;
-        let change = comms.parameters(table, send)?;
-        escs.adopt(table.configuration());
-        // Disarmed, and each change has been checked.
-        let adopted = law.prepare(table.configuration()).is_ok_and(|prepared| flight.adopt(&prepared));
-        debug_assert!(adopted, "a change that is not flown");
-        Some(change)
-    }
-
-    fn black_box(&self, start: &LogStart<'_>) -> BlackBox {
-        BlackBox::new(start, &self.table)
-    }
-
-    fn metadata(&self, vehicle: &str) -> MetadataFiles {
-        MetadataFiles::new(vehicle, &self.table)
-    }
-
-    fn parameter_values(&self) -> Vec<(RecordName, f32)> {
-        self.table.iter().map(|parameter| (parameter.name, parameter.value)).collect()
-    }
-
-    fn view(&self, now_us: u64) -> FlightView {
-        self.flight.view(now_us)
-    }
-
-    fn estimates(&self) -> Option<PerAxis<AdaptiveEstimate>> {
-        self.flight.law_memory()?.estimates()
-    }
-
-    fn change_law(&mut self, law: FlownLaw) -> Result<(), OutOfRange> {
-        let prepared = law.prepare(self.table.configuration())?;
-        self.flight.change_law(&prepared);
-        self.law = law;
-        Ok(())
-    }
-
-    fn log(
-        &self,
-        black_box: &mut HostBlackBox,
-        report: &Report<ROTORS_MAX>,
-        (readings, taken): (&Readings, TakenInputs),
-        escs: &EscTelemetry,
-        change: Option<RecordChange>,
-    ) {
-        let view = self.flight.view(report.time_us);
-        black_box.tick(report, readings, taken, (&view, escs), &self.table);
-        if let Some(change) = change {
-            black_box.change(&self.table, change);
-        }
-    }
-
-    fn record(
-        &self,
-        ExactLog { recorder, write, adopted, .. }: &mut ExactLog,
-        [vehicle, law]: &[String; 2],
-        change: Option<RecordChange>,
-    ) {
-        match change {
-            None => recorder.start([vehicle, law], &self.as_built(), write),
-            Some(change) => *adopted = Some(recorder.change(&self.table, change, write)),
-        }
-    }
-}
-
-impl<const N: usize> Aircraft<N> {
-    /// Returns the parameters beside those of an image, whose link has its declared defaults.
-    fn as_built(&self) -> ParameterTable<N> {
-        let mut image = self.table.clone();
-        image.restore();
-        let image = Configuration { link: Link::DEFAULT, ..image.configuration().clone() };
-        let mut table = ParameterTable::new(image);
-        for parameter in self.table.iter() {
-            // They are in their ranges already.
-            let _ = table.put(parameter.name, parameter.value);
-        }
-        table
-    }
-}
 
 /// Result of one control tick.
 #[derive(Clone, Debug)]
@@ -521,8 +324,8 @@ impl Host {
         let mut bytes = Vec::new();
         let mut send = |frame: &[u8]| bytes.extend_from_slice(frame);
         let escs = core::mem::take(&mut self.escs);
-        let tell = Tell { comms: &mut self.comms, tick_us, send: &mut send, escs: &escs };
-        let (report, action) = self.flight.tick(time_us, &mut self.taken, &readings, tell);
+        let exchange = Exchange { comms: &mut self.comms, tick_us, send: &mut send, escs: &escs };
+        let (report, action) = self.flight.tick(time_us, &mut self.taken, &readings, exchange);
         if let Some(ExactLog { recorder, write, adopted, notch_rad_s }) = &mut self.log {
             let (number, given, battery, clock_failed) = (self.number, Given::of(&report), self.taken.battery, false);
             let (adopted, moved) = (adopted.take(), notch_rad_s.take());

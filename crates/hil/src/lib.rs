@@ -13,6 +13,7 @@
 //! Plant, gusts, true parameters, start and trajectory are the scenario's.
 #![forbid(unsafe_code)]
 
+mod aircraft;
 mod autopilot;
 mod error;
 mod extremes;

@@ -10,6 +10,7 @@
 )]
 
 mod channels;
+mod commands;
 mod decoder;
 mod frames;
 mod inertial;

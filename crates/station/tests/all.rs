@@ -25,6 +25,7 @@ mod parameters;
 mod places;
 mod poses;
 mod rate;
+mod reports;
 mod requests;
 mod settings;
 mod signing;
