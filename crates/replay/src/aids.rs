@@ -111,12 +111,12 @@ pub(crate) fn collect(
 /// Keeps samples at least so far apart.
 pub(crate) fn sparse<T>(samples: Vec<T>, apart_us: u64, at_us: impl Fn(&T) -> u64) -> Vec<T> {
     let mut last_us: Option<u64> = None;
-    let mut keep = |sample: &T| {
+    let keep = |sample: &T| {
         let keep = last_us.is_none_or(|last_us| at_us(sample) >= last_us.saturating_add(apart_us));
         if keep {
             last_us = Some(at_us(sample));
         }
         keep
     };
-    samples.into_iter().filter(|sample| keep(sample)).collect()
+    samples.into_iter().filter(keep).collect()
 }

@@ -136,7 +136,8 @@ fn late_poses_count_for_their_own_time() {
                 measured.position_m += noise(ms) * 1e-3;
                 waiting.push_back((ms + delay_ms, message(by, ms * 1000, measured, PoseSigmas::UNKNOWN)));
             }
-            while let Some((_, message)) = waiting.pop_front_if(|(arrives_ms, _)| *arrives_ms <= ms) {
+            while waiting.front().is_some_and(|(arrives_ms, _)| *arrives_ms <= ms) {
+                let (_, message) = waiting.pop_front().expect("there is one");
                 let before = bench.inputs.inbox.state().copied();
                 bench.hear(message);
                 let state = bench.inputs.inbox.state().filter(|state| Some(**state) != before);
