@@ -109,15 +109,10 @@ pub async fn run<B: Board, const OTHERS: usize>(
                     }
                     continue;
                 }
-                let news = match link.checked_sub(1).and_then(|other| decoders.get_mut(other)) {
-                    Some(decoder) => {
-                        comms.exchange(decoder);
-                        let news = hear::<B>(comms, black_box, bytes);
-                        comms.exchange(decoder);
-                        news
-                    }
-                    None => hear::<B>(comms, black_box, bytes),
-                };
+                let mut other = link.checked_sub(1).and_then(|other| decoders.get_mut(other));
+                other.iter_mut().for_each(|decoder| comms.exchange(decoder));
+                let news = hear::<B>(comms, black_box, bytes);
+                other.iter_mut().for_each(|decoder| comms.exchange(decoder));
                 pass_on::<B>(&news, log);
                 BAD_FRAMES.store(comms.bad_frames(), Ordering::Relaxed);
             }
@@ -126,27 +121,12 @@ pub async fn run<B: Board, const OTHERS: usize>(
                     indication::put(&tick.report);
                 }
                 if B::Sampler::SENSES {
-                    let net = &table.configuration().guidance.net;
-                    let told = [net.divider, net.current_a_v];
-                    let mut aux = aux_sensors::known(tick.report.time_us, told);
-                    if B::Sampler::IS_REDUNDANT {
-                        report_imus(comms, &mut aux, tick.report.time_us);
-                    }
-                    report_self_tests(comms, &mut aux);
-                    comms.set_aux_sensors(aux);
-                    // Also that there is none any more.
-                    let battery = comms.battery();
-                    control::with_mail(|inputs| inputs.battery = battery);
+                    look_at_sensors::<B>(comms, table, tick.report.time_us);
                 }
                 if B::HAS_CARD
                     && let Some(black_box) = black_box
                 {
-                    let (now_us, armed) = (tick.report.time_us, tick.report.mode.armed());
-                    match black_box.begin_tick(now_us, armed, table) {
-                        Some((text, true)) => comms.warn(text),
-                        Some((text, false)) => comms.inform(text),
-                        None => (),
-                    }
+                    begin_logging(comms, black_box, table, &tick);
                 }
                 report(comms, &tick, B::CORE_HZ, &mut outgoing);
                 // A constant, so that a board without sensors has none of it.
@@ -206,17 +186,44 @@ pub async fn run<B: Board, const OTHERS: usize>(
                     }
                     black_box.send(tick.report.time_us, &outgoing);
                 }
-                let wanted = comms.wants_reboot();
-                leaving += u32::from(wanted.is_some());
+                leaving += u32::from(comms.wants_reboot().is_some());
                 if leaving >= FAREWELL && !control::armed() {
-                    match (wanted, B::BOOT_LOADER) {
-                        (Some(Reboot::BootLoader), Some(restart)) => restart(),
-                        _ => cortex_m::peripheral::SCB::sys_reset(),
-                    }
+                    reboot::<B>(comms);
                 }
             }
         }
     }
+}
+
+/// Tells stations what sensors outside the control tick read, and the control tick what the battery says.
+fn look_at_sensors<B: Board>(comms: &mut Comms, table: &ParameterTable, now_us: u64) {
+    let net = &table.configuration().guidance.net;
+    let mut aux = aux_sensors::known(now_us, [net.divider, net.current_a_v]);
+    if B::Sampler::IS_REDUNDANT {
+        report_imus(comms, &mut aux, now_us);
+    }
+    report_self_tests(comms, &mut aux);
+    comms.set_aux_sensors(aux);
+    // Also that there is none any more.
+    let battery = comms.battery();
+    control::with_mail(|inputs| inputs.battery = battery);
+}
+
+/// Begins a tick of the log on the card, and says what has become of the card.
+fn begin_logging(comms: &mut Comms, black_box: &mut CardLog, table: &ParameterTable, tick: &Tick) {
+    match black_box.begin_tick(tick.report.time_us, tick.report.mode.armed(), table) {
+        Some((text, true)) => comms.warn(text),
+        Some((text, false)) => comms.inform(text),
+        None => (),
+    }
+}
+
+/// Restarts as a station has asked, in the boot loader or in this program.
+fn reboot<B: Board>(comms: &Comms) -> ! {
+    if let (Some(Reboot::BootLoader), Some(restart)) = (comms.wants_reboot(), B::BOOT_LOADER) {
+        restart();
+    }
+    cortex_m::peripheral::SCB::sys_reset()
 }
 
 /// Receives bytes, and what stations ask of the logs on a card.

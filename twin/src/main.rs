@@ -51,113 +51,119 @@ use ublox::Generation;
 const RECEIVERS: [(&str, Option<Generation>); 3] =
     [("nmea", None), ("m8", Some(Generation::Eight)), ("m10", Some(Generation::Ten))];
 
+fn machine() -> Arg {
+    let names = MachineName::ALL.map(MachineName::name);
+    Arg::new("machine").required(true).value_parser(PossibleValuesParser::new(names)).help("The board")
+}
+
+fn file(name: &'static str, help: &'static str) -> Arg {
+    Arg::new(name).required(true).value_parser(value_parser!(PathBuf)).help(help)
+}
+
+fn image() -> Arg {
+    file("image", "The flight image, an ELF file")
+}
+
+fn scenario() -> Arg {
+    file("scenario", "The scenario's file")
+}
+
+fn option(name: &'static str, value: &'static str, help: &'static str) -> Arg {
+    Arg::new(name).long(name).value_name(value).help(help)
+}
+
+fn whole(name: &'static str, usual: &'static str, help: &'static str) -> Arg {
+    option(name, "N", help).value_parser(value_parser!(u64)).default_value(usual)
+}
+
+fn mission() -> Arg {
+    let mission = Arg::new("mission").long("mission").action(ArgAction::SetTrue);
+    mission.help("Fly a mission of two minutes, uploaded over the link, in the place of the hover")
+}
+
 /// Declares the command line.
 fn command() -> Command {
-    let machine = || {
-        let names = MachineName::ALL.map(MachineName::name);
-        Arg::new("machine").required(true).value_parser(PossibleValuesParser::new(names)).help("The board")
-    };
-    let file = |name: &'static str, help: &'static str| {
-        Arg::new(name).required(true).value_parser(value_parser!(PathBuf)).help(help)
-    };
-    let image = || file("image", "The flight image, an ELF file");
-    let scenario = || file("scenario", "The scenario's file");
-    let receiver = Arg::new("receiver")
-        .long("receiver")
-        .value_parser(PossibleValuesParser::new(RECEIVERS.map(|(name, _)| name)))
-        .default_value("nmea")
-        .help("GNSS receiver: the board's own model, or a new u-blox");
-    let log = Arg::new("log").long("log").value_name("FILE").value_parser(value_parser!(PathBuf));
-    let log = log.help("Keep the exact log here, and fly it again on this machine: the same to the last bit");
-    let card = Arg::new("card").long("card").value_name("FOLDER").value_parser(value_parser!(PathBuf));
-    let card = card.help("Keep the logs of the memory card here; a log of the whole flight must be among them");
-    let times = |name: &'static str, help: &'static str| {
-        let times = Arg::new(name).long(name).num_args(2).value_names(["MS", "MS"]).value_parser(value_parser!(u64));
-        times.help(help)
-    };
-    let mission = || {
-        let mission = Arg::new("mission").long("mission").action(ArgAction::SetTrue);
-        mission.help("Fly a mission of two minutes, uploaded over the link, in the place of the hover")
-    };
-    let number = |name: &'static str, usual: &'static str, help: &'static str| {
-        Arg::new(name).long(name).value_name("N").value_parser(value_parser!(u64)).default_value(usual).help(help)
-    };
-    let only = Arg::new("only").long("only").value_name("NAME").action(ArgAction::Append);
-    let only = only.help("Those whose names begin so; may be given again");
+    let phases = whole("phases", "40", "Times within a control period at which the kill switch's frames come");
+    let rate = whole("rate", "250", "Frames per second at which the kill switch is tried; may be given again")
+        .value_parser(value_parser!(u64).range(1..=1000))
+        .action(ArgAction::Append);
+    let kept = file("hover", "Where the hover is kept, from which further runs begin");
+    let only = option("only", "NAME", "Those whose names begin so; may be given again").action(ArgAction::Append);
+    let seeds = [whole("seeds", "1", "Flights of each fault"), whole("first", "1", "The first one's seed")];
+    let cuts =
+        [whole("cuts", "100", "Cuts in a write, and in an erase, about"), whole("seed", "1", "Of the random numbers")];
+    let escs = Command::new("escs").about("Fly with motor controllers that answer, and stop rotors");
     Command::new("twin")
         .about("Runs the flight image of a board, as it is flashed, on register-level models of the board")
         .subcommand_required(true)
         .arg_required_else_help(true)
         .subcommand(Command::new("boot").about("Boot, and look at bus and pins").args([machine(), image()]))
-        .subcommand(
-            Command::new("fly").about("Take off, hover and land, in lockstep with the plant").args([
-                machine(),
-                image(),
-                scenario(),
-                receiver,
-                log,
-                number("hover", "30", "Seconds of hover, of which three do not count; with --fetch six at most")
-                    .value_parser(value_parser!(u64).range(4..=3600)),
-                mission(),
-                card,
-                times("card-stall", "The card stalls: when, and for how long"),
-                times("card-out", "The card is out: from when, and until when"),
-                Arg::new("card-full")
-                    .long("card-full")
-                    .value_name("KB")
-                    .value_parser(value_parser!(u64))
-                    .help("Room on the card"),
-                Arg::new("card-cut")
-                    .long("card-cut")
-                    .value_name("MS")
-                    .action(ArgAction::Append)
-                    .value_parser(value_parser!(u64))
-                    .help("Keep what the card holds at this time, as if the power was cut then; may be given again"),
-                Arg::new("fetch")
-                    .long("fetch")
-                    .action(ArgAction::SetTrue)
-                    .requires("card")
-                    .help("After the flight, list the logs over the link, download parts of one, and erase all"),
-            ]),
-        )
-        .subcommand(
-            Command::new("radio").about("Fly by radio, and stop the motors by the kill switch").args([
-                machine(),
-                image(),
-                scenario(),
-                number("rate", "250", "Frames per second at which the kill switch is tried; may be given again")
-                    .value_parser(value_parser!(u64).range(1..=1000))
-                    .action(ArgAction::Append),
-                number("phases", "40", "Times within a control period at which the kill switch's frames come"),
-            ]),
-        )
-        .subcommand(Command::new("escs").about("Fly with motor controllers that answer, and stop rotors").args([
+        .subcommand(fly_command())
+        .subcommand(Command::new("radio").about("Fly by radio, and stop the motors by the kill switch").args([
             machine(),
             image(),
             scenario(),
+            rate,
+            phases,
         ]))
+        .subcommand(escs.args([machine(), image(), scenario()]))
         .subcommand(Command::new("replay").about("Fly an exact log again").arg(file("log", "The log")))
-        .subcommand(Command::new("faults").about("Faults at a board's pins, in a hover that is kept in a file").args([
-            machine(),
-            image(),
-            scenario(),
-            file("hover", "Where the hover is kept, from which further runs begin"),
-            number("seeds", "1", "Flights of each fault"),
-            number("first", "1", "The first one's seed"),
-            only,
-        ]))
-        .subcommand(Command::new("cuts").about("Power cut while the Matek H743 writes and erases its parameters").args(
-            [
-                image(),
-                number("cuts", "100", "Cuts in a write, and in an erase, about"),
-                number("seed", "1", "Of the random numbers"),
-            ],
-        ))
+        .subcommand(
+            Command::new("faults")
+                .about("Faults at a board's pins, in a hover that is kept in a file")
+                .args([machine(), image(), scenario(), kept, only])
+                .args(seeds),
+        )
+        .subcommand(
+            Command::new("cuts")
+                .about("Power cut while the Matek H743 writes and erases its parameters")
+                .arg(image())
+                .args(cuts),
+        )
         .subcommand(
             Command::new("host")
                 .about("Fly a scenario with the firmware's code on this machine")
                 .args([scenario(), mission()]),
         )
+}
+
+/// Declares the command that flies, and what may happen to the card meanwhile.
+fn fly_command() -> Command {
+    let receiver = Arg::new("receiver")
+        .long("receiver")
+        .value_parser(PossibleValuesParser::new(RECEIVERS.map(|(name, _)| name)))
+        .default_value("nmea")
+        .help("GNSS receiver: the board's own model, or a new u-blox");
+    let hover = whole("hover", "30", "Seconds of hover, of which three do not count; with --fetch six at most")
+        .value_parser(value_parser!(u64).range(4..=3600));
+    let log =
+        option("log", "FILE", "Keep the exact log here, and fly it again on this machine: the same to the last bit");
+    let card =
+        option("card", "FOLDER", "Keep the logs of the memory card here; a log of the whole flight must be among them");
+    let from_until = |name, help| {
+        Arg::new(name).long(name).num_args(2).value_names(["MS", "MS"]).value_parser(value_parser!(u64)).help(help)
+    };
+    let cut = option(
+        "card-cut",
+        "MS",
+        "Keep what the card holds at this time, as if the power was cut then; may be given again",
+    );
+    let fetch = Arg::new("fetch").long("fetch").action(ArgAction::SetTrue).requires("card");
+    Command::new("fly").about("Take off, hover and land, in lockstep with the plant").args([
+        machine(),
+        image(),
+        scenario(),
+        receiver,
+        log.value_parser(value_parser!(PathBuf)),
+        hover,
+        mission(),
+        card.value_parser(value_parser!(PathBuf)),
+        from_until("card-stall", "The card stalls: when, and for how long"),
+        from_until("card-out", "The card is out: from when, and until when"),
+        option("card-full", "KB", "Room on the card").value_parser(value_parser!(u64)),
+        cut.action(ArgAction::Append).value_parser(value_parser!(u64)),
+        fetch.help("After the flight, list the logs over the link, download parts of one, and erase all"),
+    ])
 }
 
 /// Returns the file that an argument names.

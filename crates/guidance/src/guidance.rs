@@ -12,7 +12,7 @@ use crate::mode::FlightMode;
 use crate::net::{self, FailedSensors, Findings, Watch};
 use crate::notice::{Cause, ModeReason, Notice, Notices};
 use crate::orbit::Orbit;
-use crate::order::{OrderRefusal, Orders};
+use crate::order::{OffboardTarget, OrderRefusal, Orders, Sticks};
 use crate::settings::Settings;
 use crate::sticks;
 use crate::table::{self, FailsafeAction, TransitionInputs};
@@ -227,15 +227,8 @@ impl Memory {
         self.find_home(state, given.rested, armed);
 
         // Watches.
-        let flying = &settings.flying;
-        let fresh = |at_us: u64, lost_s: f32| {
-            let age_us = Stamped { value: (), at_us }.age_us(given.now_us);
-            age_us as f32 * 1e-6 <= lost_s
-        };
-        let target = orders.target.as_ref().filter(|target| fresh(target.at_us, flying.targets_lost_s));
-        let target = target.filter(|target| targets::is_plausible(&target.value));
-        let sticks = orders.sticks.filter(|sticks| fresh(sticks.at_us, flying.sticks_lost_s));
-        let sticks = sticks.map(|sticks| sticks.value).filter(sticks::is_plausible);
+        let target = fresh_target(orders, given.now_us, settings.flying.targets_lost_s);
+        let sticks = fresh_sticks(orders, given.now_us, settings.flying.sticks_lost_s);
         let findings = Findings {
             mode: self.mode,
             armed,
@@ -265,22 +258,8 @@ impl Memory {
         };
 
         // Decides the mode.
-        if self.was_armed && !armed {
-            self.disarmed(&mut notices);
-        }
-        self.was_armed = armed;
-        let mut announced = None;
-        if let Some(next) = table::forced(self.mode, &seen) {
-            self.change(next, ModeReason::Failsafe(cause), &mut notices);
-            (self.failsafe, announced) = (Some(cause), Some(cause));
-        }
         let leaves = findings.fence.leaves && net::is_new(new, Cause::Fence);
-        if leaves && airborne {
-            self.stop_at_fence(settings.net.fence_action.action(), &mut notices);
-        }
-        if new != 0 {
-            net::announce(&settings.net, new, announced, &mut notices);
-        }
+        self.decide(settings, &seen, cause, new, leaves, &mut notices);
         let first = orders.given.front();
         let answer = first.map(|given| (given.ticket, self.order(settings, &given.value, state, &seen, &mut notices)));
 
@@ -317,6 +296,35 @@ impl Memory {
             against: self.against,
             charge: self.watch.charge(),
             orbits: matches!(self.plan, Plan::Orbit(_)),
+        }
+    }
+
+    /// Changes the mode, if the safety net or the end of a flight asks for it, and announces the causes in the set
+    /// `new`; `leaves` is true if the vehicle begins to leave the uploaded geofence.
+    #[inline]
+    fn decide(
+        &mut self,
+        settings: &Settings,
+        seen: &TransitionInputs,
+        cause: Cause,
+        new: u16,
+        leaves: bool,
+        notices: &mut Notices,
+    ) {
+        if self.was_armed && !seen.armed {
+            self.disarmed(notices);
+        }
+        self.was_armed = seen.armed;
+        let mut announced = None;
+        if let Some(next) = table::forced(self.mode, seen) {
+            self.change(next, ModeReason::Failsafe(cause), notices);
+            (self.failsafe, announced) = (Some(cause), Some(cause));
+        }
+        if leaves && seen.airborne {
+            self.stop_at_fence(settings.net.fence_action.action(), notices);
+        }
+        if new != 0 {
+            net::announce(&settings.net, new, announced, notices);
         }
     }
 
@@ -429,4 +437,22 @@ impl Memory {
         reasons.note(matches!(self.mode, FlightMode::Land | FlightMode::Return), Refusal::WrongMode);
         reasons
     }
+}
+
+/// Returns the newest target, if it is plausible and no older than this.
+#[inline]
+fn fresh_target(orders: &Orders, now_us: u64, lost_s: f32) -> Option<&Stamped<OffboardTarget>> {
+    let target = orders.target.as_ref().filter(|target| is_fresh(target, now_us, lost_s))?;
+    targets::is_plausible(&target.value).then_some(target)
+}
+
+/// Returns the newest position of the sticks, if it is plausible and no older than this.
+#[inline]
+fn fresh_sticks(orders: &Orders, now_us: u64, lost_s: f32) -> Option<Sticks> {
+    let sticks = orders.sticks.filter(|sticks| is_fresh(sticks, now_us, lost_s))?;
+    sticks::is_plausible(&sticks.value).then_some(sticks.value)
+}
+
+fn is_fresh<T>(stamped: &Stamped<T>, now_us: u64, lost_s: f32) -> bool {
+    stamped.age_us(now_us) as f32 * 1e-6 <= lost_s
 }

@@ -104,10 +104,11 @@ impl Mission {
             let done = leg.is_none();
             return Progress { output: ModeOutput { done, ..ModeOutput::fly(self.hold.fly(inputs)) }, ..none };
         };
-        if !is_plausible(&leg.item) {
+        let flown = is_plausible(&leg.item) && place(&leg.item, inputs).is_none_or(|place_m| inside(&place_m));
+        if !flown {
             return Progress { refused: true, ..none };
         }
-        let mut progress = self.fly_item(leg, inputs, inside, none);
+        let mut progress = self.fly_item(leg, inputs, none);
         if let (Some(at_m), Shaping::Limited(aim)) = (self.looks_at_m, &mut progress.output.shaping)
             && !matches!(leg.item, Item::Yaw { .. })
         {
@@ -116,31 +117,11 @@ impl Mission {
         progress
     }
 
-    /// Flies an item that is plausible.
-    fn fly_item(
-        &mut self,
-        leg: &Leg,
-        inputs: &ModeInputs<'_>,
-        inside: impl Fn(&Vector3<f32>) -> bool,
-        none: Progress,
-    ) -> Progress {
+    /// Flies an item that is plausible and inside the geofence.
+    fn fly_item(&mut self, leg: &Leg, inputs: &ModeInputs<'_>, none: Progress) -> Progress {
         match leg.item {
-            Item::TakeOff { height_m } => {
-                if !inside(&Vector3::new(inputs.home_m.x, inputs.home_m.y, height_m)) {
-                    return Progress { refused: true, ..none };
-                }
-                let begun = self.begin(leg, inputs, |inputs| {
-                    Course::Takeoff(Takeoff::new(inputs, max(height_m - inputs.present.position_m.z, 0.0)))
-                });
-                let takeoff = begun.course.takeoff();
-                let output = takeoff.map_or(none.output, |takeoff| takeoff.fly(inputs));
-                let at_m = takeoff.map(|takeoff| takeoff.to_m);
-                self.go_on(leg, output, at_m, none)
-            }
+            Item::TakeOff { height_m } => self.take_off(leg, height_m, inputs, none),
             Item::Waypoint { position_m, yaw_rad, hold_s, within_m, fly_through } => {
-                if !inside(&position_m) {
-                    return Progress { refused: true, ..none };
-                }
                 let begun = self.begin(leg, inputs, from_ground);
                 if let Some(output) = begun.climb(inputs) {
                     return Progress { output, ..none };
@@ -148,30 +129,13 @@ impl Mission {
                 let yaw_rad = if yaw_rad.is_nan() { begun.yaw_rad } else { yaw_rad };
                 let aim = LimiterTarget { yaw_rad, ..inputs.to(position_m) };
                 let within_m = if within_m > 0.0 { within_m } else { inputs.flying.within_m };
-                let slow = inputs.present.velocity_m_s.norm_squared() < STOPPED_M_S * STOPPED_M_S;
-                if begun.stayed_s > 0.0 || inputs.is_at(&position_m, within_m) && (fly_through || slow) {
+                if begun.stayed_s > 0.0 || inputs.is_at(&position_m, within_m) && (fly_through || is_slow(inputs)) {
                     begun.stayed_s += inputs.dt_s;
                 }
                 let done = begun.stayed_s > 0.0 && (fly_through || begun.stayed_s >= hold_s);
                 self.go_on(leg, ModeOutput { done, ..ModeOutput::fly(aim) }, Some(position_m), none)
             }
-            Item::Land { position_m } => {
-                let here = position_m.x.is_nan() || position_m.y.is_nan();
-                if here {
-                    return Progress { then: Some((FlightMode::Land, leg.number)), ..none };
-                }
-                if !inside(&Vector3::new(position_m.x, position_m.y, inputs.home_m.z)) {
-                    return Progress { refused: true, ..none };
-                }
-                let height_m = inputs.present.position_m.z;
-                let begun = self.begin(leg, inputs, |inputs| Course::Takeoff(Takeoff::new(inputs, 0.0)));
-                let height_m = begun.course.takeoff().map_or(height_m, |start| start.to_m.z);
-                let over_m = Vector3::new(position_m.x, position_m.y, height_m);
-                let slow = inputs.present.velocity_m_s.norm_squared() < STOPPED_M_S * STOPPED_M_S;
-                let there = inputs.is_at(&over_m, 1.0) && slow;
-                let then = there.then_some((FlightMode::Land, leg.number));
-                Progress { output: ModeOutput::fly(inputs.to(over_m)), then, ..none }
-            }
+            Item::Land { position_m } => self.land(leg, &position_m, inputs, none),
             Item::Return => Progress { then: Some((FlightMode::Return, leg.number)), ..none },
             Item::Speed(speed_m_s) => {
                 self.speed_m_s = Some(speed_m_s);
@@ -183,45 +147,10 @@ impl Mission {
                 let done = begun.stayed_s >= time_s;
                 self.stay(leg, inputs, done, none)
             }
-            Item::Turns { centre_m, radius_m, turns } => {
-                if !inside(&centre_m) {
-                    return Progress { refused: true, ..none };
-                }
-                let radius = if radius_m == 0.0 { orbit::ORBIT_RADIUS_M } else { radius_m.abs() };
-                let fast_m_s = min(orbit::speed_max_m_s(inputs.limits, radius), inputs.stop().speed_m_s);
-                let begun = self.begin(leg, inputs, from_ground);
-                if let Some(output) = begun.climb(inputs) {
-                    return Progress { output, ..none };
-                }
-                let round = if let Course::Circle(round) = begun.course { round } else { Round::default() };
-                let mut orbit = Orbit {
-                    centre_m,
-                    radius_m: radius,
-                    speed_m_s: if radius_m > 0.0 { fast_m_s } else { -fast_m_s },
-                    heading: OrbitHeading::Centre,
-                    angle_rad: turns * TAU,
-                    round,
-                };
-                let output = orbit.fly(inputs);
-                begun.course = Course::Circle(orbit.round);
-                self.go_on(leg, output, None, none)
-            }
+            Item::Turns { centre_m, radius_m, turns } => self.circle(leg, centre_m, [radius_m, turns], inputs, none),
             Item::Yaw { yaw_rad, relative, direction } => {
-                let first = self.begun.is_none_or(|begun| begun.number != leg.number);
-                let present = inputs.present;
-                let begun = self.begin(leg, inputs, |_| Course::Straight);
-                begun.yaw_rad = if first {
-                    to_turn(yaw_rad, relative, direction, present.yaw_rad)
-                } else {
-                    begun.yaw_rad - present.yaw_rate_rad_s * inputs.dt_s
-                };
-                let left_rad = begun.yaw_rad;
-                let turned = left_rad.abs() < TURNED_RAD && present.yaw_rate_rad_s.abs() < TURNED_RAD_S;
-                let mut progress = self.stay(leg, inputs, turned || !inputs.airborne, none);
-                if let Shaping::Limited(aim) = &mut progress.output.shaping {
-                    aim.yaw_rad = wrap_angle(present.yaw_rad + min(max(left_rad, -LED_RAD), LED_RAD));
-                }
-                progress
+                let to_turn_rad = to_turn(yaw_rad, relative, direction, inputs.present.yaw_rad);
+                self.turn(leg, to_turn_rad, inputs, none)
             }
             Item::Look { at_m } => {
                 self.looks_at_m = Some(at_m.xy()).filter(|at_m| !at_m.x.is_nan());
@@ -235,6 +164,75 @@ impl Mission {
                 progress
             }
         }
+    }
+
+    /// Climbs to a height over home.
+    fn take_off(&mut self, leg: &Leg, height_m: f32, inputs: &ModeInputs<'_>, none: Progress) -> Progress {
+        let begun = self.begin(leg, inputs, |inputs| {
+            Course::Takeoff(Takeoff::new(inputs, max(height_m - inputs.present.position_m.z, 0.0)))
+        });
+        let takeoff = begun.course.takeoff();
+        let output = takeoff.map_or(none.output, |takeoff| takeoff.fly(inputs));
+        let at_m = takeoff.map(|takeoff| takeoff.to_m);
+        self.go_on(leg, output, at_m, none)
+    }
+
+    /// Flies over a place at the height that it has, and lands; where it is if the place is NaN.
+    fn land(&mut self, leg: &Leg, position_m: &Vector3<f32>, inputs: &ModeInputs<'_>, none: Progress) -> Progress {
+        let lands = Some((FlightMode::Land, leg.number));
+        if is_here(position_m) {
+            return Progress { then: lands, ..none };
+        }
+        let height_m = inputs.present.position_m.z;
+        let begun = self.begin(leg, inputs, |inputs| Course::Takeoff(Takeoff::new(inputs, 0.0)));
+        let height_m = begun.course.takeoff().map_or(height_m, |start| start.to_m.z);
+        let over_m = Vector3::new(position_m.x, position_m.y, height_m);
+        let then = lands.filter(|_| inputs.is_at(&over_m, 1.0) && is_slow(inputs));
+        Progress { output: ModeOutput::fly(inputs.to(over_m)), then, ..none }
+    }
+
+    /// Flies round a centre, as fast as it may; counter-clockwise if the radius is positive.
+    fn circle(
+        &mut self,
+        leg: &Leg,
+        centre_m: Vector3<f32>,
+        [radius_m, turns]: [f32; 2],
+        inputs: &ModeInputs<'_>,
+        none: Progress,
+    ) -> Progress {
+        let radius = if radius_m == 0.0 { orbit::ORBIT_RADIUS_M } else { radius_m.abs() };
+        let fast_m_s = min(orbit::speed_max_m_s(inputs.limits, radius), inputs.stop().speed_m_s);
+        let begun = self.begin(leg, inputs, from_ground);
+        if let Some(output) = begun.climb(inputs) {
+            return Progress { output, ..none };
+        }
+        let round = if let Course::Circle(round) = begun.course { round } else { Round::default() };
+        let mut orbit = Orbit {
+            centre_m,
+            radius_m: radius,
+            speed_m_s: if radius_m > 0.0 { fast_m_s } else { -fast_m_s },
+            heading: OrbitHeading::Centre,
+            angle_rad: turns * TAU,
+            round,
+        };
+        let output = orbit.fly(inputs);
+        begun.course = Course::Circle(orbit.round);
+        self.go_on(leg, output, None, none)
+    }
+
+    /// Turns by an angle, which counts as the item begins.
+    fn turn(&mut self, leg: &Leg, to_turn_rad: f32, inputs: &ModeInputs<'_>, none: Progress) -> Progress {
+        let first = self.begun.is_none_or(|begun| begun.number != leg.number);
+        let present = inputs.present;
+        let begun = self.begin(leg, inputs, |_| Course::Straight);
+        begun.yaw_rad = if first { to_turn_rad } else { begun.yaw_rad - present.yaw_rate_rad_s * inputs.dt_s };
+        let left_rad = begun.yaw_rad;
+        let turned = left_rad.abs() < TURNED_RAD && present.yaw_rate_rad_s.abs() < TURNED_RAD_S;
+        let mut progress = self.stay(leg, inputs, turned || !inputs.airborne, none);
+        if let Shaping::Limited(aim) = &mut progress.output.shaping {
+            aim.yaw_rad = wrap_angle(present.yaw_rad + min(max(left_rad, -LED_RAD), LED_RAD));
+        }
+        progress
     }
 
     /// Stays where it is, until it is `done`.
@@ -309,6 +307,30 @@ fn to_turn(yaw_rad: f32, relative: bool, direction: i8, present_rad: f32) -> f32
         1.. if shorter_rad < -PI / 360.0 => shorter_rad + TAU,
         ..=-1 if shorter_rad > PI / 360.0 => shorter_rad - TAU,
         _ => shorter_rad,
+    }
+}
+
+/// True if the setpoint has stopped.
+fn is_slow(inputs: &ModeInputs<'_>) -> bool {
+    inputs.present.velocity_m_s.norm_squared() < STOPPED_M_S * STOPPED_M_S
+}
+
+/// True of a place that means where the vehicle is.
+fn is_here(position_m: &Vector3<f32>) -> bool {
+    position_m.x.is_nan() || position_m.y.is_nan()
+}
+
+/// Returns the place that an item flies to, which must be inside the geofence \[m\].
+fn place(item: &Item, inputs: &ModeInputs<'_>) -> Option<Vector3<f32>> {
+    let home_m = &inputs.home_m;
+    match *item {
+        Item::TakeOff { height_m } => Some(Vector3::new(home_m.x, home_m.y, height_m)),
+        Item::Waypoint { position_m, .. } => Some(position_m),
+        Item::Land { position_m } => {
+            (!is_here(&position_m)).then_some(Vector3::new(position_m.x, position_m.y, home_m.z))
+        }
+        Item::Turns { centre_m, .. } => Some(centre_m),
+        _ => None,
     }
 }
 

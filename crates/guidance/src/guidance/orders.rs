@@ -25,85 +25,20 @@ impl Memory {
         seen: &TransitionInputs,
         notices: &mut Notices,
     ) -> Result<(), OrderRefusal> {
-        let select = |mode: FlightMode| table::select(mode, seen);
         match *order {
-            Order::Select(mode) => {
-                select(mode)?;
-                let height_m = Vector3::new(0.0, 0.0, settings.flying.takeoff_height_m);
-                let climbs = state.filter(|_| mode == FlightMode::Takeoff);
-                if climbs.is_some_and(|state| !self.is_inside(settings, &(state.position_m + height_m))) {
-                    return Err(OrderRefusal::OutsideFence);
-                }
-                if mode != self.mode || mode == FlightMode::Hold {
-                    self.ordered(mode, notices);
-                }
-                Ok(())
-            }
-            Order::TakeOff(height_m) => {
-                let height_m = height_m.unwrap_or(settings.flying.takeoff_height_m);
-                if !(height_m > 0.0 && height_m <= 1000.0) {
-                    return Err(OrderRefusal::OutOfRange);
-                }
-                if !seen.armed {
-                    return Err(OrderRefusal::NotArmed);
-                }
-                select(FlightMode::Takeoff)?;
-                let state = state.ok_or(OrderRefusal::NoPosition)?;
-                let to_m = state.position_m + Vector3::new(0.0, 0.0, height_m);
-                if !self.is_inside(settings, &to_m) {
-                    return Err(OrderRefusal::OutsideFence);
-                }
-                self.ordered(FlightMode::Takeoff, notices);
-                self.limiter.rest(state);
-                self.plan = Plan::Takeoff(Takeoff::above(state.position_m, height_m));
-                Ok(())
-            }
+            Order::Select(mode) => self.select(settings, mode, state, seen, notices),
+            Order::TakeOff(height_m) => self.take_off(settings, height_m, state, seen, notices),
             Order::GoTo { position_m, yaw_rad, speed_m_s } => {
-                let speed_ok = speed_m_s.is_none_or(|speed_m_s| speed_m_s > 0.0 && speed_m_s <= 1e3);
-                if !speed_ok || !is_place(&position_m) || yaw_rad.abs() > 1e3 {
-                    return Err(OrderRefusal::OutOfRange);
-                }
-                let kept = self.can_go(seen)?;
-                let to_m = position_m.zip_map(&kept, |new, old| if new.is_nan() { old } else { new });
-                if !self.is_inside(settings, &to_m) {
-                    return Err(OrderRefusal::OutsideFence);
-                }
-                self.ordered(FlightMode::Hold, notices);
-                let yaw_rad = (!yaw_rad.is_nan()).then_some(yaw_rad);
-                self.plan = Plan::Hold(Hold { at_m: Some(to_m), yaw_rad, speed_m_s });
-                Ok(())
+                let to = Hold { at_m: Some(position_m), yaw_rad: (!yaw_rad.is_nan()).then_some(yaw_rad), speed_m_s };
+                self.go_to(settings, &position_m, to, seen, notices)
             }
             Order::Orbit { centre_m, radius_m, speed_m_s, angle_deg, heading } => {
-                let (left, radius_m) = (radius_m > 0.0, radius_m.abs());
-                let most_m_s = orbit::speed_max_m_s(&settings.limits, radius_m);
-                let usual_m_s = min(most_m_s, settings.flying.cruise_m_s);
-                let speed_m_s = if speed_m_s.is_nan() { usual_m_s } else { speed_m_s };
-                // False of NaN.
-                let flown = orbit::RADIUS_M.contains(&radius_m) && (0.05..=most_m_s).contains(&speed_m_s);
-                if !flown || !is_place(&centre_m) {
-                    return Err(OrderRefusal::OutOfRange);
-                }
-                let speed_m_s = if left { speed_m_s } else { -speed_m_s };
-                let present_m = self.can_go(seen)?;
-                let centre_m = centre_m.zip_map(&present_m, |new, old| if new.is_nan() { old } else { new });
-                let radius = Vector3::new(radius_m, 0.0, 0.0);
-                // The cylinder around home: its farthest point.
-                let away_m = self.home_m.map_or(radius, |home_m| {
-                    let off_m = (centre_m - home_m).xy();
-                    let far_m = off_m.try_normalize(1e-3).map_or(radius.xy(), |ahead| ahead * radius_m);
-                    Vector3::new(far_m.x, far_m.y, 0.0)
-                });
-                if !self.is_inside(settings, &(centre_m + away_m)) {
-                    return Err(OrderRefusal::OutsideFence);
-                }
-                self.ordered(FlightMode::Hold, notices);
                 let angle_rad = if angle_deg == 0 { f32::INFINITY } else { f32::from(angle_deg).to_radians() };
-                self.plan =
-                    Plan::Orbit(Orbit { centre_m, radius_m, speed_m_s, heading, angle_rad, round: Round::default() });
-                Ok(())
+                let wanted = Orbit { centre_m, radius_m, speed_m_s, heading, angle_rad, round: Round::default() };
+                self.orbit(settings, wanted, seen, notices)
             }
             Order::Speed(speed_m_s) => {
-                if !(speed_m_s > 0.0 && speed_m_s <= 1e3) {
+                if !is_speed(speed_m_s) {
                     return Err(OrderRefusal::OutOfRange);
                 }
                 self.speed_m_s = speed_m_s;
@@ -130,6 +65,101 @@ impl Memory {
         }
     }
 
+    fn select(
+        &mut self,
+        settings: &Settings,
+        mode: FlightMode,
+        state: Option<&State>,
+        seen: &TransitionInputs,
+        notices: &mut Notices,
+    ) -> Result<(), OrderRefusal> {
+        table::select(mode, seen)?;
+        let height_m = Vector3::new(0.0, 0.0, settings.flying.takeoff_height_m);
+        if let Some(state) = state.filter(|_| mode == FlightMode::Takeoff) {
+            self.must_be_inside(settings, &(state.position_m + height_m))?;
+        }
+        if mode != self.mode || mode == FlightMode::Hold {
+            self.ordered(mode, notices);
+        }
+        Ok(())
+    }
+
+    fn take_off(
+        &mut self,
+        settings: &Settings,
+        height_m: Option<f32>,
+        state: Option<&State>,
+        seen: &TransitionInputs,
+        notices: &mut Notices,
+    ) -> Result<(), OrderRefusal> {
+        let height_m = height_m.unwrap_or(settings.flying.takeoff_height_m);
+        if !(height_m > 0.0 && height_m <= 1000.0) {
+            return Err(OrderRefusal::OutOfRange);
+        }
+        if !seen.armed {
+            return Err(OrderRefusal::NotArmed);
+        }
+        table::select(FlightMode::Takeoff, seen)?;
+        let state = state.ok_or(OrderRefusal::NoPosition)?;
+        self.must_be_inside(settings, &(state.position_m + Vector3::new(0.0, 0.0, height_m)))?;
+        self.ordered(FlightMode::Takeoff, notices);
+        self.limiter.rest(state);
+        self.plan = Plan::Takeoff(Takeoff::above(state.position_m, height_m));
+        Ok(())
+    }
+
+    /// Flies to a place, whose coordinates are kept where they are NaN, and holds there.
+    fn go_to(
+        &mut self,
+        settings: &Settings,
+        position_m: &Vector3<f32>,
+        to: Hold,
+        seen: &TransitionInputs,
+        notices: &mut Notices,
+    ) -> Result<(), OrderRefusal> {
+        let turns = to.yaw_rad.is_none_or(|yaw_rad| yaw_rad.abs() <= 1e3);
+        if !to.speed_m_s.is_none_or(is_speed) || !is_place(position_m) || !turns {
+            return Err(OrderRefusal::OutOfRange);
+        }
+        let to_m = or_kept(position_m, &self.can_go(seen)?);
+        self.must_be_inside(settings, &to_m)?;
+        self.ordered(FlightMode::Hold, notices);
+        self.plan = Plan::Hold(Hold { at_m: Some(to_m), ..to });
+        Ok(())
+    }
+
+    /// Flies a circle, whose speed and radius are as ordered, and not yet checked.
+    fn orbit(
+        &mut self,
+        settings: &Settings,
+        wanted: Orbit,
+        seen: &TransitionInputs,
+        notices: &mut Notices,
+    ) -> Result<(), OrderRefusal> {
+        let (left, radius_m) = (wanted.radius_m > 0.0, wanted.radius_m.abs());
+        let most_m_s = orbit::speed_max_m_s(&settings.limits, radius_m);
+        let usual_m_s = min(most_m_s, settings.flying.cruise_m_s);
+        let speed_m_s = if wanted.speed_m_s.is_nan() { usual_m_s } else { wanted.speed_m_s };
+        // False of NaN.
+        let flown = orbit::RADIUS_M.contains(&radius_m) && (0.05..=most_m_s).contains(&speed_m_s);
+        if !flown || !is_place(&wanted.centre_m) {
+            return Err(OrderRefusal::OutOfRange);
+        }
+        let centre_m = or_kept(&wanted.centre_m, &self.can_go(seen)?);
+        let radius = Vector3::new(radius_m, 0.0, 0.0);
+        // The cylinder around home: its farthest point.
+        let away_m = self.home_m.map_or(radius, |home_m| {
+            let off_m = (centre_m - home_m).xy();
+            let far_m = off_m.try_normalize(1e-3).map_or(radius.xy(), |ahead| ahead * radius_m);
+            Vector3::new(far_m.x, far_m.y, 0.0)
+        });
+        self.must_be_inside(settings, &(centre_m + away_m))?;
+        self.ordered(FlightMode::Hold, notices);
+        let speed_m_s = if left { speed_m_s } else { -speed_m_s };
+        self.plan = Plan::Orbit(Orbit { centre_m, radius_m, speed_m_s, ..wanted });
+        Ok(())
+    }
+
     /// Returns the place that a flight to another one in mode hold begins at, or why there is none \[m\].
     fn can_go(&self, seen: &TransitionInputs) -> Result<Vector3<f32>, OrderRefusal> {
         if !seen.armed {
@@ -151,6 +181,10 @@ impl Memory {
         self.failsafe = None;
     }
 
+    fn must_be_inside(&self, settings: &Settings, place_m: &Vector3<f32>) -> Result<(), OrderRefusal> {
+        if self.is_inside(settings, place_m) { Ok(()) } else { Err(OrderRefusal::OutsideFence) }
+    }
+
     pub(super) fn is_inside(&self, settings: &Settings, place_m: &Vector3<f32>) -> bool {
         self.home_m.is_none_or(|home_m| settings.net.encloses(&home_m, place_m, 0.0))
     }
@@ -159,4 +193,14 @@ impl Memory {
 /// True if every coordinate is a number that is flown to, or NaN.
 fn is_place(place_m: &Vector3<f32>) -> bool {
     place_m.iter().all(|value| value.is_nan() || value.abs() <= PLACE_MAX_M)
+}
+
+/// Returns a place with the coordinates of another where its own are NaN.
+fn or_kept(place_m: &Vector3<f32>, kept_m: &Vector3<f32>) -> Vector3<f32> {
+    place_m.zip_map(kept_m, |new, kept| if new.is_nan() { kept } else { new })
+}
+
+/// True of a horizontal speed to fly at; false of NaN \[m/s\].
+fn is_speed(speed_m_s: f32) -> bool {
+    speed_m_s > 0.0 && speed_m_s <= 1e3
 }
