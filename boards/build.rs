@@ -17,6 +17,7 @@ fn main() {
         println!("cargo:rustc-link-search={}", root.display());
         vec!["link.x".to_owned()]
     };
+    // Sections are not aligned to pages, of which a microcontroller has none.
     println!("cargo:rustc-link-arg-bins=--nmagic");
     for script in scripts.into_iter().chain(["defmt.x".to_owned()]) {
         println!("cargo:rustc-link-arg-bins=-T{script}");

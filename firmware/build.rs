@@ -11,6 +11,7 @@ const DEFAULT: &str = "paper";
 fn main() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the workspace's root");
     let asked = env::var("VEHICLE").ok().filter(|name| !name.is_empty()).unwrap_or(DEFAULT.into());
+    // No vehicle's name has one of these.
     let path = if asked.contains(['/', '\\', '.']) {
         root.join(&asked)
     } else {

@@ -74,6 +74,7 @@ pub fn put_fix(at_us: u64, fix: Option<FixReading>) {
     let _ = with(|known| {
         known.frame = frame;
         known.receiver = Some((at_us, receiver));
+        // Of the first fix alone: later ones must not take it away.
         if origin.is_some() {
             known.origin = origin;
         }
@@ -96,6 +97,7 @@ pub fn put_battery(at_us: u64, pins: Option<BatteryPins>, scale: BatteryScale) {
 /// Returns what stations are to know at `now_us`, where the vehicle's parameters tell these volts and amperes per volt
 /// at the battery's pins.
 pub(crate) fn known(now_us: u64, told: [f32; 2]) -> AuxSensors {
+    // Saturating: a reading may be newer than the tick that stations are told of.
     let works = |at_us: u64| now_us.saturating_sub(at_us) < SILENT_US;
     let aux = with(|known| {
         let mut sensors = SensorBits::default();

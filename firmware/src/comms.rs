@@ -87,6 +87,7 @@ pub async fn run<B: Board, const OTHERS: usize>(
     // The first link's is in `comms`.
     let mut decoders: [_; OTHERS] = array::from_fn(|_| comms.decoder());
     let wired = links.each().iter().position(|link| link.receiver.is_wired()).unwrap_or(0);
+    // The first key of signatures is taken over a wire only: whoever sets it shuts out all others.
     let decoder = comms.decoder().wired();
     match wired.checked_sub(1).and_then(|other| decoders.get_mut(other)) {
         Some(other) => *other = decoder,
@@ -107,8 +108,10 @@ pub async fn run<B: Board, const OTHERS: usize>(
                     if let Some(news) = radio.receive(comms, bytes, table) {
                         pass_on::<B>(&news, log);
                     }
+                    // What a receiver sends is no MAVLink.
                     continue;
                 }
+                // A decoder for each link: frames come in pieces, and those of two links must not be mixed.
                 let mut other = link.checked_sub(1).and_then(|other| decoders.get_mut(other));
                 other.iter_mut().for_each(|decoder| comms.exchange(decoder));
                 let news = hear::<B>(comms, black_box, bytes);
@@ -159,6 +162,7 @@ pub async fn run<B: Board, const OTHERS: usize>(
                 told.for_each(|(_, link)| {
                     link.transmitter.transmit(&tick, &outgoing);
                 });
+                // The next leg of a mission and news of the fence come of what was uploaded, without a byte now.
                 if comms.has_mail() {
                     let news = hear::<B>(comms, black_box, &[]);
                     pass_on::<B>(&news, log);
@@ -187,6 +191,7 @@ pub async fn run<B: Board, const OTHERS: usize>(
                     black_box.send(tick.report.time_us, &outgoing);
                 }
                 leaving += u32::from(comms.wants_reboot().is_some());
+                // It may have been armed since the request: a reset would stop the motors in flight.
                 if leaving >= FAREWELL && !control::armed() {
                     reboot::<B>(comms);
                 }
@@ -268,6 +273,7 @@ fn record<B: Board>(
 /// Waits for bytes of any link; returns its index and their number.
 fn receive(links: &mut impl Links, buffer: &mut [u8]) -> impl Future<Output = (usize, usize)> {
     poll_fn(|context| {
+        // Futures made anew at every poll lose nothing (`Receiver::receive`), and their wakers stay with the rings.
         for (index, link) in links.each().iter_mut().enumerate() {
             if let Poll::Ready(length) = pin!(link.receiver.receive(buffer)).poll(context) {
                 return Poll::Ready((index, length));
@@ -317,6 +323,7 @@ fn report_self_tests(comms: &mut Comms, aux: &mut AuxSensors) {
 /// about a rotor's failure. Out of line like the report.
 #[inline(never)]
 fn listen_to_escs(comms: &mut Comms, reports: &mut EscReports, tick: &Tick) -> Option<ControlInputs> {
+    // Three answers, of which the line brings one in a tick; what is left waits for the next tick.
     let mut heard = Vec::<u8, 32>::new();
     while !heard.is_full()
         && let Some(byte) = escs::heard()

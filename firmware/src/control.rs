@@ -169,6 +169,7 @@ fn tick<B: Board>(
         let (mail, next) = &mut *shared;
         mail.take_into(inputs);
         if recording::is_possible::<B>() {
+            // In place: returned beside the report, it would cost the tick a copy of that.
             seen.number = *next;
             *next = next.wrapping_add(1);
         }
@@ -181,6 +182,7 @@ fn tick<B: Board>(
     if recording::is_possible::<B>() {
         seen.clock_failed = clock_failed;
     }
+    // Flown on, by a clock that is off by up to 1 %; the vehicle is not armed again.
     if clock_failed {
         flight.distrust_clock();
     }
@@ -195,6 +197,7 @@ fn tick<B: Board>(
     board.drive(report.throttles);
     // A reset restarts a failed task, once it does not end a flight.
     let may_reset = board.task_has_failed() && !report.mode.armed();
+    // Whatever the rate: in the air a wrong one is better than a reset. Not if the clock stands still.
     if report.health.rate.alive && !may_reset {
         board.feed_watchdog();
     }

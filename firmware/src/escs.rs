@@ -26,6 +26,7 @@ pub fn put(bytes: &[u8]) {
         // Not borrowed elsewhere while it is locked; no panic in any case.
         let Ok(mut heard) = heard.try_borrow_mut() else { return };
         for byte in bytes {
+            // An answer that lacks a byte fails its checksum, and counts as none.
             let _ = heard.push_back(*byte);
         }
     });
@@ -34,6 +35,7 @@ pub fn put(bytes: &[u8]) {
 /// Returns the rotor, from 0, whose motor controller is to be asked in the next frame, if `is_mine` says so of it:
 /// once.
 pub fn asked(is_mine: impl FnOnce(usize) -> bool) -> Option<usize> {
+    // Load and store need not be one: the links' task, which sets it, has a lower priority.
     let rotor = usize::from(ASKED.load(Ordering::Relaxed)).checked_sub(1)?;
     is_mine(rotor).then(|| ASKED.store(0, Ordering::Relaxed))?;
     Some(rotor)
@@ -58,6 +60,7 @@ pub(crate) fn reports(table: &ParameterTable) -> &'static mut EscReports {
 
 /// Moves the notch before the next tick.
 pub(crate) fn move_notch(notch: VelocityNotch) {
+    // Before the flag: the control tick may come in between.
     NOTCH.lock(|cell| cell.set(Some(notch)));
     MOVES.store(true, Ordering::Relaxed);
 }

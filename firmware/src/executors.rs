@@ -40,6 +40,7 @@ static LOGGING: InterruptExecutor = InterruptExecutor::new();
 
 /// Interrupt lines of the tasks without which a flight goes on: the links', housekeeping, slow sensors', the log's, and
 /// USB's.
+// At first a number that no interrupt has.
 static DISPENSABLE: [AtomicU16; 5] = [const { AtomicU16::new(u16::MAX) }; 5];
 
 /// Declares that a flight goes on without the driver that has the interrupt `usb`, of a priority below the motors'.
@@ -103,6 +104,7 @@ pub struct InterruptLines<I> {
 #[expect(unsafe_code, reason = "priorities are set by hand")]
 pub(crate) fn start<I: InterruptNumber>(core: &mut cortex_m::Peripherals, lines: InterruptLines<I>) -> Executors {
     let InterruptLines { control, comms, housekeeping, sampling, aiding, logging } = lines;
+    // Without sampling or control nothing flies: a panic there must stop the motors.
     let dispensable = [Some(comms), Some(housekeeping), aiding, logging];
     for (line, dispensable) in dispensable.into_iter().flatten().zip(&DISPENSABLE) {
         dispensable.store(line.number(), Ordering::Relaxed);

@@ -52,5 +52,6 @@ fn deepest_stack() -> u32 {
         // SAFETY: still within the stack's region, or one past its end.
         word = unsafe { word.add(1) };
     }
+    // Not below zero, since the loop ends at `top`.
     (top as usize - word as usize) as u32
 }

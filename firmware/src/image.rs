@@ -33,6 +33,7 @@ macro_rules! image {
             )
         };
 
+        // Tasks are made here, since an executor's cannot be generic in the board.
         #[embassy_executor::task]
         async fn sampling(sampler: <$board as $crate::board::Board>::Sampler) {
             $crate::samples::Sampler::run(sampler).await
@@ -138,6 +139,7 @@ macro_rules! image {
             spawner.spawn(parameters(keeper).expect("spawned once"));
         }
 
+        // Here, too, since its type has the clock of the board's core in it.
         $crate::time::time_driver_impl!(
             static TIME: $crate::time::SysTickDriver<{ <$board as $crate::board::Board>::CORE_HZ / 1_000_000 }> =
                 $crate::time::SysTickDriver

@@ -19,6 +19,7 @@ static LAST: AtomicU32 = AtomicU32::new(0);
 pub(crate) fn put(report: &Report) {
     let indication = Indication::of(report);
     let number = Indication::ALL.iter().position(|one| *one == indication).map_or(0, |at| at as u32 + 1);
+    // One word, since the reader, of a lower priority, could else mix the halves of two reports.
     LAST.store(milliseconds(report.time_us) << 3 | number, Ordering::Relaxed);
 }
 

@@ -70,6 +70,7 @@ pub fn run<B: Board>(
     let (_, table, ..) = parts;
     board.set_motor_protocol(table.configuration().outputs.protocol);
     let flight = control::make(table.configuration());
+    // Not before: a start may erase flash for half a second and more, without a tick that feeds it.
     board.unleash_watchdog();
     time::start(core.SYST, B::CORE_HZ);
     comms(executors.comms, parts, links);
@@ -101,6 +102,7 @@ fn read<B: Board>(
     links: &mut B::Links,
 ) -> (parameters::Keeper<B::Memory>, &'static mut comms::CommsParts, Option<logging::LogEnds>) {
     let (kept, table, signing) = parameters::read(memory, B::STORE);
+    // Before the radio's line, which has a rate of its own.
     for link in links.each() {
         link.transmitter.set_baud(table.configuration().link.baud);
     }

@@ -197,6 +197,7 @@ impl CardLog {
     pub(crate) fn tick(&mut self, tick: &RecordedTick, table: &ParameterTable, escs: &EscTelemetry) {
         let CardLog { writer, views, hardware, .. } = self;
         let RecordedTick { number, ref readings, ref report, .. } = *tick;
+        // Ticks and views are matched by number, since either queue drops what it has no room for.
         while let Some(view) = views.try_receive() {
             // Of a tick that was dropped here.
             let is_older = view.number.wrapping_sub(number) > u32::MAX / 2;
@@ -210,6 +211,7 @@ impl CardLog {
             if view.number == number || is_older {
                 views.receive_done();
             }
+            // A newer one is of a tick that is still to come here.
             if !is_older {
                 return;
             }

@@ -79,6 +79,7 @@ impl<M: NorFlash> NorFlash for Gate<M> {
     const ERASE_SIZE: usize = M::ERASE_SIZE;
 
     fn erase(&mut self, from: u32, to: u32) -> Result<(), Shut> {
+        // Not gated: only the start erases, before anything can be armed.
         self.0.erase(from, to).map_err(|error| Shut::Flash(error.kind()))
     }
 
@@ -99,6 +100,7 @@ pub struct Keeper<M>(Option<Store<Gate<M>>>);
 /// changes. Without a store that can be read, the parameters are the image's.
 pub fn read<M: NorFlash>(memory: M, start: u32) -> (Keeper<M>, ParameterTable, Signing) {
     let mut table = ParameterTable::new(CONFIGURATION);
+    // By the vehicle's name: what was set on another one does not count.
     let Ok(mut store) = Store::open(Gate(memory), start, hash(NAME.as_bytes())) else {
         return (Keeper(None), table, Signing::default());
     };
@@ -123,6 +125,7 @@ fn word<M: NorFlash>(store: &mut Store<Gate<M>>, name: RecordName) -> Option<u32
 /// this number. False if too many changes are waiting to be written; this one will be forgotten at the next start.
 #[must_use = "the station is to be told"]
 pub fn change(table: &ParameterTable, change: RecordChange, number: u16) -> bool {
+    // Each change has been checked; one that could not fly would leave the former configuration.
     if let Ok(prepared) = Prepared::new(table.configuration()) {
         control::fly(prepared, number);
     }
@@ -133,6 +136,7 @@ pub fn change(table: &ParameterTable, change: RecordChange, number: u16) -> bool
 /// which no interrupt runs.
 pub fn keep_signing(record: impl FnOnce() -> Option<SigningRecord>) {
     let has_room = CHANGES.lock(|changes| changes.try_borrow().is_ok_and(|changes| !changes.is_full()));
+    // The room stays, since only this task queues: a record is handed out once.
     if has_room && let Some(record) = record() {
         put(Unwritten::Signing(record));
     }

@@ -76,6 +76,7 @@ impl ExactLog {
     pub fn begin<B: Board>(table: &ParameterTable) -> Option<&'static mut Self> {
         static LOG: StaticCell<ExactLog> = StaticCell::new();
         let link = usize::try_from(table.configuration().link.log_port).ok()?.checked_sub(1)?;
+        // The log takes MAVLink's place on its link: the first one stays for stations.
         if !is_possible::<B>() || link == 0 || link >= B::Links::COUNT {
             return None;
         }

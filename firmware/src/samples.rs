@@ -83,8 +83,10 @@ pub fn put(time: SampleTime, value: SampleValue) {
             SampleValue::Imu(imu) => arrived.imu = Some((time, imu)),
             SampleValue::Aid(aid) => {
                 if arrived.aids.is_full() {
+                    // The oldest is worth least.
                     arrived.aids.pop_front();
                 }
+                // There is room now.
                 let _ = arrived.aids.push_back((time, aid));
             }
         }
@@ -128,6 +130,7 @@ pub(crate) fn raw(collects: bool) -> Option<RawSample> {
     RAW.lock(|raw| {
         let mut raw = raw.try_borrow_mut().ok().filter(|_| collects)?;
         if !collected {
+            // What is left of an earlier calibration is not of this one.
             *raw = RawReadings::NONE;
         }
         raw.take()
@@ -163,6 +166,7 @@ impl SampleTime {
     /// Returns the age at `now_us`.
     fn age_us(self, now_us: u64) -> u32 {
         match self {
+            // Sampling interrupts the tick, so that a sample may be newer than its beginning: the age is 0 then.
             SampleTime::At(at_us) => now_us.saturating_sub(at_us).try_into().unwrap_or(u32::MAX),
             SampleTime::BeforeTick(age_us) => age_us,
         }

@@ -25,6 +25,7 @@ pub struct Asked(u32);
 impl Asked {
     /// True once for each request, if the vehicle is disarmed.
     pub fn is_new(&mut self) -> bool {
+        // Noted while armed, too: a test must not begin when the vehicle is disarmed later on.
         let asked = ASKED.load(Ordering::Relaxed);
         core::mem::replace(&mut self.0, asked) != asked && !control::armed()
     }

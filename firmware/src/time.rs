@@ -49,6 +49,7 @@ static STATE: Mutex<State> =
 /// Starts the time base of a core that runs at `core_hz`; its interrupt priority must be set before.
 pub(crate) fn start(mut syst: SYST, core_hz: u32) {
     syst.set_clock_source(SystClkSource::Core);
+    // The counter passes through 0 as well.
     syst.set_reload(core_hz / 1000 - 1);
     syst.clear_current();
     syst.enable_interrupt();
@@ -59,6 +60,7 @@ pub(crate) fn start(mut syst: SYST, core_hz: u32) {
 pub fn next_period() -> Instant {
     let period_us = critical_section::with(|cs| {
         let period_us = STATE.borrow(cs).period_us.get();
+        // With interrupts off, a period that has just ended is not counted yet.
         if SCB::is_pendst_pending() { period_us + US_PER_TICK } else { period_us }
     });
     Instant::from_micros(period_us + US_PER_TICK)

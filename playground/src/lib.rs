@@ -34,6 +34,7 @@ impl Playground {
             let file = known.read().map_err(|error| JsError::new(&error.to_string()))?;
             scenario = on(scenario, &file)?;
         }
+        // A plain number of JavaScript, in which whole ones are exact up to 53 bits.
         scenario.seed = seed as u64;
         let scenarios = fleet(&scenario, 1).map_err(|error| JsError::new(&error.to_string()))?;
         let server = Server::new(&scenarios, 1).map_err(|error| JsError::new(&format!("{error:?}")))?;

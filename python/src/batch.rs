@@ -81,6 +81,7 @@ impl PyBatch {
             worlds.par_iter_mut().zip(&speeds).for_each(|((world, view), speeds)| {
                 for _ in 0..steps {
                     world.advance(speeds);
+                    // In every step, not in the last one alone: sensors and estimator go on by being read.
                     *view = world.look();
                 }
             });

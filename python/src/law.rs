@@ -29,6 +29,7 @@ pub(crate) fn take_error() -> Option<PyErr> {
 }
 
 fn raise(error: PyErr) {
+    // The first one stays: what is raised after it may come of it.
     RAISED.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
 }
 

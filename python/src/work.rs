@@ -54,6 +54,7 @@ pub(crate) fn watched<T: Send>(
         let worker = scope.spawn(|| pool.install(|| work(&watch)));
         let (mut shown, mut interrupted) = (0, Ok(()));
         while !worker.is_finished() {
+            // Short until something is done, so that brief work does not wait for a whole period.
             py.detach(|| thread::sleep(PERIOD.min(if shown == 0 { PERIOD / 25 } else { PERIOD })));
             let done = watch.done.load(Ordering::Relaxed);
             if interrupted.is_ok() {

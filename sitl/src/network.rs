@@ -71,6 +71,7 @@ impl Socket {
             _ if bytes.is_empty() => Ok(()),
             Socket::Udp(socket) => socket.send(bytes).map(drop),
             Socket::Tcp(stream) => {
+                // Half a frame must not be lost in a full buffer; the timeout bounds the wait.
                 stream.set_nonblocking(false)?;
                 stream.write_all(bytes)
             }

@@ -47,6 +47,7 @@ impl Serial {
     fn listen(&mut self, deadline: Instant, hear: &mut dyn FnMut(&[u8])) -> io::Result<()> {
         let mut buffer = [0; 4096];
         loop {
+            // A read of nothing would wait for the port's timeout, far beyond a millisecond.
             if self.port.bytes_to_read()? > 0 {
                 let length = self.port.read(&mut buffer)?;
                 hear(buffer.get(..length).unwrap_or_default());
@@ -74,6 +75,7 @@ impl Autopilot for Serial {
 impl Drop for Serial {
     fn drop(&mut self) {
         let mut station = Station::new();
+        // Not disarm, which a vehicle refuses in the air.
         (0..FAREWELLS).for_each(|_| station.command(Command::Kill));
         // A failure cannot be reported any more; without states the vehicle descends by itself.
         let _ = self.port.write_all(&station.take());

@@ -88,7 +88,9 @@ impl<M: Machine> Driver<M> for Climb {
         let (_, signals) = pilot.advance(stop.at.0 / TICK_NS)?;
         session.board_mut().sense(&signals);
         let is_there = pilot.hovers_ms().is_some_and(|hovers_ms| hovers_ms >= HOVERED_MS);
+        // Not in the middle of a frame: what has been read of it is not in the snapshot.
         if is_there && self.flight.pins.look_ns().is_none() {
+            // Held counters are the twin's doing: the snapshot is to have them as the image does.
             self.flight.pins.release(session.mcu(), stop.at);
             self.taken = Some(take(session, host, stop, &self.firmware, &self.past).map(|taken| taken.file));
             return None;

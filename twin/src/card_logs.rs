@@ -62,6 +62,7 @@ pub struct CardLog {
 
 /// Walks over the records of a log (PX4 User Guide, "ULog File Format"): length, kind, content.
 fn walk(name: String, log: &[u8]) -> CardLog {
+    // A file's header has 16 bytes.
     let (mut rest, mut missing_ms) = (log.get(16..).unwrap_or_default(), 0);
     while let Some(([low, high, kind], behind)) = rest.split_first_chunk() {
         let Some((content, behind)) = behind.split_at_checked(u16::from_le_bytes([*low, *high]).into()) else { break };

@@ -90,6 +90,7 @@ impl Cut {
             let (word, place) = (address / WORD * WORD, address % WORD / 4);
             let mut data = match self.pending {
                 Some(Pending::Program(at, data)) if at == word => data,
+                // What is not written of a word stays erased.
                 _ => [u32::MAX; 8],
             };
             if let Some(part) = data.get_mut(place as usize) {
@@ -107,6 +108,7 @@ impl Cut {
         match self.pending {
             None => false,
             Some(Pending::Program(..)) => now_ns < self.since_ns + PROGRAMS_NS,
+            // Its end is not seen: a cut behind it sets bits that are set already.
             Some(Pending::Erase(_)) => true,
         }
     }
@@ -177,6 +179,7 @@ impl Driver<MatekH743> for Cut {
             self.next_ns = now_ns + 1 + self.random.below(2 * apart_ns);
         }
         if session.pause().is_none() {
+            // The core may touch nothing until then, and a cut needs a stop.
             session.pause_at(Some(VirtualNanos(self.next_ns)));
         }
     }
@@ -226,6 +229,7 @@ impl Starts {
         }
         session.lose_memory(host, &mut self.random);
         session.reset_by_pin(stop.at, stop.instruction_count, host);
+        // What was on the wire before the cut is of another start.
         self.wire.exchange(&[]);
         self.wire.take();
         (self.cut_ns, self.started_ns, self.values) = (at_ns, stop.at.0, [None; 2]);
@@ -254,6 +258,7 @@ impl Driver<MatekH743> for Starts {
             self.found.push((self.cut_ns, self.values));
             return self.next(session, stop, host);
         }
+        // Asked again and again, since a board that starts does not hear yet.
         if (stop.at.0 - self.started_ns) % (20 * MS) != 0 {
             return Some(VirtualNanos(stop.at.0 + MS));
         }

@@ -130,6 +130,7 @@ impl<M: Machine> Driver<M> for Watched {
         self.link.pass();
         let (_, signals) = self.flight.pilot.watch(stop.at.0 / TICK_NS);
         let board = session.board_mut();
+        // By the fault's time, which the seed decides: the same flight again has the same noise.
         board.draw(self.begins_ns, stop.at.0 / TICK_NS);
         board.sense(&signals);
         (!self.judge(stop.at.0)).then_some(VirtualNanos(stop.at.0 + TICK_NS))

@@ -112,6 +112,7 @@ pub fn fly<M: Machine>(image: &Path, order: &Order<'_>) -> Result<(), Box<dyn Er
     let pilot = if fetches { pilot.fetching() } else { pilot };
     let cuts = card.map(|folder| Cuts { folder: folder.into(), at_ms: cuts_ms.to_vec() });
     let flight = Flight { pilot, hearer, receiver, pins, cuts, fetched: None };
+    // Some 75 bytes for each tick are too much for a UART at the default rate.
     let to_log: &[_] = if log.is_some() { &[("LOG_PORT", 2.0), ("SER_TEL1_BAUD", 921_600.0)] } else { &[] };
     let images = images::<M>(image, to_log)?;
     let session = Session::new(board, 0, VirtualNanos(TICK_NS))?;
@@ -129,6 +130,7 @@ pub fn fly<M: Machine>(image: &Path, order: &Order<'_>) -> Result<(), Box<dyn Er
     if let Some(receiver) = &receiver {
         println!("{}", receiver.told());
     }
+    // Judged last: log and card of a flight that failed are kept, too.
     let verdict = pilot.verdict();
     let mut same = Ok(());
     if let (Some(log), Some(mut hearer)) = (log, hearer) {

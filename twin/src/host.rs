@@ -58,9 +58,11 @@ impl Gnss {
         self.receiver.set_velocity(signals.velocity);
         let mut aids: Vec<_> = readings.aids.into_iter().flatten().collect();
         aids.retain(|aid| !matches!(aid.value, Measurement::Gnss { .. }));
+        // Four bytes in a millisecond at 38,400 baud.
         // None before the first position.
         for _ in 0..if signals.position == at_the_place().position { 0 } else { 4 } {
             let Some(byte) = self.receiver.transmit(VirtualNanos(now_ms * 1_000_000)) else { break };
+            // Bytes of an epoch follow one another: a pause has ended the last one.
             if now_ms - self.last_ms > 20 {
                 self.began_ms = now_ms;
             }

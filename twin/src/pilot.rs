@@ -95,6 +95,7 @@ impl Pilot {
             throttles: vec![0; scenario.rotors.len()],
             rotor_speeds_rad_s: vec![0.0; scenario.rotors.len()],
             stopped_rotor: None,
+            // Of `vehicles/paper.toml`, which the images are built for.
             speed_max_rad_s: 1000.0,
             wire,
             sender: Sender::new(STATION),

@@ -200,6 +200,7 @@ impl Frames {
         }
         let taken = taken + 1;
         self.sampling = Sampling::Reads(first_ns, taken);
+        // From the first bit on, so that what is rounded does not add up.
         Some(first_ns + (taken as f64 * BIT_NS) as u64)
     }
 

@@ -10,7 +10,9 @@ impl Random {
         let mix = name
             .bytes()
             .fold(seed ^ 0x9E37_79B9_7F4A_7C15, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01B3));
+        // Zero would stay zero.
         let mut random = Random(mix | 1);
+        // Seeds that differ in a few bits begin alike.
         for _ in 0..16 {
             random.next();
         }

@@ -51,11 +51,14 @@ impl Leg {
     fn item(self, number: u16) -> MissionItem {
         let (command, [north, west, up], parameters) = match self {
             Leg::TakeOff(up) => (TAKE_OFF, [0.0, 0.0, up], [0.0; 4]),
+            // Over ground, and no change of the throttle.
             Leg::Speed(speed) => (CHANGE_SPEED, [0.0; 3], [1.0, speed, -1.0, 0.0]),
+            // No heading of its own: not a number.
             Leg::To(place, stay) => (WAYPOINT, place, [stay, 0.0, 0.0, f32::NAN]),
             Leg::Loiter(place, stay) => (LOITER_TIME, place, [stay, 0.0, 0.0, f32::NAN]),
             Leg::Land([north, west]) => (LAND, [north, west, 0.0], [0.0; 4]),
         };
+        // MISSION_ITEM_INT has local places in 1e-4 m.
         let [x, y] = [north, -west].map(|metres| (metres * 1e4) as i32);
         let goes_on = true;
         MissionItem { number, command, frame: LOCAL_NED, goes_on, parameters, x, y, z: -up, ..MissionItem::default() }

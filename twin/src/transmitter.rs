@@ -79,6 +79,7 @@ impl Transmitter {
         let bytes = self.wire.take();
         self.checker.feed(&bytes, now_ns / 1000, |_| ());
         self.back.extend(bytes);
+        // CRSF's length counts neither the address nor itself.
         while let [_, length, kind, ..] = *self.back
             && self.back.len() >= usize::from(length) + 2
         {

@@ -70,6 +70,7 @@ impl<M: Machine> Patient for Session<M> {
     }
 
     fn stop_at(&mut self, at: VirtualNanos) {
+        // One that is there may be for a look at the motors' pins, which must not be missed.
         if self.pause().is_none() {
             self.pause_at(Some(at));
         }

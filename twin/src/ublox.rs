@@ -75,6 +75,7 @@ impl UbloxPeer {
                 let Measurement::Gnss { horizontal_sigma_m, vertical_sigma_m, speed_sigma_m_s, .. } = aid.value else {
                     continue;
                 };
+                // The instruments may have fixes more often than this receiver is told to send them.
                 if now_us - line.sent_us < period_us {
                     continue;
                 }

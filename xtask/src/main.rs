@@ -158,6 +158,7 @@ impl Flash {
         for (index, block) in contents.blocks.iter().enumerate() {
             let path = elf.with_extension(format!("{:08x}.bin", block.address));
             write(&path, &block.bytes)?;
+            // Only with the last one: the boot loader ends then, and starts the program.
             let leave = if index + 1 == contents.blocks.len() { ":leave" } else { "" };
             let place = format!("{:#010x}{leave}", block.address);
             run(Command::new("dfu-util").args(["-d", BOOT_LOADER, "-a", "0", "-s", &place, "-D"]).arg(path))?;
@@ -169,6 +170,7 @@ impl Flash {
 impl Image {
     /// Builds it; returns its ELF file and what is in it.
     fn build(&self, board: &Board) -> Result<(PathBuf, Contents), String> {
+        // The cargo that runs this, so that a toolchain chosen for it counts here, too.
         let mut cargo = Command::new(env::var_os("CARGO").unwrap_or("cargo".into()));
         cargo.current_dir(root()).args(["build", "--profile", "firmware", "--target", TARGET]);
         cargo.args(["--package", &board.package, "--bin", &board.image]).args(&self.options);

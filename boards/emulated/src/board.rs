@@ -105,6 +105,7 @@ impl samples::Sampler for Sampler {
             if let Some(Aged { value, age_us }) = imu {
                 samples::put(SampleTime::BeforeTick(age_us), SampleValue::Imu(value));
             }
+            // Without a sample, too: fixes must reach a vehicle whose inertial sensor has failed.
             for Aged { value, age_us } in aids.into_iter().flatten() {
                 samples::put(SampleTime::BeforeTick(age_us), SampleValue::Aid(value));
             }

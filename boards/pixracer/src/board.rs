@@ -231,12 +231,14 @@ impl Board for Pixracer {
 #[embassy_executor::task]
 async fn motors_1_to_4(mut motors: Motors<TIM1, DMA2_CH5, Irqs, u16>) {
     let [throttles, _] = &THROTTLES;
+    // No line for their telemetry.
     motors.run(throttles, [None; 4]).await
 }
 
 #[embassy_executor::task]
 async fn motors_5_and_6(mut motors: Motors<TIM4, DMA1_CH6, Irqs, u16>) {
     let [_, throttles] = &THROTTLES;
+    // No line for their telemetry.
     motors.run(throttles, [None; 4]).await
 }
 

@@ -56,6 +56,7 @@ impl SpiCard {
         let done = call(&self.card);
         self.card.spi(CardBus::release);
         done.map_err(|error| match error {
+            // An empty slot answers no command.
             SdCardError::CardNotFound | SdCardError::TimeoutCommand(_) => CardError::Absent,
             _ => CardError::Failed,
         })
@@ -64,6 +65,7 @@ impl SpiCard {
 
 impl LogCard for SpiCard {
     fn start(&mut self) -> Result<u32, CardError> {
+        // Another card may be in the slot by now.
         self.card.mark_card_uninit();
         let slow_hz = super::sensors::divided(self.kernel_hz, START_HZ);
         self.card.spi(|bus| bus.wake(slow_hz));
@@ -126,6 +128,7 @@ impl SpiDevice for CardBus {
                 Operation::Write(bytes) => self.spi.blocking_write(bytes)?,
                 Operation::Transfer(into, bytes) => self.spi.blocking_transfer(into, bytes)?,
                 Operation::TransferInPlace(bytes) => self.spi.blocking_transfer_in_place(bytes)?,
+                // `embedded_sdmmc` asks for none.
                 Operation::DelayNs(_) => (),
             }
         }

@@ -35,6 +35,7 @@ pub fn panic(info: &PanicInfo, stop_motors: fn()) -> ! {
         defmt::error!("a task has failed, the flight continues without it: {=str}:{=u32}", file, line);
         park()
     }
+    // Before the log, which panics itself if it was what has panicked.
     stop_motors();
     defmt::error!("{}", defmt::Display2Format(info));
     wait_for_watchdog()
@@ -49,6 +50,7 @@ pub fn fault(stop_motors: fn()) -> ! {
 
 /// Waits until the watchdog resets the chip, which starts disarmed.
 fn wait_for_watchdog() -> ! {
+    // Else control ticks could go on in between, and feed the watchdog.
     cortex_m::interrupt::disable();
     loop {
         cortex_m::asm::nop();

@@ -46,6 +46,7 @@ pub fn set_protocol(protocol: MotorProtocol) {
 
 /// The waveform, with a row for each bit and a column for each channel. A DMA burst of four columns must not cross
 /// 1 KiB.
+// 17: sixteen bits, and a row without a pulse that ends the frame.
 #[repr(align(16))]
 struct Rows<W>([[W; CHANNELS]; 17]);
 
@@ -95,6 +96,7 @@ where
         timer.enable_outputs();
         for channel in EACH {
             timer.set_output_compare_mode(channel, OutputCompareMode::PwmMode1);
+            // A value counts from the next period on: the pulse that is being sent keeps its length.
             timer.set_output_compare_preload(channel, true);
         }
         timer.set_autoreload_preload(true);
@@ -116,6 +118,7 @@ where
     /// Starts the timer, whose outputs stay low until the compare values are other than 0.
     fn start(&mut self, divider: u16, period: u16) {
         let registers = self.timer.regs_core();
+        // Divider and period are one more than what their registers hold.
         registers.psc().write_value(divider.saturating_sub(1));
         registers.arr().write(|reload| reload.set_arr(period.saturating_sub(1)));
         for channel in EACH {
@@ -157,6 +160,7 @@ where
             // The next frame sets up the stream again.
             defmt::warn!("the motors' DMA transfer has stopped");
         }
+        // The timer runs on, and each of its updates would ask for a transfer.
         self.timer.enable_update_dma(false);
     }
 

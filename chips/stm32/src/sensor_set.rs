@@ -66,6 +66,7 @@ impl<P> SlowSensors<P> {
 
 impl<P: BarometerCandidates> Sampler for SlowSensors<P> {
     async fn run(self) {
+        // A lock that keeps nothing else out: all that share the bus are in this task.
         let bus = Mutex::<NoopRawMutex, _>::new(self.bus);
         let compass = I2cRegisters::new(I2cDevice::new(&bus), COMPASS_ADDRESS);
         join3(

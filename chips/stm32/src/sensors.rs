@@ -95,6 +95,7 @@ impl ErrorType for SharedDevice<'_> {
 
 impl SpiDevice for SharedDevice<'_> {
     async fn transaction(&mut self, operations: &mut [Operation<'_, u8>]) -> Result<(), spi::Error> {
+        // Held to the end of the transfer: meanwhile the clock is this part's.
         let mut spi = self.spi.lock().await;
         // Nothing can be wrong with it.
         let _ = spi.set_config(&self.config);
@@ -164,6 +165,7 @@ pub async fn run<P: SensorPart, B: Registers, T: PartTiming>(
                 take(reading);
             }
             Err(fault) => {
+                // Once: a part that has failed is tried again for ever.
                 if last != Some(fault) {
                     defmt::warn!("{=str}: {}", P::NAME, defmt::Display2Format(&fault));
                 }
@@ -201,6 +203,7 @@ pub struct StampHandler<I>(PhantomData<I>);
 impl<I: typelevel::Interrupt> typelevel::Handler<I> for StampHandler<I> {
     #[expect(unsafe_code, reason = "as the trait has it; nothing here is unsafe")]
     unsafe fn on_interrupt() {
+        // The lower half, since this core cannot store 64 bits at once.
         let now_us = Instant::now().as_micros() as u32;
         // Of those that nobody waits for, edges are pending, too.
         let lines = EXTI.pr(0).read().0 & EXTI.imr(0).read().0;
@@ -240,6 +243,7 @@ impl Edge for InterruptPin {
         self.input.wait_for_rising_edge().await;
         let now_us = Instant::now().as_micros();
         let stamp = STAMPS.get(self.line).map_or(now_us as u32, |stamp| stamp.load(Ordering::Relaxed));
+        // The difference of the lower halves is right, too, if they have wrapped in between.
         now_us.saturating_sub(u64::from((now_us as u32).wrapping_sub(stamp)))
     }
 }

@@ -65,6 +65,7 @@ pub const PIECE: usize = 64;
 
 /// Queues bytes for the host, all of them or, if it is too far behind, none; returns whether it has.
 pub(crate) fn send(mut bytes: &[u8]) -> bool {
+    // The room stays, since only the links' task writes.
     if SENT.free_capacity() < bytes.len() {
         return false;
     }
@@ -99,6 +100,7 @@ async fn port(driver: Driver<'static, USB_OTG_FS>) {
     config.manufacturer = Some("AFBC");
     config.product = Some("AFBC flight controller");
     config.serial_number = Some(uid::uid_hex());
+    // In mA, the most of USB 2.0: the port feeds the board.
     config.max_power = 500;
     let (mut configuration, mut capabilities, mut control) = ([0; 80], [0; 16], [0; PACKET_MAX]);
     let mut state = cdc_acm::State::new();
@@ -123,6 +125,7 @@ async fn pass_on<'d>(mut sender: cdc_acm::Sender<'d, Driver<'d, USB_OTG_FS>>) {
     let mut packet = [0; SENT_MAX];
     loop {
         sender.wait_connection().await;
+        // What was for the last host is old.
         SENT.clear();
         let mut connected = true;
         while connected {

@@ -26,6 +26,7 @@ pub fn enter_if_wanted() {
 
 /// Makes the backup registers writable.
 fn unlock() {
+    // Without its clock, which is off after a reset, the store to PWR has no effect.
     RCC.apb1enr().modify(|enable| enable.set_pwren(true));
     PWR.cr1().modify(|power| power.set_dbp(true));
 }

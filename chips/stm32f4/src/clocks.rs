@@ -38,10 +38,12 @@ pub fn start<const CRYSTAL_HZ: u32>() -> Peripherals {
 /// 168 MHz; buses at 168, 42 and 84 MHz; USB at 48.
 fn config<const CRYSTAL_HZ: u32>(crystal: bool) -> Config {
     let source = if crystal { PllSource::HSE } else { PllSource::HSI };
+    // The chip's own oscillator has 16 MHz.
     let prediv = if crystal { PllPreDiv::from_bits((CRYSTAL_HZ / PLL_INPUT_HZ) as u8) } else { PllPreDiv::DIV8 };
     let mut config = Config::default();
     config.rcc.hse = crystal.then_some(Hse { freq: Hertz(CRYSTAL_HZ), mode: HseMode::Oscillator });
     config.rcc.pll_src = source;
+    // 336 MHz: half of it for the core, a seventh for USB.
     config.rcc.pll =
         Some(Pll { prediv, mul: PllMul::MUL168, divp: Some(PllPDiv::DIV2), divq: Some(PllQDiv::DIV7), divr: None });
     config.rcc.sys = Sysclk::PLL1_P;
@@ -84,11 +86,13 @@ unsafe fn NonMaskableInt() {
         cr.set_hseon(false);
         cr.set_pllon(false);
     });
+    // Source and factors of the PLL can be changed only while it is off (RM0090, 7.3.2).
     RCC.pllcfgr().modify(|pll| {
         pll.set_pllsrc(Pllsrc::HSI);
         pll.set_pllm(Pllm::DIV8);
     });
     RCC.cr().modify(|cr| cr.set_pllon(true));
+    // Counted, since the time base stands still during an NMI.
     if (0..LOCK_LOOKS).any(|_| RCC.cr().read().pllrdy()) {
         RCC.cfgr().modify(|cfgr| cfgr.set_sw(Sw::PLL1_P));
     }

@@ -133,6 +133,7 @@ macro_rules! flight_controller {
 
                 // Ring buffers of the link and of the receiver.
                 static RINGS: [StaticCell<[u8; 1024]>; 2] = [const { StaticCell::new() }; 2];
+                // 15 ms of its fastest line: with more, less than a quarter of a SpeedyBee F405 V4's RAM is free.
                 static GNSS_RX: StaticCell<[u8; 352]> = StaticCell::new();
                 static GNSS_TX: StaticCell<[u8; TX_RING]> = StaticCell::new();
 
@@ -170,6 +171,7 @@ macro_rules! flight_controller {
                 )?
 
                 let kernel_hz = embassy_stm32::rcc::frequency::<peripherals::$spi>().0;
+                // The slowest clock at first: it becomes the part's once one is tried.
                 let config = chip_stm32::sensors::spi(kernel_hz / 256);
                 let spi = embassy_stm32::spi::Spi::new(
                     p.$spi, p.$sck, p.$mosi, p.$miso, p.$spi_tx, p.$spi_rx, Irqs, config,
@@ -211,6 +213,7 @@ macro_rules! flight_controller {
                         chip_stm32::link::new(link.expect("the baud rate divides the clock")),
                         chip_stm32::link::of_usb(chip_stm32::usb::start(p.USB_OTG_FS, p.PA12, p.PA11, Irqs)),
                         $({
+                            // The pad's name is for the board's page, which a test compares with the table.
                             let _: &str = $sbus;
                             chip_stm32::link::new(radio.expect("the baud rate divides the clock"))
                         },)?

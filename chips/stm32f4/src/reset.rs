@@ -13,6 +13,7 @@ pub fn log() {
     let csr = RCC.csr().read();
     // The flags persist until cleared, also across resets.
     RCC.csr().modify(|csr| csr.set_rmvf(true));
+    // In this order: power-up sets the brown-out's flag, too, and every reset the pin's (RM0090, RCC_CSR).
     let cause = match () {
         () if csr.wdgrstf() => "the watchdog: no control ticks, or a panic or fault",
         () if csr.sftrstf() => "software, or a debugger",

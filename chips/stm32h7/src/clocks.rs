@@ -45,6 +45,7 @@ pub fn start<const CRYSTAL_HZ: u32>(scb: &mut SCB) -> Peripherals {
 /// that it needs no PLL that the crystal's failure would stop.
 fn config<const CRYSTAL_HZ: u32>(crystal: bool) -> Config {
     let source = if crystal { PllSource::HSE } else { PllSource::HSI };
+    // The chip's own oscillator has 64 MHz.
     let prediv = if crystal { PllPreDiv::from_bits((CRYSTAL_HZ / PLL_INPUT_HZ) as u8) } else { PllPreDiv::DIV16 };
     let mut config = Config::default();
     let rcc = &mut config.rcc;
@@ -95,11 +96,13 @@ unsafe fn NonMaskableInt() {
         cr.set_hseon(false);
         cr.set_pllon(0, false);
     });
+    // Source and divider can be changed only while the PLL is off (RM0433, RCC_PLLCKSELR).
     RCC.pllckselr().modify(|pll| {
         pll.set_pllsrc(Pllsrc::HSI);
         pll.set_divm(0, Pllm::DIV16);
     });
     RCC.cr().modify(|cr| cr.set_pllon(0, true));
+    // Counted, since the time base stands still during an NMI.
     if (0..LOCK_LOOKS).any(|_| RCC.cr().read().pllrdy(0)) {
         RCC.cfgr().modify(|cfgr| cfgr.set_sw(Sw::PLL1_P));
     }

@@ -61,6 +61,7 @@ impl NorFlash for Words {
     const ERASE_SIZE: usize = SECTOR as usize;
 
     fn erase(&mut self, from: u32, to: u32) -> Result<(), NorFlashErrorKind> {
+        // An end before the beginning wraps to a length beyond the sectors, which is refused.
         check(from, to.wrapping_sub(from) as usize, SECTOR as usize)?;
         for sector in from / SECTOR..to / SECTOR {
             unlocked(|| {
@@ -111,12 +112,15 @@ fn unlocked(start: impl FnOnce()) -> Result<(), NorFlashErrorKind> {
         bank.keyr().write_value(key);
     }
     start();
+    // All stores have reached the flash before its status is read.
     cortex_m::asm::dsb();
+    // Only who writes waits: interrupts are served meanwhile, from the other bank.
     while {
         let sr = bank.sr().read();
         sr.bsy() || sr.qw()
     } {}
     let sr = bank.sr().read();
+    // Flags stay until they are cleared, and would be taken for a failure of the next operation.
     bank.ccr().write(|ccr| {
         ccr.set_clr_eop(true);
         ccr.set_clr_wrperr(true);

@@ -43,6 +43,7 @@ impl Gains {
     #[must_use]
     pub fn scaled(&self, scale: f32) -> Self {
         let Gains { backstepping, gamma, eta, safeguards, .. } = *self;
+        // The profile `paper` has no bound, which is the end of the range: scaled up, it would be refused.
         let bound = |bound: f32| math::min(bound * scale, Safeguards::THETAMAX.range.max as f32);
         Gains {
             backstepping: backstepping::Gains { alpha2: backstepping.alpha2 * scale, ..backstepping },
@@ -72,6 +73,7 @@ impl Gains {
             },
             gamma: gamma / square,
             eta: eta / square,
+            // Not divided: delta_max stays, so the robust term's gain, delta_max/epsilon, falls as alpha_2 does.
             epsilon: epsilon * slowness,
             safeguards: Safeguards { sigma: safeguards.sigma / slowness, ..safeguards },
             ..*self
@@ -128,10 +130,12 @@ pub fn even(input: f32) -> AdaptiveEstimate {
 /// `norm_max` allows, but at least as large as the input requires.
 fn spread(input: f32, weights: &Matrix3<f32>, norm_max: f32) -> AdaptiveEstimate {
     // The smallest such Theta_hat; the rest of an even one is orthogonal to the weights.
+    // Nine weights that sum to one have a norm of at least a third.
     let least = weights * (input / weights.norm_squared());
     let rest = Matrix3::repeat(input) - least;
     let room = math::max(norm_max * norm_max - least.norm_squared(), 0.0);
     let square = rest.norm_squared();
+    // room is never negative, so square is positive where it divides.
     let share = if square > room { math::sqrt(room / square) } else { 1.0 };
     AdaptiveEstimate { theta: least + rest * share, delta: 0.0 }
 }
@@ -145,6 +149,7 @@ fn advance(estimate: &mut AdaptiveEstimate, rate: &Rate, safeguards: &Safeguards
     let theta = estimate.theta * keep + rate.first * (rate.theta * dt_s) * rate.second.transpose();
     let square = theta.norm_squared();
     estimate.theta = if square > theta_max * theta_max { theta * (theta_max / math::sqrt(square)) } else { theta };
+    // It never falls below zero: e and tanh(e_2/epsilon), whose product it grows by, have the same sign.
     estimate.delta = math::min(estimate.delta * keep + rate.delta * dt_s, delta_max);
 }
 
@@ -316,6 +321,7 @@ impl Law for Adaptive {
 
     fn approach(&self, axis: Axis, known: Option<&ModelConstants>) -> f32 {
         let gains = &self.subsystems[axis].gains.backstepping;
+        // With nothing known, u_pd is zero where the speed of approach is alpha_1 e_1.
         known.map_or(gains.alpha1, |model| gains.approach(model.hover_gain(axis)))
     }
 
@@ -325,6 +331,7 @@ impl Law for Adaptive {
 
     fn hover_thrust_n(&self, z: &AdaptiveEstimate, weight_n: f32, known_n: f32) -> f32 {
         // The rule for zero error and zero speed.
+        // Never near zero, since (40), drag and the observer of forces divide by it.
         math::max(known_n + z.theta.m22, HOVER_SHARE_MIN * weight_n)
     }
 }

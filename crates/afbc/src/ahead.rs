@@ -31,6 +31,7 @@ impl Ahead {
     /// `dt_s` seconds.
     pub fn new(lag_s: f32, smoothing: &Smoothing, bandwidth_rad_s: f32, dt_s: f32) -> Self {
         let Smoothing { smooth_tilt_rad_s, smooth_lift_rad_s, lead_s, .. } = *smoothing;
+        // Without a filter there is no lead either: all of the rotors' lag is left.
         let left = |w: f32| if w > 0.0 { math::max(lag_s + 2.0 / w - lead_s, 0.0) } else { lag_s };
         let share = 1.0 - math::exp(-bandwidth_rad_s * dt_s);
         Ahead {
@@ -45,6 +46,7 @@ impl Ahead {
     /// and advances the low-pass by one step.
     #[inline(always)]
     pub fn advance(&self, late: &mut Option<Vector2<f32>>, accelerations_rad_s2: &Vector2<f32>) -> Vector2<f32> {
+        // The first counts as having stood before: a law that takes over does not jump.
         let before = late.unwrap_or(*accelerations_rad_s2);
         *late = Some((before + (accelerations_rad_s2 - before) * self.share).map(math::settled));
         (accelerations_rad_s2 - before) * self.lead

@@ -16,6 +16,7 @@ pub fn ideal(gains: &Gains, errors: &Errors, x1d_ddot: f32, dynamics: &Dynamics)
 #[inline]
 fn compensated(acceleration: f32, e2: f32, dynamics: &Dynamics) -> f32 {
     let Dynamics { f, g, g_dot } = *dynamics;
+    // Only g_4 changes: the other subsystems are spared a division.
     let drift = if g_dot == 0.0 { 0.0 } else { 0.5 * g_dot / g * e2 };
     (acceleration - f - drift) / g
 }
@@ -65,6 +66,7 @@ impl Gains {
     /// position over rate gain.
     pub(crate) fn approach(&self, g: f32) -> f32 {
         let gain = self.alpha2 * g;
+        // alpha_1 is positive by its range, and the gain is not negative: no division by zero.
         (self.stiffness + self.alpha1 * gain) / (self.alpha1 + gain)
     }
 }

@@ -87,6 +87,7 @@ pub(crate) struct Filters {
 impl<E> Cascade<E> {
     /// Returns the memory with the estimates of another law, which starts with this rotor residual.
     pub(crate) fn handed_over<F>(&self, estimates: PerAxis<F>, rotor_residual_rad_s: f32) -> Cascade<F> {
+        // Filters and observers go on with the same memory: no input jumps, and what was observed is still made up for.
         let Cascade { last, filters, .. } = *self;
         Cascade { estimates, last, filters, rotor_residual_rad_s }
     }
@@ -161,6 +162,7 @@ impl<L: Law, const N: usize> Controller<L, N> {
     /// Returns the estimated hover thrust U4 \[N\], limited to what the rotors can give.
     pub(crate) fn hover_thrust_n(&self, memory: &Cascade<L::Estimate>) -> f32 {
         let hover_n = self.law.hover_thrust_n(&memory.estimates.z, self.weight_n, self.known_weight_n());
+        // As the commanded thrust is in (40): both thrusts that are divided there have the same limit.
         math::min(hover_n, self.thrust_max_n)
     }
 
@@ -185,6 +187,7 @@ impl<L: Law, const N: usize> Controller<L, N> {
         fresh: bool,
     ) -> Action<N> {
         if self.settings.bumpless && memory.filters.desired.is_first() {
+            // What feed-forward knows of the weight must not be learnt as well: it would be carried twice.
             self.law.start(&mut memory.estimates, self.weight_n - self.known_weight_n());
         }
         let (hover_n, stands) = (self.hover_thrust_n(memory), self.stands(memory));
@@ -194,10 +197,12 @@ impl<L: Law, const N: usize> Controller<L, N> {
         let Cascade { estimates, last, filters, rotor_residual_rad_s } = memory;
         let reference = self.reference(&mut filters.detours, state, setpoint);
         let attitude = Attitude::of(state);
+        // The last step's, since drag comes before the thrust. A law may ask for less than none; hover_n is positive.
         let share = math::max(last.asked.thrust_n, 0.0) / hover_n;
         let observed_m_s2 = self.observe_forces(&mut filters.forces, state, &attitude, hover_n, [fresh, touches]);
         let gyroscopic_rad_s2 = self.model.gyroscopic(&state.rates_rad_s, *rotor_residual_rad_s);
         let velocity_body_m_s = attitude.in_body(&state.velocity_m_s);
+        // For the observer, which would otherwise find it as a disturbance and make up for it a second time.
         let known_rad_s2 = gyroscopic_rad_s2 + self.drag_turns(&velocity_body_m_s, share);
         let observed_rad_s2 =
             self.observe_moments(&mut filters.moments, &state.rates_rad_s, &known_rad_s2, [fresh, touches]);
@@ -206,6 +211,7 @@ impl<L: Law, const N: usize> Controller<L, N> {
             roll_pitch: attitude.roll_pitch,
             rotor_residual_rad_s: *rotor_residual_rad_s,
             dt_s: self.settings.common.dt_s,
+            // Feet hold against all but the thrust, which is learnt as soon as the vehicle no longer stands (`lift`).
             adapt: fresh && !touches,
             unallocated: &last.unallocated,
             observed_m_s2,
@@ -222,12 +228,14 @@ impl<L: Law, const N: usize> Controller<L, N> {
         // Attitude: subsystems 1, 2, 3.
         let mut turn = self.turn(&desired, &reference, &attitude, state);
         if self.settings.feed_forward {
+            // Without the body's measured rates, whose noise the lead would amplify.
             let more = self.ahead.advance(&mut filters.late, &turn.desired_accelerations.xy());
             turn.accelerations += Vector3::new(more.x, more.y, 0.0);
         }
         let [u1, u2, u3] = self.attitude(&turn, [&state.attitude_rad, &eta_dot], &context, estimates, &mut last.errors);
 
         // Rotors, which also make up for the moments as they will be when they have followed.
+        // In axes that turn, (R' v)' = R' dv/dt - Omega x R' v: the drag's moment turns with the body.
         let change = attitude.in_body(&reference.acceleration_m_s2) - state.rates_rad_s.cross(&velocity_body_m_s);
         let ahead_m_s = velocity_body_m_s + change * self.settings.disturbance.disturbance_lag_s;
         let against = self.make_up(&observed_rad_s2, &ahead_m_s, share, touches);
@@ -238,6 +246,7 @@ impl<L: Law, const N: usize> Controller<L, N> {
 
         // For the next step.
         if let Some(forces) = &self.forces {
+            // As given, not as asked: what the rotors' limits take away would be observed as a disturbance.
             forces.give(&mut filters.forces, action.given.thrust_n);
         }
         if let Some(moments) = &self.moments {
@@ -245,6 +254,7 @@ impl<L: Law, const N: usize> Controller<L, N> {
         }
         filters.standstill.advance(u4, self.weight_n, state, self.settings.common.dt_s);
         let leaves = touches && !filters.standstill.touches();
+        // The way back from where it has slid is not to be learnt as a disturbance.
         if let (true, Some(reference), Some(detours)) = (leaves, &self.reference, &mut filters.detours) {
             reference.restart_level(detours, state, setpoint);
         }
@@ -256,6 +266,7 @@ impl<L: Law, const N: usize> Controller<L, N> {
             let [x, y] = desired.beyond_limits_m_s2;
             last.unallocated = PerAxis { roll: roll_n, pitch: pitch_n, yaw: yaw_n, z: thrust_n, x, y };
         }
+        // e_1 of x, y and z is cut at the speed limit, and would hide from the monitor how far away the vehicle is.
         let PerAxis { roll, pitch, yaw, .. } = &last.errors;
         let [x, y, z] = (reference.position_m - state.position_m).into();
         last.distances = PerAxis { roll: roll.e1, pitch: pitch.e1, yaw: yaw.e1, z, x, y };
@@ -423,6 +434,7 @@ impl<L: Law, const N: usize> Controller<L, N> {
         touches: bool,
     ) -> [f32; 3] {
         let Some(moments) = &self.moments else { return [0.0; 3] };
+        // Its feet hold a vehicle that touches the ground against the drag, too.
         let known = if touches { Vector3::zeros() } else { self.drag_turns(velocity_body_m_s, share) };
         moments.against(&(observed_rad_s2 + known))
     }
@@ -438,6 +450,7 @@ impl<L: Law, const N: usize> Controller<L, N> {
         hover_n: f32,
         stands: bool,
     ) -> (Inputs, f32) {
+        // The filter of U3 has no lead that the observer could feed back: its moment may pass it.
         let inputs = Inputs { roll_n: u1, pitch_n: u2, yaw_n: u3 + yaw_n, thrust_n: u4 };
         let mut inputs = self.smoother.advance(&mut filters.smoothed, &inputs);
         let mut effort = 1.0;

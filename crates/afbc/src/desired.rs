@@ -141,11 +141,13 @@ impl DesiredAttitude {
         attitude: &Attitude,
         [reference, setpoint]: [&Setpoint; 2],
     ) -> DesiredRollPitch {
+        // (40) must not count on more than the rotors can give.
         let thrust_n = math::min(u4, self.thrust_max_n);
         let (vertical, inverse_vertical) = self.vertical(thrust_n * attitude.roll_pitch.tilt_cosine(), hover_n);
         let tilt_max_tan = math::min(self.tilt_max_tan, low_tan);
         // In the same direction.
         let [a5, a6] = within([u5, u6], math::min(vertical * tilt_max_tan, self.acceleration_max_m_s2));
+        // With the reference's yaw the desired attitude does not depend on the measured one.
         let heading = if self.by_rotation {
             [math::sin(reference.yaw_rad), math::cos(reference.yaw_rad)]
         } else {
@@ -162,6 +164,7 @@ impl DesiredAttitude {
             Some((derivatives, _)) => self.ahead(tilt.rad, derivatives),
             None => tilt.rad,
         };
+        // The last step's command, which was held until now: `half_step_s` counts that delay.
         let filtered = match &memory.last {
             Some(LastAngles { commanded: [phi_d, theta_d], filtered: [roll, pitch], .. }) => {
                 [self.filter.advance(roll, *phi_d), self.filter.advance(pitch, *theta_d)]
@@ -234,6 +237,7 @@ impl DesiredAttitude {
     fn ahead(&self, mut rad: [f32; 2], [rates, accelerations]: [[f32; 2]; 2]) -> [f32; 2] {
         for ((angle, rate), acceleration) in rad.iter_mut().zip(rates).zip(accelerations) {
             let late_s = self.lag_s + self.half_step_s;
+            // (1 + s/w) (1 + s (1/w + dt/2)): the inverse of the filter, with the delay of the hold in one factor.
             *angle += (self.lag_s + late_s) * rate + self.lag_s * late_s * acceleration;
         }
         within(rad, self.tilt_max_rad)

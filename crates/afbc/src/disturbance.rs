@@ -153,8 +153,10 @@ impl ForceObserver {
             remembered,
             held: false,
         };
+        // A flight that begins in the air is taken to hover: its rotors give the weight.
         let observed = observed.get_or_insert_with(|| start(self.weight_n, Remembered::default()));
         if touches {
+            // What the rotors do, and what has been learnt of the air, outlast a touch of the ground.
             *observed = start(observed.thrust_n, observed.remembered);
             return Vector3::zeros();
         }
@@ -173,6 +175,7 @@ impl ForceObserver {
         for (((v_hat, f_hat), v), a) in
             velocity_m_s.iter_mut().zip(acceleration_m_s2.iter_mut()).zip(measured).zip(known)
         {
+            // A difference that came about while nothing was measured is no disturbance: f_hat stays.
             if *held {
                 *v_hat = v;
             } else if fresh {
@@ -262,6 +265,7 @@ impl MomentObserver {
             per_moment: vehicle.inertia_kg_m2.map(|inertia| vehicle.mass_kg / inertia),
             ineffectiveness: effectiveness.map(|g| -1.0 / g),
             acceleration_max,
+            // A step of f moves Omega - Omega_hat by f t exp(-w t), which is f/(e w) at most.
             jump: acceleration_max
                 .zip_map(&bandwidth, |most, w| max(most / (core::f32::consts::E * max(w, W_MIN_RAD_S)), 1.0)),
         })
@@ -289,6 +293,7 @@ impl MomentObserver {
             return turning.acceleration_rad_s2;
         }
         let Turning { rates_rad_s: omega_hat, acceleration_rad_s2: f_hat, given_rad_s2: given, known_rad_s2 } = turning;
+        // As old as the rates are taken to be: else every change of what is known would be observed as a moment.
         *known_rad_s2 = (*known_rad_s2 + (known - *known_rad_s2) * self.age).map(math::settled);
         let off = rates_rad_s - *omega_hat;
         let found =
@@ -321,6 +326,7 @@ impl MomentObserver {
     pub fn give(&self, turning: &mut Option<Turning>, given: &Inputs, effort: f32) {
         if let Some(turning) = turning {
             let given = Vector3::new(given.roll_n, given.pitch_n, given.yaw_n);
+            // What rotors that are known to be weak lack is no moment. effort is bounded away from zero.
             let given = given.component_mul(&self.effectiveness) * (1.0 / effort);
             turning.given_rad_s2 =
                 (turning.given_rad_s2 + (given - turning.given_rad_s2) * self.lag).map(math::settled);

@@ -73,6 +73,7 @@ impl Basis {
     #[inline]
     pub fn fire(&self, [x1, x2]: [f32; 2]) -> Firing {
         let ((first, first_sum), (second, second_sum)) = (self.memberships(x1), self.memberships(x2));
+        // Each sum is at least q, and q at least exp(-18) by SPREAD: the product is never zero.
         Firing { first, second, share: 1.0 / (first_sum * second_sum) }
     }
 

@@ -95,6 +95,7 @@ impl<const N: usize> Guarded<N> {
         let mixer = settings.common.mixer(vehicle)?;
         mixer.check_hover(weight_n)?;
         let hover = Range {
+            // Rounded up to four decimals: the figure in the error is short, and accepted when it is entered.
             min: libm::ceil(f64::from(hover_theta(settings.feed_forward) * weight_n) * 1e4) / 1e4,
             ..Safeguards::THETAMAX.range
         };
@@ -144,6 +145,7 @@ impl<const N: usize> Guarded<N> {
             let x = match axis {
                 Axis::Roll => [eta.x, eta_dot.x],
                 Axis::Pitch => [eta.y, eta_dot.y],
+                // Of yaw; z, x and y do not use it, since their fuzzy inputs are errors.
                 _ => [eta.z, eta_dot.z],
             };
             let errors = &errors[axis];
@@ -182,6 +184,7 @@ impl<const N: usize> FlightController<N> for Guarded<N> {
             && let Some(trip) = self.monitor.watch(figures, afbc, action.health.saturated)
         {
             let rotor_residual_rad_s = self.adaptive.mixer().residual_rad_s(&action.speeds);
+            // AFBC's action is flown once more: a tick has no time for a step of both laws.
             *tripped = Some(Tripped { trip, rotor_residual_rad_s });
         }
         action
@@ -208,6 +211,7 @@ impl<const N: usize> FlightController<N> for Guarded<N> {
             Some(StandIn { cascade, .. }) => self.resumed(cascade, |_, _, _, integral| integral.value),
             None => self.resumed(afbc, |axis, x, errors, own| self.adaptive.law().fuzzy(axis, x, errors, own)),
         };
+        // With new figures: an average that has tripped is still beyond its bound.
         *memory = Memory { afbc, ..Memory::default() };
         true
     }

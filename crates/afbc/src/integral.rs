@@ -82,6 +82,7 @@ impl Law for IntegralBackstepping {
         if let Some(input) = integral.resume.take() {
             integral.value = input - fixed;
         }
+        // Bounded where it is used, since an input to resume may ask for more than the bound, too.
         let i = math::min(math::max(integral.value, -integral_max), *integral_max);
         let winds_up = errors.e2 * context.unallocated[axis] > 0.0;
         integral.value = if context.adapt && !winds_up { i + kappa * errors.e2 * context.dt_s } else { i };

@@ -72,6 +72,7 @@ impl Context<'_> {
             Axis::X => Dynamics { f: x, ..dynamics },
             Axis::Y => Dynamics { f: y, ..dynamics },
             Axis::Roll | Axis::Pitch | Axis::Yaw => dynamics,
+            // f of z is gravity by the model, which stays; f of x and y is zero there.
             Axis::Z => Dynamics { f: dynamics.f + z, ..dynamics },
         }
     }

@@ -45,6 +45,7 @@ pub struct Approach {
 impl Approach {
     /// Limits the speed of approach of a law that approaches at `approach_1_s` times the error.
     pub fn new(speed_max_m_s: f32, approach_1_s: f32) -> Self {
+        // A law that does not approach has no limit: the quotient is infinite.
         Approach { e1_max_m: speed_max_m_s / approach_1_s, approach_1_s }
     }
 

@@ -173,6 +173,7 @@ impl ModelConstants {
         let effectiveness = vehicle.effectiveness();
         ModelConstants {
             a1: (iy - iz) / ix,
+            // Rotors that push to positive yaw spin negatively, which gives a_2 and a_4 their signs.
             a2: rotor_inertia_kg_m2 / ix,
             a3: (iz - ix) / iy,
             a4: -rotor_inertia_kg_m2 / iy,

@@ -111,6 +111,7 @@ impl Swing {
         } else if onward < -least {
             self.extreme = input;
             self.direction = -self.direction;
+            // It decays at 1/WINDOW_S: n such steps a second settle at n.
             self.rate_hz += 1.0 / WINDOW_S;
         }
     }
@@ -138,6 +139,7 @@ impl Default for MonitorFigures {
             error: PerAxis::default(),
             saturation_share: 0.0,
             swings: [Swing::default(); 4],
+            // The last of the round: the first step updates roll.
             axis: Axis::Y,
         }
     }

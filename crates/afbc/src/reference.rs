@@ -102,6 +102,7 @@ struct Point {
 /// The part of `jump` to take off `d`, so that it comes as near as possible to `vehicle`.
 #[inline]
 fn taken_up(d: f32, jump: f32, vehicle: f32) -> f32 {
+    // With rest the reference stays where it was, with d it jumps along: between them, the nearest to the vehicle.
     let rest = d - jump;
     if jump > 0.0 {
         if vehicle >= d { d } else { math::max(vehicle, rest) }
@@ -115,6 +116,7 @@ fn taken_up(d: f32, jump: f32, vehicle: f32) -> f32 {
 impl Coordinate {
     fn new(bandwidth: f32, acceleration_max: f32, speed_max: f32) -> Self {
         let approach = bandwidth / 3.0;
+        // A coordinate without a bandwidth is never advanced; it only must not divide by zero.
         let far = if approach > 0.0 { 0.5 * acceleration_max / (approach * approach) } else { 0.0 };
         Coordinate { bandwidth, approach, acceleration_max, speed_max, far }
     }
@@ -124,6 +126,7 @@ impl Coordinate {
     fn speed(&self, d: f32) -> f32 {
         let distance = d.abs();
         let speed = if distance > self.far {
+            // v^2 = a_max (d - far/2) brakes with a_max/2, and meets w/3 d at far in value and slope.
             math::sqrt(self.acceleration_max * (distance - 0.5 * self.far))
         } else {
             self.approach * distance
@@ -149,6 +152,7 @@ impl Coordinate {
         };
         let d_dddot = 3.0 * self.bandwidth * (a_c - *d_ddot);
         let half = 0.5 * dt_s;
+        // To second order: what a first-order step leaves out would count as a jump of a setpoint that accelerates.
         *expected = [point.x + dt_s * (point.v + half * point.a), point.v + dt_s * (point.a + half * point.j)];
         let reference = Point { x: point.x + *d, v: point.v + *d_dot, a: point.a + *d_ddot, j: point.j + d_dddot };
         *d = math::settled(*d + dt_s * (*d_dot + half * *d_ddot));
@@ -229,6 +233,7 @@ impl ReferenceFilter {
         if self.yaw.bandwidth > 0.0 {
             let Setpoint { yaw_rad, yaw_rate_rad_s, yaw_acceleration_rad_s2, .. } = &mut reference;
             let point = Point { x: *yaw_rad, v: *yaw_rate_rad_s, a: *yaw_acceleration_rad_s2, j: 0.0 };
+            // The shorter way round: a heading that passes from pi to -pi does not jump.
             let from = math::wrap_angle(state.attitude_rad.z - point.x);
             let jump = math::wrap_angle(point.x - detours.yaw.expected[0]);
             let rate = state.rates_rad_s.z - point.v;

@@ -66,6 +66,7 @@ impl Standstill {
         let slower = |speed_max| state.velocity_m_s.iter().all(|v| v.abs() < speed_max);
         let speed_max = if self.stands() { MOVING_M_S } else { STILL_M_S };
         self.still_s = if thrust_n < LIFT_SHARE * weight_n && slower(speed_max) { self.still_s + dt_s } else { 0.0 };
+        // In every step anew: what counts is the height at which it stood last.
         if self.stands() {
             self.land();
         }

@@ -70,6 +70,7 @@ impl Tilt {
         let aside_ddot = (s1 + turn * j2) * over + turn_dot * ahead + turn * ahead_dot;
         let ahead_ddot = (s2 - turn * j1) * over - turn_dot * aside - turn * aside_dot;
         let theta_dot = cos2_theta * ahead_dot;
+        // (cos^2 theta)' = -2 tan theta cos^2 theta theta', and likewise of phi below.
         let theta_ddot = cos2_theta * ahead_ddot - 2.0 * ahead * theta_dot * theta_dot;
         // cos theta, and its derivatives over cos theta.
         let (shrink, shrink_dot) = (ahead * theta_dot, ahead * theta_ddot + theta_dot * theta_dot);

@@ -105,6 +105,7 @@ impl<'a> Conversation<'a> {
     /// Sends a command of this number; returns the answer, and after how long it came \[ms\].
     pub(crate) fn command(&mut self, command: Command, number: u16) -> Result<Option<(Answer, u64)>, Error> {
         for _ in 0..ASKED_MAX {
+            // An answer to an earlier question is none to this one.
             self.heard.answers.remove(&number);
             self.say(&Uplink::Command(command));
             let began_ms = self.now_ms;
@@ -131,6 +132,7 @@ impl<'a> Conversation<'a> {
             if self.heard.has_all_parameters() {
                 break;
             }
+            // Nothing has come: the request itself was lost.
             let Some(count) = self.heard.parameter_count else {
                 self.say(&Uplink::Parameter(ParameterRequest::List));
                 continue;

@@ -49,6 +49,7 @@ pub(crate) fn turns(
         let is_level = talk.wait(PATIENCE_MS, |heard| level.follow(heard, &Vector3::z()))?;
         step.check(is_level, "it was not held level");
         tell(turn.order);
+        // Anew, so that the angle counts from level on.
         let mut turned = Turned::default();
         let is_done = talk.wait(PATIENCE_MS, |heard| turned.follow(heard, &turn.up.into()))?;
         let angle_rad = turned.angle_rad.get(turn.axis).copied().unwrap_or_default() * turn.sign;

@@ -80,6 +80,7 @@ impl AccelerometerCalibration {
             sample.at_us
         });
         let rests = sample.is_finite() && self.rest.add(sample, &Limits::HELD);
+        // Between two sides it is to be moved: only what is being measured is spoilt by that.
         if !rests && matches!(self.detected.take(), Some((Some(_), false))) {
             tell(CalibrationEvent::Moved);
         }
@@ -142,6 +143,7 @@ fn fit(read_m_s2: &Matrix3x6, gravity_m_s2: f32) -> Result<AccelerometerErrors, 
         offset += change.fixed_rows::<3>(0);
         scale += change.fixed_rows::<3>(3);
         // False of NaN.
+        // Wider than what is accepted in the end: a step may go too far on the way.
         let is_possible =
             offset.amax() * gravity_m_s2 <= 2.0 * OFFSET_MAX_M_S2 && scale.amin() > 0.5 && scale.amax() < 2.0;
         if !is_possible {

@@ -131,6 +131,7 @@ impl FieldSums {
         let found = normal.cholesky()?.solve(&right);
         let mut numbers = SVector::<f64, 9>::zeros();
         numbers.fixed_rows_mut::<4>(5).copy_from(&found);
+        // At the least squares |A x - b|^2 = b^T b - x^T A^T b, for which no reading need be kept.
         Some((numbers, self.right_squared - right.dot(&found)))
     }
 
@@ -146,6 +147,7 @@ impl FieldSums {
         let sums = self.normal.column(8) / self.readings;
         let [[a, b, xy2, xz2, yz2, x2, y2, z2, _]] = sums.data.0;
         let squares = -self.right.iter().next_back().copied().unwrap_or(0.0) / self.readings;
+        // xx = zz + a and yy = zz + b, and all three add up to `squares`.
         let zz = (squares - a - b) / 3.0;
         let (xy, xz, yz) = (0.5 * xy2, 0.5 * xz2, 0.5 * yz2);
         let moments = Matrix3::new(zz + a, xy, xz, xy, zz + b, yz, xz, yz, zz);

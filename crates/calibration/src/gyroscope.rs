@@ -41,6 +41,7 @@ impl GyroscopeCalibration {
                 Err(CalibrationFailure::TooLarge)
             });
         }
+        // Below 100: a rest that is long enough has returned above.
         let share = (100 * self.rest.elapsed_us() / MEASURE_US) as u8 / STEP * STEP;
         if share > self.told {
             self.told = share;

@@ -109,6 +109,7 @@ impl MagnetometerCalibration {
             self.turn = None;
             self.done_us = Some(at_us);
             self.pending = self.pending.without(side);
+            // That it still rests on the side which is announced as done is no news.
             self.told = true;
             tell(CalibrationEvent::Done(side));
             tell(CalibrationEvent::Progress(self.pending.done_percent()));
@@ -141,6 +142,7 @@ impl Turn {
     /// Takes the first reading of each part of the turn.
     fn take(&mut self, field_ut: &Vector3<f32>, sums: &mut FieldSums) {
         let share = self.turns - libm::floorf(self.turns);
+        // Just below a whole turn the share rounds to 1.
         let part = 1 << ((share * f32::from(PARTS)) as u8).min(PARTS - 1);
         if self.parts & part == 0 {
             self.parts |= part;

@@ -41,6 +41,7 @@ impl Rest {
             *self = with;
             return true;
         }
+        // The first sample is a beginning, and no motion.
         let moved = self.samples > 0.0;
         let (rates, force) = ([sample.rates_rad_s; 3], [sample.specific_force_m_s2; 3]);
         *self = Rest { since_us: sample.at_us, now_us: sample.at_us, samples: 1.0, rates, force };

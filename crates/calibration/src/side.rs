@@ -47,6 +47,7 @@ impl Side {
     pub fn of(specific_force_m_s2: &Vector3<f32>) -> Option<Self> {
         let norm = specific_force_m_s2.norm();
         let is_along = |side: &Side| side.up().dot(specific_force_m_s2) >= ALONG_MIN * norm;
+        // One at most: no two axes can both have more than 0.71 of the norm.
         Side::ALL.into_iter().find(is_along).filter(|_| AT_REST_M_S2.contains(&norm))
     }
 }

@@ -227,6 +227,7 @@ impl Entry {
         let count = values.len() as f64;
         let mean = values.iter().sum::<f64>() / count;
         let squares: f64 = values.iter().map(|value| (value - mean) * (value - mean)).sum();
+        // A single flight has no spread: 0, not 0/0.
         Some(Average { mean, deviation: libm::sqrt(squares / (count - 1.0).max(1.0)) })
     }
 }
@@ -289,6 +290,7 @@ pub fn fly_seeds(
 ) -> Result<Vec<Comparison>, OutOfRange> {
     let outcome = |scenario: &Scenario, contender: &Contender, number: u64| {
         let scenario = Scenario { seed: scenario.seed + number, ..scenario.clone() };
+        // Only the first flight is drawn; logs of all seeds would only take memory.
         let run = Run::fly(&scenario, contender, if number == 0 { log_every } else { u64::MAX })?;
         progress();
         Ok((Outcome::of(&scenario, &run), (number == 0).then_some(run)))

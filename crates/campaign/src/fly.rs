@@ -37,6 +37,7 @@ fn flown(
     stop: &AtomicBool,
     progress: &(dyn Fn(u64) + Sync),
 ) -> Result<Summary, Error> {
+    // Also between rows: with many flights, reading and writing them takes its time.
     let heard = |row| if stop.load(Ordering::Relaxed) { Err(Error::Stopped) } else { row };
     if let Some(rows) = folder.results()? {
         let mut summary = Summary::new(folder.manifest());
@@ -63,8 +64,11 @@ fn fly_missing(
         missing.flat_map(|chunk| folder.chunk(chunk).enumerate().map(move |(place, flight)| (chunk, place, flight)));
     // Each thread takes the next flight; the one that completes a chunk writes it. Only unfinished chunks are in
     // memory.
+    // Fused, since every thread asks once more after the last flight. Rows are sorted by their place in the chunk:
+    // threads finish flights in any order, and a file has them in the campaign's.
     let (jobs, begun) = (Mutex::new(jobs.fuse()), Mutex::new(BTreeMap::<u64, BTreeMap<usize, Vec<Row>>>::new()));
     let failed = AtomicBool::new(false);
+    // A lock is poisoned by a panic, which rayon passes on when all threads have ended: until then nothing is begun.
     let next = || match jobs.lock() {
         Ok(mut jobs) => jobs.next(),
         Err(_) => None,
@@ -108,6 +112,7 @@ pub fn merge(shards: &[PathBuf], out: &Path, force: bool) -> Result<(CampaignFol
         return Err(Error::IntoPart(part.clone()));
     }
     let mut parts = shards.iter().map(|path| Ok((path, finished(path)?))).collect::<Result<Vec<_>, Error>>()?;
+    // So that two of the same shard are neighbours.
     parts.sort_by_key(|(_, rows)| rows.manifest().shard.index);
     let Some((first, manifest)) = parts.first().map(|(path, rows)| (*path, rows.manifest().clone())) else {
         return Err(Error::Missing(vec![Shard::WHOLE]));

@@ -62,6 +62,7 @@ impl CampaignFolder {
         let is_known = match found(&path.join(MANIFEST)) {
             Ok(Some(found)) if manifest.is_same(&found) => true,
             Ok(None) => false,
+            // By force also over a manifest that cannot be read.
             _ if force => false,
             Ok(Some(_)) => return Err(Error::Changed(path.into())),
             Err(error) => return Err(error),
@@ -85,6 +86,7 @@ impl CampaignFolder {
             let page = Page { manifest: &folder.manifest, checksum: seal::OPEN.into() };
             folder.place.place(MANIFEST, |out| seal::json(out, &page))?;
         }
+        // Only under the lock: no temporary file of a program that still runs is among them.
         files::sweep(path);
         files::sweep(&path.join(CHUNKS));
         Ok(folder)
@@ -133,6 +135,7 @@ impl CampaignFolder {
         entries.filter_map(move |entry| {
             let name = entry.file_name().into_string().ok()?;
             let chunk = name.strip_suffix(".parquet")?.parse().ok().filter(|chunk| *chunk < chunks)?;
+            // Only the spelling that is written here: "1.parquet" is somebody else's file.
             (name == Self::chunk_name(chunk)).then_some(chunk)
         })
     }

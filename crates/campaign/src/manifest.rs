@@ -25,6 +25,7 @@ impl Shard {
 
     /// Returns how many of `flights` belong to this shard: every `of`-th.
     pub fn count(&self, flights: u64) -> u64 {
+        // Rounded up. No difference is negative, since the index is at most `of`.
         (flights + self.of - self.index) / self.of
     }
 
@@ -141,6 +142,7 @@ impl Manifest {
 
 /// Returns a fingerprint that differs between campaigns and between versions of this program.
 fn fingerprint(campaign: &Campaign) -> String {
+    // Every field by its name, so that a new one is not forgotten.
     let Campaign { name: _, description: _, flights, seed, scenario, trajectories, spreads } = campaign;
     // By name, since a quantity's place may change.
     let spreads: Vec<_> =

@@ -102,6 +102,7 @@ impl<W: Write + Send> Writer<W> {
         let Some(first) = rows.first() else { return Ok(()) };
         let text = |text: &String| ByteArray::from(text.as_str());
         let mut group = self.file.next_row_group()?;
+        // Flights and seeds have at most 53 bits: none becomes negative.
         put::<Int64Type>(&mut group, rows.iter().map(|row| Some(row.flight.cast_signed())))?;
         put::<Int64Type>(&mut group, rows.iter().map(|row| Some(row.seed.cast_signed())))?;
         put::<ByteArrayType>(&mut group, rows.iter().map(|row| Some(text(&row.contender))))?;
@@ -197,6 +198,7 @@ impl<R: ChunkReader + 'static> Reader<R> {
         let mut seeds = take::<Int64Type>(group, 1)?.into_iter();
         let mut contenders = take::<ByteArrayType>(group, 2)?.into_iter();
         let mut trajectories = take::<ByteArrayType>(group, 3)?.into_iter();
+        // Column 4, whether the vehicle was lost, is for other readers: it follows from the reason.
         let mut losses = take::<ByteArrayType>(group, 5)?.into_iter();
         let mut trips = take::<ByteArrayType>(group, 6)?.into_iter();
         let numbers = (0..columns).map(|column| Ok(take::<DoubleType>(group, LABELS.len() + column)?.into_iter()));
@@ -242,6 +244,7 @@ where
     let (mut present, mut dense) = (Vec::new(), Vec::new());
     column.read_records(rows, Some(&mut present), None, &mut dense)?;
     if !optional {
+        // A column that is required has no definition levels.
         present = vec![1; dense.len()];
     }
     if present.len() != rows {

@@ -135,6 +135,7 @@ pub static QUANTITIES: [Quantity; 35] = [
             |f, x| {
                 let wind = &mut f.scenario.realism.wind.steady_m_s;
                 let (sin, cos) = libm::sincos(x);
+                // wind_m_s comes before in the list, and has put the speed along x.
                 *wind = Vector3::new(cos, sin, 0.0) * wind.x;
             },
         ),
@@ -178,6 +179,7 @@ pub static QUANTITIES: [Quantity; 35] = [
     whole(quantity("imu_part", 1.0, 3.0, "inertial sensor: 1 ICM-42688-P, 2 BMI270, 3 MPU-6000", |f, x| {
         let chosen = part(&Imu::PRESETS, x);
         f.scenario.instruments.imu.iter_mut().zip(chosen).for_each(|(imu, chosen)| {
+            // Vibration is the vehicle's, whatever part it shakes.
             let gyro = Gyroscope { vibration_rad_s: imu.gyro.vibration_rad_s, ..chosen.gyro };
             let accel = Accelerometer { vibration_m_s2: imu.accel.vibration_m_s2, ..chosen.accel };
             (imu.gyro, imu.accel) = (gyro, accel);

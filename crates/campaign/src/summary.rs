@@ -160,5 +160,6 @@ impl Summary {
 
 /// Returns which of [`BINS`] equal parts of an interval `value` lies in; the upper end belongs to the last.
 fn bin([low, high]: [f64; 2], value: f64) -> usize {
+    // An interval of one value gives 0/0: the cast makes 0 of NaN, the first part.
     ((value - low) / (high - low) * BINS as f64).clamp(0.0, BINS as f64 - 1.0) as usize
 }

@@ -38,5 +38,6 @@ impl Comparison {
 
 /// Returns how much larger `own` is; both lost are level.
 fn difference(own: f64, other: f64) -> f64 {
+    // The difference of two infinities would be NaN.
     if own == other { 0.0 } else { own - other }
 }

@@ -94,7 +94,9 @@ impl KnownDrag {
         let across = |of: Vector3<f32>| of - up * up.dot(&of);
         let c = up.dot(velocity_m_s);
         let force = math::max(thrust_m_s2, THRUST_MIN_M_S2);
+        // c is negative in a descent: the divisor is kept positive.
         let per_force = 1.0 / math::max(force + rotors * c, force * SHARE_MIN);
+        // The turn depends on dk/dt, and dk/dt on the turn: first without, then with it.
         let turn = across(q) * per_force;
         let w = velocity_m_s.dot(&turn) + up.dot(a);
         // Blades drag by the root of the thrust, which changes, too.

@@ -47,7 +47,9 @@ pub fn exp2(x: f32) -> f32 {
     let n = x + LARGE;
     let f = x - (n - LARGE);
     let bits = n.to_bits();
+    // The index is always in range; `get` keeps a panic out of the tick.
     let power = POWERS.get(bits as usize % STEPS).copied().unwrap_or_default();
+    // Modulo 2^32: a negative number of steps of 1/64 lowers the exponent, which -126 keeps above the subnormal numbers.
     let power = f32::from_bits(power.wrapping_add(bits << 17));
     power + power * (f * (0.693_149_7 + f * 0.240_226_5))
 }
@@ -82,6 +84,7 @@ pub fn tan(x: f32) -> f32 {
     let y = 0.5 * x;
     let square = y * y;
     let half = y / (1.0 - square / (3.0 - square / (5.0 - square / (7.0 - square / 9.0))));
+    // tan(x/2) is below 1 for |x| <= 1.57: the divisor is positive.
     2.0 * half / (1.0 - half * half)
 }
 

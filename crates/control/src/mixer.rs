@@ -87,6 +87,8 @@ struct YawRoom<const N: usize> {
 impl<const N: usize> YawRoom<N> {
     /// Computes it for yaw that changes the loads, which are at most `most`, by `yaw` per newton.
     fn new(yaw: &SVector<f32, N>, most: &SVector<f32, N>) -> Self {
+        // Up to its limit (most - load)/yaw of a rotor that yaw loads, down to zero load/|yaw| of one that it unloads:
+        // both are lines in the load, found once so that a tick does not divide.
         YawRoom {
             unloaded: yaw.zip_map(most, |yaw, most| match yaw {
                 _ if yaw.abs() < YAW_LOAD_MIN => f32::MAX,
@@ -151,12 +153,15 @@ impl<const N: usize> Mixer<N> {
         let columns = rotors.map(|rotor| Vector4::new(rotor.y, -rotor.x, spin(&rotor), 1.0));
         let effectiveness = SMatrix::<f32, 4, N>::from_columns(&columns);
         let gram: Matrix4<f32> = effectiveness * effectiveness.transpose();
+        // By Hadamard's inequality at most 1, but for rounding.
         AUTHORITY.check(gram.determinant() / gram.diagonal().product())?;
+        // The default is never taken: a matrix without an inverse has just been refused.
         let inverse = effectiveness.transpose() * gram.try_inverse().unwrap_or_default();
         let share: SVector<f32, N> = inverse.column(3).into();
         for share in &share {
             THRUST_SHARE.check(*share)?;
         }
+        // No share is zero: THRUST_SHARE has refused less than 0.001.
         let load = |input| inverse.column(input).component_div(&share);
         // The largest load whose force, rounded, does not exceed the limit.
         let most = share.map(|share| {
@@ -222,6 +227,7 @@ impl<const N: usize> Mixer<N> {
     pub fn tilt_authority_n(&self, weight_n: f32) -> [f32; 2] {
         [&self.roll, &self.pitch].map(|loads| {
             let largest = |possible, (load, most): (&f32, &f32)| {
+                // The load of every rotor at hover is the weight: it may fall to zero or rise to its limit.
                 let room = math::max(math::min(weight_n, most - weight_n), 0.0);
                 if *load == 0.0 { possible } else { math::min(possible, room / load.abs()) }
             };
@@ -283,6 +289,7 @@ impl<const N: usize> Mixer<N> {
         // Thrusts at which the loads by roll and pitch are within limits; none if the first exceeds the second.
         let least = -lowest(&tilt);
         let most = match self.common_most {
+            // Loads come in pairs of opposite signs: the highest is minus the lowest, and need not be looked for.
             Some(most) if self.balanced => most - least,
             Some(most) => most - highest(&tilt),
             None => lowest(&(self.most - tilt)),
@@ -296,6 +303,7 @@ impl<const N: usize> Mixer<N> {
                 Some(own) => (least + own - most) / own,
                 None => highest(&tilt.add_scalar(least).component_div(&self.most)),
             };
+            // Roll and pitch give no thrust, so some load by them is negative where they do not fit: least is positive.
             let scale = math::min(1.0 / math::max(excess, 1.0), raised / least);
             (roll_n, pitch_n, tilt, thrust_n) = (roll_n * scale, pitch_n * scale, tilt * scale, least * scale);
         }

@@ -49,6 +49,7 @@ impl Screen {
             self.setpoint = Some(*setpoint);
         }
         let state = self.state.as_ref()?;
+        // Kept, not made anew in each step: it must not follow a vehicle that drifts away.
         Some((state, self.setpoint.get_or_insert_with(|| Setpoint::hold(state))))
     }
 }

@@ -104,6 +104,7 @@ impl Smoother {
         };
         *twice = filtered(twice, &led);
         let given = *twice;
+        // A memory that is not finite would never be finite again.
         if (given.roll_n + given.pitch_n + given.yaw_n + given.thrust_n).is_finite() {
             return given;
         }

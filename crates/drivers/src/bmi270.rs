@@ -117,6 +117,7 @@ impl SensorPart for Bmi270 {
                 let force = little(force.try_into().map_err(|_| PartFault::Bus)?);
                 let mut rates = little([r0, r1, r2, r3, r4, r5]);
                 rates.x = (rates.x - self.zx * rates.z).clamp(-32768.0, 32767.0);
+                // None in the first cycle: status and temperature are read behind the data.
                 return Ok(self.temperature_c.map(|temperature_c| InertialReading {
                     rates_rad_s: rates * RAD_S_PER_LSB,
                     specific_force_m_s2: force * M_S2_PER_LSB,

@@ -77,6 +77,7 @@ impl<const IDENTITY: u8> SensorPart for Bmp3<IDENTITY> {
 
     fn take(&mut self, register: u8, answer: &[u8]) -> Result<Option<PressureReading>, PartFault> {
         if register == CALIBRATION {
+            // A damaged calibration must not leave that of the last set-up in use.
             self.coefficients = None;
             let (&check, trim) = answer.split_first().ok_or(PartFault::Bus)?;
             if crc(trim) != check {

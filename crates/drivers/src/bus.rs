@@ -72,6 +72,7 @@ impl<D: SpiDevice> Registers for SpiRegisters<D> {
         match *bytes {
             [] => self.device.write(&[head]).await,
             [byte] => self.device.write(&[head, byte]).await,
+            // In two parts, so that a block stays where it is: the BMI270's has 8 KiB.
             _ => self.device.transaction(&mut [Operation::Write(&[head]), Operation::Write(bytes)]).await,
         }
         .map_err(|_| BusError)

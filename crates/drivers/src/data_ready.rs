@@ -82,6 +82,7 @@ impl<E: Edge, C: PartTiming> PartTiming for DataReady<E, C> {
         if is_faster && self.is_wired {
             self.clock.ready(us).await;
         }
+        // Two in all: a faster part has waited for one of them already. Without edges the clock alone counts.
         let periods = if self.is_wired && !is_faster { 2 } else { 1 };
         let edge_us = self.edge(us, periods).await;
         let sample_us = u64::from(us / 2);

@@ -140,6 +140,7 @@ impl<P: SensorPart, B: Registers, T: PartTiming> Driver<P, B, T> {
         if self.faults == 0 {
             return false;
         }
+        // Not one that is late or stuck: it may answer with everything as it was set, and only a set-up helps.
         let did_not_answer = matches!(
             self.last_fault,
             Some(
@@ -154,6 +155,7 @@ impl<P: SensorPart, B: Registers, T: PartTiming> Driver<P, B, T> {
         while self.timing.now_us() < end_us {
             self.timing.wait(LOOK_US).await;
             if self.is_as_set().await.unwrap_or(false) {
+                // A fault stays: the part does not count as working before it has read.
                 (self.is_up, self.faults, self.cycles) = (true, 1, 0);
                 return true;
             }
@@ -200,6 +202,7 @@ impl<P: SensorPart, B: Registers, T: PartTiming> Driver<P, B, T> {
         }
         let mut complete = None;
         for step in P::CYCLE {
+            // To the script's end: a step behind the reading may find that the part has failed.
             complete = self.step(step).await?.or(complete);
         }
         Ok(complete)
@@ -230,6 +233,7 @@ impl<P: SensorPart, B: Registers, T: PartTiming> Driver<P, B, T> {
         match *step {
             Step::Identify(register, identities) => {
                 let identity = self.byte(register).await?;
+                // The list first: the identity of a QMC5883L is all ones.
                 match identity {
                     _ if identities.contains(&identity) => (),
                     0x00 | 0xFF => return Err(PartFault::Silent),

@@ -77,6 +77,7 @@ impl EscReading {
     /// 100 rev/min, and no more than the largest that it can tell.
     #[must_use]
     pub fn erpm_hundreds_of(speed_rad_s: f32, poles: u32) -> u16 {
+        // Half as many pairs as poles, 60 s a minute, by the hundred: 60/(2 100). The cast saturates.
         (speed_rad_s * (0.3 / core::f32::consts::TAU) * poles as f32) as u16
     }
 }
@@ -171,10 +172,12 @@ impl EscLine {
             self.silent_us = Some(now_us);
             return None;
         };
+        // A byte was lost: nothing but the pause marks where an answer begins.
         if now_us.saturating_sub(self.heard_us) > PAUSE_US {
             self.answer.clear();
         }
         self.heard_us = now_us;
+        // There is room: a whole answer ends the question, and the next one clears it.
         let _ = self.answer.push(byte);
         let answer: &[u8; ANSWER_LEN] = self.answer.as_slice().try_into().ok()?;
         let reading = EscReading::from_bytes(answer);

@@ -72,6 +72,7 @@ impl SensorPart for Ms5611 {
 
 impl Ms5611 {
     fn take_prom(&mut self, command: u8, value: u16) -> Result<(), PartFault> {
+        // Each cycle begins with the PROM: what a broken one has left must not pass for this one's temperature.
         self.d2 = None;
         let at = usize::from(command.wrapping_sub(PROM_READ) / 2);
         let word = self.prom.get_mut(at).ok_or(PartFault::Bus)?;

@@ -89,6 +89,8 @@ impl NmeaDecoder {
             }
         }
         let [fix_s, motion_s] = [&self.fix.as_ref()?.time, &self.motion.as_ref()?.datetime.time].map(seconds);
+        // Halves of two epochs: the older one is overwritten once its successor comes. Both times are read from the
+        // same digits, so that those of one epoch are equal to the bit.
         if fix_s != motion_s {
             return None;
         }

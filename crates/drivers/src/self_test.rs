@@ -17,6 +17,7 @@ impl<P: SensorPart, B: Registers, T: PartTiming> Driver<P, B, T> {
     pub async fn self_test(&mut self) -> Result<(), PartFault> {
         let Some(test) = &P::SELF_TEST else { return Ok(()) };
         let result = self.respond(test).await;
+        // Before an error is returned: a test that was broken off leaves the part stimulated.
         self.forget();
         if (test.passes)(&result?) { Ok(()) } else { Err(PartFault::SelfTest) }
     }

@@ -177,6 +177,7 @@ impl UbxReceiver {
         while let Some((first_us, message)) = self.frames.next(byte_us, read) {
             // No byte of it belongs to a sentence.
             self.nmea.begin();
+            // Sentences behind a frame begin an epoch, however short the pause between.
             self.byte_us = 0;
             match message {
                 Message::Version(interface) => self.identified(interface, at_us),
@@ -188,6 +189,7 @@ impl UbxReceiver {
                 Message::Other => (),
             }
         }
+        // An epoch that has a solution must not come a second time, by its sentences.
         let solves = self.solved_us.is_some_and(|solved_us| at_us.saturating_sub(solved_us) < SOLUTION_SILENT_US);
         if solves || self.phase == Phase::Solves { fix } else { self.take_nmea(at_us, byte) }
     }
@@ -205,6 +207,7 @@ impl UbxReceiver {
     /// Returns what is to be done at `now_us`, one thing after the other until there is nothing; to be called again
     /// after [`take`](Self::take), and every 50 ms.
     pub fn poll(&mut self, now_us: u64) -> Option<ReceiverAction> {
+        // The other phases ask, and end by answers that do not come.
         let silent_us = match self.phase {
             Phase::Solves => SOLUTION_SILENT_US,
             Phase::Nmea => NMEA_SILENT_US,
@@ -239,6 +242,7 @@ impl UbxReceiver {
                         (self.asked, self.ask_us) = (self.asked + 1, now_us.saturating_add(ASK_US));
                         return Some(ReceiverAction::Send(command));
                     }
+                    // A refusal shows that the line works, and so will sentences; silence may be the wrong baud rate.
                     Some((_, Worth::Needed)) if self.refused => self.take_as_it_is(now_us),
                     Some((_, Worth::Needed)) => self.search(now_us),
                     Some(_) => self.enter(Phase::Configures(interface, number.saturating_add(1)), now_us),
@@ -304,6 +308,7 @@ impl UbxReceiver {
     fn identified(&mut self, interface: Interface, now_us: u64) {
         match self.phase {
             Phase::Searches | Phase::Nmea => {
+                // A fast rate may be what was set here before; a reset takes the receiver back to its own.
                 if self.baud < FAST_BAUD {
                     self.found_baud = self.baud;
                 }
@@ -318,6 +323,7 @@ impl UbxReceiver {
 
     fn answered(&mut self, to: MessageId, accepted: bool, now_us: u64) {
         let Phase::Configures(interface, number) = self.phase else { return };
+        // All keys have the same command: an answer that comes before this step has asked is one to the last step.
         if self.step(interface, number).is_none_or(|(command, _)| command.id() != to) || self.asked == 0 {
             return;
         }

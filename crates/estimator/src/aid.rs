@@ -139,6 +139,7 @@ impl Aids {
             Aid::GnssVelocity => live(&self.tracker_position),
             Aid::TrackerAttitude => live(&self.heading),
             Aid::Heading => live(&self.tracker_attitude),
+            // A reset of it sets the barometer's offset alone, which no other aid measures.
             Aid::Height => false,
         }
     }

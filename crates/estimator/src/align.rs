@@ -149,12 +149,15 @@ impl Align {
         if elapsed_s >= 0.5 * settings.align_s && self.half.is_none() {
             self.half = Some((self.rates.mean, self.force.mean));
         }
+        // The mean of all differs from that of the first half by half of what the halves differ by.
         let drifts = elapsed_s >= settings.align_s
             && self.half.is_some_and(|(rates, specific)| {
                 abs_max(&(self.rates.mean - rates)) > 0.25 * rate
                     || abs_max(&(self.force.mean - specific)) > 0.25 * force
             });
+        // For the tilt, too, in place of gravity: an error of scale must not look like one.
         let norm = sqrt(self.force.mean.norm_squared());
+        // From 20 samples on: the mean of fewer is too noisy to refuse a vehicle by it.
         let refused = if moves || drifts {
             Some(Unready::Moving)
         } else if abs_max(&self.rates.mean) > settings.gyro_bias_max_rad_s && self.count >= 20.0 {
@@ -183,6 +186,8 @@ impl Align {
         let given = self.heading.map(|(heading, sigma)| (heading - atan2(nose.m21, nose.m11), sigma * sigma, false));
         let by_field = field.map(|field| {
             let horizontal = field.x * field.x + field.y * field.y;
+            // Minus the declination: the earth's y is west, and declination counts to the east. Without a horizontal
+            // part the variance is infinite, and so vague.
             (-settings.declination_rad - atan2(field.y, field.x), variance / (count * horizontal), true)
         });
         let pose = self.pose.map(|(attitude, sigma)| (twist(&attitude, &level), sigma * sigma, false));
@@ -194,6 +199,7 @@ impl Align {
             let slope = -field.z / (field.x * field.x + field.y * field.y);
             (slope * field.x, slope * field.y)
         });
+        // The variance of the samples is squares over count; that of their mean is count times smaller again.
         let of_mean = |mean: &Mean| abs_max(&mean.squares) / (self.count * self.count);
         Some(Aligned {
             attitude: normalized(&(about_z * level)),

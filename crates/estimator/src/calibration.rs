@@ -60,6 +60,7 @@ impl ImuCalibration {
 
     /// Returns what a sensor at the centre of mass would have measured. `last` is what it returned for the sample
     /// before, none at first, and becomes what it returns.
+    // Only the check is inlined: a sensor without mounting and errors pays for nothing else.
     #[inline(always)]
     pub fn apply(&self, last: &mut Option<ImuSample>, sample: ImuSample) -> ImuSample {
         self.0.as_ref().map_or(sample, |mounted| mounted.apply(last, sample))
@@ -70,10 +71,12 @@ impl Mounted {
     #[inline(never)]
     fn apply(&self, last: &mut Option<ImuSample>, sample: ImuSample) -> ImuSample {
         let Mounted { to_body, position_m: r, gyro_offset_rad_s, accel_offset_m_s2, accel_scale } = self;
+        // A sensor's errors are along its own axes: they come off before it is turned.
         let rates_rad_s = to_body * (sample.rates_rad_s - gyro_offset_rad_s);
         let felt_m_s2 = (sample.specific_force_m_s2 - accel_offset_m_s2).component_mul(accel_scale);
         let since = last.map(|before| (sample.at_us.saturating_sub(before.at_us), rates_rad_s - before.rates_rad_s));
         let acceleration_rad_s2 = match since {
+            // 0 stands for a time that goes back, too: there is nothing to divide by.
             Some((us @ 1..=LEVER_GAP_US, change_rad_s)) => change_rad_s * (1e6 / us as f32),
             _ => Vector3::zeros(),
         };

@@ -140,6 +140,7 @@ impl Covariance {
     pub(crate) fn predict(&mut self, interval: &Interval, growth: &Growth) {
         let Interval { time_s, turn, thrust } = interval;
         let (t, c, s) = (*time_s, turn, thrust);
+        // Position first, rotation last: each substitution finds what it adds as it was at the beginning.
         self.slow.predict(interval);
 
         // p' = p + T v.
@@ -154,6 +155,7 @@ impl Covariance {
         let vv = self.vv + minus_cross(s, &self.tv) - by_transpose(c, &self.va);
         self.tv += crossed_minus(&self.tt, s) - by_transpose(&self.ta, c);
         self.va += minus_cross(s, &self.ta) - c * self.aa;
+        // With the new tv and va: vv is multiplied from the right, too.
         self.vv = vv + crossed_minus(&self.tv.transpose(), s) - by_transpose(&self.va, c);
         self.vp += minus_cross(s, &self.tp) - by_transpose(c, &self.pa);
         self.vg += minus_cross(s, &self.tg) - by_transpose(c, &self.ga);
@@ -238,6 +240,7 @@ impl Covariance {
     #[inline(never)]
     fn limit(&mut self) {
         let factor = |variance: f32, bounds: &Bounds| {
+            // Just below the bound, so that rounding leaves nothing above it.
             if variance > bounds.most { sqrt(bounds.most / variance) * 0.9999 } else { 1.0 }
         };
         let of = |m: &Block, bounds: Bounds| {
@@ -245,6 +248,7 @@ impl Covariance {
         };
         let (t, v, p) = (of(&self.tt, THETA), of(&self.vv, VELOCITY), of(&self.pp, POSITION));
         let (g, a, b) = (of(&self.gg, GYRO), of(&self.aa, ACCEL), factor(self.bb, &BARO));
+        // `slow` is not read: variances of slow errors are given, and stay.
         self.scale(&Errors { theta: t, velocity: v, position: p, gyro: g, accel: a, baro: b, slow: Slows::zeros() });
     }
 
@@ -293,6 +297,7 @@ impl Covariance {
             baro: self.tb.dot(&row.theta),
             slow: Slows::zeros(),
         };
+        // A row has few of these parts, and a scalar is fused within a control tick: what is not there is skipped.
         if row.velocity != 0.0 {
             let h = row.velocity;
             y.theta += at.column(&self.tv) * h;
@@ -380,6 +385,7 @@ impl Covariance {
         let w = y.scaled(1.0 / sqrt(s));
         self.subtract(&w, &w);
         self.slow.subtract(&w, &w);
+        // An update only lowers variances: the upper bounds hold by themselves.
         self.raise();
     }
 
@@ -398,7 +404,9 @@ impl Covariance {
         };
         self.subtract(k, &w);
         self.subtract(&w, k);
+        // Once: the slow errors have no gain of their own.
         self.slow.subtract(k, y);
+        // Two products, one after the other: rounding makes the halves of a block differ.
         for block in [&mut self.tt, &mut self.vv, &mut self.pp, &mut self.gg, &mut self.aa] {
             mirror(block);
         }

@@ -70,12 +70,15 @@ fn root(parts: &[f64]) -> f64 {
 
 /// What a Gauss-Markov process adds per root of a second.
 fn markov(sigma: f64, time_s: f64) -> f64 {
+    // The noise that drives it has the density 2 sigma^2/time.
     sigma * sqrt(2.0 / time_s)
 }
 
 impl Triad {
     /// Density of all that counts as white noise, at this rate or acceleration, two-sided \[unit/rtHz\].
     fn density(&self, step_s: f64, moving: f64) -> f64 {
+        // Noise of sigma in each sample has the density sigma sqrt(step); the error of rounding is uniform over a step
+        // of the output.
         let per_root_s = sqrt(step_s);
         let quantisation = self.lsb / sqrt(12.0);
         let [quantisation, vibration] = [quantisation, SHAKEN * self.vibration].map(|sigma| sigma * per_root_s);
@@ -113,6 +116,7 @@ impl Settings {
             gyro_walk_rad_s_rts: within(gyro_walk, 1e-6, 0.01),
             accel_walk_m_s2_rts: within(accel_walk, 1e-5, 0.1),
             accel_bias_m_s2: within(accel_bias, 1e-3, 1.0),
+            // Five sigma: the alignment takes a larger rate for a turn, and refuses it.
             gyro_bias_max_rad_s: within(5.0 * gyro.bias, 0.35, 1.0),
             baro_walk_m_rts: barometer
                 .map_or(default.baro_walk_m_rts, |(drift_m, time_s)| within(markov(drift_m, time_s), 1e-4, 1.0)),

@@ -76,6 +76,7 @@ impl Estimator {
             coast_us: microseconds(settings.coast_s),
             frozen_us: or_never(settings.frozen_s),
             stuck_us: or_never(settings.stuck_s),
+            // Minus: the earth's y is west, and declination counts to the east.
             magnetic_north_rad: wrap_angle(-settings.declination_rad),
             magnetic_north: (libm::cosf(settings.declination_rad), -libm::sinf(settings.declination_rad)),
             inclination_error_max: settings.inclination_error_max_rad,
@@ -152,6 +153,7 @@ impl Estimator {
             memory.monitor.refuse();
             return false;
         }
+        // Not integrated: the attitude would turn at the repeated rate for as long as the sensor is stuck.
         if memory.monitor.repeats(sample, self.stuck_us) {
             return false;
         }
@@ -199,6 +201,7 @@ impl Estimator {
         interval.turn = (memory.rotation + memory.nominal.rotation) * (0.5 * interval.time_s);
         let mut growth = self.growth;
         growth.velocity += self.bent(memory);
+        // Before the prediction: the corrections were made at the interval's beginning.
         memory.covariance.turn(&matrix(&renormalized(&memory.turned)));
         memory.turned = identity();
         memory.covariance.predict(&interval, &growth);
@@ -239,6 +242,7 @@ impl Estimator {
             memory.align.again(Unready::NoImu);
         }
         let recent = now_us.saturating_sub(OLD_US);
+        // Of any time: before the start there is no state of the past to wait for.
         while let Some(measurement) = memory.queue.take(|_| true) {
             if measurement.at_us >= recent {
                 memory.align.hear(&measurement.value);

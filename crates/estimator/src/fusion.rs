@@ -62,6 +62,7 @@ impl Estimator {
             if !self.fuse_scalar(memory) {
                 memory.end_part();
             }
+            // Its beginning has cost the look into the past and the gates: that is enough for a step.
             if begins {
                 break;
             }
@@ -73,6 +74,7 @@ impl Estimator {
     #[inline]
     fn begin_fix(&self, memory: &mut Memory, now_us: u64) -> bool {
         let newest_us = memory.covariance_us;
+        // One that is too early is taken, too, to be dropped: it would occupy the queue until its time comes.
         let due = |at_us: u64| at_us <= newest_us || at_us > now_us.saturating_add(EARLY_US);
         let Some(measurement) = memory.queue.take(due) else {
             return self.rest(memory);
@@ -82,16 +84,20 @@ impl Estimator {
             count(&mut memory.dropped.early);
             return false;
         }
+        // The history knows the lowest 32 bits of a time: the limit keeps out what is older than they reach. No
+        // underflow: later ones have returned above.
         let past = memory.history.at(at_us as u32).filter(|_| newest_us - at_us <= LATE_US);
         let Some(past) = past else {
             count(&mut memory.dropped.late);
             return false;
         };
         let mut parts = parts(&measurement.value);
+        // That of the fix before: the loop below overwrites it.
         let fix_us = memory.aids.gnss_position.newest_us;
         for part in &mut parts {
             let Some(aid) = part.and_then(|part| part.aid) else { continue };
             let record = memory.aids.of_mut(aid);
+            // The same measurement, sent twice, would be averaged as two.
             if record.newest_us.is_some_and(|newest_us| at_us <= newest_us) {
                 count(&mut memory.dropped.overtaken);
                 *part = None;
@@ -197,6 +203,7 @@ impl Estimator {
         let Some(past) = memory.history.corrected(past, gravity) else { return false };
         let (at_us, mut part, next) = (*at_us, *part, *next);
         let horizon = Horizon::new(&present, &past, gravity);
+        // On the copy: the next scalar of the part begins with the measurement's own variances.
         part.roughen(memory.roughened_since(at_us), horizon.tau_s());
         if next == 0 && !self.admits(memory, at_us, &part, &horizon) {
             return false;
@@ -216,14 +223,17 @@ impl Estimator {
             row.slow = Some(Slows::new(unit.x, unit.y, unit.z, 0.0, 0.0));
         }
         let y = memory.covariance.times(row);
+        // Negative by rounding only.
         let hph = max(row.dot(&y), 0.0);
         let r = match &part.target {
             Target::Field(field) => field_variance(&horizon.field(field), part.variance.x) + part.rough,
             _ => coordinate.of(&part.variance),
         };
+        // Above zero, since each variance has a floor: it may divide.
         let s = hph + max(r, max(LEFT * hph, ROUNDING * memory.covariance.motion_variance(row)));
         let nis = innovation * innovation / s;
         let scalars = part.target.scalars();
+        // Three scalars have passed the gate together, before the first of them changed the state.
         if scalars == 1 && nis > self.gate_squared {
             self.reject(memory, at_us, &part, nis, &horizon);
             return false;
@@ -297,6 +307,7 @@ impl Estimator {
                 }
                 let tau_s = horizon.tau_s();
                 let along = memory.covariance.vp.diagonal();
+                // Of p_past = p - tau v; what a tilt adds to it, D x theta, is left out.
                 let variance = variances.position - along * (2.0 * tau_s) + variances.velocity * (tau_s * tau_s);
                 let slow = if part.is_slow() { memory.covariance.slow.of_position(tau_s) } else { Vector3::zeros() };
                 (innovation, (variance + slow).map(|variance| max(variance, 0.0)))
@@ -324,6 +335,8 @@ impl Estimator {
                 let field = horizon.field(field);
                 let Some((strength, inclination)) = reference(&field) else { return false };
                 let (usual, steep) = *memory.field.get_or_insert((strength, inclination));
+                // Sines are compared, which an angle changes by its cosine: but for the floor, a steep field would be
+                // refused for its noise.
                 let slope = self.inclination_error_max * max(0.2, sqrt(1.0 - steep * steep));
                 if (strength - usual).abs() > self.settings.field_error_max * usual
                     || (inclination - steep).abs() > slope
@@ -333,6 +346,7 @@ impl Estimator {
                 }
                 if !memory.knows.heading {
                     let turn = wrap_angle(self.magnetic_north_rad - atan2(field.y, field.x));
+                    // A tilt turns the horizontal field by the tangent of its dip: the variance by the square of that.
                     let slope = field.z * field.z / max(field.x * field.x + field.y * field.y, 1e-3 * strength);
                     let variance = field_variance(&field, part.variance.x)
                         + min(slope, 100.0) * max(variances.theta.x, variances.theta.y);

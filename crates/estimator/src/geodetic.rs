@@ -21,6 +21,7 @@ impl Origin {
         // WGS 84.
         const RADIUS_M: f64 = 6_378_137.0;
         const ECCENTRICITY_SQUARED: f64 = 6.694_379_990_14e-3;
+        // At a pole a degree of longitude is no distance, by which `global` would divide.
         let valid = latitude_deg.abs() <= 89.0 && longitude_deg.abs() <= 180.0 && altitude_m.abs() <= 2e4;
         let (sine, cosine) = libm::sincos(latitude_deg.to_radians());
         let flattened = 1.0 - ECCENTRICITY_SQUARED * sine * sine;
@@ -48,6 +49,7 @@ impl Origin {
     /// ```
     #[must_use]
     pub fn local(&self, latitude_deg: f64, longitude_deg: f64, altitude_m: f64) -> Vector3<f32> {
+        // Subtracted in f64: an f32 of degrees does not resolve centimetres.
         let mut east_deg = longitude_deg - self.longitude_deg;
         // Across the date line.
         if east_deg > 180.0 {

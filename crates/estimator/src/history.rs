@@ -139,6 +139,7 @@ impl History {
             entry.position += position;
         }
         let zero = Vector3::zeros();
+        // The rotation stays apart: as a quaternion it is exact at any size.
         (self.shift.theta, self.shift.velocity, self.shift.position) = (zero, zero, zero);
     }
 
@@ -174,6 +175,7 @@ impl History {
     /// the newest entry.
     pub(crate) fn at(&self, at_us: u32) -> Option<Past> {
         let newest = self.entry(0)?;
+        // Signed: right also where the 32 bits of the time overflow.
         let age = |entry: &Past| entry.at_us.wrapping_sub(at_us) as i32;
         if age(newest) < 0 {
             return None;
@@ -220,9 +222,11 @@ pub(crate) fn way(present: &Past, past: &Past, gravity: f32) -> (f32, Vector3<f3
 
 /// Interpolates: the position with both velocities (Hermite's cubic), the others linearly.
 fn between(a: &Past, b: &Past, at_us: u32) -> Past {
+    // Above zero: `at_us` is not before `a`, and before `b`.
     let span_us = b.at_us.wrapping_sub(a.at_us) as f32;
     let x = at_us.wrapping_sub(a.at_us) as f32 / span_us;
     let span_s = span_us * 1e-6;
+    // q and -q are one attitude: the straight line must take the short way.
     let nearer = if a.attitude.dot(&b.attitude) < 0.0 { -b.attitude } else { b.attitude };
     // What the velocities add to the straight line between the positions.
     let chord = b.position - a.position;

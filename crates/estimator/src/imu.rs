@@ -161,6 +161,7 @@ impl LowPass {
             memory.output = *input;
             return;
         };
+        // Those of an input that has always been the same: starting from zero, the output would swing up to it.
         let (first, second) = memory.sums.unwrap_or((input * (1.0 - b0), input * (b0 - a2)));
         let output = input * b0 + first;
         memory.sums = Some((input * (2.0 * b0) - output * a1 + second, input * b0 - output * a2));

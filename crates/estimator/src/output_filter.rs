@@ -87,6 +87,7 @@ impl VelocityNotch {
     /// velocity, which so goes on without a step.
     fn take_over(&self, from: &Self, passed: &mut Option<Passed>) {
         if let Some(Passed { sums, .. }) = passed {
+            // b0 - a2 is k/Q times the norm: above zero at every speed that has a notch.
             *sums = sums.map(|sum| sum * ((self.b0 - self.a2) / (from.b0 - from.a2)));
         }
     }
@@ -148,6 +149,7 @@ impl OutputFilter {
         if let Some(last_us) = self.last_us {
             let dt_s = (estimate.at_us as u32).wrapping_sub(last_us) as f32 * 1e-6;
             let stays = |hidden: &Vector3<f32>, decay_s: f32, most: f32| {
+                // Within 0 and 1 after any time: the divisor is at least the decay, and the time at most.
                 1.0 - min(dt_s, decay_s) / max(decay_s, sqrt(hidden.norm_squared()) / most)
             };
             self.position_m = self.position_m * stays(&self.position_m, POSITION_DECAY_S, MOST_M_S) + estimate.moved_m;

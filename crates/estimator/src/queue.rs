@@ -31,6 +31,7 @@ impl Queue {
         let arrived = self.arrived;
         self.arrived = arrived.wrapping_add(1);
         // A free place, or else the oldest one's.
+        // The numbers wrap; how far apart those of eight are does not.
         let age = |place: &Option<(u32, Stamped<Measurement>)>| {
             place.as_ref().map_or(u32::MAX, |(number, _)| arrived.wrapping_sub(*number))
         };

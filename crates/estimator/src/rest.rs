@@ -88,6 +88,7 @@ impl Rest {
         let (rate, force) = (settings.still_rate_rad_s, settings.still_accel_m_s2);
         let compares = self.blocks > 0;
         self.time_s += dt_s;
+        // Both advance, whatever the other shows: what is right of `||` might not be called.
         let turns = self.rates.advance(rates_rad_s, dt_s, rate, compares);
         let mut moves = self.force.advance(specific_force_m_s2, dt_s, force, compares) || turns;
         if self.time_s >= BLOCK_S && !moves {

@@ -120,6 +120,7 @@ impl Memory {
         let position = abs_max(&sigmas.position_m) < 1e3;
         self.knows = Known { position, heading, height_offset: false };
         self.field = None;
+        // No interval leads from the last sample to this state: the next one begins.
         self.monitor.forget();
         self.run(now_us, nominal);
     }
@@ -192,6 +193,7 @@ impl Memory {
     pub(crate) fn reset_position(&mut self, by: &Vector3<f32>, part: &Part, tau_s: f32) {
         count(&mut self.resets.position);
         self.nominal.move_to(self.nominal.position + by);
+        // The past moves with it, or a late fix would report the same jump once more.
         self.history.correct(&identity(), &NONE, &NONE, by);
         let c = &mut self.covariance;
         c.forget(&Errors { position: NONE, baro: 0.0, ..KEEP });
@@ -233,7 +235,9 @@ impl Memory {
         count(&mut self.resets.heading);
         let turn = about_z(by);
         self.nominal.turn_to(normalized(&(turn * self.nominal.attitude)));
+        // That of the covariance's time, too: the next prediction takes the mean of both.
         self.rotation = matrix(&turn) * self.rotation;
+        // Not into the linear sum, for which the turn may be too large: position and velocity stay.
         self.history.correct(&turn, &NONE, &NONE, &NONE);
         self.covariance.turn(&matrix(&turn));
         self.covariance.forget(&Errors { theta: Vector3::new(1.0, 1.0, 0.0), ..KEEP });

@@ -40,6 +40,7 @@ pub(crate) fn about_z(angle_rad: f32) -> Quaternion<f32> {
 
 /// Shortest rotation that turns the unit vector `up`, in the body, to the earth's z; none if it points down.
 pub(crate) fn levelling(up: &Vector3<f32>) -> Option<Quaternion<f32>> {
+    // Upside down every axis would do, and the norm would vanish. False of NaN.
     (up.z > -0.99).then(|| normalized(&Quaternion::new(1.0 + up.z, up.y, -up.x, 0.0)))
 }
 
@@ -80,6 +81,7 @@ pub(crate) fn difference(to: &Quaternion<f32>, from: &Quaternion<f32>) -> Vector
     let sine = sqrt(vector.norm_squared());
     // The angle per unit of the vector, 2 for small ones.
     let scale = if sine < 0.05 { 2.0 + sine * sine * (1.0 / 3.0) } else { 2.0 * atan2(sine, q.w.abs()) / sine };
+    // q and -q are one rotation: the sign of w chooses the one of at most half a turn.
     vector * if q.w < 0.0 { -scale } else { scale }
 }
 
@@ -95,6 +97,7 @@ pub(crate) fn atan2(y: f32, x: f32) -> f32 {
     if x == 0.0 && y == 0.0 {
         return 0.0;
     }
+    // The smaller over the larger: an argument of at most 1, and no division by zero.
     if y.abs() > x.abs() {
         return FRAC_PI_2.copysign(y) - atan(x / y);
     }

@@ -71,6 +71,7 @@ impl Slow {
     /// Takes the variances of a new fix, since the last of which d has kept `share` of itself. A smaller variance than
     /// before is that of an error which is partly another one.
     pub(crate) fn follow(&mut self, variance: &Vector3<f32>, share: f32) {
+        // Divides only by what is above another variance, and so not zero.
         let kept =
             variance.zip_map(&self.gnss_variance(), |new, old| if new < old { share * (new / old) } else { share });
         for m in [&mut self.theta, &mut self.velocity, &mut self.position, &mut self.gyro, &mut self.accel] {
@@ -106,6 +107,7 @@ impl Slow {
     /// X = F X, as the covariance's own prediction.
     #[inline]
     pub(crate) fn predict(&mut self, interval: &Interval) {
+        // With a tracker alone all of it is zero: such a vehicle does not pay for the products.
         if self.is_none() {
             return;
         }

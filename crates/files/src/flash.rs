@@ -54,6 +54,7 @@ impl Flash {
     /// If it cannot be written, is in use, or has another size.
     pub fn open(path: &Path) -> io::Result<Self> {
         if !path.exists() {
+            // Whole at once: a program that is killed here leaves no store of another size, which would be refused.
             place(path, |out| out.write_all(&[0xFF; SECTORS * SECTOR]))?;
         }
         Flash::known(path)

@@ -114,6 +114,7 @@ impl Folder {
         let mut files = self.files()?;
         for name in names.iter().map(N::as_ref) {
             let path = self.path.join(name);
+            // Of the link itself: one that leads nowhere is somebody's, too.
             if files.insert(name.into()) && !self.force && fs::symlink_metadata(&path).is_ok() {
                 return Err(Error::Foreign {
                     path,
@@ -130,6 +131,7 @@ impl Folder {
         let before = self.files()?;
         self.add(names)?;
         let now: BTreeSet<String> = names.iter().map(|name| name.as_ref().into()).collect();
+        // Meanwhile the marker names old and new files: what a killed program leaves is still the command's own.
         for stale in before.difference(&now) {
             match fs::remove_file(self.path.join(stale)) {
                 Err(source) if source.kind() != io::ErrorKind::NotFound => return Err(self.error(stale, source)),

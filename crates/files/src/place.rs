@@ -16,6 +16,7 @@ pub fn place(path: &Path, fill: impl FnOnce(&mut (dyn Write + Send)) -> io::Resu
     let written = File::create_new(&temporary).and_then(|file| {
         let mut out = BufWriter::new(Disk { file, failure: None });
         let filled = fill(&mut out).and_then(|()| out.flush());
+        // Taken apart, since a buffer that is dropped after a failure would be written once more.
         let (disk, _) = out.into_parts();
         filled.map_err(|error| disk.cause(error))?;
         disk.file.sync_all()

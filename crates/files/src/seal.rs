@@ -48,6 +48,7 @@ impl<W: Write> Sealing<W> {
 impl<W: Write> Write for Sealing<W> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         self.held.extend_from_slice(bytes);
+        // In large pieces, since the end that is kept is moved each time.
         if self.held.len() > 16 * TAIL {
             let rest = self.held.split_off(self.held.len() - TAIL);
             self.hash.write(&self.held);

@@ -65,6 +65,7 @@ impl<M: Default> Armed<M> {
             applied: Inputs::default(),
             open_loop: None,
             turning: RateMemory::default(),
+            // As after a rest: the law is told that it begins on the ground.
             idle_on_ground: true,
             guide: Guide::default(),
             landing: LandDetector::new(state, weight_n),
@@ -107,8 +108,10 @@ impl<M> Armed<M> {
 impl Guide {
     /// Returns state and setpoint of a vehicle that does not know where it is, since `last`: downwards.
     pub(crate) fn down(&mut self, state: &State, last: Option<&State>, dt_s: f32) -> (State, &Setpoint) {
+        // Both are made of positions: if one comes back, it is held, or descended from, where the vehicle is then.
         (self.hold, self.descent) = (None, None);
         let (drift, descent) = self.position_lost.get_or_insert_with(|| {
+            // The horizontal position of `state` itself means nothing any more.
             let mut drift = Drift::new(last.unwrap_or(state).position_m.xy(), state);
             let begin = drift.advance(state, 0.0);
             (drift, Descent::new(&begin))
@@ -133,6 +136,7 @@ impl Guide {
         }
         match setpoint {
             Some(setpoint) => {
+                // The next gap is held where the vehicle is then.
                 self.hold = None;
                 setpoint
             }

@@ -100,6 +100,7 @@ impl SourceClock {
             known.arrived_us = arrived_us;
             return Some(arrived_us);
         }
+        // No underflow: older stamps and an equal one have returned above.
         known.tick_us = known.tick_us.min(sent_us - known.sent_us);
         let at_us = known.stamp(sent_us, arrived_us);
         if !goes_on_back {
@@ -111,6 +112,7 @@ impl SourceClock {
 
 /// Returns arrival minus stamp \[us\], for any two times.
 fn offset_us(sent_us: u64, arrived_us: u64) -> i128 {
+    // A sender may stamp anything: the difference of two u64 does not fit i64.
     i128::from(arrived_us) - i128::from(sent_us)
 }
 
@@ -150,7 +152,9 @@ impl Known {
         } else {
             self.least_us = [offset_us.min(present_us), before_us];
         }
+        // Never negative, since this offset is in the window by now; one that does not fit is as late as can be.
         let late_us = u64::try_from(offset_us - self.fastest_us()).unwrap_or(u64::MAX);
+        // A coarse stamp is up to a step of its clock too early, which is no delay.
         let doubt_us = if arrived_us < self.coarse_until_us { self.tick_us } else { 0 };
         arrived_us.saturating_sub(late_us.saturating_sub(doubt_us))
     }
@@ -161,8 +165,11 @@ impl Known {
         let goes_on = |step: &Step| step.ahead && sent_us >= step.sent_us;
         let new = Step { ahead: true, count: 0, since_us: arrived_us, sent_us, offset_us };
         let step = self.step.filter(goes_on).unwrap_or(new);
+        // The slowest: by the fastest, one outlier among them would make all that follow look late.
         let slowest_us = step.offset_us.max(offset_us);
+        // No overflow: at the fifth a step is over.
         let (count, needed) = (step.count + 1, if self.heard < NEW_COUNT { AHEAD_COUNT_NEW } else { AHEAD_COUNT });
+        // The stamp of an outlier is not kept: the next right one would count as out of order.
         self.arrived_us = arrived_us;
         self.step = Some(Step { count, sent_us, offset_us: slowest_us, ..step });
         if count >= needed {
@@ -174,6 +181,7 @@ impl Known {
     /// True if a message continues the messages of a clock that was set back.
     fn goes_on_back(&self, sent_us: u64, arrived_us: u64) -> bool {
         self.step.is_some_and(|step| {
+            // Messages that were held up arrive together, and their offsets differ by the times between their stamps.
             let spread_us = (offset_us(sent_us, arrived_us) - step.offset_us).unsigned_abs();
             !step.ahead && sent_us > step.sent_us && spread_us <= BACK_SPREAD_US.into()
         })

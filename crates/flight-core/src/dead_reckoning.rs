@@ -120,6 +120,7 @@ impl DeadReckoning {
         let rate_rad_s = state.rates_rad_s.xy();
         let innovation =
             (rate_rad_s - reckoning.rate_rad_s).map(|rate| min(max(rate, -INNOVATION_MAX_RAD_S), INNOVATION_MAX_RAD_S));
+        // A wrong trim shows in proportion to the time since the last measurement, so that TRIM_S holds at any rate.
         let learnt = self.inverse_authority.component_mul(&innovation) / TRIM_S;
         reckoning.trim.roll_n -= learnt.x;
         reckoning.trim.pitch_n -= learnt.y;

@@ -99,6 +99,7 @@ impl DshotReply {
         let (mut code, mut at) = (0_u32, 0_u32);
         for time in times {
             let counts = u32::from(time.wrapping_sub(*last));
+            // Not divided by zero: a length of 0 has been refused above.
             let bits = (counts + u32::from(bit_counts) / 2) / u32::from(bit_counts);
             if bits == 0 {
                 return Err(ReplyError::Timing);
@@ -107,6 +108,7 @@ impl DshotReply {
             if at >= REPLY_BITS {
                 break;
             }
+            // A shift by 0 to 19: the start bit, at 0, is no part of the code.
             code |= 1 << (REPLY_BITS - 1 - at);
             last = time;
         }

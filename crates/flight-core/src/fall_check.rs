@@ -33,6 +33,7 @@ impl FallCheck {
             *self = FallCheck { carried_m_s: velocity_m_s.z, fall_m_s: 0.0 };
             return false;
         }
+        // The usual thrust carries the weight: as much of it as is missing lets the vehicle fall.
         self.fall_m_s += dt_s * GRAVITY_M_S2 * (1.0 - thrust_share);
         let falls_m_s = self.carried_m_s - velocity_m_s.z;
         self.fall_m_s > FALL_M_S && falls_m_s < FALL_SHARE * self.fall_m_s && abs_max(velocity_m_s) <= FALL_MAX_M_S

@@ -50,6 +50,7 @@ impl FrozenTrackerCheck {
     #[inline]
     pub fn contradicts(&mut self, state: &State, at_us: u64) -> bool {
         // After a longer gap the motion in between is unknown.
+        // The difference of a state older than the last one wraps to such a gap.
         let elapsed_us = u32::try_from(at_us.wrapping_sub(self.last_us)).unwrap_or(u32::MAX);
         if elapsed_us > WINDOW_US {
             *self = FrozenTrackerCheck::new(state, at_us);

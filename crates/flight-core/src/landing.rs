@@ -88,8 +88,10 @@ impl LandDetector {
         if self.still_us >= HOVER_US && self.uncarried_us == 0 {
             self.sank = false;
         }
+        // One that never left where it stood need not have sunk in order to stand there.
         if self.stands_for_us() > STILL_US && (self.sank || !self.left) {
             let usual_n = self.usual_n;
+            // What it needs with its load and battery is known by now, and stays.
             *self = LandDetector { usual_n, ..LandDetector::new(state, usual_n) };
         }
     }

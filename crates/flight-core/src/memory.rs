@@ -144,7 +144,9 @@ impl<M> FlightCoreMemory<M> {
         let armed = self.mode.armed();
         let (Some(flight), Some(held)) = (self.flight.as_mut().filter(|_| armed), self.state) else { return false };
         let age_us = held.age_us(now_us);
+        // Whole states over the link are flown on as they are, also between two of them.
         let is_linked = is_new || flight.observer.is_none() && !inbox.is_own() && age_us <= COAST_US;
+        // A tracker whose states contradict the vehicle has no better poses.
         if is_linked || flight.distrusts {
             flight.observer = None;
             return false;
@@ -180,6 +182,7 @@ impl<M> FlightCoreMemory<M> {
     /// Notes the time of the newest attitude.
     pub(crate) fn orient(&mut self, inbox: &Inbox) {
         let newest = inbox.position_lost().map(|state| state.at_us).max(self.state.map(|state| state.at_us));
+        // `None` is less than any time.
         self.oriented_us = self.oriented_us.max(newest);
     }
 

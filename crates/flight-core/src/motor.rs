@@ -104,6 +104,7 @@ impl Motor {
         let k = self.curve.linearity;
         let linear = 1.0 - k;
         let denominator = linear + sqrt(linear * linear + 4.0 * k * share);
+        // Zero for a rotor at rest with k = 1.
         if denominator > 0.0 { 2.0 * share / denominator } else { 0.0 }
     }
 }

@@ -34,6 +34,7 @@ pub fn rotors_of_outputs<const N: usize, const OUTPUTS: usize>(
     let rotor_in = |corner| rotors.iter().position(|rotor| self::corner(rotor) == Some(corner));
     let is_x = N == numbering.len() && numbering.iter().all(|corner| rotor_in(*corner).is_some());
     array::from_fn(|output| match numbering.get(output) {
+        // There is one: every corner of an X has been looked for.
         Some(corner) if is_x => rotor_in(*corner).unwrap_or(output),
         _ => output,
     })

@@ -116,10 +116,12 @@ impl PoseObserver {
     pub fn advance(&mut self, dead_reckoning: &DeadReckoning, reckoning: &Reckoning, applied: &Inputs) {
         let DeadReckoning { dt_s, rotor_share, .. } = *dead_reckoning;
         let (least, most) = (TRIM_SHARE.0 * dead_reckoning.weight_n, TRIM_SHARE.1 * dead_reckoning.weight_n);
+        // Not zero, by which it is divided below: a trim may fall to nothing.
         let trim_n = min(max(reckoning.trim.thrust_n, least), most);
         self.thrust_n = settled(self.thrust_n + (applied.thrust_n - self.thrust_n) * rotor_share);
         self.yaw_n = settled(self.yaw_n + (applied.yaw_n - self.yaw_n) * rotor_share);
 
+        // A copy: the tick itself advances the reckoning, later.
         let mut ahead = *reckoning;
         dead_reckoning.advance(&mut ahead, applied);
         let tipping = (ahead.rate_rad_s - reckoning.rate_rad_s) / dt_s;
@@ -142,6 +144,7 @@ impl PoseObserver {
         let since_us = pose.at_us.saturating_sub(self.pose.at_us);
         self.pose = *pose;
         let [w, x, y, z] = pose.value.attitude;
+        // Not zero, by which it is divided: the first pose may be older than the state from which the observer began.
         let since_s = since_us.max(1_000) as f32 * 1e-6;
         // Back to the time of the pose.
         let late_s = pose.age_us(now_us).min(LATE_US) as f32 * 1e-6;
@@ -150,12 +153,14 @@ impl PoseObserver {
         let attitude = turned(&self.attitude, &back(&self.rates_rad_s, &self.angular_rad_s2));
 
         let turn = attitude.conjugate() * Quaternion::new(w, x, y, z);
+        // q and -q are one attitude: of the two turns the shorter one counts.
         let turn_rad = turn.imag() * if turn.w < 0.0 { -2.0 } else { 2.0 };
         let off_m = pose.value.position_m - position_m;
         let most = OUTLIER.0 + OUTLIER.1 * since_s;
         let is_outlier = abs_max(&turn_rad) > most || abs_max(&off_m) > most;
         self.outliers = if is_outlier { self.outliers + 1 } else { 0 };
         if self.outliers >= OUTLIERS_MAX {
+            // Velocity and rates stay: the tracker's frame has jumped, and not the vehicle.
             self.outliers = 0;
             self.position_m += off_m;
             self.attitude = turned(&self.attitude, &turn_rad);

@@ -49,6 +49,7 @@ impl PulseTiming {
         let counts = |us: u16| ((clocks(us) + divider * 500_000) / (divider * 1_000_000)) as u16;
         let shortest = counts(format.shortest_us);
         let span = counts(format.longest_us).saturating_sub(shortest);
+        // At most 20: 1.25 million clocks in a period of up to 65,535 counts.
         PulseTiming { divider: divider as u16, period: counts(format.period_us), shortest, span }
     }
 

@@ -96,6 +96,7 @@ impl Counter {
         }
         report.steady = self.right_us >= WINDOW_US;
         if self.window_us >= WINDOW_US {
+            // Without this tick, which is the first of the next window: 1000 Hz count as 1000, not as 1001.
             report.rate_hz = Some(self.ticks);
             (self.window_us, self.ticks) = (0, 0);
         }

@@ -76,6 +76,7 @@ impl RateControl {
         RateControl {
             inertia_kg_m2: parameters.inertia_kg_m2,
             inputs_per: parameters.effectiveness().map(|effectiveness| 1.0 / effectiveness),
+            // k_2 is negative for rotors faster than the poles ask; the loop's own damping, (1 + k_2)/tau, is not.
             gains: [squared * lag_s, 2.0 * DAMPING * bandwidth * lag_s - 1.0, LEARNS * squared],
             follows: rotors.share(dt_s),
             dt_s,
@@ -98,12 +99,14 @@ impl RateControl {
         let [roll_n, pitch_n, yaw_n] = wanted_rad_s2.component_mul(&self.inputs_per).into();
         let thrust_n = target.thrust * mixer.thrust_max_n();
         let action = mixer.action(&Inputs { roll_n, pitch_n, yaw_n, thrust_n });
+        // What saturated rotors do not give is no moment that the model does not know: z would wind up.
         if !action.health.saturated {
             let size = error.norm_squared() / (LEARNS_RAD_S * LEARNS_RAD_S);
             let more = error * (k_i * self.dt_s * math::max(1.0 - size, 0.0));
             *learnt = (*learnt + more).map(|learnt| math::max(math::min(learnt, LEARNT_MAX), -LEARNT_MAX));
         }
         let Inputs { roll_n, pitch_n, yaw_n, .. } = action.given;
+        // What makes up for z and for the gyroscopic moment turns nothing, and is no part of a.
         let reached = Vector3::new(roll_n, pitch_n, yaw_n).component_div(&self.inputs_per) - *learnt - gyroscopic;
         *given += (reached - *given) * self.follows;
         action

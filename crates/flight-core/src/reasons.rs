@@ -14,6 +14,7 @@ impl Reasons {
     /// Adds a reason, if it applies.
     pub const fn note(&mut self, applies: bool, reason: Refusal) {
         if applies {
+            // Below 32: the link's numbers from there on are refusals of the guidance.
             self.0 |= 1 << reason as u32;
         }
     }
@@ -49,6 +50,7 @@ impl Reasons {
         }
         // What is not in the order is a reason all the same.
         let any = || Refusal::ALL.into_iter().find(|reason| self.contains(*reason));
+        // A bit of no refusal can only have been read from a log.
         Err(self.iter().next().or_else(any).unwrap_or(Refusal::Unhealthy))
     }
 }

@@ -140,6 +140,7 @@ impl ArmingLimits {
                 });
                 reasons.note(far, Refusal::SetpointTooFar);
             }
+            // What the estimate misses is why there is no state, and says more than that there is none.
             None => reasons.note(true, vehicle.missing.unwrap_or(Refusal::StateStale)),
         }
         reasons.note(vehicle.setpoint.is_none(), Refusal::SetpointMissing);
@@ -240,6 +241,7 @@ impl Mode {
             Request::Arm if self.armed() => Err(Refusal::AlreadyArmed),
             Request::Arm => observed.ready,
             Request::Disarm if self.armed() && observed.airborne => Err(Refusal::InFlight),
+            // Also of a disarmed vehicle: a station repeats a command whose answer was lost.
             Request::Disarm => Ok(()),
             Request::Engage if !self.armed() => Err(Refusal::NotArmed),
             Request::Engage => Ok(()),

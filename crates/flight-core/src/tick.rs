@@ -139,14 +139,17 @@ impl<C: FlightController<N>, const N: usize> FlightCore<C, N> {
     pub fn tick(&self, memory: &mut FlightCoreMemory<C::Memory>, now_us: u64, inbox: &Inbox) -> TickOutcome<N> {
         let dt_s = self.controller.dt_s();
         // Takes the newest inputs.
+        // First: the detectors below count with the time since the last tick.
         memory.rate.tick(now_us);
         let is_new = memory.take_state(inbox, now_us);
         let observing = memory.observe(&self.dead_reckoning, inbox, now_us, is_new);
         let measured = is_new || observing;
         let state_age_us = memory.state.map_or(u32::MAX, |state| state.age_us(now_us));
+        // A state may be 20 ms old: the law is to act on where the vehicle is, not on where it was.
         let fresh =
             memory.state.filter(|_| state_age_us <= COAST_US).map(|state| extrapolated(&state.value, state_age_us));
         let fresh = fresh.as_ref();
+        // For its 20 ms the last state with a position still counts.
         let position_lost = inbox.position_lost().filter(|_| fresh.is_none()).and_then(|state| upright(state, now_us));
         memory.orient(inbox);
         memory.watch(fresh, position_lost.as_ref(), inbox, &self.limits, dt_s);
@@ -167,6 +170,7 @@ impl<C: FlightController<N>, const N: usize> FlightCore<C, N> {
         let asked = inbox.asked();
         let observed = SupervisorInputs {
             request: asked.map(|asked| asked.value),
+            // An empty queue, which is the rule, is not searched.
             kill: asked.is_some() && inbox.kills(),
             ready: against.verdict(),
             state_age_us,
@@ -175,19 +179,24 @@ impl<C: FlightController<N>, const N: usize> FlightCore<C, N> {
             airborne: flight.as_ref().is_some_and(|flight| flight.landing.airborne()),
             tumbled: flight.as_ref().is_some_and(|flight| flight.tumble.is_lost()),
         };
+        // By the mode before the transition: an armed vehicle would refuse the very request that has armed it.
         let answer = asked.map(|asked| {
             let result = mode.answer(asked.value, &observed);
             RequestAnswer { ticket: asked.ticket, request: asked.value, result }
         });
         let done = |request| answer.is_some_and(|answer| answer.request == request && answer.result.is_ok());
         let ended = mode.end(&observed);
+        // A vehicle that hovered counts as at rest: once its motors have stopped in the air, a delayed request to arm
+        // must not start them again.
         if ended.is_some() && observed.airborne {
             *rest_us = 0;
         }
+        // Not `next`, which would look a second time for the end of the flight.
         *mode = if ended.is_some() { Mode::Disarmed } else { mode.onward(&observed) };
         let mode = *mode;
         // The tick of arming only sets up the flight, and the motors idle: a step would take too long.
         let arms = done(Request::Arm);
+        // There is a state: without one, `against` refuses to arm.
         if let (true, Some(state)) = (arms, fresh) {
             Armed::begin(flight, &self.dead_reckoning, self.weight_n, state, now_us);
         }
@@ -241,9 +250,11 @@ impl<C: FlightController<N>, const N: usize> FlightCore<C, N> {
             }
             return self.open_loop(flight, Inputs::default());
         }
+        // Untold, a law that observes moments makes up for what the feet hold, and tips over when they let go.
         if mem::take(&mut flight.idle_on_ground) && !airborne {
             self.controller.on_ground(&mut flight.control);
         }
+        // An extrapolated state has the rates of the last measurement, to which the reckoning must not be set back.
         flight.reckon(&self.dead_reckoning, fresh.filter(|_| measured).or(position_lost));
         if engages && self.controller.engage(&mut flight.control) {
             // The tick of engaging has no step: the rotors keep their inputs.
@@ -261,12 +272,14 @@ impl<C: FlightController<N>, const N: usize> FlightCore<C, N> {
                 self.controller.decide(&mut flight.control, state, target, true)
             }
             (None, Some(state)) => {
+                // With its horizontal velocity, which `upright` leaves out: the drift begins with it.
                 let state = inbox.position_lost().map_or(state, |position_lost| &position_lost.value);
                 let (state, target) = flight.guide.down(state, last.map(|last| &last.value), dt_s);
                 self.controller.position_lost(&mut flight.control);
                 self.controller.decide(&mut flight.control, &state, target, true)
             }
             (None, None) => {
+                // Not taken into the trim, of which these inputs are made: a blind descent would lower it ever further.
                 let action = self.blind_action(flight, mode);
                 flight.applied = action.given;
                 return action;
@@ -283,6 +296,7 @@ impl<C: FlightController<N>, const N: usize> FlightCore<C, N> {
     #[cold]
     #[inline(never)]
     fn turn(&self, flight: &mut Armed<C::Memory>, state: &State, target: &RateTarget) -> Action<N> {
+        // Only a step of the law leaves no such inputs: this is the first tick of turning.
         if flight.open_loop.is_none() {
             flight.forget();
             flight.turning = RateMemory::default();
@@ -295,6 +309,7 @@ impl<C: FlightController<N>, const N: usize> FlightCore<C, N> {
     /// Returns the action without a state.
     #[inline(always)]
     fn blind_action<M>(&self, flight: &mut Armed<M>, mode: Mode) -> Action<N> {
+        // When states come back, it descends from where it is then, not from where it was seen last.
         (flight.guide.descent, flight.guide.position_lost) = (None, None);
         let inputs = match mode {
             Mode::Descending => self.dead_reckoning.descend(&flight.reckoning),

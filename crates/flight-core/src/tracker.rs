@@ -80,9 +80,11 @@ impl Tracker {
         let Refused { overtaken, late, elsewhere } = &mut self.refused;
         let refused = match (at_us, self.in_use) {
             (None, _) => overtaken,
+            // No underflow: a clock stamps nothing later than its arrival.
             (Some(at_us), _) if arrived_us - at_us > age_max_us => late,
             (_, Some((id, news_us))) if id != sender && arrived_us.saturating_sub(news_us) <= silent_us => elsewhere,
             (Some(at_us), in_use) => {
+                // A sender that only repeats itself is frozen, and after a while gives way to another.
                 if differs || in_use.is_none_or(|(id, _)| id != sender) {
                     self.in_use = Some((sender, arrived_us));
                 }

@@ -7,6 +7,7 @@ use afbc_types::State;
 /// Cosine of the tilt below which a vehicle is on its side or back: 80 degrees.
 pub const TILT_COSINE_MIN: f32 = 0.17;
 /// Roll and pitch up to which the cosine of the tilt is larger than that for sure \[rad\].
+// The cosine of the tilt is that of roll times that of pitch: at least cos(1.1)^2 = 0.206.
 const UPRIGHT_RAD: f32 = 1.1;
 /// Combined rate about body x and y above which a vehicle is spinning \[rad/s\].
 pub const SPIN_RAD_S: f32 = 10.0;
@@ -66,8 +67,10 @@ impl Tumble {
             }
             return;
         }
+        // One that rolls on and on passes upright in each turn, which must not count as recovering.
         over.again |= over.upright_us.take().is_some();
         if cosine > over.lowest + RIGHTING && !spins && !over.again {
+            // A vehicle that rights itself slowly has another second for each such step, one that stays down has not.
             *over = new;
         }
         over.lowest = math::min(over.lowest, cosine);

@@ -8,6 +8,7 @@
 #[inline]
 #[cfg_attr(target_arch = "arm", expect(unsafe_code, reason = "VSQRT is only available as inline assembly"))]
 pub fn sqrt(x: f32) -> f32 {
+    // By the hard-float ABI the processor has the instruction; other Arm targets may lack it.
     #[cfg(all(target_arch = "arm", target_abi = "eabihf"))]
     {
         let root: u32;

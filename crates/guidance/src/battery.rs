@@ -30,6 +30,7 @@ impl Cells {
     fn charge(&self, reading: &BatteryReading) -> Option<f32> {
         let BatteryReading { voltage_v, current_a } = *reading;
         let plausible = voltage_v > 0.0 && voltage_v < 1e3 && current_a.abs() < 1e4;
+        // There are cells: `update` asks for no charge without a number of them.
         let cell_v = voltage_v / self.number as f32 + current_a * self.resistance_ohm;
         plausible.then(|| max(min((cell_v - self.empty_v) / (self.full_v - self.empty_v), 1.0), 0.0))
     }

@@ -100,6 +100,7 @@ impl Return {
         let off_m = to_m - position_m.xy();
         let near = off_m.norm_squared() <= inputs.flying.near_home_m * inputs.flying.near_home_m;
         let safe_m = inputs.home_m.z + inputs.flying.return_height_m;
+        // A return must not itself leave the geofence.
         let height_m = if near { position_m.z } else { min(max(position_m.z, safe_m), inputs.ceiling_m) };
         Return { height_m, to_m, hold: Hold::default(), stage: Stage::Climbs }
     }
@@ -115,6 +116,7 @@ impl Return {
             Stage::Climbs => {
                 let mut aim = self.hold.fly(inputs);
                 let short_m = |z: f32| self.height_m - z;
+                // The vehicle, too: one that cannot climb must not fly home at the height it has.
                 if short_m(inputs.present.position_m.z) < CLIMBED_M && short_m(inputs.state.position_m.z) < 1.0 {
                     self.stage = Stage::Flies(inputs.towards(&home_m));
                 }

@@ -14,6 +14,7 @@ pub const MARGIN_M: f32 = 1.0;
 const EDGE_MIN_M: f32 = 0.1;
 /// Time after which the setpoint begins to brake: until every boundary has been looked at, and the guidance knows
 /// \[s\].
+// 64 boundaries, two after each tick, take 32 ms.
 const REACTION_S: f32 = 0.06;
 /// Time by which the vehicle follows its setpoint later: it has to tilt \[s\].
 const LAG_S: f32 = 0.25;
@@ -95,9 +96,11 @@ impl StopPath {
             (turns_s, velocity_m_s + (acceleration_m_s2 + wanted_m_s2) * (0.5 * turns_s))
         };
         let (_, roughly_m_s) = turns(direction(velocity_m_s) * -brakes_m_s2);
+        // The velocity turns while the acceleration does: it brakes against the mean of both directions.
         let between = direction(direction(velocity_m_s) + direction(roughly_m_s));
         let wanted_m_s2 = between * -brakes_m_s2;
         let (turns_s, turned_m_s) = turns(wanted_m_s2);
+        // The double integral of an acceleration that goes evenly from one to the other.
         let turning_m = (acceleration_m_s2 * 2.0 + wanted_m_s2) * (turns_s * turns_s / 6.0);
         let via_m = from_m + velocity_m_s * (turns_s + reaction_s) + turning_m;
         let stop_m = shape.stop(length(turned_m_s), brakes_m_s2);
@@ -147,6 +150,7 @@ fn direction(vector: Vector2<f32>) -> Vector2<f32> {
 /// Returns the distance of a place from a straight line between two others \[m\].
 pub fn distance(place_m: Vector2<f32>, a_m: Vector2<f32>, b_m: Vector2<f32>) -> f32 {
     let (line, off) = (b_m - a_m, place_m - a_m);
+    // A line without length is a point, whatever the share.
     let share = off.dot(&line) / max(line.norm_squared(), 1e-12);
     length(off - line * min(max(share, 0.0), 1.0))
 }

@@ -224,6 +224,7 @@ impl Memory {
         let airborne = armed && given.airborne;
         let mut notices = Notices::default();
         self.time(airborne, dt_s);
+        // Before `decide`, which forgets that the vehicle was still disarmed in the last tick.
         self.find_home(state, given.rested, armed);
 
         // Watches.
@@ -237,6 +238,7 @@ impl Memory {
             home_m: self.home_m,
             battery: given.battery.as_ref(),
             sensors: given.sensors,
+            // What does not fit 32 bits, 71 minutes, is beyond any COM_DL_LOSS_T.
             silent_us: orders
                 .heard_us
                 .map(|heard_us| u32::try_from(given.now_us.saturating_sub(heard_us)).unwrap_or(u32::MAX)),
@@ -258,6 +260,7 @@ impl Memory {
         };
 
         // Decides the mode.
+        // Once per approach: otherwise each tick until it stands would begin the mode anew.
         let leaves = findings.fence.leaves && net::is_new(new, Cause::Fence);
         self.decide(settings, &seen, cause, new, leaves, &mut notices);
         let first = orders.given.front();
@@ -277,6 +280,7 @@ impl Memory {
                 None
             }
         };
+        // Without a state the flight core decides alone in the air, and on the ground the motors idle.
         let (setpoint, idle_on_ground) = flight.unwrap_or((None, armed && !airborne));
         if !armed {
             self.against = self.against(settings, given, state, findings.fence.outside);
@@ -348,6 +352,7 @@ impl Memory {
         (self.flown, self.failsafe, self.speed_m_s) = (false, None, f32::INFINITY);
         (self.ground_s, self.lift_s) = (0.0, 0.0);
         self.mission.resume(0);
+        // Nothing is armed in mode land or return. A mode that sticks fly stays as it was selected.
         if !self.mode.is_manual() && self.mode != FlightMode::Hold {
             self.change(FlightMode::Hold, ModeReason::Disarmed, notices);
         }

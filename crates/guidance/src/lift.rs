@@ -46,6 +46,7 @@ impl Lift {
     /// Returns the setpoint of a vehicle in `state` whose thrust along the unit vector `up` accelerates it by
     /// `thrust_m_s2`.
     pub(crate) fn setpoint(&self, state: &State, up: Vector3<f32>, thrust_m_s2: f32) -> Setpoint {
+        // `clamp` panics if its ends are the wrong way round.
         let thrust_m_s2 = thrust_m_s2.clamp(0.0, self.most_m_s2.max(0.0));
         let acceleration_m_s2 = up * thrust_m_s2 - Vector3::new(0.0, 0.0, self.gravity_m_s2);
         Setpoint {
@@ -67,6 +68,7 @@ impl Lift {
         }
         let (was_m_s2, is_m_s2) = (z + self.gravity_m_s2, max(within_m_s2 + self.gravity_m_s2, 0.0));
         let share = is_m_s2 / max(was_m_s2, VERTICAL_MIN * self.gravity_m_s2);
+        // Less thrust keeps the tilt; more must not push the vehicle sideways by more than was asked for.
         let lean_m_s2 = Vector2::new(x, y) * min(share, 1.0);
         let acceleration_m_s2 = Vector3::new(lean_m_s2.x, lean_m_s2.y, is_m_s2 - self.gravity_m_s2);
         Setpoint { acceleration_m_s2, ..*setpoint }

@@ -227,6 +227,7 @@ impl Limiter {
         };
         let Limits { yaw_rate_rad_s, yaw_acceleration_rad_s2, .. } = *limits;
         let turning = Turning { rate_rad_s: yaw_rate_rad_s, acceleration_rad_s2: yaw_acceleration_rad_s2 };
+        // Before a stream may pass: the heading keeps to its own limits then, too.
         now.heading.advance(&turn, &turning, dt_s);
         if let Some(target) = &target
             && now.pass(target, jerk_m_s3, limits, interval_s, dt_s)
@@ -318,6 +319,7 @@ impl Stream {
 
     /// Advances the stream by one step, with a message if `sent_us` is news.
     fn advance(&mut self, target: &Complete, sent_us: u64, dt_s: f32, jerk_max_m_s3: f32) {
+        // Counted in ticks: `sent_us` only tells messages apart, and is no time where a circle numbers its aims.
         self.since_s += dt_s;
         if self.sent_us == sent_us {
             if self.fits {
@@ -325,6 +327,7 @@ impl Stream {
             }
             return;
         }
+        // Above zero, by which a change of the acceleration is divided: this tick at least has passed.
         let interval_s = self.since_s;
         if interval_s > INTERVAL_MAX_S {
             *self = Stream::new(target, sent_us);
@@ -367,6 +370,7 @@ impl Now {
         let off_m_s = target.velocity_m_s - velocity_m_s - acceleration_m_s2 * dt_s;
         let off_m_s2 = target.acceleration_m_s2 - acceleration_m_s2;
         let within = |vector: &Vector3<f32>, most: f32| vector.norm_squared() <= most * most;
+        // What the largest jerk makes of the acceleration from one message to the next, and some room, is no misfit.
         let jerk_m_s2 = 1.25 * limits.jerk_max_m_s3 * max(interval_s, dt_s);
         let stands = target.velocity_m_s == Vector3::zeros() && target.acceleration_m_s2 == Vector3::zeros();
         let misfit = match self.misfit {

@@ -16,6 +16,7 @@ const STOPPED_M_S: f32 = 0.3;
 const TURNED_RAD: f32 = 0.03;
 const TURNED_RAD_S: f32 = 0.05;
 /// Angle by which the heading is led on \[rad\].
+// Below half a turn, since the heading always takes the shorter way.
 const LED_RAD: f32 = 2.0;
 
 /// A mission in progress.
@@ -129,6 +130,7 @@ impl Mission {
                 let yaw_rad = if yaw_rad.is_nan() { begun.yaw_rad } else { yaw_rad };
                 let aim = LimiterTarget { yaw_rad, ..inputs.to(position_m) };
                 let within_m = if within_m > 0.0 { within_m } else { inputs.flying.within_m };
+                // Once reached, it stays reached: wind that pushes the vehicle away does not begin the time anew.
                 if begun.stayed_s > 0.0 || inputs.is_at(&position_m, within_m) && (fly_through || is_slow(inputs)) {
                     begun.stayed_s += inputs.dt_s;
                 }
@@ -184,6 +186,7 @@ impl Mission {
             return Progress { then: lands, ..none };
         }
         let height_m = inputs.present.position_m.z;
+        // A climb by nothing keeps the height at which the item began.
         let begun = self.begin(leg, inputs, |inputs| Course::Takeoff(Takeoff::new(inputs, 0.0)));
         let height_m = begun.course.takeoff().map_or(height_m, |start| start.to_m.z);
         let over_m = Vector3::new(position_m.x, position_m.y, height_m);
@@ -225,9 +228,11 @@ impl Mission {
         let first = self.begun.is_none_or(|begun| begun.number != leg.number);
         let present = inputs.present;
         let begun = self.begin(leg, inputs, |_| Course::Straight);
+        // By the rate of the setpoint: a difference of headings does not show more than half a turn.
         begun.yaw_rad = if first { to_turn_rad } else { begun.yaw_rad - present.yaw_rate_rad_s * inputs.dt_s };
         let left_rad = begun.yaw_rad;
         let turned = left_rad.abs() < TURNED_RAD && present.yaw_rate_rad_s.abs() < TURNED_RAD_S;
+        // On the ground nothing turns, and the item would never be done.
         let mut progress = self.stay(leg, inputs, turned || !inputs.airborne, none);
         if let Shaping::Limited(aim) = &mut progress.output.shaping {
             aim.yaw_rad = wrap_angle(present.yaw_rad + min(max(left_rad, -LED_RAD), LED_RAD));
@@ -289,6 +294,7 @@ fn from_ground(inputs: &ModeInputs<'_>) -> Course {
     if inputs.airborne {
         return Course::Straight;
     }
+    // A take-off that no item asks for must not lead out of the geofence.
     let room_m = max(inputs.ceiling_m - inputs.present.position_m.z, 0.0);
     Course::Takeoff(Takeoff::new(inputs, min(inputs.flying.takeoff_height_m, room_m)))
 }

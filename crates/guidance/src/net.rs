@@ -77,6 +77,7 @@ parameters! {
     }
     together(net) {
         let most = |range: Range, most: f32| Range { max: most.into(), ..range };
+        // The charge is a share of the difference of both, which must not be zero.
         most(Net::BAT1_V_EMPTY.range, net.full_v - 0.05).check(net.empty_v)?;
         most(Net::BAT_CRIT_THR.range, net.low).check(net.critical)?;
         most(Net::BAT_EMERGEN_THR.range, net.critical).check(net.emergency)
@@ -177,6 +178,8 @@ impl Watch {
         let new = self.holds & !before;
         let over = before & !self.holds;
         if over != 0 && seen.armed {
+            // Batteries and the flight core's descent do not recover, and targets and sticks are not looked at any more
+            // once the mode is another.
             for cause in [Cause::Fence, Cause::Sensors, Cause::Station] {
                 if over & bit(cause) != 0 {
                     notices.push(Notice::Over(cause));
@@ -231,6 +234,7 @@ impl Net {
 
     /// True if the vehicle is outside the geofence, or was and is hardly inside.
     fn is_outside(&self, seen: &Findings<'_>, was: bool) -> bool {
+        // What cannot be seen is taken for unchanged.
         let (Some(position_m), Some(home_m)) = (seen.position_m, seen.home_m) else { return was };
         let margin = if was { FENCE_MARGIN_M } else { 0.0 };
         !self.encloses(&home_m, &position_m, margin)

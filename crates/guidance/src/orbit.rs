@@ -47,6 +47,7 @@ pub(crate) struct Round {
 
 /// Returns the largest speed on a circle \[m/s\].
 pub(crate) fn speed_max_m_s(limits: &Limits, radius_m: f32) -> f32 {
+    // A circle takes the acceleration v^2/r.
     min(limits.speed_m_s, sqrt(SHARE * limits.acceleration_m_s2 * radius_m))
 }
 
@@ -74,10 +75,12 @@ impl Orbit {
         let side = if speed_m_s < 0.0 { -1.0 } else { 1.0 };
         let (speed_m_s, along_m_s2) = (side * now_m_s, side * (now_m_s - before_m_s) / inputs.dt_s);
         let rate_rad_s = speed_m_s / radius_m;
+        // By the mean speed of the step: otherwise place and velocity would not fit each other.
         let step_rad = 0.5 * (before_m_s + now_m_s) * side / radius_m * inputs.dt_s;
         let at_rad = wrap_angle(before_rad + step_rad);
         self.round.at_rad = Some(at_rad);
         self.round.turned_rad += step_rad.abs();
+        // It may wrap: it only tells an aim from the last one.
         self.round.aims = self.round.aims.wrapping_add(1);
         let (s, c) = (sin(at_rad), cos(at_rad));
         let yaw_rad = self.yaw_rad(at_rad);

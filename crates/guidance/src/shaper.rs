@@ -121,6 +121,7 @@ impl Shape {
             acceleration,
             jerk,
             braking,
+            // 2 B^2/J', unless the jerk would allow more than the largest k1: then it is larger.
             c: braking / k1,
             settling,
             d: settling / k2,
@@ -159,6 +160,7 @@ impl Shape {
         let (own, rise) = if own.norm_squared() <= self.acceleration * self.acceleration {
             (own, (change - (motion.acceleration - given)) * slope)
         } else {
+            // At its limit it does not change.
             (capped(own, self.acceleration), SVector::zeros())
         };
         let wanted = capped(given + own, reach.acceleration);

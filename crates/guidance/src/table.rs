@@ -39,6 +39,7 @@ impl FailsafeAction {
             FlightMode::Hold => FailsafeAction::Hold,
             _ => FailsafeAction::Warn,
         };
+        // By number: the order that is derived is not const.
         does as u8 >= self as u8
     }
 }

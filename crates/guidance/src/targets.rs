@@ -86,6 +86,7 @@ impl Targets {
             acceleration_m_s2,
             yaw_rad: aim_yaw_rad,
             yaw_rate_rad_s,
+            // Places relative to the vehicle of each moment are no trajectory that could pass.
             sent_us: (!motion.body).then_some(at_us),
             ..inputs.stop()
         };

@@ -109,6 +109,7 @@ impl<const N: usize> Core for Aircraft<N> {
         let report = self.flight.tick(now_us, inputs, readings);
         exchange.comms.report(&report, exchange.tick_us, exchange.send);
         let action = exchange.comms.escs(&mut self.escs, exchange.escs, &report);
+        // Between two ticks, as on the board: the next one is the first to fly it.
         action.notch.iter().for_each(|notch| self.flight.move_notch(notch));
         (report.padded(), action)
     }

@@ -220,6 +220,7 @@ impl<A: Autopilot> Line<'_, A> {
     /// True if the vehicle confirms that it has disarmed.
     fn disarm(&mut self, world: &mut World) -> Result<bool, Error> {
         let done = |heard: &ReceivedMessages| heard.answer == Some(Answer::Accepted) && !heard.armed;
+        // By force, since a plain disarm is refused in the air.
         Ok(self.ask(Command::Kill, world, DISARM_WITHIN_MS, done)?.is_some())
     }
 }

@@ -329,6 +329,7 @@ impl Host {
         if let Some(ExactLog { recorder, write, adopted, notch_rad_s }) = &mut self.log {
             let (number, given, battery, clock_failed) = (self.number, Given::of(&report), self.taken.battery, false);
             let (adopted, moved) = (adopted.take(), notch_rad_s.take());
+            // What this tick has moved counts from the next one on.
             *notch_rad_s = action.notch.map(|notch| notch.centre_rad_s());
             let notch_rad_s = moved;
             recorder.tick(
@@ -360,6 +361,7 @@ impl Host {
             self.flight.log(stream, &report, (&readings, taken), self.comms.esc_telemetry(), change);
             stream.sent(time_us, &bytes);
         }
+        // Before what follows is merged, which is of the next tick.
         self.number = self.number.wrapping_add(1);
         if let Some(news) = &action.inputs {
             self.merge(news);

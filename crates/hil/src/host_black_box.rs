@@ -55,6 +55,7 @@ impl HostBlackBox {
         let Self { log, ring, write, decoder, .. } = self;
         decoder.feed_accepted(
             bytes,
+            // Signed ones, too: they are the vehicle's own.
             |_| true,
             |_, message| {
                 if let Downlink::Text { severity, text } = message {
@@ -63,6 +64,7 @@ impl HostBlackBox {
             },
         );
         let Some(write) = write else { return };
+        // In two pieces, where the bytes go round the end of the ring.
         while !ring.is_empty() {
             let front = ring.front();
             write(front);

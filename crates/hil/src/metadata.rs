@@ -79,9 +79,11 @@ fn described(parameter: &Parameter, declaration: &Declaration, words: &[&str]) -
     if !["", "1", "number"].contains(unit) {
         put("units", json!(unit));
     }
+    // The digits of zero cannot be counted: those of the range are.
     if !is_whole {
         put("decimalPlaces", json!(decimals(if default == 0.0 { range.max.min(1.0) } else { default })));
     }
+    // A declaration says so in words alone.
     if meaning.contains("from the next start on") {
         put("rebootRequired", json!(true));
     }

@@ -61,6 +61,7 @@ impl ServedFiles {
 
     /// Returns the log called so.
     fn find_log(&self, name: &str) -> Result<PathBuf, FtpError> {
+        // Among those that are there, so that no name leads out of the folder.
         let named = |path: &PathBuf| path.file_name().is_some_and(|own| own == name);
         self.list_logs().into_iter().find(named).ok_or(FtpError::FILE_NOT_FOUND)
     }
@@ -130,6 +131,7 @@ impl FileStore for ServedFiles {
 
     fn entry(&mut self, directory: &FilePath, place: u32) -> Result<Option<DirectoryEntry>, FtpError> {
         let directory = directory.as_str();
+        // Kept from part to part of a listing: a log that comes or goes meanwhile must not shift the places.
         if place == 0 || self.listed.0 != directory {
             self.listed = (directory.into(), self.entries(directory)?);
         }
@@ -155,6 +157,7 @@ impl FileStore for ServedFiles {
 impl LogStore for ServedFiles {
     fn count_logs(&mut self) -> Poll<u16> {
         self.counted = self.list_logs();
+        // LOG_ENTRY has 16 bits for their number.
         self.counted.truncate(u16::MAX.into());
         self.reading = None;
         Poll::Ready(self.counted.len() as u16)

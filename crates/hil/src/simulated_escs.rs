@@ -43,8 +43,10 @@ impl SimulatedEscs {
         let (current_a, voltage_v) = battery.map_or((0.0, 0.0), |battery| (battery.current_a, battery.voltage_v));
         // Power goes with the cube of the speed.
         let power: f64 = speeds.iter().map(|speed| speed.powi(3)).sum();
+        // At rest the sum is zero: no share then, rather than no number.
         let share = |rotor: usize| speeds.get(rotor).map_or(0.0, |speed| speed.powi(3)) / power.max(1.0);
         for (rotor, drawn_mah) in self.drawn_mah.iter_mut().enumerate() {
+            // An ampere for a millisecond is the 3,600th part of a milliampere hour.
             *drawn_mah += current_a * share(rotor) / 3_600.0;
         }
         if let Some(rotor) = asked {

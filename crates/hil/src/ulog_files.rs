@@ -108,6 +108,7 @@ impl LogPlace {
             LogPlace::File(path) => numbered(path, start),
             LogPlace::Folder(folder) => {
                 let number = |path: &PathBuf| path.file_stem()?.to_str()?.strip_prefix("log")?.parse::<u32>().ok();
+                // By the largest number and not by how many there are: stations may have erased some.
                 let last = logs_in(folder).iter().filter_map(number).max().unwrap_or(0);
                 folder.join(format!("log{:03}.ulg", last.saturating_add(1)))
             }

@@ -255,6 +255,7 @@ impl<M: Message> Decoder<M> {
                 }
                 Front::Intact { skipped, header, message } => {
                     add(&mut self.counters.skipped_bytes, skipped as u32);
+                    // A signature costs a hash: it is not looked at for what is dropped anyway.
                     let message = message.and_then(|message| {
                         let frame = self.buffer.get(skipped..skipped + header.frame_length()).unwrap_or_default();
                         let frame = ReceivedFrame::new(header.from, header.id, frame, header.unsigned_length());
@@ -285,6 +286,7 @@ impl<M: Message> Decoder<M> {
         }
         let Some(header) = held.first_chunk().map(Header::read) else { return Front::Incomplete(HEADER) };
         let length = header.frame_length();
+        // It lies wholly within a sealed frame, from which nothing is delivered.
         if length <= self.sealed {
             return Front::Garbage(None);
         }
@@ -292,10 +294,12 @@ impl<M: Message> Decoder<M> {
         if let Some(message) = self.read(frame, &header) {
             return Front::Intact { skipped: 0, header, message };
         }
+        // Content of a sealed frame that is no frame is no fault.
         if self.sealed > 0 {
             return Front::Garbage(None);
         }
         let fault = if M::format(header.id).is_some() { Fault::BadChecksum } else { Fault::Unknown };
+        // The byte behind it decides: only a start byte makes a frame of what cannot be checked.
         match held.get(length) {
             None => Front::Incomplete(length + 1),
             Some(&START) => Front::Opaque { length, fault },
@@ -324,6 +328,7 @@ impl<M: Message> Decoder<M> {
         let sent = frame.get(end..)?.first_chunk().copied().map(u16::from_le_bytes)?;
         let format = M::format(header.id);
         let extra_crc = format.map(|format| format.extra_crc).or_else(|| dialect_extra_crc(header.id))?;
+        // The checksum first: also of what is refused, the content is not searched for frames.
         (checksum(summed, extra_crc) == sent).then(|| match format {
             None => Err(Fault::Unknown),
             Some(_) if header.incompatible & !SIGNED != 0 => Err(Fault::Unsupported),
@@ -356,6 +361,7 @@ impl<M: Message> Decoder<M> {
             Some((from, sequence)) if from == header.from => header.sequence.wrapping_sub(sequence).wrapping_sub(1),
             _ => 0,
         };
+        // Numbers have 8 bits and wrap: the upper half of the differences stands for frames that are older.
         if gap < 128 {
             add(&mut self.counters.lost, u32::from(gap));
             self.last = Some((header.from, header.sequence));

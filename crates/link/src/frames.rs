@@ -39,6 +39,7 @@ impl Odometry {
     pub fn to_state(&self) -> Option<State> {
         let [w, x, y, z] = self.attitude;
         let attitude = Quaternion::new(w, x, -y, -z);
+        // Of a quaternion of zeros this is not a number; it is refused below.
         let velocity_m_s = UnitQuaternion::new_normalize(attitude) * flip(self.velocity_m_s);
         State::from_quaternion(flip(self.position_m), velocity_m_s, &attitude, flip(self.rates_rad_s))
     }

@@ -98,6 +98,7 @@ impl Sender {
         buffer: &'a mut [u8; SIGNED_FRAME_MAX],
     ) -> &'a [u8] {
         let Some((frame, _)) = buffer.split_first_chunk_mut() else { return &[] };
+        // The flag goes in first: checksum and signature are over it, too.
         let mut length = self.write(message, if signer.is_some() { SIGNED } else { 0 }, frame);
         if let Some((key, stamp)) = signer {
             let signature = key.sign(frame.get(..length).unwrap_or_default(), stamp);

@@ -178,6 +178,7 @@ impl Mission {
                 let (to, plan) = LIST.read(payload);
                 (Mission::List(Plan(plan)), to)
             }
+            // The older request has the same fields, and the same answer: MISSION_ITEM_INT.
             MISSION_REQUEST_INT_DATA::ID | MISSION_REQUEST_DATA::ID => {
                 let (number, to, plan) = REQUEST_INT.read(payload);
                 (Mission::Request(number, Plan(plan)), to)

@@ -64,5 +64,6 @@ pub(crate) const fn frame(datum: Datum) -> u8 {
 
 /// Returns an angle in degrees as an integer of 1e-7 degrees; NaN is not given, others out of range stay so.
 pub(crate) fn e7(degrees: f32) -> i32 {
+    // Beyond any angle, and short of the number that says that none is given.
     if degrees.is_nan() { Place::AS_IT_IS } else { (f64::from(degrees) * 1e7).clamp(-2e9, 2e9) as i32 }
 }

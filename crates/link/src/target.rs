@@ -127,6 +127,7 @@ impl PositionTarget {
         let [heading, rate] = yaw;
         (read.yaw_rad, read.yaw_rate_rad_s) = (-unless(10, heading)?, -unless(11, rate)?);
         let or_zero = |number: f32| if number.is_nan() { 0.0 } else { number };
+        // What is ignored counts as zero, which is plausible, so that only the rest is judged.
         let whole = Setpoint {
             position_m: read.position_m.map(or_zero),
             velocity_m_s: read.velocity_m_s.map(or_zero),
@@ -278,6 +279,7 @@ impl ExternalTarget {
                     return Err(Fault::Unsupported);
                 }
                 let [pitch, roll, up, yaw] = axes.map(|axis| (f32::from(axis) / 1000.0).clamp(-1.0, 1.0));
+                // Below 0 is thrust to the other side, which no multirotor here has.
                 Ok(ExternalTarget::Sticks(ManualControl { roll, pitch, throttle: 2.0 * up.max(0.0) - 1.0, yaw }))
             }
             RC_CHANNELS_OVERRIDE_DATA::ID => {

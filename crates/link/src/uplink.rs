@@ -220,6 +220,7 @@ const COVARIANCE: usize = 4 * 21;
 const POSE_EXTENSION: usize = COVARIANCE + 1;
 
 fn read_vision(data: &VISION_POSITION_ESTIMATE_DATA, payload: &[u8]) -> Result<Uplink, Fault> {
+    // Looked at as angles: of absurd ones, too, a quaternion would be a rotation.
     let level = State { attitude_rad: Vector3::new(data.roll, -data.pitch, -data.yaw), ..State::default() };
     if !level.is_plausible() {
         return Err(Fault::Implausible);

@@ -23,6 +23,7 @@ impl Sink<'_> {
         if let Some((place, to)) = self.rest.next() {
             *to = byte;
             if byte != 0 {
+                // Fits: a payload has 255 bytes at most.
                 self.length = (place + 1) as u8;
             }
         }

@@ -90,6 +90,7 @@ impl<'a> LogKeeper<'a> {
     pub fn take(&mut self, now_us: u64, block: &LogBlock) {
         self.now_us = now_us;
         if block.begins() {
+            // The log before may have had no last block.
             self.close();
             self.synced_us = now_us;
             if self.state == CardState::Ready {

@@ -57,6 +57,7 @@ impl LogKeeper<'_> {
         self.each_log(&mut |number, size| {
             let Some(size) = size.filter(|_| number < bound) else { return ControlFlow::Continue(()) };
             found = (left == 0).then_some((number, size));
+            // It wraps with the log that is found, behind which nobody looks.
             left = left.wrapping_sub(1);
             if found.is_some() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         })?;
@@ -72,6 +73,7 @@ impl LogKeeper<'_> {
             self.reader.open = Some((place, volumes.open_file_in_dir(root, name, Mode::ReadOnly)?));
         }
         let (Some(volumes), Some((_, file))) = (&self.volumes, self.reader.open) else { return Err(Error::BadHandle) };
+        // Asked before the library refuses to go there: an error would give up the volume.
         if offset > volumes.file_length(file)? {
             return Ok(CardAnswer::Is(0));
         }

@@ -55,6 +55,7 @@ impl<'a> Device<'a> {
     }
 
     fn touch<T>(&self, call: impl FnOnce(&mut dyn LogCard) -> Result<T, CardError>) -> Result<T, CardError> {
+        // `try`: the library must not make it panic, in whatever order it calls.
         let done = match (self.left.get().checked_sub(1), self.card.try_borrow_mut()) {
             (Some(left), Ok(mut card)) => {
                 self.left.set(left);
@@ -126,6 +127,7 @@ fn first_partition(block: &[u8; 512]) -> Option<u32> {
 
 /// True of the first block of a volume that fits into so many blocks and whose numbers fit together.
 fn is_sound(block: &[u8; 512], room: u64) -> bool {
+    // The short number of a volume that is too large for it is 0: then the long one counts.
     let either = |short, long: u64| if short == 0 { long } else { short };
     let per_cluster = u64::from(byte(block, 13));
     let (reserved, tables, entries) = (word(block, 14), u64::from(byte(block, 16)), word(block, 17));
@@ -141,8 +143,10 @@ fn is_sound(block: &[u8; 512], room: u64) -> bool {
     if !shape {
         return false;
     }
+    // `shape` sees to it that this neither divides by zero nor underflows.
     let clusters = (total - before) / per_cluster;
     let [fat16, fat32] = CLUSTERS;
+    // Clusters are numbered from 2 on. Their table must hold all, or the library would read behind it.
     let ends = clusters + 2;
     if clusters < fat32 {
         return clusters >= fat16 && entries > 0 && table * 256 >= ends;

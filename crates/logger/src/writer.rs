@@ -76,6 +76,7 @@ impl LogWriter {
     ) {
         if self.log.is_none() && card == CardState::Ready && !self.ends {
             (self.begins, self.ticked_us) = (true, None);
+            // A log that was given up has left bytes.
             self.ring = LogRing::new();
             self.log = Some(BlackBox::new(start, table).paced(PACE));
         }

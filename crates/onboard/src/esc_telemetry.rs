@@ -43,6 +43,7 @@ impl EscTelemetry {
         let answers =
             |reading: &Option<Stamped<EscReading>>| reading.is_some_and(|reading| reading.age_us(now_us) < OFFLINE_US);
         let bits = self.readings.iter().zip(0_u8..).filter(|(reading, _)| answers(reading));
+        // Eight rotors at most: the shift does not wrap.
         bits.fold(0, |bits, (_, at)| bits | 1_u8.wrapping_shl(at.into()))
     }
 }

@@ -265,10 +265,12 @@ impl<const N: usize, C: FlightLaw<N>> Flight<N, C> {
     // Always: copying the report out of a call costs a hundred instructions.
     #[inline(always)]
     pub fn tick(&mut self, now_us: u64, inputs: &mut ControlInputs, readings: &Readings) -> Report<N> {
+        // Before the front end, which takes the pose out of the inbox.
         let mut sensors = self.timeouts.tick(now_us, readings, inputs.inbox.pose().is_some());
         // One that repeats itself has failed, too.
         sensors.inertial |= self.observes;
         let (mode, airborne, rested) = (self.memory.mode(), self.memory.airborne(), self.memory.rested());
+        // As decided in the last tick: this one's decision needs the estimate first.
         self.front_end.set_on_ground(!mode.armed() || self.idle_on_ground && !airborne);
         let estimate = self.front_end.tick(now_us, readings, &mut inputs.inbox);
         let observed = self.memory.state().filter(|_| self.observes);

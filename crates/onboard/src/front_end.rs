@@ -223,6 +223,7 @@ impl EstimatorFrontEnd {
         let Measurement::Gnss { position_m, .. } = &mut aid.value else { return Some(aid) };
         if self.origin_m.is_none() {
             let [here_m, velocity_m_s] = self.told;
+            // A fix is of some time ago: it belongs to where the vehicle was then.
             let there_m = here_m - velocity_m_s * (aid.age_us as f32 * 1e-6);
             self.origin_m = sigmas_m.map(|_| *position_m - there_m);
         }
@@ -278,6 +279,7 @@ fn leave(timed: &Stamped<Measurement>, inbox: &mut Inbox) {
 fn publish(estimate: &Estimate, state: State, now_us: u64, inbox: &mut Inbox) {
     let stamped = Stamped { value: state, at_us: now_us };
     let validity = &estimate.validity;
+    // The first that is missing is why: without a heading, for one, no position can be held.
     let missing = match (validity.attitude, validity.heading, validity.velocity && validity.position) {
         (true, true, true) => None,
         (false, ..) => Some(Refusal::AttitudeUnknown),

@@ -96,6 +96,7 @@ impl Guide {
         let ControlInputs { inbox, orders, battery, .. } = inputs;
         let fresh = inbox.state().filter(|state| state.age_us(now_us) <= COAST_US);
         let state = fresh.map(|state| &state.value).or(core.observed);
+        // By way of 32 bits, of which the processor makes a float itself; 64 bits take a library call.
         let gap_us = u32::try_from(now_us.saturating_sub(self.last_us)).unwrap_or(u32::MAX);
         let dt_s = gap_us as f32 * 1e-6;
         self.last_us = now_us;

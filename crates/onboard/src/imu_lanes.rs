@@ -20,6 +20,7 @@ const GOES: f32 = 0.5;
 /// Time after which lanes begin anew \[s\].
 const OLD_S: f32 = 6.0;
 /// What a fix finds of the past: so many entries, so far apart \[us\].
+// Together 0.4 s, more than the 0.25 s by which a measurement may be late.
 const PAST: usize = 16;
 const APART_US: u64 = 25_000;
 
@@ -138,6 +139,7 @@ impl ImuLanes {
     /// Takes a velocity with its standard deviations that was true at `at_us`.
     fn hear_velocity(&mut self, [velocity, sigmas]: &[Vector3<f32>; 2], at_us: u64) {
         let nearest = self.past.iter().min_by_key(|(past_us, _)| past_us.abs_diff(at_us));
+        // What was true before the beginning says nothing: both lanes begin there.
         let Some((_, [flying, apart])) = nearest.filter(|_| at_us > self.begin_us) else { return };
         let weights = sigmas.map(|sigma| 1.0 / (SPEED_M_S + 2.0 * sigma));
         let (apart, measured) = (apart.component_mul(&weights), (velocity - flying).component_mul(&weights));
@@ -185,6 +187,7 @@ impl ImuLanes {
 
 /// Counts a measurement that finds the vehicle on this share of the way to the other lane.
 fn vote(votes: &mut i8, share: f32) {
+    // Only votes in a row count: one for the other side takes the place of all before it.
     *votes = if share > 0.5 { votes.saturating_add(1).max(1) } else { votes.saturating_sub(1).min(-1) };
 }
 

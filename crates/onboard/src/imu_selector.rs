@@ -102,6 +102,7 @@ impl Imu {
 
     /// True if rates or force repeat themselves, and those of `other` do not.
     fn is_stuck(&self, other: &Imu) -> bool {
+        // Both repeat themselves where there is no noise, as at rest in a simulation: that is no fault.
         self.equals.iter().zip(other.equals).any(|(own, others)| *own >= STUCK && others < STUCK / 2)
     }
 
@@ -144,10 +145,12 @@ impl ImuSelector {
         for ((equals, new), old) in this.equals.iter_mut().zip(&sample).zip(&this.came) {
             *equals = if new == old { equals.saturating_add(1) } else { 0 };
         }
+        // By what came, sample or not: of a blow that both feel, the first reading is none, and confirms the second.
         let confirmed = !jumps(&this.corrected(&sample), &other.corrected(&other.came));
         let is_none = jumps(&sample, &this.came) && !confirmed || this.is_stuck(other);
         this.came = sample;
         let other_is_silent = other.is_silent(at_us);
+        // Alone, a sensor flies whatever it reads: there is no other to judge it by.
         if is_none && !other_is_silent {
             return None;
         }
@@ -175,6 +178,7 @@ impl ImuSelector {
             if size > 0.0 {
                 let rate = *owed * min(1.0 / MADE_UP_S, most / size);
                 *quantity += rate;
+                // The decay would not end by itself.
                 *owed = if size < 3e-4 { Vector3::zeros() } else { *owed - rate * since_s };
             }
         }
@@ -189,6 +193,7 @@ impl ImuSelector {
             return;
         }
         let flown = flying.corrected(&flying.newest);
+        // While the lanes decide, the difference may be a fault, which is not to become part of the mean.
         if self.lanes.is_none() {
             self.averaged = (self.averaged + 1.0).min(AVERAGED);
             for ((mean, own), flown) in this.offset.iter_mut().zip(&this.newest).zip(&flown) {
@@ -217,6 +222,7 @@ impl ImuSelector {
             self.lanes = None;
             return;
         }
+        // Ends at half of what begins them, so that noise does not begin and end lanes in turn.
         let (begins, ends) = (self.averaged >= KNOWN && self.disagree(1.0), !self.disagree(0.5));
         let Some(lanes) = &mut self.lanes else {
             if begins {
@@ -244,6 +250,7 @@ impl ImuSelector {
             if self.second_flies { (&mut self.second, &mut self.first) } else { (&mut self.first, &mut self.second) };
         (wrong.wrong, right.wrong) = (true, false);
         for (offset, moved) in right.offset.iter_mut().zip(lanes.moved(now)) {
+            // The estimator's biases have moved to fit the wrong sensor: moved with them, the right one fits at once.
             *offset -= to_imu * moved;
         }
         self.owed = lanes.hidden().map(|hidden| to_imu * (now.rotation.transpose() * hidden));

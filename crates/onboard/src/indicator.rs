@@ -72,6 +72,7 @@ impl Indication {
         }
     }
 
+    // No two are alike from whatever moment on somebody looks; a test turns each against all others.
     const fn pattern(self) -> Pattern {
         match self {
             Indication::Starting => Pattern { led: 0b1000_0000_1000_0000, buzzer_once: 0, buzzer: 0 },

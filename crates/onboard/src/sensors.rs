@@ -63,6 +63,7 @@ impl FixFrame {
         let [north, east, down] = fix.velocity_ned_m_s.into();
         let measurement = Measurement::Gnss {
             position_m,
+            // The local frame's axes are north, west and up.
             velocity_m_s: Vector3::new(north, -east, -down),
             horizontal_sigma_m: fix.horizontal_sigma_m,
             vertical_sigma_m: fix.vertical_sigma_m,

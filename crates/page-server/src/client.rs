@@ -57,6 +57,7 @@ pub(crate) fn serve(mut stream: TcpStream, number: u32, shared: &Shared) -> io::
         Some("index.html") => Some(""),
         page => page,
     };
+    // Scripts and styles are the same for everybody, and a browser asks for them without the token.
     let secret = page == Some("") || page == Some("socket");
     if let (true, Err((status, problem))) = (secret, shared.admission.check_token(&head)) {
         return refuse(&mut stream, status, &problem);
@@ -113,6 +114,7 @@ fn converse(stream: TcpStream, rest: Vec<u8>, number: u32, shared: &Shared) -> i
     limits.max_message_size = Some(MESSAGE_MAX);
     limits.max_frame_size = Some(MESSAGE_MAX);
     limits.max_write_buffer_size = WAITING_MAX;
+    // Each message is written at once: a frame that waits for others to fill a buffer is late.
     limits.write_buffer_size = 0;
     let mut socket = WebSocket::from_partially_read(stream, rest, Role::Server, Some(limits));
     // The loop that flies takes these in a millisecond.
@@ -120,6 +122,7 @@ fn converse(stream: TcpStream, rest: Vec<u8>, number: u32, shared: &Shared) -> i
         return Ok(());
     }
     let end = exchange(&mut socket, &out, number, shared);
+    // Once the flight has ended nobody wants to know, and the connection ends in any case.
     let _ = shared.events.send(Event::Gone(number));
     let _ = socket.close(None).and_then(|()| socket.flush());
     end

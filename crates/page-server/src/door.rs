@@ -89,6 +89,7 @@ impl WebDoor {
             Event::Said(number, text) => {
                 let reply = self.cockpit.command(server, &text);
                 if let Some(page) = self.pages.iter().find(|page| page.number == number) {
+                    // The flight waits for nobody: a page whose queue is full misses an answer.
                     reply.messages.into_iter().for_each(|text| drop(page.out.try_send(text.into())));
                 }
                 return reply.then;
@@ -107,6 +108,7 @@ impl WebDoor {
                 true
             }
             Err(TrySendError::Full(_)) => now.saturating_sub(page.took) < STUCK,
+            // Its connection has ended, and the event that says so, which is logged, is on the way.
             Err(TrySendError::Disconnected(_)) => true,
         });
     }

@@ -182,6 +182,7 @@ impl Cockpit {
         }
         let local_m = self.frame.local(&place_m);
         let origin = server.vehicles().first().and_then(|vehicle| vehicle.origin());
+        // A place on the earth is what DO_REPOSITION needs: without one, targets in the local frame lead the vehicle.
         let Some(origin) = origin else {
             self.station.lead(server, local_m, Command::SelectMode(custom(FlightMode::Offboard)));
             return PageReply::default();

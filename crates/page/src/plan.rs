@@ -50,6 +50,7 @@ pub(crate) fn mission_items(places_m: &[Vector3<f32>]) -> Vec<MissionItem> {
         // Whatever heading leads there.
         parameters: [0.0, 0.0, 0.0, f32::NAN],
         x: (place_m.x * 1e4) as i32,
+        // Positions of the workspace are north, west, up; those of the frame north, east, down.
         y: (place_m.y * -1e4) as i32,
         z: -place_m.z,
         ..MissionItem::default()
@@ -104,6 +105,7 @@ pub(crate) fn fence_areas(vehicle: &ServedVehicle, frame: &LocalFrame) -> Vec<Fe
     while let Some(item) = rest.first() {
         let [first, ..] = item.parameters;
         let is_polygon = [INSIDE, OUTSIDE].contains(&item.command);
+        // At least one, so that the loop ends, and no more than are left, whatever the item says.
         let count = if is_polygon { (first as usize).clamp(1, rest.len()) } else { 1 };
         let (area, others) = rest.split_at(count);
         areas.push(FenceArea {

@@ -80,6 +80,7 @@ impl PageStation {
 
     /// Gives a command.
     pub(crate) fn command(&mut self, server: &mut Server, command: Command) {
+        // What was to follow an earlier command must not follow this one.
         (self.once_armed, self.target_m) = (None, None);
         self.say(server, &Uplink::Command(command));
     }
@@ -94,6 +95,7 @@ impl PageStation {
     /// Leads the vehicle to a place of its local frame, in mode offboard \[m\].
     pub(crate) fn lead(&mut self, server: &mut Server, place_m: Vector3<f32>, offboard: Command) {
         self.target_m = Some(place_m);
+        // The target first: without a fresh one the vehicle refuses the mode.
         self.send_target(server);
         self.say(server, &Uplink::Command(offboard));
     }
@@ -133,6 +135,7 @@ impl PageStation {
     pub(crate) fn hear(&mut self, vehicle: usize, bytes: &[u8]) {
         if vehicle == VEHICLE {
             let PageStation { decoder, heard, .. } = self;
+            // Telemetry is not decoded, since the page is shown the vehicle itself.
             decoder.feed_accepted(bytes, |frame| HEARD.contains(&frame.id), |_, message| heard.push(message));
         }
     }

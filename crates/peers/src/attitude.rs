@@ -54,6 +54,7 @@ pub(crate) fn unit(v: &Vector3<f32>) -> Vector3<f32> {
 pub fn facing(thrust: &Vector3<f32>, yaw_rad: f32) -> Matrix3<f32> {
     let [_, left] = heading(yaw_rad);
     let z = unit(thrust);
+    // left is level and z is not, so they are never parallel.
     let x = unit(&left.cross(&z));
     Matrix3::from_columns(&[x, z.cross(&x), z])
 }

@@ -220,6 +220,7 @@ impl<const N: usize> FlightController<N> for Dfbc<N> {
 
         // Attitude.
         let limits = &self.position.limits;
+        // Within the limits it points up, as `flat` requires: a free fall has no direction of thrust.
         let flying = limits.apply(&(setpoint.acceleration_m_s2 + limits.gravity()));
         let Attitude { desired, rates_rad_s, angular_acceleration_rad_s2, attitude_error, rate_error } =
             self.attitude.output(&memory.reaction, &r, state, [&specific_force, &flying], setpoint);

@@ -212,6 +212,7 @@ impl<const N: usize> Geometric<N> {
             k_r,
             k_omega,
             k_integral: xy_and_z(gains.tilt_i_1_s2, gains.yaw_i_1_s2),
+            // k_Omega is at least 0.5 by its range.
             c: k_r.component_div(&k_omega),
         })
     }
@@ -223,6 +224,7 @@ impl<const N: usize> Geometric<N> {
         let specific_force = position.specific_force_m_s2;
 
         // Desired attitude.
+        // Also without a new state, since what it filters is a command, not a measurement.
         self.filter.advance(&mut memory.specific_force, &specific_force);
         let filtered = &memory.specific_force;
         let second = self.filter.second_derivative(filtered, &specific_force);

@@ -69,6 +69,7 @@ impl HoverThrustEstimator {
         let most = GATE * math::sqrt(innovation_variance);
         let innovation = (acceleration_m_s2 - g * (thrust_share / h - 1.0)).max(-most).min(most);
         let share = math::min(math::max(h + gain * innovation, SHARE_MIN), SHARE_MAX);
+        // K H is at least 0 and below 1: the variance never falls below zero.
         *estimate = HoverThrust { excess: share - 1.0, variance: (1.0 - gain * slope) * variance };
     }
 }

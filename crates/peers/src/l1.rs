@@ -242,6 +242,7 @@ impl<const N: usize> FlightController<N> for L1<N> {
         self.geometric.learn(&mut memory.geometric, &lesson, fresh, unallocated);
         memory.geometric.trace = trace;
 
+        // Before the prediction, which spans the step that this command begins.
         self.rotors.advance(&mut memory.rotors, &action.speeds);
         let now = self.rotors.inputs(body, &memory.rotors);
         memory.prediction = fresh.then(|| self.predict(memory, state, &body_z, &now));

@@ -56,6 +56,7 @@ impl Limits {
     #[inline]
     pub fn apply(&self, specific_force: &Vector3<f32>) -> Vector3<f32> {
         let vertical = self.vertical(specific_force.z);
+        // At most 90 % of the largest is vertical: the root is of a positive number.
         let left_over = math::sqrt(self.max_m_s2 * self.max_m_s2 - vertical * vertical);
         let bounded = horizontally(specific_force, left_over.min(self.tan_tilt * vertical));
         Vector3::new(bounded.x, bounded.y, vertical)

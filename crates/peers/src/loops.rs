@@ -114,6 +114,7 @@ pub(crate) struct AttitudeOutput {
 impl AttitudeLoop {
     /// Makes the loop; `yaw_p_1_s` is the gain for small yaw errors, whatever `yaw_weight` is.
     pub(crate) fn new(tilt_p_1_s: f32, yaw_p_1_s: f32, yaw_weight: f32) -> Self {
+        // The error has the weight in it already. By its range it is at least 0.05.
         AttitudeLoop { attitude_p: xy_and_z(tilt_p_1_s, yaw_p_1_s / yaw_weight), yaw_weight }
     }
 

@@ -180,6 +180,7 @@ impl Solution {
     fn new(a: &Matrix3<f32>, b: &Vector3<f32>, q: &Vector3<f32>, weight: f32) -> Self {
         let q = Matrix3::from_diagonal(q);
         let step = |p: &Matrix3<f32>| {
+            // The weight is at least 1 and P not negative: never a division by zero.
             let inverse = 1.0 / (weight + b.dot(&(p * b)));
             let gain: Vector3<f32> = (a.tr_mul(p) * b) * inverse;
             (gain, inverse, a - b * gain.transpose())
@@ -188,6 +189,7 @@ impl Solution {
         for _ in 0..RICCATI {
             let (_, _, closed) = step(&p);
             let next = q + a.tr_mul(&(p * closed));
+            // P is symmetric: what rounding takes from that must not build up over the iterations.
             p = (next + next.transpose()) * 0.5;
         }
         let (gain, inverse, closed) = step(&p);
@@ -288,6 +290,7 @@ impl<const N: usize> Mpc<N> {
             if !free {
                 break;
             }
+            // Also where ADMM starts from when a bound is reached.
             *split = Split { z: u, y: Vector3::zeros() };
             self.roll_out(&mut ahead, &u);
         }
@@ -296,6 +299,7 @@ impl<const N: usize> Mpc<N> {
         }
 
         let mut flown = first;
+        // Continues the last plan without shifting it: a planned step is far longer than the time between steps.
         for _ in 0..ITERATIONS {
             let mut forced = [Vector3::zeros(); HORIZON];
             let mut p = Errors::default();
@@ -309,6 +313,7 @@ impl<const N: usize> Mpc<N> {
                 split.y += u - split.z;
                 self.roll_out(&mut ahead, &u);
             }
+            // Not u: before both agree, only z is within the bounds.
             flown = plan.first().map_or(first, |split| split.z);
         }
         flown
@@ -390,6 +395,7 @@ impl<const N: usize> FlightController<N> for Mpc<N> {
             if (given - wanted).abs().max() <= 1e-4 { *u } else { given - balance }
         });
         let specific_force = self.limits.apply(&(balance + u));
+        // By what the bounds left of u: the model must not run ahead of what is commanded.
         memory.lagging = (a + (specific_force - balance - a).component_mul(&self.follows)).map(math::settled);
 
         // Attitude.

@@ -266,6 +266,7 @@ impl<const N: usize> FlightController<N> for Pid<N> {
         if fresh {
             self.differentiator.advance(&mut memory.velocity, &state.velocity_m_s);
             self.differentiator.advance(&mut memory.rates, &state.rates_rad_s);
+            // Before the first step no thrust has been given that could explain a motion.
             if let Some(thrust_n) = memory.thrust_n {
                 self.estimate_hover_thrust(memory, thrust_n, r.m33);
             }
@@ -282,6 +283,7 @@ impl<const N: usize> FlightController<N> for Pid<N> {
         let vertical = self.limits.vertical(h * (acceleration.z + g));
         let wanted = Vector3::new(acceleration.x, acceleration.y, g) * (vertical / g);
         let specific_force = self.limits.apply(&wanted);
+        // Limits keep the vertical part at 10 % of gravity or more: no division by zero.
         let tilted = specific_force * (g / specific_force.z);
         let missing = acceleration - Vector3::new(tilted.x, tilted.y, specific_force.z / h - g);
         let desired = facing(&specific_force, setpoint.yaw_rad);

@@ -37,6 +37,7 @@ impl Beside {
             [address("chip_stm32::motors::encode")?, address("SysTick")?, address("USART1")?, address("CAN2_RX0")?];
         let mut board = EmulatedBoard::boot(elf)?;
         let mut station = Station::default();
+        // Bytes enough for all samples of USART1's interrupt below.
         for count in 1..=50_u32 {
             let (state, _) = motion(count as f32);
             station.track(u64::from(count), state);

@@ -273,6 +273,7 @@ impl Walk<'_> {
         }
         let function = self.linked.function(address)?;
         if !self.open.insert(address) {
+            // A recursion has no worst case.
             return Err(Error::Protocol(format!("{} can call itself", function.name)));
         }
         let (mut below, mut chain) = Depth::default();

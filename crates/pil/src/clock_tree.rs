@@ -125,6 +125,7 @@ impl ClockTree {
             let Some(address) = gdb.run(PATIENCE)? else {
                 return Err(Error::Protocol("the image waits without accessing the clock tree".into()));
             };
+            // An access to one of its bytes is one to the register.
             let register = address & !3;
             let pc = gdb.register(PC)?;
             let access = Access::decode(gdb.memory(pc)?)?;

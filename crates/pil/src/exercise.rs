@@ -36,6 +36,7 @@ pub fn bytes_of_tick(station: &mut Station, tick: u64) -> Vec<u8> {
         _ => (),
     }
     let mut bytes = station.take();
+    // Coprime with the other periods, so that faults meet each of their phases.
     match tick % 97 {
         13 => bytes.truncate(bytes.len() / 2),
         31 => bytes.extend_from_slice(b"\xFD\xFDnoise\x00\xFF"),

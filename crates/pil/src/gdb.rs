@@ -90,6 +90,7 @@ impl Gdb {
     /// # Errors
     /// If the stub refuses.
     pub fn store(&mut self, address: u32, value: u32) -> Result<(), Error> {
+        // The far end of the stack, which never comes so deep (docs/budgets.md).
         const SCRATCH: u32 = 0x1000_0000;
         // STR r1, [r0]
         self.set_memory(SCRATCH, &[0x01, 0x60])?;

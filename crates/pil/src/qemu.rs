@@ -41,6 +41,7 @@ impl Qemu {
     /// Creates an empty folder shared by host and emulator.
     pub(crate) fn folder() -> Result<PathBuf, Error> {
         static COUNT: AtomicU32 = AtomicU32::new(0);
+        // Tests run several at once, in one process and in many.
         let name = format!("pil-{}-{}", std::process::id(), COUNT.fetch_add(1, Ordering::Relaxed));
         let folder = std::env::temp_dir().join(name);
         std::fs::create_dir_all(&folder)?;

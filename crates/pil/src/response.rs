@@ -43,6 +43,7 @@ pub fn worst_response_ns(tasks: &[PeriodicTask], index: usize) -> Option<u64> {
     for instance in 0_u64.. {
         let own_ns = task.blocking_ns + (instance + 1) * task.cost_ns;
         let mut window_ns = own_ns;
+        // The window only grows, so that it settles or leaves the horizon.
         loop {
             let others_ns = others().map(|other| {
                 // At least one, since a window is never empty for those that preempt.
@@ -58,6 +59,7 @@ pub fn worst_response_ns(tasks: &[PeriodicTask], index: usize) -> Option<u64> {
             window_ns = next_ns;
         }
         worst = worst.max((window_ns + task.jitter_ns).saturating_sub(instance * task.period_ns));
+        // This one has ended when the next is released: the busy period is over.
         if window_ns + task.jitter_ns <= (instance + 1) * task.period_ns {
             return Some(worst);
         }

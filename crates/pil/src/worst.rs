@@ -78,6 +78,7 @@ pub fn search(emulator: Emulator, source: StateSource, seed: u64, candidates: u6
                 None => flight.arm()?,
             }
         }
+        // Equal ones, too, so that the climb goes on over level ground.
         if instructions >= height {
             (summit, height) = (numbers, instructions);
         }
@@ -99,6 +100,7 @@ struct EmulatedFlight {
 impl EmulatedFlight {
     /// Draws a number in -1..1.
     fn number(&mut self) -> f32 {
+        // 24 bits, which an f32 has exactly.
         (self.random.next_u64() >> 40) as f32 / (1 << 23) as f32 - 1.0
     }
 

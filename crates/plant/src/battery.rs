@@ -123,6 +123,7 @@ impl Discharge {
         let Battery { resistance_ohm: r, efficiency, avionics_w, .. } = self.battery;
         let power_w = rotor_w / efficiency + avionics_w;
         let v = self.open_circuit_v();
+        // With the root in the divisor: no division by R, which may be 0, and no digits lost where R I is small.
         let current_a = if v > 0.0 { 2.0 * power_w / (v + sqrt((v * v - 4.0 * r * power_w).max(0.0))) } else { 0.0 };
         // At the limit the formula above overshoots; V_oc / 2R is the current of a matched load.
         let current_a = if r > 0.0 { current_a.min(v / (2.0 * r)) } else { current_a };

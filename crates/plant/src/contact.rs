@@ -77,6 +77,7 @@ impl Contact {
         let reach = |[point, ..]: &[Vector3<f64>; 4]| sqrt(point.norm_squared());
         Ground {
             stiffness_n_m,
+            // Four feet share 2 zeta sqrt(4 k m).
             damping_n_s_m: 0.5 * self.damping_ratio * sqrt(4.0 * stiffness_n_m * vehicle.mass_kg),
             friction: self.friction,
             reach_m: points.iter().map(reach).fold(0.0, f64::max),

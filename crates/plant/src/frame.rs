@@ -97,6 +97,7 @@ impl Frame {
     pub(crate) fn hover_shares(&self) -> Lanes {
         let equal = self.present / self.count as f64;
         let Sums { x, y, spin, .. } = self.sums(&equal);
+        // By the inverse they would be equal but for rounding.
         if x == 0.0 && y == 0.0 && spin == 0.0 {
             return equal;
         }

@@ -61,6 +61,7 @@ impl Noise {
     /// Creates the numbers of `stream` with `seed`.
     pub fn new(seed: u64, stream: Stream) -> Self {
         let mut bits = Xoshiro256PlusPlus::seed_from_u64(seed);
+        // By the order of the variants: a new one goes last, so that flights of the others keep their numbers.
         for _ in 0..stream as usize {
             bits.jump();
         }

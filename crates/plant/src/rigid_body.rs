@@ -43,6 +43,7 @@ pub fn motion(v: &Vector) -> Motion {
         velocity_m_s: v.fixed_rows::<3>(3).into(),
         attitude_rad: Vector3::new(
             atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y)),
+            // Rounding may take the sine just beyond 1, where the arcsine is NaN.
             asin((2.0 * (w * y - x * z)).clamp(-1.0, 1.0)),
             atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)),
         ),

@@ -94,6 +94,7 @@ impl Rotors {
     /// Returns each rotor's share of its thrust at time `t` \[s\], and when that next changes.
     fn efficiency(&self, frame: &Frame, t: f64) -> (Lanes, f64) {
         let (mut efficiency, mut until_s) = (frame.repeat(1.0), f64::INFINITY);
+        // `check` has refused a rotor 0: the subtraction does not underflow.
         for fault in &self.faults {
             if fault.start_s > t + TIME_SLACK_S {
                 until_s = until_s.min(fault.start_s - TIME_SLACK_S);
@@ -167,6 +168,7 @@ impl Spin {
         };
         let (efficiency, efficiency_until_s) = rotors.efficiency(frame, 0.0);
         Ok(Spin {
+            // Commands come in `f32`, and so does what is taken for those before the first.
             commands: DelayLine::new(whole_steps(rotors.delay_s, step_s), start_rad_s.map(|w| f64::from(w as f32))),
             // At tau = 0 this is exp(-infinity) = 0: no lag.
             half_step: exp(-0.5 * step_s / rotors.time_constant_s),
@@ -200,6 +202,7 @@ impl Spin {
         // max first, so that it replaces NaN.
         let floor = self.rotors.min_rad_s;
         let command = self.commands.pass(*command_rad_s);
+        // min last, so that an empty battery stops even rotors that idle.
         let target = |w: f64| (w * scale).max(floor).min(ceiling);
         let drive = if frame.count() == frame::FEW {
             self.follow::<{ frame::FEW }>(&command, target)
@@ -242,6 +245,7 @@ impl Spin {
     pub(crate) fn set_faults(&mut self, frame: &Frame, faults: Vec<RotorFault>) -> Result<(), OutOfRange> {
         check(&faults, frame)?;
         self.rotors.faults = faults;
+        // Whatever the time, the next step looks at the faults again.
         self.efficiency_until_s = f64::NEG_INFINITY;
         Ok(())
     }

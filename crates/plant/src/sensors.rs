@@ -121,6 +121,7 @@ impl StateSensor {
         let period = whole_steps(sensing.period_s, step_s).max(1);
         Ok(StateSensor {
             noise: (sensing.noise != Deviations::default()).then_some(sensing.noise),
+            // Drawn even if there is none, so that a bias does not change the noise behind it.
             bias: sensing.bias.draw(&mut random),
             random,
             delay: DelayLine::new(steps, State::default()),
@@ -148,6 +149,7 @@ impl StateSensor {
     #[inline]
     pub fn measure(&mut self, motion: &Motion) -> StateMeasurement {
         let mut measured = sum(motion, &self.bias);
+        // In every step, sampled or not: the rate of the samples does not change the noise.
         if let Some(spread) = &self.noise {
             measured = sum(&measured, &spread.draw(&mut self.random));
         }

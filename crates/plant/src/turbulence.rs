@@ -115,6 +115,7 @@ impl Across {
         let q_xd = 0.5 * d2 * h * h;
         let q_dd = 0.25 * (1.0 - d2 * (1.0 - 2.0 * h + 2.0 * h * h));
         let l_dd = sqrt(q_dd);
+        // The airspeed's floor keeps h positive, and so q_dd.
         let l_xd = q_xd / l_dd;
         // The difference is of the order of h^3, so rounding may make it negative.
         let l_xx = sqrt((q_xx - l_xd * l_xd).max(0.0));
@@ -190,6 +191,7 @@ impl Eddies {
     /// Returns the velocity along, across (to the left of) and above the wind's direction, after one more step \[m/s\].
     #[inline]
     pub(crate) fn advance(&mut self, height_m: f64, airspeed_m_s: impl FnOnce() -> f64) -> Vector3<f64> {
+        // Not in every step, since the coefficients take exponentials, powers and roots.
         if self.remaining == 0 {
             self.refresh(height_m, airspeed_m_s());
         }

@@ -180,6 +180,7 @@ impl Plant {
         let Some(effects) = &mut self.effects else { return };
         let (position, velocity) = self.body.place();
         let body = &self.body;
+        // The axes as a closure, since they are needed near the ground only.
         let (load, surroundings) =
             effects.begin_step(speeds, &self.segment, self.time_s, &position, &velocity, || body.axes());
         self.load = load;

@@ -146,6 +146,7 @@ fn frame(
     };
     let widest = |ticks: &Ticks| ticks.marks.iter().map(|(_, label)| width_pt(label, font_pt)).fold(font_pt, f64::max);
     let most = |ticks: &Ticks| ((x.to_pt - x.from_pt) / (X_APART * widest(ticks))) as usize;
+    // How many fit depends on their labels, and the labels on how many there are: a guess gives the width.
     let x_ticks = x.ticks(most(&x.ticks(8)).clamp(2, 10));
     for (value, _) in &x_ticks.marks {
         line((x.at(*value), y.from_pt), (x.at(*value), y.to_pt), GRID, GRID_PT);
@@ -190,6 +191,7 @@ fn lines(figure: &PaperFigure, panel: &FigurePanel, [x, y]: [&Axis; 2], shapes: 
     for PanelLine { color, band, .. } in &panel.lines {
         let edge = |edge: usize| {
             let values = band.iter().filter_map(move |(at, ends)| Some((*at, *ends.get(edge)?)));
+            // A logarithmic axis has no place for zero: the band goes on to the lower end of the panel.
             values.map(|(at, value)| (x.at(at), y.at(if is_seen(&value) { value } else { y.low }))).collect::<Vec<_>>()
         };
         if band.len() > 1 {
@@ -258,6 +260,7 @@ fn range(panel: &FigurePanel, [from, to]: [f64; 2], is_logarithmic: bool) -> Res
         let room = libm::pow((high / low).max(1.2), ROOM);
         return Ok([low / room, high * room]);
     }
+    // A constant has no range, and a constant of zero no size either.
     let room = (ROOM * (high - low)).max(1e-3 * low.abs().max(high.abs())).max(1e-9);
     Ok([low - room, high + room])
 }

@@ -42,6 +42,7 @@ pub(crate) fn pdf(drawing: &Drawing, title: &str) -> Vec<u8> {
 }
 
 fn draw(content: &mut Content, shape: &Shape, opacities: &mut Vec<f64>) {
+    // In PDF a clip can only be taken back with the state that was saved before it.
     content.save_state();
     match shape {
         Shape::Line { points, stroke, within } => {

@@ -16,6 +16,7 @@ pub(crate) fn svg(drawing: &Drawing, title: &str) -> String {
          <rect width=\"100%\" height=\"100%\" fill=\"#ffffff\"/>",
         escaped(title)
     );
+    // Before all else, since shapes refer to their clip by its number.
     let mut boxes: Vec<[f64; 4]> = Vec::new();
     for shape in shapes {
         if let Shape::Line { within: Some(within), .. } | Shape::Area { within: Some(within), .. } = shape

@@ -24,6 +24,7 @@ impl Ticks {
         let Some((factor, power)) = steps.into_iter().find(fits) else { return Ticks { marks: Vec::new() } };
         let step = factor * libm::pow(10.0, f64::from(power));
         let decimals = usize::try_from(-power).unwrap_or(0);
+        // An end that is a multiple itself counts in spite of rounding.
         let (first, last) = (libm::ceil(low / step - 1e-9) as i64, libm::floor(high / step + 1e-9) as i64);
         let large = low.abs().max(high.abs()) >= 1e5 || decimals > 5;
         let mark = |number: i64| {

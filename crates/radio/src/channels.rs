@@ -30,6 +30,7 @@ impl Channels {
         let (mut bits, mut held, mut bytes) = (0u32, 0, bytes.iter());
         for channel in &mut us {
             while held < BITS {
+                // At most 18 bits are held.
                 bits |= u32::from(bytes.next().copied().unwrap_or_default()) << held;
                 held += 8;
             }

@@ -58,6 +58,7 @@ impl CrsfFrame {
                 // Of two antennas, the second is active if the number says so.
                 let rssi = if antenna == 1 { second } else { first };
                 let snr_db = i8::from_le_bytes([snr]);
+                // The protocol sends the power without its sign, which is negative.
                 Some(CrsfFrame::LinkStatistics(LinkStatistics { rssi_dbm: -i16::from(rssi), quality_percent, snr_db }))
             }
             _ => None,
@@ -163,6 +164,7 @@ impl CrsfDecoder {
             return self.drop_first(1);
         }
         let Some((content, _)) = rest.split_at_checked(length) else { return false };
+        // Always: the accepted lengths have a type and a checksum.
         let Some(([kind, payload @ ..], checksum)) = content.split_last().map(|(last, content)| (content, *last))
         else {
             return self.drop_first(1);

@@ -96,6 +96,7 @@ impl RadioPilot {
             *self = RadioPilot::default();
             return PilotOutput { notice, ..PilotOutput::default() };
         };
+        // Seen twice, one frame would move a switch, which takes two.
         if self.seen_us == link.at_us() {
             return PilotOutput::default();
         }
@@ -132,6 +133,7 @@ impl RadioPilot {
         if killing && inputs.armed {
             output.request = Some(Request::Kill);
         }
+        // Sticks and modes wait for a steady link; stopping the motors, above, does not.
         if !is_steady {
             return output;
         }

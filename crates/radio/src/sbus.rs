@@ -31,7 +31,9 @@ impl SbusFrame {
         let [HEADER, rest @ ..] = frame else { return None };
         let (packed, &[flags, footer]) =
             rest.split_first_chunk::<PACKED>().and_then(|(packed, rest)| Some((packed, rest.first_chunk::<2>()?)))?;
+        // SBUS2 counts its slots in two bits of it: 0x04, 0x14, 0x24, 0x34.
         let is_footer = footer == 0 || footer & 0xCF == 0x04;
+        // The upper flags are never set: without a checksum, every bit that is known counts.
         (is_footer && flags & !FLAGS == 0).then(|| SbusFrame {
             channels: Channels::unpack(packed, to_us),
             frame_lost: flags & FRAME_LOST != 0,
@@ -89,6 +91,7 @@ impl SbusDecoder {
             if self.waits {
                 continue;
             }
+            // There is room: a frame is taken out with its last byte.
             let _ = self.held.push(*byte);
             if let Some(frame) = self.held.first_chunk::<FRAME>() {
                 match SbusFrame::read(frame) {

@@ -247,6 +247,7 @@ impl SwitchModes {
     /// Returns the mode of a switch that is `stick` of its way from the centre, -1 to 1.
     pub(crate) fn mode(&self, stick: f32) -> Option<FlightMode> {
         let position = ((stick + 1.0) * 3.0) as usize;
+        // The very end of the way would be a seventh position.
         self.numbers().get(position.min(5)).copied().and_then(mode_of)
     }
 }
@@ -301,6 +302,7 @@ impl RadioSettings {
             return false;
         };
         let us = f32::from(us);
+        // A threshold within the way of the channel is none: moving there would lose the pilot.
         failsafe_us < calibration.min_us && us < failsafe_us || failsafe_us > calibration.max_us && us > failsafe_us
     }
 }

@@ -61,6 +61,7 @@ impl CrsfTelemetry<'_> {
                 0x08
             }
             CrsfTelemetry::Attitude { angles_rad: [roll, pitch, yaw] } => {
+                // In the protocol's order.
                 for angle_rad in [pitch, roll, yaw] {
                     let ticks = angle_rad * 10_000.0;
                     put(&((if ticks < 0.0 { ticks - 0.5 } else { ticks + 0.5 }) as i16).to_be_bytes());
@@ -78,6 +79,7 @@ impl CrsfTelemetry<'_> {
                 put(&((speed_m_s * 36.0 + 0.5) as u16).to_be_bytes());
                 let course = course_rad.to_degrees() * 100.0;
                 put(&((if course < 0.0 { course + 36_000.0 } else { course }) as u16).to_be_bytes());
+                // Counted from 1000 m below the sea, since the number has no sign.
                 put(&((height_m + 1000.0) as u16).to_be_bytes());
                 put(&[satellites]);
                 0x02

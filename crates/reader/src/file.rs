@@ -20,6 +20,7 @@ const FILE_SIZE: u64 = 1 << 20;
 pub fn text(path: &Path, kind: &str) -> Result<String, FileError> {
     let read = || {
         let mut text = String::new();
+        // One byte more than is accepted shows that a file is too large, however large it is.
         let read = File::open(path)?.take(FILE_SIZE + 1).read_to_string(&mut text)?;
         if read as u64 > FILE_SIZE { Err(io::ErrorKind::FileTooLarge.into()) } else { Ok(text) }
     };

@@ -11,6 +11,7 @@ pub const LIKE: &str = "like";
 /// error refers to the line that says it. A name that nothing earlier has changes nothing; the reader refuses it.
 pub(crate) fn inherit(document: &mut DeTable<'_>, list: &str, own: &[&str]) {
     let Some(DeValue::Array(tables)) = document.get_mut(list).map(Spanned::get_mut) else { return };
+    // In their order, so that what an heir has taken over goes on to its own heirs.
     for index in 1..tables.len() {
         let (earlier, rest) = tables.split_at_mut(index);
         let Some(DeValue::Table(heir)) = rest.first_mut().map(Spanned::get_mut) else { continue };

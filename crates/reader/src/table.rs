@@ -73,6 +73,7 @@ impl<'a> Table<'a> {
             if !wanted(declaration) {
                 return Ok(());
             }
+            // Before the value is read, whose error names the unit.
             self.units.push((range.name, unit));
             match value {
                 ValueMut::Single([number]) => self.number(range)?.into_iter().for_each(|read| *number = read as f32),

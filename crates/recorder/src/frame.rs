@@ -38,6 +38,7 @@ pub fn decode(frame: &mut [u8]) -> Result<Record, FrameError> {
     let foreign = || FrameError::Foreign(version(body).filter(|version| *version != VERSION));
     match postcard::take_from_bytes(body) {
         Ok((Record::Start(start), _)) if start.version != VERSION => Err(foreign()),
+        // Bytes that are left show another version, whose beginning happens to read as a record of this one.
         Ok((record, [])) => Ok(record),
         _ => Err(foreign()),
     }

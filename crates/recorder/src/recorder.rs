@@ -30,6 +30,7 @@ impl Recorder {
         self.configuration = 0;
         self.frame(&Record::Start(StartRecord::of(vehicle, law, table)), send);
         for parameter in table.iter() {
+            // By bits: 0 and -0 are equal, and a replay is to the last bit.
             let image = table.default_of(parameter.name).map(|parameter| parameter.value.to_bits());
             if image != Some(parameter.value.to_bits()) {
                 self.frame(&Record::Parameter { configuration: 0, name: parameter.name, value: parameter.value }, send);

@@ -157,6 +157,7 @@ impl<const N: usize, P: Prepare<N>> Replayer<N, P> {
                 if self.coming.is_full() {
                     self.coming.pop_front();
                 }
+                // There is room: the oldest has given way.
                 let _ = self.coming.push_back((*tick, inputs.clone()));
                 ReplayStep::Nothing
             }
@@ -170,6 +171,7 @@ impl<const N: usize, P: Prepare<N>> Replayer<N, P> {
         (self.inputs, self.taken) = (ControlInputs::EMPTY, ControlInputs::EMPTY);
         self.waiting.clear();
         self.coming.clear();
+        // The flight itself begins with the first tick: the parameters of this start are still to come.
         (self.start, self.began, self.next) = (Some(start.clone()), is_mine, 0);
         if is_mine { Ok(()) } else { Err(ReplayDifference::Start(start.clone())) }
     }
@@ -189,6 +191,7 @@ impl<const N: usize, P: Prepare<N>> Replayer<N, P> {
         if !self.began {
             return ReplayStep::Nothing;
         }
+        // A tick needs all before it: what follows a gap cannot be run, up to the next start.
         if tick.number != self.next {
             self.began = false;
             return ReplayStep::Differs(ReplayDifference::Missing(self.next), None);

@@ -46,6 +46,7 @@ impl Fix {
 pub(crate) fn begin(fixes: &[Fix]) -> Option<&Fix> {
     let middle = |of: fn(&Fix) -> f64| {
         let mut all: Vec<f64> = fixes.iter().map(of).collect();
+        // The median, which one absurd fix does not move.
         all.sort_by(f64::total_cmp);
         all.get(all.len() / 2).copied()
     };
@@ -112,6 +113,7 @@ pub(crate) fn collect(
 pub(crate) fn sparse<T>(samples: Vec<T>, apart_us: u64, at_us: impl Fn(&T) -> u64) -> Vec<T> {
     let mut last_us: Option<u64> = None;
     let keep = |sample: &T| {
+        // Saturating, since times of a damaged log may be anything.
         let keep = last_us.is_none_or(|last_us| at_us(sample) >= last_us.saturating_add(apart_us));
         if keep {
             last_us = Some(at_us(sample));

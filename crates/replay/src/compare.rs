@@ -115,6 +115,7 @@ pub(crate) fn turn(theirs: &[f32; 4], ours: &[f32; 4]) -> Vector3<f64> {
     let [w, x, y, z] = theirs.map(f64::from);
     let [ow, ox, oy, oz] = ours.map(f64::from);
     let turn = Quaternion::new(w, x, y, z) * Quaternion::new(ow, -ox, -oy, -oz);
+    // The shorter way round: q and -q are the same rotation.
     let turn = if turn.w < 0.0 { -turn } else { turn };
     let sine = turn.vector().norm();
     // angle/sin(angle/2), whose limit is 2.

@@ -27,7 +27,9 @@ pub(crate) fn doubt(recording: &mut Recording, earth: Option<&Field>) {
         recording.mag_slow_rad = recording.sources.iter().any(is_raw).then_some(most_rad);
         return;
     };
+    // The root mean square of the two that are seen stands for the one that is not.
     let off = libm::hypotf(level - earth.horizontal_gauss, down - earth.down_gauss) * core::f32::consts::FRAC_1_SQRT_2;
+    // Near the magnetic poles nothing is left level.
     let error_rad = off / earth.horizontal_gauss.max(1e-3);
     let unseen_rad = (UNSEEN * error_rad).clamp(LEAST_RAD, Settings::DEFAULT.mag_slow_rad);
     recording.mag_slow_rad = Some(error_rad.max(unseen_rad).min(most_rad));

@@ -112,6 +112,7 @@ fn are_exchanged(fixes: &[Fix]) -> bool {
     };
     for (fix, next) in fixes.iter().zip(fixes.iter().skip(1)) {
         let (Some([north, east, _]), true) = (fix.velocity_m_s, next.arrived_us > fix.arrived_us) else { continue };
+        // Over a long gap one velocity says nothing of the way.
         let dt_s = ((next.arrived_us - fix.arrived_us) as f64 * 1e-6).min(2.0);
         flown = [flown[0] + north * dt_s, flown[1] + east * dt_s];
         let off =
@@ -136,6 +137,7 @@ fn lines(bytes: &[u8]) -> Result<Read, String> {
         return Err(format!("empty; {WANTED}"));
     }
     let mut read = Read { kinds: HashMap::new(), bad: None };
+    // Each kind of line has a number of values of its own.
     let mut reader = csv::ReaderBuilder::new().has_headers(false).flexible(true).from_reader(bytes);
     let mut record = csv::ByteRecord::new();
     let mut good = 0_usize;

@@ -16,6 +16,7 @@ pub(crate) fn rising<T>(samples: Vec<T>, at_us: impl Fn(&T) -> u64) -> (Vec<T>, 
     for sample in samples {
         let now_us = at_us(&sample);
         match runs.last_mut() {
+            // They rise, so no difference is negative.
             Some(run) if last_us.is_some_and(|last_us| now_us - last_us < APART_US) => run.push(sample),
             _ => runs.push(vec![sample]),
         }

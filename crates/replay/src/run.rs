@@ -257,6 +257,7 @@ fn between(before: &Estimate, now: &Estimate, at_us: u64) -> Option<Estimate> {
         return None;
     }
     let (from_us, to_us) = (before.at_us, now.at_us);
+    // Zero is the time of the default, before the first step.
     if !(from_us..=to_us).contains(&at_us) || to_us - from_us > GAP_US || from_us == 0 {
         return (to_us == at_us).then_some(*now);
     }
@@ -264,6 +265,7 @@ fn between(before: &Estimate, now: &Estimate, at_us: u64) -> Option<Estimate> {
     let mix = |a: &Vector3<f32>, b: &Vector3<f32>| a + (b - a) * share;
     let quaternion = |q: [f32; 4]| Quaternion::new(q[0], q[1], q[2], q[3]);
     let (a, b) = (quaternion(before.attitude), quaternion(now.attitude));
+    // The shorter way round: q and -q are the same rotation.
     let b = if a.dot(&b) < 0.0 { -b } else { b };
     let mixed = (a * (1.0 - share) + b * share).normalize();
     let mut ours = *now;

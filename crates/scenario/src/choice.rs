@@ -25,6 +25,7 @@ impl Scenario {
                 Some(vehicle) => contender.on(vehicle, Profile::Flight)?,
                 None => contender.for_vehicle(&self.vehicle),
             };
+            // A scenario keeps what its [settings] say nowhere but in its contenders.
             if let Some(other) = self.contenders.first() {
                 contender.settings = other.settings;
             }

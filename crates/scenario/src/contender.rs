@@ -78,6 +78,7 @@ impl Contender {
         limits.acceleration_max_m_s2 = limits.acceleration_max_m_s2.max(G_M_S2 * libm::tanf(tilt_max_rad));
         let Ok(()) = self.law.visit_mut(&mut |declaration: &Declaration, value: ValueMut<'_>| {
             if let (TILT_MAX, ValueMut::Single([tilt])) = (declaration.range.name, value) {
+                // No further than the law accepts, or its controller would be refused.
                 *tilt = tilt.max(tilt_max_rad).min(declaration.range.max as f32);
             }
             Ok::<(), Infallible>(())
@@ -142,6 +143,7 @@ impl Contender {
         let law = match self.law {
             Law::Afbc(gains) => Law::Afbc(by_rule(gains)),
             Law::Backstepping(own) => {
+                // The rule is for whole sets of AFBC's gains: those added here to make one are dropped after it.
                 let gains = Profile::Flight.gains();
                 let gains = PerAxis::from_fn(|axis| adaptive::Gains { backstepping: own[axis], ..gains[axis] });
                 Law::Backstepping(by_rule(gains).map(|gains| gains.backstepping))
@@ -150,6 +152,7 @@ impl Contender {
         };
         let settings =
             self.settings.slowed(slowness, vehicle.lag_s()).with_rotor_force_max_n(vehicle.force_max_n as f32);
+        // What is known of the drag is the vehicle's, whoever's settings are scaled.
         let settings = settings.with_drag(vehicle.flight_settings.common.drag);
         Contender { law, settings, ..self }
     }

@@ -166,6 +166,7 @@ impl Scenario {
     /// Returns the time from which on the scenario may take measurements away: by the first fault of a sensor or an
     /// instrument, the first outage, or from the start if any fail at random. Infinite if it takes none away \[s\].
     pub fn faulty_from_s(&self) -> f64 {
+        // Every field by its name, so that a new instrument that may fail at random is not forgotten here.
         let InstrumentSuite { imu: _, tracker, gnss, barometer: _, magnetometer: _ } = &self.instruments;
         let lost =
             tracker.iter().flat_map(|tracker| [tracker.loss, tracker.freeze]).chain(gnss.iter().map(|it| it.loss));

@@ -48,6 +48,7 @@ impl<'a> Frame<'a> {
     pub(crate) fn text(self) -> Option<String> {
         let end = HEADER + usize::from(*self.0.get(1)?);
         let payload = self.0.get(HEADER..end).filter(|_| self.id() == STATUSTEXT)?;
+        // Behind the severity. MAVLink 2 cuts zeros off the end of a payload.
         let text = payload.get(1..)?;
         let end = text.iter().take(TEXT_MAX).take_while(|&&byte| byte != 0).count();
         Some(String::from_utf8_lossy(text.get(..end)?).into_owned())

@@ -114,6 +114,7 @@ impl Station<'_> {
         self.missions.clear();
         self.texts.clear();
         self.say(&Uplink::Mission(Mission::Count(items.len() as u16, plan)));
+        // The vehicle asks for one item after the other.
         let given_up_ms = self.now_ms + ANSWER_MS + 100 * items.len() as u64;
         while self.now_ms < given_up_ms {
             self.step();

@@ -31,6 +31,7 @@ impl ReportedSensors {
         let suite = scenario.instruments;
         // Indoors nobody knows where on the earth the frame is.
         let origin = suite.gnss.and_then(|_| EarthOrigin::new(EarthOrigin::SIMULATED));
+        // A sensor counts as failed until it has been heard.
         ReportedSensors { suite, origin, silent_ms: [SILENT_MS; 3], sigma_mm: [0; 2] }
     }
 

@@ -59,6 +59,7 @@ impl Lines {
     /// Waits a little for the next line.
     fn wait(&mut self) -> Option<String> {
         if self.over {
+            // Nobody sends any more, so that waiting would return at once and the loop spin.
             thread::sleep(NAP);
             return None;
         }
@@ -166,6 +167,7 @@ impl RunningTime {
             Then::Speed(_) => return,
             Then::Pause(stands) => self.flow.paused = stands,
         }
+        // From now on: what passed while time stood still is not caught up with.
         self.pace = Pace::new(factor(self.flow.rate), now);
     }
 }

@@ -88,6 +88,7 @@ impl Udp {
             }
         }
         for frame in frames(bytes).filter(|frame| frame.is_heartbeat()) {
+            // A peer has had them already, with everything else.
             for address in self.standing.iter().filter(|address| !self.peers.contains_key(*address)) {
                 let _ = self.socket.send_to(frame.bytes(), address);
             }

@@ -164,6 +164,7 @@ impl ServedVehicle {
         self.host.hear_simulated_escs(self.world.plant());
         let HostTick { report, bytes, change, signing, .. } = self.host.next_tick(&[]);
         self.world.advance(&report.motors);
+        // After the plant's own step, which the hand overrules.
         self.hold();
         if report.mode.armed() != self.mode.armed() {
             log(if report.mode.armed() { "armed" } else { "disarmed" });
@@ -174,6 +175,7 @@ impl ServedVehicle {
         if let Some(keeper) = &mut self.keeper {
             let change = change.map_or(Ok(()), |change| keeper.keep(change));
             let signing = signing.map_or(Ok(()), |record| keeper.keep_signing(record));
+            // Both have been written by now, or tried: one failure does not keep the other back.
             if let Err(error) = change.and(signing) {
                 // The reason is a text to the stations, and reported with it.
                 self.host.comms().warn(error.reason());
@@ -215,6 +217,7 @@ impl ServedVehicle {
         match host {
             Ok(host) => {
                 self.address = address(&host);
+                // Firmware starts with its own law: one that a line has chosen is gone, like all else that it knew.
                 (self.host, self.law) = (host, ControllerKind::Afbc);
                 if let Some(file) = &self.exact_log {
                     self.host.record(file.sink());

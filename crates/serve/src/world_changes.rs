@@ -44,6 +44,7 @@ impl WorldChanges {
             WorldChange::Wind(steady_m_s) => self.set_wind(world, |wind| wind.steady_m_s = steady_m_s),
             WorldChange::Turbulence(turbulence) => self.set_wind(world, |wind| wind.turbulence = turbulence),
             WorldChange::Gust { velocity_m_s, rise_s, hold_s } => self.set_wind(world, |wind| {
+                // Gusts that are over would add up over a long session.
                 wind.gusts.retain(|gust| gust.start_s + 2.0 * gust.rise_s + gust.hold_s > now_s);
                 wind.gusts.push(CosineGust { velocity_m_s, start_s: now_s, rise_s, hold_s });
             }),
@@ -58,6 +59,7 @@ impl WorldChanges {
                 changes.push(ParameterChange { quantity, factor, start_s: now_s, end_s: until(seconds) });
             }),
             WorldChange::Payload { mass_kg, below_m } => load(world, |_, _, payloads| {
+                // What the scenario has in store for later stays.
                 payloads.retain(|payload| payload.start_s > now_s);
                 let [ahead_m, left_m] = [0.0; 2];
                 let end_s = f64::INFINITY;

@@ -164,6 +164,7 @@ impl Accumulator {
                 attitude_rad: root(attitude_rad),
                 nees: nees / count,
                 valid_ratio: valid_ratio / count,
+                // An aid of which nothing was fused has a sum of 0: its mean is 0, not NaN.
                 aids: aids.map(|aid| AidMetrics { nis: aid.nis / aid.scalars.max(1) as f64, ..aid }),
             }),
         }

@@ -189,6 +189,7 @@ impl Comms {
                 let age_max_us = if estimates { POSE_AGE_MAX_US } else { COAST_US.into() };
                 let sighting = Sighting::State(value);
                 if let Some(at_us) = tracker.sight(number(from), sent_us, dispatcher.now_us, sighting, age_max_us) {
+                    // A law cannot fly on an older one. An estimator can: it fuses a pose at the pose's own time.
                     if dispatcher.now_us - at_us <= COAST_US.into() {
                         update.inbox.put_state(Stamped { value, at_us });
                     }
@@ -205,6 +206,7 @@ impl Comms {
                     update.inbox.put_pose(Stamped { value, at_us });
                 }
             }
+            // Once all bytes are read: the key that was there judges the frames beside it.
             Uplink::Signing(wanted) => setup = Some(wanted),
             other if requests.wants(&other) => dispatcher.hand_to(requests, (from, &other, payload), &mut update),
             other => dispatcher.hear(from, other, &mut update),
@@ -305,6 +307,7 @@ impl Comms {
         let Dispatcher { commands, streams, texts, .. } = &mut self.dispatcher;
         let settled = report.answer.and_then(|answer| commands.settle(answer));
         let ordered = report.guided.answer.and_then(|(ticket, result)| commands.settle_order(ticket, result));
+        // Whatever the budget says: a station gives up, or repeats, a command that is not answered.
         for answer in settled.into_iter().chain(ordered) {
             streams.spend(outlet.say(&answer, &mut self.signing));
         }
@@ -330,6 +333,7 @@ impl Comms {
                 self.dispatcher.streams.spend(outlet.say(&reply, &mut self.signing));
             }
         }
+        // The longest of all: how long a message is turns out when it is made, and then it must leave.
         while outlet.left >= SIGNED_FRAME_MAX
             && let Some(requested) = self.dispatcher.streams.next(now_us)
         {
@@ -519,6 +523,7 @@ impl Comms {
     /// Returns which four motor controllers a message is of: its request's number, from 1, or all fours in turn.
     fn esc_page(&self, requested: Requested) -> u8 {
         let Dispatcher { status, streams, .. } = &self.dispatcher;
+        // Never 0, since it divides; of a stream that is off it is -1.
         let interval_us = u64::try_from(streams.interval_us(requested.message)).unwrap_or(1).max(1);
         let pages = status.rotors.div_ceil(ESCS_PER_MESSAGE as u8).max(1);
         let page = u64::from(requested.index).checked_sub(1).unwrap_or(status.time_us / interval_us);

@@ -192,6 +192,7 @@ impl Dispatcher {
         if self.control.hear(from, self.now_us) {
             self.report_heard(inputs);
         }
+        // `may` takes control where nobody has it: what only reads must not ask.
         let may_change = !is_change(message) || self.may(from, inputs);
         let taken = requests.take(from, message, payload, may_change);
         if let Uplink::Command(command) = message {
@@ -219,6 +220,7 @@ impl Dispatcher {
     /// Returns the item of the mission that the guidance wants and does not have.
     pub(crate) fn wanted_leg(&self) -> Option<afbc_guidance::Leg> {
         let wanted = self.status.guided.wanted;
+        // With the upload's number: another upload has another item in this place.
         if self.given == Some((wanted, self.missions.number())) {
             return None;
         }
@@ -349,6 +351,7 @@ impl Dispatcher {
 
     fn mission(&mut self, message: Mission, from: Address, inputs: &mut ControlInputs) {
         let changes = matches!(message, Mission::Count(..) | Mission::Clear(_) | Mission::SetCurrent(_));
+        // Only what changes something claims control: an item counts for the station that has begun the upload alone.
         let in_control = changes && self.may(from, inputs);
         let around = self.surroundings();
         let heard = self.missions.hear(message, from, in_control, self.now_us, &around);

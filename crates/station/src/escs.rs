@@ -87,6 +87,7 @@ impl Comms {
         let (dispatcher, mut action) = (&mut self.dispatcher, EscAction::default());
         let escs = &mut dispatcher.status.escs;
         escs.poles = u16::try_from(settings.poles).unwrap_or(u16::MAX);
+        // Without their telemetry it is as while disarmed: there is nothing to compare.
         monitor.commanded(now_us, armed && settings.serial, speeds);
         // Nobody is asked while they are not wanted, so that all bytes are dropped.
         for byte in bytes {

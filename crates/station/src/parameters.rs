@@ -107,6 +107,7 @@ impl Service {
         table: &ParameterTable<N>,
     ) -> Option<ParameterValue> {
         const COST: u64 = VALUE_BYTES as u64 * 100_000_000;
+        // A second earns more than the budget holds, and keeps the product below within its bits.
         let elapsed_us = now_us.saturating_sub(self.at_us).min(1_000_000);
         self.at_us = now_us;
         let earned = elapsed_us * u64::from(link_bytes_s) * u64::from(LINK_SHARE);
@@ -147,6 +148,7 @@ impl Service {
             return Heard { refused: Some(reason), ..Heard::unknown(asked, -1) };
         };
         let name = before.name;
+        // Whatever becomes of it: the answer is the value that counts when it is sent.
         self.dropped += count(self.set.push_back(name));
         let Some(value) = value else { return Heard::refused(Reason::on(name, "value or type not understood")) };
         if !disarmed {

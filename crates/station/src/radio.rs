@@ -105,6 +105,7 @@ impl RadioControl {
         }
         if let Some(news) = news {
             if link.at_us().is_none_or(|at_us| now_us.saturating_sub(at_us) > SILENT_US) {
+                // A message leaves channels as they are: without this, those of before the silence would come back.
                 *us = [0; CHANNELS];
             }
             news.apply(us);

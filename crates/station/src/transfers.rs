@@ -99,6 +99,7 @@ impl<F: Copy> Transfers<F> {
             }
         }
         while let Some(FileRequest { from, packet, may_change }) = self.files.pop_front() {
+            // Armed or not as it is now, which may be some time after the request.
             let terms = FileTerms { now_us, may_write: may_change && !armed };
             if let Some(packet) = self.ftp.answer(from, &packet, store, terms) {
                 return Some(Outcome::Send(Transfer::File { packet, to: from }));

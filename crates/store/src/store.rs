@@ -153,8 +153,10 @@ impl<F: NorFlash> Store<F> {
                 self.finish(filling, 1)
             }
             Some(active) => {
+                // A sector that fills up before the next start then has where to move on to, without an erase.
                 self.clear(other(active.sector))?;
                 let fills = active.next > Self::PLACES * FULL_EIGHTHS / 8;
+                // Less header and beginning: if all else counts, a move would free no place, and only wear the flash.
                 if active.is_damaged || fills && self.live()? < active.next.saturating_sub(2) {
                     self.move_on(None)?;
                     self.clear(active.sector)?;
@@ -207,6 +209,7 @@ impl<F: NorFlash> Store<F> {
         if held == bits.map(|bits| (edition, bits)) {
             return Ok(());
         }
+        // Only now do another vehicle's values end: until then its image finds them again.
         if self.active.is_some_and(|active| active.owner != Some(self.owner)) {
             self.reset()?;
         }
@@ -248,6 +251,7 @@ impl<F: NorFlash> Store<F> {
         for place in 1..Self::PLACES {
             let held = self.read(active.sector, place)?;
             if !matches!(held, Place::Blank) {
+                // Behind the last place that is not blank, damaged or not: flash is written once between erases.
                 active.next = place + 1;
             }
             match held {
@@ -267,6 +271,7 @@ impl<F: NorFlash> Store<F> {
         let mut active = self.active.ok_or(Error::NeedsErase)?;
         while active.next < Self::PLACES {
             let place = active.next;
+            // Counted first: a place where a write has failed may not be blank any more, and is not tried again.
             active.next += 1;
             self.active = Some(active);
             if self.write(active.sector, place, record)? {
@@ -302,6 +307,7 @@ impl<F: NorFlash> Store<F> {
         if let Some(record @ Record::Value { .. }) = record {
             self.append(&mut filling, record)?;
         }
+        // It does not wrap in a flash's life: each step costs an erase, of which a sector endures some 10,000.
         self.finish(filling, active.sequence.wrapping_add(1))
     }
 

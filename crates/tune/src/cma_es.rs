@@ -86,6 +86,8 @@ impl Search {
         // Relative to the expected length of a vector of n normal numbers.
         let length = sqrt(length) / (sqrt(n) * (1.0 - 1.0 / (4.0 * n) + 1.0 / (21.0 * n * n)));
         self.generation += 1;
+        // The path begins at zero: its expected length until it has settled. The power is by libm's exponential and
+        // logarithm, since powers of the platform differ in the last bit.
         let begun = sqrt(1.0 - exp(2.0 * f64::from(self.generation) * log(1.0 - c_step)));
         // While the steps are much too short, p_c is not updated.
         let follow = if length / begun < 1.4 + 2.0 / (n + 1.0) { 1.0 } else { 0.0 };
@@ -97,6 +99,7 @@ impl Search {
             c.variance = kept * c.variance + c_one * c.path * c.path + c_mu * spread;
             c.mean += step * mean_move;
         }
+        // At most e-fold in one generation, however far it has moved.
         self.step *= exp((c_step / damping * (length - 1.0)).min(1.0));
     }
 }

@@ -267,6 +267,7 @@ impl Condition {
         }
         let errors = run.metrics.rmse.component_div(&self.rmse).max();
         let jumps = run.metrics.mean_abs_delta_u.component_div(&self.jumps_n).max();
+        // What is better than asked for earns nothing.
         let excess = errors.max(run.metrics.final_error.xyz().norm() / self.end_m).max(jumps).max(1.0);
         Ok((excess * excess * excess).min(FAILED))
     }

@@ -74,6 +74,7 @@ pub(crate) fn circle(
     let trajectory =
         Trajectory::Circle { centre_m: Vector3::new(0.0, 0.0, 3.0), radius_m, period_s: TAU / rate, yaw_rad: 0.0 };
     let mut scenario = maker.scenario(TrainingFlight { trajectory, ..TrainingFlight::new(name, 12.0) })?;
+    // The circle begins at +x of its centre, towards which the thrust has to lean.
     scenario.initial.attitude_rad.y = -maker.scale.tilt_rad(radius_m * rate * rate);
     Ok(scenario)
 }

@@ -288,6 +288,7 @@ impl Results {
                 }
                 let done = self.search(search, stop, &tried);
                 if let Err(error) = done {
+                    // The others need not go on for hours: the same command does what is missing.
                     stop.store(true, Ordering::Relaxed);
                     failure.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
                 }
@@ -295,10 +296,12 @@ impl Results {
         };
         // One search leaves cores idle at the end of each generation, where others fill in.
         let drivers = 1 + rayon::current_num_threads().div_ceil(8);
+        // The scope joins them, so handles are of no use.
         std::thread::scope(|scope| (0..drivers).for_each(|_| drop(scope.spawn(drive))));
         if let Some(error) = failure.into_inner().unwrap_or_else(PoisonError::into_inner) {
             return Err(error);
         }
+        // From the files, so that a search of this run and one of an earlier run are reported alike.
         let outcomes: Vec<_> = searches.iter().map(|search| self.outcome(search)).collect::<Result<_, _>>()?;
         Ok(outcomes.into_iter().collect())
     }

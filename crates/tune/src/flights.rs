@@ -273,6 +273,7 @@ impl Maker<'_> {
     fn payload(&self, name: &'static str, flight: TrainingFlight, ahead_m: f64) -> Result<Scenario, Box<dyn Error>> {
         let scenario = self.windy(TrainingFlight { name, ..flight })?;
         let Scale { arm, .. } = self.scale;
+        // Scaled as a mass of +20 % is, so that the load takes the same share of the reserve.
         let share = 0.2 * ((self.scale.mass(1.2) - 1.0) / (1.2 - 1.0));
         let payload = Payload {
             mass_kg: share * scenario.vehicle.mass_kg,
@@ -360,6 +361,7 @@ fn blind(scenario: Scenario, starts_s: &[f64]) -> Scenario {
 
 /// Returns the battery at the voltage at which the rotors, if it slows them, give this share of their thrust.
 fn low_battery(battery: Battery, thrust: f64) -> Battery {
+    // Thrust goes with the square of the voltage.
     let voltage_v = battery.full_v * libm::sqrt(thrust);
     let charge = (voltage_v - battery.empty_v) / (battery.full_v - battery.empty_v).max(1e-9);
     Battery { initial_charge: charge.clamp(0.05, 1.0), ..battery }

@@ -45,6 +45,7 @@ impl<'a> Maker<'a> {
         let Scale { acceleration, time, .. } = self.scale;
         let gust = |gust: &Gust| {
             let turns = matches!(gust.axis, Axis::Roll | Axis::Pitch | Axis::Yaw);
+            // Angles do not scale, and times do: an angular acceleration goes with the inverse square of time.
             Gust { size: gust.size * if turns { 1.0 / (time * time) } else { acceleration }, ..*gust }
         };
         let gusts = scenario.environment.gusts().iter().map(gust).collect();

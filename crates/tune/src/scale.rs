@@ -67,6 +67,7 @@ impl Scale {
         let time = f64::from(slowness(vehicle.lag_s()));
         let arm = own.arm_m / paper.arm_m;
         // What the rotors leave beside the weight, horizontally.
+        // Never zero, or the lengths of all flights would be.
         let left = |ratio: f64, gravity_m_s2| gravity_m_s2 * sqrt((ratio * ratio - 1.0).max(0.1));
         let share = left(thrust_to_weight, own.gravity_m_s2) / left(paper_thrust_to_weight(), paper.gravity_m_s2);
         let length = (share * time * time).min(LENGTH_MAX * sqrt(arm));
@@ -144,6 +145,7 @@ fn rates(drag: &Drag, vehicle: &Parameters<f64>, rotors: f64) -> [f64; 2] {
 
 /// Speed at which drag of these `rates` decelerates by this much \[m/s\]; infinite without drag.
 fn speed([linear, square]: [f64; 2], deceleration_m_s2: f64) -> f64 {
+    // This form of the root also holds for drag without a square, where the usual one is 0/0.
     2.0 * deceleration_m_s2 / (linear + sqrt(linear * linear + 4.0 * square * deceleration_m_s2))
 }
 

@@ -135,6 +135,7 @@ impl Trial<'_> {
         let mut losses = 0;
         for &index in &self.order {
             let (Some(scenario), Some(cost)) = (self.flights.get(index), costs.get_mut(index)) else { continue };
+            // One flight after the other: contenders are rated side by side, and one that is given up saves the rest.
             *cost = flown(scenario, contender)?;
             losses += usize::from(*cost >= LOST);
             if losses > self.bearable {

@@ -37,6 +37,7 @@ impl State {
     pub fn quaternion(&self) -> UnitQuaternion<f32> {
         let half = self.attitude_rad.map(|angle| sin_cos(0.5 * angle));
         let ((sx, cx), (sy, cy), (sz, cz)) = (half.x, half.y, half.z);
+        // Rounded sines and cosines leave a length that is only nearly 1.
         UnitQuaternion::new_normalize(Quaternion::new(
             cx * cy * cz + sx * sy * sz,
             sx * cy * cz - cx * sy * sz,

@@ -167,6 +167,7 @@ pub trait Declared {
     /// The first parameter out of range.
     fn validate(&self) -> Result<(), OutOfRange> {
         let mut refused = Ok(());
+        // Its error only ends the visit; what was refused is in `refused`.
         let _ = self.visit(&mut |declaration, value| in_range(declaration, &value, &mut refused));
         refused?;
         self.together()
@@ -282,6 +283,7 @@ pub trait Choice: Copy + PartialEq + 'static {
 
     /// Returns the place in [`ALL`](Self::ALL).
     fn index(self) -> usize {
+        // ALL has every variant, so this one is always found.
         Self::ALL.iter().position(|one| *one == self).unwrap_or_default()
     }
 
@@ -414,6 +416,7 @@ macro_rules! parameters {
             }
 
             fn together(&self) -> Result<(), $crate::OutOfRange> {
+                // `let _` only names `$group`, which makes this repeat for the fields with a group and for no others.
                 $( $( let _ = $group; $crate::Declared::together(&self.$field)?; )? )*
                 $( let $this = self; $together?; )?
                 Ok(())

@@ -99,6 +99,7 @@ macro_rules! with_rotors {
             5 => $crate::with_rotors!(@ 5, $N => $body),
             6 => $crate::with_rotors!(@ 6, $N => $body),
             7 => $crate::with_rotors!(@ 7, $N => $body),
+            // Eight: other numbers have been refused by `ROTORS`.
             _ => $crate::with_rotors!(@ 8, $N => $body),
         }
     };

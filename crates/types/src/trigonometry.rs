@@ -20,6 +20,7 @@ pub fn sin_cos(angle_rad: f32) -> (f32, f32) {
     let z = x * x;
     let sine = x + x * z * (-1.666_665_5e-1 + z * (8.332_161e-3 - z * 1.951_529_6e-4));
     let cosine = 1.0 - 0.5 * z + z * z * (4.166_664_6e-2 + z * (-1.388_731_6e-3 + z * 2.443_315_7e-5));
+    // The two lowest bits count modulo 4 in two's complement, below zero, too.
     match quarters as i32 & 3 {
         0 => (sine, cosine),
         1 => (cosine, -sine),

@@ -119,6 +119,7 @@ impl BlackBox {
         if !self.definitions.is_done() {
             return;
         }
+        // Between letters: readers take it for UTF-8.
         let end = (0..=TEXT_MAX.min(text.len())).rfind(|end| text.is_char_boundary(*end)).unwrap_or_default();
         let text = text.get(..end).unwrap_or_default();
         let _ = self.dropouts.put(now_us, &mut ring.view(), &mut |ring| {
@@ -216,6 +217,7 @@ impl Topics<'_, '_> {
         // On time it keeps its phase.
         let period_us = u64::from(topic.period_us);
         let next_us = due_us.saturating_add(period_us);
+        // 0 is no phase: that of a first message, of a change, or of one that is made up for.
         let is_on_time = *due_us > 0 && next_us > self.now_us;
         let next_us = if is_on_time { next_us } else { self.now_us.saturating_add(period_us) };
         // One that is missing is made up for.
@@ -254,6 +256,7 @@ impl Last {
             let clips = moment.view.estimate.is_some_and(|estimate| estimate.imu.clipped);
             let last = self.sampled.as_ref().map(|(message, at_us)| (message, *at_us));
             let message = SensorCombined::of(&sample, last, clips);
+            // One that finds no room is in the log as a dropout; here and below.
             let _ = topics.at_once(&message);
             self.sampled = Some((message, sample.at_us));
         }

@@ -66,6 +66,7 @@ enum Part {
 /// Returns as much of a text as is written.
 fn word(text: &str) -> String<WORD_MAX> {
     let mut word = String::new();
+    // It ends at the first letter that does not fit.
     let _ = text.chars().try_for_each(|letter| word.push(letter));
     word
 }
@@ -216,6 +217,7 @@ fn release(version: &str) -> u32 {
 
 /// Writes a key after its length.
 fn keyed(content: &mut Content<'_>, key: impl Fn(&mut Content<'_>)) {
+    // Written twice, once to be counted: the length comes first, and there is no buffer for the key.
     let mut length = 0_u8;
     key(&mut Content::new(&mut |_| length = length.saturating_add(1)));
     content.put(&[length]);

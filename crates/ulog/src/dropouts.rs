@@ -41,6 +41,7 @@ impl Dropouts {
         let missed_us = self.since_us.take().map_or(0, |since_us| now_us.saturating_sub(since_us));
         self.owed_us = self.owed_us.saturating_add(missed_us);
         while self.owed_us >= 1000 {
+            // The record has 16 bits for it: a longer one becomes several.
             let ms = (self.owed_us / 1000).min(LONGEST_MS);
             if !ring.record(b'O', &mut |content| content.put(&(ms as u16).to_le_bytes())) {
                 return false;

@@ -71,6 +71,7 @@ impl RingView<'_> {
     #[inline(never)]
     pub(crate) fn record(&mut self, kind: u8, write: &mut dyn FnMut(&mut Content<'_>)) -> bool {
         let start = self.0.storage_len();
+        // A place for the length, which is known once the content is written.
         let whole = self.bytes(&mut |content| {
             content.put(&[0, 0, kind]);
             write(content);

@@ -111,6 +111,7 @@ fn read(mut root: Table<'_>, file: &str, text: &str, name: &str) -> Result<Vehic
 /// Returns what laws know of the drag of a vehicle with `count` rotors.
 fn known_drag(drag: &Drag, vehicle: &Parameters<f64>, count: usize) -> KnownDrag {
     let Parameters { mass_kg, gravity_m_s2, thrust_factor_n_s2, .. } = *vehicle;
+    // The sum of all speeds in hover, n sqrt(m g/(n b)). Of the body, half the density times the mean of both areas.
     let all_rad_s = libm::sqrt(count as f64 * mass_kg * gravity_m_s2 / thrust_factor_n_s2);
     KnownDrag {
         rotor_drag_1_s: (drag.blade_n_s2_m * all_rad_s / mass_kg) as f32,

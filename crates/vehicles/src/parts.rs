@@ -125,6 +125,7 @@ pub fn ground(
     table.declared_but(elsewhere, &mut contact)?;
     contact.validate_for(truth, step_s).map_err(together(&table))?;
     table.declared_but(GroundEffect::ROT_HEIGHT.range.name, &mut effect)?;
+    // The height is given once, so that feet and propellers cannot disagree about it.
     effect.rotor_height_m = contact.rotor_height_m;
     let with_effect = table.boolean("ground_effect")?.unwrap_or(true);
     table.finish()?;

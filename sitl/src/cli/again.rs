@@ -46,6 +46,7 @@ impl Again {
                 say(&format!("{what}: {} then, {} now; results may differ", word(then), word(now)));
             }
         }
+        // This very program: another of the same name in the path may be of another version.
         let status = Command::new(env::current_exe()?)
             .args(&before.command)
             .arg("--out")

@@ -138,6 +138,7 @@ fn date(time: SystemTime) -> String {
         year += 1;
     }
     let mut month = 1;
+    // Eleven of them: what is left then is December.
     for days in [31, 28 + u64::from(is_leap(year)), 31, 30, 31, 30, 31, 31, 30, 31, 30] {
         if day < days {
             break;

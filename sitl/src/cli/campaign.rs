@@ -94,6 +94,7 @@ impl Campaign {
                 progress.add(done);
             }
         };
+        // Ctrl-C ends the program itself, since what is in the folder is whole at any time.
         let never = AtomicBool::new(false);
         let summary = pool.install(|| campaign::fly(&plan, &folder, &never, &done));
         drop(progress);

@@ -82,6 +82,7 @@ impl Fleet<'_> {
                     continue;
                 }
                 let (path, whole) = with_gains(folder, &vehicle.name, &results.gains_of(&vehicle.name, &outcomes))?;
+                // A file that could not be flown is never written.
                 let read = afbc_vehicles::parse(&path.display().to_string(), &whole, &vehicle.name)?;
                 Law::on(ControllerKind::Afbc, &read, afbc::Profile::Flight)?;
                 afbc_files::place(&path, |out| out.write_all(whole.as_bytes()))

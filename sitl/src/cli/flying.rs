@@ -53,6 +53,7 @@ impl Flying {
                 log_every.push(log_hz.steps(scenario, contender)?);
             }
         }
+        // Not before: what is refused leaves no folder behind.
         let folder = open()?;
         if self.log_hz.is_none() {
             let longest_s = scenarios.iter().map(|scenario| scenario.duration_s).fold(0.0, f64::max);
@@ -88,6 +89,7 @@ pub(crate) fn report(folder: &Folder, flown: &[Flown], claims: &[Claim], json: J
     let written = flights::write(folder, flown, claims)?;
     let whole: Vec<manifest::Flown<'_>> =
         flown.iter().map(|Flown { scenario, .. }| (scenario, vec![scenario.seed])).collect();
+    // Every flight decides, but a scenario is written out once for all of its contenders.
     let mut first = whole.clone();
     first.dedup_by(|a, b| a == b);
     manifest::write(folder, &written, &whole, &first)?;

@@ -31,5 +31,6 @@ pub(crate) fn ends_with(line: String) -> Result<(), ctrlc::Error> {
 
 /// Makes Ctrl-C ineffective: results are written, and the program ends normally.
 pub(crate) fn is_too_late() {
+    // Never unlocked again: a handler that has been called waits until the program ends.
     std::mem::forget(WRITING.lock().unwrap_or_else(PoisonError::into_inner));
 }

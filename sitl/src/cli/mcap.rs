@@ -86,6 +86,7 @@ impl FlightMcap {
     /// Creates the file at `path`, if there is to be one; `ulog` is then where the flight's log must go.
     pub(super) fn create(path: Option<PathBuf>, ulog: &mut Option<PathBuf>) -> Result<Option<Self>, Failure> {
         let Some(path) = path else { return Ok(None) };
+        // With the process's number, so that two flights at once do not share it.
         let temporary = ulog.is_none().then(|| path.with_extension(format!("{}.ulg", std::process::id())));
         let file = McapFile::create(path)?;
         let ulog = ulog.get_or_insert_with(|| temporary.clone().unwrap_or_default()).clone();

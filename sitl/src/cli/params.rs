@@ -104,6 +104,7 @@ fn act<const N: usize>(action: &Action, vehicle: &Vehicle) -> Result<(), Failure
         }
         Action::Import { file, of } => {
             let Some(path) = &of.store else { return Err("--store: missing; name the file to import into".into()) };
+            // On a copy, before the store is touched: a file that is refused makes and changes nothing.
             let changes = take(&mut table.clone(), file)?;
             let mut store = open(path, vehicle, Flash::open)?;
             store.make_room().map_err(|error| failed(path, &error))?;

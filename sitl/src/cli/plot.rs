@@ -166,6 +166,7 @@ impl Plot {
     /// Reads the logs.
     fn logs(&self) -> Result<Vec<Named>, Failure> {
         let split = |log: &String| match log.split_once('=') {
+            // A file may have an equals sign in its own name.
             Some((name, path)) if !Path::new(log).exists() => (Some(name.to_owned()), PathBuf::from(path)),
             _ => (None, PathBuf::from(log)),
         };

@@ -85,6 +85,7 @@ impl Progress {
     /// Adds to the number done.
     pub(crate) fn add(&self, more: u64) {
         let mut state = self.shared.state();
+        // In 128 bits, in which no product of two counts overflows.
         let part = |done: u64| u128::from(done) * u128::from(PARTS) / u128::from(self.shared.total.max(1));
         let old = part(state.count.done);
         state.count.done += more;

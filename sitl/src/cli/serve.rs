@@ -153,6 +153,7 @@ impl Serve {
             }
         }
         let addresses = self.addresses()?;
+        // On loopback every peer is on this machine, which is as good as holding the wire.
         server.set_wired(addresses.bind.is_loopback());
         let mut ports = Ports::open(&addresses, server.vehicles().len())?;
         let mut door = self.web.map(|address| self.door(address)).transpose()?;

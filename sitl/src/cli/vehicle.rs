@@ -49,6 +49,7 @@ impl OnVehicle {
     pub(crate) fn for_firmware(&self) -> Result<Option<PathBuf>, Failure> {
         let Some(path) = &self.vehicle else { return Ok(None) };
         let known = path.to_str().is_some_and(|name| built_in(name).is_some());
+        // The build script runs in the folder of its package.
         Ok(Some(if known { path.clone() } else { std::path::absolute(path)? }))
     }
 

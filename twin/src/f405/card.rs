@@ -70,6 +70,7 @@ fn formatted(room: Option<u64>) -> MemoryCard {
     if let Some(room) = room {
         fill(&mut bytes[VOLUME * 512..], room).expect("it has room");
     }
+    // The master boot record: type (FAT16), first block and length of its one partition, and the mark at its end.
     bytes[450] = 0x06;
     bytes[454..458].copy_from_slice(&(VOLUME as u32).to_le_bytes());
     bytes[458..462].copy_from_slice(&((BLOCKS - VOLUME) as u32).to_le_bytes());
@@ -156,6 +157,7 @@ impl Peer for CardSlot {
             return REST;
         }
         let answer = self.card.transfer(mosi, bits, context);
+        // The model writes at once: how long a card takes is added here.
         if now_ns < self.busy_until_ns {
             return BUSY;
         }

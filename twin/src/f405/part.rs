@@ -91,6 +91,7 @@ impl Mcu for Part {
 
     fn reset(&mut self, at: VirtualNanos, cause: ResetCause) {
         self.stm32.reset(at, cause);
+        // The models make all of the part anew.
         self.wire();
     }
 

@@ -53,6 +53,7 @@ impl<'a> Base<'a> {
     /// One line on what the vehicle cannot fly.
     pub(super) fn flight(&self, seed: u64, number: u64) -> Result<DrawnFlight, FileError> {
         let vehicle = self.vehicle;
+        // By the vehicle's name, not its place in a list: others beside it change nothing.
         let of_vehicle = vehicle.name.bytes().fold(mix(seed), |hash, byte| mix(hash ^ u64::from(byte)));
         let bits = mix(of_vehicle.wrapping_add(number)) >> 11;
         let mut noise = Noise::new(bits, Stream::Scenario);

@@ -111,6 +111,7 @@ impl Change {
             Change::Mass(mass) => Change::Mass(factor(mass)),
             Change::Rotor { rotor, efficiency } => Change::Rotor { rotor, efficiency: factor(efficiency) },
             Change::Drag(drag) => Change::Drag(factor(drag)),
+            // An older state takes no thrust, so less of it would leave no more.
             Change::Nothing | Change::Older(_) => self,
         }
     }

@@ -94,12 +94,14 @@ impl Path {
             let trajectory = self.at(rate);
             power.asked_by(&trajectory, &self.times_s(&trajectory)) <= 1.0
         };
+        // Accelerations go with the square of the rate.
         self.at(sqrt(boldness) * largest(RATE_MAX, fits))
     }
 
     /// Returns the path at this rate \[rad/s\].
     fn at(&self, rate: f64) -> Trajectory {
         let centre_m = Vector3::new(0.0, 0.0, self.height_m);
+        // The period is infinite at a rate of 0, at which it is not used.
         let (yaw_rad, period_s) = (self.yaw_rad, TAU / rate);
         match &self.shape {
             _ if rate < RATE_MIN => self.rest(centre_m),
@@ -147,6 +149,7 @@ impl Path {
         let within = |from_s: f64, to_s: f64| (0..64).map(move |k| from_s + (to_s - from_s) * f64::from(k) / 64.0);
         match trajectory {
             Trajectory::Lissajous { sines: [sine, ..], .. } => within(0.0, sine.period_s.min(DURATION_S)).collect(),
+            // A circle asks for the same everywhere.
             Trajectory::Circle { .. } => vec![0.0],
             Trajectory::Waypoints(waypoints) => {
                 let legs = waypoints.iter().zip(waypoints.iter().skip(1)).skip(usize::from(self.stands()));

@@ -119,6 +119,7 @@ impl Power {
         // As if the air always blew against it.
         let level = reference.acceleration_m_s2.xy().norm() + (blades + body * airspeed_m_s) * airspeed_m_s;
         let up = g + reference.acceleration_m_s2.z;
+        // Without spare thrust whatever is asked for beyond the weight is far too much, and nothing is divided by zero.
         let spare = (self.thrust_m_s2 - g).max(f64::MIN_POSITIVE);
         [
             (hypot(level, up) - g) / (THRUST_SHARE * spare),
@@ -141,6 +142,7 @@ fn speed_share(vehicle: &Vehicle, battery: &Battery) -> f64 {
     let half_v = 0.5 * (battery.empty_v + (battery.full_v - battery.empty_v) * battery.initial_charge);
     let reached = |share: f64| {
         let power_w = full_w * share * share * share / battery.efficiency + battery.avionics_w;
+        // The larger root of V^2 - V_open V + R P = 0; beyond the most that the battery can give, half of V_open.
         let voltage_v = half_v + sqrt((half_v * half_v - battery.resistance_ohm * power_w).max(0.0));
         voltage_v / battery.full_v
     };

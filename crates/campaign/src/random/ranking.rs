@@ -110,6 +110,7 @@ fn difference(results: &[Score], contender: usize, against: usize) -> Option<Dif
             seeds.entry(result.seed).or_default().push(logarithm(own_m) - logarithm(other_m));
         }
     }
+    // A single seed says nothing of what another would give: its flights stand for themselves.
     let clusters: Vec<Vec<f64>> = match seeds.len() {
         1 => seeds.into_values().flatten().map(|difference| vec![difference]).collect(),
         _ => seeds.into_values().collect(),

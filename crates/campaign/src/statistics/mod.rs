@@ -45,6 +45,7 @@ impl Share {
 /// Returns the percentile of `sorted` values by nearest rank: the smallest value that at least `percent` of them do not
 /// exceed. It is always one of the values. None without values.
 pub fn percentile(sorted: &[f64], percent: f64) -> Option<f64> {
+    // Ranks begin at 1, also that of 0 %.
     let rank = (percent / 100.0 * sorted.len() as f64).ceil().max(1.0) as usize;
     sorted.get(rank - 1).copied()
 }

@@ -52,6 +52,7 @@ fn at_most(ranks: &[usize], sum: usize) -> f64 {
     for rank in ranks {
         let without = chance.clone();
         let with = core::iter::repeat_n(0.0, *rank).chain(without.iter().copied());
+        // By chance each difference is positive with probability 1/2, whatever the others are.
         chance.iter_mut().zip(without.iter().zip(with)).for_each(|(to, (without, with))| *to = 0.5 * (without + with));
     }
     chance.iter().sum()

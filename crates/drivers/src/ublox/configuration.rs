@@ -43,6 +43,7 @@ impl Interface {
     pub(super) fn of(version: &[u8]) -> Self {
         const NAME: &[u8] = b"PROTVER";
         let at = version.windows(NAME.len()).position(|text| text == NAME);
+        // One byte stands between name and number; of the number, four digits fit into 16 bits.
         let digits = at.and_then(|at| version.get(at + NAME.len() + 1..)).unwrap_or_default();
         let digits = digits.iter().take_while(|digit| digit.is_ascii_digit()).take(4);
         let protocol = digits.fold(0, |number, digit| 10 * number + u16::from(*digit - b'0'));
@@ -68,6 +69,7 @@ pub(super) fn step(interface: Interface, number: u8, baud: u32) -> Option<(UbxCo
         (Interface::Keys, 1) => (set(NAVSPG_DYNMODEL, &[AIRBORNE]), Worth::Wished),
         (Interface::Keys, 2) => (set(UART1OUTPROT_NMEA, &[0]), Worth::Wished),
         (Interface::Keys, 3) => (set(UART1_BAUDRATE, &baud.to_le_bytes()), Worth::Line(baud)),
+        // After the baud rate: a slow line has no room for so many solutions.
         (Interface::Keys, 4) => (set(RATE_MEAS, &BY_KEYS_MS.to_le_bytes()), Worth::Wished),
         (Interface::Messages, 0) => {
             let [class, number] = NAV_PVT;
@@ -100,6 +102,7 @@ pub(super) fn step(interface: Interface, number: u8, baud: u32) -> Option<(UbxCo
 /// Returns the command that sets a key in RAM.
 fn set(key: u32, value: &[u8]) -> UbxCommand {
     let mut payload = [0; 12];
+    // Version 0; the layer RAM alone, so that a power cycle undoes it.
     let bytes = [0, 1, 0, 0].into_iter().chain(key.to_le_bytes()).chain(value.iter().copied());
     payload.iter_mut().zip(bytes).for_each(|(to, from)| *to = from);
     UbxCommand::new(CFG_VALSET, payload.get(..8 + value.len()).unwrap_or_default())

@@ -97,6 +97,7 @@ impl FrameDecoder {
             self.first_us = at_us;
         }
         self.newest_us = at_us;
+        // There is room: `next` takes out whatever is as long as a frame can be.
         if let Some(place) = self.bytes.get_mut(self.length) {
             *place = byte;
             self.length += 1;
@@ -130,6 +131,7 @@ impl FrameDecoder {
             held.rotate_left(count);
             self.length -= count;
         }
+        // Bytes have no times of their own: those that are left came one behind the other.
         self.first_us = self.newest_us.saturating_sub(byte_us * self.length.saturating_sub(1) as u64);
     }
 }

@@ -125,6 +125,7 @@ impl Memory {
             !self.left && (!airborne || given.lift.is_exhausted() || self.limiter.setpoint().is_some_and(behind));
         self.lift_s = if lifts { self.lift_s + dt_s } else { 0.0 };
         let gives_up = self.lift_s > NO_LIFT_S;
+        // Given up once: the mode that follows is not given up in its turn.
         self.left |= gives_up;
         gives_up
     }
@@ -144,6 +145,7 @@ impl Memory {
             Shaping::Limited(aim) => {
                 (self.aim, self.trim) = (aim, Trim::default());
                 self.limiter.advance(&self.aim, dt_s);
+                // Only the position can become implausible: the limiter bounds all else.
                 self.limiter.setpoint().filter(|setpoint| abs_max(&setpoint.position_m) <= 1e5)
             }
             Shaping::Leaning(aim, [x, y]) => {
@@ -162,6 +164,7 @@ impl Memory {
             }
             Shaping::Direct(setpoint) => {
                 self.limiter.anchor(state);
+                // Through a gap of the state, or in the mode that follows, the vehicle's own motion goes on to a stop.
                 self.aim = inputs.stop();
                 let setpoint = lift.limited(&setpoint, state, &settings.limits);
                 let setpoint = self.trim.advance(lift, state, &setpoint, dt_s);
@@ -170,6 +173,7 @@ impl Memory {
             Shaping::Turning(target) => {
                 self.limiter.anchor(state);
                 (self.aim, self.rates) = (inputs.stop(), Some(target));
+                // The law flies by it in the first 100 ms after an outage, before the vehicle counts as flying again.
                 Some(Setpoint::hold(state))
             }
         }
@@ -227,6 +231,7 @@ impl Memory {
                 match &mut self.plan {
                     Plan::Hold(hold) => ModeOutput::fly(hold.fly(inputs)),
                     Plan::Orbit(orbit) => orbit.fly(inputs),
+                    // Never: the plan has just been made that of the mode. The same below.
                     _ => ModeOutput::fly(inputs.stop()),
                 }
             }
@@ -294,6 +299,7 @@ impl Memory {
         if let Some((mode, number)) = progress.then {
             self.change(mode, ModeReason::Mission, notices);
             self.mission.resume(0);
+            // No new beginning for the limiter: the setpoint goes on from the mission's.
             (self.lands_item, self.enters) = (Some(number), false);
             return ModeOutput { lifts: inputs.airborne, ..ModeOutput::fly(inputs.stop()) };
         }

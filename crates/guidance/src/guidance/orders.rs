@@ -13,6 +13,7 @@ use afbc_types::State;
 use nalgebra::Vector3;
 
 /// Largest coordinate of a place that is flown to \[m\].
+// Setpoints beyond 1e5 m are implausible: some room is left for the way.
 const PLACE_MAX_M: f32 = 9e4;
 
 impl Memory {
@@ -78,6 +79,7 @@ impl Memory {
         if let Some(state) = state.filter(|_| mode == FlightMode::Takeoff) {
             self.must_be_inside(settings, &(state.position_m + height_m))?;
         }
+        // Selected again, a mode goes on as it is; only a hold begins anew, and so ends a flight or a circle in it.
         if mode != self.mode || mode == FlightMode::Hold {
             self.ordered(mode, notices);
         }
@@ -150,6 +152,7 @@ impl Memory {
         // The cylinder around home: its farthest point.
         let away_m = self.home_m.map_or(radius, |home_m| {
             let off_m = (centre_m - home_m).xy();
+            // Around home itself every point is as far.
             let far_m = off_m.try_normalize(1e-3).map_or(radius.xy(), |ahead| ahead * radius_m);
             Vector3::new(far_m.x, far_m.y, 0.0)
         });
@@ -171,6 +174,7 @@ impl Memory {
         table::select(FlightMode::Hold, seen)?;
         let present = self.limiter.setpoint().ok_or(OrderRefusal::NoPosition)?;
         Ok(match &self.plan {
+            // What an order leaves out is kept of the last one, however far the vehicle has got on its way there.
             Plan::Hold(Hold { at_m: Some(at_m), .. }) if self.mode == FlightMode::Hold => *at_m,
             _ => present.position_m,
         })

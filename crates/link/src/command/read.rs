@@ -49,6 +49,7 @@ pub(crate) fn read(id: u32, payload: &[u8]) -> Result<(Command, Address), Fault>
         COMMAND_INT_DATA::ID => {
             let (parameters, [latitude_e7, longitude_e7], metres, id, to, frame, _) = INT.read(payload);
             if id == CALIBRATE {
+                // Its fifth and sixth parameter are whole numbers: here not those of a place.
                 let [p1, p2, p3, p4] = parameters;
                 return Ok((calibration([p1, p2, p3, p4, latitude_e7 as f32, longitude_e7 as f32, metres]), to));
             }
@@ -160,6 +161,7 @@ fn or_zero(number: f32) -> f32 {
 
 /// Returns a whole number up to 2^24.
 fn whole(number: f32) -> Option<u32> {
+    // Up to there each whole number is an f32 of its own.
     let whole = number as u32;
     ((0.0..=16_777_216.0).contains(&number) && whole as f32 == number).then_some(whole)
 }

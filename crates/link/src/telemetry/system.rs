@@ -201,5 +201,6 @@ pub(super) fn write_landed(state: u8, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, 
 }
 
 pub(super) fn write_protocol(payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
+    // In hundredths: this version, the oldest and the newest are 2.0.
     PROTOCOL.write(&([200, 200, 200], [0; 16]), payload)
 }

@@ -56,6 +56,7 @@ pub fn decode(kind: u8, bytes: [u8; 4]) -> Option<f32> {
     let unused = 32 - 8 * width;
     let shifted = u32::from_le_bytes(bytes) << unused;
     let is_signed = kind.is_multiple_of(2);
+    // Shifting back an i32 brings the sign along.
     let value = if is_signed { f64::from((shifted as i32) >> unused) } else { f64::from(shifted >> unused) };
     (value.abs() <= f64::from(WHOLE_MAX)).then_some(value as f32)
 }

@@ -86,6 +86,7 @@ impl<const N: usize> Configuration<N> {
 
     /// Returns the number of parameters.
     pub(crate) fn parameters(&self) -> u16 {
+        // A place that no parameter has: all are passed.
         let mut walk = Walk { key: Key::Place(u16::MAX), passed: 0, found: None };
         let _ = self.walk(&mut walk);
         walk.passed
@@ -94,6 +95,7 @@ impl<const N: usize> Configuration<N> {
     /// Returns a parameter.
     pub(crate) fn parameter(&self, key: Key) -> Option<Parameter> {
         let mut walk = Walk { key, passed: 0, found: None };
+        // `Found` only ends the walk early.
         let _ = self.walk(&mut walk);
         walk.found
     }
@@ -131,6 +133,7 @@ impl<const N: usize> Configuration<N> {
                 }
                 ValueMut::Whole(number) => *number = value as u32,
                 ValueMut::Switch(switch) => *switch = value != 0.0,
+                // Not negative: `put` has checked the range, which begins at `first`.
                 ValueMut::Choice(index, _) => *index = (value - first) as usize,
             }
             Err(Found)

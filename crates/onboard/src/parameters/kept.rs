@@ -65,6 +65,7 @@ impl Kept {
         if read.is_ok() && table.check().is_ok() {
             return Ok(());
         }
+        // Not what was read so far: half of the values would be a vehicle that nobody has set.
         table.restore();
         read.and_then(|()| self.load_singly(table, store, notice))
     }
@@ -78,6 +79,7 @@ impl Kept {
     ) -> Result<(), Error<F::Error>> {
         let mut last = false;
         loop {
+            // In rounds: a value may be possible only beside another that comes later in the store.
             let mut more = false;
             store.visit(|name, edition, bits| {
                 let Ok((name, value)) = self.read(name, edition, bits) else { return };
@@ -106,6 +108,7 @@ impl Kept {
         match change {
             RecordChange::Restored => store.reset(),
             RecordChange::Set(name, Some(value)) => {
+                // The new value first: a cut of power between the two leaves at least one of them.
                 store.set(name, self.edition, Some(value.to_bits()))?;
                 self.forget(store, name)
             }

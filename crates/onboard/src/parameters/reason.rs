@@ -104,6 +104,7 @@ impl Line {
     /// Adds a number as a digit and a power of ten.
     fn power(&mut self, mut size: f64) {
         let mut exponent = 0_i32;
+        // To where it rounds to a single digit. Exponents of f64 end at 308: the bound is for infinity.
         while size >= 9.5 && exponent < 400 {
             (size, exponent) = (size / 10.0, exponent + 1);
         }

@@ -69,6 +69,7 @@ pub(super) struct Pressure {
 impl Pressure {
     pub(super) fn new(barometer: &Barometer, seed: u64, step_s: f64) -> Self {
         let mut random = Noise::new(seed, Stream::Barometer);
+        // The drift advances once per measurement, of which a step has one at most.
         let period_s = (1.0 / barometer.rate_hz).max(step_s);
         Pressure {
             barometer: *barometer,

@@ -243,6 +243,7 @@ impl Failures {
                 _ => {}
             }
         }
+        // As spoilt: what sticks later repeats what was read.
         self.last.imu = Some(seen);
         alive.then_some(seen)
     }
@@ -250,6 +251,7 @@ impl Failures {
     pub(super) fn tracker(&mut self, now_s: f64, mut seen: TrackerFix) -> Option<TrackerFix> {
         let before = *self.last.tracker.get_or_insert(seen);
         let mut alive = true;
+        // By the true time: an error of the stamp must not shift the failure.
         for (failure, held) in Self::active(&mut self.faults, now_s) {
             match failure {
                 Failure::TrackerLost => alive = false,

@@ -97,6 +97,7 @@ impl Receiver {
     pub(super) fn measure(&mut self, truth: &Truth, spoil: impl FnOnce(GnssFix) -> Option<GnssFix>) -> Vec<GnssFix> {
         let lost = self.loss.advance();
         if self.clock.ticks() {
+            // Taken even if it is lost, so that a loss changes no other fix's error.
             let (fix, arrives_s) = self.take(truth);
             spoil(fix).filter(|_| !lost).into_iter().for_each(|fix| self.transit.send(arrives_s, fix));
         }

@@ -21,6 +21,7 @@ impl Clock {
 
     /// Returns whether this step is one of them; to be called in every step.
     pub(super) fn ticks(&mut self) -> bool {
+        // From the count of steps: a sum of periods would drift.
         let due = (self.steps as f64 * self.per_step + TIME_SLACK_S) as u64 + 1;
         self.steps += 1;
         let ticks = due > self.taken;
@@ -43,6 +44,7 @@ impl<T> Transit<T> {
 
     /// Sends a fix that arrives at `arrives_s`.
     pub(super) fn send(&mut self, arrives_s: f64, fix: T) {
+        // Behind those that arrive at the same time, which were sent earlier.
         let place = self.waiting.partition_point(|(earlier_s, _)| *earlier_s <= arrives_s);
         self.waiting.insert(place, (arrives_s, fix));
     }

@@ -78,8 +78,10 @@ impl Triad {
         self.walk += draw(random) * self.walk_per_step;
         let analogue = self.distortion * truth + self.bias() + draw(random) * self.white;
         let (range, lsb) = (self.range, self.lsb);
+        // Behind the filter, which works on samples: vibration above half their rate would pass it as an alias.
         (self.filter.pass(analogue) + vibration).map(|value| {
             let value = value.clamp(-range, range);
+            // `rint`, since `round` takes three times as long.
             if lsb > 0.0 { rint(value / lsb) * lsb } else { value }
         })
     }

@@ -32,6 +32,7 @@ pub(super) fn each(bytes: &mut [u8]) -> impl Iterator<Item = FileFrame<'_>> {
 
 /// Returns what a copy of a frame says; none longer than any is read.
 fn read(frame: &[u8]) -> Result<Record, FrameError> {
+    // Decoding overwrites a frame, and these are still to be run.
     let mut copy = [0; FRAME_MAX];
     let copy = copy.get_mut(..frame.len()).ok_or(FrameError::Damaged)?;
     copy.copy_from_slice(frame);

@@ -170,6 +170,7 @@ impl Run {
 
     /// Returns the time since the first tick of the log \[us\].
     fn now_us(&self, time_us: u64) -> i64 {
+        // Every start begins at zero; only that of the first has to be counted from the first tick of the log on.
         let first_us = if self.out.starts > 1 { 0 } else { self.first_us.unwrap_or_default() };
         self.began_us.saturating_add(time_us.saturating_sub(first_us).try_into().unwrap_or(i64::MAX))
     }

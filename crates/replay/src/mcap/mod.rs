@@ -56,6 +56,7 @@ fn write(bytes: &[u8], to: impl Write + Seek) -> Result<McapSummary, String> {
     let library = concat!("sitl ", env!("CARGO_PKG_VERSION"));
     let options = WriteOptions::new().compression(None).profile("ros2").library(library);
     let writer = options.create(to).map_err(unwritten)?;
+    // Borrowed by one callback of the parser at a time: none of them calls another.
     let conversion = RefCell::new(Conversion {
         output: Output { writer, channels: HashMap::new(), messages: 0, failure: None },
         topics: HashMap::new(),

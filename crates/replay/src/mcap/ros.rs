@@ -202,8 +202,10 @@ impl Fields<'_> {
     /// Returns a frame with the message's position and this attitude.
     fn frame(&self, child_frame_id: &'static str, attitude: Quaternion<f64>) -> Option<RosMessage> {
         let ned = self.vector(["x", "y", "z"])?;
+        // NED to ENU is half a turn about the bisector of x and y, FLU to FRD half a turn about x.
         let to_enu = Quaternion::new(0.0, FRAC_1_SQRT_2, FRAC_1_SQRT_2, 0.0);
         let from_flu = Quaternion::new(0.0, 1.0, 0.0, 0.0);
+        // None of a message whose quaternion is zero.
         let rotation = UnitQuaternion::try_new(to_enu * attitude * from_flu, 1e-3)?;
         let frame = FrameTransform {
             header: Header { stamp: self.time()?, frame_id: "map" },

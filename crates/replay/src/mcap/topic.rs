@@ -30,6 +30,7 @@ impl McapTopic {
     pub(super) fn of(message: &DataMessage<'_>) -> Self {
         let format = message.flattened_format;
         let fields: Vec<_> =
+            // A writer of ULog aligns its fields by these, which a reader has to leave out.
             format.field_iter().filter(|field| !field.flattened_field_name.starts_with("_padding")).collect();
         let name = match message.multi_id.value() {
             0 => format!("/{}", format.message_name()),

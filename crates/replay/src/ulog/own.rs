@@ -24,6 +24,7 @@ pub(super) fn recording(tables: &Tables) -> Result<Option<Recording>, String> {
     if !tables.announces(AFBC_ESTIMATOR) {
         return Ok(None);
     }
+    // Of a damaged log nobody knows whether it had some: that is reported with the damage, below.
     if tables.first(SENSOR_COMBINED).is_empty() && tables.notes.is_empty() {
         return Err("no samples of an inertial sensor: the vehicle flew on states from outside; log one that has an \
                     inertial sensor, as in sitl fly mocap"

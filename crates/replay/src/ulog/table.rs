@@ -157,6 +157,7 @@ impl Row {
     /// Returns the time at which it was true: that of its sample if the log has it, otherwise that of the row \[us\].
     pub(super) fn sampled_us(&self) -> u64 {
         let (sample, at) = (self.get("timestamp_sample"), self.get("timestamp"));
+        // False of NaN, where the layout has no such field.
         if sample > 0.0 && sample <= at && at - sample < 1e6 { sample as u64 } else { at as u64 }
     }
 }

@@ -152,6 +152,7 @@ fn fix(row: &Row) -> Option<Fix> {
         either("altitude_msl_m", "alt", 1e-3),
     ];
     let velocity_m_s = row.vector(["vel_n_m_s", "vel_e_m_s", "vel_d_m_s"]);
+    // True of NaN: in a layout without the flag a velocity is one.
     let is_valid = velocity_m_s.iter().all(|speed| speed.is_finite()) && row.get("vel_ned_valid") != 0.0;
     let fix = Fix {
         arrived_us: row.timestamp_us(),

@@ -75,6 +75,7 @@ impl ExplorableScene {
     /// Adds the way of a vehicle, or of its reference, which has no attitude.
     pub(crate) fn add(&mut self, name: String, pen: Pen, places: &[Place], is_reference: bool) {
         let stride = places.len().div_ceil(POINTS_MAX).max(1);
+        // The last place is not lost where the stride steps over it.
         let last = places.last().filter(|_| places.len() % stride != 1 && stride > 1);
         let few: Vec<&Place> = places.iter().step_by(stride).chain(last).collect();
         let (low, high) = (Vector3::from(self.low_m), Vector3::from(self.high_m));

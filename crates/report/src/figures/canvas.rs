@@ -68,6 +68,7 @@ pub(super) fn inks(names: &[&str], width_px: f64) -> Vec<Ink> {
 
 /// Returns the attribute that encodes a dash pattern.
 fn dash_opacity(dash: usize) -> String {
+    // With its quotes: otherwise 0.99 would be found in 0.999.
     format!(" opacity=\"{}\"", 1.0 - DASH * dash as f64)
 }
 

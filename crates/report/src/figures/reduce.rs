@@ -27,6 +27,7 @@ pub(super) fn envelope(values: impl Iterator<Item = (f64, f64)>, end_s: f64, col
     }
     points.extend(column.into_iter().flat_map(|(_, extremes)| in_time(extremes)));
     points.extend(last);
+    // Both extremes of a column may be one point, and so may the last one and an extreme.
     points.dedup();
     points
 }
@@ -52,6 +53,7 @@ pub(super) fn simplify(points: &[(f64, f64)], scale: (f64, f64), tolerance: f64)
             .max_by(|x, y| x.1.total_cmp(&y.1))
             .filter(|(_, far)| *far > tolerance);
         match farthest.and_then(|(i, _)| Some((part.get(..=i)?, part.get(i..)?))) {
+            // The part before on top, so that points are kept in their order.
             Some((before, after)) => open.extend([after, before]),
             None => kept.push(*last),
         }

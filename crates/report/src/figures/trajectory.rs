@@ -65,6 +65,7 @@ impl View {
     /// Returns the pixel of a point.
     fn at(&self, p: Vector3<f64>) -> (f64, f64) {
         let middle = 0.5 * (self.low_m + self.high_m);
+        // No edge is zero: there is room around a constant, too.
         let (right, down) = self.direction((p - middle).component_div(&(self.high_m - self.low_m)));
         (self.middle_px.0 + right, self.middle_px.1 + down)
     }

@@ -32,6 +32,7 @@ use std::path::PathBuf;
 pub fn write(folder: &Folder, flown: &[Flown], claims: &[Claim]) -> Result<Vec<PathBuf>, Error> {
     let groups = groups::groups(flown);
     let draw = |group: &groups::Group<'_>| figures::flights::draw(&group.flights);
+    // Before any file is removed: a failure to draw leaves the earlier results.
     let sets = groups.iter().map(draw).collect::<io::Result<Vec<_>>>();
     let sets = sets.map_err(|source| folder.error("figures", source))?;
     let svg_name =

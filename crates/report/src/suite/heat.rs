@@ -46,6 +46,7 @@ fn ratio(figure: &Figure, comparison: &Comparison, entry: &Entry) -> Option<f64>
     let median = |entry: &Entry| entry.median(figure.measure.value).map(|median| median.value);
     let best = comparison.entries.iter().filter_map(median).min_by(f64::total_cmp)?;
     let own = median(entry)?;
+    // 1 also where both are zero, of which there is no ratio.
     Some(if own > best { own / best } else { 1.0 })
 }
 

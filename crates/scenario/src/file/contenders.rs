@@ -85,6 +85,7 @@ pub(super) fn read(root: &mut Table<'_>, flown: Flown<'_>) -> Result<Vec<Contend
     let defaults = Defaults { flown, profile, gains: axes, settings, monitor };
 
     let tables = root.few_tables("contender")?;
+    // A file that lists contenders of its own wants no others unless it names them.
     let kinds = controllers.unwrap_or(if tables.is_empty() { ControllerKind::PAPER.to_vec() } else { Vec::new() });
     let mut contenders = kinds.into_iter().map(|kind| defaults.contender(kind)).collect::<Result<Vec<_>, _>>()?;
     for table in tables {
@@ -107,6 +108,7 @@ fn contender(mut table: Table<'_>, file: Defaults<'_>, others: &[Contender]) -> 
         Some(profile) => Defaults {
             profile,
             gains: file.flown.gains(profile),
+            // One step serves all contenders, whatever the profile's is.
             settings: file.flown.settings(profile).with_dt_s(file.settings.common.dt_s),
             ..file
         },

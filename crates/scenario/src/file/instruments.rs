@@ -16,6 +16,7 @@ pub(super) fn read(table: Option<Table<'_>>) -> Result<InstrumentSuite, FileErro
         barometer: parts::instrument(&mut table, "barometer", &Barometer::PRESETS, &[])?,
         magnetometer: parts::instrument(&mut table, "magnetometer", &Magnetometer::PRESETS, &[])?,
     };
+    // Made before the table is finished, which takes it, and returned after: an unknown key may be a misspelt imu.
     let blind = table.fault("imu", "missing; add it, since the other instruments have no effect without it");
     table.finish()?;
     if suite.imu.is_some() { Ok(suite) } else { Err(blind) }

@@ -112,6 +112,7 @@ pub fn read(mut root: Table<'_>, name: &str, trajectory: Option<&Trajectory>) ->
         trajectory,
         contenders,
     };
+    // By itself and first, so that the error says that leaving it out is a cure.
     scenario.check_flight_core().map_err(|error| {
         let cure = "change that, or leave flight_core out";
         root.fault_at("flight_core", format!("it cannot fly with {}; {cure}", out_of_range(&error)))

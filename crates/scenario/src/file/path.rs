@@ -59,6 +59,7 @@ fn paced(piece: &PolynomialPiece, first_s: f64, start_s: f64, pace: f64) -> Poly
     let mut coefficients = piece.coefficients;
     for axis in &mut coefficients {
         let mut factor = 1.0;
+        // With s at `pace` times the speed, the coefficient of s^k takes the k-th power of it.
         for coefficient in axis {
             *coefficient *= factor;
             factor *= pace;
@@ -173,6 +174,7 @@ impl Lines<'_> {
 
     fn number(&self, row: &StringRecord, place: usize, head: &StringRecord) -> Result<f64, FileError> {
         let (text, column) = (row.get(place).unwrap_or_default(), head.get(place).unwrap_or_default());
+        // Derivatives and coefficients may be larger than the places themselves.
         let number = text.parse().ok().filter(|number: &f64| number.is_finite() && number.abs() <= 1e3 * LARGEST);
         let number = number.filter(|number| !column.ends_with("_m") || number.abs() <= LARGEST);
         number.ok_or_else(|| {

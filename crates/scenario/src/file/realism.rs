@@ -49,6 +49,7 @@ pub(super) fn read(
         }
         None => (default.contact, default.ground_effect),
     };
+    // The scenario's seed counts, not this one.
     Ok(Realism { rotors, drag, wind, contact, ground_effect, seed: 0 })
 }
 

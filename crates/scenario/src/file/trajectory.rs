@@ -190,6 +190,7 @@ fn through_places(table: &mut Table<'_>) -> Result<Trajectory, FileError> {
     for mut table in table.few_tables("waypoint")? {
         let position_m = table.need_vector("position_m", &POSITION)?;
         let place = [position_m.x, position_m.y, position_m.z, yaw(&mut table)?];
+        // A turn on the spot has no length, from which the time of the leg would follow.
         if places.last().is_some_and(|before| before[..3] == place[..3]) {
             return Err(table.fault_at("position_m", "it is that of the waypoint before; leave one out"));
         }

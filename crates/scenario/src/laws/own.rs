@@ -105,6 +105,7 @@ impl OwnLaw {
         self.check(taken).map_err(|problem| format!("law \"{}\": {problem}", self.name.escape_debug()))?;
         let mut all = REGISTERED.lock().unwrap_or_else(PoisonError::into_inner);
         let known = all.iter_mut().find(|known| known.0.name == self.name);
+        // Declared as before: kinds that others hold fly the new code, and nothing more is leaked.
         if let Some(OwnKind(same)) = known.as_deref().filter(|known| known.0.is_declared_as(&self)) {
             let make = self.make.into_inner().unwrap_or_else(PoisonError::into_inner);
             *same.make.write().unwrap_or_else(PoisonError::into_inner) = make;
@@ -171,6 +172,7 @@ impl OwnKind {
 
 impl PartialEq for OwnKind {
     fn eq(&self, other: &Self) -> bool {
+        // Each registered law lives at one address; what it does cannot be compared.
         core::ptr::eq(self.0, other.0)
     }
 }
@@ -292,6 +294,7 @@ impl<const N: usize> FlightController<N> for OwnFlight<N> {
 
     fn decide(&self, memory: &mut OwnMemory, state: &State, setpoint: &Setpoint, fresh: bool) -> Action<N> {
         let mut law = self.law.borrow_mut();
+        // An empty memory begins a flight: what the law remembers of an earlier one must not reach it.
         if !core::mem::replace(&mut memory.begun, true) {
             *law = None;
         }

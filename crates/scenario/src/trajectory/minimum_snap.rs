@@ -98,6 +98,7 @@ fn ends(t: f64) -> ([f64; 3], Matrix3<f64>, Matrix3<f64>) {
         arguments[argument / 4][argument % 4] = 1.0;
         let [start, end] = arguments;
         let [.., c4, c5, c6, _] = septic(start, end, t);
+        // The n-th derivative at 0 is n! times the n-th coefficient.
         [24.0 * c4, 120.0 * c5, 720.0 * c6]
     };
     let place = response(4);

@@ -92,6 +92,7 @@ pub fn written(pieces: &[PolynomialPiece]) -> String {
     let mut text = format!("duration{}\n", ["x", "y", "z", "yaw"].map(powers).concat());
     for piece in pieces {
         text += &piece.duration_s.to_string();
+        // As Debug writes it: read back to the last bit, and with an exponent, where Display would write all zeros.
         text.extend(piece.coefficients.iter().flatten().map(|coefficient| format!(",{coefficient:?}")));
         text.push('\n');
     }

@@ -70,10 +70,12 @@ impl<'a> FlightStart<'a> {
 
     /// Returns the world for steps of `dt_s`.
     fn world(&mut self, dt_s: f64) -> Result<World, OutOfRange> {
+        // Plant, sensors and estimator are made for one step: a contender with another one needs another world.
         let world = match self.world.take().filter(|world| world.dt_s() == dt_s) {
             Some(world) => world,
             None => World::new(self.scenario, dt_s)?,
         };
+        // A copy, since the flight moves it and the next contender needs the start.
         Ok(self.world.insert(world).clone())
     }
 }

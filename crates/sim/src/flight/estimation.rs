@@ -96,6 +96,7 @@ impl SimulatedEstimator {
     pub(super) fn new(scenario: &Scenario, step_s: f64, truth: &Truth) -> Result<Option<Box<Self>>, OutOfRange> {
         let mut settled = None;
         for waits_s in 0..=WAITS_S {
+            // Anew each time: the carrying has to end at t = 0, so a rest cannot be made longer once it is over.
             let Some(mut navigator) = Self::at_rest(scenario, step_s, f64::from(waits_s))? else { return Ok(None) };
             let is_ready = navigator.settle(truth);
             settled = Some(navigator);
@@ -136,6 +137,7 @@ impl SimulatedEstimator {
             let moving_s = (time_s + CARRIED_S).max(0.0);
             let rests = moving_s == 0.0;
             let acceleration = start.velocity_m_s * if rests { 0.0 } else { 1.0 / CARRIED_S };
+            // From here a constant acceleration reaches the start with its velocity just at t = 0.
             let still_m = start.position_m - start.velocity_m_s * (0.5 * CARRIED_S);
             self.front_end.set_on_ground(rests);
             let estimate = self.step(&Truth {
@@ -160,6 +162,7 @@ impl SimulatedEstimator {
     }
 
     fn see(&mut self, truth: &Truth) -> Look {
+        // Before the step: a number that is larger after it counts what was judged in it.
         let judged = self.judged();
         let estimate = self.step(truth);
         let valid = is_valid(&estimate);
@@ -213,6 +216,7 @@ impl SimulatedEstimator {
         let readings = self.sensing.read(truth, at_us);
         self.steps += 1;
         self.inbox = Inbox::EMPTY;
+        // Nothing of the default is valid, so that nobody flies on an estimate that there is not.
         self.front_end.tick(now_us, readings, &mut self.inbox).unwrap_or_default()
     }
 
@@ -247,6 +251,7 @@ fn is_valid(estimate: &Estimate) -> bool {
 fn errors(estimate: &Estimate, truth: &Truth) -> SVector<f64, 9> {
     let [w, x, y, z] = estimate.attitude.map(f64::from);
     let turn = truth.attitude * Quaternion::new(w, -x, -y, -z);
+    // The shorter way round: q and -q are the same rotation.
     let turn = if turn.w < 0.0 { -turn } else { turn };
     let sine = turn.vector().norm();
     // angle/sin(angle/2), whose limit is 2.

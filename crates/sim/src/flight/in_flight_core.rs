@@ -44,6 +44,7 @@ impl<C: FlightController<N>, const N: usize> InFlightCore<C, N> {
         if let Some(Aged { value, age_us }) = view.pose {
             self.inbox.put_pose(Stamped { value, at_us: at_us.saturating_sub(age_us.into()) });
         }
+        // A state that is only held would be taken for fresh; the flight core extrapolates between states by itself.
         match (view.state.filter(|state| view.new && state.is_plausible()), view.missing) {
             (Some(state), _) => self.inbox.locate(stamped(state)),
             (None, Some(missing)) => self.inbox.put_position_lost(view.position_lost.map(stamped), missing),
@@ -77,6 +78,7 @@ impl<C: FlightController<N>, const N: usize> Pilot for InFlightCore<C, N> {
         let (is_held, setpoint) = (self.now_us == 0, view.reference.setpoint());
         let state = view.state.filter(State::is_plausible);
         if is_held && state.is_some() {
+            // The vehicle is held, so its state is as true in each tick of arming as when it was measured.
             self.arm(&View { new: true, pose: None, ..view }, setpoint);
         }
         let mut action = if self.now_us > 0 { self.tick(&view, setpoint) } else { Action::default() };

@@ -41,6 +41,7 @@ pub fn lockstep<P: Pilot>(
     let mut watch = Watch::new(world.faulty_from_s());
     for step in 0..=steps {
         let sample = pilot.step(world)?;
+        // Before it is judged, so that a log ends with the step in which the vehicle was lost.
         let interrupted = observe(&sample).is_break();
         let reason = watch.lost(&sample, pilot.descends()).or_else(|| pilot.gave_up());
         let lost = reason.map(|reason| Lost { time_s: sample.time_s, reason });

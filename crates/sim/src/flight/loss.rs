@@ -87,6 +87,7 @@ impl Watch {
             return None;
         }
         self.off_since_s = falls.then(|| self.off_since_s.unwrap_or(time_s));
+        // Feet that bounce do not begin the time anew; a climb clear of the ground does.
         self.grounded = self.grounded.filter(|grounded| height_m < grounded.lowest_m + CLEAR_M);
         if touches {
             self.grounded.get_or_insert(Grounded { since_s: time_s, lowest_m: height_m });
@@ -97,6 +98,7 @@ impl Watch {
         }
         let off_too_long = self.off_since_s.is_some_and(|since_s| time_s - since_s > OFF_S);
         let grounded = self.grounded.filter(|grounded| time_s - grounded.since_s > GROUNDED_S);
+        // The cause first: what has never armed has its motors off in the air, or stands on the ground, as well.
         match grounded {
             _ if (off_too_long || grounded.is_some()) && !self.started => Some("never armed"),
             _ if off_too_long => Some("motors off in the air"),

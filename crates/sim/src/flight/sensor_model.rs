@@ -16,6 +16,7 @@ fn root(parts: &[f64]) -> f64 {
 
 /// Error of quantisation.
 fn step(lsb: f64) -> f64 {
+    // Standard deviation of an error that is uniform over one step.
     lsb / libm::sqrt(12.0)
 }
 

@@ -88,6 +88,7 @@ impl World {
         let wired = Wired::new(scenario, dt_s)?;
         Ok(World {
             wired,
+            // With its instruments the world would run an estimator of its own, beside the vehicle's.
             ..World::new(&Scenario { instruments: InstrumentSuite::default(), ..scenario.clone() }, dt_s)?
         })
     }
@@ -156,6 +157,7 @@ impl World {
         }
         let measurement = match &mut self.sensors {
             None => None,
+            // Sensors without faults need no copy of the motion.
             Some(sensors) if self.faults.are_none() => Some(measure(sensors, &motion)),
             Some(sensors) => Some(measure(sensors, &self.faults.seen(&motion, time_s))),
         };
@@ -164,6 +166,7 @@ impl World {
             Some(measurement) => measurement.fresh.then_some(measurement.state),
         };
         let reference = self.trajectory.at(time_s);
+        // Most flights have no outage, and their steps do not call cold code.
         let lost = !self.outages.is_empty() && is_lost(&self.outages, time_s);
         let telemetry = self.plant.telemetry();
         let new = measurement.is_none_or(|measurement| measurement.new);

@@ -56,11 +56,13 @@ impl Dispatcher {
         match calibrator.step((self.calibration.number, what), sample, now, |words| texts.say(info, words)) {
             Step::Continue => (),
             Step::Set(name, value) => {
+                // As if a station had set it: so it is checked, kept, flown with and sent to all.
                 let kind = Kind::Real32.number();
                 let request = ParameterRequest::Set { name: name.to_bytes(), value: value.to_le_bytes(), kind };
                 self.wishes.push_back(ParameterTask::Ask(request, Address::default())).ok();
             }
             Step::Finished => {
+                // The parameters' service may have refused one: what counts is what the table has.
                 let is_set = |(name, value)| table.get(name).is_some_and(|parameter| parameter.value == value);
                 let all_set = calibrator.found().all(is_set);
                 self.end_calibration(calibrator, all_set.then_some(what).ok_or("values not accepted"));

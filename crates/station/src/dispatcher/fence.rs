@@ -32,6 +32,7 @@ impl Dispatcher {
         let Some(home_m) = self.status.guided.home_m.map(|home_m| home_m.xy()) else { return };
         let off = |place_m: &Vector2<f32>| (place_m - here_m).norm_squared();
         let points = rally.iter().map(|item| chart.local([item.x, item.y]));
+        // From home on, which takes the place of rally points that are gone.
         self.safe_m = Some(points.fold(home_m, |best, point| if off(&point) < off(&best) { point } else { best }));
     }
 

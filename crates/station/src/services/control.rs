@@ -70,6 +70,7 @@ impl OperatorControl {
             Some(holder) if holder != from => ControlClaim::Refused { holder, first_time: self.is_first_refusal(from) },
             Some(_) => ControlClaim::Granted,
             None => {
+                // Stations know of another holder than this one: each is to be informed anew.
                 (self.holder, self.informed, self.next) = (Some((from, now_us)), [None; INFORMED_MAX], 0);
                 ControlClaim::Granted
             }

@@ -42,6 +42,7 @@ pub fn check_item(item: &MissionItem) -> Result<(), Invalid> {
     if ![0, 3, 5, 6].contains(&item.frame) {
         return refuse(MissionResult::UNSUPPORTED_FRAME, "frame is not supported");
     }
+    // Unsigned, since the smallest number has no other absolute value.
     if item.x.unsigned_abs() > 900_000_000 {
         return refuse(MissionResult::INVALID_X, "latitude is out of range");
     }
@@ -153,6 +154,7 @@ pub fn holds_circle(items: &[MissionItem], chart: &LocalChart, centre_m: Vector2
             }
         }
     };
+    // A point of it is inside, and nothing crosses it: then all of it is.
     contains(items, chart, centre_m + Vector2::new(radius_m, 0.0)) && boundaries(items, chart).all(clear)
 }
 
@@ -218,12 +220,14 @@ impl FenceWatch {
             let nears = motion.stops.iter().any(|path| boundary.is_neared(path));
             self.nears |= nears;
             if nears {
+                // At once: a round of 64 boundaries takes 32 ticks.
                 (self.view.leaves, self.stopped_ticks) = (true, 0);
             }
             match boundary {
                 Boundary::Circle { .. } => self.outside |= !boundary.allows(motion.here_m),
                 Boundary::Edge(a_m, b_m) => {
                     if next == begin {
+                        // One place for all edges: with one for each, a moving vehicle would spoil the count.
                         (self.from_m, self.odd) = (motion.here_m, false);
                     }
                     self.odd ^= passes_edge(self.from_m, a_m, b_m);
@@ -240,6 +244,7 @@ impl FenceWatch {
     /// Ends with the last boundary.
     fn end(&mut self) {
         let FenceWatch { nears, outside, stopped_ticks, .. } = *self;
+        // Until it has stopped: a vehicle that brakes is soon no longer about to leave.
         let lasts = self.view.leaves && stopped_ticks < STOPPED_TICKS;
         let view = FenceView { leaves: nears || outside || lasts, outside };
         *self = FenceWatch { view, stopped_ticks, ..FenceWatch::default() };

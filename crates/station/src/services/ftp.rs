@@ -99,6 +99,7 @@ impl<F: Copy> Ftp<F> {
         if let Some(again) = self.answered.iter().flatten().find(is_again) {
             return Some(again.reply);
         }
+        // It is being calculated: the answer to the first request is that to this one.
         if self.checksum.as_ref().is_some_and(|it| it.from == from && it.request == *request) {
             return None;
         }
@@ -263,6 +264,7 @@ impl<F: Copy> Ftp<F> {
         let (file, size) = store.open(path, access)?;
         // ArduPilot's clients number their sessions themselves; others ask with 0 and take what they are told.
         let mut wanted = [request.session].into_iter().chain(0..=u8::MAX);
+        // There is one: of 256 numbers a station has four at most.
         let number = wanted.find(|number| self.place_of(from, *number).is_none()).unwrap_or_default();
         if let Some(session) = self.sessions.get_mut(place) {
             let writes = access != FileAccess::Read;
@@ -275,6 +277,7 @@ impl<F: Copy> Ftp<F> {
     fn keep(&mut self, from: Address, request: FilePacket, reply: FilePacket, now_us: u64) {
         let own = self.answered.iter().position(|it| it.as_ref().is_some_and(|it| it.from == from));
         let oldest = || {
+            // An empty place is older than any answer.
             let ages = self.answered.iter().map(|it| it.as_ref().map_or(0, |it| it.at_us + 1));
             ages.enumerate().min_by_key(|(_, age)| *age).map(|(place, _)| place)
         };
@@ -316,6 +319,7 @@ impl Burst {
     /// Returns the next packet, and what is left of the burst behind it.
     fn next<F: Copy>(self, session: u8, file: F, store: &mut impl FileStore<File = F>) -> (FilePacket, Option<Self>) {
         let Burst { sequence, offset, size, left } = self;
+        // The number before: `ack` and `nak` count on by one.
         let request = FilePacket::request(sequence.wrapping_sub(1), FileOpcode::BURST_READ_FILE, session, offset, size);
         let mut block = [0; FILE_DATA_MAX];
         let into = block.get_mut(..size.into()).unwrap_or_default();
@@ -381,6 +385,7 @@ fn list(request: &FilePacket, path: &FilePath, store: &mut impl FileStore) -> Re
             None => write!(text, "D{}\0", entry.name),
         };
         if written.is_err() {
+            // No part of an entry: it is the first of the next packet.
             text.truncate(length);
             break;
         }

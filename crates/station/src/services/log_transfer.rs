@@ -73,6 +73,7 @@ impl LogTransfer {
         if let Some(Listing::Wanted([first, last])) = self.listing {
             let Poll::Ready(count) = store.count_logs() else { return None };
             let newest = count.saturating_sub(1);
+            // Not beyond the last: `clamp` panics if its limits are the wrong way round.
             let first = first.min(newest);
             self.listing = Some(Listing::Counted([count, first, last.clamp(first, newest)]));
         }
@@ -88,8 +89,10 @@ impl LogTransfer {
         let wanted = LOG_DATA_MAX.min(left as usize);
         let into = data.get_mut(..wanted).unwrap_or_default();
         let Poll::Ready(count) = store.read_log(log, offset, into) else { return None };
+        // Only now: while the store is waited for, the part is asked for again.
         self.parts.pop_front();
         let count = count.min(wanted);
+        // No underflow: `count` is at most `wanted`, and that at most `left`.
         let (offset_then, left) = (offset.saturating_add(count as u32), left - count as u32);
         // A part that is not full tells the end of the log; behind the last full one, an empty one.
         if count == LOG_DATA_MAX && left > 0 {

@@ -40,6 +40,7 @@ impl EarthOrigin {
     /// Creates the origin at a place, none within a kilometre of a pole.
     pub fn new(at: Global) -> Option<Self> {
         let Global { latitude_deg, longitude_deg, altitude_m } = at;
+        // At a pole there is no east: `global` and `chart` divide by the cosine. False of NaN.
         let possible = latitude_deg.abs() < 89.99 && longitude_deg.abs() <= 180.0 && altitude_m.abs() <= 1e5;
         let (sine, cosine) = libm::sincos(latitude_deg * DEG);
         let [from_axis_m, from_equator_m] = meridian(sine, cosine, altitude_m);
@@ -121,6 +122,7 @@ impl LocalChart {
     pub fn local(&self, [latitude_e7, longitude_e7]: [i32; 2]) -> Vector2<f32> {
         const TURN: i64 = 3_600_000_000;
         let [at_latitude, at_longitude] = self.at_e7;
+        // In 64 bits: a whole turn does not fit into 32.
         let off = i64::from(longitude_e7) - i64::from(at_longitude);
         let off = off
             - if off > TURN / 2 {

@@ -159,9 +159,11 @@ impl Signing {
             Some(stream) => time_10us > stream.time_10us,
             None => {
                 let is_late = time_10us < clock_10us.saturating_sub(BEHIND_MAX_10US) || time_10us <= self.floor_10us;
+                // No sender gives way: frames of one that is forgotten, up to a minute old, could be replayed.
                 !is_late && !self.streams.is_full()
             }
         };
+        // The time first: what is replayed costs no hash.
         if !is_new || !frame.is_signed_by(key) {
             return false;
         }
@@ -191,6 +193,7 @@ impl Signing {
 
     /// Returns key and stamp of the next frame to be sent, if it is to be signed.
     pub fn stamp(&mut self, now_us: u64) -> Option<(&Key, Stamp)> {
+        // Two frames within 10 us would have one time, and the second would count as a replay.
         let time_10us = self.clock_10us(now_us).max(self.signed_10us.saturating_add(1));
         let Lock::Signed(key) = &self.lock else { return None };
         self.signed_10us = time_10us;

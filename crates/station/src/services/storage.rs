@@ -17,6 +17,7 @@ impl FilePath {
     pub fn of(bytes: &[u8]) -> Option<Self> {
         let text = bytes.split(|byte| *byte == 0).next().unwrap_or_default();
         let text = core::str::from_utf8(text).ok()?;
+        // Backslash and colon: on some hosts they lead to another folder, or to another drive.
         if text.contains(|letter: char| letter.is_control() || letter == '\\' || letter == ':') {
             return None;
         }

@@ -139,6 +139,7 @@ impl Streams {
             Ok(interval_us) => interval_us.max(INTERVAL_MIN_US),
             Err(_) => 0,
         };
+        // A shorter interval need not wait for the end of the longer one before it.
         stream.due_us = stream.due_us.min(now_us.saturating_add(stream.interval_us.into()));
         true
     }
@@ -159,6 +160,7 @@ impl Streams {
     /// Carries out REQUEST_DATA_STREAM of older stations: rates of a `MAV_DATA_STREAM`. Returns what it is then, with
     /// no rate if there is no such group.
     pub fn set_group(&mut self, request: DataStream, now_us: u64) -> DataStream {
+        // Without a rate the group is switched off.
         let interval_us = 1_000_000_i32.checked_div(request.rate_hz.into()).unwrap_or(-1);
         let group: &[u32] = match request.group {
             2 => &[id::SYS_STATUS, id::BATTERY_STATUS, id::GPS_RAW_INT, id::MISSION_CURRENT],

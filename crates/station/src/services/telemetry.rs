@@ -96,6 +96,7 @@ fn quaternion(state: &afbc_types::State) -> [f32; 4] {
 fn heading_deg(yaw_rad: f32) -> f32 {
     let turns = -yaw_rad / TAU;
     let heading = 360.0 * (turns - F32Ext::floor(turns));
+    // A yaw just above 0 is rounded up to a whole turn.
     if heading < 360.0 { heading } else { 0.0 }
 }
 

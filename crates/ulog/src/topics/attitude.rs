@@ -22,6 +22,7 @@ impl VehicleAttitude {
             timestamp: moment.now_us(),
             timestamp_sample: moment.state_us(),
             q: moment.attitude()?,
+            // PX4's counters have 8 bits and wrap: readers look for a change.
             quat_reset_counter: resets as u8,
         })
     }

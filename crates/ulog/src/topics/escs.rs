@@ -92,6 +92,7 @@ impl EscStatusReport {
                 failures: if fails { GENERIC } else { 0 },
                 function: MOTOR_1 + motor,
             };
+            // Both below 8: `rotor` has a reading, and `motor` a place in the message.
             online |= u8::from(answers.wrapping_shr(rotor as u32) & 1 != 0).wrapping_shl(motor.into());
         }
         Some(EscStatusReport {

@@ -77,6 +77,7 @@ impl VehicleLocalPosition {
             z_valid: validity.height,
             v_xy_valid: validity.velocity,
             v_z_valid: validity.velocity || validity.height,
+            // Counters wrap, as PX4's: readers look for a change.
             xy_reset_counter: resets.position as u8,
             z_reset_counter: resets.height as u8,
             vxy_reset_counter: resets.velocity as u8,

@@ -38,6 +38,7 @@ impl VehicleRatesSetpoint {
     pub(crate) fn of(moment: &Moment<'_>) -> Option<Self> {
         let state = moment.state().filter(|_| moment.report.mode.armed())?;
         let trace = &moment.view.trace;
+        // e2 is 0 for a law without a virtual control.
         let error = |Errors { e1_dot, e2, .. }: Errors| if e2 == 0.0 { e1_dot } else { e2 };
         let errors = &trace.errors;
         let off = Vector3::new(error(errors.roll), error(errors.pitch), error(errors.yaw));

@@ -41,6 +41,7 @@ impl VehicleState {
             vehicle_type: ROTARY_WING,
             failsafe: report.guided.failsafe || report.mode == Mode::Descending,
             system_type: match moment.known.rotors {
+                // MAV_TYPE has no number for five or seven rotors.
                 6 => 13,
                 8 => 14,
                 _ => 2,

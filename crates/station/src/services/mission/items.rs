@@ -130,6 +130,7 @@ pub fn check(item: &MissionItem) -> Result<(), Invalid> {
     let Some(place) = place(item) else {
         return refuse(MissionResult::UNSUPPORTED_FRAME, "frame is not supported");
     };
+    // A take-off goes straight up: of its place, only the height counts.
     if item.command != TAKE_OFF {
         // A landing may be where the vehicle is.
         let anywhere = item.command == LAND && place.latitude_e7 == 0 && place.longitude_e7 == 0;
@@ -203,11 +204,13 @@ pub(super) fn check_jumps(items: &[MissionItem]) -> Result<(), (u16, Invalid)> {
             return refuse(MissionResult::NO_SPACE, "more than 8 jumps");
         }
         let [target, ..] = item.parameters;
+        // Whole and not negative: `check` has refused all others.
         if target as usize >= items.len() || target as usize == place {
             return refuse(MissionResult::INVALID_PARAM1, "there is no such item");
         }
         // Jumps that end are over some time.
         let mut next = place;
+        // After as many steps as there are items, one has come twice: then it goes around.
         let ends = (0..=items.len()).any(|_| {
             let Some(item) = at(next).filter(|item| !takes_time(item)) else { return true };
             let [target, repeats, ..] = item.parameters;

@@ -39,6 +39,7 @@ impl PlanItems {
     /// Replaces the items of a plan; false, and nothing changes, if there is no room for them.
     pub(super) fn replace(&mut self, plan: Plan, items: &[MissionItem]) -> bool {
         let Some((begin, count)) = self.place(plan).filter(|_| items.len() <= self.room(plan)) else { return false };
+        // By way of the list's end, where it can shrink and grow: a second list would take much of the stack.
         let (mission, others) = (plan == Plan::MISSION, self.items.len() - count);
         if let Some(rest) = self.items.get_mut(begin..) {
             rest.rotate_left(count.min(rest.len()));
