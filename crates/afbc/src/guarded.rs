@@ -190,12 +190,19 @@ impl<const N: usize> FlightController<N> for Guarded<N> {
         action
     }
 
+    // A law that has tripped and not yet handed over hands on what it is told.
     fn on_ground(&self, memory: &mut Memory<N>) {
-        self.adaptive.on_ground(&mut memory.afbc);
+        match &mut memory.stand_in {
+            Some(stand_in) => self.fallback.on_ground(&mut stand_in.cascade),
+            None => self.adaptive.on_ground(&mut memory.afbc),
+        }
     }
 
     fn position_lost(&self, memory: &mut Memory<N>) {
-        self.adaptive.position_lost(&mut memory.afbc);
+        match &mut memory.stand_in {
+            Some(stand_in) => self.fallback.position_lost(&mut stand_in.cascade),
+            None => self.adaptive.position_lost(&mut memory.afbc),
+        }
     }
 
     fn trace(memory: &Memory<N>) -> Trace {

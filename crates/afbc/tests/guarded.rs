@@ -416,6 +416,33 @@ fn a_reckoned_motion_shows_no_disturbance() {
     check(&Controller::new(Parameters::PAPER.to_f32(), direct(), law).unwrap());
 }
 
+/// The law that has taken over observes as AFBC does, and is told the same: a reckoned motion is no wind to it either.
+#[test]
+fn a_reckoned_motion_shows_the_fallback_law_no_disturbance() {
+    let controller = guarded(lax());
+    let asked = [false, true].map(|position_lost| {
+        let ((_, mut memory), mut state) = (tripped(50, 0.0), State::default());
+        let mut asked = 0.0;
+        // Pushed, and then not, if the motion is to be believed. On its setpoint, so that nothing is learnt from errors.
+        for accelerates_m_s2 in [1.0, 0.0] {
+            for _ in 0..1000 {
+                if position_lost && accelerates_m_s2 == 0.0 {
+                    controller.position_lost(&mut memory.control);
+                }
+                let (position_m, velocity_m_s) = (state.position_m, state.velocity_m_s);
+                let setpoint = Setpoint { position_m, velocity_m_s, ..Setpoint::default() };
+                let stepped = step(&controller, &mut memory, &state, &setpoint);
+                assert!(stepped.action.health.fallback.is_some());
+                [asked, _] = stepped.trace.virtual_m_s2;
+                state.velocity_m_s.x += 1e-3 * accelerates_m_s2;
+            }
+        }
+        asked
+    });
+    let [calm, reckoned] = asked;
+    assert!((calm - reckoned - 1.0).abs() < 0.05, "{calm}, {reckoned} m/s2");
+}
+
 /// Large learnt inputs fit the bounds only if they are spread by the weights of the present rules, which are those of
 /// each attitude's own angle and rate: the inputs do not change.
 #[test]

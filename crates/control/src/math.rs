@@ -49,7 +49,7 @@ pub fn exp2(x: f32) -> f32 {
     let bits = n.to_bits();
     // The index is always in range; `get` keeps a panic out of the tick.
     let power = POWERS.get(bits as usize % STEPS).copied().unwrap_or_default();
-    // Modulo 2^32: a negative number of steps of 1/64 lowers the exponent, which -126 keeps above the subnormal numbers.
+    // Modulo 2^32: a negative number of 1/64 steps lowers the exponent, which -126 keeps above the subnormal numbers.
     let power = f32::from_bits(power.wrapping_add(bits << 17));
     power + power * (f * (0.693_149_7 + f * 0.240_226_5))
 }

@@ -24,6 +24,8 @@ pub(crate) struct Armed<M> {
     pub(crate) open_loop: Option<Inputs>,
     /// What is remembered of turning at a pilot's rates.
     pub(crate) turning: RateMemory,
+    /// True if it has turned by them since the law's last step and since it rested on the ground.
+    pub(crate) turns: bool,
     /// True if it rests on the ground, and the controller's memory is as at take-off.
     pub(crate) idle_on_ground: bool,
     pub(crate) guide: Guide,
@@ -65,6 +67,7 @@ impl<M: Default> Armed<M> {
             applied: Inputs::default(),
             open_loop: None,
             turning: RateMemory::default(),
+            turns: false,
             // As after a rest: the law is told that it begins on the ground.
             idle_on_ground: true,
             guide: Guide::default(),
@@ -81,7 +84,7 @@ impl<M: Default> Armed<M> {
         if !self.idle_on_ground {
             self.forget();
         }
-        (self.idle_on_ground, self.applied) = (true, Inputs::default());
+        (self.idle_on_ground, self.turns, self.applied) = (true, false, Inputs::default());
         if let Some(state) = state {
             self.reckoning = dead_reckoning.start(state);
         }

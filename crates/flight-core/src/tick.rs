@@ -285,7 +285,7 @@ impl<C: FlightController<N>, const N: usize> FlightCore<C, N> {
                 return action;
             }
         };
-        flight.open_loop = None;
+        (flight.open_loop, flight.turns) = (None, false);
         flight.applied = action.given;
         self.dead_reckoning.trim(&mut flight.reckoning, &flight.applied);
         action
@@ -296,8 +296,8 @@ impl<C: FlightController<N>, const N: usize> FlightCore<C, N> {
     #[cold]
     #[inline(never)]
     fn turn(&self, flight: &mut Armed<C::Memory>, state: &State, target: &RateTarget) -> Action<N> {
-        // Only a step of the law leaves no such inputs: this is the first tick of turning.
-        if flight.open_loop.is_none() {
+        // From the ground, too, of which the law has been told: it is to end in the air.
+        if !mem::replace(&mut flight.turns, true) {
             flight.forget();
             flight.turning = RateMemory::default();
         }

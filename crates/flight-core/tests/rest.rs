@@ -7,8 +7,8 @@ use afbc_flight_core::landing::CARRIED_US;
 use afbc_flight_core::supervisor::{COAST_US, DESCEND_US};
 use afbc_flight_core::tumble::LOST_US;
 use afbc_flight_core::{
-    ArmingLimits, EndReason, FlightCore, FlightCoreMemory, Inbox, Mode, Refusal, Request, Stamped, TickOutcome,
-    Ticketed,
+    ArmingLimits, EndReason, FlightCore, FlightCoreMemory, Inbox, Mode, RateTarget, Refusal, Request, Stamped,
+    TickOutcome, Ticketed,
 };
 use afbc_types::{Inputs, Parameters, Setpoint, State};
 use nalgebra::Vector3;
@@ -27,6 +27,7 @@ struct Bench {
     now_us: u64,
     inbox: Inbox,
     state: State,
+    rates: Option<RateTarget>,
 }
 
 impl Bench {
@@ -35,7 +36,7 @@ impl Bench {
         let limits = ArmingLimits::default();
         let vehicle = FlightCore::new(Parameters::PAPER.to_f32(), limits, controller()).expect("valid");
         let (memory, inbox, state) = (FlightCoreMemory::default(), Inbox::default(), State::default());
-        let mut bench = Bench { vehicle, memory, now_us: 0, inbox, state };
+        let mut bench = Bench { vehicle, memory, now_us: 0, inbox, state, rates: None };
         bench.inbox.set_idle_on_ground(rests);
         bench.run(1001);
         assert_eq!(bench.ask(Request::Arm).answer.map(|answer| answer.result), Some(Ok(())));
@@ -55,7 +56,8 @@ impl Bench {
         }
         let value = Setpoint { position_m: Vector3::new(0.3, -0.2, 0.5), ..Setpoint::default() };
         self.inbox.put_setpoint(Stamped { value, at_us });
-        let inbox = self.inbox.take();
+        let mut inbox = self.inbox.take();
+        inbox.command_rates(self.rates.as_ref());
         self.vehicle.tick(&mut self.memory, self.now_us, &inbox)
     }
 
@@ -107,6 +109,30 @@ fn the_law_begins_afresh_when_it_takes_off() {
             assert_eq!(outcome.forces, expected.forces, "tick {tick} after {flown}");
             assert_eq!(outcome.motors.0.map(f32::to_bits), expected.speeds.0.map(f32::to_bits));
         }
+    }
+}
+
+/// A pilot who takes off at rates hands a law over in the air: it begins as one that was never told of the ground.
+#[test]
+fn after_a_take_off_at_rates_the_law_begins_in_the_air() {
+    let mut bench = Bench::armed(true);
+    bench.run(50);
+    bench.inbox.set_idle_on_ground(false);
+    bench.rates = Some(RateTarget { rates_rad_s: Vector3::zeros(), thrust: 0.6 });
+    for tick in 0..3000 {
+        let height_m = 0.0002 * tick as f32;
+        (bench.state.position_m.z, bench.state.velocity_m_s.z) = (height_m, 0.2);
+        assert_eq!(bench.tick(true).mode, Mode::Flying);
+    }
+    bench.rates = None;
+    let (controller, mut memory) = (controller(), Validated::default());
+    let target = Setpoint { position_m: Vector3::new(0.3, -0.2, 0.5), ..Setpoint::default() };
+    for tick in 0..200 {
+        bench.state.attitude_rad.x = 0.02 * (tick as f32 * 0.1).sin();
+        bench.state.rates_rad_s.x = 0.002 * (tick as f32 * 0.1).cos();
+        let expected = controller.step(&mut memory, Some(&bench.state), &target);
+        let outcome = bench.tick(true);
+        assert_eq!((outcome.mode, outcome.forces), (Mode::Flying, expected.forces), "tick {tick}");
     }
 }
 
