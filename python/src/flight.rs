@@ -62,7 +62,7 @@ impl PyFlight {
     #[getter]
     fn metrics<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let dict = PyDict::new(py);
-        for (name, value) in named(&self.flown.run.metrics, self.flown.run.is_settled()) {
+        for (name, value) in named(&self.flown.run.metrics) {
             dict.set_item(name, value)?;
         }
         Ok(dict)
@@ -107,9 +107,9 @@ impl PyFlight {
 }
 
 /// The figures of merit of a flight by the names that campaigns give them; none before errors are evaluated.
-fn named(metrics: &Metrics, settled: bool) -> Vec<(&'static str, Option<f64>)> {
+fn named(metrics: &Metrics) -> Vec<(&'static str, Option<f64>)> {
     let Metrics { rmse, max_abs, max_distance_m, mean_abs_delta_u: du, estimate, .. } = metrics;
-    let settled = |value: f64| settled.then_some(value);
+    let settled = |value: f64| metrics.measured(value);
     let mut named = vec![
         ("rmse_x_m", settled(rmse.x)),
         ("rmse_y_m", settled(rmse.y)),
@@ -229,7 +229,7 @@ pub(crate) fn compare<'py>(
     let lost_at = rows().map(|(.., flight)| flight.lost.map_or(f64::NAN, |lost| lost.time_s));
     dict.set_item("lost_at_s", PyArray1::from_iter(py, lost_at))?;
     dict.set_item("lost_reason", rows().map(|(.., flight)| flight.lost.map(|lost| lost.reason)).collect::<Vec<_>>())?;
-    let figures: Vec<_> = rows().map(|(.., flight)| named(&flight.metrics, true)).collect();
+    let figures: Vec<_> = rows().map(|(.., flight)| named(&flight.metrics)).collect();
     let names = figures.iter().max_by_key(|figures| figures.len()).map_or(Vec::new(), Clone::clone);
     for (name, _) in names {
         let value = |figures: &Vec<(&str, Option<f64>)>| {

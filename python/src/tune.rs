@@ -78,6 +78,10 @@ pub(crate) fn tune<'py>(
     dict.set_item("after", found.after)?;
     dict.set_item("evaluations", found.evaluations)?;
     dict.set_item("gains", gains)?;
-    dict.set_item("text", search::fragment(&found.contender))?;
+    let text = match &vehicle {
+        Some(vehicle) => search::vehicle_fragment(&found.contender, vehicle),
+        None => search::fragment(&found.contender),
+    };
+    dict.set_item("text", text)?;
     Ok(dict)
 }

@@ -39,8 +39,8 @@ impl Board for Emulated {
     type Sampler = Sampler;
     type Aids = NoSensors;
     type Links = [BoardLink<Receiver, Transmitter>; 1];
-    /// In RAM: QEMU's flash cannot be written, and every flight begins with the image's parameters.
     type Card = firmware::logging::NoCard;
+    /// In RAM: QEMU's flash cannot be written, and every flight begins with the image's parameters.
     type Memory = Ram<1024>;
     /// As QEMU's STM32F405 counts it: the host derives instructions from it.
     const CORE_HZ: u32 = 168_000_000;

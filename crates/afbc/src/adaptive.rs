@@ -58,9 +58,9 @@ impl Gains {
         }
     }
 
-    /// Returns the gains of a subsystem that is `slowness` times slower: each is scaled by its power of time, so that
-    /// errors take the same course, only slower. Bounds of the estimates stay, since disturbances do not slow down. Not
-    /// in the paper.
+    /// Returns the gains of a subsystem that is `slowness` times slower: each rate is scaled by its power of time, so
+    /// that errors take the same course, only slower. Bounds of the estimates stay, since disturbances do not slow
+    /// down; epsilon grows, so that the robust term is softer. Not in the paper.
     pub fn slowed(&self, slowness: f32) -> Self {
         let Gains { backstepping, gamma, eta, epsilon, safeguards, .. } = *self;
         let backstepping::Gains { alpha1, alpha2, stiffness } = backstepping;

@@ -423,7 +423,7 @@ fn a_reckoned_motion_shows_the_fallback_law_no_disturbance() {
     let asked = [false, true].map(|position_lost| {
         let ((_, mut memory), mut state) = (tripped(50, 0.0), State::default());
         let mut asked = 0.0;
-        // Pushed, and then not, if the motion is to be believed. On its setpoint, so that nothing is learnt from errors.
+        // Pushed, and then not, if the motion is to be believed. On its setpoint: nothing is learnt from errors.
         for accelerates_m_s2 in [1.0, 0.0] {
             for _ in 0..1000 {
                 if position_lost && accelerates_m_s2 == 0.0 {

@@ -89,7 +89,7 @@ pub static QUANTITIES: [Quantity; 35] = [
         "rotor_efficiency",
         Quantity {
             whole: true,
-            ..quantity("fault_rotor", 1.0, 4.0, "number of the failing rotor; by default the first", |f, x| {
+            ..quantity("fault_rotor", 1.0, 8.0, "number of the failing rotor; by default the first", |f, x| {
                 f.scenario.realism.rotors.faults.last_mut().into_iter().for_each(|fault| fault.rotor = x as u8);
             })
         },

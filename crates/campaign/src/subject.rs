@@ -7,7 +7,7 @@ use afbc_scenario::Scenario;
 use std::path::{Path, PathBuf};
 use toml::de::DeTable;
 
-/// SubjectKind of a file.
+/// What a file describes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SubjectKind {
     /// Flown by `sitl fly`.

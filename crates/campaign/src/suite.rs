@@ -171,8 +171,10 @@ fn flight(
     }
     let scenario = match table.text("scenario")? {
         Some(file) => {
-            let scenario = Scenario { name: name.into(), ..named(&table, "scenario", file, folder)? };
-            table.text("description")?;
+            let mut scenario = Scenario { name: name.into(), ..named(&table, "scenario", file, folder)? };
+            if let Some(description) = table.text("description")? {
+                scenario.description = description.into();
+            }
             table.finish()?;
             scenario
         }

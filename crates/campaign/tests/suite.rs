@@ -52,6 +52,12 @@ fn a_flight_takes_over_what_it_does_not_say() {
     let hover = flown("trajectory = { kind = \"hover\", position_m = [0, 0, 1] }");
     assert_eq!(hover.scenario.trajectory.at(0.0).velocity_m_s.norm(), 0.0);
 
+    // A scenario's flight has the suite's words, if it has any.
+    let named = |words: &str| format!("{FIRST}\n[[flight]]\nname = \"second\"\nscenario = \"hardware\"\n{words}");
+    let described = |words: &str| suite(&named(words)).unwrap().flights.remove(1).scenario.description;
+    assert_eq!(described("description = \"ours\""), "ours");
+    assert!(!described("").is_empty());
+
     // Of an heir, too; and what is written last counts.
     let third = second("duration_s = 8.0") + "\n[[flight]]\nname = \"third\"\nlike = \"second\"\ntilt_max_rad = 0.9";
     let third = suite(&third).unwrap().flights.remove(2);

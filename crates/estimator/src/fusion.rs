@@ -347,7 +347,8 @@ impl Estimator {
                 if !memory.knows.heading {
                     let turn = wrap_angle(self.magnetic_north_rad - atan2(field.y, field.x));
                     // A tilt turns the horizontal field by the tangent of its dip: the variance by the square of that.
-                    let slope = field.z * field.z / max(field.x * field.x + field.y * field.y, 1e-3 * strength);
+                    let floor = 1e-3 * strength * strength;
+                    let slope = field.z * field.z / max(field.x * field.x + field.y * field.y, floor);
                     let variance = field_variance(&field, part.variance.x)
                         + min(slope, 100.0) * max(variances.theta.x, variances.theta.y);
                     memory.reset_heading(turn, variance, Some(self.magnetic_north));

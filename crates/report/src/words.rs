@@ -8,7 +8,7 @@ use afbc_plant::{
 use afbc_scenario::Scenario;
 use afbc_scenario::case::{Reading, Sign};
 use afbc_scenario::contender::Contender;
-use afbc_sim::metrics::EstimateMetrics;
+use afbc_sim::metrics::{EstimateMetrics, Metrics};
 use afbc_sim::run::Tripped;
 use afbc_types::Axis;
 
@@ -212,6 +212,11 @@ pub(super) const fn symbol(axis: Axis) -> &'static str {
         Axis::X => "x",
         Axis::Y => "y",
     }
+}
+
+/// Returns the cell of a figure from 5 s to the end: empty for a flight that was over before.
+pub(super) fn measured(metrics: &Metrics, figure: f64) -> String {
+    metrics.measured(figure).map_or_else(String::new, |figure| figure.to_string())
 }
 
 /// Example: "lost at t = 15.625 s: tilted beyond 90 degrees".

@@ -127,7 +127,7 @@ impl Server {
             send(place, &bytes);
             changed |= vehicle.system() != system;
         }
-        if let Some(system) = self.ambiguous().filter(|_| changed) {
+        if changed && let Some(system) = self.ambiguous() {
             log(&format!("{now_s:.3} several vehicles have the system id {system}: set MAV_SYS_ID of one of them"));
         }
         self.now_ms += 1;

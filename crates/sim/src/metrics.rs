@@ -11,6 +11,8 @@ pub const SETTLED_S: f64 = 5.0;
 /// Figures of merit: each vector is \[x, y, z, psi\] in m and rad, or \[U1, U2, U3, U4\] in N.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Metrics {
+    /// True if the flight reached [`SETTLED_S`]: of one that did not, only [`Metrics::final_error`] was measured.
+    pub settled: bool,
     /// Root mean square error from [`SETTLED_S`] to the end.
     pub rmse: Vector4<f64>,
     /// Largest absolute error from [`SETTLED_S`] to the end.
@@ -94,6 +96,13 @@ pub fn is_settled(time_s: f64) -> bool {
     time_s >= SETTLED_S - 5e-7
 }
 
+impl Metrics {
+    /// Returns one of the figures from [`SETTLED_S`] to the end, none of a flight that was over before.
+    pub fn measured(&self, figure: f64) -> Option<f64> {
+        self.settled.then_some(figure)
+    }
+}
+
 impl Accumulator {
     /// Adds one step.
     // Inlined, so that of a sample only what is read is ever made.
@@ -153,6 +162,7 @@ impl Accumulator {
         let count = self.estimates as f64;
         let root = |sum: Vector3<f64>| (sum / count).map(libm::sqrt);
         Metrics {
+            settled: self.errors > 0,
             rmse: mean(self.sum_squares, self.errors).map(libm::sqrt),
             max_abs: self.max_abs,
             max_distance_m: self.max_distance_m,

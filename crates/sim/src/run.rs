@@ -1,7 +1,7 @@
 //! One flight with its log and metrics.
 
 use crate::flight::{Lost, Sample, fly};
-use crate::metrics::{Accumulator, Metrics, SETTLED_S, inputs};
+use crate::metrics::{Accumulator, Metrics, inputs};
 use afbc_scenario::Scenario;
 use afbc_scenario::contender::Contender;
 use afbc_types::OutOfRange;
@@ -37,7 +37,7 @@ pub struct Tripped {
 impl Run {
     /// True if the flight reached the time from which errors are evaluated.
     pub fn is_settled(&self) -> bool {
-        self.log.last().is_some_and(|last| last.time_s >= SETTLED_S)
+        self.metrics.settled
     }
 
     /// Flies `scenario` under `contender`, logging every `log_every`-th step (at least 1).

@@ -161,6 +161,10 @@ fn sessions_are_bounded_and_those_of_their_station() {
     bench.now_us += 60_000_000;
     assert_eq!(bench.open(A, "a"), Err(FtpError::NO_SESSIONS_AVAILABLE));
     bench.now_us += 1;
+    // A file that is not there costs nobody a session.
+    assert!(bench.open(B, "b").is_err());
+    assert_eq!((bench.store.open_count(), bench.read(B, other, 0, 9).expect("read").len()), (SESSIONS, 9));
+    bench.now_us += 60_000_001;
     bench.open(A, "a").expect("open");
     assert_eq!(bench.store.open_count(), SESSIONS);
 }

@@ -164,7 +164,7 @@ pub fn fragment(contender: &Contender) -> String {
 
 /// Gains of `contender` as `[gains.flight]` of the file of `vehicle`: every gain that a search may change, so that they
 /// stay what was found when the rule changes, and what else is not by rule.
-pub(super) fn vehicle_fragment(contender: &Contender, vehicle: &Vehicle) -> String {
+pub fn vehicle_fragment(contender: &Contender, vehicle: &Vehicle) -> String {
     let kind = contender.kind();
     let rule = Contender::of(kind, Profile::Flight).by_rule(vehicle);
     let base = keys(&rule);

@@ -81,7 +81,7 @@ fn max_by_force(table: &mut Table<'_>, rotors: &mut Rotors, truth: &Parameters<f
     max.check(rotors.max_rad_s).map_err(|error| table.fault_at(FORCE_MAX.name, problem(error)))
 }
 
-/// The body that carries the rotors.
+/// Reads `[battery]`; what it does not say is as in `default`.
 ///
 /// # Errors
 /// As [`parameters`].

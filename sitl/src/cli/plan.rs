@@ -45,15 +45,20 @@ impl PlanFlight {
         {
             return Err(format!("{file}: plannedHomePosition: it is at a pole; plan elsewhere").into());
         }
-        if let Some(path) = &self.exact_log {
-            vehicle.record(LogFile::create(path).map_err(|error| unwritten(path, &error))?);
-        }
+        let exact_log = match &self.exact_log {
+            Some(path) => Some((path, LogFile::create(path).map_err(|error| unwritten(path, &error))?)),
+            None => None,
+        };
+        exact_log.iter().for_each(|(_, file)| vehicle.record(file.clone()));
         let mcap = FlightMcap::create(self.mcap, &mut self.ulog)?;
         if let Some(path) = &self.ulog {
             vehicle.log(UlogFiles::create(path)?);
         }
         let end = fly_plan(&mut vehicle, &plan, self.duration.unwrap_or(LONGEST_S), &mut |line| say(line));
         vehicle.end_log()?;
+        if let Some((path, file)) = exact_log {
+            file.finish().map_err(|error| unwritten(path, &error))?;
+        }
         mcap.map(FlightMcap::finish).transpose()?;
         let end = end.map_err(|problem| format!("{file}: {problem}"))?;
         let how = match (end.complete || end.reached.contains(&last(&plan)), end.disarmed) {

@@ -14,12 +14,14 @@ pub enum RecordChange {
     Restored,
 }
 
+/// Rounds over the store in which values that need one another are set.
+const ROUNDS_MAX: u32 = 100;
+
 /// How to read what earlier images have written.
 ///
 /// A name is used once: a parameter whose meaning or unit changes keeps its name, and gets a line in `changed`; one
-/// that
-/// gets a new name, a line in `renamed`. A range that changes needs neither, since each value is checked when it is
-/// read.
+/// that gets a new name, a line in `renamed`. A range that changes needs neither, since each value is checked when it
+/// is read.
 #[derive(Clone, Copy, Debug)]
 pub struct Kept {
     /// Number of the present meanings, at least the largest of `changed`.
@@ -78,7 +80,7 @@ impl Kept {
         mut notice: impl FnMut(Reason),
     ) -> Result<(), Error<F::Error>> {
         let mut last = false;
-        loop {
+        for round in 1.. {
             // In rounds: a value may be possible only beside another that comes later in the store.
             let mut more = false;
             store.visit(|name, edition, bits| {
@@ -96,8 +98,11 @@ impl Kept {
             if last {
                 return Ok(());
             }
-            last = !more;
+            // Bounded: a former and a present name of one parameter may stand beside each other after a cut of power,
+            // and set it in turns.
+            last = !more || round == ROUNDS_MAX;
         }
+        Ok(())
     }
 
     /// Writes a change.

@@ -133,8 +133,9 @@ impl Run {
     /// Notes what the log says, whatever becomes of the replay.
     fn count(&mut self, record: &Record) {
         if let Record::Start(_) = record {
-            self.out.starts += 1;
+            // As the start before counts: this one begins where that one's last tick was.
             self.began_us = self.now_us(self.last_us);
+            self.out.starts += 1;
             (self.next, self.is_armed) = (0, false);
         }
         if self.out.starts == 0 {

@@ -294,7 +294,7 @@ fn motions(tables: &Tables, origin: Option<&Origin>) -> (Vec<LoggedState>, Sampl
     states::collect(states, rows.len(), Sensor::Motion, VEHICLE_LOCAL_POSITION.0)
 }
 
-/// A counter of resets, what it counts, the jump's coordinates, their factor and unit.
+/// A counter of resets, what it counts, the jump's coordinates, and their unit.
 type Counter = (&'static str, &'static str, &'static [&'static str], &'static str);
 
 const COUNTERS: [Counter; 4] = [

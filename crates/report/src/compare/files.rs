@@ -1,6 +1,7 @@
 //! `comparison.csv` and `comparison.json`.
 
 use crate::differences::{self, FigureOverSeeds};
+use crate::words::measured;
 use afbc_campaign::compare::{Average, Comparison, DISTANCE, Entry, MEASURES, Measure, Outcome};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -11,7 +12,7 @@ pub(super) fn measures() -> Vec<&'static Measure> {
     [&DISTANCE].into_iter().chain(&MEASURES).collect()
 }
 
-/// Writes a row for each flight. A lost flight's figures cover the time until the loss.
+/// Writes a row for each flight. A lost flight's figures cover the time until the loss; none are measured before 5 s.
 pub(super) fn csv(out: &mut dyn Write, comparisons: &[Comparison]) -> io::Result<()> {
     let mut csv = csv::Writer::from_writer(out);
     let measures = measures();
@@ -22,7 +23,7 @@ pub(super) fn csv(out: &mut dyn Write, comparisons: &[Comparison]) -> io::Result
             for Outcome { seed, lost, metrics, .. } in &entry.flights {
                 let contender = entry.contender();
                 let who = [comparison.scenario.name.clone(), contender.name.clone(), contender.kind().name().into()];
-                let figures = measures.iter().map(|figure| (figure.value)(metrics).to_string());
+                let figures = measures.iter().map(|figure| measured(metrics, (figure.value)(metrics)));
                 let lost = lost.map_or(String::new(), |lost| lost.time_s.to_string());
                 csv.write_record(who.into_iter().chain([seed.to_string()]).chain(figures).chain([lost]))?;
             }

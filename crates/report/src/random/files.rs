@@ -2,6 +2,7 @@
 
 use super::Judged;
 use super::judged::Group;
+use crate::words::measured;
 use afbc_campaign::compare::Outcome;
 use afbc_campaign::random::{Ranking, is_level};
 use serde::Serialize;
@@ -62,9 +63,9 @@ pub(super) fn csv(out: &mut dyn Write, judged: &Judged<'_>) -> io::Result<()> {
             let how = [
                 contender.name.clone(),
                 contender.kind().name().into(),
-                rms_m.to_string(),
-                metrics.max_distance_m.to_string(),
-                metrics.rmse.w.to_string(),
+                measured(metrics, rms_m),
+                measured(metrics, metrics.max_distance_m),
+                measured(metrics, metrics.rmse.w),
                 level.to_string(),
                 lost_at,
                 lost,

@@ -3,12 +3,14 @@
 use super::FlownSuite;
 use super::cells::{FIGURES, Figure};
 use crate::differences::{self, FigureOverSeeds};
+use crate::words::measured;
 use afbc_campaign::compare::{Comparison, Entry, Measure, Outcome};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::io::{self, Write};
 
-/// Writes a row for each flight of each contender. A lost flight's figures cover the time until the loss.
+/// Writes a row for each flight of each contender. A lost flight's figures cover the time until the loss; none are
+/// measured before 5 s.
 pub(super) fn csv(out: &mut dyn Write, flown: FlownSuite<'_>) -> io::Result<()> {
     let mut csv = csv::Writer::from_writer(out);
     let inputs = (1..=4).map(|input| format!("mean_abs_delta_u{input}_n"));
@@ -22,7 +24,7 @@ pub(super) fn csv(out: &mut dyn Write, flown: FlownSuite<'_>) -> io::Result<()> 
                 let who = [comparison.scenario.name.clone(), contender.name.clone(), contender.kind().name().into()];
                 let errors = [metrics.rmse.xyz().norm(), metrics.max_distance_m, metrics.rmse.w];
                 let inputs = metrics.mean_abs_delta_u.iter().copied();
-                let figures = errors.into_iter().chain(inputs).map(|figure| figure.to_string());
+                let figures = errors.into_iter().chain(inputs).map(|figure| measured(metrics, figure));
                 let lost = lost.map_or([String::new(), String::new()], |l| [l.time_s.to_string(), l.reason.into()]);
                 let trip = tripped.map_or([String::new(), String::new()], |t| [t.time_s.to_string(), t.reason.into()]);
                 let row = who.into_iter().chain([seed.to_string()]).chain(figures).chain(lost).chain(trip);

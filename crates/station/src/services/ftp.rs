@@ -256,12 +256,12 @@ impl<F: Copy> Ftp<F> {
             None => {
                 let idle =
                     |it: &Option<Session<F>>| it.as_ref().is_some_and(|it| now_us.saturating_sub(it.used_us) > IDLE_US);
-                let idle = self.sessions.iter().position(idle).ok_or(FtpError::NO_SESSIONS_AVAILABLE)?;
-                self.close(idle, store);
-                idle
+                self.sessions.iter().position(idle).ok_or(FtpError::NO_SESSIONS_AVAILABLE)?
             }
         };
         let (file, size) = store.open(path, access)?;
+        // Only now: a file that cannot be opened costs no idle session.
+        self.close(place, store);
         // ArduPilot's clients number their sessions themselves; others ask with 0 and take what they are told.
         let mut wanted = [request.session].into_iter().chain(0..=u8::MAX);
         // There is one: of 256 numbers a station has four at most.
