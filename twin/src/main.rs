@@ -51,21 +51,21 @@ use ublox::Generation;
 const RECEIVERS: [(&str, Option<Generation>); 3] =
     [("nmea", None), ("m8", Some(Generation::Eight)), ("m10", Some(Generation::Ten))];
 
-fn machine() -> Arg {
+fn machine_argument() -> Arg {
     let names = MachineName::ALL.map(MachineName::name);
     Arg::new("machine").required(true).value_parser(PossibleValuesParser::new(names)).help("The board")
 }
 
-fn file(name: &'static str, help: &'static str) -> Arg {
+fn file_argument(name: &'static str, help: &'static str) -> Arg {
     Arg::new(name).required(true).value_parser(value_parser!(PathBuf)).help(help)
 }
 
-fn image() -> Arg {
-    file("image", "The flight image, an ELF file")
+fn image_argument() -> Arg {
+    file_argument("image", "The flight image, an ELF file")
 }
 
-fn scenario() -> Arg {
-    file("scenario", "The scenario's file")
+fn scenario_argument() -> Arg {
+    file_argument("scenario", "The scenario's file")
 }
 
 fn option(name: &'static str, value: &'static str, help: &'static str) -> Arg {
@@ -76,7 +76,7 @@ fn whole(name: &'static str, usual: &'static str, help: &'static str) -> Arg {
     option(name, "N", help).value_parser(value_parser!(u64)).default_value(usual)
 }
 
-fn mission() -> Arg {
+fn mission_argument() -> Arg {
     let mission = Arg::new("mission").long("mission").action(ArgAction::SetTrue);
     mission.help("Fly a mission of two minutes, uploaded over the link, in the place of the hover")
 }
@@ -87,7 +87,7 @@ fn command() -> Command {
     let rate = whole("rate", "250", "Frames per second at which the kill switch is tried; may be given again")
         .value_parser(value_parser!(u64).range(1..=1000))
         .action(ArgAction::Append);
-    let kept = file("hover", "Where the hover is kept, from which further runs begin");
+    let kept = file_argument("hover", "Where the hover is kept, from which further runs begin");
     let only = option("only", "NAME", "Those whose names begin so; may be given again").action(ArgAction::Append);
     let seeds = [whole("seeds", "1", "Flights of each fault"), whole("first", "1", "The first one's seed")];
     let cuts =
@@ -97,33 +97,35 @@ fn command() -> Command {
         .about("Runs the flight image of a board, as it is flashed, on register-level models of the board")
         .subcommand_required(true)
         .arg_required_else_help(true)
-        .subcommand(Command::new("boot").about("Boot, and look at bus and pins").args([machine(), image()]))
+        .subcommand(
+            Command::new("boot").about("Boot, and look at bus and pins").args([machine_argument(), image_argument()]),
+        )
         .subcommand(fly_command())
         .subcommand(Command::new("radio").about("Fly by radio, and stop the motors by the kill switch").args([
-            machine(),
-            image(),
-            scenario(),
+            machine_argument(),
+            image_argument(),
+            scenario_argument(),
             rate,
             phases,
         ]))
-        .subcommand(escs.args([machine(), image(), scenario()]))
-        .subcommand(Command::new("replay").about("Fly an exact log again").arg(file("log", "The log")))
+        .subcommand(escs.args([machine_argument(), image_argument(), scenario_argument()]))
+        .subcommand(Command::new("replay").about("Fly an exact log again").arg(file_argument("log", "The log")))
         .subcommand(
             Command::new("faults")
                 .about("Faults at a board's pins, in a hover that is kept in a file")
-                .args([machine(), image(), scenario(), kept, only])
+                .args([machine_argument(), image_argument(), scenario_argument(), kept, only])
                 .args(seeds),
         )
         .subcommand(
             Command::new("cuts")
                 .about("Power cut while the Matek H743 writes and erases its parameters")
-                .arg(image())
+                .arg(image_argument())
                 .args(cuts),
         )
         .subcommand(
             Command::new("host")
                 .about("Fly a scenario with the firmware's code on this machine")
-                .args([scenario(), mission()]),
+                .args([scenario_argument(), mission_argument()]),
         )
 }
 
@@ -150,13 +152,13 @@ fn fly_command() -> Command {
     );
     let fetch = Arg::new("fetch").long("fetch").action(ArgAction::SetTrue).requires("card");
     Command::new("fly").about("Take off, hover and land, in lockstep with the plant").args([
-        machine(),
-        image(),
-        scenario(),
+        machine_argument(),
+        image_argument(),
+        scenario_argument(),
         receiver,
         log.value_parser(value_parser!(PathBuf)),
         hover,
-        mission(),
+        mission_argument(),
         card.value_parser(value_parser!(PathBuf)),
         from_until("card-stall", "The card stalls: when, and for how long"),
         from_until("card-out", "The card is out: from when, and until when"),
