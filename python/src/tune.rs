@@ -78,10 +78,6 @@ pub(crate) fn tune<'py>(
     dict.set_item("after", found.after)?;
     dict.set_item("evaluations", found.evaluations)?;
     dict.set_item("gains", gains)?;
-    let text = match &vehicle {
-        Some(vehicle) => search::vehicle_fragment(&found.contender, vehicle),
-        None => search::fragment(&found.contender),
-    };
-    dict.set_item("text", text)?;
+    dict.set_item("text", search::found_text(&found.contender, &flights))?;
     Ok(dict)
 }

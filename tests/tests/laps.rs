@@ -113,11 +113,13 @@ fn all_errors(flight: &(Scenario, f64)) -> [[f64; LAPS]; 3] {
 }
 
 /// On drag unlike what the file says, each lap is nearer than the one before, and lap 5 is half of INDI's at most, with
-/// twice the drag nearer by 15 % at least than without the memory. Of all else the memory makes no flight worse.
+/// twice the drag nearer by 15 % at least than without the memory, and half of lap 1 on the paper's vehicle, 0.65 on
+/// the racer. Of all else the memory makes no flight worse.
 #[test]
 fn what_the_file_does_not_tell_is_learnt_lap_by_lap() {
     let mut table = String::from("| | lap 1 | 2 | 3 | 5 | 5, no memory | 5, INDI |\n|---|--:|--:|--:|--:|--:|--:|\n");
-    for (vehicle, speed_m_s, title) in [("paper", 3.0, "paper's vehicle, 3 m/s"), ("racer", 4.0, "racer, 4 m/s")] {
+    let flown = [("paper", 3.0, "paper's vehicle, 3 m/s", [0.5, 0.8]), ("racer", 4.0, "racer, 4 m/s", [0.65, 0.85])];
+    for (vehicle, speed_m_s, title, [of_lap_1, of_forgetful]) in flown {
         for unlike in Unlike::ALL {
             let [with, without, peer] = all_errors(&laps(vehicle, speed_m_s, unlike));
             let case = format!("{title}, {}", unlike.words());
@@ -128,7 +130,8 @@ fn what_the_file_does_not_tell_is_learnt_lap_by_lap() {
             println!("{seen}");
             if let Unlike::Drag(factor) = unlike {
                 assert!(with.is_sorted_by(|a, b| a >= b) && with[4] < 0.5 * peer[4], "{seen}");
-                assert!(factor < 1.0 || with[4] < 0.85 * without[4], "{seen}");
+                let learnt = with[4] < of_lap_1 * with[0] && with[4] < of_forgetful * without[4];
+                assert!(factor < 1.0 || learnt, "{seen}");
             }
             assert!(with[4] < 1.05 * without[4], "{seen}");
         }

@@ -21,7 +21,7 @@ const BYTE_BITS: u64 = 10;
 /// true \[us\]; none for an epoch without a fix.
 pub async fn run(mut uart: BufferedUart<'static>, mut take: impl FnMut(u64, Option<FixReading>)) {
     let mut receiver = UbxReceiver::new();
-    // More than half of the UART's ring, at which it wakes this task too.
+    // At least half of the UART's ring, at which it wakes this task too.
     let mut bytes = [0; 512];
     let mut byte_us = 0;
     loop {

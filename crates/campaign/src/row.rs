@@ -59,7 +59,7 @@ struct Tally {
 
 impl Tally {
     fn measured(&self, value: f64) -> Option<f64> {
-        (self.settled > 0).then_some(value)
+        self.metrics.measured(value)
     }
 
     /// Returns `value`, a change between two steps, if there were two.

@@ -54,8 +54,7 @@ impl Bench {
         if seen {
             self.inbox.put_state(Stamped { value: self.state, at_us });
         }
-        let value = Setpoint { position_m: Vector3::new(0.3, -0.2, 0.5), ..Setpoint::default() };
-        self.inbox.put_setpoint(Stamped { value, at_us });
+        self.inbox.put_setpoint(Stamped { value: target(), at_us });
         let mut inbox = self.inbox.take();
         inbox.command_rates(self.rates.as_ref());
         self.vehicle.tick(&mut self.memory, self.now_us, &inbox)
@@ -67,6 +66,23 @@ impl Bench {
         }
         self.tick(true)
     }
+
+    /// Flies on, every bit as the law alone with this memory.
+    fn flies_as(&mut self, mut memory: Validated<Adapted>, case: &str) {
+        let controller = controller();
+        for tick in 0..200 {
+            self.state.attitude_rad.x = 0.02 * (tick as f32 * 0.1).sin();
+            self.state.rates_rad_s.x = 0.002 * (tick as f32 * 0.1).cos();
+            let expected = controller.step(&mut memory, Some(&self.state), &target());
+            let outcome = self.tick(true);
+            assert_eq!((outcome.mode, outcome.forces), (Mode::Flying, expected.forces), "tick {tick}, {case}");
+            assert_eq!(outcome.motors.0.map(f32::to_bits), expected.speeds.0.map(f32::to_bits), "tick {tick}, {case}");
+        }
+    }
+}
+
+fn target() -> Setpoint {
+    Setpoint { position_m: Vector3::new(0.3, -0.2, 0.5), ..Setpoint::default() }
 }
 
 /// The estimate of a vehicle that stands may wander by metres; nothing takes off for that.
@@ -98,17 +114,9 @@ fn the_law_begins_afresh_when_it_takes_off() {
         bench.state.position_m = Vector3::new(0.05, 0.0, 0.0);
         bench.run(50);
         bench.inbox.set_idle_on_ground(false);
-        let (controller, mut memory) = (controller(), Validated::default());
-        controller.on_ground(&mut memory.control);
-        let target = Setpoint { position_m: Vector3::new(0.3, -0.2, 0.5), ..Setpoint::default() };
-        for tick in 0..200 {
-            bench.state.attitude_rad.x = 0.02 * (tick as f32 * 0.1).sin();
-            bench.state.rates_rad_s.x = 0.002 * (tick as f32 * 0.1).cos();
-            let expected = controller.step(&mut memory, Some(&bench.state), &target);
-            let outcome = bench.tick(true);
-            assert_eq!(outcome.forces, expected.forces, "tick {tick} after {flown}");
-            assert_eq!(outcome.motors.0.map(f32::to_bits), expected.speeds.0.map(f32::to_bits));
-        }
+        let mut memory = Validated::default();
+        controller().on_ground(&mut memory.control);
+        bench.flies_as(memory, &format!("after {flown}"));
     }
 }
 
@@ -125,15 +133,7 @@ fn after_a_take_off_at_rates_the_law_begins_in_the_air() {
         assert_eq!(bench.tick(true).mode, Mode::Flying);
     }
     bench.rates = None;
-    let (controller, mut memory) = (controller(), Validated::default());
-    let target = Setpoint { position_m: Vector3::new(0.3, -0.2, 0.5), ..Setpoint::default() };
-    for tick in 0..200 {
-        bench.state.attitude_rad.x = 0.02 * (tick as f32 * 0.1).sin();
-        bench.state.rates_rad_s.x = 0.002 * (tick as f32 * 0.1).cos();
-        let expected = controller.step(&mut memory, Some(&bench.state), &target);
-        let outcome = bench.tick(true);
-        assert_eq!((outcome.mode, outcome.forces), (Mode::Flying, expected.forces), "tick {tick}");
-    }
+    bench.flies_as(Validated::default(), "in the air");
 }
 
 /// A vehicle that counts as airborne, and touches the ground by the guidance's account, idles; its law goes on

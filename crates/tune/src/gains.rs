@@ -2,6 +2,7 @@
 
 use afbc::Profile;
 use afbc_reader::words;
+use afbc_scenario::Scenario;
 use afbc_scenario::contender::{Contender, ControllerKind, Law};
 use afbc_types::{Axis, Declaration, Declared, Range, Value, ValueMut};
 use afbc_vehicles::{CASCADE, Vehicle};
@@ -162,9 +163,18 @@ pub fn fragment(contender: &Contender) -> String {
     text
 }
 
+/// The gains of `contender`, found on these flights: for the file of the vehicle that they are made for, or else as
+/// `[[contender]]` for a scenario file.
+pub fn found_text(contender: &Contender, training: &[Scenario]) -> String {
+    match training.first().and_then(|scenario| scenario.vehicle_file.as_ref()) {
+        Some(vehicle) => vehicle_fragment(contender, vehicle),
+        None => fragment(contender),
+    }
+}
+
 /// Gains of `contender` as `[gains.flight]` of the file of `vehicle`: every gain that a search may change, so that they
 /// stay what was found when the rule changes, and what else is not by rule.
-pub fn vehicle_fragment(contender: &Contender, vehicle: &Vehicle) -> String {
+pub(super) fn vehicle_fragment(contender: &Contender, vehicle: &Vehicle) -> String {
     let kind = contender.kind();
     let rule = Contender::of(kind, Profile::Flight).by_rule(vehicle);
     let base = keys(&rule);

@@ -19,7 +19,7 @@ mod start;
 pub use conditions::{Condition, conditions, conditions_on, factor};
 pub use cost::{JUMP_N, LOST, POSITION_M, WORST_M, YAW_RAD, cost, costs, mean};
 pub use flights::{held_out, held_out_on, training, training_on};
-pub use gains::{GainChange, fragment, vehicle_fragment};
+pub use gains::{GainChange, found_text, fragment};
 pub use maker::is_paper;
 pub use report::report;
 pub use search::{STEP, SearchOptions, SearchResult, search};

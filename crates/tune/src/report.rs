@@ -2,7 +2,7 @@
 
 use crate::conditions::Condition;
 use crate::cost::{costs, mean};
-use crate::gains::{fragment, vehicle_fragment};
+use crate::gains::found_text;
 use crate::search::SearchResult;
 use afbc_scenario::Scenario;
 use afbc_scenario::contender::Contender;
@@ -50,9 +50,6 @@ pub fn report(
         let _ = writeln!(text, "# {:<width$} {:>10} -> {}", change.name, change.from, change.to);
     }
     text.push('\n');
-    text += &match training.first().and_then(|scenario| scenario.vehicle_file.as_ref()) {
-        Some(vehicle) => vehicle_fragment(contender, vehicle),
-        None => fragment(&Contender { name: format!("{}-tuned", start.name), ..contender.clone() }),
-    };
+    text += &found_text(&Contender { name: format!("{}-tuned", start.name), ..contender.clone() }, training);
     Ok(text)
 }

@@ -79,10 +79,12 @@ impl Kept {
         store: &mut Store<F>,
         mut notice: impl FnMut(Reason),
     ) -> Result<(), Error<F::Error>> {
-        let mut last = false;
-        for round in 1.. {
-            // In rounds: a value may be possible only beside another that comes later in the store.
-            let mut more = false;
+        let mut more = true;
+        // In rounds: a value may be possible only beside another that comes later in the store. Bounded, since a former
+        // and a present name of one parameter may stand there after a cut of power, and set it in turns.
+        for round in 1..=ROUNDS_MAX {
+            let last = !more || round == ROUNDS_MAX;
+            more = false;
             store.visit(|name, edition, bits| {
                 let Ok((name, value)) = self.read(name, edition, bits) else { return };
                 // What is unknown, or out of its own range, has been reported.
@@ -96,11 +98,8 @@ impl Kept {
                 }
             })?;
             if last {
-                return Ok(());
+                break;
             }
-            // Bounded: a former and a present name of one parameter may stand beside each other after a cut of power,
-            // and set it in turns.
-            last = !more || round == ROUNDS_MAX;
         }
         Ok(())
     }
