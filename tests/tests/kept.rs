@@ -82,3 +82,23 @@ fn a_store_in_a_file_is_whole_and_belongs_to_one_program() {
     let mut store = Store::open(Flash::known(&path).unwrap(), 0, 1).unwrap();
     assert_eq!((store.found().damaged, store.get(RecordName::new("A").unwrap()).unwrap()), (0, Some((0, 8))));
 }
+
+/// A parameter under its former and its present name, both in the store after a cut of power, has one of the two values
+/// in the end, also where what is stored does not fly together.
+#[test]
+fn a_parameter_under_two_names_has_one_of_its_values() {
+    let kept = Kept { renamed: &[("V_WEIGHT", "V_MASS")], ..Kept::NOW };
+    let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join("renamed.store");
+    let _ = fs::remove_file(&path);
+    let mut store = Store::open(Flash::open(&path).unwrap(), 0, 1).unwrap();
+    store.make_room().unwrap();
+    for (name, value) in [("V_WEIGHT", 0.47_f32), ("V_MASS", 0.5), ("A_Z_THETAMAX", 0.01)] {
+        store.set(RecordName::new(name).unwrap(), kept.edition, Some(value.to_bits())).unwrap();
+    }
+    let paper = afbc_vehicles::built_in("paper").unwrap().read().unwrap();
+    let (mut table, mut notices) = (ParameterTable::new(paper.configuration::<4>().unwrap()), 0);
+    kept.load(&mut table, &mut store, |_| notices += 1).unwrap();
+    let mass_kg = table.get(RecordName::new("V_MASS").unwrap()).unwrap().value;
+    assert!([0.47, 0.5].contains(&mass_kg) && table.check().is_ok(), "{mass_kg} kg");
+    assert_eq!(notices, 1, "the bound with which it could not hover");
+}
