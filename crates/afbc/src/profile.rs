@@ -115,7 +115,7 @@ impl Profile {
                 by_rotation: true,
                 disturbance: DisturbanceObserver {
                     disturbance_rad_s: 39.49,
-                    // By hand: with the 80 that the search finds, states that come 25 times a second lose the vehicle.
+                    // By hand: the 80 that the search finds stands fewer states per second.
                     disturbance_tilt_rad_s: 60.0,
                     disturbance_yaw_rad_s: 31.39,
                     // By hand, since no training flight needs it.
