@@ -44,8 +44,6 @@ pub fn bad_frames() -> u32 {
 
 /// Ticks from a request to reboot to the reset, in which the answer leaves and a change of a parameter is written.
 const FAREWELL: u32 = 100;
-/// Text to the station when more changes of parameters are waiting for the flash than there is room for.
-const NOT_KEPT: &str = "parameter not kept: set it again";
 
 /// What the links' task has: the services for stations, the parameters, and exact log, radio and black box if there are
 /// any.
@@ -368,9 +366,10 @@ fn serve(
     let change = comms.parameters(table, |frame| drop(outgoing.extend_from_slice(frame)));
     if let Some(change) = change {
         let number = log.map_or(0, |log| log.change(table, change));
-        if !parameters::change(table, change, number) {
-            comms.warn(NOT_KEPT);
-        }
+        parameters::change(table, change, number);
+    }
+    if let Some(text) = parameters::trouble() {
+        comms.warn(text);
     }
     parameters::keep_signing(|| comms.signing_record());
     change

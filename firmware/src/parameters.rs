@@ -14,6 +14,7 @@ use afbc_store::{Error, RecordName, Store, hash};
 use core::cell::RefCell;
 use core::future::poll_fn;
 use core::pin::pin;
+use core::sync::atomic::{AtomicBool, Ordering};
 use core::task::Poll;
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
@@ -34,6 +35,10 @@ enum Unwritten {
 /// Changes to be written, and a signal that there are some.
 static CHANGES: Mutex<CriticalSectionRawMutex, RefCell<Deque<Unwritten, 8>>> = Mutex::new(RefCell::new(Deque::new()));
 static CHANGED: Signal<CriticalSectionRawMutex, ()> = Signal::new();
+/// True if the parameters' flash could not be read at the start, or if a change has not been written: until a station
+/// is told.
+static UNREAD: AtomicBool = AtomicBool::new(false);
+static UNWRITTEN: AtomicBool = AtomicBool::new(false);
 /// Time between two looks at whether the vehicle is still armed \[us\].
 const PATIENCE_US: u64 = 100_000;
 
@@ -102,6 +107,7 @@ pub fn read<M: NorFlash>(memory: M, start: u32) -> (Keeper<M>, ParameterTable, S
     let mut table = ParameterTable::new(CONFIGURATION);
     // By the vehicle's name: what was set on another one does not count.
     let Ok(mut store) = Store::open(Gate(memory), start, hash(NAME.as_bytes())) else {
+        UNREAD.store(true, Ordering::Relaxed);
         return (Keeper(None), table, Signing::default());
     };
     if store.make_room().is_err() {
@@ -110,6 +116,7 @@ pub fn read<M: NorFlash>(memory: M, start: u32) -> (Keeper<M>, ParameterTable, S
     let notice = |notice: afbc_onboard::parameters::Reason| defmt::warn!("{=str}", notice.as_str());
     if Kept::NOW.load(&mut table, &mut store, notice).is_err() {
         defmt::warn!("the parameters' flash cannot be read");
+        UNREAD.store(true, Ordering::Relaxed);
     }
     let signing = Signing::kept(|name| word(&mut store, name));
     (Keeper(Some(store)), table, signing)
@@ -122,14 +129,21 @@ fn word<M: NorFlash>(store: &mut Store<Gate<M>>, name: RecordName) -> Option<u32
 }
 
 /// Takes a change over to flight and flash: the next tick of the disarmed vehicle flies `table`, the configuration of
-/// this number. False if too many changes are waiting to be written; this one will be forgotten at the next start.
-#[must_use = "the station is to be told"]
-pub fn change(table: &ParameterTable, change: RecordChange, number: u16) -> bool {
+/// this number.
+pub fn change(table: &ParameterTable, change: RecordChange, number: u16) {
     // Each change has been checked; one that could not fly would leave the former configuration.
     if let Ok(prepared) = Prepared::new(table.configuration()) {
         control::fly(prepared, number);
     }
-    put(Unwritten::Parameters(change))
+    put(Unwritten::Parameters(change));
+}
+
+/// Returns what is wrong with the parameters' flash, each once, for stations.
+pub fn trouble() -> Option<&'static str> {
+    if UNREAD.swap(false, Ordering::Relaxed) {
+        return Some("parameters' flash cannot be read: not as set");
+    }
+    UNWRITTEN.swap(false, Ordering::Relaxed).then_some("setting not kept: lost at restart unless set again")
 }
 
 /// Has `record` written, if there is one, once there is room for it. It is made outside of the queue's lock, during
@@ -142,25 +156,33 @@ pub fn keep_signing(record: impl FnOnce() -> Option<SigningRecord>) {
     }
 }
 
-/// Queues what is to be written; false if there is no room for it.
-fn put(change: Unwritten) -> bool {
-    let queued = CHANGES.lock(|changes| changes.try_borrow_mut().ok()?.push_back(change).ok()).is_some();
+/// Queues what is to be written, if there is room for it.
+fn put(change: Unwritten) {
+    if CHANGES.lock(|changes| changes.try_borrow_mut().ok()?.push_back(change).ok()).is_none() {
+        UNWRITTEN.store(true, Ordering::Relaxed);
+    }
     CHANGED.signal(());
-    queued
 }
 
 /// Writes changes while the vehicle is disarmed.
 pub async fn run<M: NorFlash>(keeper: &mut Keeper<M>) -> ! {
     loop {
         let change = next().await;
-        let Keeper(Some(store)) = keeper else { continue };
+        let Keeper(Some(store)) = keeper else {
+            UNWRITTEN.store(true, Ordering::Relaxed);
+            continue;
+        };
         loop {
             match keep(store, change) {
                 // Cut off by arming, if not by the flash: once more when the vehicle is disarmed.
                 Err(Error::Flash(Shut::Armed)) => {
                     Timer::at(Instant::from_micros(Instant::now().as_micros().wrapping_add(PATIENCE_US))).await;
                 }
-                Err(error) => break defmt::warn!("{=str}", error.reason()),
+                Err(error) => {
+                    defmt::warn!("{=str}", error.reason());
+                    UNWRITTEN.store(true, Ordering::Relaxed);
+                    break;
+                }
                 Ok(()) => break,
             }
         }

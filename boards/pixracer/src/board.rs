@@ -32,7 +32,7 @@ use chip_stm32::motors::{
     set_protocol,
 };
 use chip_stm32::receiver::TX_RING;
-use chip_stm32::sensors::{Device, InterruptPin, Polled, StampHandler};
+use chip_stm32::sensors::{Device, InterruptPin, Polled, SELECT, StampHandler};
 use chip_stm32::{crystal, faults, usb, watchdog};
 use chip_stm32f4::{boot_loader, clocks, reset};
 use embassy_executor::SendSpawner;
@@ -157,9 +157,9 @@ impl Board for Pixracer {
         let config = chip_stm32::sensors::spi(kernel_hz / 256);
         let spi = Spi::new(p.SPI1, p.PA5, p.PA7, p.PA6, p.DMA2_CH3, p.DMA2_CH0, Irqs, config);
         let selects = [
-            Output::new(p.PC15, Level::High, Speed::Medium),
-            Output::new(p.PC2, Level::High, Speed::VeryHigh),
-            Output::new(p.PE15, Level::High, Speed::VeryHigh),
+            Output::new(p.PC15, Level::High, SELECT),
+            Output::new(p.PC2, Level::High, SELECT),
+            Output::new(p.PE15, Level::High, SELECT),
         ];
         let ready = [InterruptPin::new(p.PC14, p.EXTI14, Irqs), InterruptPin::new(p.PD15, p.EXTI15, Irqs)];
         let sampler = Inside { spi, kernel_hz, selects, ready };

@@ -1,11 +1,12 @@
 //! A memory card by SPI.
 
+use crate::sensors::SELECT;
 use afbc_logger::embedded_sdmmc::sdcard::spi::AcquireOpts;
 use afbc_logger::embedded_sdmmc::{Block, BlockDevice, BlockIdx, SdCard, SdCardError};
 use afbc_logger::{CardError, LogCard};
 use core::slice;
 use embassy_stm32::Peri;
-use embassy_stm32::gpio::{Level, Output, Pin, Pull, Speed};
+use embassy_stm32::gpio::{Level, Output, Pin, Pull};
 use embassy_stm32::mode::Blocking;
 use embassy_stm32::spi::mode::Master;
 use embassy_stm32::spi::{self, MODE_0, Spi};
@@ -42,7 +43,7 @@ impl SpiCard {
         kernel_hz: u32,
         core_hz: u32,
     ) -> Self {
-        let bus = CardBus { spi, select: Output::new(select, Level::High, Speed::VeryHigh) };
+        let bus = CardBus { spi, select: Output::new(select, Level::High, SELECT) };
         let delay = CoreDelay { cycles_per_us: core_hz / 1_000_000 };
         // A card that is there answers the first of them, or the second.
         let options = AcquireOpts { use_crc: true, acquire_retries: 1 };

@@ -28,6 +28,9 @@ pub const COMPASS: Matrix3<f32> = CW270_FLIP;
 /// The control period \[us\].
 const PERIOD_US: u32 = 1_000;
 
+/// Drive of select pins: PC13 to PC15 may not be driven faster, and an edge of 100 ns is over before the first clock.
+pub const SELECT: Speed = Speed::Low;
+
 /// A part that is alone on its SPI.
 pub struct Device {
     spi: Spi<'static, Async, Master>,
@@ -37,7 +40,7 @@ pub struct Device {
 impl Device {
     /// The part behind a select pin, which is high from now on.
     pub fn new(spi: Spi<'static, Async, Master>, select: Peri<'static, impl Pin>) -> Self {
-        Device { spi, select: Output::new(select, Level::High, Speed::VeryHigh) }
+        Device { spi, select: Output::new(select, Level::High, SELECT) }
     }
 
     /// Sets the fastest clock of an SPI fed with `kernel_hz` that is not above `most_hz`.

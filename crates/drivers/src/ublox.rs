@@ -103,6 +103,8 @@ pub struct UbxReceiver {
     place: usize,
     /// How often was asked, whether with a refusal, and when to ask again \[us\].
     asked: u8,
+    /// Answers that may still come to the last step, which was asked for more than once.
+    owed: u8,
     refused: bool,
     ask_us: u64,
     /// Its baud rate could not be changed.
@@ -138,6 +140,7 @@ impl UbxReceiver {
             found_baud: NEW_BAUD,
             place: 0,
             asked: 0,
+            owed: 0,
             refused: false,
             ask_us: 0,
             keeps_baud: false,
@@ -235,7 +238,7 @@ impl UbxReceiver {
                     Some((command, Worth::Line(baud))) => {
                         self.phase = Phase::Confirms(interface, number);
                         (self.sets_baud, self.baud) = (baud != self.baud, baud);
-                        (self.asked, self.ask_us) = (0, now_us.saturating_add(CHANGE_US));
+                        (self.asked, self.owed, self.ask_us) = (0, 1, now_us.saturating_add(CHANGE_US));
                         return Some(ReceiverAction::Send(command));
                     }
                     Some((command, _)) if asks => {
@@ -245,7 +248,7 @@ impl UbxReceiver {
                     // A refusal shows that the line works, and so will sentences; silence may be the wrong baud rate.
                     Some((_, Worth::Needed)) if self.refused => self.take_as_it_is(now_us),
                     Some((_, Worth::Needed)) => self.search(now_us),
-                    Some(_) => self.enter(Phase::Configures(interface, number.saturating_add(1)), now_us),
+                    Some(_) => self.enter_next(interface, number, 0, now_us),
                     None => {
                         self.keeps_baud = false;
                         self.enter(Phase::Solves, now_us);
@@ -275,7 +278,7 @@ impl UbxReceiver {
 
     fn enter(&mut self, phase: Phase, now_us: u64) {
         (self.phase, self.heard_us) = (phase, now_us);
-        (self.asked, self.refused, self.ask_us) = (0, false, now_us);
+        (self.asked, self.owed, self.refused, self.ask_us) = (0, 0, false, now_us);
     }
 
     /// Looks for a receiver, first where it was.
@@ -315,23 +318,36 @@ impl UbxReceiver {
                 self.enter(Phase::Configures(interface, 0), now_us);
             }
             Phase::Confirms(interface, number) => {
-                self.enter(Phase::Configures(interface, number.saturating_add(1)), now_us);
+                self.enter_next(interface, number, self.owed, now_us);
             }
             _ => (),
         }
     }
 
     fn answered(&mut self, to: MessageId, accepted: bool, now_us: u64) {
-        let Phase::Configures(interface, number) = self.phase else { return };
-        // All keys have the same command: an answer that comes before this step has asked is one to the last step.
-        if self.step(interface, number).is_none_or(|(command, _)| command.id() != to) || self.asked == 0 {
+        let (Phase::Configures(interface, number) | Phase::Confirms(interface, number)) = self.phase else { return };
+        if self.step(interface, number).is_none_or(|(command, _)| command.id() != to) {
             return;
         }
-        if accepted {
-            self.enter(Phase::Configures(interface, number.saturating_add(1)), now_us);
+        // All keys have the same command: first come the answers to earlier steps, or to one that sets the baud rate.
+        if self.owed > 0 {
+            self.owed -= 1;
+        } else if self.asked == 0 || matches!(self.phase, Phase::Confirms(..)) {
+            // To nothing that is known.
+        } else if accepted {
+            // A refusal is asked about again, and was the answer to what came before.
+            let owed = if self.refused { 0 } else { self.asked.saturating_sub(1) };
+            self.enter_next(interface, number, owed, now_us);
         } else {
             (self.refused, self.ask_us) = (true, now_us.saturating_add(REFUSED_US));
         }
+    }
+
+    /// Begins the step after this one, while so many answers may still come.
+    fn enter_next(&mut self, interface: Interface, number: u8, owed: u8, now_us: u64) {
+        self.enter(Phase::Configures(interface, number.saturating_add(1)), now_us);
+        // Each message has answers of its own.
+        self.owed = if interface == Interface::Keys { owed } else { 0 };
     }
 }
 

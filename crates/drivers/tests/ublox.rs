@@ -27,6 +27,8 @@ struct Bench {
     model: Model,
     driver: UbxReceiver,
     line: Line,
+    /// The number of the command to come that is lost on its way.
+    loses_command: Option<usize>,
     /// The UART's baud rate.
     baud: u32,
     now_us: u64,
@@ -38,7 +40,16 @@ struct Bench {
 impl Bench {
     fn new(model: Model) -> Self {
         let driver = UbxReceiver::new();
-        Bench { model, driver, line: Line::Good, baud: 9600, now_us: 7 * SECOND, random: 1, fixes: Vec::new() }
+        Bench {
+            model,
+            driver,
+            line: Line::Good,
+            loses_command: None,
+            baud: 9600,
+            now_us: 7 * SECOND,
+            random: 1,
+            fixes: Vec::new(),
+        }
     }
 
     fn random(&mut self) -> u64 {
@@ -71,7 +82,9 @@ impl Bench {
             while let Some(action) = self.driver.poll(self.now_us) {
                 match action {
                     ReceiverAction::Baud(baud) => self.baud = baud,
+                    ReceiverAction::Send(_) if self.loses_command == Some(0) => self.loses_command = None,
                     ReceiverAction::Send(command) => {
+                        self.loses_command = self.loses_command.map(|number| number - 1);
                         for byte in command.as_bytes() {
                             let byte = if self.model.baud == self.baud { *byte } else { self.random() as u8 };
                             self.model.hear(byte);
@@ -216,6 +229,28 @@ fn refusals_are_survived() {
             "{generation:?}: {count}, {:?}",
             bench.model
         );
+    }
+}
+
+/// A receiver that answers so late that it is asked twice, on a line that loses one of the commands: no answer to an
+/// earlier command counts as one to the next.
+#[test]
+fn late_answers_are_not_taken_for_later_ones() {
+    for generation in [Generation::Eight, Generation::Ten] {
+        for late_ms in [0, 200, 365, 420, 450, 600] {
+            for lost in 0..14 {
+                let mut model = Model::new(generation);
+                model.answers_after_us = late_ms * MS;
+                let mut bench = Bench::new(model);
+                bench.loses_command = Some(lost);
+                bench.configure(60 * SECOND);
+                bench.run(2 * SECOND);
+                let Model { nmea, solves, period_us, dynamic_model, .. } = bench.model;
+                let period_ms = if generation == Generation::Ten { 100 } else { 200 };
+                let told = (nmea, solves, period_us, dynamic_model);
+                assert_eq!(told, (false, true, period_ms * MS, 8), "{generation:?}, {late_ms} ms, command {lost}");
+            }
+        }
     }
 }
 

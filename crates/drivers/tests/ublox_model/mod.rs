@@ -59,11 +59,16 @@ pub(crate) struct Model {
     /// Does not hear; refuses the messages of these numbers.
     pub(crate) deaf: bool,
     pub(crate) refuses: Vec<u8>,
+    /// How long after a command its answer is sent.
+    pub(crate) answers_after_us: u64,
     pub(crate) truth: Truth,
     epoch_us: u64,
     /// Epochs whose messages are to be sent, with what was true then.
     due: VecDeque<(u64, Truth)>,
     heard: Vec<u8>,
+    now_us: u64,
+    /// Answers that are to be sent, and when.
+    answers: VecDeque<(u64, [u8; 2], [u8; 2])>,
     /// Bytes that are to be sent.
     pub(crate) says: VecDeque<u8>,
 }
@@ -86,10 +91,13 @@ impl Model {
             dynamic_model: 0,
             deaf: false,
             refuses: Vec::new(),
+            answers_after_us: 0,
             truth: Truth::ZURICH,
             epoch_us: 0,
             due: VecDeque::new(),
             heard: Vec::new(),
+            now_us: 0,
+            answers: VecDeque::new(),
             says: VecDeque::new(),
         };
         model.reset();
@@ -105,6 +113,11 @@ impl Model {
 
     /// Goes on to `now_us`: measures, and sends what is due.
     pub(crate) fn advance(&mut self, now_us: u64) {
+        self.now_us = now_us;
+        while self.answers.front().is_some_and(|(due_us, ..)| *due_us <= now_us) {
+            let Some((_, id, to)) = self.answers.pop_front() else { break };
+            self.say(id, &to);
+        }
         while self.epoch_us + self.period_us <= now_us {
             self.epoch_us += self.period_us;
             self.due.push_back((self.epoch_us, self.truth));
@@ -164,7 +177,11 @@ impl Model {
             return;
         }
         let obeys = !self.refuses.contains(&number) && self.configure(number, payload).is_some();
-        self.say([0x05, u8::from(obeys)], &id);
+        let answer = [0x05, u8::from(obeys)];
+        if self.answers_after_us == 0 {
+            return self.say(answer, &id);
+        }
+        self.answers.push_back((self.now_us + self.answers_after_us, answer, id));
     }
 
     /// Texts of 30 bytes after a hardware version of 10.
