@@ -90,6 +90,8 @@ fn command() -> Command {
     let kept = file_argument("hover", "Where the hover is kept, from which further runs begin");
     let only = option("only", "NAME", "Those whose names begin so; may be given again").action(ArgAction::Append);
     let seeds = [whole("seeds", "1", "Flights of each fault"), whole("first", "1", "The first one's seed")];
+    let in_turn = Arg::new("in-turn").long("in-turn").action(ArgAction::SetTrue);
+    let in_turn = in_turn.help("Fly one fault with each seed, the next with the next, instead of all");
     let cuts =
         [whole("cuts", "100", "Cuts in a write, and in an erase, about"), whole("seed", "1", "Of the random numbers")];
     let escs = Command::new("escs").about("Fly with motor controllers that answer, and stop rotors");
@@ -114,7 +116,8 @@ fn command() -> Command {
             Command::new("faults")
                 .about("Faults at a board's pins, in a hover that is kept in a file")
                 .args([machine_argument(), image_argument(), scenario_argument(), kept, only])
-                .args(seeds),
+                .args(seeds)
+                .arg(in_turn),
         )
         .subcommand(
             Command::new("cuts")
@@ -236,8 +239,9 @@ fn run(matches: &ArgMatches) -> Result<(), Box<dyn Error>> {
             let first = number(matches, "first")?;
             let seeds = first..first + number(matches, "seeds")?;
             let names: Vec<_> = matches.get_many::<String>("only").into_iter().flatten().map(String::as_str).collect();
+            let in_turn = matches.get_flag("in-turn");
             with_machine!(chosen(matches)?, M => {
-                faults::fly_all(&Aloft::<M>::of(image, scenario, hover)?, seeds, &names)
+                faults::fly_all(&Aloft::<M>::of(image, scenario, hover)?, seeds, &names, in_turn)
             })
         }
         Some(("cuts", matches)) => {
