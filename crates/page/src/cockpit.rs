@@ -145,18 +145,18 @@ impl Cockpit {
     fn carry_out(&mut self, server: &mut Server, command: PageCommand) -> PageReply {
         let station = &mut self.station;
         match command {
-            PageCommand::Values => {
+            PageCommand::Values {} => {
                 return PageReply { messages: self.values(server).into_iter().collect(), then: Then::Nothing };
             }
             PageCommand::Line { text } => return line(server, &text),
-            PageCommand::Arm => station.command(server, Command::Arm),
-            PageCommand::Disarm => station.command(server, Command::Disarm),
-            PageCommand::Kill => station.command(server, Command::Kill),
-            PageCommand::Engage => station.command(server, Command::Engage),
-            PageCommand::Land => station.command(server, Command::Land),
-            PageCommand::Return => station.command(server, Command::Return),
-            PageCommand::Hold => station.command(server, Command::SelectMode(custom(FlightMode::Hold))),
-            PageCommand::StartMission => station.command_armed(server, Command::StartMission(0)),
+            PageCommand::Arm {} => station.command(server, Command::Arm),
+            PageCommand::Disarm {} => station.command(server, Command::Disarm),
+            PageCommand::Kill {} => station.command(server, Command::Kill),
+            PageCommand::Engage {} => station.command(server, Command::Engage),
+            PageCommand::Land {} => station.command(server, Command::Land),
+            PageCommand::Return {} => station.command(server, Command::Return),
+            PageCommand::Hold {} => station.command(server, Command::SelectMode(custom(FlightMode::Hold))),
+            PageCommand::StartMission {} => station.command_armed(server, Command::StartMission(0)),
             PageCommand::TakeOff { height_m } => {
                 if !(0.3..=500.0).contains(&height_m) {
                     return PageReply::refused("the height must be 0.3 to 500 m");

@@ -3,26 +3,28 @@
 use serde::{Deserialize, Serialize};
 
 /// Something that the page wants done. Places are in the earth frame of the simulator: north, west, up.
+///
+/// Braces without a field: of what has none, serde would take any.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "do", rename_all = "snake_case", deny_unknown_fields)]
 pub enum PageCommand {
     /// Start the motors.
-    Arm,
+    Arm {},
     /// Stop the motors of a vehicle on the ground.
-    Disarm,
+    Disarm {},
     /// Stop the motors, also in flight.
-    Kill,
+    Kill {},
     /// Arm, if need be, and climb to this height above where it stands.
     TakeOff {
         /// Height \[m\].
         height_m: f32,
     },
     /// Land where it is.
-    Land,
+    Land {},
     /// Fly home and land.
-    Return,
+    Return {},
     /// Hold where it is.
-    Hold,
+    Hold {},
     /// Fly to this place and hold there.
     GoTo {
         /// Place \[m\].
@@ -38,7 +40,7 @@ pub enum PageCommand {
         fence_m: Vec<[f32; 2]>,
     },
     /// Arm, if need be, and fly the mission.
-    StartMission,
+    StartMission {},
     /// Set a parameter.
     Parameter {
         /// Its name.
@@ -47,9 +49,9 @@ pub enum PageCommand {
         value: f32,
     },
     /// Send the values of all parameters.
-    Values,
+    Values {},
     /// Let AFBC fly again after its monitor has switched to the fallback law.
-    Engage,
+    Engage {},
     /// A line of the text protocol: weather, faults, laws, time.
     Line {
         /// The line.

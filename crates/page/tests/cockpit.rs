@@ -144,6 +144,7 @@ fn nonsense_is_refused() {
         json!({ "do": "line", "text": "quit" }),
         json!({ "do": "line", "text": "step 1000" }),
         json!({ "do": "line", "text": "wind a gale" }),
+        json!({ "do": "arm", "now": true }),
         json!([]),
     ] {
         let PageReply { messages, then } = page.command(&command);
