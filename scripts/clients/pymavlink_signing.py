@@ -78,7 +78,11 @@ class Station:
     def signatures(self, key, count=20):
         """Returns what is found in the next frames: "signed" or what else. By their bytes, for a frame that another has
         overtaken on its way is BAD_DATA to pymavlink, as if it were sent a second time."""
-        return {signature_of(self.next(), key) for _ in range(count)}
+        messages = [self.next() for _ in range(count)]
+        # Link and time, by which a receiver knows a frame that was sent before.
+        stamps = {bytes(message.get_msgbuf()[-13:-6]) for message in messages}
+        twice = set() if len(stamps) == count else {"a time twice"}
+        return {signature_of(message, key) for message in messages} | twice
 
 
 def signature_of(message, key):

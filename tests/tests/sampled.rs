@@ -141,8 +141,8 @@ fn the_flight_core_extrapolates_between_the_samples_of_a_scenario() {
     assert!(flown(true).is_some_and(|rms_m| rms_m < 0.015));
 }
 
-/// AFBC flies all of `hardware` on 50 states per second without a gyroscope, in the flight core and alone. On 30 it is
-/// lost where the thrust falls by 40 %, as are INDI and MPC.
+/// AFBC flies all of `hardware` on 50 states per second without a gyroscope, in the flight core and alone. On 30, the
+/// flight core loses it where the thrust falls by 40 %, and INDI and MPC too.
 #[test]
 fn afbc_flies_on_50_states_per_second() {
     for core in [true, false] {
