@@ -25,6 +25,7 @@ chip_stm32f4::flight_controller! {
         barometer: (Dps310, Bmp280)
     },
     indicator: { buzzer: PC15 },
+    card: SPI3 { clock: PB3, out: PB5, in: PB4, select: PC14, quiet: [] },
     motors: 4 as BETAFLIGHT {
         first: TIM4<u16>, DMA1_CH6 by DMA1_STREAM6 { (PB6: GPIOB 6, motor 2), (PB7: GPIOB 7, motor 1), (), () },
         second: TIM3<u16>, DMA1_CH2 by DMA1_STREAM2 { (), (), (PB0: GPIOB 0, motor 3), (PB1: GPIOB 1, motor 4) },

@@ -21,6 +21,7 @@ chip_stm32f4::flight_controller! {
         barometer: (Spl06,)
     },
     indicator: { led: PC8, buzzer: PC5 },
+    card: SPI2 { clock: PB13, out: PB15, in: PB14, select: PA15, quiet: [PB12] },
     motors: 4 as BETAFLIGHT {
         first: TIM4<u16>, DMA1_CH6 by DMA1_STREAM6 {
             (PB6: GPIOB 6, motor 1), (PB7: GPIOB 7, motor 2), (PB8: GPIOB 8, motor 3),

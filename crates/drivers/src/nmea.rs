@@ -4,11 +4,12 @@
 //! The sentences do not say how good a fix is: its standard deviations are taken from the dilution of precision and
 //! [`RANGE_SIGMA_M`]. Nor do they have a vertical speed: it is the mean change of the altitude over some [`CLIMB_S`].
 
+mod sentence;
+
 use crate::reading::FixReading;
 use afbc_types::sin_cos;
 use nalgebra::Vector3;
-use nmea0183::datetime::Time;
-use nmea0183::{GGA, GPSQuality, ParseResult, Parser, RMC};
+use sentence::{Fix, Framed, Framing, Motion, Sentence};
 
 /// Standard deviation of a satellite's range, with which the dilution of precision gives that of a position \[m\]: a
 /// single-frequency receiver under an open sky.
@@ -24,40 +25,37 @@ const CLIMB_SIGMA_M_S: f32 = 1.5;
 /// Time constant of the vertical speed, and longest time between two altitudes that it takes \[s\].
 pub const CLIMB_S: f32 = 1.0;
 const PAUSE_S: f32 = 2.0;
-/// Seconds of a day.
-const DAY_S: f32 = 86_400.0;
+/// A knot \[m/s\].
+const KNOT_M_S: f32 = 1852.0 / 3600.0;
+/// Milliseconds of a day.
+const DAY_MS: u32 = 86_400_000;
 
 /// Makes fixes of the bytes of a receiver.
+#[derive(Default)]
 pub struct NmeaDecoder {
-    parser: Parser,
+    framing: Framing,
     /// The halves of an epoch that is not complete.
-    fix: Option<GGA>,
-    motion: Option<RMC>,
-    /// Time of day \[s\], altitude \[m\] and vertical speed \[m/s\] of the last fix.
-    last: Option<[f32; 3]>,
+    fix: Option<Fix>,
+    motion: Option<Motion>,
+    /// Time of day \[ms\], altitude \[m\] and vertical speed \[m/s\] of the last fix.
+    last: Option<(u32, f32, f32)>,
     good_sentences: u32,
     bad_sentences: u32,
-}
-
-impl Default for NmeaDecoder {
-    fn default() -> Self {
-        Self::new()
-    }
 }
 
 impl NmeaDecoder {
     /// One that has read nothing.
     #[must_use]
     pub fn new() -> Self {
-        NmeaDecoder { parser: Parser::new(), fix: None, motion: None, last: None, good_sentences: 0, bad_sentences: 0 }
+        Self::default()
     }
 
     /// Begins a sentence anew, after bytes of another protocol.
     pub fn begin(&mut self) {
-        self.parser = Parser::new();
+        self.framing = Framing::default();
     }
 
-    /// Number of sentences that were whole, and of a known kind.
+    /// Number of sentences that were whole.
     #[must_use]
     pub fn good_sentences(&self) -> u32 {
         self.good_sentences
@@ -71,47 +69,36 @@ impl NmeaDecoder {
 
     /// Takes a byte, and returns the fix that it completes: `Some(None)` for an epoch without a fix.
     pub fn take(&mut self, byte: u8) -> Option<Option<FixReading>> {
-        let parsed = self.parser.parse_from_byte(byte)?;
-        self.good_sentences = self.good_sentences.saturating_add(parsed.is_ok().into());
-        match parsed {
-            Ok(ParseResult::GGA(fix)) => match fix.filter(|fix| fix.gps_quality != GPSQuality::NoFix) {
-                Some(fix) => self.fix = Some(fix),
-                None => {
-                    self.fix = None;
-                    return Some(None);
-                }
-            },
-            Ok(ParseResult::RMC(motion)) => self.motion = motion,
-            Ok(_) => return None,
-            Err(_) => {
-                self.bad_sentences = self.bad_sentences.saturating_add(1);
-                return None;
+        let sentence = match self.framing.take(byte)? {
+            Framed::Whole(body) => Sentence::read(body),
+            Framed::Damaged => Err(()),
+        };
+        let count = if sentence.is_ok() { &mut self.good_sentences } else { &mut self.bad_sentences };
+        *count = count.saturating_add(1);
+        match sentence.ok()?? {
+            Sentence::Fix(None) => {
+                self.fix = None;
+                return Some(None);
             }
+            Sentence::Fix(fix) => self.fix = fix,
+            Sentence::Motion(motion) => self.motion = motion,
         }
-        let [fix_s, motion_s] = [&self.fix.as_ref()?.time, &self.motion.as_ref()?.datetime.time].map(seconds);
-        // Halves of two epochs: the older one is overwritten once its successor comes. Both times are read from the
-        // same digits, so that those of one epoch are equal to the bit.
-        if fix_s != motion_s {
+        // Halves of two epochs: the older one is overwritten once its successor comes.
+        let (fix, motion) = (self.fix?, self.motion?);
+        if fix.time_ms != motion.time_ms {
             return None;
         }
-        let (fix, motion) = (self.fix.take()?, self.motion.take()?);
-        Some(self.reading(&fix, &motion))
+        (self.fix, self.motion) = (None, None);
+        Some(Some(self.reading(&fix, &motion)))
     }
 
-    fn reading(&mut self, fix: &GGA, motion: &RMC) -> Option<FixReading> {
-        let altitude_m = fix.altitude.as_ref()?.meters;
-        let (time_s, speed_m_s) = (seconds(&fix.time), motion.speed.as_mps());
-        let sigma_m = fix.hdop * RANGE_SIGMA_M;
-        let course_deg = motion.course.as_ref().map_or(0.0, |course| course.degrees);
-        let [latitude_deg, longitude_deg] = [fix.latitude.as_f64(), fix.longitude.as_f64()];
-        let is_finite = [altitude_m, time_s, speed_m_s, sigma_m, course_deg].iter().all(|number| number.is_finite());
-        if !(is_finite && latitude_deg.is_finite() && longitude_deg.is_finite() && sigma_m > 0.0) {
-            return None;
-        }
+    fn reading(&mut self, fix: &Fix, motion: &Motion) -> FixReading {
+        let thousandths = |number: i32| number as f32 / 1000.0;
+        let (altitude_m, sigma_m) = (thousandths(fix.altitude_mm), thousandths(fix.dilution) * RANGE_SIGMA_M);
+        let (speed_m_s, course_deg) = (thousandths(motion.speed) * KNOT_M_S, thousandths(motion.course));
         let climb_m_s = match self.last {
-            Some([last_s, last_m, climb_m_s]) => {
-                let passed_s = time_s - last_s;
-                let passed_s = if passed_s < 0.0 { passed_s + DAY_S } else { passed_s };
+            Some((last_ms, last_m, climb_m_s)) => {
+                let passed_s = ((fix.time_ms + DAY_MS).saturating_sub(last_ms) % DAY_MS) as f32 / 1000.0;
                 if passed_s <= PAUSE_S {
                     // The share of a step in a first-order filter, times the change in it.
                     climb_m_s + (altitude_m - last_m - passed_s * climb_m_s) / (passed_s + CLIMB_S)
@@ -121,23 +108,18 @@ impl NmeaDecoder {
             }
             None => 0.0,
         };
-        self.last = Some([time_s, altitude_m, climb_m_s]);
+        self.last = Some((fix.time_ms, altitude_m, climb_m_s));
         let (east, north) = sin_cos(course_deg.clamp(-360.0, 360.0) * (core::f32::consts::PI / 180.0));
-        Some(FixReading {
-            latitude_deg,
-            longitude_deg,
+        FixReading {
+            latitude_deg: fix.latitude.degrees(),
+            longitude_deg: fix.longitude.degrees(),
             altitude_m: f64::from(altitude_m),
             velocity_ned_m_s: Vector3::new(north * speed_m_s, east * speed_m_s, -climb_m_s),
             horizontal_sigma_m: sigma_m,
             vertical_sigma_m: VERTICAL * sigma_m,
             speed_sigma_m_s: SPEED_SIGMA_M_S,
             climb_sigma_m_s: CLIMB_SIGMA_M_S,
-            satellites: fix.sat_in_use,
-        })
+            satellites: fix.satellites,
+        }
     }
-}
-
-/// Returns the time of day \[s\].
-fn seconds(time: &Time) -> f32 {
-    f32::from(time.hours) * 3600.0 + f32::from(time.minutes) * 60.0 + time.seconds
 }

@@ -107,6 +107,53 @@ proptest! {
     }
 }
 
+proptest! {
+    /// Another reader finds the same in the same sentences, with as many decimal places as receivers write.
+    #[test]
+    fn another_reader_agrees(
+        time_ms in 0_u32..86_400_000, [latitude, longitude] in [0_u64..5_400_000_000, 0..10_800_000_000],
+        [south, west] in any::<[bool; 2]>(), altitude in -500.0..9000.0_f64, speed in 0.0..100.0_f64,
+        course in prop::option::of(0.0..360.0_f64), dilution in 0.5..20.0_f64, satellites in 4_u8..40, places in 1_usize..=7,
+    ) {
+        let time = format!(
+            "{:02}{:02}{:02}.{:03}", time_ms / 3_600_000, time_ms / 60_000 % 60, time_ms / 1000 % 60, time_ms % 1000
+        );
+        let angle = |number: u64, digits: usize| {
+            let (degrees, minutes) = (number / 60_000_000, number % 60_000_000);
+            let fraction = format!("{:06}0", minutes % 1_000_000);
+            format!("{degrees:0digits$}{:02}.{}", minutes / 1_000_000, &fraction[..places])
+        };
+        let place = format!(
+            "{},{},{},{}", angle(latitude, 2), ["N", "S"][usize::from(south)], angle(longitude, 3),
+            ["E", "W"][usize::from(west)]
+        );
+        let course = course.map(|course| format!("{course:.2}")).unwrap_or_default();
+        let fix = sentence(&format!("GPGGA,{time},{place},1,{satellites:02},{dilution:.2},{altitude:.2},M,47.0,M,,"));
+        let motion = sentence(&format!("GPRMC,{time},A,{place},{speed:.3},{course},251126,,,A"));
+        let Some(read) = fixes(&mut NmeaDecoder::new(), &(fix.clone() + &motion)).into_iter().next().flatten() else {
+            return Err(TestCaseError::fail("no fix"));
+        };
+
+        let mut other = nmea0183::Parser::new();
+        let all: Vec<_> = other.parse_from_bytes(fix.as_bytes()).collect();
+        let Some(Ok(nmea0183::ParseResult::GGA(Some(fix)))) = all.into_iter().next() else {
+            return Err(TestCaseError::fail("no GGA"));
+        };
+        prop_assert!((read.latitude_deg - fix.latitude.as_f64()).abs() < 1e-9);
+        prop_assert!((read.longitude_deg - fix.longitude.as_f64()).abs() < 1e-9);
+        prop_assert!((read.altitude_m - f64::from(fix.altitude.map_or(f32::NAN, |altitude| altitude.meters))).abs() < 1e-3);
+        prop_assert!((read.horizontal_sigma_m - fix.hdop * RANGE_SIGMA_M).abs() < 1e-4);
+        prop_assert_eq!(read.satellites, fix.sat_in_use);
+        let all: Vec<_> = other.parse_from_bytes(motion.as_bytes()).collect();
+        let Some(Ok(nmea0183::ParseResult::RMC(Some(motion)))) = all.into_iter().next() else {
+            return Err(TestCaseError::fail("no RMC"));
+        };
+        let (east, north) = motion.course.map_or(0.0, |course| course.degrees).to_radians().sin_cos();
+        prop_assert!((read.velocity_ned_m_s.x - north * motion.speed.as_mps()).abs() < 1e-3);
+        prop_assert!((read.velocity_ned_m_s.y - east * motion.speed.as_mps()).abs() < 1e-3);
+    }
+}
+
 #[test]
 fn numbers_that_are_none_spoil_no_fix() {
     for odd in ["inf", "-inf", "NaN", "1e39"] {

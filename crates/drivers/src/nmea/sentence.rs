@@ -1,0 +1,283 @@
+//! Sentences of NMEA 0183: their framing with a checksum, and what of a fix and a motion is read from their fields.
+//!
+//! Numbers are read as integers of their last decimal place: parsing floating point takes tables that a flash of 1 MiB
+//! misses, and double precision that these chips do not have.
+
+use heapless::Vec;
+
+/// Longest sentence between `$` and `*` that is read: NMEA allows 79 bytes, some receivers write more.
+const LENGTH: usize = 100;
+/// Ten-millionths of a minute in a degree.
+const DEGREE: i32 = 600_000_000;
+
+/// Puts sentences together, byte by byte.
+#[derive(Default)]
+pub(super) struct Framing {
+    body: Vec<u8, LENGTH>,
+    place: Place,
+}
+
+/// Where in a sentence the next byte stands.
+#[derive(Clone, Copy, Default)]
+enum Place {
+    /// In none.
+    #[default]
+    Outside,
+    Body,
+    /// Before the first or second digit of the checksum.
+    Checksum(Option<u8>),
+}
+
+/// What a byte completes.
+#[derive(Debug, PartialEq)]
+pub(super) enum Framed<'a> {
+    /// A sentence with a right checksum, without `$` and checksum.
+    Whole(&'a [u8]),
+    Damaged,
+}
+
+impl Framing {
+    /// Takes a byte.
+    pub(super) fn take(&mut self, byte: u8) -> Option<Framed<'_>> {
+        let damaged = match (self.place, byte) {
+            (place, b'$') => {
+                self.body.clear();
+                self.place = Place::Body;
+                // Whatever has begun has not ended.
+                !matches!(place, Place::Outside)
+            }
+            (Place::Outside, _) => false,
+            (Place::Body, b'*') => {
+                self.place = Place::Checksum(None);
+                false
+            }
+            // No other byte is part of a text, and each begins one only at a start.
+            (Place::Body, b' '..=b'~') => self.body.push(byte).is_err(),
+            (Place::Body, _) => true,
+            (Place::Checksum(upper), _) => match (hexadecimal(byte), upper) {
+                (None, _) => true,
+                (digit, None) => {
+                    self.place = Place::Checksum(digit);
+                    false
+                }
+                (Some(lower), Some(upper)) => {
+                    self.place = Place::Outside;
+                    let sum = self.body.iter().fold(0, |sum, byte| sum ^ byte);
+                    return Some(if sum == upper << 4 | lower { Framed::Whole(&self.body) } else { Framed::Damaged });
+                }
+            },
+        };
+        if damaged && byte != b'$' {
+            self.place = Place::Outside;
+        }
+        damaged.then_some(Framed::Damaged)
+    }
+}
+
+fn hexadecimal(digit: u8) -> Option<u8> {
+    match digit {
+        b'0'..=b'9' => Some(digit - b'0'),
+        b'A'..=b'F' => Some(digit - b'A' + 10),
+        b'a'..=b'f' => Some(digit - b'a' + 10),
+        _ => None,
+    }
+}
+
+/// A sentence that belongs to an epoch.
+#[derive(Debug, PartialEq)]
+pub(super) enum Sentence {
+    /// GGA; none without a fix.
+    Fix(Option<Fix>),
+    /// RMC; none if it is not valid.
+    Motion(Option<Motion>),
+}
+
+/// Fields of GGA.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Fix {
+    /// Time of day \[ms\].
+    pub(super) time_ms: u32,
+    pub(super) latitude: Angle,
+    pub(super) longitude: Angle,
+    pub(super) satellites: u8,
+    /// Horizontal dilution of precision, in thousandths.
+    pub(super) dilution: i32,
+    /// Above the geoid \[mm\].
+    pub(super) altitude_mm: i32,
+}
+
+/// Fields of RMC.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Motion {
+    /// Time of day \[ms\].
+    pub(super) time_ms: u32,
+    /// Over the ground, in thousandths of a knot.
+    pub(super) speed: i32,
+    /// From the north, clockwise \[0.001 deg\]; 0 if the receiver gives none, as at rest.
+    pub(super) course: i32,
+}
+
+/// An angle to the north or east.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Angle {
+    degrees: i32,
+    /// Ten-millionths of a minute.
+    minutes: i32,
+    is_negative: bool,
+}
+
+impl Angle {
+    /// Returns it in degrees.
+    pub(super) fn degrees(self) -> f64 {
+        let degrees = f64::from(self.degrees) + f64::from(self.minutes) / f64::from(DEGREE);
+        if self.is_negative { -degrees } else { degrees }
+    }
+}
+
+impl Sentence {
+    /// Reads one from any talker; none for other kinds.
+    ///
+    /// # Errors
+    /// If a field that is needed is no number, or out of range.
+    pub(super) fn read(body: &[u8]) -> Result<Option<Self>, ()> {
+        let mut fields = body.split(|byte| *byte == b',');
+        let kind = fields.next().and_then(|head| head.get(2..));
+        let mut fields = Fields(fields);
+        Ok(match kind {
+            Some(b"GGA") => Some(Sentence::Fix(fields.fix().ok_or(())?)),
+            Some(b"RMC") => Some(Sentence::Motion(fields.motion().ok_or(())?)),
+            _ => None,
+        })
+    }
+}
+
+/// The fields that are left.
+struct Fields<I>(I);
+
+impl<'a, I: Iterator<Item = &'a [u8]>> Fields<I> {
+    fn next(&mut self) -> Option<&'a [u8]> {
+        self.0.next()
+    }
+
+    /// Reads GGA: `Some(None)` without a fix.
+    fn fix(&mut self) -> Option<Option<Fix>> {
+        let time = self.next()?;
+        let [latitude, north, longitude, east] = [self.next()?, self.next()?, self.next()?, self.next()?];
+        if matches!(self.next()?, b"" | b"0") {
+            return Some(None);
+        }
+        let fix = Fix {
+            time_ms: time_of_day(time)?,
+            latitude: angle(latitude, north, *b"NS", 90)?,
+            longitude: angle(longitude, east, *b"EW", 180)?,
+            satellites: decimal(self.next()?, 0)?.try_into().ok()?,
+            dilution: decimal(self.next()?, 3).filter(|dilution| *dilution > 0)?,
+            altitude_mm: decimal(self.next()?, 3)?,
+        };
+        Some(Some(fix))
+    }
+
+    /// Reads RMC: `Some(None)` if it is not valid.
+    fn motion(&mut self) -> Option<Option<Motion>> {
+        let time = self.next()?;
+        if self.next()? != b"A" {
+            return Some(None);
+        }
+        // The place is GGA's.
+        let speed = self.0.nth(4)?;
+        let course = self.next()?;
+        Some(Some(Motion {
+            time_ms: time_of_day(time)?,
+            speed: decimal(speed, 3)?,
+            course: if course.is_empty() { 0 } else { decimal(course, 3)? },
+        }))
+    }
+}
+
+/// Reads a decimal number in units of its `places`-th decimal place; further ones are cut off.
+fn decimal(text: &[u8], places: usize) -> Option<i32> {
+    let (is_negative, digits) = match text {
+        [b'-', digits @ ..] => (true, digits),
+        digits => (false, digits),
+    };
+    let point = digits.iter().position(|byte| *byte == b'.').unwrap_or(digits.len());
+    let (whole, fraction) = digits.split_at_checked(point)?;
+    let fraction = fraction.get(1..).unwrap_or_default();
+    if whole.is_empty() && fraction.is_empty() || !whole.iter().chain(fraction).all(u8::is_ascii_digit) {
+        return None;
+    }
+    let padded = fraction.iter().chain([b'0'; 8].iter()).take(places);
+    let number = whole
+        .iter()
+        .chain(padded)
+        .try_fold(0_i32, |number, digit| number.checked_mul(10)?.checked_add(i32::from(digit - b'0')))?;
+    Some(if is_negative { -number } else { number })
+}
+
+/// Reads `hhmmss.sss`, in milliseconds of the day; a leap second is one of the next day's first.
+fn time_of_day(text: &[u8]) -> Option<u32> {
+    let number: u32 = decimal(text, 3)?.try_into().ok()?;
+    let (hours, minutes, milliseconds) = (number / 10_000_000, number / 100_000 % 100, number % 100_000);
+    let is_time = hours < 24 && minutes < 60 && milliseconds < 61_000;
+    is_time.then_some((hours * 60 + minutes) * 60_000 + milliseconds)
+}
+
+/// Reads `dddmm.mmmmm` and a letter of two.
+fn angle(text: &[u8], letter: &[u8], [positive, negative]: [u8; 2], most: i32) -> Option<Angle> {
+    let point = text.iter().position(|byte| *byte == b'.').unwrap_or(text.len());
+    let (degrees, minutes) = text.split_at_checked(point.checked_sub(2)?)?;
+    let (degrees, minutes) = (decimal(degrees, 0)?, decimal(minutes, 7)?);
+    let is_negative = letter == [negative];
+    let is_angle = (0..DEGREE).contains(&minutes) && (0..most).contains(&degrees) || (degrees, minutes) == (most, 0);
+    (is_angle && (is_negative || letter == [positive])).then_some(Angle { degrees, minutes, is_negative })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn decimals_are_cut_and_filled() {
+        let read = [("0.9", 900), ("-12.3456", -12_345), ("7", 7_000), (".5", 500), ("5.", 5_000), ("00.001", 1)];
+        for (text, expected) in read {
+            assert_eq!(decimal(text.as_bytes(), 3), Some(expected), "{text}");
+        }
+        for text in ["", ".", "-", "1e3", "+1", "1.2.3", "inf", "NaN", "3000000", "--1", "1 "] {
+            assert_eq!(decimal(text.as_bytes(), 3), None, "{text}");
+        }
+    }
+
+    #[test]
+    fn angles_and_times_have_ranges() {
+        let north = |text: &str| angle(text.as_bytes(), b"N", *b"NS", 90);
+        assert_eq!(north("9000.000").map(Angle::degrees), Some(90.0));
+        assert_eq!(north("0000.3").map(Angle::degrees), Some(0.005));
+        for text in ["9000.001", "9100.0", "4760.0", "-447.0", "4.0", "", "47-1.0", "4712"] {
+            assert_eq!(north(text).map(Angle::degrees).filter(|_| text != "4712"), None, "{text}");
+        }
+        assert_eq!(angle(b"4712", b"S", *b"NS", 90).map(Angle::degrees), Some(-47.2));
+        assert_eq!(angle(b"4712", b"E", *b"NS", 90), None);
+        assert_eq!(time_of_day(b"235960.5"), Some(86_400_500));
+        for text in ["240000", "236000", "235961", "-10000", "99999999"] {
+            assert_eq!(time_of_day(text.as_bytes()), None, "{text}");
+        }
+    }
+
+    #[test]
+    fn a_sentence_that_breaks_off_is_damaged() {
+        let mut framing = Framing::default();
+        let mut damaged = 0;
+        let mut whole = 0;
+        for byte in b"$GP,1$GPX*17\r\n$GP\r\n$*0\xFF$A*40 $A*4g$A*41\r\n" {
+            match framing.take(*byte) {
+                Some(Framed::Whole(_)) => whole += 1,
+                Some(Framed::Damaged) => damaged += 1,
+                None => (),
+            }
+        }
+        // The checksum of `GPX` is 0x4F, of `A` 0x41.
+        assert_eq!((whole, damaged), (1, 6));
+        let long: Vec<u8, 200> = core::iter::once(b'$').chain([b'A'; 150]).collect();
+        assert_eq!(long.iter().filter(|byte| framing.take(**byte) == Some(Framed::Damaged)).count(), 1);
+    }
+}
