@@ -106,8 +106,8 @@ fn the_firmware_knows_no_board() {
 fn the_wiring_is_what_the_board_uses() {
     for (board, page, heading, count) in [
         ("stm32f405", "firmware.md", "\n## Wiring", 8),
-        ("stm32h743", "boards/stm32h743.md", "\n## Wiring", 36),
-        ("pixracer", "boards/pixracer.md", "\n## Wiring", 32),
+        ("stm32h743", "boards/stm32h743.md", "\n## Wiring", 42),
+        ("pixracer", "boards/pixracer.md", "\n## Wiring", 38),
     ] {
         let text = fs::read_to_string(root().join("docs").join(page)).unwrap();
         let table = text.split_once(heading).unwrap().1.split("\n#").next().unwrap();
@@ -264,7 +264,7 @@ fn streams_have_their_interrupts_and_motors_their_pins() {
     }
 }
 
-/// Bytes of serial ports come first, then the IMU's interrupt and transfers, the motors', the slow sensors'.
+/// Bytes of serial ports come first, then the IMU's interrupt and transfers, the motors', the slow sensors', the card's.
 #[test]
 fn every_interrupt_has_the_priority_of_its_purpose() {
     let table = fs::read_to_string(root().join("chips/stm32f4/src/flight_controller.rs")).unwrap();
@@ -292,12 +292,16 @@ fn every_interrupt_has_the_priority_of_its_purpose() {
         let handlers = handlers(&code);
         assert!(priorities.keys().eq(handlers.keys()), "{}: {priorities:?} {handlers:?}", board.display());
         let motors: Vec<_> = code.split("Motors<").skip(1).filter_map(|it| it.split(", ").nth(1)).collect();
+        // What the card's interface is given.
+        let card = code.split_once("Sdmmc::new_4bit(").map_or("", |(_, call)| call.split(')').next().unwrap());
+        let card: Vec<_> = names_after(card, "p.").iter().map(|name| format!("<{name}>")).collect();
         for (line, handler) in handlers {
             let priority = priorities[&line].as_str();
             let fits = match handler.split("::").next().unwrap() {
                 "usart" => priority == "UART",
                 "i2c" => priority == "AIDING",
                 "StampHandler<EXTI2>" | "StampHandler<EXTI15_10>" => priority == "SAMPLING",
+                _ if card.iter().any(|part| handler.contains(part)) => priority == "LOGGING",
                 _ if motors.iter().any(|motor| handler.contains(motor)) => priority == "MOTOR_DMA",
                 _ => ["SAMPLING", "AIDING"].contains(&priority),
             };

@@ -1,9 +1,9 @@
 //! A flight of the image as flashed, in lockstep with the plant: the instruments' readings at the registers of the
 //! board's sensors, motor commands from its pins, a station at its telemetry UART.
 
+use crate::card::CardTrouble;
 use crate::card_logs::{self, CardLog};
 use crate::check::check;
-use crate::f405::CardTrouble;
 use crate::kept::{self, PWM400};
 use crate::machine::{Machine, Signal, quiet_usb};
 use crate::pilot::Pilot;
@@ -89,6 +89,9 @@ pub fn fly<M: Machine>(image: &Path, order: &Order<'_>) -> Result<(), Box<dyn Er
     let scenario = load(scenario)?;
     let mut board = M::built()?;
     board.sense(&at_the_place());
+    if card.is_some() {
+        board.insert_card();
+    }
     if let Some(slot) = board.card() {
         // Without a place for its logs, the slot is empty.
         let empty = CardTrouble { out_ms: Some([0, u64::MAX]), ..CardTrouble::default() };
@@ -109,6 +112,7 @@ pub fn fly<M: Machine>(image: &Path, order: &Order<'_>) -> Result<(), Box<dyn Er
     let pins = MotorPins::new(M::SIGNAL, scenario.rotors.len());
     let pilot = Pilot::new(&scenario, wire)?.hovering(hover_ms);
     let pilot = if is_mission { pilot.touring() } else { pilot };
+    let pilot = if card.is_some() { pilot.logging() } else { pilot };
     let pilot = if fetches { pilot.fetching() } else { pilot };
     let cuts = card.map(|folder| Cuts { folder: folder.into(), at_ms: cuts_ms.to_vec() });
     let flight = Flight { pilot, hearer, receiver, pins, cuts, fetched: None };
@@ -217,6 +221,9 @@ impl<M: Machine> Driver<M> for Flight {
     fn on_settled(&mut self, session: &mut Session<M>, _: &mut dyn Host, settled: Settled) {
         if let Some(receiver) = &self.receiver {
             receiver.watch(&settled);
+        }
+        if let Settled::Access { access, .. } = &settled {
+            M::complete(session, access);
         }
         match settled {
             Settled::Access { access, value } if self.pins.watch(&access, value, session.mcu()) => {}

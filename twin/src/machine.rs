@@ -1,11 +1,12 @@
 //! The boards: what of each is to be known to look at it from outside, and to put a world around it.
 
-use crate::f405::CardSlot;
+use crate::card::{CardSlot, SdSlot};
 use crate::impairments::Impairments;
 use crate::wire::Wire;
 use rigless::chip::nmea;
 use rigless::chip::uart::{Errors, Peer};
 use rigless::edge::Edge;
+use rigless::emulator::{Access, AccessKind};
 use rigless::machine::Board;
 use rigless::machine::flight::{Actuate, Actuator, Signals};
 use rigless::machine::matekh743::{self, MatekH743};
@@ -103,9 +104,17 @@ pub trait Machine: Board + Edge<Signals = Signals> + Sized + 'static {
     /// Hangs a GNSS receiver on its UART, in the place of the one that was there.
     fn attach_receiver(&mut self, receiver: Box<dyn Peer>);
 
-    /// Returns the slot of its memory card, if that is on SPI.
+    /// Puts a card of today into a slot that has another, or none.
+    fn insert_card(&mut self) {}
+
+    /// Returns the slot of its memory card, if one of ours is in it.
     fn card(&mut self) -> Option<&mut CardSlot> {
         None
+    }
+
+    /// Adds to what an access does where the models leave something out.
+    fn complete(session: &mut Session<Self>, access: &Access) {
+        let _ = (session, access);
     }
 
     /// Lets this be wrong with its parts, and nothing else.
@@ -213,9 +222,33 @@ impl Machine for Pixracer {
     const BATTERY_MV: Option<u16> = None;
     /// USB: the core's fourth hardware configuration register.
     const UNMAPPED: &[u64] = &[0x5000_0050];
+    /// RM0090, 34.16.2.
+    const USB_STATUS: Option<u64> = Some(0x5000_0014);
 
     fn built() -> Result<Box<Self>, Error> {
         Pixracer::new().map(Box::new)
+    }
+
+    fn insert_card(&mut self) {
+        self.mcu.sdio.attach(SdSlot::new());
+    }
+
+    /// The interface of a memory card waits for the block that it reads; the models' looks for one when its data path is
+    /// switched on, and not again if the command for it comes later.
+    fn complete(session: &mut Session<Self>, access: &Access) {
+        if access.kind == AccessKind::Write && access.address == SDIO_COMMAND {
+            let at = access.virtual_time;
+            let mcu = session.mcu();
+            let Ok(control) = mcu.read(at, SDIO_DATA_CONTROL, Width::W32) else { return };
+            if control & READS == READS {
+                let _ = mcu.write(at, SDIO_DATA_CONTROL, Width::W32, control & !1);
+                let _ = mcu.write(at, SDIO_DATA_CONTROL, Width::W32, control);
+            }
+        }
+    }
+
+    fn card(&mut self) -> Option<&mut CardSlot> {
+        self.mcu.sdio.card_mut::<SdSlot>().map(|card| &mut card.slot)
     }
 
     fn motors(&mut self) -> Vec<Actuator> {
@@ -258,6 +291,12 @@ impl Machine for Pixracer {
         self.mcu.usart[1].errors_mut()
     }
 }
+
+/// Registers of the interface to memory cards: its command and the control of its data path (RM0090, 31.9.4 and 31.9.8),
+/// with the bits that switch it on and that read.
+const SDIO_COMMAND: u64 = 0x4001_2C0C;
+const SDIO_DATA_CONTROL: u64 = 0x4001_2C2C;
+const READS: u64 = 0b11;
 
 /// What the register before the interrupt status, which resets the core, reads like once that is done.
 const USB_IDLE: u64 = 1 << 31;

@@ -5,6 +5,7 @@
 
 mod aloft;
 mod boot;
+mod card;
 mod card_logs;
 mod check;
 mod cuts;
@@ -38,7 +39,7 @@ mod world;
 use aloft::Aloft;
 use clap::builder::PossibleValuesParser;
 use clap::{Arg, ArgAction, ArgMatches, Command, value_parser};
-use f405::CardTrouble;
+use card::CardTrouble;
 use fly::Order;
 use machines::MachineName;
 use radio::Order as RadioOrder;

@@ -24,6 +24,8 @@ const HOVER_MS: u64 = 30_000;
 const SHORT_HOVER_MS: u64 = 6_000;
 /// Time within which it must arm, climb, and land and disarm [ms].
 const PATIENCE_MS: [u64; 3] = [40_000, 15_000, 40_000];
+/// Time for which a log goes on once the vehicle is disarmed, with its last blocks [ms].
+const REST_MS: u64 = 1_500;
 /// Time within which it must fly the mission, and have disarmed [ms].
 const TOUR_MS: u64 = 160_000;
 /// What the hover may be off on average, and the vehicle be tilted by at any time, in gusts, and on a mission, which
@@ -44,6 +46,8 @@ enum Phase {
     Tours,
     Lands,
     Fetches,
+    /// Disarmed, until the log on its card has ended.
+    Rests,
     Done,
 }
 
@@ -75,6 +79,8 @@ pub struct Pilot {
     hover_ms: u64,
     /// The mission that is flown in the place of a hover.
     tour: Option<Tour>,
+    /// Waits for the log's end afterwards.
+    logs: bool,
     /// Fetches the logs afterwards.
     fetch: Option<Fetch>,
     tilt_rad: f64,
@@ -111,6 +117,7 @@ impl Pilot {
             late: 0,
             hover_ms: HOVER_MS,
             tour: None,
+            logs: false,
             fetch: None,
             tilt_rad: 0.0,
             error: None,
@@ -155,6 +162,12 @@ impl Pilot {
     #[must_use]
     pub fn touring(self) -> Self {
         Pilot { tour: Some(Tour::new()), ..self }
+    }
+
+    /// Waits for the end of the vehicle's log after the flight.
+    #[must_use]
+    pub fn logging(self) -> Self {
+        Pilot { logs: true, ..self }
     }
 
     /// Has it list, download and erase the vehicle's logs after the flight.
@@ -339,7 +352,11 @@ impl Pilot {
             }
             println!("{:7.3} s: {:?}, {x:.2} {y:.2} {z:.2} m{errors}", self.now_ms as f64 * 1e-3, self.phase);
         }
-        let after = if self.fetch.is_some() { Phase::Fetches } else { Phase::Done };
+        let after = match &self.fetch {
+            Some(_) => Phase::Fetches,
+            None if self.logs => Phase::Rests,
+            None => Phase::Done,
+        };
         let next = match self.phase {
             Phase::Wakes => {
                 let is_ready = self.tour.as_ref().is_none_or(Tour::is_aboard);
@@ -385,6 +402,7 @@ impl Pilot {
                 }
                 self.fetch.as_ref().is_none_or(Fetch::is_done).then_some(Phase::Done)
             }
+            Phase::Rests => (passed_ms >= REST_MS).then_some(Phase::Done),
             Phase::Done => None,
         };
         let patience_ms = match self.phase {

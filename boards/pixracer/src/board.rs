@@ -17,6 +17,7 @@
 //! | barometer | MS5611 on SPI2: SCK on PB10, MISO on PB14, MOSI on PB15, select PD7; with a memory, select PD10 |
 //! | compass, outside | QMC5883L on I2C1: SCL on PB8, SDA on PB9 |
 //! | GNSS receiver, outside | u-blox or NMEA on UART4: TX on PA0, RX on PA1 |
+//! | memory card | SDIO: CK on PC12, CMD on PD2, D0 to D3 on PC8, PC9, PC10, PC11; driven by DMA2's stream 6 |
 //! | LED, green | PB1, open drain, lit if low |
 //! | buzzer, without a tone of its own | PA15: TIM2, channel 1 |
 //! | supply of the sensors | PE3, on if high |
@@ -32,6 +33,7 @@ use chip_stm32::motors::{
     set_protocol,
 };
 use chip_stm32::receiver::TX_RING;
+use chip_stm32::sd_card::SdCard;
 use chip_stm32::sensors::{Device, InterruptPin, Polled, SELECT, StampHandler};
 use chip_stm32::{crystal, faults, usb, watchdog};
 use chip_stm32f4::{boot_loader, clocks, reset};
@@ -42,9 +44,10 @@ use embassy_stm32::i2c::{self, I2c};
 use embassy_stm32::interrupt::typelevel::EXTI15_10;
 use embassy_stm32::interrupt::{Interrupt, InterruptExt, Priority};
 use embassy_stm32::peripherals::{
-    DMA1_CH0, DMA1_CH3, DMA1_CH4, DMA1_CH6, DMA1_CH7, DMA2_CH0, DMA2_CH3, DMA2_CH5, I2C1, IWDG, SPI1, SPI2, TIM1, TIM2,
-    TIM4, UART4, USART2, USART3, USB_OTG_FS,
+    DMA1_CH0, DMA1_CH3, DMA1_CH4, DMA1_CH6, DMA1_CH7, DMA2_CH0, DMA2_CH3, DMA2_CH5, DMA2_CH6, I2C1, IWDG, SDIO, SPI1,
+    SPI2, TIM1, TIM2, TIM4, UART4, USART2, USART3, USB_OTG_FS,
 };
+use embassy_stm32::sdmmc::{self, Sdmmc};
 use embassy_stm32::spi::Spi;
 use embassy_stm32::usart::{self, BufferedUart};
 use embassy_stm32::wdg::IndependentWatchdog;
@@ -76,12 +79,14 @@ bind_interrupts!(struct Irqs {
     DMA1_STREAM7 => dma::InterruptHandler<DMA1_CH7>;
     DMA2_STREAM5 => dma::InterruptHandler<DMA2_CH5>;
     DMA1_STREAM6 => dma::InterruptHandler<DMA1_CH6>;
+    SDIO => sdmmc::InterruptHandler<SDIO>;
+    DMA2_STREAM6 => dma::InterruptHandler<DMA2_CH6>;
     EXTI15_10 => StampHandler<EXTI15_10>, exti::InterruptHandler<EXTI15_10>;
     OTG_FS => embassy_stm32::usb::InterruptHandler<USB_OTG_FS>;
 });
 
 /// Each interrupt with its priority.
-const PRIORITIES: [(Interrupt, u8); 14] = [
+const PRIORITIES: [(Interrupt, u8); 16] = [
     (Interrupt::USART2, priority::UART),
     (Interrupt::USART3, priority::UART),
     (Interrupt::UART4, priority::UART),
@@ -96,6 +101,8 @@ const PRIORITIES: [(Interrupt, u8); 14] = [
     (Interrupt::DMA1_STREAM7, priority::AIDING),
     (Interrupt::DMA2_STREAM5, priority::MOTOR_DMA),
     (Interrupt::DMA1_STREAM6, priority::MOTOR_DMA),
+    (Interrupt::SDIO, priority::LOGGING),
+    (Interrupt::DMA2_STREAM6, priority::LOGGING),
 ];
 
 /// Ring buffers of the links and of the GNSS receiver.
@@ -120,7 +127,7 @@ impl Board for Pixracer {
     type Sampler = Inside;
     type Aids = Aids;
     type Links = [BoardLink<Receiver, Transmitter>; 3];
-    type Card = firmware::logging::NoCard;
+    type Card = SdCard;
     type Memory = Bank1Region1<'static, Blocking>;
     const CORE_HZ: u32 = clocks::CORE_HZ;
     /// Sectors 1 and 2, of 16 KiB each (`memory.x`).
@@ -128,6 +135,7 @@ impl Board for Pixracer {
     const HARDWARE: &'static str = env!("CARGO_PKG_NAME");
     const OUTPUTS: usize = OUTPUTS;
     const INDICATES: bool = true;
+    const HAS_CARD: bool = true;
     const BOOT_LOADER: Option<fn() -> !> = Some(boot_loader::restart);
 
     fn after_reset() {
@@ -178,6 +186,19 @@ impl Board for Pixracer {
             receiver: receiver.expect("the baud rate divides the clock"),
         };
 
+        let interface = Sdmmc::new_4bit(
+            p.SDIO,
+            p.DMA2_CH6,
+            Irqs,
+            p.PC12,
+            p.PD2,
+            p.PC8,
+            p.PC9,
+            p.PC10,
+            p.PC11,
+            sdmmc::Config::default(),
+        );
+
         let motors = Motors::new(p.TIM1, pin(p.PE9), pin(p.PE11), pin(p.PE13), pin(p.PE14), p.DMA2_CH5, Irqs);
         control.spawn(motors_1_to_4(motors).expect("spawned once"));
         let motors = Motors::new(p.TIM4, None, pin(p.PD13), pin(p.PD14), None, p.DMA1_CH6, Irqs);
@@ -195,7 +216,7 @@ impl Board for Pixracer {
             aids,
             links,
             memory: Flash::new_blocking(p.FLASH).into_blocking_regions().bank1_region1,
-            card: firmware::logging::NoCard,
+            card: SdCard::new(interface),
         }
     }
 

@@ -18,6 +18,7 @@
 //! | battery | voltage on PC0, current on PC1: ADC1 |
 //! | GNSS receiver | u-blox or NMEA on USART2, outside: TX on PD5, RX on PD6 |
 //! | motor controllers' telemetry | RX of UART8: PE0 (pad Rx8); its TX, PE1, sends nothing |
+//! | memory card | SDMMC1: CK on PC12, CMD on PD2, D0 to D3 on PC8, PC9, PC10, PC11; it reaches the AXI RAM by itself |
 //! | LED, blue | PE3, lit if low |
 //! | buzzer | PA15: TIM2, channel 1 |
 
@@ -30,6 +31,7 @@ use chip_stm32::battery::BatteryConverter;
 use chip_stm32::indicator::{Led, PassiveBuzzer};
 use chip_stm32::link::{self, Receiver, Transmitter};
 use chip_stm32::motors::{CHANNELS, MotorProtocol, Motors, Throttles, hold_low, pin, set_protocol};
+use chip_stm32::sd_card::SdCard;
 use chip_stm32::sensors::{Device, InterruptPin, Interrupted, Polled, StampHandler, interrupted};
 use chip_stm32::{crystal, escs, faults, usb, watchdog};
 use chip_stm32h7::flash::Words;
@@ -41,8 +43,9 @@ use embassy_stm32::interrupt::typelevel::{EXTI2, EXTI15_10};
 use embassy_stm32::interrupt::{self, Interrupt, InterruptExt, Priority};
 use embassy_stm32::peripherals::{
     DMA1_CH0, DMA1_CH1, DMA1_CH2, DMA1_CH3, DMA1_CH4, DMA1_CH5, DMA1_CH6, DMA1_CH7, DMA2_CH0, DMA2_CH1, I2C1, I2C2,
-    IWDG1, TIM2, TIM4, TIM5, UART7, UART8, USART1, USART2, USB_OTG_FS,
+    IWDG1, SDMMC1, TIM2, TIM4, TIM5, UART7, UART8, USART1, USART2, USB_OTG_FS,
 };
+use embassy_stm32::sdmmc::{self, Sdmmc};
 use embassy_stm32::spi::Spi;
 use embassy_stm32::usart::{self, BufferedUart};
 use embassy_stm32::wdg::IndependentWatchdog;
@@ -99,6 +102,7 @@ bind_interrupts!(struct Irqs {
     I2C2_ER => i2c::ErrorInterruptHandler<I2C2>;
     EXTI2 => StampHandler<EXTI2>, exti::InterruptHandler<EXTI2>;
     EXTI15_10 => StampHandler<EXTI15_10>, exti::InterruptHandler<EXTI15_10>;
+    SDMMC1 => sdmmc::InterruptHandler<SDMMC1>;
     OTG_FS => embassy_stm32::usb::InterruptHandler<USB_OTG_FS>;
 });
 
@@ -127,13 +131,14 @@ impl Board for Stm32h743 {
     type Sampler = Imus;
     type Aids = Aids;
     type Links = [BoardLink<Receiver, Transmitter>; 3];
-    type Card = firmware::logging::NoCard;
+    type Card = SdCard;
     type Memory = Words;
     const CORE_HZ: u32 = clocks::CORE_HZ;
     const STORE: u32 = 0;
     const HARDWARE: &'static str = env!("CARGO_PKG_NAME");
     const OUTPUTS: usize = OUTPUTS;
     const INDICATES: bool = true;
+    const HAS_CARD: bool = true;
     const ESCS: bool = true;
     const BOOT_LOADER: Option<fn() -> !> = Some(boot_loader::restart);
 
@@ -192,13 +197,17 @@ impl Board for Stm32h743 {
         interrupt::DMA1_STREAM0.set_priority(Priority::from(priority::MOTOR_DMA));
         interrupt::DMA1_STREAM1.set_priority(Priority::from(priority::MOTOR_DMA));
 
+        let config = sdmmc::Config::default();
+        let interface = Sdmmc::new_4bit(p.SDMMC1, Irqs, p.PC12, p.PD2, p.PC8, p.PC9, p.PC10, p.PC11, config);
+        interrupt::SDMMC1.set_priority(Priority::from(priority::LOGGING));
+
         let (led, buzzer) = (Led::new(p.PE3), PassiveBuzzer::new(p.TIM2, p.PA15));
         executors::housekeeping().spawn(indicator(led, buzzer).expect("spawned once"));
 
         // A debugger that halts the core halts the watchdog.
         pac::DBGMCU.apb4fzr1().modify(|freeze| freeze.set_iwdg1(true));
         let board = Stm32h743 { watchdog: watchdog(p.IWDG1) };
-        Parts { board, sampler, aids, links, memory: Words::new(p.FLASH), card: firmware::logging::NoCard }
+        Parts { board, sampler, aids, links, memory: Words::new(p.FLASH), card: SdCard::new(interface) }
     }
 
     fn set_motor_protocol(&mut self, protocol: MotorProtocol) {

@@ -12,6 +12,7 @@ pub mod indicator;
 pub mod link;
 pub mod motors;
 pub mod receiver;
+pub mod sd_card;
 pub mod sensor_set;
 pub mod sensors;
 pub mod usb;

@@ -11,16 +11,15 @@
 //! | no line from the IMU's interrupt | a pin, by which it is read |
 
 mod bmi270;
-mod card;
 mod part;
 mod relabelled;
 mod wiring;
 
+use crate::card::{CardSlot, SpiSlot};
 use crate::impairments::Impairments;
 use crate::machine::{Divider, Machine, Signal};
 use crate::wire::Wire;
 use bmi270::Bmi270;
-pub use card::{CardSlot, CardTrouble};
 use part::Part;
 use relabelled::Relabelled;
 use rigless::chip::dps310::{Dps310, Sdo};
@@ -112,7 +111,7 @@ impl<const ROW: usize> F405<ROW> {
         }
         if let Some(CardWiring { spi, select: (port, pin) }) = Self::WIRING.card {
             let select = Select { port, pin: Pin::new(pin).expect("one of sixteen pins"), active: Level::Low };
-            part.spi[spi].attach_selected(CardSlot::new(), select);
+            part.spi[spi].attach_selected(SpiSlot::new(), select);
         }
         board.sense(&AT_REST);
         Ok(board)
@@ -358,7 +357,8 @@ impl<const ROW: usize> Machine for F405<ROW> {
     }
 
     fn card(&mut self) -> Option<&mut CardSlot> {
-        self.mcu.stm32.spi[Self::WIRING.card?.spi].chip_mut(CARD)
+        let card: &mut SpiSlot = self.mcu.stm32.spi[Self::WIRING.card?.spi].chip_mut(CARD)?;
+        Some(&mut card.slot)
     }
 
     fn impair(&mut self, impairments: &Impairments) {

@@ -1,0 +1,107 @@
+//! A card by SPI.
+
+use super::CardSlot;
+use rigless::chip::Timeline;
+use rigless::chip::spi::Peer;
+use rigless::snapshot::{Error, Reader, Store, Writer};
+use serde::{Deserialize, Serialize};
+
+/// Commands that write a block, as frames begin with them, and bytes of a frame (SD Physical Layer Simplified
+/// Specification 6.00, 7.3.1.1).
+const WRITE_BLOCK: u8 = 0x40 | 24;
+const FRAME: usize = 6;
+/// The byte before a block (7.3.3.2), and the bytes of a block with its checksum.
+const START_BLOCK: u8 = 0xFE;
+const BLOCK: usize = 512 + 2;
+/// A line at rest, and that of a card that is busy.
+const REST: u32 = 0xFF;
+const BUSY: u32 = 0x00;
+
+/// Where the host is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+enum Heard {
+    #[default]
+    Nothing,
+    /// So many bytes of a frame are to come; true if it writes a block.
+    Frame(usize, bool),
+    /// The answer, and the byte before the block.
+    Waits,
+    /// So many bytes of the block are to come.
+    Block(usize),
+    /// The card's verdict on it.
+    Verdict,
+}
+
+/// A slot whose card is selected by a pin.
+#[derive(Debug)]
+pub struct SpiSlot {
+    pub slot: CardSlot,
+    heard: Heard,
+}
+
+impl SpiSlot {
+    pub fn new() -> Self {
+        SpiSlot { slot: CardSlot::new(), heard: Heard::Nothing }
+    }
+
+    /// Follows the host's bytes to the end of each block that it writes.
+    fn hear(&mut self, mosi: u8, answer: u32, now_ns: u64) {
+        self.heard = match self.heard {
+            Heard::Nothing if mosi & 0xC0 == 0x40 => Heard::Frame(FRAME - 1, mosi == WRITE_BLOCK),
+            Heard::Nothing => Heard::Nothing,
+            Heard::Frame(1, true) => Heard::Waits,
+            Heard::Frame(1, false) => Heard::Nothing,
+            Heard::Frame(left, writes) => Heard::Frame(left - 1, writes),
+            Heard::Waits if mosi == START_BLOCK => Heard::Block(BLOCK),
+            Heard::Waits => Heard::Waits,
+            Heard::Block(1) => Heard::Verdict,
+            Heard::Block(left) => Heard::Block(left - 1),
+            Heard::Verdict if answer == REST => Heard::Verdict,
+            Heard::Verdict => {
+                self.slot.write(now_ns);
+                Heard::Nothing
+            }
+        };
+    }
+}
+
+impl Peer for SpiSlot {
+    fn transfer(&mut self, mosi: u32, bits: u8, context: &mut Timeline<'_, '_>) -> u32 {
+        let now_ns = context.now().0;
+        let (is_out, is_new) = self.slot.is_out(now_ns);
+        if is_new {
+            self.heard = Heard::Nothing;
+        }
+        if is_out {
+            return REST;
+        }
+        let answer = self.slot.card.transfer(mosi, bits, context);
+        // The model writes at once: how long a card takes is added here.
+        if now_ns < self.slot.busy_until_ns {
+            return BUSY;
+        }
+        self.hear(mosi as u8, answer, now_ns);
+        answer
+    }
+
+    fn select(&mut self, context: &mut Timeline<'_, '_>) {
+        self.slot.card.select(context);
+    }
+
+    fn deselect(&mut self, context: &mut Timeline<'_, '_>) {
+        self.heard = Heard::Nothing;
+        self.slot.card.deselect(context);
+    }
+}
+
+impl Store for SpiSlot {
+    fn store(&self, to: &mut Writer) -> Result<(), Error> {
+        to.put(&self.heard)?;
+        self.slot.store(to)
+    }
+
+    fn load(&mut self, from: &mut Reader) -> Result<(), Error> {
+        self.heard = from.take()?;
+        self.slot.load(from)
+    }
+}
