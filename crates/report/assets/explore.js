@@ -358,12 +358,12 @@
       const { low_m: low, high_m: high, rotors_m: rotors } = data;
       const size = high.map((value, i) => value - low[i]);
       const extent = Math.max(...size);
-      this.renderer = new THREE.WebGLRenderer({ antialias: true, preserveDrawingBuffer: true });
-      this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
-      this.space.append(this.renderer.domElement);
-      const canvas = this.renderer.domElement;
-      canvas.setAttribute("role", "img");
-      canvas.setAttribute("aria-label", "the flights in space; drag to turn, control and wheel to zoom");
+      // One for all scenes of a page, of which a browser draws some sixteen at once; each has its picture.
+      Space.renderer ??= new THREE.WebGLRenderer({ antialias: true });
+      const canvas = element("canvas", { role: "img",
+        "aria-label": "the flights in space; drag to turn, control and wheel to zoom" });
+      this.canvas = canvas;
+      this.space.append(canvas);
       this.scene = new THREE.Scene();
       this.scene.add(new THREE.HemisphereLight(0xffffff, 0x888888, 3));
       this.camera = new THREE.PerspectiveCamera(40, 1, extent / 1000, extent * 50);
@@ -478,13 +478,19 @@
     resize() {
       const { clientWidth: width, clientHeight: height } = this.space;
       if (!width || !height) return;
-      this.renderer.setSize(width, height, false);
+      const ratio = Math.min(devicePixelRatio, 2);
+      Object.assign(this.canvas, { width: Math.round(width * ratio), height: Math.round(height * ratio) });
       this.camera.aspect = width / height;
       this.camera.updateProjectionMatrix();
       this.draw();
     }
 
-    draw() { this.renderer.render(this.scene, this.camera); }
+    draw() {
+      const { canvas: { width, height }, scene, camera } = this;
+      Space.renderer.setSize(width, height, false);
+      Space.renderer.render(scene, camera);
+      this.canvas.getContext("2d").drawImage(Space.renderer.domElement, 0, 0);
+    }
 
     /** Moves every vehicle to where it was. */
     place(time) {

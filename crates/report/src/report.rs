@@ -147,6 +147,9 @@ pub(super) fn picture(figure: &Picture) -> Markup {
     }
 }
 
+/// What is said of flights in space.
+pub(super) const SPACE: &str = "The flights in space.";
+
 /// Flights in space without a picture: seen on a screen with JavaScript alone.
 pub(super) fn space(scene: Option<ExplorableScene>, caption: &str) -> Markup {
     html! {

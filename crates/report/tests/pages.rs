@@ -4,15 +4,20 @@
 mod common;
 
 use afbc_campaign::compare::Comparison;
+use afbc_campaign::random::{self, FlownDraw, Random, Seen};
 use afbc_campaign::suite::{SUITES, Suite};
 use afbc_campaign::{QUANTITIES, compare};
 use afbc_plant::{Environment, ParameterChange, PlantParameter, RotorFault};
+use afbc_report::random::Judged;
 use afbc_report::{self as report, flights};
 use afbc_scenario::contender::{Contender, ControllerKind};
 use afbc_scenario::{Scenario, built_in};
+use afbc_sim::flight::Lost;
 use afbc_sim::flown::Flown;
 use afbc_sim::run::Run;
+use afbc_vehicles::BUILT_IN;
 use common::{OWN, captions, eventful, flown, folder, gone_alike, hover, labels, named, open, page, svgs, words};
+use nalgebra::Vector4;
 use roxmltree::Document;
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -191,6 +196,41 @@ impl Suited {
     fn flown(&self) -> report::suite::FlownSuite<'_> {
         report::suite::FlownSuite { suite: &self.0, comparisons: &self.1 }
     }
+}
+
+/// Of each vehicle's flights the one is told in which the contender was farthest behind, or which it lost alone; flown
+/// again, it is on the page in space.
+#[test]
+fn the_flights_that_tell_most_are_told() {
+    let vehicles = BUILT_IN.iter().take(2).map(|vehicle| vehicle.read().unwrap()).collect();
+    let random = Random { seeds: 1..2, flights: 3, seen: Seen::Truth, vehicles };
+    let contenders = ["afbc", "pid"].map(named);
+    let mut drawn = random.under(&contenders, &[]).unwrap();
+    drawn.iter_mut().for_each(|flight| flight.scenario.duration_s = 6.0);
+    let mut flown = random::fly(drawn, &|| ()).unwrap();
+    let told = |flown: &[FlownDraw]| -> Vec<String> {
+        Judged::new(&random, flown, "afbc").telling().iter().map(|scenario| scenario.name.clone()).collect()
+    };
+    let name = |place: usize, flown: &[FlownDraw]| flown[place].flight.scenario.name.clone();
+    // Alike, but for one flight of each vehicle.
+    for one in flown.iter_mut().flat_map(|flown| &mut flown.outcomes) {
+        (one.lost, one.metrics.rmse) = (None, Vector4::repeat(1.0));
+    }
+    assert_eq!(told(&flown), [name(0, &flown), name(3, &flown)]);
+    flown[1].outcomes[0].metrics.rmse *= 1.5;
+    flown[5].outcomes[1].metrics.rmse *= 0.5;
+    assert_eq!(told(&flown), [name(1, &flown), name(5, &flown)]);
+    let lost = Some(Lost { time_s: 1.0, reason: "it fell" });
+    flown[2].outcomes[0].lost = lost;
+    // Nobody kept it: it tells nothing.
+    flown[3].outcomes.iter_mut().for_each(|outcome| outcome.lost = lost);
+    assert_eq!(told(&flown), [name(2, &flown), name(5, &flown)]);
+
+    let judged = Judged::new(&random, &flown, "afbc");
+    let again = compare::fly(judged.telling().into_iter().cloned().collect(), 1, 10, &|| ()).unwrap();
+    let out = folder("random");
+    report::random::write(&open(&out), &judged, &again).unwrap();
+    assert_eq!(page(&out).matches("data-explore=\"scene\"").count(), 2);
 }
 
 /// Returns the declarations of a part of a style for exactly this selector.

@@ -1,6 +1,7 @@
 // Explores reports in a real browser:
 //
-//   node report.mjs SHOTS FLOWN SUITE      reports (report.html) of `sitl fly` and `sitl compare --suite`
+//   node report.mjs SHOTS FLOWN SUITE RANDOM      reports (report.html) of `sitl fly`, of `sitl compare --suite`, and of
+//                                                 the suite `random`
 //
 // Screenshots go to SHOTS.
 import assert from "node:assert/strict";
@@ -8,7 +9,7 @@ import { statSync } from "node:fs";
 import { pathToFileURL } from "node:url";
 import puppeteer from "puppeteer-core";
 
-const [shots, flown, suite] = process.argv.slice(2);
+const [shots, flown, suite, random] = process.argv.slice(2);
 const browser = await puppeteer.launch({
   executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium",
   args: ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-gpu-sandbox"],
@@ -171,6 +172,37 @@ await step("the page of a suite shows where every law stands", async () => {
   await page.screenshot({ path: `${shots}/report-suite.png` });
   await page.click(".heat a");
   await figure(0);
+});
+
+/** Colours in the picture of a scene. */
+const colours = (canvas) => {
+  const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+  return new Set(new Uint32Array(data.buffer)).size;
+};
+
+await step("a suite's flights are flown again in space, more than a browser has contexts", async () => {
+  const count = await page.$$eval("[data-explore]", (all) => all.length);
+  for (let index = 0; index < count; index++) await figure(index);
+  const seen = await page.$$eval(".space canvas", (all, colours) => all.map(eval(colours)), `(${colours})`);
+  assert.ok(seen.length > 20 && seen.every((colours) => colours > 20), `${seen}`);
+  const scene = await page.$("figure:has(.space)");
+  await scene.evaluate((node) => node.scrollIntoView({ block: "center" }));
+  const start = await pixels(scene);
+  await scene.$eval("input[type=range]", (slider) => {
+    slider.value = slider.max / 2;
+    slider.dispatchEvent(new Event("input"));
+  });
+  assert.notEqual(await pixels(scene), start);
+  await page.screenshot({ path: `${shots}/report-suite-space.png` });
+});
+
+await step("of drawn flights those that tell most are flown again", async () => {
+  await open(random);
+  const count = await page.$$eval("[data-explore]", (all) => all.length);
+  for (let index = 0; index < count; index++) await figure(index);
+  const seen = await page.$$eval(".space canvas", (all, colours) => all.map(eval(colours)), `(${colours})`);
+  assert.ok(seen.length === 6 && seen.every((colours) => colours > 20), `${seen}`);
+  await page.screenshot({ path: `${shots}/report-random.png` });
 });
 
 assert.deepEqual(errors, []);

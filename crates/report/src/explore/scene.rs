@@ -72,6 +72,18 @@ impl ExplorableScene {
         })
     }
 
+    /// Returns it with so many points of each track, at most, beside its last one: for pages with many flights.
+    pub(crate) fn thinned(mut self, points: usize) -> Self {
+        for track in &mut self.tracks {
+            let stride = track.times.len().div_ceil(points.max(1)).max(1);
+            let attitude = track.attitude.iter_mut().flatten();
+            for deltas in core::iter::once(&mut track.times).chain(&mut track.position).chain(attitude) {
+                *deltas = strided(deltas, stride);
+            }
+        }
+        self
+    }
+
     /// Adds the way of a vehicle, or of its reference, which has no attitude.
     pub(crate) fn add(&mut self, name: String, pen: Pen, places: &[Place], is_reference: bool) {
         let stride = places.len().div_ceil(POINTS_MAX).max(1);
@@ -95,5 +107,36 @@ impl ExplorableScene {
             position: [0, 1, 2].map(along),
             attitude: (!is_reference).then(|| [0, 1, 2].map(about)),
         });
+    }
+}
+
+/// Returns the differences of every `stride`-th value, and of the last one.
+fn strided(deltas: &[i64], stride: usize) -> Vec<i64> {
+    let mut sum = 0;
+    let step = |(place, delta): (usize, &i64)| {
+        sum += delta;
+        (place % stride == 0 || place + 1 == deltas.len()).then(|| core::mem::take(&mut sum))
+    };
+    deltas.iter().enumerate().filter_map(step).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn what_is_left_of_a_track_is_where_it_was(
+            deltas in prop::collection::vec(-1000..1000_i64, 0..60), stride in 1_usize..70,
+        ) {
+            let sums = |deltas: &[i64]| deltas.iter().scan(0, |sum, delta| { *sum += delta; Some(*sum) }).collect::<Vec<_>>();
+            let (all, left) = (sums(&deltas), sums(&strided(&deltas, stride)));
+            let mut expected: Vec<i64> = all.iter().step_by(stride).copied().collect();
+            if deltas.len() % stride != 1 && stride > 1 {
+                expected.extend(all.last());
+            }
+            prop_assert_eq!(left, expected);
+        }
     }
 }

@@ -1,6 +1,6 @@
 //! A figure with its caption.
 
-use crate::explore::Explorable;
+use crate::explore::{Explorable, ExplorableScene};
 
 /// A figure with its caption.
 pub(crate) struct Picture {
@@ -12,6 +12,16 @@ pub(crate) struct Picture {
     pub(crate) svg: String,
     /// The same to be explored on a page.
     pub(crate) explorable: Option<Explorable>,
+}
+
+impl Picture {
+    /// Returns the flights in space alone; none of another figure.
+    pub(crate) fn into_scene(self) -> Option<ExplorableScene> {
+        match self.explorable? {
+            Explorable::Scene(scene) => Some(scene),
+            Explorable::Chart(_) => None,
+        }
+    }
 }
 
 /// Caption of figures with a cross.

@@ -1,6 +1,7 @@
 //! Flights that were drawn and flown, and how the contenders stand.
 
 use afbc_campaign::random::{FlownDraw, Random, Ranking, Score, Seen, rankings};
+use afbc_scenario::Scenario;
 use afbc_scenario::contender::Contender;
 
 /// Flights that were drawn and flown, and how the contenders stand in them.
@@ -42,6 +43,24 @@ impl<'a> Judged<'a> {
         judged.against = against;
         judged.groups = groups;
         judged
+    }
+
+    /// Returns of each vehicle the flight that tells most of the contender with which the others are compared: one that
+    /// it lost and another kept, or else the one in which it was farthest behind the best.
+    pub fn telling(&self) -> Vec<&'a Scenario> {
+        let behind = |score: &Score| match (score.of(self.against), score.best_m()) {
+            (Some(own), Some(best)) => own / best,
+            _ => f64::INFINITY,
+        };
+        let of_vehicle = |vehicle: &str| {
+            let flown = self.flown.iter().filter(|flown| flown.flight.vehicle == vehicle);
+            let judged =
+                flown.filter_map(|flown| Some((flown, flown.score())).filter(|(_, score)| score.best_m().is_some()));
+            // Of several alike, the first.
+            let worst = judged.reduce(|worst, next| if behind(&next.1) > behind(&worst.1) { next } else { worst });
+            worst.map(|(flown, _)| &flown.flight.scenario)
+        };
+        self.random.vehicles.iter().filter_map(|vehicle| of_vehicle(&vehicle.name)).collect()
     }
 
     /// Returns the contenders.

@@ -6,6 +6,7 @@ mod grids;
 mod judged;
 mod markdown;
 mod page;
+mod shown;
 mod table;
 
 pub use files::json;
@@ -14,7 +15,10 @@ pub use markdown::markdown;
 pub use table::table;
 
 use crate::grid::{self, TableFormat};
+use afbc_campaign::compare::Comparison;
 use afbc_files::{Error, Folder};
+use shown::Shown;
+use std::io;
 use std::path::PathBuf;
 
 /// Writes everything about the flights into `folder`, replacing all earlier files of its command, and returns the paths
@@ -23,13 +27,14 @@ use std::path::PathBuf;
 /// * `flights.csv`: a row for each flight of each contender;
 /// * `random.json`: how the contenders stand;
 /// * `tables.md`, `tables.tex`: the tables for a paper;
-/// * `report.html`: the same on one self-contained page.
+/// * `report.html`: the same on one self-contained page, with the [telling](Judged::telling) flights, flown `again`.
 ///
 /// # Errors
 /// The first file that could not be written, or is not the command's.
-pub fn write(folder: &Folder, judged: &Judged<'_>) -> Result<Vec<PathBuf>, Error> {
+pub fn write(folder: &Folder, judged: &Judged<'_>, again: &[Comparison]) -> Result<Vec<PathBuf>, Error> {
     folder.only(&["flights.csv", "random.json", "tables.md", "tables.tex", "report.html"])?;
-    let page = page::page(judged);
+    let drawn = again.iter().map(Shown::of).collect::<io::Result<Vec<_>>>();
+    let page = page::page(judged, drawn.map_err(|source| folder.error("figures", source))?);
     let [md, tex] = [TableFormat::Markdown, TableFormat::Latex].map(|format| tables(judged, format));
     Ok(vec![
         folder.place("flights.csv", |out| files::csv(out, judged))?,

@@ -3,11 +3,15 @@
 use super::Judged;
 use super::cells::{cells, heads, legend, notes};
 use super::judged::Group;
-use crate::report::sheet;
+use super::shown::Shown;
+use crate::report::{SPACE, sheet, space};
 use afbc_campaign::random::TILT_MAX_RAD;
 use maud::{Markup, html};
 
-pub(super) fn page(judged: &Judged<'_>) -> String {
+/// Points of a vehicle's way in space, of each flight.
+const POINTS: usize = 300;
+
+pub(super) fn page(judged: &Judged<'_>, shown: Vec<Shown>) -> String {
     sheet(
         "Suite random",
         &html! {
@@ -21,6 +25,17 @@ pub(super) fn page(judged: &Judged<'_>) -> String {
                 h2 { (group.name()) }
                 div.scroll { (rankings(judged, group)) }
                 @for note in notes(judged, group) { p { (note) } }
+            }
+            @if !shown.is_empty() {
+                p {
+                    "Of each vehicle the flight in which " (judged.against()) " stands worst against the best, or which "
+                    "it lost and another kept:"
+                }
+            }
+            @for flight in shown {
+                h2 { (flight.name) }
+                p.quiet { (flight.conditions) "." }
+                (space(flight.space.map(|scene| scene.thinned(POINTS)), SPACE))
             }
         },
     )

@@ -1,6 +1,7 @@
 //! Results of a suite: one table of flights and contenders, for page, terminal and documents, CSV and JSON.
 
 mod cells;
+mod drawn;
 mod files;
 mod flown;
 mod heat;
@@ -15,11 +16,11 @@ pub use markdown::{markdown, markers};
 pub use table::table;
 
 use crate::differences;
-use crate::figures::{self, Picture};
 use crate::grid::{self, TableFormat};
 use afbc_campaign::compare::Comparison;
 use afbc_files::{Error, Folder};
 use cells::FIGURES;
+use drawn::Drawn;
 use std::io;
 use std::path::PathBuf;
 
@@ -38,10 +39,11 @@ use std::path::PathBuf;
 /// # Errors
 /// The first file that could not be written, or is not the command's.
 pub fn write(folder: &Folder, flown: FlownSuite<'_>) -> Result<Vec<PathBuf>, Error> {
-    let drawn = flown.comparisons.iter().map(draw).collect::<io::Result<Vec<_>>>();
+    let drawn = flown.comparisons.iter().map(Drawn::of).collect::<io::Result<Vec<_>>>();
     let drawn = drawn.map_err(|source| folder.error("figures", source))?;
     let name = |comparison: &Comparison| format!("{}.svg", comparison.scenario.name);
-    let svgs: Vec<_> = flown.comparisons.iter().zip(&drawn).filter_map(|(c, p)| Some((name(c), p.as_ref()?))).collect();
+    let svgs: Vec<_> =
+        flown.comparisons.iter().zip(&drawn).filter_map(|(c, drawn)| Some((name(c), drawn.errors.as_ref()?))).collect();
     let names = ["suite.csv", "suite.json", "statistics.csv", "standing.csv", "tables.md", "tables.tex", "report.html"];
     let names = names.into_iter();
     folder.only(&names.chain(svgs.iter().map(|(name, _)| name.as_str())).collect::<Vec<_>>())?;
@@ -58,10 +60,10 @@ pub fn write(folder: &Folder, flown: FlownSuite<'_>) -> Result<Vec<PathBuf>, Err
         let text = tables(flown, format);
         paths.push(folder.place(name, |out| out.write_all(text.as_bytes()))?);
     }
-    for (name, picture) in &svgs {
-        paths.push(folder.place(name, |out| out.write_all(picture.svg.as_bytes()))?);
+    for (name, errors) in &svgs {
+        paths.push(folder.place(name, |out| out.write_all(errors.svg.as_bytes()))?);
     }
-    let page = page::page(flown, &drawn);
+    let page = page::page(flown, drawn);
     paths.push(folder.place("report.html", |out| out.write_all(page.as_bytes()))?);
     Ok(paths)
 }
@@ -69,9 +71,4 @@ pub fn write(folder: &Folder, flown: FlownSuite<'_>) -> Result<Vec<PathBuf>, Err
 /// Formats the tables for a paper: the distances of every flight, and how the contenders stand over all of them.
 pub fn tables(flown: FlownSuite<'_>, format: TableFormat) -> String {
     grid::tables(&standing::grids(flown), &flown.suite.name, format)
-}
-
-fn draw(comparison: &Comparison) -> io::Result<Option<Picture>> {
-    let flights: Vec<_> = comparison.entries.iter().map(|entry| &entry.first).collect();
-    Ok(figures::flights::named(&flights, &[("fig7-errors", "errors")])?.pop())
 }

@@ -1,15 +1,18 @@
 //! The report of a suite.
 
 use super::cells::{FIGURES, Figure, lost, trip};
+use super::drawn::Drawn;
 use super::{FlownSuite, heat, standing};
-use crate::figures::Picture;
-use crate::report::{picture, sheet};
+use crate::report::{SPACE, picture, sheet, space};
 use crate::words;
 use afbc_campaign::suite::SuiteFlight;
 use afbc_sim::metrics::SETTLED_S;
 use maud::{Markup, html};
 
-pub(super) fn page(flown: FlownSuite<'_>, pictures: &[Option<Picture>]) -> String {
+/// Points of a vehicle's way in space, of each flight.
+const POINTS: usize = 300;
+
+pub(super) fn page(flown: FlownSuite<'_>, drawn: Vec<Drawn>) -> String {
     let suite = flown.suite;
     sheet(
         &format!("Suite {}", suite.name),
@@ -30,7 +33,7 @@ pub(super) fn page(flown: FlownSuite<'_>, pictures: &[Option<Picture>]) -> Strin
             (standing.section())
             @for figure in &FIGURES { h2 { (figure.title) } div.scroll { (results(flown, figure)) } }
             @if flown.rows().any(|(flight, _)| !flight.published.is_empty()) { (published(flown)) }
-            @for ((flight, comparison), drawn) in flown.rows().zip(pictures) {
+            @for ((flight, comparison), drawn) in flown.rows().zip(drawn) {
                 h2 id=(heat::anchor(comparison)) { (flight.scenario.name) }
                 @if !comparison.scenario.description.is_empty() { p { (comparison.scenario.description) "." } }
                 p.quiet { (words::conditions(&comparison.scenario)) (tilt(flight)) "." }
@@ -40,7 +43,8 @@ pub(super) fn page(flown: FlownSuite<'_>, pictures: &[Option<Picture>]) -> Strin
                         p { (entry.contender().title()) ": " (words::lost(&lost)) "." }
                     }
                 }
-                @if let Some(drawn) = drawn { (picture(drawn)) }
+                @if let Some(errors) = &drawn.errors { (picture(errors)) }
+                (space(drawn.space.map(|scene| scene.thinned(POINTS)), SPACE))
             }
         },
     )

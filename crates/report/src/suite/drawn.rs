@@ -1,0 +1,21 @@
+//! Pictures of a suite's flights.
+
+use crate::explore::ExplorableScene;
+use crate::figures::{self, Picture};
+use afbc_campaign::compare::Comparison;
+use std::io;
+
+/// What the page shows of a flight.
+pub(super) struct Drawn {
+    pub(super) errors: Option<Picture>,
+    pub(super) space: Option<ExplorableScene>,
+}
+
+impl Drawn {
+    pub(super) fn of(comparison: &Comparison) -> io::Result<Self> {
+        let flights: Vec<_> = comparison.entries.iter().map(|entry| &entry.first).collect();
+        let names = [("fig7-errors", "errors"), ("fig4-trajectory", "trajectory")];
+        let mut pictures = figures::flights::named(&flights, &names)?.into_iter();
+        Ok(Drawn { errors: pictures.next(), space: pictures.next().and_then(Picture::into_scene) })
+    }
+}
