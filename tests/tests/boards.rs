@@ -264,7 +264,8 @@ fn streams_have_their_interrupts_and_motors_their_pins() {
     }
 }
 
-/// Bytes of serial ports come first, then the IMU's interrupt and transfers, the motors', the slow sensors', the card's.
+/// Bytes of serial ports come first, then the IMU's interrupt and transfers, the motors', the slow sensors', and the
+/// memory card's.
 #[test]
 fn every_interrupt_has_the_priority_of_its_purpose() {
     let table = fs::read_to_string(root().join("chips/stm32f4/src/flight_controller.rs")).unwrap();

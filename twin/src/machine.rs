@@ -233,8 +233,8 @@ impl Machine for Pixracer {
         self.mcu.sdio.attach(SdSlot::new());
     }
 
-    /// The interface of a memory card waits for the block that it reads; the models' looks for one when its data path is
-    /// switched on, and not again if the command for it comes later.
+    /// The interface of a memory card waits for the block that it reads; the models' looks for one when its data path
+    /// is switched on, and not again if the command for it comes later.
     fn complete(session: &mut Session<Self>, access: &Access) {
         if access.kind == AccessKind::Write && access.address == SDIO_COMMAND {
             let at = access.virtual_time;
@@ -292,8 +292,8 @@ impl Machine for Pixracer {
     }
 }
 
-/// Registers of the interface to memory cards: its command and the control of its data path (RM0090, 31.9.4 and 31.9.8),
-/// with the bits that switch it on and that read.
+/// Registers of the interface to memory cards: its command and the control of its data path (RM0090, 31.9.4 and
+/// 31.9.8), with the bits that switch it on and that read.
 const SDIO_COMMAND: u64 = 0x4001_2C0C;
 const SDIO_DATA_CONTROL: u64 = 0x4001_2C2C;
 const READS: u64 = 0b11;

@@ -7,8 +7,8 @@ mod sensors;
 
 use defmt_rtt as _;
 
-// The interrupt lines of the display controller, of HDMI, of the JPEG codec, of the camera and of serial audio, which this firmware does
-// not need.
+// The interrupt lines of the display controller, of HDMI, of the JPEG codec, of the camera and of serial audio, which
+// this firmware does not need.
 firmware::image!(
     board::Stm32h743, control: LTDC, comms: LTDC_ER, housekeeping: CEC, sampling: JPEG, aiding: DCMI,
     logging: SAI1

@@ -113,7 +113,8 @@ proptest! {
     fn another_reader_agrees(
         time_ms in 0_u32..86_400_000, [latitude, longitude] in [0_u64..5_400_000_000, 0..10_800_000_000],
         [south, west] in any::<[bool; 2]>(), altitude in -500.0..9000.0_f64, speed in 0.0..100.0_f64,
-        course in prop::option::of(0.0..360.0_f64), dilution in 0.5..20.0_f64, satellites in 4_u8..40, places in 1_usize..=7,
+        course in prop::option::of(0.0..360.0_f64), dilution in 0.5..20.0_f64, satellites in 4_u8..40,
+        places in 1_usize..=7,
     ) {
         let time = format!(
             "{:02}{:02}{:02}.{:03}", time_ms / 3_600_000, time_ms / 60_000 % 60, time_ms / 1000 % 60, time_ms % 1000
@@ -141,7 +142,8 @@ proptest! {
         };
         prop_assert!((read.latitude_deg - fix.latitude.as_f64()).abs() < 1e-9);
         prop_assert!((read.longitude_deg - fix.longitude.as_f64()).abs() < 1e-9);
-        prop_assert!((read.altitude_m - f64::from(fix.altitude.map_or(f32::NAN, |altitude| altitude.meters))).abs() < 1e-3);
+        let altitude_m = fix.altitude.map_or(f32::NAN, |altitude| altitude.meters);
+        prop_assert!((read.altitude_m - f64::from(altitude_m)).abs() < 1e-3);
         prop_assert!((read.horizontal_sigma_m - fix.hdop * RANGE_SIGMA_M).abs() < 1e-4);
         prop_assert_eq!(read.satellites, fix.sat_in_use);
         let all: Vec<_> = other.parse_from_bytes(motion.as_bytes()).collect();

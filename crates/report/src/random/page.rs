@@ -28,8 +28,8 @@ pub(super) fn page(judged: &Judged<'_>, shown: Vec<Shown>) -> String {
             }
             @if !shown.is_empty() {
                 p {
-                    "Of each vehicle the flight in which " (judged.against()) " stands worst against the best, or which "
-                    "it lost and another kept:"
+                    "Of each vehicle the flight in which " (judged.against()) " stands worst against the best, or "
+                    "which it lost and another kept:"
                 }
             }
             @for flight in shown {
