@@ -25,8 +25,8 @@ use embassy_time::{Instant, Timer};
 use heapless::Vec;
 use static_cell::StaticCell;
 
-/// Blocks that wait for the card, at most: of a log of 140 kB/s those of 51 ms.
-const BLOCKS: usize = 14;
+/// Blocks that wait for the card, at most: of a log of 140 kB/s those of 47 ms.
+const BLOCKS: usize = 13;
 /// Ticks whose views wait for the links' task, at most.
 const VIEWS: usize = 3;
 /// Time between two looks at a card without a log \[us\].

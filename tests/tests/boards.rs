@@ -6,7 +6,7 @@
 //! large.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, clippy::panic, missing_docs)] // what is unreadable must stop it
 
-use crate::board_table::{BoardTable, Motor, Stream, Timer, wiring};
+use crate::board_table::{Battery, BoardTable, Motor, Stream, Timer, wiring};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -107,7 +107,7 @@ fn the_wiring_is_what_the_board_uses() {
     for (board, page, heading, count) in [
         ("stm32f405", "firmware.md", "\n## Wiring", 8),
         ("stm32h743", "boards/stm32h743.md", "\n## Wiring", 42),
-        ("pixracer", "boards/pixracer.md", "\n## Wiring", 38),
+        ("pixracer", "boards/pixracer.md", "\n## Wiring", 40),
     ] {
         let text = fs::read_to_string(root().join("docs").join(page)).unwrap();
         let table = text.split_once(heading).unwrap().1.split("\n#").next().unwrap();
@@ -353,7 +353,7 @@ fn prioritised(code: &str) -> BTreeMap<String, String> {
 
 /// From Betaflight's descriptions of the boards (`betaflight/config`): the gyroscope's data in, select, interrupt and
 /// alignment, motors 1 to 4, clock and data of the barometer's bus, first LED but for those at the
-/// debugger's pins, buzzer.
+/// debugger's pins, buzzer, pins of the battery's voltage and current with the current's scale.
 #[test]
 fn boards_are_as_betaflight_describes_them() {
     let tables: BTreeMap<_, _> = kinds().0.into_iter().collect();
@@ -364,6 +364,7 @@ fn boards_are_as_betaflight_describes_them() {
             ["PB6", "PB7", "PB8", "PB9"],
             ["PB10", "PB11"],
             ["PC8", "PC5"],
+            (["PC0", "PC1"], 386.0),
         ),
         (
             "speedybee-f405-v4",
@@ -371,6 +372,7 @@ fn boards_are_as_betaflight_describes_them() {
             ["PB6", "PB7", "PB0", "PB1"],
             ["PB8", "PB9"],
             ["PC13", "PC15"],
+            (["PC0", "PC1"], 400.0),
         ),
         (
             "speedybee-f405-mini",
@@ -378,19 +380,35 @@ fn boards_are_as_betaflight_describes_them() {
             ["PB6", "PB7", "PB1", "PB0"],
             ["PB8", "PB9"],
             ["PC13", "PC15"],
+            (["PC0", "PC1"], 250.0),
         ),
-        ("matek-f405-se", ["PA6", "PA4", "PC4", "CW270"], ["PB7", "PB6", "PB0", "PB1"], ["PB8", "PB9"], ["", "PC15"]),
+        (
+            "matek-f405-se",
+            ["PA6", "PA4", "PC4", "CW270"],
+            ["PB7", "PB6", "PB0", "PB1"],
+            ["PB8", "PB9"],
+            ["", "PC15"],
+            (["PC0", "PC1"], 179.0),
+        ),
         (
             "matek-f405-std",
             ["PA6", "PC2", "PC3", "CW180"],
             ["PC6", "PC7", "PC8", "PC9"],
             ["PB6", "PB7"],
             ["PB9", "PC13"],
+            (["PC5", "PC4"], 179.0),
         ),
-        ("kakute-f4-v2", ["PA6", "PC4", "PC5", "CW270"], ["PB0", "PB1", "PA3", "PA2"], ["PB8", "PB9"], ["PB5", "PC9"]),
+        (
+            "kakute-f4-v2",
+            ["PA6", "PC4", "PC5", "CW270"],
+            ["PB0", "PB1", "PA3", "PA2"],
+            ["PB8", "PB9"],
+            ["PB5", "PC9"],
+            (["PC3", "PC2"], 275.0),
+        ),
     ];
     assert_eq!(tables.len(), described.len());
-    for (name, gyroscope, motors, bus, indicator) in described {
+    for (name, gyroscope, motors, bus, indicator, (battery, current_scale)) in described {
         let table = &tables[&root().join("boards").join(name)];
         let imu = &table.imu;
         assert_eq!([&*imu.into, &imu.select, &imu.ready.pin, &imu.alignment], gyroscope, "{name}");
@@ -400,6 +418,11 @@ fn boards_are_as_betaflight_describes_them() {
         }
         assert_eq!([&*table.i2c.clock, &table.i2c.data], bus, "{name}");
         assert_eq!([table.led.as_deref().unwrap_or_default(), &table.buzzer], indicator, "{name}");
+        let Battery { converter, voltage, current, volts_per_volt, amperes_per_volt } = &table.battery;
+        assert_eq!(([&**voltage, current], &**converter), (battery, "ADC1"), "{name}");
+        // Scales in tenths of a volt per volt, 110 where none is given, and in millivolts per 10 A.
+        assert_eq!(*volts_per_volt, 11.0, "{name}");
+        assert!((amperes_per_volt - 1e4 / current_scale).abs() < 0.05, "{name}");
         assert_eq!((table.crystal_hz, table.numbering.as_str()), (8_000_000, "BETAFLIGHT"), "{name}");
     }
 }

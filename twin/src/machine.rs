@@ -219,7 +219,7 @@ impl Machine for Pixracer {
     const UART_INTERRUPTS: [u16; 2] = [38, 52];
     /// Two IMUs on one SPI.
     const JITTER: u64 = 350_000;
-    const BATTERY_MV: Option<u16> = None;
+    const BATTERY_MV: Option<u16> = Some(16_800);
     /// USB: the core's fourth hardware configuration register.
     const UNMAPPED: &[u64] = &[0x5000_0050];
     /// RM0090, 34.16.2.

@@ -20,6 +20,7 @@ chip_stm32f4::flight_controller! {
         dma: DMA1_CH7 by DMA1_STREAM7, DMA1_CH5 by DMA1_STREAM5,
         barometer: (Dps310, Bmp280)
     },
+    battery: ADC1 { voltage: PC3, current: PC2, volts_per_volt: 11.0, amperes_per_volt: 36.4 },
     indicator: { led: PB5, buzzer: PC9 },
     motors: 4 as BETAFLIGHT {
         first: TIM3<u16>, DMA1_CH2 by DMA1_STREAM2 { (), (), (PB0: GPIOB 0, motor 1), (PB1: GPIOB 1, motor 2) },

@@ -24,6 +24,7 @@ chip_stm32f4::flight_controller! {
         dma: DMA1_CH7 by DMA1_STREAM7, DMA1_CH0 by DMA1_STREAM0,
         barometer: (Dps310, Bmp280)
     },
+    battery: ADC1 { voltage: PC0, current: PC1, volts_per_volt: 11.0, amperes_per_volt: 55.9 },
     indicator: { buzzer: PC15 },
     card: SPI3 { clock: PB3, out: PB5, in: PB4, select: PC14, quiet: [] },
     motors: 4 as BETAFLIGHT {

@@ -23,6 +23,7 @@ chip_stm32f4::flight_controller! {
         dma: DMA1_CH6 by DMA1_STREAM6, DMA1_CH0 by DMA1_STREAM0,
         barometer: (Dps310, Bmp280)
     },
+    battery: ADC1 { voltage: PC5, current: PC4, volts_per_volt: 11.0, amperes_per_volt: 55.9 },
     indicator: { led: PB9, buzzer: PC13 },
     motors: 4 as BETAFLIGHT {
         first: TIM8<u16>, DMA2_CH1 by DMA2_STREAM1 {

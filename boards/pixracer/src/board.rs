@@ -17,15 +17,18 @@
 //! | barometer | MS5611 on SPI2: SCK on PB10, MISO on PB14, MOSI on PB15, select PD7; with a memory, select PD10 |
 //! | compass, outside | QMC5883L on I2C1: SCL on PB8, SDA on PB9 |
 //! | GNSS receiver, outside | u-blox or NMEA on UART4: TX on PA0, RX on PA1 |
+//! | battery | voltage on PA2, current on PA3: ADC1, by a power module |
 //! | memory card | SDIO: CK on PC12, CMD on PD2, D0 to D3 on PC8, PC9, PC10, PC11; driven by DMA2's stream 6 |
 //! | LED, green | PB1, open drain, lit if low |
 //! | buzzer, without a tone of its own | PA15: TIM2, channel 1 |
 //! | supply of the sensors | PE3, on if high |
 
 use crate::sensors::{Aids, Inside};
+use afbc_drivers::battery::BatteryScale;
 use afbc_drivers::ms5611::Ms5611;
 use afbc_drivers::qmc5883l::Qmc5883l;
 use afbc_drivers::{Driver, I2cRegisters, SensorPart, SpiRegisters};
+use chip_stm32::battery::BatteryConverter;
 use chip_stm32::indicator::{Led, PassiveBuzzer};
 use chip_stm32::link::{self, Receiver, Transmitter};
 use chip_stm32::motors::{
@@ -36,8 +39,10 @@ use chip_stm32::receiver::TX_RING;
 use chip_stm32::sd_card::SdCard;
 use chip_stm32::sensors::{Device, InterruptPin, Polled, SELECT, StampHandler};
 use chip_stm32::{crystal, faults, usb, watchdog};
+use chip_stm32f4::converter::SLOWLY;
 use chip_stm32f4::{boot_loader, clocks, reset};
 use embassy_executor::SendSpawner;
+use embassy_stm32::adc::Adc;
 use embassy_stm32::flash::{Bank1Region1, Blocking, Flash};
 use embassy_stm32::gpio::{Level, Output, Speed};
 use embassy_stm32::i2c::{self, I2c};
@@ -184,6 +189,14 @@ impl Board for Pixracer {
             barometer: Driver::new(Ms5611::default(), SpiRegisters::new(barometer, format), Polled),
             compass: Driver::new(Qmc5883l, I2cRegisters::new(outside, 0x0D), Polled),
             receiver: receiver.expect("the baud rate divides the clock"),
+            // By the usual power module.
+            battery: BatteryConverter::new(
+                Adc::new(p.ADC1),
+                p.PA2,
+                p.PA3,
+                SLOWLY,
+                BatteryScale { volts_per_volt: 10.1, amperes_per_volt: 17.0 },
+            ),
         };
 
         let interface = Sdmmc::new_4bit(

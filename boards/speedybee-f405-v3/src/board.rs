@@ -20,6 +20,7 @@ chip_stm32f4::flight_controller! {
         dma: DMA1_CH7 by DMA1_STREAM7, DMA1_CH3 by DMA1_STREAM3,
         barometer: (Spl06,)
     },
+    battery: ADC1 { voltage: PC0, current: PC1, volts_per_volt: 11.0, amperes_per_volt: 25.9 },
     indicator: { led: PC8, buzzer: PC5 },
     card: SPI2 { clock: PB13, out: PB15, in: PB14, select: PA15, quiet: [PB12] },
     motors: 4 as BETAFLIGHT {

@@ -23,6 +23,7 @@
 //! | buzzer | PA15: TIM2, channel 1 |
 
 use crate::sensors::{Aids, Imus};
+use afbc_drivers::battery::BatteryScale;
 use afbc_drivers::dps310::Dps310;
 use afbc_drivers::icm426xx::{Icm42605, Icm42688p};
 use afbc_drivers::qmc5883l::Qmc5883l;
@@ -37,7 +38,7 @@ use chip_stm32::{crystal, escs, faults, usb, watchdog};
 use chip_stm32h7::flash::Words;
 use chip_stm32h7::{boot_loader, clocks, reset};
 use embassy_executor::SendSpawner;
-use embassy_stm32::adc::Adc;
+use embassy_stm32::adc::{Adc, SampleTime};
 use embassy_stm32::i2c::{self, I2c};
 use embassy_stm32::interrupt::typelevel::{EXTI2, EXTI15_10};
 use embassy_stm32::interrupt::{self, Interrupt, InterruptExt, Priority};
@@ -179,7 +180,14 @@ impl Board for Stm32h743 {
         let aids = Aids {
             compass: Driver::new(Qmc5883l, I2cRegisters::new(outside, 0x0D), Polled),
             barometer: Driver::new(Dps310::default(), I2cRegisters::new(inside, 0x76), Polled),
-            battery: BatteryConverter::new(Adc::new(p.ADC1), p.PC0, p.PC1),
+            battery: BatteryConverter::new(
+                Adc::new(p.ADC1),
+                p.PC0,
+                p.PC1,
+                // 16 bits, as the converter has after its reset.
+                (u16::MAX, |adc, pin| adc.blocking_read(pin, SampleTime::CYCLES387_5)),
+                BatteryScale { volts_per_volt: 11.0, amperes_per_volt: 40.0 },
+            ),
             receiver: receiver.expect("the baud rate divides the clock"),
         };
         for line in IMU_INTERRUPTS {

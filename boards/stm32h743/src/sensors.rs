@@ -2,16 +2,14 @@
 //! and the compass's, are turned to the body's (x forward, y left, z up) here.
 
 use afbc_drivers::alignment::{CW0_FLIP, CW90_FLIP, turned};
-use afbc_drivers::battery::BatteryScale;
 use afbc_drivers::dps310::Dps310;
 use afbc_drivers::icm426xx::{Icm42605, Icm42688p};
 use afbc_drivers::qmc5883l::Qmc5883l;
 use afbc_drivers::{Driver, I2cRegisters, SpiRegisters};
-use chip_stm32::battery::{self, BatteryConverter};
+use chip_stm32::battery::BatteryConverter;
 use chip_stm32::receiver;
 use chip_stm32::sensors::{COMPASS, Device, Interrupted, Polled, run};
 use embassy_futures::join::{join, join4};
-use embassy_stm32::adc::SampleTime;
 use embassy_stm32::i2c::{I2c, Master};
 use embassy_stm32::mode::Async;
 use embassy_stm32::peripherals::ADC1;
@@ -45,11 +43,6 @@ impl Sampler for Imus {
     }
 }
 
-/// What a volt at the battery's pins means, by the board's divider and amplifier.
-const BATTERY: BatteryScale = BatteryScale { volts_per_volt: 11.0, amperes_per_volt: 40.0 };
-/// Largest number of the converter, at its reset of 16 bits.
-const ADC_END: u16 = u16::MAX;
-
 /// The slow sensors.
 pub(crate) struct Aids {
     pub(crate) compass: Driver<Qmc5883l, I2cRegisters<Bus>, Polled>,
@@ -63,12 +56,7 @@ impl Sampler for Aids {
         join4(
             run(self.compass, sensor::MAGNETOMETER, |reading| aux_sensors::put_field(&reading, &COMPASS)),
             run(self.barometer, sensor::BAROMETER, |reading| aux_sensors::put_pressure(&reading)),
-            battery::run(
-                self.battery,
-                ADC_END,
-                |adc, pin| adc.blocking_read(pin, SampleTime::CYCLES387_5),
-                |at_us, pins| aux_sensors::put_battery(at_us, pins, BATTERY),
-            ),
+            self.battery.run(),
             receiver::run(self.receiver, aux_sensors::put_fix),
         )
         .await;

@@ -1,6 +1,7 @@
 //! The sensors of a usual flight controller: an IMU alone on an SPI; barometer, and compass outside, on one I2C; a GNSS
-//! receiver outside.
+//! receiver outside; the battery.
 
+use crate::battery::BatteryConverter;
 use crate::candidates::{BarometerCandidates, ImuCandidates};
 use crate::receiver;
 use crate::sensors::{COMPASS, Device, InterruptPin, Polled, run};
@@ -9,9 +10,10 @@ use afbc_drivers::qmc5883l::Qmc5883l;
 use afbc_drivers::{Driver, I2cRegisters};
 use core::marker::PhantomData;
 use embassy_embedded_hal::shared_bus::asynch::i2c::I2cDevice;
-use embassy_futures::join::join3;
+use embassy_futures::join::join4;
 use embassy_stm32::i2c::{I2c, Master};
 use embassy_stm32::mode::Async;
+use embassy_stm32::peripherals::ADC1;
 use embassy_stm32::usart::BufferedUart;
 use embassy_sync::blocking_mutex::raw::NoopRawMutex;
 use embassy_sync::mutex::Mutex;
@@ -54,13 +56,18 @@ impl<P: ImuCandidates> Sampler for Imu<P> {
 pub struct SlowSensors<P> {
     bus: I2c<'static, Async, Master>,
     receiver: BufferedUart<'static>,
+    battery: BatteryConverter<ADC1>,
     parts: PhantomData<P>,
 }
 
 impl<P> SlowSensors<P> {
-    /// Barometer and compass on `bus`, and a receiver.
-    pub fn new(bus: I2c<'static, Async, Master>, receiver: BufferedUart<'static>) -> Self {
-        SlowSensors { bus, receiver, parts: PhantomData }
+    /// Barometer and compass on `bus`, a receiver, and the battery.
+    pub fn new(
+        bus: I2c<'static, Async, Master>,
+        receiver: BufferedUart<'static>,
+        battery: BatteryConverter<ADC1>,
+    ) -> Self {
+        SlowSensors { bus, receiver, battery, parts: PhantomData }
     }
 }
 
@@ -69,12 +76,13 @@ impl<P: BarometerCandidates> Sampler for SlowSensors<P> {
         // A lock that keeps nothing else out: all that share the bus are in this task.
         let bus = Mutex::<NoopRawMutex, _>::new(self.bus);
         let compass = I2cRegisters::new(I2cDevice::new(&bus), COMPASS_ADDRESS);
-        join3(
+        join4(
             P::run(I2cDevice::new(&bus), |reading| aux_sensors::put_pressure(&reading)),
             run(Driver::new(Qmc5883l, compass, Polled), sensor::MAGNETOMETER, |reading| {
                 aux_sensors::put_field(&reading, &COMPASS)
             }),
             receiver::run(self.receiver, aux_sensors::put_fix),
+            self.battery.run(),
         )
         .await;
     }

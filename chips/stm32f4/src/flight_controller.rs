@@ -11,6 +11,7 @@
 ///   pad named there, before which the board has an inverter: the chip has none.
 /// * IMU and barometer are [candidates](chip_stm32::candidates): the one that answers is read. How the IMU sits is one
 ///   of `afbc_drivers::alignment`.
+/// * The battery's voltage and current are on pins of the converter, by the board's divider and amplifier.
 /// * The buzzer sounds while its pin is high; the LED, if there is one, is lit while its pin is low.
 /// * The memory card, if there is one, has an SPI of its own; `quiet` are the select pins of whatever else is there.
 /// * Motors are so many, numbered as [`numbering`](chip_stm32::motors::numbering) has it. They have a line for each
@@ -37,6 +38,10 @@ macro_rules! flight_controller {
             clock: $scl:ident, data: $sda:ident, interrupts: $event:ident, $error:ident,
             dma: $i2c_tx:ident by $i2c_tx_line:ident, $i2c_rx:ident by $i2c_rx_line:ident,
             barometer: $barometer:ty
+        },
+        battery: ADC1 {
+            voltage: $voltage:ident, current: $current:ident,
+            volts_per_volt: $volts_per_volt:literal, amperes_per_volt: $amperes_per_volt:literal
         },
         indicator: { $(led: $led:ident,)? buzzer: $buzzer:ident },
         $(card: $card:ident {
@@ -181,6 +186,17 @@ macro_rules! flight_controller {
                 let config = chip_stm32::sensors::i2c();
                 let bus = i2c::I2c::new(p.$i2c, p.$scl, p.$sda, p.$i2c_tx, p.$i2c_rx, Irqs, config);
 
+                let battery = chip_stm32::battery::BatteryConverter::new(
+                    embassy_stm32::adc::Adc::new(p.ADC1),
+                    p.$voltage,
+                    p.$current,
+                    chip_stm32f4::converter::SLOWLY,
+                    afbc_drivers::battery::BatteryScale {
+                        volts_per_volt: $volts_per_volt,
+                        amperes_per_volt: $amperes_per_volt,
+                    },
+                );
+
                 let card = chip_stm32f4::flight_controller!(
                     @new_card p $(, $card, $card_sck, $card_mosi, $card_miso, $card_select, $($quiet),*)?
                 );
@@ -208,7 +224,11 @@ macro_rules! flight_controller {
                         kernel_hz,
                         afbc_drivers::alignment::$alignment,
                     ),
-                    aids: chip_stm32::sensor_set::SlowSensors::new(bus, gnss.expect("the baud rate divides the clock")),
+                    aids: chip_stm32::sensor_set::SlowSensors::new(
+                        bus,
+                        gnss.expect("the baud rate divides the clock"),
+                        battery,
+                    ),
                     links: [
                         chip_stm32::link::new(link.expect("the baud rate divides the clock")),
                         chip_stm32::link::of_usb(chip_stm32::usb::start(p.USB_OTG_FS, p.PA12, p.PA11, Irqs)),

@@ -4,5 +4,6 @@
 
 pub mod boot_loader;
 pub mod clocks;
+pub mod converter;
 mod flight_controller;
 pub mod reset;

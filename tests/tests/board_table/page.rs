@@ -73,6 +73,15 @@ pub(crate) fn wiring(board: &BoardTable) -> String {
             if card.quiet.is_empty() { String::new() } else { format!("; {} stays high", card.quiet.join(", ")) };
         ["memory card: clock, in, out, select".to_owned(), pins, format!("{}, up to 21 MHz{quiet}", card.name)]
     }));
+    let battery = &board.battery;
+    rows.push([
+        "battery: voltage, current".to_owned(),
+        format!("{}, {}", battery.voltage, battery.current),
+        format!(
+            "{}, {} V and {} A a volt (`BAT1_V_DIV`, `BAT1_A_PER_V`)",
+            battery.converter, battery.volts_per_volt, battery.amperes_per_volt
+        ),
+    ]);
     rows.extend(board.led.iter().map(|led| ["LED".to_owned(), led.clone(), "lit if low".to_owned()]));
     rows.push(["buzzer with a tone of its own".to_owned(), board.buzzer.clone(), "sounds if high".to_owned()]);
     rows.push(["debugger".to_owned(), "PA13, PA14".to_owned(), "SWDIO, SWCLK".to_owned()]);

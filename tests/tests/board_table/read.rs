@@ -55,6 +55,16 @@ pub(crate) struct I2c {
     pub(crate) barometers: Vec<String>,
 }
 
+/// Where the battery is measured, and what a volt there means.
+#[derive(Debug)]
+pub(crate) struct Battery {
+    pub(crate) converter: String,
+    pub(crate) voltage: String,
+    pub(crate) current: String,
+    pub(crate) volts_per_volt: f64,
+    pub(crate) amperes_per_volt: f64,
+}
+
 /// The memory card's bus.
 #[derive(Debug)]
 pub(crate) struct CardBus {
@@ -98,6 +108,7 @@ pub(crate) struct BoardTable {
     pub(crate) escs: Option<Uart>,
     pub(crate) imu: Spi,
     pub(crate) i2c: I2c,
+    pub(crate) battery: Battery,
     pub(crate) led: Option<String>,
     pub(crate) buzzer: String,
     pub(crate) card: Option<CardBus>,
@@ -144,6 +155,14 @@ impl BoardTable {
             barometers: words.parts("barometer :"),
         };
         words.expect("}");
+        let battery = Battery {
+            converter: words.after("battery :"),
+            voltage: words.after("{ voltage :"),
+            current: words.after("current :"),
+            volts_per_volt: words.after("volts_per_volt :").parse().unwrap(),
+            amperes_per_volt: words.after("amperes_per_volt :").parse().unwrap(),
+        };
+        words.expect("}");
         words.expect("indicator");
         words.expect(":");
         words.expect("{");
@@ -186,6 +205,7 @@ impl BoardTable {
             escs,
             imu,
             i2c,
+            battery,
             led,
             buzzer,
             card,
@@ -212,7 +232,17 @@ impl BoardTable {
         let uarts =
             [&self.link, &self.gnss].into_iter().chain(radio).chain(&self.escs).flat_map(|uart| [&uart.tx, &uart.rx]);
         let Spi { clock, out, into, select, ready, .. } = &self.imu;
-        let buses = [clock, out, into, select, &ready.pin, &self.i2c.clock, &self.i2c.data];
+        let buses = [
+            clock,
+            out,
+            into,
+            select,
+            &ready.pin,
+            &self.i2c.clock,
+            &self.i2c.data,
+            &self.battery.voltage,
+            &self.battery.current,
+        ];
         let motors = self.motors().map(|motor| &motor.pin);
         let card = self.card.iter().flat_map(|CardBus { clock, out, into, select, quiet, .. }| {
             [clock, out, into, select].into_iter().chain(quiet)

@@ -37,6 +37,7 @@ use rigless::machine::{Board, HostWire, Target};
 use rigless::mcu::Mcu;
 use rigless::snapshot::{Error as SnapshotError, Reader, Store, Writer};
 use rigless::soc::Error;
+use rigless::soc::stm32f427::peripherals::adc::Channel as AnalogChannel;
 use rigless::soc::stm32f427::peripherals::gpio::Pin;
 use rigless::soc::stm32f427::peripherals::spi::Select;
 use rigless::soc::stm32f427::peripherals::tim::Channel;
@@ -52,6 +53,8 @@ const LINK_WIRE: HostWire = HostWire { name: "serial1", port: 5760 };
 /// SPI1, and the place of the IMU on it.
 const SPI: usize = 0;
 const IMU: usize = 0;
+/// Volts of the battery per volt at its pin.
+const DIVIDER: u32 = 11;
 /// Place of the memory card on its SPI.
 const CARD: usize = 0;
 /// Places on the I2C.
@@ -96,6 +99,9 @@ impl<const ROW: usize> F405<ROW> {
         let part = &mut board.mcu.stm32;
         part.rcc.attach_crystals(CRYSTAL_HZ, 0);
         part.set_supply(RAIL_MV);
+        for converter in &mut part.adc {
+            converter.set_reference(RAIL_MV);
+        }
         if let Some(Sensors { imu, select: (port, pin), i2c, receiver, .. }) = Self::WIRING.sensors {
             let select = Select { port, pin: Pin::new(pin).expect("one of sixteen pins"), active: Level::Low };
             match imu {
@@ -215,7 +221,7 @@ impl<const ROW: usize> Edge for F405<ROW> {
 
     fn sense(&mut self, signals: &Signals) {
         self.sensed = *signals;
-        let Some(Sensors { imu, quarter_turns, i2c, receiver, .. }) = Self::WIRING.sensors else { return };
+        let Some(Sensors { imu, quarter_turns, i2c, receiver, battery, .. }) = Self::WIRING.sensors else { return };
         let F405 { mcu: Part { stm32: part, .. }, impairments, handed, .. } = self;
         let rate = of_imu(handed.rate.hand(signals.angular_rate, &impairments.imus[0].rate), quarter_turns);
         let force = of_imu(handed.force.hand(signals.specific_force, &impairments.imus[0].force), quarter_turns);
@@ -236,6 +242,11 @@ impl<const ROW: usize> Edge for F405<ROW> {
                 chip.inner.set_acceleration(force[0], force[1], force[2]);
                 chip.inner.set_temperature(signals.temperature);
             }
+        }
+        let current_ma = u32::try_from(signals.battery_current).unwrap_or(0);
+        let pins_mv = [signals.battery_voltage / DIVIDER, current_ma * 10 / battery.deciamperes_per_volt];
+        for (number, pin_mv) in battery.channels.into_iter().zip(pins_mv) {
+            part.adc[0].set_input(AnalogChannel::new(number).expect("one of sixteen"), pin_mv);
         }
         let barometer: &mut Dps310 = part.i2c[i2c].chip_mut(BAROMETER).expect("attached");
         let [pressure] = handed.pressure.hand([signals.pressure], &impairments.barometer.pressure);
@@ -317,7 +328,7 @@ impl<const ROW: usize> Machine for F405<ROW> {
     const UART_INTERRUPTS: [u16; 2] = [Self::WIRING.link.interrupt, Self::WIRING.receiver().interrupt];
     const RECEIVER: Divider = Self::WIRING.receiver().divider;
     const JITTER: u64 = 300_000;
-    const BATTERY_MV: Option<u16> = None;
+    const BATTERY_MV: Option<u16> = if Self::WIRING.sensors.is_some() { Some(16_800) } else { None };
     /// USB: the core's fourth hardware configuration register.
     const UNMAPPED: &[u64] = &[0x5000_0050];
     /// RM0090, 34.16.2.

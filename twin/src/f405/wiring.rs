@@ -43,6 +43,15 @@ pub struct Sensors {
     pub i2c: usize,
     pub i2c_stream: usize,
     pub receiver: Uart,
+    pub battery: Battery,
+}
+
+/// Where the battery's voltage, by a divider of 11, and current come in: channels of the converter, and amperes of a
+/// volt, in tenths.
+#[derive(Clone, Copy, Debug)]
+pub struct Battery {
+    pub channels: [u8; 2],
+    pub deciamperes_per_volt: u32,
 }
 
 /// A memory card on an SPI: its place among the part's, and port and pin that select it.
@@ -110,6 +119,7 @@ const SPEEDYBEE_V3: Wiring = Wiring {
         i2c: 1,
         i2c_stream: 3,
         receiver: USART6,
+        battery: Battery { channels: [10, 11], deciamperes_per_volt: 259 },
     }),
     card: Some(CardWiring { spi: 1, select: ("GPIOA", 15) }),
     timers: &[TIM4_ALL],
@@ -128,6 +138,7 @@ const SPEEDYBEE_V4: Wiring = Wiring {
         i2c: 0,
         i2c_stream: 0,
         receiver: USART6,
+        battery: Battery { channels: [10, 11], deciamperes_per_volt: 250 },
     }),
     card: Some(CardWiring { spi: 2, select: ("GPIOC", 14) }),
     timers: TIM4_TIM3,
@@ -144,6 +155,7 @@ const SPEEDYBEE_MINI: Wiring = Wiring {
         i2c: 0,
         i2c_stream: 0,
         receiver: USART6,
+        battery: Battery { channels: [10, 11], deciamperes_per_volt: 400 },
     }),
     card: None,
     motors: [("M1", TIM4, 1), ("M2", TIM4, 2), ("M3", TIM3, 4), ("M4", TIM3, 3)],
@@ -162,6 +174,7 @@ const MATEK_SE: Wiring = Wiring {
         i2c: 0,
         i2c_stream: 0,
         receiver: USART6,
+        battery: Battery { channels: [10, 11], deciamperes_per_volt: 559 },
     }),
     card: Some(CardWiring { spi: 2, select: ("GPIOC", 14) }),
     timers: TIM4_TIM3,
@@ -180,6 +193,7 @@ const MATEK_STD: Wiring = Wiring {
         i2c: 0,
         i2c_stream: 0,
         receiver: USART3,
+        battery: Battery { channels: [15, 14], deciamperes_per_volt: 559 },
     }),
     card: Some(CardWiring { spi: 2, select: ("GPIOC", 1) }),
     timers: &[TIM8_ALL],
@@ -198,6 +212,7 @@ const KAKUTE: Wiring = Wiring {
         i2c: 0,
         i2c_stream: 5,
         receiver: UART4,
+        battery: Battery { channels: [13, 12], deciamperes_per_volt: 364 },
     }),
     card: None,
     timers: &[tim3([0, 2]), TIM5_LAST],
