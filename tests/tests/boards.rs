@@ -166,7 +166,7 @@ fn assert_once<T: Ord + std::fmt::Debug>(what: Vec<T>, board: &Path) {
 fn nothing_is_used_twice() {
     for (board, table) in kinds().0 {
         let BoardTable { link, gnss, radio, escs, imu, i2c, timers, card, .. } = &table;
-        let radio = radio.as_ref().map(|(uart, _)| &uart.name);
+        let radio = radio.as_ref().map(|radio| &radio.uart.name);
         let escs = escs.as_ref().map(|escs| &escs.name);
         assert_once(table.pins(), &board);
         let names = [&link.name, &gnss.name, &imu.name, &i2c.name].into_iter().chain(escs);

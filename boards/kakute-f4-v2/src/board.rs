@@ -8,6 +8,7 @@ chip_stm32f4::flight_controller! {
     crystal_hz: 8_000_000,
     link: USART1 { tx: PA9, rx: PA10 },
     gnss: UART4 { tx: PA0, rx: PA1 },
+    radio: USART3 { tx: PB10, rx: PB11, sbus: "R3", inverter: PB15 },
     escs: UART5 { tx: PC12, rx: PD2 },
     imu: SPI1 {
         clock: PA5, out: PA7, in: PA6, select: PC4,

@@ -1,11 +1,16 @@
 //! Links: by UART, with ring buffers that its interrupt fills and empties, and by [`usb`].
 
 use crate::usb::{self, UsbPort};
+use core::cell::Cell;
 use core::future::poll_fn;
 use core::pin::pin;
 use core::task::{Poll, ready};
 use embassy_futures::poll_once;
+use embassy_stm32::Peri;
+use embassy_stm32::gpio::{Level, Output, Pin, Speed};
 use embassy_stm32::usart::{BufferedUart, BufferedUartRx, BufferedUartTx, Config, Parity, StopBits};
+use embassy_sync::blocking_mutex::Mutex;
+use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embedded_io_async::{BufRead, Write};
 use firmware::board::{self, BoardLink};
 use firmware::ticks::Tick;
@@ -35,6 +40,26 @@ fn sbus() -> Config {
         config.invert_rx = true;
     }
     config
+}
+
+/// What switches the inverter before the radio receiver's pin.
+static INVERTER: Mutex<CriticalSectionRawMutex, Cell<Option<Output<'static>>>> = Mutex::new(Cell::new(None));
+
+/// Lets SBUS be inverted by this pin, which is low until then; to be called before [`set_sbus`].
+///
+/// [`set_sbus`]: board::Transmitter::set_sbus
+pub fn invert_by(pin: Peri<'static, impl Pin>) {
+    let pin = Output::new(pin, Level::Low, Speed::Low);
+    INVERTER.lock(|inverter| inverter.set(Some(pin)));
+}
+
+/// Switches the inverter on, if there is one, for ever.
+fn invert() {
+    if let Some(mut pin) = INVERTER.lock(Cell::take) {
+        pin.set_high();
+        // A pin that is dropped is an input again.
+        core::mem::forget(pin);
+    }
 }
 
 /// Makes a link of a UART.
@@ -102,6 +127,7 @@ impl board::Transmitter for Transmitter {
         {
             defmt::warn!("SBUS does not divide the clock");
         }
+        invert();
     }
 
     fn transmit(&mut self, _tick: &Tick, bytes: &[u8]) -> bool {

@@ -8,7 +8,8 @@
 /// * Each peripheral has its DMA's streams, as `DMA1_CH6` for stream 6, with their interrupts.
 /// * The IMU's interrupt has a pin, the line of the pin's number, as `EXTI5`, and that one's interrupt, as `EXTI9_5`.
 /// * A radio receiver has a UART of its own, if there is one to spare, as the last link. A receiver of SBUS is on the
-///   pad named there, before which the board has an inverter: the chip has none.
+///   pad named there, before which the board has an inverter: the chip has none. An inverter that is switched, before a
+///   pad that CRSF is on, too, has a pin, high for SBUS.
 /// * IMU and barometer are [candidates](chip_stm32::candidates): the one that answers is read. How the IMU sits is one
 ///   of `afbc_drivers::alignment`.
 /// * The battery's voltage and current are on pins of the converter, by the board's divider and amplifier.
@@ -26,7 +27,9 @@ macro_rules! flight_controller {
         crystal_hz: $crystal_hz:literal,
         link: $link:ident { tx: $link_tx:ident, rx: $link_rx:ident },
         gnss: $gnss:ident { tx: $gnss_tx:ident, rx: $gnss_rx:ident },
-        $(radio: $radio:ident { tx: $radio_tx:ident, rx: $radio_rx:ident, sbus: $sbus:literal },)?
+        $(radio: $radio:ident {
+            tx: $radio_tx:ident, rx: $radio_rx:ident, sbus: $sbus:literal $(, inverter: $inverter:ident)?
+        },)?
         $(escs: $escs:ident { tx: $escs_tx:ident, rx: $escs_rx:ident },)?
         imu: $spi:ident {
             clock: $sck:ident, out: $mosi:ident, in: $miso:ident, select: $select:ident,
@@ -162,6 +165,7 @@ macro_rules! flight_controller {
                     static RADIO_RX: StaticCell<[u8; RADIO_RINGS[1]]> = StaticCell::new();
                     let (tx, rx) = (RADIO_TX.init([0; RADIO_RINGS[0]]), RADIO_RX.init([0; RADIO_RINGS[1]]));
                     let config = chip_stm32::link::config();
+                    $(chip_stm32::link::invert_by(p.$inverter);)?
                     let radio = BufferedUart::new(p.$radio, p.$radio_rx, p.$radio_tx, tx, rx, Irqs, config);
                 )?
                 $(

@@ -1,5 +1,6 @@
 //! The table of wires on a board's page.
 
+use super::read::Radio;
 use super::{BoardTable, Stream};
 use std::fmt::Write;
 
@@ -37,11 +38,15 @@ pub(crate) fn wiring(board: &BoardTable) -> String {
             format!("u-blox or NMEA on {}", gnss.name),
         ],
     ];
-    if let Some((uart, pad)) = &board.radio {
+    if let Some(Radio { uart, pad, inverter }) = &board.radio {
+        let inverted = match inverter {
+            Some(pin) => format!("SBUS by the same pad, before which {pin} switches an inverter"),
+            None => format!("SBUS by the pad {pad}, which has an inverter before {}", uart.rx),
+        };
         rows.push([
             "radio receiver, outside: out, in".to_owned(),
             format!("{}, {}", uart.tx, uart.rx),
-            format!("CRSF on {}; SBUS by the pad {pad}, which has an inverter before {}", uart.name, uart.rx),
+            format!("CRSF on {}; {inverted}", uart.name),
         ]);
     }
     rows.extend(escs.as_ref().map(|escs| {

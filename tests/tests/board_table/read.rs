@@ -19,6 +19,14 @@ pub(crate) struct Uart {
     pub(crate) rx: String,
 }
 
+/// The radio receiver's UART, the pad of its inverter, and what switches that.
+#[derive(Debug)]
+pub(crate) struct Radio {
+    pub(crate) uart: Uart,
+    pub(crate) pad: String,
+    pub(crate) inverter: Option<String>,
+}
+
 /// The pin of a part's interrupt, its line (`EXTI5`) and that one's interrupt (`EXTI9_5`).
 #[derive(Debug)]
 pub(crate) struct ReadyPin {
@@ -102,8 +110,7 @@ pub(crate) struct BoardTable {
     pub(crate) crystal_hz: u32,
     pub(crate) link: Uart,
     pub(crate) gnss: Uart,
-    /// The radio receiver's UART, and the pad of its inverter.
-    pub(crate) radio: Option<(Uart, String)>,
+    pub(crate) radio: Option<Radio>,
     /// Where the motor controllers' telemetry comes in.
     pub(crate) escs: Option<Uart>,
     pub(crate) imu: Spi,
@@ -228,7 +235,8 @@ impl BoardTable {
 
     /// Returns every pin that is used, once for each use.
     pub(crate) fn pins(&self) -> Vec<&str> {
-        let radio = self.radio.as_ref().map(|(uart, _)| uart);
+        let radio = self.radio.as_ref().map(|radio| &radio.uart);
+        let inverter = self.radio.iter().flat_map(|radio| &radio.inverter);
         let uarts =
             [&self.link, &self.gnss].into_iter().chain(radio).chain(&self.escs).flat_map(|uart| [&uart.tx, &uart.rx]);
         let Spi { clock, out, into, select, ready, .. } = &self.imu;
@@ -247,7 +255,7 @@ impl BoardTable {
         let card = self.card.iter().flat_map(|CardBus { clock, out, into, select, quiet, .. }| {
             [clock, out, into, select].into_iter().chain(quiet)
         });
-        let all = uarts.chain(buses).chain(motors).chain(&self.led).chain([&self.buzzer]).chain(card);
+        let all = uarts.chain(buses).chain(motors).chain(&self.led).chain([&self.buzzer]).chain(card).chain(inverter);
         all.map(String::as_str).collect()
     }
 }
@@ -282,11 +290,12 @@ impl Words {
         uart
     }
 
-    fn radio(&mut self) -> (Uart, String) {
+    fn radio(&mut self) -> Radio {
         let uart = Uart { name: self.after("radio :"), tx: self.after("{ tx :"), rx: self.after("rx :") };
         let pad = self.after("sbus :").replace('"', "");
+        let inverter = (self.peek() == "inverter").then(|| self.after("inverter :"));
         self.expect("}");
-        (uart, pad)
+        Radio { uart, pad, inverter }
     }
 
     fn stream(&mut self) -> Stream {

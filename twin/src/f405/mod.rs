@@ -347,13 +347,10 @@ impl<const ROW: usize> Machine for F405<ROW> {
         false
     }
 
-    /// USART2, the board's own for it.
+    /// The board's own for it.
     fn attach_radio(&mut self, wire: Wire) -> Option<f32> {
-        let is_there = Self::WIRING.has_radio;
-        if is_there {
-            self.mcu.stm32.usart[1].attach(wire);
-        }
-        is_there.then_some(0.0)
+        self.mcu.stm32.usart[Self::WIRING.radio?].attach(wire);
+        Some(0.0)
     }
 
     /// UART5, on all of them that have one for it.

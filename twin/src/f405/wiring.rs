@@ -10,8 +10,8 @@ use crate::machine::{Divider, FrameTimer};
 pub struct Wiring {
     pub name: &'static str,
     pub link: Uart,
-    /// True if USART2 is left to a radio receiver.
-    pub has_radio: bool,
+    /// The UART that is left to a radio receiver, among the part's.
+    pub radio: Option<usize>,
     /// None has sensors of its own: its state comes over the link.
     pub sensors: Option<Sensors>,
     /// The slot of its memory card.
@@ -111,7 +111,7 @@ const ALL_OF_TIM8: [(&str, Timer, u8); 4] = [("M1", TIM8, 1), ("M2", TIM8, 2), (
 const SPEEDYBEE_V3: Wiring = Wiring {
     name: "speedybeef405v3",
     link: USART3,
-    has_radio: true,
+    radio: Some(1),
     sensors: Some(Sensors {
         imu: Inertial::Bmi270,
         select: ("GPIOA", 4),
@@ -130,7 +130,7 @@ const SPEEDYBEE_V3: Wiring = Wiring {
 const SPEEDYBEE_V4: Wiring = Wiring {
     name: "speedybeef405v4",
     link: USART3,
-    has_radio: true,
+    radio: Some(1),
     sensors: Some(Sensors {
         imu: Inertial::Icm42688p,
         select: ("GPIOA", 4),
@@ -166,7 +166,7 @@ const SPEEDYBEE_MINI: Wiring = Wiring {
 const MATEK_SE: Wiring = Wiring {
     name: "matekf405se",
     link: USART1,
-    has_radio: true,
+    radio: Some(1),
     sensors: Some(Sensors {
         imu: Inertial::Relabelled(0x68),
         select: ("GPIOA", 4),
@@ -185,7 +185,7 @@ const MATEK_SE: Wiring = Wiring {
 const MATEK_STD: Wiring = Wiring {
     name: "matekf405std",
     link: USART1,
-    has_radio: true,
+    radio: Some(1),
     sensors: Some(Sensors {
         imu: Inertial::Icm42688p,
         select: ("GPIOC", 2),
@@ -204,7 +204,7 @@ const MATEK_STD: Wiring = Wiring {
 const KAKUTE: Wiring = Wiring {
     name: "kakutef4v2",
     link: USART1,
-    has_radio: false,
+    radio: Some(2),
     sensors: Some(Sensors {
         imu: Inertial::Relabelled(0x98),
         select: ("GPIOC", 4),
@@ -223,7 +223,7 @@ const KAKUTE: Wiring = Wiring {
 const PLAIN: Wiring = Wiring {
     name: "stm32f405",
     link: USART1,
-    has_radio: false,
+    radio: None,
     sensors: None,
     card: None,
     timers: &[TIM8_ALL],
