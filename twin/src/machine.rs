@@ -261,6 +261,12 @@ impl Machine for Pixracer {
         true
     }
 
+    /// USART6, the board's own for it.
+    fn attach_radio(&mut self, wire: Wire) -> Option<f32> {
+        self.mcu.usart[3].attach(wire);
+        Some(0.0)
+    }
+
     /// UART4.
     fn attach_receiver(&mut self, receiver: Box<dyn Peer>) {
         self.mcu.usart[6].attach_boxed(receiver);

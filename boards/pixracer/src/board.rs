@@ -6,6 +6,7 @@
 //! | first link (TELEM1) | USART2: TX on PD5, RX on PD6 |
 //! | second link (TELEM2) | USART3: TX on PD8, RX on PD9 |
 //! | third link | USB: D- on PA11, D+ on PA12 |
+//! | radio receiver (RCIN) | USART6: TX on PC6, which sends nothing, RX on PC7; PC13 switches the inverter before it |
 //! | motors 1 to 4 | TIM1, channels 4 to 1: PE14, PE13, PE11, PE9; driven by DMA2's stream 5 |
 //! | motors 5 and 6 | TIM4, channels 2 and 3: PD13, PD14; driven by DMA1's stream 6 |
 //! | memory | `memory.x` beside this folder |
@@ -30,7 +31,7 @@ use afbc_drivers::qmc5883l::Qmc5883l;
 use afbc_drivers::{Driver, I2cRegisters, SensorPart, SpiRegisters};
 use chip_stm32::battery::BatteryConverter;
 use chip_stm32::indicator::{Led, PassiveBuzzer};
-use chip_stm32::link::{self, Receiver, Transmitter};
+use chip_stm32::link::{self, RADIO_RINGS, Receiver, Transmitter};
 use chip_stm32::motors::{
     MotorProtocol, Motors, Throttles, hold_low, numbering, of_channels, of_outputs, pin, rotors_of_outputs,
     set_protocol,
@@ -50,7 +51,7 @@ use embassy_stm32::interrupt::typelevel::EXTI15_10;
 use embassy_stm32::interrupt::{Interrupt, InterruptExt, Priority};
 use embassy_stm32::peripherals::{
     DMA1_CH0, DMA1_CH3, DMA1_CH4, DMA1_CH6, DMA1_CH7, DMA2_CH0, DMA2_CH3, DMA2_CH5, DMA2_CH6, I2C1, IWDG, SDIO, SPI1,
-    SPI2, TIM1, TIM2, TIM4, UART4, USART2, USART3, USB_OTG_FS,
+    SPI2, TIM1, TIM2, TIM4, UART4, USART2, USART3, USART6, USB_OTG_FS,
 };
 use embassy_stm32::sdmmc::{self, Sdmmc};
 use embassy_stm32::spi::Spi;
@@ -74,6 +75,7 @@ bind_interrupts!(struct Irqs {
     USART2 => usart::BufferedInterruptHandler<USART2>;
     USART3 => usart::BufferedInterruptHandler<USART3>;
     UART4 => usart::BufferedInterruptHandler<UART4>;
+    USART6 => usart::BufferedInterruptHandler<USART6>;
     DMA2_STREAM0 => dma::InterruptHandler<DMA2_CH0>;
     DMA2_STREAM3 => dma::InterruptHandler<DMA2_CH3>;
     DMA1_STREAM3 => dma::InterruptHandler<DMA1_CH3>;
@@ -91,10 +93,11 @@ bind_interrupts!(struct Irqs {
 });
 
 /// Each interrupt with its priority.
-const PRIORITIES: [(Interrupt, u8); 16] = [
+const PRIORITIES: [(Interrupt, u8); 17] = [
     (Interrupt::USART2, priority::UART),
     (Interrupt::USART3, priority::UART),
     (Interrupt::UART4, priority::UART),
+    (Interrupt::USART6, priority::UART),
     (Interrupt::DMA2_STREAM0, priority::SAMPLING),
     (Interrupt::DMA2_STREAM3, priority::SAMPLING),
     (Interrupt::EXTI15_10, priority::SAMPLING),
@@ -114,6 +117,8 @@ const PRIORITIES: [(Interrupt, u8); 16] = [
 static RX: [StaticCell<[u8; 1024]>; 3] = [const { StaticCell::new() }; 3];
 static TX: [StaticCell<[u8; 1024]>; 2] = [const { StaticCell::new() }; 2];
 static GNSS_TX: StaticCell<[u8; TX_RING]> = StaticCell::new();
+static RADIO_TX: StaticCell<[u8; RADIO_RINGS[0]]> = StaticCell::new();
+static RADIO_RX: StaticCell<[u8; RADIO_RINGS[1]]> = StaticCell::new();
 
 /// Newest throttles, for the motors' tasks.
 static THROTTLES: [Throttles; 2] = [const { Throttles::new() }; 2];
@@ -131,7 +136,7 @@ impl Board for Pixracer {
     type Interrupt = pac::Interrupt;
     type Sampler = Inside;
     type Aids = Aids;
-    type Links = [BoardLink<Receiver, Transmitter>; 3];
+    type Links = [BoardLink<Receiver, Transmitter>; 4];
     type Card = SdCard;
     type Memory = Bank1Region1<'static, Blocking>;
     const CORE_HZ: u32 = clocks::CORE_HZ;
@@ -140,6 +145,7 @@ impl Board for Pixracer {
     const HARDWARE: &'static str = env!("CARGO_PKG_NAME");
     const OUTPUTS: usize = OUTPUTS;
     const INDICATES: bool = true;
+    const RADIO_LINK: Option<usize> = Some(3);
     const HAS_CARD: bool = true;
     const BOOT_LOADER: Option<fn() -> !> = Some(boot_loader::restart);
 
@@ -161,8 +167,12 @@ impl Board for Pixracer {
         let [rx, rx2, rx3] = RX.each_ref().map(|ring| ring.init([0; 1024]));
         let first = BufferedUart::new(p.USART2, p.PD6, p.PD5, tx, rx, Irqs, link::config());
         let second = BufferedUart::new(p.USART3, p.PD9, p.PD8, tx2, rx2, Irqs, link::config());
-        let [first, second] = [first, second].map(|uart| link::new(uart.expect("the baud rate divides the clock")));
-        let links = [first, second, link::of_usb(usb::start(p.USB_OTG_FS, p.PA12, p.PA11, Irqs))];
+        let (tx, rx) = (RADIO_TX.init([0; RADIO_RINGS[0]]), RADIO_RX.init([0; RADIO_RINGS[1]]));
+        link::invert_by(p.PC13);
+        let radio = BufferedUart::new(p.USART6, p.PC7, p.PC6, tx, rx, Irqs, link::config());
+        let uarts = [first, second, radio];
+        let [first, second, radio] = uarts.map(|uart| link::new(uart.expect("the baud rate divides the clock")));
+        let links = [first, second, link::of_usb(usb::start(p.USB_OTG_FS, p.PA12, p.PA11, Irqs)), radio];
         let tx = GNSS_TX.init([0; TX_RING]);
         let receiver = BufferedUart::new(p.UART4, p.PA1, p.PA0, tx, rx3, Irqs, usart::Config::default());
 
