@@ -169,7 +169,7 @@ impl Board for Pixracer {
         let second = BufferedUart::new(p.USART3, p.PD9, p.PD8, tx2, rx2, Irqs, link::config());
         let (tx, rx) = (RADIO_TX.init([0; RADIO_RINGS[0]]), RADIO_RX.init([0; RADIO_RINGS[1]]));
         link::invert_by(p.PC13);
-        let radio = BufferedUart::new(p.USART6, p.PC7, p.PC6, tx, rx, Irqs, link::config());
+        let radio = BufferedUart::new(p.USART6, p.PC7, p.PC6, tx, rx, Irqs, link::radio());
         let uarts = [first, second, radio];
         let [first, second, radio] = uarts.map(|uart| link::new(uart.expect("the baud rate divides the clock")));
         let links = [first, second, link::of_usb(usb::start(p.USB_OTG_FS, p.PA12, p.PA11, Irqs)), radio];

@@ -29,6 +29,11 @@ pub fn config() -> Config {
     config
 }
 
+/// Returns how the UART of a radio receiver is set up until its protocol is known.
+pub fn radio() -> Config {
+    config()
+}
+
 /// Returns how it is set up for SBUS. Without registers that invert, the board has an inverter before the pin.
 fn sbus() -> Config {
     let mut config = config();

@@ -164,7 +164,7 @@ macro_rules! flight_controller {
                     static RADIO_TX: StaticCell<[u8; RADIO_RINGS[0]]> = StaticCell::new();
                     static RADIO_RX: StaticCell<[u8; RADIO_RINGS[1]]> = StaticCell::new();
                     let (tx, rx) = (RADIO_TX.init([0; RADIO_RINGS[0]]), RADIO_RX.init([0; RADIO_RINGS[1]]));
-                    let config = chip_stm32::link::config();
+                    let config = chip_stm32::link::radio();
                     $(chip_stm32::link::invert_by(p.$inverter);)?
                     let radio = BufferedUart::new(p.$radio, p.$radio_rx, p.$radio_tx, tx, rx, Irqs, config);
                 )?
