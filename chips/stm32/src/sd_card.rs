@@ -13,7 +13,7 @@ use static_cell::StaticCell;
 /// Clock, at most: the default speed of every card (SD Physical Layer Simplified Specification, 3.9.1). A start begins
 /// with 400 kHz.
 const CLOCK: Hertz = mhz(24);
-/// Longest wait for a transfer: the interface itself gives up after 0.25 s of a card's silence.
+/// Longest wait for a transfer: the interface itself gives up after 0.2 to 0.3 s of a card's silence.
 const PATIENCE: Duration = Duration::from_secs(1);
 
 /// What DMA transfers from and to: static, since it does not reach the stack.

@@ -147,8 +147,13 @@ pub(super) fn picture(figure: &Picture) -> Markup {
     }
 }
 
-/// What is said of flights in space.
-pub(super) const SPACE: &str = "The flights in space.";
+/// Points of a vehicle's way in space, on a page with many flights.
+const POINTS_OF_MANY: usize = 300;
+
+/// Flights in space, on a page with many.
+pub(super) fn space_of_many(scene: Option<ExplorableScene>) -> Markup {
+    space(scene.map(|scene| scene.thinned(POINTS_OF_MANY)), "The flights in space.")
+}
 
 /// Flights in space without a picture: seen on a screen with JavaScript alone.
 pub(super) fn space(scene: Option<ExplorableScene>, caption: &str) -> Markup {

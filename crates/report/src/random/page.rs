@@ -4,12 +4,9 @@ use super::Judged;
 use super::cells::{cells, heads, legend, notes};
 use super::judged::Group;
 use super::shown::Shown;
-use crate::report::{SPACE, sheet, space};
+use crate::report::{sheet, space_of_many};
 use afbc_campaign::random::TILT_MAX_RAD;
 use maud::{Markup, html};
-
-/// Points of a vehicle's way in space, of each flight.
-const POINTS: usize = 300;
 
 pub(super) fn page(judged: &Judged<'_>, shown: Vec<Shown>) -> String {
     sheet(
@@ -35,7 +32,7 @@ pub(super) fn page(judged: &Judged<'_>, shown: Vec<Shown>) -> String {
             @for flight in shown {
                 h2 { (flight.name) }
                 p.quiet { (flight.conditions) "." }
-                (space(flight.space.map(|scene| scene.thinned(POINTS)), SPACE))
+                (space_of_many(flight.space))
             }
         },
     )

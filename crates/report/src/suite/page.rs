@@ -3,14 +3,11 @@
 use super::cells::{FIGURES, Figure, lost, trip};
 use super::drawn::Drawn;
 use super::{FlownSuite, heat, standing};
-use crate::report::{SPACE, picture, sheet, space};
+use crate::report::{picture, sheet, space_of_many};
 use crate::words;
 use afbc_campaign::suite::SuiteFlight;
 use afbc_sim::metrics::SETTLED_S;
 use maud::{Markup, html};
-
-/// Points of a vehicle's way in space, of each flight.
-const POINTS: usize = 300;
 
 pub(super) fn page(flown: FlownSuite<'_>, drawn: Vec<Drawn>) -> String {
     let suite = flown.suite;
@@ -44,7 +41,7 @@ pub(super) fn page(flown: FlownSuite<'_>, drawn: Vec<Drawn>) -> String {
                     }
                 }
                 @if let Some(errors) = &drawn.errors { (picture(errors)) }
-                (space(drawn.space.map(|scene| scene.thinned(POINTS)), SPACE))
+                (space_of_many(drawn.space))
             }
         },
     )
