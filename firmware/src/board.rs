@@ -5,7 +5,7 @@ use crate::samples::Sampler;
 use crate::ticks::Tick;
 use crate::vehicle::ROTORS;
 use afbc_flight_core::protocol::MotorProtocol;
-use afbc_logger::LogCard;
+use afbc_logger::LogKeeper;
 use cortex_m::interrupt::InterruptNumber;
 use embassy_executor::SendSpawner;
 use embedded_storage::nor_flash::NorFlash;
@@ -20,8 +20,8 @@ pub trait Board: Sized + 'static {
     type Aids: Sampler + Send + 'static;
     /// Its links: `[BoardLink<R, T>; N]`.
     type Links: Links + 'static;
-    /// Its memory card, or [`NoCard`](crate::logging::NoCard).
-    type Card: LogCard + Send + 'static;
+    /// What keeps its logs, or [`NoLog`](crate::logging::NoLog).
+    type Log: LogKeeper + Send + 'static;
     /// Flash with two sectors for the parameters, from [`STORE`](Self::STORE) on.
     type Memory: NorFlash + Send + 'static;
     /// Clock of the core and of SysTick \[Hz\], in whole MHz.
@@ -30,8 +30,8 @@ pub trait Board: Sized + 'static {
     const STORE: u32;
     /// Its name in logs, perhaps with `board-` before it.
     const HARDWARE: &'static str;
-    /// True if it has a slot for a memory card.
-    const HAS_CARD: bool = false;
+    /// True if it keeps logs.
+    const HAS_LOG: bool = false;
     /// Most motors that it drives.
     const OUTPUTS: usize;
     /// True if it has a task that shows by LED or buzzer how the vehicle is ([`indication`](crate::indication)).
@@ -87,7 +87,7 @@ pub struct Parts<B: Board> {
     /// Where the parameters are kept.
     pub memory: B::Memory,
     /// Where logs are kept.
-    pub card: B::Card,
+    pub log: B::Log,
 }
 
 /// Both sides of a link.

@@ -5,7 +5,7 @@ use crate::board::{Board, Links, Receiver as _, Transmitter as _};
 use crate::control;
 use crate::escs;
 use crate::indication;
-use crate::logging::CardLog;
+use crate::logging::LinkLog;
 use crate::parameters;
 use crate::radio::{self, RadioLine};
 use crate::recording::{self, ExactLog};
@@ -52,7 +52,7 @@ pub type CommsParts = (
     ParameterTable,
     Option<&'static mut ExactLog>,
     Option<&'static mut RadioLine>,
-    Option<&'static mut CardLog>,
+    Option<&'static mut LinkLog>,
 );
 
 /// Creates it, with nothing received, to be called once: in place, since a task would store a value twice and take the
@@ -63,7 +63,7 @@ pub fn make<B: Board>(
     signing: Signing,
     log: Option<&'static mut ExactLog>,
     radio: Option<&'static mut RadioLine>,
-    black_box: Option<&'static mut CardLog>,
+    black_box: Option<&'static mut LinkLog>,
 ) -> &'static mut CommsParts {
     static PARTS: StaticCell<CommsParts> = StaticCell::new();
     PARTS.init_with(|| {
@@ -124,7 +124,7 @@ pub async fn run<B: Board, const OTHERS: usize>(
                 if B::Sampler::SENSES {
                     look_at_sensors::<B>(comms, table, tick.report.time_us);
                 }
-                if B::HAS_CARD
+                if B::HAS_LOG
                     && let Some(black_box) = black_box
                 {
                     begin_logging(comms, black_box, table, &tick);
@@ -150,7 +150,7 @@ pub async fn run<B: Board, const OTHERS: usize>(
                         pass_on::<B>(&news, log);
                     }
                 }
-                if B::HAS_CARD
+                if B::HAS_LOG
                     && let Some(black_box) = black_box
                 {
                     black_box.transfer(comms, &mut outgoing);
@@ -180,7 +180,7 @@ pub async fn run<B: Board, const OTHERS: usize>(
                         log.send(&tick, links);
                     }
                 }
-                if B::HAS_CARD
+                if B::HAS_LOG
                     && let Some(black_box) = black_box
                 {
                     if let Some(change) = changed {
@@ -212,8 +212,8 @@ fn look_at_sensors<B: Board>(comms: &mut Comms, table: &ParameterTable, now_us: 
     control::with_mail(|inputs| inputs.battery = battery);
 }
 
-/// Begins a tick of the log on the card, and says what has become of the card.
-fn begin_logging(comms: &mut Comms, black_box: &mut CardLog, table: &ParameterTable, tick: &Tick) {
+/// Begins a tick of the log, and says what has become of its storage.
+fn begin_logging(comms: &mut Comms, black_box: &mut LinkLog, table: &ParameterTable, tick: &Tick) {
     match black_box.begin_tick(tick.report.time_us, tick.report.mode.armed(), table) {
         Some((text, true)) => comms.warn(text),
         Some((text, false)) => comms.inform(text),
@@ -229,12 +229,12 @@ fn reboot<B: Board>(comms: &Comms) -> ! {
     cortex_m::peripheral::SCB::sys_reset()
 }
 
-/// Receives bytes, and what stations ask of the logs on a card.
-fn hear<B: Board>(comms: &mut Comms, black_box: &mut Option<&'static mut CardLog>, bytes: &[u8]) -> ControlInputs {
+/// Receives bytes, and what stations ask of the logs that are kept.
+fn hear<B: Board>(comms: &mut Comms, black_box: &mut Option<&'static mut LinkLog>, bytes: &[u8]) -> ControlInputs {
     match black_box {
-        Some(black_box) if B::HAS_CARD => comms.receive_with_logs(bytes, &mut black_box.server),
-        // Never on a board with a card, so that no image has both.
-        _ if B::HAS_CARD => ControlInputs::EMPTY,
+        Some(black_box) if B::HAS_LOG => comms.receive_with_logs(bytes, &mut black_box.server),
+        // Never on a board that keeps logs, so that no image has both.
+        _ if B::HAS_LOG => ControlInputs::EMPTY,
         _ => comms.receive(bytes),
     }
 }
@@ -252,7 +252,7 @@ fn pass_on<B: Board>(news: &ControlInputs, log: &mut Option<&'static mut ExactLo
 /// Writes what ticks have left for exact log and black box.
 fn record<B: Board>(
     log: &mut Option<&'static mut ExactLog>,
-    black_box: &mut Option<&'static mut CardLog>,
+    black_box: &mut Option<&'static mut LinkLog>,
     table: &ParameterTable,
     escs: &EscTelemetry,
 ) {
@@ -260,7 +260,7 @@ fn record<B: Board>(
         if let Some(log) = log {
             log.tick(&tick);
         }
-        if B::HAS_CARD
+        if B::HAS_LOG
             && let Some(black_box) = black_box
         {
             black_box.tick(&tick, table, escs);

@@ -85,14 +85,14 @@ pub fn make(configuration: &Configuration) -> &'static mut Flight {
 pub async fn run<B: Board>(flight: &mut Flight, board: &mut B) -> ! {
     let (mut inputs, mut readings, mut seen) = (ControlInputs::EMPTY, Readings::NONE, Seen::default());
     let (mut adopted, mut notch_rad_s) = (None, None);
-    let mut views = if B::HAS_CARD { TickViews::take() } else { None };
+    let mut views = if B::HAS_LOG { TickViews::take() } else { None };
     loop {
         // Not a ticker, whose periods begin when it is created: just after the start of a control period, when alarms
         // are due, it would tick twice in every second period.
         Timer::at(time::next_period()).await;
         let stopwatch = Stopwatch::start();
         let report = tick(flight, &mut inputs, &mut readings, &mut seen, board);
-        let is_logged = B::HAS_CARD && logging::is_wanted();
+        let is_logged = B::HAS_LOG && logging::is_wanted();
         if recording::is_possible::<B>() && (recording::records() || is_logged) {
             let Seen { number, clock_failed, taken } = seen;
             if is_logged && let Some(views) = &mut views {
@@ -175,7 +175,7 @@ fn tick<B: Board>(
         }
     });
 
-    if B::HAS_CARD && logging::is_wanted() {
+    if B::HAS_LOG && logging::is_wanted() {
         seen.taken = TakenInputs::of(inputs);
     }
     let clock_failed = board.clock_has_failed();

@@ -27,7 +27,7 @@ pub mod priority {
     pub const COMMS: u8 = 8 << 4;
     /// [`crate::housekeeping`], and USB, whose hosts wait.
     pub const HOUSEKEEPING: u8 = 12 << 4;
-    /// [`crate::logging`], which waits for a memory card.
+    /// [`crate::logging`], which waits for a memory card or flash.
     pub const LOGGING: u8 = 14 << 4;
 }
 
@@ -75,7 +75,7 @@ pub struct Executors {
     pub control: SendSpawner,
     pub comms: SendSpawner,
     pub housekeeping: SendSpawner,
-    /// None on a board without a memory card.
+    /// None on a board that keeps no log.
     pub logging: Option<SendSpawner>,
 }
 
@@ -96,7 +96,7 @@ pub struct InterruptLines<I> {
     pub sampling: Option<I>,
     /// None on a board without slow sensors.
     pub aiding: Option<I>,
-    /// None on a board without a memory card.
+    /// None on a board that keeps no log.
     pub logging: Option<I>,
 }
 

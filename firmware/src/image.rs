@@ -4,7 +4,7 @@
 /// executors' interrupts and the tasks whose type depends on the board. The board handles panics and faults.
 ///
 /// `control`, `comms` and `housekeeping` name an interrupt line each that the board leaves unused, and so do `sampling`
-/// if it has inertial sensors, `aiding` if it has slow ones and `logging` if it has a memory card:
+/// if it has inertial sensors, `aiding` if it has slow ones and `logging` if it keeps logs:
 /// `image!(board::Mine, control: LINE_A, comms: LINE_B, housekeeping: LINE_C, sampling: LINE_D, aiding: LINE_E)`.
 #[macro_export]
 macro_rules! image {
@@ -22,8 +22,8 @@ macro_rules! image {
             let aiding: &[&str] = &[$(stringify!($aiding))?];
             let logging: &[&str] = &[$(stringify!($logging))?];
             assert!(
-                <$board as $crate::board::Board>::HAS_CARD != logging.is_empty(),
-                "a board with a memory card, and no other, names an interrupt line for its executor: logging"
+                <$board as $crate::board::Board>::HAS_LOG != logging.is_empty(),
+                "a board that keeps logs, and no other, names an interrupt line for its executor: logging"
             );
             assert!(
                 <<$board as $crate::board::Board>::Sampler as $crate::samples::Sampler>::SENSES != sampling.is_empty()
@@ -79,26 +79,26 @@ macro_rules! image {
         #[embassy_executor::task]
         async fn logging(
             blocks: $crate::logging::LogEnds,
-            mut card: <$board as $crate::board::Board>::Card,
+            log: <$board as $crate::board::Board>::Log,
         ) -> ! {
-            $crate::logging::run(blocks, &mut card).await
+            $crate::logging::run(blocks, log).await
         }
 
         #[embassy_executor::task]
         async fn start_logging(
             blocks: $crate::logging::LogEnds,
-            card: <$board as $crate::board::Board>::Card,
+            log: <$board as $crate::board::Board>::Log,
         ) {
-            let task = logging(blocks, card).expect("spawned once");
+            let task = logging(blocks, log).expect("spawned once");
             $crate::executors::spawner().await.spawn(task);
         }
 
         fn spawn_logging(
             spawner: embassy_executor::SendSpawner,
             blocks: $crate::logging::LogEnds,
-            card: <$board as $crate::board::Board>::Card,
+            log: <$board as $crate::board::Board>::Log,
         ) {
-            spawner.spawn(start_logging(blocks, card).expect("spawned once"));
+            spawner.spawn(start_logging(blocks, log).expect("spawned once"));
         }
 
         fn spawn_aiding(spawner: embassy_executor::SendSpawner, aids: <$board as $crate::board::Board>::Aids) {

@@ -23,7 +23,7 @@
 //! | 7 | [`aux_sensors`]: reading the slow ones, whose drivers may wait for their bus | |
 //! | 8 | [`comms`]: the link's messages | |
 //! | 12 | [`housekeeping`]: debugger's log, stack; [`parameters`]: to flash; [`indication`]: LED, buzzer; USB | |
-//! | 14 | [`logging`]: the black box to a memory card, for which it waits | |
+//! | 14 | [`logging`]: the black box to a memory card or flash, for which it waits | |
 //!
 //! The links precede the control tick because a UART may buffer one byte only, and the next comes within 11 us. USB
 //! comes last: its host waits, whatever it sends.
@@ -62,10 +62,10 @@ pub fn run<B: Board>(
     control: impl FnOnce(SendSpawner, &'static mut vehicle::Flight, B),
     comms: impl FnOnce(SendSpawner, &'static mut comms::CommsParts, B::Links),
     keeper: impl FnOnce(SendSpawner, parameters::Keeper<B::Memory>),
-    logging: impl FnOnce(SendSpawner, logging::LogEnds, B::Card),
+    logging: impl FnOnce(SendSpawner, logging::LogEnds, B::Log),
 ) -> ! {
     let executors = executors::start(&mut core, lines);
-    let Parts { mut board, sampler, aids, mut links, memory, card } = B::start(&mut core, executors.control);
+    let Parts { mut board, sampler, aids, mut links, memory, log } = B::start(&mut core, executors.control);
     let (kept, parts, blocks) = read::<B>(memory, &mut links);
     let (_, table, ..) = parts;
     board.set_motor_protocol(table.configuration().outputs.protocol);
@@ -83,11 +83,11 @@ pub fn run<B: Board>(
     control(executors.control, flight, board);
     keeper(executors.housekeeping, kept);
     housekeeping::spawn(executors.housekeeping);
-    // A constant, so that a board without a card has none of it.
-    if B::HAS_CARD
+    // A constant, so that a board that keeps no log has none of it.
+    if B::HAS_LOG
         && let (Some(spawner), Some(blocks)) = (executors.logging, blocks)
     {
-        logging(spawner, blocks, card);
+        logging(spawner, blocks, log);
     }
     loop {
         B::idle();
@@ -110,6 +110,6 @@ fn read<B: Board>(
     // On one link, the pilot goes before the log.
     let is_free = radio::leaves_log::<B>(&table);
     let log = if recording::is_possible::<B>() && is_free { recording::ExactLog::begin::<B>(&table) } else { None };
-    let (black_box, blocks) = if B::HAS_CARD { Some(logging::CardLog::begin::<B>()) } else { None }.unzip();
+    let (black_box, blocks) = if B::HAS_LOG { Some(logging::LinkLog::begin::<B>()) } else { None }.unzip();
     (kept, comms::make::<B>(table, signing, log, radio, black_box), blocks)
 }

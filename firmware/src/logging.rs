@@ -1,14 +1,11 @@
-//! The black box: ticks to blocks, in the links' task, and blocks to a memory card, in a task below all others, which
-//! may wait for the card. See [`afbc_logger`].
+//! The black box: ticks to blocks, in the links' task, and blocks to a memory card or flash, in a task below all
+//! others, which may wait for it. See [`afbc_logger`].
 
 use crate::aux_sensors;
 use crate::board::Board;
 use crate::recording::RecordedTick;
 use crate::vehicle::{Flight, NAME, ParameterTable};
-use afbc_logger::{
-    BlockSink, CardError, CardLogs, CardState, LogBlock, LogCard, LogKeeper, LogPage, LogPages, LogQuery, LogWriter,
-    embedded_sdmmc::Block,
-};
+use afbc_logger::{BlockSink, LogBlock, LogKeeper, LogPage, LogPages, LogQuery, LogWriter, StorageState, StoredLogs};
 use afbc_onboard::parameters::RecordChange;
 use afbc_onboard::{ControlInputs, EscTelemetry, FlightView};
 use afbc_station::{Comms, LogServer, REPORT_MAX};
@@ -25,32 +22,30 @@ use embassy_time::{Instant, Timer};
 use heapless::Vec;
 use static_cell::StaticCell;
 
-/// Blocks that wait for the card, at most: of a log of 140 kB/s those of 47 ms.
+/// Blocks that wait, at most: of a log of 140 kB/s those of 47 ms.
 const BLOCKS: usize = 13;
 /// Ticks whose views wait for the links' task, at most.
 const VIEWS: usize = 3;
-/// Time between two looks at a card without a log \[us\].
+/// Time between two looks at a storage without a log \[us\].
 const LOOK_US: u64 = 100_000;
 /// The control period \[us\].
 const PERIOD_US: u64 = 1_000;
 /// The law that every image flies: AFBC under its monitor.
 const LAW: &str = "afbc";
 
-/// The slot of a board without one.
-pub struct NoCard;
+/// Of a board that keeps no logs.
+pub struct NoLog;
 
-impl LogCard for NoCard {
-    fn start(&mut self) -> Result<u32, CardError> {
-        Err(CardError::Absent)
+impl LogKeeper for NoLog {
+    fn state(&self) -> StorageState {
+        StorageState::Absent
     }
 
-    fn read(&mut self, _: u32, _: &mut Block) -> Result<(), CardError> {
-        Err(CardError::Absent)
-    }
+    fn poll(&mut self, _: u64) {}
 
-    fn write(&mut self, _: u32, _: &Block) -> Result<(), CardError> {
-        Err(CardError::Absent)
-    }
+    fn take(&mut self, _: u64, _: &LogBlock) {}
+
+    fn answer(&mut self, _: u64, _: LogQuery, _: &mut LogPage) {}
 }
 
 /// What only the black box takes of a tick.
@@ -72,8 +67,8 @@ pub struct LogEnds {
 }
 
 static WANTED: AtomicBool = AtomicBool::new(false);
-static CARD: AtomicU8 = AtomicU8::new(CardState::Unknown as u8);
-/// What is asked of the logs on the card.
+static STORAGE: AtomicU8 = AtomicU8::new(StorageState::Unknown as u8);
+/// What is asked of the logs that are kept.
 static ASKED: Signal<CriticalSectionRawMutex, LogQuery> = Signal::new();
 /// The control task's end of the views.
 static SENDER: Mutex<CriticalSectionRawMutex, RefCell<Option<ViewSender>>> = Mutex::new(RefCell::new(None));
@@ -83,8 +78,8 @@ pub(crate) fn is_wanted() -> bool {
     WANTED.load(Ordering::Relaxed)
 }
 
-fn card() -> CardState {
-    CardState::of(CARD.load(Ordering::Relaxed))
+fn storage() -> StorageState {
+    StorageState::of(STORAGE.load(Ordering::Relaxed))
 }
 
 /// The control task's part.
@@ -96,7 +91,7 @@ impl TickViews {
         SENDER.lock(|sender| sender.try_borrow_mut().ok()?.take()).map(TickViews)
     }
 
-    /// Passes on what the flight knows after a tick. Out of line, since only boards with a card do.
+    /// Passes on what the flight knows after a tick. Out of line, since only boards that keep logs do.
     #[cold]
     #[inline(never)]
     pub(crate) fn push(&mut self, number: u32, now_us: u64, taken: &TakenInputs, flight: &Flight) {
@@ -137,21 +132,21 @@ impl LogPages for Pages {
 }
 
 /// The links' task's part.
-pub struct CardLog {
+pub struct LinkLog {
     /// What stations ask of the logs.
     pub(crate) server: LogServer,
-    stored: CardLogs<Pages>,
+    stored: StoredLogs<Pages>,
     writer: LogWriter,
     queue: Queue,
     views: Receiver<'static, CriticalSectionRawMutex, TickView>,
     hardware: &'static str,
 }
 
-impl CardLog {
+impl LinkLog {
     /// Creates it, before the first tick, and what the log's task receives; to be called once.
     #[inline(never)]
     pub(crate) fn begin<B: Board>() -> (&'static mut Self, LogEnds) {
-        static LOG: StaticCell<CardLog> = StaticCell::new();
+        static LOG: StaticCell<LinkLog> = StaticCell::new();
         static BLOCKS_HELD: StaticCell<[LogBlock; BLOCKS]> = StaticCell::new();
         static VIEWS_HELD: StaticCell<[TickView; VIEWS]> = StaticCell::new();
         static BLOCK_CHANNEL: StaticCell<Blocks> = StaticCell::new();
@@ -167,10 +162,10 @@ impl CardLog {
         let (pages, page) = PAGE_CHANNEL.init_with(|| Channel::new(PAGE.init_with(|| [LogPage::EMPTY]))).split();
         let (queue, blocks) = BLOCK_CHANNEL.init_with(|| Channel::new(blocks)).split();
         let hardware = B::HARDWARE.strip_prefix("board-").unwrap_or(B::HARDWARE);
-        let log = LOG.init_with(|| CardLog {
+        let log = LOG.init_with(|| LinkLog {
             server: LogServer::default(),
-            stored: CardLogs::new(Pages(page)),
-            writer: LogWriter::new(),
+            stored: StoredLogs::new(Pages(page)),
+            writer: LogWriter::new(B::Log::SMALL),
             queue: Queue(queue),
             views,
             hardware,
@@ -178,8 +173,8 @@ impl CardLog {
         (log, LogEnds { blocks, pages })
     }
 
-    /// Begins a tick of the links' task, of which this is the newest report. Returns a text for stations about the card
-    /// when there is something new, and whether it is a warning.
+    /// Begins a tick of the links' task, of which this is the newest report. Returns a text for stations about the
+    /// storage when there is something new, and whether it is a warning.
     pub(crate) fn begin_tick(
         &mut self,
         now_us: u64,
@@ -187,15 +182,15 @@ impl CardLog {
         table: &ParameterTable,
     ) -> Option<(&'static str, bool)> {
         let wanted = self.writer.wants(now_us, armed, table.configuration().link.log_mode);
-        // Without a card that takes it, the ticks are not even passed on.
-        WANTED.store(wanted && card() == CardState::Ready, Ordering::Relaxed);
-        self.writer.news(card())
+        // Without a storage that takes it, the ticks are not even passed on.
+        WANTED.store(wanted && storage() == StorageState::Ready, Ordering::Relaxed);
+        self.writer.news(storage())
     }
 
     /// Writes a tick.
     #[inline(never)]
     pub(crate) fn tick(&mut self, tick: &RecordedTick, table: &ParameterTable, escs: &EscTelemetry) {
-        let CardLog { writer, views, hardware, .. } = self;
+        let LinkLog { writer, views, hardware, .. } = self;
         let RecordedTick { number, ref readings, ref report, .. } = *tick;
         // Ticks and views are matched by number, since either queue drops what it has no room for.
         while let Some(view) = views.try_receive() {
@@ -206,7 +201,7 @@ impl CardLog {
                 let start = LogStart { vehicle: NAME, law: LAW, hardware, ..LogStart::default() };
                 let tick =
                     LoggedTick { report, readings, taken: view.taken, view: &view.view, escs: Some(escs), origin };
-                writer.tick(&tick, table, &start, card(), PERIOD_US);
+                writer.tick(&tick, table, &start, storage(), PERIOD_US);
             }
             if view.number == number || is_older {
                 views.receive_done();
@@ -236,17 +231,16 @@ impl CardLog {
     /// Writes the texts among the messages of a tick, and passes full blocks on.
     #[inline(never)]
     pub(crate) fn send(&mut self, now_us: u64, messages: &[u8]) {
-        let CardLog { writer, queue, .. } = self;
+        let LinkLog { writer, queue, .. } = self;
         for (severity, text) in afbc_link::sent_texts(messages) {
             writer.text(now_us, severity, text);
         }
-        writer.send(queue, card());
+        writer.send(queue, storage());
     }
 }
 
-/// Keeps logs on a card, for ever. Calls of the card wait for it: nothing else may be on this executor.
-pub async fn run(LogEnds { mut blocks, mut pages }: LogEnds, card: &mut dyn LogCard) -> ! {
-    let mut keeper = LogKeeper::new(card);
+/// Keeps logs, for ever. Calls of the keeper wait for its card or flash: nothing else may be on this executor.
+pub async fn run(LogEnds { mut blocks, mut pages }: LogEnds, mut keeper: impl LogKeeper) -> ! {
     let mut asked = LogQuery::Nothing;
     loop {
         let look = Timer::at(Instant::from_micros(Instant::now().as_micros().wrapping_add(LOOK_US)));
@@ -276,6 +270,6 @@ pub async fn run(LogEnds { mut blocks, mut pages }: LogEnds, card: &mut dyn LogC
             keeper.answer(Instant::now().as_micros(), core::mem::take(&mut asked), page);
             pages.send_done();
         }
-        CARD.store(keeper.state() as u8, Ordering::Relaxed);
+        STORAGE.store(keeper.state() as u8, Ordering::Relaxed);
     }
 }

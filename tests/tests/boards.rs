@@ -6,7 +6,7 @@
 //! large.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, clippy::panic, missing_docs)] // what is unreadable must stop it
 
-use crate::board_table::{Battery, BoardTable, Motor, Stream, Timer, wiring};
+use crate::board_table::{Battery, BoardTable, LogBus, Motor, Stream, Timer, wiring};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -165,12 +165,12 @@ fn assert_once<T: Ord + std::fmt::Debug>(what: Vec<T>, board: &Path) {
 #[test]
 fn nothing_is_used_twice() {
     for (board, table) in kinds().0 {
-        let BoardTable { link, gnss, radio, escs, imu, i2c, timers, card, .. } = &table;
+        let BoardTable { link, gnss, radio, escs, imu, i2c, timers, logs, .. } = &table;
         let radio = radio.as_ref().map(|radio| &radio.uart.name);
         let escs = escs.as_ref().map(|escs| &escs.name);
         assert_once(table.pins(), &board);
         let names = [&link.name, &gnss.name, &imu.name, &i2c.name].into_iter().chain(escs);
-        let others = timers.iter().map(|timer| &timer.name).chain(card.iter().map(|card| &card.name));
+        let others = timers.iter().map(|timer| &timer.name).chain(logs.iter().map(|logs| &logs.name));
         assert_once(names.chain(radio).chain(others).collect(), &board);
         let mut motors: Vec<_> = table.motors().map(|motor| motor.number).collect();
         motors.sort_unstable();
@@ -424,6 +424,11 @@ fn boards_are_as_betaflight_describes_them() {
         assert_eq!(*volts_per_volt, 11.0, "{name}");
         assert!((amperes_per_volt - 1e4 / current_scale).abs() < 0.05, "{name}");
         assert_eq!((table.crystal_hz, table.numbering.as_str()), (8_000_000, "BETAFLIGHT"), "{name}");
+        // The one whose flash chip is used.
+        let flash = table.logs.as_ref().filter(|logs| logs.is_flash);
+        let flash = flash.map(|LogBus { name, clock, into, out, select, .. }| [name, clock, into, out, select]);
+        let described = (name == "speedybee-f405-mini").then_some(["SPI3", "PB3", "PB4", "PB5", "PC14"]);
+        assert_eq!(flash.map(|words| words.map(String::as_str)), described, "{name}");
     }
 }
 

@@ -1,55 +1,11 @@
-//! The logs on a card, read by a FAT that is not the firmware's.
+//! The logs that a board has kept, in files of this machine.
 
-use rigless::chip::memory_card::MemoryCard;
+use crate::card::LogStorage;
 use std::error::Error;
 use std::fs;
-use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::Path;
 
-const BLOCK: usize = 512;
-/// Where the card's table of partitions has the first block of the first one.
-const FIRST: usize = 446 + 8;
-
-/// The first partition of a card. It cannot be written.
-struct CardVolume<'a> {
-    card: &'a MemoryCard,
-    start: u64,
-    at: u64,
-}
-
-impl Read for CardVolume<'_> {
-    fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
-        let (block, offset) = (self.start + self.at / BLOCK as u64, (self.at % BLOCK as u64) as usize);
-        let stored = self.card.stored(block as usize);
-        let count = into.len().min(BLOCK - offset);
-        into[..count].copy_from_slice(&stored[offset..offset + count]);
-        self.at += count as u64;
-        Ok(count)
-    }
-}
-
-impl Write for CardVolume<'_> {
-    fn write(&mut self, _: &[u8]) -> io::Result<usize> {
-        Err(io::ErrorKind::ReadOnlyFilesystem.into())
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        Ok(())
-    }
-}
-
-impl Seek for CardVolume<'_> {
-    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
-        self.at = match to {
-            SeekFrom::Start(at) => at,
-            SeekFrom::Current(by) => self.at.saturating_add_signed(by),
-            SeekFrom::End(_) => return Err(io::ErrorKind::Unsupported.into()),
-        };
-        Ok(self.at)
-    }
-}
-
-/// A log that was on a card.
+/// A log that was kept.
 #[derive(Debug)]
 pub struct CardLog {
     pub name: String,
@@ -74,23 +30,13 @@ fn walk(name: String, log: &[u8]) -> CardLog {
     CardLog { name, bytes: log.len(), missing_ms, rest: rest.len() }
 }
 
-/// Writes the logs of a card into a folder, and returns them.
-pub fn save(card: &MemoryCard, folder: &Path) -> Result<Vec<CardLog>, Box<dyn Error>> {
-    let first = card.stored(0);
-    let start = u32::from_le_bytes(first[FIRST..FIRST + 4].try_into()?).into();
-    let options = fatfs::FsOptions::new().update_accessed_date(false);
-    let volume = fatfs::FileSystem::new(CardVolume { card, start, at: 0 }, options)?;
+/// Writes the logs that are kept into a folder, and returns them.
+pub fn save(storage: &dyn LogStorage, folder: &Path) -> Result<Vec<CardLog>, Box<dyn Error>> {
     fs::create_dir_all(folder)?;
     let mut saved = Vec::new();
-    for entry in volume.root_dir().iter() {
-        let entry = entry?;
-        let name = entry.file_name().to_lowercase();
-        if name.ends_with(".ulg") {
-            let mut bytes = Vec::new();
-            entry.to_file().read_to_end(&mut bytes)?;
-            fs::write(folder.join(&name), &bytes)?;
-            saved.push(walk(name, &bytes));
-        }
+    for (name, bytes) in storage.logs()? {
+        fs::write(folder.join(&name), &bytes)?;
+        saved.push(walk(name, &bytes));
     }
     Ok(saved)
 }

@@ -92,12 +92,14 @@ pub fn fly<M: Machine>(image: &Path, order: &Order<'_>) -> Result<(), Box<dyn Er
     if card.is_some() {
         board.insert_card();
     }
-    if let Some(slot) = board.card() {
-        // Without a place for its logs, the slot is empty.
-        let empty = CardTrouble { out_ms: Some([0, u64::MAX]), ..CardTrouble::default() };
-        slot.trouble(if card.is_some() { card_trouble } else { empty });
+    if let Some(storage) = board.log_storage() {
+        storage.trouble(card_trouble);
         if let Some(kb) = full_kb {
-            slot.fill(kb * 1024);
+            storage.fill(kb * 1024);
+        }
+        // Without a place for its logs, the slot is empty.
+        if card.is_none() {
+            storage.remove();
         }
     }
     let wire = Wire::default();
@@ -143,13 +145,13 @@ pub fn fly<M: Machine>(image: &Path, order: &Order<'_>) -> Result<(), Box<dyn Er
         same = same::check_log(&bytes);
     }
     if let Some(folder) = card {
-        let slot = finished.session.board_mut().card().ok_or("this machine has no memory card")?;
-        let mut logs = card_logs::save(slot.card(), folder)?;
+        let storage = finished.session.board_mut().log_storage().ok_or("this machine keeps no logs")?;
+        let mut logs = card_logs::save(storage, folder)?;
         if let Some(fetched) = fetched {
             check(logs.is_empty(), "the logs are erased")?;
             logs = fetched?;
         }
-        println!("{} blocks written to the card", slot.written());
+        println!("{} blocks or pages written", storage.written());
         for log in &logs {
             println!(
                 "{}: {} bytes, of them {} no record; {} ms missing",
@@ -159,7 +161,7 @@ pub fn fly<M: Machine>(image: &Path, order: &Order<'_>) -> Result<(), Box<dyn Er
         let is_sound = card_trouble != CardTrouble::default()
             || full_kb.is_some()
             || logs.iter().all(|log| log.rest == 0 && log.missing_ms <= DROPOUTS_MS);
-        check(!logs.is_empty() && is_sound, "the card has a whole log of the flight")?;
+        check(!logs.is_empty() && is_sound, "a whole log of the flight is kept")?;
     }
     same?;
     verdict?;
@@ -185,9 +187,9 @@ impl Flight {
 impl Flight {
     /// Keeps what the card holds when it is time to.
     fn look_at_card<M: Machine>(&mut self, session: &mut Session<M>, now_ms: u64) {
-        let (Some(cuts), Some(slot)) = (&self.cuts, session.board_mut().card()) else { return };
+        let (Some(cuts), Some(storage)) = (&self.cuts, session.board_mut().log_storage()) else { return };
         if cuts.at_ms.contains(&now_ms) {
-            match card_logs::save(slot.card(), &cuts.folder.join(format!("cut-{now_ms}"))) {
+            match card_logs::save(storage, &cuts.folder.join(format!("cut-{now_ms}"))) {
                 Ok(logs) => println!("{:8.3} s  cut here, there are {logs:?}", now_ms as f64 * 1e-3),
                 Err(error) => println!("{:8.3} s  cut here: {error}", now_ms as f64 * 1e-3),
             }
@@ -195,7 +197,7 @@ impl Flight {
         if self.fetched.is_none()
             && let Some(fetch) = self.pilot.fetched()
         {
-            let saved = card_logs::save(slot.card(), &cuts.folder).and_then(|logs| {
+            let saved = card_logs::save(storage, &cuts.folder).and_then(|logs| {
                 let read = |log: &CardLog| std::fs::read(cuts.folder.join(&log.name));
                 let bytes: Vec<_> = logs.iter().map(read).collect::<Result<_, _>>()?;
                 fetch.compare(&bytes).map(|()| logs)

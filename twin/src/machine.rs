@@ -1,6 +1,6 @@
 //! The boards: what of each is to be known to look at it from outside, and to put a world around it.
 
-use crate::card::{CardSlot, SdSlot};
+use crate::card::{LogStorage, SdSlot};
 use crate::impairments::Impairments;
 use crate::wire::Wire;
 use rigless::chip::nmea;
@@ -107,8 +107,8 @@ pub trait Machine: Board + Edge<Signals = Signals> + Sized + 'static {
     /// Puts a card of today into a slot that has another, or none.
     fn insert_card(&mut self) {}
 
-    /// Returns the slot of its memory card, if one of ours is in it.
-    fn card(&mut self) -> Option<&mut CardSlot> {
+    /// Returns where it keeps logs: in a card of ours, or in a chip.
+    fn log_storage(&mut self) -> Option<&mut dyn LogStorage> {
         None
     }
 
@@ -247,8 +247,9 @@ impl Machine for Pixracer {
         }
     }
 
-    fn card(&mut self) -> Option<&mut CardSlot> {
-        self.mcu.sdio.card_mut::<SdSlot>().map(|card| &mut card.slot)
+    fn log_storage(&mut self) -> Option<&mut dyn LogStorage> {
+        let card = self.mcu.sdio.card_mut::<SdSlot>()?;
+        Some(&mut card.slot)
     }
 
     fn motors(&mut self) -> Vec<Actuator> {

@@ -37,9 +37,9 @@ mod wire;
 mod world;
 
 use aloft::Aloft;
+use card::CardTrouble;
 use clap::builder::PossibleValuesParser;
 use clap::{Arg, ArgAction, ArgMatches, Command, value_parser};
-use card::CardTrouble;
 use fly::Order;
 use machines::MachineName;
 use radio::Order as RadioOrder;
@@ -144,8 +144,11 @@ fn fly_command() -> Command {
         .value_parser(value_parser!(u64).range(4..=3600));
     let log =
         option("log", "FILE", "Keep the exact log here, and fly it again on this machine: the same to the last bit");
-    let card =
-        option("card", "FOLDER", "Keep the logs of the memory card here; a log of the whole flight must be among them");
+    let card = option(
+        "card",
+        "FOLDER",
+        "Keep the logs of the memory card, or flash chip, here; a log of the whole flight must be among them",
+    );
     let from_until = |name, help| {
         Arg::new(name).long(name).num_args(2).value_names(["MS", "MS"]).value_parser(value_parser!(u64)).help(help)
     };

@@ -39,7 +39,7 @@ impl Board for Emulated {
     type Sampler = Sampler;
     type Aids = NoSensors;
     type Links = [BoardLink<Receiver, Transmitter>; 1];
-    type Card = firmware::logging::NoCard;
+    type Log = firmware::logging::NoLog;
     /// In RAM: QEMU's flash cannot be written, and every flight begins with the image's parameters.
     type Memory = Ram<1024>;
     /// As QEMU's STM32F405 counts it: the host derives instructions from it.
@@ -61,7 +61,7 @@ impl Board for Emulated {
             aids: NoSensors,
             links: [BoardLink { receiver: Receiver, transmitter }],
             memory: Ram::BLANK,
-            card: firmware::logging::NoCard,
+            log: firmware::logging::NoLog,
         }
     }
 

@@ -37,7 +37,7 @@ use chip_stm32::motors::{
     set_protocol,
 };
 use chip_stm32::receiver::TX_RING;
-use chip_stm32::sd_card::SdCard;
+use chip_stm32::sd_card::{self, SdCardLog};
 use chip_stm32::sensors::{Device, InterruptPin, Polled, SELECT, StampHandler};
 use chip_stm32::{crystal, faults, usb, watchdog};
 use chip_stm32f4::converter::SLOWLY;
@@ -137,7 +137,7 @@ impl Board for Pixracer {
     type Sampler = Inside;
     type Aids = Aids;
     type Links = [BoardLink<Receiver, Transmitter>; 4];
-    type Card = SdCard;
+    type Log = SdCardLog;
     type Memory = Bank1Region1<'static, Blocking>;
     const CORE_HZ: u32 = clocks::CORE_HZ;
     /// Sectors 1 and 2, of 16 KiB each (`memory.x`).
@@ -146,7 +146,7 @@ impl Board for Pixracer {
     const OUTPUTS: usize = OUTPUTS;
     const INDICATES: bool = true;
     const RADIO_LINK: Option<usize> = Some(3);
-    const HAS_CARD: bool = true;
+    const HAS_LOG: bool = true;
     const BOOT_LOADER: Option<fn() -> !> = Some(boot_loader::restart);
 
     fn after_reset() {
@@ -239,7 +239,7 @@ impl Board for Pixracer {
             aids,
             links,
             memory: Flash::new_blocking(p.FLASH).into_blocking_regions().bank1_region1,
-            card: SdCard::new(interface),
+            log: sd_card::new(interface),
         }
     }
 

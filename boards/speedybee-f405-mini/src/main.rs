@@ -9,6 +9,6 @@ use defmt_rtt as _;
 // The interrupt lines of CAN1 and CAN2, which this firmware does not need.
 firmware::image!(
     board::FlightController, control: CAN2_TX, comms: CAN2_RX0, housekeeping: CAN2_RX1, sampling: CAN1_TX,
-    aiding: CAN1_RX0
+    aiding: CAN1_RX0, logging: CAN1_RX1
 );
 chip_stm32::faults!(board::stop_motors);

@@ -53,7 +53,7 @@ impl Board for Stm32f405 {
     type Sampler = NoSensors;
     type Aids = NoSensors;
     type Links = [BoardLink<Receiver, Transmitter>; 2];
-    type Card = firmware::logging::NoCard;
+    type Log = firmware::logging::NoLog;
     type Memory = Bank1Region1<'static, Blocking>;
     const CORE_HZ: u32 = clocks::CORE_HZ;
     /// Sectors 1 and 2, of 16 KiB each (`memory.x`).
@@ -89,7 +89,7 @@ impl Board for Stm32f405 {
             aids: NoSensors,
             links: [link, link::of_usb(usb::start(p.USB_OTG_FS, p.PA12, p.PA11, Irqs))],
             memory: Flash::new_blocking(p.FLASH).into_blocking_regions().bank1_region1,
-            card: firmware::logging::NoCard,
+            log: firmware::logging::NoLog,
         }
     }
 

@@ -32,7 +32,7 @@ use chip_stm32::battery::BatteryConverter;
 use chip_stm32::indicator::{Led, PassiveBuzzer};
 use chip_stm32::link::{self, Receiver, Transmitter};
 use chip_stm32::motors::{CHANNELS, MotorProtocol, Motors, Throttles, hold_low, pin, set_protocol};
-use chip_stm32::sd_card::SdCard;
+use chip_stm32::sd_card::{self, SdCardLog};
 use chip_stm32::sensors::{Device, InterruptPin, Interrupted, Polled, StampHandler, interrupted};
 use chip_stm32::{crystal, escs, faults, usb, watchdog};
 use chip_stm32h7::flash::Words;
@@ -132,14 +132,14 @@ impl Board for Stm32h743 {
     type Sampler = Imus;
     type Aids = Aids;
     type Links = [BoardLink<Receiver, Transmitter>; 3];
-    type Card = SdCard;
+    type Log = SdCardLog;
     type Memory = Words;
     const CORE_HZ: u32 = clocks::CORE_HZ;
     const STORE: u32 = 0;
     const HARDWARE: &'static str = env!("CARGO_PKG_NAME");
     const OUTPUTS: usize = OUTPUTS;
     const INDICATES: bool = true;
-    const HAS_CARD: bool = true;
+    const HAS_LOG: bool = true;
     const ESCS: bool = true;
     const BOOT_LOADER: Option<fn() -> !> = Some(boot_loader::restart);
 
@@ -215,7 +215,7 @@ impl Board for Stm32h743 {
         // A debugger that halts the core halts the watchdog.
         pac::DBGMCU.apb4fzr1().modify(|freeze| freeze.set_iwdg1(true));
         let board = Stm32h743 { watchdog: watchdog(p.IWDG1) };
-        Parts { board, sampler, aids, links, memory: Words::new(p.FLASH), card: SdCard::new(interface) }
+        Parts { board, sampler, aids, links, memory: Words::new(p.FLASH), log: sd_card::new(interface) }
     }
 
     fn set_motor_protocol(&mut self, protocol: MotorProtocol) {

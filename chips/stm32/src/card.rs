@@ -3,7 +3,7 @@
 use crate::sensors::SELECT;
 use afbc_logger::embedded_sdmmc::sdcard::spi::AcquireOpts;
 use afbc_logger::embedded_sdmmc::{Block, BlockDevice, BlockIdx, SdCard, SdCardError};
-use afbc_logger::{CardError, LogCard};
+use afbc_logger::{CardError, CardKeeper, LogCard};
 use core::slice;
 use embassy_stm32::Peri;
 use embassy_stm32::gpio::{Level, Output, Pin, Pull};
@@ -29,6 +29,19 @@ pub fn config(hz: u32) -> spi::Config {
     config
 }
 
+/// Keeps logs on a card by SPI.
+pub type CardLog = CardKeeper<SpiCard>;
+
+/// The card behind a select pin, of an SPI fed with `kernel_hz`, by a core of `core_hz`.
+pub fn new(
+    spi: Spi<'static, Blocking, Master>,
+    select: Peri<'static, impl Pin>,
+    kernel_hz: u32,
+    core_hz: u32,
+) -> CardLog {
+    CardKeeper::new(SpiCard::new(spi, select, kernel_hz, core_hz))
+}
+
 /// A card that is alone on its SPI. Every call waits for it, by polling: the task must be below all others.
 pub struct SpiCard {
     card: SdCard<CardBus, CoreDelay>,
@@ -36,13 +49,7 @@ pub struct SpiCard {
 }
 
 impl SpiCard {
-    /// The card behind a select pin, of an SPI fed with `kernel_hz`, by a core of `core_hz`.
-    pub fn new(
-        spi: Spi<'static, Blocking, Master>,
-        select: Peri<'static, impl Pin>,
-        kernel_hz: u32,
-        core_hz: u32,
-    ) -> Self {
+    fn new(spi: Spi<'static, Blocking, Master>, select: Peri<'static, impl Pin>, kernel_hz: u32, core_hz: u32) -> Self {
         let bus = CardBus { spi, select: Output::new(select, Level::High, SELECT) };
         let delay = CoreDelay { cycles_per_us: core_hz / 1_000_000 };
         // A card that is there answers the first of them, or the second.

@@ -10,6 +10,7 @@ pub mod escs;
 pub mod faults;
 pub mod indicator;
 pub mod link;
+pub mod log_flash;
 pub mod motors;
 pub mod receiver;
 pub mod sd_card;

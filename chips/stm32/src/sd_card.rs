@@ -1,7 +1,7 @@
 //! A memory card by the chip's own interface to it, over four lines.
 
 use afbc_logger::embedded_sdmmc::Block;
-use afbc_logger::{CardError, LogCard};
+use afbc_logger::{CardError, CardKeeper, LogCard};
 use core::pin::pin;
 use core::task::{Context, Poll, Waker};
 use embassy_stm32::sdmmc::sd::{Addressable as _, Card, CmdBlock, DataBlock, StorageDevice};
@@ -22,18 +22,25 @@ struct Buffers {
     registers: CmdBlock,
 }
 
+/// Keeps logs on a card by the chip's own interface.
+pub type SdCardLog = CardKeeper<SdCard>;
+
 /// A card. Every call waits for it, by polling: the task must be below all others.
 pub struct SdCard {
     device: StorageDevice<'static, 'static, Card>,
     buffers: &'static mut Buffers,
 }
 
+/// The card of this interface; to be called once.
+///
+/// # Panics
+/// At a second call.
+pub fn new(interface: Sdmmc<'static>) -> SdCardLog {
+    CardKeeper::new(SdCard::new(interface))
+}
+
 impl SdCard {
-    /// The card of this interface; to be called once.
-    ///
-    /// # Panics
-    /// At a second call.
-    pub fn new(interface: Sdmmc<'static>) -> Self {
+    fn new(interface: Sdmmc<'static>) -> Self {
         static INTERFACE: StaticCell<Sdmmc<'static>> = StaticCell::new();
         static BUFFERS: StaticCell<Buffers> = StaticCell::new();
         let device = StorageDevice::new_uninit_sd_card(INTERFACE.init(interface));

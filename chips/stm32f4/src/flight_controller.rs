@@ -14,7 +14,8 @@
 ///   of `afbc_drivers::alignment`.
 /// * The battery's voltage and current are on pins of the converter, by the board's divider and amplifier.
 /// * The buzzer sounds while its pin is high; the LED, if there is one, is lit while its pin is low.
-/// * The memory card, if there is one, has an SPI of its own; `quiet` are the select pins of whatever else is there.
+/// * The memory card for logs, if there is one, has an SPI of its own; `quiet` are the select pins of whatever else is
+///   there. So has the flash chip for logs of a board without a card.
 /// * Motors are so many, numbered as [`numbering`](chip_stm32::motors::numbering) has it. They have a line for each
 ///   timer, with the type of its registers, the stream of its updates, and what its channels 1 to 4 drive: the pin, the
 ///   same again as port and number, and the number of the motor.
@@ -50,6 +51,9 @@ macro_rules! flight_controller {
         $(card: $card:ident {
             clock: $card_sck:ident, out: $card_mosi:ident, in: $card_miso:ident, select: $card_select:ident,
             quiet: [$($quiet:ident),*]
+        },)?
+        $(flash: $flash:ident {
+            clock: $flash_sck:ident, out: $flash_mosi:ident, in: $flash_miso:ident, select: $flash_select:ident
         },)?
         motors: $outputs:literal as $numbering:ident {
             $($task:ident: $timer:ident<$word:ty>, $dma:ident by $line:ident { $($channel:tt),+ },)+
@@ -110,7 +114,7 @@ macro_rules! flight_controller {
             type Sampler = chip_stm32::sensor_set::Imu<$imu>;
             type Aids = chip_stm32::sensor_set::SlowSensors<$barometer>;
             type Links = [firmware::board::BoardLink<chip_stm32::link::Receiver, chip_stm32::link::Transmitter>; LINKS];
-            type Card = chip_stm32f4::flight_controller!(@card $($card)?);
+            type Log = chip_stm32f4::flight_controller!(@log $(card $card)? $(flash $flash)?);
             type Memory = embassy_stm32::flash::Bank1Region1<'static, embassy_stm32::flash::Blocking>;
             const CORE_HZ: u32 = chip_stm32f4::clocks::CORE_HZ;
             /// Sectors 1 and 2, of 16 KiB each (`memory.x`).
@@ -123,7 +127,10 @@ macro_rules! flight_controller {
                 !escs.is_empty()
             };
             const HARDWARE: &'static str = env!("CARGO_PKG_NAME");
-            const HAS_CARD: bool = chip_stm32f4::flight_controller!(@has_card $($card)?);
+            const HAS_LOG: bool = {
+                let storages: &[&str] = &[$(stringify!($card),)? $(stringify!($flash))?];
+                !storages.is_empty()
+            };
             const BOOT_LOADER: Option<fn() -> !> = Some(chip_stm32f4::boot_loader::restart);
 
             fn after_reset() {
@@ -201,8 +208,10 @@ macro_rules! flight_controller {
                     },
                 );
 
-                let card = chip_stm32f4::flight_controller!(
-                    @new_card p $(, $card, $card_sck, $card_mosi, $card_miso, $card_select, $($quiet),*)?
+                let log = chip_stm32f4::flight_controller!(
+                    @new_log p
+                    $(, card $card, $card_sck, $card_mosi, $card_miso, $card_select, $($quiet),*)?
+                    $(, flash $flash, $flash_sck, $flash_mosi, $flash_miso, $flash_select)?
                 );
 
                 $(
@@ -243,7 +252,7 @@ macro_rules! flight_controller {
                         },)?
                     ],
                     memory: embassy_stm32::flash::Flash::new_blocking(p.FLASH).into_blocking_regions().bank1_region1,
-                    card,
+                    log,
                 }
             }
 
@@ -307,12 +316,13 @@ macro_rules! flight_controller {
             $($(chip_stm32f4::flight_controller!(@stop $channel);)+)+
         }
     };
-    (@card) => { firmware::logging::NoCard };
-    (@card $card:ident) => { chip_stm32::card::SpiCard };
-    (@has_card) => { false };
-    (@has_card $card:ident) => { true };
-    (@new_card $p:ident) => { firmware::logging::NoCard };
-    (@new_card $p:ident, $card:ident, $sck:ident, $mosi:ident, $miso:ident, $select:ident, $($quiet:ident),*) => {{
+    (@log) => { firmware::logging::NoLog };
+    (@log card $card:ident) => { chip_stm32::card::CardLog };
+    (@log flash $flash:ident) => { chip_stm32::log_flash::FlashLog };
+    (@new_log $p:ident) => { firmware::logging::NoLog };
+    (
+        @new_log $p:ident, card $card:ident, $sck:ident, $mosi:ident, $miso:ident, $select:ident, $($quiet:ident),*
+    ) => {{
         $(
             // For ever: a pin that is dropped is an input again.
             core::mem::forget(embassy_stm32::gpio::Output::new(
@@ -324,7 +334,12 @@ macro_rules! flight_controller {
         let kernel_hz = embassy_stm32::rcc::frequency::<peripherals::$card>().0;
         let config = chip_stm32::card::config(kernel_hz / 256);
         let spi = embassy_stm32::spi::Spi::new_blocking($p.$card, $p.$sck, $p.$mosi, $p.$miso, config);
-        chip_stm32::card::SpiCard::new(spi, $p.$select, kernel_hz, chip_stm32f4::clocks::CORE_HZ)
+        chip_stm32::card::new(spi, $p.$select, kernel_hz, chip_stm32f4::clocks::CORE_HZ)
+    }};
+    (@new_log $p:ident, flash $flash:ident, $sck:ident, $mosi:ident, $miso:ident, $select:ident) => {{
+        let config = chip_stm32::log_flash::config(embassy_stm32::rcc::frequency::<peripherals::$flash>().0);
+        let spi = embassy_stm32::spi::Spi::new_blocking($p.$flash, $p.$sck, $p.$mosi, $p.$miso, config);
+        chip_stm32::log_flash::new(spi, $p.$select)
     }};
     (@motors $p:ident, $timer:ident, $dma:ident, $first:tt, $second:tt, $third:tt, $fourth:tt) => {
         chip_stm32::motors::Motors::new(

@@ -1,4 +1,4 @@
-//! Blocks of a log on their way to the card.
+//! Blocks of a log on their way to where they are kept.
 
 /// Bytes of a block: as many as a card writes at once.
 pub const BLOCK_BYTES: usize = 512;

@@ -1,4 +1,4 @@
-//! The card, and what is known of it.
+//! A memory card.
 
 use embedded_sdmmc::Block;
 
@@ -44,52 +44,4 @@ pub trait LogCard {
     /// # Errors
     /// If the card does not do it; the block may be written or not.
     fn write(&mut self, number: u32, block: &Block) -> Result<(), CardError>;
-}
-
-/// What is known of the card.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[repr(u8)]
-pub enum CardState {
-    /// Nothing yet.
-    #[default]
-    Unknown,
-    /// It can take a log.
-    Ready,
-    /// There is none.
-    Absent,
-    /// It has no volume of FAT16 or FAT32 in its first partition.
-    Foreign,
-    /// It is full.
-    Full,
-    /// It has failed, and is tried again.
-    Failed,
-}
-
-impl CardState {
-    /// All of them, each at the place of its number.
-    pub const ALL: [Self; 6] = [
-        CardState::Unknown,
-        CardState::Ready,
-        CardState::Absent,
-        CardState::Foreign,
-        CardState::Full,
-        CardState::Failed,
-    ];
-
-    /// Returns the state of this number, unknown for any other.
-    pub fn of(number: u8) -> Self {
-        Self::ALL.get(usize::from(number)).copied().unwrap_or_default()
-    }
-
-    /// Returns what stations are told of it, in at most 50 characters; none if there is nothing to tell.
-    pub fn text(self) -> Option<&'static str> {
-        match self {
-            CardState::Unknown => None,
-            CardState::Ready => Some("Log: card ready"),
-            CardState::Absent => Some("Log: no card"),
-            CardState::Foreign => Some("Log: no FAT16 or FAT32 on the card"),
-            CardState::Full => Some("Log: card full"),
-            CardState::Failed => Some("Log: card has failed"),
-        }
-    }
 }

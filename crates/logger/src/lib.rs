@@ -1,11 +1,12 @@
-//! The black box on a memory card.
+//! The black box on a memory card, or in flash.
 //!
 //! A [`LogWriter`], beside the task that hears of every tick, decides when there is a log ([`LogMode`]), lets an
-//! [`afbc_ulog::BlackBox`] write it, and cuts it into [`LogBlock`]s. A [`LogKeeper`], in a task that may wait for its
-//! card, writes blocks into the files `LOG001.ULG`, `LOG002.ULG` and so on of a FAT volume. Between them is a queue of
-//! blocks of the shell's; back comes what is known of the card ([`CardState`]). Back come also logs, to be
-//! downloaded and erased: [`CardLogs`] asks the keeper for pages of them. Whatever a card does costs log: a queue
-//! that is full, records, which the log counts as dropouts; a card that fails, the end of its file.
+//! [`afbc_ulog::BlackBox`] write it, and cuts it into [`LogBlock`]s. A [`LogKeeper`], in a task that may wait for it,
+//! keeps them: a [`CardKeeper`] in the files `LOG001.ULG`, `LOG002.ULG` and so on of a card's FAT volume, a
+//! [`FlashKeeper`] in sectors of flash. Between them is a queue of blocks of the shell's; back comes what is known of
+//! the storage ([`StorageState`]). Back come also logs, to be downloaded and erased: [`StoredLogs`] asks the keeper for
+//! pages of them. Whatever a card or flash does costs log: a queue that is full, records, which the log counts as
+//! dropouts; a failure, the end of its log.
 //!
 //! FAT is `embedded-sdmmc`'s, which can panic on a volume that is none; so a volume is checked before it is opened, and
 //! the number of blocks that one call may touch is limited.
@@ -13,17 +14,26 @@
 
 mod block;
 mod card;
+mod card_keeper;
+mod card_reader;
+mod flash;
+mod flash_keeper;
 mod keeper;
+mod nor_chip;
 mod query;
-mod reader;
+mod sector;
 mod volume;
 mod writer;
 
 pub use block::{BLOCK_BYTES, BlockSink, LogBlock};
-pub use card::{CardError, CardState, LogCard};
+pub use card::{CardError, LogCard};
+pub use card_keeper::{CardKeeper, log_name};
 pub use embedded_sdmmc;
-pub use keeper::{LogKeeper, log_name};
-pub use query::{CardAnswer, CardLogs, LogPage, LogPages, LogQuery, PAGE_BYTES};
+pub use flash::{FlashFailed, LogFlash, PROGRAM_BYTES, SECTOR_BYTES};
+pub use flash_keeper::FlashKeeper;
+pub use keeper::{LogKeeper, StorageState};
+pub use nor_chip::NorChip;
+pub use query::{LogAnswer, LogPage, LogPages, LogQuery, PAGE_BYTES, StoredLogs};
 pub use writer::{LogWriter, STAGING};
 
 pub use afbc_onboard::LogMode;

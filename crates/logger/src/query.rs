@@ -1,4 +1,4 @@
-//! What is asked of a card's logs, by a task that cannot wait for the card, and answered by the one that can.
+//! What is asked of kept logs, by a task that cannot wait for card or flash, and answered by the one that can.
 
 use afbc_station::services::storage::{LogInfo, LogStore};
 use core::task::Poll;
@@ -6,8 +6,8 @@ use core::task::Poll;
 /// Bytes of a log that are read at once: five parts of a download.
 pub const PAGE_BYTES: usize = 450;
 
-/// A question about the logs on a card, except the one that is being written. Each has its place, in the order of the
-/// directory, which it keeps until they are counted again.
+/// A question about the logs that are kept, except the one that is being written. Each has its place, in the order of
+/// the directory, which it keeps until they are counted again.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum LogQuery {
     /// None.
@@ -25,13 +25,13 @@ pub enum LogQuery {
 
 /// The answer to a question.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum CardAnswer {
+pub enum LogAnswer {
     /// There is no such log; of [`LogQuery::Erase`], none is left.
     #[default]
     None,
     /// The number that was asked for; of [`LogQuery::Read`], of the bytes that were read: fewer than a page at the end.
     Is(u32),
-    /// The card does not do it.
+    /// The storage does not do it.
     Failed,
 }
 
@@ -39,24 +39,24 @@ pub enum CardAnswer {
 #[derive(Clone, Debug)]
 pub struct LogPage {
     pub(crate) query: LogQuery,
-    pub(crate) answer: CardAnswer,
+    pub(crate) answer: LogAnswer,
     /// What was read.
     pub(crate) bytes: [u8; PAGE_BYTES],
 }
 
 impl LogPage {
     /// Without a question.
-    pub const EMPTY: Self = LogPage { query: LogQuery::Nothing, answer: CardAnswer::None, bytes: [0; PAGE_BYTES] };
+    pub const EMPTY: Self = LogPage { query: LogQuery::Nothing, answer: LogAnswer::None, bytes: [0; PAGE_BYTES] };
 
     /// Copies what was read from `offset` on; none if it is not on this page, not all of what fits, or was not read.
     fn copy(&self, place: u16, offset: u32, into: &mut [u8]) -> Option<usize> {
         let LogQuery::Read(at, from) = self.query else { return None };
         let skipped = offset.checked_sub(from).filter(|_| at == place)? as usize;
         let length = match self.answer {
-            CardAnswer::Is(length) => (length as usize).min(PAGE_BYTES),
-            CardAnswer::None => 0,
-            // Not the end of the log: it goes on once the card does.
-            CardAnswer::Failed => return None,
+            LogAnswer::Is(length) => (length as usize).min(PAGE_BYTES),
+            LogAnswer::None => 0,
+            // Not the end of the log: it goes on once the storage does.
+            LogAnswer::Failed => return None,
         };
         let rest = self.bytes.get(skipped..length).unwrap_or_default();
         let is_end = length < PAGE_BYTES && skipped <= length;
@@ -68,7 +68,7 @@ impl LogPage {
     }
 }
 
-/// A queue of one page, from the task that waits for the card, and one of questions to it.
+/// A queue of one page, from the task that waits for it, and one of questions to it.
 pub trait LogPages {
     /// Returns the page that is there, if one is.
     fn page(&mut self) -> Option<&LogPage>;
@@ -80,18 +80,18 @@ pub trait LogPages {
     fn ask(&mut self, query: LogQuery);
 }
 
-/// The logs on a card, as the services for stations want them.
+/// The logs that are kept, as the services for stations want them.
 #[derive(Clone, Debug)]
-pub struct CardLogs<P> {
+pub struct StoredLogs<P> {
     pages: P,
     /// What is asked and not answered.
     asked: LogQuery,
 }
 
-impl<P: LogPages> CardLogs<P> {
+impl<P: LogPages> StoredLogs<P> {
     /// With nothing asked.
     pub fn new(pages: P) -> Self {
-        CardLogs { pages, asked: LogQuery::Nothing }
+        StoredLogs { pages, asked: LogQuery::Nothing }
     }
 
     /// Asks, once until there is an answer.
@@ -104,7 +104,7 @@ impl<P: LogPages> CardLogs<P> {
 
     /// Asks, or returns the answer, once.
     #[inline(never)]
-    fn ask(&mut self, query: LogQuery) -> Poll<CardAnswer> {
+    fn ask(&mut self, query: LogQuery) -> Poll<LogAnswer> {
         let answered = self.pages.page().map(|page| (page.query, page.answer));
         if answered.is_some() {
             self.pages.done();
@@ -122,18 +122,18 @@ impl<P: LogPages> CardLogs<P> {
     }
 }
 
-impl<P: LogPages> LogStore for CardLogs<P> {
+impl<P: LogPages> LogStore for StoredLogs<P> {
     fn count_logs(&mut self) -> Poll<u16> {
         self.ask(LogQuery::Count).map(|answer| match answer {
-            CardAnswer::Is(count) => u16::try_from(count).unwrap_or(u16::MAX),
-            CardAnswer::None | CardAnswer::Failed => 0,
+            LogAnswer::Is(count) => u16::try_from(count).unwrap_or(u16::MAX),
+            LogAnswer::None | LogAnswer::Failed => 0,
         })
     }
 
     fn log(&mut self, place: u16) -> Poll<Option<LogInfo>> {
         self.ask(LogQuery::Size(place)).map(|answer| match answer {
-            CardAnswer::Is(size) => Some(LogInfo { size, utc_s: 0 }),
-            CardAnswer::None | CardAnswer::Failed => None,
+            LogAnswer::Is(size) => Some(LogInfo { size, utc_s: 0 }),
+            LogAnswer::None | LogAnswer::Failed => None,
         })
     }
 
@@ -154,10 +154,10 @@ impl<P: LogPages> LogStore for CardLogs<P> {
 
     fn erase_logs(&mut self) -> Poll<bool> {
         match self.ask(LogQuery::Erase) {
-            Poll::Ready(CardAnswer::None) => Poll::Ready(true),
-            Poll::Ready(CardAnswer::Failed) => Poll::Ready(false),
+            Poll::Ready(LogAnswer::None) => Poll::Ready(true),
+            Poll::Ready(LogAnswer::Failed) => Poll::Ready(false),
             // One at a time, so that blocks of a log are not kept waiting for all of them.
-            Poll::Ready(CardAnswer::Is(_)) => {
+            Poll::Ready(LogAnswer::Is(_)) => {
                 self.wait_for(LogQuery::Erase);
                 Poll::Pending
             }

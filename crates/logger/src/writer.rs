@@ -1,7 +1,7 @@
 //! From ticks to blocks.
 
 use crate::block::{BLOCK_BYTES, BlockSink};
-use crate::card::CardState;
+use crate::keeper::StorageState;
 use afbc_onboard::LogMode;
 use afbc_onboard::parameters::{ParameterTable, RecordChange};
 use afbc_ulog::{BlackBox, LogRing, LogStart, LoggedTick};
@@ -29,13 +29,15 @@ pub struct LogWriter {
     armed_us: Option<u64>,
     /// When the last tick was \[us\].
     ticked_us: Option<u64>,
-    /// What stations know of the card.
-    told: CardState,
+    /// What stations know of the storage.
+    told: StorageState,
+    /// True if logs are to be small.
+    small: bool,
 }
 
 impl LogWriter {
-    /// Creates it, with no log.
-    pub const fn new() -> Self {
+    /// Creates it, with no log, for small logs ([`LogKeeper::SMALL`](crate::LogKeeper::SMALL)) or usual ones.
+    pub const fn new(small: bool) -> Self {
         LogWriter {
             log: None,
             ring: LogRing::new(),
@@ -43,12 +45,13 @@ impl LogWriter {
             ends: false,
             armed_us: None,
             ticked_us: None,
-            told: CardState::Unknown,
+            told: StorageState::Unknown,
+            small,
         }
     }
 
-    /// True if a log is being written, or would be with a card that is ready: then [`tick`](Self::tick) is to be called
-    /// for every tick. To be asked once in each.
+    /// True if a log is being written, or would be with a storage that is ready: then [`tick`](Self::tick) is to be
+    /// called for every tick. To be asked once in each.
     pub fn wants(&mut self, now_us: u64, armed: bool, mode: LogMode) -> bool {
         if armed {
             self.armed_us = Some(now_us);
@@ -64,21 +67,22 @@ impl LogWriter {
         wanted && !self.ends
     }
 
-    /// Writes a tick, into the log of a vehicle as `start` has it, if the card takes one. Ticks that are missing before
-    /// it, more than `period_us` apart, count as a dropout.
+    /// Writes a tick, into the log of a vehicle as `start` has it, if the storage takes one. Ticks that are missing
+    /// before it, more than `period_us` apart, count as a dropout.
     pub fn tick<const M: usize, const N: usize>(
         &mut self,
         tick: &LoggedTick<'_, M>,
         table: &ParameterTable<N>,
         start: &LogStart<'_>,
-        card: CardState,
+        storage: StorageState,
         period_us: u64,
     ) {
-        if self.log.is_none() && card == CardState::Ready && !self.ends {
+        if self.log.is_none() && storage == StorageState::Ready && !self.ends {
             (self.begins, self.ticked_us) = (true, None);
             // A log that was given up has left bytes.
             self.ring = LogRing::new();
-            self.log = Some(BlackBox::new(start, table).paced(PACE));
+            let log = BlackBox::new(start, table).paced(PACE);
+            self.log = Some(if self.small { log.small() } else { log });
         }
         let Some(log) = self.log.as_mut().filter(|_| !self.ends) else { return };
         let now_us = tick.report.time_us;
@@ -107,9 +111,9 @@ impl LogWriter {
     }
 
     /// Hands over what fills blocks, and all that is left of a log that has ended; to be called in every tick. A log
-    /// whose card is not ready any more is given up.
-    pub fn send(&mut self, sink: &mut impl BlockSink, card: CardState) {
-        if self.log.is_some() && card != CardState::Ready {
+    /// whose storage is not ready any more is given up.
+    pub fn send(&mut self, sink: &mut impl BlockSink, storage: StorageState) {
+        if self.log.is_some() && storage != StorageState::Ready {
             (self.log, self.ends) = (None, false);
         }
         if self.log.is_none() {
@@ -133,16 +137,16 @@ impl LogWriter {
         }
     }
 
-    /// Returns a text for stations when there is something new about the card, and whether it is a warning. That a card
-    /// is ready is told only after it was not.
-    pub fn news(&mut self, card: CardState) -> Option<(&'static str, bool)> {
-        if card == self.told || card == CardState::Unknown {
+    /// Returns a text for stations when there is something new about the storage, and whether it is a warning. That a
+    /// storage is ready is told only after it was not.
+    pub fn news(&mut self, storage: StorageState) -> Option<(&'static str, bool)> {
+        if storage == self.told || storage == StorageState::Unknown {
             return None;
         }
         // What has failed is tried again, which does not tell more of it.
-        let is_news = !(self.told == CardState::Unknown && card == CardState::Ready);
-        self.told = card;
-        let text = card.text().filter(|_| is_news)?;
-        Some((text, card != CardState::Ready))
+        let is_news = !(self.told == StorageState::Unknown && storage == StorageState::Ready);
+        self.told = storage;
+        let text = storage.text().filter(|_| is_news)?;
+        Some((text, storage != StorageState::Ready))
     }
 }

@@ -4,109 +4,15 @@
 
 mod room;
 
-use afbc_link::{LogEntry, LogMessage, LogRequest};
-use afbc_logger::{CardState, LogMode};
-use afbc_station::services::log_transfer::LogTransfer;
-use afbc_station::services::storage::LogStore;
+use afbc_link::LogRequest;
+use afbc_logger::StorageState;
 use proptest::prelude::*;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
+use room::station::Station;
 use room::ulog::read;
-use room::{Card, Room, adds_up, fat16, fat32, mount};
+use room::{Card, adds_up, fat16, fat32, mount};
 use std::io::Write;
-use std::task::Poll;
-
-/// Ticks within which a card without stalls answers.
-const PATIENCE: usize = 2_000;
-
-/// A vehicle with a station.
-struct Station {
-    room: Room,
-    transfer: LogTransfer,
-}
-
-impl Station {
-    fn new(card: &Card) -> Self {
-        let mut room = Room::new(card);
-        room.mode = LogMode::Armed;
-        room.run(200);
-        Station { room, transfer: LogTransfer::default() }
-    }
-
-    /// Flies for so long: a log of a second more.
-    fn fly(&mut self, ticks: u64) {
-        self.room.armed = true;
-        self.room.run(ticks);
-        self.room.armed = false;
-        self.room.run(1_300);
-    }
-
-    /// Asks, and returns what comes until there is no more, a message of each tick.
-    fn ask(&mut self, request: LogRequest) -> Vec<LogMessage> {
-        let messages = self.ask_for(request, PATIENCE);
-        assert!(!self.transfer.is_busy(), "{request:?}: no answer");
-        messages
-    }
-
-    /// Asks, and returns what comes until there is no more, or nothing for so many ticks.
-    fn ask_for(&mut self, request: LogRequest, patience: usize) -> Vec<LogMessage> {
-        self.transfer.hear(request);
-        let (mut messages, mut quiet) = (Vec::new(), 0);
-        while self.transfer.is_busy() && quiet < patience {
-            self.room.tick(false);
-            let message = self.transfer.next(&mut self.room.stored);
-            quiet = if message.is_some() { 0 } else { quiet + 1 };
-            messages.extend(message);
-        }
-        messages
-    }
-
-    fn list(&mut self) -> Vec<LogEntry> {
-        let listed = self.ask(LogRequest::List { first: 0, last: u16::MAX });
-        let entries = listed.into_iter().map(|message| match message {
-            LogMessage::Entry(entry) => entry,
-            LogMessage::Data(data) => panic!("{data:?}"),
-        });
-        entries.filter(|entry| entry.count > 0).collect()
-    }
-
-    fn download(&mut self, log: u16, offset: u32, bytes: u32) -> Vec<u8> {
-        let found = self.ask(LogRequest::Data { log, offset, bytes });
-        Self::joined(log, offset, found)
-    }
-
-    /// Returns what parts of a log hold together.
-    fn joined(log: u16, offset: u32, messages: Vec<LogMessage>) -> Vec<u8> {
-        let mut read = Vec::new();
-        for message in messages {
-            let LogMessage::Data(data) = message else { panic!("{message:?}") };
-            assert_eq!((data.log, data.offset), (log, offset + read.len() as u32));
-            read.extend_from_slice(&data.data[..data.count.into()]);
-        }
-        read
-    }
-
-    fn erase(&mut self) -> bool {
-        for _ in 0..PATIENCE {
-            self.room.tick(false);
-            if let Poll::Ready(erased) = self.room.stored.erase_logs() {
-                return erased;
-            }
-        }
-        panic!("no answer");
-    }
-
-    fn is_same_as_on_the_card(&mut self) {
-        let held = self.room.logs();
-        let listed = self.list();
-        let sizes: Vec<_> = held.iter().map(|(_, bytes)| bytes.len() as u32).collect();
-        assert_eq!(listed.iter().map(|entry| entry.size).collect::<Vec<_>>(), sizes);
-        for (entry, (name, bytes)) in listed.iter().zip(&held) {
-            assert_eq!((usize::from(entry.count), usize::from(entry.last)), (held.len(), held.len() - 1));
-            assert!(self.download(entry.log, 0, u32::MAX) == *bytes, "{name} is another");
-        }
-    }
-}
 
 #[test]
 fn logs_are_listed_and_downloaded() {
@@ -119,7 +25,7 @@ fn logs_are_listed_and_downloaded() {
         (0..3).for_each(|number| station.fly(300 + 100 * number));
         mount(&mut card.0.borrow_mut().bytes).root_dir().remove("LOG0007.ULG").unwrap();
         mount(&mut card.0.borrow_mut().bytes).root_dir().remove("LOGBOOK.ULG").unwrap();
-        station.is_same_as_on_the_card();
+        station.is_served_as_it_is_kept();
         // Any part of any, and what is not there.
         let held = station.room.logs();
         for (log, offset, bytes) in [(0, 1, 90), (1, 449, 1), (2, 511, 1_000), (0, 100_000, 449), (1, 450, 451)] {
@@ -157,7 +63,7 @@ fn a_download_beside_a_log() {
     let missing_ms: u64 = written.dropouts.iter().map(|(ms, _)| ms).sum();
     assert!(missing_ms < 50 && last - first > 3_000_000, "{missing_ms} ms of {} us", last - first);
     assert!(station.download(2, 0, 90).is_empty());
-    station.is_same_as_on_the_card();
+    station.is_served_as_it_is_kept();
 }
 
 /// All but the one that is written are erased; what they took is free again, but for a cluster each.
@@ -218,15 +124,15 @@ fn a_full_card_is_emptied() {
     }
     let mut station = Station::new(&card);
     (0..3).for_each(|_| station.fly(1_000));
-    assert_eq!(station.room.told, [CardState::Full.text().unwrap()]);
+    assert_eq!(station.room.told, [StorageState::Full.text().unwrap()]);
     // It looks at the card again.
     station.room.run(1_500);
-    station.is_same_as_on_the_card();
+    station.is_served_as_it_is_kept();
     assert!(station.erase());
     assert!(station.room.logs().is_empty());
     station.fly(400);
     assert_eq!(station.room.logs().len(), 1);
-    assert_eq!(station.room.told.last(), CardState::Ready.text().as_ref());
+    assert_eq!(station.room.told.last(), StorageState::Ready.text().as_ref());
 }
 
 proptest! {
@@ -264,7 +170,7 @@ proptest! {
                     // A card that does not answer is not the end of a log; whoever has waited long enough says so.
                     let is_whole = !station.transfer.is_busy();
                     station.transfer.hear(LogRequest::End);
-                    let found = Station::joined(log, offset, found);
+                    let found = Station::<Card>::joined(log, offset, found);
                     let bytes = &held[usize::from(log)].1[offset as usize..(offset + wanted) as usize];
                     prop_assert!(bytes.starts_with(&found));
                     prop_assert!(!is_whole || found.len() == bytes.len() || found.is_empty());
@@ -282,7 +188,7 @@ proptest! {
         for (before, after) in held.iter().zip(&now) {
             prop_assert_eq!(before, after);
         }
-        station.is_same_as_on_the_card();
+        station.is_served_as_it_is_kept();
         prop_assert!(station.erase());
         prop_assert!(station.room.logs().is_empty());
     }

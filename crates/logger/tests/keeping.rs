@@ -4,7 +4,7 @@
 
 mod room;
 
-use afbc_logger::{CardState, LogMode, log_name};
+use afbc_logger::{LogMode, StorageState, log_name};
 use afbc_station::services::storage::LogStore;
 use proptest::prelude::*;
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -132,7 +132,7 @@ fn a_full_card_ends_the_log() {
     }
     let mut room = Room::new(&card);
     room.run(6_000);
-    assert_eq!(room.told, [CardState::Full.text().unwrap()]);
+    assert_eq!(room.told, [StorageState::Full.text().unwrap()]);
     let logs = room.logs();
     assert_eq!(logs.len(), 1);
     let log = read(&logs[0].1);
@@ -159,7 +159,7 @@ fn a_card_that_comes_back_gets_another_log() {
     let ends: Vec<_> = logs.iter().map(|(_, bytes)| adds_up(&read(bytes)).unwrap()).collect();
     assert!(ends[0][1] > 500_000 && ends[0][1] < 1_500_000 + 300_000, "{ends:?}");
     assert!(ends[1][0] > 4_500_000 && ends[1][0] < 6_500_000, "{ends:?}");
-    assert_eq!(room.told, ["Log: no card", "Log: card ready"]);
+    assert_eq!(room.told, ["Log: no card", "Log: ready"]);
 }
 
 /// Other files are left alone, and numbers go on behind the last log's.
@@ -188,15 +188,15 @@ fn cards_without_a_volume_are_told() {
     other.0.borrow_mut().bytes[450] = 0x07;
     let none = fat16();
     none.0.borrow_mut().is_there = false;
-    for (card, text) in [(blank, CardState::Foreign), (other, CardState::Foreign), (none, CardState::Absent)] {
+    for (card, text) in [(blank, StorageState::Foreign), (other, StorageState::Foreign), (none, StorageState::Absent)] {
         let mut room = Room::new(&card);
         room.run(3_000);
         assert_eq!(room.told, [text.text().unwrap()]);
         assert!(card.0.borrow().written.is_empty());
     }
-    assert!(CardState::ALL.iter().all(|state| state.text().is_none_or(|text| text.len() <= 50)));
-    for (number, state) in CardState::ALL.into_iter().enumerate() {
-        assert_eq!((state as usize, CardState::of(number as u8)), (number, state));
+    assert!(StorageState::ALL.iter().all(|state| state.text().is_none_or(|text| text.len() <= 50)));
+    for (number, state) in StorageState::ALL.into_iter().enumerate() {
+        assert_eq!((state as usize, StorageState::of(number as u8)), (number, state));
     }
 }
 
@@ -297,5 +297,5 @@ fn a_circle_ends() {
     let mut room = Room::new(&card);
     card.0.borrow_mut().takes_us = Box::new(|| 1);
     room.run(2 * SYNCED_US / TICK_US);
-    assert!(matches!(room.told.as_slice(), ["Log: card has failed"]), "{:?}", room.told);
+    assert!(matches!(room.told.as_slice(), ["Log: storage has failed"]), "{:?}", room.told);
 }

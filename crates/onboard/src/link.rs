@@ -36,7 +36,7 @@ parameters! {
         /// first one never does.
         #[parameter(LOG_PORT, "number", 0.0..=4.0)]
         pub log_port: u32 = 0,
-        /// When the black box is written, by boards with a memory card.
+        /// When the black box is written, by boards that keep logs.
         #[choice(SDLOG_MODE)]
         pub log_mode: LogMode = LogMode::Armed,
     }

@@ -7,9 +7,10 @@ use crate::moment::{LoggedTick, Moment};
 use crate::ring::{LogRing, RingView};
 use crate::topics::{
     ActuatorArmed, ActuatorMotors, ActuatorOutputs, AidOffered, Aiding, BatteryVoltage, EscStatusReport,
-    EstimatorFigures, EstimatorFlags, EstimatorVector, LandDetected, LawSignals, Listed, ManualControl, SensorCombined,
-    TOPICS, ThrustDemand, TorqueDemand, VehicleAngularVelocity, VehicleAttitude, VehicleAttitudeSetpoint,
-    VehicleGlobalPosition, VehicleLocalPosition, VehicleLocalPositionSetpoint, VehicleRatesSetpoint, VehicleState,
+    EstimatorFigures, EstimatorFlags, EstimatorVector, LandDetected, LawSignals, Listed, ManualControl, MeanSample,
+    SensorCombined, TOPICS, ThrustDemand, TorqueDemand, VehicleAngularVelocity, VehicleAttitude,
+    VehicleAttitudeSetpoint, VehicleGlobalPosition, VehicleLocalPosition, VehicleLocalPositionSetpoint,
+    VehicleRatesSetpoint, VehicleState,
 };
 use afbc_estimator::{ImuSample, Measurement};
 use afbc_onboard::parameters::{ParameterTable, RecordChange};
@@ -21,6 +22,8 @@ use nalgebra::Vector3;
 /// Bytes by which a damaged log is found again, and the time between two of them \[us\].
 const SYNC: [u8; 8] = [0x2f, 0x73, 0x13, 0x20, 0x25, 0x0c, 0xbb, 0x12];
 const SYNC_US: u64 = 500_000;
+/// Kinds of measurements, numbered as in `afbc_aid`, from 1 on.
+const AID_KINDS: usize = 7;
 /// Longest text; of a longer one the beginning is written \[bytes\].
 const TEXT_MAX: usize = 128;
 
@@ -31,6 +34,7 @@ pub struct BlackBox {
     definitions: Definitions,
     /// Entries of the beginning, and changed parameters, that are written in a tick, at most.
     pace: u16,
+    small: bool,
     unwritten: Unwritten,
     dropouts: Dropouts,
     /// When each topic is due \[us\].
@@ -63,6 +67,10 @@ struct Last {
     /// True once the estimator runs.
     runs: bool,
     sample: Option<ImuSample>,
+    /// Samples that are in no message yet.
+    mean: Option<MeanSample>,
+    /// When a measurement of each kind is due in a small log \[us\].
+    aids_due_us: [u64; AID_KINDS],
     sampled: Option<(SensorCombined, u64)>,
     pose_us: Option<u64>,
     norms: PerAxis<[f32; 2]>,
@@ -79,6 +87,7 @@ impl BlackBox {
             known: Known::of(table.configuration()),
             definitions: Definitions::new(start),
             pace: u16::MAX,
+            small: false,
             unwritten: Unwritten::None,
             dropouts: Dropouts::default(),
             due_us: [0; TOPICS.len()],
@@ -93,6 +102,13 @@ impl BlackBox {
     #[must_use]
     pub fn paced(self, entries: u16) -> Self {
         BlackBox { pace: entries.max(1), ..self }
+    }
+
+    /// Makes it a small log: each topic by its longer period ([`LoggedTopic::small_us`](crate::LoggedTopic::small_us)),
+    /// and the inertial sensor's as the mean of its samples since the last message.
+    #[must_use]
+    pub fn small(self) -> Self {
+        BlackBox { small: true, ..self }
     }
 
     /// Writes a change of the table, to be called after it.
@@ -169,7 +185,8 @@ impl BlackBox {
         let LoggedTick { report, readings, ref taken, view, escs, origin } = *tick;
         let moment = Moment { report, readings, taken, view, escs, origin, known: &self.known };
         let now_us = report.time_us;
-        let mut topics = Topics { now_us, writes, due_us: &mut self.due_us, dropouts: &mut self.dropouts, ring };
+        let (due_us, dropouts) = (&mut self.due_us, &mut self.dropouts);
+        let mut topics = Topics { now_us, writes, small: self.small, due_us, dropouts, ring };
         self.last.sensors(&moment, &mut topics);
         self.last.states(&moment, &mut topics);
         self.last.advance(&moment);
@@ -200,22 +217,33 @@ struct Topics<'a, 'r> {
     now_us: u64,
     /// True once the log's beginning is written.
     writes: bool,
+    small: bool,
     due_us: &'a mut [u64; TOPICS.len()],
     dropouts: &'a mut Dropouts,
     ring: &'a mut RingView<'r>,
 }
 
 impl Topics<'_, '_> {
-    /// Writes a message at its topic's rate.
-    fn at_rate<T: Listed>(&mut self, make: impl FnOnce() -> Option<T>) {
-        let place = usize::from(T::ID);
-        let (Some(due_us), Some(topic)) = (self.due_us.get(place), TOPICS.get(place)) else { return };
-        if self.now_us < *due_us {
-            return;
+    /// Writes a message of a topic each time, in a small log at its rate; false if it is not due.
+    fn each<T: Listed>(&mut self, message: T) -> bool {
+        if !self.small {
+            // One that finds no room is in the log as a dropout.
+            let _ = self.at_once(&message);
+            return true;
         }
-        let Some(message) = make() else { return };
+        self.at_rate(|| Some(message))
+    }
+
+    /// Writes a message at its topic's rate; false if it is not due.
+    fn at_rate<T: Listed>(&mut self, make: impl FnOnce() -> Option<T>) -> bool {
+        let place = usize::from(T::ID);
+        let (Some(due_us), Some(topic)) = (self.due_us.get(place), TOPICS.get(place)) else { return false };
+        if self.now_us < *due_us {
+            return false;
+        }
+        let Some(message) = make() else { return false };
         // On time it keeps its phase.
-        let period_us = u64::from(topic.period_us);
+        let period_us = u64::from(if self.small { topic.small_us } else { topic.period_us });
         let next_us = due_us.saturating_add(period_us);
         // 0 is no phase: that of a first message, of a change, or of one that is made up for.
         let is_on_time = *due_us > 0 && next_us > self.now_us;
@@ -223,6 +251,7 @@ impl Topics<'_, '_> {
         // One that is missing is made up for.
         let next_us = if self.at_once(&message) { next_us } else { 0 };
         self.due_us.get_mut(place).into_iter().for_each(|due_us| *due_us = next_us);
+        true
     }
 
     /// Writes a message; false if it is missing.
@@ -242,7 +271,7 @@ impl Topics<'_, '_> {
             self.due_us.get_mut(usize::from(T::ID)).into_iter().for_each(|due_us| *due_us = 0);
         }
         *last = Some(message);
-        self.at_rate(|| Some(message));
+        let _ = self.at_rate(|| Some(message));
     }
 }
 
@@ -254,11 +283,13 @@ impl Last {
             let read = ImuSample { at_us: now_us.saturating_sub(age_us.into()), rates_rad_s, specific_force_m_s2 };
             let sample = known.imu.apply(&mut self.sample, read);
             let clips = moment.view.estimate.is_some_and(|estimate| estimate.imu.clipped);
-            let last = self.sampled.as_ref().map(|(message, at_us)| (message, *at_us));
-            let message = SensorCombined::of(&sample, last, clips);
-            // One that finds no room is in the log as a dropout; here and below.
-            let _ = topics.at_once(&message);
-            self.sampled = Some((message, sample.at_us));
+            let mean = MeanSample::with(self.mean.take(), &sample, clips);
+            let (message, at_us) = SensorCombined::of(&mean, self.sampled.as_ref(), topics.small);
+            if topics.each(message) {
+                self.sampled = Some((message, at_us));
+            } else {
+                self.mean = Some(mean);
+            }
         }
         let pose = moment.taken.pose.filter(|pose| self.pose_us != Some(pose.at_us));
         self.pose_us = pose.map(|pose| pose.at_us).or(self.pose_us);
@@ -267,6 +298,9 @@ impl Last {
             age_us: u32::try_from(now_us.saturating_sub(at_us)).unwrap_or(u32::MAX),
         });
         for read in moment.readings.aids.iter().flatten().chain(&brought) {
+            if topics.small && !self.is_due(&read.value, now_us) {
+                continue;
+            }
             let aid = Aged { value: corrected(&read.value, &known.calibration), ..*read };
             let _ = match Aiding::of(moment, &aid) {
                 Some(Aiding::Air(message)) => topics.at_once(&message),
@@ -281,6 +315,17 @@ impl Last {
                 let _ = topics.at_once(&AidOffered::of(now_us, at_us, &offered));
             }
         }
+    }
+
+    /// True if a measurement of its kind is due in a small log: then the next one is not.
+    fn is_due(&mut self, value: &Measurement, now_us: u64) -> bool {
+        let (kind, _) = value.numbers();
+        let period_us = TOPICS.get(usize::from(AidOffered::ID)).map_or(0, |topic| topic.small_us);
+        let Some(due_us) = self.aids_due_us.get_mut(usize::from(kind)).filter(|due_us| **due_us <= now_us) else {
+            return false;
+        };
+        *due_us = now_us.saturating_add(period_us.into());
+        true
     }
 
     /// Returns a measurement in the local frame, as the estimator's front end makes it; none for a fix before a usable
@@ -315,23 +360,23 @@ impl Last {
                 (true, true) => *since_us,
             };
         }
-        topics.at_rate(|| VehicleAttitude::of(moment));
-        topics.at_rate(|| VehicleAngularVelocity::of(moment));
-        topics.at_rate(|| VehicleAttitudeSetpoint::of(moment));
-        topics.at_rate(|| VehicleRatesSetpoint::of(moment));
-        topics.at_rate(|| ThrustDemand::of(moment));
-        topics.at_rate(|| TorqueDemand::of(moment));
-        topics.at_rate(|| Some(ActuatorMotors::of(moment)));
-        topics.at_rate(|| VehicleLocalPosition::of(moment));
-        topics.at_rate(|| VehicleLocalPositionSetpoint::of(moment));
-        topics.at_rate(|| Some(ActuatorOutputs::of(moment)));
-        topics.at_rate(|| ManualControl::of(moment));
-        topics.at_rate(|| Some(LawSignals::of(moment, &self.norms)));
-        topics.at_rate(|| VehicleGlobalPosition::of(moment));
-        topics.at_rate(|| EstimatorVector::of(moment));
-        topics.at_rate(|| EstimatorFlags::of(moment));
-        topics.at_rate(|| BatteryVoltage::of(moment));
-        topics.at_rate(|| EscStatusReport::of(moment));
+        let _ = topics.at_rate(|| VehicleAttitude::of(moment));
+        let _ = topics.at_rate(|| VehicleAngularVelocity::of(moment));
+        let _ = topics.at_rate(|| VehicleAttitudeSetpoint::of(moment));
+        let _ = topics.at_rate(|| VehicleRatesSetpoint::of(moment));
+        let _ = topics.at_rate(|| ThrustDemand::of(moment));
+        let _ = topics.at_rate(|| TorqueDemand::of(moment));
+        let _ = topics.at_rate(|| Some(ActuatorMotors::of(moment)));
+        let _ = topics.at_rate(|| VehicleLocalPosition::of(moment));
+        let _ = topics.at_rate(|| VehicleLocalPositionSetpoint::of(moment));
+        let _ = topics.at_rate(|| Some(ActuatorOutputs::of(moment)));
+        let _ = topics.at_rate(|| ManualControl::of(moment));
+        let _ = topics.at_rate(|| Some(LawSignals::of(moment, &self.norms)));
+        let _ = topics.at_rate(|| VehicleGlobalPosition::of(moment));
+        let _ = topics.at_rate(|| EstimatorVector::of(moment));
+        let _ = topics.at_rate(|| EstimatorFlags::of(moment));
+        let _ = topics.at_rate(|| BatteryVoltage::of(moment));
+        let _ = topics.at_rate(|| EscStatusReport::of(moment));
         if let Some(figures) = EstimatorFigures::of(moment, on_ground) {
             topics.on_change(&mut self.figures, figures, EstimatorFigures::is_like);
         }

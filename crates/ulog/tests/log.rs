@@ -262,6 +262,40 @@ fn topics_have_their_rates() {
     }
 }
 
+/// In a small log every topic comes at its longer period, and the inertial sensor's messages follow each other without
+/// a gap: each is the mean of its samples.
+#[test]
+fn small_logs_have_their_rates() {
+    let mut logged = Logged::<65_536>::new();
+    logged.log = logged.log.small();
+    for tick in 0..4_000 {
+        logged.tick(tick % 20 == 0);
+        logged.keep(usize::MAX);
+    }
+    let log = read(&logged.end());
+    let count = |topic: &str| log.messages.get(topic).map_or(0, Vec::len);
+    for topic in TOPICS.iter().filter(|topic| count(topic.name) > 0) {
+        let times = log.times(topic.name);
+        let wanted = 1 + (times.last().unwrap() - times[0]) / u64::from(topic.small_us);
+        let slack = if topic.on_change { 10 } else { 1 };
+        assert!((wanted - 1..=wanted + slack).contains(&(times.len() as u64)), "{}: {}", topic.name, times.len());
+    }
+    let counts = ["sensor_combined", "vehicle_attitude", "vehicle_air_data"].map(count);
+    assert!(counts.iter().zip([350, 290, 30]).all(|(count, least)| *count > least), "{counts:?}");
+    let dts_us = log.field("sensor_combined", "gyro_integral_dt");
+    // From the third on: the first has one sample, the second as many as are left of a period.
+    assert!(dts_us.iter().skip(2).all(|dt_us| *dt_us == 10_000.0), "{dts_us:?}");
+    let times = log.times("sensor_combined");
+    let rates = log.field("sensor_combined", "gyro_rad[1]");
+    for (at_us, rate) in times.iter().zip(rates).skip(2) {
+        // Ten samples, of ticks up to the message's.
+        let middle_us = at_us - 5_000;
+        let ticks = (middle_us - 4_500) / TICK_US..=(middle_us + 4_500) / TICK_US;
+        let mean = ticks.map(|tick| 1e-3 * (tick % 7) as f64).sum::<f64>() / 10.0;
+        assert!((rate.abs() - mean).abs() < 1e-6, "{rate} at {at_us}, not {mean}");
+    }
+}
+
 /// Returns when each sample of the inertial sensor was true: in the middle of its integration.
 fn sampled_us(log: &StrictLog) -> Vec<u64> {
     let dts_us = log.field("sensor_combined", "gyro_integral_dt");

@@ -4,4 +4,4 @@ mod page;
 mod read;
 
 pub(crate) use page::wiring;
-pub(crate) use read::{Battery, BoardTable, Motor, Stream, Timer};
+pub(crate) use read::{Battery, BoardTable, LogBus, Motor, Stream, Timer};

@@ -72,11 +72,12 @@ pub(crate) fn wiring(board: &BoardTable) -> String {
     }
     motors.sort();
     rows.extend(motors);
-    rows.extend(board.card.iter().map(|card| {
-        let pins = [&*card.clock, &card.into, &card.out, &card.select].join(", ");
+    rows.extend(board.logs.iter().map(|logs| {
+        let pins = [&*logs.clock, &logs.into, &logs.out, &logs.select].join(", ");
         let quiet =
-            if card.quiet.is_empty() { String::new() } else { format!("; {} stays high", card.quiet.join(", ")) };
-        ["memory card: clock, in, out, select".to_owned(), pins, format!("{}, up to 21 MHz{quiet}", card.name)]
+            if logs.quiet.is_empty() { String::new() } else { format!("; {} stays high", logs.quiet.join(", ")) };
+        let kind = if logs.is_flash { "flash chip" } else { "memory card" };
+        [format!("{kind}: clock, in, out, select"), pins, format!("{}, up to 21 MHz{quiet}", logs.name)]
     }));
     let battery = &board.battery;
     rows.push([

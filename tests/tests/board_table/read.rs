@@ -73,9 +73,10 @@ pub(crate) struct Battery {
     pub(crate) amperes_per_volt: f64,
 }
 
-/// The memory card's bus.
+/// The bus of the memory card, or of the flash chip, for logs.
 #[derive(Debug)]
-pub(crate) struct CardBus {
+pub(crate) struct LogBus {
+    pub(crate) is_flash: bool,
     pub(crate) name: String,
     pub(crate) clock: String,
     pub(crate) out: String,
@@ -118,7 +119,7 @@ pub(crate) struct BoardTable {
     pub(crate) battery: Battery,
     pub(crate) led: Option<String>,
     pub(crate) buzzer: String,
-    pub(crate) card: Option<CardBus>,
+    pub(crate) logs: Option<LogBus>,
     pub(crate) outputs: usize,
     pub(crate) numbering: String,
     pub(crate) timers: Vec<Timer>,
@@ -176,17 +177,19 @@ impl BoardTable {
         let led = (words.peek() == "led").then(|| words.after("led :"));
         let buzzer = words.after("buzzer :");
         words.expect("}");
-        let card = (words.peek() == "card").then(|| {
-            let card = CardBus {
-                name: words.after("card :"),
+        let logs = ["card", "flash"].contains(&words.peek()).then(|| {
+            let is_flash = words.peek() == "flash";
+            let logs = LogBus {
+                is_flash,
+                name: words.after(if is_flash { "flash :" } else { "card :" }),
                 clock: words.after("{ clock :"),
                 out: words.after("out :"),
                 into: words.after("in :"),
                 select: words.after("select :"),
-                quiet: words.list("quiet :"),
+                quiet: if is_flash { Vec::new() } else { words.list("quiet :") },
             };
             words.expect("}");
-            card
+            logs
         });
         let outputs = words.after("motors :").parse().unwrap();
         let numbering = words.after("as");
@@ -215,7 +218,7 @@ impl BoardTable {
             battery,
             led,
             buzzer,
-            card,
+            logs,
             outputs,
             numbering,
             timers,
@@ -252,10 +255,10 @@ impl BoardTable {
             &self.battery.current,
         ];
         let motors = self.motors().map(|motor| &motor.pin);
-        let card = self.card.iter().flat_map(|CardBus { clock, out, into, select, quiet, .. }| {
+        let logs = self.logs.iter().flat_map(|LogBus { clock, out, into, select, quiet, .. }| {
             [clock, out, into, select].into_iter().chain(quiet)
         });
-        let all = uarts.chain(buses).chain(motors).chain(&self.led).chain([&self.buzzer]).chain(card).chain(inverter);
+        let all = uarts.chain(buses).chain(motors).chain(&self.led).chain([&self.buzzer]).chain(logs).chain(inverter);
         all.map(String::as_str).collect()
     }
 }

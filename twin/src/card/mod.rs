@@ -1,13 +1,18 @@
-//! The slot of a memory card: the card is the models' own; how long it writes, stalls and is out is the slot's.
+//! Where a board keeps logs: in the slot of a memory card, the models' own, or in a flash chip. How long they write and
+//! stall is of here.
 
+mod files;
+mod flash;
 mod sd;
 mod spi;
 
 use rigless::chip::memory_card::MemoryCard;
 use rigless::snapshot::{Error, Reader, Store, Writer};
 use serde::{Deserialize, Serialize};
+use std::error::Error as AnyError;
 use std::io::{Cursor, Write};
 
+pub use flash::FlashChip;
 pub use sd::SdSlot;
 pub use spi::SpiSlot;
 
@@ -26,6 +31,24 @@ pub struct CardTrouble {
     pub stall_ms: Option<[u64; 2]>,
     /// It is out between these times.
     pub out_ms: Option<[u64; 2]>,
+}
+
+/// Keeps logs.
+pub trait LogStorage {
+    /// Lets this be wrong with it, or nothing.
+    fn trouble(&mut self, trouble: CardTrouble);
+
+    /// Has no card; a chip stays.
+    fn remove(&mut self) {}
+
+    /// Leaves so many bytes of room.
+    fn fill(&mut self, room: u64);
+
+    /// Returns what is kept: the logs with their names.
+    fn logs(&self) -> Result<Vec<(String, Vec<u8>)>, Box<dyn AnyError>>;
+
+    /// Blocks, or pages, that were written.
+    fn written(&self) -> u64;
 }
 
 /// A card in its slot.
@@ -75,24 +98,6 @@ impl CardSlot {
         }
     }
 
-    pub fn trouble(&mut self, trouble: CardTrouble) {
-        self.trouble = trouble;
-    }
-
-    /// Leaves so many bytes of room.
-    pub fn fill(&mut self, room: u64) {
-        self.card = formatted(Some(room));
-    }
-
-    pub fn card(&self) -> &MemoryCard {
-        &self.card
-    }
-
-    /// Blocks that were written.
-    pub fn written(&self) -> u64 {
-        self.written
-    }
-
     /// True if the card is out, and whether that is new: then it has lost its supply.
     fn is_out(&mut self, now_ns: u64) -> (bool, bool) {
         let is_out = self.trouble.out_ms.is_some_and(|[from, to]| (from..to).contains(&(now_ns / 1_000_000)));
@@ -114,6 +119,28 @@ impl CardSlot {
             self.trouble.stall_ms = None;
             println!("{:8.3} s  the card stalls for {ms} ms, from {at_ms} ms on", now_ns as f64 * 1e-9);
         }
+    }
+}
+
+impl LogStorage for CardSlot {
+    fn trouble(&mut self, trouble: CardTrouble) {
+        self.trouble = trouble;
+    }
+
+    fn remove(&mut self) {
+        self.trouble = CardTrouble { out_ms: Some([0, u64::MAX]), ..CardTrouble::default() };
+    }
+
+    fn fill(&mut self, room: u64) {
+        self.card = formatted(Some(room));
+    }
+
+    fn logs(&self) -> Result<Vec<(String, Vec<u8>)>, Box<dyn AnyError>> {
+        files::logs(&self.card)
+    }
+
+    fn written(&self) -> u64 {
+        self.written
     }
 }
 

@@ -15,7 +15,7 @@ mod part;
 mod relabelled;
 mod wiring;
 
-use crate::card::{CardSlot, SpiSlot};
+use crate::card::{FlashChip, LogStorage, SpiSlot};
 use crate::impairments::Impairments;
 use crate::machine::{Divider, Machine, Signal};
 use crate::wire::Wire;
@@ -45,7 +45,7 @@ use rigless::time::VirtualNanos;
 use serde::{Deserialize, Serialize};
 use std::num::{NonZeroU32, NonZeroU64};
 use std::ops::Range;
-use wiring::{CardWiring, Inertial, Sensors, Timer, UART4, WIRINGS, Wiring};
+use wiring::{Inertial, LogWiring, Sensors, StorageKind, Timer, UART4, WIRINGS, Wiring};
 
 const CRYSTAL_HZ: u64 = 8_000_000;
 const RAIL_MV: u32 = 3_300;
@@ -55,8 +55,8 @@ const SPI: usize = 0;
 const IMU: usize = 0;
 /// Volts of the battery per volt at its pin.
 const DIVIDER: u32 = 11;
-/// Place of the memory card on its SPI.
-const CARD: usize = 0;
+/// Place of the memory card or flash chip on its SPI.
+const LOGS: usize = 0;
 /// Places on the I2C.
 const BAROMETER: usize = 0;
 const COMPASS: usize = 1;
@@ -115,9 +115,12 @@ impl<const ROW: usize> F405<ROW> {
             part.i2c[i2c].attach(Qmc5883l::new());
             part.usart[receiver.index].attach(nmea::Receiver::new());
         }
-        if let Some(CardWiring { spi, select: (port, pin) }) = Self::WIRING.card {
+        if let Some(LogWiring { storage, spi, select: (port, pin) }) = Self::WIRING.logs {
             let select = Select { port, pin: Pin::new(pin).expect("one of sixteen pins"), active: Level::Low };
-            part.spi[spi].attach_selected(SpiSlot::new(), select);
+            match storage {
+                StorageKind::Card => part.spi[spi].attach_selected(SpiSlot::new(), select),
+                StorageKind::Flash => part.spi[spi].attach_selected(FlashChip::new(), select),
+            }
         }
         board.sense(&AT_REST);
         Ok(board)
@@ -364,9 +367,13 @@ impl<const ROW: usize> Machine for F405<ROW> {
         self.mcu.stm32.usart[Self::WIRING.receiver().index].attach_boxed(receiver);
     }
 
-    fn card(&mut self) -> Option<&mut CardSlot> {
-        let card: &mut SpiSlot = self.mcu.stm32.spi[Self::WIRING.card?.spi].chip_mut(CARD)?;
-        Some(&mut card.slot)
+    fn log_storage(&mut self) -> Option<&mut dyn LogStorage> {
+        let LogWiring { storage, spi, .. } = Self::WIRING.logs?;
+        let bus = &mut self.mcu.stm32.spi[spi];
+        match storage {
+            StorageKind::Card => bus.chip_mut::<SpiSlot>(LOGS).map(|card| &mut card.slot as &mut dyn LogStorage),
+            StorageKind::Flash => bus.chip_mut::<FlashChip>(LOGS).map(|chip| chip as &mut dyn LogStorage),
+        }
     }
 
     fn impair(&mut self, impairments: &Impairments) {

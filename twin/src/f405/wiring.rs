@@ -14,8 +14,8 @@ pub struct Wiring {
     pub radio: Option<usize>,
     /// None has sensors of its own: its state comes over the link.
     pub sensors: Option<Sensors>,
-    /// The slot of its memory card.
-    pub card: Option<CardWiring>,
+    /// Where it keeps logs.
+    pub logs: Option<LogWiring>,
     /// The timers of its motors, with DMA.
     pub timers: &'static [FrameTimer],
     /// Name, timer and channel of motors 1 to 4.
@@ -54,11 +54,19 @@ pub struct Battery {
     pub deciamperes_per_volt: u32,
 }
 
-/// A memory card on an SPI: its place among the part's, and port and pin that select it.
+/// What keeps logs on an SPI: its place among the part's, and port and pin that select it.
 #[derive(Clone, Copy, Debug)]
-pub struct CardWiring {
+pub struct LogWiring {
+    pub storage: StorageKind,
     pub spi: usize,
     pub select: (&'static str, u8),
+}
+
+/// A slot of a memory card, or a flash chip.
+#[derive(Clone, Copy, Debug)]
+pub enum StorageKind {
+    Card,
+    Flash,
 }
 
 /// An inertial sensor.
@@ -121,7 +129,7 @@ const SPEEDYBEE_V3: Wiring = Wiring {
         receiver: USART6,
         battery: Battery { channels: [10, 11], deciamperes_per_volt: 259 },
     }),
-    card: Some(CardWiring { spi: 1, select: ("GPIOA", 15) }),
+    logs: Some(LogWiring { storage: StorageKind::Card, spi: 1, select: ("GPIOA", 15) }),
     timers: &[TIM4_ALL],
     motors: [("M1", TIM4, 1), ("M2", TIM4, 2), ("M3", TIM4, 3), ("M4", TIM4, 4)],
 };
@@ -140,7 +148,7 @@ const SPEEDYBEE_V4: Wiring = Wiring {
         receiver: USART6,
         battery: Battery { channels: [10, 11], deciamperes_per_volt: 250 },
     }),
-    card: Some(CardWiring { spi: 2, select: ("GPIOC", 14) }),
+    logs: Some(LogWiring { storage: StorageKind::Card, spi: 2, select: ("GPIOC", 14) }),
     timers: TIM4_TIM3,
     motors: [("M1", TIM4, 1), ("M2", TIM4, 2), ("M3", TIM3, 3), ("M4", TIM3, 4)],
 };
@@ -157,7 +165,7 @@ const SPEEDYBEE_MINI: Wiring = Wiring {
         receiver: USART6,
         battery: Battery { channels: [10, 11], deciamperes_per_volt: 400 },
     }),
-    card: None,
+    logs: Some(LogWiring { storage: StorageKind::Flash, spi: 2, select: ("GPIOC", 14) }),
     motors: [("M1", TIM4, 1), ("M2", TIM4, 2), ("M3", TIM3, 4), ("M4", TIM3, 3)],
     ..SPEEDYBEE_V4
 };
@@ -176,7 +184,7 @@ const MATEK_SE: Wiring = Wiring {
         receiver: USART6,
         battery: Battery { channels: [10, 11], deciamperes_per_volt: 559 },
     }),
-    card: Some(CardWiring { spi: 2, select: ("GPIOC", 14) }),
+    logs: Some(LogWiring { storage: StorageKind::Card, spi: 2, select: ("GPIOC", 14) }),
     timers: TIM4_TIM3,
     motors: [("M1", TIM4, 2), ("M2", TIM4, 1), ("M3", TIM3, 3), ("M4", TIM3, 4)],
 };
@@ -195,7 +203,7 @@ const MATEK_STD: Wiring = Wiring {
         receiver: USART3,
         battery: Battery { channels: [15, 14], deciamperes_per_volt: 559 },
     }),
-    card: Some(CardWiring { spi: 2, select: ("GPIOC", 1) }),
+    logs: Some(LogWiring { storage: StorageKind::Card, spi: 2, select: ("GPIOC", 1) }),
     timers: &[TIM8_ALL],
     motors: ALL_OF_TIM8,
 };
@@ -214,7 +222,7 @@ const KAKUTE: Wiring = Wiring {
         receiver: UART4,
         battery: Battery { channels: [13, 12], deciamperes_per_volt: 364 },
     }),
-    card: None,
+    logs: None,
     timers: &[tim3([0, 2]), TIM5_LAST],
     motors: [("M1", TIM3, 3), ("M2", TIM3, 4), ("M3", TIM5, 4), ("M4", TIM5, 3)],
 };
@@ -225,7 +233,7 @@ const PLAIN: Wiring = Wiring {
     link: USART1,
     radio: None,
     sensors: None,
-    card: None,
+    logs: None,
     timers: &[TIM8_ALL],
     motors: ALL_OF_TIM8,
 };

@@ -1,13 +1,15 @@
-//! A vehicle, a queue of blocks, a task that waits for its card, and a card in memory: all in the time of the card.
+//! A vehicle, a queue of blocks, a task that waits for its storage, and a card in memory: all in the storage's time.
 #![allow(dead_code, reason = "shared by tests")]
 
+pub(crate) mod chip;
+pub(crate) mod station;
 pub(crate) mod ulog;
 
 use afbc_estimator::Measurement;
 use afbc_logger::embedded_sdmmc::Block;
 use afbc_logger::{
-    BlockSink, CardError, CardLogs, CardState, LogBlock, LogCard, LogKeeper, LogMode, LogPage, LogPages, LogQuery,
-    LogWriter,
+    BlockSink, CardError, CardKeeper, LogBlock, LogCard, LogKeeper, LogMode, LogPage, LogPages, LogQuery, LogWriter,
+    StorageState, StoredLogs,
 };
 use afbc_onboard::parameters::{ParameterTable, RecordChange};
 use afbc_onboard::{Aged, Configuration, ControlInputs, Flight, Readings};
@@ -218,13 +220,50 @@ impl LogPages for Pages {
     }
 }
 
-/// A vehicle that logs.
-pub(crate) struct Room {
-    between: Rc<RefCell<Between>>,
-    pub(crate) stored: CardLogs<Pages>,
+/// Where logs are kept, in a time of its own.
+pub(crate) trait Storage: Clone {
+    type Keeper: LogKeeper;
 
-    pub(crate) card: Card,
-    pub(crate) keeper: LogKeeper<'static>,
+    fn keeper(&self) -> Self::Keeper;
+
+    /// Begins a call at this time.
+    fn begin(&self, now_us: u64);
+
+    /// Returns how long the call has taken \[us\].
+    fn taken_us(&self) -> u64;
+
+    /// Returns its logs by name, as another program reads them.
+    fn logs(&self) -> Vec<(String, Vec<u8>)>;
+}
+
+impl Storage for Card {
+    type Keeper = CardKeeper<Card>;
+
+    fn keeper(&self) -> CardKeeper<Card> {
+        CardKeeper::new(self.clone())
+    }
+
+    fn begin(&self, now_us: u64) {
+        let mut disk = self.0.borrow_mut();
+        (disk.now_us, disk.taken_us) = (now_us, 0);
+    }
+
+    fn taken_us(&self) -> u64 {
+        self.0.borrow().taken_us
+    }
+
+    fn logs(&self) -> Vec<(String, Vec<u8>)> {
+        logs(&mut self.0.borrow_mut().bytes)
+    }
+}
+
+/// A vehicle that logs.
+pub(crate) struct Room<S: Storage = Card> {
+    between: Rc<RefCell<Between>>,
+    pub(crate) stored: StoredLogs<Pages>,
+
+    pub(crate) card: S,
+    pub(crate) keeper: S::Keeper,
     pub(crate) writer: LogWriter,
     queue: Queue,
     flight: Flight,
@@ -233,7 +272,7 @@ pub(crate) struct Room {
     /// Until when the log's task waits for the card \[us\].
     busy_us: u64,
     /// The state that the writer sees.
-    pub(crate) state: CardState,
+    pub(crate) state: StorageState,
     pub(crate) mode: LogMode,
     pub(crate) armed: bool,
     pub(crate) told: Vec<&'static str>,
@@ -241,25 +280,25 @@ pub(crate) struct Room {
     pub(crate) wanted: u64,
 }
 
-impl Room {
-    pub(crate) fn new(card: &Card) -> Self {
+impl<S: Storage> Room<S> {
+    pub(crate) fn new(card: &S) -> Self {
         let configuration = Configuration::default();
-        let keeper = LogKeeper::new(Box::leak(Box::new(card.clone())));
+        let keeper = card.keeper();
         let between = Between { page: LogPage::EMPTY, is_full: false, asked: LogQuery::Nothing };
         let between = Rc::new(RefCell::new(between));
-        let stored = CardLogs::new(Pages { between: between.clone(), page: LogPage::EMPTY });
+        let stored = StoredLogs::new(Pages { between: between.clone(), page: LogPage::EMPTY });
         Room {
             between,
             stored,
             card: card.clone(),
             keeper,
-            writer: LogWriter::new(),
+            writer: LogWriter::new(S::Keeper::SMALL),
             queue: Queue::default(),
             flight: Flight::new(&configuration).unwrap(),
             table: ParameterTable::new(configuration),
             now_us: 0,
             busy_us: 0,
-            state: CardState::Unknown,
+            state: StorageState::Unknown,
             mode: LogMode::Boot,
             armed: false,
             told: Vec::new(),
@@ -302,10 +341,7 @@ impl Room {
             // What it has found before it waited.
             self.state = self.keeper.state();
             let began_us = self.busy_us.max(self.now_us - TICK_US);
-            {
-                let mut disk = self.card.0.borrow_mut();
-                (disk.now_us, disk.taken_us) = (began_us, 0);
-            }
+            self.card.begin(began_us);
             match self.queue.filled.pop_front() {
                 Some(block) => self.keeper.take(began_us, &block),
                 None => self.keeper.poll(began_us),
@@ -319,7 +355,7 @@ impl Room {
                     between.is_full = true;
                 }
             }
-            let took_us = self.card.0.borrow().taken_us;
+            let took_us = self.card.taken_us();
             // Without a block, it looks again in the next tick.
             self.busy_us = if took_us == 0 { self.now_us + 1 } else { began_us + took_us };
             if took_us == 0 && !self.queue.filled.is_empty() {
@@ -340,7 +376,7 @@ impl Room {
     }
 
     pub(crate) fn logs(&self) -> Vec<(String, Vec<u8>)> {
-        logs(&mut self.card.0.borrow_mut().bytes)
+        self.card.logs()
     }
 }
 

@@ -25,7 +25,7 @@ pub(crate) use motors::{ActuatorMotors, ActuatorOutputs};
 pub(crate) use position::{VehicleLocalPosition, VehicleLocalPositionSetpoint};
 pub(crate) use rates::{VehicleAngularVelocity, VehicleRatesSetpoint};
 pub(crate) use sensors::{
-    Aiding, SensorCombined, VehicleAirData, VehicleGpsPosition, VehicleMagnetometer, VisualOdometry,
+    Aiding, MeanSample, SensorCombined, VehicleAirData, VehicleGpsPosition, VehicleMagnetometer, VisualOdometry,
 };
 pub(crate) use sticks::ManualControl;
 pub(crate) use vehicle::{ActuatorArmed, LandDetected, VehicleState};
@@ -41,6 +41,8 @@ pub struct LoggedTopic {
     pub fields: &'static [LoggedField],
     /// Time between two messages; 0 for each one that there is \[us\].
     pub period_us: u32,
+    /// The same of a log that is to be small; of measurements, for each kind \[us\].
+    pub small_us: u32,
     /// True if there is a message whenever one of its values changes, too.
     pub on_change: bool,
 }
@@ -51,9 +53,9 @@ pub(crate) trait Listed: Message {
     const ID: u16;
 }
 
-/// Lists topics with their period \[us\], and whether a change is written at once.
+/// Lists topics with their period, in a usual and in a small log \[us\], and whether a change is written at once.
 macro_rules! topics {
-    ($($type:ident: $period_us:literal $(, $on_change:ident)?;)*) => {
+    ($($type:ident: $period_us:literal, $small_us:literal $(, $on_change:ident)?;)*) => {
         #[repr(u16)]
         enum Place {
             $($type,)*
@@ -70,6 +72,7 @@ macro_rules! topics {
             name: $type::NAME,
             fields: $type::FIELDS,
             period_us: $period_us,
+            small_us: $small_us,
             on_change: topics!(@ $($on_change)?),
         }),*];
     };
@@ -78,31 +81,31 @@ macro_rules! topics {
 }
 
 topics! {
-    VehicleAttitude: 4_000;
-    VehicleAttitudeSetpoint: 4_000;
-    VehicleAngularVelocity: 4_000;
-    VehicleRatesSetpoint: 4_000;
-    VehicleLocalPosition: 20_000;
-    VehicleLocalPositionSetpoint: 20_000;
-    VehicleGlobalPosition: 100_000;
-    ThrustDemand: 4_000;
-    TorqueDemand: 4_000;
-    ActuatorMotors: 4_000;
-    ActuatorOutputs: 20_000;
-    SensorCombined: 0;
-    VehicleAirData: 0;
-    VehicleMagnetometer: 0;
-    VehicleGpsPosition: 0;
-    VisualOdometry: 0;
-    EstimatorVector: 100_000;
-    EstimatorFlags: 200_000;
-    BatteryVoltage: 500_000;
-    VehicleState: 500_000, on_change;
-    ActuatorArmed: 500_000, on_change;
-    LandDetected: 500_000, on_change;
-    ManualControl: 20_000;
-    LawSignals: 20_000;
-    EstimatorFigures: 100_000, on_change;
-    AidOffered: 0;
-    EscStatusReport: 20_000;
+    VehicleAttitude: 4_000, 10_000;
+    VehicleAttitudeSetpoint: 4_000, 10_000;
+    VehicleAngularVelocity: 4_000, 10_000;
+    VehicleRatesSetpoint: 4_000, 10_000;
+    VehicleLocalPosition: 20_000, 100_000;
+    VehicleLocalPositionSetpoint: 20_000, 100_000;
+    VehicleGlobalPosition: 100_000, 500_000;
+    ThrustDemand: 4_000, 10_000;
+    TorqueDemand: 4_000, 10_000;
+    ActuatorMotors: 4_000, 10_000;
+    ActuatorOutputs: 20_000, 100_000;
+    SensorCombined: 0, 10_000;
+    VehicleAirData: 0, 100_000;
+    VehicleMagnetometer: 0, 100_000;
+    VehicleGpsPosition: 0, 100_000;
+    VisualOdometry: 0, 100_000;
+    EstimatorVector: 100_000, 500_000;
+    EstimatorFlags: 200_000, 1_000_000;
+    BatteryVoltage: 500_000, 1_000_000;
+    VehicleState: 500_000, 1_000_000, on_change;
+    ActuatorArmed: 500_000, 1_000_000, on_change;
+    LandDetected: 500_000, 1_000_000, on_change;
+    ManualControl: 20_000, 100_000;
+    LawSignals: 20_000, 100_000;
+    EstimatorFigures: 100_000, 500_000, on_change;
+    AidOffered: 0, 100_000;
+    EscStatusReport: 20_000, 100_000;
 }

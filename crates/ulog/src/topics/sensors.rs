@@ -6,9 +6,10 @@ use afbc_estimator::{ImuSample, Measurement};
 use afbc_onboard::Aged;
 use nalgebra::Vector3;
 
-/// Time of integration of a sample after none, or after a gap longer than this \[us\].
+/// Time of integration of a sample after none, or after a gap longer than this, in a usual and in a small log \[us\].
 const USUAL_US: u64 = 1_000;
 const GAP_US: u64 = 10_000;
+const SMALL_GAP_US: u64 = 20_000;
 /// Tesla's millionths per gauss.
 const UT_PER_GAUSS: f32 = 100.0;
 /// Kind of a fix in three dimensions.
@@ -31,14 +32,54 @@ message! {
     }
 }
 
+/// The mean of samples.
+#[derive(Clone, Debug)]
+pub(crate) struct MeanSample {
+    first_us: u64,
+    sum: ImuSample,
+    count: u16,
+    clips: bool,
+}
+
+impl MeanSample {
+    /// Of one more, after those before, if there are any.
+    pub(crate) fn with(before: Option<Self>, sample: &ImuSample, clips: bool) -> Self {
+        // Of one, it is that one, to the last bit.
+        let Some(mut mean) = before else {
+            return MeanSample { first_us: sample.at_us, sum: *sample, count: 1, clips };
+        };
+        mean.sum.rates_rad_s += sample.rates_rad_s;
+        mean.sum.specific_force_m_s2 += sample.specific_force_m_s2;
+        mean.sum.at_us = sample.at_us;
+        mean.count = mean.count.saturating_add(1);
+        mean.clips |= clips;
+        mean
+    }
+
+    /// Returns it, true in the middle of its samples.
+    fn sample(&self) -> ImuSample {
+        let share = 1.0 / f32::from(self.count);
+        ImuSample {
+            at_us: self.first_us + self.sum.at_us.saturating_sub(self.first_us) / 2,
+            rates_rad_s: self.sum.rates_rad_s * share,
+            specific_force_m_s2: self.sum.specific_force_m_s2 * share,
+        }
+    }
+}
+
 impl SensorCombined {
-    /// `last` is the message before, and the time of its sample.
-    pub(crate) fn of(sample: &ImuSample, last: Option<(&Self, u64)>, clips: bool) -> Self {
+    /// `last` is the message before, and the time of its sample; returns the same of this one.
+    pub(crate) fn of(mean: &MeanSample, last: Option<&(Self, u64)>, small: bool) -> (Self, u64) {
+        let (sample, gap_us) = (mean.sample(), if small { SMALL_GAP_US } else { GAP_US });
+        (Self::of_sample(&sample, last.map(|(message, at_us)| (message, *at_us)), mean.clips, gap_us), sample.at_us)
+    }
+
+    fn of_sample(sample: &ImuSample, last: Option<(&Self, u64)>, clips: bool, gap_us: u64) -> Self {
         let since_us = last.and_then(|(_, last_us)| sample.at_us.checked_sub(last_us));
-        let since_us = since_us.filter(|since_us| (1..=GAP_US).contains(since_us)).unwrap_or(USUAL_US);
+        let since_us = since_us.filter(|since_us| (1..=gap_us).contains(since_us)).unwrap_or(USUAL_US);
         // Longer after a longer one, so that no message is before the last, and each says when its sample was true.
         let behind_us = last.map_or(0, |(message, _)| message.timestamp.saturating_sub(sample.at_us));
-        let dt_us = since_us.max(2 * behind_us.min(GAP_US)) as u32;
+        let dt_us = since_us.max(2 * behind_us.min(gap_us)) as u32;
         let clipping = if clips { 7 } else { 0 };
         SensorCombined {
             timestamp: sample.at_us.saturating_add(u64::from(dt_us / 2)),

@@ -1,33 +1,21 @@
 //! Logs that are on the card already.
 
-use crate::card::{CardError, CardState};
-use crate::keeper::{LogKeeper, log_name};
-use crate::query::{CardAnswer, LogPage, LogQuery};
+use crate::card::{CardError, LogCard};
+use crate::card_keeper::{CardKeeper, log_name};
+use crate::keeper::StorageState;
+use crate::query::{LogAnswer, LogQuery};
 use core::ops::ControlFlow;
 use embedded_sdmmc::{Error, Mode};
 
-impl LogKeeper<'_> {
-    /// Answers a question about the logs but the one that is being written, on a page. It waits for the card.
-    pub fn answer(&mut self, now_us: u64, query: LogQuery, page: &mut LogPage) {
-        self.now_us = now_us;
-        (page.query, page.answer) = (query, CardAnswer::Failed);
-        if self.root.is_some() {
-            self.attempt(&mut |keeper| {
-                page.answer = match query {
-                    LogQuery::Nothing => CardAnswer::None,
-                    LogQuery::Count => keeper.count()?,
-                    LogQuery::Size(place) => {
-                        keeper.find(place)?.map_or(CardAnswer::None, |(_, size)| CardAnswer::Is(size))
-                    }
-                    LogQuery::Read(place, offset) => keeper.read(place, offset, &mut page.bytes)?,
-                    LogQuery::Erase => keeper.erase_one()?,
-                };
-                Ok(())
-            });
-        }
-        // Of some blocks that the card does not give, the library does not tell.
-        if self.root.is_none() {
-            page.answer = CardAnswer::Failed;
+impl<C: LogCard> CardKeeper<C> {
+    /// Answers a question; of a log that is read, with what is on the page.
+    pub(crate) fn look_up(&mut self, query: LogQuery, page: &mut [u8]) -> Result<LogAnswer, Error<CardError>> {
+        match query {
+            LogQuery::Nothing => Ok(LogAnswer::None),
+            LogQuery::Count => self.count(),
+            LogQuery::Size(place) => Ok(self.find(place)?.map_or(LogAnswer::None, |(_, size)| LogAnswer::Is(size))),
+            LogQuery::Read(place, offset) => self.read(place, offset, page),
+            LogQuery::Erase => self.erase_one(),
         }
     }
 
@@ -36,7 +24,7 @@ impl LogKeeper<'_> {
         self.next.saturating_sub(u32::from(self.file.is_some()))
     }
 
-    fn count(&mut self) -> Result<CardAnswer, Error<CardError>> {
+    fn count(&mut self) -> Result<LogAnswer, Error<CardError>> {
         self.close_read()?;
         let bound = self.bound();
         self.reader.bound = Some(bound);
@@ -45,7 +33,7 @@ impl LogKeeper<'_> {
             count += u32::from(number < bound && size.is_some());
             ControlFlow::Continue(())
         })?;
-        Ok(CardAnswer::Is(count))
+        Ok(LogAnswer::Is(count))
     }
 
     /// Returns number and size of the log at a place among those that were counted.
@@ -64,10 +52,10 @@ impl LogKeeper<'_> {
         Ok(found)
     }
 
-    fn read(&mut self, place: u16, offset: u32, page: &mut [u8]) -> Result<CardAnswer, Error<CardError>> {
+    fn read(&mut self, place: u16, offset: u32, page: &mut [u8]) -> Result<LogAnswer, Error<CardError>> {
         if self.reader.open.is_none_or(|(open, _)| open != place) {
             self.close_read()?;
-            let Some((number, _)) = self.find(place)? else { return Ok(CardAnswer::None) };
+            let Some((number, _)) = self.find(place)? else { return Ok(LogAnswer::None) };
             let (Some(volumes), Some(root)) = (&self.volumes, self.root) else { return Err(Error::BadHandle) };
             let name = log_name(number).ok_or(Error::NotFound)?;
             self.reader.open = Some((place, volumes.open_file_in_dir(root, name, Mode::ReadOnly)?));
@@ -75,28 +63,28 @@ impl LogKeeper<'_> {
         let (Some(volumes), Some((_, file))) = (&self.volumes, self.reader.open) else { return Err(Error::BadHandle) };
         // Asked before the library refuses to go there: an error would give up the volume.
         if offset > volumes.file_length(file)? {
-            return Ok(CardAnswer::Is(0));
+            return Ok(LogAnswer::Is(0));
         }
         volumes.file_seek_from_start(file, offset)?;
         let length = volumes.read(file, page)?;
-        Ok(CardAnswer::Is(length as u32))
+        Ok(LogAnswer::Is(length as u32))
     }
 
     /// Erases the first of the logs: first what it occupies, then its name.
-    fn erase_one(&mut self) -> Result<CardAnswer, Error<CardError>> {
+    fn erase_one(&mut self) -> Result<LogAnswer, Error<CardError>> {
         self.close_read()?;
         self.reader.bound = None;
-        let Some((number, _)) = self.find(0)? else { return Ok(CardAnswer::None) };
+        let Some((number, _)) = self.find(0)? else { return Ok(LogAnswer::None) };
         let (Some(volumes), Some(root)) = (&self.volumes, self.root) else { return Err(Error::BadHandle) };
         let name = log_name(number).ok_or(Error::NotFound)?;
         let emptied = volumes.open_file_in_dir(root, name, Mode::ReadWriteTruncate)?;
         volumes.close_file(emptied)?;
         volumes.delete_entry_in_dir(root, name)?;
         // There is room again.
-        if self.state == CardState::Full {
-            self.state = CardState::Ready;
+        if self.state == StorageState::Full {
+            self.state = StorageState::Ready;
         }
-        Ok(CardAnswer::Is(1))
+        Ok(LogAnswer::Is(1))
     }
 
     /// Closes the file that is read.

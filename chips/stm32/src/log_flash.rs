@@ -1,0 +1,33 @@
+//! A flash chip for logs by SPI.
+
+use crate::sensors::{SELECT, divided};
+use afbc_logger::{FlashKeeper, NorChip};
+use embassy_stm32::Peri;
+use embassy_stm32::gpio::{Level, Output, Pin};
+use embassy_stm32::mode::Blocking;
+use embassy_stm32::spi::mode::Master;
+use embassy_stm32::spi::{self, MODE_0, Spi};
+use embassy_stm32::time::Hertz;
+use embassy_time::Instant;
+use embedded_hal_bus::spi::{ExclusiveDevice, NoDelay};
+
+/// Clock, at most \[Hz\] (W25Q128JV, revision F, 9.6, of the command that reads).
+const MOST_HZ: u32 = 50_000_000;
+
+/// Keeps logs in a chip that is alone on its SPI. Every call waits for it, by polling: the task must be below all
+/// others.
+pub type FlashLog = FlashKeeper<NorChip<ExclusiveDevice<Spi<'static, Blocking, Master>, Output<'static>, NoDelay>>>;
+
+/// Returns the settings of its SPI, which is fed with `kernel_hz`.
+pub fn config(kernel_hz: u32) -> spi::Config {
+    let mut config = spi::Config::default();
+    config.mode = MODE_0;
+    config.frequency = Hertz(divided(kernel_hz, MOST_HZ));
+    config
+}
+
+/// The chip behind a select pin.
+pub fn new(spi: Spi<'static, Blocking, Master>, select: Peri<'static, impl Pin>) -> FlashLog {
+    let Ok(device) = ExclusiveDevice::new_no_delay(spi, Output::new(select, Level::High, SELECT));
+    FlashKeeper::new(NorChip::new(device, || Instant::now().as_micros()))
+}
