@@ -30,6 +30,9 @@ pub trait Board: Sized + 'static {
     const STORE: u32;
     /// Its name in logs, perhaps with `board-` before it.
     const HARDWARE: &'static str;
+    /// True if it has room for minutes of logs only, which are small then
+    /// ([`BlackBox::small`](afbc_ulog::BlackBox::small)).
+    const SMALL_LOGS: bool = false;
     /// True if it keeps logs.
     const HAS_LOG: bool = false;
     /// Most motors that it drives.
@@ -40,6 +43,8 @@ pub trait Board: Sized + 'static {
     const RADIO_LINK: Option<usize> = None;
     /// True if it has a line for the telemetry of its motor controllers ([`escs`](crate::escs)).
     const ESCS: bool = false;
+    /// True if it hears motor controllers that answer on their own lines (bidirectional DSHOT).
+    const ANSWERS: bool = false;
     /// Restarts the chip into its boot loader, if it has one.
     const BOOT_LOADER: Option<fn() -> !> = None;
 
@@ -50,8 +55,9 @@ pub trait Board: Sized + 'static {
     /// board's tasks spawned on `control` run right after the control tick.
     fn start(core: &mut cortex_m::Peripherals, control: SendSpawner) -> Parts<Self>;
 
-    /// Sets how throttles are sent to the motors, before the first are; nothing if there is only one way.
-    fn set_motor_protocol(&mut self, _protocol: MotorProtocol) {}
+    /// Sets how throttles are sent to the motors, before the first are, and whether their controllers answer; nothing
+    /// if there is only one way.
+    fn set_motor_protocol(&mut self, _protocol: MotorProtocol, _answers: bool) {}
 
     /// Starts the watchdog, if there is one; nothing is erased from now on.
     fn unleash_watchdog(&mut self);

@@ -19,7 +19,8 @@ pub use afbc_station::Comms;
 use afbc_station::services::imus::{self, ImuNews};
 use afbc_station::services::signing::Signing;
 use afbc_station::services::status::SensorBits;
-use afbc_station::{AuxSensors, Calibrator, EscAction, EscReports, REPORT_MAX, Reboot, Setup};
+use afbc_station::{AuxSensors, Calibrator, EscAction, EscReports, EscsHeard, REPORT_MAX, Reboot, Setup};
+use afbc_types::ROTORS_MAX;
 use core::array;
 use core::cell::RefCell;
 use core::future::poll_fn;
@@ -73,6 +74,9 @@ pub fn make<B: Board>(
         let setup = Setup { reboots, calibrates, ..Setup::of(&table.configuration().link) };
         let mut comms = Comms::with(setup);
         comms.set_signing(signing);
+        if table.configuration().escs.answers && !B::ANSWERS {
+            comms.warn("DSHOT_BIDIR_EN: not on this board");
+        }
         (comms, table, log, radio, black_box)
     })
 }
@@ -95,7 +99,7 @@ pub async fn run<B: Board, const OTHERS: usize>(
     let mut outgoing = Vec::<u8, REPORT_MAX>::new();
     let mut leaving = 0;
     let mut calibrator = B::Sampler::SENSES.then(calibrator);
-    let mut esc_reports = B::ESCS.then(|| escs::reports(table));
+    let mut esc_reports = (B::ESCS || B::ANSWERS).then(|| escs::reports(table));
     loop {
         match select(receive(links, &mut incoming), ticks::next()).await {
             Either::First((link, length)) => {
@@ -146,7 +150,7 @@ pub async fn run<B: Board, const OTHERS: usize>(
                     if changed.is_some() {
                         reports.adopt(table.configuration());
                     }
-                    if let Some(news) = listen_to_escs(comms, reports, &tick) {
+                    if let Some(news) = listen_to_escs(comms, reports, escs::take_answers(), &tick) {
                         pass_on::<B>(&news, log);
                     }
                 }
@@ -320,7 +324,12 @@ fn report_self_tests(comms: &mut Comms, aux: &mut AuxSensors) {
 /// Takes what the motor controllers have told, asks the next one and moves the notch; returns what the vehicle is to do
 /// about a rotor's failure. Out of line like the report.
 #[inline(never)]
-fn listen_to_escs(comms: &mut Comms, reports: &mut EscReports, tick: &Tick) -> Option<ControlInputs> {
+fn listen_to_escs(
+    comms: &mut Comms,
+    reports: &mut EscReports,
+    answers: [Option<u32>; ROTORS_MAX],
+    tick: &Tick,
+) -> Option<ControlInputs> {
     // Three answers, of which the line brings one in a tick; what is left waits for the next tick.
     let mut heard = Vec::<u8, 32>::new();
     while !heard.is_full()
@@ -329,6 +338,7 @@ fn listen_to_escs(comms: &mut Comms, reports: &mut EscReports, tick: &Tick) -> O
         // There is room.
         let _ = heard.push(byte);
     }
+    let heard = EscsHeard { bytes: &heard, speeds_rev_min: answers };
     let EscAction { ask, notch, inputs } = comms.escs(reports, &heard, &tick.report);
     ask.into_iter().for_each(escs::ask);
     notch.into_iter().for_each(escs::move_notch);

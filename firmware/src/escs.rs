@@ -1,10 +1,11 @@
 //! The motor controllers' line, between the board's tasks and the links'.
 
-use crate::vehicle::ParameterTable;
+use crate::vehicle::{ParameterTable, ROTORS};
 use afbc_estimator::VelocityNotch;
 use afbc_station::EscReports;
+use afbc_types::ROTORS_MAX;
 use core::cell::{Cell, RefCell};
-use core::sync::atomic::{AtomicBool, AtomicU8, Ordering};
+use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering};
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use heapless::Deque;
@@ -13,6 +14,8 @@ use static_cell::StaticCell;
 /// Bytes that wait for the links' task, at most: six answers.
 const WAITING: usize = 64;
 
+/// Electrical speed with which each motor controller has answered \[rev/min\], and one more; 0 for none.
+static ANSWERED: [AtomicU32; ROTORS] = [const { AtomicU32::new(0) }; ROTORS];
 static HEARD: Mutex<CriticalSectionRawMutex, RefCell<Deque<u8, WAITING>>> = Mutex::new(RefCell::new(Deque::new()));
 /// Rotor that is to be asked, from 1; 0 for none.
 static ASKED: AtomicU8 = AtomicU8::new(0);
@@ -30,6 +33,24 @@ pub fn put(bytes: &[u8]) {
             let _ = heard.push_back(*byte);
         }
     });
+}
+
+/// Puts the electrical speed \[rev/min\] with which a rotor's motor controller has answered a frame.
+pub fn answered(rotor: usize, speed_rev_min: u32) {
+    if let Some(place) = ANSWERED.get(rotor) {
+        place.store(speed_rev_min.saturating_add(1), Ordering::Relaxed);
+    }
+}
+
+/// Returns the electrical speeds that have been answered since the last call \[rev/min\].
+pub(crate) fn take_answers() -> [Option<u32>; ROTORS_MAX] {
+    let mut answers = [None; ROTORS_MAX];
+    for (answer, place) in answers.iter_mut().zip(&ANSWERED) {
+        // Load and store need not be one: an answer that comes in between is lost, and another follows.
+        *answer = place.load(Ordering::Relaxed).checked_sub(1);
+        place.store(0, Ordering::Relaxed);
+    }
+    answers
 }
 
 /// Returns the rotor, from 0, whose motor controller is to be asked in the next frame, if `is_mine` says so of it:

@@ -79,7 +79,7 @@ macro_rules! image {
         #[embassy_executor::task]
         async fn logging(
             blocks: $crate::logging::LogEnds,
-            log: <$board as $crate::board::Board>::Log,
+            log: &'static mut <$board as $crate::board::Board>::Log,
         ) -> ! {
             $crate::logging::run(blocks, log).await
         }
@@ -87,7 +87,7 @@ macro_rules! image {
         #[embassy_executor::task]
         async fn start_logging(
             blocks: $crate::logging::LogEnds,
-            log: <$board as $crate::board::Board>::Log,
+            log: &'static mut <$board as $crate::board::Board>::Log,
         ) {
             let task = logging(blocks, log).expect("spawned once");
             $crate::executors::spawner().await.spawn(task);
@@ -98,7 +98,9 @@ macro_rules! image {
             blocks: $crate::logging::LogEnds,
             log: <$board as $crate::board::Board>::Log,
         ) {
-            spawner.spawn(start_logging(blocks, log).expect("spawned once"));
+            // Once, and not in every task that it goes through.
+            static LOG: $crate::StaticCell<<$board as $crate::board::Board>::Log> = $crate::StaticCell::new();
+            spawner.spawn(start_logging(blocks, LOG.init(log)).expect("spawned once"));
         }
 
         fn spawn_aiding(spawner: embassy_executor::SendSpawner, aids: <$board as $crate::board::Board>::Aids) {

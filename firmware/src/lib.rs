@@ -48,6 +48,9 @@ pub mod ticks;
 pub mod time;
 pub mod vehicle;
 
+#[doc(hidden)]
+pub use static_cell::StaticCell;
+
 use board::{Board, Links as _, Parts, Transmitter as _};
 use embassy_executor::SendSpawner;
 
@@ -68,7 +71,8 @@ pub fn run<B: Board>(
     let Parts { mut board, sampler, aids, mut links, memory, log } = B::start(&mut core, executors.control);
     let (kept, parts, blocks) = read::<B>(memory, &mut links);
     let (_, table, ..) = parts;
-    board.set_motor_protocol(table.configuration().outputs.protocol);
+    let configuration = table.configuration();
+    board.set_motor_protocol(configuration.outputs.protocol, configuration.escs.answers);
     let flight = control::make(table.configuration());
     // Not before: a start may erase flash for half a second and more, without a tick that feeds it.
     board.unleash_watchdog();

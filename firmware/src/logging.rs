@@ -56,6 +56,14 @@ pub struct TickView {
     view: FlightView,
 }
 
+impl TickView {
+    /// Of no tick. Out of line, so that it is in the image once.
+    #[inline(never)]
+    fn empty() -> Self {
+        TickView { number: 0, taken: TakenInputs::of(&ControlInputs::EMPTY), view: FlightView::default() }
+    }
+}
+
 type Views = Channel<'static, CriticalSectionRawMutex, TickView>;
 type ViewSender = Sender<'static, CriticalSectionRawMutex, TickView>;
 type Blocks = Channel<'static, CriticalSectionRawMutex, LogBlock>;
@@ -153,9 +161,7 @@ impl LinkLog {
         static VIEW_CHANNEL: StaticCell<Views> = StaticCell::new();
         static PAGE: StaticCell<[LogPage; 1]> = StaticCell::new();
         static PAGE_CHANNEL: StaticCell<Channel<'static, CriticalSectionRawMutex, LogPage>> = StaticCell::new();
-        let empty =
-            || TickView { number: 0, taken: TakenInputs::of(&ControlInputs::EMPTY), view: FlightView::default() };
-        let views = VIEWS_HELD.init_with(|| array::from_fn(|_| empty()));
+        let views = VIEWS_HELD.init_with(|| array::from_fn(|_| TickView::empty()));
         let (sender, views) = VIEW_CHANNEL.init_with(|| Channel::new(views)).split();
         SENDER.lock(|place| place.try_borrow_mut().ok().map(|mut place| *place = Some(sender)));
         let blocks = BLOCKS_HELD.init_with(|| [const { LogBlock::EMPTY }; BLOCKS]);
@@ -165,7 +171,7 @@ impl LinkLog {
         let log = LOG.init_with(|| LinkLog {
             server: LogServer::default(),
             stored: StoredLogs::new(Pages(page)),
-            writer: LogWriter::new(B::Log::SMALL),
+            writer: LogWriter::new(B::SMALL_LOGS),
             queue: Queue(queue),
             views,
             hardware,
@@ -240,7 +246,7 @@ impl LinkLog {
 }
 
 /// Keeps logs, for ever. Calls of the keeper wait for its card or flash: nothing else may be on this executor.
-pub async fn run(LogEnds { mut blocks, mut pages }: LogEnds, mut keeper: impl LogKeeper) -> ! {
+pub async fn run(LogEnds { mut blocks, mut pages }: LogEnds, keeper: &mut dyn LogKeeper) -> ! {
     let mut asked = LogQuery::Nothing;
     loop {
         let look = Timer::at(Instant::from_micros(Instant::now().as_micros().wrapping_add(LOOK_US)));

@@ -31,8 +31,8 @@ const STATION: Address = Address { system: 255, component: 190 };
 const READY_MS: u64 = 8_000;
 const ALOFT_MS: u64 = 18_000;
 
-/// What lets the vehicle listen to its motor controllers.
-const LISTENS: &[(&str, i32)] = &[("DSHOT_TEL_CFG", 1)];
+/// What lets the vehicle listen to its motor controllers: over their telemetry's line, or on the motors' lines.
+const LISTENS: [(&str, i32); 2] = [("DSHOT_TEL_CFG", 1), ("DSHOT_BIDIR_EN", 1)];
 
 /// Returns the request to set a parameter.
 fn setting(name: &str, value: i32) -> ParameterRequest {
@@ -170,8 +170,10 @@ fn vehicles() -> Vec<Vehicle> {
 
 #[test]
 fn speeds_reach_stations() {
-    for vehicle in vehicles() {
-        let mut flier = Flier::new(&hover(1, Some(&vehicle)), LISTENS);
+    for (vehicle, listens) in
+        vehicles().into_iter().flat_map(|vehicle| LISTENS.map(|listens| (vehicle.clone(), listens)))
+    {
+        let mut flier = Flier::new(&hover(1, Some(&vehicle)), &[listens]);
         flier.lift_off();
         let told = flier.told_rpm.unwrap();
         // The message is up to 0.2 s old: as fast as the rotor has been since, to a hundredth.
@@ -198,10 +200,11 @@ fn by_default_nobody_listens() {
 #[test]
 fn a_stopped_rotor_is_noticed_within_100_ms() {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(1);
-    let mut latest_ms = 0;
+    let mut latest_ms = [0; 2];
     for vehicle in vehicles() {
         for seed in 0..8 {
-            let mut flier = Flier::new(&hover(seed, Some(&vehicle)), LISTENS);
+            let kind = seed as usize % 2;
+            let mut flier = Flier::new(&hover(seed, Some(&vehicle)), &[LISTENS[kind]]);
             flier.lift_off();
             flier.until(ALOFT_MS + random.next_u64() % 3_000);
             let rotor = (random.next_u64() % vehicle.rotors.len() as u64) as u8 + 1;
@@ -212,13 +215,14 @@ fn a_stopped_rotor_is_noticed_within_100_ms() {
             flier.until(stops_ms + 300);
             let told = flier.texts[before..].iter().find(|(_, text)| text.starts_with(&format!("rotor {rotor} ")));
             let Some((told_ms, _)) = told else { panic!("{} {seed}: {:?}", vehicle.name, flier.texts) };
-            latest_ms = latest_ms.max(told_ms - stops_ms);
+            latest_ms[kind] = latest_ms[kind].max(told_ms - stops_ms);
             assert!(told_ms - stops_ms <= 100, "{} {seed}: {} ms", vehicle.name, told_ms - stops_ms);
             let others = flier.texts[before..].iter().filter(|(ms, text)| ms <= told_ms && text.contains("rotor "));
             assert_eq!(others.count(), 1, "{:?}", flier.texts);
         }
     }
-    assert!(latest_ms > 20, "{latest_ms}");
+    // On the motors' lines they answer every frame.
+    assert!(latest_ms[0] > latest_ms[1] && latest_ms[1] > 15, "{latest_ms:?}");
 }
 
 /// A vehicle of six rotors that loses one does what the parameter says.
@@ -278,13 +282,13 @@ fn no_drawn_flight_raises_an_alarm() {
     for seen in [Seen::Mocap, Seen::Outdoor] {
         let drawn = Random { seeds: 1..3, flights: 6, seen, vehicles: vehicles() }.draw().unwrap();
         let mut flown = 0;
-        for flight in drawn {
+        for (flight, listens) in drawn.into_iter().zip(LISTENS.into_iter().cycle()) {
             let scenario = flight.scenario;
             let contenders = vec![firmware(&scenario).unwrap()];
             let scenario = Scenario { contenders, ..scenario };
             let vehicle = scenario.vehicle_file.clone().unwrap();
             let mut host = Host::for_vehicle(&vehicle).unwrap();
-            set(&mut Sender::new(STATION), LISTENS, &mut |bytes| drop(host.next_tick(bytes)));
+            set(&mut Sender::new(STATION), &[listens], &mut |bytes| drop(host.next_tick(bytes)));
             let mut heard = Heard { host, decoder: Decoder::new(STATION), texts: Vec::new(), statuses: 0 };
             let end =
                 fly(
@@ -312,7 +316,7 @@ fn kicks_n(vehicle: &Vehicle, load: f64, follows: bool, seed: u64) -> f64 {
     let mass_kg = load * vehicle.parameters.mass_kg;
     let payload = Payload { mass_kg, below_m: 0.0, ahead_m: 0.0, left_m: 0.0, start_s: 0.0, end_s: f64::INFINITY };
     scenario.environment = scenario.environment.clone().with_payloads(vec![payload]).unwrap();
-    let follow = [LISTENS[0], ("MOT_NOTCH_FOLLOW", i32::from(follows))];
+    let follow = [LISTENS[seed as usize % 2], ("MOT_NOTCH_FOLLOW", i32::from(follows))];
     let mut flier = Flier::new(&scenario, &follow);
     flier.lift_off();
     flier.kicks_n = 0.0;
@@ -337,10 +341,14 @@ fn a_notch_that_follows_beats_one_that_stands() {
 /// What a flight took and gave is the same again, wherever the notch stood; a notch that stood elsewhere is noticed.
 #[test]
 fn flights_with_measured_speeds_replay_exactly() {
+    LISTENS.into_iter().for_each(flies_and_replays);
+}
+
+fn flies_and_replays(listens: (&str, i32)) {
     let bytes = Rc::new(RefCell::new(Vec::new()));
     let taken = Rc::clone(&bytes);
     let mut flier =
-        Flier::recording(&hover(3, None), LISTENS, move |frame| taken.borrow_mut().extend_from_slice(frame));
+        Flier::recording(&hover(3, None), &[listens], move |frame| taken.borrow_mut().extend_from_slice(frame));
     flier.lift_off();
     let start_s = flier.world.plant().time_s();
     let payload = Payload { mass_kg: 0.2, below_m: 0.0, ahead_m: 0.0, left_m: 0.0, start_s, end_s: f64::INFINITY };

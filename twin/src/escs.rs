@@ -6,6 +6,7 @@ use crate::esc_line::voltage_cv;
 use crate::hands::Climb;
 use crate::led::{FRAME_NS, Hand, Hover, Next, Vehicle};
 use crate::machine::Machine;
+use crate::pins::ANSWERS;
 use std::collections::VecDeque;
 use std::error::Error;
 use std::path::Path;
@@ -25,6 +26,7 @@ const APART_MS: u64 = 4;
 /// Compares what the vehicle tells with the plant.
 #[derive(Debug, Default)]
 struct Listens {
+    on_lines: bool,
     since_ms: Option<u64>,
     /// The rotors' speeds of late \[rad/s\].
     past: VecDeque<Vec<f64>>,
@@ -56,7 +58,8 @@ impl Hand for Listens {
                     return Err(format!("rotor {rotor}: {told_rad_s:.1} rad/s told of {least:.1} to {most:.1}"));
                 }
                 let expected_v = f32::from(voltage_cv(rotor)) * 0.01;
-                if (voltage_v - expected_v).abs() > 0.005 {
+                // On the lines they tell their speeds alone.
+                if !self.on_lines && (voltage_v - expected_v).abs() > 0.005 {
                     return Err(format!("rotor {rotor}: {voltage_v} V told of {expected_v} V"));
                 }
             }
@@ -68,6 +71,7 @@ impl Hand for Listens {
 /// Stops a rotor.
 #[derive(Debug)]
 struct Stops {
+    on_lines: bool,
     rotor: usize,
     late_ms: u64,
     began_ms: Option<u64>,
@@ -79,24 +83,30 @@ impl Hand for Stops {
     fn lead(&mut self, vehicle: &mut Vehicle, now_ms: u64) -> Result<Next, String> {
         let stops_ms = *self.began_ms.get_or_insert(now_ms) + 500 + self.late_ms;
         let says = format!("rotor {} has stopped", self.rotor + 1);
+        // One that answers every frame is out of step before it has stopped.
+        let also =
+            if self.on_lines { format!("rotor {} does not turn as commanded", self.rotor + 1) } else { says.clone() };
+        let is_said = |text: &str| text == says || text == also;
         if let Some((_, text)) = vehicle.pilot.heard().iter().find(|(_, text)| text.starts_with("rotor"))
-            && (now_ms < stops_ms || *text != says)
+            && (now_ms < stops_ms || !is_said(text))
         {
             return Err(format!("it says \"{text}\" in place of \"{says}\""));
         }
         if now_ms == stops_ms {
             vehicle.pilot.stop_rotor(self.rotor);
         }
-        self.told_ms = vehicle.pilot.heard().iter().find(|(_, text)| *text == says).map(|(ms, _)| ms - stops_ms);
+        self.told_ms = vehicle.pilot.heard().iter().find(|(_, text)| is_said(text)).map(|(ms, _)| ms - stops_ms);
         let is_over = self.told_ms.is_some() || now_ms > stops_ms + 2 * TOLD_MS;
         Ok(if is_over { Next::Ends } else { Next::GoesOn })
     }
 }
 
 /// Flies with motor controllers that answer, and lets each rotor stop in the air.
-pub fn fly<M: Machine>(image: &Path, scenario: &Path) -> Result<(), Box<dyn Error>> {
-    let hover = Hover::<M>::of(image, scenario, &[("DSHOT_TEL_CFG", 1.0)], Climb::default())?;
-    let Listens { messages, most_rad_s, .. } = hover.goes_on(FRAME_NS, 0, Listens::default())?.hand;
+pub fn fly<M: Machine>(image: &Path, scenario: &Path, on_lines: bool) -> Result<(), Box<dyn Error>> {
+    let listens = if on_lines { ANSWERS } else { "DSHOT_TEL_CFG" };
+    let hover = Hover::<M>::of(image, scenario, &[(listens, 1.0)], Climb::default())?;
+    let hand = Listens { on_lines, ..Listens::default() };
+    let Listens { messages, most_rad_s, .. } = hover.goes_on(FRAME_NS, 0, hand)?.hand;
     println!(
         "{messages} messages ESC_STATUS, at most {most_rad_s:.1} rad/s beside the rotors' speeds of the last 60 ms"
     );
@@ -104,7 +114,7 @@ pub fn fly<M: Machine>(image: &Path, scenario: &Path) -> Result<(), Box<dyn Erro
     let mut all_ms = Vec::new();
     for rotor in 0..hover.vehicle().pilot.throttles().len() {
         for late_ms in (0..STOPS).map(|nth| nth * APART_MS) {
-            let hand = Stops { rotor, late_ms, began_ms: None, told_ms: None };
+            let hand = Stops { on_lines, rotor, late_ms, began_ms: None, told_ms: None };
             let told_ms = hover.goes_on(FRAME_NS, 0, hand)?.hand.told_ms;
             all_ms.push(told_ms.ok_or_else(|| format!("rotor {rotor}: its stop is not told"))?);
         }

@@ -136,7 +136,7 @@ impl<M: Machine> Hover<M> {
         let images = images::<M>(image, &parameters)?;
         let vehicle = Vehicle {
             pilot: Pilot::new(&scenario, wires.link)?,
-            pins: MotorPins::new(M::SIGNAL, scenario.rotors.len()),
+            pins: MotorPins::new(M::SIGNAL, scenario.rotors.len()).answering(&parameters),
             transmitter: Transmitter::new(wires.receiver, FRAME_NS, TICK_NS),
             escs: Escs::new(wires.escs),
             signal: M::SIGNAL,
@@ -238,6 +238,7 @@ impl<M: Machine, H: Hand> Driver<M> for Led<H> {
             let (_, signals) = self.vehicle.pilot.watch(stop.at.0 / TICK_NS);
             session.board_mut().sense(&signals);
             self.vehicle.escs.answer(self.vehicle.pilot.rotor_speeds_rad_s());
+            self.vehicle.pins.turn(self.vehicle.pilot.rotor_speeds_rad_s());
             match self.hand.lead(&mut self.vehicle, stop.at.0 / TICK_NS) {
                 Ok(Next::GoesOn) => {}
                 // Not while a frame is read from the pins.

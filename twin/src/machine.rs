@@ -2,6 +2,7 @@
 
 use crate::card::{LogStorage, SdSlot};
 use crate::impairments::Impairments;
+use crate::line_answers::Lines;
 use crate::wire::Wire;
 use rigless::chip::nmea;
 use rigless::chip::uart::{Errors, Peer};
@@ -35,6 +36,8 @@ pub struct FrameTimer {
     pub stream: u64,
     /// Its motors, from 0.
     pub motors: Range<usize>,
+    /// Where the port of its pins is, if their motors' controllers can be heard there.
+    pub lines: Option<Lines>,
 }
 
 /// A UART's divider and its clock.
@@ -130,6 +133,10 @@ pub trait Machine: Board + Edge<Signals = Signals> + Sized + 'static {
     }
 }
 
+/// The pins of the Matek H743's motors (RM0433, table 8, 11.4.4).
+const PORT_A: Lines = Lines { pulls: 0x5802_000C, first: 0 };
+const PORT_D: Lines = Lines { pulls: 0x5802_0C0C, first: 12 };
+
 impl Machine for MatekH743 {
     /// RM0433, 45.4.
     const WATCHDOG: u64 = 0x5800_4800;
@@ -140,8 +147,8 @@ impl Machine for MatekH743 {
     const MOTORS: Range<usize> = 2..10;
     /// DMA1's streams 0 and 1, for TIM5 and TIM4 (RM0433, 15.5.5).
     const SIGNAL: Signal = Signal::Dshot600(&[
-        FrameTimer { counter: 0x4000_0C00, stream: 0x4002_0010, motors: 0..4 },
-        FrameTimer { counter: 0x4000_0800, stream: 0x4002_0028, motors: 4..8 },
+        FrameTimer { counter: 0x4000_0C00, stream: 0x4002_0010, motors: 0..4, lines: Some(PORT_A) },
+        FrameTimer { counter: 0x4000_0800, stream: 0x4002_0028, motors: 4..8, lines: Some(PORT_D) },
     ]);
     /// USART2 (RM0433, 48.8.5).
     const RECEIVER: Divider = Divider { register: 0x4000_440C, clock_hz: 100_000_000 };

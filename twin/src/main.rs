@@ -20,6 +20,7 @@ mod host;
 mod impairments;
 mod kept;
 mod led;
+mod line_answers;
 mod machine;
 mod machines;
 mod pilot;
@@ -96,6 +97,8 @@ fn command() -> Command {
     let cuts =
         [whole("cuts", "100", "Cuts in a write, and in an erase, about"), whole("seed", "1", "Of the random numbers")];
     let escs = Command::new("escs").about("Fly with motor controllers that answer, and stop rotors");
+    let lines = Arg::new("lines").long("lines").action(ArgAction::SetTrue);
+    let lines = lines.help("They answer on the motors' lines (bidirectional DSHOT), not over their telemetry's");
     Command::new("twin")
         .about("Runs the flight image of a board, as it is flashed, on register-level models of the board")
         .subcommand_required(true)
@@ -111,7 +114,7 @@ fn command() -> Command {
             rate,
             phases,
         ]))
-        .subcommand(escs.args([machine_argument(), image_argument(), scenario_argument()]))
+        .subcommand(escs.args([machine_argument(), image_argument(), scenario_argument(), lines]))
         .subcommand(Command::new("replay").about("Fly an exact log again").arg(file_argument("log", "The log")))
         .subcommand(
             Command::new("faults")
@@ -234,7 +237,7 @@ fn run(matches: &ArgMatches) -> Result<(), Box<dyn Error>> {
         }
         Some(("escs", matches)) => {
             let (image, scenario) = (path(matches, "image")?, path(matches, "scenario")?);
-            with_machine!(chosen(matches)?, M => escs::fly::<M>(image, scenario))
+            with_machine!(chosen(matches)?, M => escs::fly::<M>(image, scenario, matches.get_flag("lines")))
         }
         Some(("replay", matches)) => same::check_log(&std::fs::read(path(matches, "log")?)?),
         Some(("faults", matches)) => {

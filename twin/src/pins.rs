@@ -1,8 +1,10 @@
-//! Motor commands, read from the pins: DSHOT600 bit by bit, or lengths of pulses.
+//! Motor commands, read from the pins: DSHOT600 bit by bit, or lengths of pulses. With [`ANSWERS`] set, frames are
+//! inverted, and controllers answer them.
 //!
 //! Between two frames the timers' counters are held: their updates, 600,000 a second, change no pin and would take a
 //! quarter of the emulator's time.
 
+use crate::line_answers::LineAnswers;
 use crate::machine::{FrameTimer, Signal};
 use afbc_flight_core::motor::{THROTTLE_MAX, THROTTLE_MIN};
 use rigless::emulator::{Access, AccessKind};
@@ -11,8 +13,12 @@ use rigless::mcu::{Mcu, Operate};
 use rigless::soc::Width;
 use rigless::time::VirtualNanos;
 
+/// The parameter with which motor controllers answer on their lines.
+pub const ANSWERS: &str = "DSHOT_BIDIR_EN";
 /// Bits of a frame.
 const BITS: u64 = 16;
+/// Place of a stream's direction in its control register (RM0090, 10.5.5; RM0433, 15.5.5).
+const DIRECTION: u32 = 6;
 /// Time of a bit \[ns\].
 const BIT_NS: f64 = 1e9 / 600e3;
 /// Lengths of the pulses of a zero and of a one \[ns\], and what a count of the timers may change \[ns\].
@@ -47,8 +53,12 @@ struct Frames {
     /// When the pins are looked at next \[ns\].
     look_ns: Option<u64>,
     bits: Vec<u16>,
+    /// When the last one was over \[ns\].
+    ended_ns: u64,
     /// The counter is held.
     held: bool,
+    /// Who answers, if they are to.
+    answers: Option<LineAnswers>,
 }
 
 /// The motors' pins.
@@ -77,7 +87,9 @@ impl MotorPins {
             sampling: Sampling::Idle,
             look_ns: None,
             bits: vec![0; timer.motors.end.min(motors) - timer.motors.start],
+            ended_ns: 0,
             held: false,
+            answers: None,
         });
         MotorPins {
             frames: frames.collect(),
@@ -85,6 +97,25 @@ impl MotorPins {
             asked: Vec::new(),
             sent: 0,
             wrong: Vec::new(),
+        }
+    }
+
+    /// With controllers that answer, if that is among the image's parameters and they can be heard.
+    pub fn answering(mut self, parameters: &[(&str, f32)]) -> Self {
+        if parameters.iter().any(|(name, value)| *name == ANSWERS && *value != 0.0) {
+            for frames in &mut self.frames {
+                let motors = frames.bits.len();
+                frames.answers = frames.timer.lines.as_ref().map(|lines| LineAnswers::new(lines, motors));
+            }
+        }
+        self
+    }
+
+    /// Sets what the rotors do \[rad/s\].
+    pub fn turn(&mut self, speeds_rad_s: &[f64]) {
+        for frames in &mut self.frames {
+            let speeds_rad_s = speeds_rad_s.get(frames.timer.motors.start..).unwrap_or_default();
+            frames.answers.iter_mut().for_each(|answers| answers.turn(speeds_rad_s));
         }
     }
 
@@ -104,6 +135,14 @@ impl MotorPins {
             (access.kind, access.address, value & 1) == (AccessKind::Write, frames.timer.stream, 1)
         };
         let Some(frames) = self.frames.iter_mut().find(starts) else { return false };
+        // From the pins, not to them.
+        if value >> DIRECTION & 0b11 == 0
+            && let Some(answers) = &mut frames.answers
+        {
+            answers.begin(access.virtual_time, frames.ended_ns);
+            frames.hold(mcu, access.virtual_time, false);
+            return true;
+        }
         frames.sampling = Sampling::Waits(LOOKS);
         frames.look_ns = Some(access.virtual_time.0 + LOOK_NS);
         frames.hold(mcu, access.virtual_time, false);
@@ -117,18 +156,23 @@ impl MotorPins {
 
     /// Returns when the pins are to be looked at next \[ns\].
     pub fn look_ns(&self) -> Option<u64> {
-        self.frames.iter().filter_map(|frames| frames.look_ns).min()
+        self.frames.iter().filter_map(Frames::next_ns).min()
     }
 
     /// Looks at the pins for bits of frames. Returns true if a frame is complete.
     pub fn look(&mut self, pins: &[Actuator], mcu: &mut dyn Mcu, at: VirtualNanos) -> bool {
         let mut complete = false;
+        for frames in &mut self.frames {
+            if frames.answers.as_mut().is_some_and(|answers| answers.step(mcu, at)) {
+                frames.hold(mcu, at, true);
+            }
+        }
         let due = |frames: &&mut Frames| frames.look_ns.is_some_and(|look_ns| at.0 >= look_ns);
         for frames in self.frames.iter_mut().filter(due) {
             let pins = pins.get(frames.timer.motors.clone()).unwrap_or_default();
             if frames.is_complete() {
                 (frames.sampling, frames.look_ns) = (Sampling::Idle, None);
-                if pins.iter().any(has_pulse) {
+                if pins.iter().any(|pin| frames.pulse_ns(pin) > 0) {
                     tell(&mut self.wrong, || format!("frame {}: more than {BITS} bits", self.sent));
                 } else {
                     frames.hold(mcu, at, true);
@@ -137,11 +181,14 @@ impl MotorPins {
             }
             frames.look_ns = frames.sample(pins, at.0, &mut self.wrong);
             if frames.is_complete() {
+                frames.ended_ns = at.0;
                 self.sent += 1;
                 let first = frames.timer.motors.start;
                 for (motor, bits) in (first..).zip(&mut frames.bits) {
                     let Some(throttle) = self.throttles.get_mut(motor) else { continue };
-                    let read = frame_of(std::mem::take(bits));
+                    // By a complemented checksum controllers know that they are to answer.
+                    let complement = if frames.answers.is_some() { 0xF } else { 0 };
+                    let read = frame_of(std::mem::take(bits) ^ complement);
                     *throttle = read.map(|(throttle, _)| throttle);
                     self.asked.extend(read.filter(|(_, asks)| *asks).map(|_| motor));
                     if throttle.is_none() {
@@ -178,7 +225,7 @@ impl Frames {
     fn sample(&mut self, pins: &[Actuator], now_ns: u64, wrong: &mut Vec<String>) -> Option<u64> {
         let (first_ns, taken) = match self.sampling {
             Sampling::Idle => return None,
-            Sampling::Waits(_) if pins.iter().any(has_pulse) => (now_ns, 0),
+            Sampling::Waits(_) if pins.iter().any(|pin| self.pulse_ns(pin) > 0) => (now_ns, 0),
             Sampling::Waits(0) => {
                 tell(wrong, || format!("no frame at {now_ns} ns"));
                 self.sampling = Sampling::Idle;
@@ -190,8 +237,8 @@ impl Frames {
             }
             Sampling::Reads(first_ns, taken) => (first_ns, taken),
         };
-        for (pin, bits) in pins.iter().zip(&mut self.bits) {
-            let width = pin.pulse.map_or(0, |pulse| pulse.width.0);
+        let widths: Vec<_> = pins.iter().map(|pin| self.pulse_ns(pin)).collect();
+        for ((pin, width), bits) in pins.iter().zip(widths).zip(&mut self.bits) {
             let bit = PULSES_NS.iter().position(|length| length.abs_diff(width) <= COUNT_NS);
             if bit.is_none() {
                 tell(wrong, || format!("{}: a pulse of {width} ns", pin.name));
@@ -202,6 +249,20 @@ impl Frames {
         self.sampling = Sampling::Reads(first_ns, taken);
         // From the first bit on, so that what is rounded does not add up.
         Some(first_ns + (taken as f64 * BIT_NS) as u64)
+    }
+
+    /// Returns when the pins are to be looked at, or what drives them changes \[ns\].
+    fn next_ns(&self) -> Option<u64> {
+        let answers_ns = self.answers.as_ref().and_then(LineAnswers::next_ns);
+        self.look_ns.into_iter().chain(answers_ns).min()
+    }
+
+    /// Returns the length of the pulse on a pin \[ns\]: of a low one, if it rests high.
+    fn pulse_ns(&self, pin: &Actuator) -> u64 {
+        pin.pulse.map_or(0, |pulse| {
+            let [width, period] = [pulse.width.0, pulse.period.0];
+            if self.answers.is_some() { period - width } else { width }
+        })
     }
 
     /// True if all bits are taken.
@@ -220,10 +281,6 @@ impl Frames {
         // The timer is clocked, since its register was read.
         let _ = mcu.write(at, self.timer.counter, Width::W32, control);
     }
-}
-
-fn has_pulse(pin: &Actuator) -> bool {
-    pin.pulse.is_some_and(|pulse| pulse.width.0 > 0)
 }
 
 /// Returns the throttle of a frame, and whether its telemetry bit is set; none if its checksum is wrong.

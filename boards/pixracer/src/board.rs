@@ -243,8 +243,8 @@ impl Board for Pixracer {
         }
     }
 
-    fn set_motor_protocol(&mut self, protocol: MotorProtocol) {
-        set_protocol(protocol);
+    fn set_motor_protocol(&mut self, protocol: MotorProtocol, answers: bool) {
+        set_protocol(protocol, answers);
     }
 
     fn unleash_watchdog(&mut self) {

@@ -28,6 +28,7 @@ use afbc_drivers::dps310::Dps310;
 use afbc_drivers::icm426xx::{Icm42605, Icm42688p};
 use afbc_drivers::qmc5883l::Qmc5883l;
 use afbc_drivers::{Driver, I2cRegisters, SensorPart, SpiRegisters};
+use chip_stm32::answers::Lines;
 use chip_stm32::battery::BatteryConverter;
 use chip_stm32::indicator::{Led, PassiveBuzzer};
 use chip_stm32::link::{self, Receiver, Transmitter};
@@ -141,6 +142,7 @@ impl Board for Stm32h743 {
     const INDICATES: bool = true;
     const HAS_LOG: bool = true;
     const ESCS: bool = true;
+    const ANSWERS: bool = true;
     const BOOT_LOADER: Option<fn() -> !> = Some(boot_loader::restart);
 
     fn after_reset() {
@@ -199,8 +201,10 @@ impl Board for Stm32h743 {
         interrupt::USART2.set_priority(Priority::from(priority::UART));
 
         let motors = Motors::new(p.TIM5, pin(p.PA0), pin(p.PA1), pin(p.PA2), pin(p.PA3), p.DMA1_CH0, Irqs);
+        let motors = motors.answering(Lines::new(pac::GPIOA, [0, 1, 2, 3]));
         control.spawn(motors_1_to_4(motors).expect("spawned once"));
         let motors = Motors::new(p.TIM4, pin(p.PD12), pin(p.PD13), pin(p.PD14), pin(p.PD15), p.DMA1_CH1, Irqs);
+        let motors = motors.answering(Lines::new(pac::GPIOD, [12, 13, 14, 15]));
         control.spawn(motors_5_to_8(motors).expect("spawned once"));
         interrupt::DMA1_STREAM0.set_priority(Priority::from(priority::MOTOR_DMA));
         interrupt::DMA1_STREAM1.set_priority(Priority::from(priority::MOTOR_DMA));
@@ -218,8 +222,8 @@ impl Board for Stm32h743 {
         Parts { board, sampler, aids, links, memory: Words::new(p.FLASH), log: sd_card::new(interface) }
     }
 
-    fn set_motor_protocol(&mut self, protocol: MotorProtocol) {
-        set_protocol(protocol);
+    fn set_motor_protocol(&mut self, protocol: MotorProtocol, answers: bool) {
+        set_protocol(protocol, answers);
     }
 
     fn unleash_watchdog(&mut self) {
@@ -248,15 +252,15 @@ impl Board for Stm32h743 {
 }
 
 #[embassy_executor::task]
-async fn motors_1_to_4(mut motors: Motors<TIM5, DMA1_CH0, Irqs, u32>) {
+async fn motors_1_to_4(mut motors: Motors<TIM5, DMA1_CH0, Irqs, u32, Lines>) {
     let [throttles, _] = &THROTTLES;
-    motors.run(throttles, [0, 1, 2, 3].map(Some)).await
+    motors.exchange(throttles, [0, 1, 2, 3].map(Some)).await
 }
 
 #[embassy_executor::task]
-async fn motors_5_to_8(mut motors: Motors<TIM4, DMA1_CH1, Irqs, u16>) {
+async fn motors_5_to_8(mut motors: Motors<TIM4, DMA1_CH1, Irqs, u16, Lines>) {
     let [_, throttles] = &THROTTLES;
-    motors.run(throttles, [4, 5, 6, 7].map(Some)).await
+    motors.exchange(throttles, [4, 5, 6, 7].map(Some)).await
 }
 
 #[embassy_executor::task]

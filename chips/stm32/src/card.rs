@@ -13,6 +13,7 @@ use embassy_stm32::spi::{self, MODE_0, Spi};
 use embassy_stm32::time::Hertz;
 use embedded_hal::delay::DelayNs;
 use embedded_hal::spi::{ErrorType, Operation, SpiDevice};
+use static_cell::StaticCell;
 
 /// Clock while a card starts, at most, and then \[Hz\] (SD Physical Layer Simplified Specification, 4.2.1 and 6.6.6).
 const START_HZ: u32 = 400_000;
@@ -30,16 +31,20 @@ pub fn config(hz: u32) -> spi::Config {
 }
 
 /// Keeps logs on a card by SPI.
-pub type CardLog = CardKeeper<SpiCard>;
+pub type CardLog = CardKeeper<'static>;
 
-/// The card behind a select pin, of an SPI fed with `kernel_hz`, by a core of `core_hz`.
+/// The card behind a select pin, of an SPI fed with `kernel_hz`, by a core of `core_hz`; to be called once.
+///
+/// # Panics
+/// At a second call.
 pub fn new(
     spi: Spi<'static, Blocking, Master>,
     select: Peri<'static, impl Pin>,
     kernel_hz: u32,
     core_hz: u32,
 ) -> CardLog {
-    CardKeeper::new(SpiCard::new(spi, select, kernel_hz, core_hz))
+    static CARD: StaticCell<SpiCard> = StaticCell::new();
+    CardKeeper::new(CARD.init(SpiCard::new(spi, select, kernel_hz, core_hz)))
 }
 
 /// A card that is alone on its SPI. Every call waits for it, by polling: the task must be below all others.

@@ -1,6 +1,7 @@
 //! What boards of all STM32 share. A chip's name is a feature of `embassy-stm32` that the board sets.
 #![no_std]
 
+pub mod answers;
 pub mod battery;
 pub mod boot_loader;
 pub mod candidates;

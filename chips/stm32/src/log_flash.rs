@@ -10,13 +10,16 @@ use embassy_stm32::spi::{self, MODE_0, Spi};
 use embassy_stm32::time::Hertz;
 use embassy_time::Instant;
 use embedded_hal_bus::spi::{ExclusiveDevice, NoDelay};
+use static_cell::StaticCell;
 
 /// Clock, at most \[Hz\] (W25Q128JV, revision F, 9.6, of the command that reads).
 const MOST_HZ: u32 = 50_000_000;
 
 /// Keeps logs in a chip that is alone on its SPI. Every call waits for it, by polling: the task must be below all
 /// others.
-pub type FlashLog = FlashKeeper<NorChip<ExclusiveDevice<Spi<'static, Blocking, Master>, Output<'static>, NoDelay>>>;
+pub type FlashLog = FlashKeeper<'static>;
+
+type Chip = NorChip<ExclusiveDevice<Spi<'static, Blocking, Master>, Output<'static>, NoDelay>>;
 
 /// Returns the settings of its SPI, which is fed with `kernel_hz`.
 pub fn config(kernel_hz: u32) -> spi::Config {
@@ -26,8 +29,12 @@ pub fn config(kernel_hz: u32) -> spi::Config {
     config
 }
 
-/// The chip behind a select pin.
+/// The chip behind a select pin; to be called once.
+///
+/// # Panics
+/// At a second call.
 pub fn new(spi: Spi<'static, Blocking, Master>, select: Peri<'static, impl Pin>) -> FlashLog {
     let Ok(device) = ExclusiveDevice::new_no_delay(spi, Output::new(select, Level::High, SELECT));
-    FlashKeeper::new(NorChip::new(device, || Instant::now().as_micros()))
+    static CHIP: StaticCell<Chip> = StaticCell::new();
+    FlashKeeper::new(CHIP.init(NorChip::new(device, || Instant::now().as_micros())))
 }

@@ -1,9 +1,11 @@
 //! Up to four motors on the channels of a timer: DSHOT, sent by DMA, or pulses. A board has one timer or more for its
-//! motors, each with a task that [runs](Motors::run) it.
+//! motors, each with a task that [runs](Motors::run) it. Where DMA reaches the port of the pins, motor controllers
+//! [answer](crate::answers) on them.
 
 pub use afbc_flight_core::numbering::{self, rotors_of_outputs};
 pub use afbc_flight_core::protocol::MotorProtocol;
 
+use crate::answers::{Lines, sample_counts};
 use afbc_flight_core::dshot::{DshotRate, Timing};
 use afbc_flight_core::protocol::MotorSignal;
 use afbc_flight_core::pulse::{PulseFormat, PulseTiming};
@@ -15,7 +17,7 @@ use embassy_stm32::gpio::OutputType;
 use embassy_stm32::interrupt::typelevel::Binding;
 use embassy_stm32::pac::gpio::Gpio;
 use embassy_stm32::pac::gpio::vals::Moder;
-use embassy_stm32::timer::low_level::{CountingMode, OutputCompareMode, Timer};
+use embassy_stm32::timer::low_level::{CountingMode, OutputCompareMode, OutputPolarity, Timer};
 use embassy_stm32::timer::simple_pwm::PwmPin;
 use embassy_stm32::timer::{Ch1, Ch2, Ch3, Ch4, Channel, GeneralInstance4Channel, TimerChannel, TimerPin, UpDma};
 use embassy_stm32::{Peri, rcc};
@@ -24,9 +26,12 @@ use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
 use embassy_time::{Instant, with_deadline};
 use firmware::escs;
+use firmware::vehicle::ROTORS;
 
 /// Most motors of a timer.
 pub const CHANNELS: usize = 4;
+/// Rows of a frame: sixteen bits, and one without a pulse.
+const FRAME_ROWS: usize = 17;
 /// The channels.
 const EACH: [Channel; CHANNELS] = [Channel::Ch1, Channel::Ch2, Channel::Ch3, Channel::Ch4];
 /// Longest transfer of a frame to the motors before it is aborted \[us\].
@@ -35,24 +40,25 @@ const TRANSFER_MAX_US: u64 = 2_000;
 /// Newest throttles of a timer's motors, for its task: 0, or 48 to 2047; 0 where there is no motor.
 pub type Throttles = Signal<CriticalSectionRawMutex, [u16; CHANNELS]>;
 
-/// Protocol of all motors.
-static PROTOCOL: CriticalSectionMutex<Cell<MotorProtocol>> =
-    CriticalSectionMutex::new(Cell::new(MotorProtocol::Dshot600));
+/// Protocol of all motors, and whether their controllers answer.
+static PROTOCOL: CriticalSectionMutex<Cell<(MotorProtocol, bool)>> =
+    CriticalSectionMutex::new(Cell::new((MotorProtocol::Dshot600, false)));
 
-/// Sets the protocol of all motors, before they get their first throttles.
-pub fn set_protocol(protocol: MotorProtocol) {
-    PROTOCOL.lock(|cell| cell.set(protocol));
+/// Sets the protocol of all motors, and whether their controllers answer where they can be heard, before they get their
+/// first throttles.
+pub fn set_protocol(protocol: MotorProtocol, answers: bool) {
+    PROTOCOL.lock(|cell| cell.set((protocol, answers)));
 }
 
 /// The waveform, with a row for each bit and a column for each channel. A DMA burst of four columns must not cross
 /// 1 KiB.
-// 17: sixteen bits, and a row without a pulse that ends the frame.
+// One more than a frame has: after its transfer the last bit is over.
 #[repr(align(16))]
-struct Rows<W>([[W; CHANNELS]; 17]);
+struct Rows<W>([[W; CHANNELS]; FRAME_ROWS + 1]);
 
 /// Motors of a timer. `W` is `u16`, or `u32` on a timer of 32 bits: a narrower store would fill both halves of its
 /// register.
-pub struct Motors<T: GeneralInstance4Channel, D: UpDma<T>, I, W> {
+pub struct Motors<T: GeneralInstance4Channel, D: UpDma<T>, I, W, A = ()> {
     timer: Timer<'static, T>,
     /// Held, since a pin that is let go of is no output.
     _pins: Pins<T>,
@@ -60,6 +66,8 @@ pub struct Motors<T: GeneralInstance4Channel, D: UpDma<T>, I, W> {
     dma: Peri<'static, D>,
     irqs: I,
     rows: Rows<W>,
+    /// Lines on which the controllers answer, if there are such.
+    answers: A,
 }
 
 type Pins<T> = (
@@ -100,8 +108,8 @@ where
             timer.set_output_compare_preload(channel, true);
         }
         timer.set_autoreload_preload(true);
-        let rows = Rows([[W::from(0); CHANNELS]; 17]);
-        Motors { timer, _pins: (first, second, third, fourth), clock, dma, irqs, rows }
+        let rows = Rows([[W::from(0); CHANNELS]; FRAME_ROWS + 1]);
+        Motors { timer, _pins: (first, second, third, fourth), clock, dma, irqs, rows, answers: () }
     }
 
     /// Sends each new set of throttles, and with a frame the question to the motor controller of a rotor that is
@@ -109,12 +117,27 @@ where
     pub async fn run(&mut self, throttles: &Throttles, rotors: [Option<usize>; CHANNELS]) -> ! {
         // The protocol has been set when the first come.
         let first = throttles.wait().await;
-        match PROTOCOL.lock(Cell::get).signal() {
+        let (protocol, _) = PROTOCOL.lock(Cell::get);
+        match protocol.signal() {
             MotorSignal::Frames(rate) => self.send_frames(rate, first, throttles, &rotors).await,
             MotorSignal::Pulses(format) => self.send_pulses(format, first, throttles).await,
         }
     }
 
+    /// Motors whose controllers answer, if they are to ([`set_protocol`]).
+    pub fn answering(self, lines: Lines) -> Motors<T, D, I, W, Lines> {
+        let Motors { timer, _pins, clock, dma, irqs, rows, .. } = self;
+        Motors { timer, _pins, clock, dma, irqs, rows, answers: lines }
+    }
+}
+
+impl<T, D, I, W, A> Motors<T, D, I, W, A>
+where
+    T: GeneralInstance4Channel,
+    D: UpDma<T> + ChannelInstance,
+    I: Binding<D::Interrupt, dma::InterruptHandler<D>> + Copy,
+    W: Word + From<u16> + Into<T::Word>,
+{
     /// Starts the timer, whose outputs stay low until the compare values are other than 0.
     fn start(&mut self, divider: u16, period: u16) {
         let registers = self.timer.regs_core();
@@ -140,17 +163,15 @@ where
         self.start(1, timing.period());
         let mut newest = first;
         loop {
-            let channel = |rotor| rotors.iter().position(|other| *other == Some(rotor));
-            let asked = escs::asked(|rotor| channel(rotor).is_some()).and_then(channel);
-            self.send_frame(&timing, newest, asked).await;
+            encode(&timing, newest, asked_channel(rotors), &mut self.rows);
+            self.send_rows(FRAME_ROWS).await;
             newest = throttles.wait().await;
         }
     }
 
-    /// Sends one frame to each motor; takes 28 us at 600 kbit/s.
-    async fn send_frame(&mut self, timing: &Timing, throttles: [u16; CHANNELS], asked: Option<usize>) {
-        encode(timing, throttles, asked, &mut self.rows);
-        let rows = self.rows.0.as_flattened();
+    /// Sends so many of the rows; a frame to each motor takes 28 us at 600 kbit/s.
+    async fn send_rows(&mut self, count: usize) {
+        let rows = self.rows.0.get(..count).unwrap_or_default().as_flattened();
         let dma = self.dma.reborrow();
         self.timer.enable_update_dma(true);
         let transfer = self.timer.setup_update_dma_burst(dma, self.irqs, Channel::Ch1, Channel::Ch4, rows);
@@ -187,6 +208,95 @@ where
     }
 }
 
+impl<T, D, I, W> Motors<T, D, I, W, Lines>
+where
+    T: GeneralInstance4Channel,
+    D: UpDma<T> + ChannelInstance,
+    I: Binding<D::Interrupt, dma::InterruptHandler<D>> + Copy,
+    W: Word + From<u16> + Into<u32> + Into<T::Word>,
+{
+    /// As that of motors [without answers](Motors::run); puts what the controllers [answer](firmware::escs::answered).
+    pub async fn exchange(&mut self, throttles: &Throttles, rotors: [Option<usize>; CHANNELS]) -> ! {
+        let first = throttles.wait().await;
+        let (protocol, answers) = PROTOCOL.lock(Cell::get);
+        match protocol.signal() {
+            // Only where a controller is.
+            MotorSignal::Frames(rate) if answers && rotors.iter().flatten().any(|rotor| *rotor < ROTORS) => {
+                self.exchange_frames(rate, first, throttles, &rotors).await
+            }
+            MotorSignal::Frames(rate) => self.send_frames(rate, first, throttles, &rotors).await,
+            MotorSignal::Pulses(format) => self.send_pulses(format, first, throttles).await,
+        }
+    }
+
+    /// Sends frames to which the controllers answer.
+    async fn exchange_frames(
+        &mut self,
+        rate: DshotRate,
+        first: [u16; CHANNELS],
+        throttles: &Throttles,
+        rotors: &[Option<usize>; CHANNELS],
+    ) -> ! {
+        let timing = Timing::new(self.clock, rate);
+        let sample_counts = sample_counts(self.clock, rate);
+        // The lines rest high.
+        EACH.iter().for_each(|channel| self.timer.set_output_polarity(*channel, OutputPolarity::ActiveLow));
+        self.answers.pull_up();
+        self.start(1, timing.period());
+        let mut newest = first;
+        loop {
+            encode(&timing, newest, asked_channel(rotors), &mut self.rows);
+            let [frame @ .., _] = &mut self.rows.0;
+            timing.complement_checksums(frame);
+            // With a row more than a frame has: then its last bit is over.
+            self.send_rows(self.rows.0.len()).await;
+            self.set_period(sample_counts);
+            self.sample().await;
+            self.set_period(timing.period());
+            for (channel, speed) in self.answers.speeds_rev_min() {
+                if let (Some(Some(rotor)), Some(speed)) = (rotors.get(channel), speed) {
+                    escs::answered(*rotor, speed);
+                }
+            }
+            newest = throttles.wait().await;
+        }
+    }
+
+    /// Sets the time between two updates, from now on.
+    fn set_period(&mut self, counts: u16) {
+        self.timer.regs_core().arr().write(|reload| reload.set_arr(counts.saturating_sub(1)));
+        // Takes it over from the preload register.
+        self.timer.generate_update_event();
+    }
+
+    /// Lets go of the lines, and takes samples of them; 75 us at 600 kbit/s.
+    #[expect(unsafe_code, reason = "DMA reads the port of the pins")]
+    async fn sample(&mut self) {
+        self.answers.let_go(true);
+        let (port, samples) = self.answers.sampling();
+        let request = self.dma.request();
+        let mut channel = dma::Channel::new(self.dma.reborrow(), self.irqs);
+        // One transfer for an update, not a row.
+        self.timer.regs_gp16().dcr().modify(|burst| burst.set_dbl(0));
+        self.timer.enable_update_dma(true);
+        // SAFETY: the address is that of a register that may be read at any time, and nobody else writes to the
+        // samples while the transfer lasts, which ends when it is dropped.
+        let transfer = unsafe { channel.read(request, port, samples, dma::TransferOptions::default()) };
+        let deadline = Instant::from_micros(Instant::now().as_micros().wrapping_add(TRANSFER_MAX_US));
+        if with_deadline(deadline, transfer).await.is_err() {
+            defmt::warn!("the sampling of the motors' lines has stopped");
+        }
+        self.timer.enable_update_dma(false);
+        self.answers.let_go(false);
+    }
+}
+
+/// Returns the channel whose motor controller is to be asked for its telemetry in the next frame.
+fn asked_channel(rotors: &[Option<usize>; CHANNELS]) -> Option<usize> {
+    let channel = |rotor| rotors.iter().position(|other| *other == Some(rotor));
+    escs::asked(|rotor| channel(rotor).is_some()).and_then(channel)
+}
+
 /// The output of a motor on a channel, low.
 pub fn pin<T: GeneralInstance4Channel, C: TimerChannel>(
     pin: Peri<'static, impl TimerPin<T, C>>,
@@ -212,7 +322,8 @@ pub fn rotors_of_channels(motors: [usize; CHANNELS], rotors: &[usize]) -> [Optio
 /// Encodes a frame for each channel. Out of line, like the control tick, to be counted.
 #[inline(never)]
 fn encode<W: Copy + From<u16>>(timing: &Timing, throttles: [u16; CHANNELS], asked: Option<usize>, rows: &mut Rows<W>) {
-    timing.rows(throttles, asked, &mut rows.0);
+    let [frame @ .., _] = &mut rows.0;
+    timing.rows(throttles, asked, frame);
 }
 
 /// Holds pins of a port low, whatever state the program is in. Motor controllers then stop by themselves.

@@ -23,7 +23,7 @@ struct Buffers {
 }
 
 /// Keeps logs on a card by the chip's own interface.
-pub type SdCardLog = CardKeeper<SdCard>;
+pub type SdCardLog = CardKeeper<'static>;
 
 /// A card. Every call waits for it, by polling: the task must be below all others.
 pub struct SdCard {
@@ -36,7 +36,8 @@ pub struct SdCard {
 /// # Panics
 /// At a second call.
 pub fn new(interface: Sdmmc<'static>) -> SdCardLog {
-    CardKeeper::new(SdCard::new(interface))
+    static CARD: StaticCell<SdCard> = StaticCell::new();
+    CardKeeper::new(CARD.init(SdCard::new(interface)))
 }
 
 impl SdCard {

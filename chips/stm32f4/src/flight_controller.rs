@@ -127,6 +127,10 @@ macro_rules! flight_controller {
                 !escs.is_empty()
             };
             const HARDWARE: &'static str = env!("CARGO_PKG_NAME");
+            const SMALL_LOGS: bool = {
+                let flash: &[&str] = &[$(stringify!($flash))?];
+                !flash.is_empty()
+            };
             const HAS_LOG: bool = {
                 let storages: &[&str] = &[$(stringify!($card),)? $(stringify!($flash))?];
                 !storages.is_empty()
@@ -256,8 +260,8 @@ macro_rules! flight_controller {
                 }
             }
 
-            fn set_motor_protocol(&mut self, protocol: chip_stm32::motors::MotorProtocol) {
-                chip_stm32::motors::set_protocol(protocol);
+            fn set_motor_protocol(&mut self, protocol: chip_stm32::motors::MotorProtocol, answers: bool) {
+                chip_stm32::motors::set_protocol(protocol, answers);
             }
 
             fn unleash_watchdog(&mut self) {

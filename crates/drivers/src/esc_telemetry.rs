@@ -68,9 +68,7 @@ impl EscReading {
     /// Returns the speed of the rotor of a motor with so many magnetic poles \[rad/s\].
     #[must_use]
     pub fn speed_rad_s(&self, poles: u32) -> f32 {
-        // 100 rev/min in rad/s, and two poles a pair.
-        const RAD_S: f32 = 100.0 * core::f32::consts::TAU / 60.0;
-        f32::from(self.erpm_hundreds) * (2.0 * RAD_S) / poles.max(2) as f32
+        rotor_rad_s(u32::from(self.erpm_hundreds) * 100, poles)
     }
 
     /// Returns the electrical speed of a rotor that turns with `speed_rad_s`, as a controller tells it: rounded down to
@@ -80,6 +78,15 @@ impl EscReading {
         // Half as many pairs as poles, 60 s a minute, by the hundred: 60/(2 100). The cast saturates.
         (speed_rad_s * (0.3 / core::f32::consts::TAU) * poles as f32) as u16
     }
+}
+
+/// Returns the speed of the rotor of a motor with so many magnetic poles \[rad/s\] that has this electrical speed
+/// \[rev/min\].
+#[must_use]
+pub fn rotor_rad_s(electrical_rev_min: u32, poles: u32) -> f32 {
+    // A revolution a minute in rad/s, and two poles a pair.
+    const RAD_S: f32 = core::f32::consts::TAU / 60.0;
+    electrical_rev_min as f32 * (2.0 * RAD_S) / poles.max(2) as f32
 }
 
 /// CRC-8 with polynomial x^8 + x^2 + x + 1, from 0, the highest bit first.

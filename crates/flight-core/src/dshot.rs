@@ -105,6 +105,16 @@ impl Timing {
         *last = [W::from(0); N];
     }
 
+    /// Makes [rows](Self::rows) those of bidirectional DSHOT: each frame with a
+    /// [complemented checksum](DshotFrame::bidirectional), to be sent with the line inverted.
+    pub fn complement_checksums<const N: usize, W: Copy + From<u16> + Into<u32>>(&self, rows: &mut [[W; N]; 17]) {
+        // Its four bits are the last ones.
+        for pulse in rows.iter_mut().skip(12).take(4).flatten() {
+            let is_one = (*pulse).into() == u32::from(self.one);
+            *pulse = W::from(self.pulse(!is_one));
+        }
+    }
+
     /// Returns the length of a pulse.
     const fn pulse(&self, one: bool) -> u16 {
         if one { self.one } else { self.zero }

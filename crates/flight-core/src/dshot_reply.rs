@@ -6,16 +6,18 @@
 //! five bits of a group code (GCR) of which a one is a change of level. The sixteen bits are twelve of content and a
 //! complemented checksum. The content is the period of an electrical revolution, or, between periods, another quantity
 //! (extended telemetry, EDT).
-//!
-//! No board asks for such replies yet.
 
 /// Bits of a reply on the wire, the start bit included.
 pub const REPLY_BITS: u32 = 21;
 /// Changes of level in a reply, at most, the start bit's included.
 pub const EDGES_MAX: usize = REPLY_BITS as usize + 1;
 
+/// A reply's bits are to the frame's as these are to each other.
+pub const RATE_RATIO: [u32; 2] = [5, 4];
+
 /// A period that no rotor has: it stands.
 const STOPPED: u16 = 0xFFF;
+const US_PER_MINUTE: u32 = 60_000_000;
 
 /// What a motor controller has replied.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -113,6 +115,75 @@ impl DshotReply {
             last = time;
         }
         Self::from_code(code)
+    }
+
+    /// Reads the replies on several lines from samples of all of them, `per_bit` in each bit of a reply: `lines` are
+    /// the places of their bits in a sample, below 16. A noisy line takes no longer than a reply.
+    pub fn from_port<const N: usize>(samples: &[u16], lines: [u8; N], per_bit: u16) -> [Result<Self, ReplyError>; N] {
+        let lines = lines.map(|line| 1_u16.checked_shl(line.into()).unwrap_or_default());
+        let mut edges = [[0_u16; EDGES_MAX]; N];
+        let mut counts = [0_usize; N];
+        // They rest high.
+        let (mut last, mut open) = (u16::MAX, lines.iter().fold(0, |open, line| open | line));
+        for (time, levels) in (0_u16..).zip(samples) {
+            let changed = (levels ^ last) & open;
+            last = *levels;
+            if changed == 0 {
+                continue;
+            }
+            for ((edges, count), line) in edges.iter_mut().zip(&mut counts).zip(lines) {
+                if changed & line == 0 {
+                    continue;
+                }
+                match edges.get_mut(*count) {
+                    Some(edge) => (*edge, *count) = (time, *count + 1),
+                    // More than a reply has.
+                    None => (*count, open) = (0, open & !line),
+                }
+            }
+            if open == 0 {
+                break;
+            }
+        }
+        let mut replies = [Err(ReplyError::Timing); N];
+        for ((reply, edges), count) in replies.iter_mut().zip(&edges).zip(counts) {
+            *reply = Self::from_edges(edges.get(..count).unwrap_or_default(), per_bit);
+        }
+        replies
+    }
+
+    /// Returns the electrical speed \[rev/min\] that it tells, if it does: a motor's times its pairs of poles.
+    #[must_use]
+    pub fn speed_rev_min(self) -> Option<u32> {
+        match self {
+            DshotReply::Period(None) => Some(0),
+            DshotReply::Period(Some(period_us)) => US_PER_MINUTE.checked_div(period_us),
+            _ => None,
+        }
+    }
+
+    /// Returns the sixteen bits with which a motor controller replies for an electrical speed \[rev/min\].
+    #[must_use]
+    pub fn bits_of_speed(speed_rev_min: u32) -> u16 {
+        let period_us = US_PER_MINUTE.checked_div(speed_rev_min).unwrap_or(u32::MAX);
+        // The least exponent with which it fits into nine bits.
+        let exponent = (u32::BITS - period_us.leading_zeros()).saturating_sub(9);
+        let content = if exponent > 7 { STOPPED } else { (exponent << 9 | period_us >> exponent) as u16 };
+        content << 4 | !(content ^ content >> 4 ^ content >> 8) & 0xF
+    }
+
+    /// Returns the levels of the line for sixteen bits, the start bit highest.
+    #[must_use]
+    pub fn line_of_bits(bits: u16) -> u32 {
+        let nibbles = [12, 8, 4, 0].map(|at| usize::from(bits >> at & 0xF));
+        let code = nibbles.iter().fold(0, |code, at| code << 5 | GROUPS.get(*at).copied().unwrap_or_default());
+        // From the low start bit on, each one is a change.
+        let (mut line, mut level) = (0, 0);
+        for at in (0..REPLY_BITS - 1).rev() {
+            level ^= code >> at & 1;
+            line = line << 1 | level;
+        }
+        line
     }
 
     /// Reads a reply from levels of the line at equal times, `per_bit` of them in each bit of it.

@@ -72,6 +72,43 @@ proptest! {
         prop_assert_eq!(DshotReply::from_samples(taken, per_bit as u16), Ok(wanted));
     }
 
+    /// Lines that are sampled together are read as each alone, whatever is on the others.
+    #[test]
+    fn lines_are_read_together(
+        contents in prop::array::uniform4(0_u16..4_096), befores in prop::array::uniform4(0_usize..90),
+        places in prop::sample::subsequence((0_u8..16).collect::<Vec<_>>(), 4), noise in vec(any::<u16>(), 192),
+    ) {
+        let alone: Vec<_> = contents.iter().zip(befores).map(|(content, before)| {
+            samples(&levels(checked(*content)), 3, before, 192 - before - 63)
+        }).collect();
+        let places: [u8; 4] = places.try_into().unwrap();
+        let used = places.iter().fold(0, |used, place| used | 1 << place);
+        let together: Vec<u16> = noise.iter().enumerate().map(|(at, noise)| {
+            places.iter().zip(&alone).fold(noise & !used, |all, (place, line)| all | u16::from(line[at]) << place)
+        }).collect();
+        let read = DshotReply::from_port(&together, places, 3);
+        let wanted: Vec<_> = alone.into_iter().map(|line| DshotReply::from_samples(line, 3)).collect();
+        prop_assert!(wanted.iter().all(Result::is_ok));
+        prop_assert_eq!(read.to_vec(), wanted);
+    }
+
+    #[test]
+    fn a_noisy_port_does_no_harm(samples in vec(any::<u16>(), 0..400), places: [u8; 4], per_bit in any::<u16>()) {
+        let _ = DshotReply::from_port(&samples, places, per_bit);
+    }
+
+    /// A controller's reply for a speed is that of the period's description.
+    #[test]
+    fn speeds_come_back(speed in 924_u32..2_000_000) {
+        let bits = DshotReply::bits_of_speed(speed);
+        let (content, told_us) = period_content(60_000_000 / speed);
+        prop_assert_eq!(bits, checked(content));
+        prop_assert_eq!(DshotReply::from_bits(bits).unwrap().speed_rev_min(), Some(60_000_000 / told_us));
+        let line = DshotReply::line_of_bits(bits);
+        let wanted = levels(bits).iter().fold(0, |line, level| line << 1 | u32::from(*level));
+        prop_assert_eq!(line, wanted);
+    }
+
     /// Noise is read without harm; what passes has a checksum that fits.
     #[test]
     fn noise_does_no_harm(

@@ -157,6 +157,21 @@ proptest! {
         prop_assert_eq!((bits ^ bits >> 4 ^ bits >> 8 ^ bits >> 12) & 0xF, 0);
     }
 
+    /// Bidirectional frames differ in their checksums alone.
+    #[test]
+    fn rows_become_bidirectional(throttles in prop::array::uniform4(0u16..=2047), asked in prop::option::of(0_usize..4)) {
+        let timing = Timing::new(TimerClock::new(168_000_000).unwrap(), DshotRate::Dshot600);
+        let mut rows = [[0_u32; 4]; 17];
+        timing.rows(throttles, asked, &mut rows);
+        timing.complement_checksums(&mut rows);
+        for (motor, throttle) in throttles.into_iter().enumerate() {
+            let frame = DshotFrame::new(throttle);
+            let frame = if asked == Some(motor) { frame.asking() } else { frame };
+            let column = rows.map(|row| row[motor] as u16);
+            prop_assert_eq!(column, timing.waveform(frame.bidirectional()));
+        }
+    }
+
     /// The four columns of a burst are the motors' waveforms, whatever the rows contained before.
     #[test]
     fn rows_are_waveforms_side_by_side(

@@ -10,7 +10,7 @@ use afbc_onboard::{
 };
 use afbc_recorder::Recorder;
 use afbc_scenario::{AnyController, FlownLaw};
-use afbc_station::{Calibrator, Comms, EscAction, EscReports, RadioControl};
+use afbc_station::{Calibrator, Comms, EscAction, EscReports, EscsHeard, RadioControl};
 use afbc_store::RecordName;
 use afbc_types::{OutOfRange, PerAxis, ROTORS_MAX};
 use afbc_ulog::{BlackBox, LogStart, TakenInputs};
@@ -94,8 +94,8 @@ pub(crate) struct Exchange<'a> {
     pub(crate) comms: &'a mut Comms,
     pub(crate) tick_us: f32,
     pub(crate) send: &'a mut dyn FnMut(&[u8]),
-    /// What has come over the motor controllers' line.
-    pub(crate) escs: &'a [u8],
+    /// What the motor controllers have told.
+    pub(crate) escs: EscsHeard<'a>,
 }
 
 impl<const N: usize> Core for Aircraft<N> {
@@ -108,7 +108,7 @@ impl<const N: usize> Core for Aircraft<N> {
     ) -> (Report<ROTORS_MAX>, EscAction) {
         let report = self.flight.tick(now_us, inputs, readings);
         exchange.comms.report(&report, exchange.tick_us, exchange.send);
-        let action = exchange.comms.escs(&mut self.escs, exchange.escs, &report);
+        let action = exchange.comms.escs(&mut self.escs, &exchange.escs, &report);
         // Between two ticks, as on the board: the next one is the first to fly it.
         action.notch.iter().for_each(|notch| self.flight.move_notch(notch));
         (report.padded(), action)

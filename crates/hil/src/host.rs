@@ -21,7 +21,7 @@ use afbc_recorder::{Given, Recorder, TickRecord};
 use afbc_scenario::FlownLaw;
 use afbc_scenario::contender::{ControllerKind, Law};
 use afbc_station::services::signing::{Signing, SigningRecord};
-use afbc_station::{Calibrator, Comms, EscReports, RadioControl, Setup, Transfers};
+use afbc_station::{Calibrator, Comms, EscReports, EscsHeard, RadioControl, Setup, Transfers};
 use afbc_store::{RecordName, Store};
 use afbc_types::{OutOfRange, PerAxis, ROTORS_MAX, with_rotors};
 use afbc_ulog::{LogStart, TakenInputs};
@@ -41,6 +41,8 @@ pub struct Host {
     escs: Vec<u8>,
     /// Rotor whose motor controller the last tick has asked.
     asks_esc: Option<u8>,
+    /// Electrical speeds that the motor controllers have answered \[rev/min\].
+    answers_rev_min: [Option<u32>; ROTORS_MAX],
     simulated_escs: SimulatedEscs,
     calibrator: Box<Calibrator>,
     /// What the sensors have read while somebody wants to know.
@@ -155,6 +157,7 @@ impl Host {
         Ok(Host {
             escs: Vec::new(),
             asks_esc: None,
+            answers_rev_min: [None; ROTORS_MAX],
             simulated_escs: SimulatedEscs::new(table.configuration().escs.poles),
             flight: Box::new(Aircraft { flight, table, law, escs }),
             setup,
@@ -296,11 +299,12 @@ impl Host {
     }
 
     /// Lets simulated motor controllers answer the question of the last tick, which the rotors of `plant` have turned
-    /// for; in place of [`hear_escs`](Self::hear_escs).
+    /// for, and its frame, by bidirectional DSHOT; in place of [`hear_escs`](Self::hear_escs).
     pub fn hear_simulated_escs(&mut self, plant: &Plant) {
         if let Some(answer) = self.simulated_escs.step(self.asks_esc.take(), plant) {
             self.hear_escs(&answer);
         }
+        self.answers_rev_min = self.simulated_escs.answers_rev_min(plant);
     }
 
     /// Sets what the vehicle's own sensors read for the next tick alone.
@@ -324,7 +328,8 @@ impl Host {
         let mut bytes = Vec::new();
         let mut send = |frame: &[u8]| bytes.extend_from_slice(frame);
         let escs = core::mem::take(&mut self.escs);
-        let exchange = Exchange { comms: &mut self.comms, tick_us, send: &mut send, escs: &escs };
+        let heard = EscsHeard { bytes: &escs, speeds_rev_min: core::mem::take(&mut self.answers_rev_min) };
+        let exchange = Exchange { comms: &mut self.comms, tick_us, send: &mut send, escs: heard };
         let (report, action) = self.flight.tick(time_us, &mut self.taken, &readings, exchange);
         if let Some(ExactLog { recorder, write, adopted, notch_rad_s }) = &mut self.log {
             let (number, given, battery, clock_failed) = (self.number, Given::of(&report), self.taken.battery, false);

@@ -1,6 +1,7 @@
 //! The motor controllers of a simulated vehicle.
 
 use afbc_drivers::esc_telemetry::{ANSWER_LEN, EscReading};
+use afbc_flight_core::dshot_reply::DshotReply;
 use afbc_plant::Plant;
 use afbc_types::ROTORS_MAX;
 
@@ -30,6 +31,19 @@ impl SimulatedEscs {
     #[must_use]
     pub fn new(poles: u32) -> Self {
         SimulatedEscs { poles, asked: None, measured: None, drawn_mah: [0.0; ROTORS_MAX] }
+    }
+
+    /// Returns the electrical speeds with which they answer a frame by bidirectional DSHOT \[rev/min\]: what the
+    /// plant's rotors do, as an answer has room for it.
+    #[must_use]
+    pub fn answers_rev_min(&self, plant: &Plant) -> [Option<u32>; ROTORS_MAX] {
+        let mut answers = [None; ROTORS_MAX];
+        for (answer, speed_rad_s) in answers.iter_mut().zip(&plant.truth().rotor_speeds_rad_s) {
+            let speed_rev_min = speed_rad_s * (30.0 / std::f64::consts::TAU) * f64::from(self.poles);
+            let reply = DshotReply::from_bits(DshotReply::bits_of_speed(speed_rev_min as u32));
+            *answer = reply.ok().and_then(DshotReply::speed_rev_min);
+        }
+        answers
     }
 
     /// Advances them by a millisecond, at whose beginning a rotor's is asked ([`HostTick::asks_esc`]), and during which

@@ -26,7 +26,7 @@ impl core::fmt::Display for CardError {
 impl core::error::Error for CardError {}
 
 /// A memory card: blocks of 512 bytes by number. Every call may wait for it.
-pub trait LogCard {
+pub trait LogCard: Send {
     /// Begins anew, after a failure or with another card; returns its number of blocks.
     ///
     /// # Errors

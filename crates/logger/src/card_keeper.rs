@@ -20,7 +20,7 @@ const DIGITS: usize = 3;
 const NUMBER_MAX: u32 = 99_999;
 
 /// A file that is written, and one that is read.
-type Volumes<C> = VolumeManager<Device<C>, NoClock, 1, 2, 1>;
+type Volumes<'a> = VolumeManager<Device<'a>, NoClock, 1, 2, 1>;
 
 /// What is read.
 #[derive(Debug, Default)]
@@ -39,9 +39,9 @@ impl Reader {
 }
 
 /// Keeps logs on a card.
-pub struct CardKeeper<C: LogCard> {
+pub struct CardKeeper<'a> {
     /// None only while it is exchanged.
-    pub(crate) volumes: Option<Volumes<C>>,
+    pub(crate) volumes: Option<Volumes<'a>>,
     pub(crate) root: Option<RawDirectory>,
     pub(crate) file: Option<RawFile>,
     pub(crate) reader: Reader,
@@ -55,9 +55,9 @@ pub struct CardKeeper<C: LogCard> {
     synced_us: u64,
 }
 
-impl<C: LogCard> CardKeeper<C> {
+impl<'a> CardKeeper<'a> {
     /// Creates it, with nothing known of the card.
-    pub fn new(card: C) -> Self {
+    pub fn new(card: &'a mut dyn LogCard) -> Self {
         CardKeeper {
             volumes: Some(volumes(Device::new(card))),
             root: None,
@@ -149,7 +149,7 @@ impl<C: LogCard> CardKeeper<C> {
         Ok(())
     }
 
-    fn open(&self) -> Result<(&Volumes<C>, RawFile), Error<CardError>> {
+    fn open(&self) -> Result<(&Volumes<'a>, RawFile), Error<CardError>> {
         self.volumes.as_ref().zip(self.file).ok_or(Error::BadHandle)
     }
 
@@ -194,7 +194,7 @@ impl<C: LogCard> CardKeeper<C> {
     }
 }
 
-impl<C: LogCard> LogKeeper for CardKeeper<C> {
+impl LogKeeper for CardKeeper<'_> {
     fn state(&self) -> StorageState {
         self.state
     }
@@ -248,7 +248,7 @@ impl<C: LogCard> LogKeeper for CardKeeper<C> {
     }
 }
 
-fn volumes<C: LogCard>(device: Device<C>) -> Volumes<C> {
+fn volumes(device: Device<'_>) -> Volumes<'_> {
     VolumeManager::new_with_limits(device, NoClock, 1)
 }
 

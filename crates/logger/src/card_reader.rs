@@ -1,13 +1,13 @@
 //! Logs that are on the card already.
 
-use crate::card::{CardError, LogCard};
+use crate::card::CardError;
 use crate::card_keeper::{CardKeeper, log_name};
 use crate::keeper::StorageState;
 use crate::query::{LogAnswer, LogQuery};
 use core::ops::ControlFlow;
 use embedded_sdmmc::{Error, Mode};
 
-impl<C: LogCard> CardKeeper<C> {
+impl CardKeeper<'_> {
     /// Answers a question; of a log that is read, with what is on the page.
     pub(crate) fn look_up(&mut self, query: LogQuery, page: &mut [u8]) -> Result<LogAnswer, Error<CardError>> {
         match query {

@@ -18,7 +18,7 @@ impl core::fmt::Display for FlashFailed {
 impl core::error::Error for FlashFailed {}
 
 /// NOR flash of sectors that are erased as a whole. Every call may wait for it.
-pub trait LogFlash {
+pub trait LogFlash: Send {
     /// Begins anew, after a reset or a failure; returns its number of sectors.
     ///
     /// # Errors

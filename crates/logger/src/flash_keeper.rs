@@ -39,9 +39,8 @@ struct Stretch {
 }
 
 /// Keeps logs in flash.
-#[derive(Debug)]
-pub struct FlashKeeper<F> {
-    flash: F,
+pub struct FlashKeeper<'a> {
+    flash: &'a mut dyn LogFlash,
     sectors: u32,
     state: StorageState,
     ahead: Ahead,
@@ -59,9 +58,9 @@ pub struct FlashKeeper<F> {
     retry_us: u64,
 }
 
-impl<F: LogFlash> FlashKeeper<F> {
+impl<'a> FlashKeeper<'a> {
     /// Creates it, with nothing known of the flash.
-    pub fn new(flash: F) -> Self {
+    pub fn new(flash: &'a mut dyn LogFlash) -> Self {
         FlashKeeper {
             flash,
             sectors: 0,
@@ -75,11 +74,6 @@ impl<F: LogFlash> FlashKeeper<F> {
             now_us: 0,
             retry_us: 0,
         }
-    }
-
-    /// Returns the flash.
-    pub fn flash(&self) -> &F {
-        &self.flash
     }
 
     /// True once it has started, and has not failed since.
@@ -323,10 +317,7 @@ impl<F: LogFlash> FlashKeeper<F> {
     }
 }
 
-impl<F: LogFlash> LogKeeper for FlashKeeper<F> {
-    /// 16 MiB are two minutes of a usual log.
-    const SMALL: bool = true;
-
+impl LogKeeper for FlashKeeper<'_> {
     fn state(&self) -> StorageState {
         self.state
     }

@@ -6,10 +6,6 @@ use crate::query::{LogPage, LogQuery};
 /// Keeps the blocks of logs, and gives logs back. It may wait for its card or flash in every call but
 /// [`state`](Self::state).
 pub trait LogKeeper {
-    /// True if there is room for minutes only, so that a log has fewer messages
-    /// ([`afbc_ulog::LoggedTopic::small_us`]).
-    const SMALL: bool = false;
-
     /// Returns what is known of the card or flash.
     fn state(&self) -> StorageState;
 

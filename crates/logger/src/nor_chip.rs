@@ -73,7 +73,7 @@ fn addressed(command: u8, address: u32) -> [u8; 4] {
     [command, high, middle, low]
 }
 
-impl<D: SpiDevice> LogFlash for NorChip<D> {
+impl<D: SpiDevice + Send> LogFlash for NorChip<D> {
     fn start(&mut self) -> Result<u32, FlashFailed> {
         self.call(&mut [Operation::Write(&[RELEASE_POWER_DOWN])])?;
         // What it had begun before a reset of the processor it finishes.

@@ -13,8 +13,8 @@ const TYPES: [u8; 5] = [0x04, 0x06, 0x0E, 0x0B, 0x0C];
 const CLUSTERS: [u64; 2] = [4_085, 65_525];
 
 /// A card as `embedded-sdmmc` wants it.
-pub(crate) struct Device<C> {
-    card: RefCell<C>,
+pub(crate) struct Device<'a> {
+    card: RefCell<&'a mut dyn LogCard>,
     /// Blocks, once the card has started.
     blocks: Cell<u32>,
     /// What the call may still touch.
@@ -23,8 +23,8 @@ pub(crate) struct Device<C> {
     failure: Cell<Option<CardError>>,
 }
 
-impl<C: LogCard> Device<C> {
-    pub(crate) fn new(card: C) -> Self {
+impl<'a> Device<'a> {
+    pub(crate) fn new(card: &'a mut dyn LogCard) -> Self {
         Device { card: RefCell::new(card), blocks: Cell::new(0), left: Cell::new(0), failure: Cell::new(None) }
     }
 
@@ -54,12 +54,12 @@ impl<C: LogCard> Device<C> {
         Ok(is_sound(&block[0].contents, u64::from(blocks - start)))
     }
 
-    fn touch<T>(&self, call: impl FnOnce(&mut C) -> Result<T, CardError>) -> Result<T, CardError> {
+    fn touch<T>(&self, call: impl FnOnce(&mut dyn LogCard) -> Result<T, CardError>) -> Result<T, CardError> {
         // `try`: the library must not make it panic, in whatever order it calls.
         let done = match (self.left.get().checked_sub(1), self.card.try_borrow_mut()) {
             (Some(left), Ok(mut card)) => {
                 self.left.set(left);
-                call(&mut *card)
+                call(&mut **card)
             }
             _ => Err(CardError::Endless),
         };
@@ -70,7 +70,7 @@ impl<C: LogCard> Device<C> {
     }
 }
 
-impl<C: LogCard> BlockDevice for Device<C> {
+impl BlockDevice for Device<'_> {
     type Error = CardError;
 
     fn read(&self, blocks: &mut [Block], start: BlockIdx) -> Result<(), CardError> {

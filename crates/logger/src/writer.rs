@@ -36,7 +36,8 @@ pub struct LogWriter {
 }
 
 impl LogWriter {
-    /// Creates it, with no log, for small logs ([`LogKeeper::SMALL`](crate::LogKeeper::SMALL)) or usual ones.
+    /// Creates it, with no log, for small logs, where there is room for minutes only ([`BlackBox::small`]), or usual
+    /// ones.
     pub const fn new(small: bool) -> Self {
         LogWriter {
             log: None,

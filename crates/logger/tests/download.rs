@@ -18,13 +18,13 @@ use std::io::Write;
 fn logs_are_listed_and_downloaded() {
     for card in [fat16(), fat32()] {
         for name in ["LOG0007.ULG", "LOGBOOK.ULG", "OTHER.BIN"] {
-            mount(&mut card.0.borrow_mut().bytes).root_dir().create_file(name).unwrap();
+            mount(&mut card.0.lock().unwrap().bytes).root_dir().create_file(name).unwrap();
         }
         let mut station = Station::new(&card);
         assert!(station.list().is_empty());
         (0..3).for_each(|number| station.fly(300 + 100 * number));
-        mount(&mut card.0.borrow_mut().bytes).root_dir().remove("LOG0007.ULG").unwrap();
-        mount(&mut card.0.borrow_mut().bytes).root_dir().remove("LOGBOOK.ULG").unwrap();
+        mount(&mut card.0.lock().unwrap().bytes).root_dir().remove("LOG0007.ULG").unwrap();
+        mount(&mut card.0.lock().unwrap().bytes).root_dir().remove("LOGBOOK.ULG").unwrap();
         station.is_served_as_it_is_kept();
         // Any part of any, and what is not there.
         let held = station.room.logs();
@@ -73,12 +73,17 @@ fn erased_logs_leave_room() {
         let mut other = vec![0x5A; 70_000];
         other[7] = 1;
         let free = |card: &Card| {
-            let mut disk = card.0.borrow_mut();
+            let mut disk = card.0.lock().unwrap();
             let volume = mount(&mut disk.bytes);
             let used = volume.root_dir().iter().map(|entry| entry.unwrap().len()).sum::<u64>();
             (used, u64::from(volume.cluster_size()))
         };
-        mount(&mut card.0.borrow_mut().bytes).root_dir().create_file("OTHER.BIN").unwrap().write_all(&other).unwrap();
+        mount(&mut card.0.lock().unwrap().bytes)
+            .root_dir()
+            .create_file("OTHER.BIN")
+            .unwrap()
+            .write_all(&other)
+            .unwrap();
         let mut station = Station::new(&card);
         (0..3).for_each(|_| station.fly(300));
         assert!(free(&card).0 > 300_000);
@@ -95,7 +100,7 @@ fn erased_logs_leave_room() {
         adds_up(&log).unwrap();
         // The table's own account.
         let (used, cluster) = free(&card);
-        let mut disk = card.0.borrow_mut();
+        let mut disk = card.0.lock().unwrap();
         let volume = mount(&mut disk.bytes);
         let total = u64::from(volume.stats().unwrap().total_clusters());
         let mut counted = 0;
@@ -116,7 +121,7 @@ fn erased_logs_leave_room() {
 fn a_full_card_is_emptied() {
     let card = fat16();
     {
-        let mut disk = card.0.borrow_mut();
+        let mut disk = card.0.lock().unwrap();
         let volume = mount(&mut disk.bytes);
         let free = u64::from(volume.stats().unwrap().free_clusters()) * u64::from(volume.cluster_size());
         let mut file = volume.root_dir().create_file("OTHER.BIN").unwrap();
@@ -148,16 +153,16 @@ proptest! {
         (0..2).for_each(|_| station.fly(200));
         let held = station.room.logs();
         let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
-        card.0.borrow_mut().takes_us = Box::new(move || match random.next_u32() % 1_000 {
+        card.0.lock().unwrap().takes_us = Box::new(move || match random.next_u32() % 1_000 {
             0 => 500_000,
             1..=9 => 60_000,
             part => u64::from(part),
         });
         for (step, number) in steps {
             match step {
-                0 => card.0.borrow_mut().is_there = false,
-                1 => card.0.borrow_mut().is_there = true,
-                2 => card.0.borrow_mut().fails_in = Some(number % 40),
+                0 => card.0.lock().unwrap().is_there = false,
+                1 => card.0.lock().unwrap().is_there = true,
+                2 => card.0.lock().unwrap().fails_in = Some(number % 40),
                 3 => station.room.armed = number % 2 == 0,
                 4 => {
                     station.ask_for(LogRequest::List { first: 0, last: 9 }, 300);
@@ -179,7 +184,7 @@ proptest! {
             station.room.run(u64::from(number % 300));
         }
         {
-            let mut disk = card.0.borrow_mut();
+            let mut disk = card.0.lock().unwrap();
             (disk.is_there, disk.fails_in, disk.takes_us) = (true, None, Box::new(|| 300));
         }
         station.room.armed = false;

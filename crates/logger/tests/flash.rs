@@ -64,7 +64,7 @@ fn all_is_kept() {
     }
     assert!(station.room.told.is_empty());
     // After a restart they are there, and the next has the next number.
-    let mut station = Station::new(&Chip::holding(chip.0.borrow().bytes.clone()));
+    let mut station = Station::new(&Chip::holding(chip.0.lock().unwrap().bytes.clone()));
     station.fly(400);
     station.is_served_as_it_is_kept();
     let now = station.room.logs();
@@ -110,7 +110,7 @@ fn a_full_flash_is_emptied() {
     assert_eq!(kept.last().unwrap().1.len() % (SECTOR - 256), 0, "the last one fills it");
     station.is_served_as_it_is_kept();
     assert!(station.erase());
-    assert!(chip.0.borrow().bytes.iter().all(|byte| *byte == 0xFF));
+    assert!(chip.0.lock().unwrap().bytes.iter().all(|byte| *byte == 0xFF));
     assert_eq!(station.room.told.last(), StorageState::Ready.text().as_ref());
     station.fly(3_000);
     station.is_served_as_it_is_kept();
@@ -142,7 +142,7 @@ fn cuts_of_the_power_leave_logs() {
     station.fly(300);
     let first = station.room.logs();
     station.fly(2_500);
-    let changes = chip.0.borrow().changes.clone();
+    let changes = chip.0.lock().unwrap().changes.clone();
     let mut cells = vec![0xFF; 6 * SECTOR];
     let mut random = Xoshiro256PlusPlus::seed_from_u64(1);
     let mut random = || random.next_u32() as u8;
@@ -198,9 +198,10 @@ fn cuts_of_erasing_leave_logs() {
     station.fly(8_000);
     (0..2).for_each(|_| station.fly(300));
     let held = station.room.logs();
-    let (before, written) = (chip.0.borrow().bytes.clone(), chip.0.borrow().changes.len());
+    let before = chip.0.lock().unwrap().bytes.clone();
+    let written = chip.0.lock().unwrap().changes.len();
     assert!(station.erase());
-    let changes = chip.0.borrow().changes[written..].to_vec();
+    let changes = chip.0.lock().unwrap().changes[written..].to_vec();
     assert!(changes.len() >= 4, "{changes:?}");
     let mut random = Xoshiro256PlusPlus::seed_from_u64(2);
     let mut cells = before;
@@ -216,7 +217,7 @@ fn cuts_of_erasing_leave_logs() {
         station.fly(300);
         assert!(station.room.logs().len() > kept.len() || station.room.state == StorageState::Full);
         assert!(station.erase());
-        assert!(station.room.card.0.borrow().bytes.iter().all(|byte| *byte == 0xFF));
+        assert!(station.room.card.0.lock().unwrap().bytes.iter().all(|byte| *byte == 0xFF));
         apply(&mut cells, change);
     }
 }
@@ -225,20 +226,20 @@ fn cuts_of_erasing_leave_logs() {
 #[test]
 fn a_chip_that_does_not_work() {
     let chip = Chip::new(4);
-    chip.0.borrow_mut().is_there = false;
+    chip.0.lock().unwrap().is_there = false;
     let mut station = Station::new(&chip);
     station.fly(300);
     assert_eq!(station.room.told, [StorageState::Failed.text().unwrap()]);
     assert!(station.list().is_empty());
-    chip.0.borrow_mut().is_there = true;
+    chip.0.lock().unwrap().is_there = true;
     station.room.run(1_500);
     station.fly(300);
     assert_eq!(station.room.told.last(), StorageState::Ready.text().as_ref());
     station.is_served_as_it_is_kept();
     for is_protected in [true, false] {
         let chip = Chip::new(4);
-        chip.0.borrow_mut().is_protected = is_protected;
-        chip.0.borrow_mut().takes_us[0] = if is_protected { 700 } else { 1_000_000_000 };
+        chip.0.lock().unwrap().is_protected = is_protected;
+        chip.0.lock().unwrap().takes_us[0] = if is_protected { 700 } else { 1_000_000_000 };
         let mut station = Station::new(&chip);
         station.fly(6_000);
         assert_eq!(station.room.told[0], StorageState::Failed.text().unwrap());
@@ -251,7 +252,7 @@ fn a_chip_that_does_not_work() {
 fn slow_pages_lose_nothing() {
     let chip = Chip::new(8);
     let mut station = Station::new(&chip);
-    chip.0.borrow_mut().takes_us[0] = 5_000;
+    chip.0.lock().unwrap().takes_us[0] = 5_000;
     station.fly(4_000);
     // What waits is kept after the end.
     station.room.run(2_000);
@@ -267,9 +268,9 @@ fn a_stall_is_a_dropout() {
     let mut station = Station::new(&chip);
     station.room.armed = true;
     station.room.run(2_000);
-    chip.0.borrow_mut().takes_us[0] = 600_000;
+    chip.0.lock().unwrap().takes_us[0] = 600_000;
     station.room.run(30);
-    chip.0.borrow_mut().takes_us[0] = 700;
+    chip.0.lock().unwrap().takes_us[0] = 700;
     station.fly(3_000);
     let kept = station.room.logs();
     let log = read(&kept[0].1);
@@ -300,7 +301,7 @@ proptest! {
         let blank = free.iter().filter(|sector| sector.iter().all(|byte| *byte == 0xFF)).count();
         prop_assert_eq!(station.room.logs().len(), usize::from(blank > 0));
         prop_assert!(station.erase());
-        prop_assert!(chip.0.borrow().bytes.iter().all(|byte| *byte == 0xFF));
+        prop_assert!(chip.0.lock().unwrap().bytes.iter().all(|byte| *byte == 0xFF));
     }
 
     /// Failures, arming and questions in the middle of it: each request has an answer, and each byte is the log's.
@@ -312,11 +313,11 @@ proptest! {
         let held = station.room.logs();
         for (step, number) in steps {
             match step {
-                0 => chip.0.borrow_mut().is_there = false,
-                1 => chip.0.borrow_mut().is_there = true,
-                2 => chip.0.borrow_mut().fails_in = Some(number % 400),
+                0 => chip.0.lock().unwrap().is_there = false,
+                1 => chip.0.lock().unwrap().is_there = true,
+                2 => chip.0.lock().unwrap().fails_in = Some(number % 400),
                 3 => station.room.armed = number % 2 == 0,
-                4 => chip.0.borrow_mut().takes_us[0] = [700, 3_000, 9_000][number as usize % 3],
+                4 => chip.0.lock().unwrap().takes_us[0] = [700, 3_000, 9_000][number as usize % 3],
                 5 => {
                     station.ask_for(LogRequest::List { first: 0, last: 9 }, 300);
                     station.transfer.hear(LogRequest::End);
@@ -336,7 +337,7 @@ proptest! {
             station.room.run(u64::from(number % 300));
         }
         {
-            let mut cells = chip.0.borrow_mut();
+            let mut cells = chip.0.lock().unwrap();
             (cells.is_there, cells.fails_in, cells.takes_us) = (true, None, [700, 150_000]);
         }
         station.room.armed = false;

@@ -72,10 +72,10 @@ fn modes_are_those_of_px4() {
 #[test]
 fn a_cut_leaves_a_log_up_to_the_last_second() {
     for card in [fat16(), fat32()] {
-        let mut disk = card.0.borrow().bytes.clone();
+        let mut disk = card.0.lock().unwrap().bytes.clone();
         let mut room = Room::new(&card);
         room.run(3_500);
-        let written = std::mem::take(&mut card.0.borrow_mut().written);
+        let written = std::mem::take(&mut card.0.lock().unwrap().written);
         let (mut cuts, mut read_to_us) = (0, 0);
         let mut begun_us = None;
         for (at_us, number, block) in &written {
@@ -106,7 +106,7 @@ fn a_stall_is_a_dropout() {
     let mut room = Room::new(&card);
     room.run(1_000);
     let mut calls = 0;
-    card.0.borrow_mut().takes_us = Box::new(move || {
+    card.0.lock().unwrap().takes_us = Box::new(move || {
         calls += 1;
         if calls == 100 { 500_000 } else { 300 }
     });
@@ -124,7 +124,7 @@ fn a_stall_is_a_dropout() {
 fn a_full_card_ends_the_log() {
     let card = fat16();
     {
-        let mut disk = card.0.borrow_mut();
+        let mut disk = card.0.lock().unwrap();
         let volume = mount(&mut disk.bytes);
         let free = u64::from(volume.stats().unwrap().free_clusters()) * u64::from(volume.cluster_size());
         let mut file = volume.root_dir().create_file("OTHER.BIN").unwrap();
@@ -138,7 +138,7 @@ fn a_full_card_ends_the_log() {
     let log = read(&logs[0].1);
     assert!((100_000..150_000).contains(&logs[0].1.len()), "{}", logs[0].1.len());
     adds_up(&log).unwrap();
-    let mut disk = card.0.borrow_mut();
+    let mut disk = card.0.lock().unwrap();
     let volume = mount(&mut disk.bytes);
     let others = volume.root_dir().iter().filter(|entry| entry.as_ref().unwrap().len() > 1_000_000).count();
     assert_eq!(others, 1, "the other file is there");
@@ -150,9 +150,9 @@ fn a_card_that_comes_back_gets_another_log() {
     let card = fat32();
     let mut room = Room::new(&card);
     room.run(1_500);
-    card.0.borrow_mut().is_there = false;
+    card.0.lock().unwrap().is_there = false;
     room.run(3_000);
-    card.0.borrow_mut().is_there = true;
+    card.0.lock().unwrap().is_there = true;
     room.run(2_500);
     let logs = room.logs();
     assert_eq!(logs.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>(), ["LOG001.ULG", "LOG002.ULG"]);
@@ -167,7 +167,7 @@ fn a_card_that_comes_back_gets_another_log() {
 fn numbers_go_on() {
     let card = fat16();
     for name in ["LOG007.ULG", "LOG9.ULG", "LOGBOOK.ULG", "LOG12X.ULG", "LOG1000.TXT"] {
-        mount(&mut card.0.borrow_mut().bytes).root_dir().create_file(name).unwrap();
+        mount(&mut card.0.lock().unwrap().bytes).root_dir().create_file(name).unwrap();
     }
     let mut room = Room::new(&card);
     room.run(1_500);
@@ -183,16 +183,16 @@ fn numbers_go_on() {
 #[test]
 fn cards_without_a_volume_are_told() {
     let blank = fat16();
-    blank.0.borrow_mut().bytes.fill(0);
+    blank.0.lock().unwrap().bytes.fill(0);
     let other = fat16();
-    other.0.borrow_mut().bytes[450] = 0x07;
+    other.0.lock().unwrap().bytes[450] = 0x07;
     let none = fat16();
-    none.0.borrow_mut().is_there = false;
+    none.0.lock().unwrap().is_there = false;
     for (card, text) in [(blank, StorageState::Foreign), (other, StorageState::Foreign), (none, StorageState::Absent)] {
         let mut room = Room::new(&card);
         room.run(3_000);
         assert_eq!(room.told, [text.text().unwrap()]);
-        assert!(card.0.borrow().written.is_empty());
+        assert!(card.0.lock().unwrap().written.is_empty());
     }
     assert!(StorageState::ALL.iter().all(|state| state.text().is_none_or(|text| text.len() <= 50)));
     for (number, state) in StorageState::ALL.into_iter().enumerate() {
@@ -203,7 +203,7 @@ fn cards_without_a_volume_are_told() {
 /// A draw of stalls and failures.
 fn hostile(card: &Card, seed: u64) {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
-    card.0.borrow_mut().takes_us = Box::new(move || match random.next_u32() % 1_000 {
+    card.0.lock().unwrap().takes_us = Box::new(move || match random.next_u32() % 1_000 {
         0 => 500_000,
         1..=5 => 60_000,
         part => u64::from(part),
@@ -223,16 +223,16 @@ proptest! {
         let mut room = Room::new(&card);
         for (step, ticks, calls) in steps {
             match step {
-                0 => card.0.borrow_mut().fails_in = Some(calls),
-                1 => card.0.borrow_mut().is_there = false,
+                0 => card.0.lock().unwrap().fails_in = Some(calls),
+                1 => card.0.lock().unwrap().is_there = false,
                 2 => (0..calls % 5).for_each(|_| room.tick(true)),
                 3 => room.change(3.0 + calls as f32 / 100.0),
-                _ => card.0.borrow_mut().is_there = true,
+                _ => card.0.lock().unwrap().is_there = true,
             }
             room.run(ticks);
         }
         // What is on its way arrives.
-        card.0.borrow_mut().is_there = true;
+        card.0.lock().unwrap().is_there = true;
         room.mode = LogMode::Armed;
         room.run(3_000);
         for (_, bytes) in room.logs() {
@@ -251,7 +251,7 @@ proptest! {
     ) {
         let card = if is_fat32 { fat32() } else { fat16() };
         {
-            let bytes = &mut card.0.borrow_mut().bytes;
+            let bytes = &mut card.0.lock().unwrap().bytes;
             for (block, at, value) in damage {
                 bytes[(VOLUME + block) * 512 + at] = value;
             }
@@ -259,7 +259,7 @@ proptest! {
                 bytes[VOLUME * 512 + at] = value;
             }
         }
-        let head = card.0.borrow().bytes[..512].to_vec();
+        let head = card.0.lock().unwrap().bytes[..512].to_vec();
         let mut room = Room::new(&card);
         room.run(600);
         // Its logs are listed, read and erased.
@@ -272,8 +272,8 @@ proptest! {
                 _ => room.stored.erase_logs().is_ready(),
             };
         }
-        prop_assert_eq!(&card.0.borrow().bytes[..512], &head[..]);
-        prop_assert!(card.0.borrow().calls < 4 << 20);
+        prop_assert_eq!(&card.0.lock().unwrap().bytes[..512], &head[..]);
+        prop_assert!(card.0.lock().unwrap().calls < 4 << 20);
     }
 }
 
@@ -282,7 +282,7 @@ proptest! {
 fn a_circle_ends() {
     let card = fat32();
     {
-        let bytes = &mut card.0.borrow_mut().bytes;
+        let bytes = &mut card.0.lock().unwrap().bytes;
         let reserved = usize::from(u16::from_le_bytes([bytes[VOLUME * 512 + 14], bytes[VOLUME * 512 + 15]]));
         let table = (VOLUME + reserved) * 512;
         // The root's cluster, 2, leads to 2, and is full.
@@ -295,7 +295,7 @@ fn a_circle_ends() {
         }
     }
     let mut room = Room::new(&card);
-    card.0.borrow_mut().takes_us = Box::new(|| 1);
+    card.0.lock().unwrap().takes_us = Box::new(|| 1);
     room.run(2 * SYNCED_US / TICK_US);
     assert!(matches!(room.told.as_slice(), ["Log: storage has failed"]), "{:?}", room.told);
 }

@@ -10,6 +10,10 @@ parameters! {
         /// The motor controllers are asked for their telemetry, by DSHOT, and answer over the board's line for it.
         #[switch(DSHOT_TEL_CFG)]
         pub serial: bool = false,
+        /// The motor controllers answer each frame of DSHOT on their own line (bidirectional DSHOT), to boards that can
+        /// hear them, from the next start on.
+        #[switch(DSHOT_BIDIR_EN)]
+        pub answers: bool = false,
         /// Magnetic poles of a motor, an even number: those of its bell, usually 14.
         #[parameter(MOT_POLE_COUNT, "number", 2.0..=400.0)]
         pub poles: u32 = 14,

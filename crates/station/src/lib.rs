@@ -34,7 +34,7 @@ mod transfers;
 
 pub use afbc_link::Reboot;
 pub use comms::{CLOCK_FAILED, Comms, REPORT_MAX, TICK_OFF};
-pub use escs::{EscAction, EscReports};
+pub use escs::{EscAction, EscReports, EscsHeard};
 pub use log_server::LogServer;
 pub use radio::{RADIO_FRAME_MAX, RadioControl};
 pub use services::calibration::Calibrator;

@@ -102,15 +102,15 @@ const fn uart(index: usize, register: u64, clock_hz: u64, interrupt: u16) -> Uar
 
 /// Of TIM3 with DMA1's stream 2, TIM4 and TIM5 with its stream 6, TIM8 with DMA2's stream 1 (RM0090, 10.5.5).
 const fn tim3(motors: [usize; 2]) -> FrameTimer {
-    FrameTimer { counter: 0x4000_0400, stream: 0x4002_6040, motors: motors[0]..motors[1] }
+    FrameTimer { counter: 0x4000_0400, stream: 0x4002_6040, motors: motors[0]..motors[1], lines: None }
 }
 
 const fn tim4(motors: [usize; 2]) -> FrameTimer {
-    FrameTimer { counter: 0x4000_0800, stream: 0x4002_60A0, motors: motors[0]..motors[1] }
+    FrameTimer { counter: 0x4000_0800, stream: 0x4002_60A0, motors: motors[0]..motors[1], lines: None }
 }
 
-const TIM5_LAST: FrameTimer = FrameTimer { counter: 0x4000_0C00, stream: 0x4002_60A0, motors: 2..4 };
-const TIM8_ALL: FrameTimer = FrameTimer { counter: 0x4001_0400, stream: 0x4002_6428, motors: 0..4 };
+const TIM5_LAST: FrameTimer = FrameTimer { counter: 0x4000_0C00, stream: 0x4002_60A0, motors: 2..4, lines: None };
+const TIM8_ALL: FrameTimer = FrameTimer { counter: 0x4001_0400, stream: 0x4002_6428, motors: 0..4, lines: None };
 const TIM4_ALL: FrameTimer = tim4([0, 4]);
 const TIM4_TIM3: &[FrameTimer] = &[tim4([0, 2]), tim3([2, 4])];
 const ALL_OF_TIM8: [(&str, Timer, u8); 4] = [("M1", TIM8, 1), ("M2", TIM8, 2), ("M3", TIM8, 3), ("M4", TIM8, 4)];

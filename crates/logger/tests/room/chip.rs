@@ -3,8 +3,8 @@
 use super::Storage;
 use afbc_logger::{FlashKeeper, NorChip};
 use embedded_hal::spi::{ErrorKind, ErrorType, Operation, SpiDevice};
-use std::cell::{Cell, RefCell};
-use std::rc::Rc;
+use std::cell::Cell;
+use std::sync::{Arc, Mutex};
 
 pub(crate) const SECTOR: usize = 65_536;
 const PAGE: usize = 256;
@@ -43,7 +43,7 @@ pub(crate) struct Cells {
 }
 
 #[derive(Clone, Debug)]
-pub(crate) struct Chip(pub(crate) Rc<RefCell<Cells>>);
+pub(crate) struct Chip(pub(crate) Arc<Mutex<Cells>>);
 
 impl Chip {
     /// A blank one.
@@ -52,7 +52,7 @@ impl Chip {
     }
 
     pub(crate) fn holding(bytes: Vec<u8>) -> Self {
-        Chip(Rc::new(RefCell::new(Cells {
+        Chip(Arc::new(Mutex::new(Cells {
             bytes,
             changes: Vec::new(),
             is_there: true,
@@ -143,7 +143,7 @@ impl ErrorType for Wire {
 
 impl SpiDevice for Wire {
     fn transaction(&mut self, operations: &mut [Operation<'_, u8>]) -> Result<(), Broken> {
-        let mut cells = self.0.0.borrow_mut();
+        let mut cells = self.0.0.lock().unwrap();
         let (mut command, mut answer) = (Vec::new(), 0);
         for operation in operations.iter() {
             match operation {
@@ -177,24 +177,25 @@ impl SpiDevice for Wire {
 }
 
 impl Storage for Chip {
-    type Keeper = FlashKeeper<NorChip<Wire>>;
+    type Keeper = FlashKeeper<'static>;
+    const SMALL: bool = true;
 
     fn keeper(&self) -> Self::Keeper {
-        FlashKeeper::new(NorChip::new(Wire(self.clone()), now_us))
+        FlashKeeper::new(Box::leak(Box::new(NorChip::new(Wire(self.clone()), now_us))))
     }
 
     fn begin(&self, now_us: u64) {
         // What goes on in the chip goes on until then.
         CLOCK_US.set(now_us);
-        self.0.borrow_mut().began_us = now_us;
+        self.0.lock().unwrap().began_us = now_us;
     }
 
     fn taken_us(&self) -> u64 {
-        now_us() - self.0.borrow().began_us
+        now_us() - self.0.lock().unwrap().began_us
     }
 
     fn logs(&self) -> Vec<(String, Vec<u8>)> {
-        logs(&self.0.borrow().bytes)
+        logs(&self.0.lock().unwrap().bytes)
     }
 }
 

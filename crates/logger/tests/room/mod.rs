@@ -20,6 +20,7 @@ use std::cell::RefCell;
 use std::collections::VecDeque;
 use std::io::{Cursor, Read, Seek, SeekFrom, Write};
 use std::rc::Rc;
+use std::sync::{Arc, Mutex};
 
 /// Time between two ticks \[us\].
 pub(crate) const TICK_US: u64 = 1_000;
@@ -37,7 +38,7 @@ pub(crate) struct Disk {
     /// Calls that fail, counted from now on; none forever.
     pub(crate) fails_in: Option<u32>,
     /// How long a call takes \[us\].
-    pub(crate) takes_us: Box<dyn FnMut() -> u64>,
+    pub(crate) takes_us: Box<dyn FnMut() -> u64 + Send>,
     /// What the calls since it was asked have taken \[us\].
     pub(crate) taken_us: u64,
     pub(crate) now_us: u64,
@@ -45,7 +46,7 @@ pub(crate) struct Disk {
 }
 
 #[derive(Clone)]
-pub(crate) struct Card(pub(crate) Rc<RefCell<Disk>>);
+pub(crate) struct Card(pub(crate) Arc<Mutex<Disk>>);
 
 impl Disk {
     /// Returns what is called, if it does not fail.
@@ -70,18 +71,18 @@ impl Disk {
 
 impl LogCard for Card {
     fn start(&mut self) -> Result<u32, CardError> {
-        let mut disk = self.0.borrow_mut();
+        let mut disk = self.0.lock().unwrap();
         disk.call(0)?;
         Ok((disk.bytes.len() / 512) as u32)
     }
 
     fn read(&mut self, number: u32, block: &mut Block) -> Result<(), CardError> {
-        block.contents.copy_from_slice(self.0.borrow_mut().call(number)?);
+        block.contents.copy_from_slice(self.0.lock().unwrap().call(number)?);
         Ok(())
     }
 
     fn write(&mut self, number: u32, block: &Block) -> Result<(), CardError> {
-        let mut disk = self.0.borrow_mut();
+        let mut disk = self.0.lock().unwrap();
         disk.call(number)?.copy_from_slice(&block.contents);
         let at_us = disk.now_us + disk.taken_us;
         disk.written.push((at_us, number, block.contents));
@@ -152,7 +153,7 @@ pub(crate) fn card(fat: fatfs::FatType, blocks: usize) -> Card {
     let options = fatfs::FormatVolumeOptions::new().fat_type(fat);
     let options = if fat == fatfs::FatType::Fat32 { options.bytes_per_cluster(512) } else { options };
     fatfs::format_volume(Partition(Cursor::new(&mut bytes[VOLUME * 512..])), options).unwrap();
-    Card(Rc::new(RefCell::new(Disk {
+    Card(Arc::new(Mutex::new(Disk {
         bytes,
         written: Vec::new(),
         is_there: true,
@@ -223,6 +224,8 @@ impl LogPages for Pages {
 /// Where logs are kept, in a time of its own.
 pub(crate) trait Storage: Clone {
     type Keeper: LogKeeper;
+    /// True if its logs are small.
+    const SMALL: bool;
 
     fn keeper(&self) -> Self::Keeper;
 
@@ -237,23 +240,24 @@ pub(crate) trait Storage: Clone {
 }
 
 impl Storage for Card {
-    type Keeper = CardKeeper<Card>;
+    type Keeper = CardKeeper<'static>;
+    const SMALL: bool = false;
 
-    fn keeper(&self) -> CardKeeper<Card> {
-        CardKeeper::new(self.clone())
+    fn keeper(&self) -> CardKeeper<'static> {
+        CardKeeper::new(Box::leak(Box::new(self.clone())))
     }
 
     fn begin(&self, now_us: u64) {
-        let mut disk = self.0.borrow_mut();
+        let mut disk = self.0.lock().unwrap();
         (disk.now_us, disk.taken_us) = (now_us, 0);
     }
 
     fn taken_us(&self) -> u64 {
-        self.0.borrow().taken_us
+        self.0.lock().unwrap().taken_us
     }
 
     fn logs(&self) -> Vec<(String, Vec<u8>)> {
-        logs(&mut self.0.borrow_mut().bytes)
+        logs(&mut self.0.lock().unwrap().bytes)
     }
 }
 
@@ -292,7 +296,7 @@ impl<S: Storage> Room<S> {
             stored,
             card: card.clone(),
             keeper,
-            writer: LogWriter::new(S::Keeper::SMALL),
+            writer: LogWriter::new(S::SMALL),
             queue: Queue::default(),
             flight: Flight::new(&configuration).unwrap(),
             table: ParameterTable::new(configuration),

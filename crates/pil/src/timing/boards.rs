@@ -62,6 +62,8 @@ pub struct BoardTimes {
     pub senses: bool,
     /// Timers of motors.
     pub timers: u64,
+    /// True if it listens to motor controllers that answer on their lines.
+    pub answers: bool,
     /// Instructions of the sampling task with all that it can reach, each once.
     pub sampling: u64,
     /// The same of the slow sensors' task.
@@ -104,6 +106,7 @@ pub static BOARDS: [BoardTimes; 4] = [
         uart_keeps: 1,
         senses: false,
         timers: 1,
+        answers: false,
         sampling: 0,
         aiding: 0,
         parts: &[],
@@ -118,6 +121,7 @@ pub static BOARDS: [BoardTimes; 4] = [
         uart_keeps: 1,
         senses: true,
         timers: 2,
+        answers: false,
         sampling: 7_096,
         aiding: 23_085,
         parts: parts![
@@ -143,6 +147,7 @@ pub static BOARDS: [BoardTimes; 4] = [
         uart_keeps: 1,
         senses: true,
         timers: 2,
+        answers: false,
         sampling: 12_624,
         aiding: 24_825,
         parts: parts![
@@ -163,6 +168,7 @@ pub static BOARDS: [BoardTimes; 4] = [
         uart_keeps: FIFO_H743,
         senses: true,
         timers: 2,
+        answers: true,
         sampling: 7_552,
         aiding: 23_515,
         parts: parts![

@@ -93,6 +93,10 @@ struct Entry {
     deadline_ns: Option<u64>,
 }
 
+/// Instructions to read the answers of two of a timer's motor controllers from their samples, whatever those are: 4,700
+/// of an x86-64 at most (callgrind, 2026-11-28); and how long they are sampled \[ns\].
+const ANSWERS: u64 = 5_000;
+const SAMPLED_NS: u64 = 75_000;
 /// The first fix in double precision: twice sine and cosine, 4,817 each, two square roots, some 40 operations.
 const FIRST_FIX: u64 = 13_000;
 
@@ -257,17 +261,28 @@ impl Work {
                 bus_ns: 0,
                 deadline_ns: Some(TICK_NS),
             },
-            Entry {
-                name: "links' task",
-                priority: priority::COMMS,
-                period_ns: TICK_NS,
-                instructions: self.wake,
-                interrupts: 1,
-                bus_ns: 0,
-                // Then results of ticks are dropped.
-                deadline_ns: Some(QUEUE * TICK_NS),
-            },
         ]);
+        if board.answers {
+            entries.push(Entry {
+                name: "motor controllers' answers",
+                priority: priority::CONTROL,
+                period_ns: TICK_NS,
+                instructions: (ANSWERS + DMA_END) * board.timers,
+                interrupts: board.timers,
+                bus_ns: SAMPLED_NS,
+                deadline_ns: Some(TICK_NS),
+            });
+        }
+        entries.extend([Entry {
+            name: "links' task",
+            priority: priority::COMMS,
+            period_ns: TICK_NS,
+            instructions: self.wake,
+            interrupts: 1,
+            bus_ns: 0,
+            // Then results of ticks are dropped.
+            deadline_ns: Some(QUEUE * TICK_NS),
+        }]);
         entries.sort_by_key(|entry| entry.priority);
         entries
     }
