@@ -75,10 +75,10 @@ proptest! {
     /// Lines that are sampled together are read as each alone, whatever is on the others.
     #[test]
     fn lines_are_read_together(
-        contents in prop::array::uniform4(0_u16..4_096), befores in prop::array::uniform4(0_usize..90),
+        contents in prop::array::uniform4(0_u16..4_096), waits in prop::array::uniform4(0_usize..90),
         places in prop::sample::subsequence((0_u8..16).collect::<Vec<_>>(), 4), noise in vec(any::<u16>(), 192),
     ) {
-        let alone: Vec<_> = contents.iter().zip(befores).map(|(content, before)| {
+        let alone: Vec<_> = contents.iter().zip(waits).map(|(content, before)| {
             samples(&levels(checked(*content)), 3, before, 192 - before - 63)
         }).collect();
         let places: [u8; 4] = places.try_into().unwrap();

@@ -159,7 +159,9 @@ proptest! {
 
     /// Bidirectional frames differ in their checksums alone.
     #[test]
-    fn rows_become_bidirectional(throttles in prop::array::uniform4(0u16..=2047), asked in prop::option::of(0_usize..4)) {
+    fn rows_become_bidirectional(
+        throttles in prop::array::uniform4(0u16..=2047), asked in prop::option::of(0_usize..4),
+    ) {
         let timing = Timing::new(TimerClock::new(168_000_000).unwrap(), DshotRate::Dshot600);
         let mut rows = [[0_u32; 4]; 17];
         timing.rows(throttles, asked, &mut rows);
