@@ -13,6 +13,8 @@ const TIME: &str = "time_s";
 /// Deepest nesting of messages, and longest sequence that becomes columns.
 const DEPTH: usize = 8;
 const LONGEST: usize = 64;
+/// Most fields of a message that are looked at, those of messages in it among them: ten of eight deep would be 10^8.
+const FIELDS: u32 = 100_000;
 
 /// Reads a ULog.
 pub(crate) fn read_ulog(path: &Path) -> Result<Vec<LogTable>, FileError> {
@@ -136,7 +138,7 @@ impl Layout {
         if let Some((head, body)) = data.split_at_checked(4)
             && head.get(1).is_some_and(|kind| kind % 2 == 1)
         {
-            let mut reader = CdrReader { bytes: body, at: 0 };
+            let mut reader = CdrReader { bytes: body, at: 0, fields: FIELDS };
             let _partly = self.message("", "", &mut reader, &mut values, 0);
         }
         values
@@ -157,6 +159,7 @@ impl Layout {
                 None => 1,
             };
             for index in 0..count {
+                reader.fields = reader.fields.checked_sub(1)?;
                 let before = reader.at;
                 let name = match field.many {
                     Some(_) => format!("{prefix}{}[{index}]", field.name),
@@ -217,6 +220,8 @@ fn size(kind: &str) -> Option<usize> {
 struct CdrReader<'a> {
     bytes: &'a [u8],
     at: usize,
+    /// Fields that may still be looked at.
+    fields: u32,
 }
 
 impl CdrReader<'_> {

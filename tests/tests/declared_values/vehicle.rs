@@ -261,9 +261,10 @@ fn every_value_of_a_vehicles_file_counts() {
 /// What a station may set is in a vehicle's file, but for what follows from another key, or is not the vehicle's.
 #[test]
 fn every_parameter_of_a_station_is_in_the_file() {
-    const ELSEWHERE: [(&str, &str); 26] = [
+    const ELSEWHERE: [(&str, &str); 27] = [
         ("CAL_", "those of calibrations: of each vehicle's own sensors"),
         ("COM_ACT_FAIL_ACT", "the motor controllers'"),
+        ("DSHOT_BIDIR_EN", "the motor controllers'"),
         ("DSHOT_TEL_CFG", "the motor controllers'"),
         ("FD_ACT_EN", "the motor controllers'"),
         ("MOT_NOTCH_FOLLOW", "the motor controllers'"),
