@@ -108,7 +108,9 @@ proptest! {
 
     /// Any bytes in the place of some, and a file that is cut, are read or refused in one line.
     #[test]
-    fn damage_is_borne(changes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 0..20), cut: prop::sample::Index) {
+    fn damage_is_borne(
+        changes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 0..20), cut: prop::sample::Index,
+    ) {
         let messages: Vec<_> = (0..20).map(|kind| message(&body(kind, &[1, 2, 3]))).collect();
         let mut bytes = file(SCHEMA, "cdr", &messages);
         for (place, byte) in changes {
