@@ -5,7 +5,7 @@ use crate::aux_sensors;
 use crate::board::Board;
 use crate::recording::RecordedTick;
 use crate::vehicle::{Flight, NAME, ParameterTable};
-use afbc_logger::{BlockSink, LogBlock, LogKeeper, LogPage, LogPages, LogQuery, LogWriter, StorageState, StoredLogs};
+use afbc_logger::{BlockSink, KeptLogs, LogBlock, LogKeeper, LogPage, LogPages, LogQuery, LogWriter, StorageState};
 use afbc_onboard::parameters::RecordChange;
 use afbc_onboard::{ControlInputs, EscTelemetry, FlightView};
 use afbc_station::{Comms, LogServer, REPORT_MAX};
@@ -143,7 +143,7 @@ impl LogPages for Pages {
 pub struct LinkLog {
     /// What stations ask of the logs.
     pub(crate) server: LogServer,
-    stored: StoredLogs<Pages>,
+    stored: KeptLogs<Pages>,
     writer: LogWriter,
     queue: Queue,
     views: Receiver<'static, CriticalSectionRawMutex, TickView>,
@@ -170,7 +170,7 @@ impl LinkLog {
         let hardware = B::HARDWARE.strip_prefix("board-").unwrap_or(B::HARDWARE);
         let log = LOG.init_with(|| LinkLog {
             server: LogServer::default(),
-            stored: StoredLogs::new(Pages(page)),
+            stored: KeptLogs::new(Pages(page)),
             writer: LogWriter::new(B::SMALL_LOGS),
             queue: Queue(queue),
             views,

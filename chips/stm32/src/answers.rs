@@ -2,13 +2,14 @@
 //! has sent it samples the port of its pins, by the same DMA. So DMA must reach the port, as it does on an STM32H7, and
 //! an STM32F4's first controller does not.
 
-use crate::motors::CHANNELS;
 use afbc_flight_core::dshot::DshotRate;
 use afbc_flight_core::dshot_reply::{DshotReply, RATE_RATIO};
 use afbc_flight_core::timer_clock::TimerClock;
 use embassy_stm32::pac::gpio::Gpio;
 use embassy_stm32::pac::gpio::vals::{Moder, Pupdr};
 
+/// Lines of a timer, one for each of its channels.
+const LINES: usize = 4;
 /// Samples in a bit of an answer.
 const PER_BIT: u16 = 3;
 /// Samples after a frame: 56 bits of an answer. Controllers let pass 15 of them at least, some 23 usually, before they
@@ -21,7 +22,7 @@ const QUIET: usize = 30;
 pub struct Lines {
     port: Gpio,
     /// Number of each channel's pin.
-    pins: [u8; CHANNELS],
+    pins: [u8; LINES],
     samples: [u16; SAMPLES],
     /// Whose answers were read last.
     odd: bool,
@@ -29,7 +30,7 @@ pub struct Lines {
 
 impl Lines {
     /// The pins of a port with these numbers, of channels 1 to 4.
-    pub fn new(port: Gpio, pins: [u8; CHANNELS]) -> Self {
+    pub fn new(port: Gpio, pins: [u8; LINES]) -> Self {
         Lines { port, pins, samples: [0; SAMPLES], odd: false }
     }
 
@@ -55,7 +56,7 @@ impl Lines {
 
     /// Returns the electrical speeds \[rev/min\] that the controllers on every second channel have answered: after one
     /// frame on the even ones, after the next on the odd ones. Twice as many at once would take too long.
-    pub(crate) fn speeds_rev_min(&mut self) -> [(usize, Option<u32>); CHANNELS / 2] {
+    pub(crate) fn speeds_rev_min(&mut self) -> [(usize, Option<u32>); LINES / 2] {
         self.odd = !self.odd;
         let channels = if self.odd { [1, 3] } else { [0, 2] };
         let pins = channels.map(|channel: usize| self.pins.get(channel).copied().unwrap_or_default());

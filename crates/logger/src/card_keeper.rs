@@ -3,7 +3,7 @@
 use crate::block::LogBlock;
 use crate::card::{CardError, LogCard};
 use crate::keeper::{LogKeeper, StorageState};
-use crate::query::{LogAnswer, LogPage, LogQuery};
+use crate::query::{KeeperAnswer, LogPage, LogQuery};
 use crate::volume::{Device, NoClock};
 use core::ops::ControlFlow;
 use embedded_sdmmc::{DirEntry, Error, Mode, RawDirectory, RawFile, ShortFileName, VolumeIdx, VolumeManager};
@@ -234,7 +234,7 @@ impl LogKeeper for CardKeeper<'_> {
 
     fn answer(&mut self, now_us: u64, query: LogQuery, page: &mut LogPage) {
         self.now_us = now_us;
-        (page.query, page.answer) = (query, LogAnswer::Failed);
+        (page.query, page.answer) = (query, KeeperAnswer::Failed);
         if self.root.is_some() {
             self.attempt(&mut |keeper| {
                 page.answer = keeper.look_up(query, &mut page.bytes)?;
@@ -243,7 +243,7 @@ impl LogKeeper for CardKeeper<'_> {
         }
         // Of some blocks that the card does not give, the library does not tell.
         if self.root.is_none() {
-            page.answer = LogAnswer::Failed;
+            page.answer = KeeperAnswer::Failed;
         }
     }
 }

@@ -3,17 +3,19 @@
 use crate::card::CardError;
 use crate::card_keeper::{CardKeeper, log_name};
 use crate::keeper::StorageState;
-use crate::query::{LogAnswer, LogQuery};
+use crate::query::{KeeperAnswer, LogQuery};
 use core::ops::ControlFlow;
 use embedded_sdmmc::{Error, Mode};
 
 impl CardKeeper<'_> {
     /// Answers a question; of a log that is read, with what is on the page.
-    pub(crate) fn look_up(&mut self, query: LogQuery, page: &mut [u8]) -> Result<LogAnswer, Error<CardError>> {
+    pub(crate) fn look_up(&mut self, query: LogQuery, page: &mut [u8]) -> Result<KeeperAnswer, Error<CardError>> {
         match query {
-            LogQuery::Nothing => Ok(LogAnswer::None),
+            LogQuery::Nothing => Ok(KeeperAnswer::None),
             LogQuery::Count => self.count(),
-            LogQuery::Size(place) => Ok(self.find(place)?.map_or(LogAnswer::None, |(_, size)| LogAnswer::Is(size))),
+            LogQuery::Size(place) => {
+                Ok(self.find(place)?.map_or(KeeperAnswer::None, |(_, size)| KeeperAnswer::Is(size)))
+            }
             LogQuery::Read(place, offset) => self.read(place, offset, page),
             LogQuery::Erase => self.erase_one(),
         }
@@ -24,7 +26,7 @@ impl CardKeeper<'_> {
         self.next.saturating_sub(u32::from(self.file.is_some()))
     }
 
-    fn count(&mut self) -> Result<LogAnswer, Error<CardError>> {
+    fn count(&mut self) -> Result<KeeperAnswer, Error<CardError>> {
         self.close_read()?;
         let bound = self.bound();
         self.reader.bound = Some(bound);
@@ -33,7 +35,7 @@ impl CardKeeper<'_> {
             count += u32::from(number < bound && size.is_some());
             ControlFlow::Continue(())
         })?;
-        Ok(LogAnswer::Is(count))
+        Ok(KeeperAnswer::Is(count))
     }
 
     /// Returns number and size of the log at a place among those that were counted.
@@ -52,10 +54,10 @@ impl CardKeeper<'_> {
         Ok(found)
     }
 
-    fn read(&mut self, place: u16, offset: u32, page: &mut [u8]) -> Result<LogAnswer, Error<CardError>> {
+    fn read(&mut self, place: u16, offset: u32, page: &mut [u8]) -> Result<KeeperAnswer, Error<CardError>> {
         if self.reader.open.is_none_or(|(open, _)| open != place) {
             self.close_read()?;
-            let Some((number, _)) = self.find(place)? else { return Ok(LogAnswer::None) };
+            let Some((number, _)) = self.find(place)? else { return Ok(KeeperAnswer::None) };
             let (Some(volumes), Some(root)) = (&self.volumes, self.root) else { return Err(Error::BadHandle) };
             let name = log_name(number).ok_or(Error::NotFound)?;
             self.reader.open = Some((place, volumes.open_file_in_dir(root, name, Mode::ReadOnly)?));
@@ -63,18 +65,18 @@ impl CardKeeper<'_> {
         let (Some(volumes), Some((_, file))) = (&self.volumes, self.reader.open) else { return Err(Error::BadHandle) };
         // Asked before the library refuses to go there: an error would give up the volume.
         if offset > volumes.file_length(file)? {
-            return Ok(LogAnswer::Is(0));
+            return Ok(KeeperAnswer::Is(0));
         }
         volumes.file_seek_from_start(file, offset)?;
         let length = volumes.read(file, page)?;
-        Ok(LogAnswer::Is(length as u32))
+        Ok(KeeperAnswer::Is(length as u32))
     }
 
     /// Erases the first of the logs: first what it occupies, then its name.
-    fn erase_one(&mut self) -> Result<LogAnswer, Error<CardError>> {
+    fn erase_one(&mut self) -> Result<KeeperAnswer, Error<CardError>> {
         self.close_read()?;
         self.reader.bound = None;
-        let Some((number, _)) = self.find(0)? else { return Ok(LogAnswer::None) };
+        let Some((number, _)) = self.find(0)? else { return Ok(KeeperAnswer::None) };
         let (Some(volumes), Some(root)) = (&self.volumes, self.root) else { return Err(Error::BadHandle) };
         let name = log_name(number).ok_or(Error::NotFound)?;
         let emptied = volumes.open_file_in_dir(root, name, Mode::ReadWriteTruncate)?;
@@ -84,7 +86,7 @@ impl CardKeeper<'_> {
         if self.state == StorageState::Full {
             self.state = StorageState::Ready;
         }
-        Ok(LogAnswer::Is(1))
+        Ok(KeeperAnswer::Is(1))
     }
 
     /// Closes the file that is read.

@@ -3,7 +3,7 @@
 use crate::block::LogBlock;
 use crate::flash::{FlashFailed, LogFlash, PROGRAM_BYTES, SECTOR_BYTES};
 use crate::keeper::{LogKeeper, StorageState};
-use crate::query::{LogAnswer, LogPage, LogQuery};
+use crate::query::{KeeperAnswer, LogPage, LogQuery};
 use crate::sector::{HEAD_BYTES, Head, LENGTH_AT, ROOM, START, length_bytes, read_length};
 
 /// Time between two attempts to start the flash \[us\].
@@ -202,7 +202,7 @@ impl<'a> FlashKeeper<'a> {
         self.written.map_or(self.next, |written| written.head.log)
     }
 
-    fn count(&mut self) -> Result<LogAnswer, FlashFailed> {
+    fn count(&mut self) -> Result<KeeperAnswer, FlashFailed> {
         let bound = self.first_unfinished();
         (self.bound, self.open) = (Some(bound), None);
         let mut count = 0;
@@ -210,7 +210,7 @@ impl<'a> FlashKeeper<'a> {
             let head = self.head(sector)?;
             count += u32::from(head.is_some_and(|head| head.part == 0 && head.log < bound));
         }
-        Ok(LogAnswer::Is(count))
+        Ok(KeeperAnswer::Is(count))
     }
 
     /// Returns the log at a place among those that were counted.
@@ -275,8 +275,8 @@ impl<'a> FlashKeeper<'a> {
         Ok(None)
     }
 
-    fn read(&mut self, place: u16, offset: u32, page: &mut [u8]) -> Result<LogAnswer, FlashFailed> {
-        let Some(Stretch { log, first, bytes }) = self.find(place)? else { return Ok(LogAnswer::None) };
+    fn read(&mut self, place: u16, offset: u32, page: &mut [u8]) -> Result<KeeperAnswer, FlashFailed> {
+        let Some(Stretch { log, first, bytes }) = self.find(place)? else { return Ok(KeeperAnswer::None) };
         let (mut at, mut rest, mut count) = (offset, page, 0);
         while at < bytes && !rest.is_empty() {
             let Some(sector) = self.sector_of(log, at / ROOM, first)? else { break };
@@ -286,20 +286,20 @@ impl<'a> FlashKeeper<'a> {
             self.flash.read(sector * SECTOR_BYTES + START + within, part)?;
             (at, rest, count) = (at + length as u32, behind, count + length as u32);
         }
-        Ok(LogAnswer::Is(count))
+        Ok(KeeperAnswer::Is(count))
     }
 
     /// Erases a sector, the last one that is not erased yet: what a cut of the power leaves are whole logs, and perhaps
     /// the beginning of one.
-    fn erase_one(&mut self) -> Result<LogAnswer, FlashFailed> {
+    fn erase_one(&mut self) -> Result<KeeperAnswer, FlashFailed> {
         // It would keep the blocks of a log waiting for too long.
         if self.written.is_some() {
-            return Ok(LogAnswer::Failed);
+            return Ok(KeeperAnswer::Failed);
         }
         (self.bound, self.open) = (None, None);
         let Some(sector) = self.erased.unwrap_or(self.sectors).checked_sub(1) else {
             self.erased = None;
-            return Ok(LogAnswer::None);
+            return Ok(KeeperAnswer::None);
         };
         let mut blank = 0;
         while blank < SECTOR_BYTES && self.is_blank(sector * SECTOR_BYTES + blank)? {
@@ -313,7 +313,7 @@ impl<'a> FlashKeeper<'a> {
             self.ahead = Ahead { sector, blank: SECTOR_BYTES };
             self.state = StorageState::Ready;
         }
-        Ok(LogAnswer::Is(1))
+        Ok(KeeperAnswer::Is(1))
     }
 }
 
@@ -353,16 +353,16 @@ impl LogKeeper for FlashKeeper<'_> {
 
     fn answer(&mut self, now_us: u64, query: LogQuery, page: &mut LogPage) {
         self.now_us = now_us;
-        (page.query, page.answer) = (query, LogAnswer::Failed);
+        (page.query, page.answer) = (query, KeeperAnswer::Failed);
         if !self.works() {
             return;
         }
         self.attempt(&mut |keeper| {
             page.answer = match query {
-                LogQuery::Nothing => LogAnswer::None,
+                LogQuery::Nothing => KeeperAnswer::None,
                 LogQuery::Count => keeper.count()?,
                 LogQuery::Size(place) => {
-                    keeper.find(place)?.map_or(LogAnswer::None, |stretch| LogAnswer::Is(stretch.bytes))
+                    keeper.find(place)?.map_or(KeeperAnswer::None, |stretch| KeeperAnswer::Is(stretch.bytes))
                 }
                 LogQuery::Read(place, offset) => keeper.read(place, offset, &mut page.bytes)?,
                 LogQuery::Erase => keeper.erase_one()?,

@@ -4,7 +4,7 @@
 //! [`afbc_ulog::BlackBox`] write it, and cuts it into [`LogBlock`]s. A [`LogKeeper`], in a task that may wait for it,
 //! keeps them: a [`CardKeeper`] in the files `LOG001.ULG`, `LOG002.ULG` and so on of a card's FAT volume, a
 //! [`FlashKeeper`] in sectors of flash. Between them is a queue of blocks of the shell's; back comes what is known of
-//! the storage ([`StorageState`]). Back come also logs, to be downloaded and erased: [`StoredLogs`] asks the keeper for
+//! the storage ([`StorageState`]). Back come also logs, to be downloaded and erased: [`KeptLogs`] asks the keeper for
 //! pages of them. Whatever a card or flash does costs log: a queue that is full, records, which the log counts as
 //! dropouts; a failure, the end of its log.
 //!
@@ -33,7 +33,7 @@ pub use flash::{FlashFailed, LogFlash, PROGRAM_BYTES, SECTOR_BYTES};
 pub use flash_keeper::FlashKeeper;
 pub use keeper::{LogKeeper, StorageState};
 pub use nor_chip::NorChip;
-pub use query::{LogAnswer, LogPage, LogPages, LogQuery, PAGE_BYTES, StoredLogs};
+pub use query::{KeeperAnswer, KeptLogs, LogPage, LogPages, LogQuery, PAGE_BYTES};
 pub use writer::{LogWriter, STAGING};
 
 pub use afbc_onboard::LogMode;

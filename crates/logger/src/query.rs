@@ -25,7 +25,7 @@ pub enum LogQuery {
 
 /// The answer to a question.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum LogAnswer {
+pub enum KeeperAnswer {
     /// There is no such log; of [`LogQuery::Erase`], none is left.
     #[default]
     None,
@@ -39,24 +39,24 @@ pub enum LogAnswer {
 #[derive(Clone, Debug)]
 pub struct LogPage {
     pub(crate) query: LogQuery,
-    pub(crate) answer: LogAnswer,
+    pub(crate) answer: KeeperAnswer,
     /// What was read.
     pub(crate) bytes: [u8; PAGE_BYTES],
 }
 
 impl LogPage {
     /// Without a question.
-    pub const EMPTY: Self = LogPage { query: LogQuery::Nothing, answer: LogAnswer::None, bytes: [0; PAGE_BYTES] };
+    pub const EMPTY: Self = LogPage { query: LogQuery::Nothing, answer: KeeperAnswer::None, bytes: [0; PAGE_BYTES] };
 
     /// Copies what was read from `offset` on; none if it is not on this page, not all of what fits, or was not read.
     fn copy(&self, place: u16, offset: u32, into: &mut [u8]) -> Option<usize> {
         let LogQuery::Read(at, from) = self.query else { return None };
         let skipped = offset.checked_sub(from).filter(|_| at == place)? as usize;
         let length = match self.answer {
-            LogAnswer::Is(length) => (length as usize).min(PAGE_BYTES),
-            LogAnswer::None => 0,
+            KeeperAnswer::Is(length) => (length as usize).min(PAGE_BYTES),
+            KeeperAnswer::None => 0,
             // Not the end of the log: it goes on once the storage does.
-            LogAnswer::Failed => return None,
+            KeeperAnswer::Failed => return None,
         };
         let rest = self.bytes.get(skipped..length).unwrap_or_default();
         let is_end = length < PAGE_BYTES && skipped <= length;
@@ -82,16 +82,16 @@ pub trait LogPages {
 
 /// The logs that are kept, as the services for stations want them.
 #[derive(Clone, Debug)]
-pub struct StoredLogs<P> {
+pub struct KeptLogs<P> {
     pages: P,
     /// What is asked and not answered.
     asked: LogQuery,
 }
 
-impl<P: LogPages> StoredLogs<P> {
+impl<P: LogPages> KeptLogs<P> {
     /// With nothing asked.
     pub fn new(pages: P) -> Self {
-        StoredLogs { pages, asked: LogQuery::Nothing }
+        KeptLogs { pages, asked: LogQuery::Nothing }
     }
 
     /// Asks, once until there is an answer.
@@ -104,7 +104,7 @@ impl<P: LogPages> StoredLogs<P> {
 
     /// Asks, or returns the answer, once.
     #[inline(never)]
-    fn ask(&mut self, query: LogQuery) -> Poll<LogAnswer> {
+    fn ask(&mut self, query: LogQuery) -> Poll<KeeperAnswer> {
         let answered = self.pages.page().map(|page| (page.query, page.answer));
         if answered.is_some() {
             self.pages.done();
@@ -122,18 +122,18 @@ impl<P: LogPages> StoredLogs<P> {
     }
 }
 
-impl<P: LogPages> LogStore for StoredLogs<P> {
+impl<P: LogPages> LogStore for KeptLogs<P> {
     fn count_logs(&mut self) -> Poll<u16> {
         self.ask(LogQuery::Count).map(|answer| match answer {
-            LogAnswer::Is(count) => u16::try_from(count).unwrap_or(u16::MAX),
-            LogAnswer::None | LogAnswer::Failed => 0,
+            KeeperAnswer::Is(count) => u16::try_from(count).unwrap_or(u16::MAX),
+            KeeperAnswer::None | KeeperAnswer::Failed => 0,
         })
     }
 
     fn log(&mut self, place: u16) -> Poll<Option<LogInfo>> {
         self.ask(LogQuery::Size(place)).map(|answer| match answer {
-            LogAnswer::Is(size) => Some(LogInfo { size, utc_s: 0 }),
-            LogAnswer::None | LogAnswer::Failed => None,
+            KeeperAnswer::Is(size) => Some(LogInfo { size, utc_s: 0 }),
+            KeeperAnswer::None | KeeperAnswer::Failed => None,
         })
     }
 
@@ -154,10 +154,10 @@ impl<P: LogPages> LogStore for StoredLogs<P> {
 
     fn erase_logs(&mut self) -> Poll<bool> {
         match self.ask(LogQuery::Erase) {
-            Poll::Ready(LogAnswer::None) => Poll::Ready(true),
-            Poll::Ready(LogAnswer::Failed) => Poll::Ready(false),
+            Poll::Ready(KeeperAnswer::None) => Poll::Ready(true),
+            Poll::Ready(KeeperAnswer::Failed) => Poll::Ready(false),
             // One at a time, so that blocks of a log are not kept waiting for all of them.
-            Poll::Ready(LogAnswer::Is(_)) => {
+            Poll::Ready(KeeperAnswer::Is(_)) => {
                 self.wait_for(LogQuery::Erase);
                 Poll::Pending
             }

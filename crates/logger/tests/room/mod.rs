@@ -8,8 +8,8 @@ pub(crate) mod ulog;
 use afbc_estimator::Measurement;
 use afbc_logger::embedded_sdmmc::Block;
 use afbc_logger::{
-    BlockSink, CardError, CardKeeper, LogBlock, LogCard, LogKeeper, LogMode, LogPage, LogPages, LogQuery, LogWriter,
-    StorageState, StoredLogs,
+    BlockSink, CardError, CardKeeper, KeptLogs, LogBlock, LogCard, LogKeeper, LogMode, LogPage, LogPages, LogQuery,
+    LogWriter, StorageState,
 };
 use afbc_onboard::parameters::{ParameterTable, RecordChange};
 use afbc_onboard::{Aged, Configuration, ControlInputs, Flight, Readings};
@@ -264,7 +264,7 @@ impl Storage for Card {
 /// A vehicle that logs.
 pub(crate) struct Room<S: Storage = Card> {
     between: Rc<RefCell<Between>>,
-    pub(crate) stored: StoredLogs<Pages>,
+    pub(crate) stored: KeptLogs<Pages>,
 
     pub(crate) card: S,
     pub(crate) keeper: S::Keeper,
@@ -290,7 +290,7 @@ impl<S: Storage> Room<S> {
         let keeper = card.keeper();
         let between = Between { page: LogPage::EMPTY, is_full: false, asked: LogQuery::Nothing };
         let between = Rc::new(RefCell::new(between));
-        let stored = StoredLogs::new(Pages { between: between.clone(), page: LogPage::EMPTY });
+        let stored = KeptLogs::new(Pages { between: between.clone(), page: LogPage::EMPTY });
         Room {
             between,
             stored,
