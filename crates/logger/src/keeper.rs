@@ -6,8 +6,8 @@ use crate::query::{LogPage, LogQuery};
 /// Keeps the blocks of logs, and gives logs back. It may wait for its card or flash in every call but
 /// [`state`](Self::state).
 ///
-/// A keeper holds its card or flash as a trait object: what is generic is compiled in the crate that uses it, a board's,
-/// for speed and not for size.
+/// A keeper holds its card or flash as a trait object: what is generic is compiled in the crate that uses it, a
+/// board's, for speed and not for size.
 pub trait LogKeeper {
     /// Returns what is known of the card or flash.
     fn state(&self) -> StorageState;
