@@ -251,11 +251,14 @@ where
             // With a row more than a frame has: then its last bit is over.
             self.send_rows(self.rows.0.len()).await;
             self.set_period(sample_counts);
-            self.sample().await;
+            let is_sampled = self.sample().await;
             self.set_period(timing.period());
-            for (channel, speed) in self.answers.speeds_rev_min() {
-                if let (Some(Some(rotor)), Some(speed)) = (rotors.get(channel), speed) {
-                    escs::answered(*rotor, speed);
+            // Earlier samples would be taken for an answer to this frame.
+            if is_sampled {
+                for (channel, speed) in self.answers.speeds_rev_min() {
+                    if let (Some(Some(rotor)), Some(speed)) = (rotors.get(channel), speed) {
+                        escs::answered(*rotor, speed);
+                    }
                 }
             }
             newest = throttles.wait().await;
@@ -269,9 +272,9 @@ where
         self.timer.generate_update_event();
     }
 
-    /// Lets go of the lines, and takes samples of them; 75 us at 600 kbit/s.
+    /// Lets go of the lines, and takes samples of them; 75 us at 600 kbit/s. False if that has failed.
     #[expect(unsafe_code, reason = "DMA reads the port of the pins")]
-    async fn sample(&mut self) {
+    async fn sample(&mut self) -> bool {
         self.answers.let_go(true);
         let (port, samples) = self.answers.sampling();
         let request = self.dma.request();
@@ -283,11 +286,13 @@ where
         // samples while the transfer lasts, which ends when it is dropped.
         let transfer = unsafe { channel.read(request, port, samples, dma::TransferOptions::default()) };
         let deadline = Instant::from_micros(Instant::now().as_micros().wrapping_add(TRANSFER_MAX_US));
-        if with_deadline(deadline, transfer).await.is_err() {
+        let is_sampled = with_deadline(deadline, transfer).await.is_ok();
+        if !is_sampled {
             defmt::warn!("the sampling of the motors' lines has stopped");
         }
         self.timer.enable_update_dma(false);
         self.answers.let_go(false);
+        is_sampled
     }
 }
 
