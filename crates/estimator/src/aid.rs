@@ -10,8 +10,10 @@ pub enum Aid {
     TrackerPosition,
     /// Attitude from a tracker.
     TrackerAttitude,
-    /// Position from a GNSS receiver.
+    /// Horizontal position from a GNSS receiver.
     GnssPosition,
+    /// Height from a GNSS receiver.
+    GnssHeight,
     /// Velocity from a GNSS receiver.
     GnssVelocity,
     /// Height from a barometer.
@@ -22,8 +24,15 @@ pub enum Aid {
 
 impl Aid {
     /// All kinds.
-    pub const ALL: [Aid; 6] =
-        [Aid::TrackerPosition, Aid::TrackerAttitude, Aid::GnssPosition, Aid::GnssVelocity, Aid::Height, Aid::Heading];
+    pub const ALL: [Aid; 7] = [
+        Aid::TrackerPosition,
+        Aid::TrackerAttitude,
+        Aid::GnssPosition,
+        Aid::GnssHeight,
+        Aid::GnssVelocity,
+        Aid::Height,
+        Aid::Heading,
+    ];
 }
 
 /// Record of one kind of aid.
@@ -87,6 +96,17 @@ impl Repeated {
     }
 }
 
+/// When an aid that contradicts the state is followed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Trust {
+    /// While nothing else holds the state.
+    Soon,
+    /// After longer, since something else holds it meanwhile.
+    Late,
+    /// Not as long as others contradict it.
+    Never,
+}
+
 /// Records of all kinds.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Aids {
@@ -94,8 +114,10 @@ pub struct Aids {
     pub tracker_position: AidRecord,
     /// Attitude from a tracker.
     pub tracker_attitude: AidRecord,
-    /// Position from a GNSS receiver.
+    /// Horizontal position from a GNSS receiver.
     pub gnss_position: AidRecord,
+    /// Height from a GNSS receiver.
+    pub gnss_height: AidRecord,
     /// Velocity from a GNSS receiver.
     pub gnss_velocity: AidRecord,
     /// Height from a barometer.
@@ -112,6 +134,7 @@ impl Aids {
             Aid::TrackerPosition => &self.tracker_position,
             Aid::TrackerAttitude => &self.tracker_attitude,
             Aid::GnssPosition => &self.gnss_position,
+            Aid::GnssHeight => &self.gnss_height,
             Aid::GnssVelocity => &self.gnss_velocity,
             Aid::Height => &self.height,
             Aid::Heading => &self.heading,
@@ -123,24 +146,35 @@ impl Aids {
             Aid::TrackerPosition => &mut self.tracker_position,
             Aid::TrackerAttitude => &mut self.tracker_attitude,
             Aid::GnssPosition => &mut self.gnss_position,
+            Aid::GnssHeight => &mut self.gnss_height,
             Aid::GnssVelocity => &mut self.gnss_velocity,
             Aid::Height => &mut self.height,
             Aid::Heading => &mut self.heading,
         }
     }
 
-    /// True if another aid than `aid` that measures the same was fused within the last `time_us`.
-    pub(crate) fn has_other(&self, aid: Aid, now_us: u64, time_us: u64) -> bool {
+    /// Whether an aid that was rejected for a while is to be followed, by what the others that were fused within the
+    /// last `time_us` say; `fast` if a receiver's velocity was.
+    pub(crate) fn trust(&self, aid: Aid, fast: bool, now_us: u64, time_us: u64) -> Trust {
         let live = |other: &AidRecord| other.is_live(now_us, time_us);
+        let tracker = live(&self.tracker_position);
+        let never_if = |doubts: bool, else_late: bool| match (doubts, else_late) {
+            (true, _) => Trust::Never,
+            (_, true) => Trust::Late,
+            (false, false) => Trust::Soon,
+        };
         match aid {
-            Aid::TrackerPosition => live(&self.gnss_position),
-            Aid::GnssPosition => live(&self.tracker_position),
-            // Its position, which is off by metres, contradicts no velocity.
-            Aid::GnssVelocity => live(&self.tracker_position),
-            Aid::TrackerAttitude => live(&self.heading),
-            Aid::Heading => live(&self.tracker_attitude),
+            Aid::TrackerPosition => never_if(live(&self.gnss_position), fast),
+            Aid::GnssPosition => never_if(tracker, fast),
+            // Two that know the height by different means agree that it has not changed.
+            Aid::GnssHeight => never_if(tracker || fast && live(&self.height), fast),
+            // Its position is off by metres: it holds the velocity, but not for long.
+            Aid::GnssVelocity => never_if(tracker, live(&self.gnss_position)),
+            Aid::TrackerAttitude => never_if(live(&self.heading), false),
+            // Motion shows a heading: the bank of yaw filters corrects the one that the field contradicts.
+            Aid::Heading => never_if(live(&self.tracker_attitude) || fast, true),
             // A reset of it sets the barometer's offset alone, which no other aid measures.
-            Aid::Height => false,
+            Aid::Height => Trust::Soon,
         }
     }
 

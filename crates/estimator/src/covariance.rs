@@ -23,8 +23,8 @@
 //! PX4's EKF2. The 16th state, the barometer's offset, is one column more; without it, a filter that averages a
 //! barometer is sure of a height that it cannot know.
 
-use crate::errors::{Block, Coordinate, Errors, Interval, Row, Slows, minus_cross, subtract_outer};
-use crate::slow::Slow;
+use crate::errors::{Block, Coordinate, Errors, Interval, Replaced, Row, Slows, minus_cross, subtract_outer};
+use crate::slow::{Columns, Slow};
 use afbc_control::math::{max, min, sqrt};
 use nalgebra::Vector3;
 
@@ -102,6 +102,33 @@ fn add_diagonal(m: &mut Block, variance: f32) {
     m.m11 += variance;
     m.m22 += variance;
     m.m33 += variance;
+}
+
+/// Sets a row of covariances with the slow errors.
+fn set_row(columns: &mut Columns, at: Coordinate, to: &Slows) {
+    for (mut column, to) in columns.column_iter_mut().zip(to) {
+        if let Some(number) = column.iter_mut().nth(at as usize) {
+            *number = *to;
+        }
+    }
+}
+
+/// Share of a variance that a prediction adds for rounding: each operation moves an entry by up to its last bit, and
+/// where two errors are nearly one, as a height and a barometer's offset are, what is left of them is a few hundred of
+/// these. By this alone a standard deviation grows by a tenth in an hour.
+const ROUNDED: f32 = 1.0 / 16_777_216.0;
+
+/// Number of blocks of the upper triangle.
+pub(crate) const BLOCKS: u8 = 15;
+/// Room for rounding in the square of a correlation.
+const POSSIBLE: f32 = 1.001;
+
+/// Adds a variance to the diagonal, and the share for rounding.
+#[inline]
+fn grown(m: &mut Block, variance: f32) {
+    m.m11 += m.m11 * ROUNDED + variance;
+    m.m22 += m.m22 * ROUNDED + variance;
+    m.m33 += m.m33 * ROUNDED + variance;
 }
 
 /// Smallest and largest variance of one error.
@@ -187,20 +214,65 @@ impl Covariance {
         mirror(&mut self.tt);
     }
 
-    /// Adds the noise of `time_s`.
+    /// Adds the noise of `time_s`, and what rounding may have taken.
     #[inline]
     fn grow(&mut self, time_s: f32, growth: &Growth) {
         add_diagonal(&mut self.tt, growth.theta * time_s);
-        add_diagonal(&mut self.vv, growth.velocity * time_s);
+        grown(&mut self.vv, growth.velocity * time_s);
+        grown(&mut self.pp, 0.0);
         add_diagonal(&mut self.gg, growth.gyro * time_s);
         add_diagonal(&mut self.aa, growth.accel * time_s);
-        self.bb += growth.baro * time_s;
+        self.bb += self.bb * ROUNDED + growth.baro * time_s;
     }
 
     /// Adds variances to attitude and velocity.
     pub(crate) fn roughen(&mut self, (theta, velocity): (f32, f32)) {
         add_diagonal(&mut self.tt, theta);
         add_diagonal(&mut self.vv, velocity);
+    }
+
+    /// True if no covariance of one block, the one with this number, is larger than both variances allow; block after
+    /// block, a matrix that is none is found within [`BLOCKS`] calls. False of NaN.
+    pub(crate) fn is_possible(&self, number: u8) -> bool {
+        let c = self;
+        let (block, rows, columns) = match number {
+            0 => (&c.tt, &c.tt, &c.tt),
+            1 => (&c.tv, &c.tt, &c.vv),
+            2 => (&c.tp, &c.tt, &c.pp),
+            3 => (&c.tg, &c.tt, &c.gg),
+            4 => (&c.ta, &c.tt, &c.aa),
+            5 => (&c.vv, &c.vv, &c.vv),
+            6 => (&c.vp, &c.vv, &c.pp),
+            7 => (&c.vg, &c.vv, &c.gg),
+            8 => (&c.va, &c.vv, &c.aa),
+            9 => (&c.pp, &c.pp, &c.pp),
+            10 => (&c.pg, &c.pp, &c.gg),
+            11 => (&c.pa, &c.pp, &c.aa),
+            12 => (&c.gg, &c.gg, &c.gg),
+            13 => (&c.ga, &c.gg, &c.aa),
+            _ => (&c.aa, &c.aa, &c.aa),
+        };
+        let (rows, columns) = (rows.diagonal(), columns.diagonal() * POSSIBLE);
+        let allowed = rows * columns.transpose();
+        block.iter().zip(&allowed).all(|(entry, allowed)| entry * entry <= *allowed)
+    }
+
+    /// Forgets all covariances, and doubts the variances: they are those of a matrix that was none.
+    #[cold]
+    #[inline(never)]
+    pub(crate) fn decorrelate(&mut self) {
+        let of = |block: &Block| Block::from_diagonal(&(block.diagonal() * 2.0));
+        *self = Covariance {
+            tt: of(&self.tt),
+            vv: of(&self.vv),
+            pp: of(&self.pp),
+            gg: of(&self.gg),
+            aa: of(&self.aa),
+            bb: 2.0 * self.bb,
+            slow: Slow { variance: self.slow.variance, ..Slow::default() },
+            ..Covariance::default()
+        };
+        self.hold();
     }
 
     /// True if every variance is finite.
@@ -282,6 +354,58 @@ impl Covariance {
     /// Forgets what is known of some errors: those with a zero in `keep` lose their variance and all covariances.
     pub(crate) fn forget(&mut self, keep: &Errors) {
         self.scale(keep);
+    }
+
+    /// Takes an error from a measurement instead of from what is known: the state was set so that the innovation is
+    /// zero. `row` is what the measurement makes of the other errors, and would have 1 for this one: the new error is
+    /// -(row x) less the noise, of `variance`. So it keeps every covariance that it has by them, and no other.
+    pub(crate) fn replace(&mut self, which: Replaced, row: &Row, variance: f32) {
+        let y = self.times(row);
+        let variance = max(row.dot(&y), 0.0) + variance;
+        let Errors { theta: t, velocity: v, position: p, gyro: g, accel: a, baro: b, slow } = y.scaled(-1.0);
+        match which {
+            Replaced::Heading => {
+                let at = Coordinate::Z;
+                let t = Vector3::new(t.x, t.y, variance);
+                at.set_row(&mut self.tt, &t);
+                at.set_column(&mut self.tt, &t);
+                at.set_row(&mut self.tv, &v);
+                at.set_row(&mut self.tp, &p);
+                at.set_row(&mut self.tg, &g);
+                at.set_row(&mut self.ta, &a);
+                self.tb.z = b;
+                set_row(&mut self.slow.theta, at, &slow);
+            }
+            Replaced::Velocity(at) => {
+                let mut v = v;
+                at.set(&mut v, variance);
+                at.set_column(&mut self.tv, &t);
+                at.set_row(&mut self.vv, &v);
+                at.set_column(&mut self.vv, &v);
+                at.set_row(&mut self.vp, &p);
+                at.set_row(&mut self.vg, &g);
+                at.set_row(&mut self.va, &a);
+                at.set(&mut self.vb, b);
+                set_row(&mut self.slow.velocity, at, &slow);
+            }
+            Replaced::Position(at) => {
+                let mut p = p;
+                at.set(&mut p, variance);
+                at.set_column(&mut self.tp, &t);
+                at.set_column(&mut self.vp, &v);
+                at.set_row(&mut self.pp, &p);
+                at.set_column(&mut self.pp, &p);
+                at.set_row(&mut self.pg, &g);
+                at.set_row(&mut self.pa, &a);
+                at.set(&mut self.pb, b);
+                set_row(&mut self.slow.position, at, &slow);
+            }
+            Replaced::Offset => {
+                (self.tb, self.vb, self.pb, self.gb, self.ab, self.bb) = (t, v, p, g, a, variance);
+                self.slow.baro = slow;
+            }
+        }
+        self.hold();
     }
 
     /// Returns P h.

@@ -59,6 +59,44 @@ impl Coordinate {
             Coordinate::Z => Vector3::new(m.m31, m.m32, m.m33),
         }
     }
+
+    /// Sets this row.
+    pub(crate) fn set_row(self, m: &mut Block, to: &Vector3<f32>) {
+        match self {
+            Coordinate::X => (m.m11, m.m12, m.m13) = (to.x, to.y, to.z),
+            Coordinate::Y => (m.m21, m.m22, m.m23) = (to.x, to.y, to.z),
+            Coordinate::Z => (m.m31, m.m32, m.m33) = (to.x, to.y, to.z),
+        }
+    }
+
+    /// Sets this column.
+    pub(crate) fn set_column(self, m: &mut Block, to: &Vector3<f32>) {
+        match self {
+            Coordinate::X => (m.m11, m.m21, m.m31) = (to.x, to.y, to.z),
+            Coordinate::Y => (m.m12, m.m22, m.m32) = (to.x, to.y, to.z),
+            Coordinate::Z => (m.m13, m.m23, m.m33) = (to.x, to.y, to.z),
+        }
+    }
+
+    /// Sets this coordinate of a vector.
+    pub(crate) fn set(self, vector: &mut Vector3<f32>, to: f32) {
+        match self {
+            Coordinate::X => vector.x = to,
+            Coordinate::Y => vector.y = to,
+            Coordinate::Z => vector.z = to,
+        }
+    }
+}
+
+/// An error that a measurement can replace.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Replaced {
+    /// The third coordinate of the rotation.
+    Heading,
+    Velocity(Coordinate),
+    Position(Coordinate),
+    /// The barometer's offset.
+    Offset,
 }
 
 /// Row of a Jacobian: what a scalar measurement makes of the errors. Velocity and position enter by one coordinate.
@@ -77,6 +115,18 @@ pub(crate) struct Row {
     /// By the slow errors, where they come on top.
     pub(crate) slow: Option<Slows>,
 }
+
+/// A row that measures nothing.
+pub(crate) const NO_ROW: Row = Row {
+    coordinate: Coordinate::Z,
+    theta: Vector3::new(0.0, 0.0, 0.0),
+    velocity: 0.0,
+    position: 0.0,
+    gyro: None,
+    accel: None,
+    baro: 0.0,
+    slow: None,
+};
 
 /// One number per error.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -51,6 +51,8 @@ pub struct Resets {
     pub height: u32,
     /// Roll and pitch doubted: their standard deviation raised.
     pub tilt: u32,
+    /// The covariance was none any more: all but its variances was forgotten.
+    pub covariance: u32,
     /// The filter started again after it had diverged or after a gap in the samples.
     pub restarts: u32,
 }
@@ -73,6 +75,11 @@ pub struct Dropped {
     pub disturbed: u32,
     /// The pose of a tracker, or the field of a magnetometer, that has repeated it for too long.
     pub frozen: u32,
+}
+
+/// Counts one more.
+pub(crate) fn count(number: &mut u32) {
+    *number = number.saturating_add(1);
 }
 
 /// State, its uncertainty and its validity; new with every call of [`Estimator::step`](crate::Estimator::step).

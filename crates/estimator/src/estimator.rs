@@ -1,8 +1,8 @@
 //! The estimator: what happens in a step.
 
 use crate::align::Unready;
-use crate::covariance::{Growth, largest_sigma};
-use crate::estimate::{Estimate, Sigmas, Validity};
+use crate::covariance::{BLOCKS, Growth, largest_sigma};
+use crate::estimate::{Estimate, Sigmas, Validity, count};
 use crate::imu::LowPass;
 use crate::measurement::ImuSample;
 use crate::memory::{Memory, NO_INTERVAL};
@@ -28,7 +28,8 @@ const GAP_M_S2: f32 = 3.0;
 const BENT_S: f32 = 0.7;
 /// Time for which a vehicle that is held at rest counts as such \[us\].
 const HELD_US: u64 = 500_000;
-/// Variances per second that a clipped sample adds, attitude and velocity: 0.8 rad and 2.4 m/s for 30 ms of them.
+/// Variances per second that a clipped sample of the gyroscope adds to the attitude, and one of the accelerometer to
+/// the velocity: 0.8 rad and 2.4 m/s for 30 ms of them. What the other makes of it, the prediction knows.
 const CLIPPED: (f32, f32) = (20.0, 200.0);
 
 /// The estimator. Constant; what changes is in [`Memory`].
@@ -182,8 +183,9 @@ impl Estimator {
             let (turn, speed) = (GAP_RAD_S * dt_s, GAP_M_S2 * dt_s);
             memory.roughen(sample.at_us, turn * turn, speed * speed);
         }
-        if clipped {
-            memory.roughen(sample.at_us, CLIPPED.0 * dt_s, CLIPPED.1 * dt_s);
+        if clipped.gyro || clipped.accel {
+            let of = |clipped, rate: f32| if clipped { rate * dt_s } else { 0.0 };
+            memory.roughen(sample.at_us, of(clipped.gyro, CLIPPED.0), of(clipped.accel, CLIPPED.1));
         }
         memory.rest.advance(sample, dt_s, &self.settings);
         memory.interval.thrust += memory.nominal.advance(sample, dt_s, self.settings.gravity_m_s2);
@@ -207,10 +209,16 @@ impl Estimator {
         memory.covariance.predict(&interval, &growth);
         memory.covariance.roughen(memory.rough);
         memory.history.advance(interval.time_s, &interval.thrust);
+        memory.pushed += interval.thrust.xy();
         memory.rotation = memory.nominal.rotation;
         memory.interval = NO_INTERVAL;
         memory.rough = (0.0, 0.0);
+        memory.watched = if memory.watched + 1 < BLOCKS { memory.watched + 1 } else { 0 };
         if memory.nominal.is_sound() && memory.covariance.is_sound() {
+            if !memory.covariance.is_possible(memory.watched) {
+                memory.covariance.decorrelate();
+                count(&mut memory.resets.covariance);
+            }
             memory.remember(sample.at_us);
         } else {
             memory.restart(sample.at_us);
@@ -292,7 +300,8 @@ impl Estimator {
         let held = held_us.is_some_and(|held_us| held_us <= self.coast_us) || aids.holds_velocity(at_us, self.coast_us);
         let (fast, far) = (largest_sigma(&variances.velocity), largest_sigma(&variances.position));
         let velocity = attitude && held && fast <= s.velocity_sigma_max_m_s;
-        let placed = aids.holds_position(at_us, self.coast_us);
+        let carried = || memory.carried_us.is_some_and(|carried_us| at_us.saturating_sub(carried_us) <= self.coast_us);
+        let placed = aids.holds_position(at_us, self.coast_us) || carried();
         let position = velocity && placed && memory.knows.position && far <= s.position_sigma_max_m;
         let height = position
             || attitude

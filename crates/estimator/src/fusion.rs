@@ -4,17 +4,18 @@
 //! another, each with the innovation against the state as corrected so far; their innovations' squares over s then add
 //! up to the normalised innovation squared of the whole fix.
 
-use crate::aid::{Aid, passes};
+use crate::aid::{Aid, Trust, passes};
 use crate::align::VAGUE;
 use crate::errors::{Coordinate, Errors, Slows};
+use crate::estimate::count;
 use crate::estimator::Estimator;
 use crate::horizon::{Expected, Horizon, Target};
 use crate::measurement::Measurement;
 use crate::memory::Memory;
-use crate::queue::{Fix, Part, parts};
+use crate::queue::{Axes, Fix, Part, parts};
 use crate::restart::reference;
-use crate::rotation::{atan2, renormalized, small, twist};
-use afbc_control::math::{abs_max, max, min, sqrt, wrap_angle};
+use crate::rotation::{renormalized, small, twist};
+use afbc_control::math::{abs_max, max, min, sqrt};
 use nalgebra::Vector3;
 
 /// Oldest measurement when its turn comes: 250 ms and the time to wait for it \[us\].
@@ -40,15 +41,18 @@ const ALOFT_M_S: f32 = 3.0;
 const STILL_SIGMAS: f32 = 3.0;
 /// Time within which a second reset doubts the attitude \[us\].
 const AGAIN_US: u64 = 10_000_000;
-/// Variance of the velocity after a tracker's jump: one position says nothing of it, the next two do \[m2/s2\].
-const JUMP_VARIANCE: f32 = 100.0;
+/// Time of rejections after which, at the earliest, an aid that comes back is followed \[us\].
+const REJECTED_US: u64 = 1_000_000;
 /// Variance of the velocity after a freeze, which has claimed for a while that the vehicle stands still: (0.1 m/s)^2,
 /// since faster ones contradict it \[m2/s2\].
 const FROZEN_VARIANCE: f32 = 0.01;
 
-fn count(number: &mut u32) {
-    *number = number.saturating_add(1);
-}
+/// Share of the mean innovation that a scalar replaces, and the mean, in standard deviations, from which on biases are
+/// doubted: six times that of white ones.
+const LEANS: f32 = 0.05;
+const LEANS_SIGMAS: f32 = 1.0;
+/// Standard deviations of a slow error that an innovation may lean by for that alone.
+const SLOW_SIGMAS: f32 = 1.0;
 
 impl Estimator {
     /// Fuses one scalar, and a second one if measurements pile up; the first scalar of a fix is alone in its step.
@@ -57,6 +61,10 @@ impl Estimator {
         for _ in 0..scalars {
             let begins = memory.fix.is_none();
             if begins && !self.begin_fix(memory, now_us) {
+                break;
+            }
+            // A receiver's velocity has gone through the bank of yaw filters: that is enough for a step.
+            if begins && memory.fix.as_ref().is_some_and(Fix::is_gnss) {
                 break;
             }
             if !self.fuse_scalar(memory) {
@@ -106,8 +114,9 @@ impl Estimator {
             }
         }
         match (&measurement.value, &mut parts) {
-            (Measurement::Gnss { .. }, [Some(part), _]) => {
-                self.divide(memory, part, at_us.saturating_sub(fix_us.unwrap_or(0)));
+            (Measurement::Gnss { .. }, [Some(level), Some(height), _]) => {
+                self.divide(memory, level, at_us.saturating_sub(fix_us.unwrap_or(0)));
+                height.variance = level.variance;
             }
             // A field of which the vehicle's own may be as large as the earth's gives no heading.
             (Measurement::MagneticField { .. }, _) if self.magnetic_variance >= VAGUE => {
@@ -120,20 +129,28 @@ impl Estimator {
                 count(&mut memory.dropped.frozen);
                 return false;
             }
-            (Measurement::MagneticField { .. }, [Some(_), _]) => {
+            (Measurement::MagneticField { .. }, [Some(_), ..]) => {
                 memory.covariance.slow.magnetize(self.magnetic_variance);
             }
-            (Measurement::Pose { position_m, attitude, .. }, [Some(_), _])
+            (Measurement::Pose { position_m, attitude, .. }, [Some(_), ..])
                 if self.is_frozen(memory, position_m, attitude, at_us) =>
             {
                 return false;
             }
-            (Measurement::Position { position_m, .. }, [Some(_), _])
+            (Measurement::Position { position_m, .. }, [Some(_), ..])
                 if self.is_frozen(memory, position_m, &[0.0; 4], at_us) =>
             {
                 return false;
             }
             _ => {}
+        }
+        if let Measurement::Gnss { velocity_m_s, speed_sigma_m_s, .. } = &measurement.value
+            && parts.iter().flatten().any(|part| part.aid == Some(Aid::GnssVelocity))
+        {
+            let variance = speed_sigma_m_s * speed_sigma_m_s;
+            let pushed = memory.pushed - memory.history.thrust_since(&past, self.settings.gravity_m_s2).xy();
+            memory.yaw_bank.fuse(&pushed, at_us, &velocity_m_s.xy(), variance);
+            self.follow_bank(memory, at_us);
         }
         let any = parts.iter().any(Option::is_some);
         if any {
@@ -150,7 +167,7 @@ impl Estimator {
             count(&mut memory.dropped.frozen);
             if !memory.repeated.doubted {
                 memory.repeated.doubted = true;
-                memory.doubt_velocity(FROZEN_VARIANCE);
+                memory.doubt_velocity(&Vector3::repeat(FROZEN_VARIANCE));
             }
             memory.aids.tracker_position.rejected_since_us = None;
             memory.aids.tracker_attitude.rejected_since_us = None;
@@ -189,15 +206,16 @@ impl Estimator {
         }
         let Some(past) = memory.history.newest_raw() else { return false };
         let variance = Vector3::repeat(sigma * sigma);
-        let part = Part { aid: None, target: Target::Velocity(Vector3::zeros()), variance, rough: 0.0 };
-        memory.fix = Some(Fix { at_us, past, parts: [Some(part), None], next: 0, nis: 0.0 });
+        let target = Target::Velocity(Vector3::zeros());
+        let part = Part { aid: None, target, axes: Axes::All, variance, rough: 0.0 };
+        memory.fix = Some(Fix { at_us, past, parts: [Some(part), None, None], next: 0, nis: 0.0 });
         true
     }
 
     /// Fuses the next scalar; false if the part of the fix that it belongs to is done.
     #[inline(always)]
     fn fuse_scalar(&self, memory: &mut Memory) -> bool {
-        let Some(Fix { at_us, past, parts: [Some(part), _], next, .. }) = &memory.fix else { return false };
+        let Some(Fix { at_us, past, parts: [Some(part), ..], next, .. }) = &memory.fix else { return false };
         let Some(present) = memory.history.newest() else { return false };
         let gravity = self.settings.gravity_m_s2;
         let Some(past) = memory.history.corrected(past, gravity) else { return false };
@@ -208,20 +226,16 @@ impl Estimator {
         if next == 0 && !self.admits(memory, at_us, &part, &horizon) {
             return false;
         }
-        let coordinate = match next {
-            0 => Coordinate::X,
-            1 => Coordinate::Y,
-            _ => Coordinate::Z,
-        };
-        let expected = Expected { height_offset: memory.height_offset, field: self.expected_field(memory) };
+        let coordinate = part.axes.coordinate(next);
+        let expected = self.expected(memory);
         // In place, since the copy of a large struct is a call of a slow loop.
         let mut seen = horizon.row(&part.target, coordinate, &expected);
         let Some((innovation, row)) = &mut seen else { return false };
         let innovation = *innovation;
         if part.is_slow() {
-            let unit = coordinate.unit();
-            row.slow = Some(Slows::new(unit.x, unit.y, unit.z, 0.0, 0.0));
+            row.slow = Some(slow_position(coordinate));
         }
+        let slow = row.slow.map_or(0.0, |slow| memory.covariance.slow.of_row(&slow));
         let y = memory.covariance.times(row);
         // Negative by rounding only.
         let hph = max(row.dot(&y), 0.0);
@@ -232,8 +246,8 @@ impl Estimator {
         // Above zero, since each variance has a floor: it may divide.
         let s = hph + max(r, max(LEFT * hph, ROUNDING * memory.covariance.motion_variance(row)));
         let nis = innovation * innovation / s;
-        let scalars = part.target.scalars();
-        // Three scalars have passed the gate together, before the first of them changed the state.
+        let scalars = part.scalars();
+        // Several scalars have passed the gate together, before the first of them changed the state.
         if scalars == 1 && nis > self.gate_squared {
             self.reject(memory, at_us, &part, nis, &horizon);
             return false;
@@ -260,6 +274,9 @@ impl Estimator {
                 memory.covariance.fuse(&y, s);
                 self.correct(memory, &y.scaled(innovation / s));
             }
+        }
+        if part.aid.is_some() {
+            memory.suspect(&part.target, coordinate, innovation / sqrt(s), (slow, s));
         }
         let Some(fix) = &mut memory.fix else { return false };
         fix.next += 1;
@@ -289,6 +306,7 @@ impl Estimator {
         nominal.accel_bias = limited(nominal.accel_bias + by.accel, self.settings.accel_bias_max_m_s2);
         memory.height_offset += by.baro;
         memory.turned = turn * memory.turned;
+        memory.yaw_bank.turn(by.theta.z);
         memory.history.correct(&turn, &by.theta, &by.velocity, &by.position);
     }
 
@@ -301,9 +319,13 @@ impl Estimator {
             Target::Position(position) => {
                 let innovation = position - past.position;
                 if !memory.knows.position {
-                    memory.reset_position(&innovation, part, horizon.tau_s());
+                    self.follow(memory, &Part { axes: Axes::All, ..*part }, horizon);
                     self.accept(memory, at_us, part);
+                    memory.end_height(at_us);
                     return false;
+                }
+                if part.axes == Axes::Vertical {
+                    return true;
                 }
                 let tau_s = horizon.tau_s();
                 let along = memory.covariance.vp.diagonal();
@@ -315,17 +337,15 @@ impl Estimator {
             Target::Velocity(velocity) => (velocity - past.velocity, variances.velocity),
             Target::Attitude(attitude) => {
                 if !memory.knows.heading {
-                    // As good as roll and pitch are: they mix with it.
-                    let variance = part.variance.z + max(variances.theta.x, variances.theta.y);
-                    memory.reset_heading(twist(attitude, &past.attitude), variance, None);
+                    self.follow(memory, part, horizon);
                     self.accept(memory, at_us, part);
                     return false;
                 }
                 (crate::rotation::difference(attitude, &past.attitude), variances.theta)
             }
-            Target::Height(height) => {
+            Target::Height(_) => {
                 if !memory.knows.height_offset {
-                    memory.reset_height_offset(height - past.position.z, part.variance.x);
+                    self.follow(memory, part, horizon);
                     self.accept(memory, at_us, part);
                     return false;
                 }
@@ -345,28 +365,22 @@ impl Estimator {
                     return false;
                 }
                 if !memory.knows.heading {
-                    let turn = wrap_angle(self.magnetic_north_rad - atan2(field.y, field.x));
-                    // A tilt turns the horizontal field by the tangent of its dip: the variance by the square of that.
-                    let floor = 1e-3 * strength * strength;
-                    let slope = field.z * field.z / max(field.x * field.x + field.y * field.y, floor);
-                    let variance = field_variance(&field, part.variance.x)
-                        + min(slope, 100.0) * max(variances.theta.x, variances.theta.y);
-                    memory.reset_heading(turn, variance, Some(self.magnetic_north));
+                    self.follow(memory, part, horizon);
                     self.accept(memory, at_us, part);
                     return false;
                 }
                 return true;
             }
-            Target::Heading(heading) => {
+            Target::Heading(_) => {
                 if !memory.knows.heading {
-                    memory.reset_heading(wrap_angle(heading - horizon.heading()), part.variance.x, None);
+                    self.follow(memory, part, horizon);
                     self.accept(memory, at_us, part);
                     return false;
                 }
                 return true;
             }
         };
-        let s = variance + part.variance;
+        let (innovation, s) = (part.axes.only(&innovation), variance + part.variance);
         let passes = passes(&innovation, &s, self.gate_squared);
         if !passes {
             let nis = innovation.x * innovation.x / s.x;
@@ -376,12 +390,13 @@ impl Estimator {
         passes
     }
 
-    /// Returns the direction of the magnetic field in the earth frame.
+    /// Returns what is expected of a barometer, and the direction of the magnetic field in the earth frame.
     #[inline]
-    fn expected_field(&self, memory: &Memory) -> Vector3<f32> {
+    pub(crate) fn expected(&self, memory: &Memory) -> Expected {
         let steep = memory.field.map_or(0.0, |(_, steep)| steep);
         let level = sqrt(max(1.0 - steep * steep, 0.0));
-        Vector3::new(level * self.magnetic_north.0, level * self.magnetic_north.1, steep)
+        let field = Vector3::new(level * self.magnetic_north.0, level * self.magnetic_north.1, steep);
+        Expected { height_offset: memory.height_offset, field }
     }
 
     fn accept(&self, memory: &mut Memory, at_us: u64, part: &Part) {
@@ -394,48 +409,52 @@ impl Estimator {
     #[cold]
     fn reject(&self, memory: &mut Memory, at_us: u64, part: &Part, nis: f32, horizon: &Horizon) {
         let Some(aid) = part.aid else { return };
+        let is_carried = memory.aids.gnss_velocity.is_live(at_us, PRESENT_US);
+        if is_carried && matches!(part.target, Target::Position(_)) {
+            memory.carried_us = Some(at_us);
+        }
         let record = memory.aids.of_mut(aid);
-        (record.nis, record.scalars) = (nis, part.target.scalars());
+        (record.nis, record.scalars) = (nis, part.scalars());
         let lasted_us = record.reject(at_us);
-        if lasted_us < self.reacquire_us || memory.aids.has_other(aid, at_us, PRESENT_US) {
+        // Of one that has never agreed, since it began.
+        let alone_us = record.accepted_us.map_or(lasted_us, |accepted_us| at_us.saturating_sub(accepted_us));
+        let wait_us = match memory.aids.trust(aid, is_carried, at_us, PRESENT_US) {
+            Trust::Never => return,
+            Trust::Late => self.reacquire_us,
+            Trust::Soon => self.reacquire_us.min(self.coast_us / 5 * 3),
+        };
+        if lasted_us < wait_us.min(REJECTED_US) || alone_us < wait_us {
             return;
         }
-        let past = horizon.past();
-        match &part.target {
-            Target::Position(position) => {
-                if aid == Aid::TrackerPosition {
-                    memory.doubt_velocity(JUMP_VARIANCE);
-                }
-                memory.reset_position(&(position - past.position), part, horizon.tau_s());
+        if let Target::Attitude(attitude) = &part.target {
+            // Roll and pitch are the IMU's; a tracker that contradicts them stays rejected.
+            let turn = twist(attitude, &horizon.past().attitude);
+            if turn * turn <= self.gate_squared * (memory.covariance.tt.m33 + part.variance.z) {
+                return;
+            }
+        }
+        if let Target::Position(position) = &part.target
+            && !is_carried
+        {
+            // An error of the velocity that has grown steadily since the last position has made twice the speed that
+            // leads here.
+            let alone_s = max(alone_us as f32 * 1e-6, 0.1);
+            let by = part.axes.only(&(position - horizon.past().position)) * (2.0 / alone_s);
+            memory.doubt_velocity(&by.component_mul(&by));
+        }
+        self.follow(memory, part, horizon);
+        match part.target {
+            Target::Position(_) => {
                 self.doubt(memory, at_us);
                 // The same tracker contradicts the attitude too.
                 if memory.aids.tracker_attitude.rejected_since_us.is_some() && aid == Aid::TrackerPosition {
                     memory.doubt_tilt();
                 }
             }
-            Target::Velocity(velocity) => {
-                memory.reset_velocity(&(velocity - past.velocity), &part.variance);
-                self.doubt(memory, at_us);
-            }
-            Target::Attitude(attitude) => {
-                // Roll and pitch are the IMU's; a tracker that contradicts them stays rejected.
-                let turn = twist(attitude, &past.attitude);
-                let variance = memory.covariance.tt.m33 + part.variance.z;
-                if turn * turn <= self.gate_squared * variance {
-                    return;
-                }
-                let tilt = memory.covariance.tt;
-                memory.reset_heading(turn, part.variance.z + max(tilt.m11, tilt.m22), None);
-            }
-            Target::Height(height) => memory.reset_height_offset(height - past.position.z, part.variance.x),
-            Target::Field(field) => {
-                let direction = horizon.field(field);
-                let turn = wrap_angle(self.magnetic_north_rad - atan2(direction.y, direction.x));
-                memory.reset_heading(turn, field_variance(&direction, part.variance.x), Some(self.magnetic_north));
-            }
-            Target::Heading(heading) => {
-                memory.reset_heading(wrap_angle(heading - horizon.heading()), part.variance.x, None);
-            }
+            Target::Velocity(_) => self.doubt(memory, at_us),
+            // A bias that is not what it was turns the heading away from what measures it.
+            Target::Attitude(_) | Target::Heading(_) | Target::Field(_) => memory.doubt_turn(),
+            Target::Height(_) => {}
         }
         self.accept(memory, at_us, part);
     }
@@ -450,20 +469,55 @@ impl Estimator {
 }
 
 impl Memory {
+    /// Looks at innovations, in standard deviations, in the long run: those of a right filter are white, so that a mean
+    /// of many is small, but for what a slow error makes of them, of this variance and this one in all. One that is not
+    /// is due to a bias that has changed by more than was told of it.
+    #[inline]
+    fn suspect(&mut self, target: &Target, at: Coordinate, sigmas: f32, (slow, all): (f32, f32)) {
+        let [motion, rotation] = &mut self.leaning;
+        let (mean, turns) = match target {
+            Target::Position(_) | Target::Velocity(_) => (motion, false),
+            Target::Attitude(_) | Target::Field(_) | Target::Heading(_) => (rotation, true),
+            Target::Height(_) => return,
+        };
+        let at = if matches!(target, Target::Field(_) | Target::Heading(_)) { Coordinate::Z } else { at };
+        let before = at.of(mean);
+        let now = before + LEANS * (sigmas - before);
+        at.set(mean, now);
+        let leans = now.abs();
+        if leans > LEANS_SIGMAS && leans > LEANS_SIGMAS + SLOW_SIGMAS * sqrt(max(slow / all, 0.0)) {
+            self.doubt_biases(turns);
+        }
+    }
+
     /// Ends the part of the fix that is being fused, and the fix with its last one.
     fn end_part(&mut self) {
-        if let Some(fix) = &mut self.fix {
-            let [first, second] = &mut fix.parts;
-            (*first, fix.next, fix.nis) = (second.take(), 0, 0.0);
-            if first.is_none() {
-                self.fix = None;
-            }
+        let Some(fix) = &mut self.fix else { return };
+        let [_, second, third] = fix.parts;
+        (fix.next, fix.nis) = (0, 0.0);
+        fix.parts = if second.is_some() { [second, third, None] } else { [third, None, None] };
+        if fix.parts[0].is_none() {
+            self.fix = None;
+        }
+    }
+
+    /// Leaves out the receiver's height, which the position was set to.
+    fn end_height(&mut self, at_us: u64) {
+        if let Some(Fix { parts: [_, height @ Some(Part { aid: Some(Aid::GnssHeight), .. }), _], .. }) = &mut self.fix {
+            *height = None;
+            self.aids.gnss_height.accept(at_us);
         }
     }
 }
 
+/// The share of a receiver's slow error in a coordinate of its position.
+pub(crate) fn slow_position(at: Coordinate) -> Slows {
+    let unit = at.unit();
+    Slows::new(unit.x, unit.y, unit.z, 0.0, 0.0)
+}
+
 /// Variance of the direction of a field's horizontal part; that of its coordinates is `variance`.
-fn field_variance(field: &Vector3<f32>, variance: f32) -> f32 {
+pub(crate) fn field_variance(field: &Vector3<f32>, variance: f32) -> f32 {
     let horizontal = field.x * field.x + field.y * field.y;
     let floor = 1e-6 * abs_max(field) * abs_max(field);
     variance / max(horizontal, floor) + 1e-6

@@ -171,6 +171,14 @@ impl History {
         })
     }
 
+    /// Returns the change of velocity by specific force from `raw` up to the newest entry.
+    pub(crate) fn thrust_since(&self, raw: &Past, gravity: f32) -> Vector3<f32> {
+        match (self.newest(), self.corrected(raw, gravity)) {
+            (Some(newest), Some(past)) => way(&newest, &past, gravity).1,
+            _ => Vector3::zeros(),
+        }
+    }
+
     /// Returns the state at `at_us`, interpolated and without corrections, `None` if it is before the oldest or after
     /// the newest entry.
     pub(crate) fn at(&self, at_us: u32) -> Option<Past> {

@@ -14,7 +14,7 @@
 //! the noise of the inertial sensors in between. Left out are the terms of the gyroscope's bias in v and p, 5e-5 m/s
 //! for 1e-3 rad/s and 100 ms, and that of the accelerometer's in p, 1e-4 m for 0.02 m/s2 and 100 ms.
 
-use crate::errors::{Coordinate, Row, Slows};
+use crate::errors::{Coordinate, NO_ROW, Row, Slows};
 use crate::history::{Past, way};
 use crate::rotation::{atan2, difference, matrix};
 use afbc_control::math::{max, sqrt, wrap_angle};
@@ -66,6 +66,12 @@ impl Horizon {
         Horizon { past: *past, rotation, tau_s, turn, thrust, distance }
     }
 
+    /// Returns the same after a turn about the vertical.
+    pub(crate) fn turned(&self, turn: &Quaternion<f32>) -> Self {
+        let r = matrix(turn);
+        Horizon { rotation: r * self.rotation, turn: r * self.turn, ..*self }
+    }
+
     /// Returns the past state.
     pub(crate) fn past(&self) -> &Past {
         &self.past
@@ -91,16 +97,7 @@ impl Horizon {
     pub(crate) fn row(&self, target: &Target, coordinate: Coordinate, expected: &Expected) -> Option<(f32, Row)> {
         let at = coordinate;
         let unit = at.unit();
-        let none = Row {
-            coordinate,
-            theta: Vector3::zeros(),
-            velocity: 0.0,
-            position: 0.0,
-            gyro: None,
-            accel: None,
-            baro: 0.0,
-            slow: None,
-        };
+        let none = Row { coordinate, ..NO_ROW };
         // An angle: the error's product with `theta`.
         let angle = |innovation: f32, theta: Vector3<f32>| {
             (innovation, Row { theta, gyro: Some(self.turn.tr_mul(&theta)), ..none })

@@ -38,6 +38,13 @@ impl ImuHealth {
     }
 }
 
+/// Which of the two sensors is at the end of its range.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Clipped {
+    pub(crate) gyro: bool,
+    pub(crate) accel: bool,
+}
+
 /// Watches the samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Monitor {
@@ -89,8 +96,8 @@ impl Monitor {
         self.is_stuck(stuck_us) && self.last.as_ref().is_some_and(same)
     }
 
-    /// Takes a sample that is not refused, nor repeats those of a stuck sensor. True if it is clipped.
-    pub(crate) fn take(&mut self, sample: &ImuSample, settings: &Settings) -> bool {
+    /// Takes a sample that is not refused, nor repeats those of a stuck sensor. Returns what of it is clipped.
+    pub(crate) fn take(&mut self, sample: &ImuSample, settings: &Settings) -> Clipped {
         self.in_a_row = 0;
         if let Some(last) = &self.last {
             let rates = sample.rates_rad_s - last.rates_rad_s;
@@ -104,9 +111,11 @@ impl Monitor {
         } else {
             self.same_us = sample.at_us;
         }
-        let clipped = abs_max(&sample.rates_rad_s) >= 0.98 * settings.gyro_range_rad_s
-            || abs_max(&sample.specific_force_m_s2) >= 0.98 * settings.accel_range_m_s2;
-        if clipped {
+        let clipped = Clipped {
+            gyro: abs_max(&sample.rates_rad_s) >= 0.98 * settings.gyro_range_rad_s,
+            accel: abs_max(&sample.specific_force_m_s2) >= 0.98 * settings.accel_range_m_s2,
+        };
+        if clipped.gyro || clipped.accel {
             self.clipped_us = Some(sample.at_us);
         }
         self.last = Some(*sample);

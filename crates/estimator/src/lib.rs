@@ -60,8 +60,9 @@
 //!
 //! * A **tracker** and a **GNSS receiver** both measure the position in the earth frame. Their origins must be the same
 //!   (on board `afbc_onboard::EstimatorFrontEnd` sees to that); whichever comes first sets the position, and one that
-//!   contradicts the other is rejected as long as the other is there. The receiver's antenna is taken to be at the
-//!   centre of mass, as is the IMU, whose samples [`ImuCalibration`] corrects where it is not.
+//!   contradicts the other is rejected as long as the other is there. A receiver's height has a gate of its own. The
+//!   receiver's antenna is taken to be at the centre of mass, as is the IMU, whose samples [`ImuCalibration`] corrects
+//!   where it is not.
 //! * Of the standard deviation that a receiver reports, [`Settings::gnss_noise_m`] is noise, and the rest an
 //!   [error that stays for minutes](slow), which further fixes do not average: the position is as good as the receiver.
 //! * A tracker that repeats its pose in every bit for [`Settings::frozen_s`] is frozen, and not believed.
@@ -73,8 +74,9 @@
 //!   the vehicle. What iron and currents of the vehicle add to the field, [`Settings::mag_slow_rad`], is a slow error
 //!   too: further fields do not average it, and the heading is as good as that. A field whose strength or inclination
 //!   is not that of the start is not used.
-//! * A **heading** that neither tracker nor magnetometer measures follows from the motion once the vehicle accelerates,
-//!   but never counts as valid: an error of nearly half a turn may stay, with a small standard deviation.
+//! * A **heading** that neither tracker nor magnetometer measures follows from the motion once the vehicle accelerates.
+//!   By positions alone it never counts as valid, since an error of nearly half a turn may stay with a small standard
+//!   deviation; by a receiver's velocity it does.
 //! * **At rest on the ground** the velocity is held at zero, as long as [the inertial sensor shows rest](rest) and the
 //!   motors are known not to carry the vehicle ([`Memory::set_on_ground`]), or that is unknown and it has not moved
 //!   since the alignment. A vehicle carried by hand is followed. In the air without any aid for [`Settings::coast_s`] a
@@ -83,22 +85,37 @@
 //! # For a controller
 //!
 //! Each fix makes position and velocity jump, those of an aid that comes back most, and the rotors shake the velocity.
-//! [`OutputFilter`] gives a controller the same state without either.
+//! [`OutputFilter`] gives a controller the same state without either. A position or heading that is set anew, it can
+//! hand over instead ([`OutputFilter::handing_over`]), so that setpoints shift with it and the vehicle does not move.
 //!
 //! # When something is wrong
 //!
-//! Each kind of measurement has a gate. One that is rejected for [`Settings::reacquire_s`] without a break, with nobody
-//! to contradict it, is believed: its part of the state is set to it and counted ([`Resets`]). A second reset within
-//! ten seconds doubts roll and pitch too. Clipped samples and gaps of more than 20 ms raise the variances; after 250 ms
-//! without samples, or if the state is not possible any more, the filter starts again where it is. It has no output
-//! that is not finite, whatever is put in.
+//! Each kind of measurement has a gate. One that contradicts the state [is followed](follow) only when nothing that it
+//! could be held against is left ([`aid`]): never while two others agree without it, as barometer and a receiver's
+//! velocity do about its height, and that velocity with the gyroscope about a compass; after [`Settings::reacquire_s`]
+//! without a fused one, while something else holds the state; and after three fifths of [`Settings::coast_s`] where
+//! nothing does, before the state is not valid any more. Its part of the state is then set to it and counted
+//! ([`Resets`]); the new error is that of the measurement, with every covariance that it has by the others' errors. A
+//! second reset within ten seconds doubts roll and pitch too, and one of the heading the gyroscope's bias.
+//!
+//! **The heading by a receiver's velocity** comes from a [bank of filters](yaw_bank) that take nothing from a compass.
+//! It sets a heading that nobody has told, or that it contradicts for two seconds by more than 20 degrees and three
+//! standard deviations: a compass that is disturbed along the body turns no vehicle away.
+//!
+//! Innovations that lean to one side doubt the biases, which have changed by more than was told. A clipped sample adds
+//! to the variance of what was clipped: the accelerometer's to the velocity, the gyroscope's to the attitude. Gaps of
+//! more than 20 ms raise both; after 250 ms without samples, or if the state is not possible any more, the filter
+//! starts again where it is. It has no output that is not finite, whatever is put in, and the covariance stays one
+//! (`tests/anything.rs`): a prediction adds what rounding may have taken, and a block of it that no covariance can have
+//! is found within 60 ms, forgotten and counted.
 //!
 //! # Reading order
 //!
-//! [`measurement`], [`settings`], [`data_sheet`], [`estimate`]: in and out. [`calibration`]: samples to body axes.
+//! [`measurement`], [`settings`], [`data_sheet`], [`estimate`]: in and out. [`calibration`], [`lever`]: samples to body
+//! axes and the centre of mass.
 //! [`estimator`]: a step. [`align`]: the start. [`rest`]: rest. [`nominal`], [`errors`], [`covariance`]: prediction.
-//! [`history`], [`horizon`], [`queue`], [`fusion`], [`slow`]: measurements. [`aid`], [`restart`], [`imu`]: gates,
-//! resets, health. [`rotation`], [`geodetic`]: small mathematics.
+//! [`history`], [`horizon`], [`queue`], [`fusion`], [`slow`]: measurements. [`aid`], [`follow`], [`yaw_bank`],
+//! [`restart`], [`imu`]: gates, resets, heading, starts, health. [`rotation`], [`geodetic`]: small mathematics.
 #![no_std]
 #![allow(rustdoc::private_intra_doc_links, reason = "the modules' documentation is for their reader")]
 
@@ -110,12 +127,14 @@ mod data_sheet;
 mod errors;
 mod estimate;
 mod estimator;
+mod follow;
 mod fusion;
 mod geodetic;
 mod history;
 mod horizon;
 mod imu;
 mod inertial;
+mod lever;
 mod measurement;
 mod memory;
 mod nominal;
@@ -126,6 +145,7 @@ mod restart;
 mod rotation;
 mod settings;
 mod slow;
+mod yaw_bank;
 
 pub use afbc_types::Stamped;
 pub use aid::{Aid, AidRecord, Aids};
@@ -137,6 +157,7 @@ pub use estimator::Estimator;
 pub use geodetic::Origin;
 pub use imu::{ImuHealth, MISSING_US};
 pub use inertial::Inertial;
+pub use lever::LeverFinder;
 pub use measurement::{ImuSample, Measurement};
 pub use memory::Memory;
 pub use output_filter::{OutputFilter, VelocityNotch};

@@ -14,8 +14,9 @@ use crate::queue::{Fix, Queue};
 use crate::rest::Rest;
 use crate::rotation::identity;
 use crate::settings::Settings;
+use crate::yaw_bank::YawBank;
 use afbc_types::Stamped;
-use nalgebra::{Matrix3, Quaternion, Vector3};
+use nalgebra::{Matrix3, Quaternion, Vector2, Vector3};
 
 /// Memory of an estimator. The default is that before the first sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,6 +31,8 @@ pub struct Memory {
     pub(crate) smoothed: Smoothed,
     pub(crate) nominal: Nominal,
     pub(crate) covariance: Covariance,
+    /// Block of the covariance that was looked at last.
+    pub(crate) watched: u8,
     /// Time of the covariance and of the newest entry of the history \[us\].
     pub(crate) covariance_us: u64,
     /// What happened since then.
@@ -43,6 +46,14 @@ pub struct Memory {
     /// The same, summed up to now, and the time of the last such sample \[us\].
     pub(crate) lately: ((f32, f32), u64),
     pub(crate) history: History,
+    /// Sum of the horizontal changes of velocity by specific force, which nothing corrects \[m/s\].
+    pub(crate) pushed: Vector2<f32>,
+    pub(crate) yaw_bank: YawBank,
+    /// Time since when the bank contradicts the heading \[us\].
+    pub(crate) contradicted_us: Option<u64>,
+    /// Time of the last position that was rejected while a fused velocity carried the one before on, until either is
+    /// believed \[us\].
+    pub(crate) carried_us: Option<u64>,
     /// What measurements have changed in the last step: position \[m\] and velocity \[m/s\].
     pub(crate) moved: (Vector3<f32>, Vector3<f32>),
     pub(crate) queue: Queue,
@@ -54,6 +65,8 @@ pub struct Memory {
     /// Strength and sine of the inclination of the magnetic field, once known.
     pub(crate) field: Option<(f32, f32)>,
     pub(crate) aids: Aids,
+    /// Means of the innovations of motion and rotation, along the earth's axes, in standard deviations.
+    pub(crate) leaning: [Vector3<f32>; 2],
     pub(crate) repeated: Repeated,
     pub(crate) repeated_field: Repeated,
     /// Time of the last pseudo-measurement \[us\].
@@ -95,6 +108,7 @@ impl Default for Memory {
             smoothed: Smoothed::default(),
             nominal: Nominal::default(),
             covariance: Covariance::default(),
+            watched: 0,
             covariance_us: 0,
             interval: NO_INTERVAL,
             rotation: Matrix3::identity(),
@@ -102,6 +116,10 @@ impl Default for Memory {
             rough: (0.0, 0.0),
             lately: ((0.0, 0.0), 0),
             history: History::default(),
+            pushed: Vector2::zeros(),
+            yaw_bank: YawBank::default(),
+            contradicted_us: None,
+            carried_us: None,
             moved: (Vector3::zeros(), Vector3::zeros()),
             queue: Queue::default(),
             fix: None,
@@ -109,6 +127,7 @@ impl Default for Memory {
             knows: Known::default(),
             field: None,
             aids: Aids::default(),
+            leaning: [Vector3::zeros(); 2],
             repeated: Repeated::default(),
             repeated_field: Repeated::default(),
             still_us: 0,

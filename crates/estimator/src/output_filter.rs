@@ -1,10 +1,10 @@
 //! What a controller shall not feel of an estimate: jumps of its corrections, and the rotors' vibration.
 
-use crate::estimate::Estimate;
-use afbc_control::math::{max, min, sqrt, tan};
-use afbc_types::{Parameters, State};
+use crate::estimate::{Estimate, Resets};
+use afbc_control::math::{max, min, sqrt, tan, wrap_angle};
+use afbc_types::{Parameters, ResetDelta, State};
 use core::f32::consts::TAU;
-use nalgebra::Vector3;
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 /// Times in which what is hidden of position and velocity decays to 1/e \[s\]: twice and once as long as a GNSS
 /// receiver's fixes are apart. While corrections keep one direction, as they do where the tilt is off by a little, the
@@ -25,12 +25,40 @@ const LEAD: f32 = 0.15;
 const NOTCH_MIN_RAD_S: f32 = 10.0 * TAU;
 const NOTCH_MAX_RAD_S: f32 = 100.0 * TAU;
 
+/// Time within which forces along body x and y are hidden from the velocity at take-off \[s\], a step of a millisecond,
+/// and by how much less they are hidden with each step in the air, and more with each on the ground.
+const FORCED_S: f32 = 0.4;
+const STEP_S: f32 = 1e-3;
+const UNHIDES: f32 = 1e-3;
+/// Squared specific force that says that something bears the vehicle, from half of gravity on \[m2/s4\].
+const BORNE: f32 = 24.0;
+
+/// What quick forces along body x and y make of the velocity: F/m times (T s/(1 + T s))^2/s, T = 0.4 s.
+///
+/// On its feet a vehicle cannot learn where its inertial sensor is ([`crate::LeverFinder`]), but may tumble by it. In
+/// the air no such force but a lever's is quick, so a law may as well not see what they make of the velocity; it would
+/// see a gust of wind later, however. So they are hidden when it has stood for a second, until it has been in the air
+/// for one. A vehicle that falls before its motors turn has not stood.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Forced {
+    /// Slow part of the force, in the body's axes \[m/s2\].
+    slow_m_s2: Vector3<f32>,
+    /// In the earth frame \[m/s\].
+    velocity_m_s: Vector3<f32>,
+    /// Share that is hidden.
+    share: f32,
+}
+
 /// Hides the jumps of position and velocity that measurements make: the state goes on as the inertial sensor says, and
 /// approaches the estimate within 0.2 s (velocity 0.1 s), or at 1 m/s and 3 m/s2 from further away, as when an aid
 /// comes back. A law would answer each fix with a kick. A notch removes the rotors' vibration from the velocity, which
 /// a law would turn into commands of attitude and body rate. Attitude and rates pass unchanged.
 ///
-/// The default has no notch, and is that before the first estimate.
+/// Where the position is set anew ([`Estimate::resets`]), the vehicle would fly by as much. A filter that
+/// [hands resets over](Self::handing_over) does not hide these: it tells them, and whoever makes the setpoints shifts
+/// them in the same step.
+///
+/// The default has no notch, hides everything, and is that before the first estimate.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct OutputFilter {
     notch: Option<VelocityNotch>,
@@ -41,6 +69,21 @@ pub struct OutputFilter {
     velocity_m_s: Vector3<f32>,
     /// What the notch keeps, once there was a velocity.
     passed: Option<Passed>,
+    /// True if it hands resets over.
+    hands_over: bool,
+    /// The last estimate, from the first one on.
+    last: Option<Last>,
+    /// What was set anew in the last step.
+    reset: Option<ResetDelta>,
+    forced: Forced,
+}
+
+/// What shows of an estimate that the next one has been set anew.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Last {
+    positions: u32,
+    headings: u32,
+    yaw_rad: f32,
 }
 
 /// What a notch has kept of its inputs: a low-pass of them, for the lead, and two sums.
@@ -120,6 +163,19 @@ impl OutputFilter {
         OutputFilter { notch: VelocityNotch::at(hover_rad_s), ..OutputFilter::default() }
     }
 
+    /// The same, which hands over what is set anew ([`reset`](Self::reset)).
+    #[must_use]
+    pub fn handing_over(self) -> Self {
+        OutputFilter { hands_over: true, ..self }
+    }
+
+    /// Returns by how much position and heading were set anew in the last step, if they were, and if it hands that
+    /// over.
+    #[must_use]
+    pub fn reset(&self) -> Option<&ResetDelta> {
+        self.reset.as_ref()
+    }
+
     /// Returns the notch, if there is one.
     #[must_use]
     pub fn notch(&self) -> Option<&VelocityNotch> {
@@ -136,33 +192,75 @@ impl OutputFilter {
         }
     }
 
+    /// Takes the specific force of a sample, for the attitude of the estimate then; to be called before
+    /// [`step`](Self::step). Of a vehicle that stands it hides what forces along body x and y make of the velocity.
+    pub fn feel(&mut self, specific_force_m_s2: &Vector3<f32>, [w, x, y, z]: [f32; 4], in_the_air: bool) {
+        let Forced { slow_m_s2, velocity_m_s, share } = &mut self.forced;
+        let stands = !in_the_air && specific_force_m_s2.norm_squared() > BORNE;
+        *share = if stands { min(*share + UNHIDES, 1.0) } else { max(*share - UNHIDES, 0.0) };
+        if *share > 0.0 && specific_force_m_s2.norm_squared().is_finite() {
+            let lateral_m_s2 = Vector3::new(specific_force_m_s2.x, specific_force_m_s2.y, 0.0);
+            let quick_m_s2 = lateral_m_s2 - *slow_m_s2;
+            *slow_m_s2 += quick_m_s2 * (STEP_S / FORCED_S);
+            let to_earth = UnitQuaternion::new_unchecked(Quaternion::new(w, x, y, z));
+            *velocity_m_s += to_earth * quick_m_s2 * STEP_S - *velocity_m_s * (STEP_S / FORCED_S);
+        }
+    }
+
+    /// Hides no forces any more.
+    pub fn unhide(&mut self) {
+        self.forced = Forced::default();
+    }
+
     /// Returns the state to output for this estimate; to be called every millisecond. Nothing is hidden of an estimate
     /// whose position has not been valid before.
     #[must_use = "the state is its result"]
     #[inline]
     pub fn step(&mut self, estimate: &Estimate) -> State {
         let mut state = estimate.state;
+        self.reset = None;
+        if self.hands_over {
+            self.look(estimate);
+        }
         if !estimate.validity.position {
-            *self = OutputFilter { notch: self.notch, ..OutputFilter::default() };
+            let OutputFilter { notch, hands_over, last, reset, forced, .. } = *self;
+            *self = OutputFilter { notch, hands_over, last, reset, forced, ..OutputFilter::default() };
             return state;
         }
+        // What is handed over is not hidden.
+        let moved_m = estimate.moved_m - self.reset.map_or(Vector3::zeros(), |reset| reset.position_m);
         if let Some(last_us) = self.last_us {
             let dt_s = (estimate.at_us as u32).wrapping_sub(last_us) as f32 * 1e-6;
             let stays = |hidden: &Vector3<f32>, decay_s: f32, most: f32| {
                 // Within 0 and 1 after any time: the divisor is at least the decay, and the time at most.
                 1.0 - min(dt_s, decay_s) / max(decay_s, sqrt(hidden.norm_squared()) / most)
             };
-            self.position_m = self.position_m * stays(&self.position_m, POSITION_DECAY_S, MOST_M_S) + estimate.moved_m;
+            self.position_m = self.position_m * stays(&self.position_m, POSITION_DECAY_S, MOST_M_S) + moved_m;
             self.velocity_m_s =
                 self.velocity_m_s * stays(&self.velocity_m_s, VELOCITY_DECAY_S, MOST_M_S2) + estimate.moved_m_s;
         }
         self.last_us = Some(estimate.at_us as u32);
         state.position_m -= self.position_m;
-        state.velocity_m_s -= self.velocity_m_s;
+        state.velocity_m_s -= self.velocity_m_s + self.forced.velocity_m_s * self.forced.share;
         if let Some(notch) = &self.notch {
             state.velocity_m_s = notch.pass(&mut self.passed, &state.velocity_m_s);
         }
         state
+    }
+
+    /// Looks for what has been set anew since the last estimate.
+    #[inline]
+    fn look(&mut self, estimate: &Estimate) {
+        let Resets { position, heading, .. } = estimate.resets;
+        let now = Last { positions: position, headings: heading, yaw_rad: estimate.state.attitude_rad.z };
+        if let Some(last) = self.last.replace(now)
+            && (last.positions, last.headings) != (position, heading)
+        {
+            // A turn of the vehicle within the millisecond counts too: a hundredth of a radian at most.
+            let yaw_rad = if last.headings == heading { 0.0 } else { wrap_angle(now.yaw_rad - last.yaw_rad) };
+            let position_m = if last.positions == position { Vector3::zeros() } else { estimate.moved_m };
+            self.reset = Some(ResetDelta { position_m, yaw_rad });
+        }
     }
 }
 
@@ -171,7 +269,8 @@ impl OutputFilter {
 mod tests {
     use super::{LEAD, NOTCH_MAX_RAD_S, OutputFilter, VelocityNotch};
     use crate::estimate::{Estimate, Validity};
-    use afbc_types::Parameters;
+    use afbc_types::{Parameters, ResetDelta};
+    use nalgebra::Vector3;
 
     /// An estimate of a vehicle at 1 m/s whose position is off by `error_m`, and was moved by `moved_m`.
     fn estimate(ms: u64, error_m: f32, moved_m: f32) -> Estimate {
@@ -219,6 +318,62 @@ mod tests {
         assert!(last.is_some_and(|last| (last - 9.999).abs() < 0.01), "{last:?}");
     }
 
+    /// What is set anew is told at once and to the bit, with what it was set by; what was being hidden goes on to fade.
+    #[test]
+    fn what_is_handed_over_is_not_hidden() {
+        for hands_over in [true, false] {
+            let filter = OutputFilter::new(200.0);
+            let mut filter = if hands_over { filter.handing_over() } else { filter };
+            let mut last = None;
+            for ms in 0..3000 {
+                let mut estimate = estimate(ms, 0.0, 0.0);
+                // A correction, then a position set anew, then a heading, across the half turn.
+                let jumps = [(1000, 0.1), (1050, -40.0)];
+                estimate.state.position_m.x += jumps.iter().filter(|(at, _)| ms >= *at).map(|(_, by)| by).sum::<f32>();
+                estimate.moved_m.x = jumps.iter().filter(|(at, _)| ms == *at).map(|(_, by)| by).sum();
+                estimate.resets.position = 3 + u32::from(ms >= 1050);
+                estimate.state.attitude_rad.z = if ms >= 1100 { -3.0 } else { 3.0 };
+                estimate.resets.heading = u32::from(ms >= 1100);
+                let told_m = filter.step(&estimate).position_m.x;
+                let expected = match ms {
+                    1050 if hands_over => Some(ResetDelta { position_m: Vector3::x() * -40.0, yaw_rad: 0.0 }),
+                    1100 if hands_over => {
+                        let yaw_rad = core::f32::consts::TAU - 6.0;
+                        Some(ResetDelta { position_m: Vector3::zeros(), yaw_rad })
+                    }
+                    _ => None,
+                };
+                let off = |reset: &ResetDelta, expected: &ResetDelta| {
+                    (reset.position_m - expected.position_m).norm() + (reset.yaw_rad - expected.yaw_rad).abs()
+                };
+                let fits = match (filter.reset(), &expected) {
+                    (Some(reset), Some(expected)) => off(reset, expected) < 1e-5,
+                    (reset, expected) => reset.is_none() && expected.is_none(),
+                };
+                assert!(fits, "{ms} ms: {:?}", filter.reset());
+                let by_m = expected.map_or(0.0, |reset| reset.position_m.x);
+                if let Some(last_m) = last.replace(told_m) {
+                    let step_m: f32 = told_m - last_m - by_m;
+                    assert!(step_m.abs() < 2.1e-3, "{hands_over}, {ms} ms: {step_m} m");
+                }
+            }
+        }
+    }
+
+    /// What is set anew while the position is lost is told too: a descent holds heading and height.
+    #[test]
+    fn resets_without_a_position_are_handed_over_too() {
+        let mut filter = OutputFilter::default().handing_over();
+        for ms in 0..100 {
+            let mut estimate = estimate(ms, 0.0, if ms == 50 { -5.0 } else { 0.0 });
+            estimate.validity.position = ms > 50;
+            estimate.resets.position = u32::from(ms >= 50);
+            let state = filter.step(&estimate);
+            assert_eq!(state.position_m, estimate.state.position_m, "{ms} ms: nothing is hidden");
+            assert_eq!(filter.reset().map(|reset| reset.position_m.x), (ms == 50).then_some(-5.0), "{ms} ms");
+        }
+    }
+
     /// A vehicle that accelerates is told as it is.
     #[test]
     fn nothing_else_is_eased() {
@@ -227,6 +382,40 @@ mod tests {
             let mut estimate = estimate(ms, 0.0, 0.0);
             estimate.state.velocity_m_s.z = 0.1 * ms as f32;
             assert_eq!(output_filter.step(&estimate), estimate.state);
+        }
+    }
+
+    /// A vehicle that leaves the ground and swings, with its sensor below the centre of mass, is told a quarter of what
+    /// that makes of the velocity; a second later all of it. A force that stays is told within two seconds.
+    #[test]
+    fn a_lever_is_hidden_at_take_off() {
+        let mut output_filter = OutputFilter::default();
+        let level = [1.0, 0.0, 0.0, 0.0];
+        let mut told = |ms: u64, swings: bool, in_the_air: bool| {
+            let (time_s, rad_s) = (1e-3 * ms as f32, 27.0_f32);
+            let (speed, force) =
+                if swings { ((rad_s * time_s).sin(), rad_s * (rad_s * time_s).cos()) } else { (time_s, 1.0) };
+            output_filter.feel(&Vector3::new(force, 0.0, 9.81), level, in_the_air);
+            let mut estimate = estimate(ms, 0.0, 0.0);
+            estimate.state.velocity_m_s.x = speed;
+            (output_filter.step(&estimate).velocity_m_s.x, speed)
+        };
+        let mut largest = [0.0_f32; 2];
+        for ms in 0..10_000 {
+            let (told, _) = told(ms, true, ms > 5_000);
+            let part = match ms {
+                3_000..=5_000 => 0,
+                8_000.. => 1,
+                _ => continue,
+            };
+            if let Some(largest) = largest.get_mut(part) {
+                *largest = largest.max(told.abs());
+            }
+        }
+        assert!(largest[0] < 0.27 && (largest[1] - 1.0).abs() < 0.01, "{largest:?}");
+        for ms in 10_000..14_000 {
+            let (told, speed) = told(ms, false, false);
+            assert!(ms < 13_000 || (told - speed).abs() < 0.02, "{ms} ms: {told}, not {speed}");
         }
     }
 

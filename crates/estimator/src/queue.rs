@@ -1,6 +1,7 @@
 //! Measurements that wait, and the fix that is being fused.
 
 use crate::aid::Aid;
+use crate::errors::Coordinate;
 use crate::history::Past;
 use crate::horizon::Target;
 use crate::measurement::Measurement;
@@ -58,11 +59,56 @@ impl Queue {
     }
 }
 
+/// The coordinates of a position or velocity that are judged together.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Axes {
+    /// x, y and z.
+    All,
+    /// x and y.
+    Level,
+    /// z.
+    Vertical,
+}
+
+impl Axes {
+    /// Returns the coordinate of the scalar with this number.
+    #[inline]
+    pub(crate) fn coordinate(self, number: u8) -> Coordinate {
+        match (self, number) {
+            (Axes::Vertical, _) => Coordinate::Z,
+            (_, 0) => Coordinate::X,
+            (_, 1) => Coordinate::Y,
+            _ => Coordinate::Z,
+        }
+    }
+
+    /// True of a coordinate that is one of them.
+    pub(crate) fn contain(self, at: Coordinate) -> bool {
+        match self {
+            Axes::All => true,
+            Axes::Level => at != Coordinate::Z,
+            Axes::Vertical => at == Coordinate::Z,
+        }
+    }
+
+    /// Returns the vector with zero in all other coordinates.
+    #[inline]
+    pub(crate) fn only(self, v: &Vector3<f32>) -> Vector3<f32> {
+        match self {
+            Axes::All => *v,
+            Axes::Level => Vector3::new(v.x, v.y, 0.0),
+            Axes::Vertical => Vector3::new(0.0, 0.0, v.z),
+        }
+    }
+}
+
 /// One kind of aid in a fix: one scalar or three.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Part {
     pub(crate) aid: Option<Aid>,
     pub(crate) target: Target,
+    /// Of a position or velocity, the coordinates that are fused.
+    pub(crate) axes: Axes,
     /// Variances of its scalars; the first one of a single scalar.
     pub(crate) variance: Vector3<f32>,
     /// Variance of a field's direction that comes on top.
@@ -73,7 +119,17 @@ impl Part {
     /// True of what a GNSS receiver's slow error comes on top of.
     #[inline]
     pub(crate) fn is_slow(&self) -> bool {
-        self.aid == Some(Aid::GnssPosition)
+        matches!(self.aid, Some(Aid::GnssPosition | Aid::GnssHeight))
+    }
+
+    /// Number of scalars.
+    #[inline]
+    pub(crate) fn scalars(&self) -> u8 {
+        match (&self.target, self.axes) {
+            (Target::Height(_) | Target::Field(_) | Target::Heading(_), _) | (_, Axes::Vertical) => 1,
+            (_, Axes::Level) => 2,
+            (_, Axes::All) => 3,
+        }
     }
 
     /// Adds to the variances what clipped or missing samples since the measurement have made uncertain.
@@ -98,32 +154,32 @@ pub(crate) struct Fix {
     pub(crate) at_us: u64,
     /// State at its time, without corrections.
     pub(crate) past: Past,
-    pub(crate) parts: [Option<Part>; 2],
+    pub(crate) parts: [Option<Part>; 3],
     /// Number of the first part's next scalar.
     pub(crate) next: u8,
     /// Normalised innovation squared of this part so far.
     pub(crate) nis: f32,
 }
 
+impl Fix {
+    /// True of a receiver's.
+    pub(crate) fn is_gnss(&self) -> bool {
+        let of_gnss = |part: &Part| part.is_slow() || part.aid == Some(Aid::GnssVelocity);
+        self.parts.iter().flatten().any(of_gnss)
+    }
+}
+
 /// Smallest standard deviations: position \[m\], velocity \[m/s\], angle \[rad\].
 const LEAST: f32 = 1e-4;
 const LEAST_M_S: f32 = 1e-3;
 
-impl Target {
-    /// Number of scalars.
-    pub(crate) fn scalars(&self) -> u8 {
-        match self {
-            Target::Position(_) | Target::Velocity(_) | Target::Attitude(_) => 3,
-            Target::Height(_) | Target::Field(_) | Target::Heading(_) => 1,
-        }
-    }
-}
-
 /// Returns the parts of a measurement. The variance of a field is that of its coordinates; its heading's depends on the
 /// attitude.
-pub(crate) fn parts(measurement: &Measurement) -> [Option<Part>; 2] {
+pub(crate) fn parts(measurement: &Measurement) -> [Option<Part>; 3] {
     let square = |sigma: f32, least: f32| max(sigma, least) * max(sigma, least);
-    let part = |aid, target, variance: Vector3<f32>| Some(Part { aid: Some(aid), target, variance, rough: 0.0 });
+    let of_axes =
+        |aid, target, variance: Vector3<f32>, axes| Some(Part { aid: Some(aid), target, axes, variance, rough: 0.0 });
+    let part = |aid, target, variance| of_axes(aid, target, variance, Axes::All);
     let same = |variance: f32| Vector3::new(variance, variance, variance);
     match *measurement {
         Measurement::Pose { position_m, attitude: [w, x, y, z], position_sigma_m, attitude_sigma_rad } => {
@@ -131,10 +187,11 @@ pub(crate) fn parts(measurement: &Measurement) -> [Option<Part>; 2] {
             [
                 part(Aid::TrackerPosition, Target::Position(position_m), same(square(position_sigma_m, LEAST))),
                 part(Aid::TrackerAttitude, Target::Attitude(attitude), same(square(attitude_sigma_rad, LEAST))),
+                None,
             ]
         }
         Measurement::Position { position_m, sigma_m } => {
-            [part(Aid::TrackerPosition, Target::Position(position_m), same(square(sigma_m, LEAST))), None]
+            [part(Aid::TrackerPosition, Target::Position(position_m), same(square(sigma_m, LEAST))), None, None]
         }
         Measurement::Gnss {
             position_m,
@@ -147,19 +204,21 @@ pub(crate) fn parts(measurement: &Measurement) -> [Option<Part>; 2] {
             let level = |horizontal: f32, vertical: f32| Vector3::new(horizontal, horizontal, vertical);
             let position = level(square(horizontal_sigma_m, LEAST), square(vertical_sigma_m, LEAST));
             let velocity = level(square(speed_sigma_m_s, LEAST_M_S), square(climb_sigma_m_s, LEAST_M_S));
+            // The height by itself: it is the worst of a receiver's, and a barometer can contradict it.
             [
-                part(Aid::GnssPosition, Target::Position(position_m), position),
+                of_axes(Aid::GnssPosition, Target::Position(position_m), position, Axes::Level),
+                of_axes(Aid::GnssHeight, Target::Position(position_m), position, Axes::Vertical),
                 part(Aid::GnssVelocity, Target::Velocity(velocity_m_s), velocity),
             ]
         }
         Measurement::Height { height_m, sigma_m } => {
-            [part(Aid::Height, Target::Height(height_m), same(square(sigma_m, LEAST))), None]
+            [part(Aid::Height, Target::Height(height_m), same(square(sigma_m, LEAST))), None, None]
         }
         Measurement::MagneticField { field, sigma } => {
-            [part(Aid::Heading, Target::Field(field), same(sigma * sigma)), None]
+            [part(Aid::Heading, Target::Field(field), same(sigma * sigma)), None, None]
         }
         Measurement::Heading { heading_rad, sigma_rad } => {
-            [part(Aid::Heading, Target::Heading(heading_rad), same(square(sigma_rad, LEAST))), None]
+            [part(Aid::Heading, Target::Heading(heading_rad), same(square(sigma_rad, LEAST))), None, None]
         }
     }
 }

@@ -2,21 +2,20 @@
 
 use crate::align::Aligned;
 use crate::covariance::{Covariance, angle_variance};
-use crate::errors::{Errors, Slows};
-use crate::estimate::Sigmas;
+use crate::errors::{Coordinate, Errors, Slows};
+use crate::estimate::{Sigmas, count};
 use crate::estimator::Estimator;
 use crate::history::Past;
 use crate::horizon::magnetic;
 use crate::memory::{Known, Memory, NO_INTERVAL};
 use crate::nominal::Nominal;
-use crate::queue::Part;
 use crate::rest::Rest;
-use crate::rotation::{about_z, identity, matrix, normalized};
+use crate::rotation::{identity, normalized};
 use crate::settings::Settings;
-use crate::slow::of_gnss;
+use crate::yaw_bank::YawBank;
 use afbc_control::math::{abs_max, max};
 use afbc_types::State;
-use nalgebra::{Matrix3, Quaternion, Vector3};
+use nalgebra::{Matrix3, Quaternion, Vector2, Vector3};
 
 /// Variance of an angle that may be anything, pi^2/3.
 const ANY_ANGLE: f32 = 3.28;
@@ -30,9 +29,14 @@ const DOUBT_RAD: f32 = 0.2;
 /// Change of the biases that goes with it: gyroscope \[rad/s\], accelerometer \[m/s2\].
 const DOUBT_RAD_S: f32 = 0.02;
 const DOUBT_M_S2: f32 = 0.2;
+/// Change of the biases that a scalar whose kind leans to one side stands for.
+const LEANING_RAD_S: f32 = 1e-3;
+const LEANING_M_S2: f32 = 0.02;
+/// Share of a doubt about one axis that the others have.
+const LEANT: f32 = 0.01;
 
 /// Keeps all errors.
-const KEEP: Errors = {
+pub(crate) const KEEP: Errors = {
     const ONES: Vector3<f32> = Vector3::new(1.0, 1.0, 1.0);
     Errors {
         theta: ONES,
@@ -44,7 +48,7 @@ const KEEP: Errors = {
         slow: Slows::new(1.0, 1.0, 1.0, 1.0, 1.0),
     }
 };
-const NONE: Vector3<f32> = Vector3::new(0.0, 0.0, 0.0);
+pub(crate) const NONE: Vector3<f32> = Vector3::new(0.0, 0.0, 0.0);
 
 /// Diagonal block.
 fn diagonal(variances: &Vector3<f32>) -> Matrix3<f32> {
@@ -53,10 +57,6 @@ fn diagonal(variances: &Vector3<f32>) -> Matrix3<f32> {
 
 fn squared(sigma: &Vector3<f32>) -> Vector3<f32> {
     sigma.component_mul(sigma)
-}
-
-fn count(number: &mut u32) {
-    *number = number.saturating_add(1);
 }
 
 impl Memory {
@@ -170,6 +170,11 @@ impl Memory {
         self.fix = None;
         self.height_offset = 0.0;
         self.still_us = now_us;
+        self.pushed = Vector2::zeros();
+        self.yaw_bank = YawBank::default();
+        self.contradicted_us = None;
+        self.carried_us = None;
+        self.leaning = [NONE; 2];
         self.held_us = None;
         self.rest = Rest::default();
         self.covariance.hold();
@@ -188,83 +193,8 @@ impl Memory {
         });
     }
 
-    /// Moves the position by `by`, and takes the part's variance for that of `tau_s` ago; since then the velocity's
-    /// error has moved it. A GNSS receiver's position is off by its slow error too, to the other side.
-    pub(crate) fn reset_position(&mut self, by: &Vector3<f32>, part: &Part, tau_s: f32) {
-        count(&mut self.resets.position);
-        self.nominal.move_to(self.nominal.position + by);
-        // The past moves with it, or a late fix would report the same jump once more.
-        self.history.correct(&identity(), &NONE, &NONE, by);
-        let c = &mut self.covariance;
-        c.forget(&Errors { position: NONE, baro: 0.0, ..KEEP });
-        c.pp = diagonal(&part.variance) + c.vv * (tau_s * tau_s);
-        (c.tp, c.vp, c.pg, c.pa) = (c.tv * tau_s, c.vv * tau_s, c.vg * tau_s, c.va * tau_s);
-        c.slow.position = c.slow.velocity * tau_s;
-        if part.is_slow() {
-            let variance = c.slow.gnss_variance();
-            c.pp += diagonal(&variance);
-            c.slow.position.m11 -= variance.x;
-            c.slow.position.m22 -= variance.y;
-            c.slow.position.m33 -= variance.z;
-            let velocity = of_gnss(&c.slow.velocity);
-            c.pp -= (velocity + velocity.transpose()) * tau_s;
-            c.tp -= of_gnss(&c.slow.theta);
-            c.vp -= velocity;
-            c.pg -= of_gnss(&c.slow.gyro).transpose();
-            c.pa -= of_gnss(&c.slow.accel).transpose();
-        }
-        c.hold();
-        self.knows.position = true;
-        // The offset was that of another height.
-        self.knows.height_offset = false;
-    }
-
-    /// Changes the velocity by `by`, and takes `variance` for it.
-    pub(crate) fn reset_velocity(&mut self, by: &Vector3<f32>, variance: &Vector3<f32>) {
-        count(&mut self.resets.velocity);
-        self.nominal.velocity += by;
-        self.history.correct(&identity(), &NONE, by, &NONE);
-        self.covariance.forget(&Errors { velocity: NONE, ..KEEP });
-        self.covariance.vv = diagonal(variance);
-        self.covariance.hold();
-    }
-
-    /// Turns the heading by `by`, and sets its variance to `variance`. If the heading comes from the magnetic field,
-    /// with its `north`, the variance of the vehicle's own field is added.
-    pub(crate) fn reset_heading(&mut self, by: f32, variance: f32, north: Option<(f32, f32)>) {
-        count(&mut self.resets.heading);
-        let turn = about_z(by);
-        self.nominal.turn_to(normalized(&(turn * self.nominal.attitude)));
-        // That of the covariance's time, too: the next prediction takes the mean of both.
-        self.rotation = matrix(&turn) * self.rotation;
-        // Not into the linear sum, for which the turn may be too large: position and velocity stay.
-        self.history.correct(&turn, &NONE, &NONE, &NONE);
-        self.covariance.turn(&matrix(&turn));
-        self.covariance.forget(&Errors { theta: Vector3::new(1.0, 1.0, 0.0), ..KEEP });
-        self.covariance.tt.m33 = variance;
-        if let Some(north) = north {
-            self.point(north);
-        }
-        self.knows.heading = true;
-        self.covariance.hold();
-    }
-
-    /// Takes the barometer's offset from a measured height: offset = measured - z + noise, so its error is that of the
-    /// noise less that of z.
-    pub(crate) fn reset_height_offset(&mut self, offset: f32, variance: f32) {
-        count(&mut self.resets.height);
-        self.height_offset = offset;
-        self.knows.height_offset = true;
-        let of_z = |m: &Matrix3<f32>| -Vector3::new(m.m13, m.m23, m.m33);
-        let c = &mut self.covariance;
-        (c.tb, c.vb, c.pb) = (of_z(&c.tp), of_z(&c.vp), of_z(&c.pp));
-        (c.gb, c.ab) = (of_z(&c.pg.transpose()), of_z(&c.pa.transpose()));
-        c.bb = c.pp.m33 + variance;
-        c.slow.baro = -c.slow.position.row(2).transpose();
-        c.hold();
-    }
-
-    /// Adds to the heading, which a magnetometer has measured, the error of the vehicle's own.
+    /// Adds to the heading, which a magnetometer has measured, the error of the vehicle's own: at the start, where it
+    /// has made no other error yet.
     fn point(&mut self, (x, y): (f32, f32)) {
         let row = magnetic(&self.nominal.rotation, &Vector3::new(x, y, 0.0));
         self.covariance.tt.m33 += self.covariance.slow.of_row(&row);
@@ -284,11 +214,23 @@ impl Memory {
         self.covariance.hold();
     }
 
-    /// Makes the velocity unknown, at least as much as `variance`.
-    pub(crate) fn doubt_velocity(&mut self, variance: f32) {
-        let vv = self.covariance.vv.diagonal().map(|old| max(old, variance));
-        self.covariance.forget(&Errors { velocity: NONE, ..KEEP });
-        self.covariance.vv = diagonal(&vv);
+    /// Doubts the biases a little, once for each scalar that asks for it: the gyroscope's, and if the motion shows it,
+    /// not a rotation, the accelerometer's too.
+    #[cold]
+    pub(crate) fn doubt_biases(&mut self, turns: bool) {
+        self.covariance.gg += diagonal(&Vector3::repeat(LEANING_RAD_S * LEANING_RAD_S));
+        if !turns {
+            self.covariance.aa += diagonal(&Vector3::repeat(LEANING_M_S2 * LEANING_M_S2));
+        }
+        self.covariance.hold();
+    }
+
+    /// Doubts the gyroscope's bias about the vertical, after the heading was set to what contradicted it; and a little
+    /// that about other axes, or a bias that is known along these would drown in the rounding of the doubt.
+    pub(crate) fn doubt_turn(&mut self) {
+        let up = Coordinate::Z.row(&self.nominal.rotation) * DOUBT_RAD_S;
+        self.covariance.gg += up * up.transpose() + diagonal(&Vector3::repeat(LEANT * DOUBT_RAD_S * DOUBT_RAD_S));
+        self.covariance.hold();
     }
 }
 

@@ -60,9 +60,11 @@ parameters! {
         /// Largest accepted innovation, in standard deviations.
         #[parameter(GATE, "1", 2.0..=20.0)]
         pub gate_sigmas: f32 = 5.0,
-        /// Time of nothing but rejections after which the state is reset to the measurement.
+        /// Time since an aid was last fused after which it is followed although it contradicts the state, as in PX4's
+        /// EKF2. Where nothing else holds the state it is followed earlier, after three fifths of `coast_s` at the
+        /// latest: later the state would not be valid any more.
         #[parameter(REACQUIRE, "s", 0.05..=60.0)]
-        pub reacquire_s: f32 = 1.0,
+        pub reacquire_s: f32 = 7.0,
         /// Time without any aid after which velocity and position are invalid.
         #[parameter(COAST, "s", 0.1..=60.0)]
         pub coast_s: f32 = 5.0,

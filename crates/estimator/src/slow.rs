@@ -56,11 +56,6 @@ fn minus_cross(s: &Vector3<f32>, m: &Columns) -> Columns {
     )
 }
 
-/// The columns of d.
-pub(crate) fn of_gnss(m: &Columns) -> Block {
-    Block::new(m.m11, m.m12, m.m13, m.m21, m.m22, m.m23, m.m31, m.m32, m.m33)
-}
-
 impl Slow {
     /// True if there is none.
     #[inline]
@@ -93,7 +88,8 @@ impl Slow {
         (self.variance.w, self.variance.a) = (variance, variance);
     }
 
-    /// Takes the heading from a field that measures f by `row`: its error is what f makes of it.
+    /// Takes the heading from a field that measures f by `row`, where no other error has to do with f: its error is
+    /// what f makes of it.
     pub(crate) fn point(&mut self, row: &Slows) {
         let by = -row.component_mul(&self.variance);
         self.theta.row_mut(2).copy_from(&by.transpose());

@@ -9,14 +9,31 @@ mod resets;
 mod steps;
 
 use crate::covariance::{Covariance, Growth};
-use crate::errors::{Coordinate, Errors, Interval, Row, Slows};
+use crate::errors::{Coordinate, Errors, Interval, Replaced, Row, Slows};
+use crate::estimator::Estimator;
 use crate::history::{History, Past};
-use crate::horizon::{Expected, Horizon, Target, magnetic};
+use crate::horizon::{Expected, Horizon, Target};
 use crate::memory::Memory;
+use crate::queue::{Axes, Part};
+use crate::settings::Settings;
 use crate::slow::Slow;
 use nalgebra::{Matrix3, Quaternion, Rotation3, SMatrix, SVector, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 use std::vec::Vec;
+
+/// A memory with this covariance, in this attitude.
+fn memory(p: &M21, turn: &V3) -> Memory {
+    let mut memory = Memory { runs: true, covariance: blocks(p), ..Memory::default() };
+    let q = UnitQuaternion::new(*turn).into_inner().coords.map(|x| x as f32);
+    memory.nominal.turn_to(Quaternion::from(q));
+    (memory.nominal.velocity, memory.nominal.position) = (Vector3::new(1.0, -2.0, 0.5), Vector3::new(3.0, 4.0, 5.0));
+    memory.rotation = memory.nominal.rotation;
+    memory.knows.position = true;
+    memory.knows.heading = true;
+    memory.knows.height_offset = true;
+    memory.remember(1_000_000);
+    memory
+}
 
 /// The filter's 16 errors, the slow ones of a receiver and of a magnetometer.
 type M21 = SMatrix<f64, 21, 21>;
@@ -256,27 +273,88 @@ proptest! {
         prop_assert!(correlation.symmetric_eigenvalues().min() > -1e-6);
     }
 
-    /// A heading just taken from a field is as wrong as the vehicle's own field makes it, so the next field agrees.
+    /// A heading just taken from a field is as wrong as the vehicle's own field makes it, so the next field agrees; and
+    /// it keeps what it has to do with everything else by that.
     #[test]
-    fn a_field_agrees_with_its_heading(turn in numbers::<3>(), by in -3.0..3.0_f32, own in 0.01..0.3_f32) {
-        let mut memory = Memory::default();
-        let q = UnitQuaternion::new(vector(turn) * 0.3).into_inner().coords.map(|x| x as f32);
-        memory.nominal.turn_to(Quaternion::from(q));
-        memory.covariance.slow.magnetize(own * own);
-        memory.reset_heading(by, 1e-4, Some((0.8, -0.6)));
-        let slow = magnetic(&memory.nominal.rotation, &Vector3::new(0.8, -0.6, 0.0));
-        let row = Row {
-            coordinate: Coordinate::X, theta: Vector3::z(), velocity: 0.0, position: 0.0, gyro: None, accel: None,
-            baro: 0.0, slow: Some(slow),
+    fn a_field_agrees_with_its_heading(p in covariance(), turn in numbers::<3>(), by in -3.0..3.0_f64) {
+        let mut memory = memory(&p, &(vector(turn) * 0.3));
+        memory.field = Some((1.0, -0.6));
+        let settings = Settings { declination_rad: 0.4, ..Settings::DEFAULT };
+        let estimator = Estimator::new(settings).unwrap();
+        let field = Rotation3::new(V3::z() * by) * V3::new(0.7, 0.3, -0.6);
+        let body = memory.nominal.rotation.tr_mul(&field.map(|x| x as f32));
+        let part = Part {
+            aid: Some(crate::Aid::Heading), target: Target::Field(body), axes: Axes::All,
+            variance: Vector3::repeat(1e-6), rough: 0.0,
         };
-        let variance = row.dot(&memory.covariance.times(&row));
-        prop_assert!((variance - 1e-4).abs() < 1e-6 + 1e-6 * own, "{variance}");
-        let level = slow.norm_squared();
-        prop_assert!((memory.covariance.tt.m33 - own * own * level - 1e-4).abs() < 1e-6 && level > 0.7);
-        // After half a turn it is wrong to the other side.
-        let other = Row { slow: Some(-slow), ..row };
-        let variance = other.dot(&memory.covariance.times(&other));
-        prop_assert!((variance / (4.0 * own * own * level) - 1.0).abs() < 0.02 + 1e-4 / (own * own), "{variance}");
+        let now = memory.history.newest().unwrap();
+        estimator.follow(&mut memory, &part, &Horizon::new(&now, &now, 9.81));
+        let now = memory.history.newest().unwrap();
+        let seen = Horizon::new(&now, &now, 9.81).row(&part.target, Coordinate::Z, &estimator.expected(&memory));
+        let (innovation, row) = seen.unwrap();
+        prop_assert!(innovation.abs() < 1e-4, "{innovation}");
+        let y = memory.covariance.times(&row);
+        // Innovations have the noise alone, and tell nothing of any error.
+        let noise = f64::from(crate::fusion::field_variance(&field.map(|x| x as f32), 1e-6));
+        prop_assert!((f64::from(row.dot(&y)) - noise).abs() < 1e-5, "{}", row.dot(&y));
+        prop_assert!(f64::from(y.velocity.norm() + y.position.norm() + y.gyro.norm() + y.accel.norm()) < 1e-4, "{y:?}");
+    }
+
+    /// An error that a measurement replaces is what the others make of it, and noise: a linear map of all, so that the
+    /// matrix stays one whatever the row.
+    #[test]
+    fn a_replaced_error_is_the_measurements(
+        p in covariance(), h in numbers::<21>(), which in 0..8_usize, sigma in 0.01..0.5_f64,
+    ) {
+        let at = Coordinate::ALL[which % 3];
+        let (index, replaced) = match which {
+            0..3 => (6 + which, Replaced::Position(at)),
+            3..6 => (which, Replaced::Velocity(at)),
+            6 => (2, Replaced::Heading),
+            _ => (15, Replaced::Offset),
+        };
+        let at = if which < 6 { at } else { Coordinate::Z };
+        let three = |i: usize| Vector3::from_fn(|c, _| (h[3 * i + c] * size(index) / size(3 * i)) as f32);
+        let mut row = Row {
+            coordinate: at, theta: three(0), velocity: three(1).x, position: three(2).y, gyro: Some(three(3)),
+            accel: Some(three(4)), baro: h[15] as f32, slow: Some(Slows::from_fn(|i, _| h[16 + i] as f32)),
+        };
+        match replaced {
+            Replaced::Heading => row.theta.z = 0.0,
+            Replaced::Velocity(_) => row.velocity = 0.0,
+            Replaced::Position(_) => row.position = 0.0,
+            Replaced::Offset => row.baro = 0.0,
+        }
+        let mut ours = blocks(&p);
+        ours.replace(replaced, &row, (sigma * sigma) as f32);
+        let mut t = M21::identity();
+        t.set_row(index, &-dense_row(&row).transpose());
+        let mut theirs = t * p * t.transpose();
+        theirs[(index, index)] += sigma * sigma;
+        let ours = dense(&ours);
+        prop_assert_eq!(ours, ours.transpose());
+        prop_assert!(difference(&ours, &theirs) < 1e-4, "{which}: {}", difference(&ours, &theirs));
+    }
+
+    /// A covariance that both variances do not allow is found, wherever it is, and forgotten.
+    #[test]
+    fn what_is_no_covariance_is_found(p in covariance(), i in 0..15_usize, j in 0..15_usize, sign in any::<bool>()) {
+        let possible = |c: &Covariance| (0..crate::covariance::BLOCKS).all(|number| c.is_possible(number));
+        prop_assert!(possible(&blocks(&p)));
+        let (i, j) = (i.min(j), i.max(j));
+        if i == j {
+            return Ok(());
+        }
+        let mut wrong = p;
+        let most = (p[(i, i)] * p[(j, j)]).sqrt();
+        wrong[(i, j)] = if sign { 1.01 * most } else { -1.01 * most };
+        wrong[(j, i)] = wrong[(i, j)];
+        let mut ours = blocks(&wrong);
+        prop_assert!(!possible(&ours));
+        ours.decorrelate();
+        prop_assert!(possible(&ours) && ours.slow.variance == blocks(&p).slow.variance);
+        let variances = |c: &Covariance| dense(c).diagonal();
+        prop_assert!((0..16).all(|i| (variances(&ours)[i] / variances(&blocks(&p))[i] - 2.0).abs() < 1e-5));
     }
 
     /// Too large a variance is cut with all its covariances, so the matrix stays positive.

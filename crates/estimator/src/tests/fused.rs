@@ -1,7 +1,8 @@
 //! A measurement from the queue into the state, against a dense Kalman filter in `f64`.
 
-use super::resets::memory;
-use super::std::vec::Vec;
+extern crate std;
+
+use super::memory;
 use super::{M21, V3, V21, covariance, dense, dense_row, difference, numbers, vector};
 use crate::aid::Aid;
 use crate::errors::Coordinate;
@@ -13,6 +14,7 @@ use crate::settings::Settings;
 use afbc_types::Stamped;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use proptest::prelude::*;
+use std::vec::Vec;
 
 const NOW_US: u64 = 1_000_000;
 
@@ -42,9 +44,17 @@ fn measurement(aid: Aid, memory: &Memory, by: V3) -> Measurement {
     match aid {
         Aid::TrackerPosition => Measurement::Position { position_m: n.position + off, sigma_m: SIGMA as f32 },
         Aid::GnssPosition => Measurement::Gnss {
-            position_m: n.position + off,
+            position_m: n.position + Vector3::new(off.x, off.y, 0.0),
             velocity_m_s: n.velocity,
             horizontal_sigma_m: SIGMA as f32,
+            vertical_sigma_m: 1e4,
+            speed_sigma_m_s: 1e3,
+            climb_sigma_m_s: 1e3,
+        },
+        Aid::GnssHeight => Measurement::Gnss {
+            position_m: n.position + Vector3::new(0.0, 0.0, off.x),
+            velocity_m_s: n.velocity,
+            horizontal_sigma_m: 1e4,
             vertical_sigma_m: SIGMA as f32,
             speed_sigma_m_s: 1e3,
             climb_sigma_m_s: 1e3,
@@ -83,14 +93,17 @@ fn rows(aid: Aid, memory: &Memory) -> Vec<V21> {
     let expected = Expected { height_offset: 0.0, field: Vector3::x() };
     let zero = Vector3::zeros();
     let (target, count) = match aid {
-        Aid::TrackerPosition | Aid::GnssPosition => (Target::Position(zero), 3),
+        Aid::TrackerPosition => (Target::Position(zero), 3),
+        Aid::GnssPosition => (Target::Position(zero), 2),
+        Aid::GnssHeight => (Target::Position(zero), 1),
         Aid::GnssVelocity => (Target::Velocity(zero), 3),
         Aid::TrackerAttitude => (Target::Attitude(past.attitude), 3),
         Aid::Height => (Target::Height(0.0), 1),
         Aid::Heading => (Target::Heading(0.0), 1),
     };
     let row = |at: &Coordinate| dense_row(&horizon.row(&target, *at, &expected).unwrap().1);
-    Coordinate::ALL.iter().take(count).map(row).collect()
+    let first = if aid == Aid::GnssHeight { 2 } else { 0 };
+    Coordinate::ALL.iter().skip(first).take(count).map(row).collect()
 }
 
 /// Fuses until nothing waits.
@@ -109,7 +122,7 @@ fn start(p: &M21, turn: &V3, offset: f64) -> Memory {
     memory
 }
 
-const AIDS: [Aid; 6] = Aid::ALL;
+const AIDS: [Aid; 7] = Aid::ALL;
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(96))]
@@ -117,7 +130,7 @@ proptest! {
     /// Scalar by scalar as by the matrix: state, covariance, and the normalised innovation squared of the whole.
     #[test]
     fn a_fix_is_a_kalman_update(
-        p in covariance(), turn in numbers::<3>(), by in numbers::<3>(), which in 0..6_usize, offset in -3.0..3.0_f64,
+        p in covariance(), turn in numbers::<3>(), by in numbers::<3>(), which in 0..7_usize, offset in -3.0..3.0_f64,
     ) {
         let (p, aid) = (linear(p), AIDS[which]);
         let mut ours = start(&p, &(vector(turn) * 0.4), offset);
@@ -166,7 +179,7 @@ proptest! {
 
     /// Five sigma of all that is uncertain, along each coordinate, and not more: one just within is fused.
     #[test]
-    fn the_gate_is_at_five_sigma(p in covariance(), which in 0..6_usize, c in 0..3_usize, sign in any::<bool>()) {
+    fn the_gate_is_at_five_sigma(p in covariance(), which in 0..7_usize, c in 0..3_usize, sign in any::<bool>()) {
         let (p, aid) = (linear(p), AIDS[which]);
         let memory = start(&p, &V3::new(0.1, -0.15, 0.4), 1.0);
         let h = rows(aid, &memory);
@@ -202,7 +215,7 @@ proptest! {
             let back = (NOW_US - at_us) as f32 * 1e-6;
             memory.history.store(&crate::history::Past {
                 at_us: at_us as u32, attitude: memory.nominal.attitude, velocity, position: position - velocity * back,
-            });
+                    });
         }
         let place = position - velocity * (tau as f32);
         let i = 6 + c;

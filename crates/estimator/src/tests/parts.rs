@@ -1,12 +1,13 @@
 //! The small parts, each against an independent formula: rotations, places, queue, gates, filters, checks at the door.
 
-use super::std::vec::Vec;
+extern crate std;
+
 use super::{V3, numbers, vector};
-use crate::aid::{Aid, AidRecord, Aids, Repeated, passes};
+use crate::aid::{Aid, AidRecord, Aids, Repeated, Trust, passes};
 use crate::covariance::{Covariance, angle_variance, largest_sigma};
 use crate::geodetic::Origin;
 use crate::history::{History, Past};
-use crate::imu::{LowPass, MISSING_US, Monitor, Smoothed};
+use crate::imu::{Clipped, LowPass, MISSING_US, Monitor, Smoothed};
 use crate::measurement::{ImuSample, Measurement};
 use crate::memory::Memory;
 use crate::nominal::Nominal;
@@ -16,6 +17,7 @@ use crate::settings::Settings;
 use afbc_types::Stamped;
 use nalgebra::{Quaternion, Rotation3, UnitQuaternion, Vector3};
 use proptest::prelude::*;
+use std::vec::Vec;
 
 fn single(q: &UnitQuaternion<f64>) -> Quaternion<f32> {
     Quaternion::from(q.into_inner().coords.map(|x| x as f32))
@@ -286,7 +288,7 @@ fn the_monitor_tells_what_it_sees() {
     let stuck_us = 15_000;
     let mut monitor = Monitor::default();
     assert!(monitor.health(5, &settings, stuck_us).missing && monitor.at_us().is_none());
-    assert!(!monitor.take(&sample(1_000_000, 0.0, 0.0), &settings));
+    assert_eq!(monitor.take(&sample(1_000_000, 0.0, 0.0), &settings), Clipped { gyro: false, accel: false });
     assert!(!monitor.health(1_000_000 + MISSING_US, &settings, stuck_us).missing);
     assert!(monitor.health(1_000_001 + MISSING_US, &settings, stuck_us).missing);
     // The same again and again: stuck after the time told, and free with the first change.
@@ -317,7 +319,8 @@ fn the_monitor_tells_what_it_sees() {
     ] {
         let mut monitor = Monitor::default();
         let sample = sample(1_000_000, rate * settings.gyro_range_rad_s, force * settings.accel_range_m_s2);
-        assert_eq!(monitor.take(&sample, &settings), clips, "{rate}, {force}");
+        let clipped = Clipped { gyro: clips && rate != 0.0, accel: clips && force != 0.0 };
+        assert_eq!(monitor.take(&sample, &settings), clipped, "{rate}, {force}");
         assert_eq!(monitor.health(1_000_000, &settings, stuck_us).clipped, clips);
         let _ = monitor.take(&super::parts::sample(1_199_000, 0.0, 0.0), &settings);
         assert_eq!(monitor.health(1_199_000, &settings, stuck_us).clipped, clips);
@@ -348,8 +351,45 @@ fn the_monitor_tells_what_it_sees() {
     }
 }
 
+/// An aid that contradicts the state is never followed while two that agree hold it, late while one does, and soon
+/// where nothing else does.
 #[test]
-fn an_aid_is_live_for_a_while_and_has_others() {
+fn what_two_agree_on_is_not_overruled() {
+    use Aid::{GnssHeight, GnssPosition, GnssVelocity, Heading, Height, TrackerAttitude, TrackerPosition};
+    let trust = |aid: Aid, live: &[Aid], now_us| {
+        let mut aids = Aids::default();
+        live.iter().for_each(|live| aids.of_mut(*live).accept(1000));
+        aids.trust(aid, aids.gnss_velocity.is_live(now_us, 50), now_us, 50)
+    };
+    for (aid, live, expected) in [
+        (TrackerPosition, &[GnssPosition][..], Trust::Never),
+        (TrackerPosition, &[GnssVelocity], Trust::Late),
+        (TrackerPosition, &[Height, Heading], Trust::Soon),
+        (GnssPosition, &[TrackerPosition], Trust::Never),
+        (GnssPosition, &[GnssVelocity, Height], Trust::Late),
+        (GnssPosition, &[Height], Trust::Soon),
+        (GnssHeight, &[GnssVelocity, Height], Trust::Never),
+        (GnssHeight, &[TrackerPosition], Trust::Never),
+        (GnssHeight, &[GnssVelocity, GnssPosition], Trust::Late),
+        (GnssHeight, &[Height], Trust::Soon),
+        (GnssVelocity, &[TrackerPosition], Trust::Never),
+        (GnssVelocity, &[GnssPosition], Trust::Late),
+        (GnssVelocity, &[Height], Trust::Soon),
+        (TrackerAttitude, &[Heading], Trust::Never),
+        (TrackerAttitude, &[TrackerPosition], Trust::Soon),
+        (Heading, &[TrackerAttitude], Trust::Never),
+        (Heading, &[GnssVelocity], Trust::Never),
+        (Heading, &[TrackerPosition], Trust::Late),
+        (Height, &[TrackerPosition, GnssHeight, GnssVelocity], Trust::Soon),
+    ] {
+        assert_eq!(trust(aid, live, 1050), expected, "{aid:?}, {live:?}");
+        let alone = if aid == Heading { Trust::Late } else { Trust::Soon };
+        assert_eq!(trust(aid, live, 1051), alone, "{aid:?}, {live:?}");
+    }
+}
+
+#[test]
+fn an_aid_is_live_for_a_while() {
     let mut record = AidRecord::default();
     assert!(!record.is_live(1000, u64::MAX));
     assert_eq!((record.reject(500), record.reject(900), record.rejected), (0, 400, 2));
@@ -357,27 +397,16 @@ fn an_aid_is_live_for_a_while_and_has_others() {
     assert_eq!((record.accepted, record.accepted_us, record.rejected_since_us), (1, Some(1000), None));
     assert!(record.is_live(1100, 100) && !record.is_live(1101, 100) && record.is_live(500, 0));
     assert_eq!(record.reject(2000), 0);
-    // Who tells the same, and what it holds.
-    use Aid::{GnssPosition, GnssVelocity, Heading, Height, TrackerAttitude, TrackerPosition};
-    let pairs = [
-        (TrackerPosition, &[GnssPosition, GnssVelocity][..]),
-        (GnssPosition, &[TrackerPosition]),
-        (GnssVelocity, &[]),
-        (TrackerAttitude, &[Heading]),
-        (Heading, &[TrackerAttitude]),
-        (Height, &[]),
-    ];
-    for (live, others) in pairs {
+    // What each holds.
+    for live in Aid::ALL {
         let mut aids = Aids::default();
         aids.of_mut(live).accept(1000);
         for aid in Aid::ALL {
             assert_eq!(aids.of(aid).accepted == 1, aid == live, "{live:?}, {aid:?}");
-            assert_eq!(aids.has_other(aid, 1050, 50), others.contains(&aid), "{live:?}, {aid:?}");
-            assert!(!aids.has_other(aid, 1051, 50));
         }
-        let position = matches!(live, TrackerPosition | GnssPosition);
+        let position = matches!(live, Aid::TrackerPosition | Aid::GnssPosition);
         assert_eq!(aids.holds_position(1050, 50), position);
-        assert_eq!(aids.holds_velocity(1050, 50), position || live == GnssVelocity);
+        assert_eq!(aids.holds_velocity(1050, 50), position || live == Aid::GnssVelocity);
         assert!(!aids.holds_velocity(1051, 50) && !aids.holds_position(1051, 50));
     }
     let passes = |x, y, z| passes(&Vector3::new(x, y, z), &Vector3::new(1.0, 4.0, 9.0), 25.0);

@@ -1,82 +1,101 @@
 //! Starts and resets against dense `f64` mathematics: each is a linear map of the errors, and new noise.
 
-use super::{M21, V3, blocks, covariance, dense, difference, numbers, vector};
+extern crate std;
+
+use super::{M21, V3, blocks, covariance, dense, dense_row, difference, memory, numbers, vector};
 use crate::align::{Align, Aligned, Unready};
-use crate::errors::Slows;
+use crate::errors::{Coordinate, Slows};
 use crate::estimate::Sigmas;
 use crate::estimator::Estimator;
-use crate::horizon::{Target, magnetic};
+use crate::history::Past;
+use crate::horizon::{Horizon, Target, magnetic};
 use crate::measurement::{ImuSample, Measurement};
 use crate::memory::Memory;
-use crate::queue::Part;
+use crate::queue::{Axes, Part};
 use crate::restart::reference;
 use crate::settings::Settings;
 use afbc_types::State;
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 use proptest::prelude::*;
+use std::vec::Vec;
 
-/// A memory with this covariance, in this attitude.
-pub(super) fn memory(p: &M21, turn: &V3) -> Memory {
-    let mut memory = Memory { runs: true, covariance: blocks(p), ..Memory::default() };
-    let q = UnitQuaternion::new(*turn).into_inner().coords.map(|x| x as f32);
-    memory.nominal.turn_to(Quaternion::from(q));
-    (memory.nominal.velocity, memory.nominal.position) = (Vector3::new(1.0, -2.0, 0.5), Vector3::new(3.0, 4.0, 5.0));
-    memory.rotation = memory.nominal.rotation;
-    memory.knows.position = true;
-    memory.knows.heading = true;
-    memory.knows.height_offset = true;
-    memory.remember(1_000_000);
-    memory
-}
-
-fn part(aid: Option<crate::Aid>, variance: V3) -> Part {
-    let variance = variance.map(|x| x as f32);
-    Part { aid, target: Target::Position(Vector3::zeros()), variance, rough: 0.0 }
+fn part(aid: crate::Aid, target: Target, axes: Axes, variance: &V3) -> Part {
+    Part { aid: Some(aid), target, axes, variance: variance.map(|x| x as f32), rough: 0.0 }
 }
 
 fn three(m: &mut M21, i: usize, j: usize, block: &Matrix3<f64>) {
     m.fixed_view_mut::<3, 3>(i, j).copy_from(block);
 }
 
+/// The present, and the state `tau_s` ago of a vehicle that has moved on straight since.
+fn since(memory: &mut Memory, tau_s: f32) -> Horizon {
+    let now = memory.history.newest().unwrap();
+    let at_us = now.at_us - (tau_s * 1e6) as u32;
+    let past = Past { at_us, position: now.position - now.velocity * tau_s, ..now };
+    Horizon::new(&now, &past, 9.81)
+}
+
 proptest! {
     #[test]
     fn a_new_position_is_the_measurements(
-        p in covariance(), by in numbers::<3>(), noise in numbers::<3>(), tau in 0.0..0.25_f64,
-        is_slow in any::<bool>(),
+        p in covariance(), by in numbers::<3>(), noise in numbers::<3>(), tau in 0.0..0.25_f64, which in 0..4_usize,
     ) {
+        let estimator = Estimator::new(Settings::DEFAULT).unwrap();
         let mut memory = memory(&p, &V3::new(0.1, -0.2, 0.7));
         let variance = vector(noise).map(|x| x * x + 0.01);
-        let aid = if is_slow { crate::Aid::GnssPosition } else { crate::Aid::TrackerPosition };
+        let (aid, axes, coordinates) = [
+            (crate::Aid::TrackerPosition, Axes::All, 0..3), (crate::Aid::GnssPosition, Axes::All, 0..3),
+            (crate::Aid::GnssPosition, Axes::Level, 0..2), (crate::Aid::GnssHeight, Axes::Vertical, 2..3),
+        ][which].clone();
+        let horizon = since(&mut memory, tau as f32);
         let by = vector(by).map(|x| x as f32) * 10.0;
         let before = memory.nominal.position;
-        memory.reset_position(&by, &part(Some(aid), variance), tau as f32);
+        let part = part(aid, Target::Position(horizon.past().position + by), axes, &variance);
+        let rows: Vec<_> = Coordinate::ALL.into_iter().map(|at| {
+            dense_row(&horizon.row(&part.target, at, &estimator.expected(&memory)).unwrap().1)
+        }).collect();
+        estimator.follow(&mut memory, &part, &horizon);
+        let by = Vector3::from_fn(|i, _| if coordinates.contains(&i) { by[i] } else { 0.0 });
         prop_assert!((memory.nominal.position - before - by).norm() < 1e-5);
         prop_assert!((memory.history.newest().unwrap().position - before - by).norm() < 1e-5);
-        prop_assert!(memory.resets.position == 1 && memory.knows.position && !memory.knows.height_offset);
+        prop_assert!(memory.resets.position == 1 && memory.knows.position);
+        prop_assert_eq!(memory.knows.height_offset, axes == Axes::Level);
+        // What is left of the errors by the coordinates that are measured.
         let mut t = M21::identity();
-        three(&mut t, 6, 6, &Matrix3::zeros());
-        three(&mut t, 6, 3, &(Matrix3::identity() * tau));
-        if is_slow {
-            three(&mut t, 6, 16, &-Matrix3::identity());
+        for i in coordinates.clone() {
+            let mut row = -rows[i];
+            row[6 + i] = 0.0;
+            if aid != crate::Aid::TrackerPosition {
+                row[16 + i] = -1.0;
+            }
+            t.set_row(6 + i, &row.transpose());
         }
-        t.fixed_rows_mut::<1>(15).fill(0.0);
+        if axes != Axes::Level {
+            t.fixed_rows_mut::<1>(15).fill(0.0);
+        }
         let mut theirs = t * p * t.transpose();
-        (0..3).for_each(|i| theirs[(6 + i, 6 + i)] += variance[i]);
-        // Forgotten, but for the least.
-        theirs[(15, 15)] = 1e-8;
+        coordinates.for_each(|i| theirs[(6 + i, 6 + i)] += variance[i]);
+        if axes != Axes::Level {
+            // Forgotten, but for the least.
+            theirs[(15, 15)] = 1e-8;
+        }
         let ours = dense(&memory.covariance);
-        prop_assert!(difference(&ours, &theirs) < 1e-5, "{}", difference(&ours, &theirs));
+        prop_assert!(difference(&ours, &theirs) < 1e-4, "{}", difference(&ours, &theirs));
     }
 
     #[test]
     fn a_new_velocity_or_height_is_the_measurements(
         p in covariance(), by in numbers::<3>(), noise in numbers::<3>(), offset in -50.0..50.0_f32,
     ) {
+        let estimator = Estimator::new(Settings::DEFAULT).unwrap();
         let variance = vector(noise).map(|x| x * x + 0.01);
         let by = vector(by).map(|x| x as f32) * 10.0;
         let mut fast = memory(&p, &V3::new(0.1, -0.2, 0.7));
         let before = fast.nominal.velocity;
-        fast.reset_velocity(&by, &variance.map(|x| x as f32));
+        let horizon = since(&mut fast, 0.0);
+        estimator.follow(
+            &mut fast, &part(crate::Aid::GnssVelocity, Target::Velocity(before + by), Axes::All, &variance), &horizon,
+        );
         prop_assert!((fast.nominal.velocity - before - by).norm() < 1e-5 && fast.resets.velocity == 1);
         prop_assert!((fast.history.newest().unwrap().velocity - before - by).norm() < 1e-5);
         let mut t = M21::identity();
@@ -84,18 +103,21 @@ proptest! {
         let mut theirs = t * p * t.transpose();
         (0..3).for_each(|i| theirs[(3 + i, 3 + i)] += variance[i]);
         prop_assert!(difference(&dense(&fast.covariance), &theirs) < 1e-5);
-        // Doubted: what it was, or more.
+        // Doubted: what else it may be, on top.
         let mut doubted = memory(&p, &V3::zeros());
-        doubted.doubt_velocity(0.3);
-        let mut theirs = t * p * t.transpose();
-        (0..3).for_each(|i| theirs[(3 + i, 3 + i)] = p[(3 + i, 3 + i)].max(f64::from(0.3_f32)));
+        doubted.doubt_velocity(&variance.map(|x| x as f32));
+        let mut theirs = p;
+        (0..3).for_each(|i| theirs[(3 + i, 3 + i)] += variance[i]);
         prop_assert!(difference(&dense(&doubted.covariance), &theirs) < 1e-6);
         prop_assert_eq!(doubted.nominal.velocity, before);
         // The offset's error is that of the height the other way, and noise.
         let mut high = memory(&p, &V3::zeros());
         high.knows.height_offset = false;
-        high.reset_height_offset(offset, variance.x as f32);
-        prop_assert!(high.height_offset == offset && high.knows.height_offset && high.resets.height == 1);
+        let horizon = since(&mut high, 0.0);
+        let height = horizon.past().position.z + offset;
+        estimator.follow(&mut high, &part(crate::Aid::Height, Target::Height(height), Axes::All, &variance), &horizon);
+        prop_assert!((high.height_offset - offset).abs() < 1e-5 && high.knows.height_offset);
+        prop_assert!(high.resets.height == 1);
         let mut t = M21::identity();
         t.fixed_rows_mut::<1>(15).fill(0.0);
         t[(15, 8)] = -1.0;
@@ -106,38 +128,58 @@ proptest! {
 
     #[test]
     fn a_new_heading_turns_everything(
-        p in covariance(), turn in numbers::<3>(), by in -3.0..3.0_f64, sigma in 0.01..0.5_f64, north in -3.0..3.0_f64,
-        of_field in any::<bool>(),
+        p in covariance(), turn in numbers::<3>(), by in -3.0..3.0_f64, sigma in 0.01..0.5_f64,
+        declination in -3.0..3.0_f32, which in 0..3_usize,
     ) {
+        let estimator = Estimator::new(Settings { declination_rad: declination, ..Settings::DEFAULT }).unwrap();
         let mut memory = memory(&p, &(vector(turn) * 0.5));
         memory.knows.heading = false;
+        memory.field = Some((1.0, -0.6));
         let (old, entry) = (memory.nominal.rotation, memory.history.newest().unwrap());
-        let north = (north.cos() as f32, north.sin() as f32);
-        memory.reset_heading(by as f32, (sigma * sigma) as f32, of_field.then_some(north));
-        let r = UnitQuaternion::new(V3::z() * by).to_rotation_matrix().into_inner();
+        let horizon = since(&mut memory, 0.0);
+        let r = UnitQuaternion::new(V3::z() * by);
+        // What shows this turn.
+        let field = r.inverse() * estimator.expected(&memory).field.map(f64::from);
+        let q = (r.into_inner() * Quaternion::from(entry.attitude.coords.map(f64::from))).coords.map(|x| x as f32);
+        let target = match which {
+            0 => Target::Field(old.tr_mul(&field.map(|x| x as f32))),
+            1 => Target::Attitude(Quaternion::from(q)),
+            _ => Target::Heading(horizon.heading() + by as f32),
+        };
+        let part = part(crate::Aid::Heading, target, Axes::All, &V3::repeat(sigma * sigma));
+        estimator.follow(&mut memory, &part, &horizon);
+        let r = r.to_rotation_matrix().into_inner();
         let turned = r.map(|x| x as f32) * old;
-        prop_assert!((memory.nominal.rotation - turned).norm() < 1e-5 && (memory.rotation - turned).norm() < 1e-5);
+        prop_assert!((memory.nominal.rotation - turned).norm() < 1e-4 && (memory.rotation - turned).norm() < 1e-4);
         let now = memory.history.newest().unwrap();
         let along = crate::rotation::twist(&now.attitude, &entry.attitude);
-        prop_assert!((f64::from(along) - by).abs() < 1e-5 && memory.knows.heading && memory.resets.heading == 1);
-        let mut t = M21::identity();
-        three(&mut t, 0, 0, &r);
-        t.fixed_rows_mut::<1>(2).fill(0.0);
-        // The heading measured with a field is off by what the vehicle's own makes of it.
-        let slow = magnetic(&memory.nominal.rotation, &Vector3::new(north.0, north.1, 0.0));
-        if of_field {
-            (0..5).for_each(|i| t[(2, 16 + i)] = -f64::from(slow[i]));
-        }
-        let mut theirs = t * p * t.transpose();
-        theirs[(2, 2)] += sigma * sigma;
-        if of_field {
-            // Only what is told of f is taken; f and the other errors stay independent.
-            for i in (0..16).filter(|i| *i != 2) {
-                (theirs[(2, i)], theirs[(i, 2)]) = (0.0, 0.0);
-            }
-        }
+        prop_assert!((f64::from(along) - by).abs() < 1e-4 && memory.knows.heading && memory.resets.heading == 1);
+        // After the turn, the heading's error is what the row of the measurement makes of the others.
+        let row = Horizon::new(&now, &now, 9.81).row(&part.target, Coordinate::Z, &estimator.expected(&memory));
+        let mut row = -dense_row(&row.unwrap().1);
+        row[2] = 0.0;
+        let mut first = M21::identity();
+        three(&mut first, 0, 0, &r);
+        let mut second = M21::identity();
+        second.set_row(2, &row.transpose());
+        let turned = first * p * first.transpose();
+        let mut theirs = second * turned * second.transpose();
+        theirs[(2, 2)] += match which {
+            0 => f64::from(crate::fusion::field_variance(&field.map(|x| x as f32), (sigma * sigma) as f32)),
+            1 => sigma * sigma + p[(0, 0)].max(p[(1, 1)]),
+            _ => sigma * sigma,
+        };
         let ours = dense(&memory.covariance);
-        prop_assert!(difference(&ours, &theirs) < 1e-4, "{}", difference(&ours, &theirs));
+        prop_assert!(difference(&ours, &theirs) < 1e-3, "{}", difference(&ours, &theirs));
+        // The gyroscope's bias about the vertical is doubted, and hardly any other.
+        let before = dense(&memory.covariance);
+        memory.doubt_turn();
+        let more = dense(&memory.covariance) - before;
+        let body = memory.nominal.rotation.transpose().map(f64::from);
+        let up = body * V3::z() * 0.02;
+        let gg = more.fixed_view::<3, 3>(9, 9).into_owned();
+        prop_assert!((gg - up * up.transpose() - Matrix3::identity() * 4e-6).norm() < 1e-6, "{gg}");
+        prop_assert!((more.norm() - gg.norm()).abs() < 1e-9);
     }
 
     #[test]

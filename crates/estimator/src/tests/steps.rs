@@ -1,6 +1,6 @@
 //! Limits of a step: what is refused, believed, held, rough or valid, each just within and just beyond.
 
-use super::resets::memory;
+use super::memory;
 use super::{M21, V3, V21, covariance, dense, dense_row, difference, numbers, row, vector};
 use crate::aid::Aid;
 use crate::errors::Coordinate;
@@ -432,28 +432,31 @@ fn validity_has_limits() {
 fn rough_samples_leave_it_less_sure() {
     let s = Settings::DEFAULT;
     let estimator = with(s);
-    let run = |gap_us: u64, rate: f32| {
+    let run = |gap_us: u64, rate: f32, push: f32| {
         let mut memory = memory(&usual(), &V3::zeros());
-        let sample = |at_us, rate| ImuSample {
+        let sample = |at_us, rate, push| ImuSample {
             at_us,
             rates_rad_s: Vector3::new(0.0, 0.0, rate),
-            specific_force_m_s2: Vector3::z() * 9.81,
+            specific_force_m_s2: Vector3::new(0.0, push, 9.81),
         };
-        let _ = memory.monitor.take(&sample(NOW_US, 0.0), &s);
-        memory.nominal.begin(&sample(NOW_US, 0.0));
+        let _ = memory.monitor.take(&sample(NOW_US, 0.0, 0.0), &s);
+        memory.nominal.begin(&sample(NOW_US, 0.0, 0.0));
         let at_us = NOW_US + gap_us;
-        let _ = estimator.step(&mut memory, at_us, Some(&sample(at_us, rate)));
+        let _ = estimator.step(&mut memory, at_us, Some(&sample(at_us, rate, push)));
         (memory.covariance.tt.m33 - 1e-4, memory.covariance.vv.m33 - 1e-2, memory.resets.restarts)
     };
     let near = |ours: f32, theirs: f32| (ours - theirs).abs() < 0.05 * theirs + 2e-6;
     // Of the covariance's own growth little.
-    let (theta, velocity, _) = run(20_000, 0.0);
+    let (theta, velocity, _) = run(20_000, 0.0, 0.0);
     assert!(theta < 1e-6 && velocity < 1e-3, "{theta}, {velocity}");
-    let (theta, velocity, _) = run(100_000, 0.0);
+    let (theta, velocity, _) = run(100_000, 0.0, 0.0);
     assert!(near(theta, 0.0025) && near(velocity, 0.09), "{theta}, {velocity}");
-    let (theta, velocity, _) = run(4000, 0.985 * s.gyro_range_rad_s);
-    assert!(near(theta, 0.08) && near(velocity, 0.8), "{theta}, {velocity}");
-    assert_eq!((run(249_000, 0.0).2, run(250_000, 0.0).2), (0, 1));
+    // Each sensor's clip what it measures: a push says nothing of the attitude.
+    let (theta, velocity, _) = run(4000, 0.985 * s.gyro_range_rad_s, 0.0);
+    assert!(near(theta, 0.08) && velocity < 1e-3, "{theta}, {velocity}");
+    let (theta, velocity, _) = run(4000, 0.0, 0.985 * s.accel_range_m_s2);
+    assert!(theta < 1e-6 && near(velocity, 0.8), "{theta}, {velocity}");
+    assert_eq!((run(249_000, 0.0, 0.0).2, run(250_000, 0.0, 0.0).2), (0, 1));
 }
 
 /// The variance of each scalar, not below the least, and with what rough samples add.
@@ -483,13 +486,15 @@ fn each_part_has_its_variance() {
             climb_sigma_m_s,
         })
     };
-    let [_, Some(velocity)] = fix(0.5, 1.5) else { panic!("no velocity") };
+    let [.., Some(velocity)] = fix(0.5, 1.5) else { panic!("no velocity") };
     assert_eq!(velocity.variance, Vector3::new(0.25, 0.25, 2.25));
-    let [Some(position), Some(velocity)] = fix(1e-5, 1e-5) else { panic!("a part is missing") };
+    let [Some(position), Some(height), Some(velocity)] = fix(1e-5, 1e-5) else { panic!("a part is missing") };
     assert!((position.variance - Vector3::new(4.0, 4.0, 9.0)).norm() < 1e-5);
     assert!((velocity.variance - Vector3::repeat(1e-6)).norm() < 1e-9);
-    assert_eq!((position.aid, velocity.aid), (Some(Aid::GnssPosition), Some(Aid::GnssVelocity)));
-    assert!(position.is_slow() && !velocity.is_slow());
+    let aids = [position, height, velocity].map(|part| part.aid.unwrap());
+    assert_eq!(aids, [Aid::GnssPosition, Aid::GnssHeight, Aid::GnssVelocity]);
+    assert!(position.is_slow() && height.is_slow() && !velocity.is_slow() && height.variance == position.variance);
+    assert_eq!([position, height, velocity].map(|part| part.scalars()), [2, 1, 3]);
     for (target, more) in [
         (Target::Position(zero), 0.5 * 0.04),
         (Target::Height(0.0), 0.5 * 0.04),
