@@ -8,9 +8,12 @@
 //! | reversals of U1..U4 by more than [`Bounds::swing_n`], per second | each input | [`Bounds::swings_hz`] |
 //!
 //! The last is the limit-cycle detector: it counts turning points of the input that are further apart than a threshold.
-//! So it detects chatter between steps as well as slow oscillations, but neither manoeuvres nor smaller noise.
+//! So it detects chatter between steps as well as slow oscillations, but neither manoeuvres nor smaller noise. Of U3 it
+//! looks at what the vehicle can follow, the mean of six steps behind two low-passes of [`FOLLOWS_RAD_S`]: rotors have
+//! little effect about yaw, so that their vibration, of 25 Hz and more, becomes inputs of the vehicle's weight, which
+//! do not turn it. A law that oscillates about yaw does so below 15 Hz, since the rotors need a time to follow.
 //!
-//! Norms and errors are updated for one subsystem per step, so each is at most six steps old.
+//! Norms, errors, U3 and rates are updated for one subsystem per step, so each is at most six steps old.
 
 use crate::adaptive::{self, AdaptiveEstimate};
 use crate::cascade::{Cascade, Settings};
@@ -20,6 +23,12 @@ use afbc_types::{Axis, Declared, OutOfRange, Parameters, PerAxis, parameters};
 
 /// Time over which figures are averaged \[s\].
 pub const WINDOW_S: f32 = 1.0;
+
+/// What is quicker than this in U3 turns no vehicle \[rad/s\]: that of a rotor's lag of 16 ms.
+pub const FOLLOWS_RAD_S: f32 = 63.0;
+
+/// Steps in which each subsystem is looked at once.
+const ROUND: f32 = 6.0;
 
 /// Largest |Theta_hat| as a share of what carries the vehicle: of the weight for U1..U4, of g for u5, u6.
 pub const TRIM_SHARE: PerAxis<f32> = PerAxis { roll: 0.75, pitch: 0.75, yaw: 2.2, z: 1.6, x: 2.2, y: 2.2 };
@@ -102,9 +111,9 @@ impl Default for Swing {
 }
 
 impl Swing {
+    /// Counts a reversal by more than `least`, if this input is one.
     #[inline]
-    fn advance(&mut self, input: f32, least: f32, forget: f32) {
-        self.rate_hz = math::settled(self.rate_hz - forget * self.rate_hz);
+    fn advance(&mut self, input: f32, least: f32) {
         let onward = (input - self.extreme) * self.direction;
         if onward > 0.0 {
             self.extreme = input;
@@ -114,6 +123,35 @@ impl Swing {
             // It decays at 1/WINDOW_S: n such steps a second settle at n.
             self.rate_hz += 1.0 / WINDOW_S;
         }
+    }
+
+    /// Forgets this share of the reversals; returns how many a second are left.
+    #[inline]
+    fn forget(&mut self, share: f32) -> f32 {
+        self.rate_hz = math::settled(self.rate_hz - share * self.rate_hz);
+        self.rate_hz
+    }
+}
+
+/// What a vehicle can follow of an input: the mean of a round behind two low-passes.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Followed {
+    /// Sum of the inputs since the last round \[N\].
+    sum_n: f32,
+    /// Input behind one low-pass and behind both \[N\].
+    passed_n: [f32; 2],
+}
+
+impl Followed {
+    /// Ends a round, of whose mean this share is followed; returns what was followed so far \[N\].
+    #[inline]
+    fn end_round(&mut self, share: f32) -> f32 {
+        let mean = self.sum_n * (1.0 / ROUND);
+        self.sum_n = 0.0;
+        let [once, twice] = &mut self.passed_n;
+        *once = math::settled(*once + share * (mean - *once));
+        *twice = math::settled(*twice + share * (*once - *twice));
+        *twice
     }
 }
 
@@ -128,6 +166,8 @@ pub struct MonitorFigures {
     pub saturation_share: f32,
     /// Detectors of U1, U2, U3, U4.
     pub swings: [Swing; 4],
+    /// What the vehicle can follow of U3.
+    yaw: Followed,
     /// Subsystem updated last.
     axis: Axis,
 }
@@ -139,6 +179,7 @@ impl Default for MonitorFigures {
             error: PerAxis::default(),
             saturation_share: 0.0,
             swings: [Swing::default(); 4],
+            yaw: Followed::default(),
             // The last of the round: the first step updates roll.
             axis: Axis::Y,
         }
@@ -160,6 +201,8 @@ pub struct Monitor {
     theta_squared: PerAxis<f32>,
     /// Share of an average that is replaced per step.
     forget: f32,
+    /// Share of U3 that is followed in a round.
+    follow: f32,
 }
 
 impl Monitor {
@@ -173,6 +216,7 @@ impl Monitor {
             bounds,
             theta_squared: PerAxis::from_fn(|axis| bounds.theta[axis] * bounds.theta[axis]),
             forget: 1.0 - math::exp(-dt_s / WINDOW_S),
+            follow: 1.0 - math::exp(-ROUND * dt_s * FOLLOWS_RAD_S),
         })
     }
 
@@ -198,7 +242,7 @@ impl Monitor {
 
         let error = &mut figures.error[axis];
         // Each subsystem is updated every sixth step.
-        *error = math::settled(*error + 6.0 * self.forget * (cascade.last.distances[axis].abs() - *error));
+        *error = math::settled(*error + ROUND * self.forget * (cascade.last.distances[axis].abs() - *error));
 
         let (saturated, share) = (if saturated { 1.0 } else { 0.0 }, figures.saturation_share);
         figures.saturation_share = math::settled(share + self.forget * (saturated - share));
@@ -206,10 +250,23 @@ impl Monitor {
         let [roll, pitch, yaw, thrust] = &mut figures.swings;
         let Bounds { swing_n, swings_hz, .. } = self.bounds;
         let asked = &cascade.last.asked;
-        roll.advance(asked.roll_n, swing_n, self.forget);
-        pitch.advance(asked.pitch_n, swing_n, self.forget);
-        yaw.advance(asked.yaw_n, swing_n, self.forget);
-        thrust.advance(asked.thrust_n, swing_n, self.forget);
+        roll.advance(asked.roll_n, swing_n);
+        pitch.advance(asked.pitch_n, swing_n);
+        thrust.advance(asked.thrust_n, swing_n);
+        figures.yaw.sum_n += asked.yaw_n;
+        let swing = match axis {
+            Axis::Roll => Some(roll),
+            Axis::Pitch => Some(pitch),
+            Axis::Yaw => Some(yaw),
+            Axis::Z => Some(thrust),
+            // It has no input of its own: U3's round ends in its step.
+            Axis::X => {
+                yaw.advance(figures.yaw.end_round(self.follow), swing_n);
+                None
+            }
+            Axis::Y => None,
+        };
+        let cycles = swing.is_some_and(|swing| swing.forget(ROUND * self.forget) > swings_hz);
 
         if norm.theta_squared > self.theta_squared[axis] {
             Some(Trip::Theta(axis))
@@ -220,9 +277,7 @@ impl Monitor {
         } else if figures.saturation_share > self.bounds.saturation_share {
             Some(Trip::Saturation)
         } else {
-            let axes = [Axis::Roll, Axis::Pitch, Axis::Yaw, Axis::Z];
-            let cycling = figures.swings.iter().zip(axes).find(|(swing, _)| swing.rate_hz > swings_hz);
-            cycling.map(|(_, axis)| Trip::LimitCycle(axis))
+            cycles.then_some(Trip::LimitCycle(axis))
         }
     }
 }

@@ -11,6 +11,7 @@ mod guarded;
 mod integral;
 mod law;
 mod limits;
+mod make_up;
 mod model;
 mod moments;
 mod monitor;

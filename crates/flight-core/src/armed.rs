@@ -1,7 +1,7 @@
 //! State of one flight, from arming on, and the setpoints for times without one from the commander.
 
 use crate::dead_reckoning::{DeadReckoning, Reckoning};
-use crate::descent::{Descent, Drift};
+use crate::descent::{Descent, Drift, shift};
 use crate::fall_check::FallCheck;
 use crate::frozen_tracker::FrozenTrackerCheck;
 use crate::landing::LandDetector;
@@ -9,7 +9,8 @@ use crate::observer::PoseObserver;
 use crate::rate_control::RateMemory;
 use crate::supervisor::Mode;
 use crate::tumble::Tumble;
-use afbc_types::{Inputs, Setpoint, State};
+use afbc_types::{Inputs, ResetDelta, Setpoint, State};
+use nalgebra::Vector3;
 
 /// State of one flight, from arming on.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -123,6 +124,24 @@ impl Guide {
         (drift.advance(state, dt_s), descent.setpoint())
     }
 
+    /// Shifts its setpoints with an estimate that has been set anew. Where the position is lost, its horizontal part
+    /// means nothing.
+    #[cold]
+    #[inline(never)]
+    pub(crate) fn shift(&mut self, reset: &ResetDelta) {
+        let ResetDelta { position_m, yaw_rad } = *reset;
+        let vertical = ResetDelta { position_m: Vector3::new(0.0, 0.0, position_m.z), yaw_rad };
+        if let Some(hold) = &mut self.hold {
+            shift(hold, reset);
+        }
+        if let Some(descent) = &mut self.descent {
+            descent.shift(reset);
+        }
+        if let Some((_, descent)) = &mut self.position_lost {
+            descent.shift(&vertical);
+        }
+    }
+
     /// Returns the setpoint for a fresh `state`: the descent's, the commander's, or a hold if there is none.
     pub(crate) fn target<'a>(
         &'a mut self,
@@ -137,6 +156,8 @@ impl Guide {
             descent.advance(dt_s);
             return descent.setpoint();
         }
+        // The next descent begins where the vehicle is then.
+        self.descent = None;
         match setpoint {
             Some(setpoint) => {
                 // The next gap is held where the vehicle is then.

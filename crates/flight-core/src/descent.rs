@@ -1,8 +1,8 @@
 //! Descent with states that have returned, or without a position: straight down from where the vehicle was seen, until
 //! landing is detected ([`crate::landing`]). Not in the paper.
 
-use afbc_control::math::settled;
-use afbc_types::{Setpoint, State};
+use afbc_control::math::{settled, wrap_angle};
+use afbc_types::{ResetDelta, Setpoint, State};
 use nalgebra::{Vector2, Vector3};
 
 /// Speed of the descent \[m/s\].
@@ -26,10 +26,21 @@ impl Descent {
         self.setpoint.position_m.z -= SINK_M_S * dt_s;
     }
 
+    /// Shifts it with an estimate that has been set anew.
+    pub(crate) fn shift(&mut self, reset: &ResetDelta) {
+        shift(&mut self.setpoint, reset);
+    }
+
     /// Returns the present setpoint.
     pub fn setpoint(&self) -> &Setpoint {
         &self.setpoint
     }
+}
+
+/// Shifts a setpoint with an estimate that has been set anew.
+pub(crate) fn shift(setpoint: &mut Setpoint, reset: &ResetDelta) {
+    setpoint.position_m += reset.position_m;
+    setpoint.yaw_rad = wrap_angle(setpoint.yaw_rad + reset.yaw_rad);
 }
 
 /// Times with which the estimated velocity loses its meaning, and with which what was made of it, and the way, fade

@@ -3,7 +3,7 @@
 use crate::rate_control::RateTarget;
 use crate::reasons::Reasons;
 use crate::supervisor::{Refusal, Request};
-use afbc_types::{Pose, Setpoint, Stamped, State};
+use afbc_types::{Pose, ResetDelta, Setpoint, Stamped, State};
 use heapless::Deque;
 
 /// Something asked for, with a ticket that identifies its answer.
@@ -39,6 +39,9 @@ pub struct Inbox {
     /// Of this tick alone, from the guidance: not merged, taken or recorded.
     #[cfg_attr(feature = "serde", serde(skip))]
     rates: Option<RateTarget>,
+    /// Likewise: by how much the vehicle's own estimate has been set anew.
+    #[cfg_attr(feature = "serde", serde(skip))]
+    reset: Option<ResetDelta>,
     inhibited: Reasons,
     requests: Queue<Request>,
 }
@@ -54,6 +57,7 @@ impl Inbox {
         setpoint: None,
         idle_on_ground: None,
         rates: None,
+        reset: None,
         inhibited: Reasons::NONE,
         requests: Queue::new(),
     };
@@ -122,6 +126,20 @@ impl Inbox {
     /// Returns the rates that a pilot [commands](Self::command_rates).
     pub fn rates(&self) -> Option<&RateTarget> {
         self.rates.as_ref()
+    }
+
+    /// Notes by how much the vehicle's own estimate has been set anew in this tick, if it has.
+    #[inline]
+    pub fn hand_over(&mut self, reset: Option<&ResetDelta>) {
+        self.reset = None;
+        if let Some(reset) = reset {
+            self.reset = Some(*reset);
+        }
+    }
+
+    /// Returns by how much the vehicle's own estimate [has been set anew](Self::hand_over).
+    pub fn reset(&self) -> Option<&ResetDelta> {
+        self.reset.as_ref()
     }
 
     /// Sets what speaks against arming besides what the flight core checks itself.

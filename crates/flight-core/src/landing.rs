@@ -28,6 +28,8 @@ pub const USUAL_S: f32 = 5.0;
 pub const CARRIED_US: u32 = 500_000;
 /// Time at rest without being carried after which a vehicle has landed \[us\].
 pub const STILL_US: u32 = 1_000_000;
+/// Time at rest after which a vehicle that should sink stands \[us\].
+pub const STANDS_US: u32 = 250_000;
 /// Time at rest, not carried and without a descent before, after which the tracker is distrusted \[us\].
 pub const FROZEN_US: u32 = 500_000;
 /// Time of hovering after which an earlier descent no longer counts \[us\].
@@ -155,6 +157,11 @@ impl LandDetector {
     /// True if the state is at rest in the air without thrust, which only a frozen tracker reports.
     pub fn contradicts(&self) -> bool {
         self.left && !self.sank && self.stands_for_us() > FROZEN_US
+    }
+
+    /// True if the vehicle has not moved for a moment, carried or not.
+    pub fn stands(&self) -> bool {
+        self.still_us >= STANDS_US
     }
 
     /// Returns for how long it has been at rest and not carried.

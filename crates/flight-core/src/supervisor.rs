@@ -12,6 +12,9 @@ pub const COAST_US: u32 = 20_000;
 pub const STEADY_US: u32 = 100_000;
 /// Age of the state at which coasting ends and the vehicle descends \[us\].
 pub const DESCEND_US: u32 = 250_000;
+/// Time for which states must have been fresh for a descent to end \[us\]: what recovers only for moments must not make
+/// the vehicle descend and climb repeatedly.
+pub const RESUME_US: u32 = 1_000_000;
 /// Age of the attitude at which the motors stop \[us\]: two seconds of blind descent.
 pub const GIVE_UP_US: u32 = 2_250_000;
 /// Age of the setpoint at which the vehicle holds its position instead \[us\].
@@ -31,7 +34,7 @@ pub const REST_US: u32 = 1_000_000;
 ///    |      |                     v                            |
 ///    |      |               +------------+                     |
 ///    |      +---------------| Descending | <-------------------+
-///    |    on the ground     +------------+
+///    |    on the ground     +------------+ --> Flying, fresh for 1 s
 ///    |
 ///    +--- Kill, tumbled, or attitude's age > 2.25 s, from anywhere; Disarm, from anywhere on the ground
 /// ```
@@ -41,9 +44,9 @@ pub const REST_US: u32 = 1_000_000;
 /// without drifting away on purpose ([`crate::descent`]), for as long as it takes; otherwise it is flown blind
 /// ([`crate::dead_reckoning`]).
 ///
-/// Descending does not return to Flying. The attitude has been unknown for a quarter of a second, and a tracker that
-/// recovers only for moments would make the vehicle descend and climb repeatedly. States that return are used to
-/// descend under control ([`crate::descent`]).
+/// States that return are used to descend under control ([`crate::descent`]). Once they have been fresh for
+/// [`RESUME_US`] and the vehicle sinks by them, the setpoint is flown again: a tracker that recovers only for moments
+/// must not make it descend and climb repeatedly, and one that stands on the ground has landed.
 ///
 /// The numbers are part of the link's protocol.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -185,6 +188,8 @@ pub struct SupervisorInputs {
     pub steady_us: u32,
     /// False if the vehicle is on the ground ([`crate::landing`]).
     pub airborne: bool,
+    /// True if it does not move, as on the ground, where it may not have been found yet.
+    pub stands: bool,
     /// True if it is upside down or spinning without recovery ([`crate::tumble`]).
     pub tumbled: bool,
 }
@@ -222,7 +227,9 @@ impl Mode {
                 Mode::Flying
             }
             Mode::Disarmed => Mode::Disarmed,
-            Mode::Descending => Mode::Descending,
+            Mode::Descending if age_us > COAST_US || observed.steady_us < RESUME_US || observed.stands => {
+                Mode::Descending
+            }
             _ if age_us > DESCEND_US => Mode::Descending,
             _ if age_us > COAST_US => Mode::Coasting,
             Mode::Coasting if observed.steady_us < STEADY_US => Mode::Coasting,

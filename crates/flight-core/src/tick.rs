@@ -177,6 +177,7 @@ impl<C: FlightController<N>, const N: usize> FlightCore<C, N> {
             attitude_age_us: age_us(*oriented_us),
             steady_us: *steady_us,
             airborne: flight.as_ref().is_some_and(|flight| flight.landing.airborne()),
+            stands: flight.as_ref().is_some_and(|flight| flight.landing.stands()),
             tumbled: flight.as_ref().is_some_and(|flight| flight.tumble.is_lost()),
         };
         // By the mode before the transition: an armed vehicle would refuse the very request that has armed it.
@@ -249,6 +250,9 @@ impl<C: FlightController<N>, const N: usize> FlightCore<C, N> {
                 flight.rest(&self.dead_reckoning, fresh.or(position_lost));
             }
             return self.open_loop(flight, Inputs::default());
+        }
+        if let Some(reset) = inbox.reset() {
+            flight.guide.shift(reset);
         }
         // Untold, a law that observes moments makes up for what the feet hold, and tips over when they let go.
         if mem::take(&mut flight.idle_on_ground) && !airborne {

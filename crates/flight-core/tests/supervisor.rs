@@ -1,7 +1,7 @@
 //! Every transition of the mode, every answer, and every reason against arming.
 
 use afbc_flight_core::supervisor::{
-    ArmingInputs, COAST_US, DESCEND_US, GIVE_UP_US, REST_US, STEADY_US, SupervisorInputs,
+    ArmingInputs, COAST_US, DESCEND_US, GIVE_UP_US, REST_US, RESUME_US, STEADY_US, SupervisorInputs,
 };
 use afbc_flight_core::{ArmingLimits, EndReason, Mode, Reasons, Refusal, Request};
 use afbc_types::{Declared, Setpoint, State};
@@ -23,6 +23,7 @@ const CALM: SupervisorInputs = SupervisorInputs {
     attitude_age_us: 0,
     steady_us: u32::MAX,
     airborne: true,
+    stands: false,
     tumbled: false,
 };
 
@@ -66,7 +67,7 @@ fn in_flight_the_age_decides() {
         (Disarmed, [Disarmed; 8]),
         (Flying, [Flying, Flying, Coasting, Coasting, Descending, Descending, Disarmed, Disarmed]),
         (Coasting, [Flying, Flying, Coasting, Coasting, Descending, Descending, Disarmed, Disarmed]),
-        (Descending, [Descending, Descending, Descending, Descending, Descending, Descending, Disarmed, Disarmed]),
+        (Descending, [Flying, Flying, Descending, Descending, Descending, Descending, Disarmed, Disarmed]),
     ];
     for (mode, row) in table {
         for (state_age_us, expected) in AGES_US.into_iter().zip(row) {
@@ -88,6 +89,21 @@ fn coasting_ends_once_states_have_been_fresh_for_a_while() {
     for (steady_us, expected) in [(0, Mode::Coasting), (STEADY_US - 1, Mode::Coasting), (STEADY_US, Mode::Flying)] {
         assert_eq!(Mode::Coasting.next(&SupervisorInputs { steady_us, ..CALM }), expected);
         assert_eq!(Mode::Flying.next(&SupervisorInputs { steady_us, ..CALM }), Mode::Flying);
+    }
+}
+
+/// Neither states that come for moments nor a vehicle that stands on the ground end a descent.
+#[test]
+fn a_descent_ends_once_states_have_been_fresh_for_a_second_in_the_air() {
+    for (steady_us, stands, expected) in [
+        (0, false, Mode::Descending),
+        (RESUME_US - 1, false, Mode::Descending),
+        (RESUME_US, true, Mode::Descending),
+        (RESUME_US, false, Mode::Flying),
+    ] {
+        assert_eq!(Mode::Descending.next(&SupervisorInputs { steady_us, stands, ..CALM }), expected);
+        let grounded = SupervisorInputs { steady_us, stands, airborne: false, ..CALM };
+        assert_eq!(Mode::Descending.next(&grounded), Mode::Disarmed);
     }
 }
 

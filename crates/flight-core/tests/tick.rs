@@ -280,14 +280,45 @@ fn without_a_setpoint_the_vehicle_stays_where_it_is() {
 }
 
 #[test]
-fn a_state_that_comes_back_leads_the_descent_to_the_ground() {
+fn a_state_that_comes_back_leads_the_descent_for_a_second() {
+    for gap in [false, true] {
+        let mut bench = Bench::airborne(State::default(), near());
+        for _ in 0..300 {
+            bench.tick(None, Some(near()));
+        }
+        let mut state = State { position_m: Vector3::new(1.0, 2.0, 3.0), ..State::default() };
+        state.velocity_m_s.z = -SINK_M_S;
+        for tick in 1..=1300 {
+            // A gap that coasting would bridge begins the second anew.
+            let lost = gap && (500..522).contains(&tick);
+            let outcome = bench.tick((!lost).then_some(state), Some(near()));
+            let resumed_at = if gap { 1521 } else { 1000 };
+            let expected = if tick < resumed_at { Mode::Descending } else { Mode::Flying };
+            assert_eq!(outcome.mode, expected, "{tick} ms");
+            state.position_m.z -= SINK_M_S * 1e-3;
+        }
+        if !gap {
+            // The commander's setpoint is flown again, and the next descent begins where the vehicle is then.
+            assert!((bench.trace().errors.x.e1 - (near().position_m.x - 1.0)).abs() < 1e-3);
+            for _ in 0..300 {
+                bench.tick(None, Some(near()));
+            }
+            state.position_m.z = 1.0;
+            assert_eq!(bench.tick(Some(state), Some(near())).mode, Mode::Descending);
+            assert!(bench.trace().errors.z.e1.abs() < 1e-2);
+        }
+    }
+}
+
+#[test]
+fn a_state_that_comes_back_near_the_ground_leads_the_descent_there() {
     let mut bench = Bench::airborne(State::default(), near());
     for _ in 0..300 {
         bench.tick(None, Some(near()));
     }
     let mut state = State { position_m: Vector3::new(1.0, 2.0, 3.0), ..State::default() };
     state.velocity_m_s.z = -SINK_M_S;
-    for tick in 1..=2000 {
+    for tick in 1..=700 {
         let outcome = bench.tick(Some(state), Some(near()));
         assert_eq!(outcome.mode, Mode::Descending);
         let sunk = bench.trace().errors.z.e1 + state.position_m.z - 3.0;

@@ -24,6 +24,7 @@ fn main() {
             now_us: 1000 * ms,
             dt_s: 1e-3,
             state: Some(&state),
+            reset: None,
             core: if ms < 1200 { Mode::Disarmed } else { Mode::Flying },
             airborne: state.position_m.z > 0.1,
             rested: ms > 1000,

@@ -2,7 +2,8 @@
 
 use crate::limiter::LimiterTarget;
 use crate::mode_io::{ModeInputs, ModeOutput};
-use afbc_control::math::{max, min};
+use afbc_control::math::{max, min, wrap_angle};
+use afbc_types::ResetDelta;
 use nalgebra::{Vector2, Vector3};
 
 /// Distance from home at which it descends \[m\].
@@ -22,6 +23,15 @@ pub(crate) struct Hold {
 }
 
 impl Hold {
+    /// Shifts a place that has been reached, and its heading, with an estimate that has been set anew.
+    pub(crate) fn shift(&mut self, reset: &ResetDelta, present_m: Option<Vector3<f32>>, within_m: f32) {
+        let (Some(at_m), Some(present_m)) = (&mut self.at_m, present_m) else { return };
+        if (*at_m - present_m).norm_squared() <= within_m * within_m {
+            *at_m += reset.position_m;
+            self.yaw_rad = self.yaw_rad.map(|yaw_rad| wrap_angle(yaw_rad + reset.yaw_rad));
+        }
+    }
+
     /// Holds where the vehicle stops.
     pub(crate) fn fly(&mut self, inputs: &ModeInputs<'_>) -> LimiterTarget {
         if self.at_m.is_none() && inputs.stands() {
@@ -51,6 +61,12 @@ impl Takeoff {
         Takeoff { to_m: from_m + Vector3::new(0.0, 0.0, height_m), from_m: from_m.z }
     }
 
+    /// Shifts it with an estimate that has been set anew.
+    pub(crate) fn shift(&mut self, reset: &ResetDelta) {
+        self.to_m += reset.position_m;
+        self.from_m += reset.position_m.z;
+    }
+
     pub(crate) fn fly(&self, inputs: &ModeInputs<'_>) -> ModeOutput {
         let aim = LimiterTarget { up_m_s: inputs.flying.takeoff_m_s, ..inputs.to(self.to_m) };
         let short_m = max(TAKEN_OFF_SHARE * (self.to_m.z - self.from_m), CLIMBED_M);
@@ -67,6 +83,11 @@ pub(crate) struct Land {
 }
 
 impl Land {
+    /// Shifts it with an estimate that has been set anew.
+    pub(crate) fn shift(&mut self, reset: &ResetDelta) {
+        self.over_m = self.over_m.map(|over_m| over_m + reset.position_m);
+    }
+
     pub(crate) fn fly(&mut self, inputs: &ModeInputs<'_>) -> ModeOutput {
         if self.over_m.is_none() {
             let speed_m_s = inputs.present.velocity_m_s.xy().norm_squared();
@@ -103,6 +124,13 @@ impl Return {
         // A return must not itself leave the geofence.
         let height_m = if near { position_m.z } else { min(max(position_m.z, safe_m), inputs.ceiling_m) };
         Return { height_m, to_m, hold: Hold::default(), stage: Stage::Climbs }
+    }
+
+    /// Shifts where it stops with an estimate that has been set anew; home stays where it is.
+    pub(crate) fn shift(&mut self, reset: &ResetDelta, present_m: Option<Vector3<f32>>, within_m: f32) {
+        // It climbs there.
+        let level_m = present_m.zip(self.hold.at_m).map(|(present, at)| Vector3::new(present.x, present.y, at.z));
+        self.hold.shift(reset, level_m, within_m);
     }
 
     /// True once it has stopped and climbed.

@@ -12,14 +12,14 @@ use crate::mode::FlightMode;
 use crate::net::{self, FailedSensors, Findings, Watch};
 use crate::notice::{Cause, ModeReason, Notice, Notices};
 use crate::orbit::Orbit;
-use crate::order::{OffboardTarget, OrderRefusal, Orders, Sticks};
+use crate::order::{Item, OffboardTarget, OrderRefusal, Orders, Sticks};
 use crate::settings::Settings;
 use crate::sticks;
 use crate::table::{self, FailsafeAction, TransitionInputs};
 use crate::targets::{self, Targets};
 use afbc_control::math::{max, min};
 use afbc_flight_core::{Mode, RateTarget, Reasons, Refusal, Request, Stamped};
-use afbc_types::{Declared, OutOfRange, Setpoint, State};
+use afbc_types::{Declared, OutOfRange, ResetDelta, Setpoint, State};
 use nalgebra::Vector3;
 
 /// Time between two requests to disarm \[s\].
@@ -34,6 +34,8 @@ pub struct GuidanceInputs<'a> {
     pub dt_s: f32,
     /// Fresh state; none if there is none, or the vehicle does not know where it is.
     pub state: Option<&'a State>,
+    /// By how much that has been set anew in this tick, if it has.
+    pub reset: Option<&'a ResetDelta>,
     /// Mode of the flight core.
     pub core: Mode,
     /// True if the vehicle is in the air, by the flight core.
@@ -114,6 +116,8 @@ struct Memory {
     /// True if it has been in the air since it was armed.
     flown: bool,
     failsafe: Option<Cause>,
+    /// What the flight core's descent has interrupted, until it is resumed or another mode is chosen.
+    interrupted: Option<Interrupted>,
     /// Item of the mission that is done once the vehicle has landed.
     lands_item: Option<u16>,
     /// Time on the ground with the motors idling, waiting to leave the ground, since the last request \[s\].
@@ -128,6 +132,16 @@ struct Memory {
     /// True if it has announced that it stops the motors.
     disarms: bool,
     against: Reasons,
+}
+
+/// A mode as it was flown.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Interrupted {
+    mode: FlightMode,
+    plan: Plan,
+    failsafe: Option<Cause>,
+    lands_item: Option<u16>,
+    speed_m_s: f32,
 }
 
 /// What a mode remembers.
@@ -167,6 +181,7 @@ impl Guidance {
             enters: false,
             flown: false,
             failsafe: None,
+            interrupted: None,
             lands_item: None,
             ground_s: 0.0,
             touch_s: 0.0,
@@ -224,8 +239,15 @@ impl Memory {
         let airborne = armed && given.airborne;
         let mut notices = Notices::default();
         self.time(airborne, dt_s);
+        if let Some(reset) = given.reset.filter(|_| self.was_seen) {
+            self.shift(reset, settings.flying.within_m);
+        }
         // Before `decide`, which forgets that the vehicle was still disarmed in the last tick.
         self.find_home(state, given.rested, armed);
+        // Before orders, which may choose an item of another mission.
+        if orders.leg.is_some_and(|leg| self.mission.begins_anew(leg.upload)) {
+            self.lands_item = None;
+        }
 
         // Watches.
         let target = fresh_target(orders, given.now_us, settings.flying.targets_lost_s);
@@ -252,8 +274,9 @@ impl Memory {
             armed,
             airborne,
             positioned: state.is_some(),
-            descends: findings.descends,
-            mission: orders.leg.is_some(),
+            // With a state that has come back, orders count again.
+            descends: findings.descends && state.is_none(),
+            mission: orders.leg.is_some_and(|leg| !matches!(leg.item, Item::None)),
             targets: target.is_some(),
             sticks: sticks.is_some(),
             held,
@@ -262,7 +285,8 @@ impl Memory {
         // Decides the mode.
         // Once per approach: otherwise each tick until it stands would begin the mode anew.
         let leaves = findings.fence.leaves && net::is_new(new, Cause::Fence);
-        self.decide(settings, &seen, cause, new, leaves, &mut notices);
+        let back = state.is_some() && !findings.descends;
+        self.decide(settings, &seen, cause, new, [leaves, back], &mut notices);
         let first = orders.given.front();
         let answer = first.map(|given| (given.ticket, self.order(settings, &given.value, state, &seen, &mut notices)));
 
@@ -304,7 +328,8 @@ impl Memory {
     }
 
     /// Changes the mode, if the safety net or the end of a flight asks for it, and announces the causes in the set
-    /// `new`; `leaves` is true if the vehicle begins to leave the uploaded geofence.
+    /// `new`; `leaves` is true if the vehicle begins to leave the uploaded geofence, and `back` if it knows where it is
+    /// and the flight core does not descend.
     #[inline]
     fn decide(
         &mut self,
@@ -312,17 +337,24 @@ impl Memory {
         seen: &TransitionInputs,
         cause: Cause,
         new: u16,
-        leaves: bool,
+        [leaves, back]: [bool; 2],
         notices: &mut Notices,
     ) {
         if self.was_armed && !seen.armed {
             self.disarmed(notices);
         }
         self.was_armed = seen.armed;
+        if back && let Some(flown) = self.interrupted {
+            self.resume(&flown, notices);
+        }
         let mut announced = None;
         if let Some(next) = table::forced(self.mode, seen) {
+            let Memory { mode, plan, failsafe, lands_item, speed_m_s, .. } = *self;
             self.change(next, ModeReason::Failsafe(cause), notices);
             (self.failsafe, announced) = (Some(cause), Some(cause));
+            if seen.descends {
+                self.interrupted = Some(Interrupted { mode, plan, failsafe, lands_item, speed_m_s });
+            }
         }
         if leaves && seen.airborne {
             self.stop_at_fence(settings.net.fence_action.action(), notices);
@@ -338,6 +370,25 @@ impl Memory {
         let Some(state) = state else { return };
         if self.home_m.is_none() && rested || armed && !self.was_armed && !self.home_ordered {
             self.home_m = Some(state.position_m);
+        }
+    }
+
+    /// Shifts with the vehicle's state, which has been set anew, what is meant from where the vehicle is: the setpoint,
+    /// a place that it holds or stops at, the end of a take-off. A place that was ordered, or is an item of a mission,
+    /// stays where it is, and is flown to; one that has been reached is held.
+    #[cold]
+    #[inline(never)]
+    fn shift(&mut self, reset: &ResetDelta, within_m: f32) {
+        let present_m = self.limiter.setpoint().map(|present| present.position_m);
+        self.limiter.shift(reset);
+        self.stood_m += reset.position_m;
+        self.mission.shift(reset);
+        match &mut self.plan {
+            Plan::Hold(hold) => hold.shift(reset, present_m, within_m),
+            Plan::Takeoff(takeoff) => takeoff.shift(reset),
+            Plan::Land(land) => land.shift(reset),
+            Plan::Return(home) => home.shift(reset, present_m, within_m),
+            Plan::New | Plan::Orbit(_) | Plan::Targets(_) => {}
         }
     }
 
@@ -366,7 +417,16 @@ impl Memory {
         self.mission.pause();
         (self.mode, self.plan, self.enters, self.lift_s) = (next, Plan::New, true, 0.0);
         (self.trim, self.rates) = (Trim::default(), None);
-        self.lands_item = None;
+        (self.lands_item, self.interrupted) = (None, None);
+    }
+
+    /// Goes on with what an outage of the state has interrupted, at the vehicle's present place.
+    #[cold]
+    #[inline(never)]
+    fn resume(&mut self, flown: &Interrupted, notices: &mut Notices) {
+        self.change(flown.mode, ModeReason::Back, notices);
+        (self.plan, self.failsafe) = (flown.plan, flown.failsafe);
+        (self.lands_item, self.speed_m_s) = (flown.lands_item, flown.speed_m_s);
     }
 
     /// Stops a vehicle that is about to leave the uploaded fence, in a mode that is strong enough not to be replaced:
@@ -432,14 +492,12 @@ impl Memory {
         outside_fence: bool,
     ) -> Reasons {
         let mut reasons = Reasons::NONE;
-        // Without a number of cells the battery is not watched.
-        let watched = settings.net.cells > 0;
+        let watched = self.watch.is_watched(&settings.net);
         let known = given.battery.is_some() && self.watch.charge().is_some();
         reasons.note(watched && (!known || self.watch.holds(Cause::BatteryLow)), Refusal::BatteryLow);
         reasons.note(given.sensors.any(), Refusal::SensorFailed);
         let outside = state.is_some_and(|state| !self.is_inside(settings, &state.position_m));
         reasons.note(outside || outside_fence, Refusal::OutsideFence);
-        reasons.note(matches!(self.mode, FlightMode::Land | FlightMode::Return), Refusal::WrongMode);
         reasons
     }
 }

@@ -28,6 +28,7 @@ pub mod net;
 pub mod notice;
 mod orbit;
 pub mod order;
+mod place;
 pub mod settings;
 mod shaper;
 mod sticks;
@@ -47,5 +48,6 @@ pub use orbit::ORBIT_RADIUS_M;
 pub use order::{
     AttitudeTarget, Item, Leg, MotionTarget, OffboardTarget, OrbitHeading, Order, OrderRefusal, Orders, Sticks,
 };
+pub use place::is_place;
 pub use settings::{Flying, Limits, Settings};
 pub use table::{FailsafeAction, TransitionInputs};

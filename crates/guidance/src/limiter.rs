@@ -7,8 +7,8 @@
 use crate::heading::{Heading, Turn, Turning};
 use crate::settings::Limits;
 use crate::shaper::{Goal, Motion, Reach, Shape, capped};
-use afbc_control::math::{max, min, sqrt};
-use afbc_types::{Declared, OutOfRange, Setpoint, State};
+use afbc_control::math::{max, min, sqrt, wrap_angle};
+use afbc_types::{Declared, OutOfRange, ResetDelta, Setpoint, State};
 use nalgebra::{Vector1, Vector2, Vector3};
 
 /// Time constant over which a passing stream's misfits add up \[s\].
@@ -166,6 +166,15 @@ impl Limiter {
     /// Begins at the vehicle's state at rest.
     pub fn rest(&mut self, state: &State) {
         self.anchor(&State { velocity_m_s: Vector3::zeros(), ..*state });
+    }
+
+    /// Shifts the motion with an estimate that has been set anew.
+    pub(crate) fn shift(&mut self, reset: &ResetDelta) {
+        if let Some(now) = &mut self.now {
+            now.horizontal.position += reset.position_m.xy();
+            now.vertical.position.x += reset.position_m.z;
+            now.heading.yaw_rad = wrap_angle(now.heading.yaw_rad + reset.yaw_rad);
+        }
     }
 
     /// Keeps the horizontal motion and the heading with the vehicle, which flies these without a setpoint.

@@ -4,9 +4,12 @@ use crate::course::{Hold, Takeoff};
 use crate::limiter::LimiterTarget;
 use crate::mode::FlightMode;
 use crate::mode_io::{ModeInputs, ModeOutput, Shaping};
+use crate::net::Net;
 use crate::orbit::{self, Orbit, Round};
-use crate::order::{Item, Leg, OrbitHeading};
+use crate::order::{Item, Leg, OrbitHeading, OrderRefusal};
+use crate::place::{is_place, is_within};
 use afbc_control::math::{max, min, wrap_angle};
+use afbc_types::ResetDelta;
 use core::f32::consts::{PI, TAU};
 use nalgebra::{Vector2, Vector3};
 
@@ -83,19 +86,27 @@ impl Mission {
         (self.begun, self.hold) = (None, Hold::default());
     }
 
-    /// Advances by a tick; `inside` returns whether a place is inside the geofence.
-    pub(crate) fn fly(
-        &mut self,
-        leg: Option<&Leg>,
-        inputs: &ModeInputs<'_>,
-        inside: impl Fn(&Vector3<f32>) -> bool,
-    ) -> Progress {
+    /// Shifts a climb straight up with an estimate that has been set anew; places of items stay where they are.
+    pub(crate) fn shift(&mut self, reset: &ResetDelta) {
+        if let Some(Begun { course: Course::Takeoff(takeoff), .. }) = &mut self.begun {
+            takeoff.shift(reset);
+        }
+    }
+
+    /// Begins at the first item if this is another mission than before; returns whether it is.
+    pub(crate) fn begins_anew(&mut self, upload: u16) -> bool {
+        let other = self.upload.is_some_and(|before| before != upload);
+        if other {
+            *self = Mission::default();
+        }
+        self.upload = Some(upload);
+        other
+    }
+
+    /// Advances by a tick, inside the cylinder of `net`.
+    pub(crate) fn fly(&mut self, leg: Option<&Leg>, inputs: &ModeInputs<'_>, net: &Net) -> Progress {
         if let Some(leg) = leg {
-            // Another mission begins at its first item.
-            if self.upload.is_some_and(|upload| upload != leg.upload) {
-                *self = Mission::default();
-            }
-            self.upload = Some(leg.upload);
+            self.begins_anew(leg.upload);
         }
         let inputs =
             &ModeInputs { speed_m_s: min(inputs.speed_m_s, self.speed_m_s.unwrap_or(f32::INFINITY)), ..*inputs };
@@ -105,8 +116,7 @@ impl Mission {
             let done = leg.is_none();
             return Progress { output: ModeOutput { done, ..ModeOutput::fly(self.hold.fly(inputs)) }, ..none };
         };
-        let flown = is_plausible(&leg.item) && place(&leg.item, inputs).is_none_or(|place_m| inside(&place_m));
-        if !flown {
+        if leg.item.check(net, Some(&inputs.home_m)).is_err() {
             return Progress { refused: true, ..none };
         }
         let mut progress = self.fly_item(leg, inputs, none);
@@ -122,6 +132,15 @@ impl Mission {
     fn fly_item(&mut self, leg: &Leg, inputs: &ModeInputs<'_>, none: Progress) -> Progress {
         match leg.item {
             Item::TakeOff { height_m } => self.take_off(leg, height_m, inputs, none),
+            Item::TakeOffTo { position_m } => {
+                let begun = self.begin(leg, inputs, |inputs| climb_to(position_m.z, inputs));
+                if let Some(output) = begun.climb(inputs) {
+                    return Progress { output, ..none };
+                }
+                let done = inputs.is_at(&position_m, inputs.flying.within_m) && is_slow(inputs);
+                let output = ModeOutput { done, ..ModeOutput::fly(inputs.to(position_m)) };
+                self.go_on(leg, output, Some(position_m), none)
+            }
             Item::Waypoint { position_m, yaw_rad, hold_s, within_m, fly_through } => {
                 let begun = self.begin(leg, inputs, from_ground);
                 if let Some(output) = begun.climb(inputs) {
@@ -165,14 +184,14 @@ impl Mission {
                 }
                 progress
             }
+            // Never: a mission that is no more is not flown.
+            Item::None => none,
         }
     }
 
     /// Climbs to a height over home.
     fn take_off(&mut self, leg: &Leg, height_m: f32, inputs: &ModeInputs<'_>, none: Progress) -> Progress {
-        let begun = self.begin(leg, inputs, |inputs| {
-            Course::Takeoff(Takeoff::new(inputs, max(height_m - inputs.present.position_m.z, 0.0)))
-        });
+        let begun = self.begin(leg, inputs, |inputs| climb_to(height_m, inputs));
         let takeoff = begun.course.takeoff();
         let output = takeoff.map_or(none.output, |takeoff| takeoff.fly(inputs));
         let at_m = takeoff.map(|takeoff| takeoff.to_m);
@@ -299,6 +318,11 @@ fn from_ground(inputs: &ModeInputs<'_>) -> Course {
     Course::Takeoff(Takeoff::new(inputs, min(inputs.flying.takeoff_height_m, room_m)))
 }
 
+/// Climbs straight up to a height of the local frame, if that is above.
+fn climb_to(height_m: f32, inputs: &ModeInputs<'_>) -> Course {
+    Course::Takeoff(Takeoff::new(inputs, max(height_m - inputs.present.position_m.z, 0.0)))
+}
+
 /// Returns the angle to turn by from `present_rad`, positive to the left \[rad\].
 fn to_turn(yaw_rad: f32, relative: bool, direction: i8, present_rad: f32) -> f32 {
     if relative {
@@ -326,44 +350,57 @@ fn is_here(position_m: &Vector3<f32>) -> bool {
     position_m.x.is_nan() || position_m.y.is_nan()
 }
 
-/// Returns the place that an item flies to, which must be inside the geofence \[m\].
-fn place(item: &Item, inputs: &ModeInputs<'_>) -> Option<Vector3<f32>> {
-    let home_m = &inputs.home_m;
-    match *item {
-        Item::TakeOff { height_m } => Some(Vector3::new(home_m.x, home_m.y, height_m)),
-        Item::Waypoint { position_m, .. } => Some(position_m),
-        Item::Land { position_m } => {
-            (!is_here(&position_m)).then_some(Vector3::new(position_m.x, position_m.y, home_m.z))
+impl Item {
+    /// Checks that it can be flown: its numbers, and that its place is inside the cylinder of `net` around home, if
+    /// that is known.
+    ///
+    /// # Errors
+    /// [`OrderRefusal::OutOfRange`] or [`OrderRefusal::OutsideFence`].
+    pub fn check(&self, net: &Net, home_m: Option<&Vector3<f32>>) -> Result<(), OrderRefusal> {
+        if !self.is_plausible() {
+            return Err(OrderRefusal::OutOfRange);
         }
-        Item::Turns { centre_m, .. } => Some(centre_m),
-        _ => None,
+        let inside = |home_m| self.place(home_m).is_none_or(|place_m| net.encloses(home_m, &place_m, 0.0));
+        if home_m.is_none_or(inside) { Ok(()) } else { Err(OrderRefusal::OutsideFence) }
     }
-}
 
-/// Largest coordinate of a place that is flown to \[m\].
-const PLACE_MAX_M: f32 = 9e4;
+    /// Returns the place that it flies to \[m\].
+    fn place(&self, home_m: &Vector3<f32>) -> Option<Vector3<f32>> {
+        match *self {
+            Item::TakeOff { height_m } => Some(Vector3::new(home_m.x, home_m.y, height_m)),
+            Item::TakeOffTo { position_m } | Item::Waypoint { position_m, .. } => Some(position_m),
+            Item::Land { position_m } => {
+                (!is_here(&position_m)).then_some(Vector3::new(position_m.x, position_m.y, home_m.z))
+            }
+            Item::Turns { centre_m, .. } => Some(centre_m),
+            _ => None,
+        }
+    }
 
-/// True if every number of an item can be flown; NaN only where that means something.
-fn is_plausible(item: &Item) -> bool {
-    let within = |value: f32| value.abs() <= PLACE_MAX_M;
-    match item {
-        Item::TakeOff { height_m } => within(*height_m),
-        Item::Waypoint { position_m, yaw_rad, hold_s, within_m, .. } => {
-            position_m.iter().all(|value| within(*value))
-                && (yaw_rad.is_nan() || yaw_rad.abs() <= 1e3)
-                && !hold_s.is_nan()
-                && !within_m.is_nan()
+    /// True if every number can be flown; NaN only where that means something.
+    fn is_plausible(&self) -> bool {
+        let is_whole = |place_m: &Vector3<f32>| place_m.iter().all(|value| is_within(*value));
+        // Heights of a landing and of a region do not matter.
+        let is_flat = |place_m: &Vector3<f32>| is_place(&Vector3::new(place_m.x, place_m.y, f32::NAN));
+        match self {
+            Item::TakeOff { height_m } => is_within(*height_m),
+            Item::TakeOffTo { position_m } => is_whole(position_m),
+            Item::Waypoint { position_m, yaw_rad, hold_s, within_m, .. } => {
+                is_whole(position_m)
+                    && (yaw_rad.is_nan() || yaw_rad.abs() <= 1e3)
+                    && !hold_s.is_nan()
+                    && !within_m.is_nan()
+            }
+            Item::Land { position_m } => is_flat(position_m),
+            Item::Return | Item::Jump(_) | Item::None => true,
+            Item::Speed(speed_m_s) => *speed_m_s > 0.0,
+            Item::Wait(time_s) => !time_s.is_nan(),
+            Item::Turns { centre_m, radius_m, turns } => {
+                let round = *radius_m == 0.0 || orbit::RADIUS_M.contains(&radius_m.abs());
+                is_whole(centre_m) && round && *turns >= 0.0
+            }
+            Item::Yaw { yaw_rad, .. } => yaw_rad.abs() <= 1e3,
+            Item::Look { at_m } => is_flat(at_m),
         }
-        Item::Land { position_m } => position_m.xy().iter().all(|value| value.is_nan() || within(*value)),
-        Item::Return => true,
-        Item::Speed(speed_m_s) => *speed_m_s > 0.0,
-        Item::Wait(time_s) => !time_s.is_nan(),
-        Item::Turns { centre_m, radius_m, turns } => {
-            let round = *radius_m == 0.0 || orbit::RADIUS_M.contains(&radius_m.abs());
-            centre_m.iter().all(|value| within(*value)) && round && *turns >= 0.0
-        }
-        Item::Yaw { yaw_rad, .. } => yaw_rad.abs() <= 1e3,
-        Item::Look { at_m } => at_m.xy().iter().all(|value| value.is_nan() || within(*value)),
-        Item::Jump(_) => true,
     }
 }

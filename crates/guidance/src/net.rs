@@ -50,7 +50,7 @@ parameters! {
         /// Amperes of the battery per volt at the board's pin; 0 and below for the board's own amplifier.
         #[parameter(BAT1_A_PER_V, "A/V", -1.0..=10000.0)]
         pub current_a_v: f32 = -1.0,
-        /// Number of the battery's cells; 0 if it is not to be watched.
+        /// Number of the battery's cells; 0: by its monitor's charge, or as many as the voltage says while disarmed.
         #[parameter(BAT1_N_CELLS, "number", 0.0..=24.0)]
         pub cells: u32 = 0,
         /// Voltage of an empty cell without load.
@@ -129,6 +129,8 @@ pub(crate) struct Findings<'a> {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Watch {
     charge: Option<f32>,
+    /// Number of cells by the voltage; 0 if there is no battery.
+    cells: u8,
     /// Set of causes that hold, a bit each.
     holds: u16,
 }
@@ -143,6 +145,11 @@ impl Watch {
         self.charge
     }
 
+    /// True if there is a battery to be watched.
+    pub(crate) fn is_watched(&self, net: &Net) -> bool {
+        net.cells > 0 || self.charge.is_some()
+    }
+
     /// True if the cause holds.
     pub(crate) fn holds(&self, cause: Cause) -> bool {
         self.holds & bit(cause) != 0
@@ -155,8 +162,22 @@ impl Watch {
         seen: &Findings<'_>,
         notices: &mut Notices,
     ) -> (FailsafeAction, Cause, u16) {
-        let cells =
-            Cells { number: net.cells, empty_v: net.empty_v, full_v: net.full_v, resistance_ohm: net.resistance_ohm };
+        if !seen.armed {
+            // While it is connected there are no fewer: an empty battery of six cells must not become a full one of
+            // five.
+            let cells = seen.battery.map_or(0, BatteryReading::cells);
+            self.cells = if cells == 0 { 0 } else { self.cells.max(cells) };
+            if cells == 0 {
+                self.charge = None;
+            }
+        }
+        // A number that is set counts, else what the monitor tells.
+        let number = match seen.battery {
+            _ if net.cells > 0 => net.cells,
+            Some(BatteryReading { charge: Some(_), .. }) => 0,
+            _ => self.cells.into(),
+        };
+        let cells = Cells { number, empty_v: net.empty_v, full_v: net.full_v, resistance_ohm: net.resistance_ohm };
         cells.update(&mut self.charge, seen.battery, seen.dt_s);
         let before = self.holds;
         self.holds = 0;
@@ -178,9 +199,8 @@ impl Watch {
         let new = self.holds & !before;
         let over = before & !self.holds;
         if over != 0 && seen.armed {
-            // Batteries and the flight core's descent do not recover, and targets and sticks are not looked at any more
-            // once the mode is another.
-            for cause in [Cause::Fence, Cause::Sensors, Cause::Station] {
+            // Batteries do not recover, and targets and sticks are not looked at any more once the mode is another.
+            for cause in [Cause::Descent, Cause::Fence, Cause::Sensors, Cause::Station] {
                 if over & bit(cause) != 0 {
                     notices.push(Notice::Over(cause));
                 }
@@ -189,12 +209,15 @@ impl Watch {
         if self.holds == 0 {
             return (FailsafeAction::None, Cause::Descent, 0);
         }
-        let (action, cause) = self.strongest(net);
+        let (action, cause) = self.strongest(net, seen.position_m.is_some());
         (if seen.armed { action } else { FailsafeAction::None }, cause, new)
     }
 
-    fn strongest(&self, net: &Net) -> (FailsafeAction, Cause) {
-        let found = Cause::ALL.into_iter().filter(|cause| self.holds(*cause));
+    /// Returns the strongest action with its cause; `positioned` is true if the vehicle knows where it is, and may be
+    /// ordered what to do while the flight core still descends.
+    fn strongest(&self, net: &Net, positioned: bool) -> (FailsafeAction, Cause) {
+        let counts = |cause: &Cause| self.holds(*cause) && !(positioned && *cause == Cause::Descent);
+        let found = Cause::ALL.into_iter().filter(counts);
         found.fold((FailsafeAction::None, Cause::Descent), |(strongest, of), cause| {
             let action = net.action(cause);
             if action > strongest { (action, cause) } else { (strongest, of) }

@@ -66,10 +66,14 @@ pub enum ModeReason {
     Done,
     /// An item of the mission.
     Mission,
+    /// There is no mission any more.
+    Cleared,
     /// The vehicle has not left the ground.
     NoLift,
     /// The motors have stopped.
     Disarmed,
+    /// The state is back after an outage, and with it what was flown before.
+    Back,
     /// The safety net.
     Failsafe(Cause),
 }
@@ -81,8 +85,10 @@ impl ModeReason {
             ModeReason::Ordered => "ordered",
             ModeReason::Done => "done",
             ModeReason::Mission => "by the mission",
+            ModeReason::Cleared => "the mission was cleared",
             ModeReason::NoLift => "has not left the ground",
             ModeReason::Disarmed => "disarmed",
+            ModeReason::Back => "the state is back",
             ModeReason::Failsafe(cause) => cause.name(),
         }
     }

@@ -195,6 +195,13 @@ pub enum Item {
     },
     /// Go on with the item of this number.
     Jump(u16),
+    /// Nothing: there is no mission any more.
+    None,
+    /// Climb straight up to a place's height, then fly there.
+    TakeOffTo {
+        /// Place in the local frame \[m\].
+        position_m: Vector3<f32>,
+    },
 }
 
 /// The item of a mission that the guidance [wants](crate::Order::Resume), and what follows.

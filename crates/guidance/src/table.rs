@@ -53,7 +53,7 @@ pub struct TransitionInputs {
     pub airborne: bool,
     /// The vehicle knows where it is.
     pub positioned: bool,
-    /// The flight core descends.
+    /// The flight core descends, and no state has come back.
     pub descends: bool,
     /// There is an item of a mission.
     pub mission: bool,
@@ -82,9 +82,11 @@ pub fn select(mode: FlightMode, seen: &TransitionInputs) -> Result<(), OrderRefu
     unless(!seen.demanded().is_done_by(mode), OrderRefusal::Failsafe)?;
     unless(mode != Land && !seen.positioned, OrderRefusal::NoPosition)?;
     match mode {
-        Hold | Land => Ok(()),
+        Hold => Ok(()),
+        // Disarmed, it would stay a mode that nothing is armed in.
+        Land => unless(!seen.armed, OrderRefusal::NotArmed),
         Takeoff => unless(seen.airborne, OrderRefusal::InFlight),
-        Return => unless(seen.armed && !seen.airborne, OrderRefusal::OnGround),
+        Return => unless(!seen.airborne, OrderRefusal::OnGround),
         Mission => unless(!seen.mission, OrderRefusal::NoMission),
         Offboard => unless(!seen.targets, OrderRefusal::NoTargets),
         Position | Altitude | Stabilised | Acro => unless(!seen.sticks, OrderRefusal::NoSticks),

@@ -14,5 +14,7 @@ mod items;
 mod limiter;
 mod modes;
 mod net;
+mod outages;
+mod resets;
 mod table;
 mod tick;

@@ -88,7 +88,7 @@ fn what_bars_arming_has_its_limits() {
     let bars = |change: &dyn Fn(&mut Fixture)| {
         let net = Net { cells: 3, fence_radius_m: 10.0, ..Net::DEFAULT };
         let mut fixture = Fixture::new(Settings { net, ..Settings::DEFAULT });
-        fixture.battery = Some(BatteryReading { voltage_v: 11.7, current_a: 0.0 });
+        fixture.battery = Some(BatteryReading { voltage_v: 11.7, current_a: 0.0, charge: None });
         fixture.run(1100);
         change(&mut fixture);
         fixture.tick().against.iter().collect::<Vec<_>>()
@@ -99,7 +99,7 @@ fn what_bars_arming_has_its_limits() {
     assert_eq!(bars(&|fixture| fixture.battery = None), [Refusal::BatteryLow]);
     assert_eq!(bars(&|fixture| fixture.sensors.tracker = true), [Refusal::SensorFailed]);
     let low = bars(&|fixture| {
-        fixture.battery = Some(BatteryReading { voltage_v: 10.8, current_a: 0.0 });
+        fixture.battery = Some(BatteryReading { voltage_v: 10.8, current_a: 0.0, charge: None });
         fixture.run(9000);
     });
     assert_eq!(low, [Refusal::BatteryLow]);
@@ -112,7 +112,7 @@ fn what_bars_arming_has_its_limits() {
     assert!(Fixture::new(Settings::DEFAULT).run(1100).against.is_empty());
     let net = Net { cells: 3, ..Net::DEFAULT };
     let mut fixture = Fixture::new(Settings { net, ..Settings::DEFAULT });
-    fixture.battery = Some(BatteryReading { voltage_v: NAN, current_a: 0.0 });
+    fixture.battery = Some(BatteryReading { voltage_v: NAN, current_a: 0.0, charge: None });
     assert!(fixture.run(1100).against.iter().eq([Refusal::BatteryLow]));
 }
 
@@ -328,4 +328,48 @@ fn leaning_keeps_to_the_vehicle_horizontally() {
     assert!((setpoint.position_m.z - 8.1).abs() < 0.11, "{setpoint:?}");
     let lean = G * f32::tan(0.3);
     assert!((setpoint.acceleration_m_s2 - Vector3::new(lean, 0.0, 0.0)).norm() < 0.05, "{setpoint:?}");
+}
+
+/// A mission that is cleared ends in hold, in the air and on the ground, and cannot be selected any more.
+#[test]
+fn a_mission_that_is_cleared_is_not_flown_on() {
+    for airborne in [true, false] {
+        let mut fixture = Fixture::flying(Settings::DEFAULT);
+        fixture.airborne = airborne;
+        let item = Item::Waypoint {
+            position_m: Vector3::new(60.0, 2.0, 7.0),
+            yaw_rad: NAN,
+            hold_s: 0.0,
+            within_m: 0.0,
+            fly_through: false,
+        };
+        fixture.orders.leg = Some(Leg { number: 0, upload: 1, item, is_last: true });
+        fixture.select(FlightMode::Mission).unwrap();
+        fixture.run(3000);
+        assert_eq!(fixture.guidance.mode(), FlightMode::Mission);
+        fixture.orders.leg = Some(Leg { number: 0, upload: 2, item: Item::None, is_last: true });
+        fixture.said.clear();
+        fixture.run(5000);
+        assert_eq!(fixture.guidance.mode(), FlightMode::Hold);
+        assert_eq!(fixture.said.first(), Some(&Notice::Mode(FlightMode::Hold, ModeReason::Cleared)));
+        assert!(fixture.place().x < 50.0, "{}", fixture.place());
+        assert_eq!(fixture.select(FlightMode::Mission), Err(OrderRefusal::NoMission));
+        assert_eq!(fixture.would(Order::Resume(0)), Err(OrderRefusal::NoMission));
+    }
+}
+
+/// The item that is chosen of a new mission is flown, whatever was flown before it.
+#[test]
+fn an_item_is_chosen_of_the_mission_that_there_is() {
+    let mut fixture = Fixture::flying(Settings::DEFAULT);
+    let leg = |upload| Some(Leg { number: 2, upload, item: Item::Wait(60.0), is_last: true });
+    fixture.orders.leg = leg(1);
+    fixture.order(Order::Resume(2)).unwrap();
+    fixture.select(FlightMode::Mission).unwrap();
+    fixture.run(100);
+    fixture.select(FlightMode::Hold).unwrap();
+    fixture.orders.leg = leg(2);
+    fixture.order(Order::Resume(2)).unwrap();
+    fixture.select(FlightMode::Mission).unwrap();
+    assert_eq!(fixture.tick().wanted, 2);
 }

@@ -243,10 +243,13 @@ proptest! {
                     now_us,
                     dt_s: spell.dt_s,
                     state: spell.state.as_ref(),
+                    reset: None,
                     core: spell.core,
                     airborne: spell.airborne,
                     rested: spell.fresh,
-                    battery: spell.battery.map(|(voltage_v, current_a)| BatteryReading { voltage_v, current_a }),
+                    battery: spell
+                        .battery
+                        .map(|(voltage_v, current_a)| BatteryReading { voltage_v, current_a, charge: None }),
                     sensors: FailedSensors { gnss: !spell.fresh, ..FailedSensors::default() },
                     lift: Lift { most_m_s2: spell.lift.0, gravity_m_s2: spell.lift.1, given_m_s2: Some(spell.lift.0) },
                 };

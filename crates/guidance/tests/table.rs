@@ -33,10 +33,10 @@ fn all() -> impl Iterator<Item = TransitionInputs> {
 fn needs(mode: FlightMode, seen: &TransitionInputs) -> Vec<(bool, OrderRefusal)> {
     let position = (seen.positioned, OrderRefusal::NoPosition);
     match mode {
-        FlightMode::Land => vec![],
+        FlightMode::Land => vec![(seen.armed, OrderRefusal::NotArmed)],
         FlightMode::Hold => vec![position],
         FlightMode::Takeoff => vec![position, (!seen.airborne, OrderRefusal::InFlight)],
-        FlightMode::Return => vec![position, (!seen.armed || seen.airborne, OrderRefusal::OnGround)],
+        FlightMode::Return => vec![position, (seen.airborne, OrderRefusal::OnGround)],
         FlightMode::Mission => vec![position, (seen.mission, OrderRefusal::NoMission)],
         FlightMode::Offboard => vec![position, (seen.targets, OrderRefusal::NoTargets)],
         FlightMode::Position | FlightMode::Altitude | FlightMode::Stabilised | FlightMode::Acro => {
@@ -93,9 +93,9 @@ fn a_failure_forces_its_mode_and_nothing_weaker() {
 
 #[test]
 fn every_text_is_short_and_every_severity_one_of_mavlinks() {
+    let reasons = [ModeReason::Ordered, ModeReason::Done, ModeReason::Mission, ModeReason::Cleared, ModeReason::NoLift];
     let reasons =
-        [ModeReason::Ordered, ModeReason::Done, ModeReason::Mission, ModeReason::NoLift, ModeReason::Disarmed];
-    let reasons = reasons.into_iter().chain(Cause::ALL.map(ModeReason::Failsafe));
+        reasons.into_iter().chain([ModeReason::Disarmed, ModeReason::Back]).chain(Cause::ALL.map(ModeReason::Failsafe));
     let modes = reasons.flat_map(|reason| FlightMode::ALL.map(|mode| Notice::Mode(mode, reason)));
     let causes = Cause::ALL.into_iter().flat_map(|cause| [Notice::Found(cause), Notice::Over(cause)]);
     let mut texts = BTreeSet::new();
@@ -119,7 +119,8 @@ enum Step {
     Sees(bool),
     Battery(f32),
     Sensor(bool),
-    Descends,
+    /// The flight core descends: without a state, or with one that has just come back.
+    Descends(bool),
     Mission(u8),
     Wind(f32),
     Wait(u16),
@@ -151,7 +152,7 @@ fn steps() -> impl Strategy<Value = Vec<Step>> {
         1 => any::<bool>().prop_map(Step::Sees),
         1 => (3.3_f32..4.2).prop_map(Step::Battery),
         1 => any::<bool>().prop_map(Step::Sensor),
-        1 => Just(Step::Descends),
+        2 => any::<bool>().prop_map(Step::Descends),
         2 => (0_u8..3).prop_map(Step::Mission),
         1 => (-2.0_f32..2.0).prop_map(Step::Wind),
         12 => (1_u16..6000).prop_map(Step::Wait),
@@ -199,9 +200,11 @@ fn follow(bench: &mut Bench, asked: Option<Order>) -> Result<(), TestCaseError> 
                 _ => false,
             },
             ModeReason::Done => [FlightMode::Takeoff, FlightMode::Mission].contains(&mode) && *next == FlightMode::Hold,
+            ModeReason::Cleared => (mode, *next) == (FlightMode::Mission, FlightMode::Hold),
             ModeReason::Mission => mode == FlightMode::Mission && [FlightMode::Land, FlightMode::Return].contains(next),
             ModeReason::NoLift => [FlightMode::Hold, FlightMode::Land].contains(next),
             ModeReason::Disarmed => *next == FlightMode::Hold,
+            ModeReason::Back => mode == FlightMode::Land && bench.core == Mode::Flying,
             ModeReason::Failsafe(_) => strength(*next) > strength(mode) && was_armed,
         };
         prop_assert!(fits, "{:?} to {:?} by {:?}, asked {:?}", mode, next, reason, asked);
@@ -240,7 +243,7 @@ proptest! {
         let mut settings = settings();
         (settings.net.cells, settings.net.fence_radius_m, settings.net.fence_height_m) = (1, 35.0, 25.0);
         let mut bench = Bench::new(settings);
-        bench.battery = Some(BatteryReading { voltage_v: 4.0, current_a: 0.0 });
+        bench.battery = Some(BatteryReading { voltage_v: 4.0, current_a: 0.0, charge: None });
         bench.run(1.5);
         for step in steps {
             let mut asked = None;
@@ -260,12 +263,19 @@ proptest! {
                 Step::Target(target) => bench.aim(target),
                 Step::Sticks(value) => bench.orders.sticks = Some(Stamped { value, at_us: bench.now_us }),
                 Step::Heard(heard) => bench.heard = heard,
-                Step::Sees(sees) => bench.sees = sees || bench.core.armed(),
-                Step::Battery(voltage_v) => bench.battery = Some(BatteryReading { voltage_v, current_a: 0.0 }),
+                Step::Sees(sees) => {
+                    bench.sees = sees || bench.core.armed();
+                    if bench.core == Mode::Descending {
+                        bench.core = Mode::Flying;
+                    }
+                }
+                Step::Battery(voltage_v) => {
+                    bench.battery = Some(BatteryReading { voltage_v, current_a: 0.0, charge: None });
+                }
                 Step::Sensor(inertial) => bench.sensors.inertial = inertial,
-                Step::Descends => {
-                    if bench.core == Mode::Flying {
-                        bench.core = Mode::Descending;
+                Step::Descends(sees) => {
+                    if bench.core.armed() {
+                        (bench.core, bench.sees) = (Mode::Descending, sees);
                     }
                 }
                 Step::Mission(kind) => bench.items = mission(kind),

@@ -79,7 +79,7 @@ impl<const N: usize, C: FlightLaw<N>> Prepared<N, C> {
         Ok(Prepared {
             vehicle: FlightCore::with_rotors(*parameters, response, *arming, controller)?,
             estimator: Estimator::new(*estimation)?,
-            output_filter: OutputFilter::of(parameters, N),
+            output_filter: OutputFilter::of(parameters, N).handing_over(),
             corrections: Corrections::new(imu, calibration),
             motor: Motor::new(*curve)?,
             guide: Guide::new(configuration)?,
@@ -119,6 +119,8 @@ pub struct Report<const N: usize = 4> {
     pub saturated_ticks: u32,
     /// Norms of the estimates of one subsystem, all reported in turn; none before the first flight.
     pub norms: Option<(Axis, Norm)>,
+    /// True in the air while the accelerometer is [shaken](crate::vibration) more than is acceptable.
+    pub shaken: bool,
     /// Answer to a request.
     pub answer: Option<RequestAnswer>,
     /// Why the flight ended, if it did in this tick.
@@ -136,7 +138,7 @@ impl<const N: usize> Report<N> {
         let Report { time_us, mode, motors, throttles, estimate, health, saturated_ticks, norms, answer, .. } = *self;
         let throttles = array::from_fn(|i| throttles.get(i).copied().unwrap_or_default());
         let motors = motors.padded();
-        let (ended, against, guided) = (self.ended, self.against, self.guided);
+        let (ended, against, guided, shaken) = (self.ended, self.against, self.guided, self.shaken);
         Report {
             time_us,
             mode,
@@ -146,6 +148,7 @@ impl<const N: usize> Report<N> {
             health,
             saturated_ticks,
             norms,
+            shaken,
             answer,
             ended,
             against,
@@ -293,6 +296,7 @@ impl<const N: usize, C: FlightLaw<N>> Flight<N, C> {
             health: outcome.health,
             saturated_ticks: self.saturated_ticks,
             norms: self.memory.control().and_then(C::norms),
+            shaken: airborne && self.front_end.is_shaken(),
             answer: outcome.answer,
             ended: outcome.ended,
             against: outcome.against,

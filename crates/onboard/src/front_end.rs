@@ -3,9 +3,11 @@
 
 use crate::imu_lanes::OtherSensors;
 use crate::readings::{Aged, Readings};
+use crate::vibration::Vibration;
 use afbc_control::math::{max, min};
 use afbc_estimator::{
-    Estimate, Estimator, ImuCalibration, ImuSample, Inertial, Measurement, Memory, OutputFilter, Stamped, VelocityNotch,
+    Estimate, Estimator, ImuCalibration, ImuSample, Inertial, LeverFinder, Measurement, Memory, OutputFilter, Stamped,
+    VelocityNotch,
 };
 use afbc_flight_core::{Inbox, Refusal};
 use afbc_types::{Mounting, Pose, PoseSigmas, SensorCalibration, State};
@@ -16,6 +18,10 @@ const FIXES: f32 = 10.0;
 /// Fixes so many standard deviations off, of a vehicle at rest, and so many in a row, tell that its origin is wrong.
 const ELSEWHERE: f32 = 20.0;
 const MISLED: u8 = 5;
+/// How far above or below where it stood a vehicle is clear of the ground \[m\].
+const CLEAR_M: f32 = 0.3;
+/// Ticks after which a vehicle that its motors can carry has left the ground: three seconds.
+const CARRIED: u16 = 3000;
 /// Standard deviations of a tracker's pose that does not say how good it is: a motion-capture system's \[m, rad\].
 const TRACKER: (f32, f32) = (0.003, 0.01);
 
@@ -39,6 +45,40 @@ impl Corrections {
     }
 }
 
+/// Whether a vehicle is clear of the ground, on whose feet it turns about these and not about its centre of mass. One
+/// that has never been on the ground is.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Clearance {
+    /// True while the motors cannot carry it.
+    on_ground: bool,
+    /// Height at which it stands or has stood \[m\]; none from when it is clear of that on.
+    stood_m: Option<f32>,
+    /// Ticks for which the motors could carry it, up to [`CARRIED`].
+    carried: u16,
+}
+
+impl Clearance {
+    #[inline]
+    fn advance(&mut self, height_m: f32) {
+        if self.on_ground {
+            (self.stood_m, self.carried) = (Some(height_m), 0);
+        } else {
+            self.carried = self.carried.saturating_add(1).min(CARRIED);
+            self.stood_m =
+                self.stood_m.filter(|stood_m| (height_m - stood_m) * (height_m - stood_m) < CLEAR_M * CLEAR_M);
+        }
+    }
+
+    fn is_clear(&self) -> bool {
+        self.stood_m.is_none()
+    }
+
+    /// True if it has left the ground, as far as anybody knows: it may hover below what is clear.
+    fn has_left(&self) -> bool {
+        self.is_clear() || self.carried == CARRIED
+    }
+}
+
 /// Estimator and memory of a vehicle. Until its first sample of an inertial sensor, the vehicle flies on the states
 /// that come over the link; from then on their poses, and poses that come alone, are measurements like others. While
 /// the inertial sensor has failed, poses are left to the flight core ([`afbc_flight_core::observer`]).
@@ -55,8 +95,12 @@ pub struct EstimatorFrontEnd {
     memory: Memory,
     output_filter: OutputFilter,
     corrections: Corrections,
-    /// The last sample as corrected.
+    /// What the mounting does not say of the inertial sensor's place, and whether the flight shows it.
+    lever: LeverFinder,
+    clearance: Clearance,
+    /// The last sample as corrected for the mounting.
     last: Option<ImuSample>,
+    vibration: Vibration,
     /// True if there has been a sample.
     senses: bool,
     /// True if the inertial sensor worked in the last tick.
@@ -87,9 +131,12 @@ impl EstimatorFrontEnd {
         EstimatorFrontEnd {
             estimator,
             memory: Memory::default(),
+            lever: lever_finder(&output_filter),
+            clearance: Clearance::default(),
             output_filter,
             corrections,
             last: None,
+            vibration: Vibration::default(),
             senses: false,
             works: true,
             origin_m: None,
@@ -147,6 +194,17 @@ impl EstimatorFrontEnd {
         others
     }
 
+    /// True while the accelerometer is shaken more than is acceptable.
+    pub fn is_shaken(&self) -> bool {
+        self.vibration.is_high()
+    }
+
+    /// Returns what the flight has shown of the inertial sensor's place, for whoever judges it.
+    #[must_use]
+    pub fn lever(&self) -> &LeverFinder {
+        &self.lever
+    }
+
     /// Moves the output's notch from the next tick on ([`OutputFilter::move_notch`]).
     pub fn move_notch(&mut self, to: &VelocityNotch) {
         self.output_filter.move_notch(to);
@@ -160,6 +218,14 @@ impl EstimatorFrontEnd {
     /// Sets whether the motors cannot carry the vehicle ([`Memory::set_on_ground`]).
     pub fn set_on_ground(&mut self, on_ground: bool) {
         self.memory.set_on_ground(on_ground);
+        self.clearance.on_ground = on_ground;
+    }
+
+    /// Tells that the vehicle is in the air, wherever it stood before: a simulation carries it there.
+    pub fn set_clear_of_ground(&mut self) {
+        self.clearance = Clearance::default();
+        self.output_filter.unhide();
+        self.lever.settle();
     }
 
     /// Goes on with another estimator. If the inertial sensor is mounted otherwise, or a sensor is corrected otherwise,
@@ -168,6 +234,7 @@ impl EstimatorFrontEnd {
         (self.estimator, self.output_filter) = (*estimator, *output_filter);
         if self.corrections != *corrections {
             (self.corrections, self.last) = (*corrections, None);
+            self.lever = lever_finder(output_filter);
             self.memory.align_again();
             self.stands_m = None;
         }
@@ -177,8 +244,14 @@ impl EstimatorFrontEnd {
     /// none before the first sample.
     #[inline(always)]
     pub fn tick(&mut self, now_us: u64, readings: &Readings, inbox: &mut Inbox) -> Option<Estimate> {
-        let sample = readings.sample(now_us).map(|sample| self.corrections.imu.apply(&mut self.last, sample));
+        let sample = readings.sample(now_us).map(|sample| {
+            let at_its_place = self.corrections.imu.apply(&mut self.last, sample);
+            self.lever.correct(at_its_place, self.clearance.is_clear())
+        });
         self.senses |= sample.is_some();
+        if let Some(sample) = &sample {
+            self.vibration.take(&sample.specific_force_m_s2);
+        }
         if !self.senses {
             return None;
         }
@@ -200,8 +273,13 @@ impl EstimatorFrontEnd {
         if self.origin_m.is_none() && estimate.resets.position > 0 {
             self.told = [estimate.state.position_m, estimate.state.velocity_m_s];
         }
+        self.clearance.advance(estimate.state.position_m.z);
         self.stands_m = estimate.at_rest.then_some(estimate.state.position_m);
+        if let Some(sample) = &sample {
+            self.output_filter.feel(&sample.specific_force_m_s2, estimate.attitude, self.clearance.has_left());
+        }
         publish(&estimate, self.output_filter.step(&estimate), now_us, inbox);
+        inbox.hand_over(self.output_filter.reset());
         Some(estimate)
     }
 
@@ -255,6 +333,11 @@ impl EstimatorFrontEnd {
         let sigmas_m = Vector3::new(horizontal_sigma_m, horizontal_sigma_m, vertical_sigma_m);
         (self.memory.runs() && is_good && fix.is_plausible()).then_some(sigmas_m)
     }
+}
+
+/// Returns the finder for the rotors that the filter's notch is for; without one they are quick.
+fn lever_finder(output_filter: &OutputFilter) -> LeverFinder {
+    LeverFinder::new(output_filter.notch().map_or(f32::MAX, VelocityNotch::centre_rad_s))
 }
 
 /// Returns a magnetometer's reading without its errors \[uT\].

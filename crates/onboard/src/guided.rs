@@ -104,6 +104,7 @@ impl Guide {
             now_us,
             dt_s,
             state,
+            reset: inbox.reset(),
             core: core.mode,
             airborne: core.airborne,
             rested: core.rested,

@@ -37,6 +37,7 @@ mod readings;
 mod rotor_monitor;
 mod sensor_timeouts;
 pub mod sensors;
+pub mod vibration;
 
 pub use afbc_estimator::Settings as Estimation;
 pub use afbc_flight_core::ArmingLimits;

@@ -47,7 +47,7 @@ pub use declared::{Choice, Declaration, Declared, Field, Name, Number, Value, Va
 #[doc(hidden)]
 pub use declared::{numbers, show_in_group};
 pub use frame::{Airframe, PLUS, ROTOR_POSITION, ROTORS, ROTORS_MAX, Rotor};
-pub use motion::{Setpoint, State};
+pub use motion::{ResetDelta, Setpoint, State};
 pub use mounting::Mounting;
 pub use nalgebra;
 pub use parameters::Parameters;

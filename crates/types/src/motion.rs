@@ -63,6 +63,16 @@ impl State {
     }
 }
 
+/// By how much an estimate has been set anew rather than corrected: not the vehicle has moved, but what is known of it.
+/// A setpoint that is shifted by as much moves no vehicle.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ResetDelta {
+    /// Position after less position before, earth frame \[m\].
+    pub position_m: Vector3<f32>,
+    /// Likewise the heading \[rad\].
+    pub yaw_rad: f32,
+}
+
 /// Desired motion: \[x_d, y_d, z_d, psi_d\] with two derivatives (assumption A5), and two more of the position (not in
 /// the paper) for laws that feed them forward. Unknown jerk and snap are zero, as from the link, whose messages carry
 /// neither.

@@ -2,7 +2,7 @@
 
 use crate::data_sheet;
 use crate::parts::{self, DragConditions, FORCE_MAX};
-use crate::vehicle::{CASCADE, Vehicle};
+use crate::vehicle::{CASCADE, SAMPLE, Vehicle};
 use afbc::adaptive::Gains;
 use afbc::{Profile, Settings};
 use afbc_control::drag::KnownDrag;
@@ -13,7 +13,8 @@ use afbc_plant::instruments::Imu;
 use afbc_plant::{Battery, Contact, Drag, Frame, GroundEffect, InstrumentSuite, Realism, Rotors};
 use afbc_reader::words::out_of_range;
 use afbc_reader::{FileError, Table};
-use afbc_types::{Axis, Declared, Mounting, OutOfRange, Parameters, PerAxis, ROTOR_POSITION, ROTORS, Range, Rotor};
+use afbc_types::{Axis, Declared, Mounting, PLUS, Parameters, PerAxis, ROTOR_POSITION, ROTORS, Range, Rotor};
+use core::convert::Infallible;
 use nalgebra::Vector3;
 use std::path::Path;
 
@@ -31,7 +32,7 @@ const UNFIT: &str = "AFBC would not fly it with a margin: stronger or quicker ro
 /// Reads and checks the vehicle file at `path`.
 ///
 /// # Errors
-/// One line on the first thing that is wrong.
+/// Every mistake, each as one line.
 pub fn load(path: &Path) -> Result<Vehicle, FileError> {
     let text = afbc_reader::text(path, "vehicle")?;
     let stem = path.file_stem().map_or("".into(), |stem| stem.to_string_lossy());
@@ -41,9 +42,9 @@ pub fn load(path: &Path) -> Result<Vehicle, FileError> {
 /// Reads and checks a vehicle from its `text`. Errors call it `file`; `name` is its name if it gives none itself.
 ///
 /// # Errors
-/// One line on the first thing that is wrong.
+/// Every mistake, each as one line.
 pub fn parse(file: &str, text: &str, name: &str) -> Result<Vehicle, FileError> {
-    afbc_reader::document(file, text, "vehicles paper", |root| read(root, file, text, name))
+    afbc_reader::document(file, text, SAMPLE, |root| read(root, file, text, name))
 }
 
 /// Direction of rotation of a rotor, seen from above.
@@ -73,7 +74,7 @@ fn read(mut root: Table<'_>, file: &str, text: &str, name: &str) -> Result<Vehic
     let mut flight_settings = Profile::Flight.settings_for(force_max_n as f32, lag_s);
     gains(&mut root, &mut flight_gains, &mut flight_settings)?;
     let (imu, part) = imu(&mut root)?;
-    let estimation = estimation(&mut root, &parameters, rotors.len(), part.as_ref())?;
+    let (estimation, estimation_stated) = estimation(&mut root, &parameters, rotors.len(), part.as_ref())?;
     let (mut arming, mut guidance) = (ArmingLimits::DEFAULT, afbc_guidance::Settings::DEFAULT);
     parts::declared(root.table("arming")?, &mut arming)?;
     parts::declared(root.table("guidance")?, &mut guidance)?;
@@ -86,7 +87,9 @@ fn read(mut root: Table<'_>, file: &str, text: &str, name: &str) -> Result<Vehic
         realism: Realism { rotors: actuators, ..Realism::default() },
         curve,
         imu,
+        imu_part: part,
         estimation,
+        estimation_stated,
         arming,
         guidance,
         flight_gains,
@@ -95,14 +98,18 @@ fn read(mut root: Table<'_>, file: &str, text: &str, name: &str) -> Result<Vehic
         file: file.into(),
     };
     // Before drag and ground, whose checks would refuse the same vehicle for a less useful reason.
-    let unfit = |error: OutOfRange| root.fault(error.range.name, format!("{}; {UNFIT}", out_of_range(&error)));
-    vehicle.check().map_err(unfit)?;
+    if let Err(error) = vehicle.check() {
+        let with = &["vehicle", "rotors", "rotor", "gains"];
+        root.clash("vehicle", with, format!("{}; {UNFIT}", out_of_range(&error)))?;
+    }
     surroundings(&mut root, &mut vehicle, rotor_height_m)?;
     let known = &mut vehicle.flight_settings.common.drag;
     if let (Some(drag), &KnownDrag::NONE) = (vehicle.realism.drag, &*known) {
         *known = known_drag(&drag, &vehicle.parameters, vehicle.rotors.len());
-        let beyond = |error: OutOfRange| root.fault("drag", format!("per mass, {}; {CHECK}", out_of_range(&error)));
-        known.validate().map_err(beyond)?;
+        if let Err(error) = known.validate() {
+            let with = &["vehicle", "rotors", "rotor", "drag"];
+            root.clash("drag", with, format!("per mass, {}; {CHECK}", out_of_range(&error)))?;
+        }
     }
     root.finish()?;
     Ok(vehicle)
@@ -157,29 +164,39 @@ fn masses(mut table: Table<'_>) -> Result<Parameters<f64>, FileError> {
 
 /// Reads `[[rotor]]`; returns the rotors in arm lengths and their mean height \[m\].
 fn frame(root: &mut Table<'_>, arm_m: f64) -> Result<(Vec<Rotor<f64>>, f64), FileError> {
-    let (mut rotors, mut places_m) = (Vec::new(), Vec::new());
-    for mut table in root.few_tables("rotor")? {
+    let (mut rotors, mut places_m, tables) = (Vec::new(), Vec::new(), root.few_tables("rotor")?);
+    ROTORS.check(tables.len() as f64).or_else(|_| {
+        let cure = "add one [[rotor]] with position_m and spin for each of four to eight rotors";
+        root.clash("rotor", &[], format!("{} rotors; {cure}", tables.len()))
+    })?;
+    let mut are_known = ROTORS.check(tables.len() as f64).is_ok();
+    for mut table in tables {
         let at_m = table.need_vector(POSITION.name, &POSITION)?;
         let spin = table.need_choice("spin", &[Spin::Ccw, Spin::Cw], Spin::name)?;
         let rotor = Rotor { x: at_m.x / arm_m, y: at_m.y / arm_m, pushes_left: matches!(spin, Spin::Cw) };
-        for along in [rotor.x, rotor.y] {
-            let problem =
-                |error| format!("{}, in arm's lengths; move the rotor, or change arm_m", out_of_range(&error));
-            ROTOR_POSITION.check(along).map_err(|error| table.fault_at(POSITION.name, problem(error)))?;
-        }
         table.finish()?;
+        if !table.knows(POSITION.name) {
+            are_known = false;
+            continue;
+        }
+        for along in [rotor.x, rotor.y] {
+            if let Err(error) = ROTOR_POSITION.check(along) {
+                let problem = format!("{}, in arm's lengths; move the rotor, or change arm_m", out_of_range(&error));
+                table.clash(POSITION.name, &["vehicle.arm_m"], problem)?;
+                are_known = false;
+            }
+        }
         rotors.push(rotor);
         places_m.push(at_m);
     }
-    ROTORS.check(rotors.len() as f64).map_err(|_| {
-        let cure = "add one [[rotor]] with position_m and spin for each of four to eight rotors";
-        root.fault_at("rotor", format!("{} rotors; {cure}", rotors.len()))
-    })?;
+    if !are_known {
+        return Ok((PLUS.map(|rotor| rotor.to_f64()).to_vec(), 0.0));
+    }
     let mean = |of: fn(&Vector3<f64>) -> f64| places_m.iter().map(of).sum::<f64>() / places_m.len() as f64;
     let distance_m = mean(|at_m| libm::hypot(at_m.x, at_m.y));
     if (distance_m - arm_m).abs() > ARM_TOLERANCE * distance_m {
         let problem = format!("arm_m is {arm_m}, but the rotors are {distance_m:.4} m from the z axis; change either");
-        return Err(root.fault_at("rotor", problem));
+        root.clash("rotor", &["vehicle.arm_m", "rotor"], problem)?;
     }
     Ok((rotors, mean(|at_m| at_m.z)))
 }
@@ -213,7 +230,8 @@ fn imu(root: &mut Table<'_>) -> Result<(Mounting<f64>, Option<Imu>), FileError> 
     let is_known = named.is_some() || parts::TRIADS.iter().any(|triad| table.holds_table(triad));
     let mut part = named.unwrap_or_default();
     if is_known {
-        table.declared(&mut part)?;
+        // What nobody is told is a scenario's.
+        table.declared_but(Imu::LEVER.range.name, &mut part)?;
         parts::groups(&mut table, &mut part, &parts::TRIADS)?;
     }
     table.finish()?;
@@ -222,23 +240,29 @@ fn imu(root: &mut Table<'_>) -> Result<(Mounting<f64>, Option<Imu>), FileError> 
 
 /// Reads `[estimator]`: what it leaves out is as the data sheet of the inertial sensor asks for, if the vehicle's file
 /// has one, or else at its default. Gravity is that of the vehicle, or the nearest at which the estimator starts.
+/// Returns the names of what it states, too.
 fn estimation(
     root: &mut Table<'_>,
     parameters: &Parameters<f64>,
     rotors: usize,
     imu: Option<&Imu>,
-) -> Result<Estimation, FileError> {
+) -> Result<(Estimation, Vec<&'static str>), FileError> {
     let gravity = Estimation::GRAVITY.range;
     let gravity_m_s2 = parameters.gravity_m_s2.clamp(gravity.min, gravity.max);
     let default = Estimation { gravity_m_s2: gravity_m_s2 as f32, ..Estimation::DEFAULT };
     let for_part = |imu| data_sheet::settings(&InstrumentSuite::default(), imu, rotors, gravity_m_s2, STEP_S);
     let mut estimation = imu.map_or(default, for_part);
+    let mut stated = Vec::new();
     if let Some(mut table) = root.table("estimator")? {
         table.forbid(gravity.name, "gravity is that of [vehicle]; take it out")?;
         table.declared(&mut estimation)?;
+        let Ok(()) = estimation.visit(&mut |declaration, _| {
+            stated.extend(Some(declaration.range.name).filter(|name| table.has(name)));
+            Ok::<(), Infallible>(())
+        });
         table.finish()?;
     }
-    Ok(estimation)
+    Ok((estimation, stated))
 }
 
 /// Reads `[gains.flight.afbc.AXIS]` and `[gains.flight.cascade]`; the gains of other laws are read where the laws are

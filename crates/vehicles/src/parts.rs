@@ -24,9 +24,19 @@ pub struct DragConditions<'a> {
     pub step_s: f64,
 }
 
-/// `table` is refused on account of how its numbers go together.
-fn together(table: &Table<'_>) -> impl Fn(OutOfRange) -> FileError {
-    |error| table.fault_at(error.range.name, format!("{}; change it", out_of_range(&error)))
+/// What rotors, drag and ground depend on.
+const ALL: &[&str] =
+    &["vehicle", "truth", "rotors", "rotor", "drag", "ground", "settings", "profile", "controllers", "contender"];
+
+/// Refuses `table` on account of how its numbers go together, and with those under the dotted keys `with`.
+fn together(
+    table: &Table<'_>,
+    with: &'static [&'static str],
+    checked: Result<(), OutOfRange>,
+) -> Result<(), FileError> {
+    // First, for an unknown key may be a misspelt one of these.
+    table.finish()?;
+    checked.or_else(|error| table.clash(error.range.name, with, format!("{}; change it", out_of_range(&error))))
 }
 
 /// What `table` says of `parameters`, each in its range and all together.
@@ -36,8 +46,7 @@ fn together(table: &Table<'_>) -> impl Fn(OutOfRange) -> FileError {
 pub fn declared(table: Option<Table<'_>>, parameters: &mut impl Declared) -> Result<(), FileError> {
     let Some(mut table) = table else { return Ok(()) };
     table.declared(parameters)?;
-    parameters.validate().map_err(together(&table))?;
-    table.finish()
+    together(&table, &[], parameters.validate())
 }
 
 /// Masses, arm, inertia and rotor factors.
@@ -62,8 +71,7 @@ pub fn rotors(table: Option<Table<'_>>, default: Rotors, truth: &Parameters<f64>
     if let Some(mut table) = table {
         table.declared(&mut rotors)?;
         max_by_force(&mut table, &mut rotors, truth)?;
-        rotors.validate().map_err(together(&table))?;
-        table.finish()?;
+        together(&table, ALL, rotors.validate())?;
     }
     Ok(rotors)
 }
@@ -74,11 +82,16 @@ fn max_by_force(table: &mut Table<'_>, rotors: &mut Rotors, truth: &Parameters<f
     let Some(force_n) = table.number(&FORCE_MAX)? else { return Ok(()) };
     if table.has(max.name) {
         let problem = format!("a second limit; write it or {}, not both", max.name);
-        return Err(table.fault_at(FORCE_MAX.name, problem));
+        return table.clash(FORCE_MAX.name, &[], problem);
     }
-    rotors.max_rad_s = libm::sqrt(force_n / truth.thrust_factor_n_s2);
-    let problem = |error| format!("it makes {}; change the force", out_of_range(&error));
-    max.check(rotors.max_rad_s).map_err(|error| table.fault_at(FORCE_MAX.name, problem(error)))
+    let max_rad_s = libm::sqrt(force_n / truth.thrust_factor_n_s2);
+    match max.check(max_rad_s) {
+        Ok(()) => rotors.max_rad_s = max_rad_s,
+        Err(error) => {
+            table.clash(FORCE_MAX.name, ALL, format!("it makes {}; change the force", out_of_range(&error)))?;
+        }
+    }
+    Ok(())
 }
 
 /// Reads `[battery]`; what it does not say is as in `default`.
@@ -88,8 +101,7 @@ fn max_by_force(table: &mut Table<'_>, rotors: &mut Rotors, truth: &Parameters<f
 pub fn battery(mut table: Table<'_>, default: Battery) -> Result<Battery, FileError> {
     let mut battery = default;
     table.declared(&mut battery)?;
-    battery.validate().map_err(together(&table))?;
-    table.finish()?;
+    together(&table, &[], battery.validate())?;
     Ok(battery)
 }
 
@@ -106,8 +118,7 @@ pub fn drag(
     let DragConditions { parameters, frame, rotor_max_rad_s, step_s } = *conditions;
     let mut drag = default;
     table.declared_but(elsewhere, &mut drag)?;
-    drag.validate_for(parameters, frame, rotor_max_rad_s, step_s).map_err(together(&table))?;
-    table.finish()?;
+    together(&table, ALL, drag.validate_for(parameters, frame, rotor_max_rad_s, step_s))?;
     Ok(drag)
 }
 
@@ -123,12 +134,11 @@ pub fn ground(
     step_s: f64,
 ) -> Result<(Contact, Option<GroundEffect>), FileError> {
     table.declared_but(elsewhere, &mut contact)?;
-    contact.validate_for(truth, step_s).map_err(together(&table))?;
     table.declared_but(GroundEffect::ROT_HEIGHT.range.name, &mut effect)?;
     // The height is given once, so that feet and propellers cannot disagree about it.
     effect.rotor_height_m = contact.rotor_height_m;
     let with_effect = table.boolean("ground_effect")?.unwrap_or(true);
-    table.finish()?;
+    together(&table, ALL, contact.validate_for(truth, step_s))?;
     Ok((contact, with_effect.then_some(effect)))
 }
 
@@ -136,12 +146,14 @@ pub fn ground(
 pub const TRIADS: [&str; 2] = ["gyro", "accel"];
 
 /// Reads an instrument by the name of a part, or as a table, with a table for each of its groups, that may name one.
+/// What a table leaves out is as in `base`, or perfect.
 ///
 /// # Errors
 /// As [`parameters`].
 pub fn instrument<T: Declared + Default + Copy>(
     table: &mut Table<'_>,
     key: &'static str,
+    base: Option<T>,
     presets: &[Preset<T>],
     groups: &[&'static str],
 ) -> Result<Option<T>, FileError> {
@@ -149,7 +161,7 @@ pub fn instrument<T: Declared + Default + Copy>(
         return Ok(table.choice(key, presets, |preset| preset.name)?.map(|preset| preset.settings));
     }
     let Some(mut table) = table.table(key)? else { return Ok(None) };
-    let mut settings = preset(&mut table, presets)?.unwrap_or_default();
+    let mut settings = preset(&mut table, presets)?.or(base).unwrap_or_default();
     table.declared(&mut settings)?;
     self::groups(&mut table, &mut settings, groups)?;
     table.finish()?;

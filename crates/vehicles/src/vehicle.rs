@@ -10,12 +10,20 @@ use afbc_flight_core::motor::{Curve, Response};
 use afbc_flight_core::protocol::MotorOutputs;
 use afbc_onboard::{Configuration, EscSettings, Link};
 use afbc_plant::Realism;
+use afbc_plant::instruments::Imu;
 use afbc_radio::RadioSettings;
-use afbc_reader::{FileError, Table};
-use afbc_types::{Airframe, Mounting, OutOfRange, Parameters, PerAxis, Rotor, SensorCalibration, with_rotors};
+use afbc_reader::{Example, FileError, Table};
+use afbc_types::{
+    Airframe, Declaration, Declared, Mounting, OutOfRange, Parameters, PerAxis, Rotor, SensorCalibration, Value,
+    ValueMut, with_rotors,
+};
+use core::convert::Infallible;
 
 /// Table of the settings of AFBC's cascade, beside those of the laws' gains.
 pub const CASCADE: &str = "cascade";
+/// A valid vehicle file.
+pub(crate) const SAMPLE: Example =
+    Example { command: "vehicles paper", text: include_str!("../../../vehicles/paper.toml") };
 
 /// A vehicle as its file describes it. Written by serde, it is what the vehicle is, wherever its file lies, whatever
 /// that is called and whatever comments it has.
@@ -39,8 +47,14 @@ pub struct Vehicle {
     pub curve: Curve,
     /// Mounting of the inertial sensor.
     pub imu: Mounting<f64>,
+    /// The inertial sensor's part, if the file names it or its figures. The estimator's settings follow, with which it
+    /// is written.
+    #[serde(skip)]
+    pub imu_part: Option<Imu>,
     /// Settings of the firmware's estimator.
     pub estimation: Estimation,
+    /// Names of those that the file states, whatever the parts are.
+    pub estimation_stated: Vec<&'static str>,
     /// Limits for arming the firmware.
     pub arming: ArmingLimits,
     /// Settings of the firmware's modes, limits and safety net.
@@ -67,6 +81,25 @@ impl Vehicle {
     pub fn response(&self) -> Response {
         let range = Response::LAG.range;
         Response { time_constant_s: self.realism.rotors.time_constant_s.clamp(range.min, range.max) as f32 }
+    }
+
+    /// Returns `settings` with what the file states of the estimator in their place.
+    #[must_use]
+    pub fn stated_over(&self, mut settings: Estimation) -> Estimation {
+        let mut stated: Vec<(&str, Vec<f64>)> = Vec::new();
+        let Ok(()) = self.estimation.visit(&mut |declaration: &Declaration, value: Value<'_>| {
+            let name = declaration.range.name;
+            stated.extend(self.estimation_stated.contains(&name).then(|| (name, value.numbers().collect())));
+            Ok::<(), Infallible>(())
+        });
+        let Ok(()) = settings.visit_mut(&mut |declaration: &Declaration, value: ValueMut<'_>| {
+            let own = stated.iter().find(|(name, _)| *name == declaration.range.name);
+            if let (Some((_, own)), ValueMut::Single(numbers)) = (own, value) {
+                numbers.iter_mut().zip(own).for_each(|(number, own)| *number = *own as f32);
+            }
+            Ok::<(), Infallible>(())
+        });
+        settings
     }
 
     /// Gains of AFBC in `profile`.
@@ -109,14 +142,20 @@ impl Vehicle {
         })
     }
 
+    /// Returns the vehicle with the gains of other laws from the file `file` that holds `text`.
+    #[must_use]
+    pub fn with_law_gains(self, file: &str, text: &str) -> Self {
+        Vehicle { file: file.into(), text: text.into(), ..self }
+    }
+
     /// Calls `read` with the gains of the profile `flight` in the file, a table per law, if there are any.
     ///
     /// # Errors
     /// Those of `read`.
-    pub fn law_gains(&self, read: impl FnOnce(Table<'_>) -> Result<(), FileError>) -> Result<(), FileError> {
-        afbc_reader::document(&self.file, &self.text, "vehicles paper", |mut root| {
-            let Some(mut all) = root.table("gains")? else { return Ok(()) };
-            all.table(Profile::Flight.name())?.map_or(Ok(()), read)
+    pub fn law_gains<T>(&self, read: impl Fn(Table<'_>) -> Result<T, FileError>) -> Result<Option<T>, FileError> {
+        afbc_reader::document(&self.file, &self.text, SAMPLE, |mut root| {
+            let Some(mut all) = root.table("gains")? else { return Ok(None) };
+            all.table(Profile::Flight.name())?.map(&read).transpose()
         })
     }
 

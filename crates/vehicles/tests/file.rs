@@ -19,7 +19,7 @@ fn changed(name: &str, from: &str, to: &str) -> String {
 
 fn refused(text: &str) -> String {
     let error = parse("my.toml", text, "my").unwrap_err().to_string();
-    assert!(!error.contains('\n') && error.starts_with("my.toml"), "{error}");
+    assert!(error.lines().all(|line| line.starts_with("my.toml")), "{error}");
     error
 }
 
@@ -120,9 +120,9 @@ fn gains_of_the_file_replace_those_of_the_rule() {
     assert_eq!(own.gains(Profile::Paper), rule.gains(Profile::Paper));
 }
 
-/// Whatever is done to a line, either it is still a vehicle that flies, or one line says what is wrong.
+/// Whatever is done to a line, either it is still a vehicle that flies, or lines that name the file say what is wrong.
 #[test]
-fn damaged_files_get_one_line() {
+fn damaged_files_are_told_line_by_line() {
     let values = ["", "nan", "-1e300", "1e300", "\"\\n\"", "[]", "{}", "true", "[0, 0]", "1e-12", "{ a.b = [[1]] }"];
     let (mut refusals, mut accepted) = (0, 0);
     for known in &BUILT_IN {
@@ -140,7 +140,7 @@ fn damaged_files_get_one_line() {
                     }
                     Err(error) => {
                         let error = error.to_string();
-                        assert!(error.starts_with("damaged:") && !error.contains('\n'), "{error}");
+                        assert!(error.lines().all(|line| line.starts_with("damaged:")), "{error}");
                         refusals += 1;
                     }
                 }
@@ -292,6 +292,7 @@ fn the_inertial_sensors_data_sheet_reaches_the_estimator() {
         ("part = \"bmi720\"", "bmi270"),
         ("gyro = { vibration = 1.0 }", "vibration_rad_s"),
         ("harmonics = [1.0, 0.5, 0.25]", "harmonics"),
+        ("part = \"bmi270\"\nlever_m = [0.0, 0.0, 0.05]", "lever_m"),
     ] {
         let error = refused(&iris(line));
         assert!(error.contains(named), "{error}");

@@ -6,7 +6,8 @@ use crate::lift::{Lift, Trim};
 use crate::mode::FlightMode;
 use crate::mode_io::{ModeInputs, ModeOutput, Shaping};
 use crate::notice::{ModeReason, Notice, Notices};
-use crate::order::{OffboardTarget, Orders, Sticks};
+use crate::order::{Item, OffboardTarget, Orders, Sticks};
+use crate::place::is_within;
 use crate::settings::Settings;
 use crate::sticks;
 use crate::targets::Targets;
@@ -60,6 +61,10 @@ impl Memory {
             (self.left, self.stood_m) = (false, state.position_m);
             self.plan = Plan::New;
             return Some((self.limiter.setpoint(), false));
+        }
+        if given.core == Mode::Descending {
+            // It flies down by itself: what follows begins where the vehicle is then.
+            self.limiter.anchor(state);
         }
         self.follow_vehicle(state);
         let present = self.limiter.setpoint()?;
@@ -255,7 +260,7 @@ impl Memory {
             }
             FlightMode::Return => {
                 if !matches!(self.plan, Plan::Return(_)) {
-                    let plausible = |to_m: &Vector2<f32>| to_m.iter().all(|value| value.abs() <= 9e4);
+                    let plausible = |to_m: &Vector2<f32>| to_m.iter().all(|value| is_within(*value));
                     let to_m = orders.safe_m.filter(plausible).unwrap_or(inputs.home_m.xy());
                     self.plan = Plan::Return(Return::new(inputs, to_m));
                 }
@@ -289,8 +294,11 @@ impl Memory {
         reached: &mut Option<u16>,
         notices: &mut Notices,
     ) -> ModeOutput {
-        let (net, home_m) = (&settings.net, inputs.home_m);
-        let progress = self.mission.fly(orders.leg.as_ref(), inputs, |place_m| net.encloses(&home_m, place_m, 0.0));
+        if orders.leg.is_none_or(|leg| matches!(leg.item, Item::None)) {
+            self.change(FlightMode::Hold, ModeReason::Cleared, notices);
+            return ModeOutput::fly(inputs.stop());
+        }
+        let progress = self.mission.fly(orders.leg.as_ref(), inputs, &settings.net);
         *reached = progress.reached;
         if progress.refused {
             notices.push(Notice::ItemRefused);

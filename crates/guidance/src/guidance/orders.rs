@@ -6,15 +6,12 @@ use crate::mode::FlightMode;
 use crate::notice::{ModeReason, Notices};
 use crate::orbit::{self, Orbit, Round};
 use crate::order::{Order, OrderRefusal};
+use crate::place::{is_place, is_within};
 use crate::settings::Settings;
 use crate::table::{self, TransitionInputs};
 use afbc_control::math::min;
 use afbc_types::State;
 use nalgebra::Vector3;
-
-/// Largest coordinate of a place that is flown to \[m\].
-// Setpoints beyond 1e5 m are implausible: some room is left for the way.
-const PLACE_MAX_M: f32 = 9e4;
 
 impl Memory {
     /// Carries out an order, or says why not.
@@ -47,7 +44,7 @@ impl Memory {
             }
             Order::Home(place_m) => {
                 let place_m = match (place_m, state) {
-                    (Some(place_m), _) if place_m.iter().all(|value| value.abs() <= PLACE_MAX_M) => place_m,
+                    (Some(place_m), _) if place_m.iter().all(|value| is_within(*value)) => place_m,
                     (Some(_), _) => return Err(OrderRefusal::OutOfRange),
                     (None, Some(state)) => state.position_m,
                     (None, None) => return Err(OrderRefusal::NoPosition),
@@ -82,6 +79,10 @@ impl Memory {
         // Selected again, a mode goes on as it is; only a hold begins anew, and so ends a flight or a circle in it.
         if mode != self.mode || mode == FlightMode::Hold {
             self.ordered(mode, notices);
+        }
+        // A landing that an outage began has been ordered now.
+        if self.interrupted.take().is_some() {
+            self.failsafe = None;
         }
         Ok(())
     }
@@ -192,11 +193,6 @@ impl Memory {
     pub(super) fn is_inside(&self, settings: &Settings, place_m: &Vector3<f32>) -> bool {
         self.home_m.is_none_or(|home_m| settings.net.encloses(&home_m, place_m, 0.0))
     }
-}
-
-/// True if every coordinate is a number that is flown to, or NaN.
-fn is_place(place_m: &Vector3<f32>) -> bool {
-    place_m.iter().all(|value| value.is_nan() || value.abs() <= PLACE_MAX_M)
 }
 
 /// Returns a place with the coordinates of another where its own are NaN.

@@ -28,10 +28,15 @@ fn look(watch: &mut Watch, net: &Net, seen: &Findings<'_>) -> (std::vec::Vec<Cau
     let before = watch.holds;
     let (action, cause, new) = watch.look(net, seen, &mut notices);
     let holding: std::vec::Vec<Cause> = Cause::ALL.into_iter().filter(|cause| watch.holds(*cause)).collect();
-    // The strongest action, and the first cause that has it; nothing is done to a disarmed vehicle.
-    let strongest = holding.iter().map(|cause| net.action(*cause)).max().unwrap_or(FailsafeAction::None);
+    // The strongest action, and the first cause that has it; nothing is done to a disarmed vehicle, nor for a descent
+    // of one that knows where it is.
+    let counts = |cause: &&Cause| seen.position_m.is_none() || **cause != Cause::Descent;
+    let strongest = holding.iter().filter(counts).map(|cause| net.action(*cause)).max().unwrap_or(FailsafeAction::None);
     assert_eq!(action, if seen.armed { strongest } else { FailsafeAction::None });
-    let first = holding.iter().find(|cause| net.action(**cause) == strongest && strongest > FailsafeAction::None);
+    let first = holding
+        .iter()
+        .filter(counts)
+        .find(|cause| net.action(**cause) == strongest && strongest > FailsafeAction::None);
     assert_eq!(cause, first.copied().unwrap_or(Cause::Descent), "{holding:?}");
     let news = holding.iter().filter(|cause| before & bit(**cause) == 0).fold(0, |set, cause| set | bit(*cause));
     assert_eq!(new, news);
@@ -189,7 +194,7 @@ proptest! {
     ) {
         let battery = Cells { number, empty_v: 3.4, full_v: 4.2, resistance_ohm };
         let mut charge = None;
-        battery.update(&mut charge, Some(&BatteryReading { voltage_v, current_a }), 0.01);
+        battery.update(&mut charge, Some(&BatteryReading { voltage_v, current_a, charge: None }), 0.01);
         let cell = f64::from(voltage_v) / f64::from(number) + f64::from(current_a) * f64::from(resistance_ohm);
         let expected = ((cell - 3.4) / 0.8).clamp(0.0, 1.0);
         prop_assert!((f64::from(charge.unwrap()) - expected).abs() < 1e-4, "{charge:?}, not {expected}");
@@ -200,7 +205,7 @@ proptest! {
 #[test]
 fn the_charge_is_filtered() {
     let battery = Cells { number: 1, empty_v: 3.0, full_v: 4.0, resistance_ohm: 0.0 };
-    let reading = |voltage_v: f32, current_a: f32| BatteryReading { voltage_v, current_a };
+    let reading = |voltage_v: f32, current_a: f32| BatteryReading { voltage_v, current_a, charge: None };
     let mut charge = None;
     let nonsense = [
         reading(0.0, 0.0),
@@ -237,7 +242,7 @@ fn the_charge_is_filtered() {
 fn low_batteries_are_found_by_their_thresholds() {
     let net = Net { cells: 1, low: 0.5, critical: 0.25, emergency: 0.0, empty_v: 3.0, full_v: 4.0, ..Net::DEFAULT };
     let with = |armed: bool, charge: f32, watch: &mut Watch| {
-        let reading = BatteryReading { voltage_v: 3.0 + charge, current_a: 0.0 };
+        let reading = BatteryReading { voltage_v: 3.0 + charge, current_a: 0.0, charge: None };
         look(watch, &net, &Findings { battery: Some(&reading), armed, dt_s: 2.0, ..calm() }).0
     };
     use Cause::{BatteryCritical, BatteryEmergency, BatteryLow};
@@ -247,7 +252,7 @@ fn low_batteries_are_found_by_their_thresholds() {
     assert_eq!(fresh(0.25), [BatteryLow]);
     assert_eq!(fresh(0.0), [BatteryCritical, BatteryLow], "not below nothing");
     let eager = Net { emergency: 0.1, ..net };
-    let reading = BatteryReading { voltage_v: 3.05, current_a: 0.0 };
+    let reading = BatteryReading { voltage_v: 3.05, current_a: 0.0, charge: None };
     let mut watch = Watch::default();
     let empty = Findings { battery: Some(&reading), dt_s: 2.0, ..calm() };
     assert_eq!(look(&mut watch, &eager, &empty).0, [BatteryEmergency, BatteryCritical, BatteryLow]);

@@ -1,10 +1,11 @@
 //! A point mass on flat ground that follows setpoints, with the flight core's land detector.
 
+use afbc_control::math::wrap_angle;
 use afbc_flight_core::landing::LandDetector;
 use afbc_flight_core::supervisor::REST_US;
 use afbc_flight_core::{ArmingLimits, Mode, Request, Stamped, Ticketed};
 use afbc_guidance::*;
-use afbc_types::{Setpoint, State};
+use afbc_types::{ResetDelta, Setpoint, State};
 use nalgebra::Vector3;
 
 pub(crate) const DT_S: f32 = 1e-3;
@@ -32,6 +33,9 @@ pub(crate) struct Bench {
     pub(crate) last: Option<Guided>,
     /// Highest and farthest place of the flight \[m\].
     pub(crate) highest_m: f32,
+    /// What is set anew in the next tick, and all that has been so far.
+    reset: Option<ResetDelta>,
+    resets: ResetDelta,
     thrust_m_s2: f32,
     /// Time at rest, as the flight core counts it \[us\].
     rest_us: u32,
@@ -62,6 +66,8 @@ impl Bench {
             answers: Vec::new(),
             last: None,
             highest_m: 0.0,
+            reset: None,
+            resets: ResetDelta::default(),
             thrust_m_s2: 0.0,
             rest_us: 0,
         }
@@ -77,6 +83,24 @@ impl Bench {
         bench.run(1.0);
         bench.said.clear();
         bench
+    }
+
+    /// Sets the state anew; the vehicle does not move.
+    pub(crate) fn reset(&mut self, by: ResetDelta) {
+        self.state.position_m += by.position_m;
+        self.state.attitude_rad.z = wrap_angle(self.state.attitude_rad.z + by.yaw_rad);
+        self.resets.position_m += by.position_m;
+        self.resets.yaw_rad += by.yaw_rad;
+        self.reset = Some(by);
+    }
+
+    /// Where the vehicle truly is \[m\], and its true heading \[rad\].
+    pub(crate) fn true_m(&self) -> Vector3<f32> {
+        self.state.position_m - self.resets.position_m
+    }
+
+    pub(crate) fn true_rad(&self) -> f32 {
+        wrap_angle(self.state.attitude_rad.z - self.resets.yaw_rad)
     }
 
     pub(crate) fn arm(&mut self) {
@@ -144,6 +168,7 @@ impl Bench {
             now_us: self.now_us,
             dt_s: DT_S,
             state: self.sees.then_some(&self.state),
+            reset: self.reset.as_ref(),
             core: self.core,
             airborne: self.airborne(),
             rested: self.rested(),
@@ -152,6 +177,7 @@ impl Bench {
             lift: Lift { most_m_s2: 2.0 * G_M_S2, gravity_m_s2: G_M_S2, given_m_s2: None },
         };
         let guided = self.guidance.tick(&sight, &self.orders);
+        self.reset = None;
         self.orders.given.pop_front();
         self.said.extend(guided.notices.iter());
         self.reached.extend(guided.reached);
@@ -166,8 +192,10 @@ impl Bench {
 
     fn fly(&mut self, guided: &Guided) {
         let State { position_m, velocity_m_s, .. } = self.state;
-        let idles = !self.core.armed() || guided.idle_on_ground;
+        let idles = !self.core.armed() || guided.idle_on_ground && self.core != Mode::Descending;
         let wanted_m_s2 = match &guided.setpoint {
+            // The flight core flies down by itself.
+            _ if self.core == Mode::Descending => (Vector3::new(0.0, 0.0, -0.5) - velocity_m_s) * 6.0,
             _ if idles => Vector3::new(0.0, 0.0, -G_M_S2),
             None => Vector3::zeros(),
             Some(setpoint) => {
@@ -179,15 +207,17 @@ impl Bench {
         self.thrust_m_s2 = if idles { 0.0 } else { (wanted_m_s2.z + G_M_S2).clamp(0.0, 2.0 * G_M_S2) };
         let mut acceleration_m_s2 =
             Vector3::new(wanted_m_s2.x, wanted_m_s2.y, self.thrust_m_s2 - G_M_S2) + self.wind_m_s2;
-        let on_ground = position_m.z <= 0.0 && acceleration_m_s2.z <= 0.0;
+        // A state that has been set anew says nothing of the ground.
+        let ground_m = self.resets.position_m.z;
+        let on_ground = position_m.z <= ground_m && acceleration_m_s2.z <= 0.0;
         if on_ground {
             acceleration_m_s2 = Vector3::zeros();
             self.state.velocity_m_s = Vector3::zeros();
         }
         self.state.velocity_m_s += acceleration_m_s2 * DT_S;
         self.state.position_m += self.state.velocity_m_s * DT_S;
-        if self.state.position_m.z < 0.0 {
-            self.state.position_m.z = 0.0;
+        if self.state.position_m.z < ground_m {
+            self.state.position_m.z = ground_m;
             self.state.velocity_m_s = Vector3::zeros();
         }
         if let Some(Setpoint { yaw_rad, .. }) = guided.setpoint.filter(|_| !idles) {

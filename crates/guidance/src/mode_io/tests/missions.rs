@@ -10,8 +10,11 @@ fn waypoint(position_m: Vector3<f32>) -> Item {
     Item::Waypoint { position_m, yaw_rad: f32::NAN, hold_s: 0.0, within_m: 0.0, fly_through: false }
 }
 
+/// A cylinder of a kilometre.
+const NET: Net = Net { fence_radius_m: 1e3, ..Net::DEFAULT };
+
 fn progress(mission: &mut Mission, stage: &Stage, leg: &Leg) -> mission::Progress {
-    stage.see(|inputs| mission.fly(Some(leg), inputs, |place| place.x.abs() < 1e3))
+    stage.see(|inputs| mission.fly(Some(leg), inputs, &NET))
 }
 
 /// A mission that wants this item.
@@ -186,7 +189,7 @@ fn without_its_item_a_mission_waits_or_is_over() {
     let waits = progress(&mut mission, &Stage::at(here()), &leg(3, waypoint(Vector3::zeros())));
     assert_eq!((waits.output.done, waits.reached, waits.refused, waits.then), (false, None, false, None));
     assert_eq!(limited(&waits.output).position_m, here());
-    let over = Stage::at(here()).see(|inputs| mission.fly(None, inputs, |_| true));
+    let over = Stage::at(here()).see(|inputs| mission.fly(None, inputs, &Net::DEFAULT));
     assert!(over.output.done && over.reached.is_none());
 }
 
@@ -210,12 +213,14 @@ fn items_that_cannot_be_flown_are_refused() {
         (waypoint(ok, 0.0, nan, 0.0), true),
         (waypoint(ok, 0.0, 0.0, nan), true),
         (waypoint(v(1.0, 9.1e4, 3.0), 0.0, 0.0, 0.0), true),
-        (waypoint(v(1.0, 8.9e4, 3.0), 0.0, 0.0, 0.0), false),
         (waypoint(v(1.0, 2.0, nan), 0.0, 0.0, 0.0), true),
         (waypoint(v(1e4, 0.0, 3.0), 0.0, 0.0, 0.0), true),
         (Item::TakeOff { height_m: 5.0 }, false),
         (Item::TakeOff { height_m: nan }, true),
         (Item::TakeOff { height_m: 9.1e4 }, true),
+        (Item::TakeOffTo { position_m: ok }, false),
+        (Item::TakeOffTo { position_m: v(1e4, 0.0, 3.0) }, true),
+        (Item::TakeOffTo { position_m: v(nan, 0.0, 3.0) }, true),
         (Item::Land { position_m: v(nan, nan, nan) }, false),
         (Item::Land { position_m: v(5.0, 5.0, nan) }, false),
         (Item::Land { position_m: v(5.0, -9.1e4, 0.0) }, true),
@@ -231,7 +236,17 @@ fn items_that_cannot_be_flown_are_refused() {
         assert_eq!(step.refused, refused, "{item:?}");
         assert!(!refused || step.reached.is_none() && step.then.is_none() && mission.wanted == 0);
     }
-    // A take-off over a home that the fence excludes.
-    let far = Stage { home_m: v(2e3, 0.0, 0.0), ..Stage::at(here()) };
-    assert!(progress(&mut wanting(0), &far, &leg(0, Item::TakeOff { height_m: 5.0 })).refused);
+    // Without a cylinder, as far as setpoints go.
+    for (y_m, flown) in [(8.9e4, Ok(())), (9.1e4, Err(OrderRefusal::OutOfRange))] {
+        let far = waypoint(v(1.0, y_m, 3.0), 0.0, 0.0, 0.0);
+        assert_eq!(far.check(&Net::DEFAULT, Some(&here())), flown);
+        assert_eq!(far.check(&NET, Some(&here())), flown.and(Err(OrderRefusal::OutsideFence)));
+        assert_eq!(far.check(&NET, None), flown, "nobody knows where the cylinder is");
+    }
+    // A take-off is over home: only its height can be outside.
+    let low = Net { fence_height_m: 4.0, ..NET };
+    for (height_m, refused) in [(4.4, false), (4.6, true)] {
+        let take_off = Item::TakeOff { height_m };
+        assert_eq!(take_off.check(&low, Some(&v(2e3, 0.0, 0.5))).is_err(), refused, "{height_m}");
+    }
 }
