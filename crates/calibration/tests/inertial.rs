@@ -189,6 +189,63 @@ fn a_moving_gyroscope_is_not_calibrated() {
     assert_eq!(told.iter().filter(|event| **event == CalibrationEvent::Moved).count(), 2);
 }
 
+/// While the vehicle rests, a gyroscope's calibration tells each tenth of its time once, and a level's the half.
+#[test]
+fn progress_is_told_at_rest() {
+    let mut hands = Hands::with_imu(Imu::DEFAULT, 5);
+    let tenths: Vec<_> = (1..10).map(|tenth| CalibrationEvent::Progress(10 * tenth)).collect();
+    assert_eq!(gyroscope(&mut hands, 160).1, tenths);
+    let (mut level, mut told) = (LevelCalibration::new(&Mounting::PLAIN, &SensorCalibration::DEFAULT), Vec::new());
+    let mut heard_us = Vec::new();
+    let began_us = hands.sample().at_us;
+    let found = (0..120).find_map(|_| {
+        let sample = hands.sample();
+        let before = told.len();
+        let found = level.step(&sample, keep(&mut told));
+        heard_us.extend((told.len() > before).then_some(sample.at_us - began_us));
+        found
+    });
+    assert!(found.unwrap().is_ok());
+    assert_eq!(told, [CalibrationEvent::Progress(50)]);
+    assert!((950_000..1_100_000).contains(&heard_us[0]), "{heard_us:?}");
+}
+
+/// A level that is moved says so, and begins again; one that does not come to rest fails after 20 s, not before.
+#[test]
+fn a_moving_vehicle_has_no_level() {
+    let mut hands = Hands::with_imu(Imu::ICM_42688_P, 5);
+    hands.tremor_rad = 0.05;
+    let (mut level, mut told) = (LevelCalibration::new(&Mounting::PLAIN, &SensorCalibration::DEFAULT), Vec::new());
+    let began_us = hands.sample().at_us;
+    let mut at_us = 0;
+    let found = (0..1_200).find_map(|_| {
+        let sample = hands.sample();
+        at_us = sample.at_us - began_us;
+        level.step(&sample, keep(&mut told))
+    });
+    assert_eq!(found, Some(Err(CalibrationFailure::Moving)));
+    assert!((19_900_000..20_200_000).contains(&at_us), "{at_us}");
+    assert!(told.contains(&CalibrationEvent::Moved) && !told.contains(&CalibrationEvent::Progress(50)), "{told:?}");
+
+    // The level skips a sample that is not a number, and says that the vehicle has moved. Without one it says no such
+    // thing.
+    for broken in [false, true] {
+        let mut hands = Hands::with_imu(Imu::DEFAULT, 5);
+        // The first sample of these hands is a mean of fewer readings, and differs.
+        hands.sample();
+        let (mut level, mut told) = (LevelCalibration::new(&Mounting::PLAIN, &SensorCalibration::DEFAULT), Vec::new());
+        let found = (0..115).find_map(|number| {
+            let mut sample = hands.sample();
+            if broken && number == 80 {
+                sample.specific_force_m_s2.z = f32::NAN;
+            }
+            level.step(&sample, keep(&mut told))
+        });
+        assert!(found.unwrap().is_ok());
+        assert_eq!(told.contains(&CalibrationEvent::Moved), broken, "{told:?}");
+    }
+}
+
 #[test]
 fn a_gyroscope_with_too_large_an_offset_is_broken() {
     let mut hands = Hands::with_imu(Imu::DEFAULT, 5);

@@ -33,16 +33,14 @@ impl ChannelsOverride {
         ChannelsOverride { raw_us }
     }
 
-    /// Changes pulses as the message says: to what it sets, to 0 what it gives back, and others not \[us\].
-    pub fn apply(&self, us: &mut [u16; RADIO_CHANNELS]) {
-        for (place, (us, raw)) in us.iter_mut().zip(self.raw_us).enumerate() {
-            *us = match raw {
-                NOTHING => *us,
-                // Of the later channels, 0 is what a sender of eight has there.
-                0 if place >= FIRST => *us,
-                RELEASED if place >= FIRST => 0,
-                raw => raw,
-            };
+    /// Returns the pulse that the message sets a channel to, 0 if it gives it back; none if it leaves it alone \[us\].
+    pub fn channel(&self, place: usize) -> Option<u16> {
+        match *self.raw_us.get(place)? {
+            NOTHING => None,
+            // Of the later channels, 0 is what a sender of eight has there.
+            0 if place >= FIRST => None,
+            RELEASED if place >= FIRST => Some(0),
+            raw => Some(raw),
         }
     }
 

@@ -17,8 +17,6 @@ pub struct Counters {
     pub bad_checksum: u32,
     /// Frames dropped for [`Fault::Unknown`], or bytes that looked like the start of such a frame.
     pub unknown: u32,
-    /// Frames dropped for [`Fault::Oversized`].
-    pub oversized: u32,
     /// Frames dropped for [`Fault::Malformed`].
     pub malformed: u32,
     /// Frames dropped for [`Fault::Implausible`].
@@ -35,42 +33,20 @@ pub struct Counters {
 
 impl Counters {
     /// Returns all counts in the order of the fields.
-    pub(crate) fn to_array(self) -> [u32; 10] {
-        let Counters { received, bad_checksum, unknown, oversized, malformed, implausible, .. } = self;
+    pub(crate) fn to_array(self) -> [u32; 9] {
+        let Counters { received, bad_checksum, unknown, malformed, implausible, .. } = self;
         let Counters { unsupported, elsewhere, skipped_bytes, lost, .. } = self;
-        [
-            received,
-            bad_checksum,
-            unknown,
-            oversized,
-            malformed,
-            implausible,
-            unsupported,
-            elsewhere,
-            skipped_bytes,
-            lost,
-        ]
+        [received, bad_checksum, unknown, malformed, implausible, unsupported, elsewhere, skipped_bytes, lost]
     }
 
     /// Restores the counts from [`Counters::to_array`].
-    pub(crate) fn from_array(counts: [u32; 10]) -> Self {
-        let [
-            received,
-            bad_checksum,
-            unknown,
-            oversized,
-            malformed,
-            implausible,
-            unsupported,
-            elsewhere,
-            skipped_bytes,
-            lost,
-        ] = counts;
+    pub(crate) fn from_array(counts: [u32; 9]) -> Self {
+        let [received, bad_checksum, unknown, malformed, implausible, unsupported, elsewhere, skipped_bytes, lost] =
+            counts;
         Counters {
             received,
             bad_checksum,
             unknown,
-            oversized,
             malformed,
             implausible,
             unsupported,
@@ -84,7 +60,6 @@ impl Counters {
         let counter = match fault {
             Fault::BadChecksum => &mut self.bad_checksum,
             Fault::Unknown => &mut self.unknown,
-            Fault::Oversized => &mut self.oversized,
             Fault::Malformed => &mut self.malformed,
             Fault::Implausible => &mut self.implausible,
             Fault::Unsupported => &mut self.unsupported,
@@ -101,8 +76,9 @@ fn add(counter: &mut u32, count: u32) {
 /// Decodes the messages of one direction from a stream.
 ///
 /// # What is delivered
-/// Frames of a message that the direction carries, no longer than the message, with the right checksum, which the
-/// receiver accepts: [`Decoder::feed`] those without a signature.
+/// Frames of a message that the direction carries, with the right checksum, which the receiver accepts:
+/// [`Decoder::feed`] those without a signature. Of a longer message, which a newer dialect has extended, the fields
+/// that are not known here are read as if they were not there.
 ///
 /// # Frames within frames
 /// Frames may contain other frames that are addressed to other systems: TUNNEL, FILE_TRANSFER_PROTOCOL, LOG_DATA.
@@ -332,8 +308,8 @@ impl<M: Message> Decoder<M> {
         (checksum(summed, extra_crc) == sent).then(|| match format {
             None => Err(Fault::Unknown),
             Some(_) if header.incompatible & !SIGNED != 0 => Err(Fault::Unsupported),
-            Some(format) if payload.len() > format.length_max => Err(Fault::Oversized),
-            Some(_) => M::read(header.id, payload, self.receiver),
+            // A newer dialect has appended fields, which no reader here may see.
+            Some(format) => M::read(header.id, payload.get(..format.length_max).unwrap_or(payload), self.receiver),
         })
     }
 

@@ -29,7 +29,7 @@ pub struct HealthArray {
     pub delta: PerAxis<f32>,
     /// Reception counts of the link.
     pub link: Counters,
-    /// Commands since power-up that were not answered, because more arrived at once than could be answered.
+    /// Commands since power-up that were neither carried out nor answered, because more arrived at once than could be.
     pub unanswered: u32,
     /// States that were not used.
     pub states_refused: StatesRefused,

@@ -14,7 +14,8 @@ pub(crate) const PAYLOAD_MAX: usize = 255;
 pub struct MessageFormat {
     /// Seed of the checksum, `CRC_EXTRA`.
     pub extra_crc: u8,
-    /// Longest payload \[bytes\]. Shorter ones are padded with zeros, as MAVLink 2 requires.
+    /// Longest payload that is read \[bytes\]. Shorter ones are padded with zeros, as MAVLink 2 requires, and the rest
+    /// of longer ones is left out.
     pub length_max: usize,
 }
 
@@ -33,8 +34,6 @@ pub enum Fault {
     BadChecksum,
     /// The direction does not carry this message.
     Unknown,
-    /// The payload is longer than the message.
-    Oversized,
     /// A field has an invalid value.
     Malformed,
     /// A number is not finite or not physically plausible.

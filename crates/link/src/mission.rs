@@ -2,6 +2,7 @@
 
 use crate::address::Address;
 use crate::message::{Fault, MessageFormat, PAYLOAD_MAX};
+use crate::place::Place;
 use crate::wire::Layout;
 use mavlink::MessageData;
 use mavlink::dialects::common::{
@@ -253,8 +254,12 @@ impl Mission {
 /// Returns degrees, or metres in one of the local frames, in the units of MISSION_ITEM_INT.
 fn in_units(number: f32, frame: u8) -> i32 {
     let units = if LOCAL_FRAMES.contains(&frame) { 1e4 } else { 1e7 };
-    // Saturates, so that what is out of range remains so.
-    let scaled = f64::from(number) * units;
+    // Not given: no place at 0.
+    if number.is_nan() {
+        return Place::AS_IT_IS;
+    }
+    // Beyond any place, and short of the number that says that none is given.
+    let scaled = (f64::from(number) * units).clamp(-2e9, 2e9);
     (scaled + if scaled < 0.0 { -0.5 } else { 0.5 }) as i32
 }
 

@@ -10,6 +10,7 @@
 )]
 
 mod channels;
+mod command_parameters;
 mod commands;
 mod decoder;
 mod frames;
@@ -19,5 +20,6 @@ mod poses;
 mod pymavlink;
 mod reference;
 mod signed;
+mod targets;
 mod transfers;
 mod wire;

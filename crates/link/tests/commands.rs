@@ -13,8 +13,9 @@ fn commands() {
         theirs(&COMMAND_LONG_DATA { command, param1, param2, target_system: 1, ..COMMAND_LONG_DATA::DEFAULT })
     };
     let int = |command, param1, param2| {
-        let (frame, x) = (MavFrame::MAV_FRAME_GLOBAL, -1);
-        theirs(&COMMAND_INT_DATA { command, param1, param2, x, frame, target_system: 1, ..COMMAND_INT_DATA::DEFAULT })
+        let (frame, x, y) = (MavFrame::MAV_FRAME_GLOBAL, i32::MAX, i32::MAX);
+        let data = COMMAND_INT_DATA { command, param1, param2, x, y, frame, ..COMMAND_INT_DATA::DEFAULT };
+        theirs(&COMMAND_INT_DATA { target_system: 1, ..data })
     };
     let arm = MavCmd::MAV_CMD_COMPONENT_ARM_DISARM;
     for command in [&long as &dyn Fn(_, _, _) -> Vec<u8>, &int] {
@@ -23,9 +24,9 @@ fn commands() {
             other => panic!("{other:?}"),
         };
         assert_eq!(read(arm, 1.0, 0.0), Command::Arm);
-        assert_eq!(read(arm, 1.0, 21196.0), Command::Arm);
+        assert_eq!(read(arm, 1.0, 21196.0), Command::Denied(400), "by force");
         assert_eq!(read(arm, 0.0, 0.0), Command::Disarm);
-        assert_eq!(read(arm, 0.0, 21195.0), Command::Disarm);
+        assert_eq!(read(arm, 0.0, 21195.0), Command::Denied(400), "by which force?");
         assert_eq!(read(arm, -0.0, 21196.0), Command::Kill);
         for param1 in [0.5, -1.0, 2.0, f32::NAN, f32::INFINITY] {
             assert_eq!(read(arm, param1, 21196.0), Command::Denied(400));
@@ -37,9 +38,9 @@ fn commands() {
         for param1 in [0.0, 2.0, 2.5, 4.0, -1.0, f32::NAN] {
             assert_eq!(read(reboot, param1, 0.0), Command::Denied(246));
         }
-        assert_eq!(read(MavCmd::MAV_CMD_USER_1, 0.5, f32::NAN), Command::Engage);
+        assert_eq!(read(MavCmd::MAV_CMD_USER_1, 0.0, f32::NAN), Command::Engage);
         assert_eq!(read(MavCmd::MAV_CMD_USER_2, 0.0, f32::NAN), Command::SelfTest);
-        assert_eq!(read(MavCmd::MAV_CMD_NAV_LAND, 1.0, 0.0), Command::Land);
+        assert_eq!(read(MavCmd::MAV_CMD_NAV_LAND, f32::NAN, 0.0), Command::Land);
         assert_eq!(read(MavCmd::MAV_CMD_DO_SET_SERVO, 1.0, 0.0), Command::Other(183));
     }
 }

@@ -51,7 +51,7 @@ fn commands_are_read() {
     command("COMMAND_LONG", Command::SelectMode(0x0304_0000));
     let height = Height { metres: 12.25, above: Datum::Home };
     let place = Place { latitude_e7: 473_977_420, longitude_e7: 85_455_940, height };
-    command("COMMAND_INT", Command::Reposition { place, yaw_rad: -0.5, speed_m_s: Some(2.5) });
+    command("COMMAND_INT", Command::Reposition { place, yaw_rad: -0.5, speed_m_s: Some(2.5), changes_mode: true });
     command("TAKEOFF", Command::TakeOff(Height { metres: 2.5, above: Datum::Here }));
     check("CONTROL", &Uplink::Control(ControlRequest::Release));
     check("STREAM", &Uplink::Stream(DataStream { group: 10, rate_hz: 4 }));

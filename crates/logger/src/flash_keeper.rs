@@ -97,9 +97,10 @@ impl<'a> FlashKeeper<'a> {
         self.ahead = Ahead::default();
         for sector in 0..self.sectors {
             let head = self.head_bytes(sector)?;
-            // Whatever is not blank is used: something else, or what a cut of the power has left.
+            // Whatever is not blank is used: something else, or what a cut of the power has left. The look ahead passes
+            // over the last of them.
             if head != [0xFF; HEAD_BYTES] {
-                self.ahead.sector = sector + 1;
+                self.ahead.sector = sector;
             }
             if let Some(head) = Head::read(&head) {
                 self.next = self.next.max(head.log.saturating_add(1));
@@ -279,7 +280,8 @@ impl<'a> FlashKeeper<'a> {
         let Some(Stretch { log, first, bytes }) = self.find(place)? else { return Ok(KeeperAnswer::None) };
         let (mut at, mut rest, mut count) = (offset, page, 0);
         while at < bytes && !rest.is_empty() {
-            let Some(sector) = self.sector_of(log, at / ROOM, first)? else { break };
+            // The log had this part when it was measured: without it, this is not its end, but a flash that has gone.
+            let sector = self.sector_of(log, at / ROOM, first)?.ok_or(FlashFailed)?;
             let within = at % ROOM;
             let length = rest.len().min((ROOM - within).min(bytes - at) as usize);
             let Some((part, behind)) = rest.split_at_mut_checked(length) else { break };

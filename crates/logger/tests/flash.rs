@@ -247,6 +247,23 @@ fn a_chip_that_does_not_work() {
     }
 }
 
+/// A chip that is lost in the middle of a download is not the end of the log, which goes on once the chip is back.
+#[test]
+fn a_lost_chip_ends_no_log() {
+    let chip = Chip::new(8);
+    let mut station = Station::new(&chip);
+    station.fly(500);
+    let (_, bytes) = station.room.logs().remove(0);
+    assert!(station.download(0, 0, 9_000) == bytes[..9_000]);
+    chip.0.lock().unwrap().is_there = false;
+    let rest = LogRequest::Data { log: 0, offset: 9_000, bytes: u32::MAX };
+    let told = station.ask_for(rest, 300);
+    assert!(told.is_empty() && station.transfer.is_busy(), "{told:?}");
+    assert_eq!(station.room.told, [StorageState::Failed.text().unwrap()]);
+    chip.0.lock().unwrap().is_there = true;
+    assert!(station.download(0, 9_000, u32::MAX) == bytes[9_000..]);
+}
+
 /// Pages that take as long as a chip may let them lose nothing.
 #[test]
 fn slow_pages_lose_nothing() {

@@ -66,8 +66,8 @@ fn expo(stick: f32, expo: f32) -> f32 {
 fn expo_dead_zone(stick: f32, share: f32, dead_zone: f32) -> f32 {
     // As in PX4, some of the way is left.
     let dead_zone = dead_zone.min(0.99);
-    let beyond = stick.abs() - dead_zone;
-    if beyond > 0.0 { expo((beyond / (1.0 - dead_zone)).min(1.0), share).copysign(stick) } else { 0.0 }
+    let beyond = (stick.abs() - dead_zone).max(0.0);
+    expo((beyond / (1.0 - dead_zone)).min(1.0), share).copysign(stick)
 }
 
 /// [`expo`], bent further: it reaches 1 at the end of the way only.

@@ -1,7 +1,10 @@
 //! SBUS, the protocol of Futaba's and FrSky's receivers: 100,000 baud, 8E2, inverted.
 //!
-//! A frame is 25 bytes: 0x0F, sixteen channels, flags, and 0x00 or the slot of SBUS2. There is no checksum, and a byte
-//! of a channel may be 0x0F too: frames are found by the pause before them, 4 ms at least.
+//! A frame is 25 bytes: 0x0F, sixteen channels, flags, and a footer. There is no checksum, and a byte of a channel may
+//! be 0x0F too: frames are found by the pause before them, 4 ms at least.
+//!
+//! Betaflight, ArduPilot and PX4 accept any footer, since receivers differ. Here a footer that is not known counts from
+//! its second frame on: a receiver repeats its own, noise does not.
 
 use crate::channels::{Channels, PACKED};
 use heapless::Vec;
@@ -14,6 +17,13 @@ const FRAME_LOST: u8 = 1 << 2;
 const FAILSAFE: u8 = 1 << 3;
 /// Flags of the digital channels and the two above.
 const FLAGS: u8 = 0x0F;
+/// Bits of a footer that a receiver repeats; SBUS2 counts its slots in the upper ones.
+const FOOTER: u8 = 0x0F;
+
+/// True if receivers are known to send this footer: 0x00, and with a slot above 0x03, 0x04 and 0x08 (R7003SB).
+fn is_known(footer: u8) -> bool {
+    footer == 0 || footer < 0x40 && matches!(footer & FOOTER, 0x03 | 0x04 | 0x08)
+}
 
 /// A frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -27,17 +37,15 @@ pub struct SbusFrame {
 }
 
 impl SbusFrame {
-    fn read(frame: &[u8; FRAME]) -> Option<Self> {
+    /// Reads a frame, and its footer.
+    fn read(frame: &[u8; FRAME]) -> Option<(Self, u8)> {
         let [HEADER, rest @ ..] = frame else { return None };
         let (packed, &[flags, footer]) =
             rest.split_first_chunk::<PACKED>().and_then(|(packed, rest)| Some((packed, rest.first_chunk::<2>()?)))?;
-        // SBUS2 counts its slots in two bits of it: 0x04, 0x14, 0x24, 0x34.
-        let is_footer = footer == 0 || footer & 0xCF == 0x04;
         // The upper flags are never set: without a checksum, every bit that is known counts.
-        (is_footer && flags & !FLAGS == 0).then(|| SbusFrame {
-            channels: Channels::unpack(packed, to_us),
-            frame_lost: flags & FRAME_LOST != 0,
-            failsafe: flags & FAILSAFE != 0,
+        (flags & !FLAGS == 0).then(|| {
+            let (frame_lost, failsafe) = (flags & FRAME_LOST != 0, flags & FAILSAFE != 0);
+            (SbusFrame { channels: Channels::unpack(packed, to_us), frame_lost, failsafe }, footer)
         })
     }
 
@@ -69,6 +77,8 @@ pub struct SbusDecoder {
     last_us: u64,
     /// True until the next pause: more bytes came than a frame has, or no frame.
     waits: bool,
+    /// The last frame's footer, whether it counted or not.
+    footer: Option<u8>,
     good_frames: u32,
     bad_frames: u32,
 }
@@ -88,14 +98,20 @@ impl SbusDecoder {
         }
         self.last_us = now_us;
         for byte in bytes {
+            // What begins otherwise is no frame that was damaged: on SBUS2's line, sensors answer between the frames.
+            self.waits |= self.held.is_empty() && *byte != HEADER;
             if self.waits {
                 continue;
             }
             // There is room: a frame is taken out with its last byte.
             let _ = self.held.push(*byte);
             if let Some(frame) = self.held.first_chunk::<FRAME>() {
-                match SbusFrame::read(frame) {
-                    Some(frame) => {
+                let read = SbusFrame::read(frame).filter(|(_, footer)| {
+                    let last = self.footer.replace(*footer);
+                    is_known(*footer) || last.is_some_and(|last| (last ^ footer) & FOOTER == 0)
+                });
+                match read {
+                    Some((frame, _)) => {
                         self.good_frames = self.good_frames.saturating_add(1);
                         take(frame);
                     }
@@ -112,7 +128,7 @@ impl SbusDecoder {
         self.good_frames
     }
 
-    /// Number of frames that were cut short, or no frames.
+    /// Number of frames that were cut short, or of as many bytes that are none.
     pub fn bad_frames(&self) -> u32 {
         self.bad_frames
     }

@@ -256,13 +256,14 @@ impl ChannelCalibration {
     /// Returns a pulse as a share of the way from `trim_us`, -1 to 1.
     fn share(&self, us: u16, trim_us: f32) -> f32 {
         let off_us = f32::from(us) - trim_us;
+        let is_below = off_us < 0.0;
         let outside_us = off_us.abs() - self.dead_band_us;
-        let room_us = (if off_us > 0.0 { self.max_us - trim_us } else { trim_us - self.min_us }) - self.dead_band_us;
+        let room_us = (if is_below { trim_us - self.min_us } else { self.max_us - trim_us }) - self.dead_band_us;
         if outside_us <= 0.0 || room_us <= 0.0 {
             return 0.0;
         }
-        let share = if outside_us < room_us { outside_us / room_us } else { 1.0 };
-        if (off_us < 0.0) == (self.direction < 0.0) { share } else { -share }
+        let share = (outside_us / room_us).min(1.0);
+        if is_below == (self.direction < 0.0) { share } else { -share }
     }
 
     /// Returns a stick, -1 to 1.
@@ -306,3 +307,6 @@ impl RadioSettings {
         failsafe_us < calibration.min_us && us < failsafe_us || failsafe_us > calibration.max_us && us > failsafe_us
     }
 }
+
+#[cfg(test)]
+mod tests;

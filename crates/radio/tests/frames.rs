@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, clippy::panic)]
 
 use afbc_radio::{
-    CRSF_GAP_US, Channels, CrsfDecoder, CrsfFrame, CrsfTelemetry, LinkStatistics, SbusDecoder, SbusFrame,
+    CRSF_GAP_US, Channels, CrsfDecoder, CrsfFrame, CrsfTelemetry, LinkStatistics, RadioLink, SbusDecoder, SbusFrame,
 };
 use proptest::prelude::*;
 
@@ -50,13 +50,14 @@ proptest! {
         }
     }
 
-    /// A checksum of eight bits finds one wrong bit, and any that lie within eight.
+    /// A checksum of eight bits finds one wrong bit, and any that lie within eight in the order in which it takes them,
+    /// from the highest bit of each byte on.
     #[test]
     fn a_spoilt_crsf_frame_is_none(channels in channels(), at in 16usize..200, burst in 1u8..) {
         let mut bytes = CrsfFrame::Channels(channels).encode();
-        let pattern = u16::from(burst) << (at % 8);
-        bytes[at / 8] ^= pattern as u8;
-        bytes[at / 8 + 1] ^= (pattern >> 8) as u8;
+        let [high, low] = (u16::from(burst) << (8 - at % 8)).to_be_bytes();
+        bytes[at / 8] ^= high;
+        bytes[at / 8 + 1] ^= low;
         prop_assert_eq!(crsf(&bytes), []);
     }
 
@@ -121,10 +122,75 @@ proptest! {
         let frame = SbusFrame { channels: Channels::of(us), frame_lost: false, failsafe: false };
         let bytes = frame.encode();
         let (head, tail) = bytes.split_at(early);
+        // A byte of a channel may be a header, too.
+        prop_assume!(tail[0] != 0x0F);
         prop_assert_eq!(sbus(&[(7_000, head), (500, tail)]), [frame]);
         prop_assert_eq!(sbus(&[(7_000, head), (7_000, tail), (500, &bytes)]), []);
         prop_assert_eq!(sbus(&[(7_000, &bytes), (0, &bytes), (7_000, &bytes)]), [frame, frame]);
     }
+}
+
+/// Feeds a receiver's frames, 15 ms apart, and bytes of others 2.5 ms after each; returns the decoder and whether the
+/// pilot is heard.
+fn listen(frames: impl Iterator<Item = [u8; 25]>, between: &[u8]) -> (SbusDecoder, bool) {
+    let (mut decoder, mut link, mut now_us) = (SbusDecoder::default(), RadioLink::default(), 0);
+    for frame in frames {
+        now_us += 15_000;
+        for (pause_us, bytes) in [(0, &frame[..]), (2_500, between)] {
+            let bad = decoder.bad_frames();
+            decoder.feed(bytes, now_us + pause_us, |frame| link.take(&frame.channels, now_us));
+            // As the vehicle does.
+            if decoder.bad_frames() != bad {
+                link.refuse();
+            }
+        }
+    }
+    (decoder, link.heard(now_us).is_some())
+}
+
+/// The frame of a Futaba R7003SB.
+const R7003SB: [u8; 25] = [
+    0x0F, 0x01, 0x1C, 0x20, 0xA8, 0x05, 0x08, 0x6A, 0x40, 0x03, 0x10, 0x80, 0x90, 0x85, 0x2C, 0x00, 0x01, 0x08, 0x40,
+    0x00, 0x02, 0x10, 0x80, 0x00, 0x08,
+];
+
+#[test]
+fn the_footers_of_known_receivers_count_at_once() {
+    for footer in [0x00, 0x03, 0x04, 0x08, 0x13, 0x14, 0x18, 0x23, 0x24, 0x28, 0x33, 0x34, 0x38] {
+        let mut bytes = R7003SB;
+        bytes[24] = footer;
+        assert_eq!(sbus(&[(7_000, &bytes)]).len(), 1, "{footer:#04x}");
+    }
+    // Eleven bits of its first channel: 0x401.
+    assert_eq!(sbus(&[(7_000, &R7003SB)])[0].channels.us[0], (0x401 * 5 / 8 + 875) as u16);
+}
+
+#[test]
+fn a_footer_that_a_receiver_repeats_counts() {
+    for footer in 0..=0xFF_u8 {
+        let with = |footer: u8| {
+            let mut bytes = R7003SB;
+            bytes[24] = footer;
+            bytes
+        };
+        // The same in each frame, or with a slot that is counted in two or four bits.
+        for slots in [1, 4, 16] {
+            let frames = |count: u8| (0..count).map(move |number| with(footer.wrapping_add((number % slots) << 4)));
+            let (decoder, heard) = listen(frames(11), &[]);
+            assert!(heard && decoder.good_frames() >= 10, "{footer:#04x}: {decoder:?}");
+            // Sensors that answer in SBUS2's slots.
+            assert!(listen(frames(11), &[0x03, 0x84, 0x2F]).1, "{footer:#04x} with sensors");
+        }
+    }
+    // What changes in every frame is no receiver's.
+    let odd = |count: u8| (0..count).map(|number| (number % 2 * 5 + 1) | (number << 4));
+    let frames = odd(200).map(|footer| {
+        let mut bytes = R7003SB;
+        bytes[24] = footer;
+        bytes
+    });
+    let (decoder, heard) = listen(frames, &[]);
+    assert!(!heard && decoder.good_frames() == 0, "{decoder:?}");
 }
 
 #[test]

@@ -95,7 +95,7 @@ impl Waiting {
     #[inline(never)]
     fn append(&mut self, frame: &[u8]) {
         let Waiting { bytes, sent, lacks } = self;
-        if bytes.len() + frame.len() > BYTES {
+        if bytes.extend_from_slice(frame).is_err() {
             // What has left makes room.
             let left = bytes.len().saturating_sub(*sent);
             for place in 0..left {
@@ -104,7 +104,7 @@ impl Waiting {
             }
             bytes.truncate(left);
             *sent = 0;
+            *lacks |= bytes.extend_from_slice(frame).is_err();
         }
-        *lacks |= bytes.extend_from_slice(frame).is_err();
     }
 }

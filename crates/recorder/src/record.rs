@@ -10,7 +10,7 @@ use heapless::String;
 use serde::{Deserialize, Serialize};
 
 /// Version of the format, and of what the records mean.
-pub const VERSION: u16 = 4;
+pub const VERSION: u16 = 5;
 
 const CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 

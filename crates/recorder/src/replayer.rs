@@ -176,14 +176,12 @@ impl<const N: usize, P: Prepare<N>> Replayer<N, P> {
         if is_mine { Ok(()) } else { Err(ReplayDifference::Start(start.clone())) }
     }
 
-    /// Notes a configuration; that of the start is flown at once.
+    /// Notes a configuration, until a tick flies it; that of the start is flown at once, whatever waits.
     fn configured(&mut self, number: u16, known: bool) -> ReplayStep<N> {
-        if number > 0 {
-            if self.waiting.is_full() {
-                self.waiting.pop_front();
-            }
-            let _ = self.waiting.push_back((number, self.configuration()));
+        if self.waiting.is_full() {
+            self.waiting.pop_front();
         }
+        let _ = self.waiting.push_back((number, self.configuration()));
         if known { ReplayStep::Nothing } else { ReplayStep::Differs(ReplayDifference::Parameter, None) }
     }
 

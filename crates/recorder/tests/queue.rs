@@ -4,7 +4,9 @@
 
 use afbc_onboard::parameters::{ParameterTable, RecordChange};
 use afbc_onboard::{Aged, Configuration, ControlInputs, Flight, Prepared, Readings};
-use afbc_recorder::{Frames, Given, Record, RecordQueue, ReplayDifference, ReplayStep, Replayer, TickRecord};
+use afbc_recorder::{
+    FRAME_MAX, Frames, Given, Record, RecordQueue, ReplayDifference, ReplayStep, Replayer, TickRecord, write,
+};
 use afbc_store::RecordName;
 use afbc_types::{Pose, PoseSigmas, Stamped, State};
 use nalgebra::Vector3;
@@ -213,4 +215,116 @@ fn a_link_that_comes_back_has_later_ticks() {
         _ => None,
     });
     assert_eq!(last.last(), Some(ticks - 1));
+}
+
+/// What is asked of the queue.
+#[derive(Clone, Copy, Debug)]
+enum Asked {
+    Inputs(u8),
+    Tick(u8),
+    /// The link takes so many frames, and then no more.
+    Takes(usize),
+    /// It takes nothing, so many times.
+    Refuses(u16),
+}
+
+fn asked() -> impl Strategy<Value = Asked> {
+    prop_oneof![
+        8 => (0..4_u8).prop_map(Asked::Inputs),
+        8 => (0..4_u8).prop_map(Asked::Tick),
+        4 => (0..12_usize).prop_map(Asked::Takes),
+        1 => (1..700_u16).prop_map(Asked::Refuses),
+        1 => Just(Asked::Refuses(1_000)),
+    ]
+}
+
+/// The queue as it is described: a kilobyte of whole frames; without room for one, it and all up to the end of the next
+/// tick are missing; so if the link has refused one a thousand times in a row.
+#[derive(Default)]
+struct Described {
+    waiting: VecDeque<Vec<u8>>,
+    lacks: bool,
+    refused: u16,
+}
+
+impl Described {
+    fn append(&mut self, frame: Vec<u8>) {
+        let length: usize = self.waiting.iter().map(Vec::len).sum();
+        if length + frame.len() > 1024 {
+            self.lacks = true;
+        } else {
+            self.waiting.push_back(frame);
+        }
+    }
+
+    fn tick(&mut self, frame: Vec<u8>) {
+        if !std::mem::take(&mut self.lacks) {
+            self.append(frame);
+            self.lacks = false;
+        }
+    }
+
+    fn send(&mut self, takes: usize) -> Vec<u8> {
+        let mut sent = Vec::new();
+        for k in 0.. {
+            let Some(frame) = self.waiting.front() else { break };
+            if k < takes {
+                sent.extend(frame);
+                self.refused = 0;
+            } else if self.refused < 1_000 {
+                self.refused += 1;
+                break;
+            } else {
+                (self.refused, self.lacks) = (0, true);
+            }
+            self.waiting.pop_front();
+        }
+        sent
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 200, failure_persistence: None, ..ProptestConfig::default() })]
+
+    /// The same frames as those of the queue that is described leave it, each whole.
+    #[test]
+    fn it_is_a_queue_of_a_kilobyte(steps in prop::collection::vec(asked(), 1..200)) {
+        let (mut queue, mut described, mut number) = (RecordQueue::default(), Described::default(), 0);
+        let frame = |record: &Record| write(record, &mut [0; FRAME_MAX]).unwrap().to_vec();
+        for step in steps {
+            let (takes, times) = match step {
+                Asked::Inputs(size) => {
+                    let mut inputs = ControlInputs::EMPTY;
+                    inputs.inbox.set_idle_on_ground(true);
+                    let pose = Pose::of(&State::default(), PoseSigmas::UNKNOWN);
+                    (0..size.min(1)).for_each(|_| inputs.inbox.put_pose(Stamped { value: pose, at_us: 1 }));
+                    inputs.order().heard_us = (size > 2).then_some(u64::MAX);
+                    queue.inputs(number, &inputs);
+                    described.append(frame(&Record::Inputs { tick: number, inputs }));
+                    (0, 0)
+                }
+                Asked::Tick(size) => {
+                    let time_us = u64::MAX >> (14 * size);
+                    let record = TickRecord { number, time_us, ..TickRecord::default() };
+                    number += 1;
+                    queue.tick(&record);
+                    described.tick(frame(&Record::Tick(record)));
+                    (0, 0)
+                }
+                Asked::Takes(takes) => (takes, 1),
+                Asked::Refuses(times) => (0, times),
+            };
+            for _ in 0..times {
+                let (mut sent, mut taken) = (Vec::<u8>::new(), 0);
+                queue.send(&mut |frame| {
+                    let takes = taken < takes;
+                    taken += 1;
+                    assert!(frame.iter().filter(|byte| **byte == 0).eq([&0]) && frame.ends_with(&[0]));
+                    sent.extend(if takes { frame } else { &[] });
+                    takes
+                });
+                prop_assert_eq!(sent, described.send(takes));
+            }
+        }
+    }
 }

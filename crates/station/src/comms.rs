@@ -254,6 +254,7 @@ impl Comms {
             voltage_v: f32::from(battery.voltage_mv) * 1e-3,
             // Negative: not measured.
             current_a: f32::from(battery.current_ca.max(0)) * 1e-2,
+            charge: (battery.remaining_percent >= 0).then(|| f32::from(battery.remaining_percent) * 1e-2),
         })
     }
 
@@ -272,9 +273,7 @@ impl Comms {
     /// Returns the number of frames dropped since power-up, for any reason.
     pub fn bad_frames(&self) -> u32 {
         let c = self.decoder.counters();
-        [c.bad_checksum, c.unknown, c.oversized, c.malformed, c.implausible, c.unsupported]
-            .into_iter()
-            .fold(0, u32::saturating_add)
+        [c.bad_checksum, c.unknown, c.malformed, c.implausible, c.unsupported].into_iter().fold(0, u32::saturating_add)
     }
 
     /// Sends all messages due after a tick, frame by frame, through `send`: at most [`REPORT_MAX`] bytes. `tick_us` is
@@ -357,7 +356,9 @@ impl Comms {
         // COM_DL_LOSS_T, which is in range.
         let silent_us = (table.configuration().guidance.net.station_lost_s * 1e6) as u64;
         self.dispatcher.control.set_silence(silent_us);
-        self.dispatcher.braking = table.configuration().guidance.limits.braking();
+        let afbc_guidance::Settings { limits, net, .. } = &table.configuration().guidance;
+        self.dispatcher.braking = limits.braking();
+        self.dispatcher.cylinder_m = [net.fence_radius_m, net.fence_height_m];
         let radio = &table.configuration().radio;
         (self.dispatcher.curves, self.dispatcher.takes_joystick) = (radio.curves, radio.receiver.takes_joystick());
         let mut outlet = self.outlet(self.left, send);

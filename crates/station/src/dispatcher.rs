@@ -21,11 +21,11 @@ use crate::setup::Setup;
 use crate::transferring::TransferRequests;
 use crate::transfers::is_change;
 use afbc_guidance::fence::Braking;
-use afbc_guidance::{FenceView, Limits, Order};
+use afbc_guidance::{FenceView, Item, Leg, Limits, Order};
 use afbc_link::telemetry::OrbitStatus;
 use afbc_link::{
-    Address, Answer, ChannelsOverride, Clock, ControlAnswer, DataStream, Downlink, Interval, MavSeverity, Mission,
-    ParameterError, ParameterRequest, Question, QuestionRefusal, Reboot, Telemetry, Uplink,
+    Address, Answer, ChannelsOverride, Clock, Command, ControlAnswer, DataStream, Downlink, Interval, MavSeverity,
+    Mission, ParameterError, ParameterRequest, Question, QuestionRefusal, Reboot, Telemetry, Uplink,
 };
 use afbc_onboard::ControlInputs;
 use afbc_radio::StickCurves;
@@ -71,6 +71,8 @@ pub(crate) struct Dispatcher {
     /// What is seen of the geofence, with which limits, and what the guidance knows of it.
     fence: FenceWatch,
     pub(crate) braking: Braking,
+    /// Radius and height of the cylinder around home; 0 for none \[m\].
+    pub(crate) cylinder_m: [f32; 2],
     /// Curves of a station's sticks, and whether these count.
     pub(crate) curves: StickCurves,
     pub(crate) takes_joystick: bool,
@@ -122,6 +124,7 @@ impl Dispatcher {
             missions: Missions::default(),
             fence: FenceWatch::default(),
             braking: Limits::DEFAULT.braking(),
+            cylinder_m: [0.0; 2],
             curves: StickCurves::DEFAULT,
             takes_joystick: true,
             overrides: None,
@@ -158,6 +161,12 @@ impl Dispatcher {
         if self.control.hear(from, self.now_us) {
             self.report_heard(inputs);
         }
+        let replies =
+            matches!(message, Uplink::Stream(_) | Uplink::Question(_) | Uplink::Clock(_) | Uplink::Control(_));
+        if replies && self.replies.is_full() {
+            // As if it had not arrived: nothing is done that nobody is told of.
+            return;
+        }
         match message {
             Uplink::Command(command) => self.command(command, from, inputs),
             Uplink::Setpoint(setpoint) => self.setpoint(setpoint, from, inputs),
@@ -192,19 +201,25 @@ impl Dispatcher {
         if self.control.hear(from, self.now_us) {
             self.report_heard(inputs);
         }
+        if let Uplink::Command(command) = message {
+            let answer = match command {
+                _ if !self.commands.has_room() => Answer::Refused(BUSY),
+                // There is one of each.
+                Command::RequestMessage { index: 1.., .. } => Answer::Denied,
+                _ if requests.take(from, message, payload, true) => Answer::Accepted,
+                _ => Answer::Refused(BUSY),
+            };
+            return self.commands.answer(command.id(), answer, from);
+        }
         // `may` takes control where nobody has it: what only reads must not ask.
         let may_change = !is_change(message) || self.may(from, inputs);
-        let taken = requests.take(from, message, payload, may_change);
-        if let Uplink::Command(command) = message {
-            let answer = if taken { Answer::Accepted } else { Answer::Refused(BUSY) };
-            self.commands.answer(command.id(), answer, from);
-        }
+        requests.take(from, message, payload, may_change);
     }
 
     /// Hands the guidance the item of the mission that it wants, if it does not have it.
     pub(crate) fn hand_over(&mut self, inputs: &mut ControlInputs) {
         if let Some(leg) = self.wanted_leg() {
-            self.given = Some((leg.number, leg.upload));
+            self.given = Some((self.status.guided.wanted, leg.upload));
             inputs.order().leg = Some(leg);
         }
         if self.has_fence_news() {
@@ -217,15 +232,22 @@ impl Dispatcher {
         }
     }
 
-    /// Returns the item of the mission that the guidance wants and does not have.
-    pub(crate) fn wanted_leg(&self) -> Option<afbc_guidance::Leg> {
-        let wanted = self.status.guided.wanted;
+    /// Returns the item of the mission that the guidance wants and does not have; the first of another mission that is
+    /// shorter, and none where it has to learn that there is no mission any more.
+    pub(crate) fn wanted_leg(&self) -> Option<Leg> {
+        let (wanted, upload) = (self.status.guided.wanted, self.missions.number());
         // With the upload's number: another upload has another item in this place.
-        if self.given == Some((wanted, self.missions.number())) {
+        if self.given == Some((wanted, upload)) {
             return None;
         }
+        let items = self.missions.items().len();
+        if items == 0 {
+            let none = Leg { number: wanted, upload, item: Item::None, is_last: true };
+            return Some(none).filter(|_| self.given.is_some());
+        }
+        let number = if usize::from(wanted) < items { wanted } else { 0 };
         let home_m = self.status.guided.home_m.map_or(0.0, |home| home.z);
-        self.missions.leg(wanted, self.status.aux.origin.as_ref(), home_m).map(|leg| self.fenced(leg))
+        self.missions.leg(number, self.status.aux.origin.as_ref(), home_m).map(|leg| self.fenced(leg))
     }
 
     /// Does what is due after a tick.
@@ -353,8 +375,12 @@ impl Dispatcher {
         let changes = matches!(message, Mission::Count(..) | Mission::Clear(_) | Mission::SetCurrent(_));
         // Only what changes something claims control: an item counts for the station that has begun the upload alone.
         let in_control = changes && self.may(from, inputs);
-        let around = self.surroundings();
+        let (around, number) = (self.surroundings(), self.missions.number());
         let heard = self.missions.hear(message, from, in_control, self.now_us, &around);
+        if self.missions.number() != number {
+            // Of the mission before.
+            self.reached = None;
+        }
         if heard.fence {
             self.fence.renew();
         }

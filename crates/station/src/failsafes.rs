@@ -11,6 +11,7 @@ const COASTING: Notice = (MavSeverity::MAV_SEVERITY_WARNING, "no fresh state for
 const DESCENDING: Notice = (MavSeverity::MAV_SEVERITY_CRITICAL, "no state for 0.25 s: descending");
 const STATE_LOST: Notice = (MavSeverity::MAV_SEVERITY_EMERGENCY, "no state for 2.25 s: motors stopped");
 const TUMBLED: Notice = (MavSeverity::MAV_SEVERITY_EMERGENCY, "tumbled: motors stopped");
+const SHAKEN: Notice = (MavSeverity::MAV_SEVERITY_WARNING, "vibration above 4.9 m/s2: check rotors and mounts");
 const OBSERVED: Notice = (MavSeverity::MAV_SEVERITY_CRITICAL, "inertial sensor failed: flying on tracker's poses");
 
 /// Failsafes of the last tick.
@@ -18,6 +19,7 @@ const OBSERVED: Notice = (MavSeverity::MAV_SEVERITY_CRITICAL, "inertial sensor f
 pub(crate) struct Failsafes {
     mode: Mode,
     observed: bool,
+    shaken: bool,
     /// Number of the last tick with a failsafe.
     last: Option<u64>,
 }
@@ -36,6 +38,8 @@ impl Failsafes {
             (entered == Some(Mode::Coasting)).then_some(COASTING),
             (entered == Some(Mode::Descending)).then_some(DESCENDING),
             (health.observed && !self.observed).then_some(OBSERVED),
+            // No failsafe: nothing is done about it but to say so.
+            (report.shaken && !self.shaken).then_some(SHAKEN),
             (*ended == Some(EndReason::StateLost)).then_some(STATE_LOST),
             (*ended == Some(EndReason::Tumbled)).then_some(TUMBLED),
         ];
@@ -43,7 +47,7 @@ impl Failsafes {
         if matches!(mode, Mode::Coasting | Mode::Descending) || failsafe {
             self.last = Some(tick);
         }
-        (self.mode, self.observed) = (*mode, health.observed);
+        (self.mode, self.observed, self.shaken) = (*mode, health.observed, report.shaken);
         notices.into_iter().flatten()
     }
 

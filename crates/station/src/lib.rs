@@ -39,7 +39,7 @@ pub use log_server::LogServer;
 pub use radio::{RADIO_FRAME_MAX, RadioControl};
 pub use services::calibration::Calibrator;
 pub use services::commands::{
-    ANSWERS_MAX, ANSWERS_PER_TICK, BUSY, CALIBRATES, FORGOTTEN_US, NO_ORIGIN, NOT_IN_CONTROL, NOT_KNOWN,
+    ANSWERS_MAX, ANSWERS_PER_TICK, BUSY, BUSY_FROM, CALIBRATES, FORGOTTEN_US, NO_ORIGIN, NOT_IN_CONTROL, NOT_KNOWN,
 };
 pub use services::status::AuxSensors;
 pub use setup::Setup;

@@ -10,7 +10,8 @@ use crate::services::status::RadioStatus;
 use crate::services::streams::id;
 use crate::services::telemetry::compose;
 use afbc_control::math::sqrt;
-use afbc_flight_core::{Request, Stamped, Ticketed};
+use afbc_flight_core::{Refusal, Request, Stamped, Ticketed};
+use afbc_guidance::{FlightMode, Order};
 use afbc_link::{ChannelsOverride, Downlink, MavSeverity, Telemetry};
 use afbc_onboard::{ControlInputs, give};
 use afbc_radio::{
@@ -34,6 +35,8 @@ const RSSI_UNKNOWN: u8 = 255;
 #[derive(Clone, Debug, Default)]
 struct Override {
     us: [u16; CHANNELS],
+    /// When each was sent last \[ms\].
+    sent_ms: [u32; CHANNELS],
     link: RadioLink,
     pilot: RadioPilot,
 }
@@ -98,21 +101,27 @@ impl RadioControl {
         act: &mut dyn FnMut(PilotOutput),
     ) {
         let now_us = inputs.now_us;
-        let Override { us, link, pilot } = &mut self.overrides;
+        let Override { us, sent_ms, link, pilot } = &mut self.overrides;
         if self.link.heard(now_us).is_some() {
             self.overrides = Override::default();
             return;
         }
         if let Some(news) = news {
-            if link.at_us().is_none_or(|at_us| now_us.saturating_sub(at_us) > SILENT_US) {
-                // A message leaves channels as they are: without this, those of before the silence would come back.
-                *us = [0; CHANNELS];
+            // The time in 32 bits wraps after 49 days: only differences count.
+            let now_ms = (now_us / 1000) as u32;
+            let mut refreshed = false;
+            for (place, (us, sent_ms)) in us.iter_mut().zip(sent_ms).enumerate() {
+                match news.channel(place) {
+                    Some(new) => (*us, *sent_ms, refreshed) = (new, now_ms, true),
+                    // One that the station leaves alone is lost as a stick is.
+                    None if now_ms.wrapping_sub(*sent_ms) > (SILENT_US / 1000) as u32 => *us = 0,
+                    None => (),
+                }
             }
-            news.apply(us);
-            if us.iter().any(|us| *us != 0) {
-                link.take(&Channels { us: *us }, now_us);
-            } else {
+            if us.iter().all(|us| *us == 0) {
                 link.lose();
+            } else if refreshed {
+                link.take(&Channels { us: *us }, now_us);
             }
         }
         let output = pilot.step(settings, link, inputs);
@@ -161,6 +170,11 @@ impl Comms {
                 texts.put(severity, notice.text());
             }
             let mut request = request;
+            let lands = matches!(order, Some(Order::Select(FlightMode::Land | FlightMode::Return)));
+            if request == Some(Request::Arm) && lands {
+                texts.put(MavSeverity::MAV_SEVERITY_WARNING, Refusal::WrongMode.reason());
+                return;
+            }
             if request == Some(Request::Arm)
                 && let Some(text) = faulty
             {

@@ -10,6 +10,7 @@
 
 mod answers;
 mod arming;
+mod command_parameters;
 mod commands;
 mod common;
 mod dialect;
@@ -17,10 +18,13 @@ mod failsafes;
 mod flood;
 mod frames;
 mod ftp;
+mod inertial;
+mod kept_clock;
 mod line;
 mod log_stream;
 mod log_transfer;
 mod memory;
+mod missions;
 mod parameters;
 mod places;
 mod poses;
@@ -31,4 +35,5 @@ mod settings;
 mod signing;
 mod telemetry;
 mod transfers;
+mod transmitter;
 mod trip;

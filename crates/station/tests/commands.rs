@@ -26,12 +26,12 @@ fn at(place: [f32; 3]) -> State {
     State { position_m: place.into(), ..State::default() }
 }
 
-fn origin() -> EarthOrigin {
+pub(crate) fn origin() -> EarthOrigin {
     EarthOrigin::new(EarthOrigin::SIMULATED).expect("possible")
 }
 
 /// One that knows where it is, on the earth too or not; its home is elsewhere.
-fn bench(located: bool) -> Bench {
+pub(crate) fn bench(located: bool) -> Bench {
     let mut bench = Bench::new();
     bench.comms = Comms::with(Setup { bytes_per_s: 1_000_000, ..Setup::default() });
     let origin = located.then(origin);
@@ -44,13 +44,13 @@ fn bench(located: bool) -> Bench {
 }
 
 /// Runs a tick where it is; returns what was said.
-fn step(bench: &mut Bench) -> Vec<Downlink> {
+pub(crate) fn step(bench: &mut Bench) -> Vec<Downlink> {
     bench.measure(&at(HERE));
     bench.step().1
 }
 
 /// Returns the orders to which a command leads, and the answer, if it comes without the guidance.
-fn orders(bench: &mut Bench, command: Command) -> (Vec<Order>, Option<Answer>) {
+pub(crate) fn orders(bench: &mut Bench, command: Command) -> (Vec<Order>, Option<Answer>) {
     // Whatever was before is done.
     (0..5).for_each(|_| drop(step(bench)));
     bench.hear(Uplink::Command(command));
@@ -63,7 +63,7 @@ fn orders(bench: &mut Bench, command: Command) -> (Vec<Order>, Option<Answer>) {
     (orders, answer.filter(|_| bench.inputs.orders.given.is_empty()))
 }
 
-fn leads_to(bench: &mut Bench, command: Command, expected: &[Order]) {
+pub(crate) fn leads_to(bench: &mut Bench, command: Command, expected: &[Order]) {
     let (found, _) = orders(bench, command);
     // As text, since NaN differs from itself; places to a centimetre, which is what the wire has of degrees.
     let rounded = |orders: &[Order]| {
@@ -86,7 +86,7 @@ fn leads_to(bench: &mut Bench, command: Command, expected: &[Order]) {
     assert_eq!(rounded(&found), rounded(expected), "{command:?}");
 }
 
-fn refused(bench: &mut Bench, command: Command, expected: Answer) {
+pub(crate) fn refused(bench: &mut Bench, command: Command, expected: Answer) {
     assert_eq!(orders(bench, command), (vec![], Some(expected)), "{command:?}");
 }
 
@@ -127,8 +127,12 @@ fn each_command_is_its_order() {
     leads_to(&mut bench, Command::Home(Some(there)), &[Order::Home(Some(Vector3::new(40.0, -30.0, 7.0)))]);
     // Home is where it was ordered from here on: 7 m high.
     for (above, metres, z) in [(Datum::Sea, 500.0, 12.0), (Datum::Home, 5.0, 12.0)] {
-        let go =
-            Command::Reposition { place: place([40.0, -30.0, 0.0], above, metres), yaw_rad: 0.5, speed_m_s: Some(2.0) };
+        let go = Command::Reposition {
+            place: place([40.0, -30.0, 0.0], above, metres),
+            yaw_rad: 0.5,
+            speed_m_s: Some(2.0),
+            changes_mode: true,
+        };
         let position_m = Vector3::new(40.0, -30.0, z);
         leads_to(&mut bench, go, &[Order::GoTo { position_m, yaw_rad: 0.5, speed_m_s: Some(2.0) }]);
     }
@@ -138,7 +142,7 @@ fn each_command_is_its_order() {
 #[test]
 fn without_an_origin_there_are_heights_only() {
     let mut bench = bench(false);
-    let go = |place| Command::Reposition { place, yaw_rad: f32::NAN, speed_m_s: None };
+    let go = |place| Command::Reposition { place, yaw_rad: f32::NAN, speed_m_s: None, changes_mode: true };
     let unknown = Answer::Refused(NO_ORIGIN);
     for above in [Datum::Sea, Datum::Home] {
         refused(&mut bench, go(place([4.0, 3.0, 0.0], above, 5.0)), unknown);
@@ -154,7 +158,7 @@ fn without_an_origin_there_are_heights_only() {
     leads_to(&mut bench, Command::TakeOff(Height { metres: 4.0, above: Datum::Home }), &[order]);
 }
 
-fn item(number: u16, command: u16) -> MissionItem {
+pub(crate) fn item(number: u16, command: u16) -> MissionItem {
     let place = place([20.0, 10.0, 0.0], Datum::Home, 5.0);
     let (x, y) = (place.latitude_e7, place.longitude_e7);
     let parameters = [0.0, 0.0, 0.0, f32::NAN];
@@ -162,7 +166,7 @@ fn item(number: u16, command: u16) -> MissionItem {
 }
 
 /// Uploads these items; returns the last acknowledgement.
-fn upload(bench: &mut Bench, items: &[MissionItem]) -> Option<MissionResult> {
+pub(crate) fn upload(bench: &mut Bench, items: &[MissionItem]) -> Option<MissionResult> {
     bench.hear(Uplink::Mission(Mission::Count(items.len() as u16, Plan::MISSION)));
     let mut result = None;
     for _ in 0..10 * (items.len() + 1) {
@@ -183,17 +187,23 @@ fn upload(bench: &mut Bench, items: &[MissionItem]) -> Option<MissionResult> {
 fn missions_begin_and_go_on_at_items_that_there_are() {
     let mut bench = bench(true);
     let none = Answer::Refused(OrderRefusal::NoMission as i32);
-    refused(&mut bench, Command::StartMission(0), none);
-    refused(&mut bench, Command::SetCurrent(0), none);
+    refused(&mut bench, Command::StartMission(0, None), none);
+    for (number, resets) in [(Some(0), false), (None, false), (None, true)] {
+        refused(&mut bench, Command::SetCurrent(number, resets), none);
+    }
     assert!(!bench.comms.has_mail());
     assert_eq!(upload(&mut bench, &[item(0, 16), item(1, 16)]), Some(MissionResult::ACCEPTED));
     let select = Order::Select(FlightMode::Mission);
-    leads_to(&mut bench, Command::StartMission(0), &[select]);
-    leads_to(&mut bench, Command::StartMission(1), &[Order::Resume(1), select]);
-    leads_to(&mut bench, Command::SetCurrent(1), &[Order::Resume(1)]);
-    leads_to(&mut bench, Command::SetCurrent(0), &[Order::Resume(0)]);
-    refused(&mut bench, Command::StartMission(2), none);
-    refused(&mut bench, Command::SetCurrent(2), none);
+    leads_to(&mut bench, Command::StartMission(0, None), &[select]);
+    leads_to(&mut bench, Command::StartMission(1, Some(1)), &[Order::Resume(1), select]);
+    leads_to(&mut bench, Command::SetCurrent(Some(1), false), &[Order::Resume(1)]);
+    leads_to(&mut bench, Command::SetCurrent(Some(0), true), &[Order::Resume(0)]);
+    // The present item, with or without a new beginning, is left alone.
+    refused(&mut bench, Command::SetCurrent(None, false), Answer::Accepted);
+    refused(&mut bench, Command::SetCurrent(None, true), Answer::Accepted);
+    refused(&mut bench, Command::StartMission(2, None), none);
+    refused(&mut bench, Command::StartMission(0, Some(2)), none);
+    refused(&mut bench, Command::SetCurrent(Some(2), true), none);
 }
 
 /// The guidance is handed the item that it wants, once; then there are no inputs without bytes.
@@ -209,7 +219,7 @@ fn the_wanted_item_is_handed_over_once() {
     };
     // Handed over with the state that came after the upload.
     assert_eq!((bench.comms.has_mail(), legs(&mut bench)), (false, None));
-    bench.hear(Uplink::Command(Command::SetCurrent(1)));
+    bench.hear(Uplink::Command(Command::SetCurrent(Some(1), false)));
     bench.step();
     assert!(bench.comms.has_mail(), "it wants the other one");
     let leg = legs(&mut bench).expect("handed over");
@@ -219,7 +229,7 @@ fn the_wanted_item_is_handed_over_once() {
     assert_eq!((current.number, current.total, current.state, current.mode), (1, 2, 4, 2));
 }
 
-trait Current {
+pub(crate) trait Current {
     fn comms_current(&mut self) -> afbc_link::MissionCurrent;
 }
 
@@ -257,8 +267,8 @@ fn orders_are_for_the_station_in_control() {
         Command::Home(None),
         Command::SelectMode(0x0304_0000),
         Command::SelectStandardMode(7),
-        Command::StartMission(0),
-        Command::SetCurrent(0),
+        Command::StartMission(0, None),
+        Command::SetCurrent(Some(0), false),
         Command::Reboot(Reboot::Program),
         Command::Reboot(Reboot::BootLoader),
         Command::Arm,
@@ -326,6 +336,9 @@ fn messages_on_request_are_sent_or_refused_with_the_reason() {
         let sent = said.iter().any(|message| matches!(message, Downlink::Telemetry(it) if is_it(it)));
         assert!(sent, "{command:?}: {said:?}");
     }
+    // One that has no index is not asked for by one.
+    assert_eq!(ask(&mut bench, id::ATTITUDE, 1), Answer::Denied);
+    (0..20).for_each(|_| drop(step(&mut bench)));
     // More than there is room for.
     for _ in 0..40 {
         bench.hear(Uplink::Command(Command::RequestProtocol));
@@ -336,7 +349,7 @@ fn messages_on_request_are_sent_or_refused_with_the_reason() {
             .filter(|it| matches!(it, Downlink::Answer { command: 519, answer, .. } if *answer == wanted))
             .count()
     };
-    assert_eq!((count(Answer::Accepted), count(Answer::Refused(BUSY))), (16, 16));
+    assert_eq!((count(Answer::Accepted), count(Answer::Refused(BUSY))), (16, 24));
 }
 
 #[test]

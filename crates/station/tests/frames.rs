@@ -79,9 +79,9 @@ fn sent() -> impl Strategy<Value = Sent> {
 
 /// Returns the command in a frame, if it is for the vehicle.
 fn command(sent: &Sent) -> Option<Command> {
-    let format = Uplink::format(sent.id).filter(|format| sent.payload.len() <= format.length_max)?;
-    let _ = format;
-    match Uplink::read(sent.id, &sent.payload, VEHICLE) {
+    // Of a longer one, what is known here.
+    let known = sent.payload.len().min(Uplink::format(sent.id)?.length_max);
+    match Uplink::read(sent.id, &sent.payload[..known], VEHICLE) {
         Ok(Uplink::Command(command)) => Some(command),
         _ => None,
     }
@@ -223,7 +223,7 @@ fn a_second_station_is_informed_once_and_follows() {
         }
         (answers, texts)
     };
-    bench.hear_from(first, Uplink::Command(Command::SetCurrent(7)));
+    bench.hear_from(first, Uplink::Command(Command::SetCurrent(Some(7), false)));
     heard(&mut bench);
     for times in 0..2 {
         bench.hear_from(second, Uplink::Command(Command::Arm));

@@ -389,12 +389,12 @@ fn a_mission_is_uploaded_by_messages_of_old() {
         let data = MISSION_ITEM_DATA { seq, x, y, z, frame, command, ..MISSION_ITEM_DATA::DEFAULT };
         at(&data, 32, &[0])
     };
-    let first = item(0, MavFrame::MAV_FRAME_GLOBAL_RELATIVE_ALT, [-47.5, 8.25, 10.0]);
+    let first = item(0, MavFrame::MAV_FRAME_GLOBAL_RELATIVE_ALT, [47.5, 8.25, 10.0]);
     next(&ask(&mut bench, &[STATION], &first, &[51, 47]), 1);
     let second = item(1, MavFrame::MAV_FRAME_LOCAL_NED, [12.5, -3.25, -4.0]);
     let reported = ask(&mut bench, &[STATION], &second, &[51, 47]);
     assert_eq!((reported[0].id, reported[0].payload.get(2).copied().unwrap_or(0)), (47, 0), "{reported:?}");
-    for (number, x, y) in [(0, -475_000_000, 82_500_000), (1, 125_000, -32_500)] {
+    for (number, x, y) in [(0, 475_000_000, 82_500_000), (1, 125_000, -32_500)] {
         let request = at(&MISSION_REQUEST_INT_DATA { seq: number, ..Default::default() }, 2, &[0]);
         let reported = ask(&mut bench, &[OTHER], &request, &[73, 47]);
         let read = MavMessage::parse(MavlinkVersion::V2, reported[0].id, &reported[0].payload);

@@ -11,7 +11,7 @@ pub(crate) use write::write;
 /// [`Downlink::Answer`](crate::Downlink::Answer).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Command {
-    /// MAV_CMD_COMPONENT_ARM_DISARM (400) with 1. Forcing it (param2 = 21196) has no effect.
+    /// MAV_CMD_COMPONENT_ARM_DISARM (400) with 1. It cannot be forced.
     Arm,
     /// MAV_CMD_COMPONENT_ARM_DISARM (400) with 0.
     Disarm,
@@ -21,10 +21,10 @@ pub enum Command {
     Engage,
     /// MAV_CMD_USER_2 (31011): run the sensors' own tests.
     SelfTest,
-    /// MAV_CMD_NAV_TAKEOFF (22). The height is above where the vehicle stands in COMMAND_LONG, which has no frame, and
-    /// NaN or 0 stand for that of the parameters; heading and place are ignored.
+    /// MAV_CMD_NAV_TAKEOFF (22), where the vehicle is. The height is above where it stands in COMMAND_LONG, which has
+    /// no frame, and NaN or 0 stand for that of the parameters.
     TakeOff(Height),
-    /// MAV_CMD_NAV_LAND (21), where the vehicle is; a place is ignored.
+    /// MAV_CMD_NAV_LAND (21), where the vehicle is.
     Land,
     /// MAV_CMD_NAV_RETURN_TO_LAUNCH (20).
     Return,
@@ -41,6 +41,8 @@ pub enum Command {
         yaw_rad: f32,
         /// Horizontal speed; none for the usual \[m/s\].
         speed_m_s: Option<f32>,
+        /// True if the mode may change for it (MAV_DO_REPOSITION_FLAGS_CHANGE_MODE).
+        changes_mode: bool,
     },
     /// MAV_CMD_DO_ORBIT (34).
     Orbit {
@@ -59,10 +61,10 @@ pub enum Command {
     Speed(f32),
     /// MAV_CMD_DO_SET_HOME (179): here, or at a place; or SET_HOME_POSITION.
     Home(Option<Place>),
-    /// MAV_CMD_MISSION_START (300) with this item.
-    StartMission(u16),
-    /// MAV_CMD_DO_SET_MISSION_CURRENT (224).
-    SetCurrent(u16),
+    /// MAV_CMD_MISSION_START (300) with this item, up to the other one; none for the last of the mission.
+    StartMission(u16, Option<u16>),
+    /// MAV_CMD_DO_SET_MISSION_CURRENT (224) of this item; none for the present one. True resets the mission.
+    SetCurrent(Option<u16>, bool),
     /// MAV_CMD_SET_MESSAGE_INTERVAL (511).
     SetInterval {
         /// Number of the message.
@@ -214,8 +216,8 @@ impl Command {
             Command::Orbit { .. } => ORBIT,
             Command::Speed(_) => SPEED,
             Command::Home(_) => HOME,
-            Command::StartMission(_) => START_MISSION,
-            Command::SetCurrent(_) => SET_CURRENT,
+            Command::StartMission(..) => START_MISSION,
+            Command::SetCurrent(..) => SET_CURRENT,
             Command::SetInterval { .. } => SET_INTERVAL,
             Command::GetInterval(_) => GET_INTERVAL,
             Command::RequestMessage { .. } => REQUEST_MESSAGE,

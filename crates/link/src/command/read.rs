@@ -4,7 +4,7 @@ use super::{
     ARM_DISARM, CALIBRATE, CHECK_ARMING, CUSTOM_MODE, CalibrationRequest, Command, ENGAGE, FORCED, GET_INTERVAL, HOME,
     LAND, ORBIT, REBOOT, REPOSITION, REQUEST_CAPABILITIES, REQUEST_MESSAGE, REQUEST_PROTOCOL, RETURN, Reboot,
     SELECT_MODE, SELECT_STANDARD_MODE, SELF_TEST, SET_CURRENT, SET_INTERVAL, SPEED, START_LOG_STREAM, START_MISSION,
-    STOP_LOG_STREAM, STORAGE, Storage, TAKE_OFF, USUAL,
+    STOP_LOG_STREAM, STORAGE, Storage, TAKE_OFF,
 };
 use crate::address::Address;
 use crate::message::{Fault, MessageFormat};
@@ -22,6 +22,11 @@ const MODE: Layout<SET_MODE_DATA, (u32, u8, u8)> = Layout::NEW;
 /// Latitude, longitude, altitude \[mm\]; attitude and approach; system, time.
 const PLACE: Layout<SET_HOME_POSITION_DATA, ([i32; 3], Unused<40>, u8, Unused<8>)> = Layout::NEW;
 
+/// Speed that is no limit \[m/s\].
+const SPEED_MAX_M_S: f32 = 1e3;
+/// MAV_CMD_DO_CHANGE_SPEED's "as usual again".
+const DEFAULT: f32 = -2.0;
+
 pub(crate) fn format(id: u32) -> Option<MessageFormat> {
     Some(match id {
         COMMAND_LONG_DATA::ID => LONG.format(),
@@ -36,23 +41,18 @@ pub(crate) fn format(id: u32) -> Option<MessageFormat> {
 pub(crate) fn read(id: u32, payload: &[u8]) -> Result<(Command, Address), Fault> {
     match id {
         COMMAND_LONG_DATA::ID => {
-            let ([p1, p2, p3, p4, latitude, longitude, metres], id, to, _) = LONG.read(payload);
-            if id == CALIBRATE {
-                return Ok((calibration([p1, p2, p3, p4, latitude, longitude, metres]), to));
-            }
+            let (parameters, id, to, _) = LONG.read(payload);
+            let [.., latitude, longitude, metres] = parameters;
             // It has no frame: stations send heights of places above the sea, and of a take-off above the ground.
             let above = if id == TAKE_OFF { Datum::Here } else { Datum::Sea };
             let place =
                 Place { latitude_e7: e7(latitude), longitude_e7: e7(longitude), height: Height { metres, above } };
-            Ok((command(id, [p1, p2, p3, p4], Some(place)), to))
+            Ok((command(id, parameters, Some(place)), to))
         }
         COMMAND_INT_DATA::ID => {
-            let (parameters, [latitude_e7, longitude_e7], metres, id, to, frame, _) = INT.read(payload);
-            if id == CALIBRATE {
-                // Its fifth and sixth parameter are whole numbers: here not those of a place.
-                let [p1, p2, p3, p4] = parameters;
-                return Ok((calibration([p1, p2, p3, p4, latitude_e7 as f32, longitude_e7 as f32, metres]), to));
-            }
+            let ([p1, p2, p3, p4], [latitude_e7, longitude_e7], metres, id, to, frame, _) = INT.read(payload);
+            let number = |whole: i32| if whole == Place::AS_IT_IS { f32::NAN } else { whole as f32 };
+            let parameters = [p1, p2, p3, p4, number(latitude_e7), number(longitude_e7), metres];
             let place = datum(frame).map(|above| Place { latitude_e7, longitude_e7, height: Height { metres, above } });
             Ok((command(id, parameters, place), to))
         }
@@ -65,32 +65,70 @@ pub(crate) fn read(id: u32, payload: &[u8]) -> Result<(Command, Address), Fault>
         SET_HOME_POSITION_DATA::ID => {
             let ([latitude_e7, longitude_e7, altitude_mm], _, system, _) = PLACE.read(payload);
             let height = Height { metres: altitude_mm as f32 * 1e-3, above: Datum::Sea };
-            let command = command(HOME, [0.0; 4], Some(Place { latitude_e7, longitude_e7, height }));
+            let command = command(HOME, [0.0; 7], Some(Place { latitude_e7, longitude_e7, height }));
             Ok((command, Address { system, component: 0 }))
         }
         _ => Err(Fault::Unknown),
     }
 }
 
-fn command(id: u16, parameters: [f32; 4], place: Option<Place>) -> Command {
-    if Command::KNOWN.contains(&id) {
-        known(id, parameters, place).unwrap_or(Command::Denied(id))
-    } else {
-        Command::Other(id)
+fn command(id: u16, parameters: [f32; 7], place: Option<Place>) -> Command {
+    let [p1, p2, ..] = parameters;
+    // Whatever else it says: nothing may keep the motors running.
+    if id == ARM_DISARM && p1 == 0.0 && p2 == FORCED {
+        return Command::Kill;
+    }
+    if !Command::KNOWN.contains(&id) {
+        return Command::Other(id);
+    }
+    let used = used(id, p1);
+    let unused = parameters.into_iter().enumerate().filter(|(place, _)| used >> place & 1 == 0);
+    let command = if unused.map(|(_, value)| value).all(is_neutral) { known(id, parameters, place) } else { None };
+    command.unwrap_or(Command::Denied(id))
+}
+
+/// Returns which parameters of a known command are used, a bit each from the first on. All others must be neutral, so
+/// that nothing that a station asks for is ignored in silence.
+fn used(id: u16, first: f32) -> u8 {
+    match id {
+        RETURN | LAND | CHECK_ARMING | STOP_LOG_STREAM | ENGAGE | SELF_TEST => 0,
+        SELECT_STANDARD_MODE | GET_INTERVAL | REQUEST_PROTOCOL | REQUEST_CAPABILITIES => 0b1,
+        REBOOT | START_LOG_STREAM | ARM_DISARM => 0b1,
+        START_MISSION | SET_CURRENT | STORAGE => 0b11,
+        SELECT_MODE | SPEED => 0b111,
+        SET_INTERVAL | REQUEST_MESSAGE => 0b100_0011,
+        TAKE_OFF => 0b100_0001,
+        // Here, or at a place.
+        HOME if first == 1.0 => 0b1,
+        HOME => 0b111_0001,
+        REPOSITION => 0b111_1011,
+        ORBIT | CALIBRATE => 0b111_1111,
+        _ => 0,
     }
 }
 
+/// True of a parameter that asks for nothing.
+fn is_neutral(value: f32) -> bool {
+    value == 0.0 || value.is_nan()
+}
+
+/// The same where -1 asks for nothing, too.
+fn is_neutral_or_minus(value: f32) -> bool {
+    is_neutral(value) || value == -1.0
+}
+
 /// Returns the known command with these parameters, the last three of which are a place; none if one is invalid.
-fn known(id: u16, [p1, p2, p3, p4]: [f32; 4], place: Option<Place>) -> Option<Command> {
-    let forced = p2 == FORCED;
+fn known(id: u16, parameters: [f32; 7], place: Option<Place>) -> Option<Command> {
+    let [p1, p2, p3, p4, _, _, p7] = parameters;
     let plausible = place.filter(Place::is_plausible);
     Some(match id {
+        CALIBRATE => calibration(parameters),
         ARM_DISARM if p1 == 1.0 => Command::Arm,
-        ARM_DISARM if p1 == 0.0 && forced => Command::Kill,
         ARM_DISARM if p1 == 0.0 => Command::Disarm,
         ENGAGE => Command::Engage,
         SELF_TEST => Command::SelfTest,
-        TAKE_OFF => Command::TakeOff(take_off(place?.height)?),
+        // -1: no pitch.
+        TAKE_OFF if is_neutral_or_minus(p1) => Command::TakeOff(take_off(place?.height)?),
         LAND => Command::Land,
         RETURN => Command::Return,
         SELECT_MODE => {
@@ -101,25 +139,40 @@ fn known(id: u16, [p1, p2, p3, p4]: [f32; 4], place: Option<Place>) -> Option<Co
         }
         SELECT_STANDARD_MODE => Command::SelectStandardMode(u8::try_from(whole(p1)?).ok()?),
         REPOSITION => {
-            let is_usual = p1 == USUAL || p1 == 0.0 || p1.is_nan();
+            let is_usual = p1 < 0.0 || is_neutral(p1);
             let speed_m_s = if is_usual { None } else { Some(speed(p1)?) };
+            // A heading relative to the present one is not flown.
+            let changes_mode = if p2 == 1.0 { true } else { Some(false).filter(|_| is_neutral(p2))? };
             let yaw_rad = if p4.is_nan() { p4 } else { Some(-p4).filter(|yaw| yaw.abs() <= 1e3)? };
-            Command::Reposition { place: plausible?, yaw_rad, speed_m_s }
+            Command::Reposition { place: plausible?, yaw_rad, speed_m_s, changes_mode }
         }
         ORBIT => orbit([p1, p2, p3, p4], plausible?)?,
         // 0 and 1: through the air and above the ground; climb and descent have limits of their own.
-        SPEED if p1 == 0.0 || p1 == 1.0 => Command::Speed(speed(p2)?),
+        // -1 and -2 leave the throttle alone, and -2 as a speed is the usual one again.
+        SPEED if (p1 == 0.0 || p1 == 1.0) && (is_neutral_or_minus(p3) || p3 == DEFAULT) => {
+            Command::Speed(if p2 == DEFAULT { SPEED_MAX_M_S } else { speed(p2)? })
+        }
         HOME if p1 == 1.0 => Command::Home(None),
         HOME if p1 == 0.0 => Command::Home(Some(plausible.filter(is_whole)?)),
-        START_MISSION => Command::StartMission(u16::try_from(whole(or_zero(p1))?).ok()?),
-        SET_CURRENT => Command::SetCurrent(u16::try_from(whole(p1)?).ok()?),
+        START_MISSION => {
+            let [first, last] = [number(or_zero(p1))?, number(or_zero(p2))?];
+            let last = if last == 0 { None } else { Some(Some(last).filter(|last| *last >= first)?) };
+            Command::StartMission(first, last)
+        }
+        SET_CURRENT if p2 == 1.0 || is_neutral(p2) => {
+            Command::SetCurrent(if p1 == -1.0 { None } else { Some(number(p1)?) }, p2 == 1.0)
+        }
+        // Everything is sent to everyone, the one that asks included.
+        SET_INTERVAL | REQUEST_MESSAGE if ![0.0, 1.0, 2.0].contains(&or_zero(p7)) => return None,
         SET_INTERVAL => Command::SetInterval { message: whole(p1)?, interval_us: interval(or_zero(p2))? },
         GET_INTERVAL => Command::GetInterval(whole(p1)?),
-        REQUEST_MESSAGE => Command::RequestMessage { message: whole(p1)?, index: whole(p2).unwrap_or(0) },
+        REQUEST_MESSAGE => Command::RequestMessage { message: whole(p1)?, index: whole(or_zero(p2))? },
         REQUEST_PROTOCOL if p1 == 1.0 => Command::RequestProtocol,
         REQUEST_CAPABILITIES if p1 == 1.0 => Command::RequestCapabilities,
         REBOOT if p1 == 1.0 => Command::Reboot(Reboot::Program),
         REBOOT if p1 == 3.0 => Command::Reboot(Reboot::BootLoader),
+        // Plans are not stored: -1 leaves them alone, and 0 has nothing to read.
+        STORAGE if !is_neutral_or_minus(p2) => return None,
         STORAGE if p1 == 0.0 => Command::Storage(Storage::Load),
         STORAGE if p1 == 1.0 => Command::Storage(Storage::Save),
         STORAGE if p1 == 2.0 => Command::Storage(Storage::Reset),
@@ -159,6 +212,11 @@ fn or_zero(number: f32) -> f32 {
     if number.is_nan() { 0.0 } else { number }
 }
 
+/// Returns the number of an item.
+fn number(number: f32) -> Option<u16> {
+    u16::try_from(whole(number)?).ok()
+}
+
 /// Returns a whole number up to 2^24.
 fn whole(number: f32) -> Option<u32> {
     // Up to there each whole number is an f32 of its own.
@@ -179,7 +237,7 @@ fn interval(number: f32) -> Option<i32> {
 }
 
 fn speed(number: f32) -> Option<f32> {
-    (0.0..=1e3).contains(&number).then_some(number)
+    (0.0..=SPEED_MAX_M_S).contains(&number).then_some(number)
 }
 
 fn is_whole(place: &Place) -> bool {

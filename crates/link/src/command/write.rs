@@ -10,7 +10,7 @@ use crate::place::{Datum, Height, Place, frame};
 pub(crate) fn write(command: Command, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
     let nowhere = |height| Place { latitude_e7: 0, longitude_e7: 0, height };
     let (first, place) = match command {
-        Command::Arm | Command::CheckArming => ([1.0, 0.0, 0.0, 0.0], None),
+        Command::Arm => ([1.0, 0.0, 0.0, 0.0], None),
         Command::Kill => ([0.0, FORCED, 0.0, 0.0], None),
         Command::Calibrate(asked) => {
             let (first, fifth) = match asked {
@@ -27,6 +27,7 @@ pub(crate) fn write(command: Command, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, 
         // No parameter of any command may be infinite.
         Command::Denied(id) => return LONG.write(&([f32::INFINITY; 7], id, Address::default(), 0), payload),
         Command::Disarm
+        | Command::CheckArming
         | Command::Engage
         | Command::SelfTest
         | Command::Land
@@ -40,8 +41,8 @@ pub(crate) fn write(command: Command, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, 
             ([1.0, f32::from(main), f32::from(sub), 0.0], None)
         }
         Command::SelectStandardMode(mode) => ([f32::from(mode), 0.0, 0.0, 0.0], None),
-        Command::Reposition { place, yaw_rad, speed_m_s } => {
-            ([speed_m_s.unwrap_or(USUAL), 1.0, 0.0, -yaw_rad], Some(place))
+        Command::Reposition { place, yaw_rad, speed_m_s, changes_mode } => {
+            ([speed_m_s.unwrap_or(USUAL), f32::from(u8::from(changes_mode)), 0.0, -yaw_rad], Some(place))
         }
         Command::Orbit { place, radius_m, speed_m_s, angle_deg, heading } => {
             let angle_rad = f32::from(angle_deg).to_radians();
@@ -49,7 +50,10 @@ pub(crate) fn write(command: Command, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, 
         }
         Command::Speed(speed_m_s) => ([1.0, speed_m_s, USUAL, 0.0], None),
         Command::Home(place) => ([f32::from(u8::from(place.is_none())), 0.0, 0.0, 0.0], place),
-        Command::StartMission(number) | Command::SetCurrent(number) => ([f32::from(number), 0.0, 0.0, 0.0], None),
+        Command::StartMission(first, last) => ([f32::from(first), last.map_or(0.0, f32::from), 0.0, 0.0], None),
+        Command::SetCurrent(number, resets) => {
+            ([number.map_or(USUAL, f32::from), f32::from(u8::from(resets)), 0.0, 0.0], None)
+        }
         Command::SetInterval { message, interval_us } => ([message as f32, interval_us as f32, 0.0, 0.0], None),
         Command::GetInterval(message) => ([message as f32, 0.0, 0.0, 0.0], None),
         Command::RequestMessage { message, index } => ([message as f32, index as f32, 0.0, 0.0], None),

@@ -25,6 +25,10 @@ impl Dispatcher {
     /// Carries out a command, or leads to its being carried out: it is answered once, to `from`.
     pub(super) fn command(&mut self, command: Command, from: Address, inputs: &mut ControlInputs) {
         let id = command.id();
+        // Nothing is done that cannot be answered, except to stop the motors.
+        if command != Command::Kill && !self.commands.has_room() {
+            return self.commands.answer(id, Answer::Refused(BUSY), from);
+        }
         if control::is_needed_for(command) && !self.may(from, inputs) {
             return self.commands.answer(id, Answer::Refused(NOT_IN_CONTROL), from);
         }
@@ -55,6 +59,7 @@ impl Dispatcher {
                     Answer::Unsupported
                 }
             }
+            Command::GetInterval(_) if self.replies.is_full() => Answer::Refused(BUSY),
             Command::GetInterval(message) => {
                 self.reply(Reply::Interval(Interval { message, interval_us: self.streams.interval_us(message) }));
                 Answer::Accepted
@@ -74,7 +79,25 @@ impl Dispatcher {
                 self.check_arming(from);
                 Answer::Accepted
             }
+            Command::SetCurrent(number, resets) => {
+                let items = self.missions.items().len();
+                if usize::from(number.unwrap_or(0)) >= items {
+                    Answer::Refused(OrderRefusal::NoMission as i32)
+                } else {
+                    if resets {
+                        self.missions.restart();
+                        self.reached = None;
+                    }
+                    match number {
+                        Some(number) => return self.order(Order::Resume(number), Some(id), from, inputs),
+                        None => Answer::Accepted,
+                    }
+                }
+            }
             _ => match self.order_of(command) {
+                Ok(Order::Select(FlightMode::Mission)) if !self.is_mission_flown() => {
+                    Answer::Refused(OrderRefusal::OutOfRange as i32)
+                }
                 Ok(order) if !self.fence_allows(&order) => {
                     self.texts.put(MavSeverity::MAV_SEVERITY_WARNING, reason(OrderRefusal::OutsideFence));
                     Answer::Refused(OrderRefusal::OutsideFence as i32)
@@ -89,8 +112,14 @@ impl Dispatcher {
                         let or_here = |to: f32, here: f32| if to.is_nan() { here } else { to };
                         self.orbit_m = Some((centre_m.zip_map(&here_m, or_here), radius_m));
                     }
-                    if let Command::StartMission(number @ 1..) = command {
-                        self.order(Order::Resume(number), None, from, inputs);
+                    if let Command::StartMission(first, last) = command {
+                        if self.missions.set_last(last) {
+                            // Whether an item is the last one has changed.
+                            self.given = self.given.map(|(wanted, upload)| (wanted, upload.wrapping_sub(1)));
+                        }
+                        if first > 0 {
+                            self.order(Order::Resume(first), None, from, inputs);
+                        }
                     }
                     return self.order(order, Some(id), from, inputs);
                 }
@@ -121,7 +150,10 @@ impl Dispatcher {
             Command::Return => Order::Select(FlightMode::Return),
             Command::SelectMode(custom) => Order::Select(modes::of_custom(custom).ok_or(Answer::Denied)?),
             Command::SelectStandardMode(mode) => Order::Select(modes::of_standard(mode).ok_or(Answer::Denied)?),
-            Command::Reposition { place, yaw_rad, speed_m_s } => {
+            Command::Reposition { changes_mode: false, .. } if self.status.guided.mode != FlightMode::Hold => {
+                return Err(Answer::Denied);
+            }
+            Command::Reposition { place, yaw_rad, speed_m_s, .. } => {
                 Order::GoTo { position_m: self.local(&place)?, yaw_rad, speed_m_s }
             }
             Command::Orbit { place, radius_m, speed_m_s, angle_deg, heading } => {
@@ -136,18 +168,22 @@ impl Dispatcher {
             }
             Command::Speed(speed_m_s) => Order::Speed(speed_m_s),
             Command::Home(place) => Order::Home(place.map(|place| self.local(&place)).transpose()?),
-            Command::StartMission(number) | Command::SetCurrent(number) => {
-                if usize::from(number) >= self.missions.items().len() {
+            Command::StartMission(first, last) => {
+                if usize::from(last.unwrap_or(first)) >= self.missions.items().len() {
                     return Err(Answer::Refused(OrderRefusal::NoMission as i32));
                 }
-                match command {
-                    Command::StartMission(_) => Order::Select(FlightMode::Mission),
-                    _ => Order::Resume(number),
-                }
+                Order::Select(FlightMode::Mission)
             }
             // The other commands have nothing for the guidance.
             _ => return Err(Answer::Unsupported),
         })
+    }
+
+    /// True if every item of the mission can be flown from here and now; tells which one cannot.
+    fn is_mission_flown(&mut self) -> bool {
+        let problem = self.missions.problem(&self.surroundings());
+        problem.iter().for_each(|words| self.texts.say(MavSeverity::MAV_SEVERITY_WARNING, words));
+        problem.is_none()
     }
 
     /// Returns the height above where the vehicle stands \[m\].
@@ -190,8 +226,10 @@ impl Dispatcher {
             id::AVAILABLE_MODES => index <= modes::COUNT.into(),
             _ => compose(message, &self.status).is_some(),
         };
+        let has_index = [id::AVAILABLE_MODES, id::ESC_INFO, id::ESC_STATUS].contains(&message);
         match (Streams::knows(message), known) {
             (false, _) => Answer::Unsupported,
+            _ if index != 0 && !has_index => Answer::Denied,
             (_, false) if message == id::AVAILABLE_MODES => Answer::Denied,
             (_, false) => Answer::Refused(NOT_KNOWN),
             _ if self.streams.request(Requested { message, index }) => Answer::Accepted,

@@ -28,8 +28,11 @@ impl Dispatcher {
             return;
         }
         self.safe_us = self.now_us;
-        let Surroundings { chart: Some(chart), here_m: Some(here_m) } = self.surroundings() else { return };
-        let Some(home_m) = self.status.guided.home_m.map(|home_m| home_m.xy()) else { return };
+        let Surroundings { origin: Some(origin), here_m: Some(here_m), home_m: Some(home_m), .. } = self.surroundings()
+        else {
+            return;
+        };
+        let (chart, home_m) = (origin.chart(), home_m.xy());
         let off = |place_m: &Vector2<f32>| (place_m - here_m).norm_squared();
         let points = rally.iter().map(|item| chart.local([item.x, item.y]));
         // From home on, which takes the place of rally points that are gone.
@@ -39,7 +42,8 @@ impl Dispatcher {
     /// Returns what plans are checked against.
     pub(super) fn surroundings(&self) -> Surroundings {
         let here_m = self.status.state.filter(|_| self.status.is_located()).map(|state| state.position_m.xy());
-        Surroundings { chart: self.status.aux.origin.map(|origin| origin.chart()), here_m }
+        let (origin, home_m) = (self.status.aux.origin, self.status.guided.home_m);
+        Surroundings { origin, here_m, home_m, cylinder_m: self.cylinder_m }
     }
 
     /// Looks at a part of the fence.
@@ -65,8 +69,11 @@ impl Dispatcher {
     /// True if an order would not leave the fence: its place and the straight way there.
     pub(super) fn fence_allows(&self, order: &Order) -> bool {
         let items = self.missions.fence();
-        let Surroundings { chart: Some(chart), here_m } = self.surroundings() else { return true };
-        let (Some(here_m), false) = (here_m, items.is_empty()) else { return true };
+        let Surroundings { origin: Some(origin), here_m: Some(here_m), .. } = self.surroundings() else { return true };
+        if items.is_empty() {
+            return true;
+        }
+        let chart = origin.chart();
         let or_here =
             |place_m: &Vector3<f32>| place_m.xy().zip_map(&here_m, |to, here| if to.is_nan() { here } else { to });
         match order {
@@ -90,7 +97,9 @@ impl Dispatcher {
             return leg;
         };
         match &mut leg.item {
-            Item::Waypoint { position_m: place_m, .. } | Item::Turns { centre_m: place_m, .. }
+            Item::Waypoint { position_m: place_m, .. }
+            | Item::TakeOffTo { position_m: place_m }
+            | Item::Turns { centre_m: place_m, .. }
                 if !holds(items, &chart, place_m.xy()) =>
             {
                 *place_m = Vector3::repeat(f32::NAN);

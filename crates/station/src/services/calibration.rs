@@ -134,12 +134,7 @@ impl Calibrator {
     /// Advances the procedure.
     fn find(&mut self, sample: &RawSample, mut say: impl FnMut(&Words)) -> Option<Result<(), CalibrationFailure>> {
         let found = &mut self.found;
-        let mut put = |name: &str, values: Vector3<f32>| {
-            for (axis, value) in ['X', 'Y', 'Z'].into_iter().zip(values.iter()) {
-                // Names fit, and there is room: the tests look up each.
-                found.extend(RecordName::of(name.chars().chain([axis])).map(|name| (name, *value)));
-            }
-        };
+        let mut put = |name: &str, values: Vector3<f32>| keep(found, name, &values);
         let tell = |event| words(event, &mut say);
         Some(match self.procedure.as_mut()? {
             Procedure::Gyroscope(it) => it.step(sample, tell)?.map(|offset| put("CAL_GYRO0_OFF_", offset)),
@@ -154,6 +149,15 @@ impl Calibrator {
                 put("CAL_MAG0_ODIAG_", fit.off_diagonal);
             }),
         })
+    }
+}
+
+/// Adds the parameters of three axes.
+#[inline(never)]
+fn keep(found: &mut Vec<(RecordName, f32), VALUES_MAX>, name: &str, values: &Vector3<f32>) {
+    for (axis, value) in ['X', 'Y', 'Z'].into_iter().zip(values.iter()) {
+        // Names fit, and there is room: the tests look up each.
+        found.extend(RecordName::of(name.chars().chain([axis])).map(|name| (name, *value)));
     }
 }
 
@@ -179,8 +183,9 @@ fn side_name(side: Side) -> &'static str {
     }
 }
 
-/// Says what happens, in PX4's words as far as stations read them.
-fn words(event: CalibrationEvent, say: &mut impl FnMut(&Words)) {
+/// Says what happens, in PX4's words as far as stations read them. Compiled once: every step of a procedure calls it.
+#[inline(never)]
+fn words(event: CalibrationEvent, say: &mut dyn FnMut(&Words)) {
     let cal = Words::of("[cal] ");
     match event {
         CalibrationEvent::Progress(percent) => say(&cal.and("progress <").number(percent.into()).and(">")),

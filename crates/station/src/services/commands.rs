@@ -6,9 +6,11 @@ use afbc_guidance::{Order, OrderRefusal};
 use afbc_link::{Address, Answer, Downlink};
 use heapless::Deque;
 
-/// Largest number of queued answers, besides those of flight core and guidance. Further commands are not answered, but
-/// counted.
-pub const ANSWERS_MAX: usize = 32;
+/// Largest number of different answers that wait, besides those of flight core and guidance: a command beyond that is
+/// neither carried out nor answered, as if it had not arrived, and counted.
+pub const ANSWERS_MAX: usize = 48;
+/// Number of answers that wait from which on further commands are refused as [`BUSY`].
+pub const BUSY_FROM: usize = 32;
 /// Answers sent per tick, more than commands can arrive in a millisecond at 921,600 baud.
 pub const ANSWERS_PER_TICK: usize = 3;
 /// Time after which a request without an answer counts as handled in a tick whose report was lost \[us\].
@@ -47,6 +49,8 @@ struct QueuedAnswer {
     command: u16,
     answer: Answer,
     to: Address,
+    /// Number of commands that it answers.
+    times: u16,
 }
 
 /// A command that is not answered yet.
@@ -111,9 +115,19 @@ impl Commands {
         }
     }
 
+    /// True if another command may be carried out: there is room for its answer.
+    pub fn has_room(&self) -> bool {
+        self.waiting.len() < BUSY_FROM
+    }
+
     /// Queues the answer to a command.
     pub fn answer(&mut self, command: u16, answer: Answer, to: Address) {
-        if self.waiting.push_back(QueuedAnswer { command, answer, to }).is_err() {
+        let same = |waits: &&mut QueuedAnswer| {
+            (waits.command, waits.answer, waits.to) == (command, answer, to) && waits.times < u16::MAX
+        };
+        if let Some(waits) = self.waiting.iter_mut().find(same) {
+            waits.times += 1;
+        } else if self.waiting.push_back(QueuedAnswer { command, answer, to, times: 1 }).is_err() {
             self.unanswered = self.unanswered.saturating_add(1);
         }
     }
@@ -132,8 +146,13 @@ impl Commands {
 
     /// Returns the next answer to be sent at `now_us`.
     pub fn next(&mut self, now_us: u64) -> Option<Downlink> {
-        if let Some(QueuedAnswer { command, answer, to }) = self.waiting.pop_front() {
-            return Some(Downlink::Answer { command, answer, to });
+        if let Some(QueuedAnswer { command, answer, to, times }) = self.waiting.front_mut() {
+            let next = Downlink::Answer { command: *command, answer: *answer, to: *to };
+            *times -= 1;
+            if *times == 0 {
+                self.waiting.pop_front();
+            }
+            return Some(next);
         }
         let forgotten = |open: &mut Open| now_us.saturating_sub(open.at_us) > FORGOTTEN_US;
         let mut open = self.asked.iter_mut().chain(&mut self.ordered);
@@ -152,7 +171,7 @@ impl Commands {
         }
     }
 
-    /// Returns the number of commands that were not answered.
+    /// Returns the number of commands that were neither carried out nor answered.
     pub fn unanswered(&self) -> u32 {
         self.unanswered
     }

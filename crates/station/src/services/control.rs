@@ -120,8 +120,8 @@ pub fn is_needed_for(command: Command) -> bool {
         | Command::Orbit { .. }
         | Command::Speed(_)
         | Command::Home(_)
-        | Command::StartMission(_)
-        | Command::SetCurrent(_)
+        | Command::StartMission(..)
+        | Command::SetCurrent(..)
         | Command::Reboot(_)
         | Command::Calibrate(_)
         | Command::Storage(_) => true,

@@ -4,7 +4,7 @@
 //! polygon, a vertex an item, or a circle; a circle of radius 0 is none. A few boundaries are looked at after each tick
 //! ([`FenceWatch`]), so that its cost does not depend on their number.
 
-use crate::services::mission::Invalid;
+use crate::services::mission::{Invalid, check_unused};
 use crate::services::origin::LocalChart;
 use afbc_guidance::FenceView;
 use afbc_guidance::fence::{MARGIN_M, PolygonFault, StopPath, check_polygon, distance, passes_edge};
@@ -38,7 +38,7 @@ pub fn check_item(item: &MissionItem) -> Result<(), Invalid> {
     if !circle && !VERTEX.contains(&item.command) {
         return Err(Invalid::COMMAND);
     }
-    // Heights do not matter.
+    check_unused(item, if is_inclusion(item) { 0b011_0011 } else { 0b011_0001 })?;
     if ![0, 3, 5, 6].contains(&item.frame) {
         return refuse(MissionResult::UNSUPPORTED_FRAME, "frame is not supported");
     }

@@ -86,7 +86,8 @@ impl EarthOrigin {
         }
     }
 
-    /// Returns the distances to the north and to the east in the tangent plane at the origin's altitude \[m\].
+    /// Returns the distances to the north and to the east in the tangent plane at the origin's altitude \[m\]. Places
+    /// on the far half of the earth have none there: they are infinitely far.
     fn tangent(&self, place: &Global) -> [f64; 2] {
         let (sine, cosine) = libm::sincos(place.latitude_deg * DEG);
         // Altitudes are along the vertical of the place: only directions count.
@@ -100,6 +101,9 @@ impl EarthOrigin {
             degrees
         };
         let (turn_sine, turn_cosine) = libm::sincos(turn * DEG);
+        if self.cosine * from_axis_m * turn_cosine + self.sine * from_equator_m < 0.0 {
+            return [f64::INFINITY; 2];
+        }
         let north = self.cosine * (from_equator_m - self.from_equator_m)
             - self.sine * (from_axis_m * turn_cosine - self.from_axis_m);
         [north, from_axis_m * turn_sine]
@@ -256,6 +260,28 @@ mod tests {
         let back = Global::of_e7([-123_456_789, 1_234_567_891], 7.5);
         assert!((back.latitude_deg + 12.345_678_9).abs() < 1e-9 && (back.longitude_deg - 123.456_789_1).abs() < 1e-9);
         assert_eq!(back.altitude_m, 7.5);
+    }
+
+    /// Any place on the earth is where it is, as far as its distance over the ground says, or at least beyond all that
+    /// is flown to: none is taken for one near the origin.
+    #[test]
+    fn no_place_is_folded_onto_another() {
+        for at in [[47.4, 8.5], [0.0, 0.0], [-33.9, 151.2], [89.9, 10.0], [-89.9, -170.0], [60.0, 179.9]] {
+            let [latitude_deg, longitude_deg] = at;
+            let origin = EarthOrigin::new(Global { latitude_deg, longitude_deg, altitude_m: 0.0 }).expect("possible");
+            for (latitude, longitude) in
+                (-90..=90).flat_map(|x| (-180..=180).map(move |y| (f64::from(x), f64::from(y))))
+            {
+                let local = origin.local(&Global { latitude_deg: latitude, longitude_deg: longitude, altitude_m: 0.0 });
+                let turn = (longitude - longitude_deg) * DEG;
+                let (a, b) = (latitude_deg * DEG, latitude * DEG);
+                let cosine = a.sin() * b.sin() + a.cos() * b.cos() * turn.cos();
+                let over_m = 6_371_000.0 * cosine.clamp(-1.0, 1.0).acos();
+                let near = local.xy().norm() < 9e4;
+                assert!(!near || over_m < 1e5, "{at:?}: {latitude} {longitude} at {local}, {over_m} m off");
+                assert!(near || over_m > 8e4, "{at:?}: {latitude} {longitude} at {local}, {over_m} m off");
+            }
+        }
     }
 
     /// Heights above the origin, in both directions, and across the date line to the west too.

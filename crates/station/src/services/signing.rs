@@ -14,11 +14,20 @@ use heapless::Vec;
 pub const STREAMS_MAX: usize = 6;
 /// How far the first frame of a sender may be behind the clock \[10 us\]: a minute.
 const BEHIND_MAX_10US: u64 = 6_000_000;
+/// How far a sender may move on the clock that has come with the key \[10 us\]: an hour. What is further ahead is heard
+/// but not remembered beyond the next start, so it could be replayed then.
+const AHEAD_MAX_10US: u64 = 360_000_000;
+/// Latest time that a frame may have \[10 us\]: ten years before the wire's 48 bits end, so that those that are sent
+/// later have times of their own.
+const LATEST_10US: u64 = TIME_MAX - 10 * 365 * 86_400 * SECOND_10US;
 const SECOND_10US: u64 = 100_000;
 /// Seconds that the clock runs before it is kept again while the vehicle is disarmed.
 const KEPT_EVERY_S: u32 = 120;
 /// The vehicle's own link.
 const LINK: u8 = 0;
+
+/// Text on a vehicle that has no key.
+const OFF: &str = "signing: off, no key";
 
 /// Names of the records: check of the key, seconds of the clock, words of the key.
 const CHECK: &str = "_SIGN_CHECK";
@@ -70,8 +79,11 @@ pub struct Signing {
     /// The clock at power-up, and of the last frame signed, since the beginning of 2015 \[10 us\].
     started_10us: u64,
     signed_10us: u64,
-    /// The clock that was kept at the last start: what a sender has sent before is not heard \[10 us\].
+    /// What a sender that is not known has sent up to here is not heard: the clock that was kept at the last start, or
+    /// that has come with the same key again \[10 us\].
     floor_10us: u64,
+    /// True if the clock has come with the key since the start: it is right, whatever a sender's is.
+    is_set: bool,
     streams: Vec<Stream, STREAMS_MAX>,
     /// Seconds of the clock that are kept.
     kept_s: u32,
@@ -153,6 +165,9 @@ impl Signing {
     /// True if a frame is signed with the key and newer than all of its sender; the next must be newer than this one.
     fn is_genuine(&mut self, now_us: u64, frame: &ReceivedFrame<'_>, key: &Key) -> bool {
         let Some(Stamp { link, time_10us }) = frame.stamp() else { return false };
+        if time_10us > LATEST_10US {
+            return false;
+        }
         let clock_10us = self.clock_10us(now_us);
         let known = self.streams.iter().position(|stream| stream.from == frame.from && stream.link == link);
         let is_new = match known.and_then(|place| self.streams.get(place)) {
@@ -172,7 +187,11 @@ impl Signing {
             // There is room.
             None => drop(self.streams.push(Stream { from: frame.from, link, time_10us })),
         }
-        self.set_clock(now_us, time_10us);
+        // One whose clock is ahead is heard, and must not lock others out. After a start nobody knows how long the
+        // vehicle has been off: the newest frame says it.
+        if !self.is_set || time_10us <= clock_10us.saturating_add(AHEAD_MAX_10US) {
+            self.set_clock(now_us, time_10us);
+        }
         true
     }
 
@@ -181,14 +200,23 @@ impl Signing {
         if armed {
             return SetupOutcome::Refused("signing key not changed: armed");
         }
-        let lock = setup.key.map_or(Lock::Open, Lock::Signed);
-        if lock != self.lock {
-            // Nothing that was signed before counts, and a clock that was set wrong does not stay so.
-            let started_10us = setup.time_10us.saturating_sub(now_us / 10);
-            *self = Signing { lock, started_10us, unkept: Some(0), was_armed: self.was_armed, ..Signing::default() };
+        if setup.time_10us > LATEST_10US {
+            return SetupOutcome::Refused("signing key not changed: its time is wrong");
         }
-        self.set_clock(now_us, setup.time_10us);
-        SetupOutcome::Done(if self.is_on() { "signing: on, key set" } else { "signing: off, no key" })
+        let lock = setup.key.map_or(Lock::Open, Lock::Signed);
+        if lock == Lock::Open && !self.is_on() {
+            return SetupOutcome::Done(OFF);
+        }
+        // With the same key, what was signed before does not count again, and what is sent goes on to grow. The next
+        // frame of whoever sets it may have the same time.
+        let (floor_10us, signed_10us) =
+            if lock == self.lock { (setup.time_10us.saturating_sub(1), self.signed_10us) } else { (0, 0) };
+        // A clock that was set wrong does not stay so, nor do senders that are not there any more.
+        let started_10us = setup.time_10us.saturating_sub(now_us / 10);
+        let was_armed = self.was_armed;
+        let new = Signing { lock, started_10us, signed_10us, floor_10us, was_armed, ..Signing::default() };
+        *self = Signing { is_set: true, unkept: Some(0), ..new };
+        SetupOutcome::Done(if self.is_on() { "signing: on, key set" } else { OFF })
     }
 
     /// Returns key and stamp of the next frame to be sent, if it is to be signed.

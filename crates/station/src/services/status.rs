@@ -111,9 +111,10 @@ impl VehicleStatus {
         (self.time_us / 1000) as u32
     }
 
-    /// Returns the flight mode that is reported to stations.
+    /// Returns the flight mode that is reported to stations: that of the guidance, which orders change as soon as the
+    /// state is back, also while the flight core still descends.
     pub fn flight_mode(&self) -> FlightMode {
-        if self.mode == Mode::Descending { FlightMode::Land } else { self.guided.mode }
+        if self.mode == Mode::Descending && !self.is_located() { FlightMode::Land } else { self.guided.mode }
     }
 
     /// True if the vehicle knows where it is.
@@ -151,6 +152,8 @@ mod tests {
             let reported = if mode == Mode::Descending { FlightMode::Land } else { FlightMode::Mission };
             assert_eq!(status.flight_mode(), reported);
         }
+        status.state = Some(State::default());
+        assert_eq!(status.flight_mode(), FlightMode::Mission, "chosen since the state is back");
         for airborne in [true, false] {
             status.guided.airborne = airborne;
             assert_eq!(status.is_airborne(), airborne);

@@ -41,7 +41,7 @@ fn numbered(items: Vec<MissionItem>) -> Vec<MissionItem> {
 }
 
 fn around(here: Option<[f32; 2]>) -> Surroundings {
-    Surroundings { chart: Some(origin().chart()), here_m: here.map(Vector2::from) }
+    Surroundings { origin: Some(origin()), here_m: here.map(Vector2::from), ..Surroundings::default() }
 }
 
 /// Uploads a fence; returns the outcome and the text.
@@ -129,8 +129,9 @@ proptest! {
     #[test]
     fn what_was_uploaded_can_be_downloaded(items in fences(), mission in 0..5_u16) {
         let mut missions = Missions::default();
+        let [x, y] = at([1.0, 2.0]);
         for number in 0..mission {
-            let waypoint = MissionItem { number, command: 16, frame: 6, ..MissionItem::default() };
+            let waypoint = MissionItem { number, command: 16, frame: 6, x, y, ..MissionItem::default() };
             if number == 0 {
                 missions.hear(Mission::Count(mission, Plan::MISSION), A, true, 0, &around(None));
             }

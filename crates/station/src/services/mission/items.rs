@@ -2,7 +2,7 @@
 
 use crate::services::origin::{EarthOrigin, LocalChart, resolve};
 use crate::services::texts::Words;
-use afbc_guidance::Item;
+use afbc_guidance::{Item, is_place};
 use afbc_link::{Datum, Height, MissionItem, MissionResult, Place};
 use nalgebra::{Vector2, Vector3};
 
@@ -48,8 +48,11 @@ const NAMES: [(u16, &str); 19] = [
     (2500, "VIDEO_START_CAPTURE"),
     (2501, "VIDEO_STOP_CAPTURE"),
 ];
-/// Reason that follows the name of a command.
+/// Reason that follows the name of a command, and one that follows the number of a parameter.
 const UNSUPPORTED: &str = " unsupported";
+const NOT_USED: &str = " must be 0";
+/// A place that is not flown to.
+pub(super) const FAR: Invalid = Invalid { result: MissionResult::INVALID_X, reason: "too far away" };
 /// Most repetitions of a jump.
 const REPEATS_MAX: f32 = 1000.0;
 
@@ -69,6 +72,10 @@ impl Invalid {
     /// Returns a text on the item of this number and command in a plan.
     pub(super) fn text(self, plan: &str, number: u16, command: u16) -> Words {
         let words = Words::of(plan).and(" item ").number(number.into()).and(": ");
+        if self.reason == NOT_USED {
+            let parameter = self.result.0.saturating_sub(MissionResult::INVALID_PARAM1.0) + 1;
+            return words.and("parameter ").number(parameter.into()).and(self.reason);
+        }
         if self != Invalid::COMMAND {
             return words.and(self.reason);
         }
@@ -86,6 +93,8 @@ impl Invalid {
 /// The first thing that is wrong with it.
 pub fn check(item: &MissionItem) -> Result<(), Invalid> {
     let refuse = |result, reason| Err(Invalid { result, reason });
+    let used = used(item).ok_or(Invalid::COMMAND)?;
+    check_unused(item, used)?;
     let within = |number: f32, max: f32| number.is_nan() || (0.0..=max).contains(&number);
     let [first, second, third, fourth] = item.parameters;
     match item.command {
@@ -95,14 +104,20 @@ pub fn check(item: &MissionItem) -> Result<(), Invalid> {
         OLD_LOOK => return refuse(MissionResult::INVALID_PARAM1, "kind of region is not supported"),
         RETURN | LOOK_NOWHERE => return Ok(()),
         SPEED => {
+            let speed_known = KEPT.contains(&second) || (second > 0.0 && second <= 1e3);
             return match item.parameters {
-                // -1: no change.
-                [0.0 | 1.0, speed, ..] if speed == -1.0 || (speed > 0.0 && speed <= 1e3) => Ok(()),
-                [0.0 | 1.0, ..] => refuse(MissionResult(7), "speed is out of range"),
+                [0.0 | 1.0, ..] if !speed_known => refuse(MissionResult(7), "speed is out of range"),
+                [0.0 | 1.0, _, throttle, _] if !(is_neutral(throttle) || KEPT.contains(&throttle)) => {
+                    refuse(MissionResult(8), "a throttle is not set")
+                }
+                [0.0 | 1.0, ..] => Ok(()),
                 _ => refuse(MissionResult::INVALID_PARAM1, "kind of speed is not supported"),
             };
         }
-        DELAY if (0.0..=86_400.0).contains(&first) => return Ok(()),
+        DELAY if (0.0..=86_400.0).contains(&first) => {
+            let clock = [second, third, fourth].into_iter().any(|part| !(is_neutral(part) || part == -1.0));
+            return if clock { refuse(MissionResult(7), "a time of day is not known") } else { Ok(()) };
+        }
         DELAY if first < 0.0 => return refuse(MissionResult::INVALID_PARAM1, "a time of day is not known"),
         DELAY => return refuse(MissionResult::INVALID_PARAM1, "delay is out of range"),
         YAW => {
@@ -125,18 +140,15 @@ pub fn check(item: &MissionItem) -> Result<(), Invalid> {
                 Ok(())
             };
         }
+        // Never: it is used above.
         _ => return Err(Invalid::COMMAND),
     }
     let Some(place) = place(item) else {
         return refuse(MissionResult::UNSUPPORTED_FRAME, "frame is not supported");
     };
-    // A take-off goes straight up: of its place, only the height counts.
-    if item.command != TAKE_OFF {
-        // A landing may be where the vehicle is.
-        let anywhere = item.command == LAND && place.latitude_e7 == 0 && place.longitude_e7 == 0;
-        if !anywhere {
-            on_earth(&place)?;
-        }
+    // A take-off and a landing may be where the vehicle is.
+    if !is_here(item) {
+        on_earth(&place)?;
     }
     // Heights of a landing and of a region do not matter.
     let any_height = item.z.is_nan() && [LAND, LOOK, OLD_LOOK].contains(&item.command);
@@ -167,15 +179,75 @@ pub fn check(item: &MissionItem) -> Result<(), Invalid> {
 ///
 /// # Errors
 /// The first thing that is wrong with it.
-pub(super) fn check_rally(item: &MissionItem) -> Result<(), Invalid> {
+pub(super) fn check_rally(item: &MissionItem, origin: Option<&EarthOrigin>) -> Result<(), Invalid> {
     if item.command != RALLY_POINT {
         return Err(Invalid::COMMAND);
     }
+    check_unused(item, PLACE)?;
     let global = place(item).filter(|_| item.frame != LOCAL_NED);
     let Some(place) = global else {
         return Err(Invalid { result: MissionResult::UNSUPPORTED_FRAME, reason: "frame is not supported" });
     };
-    on_earth(&place)
+    on_earth(&place)?;
+    let near = resolve_item(item, origin, 0.0).is_none_or(|place_m| is_place(&place_m));
+    if near { Ok(()) } else { Err(FAR) }
+}
+
+/// Parameters of a place, a bit each.
+const PLACE: u8 = 0b111_0000;
+
+/// Returns which parameters of a command are used, a bit each from the first on; none of a command that is not known.
+fn used(item: &MissionItem) -> Option<u8> {
+    let [first, ..] = item.parameters;
+    Some(match item.command {
+        WAYPOINT => PLACE | 0b1011,
+        LOITER => PLACE | 0b1000,
+        LOITER_TURNS => PLACE | 0b0101,
+        LOITER_TIME => PLACE | 0b1001,
+        // The pitch is a fixed wing's, which ground stations write into the take-off of any vehicle.
+        TAKE_OFF => PLACE | 0b0001,
+        LAND | LOITER_TO_ALTITUDE | LOOK => PLACE,
+        RETURN | LOOK_NOWHERE => 0,
+        OLD_LOOK if first == 0.0 => 0b0001,
+        OLD_LOOK => PLACE | 0b0001,
+        DELAY => 0b1111,
+        YAW => 0b1101,
+        JUMP => 0b0011,
+        SPEED => 0b0111,
+        _ => return None,
+    })
+}
+
+/// Checks that nothing is asked for by parameters that are not `used`, a bit each: nothing is ignored in silence.
+///
+/// # Errors
+/// The first one that is neither 0 nor left out.
+pub(in crate::services) fn check_unused(item: &MissionItem, used: u8) -> Result<(), Invalid> {
+    let [p1, p2, p3, p4] = item.parameters.map(is_neutral);
+    let [x, y] = [item.x, item.y].map(|whole| whole == 0 || whole == Place::AS_IT_IS);
+    for (place, neutral) in (0..).zip([p1, p2, p3, p4, x, y, is_neutral(item.z)]) {
+        if used >> place & 1 == 0 && !neutral {
+            let result = MissionResult(MissionResult::INVALID_PARAM1.0 + place);
+            return Err(Invalid { result, reason: NOT_USED });
+        }
+    }
+    Ok(())
+}
+
+/// True of a parameter that asks for nothing.
+fn is_neutral(value: f32) -> bool {
+    value == 0.0 || value.is_nan()
+}
+
+/// Speeds and throttles of DO_CHANGE_SPEED that change nothing, and that are the usual ones again.
+const KEPT: [f32; 2] = [NO_CHANGE, USUAL];
+const NO_CHANGE: f32 = -1.0;
+const USUAL: f32 = -2.0;
+
+/// True of a take-off or a landing where the vehicle is.
+fn is_here(item: &MissionItem) -> bool {
+    let nowhere = [[0; 2], [Place::AS_IT_IS; 2]].contains(&[item.x, item.y]);
+    nowhere && [TAKE_OFF, LAND].contains(&item.command)
 }
 
 fn on_earth(place: &Place) -> Result<(), Invalid> {
@@ -235,8 +307,8 @@ fn whole(number: f32, most: f32) -> Option<u16> {
 
 /// Returns where an item wants the vehicle to be, horizontally \[m\]; none of an item without a place.
 pub(super) fn stop_m(item: &MissionItem, chart: &LocalChart) -> Option<Vector2<f32>> {
-    let here = item.command == LAND && item.x == 0 && item.y == 0;
-    if here || ![WAYPOINT, LOITER, LOITER_TURNS, LOITER_TIME, LOITER_TO_ALTITUDE, LAND].contains(&item.command) {
+    let stops = [TAKE_OFF, WAYPOINT, LOITER, LOITER_TURNS, LOITER_TIME, LOITER_TO_ALTITUDE, LAND];
+    if is_here(item) || !stops.contains(&item.command) {
         return None;
     }
     if item.frame == LOCAL_NED {
@@ -252,7 +324,8 @@ pub fn to_guidance(item: &MissionItem, origin: Option<&EarthOrigin>, home_m: f32
     let or_zero = |number: f32| if number.is_nan() { 0.0 } else { number };
     let position_m = || resolve_item(item, origin, home_m);
     Some(match item.command {
-        TAKE_OFF => Item::TakeOff { height_m: position_m()?.z },
+        TAKE_OFF if is_here(item) => Item::TakeOff { height_m: position_m()?.z },
+        TAKE_OFF => Item::TakeOffTo { position_m: position_m()? },
         // 0 repetitions are none, and -1 are any number: see `Jumps`.
         JUMP => Item::Jump(whole(first, f32::from(u8::MAX))?),
         LOITER => Item::Waypoint {
@@ -285,15 +358,16 @@ pub fn to_guidance(item: &MissionItem, origin: Option<&EarthOrigin>, home_m: f32
         },
         LOITER_TIME => Item::Waypoint {
             position_m: position_m()?,
-            yaw_rad: f32::NAN,
+            yaw_rad: -fourth.to_radians(),
             hold_s: or_zero(first),
             within_m: 0.0,
             fly_through: false,
         },
-        LAND if item.x == 0 && item.y == 0 => Item::Land { position_m: Vector3::from_element(f32::NAN) },
+        LAND if is_here(item) => Item::Land { position_m: Vector3::from_element(f32::NAN) },
         LAND => Item::Land { position_m: position_m()? },
         RETURN => Item::Return,
-        SPEED => Item::Speed(second),
+        SPEED if second == NO_CHANGE => Item::Wait(0.0),
+        SPEED => Item::Speed(if second == USUAL { f32::INFINITY } else { second }),
         _ => return None,
     })
 }

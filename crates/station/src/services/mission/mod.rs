@@ -9,17 +9,18 @@ mod jumps;
 mod plans;
 mod upload;
 
+pub(super) use items::check_unused;
 pub use items::{ITEMS_MAX, Invalid, check, to_guidance};
 
 use crate::services::fence;
-use crate::services::origin::{EarthOrigin, LocalChart};
+use crate::services::origin::EarthOrigin;
 use crate::services::texts::Words;
-use afbc_guidance::{Item, Leg};
+use afbc_guidance::{Item, Leg, Net, OrderRefusal};
 use afbc_link::{Address, Mission, MissionCurrent, MissionItem, MissionResult, Plan};
 use heapless::Deque;
-use items::{check_jumps, check_rally, stop_m};
+use items::{FAR, check_jumps, check_rally, stop_m};
 use jumps::Jumps;
-use nalgebra::Vector2;
+use nalgebra::{Vector2, Vector3};
 use plans::PlanItems;
 use upload::Upload;
 
@@ -29,10 +30,14 @@ const OUT_MAX: usize = 8;
 /// What plans are checked against.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Surroundings {
-    /// What converts places, if the origin is known.
-    pub chart: Option<LocalChart>,
+    /// Where the local frame is, if that is known.
+    pub origin: Option<EarthOrigin>,
     /// Where the vehicle is, if that is known \[m\].
     pub here_m: Option<Vector2<f32>>,
+    /// Home, if there is one \[m\].
+    pub home_m: Option<Vector3<f32>>,
+    /// Radius and height of the cylinder around home; 0 for none \[m\].
+    pub cylinder_m: [f32; 2],
 }
 
 /// The plans and their transfer.
@@ -41,6 +46,8 @@ pub struct Missions {
     plans: PlanItems,
     /// Which upload of the mission it is.
     number: u16,
+    /// The item that ends the mission before its end.
+    last: Option<u16>,
     jumps: Jumps,
     upload: Option<Upload>,
     /// Station, plan and last item of the last upload, in case its answer is lost.
@@ -70,6 +77,10 @@ impl Missions {
         around: &Surroundings,
     ) -> Heard {
         let mut heard = Heard::default();
+        if self.out.is_full() {
+            // As if it had not arrived: nothing is done that nobody is told of.
+            return heard;
+        }
         match message {
             Mission::List(plan) => self.say(Mission::Count(self.count(plan), plan), from),
             Mission::Request(number, plan) => match self.item(number, plan) {
@@ -136,7 +147,7 @@ impl Missions {
         let items = self.items();
         let of_station = items.get(usize::from(number))?;
         let mut item = to_guidance(of_station, origin, home_m)?;
-        let mut is_last = usize::from(number) + 1 == items.len();
+        let mut is_last = usize::from(number) + 1 == items.len() || self.last == Some(number);
         if let Item::Jump(target) = &mut item {
             *target = self.jumps.next(of_station, *target);
             is_last &= usize::from(*target) == items.len();
@@ -154,6 +165,18 @@ impl Missions {
     /// Notes that the mission begins anew.
     pub fn restart(&mut self) {
         self.jumps.clear();
+    }
+
+    /// Ends the mission with this item from now on, or with its last one; returns whether that is another one.
+    pub fn set_last(&mut self, last: Option<u16>) -> bool {
+        core::mem::replace(&mut self.last, last) != last
+    }
+
+    /// Returns what is wrong with the first item of the mission that cannot be flown now.
+    pub fn problem(&self, around: &Surroundings) -> Option<Words> {
+        let (number, invalid) = check_places(self.items(), self.fence(), around).err()?;
+        let command = self.items().get(usize::from(number)).map_or(0, |item| item.command);
+        Some(invalid.text(name(Plan::MISSION), number, command))
     }
 
     /// Returns the items of the mission.
@@ -245,7 +268,7 @@ impl Missions {
         }
         let mut checked = match plan {
             Plan::FENCE => fence::check_item(&item),
-            Plan::RALLY => check_rally(&item),
+            Plan::RALLY => check_rally(&item, around.origin.as_ref()),
             _ => check(&item),
         }
         .map_err(|invalid| (item.number, invalid));
@@ -256,10 +279,12 @@ impl Missions {
         }
         if checked.is_ok() {
             checked = match plan {
-                Plan::FENCE => fence::check(&upload.items, around.chart.as_ref(), around.here_m),
-                Plan::MISSION => {
-                    check_jumps(&upload.items).and_then(|()| check_places(&upload.items, &self.plans, around))
+                Plan::FENCE => {
+                    let chart = around.origin.map(|origin| origin.chart());
+                    fence::check(&upload.items, chart.as_ref(), around.here_m)
                 }
+                Plan::MISSION => check_jumps(&upload.items)
+                    .and_then(|()| check_places(&upload.items, self.plans.of(Plan::FENCE), around)),
                 _ => Ok(()),
             };
         }
@@ -291,6 +316,7 @@ impl Missions {
     /// Notes that there is another mission.
     fn renew(&mut self) {
         self.number = self.number.wrapping_add(1);
+        self.last = None;
         self.jumps.clear();
     }
 
@@ -303,14 +329,23 @@ impl Missions {
     }
 }
 
-/// Checks that the places of a mission are inside the fence, where both are known.
-fn check_places(items: &[MissionItem], plans: &PlanItems, around: &Surroundings) -> Result<(), (u16, Invalid)> {
-    let (areas, Some(chart)) = (plans.of(Plan::FENCE), &around.chart) else { return Ok(()) };
-    let outside = |item: &&MissionItem| stop_m(item, chart).is_some_and(|stop_m| !fence::holds(areas, chart, stop_m));
-    match items.iter().find(outside).filter(|_| !areas.is_empty()) {
-        Some(item) => Err((item.number, Invalid { result: MissionResult::DENIED, reason: "outside the geofence" })),
-        None => Ok(()),
-    }
+/// Checks that the guidance would fly each item of a mission, and that its place is inside the fence, as far as that is
+/// known.
+fn check_places(items: &[MissionItem], fence: &[MissionItem], around: &Surroundings) -> Result<(), (u16, Invalid)> {
+    let [fence_radius_m, fence_height_m] = around.cylinder_m;
+    let (net, home_m) = (Net { fence_radius_m, fence_height_m, ..Net::DEFAULT }, around.home_m);
+    let chart = around.origin.filter(|_| !fence.is_empty()).map(|origin| origin.chart());
+    let flown = |item: &MissionItem| {
+        let flown = to_guidance(item, around.origin.as_ref(), home_m.map_or(0.0, |home_m| home_m.z));
+        flown.map_or(Ok(()), |flown| flown.check(&net, home_m.as_ref()))?;
+        let stop_m = chart.as_ref().and_then(|chart| Some((chart, stop_m(item, chart)?)));
+        let inside = stop_m.is_none_or(|(chart, stop_m)| fence::holds(fence, chart, stop_m));
+        if inside { Ok(()) } else { Err(OrderRefusal::OutsideFence) }
+    };
+    let outside = Invalid { result: MissionResult::DENIED, reason: "outside the geofence" };
+    items.iter().try_for_each(|item| {
+        flown(item).map_err(|refusal| (item.number, if refusal == OrderRefusal::OutsideFence { outside } else { FAR }))
+    })
 }
 
 /// Returns the name of a plan.

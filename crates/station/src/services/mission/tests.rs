@@ -7,6 +7,8 @@
 )]
 
 extern crate std;
+mod jumps;
+
 use super::upload::{PATIENCE_US, TRIES};
 use super::*;
 use crate::services::origin::Global;
@@ -16,7 +18,7 @@ use std::vec::Vec as List;
 const A: Address = Address { system: 255, component: 190 };
 const B: Address = Address { system: 245, component: 190 };
 const PLAN: Plan = Plan::MISSION;
-const NOWHERE: Surroundings = Surroundings { chart: None, here_m: None };
+const NOWHERE: Surroundings = Surroundings { origin: None, here_m: None, home_m: None, cylinder_m: [0.0; 2] };
 
 fn waypoint(number: u16) -> MissionItem {
     MissionItem {
@@ -158,6 +160,7 @@ fn each_invalid_number_is_named() {
     let good = waypoint(0);
     assert_eq!(check(&good), Ok(()));
     let [_, _, _, yaw] = good.parameters;
+    let bare = MissionItem { x: 0, y: 0, z: 0.0, ..good };
     let cases = [
         (MissionItem { frame: 10, ..good }, MissionResult::UNSUPPORTED_FRAME),
         (MissionItem { x: 900_000_001, ..good }, MissionResult::INVALID_X),
@@ -168,8 +171,8 @@ fn each_invalid_number_is_named() {
         (MissionItem { parameters: [-1.0, 0.0, 0.0, yaw], ..good }, MissionResult::INVALID_PARAM1),
         (MissionItem { parameters: [0.0, f32::INFINITY, 0.0, yaw], ..good }, MissionResult(7)),
         (MissionItem { parameters: [0.0, 0.0, 0.0, 1e9], ..good }, MissionResult(9)),
-        (MissionItem { command: 178, parameters: [1.0, 0.0, 0.0, 0.0], ..good }, MissionResult(7)),
-        (MissionItem { command: 178, parameters: [3.0, 5.0, 0.0, 0.0], ..good }, MissionResult::INVALID_PARAM1),
+        (MissionItem { command: 178, parameters: [1.0, 0.0, 0.0, 0.0], ..bare }, MissionResult(7)),
+        (MissionItem { command: 178, parameters: [3.0, 5.0, 0.0, 0.0], ..bare }, MissionResult::INVALID_PARAM1),
         (MissionItem { command: 92, ..good }, MissionResult::UNSUPPORTED),
     ];
     for (item, result) in cases {
@@ -183,7 +186,7 @@ fn the_guidance_gets_items_in_the_local_frame() {
     let origin = EarthOrigin::new(at).expect("possible");
     let mut missions = Missions::default();
     let [latitude, longitude] = Global { altitude_m: 0.0, ..at }.e7();
-    let take_off = MissionItem { command: 22, ..waypoint(0) };
+    let take_off = MissionItem { command: 22, x: 0, y: 0, ..waypoint(0) };
     // 10 m above the sea's level of the origin, to the north.
     let north = MissionItem { frame: 0, x: latitude + 1000, y: longitude, z: 498.0, ..waypoint(1) };
     let local = MissionItem { frame: 1, x: 20_000, y: 30_000, z: -4.0, ..waypoint(2) };
@@ -211,7 +214,8 @@ fn items_reach_up_to_their_limits() {
     let good = waypoint(0);
     let with = |first, second, fourth| MissionItem { parameters: [first, second, 0.0, fourth], ..good };
     let (loiter, land, take_off) = (19, 21, 22);
-    let speed = |kind, speed| MissionItem { command: 178, frame: 99, parameters: [kind, speed, 0.0, 0.0], ..good };
+    let bare = MissionItem { x: 0, y: 0, z: 0.0, ..good };
+    let speed = |kind, speed| MissionItem { command: 178, frame: 99, parameters: [kind, speed, 0.0, 0.0], ..bare };
     for (item, expected) in [
         (MissionItem { x: 900_000_000, y: -1_800_000_000, z: 1e5, ..good }, OK),
         (MissionItem { x: -900_000_000, y: 1_800_000_000, z: -1e5, ..good }, OK),
@@ -229,24 +233,33 @@ fn items_reach_up_to_their_limits() {
         (with(0.0, 0.0, 3600.5), fourth),
         (with(0.0, 0.0, -3600.5), fourth),
         // The second one of a stay is no radius; its time and heading count.
-        (MissionItem { command: loiter, ..with(0.0, -7.0, 0.0) }, OK),
+        (MissionItem { command: loiter, ..with(0.0, -7.0, 0.0) }, second),
         (MissionItem { command: loiter, ..with(3601.0, 0.0, 0.0) }, first),
         (MissionItem { command: loiter, ..with(0.0, 0.0, 1e9) }, fourth),
-        // A landing is where the vehicle is, or somewhere; its height does not matter, nor do its numbers.
-        (MissionItem { command: land, x: 0, y: 0, z: f32::NAN, ..with(-1.0, -1.0, 1e9) }, OK),
+        // A landing is where the vehicle is, or somewhere; its height does not matter, and it has no numbers.
+        (MissionItem { command: land, x: 0, y: 0, z: f32::NAN, ..good }, OK),
+        (MissionItem { command: land, x: i32::MAX, y: i32::MAX, z: f32::NAN, ..good }, OK),
+        (MissionItem { command: land, ..with(-1.0, -1.0, 1e9) }, first),
+        (MissionItem { command: land, ..with(0.0, -1.0, 1e9) }, second),
+        (MissionItem { command: land, ..with(0.0, 0.0, 1e9) }, fourth),
         (MissionItem { command: land, z: f32::NAN, ..good }, OK),
         (MissionItem { command: land, z: 2e5, ..good }, z),
         (MissionItem { command: land, x: i32::MAX, ..good }, x),
         (MissionItem { command: land, x: 0, y: i32::MAX, ..good }, y),
         (MissionItem { command: land, x: i32::MAX, y: 0, ..good }, x),
-        // A take-off is here: its place does not count, its height does.
-        (MissionItem { command: take_off, x: i32::MAX, y: i32::MIN, ..with(-1.0, -1.0, 1e9) }, OK),
+        // A take-off is here, or leads somewhere.
+        (MissionItem { command: take_off, x: i32::MAX, y: i32::MAX, ..good }, OK),
+        (MissionItem { command: take_off, x: 0, y: 0, ..good }, OK),
+        (MissionItem { command: take_off, x: i32::MAX, ..good }, x),
+        (MissionItem { command: take_off, y: i32::MIN, ..good }, y),
+        (MissionItem { command: take_off, ..with(15.0, 0.0, 0.0) }, OK),
         (MissionItem { command: take_off, z: f32::NAN, ..good }, z),
-        (MissionItem { command: 20, frame: 99, x: i32::MAX, z: f32::NAN, ..good }, OK),
+        (MissionItem { command: 20, frame: 99, x: i32::MAX, z: f32::NAN, ..bare }, OK),
         (speed(0.0, 1000.0), OK),
         (speed(1.0, 0.5), OK),
         (speed(1.0, -1.0), OK),
-        (speed(1.0, -2.0), second),
+        (speed(1.0, -2.0), OK),
+        (speed(1.0, -3.0), second),
         (speed(0.0, 0.0), second),
         (speed(0.0, 1000.5), second),
         (speed(0.0, f32::NAN), second),
@@ -254,7 +267,10 @@ fn items_reach_up_to_their_limits() {
     ] {
         assert_eq!(check(&item).err().map(|invalid| invalid.result), expected, "{item:?}");
     }
-    let item = |command, parameters| MissionItem { command, parameters, ..good };
+    let item = |command: u16, parameters| {
+        let placed = [17, 18, 31, 195, 201].contains(&command);
+        MissionItem { command, parameters, ..if placed { good } else { bare } }
+    };
     let (eighth, nan) = (Some(MissionResult(8)), f32::NAN);
     for (item, expected) in [
         (item(93, [86_400.0, 0.0, 0.0, 0.0]), OK),
@@ -277,9 +293,15 @@ fn items_reach_up_to_their_limits() {
         (item(177, [0.0, -2.0, 0.0, 0.0]), second),
         (item(177, [0.0, 1001.0, 0.0, 0.0]), second),
         (item(177, [0.0, nan, 0.0, 0.0]), second),
-        (item(201, [0.0, 0.0, 0.0, 0.0]), OK),
+        (MissionItem { command: 201, parameters: [0.0; 4], ..bare }, OK),
+        (item(201, [0.0; 4]), x),
         (item(201, [3.0, 0.0, 0.0, 0.0]), OK),
         (item(201, [1.0, 0.0, 0.0, 0.0]), first),
+        (item(178, [1.0, 5.0, 50.0, 0.0]), eighth),
+        (item(178, [1.0, 5.0, -2.0, 1.0]), fourth),
+        (item(115, [90.0, 20.0, 0.0, 0.0]), second),
+        (item(18, [1.0, 0.0, 10.0, 1.0]), fourth),
+        (item(93, [5.0, 12.0, -1.0, -1.0]), second),
         (MissionItem { z: nan, ..item(195, [0.0; 4]) }, OK),
         (MissionItem { x: i32::MAX, ..item(195, [0.0; 4]) }, x),
         (MissionItem { z: nan, ..item(17, [0.0; 4]) }, z),
@@ -295,9 +317,11 @@ fn items_reach_up_to_their_limits() {
         }
     }
     for command in 0..1000 {
-        let known = [16, 17, 18, 19, 20, 21, 22, 31, 93, 115, 177, 178, 195, 197].contains(&command);
-        let item = MissionItem { command, parameters: [1.0, 1.0, 0.0, 0.0], ..good };
-        assert_eq!(check(&item).is_ok(), known, "{command}");
+        let known = [16, 17, 18, 19, 20, 21, 22, 31, 93, 115, 177, 178, 195, 197, 201].contains(&command);
+        let all = [[0.0; 4], [1.0, 1.0, 0.0, 0.0]].into_iter().flat_map(|parameters| {
+            [good, bare].map(|item| check(&MissionItem { command, parameters, ..item }).is_ok())
+        });
+        assert_eq!(all.into_iter().any(|ok| ok), known, "{command}");
     }
 }
 
@@ -329,7 +353,7 @@ fn each_item_is_one_of_the_guidance() {
         panic!("no stay")
     };
     near(position_m, 30.0, -20.0, 9.0);
-    assert!(yaw_rad.is_nan());
+    assert!((yaw_rad + core::f32::consts::FRAC_PI_2).abs() < 1e-6, "{yaw_rad}");
     assert_eq!((hold_s, within_m, fly_through), (12.0, 0.0, false));
     let Some(Item::Land { position_m }) = there(&MissionItem { command: 21, ..full }) else { panic!("no landing") };
     near(position_m, 30.0, -20.0, 9.0);
@@ -339,14 +363,21 @@ fn each_item_is_one_of_the_guidance() {
         };
         assert_eq!(position_m.x.is_nan(), here, "{x} {y}");
     }
-    let Some(Item::TakeOff { height_m }) = there(&MissionItem { command: 22, ..full }) else { panic!("no take-off") };
-    assert!((height_m - 9.0).abs() < 1e-3);
-    // Above the sea: the origin is at 488 m.
-    let above = MissionItem { command: 22, frame: 5, z: 500.0, ..full };
-    assert_eq!(there(&above), Some(Item::TakeOff { height_m: 12.0 }));
+    let Some(Item::TakeOffTo { position_m }) = there(&MissionItem { command: 22, ..full }) else {
+        panic!("no take-off")
+    };
+    near(position_m, 30.0, -20.0, 9.0);
+    // Here, above the sea: the origin is at 488 m.
+    for nowhere in [0, i32::MAX] {
+        let above = MissionItem { command: 22, frame: 5, x: nowhere, y: nowhere, z: 500.0, ..full };
+        assert_eq!(there(&above), Some(Item::TakeOff { height_m: 12.0 }));
+    }
     assert_eq!(there(&MissionItem { command: 20, ..full }), Some(Item::Return));
     let speed = MissionItem { command: 178, parameters: [1.0, 4.5, 0.0, 0.0], ..full };
     assert_eq!(there(&speed), Some(Item::Speed(4.5)));
+    // No change, and as usual.
+    let speed = |speed| there(&MissionItem { command: 178, parameters: [1.0, speed, 0.0, 0.0], ..full });
+    assert_eq!([-1.0, -2.0].map(speed), [Some(Item::Wait(0.0)), Some(Item::Speed(f32::INFINITY))]);
     let item = |command, parameters| there(&MissionItem { command, parameters, ..place(30.0, -20.0) });
     assert_eq!(item(93, [7.0, -1.0, -1.0, -1.0]), Some(Item::Wait(7.0)));
     assert_eq!(item(177, [3.0, 2.0, 0.0, 0.0]), Some(Item::Jump(3)));
@@ -375,82 +406,14 @@ fn each_item_is_one_of_the_guidance() {
     }
 }
 
-/// Items flown, one by one, as a guidance does that does each at once.
-fn flown(missions: &mut Missions, most: usize) -> List<u16> {
-    let (mut wanted, mut done) = (0, List::new());
-    let origin = EarthOrigin::new(EarthOrigin::SIMULATED).expect("possible");
-    while let Some(leg) = missions.leg(wanted, Some(&origin), 0.0).filter(|_| done.len() < most) {
-        done.push(leg.number);
-        missions.reached(leg.number);
-        if leg.is_last {
-            break;
-        }
-        wanted = if let Item::Jump(to) = leg.item { to } else { leg.number + 1 };
-    }
-    done
-}
-
-fn jump(number: u16, to: u16, repeats: f32) -> MissionItem {
-    MissionItem { command: 177, parameters: [f32::from(to), repeats, 0.0, 0.0], ..waypoint(number) }
-}
-
-/// Each jump is made as often as it says, again in each round of an outer one, and from the start once disarmed.
-#[test]
-fn jumps_are_repeated() {
-    let mut missions = Missions::default();
-    upload(&mut missions, &[waypoint(0), waypoint(1), jump(2, 1, 2.0), waypoint(3)]);
-    assert_eq!(flown(&mut missions, 99), [0, 1, 2, 1, 2, 1, 2, 3]);
-    assert_eq!(flown(&mut missions, 4), [0, 1, 2, 1]);
-    missions.restart();
-    assert_eq!(flown(&mut missions, 99), [0, 1, 2, 1, 2, 1, 2, 3]);
-    upload(&mut missions, &[waypoint(0), jump(1, 0, 1.0), jump(2, 0, 1.0)]);
-    assert_eq!(flown(&mut missions, 99), [0, 1, 0, 1, 2, 0, 1, 0, 1, 2], "one within the other");
-    upload(&mut missions, &[waypoint(0), jump(1, 0, -1.0)]);
-    assert_eq!(flown(&mut missions, 1001).len(), 1001, "for ever");
-    upload(&mut missions, &[jump(0, 2, 1.0), waypoint(1), waypoint(2)]);
-    assert_eq!(flown(&mut missions, 99), [0, 2], "ahead");
-    upload(&mut missions, &[waypoint(0), jump(1, 0, 0.0)]);
-    assert_eq!(flown(&mut missions, 99), [0, 1], "never");
-}
-
-/// A mission that would jump to nowhere, or go around without a flight, is refused as a whole.
-#[test]
-fn jumps_without_an_end_are_refused() {
-    let speed = |number| MissionItem { command: 178, parameters: [1.0, 2.0, 0.0, 0.0], ..waypoint(number) };
-    let nine: List<_> = (0..10).map(|number| if number == 0 { waypoint(0) } else { jump(number, 0, 1.0) }).collect();
-    let cases: &[(&[MissionItem], u16, &str)] = &[
-        (&[waypoint(0), jump(1, 2, 1.0)], 1, "there is no such item"),
-        (&[waypoint(0), jump(1, 1, 1.0), waypoint(2)], 1, "there is no such item"),
-        (&[waypoint(0), speed(1), jump(2, 1, -1.0)], 2, "goes around for ever without a flight"),
-        (&[jump(0, 2, -1.0), waypoint(1), jump(2, 0, -1.0)], 0, "goes around for ever without a flight"),
-        (&nine, 9, "more than 8 jumps"),
-    ];
-    for (items, number, reason) in cases {
-        let mut missions = Missions::default();
-        missions.hear(Mission::Count(items.len() as u16, PLAN), A, true, 0, &NOWHERE);
-        let heard = items.iter().map(|item| missions.hear(Mission::Item(*item, PLAN), A, true, 0, &NOWHERE)).last();
-        let text = Words::of("mission item ").number((*number).into()).and(": ").and(reason);
-        assert_eq!(heard.expect("an item").text, Some(text));
-        assert!(missions.items().is_empty());
-    }
-    // Which end, or take time.
-    for items in [
-        &[waypoint(0), speed(1), jump(2, 1, 1000.0)][..],
-        &[waypoint(0), jump(1, 0, -1.0)],
-        &[jump(0, 2, 1.0), waypoint(1), jump(2, 0, -1.0)],
-    ] {
-        let mut missions = Missions::default();
-        assert_eq!(upload(&mut missions, items), [(Mission::Ack(MissionResult::ACCEPTED, PLAN), A)], "{items:?}");
-    }
-}
-
 /// A mission whose places are outside the fence is refused, if both are known.
 #[test]
 fn a_mission_outside_the_fence_is_refused() {
     let origin = EarthOrigin::new(EarthOrigin::SIMULATED).expect("possible");
-    let around = Surroundings { chart: Some(origin.chart()), here_m: None };
+    let around = Surroundings { origin: Some(origin), ..NOWHERE };
     let [x, y] = origin.at().e7();
-    let circle = MissionItem { command: 5003, frame: 5, parameters: [30.0, 0.0, 0.0, 0.0], x, y, ..waypoint(0) };
+    let circle =
+        MissionItem { command: 5003, frame: 5, parameters: [30.0, 0.0, 0.0, 0.0], x, y, z: 0.0, ..waypoint(0) };
     for (command, north, outside) in
         [(16, 100, false), (16, 2600, false), (16, 2650, true), (17, 2650, true), (21, 2650, true), (195, 2650, false)]
     {
@@ -458,7 +421,7 @@ fn a_mission_outside_the_fence_is_refused() {
         missions.hear(Mission::Count(1, Plan::FENCE), A, true, 0, &around);
         missions.hear(Mission::Item(circle, Plan::FENCE), A, true, 0, &around);
         missions.hear(Mission::Count(1, PLAN), A, true, 0, &around);
-        let item = MissionItem { command, x: x + north, y, ..waypoint(0) };
+        let item = MissionItem { command, x: x + north, y, parameters: [0.0; 4], ..waypoint(0) };
         let heard = missions.hear(Mission::Item(item, PLAN), A, true, 0, &around);
         let text = outside.then(|| Words::of("mission item 0: outside the geofence"));
         assert_eq!((heard.text, missions.items().len()), (text, usize::from(!outside)), "{command} {north}");
@@ -583,4 +546,29 @@ fn an_upload_is_its_stations_own() {
         missions.hear(Mission::Item(item, plan), from, true, 0, &NOWHERE);
         assert_eq!(said(&mut missions), [(Mission::Ack(result, plan), from)]);
     }
+}
+
+/// A parameter that is not used is named by its number.
+#[test]
+fn what_is_not_used_is_named() {
+    let mut missions = Missions::default();
+    let cases =
+        [([0.0, 0.0, 5.0, 0.0], "parameter 3 must be 0", 8), ([0.0, 0.0, 0.0, 4000.0], "heading is out of range", 9)];
+    for (parameters, reason, result) in cases {
+        missions.hear(Mission::Count(1, PLAN), A, true, 0, &NOWHERE);
+        let heard = missions.hear(Mission::Item(MissionItem { parameters, ..waypoint(0) }, PLAN), A, true, 0, &NOWHERE);
+        assert_eq!(heard.text, Some(Words::of("mission item 0: ").and(reason)));
+        assert_eq!(said(&mut missions).last(), Some(&(Mission::Ack(MissionResult(result), PLAN), A)));
+    }
+}
+
+/// More messages in a tick than can be answered: what is not answered is not done.
+#[test]
+fn nothing_is_cleared_without_an_answer() {
+    let mut missions = Missions::default();
+    (0..OUT_MAX).for_each(|_| drop(missions.hear(Mission::List(PLAN), A, true, 0, &NOWHERE)));
+    for message in [Mission::Clear(PLAN), Mission::Count(0, PLAN)] {
+        assert_eq!(missions.hear(message, A, true, 0, &NOWHERE), Heard::default());
+    }
+    assert_eq!((missions.number, said(&mut missions).len()), (0, OUT_MAX));
 }

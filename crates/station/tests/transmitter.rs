@@ -1,0 +1,62 @@
+//! What the pilot's transmitter is told: battery, attitude, mode and place in turn. A CRSF frame has address, length,
+//! type, numbers with the most significant byte first, and a checksum.
+
+use crate::common::Bench;
+use afbc_link::telemetry::BatteryStatus;
+use afbc_station::{AuxSensors, RadioControl};
+use afbc_types::State;
+use nalgebra::Vector3;
+
+/// CRC-8 of polynomial 0xD5.
+fn checksum(bytes: &[u8]) -> u8 {
+    bytes.iter().fold(0, |crc, byte| {
+        (0..8).fold(crc ^ byte, |crc: u8, _| if crc & 0x80 == 0 { crc << 1 } else { crc << 1 ^ 0xD5 })
+    })
+}
+
+/// Type and numbers of a frame.
+fn parts(frame: &[u8]) -> (u8, Vec<u8>) {
+    assert_eq!(usize::from(frame[1]) + 2, frame.len());
+    assert_eq!(checksum(&frame[2..frame.len() - 1]), frame[frame.len() - 1]);
+    (frame[2], frame[3..frame.len() - 1].to_vec())
+}
+
+fn number(bytes: &[u8]) -> i64 {
+    bytes.iter().fold(0, |number, byte| number << 8 | i64::from(*byte))
+}
+
+#[test]
+fn the_transmitter_is_told_in_turn() {
+    let mut bench = Bench::new();
+    let battery =
+        BatteryStatus { voltage_mv: 15_400, current_ca: 1_230, remaining_percent: -1, consumed_mah: 456, charge: 0 };
+    bench.comms.set_aux_sensors(AuxSensors { battery: Some(battery), ..AuxSensors::default() });
+    let state = State { attitude_rad: Vector3::new(0.1, -0.2, 0.3), ..State::default() };
+    let (mut radio, mut told) = (RadioControl::default(), Vec::new());
+    for tick in 1..=2_000_u64 {
+        bench.tick(&state);
+        if let Some(frame) = bench.comms.radio_telemetry(&mut radio) {
+            told.push((tick, parts(&frame)));
+        }
+        // At once again there is nothing to tell.
+        assert_eq!(bench.comms.radio_telemetry(&mut radio), None);
+    }
+    let of = |kind| told.iter().filter(move |(_, (it, _))| *it == kind).collect::<Vec<_>>();
+    let (batteries, attitudes, modes) = (of(0x08), of(0x1E), of(0x21));
+    // Of 20 turns in two seconds each kind has five; without an origin on the earth there is no place.
+    assert_eq!((batteries.len(), attitudes.len(), modes.len(), told.len()), (5, 5, 5, 15), "{told:?}");
+    for kind in [&batteries, &attitudes, &modes] {
+        assert!(kind.windows(2).all(|two| two[1].0 - two[0].0 == 400), "{told:?}");
+    }
+    for (_, (_, numbers)) in batteries {
+        assert_eq!((number(&numbers[..2]), number(&numbers[2..4]), number(&numbers[4..7])), (154, 123, 456));
+    }
+    // Pitch, roll and yaw of the field's axes, in 1e-4 rad.
+    for (_, (_, numbers)) in attitudes.iter().skip(1) {
+        let angles = numbers.chunks_exact(2).map(|two| i16::from_be_bytes([two[0], two[1]])).collect::<Vec<_>>();
+        for (angle, expected) in angles.iter().zip([2000, 1000, -3000]) {
+            assert!((angle - expected).abs() <= 1, "{angles:?}");
+        }
+    }
+    assert!(modes.iter().all(|(_, (_, name))| name.ends_with(&[0]) && name.len() > 3));
+}
