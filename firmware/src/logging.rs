@@ -22,8 +22,8 @@ use embassy_time::{Instant, Timer};
 use heapless::Vec;
 use static_cell::StaticCell;
 
-/// Blocks that wait, at most: of a log of 140 kB/s those of 47 ms.
-const BLOCKS: usize = 13;
+/// Blocks that wait, at most: of a log of 140 kB/s those of 43 ms.
+const BLOCKS: usize = 12;
 /// Ticks whose views wait for the links' task, at most.
 const VIEWS: usize = 3;
 /// Time between two looks at a storage without a log \[us\].

@@ -20,11 +20,12 @@ pub struct Tick {
 }
 
 /// Results of the last ticks, and a signal that there are some. Not a channel, which panics when it is re-entered.
-// 24: with eight, ticks were lost on a processor of a quarter of the speed; with 20 or more, none was.
-static TICKS: Mutex<CriticalSectionRawMutex, RefCell<Deque<Tick, 24>>> = Mutex::new(RefCell::new(Deque::new()));
+// 20: with eight, ticks were lost on a processor of a quarter of the speed; with 20 or more, none was. With more, less
+// than a quarter of the RAM is free on a board with a black box and motor controllers that answer.
+static TICKS: Mutex<CriticalSectionRawMutex, RefCell<Deque<Tick, 20>>> = Mutex::new(RefCell::new(Deque::new()));
 static TICKED: Signal<CriticalSectionRawMutex, ()> = Signal::new();
 
-/// Waits for the result of the oldest tick not yet returned. A tick never waits: while twenty-four results are queued,
+/// Waits for the result of the oldest tick not yet returned. A tick never waits: while twenty results are queued,
 /// further ones are dropped.
 pub fn next() -> impl Future<Output = Tick> {
     poll_fn(|context| {

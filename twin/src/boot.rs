@@ -4,10 +4,12 @@
 use crate::check::check;
 use crate::fly::images;
 use crate::machine::{Machine, Signal};
+use crate::steady::{SteadyPin, floating};
 use crate::wire::Wire;
 use afbc_link::telemetry::Telemetry;
 use afbc_link::{Address, Decoder, Downlink};
 use rigless::emulator::{AccessKind, Driver, Host, Settled, Start, Stop, run};
+use rigless::mcu::Operate;
 use rigless::session::Session;
 use rigless::soc::Width;
 use rigless::time::VirtualNanos;
@@ -46,6 +48,8 @@ struct Seen {
     wrong: Vec<String>,
     /// First word of the parameters' flash at the end.
     store: u64,
+    /// Pins that float at the end.
+    floating: Vec<SteadyPin>,
 }
 
 impl<M: Machine> Driver<M> for Seen {
@@ -72,6 +76,9 @@ impl<M: Machine> Driver<M> for Seen {
             }
         }
         self.store = host.read(M::STORE, Width::W32).unwrap_or(u64::MAX);
+        let mcu = session.mcu();
+        let read = |address| mcu.read(stop.at, address, Width::W32).unwrap_or(0);
+        self.floating = floating(M::PORTS, M::STEADY, read);
         (stop.at.0 < END).then(|| VirtualNanos(stop.at.0 + LOOK_EVERY))
     }
 }
@@ -81,7 +88,8 @@ pub fn boot<M: Machine>(image: &Path) -> Result<(), Box<dyn Error>> {
     let mut board = M::built()?;
     let wire = Wire::default();
     check(board.attach_link(wire.clone()), "the link is wired")?;
-    let seen = Seen { feeds: Vec::new(), pulses: vec![0; M::MOTORS.len()], looks: 0, wrong: Vec::new(), store: 0 };
+    let (feeds, pulses, floating) = (Vec::new(), vec![0; M::MOTORS.len()], Vec::new());
+    let seen = Seen { feeds, pulses, looks: 0, wrong: Vec::new(), store: 0, floating };
     let images = images::<M>(image, &[])?;
     let finished = run(Session::new(board, 0, VirtualNanos(LOOK_FROM))?, &Start::new(&images), seen)?;
 
@@ -89,7 +97,7 @@ pub fn boot<M: Machine>(image: &Path) -> Result<(), Box<dyn Error>> {
         println!("the models say: {} {}: {}", told.instance, told.register, told.reason);
     }
 
-    let Seen { feeds, pulses, looks, wrong, store, .. } = &finished.driver;
+    let Seen { feeds, pulses, looks, wrong, store, floating } = &finished.driver;
     let bytes = wire.take();
     let (mut messages, mut heartbeats, mut battery_mv) = (0, 0, None);
     Decoder::new(STATION).feed(&bytes, |_, message: Downlink| {
@@ -121,6 +129,7 @@ pub fn boot<M: Machine>(image: &Path) -> Result<(), Box<dyn Error>> {
     check(wrong.is_empty(), &format!("{:?}: {wrong:?}", M::SIGNAL))?;
     check(pulses.iter().all(|pulses| pulses.abs_diff(carried) * 10 <= carried), "every motor has its pulses")?;
 
+    check(floating.is_empty(), &format!("pins that float on a board: {floating:?}"))?;
     check(!M::STORES || *store & 0xFFFF_FFFF != 0xFFFF_FFFF, "the parameters' store has a header")?;
     check(heartbeats >= 2, "a heartbeat every second")?;
     println!("battery: {battery_mv:?} mV");

@@ -3,6 +3,8 @@
 use crate::card::{LogStorage, SdSlot};
 use crate::impairments::Impairments;
 use crate::line_answers::Lines;
+use crate::steady::Steady::{Output, PulledUp};
+use crate::steady::SteadyPin;
 use crate::wire::Wire;
 use rigless::chip::nmea;
 use rigless::chip::uart::{Errors, Peer};
@@ -77,6 +79,9 @@ pub trait Machine: Board + Edge<Signals = Signals> + Sized + 'static {
     const BATTERY_MV: Option<u16>;
     /// Registers that the chip has and the models do not.
     const UNMAPPED: &[u64];
+    /// First register of the ports of pins, and the pins that must not float.
+    const PORTS: u64;
+    const STEADY: &'static [SteadyPin];
     /// Interrupt status of the USB core, if the models have it as a register only.
     const USB_STATUS: Option<u64> = None;
 
@@ -158,6 +163,9 @@ impl Machine for MatekH743 {
     const JITTER: u64 = 150_000;
     const BATTERY_MV: Option<u16> = Some(16_800);
     const UNMAPPED: &[u64] = &[];
+    /// RX of UART7, USART1, USART2 and UART8.
+    const PORTS: u64 = 0x5802_0000;
+    const STEADY: &'static [SteadyPin] = &[(4, 7, PulledUp), (0, 10, PulledUp), (3, 6, PulledUp), (4, 0, PulledUp)];
     /// RM0433, 57.14.6.
     const USB_STATUS: Option<u64> = Some(0x4008_0014);
 
@@ -229,6 +237,17 @@ impl Machine for Pixracer {
     const BATTERY_MV: Option<u16> = Some(16_800);
     /// USB: the core's fourth hardware configuration register.
     const UNMAPPED: &[u64] = &[0x5000_0050];
+    /// RX of USART2, USART3, UART4 and USART6; the supplies of sensors and of what is connected, and the heater.
+    const PORTS: u64 = 0x4002_0000;
+    const STEADY: &'static [SteadyPin] = &[
+        (3, 6, PulledUp),
+        (3, 9, PulledUp),
+        (0, 1, PulledUp),
+        (2, 7, PulledUp),
+        (4, 3, Output(true)),
+        (2, 5, Output(true)),
+        (2, 6, Output(false)),
+    ];
     /// RM0090, 34.16.2.
     const USB_STATUS: Option<u64> = Some(0x5000_0014);
 

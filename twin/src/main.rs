@@ -28,6 +28,7 @@ mod pins;
 mod radio;
 mod random;
 mod same;
+mod steady;
 mod table;
 mod tour;
 mod transmitter;

@@ -385,7 +385,7 @@ impl Pilot {
             }
             Phase::Tours => {
                 if passed_ms % 2000 == 0 && z < 0.5 && self.tour.as_ref().is_some_and(|tour| !tour.has_begun()) {
-                    self.say(&Uplink::Command(Command::StartMission(0)));
+                    self.say(&Uplink::Command(Command::StartMission(0, None)));
                 }
                 (!self.armed).then_some(after)
             }

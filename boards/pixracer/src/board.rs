@@ -6,7 +6,8 @@
 //! | first link (TELEM1) | USART2: TX on PD5, RX on PD6 |
 //! | second link (TELEM2) | USART3: TX on PD8, RX on PD9 |
 //! | third link | USB: D- on PA11, D+ on PA12 |
-//! | radio receiver (RCIN) | USART6: TX on PC6, which sends nothing, RX on PC7; PC13 switches the inverter before it |
+//! | radio receiver (RCIN) | USART6: RX on PC7; PC13 switches the inverter before it |
+//! | heater of the sensors | PC6, held low: off; also TX of USART6, which sends nothing |
 //! | motors 1 to 4 | TIM1, channels 4 to 1: PE14, PE13, PE11, PE9; driven by DMA2's stream 5 |
 //! | motors 5 and 6 | TIM4, channels 2 and 3: PD13, PD14; driven by DMA1's stream 6 |
 //! | memory | `memory.x` beside this folder |
@@ -23,6 +24,7 @@
 //! | LED, green | PB1, open drain, lit if low |
 //! | buzzer, without a tone of its own | PA15: TIM2, channel 1 |
 //! | supply of the sensors | PE3, on if high |
+//! | supply of 3.3 V of what is connected | PC5, on if high |
 
 use crate::sensors::{Aids, Inside};
 use afbc_drivers::battery::BatteryScale;
@@ -31,6 +33,7 @@ use afbc_drivers::qmc5883l::Qmc5883l;
 use afbc_drivers::{Driver, I2cRegisters, SensorPart, SpiRegisters};
 use chip_stm32::battery::BatteryConverter;
 use chip_stm32::indicator::{Led, PassiveBuzzer};
+use chip_stm32::line::Line;
 use chip_stm32::link::{self, RADIO_RINGS, Receiver, Transmitter};
 use chip_stm32::motors::{
     MotorProtocol, Motors, Throttles, hold_low, numbering, of_channels, of_outputs, pin, rotors_of_outputs,
@@ -128,8 +131,8 @@ pub(crate) struct Pixracer {
     watchdog: IndependentWatchdog<'static, IWDG>,
     /// Index of the rotor of each output.
     rotors: [usize; OUTPUTS],
-    /// Held as they are: the sensors' supply on, the memory on the barometer's SPI not selected.
-    _held: [Output<'static>; 2],
+    /// Held as they are: both supplies on, the memory on the barometer's SPI not selected.
+    _held: [Output<'static>; 3],
 }
 
 impl Board for Pixracer {
@@ -154,14 +157,17 @@ impl Board for Pixracer {
     }
 
     fn start(_core: &mut cortex_m::Peripherals, control: SendSpawner) -> Parts<Self> {
-        let p = clocks::start::<CRYSTAL_HZ>();
+        let mut p = clocks::start::<CRYSTAL_HZ>();
         reset::log();
         for (line, priority) in PRIORITIES {
             line.set_priority(Priority::from(priority));
         }
         // The sensors have their supply before a line to them is high.
-        let supply = Output::new(p.PE3, Level::High, Speed::Low);
-        let memory = Output::new(p.PD10, Level::High, Speed::Low);
+        let held = [
+            Output::new(p.PE3, Level::High, Speed::Low),
+            Output::new(p.PC5, Level::High, Speed::Low),
+            Output::new(p.PD10, Level::High, Speed::Low),
+        ];
 
         let [tx, tx2] = TX.each_ref().map(|ring| ring.init([0; 1024]));
         let [rx, rx2, rx3] = RX.each_ref().map(|ring| ring.init([0; 1024]));
@@ -169,12 +175,15 @@ impl Board for Pixracer {
         let second = BufferedUart::new(p.USART3, p.PD9, p.PD8, tx2, rx2, Irqs, link::config());
         let (tx, rx) = (RADIO_TX.init([0; RADIO_RINGS[0]]), RADIO_RX.init([0; RADIO_RINGS[1]]));
         link::invert_by(p.PC13);
+        let heater = Line::of(p.PC6.reborrow());
         let radio = BufferedUart::new(p.USART6, p.PC7, p.PC6, tx, rx, Irqs, link::radio());
+        // An idle TX is high.
+        heater.hold_low();
         let uarts = [first, second, radio];
         let [first, second, radio] = uarts.map(|uart| link::new(uart.expect("the baud rate divides the clock")));
         let links = [first, second, link::of_usb(usb::start(p.USB_OTG_FS, p.PA12, p.PA11, Irqs)), radio];
         let tx = GNSS_TX.init([0; TX_RING]);
-        let receiver = BufferedUart::new(p.UART4, p.PA1, p.PA0, tx, rx3, Irqs, usart::Config::default());
+        let receiver = BufferedUart::new(p.UART4, p.PA1, p.PA0, tx, rx3, Irqs, link::uart());
 
         let kernel_hz = rcc::frequency::<SPI1>().0;
         let config = chip_stm32::sensors::spi(kernel_hz / 256);
@@ -193,13 +202,15 @@ impl Board for Pixracer {
         let format = Ms5611::SPI.expect("a part on SPI");
         let mut barometer = Device::new(spi, p.PD7);
         barometer.set_clock(kernel_hz, format.clock_hz);
+        let lines = [Line::of(p.PB8.reborrow()), Line::of(p.PB9.reborrow())];
         let config = chip_stm32::sensors::i2c();
         let outside = I2c::new(p.I2C1, p.PB8, p.PB9, p.DMA1_CH7, p.DMA1_CH0, Irqs, config);
+        let outside = chip_stm32::i2c::bus(outside, lines, || chip_stm32f4::i2c::restart(pac::I2C1));
         let aids = Aids {
             barometer: Driver::new(Ms5611::default(), SpiRegisters::new(barometer, format), Polled),
             compass: Driver::new(Qmc5883l, I2cRegisters::new(outside, 0x0D), Polled),
             receiver: receiver.expect("the baud rate divides the clock"),
-            // By the usual power module.
+            // By the common power module; the board's page has another one's.
             battery: BatteryConverter::new(
                 Adc::new(p.ADC1),
                 p.PA2,
@@ -234,7 +245,7 @@ impl Board for Pixracer {
         pac::DBGMCU.apb1fzr().modify(|freeze| freeze.set_iwdg(true));
         let rotors = rotors_of_outputs(numbering::ARDUPILOT, &CONFIGURATION.airframe.rotors);
         Parts {
-            board: Pixracer { watchdog: watchdog(p.IWDG), rotors, _held: [supply, memory] },
+            board: Pixracer { watchdog: watchdog(p.IWDG), rotors, _held: held },
             sampler,
             aids,
             links,

@@ -7,12 +7,12 @@ use afbc_drivers::ms5611::Ms5611;
 use afbc_drivers::qmc5883l::Qmc5883l;
 use afbc_drivers::{Driver, I2cRegisters, PartTiming, SensorPart, SpiRegisters};
 use chip_stm32::battery::BatteryConverter;
+use chip_stm32::i2c::Bus;
 use chip_stm32::receiver;
 use chip_stm32::sensors::{COMPASS, Device, InterruptPin, Polled, SharedDevice, SharedSpi, interrupted, run};
 use core::sync::atomic::{AtomicBool, Ordering};
 use embassy_futures::join::{join3, join4};
 use embassy_stm32::gpio::Output;
-use embassy_stm32::i2c::{I2c, Master};
 use embassy_stm32::mode::Async;
 use embassy_stm32::peripherals::ADC1;
 use embassy_stm32::spi::{self, Spi};
@@ -74,7 +74,7 @@ fn driver<'a, P: SensorPart, T: PartTiming>(
 /// The slow sensors.
 pub(crate) struct Aids {
     pub(crate) barometer: Driver<Ms5611, SpiRegisters<Device>, Polled>,
-    pub(crate) compass: Driver<Qmc5883l, I2cRegisters<I2c<'static, Async, Master>>, Polled>,
+    pub(crate) compass: Driver<Qmc5883l, I2cRegisters<Bus>, Polled>,
     pub(crate) receiver: BufferedUart<'static>,
     pub(crate) battery: BatteryConverter<ADC1>,
 }

@@ -22,6 +22,7 @@ chip_stm32f4::flight_controller! {
     },
     battery: ADC1 { voltage: PC0, current: PC1, volts_per_volt: 11.0, amperes_per_volt: 40.0 },
     indicator: { led: PC13, buzzer: PC15 },
+    bluetooth: PB11,
     flash: SPI3 { clock: PB3, out: PB5, in: PB4, select: PC14 },
     motors: 4 as BETAFLIGHT {
         first: TIM4<u16>, DMA1_CH6 by DMA1_STREAM6 { (PB6: GPIOB 6, motor 1), (PB7: GPIOB 7, motor 2), (), () },

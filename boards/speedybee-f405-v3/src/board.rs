@@ -22,6 +22,7 @@ chip_stm32f4::flight_controller! {
     },
     battery: ADC1 { voltage: PC0, current: PC1, volts_per_volt: 11.0, amperes_per_volt: 25.9 },
     indicator: { led: PC8, buzzer: PC5 },
+    bluetooth: PC3,
     card: SPI2 { clock: PB13, out: PB15, in: PB14, select: PA15, quiet: [PB12] },
     motors: 4 as BETAFLIGHT {
         first: TIM4<u16>, DMA1_CH6 by DMA1_STREAM6 {

@@ -31,6 +31,7 @@ use afbc_drivers::{Driver, I2cRegisters, SensorPart, SpiRegisters};
 use chip_stm32::answers::Lines;
 use chip_stm32::battery::BatteryConverter;
 use chip_stm32::indicator::{Led, PassiveBuzzer};
+use chip_stm32::line::Line;
 use chip_stm32::link::{self, Receiver, Transmitter};
 use chip_stm32::motors::{CHANNELS, MotorProtocol, Motors, Throttles, hold_low, pin, set_protocol};
 use chip_stm32::sd_card::{self, SdCardLog};
@@ -150,14 +151,17 @@ impl Board for Stm32h743 {
     }
 
     fn start(core: &mut cortex_m::Peripherals, control: SendSpawner) -> Parts<Self> {
-        let p = clocks::start::<CRYSTAL_HZ>(&mut core.SCB);
+        let mut p = clocks::start::<CRYSTAL_HZ>(&mut core.SCB);
         reset::log();
 
         let [tx, tx2, tx3] = TX.each_ref().map(|ring| ring.init([0; 1024]));
         let [rx, rx2, rx3] = RX.each_ref().map(|ring| ring.init([0; 1024]));
+        let receiving = [Line::of(p.PE7.reborrow()), Line::of(p.PA10.reborrow())];
         let first = BufferedUart::new(p.UART7, p.PE7, p.PE8, tx, rx, Irqs, link::config());
         let second = BufferedUart::new(p.USART1, p.PA10, p.PA9, tx2, rx2, Irqs, link::config());
-        let [first, second] = [first, second].map(|uart| link::new(uart.expect("the baud rate divides the clock")));
+        let [first, second] = [first, second].map(|uart| uart.expect("the baud rate divides the clock"));
+        let [first_rx, second_rx] = receiving;
+        let (first, second) = (link::inverting(first, first_rx), link::inverting(second, second_rx));
         let links = [first, second, link::of_usb(usb::start(p.USB_OTG_FS, p.PA12, p.PA11, Irqs))];
         interrupt::UART7.set_priority(Priority::from(priority::UART));
         interrupt::USART1.set_priority(Priority::from(priority::UART));
@@ -171,10 +175,14 @@ impl Board for Stm32h743 {
         let config = chip_stm32::sensors::spi(SPI_HZ);
         let first = Spi::new(p.SPI1, p.PA5, p.PD7, p.PA6, p.DMA1_CH3, p.DMA1_CH2, Irqs, config);
         let second = Spi::new(p.SPI4, p.PE12, p.PE14, p.PE13, p.DMA1_CH5, p.DMA1_CH4, Irqs, config);
-        let receiver = BufferedUart::new(p.USART2, p.PD6, p.PD5, tx3, rx3, Irqs, usart::Config::default());
+        let receiver = BufferedUart::new(p.USART2, p.PD6, p.PD5, tx3, rx3, Irqs, link::uart());
+        let inside_lines = [Line::of(p.PB10.reborrow()), Line::of(p.PB11.reborrow())];
+        let outside_lines = [Line::of(p.PB6.reborrow()), Line::of(p.PB7.reborrow())];
         let config = chip_stm32::sensors::i2c();
         let inside = I2c::new(p.I2C2, p.PB10, p.PB11, p.DMA2_CH0, p.DMA2_CH1, Irqs, config);
         let outside = I2c::new(p.I2C1, p.PB6, p.PB7, p.DMA1_CH6, p.DMA1_CH7, Irqs, config);
+        let inside = chip_stm32::i2c::bus(inside, inside_lines, || chip_stm32h7::i2c::restart(pac::I2C2));
+        let outside = chip_stm32::i2c::bus(outside, outside_lines, || chip_stm32h7::i2c::restart(pac::I2C1));
         let sampler = Imus {
             first: imu(Icm42688p {}, Device::new(first, p.PC15), InterruptPin::new(p.PB2, p.EXTI2, Irqs)),
             second: imu(Icm42605 {}, Device::new(second, p.PC13), InterruptPin::new(p.PE15, p.EXTI15, Irqs)),

@@ -7,19 +7,15 @@ use afbc_drivers::icm426xx::{Icm42605, Icm42688p};
 use afbc_drivers::qmc5883l::Qmc5883l;
 use afbc_drivers::{Driver, I2cRegisters, SpiRegisters};
 use chip_stm32::battery::BatteryConverter;
+use chip_stm32::i2c::Bus;
 use chip_stm32::receiver;
 use chip_stm32::sensors::{COMPASS, Device, Interrupted, Polled, run};
 use embassy_futures::join::{join, join4};
-use embassy_stm32::i2c::{I2c, Master};
-use embassy_stm32::mode::Async;
 use embassy_stm32::peripherals::ADC1;
 use embassy_stm32::usart::BufferedUart;
 use firmware::samples::Sampler;
 use firmware::self_tests::{FIRST_IMU, SECOND_IMU, sensor};
 use firmware::{aux_sensors, samples};
-
-/// A bus of sensors.
-type Bus = I2c<'static, Async, Master>;
 
 /// The inertial sensors.
 pub(crate) struct Imus {

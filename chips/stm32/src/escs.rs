@@ -1,5 +1,6 @@
 //! The motor controllers' telemetry on a UART of which only RX is wired.
 
+use crate::link;
 use afbc_drivers::esc_telemetry::BAUD;
 use embassy_stm32::usart::{BufferedUart, Config};
 use embedded_io_async::Read;
@@ -11,7 +12,7 @@ pub const TX_RING: usize = 1;
 
 /// Returns how the UART is set up.
 pub fn config() -> Config {
-    let mut config = Config::default();
+    let mut config = link::uart();
     config.baudrate = BAUD;
     config
 }

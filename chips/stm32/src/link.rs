@@ -1,5 +1,6 @@
 //! Links: by UART, with ring buffers that its interrupt fills and empties, and by [`usb`].
 
+use crate::line::Line;
 use crate::usb::{self, UsbPort};
 use core::cell::Cell;
 use core::future::poll_fn;
@@ -7,7 +8,7 @@ use core::pin::pin;
 use core::task::{Poll, ready};
 use embassy_futures::poll_once;
 use embassy_stm32::Peri;
-use embassy_stm32::gpio::{Level, Output, Pin, Speed};
+use embassy_stm32::gpio::{Level, Output, Pin, Pull, Speed};
 use embassy_stm32::usart::{BufferedUart, BufferedUartRx, BufferedUartTx, Config, Parity, StopBits};
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
@@ -22,9 +23,16 @@ const READ_MIN: usize = 32;
 /// Bytes of the rings of a radio receiver's UART: what goes to it, and what comes within 10 ms.
 pub const RADIO_RINGS: [usize; 2] = [128, 512];
 
+/// Returns how any UART is set up: RX is pulled up, so that a line that nothing drives is idle, and no noise is read.
+pub fn uart() -> Config {
+    let mut config = Config::default();
+    config.rx_pull = Pull::Up;
+    config
+}
+
 /// Returns how the UART of a link is set up; its baud rate is a parameter.
 pub fn config() -> Config {
-    let mut config = Config::default();
+    let mut config = uart();
     config.eager_reads = Some(READ_MIN);
     config
 }
@@ -69,8 +77,17 @@ fn invert() {
 
 /// Makes a link of a UART.
 pub fn new(uart: BufferedUart<'static>) -> BoardLink<Receiver, Transmitter> {
+    split(uart, None)
+}
+
+/// Makes a link of a UART that inverts its line itself for SBUS, which is low while it is idle: RX is pulled down then.
+pub fn inverting(uart: BufferedUart<'static>, rx: Line) -> BoardLink<Receiver, Transmitter> {
+    split(uart, Some(rx))
+}
+
+fn split(uart: BufferedUart<'static>, inverts: Option<Line>) -> BoardLink<Receiver, Transmitter> {
     let (transmitter, receiver) = uart.split();
-    BoardLink { receiver: Receiver::Uart(receiver), transmitter: Transmitter::Uart(transmitter) }
+    BoardLink { receiver: Receiver::Uart(receiver), transmitter: Transmitter::Uart(transmitter, inverts) }
 }
 
 /// Makes a link of the USB port.
@@ -111,15 +128,15 @@ impl board::Receiver for Receiver {
 
 /// Sending side.
 pub enum Transmitter {
-    /// Of a UART.
-    Uart(BufferedUartTx<'static>),
+    /// Of a UART, with its RX if it inverts the line itself for SBUS.
+    Uart(BufferedUartTx<'static>, Option<Line>),
     /// Of the USB port, through its ring.
     Usb,
 }
 
 impl board::Transmitter for Transmitter {
     fn set_baud(&mut self, baud: u32) {
-        if let Transmitter::Uart(uart) = self
+        if let Transmitter::Uart(uart, _) = self
             && uart.set_baudrate(baud).is_err()
         {
             defmt::warn!("{=u32} baud do not divide the clock", baud);
@@ -127,10 +144,13 @@ impl board::Transmitter for Transmitter {
     }
 
     fn set_sbus(&mut self) {
-        if let Transmitter::Uart(uart) = self
-            && uart.set_config(&sbus()).is_err()
-        {
-            defmt::warn!("SBUS does not divide the clock");
+        if let Transmitter::Uart(uart, inverts) = self {
+            if uart.set_config(&sbus()).is_err() {
+                defmt::warn!("SBUS does not divide the clock");
+            }
+            if let Some(rx) = inverts {
+                rx.pull_down();
+            }
         }
         invert();
     }
@@ -138,10 +158,10 @@ impl board::Transmitter for Transmitter {
     fn transmit(&mut self, _tick: &Tick, bytes: &[u8]) -> bool {
         match self {
             // Accepts all bytes or, if the ring is full, none; the driver does not wake those who wait for room.
-            Transmitter::Uart(uart) if !bytes.is_empty() => {
+            Transmitter::Uart(uart, _) if !bytes.is_empty() => {
                 matches!(poll_once(uart.write(bytes)), Poll::Ready(Ok(_)))
             }
-            Transmitter::Uart(_) => true,
+            Transmitter::Uart(..) => true,
             Transmitter::Usb => usb::send(bytes),
         }
     }

@@ -3,6 +3,7 @@
 
 use crate::battery::BatteryConverter;
 use crate::candidates::{BarometerCandidates, ImuCandidates};
+use crate::i2c::Bus;
 use crate::receiver;
 use crate::sensors::{COMPASS, Device, InterruptPin, Polled, run};
 use afbc_drivers::alignment::turned;
@@ -11,8 +12,6 @@ use afbc_drivers::{Driver, I2cRegisters};
 use core::marker::PhantomData;
 use embassy_embedded_hal::shared_bus::asynch::i2c::I2cDevice;
 use embassy_futures::join::join4;
-use embassy_stm32::i2c::{I2c, Master};
-use embassy_stm32::mode::Async;
 use embassy_stm32::peripherals::ADC1;
 use embassy_stm32::usart::BufferedUart;
 use embassy_sync::blocking_mutex::raw::NoopRawMutex;
@@ -54,7 +53,7 @@ impl<P: ImuCandidates> Sampler for Imu<P> {
 
 /// The slow sensors, with a barometer of `P`.
 pub struct SlowSensors<P> {
-    bus: I2c<'static, Async, Master>,
+    bus: Bus,
     receiver: BufferedUart<'static>,
     battery: BatteryConverter<ADC1>,
     parts: PhantomData<P>,
@@ -62,11 +61,7 @@ pub struct SlowSensors<P> {
 
 impl<P> SlowSensors<P> {
     /// Barometer and compass on `bus`, a receiver, and the battery.
-    pub fn new(
-        bus: I2c<'static, Async, Master>,
-        receiver: BufferedUart<'static>,
-        battery: BatteryConverter<ADC1>,
-    ) -> Self {
+    pub fn new(bus: Bus, receiver: BufferedUart<'static>, battery: BatteryConverter<ADC1>) -> Self {
         SlowSensors { bus, receiver, battery, parts: PhantomData }
     }
 }

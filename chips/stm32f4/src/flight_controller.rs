@@ -14,6 +14,8 @@
 ///   of `afbc_drivers::alignment`.
 /// * The battery's voltage and current are on pins of the converter, by the board's divider and amplifier.
 /// * The buzzer sounds while its pin is high; the LED, if there is one, is lit while its pin is low.
+/// * The enable pin of the board's Bluetooth, if it has one, is held low: it is not used, and sends beside the radio
+///   receiver.
 /// * The memory card for logs, if there is one, has an SPI of its own; `quiet` are the select pins of whatever else is
 ///   there. So has the flash chip for logs of a board without a card.
 /// * Motors are so many, numbered as [`numbering`](chip_stm32::motors::numbering) has it. They have a line for each
@@ -48,6 +50,7 @@ macro_rules! flight_controller {
             volts_per_volt: $volts_per_volt:literal, amperes_per_volt: $amperes_per_volt:literal
         },
         indicator: { $(led: $led:ident,)? buzzer: $buzzer:ident },
+        $(bluetooth: $bluetooth:ident,)?
         $(card: $card:ident {
             clock: $card_sck:ident, out: $card_mosi:ident, in: $card_miso:ident, select: $card_select:ident,
             quiet: [$($quiet:ident),*]
@@ -148,6 +151,7 @@ macro_rules! flight_controller {
                 use embassy_stm32::usart::BufferedUart;
                 use static_cell::StaticCell;
 
+                use chip_stm32::line::Line;
                 use chip_stm32::receiver::TX_RING;
 
                 // Ring buffers of the link and of the receiver.
@@ -156,7 +160,7 @@ macro_rules! flight_controller {
                 static GNSS_RX: StaticCell<[u8; 352]> = StaticCell::new();
                 static GNSS_TX: StaticCell<[u8; TX_RING]> = StaticCell::new();
 
-                let p = chip_stm32f4::clocks::start::<$crystal_hz>();
+                let mut p = chip_stm32f4::clocks::start::<$crystal_hz>();
                 chip_stm32f4::reset::log();
                 for (line, priority) in PRIORITIES {
                     line.set_priority(Priority::from(*priority));
@@ -166,7 +170,7 @@ macro_rules! flight_controller {
                 let config = chip_stm32::link::config();
                 let link = BufferedUart::new(p.$link, p.$link_rx, p.$link_tx, tx, rx, Irqs, config);
                 let (tx, rx) = (GNSS_TX.init([0; TX_RING]), GNSS_RX.init([0; 352]));
-                let config = usart::Config::default();
+                let config = chip_stm32::link::uart();
                 let gnss = BufferedUart::new(p.$gnss, p.$gnss_rx, p.$gnss_tx, tx, rx, Irqs, config);
 
                 $(
@@ -198,8 +202,10 @@ macro_rules! flight_controller {
                 );
                 let device = chip_stm32::sensors::Device::new(spi, p.$select);
                 let ready = chip_stm32::sensors::InterruptPin::new(p.$ready, p.$exti, Irqs);
+                let lines = [Line::of(p.$scl.reborrow()), Line::of(p.$sda.reborrow())];
                 let config = chip_stm32::sensors::i2c();
                 let bus = i2c::I2c::new(p.$i2c, p.$scl, p.$sda, p.$i2c_tx, p.$i2c_rx, Irqs, config);
+                let bus = chip_stm32::i2c::bus(bus, lines, || chip_stm32f4::i2c::restart(pac::$i2c));
 
                 let battery = chip_stm32::battery::BatteryConverter::new(
                     embassy_stm32::adc::Adc::new(p.ADC1),
@@ -223,6 +229,7 @@ macro_rules! flight_controller {
                     control.spawn($task::run(motors).expect("spawned once"));
                 )+
 
+                $(Line::of(p.$bluetooth).hold_low();)?
                 let led = None$(.or(Some(chip_stm32::indicator::Led::new(p.$led))))?;
                 let buzzer = chip_stm32::indicator::ActiveBuzzer::new(p.$buzzer);
                 firmware::executors::housekeeping().spawn(indicator(led, buzzer).expect("spawned once"));

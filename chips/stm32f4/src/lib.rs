@@ -6,4 +6,5 @@ pub mod boot_loader;
 pub mod clocks;
 pub mod converter;
 mod flight_controller;
+pub mod i2c;
 pub mod reset;

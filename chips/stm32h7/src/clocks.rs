@@ -8,7 +8,7 @@ use chip_stm32::crystal;
 use cortex_m::peripheral::SCB;
 use embassy_stm32::pac::crs::vals::Syncsrc;
 use embassy_stm32::pac::rcc::vals::{Pllm, Pllsrc, Sw};
-use embassy_stm32::pac::{CRS, RCC};
+use embassy_stm32::pac::{CRS, DBGMCU, RCC};
 use embassy_stm32::rcc::mux::Usbsel;
 use embassy_stm32::rcc::{
     AHBPrescaler, APBPrescaler, Hse, HseMode, Hsi48Config, Pll, PllDiv, PllMul, PllPreDiv, PllSource, Sysclk,
@@ -31,6 +31,7 @@ const LOCK_LOOKS: u32 = 10_000;
 /// once after reset.
 pub fn start<const CRYSTAL_HZ: u32>(scb: &mut SCB) -> Peripherals {
     const { assert!(CRYSTAL_HZ.is_multiple_of(PLL_INPUT_HZ) && CRYSTAL_HZ >= 4_000_000 && CRYSTAL_HZ <= 48_000_000) }
+    limit_ram_reads();
     RCC.cr().modify(|cr| cr.set_hseon(true));
     let starts = crystal::starts(START_UP_CYCLES_PER_MS, || RCC.cr().read().hserdy());
     let peripherals = embassy_stm32::init(config::<CRYSTAL_HZ>(starts));
@@ -39,6 +40,23 @@ pub fn start<const CRYSTAL_HZ: u32>(scb: &mut SCB) -> Peripherals {
     // The clock security system switches to the chip's oscillator and raises an NMI if the crystal fails.
     RCC.cr().modify(|cr| cr.set_hsecsson(starts));
     peripherals
+}
+
+/// First revision of the chip (X) whose AXI RAM takes several reads at once: earlier ones (Z, Y) may then answer with
+/// wrong data.
+const REVISION_X: u16 = 0x2001;
+
+/// Lets the AXI RAM take one read after the other on a chip of an early revision, as ES0392 has it ("Reading from AXI
+/// SRAM may lead to data read corruption").
+#[expect(unsafe_code, reason = "an address that the register definitions lack")]
+fn limit_ram_reads() {
+    /// AXI_TARG7_FN_MOD, which the register definitions lack, and its bit READ_ISS_OVERRIDE.
+    const TARGET_7: *mut u32 = 0x5100_8108 as *mut u32;
+    const ONE_READ: u32 = 1;
+    if DBGMCU.idc().read().rev_id() < REVISION_X {
+        // SAFETY: a register of the bus matrix that nothing else uses, as the errata sheet has it.
+        unsafe { TARGET_7.write_volatile(ONE_READ) };
+    }
 }
 
 /// 400 MHz; buses at 200 MHz, peripherals' and SPI at 100, timers at 200; USB at 48 by an oscillator of its own, so

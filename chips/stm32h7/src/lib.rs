@@ -5,4 +5,5 @@
 pub mod boot_loader;
 pub mod clocks;
 pub mod flash;
+pub mod i2c;
 pub mod reset;

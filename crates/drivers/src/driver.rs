@@ -14,6 +14,9 @@ const LOOK_US: u32 = 2_000;
 /// Pause after the second fault in a row and each further one \[us\]: the next attempt would follow at once, and a task
 /// of the sensors' priority leaves the others no time.
 const RETRY_US: u32 = 1_000;
+/// Pause after each step of a set-up \[us\]: a control tick that is due goes first, for the steps together take longer
+/// than it may be late.
+const GIVE_WAY_US: u32 = 10;
 /// Longest transfer \[us\], and what each of its bytes adds \[us\]: 1 MHz.
 const TRANSFER_US: u32 = 10_000;
 const BYTE_US: u32 = 8;
@@ -182,9 +185,11 @@ impl<P: SensorPart, B: Registers, T: PartTiming> Driver<P, B, T> {
         self.was_set_up = false;
         for step in P::SETUP {
             self.step(step).await?;
+            self.timing.wait(GIVE_WAY_US).await;
         }
         for at in 0..P::SETUP.len() {
             self.look(at).await?;
+            self.timing.wait(GIVE_WAY_US).await;
         }
         // It works when it reads. What has stuck stays so until its reading changes.
         (self.is_up, self.was_set_up, self.faults, self.cycles) = (true, true, self.faults.min(1), 0);

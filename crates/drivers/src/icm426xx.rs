@@ -3,6 +3,10 @@
 //! +-2000 deg/s and +-16 g, each behind the part's own second-order filter of 250 Hz, which is also the anti-alias
 //! filter for readings at 1 kHz. The interrupt INT1 is a pulse, active high, for each sample. The part measures at 1
 //! kHz or, for readings by the board's clock, at 4 kHz, so that a reading is never older than 0.25 ms.
+//!
+//! The parts have an adaptive full-scale range (AFSR) of which the data sheets say nothing. It is on after a reset, and
+//! freezes the gyroscope for 1 to 2 ms whenever a rate crosses about 100 deg/s. It is switched off here, as by
+//! Betaflight, ArduPilot (issue 25025) and PX4 (issue 22254).
 
 use crate::bus::SpiFormat;
 use crate::part::{PartFault, SelfTest, SensorPart, Step};
@@ -23,6 +27,7 @@ const DEVICE_CONFIG: u8 = 0x11;
 const INT_CONFIG: u8 = 0x14;
 const TEMP_DATA1: u8 = 0x1D;
 const INTF_CONFIG0: u8 = 0x4C;
+const INTF_CONFIG1: u8 = 0x4D;
 const PWR_MGMT0: u8 = 0x4E;
 const GYRO_CONFIG0: u8 = 0x4F;
 const ACCEL_CONFIG0: u8 = 0x50;
@@ -35,6 +40,12 @@ const REG_BANK_SEL: u8 = 0x76;
 /// Of bank 1 and of bank 2.
 const XG_ST_DATA: u8 = 0x5F;
 const XA_ST_DATA: u8 = 0x3B;
+
+/// INTF_CONFIG1 as after a reset (0x91), but for its two upper bits, by which the adaptive full-scale range is off.
+const AFSR_OFF: u8 = 0x51;
+/// Bits of INT_CONFIG1: a pulse of 8 us without a guard after it, as the data sheet demands at 4 kHz. It also demands
+/// that INT_ASYNC_RESET is off.
+const SHORT_PULSE: u8 = 0x60;
 
 /// Length of temperature, specific force and rates.
 const LENGTH: usize = 14;
@@ -71,8 +82,9 @@ impl<const IDENTITY: u8, const POLLED: bool> SensorPart for Icm426xx<IDENTITY, P
         Step::Wait(2_000),
         Step::Identify(WHO_AM_I, &[IDENTITY]),
         Step::Set(INTF_CONFIG0, 0x30), // big endian, nothing held: as after a reset
-        Step::Set(INT_CONFIG, 0b011),  // INT1 pulsed, push-pull, active high
-        Step::Set(INT_CONFIG1, 0),     // INT_ASYNC_RESET off, as the data sheet demands
+        Step::Set(INTF_CONFIG1, AFSR_OFF),
+        Step::Set(INT_CONFIG, 0b011), // INT1 pulsed, push-pull, active high
+        Step::Set(INT_CONFIG1, SHORT_PULSE),
         Step::Set(INT_SOURCE0, 0b1000),
         // 2000 deg/s and 16 g, at 4 kHz or 1 kHz, behind a filter of a sixteenth or a quarter of the rate.
         Step::Set(GYRO_CONFIG0, if POLLED { 0x04 } else { 0x06 }),

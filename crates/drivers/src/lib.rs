@@ -9,7 +9,7 @@
 //! | another part | identity, at set-up | set-up again after 0.1 s |
 //! | nothing answers | all bits of an answer of three bytes or more are equal | set-up after 10 faults |
 //! | set-up lost (reset, brown-out) | one register that was set is read back every 16 readings | the same |
-//! | transfer fails or never ends | the bus, 10 ms and 8 us a byte | the same |
+//! | transfer fails or never ends | the bus, 10 ms and 8 us a byte | the same; [I2C is recovered](RecoveringI2c) |
 //! | no interrupt | twice the time of a sample | set-up after 10 faults; or read by the clock ([`data_ready`]) |
 //! | never ready | 100 cycles | the same |
 //! | readings do not change | [`SensorPart::STUCK_AFTER`] equal answers | the same |
@@ -40,6 +40,7 @@ pub mod data_ready;
 pub mod dps310;
 mod driver;
 pub mod esc_telemetry;
+mod i2c_recovery;
 pub mod icm426xx;
 pub mod ist8310;
 pub mod lis3mdl;
@@ -54,5 +55,6 @@ pub mod ublox;
 
 pub use bus::{BusError, I2cRegisters, READ_MAX, Registers, SpiFormat, SpiRegisters};
 pub use driver::{Driver, FAULTS_MAX, PAUSE_US, PartTiming};
+pub use i2c_recovery::{I2cLine, I2cLines, RecoveringI2c};
 pub use part::{PartFault, SensorPart, Step};
 pub use reading::{FixReading, InertialReading, MagneticReading, PressureReading};

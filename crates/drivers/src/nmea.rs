@@ -1,5 +1,6 @@
 //! GNSS receivers that speak NMEA 0183: every one does, without being configured. An epoch is a fix (GGA) and the speed
-//! and course of the same time (RMC), in either order, as makers differ; other sentences are left out.
+//! and course of the same time (RMC), in either order, as makers differ; other sentences are left out. Both must say
+//! that they are measured: dead reckoning, a place put in by hand and a simulator's are an epoch without a fix.
 //!
 //! The sentences do not say how good a fix is: its standard deviations are taken from the dilution of precision and
 //! [`RANGE_SIGMA_M`]. Nor do they have a vertical speed: it is the mean change of the altitude over some [`CLIMB_S`].
@@ -75,13 +76,18 @@ impl NmeaDecoder {
         };
         let count = if sentence.is_ok() { &mut self.good_sentences } else { &mut self.bad_sentences };
         *count = count.saturating_add(1);
-        match sentence.ok()?? {
-            Sentence::Fix(None) => {
-                self.fix = None;
-                return Some(None);
+        let is_measured = match sentence.ok()?? {
+            Sentence::Fix(fix) => {
+                self.fix = fix;
+                fix.is_some()
             }
-            Sentence::Fix(fix) => self.fix = fix,
-            Sentence::Motion(motion) => self.motion = motion,
+            Sentence::Motion(motion) => {
+                self.motion = motion;
+                motion.is_some()
+            }
+        };
+        if !is_measured {
+            return Some(None);
         }
         // Halves of two epochs: the older one is overwritten once its successor comes.
         let (fix, motion) = (self.fix?, self.motion?);
@@ -89,10 +95,11 @@ impl NmeaDecoder {
             return None;
         }
         (self.fix, self.motion) = (None, None);
-        Some(Some(self.reading(&fix, &motion)))
+        Some(self.reading(&fix, &motion))
     }
 
-    fn reading(&mut self, fix: &Fix, motion: &Motion) -> FixReading {
+    /// Returns what an epoch's halves say; none if no receiver can have it.
+    fn reading(&mut self, fix: &Fix, motion: &Motion) -> Option<FixReading> {
         let thousandths = |number: i32| number as f32 / 1000.0;
         let (altitude_m, sigma_m) = (thousandths(fix.altitude_mm), thousandths(fix.dilution) * RANGE_SIGMA_M);
         let (speed_m_s, course_deg) = (thousandths(motion.speed) * KNOT_M_S, thousandths(motion.course));
@@ -108,9 +115,8 @@ impl NmeaDecoder {
             }
             None => 0.0,
         };
-        self.last = Some((fix.time_ms, altitude_m, climb_m_s));
         let (east, north) = sin_cos(course_deg.clamp(-360.0, 360.0) * (core::f32::consts::PI / 180.0));
-        FixReading {
+        let reading = FixReading {
             latitude_deg: fix.latitude.degrees(),
             longitude_deg: fix.longitude.degrees(),
             altitude_m: f64::from(altitude_m),
@@ -120,6 +126,9 @@ impl NmeaDecoder {
             speed_sigma_m_s: SPEED_SIGMA_M_S,
             climb_sigma_m_s: CLIMB_SIGMA_M_S,
             satellites: fix.satellites,
-        }
+        };
+        let reading = reading.possible()?;
+        self.last = Some((fix.time_ms, altitude_m, climb_m_s));
+        Some(reading)
     }
 }

@@ -1,6 +1,7 @@
 //! What parts read, in SI units and the part's own axes.
 
 use crate::part::PartFault;
+use core::ops::RangeInclusive;
 use nalgebra::Vector3;
 
 /// What an IMU reads.
@@ -51,6 +52,29 @@ pub struct FixReading {
     pub climb_sigma_m_s: f32,
     /// Satellites in use.
     pub satellites: u8,
+}
+
+/// Limits of GNSS receivers, as u-blox has them: altitude \[m\], speed along an axis \[m/s\].
+const ALTITUDES_M: RangeInclusive<f64> = -10_000.0..=80_000.0;
+const SPEED_MAX_M_S: f32 = 500.0;
+/// Standard deviations beyond which a fix is none: of the position \[m\], of the velocity \[m/s\].
+const SIGMA_MAX_M: f32 = 200.0;
+const SIGMA_MAX_M_S: f32 = 20.0;
+
+impl FixReading {
+    /// Passes a fix that a receiver can have, and that is accurate enough to be one.
+    pub(crate) fn possible(self) -> Option<Self> {
+        let is_sigma = |sigma: f32, most: f32| sigma > 0.0 && sigma <= most;
+        let is_possible = self.latitude_deg.abs() <= 90.0
+            && self.longitude_deg.abs() <= 180.0
+            && ALTITUDES_M.contains(&self.altitude_m)
+            && self.velocity_ned_m_s.iter().all(|speed| speed.abs() <= SPEED_MAX_M_S)
+            && is_sigma(self.horizontal_sigma_m, SIGMA_MAX_M)
+            && is_sigma(self.vertical_sigma_m, SIGMA_MAX_M)
+            && is_sigma(self.speed_sigma_m_s, SIGMA_MAX_M_S)
+            && is_sigma(self.climb_sigma_m_s, SIGMA_MAX_M_S);
+        is_possible.then_some(self)
+    }
 }
 
 /// Returns three numbers of two bytes each, the higher first.

@@ -21,6 +21,7 @@ mod data_ready;
 mod dps310;
 mod esc_telemetry;
 mod framing;
+mod i2c_recovery;
 mod icm426xx;
 mod ist8310;
 mod lis3mdl;

@@ -1,7 +1,8 @@
-//! ICM-42688-P and ICM-42605 against their registers, as DS-000347 has them.
+//! ICM-42688-P and ICM-42605 against their registers, as DS-000347 has them, and as silicon is known to differ: the
+//! adaptive full-scale range freezes the gyroscope.
 
 use crate::rig::{Model, Rig, Trouble, comes_back_at_once, noise, reads, refuses_another, run, survives_all_troubles};
-use afbc_drivers::icm426xx::{Icm42605, Icm42688p};
+use afbc_drivers::icm426xx::{Icm426xx, Icm42605, Icm42688p};
 use afbc_drivers::{InertialReading, PartFault};
 use embassy_futures::block_on;
 
@@ -13,6 +14,8 @@ struct Registers {
     /// Since when gyroscope and accelerometer run.
     on_us: [Option<u64>; 2],
     rates_deg_s: [f64; 3],
+    /// How far each rate swings to both sides of that, once in 0.1 s \[deg/s\].
+    swing_deg_s: f64,
     force_g: [f64; 3],
     /// What the factory has written of the self-test, and how much of it each axis responds.
     trims: [[u8; 3]; 2],
@@ -24,7 +27,9 @@ impl Registers {
         let (rates_deg_s, force_g) = ([10.0, -250.0, 0.5], [0.1, -0.2, 1.0]);
         let (trims, responds) = ([[110, 97, 130], [140, 1, 120]], [1.0; 6]);
         let (registers, on_us) = ([0; 128], [None; 2]);
-        let mut part = Registers { identity, bank: 0, registers, on_us, rates_deg_s, force_g, trims, responds };
+        let (bank, swing_deg_s) = (0, 0.0);
+        let mut part =
+            Registers { identity, bank, registers, on_us, rates_deg_s, swing_deg_s, force_g, trims, responds };
         part.reset(0);
         part
     }
@@ -45,8 +50,27 @@ impl Registers {
         }
     }
 
+    /// True turn rate of an axis \[deg/s\].
+    fn rate_deg_s(&self, axis: usize, at_us: u64) -> f64 {
+        let turns = at_us as f64 / 100e3 + axis as f64 / 3.0;
+        self.rates_deg_s[axis] + self.swing_deg_s * (turns * std::f64::consts::TAU).sin()
+    }
+
+    /// Time of the sample that the gyroscope still shows: of its newest one, unless the adaptive full-scale range is on
+    /// and a rate has crossed 100 deg/s within 2 ms. No data sheet has it (ArduPilot's issue 25025).
+    fn shown_us(&self, sample_us: u64) -> u64 {
+        let is_fast = |at_us| (0..3).any(|axis| self.rate_deg_s(axis, at_us).abs() > 100.0);
+        let adapts = self.registers[0x4D] & 0xC0 != 0x40;
+        let crossed = (1..=2_000 / self.period_us()).rev().find_map(|samples| {
+            let before_us = sample_us.saturating_sub(samples * self.period_us());
+            (is_fast(before_us) != is_fast(before_us + self.period_us())).then_some(before_us)
+        });
+        crossed.filter(|_| adapts).unwrap_or(sample_us)
+    }
+
     fn data(&self, now_us: u64) -> [u8; 14] {
         let now_us = now_us / self.period_us() * self.period_us();
+        let shown_us = self.shown_us(now_us);
         let mut numbers = [-32768_i16; 7];
         numbers[0] = ((31.0 - 25.0) * 132.48 + 4.0 * noise(now_us, 9)) as i16;
         let on = |at: usize, start_us: u64| self.on_us[at].is_some_and(|on_us| now_us >= on_us + start_us);
@@ -62,9 +86,10 @@ impl Registers {
                 let responds = self.registers[0x70] >> axis & 1 != 0;
                 let more_deg_s =
                     if responds { self.responds[axis] * factory(self.trims[0][axis]) / 131.0 } else { 0.0 };
-                let lsb = (self.rates_deg_s[axis] + more_deg_s) * Self::scale(self.registers[0x4F], 2000.0);
+                let rate_deg_s = self.rate_deg_s(axis, shown_us) + more_deg_s;
+                let lsb = rate_deg_s * Self::scale(self.registers[0x4F], 2000.0);
                 numbers[4 + axis] =
-                    (lsb + 2.0 * noise(now_us, 4 + axis as u64)).round().clamp(-32767.0, 32767.0) as i16;
+                    (lsb + 2.0 * noise(shown_us, 4 + axis as u64)).round().clamp(-32767.0, 32767.0) as i16;
             }
         }
         let mut bytes = [0; 14];
@@ -116,7 +141,9 @@ impl Model for Registers {
 
     fn reset(&mut self, _: u64) {
         self.registers = [0; 128];
-        for (register, value) in [(0x4C, 0x30), (0x4F, 0x06), (0x50, 0x06), (0x52, 0x11), (0x64, 0x10), (0x65, 0x10)] {
+        for (register, value) in
+            [(0x4C, 0x30), (0x4D, 0x91), (0x4F, 0x06), (0x50, 0x06), (0x52, 0x11), (0x64, 0x10), (0x65, 0x10)]
+        {
             self.registers[register] = value;
         }
         (self.bank, self.on_us) = (0, [None; 2]);
@@ -124,8 +151,10 @@ impl Model for Registers {
 
     fn next_interrupt_us(&self, now_us: u64) -> Option<u64> {
         let routed = self.registers[0x65] & 8 != 0 && self.registers[0x14] & 3 == 3 && self.registers[0x64] & 0x10 == 0;
+        // From 4 kHz on, a pulse of 100 us and the guard of as much after it must be off.
+        let is_apart = self.period_us() > 250 || self.registers[0x64] & 0x60 == 0x60;
         let on = self.on_us.iter().any(Option::is_some);
-        (routed && on).then(|| (now_us / self.period_us() + 1) * self.period_us())
+        (routed && is_apart && on).then(|| (now_us / self.period_us() + 1) * self.period_us())
     }
 }
 
@@ -211,4 +240,37 @@ fn its_full_range_is_read() {
         assert!((rates_rad_s.x - rate as f32).abs() < 0.02, "{rates_rad_s}");
         assert!((specific_force_m_s2.x - force as f32).abs() < 0.05, "{specific_force_m_s2}");
     }
+}
+
+/// The part shows the rates of the moment, at any rate of turn.
+fn follows_every_turn<const IDENTITY: u8, const POLLED: bool>() {
+    for (middle, swing) in [(0.0, 90.0), (0.0, 150.0), (100.0, 20.0), (-100.0, 5.0), (-300.0, 600.0), (0.0, 1900.0)] {
+        let rig = Rig::new(Registers::new(IDENTITY));
+        rig.with(|part| (part.rates_deg_s, part.swing_deg_s) = ([middle; 3], swing));
+        let mut driver = rig.driver(Icm426xx::<IDENTITY, POLLED> {});
+        let (mut readings, faults) = run(&mut driver, &rig, 500_000);
+        assert!(faults.is_empty() && readings.len() > 400, "{middle}, {swing}: {faults:?}");
+        // A part that was reset meanwhile is set up the same way.
+        rig.set(Trouble::Reset);
+        rig.set(Trouble::None);
+        let _ = run(&mut driver, &rig, 300_000);
+        readings.extend(run(&mut driver, &rig, 300_000).0);
+        for reading in readings {
+            for axis in 0..3 {
+                let true_deg_s = rig.with(|part| part.rate_deg_s(axis, reading.at_us));
+                let off_deg_s = f64::from(reading.value.rates_rad_s[axis]).to_degrees() - true_deg_s;
+                assert!(off_deg_s.abs() < 0.3, "{middle}, {swing}: {off_deg_s} at {} us", reading.at_us);
+            }
+        }
+        // The bits beside it are the clock's, and stay what they are after a reset.
+        assert_eq!(rig.with(|part| part.registers[0x4D]), 0x51);
+    }
+}
+
+#[test]
+fn no_rate_freezes_it() {
+    follows_every_turn::<0x47, false>();
+    follows_every_turn::<0x47, true>();
+    follows_every_turn::<0x42, false>();
+    follows_every_turn::<0x42, true>();
 }

@@ -190,3 +190,88 @@ fn epochs_that_do_not_belong_together_are_no_fix() {
     let (_, motion) = late.split_once("$GPGSV").expect("two halves");
     assert_eq!(fixes(&mut decoder, &format!("{fix}$GPGSV{motion}")), []);
 }
+
+/// An epoch in either order, by the fields that say how good it is.
+fn judged(quality: &str, dilution: &str, status: &str, mode: Option<&str>, motion_comes_first: bool) -> String {
+    let place = "4807.03800,N,01131.00000,E";
+    let mode = mode.map(|mode| format!(",{mode}")).unwrap_or_default();
+    let epoch = sentence(&format!("GNGGA,123519.00,{place},{quality},08,{dilution},545.4,M,46.9,M,,"))
+        + &sentence("GPGSV,1,1,01,05,45,120,40")
+        + &sentence(&format!("GNRMC,123519.00,{status},{place},22.4,84.4,230394,,{mode}"))
+        + &sentence("GPGLL,4807.03800,N,01131.00000,E,123519.00,A,A");
+    if motion_comes_first { motion_first(&epoch) } else { epoch }
+}
+
+/// Dead reckoning, a place put in by hand, a simulator's and one that the receiver calls none are no fix, whichever of
+/// the two sentences says so. The epoch is told nevertheless: a receiver without a fix is not silent.
+#[test]
+fn what_is_not_measured_is_no_fix() {
+    let qualities = ["", "0", "1", "2", "3", "4", "5", "6", "7", "8", "9", "10", "A", "-1"];
+    let modes = ["", "A", "D", "F", "P", "R", "E", "M", "N", "S", "X", "AA"].map(Some);
+    for quality in qualities {
+        // Receivers before NMEA 2.3 have no mode.
+        for mode in modes.into_iter().chain([None]) {
+            for (status, motion_comes_first) in [("A", false), ("A", true), ("V", false), ("V", true)] {
+                let text = judged(quality, "0.9", status, mode, motion_comes_first);
+                let read = fixes(&mut NmeaDecoder::new(), &text);
+                let measured = ["1", "2", "3", "4", "5", "9"].contains(&quality)
+                    && matches!(mode, None | Some("" | "A" | "D" | "F" | "P" | "R"))
+                    && status == "A";
+                assert!(!read.is_empty() && read.iter().all(|fix| fix.is_some() == measured), "{text}{read:?}");
+            }
+        }
+    }
+    // As a receiver in a tunnel sends it.
+    let tunnel = "$GNGGA,123519.00,4807.038000,N,01131.000000,E,6,00,0.9,545.4,M,46.9,M,,*78\r\n\
+        $GNRMC,123519.00,A,4807.038000,N,01131.000000,E,22.4,84.4,230394,,,E*48\r\n";
+    assert_eq!(fixes(&mut NmeaDecoder::new(), tunnel).into_iter().flatten().count(), 0);
+}
+
+proptest! {
+    /// No fix is worse than 200 m, or faster or higher than a receiver can tell; nor is one that claims to be perfect.
+    #[test]
+    fn impossible_numbers_are_an_epoch_without_a_fix(
+        hundredths in prop_oneof![Just(0), 1_u32..12_000, Just(9_999)],
+        knots in prop_oneof![0.0..950.0_f64, 0.0..3_000.0_f64],
+        altitude in prop_oneof![-9_000.0..79_000.0_f64, -20_000.0..200_000.0_f64],
+    ) {
+        let place = "4807.03800,N,01131.00000,E";
+        let text = sentence(&format!(
+            "GNGGA,123519.00,{place},1,08,{}.{:02},{altitude:.1},M,46.9,M,,", hundredths / 100, hundredths % 100
+        )) + &sentence(&format!("GNRMC,123519.00,A,{place},{knots:.1},0.0,230394,,,A"));
+        let read = fixes(&mut NmeaDecoder::new(), &text);
+        prop_assert_eq!(read.len(), 1);
+        let vertical_m = 1.5 * RANGE_SIGMA_M * hundredths as f32 / 100.0;
+        let speed_m_s = knots * 1852.0 / 3600.0;
+        prop_assume!((vertical_m - 200.0).abs() > 0.1 && (speed_m_s - 500.0).abs() > 0.1);
+        let possible = vertical_m > 0.0 && vertical_m <= 200.0 && speed_m_s <= 500.0
+            && (-10_000.0..=80_000.0).contains(&altitude);
+        prop_assert_eq!(read[0].is_some(), possible, "{}: {:?}", text, read);
+    }
+
+    /// The head of a proprietary sentence begins with a P, has any length, and may end like a head that is known.
+    #[test]
+    fn only_heads_of_a_talker_and_a_kind_are_read(head in "[A-Z0-9]{0,7}", kind in 0_usize..2) {
+        let known = ["GGA", "RMC"][kind];
+        let mut decoder = NmeaDecoder::new();
+        for text in [head.clone(), format!("P{head}{known}"), format!("{head}{known}")] {
+            let talks = text.len() == 5 && text.ends_with(known) && !text.starts_with('P')
+                && text.bytes().take(2).all(|byte| byte.is_ascii_uppercase());
+            // Without a fix, and not valid: the shortest of which the decoder tells.
+            let read = fixes(&mut decoder, &sentence(&format!("{text},123519.00,V,,,,0,,")));
+            prop_assert_eq!(read.len(), usize::from(talks), "{}", text);
+        }
+        prop_assert_eq!(decoder.bad_sentences(), 0);
+    }
+}
+
+/// A proprietary sentence within an epoch is not taken for its motion.
+#[test]
+fn a_proprietary_sentence_spoils_no_epoch() {
+    let good = judged("1", "0.9", "A", Some("A"), false);
+    let own = sentence("PGRMC,A,218.8,100,6378137.000,298.257223563,0.0,0.0,0.0,A,3,1,1,4,30");
+    let mixed = good.replace("$GPGSV", &format!("{own}$GPGSV")).replace("$GPGLL", &format!("{own}$GPGLL"));
+    let mut decoder = NmeaDecoder::new();
+    assert_eq!(fixes(&mut decoder, &mixed), fixes(&mut NmeaDecoder::new(), &good));
+    assert_eq!(decoder.bad_sentences(), 0);
+}

@@ -7,7 +7,7 @@ use nalgebra::Vector3;
 
 const FIELD_UT: [f64; 3] = [22.0, -3.0, -42.0];
 
-struct Registers {
+pub(crate) struct Registers {
     identity: u8,
     data: [u8; 6],
     /// DOR, OVL, DRDY.
@@ -22,7 +22,7 @@ struct Registers {
 }
 
 impl Registers {
-    fn new() -> Self {
+    pub(crate) fn new() -> Self {
         let (data, control, field_ut) = ([0; 6], [0; 3], FIELD_UT);
         Registers { identity: 0xFF, data, status: 0, control, is_locked: false, since_us: 0, measured: 0, field_ut }
     }

@@ -18,6 +18,7 @@ mod wiring;
 use crate::card::{FlashChip, LogStorage, SpiSlot};
 use crate::impairments::Impairments;
 use crate::machine::{Divider, Machine, Signal};
+use crate::steady::SteadyPin;
 use crate::wire::Wire;
 use bmi270::Bmi270;
 use part::Part;
@@ -334,6 +335,8 @@ impl<const ROW: usize> Machine for F405<ROW> {
     const BATTERY_MV: Option<u16> = if Self::WIRING.sensors.is_some() { Some(16_800) } else { None };
     /// USB: the core's fourth hardware configuration register.
     const UNMAPPED: &[u64] = &[0x5000_0050];
+    const PORTS: u64 = 0x4002_0000;
+    const STEADY: &'static [SteadyPin] = Self::WIRING.steady;
     /// RM0090, 34.16.2.
     const USB_STATUS: Option<u64> = Some(0x5000_0014);
 

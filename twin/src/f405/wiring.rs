@@ -4,6 +4,8 @@
 //! sensor's turns are Betaflight's alignments.
 
 use crate::machine::{Divider, FrameTimer};
+use crate::steady::Steady::{Output, PulledUp};
+use crate::steady::SteadyPin;
 
 /// A board.
 #[derive(Clone, Copy, Debug)]
@@ -16,6 +18,8 @@ pub struct Wiring {
     pub sensors: Option<Sensors>,
     /// Where it keeps logs.
     pub logs: Option<LogWiring>,
+    /// Pins that must not float: RX of its UARTs, and what switches its Bluetooth.
+    pub steady: &'static [SteadyPin],
     /// The timers of its motors, with DMA.
     pub timers: &'static [FrameTimer],
     /// Name, timer and channel of motors 1 to 4.
@@ -85,6 +89,18 @@ pub enum Timer {
     Advanced(usize),
 }
 
+/// RX of the usual UARTs: of USART2, USART3, UART5 and USART6 (RM0090).
+const RX2: SteadyPin = (0, 3, PulledUp);
+const RX3: SteadyPin = (2, 11, PulledUp);
+const RX5: SteadyPin = (3, 2, PulledUp);
+const RX6: SteadyPin = (2, 7, PulledUp);
+/// And of USART1 and UART4.
+const RX1: SteadyPin = (0, 10, PulledUp);
+const RX4: SteadyPin = (0, 1, PulledUp);
+/// The enable pin of Bluetooth.
+const QUIET_PB11: SteadyPin = (1, 11, Output(false));
+const QUIET_PC3: SteadyPin = (2, 3, Output(false));
+
 const TIM3: Timer = Timer::General(1);
 const TIM4: Timer = Timer::General(2);
 const TIM5: Timer = Timer::General(3);
@@ -130,6 +146,7 @@ const SPEEDYBEE_V3: Wiring = Wiring {
         battery: Battery { channels: [10, 11], deciamperes_per_volt: 259 },
     }),
     logs: Some(LogWiring { storage: StorageKind::Card, spi: 1, select: ("GPIOA", 15) }),
+    steady: &[RX2, RX3, RX5, RX6, QUIET_PC3],
     timers: &[TIM4_ALL],
     motors: [("M1", TIM4, 1), ("M2", TIM4, 2), ("M3", TIM4, 3), ("M4", TIM4, 4)],
 };
@@ -149,6 +166,7 @@ const SPEEDYBEE_V4: Wiring = Wiring {
         battery: Battery { channels: [10, 11], deciamperes_per_volt: 250 },
     }),
     logs: Some(LogWiring { storage: StorageKind::Card, spi: 2, select: ("GPIOC", 14) }),
+    steady: &[RX2, RX3, RX5, RX6, QUIET_PB11],
     timers: TIM4_TIM3,
     motors: [("M1", TIM4, 1), ("M2", TIM4, 2), ("M3", TIM3, 3), ("M4", TIM3, 4)],
 };
@@ -185,6 +203,7 @@ const MATEK_SE: Wiring = Wiring {
         battery: Battery { channels: [10, 11], deciamperes_per_volt: 559 },
     }),
     logs: Some(LogWiring { storage: StorageKind::Card, spi: 2, select: ("GPIOC", 14) }),
+    steady: &[RX1, RX2, RX5, RX6],
     timers: TIM4_TIM3,
     motors: [("M1", TIM4, 2), ("M2", TIM4, 1), ("M3", TIM3, 3), ("M4", TIM3, 4)],
 };
@@ -204,6 +223,7 @@ const MATEK_STD: Wiring = Wiring {
         battery: Battery { channels: [15, 14], deciamperes_per_volt: 559 },
     }),
     logs: Some(LogWiring { storage: StorageKind::Card, spi: 2, select: ("GPIOC", 1) }),
+    steady: &[RX1, RX2, RX3, RX5],
     timers: &[TIM8_ALL],
     motors: ALL_OF_TIM8,
 };
@@ -223,6 +243,7 @@ const KAKUTE: Wiring = Wiring {
         battery: Battery { channels: [13, 12], deciamperes_per_volt: 364 },
     }),
     logs: None,
+    steady: &[RX1, (1, 11, PulledUp), RX4, RX5],
     timers: &[tim3([0, 2]), TIM5_LAST],
     motors: [("M1", TIM3, 3), ("M2", TIM3, 4), ("M3", TIM5, 4), ("M4", TIM5, 3)],
 };
@@ -234,6 +255,7 @@ const PLAIN: Wiring = Wiring {
     radio: None,
     sensors: None,
     logs: None,
+    steady: &[RX1],
     timers: &[TIM8_ALL],
     motors: ALL_OF_TIM8,
 };

@@ -7,6 +7,9 @@ use heapless::Vec;
 
 /// Longest sentence between `$` and `*` that is read: NMEA allows 79 bytes, some receivers write more.
 const LENGTH: usize = 100;
+/// Qualities in GGA of a fix that is measured: by satellites alone (1), with corrections (2, 3, and 9 of NovAtel), by
+/// the carrier (4, 5). Dead reckoning (6), a place put in by hand (7) and a simulator's (8) are none.
+const MEASURED: &[u8] = b"123459";
 /// Ten-millionths of a minute in a degree.
 const DEGREE: i32 = 600_000_000;
 
@@ -86,9 +89,9 @@ fn hexadecimal(digit: u8) -> Option<u8> {
 /// A sentence that belongs to an epoch.
 #[derive(Debug, PartialEq)]
 pub(super) enum Sentence {
-    /// GGA; none without a fix.
+    /// GGA; none without a fix that is measured.
     Fix(Option<Fix>),
-    /// RMC; none if it is not valid.
+    /// RMC; none if it is not valid, or not measured.
     Motion(Option<Motion>),
 }
 
@@ -135,17 +138,21 @@ impl Angle {
 }
 
 impl Sentence {
-    /// Reads one from any talker; none for other kinds.
+    /// Reads one from any talker, of two letters; none for other kinds, and for what makers send of their own, whose
+    /// head begins with a P (`PGRMC`).
     ///
     /// # Errors
     /// If a field that is needed is no number, or out of range.
     pub(super) fn read(body: &[u8]) -> Result<Option<Self>, ()> {
         let mut fields = body.split(|byte| *byte == b',');
-        let kind = fields.next().and_then(|head| head.get(2..));
+        let kind = match fields.next() {
+            Some([b'A'..=b'O' | b'Q'..=b'Z', b'A'..=b'Z', kind @ ..]) => kind,
+            _ => return Ok(None),
+        };
         let mut fields = Fields(fields);
         Ok(match kind {
-            Some(b"GGA") => Some(Sentence::Fix(fields.fix().ok_or(())?)),
-            Some(b"RMC") => Some(Sentence::Motion(fields.motion().ok_or(())?)),
+            b"GGA" => Some(Sentence::Fix(fields.fix().ok_or(())?)),
+            b"RMC" => Some(Sentence::Motion(fields.motion().ok_or(())?)),
             _ => None,
         })
     }
@@ -163,7 +170,7 @@ impl<'a, I: Iterator<Item = &'a [u8]>> Fields<I> {
     fn fix(&mut self) -> Option<Option<Fix>> {
         let time = self.next()?;
         let [latitude, north, longitude, east] = [self.next()?, self.next()?, self.next()?, self.next()?];
-        if matches!(self.next()?, b"" | b"0") {
+        if !matches!(self.next()?, [quality] if MEASURED.contains(quality)) {
             return Some(None);
         }
         let fix = Fix {
@@ -171,13 +178,13 @@ impl<'a, I: Iterator<Item = &'a [u8]>> Fields<I> {
             latitude: angle(latitude, north, *b"NS", 90)?,
             longitude: angle(longitude, east, *b"EW", 180)?,
             satellites: decimal(self.next()?, 0)?.try_into().ok()?,
-            dilution: decimal(self.next()?, 3).filter(|dilution| *dilution > 0)?,
+            dilution: decimal(self.next()?, 3)?,
             altitude_mm: decimal(self.next()?, 3)?,
         };
         Some(Some(fix))
     }
 
-    /// Reads RMC: `Some(None)` if it is not valid.
+    /// Reads RMC: `Some(None)` if it is not valid, or not measured.
     fn motion(&mut self) -> Option<Option<Motion>> {
         let time = self.next()?;
         if self.next()? != b"A" {
@@ -186,6 +193,10 @@ impl<'a, I: Iterator<Item = &'a [u8]>> Fields<I> {
         // The place is GGA's.
         let speed = self.0.nth(4)?;
         let course = self.next()?;
+        // Behind date and variation; receivers before NMEA 2.3 do not tell.
+        if !matches!(self.0.nth(3), None | Some(b"" | b"A" | b"D" | b"F" | b"P" | b"R")) {
+            return Some(None);
+        }
         Some(Some(Motion {
             time_ms: time_of_day(time)?,
             speed: decimal(speed, 3)?,

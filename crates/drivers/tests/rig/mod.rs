@@ -216,7 +216,7 @@ impl<M: Model> PartTiming for Rig<M> {
 
 /// Reads until so much time has passed; returns readings and faults.
 pub fn run<P: SensorPart, M: Model>(
-    driver: &mut Driver<P, Rig<M>, Rig<M>>,
+    driver: &mut Driver<P, impl Registers, Rig<M>>,
     rig: &Rig<M>,
     us: u64,
 ) -> (Vec<Stamped<P::Reading>>, Vec<PartFault>) {

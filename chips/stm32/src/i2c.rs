@@ -1,0 +1,55 @@
+//! An I2C that is recovered before its first transfer, and after each that failed or was given up.
+
+use crate::line::Line;
+use afbc_drivers::{I2cLine, I2cLines, RecoveringI2c};
+use embassy_stm32::i2c::{I2c, Master};
+use embassy_stm32::mode::Async;
+use embassy_time::{Duration, block_for};
+
+/// Half a clock while a bus is recovered \[us\]: 100 kHz, at which every part works.
+const HALF_CLOCK_US: u64 = 5;
+
+/// A bus.
+pub type Bus = RecoveringI2c<I2c<'static, Async, Master>, Lines>;
+
+/// The lines of a controller, and what resets it and leaves it set up.
+pub struct Lines {
+    clock: Line,
+    data: Line,
+    restart: fn(),
+}
+
+/// Makes a bus of a controller and its lines.
+pub fn bus(controller: I2c<'static, Async, Master>, [clock, data]: [Line; 2], restart: fn()) -> Bus {
+    RecoveringI2c::new(controller, Lines { clock, data, restart })
+}
+
+impl I2cLines for Lines {
+    fn take(&mut self) {
+        for line in [self.clock, self.data] {
+            line.set(true);
+            line.take();
+        }
+    }
+
+    fn drive(&mut self, line: I2cLine, is_released: bool) {
+        let line = match line {
+            I2cLine::Clock => self.clock,
+            I2cLine::Data => self.data,
+        };
+        // An open drain, which the pin stays.
+        line.set(is_released);
+        block_for(Duration::from_micros(HALF_CLOCK_US));
+    }
+
+    fn is_clock_high(&self) -> bool {
+        self.clock.is_high()
+    }
+
+    fn restart(&mut self) {
+        // The lines first: a controller that is reset while its lines are low counts the bus as busy.
+        self.clock.give_back();
+        self.data.give_back();
+        (self.restart)();
+    }
+}

@@ -1,0 +1,56 @@
+//! A pin by its registers, beside the driver that has it.
+
+use embassy_stm32::Peri;
+use embassy_stm32::gpio::{AnyPin, Pin};
+use embassy_stm32::pac::gpio::Gpio;
+use embassy_stm32::pac::gpio::vals::{Idr, Moder, Pupdr};
+
+/// A pin's registers.
+#[derive(Clone, Copy)]
+pub struct Line {
+    port: Gpio,
+    pin: usize,
+}
+
+impl Line {
+    /// The registers of a pin that a driver is going to have.
+    pub fn of(pin: Peri<'_, impl Pin>) -> Self {
+        let pin = pin.into::<AnyPin>();
+        Line { port: pin.block(), pin: pin.pin().into() }
+    }
+
+    /// Takes the pin from its driver for ever, and holds it low.
+    pub fn hold_low(self) {
+        self.set(false);
+        self.take();
+    }
+
+    /// Takes the pin from its driver: it has the level that was set; an open drain is released by a high one.
+    pub(crate) fn take(self) {
+        self.mode(Moder::OUTPUT);
+    }
+
+    /// Gives the pin back to its driver, which has it as an alternate function.
+    pub(crate) fn give_back(self) {
+        self.mode(Moder::ALTERNATE);
+    }
+
+    /// Sets the level.
+    pub(crate) fn set(self, is_high: bool) {
+        self.port.bsrr().write(|bits| if is_high { bits.set_bs(self.pin, true) } else { bits.set_br(self.pin, true) });
+    }
+
+    pub(crate) fn is_high(self) -> bool {
+        self.port.idr().read().idr(self.pin) == Idr::HIGH
+    }
+
+    /// Pulls the pin down instead of up.
+    pub(crate) fn pull_down(self) {
+        // Tasks of other priorities change other pins of the port.
+        cortex_m::interrupt::free(|_| self.port.pupdr().modify(|pulls| pulls.set_pupdr(self.pin, Pupdr::PULL_DOWN)));
+    }
+
+    fn mode(self, mode: Moder) {
+        cortex_m::interrupt::free(|_| self.port.moder().modify(|modes| modes.set_moder(self.pin, mode)));
+    }
+}

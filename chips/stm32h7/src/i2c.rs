@@ -1,0 +1,11 @@
+//! Restarts an I2C controller that a broken transfer has left stuck.
+
+use embassy_stm32::pac::i2c::I2c;
+
+/// Resets a controller, which keeps its set-up meanwhile.
+pub fn restart(i2c: I2c) {
+    i2c.cr1().modify(|cr1| cr1.set_pe(false));
+    // The read-back takes the three clocks for which it must be off.
+    while i2c.cr1().read().pe() {}
+    i2c.cr1().modify(|cr1| cr1.set_pe(true));
+}

@@ -1,0 +1,241 @@
+//! A bus whose part holds the data line, and whose controller is left in mid-transfer: both at the level of the two
+//! lines, as UM10204 has them, and as the STM32F4's controller is known to behave.
+
+use crate::qmc5883l::Registers as Compass;
+use crate::rig::{Rig, run};
+use afbc_drivers::qmc5883l::Qmc5883l;
+use afbc_drivers::{Driver, I2cLine, I2cLines, I2cRegisters, PartFault, RecoveringI2c, Registers};
+use core::future::pending;
+use embassy_futures::block_on;
+use embedded_hal_async::i2c::{ErrorKind, ErrorType, I2c, Operation};
+use std::cell::RefCell;
+use std::rc::Rc;
+
+/// State of the part within a transfer.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Amid {
+    Nothing,
+    /// It sends these bits, the first of them on the line, and then looks for an acknowledgement. One that does not
+    /// heed START and STOP meanwhile ends by the acknowledgement that does not come.
+    Sends {
+        bits: u8,
+        left: u8,
+        heeds: bool,
+    },
+    /// It takes bits in, and acknowledges the eighth.
+    Takes {
+        taken: u8,
+    },
+}
+
+/// Lines, part and controller.
+#[derive(Debug)]
+struct Bus {
+    amid: Amid,
+    /// Levels to which the master drives the lines.
+    is_clock_released: bool,
+    is_data_released: bool,
+    /// Bytes that the part has taken in by mistake.
+    mistaken: u32,
+    /// For how many looks the part holds the clock line.
+    stretches: u32,
+    /// True if the controller has a transfer that was not ended.
+    is_locked: bool,
+    /// In the middle of what the next transfer breaks off.
+    breaks: Option<Amid>,
+    recoveries: u32,
+}
+
+impl Bus {
+    fn part_pulls_data(&self) -> bool {
+        match self.amid {
+            Amid::Sends { bits, left, .. } => left > 0 && bits & 0x80 == 0,
+            Amid::Takes { taken } => taken == 8,
+            Amid::Nothing => false,
+        }
+    }
+
+    fn is_data_high(&self) -> bool {
+        self.is_data_released && !self.part_pulls_data()
+    }
+
+    fn drive(&mut self, line: I2cLine, is_released: bool) {
+        let (clock, data) = (self.is_clock_released, self.is_data_high());
+        match line {
+            I2cLine::Clock => self.is_clock_released = is_released,
+            I2cLine::Data => self.is_data_released = is_released,
+        }
+        match (clock, self.is_clock_released) {
+            (false, true) => self.rises(),
+            (true, false) => self.falls(),
+            // START and STOP.
+            (true, true) if self.is_data_high() != data && !matches!(self.amid, Amid::Sends { heeds: false, .. }) => {
+                self.amid = Amid::Nothing;
+            }
+            _ => (),
+        }
+    }
+
+    /// The part reads the data line.
+    fn rises(&mut self) {
+        match &mut self.amid {
+            Amid::Sends { left: 0, .. } if self.is_data_released => self.amid = Amid::Nothing,
+            Amid::Takes { taken } if *taken < 8 => *taken += 1,
+            _ => (),
+        }
+    }
+
+    /// The part changes the data line.
+    fn falls(&mut self) {
+        match &mut self.amid {
+            Amid::Sends { bits, left, .. } if *left > 0 => (*bits, *left) = (*bits << 1, *left - 1),
+            // Acknowledged: the next byte.
+            Amid::Sends { left, .. } => *left = 8,
+            Amid::Takes { taken } if *taken == 8 => {
+                self.mistaken += 1;
+                *taken = 0;
+            }
+            _ => (),
+        }
+    }
+}
+
+/// The controller of a bus with a part that the rig has.
+#[derive(Clone)]
+struct Port {
+    bus: Rc<RefCell<Bus>>,
+    rig: Rig<Compass>,
+}
+
+impl Port {
+    fn new(rig: &Rig<Compass>, amid: Amid) -> Self {
+        let bus = Bus {
+            amid,
+            is_clock_released: true,
+            is_data_released: true,
+            mistaken: 0,
+            stretches: 0,
+            is_locked: false,
+            breaks: None,
+            recoveries: 0,
+        };
+        Port { bus: Rc::new(RefCell::new(bus)), rig: rig.clone() }
+    }
+}
+
+impl ErrorType for Port {
+    type Error = ErrorKind;
+}
+
+impl I2c for Port {
+    async fn transaction(&mut self, _: u8, operations: &mut [Operation<'_>]) -> Result<(), ErrorKind> {
+        let amid = self.bus.borrow_mut().breaks.take();
+        if let Some(amid) = amid {
+            (self.bus.borrow_mut().amid, self.bus.borrow_mut().is_locked) = (amid, true);
+        }
+        // No controller begins on a bus that is held, nor while it waits for the end of another transfer.
+        if self.bus.borrow().is_locked || self.bus.borrow().amid != Amid::Nothing {
+            return pending().await;
+        }
+        let result = match operations {
+            [Operation::Write([register]), Operation::Read(into)] => self.rig.read(*register, into).await,
+            [Operation::Write([register, bytes @ ..])] => self.rig.write(*register, bytes).await,
+            _ => panic!("{operations:?}"),
+        };
+        result.map_err(|_| ErrorKind::Other)
+    }
+}
+
+impl I2cLines for Port {
+    fn take(&mut self) {
+        let mut bus = self.bus.borrow_mut();
+        bus.recoveries += 1;
+        (bus.is_clock_released, bus.is_data_released) = (true, true);
+    }
+
+    fn drive(&mut self, line: I2cLine, is_released: bool) {
+        let mut bus = self.bus.borrow_mut();
+        if line == I2cLine::Clock && is_released && bus.stretches > 0 {
+            bus.stretches -= 1;
+            return;
+        }
+        bus.drive(line, is_released);
+    }
+
+    fn is_clock_high(&self) -> bool {
+        self.bus.borrow().is_clock_released
+    }
+
+    fn restart(&mut self) {
+        let mut bus = self.bus.borrow_mut();
+        bus.is_locked &= !(bus.is_clock_released && bus.is_data_released);
+    }
+}
+
+/// Everything that a part may be in the middle of.
+fn all_amid() -> Vec<Amid> {
+    let sends = (0..=8).flat_map(|left| {
+        let bits = [0x00, 0xFF, 0x55, 0xAA, 0x0F, 0xF0];
+        bits.into_iter().flat_map(move |bits| [true, false].map(|heeds| Amid::Sends { bits, left, heeds }))
+    });
+    [Amid::Nothing].into_iter().chain(sends).chain((0..=8).map(|taken| Amid::Takes { taken })).collect()
+}
+
+type CompassDriver = Driver<Qmc5883l, I2cRegisters<RecoveringI2c<Port, Port>>, Rig<Compass>>;
+
+fn driver(port: &Port) -> CompassDriver {
+    let bus = RecoveringI2c::new(port.clone(), port.clone());
+    Driver::new(Qmc5883l, I2cRegisters::new(bus, 0x0D), port.rig.clone())
+}
+
+/// The first reading comes in whichever state a reset of the watchdog has left the part.
+#[test]
+fn a_bus_is_recovered_at_the_start() {
+    for amid in all_amid() {
+        for stretches in [0, 1, 7] {
+            let rig = Rig::new(Compass::new());
+            let port = Port::new(&rig, amid);
+            port.bus.borrow_mut().stretches = stretches;
+            let mut driver = driver(&port);
+            assert!(block_on(driver.reading()).is_ok(), "{amid:?}");
+            // In order, it is left alone.
+            for _ in 0..100 {
+                assert!(block_on(driver.reading()).is_ok(), "{amid:?}");
+            }
+            assert_eq!(port.bus.borrow().recoveries, 1, "{amid:?}");
+            // A byte that was begun is not completed with what recovers the bus, unless it waited for no more than the
+            // clock of its acknowledgement.
+            let begun = matches!(amid, Amid::Takes { taken } if taken < 8);
+            assert!(!begun || port.bus.borrow().mistaken == 0, "{amid:?}");
+        }
+    }
+}
+
+/// A transfer that is broken off costs one fault, and the next one is right.
+#[test]
+fn a_bus_is_recovered_after_a_transfer_that_was_given_up() {
+    let rig = Rig::new(Compass::new());
+    let port = Port::new(&rig, Amid::Nothing);
+    let mut driver = driver(&port);
+    let _ = run(&mut driver, &rig, 1_000_000);
+    for amid in all_amid() {
+        port.bus.borrow_mut().breaks = Some(amid);
+        assert_eq!(block_on(driver.reading()).map(|_| ()), Err(PartFault::Bus), "{amid:?}");
+        assert!(!driver.works() && block_on(driver.reading()).is_ok(), "{amid:?}");
+        let (readings, faults) = run(&mut driver, &rig, 100_000);
+        assert!(faults.is_empty() && readings.len() > 5, "{amid:?}: {faults:?}");
+    }
+    assert_eq!(port.bus.borrow().recoveries as usize, 1 + all_amid().len());
+}
+
+/// A part that holds the clock line for longer than a recovery waits costs a recovery more, and no more.
+#[test]
+fn a_clock_line_that_is_held_is_waited_for() {
+    let rig = Rig::new(Compass::new());
+    let port = Port::new(&rig, Amid::Nothing);
+    let mut driver = driver(&port);
+    port.bus.borrow_mut().breaks = Some(Amid::Sends { bits: 0, left: 8, heeds: false });
+    port.bus.borrow_mut().stretches = 200;
+    let (readings, faults) = run(&mut driver, &rig, 2_000_000);
+    assert!((1..5).contains(&faults.len()) && readings.len() > 50, "{faults:?}, {} readings", readings.len());
+}
