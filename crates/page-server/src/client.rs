@@ -3,6 +3,8 @@
 use crate::admission::Admission;
 use crate::head::{HEAD_MAX, Head};
 use crate::http::{answer, refuse, switch};
+use crate::places::Place;
+use crate::timed::{Rate, Timed};
 use afbc_web::PageFile;
 use std::io::{self, Read};
 use std::net::TcpStream;
@@ -10,10 +12,14 @@ use std::sync::Arc;
 use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, sync_channel};
 use std::time::{Duration, Instant};
 use tungstenite::handshake::derive_accept_key;
+use tungstenite::protocol::frame::CloseFrame;
+use tungstenite::protocol::frame::coding::CloseCode;
 use tungstenite::protocol::{Role, WebSocketConfig};
 use tungstenite::{Message, WebSocket};
 
-/// Time for a request to be whole, and for a client to take what is written.
+/// Time for a request to be whole, for an answer to be taken, and for a page to take a part of what is written.
+const HEAD_MAX_TIME: Duration = Duration::from_secs(5);
+const ANSWER_MAX_TIME: Duration = Duration::from_secs(30);
 const PATIENCE: Duration = Duration::from_secs(5);
 /// Time between two looks at what is to be sent.
 const NAP: Duration = Duration::from_millis(8);
@@ -21,9 +27,13 @@ const NAP: Duration = Duration::from_millis(8);
 const MESSAGE_MAX: usize = 16_384;
 const WAITING_MAX: usize = 1 << 20;
 /// Messages that wait for a client, and for the flight.
-const OUT_MAX: usize = 16;
-/// Messages of a client in a second.
+const OUT_MAX: usize = 32;
+/// Messages of a client in a second, pings among them.
 const RATE_MAX: u32 = 60;
+
+/// Why a page is closed that another has taken the place of: it does not come again by itself.
+const TAKEN: u16 = 4000;
+const TAKEN_BY: &str = "too many pages are open, and another has taken the place of this one; reload to take it back";
 
 /// Something that a client does.
 pub(crate) enum Event {
@@ -43,15 +53,15 @@ pub(crate) struct Shared {
 }
 
 /// Serves a connection until it ends.
-pub(crate) fn serve(mut stream: TcpStream, number: u32, shared: &Shared) -> io::Result<()> {
+pub(crate) fn serve(mut stream: TcpStream, (number, place): (u32, &Place), shared: &Shared) -> io::Result<()> {
     stream.set_nodelay(true)?;
-    stream.set_write_timeout(Some(PATIENCE))?;
-    let (head, rest) = match read_head(&mut stream)? {
+    let (head, rest) = match read_head(&mut Timed::new(&mut stream, HEAD_MAX_TIME))? {
         Ok(read) => read,
-        Err(problem) => return refuse(&mut stream, "400 Bad Request", problem),
+        Err(problem) => return refuse(&mut Timed::new(&mut stream, ANSWER_MAX_TIME), "400 Bad Request", problem),
     };
+    let out = &mut Timed::new(&mut stream, ANSWER_MAX_TIME);
     if let Err((status, problem)) = shared.admission.check_names(&head) {
-        return refuse(&mut stream, status, &problem);
+        return refuse(out, status, &problem);
     }
     let page = match head.path.strip_prefix('/') {
         Some("index.html") => Some(""),
@@ -60,34 +70,29 @@ pub(crate) fn serve(mut stream: TcpStream, number: u32, shared: &Shared) -> io::
     // Scripts and styles are the same for everybody, and a browser asks for them without the token.
     let secret = page == Some("") || page == Some("socket");
     if let (true, Err((status, problem))) = (secret, shared.admission.check_token(&head)) {
-        return refuse(&mut stream, status, &problem);
+        return refuse(out, status, &problem);
     }
     match (head.method.as_str(), page) {
         ("GET", Some("socket")) => match &head.socket_key {
+            Some(_) if !place.keep() => refuse(out, "503 Service Unavailable", "too many have come; come again"),
             Some(key) => {
-                switch(&mut stream, &derive_accept_key(key.as_bytes()))?;
-                converse(stream, rest, number, shared)
+                switch(out, &derive_accept_key(key.as_bytes()))?;
+                converse(stream, rest, (number, place), shared)
             }
-            None => refuse(&mut stream, "426 Upgrade Required", "here is a WebSocket, version 13"),
+            None => refuse(out, "426 Upgrade Required", "here is a WebSocket, version 13"),
         },
         ("GET" | "HEAD", Some(path)) => match shared.files.iter().find(|file| file.path == path) {
-            Some(file) => answer(&mut stream, "200 OK", file.media, &file.text, head.method == "HEAD"),
-            None => refuse(&mut stream, "404 Not Found", "there is no such file"),
+            Some(file) => answer(out, "200 OK", file.media, &file.text, head.method == "HEAD"),
+            None => refuse(out, "404 Not Found", "there is no such file"),
         },
-        _ => refuse(&mut stream, "405 Method Not Allowed", "only GET and HEAD"),
+        _ => refuse(out, "405 Method Not Allowed", "only GET and HEAD"),
     }
 }
 
-/// Reads a head within [`PATIENCE`], however slowly it comes; returns what follows it, too.
-fn read_head(stream: &mut TcpStream) -> io::Result<Result<(Head, Vec<u8>), &'static str>> {
-    let deadline = Instant::now() + PATIENCE;
+/// Reads a head; returns what follows it, too.
+fn read_head(stream: &mut impl Read) -> io::Result<Result<(Head, Vec<u8>), &'static str>> {
     let (mut bytes, mut part) = (Vec::new(), [0; 1024]);
     loop {
-        let left = deadline.saturating_duration_since(Instant::now());
-        if left.is_zero() {
-            return Err(io::ErrorKind::TimedOut.into());
-        }
-        stream.set_read_timeout(Some(left))?;
         let length = stream.read(&mut part)?;
         if length == 0 {
             return Err(io::ErrorKind::UnexpectedEof.into());
@@ -106,9 +111,10 @@ fn read_head(stream: &mut TcpStream) -> io::Result<Result<(Head, Vec<u8>), &'sta
 }
 
 /// Carries messages both ways.
-fn converse(stream: TcpStream, rest: Vec<u8>, number: u32, shared: &Shared) -> io::Result<()> {
+fn converse(stream: TcpStream, rest: Vec<u8>, (number, place): (u32, &Place), shared: &Shared) -> io::Result<()> {
     let from = stream.peer_addr()?.to_string();
     stream.set_read_timeout(Some(NAP))?;
+    stream.set_write_timeout(Some(PATIENCE))?;
     let (sender, out) = sync_channel(OUT_MAX);
     let mut limits = WebSocketConfig::default();
     limits.max_message_size = Some(MESSAGE_MAX);
@@ -121,21 +127,22 @@ fn converse(stream: TcpStream, rest: Vec<u8>, number: u32, shared: &Shared) -> i
     if shared.events.send(Event::New(number, from, sender)).is_err() {
         return Ok(());
     }
-    let end = exchange(&mut socket, &out, number, shared);
+    let end = exchange(&mut socket, &out, (number, place), shared);
     // Once the flight has ended nobody wants to know, and the connection ends in any case.
     let _ = shared.events.send(Event::Gone(number));
-    let _ = socket.close(None).and_then(|()| socket.flush());
+    let taken = (!place.is_page()).then(|| CloseFrame { code: CloseCode::Library(TAKEN), reason: TAKEN_BY.into() });
+    let _ = socket.close(taken).and_then(|()| socket.flush());
     end
 }
 
 fn exchange(
     socket: &mut WebSocket<TcpStream>,
     out: &Receiver<Arc<str>>,
-    number: u32,
+    (number, place): (u32, &Place),
     shared: &Shared,
 ) -> io::Result<()> {
-    let (mut since, mut said) = (Instant::now(), 0);
-    loop {
+    let mut rate = Rate::new(Instant::now());
+    while place.is_page() {
         loop {
             match out.try_recv() {
                 Ok(text) => socket.send(Message::text(text.as_ref())).map_err(in_io)?,
@@ -145,27 +152,23 @@ fn exchange(
             }
         }
         match socket.read() {
+            Ok(Message::Text(_) | Message::Ping(_) | Message::Pong(_)) if rate.count(Instant::now()) > RATE_MAX => {
+                return Ok(());
+            }
             Ok(Message::Text(text)) => {
-                if since.elapsed() > Duration::from_secs(1) {
-                    (since, said) = (Instant::now(), 0);
-                }
-                said += 1;
-                if said > RATE_MAX || shared.events.send(Event::Said(number, text.as_str().into())).is_err() {
+                place.speaks();
+                if shared.events.send(Event::Said(number, text.as_str().into())).is_err() {
                     return Ok(());
                 }
             }
+            Ok(Message::Ping(_) | Message::Pong(_)) => {}
             // What is no text says nothing sensible.
             Ok(Message::Binary(_) | Message::Frame(_) | Message::Close(_)) => return Ok(()),
-            Ok(Message::Ping(_) | Message::Pong(_)) => {
-                said += 1;
-                if said > RATE_MAX {
-                    return Ok(());
-                }
-            }
             Err(tungstenite::Error::Io(error)) if is_silence(&error) => {}
             Err(error) => return Err(in_io(error)),
         }
     }
+    Ok(())
 }
 
 fn is_silence(error: &io::Error) -> bool {

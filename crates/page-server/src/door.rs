@@ -3,6 +3,7 @@
 use crate::admission::Admission;
 use crate::client::{Event, Shared};
 use crate::listener::listen;
+use crate::places::CONNECTIONS_MAX;
 use afbc_page::Cockpit;
 use afbc_serve::{Door, Server, Then, TimeFlow};
 use afbc_web::page_files;
@@ -20,14 +21,14 @@ const PAUSED: Duration = Duration::from_millis(250);
 const EVENTS_MAX: usize = 32;
 /// Time for which a client may take nothing.
 const STUCK: Duration = Duration::from_secs(10);
-/// Most pages at a time.
-const PAGES_MAX: usize = 8;
 
 /// Serves the page, in threads of its own, and connects it to the first vehicle of a server.
 pub struct WebDoor {
     address: SocketAddr,
     admission: Admission,
     cockpit: Cockpit,
+    /// What does not change: made once, since it takes longer than a step.
+    hello: Option<Arc<str>>,
     events: Receiver<Event>,
     pages: Vec<OpenPage>,
     shown: Duration,
@@ -54,7 +55,8 @@ impl WebDoor {
         let shared = Arc::new(Shared { admission: admission.clone(), files: page_files(), events: sender });
         let listen = move || listen(&listener, &shared);
         thread::Builder::new().name("page port".into()).spawn(listen).map_err(|error| taken(address, &error))?;
-        Ok(WebDoor { address, admission, cockpit: Cockpit::new(), events, pages: Vec::new(), shown: Duration::ZERO })
+        let (cockpit, hello, pages, shown) = (Cockpit::new(), None, Vec::new(), Duration::ZERO);
+        Ok(WebDoor { address, admission, cockpit, hello, events, pages, shown })
     }
 
     /// Returns the port's address.
@@ -73,11 +75,11 @@ impl WebDoor {
         let Ok(event) = self.events.try_recv() else { return Then::Nothing };
         let now_s = server.now_s();
         match event {
-            Event::New(number, from, out) if self.pages.len() < PAGES_MAX => {
+            Event::New(number, from, out) if self.pages.len() < CONNECTIONS_MAX => {
                 log(&format!("{now_s:.3} page {from} connected"));
                 let page = OpenPage { number, from, out, took: now };
-                let first = [self.cockpit.hello(server), self.cockpit.values(server)];
-                first.into_iter().flatten().for_each(|text| drop(page.out.try_send(text.into())));
+                let first = [self.hello.clone(), self.cockpit.values(server).map(Arc::from)];
+                first.into_iter().flatten().for_each(|text| drop(page.out.try_send(text)));
                 self.pages.push(page);
             }
             // Its sender is dropped, which ends it.
@@ -116,6 +118,9 @@ impl WebDoor {
 
 impl Door for WebDoor {
     fn turn(&mut self, server: &mut Server, flow: TimeFlow, now: Duration, log: &mut dyn FnMut(&str)) -> Then {
+        if self.hello.is_none() {
+            self.hello = self.cockpit.hello(server).map(Arc::from);
+        }
         let then = self.receive(server, now, log);
         self.cockpit.turn(server);
         // What somebody has done is seen at once.

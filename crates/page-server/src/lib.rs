@@ -10,9 +10,14 @@
 //!
 //! # What clients cost the flight
 //!
-//! Each connection has a thread of its own, and there are at most [`CONNECTIONS_MAX`]. The loop that flies takes one
-//! message at a time from a short queue and never waits: what a slow client does not take is dropped, and a client that
-//! says too much, too long or nothing sensible is disconnected.
+//! Each connection has a thread of its own, and there are at most [`CONNECTIONS_MAX`]. [`PAGES_MAX`] of them are for
+//! sockets of those who may come in: one more takes the place of the one that has said nothing for the longest time, so
+//! that pages which somebody holds open keep nobody out. The others are for requests, which must be whole within 5 s
+//! and whose answers must be taken within 30 s; if they are all in use, a new one takes the place of the oldest from
+//! the address that has the most.
+//!
+//! The loop that flies takes one message at a time from a short queue and never waits: what a slow client does not take
+//! is dropped, and a client that says too much, too long or nothing sensible is disconnected.
 #![forbid(unsafe_code)]
 
 mod admission;
@@ -21,9 +26,11 @@ mod door;
 mod head;
 mod http;
 mod listener;
+mod places;
+mod timed;
 mod token;
 
 pub use admission::Admission;
 pub use door::WebDoor;
-pub use listener::CONNECTIONS_MAX;
+pub use places::{CONNECTIONS_MAX, PAGES_MAX};
 pub use token::Token;

@@ -1,7 +1,7 @@
 //! The port in front of a flying server: who gets in, and what hostile clients cost.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, clippy::panic, missing_docs, reason = "tests")]
 
-use afbc_page_server::{Admission, CONNECTIONS_MAX, Token, WebDoor};
+use afbc_page_server::{Admission, CONNECTIONS_MAX, PAGES_MAX, Token, WebDoor};
 use afbc_plant::EffectsState;
 use afbc_scenario::built_in;
 use afbc_serve::{Door, Server, TimeFlow, TimeRate, fleet};
@@ -254,4 +254,87 @@ fn hostile_clients_cost_the_flight_nothing() {
     flight.fly_until("the command", |flight| flight.effects().battery.unwrap().charge < 0.51);
     // And a new page is served once the others have left.
     flight.fly_until("the page", |flight| status(&flight.get("/", "")) == "200");
+}
+
+/// Whoever has no token holds no place against somebody who has one, however slowly it reads or asks.
+#[test]
+fn slow_strangers_keep_no_holder_out() {
+    let mut flight = Flight::new(Some(TOKEN));
+    let host = flight.door.address();
+    let page = flight.get(&format!("/?token={TOKEN}"), "");
+    let files: Vec<String> = page.split('"').filter(|it| it.ends_with(".js")).map(str::to_owned).collect();
+    assert!(!files.is_empty());
+    let get = |file: &str| format!("GET /{file} HTTP/1.1\r\nHost: {host}\r\n\r\n");
+    let mut held = Vec::new();
+    for round in 0..3 {
+        // Answers that nobody reads, halves of requests, and nothing at all.
+        for place in 0..2 * CONNECTIONS_MAX {
+            let mut stream = flight.connect();
+            let asked = get(&files[place % files.len()]);
+            let length = [asked.len(), asked.len() / 2, 0][place % 3];
+            let _ = stream.write_all(&asked.as_bytes()[..length]);
+            held.push(stream);
+        }
+        flight.fly(50);
+        assert_eq!(status(&flight.get(&format!("/?token={TOKEN}"), "")), "200", "{round}");
+        for file in &files {
+            assert_eq!(status(&flight.get(&format!("/{file}"), "")), "200", "{round} {file}");
+        }
+    }
+    // A page that is open stays open, whoever comes.
+    let mut socket = flight.socket(&format!("?token={TOKEN}"));
+    for _ in 0..4 * CONNECTIONS_MAX {
+        held.push(flight.connect());
+    }
+    flight.fly(200);
+    socket.write_all(&frame(1, br#"{"do":"line","text":"gust 7 0 0 0.1 5"}"#)).unwrap();
+    flight.fly_until("the gust", |flight| flight.effects().wind_m_s.x > 6.0);
+    assert!(!flight.lines.iter().any(|line| line.ends_with("gone")), "{:?}", flight.lines);
+    assert!(flight.longest < Duration::from_millis(250), "{:?}", flight.longest);
+}
+
+/// Eight pages that are held open keep nobody out, with or without a token: the one that has said nothing for the
+/// longest time is told that another has its place, and the others stay.
+#[test]
+fn a_page_too_many_takes_the_place_of_the_silent_one() {
+    for (token, query) in [(None, ""), (Some(TOKEN), &*format!("?token={TOKEN}"))] {
+        let mut flight = Flight::new(token);
+        let mut pages: Vec<TcpStream> = (0..PAGES_MAX).map(|_| flight.socket(query)).collect();
+        let gone = |flight: &Flight| flight.lines.iter().filter(|line| line.ends_with("gone")).count();
+        for silent in [1, 2, 4] {
+            // All but this one speak, the first always.
+            for (index, page) in pages.iter_mut().enumerate().filter(|(index, _)| *index != silent) {
+                page.write_all(&frame(1, br#"{"do":"line","text":"status"}"#)).unwrap_or_else(|_| panic!("{index}"));
+            }
+            flight.fly(100);
+            let before = gone(&flight);
+            pages.push(flight.socket(query));
+            flight.fly_until("its end", |flight| gone(flight) > before);
+            flight.fly(100);
+            assert_eq!(gone(&flight), before + 1, "{:?}", flight.lines);
+            let mut said = Vec::new();
+            pages.remove(silent).read_to_end(&mut said).unwrap();
+            // A frame that closes it, by the code 4000.
+            let close = said.windows(4).rposition(|it| it[0] == 0x88 && it[2..] == 4000_u16.to_be_bytes());
+            let reason = close.map(|at| String::from_utf8_lossy(&said[at + 4..]).into_owned());
+            assert!(reason.as_ref().is_some_and(|it| it.starts_with("too many pages are open")), "{reason:?}");
+        }
+        let refused = flight.get("/", "");
+        assert_eq!(status(&refused), if token.is_some() { "401" } else { "200" });
+    }
+}
+
+/// A page that is only watched, and pings to keep its connection alive, stays; one that pings without an end does not.
+#[test]
+fn pings_keep_a_page_alive() {
+    let mut flight = Flight::new(None);
+    let mut socket = flight.socket("");
+    let is_gone = |flight: &Flight| flight.lines.iter().any(|line| line.ends_with("gone"));
+    for _ in 0..100 {
+        socket.write_all(&frame(9, b"here")).unwrap();
+        flight.fly(30);
+    }
+    assert!(!is_gone(&flight), "{:?}", flight.lines);
+    (0..100).for_each(|_| drop(socket.write_all(&frame(9, b"here"))));
+    flight.fly_until("its end", |flight| is_gone(flight));
 }

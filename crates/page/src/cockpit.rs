@@ -9,7 +9,7 @@ use crate::plan::{fence_areas, fence_items, mission_items, mission_points};
 use crate::station::PageStation;
 use afbc_flight_core::Mode;
 use afbc_guidance::FlightMode;
-use afbc_link::{Command, Datum, Height, Place, Plan};
+use afbc_link::{Command, Datum, Height, MavSeverity, Place, Plan};
 use afbc_serve::command::{ServerCommand, parse};
 use afbc_serve::{Server, Then, TimeFlow, TimeRate};
 use afbc_station::services::modes::custom;
@@ -76,16 +76,16 @@ impl Cockpit {
     /// Goes on after a step.
     pub fn turn(&mut self, server: &mut Server) {
         let mut said = Vec::new();
-        self.station.turn(server, &mut |text| said.push(text));
-        said.into_iter().for_each(|text| self.say(server.now_s(), text));
+        self.station.turn(server, &mut |severity, text| said.push((severity, text)));
+        said.into_iter().for_each(|(severity, text)| self.say(server.now_s(), severity, text));
         if let Some(vehicle) = server.vehicles().first() {
             self.frame.look(vehicle);
         }
     }
 
     /// Shows a text.
-    pub fn say(&mut self, time_s: f64, text: String) {
-        self.texts.push_back(PageText { number: self.next, time_s, text });
+    pub fn say(&mut self, time_s: f64, severity: MavSeverity, text: String) {
+        self.texts.push_back(PageText { number: self.next, time_s, severity: severity as u8, text });
         self.next = self.next.wrapping_add(1);
         if self.texts.len() > TEXTS_MAX {
             self.texts.pop_front();
@@ -156,7 +156,7 @@ impl Cockpit {
             PageCommand::Land {} => station.command(server, Command::Land),
             PageCommand::Return {} => station.command(server, Command::Return),
             PageCommand::Hold {} => station.command(server, Command::SelectMode(custom(FlightMode::Hold))),
-            PageCommand::StartMission {} => station.command_armed(server, Command::StartMission(0)),
+            PageCommand::StartMission {} => station.command_armed(server, Command::StartMission(0, None)),
             PageCommand::TakeOff { height_m } => {
                 if !(0.3..=500.0).contains(&height_m) {
                     return PageReply::refused("the height must be 0.3 to 500 m");
@@ -191,7 +191,8 @@ impl Cockpit {
         let [latitude_e7, longitude_e7] = there.e7();
         let height = Height { metres: there.altitude_m as f32, above: Datum::Sea };
         let place = Place { latitude_e7, longitude_e7, height };
-        self.station.command(server, Command::Reposition { place, yaw_rad: f32::NAN, speed_m_s: None });
+        let go = Command::Reposition { place, yaw_rad: f32::NAN, speed_m_s: None, changes_mode: true };
+        self.station.command(server, go);
         PageReply::default()
     }
 

@@ -160,6 +160,8 @@ pub struct PageText {
     pub number: u32,
     /// When \[s\].
     pub time_s: f64,
+    /// How grave it is, by MAVLink's number: 0 an emergency, 7 for debugging.
+    pub severity: u8,
     /// What.
     pub text: String,
 }

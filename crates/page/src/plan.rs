@@ -80,7 +80,9 @@ pub(crate) fn mission_points(vehicle: &ServedVehicle, frame: &LocalFrame) -> Vec
     let place = |item: &MissionItem| {
         let position_m = match to_guidance(item, vehicle.origin().as_ref(), home_m.z)? {
             Item::TakeOff { height_m } => Vector3::new(home_m.x, home_m.y, height_m),
-            Item::Waypoint { position_m, .. } | Item::Land { position_m } => position_m,
+            Item::TakeOffTo { position_m } | Item::Waypoint { position_m, .. } | Item::Land { position_m } => {
+                position_m
+            }
             Item::Turns { centre_m, .. } => centre_m,
             Item::Return => home_m,
             _ => return None,

@@ -1,7 +1,7 @@
 //! The page as a ground station: what it asks of the vehicle by messages, and what it hears.
 
 use afbc_link::{
-    Address, Answer, Command, Decoder, Downlink, ExternalTarget, FRAME_MAX, MavCmd, Mission, MissionItem,
+    Address, Answer, Command, Decoder, Downlink, ExternalTarget, FRAME_MAX, MavCmd, MavSeverity, Mission, MissionItem,
     MissionResult, ParameterRequest, Plan, PositionTarget, Sender, Uplink,
 };
 use afbc_onboard::parameters::Kind;
@@ -22,6 +22,9 @@ const PATIENCE_MS: u64 = 3_000;
 /// Messages that are heard: COMMAND_ACK, STATUSTEXT, MISSION_REQUEST, MISSION_REQUEST_INT, MISSION_ACK, PARAM_VALUE,
 /// PARAM_ERROR.
 const HEARD: [u32; 7] = [77, 253, 40, 51, 47, 22, 345];
+/// Severity of what did not happen, and of what goes on.
+const REFUSED: MavSeverity = MavSeverity::MAV_SEVERITY_ERROR;
+const INFO: MavSeverity = MavSeverity::MAV_SEVERITY_INFO;
 /// Commands by number, in words.
 const NAMES: [(u16, &str); 8] = [
     (MavCmd::MAV_CMD_COMPONENT_ARM_DISARM as u16, "arm or disarm"),
@@ -141,28 +144,31 @@ impl PageStation {
     }
 
     /// Answers what was heard, after a step; what is worth a line goes to `say`.
-    pub(crate) fn turn(&mut self, server: &mut Server, say: &mut dyn FnMut(String)) {
+    pub(crate) fn turn(&mut self, server: &mut Server, say: &mut dyn FnMut(MavSeverity, String)) {
         let now_ms = (server.now_s() * 1e3).round() as u64;
         // Time may stand still.
         let goes_on = now_ms != self.now_ms;
         self.now_ms = now_ms;
         for message in std::mem::take(&mut self.heard) {
             match message {
-                Downlink::Text { text, .. } => say(text.to_str().unwrap_or_default().into()),
+                Downlink::Text { severity, text } => say(severity, text.to_str().unwrap_or_default().into()),
                 Downlink::Answer { command, answer, to } if to == ADDRESS && answer != Answer::Accepted => {
                     let known = NAMES.iter().find(|(number, _)| *number == command);
                     let name = known.map_or_else(|| format!("command {command}"), |(_, name)| (*name).into());
-                    say(format!("{name}: {}", in_words(answer)));
+                    let severity = if answer == Answer::InProgress { INFO } else { REFUSED };
+                    say(severity, format!("{name}: {}", in_words(answer)));
                 }
                 Downlink::Mission { message, to } if to == ADDRESS => self.go_on(server, message, say),
                 Downlink::Parameter(_) => self.parameter_changes = self.parameter_changes.wrapping_add(1),
-                Downlink::ParameterError { to, .. } if to == ADDRESS => say("parameter: refused".into()),
+                Downlink::ParameterError { to, .. } if to == ADDRESS => {
+                    say(REFUSED, "parameter: refused".into());
+                }
                 _ => (),
             }
         }
         if !self.uploads.is_empty() && self.now_ms >= self.given_up_ms {
             self.uploads.clear();
-            say("plan: the vehicle does not answer".into());
+            say(REFUSED, "plan: the vehicle does not answer".into());
         }
         if let Some((command, given_up_ms)) = self.once_armed {
             let armed = server.vehicles().get(VEHICLE).and_then(|it| it.report()).is_some_and(|it| it.mode.armed());
@@ -181,7 +187,7 @@ impl PageStation {
     }
 
     /// Goes on with the upload.
-    fn go_on(&mut self, server: &mut Server, message: Mission, say: &mut dyn FnMut(String)) {
+    fn go_on(&mut self, server: &mut Server, message: Mission, say: &mut dyn FnMut(MavSeverity, String)) {
         let Some((plan, items)) = self.uploads.front() else { return };
         let plan = *plan;
         match message {
@@ -196,7 +202,7 @@ impl PageStation {
             }
             Mission::Ack(MissionResult(result), of) if of == plan => {
                 self.uploads.clear();
-                say(format!("plan: refused, result {result}"));
+                say(REFUSED, format!("plan: refused, result {result}"));
             }
             _ => (),
         }

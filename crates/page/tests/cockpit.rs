@@ -172,3 +172,17 @@ proptest! {
         prop_assert_eq!(&page.frame()["kind"], "frame");
     }
 }
+
+/// How grave a text is comes from the vehicle, or from its refusal: the page has no list of words.
+#[test]
+fn texts_say_how_grave_they_are() {
+    let mut page = Page::of("mocap");
+    page.fly_until(20.0, "ready", |frame| !frame["estimate"].is_null());
+    page.fly(8.0);
+    // On the ground there is nothing to be returned from.
+    page.order(&json!({ "do": "return" }));
+    page.fly(0.5);
+    let refused = page.frame()["texts"].clone();
+    let gravest = |texts: &Value| texts.as_array().unwrap().iter().filter_map(|it| it["severity"].as_u64()).min();
+    assert!(gravest(&refused).unwrap() <= 4, "{refused}");
+}

@@ -256,9 +256,9 @@ fn change(word: &str, words: &mut Words<'_>) -> Result<WorldChange, String> {
 
 /// Reads the name of a law.
 fn law(words: &mut Words<'_>) -> Result<ControllerKind, String> {
-    let wanted = || format!("one of {}", ControllerKind::names());
-    let name = words.word(&wanted())?;
-    ControllerKind::named(name).ok_or_else(|| format!("law: {} is not {}", shown(name), wanted()))
+    let name = words.word(&format!("one of {}", ControllerKind::names()))?;
+    ControllerKind::named(name)
+        .ok_or_else(|| format!("law: {}: no such law; {}", shown(name), ControllerKind::cure(name)))
 }
 
 /// Reads how a hand holds the vehicle, as `left 60`.
@@ -302,6 +302,10 @@ fn fault(words: &mut Words<'_>) -> Result<Failure, String> {
             Failure::TrackerJumped { by_m: words.vector(&failure::JUMP)?, yaw_rad: words.number(&failure::YAW)? }
         }
         Failure::GnssJumped { .. } => Failure::GnssJumped { by_m: words.vector(&failure::JUMP)? },
+        Failure::GnssMultipath { .. } => Failure::GnssMultipath {
+            deviation_m: words.number(&failure::DEVIATION)?,
+            correlation_time_s: words.number(&failure::CORRELATION)?,
+        },
         Failure::MagnetometerDisturbed { .. } => {
             Failure::MagnetometerDisturbed { field_ut: words.vector(&failure::FIELD)? }
         }

@@ -9,7 +9,7 @@
 //!    a clock or a socket: the same lines and bytes at the same milliseconds give the same bytes.
 //! 3. [`QgcPlan`]: a file of QGroundControl, and [`fly_plan`], a station that flies it.
 //! 4. [`Ports`]: their UDP and TCP ports. [`Door`]: another way to them, such as a page. [`Pace`]: real time. [`run`]:
-//!    all of it together.
+//!    all of it together. [`LineOutput`]: lines to whoever reads them, or does not.
 #![forbid(unsafe_code)]
 
 pub mod command;
@@ -17,6 +17,7 @@ mod door;
 mod frames;
 mod guide;
 mod hand;
+mod output;
 mod pace;
 mod parameter_file;
 mod peer;
@@ -31,10 +32,12 @@ mod systems;
 mod tcp;
 mod udp;
 mod vehicle;
+mod waypoint_file;
 mod world_changes;
 
 pub use door::{Door, TimeFlow, TimeRate};
 pub use guide::guide;
+pub use output::LineOutput;
 pub use pace::{BEHIND_MAX, Pace, Wait};
 pub use parameter_file::ParameterFile;
 pub use plan_file::QgcPlan;
@@ -44,3 +47,4 @@ pub use run::{Lines, RunEnd, run};
 pub use server::{Reply, Server, Then};
 pub use stand::{VEHICLES_MAX, fleet};
 pub use vehicle::ServedVehicle;
+pub use waypoint_file::is_waypoint_file;

@@ -1,6 +1,6 @@
 //! The parameters of a vehicle in a file, by the firmware's code.
 
-use afbc_files::{Flash, FlashError};
+use afbc_files::{Flash, FlashError, FlashFailure};
 use afbc_hil::Host;
 use afbc_onboard::Link;
 use afbc_onboard::parameters::{Kept, RecordChange};
@@ -14,8 +14,8 @@ use std::path::Path;
 /// Vehicle of a scenario without a vehicle file.
 const PAPER: &str = "paper";
 
-/// A store of parameters in a file.
-pub struct ParameterFile(Store<Flash>);
+/// A store of parameters in a file, which is written in the background: no tick waits for a disk.
+pub struct ParameterFile(Store<Flash>, FlashFailure);
 
 impl ParameterFile {
     /// Opens the file at `path` for the vehicle of `scenario`, or makes it.
@@ -28,8 +28,9 @@ impl ParameterFile {
             ErrorKind::NotFound => format!("{}: its folder does not exist; make it first", path.display()),
             _ => format!("{}: {error}", path.display()),
         })?;
+        let (flash, failure) = flash.in_background().map_err(|error| format!("{}: {error}", path.display()))?;
         let store = Store::open(flash, 0, hash(name.as_bytes()));
-        Ok(ParameterFile(store.map_err(|error| format!("{}: {error}", path.display()))?))
+        Ok(ParameterFile(store.map_err(|error| format!("{}: {error}", path.display()))?, failure))
     }
 
     /// Powers up the firmware of `scenario`'s vehicle with these parameters, by default these of the link; calls
@@ -45,6 +46,11 @@ impl ParameterFile {
             notice(error.reason());
         }
         Host::stored(scenario.vehicle_file.as_ref(), link, &mut self.0, &mut notice)
+    }
+
+    /// Returns why something that was written has not got to the disk, once.
+    pub(crate) fn take_failure(&self) -> Option<Error<FlashError>> {
+        self.1.take().map(Error::Flash)
     }
 
     /// Writes a change.

@@ -1,6 +1,10 @@
 //! Plans of QGroundControl: `.plan` files, with mission, geofence and rally points.
+//!
+//! Nothing in a file is left out in silence: a version or a name that is not known here is refused. What describes a
+//! plan, and flies nothing, is known by name.
 
-use afbc_link::MissionItem;
+use crate::waypoint_file;
+use afbc_link::{MissionItem, Place};
 use afbc_reader::FileError;
 use serde_json::Value;
 
@@ -13,6 +17,36 @@ const JUMP: u16 = 177;
 const VERTEX: u16 = 5001;
 const CIRCLE: u16 = 5003;
 const RALLY_POINT: u16 = 5100;
+
+/// Names in each part of a file, those that describe it among them.
+const PLAN: &[&str] = &["fileType", "version", "groundStation", "mission", "geoFence", "rallyPoints"];
+const MISSION: &[&str] = &[
+    "version",
+    "items",
+    "plannedHomePosition",
+    "firmwareType",
+    "vehicleType",
+    "cruiseSpeed",
+    "hoverSpeed",
+    "globalPlanAltitudeMode",
+];
+const SIMPLE_ITEM: &[&str] = &[
+    "type",
+    "command",
+    "frame",
+    "params",
+    "autoContinue",
+    "doJumpId",
+    "Altitude",
+    "AltitudeMode",
+    "AMSLAltAboveTerrain",
+    "MISSION_ITEM_ID",
+];
+const FENCE: &[&str] = &["version", "polygons", "circles", "breachReturn"];
+const POLYGON: &[&str] = &["version", "inclusion", "polygon"];
+const CIRCLE_AREA: &[&str] = &["version", "inclusion", "circle"];
+const CIRCLE_SHAPE: &[&str] = &["center", "radius"];
+const RALLY: &[&str] = &["version", "points"];
 
 /// A plan.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -48,6 +82,22 @@ impl<'a> Part<'a> {
         self.at(key).ok_or_else(|| self.wrong(&format!("{key} is missing; save the plan again in QGroundControl")))
     }
 
+    /// Checks that it has this version, and nothing but these names.
+    fn known(&self, version: Option<u64>, names: &[&str]) -> Result<(), FileError> {
+        let object = self.value.as_object().ok_or_else(|| self.wrong("it must be an object"))?;
+        if let Some(known) = version {
+            let found = self.get("version")?;
+            if found.value.as_u64() != Some(known) {
+                let cure = "save the plan again in a QGroundControl of today";
+                return Err(found.wrong(&format!("{} is not known, {known} is; {cure}", found.value)));
+            }
+        }
+        match object.keys().find(|name| !names.contains(&name.as_str())) {
+            Some(name) => Err(self.wrong(&format!("{name} is not known, and is not flown; remove it"))),
+            None => Ok(()),
+        }
+    }
+
     fn list(&self) -> Result<Vec<Part<'a>>, FileError> {
         let list = self.value.as_array().ok_or_else(|| self.wrong("it must be a list"))?;
         let part = |(number, value)| Part { file: self.file, place: format!("{} {number}", self.place), value };
@@ -78,7 +128,21 @@ impl<'a> Part<'a> {
         if latitude.abs() > 90.0 || longitude.abs() > 180.0 {
             return Err(self.wrong("there is no such place; latitude and longitude are in degrees"));
         }
-        Ok((place, rest.first().and_then(|altitude| altitude.value.as_f64())))
+        let altitude = match rest {
+            [] => None,
+            [altitude] if altitude.value.is_null() => None,
+            [altitude] => Some(altitude.number()?),
+            _ => return Err(self.wrong("it must be a list of latitude, longitude and altitude")),
+        };
+        Ok((place, altitude))
+    }
+
+    /// Returns latitude and longitude \[deg\], which nothing follows.
+    fn flat(&self) -> Result<[f64; 2], FileError> {
+        match self.coordinates()? {
+            (place, None) => Ok(place),
+            _ => Err(self.wrong("an altitude is not flown; remove it")),
+        }
     }
 }
 
@@ -88,12 +152,17 @@ impl QgcPlan {
     /// # Errors
     /// One line that names the file, the item, what is wrong and what helps.
     pub fn read(file: &str, text: &str) -> Result<Self, FileError> {
+        if waypoint_file::is_waypoint_file(text.as_bytes()) {
+            let (mission, home) = waypoint_file::read(file, text)?;
+            return Ok(QgcPlan { mission, home, ..QgcPlan::default() });
+        }
         let value: Value = serde_json::from_str(text)
             .map_err(|error| FileError::whole(file, format!("no JSON: {error}; save the plan again")))?;
         let whole = Part { file, place: "plan".into(), value: &value };
         if value.get("fileType").and_then(Value::as_str) != Some("Plan") {
             return Err(FileError::whole(file, "no plan of QGroundControl: its fileType is not Plan"));
         }
+        whole.known(Some(1), PLAN)?;
         let part = |key: &str| whole.at(key).map(|part| Part { place: key.into(), ..part });
         let mission = part("mission");
         Ok(QgcPlan {
@@ -107,6 +176,7 @@ impl QgcPlan {
 
 /// Returns the items of the mission, those of complex ones as they were worked out.
 fn read_mission(mission: &Part<'_>) -> Result<Vec<MissionItem>, FileError> {
+    mission.known(Some(2), MISSION)?;
     let items = Part { place: "mission item".into(), ..mission.get("items")? };
     let mut simple = Vec::new();
     for item in items.list()? {
@@ -124,6 +194,10 @@ fn read_mission(mission: &Part<'_>) -> Result<Vec<MissionItem>, FileError> {
 }
 
 fn simple_item(item: &Part<'_>, number: u16, names: &[Option<u64>]) -> Result<MissionItem, FileError> {
+    item.known(None, SIMPLE_ITEM)?;
+    if item.at("autoContinue").is_some_and(|goes_on| goes_on.value != &Value::Bool(true)) {
+        return Err(item.wrong("autoContinue must be true: a mission does not wait between items"));
+    }
     let command = item.get("command")?.whole(u16::MAX)?;
     let frame = item.get("frame")?.whole(u8::MAX.into())? as u8;
     let params = item.get("params")?;
@@ -135,14 +209,21 @@ fn simple_item(item: &Part<'_>, number: u16, names: &[Option<u64>]) -> Result<Mi
     };
     let mut parameters = [*first, *second, *third, *fourth].map(|number| number as f32);
     if command == JUMP {
-        let place = names.iter().position(|name| name.is_some_and(|name| name as f64 == *first));
+        let mut places = (0..names.len()).filter(|place| names.get(*place) == Some(&Some(*first as u64)));
+        let place = places.next().filter(|_| first.fract() == 0.0);
         let place = place.ok_or_else(|| item.wrong("no item has the doJumpId that it jumps to; correct it"))?;
+        if places.next().is_some() {
+            return Err(item.wrong("several items have the doJumpId that it jumps to; correct it"));
+        }
         let [target, ..] = &mut parameters;
         *target = place as f32;
     }
     let units = if frame == LOCAL_NED { 1e4 } else { 1e7 };
-    // Saturates, so that what is out of range remains so.
-    let in_units = |coordinate: f64| (coordinate * units).round() as i32;
+    // What is out of range remains so; one that is left out is no place at 0.
+    let in_units = |coordinate: f64| match coordinate {
+        left_out if left_out.is_nan() => Place::AS_IT_IS,
+        coordinate => (coordinate * units).clamp(-2e9, 2e9).round() as i32,
+    };
     Ok(MissionItem {
         number,
         command,
@@ -160,6 +241,7 @@ fn read_fence(fence: &Part<'_>) -> Result<Vec<MissionItem>, FileError> {
     if let Some(point) = fence.at("breachReturn") {
         return Err(point.wrong("return points are not supported; remove it, the vehicle returns home"));
     }
+    fence.known(Some(2), FENCE)?;
     let mut items = Vec::new();
     let kind = |area: &Part<'_>, command: u16| Ok(command + u16::from(!area.get("inclusion")?.truth()?));
     let named = |key: &str, name: &str| match fence.at(key) {
@@ -167,22 +249,26 @@ fn read_fence(fence: &Part<'_>) -> Result<Vec<MissionItem>, FileError> {
         None => Ok(Vec::new()),
     };
     for polygon in named("polygons", "geoFence polygon")? {
+        polygon.known(Some(1), POLYGON)?;
         let command = kind(&polygon, VERTEX)?;
         let corners = polygon.get("polygon")?.list()?;
         for corner in &corners {
-            items.push(point(command, corners.len() as f32, corner.coordinates()?.0));
+            items.push(point(command, corners.len() as f32, corner.flat()?));
         }
     }
     for circle in named("circles", "geoFence circle")? {
+        circle.known(Some(1), CIRCLE_AREA)?;
         let command = kind(&circle, CIRCLE)?;
         let shape = circle.get("circle")?;
-        let (centre, radius) = (shape.get("center")?.coordinates()?.0, shape.get("radius")?.number()?);
+        let (centre, radius) = (shape.get("center")?.flat()?, shape.get("radius")?.number()?);
+        shape.known(None, CIRCLE_SHAPE)?;
         items.push(point(command, radius as f32, centre));
     }
     Ok(numbered(items))
 }
 
 fn read_rally(rally: &Part<'_>) -> Result<Vec<MissionItem>, FileError> {
+    rally.known(Some(2), RALLY)?;
     let points = Part { place: "rally point".into(), ..rally.get("points")? };
     let points = points.list()?;
     let items = points.iter().map(|part| {

@@ -2,9 +2,11 @@
 
 use crate::plan_file::QgcPlan;
 use crate::vehicle::ServedVehicle;
+use afbc_guidance::FlightMode;
 use afbc_link::{
     Address, Answer, Command, Decoder, Downlink, FRAME_MAX, Mission, MissionItem, MissionResult, Plan, Sender, Uplink,
 };
+use afbc_station::services::modes::custom;
 
 const STATION: Address = Address { system: 255, component: 190 };
 /// Number of its peer.
@@ -17,6 +19,14 @@ const READY_MS: u64 = 60_000;
 const ANSWER_MS: u64 = 3_000;
 /// Time between heartbeats, and between two attempts to arm \[ms\].
 const HEARTBEAT_MS: u64 = 1_000;
+/// Time in hold after which a mission that is not complete has been stopped: MISSION_CURRENT comes every second \[ms\].
+const STOPPED_MS: u64 = 2_500;
+/// Time in which a vehicle whose motors have stopped in the air comes to the ground \[ms\].
+const FALL_MS: u64 = 60_000;
+/// Speed at which a vehicle that comes to the ground has fallen, twice that of the fastest descent, and the tilt of one
+/// that lies there \[m/s, rad\].
+const FALLS_M_S: f64 = 3.0;
+const LIES_RAD: f64 = 1.0;
 /// `MISSION_STATE`: complete.
 const COMPLETE: u8 = 5;
 
@@ -27,8 +37,12 @@ pub struct PlanEnd {
     pub reached: Vec<u16>,
     /// True if the mission is complete.
     pub complete: bool,
+    /// True if the vehicle has left the mission for hold before that, where it stays.
+    pub stopped: bool,
     /// True if the motors have stopped.
     pub disarmed: bool,
+    /// True if it has come to the ground faster than it lands, or lies there.
+    pub fell: bool,
     /// Duration of the flight \[s\].
     pub flight_s: f64,
 }
@@ -45,6 +59,12 @@ struct Station<'a> {
     reached: Vec<u16>,
     complete: bool,
     armed: bool,
+    /// Since when it has been in hold \[ms\].
+    hold_ms: Option<u64>,
+    /// Its speed downwards in the last step, and the largest at which it has come to the ground \[m/s\].
+    sinks_m_s: f64,
+    struck_m_s: f64,
+    on_ground: bool,
 }
 
 /// Flies `plan` with a vehicle that stands at its start, for at most `limit_s`; what is worth a line goes to `log`.
@@ -68,6 +88,10 @@ pub fn fly_plan(
         reached: Vec::new(),
         complete: false,
         armed: false,
+        hold_ms: None,
+        sinks_m_s: 0.0,
+        struck_m_s: 0.0,
+        on_ground: true,
     };
     station.fly(plan, limit_s)
 }
@@ -84,17 +108,32 @@ impl Station<'_> {
         self.upload(&plan.mission, Plan::MISSION, "mission")?;
         self.order(Command::Arm, ARM)?;
         let begun_ms = self.now_ms;
-        self.order(Command::StartMission(0), START)?;
+        self.order(Command::StartMission(0, None), START)?;
         let limit_ms = begun_ms + (limit_s * 1e3) as u64;
-        while self.now_ms < limit_ms && self.armed && !self.complete {
+        while self.now_ms < limit_ms && self.armed && !self.complete && !self.is_stopped() {
             self.step();
         }
+        let flight_s = (self.now_ms - begun_ms) as f64 * 1e-3;
+        // Motors that were stopped in the air: how it ends is seen on the ground.
+        let fallen_ms = self.now_ms + FALL_MS;
+        while !self.armed && !self.on_ground && self.now_ms < fallen_ms {
+            self.step();
+        }
+        let [roll, pitch, _] = self.vehicle.world().plant().motion().attitude_rad.into();
+        let lies = self.on_ground && f64::max(roll.abs(), pitch.abs()) > LIES_RAD;
         Ok(PlanEnd {
             reached: std::mem::take(&mut self.reached),
             complete: self.complete,
+            stopped: self.is_stopped() && !self.complete && self.armed,
             disarmed: !self.armed,
-            flight_s: (self.now_ms - begun_ms) as f64 * 1e-3,
+            fell: lies || self.struck_m_s > FALLS_M_S,
+            flight_s,
         })
+    }
+
+    /// True if the vehicle has left the mission for hold, and does not say that it is complete.
+    fn is_stopped(&self) -> bool {
+        self.hold_ms.is_some_and(|hold_ms| self.now_ms - hold_ms > STOPPED_MS)
     }
 
     /// Waits until the vehicle would arm.
@@ -173,11 +212,15 @@ impl Station<'_> {
             self.say(&Uplink::Heartbeat);
         }
         self.now_ms += 1;
-        let Station { vehicle, log, decoder, now_ms, answers, missions, texts, reached, complete, armed } = self;
+        let Station { vehicle, log, decoder, now_ms, answers, missions, texts, reached, complete, armed, .. } = self;
         let time_s = *now_ms as f64 * 1e-3;
         let bytes = vehicle.step(|text| log(&format!("{time_s:.3} {text}")));
         decoder.feed(&bytes, |_, message| match message {
-            Downlink::Heartbeat { armed: is_armed, .. } => *armed = is_armed,
+            Downlink::Heartbeat { armed: is_armed, mode, .. } => {
+                *armed = is_armed;
+                let holds = is_armed && mode == custom(FlightMode::Hold);
+                self.hold_ms = holds.then_some(self.hold_ms.unwrap_or(*now_ms));
+            }
             Downlink::Answer { command, answer, .. } => answers.push((command, answer)),
             Downlink::Text { text, .. } => texts.push(text.to_str().unwrap_or_default().into()),
             Downlink::Mission { message: Mission::Reached(number), .. } => reached.push(number),
@@ -185,5 +228,11 @@ impl Station<'_> {
             Downlink::Mission { message, .. } => missions.push(message),
             _ => (),
         });
+        let plant = vehicle.world().plant();
+        let was_on_ground = std::mem::replace(&mut self.on_ground, plant.telemetry().is_some_and(|it| it.on_ground));
+        if self.on_ground && !was_on_ground {
+            self.struck_m_s = self.struck_m_s.max(self.sinks_m_s);
+        }
+        self.sinks_m_s = -plant.motion().velocity_m_s.z;
     }
 }

@@ -93,17 +93,30 @@ impl Ports {
         for (place, (udp, tcp)) in vehicles.iter_mut().enumerate() {
             let system = server.vehicles().get(place).map_or(0, |vehicle| vehicle.system());
             let now_s = server.now_s();
+            let as_of = (now, server.vehicles().get(place).is_some_and(|vehicle| vehicle.needs_signatures()));
             let mut on = |event: Event<'_>, wire: &str| match event {
-                Event::New(from) => log(&format!("{now_s:.3} vehicle {system}: {wire} {from} connected")),
+                Event::New(from) => {
+                    log(&format!("{now_s:.3} vehicle {system}: {wire} {from} connected"));
+                    true
+                }
                 Event::Sent(peer, bytes) => server.hear(place, peer, bytes),
+                Event::Nobody(peer) => {
+                    server.forget(place, peer);
+                    false
+                }
+                Event::Foreign(from) => {
+                    log(&format!("{now_s:.3} vehicle {system}: {wire} {from} speaks another protocol than MAVLink"));
+                    false
+                }
                 Event::Gone(from, peer) => {
                     log(&format!("{now_s:.3} vehicle {system}: {wire} {from} gone"));
                     server.forget(place, peer);
+                    false
                 }
             };
-            udp.receive(now, &mut number, |event| on(event, "udp"));
+            udp.receive(as_of, &mut number, |event| on(event, "udp"));
             if let Some(tcp) = tcp {
-                tcp.receive(&mut number, |event| on(event, "tcp"));
+                tcp.receive(as_of, &mut number, |event| on(event, "tcp"));
             }
         }
     }

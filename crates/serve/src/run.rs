@@ -3,10 +3,10 @@
 use crate::door::{Door, TimeFlow, TimeRate};
 use crate::pace::{Pace, Wait};
 use crate::ports::Ports;
-use crate::server::{Server, Then};
-use std::io::BufRead;
+use crate::server::{LINE_MAX, Server, Then};
+use std::io::{self, BufRead, Read};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, TryRecvError, channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, TryRecvError, sync_channel};
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -29,21 +29,27 @@ pub struct Lines {
 
 /// Longest wait for a line between two looks at the stop flag.
 const NAP: Duration = Duration::from_millis(50);
+/// Most lines that wait, and most that are carried out before time goes on.
+const LINES_MAX: usize = 16;
 /// Least time between two lines about lost time.
 const REPORTED_EVERY: Duration = Duration::from_secs(5);
 
 impl Lines {
     /// Reads lines in a thread of their own.
-    pub fn of(mut source: impl BufRead + Send + 'static) -> Self {
-        let (sender, lines) = channel();
+    pub fn of(source: impl BufRead + Send + 'static) -> Self {
+        Self::paced(source, || ())
+    }
+
+    /// The same, and calls `wait` before each line.
+    pub fn paced(mut source: impl BufRead + Send + 'static, wait: impl Fn() + Send + 'static) -> Self {
+        let (sender, lines) = sync_channel(LINES_MAX);
         thread::spawn(move || {
-            let mut bytes = Vec::new();
             // What is not text is a line as well, which is refused.
-            while source.read_until(b'\n', &mut bytes).is_ok_and(|length| length > 0) {
-                if sender.send(String::from_utf8_lossy(&bytes).trim().to_owned()).is_err() {
+            while let Ok(Some(line)) = read_line(&mut source) {
+                wait();
+                if sender.send(String::from_utf8_lossy(&line).into_owned()).is_err() {
                     return;
                 }
-                bytes.clear();
             }
         });
         Lines { lines, over: false }
@@ -69,6 +75,26 @@ impl Lines {
     }
 }
 
+/// Returns the next line, or of one that is too long the beginning, which is refused; none at the end.
+fn read_line(source: &mut impl BufRead) -> io::Result<Option<Vec<u8>>> {
+    // One byte too many, and the end of the line.
+    let most = LINE_MAX as u64 + 3;
+    let mut line = Vec::new();
+    if source.take(most).read_until(b'\n', &mut line)? == 0 {
+        return Ok(None);
+    }
+    let mut rest = Vec::new();
+    while !line.ends_with(b"\n") && !rest.ends_with(b"\n") {
+        rest.clear();
+        if source.take(most).read_until(b'\n', &mut rest)? == 0 {
+            break;
+        }
+    }
+    let ends = [&b"\n"[..], b"\r"];
+    ends.into_iter().for_each(|end| line.truncate(line.strip_suffix(end).unwrap_or(&line).len()));
+    Ok(Some(line))
+}
+
 /// Runs `server` until somebody says `quit` or `stop` is set; passes answers and events to `log`, a line each.
 pub fn run(
     server: &mut Server,
@@ -84,7 +110,7 @@ pub fn run(
     let mut reported = None;
     loop {
         // Lines first: where time stands still there is nothing else to do.
-        loop {
+        for _ in 0..LINES_MAX {
             let stands = time.stands();
             let line = if stands { lines.wait() } else { lines.next() };
             if stop.load(Ordering::Relaxed) {

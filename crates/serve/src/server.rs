@@ -8,6 +8,10 @@ use afbc_hil::{LogFile, UlogFiles};
 use afbc_scenario::Scenario;
 use afbc_types::OutOfRange;
 
+/// Longest line \[bytes\], and most lines to come.
+pub(crate) const LINE_MAX: usize = 512;
+const AGENDA_MAX: usize = 1000;
+
 /// The vehicles, on one clock, which begins when they are powered up.
 pub struct Server {
     vehicles: Vec<ServedVehicle>,
@@ -64,19 +68,20 @@ impl Server {
         Ok(Server { vehicles: vehicles.collect::<Result<_, _>>()?, now_ms: 0, agenda: Vec::new() })
     }
 
-    /// Keeps the exact log of each vehicle in one of `files`, in order, from now on, before the first step.
+    /// Keeps the exact log of each vehicle in one of `files`, in order, from now on, before the first step. No step
+    /// waits for a disk.
     pub fn record(&mut self, files: Vec<LogFile>) {
-        self.vehicles.iter_mut().zip(files).for_each(|(vehicle, file)| vehicle.record(file));
+        self.vehicles.iter_mut().zip(files).for_each(|(vehicle, file)| vehicle.record(file.live()));
     }
 
-    /// Keeps the black box of each vehicle in one of `logs`, in order, from now on, before the first step.
+    /// Keeps the black box of each vehicle in one of `logs`, likewise.
     pub fn log(&mut self, logs: Vec<UlogFiles>) {
-        self.vehicles.iter_mut().zip(logs).for_each(|(vehicle, files)| vehicle.log(files));
+        self.vehicles.iter_mut().zip(logs).for_each(|(vehicle, files)| vehicle.log(files.live()));
     }
 
     /// Ends the black boxes; returns a line on each that has ended early and was not reported.
     pub fn end_logs(&mut self) -> Vec<String> {
-        self.vehicles.iter_mut().filter_map(|vehicle| vehicle.end_log().err()).collect()
+        self.vehicles.iter_mut().filter_map(ServedVehicle::close_log).collect()
     }
 
     /// Returns the time since the start \[s\].
@@ -106,9 +111,10 @@ impl Server {
         self.vehicles.iter_mut().for_each(|vehicle| vehicle.set_wired(wired));
     }
 
-    /// Receives, for the next step, what `peer` of the vehicle at this place has sent.
-    pub fn hear(&mut self, vehicle: usize, peer: u32, bytes: &[u8]) {
-        self.vehicles.get_mut(vehicle).into_iter().for_each(|it| it.hear(peer, bytes));
+    /// Receives, for the next step, what `peer` of the vehicle at this place has sent; returns whether that completes a
+    /// frame that counts ([`ServedVehicle::hear`]).
+    pub fn hear(&mut self, vehicle: usize, peer: u32, bytes: &[u8]) -> bool {
+        self.vehicles.get_mut(vehicle).is_some_and(|it| it.hear(peer, bytes))
     }
 
     /// Forgets what is left of a peer that is gone.
@@ -151,6 +157,9 @@ impl Server {
 
     /// Takes a line of the [text protocol](crate::command); returns its answer.
     pub fn line(&mut self, text: &str) -> Reply {
+        if text.len() > LINE_MAX {
+            return Reply::refused(&format!("a line has at most {LINE_MAX} characters"));
+        }
         let line = match parse(text) {
             Ok(None) => return Reply::default(),
             Ok(Some(line)) => line,
@@ -174,6 +183,9 @@ impl Server {
                 Some(format!("there is no vehicle {system}; they are {}", listed(&self.systems())))
             }
             Line { at_s: Some(_), command: ServerCommand::Step(_), .. } => Some("step cannot be put off".into()),
+            Line { at_s: Some(_), .. } if self.agenda.len() >= AGENDA_MAX => {
+                Some(format!("{AGENDA_MAX} lines wait for their time already; send this one later"))
+            }
             Line { at_s: Some(at_s), .. } if *at_s < self.now_s() => {
                 Some(format!("{at_s} s are over; it is {:.3} s", self.now_s()))
             }

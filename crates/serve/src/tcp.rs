@@ -1,28 +1,42 @@
 //! A vehicle's TCP port.
 
-use crate::peer::Event;
+use crate::frames::frames;
+use crate::peer::{Event, speaks_mavlink};
+use std::collections::VecDeque;
 use std::io::{self, Read, Write};
 use std::net::{IpAddr, SocketAddr, TcpListener, TcpStream};
+use std::time::Duration;
 
-/// Bytes that wait for a slow reader before it is let go: some minutes of telemetry.
-const WAITING_MAX: usize = 1 << 22;
-/// Most connections.
-const STREAMS_MAX: usize = 32;
-/// Most bytes taken from a stream in one step.
-const TAKEN_MAX: usize = 65_536;
+/// Bytes that wait for a slow reader before it is let go: a minute or more of telemetry.
+const WAITING_MAX: usize = 1 << 20;
+/// Most connections, and most that are accepted in one step.
+pub(crate) const STREAMS_MAX: usize = 32;
+const ACCEPTED_MAX: usize = 2;
+/// Most bytes taken in one step from all streams together, and from one of them.
+const TAKEN_MAX: usize = 16_384;
+const PART_MAX: usize = 2048;
+/// Most bytes written to a stream in one step: much more than a step's telemetry.
+const WRITTEN_MAX: usize = 4096;
 
 /// A listener and its streams.
 pub(crate) struct Tcp {
     listener: TcpListener,
-    streams: Vec<Connection>,
+    /// Whoever is read first changes from step to step.
+    streams: VecDeque<Connection>,
+    /// True while frames need a signature.
+    signed: bool,
 }
 
 struct Connection {
     number: u32,
     stream: TcpStream,
     address: SocketAddr,
+    /// When it was accepted, and when it last sent a frame that the vehicle takes, if it has.
+    since: Duration,
+    heard: Option<Duration>,
+    has_begun: bool,
     /// Bytes that the system has not taken yet.
-    waiting: Vec<u8>,
+    waiting: VecDeque<u8>,
     open: bool,
 }
 
@@ -34,70 +48,118 @@ impl Tcp {
     pub(crate) fn open(address: IpAddr, port: u16) -> io::Result<Self> {
         let listener = TcpListener::bind((address, port))?;
         listener.set_nonblocking(true)?;
-        Ok(Tcp { listener, streams: Vec::new() })
+        Ok(Tcp { listener, streams: VecDeque::new(), signed: false })
     }
 
     pub(crate) fn address(&self) -> io::Result<SocketAddr> {
         self.listener.local_addr()
     }
 
-    /// Accepts and receives what has arrived. `number` gives a new peer its number.
-    pub(crate) fn receive(&mut self, number: &mut impl FnMut() -> u32, mut on: impl FnMut(Event<'_>)) {
-        while let Ok((stream, address)) = self.listener.accept() {
-            let fit = self.streams.len() < STREAMS_MAX && stream.set_nonblocking(true).is_ok();
-            if fit {
-                // Small frames leave at once; without it they only come later.
-                let _ = stream.set_nodelay(true);
-                self.streams.push(Connection { number: number(), stream, address, waiting: Vec::new(), open: true });
-                on(Event::New(address));
-            }
+    /// Accepts and receives what has arrived by `now`. Frames need a signature if `signed`. `number` gives a new peer
+    /// its number; `on` tells of what was [sent](Event::Sent) whether the vehicle takes a frame of it.
+    pub(crate) fn receive(
+        &mut self,
+        (now, signed): (Duration, bool),
+        number: &mut impl FnMut() -> u32,
+        mut on: impl FnMut(Event<'_>) -> bool,
+    ) {
+        if signed && !self.signed {
+            // Nobody has signed yet.
+            self.streams.iter_mut().for_each(|connection| connection.heard = None);
         }
+        self.signed = signed;
+        for _ in 0..ACCEPTED_MAX {
+            let Ok((stream, address)) = self.listener.accept() else { break };
+            if stream.set_nonblocking(true).is_err() {
+                continue;
+            }
+            // Small frames leave at once; without it they only come later.
+            let _ = stream.set_nodelay(true);
+            if self.streams.len() >= STREAMS_MAX
+                && let Some(gone) = self.give_up()
+            {
+                on(Event::Gone(gone.address, gone.number));
+            }
+            self.streams.push_back(Connection::new(number(), stream, address, now));
+            on(Event::New(address));
+        }
+        let mut left = TAKEN_MAX;
         for connection in &mut self.streams {
-            connection.receive(&mut on);
+            connection.receive(now, &mut left, &mut on);
             if !connection.open {
                 on(Event::Gone(connection.address, connection.number));
             }
         }
         self.streams.retain(|connection| connection.open);
+        if left == 0 && !self.streams.is_empty() {
+            self.streams.rotate_left(1);
+        }
     }
 
-    /// Sends `bytes` to everyone.
+    /// Takes out the stream that has been silent for longest, one that has never sent a frame before all others.
+    fn give_up(&mut self) -> Option<Connection> {
+        let streams = self.streams.iter().enumerate();
+        let longest = streams.min_by_key(|(_, it)| (it.heard.is_some(), it.heard.unwrap_or(it.since), it.number));
+        longest.map(|(place, _)| place).and_then(|place| self.streams.remove(place))
+    }
+
+    /// Sends whole frames to everyone. Where frames need a signature, whoever has not sent one gets heartbeats alone.
     pub(crate) fn send(&mut self, bytes: &[u8]) {
         for connection in &mut self.streams {
-            connection.waiting.extend_from_slice(bytes);
+            if !self.signed || connection.heard.is_some() {
+                connection.waiting.extend(bytes);
+            } else {
+                frames(bytes).filter(|it| it.is_heartbeat()).for_each(|it| connection.waiting.extend(it.bytes()));
+            }
             connection.flush();
         }
     }
 }
 
 impl Connection {
-    fn receive(&mut self, on: &mut impl FnMut(Event<'_>)) {
-        let (mut buffer, mut taken) = ([0; 4096], 0);
-        while taken < TAKEN_MAX {
-            match self.stream.read(&mut buffer) {
-                Ok(length @ 1..) => {
-                    taken += length;
-                    on(Event::Sent(self.number, buffer.get(..length).unwrap_or_default()));
-                }
-                Err(error) if error.kind() == io::ErrorKind::WouldBlock => return,
-                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
-                Ok(0) | Err(_) => {
+    fn new(number: u32, stream: TcpStream, address: SocketAddr, since: Duration) -> Self {
+        let (heard, has_begun, waiting) = (None, false, VecDeque::new());
+        Connection { number, stream, address, since, heard, has_begun, waiting, open: true }
+    }
+
+    /// Receives at most as many bytes as are `left`, one read's.
+    fn receive(&mut self, now: Duration, left: &mut usize, on: &mut impl FnMut(Event<'_>) -> bool) {
+        let mut buffer = [0; PART_MAX];
+        let Some(room) = buffer.get_mut(..PART_MAX.min(*left)).filter(|room| !room.is_empty()) else { return };
+        match self.stream.read(room) {
+            Ok(length @ 1..) => {
+                *left -= length;
+                let bytes = buffer.get(..length).unwrap_or_default();
+                if !self.has_begun && !speaks_mavlink(bytes) {
                     self.open = false;
+                    on(Event::Foreign(self.address));
                     return;
                 }
+                self.has_begun = true;
+                if on(Event::Sent(self.number, bytes)) {
+                    self.heard = Some(now);
+                }
             }
+            Err(error) if matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::Interrupted) => {}
+            Ok(0) | Err(_) => self.open = false,
         }
     }
 
-    /// Hands over as much as the system takes.
+    /// Hands over as much as the system takes, of one step's share.
     fn flush(&mut self) {
-        while self.open && !self.waiting.is_empty() {
-            match self.stream.write(&self.waiting) {
+        let mut left = WRITTEN_MAX;
+        while self.open && left > 0 {
+            let (front, _) = self.waiting.as_slices();
+            let front = front.get(..front.len().min(left)).unwrap_or_default();
+            if front.is_empty() {
+                break;
+            }
+            match self.stream.write(front) {
                 Ok(length @ 1..) => {
+                    left = left.saturating_sub(length);
                     self.waiting.drain(..length);
                 }
-                Err(error) if error.kind() == io::ErrorKind::WouldBlock => break,
-                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+                Err(error) if matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::Interrupted) => break,
                 Ok(0) | Err(_) => self.open = false,
             }
         }

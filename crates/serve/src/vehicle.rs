@@ -9,7 +9,7 @@ use crate::world_changes::WorldChanges;
 use afbc::Profile;
 use afbc_flight_core::Mode;
 use afbc_hil::{Host, HostTick, LogFile, UlogFiles, place};
-use afbc_link::{Address, Decoder, Reboot, Uplink};
+use afbc_link::{Address, Counters, Decoder, Reboot, Uplink};
 use afbc_onboard::{Link, Readings, Report};
 use afbc_reader::words::out_of_range;
 use afbc_scenario::Scenario;
@@ -112,9 +112,14 @@ impl ServedVehicle {
     /// Ends the black box.
     ///
     /// # Errors
-    /// A line on why it has ended early, unless that was reported.
+    /// A line on why it has ended early, reported or not.
     pub fn end_log(&mut self) -> Result<(), String> {
         self.black_box.take().map_or(Ok(()), UlogFiles::finish)
+    }
+
+    /// Ends the black box; returns a line on why it has ended early, unless that was reported.
+    pub fn close_log(&mut self) -> Option<String> {
+        self.black_box.take().and_then(|mut files| files.end())
     }
 
     /// Returns its world.
@@ -134,10 +139,20 @@ impl ServedVehicle {
         self.wired = wired;
     }
 
-    /// Receives, for the next step, what `peer` has sent.
-    pub fn hear(&mut self, peer: u32, bytes: &[u8]) {
-        let (address, wired) = (self.address, self.wired);
-        self.host.hear(self.peers.entry(peer).or_insert_with(|| decoder(address, wired)), bytes);
+    /// True if frames need a signature.
+    pub fn needs_signatures(&self) -> bool {
+        self.host.needs_signatures()
+    }
+
+    /// Receives, for the next step, what `peer` has sent. Returns whether that completes a frame that shows who it is:
+    /// any that is intact or, where frames need a signature, one that is accepted.
+    pub fn hear(&mut self, peer: u32, bytes: &[u8]) -> bool {
+        let (address, wired, signed) = (self.address, self.wired, self.host.needs_signatures());
+        let decoder = self.peers.entry(peer).or_insert_with(|| decoder(address, wired));
+        let before = *decoder.counters();
+        self.host.hear(decoder, bytes);
+        let after = *decoder.counters();
+        after.received != before.received || (!signed && intact(&after) != intact(&before))
     }
 
     /// Forgets what is left of a peer that is gone.
@@ -176,7 +191,8 @@ impl ServedVehicle {
             let change = change.map_or(Ok(()), |change| keeper.keep(change));
             let signing = signing.map_or(Ok(()), |record| keeper.keep_signing(record));
             // Both have been written by now, or tried: one failure does not keep the other back.
-            if let Err(error) = change.and(signing) {
+            let later = keeper.take_failure().map_or(Ok(()), Err);
+            if let Err(error) = change.and(signing).and(later) {
                 // The reason is a text to the stations, and reported with it.
                 self.host.comms().warn(error.reason());
             }
@@ -369,6 +385,12 @@ fn power_up(
 fn decoder(receiver: Address, wired: bool) -> Decoder<Uplink> {
     let decoder = Decoder::new(receiver);
     if wired { decoder.wired() } else { decoder }
+}
+
+/// Returns the number of frames with the right checksum that were not delivered.
+fn intact(counters: &Counters) -> u32 {
+    let Counters { malformed, implausible, unsupported, elsewhere, .. } = *counters;
+    [malformed, implausible, unsupported, elsewhere].into_iter().fold(0, u32::wrapping_add)
 }
 
 fn address(host: &Host) -> Address {

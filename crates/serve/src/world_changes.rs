@@ -10,6 +10,9 @@ use afbc_scenario::Scenario;
 use afbc_sim::flight::World;
 use afbc_types::{Axis, OutOfRange};
 
+/// Most changes of a kind that act at a time: each costs every step a little.
+const ACTIVE_MAX: usize = 256;
+
 /// What a vehicle suffers now, and what its scenario has in store.
 pub(crate) struct WorldChanges {
     suite: InstrumentSuite,
@@ -41,12 +44,19 @@ impl WorldChanges {
         let now_s = world.plant().time_s();
         let until = |seconds: Option<f64>| seconds.map_or(f64::INFINITY, |seconds| now_s + seconds);
         match *change {
-            WorldChange::Wind(steady_m_s) => self.set_wind(world, |wind| wind.steady_m_s = steady_m_s),
-            WorldChange::Turbulence(turbulence) => self.set_wind(world, |wind| wind.turbulence = turbulence),
+            WorldChange::Wind(steady_m_s) => self.set_wind(world, |wind| {
+                wind.steady_m_s = steady_m_s;
+                Ok(())
+            }),
+            WorldChange::Turbulence(turbulence) => self.set_wind(world, |wind| {
+                wind.turbulence = turbulence;
+                Ok(())
+            }),
             WorldChange::Gust { velocity_m_s, rise_s, hold_s } => self.set_wind(world, |wind| {
                 // Gusts that are over would add up over a long session.
                 wind.gusts.retain(|gust| gust.start_s + 2.0 * gust.rise_s + gust.hold_s > now_s);
                 wind.gusts.push(CosineGust { velocity_m_s, start_s: now_s, rise_s, hold_s });
+                bounded(wind.gusts.len())
             }),
             WorldChange::Push { force_n, seconds } => {
                 // A positive gust of the paper pushes in the negative direction.
@@ -66,12 +76,14 @@ impl WorldChanges {
                 payloads.push(Payload { mass_kg, below_m, ahead_m, left_m, start_s: now_s, end_s });
             }),
             WorldChange::Fault { failure, seconds } => {
-                let fault = InstrumentFault { failure, start_s: now_s, end_s: until(seconds) };
+                let fault = InstrumentFault { failure, start_s: now_s, end_s: until(seconds), rise_s: 0.0 };
                 let (instrument, _) = failure.name().split_once('-').unwrap_or_default();
                 let absent = || format!("this vehicle has no {instrument}");
                 if !has(&self.suite, instrument) {
                     return Err(absent());
                 }
+                self.failures.retain(|fault| fault.end_s > now_s);
+                bounded(self.failures.len() + 1)?;
                 world.instruments_mut().ok_or_else(absent)?.fail(fault).map_err(in_words)?;
                 self.failures.push(fault);
                 Ok(())
@@ -92,7 +104,10 @@ impl WorldChanges {
             WorldChange::Hold(_) => Ok(()),
             WorldChange::Clear => {
                 let wind = self.scenario_wind.clone();
-                self.set_wind(world, |now| *now = wind)?;
+                self.set_wind(world, |now| {
+                    *now = wind;
+                    Ok(())
+                })?;
                 world.plant_mut().set_rotor_faults(Vec::new()).map_err(in_words)?;
                 world.plant_mut().set_environment(self.scenario_environment.clone());
                 world.instruments_mut().into_iter().for_each(|instruments| instruments.clear_faults());
@@ -104,9 +119,13 @@ impl WorldChanges {
     }
 
     /// Changes the wind.
-    fn set_wind(&mut self, world: &mut World, change: impl FnOnce(&mut Wind)) -> Result<(), String> {
+    fn set_wind(
+        &mut self,
+        world: &mut World,
+        change: impl FnOnce(&mut Wind) -> Result<(), String>,
+    ) -> Result<(), String> {
         let mut wind = self.wind.clone();
-        change(&mut wind);
+        change(&mut wind)?;
         world.plant_mut().set_wind(&wind).map_err(in_words)?;
         self.wind = wind;
         Ok(())
@@ -143,9 +162,16 @@ fn load(
     let mut changes: Vec<ParameterChange> = old.changes().iter().filter(|it| it.end_s > now_s).copied().collect();
     let mut payloads = old.payloads().to_vec();
     change(&mut gusts, &mut changes, &mut payloads);
+    bounded(gusts.len().max(changes.len()))?;
     let new = Environment::new(*old.nominal(), changes, gusts).and_then(|new| new.with_payloads(payloads));
     world.plant_mut().set_environment(new.map_err(in_words)?);
     Ok(())
+}
+
+/// Refuses more changes of a kind than act at a time.
+fn bounded(count: usize) -> Result<(), String> {
+    let most = format!("{ACTIVE_MAX} of its kind act already; clear ends them");
+    if count <= ACTIVE_MAX { Ok(()) } else { Err(most) }
 }
 
 fn has(suite: &InstrumentSuite, instrument: &str) -> bool {

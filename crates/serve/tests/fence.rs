@@ -174,7 +174,12 @@ impl Flown {
         let last_ms = 1000 + random.below(6000) as u32;
         match random.below(6) {
             0 => {
-                self.command(Command::Reposition { place, yaw_rad: f32::NAN, speed_m_s: Some(12.0) });
+                self.command(Command::Reposition {
+                    place,
+                    yaw_rad: f32::NAN,
+                    speed_m_s: Some(12.0),
+                    changes_mode: true,
+                });
                 self.run(last_ms);
             }
             1 => {

@@ -128,12 +128,71 @@ fn what_is_wrong_is_named() {
             "my.plan: geoFence.breachReturn: return points are not supported; remove it, the vehicle returns home",
         ),
         (&|plan| plan["rallyPoints"]["points"] = json!(7), "my.plan: rally point: it must be a list"),
+        (
+            &|plan| plan["mission"]["items"][2]["autoContinue"] = json!(false),
+            "my.plan: mission item 2: autoContinue must be true: a mission does not wait between items",
+        ),
+        (
+            &|plan| plan["mission"]["items"][3]["doJumpId"] = json!(3),
+            "my.plan: mission item 5: several items have the doJumpId that it jumps to; correct it",
+        ),
+        (
+            &|plan| plan["geoFence"]["polygons"][0]["polygon"][1] = json!([HOME[0], HOME[1], 50.0]),
+            "my.plan: geoFence polygon 0.polygon 1: an altitude is not flown; remove it",
+        ),
     ];
     for (change, line) in cases {
         assert_eq!(changed(change), *line);
     }
     let torn = QgcPlan::read("my.plan", "{\"fileType\": ").unwrap_err().to_string();
     assert!(torn.starts_with("my.plan: no JSON: ") && torn.ends_with("; save the plan again"), "{torn}");
+}
+
+/// Every part that has a version is of one that is known, and has no name that is not: whatever is put into an object
+/// is read, known to fly nothing, or refused by its name.
+#[test]
+fn what_is_not_understood_is_refused_by_name() {
+    fn objects(value: &Value, path: &str, found: &mut Vec<String>) {
+        match value {
+            Value::Object(object) => {
+                // Of complex items, the list of those that they were worked out to is flown.
+                let is_described = path.ends_with("/items/6") || path.contains("TransectStyle");
+                if !is_described || path.ends_with("/Items/0") {
+                    found.push(path.into());
+                }
+                object.iter().for_each(|(name, value)| objects(value, &format!("{path}/{name}"), found));
+            }
+            Value::Array(list) => {
+                list.iter().enumerate().for_each(|(at, value)| objects(value, &format!("{path}/{at}"), found));
+            }
+            _ => (),
+        }
+    }
+    let (whole, mut found) = (plan(), Vec::new());
+    objects(&whole, "", &mut found);
+    assert_eq!(found.len(), 15, "{found:?}");
+    let mut versions = 0;
+    for path in found {
+        let mut other = whole.clone();
+        other.pointer_mut(&path).unwrap()["speedLimit"] = json!(3);
+        let line = read(&other).unwrap_err();
+        assert!(line.ends_with(": speedLimit is not known, and is not flown; remove it"), "{path}: {line}");
+        let Some(version) = whole.pointer(&path).unwrap().get("version").and_then(Value::as_u64) else { continue };
+        versions += 1;
+        for wrong in [json!(version + 1), json!(version - 1), json!(42), json!(1.5), json!("2"), json!(null)] {
+            let mut other = whole.clone();
+            other.pointer_mut(&path).unwrap()["version"] = wrong.clone();
+            let line = read(&other).unwrap_err();
+            let named = if wrong.is_null() { "version is missing" } else { "is not known" };
+            assert!(line.contains("version") && line.contains(named), "{path} {wrong}: {line}");
+        }
+    }
+    assert_eq!(versions, 6);
+    // A fence of old, which has other names.
+    let mut old = whole.clone();
+    old["geoFence"] = json!({ "version": 1, "polygon": [at(-60.0, -60.0), at(60.0, -60.0), at(60.0, 60.0)] });
+    let cure = "save the plan again in a QGroundControl of today";
+    assert_eq!(read(&old).unwrap_err(), format!("my.plan: geoFence.version: 1 is not known, 2 is; {cure}"));
 }
 
 /// From take-off to the landing at home, with the loop flown twice, inside the fence.
@@ -173,7 +232,7 @@ fn what_the_vehicle_refuses_is_named() {
 fn a_return_lands_at_the_nearest_rally_point() {
     let mut plan = plan();
     let point = at(10.0, 20.0);
-    plan["rallyPoints"]["points"] = json!([[point[0], point[1], 20.0], [HOME[0] + 1.0, HOME[1], 20.0]]);
+    plan["rallyPoints"]["points"] = json!([[point[0], point[1], 20.0], [HOME[0] + 0.5, HOME[1], 20.0]]);
     let plan = read(&plan).unwrap();
     let scenario = built_in("outdoor").unwrap().read().unwrap();
     let mut vehicle = ServedVehicle::new(&fleet(&scenario, 1).unwrap()[0], 1, None).unwrap();

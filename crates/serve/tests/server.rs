@@ -240,7 +240,7 @@ fn bad_lines_are_refused_in_one_line() {
         ("battery", "battery SHARE: initial_charge is missing"),
         ("fault", "fault INSTRUMENT FAILURE [NUMBERS] [SECONDS]: it needs an instrument, as in: fault gnss lost"),
         ("fault gps lost", "fault: \"gps\" is no instrument; it must be imu, tracker, gnss, barometer or magnetometer"),
-        ("fault gnss stuck", "fault gnss: \"stuck\" is none of lost, jumped"),
+        ("fault gnss stuck", "fault gnss: \"stuck\" is none of lost, jumped, multipath"),
         ("fault tracker lost", "this vehicle has no tracker"),
         ("fault gnss lost -3", "fault: seconds = -3, out of range: it must lie within 0 to 1000000"),
         ("turbulence strong", "turbulence: \"strong\" is not one of none, light, moderate, severe"),
@@ -288,6 +288,7 @@ fn every_command_is_helped_with_and_every_failure_is_known() {
         "fault imu biased 0.1 0 0 0.5 0 0 3",
         "fault gnss lost",
         "fault gnss jumped 5 0 0 2",
+        "fault gnss multipath 5 10 2",
         "fault barometer lost",
         "fault barometer stuck",
         "fault barometer blocked",
@@ -317,4 +318,34 @@ fn what_the_firmware_cannot_fly_is_refused() {
     let mut heavy = scenario("outdoor");
     heavy.vehicle.mass_kg *= 1.5;
     assert!(fleet(&heavy, 1).unwrap_err().to_string().contains("another vehicle"));
+}
+
+/// Whoever sends line after line holds no more than a little memory, and no step costs more and more.
+#[test]
+fn what_lines_leave_behind_is_bounded() {
+    let mut server = served("outdoor", 1);
+    run(&mut server, 10);
+    for line in ["push 0 0 0.1", "change mass 1.001", "gust 0 0 1 1 100000", "fault gnss lost", "fault imu dead 50"] {
+        let taken = (0..2000).take_while(|_| server.line(line).lines == [format!("ok {line}")]).count();
+        assert!((100..=256).contains(&taken), "{line}: {taken}");
+        let refused = server.line(line).lines.concat();
+        assert_eq!(refused, "error 256 of its kind act already; clear ends them", "{line}");
+        // The others go on, and the cure cures.
+        ok(&mut server, "battery 0.9");
+        ok(&mut server, "clear");
+        ok(&mut server, line);
+    }
+    // What is over makes room.
+    ok(&mut server, "clear");
+    for _ in 0..2000 {
+        ok(&mut server, "fault gnss lost 0.001");
+        ok(&mut server, "push 0 0 0.1 0.001");
+        run(&mut server, 2);
+    }
+    let long = format!("at 1000 wind 1 0 0 # {}", "x".repeat(16_000));
+    assert_eq!(server.line(&long).lines, ["error a line has at most 512 characters"]);
+    let taken = (0..2000).take_while(|_| server.line("at 1000 wind 1 0 0").lines == ["ok at 1000 wind 1 0 0"]).count();
+    assert_eq!(taken, 1000);
+    assert!(server.line("at 1000 wind 1 0 0").lines.concat().starts_with("error 1000 lines wait for their time"));
+    ok(&mut server, "wind 1 0 0");
 }

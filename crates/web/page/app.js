@@ -30,6 +30,8 @@ export function run(engine) {
     if (mode === "waypoint") draft.waypoints.push([x, y, height]);
     if (mode === "corner") draft.corners.push([x, y]);
     showDraft();
+  }, (number) => {
+    at("sigmas").textContent = number;
   });
 
   const showDraft = () => {
@@ -44,10 +46,11 @@ export function run(engine) {
     [draft.waypoints, draft.corners] = [[], []];
     showDraft();
   };
-  const say = (text, time = "") => {
+  /** Shows a text; `severity` is MAVLink's, 0 to 7. */
+  const say = (text, severity, time) => {
     const item = document.createElement("li");
-    item.textContent = time === "" ? text : `${time.toFixed(1)} s  ${text}`;
-    item.className = /^error|refus|fail|lost|emergency|not ready/i.test(text) ? "error" : "";
+    item.textContent = time === undefined ? text : `${time.toFixed(1)} s  ${text}`;
+    item.className = severity <= 3 ? "error" : severity === 4 ? "warning" : "";
     const list = at("texts");
     list.append(item);
     while (list.children.length > 200) list.firstChild.remove();
@@ -108,11 +111,14 @@ export function run(engine) {
   on(
     "follow",
     () => {
-      scene.follow = at("follow").checked;
+      scene.setFollow(at("follow").checked);
     },
     "change",
   );
-  on("home-view", () => scene.wholeView());
+  on("home-view", () => {
+    at("follow").checked = false;
+    scene.wholeView();
+  });
   on(
     "line-form",
     (event) => {
@@ -182,7 +188,7 @@ export function run(engine) {
       parameters.values(values);
     },
     reply({ text }) {
-      say(text);
+      say(text, text.startsWith("error") ? 3 : 6);
     },
     // Of the frames that come between two pictures, the newest is drawn: a slow browser does not fall behind.
     frame(now) {
@@ -195,9 +201,9 @@ export function run(engine) {
       }
       now.texts
         .filter(({ number }) => number > seen)
-        .forEach(({ number, time_s: time, text }) => {
+        .forEach(({ number, time_s: time, severity, text }) => {
           seen = number;
-          say(text, time);
+          say(text, severity, time);
         });
     },
     picture(now) {
@@ -238,6 +244,8 @@ export function run(engine) {
   };
   globalThis.page = {
     engine,
+    scene,
+    charts,
     get frame() {
       return frame;
     },

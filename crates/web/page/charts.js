@@ -1,11 +1,16 @@
 // Charts over time, with one cursor for all.
+import { label, roomy, ticked } from "./fit.js";
 const { uPlot } = globalThis;
 
 const WINDOW_S = 60;
 const EVERY_S = 0.1;
+/** Least time between the ends of a chart, and the height of all of it. */
+const LEAST_S = 1;
+const HEIGHT_PX = 150;
 const style = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
 const minus = (a, b) => a.map((value, i) => value - b[i]);
 const three = (of) => ["x", "y", "z"].map((name, i) => [name, (frame) => of(frame)?.[i] ?? null]);
+const sigmas = (estimate) => estimate?.valid && estimate.position_sigma_m.map((sigma) => 3 * sigma);
 const angles = (of) => ["roll", "pitch", "yaw"].map((name, i) => [name, (frame) => of(frame)?.[i] ?? null]);
 const axes = (of) =>
   ["roll", "pitch", "yaw", "z", "x", "y"].map((name, i) => [
@@ -13,18 +18,23 @@ const axes = (of) =>
     (frame) => of(frame.adaptation.axes[i] ?? {}) ?? null,
   ]);
 
-/** Title, unit and series, each a name and what it shows of a frame. */
+/** A number of three digits. */
+const short = (number) => {
+  const rounded = Number(number.toPrecision(3));
+  return label(rounded, rounded === 0 ? 2 : Math.max(2 - Math.floor(Math.log10(Math.abs(rounded))), 0));
+};
+/** Title, unit, least range of values, and series, each a name and what it shows of a frame. */
 const charts = (hello) => [
-  ["Position error", "m", three((f) => f.reference && minus(f.reference.position_m, f.truth.position_m))],
-  ["Attitude error e1", "rad", axes((axis) => axis.e1).slice(0, 3)],
-  ["Attitude", "rad", angles((f) => f.truth.attitude_rad)],
-  ["Velocity", "m/s", three((f) => f.truth.velocity_m_s)],
-  ["Estimate's error", "m", three((f) => f.estimate?.valid && minus(f.truth.position_m, f.estimate.position_m))],
-  ["3 sigma of the estimate", "m", three((f) => f.estimate?.valid && f.estimate.position_sigma_m.map((s) => 3 * s))],
-  ["Rotor speeds", "rad/s", hello.rotors.map((_, i) => [`${i + 1}`, (f) => f.rotors[i]?.speed_rad_s ?? null])],
-  ["Battery", "V", [["voltage", (f) => f.battery?.voltage_v ?? null]]],
-  ["|Theta_hat|", "input's unit", axes((axis) => axis.theta_norm)],
-  ["V", "", [["sum", (f) => f.adaptation.lyapunov], ...axes((axis) => axis.lyapunov)]],
+  ["Position error", "m", 0.01, three((f) => f.reference && minus(f.reference.position_m, f.truth.position_m))],
+  ["Attitude error e1", "rad", 0.01, axes((axis) => axis.e1).slice(0, 3)],
+  ["Attitude", "rad", 0.01, angles((f) => f.truth.attitude_rad)],
+  ["Velocity", "m/s", 0.01, three((f) => f.truth.velocity_m_s)],
+  ["Estimate's error", "m", 0.01, three((f) => f.estimate?.valid && minus(f.truth.position_m, f.estimate.position_m))],
+  ["3 sigma of the estimate", "m", 0.01, three((f) => sigmas(f.estimate))],
+  ["Rotor speeds", "rad/s", 10, hello.rotors.map((_, i) => [`${i + 1}`, (f) => f.rotors[i]?.speed_rad_s ?? null])],
+  ["Battery", "V", 0.1, [["voltage", (f) => f.battery?.voltage_v ?? null]]],
+  ["|Theta_hat|", "input's unit", 0.01, axes((axis) => axis.theta_norm)],
+  ["V", "", 0.001, [["sum", (f) => f.adaptation.lyapunov], ...axes((axis) => axis.lyapunov)]],
 ];
 
 export class Charts {
@@ -42,9 +52,10 @@ export class Charts {
   }
 
   hello(hello) {
-    this.shown = charts(hello).map(([title, unit, series]) => ({
+    this.shown = charts(hello).map(([title, unit, least, series]) => ({
       title,
       unit,
+      least,
       series,
       data: [[], ...series.map(() => [])],
     }));
@@ -70,18 +81,21 @@ export class Charts {
         grid: { stroke: style("line"), width: 1 },
         ticks: { stroke: style("line"), width: 1 },
       };
-      const value = (_, number) => (number === null || number === undefined ? "–" : number.toPrecision(3));
+      const value = (_, number) => (number === null || number === undefined ? "–" : short(number));
       chart.box = box;
       chart.plot = new uPlot(
         {
           width: Math.max(box.clientWidth - 8, 200),
-          height: 150,
-          scales: { x: { time: false } },
+          height: HEIGHT_PX,
+          scales: {
+            x: { time: false, range: (_, from, to) => [from ?? 0, Math.max(to ?? 0, (from ?? 0) + LEAST_S)] },
+            y: { range: (_, low, high) => roomy(low ?? 0, high ?? 0, chart.least) },
+          },
           cursor: { sync: { key: "time" }, drag: { x: false, y: false } },
           legend: { live: true },
           axes: [
-            { ...axis, size: 26 },
-            { ...axis, size: 52 },
+            { ...axis, ...ticked(50, "width"), size: 26 },
+            { ...axis, ...ticked(28, "height"), size: 58 },
           ],
           series: [
             { label: "t", value: (_, t) => (t === null ? "–" : `${t.toFixed(1)} s`) },
@@ -102,7 +116,7 @@ export class Charts {
 
   resize() {
     for (const { plot, box } of this.shown ?? []) {
-      plot?.setSize({ width: Math.max(box.clientWidth - 8, 200), height: 150 });
+      plot?.setSize({ width: Math.max(box.clientWidth - 8, 200), height: HEIGHT_PX });
     }
   }
 
@@ -115,6 +129,8 @@ export class Charts {
       columns.forEach((column, i) => column.push(chart.series[i][1](frame)));
       while (times[0] < frame.time_s - WINDOW_S) chart.data.forEach((column) => column.shift());
       chart.plot.setData(chart.data);
+      // What is newest, unless something is pointed at.
+      if (!(chart.plot.cursor.left >= 0)) chart.plot.setLegend({ idx: times.length - 1 }, false);
     }
   }
 }

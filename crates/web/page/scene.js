@@ -1,7 +1,19 @@
 // The vehicle in three dimensions. Axes are those of the simulator: x north, y west, z up [m].
+import { stand } from "./fit.js";
 const { THREE } = globalThis;
 
 const TRAIL = 3000;
+/** Cells of the grid from its middle to its edge, cells between strong lines, and cells of the view's distance. */
+const GRID = 50;
+const STRONG = 10;
+const CELLS = 12;
+/** Half of the edge of a box around the vehicle that is seen whole [m], in arms at least. */
+const NEAR_M = 1;
+const NEAR_ARMS = 4;
+/** What a whole view leaves free, of half the view: buttons lie above it, the legend below. */
+const FREE = 0.2;
+/** The ellipsoid is one of so many standard deviations: of the most that reach over at most half of the view. */
+const SIGMAS = [3, 1, 0.3, 0.1, 0.03, 0.01];
 const colour = (name) =>
   new THREE.Color(getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim());
 const line = (points, name, extra = {}) => {
@@ -14,6 +26,7 @@ class Trail {
   constructor(name) {
     this.points = new Float32Array(3 * TRAIL);
     this.count = 0;
+    this.box = new THREE.Box3();
     const geometry = new THREE.BufferGeometry();
     this.attribute = new THREE.BufferAttribute(this.points, 3);
     geometry.setAttribute("position", this.attribute);
@@ -28,6 +41,7 @@ class Trail {
       this.points.copyWithin(0, 3);
       this.count -= 1;
     }
+    this.box.expandByPoint(new THREE.Vector3(...at));
     this.points.set(at, 3 * this.count);
     this.count += 1;
     this.attribute.needsUpdate = true;
@@ -35,11 +49,48 @@ class Trail {
   }
 }
 
+/** The eight corners of a box. */
+const corners = (low, high) =>
+  Array.from({ length: 8 }, (_, i) => low.map((value, axis) => ((i >> axis) & 1 ? high[axis] : value)));
+
+/** A floor with lines one apart, from -GRID to GRID, which fade into it. Neither hides anything, and each line is many
+ * short ones: whoever draws long lines from behind the camera to the horizon may lose them. */
+const ground = () => {
+  const flat = { depthWrite: false };
+  const floor = new THREE.Mesh(
+    new THREE.CircleGeometry(100 * GRID, 64),
+    new THREE.MeshBasicMaterial({ color: colour("floor"), ...flat }),
+  );
+  const [points, colours] = [[], []];
+  const add = (x, y, line) => {
+    points.push(x, y, 0);
+    const fade = Math.max(1 - Math.hypot(x, y) / GRID, 0);
+    colours.push(...colour("floor").lerp(line, fade).toArray());
+  };
+  for (let across = -GRID; across <= GRID; across += 1) {
+    const line = colour(across % STRONG === 0 ? "grid-strong" : "grid");
+    for (let along = -GRID; along < GRID; along += 1) {
+      for (const end of [along, along + 1]) add(across, end, line);
+      for (const end of [along, along + 1]) add(end, across, line);
+    }
+  }
+  const geometry = new THREE.BufferGeometry();
+  geometry.setAttribute("position", new THREE.BufferAttribute(new Float32Array(points), 3));
+  geometry.setAttribute("color", new THREE.BufferAttribute(new Float32Array(colours), 3));
+  const grid = new THREE.LineSegments(geometry, new THREE.LineBasicMaterial({ vertexColors: true, ...flat }));
+  const group = new THREE.Group();
+  group.add(floor, grid);
+  [floor.renderOrder, grid.renderOrder] = [-2, -1];
+  return group;
+};
+
 export class VehicleScene {
-  /** `onPlace(place)` is called with a clicked place [x, y] on the ground's plane. */
-  constructor(canvas, onPlace) {
+  /** `onPlace(place)` is called with a clicked place [x, y] on the ground's plane, `onSigmas(number)` with how many
+   * standard deviations the ellipsoid shows. */
+  constructor(canvas, onPlace, onSigmas) {
     this.canvas = canvas;
     this.onPlace = onPlace;
+    this.onSigmas = onSigmas;
     // Kept, so that what is drawn can be read.
     this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, preserveDrawingBuffer: true });
     this.camera = new THREE.PerspectiveCamera(50, 1, 0.05, 2000);
@@ -48,9 +99,13 @@ export class VehicleScene {
     this.controls.maxPolarAngle = 1.55;
     this.controls.listenToKeyEvents(canvas);
     this.controls.keyPanSpeed = 14;
+    this.controls.addEventListener("change", () => this.moved());
+    this.controls.addEventListener("start", () => {
+      this.whole = false;
+    });
     this.follow = true;
-    this.height = 2;
-    this.wholeView();
+    this.camera.position.set(-5.4, -4.4, 2.8);
+    this.controls.update();
     let down = null;
     canvas.addEventListener("pointerdown", (event) => {
       down = [event.clientX, event.clientY];
@@ -70,15 +125,70 @@ export class VehicleScene {
     this.renderer.setSize(width, height, false);
     this.camera.aspect = width / height;
     this.camera.updateProjectionMatrix();
+    if (this.whole) this.seeAll();
     this.draw();
   }
 
+  /** Follows the vehicle, seen from near, or stays where it is. */
+  setFollow(follow) {
+    [this.follow, this.whole] = [follow, false];
+    if (follow) this.see(this.aroundVehicle());
+  }
+
+  /** Shows the vehicle, where it was and will be, and the fence, from the side that one looks from now; and goes on so
+   * until somebody moves the view. */
   wholeView() {
-    this.controls.target.set(...(this.at ?? [0, 0, 1]));
-    const [x, y, z] = this.controls.target.toArray();
-    this.camera.position.set(x - 5.4, y - 4.4, z + 2.8);
-    this.controls.update();
+    [this.follow, this.whole] = [false, true];
+    this.seeAll();
+  }
+
+  seeAll() {
+    const boxes = [new THREE.Box3().setFromObject(this.plan), this.trail.box, this.led.box];
+    for (const object of [this.home, this.reference])
+      if (object.visible) boxes.push(new THREE.Box3().setFromObject(object));
+    const places = boxes.filter((box) => !box.isEmpty()).map(({ min, max }) => corners(min.toArray(), max.toArray()));
+    this.see([...this.aroundVehicle(), ...places.flat()]);
+  }
+
+  /** Corners of a box around the vehicle. */
+  aroundVehicle() {
+    const at = this.at ?? [0, 0, 0];
+    const reach = Math.max(NEAR_M, NEAR_ARMS * (this.hello?.arm_m ?? 0));
+    return corners(
+      at.map((value) => value - reach),
+      at.map((value) => value + reach),
+    );
+  }
+
+  /** Moves the camera, without turning it, to where these places are seen as large as they fit. */
+  see(points) {
+    const { camera, controls } = this;
+    camera.updateMatrixWorld();
+    const axis = (column) => new THREE.Vector3().setFromMatrixColumn(camera.matrixWorld, column).toArray();
+    const [right, up, back] = [axis(0), axis(1), axis(2)];
+    const along = (1 - FREE) * Math.tan((camera.fov * Math.PI) / 360);
+    const axes = { right, up, forward: back.map((value) => -value) };
+    const { position, middle } = stand(points, axes, [along * camera.aspect, along], 1);
+    camera.position.set(...position);
+    controls.target.set(...middle);
+    controls.update();
+    this.moved();
     this.draw();
+  }
+
+  /** Fits the ground and the depth of the view to how far the camera is. */
+  moved() {
+    const { camera, controls, ground } = this;
+    const distance = Math.max(camera.position.distanceTo(controls.target), camera.position.z);
+    [camera.near, camera.far] = [distance / 100, distance * 300];
+    camera.updateProjectionMatrix();
+    if (!ground) return;
+    const power = 10 ** Math.floor(Math.log10(distance / CELLS));
+    const cell = [1, 2, 5, 10].map((factor) => factor * power).find((size) => size * CELLS >= distance);
+    ground.scale.set(cell, cell, 1);
+    // Strong lines stay at the same places.
+    const snap = (value) => Math.round(value / (STRONG * cell)) * STRONG * cell;
+    ground.position.set(snap(controls.target.x), snap(controls.target.y), 0);
   }
 
   /** Builds everything for a vehicle. */
@@ -94,15 +204,8 @@ export class VehicleScene {
     const sun = new THREE.DirectionalLight(0xffffff, 1.6);
     sun.position.set(-3, -4, 8);
     scene.add(sun);
-    const floor = new THREE.Mesh(
-      new THREE.CircleGeometry(400, 64),
-      new THREE.MeshBasicMaterial({ color: colour("floor") }),
-    );
-    floor.position.z = -0.02;
-    scene.add(floor);
-    const grid = new THREE.GridHelper(80, 80, colour("grid-strong"), colour("grid"));
-    grid.rotation.x = Math.PI / 2;
-    scene.add(grid);
+    this.ground = ground();
+    scene.add(this.ground);
     scene.add(
       new THREE.ArrowHelper(
         new THREE.Vector3(1, 0, 0),
@@ -259,11 +362,10 @@ export class VehicleScene {
       const moved = new THREE.Vector3(at[0] - this.at[0], at[1] - this.at[1], at[2] - this.at[2]);
       this.camera.position.add(moved);
       this.controls.target.add(moved);
-    } else if (!this.at) {
-      this.at = at;
-      this.wholeView();
     }
+    const first = !this.at;
     this.at = at;
+    if (first) this.see(this.aroundVehicle());
     this.vehicle.position.set(...at);
     const [w, x, y, z] = truth.attitude;
     this.vehicle.quaternion.set(x, y, z, w);
@@ -286,7 +388,7 @@ export class VehicleScene {
     if (this.estimate.visible) {
       this.believed.position.set(...estimate.position_m);
       this.estimate.position.set(...estimate.position_m);
-      this.estimate.scale.set(...estimate.position_sigma_m.map((sigma) => Math.min(Math.max(3 * sigma, 0.01), 50)));
+      this.showSigma(estimate);
     }
     const wind = new THREE.Vector3(...frame.wind_m_s);
     const speed = wind.length();
@@ -302,7 +404,19 @@ export class VehicleScene {
     this.drop.position.set(at[0], at[1], 0);
     this.drop.scale.z = Math.max(at[2], 0.001);
     this.showPlan(frame, draft);
+    if (this.whole) this.seeAll();
     this.draw();
+  }
+
+  /** Draws the ellipsoid of as many standard deviations as leave something else to be seen. */
+  showSigma({ position_m: at, position_sigma_m: sigmas }) {
+    const { camera } = this;
+    const half = Math.tan((camera.fov * Math.PI) / 360) * Math.min(camera.aspect, 1);
+    const most = 0.5 * half * camera.position.distanceTo(new THREE.Vector3(...at));
+    const number = SIGMAS.find((sigma) => sigma * Math.max(...sigmas) <= most) ?? SIGMAS.at(-1);
+    this.estimate.scale.set(...sigmas.map((sigma) => Math.min(Math.max(number * sigma, 0.01), most)));
+    if (number !== this.sigmas) this.onSigmas(number);
+    this.sigmas = number;
   }
 
   showPlan(frame, draft) {

@@ -5,7 +5,12 @@ export class SocketEngine {
     this.socket = new WebSocket(`${scheme}//${location.host}/socket${location.search}`);
     this.socket.addEventListener("open", () => onLink("connected", true));
     this.socket.addEventListener("message", ({ data }) => onMessage(JSON.parse(data)));
-    this.socket.addEventListener("close", ({ reason }) => {
+    this.socket.addEventListener("close", ({ code, reason }) => {
+      // Another page has taken the place of this one: two that take it from each other would go on for ever.
+      if (code === 4000) {
+        onLink(`not connected: ${reason}`, false);
+        return;
+      }
       onLink(`not connected${reason ? `: ${reason}` : ""}; trying again`, false);
       setTimeout(() => this.start(onMessage, onLink), 1000);
     });

@@ -8,5 +8,5 @@
 mod page;
 mod vendor;
 
-pub use page::{PageFile, page_files};
+pub use page::{PageFile, fit_script, page_files};
 pub use vendor::{THREE_JS, UPLOT_CSS, UPLOT_JS};

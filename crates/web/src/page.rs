@@ -19,6 +19,14 @@ const HEAD: &str = r#"<link rel="stylesheet" href="uplot.min.css"><link rel="sty
 const TAIL: &str = r#"<script src="three.min.js"></script><script src="uplot.min.js"></script>
 <script type="module" src="socket-main.js"></script>"#;
 
+/// Ranges and ticks of axes, and where a camera stands: a module.
+const FIT_JS: &str = include_str!("../page/fit.js");
+
+/// Returns the functions of `fit.js` as a plain script, for a page without modules.
+pub fn fit_script() -> &'static str {
+    FIT_JS.split_once("\nexport ").map_or(FIT_JS, |(functions, _)| functions)
+}
+
 /// Returns the files of the page for a server, whose socket is at `/socket` (`scripts/build-playground` makes the page
 /// without one).
 pub fn page_files() -> Vec<PageFile> {
@@ -30,6 +38,7 @@ pub fn page_files() -> Vec<PageFile> {
         ("style.css", STYLE, include_str!("../page/style.css")),
         ("app.js", SCRIPT, include_str!("../page/app.js")),
         ("charts.js", SCRIPT, include_str!("../page/charts.js")),
+        ("fit.js", SCRIPT, FIT_JS),
         ("parameters.js", SCRIPT, include_str!("../page/parameters.js")),
         ("scene.js", SCRIPT, include_str!("../page/scene.js")),
         ("socket-engine.js", SCRIPT, include_str!("../page/socket-engine.js")),

@@ -67,6 +67,37 @@ const colours = () =>
     return new Set(new Uint32Array(context.getImageData(0, 0, 200, 120).data.buffer)).size;
   });
 
+/** Corners of what a whole view shows, on the screen: -1 to 1 across and along what is seen. */
+const inView = () =>
+  page.evaluate(() => {
+    const { scene } = globalThis.page;
+    const { Box3, Vector3 } = globalThis.THREE;
+    const boxes = [scene.vehicle, scene.plan, scene.home].map((object) => new Box3().setFromObject(object));
+    scene.camera.updateMatrixWorld();
+    const corners = ({ min, max }) =>
+      [min.x, max.x].flatMap((x) => [min.y, max.y].flatMap((y) => [min.z, max.z].map((z) => new Vector3(x, y, z))));
+    return [...boxes, scene.trail.box]
+      .filter((box) => !box.isEmpty())
+      .flatMap(corners)
+      .map((corner) => corner.project(scene.camera).toArray());
+  });
+/** Lines of the ground within this part of the canvas: how often neighbouring pixels differ, with the ground alone. */
+const groundLines = (left, top, right, bottom) =>
+  page.evaluate((...part) => {
+    const { scene, canvas } = globalThis.page.scene;
+    const others = scene.children.filter((object) => object !== globalThis.page.scene.ground && object.visible);
+    for (const object of others) object.visible = false;
+    globalThis.page.scene.draw();
+    const copy = Object.assign(document.createElement("canvas"), { width: 400, height: 240 });
+    const context = copy.getContext("2d");
+    context.drawImage(canvas, 0, 0, 400, 240);
+    for (const object of others) object.visible = true;
+    const [x, y, u, v] = part.map((share, i) => Math.round(share * (i % 2 ? 240 : 400)));
+    const { data } = context.getImageData(x, y, u - x, v - y);
+    const pixels = new Uint32Array(data.buffer);
+    return pixels.filter((pixel, i) => i > 0 && pixel !== pixels[i - 1]).length / pixels.length;
+  }, left, top, right, bottom);
+
 await media("light");
 await page.setViewport({ width: 1280, height: 800 });
 await step("the page opens and shows a vehicle", async () => {
@@ -74,6 +105,47 @@ await step("the page opens and shows a vehicle", async () => {
   await until(() => globalThis.page?.frame?.time_s > 0.2, "the first frame");
   assert.ok((await colours()) > 20, "the canvas is empty");
   assert.ok((await page.$$eval(".uplot canvas", (all) => all.length)) >= 8);
+});
+await step("the ground has lines near the vehicle, wherever that is", async () => {
+  for (const [x, y, z, away] of [[0, 0, 1, 5], [300, -80, 2, 5], [0, 40, 60, 80], [0, 0, 0.5, 2]]) {
+    await page.evaluate((place, far) => {
+      const { camera, controls } = globalThis.page.scene;
+      controls.target.set(...place);
+      camera.position.set(place[0] - 0.7 * far, place[1] - 0.6 * far, place[2] + 0.4 * far);
+      controls.update();
+    }, [x, y, z], away);
+    const share = await groundLines(0.2, 0.6, 0.8, 1);
+    assert.ok(share > 0.02, `around ${[x, y, z]} from ${away} m: ${share}`);
+  }
+});
+await step("the ellipsoid leaves a view of the vehicle, however large the uncertainty", async () => {
+  for (const sigma of [1e-4, 0.02, 0.4, 3, 80]) {
+    const [share, number] = await page.evaluate((size) => {
+      const { scene } = globalThis.page;
+      scene.setFollow(true);
+      scene.showSigma({ position_m: scene.at, position_sigma_m: [size, size, 1.5 * size] });
+      const radius = Math.max(...scene.estimate.scale.toArray());
+      const distance = scene.camera.position.distanceTo(scene.controls.target);
+      const half = Math.tan((scene.camera.fov * Math.PI) / 360) * Math.min(scene.camera.aspect, 1);
+      return [radius / (half * distance), Number(document.getElementById("sigmas").textContent)];
+    }, sigma);
+    assert.ok(share < 0.65, `${sigma} m: ${share} of the view`);
+    assert.ok(number <= 3 && (number === 3 || share > 0.1), `${sigma} m: ${number} sigma, ${share} of the view`);
+  }
+});
+await step("every axis has two ticks or more, and what is constant lies within a narrow range", async () => {
+  const axes = await page.evaluate(() =>
+    globalThis.page.charts.shown.map(({ title, least, plot, data }) => {
+      const values = data.slice(1).flat().filter((value) => value !== null);
+      const { min, max } = plot.scales.y;
+      const wide = Math.max(...values, 0) - Math.min(...values, 0);
+      return { title, ticks: plot.axes.map(({ _splits }) => _splits?.length), span: max - min, least, wide };
+    }),
+  );
+  for (const { title, ticks, span, least, wide } of axes) {
+    assert.ok(ticks.every((count) => count >= 2), `${title}: ${ticks} ticks`);
+    assert.ok(span <= Math.max(2 * least, 2 * wide), `${title}: from end to end ${span}, for values over ${wide}`);
+  }
 });
 await step("it asks nobody but its own place", async () => {
   const own = engine === "playground" ? "file:" : new URL(address).origin;
@@ -212,6 +284,21 @@ await step("time stands still and goes on", async () => {
   await page.keyboard.press("Space");
   await until((now) => globalThis.page.frame.time_s > now, "time", then);
 });
+await step("a whole view shows all, in every shape of the page", async () => {
+  await click("#square");
+  await until(() => globalThis.page.frame.fence.length === 1, "the plan");
+  await click("#home-view");
+  for (const [width, height] of [[1280, 800], [390, 844], [1900, 500], [900, 1200]]) {
+    await page.setViewport({ width, height });
+    await later(1);
+    const corners = await inView();
+    assert.ok(corners.length >= 24 && corners.every(([x, y, z]) => Math.abs(x) < 0.99 && Math.abs(y) < 0.99 && z < 1));
+    const fill = Math.max(...corners.flatMap(([x, y]) => [Math.abs(x), Math.abs(y)]));
+    assert.ok(fill > 0.6, `${width} by ${height}: it fills ${fill} of the view`);
+  }
+  await page.setViewport({ width: 1280, height: 800 });
+  await click("#follow");
+});
 await step("a mission within a fence", async () => {
   await click("#square");
   await until(
@@ -231,10 +318,38 @@ await step("lines are answered, and quit is not for pages", async () => {
   await page.keyboard.type("nonsense\n");
   await until(() => /no such command/.test(document.getElementById("texts").innerText), "an error");
 });
+await step("what is done is not in red", async () => {
+  await page.focus("#line");
+  for (const text of ["fault barometer lost 1", "clear", "nonsense"]) await page.keyboard.type(`${text}\n`);
+  await until(() => /no such command.*\s*$/.test(document.getElementById("texts").innerText), "the answers");
+  const lines = await page.$$eval("#texts li", (all) => all.map(({ innerText, className }) => [innerText, className]));
+  const said = (start) => lines.filter(([text]) => text.startsWith(start)).map(([, name]) => name);
+  assert.deepEqual([...new Set(said("ok"))], [""]);
+  assert.deepEqual([...new Set(said("error"))], ["error"]);
+});
 await step("it lands", async () => {
   await page.evaluate(() => document.activeElement.blur());
   await page.keyboard.press("l");
   await until(() => !globalThis.page.frame.armed, "the landing");
+});
+await step("no number and no choice is cut off", async () => {
+  for (const [width, height] of [[1280, 800], [390, 844]]) {
+    await page.setViewport({ width, height });
+    const cut = await page.$$eval("main :is(input[type=number], select)", (fields) => {
+      const pen = document.createElement("canvas").getContext("2d");
+      return fields
+        .filter((field) => {
+          const style = getComputedStyle(field);
+          pen.font = style.font;
+          const texts = field.options ? [...field.options].map(({ text }) => text) : [field.value, field.max, "-12.5"];
+          const inside = field.clientWidth - parseFloat(style.paddingLeft) - parseFloat(style.paddingRight);
+          return Math.max(...texts.map((text) => pen.measureText(text).width)) > inside + 0.5;
+        })
+        .map((field) => `${field.id || field.ariaLabel}: ${field.value}`);
+    });
+    assert.deepEqual(cut, []);
+  }
+  await page.setViewport({ width: 1280, height: 800 });
 });
 await step("a parameter is filtered, changed and shown", async () => {
   await put("filter", "A_ROLL_GAMMA");

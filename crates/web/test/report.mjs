@@ -1,7 +1,9 @@
 // Explores reports in a real browser:
 //
-//   node report.mjs SHOTS FLOWN SUITE RANDOM      reports (report.html) of `sitl fly`, of `sitl compare --suite`, and of
-//                                                 the suite `random`
+//   node report.mjs SHOTS FLOWN SUITE RANDOM COMPARED
+//
+// with the reports (report.html) of `sitl fly`, of `sitl compare --suite`, of the suite `random`, and of `sitl compare`
+// with six seeds or more.
 //
 // Screenshots go to SHOTS.
 import assert from "node:assert/strict";
@@ -9,7 +11,7 @@ import { statSync } from "node:fs";
 import { pathToFileURL } from "node:url";
 import puppeteer from "puppeteer-core";
 
-const [shots, flown, suite, random] = process.argv.slice(2);
+const [shots, flown, suite, random, compared] = process.argv.slice(2);
 const browser = await puppeteer.launch({
   executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium",
   args: ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-gpu-sandbox"],
@@ -114,6 +116,35 @@ await step("a contender that is hidden is hidden everywhere", async () => {
   assert.ok(await pixels(outputs) === before, "shown again");
 });
 
+await step("flights in space fill their frame, in every shape of it", async () => {
+  for (const [width, height] of [[1100, 900], [390, 844], [2000, 500]]) {
+    await page.setViewport({ width, height });
+    const flights = await figure(FLIGHTS);
+    const seen = () => flights.$eval(".space canvas", (canvas) => {
+      // Of a copy: a canvas that is read again and again makes the browser warn.
+      const { width, height } = canvas;
+      const context = Object.assign(document.createElement("canvas"), { width, height }).getContext("2d");
+      context.drawImage(canvas, 0, 0);
+      // What differs from the paper in the corner: ways, floor, vehicles.
+      const pixels = new Uint32Array(context.getImageData(0, 0, width, height).data.buffer);
+      const [across, along] = [new Set(), new Set()];
+      pixels.forEach((pixel, i) => {
+        if (pixel === pixels[0]) return;
+        across.add(i % canvas.width);
+        along.add(Math.floor(i / canvas.width));
+      });
+      const extent = (all) => Math.max(...all) - Math.min(...all);
+      return [extent(across) / canvas.width, extent(along) / canvas.height];
+    });
+    await page.waitForFunction((node, wide) => innerWidth === wide && node.querySelector("canvas").width > 0, {},
+      flights, width);
+    const [across, along] = await seen();
+    assert.ok(Math.max(across, along) > 0.8, `${width} by ${height}: ${across} across, ${along} along`);
+    assert.ok(Math.max(across, along) <= 1);
+  }
+  await page.setViewport({ width: 1100, height: 900 });
+});
+
 await step("flights are flown again in space", async () => {
   const flights = await figure(FLIGHTS);
   const colours = await flights.$eval("canvas", (canvas) => {
@@ -174,10 +205,12 @@ await step("the page of a suite shows where every law stands", async () => {
   await figure(0);
 });
 
-/** Colours in the picture of a scene. */
+/** Colours in the picture of a scene; of a copy, since a canvas that is read again makes the browser warn. */
 const colours = (canvas) => {
-  const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
-  return new Set(new Uint32Array(data.buffer)).size;
+  const { width, height } = canvas;
+  const context = Object.assign(document.createElement("canvas"), { width, height }).getContext("2d");
+  context.drawImage(canvas, 0, 0);
+  return new Set(new Uint32Array(context.getImageData(0, 0, width, height).data.buffer)).size;
 };
 
 await step("a suite's flights are flown again in space, more than a browser has contexts", async () => {
@@ -203,6 +236,14 @@ await step("of drawn flights those that tell most are flown again", async () => 
   const seen = await page.$$eval(".space canvas", (all, colours) => all.map(eval(colours)), `(${colours})`);
   assert.ok(seen.length === 6 && seen.every((colours) => colours > 20), `${seen}`);
   await page.screenshot({ path: `${shots}/report-random.png` });
+});
+
+await step("a comparison's tables are as wide as their page, intervals and all", async () => {
+  await open(compared);
+  const tables = await page.$$eval(".scroll:has(td small)", (all) =>
+    all.map(({ scrollWidth, clientWidth }) => [scrollWidth, clientWidth]));
+  assert.ok(tables.length >= 2 && tables.every(([wide, room]) => wide <= room), JSON.stringify(tables));
+  await page.screenshot({ path: `${shots}/report-compare.png` });
 });
 
 assert.deepEqual(errors, []);

@@ -1,0 +1,104 @@
+//! Places of connections: how many there are, and who has to go for another.
+
+use std::collections::BTreeMap;
+use std::io;
+use std::net::{IpAddr, Shutdown, TcpStream};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Instant;
+
+/// Most pages at a time: sockets of those who may come in.
+pub const PAGES_MAX: usize = 8;
+/// Most other connections at a time.
+const OTHERS_MAX: usize = 32;
+/// Most connections at a time.
+pub const CONNECTIONS_MAX: usize = PAGES_MAX + OTHERS_MAX;
+
+/// The connections that are open.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Places(Arc<Mutex<Vec<Connection>>>);
+
+#[derive(Debug)]
+struct Connection {
+    number: u32,
+    from: IpAddr,
+    stream: TcpStream,
+    /// When a page last said something, or came; none of what is no page, or is one no longer.
+    said: Option<Instant>,
+}
+
+impl Connection {
+    const fn is_page(&self) -> bool {
+        self.said.is_some()
+    }
+}
+
+/// The place of one connection, until it is dropped.
+#[derive(Debug)]
+pub(crate) struct Place {
+    places: Places,
+    number: u32,
+}
+
+impl Places {
+    /// Gives a new connection a place. If too many have not shown that they may come in, it takes the place of the
+    /// oldest of them from the address that has the most: whoever holds many places loses one of them.
+    ///
+    /// # Errors
+    /// The system's.
+    pub(crate) fn enter(&self, number: u32, stream: &TcpStream) -> io::Result<Place> {
+        let (from, stream) = (stream.peer_addr()?.ip(), stream.try_clone()?);
+        let mut open = self.lock();
+        if open.iter().filter(|it| !it.is_page()).count() >= OTHERS_MAX
+            && let Some(place) = last_to_stay(&open)
+        {
+            // Its thread, which may be waiting for it, ends by this.
+            let _ = open.remove(place).stream.shutdown(Shutdown::Both);
+        }
+        open.push(Connection { number, from, stream, said: None });
+        Ok(Place { places: self.clone(), number })
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Vec<Connection>> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Place {
+    /// Makes it the place of a page, if nobody has taken it. Of too many pages the one that has said nothing for the
+    /// longest time is none any longer: eight that are left open, or held, keep nobody out.
+    pub(crate) fn keep(&self) -> bool {
+        let mut open = self.places.lock();
+        let Some(own) = open.iter().position(|it| it.number == self.number) else { return false };
+        if open.iter().filter(|it| it.is_page()).count() >= PAGES_MAX {
+            let silent = open.iter_mut().filter(|it| it.is_page()).min_by_key(|it| it.said);
+            silent.into_iter().for_each(|silent| silent.said = None);
+        }
+        open.get_mut(own).map(|own| own.said = Some(Instant::now())).is_some()
+    }
+
+    /// Notes that the page says something.
+    pub(crate) fn speaks(&self) {
+        let mut open = self.places.lock();
+        let own = open.iter_mut().find(|it| it.number == self.number && it.is_page());
+        own.into_iter().for_each(|own| own.said = Some(Instant::now()));
+    }
+
+    /// False once its place has been taken.
+    pub(crate) fn is_page(&self) -> bool {
+        self.places.lock().iter().any(|it| it.number == self.number && it.is_page())
+    }
+}
+
+impl Drop for Place {
+    fn drop(&mut self) {
+        self.places.lock().retain(|it| it.number != self.number);
+    }
+}
+
+/// Returns the oldest connection of the address that has the most, pages apart.
+fn last_to_stay(open: &[Connection]) -> Option<usize> {
+    let mut counts = BTreeMap::new();
+    open.iter().filter(|it| !it.is_page()).for_each(|it| *counts.entry(it.from).or_insert(0_usize) += 1);
+    let most = counts.into_iter().max_by_key(|(_, count)| *count).map(|(from, _)| from)?;
+    open.iter().position(|it| !it.is_page() && it.from == most)
+}

@@ -1,0 +1,99 @@
+//! Limits of time and of rate.
+
+use std::io::{self, Read, Write};
+use std::net::TcpStream;
+use std::time::{Duration, Instant};
+
+/// A stream that ends at a deadline, however slowly it is read or written until then.
+pub(crate) struct Timed<'a> {
+    stream: &'a mut TcpStream,
+    deadline: Instant,
+}
+
+impl<'a> Timed<'a> {
+    pub(crate) fn new(stream: &'a mut TcpStream, within: Duration) -> Self {
+        Timed { stream, deadline: Instant::now() + within }
+    }
+
+    fn left(&self) -> io::Result<Duration> {
+        let left = self.deadline.saturating_duration_since(Instant::now());
+        if left.is_zero() { Err(io::ErrorKind::TimedOut.into()) } else { Ok(left) }
+    }
+}
+
+impl Read for Timed<'_> {
+    fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
+        self.stream.set_read_timeout(Some(self.left()?))?;
+        self.stream.read(bytes)
+    }
+}
+
+impl Write for Timed<'_> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.stream.set_write_timeout(Some(self.left()?))?;
+        self.stream.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.stream.flush()
+    }
+}
+
+/// Counts events of a second.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Rate {
+    since: Instant,
+    count: u32,
+}
+
+impl Rate {
+    pub(crate) fn new(now: Instant) -> Self {
+        Rate { since: now, count: 0 }
+    }
+
+    /// Counts an event; returns its number in the second that goes on.
+    pub(crate) fn count(&mut self, now: Instant) -> u32 {
+        if now.saturating_duration_since(self.since) >= Duration::from_secs(1) {
+            *self = Rate::new(now);
+        }
+        self.count = self.count.saturating_add(1);
+        self.count
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "tests")]
+mod tests {
+    use super::*;
+    use std::net::{Ipv4Addr, TcpListener};
+
+    /// Whoever takes a byte now and then gets no more time than others.
+    #[test]
+    fn a_slow_reader_or_writer_ends_at_the_deadline() {
+        let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
+        let mut slow = TcpStream::connect(listener.local_addr().unwrap()).unwrap();
+        let (mut stream, _) = listener.accept().unwrap();
+        std::thread::spawn(move || {
+            while slow.read(&mut [0; 1]).is_ok_and(|length| length > 0) && slow.write(&[0]).is_ok() {
+                std::thread::sleep(Duration::from_millis(1));
+            }
+        });
+        let within = Duration::from_millis(200);
+        assert!(Timed::new(&mut stream, within).write_all(&vec![0; 1 << 28]).is_err());
+        let mut timed = Timed::new(&mut stream, within);
+        assert!(std::iter::repeat_with(|| timed.read(&mut [0; 1])).any(|read| read.is_err()));
+    }
+
+    /// As many as are allowed, for ever; one more in a second, never.
+    #[test]
+    fn a_rate_is_of_each_second() {
+        let start = Instant::now();
+        for per_s in [1_u32, 20, 60] {
+            let mut rate = Rate::new(start);
+            let most = (0..per_s * 100).map(|event| rate.count(start + Duration::from_secs(1) * event / per_s));
+            assert_eq!(most.max(), Some(per_s));
+        }
+        let mut rate = Rate::new(start);
+        assert_eq!((0..1000).map(|_| rate.count(start)).max(), Some(1000));
+    }
+}

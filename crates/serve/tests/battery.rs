@@ -1,0 +1,103 @@
+//! The battery's failsafe with its defaults, in closed loop: it warns, brings the vehicle back, and lands it where it
+//! is before nothing is left to land with.
+#![allow(clippy::unwrap_used, clippy::panic, missing_docs, reason = "tests")]
+
+use afbc_guidance::FlightMode;
+use afbc_link::{Address, Command, Datum, Decoder, Downlink, FRAME_MAX, Height, Place, Sender, Uplink};
+use afbc_plant::Battery;
+use afbc_scenario::built_in;
+use afbc_serve::{Server, fleet};
+use afbc_station::services::modes::custom;
+use afbc_station::services::origin::EarthOrigin;
+use nalgebra::Vector3;
+
+const STATION: Address = Address { system: 255, component: 190 };
+/// Times of the orders \[ms\].
+const ARM: u64 = 6_000;
+const TAKE_OFF: u64 = 6_300;
+const GO: u64 = 12_000;
+/// Longest flight \[ms\].
+const END: u64 = 400_000;
+/// Where it is sent \[m\]: so far that the way back takes longer than from critical to almost empty.
+const FAR: [f32; 3] = [200.0, 0.0, 10.0];
+
+/// What is seen in a step.
+#[derive(Clone, Copy, Debug)]
+struct Moment {
+    charge: f64,
+    place_m: Vector3<f64>,
+}
+
+#[test]
+fn an_empty_battery_warns_returns_and_lands() {
+    let mut scenario = fleet(&built_in("outdoor").unwrap().read().unwrap(), 1).unwrap().pop().unwrap();
+    let battery = scenario.realism.rotors.battery.unwrap();
+    scenario.realism.rotors.battery = Some(Battery { initial_charge: 0.2, capacity_a_h: 0.9, ..battery });
+    let (mut server, mut sender) = (Server::new(&[scenario], 1).unwrap(), Sender::new(STATION));
+    let mut decoder = Decoder::<Downlink>::new(STATION);
+    let origin = EarthOrigin::new(EarthOrigin::SIMULATED).unwrap();
+    let [latitude_e7, longitude_e7] = origin.global(&Vector3::from(FAR)).e7();
+    let place = Place { latitude_e7, longitude_e7, height: Height { metres: FAR[2], above: Datum::Home } };
+    let go = Command::Reposition { place, yaw_rad: f32::NAN, speed_m_s: Some(10.0), changes_mode: true };
+
+    // Every mode with the moment at which it is first told; every line on the battery.
+    let (mut modes, mut lines) = (Vec::<(u32, Moment)>::new(), Vec::<(String, Moment)>::new());
+    let mut has_landed = false;
+    for ms in 0..END {
+        let message = match ms {
+            ARM => Some(Uplink::Command(Command::Arm)),
+            TAKE_OFF => Some(Uplink::Command(Command::TakeOff(Height { metres: f32::NAN, above: Datum::Home }))),
+            GO => Some(Uplink::Command(go)),
+            _ if ms % 1_000 == 0 => Some(Uplink::Heartbeat),
+            _ => None,
+        };
+        if let Some(message) = message {
+            server.hear(0, 1, sender.send(&message, &mut [0; FRAME_MAX]));
+        }
+        let plant = server.vehicles().first().unwrap().world().plant();
+        let charge = plant.telemetry().unwrap().battery.unwrap().charge;
+        let moment = Moment { charge, place_m: plant.motion().position_m };
+        let hear = |_, bytes: &[u8]| {
+            decoder.feed(bytes, |_, message| match message {
+                Downlink::Heartbeat { mode, armed: true, .. } if modes.last().is_none_or(|last| last.0 != mode) => {
+                    modes.push((mode, moment));
+                }
+                _ => {}
+            });
+        };
+        let log = |line: &str| {
+            has_landed |= line.ends_with("disarmed");
+            if line.contains("battery") {
+                lines.push((line.to_owned(), moment));
+            }
+        };
+        let _ = server.step(hear, log);
+        if has_landed {
+            break;
+        }
+    }
+    assert!(has_landed, "{modes:?} {lines:?}");
+
+    let told = |what: &str| lines.iter().find(|(line, _)| line.contains(what)).map(|(_, moment)| *moment).unwrap();
+    // A simulated battery's monitor tells whole percents, rounded down.
+    for (what, threshold) in [("battery low", 0.15), ("battery critical", 0.07), ("battery almost empty", 0.05)] {
+        let charge = told(what).charge;
+        assert!((threshold - 0.002..=threshold).contains(&charge), "{what}: {charge} {lines:?}");
+    }
+    let [returns, lands] = [FlightMode::Return, FlightMode::Land].map(|mode| {
+        let first = modes.iter().find(|(told, _)| *told == custom(mode));
+        first.map(|(_, moment)| *moment).unwrap_or_else(|| panic!("{modes:?}"))
+    });
+    // A heartbeat a second tells the mode.
+    for (moment, cause) in [(returns, "battery critical"), (lands, "battery almost empty")] {
+        assert!(moment.charge <= told(cause).charge && told(cause).charge - moment.charge < 0.01, "{modes:?}");
+    }
+    // Low is only told; it came back a good way, landed where it was then, and had something left.
+    assert_eq!(modes.iter().filter(|(_, moment)| (0.07..0.15).contains(&moment.charge)).count(), 0, "{modes:?}");
+    let from_home = |moment: &Moment| moment.place_m.xy().norm();
+    let end = server.vehicles().first().unwrap().world().plant();
+    let landed = Moment { charge: end.telemetry().unwrap().battery.unwrap().charge, place_m: end.motion().position_m };
+    assert!(from_home(&lands) < from_home(&returns) - 20.0 && from_home(&lands) > 20.0, "{returns:?} {lands:?}");
+    assert!((landed.place_m - lands.place_m).xy().norm() < 10.0, "{lands:?} {landed:?}");
+    assert!(landed.charge > 0.0 && landed.place_m.z < 0.3, "{landed:?}");
+}
