@@ -20,6 +20,26 @@ pub enum Error {
         /// Its owner, in words.
         whose: String,
     },
+    /// Another program is writing into the folder.
+    Busy(PathBuf),
+    /// A single file that is there already.
+    Exists {
+        /// Path of the file.
+        path: PathBuf,
+        /// The option that names it.
+        option: &'static str,
+        /// True if the command has `--force`.
+        forcible: bool,
+    },
+    /// A single file that could not be written.
+    File {
+        /// Path of the file.
+        path: PathBuf,
+        /// The option that names it.
+        option: &'static str,
+        /// What is wrong.
+        problem: String,
+    },
     /// The file that records the owner of a folder is damaged.
     Damaged {
         /// Path of the file.
@@ -49,6 +69,18 @@ impl fmt::Display for Error {
                 "{}: {whose}; choose another folder with --out, or replace what is in the way with --force",
                 path.display()
             ),
+            Error::Busy(path) => write!(
+                f,
+                "{}: another program is writing into it; wait until it has ended, or choose another folder with --out",
+                path.display()
+            ),
+            Error::Exists { path, option, forcible } => {
+                let cure = if *forcible { "replace it with --force" } else { "remove that one" };
+                write!(f, "{}: exists already; choose another file for {option}, or {cure}", path.display())
+            }
+            Error::File { path, option, problem } => {
+                write!(f, "{}: cannot be written ({problem}); choose another file for {option}", path.display())
+            }
             Error::Damaged { path, problem } => write!(
                 f,
                 "{}: damaged ({problem}), so the owner of the folder is unknown; choose another folder with --out, or \

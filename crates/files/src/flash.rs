@@ -6,6 +6,9 @@ use embedded_storage::nor_flash::{check_erase, check_read, check_write};
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::Path;
+use std::sync::mpsc::{SyncSender, sync_channel};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::thread::{self, JoinHandle};
 
 /// Bytes of a sector, as the STM32F405's first ones.
 const SECTOR: usize = 16 * 1024;
@@ -13,9 +16,87 @@ const SECTORS: usize = 2;
 
 /// Two sectors of flash in a file, for a store of parameters.
 ///
-/// A write is on the disk before it returns. A program that is killed leaves what a cut of power leaves in a chip.
+/// A write is on the disk before it returns, unless it is [in the background](Self::in_background). A program that is
+/// killed leaves what a cut of power leaves in a chip.
 #[derive(Debug)]
-pub struct Flash(File);
+pub struct Flash {
+    /// What is in the file, or will be: nobody else writes it.
+    bytes: Vec<u8>,
+    disk: Disk,
+}
+
+#[derive(Debug)]
+enum Disk {
+    File(File),
+    Background(Writer),
+}
+
+/// Most writes that wait for a slow disk: a station sets one parameter after the other, each a few writes.
+const WAITING_MAX: usize = 4096;
+
+/// Writes in a thread of its own, in their order, each on the disk before the next. It ends when all is written.
+#[derive(Debug)]
+struct Writer {
+    queue: Option<SyncSender<(u32, Vec<u8>)>>,
+    failure: FlashFailure,
+    thread: Option<JoinHandle<()>>,
+}
+
+/// Why writing in the background has failed. Nothing is written after a failure.
+#[derive(Clone, Debug, Default)]
+pub struct FlashFailure(Arc<Mutex<Failure>>);
+
+#[derive(Debug, Default)]
+struct Failure {
+    has_failed: bool,
+    untold: Option<io::Error>,
+}
+
+impl FlashFailure {
+    /// Returns it, once.
+    pub fn take(&self) -> Option<FlashError> {
+        self.lock().untold.take().map(FlashError::File)
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Failure> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Writer {
+    /// Begins to write by `put`.
+    fn new(mut put: impl FnMut(u32, &[u8]) -> io::Result<()> + Send + 'static) -> io::Result<Self> {
+        let (queue, waiting) = sync_channel::<(u32, Vec<u8>)>(WAITING_MAX);
+        let failure = FlashFailure::default();
+        let told = failure.clone();
+        let thread = thread::Builder::new().name("flash".into()).spawn(move || {
+            for (offset, bytes) in waiting {
+                if let Err(error) = put(offset, &bytes) {
+                    *told.lock() = Failure { has_failed: true, untold: Some(error) };
+                    break;
+                }
+            }
+        })?;
+        Ok(Writer { queue: Some(queue), failure, thread: Some(thread) })
+    }
+
+    /// Lets it be written; never waits.
+    fn put(&self, offset: u32, bytes: &[u8]) -> io::Result<()> {
+        let sent = self.queue.as_ref().map(|queue| queue.try_send((offset, bytes.to_vec())));
+        let mut failure = self.failure.lock();
+        // What follows a gap could be of no use.
+        failure.has_failed |= !matches!(sent, Some(Ok(())));
+        if failure.has_failed { Err(io::Error::other("the disk is too slow, or has failed")) } else { Ok(()) }
+    }
+}
+
+impl Drop for Writer {
+    fn drop(&mut self) {
+        self.queue = None;
+        // The thread has no result.
+        self.thread.take().map(JoinHandle::join);
+    }
+}
 
 /// Why a [`Flash`] failed.
 #[derive(Debug)]
@@ -65,7 +146,7 @@ impl Flash {
     /// # Errors
     /// As [`Flash::open`].
     pub fn known(path: &Path) -> io::Result<Self> {
-        let file = OpenOptions::new().read(true).write(true).open(path)?;
+        let mut file = OpenOptions::new().read(true).write(true).open(path)?;
         file.try_lock().map_err(|error| match error {
             TryLockError::WouldBlock => io::Error::new(io::ErrorKind::WouldBlock, "in use by another program"),
             TryLockError::Error(error) => error,
@@ -75,14 +156,40 @@ impl Flash {
             let problem = format!("no store of parameters: {length} bytes, not {}", SECTORS * SECTOR);
             return Err(io::Error::new(io::ErrorKind::InvalidData, problem));
         }
-        Ok(Flash(file))
+        let mut bytes = vec![0; SECTORS * SECTOR];
+        file.read_exact(&mut bytes)?;
+        Ok(Flash { bytes, disk: Disk::File(file) })
+    }
+
+    /// Writes in the background from now on: no write waits for the disk. All is on it once this is dropped, unless
+    /// that fails.
+    ///
+    /// # Errors
+    /// If the system has no thread for it.
+    pub fn in_background(self) -> io::Result<(Self, FlashFailure)> {
+        let writer = match self.disk {
+            Disk::File(mut file) => Writer::new(move |offset, bytes| put(&mut file, offset, bytes))?,
+            Disk::Background(writer) => writer,
+        };
+        let failure = writer.failure.clone();
+        Ok((Flash { disk: Disk::Background(writer), ..self }, failure))
     }
 
     fn put(&mut self, offset: u32, bytes: &[u8]) -> io::Result<()> {
-        self.0.seek(SeekFrom::Start(offset.into()))?;
-        self.0.write_all(bytes)?;
-        self.0.sync_data()
+        match &mut self.disk {
+            Disk::File(file) => put(file, offset, bytes)?,
+            Disk::Background(writer) => writer.put(offset, bytes)?,
+        }
+        let held = self.bytes.iter_mut().skip(offset as usize);
+        held.zip(bytes).for_each(|(held, byte)| *held = *byte);
+        Ok(())
     }
+}
+
+fn put(file: &mut File, offset: u32, bytes: &[u8]) -> io::Result<()> {
+    file.seek(SeekFrom::Start(offset.into()))?;
+    file.write_all(bytes)?;
+    file.sync_data()
 }
 
 impl ErrorType for Flash {
@@ -94,8 +201,9 @@ impl ReadNorFlash for Flash {
 
     fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), FlashError> {
         check_read(self, offset, bytes.len())?;
-        self.0.seek(SeekFrom::Start(offset.into()))?;
-        Ok(self.0.read_exact(bytes)?)
+        let held = self.bytes.iter().skip(offset as usize);
+        bytes.iter_mut().zip(held).for_each(|(to, held)| *to = *held);
+        Ok(())
     }
 
     fn capacity(&self) -> usize {
@@ -119,5 +227,67 @@ impl NorFlash for Flash {
         self.read(offset, &mut held)?;
         held.iter_mut().zip(bytes).for_each(|(to, from)| *to &= from);
         Ok(self.put(offset, &held)?)
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "tests")]
+mod tests {
+    use super::*;
+    use std::sync::mpsc::{Receiver, Sender, channel};
+
+    /// Offset and bytes of a write.
+    type Written = (u32, Vec<u8>);
+
+    /// Flash on a disk that takes a write for each `true`, and fails for a `false`; and what it has taken.
+    fn slow() -> (Flash, Sender<bool>, Receiver<Written>) {
+        let ((go, wait), (put, taken)) = (channel(), channel());
+        let writer = Writer::new(move |offset, bytes: &[u8]| match wait.recv() {
+            Ok(true) => put.send((offset, bytes.to_vec())).map_err(io::Error::other),
+            _ => Err(io::ErrorKind::StorageFull.into()),
+        });
+        let flash = Flash { bytes: vec![0xFF; SECTORS * SECTOR], disk: Disk::Background(writer.unwrap()) };
+        (flash, go, taken)
+    }
+
+    /// A disk that takes nothing holds nobody up: what is written is read at once, and written in its order later.
+    #[test]
+    fn no_write_waits_for_a_slow_disk() {
+        let (flash, go, taken) = slow();
+        let (mut flash, failure) = flash.in_background().unwrap();
+        flash.erase(0, SECTOR as u32).unwrap();
+        let places: Vec<u32> = (0..100).map(|place| 4 * ((7 * place) % 100)).collect();
+        places.iter().for_each(|place| flash.write(*place, &[*place as u8; 4]).unwrap());
+        // Bits are cleared only.
+        flash.write(4, &[1; 4]).unwrap();
+        let mut read = [0; 8];
+        flash.read(4, &mut read).unwrap();
+        assert_eq!(read, [0, 0, 0, 0, 8, 8, 8, 8]);
+        assert!(taken.try_recv().is_err() && failure.take().is_none());
+        (0..102).for_each(|_| go.send(true).unwrap());
+        drop(flash);
+        let all: Vec<(u32, Vec<u8>)> = taken.iter().collect();
+        assert_eq!(all.iter().map(|(place, _)| *place).skip(1).collect::<Vec<_>>(), [places, vec![4]].concat());
+        assert_eq!(all.last().unwrap().1, [0; 4]);
+    }
+
+    /// A failure is told once, and nothing is written behind the gap; so is a disk that takes nothing for ever.
+    #[test]
+    fn a_failure_is_told_once() {
+        let (flash, go, taken) = slow();
+        let (mut flash, failure) = flash.in_background().unwrap();
+        go.send(false).unwrap();
+        flash.write(0, &[1; 4]).unwrap();
+        while !failure.lock().has_failed {
+            thread::yield_now();
+        }
+        assert!(failure.take().is_some() && failure.take().is_none());
+        assert!(flash.write(4, &[1; 4]).is_err() && taken.try_recv().is_err());
+
+        let (mut flash, go, taken) = slow();
+        let written = (0..2 * WAITING_MAX as u32).take_while(|_| flash.write(8, &[0; 4]).is_ok()).count();
+        assert!((WAITING_MAX..WAITING_MAX + 2).contains(&written), "{written}");
+        (0..written).for_each(|_| go.send(true).unwrap());
+        assert!(taken.recv().is_ok() && flash.write(12, &[0; 4]).is_err());
     }
 }

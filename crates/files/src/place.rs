@@ -7,8 +7,35 @@ use std::path::Path;
 /// Prefix of the names of temporary files.
 pub(crate) const HIDDEN: &str = ".sitl.";
 
-/// Writes the file at `path` as [`Folder::place`](crate::Folder::place) does.
-pub fn place(path: &Path, fill: impl FnOnce(&mut (dyn Write + Send)) -> io::Result<()>) -> io::Result<()> {
+/// Lets a function write to a file.
+type Fill<'a> = &'a mut (dyn Write + Send);
+
+/// Writes the file at `path` as [`Folder::place`](crate::Folder::place) does, in place of any other.
+///
+/// # Errors
+/// If it cannot be written; what was there before is there still.
+pub fn place(path: &Path, fill: impl FnOnce(Fill<'_>) -> io::Result<()>) -> io::Result<()> {
+    by_way_of(path, fill, |temporary| fs::rename(temporary, path))
+}
+
+/// As [`place`], where there must be no file.
+pub(crate) fn fresh(path: &Path, fill: impl FnOnce(Fill<'_>) -> io::Result<()>) -> io::Result<()> {
+    by_way_of(path, fill, |temporary| match fs::hard_link(temporary, path) {
+        // Some file systems have no links.
+        Err(error) if error.kind() != io::ErrorKind::AlreadyExists => {
+            File::create_new(path)?;
+            fs::rename(temporary, path)
+        }
+        linked => linked.map(|()| drop(fs::remove_file(temporary))),
+    })
+}
+
+/// Lets `fill` write a temporary file beside `path`, and `settle` give it its name.
+fn by_way_of(
+    path: &Path,
+    fill: impl FnOnce(Fill<'_>) -> io::Result<()>,
+    settle: impl FnOnce(&Path) -> io::Result<()>,
+) -> io::Result<()> {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let temporary = path.with_file_name(format!("{HIDDEN}{name}.{}.tmp", std::process::id()));
     // A killed program of the same process id may have left one; usually there is nothing to remove.
@@ -21,7 +48,7 @@ pub fn place(path: &Path, fill: impl FnOnce(&mut (dyn Write + Send)) -> io::Resu
         filled.map_err(|error| disk.cause(error))?;
         disk.file.sync_all()
     });
-    written.and_then(|()| fs::rename(&temporary, path)).inspect_err(|_| {
+    written.and_then(|()| settle(&temporary)).inspect_err(|_| {
         // Nothing more can be done if this fails too.
         let _ = fs::remove_file(&temporary);
     })

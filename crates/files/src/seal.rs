@@ -3,7 +3,7 @@
 //! Near its end the file holds `xxh64:` and 16 digits: its own XXH64, computed with 16 zeros in their place.
 
 use core::hash::Hasher;
-use std::fs;
+use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::Path;
 use twox_hash::XxHash64;
@@ -76,9 +76,38 @@ pub fn json(out: &mut dyn Write, value: &impl serde::Serialize) -> io::Result<()
 /// # Errors
 /// If it cannot be read.
 pub fn hash_of_file(path: &Path) -> io::Result<String> {
-    let mut hash = XxHash64::with_seed(0);
-    hash.write(&fs::read(path)?);
-    Ok(format!("xxh64:{:016x}", hash.finish()))
+    let mut out = Hashing::new(io::sink());
+    io::copy(&mut File::open(path)?, &mut out)?;
+    Ok(out.finish())
+}
+
+/// Passes on the data written to it, and hashes them.
+pub(crate) struct Hashing<W> {
+    out: W,
+    hash: XxHash64,
+}
+
+impl<W> Hashing<W> {
+    pub(crate) fn new(out: W) -> Self {
+        Hashing { out, hash: XxHash64::with_seed(0) }
+    }
+
+    /// Returns the hash, as [`hash_of_file`] does.
+    pub(crate) fn finish(self) -> String {
+        format!("xxh64:{:016x}", self.hash.finish())
+    }
+}
+
+impl<W: Write> Write for Hashing<W> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let written = self.out.write(bytes)?;
+        self.hash.write(bytes.get(..written).unwrap_or_default());
+        Ok(written)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.out.flush()
+    }
 }
 
 /// Checks that a sealed file is unchanged.

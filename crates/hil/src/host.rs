@@ -6,7 +6,7 @@ use crate::host_black_box::{HostBlackBox, Sink};
 use crate::metadata::MetadataFiles;
 use crate::served_files::{OpenFile, ServedFiles};
 use crate::simulated_escs::SimulatedEscs;
-use crate::ulog_files::StoredLogs;
+use crate::stored_logs::StoredLogs;
 use afbc::AdaptiveEstimate;
 use afbc_estimator::Origin;
 use afbc_files::Flash;
@@ -189,6 +189,11 @@ impl Host {
         let mut comms = Comms::with(setup);
         comms.set_signing(self.comms.signing().clone());
         Host { setup, comms, ..self }
+    }
+
+    /// True if frames need a signature.
+    pub fn needs_signatures(&self) -> bool {
+        self.comms.signing().is_on()
     }
 
     /// Returns the half that communicates.

@@ -29,6 +29,7 @@ mod report;
 mod served_files;
 mod simulated_escs;
 mod station;
+mod stored_logs;
 mod ulog_files;
 
 #[cfg(test)]
@@ -48,4 +49,5 @@ pub use report::tracking;
 pub use served_files::{OpenFile, ServedFiles};
 pub use simulated_escs::SimulatedEscs;
 pub use station::{ReceivedMessages, Station};
-pub use ulog_files::{StoredLogs, UlogFiles};
+pub use stored_logs::StoredLogs;
+pub use ulog_files::UlogFiles;

@@ -1,29 +1,33 @@
 //! CSV log of a flight in the loop.
 
 use super::Error;
+use afbc_files::BackgroundWriter;
 use afbc_sim::columns::MOTION;
 use afbc_sim::flight::Sample;
 use csv::Writer;
 use std::fs::File;
-use std::path::Path;
 
 /// Steps per row: 100 Hz.
 const EVERY: u64 = 10;
+/// Most bytes that wait for a slow disk: minutes of a flight.
+const ROOM: usize = 1 << 22;
 
-/// Writes a row every 10 ms with the vehicle's true motion, the reference, and the rotor speeds from the link.
+/// Writes a row every 10 ms with the vehicle's true motion, the reference, and the rotor speeds from the link. No step
+/// waits for the disk.
 pub struct Log {
-    rows: Writer<File>,
+    rows: Writer<BackgroundWriter>,
     steps: u64,
     rotors: usize,
 }
 
 impl Log {
-    /// Creates the file at `path` for a vehicle with this number of rotors, overwriting an existing one.
+    /// Begins the log of a vehicle with this number of rotors in an empty file.
     ///
     /// # Errors
     /// [`Error::Log`].
-    pub fn create(path: &Path, rotors: usize) -> Result<Self, Error> {
-        let mut rows = Writer::from_path(path)?;
+    pub fn new(file: File, rotors: usize) -> Result<Self, Error> {
+        let file = BackgroundWriter::new(file, ROOM).map_err(csv::Error::from)?;
+        let mut rows = Writer::from_writer(file);
         let names = MOTION.iter().map(|(name, _)| (*name).to_owned());
         rows.write_record(names.chain((1..=rotors).map(|rotor| format!("omega{rotor}_rad_s"))))?;
         Ok(Log { rows, steps: 0, rotors })
@@ -48,7 +52,8 @@ impl Log {
     ///
     /// # Errors
     /// [`Error::Log`].
-    pub fn finish(mut self) -> Result<(), Error> {
-        self.rows.flush().map_err(|error| Error::Log(error.into()))
+    pub fn finish(self) -> Result<(), Error> {
+        let file = self.rows.into_inner().map_err(|error| error.into_error());
+        file.and_then(|file| file.finish(None)).map_err(|error| Error::Log(error.into()))
     }
 }

@@ -1,20 +1,22 @@
 //! What a host serves of files: the component's metadata in `/etc`, its logs in `/log`, and the log that is streamed.
 
 use crate::host_black_box::HostBlackBox;
-use crate::ulog_files::StoredLogs;
+use crate::stored_logs::StoredLogs;
 use afbc_link::FtpError;
 use afbc_station::services::storage::{
     DirectoryEntry, FileAccess, FileChange, FilePath, FileStore, LogInfo, LogSource, LogStore,
 };
-use std::fs::{self, File};
+use std::fs::File;
 use std::io::{ErrorKind, Read, Seek, SeekFrom};
-use std::path::PathBuf;
+use std::rc::Rc;
 use std::task::Poll;
 use std::time::UNIX_EPOCH;
 
 /// Directory of the metadata, and of the logs.
 const ETC: &str = "etc";
 const LOG: &str = "log";
+/// Most logs that are erased at a time.
+const ERASED_MAX: usize = 16;
 
 /// The files of a host. Nothing of them can be written; logs can be removed, except the one that is being written.
 #[derive(Default)]
@@ -23,11 +25,12 @@ pub struct ServedFiles {
     etc: Vec<(String, Vec<u8>)>,
     logs: Option<StoredLogs>,
     open: Vec<Option<Opened>>,
-    /// Entries of the directory that was listed last.
-    listed: (String, Vec<DirectoryEntry>),
-    /// The logs as they were counted last, and the one that is read.
-    counted: Vec<PathBuf>,
+    /// The logs as they were listed and counted last, and the one that is read.
+    listed: Rc<Vec<String>>,
+    counted: Rc<Vec<String>>,
     reading: Option<(u16, File)>,
+    /// The logs that are yet to be erased, and whether one of them could not be.
+    erasing: Option<(Vec<String>, bool)>,
     /// True while a log is to be streamed; the black box that makes it, once there is one.
     streams: bool,
     stream: Option<HostBlackBox>,
@@ -55,33 +58,20 @@ impl ServedFiles {
         self.streams.then(|| self.stream.get_or_insert_with(begin))
     }
 
-    fn list_logs(&self) -> Vec<PathBuf> {
-        self.logs.as_ref().map_or_else(Vec::new, StoredLogs::list)
-    }
-
-    /// Returns the log called so.
-    fn find_log(&self, name: &str) -> Result<PathBuf, FtpError> {
-        // Among those that are there, so that no name leads out of the folder.
-        let named = |path: &PathBuf| path.file_name().is_some_and(|own| own == name);
-        self.list_logs().into_iter().find(named).ok_or(FtpError::FILE_NOT_FOUND)
+    fn names(&self) -> Rc<Vec<String>> {
+        self.logs.as_ref().map_or_else(Rc::default, StoredLogs::names)
     }
 
     fn find_etc(&self, name: &str) -> Result<usize, FtpError> {
         self.etc.iter().position(|(own, _)| own == name).ok_or(FtpError::FILE_NOT_FOUND)
     }
 
-    fn entries(&self, directory: &str) -> Result<Vec<DirectoryEntry>, FtpError> {
-        // A name that does not fit, or is no text, is left out.
-        let entry = |name: &str, size| Some(DirectoryEntry { name: name.try_into().ok()?, size });
-        Ok(match directory {
-            "" => [ETC, LOG].iter().filter_map(|name| entry(name, None)).collect(),
-            ETC => self.etc.iter().filter_map(|(name, bytes)| entry(name, Some(bytes.len() as u32))).collect(),
-            LOG => {
-                let logs = self.list_logs().into_iter();
-                logs.filter_map(|path| entry(path.file_name()?.to_str()?, Some(size(&path)))).collect()
-            }
-            _ => return Err(FtpError::FILE_NOT_FOUND),
-        })
+    /// Opens the log called so; returns its size, too.
+    fn open_log(&self, name: &str) -> Result<(File, u32), FtpError> {
+        let logs = self.logs.as_ref().ok_or(FtpError::FILE_NOT_FOUND)?;
+        let file = logs.open(name).map_err(|error| refusal(&error))?;
+        let size = file.metadata().map_or(0, |data| size(data.len()));
+        Ok((file, size))
     }
 }
 
@@ -98,9 +88,8 @@ impl FileStore for ServedFiles {
                 (Opened::Etc(place), self.etc.get(place).map_or(0, |(_, bytes)| bytes.len() as u32))
             }
             Some((LOG, name)) => {
-                let path = self.find_log(name)?;
-                let size = size(&path);
-                (Opened::Log(File::open(path).map_err(|error| refusal(&error))?), size)
+                let (file, size) = self.open_log(name)?;
+                (Opened::Log(file), size)
             }
             _ => return Err(FtpError::FILE_NOT_FOUND),
         };
@@ -130,12 +119,21 @@ impl FileStore for ServedFiles {
     }
 
     fn entry(&mut self, directory: &FilePath, place: u32) -> Result<Option<DirectoryEntry>, FtpError> {
-        let directory = directory.as_str();
-        // Kept from part to part of a listing: a log that comes or goes meanwhile must not shift the places.
-        if place == 0 || self.listed.0 != directory {
-            self.listed = (directory.into(), self.entries(directory)?);
-        }
-        Ok(self.listed.1.get(place as usize).cloned())
+        let at = place as usize;
+        let entry = |name: &str, size| Some(DirectoryEntry { name: name.try_into().ok()?, size });
+        Ok(match directory.as_str() {
+            "" => [ETC, LOG].get(at).and_then(|name| entry(name, None)),
+            ETC => self.etc.get(at).and_then(|(name, bytes)| entry(name, Some(size(bytes.len() as u64)))),
+            LOG => {
+                // Kept from part to part of a listing: a log that comes or goes meanwhile must not shift the places.
+                if at == 0 {
+                    self.listed = self.names();
+                }
+                let data = |name| self.logs.as_ref()?.metadata(name).ok();
+                self.listed.get(at).and_then(|name| entry(name, Some(data(name).map_or(0, |data| size(data.len())))))
+            }
+            _ => return Err(FtpError::FILE_NOT_FOUND),
+        })
     }
 
     fn change(&mut self, change: FileChange<'_>) -> Result<(), FtpError> {
@@ -143,11 +141,11 @@ impl FileStore for ServedFiles {
         match path.as_str().split_once('/') {
             Some((ETC, name)) => self.find_etc(name).and(Err(FtpError::FILE_PROTECTED)),
             Some((LOG, name)) => {
-                let path = self.find_log(name)?;
-                if self.logs.as_ref().is_some_and(|logs| logs.is_current(&path)) {
+                let logs = self.logs.as_ref().ok_or(FtpError::FILE_NOT_FOUND)?;
+                if logs.is_current(name) {
                     return Err(FtpError::FILE_PROTECTED);
                 }
-                fs::remove_file(path).map_err(|error| refusal(&error))
+                logs.remove(name).map_err(|error| refusal(&error))
             }
             _ => Err(FtpError::FILE_NOT_FOUND),
         }
@@ -156,19 +154,18 @@ impl FileStore for ServedFiles {
 
 impl LogStore for ServedFiles {
     fn count_logs(&mut self) -> Poll<u16> {
-        self.counted = self.list_logs();
+        (self.counted, self.reading) = (self.names(), None);
         // LOG_ENTRY has 16 bits for their number.
-        self.counted.truncate(u16::MAX.into());
-        self.reading = None;
-        Poll::Ready(self.counted.len() as u16)
+        Poll::Ready(u16::try_from(self.counted.len()).unwrap_or(u16::MAX))
     }
 
     fn log(&mut self, place: u16) -> Poll<Option<LogInfo>> {
-        let data = self.counted.get(usize::from(place)).and_then(|path| path.metadata().ok());
+        let named = self.logs.as_ref().zip(self.counted.get(usize::from(place)));
+        let data = named.and_then(|(logs, name)| logs.metadata(name).ok());
         Poll::Ready(data.map(|data| {
             let written = data.modified().ok().and_then(|at| at.duration_since(UNIX_EPOCH).ok());
             let utc_s = written.map_or(0, |since| u32::try_from(since.as_secs()).unwrap_or(0));
-            LogInfo { size: u32::try_from(data.len()).unwrap_or(u32::MAX), utc_s }
+            LogInfo { size: size(data.len()), utc_s }
         }))
     }
 
@@ -178,17 +175,25 @@ impl LogStore for ServedFiles {
             let _ = self.count_logs();
         }
         if !matches!(&self.reading, Some((open, _)) if *open == place) {
-            let file = self.counted.get(usize::from(place)).and_then(|path| File::open(path).ok());
-            self.reading = file.map(|file| (place, file));
+            let opened = self.counted.get(usize::from(place)).and_then(|name| self.open_log(name).ok());
+            self.reading = opened.map(|(file, _)| (place, file));
         }
         Poll::Ready(self.reading.as_mut().map_or(0, |(_, file)| read(file, offset, into).unwrap_or(0)))
     }
 
     fn erase_logs(&mut self) -> Poll<bool> {
         let Some(logs) = &self.logs else { return Poll::Ready(false) };
-        (self.reading, self.counted) = (None, Vec::new());
-        let old = logs.list().into_iter().filter(|path| !logs.is_current(path));
-        Poll::Ready(old.filter(|path| fs::remove_file(path).is_err()).count() == 0)
+        (self.reading, self.counted) = (None, Rc::default());
+        let old = || (logs.names().iter().filter(|name| !logs.is_current(name)).cloned().collect(), false);
+        let (names, failed) = self.erasing.get_or_insert_with(old);
+        for name in names.drain(names.len().saturating_sub(ERASED_MAX)..) {
+            // One that a station has removed meanwhile is erased, too.
+            *failed |= logs.remove(&name).is_err_and(|error| error.kind() != ErrorKind::NotFound);
+        }
+        if !names.is_empty() {
+            return Poll::Pending;
+        }
+        Poll::Ready(self.erasing.take().is_none_or(|(_, failed)| !failed))
     }
 }
 
@@ -213,9 +218,9 @@ impl LogSource for ServedFiles {
     }
 }
 
-/// Returns the size of a file; of what is beyond 4 GB, the end is not served.
-fn size(path: &PathBuf) -> u32 {
-    fs::metadata(path).map_or(0, |data| u32::try_from(data.len()).unwrap_or(u32::MAX))
+/// Returns the size of a file as stations know it; of what is beyond 4 GB, the end is not served.
+fn size(bytes: u64) -> u32 {
+    u32::try_from(bytes).unwrap_or(u32::MAX)
 }
 
 /// Reads as much as there is and fits.

@@ -1,21 +1,33 @@
 //! The black box in files: one for each start of the vehicle.
 
 use crate::log_file::LogFile;
-use std::fs;
-use std::io;
+use crate::stored_logs::StoredLogs;
+use afbc_files::{Error, Output};
 use std::path::{Path, PathBuf};
-use std::time::SystemTime;
+
+/// Logs of earlier starts that may still be on their way to the disk.
+const ENDING_MAX: usize = 8;
+/// Most starts that are logged: stations may ask for any number of them.
+const STARTS_MAX: u32 = 1000;
+/// Numbers of files that are tried, one after the other, until one is free.
+const NUMBERS_TRIED: u32 = 1000;
 
 /// The ULog of a vehicle. A log that cannot be written any more ends, and the flight goes on.
 #[derive(Clone, Debug)]
 pub struct UlogFiles {
     place: LogPlace,
+    stored: StoredLogs,
+    is_live: bool,
     /// That of the last start.
     path: PathBuf,
     /// Number of starts.
     starts: u32,
     /// The last start's, until it has failed.
     file: Option<LogFile>,
+    /// Those of earlier starts that are not written yet.
+    ending: Vec<(PathBuf, LogFile)>,
+    /// A failure of which nobody knows yet, and the first of all.
+    untold: Option<String>,
     failure: Option<String>,
 }
 
@@ -24,17 +36,8 @@ pub struct UlogFiles {
 enum LogPlace {
     /// In a file for the first start; the others are beside it.
     File(PathBuf),
-    /// In a folder, with those of all earlier runs.
-    Folder(PathBuf),
-}
-
-/// The logs of a vehicle that are there, for stations to download.
-#[derive(Clone, Debug)]
-pub struct StoredLogs {
-    place: LogPlace,
-    starts: u32,
-    /// The one that is being written.
-    current: PathBuf,
+    /// In a folder, with those of all earlier runs, by number; the last one.
+    Folder(PathBuf, u32),
 }
 
 impl UlogFiles {
@@ -44,10 +47,26 @@ impl UlogFiles {
     /// # Errors
     /// One line on why it cannot be created.
     pub fn create(path: &Path) -> Result<Self, String> {
-        let place = if path.is_dir() { LogPlace::Folder(path.into()) } else { LogPlace::File(path.into()) };
-        let path = place.of_start(1);
-        let file = create(&path)?;
-        Ok(UlogFiles { place, path, starts: 1, file: Some(file), failure: None })
+        let (mut place, stored) = if path.is_dir() {
+            let stored = StoredLogs::read(path);
+            let number = |name: &String| name.strip_prefix("log")?.strip_suffix(".ulg")?.parse::<u32>().ok();
+            // By the largest number and not by how many there are: stations may have erased some.
+            let last = stored.names().iter().filter_map(number).max().unwrap_or(0);
+            (LogPlace::Folder(path.into(), last), stored)
+        } else {
+            let folder = path.parent().unwrap_or(Path::new(""));
+            (LogPlace::File(path.into()), StoredLogs::none_in(folder))
+        };
+        let (path, file) = place.create(1)?;
+        stored.begin(&path);
+        let (ending, untold, failure) = (Vec::new(), None, None);
+        Ok(UlogFiles { place, stored, is_live: false, path, starts: 1, file: Some(file), ending, untold, failure })
+    }
+
+    /// The same of a flight that goes on by itself ([`LogFile::live`]).
+    #[must_use]
+    pub fn live(self) -> Self {
+        UlogFiles { is_live: true, file: self.file.map(LogFile::live), ..self }
     }
 
     /// Returns what takes the bytes of a host ([`Host::log`](crate::Host::log)).
@@ -62,98 +81,101 @@ impl UlogFiles {
 
     /// Returns the logs that there are.
     pub fn stored(&self) -> StoredLogs {
-        StoredLogs { place: self.place.clone(), starts: self.starts, current: self.path.clone() }
+        self.stored.clone()
     }
 
-    /// Ends the file, and creates that of the next start.
+    /// Ends the file, and creates that of the next start. Waits for no disk.
     pub fn next_start(&mut self) {
-        let ended = self.end();
-        self.starts += 1;
-        self.path = self.place.of_start(self.starts);
-        match create(&self.path) {
-            Ok(file) => self.file = Some(file),
-            Err(error) => self.failure = Some(error),
+        self.look();
+        if let Some(file) = self.file.take() {
+            file.close();
+            self.ending.push((self.path.clone(), file));
         }
-        self.failure = ended.err().or(self.failure.take());
+        self.starts += 1;
+        let refused = match () {
+            () if self.starts > STARTS_MAX => Some("there were too many starts"),
+            () if self.ending.len() > ENDING_MAX => Some("the logs of earlier starts are not written yet"),
+            () => None,
+        };
+        if let Some(why) = refused {
+            return self.fail(format!("this start is not logged: {why}"));
+        }
+        match self.place.create(self.starts) {
+            Ok((path, file)) => {
+                self.stored.begin(&path);
+                self.path = path;
+                self.file = Some(if self.is_live { file.live() } else { file });
+            }
+            Err(error) => self.fail(error),
+        }
     }
 
     /// Returns a line on why the log has ended early, once.
     pub fn take_failure(&mut self) -> Option<String> {
-        if let Some(failure) = self.file.as_ref().and_then(LogFile::take_failure) {
-            self.file = None;
-            self.failure = Some(ended(&self.path, &failure));
-        }
-        self.failure.take()
+        self.look();
+        self.untold.take()
     }
 
     /// Writes what is left.
     ///
     /// # Errors
-    /// A line on why the log has ended early, unless that was told.
+    /// A line on why a log has ended early, told or not.
     pub fn finish(mut self) -> Result<(), String> {
-        self.end()?;
+        self.end();
         self.failure.map_or(Ok(()), Err)
     }
 
-    fn end(&mut self) -> Result<(), String> {
-        let finished = self.file.take().map_or(Ok(()), |file| file.finish());
-        finished.map_err(|error| ended(&self.path, &error.to_string()))
+    /// Writes what is left; returns a line on why a log has ended early, unless that was told.
+    pub fn end(&mut self) -> Option<String> {
+        let last = self.file.take().map(|file| (self.path.clone(), file));
+        for (path, file) in self.ending.split_off(0).into_iter().chain(last) {
+            if let Err(error) = file.finish() {
+                self.fail(ended(&path, &error.to_string()));
+            }
+        }
+        self.untold.take()
+    }
+
+    /// Notes what has failed, and forgets what is written.
+    fn look(&mut self) {
+        if let Some(failure) = self.file.as_ref().and_then(LogFile::take_failure) {
+            self.file = None;
+            self.fail(ended(&self.path, &failure));
+        }
+        for (path, file) in self.ending.extract_if(.., |(_, file)| file.is_over()).collect::<Vec<_>>() {
+            if let Some(failure) = file.take_failure() {
+                self.fail(ended(&path, &failure));
+            }
+        }
+    }
+
+    fn fail(&mut self, line: String) {
+        self.failure.get_or_insert_with(|| line.clone());
+        self.untold = Some(line);
     }
 }
 
 impl LogPlace {
-    /// Returns the path of a start's file.
-    fn of_start(&self, start: u32) -> PathBuf {
-        match self {
-            LogPlace::File(path) => numbered(path, start),
-            LogPlace::Folder(folder) => {
-                let number = |path: &PathBuf| path.file_stem()?.to_str()?.strip_prefix("log")?.parse::<u32>().ok();
-                // By the largest number and not by how many there are: stations may have erased some.
-                let last = logs_in(folder).iter().filter_map(number).max().unwrap_or(0);
-                folder.join(format!("log{:03}.ulg", last.saturating_add(1)))
+    /// Creates a start's file.
+    fn create(&mut self, start: u32) -> Result<(PathBuf, LogFile), String> {
+        let mut tried = 0;
+        loop {
+            let path = match self {
+                LogPlace::File(path) => numbered(path, start),
+                LogPlace::Folder(folder, last) => {
+                    *last = last.saturating_add(1);
+                    folder.join(format!("log{last:03}.ulg"))
+                }
+            };
+            tried += 1;
+            match Output::new(&path, "--ulog").and_then(|output| LogFile::create(&output)) {
+                Ok(file) => return Ok((path, file)),
+                // Somebody else logs into the folder, too.
+                Err(Error::Exists { .. }) if matches!(self, LogPlace::Folder(..)) && tried < NUMBERS_TRIED => {}
+                Err(error) => return Err(error.to_string()),
             }
         }
     }
-}
-
-impl StoredLogs {
-    /// Returns the logs, the oldest first.
-    pub fn list(&self) -> Vec<PathBuf> {
-        match &self.place {
-            LogPlace::File(path) => {
-                (1..=self.starts).map(|start| numbered(path, start)).filter(|path| path.is_file()).collect()
-            }
-            LogPlace::Folder(folder) => logs_in(folder),
-        }
-    }
-
-    /// True of the log that is being written.
-    pub fn is_current(&self, path: &Path) -> bool {
-        path == self.current
-    }
-}
-
-/// Returns the logs in a folder, the oldest first.
-fn logs_in(folder: &Path) -> Vec<PathBuf> {
-    let Ok(entries) = fs::read_dir(folder) else { return Vec::new() };
-    let paths = entries.filter_map(|entry| Some(entry.ok()?.path()));
-    let is_log = |path: &PathBuf| path.extension().is_some_and(|extension| extension == "ulg") && path.is_file();
-    let written = |path: &PathBuf| path.metadata().and_then(|data| data.modified()).unwrap_or(SystemTime::UNIX_EPOCH);
-    let mut logs: Vec<_> = paths.filter(is_log).map(|path| (written(&path), path)).collect();
-    logs.sort();
-    logs.into_iter().map(|(_, path)| path).collect()
-}
-
-fn create(path: &Path) -> Result<LogFile, String> {
-    LogFile::create_new(path).map_err(|error| {
-        let path = path.display();
-        match error.kind() {
-            io::ErrorKind::AlreadyExists => {
-                format!("{path}: exists already; choose another file for --ulog, or remove that one")
-            }
-            _ => format!("{path}: cannot be written ({error}); choose another file for --ulog"),
-        }
-    })
 }
 
 fn ended(path: &Path, problem: &str) -> String {

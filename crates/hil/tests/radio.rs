@@ -243,6 +243,41 @@ fn a_flight_by_a_stations_channels() {
     assert!(!flier.armed());
 }
 
+/// What a station does not send any more is lost as a stick is, whatever else it sends: one stick is centred, and with
+/// nothing but "leave alone" in every channel the pilot is lost.
+#[test]
+fn channels_that_are_not_refreshed_are_lost() {
+    const ALONE: u16 = u16::MAX;
+    let mut flier = Flier::new(11, silent(), 4, false);
+    flier.channels.us[THROTTLE] = 1000;
+    relayed(&mut flier, 1_000);
+    flier.channels.us[ARM] = 2000;
+    relayed(&mut flier, 300);
+    flier.channels.us[THROTTLE] = 1900;
+    relayed(&mut flier, 5_000);
+    flier.channels.us[THROTTLE] = 1500;
+    flier.channels.us[PITCH] = 1800;
+    relayed(&mut flier, 3_000);
+    let moved_m = |flier: &mut Flier, us: [u16; 18]| {
+        let before_m = flier.position_m();
+        let message = Uplink::Target(ExternalTarget::Channels(ChannelsOverride::new(us)));
+        (0..3_000).for_each(|ms| flier.tick((ms % 40 == 0).then_some(&message)));
+        (flier.position_m() - before_m).norm()
+    };
+    let all = flier.channels.us;
+    assert!(moved_m(&mut flier, all) > 4.0);
+    let mut others = flier.channels.us;
+    others[PITCH] = ALONE;
+    moved_m(&mut flier, others);
+    assert!(moved_m(&mut flier, others) < 1.0, "centred");
+    assert_eq!((flier.mode(), flier.armed()), (FlightMode::Position, true));
+    relayed(&mut flier, 2_000);
+    moved_m(&mut flier, [ALONE; 18]);
+    assert_eq!((flier.mode(), flier.armed()), (FlightMode::Hold, true));
+    assert!(flier.says("radio: lost"));
+    assert!(moved_m(&mut flier, [ALONE; 18]) < 1.0, "holds");
+}
+
 /// Two receivers on one transmitter, of which either falls silent in turn, or both at once for a while.
 #[test]
 fn a_receiver_that_switches_is_flown_with() {

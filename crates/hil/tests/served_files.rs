@@ -178,3 +178,67 @@ fn metadata_describes_every_parameter() {
     assert_eq!((&mass["units"], &mass["min"], &mass["max"]), (&"kg".into(), &0.01.into(), &500.0.into()));
     assert_eq!((&mass["shortDesc"], &mass["default"]), (&"m: mass of the vehicle".into(), &0.486.into()));
 }
+
+/// A symbolic link in the folder is nobody's log: neither one that was there nor one that takes a log's place.
+#[cfg(unix)]
+#[test]
+fn links_are_not_served() {
+    use std::os::unix::fs::symlink;
+    let (folder, elsewhere) = (folder("links"), folder("links-elsewhere"));
+    fs::write(elsewhere.join("secret.ulg"), "secret").expect("written");
+    fs::write(folder.join("one.ulg"), "one").expect("written");
+    symlink(elsewhere.join("secret.ulg"), folder.join("secret.ulg")).expect("linked");
+    symlink(folder.join("one.ulg"), folder.join("also.ulg")).expect("linked");
+    symlink(&elsewhere, folder.join("folder.ulg")).expect("linked");
+    symlink(folder.join("nothing"), folder.join("log001.ulg")).expect("linked");
+    let logs = UlogFiles::create(&folder).expect("created");
+    let mut files = ServedFiles::new(Some(logs.stored()), Vec::new());
+    assert_eq!(names(&mut files, "log"), [("one.ulg".into(), Some(3)), ("log002.ulg".into(), Some(0))]);
+    for name in ["secret.ulg", "also.ulg", "folder.ulg", "folder.ulg/secret.ulg", "log001.ulg"] {
+        assert_eq!(read(&mut files, &format!("log/{name}")), Err(FtpError::FILE_NOT_FOUND), "{name}");
+        assert!(files.change(FileChange::Remove(&path(&format!("log/{name}")))).is_err(), "{name}");
+    }
+    // Swapped while it is served, also for what would be waited for.
+    let fifo =
+        |path: &PathBuf| assert!(std::process::Command::new("mkfifo").arg(path).status().expect("run").success());
+    let swaps: [&dyn Fn(&PathBuf); 2] =
+        [&|path| symlink(elsewhere.join("secret.ulg"), path).expect("linked"), &|path| fifo(path)];
+    for swap in swaps {
+        fs::remove_file(folder.join("one.ulg")).expect("removed");
+        swap(&folder.join("one.ulg"));
+        assert_eq!(read(&mut files, "log/one.ulg"), Err(FtpError::FILE_NOT_FOUND));
+        assert_eq!((files.count_logs(), files.log(0)), (Poll::Ready(2), Poll::Ready(None)));
+        assert_eq!(files.read_log(0, 0, &mut [0; 90]), Poll::Ready(0));
+    }
+    assert_eq!(files.erase_logs(), Poll::Ready(true));
+    assert!(elsewhere.join("secret.ulg").exists() && folder.join("secret.ulg").exists());
+}
+
+/// The folder is read at the start alone: what others put there later is not seen, however often somebody asks. What
+/// the vehicle writes is seen at once.
+#[test]
+fn the_folder_is_read_once() {
+    let folder = folder("read-once");
+    (0..1000).for_each(|number| fs::write(folder.join(format!("old{number}.ulg")), "old").expect("written"));
+    let mut logs = UlogFiles::create(&folder).expect("created");
+    let mut files = ServedFiles::new(Some(logs.stored()), Vec::new());
+    fs::write(folder.join("later.ulg"), "later").expect("written");
+    assert_eq!((files.count_logs(), names(&mut files, "log").len()), (Poll::Ready(1001), 1001));
+    assert_eq!(read(&mut files, "log/later.ulg"), Err(FtpError::FILE_NOT_FOUND));
+    logs.next_start();
+    assert_eq!((files.count_logs(), names(&mut files, "log").len()), (Poll::Ready(1002), 1002));
+    assert_eq!(read(&mut files, "log/log002.ulg"), Ok(Vec::new()));
+    // A listing that is under way keeps its places.
+    let tenth = files.entry(&path("log"), 10);
+    files.change(FileChange::Remove(&path("log/old999.ulg"))).expect("removed");
+    assert_eq!(files.entry(&path("log"), 10), tenth);
+    // Erased in parts, each soon done.
+    let mut parts = 0;
+    while files.erase_logs() == Poll::Pending {
+        parts += 1;
+        assert!(parts < 1000);
+    }
+    assert!(parts > 20, "{parts}");
+    assert_eq!(names(&mut files, "log"), [("log002.ulg".into(), Some(0))]);
+    assert!(folder.join("later.ulg").exists() && !folder.join("old0.ulg").exists());
+}

@@ -30,7 +30,7 @@ const NOISE: [f32; 2] = [0.02, 1.0];
 const HOVERS_MS: u64 = 12_000;
 /// What a flight may be off from where it was \[m\], and its largest tilt \[rad\]: 30 deg/s or 0.5 g are hidden for
 /// half a second, and what they have led to is braked.
-const OFF_M: f64 = 3.0;
+const OFF_M: f64 = 4.0;
 const TILT_RAD: f64 = 1.3;
 /// Flights with a wrong sensor.
 const CASES: usize = 64;

@@ -32,7 +32,9 @@ impl LogColumns {
         let bytes = fs::read(path).map_err(unread)?;
         let tables = match bytes.as_slice() {
             [b'P', b'A', b'R', b'1', ..] => crate::parquet::read(bytes).map_err(fault)?,
-            [0x89, b'M', b'C', b'A', b'P', ..] => crate::mcap::read(&bytes).map_err(fault)?,
+            [0x89, b'M', b'C', b'A', b'P', ..] => {
+                crate::mcap::check(&bytes).and_then(|()| crate::mcap::read(&bytes)).map_err(fault)?
+            }
             [b'U', b'L', b'o', b'g', ..] => crate::mcap::read_ulog(path)?,
             _ => crate::csv::read(&bytes).map_err(fault)?,
         };

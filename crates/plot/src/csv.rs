@@ -1,10 +1,12 @@
 //! CSV files with a head.
 
 use crate::table::LogTable;
+use afbc_reader::Separated;
 
 /// Reads the only table of a file: a column of which no field is a number is one of words.
 pub(crate) fn read(bytes: &[u8]) -> Result<Vec<LogTable>, String> {
-    let mut reader = csv::Reader::from_reader(bytes);
+    let form = Separated::of(bytes);
+    let mut reader = csv::ReaderBuilder::new().delimiter(form.separator).from_reader(bytes);
     let bad = |error: csv::Error| match error.position() {
         Some(place) => {
             format!("line {}: not a CSV file ({error}); give CSV with a head, Parquet, ULog or MCAP", place.line())
@@ -19,7 +21,7 @@ pub(crate) fn read(bytes: &[u8]) -> Result<Vec<LogTable>, String> {
     }
     let mut table = LogTable::default();
     for (head, fields) in heads.into_iter().zip(fields) {
-        let numbers: Vec<f64> = fields.iter().map(|field| field.parse().unwrap_or(f64::NAN)).collect();
+        let numbers: Vec<f64> = fields.iter().map(|field| form.number(field).unwrap_or(f64::NAN)).collect();
         if !fields.is_empty() && numbers.iter().all(|number| number.is_nan()) {
             table.words.push((head, fields));
         } else {

@@ -46,10 +46,9 @@ impl Axis {
     }
 
     fn ticks(&self, most: usize) -> Ticks {
-        if self.is_logarithmic && self.high > 10.0 * self.low {
-            return Ticks::logarithmic(self.low, self.high, most);
-        }
-        Ticks::linear(self.low, self.high, most)
+        let powers = self.is_logarithmic.then(|| Ticks::logarithmic(self.low, self.high, most));
+        // Between two powers of ten there may be one or none of them.
+        powers.filter(|ticks| ticks.marks.len() > 1).unwrap_or_else(|| Ticks::linear(self.low, self.high, most))
     }
 }
 
@@ -176,7 +175,9 @@ fn frame(
     shapes.push(title);
     if is_last {
         for (value, label) in &x_ticks.marks {
-            let place = (x.at(*value), y.from_pt + TICK_PT + 1.1 * font_pt);
+            // A long number at the right end stays within the figure.
+            let last_pt = figure.width_mm * PT_PER_MM - 0.5 * width_pt(label, font_pt);
+            let place = (x.at(*value).min(last_pt), y.from_pt + TICK_PT + 1.1 * font_pt);
             shapes.push(text(label, place, font_pt, TextAnchor::Middle));
         }
         let place = (0.5 * (x.from_pt + x.to_pt), y.from_pt + TICK_PT + 2.5 * font_pt);
@@ -261,6 +262,7 @@ fn range(panel: &FigurePanel, [from, to]: [f64; 2], is_logarithmic: bool) -> Res
         return Ok([low / room, high * room]);
     }
     // A constant has no range, and a constant of zero no size either.
-    let room = (ROOM * (high - low)).max(1e-3 * low.abs().max(high.abs())).max(1e-9);
+    let least = if low == 0.0 && high == 0.0 { 1.0 } else { 1e-9 };
+    let room = (ROOM * (high - low)).max(1e-3 * low.abs().max(high.abs())).max(least);
     Ok([low - room, high + room])
 }

@@ -1,9 +1,10 @@
 //! MCAP files whose messages are as ROS 2 writes them (CDR, schemas in `ros2msg`); ULogs by way of them.
 
 use crate::table::LogTable;
-use ::mcap::{Channel, MessageStream};
+use ::mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
+use ::mcap::{Channel, McapError, MessageStream};
 use afbc_reader::FileError;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 use std::io::Cursor;
 use std::path::Path;
 use std::sync::Arc;
@@ -25,14 +26,11 @@ pub(crate) fn read_ulog(path: &Path) -> Result<Vec<LogTable>, FileError> {
 
 /// Reads the topics of a file; those that are written otherwise are left out.
 pub(crate) fn read(bytes: &[u8]) -> Result<Vec<LogTable>, String> {
-    let damaged = |error: ::mcap::McapError| {
-        format!("cannot be read as MCAP ({error}); give an uncompressed one, as `sitl mcap` writes them")
-    };
     let mut topics: BTreeMap<u16, Option<(Layout, Topic)>> = BTreeMap::new();
     let mut start = None;
     let mut others = Vec::new();
-    for message in MessageStream::new(bytes).map_err(damaged)? {
-        let message = message.map_err(damaged)?;
+    for message in MessageStream::new(bytes).map_err(refused)? {
+        let message = message.map_err(refused)?;
         let start = *start.get_or_insert(message.log_time);
         let channel = &message.channel;
         let known = topics.entry(channel.id).or_insert_with(|| {
@@ -55,11 +53,41 @@ pub(crate) fn read(bytes: &[u8]) -> Result<Vec<LogTable>, String> {
     Ok(tables)
 }
 
+/// Checks that a file is whole, by the checksums in it.
+pub(crate) fn check(mut bytes: &[u8]) -> Result<(), String> {
+    let options = LinearReaderOptions::default().with_validate_chunk_crcs(true).with_validate_data_section_crc(true);
+    let mut reader = LinearReader::new_with_options(options);
+    while let Some(event) = reader.next_event() {
+        if let LinearReadEvent::ReadRequest(wanted) = event.map_err(refused)? {
+            let (now, rest) = bytes.split_at(wanted.min(bytes.len()));
+            reader.insert(now.len()).copy_from_slice(now);
+            reader.notify_read(now.len());
+            bytes = rest;
+        }
+    }
+    Ok(())
+}
+
+/// Says why a file is not drawn, and what helps: one that is not whole is not drawn as if it were.
+fn refused(error: McapError) -> String {
+    match error {
+        McapError::UnsupportedCompression(by) => {
+            format!("is compressed by {by}; give an uncompressed one, as `mcap compress --compression none` writes it")
+        }
+        McapError::UnexpectedEof | McapError::UnexpectedEoc | McapError::BadFooter => {
+            "is cut: it ends within a record; copy it again, or mend it with `mcap recover`".into()
+        }
+        error => format!("is damaged ({error}); copy it again, or mend it with `mcap recover`"),
+    }
+}
+
 /// The columns of a topic while it is read.
 #[derive(Default)]
 struct Topic {
     times_s: Vec<f64>,
     columns: Vec<(String, Vec<f64>)>,
+    /// Where in them each name is.
+    places: HashMap<String, usize>,
 }
 
 impl Topic {
@@ -69,8 +97,8 @@ impl Topic {
         for (place, (name, value)) in values.into_iter().enumerate() {
             // Usually each message has the same fields.
             let known = self.columns.get(place).filter(|(known, _)| *known == name).map(|_| place);
-            let known = known.or_else(|| self.columns.iter().position(|(known, _)| *known == name));
-            let known = known.unwrap_or_else(|| {
+            let known = known.or_else(|| self.places.get(&name).copied()).unwrap_or_else(|| {
+                self.places.insert(name.clone(), self.columns.len());
                 self.columns.push((name, Vec::new()));
                 self.columns.len() - 1
             });

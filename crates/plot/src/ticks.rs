@@ -7,31 +7,44 @@ pub(crate) struct Ticks {
     pub(crate) marks: Vec<(f64, String)>,
 }
 
+/// Steps within a power of ten.
+const FACTORS: [f64; 3] = [1.0, 2.0, 5.0];
+
+fn power_of_ten(power: i32) -> f64 {
+    libm::pow(10.0, f64::from(power))
+}
+
 impl Ticks {
-    /// Returns at most `most` ticks from `low` to `high`: multiples of 1, 2 or 5 times a power of ten.
+    /// Returns ticks from `low` to `high`: two at least and, from two on, at most `most`, at equal multiples of 1, 2 or
+    /// 5 times a power of ten.
     pub(crate) fn linear(low: f64, high: f64, most: usize) -> Self {
-        let span = high - low;
-        if !(span > 0.0 && span.is_finite()) {
+        let rough = libm::log10((high - low) / most.max(1) as f64);
+        if !rough.is_finite() {
             return Ticks { marks: Vec::new() };
         }
-        let least = span / most.max(1) as f64;
-        let power = libm::floor(libm::log10(least)) as i32;
-        let steps = (power..power + 2).flat_map(|power| [(1.0, power), (2.0, power), (5.0, power)]);
-        let fits = |(factor, power): &(f64, i32)| {
-            let step = factor * libm::pow(10.0, f64::from(*power));
-            libm::floor(high / step) - libm::ceil(low / step) < most as f64
-        };
-        let Some((factor, power)) = steps.into_iter().find(fits) else { return Ticks { marks: Vec::new() } };
-        let step = factor * libm::pow(10.0, f64::from(power));
-        let decimals = usize::try_from(-power).unwrap_or(0);
+        let step = |n: i32| FACTORS.get(n.rem_euclid(3) as usize).unwrap_or(&1.0) * power_of_ten(n.div_euclid(3));
         // An end that is a multiple itself counts in spite of rounding.
-        let (first, last) = (libm::ceil(low / step - 1e-9) as i64, libm::floor(high / step + 1e-9) as i64);
+        let ends = |n: i32| (libm::ceil(low / step(n) - 1e-9), libm::floor(high / step(n) + 1e-9));
+        let count = |n: i32| {
+            let (first, last) = ends(n);
+            last - first + 1.0
+        };
+        let mut n = 3 * libm::floor(rough) as i32;
+        while count(n) > most.max(1) as f64 {
+            n += 1;
+        }
+        while count(n) < 2.0 {
+            n -= 1;
+        }
+        let ((first, _), count) = (ends(n), count(n) as usize);
+        let decimals = usize::try_from(-n.div_euclid(3)).unwrap_or(0);
         let large = low.abs().max(high.abs()) >= 1e5 || decimals > 5;
-        let mark = |number: i64| {
-            let value = number as f64 * step;
+        let mark = |i: usize| {
+            let value = (first + i as f64) * step(n);
             (value, if large { scientific(value) } else { label(value, decimals) })
         };
-        Ticks { marks: (first..=last).map(mark).collect() }
+        // The next wider step may leave one: then some of the narrower are left out.
+        Ticks { marks: (0..count).step_by(count.div_ceil(most.max(2))).map(mark).collect() }
     }
 
     /// Returns ticks at the powers of ten from `low` to `high`, both positive; every second, third and so on if there
@@ -39,7 +52,7 @@ impl Ticks {
     pub(crate) fn logarithmic(low: f64, high: f64, most: usize) -> Self {
         let (first, last) = (libm::ceil(libm::log10(low) - 1e-9) as i32, libm::floor(libm::log10(high) + 1e-9) as i32);
         let every = 1 + usize::try_from(last - first).unwrap_or(0) / most.max(1);
-        let mark = |power: i32| (libm::pow(10.0, f64::from(power)), format!("10{}", raised(power)));
+        let mark = |power: i32| (power_of_ten(power), format!("10{}", raised(power)));
         Ticks { marks: (first..=last).step_by(every).map(mark).collect() }
     }
 }
@@ -58,7 +71,7 @@ fn scientific(value: f64) -> String {
     }
     let text = format!("{value:e}");
     let (digits, power) = text.split_once('e').unwrap_or((&text, "0"));
-    let rounded = format!("{:.3}", digits.parse::<f64>().unwrap_or_default());
+    let rounded = format!("{:.9}", digits.parse::<f64>().unwrap_or_default());
     let digits = rounded.trim_end_matches('0').trim_end_matches('.').replace('-', "−");
     format!("{digits}·10{}", raised(power.parse().unwrap_or_default()))
 }
@@ -79,6 +92,8 @@ fn raised(power: i32) -> String {
 mod tests {
     #![expect(clippy::unwrap_used, reason = "tests")]
     use super::*;
+    use proptest::prelude::*;
+    use std::collections::HashSet;
 
     #[test]
     fn ticks_are_round_within_the_axis_and_few() {
@@ -98,6 +113,24 @@ mod tests {
         }
         assert_eq!(Ticks::linear(1.0, 1.0, 5).marks, []);
         assert_eq!(Ticks::linear(f64::NAN, 1.0, 5).marks, []);
+    }
+
+    proptest! {
+        /// Whatever an axis shows, and however few labels fit.
+        #[test]
+        fn every_axis_has_two_ticks_with_labels_of_their_own(
+            sign in prop::sample::select(vec![-1.0, 0.0, 1.0]), offset in -12.0..9.0f64, span in -12.0..9.0f64,
+            most in 2_usize..11,
+        ) {
+            let low = sign * libm::pow(10.0, offset.min(span + 6.0));
+            let high = low + libm::pow(10.0, span);
+            let marks = Ticks::linear(low, high, most).marks;
+            prop_assert!((2..=most).contains(&marks.len()), "{low} to {high}, {most}: {marks:?}");
+            let room = 1e-6 * (high - low);
+            prop_assert!(marks.iter().all(|(value, _)| (low - room..=high + room).contains(value)), "{marks:?}");
+            let distinct: HashSet<_> = marks.iter().map(|(_, label)| label).collect();
+            prop_assert_eq!(distinct.len(), marks.len(), "{:?}", marks);
+        }
     }
 
     #[test]

@@ -79,6 +79,35 @@ fn everything_lies_within_the_width_asked_for() {
     }
 }
 
+/// Constants, noise about one, and narrow times: each axis has two labels or more, all within the figure.
+#[test]
+fn every_axis_has_ticks_within_the_figure() {
+    for (value, width_mm, [from, to]) in
+        [(0.0, 88.0, [0.0, 10.0]), (12.6, 40.0, [3.0, 3.00001]), (-3e-7, 40.0, [0.9, 3.1]), (2e6, 60.0, [1e4, 1.9e4])]
+    {
+        let lines = vec![vec![(from, value), (to, value)]];
+        let constant = PanelLine { lines, band: Vec::new(), ..sine("constant", RED, 0.0) };
+        for is_logarithmic in [false, true].into_iter().filter(|is_logarithmic| !is_logarithmic || value > 0.0) {
+            let panels = vec![FigurePanel { y_title: "value".into(), lines: vec![constant.clone()] }];
+            let text = svg(&PaperFigure { panels, is_logarithmic, ..figure(width_mm, 1) });
+            let document = Document::parse(&text).unwrap();
+            let width = number(document.root_element(), "width");
+            let labels = |anchor: &str| -> Vec<_> {
+                let texts = document.descendants().filter(|node| node.tag_name().name() == "text");
+                let upright = texts.filter(|node| node.attribute("transform").is_none());
+                upright.filter(|node| node.attribute("text-anchor") == Some(anchor)).collect()
+            };
+            assert!(labels("end").len() >= 2, "{value}: {text}");
+            // The title is one of those in the middle.
+            assert!(labels("middle").len() >= 3, "{from} to {to}: {text}");
+            for label in labels("middle") {
+                let half = 0.29 * number(label, "font-size") * label.text().unwrap().chars().count() as f64;
+                assert!(number(label, "x") + half <= width, "{:?}", label.text());
+            }
+        }
+    }
+}
+
 /// The line's highest point is at the top of the panel, and half the range as far down as it should be.
 #[test]
 fn values_lie_where_the_axis_says() {
@@ -164,6 +193,22 @@ fn what_cannot_be_drawn_is_refused() {
     assert!(negative.write(FigureFormat::Svg).unwrap_err().contains("positive"));
 }
 
+/// Semicolons with decimal commas, as spreadsheets write where a comma is decimal, and tabs.
+#[test]
+fn a_log_may_be_separated_otherwise() {
+    let folder = folder();
+    let read = |name: &str, text: &str| {
+        let path = folder.join(name);
+        fs::write(&path, text).unwrap();
+        LogColumns::read(&path).unwrap().points("time_s", "x_m").unwrap()
+    };
+    let expected = read("commas.csv", "time_s,x_m,y_m\n0,1.5,2\n0.25,-3e-1,2\n");
+    assert_eq!(expected[&None], [(0.0, 1.5), (0.25, -0.3)]);
+    assert_eq!(read("semicolons.csv", "time_s;x_m;y_m\n0;1,5;2\n0,25;-3e-1;2\n"), expected);
+    assert_eq!(read("dots.csv", "time_s;x_m;y_m\n0;1.5;2\n0.25;-3e-1;2\n"), expected);
+    assert_eq!(read("tabs.csv", "time_s\tx_m\ty_m\n0\t1.5\t2\n0.25\t-0.3\t2\n"), expected);
+}
+
 #[test]
 fn columns_are_found_by_name_or_refused_in_one_line() {
     let folder = folder();
@@ -191,6 +236,6 @@ fn columns_are_found_by_name_or_refused_in_one_line() {
     let mcap = [0x89, b'M', b'C', b'A', b'P', b'0', b'\r', b'\n', 1, 2, 3];
     fs::write(&path, mcap).unwrap();
     let error = LogColumns::read(&path).unwrap_err().to_string();
-    assert!(error.contains("cannot be read as MCAP") && error.lines().count() == 1, "{error}");
+    assert!(error.contains("is cut: ") && error.lines().count() == 1, "{error}");
     assert!(LogColumns::read(&folder.join("nothing")).unwrap_err().to_string().contains("cannot be read"));
 }

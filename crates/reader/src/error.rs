@@ -2,25 +2,114 @@
 
 use std::fmt;
 
-/// An error as one line: `FILE:LINE: KEY: problem; remedy`. An unreadable file has no line and no key.
+/// Mistakes in a file, each as one line: `FILE:LINE: KEY: problem; remedy`. An unreadable file has no line and no key.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FileError {
+    first: Mistake,
+    others: Vec<Mistake>,
+}
+
+/// One mistake.
+#[derive(Clone, Debug, PartialEq, Eq)]
+struct Mistake {
     file: String,
     line: Option<usize>,
     key: String,
     problem: String,
+    /// Where the file that was being read has it, if it is in one part of it.
+    place: Option<Box<Place>>,
+}
+
+/// Where a mistake is in a file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Place {
+    pub(crate) file: String,
+    /// Dotted key.
+    pub(crate) key: String,
+    /// Byte of the text, and its line.
+    pub(crate) at: usize,
+    pub(crate) line: usize,
+    /// Where the table of the key begins.
+    pub(crate) table: usize,
+    pub(crate) fault: Fault,
+}
+
+/// What is wrong with a key.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) enum Fault {
+    /// Its value.
+    Value,
+    /// Its value is none of the options: of the most similar one, or of all.
+    Choice(Vec<&'static str>),
+    /// It is not there.
+    Missing,
+    /// Nobody knows it; what it should be called, if it is misspelt.
+    Unknown(Option<&'static str>),
+    /// How its value goes with those under these dotted keys, or without any with the others of its table.
+    Clash(&'static [&'static str]),
 }
 
 impl FileError {
     /// Creates an error about the file as a whole.
     pub fn whole(file: &str, problem: impl Into<String>) -> Self {
-        FileError { file: file.into(), line: None, key: String::new(), problem: problem.into() }
+        let (file, problem) = (file.into(), problem.into());
+        FileError::of(Mistake { file, line: None, key: String::new(), problem, place: None })
     }
 
     /// Creates an error at byte `at` of `text`; `key` is empty if it concerns no key.
     pub fn at(source: Source<'_>, at: usize, key: impl Into<String>, problem: impl Into<String>) -> Self {
-        let line = 1 + source.text.bytes().take(at).filter(|&byte| byte == b'\n').count();
-        FileError { file: source.file.into(), line: Some(line), key: key.into(), problem: problem.into() }
+        let line = source.line(at);
+        let (file, key): (String, String) = (source.file.into(), key.into());
+        let place = Place { file: file.clone(), key: key.clone(), at, line, table: 0, fault: Fault::Value };
+        let place = Some(Box::new(place)).filter(|place| !place.key.is_empty());
+        FileError::of(Mistake { file, line: Some(line), key, problem: problem.into(), place })
+    }
+
+    const fn of(first: Mistake) -> Self {
+        FileError { first, others: Vec::new() }
+    }
+
+    /// Returns all mistakes of a file as one error, in its order. There must be one.
+    pub(crate) fn all(errors: Vec<FileError>) -> Self {
+        let mistakes = errors.into_iter().flat_map(|FileError { first, others }| [first].into_iter().chain(others));
+        let mut mistakes: Vec<Mistake> = mistakes.collect();
+        mistakes.sort_by_key(|mistake| mistake.place.as_ref().map(|place| place.line));
+        let mut mistakes = mistakes.into_iter();
+        let first = mistakes.next().unwrap_or_else(|| FileError::whole("file", "cannot be read").first);
+        FileError { first, others: mistakes.collect() }
+    }
+
+    /// Returns both errors as one.
+    #[must_use]
+    pub fn and(mut self, other: FileError) -> Self {
+        let more = [other.first].into_iter().chain(other.others);
+        let is_new = |mistake: &Mistake| *mistake != self.first && !self.others.contains(mistake);
+        let more: Vec<_> = more.filter(is_new).collect();
+        self.others.extend(more);
+        self
+    }
+
+    /// Returns the line of the first mistake.
+    pub(crate) const fn line(&self) -> Option<usize> {
+        self.first.line
+    }
+
+    /// Returns where the first mistake is.
+    pub(crate) fn place(&self) -> Option<&Place> {
+        self.first.place.as_deref()
+    }
+
+    /// Says what is wrong with the key of the first mistake.
+    pub(crate) fn because(mut self, fault: Fault) -> Self {
+        self.first.place.iter_mut().for_each(|place| place.fault = fault.clone());
+        self
+    }
+
+    /// Changes where the mistakes are, which does not show.
+    pub(crate) fn placed(mut self, change: impl Fn(&mut Option<Box<Place>>)) -> Self {
+        change(&mut self.first.place);
+        self.others.iter_mut().for_each(|other| change(&mut other.place));
+        self
     }
 }
 
@@ -33,7 +122,21 @@ pub struct Source<'a> {
     pub text: &'a str,
 }
 
+impl Source<'_> {
+    /// Returns the line of the byte `at`.
+    pub(crate) fn line(&self, at: usize) -> usize {
+        1 + self.text.bytes().take(at).filter(|&byte| byte == b'\n').count()
+    }
+}
+
 impl fmt::Display for FileError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.first.fmt(f)?;
+        self.others.iter().try_for_each(|other| write!(f, "\n{other}"))
+    }
+}
+
+impl fmt::Display for Mistake {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let mut line = self.file.clone();
         if let Some(number) = self.line {

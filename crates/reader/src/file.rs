@@ -2,6 +2,7 @@
 
 use super::error::{FileError, Source};
 use super::heirs;
+use super::mistakes::read_all;
 use super::table::Table;
 use std::fs::File;
 use std::io::{self, Read};
@@ -38,19 +39,27 @@ pub fn text(path: &Path, kind: &str) -> Result<String, FileError> {
     })
 }
 
-/// Parses the `text` of a TOML file with `read`; `sitl SAMPLE` prints a valid one.
+/// A valid file of a kind.
+#[derive(Clone, Copy, Debug)]
+pub struct Example {
+    /// What `sitl` prints it by.
+    pub command: &'static str,
+    /// Its text, from which required tables are taken to read on behind a mistake in one.
+    pub text: &'static str,
+}
+
+/// Parses the `text` of a TOML file with `read`.
 ///
 /// # Errors
-/// If it is not TOML, and the errors of `read`.
+/// If it is not TOML; or every mistake that `read` finds, going on behind each of them.
 pub fn document<T>(
     file: &str,
     text: &str,
-    sample: &str,
-    read: impl FnOnce(Table<'_>) -> Result<T, FileError>,
+    sample: Example,
+    read: impl Fn(Table<'_>) -> Result<T, FileError>,
 ) -> Result<T, FileError> {
     let source = Source { file, text };
-    let document = DeTable::parse(text).map_err(|error| syntax(source, &error, sample))?;
-    read(Table::root(source, document.get_ref()))
+    read_all(source, parsed(source, sample)?, sample.text, read)
 }
 
 /// As [`document`], where a table of the list `list` may say `like = "NAME"`: it takes over what an earlier one of this
@@ -61,14 +70,38 @@ pub fn document<T>(
 pub fn document_with_heirs<T>(
     file: &str,
     text: &str,
-    sample: &str,
+    sample: Example,
     (list, own): (&str, &[&str]),
-    read: impl FnOnce(Table<'_>) -> Result<T, FileError>,
+    read: impl Fn(Table<'_>) -> Result<T, FileError>,
 ) -> Result<T, FileError> {
     let source = Source { file, text };
-    let mut document = DeTable::parse(text).map_err(|error| syntax(source, &error, sample))?;
-    heirs::inherit(document.get_mut(), list, own);
-    read(Table::root(source, document.get_ref()))
+    let mut document = parsed(source, sample)?;
+    heirs::inherit(&mut document, list, own);
+    read_all(source, document, sample.text, read)
+}
+
+/// Parses the text.
+///
+/// # Errors
+/// Every place that is not TOML.
+fn parsed<'t>(source: Source<'t>, sample: Example) -> Result<DeTable<'t>, FileError> {
+    let (document, errors) = DeTable::parse_recoverable(source.text);
+    // Keys of a table that is there twice are there twice as well.
+    let (mut twice, mut told) = (Vec::new(), Vec::new());
+    for error in &errors {
+        let at = error.span().unwrap_or_default().start;
+        let head = head(source.text, at);
+        match error.message().starts_with("duplicate key") {
+            true if twice.contains(&head) => continue,
+            true if head.1 == source.line(at) => twice.push(head),
+            _ => {}
+        }
+        told.push(error);
+    }
+    let mut errors: Vec<_> = told.into_iter().map(|error| syntax(source, error, sample.command)).collect();
+    // Behind one on a line, the others follow from it.
+    errors.dedup_by_key(|error| error.line());
+    if errors.is_empty() { Ok(document.into_inner()) } else { Err(FileError::all(errors)) }
 }
 
 /// Returns name and description; the name is `name` if the file has none.
@@ -86,6 +119,14 @@ pub fn title(root: &mut Table<'_>, name: &str) -> Result<[String; 2], FileError>
         return Err(root.fault_at("description", "it has line breaks or control characters; make it one plain line"));
     }
     Ok([name, description])
+}
+
+/// Returns the head of the table that the byte `at` is in, and its line; empty before the first.
+fn head(text: &str, at: usize) -> (&str, usize) {
+    let line = text.bytes().take(at).filter(|byte| *byte == b'\n').count();
+    let lines = text.lines().enumerate().take(line + 1);
+    let heads = lines.filter(|(_, text)| text.trim_start().starts_with('['));
+    heads.last().map_or(("", 0), |(number, text)| (text, number + 1))
 }
 
 /// Returns the error of a text that is not TOML.

@@ -1,6 +1,6 @@
 //! Typed access to TOML: every value is checked as it is read, and unknown keys are refused.
 
-use super::error::{FileError, Source};
+use super::error::{Fault, FileError, Place, Source};
 use super::words::{self, nearest, one_of};
 use afbc_types::{Declaration, Declared, Range, ValueMut};
 use nalgebra::Vector3;
@@ -9,6 +9,15 @@ use toml::de::{DeTable, DeValue};
 
 /// Largest length of an array of tables that is searched in each step of a flight.
 const MOST: usize = 100;
+
+/// What the reader overlooks since it was told: dotted keys, and where their tables begin.
+#[derive(Clone, Default)]
+pub(crate) struct Overlooked {
+    /// Those that were taken out: a reader that needs them gets any value.
+    pub(crate) keys: Vec<(String, usize)>,
+    /// Those that do not go with others.
+    pub(crate) clashes: Vec<(String, usize)>,
+}
 
 /// One table of a document, and its keys read so far.
 pub struct Table<'a> {
@@ -21,12 +30,13 @@ pub struct Table<'a> {
     read: Vec<&'static str>,
     /// Declared keys among those read, with their unit symbols.
     units: Vec<(&'static str, &'static str)>,
+    overlooked: &'a Overlooked,
 }
 
 impl<'a> Table<'a> {
     /// Returns the document as a table.
-    pub fn root(source: Source<'a>, entries: &'a DeTable<'a>) -> Self {
-        Table { source, path: String::new(), start: 0, entries, read: Vec::new(), units: Vec::new() }
+    pub(crate) fn root(source: Source<'a>, entries: &'a DeTable<'a>, overlooked: &'a Overlooked) -> Self {
+        Table { source, path: String::new(), start: 0, entries, read: Vec::new(), units: Vec::new(), overlooked }
     }
 
     /// What errors call the file.
@@ -44,7 +54,7 @@ impl<'a> Table<'a> {
     pub fn need_number(&mut self, range: &Range) -> Result<f64, FileError> {
         let number = self.number(range)?;
         self.require(range)?;
-        Ok(number.unwrap_or_default())
+        Ok(number.unwrap_or(any(range)))
     }
 
     /// Reads every key of `parameters` that is present; the others keep their values. Each group has a table of its
@@ -99,7 +109,7 @@ impl<'a> Table<'a> {
 
     /// Returns an error if `range.name` is missing.
     pub fn require(&self, range: &Range) -> Result<(), FileError> {
-        if self.has(range.name) {
+        if self.has(range.name) || !self.knows(range.name) {
             return Ok(());
         }
         Err(self.missing(range.name, &format!("add it{}", self.unit(range.name))))
@@ -174,7 +184,8 @@ impl<'a> Table<'a> {
 
     /// Returns the three numbers under `key`, which are required, each within `range`.
     pub fn need_vector(&mut self, key: &'static str, range: &Range) -> Result<Vector3<f64>, FileError> {
-        let vector = self.vector(key, [range; 3])?;
+        let any = (!self.knows(key)).then(|| Vector3::repeat(any(range)));
+        let vector = self.vector(key, [range; 3])?.or(any);
         vector.ok_or_else(|| self.missing(key, &format!("add three numbers{}", self.unit(key))))
     }
 
@@ -186,7 +197,8 @@ impl<'a> Table<'a> {
 
     /// Returns the string under `key`, which is required.
     pub fn need_text(&mut self, key: &'static str, cure: &str) -> Result<&'a str, FileError> {
-        self.text(key)?.ok_or_else(|| self.missing(key, cure))
+        let text = self.text(key)?.or_else(|| (!self.knows(key)).then_some("any"));
+        text.ok_or_else(|| self.missing(key, cure))
     }
 
     /// Returns the strings in the list under `key`, if present.
@@ -216,8 +228,17 @@ impl<'a> Table<'a> {
         options: &[T],
         name: fn(T) -> &'static str,
     ) -> Result<T, FileError> {
-        let choice = self.choice(key, options, name)?;
-        choice.ok_or_else(|| self.missing(key, &format!("it must be {}", one_of(options, name))))
+        let any = options.first().copied().filter(|_| !self.knows(key));
+        let choice = self.choice(key, options, name)?.or(any);
+        choice.ok_or_else(|| {
+            let missing = self.missing(key, &format!("it must be {}", one_of(options, name)));
+            let is_misspelt = missing.place().is_some_and(|place| matches!(place.fault, Fault::Unknown(_)));
+            if is_misspelt {
+                missing
+            } else {
+                missing.because(Fault::Choice(options.iter().copied().map(name).collect()))
+            }
+        })
     }
 
     /// Returns the options named in the list under `key`, at least one and none twice, if present.
@@ -231,13 +252,19 @@ impl<'a> Table<'a> {
         let Some(array) = value.get_ref().as_array() else {
             return Err(self.wrong_type(value, key, "a list", "[\"...\"]"));
         };
-        let mut chosen = Vec::new();
+        let (mut chosen, mut wrong) = (Vec::new(), None::<FileError>);
         for item in array.iter() {
-            let choice = self.choice_in(item, key, options, name)?;
-            if chosen.contains(&choice) {
-                return Err(self.refuse(item, key, format!("\"{}\" is listed twice; once is enough", name(choice))));
+            match self.choice_in(item, key, options, name) {
+                Ok(choice) if !chosen.contains(&choice) => chosen.push(choice),
+                read => {
+                    let twice = |choice| format!("\"{}\" is listed twice; once is enough", name(choice));
+                    let error = read.map_or_else(|error| error, |choice| self.refuse(item, key, twice(choice)));
+                    wrong = Some(wrong.map_or(error.clone(), |wrong| wrong.and(error)));
+                }
             }
-            chosen.push(choice);
+        }
+        if let Some(wrong) = wrong {
+            return Err(wrong);
         }
         if chosen.is_empty() {
             return Err(self.refuse(value, key, format!("the list is empty; it must hold {}", one_of(options, name))));
@@ -289,13 +316,15 @@ impl<'a> Table<'a> {
     }
 
     /// Returns an error for the first key that was not read.
-    pub fn finish(self) -> Result<(), FileError> {
+    pub fn finish(&self) -> Result<(), FileError> {
         let Some((key, start)) = self.unread().min_by_key(|(_, start)| *start) else { return Ok(()) };
-        let cure = match nearest(key, self.read.iter().copied()) {
+        let instead = nearest(key, self.read.iter().copied());
+        let instead = instead.and_then(|known| self.read.iter().copied().find(|read| *read == known));
+        let cure = match instead {
             Some(known) => self.did_you_mean(known),
             None => format!("known here: {}", self.read.join(", ")),
         };
-        Err(self.unknown(key, start, &cure))
+        Err(self.unknown(key, start, &cure, instead))
     }
 
     /// Returns an error if `key` is present, since it belongs elsewhere.
@@ -303,23 +332,56 @@ impl<'a> Table<'a> {
         if self.has(key) { Err(self.fault_at(key, problem)) } else { Ok(()) }
     }
 
-    /// Returns an error about the whole table, naming `key`.
-    pub fn fault(&self, key: &str, problem: impl Into<String>) -> FileError {
-        FileError::at(self.source, self.start, self.dotted(key), problem)
+    /// Returns an error of another file, which `key` names: mistakes of this one are looked for behind it.
+    pub fn through(&self, key: &str, error: FileError) -> FileError {
+        let at = self.entries.get(key).map_or(self.start, |value| value.span().start);
+        let (file, line, key) = (self.source.file.to_owned(), self.source.line(at), self.dotted(key));
+        let place = Box::new(Place { file, key, at, line, table: self.start, fault: Fault::Value });
+        error.placed(|own| {
+            if own.as_ref().is_none_or(|own| own.file != place.file) {
+                *own = Some(place.clone());
+            }
+        })
+    }
+
+    /// Refuses how the value under `key` goes with those under the dotted keys `with`, or without any with the others
+    /// of this table. Nothing is refused if one of these is wrong by itself, or where this has been told: the reader
+    /// goes on, to find what else is wrong.
+    ///
+    /// # Errors
+    /// The problem.
+    pub fn clash(&self, key: &str, with: &'static [&'static str], problem: impl Into<String>) -> Result<(), FileError> {
+        let clash = (self.dotted(key), self.start);
+        if self.overlooked.clashes.contains(&clash) {
+            return Ok(());
+        }
+        Err(self.fault_at(key, problem).because(Fault::Clash(with)))
     }
 
     /// Returns an error about the value under `key`.
     pub fn fault_at(&self, key: &str, problem: impl Into<String>) -> FileError {
         let start = self.entries.get(key).map_or(self.start, |value| value.span().start);
-        FileError::at(self.source, start, self.dotted(key), problem)
+        self.error(start, key, problem)
+    }
+
+    /// Returns an error about `key` at the byte `at`.
+    fn error(&self, at: usize, key: &str, problem: impl Into<String>) -> FileError {
+        let in_table = |place: &mut Option<Box<Place>>| place.iter_mut().for_each(|place| place.table = self.start);
+        FileError::at(self.source, at, self.dotted(key), problem).placed(in_table)
+    }
+
+    /// False if the key was taken out, for its value was wrong: then any value will do, and nothing follows from it.
+    pub fn knows(&self, key: &str) -> bool {
+        let dotted = self.dotted(key);
+        !self.overlooked.keys.iter().any(|(key, table)| *table == self.start && *key == dotted)
     }
 
     /// Returns the error that `key` is missing, or that a similar unknown key is a misspelling.
     pub fn missing(&self, key: &'static str, cure: &str) -> FileError {
         let slip = nearest(key, self.unread().map(|(unread, _)| unread));
         match self.unread().find(|(unread, _)| Some(*unread) == slip) {
-            Some((slip, start)) => self.unknown(slip, start, &self.did_you_mean(key)),
-            None => self.fault(key, format!("missing; {cure}")),
+            Some((slip, start)) => self.unknown(slip, start, &self.did_you_mean(key), Some(key)),
+            None => self.error(self.start, key, format!("missing; {cure}")).because(Fault::Missing),
         }
     }
 
@@ -340,8 +402,8 @@ impl<'a> Table<'a> {
         keys.filter(|(key, _)| !self.read.contains(key))
     }
 
-    fn unknown(&self, key: &str, start: usize, cure: &str) -> FileError {
-        FileError::at(self.source, start, self.dotted(key), format!("unknown key; {cure}"))
+    fn unknown(&self, key: &str, start: usize, cure: &str, instead: Option<&'static str>) -> FileError {
+        self.error(start, key, format!("unknown key; {cure}")).because(Fault::Unknown(instead))
     }
 
     fn value(&mut self, key: &'static str) -> Option<&'a Spanned<DeValue<'a>>> {
@@ -382,16 +444,23 @@ impl<'a> Table<'a> {
         options: &[T],
         name: fn(T) -> &'static str,
     ) -> Result<T, FileError> {
-        let text = self.text_in(value, key)?;
+        let names = || options.iter().copied().map(name);
+        let text = self.text_in(value, key).map_err(|error| error.because(Fault::Choice(names().collect())))?;
         options.iter().copied().find(|&option| name(option) == text).ok_or_else(|| {
-            self.refuse(value, key, format!("\"{text}\" is unknown; it must be {}", one_of(options, name)))
+            let slip = nearest(text, names()).and_then(|slip| names().find(|name| *name == slip));
+            let likely = slip.map_or_else(|| names().collect(), |slip| vec![slip]);
+            let slip = slip.map_or(String::new(), |known| format!("did you mean \"{known}\"? "));
+            let (must, options) = (if slip.is_empty() { "it" } else { "It" }, one_of(options, name));
+            let problem = format!("\"{text}\" is unknown; {slip}{must} must be {options}");
+            self.refuse(value, key, problem).because(Fault::Choice(likely))
         })
     }
 
     fn table_in(&self, value: &'a Spanned<DeValue<'a>>, key: &str, cure: &str) -> Result<Table<'a>, FileError> {
         let entries = value.get_ref().as_table().ok_or_else(|| self.wrong_type(value, key, "a table", cure))?;
         let (path, start) = (self.dotted(key), value.span().start);
-        Ok(Table { source: self.source, path, start, entries, read: Vec::new(), units: Vec::new() })
+        let Table { source, overlooked, .. } = *self;
+        Ok(Table { source, path, start, entries, read: Vec::new(), units: Vec::new(), overlooked })
     }
 
     fn wrong_type(&self, value: &Spanned<DeValue<'_>>, key: &str, wanted: &str, cure: &str) -> FileError {
@@ -407,12 +476,17 @@ impl<'a> Table<'a> {
     }
 
     fn refuse(&self, value: &Spanned<DeValue<'_>>, key: &str, problem: String) -> FileError {
-        FileError::at(self.source, value.span().start, self.dotted(key), problem)
+        self.error(value.span().start, key, problem)
     }
 
     fn dotted(&self, key: &str) -> String {
         if self.path.is_empty() { key.into() } else { format!("{}.{key}", self.path) }
     }
+}
+
+/// Returns a value in this range, at best one.
+fn any(range: &Range) -> f64 {
+    1.0_f64.clamp(range.min, range.max)
 }
 
 /// True if a float is written as a whole number; infinities and NaN are handled elsewhere.

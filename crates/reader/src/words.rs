@@ -76,6 +76,14 @@ pub fn nearest<'w>(word: &str, words: impl Iterator<Item = &'w str>) -> Option<&
     (likeness >= LIKENESS).then_some(best)
 }
 
+/// Returns the cure for a word that is none of `known`: the most similar one, or else all of them.
+pub fn cure<'w>(word: &str, known: impl Iterator<Item = &'w str> + Clone) -> String {
+    match nearest(word, known.clone()) {
+        Some(similar) => format!("did you mean {similar}?"),
+        None => format!("there are {}", known.collect::<Vec<_>>().join(", ")),
+    }
+}
+
 /// Formats a list such as `"step", "circle" or "hover"`.
 pub fn one_of<T: Copy>(options: &[T], name: fn(T) -> &'static str) -> String {
     let quoted: Vec<_> = options.iter().map(|&option| format!("\"{}\"", name(option))).collect();

@@ -24,7 +24,8 @@ pub use recording::{Aiding, LoggedReset, LoggedState, Recording, SampleSource, S
 pub use run::{EstimatorStart, ReplayRow, Replayed, fly};
 
 use afbc_reader::FileError;
-use std::fs;
+use std::fs::File;
+use std::io::{self, Read};
 use std::path::Path;
 
 /// Reads the log at `path`.
@@ -34,7 +35,7 @@ use std::path::Path;
 pub fn read(path: &Path) -> Result<Recording, FileError> {
     let shown = path.display().to_string();
     let failed = |problem: String| FileError::whole(&shown, problem);
-    let bytes = fs::read(path).map_err(|error| failed(format!("cannot be read ({error}); give the path of a log")))?;
+    let bytes = bytes(path).map_err(|error| failed(format!("cannot be read ({error}); give the path of a log")))?;
     if exact::is_exact(&bytes) {
         return Err(failed("this is an exact log; replay it with --exact".into()));
     }
@@ -43,4 +44,14 @@ pub fn read(path: &Path) -> Result<Recording, FileError> {
         false => ecl::read(&bytes, path),
     };
     recording.map_err(failed)
+}
+
+/// Largest log \[bytes\]: days of a flight. What has no end, such as a device, must not fill the memory.
+const LOG_SIZE: u64 = 1 << 30;
+
+/// Returns what is in a file, if it is no larger than a log.
+fn bytes(path: &Path) -> io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    File::open(path)?.take(LOG_SIZE + 1).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > LOG_SIZE { Err(io::ErrorKind::FileTooLarge.into()) } else { Ok(bytes) }
 }

@@ -39,7 +39,7 @@ fn old_and_new_layouts_say_the_same() {
     }
 }
 
-/// Heading counts only with a magnetometer, velocity and position only with a receiver.
+/// Heading counts only with a magnetometer, or once the motion shows it; velocity and position only with a receiver.
 #[test]
 fn a_log_that_lacks_a_topic_flies_on_the_rest() {
     for old in [false, true] {
@@ -59,7 +59,8 @@ fn a_log_that_lacks_a_topic_flies_on_the_rest() {
 
         let (recording, Replayed { figures, .. }) = without("vehicle_magnetometer");
         assert_eq!(missing(&recording), [Sensor::Magnetometer]);
-        assert_eq!((figures.attitude.rms(), figures.heading.rms()), (None, None));
+        // Where the vehicle accelerates, the receiver's velocity shows its heading.
+        assert!(figures.heading.rms() < Some(10.0), "{:?}", figures.heading.rms());
         assert!(figures.tilt.rms() < Some(1.0) && figures.position.rms() < Some(1.0), "{figures:?}");
 
         let (recording, Replayed { figures, rows, .. }) = without("vehicle_attitude");

@@ -454,7 +454,7 @@ fn values_are_px4s() {
     (view.trace.inputs.thrust_n, view.trace.inputs.pitch_n) = (2.0, 0.5);
     view.trace.filtered[1].angle = 0.1;
     let mut inputs = ControlInputs::EMPTY;
-    inputs.battery = Some(BatteryReading { voltage_v: 11.1, current_a: 4.5 });
+    inputs.battery = Some(BatteryReading { voltage_v: 11.1, current_a: 4.5, charge: None });
     let sticks = Sticks { roll: 0.1, pitch: -0.2, throttle: 0.3, yaw: -0.4 };
     inputs.order().sticks = Some(Stamped { value: sticks, at_us: 4_900_000 });
     let field = Measurement::MagneticField { field: Vector3::new(20.0, 5.0, -40.0), sigma: 1.0 };

@@ -26,9 +26,7 @@ impl FromStr for SettingChange {
         let (key, value) = (key.trim(), value.trim());
         if key == LAW {
             let kind = ControllerKind::named(value);
-            return kind
-                .map(SettingChange::Law)
-                .ok_or_else(|| format!("no such law; they are {}", ControllerKind::names()));
+            return kind.map(SettingChange::Law).ok_or_else(|| format!("no such law; {}", ControllerKind::cure(value)));
         }
         let name = RecordName::new(key).ok_or("no such parameter; `sitl params export` lists them")?;
         let value: Option<f32> = value.parse().ok().filter(|value: &f32| value.is_finite());

@@ -5,21 +5,16 @@
 //! place on a map, its texts.
 
 mod ros;
+mod times;
 mod topic;
 
-use crate::ulog::{HEADER, Piece, each, is_ulog};
+use crate::ulog::{Entry, LogReader, LoggedTopic, ParameterValue, Piece, each, is_ulog};
 use afbc_reader::FileError;
 use cdr_encoding::to_vec;
 use mcap::records::{MessageHeader, Metadata};
 use mcap::{McapError, WriteOptions, Writer};
-use px4_ulog::stream_parser::LogParser;
-use px4_ulog::stream_parser::model::{
-    DataMessage, DropoutMessage, InfoMessage, LogStage, LoggedStringMessage, ParameterMessage,
-    TaggedLoggedStringMessage,
-};
 use ros::{ParameterChange, RosMessage, Scene, ShownText};
 use serde::Serialize;
-use std::cell::RefCell;
 use std::collections::{BTreeMap, HashMap};
 use std::fs;
 use std::io::{Seek, Write};
@@ -56,44 +51,48 @@ fn write(bytes: &[u8], to: impl Write + Seek) -> Result<McapSummary, String> {
     let library = concat!("sitl ", env!("CARGO_PKG_VERSION"));
     let options = WriteOptions::new().compression(None).profile("ros2").library(library);
     let writer = options.create(to).map_err(unwritten)?;
-    // Borrowed by one callback of the parser at a time: none of them calls another.
-    let conversion = RefCell::new(Conversion {
+    let mut conversion = Conversion {
         output: Output { writer, channels: HashMap::new(), messages: 0, failure: None },
         topics: HashMap::new(),
         scene: Scene::default(),
         now_us: 0,
-        damaged: 0,
         parameters: BTreeMap::new(),
         information: BTreeMap::new(),
-    });
-    let mut on_data = |message: &DataMessage<'_>| conversion.borrow_mut().data(message);
-    let mut on_text = |text: &LoggedStringMessage<'_>| {
-        conversion.borrow_mut().text(text.timestamp, text.log_level, text.logged_message);
     };
-    let mut on_tagged_text = |text: &TaggedLoggedStringMessage<'_>| {
-        conversion.borrow_mut().text(text.timestamp, text.log_level, text.logged_message);
-    };
-    let mut on_parameter = |parameter: &ParameterMessage<'_>| conversion.borrow_mut().parameter(parameter);
-    let mut on_information = |information: &InfoMessage<'_>| conversion.borrow_mut().information(information);
-    let mut on_dropout = |dropout: &DropoutMessage| conversion.borrow_mut().dropout(dropout);
-    let mut parser = LogParser::default();
-    parser.set_data_message_callback(&mut on_data);
-    parser.set_logged_string_message_callback(&mut on_text);
-    parser.set_tagged_logged_string_message_callback(&mut on_tagged_text);
-    parser.set_parameter_message_callback(&mut on_parameter);
-    parser.set_info_message_callback(&mut on_information);
-    parser.set_dropout_message_callback(&mut on_dropout);
-    let header = bytes.get(..HEADER).ok_or("cut within the first 16 bytes; copy it from the vehicle again")?;
-    parser.consume_bytes(header).map_err(|error| error.description)?;
+    let mut ahead = times::ahead(&times_us(bytes)?).into_iter();
     let mut damaged = 0;
-    each(bytes, |piece, _| {
-        let is_read = matches!(piece, Piece::Record(record) if parser.consume_bytes(record).is_ok());
-        damaged += u64::from(!is_read);
-    });
-    drop(parser);
-    let mut conversion = conversion.into_inner();
-    conversion.damaged += damaged;
-    conversion.finish()
+    entries(bytes, |entry| {
+        let entry = entry.filter(|entry| time_us(entry).is_none() || ahead.next() != Some(true));
+        damaged += u64::from(entry.is_none());
+        entry.into_iter().for_each(|entry| conversion.take(entry));
+    })?;
+    conversion.finish(damaged)
+}
+
+/// Calls `take` with what each record says; none of a damaged one.
+fn entries(bytes: &[u8], mut take: impl FnMut(Option<Entry<'_>>)) -> Result<(), String> {
+    let mut reader = LogReader::default();
+    each(bytes, |piece, _| match piece {
+        Piece::Record(record) => take(reader.entry(record)),
+        Piece::Junk(_) => take(None),
+    })
+    .map(drop)
+}
+
+/// Returns the time of a record, if it has one \[us\].
+fn time_us(entry: &Entry<'_>) -> Option<u64> {
+    match entry {
+        Entry::Message { topic, data, .. } => topic::time_us(&topic.format, data),
+        Entry::Text { time_us, .. } => Some(*time_us),
+        _ => None,
+    }
+}
+
+/// Returns the times of all records that have one \[us\].
+fn times_us(bytes: &[u8]) -> Result<Vec<u64>, String> {
+    let mut times_us = Vec::new();
+    entries(bytes, |entry| times_us.extend(entry.as_ref().and_then(time_us)))?;
+    Ok(times_us)
 }
 
 fn unwritten(error: McapError) -> String {
@@ -108,66 +107,66 @@ struct Conversion<W: Write + Seek> {
     scene: Scene,
     /// Time of the last message that had one \[us\].
     now_us: u64,
-    /// Messages that are too short.
-    damaged: u64,
     /// Those at the log's beginning.
     parameters: BTreeMap<String, String>,
     information: BTreeMap<String, String>,
 }
 
 impl<W: Write + Seek> Conversion<W> {
-    fn data(&mut self, message: &DataMessage<'_>) {
-        let topic = self.topics.entry(message.msg_id).or_insert_with(|| McapTopic::of(message));
-        let Some(sample) = topic.sample(message.data) else {
-            self.damaged += 1;
-            return;
-        };
-        self.now_us = sample.time_us.unwrap_or(self.now_us);
-        self.output.put(&topic.name, [&topic.kind, &topic.schema], self.now_us, &sample);
-        if let Some(RosMessage { topic, kind, schema, content }) =
-            self.scene.update(message.flattened_format, message.data)
-        {
+    fn take(&mut self, entry: Entry<'_>) {
+        self.now_us = time_us(&entry).unwrap_or(self.now_us);
+        match entry {
+            Entry::Message { id, topic, data } => self.message(id, topic, data),
+            Entry::Parameter { name, value, is_initial } => self.parameter(name, value, is_initial),
+            Entry::Information { kind, name, value } => self.information(kind, name, value),
+            Entry::Text { time_us, level, text } => {
+                let shown = ShownText::of(time_us, level, &text);
+                self.output.put(ShownText::TOPIC, [ShownText::KIND, ShownText::SCHEMA], self.now_us, &shown);
+            }
+            Entry::Dropout(lost_ms) => self.dropout(lost_ms),
+            Entry::Other => {}
+        }
+    }
+
+    fn message(&mut self, id: u16, topic: &LoggedTopic, data: &[u8]) {
+        let known = self.topics.entry(id).or_insert_with(|| McapTopic::of(topic));
+        self.output.put(&known.name, [&known.kind, &known.schema], self.now_us, &known.sample(data));
+        if let Some(RosMessage { topic, kind, schema, content }) = self.scene.update(&topic.format, data) {
             self.output.put(topic, [kind, schema], self.now_us, &content);
         }
     }
 
-    fn text(&mut self, time_us: u64, level: u8, text: &str) {
-        self.now_us = time_us;
-        let shown = ShownText::of(time_us, level, text);
-        self.output.put(ShownText::TOPIC, [ShownText::KIND, ShownText::SCHEMA], self.now_us, &shown);
-    }
-
-    fn parameter(&mut self, parameter: &ParameterMessage<'_>) {
-        let (name, value, shown, stage) = match parameter {
-            ParameterMessage::Float(name, value, stage) => (*name, f64::from(*value), value.to_string(), stage),
-            ParameterMessage::Int32(name, value, stage) => (*name, f64::from(*value), value.to_string(), stage),
-        };
-        if *stage == LogStage::Definitions {
-            self.parameters.insert(name.to_owned(), shown);
+    fn parameter(&mut self, name: &str, value: ParameterValue, is_initial: bool) {
+        if is_initial {
+            self.parameters.insert(name.to_owned(), value.to_string());
         } else {
-            let change = ParameterChange { name: name.to_owned(), value };
+            let change = ParameterChange { name: name.to_owned(), value: value.number() };
             let schema = [ParameterChange::KIND, ParameterChange::SCHEMA];
             self.output.put(ParameterChange::TOPIC, schema, self.now_us, &change);
         }
     }
 
-    fn information(&mut self, information: &InfoMessage<'_>) {
-        if information.type_str.starts_with("char") {
-            let value = String::from_utf8_lossy(information.value);
-            self.information.insert(information.key.to_owned(), value.trim_end_matches('\0').to_owned());
+    fn information(&mut self, kind: &str, name: &str, value: &[u8]) {
+        if kind.starts_with("char") {
+            let value = String::from_utf8_lossy(value);
+            self.information.insert(name.to_owned(), value.trim_end_matches('\0').to_owned());
         }
     }
 
     /// A dropout has no time of its own: it ends with the next message.
-    fn dropout(&mut self, dropout: &DropoutMessage) {
+    fn dropout(&mut self, duration_ms: u16) {
         let schema = ["afbc_msgs/msg/Dropout", "uint16 duration_ms\n"];
-        self.output.put("/dropout", schema, self.now_us, &dropout.duration_ms);
+        self.output.put("/dropout", schema, self.now_us, &duration_ms);
     }
 
-    fn finish(self) -> Result<McapSummary, String> {
-        let Self { mut output, damaged, parameters, information, .. } = self;
+    fn finish(self, damaged: u64) -> Result<McapSummary, String> {
+        let Self { mut output, parameters, information, .. } = self;
         if let Some(failure) = output.failure {
             return Err(unwritten(failure));
+        }
+        if output.messages == 0 {
+            let why = if damaged == 0 { "it ends before the first" } else { "what is in it is damaged" };
+            return Err(format!("no message can be read: {why}; copy it from the vehicle again"));
         }
         for (name, metadata) in [("parameters", parameters), ("information", information)] {
             output.writer.write_metadata(&Metadata { name: name.to_owned(), metadata }).map_err(unwritten)?;

@@ -3,8 +3,9 @@
 //! Frames are as [REP 103](https://www.ros.org/reps/rep-0103.html) has them: `map` is east-north-up, `base_link` and
 //! `setpoint` are forward-left-up.
 
+use super::topic::time_us;
+use crate::ulog::{FieldType, Format};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
-use px4_ulog::stream_parser::model::{FlattenedFormat, ParseableFieldType};
 use serde::Serialize;
 use std::f64::consts::FRAC_1_SQRT_2;
 
@@ -157,9 +158,9 @@ pub(super) struct Scene {
 
 impl Scene {
     /// Takes a message of the log, and returns what is to be shown then.
-    pub(super) fn update(&mut self, format: &FlattenedFormat, data: &[u8]) -> Option<RosMessage> {
+    pub(super) fn update(&mut self, format: &Format, data: &[u8]) -> Option<RosMessage> {
         let fields = Fields { format, data };
-        match format.message_name() {
+        match format.name.as_str() {
             "vehicle_attitude" => self.attitude = fields.quaternion(["q[0]", "q[1]", "q[2]", "q[3]"]),
             "vehicle_attitude_setpoint" => self.desired = fields.quaternion(["q_d[0]", "q_d[1]", "q_d[2]", "q_d[3]"]),
             "vehicle_local_position" => return fields.frame("base_link", self.attitude?),
@@ -173,29 +174,32 @@ impl Scene {
 
 /// Fields of a message.
 struct Fields<'a> {
-    format: &'a FlattenedFormat,
+    format: &'a Format,
     data: &'a [u8],
 }
 
 impl Fields<'_> {
-    fn get<T: ParseableFieldType>(&self, name: &str) -> Option<T> {
-        let parser = self.format.get_field_parser::<T>(name).ok()?;
-        // The parser takes for granted that the message is long enough; eight bytes are, for any type.
-        let end = usize::from(parser.offset()) + size_of::<T>();
-        (self.data.len() >= end).then(|| parser.parse(self.data))
+    fn float(&self, name: &str) -> Option<f64> {
+        let from = self.data.get(self.format.place(name, FieldType::Float)?..)?;
+        Some(f32::from_le_bytes(*from.first_chunk()?).into())
+    }
+
+    fn double(&self, name: &str) -> Option<f64> {
+        let from = self.data.get(self.format.place(name, FieldType::Double)?..)?;
+        Some(f64::from_le_bytes(*from.first_chunk()?))
     }
 
     fn time(&self) -> Option<Time> {
-        self.get("timestamp").map(Time::of)
+        time_us(self.format, self.data).map(Time::of)
     }
 
     fn vector(&self, names: [&str; 3]) -> Option<Vector3<f64>> {
-        let [x, y, z] = names.map(|name| self.get::<f32>(name).map(f64::from).filter(|value| value.is_finite()));
+        let [x, y, z] = names.map(|name| self.float(name).filter(|value| value.is_finite()));
         Some(Vector3::new(x?, y?, z?))
     }
 
     fn quaternion(&self, names: [&str; 4]) -> Option<Quaternion<f64>> {
-        let [w, x, y, z] = names.map(|name| self.get::<f32>(name).map(f64::from).filter(|value| value.is_finite()));
+        let [w, x, y, z] = names.map(|name| self.float(name).filter(|value| value.is_finite()));
         Some(Quaternion::new(w?, x?, y?, z?))
     }
 
@@ -218,8 +222,8 @@ impl Fields<'_> {
     }
 
     fn fix(&self) -> Option<RosMessage> {
-        let degrees = |name| self.get::<f64>(name).filter(|value| value.is_finite());
-        let variance = |name| self.get::<f32>(name).map_or(0.0, |sigma| f64::from(sigma) * f64::from(sigma));
+        let degrees = |name| self.double(name).filter(|value| value.is_finite());
+        let variance = |name| self.float(name).map_or(0.0, |sigma| sigma * sigma);
         let (horizontal, vertical) = (variance("eph"), variance("epv"));
         let fix = PlaceFix {
             header: Header { stamp: self.time()?, frame_id: "base_link" },
@@ -227,7 +231,7 @@ impl Fields<'_> {
             service: 1,
             latitude_deg: degrees("lat")?,
             longitude_deg: degrees("lon")?,
-            altitude_m: self.get::<f32>("alt").map(f64::from)?,
+            altitude_m: self.float("alt")?,
             position_covariance: [horizontal, 0.0, 0.0, 0.0, horizontal, 0.0, 0.0, 0.0, vertical],
             position_covariance_type: 2,
         };

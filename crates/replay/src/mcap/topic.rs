@@ -1,6 +1,6 @@
 //! A topic of the log as one of ROS 2's: the same fields in the same order.
 
-use px4_ulog::stream_parser::model::{DataMessage, FlattenedField, FlattenedFieldType as Type};
+use crate::ulog::{Field, FieldType as Type, Format, LoggedTopic};
 use serde::ser::{Serialize, SerializeTuple, Serializer};
 use std::collections::HashSet;
 use std::fmt::Write as _;
@@ -14,45 +14,39 @@ pub(super) struct McapTopic {
     /// Fields, as `ros2msg`.
     pub(super) schema: String,
     places: Vec<(Type, usize)>,
-    timestamp: Option<usize>,
 }
 
 /// A message: its values in the order of the schema.
 pub(super) struct McapSample<'a> {
-    /// Its time since power-up \[us\], if it has one.
-    pub(super) time_us: Option<u64>,
     places: &'a [(Type, usize)],
     data: &'a [u8],
 }
 
+/// Returns the time of a message since power-up, if it has one \[us\].
+pub(super) fn time_us(format: &Format, data: &[u8]) -> Option<u64> {
+    data.get(format.timestamp()?..)?.first_chunk().map(|bytes| u64::from_le_bytes(*bytes))
+}
+
 impl McapTopic {
-    /// Returns the topic of a message.
-    pub(super) fn of(message: &DataMessage<'_>) -> Self {
-        let format = message.flattened_format;
-        let fields: Vec<_> =
-            // A writer of ULog aligns its fields by these, which a reader has to leave out.
-            format.field_iter().filter(|field| !field.flattened_field_name.starts_with("_padding")).collect();
-        let name = match message.multi_id.value() {
-            0 => format!("/{}", format.message_name()),
-            instance => format!("/{}/{instance}", format.message_name()),
+    /// Returns the topic of the file for one of the log.
+    pub(super) fn of(topic: &LoggedTopic) -> Self {
+        let format = &topic.format;
+        let name = match topic.instance {
+            0 => format!("/{}", format.name),
+            instance => format!("/{}/{instance}", format.name),
         };
-        let package = if format.message_name().starts_with("afbc_") { "afbc_msgs" } else { "px4_msgs" };
+        let package = if format.name.starts_with("afbc_") { "afbc_msgs" } else { "px4_msgs" };
         McapTopic {
             name,
-            kind: format!("{package}/msg/{}", type_name(format.message_name())),
-            schema: schema(&fields),
-            places: fields.iter().map(|field| (field.field_type.clone(), usize::from(field.offset))).collect(),
-            timestamp: format.timestamp_field.as_ref().map(|field| usize::from(field.offset)),
+            kind: format!("{package}/msg/{}", type_name(&format.name)),
+            schema: schema(&format.fields),
+            places: format.fields.iter().map(|field| (field.kind, field.at)).collect(),
         }
     }
 
-    /// Returns a message; none if it is too short for its fields.
-    pub(super) fn sample<'a>(&'a self, data: &'a [u8]) -> Option<McapSample<'a>> {
-        let is_whole = |(kind, at): &(Type, usize)| data.len() >= at + size(kind);
-        let time =
-            |at: usize| data.get(at..).and_then(|from| from.first_chunk()).map(|bytes| u64::from_le_bytes(*bytes));
-        let sample = McapSample { time_us: self.timestamp.and_then(time), places: &self.places, data };
-        self.places.iter().all(is_whole).then_some(sample)
+    /// Returns a message.
+    pub(super) fn sample<'a>(&'a self, data: &'a [u8]) -> McapSample<'a> {
+        McapSample { places: &self.places, data }
     }
 }
 
@@ -84,18 +78,8 @@ impl Serialize for McapSample<'_> {
     }
 }
 
-/// Returns the length of a value \[bytes\].
-fn size(kind: &Type) -> usize {
-    match kind {
-        Type::Int8 | Type::UInt8 | Type::Bool | Type::Char => 1,
-        Type::Int16 | Type::UInt16 => 2,
-        Type::Int32 | Type::UInt32 | Type::Float => 4,
-        Type::Int64 | Type::UInt64 | Type::Double => 8,
-    }
-}
-
 /// Returns what ROS 2 calls a type.
-fn ros_type(kind: &Type) -> &'static str {
+fn ros_type(kind: Type) -> &'static str {
     match kind {
         Type::Int8 => "int8",
         Type::UInt8 | Type::Char => "uint8",
@@ -113,32 +97,31 @@ fn ros_type(kind: &Type) -> &'static str {
 
 /// Returns the fields as `ros2msg`: `q[0]`, `q[1]` and so on are an array again, and a field of a part, `esc[0].rpm`,
 /// has a name in one piece, `esc_0_rpm`.
-fn schema(fields: &[&FlattenedField]) -> String {
+fn schema(fields: &[Field]) -> String {
     let mut schema = String::new();
     let mut names = HashSet::new();
     let mut rest = fields;
     while let [first, ..] = rest {
         let length = array(rest);
         let name = match length {
-            1 => &first.flattened_field_name,
-            _ => first.flattened_field_name.trim_end_matches("[0]"),
+            1 => &first.name,
+            _ => first.name.trim_end_matches("[0]"),
         };
         let name = unlike(field_name(name), &mut names);
         let length_of = if length == 1 { String::new() } else { format!("[{length}]") };
         // Writing to a string cannot fail.
-        let _ = writeln!(schema, "{}{length_of} {name}", ros_type(&first.field_type));
+        let _ = writeln!(schema, "{}{length_of} {name}", ros_type(first.kind));
         rest = rest.get(length..).unwrap_or_default();
     }
     schema
 }
 
 /// Returns the number of values of the array that the fields begin with; 1 if it is none.
-fn array(fields: &[&FlattenedField]) -> usize {
+fn array(fields: &[Field]) -> usize {
     let [first, ..] = fields else { return 1 };
-    let Some(name) = first.flattened_field_name.strip_suffix("[0]") else { return 1 };
-    let belongs = |(index, field): &(usize, &&FlattenedField)| {
-        field.flattened_field_name == format!("{name}[{index}]") && field.field_type == first.field_type
-    };
+    let Some(name) = first.name.strip_suffix("[0]") else { return 1 };
+    let belongs =
+        |(index, field): &(usize, &Field)| field.name == format!("{name}[{index}]") && field.kind == first.kind;
     fields.iter().enumerate().take_while(belongs).count().max(1)
 }
 

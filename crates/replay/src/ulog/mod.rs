@@ -1,13 +1,18 @@
 //! PX4's ULog, also that of this firmware's black box.
 //!
-//! `px4-ulog` parses; records are cut here, so that a damaged one costs itself, and not the rest of the log.
+//! Whatever is in a log, a damaged record costs itself, and not the rest, and nothing takes longer than the file is
+//! long.
 
+mod format;
 mod own;
+mod reader;
 mod records;
 mod table;
 mod topics;
 
-pub(crate) use records::{HEADER, Piece, each, is_ulog};
+pub(crate) use format::{Field, FieldType, Format};
+pub(crate) use reader::{Entry, LogReader, LoggedTopic, ParameterValue};
+pub(crate) use records::{Piece, each, is_ulog};
 
 use crate::recording::Recording;
 

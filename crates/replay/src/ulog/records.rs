@@ -63,18 +63,64 @@ fn chains(mut rest: &[u8]) -> bool {
     true
 }
 
+/// Incompatible flags that are known: data are appended at places that the record of flags names.
+const APPENDED: u64 = 1;
+
+/// The places in a file at which its parts begin, and its length: the whole, or more where data were appended.
+///
+/// # Errors
+/// If it is too short, or says that this reader does not know its format.
+fn parts(bytes: &[u8]) -> Result<Vec<usize>, String> {
+    let after = bytes.get(HEADER..).ok_or("cut within the first 16 bytes; copy it from the vehicle again")?;
+    let mut parts = vec![HEADER];
+    // Logs of version 0 have no flags.
+    if let Cut::Record(b'B', content, _) = cut(after) {
+        let mut words =
+            content.chunks_exact(8).filter_map(|word| word.first_chunk()).map(|word| u64::from_le_bytes(*word));
+        let incompatible = words.nth(1).unwrap_or_default();
+        if incompatible & !APPENDED != 0 {
+            return Err(format!(
+                "in a newer format than this program knows: its incompatible flags are {incompatible:#x}; read it with \
+                 the tools of the program that wrote it, or with a newer version of this one"
+            ));
+        }
+        for place in words.take(3).filter(|_| incompatible & APPENDED != 0) {
+            let place = usize::try_from(place).unwrap_or(usize::MAX);
+            if place < bytes.len() && parts.last().is_some_and(|last| *last < place) {
+                parts.push(place);
+            }
+        }
+    }
+    parts.push(bytes.len());
+    Ok(parts)
+}
+
 /// Calls `take` with every piece after the header, and the byte at which it begins.
-pub(crate) fn each(bytes: &[u8], mut take: impl FnMut(Piece<'_>, usize)) -> End {
-    let mut at = HEADER;
+///
+/// # Errors
+/// One line, before anything is taken, if the file is too short or in a newer format.
+pub(crate) fn each(bytes: &[u8], mut take: impl FnMut(Piece<'_>, usize)) -> Result<End, String> {
+    let parts = parts(bytes)?;
+    let mut end = End::Whole;
+    for (from, to) in parts.iter().zip(parts.iter().skip(1)) {
+        // The writer of a part that is followed by another has died there.
+        if let End::Cut(at) | End::Lost(at) = end {
+            take(Piece::Junk(from - at), at);
+        }
+        end = each_of_part(bytes.get(..*to).unwrap_or_default(), *from, &mut take);
+    }
+    Ok(end)
+}
+
+fn each_of_part(bytes: &[u8], mut at: usize, take: &mut impl FnMut(Piece<'_>, usize)) -> End {
     loop {
         let rest = bytes.get(at..).unwrap_or_default();
         if rest.is_empty() {
             return End::Whole;
         }
         let found = cut(rest);
-        if let Cut::Record(kind, content, length) = found {
-            let record = rest.get(..length).unwrap_or_default();
-            take(if is_sound(kind, content) { Piece::Record(record) } else { Piece::Junk(length) }, at);
+        if let Cut::Record(_, _, length) = found {
+            take(Piece::Record(rest.get(..length).unwrap_or_default()), at);
             at += length;
             continue;
         }
@@ -86,14 +132,5 @@ pub(crate) fn each(bytes: &[u8], mut take: impl FnMut(Piece<'_>, usize)) -> End 
             None if matches!(found, Cut::Long) => return End::Cut(at),
             None => return End::Lost(at),
         }
-    }
-}
-
-/// True if the parser can look at this content: it takes for granted that some kinds are long enough.
-fn is_sound(kind: u8, content: &[u8]) -> bool {
-    match kind {
-        b'A' => content.len() > 3,
-        b'P' => content.first().is_some_and(|key| content.len() == usize::from(*key) + 5),
-        _ => true,
     }
 }

@@ -1,11 +1,8 @@
 //! Fields of a log's topics, as numbers.
 
-use super::records::{End, HEADER, Piece, each};
-use px4_ulog::stream_parser::LogParser;
-use px4_ulog::stream_parser::model::{
-    DataMessage, DropoutMessage, FlattenedFieldType as Type, FlattenedFormat, ParameterMessage,
-};
-use std::cell::RefCell;
+use super::format::{FieldType as Type, Format};
+use super::reader::{Entry, LogReader};
+use super::records::{End, Piece, each};
 use std::collections::{HashMap, HashSet};
 
 /// A topic, and the fields of any of its layouts that are read.
@@ -207,23 +204,23 @@ impl Tables {
 /// Where a topic's fields lie in a message.
 struct Plan {
     topic: Topic,
-    places: Vec<Option<(Type, u16)>>,
+    places: Vec<Option<(Type, usize)>>,
 }
 
 impl Plan {
-    fn of(format: &FlattenedFormat) -> Option<Self> {
-        let topic = *TOPICS.iter().find(|(name, _)| *name == format.message_name())?;
+    fn of(format: &Format) -> Option<Self> {
+        let topic = *TOPICS.iter().find(|(name, _)| *name == format.name)?;
         let place = |name: &&str| {
-            let field = format.field_iter().find(|field| field.flattened_field_name == *name)?;
-            Some((field.field_type.clone(), field.offset))
+            let field = format.fields.iter().find(|field| field.name == *name)?;
+            Some((field.kind, field.at))
         };
         Some(Plan { topic, places: topic.1.iter().map(place).collect() })
     }
 }
 
 /// Returns the number at a place of a message.
-fn number(data: &[u8], (kind, offset): &(Type, u16)) -> Option<f64> {
-    let from = data.get(usize::from(*offset)..)?;
+fn number(data: &[u8], (kind, at): &(Type, usize)) -> Option<f64> {
+    let from = data.get(*at..)?;
     Some(match kind {
         Type::Int8 => f64::from(i8::from_le_bytes(*from.first_chunk()?)),
         Type::UInt8 | Type::Bool | Type::Char => f64::from(u8::from_le_bytes(*from.first_chunk()?)),
@@ -271,55 +268,42 @@ impl Wanted {
 /// # Errors
 /// What is wrong with the file, if nothing can be read.
 pub(super) fn read(bytes: &[u8]) -> Result<Tables, String> {
-    let tables = RefCell::new(Tables::default());
+    let mut tables = Tables::default();
     let mut plans: HashMap<u16, Option<Plan>> = HashMap::new();
     let (mut dropouts, mut dropped_ms) = (0_u64, 0_u64);
-    let mut on_data = |message: &DataMessage<'_>| {
-        let plan = plans.entry(message.msg_id).or_insert_with(|| Plan::of(message.flattened_format));
-        if let Some(Plan { topic: (name, fields), places }) = plan {
-            let value = |place: &Option<_>| place.as_ref().and_then(|place| number(message.data, place));
-            let values = places.iter().map(|place| value(place).unwrap_or(f64::NAN)).collect();
-            let key = (*name, message.multi_id.value());
-            tables.borrow_mut().rows.entry(key).or_default().push(Row { fields, values });
-        }
-    };
-    // The value at the beginning; a later change is another flight's.
-    let mut on_parameter = |parameter: &ParameterMessage<'_>| {
-        let (name, value) = match parameter {
-            ParameterMessage::Float(name, value, _) => (name, f64::from(*value)),
-            ParameterMessage::Int32(name, value, _) => (name, f64::from(*value)),
-        };
-        tables.borrow_mut().parameters.entry((*name).to_owned()).or_insert(value);
-    };
-    let mut on_dropout = |dropout: &DropoutMessage| {
-        dropouts += 1;
-        dropped_ms += u64::from(dropout.duration_ms);
-    };
-    let mut parser = LogParser::default();
-    parser.set_data_message_callback(&mut on_data);
-    parser.set_parameter_message_callback(&mut on_parameter);
-    parser.set_dropout_message_callback(&mut on_dropout);
-
-    let whole = |problem: &str| format!("{problem}; copy it from the vehicle again");
-    let header = bytes.get(..HEADER).ok_or_else(|| whole("cut within the first 16 bytes"))?;
-    parser.consume_bytes(header).map_err(|error| whole(&error.description))?;
     let (mut pieces, mut length, mut first) = (0_u64, 0, None);
-    let mut wanted = Wanted::default();
+    let (mut reader, mut wanted) = (LogReader::default(), Wanted::default());
     let end = each(bytes, |piece, at| {
-        let lost = match piece {
+        let entry = match piece {
             Piece::Record(record) if !wanted.has(record) => return,
-            Piece::Record(record) => match parser.consume_bytes(record) {
-                Ok(()) => return,
-                Err(_) => record.len(),
-            },
-            Piece::Junk(length) => length,
+            Piece::Record(record) => reader.entry(record).ok_or(record.len()),
+            Piece::Junk(length) => Err(length),
         };
-        first.get_or_insert(at);
-        pieces += 1;
-        length += lost;
-    });
-    drop(parser);
-    let mut tables = tables.into_inner();
+        match entry {
+            Ok(Entry::Message { id, topic, data }) => {
+                let plan = plans.entry(id).or_insert_with(|| Plan::of(&topic.format));
+                if let Some(Plan { topic: (name, fields), places }) = plan {
+                    let value = |place: &Option<_>| place.as_ref().and_then(|place| number(data, place));
+                    let values = places.iter().map(|place| value(place).unwrap_or(f64::NAN)).collect();
+                    tables.rows.entry((*name, topic.instance)).or_default().push(Row { fields, values });
+                }
+            }
+            // The value at the beginning; a later change is another flight's.
+            Ok(Entry::Parameter { name, value, .. }) => {
+                tables.parameters.entry(name.to_owned()).or_insert(value.number());
+            }
+            Ok(Entry::Dropout(lost_ms)) => {
+                dropouts += 1;
+                dropped_ms += u64::from(lost_ms);
+            }
+            Ok(_) => {}
+            Err(lost) => {
+                first.get_or_insert(at);
+                pieces += 1;
+                length += lost;
+            }
+        }
+    })?;
     tables.announced = wanted.announced;
     match end {
         End::Whole => {}

@@ -1,5 +1,5 @@
 //! A flight, written as a ULog of any layout.
-#![allow(dead_code, reason = "each test file uses a part")]
+#![allow(dead_code, clippy::indexing_slicing, reason = "each test file uses a part")]
 
 use afbc_replay::{Recording, Replayed, fly, read};
 use std::fs;
@@ -75,13 +75,13 @@ pub(crate) fn truth(time_s: f64) -> Truth {
 
 /// The bytes of a log.
 #[derive(Default)]
-struct Ulog {
-    bytes: Vec<u8>,
+pub(crate) struct Ulog {
+    pub(crate) bytes: Vec<u8>,
     ids: u16,
 }
 
 impl Ulog {
-    fn new() -> Self {
+    pub(crate) fn new() -> Self {
         let mut log = Ulog::default();
         log.bytes.extend(b"ULog\x01\x12\x35\x01");
         log.bytes.extend(BOOT_US.to_le_bytes());
@@ -89,7 +89,7 @@ impl Ulog {
         log
     }
 
-    fn record(&mut self, kind: u8, content: &[u8]) {
+    pub(crate) fn record(&mut self, kind: u8, content: &[u8]) {
         self.bytes.extend((content.len() as u16).to_le_bytes());
         self.bytes.push(kind);
         self.bytes.extend(content);
@@ -107,7 +107,7 @@ impl Ulog {
         self.record(b'F', format!("{name}:uint64_t timestamp;{fields}").as_bytes());
     }
 
-    fn subscribe(&mut self, name: &str, instance: u8) -> u16 {
+    pub(crate) fn subscribe(&mut self, name: &str, instance: u8) -> u16 {
         let id = self.ids;
         self.ids += 1;
         let mut content = vec![instance];
@@ -295,6 +295,17 @@ pub(crate) fn log(kind: &Kind) -> Vec<u8> {
         }
     }
     log.bytes
+}
+
+/// Returns the places of the records of a log: kind, begin, end.
+pub(crate) fn records(bytes: &[u8]) -> Vec<(u8, usize, usize)> {
+    let (mut at, mut records) = (16, Vec::new());
+    while at < bytes.len() {
+        let end = at + 3 + usize::from(u16::from_le_bytes([bytes[at], bytes[at + 1]]));
+        records.push((bytes[at + 2], at, end));
+        at = end;
+    }
+    records
 }
 
 /// Writes bytes into a file of a test.

@@ -97,8 +97,8 @@ impl EstimatorFlags {
 }
 
 message! {
-    /// What it makes of each kind of measurement, in the order position and attitude of a tracker, position and
-    /// velocity of a receiver, height, heading; whether it holds the vehicle at rest.
+    /// What it makes of each kind of measurement, in the order position and attitude of a tracker, position,
+    /// height and velocity of a receiver, height, heading; whether it holds the vehicle at rest.
     "afbc_estimator" EstimatorFigures {
         nis: [f32; AIDS] = "normalised innovation squared of the last one; a lower bound if rejected",
         accepted: [u32; AIDS] = "",

@@ -1,0 +1,141 @@
+//! What is written never replaces what others have, in folders and single files.
+#![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs, reason = "tests")]
+
+use afbc_files::{Error, Folder, Output};
+use std::fs;
+use std::io;
+use std::os::unix::fs::symlink;
+use std::path::{Path, PathBuf};
+
+fn folder(test: &str) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("outputs").join(test);
+    if folder.exists() {
+        fs::remove_dir_all(&folder).unwrap();
+    }
+    fs::create_dir_all(&folder).unwrap();
+    folder
+}
+
+fn names(folder: &Path) -> Vec<String> {
+    let names = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
+    let mut names: Vec<_> = names.filter(|name| !name.starts_with(".sitl")).collect();
+    names.sort();
+    names
+}
+
+/// Puts something in the way.
+type Make = fn(&Path);
+
+/// What may be in the way of a file; the target of links is beside it.
+const IN_THE_WAY: [(&str, Make); 4] = [
+    ("file", |path| fs::write(path, "mine").unwrap()),
+    ("empty", |path| fs::write(path, "").unwrap()),
+    ("link", |path| symlink("target", path).unwrap()),
+    ("lost", |path| symlink("nowhere", path).unwrap()),
+];
+
+#[test]
+fn nothing_is_replaced_unless_by_force() {
+    let folder = folder("single");
+    fs::write(folder.join("target"), "theirs").unwrap();
+    for (name, make) in IN_THE_WAY {
+        let path = folder.join(name);
+        make(&path);
+        let before = (fs::symlink_metadata(&path).unwrap().file_type(), fs::read(&path).ok());
+        for error in [Output::new(&path, "--it"), Output::forcible(&path, "--it", false)] {
+            let error = error.unwrap_err().to_string();
+            assert!(error.contains("exists already; choose another file for --it, or "), "{error}");
+        }
+        assert_eq!((fs::symlink_metadata(&path).unwrap().file_type(), fs::read(&path).ok()), before);
+        let forced = Output::forcible(&path, "--it", true).unwrap();
+        // Without success it is as it was.
+        forced.place(|_| Err(io::ErrorKind::StorageFull.into())).unwrap_err();
+        assert_eq!((fs::symlink_metadata(&path).unwrap().file_type(), fs::read(&path).ok()), before);
+        assert!(matches!(forced.create(), Err(Error::Exists { .. })), "logs are not forced");
+        forced.place(|out| out.write_all(b"new")).unwrap();
+        assert!(fs::symlink_metadata(&path).unwrap().is_file());
+        assert_eq!(fs::read(&path).unwrap(), b"new");
+    }
+    assert_eq!(fs::read(folder.join("target")).unwrap(), b"theirs");
+    for path in ["", "..", ".", "no/such"] {
+        let error = Output::forcible(&folder.join(path), "--it", true).unwrap_err().to_string();
+        assert!(error.contains("cannot be written (") && error.contains("--it"), "{error}");
+    }
+    assert_eq!(names(&folder), ["empty", "file", "link", "lost", "target"]);
+}
+
+/// What was checked may appear before it is written: it is not replaced then, either.
+#[test]
+fn what_appears_meanwhile_is_kept() {
+    let folder = folder("meanwhile");
+    for (name, make) in IN_THE_WAY {
+        let path = folder.join(name);
+        let output = Output::new(&path, "--it").unwrap();
+        output.place(|_| Err(io::ErrorKind::StorageFull.into())).unwrap_err();
+        assert!(names(&folder).iter().all(|known| known != name), "nothing stays of a failure");
+        make(&path);
+        let before = fs::read(&path).ok();
+        assert!(matches!(output.place(|out| out.write_all(b"new")), Err(Error::Exists { .. })), "{name}");
+        assert!(matches!(output.create(), Err(Error::Exists { .. })), "{name}");
+        assert_eq!(fs::read(&path).ok(), before);
+    }
+    assert_eq!(names(&folder), ["empty", "file", "link", "lost"]);
+    assert!(!fs::read_dir(&folder).unwrap().any(|it| it.unwrap().file_name().to_string_lossy().ends_with(".tmp")));
+}
+
+fn written(path: &Path, command: &str, force: bool, files: &[&str]) -> Result<(), Error> {
+    let folder = Folder::open(path, command, "it", force)?;
+    folder.only(files)?;
+    files.iter().try_for_each(|name| folder.place(name, |out| out.write_all(command.as_bytes())).map(drop))
+}
+
+#[test]
+fn results_are_replaced_by_the_same_command_as_long_as_nobody_has_changed_them() {
+    let path = folder("changed").join("results");
+    let files = ["a.csv", "b.json", "c.html"];
+    written(&path, "fly x", false, &files).unwrap();
+    let refused = |command: &str| written(&path, command, false, &files).unwrap_err().to_string();
+    assert!(refused("fly x --seed 2").contains("holds what `sitl fly x` made of it"));
+    for name in files {
+        written(&path, "fly x", false, &files).unwrap();
+        fs::write(path.join(name), "fly y").unwrap();
+        let error = refused("fly x");
+        assert!(error.contains(&format!("{name}: changed since `sitl fly x` wrote it")), "{error}");
+        assert_eq!(fs::read(path.join(name)).unwrap(), b"fly y");
+        // As it was, or gone, it is nobody's again.
+        fs::write(path.join(name), "fly x").unwrap();
+        written(&path, "fly x", false, &files).unwrap();
+        fs::remove_file(path.join(name)).unwrap();
+    }
+    // By force another command takes over, also what it does not write; what was changed is left.
+    written(&path, "fly x", false, &files).unwrap();
+    fs::write(path.join("b.json"), "mine").unwrap();
+    written(&path, "fly z", true, &["a.csv"]).unwrap();
+    assert_eq!(names(&path), ["a.csv", "b.json"]);
+    assert_eq!(fs::read(path.join("b.json")).unwrap(), b"mine");
+    assert!(refused("fly x").contains("holds what `sitl fly z` made of it"));
+}
+
+/// A command that was interrupted before it wrote anything is in nobody's way.
+#[test]
+fn a_folder_without_results_is_anybodys() {
+    let folder = folder("interrupted").join("results");
+    drop(Folder::open(&folder, "compare --suite field", "suite", false).unwrap());
+    written(&folder, "compare --suite faults", false, &["suite.csv"]).unwrap();
+    assert!(matches!(Folder::open(&folder, "compare --suite field", "suite", false), Err(Error::Foreign { .. })));
+    fs::remove_file(folder.join("suite.csv")).unwrap();
+    fs::write(folder.join("mine.txt"), "mine").unwrap();
+    assert!(matches!(Folder::open(&folder, "compare --suite field", "suite", false), Err(Error::Foreign { .. })));
+}
+
+#[test]
+fn a_folder_that_is_being_written_cannot_be_opened() {
+    let path = folder("busy").join("results");
+    let open = Folder::open(&path, "fly x", "it", false).unwrap();
+    for force in [false, true] {
+        let error = Folder::open(&path, "fly x", "it", force).unwrap_err();
+        assert!(matches!(error, Error::Busy(_)), "{error}");
+    }
+    drop(open);
+    Folder::open(&path, "fly x", "it", false).unwrap();
+}

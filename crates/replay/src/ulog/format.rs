@@ -1,0 +1,210 @@
+//! Formats of messages: the fields that they declare, and where these lie.
+
+use std::collections::HashMap;
+use std::collections::hash_map::Entry;
+use std::rc::Rc;
+
+/// Deepest nesting of messages: PX4 nests two.
+const DEPTH: usize = 8;
+/// Longest names, of all fields of a format and of all formats \[bytes\]. A message has at most 65,535 bytes, and PX4's
+/// formats together names of some 200 KB; but few bytes can declare as many fields of fields as they like.
+const NAMES_OF_FORMAT: usize = 1 << 21;
+const NAMES_OF_ALL: usize = 1 << 24;
+/// Longest message \[bytes\].
+const LONGEST: usize = u16::MAX as usize;
+/// Fields that only align others begin with this, and the last one of a message is not logged.
+const PADDING: &str = "_padding";
+
+/// Type of a field.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum FieldType {
+    Int8,
+    UInt8,
+    Int16,
+    UInt16,
+    Int32,
+    UInt32,
+    Int64,
+    UInt64,
+    Float,
+    Double,
+    Bool,
+    Char,
+}
+
+impl FieldType {
+    fn named(name: &str) -> Option<Self> {
+        Some(match name {
+            "int8_t" => FieldType::Int8,
+            "uint8_t" => FieldType::UInt8,
+            "int16_t" => FieldType::Int16,
+            "uint16_t" => FieldType::UInt16,
+            "int32_t" => FieldType::Int32,
+            "uint32_t" => FieldType::UInt32,
+            "int64_t" => FieldType::Int64,
+            "uint64_t" => FieldType::UInt64,
+            "float" => FieldType::Float,
+            "double" => FieldType::Double,
+            "bool" => FieldType::Bool,
+            "char" => FieldType::Char,
+            _ => return None,
+        })
+    }
+
+    /// Returns the length of a value \[bytes\].
+    pub(crate) fn size(self) -> usize {
+        match self {
+            FieldType::Int8 | FieldType::UInt8 | FieldType::Bool | FieldType::Char => 1,
+            FieldType::Int16 | FieldType::UInt16 => 2,
+            FieldType::Int32 | FieldType::UInt32 | FieldType::Float => 4,
+            FieldType::Int64 | FieldType::UInt64 | FieldType::Double => 8,
+        }
+    }
+}
+
+/// A field of a message, or of a message in it.
+#[derive(Debug)]
+pub(crate) struct Field {
+    /// Name, such as `q[0]` or `esc[1].rpm`.
+    pub(crate) name: String,
+    pub(crate) kind: FieldType,
+    /// Place of its first byte in the message.
+    pub(crate) at: usize,
+}
+
+/// Where the fields of a message lie.
+#[derive(Debug)]
+pub(crate) struct Format {
+    /// Name of the topic.
+    pub(crate) name: String,
+    /// Fields in the order of their places, without those that align others.
+    pub(crate) fields: Vec<Field>,
+    /// Length of a message \[bytes\].
+    pub(crate) size: usize,
+}
+
+impl Format {
+    /// Returns the place of a field, if it is of that type.
+    pub(crate) fn place(&self, name: &str, kind: FieldType) -> Option<usize> {
+        self.fields.iter().find(|field| field.name == name && field.kind == kind).map(|field| field.at)
+    }
+
+    /// Returns the place of the time, which is one only in microseconds.
+    pub(crate) fn timestamp(&self) -> Option<usize> {
+        self.place("timestamp", FieldType::UInt64)
+    }
+}
+
+/// A field as it is declared.
+#[derive(Debug, PartialEq, Eq)]
+struct DeclaredField {
+    kind: String,
+    /// How many of an array.
+    many: Option<usize>,
+    name: String,
+}
+
+impl DeclaredField {
+    /// Reads `float[4] q`.
+    fn read(text: &str) -> Option<Self> {
+        let (kind, name) = text.split_once(' ').filter(|(_, name)| !name.is_empty() && !name.contains(' '))?;
+        let (kind, many) = match kind.split_once('[') {
+            Some((kind, many)) => (kind, Some(many.strip_suffix(']')?.parse().ok()?)),
+            None => (kind, None),
+        };
+        (!kind.is_empty()).then(|| DeclaredField { kind: kind.into(), many, name: name.into() })
+    }
+}
+
+/// The formats of a log.
+#[derive(Debug)]
+pub(crate) struct Formats {
+    declared: HashMap<String, Vec<DeclaredField>>,
+    /// Those that were asked for; none of one that is not whole.
+    laid_out: HashMap<String, Option<Rc<Format>>>,
+    /// Names that there may still be \[bytes\].
+    left: usize,
+}
+
+impl Default for Formats {
+    fn default() -> Self {
+        Formats { declared: HashMap::new(), laid_out: HashMap::new(), left: NAMES_OF_ALL }
+    }
+}
+
+impl Formats {
+    /// Takes a declaration, `topic:type name;type[n] name;`; none if it is damaged, or is not that of before.
+    pub(crate) fn declare(&mut self, text: &[u8]) -> Option<()> {
+        let (name, fields) = std::str::from_utf8(text).ok()?.split_once(':').filter(|(name, _)| !name.is_empty())?;
+        let fields = fields.split(';').filter(|field| !field.is_empty());
+        let fields = fields.map(DeclaredField::read).collect::<Option<Vec<_>>>()?;
+        match self.declared.entry(name.to_owned()) {
+            Entry::Occupied(known) => (*known.get() == fields).then_some(()),
+            Entry::Vacant(free) => {
+                free.insert(fields);
+                Some(())
+            }
+        }
+    }
+
+    /// Returns the format of a topic; none if it, or one in it, is not declared, or if it is too large or too deep.
+    pub(crate) fn of(&mut self, name: &str) -> Option<Rc<Format>> {
+        if let Some(known) = self.laid_out.get(name) {
+            return known.clone();
+        }
+        let most = self.left.min(NAMES_OF_FORMAT);
+        let mut layout = Layout { declared: &self.declared, fields: Vec::new(), at: 0, left: most };
+        let is_whole = layout.add(name, "", 0).is_some();
+        let Layout { fields, at, left, .. } = layout;
+        self.left -= most - left;
+        let format = is_whole.then(|| Rc::new(Format { name: name.into(), fields, size: at }));
+        self.laid_out.insert(name.into(), format.clone());
+        format
+    }
+}
+
+/// A message while its fields are laid out.
+struct Layout<'a> {
+    declared: &'a HashMap<String, Vec<DeclaredField>>,
+    fields: Vec<Field>,
+    at: usize,
+    left: usize,
+}
+
+impl Layout<'_> {
+    /// Adds the fields of the message `name`, with `prefix` before their names.
+    fn add(&mut self, name: &str, prefix: &str, depth: usize) -> Option<()> {
+        let declared = self.declared;
+        let fields = declared.get(name).filter(|_| depth < DEPTH)?;
+        for (index, DeclaredField { kind, many, name }) in fields.iter().enumerate() {
+            let is_padding = name.starts_with(PADDING);
+            if is_padding && depth == 0 && index + 1 == fields.len() {
+                break;
+            }
+            for element in 0..many.unwrap_or(1) {
+                let name = match many {
+                    Some(_) => format!("{prefix}{name}[{element}]"),
+                    None => format!("{prefix}{name}"),
+                };
+                self.left = self.left.checked_sub(1 + name.len())?;
+                match FieldType::named(kind) {
+                    Some(kind) => {
+                        let at = self.at;
+                        self.at = Some(at + kind.size()).filter(|end| *end <= LONGEST)?;
+                        if !is_padding {
+                            self.fields.push(Field { name, kind, at });
+                        }
+                    }
+                    None => {
+                        let before = self.fields.len();
+                        self.add(kind, &format!("{name}."), depth + 1)?;
+                        if is_padding {
+                            self.fields.truncate(before);
+                        }
+                    }
+                }
+            }
+        }
+        Some(())
+    }
+}

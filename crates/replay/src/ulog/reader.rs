@@ -1,0 +1,137 @@
+//! What the records of a log say.
+
+use super::format::{Format, Formats};
+use std::borrow::Cow;
+use std::collections::HashMap;
+use std::collections::hash_map::Entry as Place;
+use std::fmt;
+use std::rc::Rc;
+
+/// A topic that is logged.
+#[derive(Debug)]
+pub(crate) struct LoggedTopic {
+    pub(crate) format: Rc<Format>,
+    /// Number among several of the same name, from 0 on.
+    pub(crate) instance: u8,
+}
+
+/// Value of a parameter.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum ParameterValue {
+    Int32(i32),
+    Float(f32),
+}
+
+impl ParameterValue {
+    /// Returns it as a number.
+    pub(crate) fn number(self) -> f64 {
+        match self {
+            ParameterValue::Int32(value) => value.into(),
+            ParameterValue::Float(value) => value.into(),
+        }
+    }
+}
+
+impl fmt::Display for ParameterValue {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            ParameterValue::Int32(value) => value.fmt(f),
+            ParameterValue::Float(value) => value.fmt(f),
+        }
+    }
+}
+
+/// What a record says.
+pub(crate) enum Entry<'a> {
+    /// A message of a topic.
+    Message { id: u16, topic: &'a LoggedTopic, data: &'a [u8] },
+    /// A parameter, as at the log's beginning or changed later.
+    Parameter { name: &'a str, value: ParameterValue, is_initial: bool },
+    /// Something about the vehicle, by type and name.
+    Information { kind: &'a str, name: &'a str, value: &'a [u8] },
+    /// A line, with its level as a letter.
+    Text { time_us: u64, level: u8, text: Cow<'a, str> },
+    /// The logger has lost this long \[ms\].
+    Dropout(u16),
+    /// What readers need not know.
+    Other,
+}
+
+/// Reads records one after the other. Each stands for itself: a damaged one costs itself alone.
+#[derive(Debug, Default)]
+pub(crate) struct LogReader {
+    formats: Formats,
+    topics: HashMap<u16, LoggedTopic>,
+    /// True behind the definitions.
+    is_in_data: bool,
+}
+
+impl LogReader {
+    /// Returns what a record says; none if it is damaged.
+    pub(crate) fn entry<'a>(&'a mut self, record: &'a [u8]) -> Option<Entry<'a>> {
+        let &[_, _, kind, ref content @ ..] = record else { return None };
+        self.is_in_data |= b"ADLCORS".contains(&kind);
+        match kind {
+            b'F' => self.formats.declare(content).map(|()| Entry::Other),
+            b'A' => self.add(content).map(|()| Entry::Other),
+            b'D' => {
+                let (id, data) = content.split_first_chunk()?;
+                let id = u16::from_le_bytes(*id);
+                let topic = self.topics.get(&id).filter(|topic| topic.format.size == data.len())?;
+                Some(Entry::Message { id, topic, data })
+            }
+            b'P' => {
+                let (kind, name, value) = keyed(content)?;
+                let value = *value.first_chunk().filter(|_| value.len() == 4 && !name.contains(' '))?;
+                let value = match kind {
+                    "int32_t" => ParameterValue::Int32(i32::from_le_bytes(value)),
+                    "float" => ParameterValue::Float(f32::from_le_bytes(value)),
+                    _ => return None,
+                };
+                Some(Entry::Parameter { name, value, is_initial: !self.is_in_data })
+            }
+            b'I' => keyed(content).map(|(kind, name, value)| Entry::Information { kind, name, value }),
+            b'L' => {
+                let (level, rest) = content.split_first()?;
+                text(*level, rest)
+            }
+            b'C' => {
+                let (level, rest) = content.split_first()?;
+                text(*level, rest.get(2..)?)
+            }
+            b'O' => content.first_chunk().map(|lost_ms| Entry::Dropout(u16::from_le_bytes(*lost_ms))),
+            _ => Some(Entry::Other),
+        }
+    }
+
+    /// Takes the announcement of a topic: instance, id, name.
+    fn add(&mut self, content: &[u8]) -> Option<()> {
+        let &[instance, low, high, ref name @ ..] = content else { return None };
+        let format = self.formats.of(std::str::from_utf8(name).ok()?)?;
+        match self.topics.entry(u16::from_le_bytes([low, high])) {
+            Place::Occupied(known) => {
+                let LoggedTopic { format: held, instance: own } = known.get();
+                (held.name == format.name && *own == instance).then_some(())
+            }
+            Place::Vacant(free) => {
+                free.insert(LoggedTopic { format, instance });
+                Some(())
+            }
+        }
+    }
+}
+
+/// Returns type, name and value behind a key: its length, `type name`, the value.
+fn keyed(content: &[u8]) -> Option<(&str, &str, &[u8])> {
+    let (length, rest) = content.split_first()?;
+    let (key, value) = rest.split_at_checked(usize::from(*length))?;
+    let key = std::str::from_utf8(key).ok()?;
+    let (kind, name) = key.split_once(' ').unwrap_or(("", key));
+    Some((kind, name, value))
+}
+
+fn text(level: u8, rest: &[u8]) -> Option<Entry<'_>> {
+    let (time, text) = rest.split_first_chunk()?;
+    // Part of a line is better than none.
+    Some(Entry::Text { time_us: u64::from_le_bytes(*time), level, text: String::from_utf8_lossy(text) })
+}
