@@ -3,6 +3,7 @@
 use crate::statistics::Median;
 use afbc::Profile;
 use afbc_reader::FileError;
+use afbc_reader::words::cure;
 use afbc_scenario::Scenario;
 use afbc_scenario::contender::{Contender, ControllerKind};
 use afbc_sim::flight::Lost;
@@ -14,8 +15,8 @@ use rayon::prelude::*;
 
 /// Returns the default contenders: every law with its profile for flight, and AFBC as printed.
 pub fn standard() -> Vec<Contender> {
-    let flying = |kind| Contender::of(kind, Profile::Flight);
-    let printed = Contender { name: "afbc-as-printed".into(), ..Contender::of(ControllerKind::Afbc, Profile::Paper) };
+    let flying = |kind| Contender::standard(kind, Profile::Flight);
+    let printed = Contender::standard(ControllerKind::Afbc, Profile::Paper);
     let others = ControllerKind::all().into_iter().filter(|kind| *kind != ControllerKind::Afbc);
     [flying(ControllerKind::Afbc), printed].into_iter().chain(others.map(flying)).collect()
 }
@@ -32,20 +33,21 @@ pub fn standard_and_monitored() -> Vec<Contender> {
 /// # Errors
 /// One line on a name that is unknown, or named twice.
 pub fn choose(own: &[Contender], names: &[String]) -> Result<Vec<Contender>, FileError> {
-    let standard = standard();
     let mut chosen: Vec<Contender> = Vec::new();
     for name in names {
-        let Some(contender) = own.iter().chain(&standard).find(|contender| &contender.name == name) else {
-            let mut known: Vec<_> = own.iter().chain(&standard).map(|contender| contender.name.as_str()).collect();
+        let called = own.iter().find(|contender| &contender.name == name).cloned();
+        let Some(contender) = called.or_else(|| Contender::named(name)) else {
+            let mut known: Vec<_> = own.iter().map(|contender| contender.name.clone()).collect();
+            known.extend(Contender::all_standard().map(|contender| contender.name));
             known.sort_unstable();
             known.dedup();
-            let problem = format!("no such controller; there are {}", known.join(", "));
-            return Err(unchosen(name, problem));
+            let cure = cure(name, known.iter().map(String::as_str));
+            return Err(unchosen(name, format!("no such controller; {cure}")));
         };
         if chosen.iter().any(|other| other.name == contender.name) {
             return Err(unchosen(name, "named twice; once is enough".into()));
         }
-        chosen.push(contender.clone());
+        chosen.push(contender);
     }
     Ok(chosen)
 }
@@ -54,17 +56,23 @@ fn unchosen(name: &str, problem: String) -> FileError {
     FileError::whole(&format!("controllers {}", name.escape_debug()), problem)
 }
 
-/// Gives `scenario` these contenders, each with its gains for the scenario's vehicle, and checks them.
+/// Gives `scenario` these contenders, each with its gains for the scenario's vehicle, and checks them. The scenario's
+/// own stay as its file has them.
 ///
 /// # Errors
 /// One line on what is wrong with the gains in the vehicle's file, or the first gain or setting out of range.
 pub fn fly_under(scenario: &mut Scenario, contenders: &[Contender]) -> Result<(), FileError> {
-    let own = |contender: &Contender| match &scenario.vehicle_file {
-        Some(vehicle) => contender.clone().on(vehicle, contender.profile().unwrap_or(Profile::Flight)),
-        None => Ok(contender.clone().for_vehicle(&scenario.vehicle)),
+    let put = |contender: &Contender| match scenario.contenders.iter().any(|own| is_same(own, contender)) {
+        true => Ok(contender.clone()),
+        false => scenario.carried(contender.clone()),
     };
-    scenario.contenders = contenders.iter().map(own).collect::<Result<_, _>>()?;
+    scenario.contenders = contenders.iter().map(put).collect::<Result<_, _>>()?;
     scenario.check().map_err(|error| FileError::whole(&scenario.name, error.to_string()))
+}
+
+/// True if both fly alike, whatever they are called.
+fn is_same(a: &Contender, b: &Contender) -> bool {
+    (&a.law, &a.settings, a.monitored) == (&b.law, &b.settings, b.monitored)
 }
 
 /// Adds these contenders to those of `scenario`, their gains scaled by rule to the scenario's vehicle, and checks them.
@@ -84,23 +92,35 @@ pub(crate) fn free_to_tilt(scenario: &mut Scenario, tilt_max_rad: f64) {
     scenario.contenders = contenders.map(|contender| contender.free_to_tilt(tilt_max_rad as f32)).collect();
 }
 
-/// Returns all contenders of `scenarios`; of two different ones with the same name, the second gets its scenario's name
-/// too.
+/// Returns all contenders of `scenarios`. A law's name stands for the law that flies, with its profile for flight: a
+/// printed law is called so, and one with gains or settings of its own, or the second of a name, gets its scenario's
+/// name too. So it does not matter which scenario comes first.
 pub fn contenders(scenarios: &[Scenario]) -> Vec<Contender> {
-    let mut all: Vec<Contender> = Vec::new();
-    for scenario in scenarios {
-        for contender in &scenario.contenders {
-            let mut contender = contender.clone();
-            if all.contains(&contender) {
-                continue;
-            }
-            if all.iter().any(|other| other.name == contender.name) {
-                contender.name = format!("{} ({})", contender.name, scenario.name);
-            }
-            all.push(contender);
+    let own = scenarios.iter().flat_map(|scenario| scenario.contenders.iter().map(move |own| (scenario, own)));
+    let all: Vec<_> = own.map(|(scenario, own)| (scenario, own, as_standard(scenario, own))).collect();
+    let is_standard = |name: &str| all.iter().filter_map(|(.., standard)| standard.as_ref()).any(|it| it.name == name);
+    let mut named: Vec<Contender> = Vec::new();
+    for (scenario, own, standard) in &all {
+        let mut contender = standard.clone().unwrap_or_else(|| (*own).clone().named_as_printed());
+        if named.contains(&contender) {
+            continue;
         }
+        let is_taken = named.iter().any(|other| other.name == contender.name);
+        if is_taken || (standard.is_none() && is_standard(&contender.name)) {
+            contender.name = format!("{} ({})", contender.name, scenario.name);
+        }
+        named.push(contender);
     }
-    all
+    named
+}
+
+/// Returns the standard contender that `own`, called by its law, is on the vehicle of `scenario`, if it is one.
+fn as_standard(scenario: &Scenario, own: &Contender) -> Option<Contender> {
+    let kind = own.kind();
+    let flies = Contender::standard(kind, Profile::Flight);
+    let printed = Some(Contender::standard(kind, Profile::Paper)).filter(Contender::is_printed);
+    let is_own = |standard: &Contender| scenario.carried(standard.clone()).is_ok_and(|carried| is_same(&carried, own));
+    if own.name == kind.name() { [flies].into_iter().chain(printed).find(is_own) } else { None }
 }
 
 /// Number of seeds that a comparison flies, unless another is asked for, where a seed changes anything: the least round

@@ -72,7 +72,8 @@ impl Campaign {
 
     /// Returns flight `flight` with the given draw.
     pub(super) fn with(&self, flight: u64, draw: &Draw) -> Result<Scenario, OutOfRange> {
-        let mut scenario = Scenario { seed: draw.seed, ..self.scenario.clone() };
+        let told = self.scenario.told_before_draws();
+        let mut scenario = Scenario { seed: draw.seed, told, ..self.scenario.clone() };
         if let Some(named) = self.trajectory(flight) {
             scenario.trajectory = named.trajectory.clone();
             scenario.initial = named.initial;

@@ -33,8 +33,6 @@ pub enum Error {
     },
     /// The folder holds results of another campaign.
     Changed(PathBuf),
-    /// Another program is using the folder.
-    Busy(PathBuf),
     /// A shard has no results yet.
     Unfinished(PathBuf),
     /// Results of different campaigns.
@@ -73,13 +71,6 @@ impl fmt::Display for Error {
                  folder with --out, or replace them with --force",
                 path.display()
             ),
-            Error::Busy(path) => {
-                write!(
-                    f,
-                    "{}: another campaign is being flown into it; wait, or choose another with --out",
-                    path.display()
-                )
-            }
             Error::Unfinished(path) => write!(
                 f,
                 "{}: no finished results in it; fly that shard to its end with `sitl campaign --shard` first",

@@ -3,12 +3,17 @@
 use crate::plan::{Campaign, NamedTrajectory, Spread};
 use crate::quantity::{QUANTITIES, Quantity};
 use afbc_plant::InstrumentSuite;
-use afbc_reader::FileError;
-use afbc_reader::Table;
 use afbc_reader::words::out_of_range;
+use afbc_reader::{Example, FileError, Table};
+use afbc_scenario::contender::Contender;
 use afbc_scenario::{DURATION, Scenario, built_in, similar_built_in};
 use afbc_types::Range;
 use std::path::{Path, PathBuf};
+
+const SAMPLE: Example = Example {
+    command: "campaigns robustness",
+    text: "flights = 1\n[scenario.trajectory]\nkind = \"hover\"\nposition_m = [0, 0, 1]\n",
+};
 
 /// Accepted number of flights.
 const FLIGHTS: Range = Range::new("flights", 1.0, 1e7);
@@ -19,9 +24,9 @@ const SEED: Range = Range::new("seed", 0.0, 9_007_199_254_740_991.0);
 /// `folder` the one to which the paths of scenario files are relative.
 ///
 /// # Errors
-/// The first mistake, as one line.
+/// Every mistake, each as one line.
 pub fn parse(file: &str, text: &str, name: &str, folder: &Path) -> Result<Campaign, FileError> {
-    afbc_reader::document(file, text, "campaigns robustness", |mut root| {
+    afbc_reader::document(file, text, SAMPLE, |mut root| {
         let [name, description] = afbc_reader::title(&mut root, name)?;
         let flights = root.whole(&FLIGHTS)?.ok_or_else(|| root.missing(FLIGHTS.name, "say how many to fly"))?;
         let seed = root.whole(&SEED)?.unwrap_or(1);
@@ -29,16 +34,21 @@ pub fn parse(file: &str, text: &str, name: &str, folder: &Path) -> Result<Campai
         let trajectories = trajectories(&mut root, folder)?;
         let mut scenario = scenario(&mut root, folder, trajectories.first())?;
         scenario.duration_s = duration_s.unwrap_or(scenario.duration_s);
+        let own = scenario.contenders.clone();
+        let is_free = |named: &Contender| own.iter().all(|other| other.name != named.name);
+        let named =
+            |own: &Contender| Some(own.clone().named_as_printed()).filter(is_free).unwrap_or_else(|| own.clone());
+        scenario.contenders = own.iter().map(named).collect();
         let trajectories = if trajectories.is_empty() { vec![trajectory(scenario.clone())] } else { trajectories };
         let spreads = match root.table("spread")? {
             Some(table) => spreads(table, &scenario)?,
             None => Vec::new(),
         };
         let campaign = Campaign { name, description, flights, seed, scenario, trajectories, spreads };
-        campaign
-            .check()
-            .map_err(|error| root.fault("spread", format!("it causes {}; narrow it", out_of_range(&error))))?;
         root.finish()?;
+        if let Err(error) = campaign.check() {
+            root.clash("spread", &[], format!("it causes {}; narrow it", out_of_range(&error)))?;
+        }
         Ok(campaign)
     })
 }
@@ -60,14 +70,24 @@ fn trajectory(Scenario { name, trajectory, initial, .. }: Scenario) -> NamedTraj
 
 /// Reads the references of the scenarios in the list `trajectories`, if there is one.
 fn trajectories(root: &mut Table<'_>, folder: &Path) -> Result<Vec<NamedTrajectory>, FileError> {
-    let Some(names) = root.texts("trajectories")? else { return Ok(Vec::new()) };
-    let mut trajectories: Vec<NamedTrajectory> = Vec::new();
+    let Some(names) = root.texts("trajectories")? else {
+        // The scenario may have none of its own if these are wrong.
+        let any = (!root.knows("trajectories")).then(|| built_in("hover")?.read().ok()).flatten();
+        return Ok(any.map(trajectory).into_iter().collect());
+    };
+    let (mut trajectories, mut wrong) = (Vec::<NamedTrajectory>::new(), None::<FileError>);
     for name in names {
-        let next = trajectory(named(root, "trajectories", name, folder)?);
-        if trajectories.iter().any(|trajectory| trajectory.name == next.name) {
-            return Err(root.fault_at("trajectories", format!("\"{}\" is listed twice; once is enough", next.name)));
+        let twice = |name: &str| root.fault_at("trajectories", format!("\"{name}\" is listed twice; once is enough"));
+        match named(root, "trajectories", name, folder).map(trajectory) {
+            Ok(next) if trajectories.iter().all(|other| other.name != next.name) => trajectories.push(next),
+            read => {
+                let error = read.map_or_else(|error| error, |next| twice(&next.name));
+                wrong = Some(wrong.map_or(error.clone(), |wrong| wrong.and(error)));
+            }
         }
-        trajectories.push(next);
+    }
+    if let Some(wrong) = wrong {
+        return Err(wrong);
     }
     if trajectories.is_empty() {
         return Err(root.fault_at("trajectories", "the list is empty; name a scenario in it, or leave it out"));
@@ -88,7 +108,7 @@ pub(crate) fn named(root: &Table<'_>, key: &str, name: &str, folder: &Path) -> R
         return built_in.read();
     }
     let path: PathBuf = folder.join(name);
-    afbc_scenario::load(&path)
+    afbc_scenario::load(&path).map_err(|error| root.through(key, error))
 }
 
 fn spreads(mut table: Table<'_>, scenario: &Scenario) -> Result<Vec<Spread>, FileError> {
@@ -101,10 +121,10 @@ fn spreads(mut table: Table<'_>, scenario: &Scenario) -> Result<Vec<Spread>, Fil
             return Err(table.fault_at(range.name, "only whole numbers are drawn; write whole ends"));
         }
         if let Some(needed) = needs.filter(|needed| !wanted.contains(needed)) {
-            return Err(table.fault_at(range.name, format!("it has no effect without {needed}; add that")));
+            table.clash(range.name, &[], format!("it has no effect without {needed}; add that"))?;
         }
         if let Some(problem) = idle(range.name, scenario) {
-            return Err(table.fault_at(range.name, problem));
+            table.clash(range.name, &["scenario"], problem)?;
         }
         wanted.push(range.name);
         spreads.push(Spread { quantity: index, ends });

@@ -15,7 +15,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 use std::fmt;
-use std::fs::{self, File, TryLockError};
+use std::fs::{self, File};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -29,7 +29,6 @@ const RESULTS: &str = "results.parquet";
 /// File of the manifest, present from the beginning.
 const MANIFEST: &str = "campaign.json";
 const CHUNKS: &str = "chunks";
-const LOCK: &str = ".sitl.lock";
 /// Command recorded in the folder.
 const COMMAND: &str = "campaign";
 
@@ -37,8 +36,6 @@ const COMMAND: &str = "campaign";
 pub struct CampaignFolder {
     place: Place,
     manifest: Manifest,
-    /// Holds the lock until it is closed.
-    _lock: File,
 }
 
 /// `campaign.json`.
@@ -58,7 +55,7 @@ impl CampaignFolder {
     /// then.
     pub fn open(path: &Path, manifest: Manifest, force: bool) -> Result<Self, Error> {
         let name = manifest.name.clone();
-        let place = Place::find(path, COMMAND, &name, force)?;
+        Place::find(path, COMMAND, &name, force)?;
         let is_known = match found(&path.join(MANIFEST)) {
             Ok(Some(found)) if manifest.is_same(&found) => true,
             Ok(None) => false,
@@ -67,27 +64,18 @@ impl CampaignFolder {
             Ok(Some(_)) => return Err(Error::Changed(path.into())),
             Err(error) => return Err(error),
         };
-        fs::create_dir_all(path).map_err(|source| files::Error::Write { path: path.into(), source })?;
-        // Without truncation: with `force`, it may be somebody else's file.
-        let lock = File::options().write(true).create(true).truncate(false).open(path.join(LOCK));
-        let lock = lock.map_err(|source| place.error(LOCK, source))?;
-        match lock.try_lock() {
-            Err(TryLockError::WouldBlock) => return Err(Error::Busy(path.into())),
-            // Some network file systems have no locks: there, two programs must not use the same folder.
-            Err(TryLockError::Error(_)) | Ok(()) => {}
-        }
+        let place = Place::open(path, COMMAND, &name, force)?;
         place.add(&[MANIFEST, RESULTS, CHUNKS, "summary.json", "report.html"])?;
-        let folder = CampaignFolder { place, manifest, _lock: lock };
+        let folder = CampaignFolder { place, manifest };
         if force && folder.results().is_err() {
             // Results of another campaign, or damaged.
             fs::remove_file(path.join(RESULTS)).map_err(|source| folder.place.error(RESULTS, source))?;
         }
         if !is_known {
             let page = Page { manifest: &folder.manifest, checksum: seal::OPEN.into() };
-            folder.place.place(MANIFEST, |out| seal::json(out, &page))?;
+            folder.place_sealed(MANIFEST, |out| seal::json(out, &page))?;
         }
         // Only under the lock: no temporary file of a program that still runs is among them.
-        files::sweep(path);
         files::sweep(&path.join(CHUNKS));
         Ok(folder)
     }
@@ -102,9 +90,23 @@ impl CampaignFolder {
         &self.place
     }
 
+    /// Returns the paths of the files that have checksums of their own: the manifest and all rows.
+    pub fn sealed(&self) -> [PathBuf; 2] {
+        [MANIFEST, RESULTS].map(|name| self.path().join(name))
+    }
+
     /// Returns the manifest of the results.
     pub fn manifest(&self) -> &Manifest {
         &self.manifest
+    }
+
+    /// Writes a file with a checksum of its own, which says more of damage than the folder's can.
+    fn place_sealed(
+        &self,
+        name: &str,
+        fill: impl FnOnce(&mut (dyn Write + Send)) -> io::Result<()>,
+    ) -> Result<(), files::Error> {
+        files::place(&self.path().join(name), fill).map_err(|source| self.place.error(name, source))
     }
 
     /// Returns the number of all chunks.
@@ -202,7 +204,7 @@ impl CampaignFolder {
     /// The first error among the rows, or of writing; then no file is written.
     pub(super) fn write(&self, rows: impl Iterator<Item = Result<Row, Error>>) -> Result<(), Error> {
         let mut failure = None;
-        let written = self.place.place(RESULTS, |out| {
+        let written = self.place_sealed(RESULTS, |out| {
             write(out, &self.manifest, rows.map_while(|row| row.map_err(|error| failure = Some(error)).ok()))?;
             // Otherwise an error would leave an incomplete file that looks complete.
             if failure.is_some() { Err(io::ErrorKind::InvalidData.into()) } else { Ok(()) }

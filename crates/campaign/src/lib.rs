@@ -2,7 +2,8 @@
 //!
 //! Flight `i` is drawn from the campaign's seed and `i` alone, so it can be flown again by itself on any machine. All
 //! contenders fly the same draws. `docs/campaigns.md` describes the format of campaign files. [`compare`] flies
-//! unmodified scenarios under every contender, [`suite`] lists of them; [`random`] draws flights over vehicles.
+//! unmodified scenarios under every contender, [`suite`] lists of them; [`random`] and [`rough`] draw
+//! flights over vehicles.
 #![forbid(unsafe_code)]
 
 mod built_in;
@@ -17,6 +18,7 @@ mod parquet;
 mod plan;
 mod quantity;
 pub mod random;
+pub mod rough;
 mod row;
 pub mod statistics;
 pub mod subject;

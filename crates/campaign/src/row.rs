@@ -5,6 +5,7 @@ use afbc_scenario::contender::Contender;
 use afbc_sim::flight::{FlightStart, Lost};
 use afbc_sim::metrics::{Accumulator, Metrics, is_settled};
 use afbc_types::OutOfRange;
+use core::ops::ControlFlow;
 
 /// Result of one flight of one contender: a row of the results.
 #[derive(Clone, Debug, PartialEq)]
@@ -149,6 +150,7 @@ impl Tally {
             outcome.saturated += u64::from(health.saturated);
             outcome.tripped = outcome.tripped.or(health.fallback.map(|reason| (sample.time_s, reason)));
             outcome.settled += u64::from(is_settled(sample.time_s));
+            ControlFlow::Continue(())
         })?;
         outcome.metrics = metrics.finish();
         Ok(outcome)

@@ -1,9 +1,10 @@
-//! What a name stands for: a scenario or a campaign, built in or in a file.
+//! Reads the scenario, campaign or vehicle that a name stands for, built in or in a file.
 
 use crate::built_in;
 use crate::plan::Campaign;
-use afbc_reader::FileError;
-use afbc_scenario::Scenario;
+use afbc_reader::{BuiltIn, FileError};
+use afbc_scenario::{Scenario, vehicle_of};
+use afbc_vehicles::Vehicle;
 use std::path::{Path, PathBuf};
 use toml::de::DeTable;
 
@@ -14,15 +15,19 @@ pub enum SubjectKind {
     Scenario,
     /// Flown by `sitl campaign`.
     Campaign,
+    /// Flown by `--vehicle`.
+    Vehicle,
 }
 
-/// A scenario or a campaign, read.
+/// A scenario, a campaign or a vehicle, read.
 #[derive(Clone, Debug)]
 pub enum Subject {
     /// Flown by `sitl fly`.
     Scenario(Scenario),
     /// Flown by `sitl campaign`.
     Campaign(Campaign),
+    /// Flown by `--vehicle`.
+    Vehicle(Box<Vehicle>),
 }
 
 /// A file found, but not parsed.
@@ -41,6 +46,8 @@ struct Found {
 
 /// Top-level keys that only a campaign has.
 const CAMPAIGN: [&str; 4] = ["flights", "spread", "scenario", "trajectories"];
+/// Top-level keys that only a vehicle has.
+const VEHICLE: [&str; 2] = ["motor", "rotor"];
 /// Top-level key that every scenario and no campaign has.
 const SCENARIO: &str = "trajectory";
 
@@ -49,14 +56,14 @@ impl SubjectKind {
         match self {
             SubjectKind::Scenario => "scenario",
             SubjectKind::Campaign => "campaign",
+            SubjectKind::Vehicle => "vehicle",
         }
     }
 
-    const fn other(self) -> SubjectKind {
-        match self {
-            SubjectKind::Scenario => SubjectKind::Campaign,
-            SubjectKind::Campaign => SubjectKind::Scenario,
-        }
+    /// The built-in one of another kind called `name`.
+    fn other(self, name: &str) -> Option<Found> {
+        let all = [SubjectKind::Scenario, SubjectKind::Campaign, SubjectKind::Vehicle];
+        all.into_iter().filter(|kind| *kind != self).find_map(|kind| kind.built_in(name))
     }
 
     /// Returns the kind of file by its `text`; none if it could be either.
@@ -65,7 +72,8 @@ impl SubjectKind {
         let has = |key: &str| document.get_ref().contains_key(key);
         match has(SCENARIO) {
             true => Some(SubjectKind::Scenario),
-            false => CAMPAIGN.into_iter().any(has).then_some(SubjectKind::Campaign),
+            false if CAMPAIGN.into_iter().any(has) => Some(SubjectKind::Campaign),
+            false => VEHICLE.into_iter().any(has).then_some(SubjectKind::Vehicle),
         }
     }
 
@@ -73,6 +81,7 @@ impl SubjectKind {
         let text = match self {
             SubjectKind::Scenario => afbc_scenario::built_in(name)?.text,
             SubjectKind::Campaign => built_in::built_in(name)?.text,
+            SubjectKind::Vehicle => afbc_vehicles::built_in(name)?.text,
         };
         let file = format!("built-in {name}");
         let [shown, name] = [name; 2].map(str::to_owned);
@@ -83,12 +92,13 @@ impl SubjectKind {
         match self {
             SubjectKind::Scenario => afbc_scenario::similar_built_in(name).map(|known| known.name),
             SubjectKind::Campaign => built_in::similar_built_in(name).map(|known| known.name),
+            SubjectKind::Vehicle => BuiltIn::similar(&afbc_vehicles::BUILT_IN, name).map(|known| known.name),
         }
     }
 
     /// Returns the error that `name` is neither built in nor a file.
     pub fn unknown(self, name: &str) -> FileError {
-        if let Some(Err(refused)) = self.other().built_in(name).map(|found| found.only(self)) {
+        if let Some(Err(refused)) = self.other(name).map(|found| found.only(self)) {
             return refused;
         }
         let kind = self.name();
@@ -109,7 +119,7 @@ impl Found {
             return Ok(found);
         }
         if let Some(name) = plain.filter(|_| !path.exists()) {
-            return kind.other().built_in(name).ok_or_else(|| kind.unknown(name));
+            return kind.other(name).ok_or_else(|| kind.unknown(name));
         }
         let text = afbc_reader::text(path, kind.name())?;
         let shown = path.display().to_string();
@@ -132,12 +142,17 @@ impl Found {
                 "this is a scenario: sitl fly {shown}; `sitl campaigns robustness` prints a campaign to start from"
             ),
             SubjectKind::Campaign => format!("this is a campaign: sitl campaign {shown}"),
+            SubjectKind::Vehicle => format!("this is a vehicle: sitl fly hover --vehicle {shown}"),
         };
         Err(FileError::whole(shown, problem))
     }
 
     fn scenario(&self) -> Result<Scenario, FileError> {
         afbc_scenario::parse(&self.file, &self.text, &self.name)
+    }
+
+    fn vehicle(&self) -> Result<Vehicle, FileError> {
+        vehicle_of(&self.file, &self.text, &self.name)
     }
 
     fn campaign(&self) -> Result<Campaign, FileError> {
@@ -161,15 +176,16 @@ pub fn campaign(path: &Path) -> Result<Campaign, FileError> {
     Found::at(path, SubjectKind::Campaign)?.only(SubjectKind::Campaign)?.campaign()
 }
 
-/// Reads and checks the scenario or campaign at `path`.
+/// Reads and checks the scenario, campaign or vehicle at `path`.
 ///
 /// # Errors
-/// The first error, as one line.
-pub fn either(path: &Path) -> Result<Subject, FileError> {
+/// Every mistake, each as one line.
+pub fn any(path: &Path) -> Result<Subject, FileError> {
     let found = Found::at(path, SubjectKind::Scenario)?;
     match found.kind {
         SubjectKind::Scenario => found.scenario().map(Subject::Scenario),
         SubjectKind::Campaign => found.campaign().map(Subject::Campaign),
+        SubjectKind::Vehicle => found.vehicle().map(|vehicle| Subject::Vehicle(Box::new(vehicle))),
     }
 }
 
@@ -184,6 +200,9 @@ mod tests {
         }
         for known in &built_in::BUILT_IN {
             assert_eq!(SubjectKind::of(known.text), Some(SubjectKind::Campaign), "{}", known.name);
+        }
+        for known in &afbc_vehicles::BUILT_IN {
+            assert_eq!(SubjectKind::of(known.text), Some(SubjectKind::Vehicle), "{}", known.name);
         }
         assert_eq!(SubjectKind::of(""), None);
         assert_eq!(SubjectKind::of("[trajectory"), None);

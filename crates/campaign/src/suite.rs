@@ -2,12 +2,14 @@
 
 use crate::compare;
 use crate::file::named;
-use afbc_reader::{BuiltIn, FileError, LIKE, Table};
+use afbc_reader::{BuiltIn, Example, FileError, LIKE, Table};
 use afbc_scenario::Scenario;
 use afbc_scenario::contender::Contender;
 use afbc_types::Range;
 use std::ffi::OsStr;
 use std::path::Path;
+
+const SAMPLE: Example = Example { command: "suites field", text: "" };
 
 /// A suite of flights.
 #[derive(Clone, Debug, PartialEq)]
@@ -93,7 +95,7 @@ impl Suite {
 /// # Errors
 /// The first mistake, as one line.
 pub fn parse(file: &str, text: &str, name: &str, folder: &Path) -> Result<Suite, FileError> {
-    afbc_reader::document_with_heirs(file, text, "suites field", ("flight", &OWN), |mut root| {
+    afbc_reader::document_with_heirs(file, text, SAMPLE, ("flight", &OWN), |mut root| {
         let [name, description] = afbc_reader::title(&mut root, name)?;
         let sources: Vec<Citation> = root.few_tables("source")?.into_iter().map(source).collect::<Result<_, _>>()?;
         let mut flights: Vec<SuiteFlight> = Vec::new();

@@ -160,7 +160,7 @@ fn a_folder_belongs_to_one_campaign_and_one_program() {
     };
     {
         let _held = CampaignFolder::open(&folder, Manifest::new(&campaign, Shard::WHOLE), false).unwrap();
-        assert!(refused(&campaign, Shard::WHOLE).contains("is being flown into it"));
+        assert!(refused(&campaign, Shard::WHOLE).contains("another program is writing into it"));
     }
     for (from, to) in [("seed = 7", "seed = 8"), ("\"circle\"", "\"step\""), ("0.02", "0.03"), ("= 150", "= 151")] {
         let error = refused(&parse(&SMALL.replace(from, to)), Shard::WHOLE);

@@ -50,6 +50,63 @@ fn a_seed_is_said_to_matter_where_it_does() {
     assert!(random >= 4 && fixed >= 4, "{random}, {fixed}");
 }
 
+/// A law's name stands for the law that flies, whichever scenario comes first; a printed law is called so.
+#[test]
+fn a_laws_name_is_that_of_the_law_that_flies_in_any_order() {
+    let all: Vec<Scenario> = BUILT_IN.iter().map(|known| known.read().unwrap()).collect();
+    for kind in ControllerKind::ALL {
+        for (a, b) in all.iter().flat_map(|a| all.iter().map(move |b| (a, b))) {
+            let own = compare::contenders(&[a.clone(), b.clone()]);
+            let chosen = compare::choose(&own, &[kind.name().to_owned()]).unwrap();
+            assert_eq!(chosen, [Contender::of(kind, Profile::Flight)], "{} {}", a.name, b.name);
+            let mut turned = compare::contenders(&[b.clone(), a.clone()]);
+            let name = |contender: &Contender| contender.name.clone();
+            let mut own = own;
+            own.sort_by_key(name);
+            turned.sort_by_key(name);
+            assert_eq!(own, turned, "{} {}", a.name, b.name);
+        }
+    }
+    let printed = compare::contenders(&[named("paper")]);
+    let titles: Vec<_> = printed.iter().map(|contender| (contender.name.as_str(), contender.title())).collect();
+    let [afbc, backstepping] = ["AFBC as printed", "backstepping as printed"];
+    assert_eq!(titles, [("afbc-as-printed", afbc), ("backstepping-as-printed", backstepping)]);
+}
+
+/// Of the built-in scenarios only the paper's flies the printed law, and says so.
+#[test]
+fn only_the_papers_scenario_flies_the_printed_law() {
+    for known in &BUILT_IN {
+        let scenario = known.read().unwrap();
+        for contender in &scenario.contenders {
+            let is_paper = scenario.name == "paper";
+            assert_eq!(contender.is_printed(), is_paper, "{}: {}", scenario.name, contender.name);
+            assert_eq!(contender.title().ends_with("as printed"), is_paper, "{}", scenario.name);
+        }
+    }
+}
+
+/// A comparison flies a scenario's own contenders as its file has them, on any vehicle.
+#[test]
+fn own_gains_fly_in_their_own_scenario() {
+    let text = "controllers = [\"pid\", \"afbc\"]\n[vehicle]\nname = \"racer\"";
+    let hover = "[trajectory]\nkind = \"hover\"\nposition_m = [0, 0, 1]\n";
+    let gentle = "[[contender]]\nname = \"gentle\"\ncontroller = \"pid\"\ngains = { position_p_1_s = 0.6 }\n";
+    let racer = afbc_scenario::parse("racer.toml", &format!("{text}\n{hover}{gentle}"), "racer").unwrap();
+    let masses = afbc_scenario::parse("light.toml", &format!("[vehicle]\nmass_kg = 0.3\n{hover}"), "light").unwrap();
+    let own = compare::contenders(&[racer.clone(), masses.clone(), named("hover")]);
+    let names: Vec<_> = own.iter().map(|contender| contender.name.as_str()).collect();
+    assert_eq!(names, ["pid", "afbc", "gentle", "backstepping"]);
+    for mut scenario in [racer, masses] {
+        let before = scenario.contenders.clone();
+        compare::fly_under(&mut scenario, &own).unwrap();
+        for contender in before {
+            let flies = scenario.contenders.iter().find(|other| other.name == contender.name).unwrap();
+            assert_eq!(*flies, contender, "{}", scenario.name);
+        }
+    }
+}
+
 #[test]
 fn differences_are_those_of_the_same_seeds() {
     let kinds = [ControllerKind::Pid, ControllerKind::Afbc, ControllerKind::Indi, ControllerKind::Backstepping];

@@ -19,6 +19,7 @@ mod instruments;
 mod noise;
 mod outdoor_instruments;
 mod realism;
+mod rising_faults;
 mod sensor_fault;
 mod sensors;
 mod tracker;

@@ -198,15 +198,18 @@ fn oscillations_above_the_cut_off_are_attenuated() {
     }
 }
 
-/// A sensor beside the centre of mass feels the acceleration of its own place, in its own axes: compared with the
-/// second difference of that place's path in a tumbling flight.
+/// A sensor beside the centre of mass feels the acceleration of its own place, told or not, in its own axes: compared
+/// with the second difference of that place's path in a tumbling flight.
 #[test]
 fn a_mounted_sensor_feels_its_own_place() {
     const DT_S: f64 = 1e-4;
     let mounting = Mounting { position_m: Vector3::new(0.05, -0.03, 0.02), attitude_rad: Vector3::new(0.3, -0.2, 2.5) };
     let initial = Motion { rates_rad_s: Vector3::new(4.0, -3.0, 6.0), ..Motion::default() };
     let mut plant = Plant::new(PlantModel::RigidBody, initial, Environment::calm(Parameters::PAPER).unwrap());
-    let mut sensor = afbc_plant::Instruments::new(&with(Imu { mounting, ..Imu::DEFAULT }), &[], 1, DT_S).unwrap();
+    let lever_m = Vector3::new(-0.02, 0.01, 0.04);
+    let told = Mounting { position_m: mounting.position_m - lever_m, ..mounting };
+    let imu = Imu { mounting: told, lever_m, ..Imu::DEFAULT };
+    let mut sensor = afbc_plant::Instruments::new(&with(imu), &[], 1, DT_S).unwrap();
     let axes = {
         let a = mounting.attitude_rad;
         UnitQuaternion::from_euler_angles(a.x, a.y, a.z)

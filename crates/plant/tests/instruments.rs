@@ -139,7 +139,7 @@ fn settings_out_of_range_are_refused_by_name() {
 
 /// From step 1000 to step 2000.
 fn fault(failure: Failure) -> InstrumentFault {
-    InstrumentFault { failure, start_s: 1.0, end_s: 2.0 }
+    InstrumentFault { failure, start_s: 1.0, end_s: 2.0, rise_s: 0.0 }
 }
 
 /// Whether a failure acts on what is taken at this time.

@@ -3,6 +3,8 @@
 "use strict";
 (() => {
   const PANEL_PX = 150, LEFT_PX = 66, KEY_STEP = 1 / 200;
+  // Share of a view that flights in space fill: vehicles and labels are larger than their places.
+  const FRAMED = 0.86;
   const SPEEDS = [0.25, 0.5, 1, 2, 5, 10];
   const dark = matchMedia("(prefers-color-scheme: dark)");
   const shade = (colors) => colors[dark.matches ? 1 : 0];
@@ -165,9 +167,10 @@
         series: [{}, ...traces.map((trace) => ({ stroke: () => shade(trace.colors), width: trace.width_px,
           alpha: trace.opacity, dash: trace.dash_px, points: { show: false } }))],
         axes: [
-          { ...axis, show: true, size: last ? 40 : 8, label: last ? "t [s]" : undefined, labelSize: 16,
-            labelFont: axis.font, values: last ? undefined : () => [] },
-          { ...axis, size: LEFT_PX - 20, label: plain(panel.label), labelSize: 20, labelFont: axis.font },
+          { ...axis, ...ticked(60, "width"), show: true, size: last ? 40 : 8, label: last ? "t [s]" : undefined,
+            labelSize: 16, labelFont: axis.font, ...(last ? {} : { values: () => [] }) },
+          { ...axis, ...ticked(26, "height"), size: LEFT_PX - 20, label: plain(panel.label), labelSize: 20,
+            labelFont: axis.font },
         ],
         hooks: {
           drawClear: [(plot) => this.shadeSpans(plot, index === 0)],
@@ -212,8 +215,7 @@
         }
       }
       if (!(low <= high)) return [panel.low, panel.high];
-      const room = Math.max(0.06 * (high - low), 1e-4 * (panel.high - panel.low));
-      return [low - room, high + room];
+      return roomy(low, high, 1e-3 * (panel.high - panel.low));
     }
 
     shadeSpans(plot, labelled) {
@@ -357,7 +359,7 @@
       const { THREE, data } = this;
       const { low_m: low, high_m: high, rotors_m: rotors } = data;
       const size = high.map((value, i) => value - low[i]);
-      const extent = Math.max(...size);
+      const extent = this.extent = Math.max(...size);
       // One for all scenes of a page, of which a browser draws some sixteen at once; each has its picture.
       Space.renderer ??= new THREE.WebGLRenderer({ antialias: true });
       const canvas = element("canvas", { role: "img",
@@ -368,17 +370,12 @@
       this.scene.add(new THREE.HemisphereLight(0xffffff, 0x888888, 3));
       this.camera = new THREE.PerspectiveCamera(40, 1, extent / 1000, extent * 50);
       this.camera.up.set(0, 0, 1);
-      const middle = new THREE.Vector3(...low.map((value, i) => value + size[i] / 2));
-      // So far away that a ball around the box is seen whole.
-      const away = Math.hypot(...size) / 2 / Math.sin(Math.PI / 180 * this.camera.fov / 2);
-      this.camera.position.copy(middle).add(new THREE.Vector3(0.56, -0.72, 0.4).normalize().multiplyScalar(away));
       this.controls = new THREE.OrbitControls(this.camera, canvas);
-      this.controls.target.copy(middle);
+      this.controls.addEventListener("start", () => { this.moved = true; });
       this.controls.addEventListener("change", () => this.draw());
       // A page scrolls by the wheel; with the control key the wheel zooms.
       canvas.addEventListener("wheel", (event) => { if (!event.ctrlKey) event.stopImmediatePropagation(); },
         { capture: true, passive: true });
-      this.controls.update();
       // Floor: lines of 1, 2 or 5 times a power of ten metres.
       const step = [1, 2, 5, 10].map((n) => n * 10 ** Math.floor(Math.log10(extent / 8)))
         .find((s) => extent / s <= 16);
@@ -397,6 +394,8 @@
         this.labels.push({ sprite, text });
         this.scene.add(sprite);
       };
+      this.floorCorners = [x0, x1].flatMap((x) => [y0, y1].map((y) => [x, y, low[2]]));
+      this.ways = [];
       label(`x ${minus(x1.toPrecision(3))} m`, [x1 + extent * 0.1, y0, low[2]]);
       label(`y ${minus(y1.toPrecision(3))} m`, [x0, y1 + extent * 0.05, low[2]]);
       label(`${step} m grid, z ${minus(low[2].toFixed(1))} m`, [(x0 + x1) / 2, y0 - extent * 0.08, low[2]]);
@@ -404,7 +403,11 @@
       const scale = Math.max(1, extent * 0.03 / arm);
       for (const track of this.tracks) {
         const points = [];
-        for (let i = 0; i < track.times.length; i++) points.push(...track.position.map((values) => values[i]));
+        for (let i = 0; i < track.times.length; i++) {
+          const at = track.position.map((values) => values[i]);
+          points.push(...at);
+          this.ways.push(at);
+        }
         const geometry = new THREE.BufferGeometry();
         geometry.setAttribute("position", new THREE.BufferAttribute(new Float32Array(points), 3));
         track.material = new THREE.LineBasicMaterial({ transparent: true, opacity: track.attitude ? 0.9 : 0.8 });
@@ -482,7 +485,19 @@
       Object.assign(this.canvas, { width: Math.round(width * ratio), height: Math.round(height * ratio) });
       this.camera.aspect = width / height;
       this.camera.updateProjectionMatrix();
+      // Until a reader turns the view.
+      if (!this.moved) this.frame();
       this.draw();
+    }
+
+    /** Moves the camera to where all is seen as large as it fits. */
+    frame() {
+      const { camera, controls, floorCorners, ways, extent } = this;
+      const along = FRAMED * Math.tan(Math.PI / 360 * camera.fov);
+      const { position, middle } = bestSide(ways, floorCorners, [along * camera.aspect, along], extent / 4);
+      camera.position.set(...position);
+      controls.target.set(...middle);
+      controls.update();
     }
 
     draw() {

@@ -1,5 +1,6 @@
 //! A table: for the terminal, for a page, and for a paper as Markdown and as LaTeX with booktabs.
 
+use crate::table::line_width;
 use core::fmt::Write;
 use maud::{Markup, Render, html};
 
@@ -41,7 +42,17 @@ impl<T: Into<String>> From<T> for GridCell {
 
 impl Render for GridCell {
     fn render(&self) -> Markup {
-        html! { td { @if self.best { strong { (self.text) } "*" } @else { (self.text) } } }
+        // An interval goes below its median: beside it, a table of several columns is wider than a page.
+        let (figure, interval) = match self.text.split_once(" [") {
+            Some((figure, interval)) => (figure, Some(interval)),
+            None => (self.text.as_str(), None),
+        };
+        html! {
+            td {
+                @if self.best { strong { (figure) } "*" } @else { (figure) }
+                @if let Some(interval) = interval { br; small.quiet { "[" (interval) } }
+            }
+        }
     }
 }
 
@@ -54,27 +65,48 @@ pub(crate) fn tables(grids: &[Grid], name: &str, format: TableFormat) -> String 
     grids.iter().enumerate().map(one).collect::<Vec<_>>().join("\n")
 }
 
+/// Formats rows for the terminal: names to the left, cells to the right. Columns that do not fit beside others go below
+/// them, into a part of their own with the names again.
+pub(crate) fn parts(rows: &[(String, Vec<String>)]) -> Vec<Vec<String>> {
+    let width = |text: &str| text.chars().count();
+    let name_width = rows.iter().map(|(name, _)| width(name)).max().unwrap_or_default();
+    let columns = rows.iter().map(|(_, cells)| cells.len()).max().unwrap_or_default();
+    let widest =
+        |column: usize| rows.iter().filter_map(|(_, cells)| cells.get(column)).map(|cell: &String| width(cell)).max();
+    let widths: Vec<usize> = (0..columns).map(|column| widest(column).unwrap_or_default()).collect();
+    let (mut parts, mut used): (Vec<Vec<usize>>, usize) = (vec![Vec::new()], name_width);
+    for (column, width) in widths.iter().enumerate() {
+        used += 2 + width;
+        match parts.last_mut().filter(|part| part.is_empty() || used <= line_width()) {
+            Some(part) => part.push(column),
+            None => {
+                parts.push(vec![column]);
+                used = name_width + 2 + width;
+            }
+        }
+    }
+    let line = |(name, cells): &(String, Vec<String>), part: &[usize]| {
+        let cells = part.iter().filter_map(|column| Some((cells.get(*column)?, widths.get(*column)?)));
+        let cells: String = cells.map(|(cell, width)| format!("  {cell:>width$}")).collect();
+        format!("{name:<name_width$}{cells}").trim_end().to_owned()
+    };
+    parts.iter().map(|part| rows.iter().map(|row| line(row, part)).collect()).collect()
+}
+
 impl Grid {
-    /// Formats as lines for the terminal: names to the left, figures to the right, the best with an asterisk.
+    /// Formats as lines for the terminal: names to the left, figures to the right, the best with an asterisk. If it is
+    /// too wide, its last columns go below.
     pub(crate) fn lines(&self) -> Vec<String> {
+        self.parts().join(&String::new())
+    }
+
+    /// The same, part by part.
+    pub(crate) fn parts(&self) -> Vec<Vec<String>> {
         let marked = |cell: &GridCell| cell.text.clone() + if cell.best { "*" } else { " " };
         let heads: Vec<String> = self.heads.iter().skip(1).map(|head| format!("{head} ")).collect();
         let first = self.heads.first().cloned().unwrap_or_default();
         let rows = self.rows.iter().map(|(name, cells)| (name.clone(), cells.iter().map(marked).collect()));
-        let rows: Vec<(String, Vec<String>)> = [(first, heads)].into_iter().chain(rows).collect();
-        let width = |text: &str| text.chars().count();
-        let name_width = rows.iter().map(|(name, _)| width(name)).max().unwrap_or_default();
-        let columns = rows.iter().map(|(_, cells)| cells.len()).max().unwrap_or_default();
-        let widest = |column: usize| {
-            rows.iter().filter_map(|(_, cells)| cells.get(column)).map(|cell: &String| width(cell)).max()
-        };
-        let widths: Vec<usize> = (0..columns).map(|column| widest(column).unwrap_or_default()).collect();
-        let line = |(name, cells): &(String, Vec<String>)| {
-            let cells = cells.iter().zip(&widths).map(|(cell, width)| format!("  {cell:>width$}"));
-            let line = format!("{name:<name_width$}{}", cells.collect::<String>());
-            line.trim_end().to_owned()
-        };
-        rows.iter().map(line).collect()
+        parts(&[(first, heads)].into_iter().chain(rows).collect::<Vec<_>>())
     }
 
     /// Formats for a page, below a heading: table and note.

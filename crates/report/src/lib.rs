@@ -21,6 +21,7 @@ mod reality;
 pub mod replay;
 mod report;
 pub mod results;
+pub mod rough;
 pub mod suite;
 mod summary;
 mod table;
@@ -28,3 +29,4 @@ mod words;
 
 pub use figures::contender_color;
 pub use grid::TableFormat;
+pub use table::for_terminal;

@@ -37,6 +37,7 @@ h1, h2, h3, p, dd, figcaption { overflow-wrap: anywhere; }
 table { border-collapse: separate; border-spacing: 0; margin: .6rem 0; font-variant-numeric: tabular-nums; }
 th, td { padding: .16rem .65rem; text-align: right; white-space: nowrap; }
 th { font-weight: 600; }
+td small { display: inline-block; font-size: .75rem; line-height: 1.1; }
 th:first-child, td:first-child, .name, .prose { text-align: left; }
 .prose { white-space: normal; min-width: 14rem; }
 .prose code { overflow-wrap: anywhere; }
@@ -47,7 +48,8 @@ thead tr:last-child > * { border-color: var(--rule); }
 .lost { color: var(--bad); text-align: left; }
 .heat td { background: color-mix(in srgb, var(--bad) calc(0.55 * var(--heat, 0%)), var(--paper)); }
 .heat .best { background: color-mix(in srgb, var(--good) 30%, var(--paper)); font-weight: 600; }
-.heat .lost { text-align: right; }
+.heat .lost { text-align: right; color: var(--paper);
+  background: color-mix(in srgb, var(--bad) 75%, var(--paper)); }
 .heat a { color: inherit; text-underline-offset: .2em; }
 dl { margin: .4rem 0; }
 dl > div { display: grid; grid-template-columns: 8.5rem 1fr; margin: .7rem 0; }

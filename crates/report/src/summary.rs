@@ -88,6 +88,7 @@ const fn name(aid: Aid) -> &'static str {
         Aid::TrackerPosition => "tracker-position",
         Aid::TrackerAttitude => "tracker-attitude",
         Aid::GnssPosition => "gnss-position",
+        Aid::GnssHeight => "gnss-height",
         Aid::GnssVelocity => "gnss-velocity",
         Aid::Height => "height",
         Aid::Heading => "heading",

@@ -1,14 +1,36 @@
-//! The table for the terminal: plain text of at most [`WIDTH`] columns.
+//! The table for the terminal.
 
 use crate::claims::Claim;
 use crate::groups::{Group, groups};
 use crate::words;
 use afbc_sim::flown::Flown;
 use afbc_sim::metrics::{Metrics, SETTLED_S};
+use core::cell::Cell;
 use nalgebra::Vector4;
 
-/// Widest line.
+/// Widest line of text in files, and where nobody knows better.
 const WIDTH: usize = 100;
+
+thread_local! {
+    /// Widest line of text now.
+    static WIDTH_NOW: Cell<usize> = const { Cell::new(WIDTH) };
+}
+
+/// Width of a column of figures.
+const CELL: usize = 10;
+
+/// Returns the widest line of text now.
+pub(super) fn line_width() -> usize {
+    WIDTH_NOW.get()
+}
+
+/// Returns the table that `make` makes, its text wrapped for a terminal of so many columns.
+pub fn for_terminal(columns: usize, make: impl FnOnce() -> String) -> String {
+    WIDTH_NOW.set(columns.min(WIDTH));
+    let table = make();
+    WIDTH_NOW.set(WIDTH);
+    table
+}
 
 /// One block of figures: title, heads of its four columns, and values.
 pub(super) struct Block {
@@ -44,7 +66,7 @@ pub(super) const BLOCKS: [Block; 4] = [
         first: false,
     },
     Block {
-        title: "mean |dU| per step",
+        title: "mean |dU|",
         columns: ["U1 [mN]", "U2 [mN]", "U3 [mN]", "U4 [mN]"],
         digits: 1,
         values: |m| m.mean_abs_delta_u * 1000.0,
@@ -73,8 +95,8 @@ impl Block {
 /// Formats `value` with `digits` decimals, fewer if it is too wide for its column, and without "-0.000".
 fn number(value: f64, digits: usize) -> String {
     let text = format!("{value:.digits$}");
-    if text.len() > 11 {
-        format!("{value:.3e}")
+    if text.len() >= CELL {
+        format!("{value:.2e}")
     } else if text.bytes().all(|b| matches!(b, b'-' | b'0' | b'.')) {
         text.trim_start_matches('-').into()
     } else {
@@ -85,8 +107,8 @@ fn number(value: f64, digits: usize) -> String {
 /// Explains the figures in one sentence.
 pub(super) fn legend() -> String {
     format!(
-        "Error: reference minus vehicle, from {SETTLED_S} s to the end. Mean |dU| per step: mean absolute change of \
-         each input from one control step to the next."
+        "Error: reference minus vehicle, from {SETTLED_S} s to the end. Mean |dU|: mean absolute change of each input \
+         from one control step to the next."
     )
 }
 
@@ -121,8 +143,10 @@ fn flights(group: &Group, lines: &mut Vec<String>) {
     wrap(lines, "", &format!("{}: {}", group.scenario.name, words::conditions(group.scenario)));
     // Width of the longest printed name.
     let name_width = group.flights.iter().map(|flight| flight.run.contender.title().chars().count()).max().unwrap_or(0);
-    let rule = "─".repeat(20 + name_width + 4 * 12);
-    let mut head = [""; 4];
+    // Titles, names and figures fit a terminal of 80 columns.
+    let title_width = BLOCKS.iter().map(|block| block.title.len() + 2).max().unwrap_or(0);
+    let rule = "─".repeat(title_width + name_width + 4 * CELL);
+    let (widths, mut head) = ([title_width, name_width], [""; 4]);
     for block in &BLOCKS {
         let rows: Vec<_> = block.rows(group).collect();
         if rows.is_empty() {
@@ -133,14 +157,16 @@ fn flights(group: &Group, lines: &mut Vec<String>) {
         } else {
             head = block.columns;
             lines.push(rule.clone());
-            lines.push(row("", "", name_width, &head));
+            lines.push(row("", "", widths, &head));
         }
         let mut title = block.title;
         for flight in rows {
             let name = flight.run.contender.title();
             lines.push(match &flight.run.lost {
-                Some(lost) => format!("{title:<20}{name:<name_width$}   {}", words::lost(lost)),
-                None => row(title, name, name_width, &block.cells(flight)),
+                Some(lost) => {
+                    format!("{title:<title_width$}{name:<name_width$}   {}", words::lost(lost))
+                }
+                None => row(title, name, widths, &block.cells(flight)),
             });
             title = "";
         }
@@ -156,20 +182,20 @@ fn flights(group: &Group, lines: &mut Vec<String>) {
     }
 }
 
-fn row(title: &str, name: &str, name_width: usize, cells: &[impl AsRef<str>; 4]) -> String {
+fn row(title: &str, name: &str, [title_width, name_width]: [usize; 2], cells: &[impl AsRef<str>; 4]) -> String {
     let [a, b, c, d] = cells.each_ref().map(AsRef::as_ref);
-    format!("{title:<20}{name:<name_width$}{a:>12}{b:>12}{c:>12}{d:>12}")
+    format!("{title:<title_width$}{name:<name_width$}{a:>CELL$}{b:>CELL$}{c:>CELL$}{d:>CELL$}")
 }
 
 /// Appends `text` behind `first`, wrapped; further lines are aligned with the text.
 pub(super) fn wrap(lines: &mut Vec<String>, first: &str, text: &str) {
-    let mut line = first.to_owned();
+    let (width, mut line) = (line_width(), first.to_owned());
     let mut length = first.chars().count();
     let indent = length;
     for word in text.split_whitespace() {
         let word_length = word.chars().count();
         if length > indent {
-            if length + 1 + word_length > WIDTH {
+            if length + 1 + word_length > width {
                 lines.push(core::mem::replace(&mut line, " ".repeat(indent)));
                 length = indent;
             } else {

@@ -1,9 +1,10 @@
 //! Which contenders fly a scenario.
 
 use crate::Scenario;
-use crate::contender::{Contender, ControllerKind};
+use crate::contender::{Contender, has_printed_cascade};
 use afbc::Profile;
 use afbc_reader::FileError;
+use afbc_reader::words::cure;
 
 impl Scenario {
     /// Keeps the contenders named in `names`, or whose law is, and adds the laws named that no contender flies, with
@@ -17,28 +18,50 @@ impl Scenario {
             if self.contenders.iter().any(|contender| called(contender, name)) {
                 continue;
             }
-            let Some(kind) = ControllerKind::named(name) else {
+            let Some(contender) = Contender::named(name) else {
                 return Err(self.unknown_contender(name));
             };
-            let mut contender = Contender::of(kind, Profile::Paper);
-            contender = match &self.vehicle_file {
-                Some(vehicle) => contender.on(vehicle, Profile::Flight)?,
-                None => contender.for_vehicle(&self.vehicle),
-            };
-            // A scenario keeps what its [settings] say nowhere but in its contenders.
-            if let Some(other) = self.contenders.first() {
-                contender.settings = other.settings;
-            }
-            self.contenders.push(contender);
+            self.contenders.push(self.settled(contender)?);
         }
         self.contenders.retain(|contender| names.iter().any(|name| called(contender, name)));
         self.check().map_err(|error| FileError::whole(&self.name, error.to_string()))
     }
 
+    /// Gives a standard contender the scenario's profile, vehicle and settings. A printed law keeps its own profile.
+    fn settled(&self, contender: Contender) -> Result<Contender, FileError> {
+        // A scenario keeps what its profile and [settings] say nowhere but in its contenders.
+        let first = self.contenders.first();
+        let is_printed = first.is_some_and(|first| has_printed_cascade(&first.settings));
+        let contender = match is_printed {
+            true => Contender { name: contender.name, ..Contender::of(contender.law.kind(), Profile::Paper) },
+            false => contender,
+        };
+        let contender = self.carried(contender)?;
+        let Some(first) = first else { return Ok(contender) };
+        let settings = match contender.is_printed() == is_printed || !contender.kind().in_cascade() {
+            true => first.settings,
+            false => contender.settings.with_dt_s(first.settings.common.dt_s),
+        };
+        Ok(Contender { settings, ..contender })
+    }
+
+    /// Gives a standard contender its gains for this scenario's vehicle.
+    ///
+    /// # Errors
+    /// One line on what is wrong with the gains in the vehicle's file.
+    pub fn carried(&self, contender: Contender) -> Result<Contender, FileError> {
+        let profile = contender.kept_profile();
+        match &self.vehicle_file {
+            Some(vehicle) => contender.on(vehicle, profile),
+            None => Ok(contender.for_vehicle(&self.vehicle)),
+        }
+    }
+
     fn unknown_contender(&self, name: &str) -> FileError {
-        let laws = ControllerKind::names();
-        let own: Vec<_> = self.contenders.iter().map(|contender| contender.name.as_str()).collect();
-        let problem = format!("no such controller; the laws are {laws}, the scenario's contenders {}", own.join(", "));
+        let standard: Vec<_> = Contender::all_standard().map(|contender| contender.name).collect();
+        let own = self.contenders.iter().map(|contender| &contender.name).filter(|own| !standard.contains(own));
+        let cure = cure(name, standard.iter().chain(own).map(String::as_str));
+        let problem = format!("no such controller; {cure}");
         FileError::whole(&format!("controller {}", name.escape_debug()), problem)
     }
 }

@@ -5,11 +5,13 @@ pub use crate::laws::{ControllerKind, Law};
 use crate::AnyController;
 use crate::laws::law_gains;
 use afbc::monitor::Bounds;
-use afbc::{Guarded, LAG_S, Profile, Settings, adaptive, by_rule, slowness};
+use afbc::{Guarded, LAG_S, Profile, Safeguards, Settings, adaptive, by_rule, slowness};
 use afbc_control::FlightController;
 use afbc_peers::slowed;
 use afbc_reader::FileError;
-use afbc_types::{Airframe, Declaration, Declared, OutOfRange, Parameters, PerAxis, Rotor, ValueMut, with_rotors};
+use afbc_types::{
+    Airframe, Axis, Declaration, Declared, OutOfRange, Parameters, PerAxis, Rotor, ValueMut, with_rotors,
+};
 use afbc_vehicles::Vehicle;
 use core::convert::Infallible;
 
@@ -37,6 +39,15 @@ impl Law {
     }
 }
 
+/// Returns name and title of a law of this kind as printed, if the profile `flight` adds to it.
+const fn printed_names(kind: ControllerKind) -> Option<[&'static str; 2]> {
+    match kind {
+        ControllerKind::Afbc => Some(["afbc-as-printed", "AFBC as printed"]),
+        ControllerKind::Backstepping => Some(["backstepping-as-printed", "backstepping as printed"]),
+        _ => None,
+    }
+}
+
 /// A named controller with its law, gains and settings.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Contender {
@@ -55,6 +66,28 @@ impl Contender {
     pub fn of(kind: ControllerKind, profile: Profile) -> Self {
         let (law, settings) = (Law::of(kind, profile), profile.settings());
         Contender { name: kind.name().into(), law, settings, monitored: false }
+    }
+
+    /// Returns the law of this kind with gains and settings of `profile`, under a name that tells a printed law from
+    /// the one that flies.
+    pub fn standard(kind: ControllerKind, profile: Profile) -> Self {
+        let contender = Contender::of(kind, profile);
+        match printed_names(kind).filter(|_| profile == Profile::Paper) {
+            Some([name, _]) => Contender { name: name.into(), ..contender },
+            None => contender,
+        }
+    }
+
+    /// Returns the standard contenders: every law that flies, and those that differ from it as printed.
+    pub fn all_standard() -> impl Iterator<Item = Contender> {
+        let flies = |kind| Contender::standard(kind, Profile::Flight);
+        let printed = ControllerKind::PAPER.map(|kind| Contender::standard(kind, Profile::Paper));
+        ControllerKind::all().into_iter().map(flies).chain(printed)
+    }
+
+    /// Returns the standard contender called `name`: a law's own name is that of the law that flies.
+    pub fn named(name: &str) -> Option<Self> {
+        Contender::all_standard().find(|contender| contender.name == name)
     }
 
     /// Returns it under AFBC's monitor, if it flies AFBC.
@@ -91,9 +124,37 @@ impl Contender {
         self.law.kind()
     }
 
-    /// Returns the name for tables and figures.
+    /// Returns the name for tables and figures, in which a printed law is called so.
     pub fn title(&self) -> &str {
-        if self.name == self.kind().name() { self.kind().title() } else { &self.name }
+        let kind = self.kind();
+        match printed_names(kind) {
+            Some([name, title]) if self.name == name || (self.name == kind.name() && self.is_printed()) => title,
+            _ if self.name == kind.name() => kind.title(),
+            _ => &self.name,
+        }
+    }
+
+    /// Returns it under the printed law's name, if it flies that under the name of its law: for results of several
+    /// scenarios, which have no other words for it.
+    #[must_use]
+    pub fn named_as_printed(self) -> Self {
+        match printed_names(self.kind()).filter(|_| self.is_printed() && self.name == self.kind().name()) {
+            Some([name, _]) => Contender { name: name.into(), ..self },
+            None => self,
+        }
+    }
+
+    /// True if the law is the printed one, whatever its gains: without anything that the profile `flight` adds.
+    pub fn is_printed(&self) -> bool {
+        let guarded = |gains: &adaptive::Gains| gains.safeguards != Safeguards::NONE;
+        printed_names(self.kind()).is_some()
+            && has_printed_cascade(&self.settings)
+            && !self.gains().is_some_and(|gains| Axis::ALL.iter().any(|axis| guarded(&gains[*axis])))
+    }
+
+    /// Returns the profile that it flies on another vehicle.
+    pub fn kept_profile(&self) -> Profile {
+        if self.is_printed() { Profile::Paper } else { Profile::Flight }
     }
 
     /// Returns the profile with these gains and settings, if there is one.
@@ -186,6 +247,13 @@ impl Contender {
             self.controller::<N>(parameters, rotors)?.mixer().check_hover(parameters.to_f32().weight_n())
         })
     }
+}
+
+/// True if the cascade has none of the additions of the profile `flight`. The numbers that the paper leaves open,
+/// rotors, filters and limits, may be any.
+pub(crate) fn has_printed_cascade(settings: &Settings) -> bool {
+    let Settings { common, command_filter_rad_s, forward_rad_s, limits, .. } = *settings;
+    *settings == Settings { common, command_filter_rad_s, forward_rad_s, limits, ..Profile::Paper.settings() }
 }
 
 /// Returns a time step rounded to remove the error of `f32` decimals \[s\].

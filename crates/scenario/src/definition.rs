@@ -2,6 +2,7 @@
 
 use crate::case::Case;
 use crate::contender::{Contender, ControllerKind};
+use crate::told::{Told, stated};
 use crate::trajectory::Trajectory;
 use afbc::Profile;
 use afbc_estimator::Settings;
@@ -68,6 +69,8 @@ pub struct Scenario {
     pub sensor_faults: Vec<SensorFault>,
     /// Instruments of the vehicle, for its estimator; their mounting is the vehicle file's.
     pub instruments: InstrumentSuite,
+    /// What the vehicle's software is told of them.
+    pub told: Told,
     /// Failures of the instruments.
     pub instrument_faults: Vec<InstrumentFault>,
     /// Outages of the link.
@@ -215,10 +218,41 @@ impl Scenario {
         StateSensor::new(&self.sensing, self.seed, step_s).map(Some)
     }
 
-    /// Returns the estimator's settings: those that the data sheets of the instruments ask for.
+    /// Returns what the vehicle is told whatever a campaign draws from here on.
     #[must_use]
-    pub fn estimation(&self, imu: &Imu, step_s: f64) -> Settings {
-        data_sheet::settings(&self.instruments, imu, self.rotors.len(), self.vehicle.gravity_m_s2, step_s)
+    pub fn told_before_draws(&self) -> Told {
+        match &self.told {
+            Told::Stated => Told::Suite(Box::new(self.told())),
+            told => told.clone(),
+        }
+    }
+
+    /// Returns what the vehicle's software is told of its instruments. Which of them there are, it finds out.
+    #[must_use]
+    pub fn told(&self) -> InstrumentSuite {
+        let there = &self.instruments;
+        let told = match &self.told {
+            Told::Stated => stated(there, self.vehicle_file.as_ref()),
+            Told::Drawn => *there,
+            Told::Suite(told) => **told,
+        };
+        InstrumentSuite {
+            imu: there.imu.map(|own| told.imu.unwrap_or(own)),
+            tracker: there.tracker.map(|own| told.tracker.unwrap_or(own)),
+            gnss: there.gnss.map(|own| told.gnss.unwrap_or(own)),
+            barometer: there.barometer.map(|own| told.barometer.unwrap_or(own)),
+            magnetometer: there.magnetometer.map(|own| told.magnetometer.unwrap_or(own)),
+        }
+    }
+
+    /// Returns the estimator's settings: those that the data sheets of the instruments that it is told of ask for, and
+    /// what the vehicle's file states instead.
+    #[must_use]
+    pub fn estimation(&self, step_s: f64) -> Settings {
+        let told = self.told();
+        let imu = told.imu.unwrap_or(Imu::DEFAULT);
+        let settings = data_sheet::settings(&told, &imu, self.rotors.len(), self.vehicle.gravity_m_s2, step_s);
+        self.vehicle_file.as_ref().map_or(settings, |vehicle| vehicle.stated_over(settings))
     }
 
     /// Returns how the inertial sensor is mounted, as the vehicle's file says.

@@ -14,6 +14,7 @@ mod file;
 mod flown_law;
 mod laws;
 pub mod paper;
+mod told;
 pub mod trajectory;
 mod vehicle_named;
 
@@ -25,4 +26,5 @@ pub use laws::{
     AnyController, AnyControllerMemory, OWN_GAINS_MAX, OwnController, OwnFlight, OwnGain, OwnGains, OwnKind, OwnLaw,
     OwnMemory, OwnVehicle,
 };
-pub use vehicle_named::vehicle_named;
+pub use told::Told;
+pub use vehicle_named::{vehicle_named, vehicle_of};

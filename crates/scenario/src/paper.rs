@@ -3,6 +3,7 @@
 use crate::Scenario;
 use crate::case::{Case, Reading, Uncertainty};
 use crate::contender::{Contender, ControllerKind};
+use crate::told::Told;
 use crate::trajectory::Trajectory;
 use afbc::Profile;
 use afbc_plant::{
@@ -59,6 +60,7 @@ pub fn scenario(model: PlantModel, case: Case) -> Result<Scenario, OutOfRange> {
         sensing: Sensing::default(),
         sensor_faults: Vec::new(),
         instruments: InstrumentSuite::default(),
+        told: Told::Stated,
         instrument_faults: Vec::new(),
         outages: Vec::new(),
         flight_core: false,

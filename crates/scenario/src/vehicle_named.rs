@@ -3,7 +3,7 @@
 use crate::contender::{ControllerKind, Law};
 use afbc::Profile;
 use afbc_reader::FileError;
-use afbc_vehicles::{Vehicle, built_in, unknown};
+use afbc_vehicles::{BUILT_IN, Vehicle, built_in, unknown};
 use std::path::Path;
 
 /// Returns the vehicle that `path` stands for, checked, with the gains of its file: a plain name is a built-in one
@@ -24,4 +24,28 @@ pub fn vehicle_named(path: &Path) -> Result<Vehicle, FileError> {
     // Gains of every law, so that a slip in a table's name is reported whoever flies.
     Law::on(ControllerKind::Afbc, &vehicle, Profile::Flight)?;
     Ok(vehicle)
+}
+
+/// Reads and checks a vehicle from its `text`, with the gains of every law. `file` is its path for errors, `name` its
+/// name if it has no other.
+///
+/// # Errors
+/// Every mistake, each as one line.
+pub fn vehicle_of(file: &str, text: &str, name: &str) -> Result<Vehicle, FileError> {
+    let read = afbc_vehicles::parse(file, text, name);
+    // Where the file is wrong elsewhere, gains are checked on a vehicle that is not.
+    let base = match &read {
+        Ok(vehicle) => Some(vehicle.clone()),
+        Err(_) => BUILT_IN.iter().find_map(|known| known.read().ok()),
+    };
+    let base = base.map(|base| base.with_law_gains(file, text));
+    let gains = |vehicle: &Vehicle| {
+        let of = |kind| Law::on(kind, vehicle, Profile::Flight).err();
+        ControllerKind::all().into_iter().filter_map(of).reduce(FileError::and)
+    };
+    match (read, base.as_ref().and_then(gains)) {
+        (read, None) => read,
+        (Ok(_), Some(gains)) => Err(gains),
+        (Err(error), Some(gains)) => Err(error.and(gains)),
+    }
 }

@@ -1,9 +1,10 @@
 //! Paths of one's own: minimum snap through waypoints, samples and polynomials from files.
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "tests")]
 
-use afbc_scenario::trajectory::minimum_snap::{PaceLimits, minimum_snap};
+use afbc_scenario::trajectory::minimum_snap::{PaceLimits, distance_m, minimum_snap};
 use afbc_scenario::trajectory::polynomial::{Coefficients, PolynomialPiece, peaks};
-use afbc_scenario::trajectory::{Reference, Trajectory};
+use afbc_scenario::trajectory::{Reference, SAMPLES, Trajectory};
+use core::f64::consts::TAU;
 use proptest::prelude::*;
 use std::fs;
 use std::path::PathBuf;
@@ -13,8 +14,11 @@ const LIMITS: PaceLimits = PaceLimits { speed_m_s: 3.0, acceleration_m_s2: 4.0 }
 fn places() -> impl Strategy<Value = Vec<[f64; 4]>> {
     let place = (-20.0..20.0, -20.0..20.0, 0.5..20.0, -3.0..3.0)
         .prop_map(|(x, y, z, yaw): (f64, f64, f64, f64)| [x, y, z, yaw]);
-    prop::collection::vec(place, 2..12).prop_filter("not too near", |places| {
-        places.windows(2).all(|pair| (0..3).map(|i| f64::abs(pair[0][i] - pair[1][i])).sum::<f64>() > 0.5)
+    // Distances that differ by more than five times may have no path that is near the places.
+    prop::collection::vec(place, 2..12).prop_filter("distances alike", |places| {
+        let lengths_m = places.windows(2).map(|pair| distance_m(&pair[0], &pair[1]));
+        let (shortest_m, longest_m) = lengths_m.fold((50.0, 0.5), |(a, b), m| (f64::min(a, m), f64::max(b, m)));
+        longest_m < 5.0 * shortest_m
     })
 }
 
@@ -54,7 +58,9 @@ proptest! {
         }
         for (piece, place) in pieces.iter().zip(&places) {
             for (axis, value) in place.iter().enumerate() {
-                prop_assert!((piece.coefficients[axis][0] - value).abs() < 1e-9);
+                // A heading but for whole turns.
+                let whole = if axis == 3 { TAU * ((piece.coefficients[axis][0] - value) / TAU).round() } else { 0.0 };
+                prop_assert!((piece.coefficients[axis][0] - value - whole).abs() < 1e-9);
             }
         }
         for pair in pieces.windows(2) {
@@ -67,7 +73,7 @@ proptest! {
                 }
             }
         }
-        let [speed, acceleration, ..] = peaks(&pieces);
+        let [speed, acceleration, ..] = peaks(&pieces, SAMPLES);
         prop_assert!(speed <= LIMITS.speed_m_s && acceleration <= LIMITS.acceleration_m_s2);
         prop_assert!(speed > 0.99 * LIMITS.speed_m_s || acceleration > 0.99 * LIMITS.acceleration_m_s2);
     }
@@ -208,6 +214,22 @@ fn polynomials_are_flown_as_they_are() {
     let broken = format!("{head}\n{}{}", row(2.0, [0.0, 0.0, 0.5]), row(1.0, [2.5, 2.0, 0.0]));
     let refused = scenario(&folder, &broken, "").unwrap_err();
     assert!(refused.contains("path.csv:3: duration: it begins 0.500 m"), "{refused}");
+}
+
+/// Semicolons with decimal commas, as spreadsheets write where a comma is decimal, and tabs.
+#[test]
+fn a_path_may_be_separated_otherwise() {
+    let folder = folder("separated");
+    let commas = "time_s,x_m,y_m,z_m\n0,0,0,1\n0.5,0.25,-1e-1,1\n1,1,0,1.5\n";
+    let expected = scenario(&folder, commas, "").unwrap();
+    for separated in [
+        commas.replace(',', ";"),
+        commas.replace(',', "\t"),
+        commas.replace(',', ";").replace('.', ","),
+        commas.replace(',', " \t ").replace('.', ","),
+    ] {
+        assert_eq!(scenario(&folder, &separated, "").unwrap(), expected, "{separated}");
+    }
 }
 
 /// Whatever is wrong with a file is told in one line with its name, line and column.

@@ -1,11 +1,15 @@
 //! One flight with its log and metrics.
 
-use crate::flight::{Lost, Sample, fly};
+use crate::flight::{Lost, Sample, fly_until};
 use crate::metrics::{Accumulator, Metrics, inputs};
 use afbc_scenario::Scenario;
 use afbc_scenario::contender::Contender;
 use afbc_types::OutOfRange;
+use core::ops::ControlFlow;
 use nalgebra::Vector4;
+
+/// Steps between looks at whether a flight is over: milliseconds of work.
+pub const LOOK_STEPS: u64 = 1024;
 
 /// A flight of a scenario under one contender.
 #[derive(Clone, Debug)]
@@ -45,12 +49,25 @@ impl Run {
     /// # Errors
     /// The first parameter, gain or setting out of range; nothing has been flown then.
     pub fn fly(scenario: &Scenario, contender: &Contender, log_every: u64) -> Result<Self, OutOfRange> {
+        Run::fly_unless(scenario, contender, log_every, || false)
+    }
+
+    /// Flies as [`Run::fly`] does, and ends early once `is_over`, which is asked every [`LOOK_STEPS`].
+    ///
+    /// # Errors
+    /// As there.
+    pub fn fly_unless(
+        scenario: &Scenario,
+        contender: &Contender,
+        log_every: u64,
+        is_over: impl Fn() -> bool,
+    ) -> Result<Self, OutOfRange> {
         let log_every = log_every.max(1);
         let mut metrics = Accumulator::default();
         let (mut log, mut input_extremes) = (Vec::new(), Vec::new());
         let mut unlogged: Option<(Sample, [Vector4<f64>; 2])> = None;
         let (mut step, mut tripped) = (0, None);
-        let lost = fly(scenario, contender, |sample| {
+        let lost = fly_until(scenario, contender, |sample| {
             metrics.add(sample);
             if let Some(reason) = sample.action.health.fallback {
                 tripped.get_or_insert(Tripped { time_s: sample.time_s, reason });
@@ -67,6 +84,7 @@ impl Run {
                 unlogged = Some((*sample, extremes));
             }
             step += 1;
+            if step % LOOK_STEPS == 0 && is_over() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         })?;
         if let Some((last, extremes)) = unlogged {
             log.push(last);

@@ -40,7 +40,10 @@ fn instruments_and_faults_that_do_not_exist_are_refused() {
     let parts = "\"icm-42688-p\", \"bmi270\" or \"mpu-6000\"";
     let known = "imu, tracker, gnss, barometer, magnetometer";
     let cases = [
-        ("[instruments]\nimu = \"bmi160\"", format!("2: instruments.imu: \"bmi160\" is unknown; it must be {parts}")),
+        (
+            "[instruments]\nimu = \"bmi160\"",
+            format!("2: instruments.imu: \"bmi160\" is unknown; did you mean \"bmi270\"? It must be {parts}"),
+        ),
         ("[instruments]\ncompass = \"ist8310\"", format!("2: instruments.compass: unknown key; known here: {known}")),
         (
             "[instruments]\ngnss = \"m10\"",
@@ -68,7 +71,26 @@ fn instruments_and_faults_that_do_not_exist_are_refused() {
         ),
         (
             &format!("{imu}[[instrument_fault]]\nfailure = \"imu-dead\"\nby_m = [1, 0, 0]\nstart_s = 1"),
-            "5: instrument_fault.by_m: unknown key; known here: failure, start_s, duration_s".into(),
+            "5: instrument_fault.by_m: unknown key; known here: failure, start_s, duration_s, rise_s".into(),
+        ),
+        (
+            &format!("{imu}[[instrument_fault]]\nfailure = \"imu-dead\"\nstart_s = 1\nrise_s = 2"),
+            "6: instrument_fault.rise_s: imu-dead has no size that could grow; leave it out".into(),
+        ),
+        (
+            "told = \"drawn\"",
+            "1: told: there are no instruments to be told of; add [instruments], or leave it out".into(),
+        ),
+        (&format!("told = \"flown\"\n{imu}"), "1: told: \"flown\" is unknown; it must be \"drawn\"".into()),
+        (
+            &format!("{imu}[told]\ngnss = \"m10\""),
+            "4: told.gnss: there is no gnss to be told of; add it to [instruments], or leave it out".into(),
+        ),
+        (&format!("{imu}[told]\nbaro = 1"), "4: told.baro: unknown key; did you mean barometer?".into()),
+        (&format!("{imu}[tolt]\nimu = \"bmi270\""), "3: tolt: unknown key; did you mean told?".into()),
+        (
+            &format!("{imu}[told.imu.gyro]\nvibration = 1"),
+            "4: told.imu.gyro.vibration: unknown key; did you mean vibration_rad_s (radians per second)?".into(),
         ),
     ];
     for (text, message) in cases {

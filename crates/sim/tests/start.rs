@@ -5,7 +5,8 @@ use afbc::Profile;
 use afbc_plant::Motion;
 use afbc_scenario::contender::{Contender, ControllerKind};
 use afbc_scenario::parse;
-use afbc_sim::flight::{Estimated, FlightStart, fly};
+use afbc_sim::flight::{Estimated, FlightStart, Sample, fly};
+use core::ops::ControlFlow;
 
 const FLIGHT: &str = r#"
 duration_s = 0.3
@@ -33,7 +34,11 @@ fn contenders_do_not_feel_who_flew_before() {
             let (mut alone, mut after): (Vec<_>, Vec<_>) = (Vec::new(), Vec::new());
             let of = |motion: Motion, estimated: Option<Estimated>| (motion, estimated);
             fly(&scenario, &contender, |sample| alone.push(of(sample.motion, sample.estimated))).unwrap();
-            start.fly(&contender, &mut |sample| after.push(of(sample.motion, sample.estimated))).unwrap();
+            let mut observe = |sample: &Sample| {
+                after.push(of(sample.motion, sample.estimated));
+                ControlFlow::Continue(())
+            };
+            start.fly(&contender, &mut observe).unwrap();
             assert_eq!(alone, after, "{name}, {kind:?}");
             assert_eq!(alone.len(), 301);
             ends.extend(alone.last().map(|(motion, _)| *motion));

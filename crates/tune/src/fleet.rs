@@ -222,29 +222,26 @@ impl Results {
             start: if flying { "flying" } else { "by hand" }.into(),
             searches: searches.iter().map(Search::planned).collect(),
         };
-        let place = Folder::find(path, COMMAND, NAME, false).map_err(|error| match error {
+        let cured = |error| match error {
             files::Error::Foreign { path, whose } => {
                 format!("{}: {whose}; choose another folder, or delete it", path.display())
             }
             error => error.to_string(),
-        })?;
-        match read::<FleetManifest>(&path.join(MANIFEST))? {
-            Some(held) if held != manifest => {
-                let what = held.differs(&manifest);
-                return Err(
-                    format!("{}: holds searches {what}; choose another folder, or delete it", path.display()).into()
-                );
-            }
-            Some(_) => {}
-            None => {
-                let place = Folder::open(path, COMMAND, NAME, false)?;
-                let names: Vec<_> = manifest.searches.iter().map(file_name).collect();
-                place.add(&names)?;
-                place.add(&[MANIFEST, GAINS])?;
-                place.place(MANIFEST, |out| put(out, &manifest))?;
-            }
+        };
+        Folder::find(path, COMMAND, NAME, false).map_err(cured)?;
+        let held = read::<FleetManifest>(&path.join(MANIFEST))?;
+        if let Some(held) = held.as_ref().filter(|held| **held != manifest) {
+            let what = held.differs(&manifest);
+            return Err(
+                format!("{}: holds searches {what}; choose another folder, or delete it", path.display()).into()
+            );
         }
-        files::sweep(path);
+        let place = Folder::open(path, COMMAND, NAME, false).map_err(cured)?;
+        if held.is_none() {
+            place.add(&manifest.searches.iter().map(file_name).collect::<Vec<_>>())?;
+            place.add(&[MANIFEST, GAINS])?;
+            place_sealed(&place, MANIFEST, |out| put(out, &manifest))?;
+        }
         Ok(Results { place, course, manifest })
     }
 
@@ -314,8 +311,7 @@ impl Results {
         };
         let outcome = search.run(self.course, goes_on).map_err(|error| error.to_string())?;
         let Some(outcome) = outcome else { return Ok(()) };
-        self.place.place(&file_name(&outcome.planned), |out| put(out, &outcome))?;
-        Ok(())
+        Ok(place_sealed(&self.place, &file_name(&outcome.planned), |out| put(out, &outcome))?)
     }
 
     /// Writes the gains of each vehicle among `outcomes`, ready to go into its file; returns the files.
@@ -329,8 +325,16 @@ impl Results {
         for vehicle in self.vehicles() {
             let path = folder.join(format!("{vehicle}.toml"));
             let text = self.gains_of(&vehicle, outcomes);
-            files::place(&path, |out| out.write_all(text.as_bytes()))
-                .map_err(|source| files::Error::Write { path: path.clone(), source })?;
+            match fs::read(&path) {
+                Ok(held) if held == text.as_bytes() => {}
+                // The same searches write the same bytes.
+                Ok(_) => {
+                    let cure = "move it, and start again";
+                    return Err(format!("{}: changed since it was written; {cure}", path.display()).into());
+                }
+                Err(_) => files::place(&path, |out| out.write_all(text.as_bytes()))
+                    .map_err(|source| files::Error::Write { path: path.clone(), source })?,
+            }
             paths.push(path);
         }
         Ok(paths)
@@ -381,6 +385,15 @@ impl FleetManifest {
 
 fn file_name(planned: &Planned) -> String {
     format!("{}.{}.json", planned.vehicle, planned.law)
+}
+
+/// Writes a file with a checksum of its own, which says more of damage than the folder's can.
+fn place_sealed(
+    place: &Folder,
+    name: &str,
+    fill: impl FnOnce(&mut (dyn Write + Send)) -> io::Result<()>,
+) -> Result<(), files::Error> {
+    files::place(&place.path().join(name), fill).map_err(|source| place.error(name, source))
 }
 
 fn put(out: &mut dyn Write, page: &impl Serialize) -> io::Result<()> {

@@ -36,7 +36,7 @@ pub fn report(
             let _ = writeln!(text, "# {:<16}{before:>10.4}{after:>10.4}", scenario.name);
         }
         let (before, after) = (mean(&before), mean(&after));
-        let _ = writeln!(text, "# {title:<16}{before:>10.4}{after:>10.4}  mean\n#");
+        let _ = writeln!(text, "# {title:<16}{before:>10.4}{after:>10.4}  geometric mean\n#");
     }
     for condition in conditions.iter().filter(|condition| condition.is_asked_of(contender.kind())) {
         let met = |contender| Ok::<_, OutOfRange>(if condition.factor(contender)? > 1.0 { "not met" } else { "met" });

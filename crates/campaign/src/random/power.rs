@@ -3,6 +3,7 @@
 use super::bisection::largest;
 use super::change::Change;
 use afbc_plant::Battery;
+use afbc_scenario::trajectory::SAMPLES;
 use afbc_scenario::trajectory::polynomial::peaks;
 use afbc_scenario::trajectory::{Reference, Trajectory};
 use afbc_types::Rotor;
@@ -164,7 +165,7 @@ fn fastest_rad_s(trajectory: &Trajectory) -> f64 {
         }
         // As if the largest jerk and acceleration were of one sine.
         Trajectory::Polynomials(pieces) => {
-            let [_, acceleration, jerk, _] = peaks(pieces);
+            let [_, acceleration, jerk, _] = peaks(pieces, SAMPLES);
             if acceleration > 0.0 { jerk / acceleration } else { 0.0 }
         }
         Trajectory::Paper | Trajectory::Hover { .. } | Trajectory::Step { .. } => 0.0,

@@ -9,7 +9,7 @@ use super::tracker::TrackerFix;
 use crate::noise::{Noise, Stream};
 use afbc_types::{OutOfRange, Range};
 use alloc::vec::Vec;
-use libm::{cos, sin};
+use libm::{cos, exp, sin, sqrt};
 use nalgebra::{Quaternion, Vector3};
 
 /// What is wrong with an instrument.
@@ -59,6 +59,14 @@ pub enum Failure {
         /// \[m\].
         by_m: Vector3<f64>,
     },
+    /// Reflections: an additional error of the GNSS receiver's position that wanders, a first-order Gauss-Markov
+    /// process, of which the receiver does not know.
+    GnssMultipath {
+        /// Its standard deviation, per coordinate \[m\].
+        deviation_m: f64,
+        /// Its correlation time \[s\].
+        correlation_time_s: f64,
+    },
     /// The barometer sends nothing.
     BarometerLost,
     /// The barometer repeats the height before the onset.
@@ -78,7 +86,7 @@ pub enum Failure {
 
 impl Failure {
     /// Each kind, its numbers zero.
-    pub const ALL: [Failure; 16] = {
+    pub const ALL: [Failure; 17] = {
         let zero = Vector3::new(0.0, 0.0, 0.0);
         [
             Failure::ImuStuck,
@@ -91,6 +99,7 @@ impl Failure {
             Failure::TrackerJumped { by_m: zero, yaw_rad: 0.0 },
             Failure::GnssLost,
             Failure::GnssJumped { by_m: zero },
+            Failure::GnssMultipath { deviation_m: 0.0, correlation_time_s: 1.0 },
             Failure::BarometerLost,
             Failure::BarometerStuck,
             Failure::BarometerBlocked,
@@ -113,6 +122,7 @@ impl Failure {
             Failure::TrackerJumped { .. } => "tracker-jumped",
             Failure::GnssLost => "gnss-lost",
             Failure::GnssJumped { .. } => "gnss-jumped",
+            Failure::GnssMultipath { .. } => "gnss-multipath",
             Failure::BarometerLost => "barometer-lost",
             Failure::BarometerStuck => "barometer-stuck",
             Failure::BarometerBlocked => "barometer-blocked",
@@ -120,6 +130,30 @@ impl Failure {
             Failure::MagnetometerStuck => "magnetometer-stuck",
             Failure::MagnetometerDisturbed { .. } => "magnetometer-disturbed",
         }
+    }
+
+    /// Returns this share of it, if it has a size; none for what either is or is not.
+    pub fn scaled(self, share: f64) -> Option<Self> {
+        Some(match self {
+            Failure::ImuNoisy { rates_rad_s, specific_force_m_s2 } => {
+                Failure::ImuNoisy { rates_rad_s: rates_rad_s * share, specific_force_m_s2: specific_force_m_s2 * share }
+            }
+            Failure::ImuBiased { rates_bias_rad_s, force_bias_m_s2 } => Failure::ImuBiased {
+                rates_bias_rad_s: rates_bias_rad_s * share,
+                force_bias_m_s2: force_bias_m_s2 * share,
+            },
+            Failure::TrackerJumped { by_m, yaw_rad } => {
+                Failure::TrackerJumped { by_m: by_m * share, yaw_rad: yaw_rad * share }
+            }
+            Failure::GnssJumped { by_m } => Failure::GnssJumped { by_m: by_m * share },
+            Failure::GnssMultipath { deviation_m, correlation_time_s } => {
+                Failure::GnssMultipath { deviation_m: deviation_m * share, correlation_time_s }
+            }
+            Failure::MagnetometerDisturbed { field_ut } => {
+                Failure::MagnetometerDisturbed { field_ut: field_ut * share }
+            }
+            _ => return None,
+        })
     }
 }
 
@@ -133,6 +167,8 @@ pub struct InstrumentFault {
     pub start_s: f64,
     /// End \[s\]; infinite for a failure that stays.
     pub end_s: f64,
+    /// Time from the onset in which it grows to its size, evenly \[s\]; 0 for at once.
+    pub rise_s: f64,
 }
 
 /// Accepted ranges of a failure's numbers.
@@ -146,14 +182,27 @@ pub mod limits {
     pub const JUMP: Range = Range::new("by_m", -10_000.0, 10_000.0);
     pub const YAW: Range = Range::new("yaw_rad", -10.0, 10.0);
     pub const FIELD: Range = Range::new("field_ut", -100_000.0, 100_000.0);
+    pub const DEVIATION: Range = Range::new("deviation_m", 0.0, 1000.0);
+    pub const CORRELATION: Range = Range::new("correlation_time_s", 0.001, 1e5);
     pub const START: Range = Range::new("start_s", 0.0, f64::INFINITY);
+    pub const RISE: Range = Range::new("rise_s", 0.0, 36_000.0);
 }
 
 impl InstrumentFault {
+    /// What is wrong at `now_s`, while it grows.
+    fn at(&self, now_s: f64) -> Failure {
+        if now_s >= self.start_s + self.rise_s {
+            return self.failure;
+        }
+        let share = (now_s - self.start_s) / self.rise_s;
+        self.failure.scaled(share).unwrap_or(self.failure)
+    }
+
     /// # Errors
     /// The first number out of range, by name.
     pub(super) fn validate(&self) -> Result<(), OutOfRange> {
         limits::START.check(self.start_s)?;
+        limits::RISE.check(self.rise_s)?;
         let each = |range: Range, vector: &Vector3<f64>| vector.iter().try_for_each(|&number| range.check(number));
         match &self.failure {
             Failure::ImuNoisy { rates_rad_s, specific_force_m_s2 }
@@ -170,13 +219,17 @@ impl InstrumentFault {
                 limits::YAW.check(*yaw_rad)
             }
             Failure::GnssJumped { by_m } => each(limits::JUMP, by_m),
+            Failure::GnssMultipath { deviation_m, correlation_time_s } => {
+                limits::DEVIATION.check(*deviation_m)?;
+                limits::CORRELATION.check(*correlation_time_s)
+            }
             Failure::MagnetometerDisturbed { field_ut } => each(limits::FIELD, field_ut),
             _ => Ok(()),
         }
     }
 }
 
-/// What an instrument said before the onset.
+/// What an instrument said before the onset, and where an error that wanders is.
 #[derive(Clone, Copy, Debug, Default)]
 struct Held {
     imu: Option<ImuReading>,
@@ -184,6 +237,8 @@ struct Held {
     height: Option<HeightFix>,
     true_height_m: Option<f64>,
     field: Option<FieldFix>,
+    /// Standard deviations off, and since when \[s\].
+    wander: Option<(Vector3<f64>, f64)>,
 }
 
 /// The failures of a flight, which act one after the other, as listed.
@@ -218,7 +273,7 @@ impl Failures {
     fn active(faults: &mut [(InstrumentFault, Held)], now_s: f64) -> impl Iterator<Item = (Failure, &mut Held)> {
         let now_s = now_s + TIME_SLACK_S;
         let active = faults.iter_mut().filter(move |(fault, _)| (fault.start_s..fault.end_s).contains(&now_s));
-        active.map(|(fault, held)| (fault.failure, held))
+        active.map(move |(fault, held)| (fault.at(now_s), held))
     }
 
     pub(super) fn imu(&mut self, mut seen: ImuReading) -> Option<ImuReading> {
@@ -272,12 +327,22 @@ impl Failures {
         alive.then_some(seen)
     }
 
-    pub(super) fn gnss(&mut self, mut seen: GnssFix) -> Option<GnssFix> {
+    pub(super) fn gnss(&mut self, now_s: f64, mut seen: GnssFix) -> Option<GnssFix> {
         let mut alive = true;
-        for (failure, _) in Self::active(&mut self.faults, seen.true_at_s) {
+        // By the true time, as the tracker's.
+        for (failure, held) in Self::active(&mut self.faults, now_s) {
             match failure {
                 Failure::GnssLost => alive = false,
                 Failure::GnssJumped { by_m } => seen.position_m += by_m,
+                Failure::GnssMultipath { deviation_m, correlation_time_s } => {
+                    let drawn = draw(&mut self.random);
+                    let off = held.wander.map_or(drawn, |(off, since_s)| {
+                        let kept = exp((since_s - now_s) / correlation_time_s);
+                        off * kept + drawn * sqrt(1.0 - kept * kept)
+                    });
+                    held.wander = Some((off, now_s));
+                    seen.position_m += off * deviation_m;
+                }
                 _ => {}
             }
         }

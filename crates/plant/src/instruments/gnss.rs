@@ -24,6 +24,9 @@ parameters! {
         /// Largest deviation of the delay, uniform; no fix arrives before its motion.
         #[parameter(JITTER, "s", 0.0..=1.0)]
         pub jitter_s: f64 = 0.0,
+        /// Error of every time stamp; positive if stamps are late.
+        #[parameter(STAMP, "s", -1.0..=1.0)]
+        pub stamp_s: f64 = 0.0,
         /// Standard deviation of the horizontal position's slow error, a first-order Gauss-Markov process, per
         /// coordinate.
         #[parameter(HORIZONTAL, "m", 0.0..=1000.0)]
@@ -52,7 +55,7 @@ parameters! {
 /// Position and velocity, earth frame, with the receiver's own opinion of them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GnssFix {
-    /// Time at which it was true \[s\].
+    /// Time at which it was true, as far as the receiver knows \[s\].
     pub true_at_s: f64,
     /// Position \[m\].
     pub position_m: Vector3<f64>,
@@ -110,7 +113,7 @@ impl Receiver {
         self.slow.advance(&mut self.random);
         let sigma = |slow: f64| reported * sqrt(slow * slow + noise_m * noise_m);
         let fix = GnssFix {
-            true_at_s: truth.time_s,
+            true_at_s: truth.time_s + self.gnss.stamp_s,
             position_m: truth.position_m + self.slow.value + draw(&mut self.random) * noise_m,
             velocity_m_s: truth.velocity_m_s + draw(&mut self.random) * velocity_m_s,
             horizontal_sigma_m: sigma(horizontal_m),

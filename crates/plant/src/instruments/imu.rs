@@ -108,6 +108,9 @@ parameters! {
         /// Amplitudes of the vibration at one, two and three times a rotor's frequency, relative to the first.
         #[parameter(HARMONICS, "1", 0.0..=10.0)]
         pub harmonics: Vector3<f64> = Vector3::new(1.0, 0.5, 0.25),
+        /// How far the sensor is from where its mounting says, body frame: flight software is told the mounting alone.
+        #[parameter(LEVER, "m", -0.2..=0.2)]
+        pub lever_m: Vector3<f64> = Vector3::new(0.0, 0.0, 0.0),
         /// Place on the vehicle.
         pub mounting: Mounting<f64> = Mounting::DEFAULT,
     }
@@ -185,7 +188,7 @@ impl Inertial {
         let mut random = Noise::new(seed, Stream::Imu);
         let amplitudes = [imu.gyro.vibration_rad_s, imu.accel.vibration_m_s2];
         Inertial {
-            mounted: Mounted::new(&imu.mounting),
+            mounted: Mounted::new(&imu.mounting, &imu.lever_m),
             gyro: Triad::new(&imu.gyro.quality(), &mut random, step_s),
             accel: Triad::new(&imu.accel.quality(), &mut random, step_s),
             vibration: Vibration::new(amplitudes, imu.harmonics, seed, step_s),

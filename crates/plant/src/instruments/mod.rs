@@ -143,7 +143,7 @@ impl Instruments {
         let (failures, height_m) = (&mut self.failures, truth.position_m.z);
         let imu = self.imu.as_mut().and_then(|imu| failures.imu(imu.sample(truth)));
         let tracker = self.tracker.as_mut().map(|it| it.measure(truth, |fix| failures.tracker(truth.time_s, fix)));
-        let gnss = self.gnss.as_mut().map(|it| it.measure(truth, |fix| failures.gnss(fix)));
+        let gnss = self.gnss.as_mut().map(|it| it.measure(truth, |fix| failures.gnss(truth.time_s, fix)));
         let barometer = self.barometer.as_mut().map(|it| it.measure(truth, |fix| failures.barometer(height_m, fix)));
         let magnetometer = self.magnetometer.as_mut().map(|it| it.measure(truth, |fix| failures.magnetometer(fix)));
         InstrumentReadings {

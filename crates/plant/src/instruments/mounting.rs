@@ -15,9 +15,10 @@ pub(super) struct Mounted {
 }
 
 impl Mounted {
-    pub(super) fn new(mounting: &Mounting<f64>) -> Self {
+    /// A sensor that is so far from where its mounting says.
+    pub(super) fn new(mounting: &Mounting<f64>, lever_m: &Vector3<f64>) -> Self {
         let [w, x, y, z] = quaternion(&mounting.attitude_rad);
-        Mounted { position_m: mounting.position_m, axes: BodyAxes::of_quaternion(w, x, y, z) }
+        Mounted { position_m: mounting.position_m + lever_m, axes: BodyAxes::of_quaternion(w, x, y, z) }
     }
 
     /// Returns angular rate and specific force at the sensor, sensor axes: f + d omega/dt x r + omega x (omega x r).

@@ -25,8 +25,8 @@ pub(super) fn cells(tally: &Tally) -> Vec<String> {
         Some(_) => "lost".into(),
     };
     let mut cells = vec![percent(value), format!("{:.2} to {:.2}", 100.0 * low, 100.0 * high)];
-    cells.extend(PERCENTS.map(|percent| at(&tally.rmse_position_m, percent, 1.0, 3)));
-    cells.extend([50.0, 99.0].map(|percent| at(&tally.max_position_m, percent, 1.0, 3)));
+    cells.extend(PERCENTS.map(|percent| at(&tally.rmse_position_m, percent, 1.0, 5)));
+    cells.extend([50.0, 99.0].map(|percent| at(&tally.max_position_m, percent, 1.0, 4)));
     cells.push(at(&tally.mean_abs_du4_n, 50.0, 1000.0, 1));
     cells.push(percent(tally.tripped as f64 / tally.count.flights as f64));
     cells
@@ -59,7 +59,7 @@ pub(super) fn bad(target: &str, tally: &Tally, bad: &Bad) -> [String; 2] {
     let how = match &bad.lost {
         Some((time_s, reason)) => format!("lost at t = {time_s:.3} s: {reason}"),
         None => match bad.rmse_position_m {
-            Some(rmse_m) => format!("{rmse_m:.3} m from the reference, root mean square"),
+            Some(rmse_m) => format!("{rmse_m:.5} m from the reference, root mean square"),
             None => format!("over before {SETTLED_S} s, from which errors count"),
         },
     };

@@ -1,11 +1,69 @@
 //! A campaign's table for the terminal.
 
 use super::cells::{HEADS, bad, cells, flights, legend};
-use crate::table::wrap;
+use crate::table::{line_width, wrap};
 use afbc_campaign::Summary;
 
 /// Space between columns.
 const GAP: usize = 2;
+
+/// A group of columns.
+struct Group {
+    title: &'static str,
+    heads: &'static [&'static str],
+    widths: Vec<usize>,
+    /// Place of its first cell in a row.
+    first: usize,
+}
+
+impl Group {
+    fn room(&self) -> usize {
+        self.widths.iter().map(|width| width + GAP).sum()
+    }
+
+    /// Returns its part of a row.
+    fn cells<'a>(&self, cells: impl IntoIterator<Item = &'a str>) -> String {
+        cells.into_iter().zip(&self.widths).map(|(cell, width)| right(cell, width + GAP)).collect()
+    }
+}
+
+fn width(text: &str) -> usize {
+    text.chars().count()
+}
+
+fn right(text: &str, to: usize) -> String {
+    " ".repeat(to.saturating_sub(width(text))) + text
+}
+
+/// Returns the groups with their columns as wide as heads and cells are.
+fn groups(body: &[Vec<String>]) -> Vec<Group> {
+    let mut first = 0;
+    let mut groups = Vec::new();
+    for (title, heads) in HEADS {
+        let cell = |row: &Vec<String>, index: usize| row.get(index).map_or(0, |cell| width(cell));
+        let widest = |index: usize| body.iter().map(|row| cell(row, index)).max().unwrap_or(0);
+        let widths = heads.iter().enumerate().map(|(index, head)| widest(first + index).max(width(head))).collect();
+        let mut group = Group { title, heads, widths, first };
+        let lacks = (width(title) + GAP).saturating_sub(group.room());
+        group.widths.iter_mut().take(1).for_each(|width| *width += lacks);
+        first += heads.len();
+        groups.push(group);
+    }
+    groups
+}
+
+/// Divides the groups into tables that are no wider than a line.
+fn parts(groups: Vec<Group>, name_width: usize) -> Vec<Vec<Group>> {
+    let mut parts: Vec<Vec<Group>> = Vec::new();
+    for group in groups {
+        let used = |part: &Vec<Group>| name_width + part.iter().map(Group::room).sum::<usize>();
+        match parts.last_mut().filter(|part| used(part) + group.room() <= line_width()) {
+            Some(part) => part.push(group),
+            None => parts.push(vec![group]),
+        }
+    }
+    parts
+}
 
 /// Formats the results of every contender, and each one's worst flight with the command that flies it again; `target`
 /// is the campaign's name for `sitl campaign`.
@@ -13,39 +71,20 @@ pub fn table(summary: &Summary, target: &str) -> String {
     let manifest = &summary.manifest;
     let mut lines = vec![format!("{}: {} flights each", manifest.name, flights(summary))];
     let body: Vec<_> = summary.tallies.iter().map(cells).collect();
-    let columns: Vec<_> = HEADS.iter().flat_map(|(_, columns)| columns.iter()).collect();
-    let width = |text: &str| text.chars().count();
-    let mut widths: Vec<_> = columns
-        .iter()
-        .enumerate()
-        .map(|(i, head)| {
-            body.iter().filter_map(|cells| cells.get(i)).map(|cell| width(cell)).max().unwrap_or(0).max(width(head))
-        })
-        .collect();
     let name_width = summary.tallies.iter().map(|tally| width(&tally.contender)).max().unwrap_or(0);
-    let right = |text: &str, to: usize| " ".repeat((to + GAP).saturating_sub(width(text))) + text;
-
-    let mut groups = " ".repeat(name_width);
-    let mut rest = widths.iter_mut();
-    for (group, columns) in HEADS {
-        let mut columns: Vec<_> = rest.by_ref().take(columns.len()).collect();
-        let room = columns.iter().map(|width| **width + GAP).sum::<usize>() - GAP;
-        if let Some(first) = columns.first_mut() {
-            **first += width(group).saturating_sub(room);
+    for part in parts(groups(&body), name_width) {
+        let row = |name: &str, cells: &dyn Fn(&Group) -> String| {
+            let cells: String = part.iter().map(cells).collect();
+            format!("{name:<name_width$}{cells}")
+        };
+        let head = row("", &|group| group.cells(group.heads.iter().copied()));
+        lines.extend(["─".repeat(width(&head)), row("", &|group| right(group.title, group.room())), head]);
+        for (tally, cells) in summary.tallies.iter().zip(&body) {
+            let own = |group: &Group| group.cells(cells.iter().skip(group.first).map(String::as_str));
+            lines.push(row(&tally.contender, &own));
         }
-        groups += &right(group, room.max(width(group)));
     }
-    let row = |name: &str, cells: &mut dyn Iterator<Item = &str>| {
-        let cells: String = cells.zip(&widths).map(|(cell, &width)| right(cell, width)).collect();
-        name.to_owned() + &" ".repeat(name_width - width(name)) + &cells
-    };
-    let head = row("", &mut columns.iter().map(|head| **head));
-    let rule = "─".repeat(width(&head));
-    lines.extend([rule.clone(), groups, head]);
-    for (tally, cells) in summary.tallies.iter().zip(&body) {
-        lines.push(row(&tally.contender, &mut cells.iter().map(String::as_str)));
-    }
-    lines.push(rule);
+    lines.push("─".repeat(lines.last().map_or(0, |line| width(line))));
     wrap(&mut lines, "", &legend(summary));
     lines.extend([String::new(), "Worst flights".into()]);
     for tally in &summary.tallies {

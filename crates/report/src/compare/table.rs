@@ -28,21 +28,29 @@ fn block(comparison: &Comparison, lines: &mut Vec<String>) {
     };
     let heads = [""].into_iter().chain(heads(comparison)).map(String::from).collect();
     let rows = comparison.entries.iter().map(row).collect();
-    let figures = Grid { caption: String::new(), heads, rows, note: String::new() }.lines();
-    let rule = "─".repeat(figures.iter().map(|line| line.chars().count()).max().unwrap_or_default());
+    let parts = Grid { caption: String::new(), heads, rows, note: String::new() }.parts();
+    let rule = "─".repeat(parts.iter().flatten().map(|line| line.chars().count()).max().unwrap_or_default());
     lines.push(rule.clone());
     let names = comparison.entries.iter().map(|entry| entry.contender().title().chars().count()).max();
-    lines.extend(figures.first().cloned());
-    for (entry, line) in comparison.entries.iter().zip(figures.into_iter().skip(1)) {
-        let name = entry.contender().title();
-        lines.push(match cells(comparison, entry, alone) {
-            Some(_) => line,
-            None => format!("{name:<0$}  {1}", names.unwrap_or_default(), lost(entry)),
-        });
+    for (index, figures) in parts.into_iter().enumerate() {
+        lines.extend((index > 0).then(String::new));
+        lines.extend(figures.first().cloned());
+        for (entry, line) in comparison.entries.iter().zip(figures.into_iter().skip(1)) {
+            match cells(comparison, entry, alone) {
+                Some(_) => lines.push(line),
+                // Once: it has no figures below, either.
+                None if index == 0 => {
+                    let name = format!("{:<1$}  ", entry.contender().title(), names.unwrap_or_default());
+                    wrap(lines, &name, &lost(entry));
+                }
+                None => {}
+            }
+        }
     }
     lines.push(rule);
     if let Some(grid) = differences::grid(comparison) {
-        lines.extend([String::new(), format!("{}:", grid.caption)]);
+        lines.push(String::new());
+        wrap(lines, "", &format!("{}:", grid.caption));
         lines.extend(grid.lines());
         for entry in comparison.entries.iter().filter(|entry| 0 < entry.lost() && entry.lost() < entry.flights.len()) {
             wrap(lines, "", &format!("{}: {}.", entry.contender().title(), lost(entry)));

@@ -57,7 +57,7 @@ pub(crate) fn scripts(body: &Markup) -> Markup {
             (library("uPlot", afbc_web::UPLOT_JS))
             @if scenes { (library("THREE", afbc_web::THREE_JS)) }
             style { (PreEscaped(afbc_web::UPLOT_CSS)) }
-            script { (PreEscaped(SCRIPT)) }
+            script { (PreEscaped(afbc_web::fit_script())) (PreEscaped(SCRIPT)) }
         }
     }
 }

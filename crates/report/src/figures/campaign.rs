@@ -3,19 +3,20 @@
 use super::canvas::{self, Area, Failure, Ink, WIDTH_PX, marker, text, units};
 use super::palette::{BLACK, FRAME, GREY, GRID};
 use super::picture::Picture;
-use super::time_chart::{decimals, number};
+use super::ticks::{self, Axis, number};
 use crate::words;
 use afbc_campaign::statistics::{Share, percentile};
 use afbc_campaign::{BINS, Count, Drawn, Summary, Tally};
 use core::ops::Range;
-use plotters::coord::ranged1d::{Ranged, ValueFormatter};
-use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 use plotters::style::text_anchor::HPos;
 use std::io;
 
 /// Largest number of points of a curve.
 const POINTS: usize = 400;
+/// Largest number of ticks along a distribution, and on each other axis.
+const X_TICKS: usize = 12;
+const Y_TICKS: usize = 6;
 const LINE_PX: f64 = 1.6;
 const LEFT_PX: f64 = 62.0;
 const BOTTOM_PX: f64 = 42.0;
@@ -120,8 +121,11 @@ impl Distribution {
         let svg = canvas::svg(top_px + WIDE_PX, self.title, |area| {
             head(area, self.title, conditions, &legend)?;
             let area = area.clone().shrink((0, units(top_px)), (units(WIDTH_PX - MARGIN_PX), units(WIDE_PX)));
-            let mut chart = chart_on(&area, 6.0).build_cartesian_2d(range.clone().log_scale(), 0.0..TOP)?;
-            mesh(&mut chart, self.label, "flights [%]", 12, &|x| logarithmic(*x))?;
+            let mut chart = chart_on(&area, 6.0).build_cartesian_2d(
+                Axis::logarithmic(range.clone(), X_TICKS),
+                Axis::linear(0.0..TOP, ticks::linear(&(0.0..100.0), Y_TICKS).at),
+            )?;
+            mesh(&mut chart, self.label, "flights [%]", &|x| logarithmic(*x))?;
             let opacity = INTERVAL_OPACITY.min(INTERVALS_OPACITY / legend.len() as f64);
             for (curve, (_, ink)) in curves.iter().zip(&legend) {
                 let high = curve.iter().map(|(value, [_, _, high])| (*value, *high));
@@ -132,7 +136,7 @@ impl Distribution {
             for (index, (curve, (_, ink))) in curves.iter().zip(&legend).enumerate() {
                 // A line hidden by later ones is wider, to be visible on both sides of them.
                 let hidden = curves.iter().skip(index + 1).filter(|later| coincide(curve, later, px)).count();
-                let ink = Ink { width_px: LINE_PX * (1.0 + 1.5 * hidden as f64), ..*ink };
+                let ink = Ink { width_px: ink.width_px.max(LINE_PX * (1.0 + 1.5 * hidden as f64)), ..*ink };
                 let points: Vec<_> = curve.iter().map(|(value, [share, _, _])| (*value, *share)).collect();
                 chart.draw_series([PathElement::new(points, ink.style())])?;
             }
@@ -229,9 +233,12 @@ fn success_panel(
     let [low, high] = drawn.ends;
     // As much room above 100 as with an axis from 0.
     let top = 100.0 + (TOP - 100.0) * (1.0 - bottom / 100.0);
-    let mut chart = chart_on(area, 10.0).build_cartesian_2d(low..high, bottom..top)?;
-    let digits = decimals((high - low) / 5.0);
-    mesh(&mut chart, &words::drawn(&drawn.name), "not lost [%]", 6, &|x| short(*x, digits))?;
+    let values = ticks::linear(&(low..high), Y_TICKS);
+    let mut chart = chart_on(area, 10.0).build_cartesian_2d(
+        Axis::linear(low..high, values.at),
+        Axis::linear(bottom..top, ticks::linear(&(bottom..100.0), Y_TICKS).at),
+    )?;
+    mesh(&mut chart, &words::drawn(&drawn.name), "not lost [%]", &|x| short(*x, values.decimals))?;
     // Side by side within a tenth of the range, with a gap to the next.
     let bin_px = plot_px / BINS as f64;
     let apart_px = bin_px / (contenders.len() as f64 + 2.0);
@@ -269,17 +276,16 @@ fn chart_on<'a, 'b>(area: &'a Area<'b>, top_px: f64) -> ChartBuilder<'a, 'b, SVG
 }
 
 /// Draws frame, grid and labels of a chart.
-fn mesh<X: Ranged<ValueType = f64> + ValueFormatter<f64>>(
-    chart: &mut ChartContext<'_, SVGBackend<'_>, Cartesian2d<X, RangedCoordf64>>,
+fn mesh(
+    chart: &mut ChartContext<'_, SVGBackend<'_>, Cartesian2d<Axis, Axis>>,
     x_label: &str,
     y_label: &str,
-    x_ticks: usize,
     format: &dyn Fn(&f64) -> String,
 ) -> Result<(), Failure> {
     chart
         .configure_mesh()
-        .x_labels(x_ticks)
-        .y_labels(6)
+        .x_labels(X_TICKS)
+        .y_labels(X_TICKS)
         .max_light_lines(0)
         .bold_line_style(Ink::new(GRID, 0.75).style())
         .light_line_style(Ink::new(GRID, 0.25).style())

@@ -60,9 +60,16 @@ impl Ink {
     }
 }
 
-/// Returns a line for each of the contenders `names`: of two that share a colour, the second is dashed.
+/// AFBC's line is wider than the others by this factor: it is seen on both sides of a line that lies on it.
+const PROMINENT: f64 = 1.4;
+
+/// Returns a line for each of the contenders `names`: AFBC's is the widest; of two that share a colour, the second is
+/// dashed.
 pub(super) fn inks(names: &[&str], width_px: f64) -> Vec<Ink> {
-    let ink = |(name, dash): (&&str, usize)| Ink { dash, ..Ink::new(palette::color(name), width_px) };
+    let ink = |(name, dash): (&&str, usize)| {
+        let width_px = if *name == "afbc" { PROMINENT * width_px } else { width_px };
+        Ink { dash, ..Ink::new(palette::color(name), width_px) }
+    };
     names.iter().zip(palette::repeats(names)).map(ink).collect()
 }
 

@@ -14,6 +14,7 @@ mod picture;
 mod plotted;
 mod reduce;
 pub(super) mod replay;
+mod ticks;
 mod time_chart;
 mod trajectory;
 

@@ -44,19 +44,19 @@ const ROLES: [Shades; 12] = [
     [TINTS[4], rgb(0x3D2E5A)],
 ];
 
-/// Colours of the built-in contenders. Any two differ to the colour-blind, too, on white (contrast 3 : 1 or
-/// more) and in the dark (4 : 1 or more).
+/// Colours of the built-in contenders. Any two differ to everyone, the colour-blind, too, on white (contrast 3 : 1 or
+/// more) and in the dark (4 : 1 or more), and none is so dark or pale that a thin line looks black or white.
 const KNOWN: [(&str, Shades); 10] = [
-    ("afbc", shades(0x0072B2, 0x7FA8ED)),
-    ("backstepping", shades(0xD55E00, 0xC7613D)),
-    ("pid", shades(0x189E8C, 0x39F3FC)),
-    ("geometric", shades(0xC171F6, 0x906B98)),
-    ("indi", shades(0x681053, 0xED7FA4)),
-    ("l1", shades(0x7800E6, 0x8C82CD)),
-    ("dfbc", shades(0x322300, 0xB9AA37)),
-    ("mpc", shades(0x825267, 0xCCFD0C)),
-    ("afbc-as-printed", shades(0x26349E, 0x2773EE)),
-    ("afbc-monitored", shades(0x923002, 0xF5C299)),
+    ("afbc", shades(0x0072B2, 0x4DA6FF)),
+    ("backstepping", shades(0xA90045, 0xFF0700)),
+    ("pid", shades(0x319EA6, 0x2B8C94)),
+    ("geometric", shades(0xFF407C, 0xE09FA7)),
+    ("indi", shades(0x7A0078, 0xFF34BB)),
+    ("l1", shades(0x9076FF, 0xD9C2FF)),
+    ("dfbc", shades(0x7F702B, 0x77814D)),
+    ("mpc", shades(0x005800, 0x86DD35)),
+    ("afbc-as-printed", shades(0xDB7D1B, 0xFFED9C)),
+    ("afbc-monitored", shades(0x001DEE, 0xAEFFE1)),
 ];
 
 /// Colours of all others, chosen by a hash of the name.
@@ -178,6 +178,83 @@ mod tests {
             100.0 * libm::sqrt(a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum())
         };
         SIGHTS.iter().map(apart).fold(f64::INFINITY, f64::min)
+    }
+
+    /// L*, a*, b* of what somebody with this sight sees, under daylight (D65).
+    fn lab(color: RGBColor, sight: &[[f64; 3]; 3]) -> [f64; 3] {
+        let seen = times(sight, linear(color)).map(|part| part.clamp(0.0, 1.0));
+        let xyz = times(
+            &[
+                [0.4124564 / 0.95047, 0.3575761 / 0.95047, 0.1804375 / 0.95047],
+                [0.2126729, 0.7151522, 0.0721750],
+                [0.0193339 / 1.08883, 0.1191920 / 1.08883, 0.9503041 / 1.08883],
+            ],
+            seen,
+        );
+        let [x, y, z] = xyz
+            .map(|part| if part > 216.0 / 24389.0 { libm::cbrt(part) } else { (24389.0 / 27.0 * part + 16.0) / 116.0 });
+        [116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z)]
+    }
+
+    /// Colour difference CIEDE2000 (Sharma, Wu and Dalal 2005).
+    fn ciede2000([l1, a1, b1]: [f64; 3], [l2, a2, b2]: [f64; 3]) -> f64 {
+        let seventh = |chroma: f64| {
+            let power = libm::pow(chroma, 7.0);
+            libm::sqrt(power / (power + libm::pow(25.0, 7.0)))
+        };
+        let grown = 1.0 + 0.5 * (1.0 - seventh(0.5 * (libm::hypot(a1, b1) + libm::hypot(a2, b2))));
+        let polar =
+            |a: f64, b: f64| (libm::hypot(grown * a, b), libm::atan2(b, grown * a).to_degrees().rem_euclid(360.0));
+        let ((c1, h1), (c2, h2)) = (polar(a1, b1), polar(a2, b2));
+        let is_grey = c1 * c2 == 0.0;
+        let turn = if is_grey { 0.0 } else { (h2 - h1 + 540.0).rem_euclid(360.0) - 180.0 };
+        let hue = if is_grey { h1 + h2 } else { (h1 + 0.5 * turn).rem_euclid(360.0) };
+        let (lightness, chroma) = (0.5 * (l1 + l2), 0.5 * (c1 + c2));
+        let cos = |degrees: f64| libm::cos(degrees.to_radians());
+        let weight = 1.0 - 0.17 * cos(hue - 30.0) + 0.24 * cos(2.0 * hue) + 0.32 * cos(3.0 * hue + 6.0)
+            - 0.2 * cos(4.0 * hue - 63.0);
+        let off = (lightness - 50.0) * (lightness - 50.0);
+        let dl = (l2 - l1) / (1.0 + 0.015 * off / libm::sqrt(20.0 + off));
+        let dc = (c2 - c1) / (1.0 + 0.045 * chroma);
+        let dh = 2.0 * libm::sqrt(c1 * c2) * libm::sin((0.5 * turn).to_radians()) / (1.0 + 0.015 * chroma * weight);
+        let bend = (hue - 275.0) / 25.0;
+        let rotation = -2.0 * seventh(chroma) * libm::sin((60.0 * libm::exp(-bend * bend)).to_radians());
+        libm::sqrt(dl * dl + dc * dc + dh * dh + rotation * dc * dh)
+    }
+
+    /// Pairs of the table in Sharma, Wu and Dalal 2005.
+    #[test]
+    fn differences_of_colors_are_the_published_ones() {
+        for (a, b, published) in [
+            ([50.0, 2.6772, -79.7751], [50.0, 0.0, -82.7485], 2.0425),
+            ([50.0, -1.0, 2.0], [50.0, 0.0, 0.0], 2.3669),
+            ([50.0, 2.49, -0.001], [50.0, -2.49, 0.0011], 7.2195),
+            ([50.0, 2.5, 0.0], [73.0, 25.0, -18.0], 27.1492),
+            ([22.7233, 20.0904, -46.6940], [23.0331, 14.9730, -42.5619], 2.0373),
+            ([90.8027, -2.0831, 1.4410], [91.1528, -1.6435, 0.0447], 1.4441),
+        ] {
+            assert!((ciede2000(a, b) - published).abs() < 1e-4, "{a:?} {b:?}: {}", ciede2000(a, b));
+        }
+    }
+
+    /// Neighbours in Okabe and Ito's palette are 20 apart to the normal eye; from 10 on nobody confuses two lines.
+    #[test]
+    fn no_two_laws_have_colors_that_look_alike() {
+        for shade in [0, 1] {
+            for (i, (name, a)) in KNOWN.iter().enumerate() {
+                for (sight, least) in SIGHTS.iter().zip([20.0, 10.0, 10.0, 10.0]) {
+                    let seen = |color| lab(color, sight);
+                    for (other, b) in &KNOWN[..i] {
+                        let apart = ciede2000(seen(a[shade]), seen(b[shade]));
+                        assert!(apart >= least, "{name}, {other}, shade {shade}: {apart}");
+                    }
+                }
+                let [lightness, red, blue] = lab(a[shade], &SIGHTS[0]);
+                let (dark, pale) = [(25.0, 65.0), (50.0, 95.0)][shade];
+                assert!((dark..=pale).contains(&lightness), "{name}, shade {shade}: lightness {lightness}");
+                assert!(libm::hypot(red, blue) >= 24.0, "{name}, shade {shade}: a grey");
+            }
+        }
     }
 
     #[test]

@@ -5,10 +5,9 @@ use super::marks::{LABEL_PX, Mark, Marks};
 use super::palette::{self, BLACK, EDGE, FRAME, GREY, GRID};
 use super::picture::{CROSS, Picture};
 use super::reduce::{clip, envelope, simplify};
+use super::ticks::{self, Axis, number};
 use crate::explore::{Explorable, ExplorableChart, LegendEntry, Span, TracePanel};
 use core::ops::Range;
-use plotters::coord::ranged1d::{BoldPoints, Ranged};
-use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 use plotters::style::text_anchor::HPos;
 use std::io;
@@ -184,12 +183,13 @@ impl Chart<'_> {
             area.clone().shrink((0, units(y_px)), (units(WIDTH_PX - RIGHT_PX), units(plot_height_px + bottom_px)));
         let range = range(&panel.lines, LEAST_ROOM);
         let (low, high) = (range.start, range.end);
-        let (decimals, time_decimals) = (tick_decimals(low..high, Y_TICKS), tick_decimals(0.0..self.end_s, T_TICKS));
+        let (times, values) = (ticks::linear(&(0.0..self.end_s), T_TICKS), ticks::linear(&range, Y_TICKS));
+        let (decimals, time_decimals) = (values.decimals, times.decimals);
         let mut chart = ChartBuilder::on(&area)
             .margin_left(units(MARGIN_PX))
             .set_label_area_size(LabelAreaPosition::Left, units(LEFT_PX - MARGIN_PX))
             .set_label_area_size(LabelAreaPosition::Bottom, units(bottom_px))
-            .build_cartesian_2d(0.0..self.end_s, range)?;
+            .build_cartesian_2d(Axis::linear(0.0..self.end_s, times.at), Axis::linear(range, values.at))?;
 
         let line = |from, to, ink: Ink| PathElement::new([from, to], ink.style());
         let bands = || marks.changes.iter().chain(&marks.gusts).filter(|mark| mark.is_band);
@@ -290,27 +290,4 @@ fn extent<'a>(lines: impl Iterator<Item = &'a Line>) -> Option<(f64, f64)> {
         }
     }
     extent
-}
-
-/// Returns the number of decimals for the ticks of an axis.
-fn tick_decimals(range: Range<f64>, most: usize) -> usize {
-    match RangedCoordf64::from(range).key_points(BoldPoints(most)).as_slice() {
-        [first, second, ..] => decimals(second - first),
-        _ => 3,
-    }
-}
-
-/// Returns the number of decimals that distinguishes numbers `step` apart.
-pub(super) fn decimals(step: f64) -> usize {
-    (-libm::log10(step) - 1e-6).ceil().clamp(0.0, 9.0) as usize
-}
-
-/// Formats a number on an axis, with a typographic minus sign.
-pub(super) fn number(value: f64, decimals: usize) -> String {
-    let text = format!("{value:.decimals$}");
-    match text.strip_prefix('-') {
-        Some(digits) if digits.bytes().any(|b| matches!(b, b'1'..=b'9')) => format!("−{digits}"),
-        Some(digits) => digits.into(),
-        None => text,
-    }
 }

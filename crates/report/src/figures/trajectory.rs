@@ -6,7 +6,8 @@ use super::palette::{BLACK, FRAME, GREY, GRID};
 use super::picture::{CROSS, Picture};
 use super::plotted::{Plotted, REFERENCE};
 use super::reduce::simplify;
-use super::time_chart::{Line, PLOT_PX, decimals, number, range};
+use super::ticks::{self, Ticks, number};
+use super::time_chart::{Line, PLOT_PX, range};
 
 use crate::explore::{Explorable, ExplorableScene};
 use afbc_sim::flight::Sample;
@@ -20,6 +21,8 @@ use std::io;
 const HEIGHT_PX: f64 = 660.0;
 /// Room for the box, below a legend of one line: left, top, width, height.
 const ROOM_PX: [f64; 4] = [110.0, 70.0, WIDTH_PX - 220.0, HEIGHT_PX - 70.0 - 62.0];
+/// Largest number of ticks along an edge.
+const TICKS: usize = 7;
 /// Width of a band along the reference.
 const BAND_PX: f64 = 13.0;
 /// Height of the box relative to its longer floor edge.
@@ -274,15 +277,15 @@ fn furniture(area: &Area, view: &View) -> Result<(), Failure> {
             let away = away_px / out_length;
             area.draw(&Text::new(text, pixel((right + out.0 * away, down + out.1 * away + 4.0)), style))
         };
-        let (ticks, step) = ticks(first, last);
-        for value in ticks {
+        let Ticks { at, decimals } = ticks::linear(&(first..last), TICKS);
+        for value in at {
             for (edge, way) in [front, back] {
                 let from = edge + axis * value;
                 line(from, from + way.component_mul(&span), GRID)?;
             }
             // The left corner is labelled by the height.
             if axis != x || value - first > 0.04 * (last - first) {
-                label(value, 16.0, number(value, decimals(step)), text(LABEL_PX, GREY, HPos::Center))?;
+                label(value, 16.0, number(value, decimals), text(LABEL_PX, GREY, HPos::Center))?;
             }
         }
         for (edge, _) in [front, back] {
@@ -294,13 +297,4 @@ fn furniture(area: &Area, view: &View) -> Result<(), Failure> {
     line(Vector3::new(low.x, low.y, high.z), Vector3::new(low.x, high.y, high.z), FRAME)?;
     line(Vector3::new(low.x, high.y, high.z), Vector3::new(high.x, high.y, high.z), FRAME)?;
     line(Vector3::new(high.x, high.y, low.z), Vector3::new(high.x, high.y, high.z), FRAME)
-}
-
-/// Returns about six round numbers within the interval, and the step between them.
-fn ticks(low: f64, high: f64) -> (Vec<f64>, f64) {
-    let rough = (high - low) / 6.0;
-    let power = libm::pow(10.0, libm::log10(rough).floor());
-    let step = [1.0, 2.0, 5.0].map(|m| m * power).into_iter().find(|step| *step >= rough).unwrap_or(10.0 * power);
-    let (first, last) = ((low / step).ceil() as i64, (high / step).floor() as i64);
-    ((first..=last).map(|i| i as f64 * step).collect(), step)
 }

@@ -82,10 +82,10 @@ pub(super) fn sentences(replay: &Replay<'_>) -> Vec<String> {
             by.x, by.y, by.z
         ));
     }
-    let Resets { position, velocity, heading, height, tilt, restarts } = replayed.resets;
+    let Resets { position, velocity, heading, height, tilt, covariance, restarts } = replayed.resets;
     said.push(format!(
         "Set anew by the estimator: position {position}, velocity {velocity}, heading {heading}, barometer's offset \
-         {height}, tilt doubted {tilt}, restarts {restarts} times."
+         {height}, tilt doubted {tilt}, covariance {covariance}, restarts {restarts} times."
     ));
     let rejected = AIDS.iter().filter_map(|(name, aid)| {
         let record = replayed.aids.of(*aid);
@@ -114,8 +114,9 @@ pub(super) fn sentences(replay: &Replay<'_>) -> Vec<String> {
 }
 
 /// The names of what is measured.
-pub(super) const AIDS: [(&str, Aid); 4] = [
+pub(super) const AIDS: [(&str, Aid); 5] = [
     ("gnss-position", Aid::GnssPosition),
+    ("gnss-height", Aid::GnssHeight),
     ("gnss-velocity", Aid::GnssVelocity),
     ("height", Aid::Height),
     ("heading", Aid::Heading),

@@ -231,6 +231,7 @@ pub fn json(out: &mut dyn Write, replay: &Replay<'_>) -> io::Result<()> {
             ("heading", resets.heading),
             ("height", resets.height),
             ("tilt", resets.tilt),
+            ("covariance", resets.covariance),
             ("restarts", resets.restarts),
         ]),
         logged_resets: recording

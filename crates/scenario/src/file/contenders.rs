@@ -34,14 +34,6 @@ impl Flown<'_> {
         }
     }
 
-    /// The profile of a file that names none: the paper's law is for the paper's rotors, which do not lag.
-    fn profile(self) -> Profile {
-        match self {
-            Flown::File(_) => Profile::Flight,
-            Flown::Paper(_) => Profile::Paper,
-        }
-    }
-
     /// The law of this kind, AFBC's gains being `afbc`.
     fn law(self, kind: ControllerKind, profile: Profile, afbc: &PerAxis<adaptive::Gains>) -> Result<Law, FileError> {
         let law = Law::beside(kind, afbc);
@@ -77,7 +69,7 @@ impl Defaults<'_> {
 /// Reads all contenders, those of `controllers` first.
 pub(super) fn read(root: &mut Table<'_>, flown: Flown<'_>) -> Result<Vec<Contender>, FileError> {
     let controllers = root.choices("controllers", &ControllerKind::all(), ControllerKind::name)?;
-    let profile = root.choice("profile", &Profile::ALL, Profile::name)?.unwrap_or(flown.profile());
+    let profile = root.choice("profile", &Profile::ALL, Profile::name)?.unwrap_or(Profile::Flight);
     let mut axes = flown.gains(profile);
     per_axis(root.table("gains")?, &mut axes)?;
     let settings = settings(root, flown.settings(profile), true)?;
@@ -87,20 +79,24 @@ pub(super) fn read(root: &mut Table<'_>, flown: Flown<'_>) -> Result<Vec<Contend
     let tables = root.few_tables("contender")?;
     // A file that lists contenders of its own wants no others unless it names them.
     let kinds = controllers.unwrap_or(if tables.is_empty() { ControllerKind::PAPER.to_vec() } else { Vec::new() });
-    let mut contenders = kinds.into_iter().map(|kind| defaults.contender(kind)).collect::<Result<Vec<_>, _>>()?;
+    // The gains may be those of the vehicle's file.
+    let of_vehicle = |error| root.through("vehicle", error);
+    let contenders = kinds.into_iter().map(|kind| defaults.contender(kind)).collect::<Result<Vec<_>, _>>();
+    let mut contenders = contenders.map_err(of_vehicle)?;
     for table in tables {
-        contenders.push(contender(table, defaults, &contenders)?);
+        contenders.push(contender(table, defaults, &contenders).map_err(of_vehicle)?);
     }
     Ok(contenders)
 }
 
 fn contender(mut table: Table<'_>, file: Defaults<'_>, others: &[Contender]) -> Result<Contender, FileError> {
     let name = table.need_text("name", "give it one, such as \"gentle\"")?.to_owned();
+    let is_known = table.knows("name");
     if !(1..=NAME_LENGTH).contains(&name.chars().count()) || name.chars().any(char::is_control) {
         let problem = format!("it cannot be a name; make it one plain line of 1 to {NAME_LENGTH} characters");
         return Err(table.fault_at("name", problem));
     }
-    if others.iter().any(|other| other.name == name) {
+    if is_known && others.iter().any(|other| other.name == name) {
         return Err(table.fault_at("name", format!("\"{name}\" is the name of another contender; choose another")));
     }
     let kind = table.need_choice("controller", &ControllerKind::all(), ControllerKind::name)?;

@@ -30,6 +30,9 @@ const ANGULAR: [(Range, GustKind); 2] = [
     (Range::new("moment_n_m", -10_000.0, 10_000.0), GustKind::Force),
 ];
 
+/// What masses and rotors depend on.
+const ALL: &[&str] = &["truth", "vehicle", "change", "payload"];
+
 /// Reads the environment of a vehicle with these true parameters.
 pub(super) fn read(root: &mut Table<'_>, truth: Parameters<f64>) -> Result<Environment, FileError> {
     let gusts = root.tables("gust")?.into_iter().map(gust).collect::<Result<_, _>>()?;
@@ -40,18 +43,26 @@ pub(super) fn read(root: &mut Table<'_>, truth: Parameters<f64>) -> Result<Envir
         // Overlapping changes multiply, so each is checked together with those before it.
         let mut changes = environment.changes().to_vec();
         changes.push(change(&mut table)?);
-        environment = Environment::new(truth, changes, environment.gusts().to_vec()).map_err(|error| {
-            table.fault_at(FACTOR.name, format!("it makes {}; change the factor", out_of_range(&error)))
-        })?;
         table.finish()?;
+        match Environment::new(truth, changes, environment.gusts().to_vec()) {
+            Ok(changed) => environment = changed,
+            Err(error) => {
+                table.clash(FACTOR.name, ALL, format!("it makes {}; change the factor", out_of_range(&error)))?;
+            }
+        }
     }
     let mut payloads = Vec::new();
     for mut table in root.few_tables("payload")? {
         payloads.push(payload(&mut table)?);
-        environment = environment.with_payloads(payloads.clone()).map_err(|error| {
-            table.fault_at(PAYLOAD_MASS.name, format!("it makes {}; change the payload", out_of_range(&error)))
-        })?;
         table.finish()?;
+        match environment.clone().with_payloads(payloads.clone()) {
+            Ok(laden) => environment = laden,
+            Err(error) => {
+                let problem = format!("it makes {}; change the payload", out_of_range(&error));
+                table.clash(PAYLOAD_MASS.name, ALL, problem)?;
+                payloads.pop();
+            }
+        }
     }
     Ok(environment)
 }
@@ -81,14 +92,15 @@ fn gust(mut table: Table<'_>) -> Result<Gust, FileError> {
         Axis::Roll | Axis::Pitch | Axis::Yaw => ANGULAR,
     };
     let sizes = format!("axis \"{}\" takes {} or {}", axis.name(), acceleration.name, force.name);
-    let (kind, size) = match (table.number(&acceleration)?, table.number(&force)?) {
-        (Some(size), None) => (by_acceleration, size),
-        (None, Some(size)) => (by_force, size),
-        (Some(_), Some(_)) => return Err(table.fault_at(force.name, format!("a second size; {sizes}, not both"))),
-        (None, None) => return Err(table.missing(acceleration.name, &sizes)),
-    };
+    let (by, of) = (table.number(&acceleration)?, table.number(&force)?);
     let [start_s, end_s] = interval(&mut table)?;
     table.finish()?;
+    match (by, of) {
+        (Some(_), Some(_)) => table.clash(force.name, &[], format!("a second size; {sizes}, not both"))?,
+        (None, None) => table.clash(acceleration.name, &[], format!("missing; {sizes}"))?,
+        _ => {}
+    }
+    let (kind, size) = by.map_or((by_force, of.unwrap_or_default()), |size| (by_acceleration, size));
     Ok(Gust { axis, kind, size, start_s, end_s })
 }
 

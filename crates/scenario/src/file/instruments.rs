@@ -1,25 +1,74 @@
-//! `[instruments]` and `[[instrument_fault]]`: the sensors of a real vehicle, for its estimator.
+//! `[instruments]`, `[told]` and `[[instrument_fault]]`: the sensors of a real vehicle, for its estimator, and what it
+//! is told of them.
 
 use super::environment::interval;
+use crate::told::{Told, stated};
 use afbc_plant::InstrumentSuite;
 use afbc_plant::instruments::{Barometer, Failure, Gnss, Imu, InstrumentFault, Magnetometer, TrackerModel, limits};
 use afbc_reader::{FileError, Table};
-use afbc_vehicles::parts;
+use afbc_vehicles::{Vehicle, parts};
 
 /// Reads the instruments of `table`; none without it.
 pub(super) fn read(table: Option<Table<'_>>) -> Result<InstrumentSuite, FileError> {
     let Some(mut table) = table else { return Ok(InstrumentSuite::default()) };
-    let suite = InstrumentSuite {
-        imu: parts::instrument(&mut table, "imu", &Imu::PRESETS, &parts::TRIADS)?,
-        tracker: parts::instrument(&mut table, "tracker", &TrackerModel::PRESETS, &["loss", "freeze"])?,
-        gnss: parts::instrument(&mut table, "gnss", &Gnss::PRESETS, &["loss"])?,
-        barometer: parts::instrument(&mut table, "barometer", &Barometer::PRESETS, &[])?,
-        magnetometer: parts::instrument(&mut table, "magnetometer", &Magnetometer::PRESETS, &[])?,
-    };
-    // Made before the table is finished, which takes it, and returned after: an unknown key may be a misspelt imu.
-    let blind = table.fault("imu", "missing; add it, since the other instruments have no effect without it");
+    let suite = suite(&mut table, &InstrumentSuite::default())?;
+    // First, for an unknown key may be a misspelt imu.
     table.finish()?;
-    if suite.imu.is_some() { Ok(suite) } else { Err(blind) }
+    if suite.imu.is_none() {
+        table.clash("imu", &[], "missing; add it, since the other instruments have no effect without it")?;
+    }
+    Ok(suite)
+}
+
+/// Reads the instruments in `table`; of each, what a table of its own leaves out is as in `base`, or perfect.
+fn suite(table: &mut Table<'_>, base: &InstrumentSuite) -> Result<InstrumentSuite, FileError> {
+    let InstrumentSuite { imu, tracker, gnss, barometer, magnetometer } = *base;
+    Ok(InstrumentSuite {
+        imu: parts::instrument(table, "imu", imu, &Imu::PRESETS, &parts::TRIADS)?,
+        tracker: parts::instrument(table, "tracker", tracker, &TrackerModel::PRESETS, &["loss", "freeze"])?,
+        gnss: parts::instrument(table, "gnss", gnss, &Gnss::PRESETS, &["loss"])?,
+        barometer: parts::instrument(table, "barometer", barometer, &Barometer::PRESETS, &[])?,
+        magnetometer: parts::instrument(table, "magnetometer", magnetometer, &Magnetometer::PRESETS, &[])?,
+    })
+}
+
+/// Reads what the vehicle is told of `instruments`: a table with what differs, or a word.
+pub(super) fn told(
+    root: &mut Table<'_>,
+    instruments: &InstrumentSuite,
+    vehicle: Option<&Vehicle>,
+) -> Result<Told, FileError> {
+    const KEY: &str = "told";
+    if root.has(KEY) && instruments.imu.is_none() {
+        root.clash(
+            KEY,
+            &["instruments"],
+            "there are no instruments to be told of; add [instruments], or leave it out",
+        )?;
+    }
+    if !root.holds_table(KEY) {
+        return Ok(root.choice(KEY, &[()], |()| "drawn")?.map_or(Told::Stated, |()| Told::Drawn));
+    }
+    let Some(mut table) = root.table(KEY)? else { return Ok(Told::Stated) };
+    let there = [
+        ("tracker", instruments.tracker.is_some()),
+        ("gnss", instruments.gnss.is_some()),
+        ("barometer", instruments.barometer.is_some()),
+        ("magnetometer", instruments.magnetometer.is_some()),
+    ];
+    for (key, _) in there.into_iter().filter(|(_, there)| !there) {
+        table.forbid(key, &format!("there is no {key} to be told of; add it to [instruments], or leave it out"))?;
+    }
+    let base = stated(instruments, vehicle);
+    let told = suite(&mut table, &base)?;
+    table.finish()?;
+    Ok(Told::Suite(Box::new(InstrumentSuite {
+        imu: told.imu.or(base.imu),
+        tracker: told.tracker.or(base.tracker),
+        gnss: told.gnss.or(base.gnss),
+        barometer: told.barometer.or(base.barometer),
+        magnetometer: told.magnetometer.or(base.magnetometer),
+    })))
 }
 
 /// Reads the failures of the instruments.
@@ -49,11 +98,22 @@ fn fault(mut table: Table<'_>, suite: &InstrumentSuite) -> Result<InstrumentFaul
         Failure::GnssJumped { .. } => {
             Failure::GnssJumped { by_m: table.need_vector(limits::JUMP.name, &limits::JUMP)? }
         }
+        Failure::GnssMultipath { .. } => Failure::GnssMultipath {
+            deviation_m: table.need_number(&limits::DEVIATION)?,
+            correlation_time_s: table.need_number(&limits::CORRELATION)?,
+        },
         Failure::MagnetometerDisturbed { .. } => {
             Failure::MagnetometerDisturbed { field_ut: table.need_vector(limits::FIELD.name, &limits::FIELD)? }
         }
         plain => plain,
     };
+    let [start_s, end_s] = interval(&mut table)?;
+    let rise_s = table.number(&limits::RISE)?.unwrap_or(0.0);
+    if rise_s > 0.0 && failure.scaled(1.0).is_none() {
+        let problem = format!("{} has no size that could grow; leave it out", failure.name());
+        table.clash(limits::RISE.name, &["failure"], problem)?;
+    }
+    table.finish()?;
     let (instrument, _) = failure.name().split_once('-').unwrap_or_default();
     let there = match instrument {
         "imu" => suite.imu.is_some(),
@@ -64,9 +124,7 @@ fn fault(mut table: Table<'_>, suite: &InstrumentSuite) -> Result<InstrumentFaul
     };
     if !there {
         let problem = format!("there is no {instrument} to fail; add it to [instruments]");
-        return Err(table.fault_at("failure", problem));
+        table.clash("failure", &["instruments"], problem)?;
     }
-    let [start_s, end_s] = interval(&mut table)?;
-    table.finish()?;
-    Ok(InstrumentFault { failure, start_s, end_s })
+    Ok(InstrumentFault { failure, start_s, end_s, rise_s })
 }

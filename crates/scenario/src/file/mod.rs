@@ -20,8 +20,8 @@ use crate::contender::Contender;
 use crate::trajectory::Trajectory;
 use afbc_plant::{Frame, PlantModel, Realism, Sensing};
 use afbc_reader::words::out_of_range;
-use afbc_reader::{FileError, Table};
-use afbc_types::{PLUS, Range};
+use afbc_reader::{Example, FileError, Table};
+use afbc_types::{PLUS, ROTORS, Range};
 use afbc_vehicles::parts;
 use contenders::Flown;
 use std::path::Path;
@@ -30,6 +30,8 @@ use std::path::Path;
 const DURATION_S: f64 = 60.0;
 /// Accepted seeds.
 const SEED: Range = Range::new("seed", 0.0, 1e9);
+const SAMPLE: Example = Example { command: "scenarios hover", text: include_str!("../../scenarios/hover.toml") };
+
 /// Reads and checks the scenario file at `path`.
 ///
 /// # Errors
@@ -43,15 +45,15 @@ pub fn load(path: &Path) -> Result<Scenario, FileError> {
 /// Reads and checks a scenario from its `text`. `file` is its path for errors, `name` its name if it has no other.
 ///
 /// # Errors
-/// The first mistake, as one line.
+/// Every mistake, each as one line.
 pub fn parse(file: &str, text: &str, name: &str) -> Result<Scenario, FileError> {
-    afbc_reader::document(file, text, "scenarios hover", |root| read(root, name, None))
+    afbc_reader::document(file, text, SAMPLE, |root| read(root, name, None))
 }
 
 /// Reads the scenario in `root`; `name` and `trajectory` are the defaults.
 ///
 /// # Errors
-/// The first mistake, as one line.
+/// The first mistake, as one line. [`afbc_reader::document`] goes on behind it.
 pub fn read(mut root: Table<'_>, name: &str, trajectory: Option<&Trajectory>) -> Result<Scenario, FileError> {
     let [name, description] = afbc_reader::title(&mut root, name)?;
     let duration_s = root.number(&DURATION)?.unwrap_or(DURATION_S);
@@ -59,7 +61,9 @@ pub fn read(mut root: Table<'_>, name: &str, trajectory: Option<&Trajectory>) ->
     let seed = root.whole(&SEED)?.unwrap_or(0);
     let model = root.choice("plant", &models, PlantModel::name)?.unwrap_or(PlantModel::RigidBody);
 
-    let (vehicle_file, vehicle) = vehicle::read(root.table("vehicle")?)?;
+    let table = root.table("vehicle")?;
+    let is_known = root.knows("vehicle") && table.as_ref().is_none_or(|table| table.knows("name"));
+    let (vehicle_file, vehicle) = vehicle::read(table)?;
     let truth = parts::parameters(root.table("truth")?, vehicle)?;
     let flown = vehicle_file.as_ref().map_or(Flown::Paper(&vehicle), Flown::File);
     let contenders = contenders::read(&mut root, flown)?;
@@ -75,17 +79,19 @@ pub fn read(mut root: Table<'_>, name: &str, trajectory: Option<&Trajectory>) ->
     let environment = environment::read(&mut root, truth)?;
     let step_s = contenders.first().map_or(afbc_control::Settings::DT.range.max, Contender::step_s);
     let rotors = vehicle_file.as_ref().map_or(PLUS.map(|rotor| rotor.to_f64()).to_vec(), |file| file.rotors.clone());
-    let frame = Frame::new(&rotors).map_err(|error| root.fault("vehicle", out_of_range(&error)))?;
+    let frame = Frame::new(&rotors).map_err(|error| root.fault_at("vehicle", out_of_range(&error)))?;
     let real = vehicle_file.as_ref().map_or(Realism::default(), |file| file.realism.clone());
-    let realism = realism::read(&mut root, &real, &truth, &frame, step_s)?;
+    let count = if is_known { frame.count() } else { ROTORS.max as usize };
+    let realism = realism::read(&mut root, &real, &truth, (&frame, count), step_s)?;
     let sensing = sensors::read(root.table("sensors")?)?;
     let sensor_faults = sensors::faults(&mut root)?;
     let instruments = instruments::read(root.table("instruments")?)?;
+    let told = instruments::told(&mut root, &instruments, vehicle_file.as_ref())?;
     let instrument_faults = instruments::faults(&mut root, &instruments)?;
     if instruments.imu.is_some() && (sensing != Sensing::default() || !sensor_faults.is_empty()) {
         let key = if sensor_faults.is_empty() { "sensors" } else { "sensor_fault" };
         let problem = "it has no effect on a vehicle that estimates its state; leave it out, or the inertial sensor";
-        return Err(root.fault_at(key, problem));
+        root.clash(key, &["instruments", "sensors", "sensor_fault"], problem)?;
     }
     let outages = environment::outages(&mut root)?;
     let flight_core = root.boolean("flight_core")?.unwrap_or(false);
@@ -104,6 +110,7 @@ pub fn read(mut root: Table<'_>, name: &str, trajectory: Option<&Trajectory>) ->
         sensing,
         sensor_faults,
         instruments,
+        told,
         instrument_faults,
         outages,
         flight_core,
@@ -112,13 +119,16 @@ pub fn read(mut root: Table<'_>, name: &str, trajectory: Option<&Trajectory>) ->
         trajectory,
         contenders,
     };
-    // By itself and first, so that the error says that leaving it out is a cure.
-    scenario.check_flight_core().map_err(|error| {
-        let cure = "change that, or leave flight_core out";
-        root.fault_at("flight_core", format!("it cannot fly with {}; {cure}", out_of_range(&error)))
-    })?;
-    // Final check of combinations that the tables accept.
-    scenario.check().map_err(|error| root.fault(error.range.name, format!("{}; change it", out_of_range(&error))))?;
     root.finish()?;
+    // By itself and first, so that the error says that leaving it out is a cure.
+    if let Err(error) = scenario.check_flight_core() {
+        let problem = format!("it cannot fly with {}; change that, or leave flight_core out", out_of_range(&error));
+        let with = &["initial", "trajectory", "settings", "contender", "controllers", "profile", "vehicle"];
+        root.clash("flight_core", with, problem)?;
+    }
+    // Final check of combinations that the tables accept.
+    if let Err(error) = scenario.check() {
+        root.clash(error.range.name, &[], format!("{}; change it", out_of_range(&error)))?;
+    }
     Ok(scenario)
 }

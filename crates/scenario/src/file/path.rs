@@ -3,13 +3,12 @@
 //! Either samples over time, with the columns of a flight's log, or the polynomials of the Crazyflie's tools
 //! (`duration,x^0,...,x^7,y^0,...,yaw^7`).
 
-use super::reference::{START, slow_enough};
-use crate::trajectory::polynomial::{COEFFICIENTS, Coefficients, PolynomialPiece, peaks, through};
+use super::reference::{START, flyable};
+use crate::trajectory::polynomial::{COEFFICIENTS, Coefficients, PolynomialPiece, through};
 use crate::trajectory::spline::PathSamples;
-use crate::trajectory::{Reference, Trajectory};
-use afbc_reader::{FileError, Source, Table};
+use crate::trajectory::{Reference, Trajectory, nearest_heading};
+use afbc_reader::{FileError, Separated, Source, Table};
 use afbc_types::Range;
-use core::f64::consts::TAU;
 use csv::{ReaderBuilder, StringRecord};
 use std::path::Path;
 
@@ -36,12 +35,16 @@ pub(super) fn read(table: &mut Table<'_>) -> Result<Trajectory, FileError> {
     let named = table.need_text(FILE, "give the path of a file of comma-separated values")?;
     let start_s = table.number(&START)?;
     let pace = table.number(&PACE)?.unwrap_or(1.0);
+    table.finish()?;
+    if !table.knows(FILE) {
+        return Ok(Trajectory::Paper);
+    }
     let path = Path::new(table.file()).parent().unwrap_or(Path::new("")).join(named);
     let shown = path.display().to_string();
     let text = std::fs::read_to_string(&path)
         .map_err(|error| table.fault_at(FILE, format!("{shown} cannot be read ({error}); name a file of text")))?;
     let file = Lines { source: Source { file: &shown, text: &text } };
-    let mut pieces = file.pieces()?;
+    let mut pieces = file.pieces().map_err(|error| table.through(FILE, error))?;
     let first_s = pieces.first().map_or(0.0, |piece| piece.start_s);
     let start_s = start_s.unwrap_or(first_s);
     for piece in &mut pieces {
@@ -50,8 +53,9 @@ pub(super) fn read(table: &mut Table<'_>) -> Result<Trajectory, FileError> {
     if start_s < 0.0 {
         return Err(table.fault_at(FILE, format!("it begins at {start_s} s; set start_s, such as 0")));
     }
-    slow_enough(table, FILE, peaks(&pieces))?;
-    Ok(Trajectory::Polynomials(pieces))
+    let path = Trajectory::Polynomials(pieces);
+    flyable(table, FILE, &path)?;
+    Ok(path)
 }
 
 /// The piece `pace` times as fast, of a path that begins at `start_s` instead of `first_s`.
@@ -76,7 +80,10 @@ struct Lines<'a> {
 
 impl Lines<'_> {
     fn pieces(&self) -> Result<Vec<PolynomialPiece>, FileError> {
-        let mut reader = ReaderBuilder::new().trim(csv::Trim::All).from_reader(self.source.text.as_bytes());
+        let mut reader = ReaderBuilder::new()
+            .delimiter(self.form().separator)
+            .trim(csv::Trim::All)
+            .from_reader(self.source.text.as_bytes());
         let head = reader.headers().map_err(|error| self.broken(&error))?.clone();
         let mut rows = Vec::new();
         for record in reader.records() {
@@ -143,8 +150,10 @@ impl Lines<'_> {
             for (i, coefficient) in coefficients.iter_mut().flatten().enumerate() {
                 *coefficient = self.number(row, i + 1, head)?;
             }
-            let piece = PolynomialPiece { start_s, duration_s, coefficients };
+            let mut piece = PolynomialPiece { start_s, duration_s, coefficients };
             if let Some(before) = pieces.last() {
+                let [.., [yaw_rad, ..]] = &mut piece.coefficients;
+                *yaw_rad = nearest_heading(before.at(before.end_s()).yaw_rad, *yaw_rad);
                 self.joined(row, before, &piece)?;
             }
             start_s = piece.end_s();
@@ -156,16 +165,22 @@ impl Lines<'_> {
         Ok(pieces)
     }
 
-    /// Checks that a piece begins where and as fast as the one before ends.
+    /// Checks that a piece begins where, as fast as and with the heading with which the one before ends.
     fn joined(&self, row: &StringRecord, before: &PolynomialPiece, piece: &PolynomialPiece) -> Result<(), FileError> {
         let [end, begin]: [Reference; 2] = [before.at(before.end_s()), piece.at(piece.start_s)];
         let jump_m = (end.position_m - begin.position_m).norm();
         let jump_m_s = (end.velocity_m_s - begin.velocity_m_s).norm();
-        if jump_m > 0.01 || jump_m_s > 0.1 {
-            let problem = format!("it begins {jump_m:.3} m and {jump_m_s:.3} m/s from the end of the piece before");
+        let turn_rad = (end.yaw_rad - begin.yaw_rad).abs();
+        if jump_m > 0.01 || jump_m_s > 0.1 || turn_rad > 0.1 {
+            let jump = format!("{jump_m:.3} m, {jump_m_s:.3} m/s and {turn_rad:.3} rad");
+            let problem = format!("it begins {jump} from the end of the piece before");
             return Err(self.fault(row, DURATION, format!("{problem}; pieces must join")));
         }
         Ok(())
+    }
+
+    fn form(&self) -> Separated {
+        Separated::of(self.source.text.as_bytes())
     }
 
     fn column(&self, rows: &[StringRecord], place: usize, head: &StringRecord) -> Result<Vec<f64>, FileError> {
@@ -175,7 +190,7 @@ impl Lines<'_> {
     fn number(&self, row: &StringRecord, place: usize, head: &StringRecord) -> Result<f64, FileError> {
         let (text, column) = (row.get(place).unwrap_or_default(), head.get(place).unwrap_or_default());
         // Derivatives and coefficients may be larger than the places themselves.
-        let number = text.parse().ok().filter(|number: &f64| number.is_finite() && number.abs() <= 1e3 * LARGEST);
+        let number = self.form().number(text).filter(|number| number.is_finite() && number.abs() <= 1e3 * LARGEST);
         let number = number.filter(|number| !column.ends_with("_m") || number.abs() <= LARGEST);
         number.ok_or_else(|| {
             self.fault(row, column, format!("\"{}\" is no number that a path may have", text.escape_debug()))
@@ -208,7 +223,7 @@ fn unwrapped(mut angles: Vec<f64>) -> Vec<f64> {
     let mut before = None;
     for angle in &mut angles {
         if let Some(before) = before {
-            *angle -= TAU * libm::rint((*angle - before) / TAU);
+            *angle = nearest_heading(before, *angle);
         }
         before = Some(*angle);
     }

@@ -13,17 +13,17 @@ use afbc_vehicles::parts::{self, DragConditions};
 /// Accepted time from a gust's rise to its fall \[s\].
 const HOLD: Range = Range::new("hold_s", 0.0, LENGTH.max);
 
-/// Reads the effects for a vehicle with these true parameters and this frame, in steps of `step_s`; what the file
-/// leaves out is as in `default`.
+/// Reads the effects for a vehicle with these true parameters, this frame and at most `count` rotors, in steps of
+/// `step_s`; what the file leaves out is as in `default`.
 pub(super) fn read(
     root: &mut Table<'_>,
     default: &Realism,
     truth: &Parameters<f64>,
-    frame: &Frame,
+    (frame, count): (&Frame, usize),
     step_s: f64,
 ) -> Result<Realism, FileError> {
     let mut rotors = parts::rotors(root.table("rotors")?, default.rotors.clone(), truth)?;
-    let faults = root.few_tables("rotor_fault")?.into_iter().map(|table| fault(table, frame.count()));
+    let faults = root.few_tables("rotor_fault")?.into_iter().map(|table| fault(table, count));
     rotors.faults = faults.collect::<Result<_, _>>()?;
     if let Some(table) = root.table("battery")? {
         rotors.battery = Some(parts::battery(table, rotors.battery.unwrap_or(Battery::THREE_CELLS))?);
@@ -38,7 +38,7 @@ pub(super) fn read(
         None => Wind::default(),
     };
     if drag.is_none() && wind != Wind::default() {
-        return Err(root.fault_at("wind", "wind acts through drag, and there is none; add [drag]"));
+        root.clash("wind", &["drag", "vehicle"], "wind acts through drag, and there is none; add [drag]")?;
     }
     let (contact, ground_effect) = match root.table("ground")? {
         Some(table) => {

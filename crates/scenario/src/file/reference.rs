@@ -1,22 +1,46 @@
-//! What every reference has to keep to.
+//! Limits that every reference has to keep.
 
+use crate::definition::DURATION;
+use crate::trajectory::{Reference, Trajectory};
 use afbc_reader::{FileError, Table};
-use afbc_types::{Range, Setpoint};
-use nalgebra::Vector3;
+use afbc_types::Range;
 
 /// Accepted start of a path \[s\].
 pub(super) const START: Range = Range::new("start_s", 0.0, 36_000.0);
 
-/// Returns an error if the reference is too fast for a controller to accept; `peaks` are those of its derivatives from
-/// the speed to the snap, in m and s.
-pub(super) fn slow_enough(table: &Table<'_>, key: &str, peaks: [f64; 4]) -> Result<(), FileError> {
-    let [velocity_m_s, acceleration_m_s2, jerk_m_s3, snap_m_s4] = peaks.map(|size| Vector3::new(size as f32, 0.0, 0.0));
-    let fastest = Setpoint { velocity_m_s, acceleration_m_s2, jerk_m_s3, snap_m_s4, ..Setpoint::default() };
-    if fastest.is_plausible() {
-        return Ok(());
+/// Refuses the key if a controller refuses the reference anywhere, as sampled, or if it ends after the longest flight.
+pub(super) fn flyable(table: &Table<'_>, key: &str, trajectory: &Trajectory) -> Result<(), FileError> {
+    // First, for an unknown key may be a misspelt one that changes the path.
+    table.finish()?;
+    let mut refused: Option<Reference> = None;
+    trajectory.sample(&mut |at| {
+        if !at.setpoint().is_plausible() {
+            refused.get_or_insert(at);
+        }
+    });
+    if let Some(at) = refused {
+        return table.clash(key, &[], format!("it asks for {}", excess(&at)));
     }
-    let [speed, acceleration, jerk, snap] = peaks;
-    let peak = format!("it asks for {speed:.3e} m/s, {acceleration:.3e} m/s2, {jerk:.3e} m/s3 and {snap:.3e} m/s4");
-    let accepted = "more than a controller accepts (1e3, 1e3, 1e5 and 1e7 of these)";
-    Err(table.fault_at(key, format!("{peak}, {accepted}; allow more time")))
+    let end_s = trajectory.end_s().unwrap_or_default();
+    if DURATION.max < end_s {
+        let longest = format!("no flight lasts longer than {} s", DURATION.max);
+        return table.clash(key, &[], format!("it ends at {end_s:.3e} s, and {longest}; make it shorter or faster"));
+    }
+    Ok(())
+}
+
+/// Returns what a controller refuses of a reference, and the cure: its motion, or its place and heading.
+fn excess(at: &Reference) -> String {
+    let Reference { velocity_m_s, acceleration_m_s2, jerk_m_s3, snap_m_s4, .. } = *at;
+    let Reference { yaw_rad, yaw_rate_rad_s, yaw_acceleration_rad_s2, .. } = *at;
+    let motion = Reference { velocity_m_s, acceleration_m_s2, jerk_m_s3, snap_m_s4, ..Reference::default() };
+    if motion.setpoint().is_plausible() {
+        let heading = format!("{yaw_rad:.3e} rad, {yaw_rate_rad_s:.3e} rad/s and {yaw_acceleration_rad_s2:.3e} rad/s2");
+        let place = format!("{:.3e} m from the origin and a heading of {heading}", at.position_m.norm());
+        return format!("{place}, more than a controller accepts (1e5; 1e3 of each); stay nearer, or turn less");
+    }
+    let [speed, acceleration, jerk, snap] =
+        [velocity_m_s, acceleration_m_s2, jerk_m_s3, snap_m_s4].map(|part| part.norm());
+    let motion = format!("{speed:.3e} m/s, {acceleration:.3e} m/s2, {jerk:.3e} m/s3 and {snap:.3e} m/s4");
+    format!("{motion}, more than a controller accepts (1e3, 1e3, 1e5 and 1e7 of these); allow more time")
 }

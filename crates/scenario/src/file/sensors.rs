@@ -62,15 +62,17 @@ fn fault(mut table: Table<'_>) -> Result<SensorFault, FileError> {
     let frozen = table.boolean("frozen")?.unwrap_or(false).then_some(Misreading::Frozen);
     let factor = table.number(&FACTOR)?.map(Misreading::Factor);
     let offset_by = table.number(&offset)?.map(Misreading::Offset);
-    let known = format!("it takes one of factor, {} and frozen = true", offset.name);
-    let mut misreadings = [factor, offset_by, frozen].into_iter().flatten();
-    let (Some(misreading), None) = (misreadings.next(), misreadings.next()) else {
-        return Err(table.fault(FACTOR.name, format!("{known}, and no more")));
-    };
-    if axis.is_none() && misreading != Misreading::Frozen {
-        return Err(table.missing("axis", "name the axis; only a frozen state may be the whole one"));
-    }
     let [start_s, end_s] = interval(&mut table)?;
     table.finish()?;
+    let mut misreadings = [factor, offset_by, frozen].into_iter().flatten();
+    let (first, second) = (misreadings.next(), misreadings.next());
+    if first.is_none() || second.is_some() {
+        let known = format!("it takes one of factor, {} and frozen = true, and no more", offset.name);
+        table.clash(FACTOR.name, &[], known)?;
+    }
+    let misreading = first.unwrap_or(Misreading::Frozen);
+    if axis.is_none() && misreading != Misreading::Frozen {
+        table.clash("axis", &[], "missing; name the axis; only a frozen state may be the whole one")?;
+    }
     Ok(SensorFault { axis, misreading, start_s, end_s })
 }

@@ -70,14 +70,15 @@ fn with_line(text: &str, key: &str, line: &str) -> String {
 #[test]
 fn documented_examples_are_valid_and_complete() {
     let sections = sections();
-    assert_eq!(sections.len(), 47);
+    assert_eq!(sections.len(), 48);
     for Section { example: text, rows } in sections {
         example(&text).unwrap_or_else(|error| panic!("{error} in\n{text}"));
         for line in text.lines().filter(|line| line.contains(" = ")) {
             let documented = rows.iter().any(|[key, ..]| line.starts_with(&format!("{} = ", key.trim_matches('`'))));
-            // The kind of a trajectory, and the head of a contender whose gains are the section's subject, are not in
-            // the table.
-            let head = ["kind", "name", "controller"].iter().any(|key| line.starts_with(&format!("{key} = ")));
+            // The kind of a trajectory, the profile, and the head of a contender whose gains are the subject are not
+            // in the table.
+            let head =
+                ["kind", "name", "controller", "profile"].iter().any(|key| line.starts_with(&format!("{key} = ")));
             assert!(documented || head, "{line}");
         }
     }
@@ -127,9 +128,9 @@ fn documented_defaults_are_those_of_the_code() {
     assert!(checked > 35, "{checked}");
 }
 
-/// With any damage to a line of a file, either it is a valid scenario, or there is one line with the error.
+/// With any damage to a line of a file, either it is a valid scenario, or there are lines that name the file.
 #[test]
-fn damaged_files_get_one_line() {
+fn damaged_files_are_told_line_by_line() {
     let values =
         ["", "nan", "-1e300", "1e300", "\"\\n\"", "[]", "{}", "true", "[0, 0]", "1979-05-27", "{ a.b = [[1]] }"];
     let (mut refused, mut accepted) = (0, 0);
@@ -153,7 +154,7 @@ fn damaged_files_get_one_line() {
                     }
                     Err(error) => {
                         let error = error.to_string();
-                        assert!(error.starts_with("damaged:") && !error.contains('\n'), "{error}");
+                        assert!(error.lines().all(|line| line.starts_with("damaged:")), "{error}");
                         refused += 1;
                     }
                 }
@@ -167,16 +168,16 @@ fn damaged_files_get_one_line() {
 fn contenders_start_from_the_file_or_from_a_profile() {
     let text = "controllers = [\"afbc\"]\n[gains.z]\ngamma = 5.0\n[settings]\ndt_s = 0.002\nrotor_force_max_n = 4.0\n\
                 [[contender]]\nname = \"file\"\ncontroller = \"afbc\"\ngains.z.eta = 0.1\n\
-                [[contender]]\nname = \"flight\"\ncontroller = \"afbc\"\nprofile = \"flight\"\nmonitor = true\n\
+                [[contender]]\nname = \"printed\"\ncontroller = \"afbc\"\nprofile = \"paper\"\nmonitor = true\n\
                 [[contender]]\nname = \"pid\"\ncontroller = \"pid\"\ngains.tilt_p_1_s = 9.0\n";
     let contenders = example(text).unwrap().contenders;
-    let [short, file, flight, pid] = contenders.as_slice() else { panic!("{contenders:?}") };
+    let [short, file, printed, pid] = contenders.as_slice() else { panic!("{contenders:?}") };
     let z = |contender: &Contender| contender.gains().unwrap().z;
-    let paper = Profile::Paper.gains().z;
-    assert_eq!((short.name.as_str(), z(short)), ("afbc", adaptive::Gains { gamma: 5.0, ..paper }));
-    assert_eq!(z(file), adaptive::Gains { gamma: 5.0, eta: 0.1, ..paper });
-    assert_eq!((flight.law, flight.monitored), (Law::Afbc(Profile::Flight.gains()), true));
-    assert_eq!(flight.settings, Profile::Flight.settings().with_dt_s(0.002));
+    let flight = Profile::Flight.gains().z;
+    assert_eq!((short.name.as_str(), z(short)), ("afbc", adaptive::Gains { gamma: 5.0, ..flight }));
+    assert_eq!(z(file), adaptive::Gains { gamma: 5.0, eta: 0.1, ..flight });
+    assert_eq!((printed.law, printed.monitored), (Law::Afbc(Profile::Paper.gains()), true));
+    assert_eq!(printed.settings, Profile::Paper.settings().with_dt_s(0.002));
     let tuned = pid::Gains { tilt_p_1_s: 9.0, ..pid::Gains::TUNED };
     assert_eq!((pid.law, pid.settings), (Law::Pid(tuned), short.settings));
     // Without controllers, a contender is alone.
@@ -196,7 +197,8 @@ fn sensor_faults_and_paces_that_contradict_themselves_are_refused() {
     ] {
         assert!(fault(keys).contains(one), "{}", fault(keys));
     }
-    assert!(fault("axis = \"yaw\"\noffset_m = 1").contains("factor, offset_rad and"));
+    assert!(fault("axis = \"yaw\"").contains("factor, offset_rad and"));
+    assert!(fault("axis = \"yaw\"\noffset_m = 1").contains("offset_m: unknown key; did you mean offset_rad"));
     assert!(fault("factor = -1").contains("axis: missing; name the axis"));
     let circle = "[trajectory]\nkind = \"circle\"\ncentre_m = [0, 0, 1]\nradius_m = 2\n";
     let both = refused(&format!("{circle}period_s = 3\nacceleration_m_s2 = 4"));
@@ -204,6 +206,21 @@ fn sensor_faults_and_paces_that_contradict_themselves_are_refused() {
     assert!(
         refused(&format!("{}acceleration_m_s2 = 4", circle.replace("= 2", "= 0"))).contains("more than a controller")
     );
+}
+
+/// Of a reference that no controller accepts, the motion is told, or the heading; so is a path longer than any flight.
+#[test]
+fn references_that_no_controller_accepts_are_told() {
+    let refused = |keys: &str| example(&format!("[trajectory]\n{keys}")).unwrap_err().to_string();
+    let place = |x: f64, yaw: f64| format!("[[trajectory.waypoint]]\nposition_m = [{x}, 0, 1]\nyaw_rad = {yaw}\n");
+    let [first, near, far] = [place(0.0, 0.0), place(0.0, 3.0), place(9e3, 0.0)];
+    let turns = refused(&format!("kind = \"waypoints\"\n{first}time_s = 1\n{near}time_s = 1.01\n"));
+    assert!(turns.contains("waypoint.time_s: it asks for") && turns.contains("rad/s2, more than a"), "{turns}");
+    let moves = refused(&format!("kind = \"waypoints\"\n{first}time_s = 1\n{far}time_s = 2\n"));
+    assert!(moves.contains("waypoint.time_s: it asks for") && moves.contains("m/s4, more than a"), "{moves}");
+    let slow = "kind = \"minimum-snap\"\nspeed_max_m_s = 0.1\nacceleration_max_m_s2 = 1";
+    let lasts = refused(&format!("{slow}\n{first}{far}"));
+    assert!(lasts.contains("speed_max_m_s: it ends at") && lasts.contains("no flight lasts longer"), "{lasts}");
 }
 
 /// The paces of a circle and a lemniscate are those asked for: the largest acceleration and speed of their references.

@@ -2,10 +2,9 @@
 
 use super::motion::POSITION;
 use super::path;
-use super::reference::{START, slow_enough};
-use crate::trajectory::minimum_snap::{FlatOutput, PaceLimits, minimum_snap};
-use crate::trajectory::polynomial::peaks;
-use crate::trajectory::{Sine, Trajectory, Waypoint};
+use super::reference::{START, flyable};
+use crate::trajectory::minimum_snap::{FlatOutput, LEG_MIN_M, NoPath, PaceLimits, SWING_MAX, distance_m, minimum_snap};
+use crate::trajectory::{Sine, Trajectory, Waypoint, nearest_heading};
 use afbc_reader::{FileError, Table};
 use afbc_types::Range;
 use core::f64::consts::{SQRT_2, TAU};
@@ -110,16 +109,25 @@ fn yaw(table: &mut Table<'_>) -> Result<f64, FileError> {
 fn circle(table: &mut Table<'_>) -> Result<Trajectory, FileError> {
     let centre_m = table.need_vector("centre_m", &POSITION)?;
     let radius_m = table.need_number(&RADIUS)?;
-    let (period_s, key) = match table.number(&CENTRIPETAL)? {
-        Some(acceleration_m_s2) => {
-            table.forbid(PERIOD.name, "a second pace; acceleration_m_s2 gives the period, so leave out one of them")?;
-            (TAU * sqrt(radius_m / acceleration_m_s2), CENTRIPETAL.name)
+    let (acceleration_m_s2, period_s) = (table.number(&CENTRIPETAL)?, table.number(&PERIOD)?);
+    let yaw_rad = yaw(table)?;
+    // First, for an unknown key may be a misspelt pace.
+    table.finish()?;
+    match (acceleration_m_s2, period_s) {
+        (Some(_), Some(_)) => {
+            let problem = "a second pace; acceleration_m_s2 gives the period, so leave out one of them";
+            table.clash(PERIOD.name, &[], problem)?;
         }
-        None => (table.need_number(&PERIOD)?, PERIOD.name),
+        (None, None) => table.clash(PERIOD.name, &[], "missing; add it (seconds)")?,
+        _ => {}
+    }
+    let (period_s, key) = match acceleration_m_s2 {
+        Some(acceleration_m_s2) => (TAU * sqrt(radius_m / acceleration_m_s2), CENTRIPETAL.name),
+        None => (period_s.unwrap_or(PERIOD.max), PERIOD.name),
     };
-    let rate = TAU / period_s;
-    slow_enough(table, key, [1, 2, 3, 4].map(|order| radius_m * rate.powi(order)))?;
-    Ok(Trajectory::Circle { centre_m, radius_m, period_s, yaw_rad: yaw(table)? })
+    let circle = Trajectory::Circle { centre_m, radius_m, period_s, yaw_rad };
+    flyable(table, key, &circle)?;
+    Ok(circle)
 }
 
 /// Gerono's lemniscate, x = a sin(w t), y = a/2 sin(2 w t), which is fastest in the middle: sqrt(2) a w.
@@ -127,12 +135,12 @@ fn lemniscate(table: &mut Table<'_>) -> Result<Trajectory, FileError> {
     let centre_m = table.need_vector("centre_m", &POSITION)?;
     let (half_m, speed_m_s) = (table.need_number(&HALF_LENGTH)?, table.need_number(&SPEED)?);
     let rate = speed_m_s / (SQRT_2 * half_m);
-    // Each derivative is at most both coordinates' together.
-    slow_enough(table, SPEED.name, [1, 2, 3, 4].map(|n| half_m * rate.powi(n) * (1.0 + 2.0_f64.powi(n - 1))))?;
     let period_s = TAU / rate;
     let sine = |amplitude_m, period_s| Sine { amplitude_m, period_s, phase_rad: 0.0 };
     let sines = [sine(half_m, period_s), sine(0.5 * half_m, 0.5 * period_s), sine(0.0, period_s)];
-    Ok(Trajectory::Lissajous { centre_m, sines, yaw_rad: yaw(table)? })
+    let lemniscate = Trajectory::Lissajous { centre_m, sines, yaw_rad: yaw(table)? };
+    flyable(table, SPEED.name, &lemniscate)?;
+    Ok(lemniscate)
 }
 
 fn lissajous(table: &mut Table<'_>) -> Result<Trajectory, FileError> {
@@ -140,22 +148,31 @@ fn lissajous(table: &mut Table<'_>) -> Result<Trajectory, FileError> {
     let amplitude_m = table.need_vector("amplitude_m", &AMPLITUDE)?;
     let period_s = table.need_vector("period_s", &PERIOD)?;
     let phase_rad = table.vector("phase_rad", [&PHASE; 3])?.unwrap_or_default();
-    let rate = period_s.map(|period_s| TAU / period_s);
-    let peak = |order| amplitude_m.zip_map(&rate, |amplitude_m, rate| amplitude_m * rate.powi(order)).amax();
-    slow_enough(table, PERIOD.name, [1, 2, 3, 4].map(peak))?;
     let sine = |amplitude_m, period_s, phase_rad| Sine { amplitude_m, period_s, phase_rad };
     let sines = amplitude_m.zip_zip_map(&period_s, &phase_rad, sine).into();
-    Ok(Trajectory::Lissajous { centre_m, sines, yaw_rad: yaw(table)? })
+    let lissajous = Trajectory::Lissajous { centre_m, sines, yaw_rad: yaw(table)? };
+    flyable(table, PERIOD.name, &lissajous)?;
+    Ok(lissajous)
 }
 
 fn waypoints(table: &mut Table<'_>) -> Result<Trajectory, FileError> {
-    let mut waypoints: Vec<Waypoint> = Vec::new();
-    for mut table in table.tables("waypoint")? {
-        let waypoint = Waypoint {
+    let (mut waypoints, tables) = (Vec::<Waypoint>::new(), table.tables("waypoint")?);
+    if tables.is_empty() && table.knows("waypoint") {
+        // First, for an unknown key may be a misspelt one.
+        table.finish()?;
+        return Err(table.missing("waypoint", "add [[trajectory.waypoint]] with time_s and position_m"));
+    }
+    for mut table in tables {
+        let mut waypoint = Waypoint {
             time_s: table.need_number(&WAYPOINT_TIME)?,
             position_m: table.need_vector("position_m", &POSITION)?,
             yaw_rad: yaw(&mut table)?,
         };
+        table.finish()?;
+        // Nothing follows from a place that nobody knows.
+        if !table.knows(WAYPOINT_TIME.name) || !table.knows(POSITION.name) {
+            continue;
+        }
         if let Some(before) = waypoints.last() {
             let length_s = waypoint.time_s - before.time_s;
             if length_s <= 0.0 {
@@ -163,18 +180,16 @@ fn waypoints(table: &mut Table<'_>) -> Result<Trajectory, FileError> {
                     "{} is not after the {} of the waypoint before; make times rise",
                     waypoint.time_s, before.time_s
                 );
-                return Err(table.fault_at(WAYPOINT_TIME.name, problem));
+                table.clash(WAYPOINT_TIME.name, &[], problem)?;
+                continue;
             }
-            let leg_m = (waypoint.position_m - before.position_m).amax();
-            // Peaks of minimum-jerk motion over unit distance in unit time: 15/8, 10/sqrt(3), 60, 360.
-            let peaks = [(1.875, 1), (5.774, 2), (60.0, 3), (360.0, 4)];
-            slow_enough(&table, WAYPOINT_TIME.name, peaks.map(|(peak, order)| peak * leg_m / length_s.powi(order)))?;
+            waypoint.yaw_rad = nearest_heading(before.yaw_rad, waypoint.yaw_rad);
+            flyable(&table, WAYPOINT_TIME.name, &Trajectory::Waypoints(vec![*before, waypoint]))?;
         }
-        table.finish()?;
         waypoints.push(waypoint);
     }
     if waypoints.is_empty() {
-        return Err(table.missing("waypoint", "add [[trajectory.waypoint]] with time_s and position_m"));
+        return Ok(Trajectory::Paper);
     }
     Ok(Trajectory::Waypoints(waypoints))
 }
@@ -186,23 +201,42 @@ fn through_places(table: &mut Table<'_>) -> Result<Trajectory, FileError> {
         speed_m_s: table.need_number(&SPEED_MAX)?,
         acceleration_m_s2: table.need_number(&ACCELERATION_MAX)?,
     };
-    let mut places: Vec<FlatOutput> = Vec::new();
+    let (mut places, mut are_known) = (Vec::<FlatOutput>::new(), true);
     for mut table in table.few_tables("waypoint")? {
         let position_m = table.need_vector("position_m", &POSITION)?;
         let place = [position_m.x, position_m.y, position_m.z, yaw(&mut table)?];
-        // A turn on the spot has no length, from which the time of the leg would follow.
-        if places.last().is_some_and(|before| before[..3] == place[..3]) {
-            return Err(table.fault_at("position_m", "it is that of the waypoint before; leave one out"));
-        }
         table.finish()?;
-        places.push(place);
+        let is_known = table.knows(POSITION.name);
+        if let Some(length_m) = places.last().map(|before| distance_m(before, &place)).filter(|it| *it < LEG_MIN_M)
+            && is_known
+        {
+            let near = format!("{length_m} m from the waypoint before, nearer than {LEG_MIN_M} m; leave one out");
+            table.clash("position_m", &[], near)?;
+        } else if is_known {
+            places.push(place);
+        }
+        are_known &= is_known;
     }
-    if places.len() < 2 {
+    if places.len() < 2 && are_known && table.knows("waypoint") {
+        table.finish()?;
         return Err(table.missing("waypoint", "add two or more [[trajectory.waypoint]] with position_m"));
     }
-    let pieces = minimum_snap(&places, start_s, limits).ok_or_else(|| {
-        table.fault_at("waypoint", "no smooth path goes through them; make their distances more alike")
-    })?;
-    slow_enough(table, SPEED_MAX.name, peaks(&pieces))?;
-    Ok(Trajectory::Polynomials(pieces))
+    let pieces = match minimum_snap(&places, start_s, limits) {
+        Ok(pieces) => pieces,
+        Err(error) => {
+            let cure = "make their distances more alike, or leave one of two near ones out";
+            let problem = match error {
+                NoPath::Swings(leg) => {
+                    let swing = format!("swings away by more than {SWING_MAX} times the longest distance");
+                    format!("from waypoint {} to {} the smooth path {swing}", leg + 1, leg + 2)
+                }
+                NoPath::TooFew | NoPath::ShortLeg(_) | NoPath::Unsolvable => "no smooth path goes through them".into(),
+            };
+            table.clash("waypoint", &[], format!("{problem}; {cure}"))?;
+            return Ok(Trajectory::Paper);
+        }
+    };
+    let path = Trajectory::Polynomials(pieces);
+    flyable(table, SPEED_MAX.name, &path)?;
+    Ok(path)
 }

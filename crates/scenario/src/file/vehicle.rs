@@ -10,6 +10,10 @@ use std::path::Path;
 pub(super) fn read(table: Option<Table<'_>>) -> Result<(Option<Vehicle>, Parameters<f64>), FileError> {
     let Some(mut table) = table else { return Ok((None, Parameters::PAPER)) };
     let Some(name) = table.text("name")? else {
+        if !table.knows("name") {
+            table.finish()?;
+            return Ok((None, Parameters::PAPER));
+        }
         return Ok((None, parts::parameters(Some(table), Parameters::PAPER)?));
     };
     let vehicle = named(&table, name)?;
@@ -22,7 +26,7 @@ pub(super) fn read(table: Option<Table<'_>>) -> Result<(Option<Vehicle>, Paramet
 fn named(table: &Table<'_>, name: &str) -> Result<Vehicle, FileError> {
     if name.contains(['/', '\\', '.']) {
         let folder = Path::new(table.file()).parent().unwrap_or(Path::new(""));
-        return afbc_vehicles::load(&folder.join(name));
+        return afbc_vehicles::load(&folder.join(name)).map_err(|error| table.through("name", error));
     }
     let built_in = afbc_vehicles::built_in(name).ok_or_else(|| table.fault_at("name", afbc_vehicles::unknown(name)))?;
     built_in.read()

@@ -27,19 +27,20 @@ pub(crate) fn whole(table: Option<Table<'_>>, gains: &mut impl Declared) -> Resu
 fn group(mut table: Table<'_>, name: &str, gains: &mut impl Declared) -> Result<(), FileError> {
     table.declared_in(name, gains)?;
     // Each gain is in its range; what is left to refuse is how centre and width go together.
-    gains.together().map_err(|error| {
+    table.finish()?;
+    gains.together().or_else(|error| {
         let problem = format!("{}; change one of the two", out_of_range(&error));
-        table.fault_at(Membership::CENTRE.range.name, problem)
-    })?;
-    table.finish()
+        table.clash(Membership::CENTRE.range.name, &[], problem)
+    })
 }
 
 /// `law` with those of its gains that the file of `vehicle` holds.
 ///
 /// # Errors
 /// One line on the first thing that is wrong, such as gains of an unknown law.
-pub(crate) fn law_gains(vehicle: &Vehicle, mut law: Law) -> Result<Law, FileError> {
-    vehicle.law_gains(|mut laws| {
+pub(crate) fn law_gains(vehicle: &Vehicle, law: Law) -> Result<Law, FileError> {
+    let read = vehicle.law_gains(|mut laws| {
+        let mut law = law;
         // Settings of the cascade are not a law's own.
         laws.table(afbc_vehicles::CASCADE)?;
         for kind in ControllerKind::all() {
@@ -50,7 +51,8 @@ pub(crate) fn law_gains(vehicle: &Vehicle, mut law: Law) -> Result<Law, FileErro
                 false => (),
             }
         }
-        laws.finish()
+        laws.finish()?;
+        Ok(law)
     })?;
-    Ok(law)
+    Ok(read.unwrap_or(law))
 }

@@ -13,6 +13,7 @@ pub use own::{OWN_GAINS_MAX, OwnController, OwnFlight, OwnGain, OwnGains, OwnKin
 use afbc::{Adaptive, Backstepping, Controller, Guarded, Profile, Safeguards, adaptive, backstepping};
 use afbc_control::{Action, FlightController, Mixer, Smoothing, Trace};
 use afbc_peers::{Dfbc, Geometric, Indi, L1, Mpc, Pid, dfbc, geometric, indi, l1, mpc, pid};
+use afbc_reader::words::nearest;
 use afbc_types::{Axis, PerAxis, Setpoint, State};
 
 declare::laws! {
@@ -138,6 +139,14 @@ impl ControllerKind {
     pub fn names() -> String {
         let names: Vec<_> = ControllerKind::all().into_iter().map(ControllerKind::name).collect();
         names.join(", ")
+    }
+
+    /// Returns the cure for a `name` that no law has, for a message: the most similar one, or all of them.
+    pub fn cure(name: &str) -> String {
+        match nearest(name, ControllerKind::all().into_iter().map(ControllerKind::name)) {
+            Some(similar) => format!("did you mean {similar}?"),
+            None => format!("the laws are {}", ControllerKind::names()),
+        }
     }
 
     /// The two that the paper compares.

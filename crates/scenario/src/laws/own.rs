@@ -16,7 +16,7 @@ pub const OWN_GAINS_MAX: usize = 32;
 /// Longest name of such a law.
 const NAME_LENGTH: usize = 32;
 /// Names that stand for contenders of the list.
-const TAKEN: [&str; 2] = ["afbc-as-printed", "afbc-monitored"];
+const TAKEN: [&str; 3] = ["afbc-as-printed", "backstepping-as-printed", "afbc-monitored"];
 
 /// A control law of one's own, flown with the harness's mixer, sensors and losses: U1..U4 from state and setpoint.
 ///

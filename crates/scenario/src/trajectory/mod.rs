@@ -8,7 +8,7 @@ mod reference;
 pub mod spline;
 
 use core::f64::consts::{PI, TAU};
-use libm::{cos, sin, sincos};
+use libm::{cos, rint, sin, sincos};
 use nalgebra::Vector3;
 pub use polynomial::PolynomialPiece;
 pub use reference::Reference;
@@ -94,7 +94,8 @@ pub enum Trajectory {
         yaw_rad: f64,
     },
     /// Minimum-jerk motion from rest to rest between waypoints with increasing times; at rest before the first and
-    /// after the last. Position, velocity and acceleration are continuous; the jerk jumps at each waypoint.
+    /// after the last. Position, velocity and acceleration are continuous; the jerk jumps at each waypoint. The heading
+    /// turns by the difference of the two: [`nearest_heading`] makes that the short way round.
     Waypoints(Vec<Waypoint>),
     /// Polynomial pieces, each beginning where the one before ends; at rest before the first and after the last.
     Polynomials(Vec<PolynomialPiece>),
@@ -138,6 +139,50 @@ impl Trajectory {
             Trajectory::Polynomials(pieces) => polynomial::at(pieces, t),
         }
     }
+
+    /// Calls `take` with the reference at [`SAMPLES`] times and more of each period, leg or piece.
+    pub fn sample(&self, take: &mut dyn FnMut(Reference)) {
+        let mut within = |from_s: f64, length_s: f64| {
+            (0..=SAMPLES).for_each(|k| take(self.at(from_s + length_s * f64::from(k) / f64::from(SAMPLES))));
+        };
+        match self {
+            Trajectory::Paper => within(0.0, PAPER_PERIOD_S),
+            Trajectory::Hover { .. } => within(0.0, 0.0),
+            Trajectory::Step { at_s, .. } => within(0.0, *at_s),
+            Trajectory::Circle { period_s, .. } => within(0.0, *period_s),
+            // Each coordinate goes through all of its values in its own period.
+            Trajectory::Lissajous { sines, .. } => sines.iter().for_each(|sine| within(0.0, sine.period_s)),
+            Trajectory::Waypoints(waypoints) => {
+                waypoints.iter().zip(waypoints.iter().skip(1)).for_each(|(from, to)| {
+                    within(from.time_s, to.time_s - from.time_s);
+                });
+            }
+            Trajectory::Polynomials(pieces) => {
+                pieces.iter().flat_map(|piece| piece.samples(SAMPLES)).for_each(take);
+            }
+        }
+    }
+
+    /// Returns the time from which on the reference is at rest, if there is one \[s\].
+    pub fn end_s(&self) -> Option<f64> {
+        match self {
+            Trajectory::Paper | Trajectory::Circle { .. } | Trajectory::Lissajous { .. } => None,
+            Trajectory::Hover { .. } => Some(0.0),
+            Trajectory::Step { at_s, .. } => Some(*at_s),
+            Trajectory::Waypoints(waypoints) => waypoints.last().map(|waypoint| waypoint.time_s),
+            Trajectory::Polynomials(pieces) => pieces.last().map(PolynomialPiece::end_s),
+        }
+    }
+}
+
+/// Samples of a period, leg or piece.
+pub const SAMPLES: u32 = 64;
+/// Period of the paper's trajectory \[s\].
+const PAPER_PERIOD_S: f64 = 60.0;
+
+/// Returns `yaw_rad` with the whole turns that bring it within half a turn of `before_rad`.
+pub fn nearest_heading(before_rad: f64, yaw_rad: f64) -> f64 {
+    yaw_rad - TAU * rint((yaw_rad - before_rad) / TAU)
 }
 
 /// Returns the reference of Section IV, with sin(a + pi/2) = cos a and sin(a + pi) = -sin a inserted.

@@ -40,6 +40,12 @@ impl PolynomialPiece {
         self.start_s + self.duration_s
     }
 
+    /// Returns the reference at `count` + 1 times from start to end.
+    pub fn samples(&self, count: u32) -> impl Iterator<Item = Reference> {
+        let piece = *self;
+        (0..=count).map(move |k| piece.at(piece.start_s + piece.duration_s * f64::from(k) / f64::from(count)))
+    }
+
     /// Returns the reference at time `t` \[s\], which is moved into the piece.
     pub fn at(&self, t: f64) -> Reference {
         let s = (t - self.start_s).clamp(0.0, self.duration_s);
@@ -68,19 +74,13 @@ pub(super) fn at(pieces: &[PolynomialPiece], t: f64) -> Reference {
     if flies { reference } else { Reference::rest(reference.position_m, reference.yaw_rad) }
 }
 
-/// Samples of each piece, for [`peaks`].
-const SAMPLES: u32 = 64;
-
-/// Returns the largest speed, acceleration, jerk and snap of pieces \[m, s\], as sampled.
-pub fn peaks(pieces: &[PolynomialPiece]) -> [f64; 4] {
+/// Returns the largest speed, acceleration, jerk and snap of pieces \[m, s\], in `samples` of each.
+pub fn peaks(pieces: &[PolynomialPiece], samples: u32) -> [f64; 4] {
     let mut peaks = [0.0_f64; 4];
-    for piece in pieces {
-        for sample in 0..=SAMPLES {
-            let at = piece.at(piece.start_s + piece.duration_s * f64::from(sample) / f64::from(SAMPLES));
-            let parts = [at.velocity_m_s, at.acceleration_m_s2, at.jerk_m_s3, at.snap_m_s4];
-            for (peak, part) in peaks.iter_mut().zip(parts) {
-                *peak = peak.max(part.norm());
-            }
+    for at in pieces.iter().flat_map(|piece| piece.samples(samples)) {
+        let parts = [at.velocity_m_s, at.acceleration_m_s2, at.jerk_m_s3, at.snap_m_s4];
+        for (peak, part) in peaks.iter_mut().zip(parts) {
+            *peak = peak.max(part.norm());
         }
     }
     peaks

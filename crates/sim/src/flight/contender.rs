@@ -21,6 +21,21 @@ pub fn fly(
     contender: &Contender,
     mut observe: impl FnMut(&Sample),
 ) -> Result<Option<Lost>, OutOfRange> {
+    fly_until(scenario, contender, |sample| {
+        observe(sample);
+        ControlFlow::Continue(())
+    })
+}
+
+/// Flies as [`fly`] does, until `observe` ends the flight.
+///
+/// # Errors
+/// As there.
+pub fn fly_until(
+    scenario: &Scenario,
+    contender: &Contender,
+    mut observe: impl FnMut(&Sample) -> ControlFlow<()>,
+) -> Result<Option<Lost>, OutOfRange> {
     FlightStart::of(scenario).fly(contender, &mut observe)
 }
 
@@ -37,11 +52,15 @@ impl<'a> FlightStart<'a> {
         FlightStart { scenario, world: None }
     }
 
-    /// Flies under one contender, as [`fly`] does.
+    /// Flies under one contender, as [`fly_until`] does.
     ///
     /// # Errors
     /// As there.
-    pub fn fly(&mut self, contender: &Contender, observe: &mut dyn FnMut(&Sample)) -> Result<Option<Lost>, OutOfRange> {
+    pub fn fly(
+        &mut self,
+        contender: &Contender,
+        observe: &mut dyn FnMut(&Sample) -> ControlFlow<()>,
+    ) -> Result<Option<Lost>, OutOfRange> {
         let scenario = self.scenario;
         with_rotors!(scenario.rotors.len(), N => {
             let controller = contender.controller::<N>(&scenario.vehicle, &scenario.rotors)?;
@@ -52,13 +71,9 @@ impl<'a> FlightStart<'a> {
     fn fly_under<const N: usize>(
         &mut self,
         controller: AnyController<N>,
-        observe: &mut dyn FnMut(&Sample),
+        observe: &mut dyn FnMut(&Sample) -> ControlFlow<()>,
     ) -> Result<Option<Lost>, OutOfRange> {
         let (scenario, mut world) = (self.scenario, self.world(decimal(controller.dt_s()))?);
-        let observe = |sample: &Sample| {
-            observe(sample);
-            ControlFlow::Continue(())
-        };
         let Ok(end) = if scenario.flight_core {
             let mut aboard = InFlightCore::new(scenario.vehicle.to_f32(), &scenario.response(), controller)?;
             lockstep(&mut world, &mut aboard, scenario.duration_s, observe)

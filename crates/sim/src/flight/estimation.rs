@@ -1,6 +1,6 @@
 //! The vehicle's own estimate, by the [front end](EstimatorFrontEnd) that flies on board, and how good it is.
 
-use super::sensing::{Sensing, still};
+use super::sensing::{CARRIED_S, Sensing, carried};
 use afbc_estimator::{Aid, Estimate, Estimator, ImuCalibration, OutputFilter};
 use afbc_flight_core::{Inbox, Refusal};
 use afbc_onboard::{Aged, EstimatorFrontEnd};
@@ -12,10 +12,11 @@ use nalgebra::{Quaternion, SMatrix, SVector, Vector3};
 /// Time before t = 0 for which a vehicle stands at rest in the attitude of its start, its rotors still, while the
 /// estimator levels itself, finds the gyroscope's bias and hears the other instruments \[s\].
 pub const REST_S: f64 = 2.0;
-/// Time after that in which it is carried to its start, and accelerated to the velocity there \[s\].
-pub const CARRIED_S: f64 = 1.0;
 /// Time by which it rests longer, at most, if the estimate is not valid then: nobody starts on none \[s\].
 const WAITS_S: u32 = 5;
+
+/// Height of a vehicle's feet at the start from which on it starts in the air \[m\].
+const CLEAR_M: f64 = 0.1;
 
 /// Steps between two evaluations of [`Estimated::nees`], which costs as much as the estimator.
 const NEES_EVERY: u64 = 10;
@@ -104,15 +105,17 @@ impl SimulatedEstimator {
                 break;
             }
         }
+        let feet_m = scenario.realism.contact.map_or(f64::NEG_INFINITY, |contact| contact.foot_depth_m);
+        if let Some(navigator) = settled.as_mut().filter(|_| truth.position_m.z > feet_m + CLEAR_M) {
+            navigator.front_end.set_clear_of_ground();
+        }
         Ok(settled)
     }
 
     /// Creates one that will rest for `waits_s` longer than usual.
     fn at_rest(scenario: &Scenario, step_s: f64, waits_s: f64) -> Result<Option<Box<Self>>, OutOfRange> {
-        let (Some(imu), Some(sensing)) = (scenario.instruments.imu, Sensing::new(scenario, step_s)?) else {
-            return Ok(None);
-        };
-        let settings = scenario.estimation(&imu, step_s);
+        let Some(sensing) = Sensing::new(scenario, step_s)? else { return Ok(None) };
+        let settings = scenario.estimation(step_s);
         let filter = OutputFilter::of(&scenario.vehicle.to_f32(), scenario.rotors.len());
         let calibration = ImuCalibration::new(&scenario.mounting().to_f32());
         let front_end = EstimatorFrontEnd::new(Estimator::new(settings)?, filter, calibration);
@@ -133,19 +136,8 @@ impl SimulatedEstimator {
         let mut is_ready = false;
         for step in 0..self.settling {
             let time_s = (step as f64 - self.settling as f64) * self.step_s;
-            // Time for which it has been accelerated.
-            let moving_s = (time_s + CARRIED_S).max(0.0);
-            let rests = moving_s == 0.0;
-            let acceleration = start.velocity_m_s * if rests { 0.0 } else { 1.0 / CARRIED_S };
-            // From here a constant acceleration reaches the start with its velocity just at t = 0.
-            let still_m = start.position_m - start.velocity_m_s * (0.5 * CARRIED_S);
-            self.front_end.set_on_ground(rests);
-            let estimate = self.step(&Truth {
-                position_m: still_m + acceleration * (0.5 * moving_s * moving_s),
-                velocity_m_s: acceleration * moving_s,
-                acceleration_m_s2: acceleration,
-                ..still(start, time_s)
-            });
+            self.front_end.set_on_ground(time_s <= -CARRIED_S);
+            let estimate = self.step(&carried(start, time_s));
             is_ready = is_valid(&estimate);
         }
         self.front_end.set_on_ground(false);

@@ -85,7 +85,8 @@ impl<C: FlightController<N>, const N: usize> Pilot for InFlightCore<C, N> {
         action.health.state_rejected = state.is_none();
         action.health.setpoint_rejected = !setpoint.is_plausible();
         let estimates = self.memory.control().and_then(|control| estimates::<N>(control));
-        Ok(view.sample(action, self.memory.trace::<C, N>(), estimates))
+        let sample = view.sample(action, self.memory.trace::<C, N>(), estimates);
+        Ok(Sample { mode: Some(self.memory.mode()), ..sample })
     }
 
     fn descends(&self) -> bool {

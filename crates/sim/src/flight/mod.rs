@@ -17,13 +17,14 @@ mod sensing;
 mod sensor_model;
 mod world;
 
-pub use contender::{FlightStart, fly};
-pub use estimation::{CARRIED_S, Estimated, Innovation, REST_S};
+pub use afbc_flight_core::Mode;
+pub use contender::{FlightStart, fly, fly_until};
+pub use estimation::{Estimated, Innovation, REST_S};
 pub use in_flight_core::InFlightCore;
 pub use law_only::LawOnly;
 pub use lockstep::{FlightEnd, Lost, lockstep};
 pub use loss::{ALOFT_M, CLEAR_M, GROUNDED_S, LOST_DISTANCE_M, OFF_S};
 pub use pilot::Pilot;
 pub use sample::Sample;
-pub use sensing::STANDS_S;
+pub use sensing::{CARRIED_S, STANDS_S};
 pub use world::{View, World};

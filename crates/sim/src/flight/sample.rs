@@ -3,6 +3,7 @@
 use super::estimation::Estimated;
 use afbc::AdaptiveEstimate;
 use afbc_control::{Action, Trace};
+use afbc_flight_core::Mode;
 use afbc_plant::{EffectsState, Motion, StateMeasurement};
 use afbc_scenario::AnyControllerMemory;
 use afbc_scenario::trajectory::Reference;
@@ -24,6 +25,8 @@ pub struct Sample {
     pub telemetry: Option<EffectsState>,
     /// Reference at this time.
     pub reference: Reference,
+    /// Mode of the flight core, if it flies inside one.
+    pub mode: Option<Mode>,
     /// The controller's output; 0 for rotors that the vehicle does not have.
     pub action: Action<ROTORS_MAX>,
     /// The controller's trace.

@@ -9,14 +9,18 @@ use afbc_types::OutOfRange;
 use nalgebra::Vector3;
 use std::collections::VecDeque;
 
-/// Time for which a vehicle with an estimator of its own stands at its start before t = 0 \[s\].
+/// Time for which a vehicle with an estimator of its own stands at its start, and is carried to it, before t = 0 \[s\].
 pub const STANDS_S: f64 = 4.0;
+/// Time before t = 0 in which a vehicle that has rested is carried to its start, and accelerated to the velocity there
+/// \[s\]: no sensor would notice a jump.
+pub const CARRIED_S: f64 = 1.0;
 
 /// Instruments of a vehicle, and what of their readings has not reached a tick yet.
 #[derive(Clone)]
 pub(super) struct Sensing {
     instruments: Instruments,
-    suite: InstrumentSuite,
+    /// What the vehicle is told of them.
+    told: InstrumentSuite,
     outages: Vec<Outage>,
     readings: Readings,
     /// Measurements that wait for a tick that takes them.
@@ -32,7 +36,7 @@ impl Sensing {
         let instruments = scenario.instruments(step_s)?.filter(|_| scenario.instruments.imu.is_some());
         Ok(instruments.map(|instruments| Sensing {
             instruments,
-            suite: scenario.instruments,
+            told: scenario.told(),
             outages: scenario.outages.clone(),
             readings: Readings::NONE,
             waiting: VecDeque::new(),
@@ -50,18 +54,18 @@ impl Sensing {
 
     /// Reads the instruments in `truth`, for a tick of that time. `at_us` is the vehicle's clock.
     pub(super) fn read(&mut self, truth: &Truth, at_us: impl Fn(f64) -> u64) -> &Readings {
-        let Sensing { instruments, suite, outages, readings, waiting } = self;
+        let Sensing { instruments, told, outages, readings, waiting } = self;
         let read = instruments.measure(truth);
         // The tracker is on the ground: what it sends in an outage of the link is lost.
         let heard = !outages.iter().any(|outage| (outage.start_s..outage.end_s).contains(&truth.time_s));
-        if let Some(tracker) = suite.tracker.filter(|_| heard) {
+        if let Some(tracker) = told.tracker.filter(|_| heard) {
             waiting.extend(read.tracker.iter().map(|fix| sensor_model::pose(fix, &tracker, &at_us)));
         }
         waiting.extend(read.gnss.iter().map(|fix| sensor_model::gnss(fix, &at_us)));
-        if let Some(barometer) = suite.barometer {
+        if let Some(barometer) = told.barometer {
             waiting.extend(read.barometer.iter().map(|fix| sensor_model::height(fix, &barometer, &at_us)));
         }
-        if let Some(magnetometer) = suite.magnetometer {
+        if let Some(magnetometer) = told.magnetometer {
             waiting.extend(read.magnetometer.iter().map(|fix| sensor_model::field(fix, &magnetometer, &at_us)));
         }
         let now_us = at_us(truth.time_s);
@@ -89,6 +93,20 @@ pub(super) fn still(start: &Truth, time_s: f64) -> Truth {
         rotor_speeds_rad_s: start.rotor_speeds_rad_s * 0.0,
         thrust_share: 0.0,
         ..*start
+    }
+}
+
+/// Returns the truth of a vehicle before t = 0: it stands, and is carried to its start in the last [`CARRIED_S`]. From
+/// there a constant acceleration reaches the start with its velocity just at t = 0.
+pub(super) fn carried(start: &Truth, time_s: f64) -> Truth {
+    let moving_s = (time_s + CARRIED_S).max(0.0);
+    let acceleration_m_s2 = start.velocity_m_s * if moving_s > 0.0 { 1.0 / CARRIED_S } else { 0.0 };
+    let still_m = start.position_m - start.velocity_m_s * (0.5 * CARRIED_S);
+    Truth {
+        position_m: still_m + acceleration_m_s2 * (0.5 * moving_s * moving_s),
+        velocity_m_s: acceleration_m_s2 * moving_s,
+        acceleration_m_s2,
+        ..still(start, time_s)
     }
 }
 
@@ -140,11 +158,11 @@ impl Wired {
         self.sensing.readings()
     }
 
-    /// Reads all sensors; before t = 0 those of a vehicle at rest.
+    /// Reads all sensors; before t = 0 those of a vehicle at rest that is carried to its start.
     pub(super) fn look(&mut self, truth: &Truth) {
         let step_s = self.step_s;
         let before_s = if self.stands() { self.looks as f64 * step_s - STANDS_S } else { 0.0 };
-        let seen = if self.stands() { still(truth, before_s) } else { *truth };
+        let seen = if self.stands() { carried(truth, before_s) } else { *truth };
         self.looks += 1;
         // The clock begins a step before the first look: no time of it is zero.
         let at_us = |time_s: f64| ((time_s + STANDS_S + step_s) * 1e6).round().max(0.0) as u64;

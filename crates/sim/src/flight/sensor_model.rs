@@ -1,5 +1,5 @@
-//! Measurements as an estimator gets them, with the standard deviations that data sheets and receivers state, not what
-//! was drawn for this flight: slow errors of a receiver, hard iron.
+//! Measurements as an estimator gets them, with the standard deviations that receivers state and data sheets that it is
+//! told of, not what was drawn for this flight: slow errors of a receiver, hard iron.
 
 use afbc_estimator::{Measurement, Stamped};
 use afbc_plant::instruments::{Barometer, FieldFix, GnssFix, HeightFix, Magnetometer, TrackerFix, TrackerModel};

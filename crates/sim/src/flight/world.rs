@@ -211,7 +211,7 @@ impl View {
     ) -> Sample {
         let View { time_s, motion, measurement, estimated, telemetry, reference, .. } = self;
         let action = action.padded();
-        Sample { time_s, motion, measurement, estimated, telemetry, reference, action, trace, estimates }
+        Sample { time_s, motion, measurement, estimated, telemetry, reference, mode: None, action, trace, estimates }
     }
 }
 

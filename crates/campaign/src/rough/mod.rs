@@ -1,0 +1,150 @@
+//! The suite `rough-estimate`: flights whose sensors do what the vehicle is not told, and how good its estimate is.
+//! `docs/suites.md` has the classes.
+//!
+//! A flight is a function of seed, vehicle, class and number alone: it is the same on every machine, beside whatever
+//! others.
+
+mod class;
+mod drawing;
+mod flight;
+mod judgement;
+mod row;
+
+pub use class::{CLASSES, Class, MIXTURE, MIXTURE_MEANING, Venue, names};
+pub use flight::RoughFlight;
+pub use judgement::Judgement;
+pub use row::{ClassRow, FlownRough, rows};
+
+use crate::compare;
+use crate::draw::mix;
+use afbc::Profile;
+use afbc_plant::noise::{Noise, Stream};
+use afbc_reader::FileError;
+use afbc_reader::words::out_of_range;
+use afbc_scenario::Scenario;
+use afbc_scenario::contender::Contender;
+use afbc_scenario::trajectory::Trajectory;
+use afbc_types::OutOfRange;
+use afbc_vehicles::Vehicle;
+use core::ops::Range;
+use drawing::Drawing;
+use rayon::prelude::*;
+
+/// Name of the suite.
+pub const NAME: &str = "rough-estimate";
+/// Length of most flights \[s\].
+pub const SHORT_S: f64 = 60.0;
+/// Length of one in [`LONG_ONE_IN`] \[s\].
+pub const LONG_S: f64 = 600.0;
+/// One flight in so many is long.
+pub const LONG_ONE_IN: u64 = 10;
+
+/// What to draw.
+#[derive(Clone, Debug)]
+pub struct Rough {
+    /// Seeds.
+    pub seeds: Range<u64>,
+    /// Number of flights of each vehicle, class and seed.
+    pub flights: u64,
+    /// Length of every flight, instead of [`SHORT_S`] and [`LONG_S`].
+    pub duration_s: Option<f64>,
+    /// Who flies.
+    pub vehicles: Vec<Vehicle>,
+}
+
+/// A vehicle at both places, as its sensors are stated.
+struct Base<'a> {
+    vehicle: &'a Vehicle,
+    indoors: Scenario,
+    outdoors: Scenario,
+}
+
+impl Rough {
+    /// Draws every flight, flown by `contender` with its gains for the vehicle.
+    ///
+    /// # Errors
+    /// One line on what a vehicle cannot fly, or on a gain or setting out of range.
+    pub fn draw(&self, contender: &Contender) -> Result<Vec<RoughFlight>, FileError> {
+        let bases = self.vehicles.iter().map(|vehicle| Base::new(vehicle, contender));
+        let bases = bases.collect::<Result<Vec<_>, _>>()?;
+        let (bases, flights) = (bases.as_slice(), self.flights);
+        let of_base = |seed| bases.iter().flat_map(move |base| names().map(move |class| (base, class, seed)));
+        let all = self.seeds.clone().flat_map(of_base);
+        let all = all.flat_map(|(base, class, seed)| (1..=flights).map(move |number| (base, class, seed, number)));
+        let all: Vec<_> = all.collect();
+        all.into_par_iter().map(|(base, class, seed, number)| self.flight(base, class, seed, number)).collect()
+    }
+
+    fn flight(&self, base: &Base<'_>, class: &'static str, seed: u64, number: u64) -> Result<RoughFlight, FileError> {
+        let vehicle = &base.vehicle.name;
+        // By the names, not their places in a list: others beside them change nothing.
+        let of_names = vehicle.bytes().chain(class.bytes()).fold(mix(seed), |hash, byte| mix(hash ^ u64::from(byte)));
+        let bits = mix(of_names.wrapping_add(number)) >> 11;
+        let mut noise = Noise::new(bits, Stream::Scenario);
+        let is_long = (noise.uniform() * LONG_ONE_IN as f64) < 1.0;
+        let hovers = noise.uniform() < 0.3;
+        let drawn_place = if noise.uniform() < 0.5 { Venue::Indoors } else { Venue::Outdoors };
+        let one = CLASSES.iter().find(|own| own.name == class);
+        let place = one.and_then(|one| one.place).unwrap_or(drawn_place);
+        let parts = match one {
+            Some(one) => vec![one],
+            None => two(&mut noise, place),
+        };
+        let stated = if place == Venue::Indoors { &base.indoors } else { &base.outdoors };
+        let lasts_s = if is_long { LONG_S } else { SHORT_S };
+        let mut scenario = Scenario {
+            name: format!("{vehicle}-{class}-{seed}-{number}"),
+            duration_s: self.duration_s.unwrap_or(lasts_s),
+            seed: bits,
+            told: stated.told_before_draws(),
+            ..stated.clone()
+        };
+        if hovers {
+            scenario.trajectory = Trajectory::Hover { position_m: scenario.initial.position_m, yaw_rad: 0.0 };
+        }
+        let mut drawing = Drawing { noise: &mut noise, scenario: &mut scenario, gusts: Vec::new() };
+        parts.iter().for_each(|part| part.put(&mut drawing));
+        let parts: Vec<&str> = parts.iter().map(|part| part.name).collect();
+        let unfit = |error: OutOfRange| {
+            let problem = format!("it cannot fly {class} with {}; fly it with other seeds", out_of_range(&error));
+            FileError::whole(vehicle, problem)
+        };
+        drawing.finish().and_then(|()| scenario.check()).map_err(unfit)?;
+        scenario.description = format!("{}, {}", parts.join(" and "), place.name());
+        Ok(RoughFlight { seed, vehicle: vehicle.clone(), class, parts, number, place, scenario })
+    }
+}
+
+/// Draws two different classes that concern instruments of `place`.
+fn two(noise: &mut Noise, place: Venue) -> Vec<&'static Class> {
+    let mut there: Vec<&Class> = CLASSES.iter().skip(1).filter(|class| class.is_at(place)).collect();
+    let mut one = || there.remove((noise.uniform() * there.len() as f64) as usize);
+    vec![one(), one()]
+}
+
+impl<'a> Base<'a> {
+    fn new(vehicle: &'a Vehicle, contender: &Contender) -> Result<Self, FileError> {
+        let at = |text: &str| {
+            let mut scenario = afbc_scenario::parse(NAME, text, NAME)?.on(vehicle, Profile::Flight)?;
+            compare::fly_under(&mut scenario, core::slice::from_ref(contender))?;
+            // Some vehicles' batteries are empty before ten minutes are over.
+            scenario.realism.rotors.battery = None;
+            Ok::<Scenario, FileError>(scenario)
+        };
+        Ok(Base { vehicle, indoors: at(include_str!("indoors.toml"))?, outdoors: at(include_str!("outdoors.toml"))? })
+    }
+}
+
+/// Flies every flight on the current rayon pool, and calls `progress` after each. The result does not depend on the
+/// number of threads.
+///
+/// # Errors
+/// The first parameter, gain or setting out of range.
+pub fn fly(flights: Vec<RoughFlight>, progress: &(dyn Fn() + Sync)) -> Result<Vec<FlownRough>, OutOfRange> {
+    let flown = |flight: RoughFlight| {
+        let judgement = Judgement::of(&flight.scenario)?;
+        progress();
+        Ok(FlownRough { flight, judgement })
+    };
+    flights.into_par_iter().map(flown).collect()
+}

@@ -1,0 +1,80 @@
+//! Results of the suite `rough-estimate`: how good the estimate is in each class, and every flight.
+
+mod cells;
+mod files;
+mod judged;
+
+pub use files::json;
+pub use judged::RoughResults;
+
+use crate::grid::{self, Grid, TableFormat};
+use crate::report::sheet;
+use crate::table::wrap;
+use afbc_files::{Error, Folder};
+use core::fmt::Write;
+use maud::html;
+use std::path::PathBuf;
+
+fn grid(results: &RoughResults<'_>) -> Grid {
+    Grid {
+        caption: cells::words(results),
+        heads: ["class"].into_iter().chain(cells::HEADS).map(String::from).collect(),
+        rows: results.rows.iter().map(|row| (cells::name(row).to_owned(), cells::cells(row))).collect(),
+        note: cells::legend(),
+    }
+}
+
+/// Writes everything about the flights into `folder`, replacing all earlier files of its command, and returns the paths
+/// written:
+///
+/// * `flights.csv`: a row for each flight;
+/// * `rough-estimate.json`: a row for each class;
+/// * `tables.md`, `tables.tex`: the table for a paper;
+/// * `report.html`: the same on one self-contained page.
+///
+/// # Errors
+/// The first file that could not be written, or is not the command's.
+pub fn write(folder: &Folder, results: &RoughResults<'_>) -> Result<Vec<PathBuf>, Error> {
+    folder.only(&["flights.csv", "rough-estimate.json", "tables.md", "tables.tex", "report.html"])?;
+    let [md, tex] = [TableFormat::Markdown, TableFormat::Latex].map(|format| tables(results, format));
+    let shown = grid(results);
+    let body = html! { p { (shown.caption) "." } (shown.section()) (cells::meanings()) };
+    let page = sheet("Suite rough-estimate", &body);
+    Ok(vec![
+        folder.place("flights.csv", |out| files::csv(out, results))?,
+        folder.place("rough-estimate.json", |out| files::json(out, results))?,
+        folder.place("tables.md", |out| out.write_all(md.as_bytes()))?,
+        folder.place("tables.tex", |out| out.write_all(tex.as_bytes()))?,
+        folder.place("report.html", |out| out.write_all(page.as_bytes()))?,
+    ])
+}
+
+/// Formats the table for a paper.
+pub fn tables(results: &RoughResults<'_>, format: TableFormat) -> String {
+    grid::tables(&[grid(results)], "rough-estimate", format)
+}
+
+/// Formats the table for the terminal: a line for each class, and what the columns are.
+pub fn table(results: &RoughResults<'_>) -> String {
+    let shown = grid(results);
+    let mut lines = vec![format!("Suite rough-estimate: {}.", shown.caption), String::new()];
+    lines.extend(shown.lines());
+    lines.push(String::new());
+    wrap(&mut lines, "", &shown.note);
+    lines.join("\n") + "\n"
+}
+
+/// Formats as Markdown for a page: what was drawn, and the table.
+pub fn markdown(results: &RoughResults<'_>) -> String {
+    let shown = grid(results);
+    let mut lines = Vec::new();
+    wrap(&mut lines, "", &format!("{}.", shown.caption));
+    let mut page = lines.join("\n") + "\n\n";
+    // Writing to a String cannot fail.
+    let _ = writeln!(page, "| {} |\n|---|{}", shown.heads.join(" | "), "--:|".repeat(cells::HEADS.len()));
+    for (name, cells) in &shown.rows {
+        let cells: Vec<&str> = cells.iter().map(|cell| cell.text.as_str()).collect();
+        let _ = writeln!(page, "| {name} | {} |", cells.join(" | "));
+    }
+    page
+}
