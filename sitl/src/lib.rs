@@ -25,7 +25,7 @@ mod network;
 mod serial;
 
 use afbc_scenario::OwnLaw;
-use clap::Parser;
+use clap_complete::CompleteEnv;
 use std::process::ExitCode;
 
 /// Runs the command line with these laws beside the built-in ones: in every command that flies, in scenario and vehicle
@@ -39,9 +39,13 @@ pub fn main_with(laws: impl IntoIterator<Item = OwnLaw>) -> ExitCode {
         eprintln!("{problem}");
         return ExitCode::from(2);
     }
-    match cli::Cli::parse().run() {
+    // Ends the program if a shell asks what could stand next.
+    CompleteEnv::with_factory(cli::Cli::program).complete();
+    match cli::Cli::read().run() {
         Ok(code) => code,
         Err(failure) => {
+            // A log without anything in it would only be in the way of the next try.
+            afbc_files::remove_empty();
             eprintln!("{failure}");
             ExitCode::from(2)
         }

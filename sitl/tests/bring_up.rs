@@ -43,7 +43,7 @@ fn a_served_vehicle_is_asked_everything() {
     }
     // A second one does not take its place.
     let error = refused(&sitl(&folder, &asked));
-    assert!(error.contains("log.md: there is a file already"), "{error}");
+    assert!(error.contains("log.md: exists already"), "{error}");
 }
 
 #[test]

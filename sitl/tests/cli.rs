@@ -8,8 +8,10 @@ use afbc_scenario::contender::ControllerKind;
 use common::{command, folder, sitl};
 use std::collections::BTreeMap;
 use std::fs;
+use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Output, Stdio};
+use std::time::Instant;
 
 fn code(output: &Output) -> i32 {
     output.status.code().unwrap()
@@ -41,7 +43,7 @@ fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
 const HOVER: &str = "[trajectory]\nkind = \"hover\"\nposition_m = [0, 0, 1]\n";
 
 /// Text after [`HOVER`], and the error.
-const BAD_TABLES: [(&str, &str); 69] = [
+const BAD_TABLES: [(&str, &str); 70] = [
     ("[[outage]]\nstart_s = -1", ":5: outage.start_s: -1 is out of range: it must lie within 0 to 36000 (seconds)"),
     ("[vehicle]\nmass_g = 486", ":5: vehicle.mass_g: unknown key; did you mean mass_kg (kilograms)?"),
     (
@@ -98,6 +100,10 @@ const BAD_TABLES: [(&str, &str); 69] = [
     ),
     (
         "[[gust]]\naxis = \"x\"\nmoment_n_m = 1\nstart_s = 1",
+        ":6: gust.moment_n_m: unknown key; known here: axis, acceleration_m_s2, force_n, start_s, duration_s",
+    ),
+    (
+        "[[gust]]\naxis = \"x\"\nstart_s = 1",
         ":4: gust.acceleration_m_s2: missing; axis \"x\" takes acceleration_m_s2 or force_n",
     ),
     (
@@ -105,7 +111,7 @@ const BAD_TABLES: [(&str, &str); 69] = [
         ":6: gust.moment_n_m: a second size; axis \"yaw\" takes angular_acceleration_rad_s2 or moment_n_m, not both",
     ),
     (
-        "[[gust]]\naxis = \"phi\"",
+        "[[gust]]\naxis = \"phi\"\nforce_n = 1\nstart_s = 1",
         ":5: gust.axis: \"phi\" is unknown; it must be \"roll\", \"pitch\", \"yaw\", \"z\", \"x\" or \"y\"",
     ),
     ("[[gust]]\naxis = \"x\"\nforce_n = 1", ":4: gust.start_s: missing; add it (seconds)"),
@@ -115,7 +121,7 @@ const BAD_TABLES: [(&str, &str); 69] = [
     ),
     ("[gust]\naxis = \"x\"", ":4: gust: it is a table and must be a list of tables; write [[gust]], once for each"),
     (
-        "[[change]]\nparameter = \"weight\"",
+        "[[change]]\nparameter = \"weight\"\nfactor = 2\nstart_s = 1",
         ":5: change.parameter: \"weight\" is unknown; \
          it must be \"mass\", \"inertia\", \"thrust-factor\", \"drag-factor\", \
          \"roll-moment\", \"pitch-moment\" or \"yaw-moment\"",
@@ -164,7 +170,10 @@ const BAD_TABLES: [(&str, &str); 69] = [
         "[rotors]\ntime_constant = 0.02",
         ":5: rotors.time_constant: unknown key; did you mean time_constant_s (seconds)?",
     ),
-    ("[[rotor_fault]]\nrotor = 5", ":5: rotor_fault.rotor: 5 is out of range: it must lie within 1 to 4"),
+    (
+        "[[rotor_fault]]\nrotor = 5\nefficiency = 1\nstart_s = 0",
+        ":5: rotor_fault.rotor: 5 is out of range: it must lie within 1 to 4",
+    ),
     (
         "[[rotor_fault]]\nrotor = 1.5\nefficiency = 1\nstart_s = 0",
         ":5: rotor_fault.rotor: 1.5 is no rotor; it must be a whole number, 1 to 4",
@@ -193,11 +202,11 @@ const BAD_TABLES: [(&str, &str); 69] = [
     ("[gains.z]\nepsilom = 1", ":5: gains.z.epsilom: unknown key; did you mean epsilon (m/s or rad/s)?"),
     ("[[contender]]\ncontroller = \"afbc\"", ":4: contender.name: missing; give it one, such as \"gentle\""),
     (
-        "[[contender]]\nname = \"a\\nb\"",
+        "[[contender]]\nname = \"a\\nb\"\ncontroller = \"pid\"",
         ":5: contender.name: it cannot be a name; make it one plain line of 1 to 32 characters",
     ),
     (
-        "[[contender]]\nname = \"a\"\ncontroller = \"pid\"\n[[contender]]\nname = \"a\"",
+        "[[contender]]\nname = \"a\"\ncontroller = \"pid\"\n[[contender]]\nname = \"a\"\ncontroller = \"pid\"",
         ":8: contender.name: \"a\" is the name of another contender; choose another",
     ),
     (
@@ -261,7 +270,7 @@ const BAD_FILES: [(&str, &str); 28] = [
     ),
     ("[trajectory]\nkind = \"paper\"\nradius_m = 1", ":3: trajectory.radius_m: unknown key; known here: kind"),
     (
-        "[trajectory]\nkind = \"circle\"\ncentre_m = [0, 0, 1]\nradius = 1",
+        "[trajectory]\nkind = \"circle\"\ncentre_m = [0, 0, 1]\nradius = 1\nperiod_s = 5",
         ":4: trajectory.radius: unknown key; did you mean radius_m (metres)?",
     ),
     (
@@ -319,25 +328,37 @@ fn expand(message: &str) -> String {
             "ALL",
             "name, description, duration_s, seed, plant, vehicle, truth, controllers, profile, gains, settings, \
              limits, monitor, contender, trajectory, initial, gust, change, payload, rotors, rotor_fault, battery, \
-             drag, wind, ground, sensors, sensor_fault, instruments, instrument_fault, outage, flight_core",
+             drag, wind, ground, sensors, sensor_fault, instruments, told, instrument_fault, outage, flight_core",
         )
 }
 
 #[test]
-fn bad_files_get_one_line_and_nothing_is_written() {
+fn bad_files_get_a_line_for_each_mistake_and_nothing_is_written() {
     let folder = folder("bad");
     let tables = BAD_TABLES.map(|(text, message)| (format!("{HOVER}{text}\n"), message));
     let files_ = BAD_FILES.map(|(text, message)| (format!("{text}\n"), message));
+    let mut wrong = Vec::new();
     for (text, message) in tables.into_iter().chain(files_) {
         fs::write(folder.join("my.toml"), &text).unwrap();
         for verb in ["check", "fly"] {
             let output = sitl(&folder, &[verb, "my.toml"]);
-            assert_eq!(stderr(&output), format!("my.toml{}\n", expand(message)), "{text}");
+            let (said, expected) = (stderr(&output), format!("my.toml{}", expand(message)));
+            if !said.lines().any(|line| line == expected) {
+                wrong.push(format!("{text}is not told {expected} but {said}"));
+            }
+            // Some files of one mistake have nothing to follow, which is another one.
+            let others = said.lines().filter(|line| *line != expected);
+            let mut others = others.filter(|line| !line.contains("trajectory: missing"));
+            let known = "my.toml:1: duration: unknown key; did you mean duration_s (seconds)?";
+            if let Some(other) = others.find(|line| *line != known) {
+                wrong.push(format!("{text}is told {other}, too"));
+            }
             assert_eq!(code(&output), 2, "{text}");
             assert_eq!(stdout(&output), "");
         }
         assert_eq!(files(&folder).len(), 1, "{text}");
     }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
 #[test]
@@ -373,6 +394,11 @@ fn bad_options_are_refused_before_anything_is_written() {
         &["paper", "--log-hz", "300"],
         &["paper", "--duration", "0"],
         &["paper", "--duration", "nan"],
+        &["fly", "hover", "--duration", "-5"],
+        &["fly", "hover", "--seed", "-5"],
+        &["fly", "hover", "--speed", "5"],
+        &["campaign", "robustness", "--flights", "0"],
+        &["campaign", "robustness", "--flights", "20000"],
         &["fly"],
         &["fly", "hover", "--controller", "lqr"],
         &["fly", "hover", "--duration", "36000", "--log-hz", "1000"],
@@ -381,6 +407,7 @@ fn bad_options_are_refused_before_anything_is_written() {
         let output = sitl(&folder, arguments);
         assert_eq!(code(&output), 2, "{arguments:?}");
         assert!(!stderr(&output).is_empty() && output.stdout.is_empty(), "{arguments:?}");
+        assert!(!stderr(&output).contains("-- -"), "an option is advised as a file: {}", stderr(&output));
         assert!(files(&folder).is_empty(), "{arguments:?}");
     }
 }
@@ -525,7 +552,7 @@ fn the_default_log_rate_is_reduced_for_a_long_flight() {
     let folder = folder("long");
     let log = folder.join("out/hover/hover-backstepping.csv");
     let fly = |arguments: &[&str]| {
-        let output = sitl(&folder, &[&["fly", "hover", "--controller", "backstepping"], arguments].concat());
+        let output = sitl(&folder, &[&["fly", "hover", "--controller", "backstepping", "--force"], arguments].concat());
         assert_eq!(code(&output), 0, "{}", stderr(&output));
         (rows(&log), stderr(&output))
     };
@@ -535,4 +562,55 @@ fn the_default_log_rate_is_reduced_for_a_long_flight() {
     assert!(said.starts_with("logs of 1500 s keep 40 rows per second; --log-hz 100 keeps more\n"), "{said}");
     assert_eq!(fly(&["--duration", "601", "--log-hz", "100"]), (60_101, String::new()));
     assert_eq!(fly(&["--duration", "601", "--log-hz", "200"]), (120_201, String::new()));
+}
+
+/// Whoever reads the progress through a pipe hears of it every few seconds, long before a tenth is done.
+#[test]
+fn progress_through_a_pipe_is_not_silent() {
+    let folder = folder("progress");
+    // Hours.
+    let mut flying = command(&folder, &["compare", "storm", "--seeds", "10000"]);
+    let mut child = flying.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+    let mut said = BufReader::new(child.stderr.take().unwrap());
+    let begun = Instant::now();
+    let mut line = || {
+        let mut line = String::new();
+        assert_ne!(said.read_line(&mut line).unwrap(), 0, "it has ended");
+        (line, begun.elapsed())
+    };
+    let (first, _) = line();
+    assert!(first.contains(": 0 of ") && first.ends_with(" flights\n"), "{first}");
+    // Five seconds later, and ten after that; slower machines are late.
+    for (from_s, to_s) in [(4, 12), (13, 30)] {
+        let (line, after) = line();
+        let done: u64 = line.split(' ').nth(1).unwrap().parse().unwrap();
+        assert!(line.contains(" flights") && done < 10_000, "{line}");
+        assert!((from_s..to_s).contains(&after.as_secs()), "{after:?}: {line}");
+    }
+    child.kill().unwrap();
+    child.wait().unwrap();
+}
+
+/// Nothing is cut by a terminal of 80 columns: tables fit, text is wrapped between words.
+#[test]
+fn text_fits_a_terminal_of_80_columns() {
+    let folder = folder("width");
+    let campaign = "flights = 3\nduration_s = 6\nscenario = \"hover\"\n[spread]\nmass_ratio = [0.8, 1.2]\n";
+    fs::write(folder.join("few.toml"), campaign).unwrap();
+    for arguments in [
+        &["paper", "--duration", "6"][..],
+        &["fly", "wind", "--duration", "6"],
+        &["campaign", "few.toml"],
+        &["fly", "--help"],
+    ] {
+        let wide = |columns: &str| {
+            let output =
+                command(&folder, &[arguments, &["--force"]].concat()).env("COLUMNS", columns).output().unwrap();
+            assert_eq!(code(&output), 0, "{}", stderr(&output));
+            let shown = stdout(&output);
+            // A command to copy stays whole.
+            shown.lines().filter(|line| !line.contains("sitl ")).map(|line| line.chars().count()).max().unwrap()
+        };
+        assert!(wide("80") <= 80, "{arguments:?}: {}", wide("80"));
+    }
 }

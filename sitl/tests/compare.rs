@@ -4,10 +4,13 @@
 
 mod common;
 
+use afbc_files::seal;
 use afbc_scenario::contender::ControllerKind;
 use common::{command, folder, refused, succeeds};
 use serde_json::Value;
+use std::collections::BTreeSet;
 use std::fs;
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::Output;
 
@@ -83,8 +86,10 @@ fn compares_by_the_figures_of_fly() {
 fn flies_several_seeds_where_they_matter() {
     let folder = soft("usual-seeds");
     let fly = |more: &[&str]| {
-        let table =
-            succeeds(&sitl(&folder, &[&["compare", "soft.toml", "hover", "--controllers", "pid"], more].concat()));
+        let table = succeeds(&sitl(
+            &folder,
+            &[&["compare", "soft.toml", "hover", "--controllers", "pid", "--force"], more].concat(),
+        ));
         let compared = json(&folder.join("out/compare/comparison.json"));
         let flown = |scenario: usize| compared[scenario]["contenders"][0]["seeds"].as_array().unwrap().len();
         (table, [flown(0), flown(1)])
@@ -160,6 +165,138 @@ fn prints_the_tables_of_its_folder_for_a_paper() {
     let random = ["compare", "--suite", "random", "--vehicle", "iris", "--flights", "2", "--controllers", "pid,indi"];
     let printed = succeeds(&sitl(&folder, &[&random[..], &["--table", "markdown"]].concat()));
     assert!(printed.contains("| law | best or level |"), "{printed}");
+}
+
+/// Whatever the terminal's width, tables fit and say the same: columns that have no room go below.
+#[test]
+fn tables_narrow_to_the_terminal() {
+    let folder = soft("narrow");
+    fs::write(folder.join("two.toml"), SUITE).unwrap();
+    for (arguments, columns) in [
+        (&["compare", "soft.toml", "--controllers", "pid,indi,soft", "--seeds", "2"][..], ["48", "80"]),
+        (&["compare", "--suite", "two.toml", "--controllers", "pid,indi,mpc,l1,dfbc", "--seeds", "1"], ["48", "80"]),
+        (
+            &["compare", "--suite", "random", "--vehicle", "iris", "--flights", "1", "--controllers", "pid,indi"],
+            ["64", "80"],
+        ),
+    ] {
+        let shown = |columns: &str| {
+            let all = [arguments, &["--force"]].concat();
+            succeeds(&command(&folder, &all).env("COLUMNS", columns).output().unwrap())
+        };
+        let words = |text: &str| text.split_whitespace().map(str::to_owned).collect::<BTreeSet<_>>();
+        let wide = shown("100");
+        for columns in columns {
+            let narrow = shown(columns);
+            // A path to copy stays whole.
+            let lines = narrow.lines().filter(|line| !line.contains("report.html"));
+            let widest = lines.map(|line| line.chars().count()).max().unwrap();
+            assert!(widest <= columns.parse().unwrap(), "{widest}:\n{narrow}");
+            let rules = |text: &str| words(text).into_iter().filter(|word| !word.starts_with('─')).collect::<Vec<_>>();
+            assert_eq!(rules(&narrow), rules(&wide), "{narrow}\n{wide}");
+        }
+    }
+}
+
+/// Changes the command of a manifest, and seals it anew: whoever can write it can do so.
+fn forged(manifest: &Path, command: &[&str]) {
+    let mut text = fs::read_to_string(manifest).unwrap();
+    let (from, to) = (text.find("\"command\": [").unwrap(), text.find("\"fingerprint\"").unwrap());
+    text.replace_range(from..to, &format!("\"command\": {}, ", serde_json::json!(command)));
+    let digits = text.rfind("xxh64:").unwrap();
+    text.replace_range(digits..digits + seal::OPEN.len(), seal::OPEN);
+    let mut bytes = Vec::new();
+    let mut sealing = seal::Sealing::new(&mut bytes);
+    sealing.write_all(text.as_bytes()).unwrap();
+    sealing.finish().unwrap();
+    fs::write(manifest, bytes).unwrap();
+}
+
+/// Manifests come from others, and a seal is no key: they name what is made again, and nothing that writes elsewhere.
+#[test]
+fn a_manifest_of_others_writes_nothing_but_its_results() {
+    let folder = soft("foreign");
+    succeeds(&sitl(&folder, &["fly", "soft.toml", "--controller", "soft", "--out", "theirs"]));
+    let manifest = folder.join("theirs/manifest.json");
+    fs::write(folder.join("mine"), "mine").unwrap();
+    fs::write(folder.join("page.md"), "<!-- suite faults: begin -->\n<!-- suite faults: end -->\n").unwrap();
+    for command in [
+        &["fly", "soft.toml", "--exact-log", "mine"][..],
+        &["fly", "soft.toml", "--exact-log=new"],
+        &["fly", "--ulog", "new", "soft.toml"],
+        &["fly", "soft.toml", "--mcap", "new"],
+        &["fly", "soft.toml", "--force"],
+        &["fly", "soft.toml", "--json"],
+        &["fly", "soft.toml", "--out", "new"],
+        &["--out", "new"],
+        &["paper", "--force"],
+        &["compare", "--suite", "faults", "--seeds", "1", "--write", "page.md"],
+        &["compare", "soft.toml", "--table", "latex"],
+        &["campaign", "robustness", "--threads", "1"],
+        &["tune", "pid", "--out", "mine"],
+        &["merge", "theirs", "-o", "new"],
+        &["man", "."],
+        &["again", "theirs"],
+        &["serve", "--exact-log", "mine"],
+        &["fly", "--help"],
+        &["fly", "--no-such"],
+        &[],
+        &["--", "fly"],
+    ] {
+        forged(&manifest, command);
+        if command.is_empty() {
+            // The paper's flight, which is none of these results.
+            assert_eq!(sitl(&folder, &["again", "theirs"]).status.code(), Some(1));
+            fs::remove_dir_all(folder.join("theirs-again")).unwrap();
+            continue;
+        }
+        let line = refused(&sitl(&folder, &["again", "theirs"]));
+        assert!(line.starts_with("theirs: its command ") && line.lines().count() == 1, "{command:?}: {line}");
+        let mut names: Vec<_> = fs::read_dir(&folder).unwrap().map(|it| it.unwrap().file_name()).collect();
+        names.sort();
+        assert_eq!(names, ["mine", "page.md", "soft.toml", "theirs"], "{command:?}");
+        assert_eq!(fs::read(folder.join("mine")).unwrap(), b"mine");
+    }
+    // A folder that holds anything else is not written into, and no file is named by a path.
+    forged(&manifest, &["fly", "soft.toml", "--controller", "soft"]);
+    fs::create_dir(folder.join("other")).unwrap();
+    fs::write(folder.join("other/report.html"), "mine").unwrap();
+    refused(&sitl(&folder, &["again", "theirs", "--out", "other"]));
+    assert_eq!(fs::read(folder.join("other/report.html")).unwrap(), b"mine");
+    let path = fs::read_to_string(&manifest).unwrap().replace("\"report.html\": \"xxh64:", "\"../mine\": \"xxh64:");
+    fs::write(&manifest, path).unwrap();
+    forged(&manifest, &["fly", "soft.toml", "--controller", "soft"]);
+    let line = refused(&sitl(&folder, &["again", "theirs"]));
+    assert!(line.contains("damaged or no manifest (a path in it, ../mine)"), "{line}");
+}
+
+/// A campaign, one of its parts, and the whole of the parts are made again; a folder with results is not.
+#[test]
+fn campaigns_are_made_again() {
+    let folder = soft("campaigns");
+    let text = "flights = 5\nscenario = \"soft.toml\"\n[spread]\nmass_ratio = [0.9, 1.1]\n";
+    fs::write(folder.join("few.toml"), text).unwrap();
+    fs::write(folder.join("soft.toml"), SOFT.replace("duration_s = 8.0", "duration_s = 1.0")).unwrap();
+    let on = ["campaign", "few.toml", "--vehicle", "racer"];
+    succeeds(&sitl(&folder, &[&on[..], &["--threads", "1", "--json"]].concat()));
+    for part in ["1/2", "2/2"] {
+        succeeds(&sitl(&folder, &[&on[..], &["--shard", part]].concat()));
+    }
+    succeeds(&sitl(&folder, &["merge", "out/few-1-of-2", "out/few-2-of-2", "-o", "out/whole"]));
+    for name in ["few", "few-2-of-2", "whole"] {
+        let said = succeeds(&sitl(&folder, &["again", &format!("out/{name}")]));
+        assert!(said.starts_with("the same bytes: ") && said.contains(&format!("out/{name}-again")), "{said}");
+        let line = refused(&sitl(&folder, &["again", &format!("out/{name}/manifest.json")]));
+        assert!(line.starts_with(&format!("out/{name}-again: exists already; ")), "{line}");
+    }
+    let commands =
+        ["few", "whole"].map(|name| json(&folder.join(format!("out/{name}/manifest.json")))["command"].clone());
+    assert_eq!(commands, [serde_json::json!(on), serde_json::json!(on)]);
+    fs::write(folder.join("few.toml"), text.replace("1.1", "1.2")).unwrap();
+    let output = sitl(&folder, &["again", "out/few", "--out", "other"]);
+    let said = String::from_utf8(output.stdout).unwrap();
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert!(said.contains("results.parquet: differs\n") && said.contains("what was flown is not the same"), "{said}");
 }
 
 /// A manifest makes the same bytes again, and says so if they are others.
@@ -239,7 +376,20 @@ fn a_lost_vehicle_is_part_of_the_comparison() {
 fn compare_refuses_what_it_cannot_fly() {
     let folder = soft("refused");
     let line = refused(&sitl(&folder, &["compare", "soft.toml", "--controllers", "sof"]));
-    assert!(line.starts_with("controllers sof: no such controller; there are afbc, afbc-as-printed,"), "{line}");
+    assert_eq!(line, "controllers sof: no such controller; did you mean soft?\n");
+    let line = refused(&sitl(&folder, &["compare", "soft.toml", "--controllers", "zzz"]));
+    assert!(line.starts_with("controllers zzz: no such controller; there are afbc, afbc-as-printed,"), "{line}");
+    for (arguments, expected) in [
+        (&["compare", "soft.toml", "--controllers", "abfc"][..], "did you mean afbc?"),
+        (&["compare", "soft.toml", "--against", "sotf"], "did you mean soft?"),
+        (&["compare", "circel"], "did you mean circle?"),
+        (&["fly", "soft.toml", "--controller", "abfc"], "did you mean afbc?"),
+        (&["tune", "abfc"], "did you mean afbc?"),
+        (&["replay", "a.log", "--exact", "--change", "law=abfc"], "did you mean afbc?"),
+    ] {
+        let line = refused(&sitl(&folder, arguments));
+        assert!(line.contains(expected), "{arguments:?}: {line}");
+    }
     assert_eq!(line.lines().count(), 1);
     let line = refused(&sitl(&folder, &["compare", "hardwear"]));
     assert_eq!(line, "hardwear: no such scenario; did you mean hardware?\n");
@@ -376,7 +526,9 @@ fn random_flights_are_alike_on_any_number_of_threads() {
     let own = ["compare", "--suite", "random", "--vehicle", "mine.toml", "--flights", "2", "--controllers", "pid"];
     let own = [&own[..], &["--on-estimate"]].concat();
     let table = succeeds(&sitl(&folder, &own));
-    assert!(table.contains("the instruments of the scenario mocap") && table.contains("mine, 2 flights"), "{table}");
+    // Its text is as wide as the terminal.
+    let words = table.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(words.contains("the instruments of the scenario mocap") && words.contains("mine, 2 flights"), "{table}");
     fs::write(folder.join("page.md"), "<!-- suite random: begin -->\n<!-- suite random: end -->\n").unwrap();
     succeeds(&sitl(&folder, &[&own[..], &["--write", "page.md"]].concat()));
     let page = fs::read_to_string(folder.join("page.md")).unwrap();
@@ -402,7 +554,47 @@ fn random_flights_that_cannot_be_drawn_are_refused_in_one_line() {
     refused(&sitl(&folder, &["compare", "--suite", "random", "--on-estimate", "nothing"]));
     refused(&sitl(&folder, &["compare", "hover", "--seed", "2"]));
     assert!(!folder.join("out").exists());
-    assert!(succeeds(&sitl(&folder, &["suites"])).contains("random        72 flights  drawn from --seed"));
+    assert!(succeeds(&sitl(&folder, &["suites"])).contains("random           72 flights  drawn from --seed"));
+}
+
+/// The short form of the suite: the same bytes on any number of threads, a row for each class, and one line for what it
+/// does not take.
+#[test]
+fn rough_flights_are_alike_on_any_number_of_threads() {
+    let folder = folder("rough");
+    let short = ["compare", "--suite", "rough-estimate", "--vehicle", "iris", "--duration", "7", "--seed", "3"];
+    let table = succeeds(&sitl_on("1", &folder, &[&short[..], &["--out", "one"]].concat()));
+    succeeds(&sitl_on("3", &folder, &[&short[..], &["--out", "three"]].concat()));
+    for file in ["flights.csv", "rough-estimate.json", "report.html", "tables.md", "tables.tex"] {
+        let [one, three] = ["one", "three"].map(|out| fs::read(folder.join(out).join(file)).unwrap());
+        assert!(one == three, "{file}");
+    }
+    assert!(table.starts_with("Suite rough-estimate: Seed 3, flights of each vehicle, class and seed: 1"), "{table}");
+    let classes = ["nothing", "vibration", "bumps", "field", "gnss-jump", "tracker-flip", "mixture", "all"];
+    for class in classes {
+        assert!(table.lines().any(|line| line.starts_with(&format!("{class} "))), "no {class} in {table}");
+    }
+    assert_eq!(fs::read_to_string(folder.join("one/flights.csv")).unwrap().lines().count(), 1 + 25);
+    fs::write(folder.join("page.md"), "<!-- suite rough-estimate: begin -->\n<!-- suite rough-estimate: end -->\n")
+        .unwrap();
+    succeeds(&sitl(&folder, &[&short[..], &["--write", "page.md"]].concat()));
+    let page = fs::read_to_string(folder.join("page.md")).unwrap();
+    assert!(page.contains("\n| class | known | flights | NEES |") && page.contains("\n| mixture |  | 1 | "), "{page}");
+    assert!(succeeds(&sitl(&folder, &["suites"])).contains("rough-estimate  150 flights  drawn from --seed"));
+    let rough = ["compare", "--suite", "rough-estimate"];
+    for (arguments, expected) in [
+        (&["suites", "rough-estimate"][..], "rough-estimate: drawn from a seed, not a file; fly it with"),
+        (&[&rough[..], &["--on-estimate"]].concat(), "--on-estimate: only --suite random takes it; leave it out"),
+        (&[&rough[..], &["--against", "afbc-monitored"]].concat(), "--against: --suite rough-estimate compares nobody"),
+        (&[&rough[..], &["--controllers", "afbc,pid"]].concat(), "--controllers: the estimate of one law at a time"),
+        (
+            &["compare", "--suite", "random", "--duration", "9"],
+            "--duration: only --suite rough-estimate takes it; leave it out",
+        ),
+    ] {
+        let line = refused(&sitl(&folder, arguments));
+        assert!(line.starts_with(expected) && line.lines().count() == 1, "{line}");
+    }
 }
 
 /// The two costs in the first line of the output of `sitl tune`.
@@ -459,7 +651,7 @@ fn tune_refuses_what_it_cannot_do() {
     let line = refused(&sitl(&folder, &["tune", "hard", "--scenario", "soft.toml"]));
     assert!(line.ends_with("; the scenario's contenders backstepping, soft\n"), "{line}");
     let line = refused(&sitl(&folder, &["tune", "pid", "--out", "nowhere/pid.toml"]));
-    assert_eq!(line, "nowhere: no such folder; make it first\n");
+    assert!(line.starts_with("nowhere/pid.toml: cannot be written (there is no folder nowhere); "), "{line}");
     refused(&sitl(&folder, &["tune", "pid", "--budget", "0"]));
 }
 
@@ -475,5 +667,30 @@ fn tune_tries_as_many_gains_as_asked() {
     for budget in ["1", "2", "9", "12", "13", "14", "40"] {
         let fragment = succeeds(&sitl(&folder, &["tune", "soft", "--scenario", "soft.toml", "--budget", budget]));
         assert_eq!(tries(&fragment), budget);
+    }
+}
+
+/// The example of docs/python.md by the command line: AFBC is the law that flies in every scenario, whichever is first.
+#[test]
+fn a_comparison_flies_the_flown_law_in_any_order() {
+    let folder = folder("profiles");
+    let rms = |scenarios: [&str; 2]| {
+        let out = scenarios.join("-");
+        let fly = ["--controllers", "afbc,pid", "--seeds", "1", "--out", &out];
+        succeeds(&sitl(&folder, &[&["compare"], &scenarios[..], &fly].concat()));
+        let compared = json(&folder.join(&out).join("comparison.json"));
+        let of = |scenario: &Value| {
+            let contenders = scenario["contenders"].as_array().unwrap();
+            let rms = contenders.iter().map(|contender| contender["figures"][0]["median"].as_f64().unwrap()).collect();
+            (scenario["scenario"].as_str().unwrap().to_owned(), rms)
+        };
+        let mut all: Vec<(String, Vec<f64>)> = compared.as_array().unwrap().iter().map(of).collect();
+        all.sort_by(|a, b| a.0.cmp(&b.0));
+        all
+    };
+    let (one, other) = (rms(["paper", "wind"]), rms(["wind", "paper"]));
+    assert_eq!(one, other);
+    for (scenario, rms) in one {
+        assert!(rms[0] < 3.0 * rms[1], "{scenario}: AFBC {} m, PID {} m", rms[0], rms[1]);
     }
 }

@@ -165,20 +165,21 @@ fn files_of_an_earlier_report_are_removed() {
         csvs.sort();
         csvs
     };
+    // Other options are another command: its results take the place of the others' by force.
     let fly = ["fly", "short.toml", "--out", "fly"];
     succeeds(&folder, &fly, &[]);
-    succeeds(&folder, &fly, &["--controller", "pid"]);
+    succeeds(&folder, &fly, &["--controller", "pid", "--force"]);
     assert_eq!(csvs("fly"), ["short-pid.csv"]);
     let paper = ["paper", "--duration", "0.5", "--log-hz", "1", "--out", "paper"];
     succeeds(&folder, &paper, &["--reading", "all"]);
     assert_eq!(csvs("paper").len(), 6);
-    succeeds(&folder, &paper, &[]);
+    succeeds(&folder, &paper, &["--force"]);
     assert_eq!(csvs("paper"), ["paper-afbc.csv", "paper-backstepping.csv"]);
     // With two scenarios, each has figures under its own name.
     let longer = fs::read_to_string(folder.join("short.toml")).unwrap().replace("0.5", "0.6");
     fs::write(folder.join("longer.toml"), longer).unwrap();
     let names = |more: &[&str]| {
-        succeeds(&folder, &["compare", "short.toml", "--out", "compare"], more);
+        succeeds(&folder, &["compare", "short.toml", "--out", "compare", "--force"], more);
         contents(&folder.join("compare")).into_keys().collect::<Vec<_>>()
     };
     let one = names(&[]);

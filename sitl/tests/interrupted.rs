@@ -1,10 +1,12 @@
-//! Ctrl-C: commands without partial results end at once, with one line.
+//! Ctrl-C: commands without partial results end at once, with one line, and leave nothing that is in the way of the
+//! next try.
 
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 mod common;
 
 use common::{command, folder};
+use std::ffi::OsString;
 use std::fs;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
@@ -53,4 +55,58 @@ fn ends_with_one_line_and_writes_nothing() {
         let written: Vec<_> = results(name).filter(|file| !file.to_string_lossy().starts_with('.')).collect();
         assert!(written.is_empty(), "{written:?}");
     }
+}
+
+/// A mission to a place 400 m away.
+const FAR: &str = "QGC WPL 110\n\
+    0\t1\t0\t16\t0\t0\t0\t0\t47.397742\t8.545594\t488\t1\n\
+    1\t0\t3\t22\t0\t0\t0\t0\t47.397742\t8.545594\t10\t1\n\
+    2\t0\t3\t16\t0\t0\t0\t0\t47.401342\t8.545594\t10\t1\n";
+
+/// Logs that an interrupted flight has begun are removed, whether it is still flown by the laws alone or already by the
+/// firmware's code: the same command can be given again.
+#[test]
+fn leaves_no_log_behind() {
+    let folder = folder("logs");
+    let logs = ["--exact-log", "flight.log", "--ulog", "flight.ulg", "--mcap", "flight.mcap"];
+    let long = ["fly", "storm", "--duration", "36000"];
+    let files = || fs::read_dir(&folder).unwrap().flatten().map(|it| it.file_name()).filter(|it| it != "out");
+    for options in [&logs[..], &logs[4..], &logs[..2], &logs[..4]] {
+        for signal in ["-INT", "-TERM"] {
+            let (code, said) = interrupted(&folder, &[&long[..], options].concat(), signal);
+            assert_eq!(code, Some(130), "{options:?}: {said}");
+            assert_eq!(said.lines().last(), Some("stopped before the end; nothing was written"));
+            assert_eq!(files().collect::<Vec<_>>(), Vec::<OsString>::new(), "{options:?}");
+        }
+    }
+    // While the logs are being written.
+    fs::write(folder.join("out/far.waypoints"), FAR).unwrap();
+    for flight in [&["fly", "hover", "--controller", "pid", "--duration", "300"][..], &["fly", "out/far.waypoints"]] {
+        let arguments = [flight, &logs[..]].concat();
+        for _ in 0..2 {
+            let mut child = command(&folder, &arguments).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+            let is_begun = || fs::metadata(folder.join("flight.log")).is_ok_and(|it| it.len() > 0);
+            while !is_begun() {
+                assert_eq!(child.try_wait().unwrap(), None, "{arguments:?}");
+                std::thread::sleep(std::time::Duration::from_millis(1));
+            }
+            assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+            let output = child.wait_with_output().unwrap();
+            let said = String::from_utf8_lossy(&output.stderr);
+            assert_eq!(output.status.code(), Some(130), "{arguments:?}: {said}");
+            assert_eq!(said.lines().last(), Some("stopped before the end; nothing was written"));
+            assert_eq!(files().collect::<Vec<_>>(), Vec::<OsString>::new(), "{arguments:?}");
+        }
+    }
+}
+
+/// So are those of a command that fails after it has created them, as long as nothing is in them.
+#[test]
+fn an_empty_log_of_a_command_that_fails_is_removed() {
+    let folder = folder("failed");
+    // A folder that nobody may write to, whoever runs this.
+    let arguments = ["fly", "hover", "--duration", "1", "--exact-log", "flight.log", "--ulog", "/proc/flight.ulg"];
+    let output = command(&folder, &arguments).output().unwrap();
+    assert_eq!(output.status.code(), Some(2), "{}", String::from_utf8_lossy(&output.stderr));
+    assert!(!folder.join("flight.log").exists());
 }

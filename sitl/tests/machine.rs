@@ -172,6 +172,19 @@ fn random_flights() {
 }
 
 #[test]
+fn rough_estimates() {
+    let folder = small("rough");
+    let fly = ["compare", "--suite", "rough-estimate", "--vehicle", "paper", "--duration", "6"];
+    let flown = prints(&folder, "Sensors that the vehicle is not told of", &[&fly]);
+    let file = fs::read(folder.join("out/rough-estimate/rough-estimate.json")).unwrap();
+    assert_eq!(flown, serde_json::from_slice::<Value>(&file).unwrap());
+    let classes = flown["classes"].as_array().unwrap();
+    assert_eq!((classes.len(), &classes[0]["class"], &classes[0]["known"]), (26, &"nothing".into(), &true.into()));
+    assert_eq!((&classes[25]["class"], &classes[25]["flights"]), (&Value::Null, &25.into()));
+    assert_eq!(flown["contender"], "afbc-monitored");
+}
+
+#[test]
 fn comparisons_and_gains() {
     let folder = small("comparisons");
     let compared = prints(&folder, "Comparisons", &[&["compare", "flight.toml", "--seeds", "2"]]);

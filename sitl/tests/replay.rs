@@ -40,7 +40,7 @@ fn says_how_far_the_estimates_are_apart() {
     let columns = csv.lines().next().unwrap().split(',').count();
     assert!(columns == 28 && csv.lines().all(|line| line.split(',').count() == columns));
     // Another time to compare from.
-    succeeds(&sitl(&folder, &["replay", "rest.csv", "--from", "14"]));
+    succeeds(&sitl(&folder, &["replay", "rest.csv", "--from", "14", "--force"]));
     assert_eq!(summary(&folder, "replay-rest")["measured_from_s"], 14.0);
 }
 

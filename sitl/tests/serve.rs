@@ -96,6 +96,23 @@ fn ctrl_c_ends_it_cleanly() {
     }
 }
 
+/// Nobody reads standard output, and much more is said than a pipe holds: the flight goes on, and ends as told.
+#[test]
+fn an_unread_output_stops_nothing() {
+    for pace in ["--fast", "--lockstep"] {
+        let mut child = started(&format!("unread{pace}"), &[pace, "--vehicles", "4", "--do", "at 3 quit"]);
+        let mut lines = child.stdin.take().unwrap();
+        lines.write_all("status\n".repeat(if pace == "--fast" { 1000 } else { 600 }).as_bytes()).unwrap();
+        lines.write_all(b"step 5000\n").unwrap();
+        let ended = (0..6000).find_map(|_| {
+            std::thread::sleep(std::time::Duration::from_millis(10));
+            child.try_wait().unwrap()
+        });
+        let _ = child.kill();
+        assert_eq!(ended.map(|status| status.code()), Some(Some(0)), "{pace}");
+    }
+}
+
 /// The end of stdin, as under a service manager, ends nothing but a lockstep.
 #[test]
 fn without_stdin_it_goes_on() {

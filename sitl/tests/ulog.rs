@@ -11,6 +11,17 @@ use std::path::Path;
 /// Serves at free ports, without sending anything to anyone.
 const SERVE: [&str; 8] = ["serve", "--port", "0", "--station", "none", "--companion", "none", "--fast"];
 
+/// Takes off, and holds.
+#[cfg(unix)]
+const PLAN: &str = r#"{"fileType": "Plan", "version": 1, "groundStation": "QGroundControl",
+    "geoFence": {"circles": [], "polygons": [], "version": 2}, "rallyPoints": {"points": [], "version": 2},
+    "mission": {"version": 2, "firmwareType": 12, "vehicleType": 2, "cruiseSpeed": 15, "hoverSpeed": 5,
+    "plannedHomePosition": [47.397742, 8.545594, 488], "globalPlanAltitudeMode": 1, "items": [
+    {"type": "SimpleItem", "command": 22, "frame": 3, "autoContinue": true, "doJumpId": 1,
+    "params": [0, 0, 0, null, 47.397742, 8.545594, 10]},
+    {"type": "SimpleItem", "command": 16, "frame": 3, "autoContinue": true, "doJumpId": 2,
+    "params": [600, 0, 0, null, 47.397742, 8.545594, 10]}]}}"#;
+
 fn is_log(path: &Path) -> bool {
     fs::read(path).is_ok_and(|bytes| bytes.starts_with(b"ULog\x01\x12\x35\x01") && bytes.len() > 50_000)
 }
@@ -78,4 +89,28 @@ fn a_full_disc_costs_the_log_alone() {
     assert!(told.len() == 1 && said.contains("6.000 ok at 6 quit"), "{said}");
     assert!(output.stderr.is_empty(), "{}", String::from_utf8_lossy(&output.stderr));
     assert!(is_log(&folder.join("full.ulg")));
+}
+
+/// A flight whose log is cut says so, exits with 2, and keeps its other results.
+#[cfg(unix)]
+#[test]
+fn a_flight_on_a_full_disc_fails() {
+    let folder = folder("flown-full");
+    let sitl = env!("CARGO_BIN_EXE_sitl");
+    fs::write(folder.join("short.plan"), PLAN).unwrap();
+    for (fly, kept) in [
+        ("fly mocap --controller pid --duration 60 --log-hz 1 --out out --ulog cut.ulg", Some("report.html")),
+        ("fly mocap --controller pid --duration 60 --log-hz 1 --out out --exact-log cut.ulg", Some("report.html")),
+        ("fly short.plan --duration 60 --ulog cut.ulg", None),
+    ] {
+        let script = format!("trap '' XFSZ; ulimit -f 2000; exec {sitl} {fly}");
+        let output = std::process::Command::new("sh").current_dir(&folder).args(["-c", &script]).output().unwrap();
+        let error = String::from_utf8(output.stderr).unwrap();
+        let told: Vec<_> =
+            error.lines().filter(|line| line.contains("cut.ulg: ") && line.contains("too large")).collect();
+        assert_eq!((output.status.code(), told.is_empty()), (Some(2), false), "{fly}: {error}");
+        assert!(kept.is_none_or(|file| folder.join("out").join(file).exists()), "{fly}: {error}");
+        fs::remove_file(folder.join("cut.ulg")).unwrap();
+        let _ = fs::remove_dir_all(folder.join("out"));
+    }
 }

@@ -51,7 +51,7 @@ fn a_vehicle_that_is_not_there_or_does_not_fly_gets_one_line() {
     for (arguments, expected) in [
         (&["fly", "hover", "--vehicle", "racr"][..], "did you mean racer?"),
         (&["fly", "hover", "--vehicle", "./none.toml"], "./none.toml: no such file; `sitl vehicles` lists"),
-        (&["fly", "hover", "--vehicle", "heavy.toml"], "heavy.toml:1: rotor_force_max_n"),
+        (&["fly", "hover", "--vehicle", "heavy.toml"], "heavy.toml:14: vehicle: rotor_force_max_n"),
         (&["compare", "hover", "--vehicle", "slip.toml"], "gains.flight.pdi: unknown key; known here: cascade, afbc"),
         (&["vehicles", "nothing"], "no built-in vehicle"),
         (&["fly", "pinned.toml"], "pinned.toml:2: vehicle.name: \"racr\" is no built-in vehicle; did you mean racer?"),

@@ -1,8 +1,9 @@
 //! `sitl fly --exact-log` and `--ulog`: the same flight by the firmware's own code.
 
 use super::serve::unwritten;
-use super::terminal::{Failure, say};
+use super::terminal::Failure;
 use afbc::Profile;
+use afbc_files::Output;
 use afbc_hil::{Host, LogFile, MessagePeriods, Station, UlogFiles, place};
 use afbc_onboard::Link;
 use afbc_scenario::Scenario;
@@ -65,15 +66,13 @@ impl AboardFlight {
         };
         let lost = |lost: &Lost| format!("; lost at {:.3} s: {}", lost.time_s, lost.reason);
         let lost = flown.as_ref().ok().and_then(|end| end.lost.as_ref()).map_or(String::new(), lost);
-        if let Some((path, file)) = exact {
-            file.finish().map_err(|error| unwritten(&path, &error))?;
-            logged(&path, "exact log", &lost);
-        }
-        if let Some((path, files)) = ulog {
-            // A log that has ended early costs no flight.
-            match files.finish() {
-                Ok(()) => logged(&path, "ULog", &lost),
-                Err(line) => say(&line),
+        // Both are ended by now, or tried: one failure does not keep the other back.
+        let exact = exact.map(|(path, file)| (file.finish().map_err(|error| unwritten(&path, &error)), path));
+        let ulog = ulog.map(|(path, files)| (files.finish(), path));
+        for (what, ended) in [("exact log", exact), ("ULog", ulog)] {
+            if let Some((ended, path)) = ended {
+                ended?;
+                logged(&path, what, &lost);
             }
         }
         flown.map_err(|error| format!("{OPTIONS}: {}: {error}", scenario.name))?;
@@ -81,20 +80,35 @@ impl AboardFlight {
     }
 }
 
+/// Where its logs go.
+pub(super) struct LogOutputs {
+    exact: Option<Output>,
+    ulog: Option<PathBuf>,
+}
+
 /// The files of its logs.
 pub(super) struct AboardLogs {
-    exact: Option<(PathBuf, LogFile)>,
-    ulog: Option<(PathBuf, UlogFiles)>,
+    pub(super) exact: Option<(PathBuf, LogFile)>,
+    pub(super) ulog: Option<(PathBuf, UlogFiles)>,
+}
+
+impl LogOutputs {
+    /// Checks that the files that are wanted are not there and can be.
+    pub(super) fn new(exact: Option<&Path>, ulog: Option<&Path>) -> Result<Self, Failure> {
+        if let Some(file) = ulog.filter(|path| !path.is_dir()) {
+            Output::new(file, "--ulog")?;
+        }
+        let exact = exact.map(|path| Output::new(path, "--exact-log")).transpose()?;
+        Ok(LogOutputs { exact, ulog: ulog.map(Path::to_path_buf) })
+    }
 }
 
 impl AboardLogs {
-    /// Creates the files that are wanted.
-    pub(super) fn create(exact: Option<PathBuf>, ulog: Option<PathBuf>) -> Result<Self, Failure> {
-        let exact = exact.map(|path| match LogFile::create(&path) {
-            Ok(file) => Ok((path, file)),
-            Err(error) => Err(unwritten(&path, &error)),
-        });
-        let ulog = ulog.map(|path| UlogFiles::create(&path).map(|files| (path, files)));
+    /// Creates the files.
+    pub(super) fn create(outputs: &LogOutputs) -> Result<Self, Failure> {
+        let LogOutputs { exact, ulog } = outputs;
+        let exact = exact.as_ref().map(|output| Ok::<_, Failure>((output.path().into(), LogFile::create(output)?)));
+        let ulog = ulog.as_ref().map(|path| UlogFiles::create(path).map(|files| (path.clone(), files)));
         Ok(AboardLogs { exact: exact.transpose()?, ulog: ulog.transpose()? })
     }
 }

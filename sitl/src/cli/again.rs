@@ -1,21 +1,26 @@
 //! `sitl again`: the same results from their manifest.
 
-use super::manifest::{self, NAME, ResultsManifest};
+use super::manifest::{self, NAME, ResultsManifest, WITH_VALUE, WITHOUT_VALUE};
 use super::terminal::{Failure, print, say};
 use afbc_files::seal::hash_of_file;
-use clap::Args;
+use clap::parser::ValueSource;
+use clap::{Arg, ArgMatches, Args, Command as CliCommand};
 use std::env;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode, Stdio};
 
 /// Commands that leave a manifest.
-const WITH_MANIFEST: [&str; 3] = ["compare", "fly", "paper"];
+const WITH_MANIFEST: [&str; 4] = ["campaign", "compare", "fly", "paper"];
+/// The one that goes on with what it finds, and makes nothing again in a folder of its own.
+const RESUMES: &str = "campaign";
 
 /// Make results again from their manifest, and compare them byte by byte
 ///
 /// Runs the command that the manifest names, with the results in a folder of their own, and compares every file with
-/// the manifest's hash. Paths of the command are relative to the current folder. Exits with 1 if a file differs.
+/// the manifest's hash. Paths of the command are relative to the current folder. A manifest by others is as good as
+/// one's own: it can name scenarios, vehicles and what else decides results, and nothing that writes elsewhere. Exits
+/// with 1 if a file differs.
 #[derive(Args, Debug)]
 pub(crate) struct Again {
     /// manifest.json of a folder of results, or the folder
@@ -28,15 +33,16 @@ pub(crate) struct Again {
 
 impl Again {
     /// Runs the command, compares, prints.
-    pub(super) fn run(self) -> Result<ExitCode, Failure> {
+    pub(super) fn run(self, program: CliCommand) -> Result<ExitCode, Failure> {
         let before = manifest::read(&self.manifest)?;
-        // Without a command, or with options first, it is `paper`.
-        let command = before.command.first().filter(|word| !word.starts_with('-')).map_or("paper", String::as_str);
-        if !WITH_MANIFEST.contains(&command) {
-            let (path, known) = (self.manifest.display(), WITH_MANIFEST.join(", "));
-            return Err(format!("{path}: its command is {command:?}, not one of {known}").into());
-        }
+        let command =
+            checked(&before.command, &program).map_err(|problem| format!("{}: {problem}", self.manifest.display()))?;
         let out = self.out.clone().unwrap_or_else(|| beside(&self.manifest));
+        if command == RESUMES && out.exists() {
+            return Err(
+                format!("{}: exists already; choose another folder with --out, or remove it", out.display()).into()
+            );
+        }
         for (what, then, now) in [
             ("version", Some(before.version.clone()), Some(manifest::version())),
             ("commit", before.commit.clone(), manifest::commit()),
@@ -48,9 +54,10 @@ impl Again {
         }
         // This very program: another of the same name in the path may be of another version.
         let status = Command::new(env::current_exe()?)
-            .args(&before.command)
+            .arg(&command)
             .arg("--out")
             .arg(&out)
+            .args(before.command.iter().skip(usize::from(is_named(&before.command))))
             .stdout(Stdio::null())
             .status()
             .map_err(|error| format!("the command cannot be run again ({error})"))?;
@@ -73,6 +80,42 @@ impl Again {
         print(&format!("{}\n{cause}\n", differences.join("\n")))?;
         Ok(ExitCode::FAILURE)
     }
+}
+
+/// True if the arguments begin with the name of a command: without one, or with options first, it is `paper`.
+fn is_named(arguments: &[String]) -> bool {
+    arguments.first().is_some_and(|word| !word.starts_with('-'))
+}
+
+/// Returns the command of a manifest's arguments, if it and every option of it may be run for whoever has written them.
+fn checked(arguments: &[String], program: &CliCommand) -> Result<String, String> {
+    let command = if is_named(arguments) { arguments.first().map_or("", String::as_str) } else { "paper" };
+    let known = WITH_MANIFEST.join(", ");
+    let unknown = || format!("its command is {:?}, not one of {known}", command.escape_debug().to_string());
+    let name = WITH_MANIFEST.iter().find(|known| **known == command).ok_or_else(unknown)?;
+    let options = program.find_subcommand(name).ok_or_else(unknown)?;
+    let rest = arguments.iter().skip(usize::from(is_named(arguments)));
+    let words = [*name].into_iter().chain(rest.map(String::as_str));
+    let given: ArgMatches = options.clone().no_binary_name(false).try_get_matches_from(words).map_err(|error| {
+        let line = error.to_string();
+        format!("its command cannot be run: {}", line.lines().next().unwrap_or_default())
+    })?;
+    let is_given = |arg: &&Arg| given.value_source(arg.get_id().as_str()) == Some(ValueSource::CommandLine);
+    match places(options).find(is_given).and_then(Arg::get_long) {
+        Some(place) => Err(format!(
+            "its command has --{place}, which decides no result; a manifest names only what may be made again, run \
+             that command yourself if you trust it"
+        )),
+        None => Ok((*name).into()),
+    }
+}
+
+/// Returns the options of a command that do not decide results.
+fn places(options: &CliCommand) -> impl Iterator<Item = &Arg> {
+    let of = |arg: &&Arg, names: &[&str]| {
+        arg.get_long().is_some_and(|long| names.iter().any(|name| name.strip_prefix("--") == Some(long)))
+    };
+    options.get_arguments().filter(move |arg| of(arg, &WITH_VALUE) || of(arg, &WITHOUT_VALUE))
 }
 
 /// Returns the folder of new results beside those of the manifest.

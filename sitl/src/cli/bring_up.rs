@@ -4,7 +4,7 @@ use super::terminal::{Failure, print, say};
 use crate::network::Network;
 use crate::serial::Serial;
 use afbc_bring_up::{BringUpOptions, Verdict, bring_up};
-use afbc_files::place;
+use afbc_files::Output;
 use afbc_hil::Autopilot;
 use afbc_onboard::BAUD;
 use clap::{Args, value_parser};
@@ -72,9 +72,7 @@ impl BringUp {
     /// Goes through the steps, writes the log.
     pub(super) fn run(self) -> Result<ExitCode, Failure> {
         let out = self.out.display();
-        if self.out.exists() {
-            return Err(format!("{out}: there is a file already; name another one by --out").into());
-        }
+        let output = Output::new(&self.out, "--out")?;
         if !self.yes {
             confirm()?;
         }
@@ -89,8 +87,7 @@ impl BringUp {
             ("with somebody's hands", if self.yes { "no" } else { "yes" }.into()),
         ];
         log.head = head.map(|(what, value)| (what.into(), value)).into();
-        place(&self.out, |to| to.write_all(log.page().as_bytes()))
-            .map_err(|error| format!("{out}: cannot be written ({error})"))?;
+        output.place(|to| to.write_all(log.page().as_bytes()))?;
         let line = |step: &afbc_bring_up::BringUpStep| {
             let because =
                 if step.reasons.is_empty() { String::new() } else { format!(": {}", step.reasons.join("; ")) };

@@ -5,20 +5,23 @@ use super::json::Json;
 use super::place::Place;
 use super::progress::Progress;
 use super::target::Target;
-use super::terminal::{Failure, print, say};
+use super::terminal::{Failure, columns, print, say};
 use super::vehicle::OnVehicle;
-use super::{interrupt, json};
+use super::{interrupt, json, manifest};
 use afbc_campaign::subject::SubjectKind;
 use afbc_campaign::{self as campaign, BUILT_IN, Campaign as Plan, CampaignFolder, Manifest, Shard, Summary, built_in};
 use afbc_reader::BuiltIn;
-use afbc_report::campaign as report;
+use afbc_report::{campaign as report, for_terminal};
 use afbc_sim::LogRate;
-use clap::Args;
+use clap::{Args, value_parser};
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::OnceLock;
 use std::sync::atomic::AtomicBool;
 use std::thread;
+
+/// Option of a part.
+const SHARD: &str = "--shard";
 
 /// Fly a campaign: one scenario, many times, with drawn vehicles, weather and faults
 ///
@@ -29,6 +32,10 @@ use std::thread;
 pub(crate) struct Campaign {
     /// Name of a built-in campaign, or path of a campaign file
     campaign: Target,
+
+    /// Fly only the first N flights
+    #[arg(long, value_name = "N", conflicts_with = "flight", value_parser = value_parser!(u64).range(1..))]
+    flights: Option<u64>,
 
     /// Number of cores [default: all]; the results do not depend on it
     #[arg(long, value_name = "N", value_parser = threads)]
@@ -64,6 +71,11 @@ impl Campaign {
     /// Flies, writes, prints.
     pub(super) fn run(self) -> Result<ExitCode, Failure> {
         let plan = self.on.campaign(self.campaign.campaign()?)?;
+        let flights = self.flights.unwrap_or(plan.flights);
+        if flights > plan.flights {
+            return Err(format!("--flights {flights}: the campaign has only {}; fly fewer", plan.flights).into());
+        }
+        let plan = Plan { flights, ..plan };
         if let Some(flight) = self.flight {
             return self.fly_again(&plan, flight);
         }
@@ -99,7 +111,9 @@ impl Campaign {
         let summary = pool.install(|| campaign::fly(&plan, &folder, &never, &done));
         drop(progress);
         let summary = summary?.ok_or("stopped")?;
-        conclude(&folder, &summary, &self.on.arguments(&self.campaign), self.json)
+        let flown = vec![manifest::words(&(&plan.scenario, vec![plan.seed]))?];
+        let origin = Some((manifest::own_command(), flown));
+        conclude(&folder, &summary, origin, &self.on.arguments(&self.campaign), self.json)
     }
 
     /// Flies one flight, and writes everything about it.
@@ -119,7 +133,7 @@ impl Campaign {
             scenario.contenders.retain(|contender| self.contenders.contains(&contender.name));
         }
         let name = scenario.name.clone();
-        let open = || self.place.open("campaign --flight", &name);
+        let open = || self.place.open(&name);
         let (folder, flown) = Flying { duration: None, log_hz: self.log_hz }.fly(vec![scenario], open)?;
         report(&folder, &flown, &[], self.json)?;
         Ok(ExitCode::from(u8::from(flown.iter().any(|flown| flown.run.lost.is_some()))))
@@ -141,15 +155,28 @@ fn useful(wanted: Option<u64>, flights: u64) -> usize {
     wanted.unwrap_or(most).min(most) as usize
 }
 
-/// Writes and prints the results of all flights.
-fn conclude(folder: &CampaignFolder, summary: &Summary, target: &str, json: Json) -> Result<ExitCode, Failure> {
+/// The command that makes a campaign's results, and what it flies.
+type Origin = (Vec<String>, Vec<manifest::FlownWords>);
+
+/// Writes and prints the results of all flights; with their manifest, if it is known how they were made.
+fn conclude(
+    folder: &CampaignFolder,
+    summary: &Summary,
+    origin: Option<Origin>,
+    target: &str,
+    json: Json,
+) -> Result<ExitCode, Failure> {
     let out = folder.path();
-    report::write(folder.place(), summary)?;
+    let mut files = report::write(folder.place(), summary)?;
+    if let Some((command, flown)) = origin {
+        files.extend(folder.sealed());
+        manifest::write_as(folder.place(), &files, command, summary.manifest.fingerprint.clone(), flown)?;
+    }
     if json.json {
         json::print_written(|out| report::json(out, summary))?;
         return Ok(ExitCode::SUCCESS);
     }
-    let (table, shard) = (report::table(summary, target), summary.manifest.shard);
+    let (table, shard) = (for_terminal(columns(), || report::table(summary, target)), summary.manifest.shard);
     let part = if shard.of > 1 { format!("part {shard} only; ") } else { String::new() };
     let (rows, page) = (out.join("results.parquet"), out.join("report.html"));
     print(&format!("{table}\n{part}every flight is in {}; open {}\n", rows.display(), page.display()))?;
@@ -180,8 +207,18 @@ impl Merge {
     pub(super) fn run(self) -> Result<ExitCode, Failure> {
         interrupt::ends_with("stopped; the same command starts again".into())?;
         let (folder, summary) = campaign::merge(&self.shards, &self.out, self.force)?;
-        conclude(&folder, &summary, &summary.manifest.target(), self.json)
+        conclude(&folder, &summary, whole(&self.shards), &summary.manifest.target(), self.json)
     }
+}
+
+/// Returns what makes the whole of the parts in one: the command of a part, if that is known.
+fn whole(parts: &[PathBuf]) -> Option<Origin> {
+    let part = manifest::read(parts.first()?).ok()?;
+    let mut command = part.command;
+    let shard = command.iter().position(|word| word == SHARD || word.starts_with(&format!("{SHARD}=")))?;
+    let words = if command.get(shard).is_some_and(|word| word == SHARD) { 2 } else { 1 };
+    command.drain(shard..command.len().min(shard + words));
+    Some((command, part.flown))
 }
 
 /// List the built-in campaigns, or print one of them to start from

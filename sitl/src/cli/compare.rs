@@ -5,9 +5,10 @@ use super::target::Target;
 use super::terminal::Failure;
 use super::vehicle::OnVehicle;
 use super::written::Output;
-use super::{interrupt, random, suite};
+use super::{interrupt, random, rough, suite};
 use afbc_campaign::compare::{self, choose, standard};
 use afbc_campaign::suite::suite_at;
+use afbc_reader::words::nearest;
 use afbc_report::compare as report;
 use afbc_sim::LogRate;
 use clap::Args;
@@ -19,7 +20,9 @@ use std::process::ExitCode;
 /// Without arguments: AFBC, AFBC as printed, and every other law in the built-in scenario `hardware`. With `--suite`:
 /// these, and AFBC under its monitor, in every flight of a suite, each on that flight's vehicle; one report, in
 /// out/suite. With `--suite random`: flights drawn from --seed, on all built-in vehicles or one; how the contenders
-/// stand is in out/random. A lost vehicle is part of the comparison and does not change the exit code.
+/// stand is in out/random. With `--suite rough-estimate`: AFBC under its monitor, or one other, with sensors that do
+/// what it is not told; how good its estimate is stands in out/rough-estimate. A lost vehicle is part of the comparison
+/// and does not change the exit code.
 #[derive(Args, Debug)]
 pub(crate) struct Compare {
     /// Built-in scenarios or scenario files; the contenders of all of them fly each one
@@ -36,7 +39,7 @@ pub(crate) struct Compare {
     controllers: Vec<String>,
 
     /// Fly each scenario with this many consecutive seeds, from its own on; with `--suite random`, draw flights from
-    /// this many [default: 10, or 1 where no seed changes a flight; 1 for the suite random]
+    /// this many [default: 10, or 1 where no seed changes a flight; 1 for the suites random and rough-estimate]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=10_000))]
     seeds: Option<u64>,
 
@@ -60,14 +63,24 @@ impl Compare {
         if let Some(path) = &self.suite {
             let own = self.random.own()?;
             let known = compare::standard_and_monitored();
+            let is_rough = rough::is_named(path);
             let contenders = match self.controllers.as_slice() {
+                [] if is_rough => choose(&known, &["afbc-monitored".to_owned()])?,
                 [] if own.is_empty() => known,
                 names => choose(&known, names)?,
             };
             let Compare { random, seeds, against, output, .. } = self;
             let names = contenders.iter().chain(&own).map(|contender| contender.name.as_str());
             flies(against.as_deref(), &names.collect::<Vec<_>>())?;
+            if is_rough {
+                random.are_for(afbc_campaign::rough::NAME)?;
+                if against.is_some() {
+                    return Err("--against: --suite rough-estimate compares nobody; leave it out".into());
+                }
+                return rough::run(&random, self.on.vehicle()?, &contenders, seeds.unwrap_or(1), &output);
+            }
             if random::is_named(path) {
+                random.are_for(afbc_campaign::random::NAME)?;
                 if let Some(twice) = own.iter().find(|own| contenders.iter().any(|other| other.name == own.name)) {
                     let name = &twice.name;
                     return Err(format!("--controllers {name}: --from has a contender of this name; rename it").into());
@@ -77,7 +90,7 @@ impl Compare {
             }
             let suite = suite_at(path)?;
             if let Some(option) = self.on.vehicle()?.map(|_| "--vehicle").or_else(|| random.given()) {
-                let cure = "only --suite random takes it, this suite's flights are in its file; leave it out";
+                let cure = "only --suite random takes it, or rough-estimate: this suite is a file; leave it out";
                 return Err(format!("{option}: {cure}").into());
             }
             return suite::run(&suite, &contenders, seeds, against.as_deref(), &output);
@@ -96,7 +109,7 @@ impl Compare {
         flies(self.against.as_deref(), &contenders.iter().map(|own| own.name.as_str()).collect::<Vec<_>>())?;
         let log_every = LogRate::common(&scenarios)?;
         interrupt::ends_it()?;
-        let folder = self.output.place.open("compare", "compare")?;
+        let folder = self.output.place.open("compare")?;
         let comparisons = fly(scenarios, self.seeds, self.against.as_deref(), log_every)?;
 
         interrupt::is_too_late();
@@ -111,8 +124,10 @@ impl Compare {
 
 /// Checks that `against` is one of those who fly.
 fn flies(against: Option<&str>, names: &[&str]) -> Result<(), Failure> {
-    match against.filter(|against| !names.contains(against)) {
-        Some(against) => Err(format!("--against {against}: does not fly; name one of {}", names.join(", ")).into()),
-        None => Ok(()),
-    }
+    let Some(against) = against.filter(|against| !names.contains(against)) else { return Ok(()) };
+    let cure = match nearest(against, names.iter().copied()) {
+        Some(similar) => format!("did you mean {similar}?"),
+        None => format!("name one of {}", names.join(", ")),
+    };
+    Err(format!("--against {against}: does not fly; {cure}").into())
 }

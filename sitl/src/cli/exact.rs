@@ -52,7 +52,7 @@ impl Exact {
         drop(progress);
         let log = ReplayedLog { name: &name, replay: &replayed };
         if replayed.comparison.is_some() {
-            let folder = place.open("replay", &afbc_report::replay::folder_name(&name))?;
+            let folder = place.open(&afbc_report::replay::folder_name(&name))?;
             interrupt::is_too_late();
             let written = write(&folder, &log)?;
             show(&folder, written.len(), json, |out| report::json(out, &log), || table(&log))?;

@@ -107,8 +107,8 @@ fn laws(names: &[String]) -> Result<Vec<ControllerKind>, Failure> {
         return Ok(all.filter(|kind| *kind != ControllerKind::Backstepping).collect());
     }
     if let Some(unknown) = names.iter().find(|name| ControllerKind::named(name).is_none()) {
-        let laws = ControllerKind::names();
-        return Err(format!("{}: no such law; the laws are {laws}", unknown.escape_debug()).into());
+        let cure = ControllerKind::cure(unknown);
+        return Err(format!("{}: no such law; {cure}", unknown.escape_debug()).into());
     }
     Ok(all.filter(|kind| names.iter().any(|name| kind.name() == name)).collect())
 }

@@ -1,14 +1,15 @@
 //! `sitl fly`.
 
-use super::aboard::{AboardLogs, aboard};
+use super::aboard::{AboardLogs, LogOutputs, aboard};
 use super::flying::{Flying, report};
 use super::json::Json;
 use super::mcap::FlightMcap;
 use super::place::Place;
-use super::plan::{PlanFlight, is_plan};
-use super::target::Target;
+use super::plan::PlanFlight;
+use super::target::{Target, is_plan};
 use super::terminal::{Failure, say};
 use super::vehicle::OnVehicle;
+use afbc_scenario::Scenario;
 use clap::Args;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -30,7 +31,7 @@ pub(crate) struct Fly {
     controllers: Vec<String>,
 
     /// Also fly it by the firmware's own code, as `sitl pil` does, under the first of the controllers, and keep the
-    /// exact log of that flight, for `sitl replay --exact`, in this file
+    /// exact log of that flight, for `sitl replay --exact`, in this file, which must not exist
     #[arg(long, value_name = "FILE")]
     exact_log: Option<PathBuf>,
 
@@ -42,6 +43,10 @@ pub(crate) struct Fly {
     /// The same as MCAP, for Foxglove, PlotJuggler and ROS 2's tools, in this file, which must not exist
     #[arg(long, value_name = "FILE")]
     mcap: Option<PathBuf>,
+
+    /// Seed of weather, noise and faults, instead of the scenario's
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(0..=1_000_000_000))]
+    seed: Option<u64>,
 
     #[command(flatten)]
     on: OnVehicle,
@@ -67,27 +72,36 @@ impl Fly {
             scenario.choose(&self.controllers)?;
         }
         let scenario = self.on.put(scenario)?;
+        let scenario = Scenario { seed: self.seed.unwrap_or(scenario.seed), ..scenario };
         let name = scenario.name.clone();
         let is_logged = self.mcap.is_some() || self.exact_log.is_some() || self.ulog.is_some();
         let firmware = is_logged.then(|| aboard(&scenario, self.flying.duration)).transpose()?;
-        // Before the flights, so that a file that cannot be costs none.
-        let mcap = FlightMcap::create(self.mcap, &mut self.ulog)?;
-        let logs = AboardLogs::create(self.exact_log, self.ulog)?;
-        let (folder, flown) = self.flying.fly(vec![scenario], || self.place.open("fly", &name))?;
-        let logged = firmware.map(|firmware| firmware.fly(logs)).transpose()?;
+        // Before the flights, so that a file that cannot be costs none; and created when everything else is right.
+        let mcap = FlightMcap::plan(self.mcap, &mut self.ulog)?;
+        let outputs = LogOutputs::new(self.exact_log.as_deref(), self.ulog.as_deref())?;
+        let mut logs = None;
+        let open = || {
+            let folder = self.place.open(&name)?;
+            logs = Some(AboardLogs::create(&outputs)?);
+            Ok(folder)
+        };
+        let (folder, flown) = self.flying.fly(vec![scenario], open)?;
+        let logged = firmware.zip(logs).map(|(firmware, logs)| firmware.fly(logs));
+        // A log that has failed costs no other result; the failure is told in the end.
         report(&folder, &flown, &[], self.json)?;
-        logged.iter().flatten().for_each(|line| say(line));
-        mcap.map(FlightMcap::finish).transpose()?;
+        let converted = mcap.map(FlightMcap::finish);
+        logged.transpose()?.iter().flatten().for_each(|line| say(line));
+        converted.transpose()?;
         Ok(ExitCode::from(u8::from(flown.iter().any(|flown| flown.run.lost.is_some()))))
     }
 }
 
 impl Fly {
     fn fly_plan(self) -> Result<ExitCode, Failure> {
-        let Fly { scenario, controllers, exact_log, ulog, mcap, on, flying, json, .. } = self;
+        let Fly { scenario, controllers, seed, exact_log, ulog, mcap, on, flying, json, .. } = self;
         let path = scenario.path().to_path_buf();
-        if !controllers.is_empty() || json.json || flying.log_hz.is_some() {
-            let options = "--controller, --log-hz and --json";
+        if !controllers.is_empty() || json.json || flying.log_hz.is_some() || seed.is_some() {
+            let options = "--controller, --seed, --log-hz and --json";
             return Err(format!("{}: {options} do not apply to a plan; leave them out", path.display()).into());
         }
         PlanFlight { path, on, duration: flying.duration, exact_log, ulog, mcap }.run()

@@ -49,11 +49,12 @@ impl Hitl {
         };
         let scenario = self.flying.scenario(&self.scenario)?;
         let pace = MessagePeriods::at(self.baud)?;
-        let mut recorder = Recorder::new(&scenario, &self.flying)?;
+        let output = self.flying.output()?;
         let stop = Arc::new(AtomicBool::new(false));
         let stopper = Arc::clone(&stop);
         ctrlc::set_handler(move || stopper.store(true, Ordering::Relaxed))?;
         let mut serial = Serial::open(&port, self.baud)?;
+        let mut recorder = Recorder::new(&scenario, output.as_ref())?;
         print(&format!(
             "{}: {} s in real time; {} baud carry a state every {} ms ({:.0} Hz), a setpoint every {} ms\n",
             scenario.name,

@@ -3,6 +3,7 @@
 use super::target::Target;
 use super::terminal::Failure;
 use super::vehicle::OnVehicle;
+use afbc_files::Output;
 use afbc_hil::{Error, Log, LoopEnd};
 use afbc_scenario::{DURATION, Scenario};
 use afbc_sim::flight::Sample;
@@ -12,6 +13,11 @@ use clap::Args;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::ops::ControlFlow;
 use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
+use std::thread::{JoinHandle, spawn};
+use std::time::Duration;
 
 /// Options of every flight in the loop.
 #[derive(Args, Clone, Debug)]
@@ -23,7 +29,7 @@ pub(crate) struct InTheLoop {
     #[command(flatten)]
     pub(super) on: OnVehicle,
 
-    /// Log the flight to this CSV file, 100 rows per second
+    /// Log the flight to this CSV file, which must not exist, 100 rows per second
     #[arg(long, value_name = "CSV")]
     out: Option<PathBuf>,
 }
@@ -54,40 +60,45 @@ impl InTheLoop {
         afbc_hil::check(&scenario).map_err(|error| format!("{}: {error}", scenario.name))?;
         Ok(scenario)
     }
+
+    /// Returns where the log goes, if it is wanted.
+    pub(crate) fn output(&self) -> Result<Option<Output>, Failure> {
+        Ok(self.out.as_deref().map(|out| Output::new(out, "--out")).transpose()?)
+    }
 }
 
 /// Log, metrics and progress of a flight.
 pub(crate) struct Recorder {
     metrics: Accumulator,
     log: Option<Log>,
-    progress: ProgressBar,
+    progress: LiveProgress,
     failure: Option<Error>,
 }
 
-/// Steps between updates of the progress bar.
-const PROGRESS_EVERY: u64 = 100;
+/// Progress on stderr, drawn by a thread of its own: a terminal that stands still delays no step.
+struct LiveProgress {
+    steps: Arc<AtomicU64>,
+    end: Sender<()>,
+    thread: JoinHandle<()>,
+}
+
+/// Time between updates of the progress bar.
+const PROGRESS_EVERY: Duration = Duration::from_millis(100);
 
 impl Recorder {
-    /// Creates the recorder of a flight of `scenario`.
-    pub(crate) fn new(scenario: &Scenario, flying: &InTheLoop) -> Result<Self, Failure> {
-        let create = |path: &PathBuf| {
-            Log::create(path, scenario.rotors.len()).map_err(|error| format!("{}: {error}", path.display()))
-        };
-        let log = flying.out.as_ref().map(create).transpose()?;
+    /// Creates the recorder of a flight of `scenario`, and its log.
+    pub(crate) fn new(scenario: &Scenario, output: Option<&Output>) -> Result<Self, Failure> {
+        let create = |output: &Output| Ok::<_, Failure>(Log::new(output.create()?, scenario.rotors.len())?);
+        let log = output.map(create).transpose()?;
         let steps = (scenario.duration_s * 1000.0).round() as u64;
-        let progress = ProgressBar::with_draw_target(Some(steps), ProgressDrawTarget::stderr());
-        let style = ProgressStyle::with_template("{bar:40} {percent:>3} %, {eta} left");
-        progress.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+        let progress = LiveProgress::new(steps);
         Ok(Recorder { metrics: Accumulator::default(), log, progress, failure: None })
     }
 
     /// Records one step; aborts the flight if it cannot be logged.
     pub(crate) fn observe(&mut self, sample: &Sample) -> ControlFlow<()> {
         self.metrics.add(sample);
-        let step = (sample.time_s * 1000.0).round() as u64;
-        if step.is_multiple_of(PROGRESS_EVERY) {
-            self.progress.set_position(step);
-        }
+        self.progress.steps.store((sample.time_s * 1000.0).round() as u64, Ordering::Relaxed);
         match self.log.as_mut().map_or(Ok(()), |log| log.add(sample)) {
             Ok(()) => ControlFlow::Continue(()),
             Err(error) => {
@@ -99,11 +110,36 @@ impl Recorder {
 
     /// Completes the log and returns the metrics.
     pub(crate) fn finish(self) -> Result<Metrics, Error> {
-        self.progress.finish_and_clear();
+        self.progress.finish();
         if let Some(failure) = self.failure {
             return Err(failure);
         }
         self.log.map_or(Ok(()), Log::finish)?;
         Ok(self.metrics.finish())
+    }
+}
+
+impl LiveProgress {
+    /// Begins to draw the progress of so many steps.
+    fn new(steps: u64) -> Self {
+        let (done, (end, ended)) = (Arc::new(AtomicU64::new(0)), channel());
+        let seen = Arc::clone(&done);
+        let thread = spawn(move || {
+            let bar = ProgressBar::with_draw_target(Some(steps), ProgressDrawTarget::stderr());
+            let style = ProgressStyle::with_template("{bar:40} {percent:>3} %, {eta} left");
+            bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+            while ended.recv_timeout(PROGRESS_EVERY) == Err(RecvTimeoutError::Timeout) {
+                bar.set_position(seen.load(Ordering::Relaxed));
+            }
+            bar.finish_and_clear();
+        });
+        LiveProgress { steps: done, end, thread }
+    }
+
+    /// Clears it, after the flight.
+    fn finish(self) {
+        drop(self.end);
+        // The thread has no result.
+        let _ = self.thread.join();
     }
 }

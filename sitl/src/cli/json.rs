@@ -6,6 +6,7 @@ use afbc_campaign::Campaign;
 use afbc_scenario::Scenario;
 use afbc_scenario::contender::Contender;
 use afbc_tune::{GainChange, SearchResult, fragment};
+use afbc_vehicles::Vehicle;
 use clap::Args;
 use serde::Serialize;
 use std::io;
@@ -70,6 +71,22 @@ pub(crate) fn scenario(scenario: &Scenario) -> impl Serialize + '_ {
         seed: *seed,
         contenders: who(contenders),
     }
+}
+
+/// Summary of a vehicle.
+#[derive(Serialize)]
+struct VehicleWords<'a> {
+    kind: &'static str,
+    name: &'a str,
+    description: &'a str,
+    rotors: usize,
+    mass_kg: f64,
+}
+
+/// Returns the summary of a vehicle.
+pub(crate) fn vehicle(vehicle: &Vehicle) -> impl Serialize + '_ {
+    let Vehicle { name, description, rotors, parameters, .. } = vehicle;
+    VehicleWords { kind: "vehicle", name, description, rotors: rotors.len(), mass_kg: parameters.mass_kg }
 }
 
 /// Summary of a campaign.

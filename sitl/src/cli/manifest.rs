@@ -16,9 +16,11 @@ use std::thread;
 
 /// Name of the file.
 pub(super) const NAME: &str = "manifest.json";
-/// Options that say where results go, each with a value; and those that say how they are printed.
-const WHERE: [&str; 4] = ["--out", "--ulog", "--exact-log", "--mcap"];
-const HOW: [&str; 2] = ["--force", "--json"];
+/// Options that do not decide results, but where they go, how they are printed and on how many cores they are made:
+/// some have a value, others have none.
+pub(super) const WITH_VALUE: [&str; 7] =
+    ["--out", "--ulog", "--exact-log", "--mcap", "--write", "--table", "--threads"];
+pub(super) const WITHOUT_VALUE: [&str; 2] = ["--force", "--json"];
 
 /// What results were made of.
 #[derive(Debug, Serialize, Deserialize)]
@@ -70,6 +72,11 @@ pub(super) fn commit() -> Option<String> {
 /// A scenario, and the seeds that each contender flew it with.
 pub(super) type Flown<'a> = (&'a Scenario, Vec<u64>);
 
+/// Returns what is written out of a scenario that was flown.
+pub(super) fn words((scenario, seeds): &Flown<'_>) -> Result<FlownWords, serde_json::Error> {
+    Ok(FlownWords { name: scenario.name.clone(), seeds: seeds.clone(), scenario: serde_json::to_value(scenario)? })
+}
+
 /// Writes the manifest of the results `files` in `folder`, of which everything in `flown` decides, and `shown` is
 /// written out.
 pub(super) fn write(
@@ -78,9 +85,18 @@ pub(super) fn write(
     flown: &[Flown<'_>],
     shown: &[Flown<'_>],
 ) -> Result<(), Failure> {
-    let words = |(scenario, seeds): &Flown<'_>| {
-        Ok(FlownWords { name: scenario.name.clone(), seeds: seeds.clone(), scenario: serde_json::to_value(scenario)? })
-    };
+    let shown = shown.iter().map(words).collect::<Result<_, serde_json::Error>>()?;
+    write_as(folder, files, own_command(), hash_of(&(version(), flown)), shown)
+}
+
+/// Writes the manifest of the results `files` of a command in `folder`.
+pub(super) fn write_as(
+    folder: &Folder,
+    files: &[PathBuf],
+    command: Vec<String>,
+    fingerprint: String,
+    flown: Vec<FlownWords>,
+) -> Result<(), Failure> {
     let hash = |path: &PathBuf| {
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         Ok((name, hash_of_file(path)?))
@@ -88,9 +104,9 @@ pub(super) fn write(
     let manifest = ResultsManifest {
         version: version(),
         commit: commit(),
-        command: command(env::args_os().skip(1).map(|argument| argument.to_string_lossy().into_owned())),
-        fingerprint: hash_of(&(version(), flown)),
-        flown: shown.iter().map(words).collect::<Result<_, serde_json::Error>>()?,
+        command,
+        fingerprint,
+        flown,
         machine: Machine {
             os: env::consts::OS.into(),
             architecture: env::consts::ARCH.into(),
@@ -104,15 +120,24 @@ pub(super) fn write(
     Ok(())
 }
 
+/// Returns the arguments of this program that decide the results, after the name of the command.
+pub(super) fn own_command() -> Vec<String> {
+    let own = command(env::args_os().skip(1).map(|argument| argument.to_string_lossy().into_owned()));
+    // Without a command, or with options first, it is `paper`.
+    let named = own.first().is_some_and(|word| !word.starts_with('-'));
+    if named { own } else { [vec!["paper".into()], own].concat() }
+}
+
 /// Returns the arguments that decide the results.
 fn command(arguments: impl Iterator<Item = String>) -> Vec<String> {
     let mut kept = Vec::new();
     let mut arguments = arguments.into_iter();
     while let Some(argument) = arguments.next() {
-        if WHERE.contains(&argument.as_str()) {
-            arguments.next();
-        } else if !HOW.contains(&argument.as_str()) && !WHERE.iter().any(|it| argument.starts_with(&format!("{it}="))) {
-            kept.push(argument);
+        let name = argument.split_once('=').map_or(argument.as_str(), |(name, _)| name);
+        match (WITH_VALUE.contains(&name), name == argument) {
+            (true, true) => drop(arguments.next()),
+            (false, _) if !WITHOUT_VALUE.contains(&name) => kept.push(argument),
+            _ => {}
         }
     }
     kept
@@ -126,12 +151,58 @@ pub(super) fn read(path: &Path) -> Result<ResultsManifest, Failure> {
     let bytes = fs::read(&path).map_err(|error| format!("{name}: cannot be read ({error}); {cure}"))?;
     let damaged = |problem: &dyn std::fmt::Display| format!("{name}: damaged or no manifest ({problem}); {cure}");
     seal::verify(&mut io::Cursor::new(&bytes)).map_err(|error| damaged(&error))?;
-    Ok(serde_json::from_slice(&bytes).map_err(|error| damaged(&error))?)
+    let manifest: ResultsManifest = serde_json::from_slice(&bytes).map_err(|error| damaged(&error))?;
+    // Whoever made it: the files are those of its own folder.
+    let is_plain = |name: &String| Path::new(name).file_name().is_some_and(|plain| plain == name.as_str());
+    match manifest.results.keys().find(|name| !is_plain(name)) {
+        Some(name) => Err(damaged(&format!("a path in it, {}", name.escape_debug())).into()),
+        None => Ok(manifest),
+    }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::command;
+    #![expect(clippy::unwrap_used, reason = "tests")]
+    use super::{WITH_VALUE, WITHOUT_VALUE, command};
+    use crate::cli::Cli;
+    use clap::CommandFactory;
+
+    /// An option that is new is sorted in here, too: `sitl again` runs whatever is none of the places.
+    #[test]
+    fn each_option_decides_results_or_is_a_place() {
+        let decide: [(&str, &[&str]); 4] = [
+            ("campaign", &["campaign", "flights", "shard", "flight", "contenders", "log_hz", "vehicle"]),
+            (
+                "compare",
+                &[
+                    "scenarios",
+                    "suite",
+                    "controllers",
+                    "seeds",
+                    "against",
+                    "vehicle",
+                    "seed",
+                    "flights",
+                    "on_estimate",
+                    "duration",
+                    "from",
+                ],
+            ),
+            ("fly", &["scenario", "controllers", "vehicle", "duration", "seed", "log_hz"]),
+            ("paper", &["reading", "inertia", "thrust", "no_uncertainty", "plant", "duration", "log_hz"]),
+        ];
+        let program = Cli::command();
+        for (command, decide) in decide {
+            for arg in program.find_subcommand(command).unwrap().get_arguments() {
+                let long = format!("--{}", arg.get_long().unwrap_or_default());
+                let with = WITH_VALUE.contains(&long.as_str());
+                let place = with || WITHOUT_VALUE.contains(&long.as_str());
+                assert!(place != decide.contains(&arg.get_id().as_str()), "{command} {long}");
+                let takes_one = arg.get_action().takes_values();
+                assert!(!place || with == takes_one, "{command} {long}");
+            }
+        }
+    }
 
     #[test]
     fn a_command_is_kept_without_its_places() {

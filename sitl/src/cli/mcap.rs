@@ -1,10 +1,11 @@
 //! `sitl mcap`, and `sitl fly --mcap`.
 
 use super::terminal::{Failure, print, say};
+use afbc_files::Output;
 use afbc_replay::mcap::convert;
 use clap::Args;
-use std::fs::{self, File, OpenOptions};
-use std::io::BufWriter;
+use std::fs;
+use std::io::Cursor;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -24,48 +25,28 @@ impl Mcap {
     pub(super) fn run(self) -> Result<ExitCode, Failure> {
         let beside = || PathBuf::from(self.log.file_name().unwrap_or_default()).with_extension("mcap");
         let path = self.out.clone().unwrap_or_else(beside);
-        let line = McapFile::create(path)?.convert(&self.log)?;
+        let line = converted(&self.log, &Output::new(&path, "--out")?)?;
         print(&format!("{line}\n"))?;
         Ok(ExitCode::SUCCESS)
     }
 }
 
-/// A file that is there, and empty until a log is converted into it.
-pub(super) struct McapFile {
-    path: PathBuf,
-    file: File,
-}
-
-impl McapFile {
-    fn create(path: PathBuf) -> Result<Self, Failure> {
-        let file = OpenOptions::new().write(true).create_new(true).open(&path);
-        let file = file.map_err(|error| {
-            let path = path.display();
-            match error.kind() {
-                std::io::ErrorKind::AlreadyExists => {
-                    format!("{path}: exists already; choose another file for MCAP, or remove that one")
-                }
-                _ => format!("{path}: cannot be written ({error}); choose another file for MCAP"),
-            }
-        })?;
-        Ok(McapFile { path, file })
-    }
-
-    /// Converts a log, and returns a line on it. Without success the file is gone.
-    fn convert(self, log: &Path) -> Result<String, Failure> {
-        let Self { path, file } = self;
-        let summary = convert(log, BufWriter::new(file)).inspect_err(|_| drop(fs::remove_file(&path)))?;
-        let damaged = match summary.damaged {
-            0 => String::new(),
-            pieces => format!("; {pieces} pieces of the log are damaged, and missing"),
-        };
-        Ok(format!("{}: MCAP, {} messages of {} topics{damaged}", path.display(), summary.messages, summary.topics))
-    }
+/// Converts a log, and returns a line on it. Without success there is no file.
+fn converted(log: &Path, output: &Output) -> Result<String, Failure> {
+    let mut bytes = Vec::new();
+    let summary = convert(log, Cursor::new(&mut bytes))?;
+    output.place(|out| out.write_all(&bytes))?;
+    let damaged = match summary.damaged {
+        0 => String::new(),
+        pieces => format!("; {pieces} pieces of the log are damaged, and missing"),
+    };
+    let path = output.path().display();
+    Ok(format!("{path}: MCAP, {} messages of {} topics{damaged}", summary.messages, summary.topics))
 }
 
 /// The MCAP of a flight, made of its ULog when it has ended.
 pub(super) struct FlightMcap {
-    file: McapFile,
+    output: Output,
     /// The log that it is made of.
     ulog: PathBuf,
     /// The same, if nobody has asked for it.
@@ -83,19 +64,19 @@ impl Drop for TemporaryFile {
 }
 
 impl FlightMcap {
-    /// Creates the file at `path`, if there is to be one; `ulog` is then where the flight's log must go.
-    pub(super) fn create(path: Option<PathBuf>, ulog: &mut Option<PathBuf>) -> Result<Option<Self>, Failure> {
+    /// Plans the file at `path`, if there is to be one; `ulog` is then where the flight's log must go.
+    pub(super) fn plan(path: Option<PathBuf>, ulog: &mut Option<PathBuf>) -> Result<Option<Self>, Failure> {
         let Some(path) = path else { return Ok(None) };
         // With the process's number, so that two flights at once do not share it.
         let temporary = ulog.is_none().then(|| path.with_extension(format!("{}.ulg", std::process::id())));
-        let file = McapFile::create(path)?;
+        let output = Output::new(&path, "--mcap")?;
         let ulog = ulog.get_or_insert_with(|| temporary.clone().unwrap_or_default()).clone();
-        Ok(Some(FlightMcap { file, ulog, _temporary: temporary.map(TemporaryFile) }))
+        Ok(Some(FlightMcap { output, ulog, _temporary: temporary.map(TemporaryFile) }))
     }
 
     /// Converts the log.
     pub(super) fn finish(self) -> Result<(), Failure> {
-        say(&self.file.convert(&self.ulog)?);
+        say(&converted(&self.ulog, &self.output)?);
         Ok(())
     }
 }

@@ -23,10 +23,12 @@ mod pil;
 mod place;
 mod plan;
 mod plot;
+mod program;
 mod progress;
 mod random;
 mod replay;
 mod results;
+mod rough;
 mod scenarios;
 mod serve;
 mod shell;
@@ -37,7 +39,7 @@ mod tune;
 mod vehicle;
 mod written;
 
-use clap::{CommandFactory, Parser, Subcommand};
+use clap::{Command as Program, CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::process::ExitCode;
 use terminal::Failure;
 
@@ -87,6 +89,17 @@ enum Command {
 }
 
 impl Cli {
+    /// Returns the whole command line.
+    pub(crate) fn program() -> Program {
+        program::prepared(Self::command())
+    }
+
+    /// Reads the command line; ends the program if it is wrong or asks for help.
+    pub(crate) fn read() -> Self {
+        let read = Self::program().try_get_matches().and_then(|matches| Self::from_arg_matches(&matches));
+        read.unwrap_or_else(|error| program::advised(error).exit())
+    }
+
     /// Runs the command.
     pub(crate) fn run(self) -> Result<ExitCode, Failure> {
         match self.command.unwrap_or(Command::Paper(self.paper)) {
@@ -95,7 +108,7 @@ impl Cli {
             Command::Campaign(campaign) => campaign.run(),
             Command::Merge(merge) => merge.run(),
             Command::Compare(compare) => compare.run(),
-            Command::Again(again) => again.run(),
+            Command::Again(again) => again.run(Self::command()),
             Command::Tune(tune) => tune.run(),
             Command::Check(check) => check.run(),
             Command::Scenarios(scenarios) => scenarios.run(),
@@ -111,7 +124,7 @@ impl Cli {
             Command::Pil(pil) => pil.run(),
             Command::Hitl(hitl) => hitl.run(),
             Command::BringUp(bring_up) => bring_up.run(),
-            Command::Completions(completions) => completions.run(Self::command()),
+            Command::Completions(completions) => completions.run(),
             Command::Man(man) => man.run(Self::command()),
         }
     }

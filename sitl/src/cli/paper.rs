@@ -114,7 +114,7 @@ impl Plants {
 impl Paper {
     /// Flies, writes, prints.
     pub(super) fn run(self) -> Result<ExitCode, Failure> {
-        let (folder, flown) = self.flying.fly(self.scenarios()?, || self.place.open("paper", "paper"))?;
+        let (folder, flown) = self.flying.fly(self.scenarios()?, || self.place.open("paper"))?;
         report(&folder, &flown, &claims(&flown), self.json)?;
         Ok(ExitCode::from(u8::from(flown.iter().any(unexpectedly_lost))))
     }

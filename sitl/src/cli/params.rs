@@ -1,7 +1,7 @@
 //! `sitl params`: the parameters of a vehicle, as ground stations' files.
 
 use super::terminal::{Failure, print, say};
-use afbc_files::{Flash, place};
+use afbc_files::{Flash, Output};
 use afbc_onboard::parameters::{Kept, Parameter, ParameterTable, RecordChange};
 use afbc_reader::params::{Format, ParameterEntry, read, written};
 use afbc_reader::words::out_of_range;
@@ -33,6 +33,9 @@ enum Action {
         /// File to write; by its name .parm is MAVProxy's, anything else QGroundControl's [default: standard output]
         #[arg(long, short, value_name = "FILE")]
         out: Option<PathBuf>,
+        /// Replace the file if it is there
+        #[arg(long, requires = "out")]
+        force: bool,
         /// Format, whatever the file's name
         #[arg(long, value_enum)]
         format: Option<Style>,
@@ -83,7 +86,7 @@ impl Params {
 fn act<const N: usize>(action: &Action, vehicle: &Vehicle) -> Result<(), Failure> {
     let mut table = ParameterTable::<N>::new(vehicle.configuration()?);
     match action {
-        Action::Export { of, out, format } => {
+        Action::Export { of, out, force, format } => {
             if let Some(path) = &of.store {
                 load(&mut table, &mut open(path, vehicle, Flash::known)?, path)?;
             }
@@ -97,8 +100,7 @@ fn act<const N: usize>(action: &Action, vehicle: &Vehicle) -> Result<(), Failure
             let entries = table.iter().map(|it| (it.name, it.value, it.kind.number()));
             let text = written(format, &vehicle.name, entries);
             match out {
-                Some(out) => place(out, |to| to.write_all(text.as_bytes()))
-                    .map_err(|error| format!("{}: cannot be written ({error})", out.display()))?,
+                Some(out) => Output::forcible(out, "--out", *force)?.place(|to| to.write_all(text.as_bytes()))?,
                 None => print(&text)?,
             }
         }

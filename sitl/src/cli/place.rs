@@ -1,5 +1,6 @@
 //! Output folder: `--out` and `--force`.
 
+use super::manifest;
 use super::terminal::Failure;
 use afbc_files::Folder;
 use clap::Args;
@@ -12,7 +13,8 @@ pub(crate) struct Place {
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 
-    /// Write into the folder even if it holds something else; replaces files of the same names
+    /// Write into the folder even if it holds something else, such as results of the same command with other options;
+    /// replaces files of the same names
     #[arg(long)]
     pub(crate) force: bool,
 }
@@ -23,8 +25,9 @@ impl Place {
         self.out.clone().unwrap_or_else(|| Path::new("out").join(name))
     }
 
-    /// Opens the folder, after checking that it can be used for the results of `sitl <command>` for `name`.
-    pub(crate) fn open(&self, command: &str, name: &str) -> Result<Folder, Failure> {
-        Ok(Folder::open(&self.path(name), command, name, self.force)?)
+    /// Opens the folder for the results of this program's command line for `name`, after checking that it can be used
+    /// for them: it holds nothing, or what the same command line made.
+    pub(crate) fn open(&self, name: &str) -> Result<Folder, Failure> {
+        Ok(Folder::open(&self.path(name), &manifest::own_command().join(" "), name, self.force)?)
     }
 }

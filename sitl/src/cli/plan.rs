@@ -1,12 +1,13 @@
 //! `sitl fly PLAN.plan`: a plan of QGroundControl.
 
+use super::aboard::{AboardLogs, LogOutputs};
+use super::interrupt;
 use super::mcap::FlightMcap;
 use super::serve::unwritten;
 use super::terminal::{Failure, print, say};
 use super::vehicle::OnVehicle;
-use afbc_hil::{LogFile, UlogFiles};
 use afbc_serve::{QgcPlan, ServedVehicle, fleet, fly_plan};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 /// What it is flown in: place, weather and instruments.
@@ -22,11 +23,6 @@ pub(super) struct PlanFlight {
     pub(super) exact_log: Option<PathBuf>,
     pub(super) ulog: Option<PathBuf>,
     pub(super) mcap: Option<PathBuf>,
-}
-
-/// True if a path names a plan of QGroundControl.
-pub(super) fn is_plan(path: &Path) -> bool {
-    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("plan"))
 }
 
 impl PlanFlight {
@@ -45,26 +41,26 @@ impl PlanFlight {
         {
             return Err(format!("{file}: plannedHomePosition: it is at a pole; plan elsewhere").into());
         }
-        let exact_log = match &self.exact_log {
-            Some(path) => Some((path, LogFile::create(path).map_err(|error| unwritten(path, &error))?)),
-            None => None,
-        };
-        exact_log.iter().for_each(|(_, file)| vehicle.record(file.clone()));
-        let mcap = FlightMcap::create(self.mcap, &mut self.ulog)?;
-        if let Some(path) = &self.ulog {
-            vehicle.log(UlogFiles::create(path)?);
-        }
+        let mcap = FlightMcap::plan(self.mcap, &mut self.ulog)?;
+        interrupt::ends_it()?;
+        let AboardLogs { exact, ulog } =
+            AboardLogs::create(&LogOutputs::new(self.exact_log.as_deref(), self.ulog.as_deref())?)?;
+        exact.iter().for_each(|(_, file)| vehicle.record(file.clone()));
+        ulog.into_iter().for_each(|(_, files)| vehicle.log(files));
         let end = fly_plan(&mut vehicle, &plan, self.duration.unwrap_or(LONGEST_S), &mut |line| say(line));
-        vehicle.end_log()?;
-        if let Some((path, file)) = exact_log {
-            file.finish().map_err(|error| unwritten(path, &error))?;
-        }
-        mcap.map(FlightMcap::finish).transpose()?;
+        interrupt::is_too_late();
+        // A log that has failed costs no other result; the failure is told in the end.
+        let logged = vehicle.end_log();
+        let recorded = exact.map(|(path, file)| file.finish().map_err(|error| unwritten(&path, &error)));
+        let converted = mcap.map(FlightMcap::finish);
         let end = end.map_err(|problem| format!("{file}: {problem}"))?;
         let how = match (end.complete || end.reached.contains(&last(&plan)), end.disarmed) {
+            (true, _) if end.fell => "not landed: it has fallen after its last item",
+            (false, _) if end.fell => "not complete: it has fallen",
             (true, true) => "complete, on the ground",
             (true, false) => "complete, in hold",
             (false, true) => "not complete: it has landed",
+            (false, false) if end.stopped => "not complete: stopped, in hold",
             (false, false) => "not complete within the time; give it more by --duration",
         };
         let (items, reached) = (plan.mission.len(), end.reached.len());
@@ -75,6 +71,9 @@ impl PlanFlight {
             plan.rally.len(),
             end.flight_s
         ))?;
+        logged?;
+        recorded.transpose()?;
+        converted.transpose()?;
         Ok(ExitCode::from(u8::from(how.starts_with("not"))))
     }
 }

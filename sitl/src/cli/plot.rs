@@ -1,7 +1,7 @@
 //! `sitl plot`.
 
 use super::terminal::{Failure, print};
-use afbc_files::place;
+use afbc_files::Output;
 use afbc_plot::{
     FigureFormat, FigurePanel, LogColumns, PanelLine, PaperFigure, Points, axis_title, binned, over_seeds,
 };
@@ -121,11 +121,7 @@ impl Plot {
         let Some(format) = FigureFormat::of(&self.out, self.dpi.into()) else {
             return Err(format!("--out {out}: the end of the name says the format; use .pdf, .svg or .png").into());
         };
-        if self.out.exists() && !self.force {
-            return Err(
-                format!("{out}: exists already; choose another file with --out, or replace it with --force").into()
-            );
-        }
+        let output = Output::forcible(&self.out, "--out", self.force)?;
         let logs = self.logs()?;
         let x = match (&self.x, logs.first(), self.columns().next()) {
             (None, Some(first), Some(y)) => first.columns.usual_x(y)?,
@@ -152,8 +148,7 @@ impl Plot {
             panels,
         };
         let bytes = figure.write(format).map_err(|problem| format!("--out {out}: {problem}"))?;
-        place(&self.out, |to| to.write_all(&bytes))
-            .map_err(|error| format!("{out}: cannot be written ({error}); choose another file with --out"))?;
+        output.place(|to| to.write_all(&bytes))?;
         print(&format!("{out}: {:.1} mm wide, {} panels\n", self.width, self.y.len()))?;
         Ok(ExitCode::SUCCESS)
     }

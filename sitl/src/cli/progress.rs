@@ -10,8 +10,10 @@ use std::time::{Duration, Instant};
 
 /// Without a terminal there is a line at the start, after each further tenth, ...
 const PARTS: u64 = 10;
-/// ... and after this long without one.
-const SILENCE: Duration = Duration::from_secs(60);
+/// ... and after this long without one, which doubles ...
+const SILENCE: Duration = Duration::from_secs(5);
+/// ... up to this, so that the log of a long command stays short.
+const SILENCE_MAX: Duration = Duration::from_secs(30);
 
 /// Progress of a command.
 pub(crate) struct Progress {
@@ -62,10 +64,14 @@ impl Progress {
             let (sender, end) = channel();
             let shared = Arc::clone(&shared);
             let remind = move || {
-                while end.recv_timeout(SILENCE) == Err(RecvTimeoutError::Timeout) {
+                let (mut silence, mut wait) = (SILENCE, SILENCE);
+                while end.recv_timeout(wait) == Err(RecvTimeoutError::Timeout) {
                     let mut state = shared.state();
-                    if state.said.elapsed() >= SILENCE {
+                    wait = silence.saturating_sub(state.said.elapsed());
+                    if wait.is_zero() {
                         shared.show(&mut state, true);
+                        silence = (2 * silence).min(SILENCE_MAX);
+                        wait = silence;
                     }
                 }
             };

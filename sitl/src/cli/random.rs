@@ -7,6 +7,7 @@ use super::written::Output;
 use super::{interrupt, manifest, page};
 use afbc_campaign::compare;
 use afbc_campaign::random::{self, FLIGHTS, FlownDraw, NAME, Random, Seen};
+use afbc_campaign::rough::NAME as ROUGH;
 use afbc_files::Folder;
 use afbc_reader::BuiltIn;
 use afbc_report::random::{self as report, Judged};
@@ -24,15 +25,19 @@ pub(super) const DESCRIPTION: &str = "drawn from --seed: paths, speeds, wind, pa
 
 /// Options of the suite.
 #[derive(Args, Clone, Debug)]
-#[command(next_help_heading = "Options of `--suite random`")]
+#[command(next_help_heading = "Options of `--suite random` and `--suite rough-estimate`")]
 pub(super) struct Options {
     /// First seed that flights are drawn from; --seeds takes those after it, too [default: 1]
     #[arg(long, value_name = "N", requires = "suite", value_parser = clap::value_parser!(u64).range(..1 << 53))]
-    seed: Option<u64>,
+    pub(super) seed: Option<u64>,
 
-    /// Number of flights of each vehicle and seed [default: 12]
+    /// Number of flights of each vehicle and seed, and class of rough-estimate [default: 12; 1 for rough-estimate]
     #[arg(long, value_name = "K", requires = "suite", value_parser = clap::value_parser!(u64).range(1..=10_000))]
-    flights: Option<u64>,
+    pub(super) flights: Option<u64>,
+
+    /// Length of every flight of rough-estimate [s] [default: 60, one in ten 600]
+    #[arg(long, value_name = "S", requires = "suite", value_parser = duration)]
+    pub(super) duration: Option<f64>,
 
     /// Fly on the vehicle's own estimate, by the instruments of this built-in scenario, instead of the truth
     #[arg(long, value_name = "SCENARIO", requires = "suite", num_args = 0..=1, default_missing_value = "mocap")]
@@ -52,6 +57,13 @@ enum Instruments {
     Outdoor,
 }
 
+/// Reads a length of flights.
+fn duration(text: &str) -> Result<f64, String> {
+    let range = afbc_scenario::DURATION;
+    let seconds = text.parse().ok().filter(|seconds: &f64| range.check(*seconds).is_ok());
+    seconds.ok_or_else(|| format!("it must lie within {} to {} seconds", range.min, range.max))
+}
+
 /// True if `path` names this suite.
 pub(super) fn is_named(path: &Path) -> bool {
     path == Path::new(NAME)
@@ -65,14 +77,28 @@ pub(super) const fn flights() -> usize {
 impl Options {
     /// The first option that was given, by name.
     pub(super) fn given(&self) -> Option<&'static str> {
-        let Options { seed, flights, on_estimate, from } = self;
+        let Options { seed, flights, duration, on_estimate, from } = self;
         let all = [
             (seed.is_some(), "--seed"),
             (flights.is_some(), "--flights"),
+            (duration.is_some(), "--duration"),
             (on_estimate.is_some(), "--on-estimate"),
             (from.is_some(), "--from"),
         ];
         all.into_iter().find_map(|(given, name)| given.then_some(name))
+    }
+
+    /// Checks that what was given is for the suite `name`, of these two.
+    pub(super) fn are_for(&self, name: &str) -> Result<(), Failure> {
+        let all = [
+            (self.duration.is_some(), "--duration", ROUGH),
+            (self.on_estimate.is_some(), "--on-estimate", NAME),
+            (self.from.is_some(), "--from", NAME),
+        ];
+        match all.into_iter().find(|(given, _, of)| *given && *of != name) {
+            Some((_, option, of)) => Err(format!("{option}: only --suite {of} takes it; leave it out").into()),
+            None => Ok(()),
+        }
     }
 
     /// The contenders of `--from`.
@@ -113,7 +139,7 @@ impl Options {
         }
         let mut folder = None;
         let flown = fly(&random, contenders, || {
-            folder = Some(output.place.open(NAME, NAME)?);
+            folder = Some(output.place.open(NAME)?);
             Ok(())
         })?;
         let Some(folder) = folder else { return Ok(ExitCode::SUCCESS) };

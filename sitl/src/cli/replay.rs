@@ -71,7 +71,7 @@ impl Replay {
             return Err(FileError::whole(&shown, format!("{problem}; record from rest on")).into());
         }
         let name = self.log.file_stem().map_or(String::new(), |stem| stem.to_string_lossy().into_owned());
-        let folder = self.place.open("replay", &report::folder_name(&name))?;
+        let folder = self.place.open(&report::folder_name(&name))?;
         interrupt::is_too_late();
         let replay = report::Replay { name: &name, recording: &recording, replayed: &replayed };
         let written = report::write(&folder, &replay)?;

@@ -6,11 +6,12 @@ use super::target::Target;
 use super::terminal::{Failure, print};
 use afbc_campaign::Campaign;
 use afbc_campaign::subject::{Subject, SubjectKind};
-use afbc_files::Error;
+use afbc_files::Output;
 use afbc_reader::BuiltIn;
 use afbc_scenario::contender::Contender;
 use afbc_scenario::trajectory::{Trajectory, polynomial};
 use afbc_scenario::{BUILT_IN, Scenario, built_in};
+use afbc_vehicles::Vehicle;
 use clap::Args;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -50,16 +51,20 @@ fn line(scenario: &Scenario) -> String {
     format!("{name:<12}{duration_s:>4} s  {description}\n")
 }
 
-/// Check a scenario or a campaign without flying it; exits with 2 and a message on the first error
+/// Check a scenario, a campaign or a vehicle without flying it; exits with 2 and a line for every mistake
 #[derive(Args, Debug)]
 pub(crate) struct Check {
-    /// Name of a built-in scenario or campaign, or path of a file
+    /// Name of a built-in scenario, campaign or vehicle, or path of a file
     scenario: Target,
 
     /// Also write the polynomials of a scenario's minimum-snap path, or of a path from a file, into this file, as the
     /// Crazyflie's tools do
     #[arg(long, value_name = "FILE")]
     polynomials: Option<PathBuf>,
+
+    /// Replace the file of --polynomials if it is there
+    #[arg(long, requires = "polynomials")]
+    force: bool,
 
     #[command(flatten)]
     json: Json,
@@ -75,14 +80,14 @@ impl Check {
                 return Err(format!("--polynomials: {} has none; {cure}", scenario.name).into());
             };
             let text = polynomial::written(pieces);
-            return match std::fs::write(&path, text) {
-                Ok(()) => Ok(ExitCode::SUCCESS),
-                Err(source) => Err(Error::Write { path, source }.into()),
-            };
+            let output = Output::forcible(&path, "--polynomials", self.force)?;
+            output.place(|out| out.write_all(text.as_bytes()))?;
+            return Ok(ExitCode::SUCCESS);
         }
-        match (self.scenario.either()?, self.json.json) {
+        match (self.scenario.any()?, self.json.json) {
             (Subject::Scenario(scenario), true) => json::print_value(&json::scenario(&scenario))?,
             (Subject::Campaign(campaign), true) => json::print_value(&json::campaign(&campaign))?,
+            (Subject::Vehicle(vehicle), true) => json::print_value(&json::vehicle(&vehicle))?,
             (Subject::Scenario(scenario), false) => {
                 let Scenario { name, duration_s, model, contenders, .. } = scenario;
                 print(&format!("{name}: ok, {duration_s} s, {} plant, {}\n", model.name(), titles(&contenders)))?;
@@ -94,6 +99,11 @@ impl Check {
                     "{name}: ok, {flights} flights of {duration_s} s, {plant} plant, {titles}; this is a campaign: \
                      sitl campaign {file}\n"
                 ))?;
+            }
+            (Subject::Vehicle(vehicle), false) => {
+                let (Vehicle { name, rotors, .. }, file) = (*vehicle, self.scenario);
+                let rotors = rotors.len();
+                print(&format!("{name}: ok, {rotors} rotors; this is a vehicle: sitl fly hover --vehicle {file}\n"))?;
             }
         }
         Ok(ExitCode::SUCCESS)

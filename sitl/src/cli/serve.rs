@@ -3,15 +3,17 @@
 use super::target::Target;
 use super::terminal::{Failure, INTERRUPTED, print, say};
 use super::vehicle::OnVehicle;
+use afbc_files::Output;
 use afbc_hil::{LogFile, UlogFiles};
 use afbc_page_server::{Admission, Token, WebDoor};
 use afbc_serve::{
-    Addresses, Door, Lines, ParameterFile, Ports, RunEnd, Server, Then, TimeRate, VEHICLES_MAX, fleet, guide, run,
+    Addresses, Door, LineOutput, Lines, ParameterFile, Ports, RunEnd, Server, Then, TimeRate, VEHICLES_MAX, fleet,
+    guide, run,
 };
 use clap::{Args, value_parser};
 use std::ffi::OsString;
 use std::fs::{create_dir_all, read_to_string};
-use std::io::{self, BufReader, Write, stdin, stdout};
+use std::io::{self, BufReader, stdin, stdout};
 use std::net::{IpAddr, Ipv4Addr, SocketAddr, ToSocketAddrs};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -76,8 +78,8 @@ pub(crate) struct Serve {
     #[arg(long, value_name = "FILE")]
     parameters: Option<PathBuf>,
 
-    /// Keep the exact log, for `sitl replay --exact`, in this file; of several vehicles each has its own, which ends in
-    /// its system id
+    /// Keep the exact log, for `sitl replay --exact`, in this file, which must not exist; of several vehicles each has
+    /// its own, which ends in its system id
     #[arg(long, value_name = "FILE")]
     exact_log: Option<PathBuf>,
 
@@ -137,9 +139,8 @@ impl Serve {
             )
             .into());
         }
-        let logs = self.exact_logs()?;
-        server.record(logs.iter().map(|(_, log)| log.clone()).collect());
-        server.log(self.black_boxes()?);
+        let exact_logs = self.exact_logs()?;
+        let black_boxes = self.black_boxes()?;
         for line in &self.lines {
             let reply = server.line(line);
             let answer = reply.lines.last().map_or("ok", String::as_str);
@@ -160,6 +161,11 @@ impl Serve {
         let stop = Arc::new(AtomicBool::new(false));
         let stopper = Arc::clone(&stop);
         ctrlc::set_handler(move || stopper.store(true, Ordering::Relaxed))?;
+        // Only now: what is refused leaves no file behind.
+        let logs = exact_logs.iter().map(|output| Ok::<_, Failure>((output.path(), LogFile::create(output)?)));
+        let logs = logs.collect::<Result<Vec<_>, _>>()?;
+        server.record(logs.iter().map(|(_, log)| log.clone()).collect());
+        server.log(black_boxes.iter().map(|path| self.black_box(path)).collect::<Result<_, _>>()?);
         print(&format!("{}: {}", scenario.name, guide(&addresses, &ports.addresses()?, &server.systems())))?;
         if let Some(door) = &door {
             print(&format!("Open {} in a browser (docs/page.md).\n", door.url()))?;
@@ -174,15 +180,18 @@ impl Serve {
             Some(door) => door,
             None => &mut (),
         };
-        let mut lines = Lines::of(BufReader::new(stdin()));
-        let end = run(&mut server, (&mut ports, door), rate, &mut lines, &stop, |line| {
-            // Whoever has closed the pipe reads nothing.
-            let mut out = stdout().lock();
-            let _ = writeln!(out, "{line}").and_then(|()| out.flush());
-        });
+        let mut output = LineOutput::to(stdout())?;
+        let answers = output.clone();
+        let mut lines = match rate {
+            // Time stands still until the answers are read: none is lost.
+            TimeRate::Lockstep => Lines::paced(BufReader::new(stdin()), move || answers.wait_for_room()),
+            TimeRate::Times(_) => Lines::of(BufReader::new(stdin())),
+        };
+        let end = run(&mut server, (&mut ports, door), rate, &mut lines, &stop, |line| output.line(line));
+        output.finish();
         server.end_logs().iter().for_each(|line| say(line));
         for (path, log) in logs {
-            log.finish().map_err(|error| unwritten(&path, &error))?;
+            log.finish().map_err(|error| unwritten(path, &error))?;
         }
         Ok(ExitCode::from(if end == RunEnd::Stopped { INTERRUPTED } else { 0 }))
     }
@@ -201,32 +210,35 @@ impl Serve {
         Ok(WebDoor::open(address, Admission::at(address.ip(), token)?)?)
     }
 
-    /// Creates the files of the exact logs, if they are wanted.
-    fn exact_logs(&self) -> Result<Vec<(PathBuf, LogFile)>, Failure> {
+    /// Returns the files of the exact logs, if they are wanted.
+    fn exact_logs(&self) -> Result<Vec<Output>, Failure> {
         let Some(path) = &self.exact_log else { return Ok(Vec::new()) };
         let paths = (self.system..).take(self.vehicles.into()).map(|system| file(path, system, self.vehicles));
-        let open = |path: PathBuf| match LogFile::create(&path) {
-            Ok(log) => Ok((path, log)),
-            Err(error) => Err(unwritten(&path, &error).into()),
-        };
-        paths.map(open).collect()
+        Ok(paths.map(|path| Output::new(&path, "--exact-log")).collect::<Result<_, _>>()?)
     }
 
-    /// Creates the files of the black boxes, if they are wanted.
-    fn black_boxes(&self) -> Result<Vec<UlogFiles>, Failure> {
+    /// Returns the files of the black boxes, or the folders for them, if they are wanted.
+    fn black_boxes(&self) -> Result<Vec<PathBuf>, Failure> {
         let Some(path) = &self.ulog else { return Ok(Vec::new()) };
         let of = |system: u8| match self.vehicles {
-            1 => Ok(path.clone()),
-            _ if path.is_dir() => {
-                let folder = path.join(system.to_string());
-                let cure = "choose another one for --ulog";
-                let failed = |error| format!("{}: cannot be made ({error}); {cure}", folder.display());
-                create_dir_all(&folder).map_err(failed).map(|()| folder)
-            }
-            _ => Ok(path.with_extension(extension(path, system))),
+            1 => path.clone(),
+            _ if path.is_dir() => path.join(system.to_string()),
+            _ => path.with_extension(extension(path, system)),
         };
-        let open = |system| Ok(UlogFiles::create(&of(system)?)?);
-        (self.system..).take(self.vehicles.into()).map(open).collect()
+        let paths: Vec<_> = (self.system..).take(self.vehicles.into()).map(of).collect();
+        if !path.is_dir() {
+            paths.iter().try_for_each(|path| Output::new(path, "--ulog").map(drop))?;
+        }
+        Ok(paths)
+    }
+
+    /// Creates the file of a black box.
+    fn black_box(&self, path: &Path) -> Result<UlogFiles, String> {
+        if self.ulog.as_ref().is_some_and(|ulog| ulog.is_dir()) {
+            let cure = "choose another one for --ulog";
+            create_dir_all(path).map_err(|error| format!("{}: cannot be made ({error}); {cure}", path.display()))?;
+        }
+        UlogFiles::create(path)
     }
 
     fn addresses(&self) -> Result<Addresses, Failure> {

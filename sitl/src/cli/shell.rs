@@ -1,18 +1,24 @@
 //! `sitl completions` and `sitl man`: what a shell and a reader of manuals want.
 
 use super::terminal::{Failure, print};
+use afbc_files::Output;
 use clap::{Args, Command};
 use clap_complete::Shell;
+use clap_complete::env::Shells;
+use std::io;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 /// Name of the program.
 const NAME: &str = "sitl";
+/// Variable by which a shell asks for completions, clap's default.
+const VARIABLE: &str = "COMPLETE";
 
 /// Print completions for a shell
 ///
-/// bash: `sitl completions bash >~/.local/share/bash-completion/completions/sitl`; zsh: `sitl completions zsh
-/// >~/.zfunc/_sitl`; fish: `sitl completions fish >~/.config/fish/completions/sitl.fish`.
+/// The shell asks the program then for commands, options and the names of scenarios, campaigns, suites, vehicles and
+/// laws, so `sitl` must be in its path. bash: `sitl completions bash >~/.local/share/bash-completion/completions/sitl`;
+/// zsh: `sitl completions zsh >~/.zfunc/_sitl`; fish: `sitl completions fish >~/.config/fish/completions/sitl.fish`.
 #[derive(Args, Debug)]
 pub(crate) struct Completions {
     /// The shell
@@ -21,9 +27,11 @@ pub(crate) struct Completions {
 
 impl Completions {
     /// Prints the script for the whole command line.
-    pub(super) fn run(self, mut program: Command) -> Result<ExitCode, Failure> {
-        let mut script = Vec::new();
-        clap_complete::generate(self.shell, &mut program, NAME, &mut script);
+    pub(super) fn run(self) -> Result<ExitCode, Failure> {
+        let (shell, mut script) = (self.shell.to_string(), Vec::new());
+        let shells = Shells::builtins();
+        let shell = shells.completer(&shell).ok_or_else(|| format!("{shell}: cannot be completed; use another"))?;
+        shell.write_registration(VARIABLE, NAME, NAME, NAME, &mut script)?;
         print(&String::from_utf8(script)?)?;
         Ok(ExitCode::SUCCESS)
     }
@@ -37,18 +45,41 @@ pub(crate) struct Man {
     /// An existing folder
     #[arg(value_name = "FOLDER")]
     folder: PathBuf,
+
+    /// Replace pages that are there
+    #[arg(long)]
+    force: bool,
 }
 
 impl Man {
     /// Writes the pages of the whole command line.
     pub(super) fn run(self, program: Command) -> Result<ExitCode, Failure> {
-        let Man { folder } = self;
-        let failed = |problem: &dyn std::fmt::Display| format!("{}: {problem}; name a folder", folder.display());
+        let Man { folder, force } = self;
         if !folder.is_dir() {
-            return Err(failed(&"no such folder").into());
+            return Err(format!("{}: no such folder; name a folder", folder.display()).into());
         }
-        clap_mangen::generate_to(program, &folder).map_err(|error| failed(&error))?;
+        let mut program = program.disable_help_subcommand(true);
+        program.build();
+        let mut outputs = Vec::new();
+        for (name, text) in pages(&program)? {
+            outputs.push((Output::forcible(&folder.join(name), "the manual", force)?, text));
+        }
+        for (output, text) in outputs {
+            output.place(|out| out.write_all(&text))?;
+        }
         print(&format!("{}\n", folder.join("sitl.1").display()))?;
         Ok(ExitCode::SUCCESS)
     }
+}
+
+/// Returns the pages of a command and of those in it: names of files, and texts.
+fn pages(command: &Command) -> io::Result<Vec<(String, Vec<u8>)>> {
+    let page = clap_mangen::Man::new(command.clone());
+    let mut text = Vec::new();
+    page.render(&mut text)?;
+    let mut all = vec![(page.get_filename(), text)];
+    for part in command.get_subcommands().filter(|part| !part.is_hide_set()) {
+        all.extend(pages(part)?);
+    }
+    Ok(all)
 }

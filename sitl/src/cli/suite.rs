@@ -2,9 +2,10 @@
 
 use super::terminal::{Failure, print};
 use super::written::Output;
-use super::{interrupt, over_seeds, page, random};
+use super::{interrupt, over_seeds, page, random, rough};
 use afbc_campaign::compare::Comparison;
 use afbc_campaign::random::NAME;
+use afbc_campaign::rough::NAME as ROUGH;
 use afbc_campaign::suite::{self, SUITES, Suite};
 use afbc_reader::{BuiltIn, FileError};
 use afbc_report::suite::{self as report, FlownSuite};
@@ -26,9 +27,10 @@ impl Suites {
     /// Prints the list or the file.
     pub(super) fn run(self) -> Result<ExitCode, Failure> {
         match self.name {
-            Some(name) if name == NAME => {
-                let cure = "fly it with `sitl compare --suite random --seed N`; docs/suites.md says what is drawn";
-                return Err(FileError::whole(&name, format!("drawn from a seed, not a file; {cure}")).into());
+            Some(name) if [NAME, ROUGH].contains(&name.as_str()) => {
+                let cure = format!("fly it with `sitl compare --suite {name} --seed N`");
+                let problem = format!("drawn from a seed, not a file; {cure}; docs/suites.md says what is drawn");
+                return Err(FileError::whole(&name, problem).into());
             }
             Some(name) => print(BuiltIn::named(&SUITES, &name).ok_or_else(|| suite::unknown(&name))?.text)?,
             None => {
@@ -36,6 +38,7 @@ impl Suites {
                 let mut lines: String =
                     all.iter().map(|suite| line(&suite.name, suite.flights.len(), &suite.description)).collect();
                 lines += &line(NAME, random::flights(), random::DESCRIPTION);
+                lines += &line(ROUGH, rough::flights(), rough::DESCRIPTION);
                 print(&lines)?;
             }
         }
@@ -44,7 +47,7 @@ impl Suites {
 }
 
 fn line(name: &str, flights: usize, description: &str) -> String {
-    format!("{name:<12}{flights:>4} flights  {description}\n")
+    format!("{name:<15}{flights:>4} flights  {description}\n")
 }
 
 /// Flies `suite` under `contenders`; then writes the folder and prints, or writes the table into a page.
@@ -65,7 +68,7 @@ pub(super) fn run(
     }
     let mut folder = None;
     let comparisons = fly(suite, contenders, seeds, against, || {
-        folder = Some(output.place.open("suite", "suite")?);
+        folder = Some(output.place.open("suite")?);
         Ok(())
     })?;
     let Some(folder) = folder else { return Ok(ExitCode::SUCCESS) };

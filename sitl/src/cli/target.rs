@@ -6,6 +6,8 @@ use afbc_campaign::subject::{self, Subject};
 use afbc_scenario::Scenario;
 use std::ffi::OsString;
 use std::fmt;
+use std::fs::File;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 /// The name of a built-in one, or the path of a file.
@@ -32,16 +34,37 @@ impl Target {
 
     /// Reads and checks the scenario.
     pub(crate) fn scenario(&self) -> Result<Scenario, Failure> {
-        Ok(subject::scenario(&self.0)?)
+        Ok(subject::scenario(self.no_plan()?)?)
     }
 
     /// Reads and checks the campaign.
     pub(crate) fn campaign(&self) -> Result<Campaign, Failure> {
-        Ok(subject::campaign(&self.0)?)
+        Ok(subject::campaign(self.no_plan()?)?)
     }
 
-    /// Reads and checks the scenario or campaign.
-    pub(crate) fn either(&self) -> Result<Subject, Failure> {
-        Ok(subject::either(&self.0)?)
+    /// Reads and checks the scenario, campaign or vehicle.
+    pub(crate) fn any(&self) -> Result<Subject, Failure> {
+        Ok(subject::any(self.no_plan()?)?)
     }
+
+    /// Returns what was given, unless it is a ground station's file.
+    fn no_plan(&self) -> Result<&Path, Failure> {
+        match is_plan(&self.0) && self.0.exists() {
+            true => {
+                Err(format!("{self}: a ground station's plan, not a scenario; fly it with `sitl fly {self}`").into())
+            }
+            false => Ok(&self.0),
+        }
+    }
+}
+
+/// True if a path names a plan of QGroundControl, or a file of any name holds a mission as text.
+pub(super) fn is_plan(path: &Path) -> bool {
+    let is_mission = || {
+        let mut head = [0; 12];
+        let read = File::open(path).and_then(|mut file| file.read(&mut head));
+        read.is_ok_and(|length| head.get(..length).is_some_and(afbc_serve::is_waypoint_file))
+    };
+    // Of a pipe, what is read here would be gone.
+    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("plan")) || path.is_file() && is_mission()
 }

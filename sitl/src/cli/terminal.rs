@@ -2,6 +2,7 @@
 
 use std::error::Error;
 use std::io::{self, Write};
+use terminal_size::Width;
 
 /// Error of a command, displayed as one line.
 pub(crate) type Failure = Box<dyn Error>;
@@ -12,6 +13,18 @@ pub(crate) const INTERRUPTED: u8 = 130;
 /// Writes one line to stderr, ignoring errors.
 pub(crate) fn say(line: &str) {
     let _ = writeln!(io::stderr().lock(), "{line}");
+}
+
+/// Columns of text for a reader that has no terminal.
+const COLUMNS: usize = 100;
+/// Fewest columns that text is wrapped at.
+const COLUMNS_MIN: usize = 40;
+
+/// Returns the columns of the terminal that stdout is, or that $COLUMNS says.
+pub(crate) fn columns() -> usize {
+    let shown = terminal_size::terminal_size_of(io::stdout()).map(|(Width(columns), _)| usize::from(columns));
+    let said = || std::env::var("COLUMNS").ok()?.parse().ok();
+    shown.or_else(said).unwrap_or(COLUMNS).max(COLUMNS_MIN)
 }
 
 /// Prints to stdout. A closed pipe, as in `sitl | head`, is no failure.

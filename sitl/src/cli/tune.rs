@@ -7,7 +7,7 @@ use super::progress::Progress;
 use super::target::Target;
 use super::terminal::{Failure, print};
 use afbc::Profile;
-use afbc_files::Error;
+use afbc_files::Output;
 use afbc_scenario::contender::{Contender, ControllerKind};
 use afbc_scenario::{Scenario, vehicle_named};
 use afbc_tune::{self as tune, SearchOptions, SearchResult};
@@ -73,6 +73,10 @@ pub(crate) struct Tune {
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
 
+    /// Replace the file if it is there
+    #[arg(long, requires = "out")]
+    force: bool,
+
     #[command(flatten)]
     json: Json,
 }
@@ -114,9 +118,8 @@ impl Tune {
             Some(vehicle) => (tune::training_on(vehicle)?, tune::held_out_on(vehicle)?, tune::conditions_on(vehicle)?),
             None => (tune::training()?, tune::held_out()?, tune::conditions()?),
         };
-        if let Some(out) = &self.out {
-            writable(out)?;
-        }
+        // Before a long search.
+        let output = self.out.as_deref().map(|out| Output::forcible(out, "--out", self.force)).transpose()?;
 
         let stop = Arc::new(AtomicBool::new(false));
         let stopper = Arc::clone(&stop);
@@ -132,8 +135,13 @@ impl Tune {
         drop(progress);
 
         let report = || tune::report(&start, &found, [&training, &held_out], &conditions, self.seed);
-        if let Some(out) = &self.out {
-            std::fs::write(out, report()?).map_err(|source| Error::Write { path: out.clone(), source })?;
+        if let Some(output) = &output {
+            let text = report()?;
+            if let Err(error) = output.place(|to| to.write_all(text.as_bytes())) {
+                // What was found in hours is not lost.
+                print(&text)?;
+                return Err(error.into());
+            }
         }
         let SearchResult { before, after, evaluations, .. } = &found;
         match &self.out {
@@ -161,11 +169,11 @@ fn start(name: &str, scenario: Option<&Scenario>, vehicle: Option<&Vehicle>) -> 
     let law = ControllerKind::named(name);
     let by_hand = |kind| vehicle.map_or_else(|| tune::by_hand(kind), |vehicle| tune::by_hand_on(kind, vehicle));
     law.map(by_hand).ok_or_else(|| {
-        let laws = ControllerKind::names();
+        let cure = ControllerKind::cure(name);
         let own: Vec<_> = own.iter().map(|contender| contender.name.as_str()).collect();
         let own =
             if own.is_empty() { String::new() } else { format!("; the scenario's contenders {}", own.join(", ")) };
-        format!("{}: no such controller; the laws are {laws}{own}", name.escape_debug()).into()
+        format!("{}: no such controller; {cure}{own}", name.escape_debug()).into()
     })
 }
 
@@ -182,16 +190,4 @@ fn flying(kind: ControllerKind, vehicle: Option<&Vehicle>) -> Result<Contender, 
 fn step(text: &str) -> Result<f64, String> {
     let step = text.parse().ok().filter(|step| (0.001..=1.0).contains(step));
     step.ok_or_else(|| "a number from 0.001 to 1".into())
-}
-
-/// Checks that `path` can be a file, before a long search.
-fn writable(path: &std::path::Path) -> Result<(), Failure> {
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
-    if path.is_dir() {
-        return Err(format!("{}: it is a folder; name a file in it", path.display()).into());
-    }
-    match folder {
-        Some(folder) if !folder.is_dir() => Err(format!("{}: no such folder; make it first", folder.display()).into()),
-        _ => Ok(()),
-    }
 }

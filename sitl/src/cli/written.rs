@@ -2,9 +2,9 @@
 
 use super::json::{self, Json};
 use super::place::Place;
-use super::terminal::{Failure, print};
+use super::terminal::{Failure, columns, print};
 use afbc_files::Folder;
-use afbc_report::TableFormat;
+use afbc_report::{TableFormat, for_terminal};
 use clap::{Args, ValueEnum};
 use std::io;
 use std::path::PathBuf;
@@ -74,7 +74,7 @@ pub(crate) fn show(
     if json {
         return json::print_written(object);
     }
-    let (table, folder) = (table(), folder.path());
+    let (table, folder) = (for_terminal(columns(), table), folder.path());
     let page = folder.join("report.html");
     print(&format!("{}\n\n{files} files in {}; open {}\n", table.trim_end(), folder.display(), page.display()))
 }

@@ -1,6 +1,7 @@
 //! The flight in the emulator.
 
 use crate::cli::in_the_loop::{InTheLoop, Recorder, outcome};
+use crate::cli::interrupt;
 use crate::cli::terminal::{Failure, print};
 use afbc_hil::{Host, MessagePeriods, Station};
 use afbc_scenario::Scenario;
@@ -12,19 +13,22 @@ use std::time::Instant;
 
 /// Flies `scenario` with `image`, or with the one built from this source, and prints the results.
 pub(super) fn fly(scenario: &Scenario, flying: &InTheLoop, image: Option<PathBuf>) -> Result<ExitCode, Failure> {
-    let mut recorder = Recorder::new(scenario, flying)?;
+    let output = flying.output()?;
     let image = match image {
         Some(image) => image,
         None => Image::Pil.build(flying.on.for_firmware()?.as_deref())?,
     };
     let host = scenario.vehicle_file.as_ref().map_or_else(Host::new, Host::for_vehicle)?;
+    interrupt::ends_it()?;
     let mut twins = Twins::new(Emulator::start(&image)?, host);
+    let mut recorder = Recorder::new(scenario, output.as_ref())?;
 
     let start = Instant::now();
     let observe = |sample: &Sample| recorder.observe(sample);
     let end = afbc_hil::fly(scenario, &mut Station::new(), &mut twins, MessagePeriods::LOCKSTEP, observe)?;
     let seconds = start.elapsed().as_secs_f64();
     let comparison = twins.comparison();
+    interrupt::is_too_late();
     let metrics = recorder.finish()?;
 
     print(&format!(

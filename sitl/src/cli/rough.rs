@@ -1,0 +1,95 @@
+//! `sitl compare --suite rough-estimate`: what vehicles are not told of their sensors.
+
+use super::progress::Progress;
+use super::random;
+use super::terminal::Failure;
+use super::written::Output;
+use super::{interrupt, manifest, page};
+use afbc_campaign::rough::{self, FlownRough, NAME, Rough};
+use afbc_reader::BuiltIn;
+use afbc_report::rough::{self as report, RoughResults};
+use afbc_report::suite::markers;
+use afbc_scenario::contender::Contender;
+use afbc_vehicles::{BUILT_IN, Vehicle};
+use std::collections::BTreeSet;
+use std::path::Path;
+use std::process::ExitCode;
+
+/// One line on the suite.
+pub(super) const DESCRIPTION: &str = "drawn from --seed: sensors that do what no vehicle is told, on every vehicle";
+
+/// True if `path` names this suite.
+pub(super) fn is_named(path: &Path) -> bool {
+    path == Path::new(NAME)
+}
+
+/// Number of flights of a seed.
+pub(super) fn flights() -> usize {
+    BUILT_IN.len() * rough::names().count()
+}
+
+/// Draws and flies; then writes the folder and prints, or writes the table into a page.
+pub(super) fn run(
+    options: &random::Options,
+    vehicle: Option<Vehicle>,
+    contenders: &[Contender],
+    seeds: u64,
+    output: &Output,
+) -> Result<ExitCode, Failure> {
+    let [contender] = contenders else {
+        return Err("--controllers: the estimate of one law at a time is judged; name one".into());
+    };
+    let seed = options.seed.unwrap_or(1);
+    let rough = Rough {
+        seeds: seed..seed + seeds,
+        flights: options.flights.unwrap_or(1),
+        duration_s: options.duration,
+        vehicles: match vehicle {
+            Some(vehicle) => vec![vehicle],
+            None => BUILT_IN.iter().map(BuiltIn::read).collect::<Result<_, _>>()?,
+        },
+    };
+    if let Some(path) = &output.write {
+        let [begin, end] = markers(NAME);
+        page::write(path, [&begin, &end], || {
+            let flown = fly(&rough, contender, || Ok(()))?;
+            Ok(report::markdown(&RoughResults::new(&rough, &flown)))
+        })?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    let mut folder = None;
+    let flown = fly(&rough, contender, || {
+        folder = Some(output.place.open(NAME)?);
+        Ok(())
+    })?;
+    let Some(folder) = folder else { return Ok(ExitCode::SUCCESS) };
+    let results = RoughResults::new(&rough, &flown);
+    let written = report::write(&folder, &results)?;
+    let all: Vec<manifest::Flown<'_>> =
+        flown.iter().map(|flown| (&flown.flight.scenario, vec![flown.flight.scenario.seed])).collect();
+    // Every flight decides; the first of each class is written out.
+    let mut classes = BTreeSet::new();
+    let firsts = flown.iter().zip(&all).filter(|(flown, _)| classes.insert(flown.flight.class));
+    let firsts: Vec<manifest::Flown<'_>> = firsts.map(|(_, one)| one.clone()).collect();
+    manifest::write(&folder, &written, &all, &firsts)?;
+    let object = |out: &mut Vec<u8>| report::json(out, &results);
+    let tables = |format| report::tables(&results, format);
+    output.show(&folder, written.len() + 1, object, tables, || report::table(&results))?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Flies after `ready`, when all flights are known to be right.
+fn fly(
+    rough: &Rough,
+    contender: &Contender,
+    ready: impl FnOnce() -> Result<(), Failure>,
+) -> Result<Vec<FlownRough>, Failure> {
+    let drawn = rough.draw(contender)?;
+    interrupt::ends_it()?;
+    ready()?;
+    let progress = Progress::new("compare", "flights", drawn.len() as u64, 0);
+    let flown = rough::fly(drawn, &|| progress.add(1))?;
+    drop(progress);
+    interrupt::is_too_late();
+    Ok(flown)
+}
