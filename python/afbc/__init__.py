@@ -20,7 +20,7 @@ from typing import Any, Protocol
 
 from numpy.typing import ArrayLike
 
-from . import _afbc
+from . import _afbc, _check
 from ._afbc import (
     Action,
     AfbcError,
@@ -109,6 +109,7 @@ def frame(columns: Mapping[str, Any]) -> Any:
 
     A flight's log (`frame(flight.columns)`), or what `compare`, `campaign` and `replay` made.
     """
+    columns = _check.mapping("columns", columns, "a mapping of names to arrays is")
     try:
         import polars
     except ImportError:
@@ -136,24 +137,35 @@ def register(
     It returns an object whose `step(state, setpoint, fresh)` returns the demanded U1, U2, U3, U4 [N] once a time step:
     U1 and U2 are the moments about body x and y over the arm, U3 the moment about body z over d/b, U4 the thrust. A
     state that is not `fresh` repeats the last one. `gains` maps a name to (default, smallest, largest) or to a default;
-    the range is where `tune` searches. A law of the same name is replaced.
+    the range is where `tune` searches, from a twentieth of the default to twenty times it unless it is given. A law of
+    the same name is replaced.
     """
-    ranges = []
-    for gain, value in (gains or {}).items():
-        default, *ends = (value,) if isinstance(value, (int, float)) else value
-        low, high = ends or sorted((default / 20, default * 20))
-        ranges.append((gain, (float(default), float(low), float(high))))
-    _afbc.register(name, make, title=title, gains=ranges)
+    gains = _check.mapping("gains", {} if gains is None else gains, "a mapping of names to numbers is")
+    _afbc.register(name, make, title=title, gains=[(gain, _range(gain, value)) for gain, value in gains.items()])
+
+
+def _range(gain: str, value: Any) -> tuple[float, float, float]:
+    """Returns default, smallest and largest value of a gain."""
+    if not isinstance(gain, str):
+        raise TypeError(f"gains: names are needed as keys, not {gain!r}")
+    name = f"gains[{gain!r}]"
+    given = value if isinstance(value, (tuple, list)) else (value,)
+    default, *ends = (_check.number(name, number, -1e30, 1e30) for number in given) if given else (0.0,)
+    if len(given) not in (1, 3) or (not ends and default == 0.0):
+        raise AfbcError(f"{name}: {value!r} given; a default other than 0, or (default, smallest, largest) is needed")
+    low, high = ends or sorted((default / 20, default * 20))
+    return default, low, high
 
 
 def _controllers(controllers: _Controllers) -> list[str] | None:
     """Registers the laws in a mapping of names, and returns the names."""
     if controllers is None or isinstance(controllers, str):
-        return [controllers] if controllers else None
-    if hasattr(controllers, "items"):
-        for name, make in controllers.items():
-            if make is not None:
-                register(name, make)
+        return None if controllers is None else [controllers]
+    if not isinstance(controllers, Mapping):
+        return _check.several("controllers", controllers, "names, or a mapping of names to laws, are")
+    for name, make in controllers.items():
+        if make is not None:
+            register(name, make)
     return list(controllers)
 
 
@@ -161,7 +173,7 @@ def _list(scenarios: _Named | Sequence[_Named]) -> list[_Named]:
     """Returns one scenario, or several, as a list."""
     if isinstance(scenarios, (str, Scenario, PathLike)):
         return [scenarios]
-    return list(scenarios)
+    return _check.several("scenarios", scenarios, "an afbc.Scenario, a name, a path, or several of them are")
 
 
 def fly(
@@ -200,14 +212,15 @@ def compare(
     controllers: _Controllers = None,
     *,
     vehicle: Vehicle | _Path | None = None,
-    seeds: int = 1,
+    seeds: int | None = None,
     threads: int | None = None,
     progress: bool = False,
 ) -> Any:
-    """Flies scenarios under the same contenders, each with `seeds` consecutive seeds on all cores.
+    """Flies scenarios under the same contenders, each with `seeds` consecutive seeds, on all cores.
 
-    Returns a data frame (see `frame`) with a row for each flight: scenario, contender, seed, lost_at_s, lost_reason and
-    the figures of merit.
+    As `sitl compare`: a scenario flies with ten seeds unless another number is given, or with one if no seed changes
+    it. Returns a data frame (see `frame`) with a row for each flight: scenario, contender, seed, lost_at_s, lost_reason
+    and the figures of merit.
     """
     with _bar(progress, None, "flight") as shown:
         return frame(
@@ -251,7 +264,7 @@ def merge(shards: Sequence[_Path], out: _Path) -> Any:
 
     Returns a data frame as `campaign` does.
     """
-    return frame(_afbc.merge(list(shards), out))
+    return frame(_afbc.merge(_check.several("shards", shards, "the folders of all shards are"), out))
 
 
 def tune(

@@ -7,10 +7,20 @@ from math import asin, atan2, cos, sin
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ._afbc import AfbcError
+from ._check import finite
+
+#: How far the length of a quaternion may be from 1: further than steps of any integrator take it.
+OFF = 0.1
+
 
 def euler(quaternion: ArrayLike) -> tuple[float, float, float]:
-    """Returns roll, pitch, yaw [rad] of the z-y-x sequence."""
-    x, y, z, w = map(float, np.asarray(quaternion))
+    """Returns roll, pitch, yaw [rad] of the z-y-x sequence. A quaternion of another length than 1 is no attitude."""
+    given = finite("quaternion", quaternion, (4,))
+    length = float(np.linalg.norm(given))
+    if abs(length - 1.0) > OFF:
+        raise AfbcError(f"quaternion: length {length:g} given; a unit quaternion x, y, z, w is needed")
+    x, y, z, w = map(float, given / length)
     return (
         atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y)),
         asin(min(1.0, max(-1.0, 2 * (w * y - x * z)))),
@@ -20,7 +30,7 @@ def euler(quaternion: ArrayLike) -> tuple[float, float, float]:
 
 def quaternion(attitude_rad: ArrayLike) -> NDArray[np.float64]:
     """Returns x, y, z, w of roll, pitch, yaw [rad]."""
-    roll, pitch, yaw = (float(angle) / 2 for angle in np.asarray(attitude_rad))
+    roll, pitch, yaw = finite("attitude_rad", attitude_rad, (3,)) / 2
     (cr, sr), (cp, sp), (cy, sy) = ((cos(half), sin(half)) for half in (roll, pitch, yaw))
     return np.array(
         [

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from os import PathLike
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from . import _afbc
+from ._check import SEED_MAX, finite, number, path, whole
 
 #: Numbers of an observation besides one for each rotor.
 MOTION = 15
+#: Largest number of vehicles.
+COUNT_MAX = 100_000
 
 
 class Task:
@@ -48,18 +53,19 @@ class Task:
         spread_rad: float = 0.2,
         far_m: float = 3.0,
     ) -> None:
-        if count < 1:
-            raise _afbc.AfbcError(f"{count} vehicles: at least 1 is needed")
-        if not 1 <= control_hz <= 1000 or 1000 % control_hz:
-            raise _afbc.AfbcError(f"control_hz {control_hz}: a divisor of 1000 is needed")
-        vehicle = vehicle if isinstance(vehicle, _afbc.Vehicle) else _afbc.Vehicle(vehicle)
-        scenario = scenario if isinstance(scenario, _afbc.Scenario) else _afbc.Scenario(scenario)
-        self.scenario = scenario.replace(vehicle=vehicle)
+        count = whole("count", count, 1, COUNT_MAX)
+        if 1000 % whole("control_hz", control_hz, 1, 1000):
+            raise _afbc.AfbcError(f"control_hz: {control_hz} given; a divisor of 1000 is needed")
+        vehicle = vehicle if isinstance(vehicle, _afbc.Vehicle) else _afbc.Vehicle(path("vehicle", vehicle))
+        scenario = scenario if isinstance(scenario, _afbc.Scenario) else _afbc.Scenario(path("scenario", scenario))
+        self.scenario = scenario.replace(vehicle=vehicle, duration_s=duration_s)
         self.batch = _afbc.Batch(count, self.scenario)
         self.rotors = vehicle.rotors
         self.steps = 1000 // control_hz
-        self.duration_s = scenario.duration_s if duration_s is None else duration_s
-        self.far_m, self.spread_m, self.spread_rad = far_m, spread_m, spread_rad
+        self.duration_s = self.scenario.duration_s
+        self.far_m = number("far_m", far_m, 1e-3, 1e6)
+        self.spread_m = number("spread_m", spread_m, 0.0, 1e3)
+        self.spread_rad = number("spread_rad", spread_rad, 0.0, np.pi)
         # Squares of the speeds over thrust.
         self._per_share = vehicle.rotor_force_max_n / vehicle.parameters["thrust_factor_n_s2"]
         self._start = self.batch.true_states[0]
@@ -69,6 +75,9 @@ class Task:
     def reset(self, index: int, random: np.random.Generator) -> None:
         """Starts a vehicle again: from the scenario's start, moved by up to `spread_m` along each axis and turned by up
         to `spread_rad`, with noise and weather of a seed of their own."""
+        whole("index", index, 0, len(self.batch) - 1)
+        if not isinstance(random, np.random.Generator):
+            raise TypeError(f"random: a numpy.random.Generator is needed, not {type(random).__name__}")
         start = self._start.copy()
         start[0:3] += random.uniform(-self.spread_m, self.spread_m, 3)
         start[6:9] += random.uniform(-self.spread_rad, self.spread_rad, 3)
@@ -94,7 +103,7 @@ class Task:
         self, actions: NDArray[np.floating]
     ) -> tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], NDArray[np.float64]]:
         """Moves all vehicles by one action; returns rewards, which are lost, whose time is over, and distances [m]."""
-        shares = np.clip(np.asarray(actions, dtype=np.float64), -1.0, 1.0)
+        shares = np.clip(finite("actions", actions, self.actions.shape), -1.0, 1.0)
         self.batch.step(np.sqrt((1.0 + shares) / 2 * self._per_share), self.steps)
         states, references = self.batch.true_states, self.batch.references
         distance_m = np.linalg.norm(states[:, 0:3] - references[:, 0:3], axis=1)
@@ -106,6 +115,18 @@ class Task:
         self.actions = shares
         over = ~lost & (self.batch.time_s >= self.duration_s - 1e-9)
         return rewards, lost, over, distance_m
+
+
+def seeds(name: str, given: Any, count: int) -> list[int | None]:
+    """Returns a seed for each of `count` vehicles: of one, the consecutive ones; of a list, those in it."""
+    if given is None:
+        return [None] * count
+    if not isinstance(given, (Sequence, np.ndarray)) or isinstance(given, (str, bytes)):
+        first = whole(name, given, 0, SEED_MAX - count)
+        return [first + index for index in range(count)]
+    if len(given) != count:
+        raise _afbc.AfbcError(f"{name}: {len(given)} seeds given; one, or one for each of {count} vehicles is needed")
+    return [None if seed is None else whole(name, seed, 0, SEED_MAX) for seed in given]
 
 
 def _turn(angle: NDArray[np.float64]) -> NDArray[np.float64]:

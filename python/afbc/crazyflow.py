@@ -69,4 +69,6 @@ def mellinger(drone: str = "cf2x_L250") -> Callable[[_afbc.OwnVehicle], Any]:
     What `afbc.register` and `afbc.fly` take. Its position loop runs at 100 Hz, its attitude loop at 500 Hz. The moments
     are those that it finds for its own drone; our harness allocates them to the rotors.
     """
+    if not isinstance(drone, str):
+        raise TypeError(f"drone: the name of a drone is needed, not {type(drone).__name__}")
     return lambda vehicle: _Mellinger(drone, vehicle)

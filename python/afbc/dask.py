@@ -13,14 +13,19 @@ Dask 2026.8.
 from __future__ import annotations
 
 from os import PathLike, fspath
+from os.path import exists
 from pathlib import Path
 from typing import Any
 
 from . import _afbc, campaign as _campaign, merge
+from ._check import path, whole
 
 __all__ = ["campaign"]
 
 _Path = str | PathLike[str]
+
+#: Most tasks that a scheduler is asked to hold.
+SHARDS_MAX = 100_000
 
 
 def _shard(campaign: str, shard: str, out: str, flights: int | None, vehicle: str | None) -> str:
@@ -29,9 +34,9 @@ def _shard(campaign: str, shard: str, out: str, flights: int | None, vehicle: st
     return out
 
 
-def _everywhere(named: _Path, built_in: list[str]) -> str:
+def _everywhere(named: str, built_in: list[str]) -> str:
     """Returns the absolute path of a file, which workers in other folders find, or the name of a built-in one."""
-    return fspath(Path(named).resolve()) if Path(named).exists() and named not in built_in else fspath(named)
+    return fspath(Path(named).resolve()) if named not in built_in and exists(named) else named
 
 
 def campaign(
@@ -50,8 +55,12 @@ def campaign(
     it was on another one, and so does the whole campaign by the same call. Shards, a task each, should be a few times
     as many as threads of all workers. At the end they are joined into `out`.
     """
-    if shards < 1:
-        raise _afbc.AfbcError(f"{shards} shards: at least 1 is needed")
+    for method in ("submit", "gather"):
+        if not callable(getattr(client, method, None)):
+            raise TypeError(f"client: a dask.distributed.Client is needed, not {type(client).__name__}")
+    campaign, out, shards = path("campaign", campaign), path("out", out), whole("shards", shards, 1, SHARDS_MAX)
+    vehicle = None if vehicle is None else path("vehicle", vehicle)
+    flights = None if flights is None else whole("flights", flights, 1, 2**63 - 1)
     parts = Path(out).resolve().with_name(Path(out).name + "-parts")
     tasks = [
         client.submit(

@@ -12,7 +12,7 @@ Gymnasium 1.4.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from os import PathLike
 from typing import Any
 
@@ -24,8 +24,8 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from ._afbc import Scenario, Vehicle
-from ._task import MOTION, Task
+from ._afbc import AfbcError, Scenario, Vehicle
+from ._task import MOTION, Task, seeds
 
 __all__ = ["FlightEnv", "FlightVectorEnv", "Task"]
 
@@ -55,12 +55,13 @@ class FlightEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
+        [seed] = seeds("seed", seed, 1)
         super().reset(seed=seed)
         self.task.reset(0, self.np_random)
         return self.task.observe()[0], {}
 
     def step(self, action: NDArray[np.float32]) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
-        rewards, lost, over, distance_m = self.task.step(np.asarray(action)[np.newaxis])
+        rewards, lost, over, distance_m = self.task.step([action])
         info = {"distance_m": float(distance_m[0])}
         return self.task.observe()[0], float(rewards[0]), bool(lost[0]), bool(over[0]), info
 
@@ -93,14 +94,27 @@ class FlightVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArra
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
         """Starts all vehicles again, or those of `options["reset_mask"]`; of one seed, vehicle i has `seed + i`."""
-        seeds = [seed + i for i in range(self.num_envs)] if isinstance(seed, (int, np.integer)) else seed
-        seeds = seeds or [None] * self.num_envs
-        for index in np.flatnonzero((options or {}).get("reset_mask", np.ones(self.num_envs, dtype=bool))):
-            if seeds[index] is not None:
-                self._randoms[index] = seeding.np_random(int(seeds[index]))[0]
+        given = seeds("seed", seed, self.num_envs)
+        for index in np.flatnonzero(self._masked(options)):
+            if given[index] is not None:
+                self._randoms[index] = seeding.np_random(given[index])[0]
             self.task.reset(int(index), self._randoms[index])
             self._ended[index] = False
         return self.task.observe(), {}
+
+    def _masked(self, options: dict[str, Any] | None) -> NDArray[np.bool_]:
+        """Returns which vehicles start again."""
+        if options is not None and not isinstance(options, Mapping):
+            raise TypeError(f"options: a mapping is needed, not {type(options).__name__}")
+        mask = (options or {}).get("reset_mask")
+        if mask is None:
+            return np.ones(self.num_envs, dtype=bool)
+        mask = np.asarray(mask)
+        if mask.dtype != bool or mask.shape != (self.num_envs,):
+            raise AfbcError(
+                f"reset_mask: shape {mask.shape} of {mask.dtype} given; ({self.num_envs},) of bool is needed"
+            )
+        return mask
 
     def step(
         self, actions: NDArray[np.float32]

@@ -16,7 +16,9 @@ from gymnasium.utils import seeding
 from numpy.typing import NDArray
 from pettingzoo import ParallelEnv
 
-from ._afbc import Scenario, Vehicle
+from ._afbc import AfbcError, Scenario, Vehicle
+from ._check import finite, mapping
+from ._task import seeds
 from .gymnasium import Task, spaces
 
 __all__ = ["FlightParallelEnv"]
@@ -55,20 +57,16 @@ class FlightParallelEnv(ParallelEnv):
     def reset(self, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[_Each, _Each]:
         """Starts all vehicles again; vehicle i has `seed + i`."""
         self.agents = list(self.possible_agents)
-        for index in range(len(self.agents)):
-            if seed is not None:
-                self._randoms[index] = seeding.np_random(seed + index)[0]
+        for index, own in enumerate(seeds("seed", seed, len(self.agents))):
+            if own is not None:
+                self._randoms[index] = seeding.np_random(own)[0]
             self.task.reset(index, self._randoms[index])
         return self._of(self.task.observe()), {agent: {} for agent in self.agents}
 
     def step(self, actions: dict[str, NDArray[np.float32]]) -> tuple[_Each, _Each, _Each, _Each, _Each]:
         if not self.agents:
             return {}, {}, {}, {}, {}
-        # One whose episode has ended is out: its rotors stand still.
-        still = np.full(self.task.rotors, -1.0)
-        rewards, lost, over, distance_m = self.task.step(
-            np.array([actions[agent] if agent in self.agents else still for agent in self.possible_agents])
-        )
+        rewards, lost, over, distance_m = self.task.step(self._actions(actions))
         each = (
             self._of(self.task.observe()),
             self._of(rewards.tolist()),
@@ -79,6 +77,20 @@ class FlightParallelEnv(ParallelEnv):
         ended = self._of((lost | over).tolist())
         self.agents = [agent for agent in self.agents if not ended[agent]]
         return each
+
+    def _actions(self, actions: dict[str, NDArray[np.float32]]) -> NDArray[np.float64]:
+        """Returns an action for each vehicle; one whose episode has ended is out: its rotors stand still."""
+        given = mapping("actions", actions, "a mapping of agents to actions is")
+        unknown = [agent for agent in given if agent not in self.possible_agents]
+        missing = [agent for agent in self.agents if agent not in given]
+        if unknown or missing:
+            problem = f"no agent {unknown[0]!r}" if unknown else f"no action of {missing[0]!r}"
+            raise AfbcError(f"actions: {problem}; one for each of {len(self.agents)} agents in flight is needed")
+        shares = np.full((len(self.possible_agents), self.task.rotors), -1.0)
+        for index, agent in enumerate(self.possible_agents):
+            if agent in self.agents:
+                shares[index] = finite(f"actions[{agent!r}]", given[agent], (self.task.rotors,))
+        return shares
 
     def _of(self, values: Any) -> _Each:
         """Returns what belongs to each agent that flies."""

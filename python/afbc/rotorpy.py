@@ -19,12 +19,14 @@ whoever flies in it. Tried with RotorPy 3.0.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from json import dumps
 from os import PathLike
 from typing import Any
 
 import numpy as np
 
 from . import _afbc
+from ._check import finite, key, mapping, number, path
 from ._rotation import euler, quaternion
 
 __all__ = [
@@ -48,7 +50,7 @@ _OTHERS = ("Ixy", "Ixz", "Iyz", "k_z", "k_h", "k_flap")
 
 
 def _found(named: _Vehicle) -> _afbc.Vehicle:
-    return named if isinstance(named, _afbc.Vehicle) else _afbc.Vehicle(named)
+    return named if isinstance(named, _afbc.Vehicle) else _afbc.Vehicle(path("vehicle", named))
 
 
 def parameters(vehicle: _Vehicle) -> dict[str, Any]:
@@ -90,41 +92,50 @@ def to_vehicle(parameters: Mapping[str, Any], name: str = "rotorpy") -> _afbc.Ve
 
     Refused if it has effects that our plant has not: pass `params | {"k_z": 0, "k_h": 0}` to fly without them.
     """
-    unknown = [key for key in _OTHERS if parameters.get(key, 0.0) != 0.0]
+    parameters = mapping("parameters", parameters, "a dictionary of RotorPy's is")
+
+    def of(wanted: str) -> float:
+        return number(wanted, key("parameters", parameters, wanted), -1e30, 1e30)
+
+    unknown = [other for other in _OTHERS if parameters.get(other, 0.0) != 0.0]
     if unknown:
-        cure = ", ".join(f'"{key}": 0' for key in unknown)
+        cure = ", ".join(f'"{other}": 0' for other in unknown)
         raise _afbc.AfbcError(f"{name}: {', '.join(unknown)}: not in our plant; {{**parameters, {cure}}} flies without")
-    positions = np.array([parameters["rotor_pos"][rotor] for rotor in parameters["rotor_pos"]], dtype=float)
-    arm_m = np.mean(np.hypot(positions[:, 0], positions[:, 1]))
-    fastest = float(parameters["rotor_speed_max"])
-    spins = ["cw" if sign > 0 else "ccw" for sign in parameters["rotor_directions"]]
+    hubs = mapping("rotor_pos", key("parameters", parameters, "rotor_pos"), "a mapping of rotors to positions is")
+    positions = np.array([finite(f"rotor_pos[{rotor!r}]", hub, (3,)) for rotor, hub in hubs.items()])
+    directions = finite("rotor_directions", key("parameters", parameters, "rotor_directions"), (len(positions),))
+    arm_m = np.mean(np.hypot(positions[:, 0], positions[:, 1])) if hubs else 0.0
+    fastest = of("rotor_speed_max")
+    spins = ["cw" if sign > 0 else "ccw" for sign in directions]
     rotors = "".join(
         f'[[rotor]]\nposition_m = {position.tolist()}\nspin = "{spin}"\n' for position, spin in zip(positions, spins)
     )
     # A drag area of 2 m2 in air of 1 kg/m3 gives 1 N s2/m2.
-    area_m2 = [2.0 * float(parameters.get(f"c_D{axis}", 0.0)) for axis in "xyz"]
+    without_drag = {"c_Dx": 0.0, "c_Dy": 0.0, "c_Dz": 0.0, "k_d": 0.0}
+    parameters = {**without_drag, **parameters}
+    area_m2 = [2.0 * of(f"c_D{axis}") for axis in "xyz"]
     return _afbc.Vehicle.from_toml(
         f"""
-description = "RotorPy's {name}"
+description = {dumps(f"RotorPy's {name}")}
 [vehicle]
-mass_kg = {float(parameters["mass"])!r}
+mass_kg = {of("mass")!r}
 arm_m = {float(arm_m)!r}
-inertia_kg_m2 = {[float(parameters[key]) for key in ("Ixx", "Iyy", "Izz")]}
+inertia_kg_m2 = {[of("Ixx"), of("Iyy"), of("Izz")]}
 rotor_inertia_kg_m2 = 0.0
-thrust_factor_n_s2 = {float(parameters["k_eta"])!r}
-drag_factor_n_m_s2 = {float(parameters["k_m"])!r}
+thrust_factor_n_s2 = {of("k_eta")!r}
+drag_factor_n_m_s2 = {of("k_m")!r}
 {rotors}
 [rotors]
-time_constant_s = {float(parameters["tau_m"])!r}
-force_max_n = {float(parameters["k_eta"]) * fastest**2!r}
-min_rad_s = {float(parameters["rotor_speed_min"])!r}
+time_constant_s = {of("tau_m")!r}
+force_max_n = {of("k_eta") * fastest**2!r}
+min_rad_s = {of("rotor_speed_min")!r}
 [motor]
 speed_max_rad_s = {fastest!r}
 linearity = 1.0
 idle = 0.0
 [drag]
 air_density_kg_m3 = 1.0
-blade_n_s2_m = {float(parameters.get("k_d", 0.0))!r}
+blade_n_s2_m = {of("k_d")!r}
 area_m2 = {area_m2}
 centre_m = [0.0, 0.0, 0.0]
 """,
@@ -133,20 +144,26 @@ centre_m = [0.0, 0.0, 0.0]
 
 
 def to_state(state: Mapping[str, Any]) -> _afbc.State:
-    """Returns a state of RotorPy's as one of ours."""
-    return _afbc.State(state["x"], state["v"], euler(state["q"]), state["w"])
+    """Returns a state of RotorPy's as one of ours. Its quaternion must have length 1."""
+    state = mapping("state", state, "a dictionary of RotorPy's is")
+    x, v, w = (finite(f"state[{part!r}]", key("state", state, part), (3,)) for part in ("x", "v", "w"))
+    return _afbc.State(x, v, euler(key("state", state, "q")), w)
 
 
 def to_setpoint(flat_output: Mapping[str, Any]) -> _afbc.Setpoint:
     """Returns RotorPy's flat outputs as a setpoint."""
+    flat = mapping("flat_output", flat_output, "a dictionary of RotorPy's is")
+    vectors, angles = ("x", "x_dot", "x_ddot", "x_dddot", "x_ddddot"), ("yaw", "yaw_dot", "yaw_ddot")
     return _afbc.Setpoint(
-        *(flat_output[key] for key in ("x", "x_dot", "x_ddot", "x_dddot", "x_ddddot")),
-        *(float(flat_output.get(key, 0.0)) for key in ("yaw", "yaw_dot", "yaw_ddot")),
+        *(finite(f"flat_output[{part!r}]", key("flat_output", flat, part), (3,)) for part in vectors),
+        *(number(f"flat_output[{part!r}]", flat.get(part, 0.0), -1e30, 1e30) for part in angles),
     )
 
 
 def state(plant: _afbc.Plant) -> dict[str, Any]:
     """Returns the true state of our plant as RotorPy's, with wind and rotor speeds: where its vehicle may begin."""
+    if not isinstance(plant, _afbc.Plant):
+        raise TypeError(f"plant: an afbc.Plant is needed, not {type(plant).__name__}")
     vector = plant.true_vector
     return {
         "x": vector[0:3],
@@ -160,6 +177,8 @@ def state(plant: _afbc.Plant) -> dict[str, Any]:
 
 def flat_output(setpoint: _afbc.Setpoint) -> dict[str, Any]:
     """Returns a setpoint as RotorPy's flat outputs."""
+    if not isinstance(setpoint, _afbc.Setpoint):
+        raise TypeError(f"setpoint: an afbc.Setpoint is needed, not {type(setpoint).__name__}")
     return {
         "x": setpoint.position_m,
         "x_dot": setpoint.velocity_m_s,
@@ -189,6 +208,7 @@ class Controller:
     def update(self, t: float, state: Mapping[str, Any], flat_output: Mapping[str, Any]) -> dict[str, Any]:
         """Returns rotor speeds [rad/s] and thrusts [N], shape (4,); their sum [N] and moment [N m], shape (3,)."""
         before, dt_s = self._time_s, self.controller.dt_s
+        t = number("t", t, -1e9, 1e9)
         if before is not None and t <= before:
             self.controller.reset()
         elif before is not None and abs(t - before - dt_s) > 0.01 * dt_s:
@@ -215,11 +235,12 @@ class Trajectory:
     """The reference of a scenario as a trajectory of RotorPy's."""
 
     def __init__(self, scenario: _afbc.Scenario | str | PathLike[str]) -> None:
-        self.scenario = scenario if isinstance(scenario, _afbc.Scenario) else _afbc.Scenario(scenario)
+        self.scenario = scenario if isinstance(scenario, _afbc.Scenario) else _afbc.Scenario(path("scenario", scenario))
 
     def update(self, t: float) -> dict[str, Any]:
         """Returns the flat outputs at `t` [s]."""
-        at = {name: column[0] for name, column in self.scenario.reference(np.array([float(t)])).items()}
+        times_s = [number("t", t, -1e9, 1e9)]
+        at = {name: column[0] for name, column in self.scenario.reference(times_s).items()}
         parts = {"x": ("", "m"), "x_dot": ("v", "m_s"), "x_ddot": ("a", "m_s2"), "x_dddot": ("j", "m_s3")}
         parts["x_ddddot"] = ("s", "m_s4")
         flat: dict[str, Any] = {
@@ -276,4 +297,6 @@ def law(make: Callable[[dict[str, Any]], Any]) -> Callable[[_afbc.OwnVehicle], A
     `make(parameters)` makes the controller: a class of RotorPy's, or what sets its gains besides. Its `cmd_thrust` and
     `cmd_moment` fly, allocated to the rotors by our harness.
     """
+    if not callable(make):
+        raise TypeError(f"make: a controller's class is needed, not {type(make).__name__}")
     return lambda vehicle: _Law(make, vehicle)

@@ -40,7 +40,7 @@ def kill_one(client: Client, parts: Path, killed: list) -> None:
 
 def recipe() -> str:
     """The example of docs/campaigns.md."""
-    [text] = re.findall(r"```python\n(from dask[^`]*)```", (ROOT / "docs/campaigns.md").read_text())
+    [text] = re.findall(r"```python\n([^`]*from dask[^`]*)```", (ROOT / "docs/campaigns.md").read_text())
     return text
 
 

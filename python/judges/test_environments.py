@@ -82,3 +82,82 @@ def test_bad_options_are_refused_by_one_line(options):
         with pytest.raises(afbc.AfbcError) as raised:
             make(**options)
         assert "\n" not in str(raised.value)
+
+
+WRONG = {
+    FlightVectorEnv: [
+        lambda env: env.reset(seed=-1),
+        lambda env: env.reset(seed=1.5),
+        lambda env: env.reset(seed=2**64),
+        lambda env: env.reset(seed=[1, 2]),
+        lambda env: env.reset(seed=[1, 2, 3, 4]),
+        lambda env: env.reset(seed=[1, 2, -3]),
+        lambda env: env.reset(seed=np.array([1.0, 2.0, 3.0])),
+        lambda env: env.reset(seed="1"),
+        lambda env: env.reset(options={"reset_mask": [0, 2]}),
+        lambda env: env.reset(options={"reset_mask": np.array([True])}),
+        lambda env: env.reset(options={"reset_mask": np.ones((3, 1), dtype=bool)}),
+        lambda env: env.reset(options={"reset_mask": np.ones(3)}),
+        lambda env: env.reset(options=5),
+        lambda env: env.step(np.zeros((2, 4))),
+        lambda env: env.step(np.zeros(4)),
+        lambda env: env.step(np.full((3, 4), np.nan)),
+        lambda env: env.step(np.full((3, 4), np.inf)),
+        lambda env: env.step([["0"] * 4] * 3),
+        lambda env: env.step(None),
+        lambda env: env.task.reset(-1, np.random.default_rng(1)),
+        lambda env: env.task.reset(3, np.random.default_rng(1)),
+        lambda env: env.task.reset(0, 5),
+    ],
+    FlightEnv: [
+        lambda env: env.reset(seed=-1),
+        lambda env: env.reset(seed=0.5),
+        lambda env: env.step(np.zeros(3)),
+        lambda env: env.step(np.full(4, np.nan)),
+        lambda env: env.step(None),
+    ],
+    afbc.pettingzoo.FlightParallelEnv: [
+        lambda env: env.reset(seed=-1),
+        lambda env: env.reset(seed="x"),
+        lambda env: env.step({}),
+        lambda env: env.step({"vehicle_0": np.zeros(4)}),
+        lambda env: env.step({f"vehicle_{i}": np.zeros(4) for i in range(4)}),
+        lambda env: env.step({f"vehicle_{i}": np.zeros(5) for i in range(3)}),
+        lambda env: env.step({f"vehicle_{i}": np.full(4, np.nan) for i in range(3)}),
+        lambda env: env.step(np.zeros((3, 4))),
+    ],
+}
+
+
+@pytest.mark.parametrize("kind, call", [(kind, call) for kind in WRONG for call in WRONG[kind]])
+def test_wrong_calls_are_refused_by_one_line(kind, call):
+    env = kind(*([] if kind is FlightEnv else [3]), "hover", "crazyflie")
+    env.reset(seed=1)
+    with pytest.raises((TypeError, afbc.AfbcError)) as raised:
+        call(env)
+    assert str(raised.value) and "\n" not in str(raised.value)
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -1.0, "x", None, [1.0], 10**400])
+@pytest.mark.parametrize("option", ["duration_s", "far_m", "spread_m", "spread_rad", "control_hz"])
+def test_wrong_options_are_refused_by_name(option, value):
+    if (option, value) == ("duration_s", None):
+        return
+    for make in (FlightEnv, lambda **given: FlightVectorEnv(2, **given), afbc.pettingzoo.FlightParallelEnv):
+        with pytest.raises((TypeError, afbc.AfbcError), match=option):
+            make(**{option: value})
+
+
+@pytest.mark.parametrize("count", [0, -1, 1.5, "2", None, 10**12, 2**31])
+def test_wrong_counts_are_refused_by_name(count):
+    for make in (FlightVectorEnv, afbc.pettingzoo.FlightParallelEnv):
+        with pytest.raises((TypeError, afbc.AfbcError), match="count"):
+            make(count)
+
+
+def test_a_mask_starts_those_alone_that_it_names():
+    env = FlightVectorEnv(3, "hover", "crazyflie")
+    first, _ = env.reset(seed=[1, None, 3])
+    env.step(np.zeros((3, 4)))
+    seen, _ = env.reset(seed=[1, 2, 3], options={"reset_mask": np.array([True, False, True])})
+    assert np.array_equal(seen[[0, 2]], first[[0, 2]]) and not np.array_equal(seen[1], first[1])

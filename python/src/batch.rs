@@ -1,13 +1,15 @@
 //! Many vehicles in one call.
 
+use crate::argument::{Array, Given, SEEDS, optional};
 use crate::error::error;
-use crate::motion::PyState;
-use crate::plant::{begun, commands, start};
-use crate::scenario::{ScenarioArgument, changed};
+use crate::plant::{StateArgument, begun, commands, start, step_s};
+use crate::scenario::{ScenarioArgument, asked};
 use crate::vehicle::VehicleArgument;
+use crate::work::in_slices;
 use afbc_scenario::Scenario;
 use afbc_sim::flight::{View, World};
-use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2};
+use numpy::{PyArray1, PyArray2, PyArrayMethods};
+use pyo3::exceptions::PyMemoryError;
 use pyo3::prelude::*;
 use rayon::prelude::*;
 
@@ -15,6 +17,12 @@ use rayon::prelude::*;
 const STATE: usize = 12;
 /// Numbers of a reference: position, velocity, acceleration, heading.
 const REFERENCE: usize = 10;
+/// Largest number of worlds: some 2 GB.
+const COUNT_MAX: u64 = 100_000;
+/// Largest number of steps in one call: more than a quarter of an hour at 1 kHz.
+const STEPS_MAX: u64 = 1_000_000;
+/// Steps of one vehicle between looks at Ctrl-C: hundredths of a second.
+const SLICE: usize = 20_000;
 
 /// Worlds of one scenario with consecutive seeds, stepped together on all cores without the GIL.
 #[pyclass(name = "Batch", module = "afbc")]
@@ -25,8 +33,8 @@ pub(crate) struct PyBatch {
 }
 
 impl PyBatch {
-    fn begin(&self, index: usize, seed: u64) -> PyResult<(World, View)> {
-        start(&Scenario { seed: seed + index as u64, ..self.scenario.clone() }, self.dt_s)
+    fn begin(&self, seed: u64) -> PyResult<(World, View)> {
+        start(&Scenario { seed, ..self.scenario.clone() }, self.dt_s)
     }
 
     /// Numbers of every vehicle, in rows of `width`.
@@ -45,19 +53,35 @@ impl PyBatch {
 impl PyBatch {
     /// Makes `count` worlds of a scenario, seeds from the scenario's own or from `seed` on.
     #[new]
-    #[pyo3(signature = (count, scenario=None, *, vehicle=None, seed=None, dt_s=0.001))]
+    #[pyo3(
+        signature = (count, scenario=None, *, vehicle=None, seed=None, dt_s=Given::Default(0.001)),
+        text_signature = "(count, scenario=None, *, vehicle=None, seed=None, dt_s=0.001)"
+    )]
     fn new(
-        count: usize,
-        scenario: Option<ScenarioArgument<'_>>,
-        vehicle: Option<VehicleArgument<'_>>,
-        seed: Option<u64>,
-        dt_s: f64,
+        py: Python<'_>,
+        count: Given<'_, u64>,
+        scenario: Option<Given<'_, ScenarioArgument<'_>>>,
+        vehicle: Option<Given<'_, VehicleArgument<'_>>>,
+        seed: Option<Given<'_, u64>>,
+        dt_s: Given<'_, f64>,
     ) -> PyResult<Self> {
-        let scenario = scenario.unwrap_or(ScenarioArgument::Path("hover".into())).scenario()?;
-        let scenario = changed(scenario, vehicle.as_ref(), seed, None)?;
-        let seed = scenario.seed;
-        let mut batch = PyBatch { scenario, worlds: Vec::new(), dt_s };
-        batch.worlds = (0..count).map(|index| batch.begin(index, seed)).collect::<PyResult<_>>()?;
+        let count = count.within("count", 1..=COUNT_MAX)?;
+        let scenario = asked(scenario.as_ref(), "hover", vehicle.as_ref(), seed.as_ref())?;
+        let first = scenario.seed;
+        if first > SEEDS.end() - count {
+            return Err(error(format!("seed: {first} given; {count} vehicles have no seeds from there on")));
+        }
+        let mut worlds = Vec::new();
+        let full = |_| PyMemoryError::new_err(format!("count: {count} vehicles do not fit into memory; take fewer"));
+        worlds.try_reserve_exact(count as usize).map_err(full)?;
+        let mut batch = PyBatch { scenario, worlds, dt_s: step_s(&dt_s)? };
+        for index in 0..count {
+            let world = batch.begin(first + index)?;
+            batch.worlds.push(world);
+            if index % 256 == 0 {
+                py.check_signals()?;
+            }
+        }
         Ok(batch)
     }
 
@@ -66,18 +90,15 @@ impl PyBatch {
     }
 
     /// Moves every vehicle by `steps` steps with these commanded rotor speeds [rad/s], shape (count, rotors).
-    #[pyo3(signature = (speeds_rad_s, steps=1))]
-    fn step(&mut self, py: Python<'_>, speeds_rad_s: PyReadonlyArray2<'_, f64>, steps: u32) -> PyResult<()> {
-        let (given, rotors) = (speeds_rad_s.as_array(), self.scenario.rotors.len());
-        let [rows, columns] = [given.nrows(), given.ncols()];
-        if rows != self.worlds.len() {
-            let needed = self.worlds.len();
-            return Err(error(format!("speeds_rad_s: shape ({rows}, {columns}); ({needed}, {rotors}) is needed")));
-        }
-        let speeds = given.rows().into_iter().map(|row| commands(&row.to_vec(), rotors));
-        let speeds = speeds.collect::<PyResult<Vec<_>>>()?;
+    #[pyo3(signature = (speeds_rad_s, steps=Given::Default(1)), text_signature = "($self, speeds_rad_s, steps=1)")]
+    fn step(&mut self, py: Python<'_>, speeds_rad_s: Given<'_, Array>, steps: Given<'_, u64>) -> PyResult<()> {
+        let (count, rotors) = (self.worlds.len(), self.scenario.rotors.len());
+        let speeds = speeds_rad_s.named("speeds_rad_s")?.shaped("speeds_rad_s", [Some(count), Some(rotors)])?;
+        let speeds = speeds.chunks_exact(rotors).map(commands).collect::<PyResult<Vec<_>>>()?;
+        let steps = steps.within("steps", 1..=STEPS_MAX)?;
+        let slice = (SLICE / count).max(1) as u64;
         let worlds = &mut self.worlds;
-        py.detach(|| {
+        in_slices(py, steps, slice, |steps| {
             worlds.par_iter_mut().zip(&speeds).for_each(|((world, view), speeds)| {
                 for _ in 0..steps {
                     world.advance(speeds);
@@ -85,18 +106,18 @@ impl PyBatch {
                     *view = world.look();
                 }
             });
-        });
-        Ok(())
+        })
     }
 
     /// Starts vehicle `index` again, with this seed, from the scenario's start or this motion.
     #[pyo3(signature = (index, seed, state=None))]
-    fn reset(&mut self, index: usize, seed: u64, state: Option<PyRef<'_, PyState>>) -> PyResult<()> {
-        let count = self.worlds.len();
-        let scenario = begun(&self.scenario, state.as_deref())?;
+    fn reset(&mut self, index: Given<'_, u64>, seed: Given<'_, u64>, state: Option<StateArgument<'_>>) -> PyResult<()> {
+        let index = index.within("index", 0..=self.worlds.len() as u64 - 1)? as usize;
+        let seed = seed.within("seed", SEEDS)?;
+        let state = optional(state.as_ref(), "state")?;
+        let scenario = begun(&self.scenario, state.as_ref().map(Bound::get))?;
         let world = start(&Scenario { seed, ..scenario }, self.dt_s)?;
-        let slot = self.worlds.get_mut(index);
-        *slot.ok_or_else(|| error(format!("index {index}: there are {count} vehicles")))? = world;
+        self.worlds.iter_mut().skip(index).take(1).for_each(|slot| *slot = world.clone());
         Ok(())
     }
 

@@ -1,7 +1,8 @@
 //! Campaigns.
 
+use crate::argument::{self, Given, optional};
 use crate::error::error;
-use crate::vehicle::VehicleArgument;
+use crate::vehicle::{self, VehicleArgument};
 use crate::work::{Watch, watched};
 use afbc::Profile;
 use afbc_campaign::{self as campaigns, BUILT_IN, Campaign, CampaignFolder, Manifest, Row, Shard, Summary, subject};
@@ -22,21 +23,25 @@ use std::path::PathBuf;
 #[expect(clippy::too_many_arguments, reason = "each by its name")]
 pub(crate) fn campaign<'py>(
     py: Python<'py>,
-    campaign: PathBuf,
-    flights: Option<u64>,
-    vehicle: Option<VehicleArgument<'py>>,
-    shard: Option<&str>,
-    out: Option<PathBuf>,
-    threads: Option<usize>,
+    campaign: Given<'py, PathBuf>,
+    flights: Option<Given<'py, u64>>,
+    vehicle: Option<Given<'py, VehicleArgument<'py>>>,
+    shard: Option<Given<'py, String>>,
+    out: Option<Given<'py, PathBuf>>,
+    threads: Option<Given<'py, u64>>,
     progress: Option<Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let mut plan = subject::campaign(&campaign).map_err(error)?;
-    if let Some(vehicle) = vehicle {
-        plan.scenario = plan.scenario.on(&vehicle.vehicle()?, Profile::Flight).map_err(error)?;
+    let mut plan = subject::campaign(&campaign.named("campaign")?).map_err(error)?;
+    if let Some(vehicle) = vehicle::given(vehicle.as_ref())? {
+        plan.scenario = plan.scenario.on(&vehicle, Profile::Flight).map_err(error)?;
     }
-    plan.flights = flights.unwrap_or(plan.flights).min(plan.flights);
+    if let Some(flights) = flights {
+        plan.flights = flights.within("flights", 1..=plan.flights)?;
+    }
     plan.check().map_err(error)?;
-    let shard = shard.map_or(Ok(Shard::WHOLE), |shard| {
+    let threads = argument::threads(threads.as_ref())?;
+    let out = optional(out.as_ref(), "out")?;
+    let shard = optional(shard.as_ref(), "shard")?.map_or(Ok(Shard::WHOLE), |shard| {
         let known: Result<Shard, _> = shard.parse();
         known.map_err(|problem| error(format!("shard {shard}: {problem}")))
     })?;
@@ -81,11 +86,19 @@ fn kept(plan: &Campaign, folder: &CampaignFolder, watch: &Watch) -> Result<Vec<R
 /// Joins all shards of a campaign into the folder `out`, with the same bytes as on one machine, as `sitl merge` does.
 /// Returns a row for each flight of each contender, by columns.
 #[pyfunction]
-pub(crate) fn merge(py: Python<'_>, shards: Vec<PathBuf>, out: PathBuf) -> PyResult<Bound<'_, PyDict>> {
-    let merged = py.detach(|| {
+pub(crate) fn merge<'py>(
+    py: Python<'py>,
+    shards: Given<'py, Vec<PathBuf>>,
+    out: Given<'py, PathBuf>,
+) -> PyResult<Bound<'py, PyDict>> {
+    let (shards, out) = (shards.named("shards")?, out.named("out")?);
+    if shards.is_empty() {
+        return Err(error("shards: none named; name the folders of all shards"));
+    }
+    let merged = watched(py, None, None, |_| {
         let (folder, summary) = campaigns::merge(&shards, &out, false).map_err(|error| error.to_string())?;
         Ok((folder.manifest().clone(), concluded(&folder, &summary)?))
-    });
+    })?;
     let (manifest, rows) = merged.map_err(|problem: String| error(problem))?;
     columns(py, &manifest, &rows)
 }

@@ -1,8 +1,10 @@
 //! A controller, step by step.
 
+use crate::argument::{Gains, Given, optional};
 use crate::error::error;
 use crate::motion::{PySetpoint, PyState};
-use crate::vehicle::VehicleArgument;
+use crate::plant::StateArgument;
+use crate::vehicle::{self, VehicleArgument};
 use afbc::{AdaptiveEstimate, Profile};
 use afbc_control::{Action, FlightController, Trace, Validated};
 use afbc_scenario::contender::{Contender, ControllerKind};
@@ -80,6 +82,9 @@ fn inputs<'py>(py: Python<'py>, u: &Inputs) -> Bound<'py, PyArray1<f64>> {
     [u.roll_n, u.pitch_n, u.yaw_n, u.thrust_n].map(f64::from).to_pyarray(py)
 }
 
+/// A setpoint as an argument.
+pub(crate) type SetpointArgument<'py> = Given<'py, Bound<'py, PySetpoint>>;
+
 /// A controller whose number of rotors is known when it is made.
 trait AnyRotors: Send + Sync {
     fn step(&mut self, state: Option<&PyState>, setpoint: &PySetpoint) -> Action<ROTORS_MAX>;
@@ -129,13 +134,14 @@ impl PyController {
     #[pyo3(signature = (law="afbc", vehicle=None, *, profile="flight", monitored=false, gains=None))]
     fn new(
         law: &str,
-        vehicle: Option<VehicleArgument<'_>>,
+        vehicle: Option<Given<'_, VehicleArgument<'_>>>,
         profile: &str,
         monitored: bool,
-        gains: Option<Vec<(String, f64)>>,
+        gains: Option<Given<'_, Gains>>,
     ) -> PyResult<Self> {
-        let vehicle = vehicle.map(|vehicle| vehicle.vehicle()).transpose()?;
-        let named = Named { law, profile, monitored, gains: gains.unwrap_or_default() };
+        let vehicle = vehicle::given(vehicle.as_ref())?;
+        let Gains(gains) = optional(gains.as_ref(), "gains")?.unwrap_or_default();
+        let named = Named { law, profile, monitored, gains };
         let (contender, parameters, rotors) = made(&named, vehicle.as_ref())?;
         let law: Box<dyn AnyRotors> = with_rotors!(rotors.len(), N => {
             let controller = contender.controller::<N>(&parameters, &rotors).map_err(error)?;
@@ -168,8 +174,9 @@ impl PyController {
     }
 
     /// Performs a step; without a state the last one is used, and nothing is learnt.
-    fn step(&mut self, state: Option<PyRef<'_, PyState>>, setpoint: PyRef<'_, PySetpoint>) -> PyResult<PyAction> {
-        let action = self.law.step(state.as_deref(), &setpoint);
+    fn step(&mut self, state: Option<StateArgument<'_>>, setpoint: SetpointArgument<'_>) -> PyResult<PyAction> {
+        let (state, setpoint) = (optional(state.as_ref(), "state")?, setpoint.named("setpoint")?);
+        let action = self.law.step(state.as_ref().map(Bound::get), setpoint.get());
         match crate::law::take_error() {
             Some(error) => Err(error),
             None => Ok(PyAction { action, rotors: self.rotors }),
@@ -219,7 +226,7 @@ pub(crate) fn made(
 ) -> PyResult<(Contender, Parameters<f64>, Vec<Rotor<f64>>)> {
     let Named { law, profile, monitored, gains } = named;
     let kind = ControllerKind::named(law)
-        .ok_or_else(|| error(format!("{law}: no such law; the laws are {}", ControllerKind::names())))?;
+        .ok_or_else(|| error(format!("{law}: no such law; {}", ControllerKind::cure(law))))?;
     let profile = Profile::ALL.into_iter().find(|known| known.name() == *profile).ok_or_else(|| {
         let known = Profile::ALL.map(Profile::name).join(", ");
         error(format!("{profile}: no such profile; they are {known}"))

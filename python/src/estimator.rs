@@ -1,8 +1,10 @@
 //! The estimator, step by step.
 
+use crate::argument::{Given, all_finite, finite};
 use crate::error::error;
 use crate::motion::{PyState, array, vector};
 use afbc_estimator::{Estimate, Estimator, ImuSample, Measurement, Memory, Settings, Stamped};
+use nalgebra::Vector3;
 use numpy::{PyArray1, ToPyArray};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -17,22 +19,48 @@ pub(crate) struct PyEstimator {
     estimator: Estimator,
     memory: Memory,
     estimate: Estimate,
+    /// Time of the last step.
+    now_us: u64,
 }
 
-/// A time on the estimator's clock.
-fn us(time_s: f64) -> PyResult<u64> {
+/// A number as an argument.
+type Number<'py> = Given<'py, f64>;
+/// Three numbers as an argument.
+type Three<'py> = Given<'py, [f64; 3]>;
+
+/// The time of the argument called `name`, on the estimator's clock.
+fn us(time_s: &Number<'_>, name: &str) -> PyResult<u64> {
+    let time_s = time_s.named(name)?;
     if (0.0..=LATEST_S).contains(&time_s) {
         return Ok((time_s * 1e6).round() as u64);
     }
-    Err(error(format!("{time_s} s: times lie within 0 to {LATEST_S:e} s")))
+    Err(error(format!("{name}: {time_s} given; times lie within 0 to {LATEST_S:e} s")))
+}
+
+/// The finite number of the argument called `name`.
+fn number(given: &Number<'_>, name: &str) -> PyResult<f32> {
+    Ok(finite(name, given.named(name)?)? as f32)
+}
+
+/// The standard deviation of the argument called `name`.
+fn sigma(given: &Number<'_>, name: &str) -> PyResult<f32> {
+    match number(given, name)? {
+        value if value > 0.0 => Ok(value),
+        value => Err(error(format!("{name}: {value} given; a positive number is needed"))),
+    }
+}
+
+/// The finite numbers of the argument called `name`.
+fn three(given: &Three<'_>, name: &str) -> PyResult<Vector3<f32>> {
+    Ok(vector(all_finite(name, given.named(name)?)?))
 }
 
 impl PyEstimator {
-    fn offer(&mut self, at_s: f64, value: Measurement) -> PyResult<()> {
+    fn offer(&mut self, at_s: &Number<'_>, value: Measurement) -> PyResult<()> {
         if !value.is_plausible() {
-            return Err(error(format!("{value:?}: not plausible; finite numbers and positive deviations are needed")));
+            return Err(error(format!("{value:?}: not plausible; check units, and that the attitude has length 1")));
         }
-        self.memory.offer(&Stamped { value, at_us: us(at_s)? });
+        self.memory.offer(&Stamped { value, at_us: us(at_s, "at_s")? });
         Ok(())
     }
 }
@@ -44,68 +72,92 @@ impl PyEstimator {
         let estimator = Estimator::new(Settings::DEFAULT).map_err(error)?;
         let memory = Memory::default();
         let estimate = estimator.estimate(&memory, 0);
-        Ok(PyEstimator { estimator, memory, estimate })
+        Ok(PyEstimator { estimator, memory, estimate, now_us: 0 })
     }
 
     /// Hands over a tracker's pose, true at `at_s`: position [m], attitude as a quaternion w, x, y, z from body to
     /// earth, and standard deviations [m, rad].
-    #[pyo3(signature = (at_s, position_m, attitude, position_sigma_m=0.001, attitude_sigma_rad=0.01))]
+    #[pyo3(
+        signature = (
+            at_s, position_m, attitude, position_sigma_m=Given::Default(0.001), attitude_sigma_rad=Given::Default(0.01)
+        ),
+        text_signature = "($self, at_s, position_m, attitude, position_sigma_m=0.001, attitude_sigma_rad=0.01)"
+    )]
     fn pose(
         &mut self,
-        at_s: f64,
-        position_m: [f64; 3],
-        attitude: [f64; 4],
-        position_sigma_m: f32,
-        attitude_sigma_rad: f32,
+        at_s: Number<'_>,
+        position_m: Three<'_>,
+        attitude: Given<'_, [f64; 4]>,
+        position_sigma_m: Number<'_>,
+        attitude_sigma_rad: Number<'_>,
     ) -> PyResult<()> {
-        let attitude = attitude.map(|part| part as f32);
-        let position_m = vector(position_m);
-        self.offer(at_s, Measurement::Pose { position_m, attitude, position_sigma_m, attitude_sigma_rad })
+        let attitude = all_finite("attitude", attitude.named("attitude")?)?;
+        let pose = Measurement::Pose {
+            position_m: three(&position_m, "position_m")?,
+            attitude: attitude.map(|part| part as f32),
+            position_sigma_m: sigma(&position_sigma_m, "position_sigma_m")?,
+            attitude_sigma_rad: sigma(&attitude_sigma_rad, "attitude_sigma_rad")?,
+        };
+        self.offer(&at_s, pose)
     }
 
     /// Hands over a fix of a GNSS receiver in local coordinates: position [m], velocity [m/s], standard deviations.
-    #[pyo3(signature = (
-        at_s, position_m, velocity_m_s, horizontal_sigma_m=1.5, vertical_sigma_m=3.0, speed_sigma_m_s=0.2,
-        climb_sigma_m_s=0.3
-    ))]
+    #[pyo3(
+        signature = (
+            at_s, position_m, velocity_m_s, horizontal_sigma_m=Given::Default(1.5),
+            vertical_sigma_m=Given::Default(3.0), speed_sigma_m_s=Given::Default(0.2),
+            climb_sigma_m_s=Given::Default(0.3)
+        ),
+        text_signature = "($self, at_s, position_m, velocity_m_s, horizontal_sigma_m=1.5, vertical_sigma_m=3.0, \
+                          speed_sigma_m_s=0.2, climb_sigma_m_s=0.3)"
+    )]
     #[expect(clippy::too_many_arguments, reason = "each by its name")]
     fn gnss(
         &mut self,
-        at_s: f64,
-        position_m: [f64; 3],
-        velocity_m_s: [f64; 3],
-        horizontal_sigma_m: f32,
-        vertical_sigma_m: f32,
-        speed_sigma_m_s: f32,
-        climb_sigma_m_s: f32,
+        at_s: Number<'_>,
+        position_m: Three<'_>,
+        velocity_m_s: Three<'_>,
+        horizontal_sigma_m: Number<'_>,
+        vertical_sigma_m: Number<'_>,
+        speed_sigma_m_s: Number<'_>,
+        climb_sigma_m_s: Number<'_>,
     ) -> PyResult<()> {
-        let (position_m, velocity_m_s) = (vector(position_m), vector(velocity_m_s));
         let fix = Measurement::Gnss {
-            position_m,
-            velocity_m_s,
-            horizontal_sigma_m,
-            vertical_sigma_m,
-            speed_sigma_m_s,
-            climb_sigma_m_s,
+            position_m: three(&position_m, "position_m")?,
+            velocity_m_s: three(&velocity_m_s, "velocity_m_s")?,
+            horizontal_sigma_m: sigma(&horizontal_sigma_m, "horizontal_sigma_m")?,
+            vertical_sigma_m: sigma(&vertical_sigma_m, "vertical_sigma_m")?,
+            speed_sigma_m_s: sigma(&speed_sigma_m_s, "speed_sigma_m_s")?,
+            climb_sigma_m_s: sigma(&climb_sigma_m_s, "climb_sigma_m_s")?,
         };
-        self.offer(at_s, fix)
+        self.offer(&at_s, fix)
     }
 
     /// Hands over a barometer's height [m] above any fixed reference.
-    #[pyo3(signature = (at_s, height_m, sigma_m=0.1))]
-    fn height(&mut self, at_s: f64, height_m: f32, sigma_m: f32) -> PyResult<()> {
-        self.offer(at_s, Measurement::Height { height_m, sigma_m })
+    #[pyo3(
+        signature = (at_s, height_m, sigma_m=Given::Default(0.1)),
+        text_signature = "($self, at_s, height_m, sigma_m=0.1)"
+    )]
+    fn height(&mut self, at_s: Number<'_>, height_m: Number<'_>, sigma_m: Number<'_>) -> PyResult<()> {
+        let (height_m, sigma_m) = (number(&height_m, "height_m")?, sigma(&sigma_m, "sigma_m")?);
+        self.offer(&at_s, Measurement::Height { height_m, sigma_m })
     }
 
     /// Hands over a magnetometer's field in the body frame, in any unit that does not change.
-    fn magnetic_field(&mut self, at_s: f64, field: [f64; 3], sigma: f32) -> PyResult<()> {
-        self.offer(at_s, Measurement::MagneticField { field: vector(field), sigma })
+    #[pyo3(signature = (at_s, field, sigma))]
+    fn magnetic_field(&mut self, at_s: Number<'_>, field: Three<'_>, sigma: Number<'_>) -> PyResult<()> {
+        let (field, sigma) = (three(&field, "field")?, self::sigma(&sigma, "sigma")?);
+        self.offer(&at_s, Measurement::MagneticField { field, sigma })
     }
 
     /// Hands over a heading [rad].
-    #[pyo3(signature = (at_s, heading_rad, sigma_rad=0.05))]
-    fn heading(&mut self, at_s: f64, heading_rad: f32, sigma_rad: f32) -> PyResult<()> {
-        self.offer(at_s, Measurement::Heading { heading_rad, sigma_rad })
+    #[pyo3(
+        signature = (at_s, heading_rad, sigma_rad=Given::Default(0.05)),
+        text_signature = "($self, at_s, heading_rad, sigma_rad=0.05)"
+    )]
+    fn heading(&mut self, at_s: Number<'_>, heading_rad: Number<'_>, sigma_rad: Number<'_>) -> PyResult<()> {
+        let (heading_rad, sigma_rad) = (number(&heading_rad, "heading_rad")?, sigma(&sigma_rad, "sigma_rad")?);
+        self.offer(&at_s, Measurement::Heading { heading_rad, sigma_rad })
     }
 
     /// Says whether the vehicle stands on the ground, where its velocity is held at zero while it rests.
@@ -118,18 +170,25 @@ impl PyEstimator {
     #[pyo3(signature = (now_s, rates_rad_s=None, specific_force_m_s2=None))]
     fn step(
         &mut self,
-        now_s: f64,
-        rates_rad_s: Option<[f64; 3]>,
-        specific_force_m_s2: Option<[f64; 3]>,
+        now_s: Number<'_>,
+        rates_rad_s: Option<Three<'_>>,
+        specific_force_m_s2: Option<Three<'_>>,
     ) -> PyResult<PyState> {
-        let now_us = us(now_s)?;
-        let sample = match (rates_rad_s, specific_force_m_s2) {
-            (Some(rates), Some(force)) => {
-                Some(ImuSample { at_us: now_us, rates_rad_s: vector(rates), specific_force_m_s2: vector(force) })
+        let now_us = us(&now_s, "now_s")?;
+        if now_us < self.now_us {
+            let [now_s, last_s] = [now_us, self.now_us].map(|us| us as f64 * 1e-6);
+            return Err(error(format!("now_s: {now_s} given after {last_s}; time does not run backwards")));
+        }
+        let rates = rates_rad_s.map(|rates| three(&rates, "rates_rad_s")).transpose()?;
+        let force = specific_force_m_s2.map(|force| three(&force, "specific_force_m_s2")).transpose()?;
+        let sample = match (rates, force) {
+            (Some(rates_rad_s), Some(specific_force_m_s2)) => {
+                Some(ImuSample { at_us: now_us, rates_rad_s, specific_force_m_s2 })
             }
             (None, None) => None,
-            _ => return Err(error("a sample has rates and specific force; give both, or none")),
+            _ => return Err(error("rates_rad_s, specific_force_m_s2: a sample has both; give both, or none")),
         };
+        self.now_us = now_us;
         self.estimate = self.estimator.step(&mut self.memory, now_us, sample.as_ref());
         Ok(PyState(self.estimate.state))
     }

@@ -1,16 +1,18 @@
 //! Flights and comparisons.
 
+use crate::argument::{self, Given, optional};
 use crate::error::error;
 use crate::scenario::{ScenarioArgument, changed};
-use crate::vehicle::VehicleArgument;
-use crate::work::watched;
+use crate::vehicle::{self, VehicleArgument};
+use crate::work::{Watch, watched};
 use afbc::Profile;
 use afbc_campaign::compare as comparison;
 use afbc_report::flights;
 use afbc_scenario::Scenario;
+use afbc_scenario::contender::Contender;
 use afbc_sim::LogRate;
 use afbc_sim::flown::Flown;
-use afbc_sim::metrics::Metrics;
+use afbc_sim::metrics::{Metrics, SETTLED_S};
 use afbc_sim::run::Run;
 use numpy::{PyArray1, ToPyArray};
 use pyo3::exceptions::PyKeyError;
@@ -22,14 +24,39 @@ use rayon::prelude::*;
 /// One flight under one contender: its log by columns, and its figures of merit.
 #[pyclass(name = "Flight", module = "afbc", frozen)]
 pub(crate) struct PyFlight {
-    flown: Flown,
+    told: Told,
+    /// The flight itself, whose log becomes columns when they are asked for; none where `pickle` has brought them.
+    flown: Option<Flown>,
     columns: PyOnceLock<Py<PyDict>>,
 }
 
+/// Time [s] and reason.
+type When = (f64, String);
+/// A figure of merit: its name, and its value if there was something to measure.
+type Figure = (String, Option<f64>);
+/// What a flight tells besides its log: contender, scenario, rows of the log, loss, trip, figures of merit.
+type Told = (String, String, usize, Option<When>, Option<When>, Vec<Figure>);
+/// What makes a flight again in another process: a function and its arguments.
+type Reduced<'py> = (Bound<'py, PyAny>, (Told, Bound<'py, PyDict>));
+
 impl PyFlight {
     fn of(flown: Flown) -> Self {
-        PyFlight { flown, columns: PyOnceLock::new() }
+        let Flown { scenario, run } = &flown;
+        let lost = run.lost.map(|lost| (lost.time_s, lost.reason.to_owned()));
+        let tripped = run.tripped.map(|tripped| (tripped.time_s, tripped.reason.to_owned()));
+        let figures = named(&run.metrics).into_iter().map(|(name, value)| (name.to_owned(), value)).collect();
+        let told = (run.contender.name.clone(), scenario.name.clone(), run.log.len(), lost, tripped, figures);
+        PyFlight { told, flown: Some(flown), columns: PyOnceLock::new() }
     }
+}
+
+/// Makes a flight of what `pickle` has kept of it.
+#[pyfunction]
+pub(crate) fn _flight(py: Python<'_>, told: Told, columns: Py<PyDict>) -> PyResult<PyFlight> {
+    let kept = PyOnceLock::new();
+    // It is new, so that nothing is in it yet.
+    let _ = kept.set(py, columns);
+    Ok(PyFlight { told, flown: None, columns: kept })
 }
 
 #[pymethods]
@@ -37,34 +64,32 @@ impl PyFlight {
     /// Name of the contender.
     #[getter]
     fn contender(&self) -> &str {
-        &self.flown.run.contender.name
+        &self.told.0
     }
 
     /// Name of the scenario.
     #[getter]
     fn scenario(&self) -> &str {
-        &self.flown.scenario.name
+        &self.told.1
     }
 
     /// When [s] and why the vehicle was lost; None if it was not.
     #[getter]
-    fn lost(&self) -> Option<(f64, &'static str)> {
-        self.flown.run.lost.map(|lost| (lost.time_s, lost.reason))
+    fn lost(&self) -> Option<When> {
+        self.told.3.clone()
     }
 
     /// When [s] and why AFBC's monitor switched to the fallback law; None if it did not.
     #[getter]
-    fn tripped(&self) -> Option<(f64, &'static str)> {
-        self.flown.run.tripped.map(|tripped| (tripped.time_s, tripped.reason))
+    fn tripped(&self) -> Option<When> {
+        self.told.4.clone()
     }
 
     /// Figures of merit from 5 s on, by name; None where there was nothing to measure.
     #[getter]
     fn metrics<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let dict = PyDict::new(py);
-        for (name, value) in named(&self.flown.run.metrics) {
-            dict.set_item(name, value)?;
-        }
+        self.told.5.iter().try_for_each(|(name, value)| dict.set_item(name, value))?;
         Ok(dict)
     }
 
@@ -72,7 +97,7 @@ impl PyFlight {
     #[getter]
     fn columns<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let columns = self.columns.get_or_try_init(py, || {
-            let columns = py.detach(|| flights::columns(&self.flown));
+            let columns = py.detach(|| self.flown.as_ref().map_or_else(Vec::new, flights::columns));
             let dict = PyDict::new(py);
             for (name, values) in columns {
                 dict.set_item(name, PyArray1::from_vec(py, values))?;
@@ -82,29 +107,37 @@ impl PyFlight {
         Ok(columns.bind(py).clone())
     }
 
-    fn __getitem__<'py>(&self, py: Python<'py>, column: &str) -> PyResult<Bound<'py, PyAny>> {
+    fn __getitem__<'py>(&self, py: Python<'py>, column: Given<'py, String>) -> PyResult<Bound<'py, PyAny>> {
+        let column = column.named("column")?;
         let columns = self.columns(py)?;
-        columns.get_item(column)?.ok_or_else(|| {
+        columns.get_item(&column)?.ok_or_else(|| {
             let known = columns.keys();
             PyKeyError::new_err(format!("no column {column:?}; there are {known}"))
         })
     }
 
     fn __len__(&self) -> usize {
-        self.flown.run.log.len()
+        self.told.2
+    }
+
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Reduced<'py>> {
+        Ok((py.import("afbc._afbc")?.getattr("_flight")?, (self.told.clone(), self.columns(py)?)))
     }
 
     fn __repr__(&self) -> String {
-        let (scenario, contender) = (&self.flown.scenario.name, &self.flown.run.contender.name);
-        match self.flown.run.lost {
-            Some(lost) => format!("Flight({scenario}, {contender}, lost at {} s: {})", lost.time_s, lost.reason),
-            None => {
-                let rms_mm = 1000.0 * self.flown.run.metrics.rmse.xyz().norm();
-                format!("Flight({scenario}, {contender}, {rms_mm:.3} mm rms)")
-            }
-        }
+        let (contender, scenario, _, lost, _, figures) = &self.told;
+        let rms = figures.iter().find(|(name, _)| name == RMS).and_then(|(_, value)| *value);
+        let what = match (lost, rms) {
+            (Some((time_s, reason)), _) => format!("lost at {time_s} s: {reason}"),
+            (None, Some(rms_m)) => format!("{:.3} mm rms", 1000.0 * rms_m),
+            (None, None) => format!("ended before {SETTLED_S} s, from which errors count"),
+        };
+        format!("Flight({scenario}, {contender}, {what})")
     }
 }
+
+/// Name of the figure that a flight is shown by.
+const RMS: &str = "rmse_position_m";
 
 /// The figures of merit of a flight by the names that campaigns give them; none before errors are evaluated.
 fn named(metrics: &Metrics) -> Vec<(&'static str, Option<f64>)> {
@@ -115,7 +148,7 @@ fn named(metrics: &Metrics) -> Vec<(&'static str, Option<f64>)> {
         ("rmse_y_m", settled(rmse.y)),
         ("rmse_z_m", settled(rmse.z)),
         ("rmse_psi_rad", settled(rmse.w)),
-        ("rmse_position_m", settled(rmse.xyz().norm())),
+        (RMS, settled(rmse.xyz().norm())),
         ("max_x_m", settled(max_abs.x)),
         ("max_y_m", settled(max_abs.y)),
         ("max_z_m", settled(max_abs.z)),
@@ -138,11 +171,31 @@ fn named(metrics: &Metrics) -> Vec<(&'static str, Option<f64>)> {
 }
 
 /// Rows of a log per second.
-fn log_rate(log_hz: Option<u16>, scenario: &Scenario) -> PyResult<LogRate> {
-    match log_hz {
+fn log_rate(log_hz: Option<&Given<'_, u64>>, scenario: &Scenario) -> PyResult<LogRate> {
+    match log_hz.map(|log_hz| log_hz.within("log_hz", 1..=1000)).transpose()? {
         Some(hz) => hz.to_string().parse().map_err(|problem| error(format!("log_hz {hz}: {problem}"))),
         None => Ok(LogRate::usual(scenario.duration_s)),
     }
+}
+
+/// Names in the argument `controllers`, if it is given.
+fn chosen(controllers: Option<&Given<'_, Vec<String>>>) -> PyResult<Option<Vec<String>>> {
+    match optional(controllers, "controllers")? {
+        Some(names) if names.is_empty() => {
+            Err(error("controllers: none named; name one, or leave it out for the scenario's own"))
+        }
+        names => Ok(names),
+    }
+}
+
+/// Flies until it is time to stop.
+fn flown(scenario: &Scenario, contender: &Contender, log_every: u64, watch: &Watch) -> Result<Run, String> {
+    let run = Run::fly_unless(scenario, contender, log_every, || watch.is_over()).map_err(|error| error.to_string())?;
+    if watch.is_over() {
+        return Err("interrupted".into());
+    }
+    watch.add(1);
+    Ok(run)
 }
 
 /// Flies a scenario under each of its contenders, or under these laws, and returns the flights by contender.
@@ -155,30 +208,26 @@ fn log_rate(log_hz: Option<u16>, scenario: &Scenario) -> PyResult<LogRate> {
 #[expect(clippy::too_many_arguments, reason = "each by its name")]
 pub(crate) fn fly<'py>(
     py: Python<'py>,
-    scenario: ScenarioArgument<'py>,
-    controllers: Option<Vec<String>>,
-    vehicle: Option<VehicleArgument<'py>>,
-    seed: Option<u64>,
-    duration_s: Option<f64>,
-    log_hz: Option<u16>,
-    threads: Option<usize>,
+    scenario: Given<'py, ScenarioArgument<'py>>,
+    controllers: Option<Given<'py, Vec<String>>>,
+    vehicle: Option<Given<'py, VehicleArgument<'py>>>,
+    seed: Option<Given<'py, u64>>,
+    duration_s: Option<Given<'py, f64>>,
+    log_hz: Option<Given<'py, u64>>,
+    threads: Option<Given<'py, u64>>,
     progress: Option<Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let mut scenario = scenario.scenario()?;
-    if let Some(names) = &controllers {
-        scenario.choose(names).map_err(error)?;
+    let mut scenario = scenario.named("scenario")?.scenario()?;
+    if let Some(names) = chosen(controllers.as_ref())? {
+        scenario.choose(&names).map_err(error)?;
     }
-    let scenario = changed(scenario, vehicle.as_ref(), seed, duration_s)?;
-    let rate = log_rate(log_hz, &scenario)?;
-    let flights = watched(py, threads, progress.as_ref(), |watch| {
+    let (vehicle, seed) = (vehicle::given(vehicle.as_ref())?, argument::seed(seed.as_ref())?);
+    let scenario = changed(scenario, vehicle.as_ref(), seed, optional(duration_s.as_ref(), "duration_s")?)?;
+    let rate = log_rate(log_hz.as_ref(), &scenario)?;
+    let flights = watched(py, argument::threads(threads.as_ref())?, progress.as_ref(), |watch| {
         let fly = |contender| {
-            if watch.is_over() {
-                return Err("interrupted".to_owned());
-            }
-            let log_every = rate.steps(&scenario, contender)?;
-            let run = Run::fly(&scenario, contender, log_every).map_err(|error| error.to_string())?;
-            watch.add(1);
-            Ok(Flown { scenario: scenario.clone(), run })
+            let run = flown(&scenario, contender, rate.steps(&scenario, contender)?, watch)?;
+            Ok::<_, String>(Flown { scenario: scenario.clone(), run })
         };
         scenario.contenders.par_iter().map(fly).collect::<Result<Vec<_>, _>>()
     })?;
@@ -189,47 +238,93 @@ pub(crate) fn fly<'py>(
     Ok(dict)
 }
 
-/// Flies scenarios under the same contenders with `seeds` consecutive seeds each, and returns a row for each flight, by
-/// columns: scenario, contender, seed, when and why the vehicle was lost, and the figures of merit.
+/// Result of a flight of a comparison.
+struct Outcome<'a> {
+    scenario: &'a str,
+    contender: &'a str,
+    seed: u64,
+    run: Run,
+}
+
+/// A flight of a comparison: its scenario, contender and seed.
+type Planned<'a> = (&'a Scenario, &'a Contender, u64);
+
+impl<'a> Outcome<'a> {
+    fn of((scenario, contender, seed): &Planned<'a>, watch: &Watch) -> Result<Self, String> {
+        let run = flown(&Scenario { seed: *seed, ..(*scenario).clone() }, contender, u64::MAX, watch)?;
+        Ok(Outcome { scenario: &scenario.name, contender: &contender.name, seed: *seed, run })
+    }
+}
+
+/// Flies scenarios under the same contenders with `seeds` consecutive seeds each, as `sitl compare` does, and returns a
+/// row for each flight, by columns: scenario, contender, seed, when and why the vehicle was lost, and the figures of
+/// merit.
 #[pyfunction]
-#[pyo3(signature = (scenarios, controllers=None, *, vehicle=None, seeds=1, threads=None, progress=None))]
+#[pyo3(signature = (scenarios, controllers=None, *, vehicle=None, seeds=None, threads=None, progress=None))]
 pub(crate) fn compare<'py>(
     py: Python<'py>,
-    scenarios: Vec<ScenarioArgument<'py>>,
-    controllers: Option<Vec<String>>,
-    vehicle: Option<VehicleArgument<'py>>,
-    seeds: u64,
-    threads: Option<usize>,
+    scenarios: Given<'py, Vec<ScenarioArgument<'py>>>,
+    controllers: Option<Given<'py, Vec<String>>>,
+    vehicle: Option<Given<'py, VehicleArgument<'py>>>,
+    seeds: Option<Given<'py, u64>>,
+    threads: Option<Given<'py, u64>>,
     progress: Option<Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyDict>> {
+    let scenarios = scenarios.named("scenarios")?;
     let mut scenarios = scenarios.iter().map(ScenarioArgument::scenario).collect::<PyResult<Vec<_>>>()?;
+    if scenarios.is_empty() {
+        return Err(error("scenarios: none named; name one"));
+    }
     let own = comparison::contenders(&scenarios);
-    let contenders = match &controllers {
-        Some(names) => comparison::choose(&own, names).map_err(error)?,
+    let contenders = match chosen(controllers.as_ref())? {
+        Some(names) => comparison::choose(&own, &names).map_err(error)?,
         None => own,
     };
-    let vehicle = vehicle.map(|vehicle| vehicle.vehicle()).transpose()?;
+    let vehicle = vehicle::given(vehicle.as_ref())?;
     for scenario in &mut scenarios {
         if let Some(vehicle) = &vehicle {
             *scenario = scenario.clone().on(vehicle, Profile::Flight).map_err(error)?;
         }
         comparison::fly_under(scenario, &contenders).map_err(error)?;
     }
-    let comparisons = watched(py, threads, progress.as_ref(), |watch| {
-        comparison::fly(scenarios, seeds, u64::MAX, &|| watch.add(1)).map_err(|error| error.to_string())
+    let seeds = seeds.map(|seeds| seeds.within("seeds", 1..=SEEDS_MAX)).transpose()?;
+    let planned = planned(&scenarios, seeds)?;
+    let outcomes = watched(py, argument::threads(threads.as_ref())?, progress.as_ref(), |watch| {
+        planned.par_iter().map(|planned| Outcome::of(planned, watch)).collect::<Result<Vec<_>, _>>()
     })?;
-    let comparisons = comparisons.map_err(error)?;
+    rows(py, &outcomes.map_err(error)?)
+}
+
+/// Largest number of seeds of a comparison, as on the command line.
+const SEEDS_MAX: u64 = 10_000;
+
+/// The flights of a comparison: by scenario, contender and seed.
+fn planned(scenarios: &[Scenario], seeds: Option<u64>) -> PyResult<Vec<Planned<'_>>> {
+    let mut planned = Vec::new();
+    for scenario in scenarios {
+        let seeds = seeds.unwrap_or_else(|| comparison::usual_seeds(scenario));
+        let end = scenario.seed.checked_add(seeds);
+        let end =
+            end.ok_or_else(|| error(format!("seeds: {seeds} given; there are not as many from the scenario's")))?;
+        for contender in &scenario.contenders {
+            planned.extend((scenario.seed..end).map(|seed| (scenario, contender, seed)));
+        }
+    }
+    Ok(planned)
+}
+
+/// Rows by columns.
+fn rows<'py>(py: Python<'py>, outcomes: &[Outcome<'_>]) -> PyResult<Bound<'py, PyDict>> {
     let dict = PyDict::new(py);
-    let rows = || comparisons.iter().flat_map(|of| of.entries.iter().map(move |entry| (&of.scenario, entry)));
-    let rows =
-        || rows().flat_map(|(scenario, entry)| entry.flights.iter().map(move |flight| (scenario, entry, flight)));
-    dict.set_item("scenario", rows().map(|(scenario, ..)| scenario.name.as_str()).collect::<Vec<_>>())?;
-    dict.set_item("contender", rows().map(|(_, entry, _)| entry.contender().name.as_str()).collect::<Vec<_>>())?;
-    dict.set_item("seed", rows().map(|(.., flight)| flight.seed).collect::<Vec<_>>().to_pyarray(py))?;
-    let lost_at = rows().map(|(.., flight)| flight.lost.map_or(f64::NAN, |lost| lost.time_s));
+    dict.set_item("scenario", outcomes.iter().map(|outcome| outcome.scenario).collect::<Vec<_>>())?;
+    dict.set_item("contender", outcomes.iter().map(|outcome| outcome.contender).collect::<Vec<_>>())?;
+    dict.set_item("seed", outcomes.iter().map(|outcome| outcome.seed).collect::<Vec<_>>().to_pyarray(py))?;
+    let lost = |outcome: &Outcome<'_>| outcome.run.lost;
+    let lost_at = outcomes.iter().map(|outcome| lost(outcome).map_or(f64::NAN, |lost| lost.time_s));
     dict.set_item("lost_at_s", PyArray1::from_iter(py, lost_at))?;
-    dict.set_item("lost_reason", rows().map(|(.., flight)| flight.lost.map(|lost| lost.reason)).collect::<Vec<_>>())?;
-    let figures: Vec<_> = rows().map(|(.., flight)| named(&flight.metrics)).collect();
+    let reasons = outcomes.iter().map(|outcome| lost(outcome).map(|lost| lost.reason));
+    dict.set_item("lost_reason", reasons.collect::<Vec<_>>())?;
+    let figures: Vec<_> = outcomes.iter().map(|outcome| named(&outcome.run.metrics)).collect();
     let names = figures.iter().max_by_key(|figures| figures.len()).map_or(Vec::new(), Clone::clone);
     for (name, _) in names {
         let value = |figures: &Vec<(&str, Option<f64>)>| {

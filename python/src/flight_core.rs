@@ -1,16 +1,16 @@
 //! The flight core around a law, tick by tick.
 
-use crate::controller::{Named, PyAction, made};
+use crate::argument::{Gains, Given, optional};
+use crate::controller::{Named, PyAction, SetpointArgument, made};
 use crate::error::error;
-use crate::motion::{PySetpoint, PyState};
-use crate::vehicle::VehicleArgument;
+use crate::plant::StateArgument;
+use crate::vehicle::{VehicleArgument, flown};
 use afbc_control::{Action, FlightController, Mixer};
 use afbc_flight_core::{FlightCore, FlightCoreMemory, Inbox, Mode, Request, RequestAnswer, Stamped, Ticketed};
 use afbc_scenario::AnyController;
 use afbc_types::{ROTORS_MAX, with_rotors};
 use core::fmt::Debug;
 use pyo3::prelude::*;
-use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
 
 /// Time between ticks [us].
@@ -98,12 +98,13 @@ impl PyFlightCore {
     #[pyo3(signature = (law="afbc", vehicle=None, *, monitored=true, gains=None))]
     fn new(
         law: &str,
-        vehicle: Option<VehicleArgument<'_>>,
+        vehicle: Option<Given<'_, VehicleArgument<'_>>>,
         monitored: bool,
-        gains: Option<Vec<(String, f64)>>,
+        gains: Option<Given<'_, Gains>>,
     ) -> PyResult<Self> {
-        let vehicle = vehicle.unwrap_or(VehicleArgument::Path(PathBuf::from("paper"))).vehicle()?;
-        let named = Named { law, profile: "flight", monitored, gains: gains.unwrap_or_default() };
+        let vehicle = flown(vehicle.as_ref())?;
+        let Gains(gains) = optional(gains.as_ref(), "gains")?.unwrap_or_default();
+        let named = Named { law, profile: "flight", monitored, gains };
         let (contender, parameters, rotors) = made(&named, Some(&vehicle))?;
         let nominal = parameters.to_f32();
         let core: Box<dyn AnyCore> = with_rotors!(rotors.len(), N => {
@@ -120,7 +121,8 @@ impl PyFlightCore {
     }
 
     /// Asks for "arm", "disarm", "kill" or "engage" (a law that has handed over) in the next step, which answers.
-    fn request(&mut self, request: &str) -> PyResult<()> {
+    fn request(&mut self, request: Given<'_, String>) -> PyResult<()> {
+        let request = request.named("request")?;
         let known = REQUESTS.iter().find(|(name, _)| *name == request);
         let (_, value) = known.ok_or_else(|| {
             let names = REQUESTS.map(|(name, _)| name).join(", ");
@@ -135,17 +137,19 @@ impl PyFlightCore {
     #[pyo3(signature = (state=None, setpoint=None, *, idle_on_ground=false))]
     fn step(
         &mut self,
-        state: Option<PyRef<'_, PyState>>,
-        setpoint: Option<PyRef<'_, PySetpoint>>,
+        state: Option<StateArgument<'_>>,
+        setpoint: Option<SetpointArgument<'_>>,
         idle_on_ground: bool,
     ) -> PyResult<PyAction> {
+        let state = optional(state.as_ref(), "state")?;
+        let setpoint = optional(setpoint.as_ref(), "setpoint")?;
         self.now_us += TICK_US;
         let at_us = self.now_us;
-        if let Some(state) = state.filter(|state| state.0.is_plausible()) {
+        if let Some(state) = state.as_ref().map(Bound::get).filter(|state| state.0.is_plausible()) {
             self.inbox.locate(Stamped { value: state.0, at_us });
         }
         if let Some(setpoint) = setpoint {
-            self.inbox.put_setpoint(Stamped { value: setpoint.0, at_us });
+            self.inbox.put_setpoint(Stamped { value: setpoint.get().0, at_us });
         }
         self.inbox.set_idle_on_ground(idle_on_ground);
         let ticked = self.core.tick(at_us, &self.inbox.take());

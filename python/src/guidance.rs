@@ -1,14 +1,15 @@
 //! Flight modes, step by step.
 
+use crate::argument::{Given, finite, optional};
 use crate::error::error;
 use crate::flight_core::words;
-use crate::motion::{PySetpoint, PyState, vector};
-use crate::vehicle::VehicleArgument;
+use crate::motion::{PySetpoint, vector};
+use crate::plant::{StateArgument, step_s};
+use crate::vehicle::{VehicleArgument, flown};
 use afbc_flight_core::{Mode, Ticketed};
 use afbc_guidance::{FailedSensors, FlightMode, Guidance, GuidanceInputs, Guided, Lift, Order, Orders, Sticks};
 use afbc_types::Stamped;
 use pyo3::prelude::*;
-use std::path::PathBuf;
 
 /// Modes that are flown by what this class is given.
 const MODES: [FlightMode; 6] = [
@@ -49,10 +50,13 @@ impl PyGuidance {
     /// Makes the guidance with the settings of this vehicle's file, the paper's if none is given, for steps of `dt_s`
     /// [s].
     #[new]
-    #[pyo3(signature = (vehicle=None, *, dt_s=0.001))]
-    fn new(vehicle: Option<VehicleArgument<'_>>, dt_s: f64) -> PyResult<Self> {
-        afbc_control::Settings::DT.range.check(dt_s).map_err(error)?;
-        let vehicle = vehicle.unwrap_or(VehicleArgument::Path(PathBuf::from("paper"))).vehicle()?;
+    #[pyo3(
+        signature = (vehicle=None, *, dt_s=Given::Default(0.001)),
+        text_signature = "(vehicle=None, *, dt_s=0.001)"
+    )]
+    fn new(vehicle: Option<Given<'_, VehicleArgument<'_>>>, dt_s: Given<'_, f64>) -> PyResult<Self> {
+        let dt_s = step_s(&dt_s)?;
+        let vehicle = flown(vehicle.as_ref())?;
         let mass_kg = vehicle.parameters.mass_kg;
         let lift = Lift {
             most_m_s2: (vehicle.rotors.len() as f64 * vehicle.force_max_n / mass_kg) as f32,
@@ -65,19 +69,34 @@ impl PyGuidance {
 
     /// Orders to take off to a height above where it stands [m], or to that of the settings.
     #[pyo3(signature = (height_m=None))]
-    fn take_off(&mut self, height_m: Option<f32>) -> PyResult<()> {
-        self.order(Order::TakeOff(height_m))
+    fn take_off(&mut self, height_m: Option<Given<'_, f64>>) -> PyResult<()> {
+        let height_m = optional(height_m.as_ref(), "height_m")?.map(|height_m| finite("height_m", height_m));
+        self.order(Order::TakeOff(height_m.transpose()?.map(|height_m| height_m as f32)))
     }
 
-    /// Orders to fly to a place and to hold there [m]; NaN keeps a coordinate. Heading [rad] and horizontal speed
-    /// [m/s] if they are given.
-    #[pyo3(signature = (position_m, yaw_rad=f32::NAN, speed_m_s=None))]
-    fn go_to(&mut self, position_m: [f64; 3], yaw_rad: f32, speed_m_s: Option<f32>) -> PyResult<()> {
+    /// Orders to fly to a place and to hold there [m]; NaN keeps a coordinate. Heading [rad], the one that it has if
+    /// that is None or NaN, and horizontal speed [m/s] if they are given.
+    #[pyo3(signature = (position_m, yaw_rad=None, speed_m_s=None))]
+    fn go_to(
+        &mut self,
+        position_m: Given<'_, [f64; 3]>,
+        yaw_rad: Option<Given<'_, f64>>,
+        speed_m_s: Option<Given<'_, f64>>,
+    ) -> PyResult<()> {
+        let position_m = position_m.named("position_m")?;
+        // NaN has a meaning; infinity has none.
+        let kept = |name, value: f64| if value.is_nan() { Ok(value) } else { finite(name, value) };
+        position_m.iter().try_for_each(|value| kept("position_m", *value).map(drop))?;
+        let yaw_rad = kept("yaw_rad", optional(yaw_rad.as_ref(), "yaw_rad")?.unwrap_or(f64::NAN))? as f32;
+        let speed_m_s = optional(speed_m_s.as_ref(), "speed_m_s")?;
+        let speed_m_s = speed_m_s.map(|speed_m_s| finite("speed_m_s", speed_m_s)).transpose()?;
+        let speed_m_s = speed_m_s.map(|speed_m_s| speed_m_s as f32);
         self.order(Order::GoTo { position_m: vector(position_m), yaw_rad, speed_m_s })
     }
 
     /// Orders a flight mode: "hold", "land", "return" or, flown by sticks, "position", "altitude", "stabilised".
-    fn select(&mut self, mode: &str) -> PyResult<()> {
+    fn select(&mut self, mode: Given<'_, String>) -> PyResult<()> {
+        let mode = mode.named("mode")?;
         let known = MODES.into_iter().find(|known| words(known) == mode);
         let known = known.ok_or_else(|| {
             let names = MODES.map(|known| words(&known)).join(", ");
@@ -88,11 +107,19 @@ impl PyGuidance {
 
     /// Sets a pilot's sticks, -1 to 1 each: roll and yaw positive to the right, pitch forward, throttle up, 0 in its
     /// middle.
-    fn sticks(&mut self, roll: f32, pitch: f32, yaw: f32, throttle: f32) -> PyResult<()> {
-        let given = [roll, pitch, yaw, throttle];
-        if !given.iter().all(|stick| (-1.0..=1.0).contains(stick)) {
-            return Err(error(format!("sticks: {given:?}; each is within -1 to 1")));
-        }
+    fn sticks(
+        &mut self,
+        roll: Given<'_, f64>,
+        pitch: Given<'_, f64>,
+        yaw: Given<'_, f64>,
+        throttle: Given<'_, f64>,
+    ) -> PyResult<()> {
+        let stick = |stick: Given<'_, f64>, name| match stick.named(name)? {
+            value if (-1.0..=1.0).contains(&value) => Ok(value as f32),
+            value => Err(error(format!("{name}: {value} given; a stick is within -1 to 1"))),
+        };
+        let (roll, pitch) = (stick(roll, "roll")?, stick(pitch, "pitch")?);
+        let (yaw, throttle) = (stick(yaw, "yaw")?, stick(throttle, "throttle")?);
         let value = Sticks { roll, pitch, throttle, yaw };
         self.orders.sticks = Some(Stamped { value, at_us: self.now_us });
         Ok(())
@@ -104,12 +131,15 @@ impl PyGuidance {
     #[pyo3(signature = (state, core="flying", *, airborne=true, rested=true, thrust_m_s2=None))]
     fn step(
         &mut self,
-        state: Option<PyRef<'_, PyState>>,
+        state: Option<StateArgument<'_>>,
         core: &str,
         airborne: bool,
         rested: bool,
-        thrust_m_s2: Option<f32>,
+        thrust_m_s2: Option<Given<'_, f64>>,
     ) -> PyResult<Option<PySetpoint>> {
+        let state = optional(state.as_ref(), "state")?;
+        let thrust_m_s2 = optional(thrust_m_s2.as_ref(), "thrust_m_s2")?;
+        let thrust_m_s2 = thrust_m_s2.map(|thrust_m_s2| finite("thrust_m_s2", thrust_m_s2)).transpose()?;
         let known = FLYING.iter().find(|(name, _)| *name == core);
         let (_, core) = known.ok_or_else(|| {
             let names = FLYING.map(|(name, _)| name).join(", ");
@@ -122,13 +152,14 @@ impl PyGuidance {
         let inputs = GuidanceInputs {
             now_us: self.now_us,
             dt_s: self.dt_s as f32,
-            state: state.as_deref().map(|state| &state.0),
+            state: state.as_ref().map(|state| &state.get().0),
+            reset: None,
             core: *core,
             airborne,
             rested,
             battery: None,
             sensors: FailedSensors::default(),
-            lift: Lift { given_m_s2: thrust_m_s2, ..self.lift },
+            lift: Lift { given_m_s2: thrust_m_s2.map(|thrust_m_s2| thrust_m_s2 as f32), ..self.lift },
         };
         let guided = self.guidance.tick(&inputs, &self.orders);
         self.orders.given.pop_front();

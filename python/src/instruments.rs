@@ -1,8 +1,9 @@
 //! Instruments, reading by reading.
 
+use crate::argument::Given;
 use crate::error::error;
-use crate::plant::PyPlant;
-use crate::scenario::{ScenarioArgument, changed};
+use crate::plant::{PyPlant, step_s};
+use crate::scenario::{ScenarioArgument, asked};
 use crate::vehicle::VehicleArgument;
 use afbc_plant::Instruments;
 use afbc_plant::instruments::ImuReading;
@@ -34,15 +35,18 @@ fn inertial<'py>(py: Python<'py>, sample: &ImuReading) -> PyResult<Bound<'py, Py
 impl PyInstruments {
     /// Makes the instruments of a scenario, "outdoor" if none is given, that are read every `dt_s` [s].
     #[new]
-    #[pyo3(signature = (scenario=None, *, vehicle=None, seed=None, dt_s=0.001))]
+    #[pyo3(
+        signature = (scenario=None, *, vehicle=None, seed=None, dt_s=Given::Default(0.001)),
+        text_signature = "(scenario=None, *, vehicle=None, seed=None, dt_s=0.001)"
+    )]
     fn new(
-        scenario: Option<ScenarioArgument<'_>>,
-        vehicle: Option<VehicleArgument<'_>>,
-        seed: Option<u64>,
-        dt_s: f64,
+        scenario: Option<Given<'_, ScenarioArgument<'_>>>,
+        vehicle: Option<Given<'_, VehicleArgument<'_>>>,
+        seed: Option<Given<'_, u64>>,
+        dt_s: Given<'_, f64>,
     ) -> PyResult<Self> {
-        let scenario = scenario.unwrap_or(ScenarioArgument::Path("outdoor".into())).scenario()?;
-        let scenario = changed(scenario, vehicle.as_ref(), seed, None)?;
+        let scenario = asked(scenario.as_ref(), "outdoor", vehicle.as_ref(), seed.as_ref())?;
+        let dt_s = step_s(&dt_s)?;
         let cure = "has no instruments; give it a table [instruments], or take mocap or outdoor";
         let instruments = scenario.instruments(dt_s).map_err(error)?;
         let instruments = instruments.ok_or_else(|| error(format!("{}: {cure}", scenario.name)))?;
@@ -51,8 +55,13 @@ impl PyInstruments {
 
     /// Reads them once, in the plant as it is now. Returns what arrives: "imu", a sample or None, and lists of what
     /// each of "tracker", "gnss", "barometer" and "magnetometer" has measured, with the times for which it was true.
-    fn measure<'py>(&mut self, py: Python<'py>, plant: PyRef<'_, PyPlant>) -> PyResult<Bound<'py, PyDict>> {
-        let readings = self.instruments.measure(&plant.truth());
+    fn measure<'py>(
+        &mut self,
+        py: Python<'py>,
+        plant: Given<'py, Bound<'py, PyPlant>>,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let truth = plant.named("plant")?.try_borrow()?.truth();
+        let readings = self.instruments.measure(&truth);
         let dict = PyDict::new(py);
         dict.set_item("imu", readings.imu.map(|sample| inertial(py, &sample)).transpose()?)?;
         let fixes =

@@ -1,11 +1,11 @@
 //! Laws of one's own, in Python.
 
+use crate::argument::{Argument, Given, optional, wrong};
 use crate::error::error;
 use crate::motion::{PySetpoint, PyState};
 use afbc_scenario::contender::ControllerKind;
 use afbc_scenario::{OwnController, OwnGain, OwnLaw, OwnVehicle};
 use afbc_types::{Inputs, Setpoint, State};
-use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::collections::BTreeSet;
@@ -131,10 +131,7 @@ impl PythonLaw {
         let Some(law) = &self.0 else { return Ok(Inputs::default()) };
         Python::attach(|py| {
             let given = law.bind(py).call_method1("step", (PyState(*state), PySetpoint(*setpoint), fresh))?;
-            let given: [f64; 4] = given.extract().map_err(|_| {
-                let kind = given.get_type();
-                PyTypeError::new_err(format!("step must return the four numbers U1, U2, U3, U4 [N], not {kind}"))
-            })?;
+            let given = <[f64; 4]>::of("U1, U2, U3, U4 [N] of step", &given)?;
             let [roll_n, pitch_n, yaw_n, thrust_n] = given.map(|input| input as f32);
             if given.iter().any(|input| !input.is_finite()) {
                 return Err(error(format!("step returned {given:?}: U1, U2, U3, U4 must be finite")));
@@ -163,21 +160,27 @@ impl OwnController for PythonLaw {
 #[pyfunction]
 #[pyo3(signature = (name, make, *, title=None, gains=None))]
 pub(crate) fn register(
-    name: &str,
-    make: Py<PyAny>,
-    title: Option<&str>,
+    name: Given<'_, String>,
+    make: Bound<'_, PyAny>,
+    title: Option<Given<'_, String>>,
     gains: Option<Vec<(String, Ranged)>>,
 ) -> PyResult<()> {
+    let name = name.named("name")?;
+    if !make.is_callable() {
+        return Err(wrong("make", "a class, or another callable that takes an afbc.OwnVehicle, is", &make));
+    }
+    let make = make.unbind();
+    let title = optional(title.as_ref(), "title")?.unwrap_or_else(|| name.clone());
     let gains = gains.unwrap_or_default();
     let names: Vec<&'static str> = gains.iter().map(|(name, _)| kept(name)).collect();
     let own = names.iter().zip(&gains);
     let gains: Vec<OwnGain> =
         own.map(|(name, (_, (value, min, max)))| OwnGain::new(name, "1", *value as f32, [*min, *max])).collect();
-    let law = OwnLaw::new(kept(name), move |vehicle| {
+    let law = OwnLaw::new(kept(&name), move |vehicle| {
         let vehicle = PyOwnVehicle { vehicle: *vehicle, gains: names.clone() };
         PythonLaw(Python::attach(|py| make.call1(py, (vehicle,))).map_err(raise).ok())
     });
-    law.title(kept(title.unwrap_or(name))).gains(gains).register().map(drop).map_err(error)
+    law.title(kept(&title)).gains(gains).register().map(drop).map_err(error)
 }
 
 /// Names of the laws: the built-in ones, then those registered.

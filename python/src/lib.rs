@@ -3,6 +3,7 @@
 //! What is here only converts; all that flies is in the crates that `sitl` flies, so that both give the same bits.
 //! `python/afbc` has what needs no Rust: data frames, and the types for editors.
 
+mod argument;
 mod batch;
 mod campaign;
 mod controller;
@@ -17,6 +18,7 @@ mod motion;
 mod plant;
 mod replay;
 mod scenario;
+mod source;
 mod tune;
 mod vehicle;
 mod work;
@@ -56,5 +58,8 @@ fn _afbc(module: &Bound<'_, PyModule>) -> PyResult<()> {
     ] {
         module.add_function(function)?;
     }
-    Ok(())
+    // What `pickle` calls; not for others.
+    module.setattr("_flight", wrap_pyfunction!(flight::_flight, module)?)?;
+    module.setattr("_scenario", wrap_pyfunction!(scenario::_scenario, module)?)?;
+    module.setattr("_vehicle", wrap_pyfunction!(vehicle::_vehicle, module)?)
 }

@@ -1,11 +1,14 @@
 //! State and setpoint.
 
+use crate::argument::Given;
 use afbc_types::{Setpoint, State};
 use nalgebra::Vector3;
 use numpy::{PyArray1, ToPyArray};
 use pyo3::prelude::*;
 
 type Array<'py> = Bound<'py, PyArray1<f64>>;
+type Three<'py> = Given<'py, [f64; 3]>;
+const ZERO: [f64; 3] = [0.0; 3];
 
 /// The three numbers as an array, which hold a single's value exactly.
 pub(crate) fn array<'py>(py: Python<'py>, vector: &Vector3<f32>) -> Array<'py> {
@@ -26,14 +29,31 @@ pub(crate) struct PyState(pub(crate) State);
 #[pymethods]
 impl PyState {
     #[new]
-    #[pyo3(signature = (position_m=[0.0; 3], velocity_m_s=[0.0; 3], attitude_rad=[0.0; 3], rates_rad_s=[0.0; 3]))]
-    fn new(position_m: [f64; 3], velocity_m_s: [f64; 3], attitude_rad: [f64; 3], rates_rad_s: [f64; 3]) -> Self {
-        PyState(State {
-            position_m: vector(position_m),
-            velocity_m_s: vector(velocity_m_s),
-            attitude_rad: vector(attitude_rad),
-            rates_rad_s: vector(rates_rad_s),
-        })
+    #[pyo3(signature = (
+        position_m=Given::Default(ZERO), velocity_m_s=Given::Default(ZERO), attitude_rad=Given::Default(ZERO),
+        rates_rad_s=Given::Default(ZERO)
+    ))]
+    fn new(
+        position_m: Three<'_>,
+        velocity_m_s: Three<'_>,
+        attitude_rad: Three<'_>,
+        rates_rad_s: Three<'_>,
+    ) -> PyResult<Self> {
+        Ok(PyState(State {
+            position_m: vector(position_m.named("position_m")?),
+            velocity_m_s: vector(velocity_m_s.named("velocity_m_s")?),
+            attitude_rad: vector(attitude_rad.named("attitude_rad")?),
+            rates_rad_s: vector(rates_rad_s.named("rates_rad_s")?),
+        }))
+    }
+
+    fn __reduce__<'py>(
+        &self,
+        py: Python<'py>,
+    ) -> (Bound<'py, PyAny>, (Array<'py>, Array<'py>, Array<'py>, Array<'py>)) {
+        let State { position_m, velocity_m_s, attitude_rad, rates_rad_s } = &self.0;
+        let [x, v, eta, omega] = [position_m, velocity_m_s, attitude_rad, rates_rad_s].map(|part| array(py, part));
+        (py.get_type::<PyState>().into_any(), (x, v, eta, omega))
     }
 
     #[getter]
@@ -82,6 +102,9 @@ pub(crate) fn numbers(state: &State) -> [f64; 12] {
     core::array::from_fn(|_| numbers.next().unwrap_or_default())
 }
 
+/// The numbers of a setpoint, in the order of its constructor.
+type Numbers<'py> = (Array<'py>, Array<'py>, Array<'py>, Array<'py>, Array<'py>, f32, f32, f32);
+
 /// Desired motion, earth frame: position with four derivatives, heading with two.
 #[pyclass(name = "Setpoint", module = "afbc", frozen, from_py_object)]
 #[derive(Clone, Copy)]
@@ -90,31 +113,45 @@ pub(crate) struct PySetpoint(pub(crate) Setpoint);
 #[pymethods]
 impl PySetpoint {
     #[new]
-    #[pyo3(signature = (
-        position_m=[0.0; 3], velocity_m_s=[0.0; 3], acceleration_m_s2=[0.0; 3], jerk_m_s3=[0.0; 3],
-        snap_m_s4=[0.0; 3], yaw_rad=0.0, yaw_rate_rad_s=0.0, yaw_acceleration_rad_s2=0.0
-    ))]
+    #[pyo3(
+        signature = (
+            position_m=Given::Default(ZERO), velocity_m_s=Given::Default(ZERO), acceleration_m_s2=Given::Default(ZERO),
+            jerk_m_s3=Given::Default(ZERO), snap_m_s4=Given::Default(ZERO), yaw_rad=Given::Default(0.0),
+            yaw_rate_rad_s=Given::Default(0.0), yaw_acceleration_rad_s2=Given::Default(0.0)
+        ),
+        text_signature = "(position_m=..., velocity_m_s=..., acceleration_m_s2=..., jerk_m_s3=..., snap_m_s4=..., \
+                          yaw_rad=0.0, yaw_rate_rad_s=0.0, yaw_acceleration_rad_s2=0.0)"
+    )]
     #[expect(clippy::too_many_arguments, reason = "each by its name")]
     fn new(
-        position_m: [f64; 3],
-        velocity_m_s: [f64; 3],
-        acceleration_m_s2: [f64; 3],
-        jerk_m_s3: [f64; 3],
-        snap_m_s4: [f64; 3],
-        yaw_rad: f64,
-        yaw_rate_rad_s: f64,
-        yaw_acceleration_rad_s2: f64,
-    ) -> Self {
-        PySetpoint(Setpoint {
-            position_m: vector(position_m),
-            velocity_m_s: vector(velocity_m_s),
-            acceleration_m_s2: vector(acceleration_m_s2),
-            jerk_m_s3: vector(jerk_m_s3),
-            snap_m_s4: vector(snap_m_s4),
-            yaw_rad: yaw_rad as f32,
-            yaw_rate_rad_s: yaw_rate_rad_s as f32,
-            yaw_acceleration_rad_s2: yaw_acceleration_rad_s2 as f32,
-        })
+        position_m: Three<'_>,
+        velocity_m_s: Three<'_>,
+        acceleration_m_s2: Three<'_>,
+        jerk_m_s3: Three<'_>,
+        snap_m_s4: Three<'_>,
+        yaw_rad: Given<'_, f64>,
+        yaw_rate_rad_s: Given<'_, f64>,
+        yaw_acceleration_rad_s2: Given<'_, f64>,
+    ) -> PyResult<Self> {
+        Ok(PySetpoint(Setpoint {
+            position_m: vector(position_m.named("position_m")?),
+            velocity_m_s: vector(velocity_m_s.named("velocity_m_s")?),
+            acceleration_m_s2: vector(acceleration_m_s2.named("acceleration_m_s2")?),
+            jerk_m_s3: vector(jerk_m_s3.named("jerk_m_s3")?),
+            snap_m_s4: vector(snap_m_s4.named("snap_m_s4")?),
+            yaw_rad: yaw_rad.named("yaw_rad")? as f32,
+            yaw_rate_rad_s: yaw_rate_rad_s.named("yaw_rate_rad_s")? as f32,
+            yaw_acceleration_rad_s2: yaw_acceleration_rad_s2.named("yaw_acceleration_rad_s2")? as f32,
+        }))
+    }
+
+    fn __reduce__<'py>(&self, py: Python<'py>) -> (Bound<'py, PyAny>, Numbers<'py>) {
+        let Setpoint { position_m, velocity_m_s, acceleration_m_s2, jerk_m_s3, snap_m_s4, .. } = &self.0;
+        let Setpoint { yaw_rad, yaw_rate_rad_s, yaw_acceleration_rad_s2, .. } = self.0;
+        let [x, v, a, j, s] =
+            [position_m, velocity_m_s, acceleration_m_s2, jerk_m_s3, snap_m_s4].map(|part| array(py, part));
+        let numbers = (x, v, a, j, s, yaw_rad, yaw_rate_rad_s, yaw_acceleration_rad_s2);
+        (py.get_type::<PySetpoint>().into_any(), numbers)
     }
 
     #[getter]

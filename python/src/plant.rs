@@ -1,8 +1,9 @@
 //! The plant, step by step.
 
+use crate::argument::{Array, Given, optional};
 use crate::error::error;
 use crate::motion::{PySetpoint, PyState};
-use crate::scenario::{ScenarioArgument, changed};
+use crate::scenario::{ScenarioArgument, asked};
 use crate::vehicle::VehicleArgument;
 use afbc_control::Settings;
 use afbc_plant::{Motion, Truth};
@@ -10,7 +11,7 @@ use afbc_scenario::Scenario;
 use afbc_sim::flight::{View, World};
 use afbc_types::{ROTORS_MAX, RotorSpeeds};
 use nalgebra::SVector;
-use numpy::{PyArray1, PyReadonlyArray1, ToPyArray};
+use numpy::{PyArray1, ToPyArray};
 use pyo3::prelude::*;
 
 /// The world of a scenario without its controllers: plant with rotors, air, ground and battery, sensors, link and
@@ -23,9 +24,18 @@ pub(crate) struct PyPlant {
     dt_s: f64,
 }
 
+/// A state as an argument.
+pub(crate) type StateArgument<'py> = Given<'py, Bound<'py, PyState>>;
+
+/// The time between steps of the argument `dt_s`.
+pub(crate) fn step_s(dt_s: &Given<'_, f64>) -> PyResult<f64> {
+    let dt_s = dt_s.named("dt_s")?;
+    Settings::DT.range.check(dt_s).map_err(error)?;
+    Ok(dt_s)
+}
+
 /// The world of `scenario`, and what is seen of it at its start.
 pub(crate) fn start(scenario: &Scenario, dt_s: f64) -> PyResult<(World, View)> {
-    Settings::DT.range.check(dt_s).map_err(error)?;
     let mut world = World::new(scenario, dt_s).map_err(error)?;
     let view = world.look();
     Ok((world, view))
@@ -49,11 +59,13 @@ pub(crate) fn begun(scenario: &Scenario, state: Option<&PyState>) -> PyResult<Sc
     Ok(scenario)
 }
 
-/// Commands of as many rotors as the vehicle has.
-pub(crate) fn commands(speeds: &[f64], rotors: usize) -> PyResult<RotorSpeeds<ROTORS_MAX>> {
-    if speeds.len() != rotors || !speeds.iter().all(|speed| speed.is_finite() && *speed >= 0.0) {
-        let given = speeds.len();
-        return Err(error(format!("speeds_rad_s: {given} given; {rotors} finite numbers, 0 or more, are needed")));
+/// Largest speed that a rotor may be commanded [rad/s]: far beyond what any turns at.
+const SPEED_MAX_RAD_S: f64 = 1e5;
+
+/// Commands of the rotors, by their speeds.
+pub(crate) fn commands(speeds: &[f64]) -> PyResult<RotorSpeeds<ROTORS_MAX>> {
+    if let Some(speed) = speeds.iter().find(|speed| !(0.0..=SPEED_MAX_RAD_S).contains(*speed)) {
+        return Err(error(format!("speeds_rad_s: {speed} given; numbers from 0 to {SPEED_MAX_RAD_S} are needed")));
     }
     let speed = |i: usize| speeds.get(i).copied().unwrap_or_default() as f32;
     Ok(RotorSpeeds(SVector::from_fn(|i, _| speed(i))))
@@ -70,33 +82,38 @@ impl PyPlant {
 impl PyPlant {
     /// Makes the world of a scenario, "hover" if none is given, for steps of `dt_s` [s].
     #[new]
-    #[pyo3(signature = (scenario=None, *, vehicle=None, seed=None, dt_s=0.001))]
+    #[pyo3(
+        signature = (scenario=None, *, vehicle=None, seed=None, dt_s=Given::Default(0.001)),
+        text_signature = "(scenario=None, *, vehicle=None, seed=None, dt_s=0.001)"
+    )]
     fn new(
-        scenario: Option<ScenarioArgument<'_>>,
-        vehicle: Option<VehicleArgument<'_>>,
-        seed: Option<u64>,
-        dt_s: f64,
+        scenario: Option<Given<'_, ScenarioArgument<'_>>>,
+        vehicle: Option<Given<'_, VehicleArgument<'_>>>,
+        seed: Option<Given<'_, u64>>,
+        dt_s: Given<'_, f64>,
     ) -> PyResult<Self> {
-        let scenario = scenario.unwrap_or(ScenarioArgument::Path("hover".into())).scenario()?;
-        let scenario = changed(scenario, vehicle.as_ref(), seed, None)?;
+        let scenario = asked(scenario.as_ref(), "hover", vehicle.as_ref(), seed.as_ref())?;
+        let dt_s = step_s(&dt_s)?;
         let (world, view) = start(&scenario, dt_s)?;
         Ok(PyPlant { scenario, world, view, dt_s })
     }
 
     /// Starts again, with another seed or from another motion if one is given.
     #[pyo3(signature = (seed=None, state=None))]
-    fn reset(&mut self, seed: Option<u64>, state: Option<PyRef<'_, PyState>>) -> PyResult<()> {
-        let mut scenario = begun(&self.scenario, state.as_deref())?;
-        scenario.seed = seed.unwrap_or(scenario.seed);
+    fn reset(&mut self, seed: Option<Given<'_, u64>>, state: Option<StateArgument<'_>>) -> PyResult<()> {
+        let state = optional(state.as_ref(), "state")?;
+        let mut scenario = begun(&self.scenario, state.as_ref().map(Bound::get))?;
+        scenario.seed = crate::argument::seed(seed.as_ref())?.unwrap_or(scenario.seed);
         (self.world, self.view) = start(&scenario, self.dt_s)?;
         self.scenario = scenario;
         Ok(())
     }
 
     /// Moves the vehicle by one step with these commanded rotor speeds [rad/s], shape (rotors,).
-    fn step(&mut self, speeds_rad_s: PyReadonlyArray1<'_, f64>) -> PyResult<()> {
-        let speeds: Vec<f64> = speeds_rad_s.as_array().iter().copied().collect();
-        self.world.advance(&commands(&speeds, self.scenario.rotors.len())?);
+    fn step(&mut self, speeds_rad_s: Given<'_, Array>) -> PyResult<()> {
+        let rotors = self.scenario.rotors.len();
+        let speeds = speeds_rad_s.named("speeds_rad_s")?.shaped("speeds_rad_s", [Some(rotors)])?;
+        self.world.advance(&commands(&speeds)?);
         self.view = self.world.look();
         Ok(())
     }

@@ -1,5 +1,6 @@
 //! Recorded flights through the estimator.
 
+use crate::argument::Given;
 use crate::error::error;
 use crate::work::watched;
 use afbc_replay::EstimatorStart;
@@ -11,7 +12,8 @@ use std::path::PathBuf;
 /// Runs the estimator over a recorded flight, a ULog of PX4 or of this firmware, and returns its estimate beside the
 /// log's, by the columns of `sitl replay`'s CSV file, NaN where there is none.
 #[pyfunction]
-pub(crate) fn replay<'py>(py: Python<'py>, log: PathBuf) -> PyResult<Bound<'py, PyDict>> {
+pub(crate) fn replay<'py>(py: Python<'py>, log: Given<'py, PathBuf>) -> PyResult<Bound<'py, PyDict>> {
+    let log = log.named("log")?;
     let replayed = watched(py, None, None, |_| {
         let recording = afbc_replay::read(&log).map_err(|error| error.to_string())?;
         afbc_replay::fly(&recording, None).map_err(|error| error.to_string())

@@ -1,14 +1,17 @@
 //! Scenarios.
 
+use crate::argument::{Argument, Array, Given, finite, optional, wrong};
 use crate::error::error;
-use crate::vehicle::VehicleArgument;
+use crate::source::Source;
+use crate::vehicle::{PyVehicle, VehicleArgument};
 use afbc::Profile;
 use afbc_campaign::subject;
 use afbc_scenario::trajectory::polynomial::COEFFICIENTS;
 use afbc_scenario::trajectory::{PolynomialPiece, Reference, Trajectory};
 use afbc_scenario::{BUILT_IN, DURATION, Scenario};
+use afbc_vehicles::Vehicle;
 use nalgebra::Vector3;
-use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1};
+use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::path::PathBuf;
@@ -16,36 +19,70 @@ use std::path::PathBuf;
 /// A scenario: one vehicle, one trajectory, one environment, the contenders to compare. Of the built-in ones by name,
 /// or of a file by path; docs/scenarios.md describes the files.
 #[pyclass(name = "Scenario", module = "afbc", frozen)]
-pub(crate) struct PyScenario(pub(crate) Scenario);
+pub(crate) struct PyScenario {
+    pub(crate) scenario: Scenario,
+    source: Source,
+    /// What `replace` has changed, in this order.
+    changes: Vec<Change>,
+}
 
 /// Start and length [s] of a piece of a path, and its coefficients.
 type Piece<'py> = (f64, f64, Bound<'py, PyArray2<f64>>);
 
+/// What `replace` changes: vehicle, seed, length [s].
+type Change = (Option<Py<PyVehicle>>, Option<u64>, Option<f64>);
+
+/// What `pickle` keeps of a scenario.
+type Kept = (String, String, String, Vec<Change>);
+
 /// A scenario, or what names one.
-#[derive(FromPyObject)]
+#[derive(Clone)]
 pub(crate) enum ScenarioArgument<'py> {
     Scenario(Bound<'py, PyScenario>),
     Path(PathBuf),
 }
 
+impl<'py> Argument<'py> for ScenarioArgument<'py> {
+    fn of(name: &str, object: &Bound<'py, PyAny>) -> PyResult<Self> {
+        if let Ok(scenario) = object.cast::<PyScenario>() {
+            return Ok(ScenarioArgument::Scenario(scenario.clone()));
+        }
+        let path = object.extract().map_err(|_| wrong(name, "afbc.Scenario, a name or a path is", object))?;
+        Ok(ScenarioArgument::Path(path))
+    }
+}
+
 impl ScenarioArgument<'_> {
     pub(crate) fn scenario(&self) -> PyResult<Scenario> {
         match self {
-            ScenarioArgument::Scenario(scenario) => Ok(scenario.get().0.clone()),
+            ScenarioArgument::Scenario(scenario) => Ok(scenario.get().scenario.clone()),
             ScenarioArgument::Path(path) => subject::scenario(path).map_err(error),
         }
     }
 }
 
+/// The scenario of the argument `scenario`, or the built-in one called `usual`, on another vehicle or with another seed
+/// if these are given.
+pub(crate) fn asked(
+    scenario: Option<&Given<'_, ScenarioArgument<'_>>>,
+    usual: &str,
+    vehicle: Option<&Given<'_, VehicleArgument<'_>>>,
+    seed: Option<&Given<'_, u64>>,
+) -> PyResult<Scenario> {
+    let scenario = optional(scenario, "scenario")?.unwrap_or_else(|| ScenarioArgument::Path(usual.into()));
+    let vehicle = crate::vehicle::given(vehicle)?;
+    changed(scenario.scenario()?, vehicle.as_ref(), crate::argument::seed(seed)?, None)
+}
+
 /// The flight on another vehicle, or with another seed or length.
 pub(crate) fn changed(
     scenario: Scenario,
-    vehicle: Option<&VehicleArgument<'_>>,
+    vehicle: Option<&Vehicle>,
     seed: Option<u64>,
     duration_s: Option<f64>,
 ) -> PyResult<Scenario> {
     let mut scenario = match vehicle {
-        Some(vehicle) => scenario.on(&vehicle.vehicle()?, Profile::Flight).map_err(error)?,
+        Some(vehicle) => scenario.on(vehicle, Profile::Flight).map_err(error)?,
         None => scenario,
     };
     scenario.seed = seed.unwrap_or(scenario.seed);
@@ -56,74 +93,132 @@ pub(crate) fn changed(
     Ok(scenario)
 }
 
+/// Makes the scenario of this source.
+fn of(source: Source) -> PyResult<PyScenario> {
+    let scenario = afbc_scenario::parse(&source.file, &source.text, &source.name).map_err(error)?;
+    Ok(PyScenario { scenario, source, changes: Vec::new() })
+}
+
+impl PyScenario {
+    fn changed(&self, py: Python<'_>, change: Change) -> PyResult<Self> {
+        let (vehicle, seed, duration_s) = &change;
+        let vehicle = vehicle.as_ref().map(|vehicle| &vehicle.get().vehicle);
+        let scenario = changed(self.scenario.clone(), vehicle, *seed, *duration_s)?;
+        let changes = self.changes.iter().map(|change| copied(py, change)).chain([change]).collect();
+        Ok(PyScenario { scenario, source: self.source.clone(), changes })
+    }
+}
+
+fn copied(py: Python<'_>, (vehicle, seed, duration_s): &Change) -> Change {
+    (vehicle.as_ref().map(|vehicle| vehicle.clone_ref(py)), *seed, *duration_s)
+}
+
+/// Makes a scenario of what `pickle` has kept of it.
+#[pyfunction]
+pub(crate) fn _scenario(
+    py: Python<'_>,
+    file: String,
+    text: String,
+    name: String,
+    changes: Vec<Change>,
+) -> PyResult<PyScenario> {
+    let scenario = of(Source { file, text, name })?;
+    changes.into_iter().try_fold(scenario, |scenario, change| scenario.changed(py, change))
+}
+
 #[pymethods]
 impl PyScenario {
     #[new]
-    fn new(name: PathBuf) -> PyResult<Self> {
-        subject::scenario(&name).map(PyScenario).map_err(error)
+    fn new(name: Given<'_, PathBuf>) -> PyResult<Self> {
+        let path = name.named("name")?;
+        // First as the command line does, whose errors have the path as it was given.
+        subject::scenario(&path).map_err(error)?;
+        let text = |name: &str| afbc_scenario::built_in(name).map(|known| known.text);
+        of(Source::at(&path, "scenario", text).map_err(error)?)
     }
 
     /// Reads the text of a scenario file (TOML).
     #[staticmethod]
     #[pyo3(signature = (text, name="scenario"))]
     fn from_toml(text: &str, name: &str) -> PyResult<Self> {
-        afbc_scenario::parse(name, text, name).map(PyScenario).map_err(error)
+        of(Source { file: name.into(), text: text.into(), name: name.into() })
     }
 
     /// Returns it on another vehicle, with another seed, or of another length.
     #[pyo3(signature = (*, vehicle=None, seed=None, duration_s=None))]
     fn replace(
         &self,
-        vehicle: Option<VehicleArgument<'_>>,
-        seed: Option<u64>,
-        duration_s: Option<f64>,
+        py: Python<'_>,
+        vehicle: Option<Given<'_, VehicleArgument<'_>>>,
+        seed: Option<Given<'_, u64>>,
+        duration_s: Option<Given<'_, f64>>,
     ) -> PyResult<Self> {
-        changed(self.0.clone(), vehicle.as_ref(), seed, duration_s).map(PyScenario)
+        let vehicle = match optional(vehicle.as_ref(), "vehicle")? {
+            Some(VehicleArgument::Vehicle(vehicle)) => Some(vehicle.unbind()),
+            Some(VehicleArgument::Path(path)) => Some(Py::new(py, PyVehicle::at(&path)?)?),
+            None => None,
+        };
+        let seed = crate::argument::seed(seed.as_ref())?;
+        self.changed(py, (vehicle, seed, optional(duration_s.as_ref(), "duration_s")?))
+    }
+
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Kept)> {
+        let (file, text, name) = self.source.clone().into_texts();
+        let changes: Vec<Change> = self.changes.iter().map(|change| copied(py, change)).collect();
+        Ok((py.import("afbc._afbc")?.getattr("_scenario")?, (file, text, name, changes)))
+    }
+
+    fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
+        other.cast::<PyScenario>().is_ok_and(|other| other.get().scenario == self.scenario)
+    }
+
+    fn __hash__(&self) -> u64 {
+        crate::vehicle::hash(&self.scenario.name)
     }
 
     #[getter]
     fn name(&self) -> &str {
-        &self.0.name
+        &self.scenario.name
     }
 
     #[getter]
     fn description(&self) -> &str {
-        &self.0.description
+        &self.scenario.description
     }
 
     #[getter]
     fn duration_s(&self) -> f64 {
-        self.0.duration_s
+        self.scenario.duration_s
     }
 
     #[getter]
     fn seed(&self) -> u64 {
-        self.0.seed
+        self.scenario.seed
     }
 
     /// Number of rotors.
     #[getter]
     fn rotors(&self) -> usize {
-        self.0.rotors.len()
+        self.scenario.rotors.len()
     }
 
     /// Names of its contenders.
     #[getter]
     fn contenders(&self) -> Vec<String> {
-        self.0.contenders.iter().map(|contender| contender.name.clone()).collect()
+        self.scenario.contenders.iter().map(|contender| contender.name.clone()).collect()
     }
 
     /// Nominal masses, inertia, arm and rotor factors by name, in SI.
     #[getter]
     fn parameters<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        crate::vehicle::parameters(py, &self.0.vehicle)
+        crate::vehicle::parameters(py, &self.scenario.vehicle)
     }
 
     /// The polynomials of a path of minimum snap, or of one from a file: for each piece its start [s], its length [s]
     /// and the coefficients of x, y, z, yaw, lowest power first, over the time since its start. None for others.
     #[getter]
     fn polynomials<'py>(&self, py: Python<'py>) -> PyResult<Option<Vec<Piece<'py>>>> {
-        let Trajectory::Polynomials(pieces) = &self.0.trajectory else { return Ok(None) };
+        let Trajectory::Polynomials(pieces) = &self.scenario.trajectory else { return Ok(None) };
         let piece = |piece: &PolynomialPiece| {
             let coefficients: Vec<f64> = piece.coefficients.iter().flatten().copied().collect();
             let coefficients = PyArray1::from_vec(py, coefficients).reshape([4, COEFFICIENTS])?;
@@ -133,8 +228,10 @@ impl PyScenario {
     }
 
     /// The reference at these times [s]: a column for each coordinate and derivative, named as in a flight's log.
-    fn reference<'py>(&self, py: Python<'py>, time_s: PyReadonlyArray1<'py, f64>) -> PyResult<Bound<'py, PyDict>> {
-        let at: Vec<Reference> = time_s.as_array().iter().map(|time_s| self.0.trajectory.at(*time_s)).collect();
+    fn reference<'py>(&self, py: Python<'py>, time_s: Given<'py, Array>) -> PyResult<Bound<'py, PyDict>> {
+        let times_s = time_s.named("time_s")?.shaped("time_s", [None])?;
+        times_s.iter().try_for_each(|time_s| finite("time_s", *time_s).map(drop))?;
+        let at: Vec<Reference> = times_s.iter().map(|time_s| self.scenario.trajectory.at(*time_s)).collect();
         let dict = PyDict::new(py);
         let add = |name: String, value: &dyn Fn(&Reference) -> f64| {
             dict.set_item(name, PyArray1::from_iter(py, at.iter().map(value)))
@@ -159,7 +256,7 @@ impl PyScenario {
     }
 
     fn __repr__(&self) -> String {
-        format!("Scenario('{}')", self.0.name)
+        format!("Scenario('{}')", self.scenario.name)
     }
 }
 

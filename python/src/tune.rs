@@ -1,8 +1,9 @@
 //! Searches for gains.
 
+use crate::argument::{self, Given, SEEDS, optional};
 use crate::error::error;
 use crate::scenario::ScenarioArgument;
-use crate::vehicle::VehicleArgument;
+use crate::vehicle::{self, VehicleArgument};
 use crate::work::watched;
 use afbc::Profile;
 use afbc_scenario::contender::{Contender, ControllerKind};
@@ -16,29 +17,41 @@ use pyo3::types::PyDict;
 /// Returns the costs `before` and `after`, the number of `evaluations`, the `gains` found by name, and the `text` for a
 /// scenario or vehicle file.
 #[pyfunction]
-#[pyo3(signature = (
-    law, scenarios=None, *, vehicle=None, budget=1000, seed=1, step=search::STEP, flying=false, threads=None,
-    progress=None
-))]
+#[pyo3(
+    signature = (
+        law, scenarios=None, *, vehicle=None, budget=Given::Default(1000), seed=Given::Default(1),
+        step=Given::Default(search::STEP), flying=false, threads=None, progress=None
+    ),
+    text_signature = "(law, scenarios=None, *, vehicle=None, budget=1000, seed=1, step=..., flying=False, \
+                      threads=None, progress=None)"
+)]
 #[expect(clippy::too_many_arguments, reason = "each by its name")]
 pub(crate) fn tune<'py>(
     py: Python<'py>,
-    law: &str,
-    scenarios: Option<Vec<ScenarioArgument<'py>>>,
-    vehicle: Option<VehicleArgument<'py>>,
-    budget: usize,
-    seed: u64,
-    step: f64,
+    law: Given<'py, String>,
+    scenarios: Option<Given<'py, Vec<ScenarioArgument<'py>>>>,
+    vehicle: Option<Given<'py, VehicleArgument<'py>>>,
+    budget: Given<'py, u64>,
+    seed: Given<'py, u64>,
+    step: Given<'py, f64>,
     flying: bool,
-    threads: Option<usize>,
+    threads: Option<Given<'py, u64>>,
     progress: Option<Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let kind = ControllerKind::named(law)
-        .ok_or_else(|| error(format!("{law}: no such controller; the laws are {}", ControllerKind::names())))?;
-    if budget == 0 || !(0.001..=1.0).contains(&step) {
-        return Err(error(format!("budget {budget}, step {step}: at least 1 try, and a step from 0.001 to 1")));
+    let law = law.named("law")?;
+    let kind = ControllerKind::named(&law)
+        .ok_or_else(|| error(format!("{law}: no such controller; {}", ControllerKind::cure(&law))))?;
+    let (budget, seed) = (budget.within("budget", 1..=1_000_000)? as usize, seed.within("seed", SEEDS)?);
+    let step = step.named("step")?;
+    if !(0.001..=1.0).contains(&step) {
+        return Err(error(format!("step: {step} given; a number from 0.001 to 1 is needed")));
     }
-    let vehicle = vehicle.map(|vehicle| vehicle.vehicle()).transpose()?;
+    let threads = argument::threads(threads.as_ref())?;
+    let scenarios = optional(scenarios.as_ref(), "scenarios")?;
+    if scenarios.as_ref().is_some_and(Vec::is_empty) {
+        return Err(error("scenarios: none named; name one, or leave it out for the training flights"));
+    }
+    let vehicle = vehicle::given(vehicle.as_ref())?;
     let start = match (&vehicle, flying) {
         (None, false) => search::by_hand(kind),
         (Some(vehicle), false) => search::by_hand_on(kind, vehicle),

@@ -1,96 +1,149 @@
 //! Vehicles.
 
+use crate::argument::{Argument, Given, wrong};
 use crate::error::error;
+use crate::source::Source;
 use afbc_types::Parameters;
 use afbc_vehicles::{BUILT_IN, Vehicle};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use std::path::PathBuf;
+use std::hash::{DefaultHasher, Hash, Hasher};
+use std::path::{Path, PathBuf};
 
 /// A vehicle: of the built-in ones by name, or of a file by path.
 #[pyclass(name = "Vehicle", module = "afbc", frozen)]
-pub(crate) struct PyVehicle(pub(crate) Vehicle);
+pub(crate) struct PyVehicle {
+    pub(crate) vehicle: Vehicle,
+    source: Source,
+}
 
 /// A vehicle, or what names one.
-#[derive(FromPyObject)]
+#[derive(Clone)]
 pub(crate) enum VehicleArgument<'py> {
     Vehicle(Bound<'py, PyVehicle>),
     Path(PathBuf),
 }
 
+impl<'py> Argument<'py> for VehicleArgument<'py> {
+    fn of(name: &str, object: &Bound<'py, PyAny>) -> PyResult<Self> {
+        if let Ok(vehicle) = object.cast::<PyVehicle>() {
+            return Ok(VehicleArgument::Vehicle(vehicle.clone()));
+        }
+        let path = object.extract().map_err(|_| wrong(name, "afbc.Vehicle, a name or a path is", object))?;
+        Ok(VehicleArgument::Path(path))
+    }
+}
+
 impl VehicleArgument<'_> {
     pub(crate) fn vehicle(&self) -> PyResult<Vehicle> {
         match self {
-            VehicleArgument::Vehicle(vehicle) => Ok(vehicle.get().0.clone()),
+            VehicleArgument::Vehicle(vehicle) => Ok(vehicle.get().vehicle.clone()),
             VehicleArgument::Path(path) => afbc_scenario::vehicle_named(path).map_err(error),
         }
+    }
+}
+
+/// Returns the vehicle of the argument `vehicle`, if it is given.
+pub(crate) fn given(vehicle: Option<&Given<'_, VehicleArgument<'_>>>) -> PyResult<Option<Vehicle>> {
+    crate::argument::optional(vehicle, "vehicle")?.map(|vehicle| vehicle.vehicle()).transpose()
+}
+
+/// Returns the vehicle of the argument `vehicle`, the paper's if none is given.
+pub(crate) fn flown(vehicle: Option<&Given<'_, VehicleArgument<'_>>>) -> PyResult<Vehicle> {
+    given(vehicle)?.map_or_else(|| afbc_scenario::vehicle_named(Path::new("paper")).map_err(error), Ok)
+}
+
+/// Makes the vehicle of this source.
+fn of(source: Source) -> PyResult<PyVehicle> {
+    let vehicle = afbc_vehicles::parse(&source.file, &source.text, &source.name).map_err(error)?;
+    Ok(PyVehicle { vehicle, source })
+}
+
+impl PyVehicle {
+    pub(crate) fn at(path: &Path) -> PyResult<Self> {
+        // First as the command line does, whose errors have the path as it was given.
+        afbc_scenario::vehicle_named(path).map_err(error)?;
+        let text = |name: &str| afbc_vehicles::built_in(name).map(|known| known.text);
+        of(Source::at(path, "vehicle", text).map_err(error)?)
     }
 }
 
 #[pymethods]
 impl PyVehicle {
     #[new]
-    fn new(name: PathBuf) -> PyResult<Self> {
-        afbc_scenario::vehicle_named(&name).map(PyVehicle).map_err(error)
+    fn new(name: Given<'_, PathBuf>) -> PyResult<Self> {
+        PyVehicle::at(&name.named("name")?)
     }
 
     /// Reads the text of a vehicle file (TOML), as docs/vehicles.md describes it.
     #[staticmethod]
     #[pyo3(signature = (text, name="vehicle"))]
     fn from_toml(text: &str, name: &str) -> PyResult<Self> {
-        afbc_vehicles::parse(name, text, name).map(PyVehicle).map_err(error)
+        of(Source { file: name.into(), text: text.into(), name: name.into() })
+    }
+
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (String, String, String))> {
+        Ok((py.import("afbc._afbc")?.getattr("_vehicle")?, self.source.clone().into_texts()))
+    }
+
+    fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
+        other.cast::<PyVehicle>().is_ok_and(|other| other.get().vehicle == self.vehicle)
+    }
+
+    fn __hash__(&self) -> u64 {
+        hash(&self.vehicle.name)
     }
 
     #[getter]
     fn name(&self) -> &str {
-        &self.0.name
+        &self.vehicle.name
     }
 
     #[getter]
     fn description(&self) -> &str {
-        &self.0.description
+        &self.vehicle.description
     }
 
     /// Number of rotors.
     #[getter]
     fn rotors(&self) -> usize {
-        self.0.rotors.len()
+        self.vehicle.rotors.len()
     }
 
     /// Largest force of one rotor [N].
     #[getter]
     fn rotor_force_max_n(&self) -> f64 {
-        self.0.force_max_n
+        self.vehicle.force_max_n
     }
 
     /// Lag of the rotors [s].
     #[getter]
     fn lag_s(&self) -> f32 {
-        self.0.lag_s()
+        self.vehicle.lag_s()
     }
 
     /// Positions of the rotors' hubs from the centre of mass, body frame [m], shape (rotors, 3).
     #[getter]
     fn rotor_positions_m<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let (realism, arm_m) = (&self.0.realism, self.0.parameters.arm_m);
+        let (realism, arm_m) = (&self.vehicle.realism, self.vehicle.parameters.arm_m);
         let contact = realism.contact.map(|contact| contact.rotor_height_m);
         let height_m = realism.drag.map(|drag| drag.rotor_height_m).or(contact).unwrap_or_default();
-        let numbers = self.0.rotors.iter().flat_map(|rotor| [rotor.x * arm_m, rotor.y * arm_m, height_m]);
-        PyArray1::from_iter(py, numbers).reshape([self.0.rotors.len(), 3])
+        let numbers = self.vehicle.rotors.iter().flat_map(|rotor| [rotor.x * arm_m, rotor.y * arm_m, height_m]);
+        PyArray1::from_iter(py, numbers).reshape([self.vehicle.rotors.len(), 3])
     }
 
     /// Direction of the moment by which each rotor's drag turns the body, shape (rotors,): 1 to positive yaw, by a
     /// rotor that turns clockwise seen from above; -1 by one that turns counter-clockwise.
     #[getter]
     fn rotor_yaw_signs<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        PyArray1::from_iter(py, self.0.rotors.iter().map(|rotor| if rotor.pushes_left { 1.0 } else { -1.0 }))
+        PyArray1::from_iter(py, self.vehicle.rotors.iter().map(|rotor| if rotor.pushes_left { 1.0 } else { -1.0 }))
     }
 
     /// Smallest and largest speed of a rotor [rad/s].
     #[getter]
     fn rotor_speed_limits_rad_s(&self) -> (f64, f64) {
-        (self.0.realism.rotors.min_rad_s, self.0.realism.rotors.max_rad_s)
+        (self.vehicle.realism.rotors.min_rad_s, self.vehicle.realism.rotors.max_rad_s)
     }
 
     /// Drag by name, in SI, or None: `blade_n_s2_m`, the force of one rotor's blades per rotor speed and airspeed in
@@ -98,7 +151,7 @@ impl PyVehicle {
     /// acts.
     #[getter]
     fn drag<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
-        let Some(drag) = &self.0.realism.drag else { return Ok(None) };
+        let Some(drag) = &self.vehicle.realism.drag else { return Ok(None) };
         let dict = PyDict::new(py);
         dict.set_item("blade_n_s2_m", drag.blade_n_s2_m)?;
         dict.set_item("body_n_s2_m2", <[f64; 3]>::from(drag.area_m2 * (0.5 * drag.air_density_kg_m3)))?;
@@ -109,11 +162,11 @@ impl PyVehicle {
     /// Nominal masses, inertia, arm and rotor factors by name, in SI.
     #[getter]
     fn parameters<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        parameters(py, &self.0.parameters)
+        parameters(py, &self.vehicle.parameters)
     }
 
     fn __repr__(&self) -> String {
-        format!("Vehicle('{}')", self.0.name)
+        format!("Vehicle('{}')", self.vehicle.name)
     }
 }
 
@@ -128,6 +181,19 @@ pub(crate) fn parameters<'py>(py: Python<'py>, of: &Parameters<f64>) -> PyResult
     dict.set_item("drag_factor_n_m_s2", of.drag_factor_n_m_s2)?;
     dict.set_item("gravity_m_s2", of.gravity_m_s2)?;
     Ok(dict)
+}
+
+/// A hash that equal ones share: that of the name.
+pub(crate) fn hash(name: &str) -> u64 {
+    let mut hasher = DefaultHasher::new();
+    name.hash(&mut hasher);
+    hasher.finish()
+}
+
+/// Makes a vehicle of what `pickle` has kept of it.
+#[pyfunction]
+pub(crate) fn _vehicle(file: String, text: String, name: String) -> PyResult<PyVehicle> {
+    of(Source { file, text, name })
 }
 
 /// Names of the built-in vehicles.

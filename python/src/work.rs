@@ -1,8 +1,12 @@
 //! Long work without the GIL: Ctrl-C ends it, progress is shown, and what a law of one's own raised is raised again.
 
+use crate::error::error;
 use crate::law;
 use pyo3::prelude::*;
+use rayon::ThreadPool;
+use std::process;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
 use std::time::Duration;
 
@@ -38,6 +42,39 @@ impl Watch {
     }
 }
 
+fn threads_of(count: usize) -> PyResult<ThreadPool> {
+    rayon::ThreadPoolBuilder::new().num_threads(count).build().map_err(error)
+}
+
+/// Threads that stay, of the process with this number.
+static KEPT: Mutex<Option<(u32, Arc<ThreadPool>)>> = Mutex::new(None);
+
+/// Threads on all cores. A process that was forked has those of its parent no more, and gets its own.
+fn kept_threads() -> PyResult<Arc<ThreadPool>> {
+    let mut kept = KEPT.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some((_, pool)) = kept.as_ref().filter(|(owner, _)| *owner == process::id()) {
+        return Ok(Arc::clone(pool));
+    }
+    let pool = Arc::new(threads_of(0)?);
+    let before = kept.replace((process::id(), Arc::clone(&pool)));
+    // Nobody answers there any more: it is left as it is.
+    core::mem::forget(before);
+    Ok(pool)
+}
+
+/// Does `work` in `slices` of a whole, on all cores; Ctrl-C ends it between them.
+pub(crate) fn in_slices(py: Python<'_>, whole: u64, slice: u64, mut work: impl FnMut(u64) + Send) -> PyResult<()> {
+    let pool = kept_threads()?;
+    let mut left = whole;
+    while left > 0 {
+        let part = left.min(slice);
+        py.detach(|| pool.install(|| work(part)));
+        left -= part;
+        py.check_signals()?;
+    }
+    Ok(())
+}
+
 /// Does `work` on a thread of its own, on this many cores if that is said, while this one calls `progress` with what is
 /// done.
 pub(crate) fn watched<T: Send>(
@@ -47,8 +84,7 @@ pub(crate) fn watched<T: Send>(
     work: impl FnOnce(&Watch) -> T + Send,
 ) -> PyResult<T> {
     let watch = Watch::default();
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.unwrap_or(0)).build();
-    let pool = pool.map_err(crate::error::error)?;
+    let pool = threads_of(threads.unwrap_or(0))?;
     law::forget_error();
     let ended = thread::scope(|scope| {
         let worker = scope.spawn(|| pool.install(|| work(&watch)));
@@ -68,8 +104,7 @@ pub(crate) fn watched<T: Send>(
                 watch.stop.store(true, Ordering::Relaxed);
             }
         }
-        interrupted
-            .and_then(|()| worker.join().map_err(|_| crate::error::error("a flight ended by a panic; report it")))
+        interrupted.and_then(|()| worker.join().map_err(|_| error("a flight ended by a panic; report it")))
     });
     match law::take_error() {
         Some(error) => Err(error),

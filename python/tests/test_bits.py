@@ -54,8 +54,7 @@ def test_stepping_is_flying(law, vehicle):
     if vehicle:
         scenario = scenario.replace(vehicle=vehicle)
     flight = afbc.fly(scenario, [law], log_hz=1000, duration_s=3)[law]
-    profile = "flight" if vehicle else "paper"
-    controller, plant = afbc.Controller(law, vehicle, profile=profile), afbc.Plant(scenario)
+    controller, plant = afbc.Controller(law, vehicle), afbc.Plant(scenario)
     for row in range(len(flight)):
         action = controller.step(plant.state, plant.setpoint)
         assert plant.true_vector[2] == flight["z_m"][row], (row, law, vehicle)

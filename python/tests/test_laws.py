@@ -1,5 +1,6 @@
 """Laws of one's own, and what goes wrong."""
 
+import re
 import signal
 import threading
 
@@ -87,7 +88,10 @@ def test_what_a_law_raises_is_raised(make, problem):
     assert afbc.fly("hover", ["pid"])["pid"].lost is None
 
 
-@pytest.mark.parametrize("given, problem", [([1, 2], TypeError), ([0, 0, 0, float("nan")], afbc.AfbcError)])
+@pytest.mark.parametrize(
+    "given, problem",
+    [([1, 2], afbc.AfbcError), ([0, 0, 0, float("nan")], afbc.AfbcError), (None, TypeError), ("1234", TypeError)],
+)
 def test_what_a_step_may_return(given, problem):
     class Wrong(PD):
         def step(self, state, setpoint, fresh):
@@ -133,7 +137,8 @@ def test_errors_are_the_line_of_the_command_line(arguments, sitl, tmp_path, monk
     laws = ", ".join(afbc.laws())
     built_in = ", ".join(afbc.laws()[:8])
     assert str(raised.value).replace(laws, built_in) == said
-    assert isinstance(raised.value, ValueError) and "\n" not in said
+    # A file with two mistakes has a line for each.
+    assert isinstance(raised.value, ValueError) and said.count("\n") == (subject == "bad.toml")
 
 
 @pytest.mark.parametrize(
@@ -160,7 +165,24 @@ def test_errors_are_the_line_of_the_command_line(arguments, sitl, tmp_path, monk
 def test_bad_values_are_refused_by_one_line(call):
     with pytest.raises(afbc.AfbcError) as raised:
         call()
-    assert str(raised.value) and "\n" not in str(raised.value)
+    lines = str(raised.value).splitlines()
+    # Mistakes of a file have a line each.
+    assert len(lines) == 1 or lines and all(re.match(r"[^:]+:\d+: ", line) for line in lines)
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda law: afbc.Controller(law),
+        lambda law: afbc.tune(law, "hover"),
+        lambda law: afbc.fly("hover", controllers=[law]),
+    ],
+)
+def test_a_misspelt_law_is_answered_by_the_nearest(call):
+    with pytest.raises(afbc.AfbcError, match=r"did you mean indi\?"):
+        call("idni")
+    with pytest.raises(afbc.AfbcError, match="afbc, "):
+        call("magic")
 
 
 def test_implausible_input_is_reported_not_flown():
