@@ -1,14 +1,14 @@
 # To be sourced: what scripts install.
 
 # Brings the lists of Debian's packages up to date and installs these; one caller at a time, since checks run side by
-# side.
+# side. A package may start a service, which must not inherit the lock.
 debian() {
     local sudo
     sudo=$([ "$(id -u)" = 0 ] || echo sudo)
     (
         flock 9
-        $sudo apt-get update -qq
-        $sudo apt-get install -y -qq --no-install-recommends -o DPkg::Lock::Timeout=300 "$@" >/dev/null
+        $sudo apt-get update -qq 9>&-
+        $sudo apt-get install -y -qq --no-install-recommends -o DPkg::Lock::Timeout=300 "$@" >/dev/null 9>&-
     ) 9>"${TMPDIR:-/tmp}/debian.$(id -u).lock" >&2
 }
 

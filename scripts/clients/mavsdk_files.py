@@ -19,6 +19,8 @@ from socket import SOCK_STREAM
 
 # An older log among those of the vehicle, of no even number of messages.
 OLD, OLD_BYTES = "log001.ulg", bytes(place * 7919 >> 3 & 0xFF for place in range(150_001))
+# Another older log, and the log that is being written.
+OTHER, NOW = "log002.ulg", "log003.ulg"
 
 
 async def connect(served):
@@ -39,7 +41,7 @@ def same(path):
 async def list_logs(drone, entries):
     entries += await drone.log_files.get_entries()
     sizes = [entry.size_bytes for entry in entries]
-    if len(sizes) != 2 or sizes[0] != len(OLD_BYTES):
+    if len(sizes) != 3 or sizes[0] != len(OLD_BYTES):
         raise ValueError(f"{entries}")
     return ", ".join(f"log {entry.id} of {entry.date[:4]}" for entry in entries)
 
@@ -117,6 +119,8 @@ async def run():
     down.mkdir()
     (logs / OLD).write_bytes(OLD_BYTES)
     os.utime(logs / OLD, (1_700_000_000, 1_700_000_000))
+    (logs / OTHER).write_bytes(OLD_BYTES[:1000])
+    os.utime(logs / OTHER, (1_710_000_000, 1_710_000_000))
     served = Served("--ulog", str(logs))
     drone = await session.step("connect", connect(served), 20)
     entries = []
@@ -124,7 +128,7 @@ async def run():
     await session.step("download of a log", download_log(drone, entries[0], down), 20)
     await session.step("the root", list_folder(drone, "/", "etc", "log"))
     await session.step("the metadata", list_folder(drone, "/etc", "general.json", "parameters.json"))
-    await session.step("the logs", list_folder(drone, "/log", OLD, "log002.ulg"))
+    await session.step("the logs", list_folder(drone, "/log", OLD, OTHER, NOW))
     for burst in (False, True):
         await session.step(f"download, burst {burst}", download_file(drone, f"/log/{OLD}", down, burst), 30)
     await session.step("checksum", identical(drone, down / OLD, f"/log/{OLD}"))
@@ -136,19 +140,18 @@ async def run():
     await session.step("out of the root", refused(drone.ftp.list_directory("/log/../.."), "FILE_DOES_NOT_EXIST"), 2)
     new = drone.ftp.create_directory("/log/new")
     await session.step("a new folder", refused(new, "FILE_PROTECTED"), 2)
-    await session.step("the log of now", refused(drone.ftp.remove_file("/log/log002.ulg"), "FILE_PROTECTED"), 2)
+    await session.step("the log of now", refused(drone.ftp.remove_file(f"/log/{NOW}"), "FILE_PROTECTED"), 2)
     await session.step("an old log removed", drone.ftp.remove_file(f"/log/{OLD}"), 2)
-    if (logs / OLD).exists() or not (logs / "log002.ulg").exists():
+    if (logs / OLD).exists() or not (logs / OTHER).exists() or not (logs / NOW).exists():
         session.fail("an old log removed", f"{sorted(logs.iterdir())}")
-    (logs / OLD).write_bytes(OLD_BYTES)
     await session.step("logs erased", drone.log_files.erase_all_log_files(), 2)
     for _ in range(20):
         await asyncio.sleep(0.1)
-        if not (logs / OLD).exists():
+        if not (logs / OTHER).exists():
             break
     else:
         session.fail("logs erased", "they are still there")
-    await session.step("the logs then", list_folder(drone, "/log", "log002.ulg"))
+    await session.step("the logs then", list_folder(drone, "/log", NOW))
     session.end(served)
 
 

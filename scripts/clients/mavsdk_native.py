@@ -38,7 +38,7 @@ async def run():
         await session.step("climbed", climbed, 20)
         await session.step("land", action.land())
         await session.step("armed", first(telemetry.subscribe_armed(), lambda armed: not armed), 60)
-    session.end(served)
+        session.end(served)
 
 
 asyncio.run(run())

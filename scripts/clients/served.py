@@ -7,7 +7,6 @@ import os
 import queue
 import socket
 import subprocess
-import sys
 import threading
 import time
 
@@ -18,6 +17,16 @@ SITL = os.environ.get("SITL", "target/release/sitl")
 PATIENCE = 3
 # Each process has ports of its own, none of which the system gives to anybody unasked.
 PORTS = itertools.count(20_000 + os.getpid() % 500 * 20)
+
+# Every `sitl serve` of this process.
+RUNNING = []
+
+
+@atexit.register
+def stop_all():
+    """Ends every `sitl serve`, also after an exception that nobody expected."""
+    for process in RUNNING:
+        process.kill()
 
 
 def free_port(kind=socket.SOCK_DGRAM):
@@ -39,8 +48,7 @@ class Served:
         command = [SITL, "serve", "--port", "0", "--station", f"127.0.0.1:{self.station}"]
         command += ["--companion", f"127.0.0.1:{self.companion}", *options]
         self.process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
-        # Also after a step that failed.
-        atexit.register(self.process.kill)
+        RUNNING.append(self.process)
         self.lines, self.said = queue.Queue(), []
         threading.Thread(target=self._listen, daemon=True).start()
 
@@ -88,10 +96,14 @@ class Session:
 
     async def step(self, what, doing, seconds=10):
         """Awaits `doing`; what it returns is told."""
-        try:
-            result = await asyncio.wait_for(doing, seconds * PATIENCE)
-        except asyncio.TimeoutError:
+        doing = asyncio.ensure_future(doing)
+        # Unlike `asyncio.wait_for`, this does not wait until a client has ended what it was told to end, maybe never.
+        done, _ = await asyncio.wait({doing}, timeout=seconds * PATIENCE)
+        if not done:
+            doing.cancel()
             return self.fail(what, f"not within {seconds * PATIENCE} s")
+        try:
+            result = doing.result()
         except Exception as error:  # Whatever a client throws is a failed step.
             return self.fail(what, f"{type(error).__name__}: {error}")
         self.line(f"{what}: {'ok' if result is None else result}")
@@ -101,7 +113,7 @@ class Session:
         self.failed.append(what)
         self.line(f"{what}: FAILED: {why}")
         if not self.keep_going:
-            raise SystemExit(1)
+            self.exit(1)
 
     def end(self, served):
         code = served.quit()
@@ -111,5 +123,12 @@ class Session:
         if self.failed:
             tail = "\n".join([line for line in served.said if not line.startswith(("ok", "vehicle"))][-40:])
             self.line(f"{len(self.failed)} steps failed: {', '.join(self.failed)}; sitl serve said\n{tail}")
-            sys.exit(1)
+            self.exit(1)
         self.line("all steps passed")
+        self.exit(0)
+
+    @staticmethod
+    def exit(code):
+        """Ends the process without waiting for the client library's threads: some wait for each other for ever."""
+        stop_all()
+        os._exit(code)

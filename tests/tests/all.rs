@@ -53,6 +53,7 @@ mod sequences;
 mod structure;
 mod suites;
 mod take_off;
+mod told;
 mod trajectories;
 mod tuning;
 mod vehicle_files;

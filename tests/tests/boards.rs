@@ -107,7 +107,7 @@ fn the_wiring_is_what_the_board_uses() {
     for (board, page, heading, count) in [
         ("stm32f405", "firmware.md", "\n## Wiring", 8),
         ("stm32h743", "boards/stm32h743.md", "\n## Wiring", 42),
-        ("pixracer", "boards/pixracer.md", "\n## Wiring", 43),
+        ("pixracer", "boards/pixracer.md", "\n## Wiring", 44),
     ] {
         let text = fs::read_to_string(root().join("docs").join(page)).unwrap();
         let table = text.split_once(heading).unwrap().1.split("\n#").next().unwrap();
@@ -351,6 +351,29 @@ fn prioritised(code: &str) -> BTreeMap<String, String> {
     found
 }
 
+/// A line that nothing drives must not be read: every UART has the set-up whose RX is pulled up. Every I2C is recovered
+/// after trouble.
+#[test]
+fn no_board_has_a_bare_uart_or_i2c() {
+    let (mut uarts, mut buses) = (0, 0);
+    for (path, text) in ["boards", "chips"].iter().flat_map(|folder| sources(&root().join(folder))) {
+        let calls = |call: &str| text.matches(call).count();
+        assert_eq!(calls("usart::Config::default()"), 0, "{}", path.display());
+        if text.contains("embassy_stm32::usart::") {
+            // Where all others begin.
+            let begins = path.ends_with("chips/stm32/src/link.rs");
+            assert_eq!(calls("= Config::default()"), usize::from(begins), "{}", path.display());
+        }
+        let set_up = ["link::uart()", "link::config()", "link::radio()", "escs::config()"].map(calls);
+        assert!(calls("BufferedUart::new(") <= set_up.iter().sum(), "{}", path.display());
+        assert_eq!(calls("I2c::new(p."), calls("i2c::bus("), "{}", path.display());
+        (uarts, buses) = (uarts + calls("BufferedUart::new("), buses + calls("I2c::new(p."));
+    }
+    let link = fs::read_to_string(root().join("chips/stm32/src/link.rs")).unwrap();
+    assert!(link.contains("config.rx_pull = Pull::Up;"));
+    assert!(uarts >= 12 && buses >= 4, "{uarts} UARTs, {buses} I2C");
+}
+
 /// From Betaflight's descriptions of the boards (`betaflight/config`): the gyroscope's data in, select, interrupt and
 /// alignment, motors 1 to 4, clock and data of the barometer's bus, first LED but for those at the
 /// debugger's pins, buzzer, pins of the battery's voltage and current with the current's scale.
@@ -424,6 +447,13 @@ fn boards_are_as_betaflight_describes_them() {
         assert_eq!(*volts_per_volt, 11.0, "{name}");
         assert!((amperes_per_volt - 1e4 / current_scale).abs() < 0.05, "{name}");
         assert_eq!((table.crystal_hz, table.numbering.as_str()), (8_000_000, "BETAFLIGHT"), "{name}");
+        // Its PINIO1, which it inverts and switches off while armed.
+        let bluetooth = match name {
+            "speedybee-f405-v3" => Some("PC3"),
+            "speedybee-f405-v4" | "speedybee-f405-mini" => Some("PB11"),
+            _ => None,
+        };
+        assert_eq!(table.bluetooth.as_deref(), bluetooth, "{name}");
         // The one whose flash chip is used.
         let flash = table.logs.as_ref().filter(|logs| logs.is_flash);
         let flash = flash.map(|LogBus { name, clock, into, out, select, .. }| [name, clock, into, out, select]);

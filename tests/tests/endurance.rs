@@ -4,7 +4,7 @@ use afbc::{Adaptive, AdaptiveEstimate, Cascade, Controller, Profile};
 use afbc_control::{FlightController, Validated};
 use afbc_plant::sensors::Deviations;
 use afbc_plant::{Environment, Motion, Plant, PlantModel, Realism, Rotors, Sensing, StateSensor};
-use afbc_scenario::contender::ControllerKind;
+use afbc_scenario::contender::{Contender, ControllerKind};
 use afbc_scenario::{Scenario, built_in};
 use afbc_sim::flight::Sample;
 use afbc_sim::run::Run;
@@ -104,12 +104,13 @@ fn estimates_of_the_law_as_printed_drift_until_the_vehicle_is_lost() {
 /// that the allocation needs for the limit cycle in pitch.
 #[test]
 fn the_printed_hover_is_lost_upwards_and_level() {
-    let scenario = Scenario { duration_s: 300.0, ..built_in("hover").unwrap().read().unwrap() };
+    let mut scenario = Scenario { duration_s: 300.0, ..built_in("hover").unwrap().read().unwrap() };
+    scenario.contenders = ControllerKind::PAPER.map(|kind| Contender::of(kind, Profile::Paper)).to_vec();
     let fly = |kind| Run::fly(&scenario, scenario.contender(kind).unwrap(), 7).unwrap();
     let run = fly(ControllerKind::Afbc);
     let (lost, last) = (run.lost.unwrap(), run.log.last().unwrap());
     let reported = format!(
-        "after {:.1} s (`sitl fly hover --duration 300`), level, and {:.0} m up",
+        "after {:.1} s (`sitl fly hover --controller afbc-as-printed --duration 300`), level, and {:.0} m up",
         lost.time_s, last.motion.position_m.z
     );
     let page = include_str!("../../docs/results.md").split_whitespace().collect::<Vec<_>>().join(" ");

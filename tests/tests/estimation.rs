@@ -101,7 +101,7 @@ fn without_tracker(failure: Failure, gap_s: f64, seed: u64) -> (f64, f64, f64) {
     scenario.initial.velocity_m_s = Vector3::zeros();
     (scenario.duration_s, scenario.seed) = (20.0, seed);
     let [start_s, end_s] = [10.0, 10.0 + gap_s];
-    scenario.instrument_faults = vec![InstrumentFault { failure, start_s, end_s }];
+    scenario.instrument_faults = vec![InstrumentFault { failure, start_s, end_s, rise_s: 0.0 }];
     let (mut far_m, mut before, mut after) = (0.0_f64, 0.0_f64, 0.0_f64);
     let mut last: Option<Vector4<f64>> = None;
     flown(&scenario, |sample| {
@@ -132,8 +132,9 @@ fn the_tracker_is_gone_in_hover() {
             failure.name()
         );
         assert!(far_m <= most_m, "{gap_s} s: {far_m} m");
-        // A frozen pose is believed for 0.2 s, against what the inertial sensor says.
-        let most = if matches!(failure, Failure::TrackerFrozen) { 0.3 } else { 1.2 * before };
+        // A frozen pose is believed for 0.2 s, against what the inertial sensor says: the vehicle, 0.4 m off by then,
+        // flies back faster than one whose tracker was lost.
+        let most = if matches!(failure, Failure::TrackerFrozen) { 0.35 } else { 1.2 * before };
         assert!(after <= most, "{gap_s} s: {after} N after {before} N");
     }
 }
@@ -148,7 +149,7 @@ fn a_tracker_gone_for_good_is_admitted() {
 
 fn admitted(failure: Failure) {
     let mut scenario = scenario("mocap");
-    scenario.instrument_faults = vec![InstrumentFault { failure, start_s: 1.0, end_s: f64::INFINITY }];
+    scenario.instrument_faults = vec![InstrumentFault { failure, start_s: 1.0, end_s: f64::INFINITY, rise_s: 0.0 }];
     let mut world = World::new(&scenario, 0.001).unwrap();
     let mut lost_s = None;
     for _ in 0..8000 {

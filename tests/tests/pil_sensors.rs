@@ -86,7 +86,7 @@ fn compare(scenario: &Scenario) {
 fn what_is_left_of_the_sensors_is_the_hosts_bit_for_bit() {
     let mut scenario = built_in("mocap").expect("built in").read().expect("valid");
     scenario.duration_s = 9.0;
-    let fault = |failure, start_s| InstrumentFault { failure, start_s, end_s: 9.0 };
+    let fault = |failure, start_s| InstrumentFault { failure, start_s, end_s: 9.0, rise_s: 0.0 };
     scenario.instrument_faults = vec![fault(Failure::ImuDead, 3.0), fault(Failure::TrackerLost, 6.0)];
     let Some(mut twins) = twins_or_skip() else { return };
     let end = fly(&scenario, &mut Station::new(), &mut twins, MessagePeriods::LOCKSTEP, |_| ControlFlow::Continue(()));

@@ -50,7 +50,7 @@ fn no_law_loses_the_vehicle_in_the_storm() {
 fn a_monitor_that_trips_saves_the_vehicle() {
     let text = |monitor| {
         format!(
-            "monitor = {monitor}\ncontrollers = [\"afbc\"]\n[settings]\nrotor_force_max_n = 3.0\n\
+            "monitor = {monitor}\nprofile = \"paper\"\ncontrollers = [\"afbc\"]\n[settings]\nrotor_force_max_n = 3.0\n\
              [rotors]\ntime_constant_s = 0.02\nforce_max_n = 3.0\n[sensors]\nnoise = 0.001\n\
              [initial]\nposition_m = [0, 0, 1.5]\n[trajectory]\nkind = \"hover\"\nposition_m = [0, 0, 2]"
         )

@@ -179,7 +179,7 @@ fn the_model_that_stands_in_for_the_inertial_sensor_need_not_be_right() {
     };
     let mut jumped = Scenario { name: "jumped".into(), ..base.clone() };
     let failure = Failure::TrackerJumped { by_m: Vector3::new(0.5, 0.0, 0.0), yaw_rad: 0.3 };
-    jumped.instrument_faults.push(InstrumentFault { failure, start_s: 15.0, end_s: jumped.duration_s });
+    jumped.instrument_faults.push(InstrumentFault { failure, start_s: 15.0, end_s: jumped.duration_s, rise_s: 0.0 });
     let scenarios = [
         changed(PlantParameter::ThrustFactor, 0.5),
         changed(PlantParameter::ThrustFactor, 2.0),

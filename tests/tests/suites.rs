@@ -54,8 +54,8 @@ fn the_page_of_the_field_is_what_flies() {
     compared("field", include_str!("../../docs/suites.md"));
 }
 
-/// What the pages say about AFBC, MPC, INDI and DFBC is what the field's table says. First is who has the least root
-/// mean square distance of the tuned laws.
+/// What the pages say about AFBC and others is what `sitl compare --suite field` prints, as far as the field's table,
+/// of one seed and rounded, can tell.
 #[test]
 fn pages_say_where_afbc_leads() {
     let [begin, end] = suite::markers("field");
@@ -72,28 +72,26 @@ fn pages_say_where_afbc_leads() {
         .map(cells)
         .map(|cells| (cells[0].split('`').nth(1).unwrap().to_owned(), columns.map(|column| distance(&cells[column]))))
         .collect();
-    let is_first = |law: usize, distances: &[Option<String>; 7]| {
-        let number = |text: &Option<String>| text.as_ref().map_or(f64::INFINITY, |text| text.parse().unwrap());
-        distances.iter().all(|other| number(&distances[law]) <= number(other))
+    // The command tells these over ten seeds, the page one to four digits: what is surely level, and what may be.
+    let number = |text: &Option<String>| text.as_ref().map_or(f64::INFINITY, |text| text.parse().unwrap());
+    let is_level = |law: usize, distances: &[Option<String>; 7], rounding_m: f64| {
+        let best = distances.iter().map(number).fold(f64::INFINITY, f64::min);
+        number(&distances[law]) - best <= (0.05 * best).max(0.2e-3) + rounding_m
     };
-    let (afbc, indi, dfbc, mpc) = (0, 3, 5, 6);
+    let (afbc, pid, indi, dfbc, mpc) = (0, 1, 3, 5, 6);
     let survived = || flights.iter().filter(|(_, distances)| distances.iter().any(Option::is_some));
+    assert_eq!((flights.len(), survived().count()), (26, 25));
+    for (law, said) in [(afbc, 21), (mpc, 8), (dfbc, 6), (indi, 5), (pid, 4)] {
+        let level = |rounding_m| survived().filter(|(_, distances)| is_level(law, distances, rounding_m)).count();
+        assert!((level(-1e-4)..=level(1e-4 + 1e-9)).contains(&said), "{}: {said}", tuned[law]);
+    }
     let raced = || survived().filter(|(name, _)| ["lemniscate-", "circle-"].iter().any(|kind| name.starts_with(kind)));
-    let first = |law| survived().filter(|(_, distances)| is_first(law, distances)).count();
-    let first_raced = |law| raced().filter(|(_, distances)| is_first(law, distances)).count();
-    let said = format!(
-        "AFBC is first, alone or level, in {} of the {} flights of the suite `field` that a law survives, MPC in {}, \
-         INDI in {}, DFBC in {}; of the racer's {} flights AFBC is first in {}, DFBC in {}, MPC in {}",
-        first(afbc),
-        survived().count(),
-        first(mpc),
-        first(indi),
-        first(dfbc),
-        raced().count(),
-        first_raced(afbc),
-        first_raced(dfbc),
-        first_raced(mpc)
-    );
+    assert_eq!(raced().count(), 10);
+    let least = |distances: &[Option<String>; 7]| distances.iter().map(number).fold(f64::INFINITY, f64::min);
+    assert!(raced().all(|(_, distances)| number(&distances[afbc]) <= least(distances)));
+    let said = "AFBC is best or level, within 5 % or 0.2 mm of the best, in 21 of the 26 flights of the suite `field`, \
+                MPC in 8, DFBC in 6, INDI in 5, PID in 4; it is the best in each of the racer's 10 flights, and one \
+                flight is lost under every law";
     let plain = |page: &str| page.split_whitespace().collect::<Vec<_>>().join(" ");
     let results = plain(include_str!("../../docs/results.md"));
     for (name, page) in [
@@ -103,7 +101,7 @@ fn pages_say_where_afbc_leads() {
         ("docs/suites.md", plain(include_str!("../../docs/suites.md"))),
         ("docs/tuning.md", plain(include_str!("../../docs/tuning.md"))),
     ] {
-        assert!(page.contains(&said), "{name} lacks: {said}");
+        assert!(page.contains(said), "{name} lacks: {said}");
     }
     let section = results.split("## On other vehicles").nth(1).unwrap().split(" ## ").next().unwrap();
     let mut quoted = 0;

@@ -277,6 +277,7 @@ impl Checker {
             "has not left the ground" => matches!(mode, FlightMode::Hold | FlightMode::Land),
             "disarmed" => mode == FlightMode::Hold && !self.armed && time_ms - self.disarmed_ms <= 2,
             "station lost" => silent_ms + SOON_MS > self.station_lost_ms,
+            "the state is back" => self.mode == FlightMode::Land && self.descends.is_some(),
             "no targets" => self.mode == FlightMode::Offboard && targetless_ms + SOON_MS > TARGETS_MS,
             // What the safety net acts on; the flights that cause it say which.
             _ => matches!(mode, FlightMode::Hold | FlightMode::Return | FlightMode::Land),
@@ -434,8 +435,8 @@ fn needs_control(command: &Command) -> bool {
             | Command::Orbit { .. }
             | Command::Speed(_)
             | Command::Home(_)
-            | Command::StartMission(_)
-            | Command::SetCurrent(_)
+            | Command::StartMission(..)
+            | Command::SetCurrent(..)
             | Command::Reboot(_)
             | Command::Storage(_)
     )
@@ -448,7 +449,7 @@ fn wanted(command: &Command) -> Option<FlightMode> {
         Command::Land => Some(FlightMode::Land),
         Command::Return => Some(FlightMode::Return),
         Command::Reposition { .. } => Some(FlightMode::Hold),
-        Command::StartMission(_) => Some(FlightMode::Mission),
+        Command::StartMission(..) => Some(FlightMode::Mission),
         Command::SelectMode(custom) => modes::of_custom(*custom),
         Command::SelectStandardMode(standard) => modes::of_standard(*standard),
         _ => None,

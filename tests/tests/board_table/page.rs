@@ -90,6 +90,12 @@ pub(crate) fn wiring(board: &BoardTable) -> String {
     ]);
     rows.extend(board.led.iter().map(|led| ["LED".to_owned(), led.clone(), "lit if low".to_owned()]));
     rows.push(["buzzer with a tone of its own".to_owned(), board.buzzer.clone(), "sounds if high".to_owned()]);
+    rows.extend(
+        board
+            .bluetooth
+            .iter()
+            .map(|pin| ["Bluetooth's enable pin".to_owned(), pin.clone(), "held low: off".to_owned()]),
+    );
     rows.push(["debugger".to_owned(), "PA13, PA14".to_owned(), "SWDIO, SWCLK".to_owned()]);
     let mut table = "| what | pin | peripheral |\n|---|---|---|\n".to_owned();
     for row in rows {

@@ -119,6 +119,8 @@ pub(crate) struct BoardTable {
     pub(crate) battery: Battery,
     pub(crate) led: Option<String>,
     pub(crate) buzzer: String,
+    /// The enable pin of the board's Bluetooth.
+    pub(crate) bluetooth: Option<String>,
     pub(crate) logs: Option<LogBus>,
     pub(crate) outputs: usize,
     pub(crate) numbering: String,
@@ -177,6 +179,7 @@ impl BoardTable {
         let led = (words.peek() == "led").then(|| words.after("led :"));
         let buzzer = words.after("buzzer :");
         words.expect("}");
+        let bluetooth = (words.peek() == "bluetooth").then(|| words.after("bluetooth :"));
         let logs = ["card", "flash"].contains(&words.peek()).then(|| {
             let is_flash = words.peek() == "flash";
             let logs = LogBus {
@@ -218,6 +221,7 @@ impl BoardTable {
             battery,
             led,
             buzzer,
+            bluetooth,
             logs,
             outputs,
             numbering,
@@ -258,7 +262,8 @@ impl BoardTable {
         let logs = self.logs.iter().flat_map(|LogBus { clock, out, into, select, quiet, .. }| {
             [clock, out, into, select].into_iter().chain(quiet)
         });
-        let all = uarts.chain(buses).chain(motors).chain(&self.led).chain([&self.buzzer]).chain(logs).chain(inverter);
+        let held = [&self.buzzer].into_iter().chain(&self.led).chain(&self.bluetooth).chain(inverter);
+        let all = uarts.chain(buses).chain(motors).chain(logs).chain(held);
         all.map(String::as_str).collect()
     }
 }

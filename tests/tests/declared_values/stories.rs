@@ -131,7 +131,7 @@ impl Story {
                 }
             }
             if self == Story::Journey && time_ms == BEGINS_MS + 6_000 {
-                session.say(STATION, Uplink::Command(Command::StartMission(0)));
+                session.say(STATION, Uplink::Command(Command::StartMission(0, None)));
             }
             let tick = session.step();
             armed = is_armed(&tick).unwrap_or(armed);

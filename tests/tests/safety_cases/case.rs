@@ -151,7 +151,7 @@ impl Case {
     /// Flies a mission from the beginning on.
     pub(crate) fn mission(self, places: &[[f32; 3]]) -> Self {
         let items = (0..).zip(places).map(|(number, at)| item(number, WAYPOINT, *at)).collect();
-        self.before(Do::Upload(items)).at(0.1, say(Command::StartMission(0)))
+        self.before(Do::Upload(items)).at(0.1, say(Command::StartMission(0, None)))
     }
 
     /// Watches the battery, whose cells are known.
@@ -183,7 +183,7 @@ pub(crate) fn take_off(metres: f32) -> Command {
 }
 
 pub(crate) fn go_to(x: f32, y: f32, z: f32) -> Command {
-    Command::Reposition { place: global(x, y, z), yaw_rad: f32::NAN, speed_m_s: None }
+    Command::Reposition { place: global(x, y, z), yaw_rad: f32::NAN, speed_m_s: None, changes_mode: true }
 }
 
 /// Leans towards the north and climbs a little.
