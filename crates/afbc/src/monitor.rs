@@ -24,7 +24,8 @@ use afbc_types::{Axis, Declared, OutOfRange, Parameters, PerAxis, parameters};
 /// Time over which figures are averaged \[s\].
 pub const WINDOW_S: f32 = 1.0;
 
-/// What is quicker than this in U3 turns no vehicle \[rad/s\]: that of a rotor's lag of 16 ms.
+/// Corner of the low-passes behind which U3 is looked at \[rad/s\], that of a rotor's lag of 16 ms: quicker changes of
+/// U3 turn no vehicle.
 pub const FOLLOWS_RAD_S: f32 = 63.0;
 
 /// Steps in which each subsystem is looked at once.
@@ -133,7 +134,7 @@ impl Swing {
     }
 }
 
-/// What a vehicle can follow of an input: the mean of a round behind two low-passes.
+/// The part of an input that a vehicle can follow: the mean of a round behind two low-passes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Followed {
     /// Sum of the inputs since the last round \[N\].
@@ -166,7 +167,7 @@ pub struct MonitorFigures {
     pub saturation_share: f32,
     /// Detectors of U1, U2, U3, U4.
     pub swings: [Swing; 4],
-    /// What the vehicle can follow of U3.
+    /// The part of U3 that the vehicle can follow.
     yaw: Followed,
     /// Subsystem updated last.
     axis: Axis,

@@ -39,7 +39,7 @@ pub struct Class {
 
 /// Name of the class of two others at once.
 pub const MIXTURE: &str = "mixture";
-/// What it means in words.
+/// Description of the class of mixtures.
 pub const MIXTURE_MEANING: &str = "two of the others at once";
 
 const fn class(

@@ -12,7 +12,7 @@ pub struct RoughFlight {
     pub vehicle: String,
     /// Name of its class.
     pub class: &'static str,
-    /// What was drawn: its class, or the two of a mixture.
+    /// The classes that were drawn: its own, or the two of a mixture.
     pub parts: Vec<&'static str>,
     /// Number among the flights of the same seed, vehicle and class, from 1.
     pub number: u64,

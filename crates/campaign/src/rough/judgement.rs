@@ -1,4 +1,4 @@
-//! What became of a flight.
+//! The judgement of a flight: its estimate's errors, and how it ended.
 
 use afbc_scenario::Scenario;
 use afbc_sim::flight::{Estimated, Lost, Mode, Sample, fly};

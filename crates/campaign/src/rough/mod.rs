@@ -39,7 +39,7 @@ pub const LONG_S: f64 = 600.0;
 /// One flight in so many is long.
 pub const LONG_ONE_IN: u64 = 10;
 
-/// What to draw.
+/// The flights to draw: how many, of which vehicles, for how long.
 #[derive(Clone, Debug)]
 pub struct Rough {
     /// Seeds.

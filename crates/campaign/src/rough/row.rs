@@ -22,7 +22,7 @@ pub struct ClassRow {
     pub flights: usize,
     /// Mean over the flights of their normalised error; not a number if any has none.
     pub nees: f64,
-    /// That of the worst flight.
+    /// Normalised error of the worst flight.
     pub worst_nees: f64,
     /// Mean share within three standard deviations, of flights with a valid estimate.
     pub within: f64,

@@ -5,7 +5,7 @@ use afbc_campaign::rough::{ClassRow, FlownRough, Rough, rows};
 /// Flights that were drawn and flown, and a row for each class.
 #[derive(Clone, Debug)]
 pub struct RoughResults<'a> {
-    /// What was drawn.
+    /// The suite as it was drawn.
     pub rough: &'a Rough,
     /// The flights.
     pub flown: &'a [FlownRough],
