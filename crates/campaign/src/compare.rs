@@ -5,7 +5,7 @@ use afbc::Profile;
 use afbc_reader::FileError;
 use afbc_reader::words::cure;
 use afbc_scenario::Scenario;
-use afbc_scenario::contender::{Contender, ControllerKind};
+use afbc_scenario::contender::{Contender, ControllerKind, MONITORED};
 use afbc_sim::flight::Lost;
 use afbc_sim::flown::Flown;
 use afbc_sim::metrics::Metrics;
@@ -24,7 +24,7 @@ pub fn standard() -> Vec<Contender> {
 /// Returns the contenders of a suite: the default ones, and AFBC under its monitor.
 pub fn standard_and_monitored() -> Vec<Contender> {
     let guarded = Contender::of(ControllerKind::Afbc, Profile::Flight).monitored();
-    let guarded = Contender { name: "afbc-monitored".into(), ..guarded };
+    let guarded = Contender { name: MONITORED.into(), ..guarded };
     standard().into_iter().chain([guarded]).collect()
 }
 

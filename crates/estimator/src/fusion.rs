@@ -31,11 +31,14 @@ const ROUNDING: f32 = 1e-6;
 const CROWD: u8 = 3;
 /// Time for which another aid counts as present \[us\].
 const PRESENT_US: u64 = 1_000_000;
-/// Interval of the pseudo-measurements of rest \[us\], and their standard deviations on the ground and in the air
-/// \[m/s\].
+/// Interval of the pseudo-measurements of rest \[us\].
 const STILL_US: u64 = 200_000;
+/// Their standard deviation on the ground \[m/s\].
 const STILL_M_S: f32 = 0.05;
-const ALOFT_M_S: f32 = 3.0;
+/// Their standard deviation in the air without any aid \[m/s\]. A vehicle flies at some 5 m/s, and its velocity stays
+/// what it is for some 2.5 s: noise that is correlated over a time tau, taken every T, counts as white noise of
+/// sqrt(2 tau/T) = 5 times its standard deviation.
+const UNAIDED_M_S: f32 = 25.0;
 /// Largest velocity that may be that of a vehicle at rest, in standard deviations: less than the gate of a measurement,
 /// since one that is driven straight on looks the same to the inertial sensor.
 const STILL_SIGMAS: f32 = 3.0;
@@ -199,7 +202,7 @@ impl Estimator {
         if !held && memory.aids.holds_velocity(at_us, self.coast_us) {
             return false;
         }
-        let sigma = if held { STILL_M_S } else { ALOFT_M_S };
+        let sigma = if held { STILL_M_S } else { UNAIDED_M_S };
         memory.still_us = at_us;
         if held {
             memory.held_us = Some(at_us);

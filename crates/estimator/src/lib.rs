@@ -80,7 +80,8 @@
 //! * **At rest on the ground** the velocity is held at zero, as long as [the inertial sensor shows rest](rest) and the
 //!   motors are known not to carry the vehicle ([`Memory::set_on_ground`]), or that is unknown and it has not moved
 //!   since the alignment. A vehicle carried by hand is followed. In the air without any aid for [`Settings::coast_s`] a
-//!   weak zero (3 m/s) keeps roll and pitch level; velocity and position are then invalid.
+//!   weak zero keeps roll and pitch level: of 5 m/s that stay for 2.5 s, which is no white noise. The tilt is then as
+//!   good as is said (`tests/unaided.rs`); velocity and position are invalid.
 //!
 //! # For a controller
 //!

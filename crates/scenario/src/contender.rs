@@ -17,6 +17,8 @@ use core::convert::Infallible;
 
 /// Name of every law's limit on the tilt.
 const TILT_MAX: &str = "tilt_max_rad";
+/// Name of AFBC under its monitor, where it stands beside AFBC without.
+pub const MONITORED: &str = "afbc-monitored";
 /// Acceleration of free fall, for a limit \[m/s2\].
 const G_M_S2: f32 = 9.81;
 
@@ -124,12 +126,13 @@ impl Contender {
         self.law.kind()
     }
 
-    /// Returns the name for tables and figures, in which a printed law is called so.
+    /// Returns the name for tables and figures, in which a printed law is called so, and a monitored one.
     pub fn title(&self) -> &str {
         let kind = self.kind();
         match printed_names(kind) {
             Some([name, title]) if self.name == name || (self.name == kind.name() && self.is_printed()) => title,
             _ if self.name == kind.name() => kind.title(),
+            _ if self.name == MONITORED && self.monitored => "AFBC with monitor",
             _ => &self.name,
         }
     }

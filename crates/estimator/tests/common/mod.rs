@@ -121,7 +121,7 @@ pub fn hover(t: f64) -> (V3, f64) {
 }
 
 /// Truth of a flight, a moment per millisecond.
-pub fn fly(path: Path, time_s: f64) -> Vec<Moment> {
+pub fn fly(path: impl Fn(f64) -> (V3, f64), time_s: f64) -> Vec<Moment> {
     const H: f64 = 1e-3;
     // Derivatives of the fourth order.
     let velocity =
