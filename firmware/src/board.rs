@@ -5,7 +5,7 @@ use crate::samples::Sampler;
 use crate::ticks::Tick;
 use crate::vehicle::ROTORS;
 use afbc_flight_core::protocol::MotorProtocol;
-use afbc_logger::LogKeeper;
+use afbc_log::storage::LogKeeper;
 use cortex_m::interrupt::InterruptNumber;
 use embassy_executor::SendSpawner;
 use embedded_storage::nor_flash::NorFlash;
@@ -31,7 +31,7 @@ pub trait Board: Sized + 'static {
     /// Its name in logs, perhaps with `board-` before it.
     const HARDWARE: &'static str;
     /// True if it has room for minutes of logs only, which are small then
-    /// ([`BlackBox::small`](afbc_ulog::BlackBox::small)).
+    /// ([`BlackBox::small`](afbc_log::ulog::BlackBox::small)).
     const SMALL_LOGS: bool = false;
     /// True if it keeps logs.
     const HAS_LOG: bool = false;

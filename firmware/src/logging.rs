@@ -1,15 +1,17 @@
 //! The black box: ticks to blocks, in the links' task, and blocks to a memory card or flash, in a task below all
-//! others, which may wait for it. See [`afbc_logger`].
+//! others, which may wait for it. See [`afbc_log::storage`].
 
 use crate::aux_sensors;
 use crate::board::Board;
 use crate::recording::RecordedTick;
 use crate::vehicle::{Flight, NAME, ParameterTable};
-use afbc_logger::{BlockSink, KeptLogs, LogBlock, LogKeeper, LogPage, LogPages, LogQuery, LogWriter, StorageState};
+use afbc_log::storage::{
+    BlockSink, KeptLogs, LogBlock, LogKeeper, LogPage, LogPages, LogQuery, LogWriter, StorageState,
+};
+use afbc_log::ulog::{LogStart, LoggedTick, TakenInputs};
 use afbc_onboard::parameters::RecordChange;
 use afbc_onboard::{ControlInputs, EscTelemetry, FlightView};
 use afbc_station::{Comms, LogServer, REPORT_MAX};
-use afbc_ulog::{LogStart, LoggedTick, TakenInputs};
 use core::array;
 use core::cell::RefCell;
 use core::sync::atomic::{AtomicBool, AtomicU8, Ordering};

@@ -1,4 +1,4 @@
-//! What ticks took and gave, from the control task to the links' task, for the exact log ([`afbc_recorder`]) and the
+//! What ticks took and gave, from the control task to the links' task, for the exact log ([`afbc_log::exact`]) and the
 //! black box ([`crate::logging`]). Nothing is kept unless one of them is written.
 
 use crate::board::{Board, Links, Transmitter};
@@ -6,9 +6,9 @@ use crate::samples::Sampler;
 use crate::ticks::Tick;
 use crate::vehicle::{NAME, ParameterTable, Report};
 use afbc_guidance::BatteryReading;
+use afbc_log::exact::{Given, RecordQueue, TickRecord};
 use afbc_onboard::parameters::RecordChange;
 use afbc_onboard::{ControlInputs, Readings};
-use afbc_recorder::{Given, RecordQueue, TickRecord};
 use core::cell::RefCell;
 use core::sync::atomic::{AtomicBool, Ordering};
 use embassy_sync::blocking_mutex::Mutex;

@@ -2,7 +2,7 @@
 //! flights of `sitl fly`, to the same bits.
 
 use afbc::Profile;
-use afbc_page::Cockpit;
+use afbc_serve::page::Cockpit;
 use afbc_scenario::{BUILT_IN, Scenario, built_in};
 use afbc_serve::{Server, Then, TimeFlow, TimeRate, fleet};
 use afbc_sim::LogRate;

@@ -1,6 +1,6 @@
 //! Texts of files, by which scenarios and vehicles are made again elsewhere: `pickle` carries them.
 
-use afbc_reader::FileError;
+use afbc_files::read::FileError;
 use std::path::Path;
 
 /// The text of a file, and what it is called.
@@ -24,7 +24,7 @@ impl Source {
         if let Some((name, text)) = plain.and_then(|name| Some((name, built_in(name)?))) {
             return Ok(Source { file: format!("built-in {name}"), text: text.into(), name: name.into() });
         }
-        let text = afbc_reader::text(path, kind)?;
+        let text = afbc_files::read::text(path, kind)?;
         let file = std::path::absolute(path).unwrap_or_else(|_| path.into()).display().to_string();
         let name = path.file_stem().map_or(String::new(), |stem| stem.to_string_lossy().into_owned());
         Ok(Source { file, text, name })

@@ -2,10 +2,10 @@
 
 use crate::exact_flights::{SCENARIO, fly, fly_with, log_of, records};
 use afbc::Profile;
+use afbc_files::read::FileError;
 use afbc_hil::Host;
+use afbc_log::exact::{Given, Record, TickRecord};
 use afbc_onboard::Configuration;
-use afbc_reader::FileError;
-use afbc_recorder::{Given, Record, TickRecord};
 use afbc_replay::exact::{
     ChangeComparison, ExactReplay, FirstDifference, GivenSignal, QUANTITIES, ReplayFinding, SettingChange, replay,
 };
@@ -228,7 +228,7 @@ fn what_is_no_log_is_refused_in_one_line() {
     let later: Vec<_> = all.iter().filter(|record| !matches!(record, Record::Start(_))).cloned().collect();
     assert!(line("later", &log_of(&later)).contains("no start"));
     assert!(line("start", &log_of(&all[..1])).contains("no tick"));
-    let renamed = |change: fn(&mut afbc_recorder::StartRecord)| {
+    let renamed = |change: fn(&mut afbc_log::exact::StartRecord)| {
         let mut all = all.clone();
         let Record::Start(start) = &mut all[0] else { panic!("a start") };
         change(start);

@@ -1,8 +1,8 @@
 //! A flight is flown again from its exact log, to the last bit, and what differs is named.
 
 use crate::exact_flights::{SCENARIO, fly, log_of, records};
+use afbc_log::exact::{FRAME_MAX as RECORD_MAX, Frames, Record, ReplayDifference, ReplayStep, Replayer};
 use afbc_onboard::Configuration;
-use afbc_recorder::{FRAME_MAX as RECORD_MAX, Frames, Record, ReplayDifference, ReplayStep, Replayer};
 use afbc_scenario::load;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};

@@ -66,7 +66,7 @@ fn faults(scenario: &Scenario) -> Vec<String> {
 fn every_vehicle_flies_everything_under_every_law() {
     let scenarios = ["hover", "step", "lissajous", "wind"];
     let faults: Vec<_> = thread::scope(|threads| {
-        let fly = |known: &'static afbc_reader::BuiltIn<Vehicle>| {
+        let fly = |known: &'static afbc_files::read::BuiltIn<Vehicle>| {
             threads.spawn(move || {
                 let vehicle = known.read().unwrap_or_else(|error| panic!("{error}"));
                 assert_eq!(vehicle.name, known.name);

@@ -3,9 +3,9 @@
 #![allow(clippy::unwrap_used, missing_docs)] // tests
 
 use afbc_files::Flash;
+use afbc_files::read::params::{Format, read, written};
 use afbc_onboard::parameters::{Kept, ParameterTable, RecordChange};
 use afbc_onboard::{Configuration, Prepared};
-use afbc_reader::params::{Format, read, written};
 use afbc_store::{RecordName, Store, hash};
 use afbc_types::with_rotors;
 use afbc_vehicles::{BUILT_IN, Vehicle};

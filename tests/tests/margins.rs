@@ -4,8 +4,8 @@
 use afbc::Profile;
 use afbc_campaign::suite::SUITES;
 use afbc_control::drag::KnownDrag;
+use afbc_files::read::BuiltIn;
 use afbc_plant::{Drag, Environment, Turbulence};
-use afbc_reader::BuiltIn;
 use afbc_scenario::contender::{Contender, ControllerKind};
 use afbc_scenario::trajectory::{Sine, Trajectory};
 use afbc_scenario::{Scenario, built_in};

@@ -3,8 +3,8 @@
 use afbc::Profile;
 use afbc::Trip;
 use afbc_campaign::suite::{SUITES, Suite};
+use afbc_files::read::BuiltIn;
 use afbc_plant::{Drag, Environment, ParameterChange, PlantParameter, Turbulence};
-use afbc_reader::BuiltIn;
 use afbc_scenario::contender::{Contender, ControllerKind};
 use afbc_scenario::trajectory::Trajectory;
 use afbc_scenario::{Scenario, built_in};

@@ -8,9 +8,9 @@ use afbc_hil::{Autopilot, Error, Host, MessagePeriods, Station, firmware, fly};
 use afbc_link::{
     Address, Command, Datum, Decoder, Downlink, FRAME_MAX, Height, ParameterRequest, Sender, Telemetry, Uplink,
 };
+use afbc_log::exact::{Frames, Record, ReplayStep, Replayer};
 use afbc_onboard::{Configuration, Readings, Report};
 use afbc_plant::{Motion, Payload, Plant, RotorFault};
-use afbc_recorder::{Frames, Record, ReplayStep, Replayer};
 use afbc_scenario::{Scenario, load};
 use afbc_sim::flight::World;
 use afbc_types::{ROTORS_MAX, RotorSpeeds};

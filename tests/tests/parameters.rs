@@ -6,6 +6,7 @@
 
 use afbc::Profile;
 use afbc::monitor::Bounds;
+use afbc_files::read::words::{self, number};
 use afbc_flight_core::ArmingLimits;
 use afbc_flight_core::motor::{Curve, Response};
 use afbc_flight_core::protocol::MotorOutputs;
@@ -13,7 +14,6 @@ use afbc_onboard::parameters::ParameterTable;
 use afbc_onboard::{Configuration, EscSettings, Link};
 use afbc_plant::instruments::{Accelerometer, Barometer, Gnss, Gyroscope, Imu, Magnetometer, TrackerModel};
 use afbc_plant::{Battery, Contact, Deviations, Drag, Dropouts, GroundEffect, Rotors, Sensing, Turbulence, Wind};
-use afbc_reader::words::{self, number};
 use afbc_scenario::contender::{ControllerKind, Law};
 use afbc_types::{Declaration, Declared, Mounting, OutOfRange, Parameters, Range, SensorCalibration, Value};
 use core::convert::Infallible;

@@ -3,8 +3,8 @@
 use afbc::Profile;
 use afbc_campaign::compare::{self, standard_and_monitored};
 use afbc_campaign::suite::{SUITES, Suite, SuiteFlight};
+use afbc_files::read::BuiltIn;
 use afbc_plant::{Misreading, PlantParameter};
-use afbc_reader::BuiltIn;
 use afbc_report::markers;
 use afbc_report::suite::{self, FlownSuite};
 use afbc_scenario::contender::{Contender, ControllerKind};

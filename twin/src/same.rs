@@ -2,7 +2,7 @@
 
 use crate::check::check;
 use afbc_onboard::Configuration;
-use afbc_recorder::{Frames, ReplayStep, Replayer};
+use afbc_log::exact::{Frames, ReplayStep, Replayer};
 use std::error::Error;
 
 /// Flies a log of the image's default vehicle again, and fails at the first tick that differs.

@@ -1,9 +1,9 @@
 //! A memory card by SPI.
 
 use crate::sensors::SELECT;
-use afbc_logger::embedded_sdmmc::sdcard::spi::AcquireOpts;
-use afbc_logger::embedded_sdmmc::{Block, BlockDevice, BlockIdx, SdCard, SdCardError};
-use afbc_logger::{CardError, CardKeeper, LogCard};
+use afbc_log::storage::embedded_sdmmc::sdcard::spi::AcquireOpts;
+use afbc_log::storage::embedded_sdmmc::{Block, BlockDevice, BlockIdx, SdCard, SdCardError};
+use afbc_log::storage::{CardError, CardKeeper, LogCard};
 use core::slice;
 use embassy_stm32::Peri;
 use embassy_stm32::gpio::{Level, Output, Pin, Pull};

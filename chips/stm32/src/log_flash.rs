@@ -1,7 +1,7 @@
 //! A flash chip for logs by SPI.
 
 use crate::sensors::{SELECT, divided};
-use afbc_logger::{FlashKeeper, NorChip};
+use afbc_log::storage::{FlashKeeper, NorChip};
 use embassy_stm32::Peri;
 use embassy_stm32::gpio::{Level, Output, Pin};
 use embassy_stm32::mode::Blocking;

@@ -1,7 +1,7 @@
 //! A memory card by the chip's own interface to it, over four lines.
 
-use afbc_logger::embedded_sdmmc::Block;
-use afbc_logger::{CardError, CardKeeper, LogCard};
+use afbc_log::storage::embedded_sdmmc::Block;
+use afbc_log::storage::{CardError, CardKeeper, LogCard};
 use core::pin::pin;
 use core::task::{Context, Poll, Waker};
 use embassy_stm32::sdmmc::sd::{Addressable as _, Card, CmdBlock, DataBlock, StorageDevice};

@@ -2,7 +2,7 @@
 
 use crate::file::parse;
 use crate::plan::Campaign;
-use afbc_reader::{BuiltIn, FileError};
+use afbc_files::read::{BuiltIn, FileError};
 use std::path::Path;
 
 /// Every built-in campaign.

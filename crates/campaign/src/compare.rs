@@ -2,8 +2,8 @@
 
 use crate::statistics::Median;
 use afbc::Profile;
-use afbc_reader::FileError;
-use afbc_reader::words::cure;
+use afbc_files::read::FileError;
+use afbc_files::read::words::cure;
 use afbc_scenario::Scenario;
 use afbc_scenario::contender::{Contender, ControllerKind, MONITORED};
 use afbc_sim::flight::Lost;

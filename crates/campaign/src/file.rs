@@ -2,9 +2,9 @@
 
 use crate::plan::{Campaign, NamedTrajectory, Spread};
 use crate::quantity::{QUANTITIES, Quantity};
+use afbc_files::read::words::out_of_range;
+use afbc_files::read::{Example, FileError, Table};
 use afbc_plant::InstrumentSuite;
-use afbc_reader::words::out_of_range;
-use afbc_reader::{Example, FileError, Table};
 use afbc_scenario::contender::Contender;
 use afbc_scenario::{DURATION, Scenario, built_in, similar_built_in};
 use afbc_types::Range;
@@ -26,8 +26,8 @@ const SEED: Range = Range::new("seed", 0.0, 9_007_199_254_740_991.0);
 /// # Errors
 /// Every mistake, each as one line.
 pub fn parse(file: &str, text: &str, name: &str, folder: &Path) -> Result<Campaign, FileError> {
-    afbc_reader::document(file, text, SAMPLE, |mut root| {
-        let [name, description] = afbc_reader::title(&mut root, name)?;
+    afbc_files::read::document(file, text, SAMPLE, |mut root| {
+        let [name, description] = afbc_files::read::title(&mut root, name)?;
         let flights = root.whole(&FLIGHTS)?.ok_or_else(|| root.missing(FLIGHTS.name, "say how many to fly"))?;
         let seed = root.whole(&SEED)?.unwrap_or(1);
         let duration_s = root.number(&DURATION)?;

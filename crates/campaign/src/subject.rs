@@ -2,7 +2,7 @@
 
 use crate::built_in;
 use crate::plan::Campaign;
-use afbc_reader::{BuiltIn, FileError};
+use afbc_files::read::{BuiltIn, FileError};
 use afbc_scenario::{Scenario, vehicle_of};
 use afbc_vehicles::Vehicle;
 use std::path::{Path, PathBuf};
@@ -121,7 +121,7 @@ impl Found {
         if let Some(name) = plain.filter(|_| !path.exists()) {
             return kind.other(name).ok_or_else(|| kind.unknown(name));
         }
-        let text = afbc_reader::text(path, kind.name())?;
+        let text = afbc_files::read::text(path, kind.name())?;
         let shown = path.display().to_string();
         Ok(Found {
             kind: SubjectKind::of(&text).unwrap_or(kind),

@@ -2,7 +2,7 @@
 
 use crate::compare;
 use crate::file::named;
-use afbc_reader::{BuiltIn, Example, FileError, LIKE, Table};
+use afbc_files::read::{BuiltIn, Example, FileError, LIKE, Table};
 use afbc_scenario::Scenario;
 use afbc_scenario::contender::Contender;
 use afbc_types::Range;
@@ -95,8 +95,8 @@ impl Suite {
 /// # Errors
 /// The first mistake, as one line.
 pub fn parse(file: &str, text: &str, name: &str, folder: &Path) -> Result<Suite, FileError> {
-    afbc_reader::document_with_heirs(file, text, SAMPLE, ("flight", &OWN), |mut root| {
-        let [name, description] = afbc_reader::title(&mut root, name)?;
+    afbc_files::read::document_with_heirs(file, text, SAMPLE, ("flight", &OWN), |mut root| {
+        let [name, description] = afbc_files::read::title(&mut root, name)?;
         let sources: Vec<Citation> = root.few_tables("source")?.into_iter().map(source).collect::<Result<_, _>>()?;
         let mut flights: Vec<SuiteFlight> = Vec::new();
         for table in root.few_tables("flight")? {
@@ -132,7 +132,7 @@ pub fn suite_at(path: &Path) -> Result<Suite, FileError> {
             None => {}
         }
     }
-    let text = afbc_reader::text(path, "suite")?;
+    let text = afbc_files::read::text(path, "suite")?;
     let stem = path.file_stem().map_or("".into(), OsStr::to_string_lossy);
     parse(&path.display().to_string(), &text, &stem, path.parent().unwrap_or(Path::new("")))
 }

@@ -5,8 +5,8 @@
 
 use afbc::Profile;
 use afbc_campaign::{self as campaign, Campaign, Manifest, NamedTrajectory, Shard, Spread};
+use afbc_files::read::words;
 use afbc_plant::instruments::{Accelerometer, Gyroscope, Imu};
-use afbc_reader::words;
 use afbc_scenario::Scenario;
 use afbc_scenario::contender::{Contender, ControllerKind, Law};
 use afbc_types::{Axis, Declaration, Declared, Mounting, Parameters, Value};

@@ -2,7 +2,7 @@
 
 #![expect(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "tests")]
 
-use afbc_reader::FileError;
+use afbc_files::read::FileError;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 

@@ -3,7 +3,7 @@
 
 use afbc_campaign::compare::standard_and_monitored;
 use afbc_campaign::random::{self, Change, DrawnFlight, Random, Seen};
-use afbc_reader::BuiltIn;
+use afbc_files::read::BuiltIn;
 use afbc_scenario::trajectory::{Reference, Trajectory};
 use afbc_vehicles::{BUILT_IN, Vehicle, built_in, parse};
 use std::collections::BTreeSet;

@@ -3,7 +3,7 @@
 
 use afbc_campaign::compare::standard_and_monitored;
 use afbc_campaign::suite::{Suite, parse};
-use afbc_reader::FileError;
+use afbc_files::read::FileError;
 use std::path::Path;
 
 fn suite(text: &str) -> Result<Suite, FileError> {

@@ -4,16 +4,16 @@ use crate::host_black_box::{HostBlackBox, Sink};
 use crate::metadata::MetadataFiles;
 use afbc::AdaptiveEstimate;
 use afbc_calibration::RawSample;
+use afbc_log::exact::Recorder;
+use afbc_log::ulog::{BlackBox, LogStart, TakenInputs};
 use afbc_onboard::parameters::{ParameterTable, RecordChange};
 use afbc_onboard::{
     Configuration, ControlInputs, EscTelemetry, Flight, FlightView, ImuSelector, Link, Prepare, Readings, Report,
 };
-use afbc_recorder::Recorder;
 use afbc_scenario::{AnyController, FlownLaw};
 use afbc_station::{Calibrator, Comms, EscAction, EscReports, EscsHeard, RadioControl};
 use afbc_store::RecordName;
 use afbc_types::{OutOfRange, PerAxis, ROTORS_MAX};
-use afbc_ulog::{BlackBox, LogStart, TakenInputs};
 
 /// Makes the exact log, and what takes its bytes.
 pub(crate) struct ExactLog {

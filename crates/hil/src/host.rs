@@ -12,19 +12,19 @@ use afbc_estimator::Origin;
 use afbc_files::Flash;
 use afbc_flight_core::rate::PERIOD_US;
 use afbc_link::{Decoder, MissionItem, Uplink};
+use afbc_log::exact::{Given, Recorder, TickRecord};
+use afbc_log::ulog::{LogStart, TakenInputs};
 use afbc_onboard::parameters::{Kept, ParameterTable, Reason, RecordChange};
 use afbc_onboard::{
     Configuration, ControlInputs, Flight, FlightView, ImuSelector, Link, Prepare, RawReadings, Readings, Report,
 };
 use afbc_plant::Plant;
-use afbc_recorder::{Given, Recorder, TickRecord};
 use afbc_scenario::FlownLaw;
 use afbc_scenario::contender::{ControllerKind, Law};
 use afbc_station::services::signing::{Signing, SigningRecord};
 use afbc_station::{Calibrator, Comms, EscReports, EscsHeard, RadioControl, Setup, Transfers};
 use afbc_store::{RecordName, Store};
 use afbc_types::{OutOfRange, PerAxis, ROTORS_MAX, with_rotors};
-use afbc_ulog::{LogStart, TakenInputs};
 use afbc_vehicles::Vehicle;
 
 /// The firmware without its hardware, ticked in lockstep.
@@ -239,7 +239,7 @@ impl Host {
         self.flight.metadata(vehicle)
     }
 
-    /// Keeps an exact log ([`afbc_recorder`]) from now on, before the first tick; `write` takes its bytes.
+    /// Keeps an exact log ([`afbc_log::exact`]) from now on, before the first tick; `write` takes its bytes.
     pub fn record(&mut self, write: impl FnMut(&[u8]) + 'static) {
         let mut log =
             ExactLog { recorder: Recorder::default(), write: Box::new(write), adopted: None, notch_rad_s: None };
@@ -247,7 +247,7 @@ impl Host {
         self.log = Some(log);
     }
 
-    /// Keeps a black box's log ([`afbc_ulog`]) from now on, before the first tick; `write` takes its bytes. Fixes of a
+    /// Keeps a black box's log ([`afbc_log::ulog`]) from now on, before the first tick; `write` takes its bytes. Fixes of a
     /// GNSS receiver are measured from `origin`, if that is known.
     pub fn log(&mut self, origin: Option<Origin>, write: impl FnMut(&[u8]) + 'static) {
         self.origin = origin;

@@ -2,10 +2,10 @@
 
 use afbc_estimator::Origin;
 use afbc_link::{Address, Decoder, Downlink};
+use afbc_log::ulog::{BlackBox, LogRing, LoggedTick, TakenInputs};
 use afbc_onboard::parameters::{ParameterTable, RecordChange};
 use afbc_onboard::{EscTelemetry, FlightView, Readings, Report};
 use afbc_types::ROTORS_MAX;
-use afbc_ulog::{BlackBox, LogRing, LoggedTick, TakenInputs};
 
 /// Bytes that wait for the end of a tick, at most: more than a log's beginning and a tick.
 const RING: usize = 1 << 16;

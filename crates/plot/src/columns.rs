@@ -1,7 +1,7 @@
 //! The columns of a log, by name.
 
 use crate::table::{LogTable, Points};
-use afbc_reader::FileError;
+use afbc_files::read::FileError;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;

@@ -1,7 +1,7 @@
 //! CSV files with a head.
 
 use crate::table::LogTable;
-use afbc_reader::Separated;
+use afbc_files::read::Separated;
 
 /// Reads the only table of a file: a column of which no field is a number is one of words.
 pub(crate) fn read(bytes: &[u8]) -> Result<Vec<LogTable>, String> {

@@ -3,7 +3,7 @@
 use crate::table::LogTable;
 use ::mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use ::mcap::{Channel, McapError, MessageStream};
-use afbc_reader::FileError;
+use afbc_files::read::FileError;
 use std::collections::{BTreeMap, HashMap};
 use std::io::Cursor;
 use std::path::Path;

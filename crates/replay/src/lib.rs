@@ -23,7 +23,7 @@ pub use compare::{ErrorFigure, Figures};
 pub use recording::{Aiding, LoggedReset, LoggedState, Recording, SampleSource, Sensor};
 pub use run::{EstimatorStart, ReplayRow, Replayed, fly};
 
-use afbc_reader::FileError;
+use afbc_files::read::FileError;
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;

@@ -2,7 +2,7 @@
 
 use super::definition::Scenario;
 use super::file::parse;
-use afbc_reader::BuiltIn;
+use afbc_files::read::BuiltIn;
 
 /// Every built-in scenario.
 pub static BUILT_IN: [BuiltIn<Scenario>; 12] = [

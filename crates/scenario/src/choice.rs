@@ -3,8 +3,8 @@
 use crate::Scenario;
 use crate::contender::{Contender, has_printed_cascade};
 use afbc::Profile;
-use afbc_reader::FileError;
-use afbc_reader::words::cure;
+use afbc_files::read::FileError;
+use afbc_files::read::words::cure;
 
 impl Scenario {
     /// Keeps the contenders named in `names`, or whose law is, and adds the laws named that no contender flies, with

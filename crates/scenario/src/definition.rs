@@ -6,6 +6,8 @@ use crate::told::{Told, stated};
 use crate::trajectory::Trajectory;
 use afbc::Profile;
 use afbc_estimator::Settings;
+use afbc_files::read::FileError;
+use afbc_files::read::words::out_of_range;
 use afbc_flight_core::ArmingLimits;
 use afbc_flight_core::motor::Response;
 use afbc_plant::instruments::{Imu, InstrumentFault};
@@ -13,8 +15,6 @@ use afbc_plant::{
     Deviations, Environment, Frame, InstrumentSuite, Instruments, Motion, Plant, PlantModel, Realism, Rotors, Sensing,
     SensorFault, StateSensor,
 };
-use afbc_reader::FileError;
-use afbc_reader::words::out_of_range;
 use afbc_types::{Mounting, OutOfRange, Parameters, Range, Rotor};
 use afbc_vehicles::{Vehicle, data_sheet};
 

@@ -2,7 +2,7 @@
 
 use crate::contender::{ControllerKind, Law};
 use afbc::Profile;
-use afbc_reader::FileError;
+use afbc_files::read::FileError;
 use afbc_vehicles::{BUILT_IN, Vehicle, built_in, unknown};
 use std::path::Path;
 

@@ -1,11 +1,11 @@
 //! Commands in text, one a line, that change weather and faults while vehicles fly.
 
 use crate::hand::{Grip, SIDES};
+use afbc_files::read::words::{nearest, out_of_range};
 use afbc_plant::instruments::{Failure, limits as failure};
 use afbc_plant::rotors::limits as rotor;
 use afbc_plant::wind::limits as gust;
 use afbc_plant::{Battery, GUST_SIZE, PAYLOAD_BELOW, PAYLOAD_MASS, PlantParameter, Turbulence, Wind};
-use afbc_reader::words::{nearest, out_of_range};
 use afbc_scenario::contender::ControllerKind;
 use afbc_types::Range;
 use nalgebra::Vector3;

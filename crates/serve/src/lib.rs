@@ -10,6 +10,7 @@
 //! 3. [`QgcPlan`]: a file of QGroundControl, and [`fly_plan`], a station that flies it.
 //! 4. [`Ports`]: their UDP and TCP ports. [`Door`]: another way to them, such as a page. [`Pace`]: real time. [`run`]:
 //!    all of it together. [`LineOutput`]: lines to whoever reads them, or does not.
+//! 5. [`page`]: what a page in a browser sees and may do. `web`, a feature: the server that carries it to browsers.
 #![forbid(unsafe_code)]
 
 pub mod command;
@@ -19,6 +20,7 @@ mod guide;
 mod hand;
 mod output;
 mod pace;
+pub mod page;
 mod parameter_file;
 mod peer;
 mod plan_file;
@@ -33,6 +35,8 @@ mod tcp;
 mod udp;
 mod vehicle;
 mod waypoint_file;
+#[cfg(feature = "web")]
+pub mod web;
 mod world_changes;
 
 pub use door::{Door, TimeFlow, TimeRate};

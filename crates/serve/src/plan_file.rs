@@ -4,8 +4,8 @@
 //! plan, and flies nothing, is known by name.
 
 use crate::waypoint_file;
+use afbc_files::read::FileError;
 use afbc_link::{MissionItem, Place};
-use afbc_reader::FileError;
 use serde_json::Value;
 
 /// MAV_FRAME_GLOBAL and MAV_FRAME_LOCAL_NED.

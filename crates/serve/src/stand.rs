@@ -1,8 +1,8 @@
 //! Scenarios made fit for a vehicle that stands on the ground until it is flown.
 
+use afbc_files::read::FileError;
+use afbc_files::read::words::out_of_range;
 use afbc_plant::{Motion, Realism, Rotors, Start};
-use afbc_reader::FileError;
-use afbc_reader::words::out_of_range;
 use afbc_scenario::Scenario;
 use nalgebra::Vector3;
 

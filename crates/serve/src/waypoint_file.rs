@@ -4,8 +4,8 @@
 //! command, four parameters, latitude or x, longitude or y, altitude or z, whether the mission goes on by itself. In
 //! version 110 the first line is the home position, unless it is no waypoint; version 120 has none.
 
+use afbc_files::read::{FileError, Source};
 use afbc_link::MissionItem;
-use afbc_reader::{FileError, Source};
 
 /// First words of every file, before its version.
 const MAGIC: &str = "QGC WPL";

@@ -1,11 +1,11 @@
 //! Weather and faults of one vehicle, as changed while it flies.
 
 use crate::command::WorldChange;
+use afbc_files::read::words::out_of_range;
 use afbc_plant::instruments::InstrumentFault;
 use afbc_plant::{
     CosineGust, Environment, Gust, GustKind, InstrumentSuite, ParameterChange, Payload, RotorFault, Wind,
 };
-use afbc_reader::words::out_of_range;
 use afbc_scenario::Scenario;
 use afbc_sim::flight::World;
 use afbc_types::{Axis, OutOfRange};

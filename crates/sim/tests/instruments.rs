@@ -1,9 +1,9 @@
 //! The instruments in scenario files.
 #![allow(clippy::unwrap_used, missing_docs)] // tests
 
+use afbc_files::read::FileError;
 use afbc_plant::instruments::{Barometer, Gnss, Imu, TrackerModel};
 use afbc_plant::{Dropouts, InstrumentSuite, Truth};
-use afbc_reader::FileError;
 use afbc_scenario::{Scenario, parse};
 use nalgebra::Vector3;
 

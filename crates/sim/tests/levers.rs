@@ -60,7 +60,7 @@ fn faults(
 ) -> (Vec<String>, f64) {
     let ends: Vec<_> = thread::scope(|threads| {
         let mount = &mount;
-        let fly_all = |known: &'static afbc_reader::BuiltIn<Vehicle>| {
+        let fly_all = |known: &'static afbc_files::read::BuiltIn<Vehicle>| {
             threads.spawn(move || {
                 let mut ends = Vec::new();
                 for kind in LAWS {

@@ -1,7 +1,7 @@
 //! A contender's gains as coordinates of a search, and as text for a scenario file.
 
 use afbc::Profile;
-use afbc_reader::words;
+use afbc_files::read::words;
 use afbc_scenario::Scenario;
 use afbc_scenario::contender::{Contender, ControllerKind, Law};
 use afbc_types::{Axis, Declaration, Declared, Range, Value, ValueMut};

@@ -2,8 +2,8 @@
 
 use crate::scale::Scale;
 use afbc::Profile;
+use afbc_files::read::FileError;
 use afbc_plant::{Drag, Environment, Gust, Motion, ParameterChange, PlantParameter, Turbulence};
-use afbc_reader::FileError;
 use afbc_scenario::trajectory::Trajectory;
 use afbc_scenario::{Scenario, built_in};
 use afbc_types::Axis;

@@ -1,7 +1,7 @@
 //! A vehicle file of one's own, with gains by rule: `cargo run -p afbc-vehicles --example own_vehicle`.
 
 use afbc::Profile;
-use afbc_reader::FileError;
+use afbc_files::read::FileError;
 
 /// What has to be measured or taken from data sheets; every key is in `docs/vehicles.md`.
 const FILE: &str = r#"

@@ -2,7 +2,7 @@
 
 use crate::file::parse;
 use crate::vehicle::Vehicle;
-use afbc_reader::BuiltIn;
+use afbc_files::read::BuiltIn;
 
 /// Every built-in vehicle.
 pub static BUILT_IN: [BuiltIn<Vehicle>; 6] = [

@@ -7,12 +7,12 @@ use afbc::adaptive::Gains;
 use afbc::{Profile, Settings};
 use afbc_control::drag::KnownDrag;
 use afbc_estimator::Settings as Estimation;
+use afbc_files::read::words::out_of_range;
+use afbc_files::read::{FileError, Table};
 use afbc_flight_core::ArmingLimits;
 use afbc_flight_core::motor::Curve;
 use afbc_plant::instruments::Imu;
 use afbc_plant::{Battery, Contact, Drag, Frame, GroundEffect, InstrumentSuite, Realism, Rotors};
-use afbc_reader::words::out_of_range;
-use afbc_reader::{FileError, Table};
 use afbc_types::{Axis, Declared, Mounting, PLUS, Parameters, PerAxis, ROTOR_POSITION, ROTORS, Range, Rotor};
 use core::convert::Infallible;
 use nalgebra::Vector3;
@@ -34,7 +34,7 @@ const UNFIT: &str = "AFBC would not fly it with a margin: stronger or quicker ro
 /// # Errors
 /// Every mistake, each as one line.
 pub fn load(path: &Path) -> Result<Vehicle, FileError> {
-    let text = afbc_reader::text(path, "vehicle")?;
+    let text = afbc_files::read::text(path, "vehicle")?;
     let stem = path.file_stem().map_or("".into(), |stem| stem.to_string_lossy());
     parse(&path.display().to_string(), &text, &stem)
 }
@@ -44,7 +44,7 @@ pub fn load(path: &Path) -> Result<Vehicle, FileError> {
 /// # Errors
 /// Every mistake, each as one line.
 pub fn parse(file: &str, text: &str, name: &str) -> Result<Vehicle, FileError> {
-    afbc_reader::document(file, text, SAMPLE, |root| read(root, file, text, name))
+    afbc_files::read::document(file, text, SAMPLE, |root| read(root, file, text, name))
 }
 
 /// Direction of rotation of a rotor, seen from above.
@@ -64,7 +64,7 @@ impl Spin {
 }
 
 fn read(mut root: Table<'_>, file: &str, text: &str, name: &str) -> Result<Vehicle, FileError> {
-    let [name, description] = afbc_reader::title(&mut root, name)?;
+    let [name, description] = afbc_files::read::title(&mut root, name)?;
     let parameters = masses(need(&mut root, "vehicle")?)?;
     let (rotors, rotor_height_m) = frame(&mut root, parameters.arm_m)?;
     let (actuators, force_max_n) = actuators(&mut root, &parameters)?;

@@ -2,10 +2,10 @@
 //! instruments.
 //! Each function takes what a table leaves out from a default.
 
+use afbc_files::read::words::out_of_range;
+use afbc_files::read::{FileError, Table};
 use afbc_plant::instruments::Preset;
 use afbc_plant::{Battery, Contact, Drag, Frame, GroundEffect, Rotors};
-use afbc_reader::words::out_of_range;
-use afbc_reader::{FileError, Table};
 use afbc_types::{Declared, OutOfRange, Parameters, Range};
 
 /// Accepted largest force of a rotor \[N\]; the speed that goes with it must be in range too.

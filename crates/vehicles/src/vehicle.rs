@@ -5,6 +5,7 @@ use afbc::guarded::Guarded;
 use afbc::monitor::Bounds;
 use afbc::{Profile, Settings};
 use afbc_estimator::Settings as Estimation;
+use afbc_files::read::{Example, FileError, Table};
 use afbc_flight_core::ArmingLimits;
 use afbc_flight_core::motor::{Curve, Response};
 use afbc_flight_core::protocol::MotorOutputs;
@@ -12,7 +13,6 @@ use afbc_onboard::{Configuration, EscSettings, Link};
 use afbc_plant::Realism;
 use afbc_plant::instruments::Imu;
 use afbc_radio::RadioSettings;
-use afbc_reader::{Example, FileError, Table};
 use afbc_types::{
     Airframe, Declaration, Declared, Mounting, OutOfRange, Parameters, PerAxis, Rotor, SensorCalibration, Value,
     ValueMut, with_rotors,
@@ -153,7 +153,7 @@ impl Vehicle {
     /// # Errors
     /// Those of `read`.
     pub fn law_gains<T>(&self, read: impl Fn(Table<'_>) -> Result<T, FileError>) -> Result<Option<T>, FileError> {
-        afbc_reader::document(&self.file, &self.text, SAMPLE, |mut root| {
+        afbc_files::read::document(&self.file, &self.text, SAMPLE, |mut root| {
             let Some(mut all) = root.table("gains")? else { return Ok(None) };
             all.table(Profile::Flight.name())?.map(&read).transpose()
         })

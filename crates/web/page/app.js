@@ -2,7 +2,7 @@
 //
 // An engine has `start(onMessage, onLink)`, which calls `onMessage` with objects whose `kind` is hello, values, frame
 // or reply, and `onLink` with a text on the connection and whether it works; and `send(command)`. The objects are those
-// of the crate afbc-page.
+// of afbc-serve's module page.
 import { Charts } from "./charts.js";
 import { Parameters } from "./parameters.js";
 import { VehicleScene } from "./scene.js";

@@ -10,7 +10,7 @@ use super::vehicle::OnVehicle;
 use super::{interrupt, json, manifest};
 use afbc_campaign::subject::SubjectKind;
 use afbc_campaign::{self as campaign, BUILT_IN, Campaign as Plan, CampaignFolder, Manifest, Shard, Summary, built_in};
-use afbc_reader::BuiltIn;
+use afbc_files::read::BuiltIn;
 use afbc_report::{campaign as report, for_terminal};
 use afbc_sim::LogRate;
 use clap::{Args, value_parser};

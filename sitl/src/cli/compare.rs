@@ -8,7 +8,7 @@ use super::written::Output;
 use super::{interrupt, random, rough, suite};
 use afbc_campaign::compare::{self, choose, standard};
 use afbc_campaign::suite::suite_at;
-use afbc_reader::words::nearest;
+use afbc_files::read::words::nearest;
 use afbc_report::compare as report;
 use afbc_sim::LogRate;
 use clap::Args;

@@ -34,7 +34,7 @@ impl Fleet<'_> {
     pub(super) fn run(self) -> Result<ExitCode, Failure> {
         let laws = laws(self.laws)?;
         let vehicles = if self.vehicles.is_empty() {
-            afbc_vehicles::BUILT_IN.iter().map(afbc_reader::BuiltIn::read).collect::<Result<_, _>>()?
+            afbc_vehicles::BUILT_IN.iter().map(afbc_files::read::BuiltIn::read).collect::<Result<_, _>>()?
         } else {
             self.vehicles
         };

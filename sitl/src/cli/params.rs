@@ -1,11 +1,11 @@
 //! `sitl params`: the parameters of a vehicle, as ground stations' files.
 
 use super::terminal::{Failure, print, say};
+use afbc_files::read::params::{Format, ParameterEntry, read, written};
+use afbc_files::read::words::out_of_range;
+use afbc_files::read::{FileError, Source};
 use afbc_files::{Flash, Output};
 use afbc_onboard::parameters::{Kept, Parameter, ParameterTable, RecordChange};
-use afbc_reader::params::{Format, ParameterEntry, read, written};
-use afbc_reader::words::out_of_range;
-use afbc_reader::{FileError, Source};
 use afbc_scenario::vehicle_named;
 use afbc_store::{Error, RecordName, Store, hash};
 use afbc_types::with_rotors;

@@ -7,7 +7,7 @@ use std::ffi::OsStr;
 
 use afbc_campaign::suite::SUITES;
 use afbc_campaign::{random, rough};
-use afbc_reader::BuiltIn;
+use afbc_files::read::BuiltIn;
 use afbc_scenario::contender::{Contender, ControllerKind};
 
 /// Returns `command` and its own commands with arguments that may be negative numbers, and that a shell completes.

@@ -9,7 +9,7 @@ use afbc_campaign::compare;
 use afbc_campaign::random::{self, FLIGHTS, FlownDraw, NAME, Random, Seen};
 use afbc_campaign::rough::NAME as ROUGH;
 use afbc_files::Folder;
-use afbc_reader::BuiltIn;
+use afbc_files::read::BuiltIn;
 use afbc_report::random::{self as report, Judged};
 use afbc_report::suite::markers;
 use afbc_scenario::contender::Contender;

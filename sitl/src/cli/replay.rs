@@ -7,7 +7,7 @@ use super::place::Place;
 use super::terminal::Failure;
 use super::written::show;
 use afbc_estimator::Settings;
-use afbc_reader::FileError;
+use afbc_files::read::FileError;
 use afbc_replay::EstimatorStart;
 use afbc_report::replay as report;
 use clap::Args;

@@ -6,7 +6,7 @@ use super::terminal::Failure;
 use super::written::Output;
 use super::{interrupt, manifest, page};
 use afbc_campaign::rough::{self, FlownRough, NAME, Rough};
-use afbc_reader::BuiltIn;
+use afbc_files::read::BuiltIn;
 use afbc_report::rough::{self as report, RoughResults};
 use afbc_report::suite::markers;
 use afbc_scenario::contender::Contender;

@@ -7,7 +7,7 @@ use super::terminal::{Failure, print};
 use afbc_campaign::Campaign;
 use afbc_campaign::subject::{Subject, SubjectKind};
 use afbc_files::Output;
-use afbc_reader::BuiltIn;
+use afbc_files::read::BuiltIn;
 use afbc_scenario::contender::Contender;
 use afbc_scenario::trajectory::{Trajectory, polynomial};
 use afbc_scenario::{BUILT_IN, Scenario, built_in};

@@ -5,7 +5,7 @@ use super::terminal::{Failure, INTERRUPTED, print, say};
 use super::vehicle::OnVehicle;
 use afbc_files::Output;
 use afbc_hil::{LogFile, UlogFiles};
-use afbc_page_server::{Admission, Token, WebDoor};
+use afbc_serve::web::{Admission, Token, WebDoor};
 use afbc_serve::{
     Addresses, Door, LineOutput, Lines, ParameterFile, Ports, RunEnd, Server, Then, TimeRate, VEHICLES_MAX, fleet,
     guide, run,

@@ -7,7 +7,7 @@ use afbc_campaign::compare::Comparison;
 use afbc_campaign::random::NAME;
 use afbc_campaign::rough::NAME as ROUGH;
 use afbc_campaign::suite::{self, SUITES, Suite};
-use afbc_reader::{BuiltIn, FileError};
+use afbc_files::read::{BuiltIn, FileError};
 use afbc_report::suite::{self as report, FlownSuite};
 use afbc_scenario::contender::Contender;
 use afbc_sim::LogRate;

@@ -1,6 +1,6 @@
 //! A file as tables of keys, and what else each value might be.
 
-use afbc_reader::words;
+use afbc_files::read::words;
 use afbc_types::{Declaration, Declared, Value};
 use core::convert::Infallible;
 use core::fmt::{self, Write};

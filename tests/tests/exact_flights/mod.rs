@@ -3,7 +3,7 @@
 use afbc_hil::Host;
 use afbc_link::telemetry::BatteryStatus;
 use afbc_link::{Address, Command, Datum, FRAME_MAX, Height, ParameterRequest, Sender, Uplink};
-use afbc_recorder::{FRAME_MAX as RECORD_MAX, Frames, Record, write};
+use afbc_log::exact::{FRAME_MAX as RECORD_MAX, Frames, Record, write};
 use afbc_scenario::Scenario;
 use afbc_sim::flight::World;
 use afbc_station::AuxSensors;

@@ -16,7 +16,7 @@ pub use flight::{DrawnFlight, Seen};
 pub use ranking::{Difference, RESAMPLES, Ranking, Score, is_level, rankings};
 
 use crate::compare::{self, Outcome};
-use afbc_reader::FileError;
+use afbc_files::read::FileError;
 use afbc_scenario::Scenario;
 use afbc_scenario::contender::Contender;
 use afbc_sim::run::Run;

@@ -1,6 +1,6 @@
 //! Frames of an exact log in a file.
 
-use afbc_recorder::{FRAME_MAX, FrameError, Record, StartRecord, VERSION, decode};
+use afbc_log::exact::{FRAME_MAX, FrameError, Record, StartRecord, VERSION, decode};
 
 /// What was looked for in a file.
 pub(super) enum Found {

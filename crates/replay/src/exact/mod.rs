@@ -15,7 +15,7 @@ pub use outcome::{ExactReplay, FirstDifference, GivenSignal, LoggedParameter, Re
 pub use quantities::{QUANTITIES, ReplayQuantity};
 
 use crate::ulog;
-use afbc_reader::FileError;
+use afbc_files::read::FileError;
 use afbc_vehicles::{Vehicle, built_in};
 use frames::Found;
 use std::fs;

@@ -3,9 +3,9 @@
 use super::change::SettingChange;
 use afbc::Profile;
 use afbc_control::Trace;
-use afbc_reader::FileError;
-use afbc_reader::words::out_of_range;
-use afbc_recorder::{Record, ReplayStep, Replayer, StartRecord};
+use afbc_files::read::FileError;
+use afbc_files::read::words::out_of_range;
+use afbc_log::exact::{Record, ReplayStep, Replayer, StartRecord};
 use afbc_scenario::FlownLaw;
 use afbc_scenario::contender::{ControllerKind, Law};
 use afbc_store::RecordName;

@@ -4,8 +4,8 @@ use super::compare::ChangeComparison;
 use super::frames;
 use super::outcome::{ExactReplay, FirstDifference, GivenSignal, LoggedParameter, ReplayFinding};
 use super::player::Players;
+use afbc_log::exact::{FrameError, Given, Record, ReplayDifference, ReplayStep, StartRecord, TickRecord, decode};
 use afbc_onboard::Report;
-use afbc_recorder::{FrameError, Given, Record, ReplayDifference, ReplayStep, StartRecord, TickRecord, decode};
 use afbc_types::ROTORS_MAX;
 
 /// Bytes between two calls for progress.

@@ -9,7 +9,7 @@ mod times;
 mod topic;
 
 use crate::ulog::{Entry, LogReader, LoggedTopic, ParameterValue, Piece, each, is_ulog};
-use afbc_reader::FileError;
+use afbc_files::read::FileError;
 use cdr_encoding::to_vec;
 use mcap::records::{MessageHeader, Metadata};
 use mcap::{McapError, WriteOptions, Writer};

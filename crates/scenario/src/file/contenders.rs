@@ -4,7 +4,7 @@ use super::control::settings;
 use crate::contender::{Contender, ControllerKind, Law};
 use crate::laws::{law_gains, per_axis, whole};
 use afbc::{LAG_S, Profile, Settings, adaptive};
-use afbc_reader::{FileError, Table};
+use afbc_files::read::{FileError, Table};
 use afbc_types::{Parameters, PerAxis};
 use afbc_vehicles::Vehicle;
 

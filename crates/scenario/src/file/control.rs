@@ -1,7 +1,7 @@
 //! `[settings]` and `[limits]` of a file or a contender.
 
 use afbc::Settings;
-use afbc_reader::{FileError, Table};
+use afbc_files::read::{FileError, Table};
 
 /// Reads `[settings]` and `[limits]` in `parent`; missing keys are as in `default`. Only the file's own have a time
 /// step.

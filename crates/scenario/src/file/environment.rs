@@ -1,11 +1,11 @@
 //! `[[gust]]`, `[[change]]`, `[[payload]]` and `[[outage]]`: events in flight.
 
 use crate::definition::Outage;
+use afbc_files::read::words::out_of_range;
+use afbc_files::read::{FileError, Table};
 use afbc_plant::{
     Environment, Gust, GustKind, PAYLOAD_AHEAD, PAYLOAD_BELOW, PAYLOAD_LEFT, ParameterChange, Payload, PlantParameter,
 };
-use afbc_reader::words::out_of_range;
-use afbc_reader::{FileError, Table};
 use afbc_types::{Axis, Parameters, Range};
 
 /// Accepted start of an event \[s\].

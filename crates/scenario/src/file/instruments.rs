@@ -3,9 +3,9 @@
 
 use super::environment::interval;
 use crate::told::{Told, stated};
+use afbc_files::read::{FileError, Table};
 use afbc_plant::InstrumentSuite;
 use afbc_plant::instruments::{Barometer, Failure, Gnss, Imu, InstrumentFault, Magnetometer, TrackerModel, limits};
-use afbc_reader::{FileError, Table};
 use afbc_vehicles::{Vehicle, parts};
 
 /// Reads the instruments of `table`; none without it.

@@ -18,9 +18,9 @@ mod tests;
 use super::definition::{DURATION, Scenario};
 use crate::contender::Contender;
 use crate::trajectory::Trajectory;
+use afbc_files::read::words::out_of_range;
+use afbc_files::read::{Example, FileError, Table};
 use afbc_plant::{Frame, PlantModel, Realism, Sensing};
-use afbc_reader::words::out_of_range;
-use afbc_reader::{Example, FileError, Table};
 use afbc_types::{PLUS, ROTORS, Range};
 use afbc_vehicles::parts;
 use contenders::Flown;
@@ -37,7 +37,7 @@ const SAMPLE: Example = Example { command: "scenarios hover", text: include_str!
 /// # Errors
 /// The first mistake, as one line.
 pub fn load(path: &Path) -> Result<Scenario, FileError> {
-    let text = afbc_reader::text(path, "scenario")?;
+    let text = afbc_files::read::text(path, "scenario")?;
     let stem = path.file_stem().map_or("".into(), |stem| stem.to_string_lossy());
     parse(&path.display().to_string(), &text, &stem)
 }
@@ -47,15 +47,15 @@ pub fn load(path: &Path) -> Result<Scenario, FileError> {
 /// # Errors
 /// Every mistake, each as one line.
 pub fn parse(file: &str, text: &str, name: &str) -> Result<Scenario, FileError> {
-    afbc_reader::document(file, text, SAMPLE, |root| read(root, name, None))
+    afbc_files::read::document(file, text, SAMPLE, |root| read(root, name, None))
 }
 
 /// Reads the scenario in `root`; `name` and `trajectory` are the defaults.
 ///
 /// # Errors
-/// The first mistake, as one line. [`afbc_reader::document`] goes on behind it.
+/// The first mistake, as one line. [`afbc_files::read::document`] goes on behind it.
 pub fn read(mut root: Table<'_>, name: &str, trajectory: Option<&Trajectory>) -> Result<Scenario, FileError> {
-    let [name, description] = afbc_reader::title(&mut root, name)?;
+    let [name, description] = afbc_files::read::title(&mut root, name)?;
     let duration_s = root.number(&DURATION)?.unwrap_or(DURATION_S);
     let models = [PlantModel::Simplified, PlantModel::RigidBody];
     let seed = root.whole(&SEED)?.unwrap_or(0);

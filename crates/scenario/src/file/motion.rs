@@ -1,8 +1,8 @@
 //! `[initial]`: the initial state.
 
 use crate::trajectory::Reference;
+use afbc_files::read::{FileError, Table};
 use afbc_plant::Motion;
-use afbc_reader::{FileError, Table};
 use afbc_types::Range;
 use nalgebra::Vector3;
 

@@ -7,7 +7,7 @@ use super::reference::{START, flyable};
 use crate::trajectory::polynomial::{COEFFICIENTS, Coefficients, PolynomialPiece, through};
 use crate::trajectory::spline::PathSamples;
 use crate::trajectory::{Reference, Trajectory, nearest_heading};
-use afbc_reader::{FileError, Separated, Source, Table};
+use afbc_files::read::{FileError, Separated, Source, Table};
 use afbc_types::Range;
 use csv::{ReaderBuilder, StringRecord};
 use std::path::Path;

@@ -2,11 +2,11 @@
 //! lacks.
 
 use super::environment::{LENGTH, START};
+use afbc_files::read::{FileError, Table};
 use afbc_plant::rotors::limits::{EFFICIENCY, ROTOR};
 use afbc_plant::{
     Battery, Contact, CosineGust, Drag, Frame, GroundEffect, Realism, RotorFault, Turbulence, Wind, wind,
 };
-use afbc_reader::{FileError, Table};
 use afbc_types::{Parameters, Range};
 use afbc_vehicles::parts::{self, DragConditions};
 

@@ -2,7 +2,7 @@
 
 use crate::definition::DURATION;
 use crate::trajectory::{Reference, Trajectory};
-use afbc_reader::{FileError, Table};
+use afbc_files::read::{FileError, Table};
 use afbc_types::Range;
 
 /// Accepted start of a path \[s\].

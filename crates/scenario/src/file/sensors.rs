@@ -1,8 +1,8 @@
 //! `[sensors]` and `[[sensor_fault]]`: measurement of the state for the controllers.
 
 use super::environment::interval;
+use afbc_files::read::{FileError, Table};
 use afbc_plant::{Deviations, Dropouts, Misreading, Sensing, SensorFault};
-use afbc_reader::{FileError, Table};
 use afbc_types::{Axis, Range};
 
 /// Accepted single number for all coordinates: the range that every coordinate accepts.

@@ -9,9 +9,9 @@ use crate::paper;
 use crate::{BUILT_IN, Scenario, built_in};
 use afbc::Profile;
 use afbc::adaptive;
+use afbc_files::read::FileError;
 use afbc_peers::pid;
 use afbc_plant::PlantModel;
-use afbc_reader::FileError;
 
 #[test]
 fn built_in_paper_is_the_paper() {

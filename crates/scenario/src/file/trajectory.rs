@@ -5,7 +5,7 @@ use super::path;
 use super::reference::{START, flyable};
 use crate::trajectory::minimum_snap::{FlatOutput, LEG_MIN_M, NoPath, PaceLimits, SWING_MAX, distance_m, minimum_snap};
 use crate::trajectory::{Sine, Trajectory, Waypoint, nearest_heading};
-use afbc_reader::{FileError, Table};
+use afbc_files::read::{FileError, Table};
 use afbc_types::Range;
 use core::f64::consts::{SQRT_2, TAU};
 use libm::sqrt;

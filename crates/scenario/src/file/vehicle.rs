@@ -1,6 +1,6 @@
 //! `[vehicle]`: the nominal parameters, or the name of a vehicle file.
 
-use afbc_reader::{FileError, Table};
+use afbc_files::read::{FileError, Table};
 use afbc_types::Parameters;
 use afbc_vehicles::{Vehicle, parts};
 use std::path::Path;

@@ -2,8 +2,8 @@
 
 use super::{ControllerKind, Law};
 use afbc::fuzzy::Membership;
-use afbc_reader::words::out_of_range;
-use afbc_reader::{FileError, Table};
+use afbc_files::read::words::out_of_range;
+use afbc_files::read::{FileError, Table};
 use afbc_types::{Axis, Declared};
 use afbc_vehicles::Vehicle;
 

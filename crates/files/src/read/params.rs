@@ -1,0 +1,80 @@
+//! Files of parameters by name, as ground stations write them: QGroundControl's `.params` and MAVProxy's `.parm`.
+//!
+//! Both are lines of fields. QGroundControl's has five: system, component, name, value, type; MAVProxy's has two: name
+//! and value. `#` begins a comment. Either is read, whatever the file is called.
+
+use crate::read::{FileError, Source};
+use core::fmt::Write;
+
+/// One parameter of a file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ParameterEntry {
+    /// Name.
+    pub name: String,
+    /// Value.
+    pub value: f32,
+    /// Where its line begins in the text.
+    pub at: usize,
+}
+
+/// Format of a file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Format {
+    /// QGroundControl's.
+    Qgc,
+    /// MAVProxy's.
+    Mavproxy,
+}
+
+/// Reads the parameters in `text`, the contents of `file`.
+///
+/// # Errors
+/// One line on the first line of the file that is wrong.
+pub fn read(file: &str, text: &str) -> Result<Vec<ParameterEntry>, FileError> {
+    let (mut entries, mut at) = (Vec::<ParameterEntry>::new(), 0);
+    for line in text.split_inclusive('\n') {
+        let start = at;
+        at += line.len();
+        let line = line.split('#').next().unwrap_or_default();
+        let fields: Vec<&str> = line.split([' ', '\t', ',', '\r', '\n']).filter(|field| !field.is_empty()).collect();
+        let fault = |key: &str, problem: String| Err(FileError::at(Source { file, text }, start, key, problem));
+        let (name, value) = match *fields {
+            [] => continue,
+            [name, value] | [_, _, name, value, _] => (name, value),
+            _ => {
+                let problem = "neither `name value` nor `system component name value type`";
+                return fault("", format!("{} fields, {problem}", fields.len()));
+            }
+        };
+        let Some(number) = value.parse().ok().filter(|number: &f32| number.is_finite()) else {
+            return fault(name, format!("\"{value}\" is no number"));
+        };
+        if entries.iter().any(|entry| entry.name == name) {
+            return fault(name, "a second value; take one of them out".into());
+        }
+        entries.push(ParameterEntry { name: name.into(), value: number, at: start });
+    }
+    Ok(entries)
+}
+
+/// Returns a file of parameters: name, value, MAV_PARAM_TYPE. Its values are read back to the bit.
+pub fn written<N: core::fmt::Display>(
+    format: Format,
+    vehicle: &str,
+    entries: impl IntoIterator<Item = (N, f32, u8)>,
+) -> String {
+    let mut text = match format {
+        Format::Qgc => format!(
+            "# Onboard parameters for Vehicle 1\n#\n# {vehicle}\n#\n# Vehicle-Id Component-Id Name Value Type\n"
+        ),
+        Format::Mavproxy => format!("# {vehicle}\n"),
+    };
+    for (name, value, kind) in entries {
+        // Writing to a string does not fail.
+        let _ = match format {
+            Format::Qgc => writeln!(text, "1\t1\t{name}\t{value}\t{kind}"),
+            Format::Mavproxy => writeln!(text, "{name:<16} {value}"),
+        };
+    }
+    text
+}

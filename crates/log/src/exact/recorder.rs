@@ -1,0 +1,81 @@
+//! The writing side.
+
+use crate::exact::frame::{FRAME_MAX, write};
+use crate::exact::record::{Record, StartRecord, TickRecord};
+use afbc_onboard::ControlInputs;
+use afbc_onboard::parameters::{ParameterTable, RecordChange};
+
+/// Makes the frames of a log, in the order in which it is called: beside the control tick, not in it.
+#[derive(Clone, Debug)]
+pub struct Recorder {
+    buffer: [u8; FRAME_MAX],
+    configuration: u16,
+}
+
+impl Default for Recorder {
+    fn default() -> Self {
+        Recorder { buffer: [0; FRAME_MAX], configuration: 0 }
+    }
+}
+
+impl Recorder {
+    /// Records the start of a processor that flies the vehicle and the law of these names, with the parameters that are
+    /// not as its image has them; calls `send` with each frame.
+    pub fn start<const N: usize>(
+        &mut self,
+        [vehicle, law]: [&str; 2],
+        table: &ParameterTable<N>,
+        send: &mut dyn FnMut(&[u8]),
+    ) {
+        self.configuration = 0;
+        self.frame(&Record::Start(StartRecord::of(vehicle, law, table)), send);
+        for parameter in table.iter() {
+            // By bits: 0 and -0 are equal, and a replay is to the last bit.
+            let image = table.default_of(parameter.name).map(|parameter| parameter.value.to_bits());
+            if image != Some(parameter.value.to_bits()) {
+                self.frame(&Record::Parameter { configuration: 0, name: parameter.name, value: parameter.value }, send);
+            }
+        }
+    }
+
+    /// Records a change of the table, and returns the number of the configuration that it makes.
+    pub fn change<const N: usize>(
+        &mut self,
+        table: &ParameterTable<N>,
+        change: RecordChange,
+        send: &mut dyn FnMut(&[u8]),
+    ) -> u16 {
+        self.configuration = self.configuration.wrapping_add(1);
+        let configuration = self.configuration;
+        match change {
+            RecordChange::Set(name, _) => {
+                if let Some(parameter) = table.get(name) {
+                    self.frame(&Record::Parameter { configuration, name, value: parameter.value }, send);
+                }
+            }
+            RecordChange::Restored => self.frame(&Record::Restored { configuration }, send),
+        }
+        configuration
+    }
+
+    /// Records what messages have brought for the tick of this number, if they have brought anything. The battery is
+    /// recorded with the tick.
+    pub fn inputs(&mut self, tick: u32, inputs: &ControlInputs, send: &mut dyn FnMut(&[u8])) {
+        let mut inputs = inputs.clone();
+        inputs.battery = None;
+        if inputs != ControlInputs::EMPTY {
+            self.frame(&Record::Inputs { tick, inputs }, send);
+        }
+    }
+
+    /// Records a tick.
+    pub fn tick(&mut self, record: &TickRecord, send: &mut dyn FnMut(&[u8])) {
+        self.frame(&Record::Tick(*record), send);
+    }
+
+    fn frame(&mut self, record: &Record, send: &mut dyn FnMut(&[u8])) {
+        if let Some(frame) = write(record, &mut self.buffer) {
+            send(frame);
+        }
+    }
+}

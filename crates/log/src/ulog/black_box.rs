@@ -1,0 +1,417 @@
+//! The writer.
+
+use crate::ulog::definitions::{Definitions, LogStart, parameter};
+use crate::ulog::dropouts::Dropouts;
+use crate::ulog::known::Known;
+use crate::ulog::moment::{LoggedTick, Moment};
+use crate::ulog::ring::{LogRing, RingView};
+use crate::ulog::topics::{
+    ActuatorArmed, ActuatorMotors, ActuatorOutputs, AidOffered, Aiding, BatteryVoltage, EscStatusReport,
+    EstimatorFigures, EstimatorFlags, EstimatorVector, LandDetected, LawSignals, Listed, ManualControl, MeanSample,
+    SensorCombined, TOPICS, ThrustDemand, TorqueDemand, VehicleAngularVelocity, VehicleAttitude,
+    VehicleAttitudeSetpoint, VehicleGlobalPosition, VehicleLocalPosition, VehicleLocalPositionSetpoint,
+    VehicleRatesSetpoint, VehicleState,
+};
+use afbc_estimator::{ImuSample, Measurement};
+use afbc_onboard::parameters::{ParameterTable, RecordChange};
+use afbc_onboard::{Aged, tracker_aid};
+use afbc_store::RecordName;
+use afbc_types::{PerAxis, ROTORS_MAX, SensorCalibration, Stamped};
+use nalgebra::Vector3;
+
+/// Bytes by which a damaged log is found again, and the time between two of them \[us\].
+const SYNC: [u8; 8] = [0x2f, 0x73, 0x13, 0x20, 0x25, 0x0c, 0xbb, 0x12];
+const SYNC_US: u64 = 500_000;
+/// Kinds of measurements, numbered as in `afbc_aid`, from 1 on.
+const AID_KINDS: usize = 7;
+/// Longest text; of a longer one the beginning is written \[bytes\].
+const TEXT_MAX: usize = 128;
+
+/// Writes the log of a vehicle from its power-up on: beside the control tick, not in it.
+#[derive(Clone, Debug)]
+pub struct BlackBox {
+    known: Known,
+    definitions: Definitions,
+    /// Entries of the beginning, and changed parameters, that are written in a tick, at most.
+    pace: u16,
+    small: bool,
+    unwritten: Unwritten,
+    dropouts: Dropouts,
+    /// When each topic is due \[us\].
+    due_us: [u64; TOPICS.len()],
+    synced_us: u64,
+    last: Last,
+}
+
+/// Parameters whose change is not in the log yet.
+#[derive(Clone, Copy, Debug)]
+enum Unwritten {
+    None,
+    One(RecordName),
+    /// All from this place on.
+    From(u16),
+}
+
+/// What the last tick has left.
+#[derive(Clone, Debug, Default)]
+struct Last {
+    armed: bool,
+    airborne: bool,
+    /// When it was armed, and when it has taken off \[us\].
+    since_us: [u64; 2],
+    idle_on_ground: bool,
+    /// True if the inertial sensor did not work.
+    is_blind: bool,
+    /// Estimated position of a vehicle at rest \[m\].
+    stands_m: Option<Vector3<f32>>,
+    /// True once the estimator runs.
+    runs: bool,
+    sample: Option<ImuSample>,
+    /// Samples that are in no message yet.
+    mean: Option<MeanSample>,
+    /// When a measurement of each kind is due in a small log \[us\].
+    aids_due_us: [u64; AID_KINDS],
+    sampled: Option<(SensorCombined, u64)>,
+    pose_us: Option<u64>,
+    norms: PerAxis<[f32; 2]>,
+    state: Option<VehicleState>,
+    arming: Option<ActuatorArmed>,
+    landing: Option<LandDetected>,
+    figures: Option<EstimatorFigures>,
+}
+
+impl BlackBox {
+    /// Creates it, with nothing written, for a vehicle with these parameters.
+    pub fn new<const N: usize>(start: &LogStart<'_>, table: &ParameterTable<N>) -> Self {
+        BlackBox {
+            known: Known::of(table.configuration()),
+            definitions: Definitions::new(start),
+            pace: u16::MAX,
+            small: false,
+            unwritten: Unwritten::None,
+            dropouts: Dropouts::default(),
+            due_us: [0; TOPICS.len()],
+            synced_us: 0,
+            last: Last::default(),
+        }
+    }
+
+    /// Looks at so many entries of the log's beginning in a tick, at most, one at least: formats, parameters and the
+    /// like, some hundreds in all, each looked up in the vehicle's table. So it is also with parameters that have
+    /// changed all at once. Without that it is as many as there is room for.
+    #[must_use]
+    pub fn paced(self, entries: u16) -> Self {
+        BlackBox { pace: entries.max(1), ..self }
+    }
+
+    /// Makes it a small log: each topic by its longer period ([`LoggedTopic::small_us`](crate::ulog::LoggedTopic::small_us)),
+    /// and the inertial sensor's as the mean of its samples since the last message.
+    #[must_use]
+    pub fn small(self) -> Self {
+        BlackBox { small: true, ..self }
+    }
+
+    /// Writes a change of the table, to be called after it.
+    pub fn change<const N: usize, const R: usize>(
+        &mut self,
+        table: &ParameterTable<N>,
+        change: RecordChange,
+        ring: &mut LogRing<R>,
+    ) {
+        self.known = Known::of(table.configuration());
+        self.unwritten = match (self.unwritten, change) {
+            (Unwritten::None, RecordChange::Set(name, _)) => Unwritten::One(name),
+            // There is place for one.
+            _ => Unwritten::From(0),
+        };
+        // All of them go at their pace.
+        if self.definitions.is_done() && matches!(self.unwritten, Unwritten::One(_)) {
+            self.write_parameters(table, &mut ring.view());
+        }
+    }
+
+    /// Writes a text of this severity (0 emergency to 7 debug), if there is room.
+    pub fn text<const R: usize>(&mut self, now_us: u64, severity: u8, text: &str, ring: &mut LogRing<R>) {
+        if !self.definitions.is_done() {
+            return;
+        }
+        // Between letters: readers take it for UTF-8.
+        let end = (0..=TEXT_MAX.min(text.len())).rfind(|end| text.is_char_boundary(*end)).unwrap_or_default();
+        let text = text.get(..end).unwrap_or_default();
+        let _ = self.dropouts.put(now_us, &mut ring.view(), &mut |ring| {
+            ring.record(b'L', &mut |content| {
+                content.put(&[b'0' + severity.min(7)]);
+                content.put(&now_us.to_le_bytes());
+                content.put(text.as_bytes());
+            })
+        });
+    }
+
+    /// Notes that ticks are missing from a time on, up to the next one that is written: a dropout.
+    pub fn miss(&mut self, since_us: u64) {
+        if self.definitions.is_done() {
+            self.dropouts.miss(since_us);
+        }
+    }
+
+    /// Writes a tick, after what is left of the log's beginning. Without room for all of that, nothing of the tick is
+    /// written.
+    pub fn tick<const M: usize, const N: usize, const R: usize>(
+        &mut self,
+        tick: &LoggedTick<'_, M>,
+        table: &ParameterTable<N>,
+        ring: &mut LogRing<R>,
+    ) {
+        let LoggedTick { report, readings, ref taken, view, escs, origin } = *tick;
+        let now_us = report.time_us;
+        let mut ring = ring.view();
+        self.definitions.write(now_us, table, self.pace, &mut ring);
+        let writes = self.definitions.is_done();
+        if writes {
+            self.write_parameters(table, &mut ring);
+            if now_us.saturating_sub(self.synced_us) >= SYNC_US && ring.record(b'S', &mut |content| content.put(&SYNC))
+            {
+                self.synced_us = now_us;
+            }
+        }
+        let report = report.padded();
+        let tick = LoggedTick { report: &report, readings, taken: *taken, view, escs, origin };
+        self.topics(&tick, writes, &mut ring);
+    }
+
+    /// Writes the topics of a tick, or only remembers it. Once, for vehicles with any number of rotors.
+    #[inline(never)]
+    fn topics(&mut self, tick: &LoggedTick<'_, ROTORS_MAX>, writes: bool, ring: &mut RingView<'_>) {
+        let LoggedTick { report, readings, ref taken, view, escs, origin } = *tick;
+        let moment = Moment { report, readings, taken, view, escs, origin, known: &self.known };
+        let now_us = report.time_us;
+        let (due_us, dropouts) = (&mut self.due_us, &mut self.dropouts);
+        let mut topics = Topics { now_us, writes, small: self.small, due_us, dropouts, ring };
+        self.last.sensors(&moment, &mut topics);
+        self.last.states(&moment, &mut topics);
+        self.last.advance(&moment);
+    }
+
+    /// Writes what has changed of the parameters, as far as there is room, and at its pace.
+    fn write_parameters<const N: usize>(&mut self, table: &ParameterTable<N>, ring: &mut RingView<'_>) {
+        for _ in 0..self.pace {
+            let (found, next) = match self.unwritten {
+                Unwritten::None => return,
+                Unwritten::One(name) => (table.get(name), Unwritten::None),
+                Unwritten::From(place) => {
+                    let found = table.at(place);
+                    let next = if found.is_some() { Unwritten::From(place + 1) } else { Unwritten::None };
+                    (found, next)
+                }
+            };
+            if found.is_some_and(|found| !parameter(&found, ring)) {
+                return;
+            }
+            self.unwritten = next;
+        }
+    }
+}
+
+/// Writes the messages of a tick that are due.
+struct Topics<'a, 'r> {
+    now_us: u64,
+    /// True once the log's beginning is written.
+    writes: bool,
+    small: bool,
+    due_us: &'a mut [u64; TOPICS.len()],
+    dropouts: &'a mut Dropouts,
+    ring: &'a mut RingView<'r>,
+}
+
+impl Topics<'_, '_> {
+    /// Writes a message of a topic each time, in a small log at its rate; false if it is not due.
+    fn each<T: Listed>(&mut self, message: T) -> bool {
+        if !self.small {
+            // One that finds no room is in the log as a dropout.
+            let _ = self.at_once(&message);
+            return true;
+        }
+        self.at_rate(|| Some(message))
+    }
+
+    /// Writes a message at its topic's rate; false if it is not due.
+    fn at_rate<T: Listed>(&mut self, make: impl FnOnce() -> Option<T>) -> bool {
+        let place = usize::from(T::ID);
+        let (Some(due_us), Some(topic)) = (self.due_us.get(place), TOPICS.get(place)) else { return false };
+        if self.now_us < *due_us {
+            return false;
+        }
+        let Some(message) = make() else { return false };
+        // On time it keeps its phase.
+        let period_us = u64::from(if self.small { topic.small_us } else { topic.period_us });
+        let next_us = due_us.saturating_add(period_us);
+        // 0 is no phase: that of a first message, of a change, or of one that is made up for.
+        let is_on_time = *due_us > 0 && next_us > self.now_us;
+        let next_us = if is_on_time { next_us } else { self.now_us.saturating_add(period_us) };
+        // One that is missing is made up for.
+        let next_us = if self.at_once(&message) { next_us } else { 0 };
+        self.due_us.get_mut(place).into_iter().for_each(|due_us| *due_us = next_us);
+        true
+    }
+
+    /// Writes a message; false if it is missing.
+    fn at_once<T: Listed>(&mut self, message: &T) -> bool {
+        self.writes
+            && self.dropouts.put(self.now_us, self.ring, &mut |ring| {
+                ring.record(b'D', &mut |content| {
+                    content.put(&T::ID.to_le_bytes());
+                    message.write(content);
+                })
+            })
+    }
+
+    /// Writes a message at its topic's rate, or at once if it is not `like` the last one.
+    fn on_change<T: Listed + Copy>(&mut self, last: &mut Option<T>, message: T, like: impl FnOnce(&T, &T) -> bool) {
+        if !last.as_ref().is_some_and(|last| like(last, &message)) {
+            self.due_us.get_mut(usize::from(T::ID)).into_iter().for_each(|due_us| *due_us = 0);
+        }
+        *last = Some(message);
+        let _ = self.at_rate(|| Some(message));
+    }
+}
+
+impl Last {
+    /// Writes what the sensors have read, and what the estimator was offered of it.
+    fn sensors(&mut self, moment: &Moment<'_>, topics: &mut Topics<'_, '_>) {
+        let (now_us, known) = (moment.now_us(), moment.known);
+        if let Some(Aged { value: [rates_rad_s, specific_force_m_s2], age_us }) = moment.readings.imu {
+            let read = ImuSample { at_us: now_us.saturating_sub(age_us.into()), rates_rad_s, specific_force_m_s2 };
+            let sample = known.imu.apply(&mut self.sample, read);
+            let clips = moment.view.estimate.is_some_and(|estimate| estimate.imu.clipped);
+            let mean = MeanSample::with(self.mean.take(), &sample, clips);
+            let (message, at_us) = SensorCombined::of(&mean, self.sampled.as_ref(), topics.small);
+            if topics.each(message) {
+                self.sampled = Some((message, at_us));
+            } else {
+                self.mean = Some(mean);
+            }
+        }
+        let pose = moment.taken.pose.filter(|pose| self.pose_us != Some(pose.at_us));
+        self.pose_us = pose.map(|pose| pose.at_us).or(self.pose_us);
+        let brought = pose.map(|Stamped { value, at_us }| Aged {
+            value: tracker_aid(&value),
+            age_us: u32::try_from(now_us.saturating_sub(at_us)).unwrap_or(u32::MAX),
+        });
+        for read in moment.readings.aids.iter().flatten().chain(&brought) {
+            if topics.small && !self.is_due(&read.value, now_us) {
+                continue;
+            }
+            let aid = Aged { value: corrected(&read.value, &known.calibration), ..*read };
+            let _ = match Aiding::of(moment, &aid) {
+                Some(Aiding::Air(message)) => topics.at_once(&message),
+                Some(Aiding::Field(message)) => topics.at_once(&message),
+                Some(Aiding::Gnss(message)) => topics.at_once(&message),
+                Some(Aiding::Pose(message)) => topics.at_once(&message),
+                None => true,
+            };
+            let offered = self.local(moment, aid.value).filter(|_| moment.view.estimate.is_some() && !self.is_blind);
+            if let Some(offered) = offered {
+                let at_us = now_us.saturating_sub(aid.age_us.into());
+                let _ = topics.at_once(&AidOffered::of(now_us, at_us, &offered));
+            }
+        }
+    }
+
+    /// True if a measurement of its kind is due in a small log: then the next one is not.
+    fn is_due(&mut self, value: &Measurement, now_us: u64) -> bool {
+        let (kind, _) = value.numbers();
+        let period_us = TOPICS.get(usize::from(AidOffered::ID)).map_or(0, |topic| topic.small_us);
+        let Some(due_us) = self.aids_due_us.get_mut(usize::from(kind)).filter(|due_us| **due_us <= now_us) else {
+            return false;
+        };
+        *due_us = now_us.saturating_add(period_us.into());
+        true
+    }
+
+    /// Returns a measurement in the local frame, as the estimator's front end makes it; none for a fix before a usable
+    /// one. While the vehicle is at rest, a usable fix tells where the frame's origin is.
+    fn local(&self, moment: &Moment<'_>, mut value: Measurement) -> Option<Measurement> {
+        let plausible = value.is_plausible();
+        if let Measurement::Gnss { position_m, horizontal_sigma_m, vertical_sigma_m, .. } = &mut value {
+            let origin_m = moment.view.origin_m?;
+            let most_m = moment.known.position_sigma_max_m;
+            let is_good = *horizontal_sigma_m <= most_m && *vertical_sigma_m <= most_m;
+            *position_m = match self.stands_m {
+                Some(stands_m) if is_good && self.runs && plausible => stands_m,
+                _ => *position_m - origin_m,
+            };
+        }
+        Some(value)
+    }
+
+    /// Writes states, setpoints, commands and figures.
+    fn states(&mut self, moment: &Moment<'_>, topics: &mut Topics<'_, '_>) {
+        let (report, now_us) = (moment.report, moment.now_us());
+        if let Some((axis, norm)) = report.norms {
+            self.norms[axis] = [norm.theta_squared, norm.delta];
+        }
+        let on_ground = !self.armed || self.idle_on_ground && !report.guided.airborne;
+        let (is_armed, is_airborne) = (report.mode.armed(), report.guided.airborne);
+        let [armed_us, airborne_us] = &mut self.since_us;
+        for (since_us, was, is) in [(armed_us, self.armed, is_armed), (airborne_us, self.airborne, is_airborne)] {
+            *since_us = match (was, is) {
+                (_, false) => 0,
+                (false, true) => now_us,
+                (true, true) => *since_us,
+            };
+        }
+        let _ = topics.at_rate(|| VehicleAttitude::of(moment));
+        let _ = topics.at_rate(|| VehicleAngularVelocity::of(moment));
+        let _ = topics.at_rate(|| VehicleAttitudeSetpoint::of(moment));
+        let _ = topics.at_rate(|| VehicleRatesSetpoint::of(moment));
+        let _ = topics.at_rate(|| ThrustDemand::of(moment));
+        let _ = topics.at_rate(|| TorqueDemand::of(moment));
+        let _ = topics.at_rate(|| Some(ActuatorMotors::of(moment)));
+        let _ = topics.at_rate(|| VehicleLocalPosition::of(moment));
+        let _ = topics.at_rate(|| VehicleLocalPositionSetpoint::of(moment));
+        let _ = topics.at_rate(|| Some(ActuatorOutputs::of(moment)));
+        let _ = topics.at_rate(|| ManualControl::of(moment));
+        let _ = topics.at_rate(|| Some(LawSignals::of(moment, &self.norms)));
+        let _ = topics.at_rate(|| VehicleGlobalPosition::of(moment));
+        let _ = topics.at_rate(|| EstimatorVector::of(moment));
+        let _ = topics.at_rate(|| EstimatorFlags::of(moment));
+        let _ = topics.at_rate(|| BatteryVoltage::of(moment));
+        let _ = topics.at_rate(|| EscStatusReport::of(moment));
+        if let Some(figures) = EstimatorFigures::of(moment, on_ground) {
+            topics.on_change(&mut self.figures, figures, EstimatorFigures::is_like);
+        }
+        let state = VehicleState::of(moment, self.since_us);
+        let timed =
+            |last: &VehicleState, now: &VehicleState| VehicleState { timestamp: now.timestamp, ..*last } == *now;
+        topics.on_change(&mut self.state, state, timed);
+        let timed =
+            |last: &ActuatorArmed, now: &ActuatorArmed| ActuatorArmed { timestamp: now.timestamp, ..*last } == *now;
+        topics.on_change(&mut self.arming, ActuatorArmed::of(moment), timed);
+        let timed =
+            |last: &LandDetected, now: &LandDetected| LandDetected { timestamp: now.timestamp, ..*last } == *now;
+        topics.on_change(&mut self.landing, LandDetected::of(moment), timed);
+    }
+
+    /// Remembers what the next tick needs.
+    fn advance(&mut self, moment: &Moment<'_>) {
+        let (report, estimate) = (moment.report, moment.view.estimate.as_ref());
+        (self.armed, self.airborne) = (report.mode.armed(), report.guided.airborne);
+        self.idle_on_ground = moment.view.idle_on_ground;
+        self.is_blind = estimate.is_some_and(|estimate| !estimate.imu.is_usable());
+        self.stands_m = estimate.filter(|estimate| estimate.at_rest).map(|estimate| estimate.state.position_m);
+        self.runs = estimate.is_some_and(|estimate| estimate.unready.is_none());
+    }
+}
+
+/// Returns a reading without the magnetometer's errors.
+fn corrected(read: &Measurement, calibration: &SensorCalibration) -> Measurement {
+    let of_field = |of: &SensorCalibration| [of.mag_offset_ut, of.mag_scale, of.mag_off_diagonal];
+    match *read {
+        Measurement::MagneticField { field, sigma }
+            if of_field(calibration) != of_field(&SensorCalibration::DEFAULT) =>
+        {
+            Measurement::MagneticField { field: calibration.field(&field), sigma }
+        }
+        other => other,
+    }
+}

@@ -1,0 +1,122 @@
+//! Layout of a topic's messages: declared once, so that what the log says of them cannot differ from their bytes.
+
+use crate::ulog::record::Content;
+
+/// A field of a topic.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct LoggedField {
+    /// Name.
+    pub name: &'static str,
+    /// Type in the log: `float`, `uint64_t` and the like.
+    pub kind: &'static str,
+    /// Number of values, none for a single one.
+    pub values: Option<usize>,
+    /// Unit or meaning, as documents show it.
+    pub unit: &'static str,
+}
+
+impl LoggedField {
+    pub(crate) const fn of<W: Wire>(name: &'static str, unit: &'static str) -> Self {
+        LoggedField { name, kind: W::KIND, values: W::VALUES, unit }
+    }
+
+    /// Writes it as a format has it: `float[3] xyz;`.
+    pub(crate) fn format(&self, to: &mut Content<'_>) {
+        to.put(self.kind.as_bytes());
+        if let Some(values) = self.values {
+            to.put(b"[");
+            to.number(values);
+            to.put(b"]");
+        }
+        to.put(b" ");
+        to.put(self.name.as_bytes());
+        to.put(b";");
+    }
+}
+
+/// A type of a field.
+pub(crate) trait Wire: Copy {
+    /// Its name in a format.
+    const KIND: &'static str;
+    /// Number of values, none for a single one.
+    const VALUES: Option<usize> = None;
+
+    /// Writes it, little-endian.
+    fn put(self, to: &mut Content<'_>);
+}
+
+macro_rules! wire {
+    ($($type:ty: $kind:literal),* $(,)?) => {
+        $(
+            impl Wire for $type {
+                const KIND: &'static str = $kind;
+
+                fn put(self, to: &mut Content<'_>) {
+                    to.put(&self.to_le_bytes());
+                }
+            }
+        )*
+    };
+}
+
+wire! {
+    u64: "uint64_t", u32: "uint32_t", i32: "int32_t", u16: "uint16_t", u8: "uint8_t", i8: "int8_t", f64: "double",
+    f32: "float",
+}
+
+impl Wire for bool {
+    const KIND: &'static str = "bool";
+
+    fn put(self, to: &mut Content<'_>) {
+        to.put(&[u8::from(self)]);
+    }
+}
+
+impl<W: Wire, const N: usize> Wire for [W; N] {
+    const KIND: &'static str = W::KIND;
+    const VALUES: Option<usize> = Some(N);
+
+    fn put(self, to: &mut Content<'_>) {
+        self.into_iter().for_each(|value| value.put(to));
+    }
+}
+
+/// A topic's message.
+pub(crate) trait Message {
+    /// Name of the topic.
+    const NAME: &'static str;
+    /// Its fields, in the order of their bytes.
+    const FIELDS: &'static [LoggedField];
+
+    /// Writes the fields.
+    fn write(&self, to: &mut Content<'_>);
+}
+
+/// Declares a topic: its name, the type of its messages, and their fields with types and units. Every one begins with
+/// the time since power-up.
+macro_rules! message {
+    ($(#[$doc:meta])* $name:literal $type:ident { $($field:ident: $kind:ty = $unit:literal),* $(,)? }) => {
+        $(#[$doc])*
+        #[derive(Clone, Copy, Debug, PartialEq)]
+        pub(crate) struct $type {
+            pub(crate) timestamp: u64,
+            $(pub(crate) $field: $kind,)*
+        }
+
+        impl $crate::ulog::layout::Message for $type {
+            const NAME: &'static str = $name;
+            const FIELDS: &'static [$crate::ulog::layout::LoggedField] = &[
+                $crate::ulog::layout::LoggedField::of::<u64>("timestamp", "us"),
+                $($crate::ulog::layout::LoggedField::of::<$kind>(stringify!($field), $unit),)*
+            ];
+
+            fn write(&self, to: &mut $crate::ulog::record::Content<'_>) {
+                use $crate::ulog::layout::Wire;
+                self.timestamp.put(to);
+                $(self.$field.put(to);)*
+            }
+        }
+    };
+}
+
+pub(crate) use message;

@@ -1,0 +1,28 @@
+//! The battery.
+
+use crate::ulog::layout::message;
+use crate::ulog::moment::Moment;
+
+message! {
+    /// The battery.
+    "battery_status" BatteryVoltage {
+        voltage_v: f32 = "V",
+        current_a: f32 = "A",
+        remaining: f32 = "0 to 1; -1 if unknown",
+        connected: bool = "",
+    }
+}
+
+impl BatteryVoltage {
+    /// None if it is not measured.
+    pub(crate) fn of(moment: &Moment<'_>) -> Option<Self> {
+        let reading = moment.taken.battery?;
+        Some(BatteryVoltage {
+            timestamp: moment.now_us(),
+            voltage_v: reading.voltage_v,
+            current_a: reading.current_a,
+            remaining: moment.report.guided.charge.unwrap_or(-1.0),
+            connected: true,
+        })
+    }
+}

@@ -1,0 +1,221 @@
+//! The page as a ground station: what it asks of the vehicle by messages, and what it hears.
+
+use crate::Server;
+use afbc_link::{
+    Address, Answer, Command, Decoder, Downlink, ExternalTarget, FRAME_MAX, MavCmd, MavSeverity, Mission, MissionItem,
+    MissionResult, ParameterRequest, Plan, PositionTarget, Sender, Uplink,
+};
+use afbc_onboard::parameters::Kind;
+use nalgebra::Vector3;
+use std::collections::VecDeque;
+
+/// Its address: a station's, and a component of its own.
+const ADDRESS: Address = Address { system: 255, component: 191 };
+/// Number of its peer; ports count up from 1.
+const PEER: u32 = u32::MAX;
+/// The vehicle that it talks to: the first.
+const VEHICLE: usize = 0;
+/// Time between heartbeats, between targets, and until it gives up \[ms\].
+const HEARTBEAT_MS: u64 = 1_000;
+const TARGET_MS: u64 = 50;
+const PATIENCE_MS: u64 = 3_000;
+/// Messages that are heard: COMMAND_ACK, STATUSTEXT, MISSION_REQUEST, MISSION_REQUEST_INT, MISSION_ACK, PARAM_VALUE,
+/// PARAM_ERROR.
+const HEARD: [u32; 7] = [77, 253, 40, 51, 47, 22, 345];
+/// Severity of what did not happen, and of what goes on.
+const REFUSED: MavSeverity = MavSeverity::MAV_SEVERITY_ERROR;
+const INFO: MavSeverity = MavSeverity::MAV_SEVERITY_INFO;
+/// Commands by number, in words.
+const NAMES: [(u16, &str); 8] = [
+    (MavCmd::MAV_CMD_COMPONENT_ARM_DISARM as u16, "arm or disarm"),
+    (MavCmd::MAV_CMD_NAV_TAKEOFF as u16, "take off"),
+    (MavCmd::MAV_CMD_NAV_LAND as u16, "land"),
+    (MavCmd::MAV_CMD_NAV_RETURN_TO_LAUNCH as u16, "return"),
+    (MavCmd::MAV_CMD_DO_SET_MODE as u16, "mode"),
+    (MavCmd::MAV_CMD_DO_REPOSITION as u16, "go to"),
+    (MavCmd::MAV_CMD_MISSION_START as u16, "start mission"),
+    (31_010, "engage"),
+];
+
+/// A station.
+pub(crate) struct PageStation {
+    sender: Sender,
+    decoder: Decoder<Downlink>,
+    /// True once it has commanded something: it stays with the vehicle from then on.
+    speaks: bool,
+    now_ms: u64,
+    /// Plans to be uploaded, the first one now, and when that is given up.
+    uploads: VecDeque<(Plan, Vec<MissionItem>)>,
+    given_up_ms: u64,
+    /// What follows once the vehicle is armed, and when that is given up.
+    once_armed: Option<(Command, u64)>,
+    /// Where it leads a vehicle that does not know where on the earth it is, local frame \[m\].
+    target_m: Option<Vector3<f32>>,
+    heard: Vec<Downlink>,
+    parameter_changes: u32,
+}
+
+impl PageStation {
+    pub(crate) fn new() -> Self {
+        PageStation {
+            sender: Sender::new(ADDRESS),
+            decoder: Decoder::new(ADDRESS),
+            speaks: false,
+            now_ms: 0,
+            uploads: VecDeque::new(),
+            given_up_ms: 0,
+            once_armed: None,
+            target_m: None,
+            heard: Vec::new(),
+            parameter_changes: 0,
+        }
+    }
+
+    /// Returns the number of parameters that were changed.
+    pub(crate) fn parameter_changes(&self) -> u32 {
+        self.parameter_changes
+    }
+
+    fn say(&mut self, server: &mut Server, message: &Uplink) {
+        self.speaks = true;
+        server.hear(VEHICLE, PEER, self.sender.send(message, &mut [0; FRAME_MAX]));
+    }
+
+    /// Gives a command.
+    pub(crate) fn command(&mut self, server: &mut Server, command: Command) {
+        // What was to follow an earlier command must not follow this one.
+        (self.once_armed, self.target_m) = (None, None);
+        self.say(server, &Uplink::Command(command));
+    }
+
+    /// Gives a command that needs an armed vehicle, which is armed first.
+    pub(crate) fn command_armed(&mut self, server: &mut Server, command: Command) {
+        let armed = server.vehicles().get(VEHICLE).and_then(|it| it.report()).is_some_and(|it| it.mode.armed());
+        self.command(server, if armed { command } else { Command::Arm });
+        self.once_armed = (!armed).then_some((command, self.now_ms + PATIENCE_MS));
+    }
+
+    /// Leads the vehicle to a place of its local frame, in mode offboard \[m\].
+    pub(crate) fn lead(&mut self, server: &mut Server, place_m: Vector3<f32>, offboard: Command) {
+        self.target_m = Some(place_m);
+        // The target first: without a fresh one the vehicle refuses the mode.
+        self.send_target(server);
+        self.say(server, &Uplink::Command(offboard));
+    }
+
+    fn send_target(&mut self, server: &mut Server) {
+        if let Some(position_m) = self.target_m {
+            let target = PositionTarget { position_m, ..PositionTarget::NONE };
+            self.say(server, &Uplink::Target(ExternalTarget::Motion(target)));
+        }
+    }
+
+    /// Sets a parameter.
+    pub(crate) fn set(&mut self, server: &mut Server, name: &str, value: f32) {
+        let mut bytes = [0; 16];
+        bytes.iter_mut().zip(name.bytes()).for_each(|(to, from)| *to = from);
+        // As a number: understood for whole ones, too.
+        let value = value.to_le_bytes();
+        let request = ParameterRequest::Set { name: bytes, value, kind: Kind::Real32.number() };
+        self.say(server, &Uplink::Parameter(request));
+    }
+
+    /// Replaces plans, in this order.
+    pub(crate) fn upload(&mut self, server: &mut Server, plans: impl IntoIterator<Item = (Plan, Vec<MissionItem>)>) {
+        self.uploads = plans.into_iter().collect();
+        self.begin_upload(server);
+    }
+
+    fn begin_upload(&mut self, server: &mut Server) {
+        self.given_up_ms = self.now_ms + PATIENCE_MS;
+        if let Some((plan, items)) = self.uploads.front() {
+            let (count, plan) = (items.len() as u16, *plan);
+            self.say(server, &Uplink::Mission(Mission::Count(count, plan)));
+        }
+    }
+
+    /// Takes what the vehicle has sent in a step.
+    pub(crate) fn hear(&mut self, vehicle: usize, bytes: &[u8]) {
+        if vehicle == VEHICLE {
+            let PageStation { decoder, heard, .. } = self;
+            // Telemetry is not decoded, since the page is shown the vehicle itself.
+            decoder.feed_accepted(bytes, |frame| HEARD.contains(&frame.id), |_, message| heard.push(message));
+        }
+    }
+
+    /// Answers what was heard, after a step; what is worth a line goes to `say`.
+    pub(crate) fn turn(&mut self, server: &mut Server, say: &mut dyn FnMut(MavSeverity, String)) {
+        let now_ms = (server.now_s() * 1e3).round() as u64;
+        // Time may stand still.
+        let goes_on = now_ms != self.now_ms;
+        self.now_ms = now_ms;
+        for message in std::mem::take(&mut self.heard) {
+            match message {
+                Downlink::Text { severity, text } => say(severity, text.to_str().unwrap_or_default().into()),
+                Downlink::Answer { command, answer, to } if to == ADDRESS && answer != Answer::Accepted => {
+                    let known = NAMES.iter().find(|(number, _)| *number == command);
+                    let name = known.map_or_else(|| format!("command {command}"), |(_, name)| (*name).into());
+                    let severity = if answer == Answer::InProgress { INFO } else { REFUSED };
+                    say(severity, format!("{name}: {}", in_words(answer)));
+                }
+                Downlink::Mission { message, to } if to == ADDRESS => self.go_on(server, message, say),
+                Downlink::Parameter(_) => self.parameter_changes = self.parameter_changes.wrapping_add(1),
+                Downlink::ParameterError { to, .. } if to == ADDRESS => {
+                    say(REFUSED, "parameter: refused".into());
+                }
+                _ => (),
+            }
+        }
+        if !self.uploads.is_empty() && self.now_ms >= self.given_up_ms {
+            self.uploads.clear();
+            say(REFUSED, "plan: the vehicle does not answer".into());
+        }
+        if let Some((command, given_up_ms)) = self.once_armed {
+            let armed = server.vehicles().get(VEHICLE).and_then(|it| it.report()).is_some_and(|it| it.mode.armed());
+            if armed {
+                self.command(server, command);
+            } else if self.now_ms >= given_up_ms {
+                self.once_armed = None;
+            }
+        }
+        if goes_on && self.now_ms.is_multiple_of(TARGET_MS) {
+            self.send_target(server);
+        }
+        if goes_on && self.speaks && self.now_ms.is_multiple_of(HEARTBEAT_MS) {
+            self.say(server, &Uplink::Heartbeat);
+        }
+    }
+
+    /// Goes on with the upload.
+    fn go_on(&mut self, server: &mut Server, message: Mission, say: &mut dyn FnMut(MavSeverity, String)) {
+        let Some((plan, items)) = self.uploads.front() else { return };
+        let plan = *plan;
+        match message {
+            Mission::Request(number, asked) if asked == plan => {
+                if let Some(item) = items.get(usize::from(number)).copied() {
+                    self.say(server, &Uplink::Mission(Mission::Item(item, plan)));
+                }
+            }
+            Mission::Ack(MissionResult::ACCEPTED, of) if of == plan => {
+                self.uploads.pop_front();
+                self.begin_upload(server);
+            }
+            Mission::Ack(MissionResult(result), of) if of == plan => {
+                self.uploads.clear();
+                say(REFUSED, format!("plan: refused, result {result}"));
+            }
+            _ => (),
+        }
+    }
+}
+
+fn in_words(answer: Answer) -> &'static str {
+    match answer {
+        Answer::Accepted => "done",
+        Answer::Denied => "a number is out of range",
+        Answer::Unsupported => "not supported",
+        Answer::Failed => "failed",
+        Answer::InProgress => "in progress",
+        _ => "refused",
+    }
+}

@@ -1,0 +1,183 @@
+//! One connection, from its first byte to its last.
+
+use crate::web::admission::Admission;
+use crate::web::head::{HEAD_MAX, Head};
+use crate::web::http::{answer, refuse, switch};
+use crate::web::places::Place;
+use crate::web::timed::{Rate, Timed};
+use afbc_web::PageFile;
+use std::io::{self, Read};
+use std::net::TcpStream;
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, sync_channel};
+use std::time::{Duration, Instant};
+use tungstenite::handshake::derive_accept_key;
+use tungstenite::protocol::frame::CloseFrame;
+use tungstenite::protocol::frame::coding::CloseCode;
+use tungstenite::protocol::{Role, WebSocketConfig};
+use tungstenite::{Message, WebSocket};
+
+/// Time for a request to be whole, for an answer to be taken, and for a page to take a part of what is written.
+const HEAD_MAX_TIME: Duration = Duration::from_secs(5);
+const ANSWER_MAX_TIME: Duration = Duration::from_secs(30);
+const PATIENCE: Duration = Duration::from_secs(5);
+/// Time between two looks at what is to be sent.
+const NAP: Duration = Duration::from_millis(8);
+/// Longest message from a page, and most of what waits to be written \[bytes\].
+const MESSAGE_MAX: usize = 16_384;
+const WAITING_MAX: usize = 1 << 20;
+/// Messages that wait for a client, and for the flight.
+const OUT_MAX: usize = 32;
+/// Messages of a client in a second, pings among them.
+const RATE_MAX: u32 = 60;
+
+/// Why a page is closed that another has taken the place of: it does not come again by itself.
+const TAKEN: u16 = 4000;
+const TAKEN_BY: &str = "too many pages are open, and another has taken the place of this one; reload to take it back";
+
+/// Something that a client does.
+pub(crate) enum Event {
+    /// It is there, and hears by this.
+    New(u32, String, SyncSender<Arc<str>>),
+    /// It says something.
+    Said(u32, String),
+    /// It is gone.
+    Gone(u32),
+}
+
+/// What all connections share.
+pub(crate) struct Shared {
+    pub(crate) admission: Admission,
+    pub(crate) files: Vec<PageFile>,
+    pub(crate) events: SyncSender<Event>,
+}
+
+/// Serves a connection until it ends.
+pub(crate) fn serve(mut stream: TcpStream, (number, place): (u32, &Place), shared: &Shared) -> io::Result<()> {
+    stream.set_nodelay(true)?;
+    let (head, rest) = match read_head(&mut Timed::new(&mut stream, HEAD_MAX_TIME))? {
+        Ok(read) => read,
+        Err(problem) => return refuse(&mut Timed::new(&mut stream, ANSWER_MAX_TIME), "400 Bad Request", problem),
+    };
+    let out = &mut Timed::new(&mut stream, ANSWER_MAX_TIME);
+    if let Err((status, problem)) = shared.admission.check_names(&head) {
+        return refuse(out, status, &problem);
+    }
+    let page = match head.path.strip_prefix('/') {
+        Some("index.html") => Some(""),
+        page => page,
+    };
+    // Scripts and styles are the same for everybody, and a browser asks for them without the token.
+    let secret = page == Some("") || page == Some("socket");
+    if let (true, Err((status, problem))) = (secret, shared.admission.check_token(&head)) {
+        return refuse(out, status, &problem);
+    }
+    match (head.method.as_str(), page) {
+        ("GET", Some("socket")) => match &head.socket_key {
+            Some(_) if !place.keep() => refuse(out, "503 Service Unavailable", "too many have come; come again"),
+            Some(key) => {
+                switch(out, &derive_accept_key(key.as_bytes()))?;
+                converse(stream, rest, (number, place), shared)
+            }
+            None => refuse(out, "426 Upgrade Required", "here is a WebSocket, version 13"),
+        },
+        ("GET" | "HEAD", Some(path)) => match shared.files.iter().find(|file| file.path == path) {
+            Some(file) => answer(out, "200 OK", file.media, &file.text, head.method == "HEAD"),
+            None => refuse(out, "404 Not Found", "there is no such file"),
+        },
+        _ => refuse(out, "405 Method Not Allowed", "only GET and HEAD"),
+    }
+}
+
+/// Reads a head; returns what follows it, too.
+fn read_head(stream: &mut impl Read) -> io::Result<Result<(Head, Vec<u8>), &'static str>> {
+    let (mut bytes, mut part) = (Vec::new(), [0; 1024]);
+    loop {
+        let length = stream.read(&mut part)?;
+        if length == 0 {
+            return Err(io::ErrorKind::UnexpectedEof.into());
+        }
+        bytes.extend_from_slice(part.get(..length).unwrap_or_default());
+        match Head::read(&bytes) {
+            Ok(Some(head)) => {
+                let rest = bytes.split_off(head.length.min(bytes.len()));
+                return Ok(Ok((head, rest)));
+            }
+            Ok(None) if bytes.len() < HEAD_MAX => {}
+            Ok(None) => return Ok(Err("its head is too long")),
+            Err(problem) => return Ok(Err(problem)),
+        }
+    }
+}
+
+/// Carries messages both ways.
+fn converse(stream: TcpStream, rest: Vec<u8>, (number, place): (u32, &Place), shared: &Shared) -> io::Result<()> {
+    let from = stream.peer_addr()?.to_string();
+    stream.set_read_timeout(Some(NAP))?;
+    stream.set_write_timeout(Some(PATIENCE))?;
+    let (sender, out) = sync_channel(OUT_MAX);
+    let mut limits = WebSocketConfig::default();
+    limits.max_message_size = Some(MESSAGE_MAX);
+    limits.max_frame_size = Some(MESSAGE_MAX);
+    limits.max_write_buffer_size = WAITING_MAX;
+    // Each message is written at once: a frame that waits for others to fill a buffer is late.
+    limits.write_buffer_size = 0;
+    let mut socket = WebSocket::from_partially_read(stream, rest, Role::Server, Some(limits));
+    // The loop that flies takes these in a millisecond.
+    if shared.events.send(Event::New(number, from, sender)).is_err() {
+        return Ok(());
+    }
+    let end = exchange(&mut socket, &out, (number, place), shared);
+    // Once the flight has ended nobody wants to know, and the connection ends in any case.
+    let _ = shared.events.send(Event::Gone(number));
+    let taken = (!place.is_page()).then(|| CloseFrame { code: CloseCode::Library(TAKEN), reason: TAKEN_BY.into() });
+    let _ = socket.close(taken).and_then(|()| socket.flush());
+    end
+}
+
+fn exchange(
+    socket: &mut WebSocket<TcpStream>,
+    out: &Receiver<Arc<str>>,
+    (number, place): (u32, &Place),
+    shared: &Shared,
+) -> io::Result<()> {
+    let mut rate = Rate::new(Instant::now());
+    while place.is_page() {
+        loop {
+            match out.try_recv() {
+                Ok(text) => socket.send(Message::text(text.as_ref())).map_err(in_io)?,
+                Err(TryRecvError::Empty) => break,
+                // The flight has ended, or has had enough of this client.
+                Err(TryRecvError::Disconnected) => return Ok(()),
+            }
+        }
+        match socket.read() {
+            Ok(Message::Text(_) | Message::Ping(_) | Message::Pong(_)) if rate.count(Instant::now()) > RATE_MAX => {
+                return Ok(());
+            }
+            Ok(Message::Text(text)) => {
+                place.speaks();
+                if shared.events.send(Event::Said(number, text.as_str().into())).is_err() {
+                    return Ok(());
+                }
+            }
+            Ok(Message::Ping(_) | Message::Pong(_)) => {}
+            // What is no text says nothing sensible.
+            Ok(Message::Binary(_) | Message::Frame(_) | Message::Close(_)) => return Ok(()),
+            Err(tungstenite::Error::Io(error)) if is_silence(&error) => {}
+            Err(error) => return Err(in_io(error)),
+        }
+    }
+    Ok(())
+}
+
+fn is_silence(error: &io::Error) -> bool {
+    matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut | io::ErrorKind::Interrupted)
+}
+
+fn in_io(error: tungstenite::Error) -> io::Error {
+    match error {
+        tungstenite::Error::Io(error) => error,
+        error => io::Error::other(error),
+    }
+}

@@ -1,0 +1,144 @@
+//! The page's way to the vehicles.
+
+use crate::page::Cockpit;
+use crate::web::admission::Admission;
+use crate::web::client::{Event, Shared};
+use crate::web::listener::listen;
+use crate::web::places::CONNECTIONS_MAX;
+use crate::{Door, Server, Then, TimeFlow};
+use afbc_web::page_files;
+use std::io;
+use std::net::{SocketAddr, TcpListener};
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
+use std::thread;
+use std::time::Duration;
+
+/// Time between two frames, and while time stands still.
+const FRAME: Duration = Duration::from_millis(33);
+const PAUSED: Duration = Duration::from_millis(250);
+/// Messages that wait for the flight.
+const EVENTS_MAX: usize = 32;
+/// Time for which a client may take nothing.
+const STUCK: Duration = Duration::from_secs(10);
+
+/// Serves the page, in threads of its own, and connects it to the first vehicle of a server.
+pub struct WebDoor {
+    address: SocketAddr,
+    admission: Admission,
+    cockpit: Cockpit,
+    /// What does not change: made once, since it takes longer than a step.
+    hello: Option<Arc<str>>,
+    events: Receiver<Event>,
+    pages: Vec<OpenPage>,
+    shown: Duration,
+}
+
+/// A page that somebody looks at.
+struct OpenPage {
+    number: u32,
+    from: String,
+    out: SyncSender<Arc<str>>,
+    /// When it last took something.
+    took: Duration,
+}
+
+impl WebDoor {
+    /// Opens the port, any free one for 0.
+    ///
+    /// # Errors
+    /// One line that names the address and the cure.
+    pub fn open(address: SocketAddr, admission: Admission) -> Result<Self, String> {
+        let listener = TcpListener::bind(address).map_err(|error| taken(address, &error))?;
+        let address = listener.local_addr().map_err(|error| taken(address, &error))?;
+        let (sender, events) = sync_channel(EVENTS_MAX);
+        let shared = Arc::new(Shared { admission: admission.clone(), files: page_files(), events: sender });
+        let listen = move || listen(&listener, &shared);
+        thread::Builder::new().name("page port".into()).spawn(listen).map_err(|error| taken(address, &error))?;
+        let (cockpit, hello, pages, shown) = (Cockpit::new(), None, Vec::new(), Duration::ZERO);
+        Ok(WebDoor { address, admission, cockpit, hello, events, pages, shown })
+    }
+
+    /// Returns the port's address.
+    pub fn address(&self) -> SocketAddr {
+        self.address
+    }
+
+    /// Returns what to open in a browser.
+    pub fn url(&self) -> String {
+        let token = self.admission.token.as_ref().map_or(String::new(), |token| format!("?token={token}"));
+        format!("http://{}/{token}", self.address)
+    }
+
+    /// Takes what has come: one message, so that a flood of them costs a step little.
+    fn receive(&mut self, server: &mut Server, now: Duration, log: &mut dyn FnMut(&str)) -> Then {
+        let Ok(event) = self.events.try_recv() else { return Then::Nothing };
+        let now_s = server.now_s();
+        match event {
+            Event::New(number, from, out) if self.pages.len() < CONNECTIONS_MAX => {
+                log(&format!("{now_s:.3} page {from} connected"));
+                let page = OpenPage { number, from, out, took: now };
+                let first = [self.hello.clone(), self.cockpit.values(server).map(Arc::from)];
+                first.into_iter().flatten().for_each(|text| drop(page.out.try_send(text)));
+                self.pages.push(page);
+            }
+            // Its sender is dropped, which ends it.
+            Event::New(..) => {}
+            Event::Gone(number) => {
+                let gone = self.pages.extract_if(.., |page| page.number == number);
+                gone.for_each(|page| log(&format!("{now_s:.3} page {} gone", page.from)));
+            }
+            Event::Said(number, text) => {
+                let reply = self.cockpit.command(server, &text);
+                if let Some(page) = self.pages.iter().find(|page| page.number == number) {
+                    // The flight waits for nobody: a page whose queue is full misses an answer.
+                    reply.messages.into_iter().for_each(|text| drop(page.out.try_send(text.into())));
+                }
+                return reply.then;
+            }
+        }
+        Then::Nothing
+    }
+
+    /// Shows the vehicle to every page; forgets those that take nothing.
+    fn show(&mut self, server: &Server, flow: TimeFlow, now: Duration) {
+        let Some(frame) = self.cockpit.frame(server, flow) else { return };
+        let frame: Arc<str> = frame.into();
+        self.pages.retain_mut(|page| match page.out.try_send(Arc::clone(&frame)) {
+            Ok(()) => {
+                page.took = now;
+                true
+            }
+            Err(TrySendError::Full(_)) => now.saturating_sub(page.took) < STUCK,
+            // Its connection has ended, and the event that says so, which is logged, is on the way.
+            Err(TrySendError::Disconnected(_)) => true,
+        });
+    }
+}
+
+impl Door for WebDoor {
+    fn turn(&mut self, server: &mut Server, flow: TimeFlow, now: Duration, log: &mut dyn FnMut(&str)) -> Then {
+        if self.hello.is_none() {
+            self.hello = self.cockpit.hello(server).map(Arc::from);
+        }
+        let then = self.receive(server, now, log);
+        self.cockpit.turn(server);
+        // What somebody has done is seen at once.
+        let wait = if flow.paused && then == Then::Nothing { PAUSED } else { FRAME };
+        if now.saturating_sub(self.shown) >= wait && !self.pages.is_empty() {
+            self.shown = now;
+            self.show(server, flow, now);
+        }
+        then
+    }
+
+    fn sent(&mut self, vehicle: usize, bytes: &[u8]) {
+        self.cockpit.sent(vehicle, bytes);
+    }
+}
+
+/// Tells why a port cannot be opened.
+fn taken(address: SocketAddr, error: &io::Error) -> String {
+    let cure = "choose another one, as in --web 127.0.0.1:0 for any free port";
+    format!("--web {address}: it cannot be opened ({error}); {cure}")
+}

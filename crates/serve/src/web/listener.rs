@@ -1,0 +1,37 @@
+//! The port, and a thread for each connection.
+
+use crate::web::client::{Shared, serve};
+use crate::web::places::Places;
+use std::io::ErrorKind;
+use std::net::TcpListener;
+use std::sync::Arc;
+use std::thread;
+use std::time::Duration;
+
+/// Wait after a failure to accept, such as too many open files.
+const NAP: Duration = Duration::from_millis(50);
+
+/// Accepts connections for as long as the program runs.
+pub(crate) fn listen(listener: &TcpListener, shared: &Arc<Shared>) {
+    let places = Places::default();
+    let mut number: u32 = 0;
+    loop {
+        let stream = match listener.accept() {
+            Ok((stream, _)) => stream,
+            Err(error) if error.kind() == ErrorKind::Interrupted => continue,
+            Err(_) => {
+                thread::sleep(NAP);
+                continue;
+            }
+        };
+        number = number.wrapping_add(1);
+        // Whoever is gone already needs no place.
+        let Ok(place) = places.enter(number, &stream) else { continue };
+        let shared = Arc::clone(shared);
+        // Without a thread, the connection is closed and its place free.
+        let _ = thread::Builder::new().name("page".into()).spawn(move || {
+            // How a connection ends is its own business.
+            let _ = serve(stream, (number, &place), &shared);
+        });
+    }
+}
