@@ -1,5 +1,6 @@
-//! Files. [`read`]: TOML files, whose mistakes are reported in one line each. The rest is what commands write: folders of results and single files, which appear whole or not at all, carry a
-//! checksum and never replace files of others; files and pipes that are written in the background. Flash in a file.
+//! Files. [`read`]: TOML files, whose mistakes are reported in one line each. The rest is what commands write: folders
+//! of results and single files, which appear whole or not at all, carry a checksum and never replace files of others;
+//! files and pipes that are written in the background. Flash in a file.
 #![forbid(unsafe_code)]
 
 mod background;

@@ -247,8 +247,8 @@ impl Host {
         self.log = Some(log);
     }
 
-    /// Keeps a black box's log ([`afbc_log::ulog`]) from now on, before the first tick; `write` takes its bytes. Fixes of
-    /// a GNSS receiver are measured from `origin`, if that is known.
+    /// Keeps a black box's log ([`afbc_log::ulog`]) from now on, before the first tick; `write` takes its bytes. Fixes
+    /// of a GNSS receiver are measured from `origin`, if that is known.
     pub fn log(&mut self, origin: Option<Origin>, write: impl FnMut(&[u8]) + 'static) {
         self.origin = origin;
         self.black_box = Some(self.new_black_box(Some(Box::new(write))));

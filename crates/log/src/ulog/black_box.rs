@@ -105,7 +105,8 @@ impl BlackBox {
     }
 
     /// Makes it a small log: each topic by its longer period
-    /// ([`LoggedTopic::small_us`](crate::ulog::LoggedTopic::small_us)), and the inertial sensor's as the mean of its samples since the last message.
+    /// ([`LoggedTopic::small_us`](crate::ulog::LoggedTopic::small_us)), and the inertial sensor's as the mean of its
+    /// samples since the last message.
     #[must_use]
     pub fn small(self) -> Self {
         BlackBox { small: true, ..self }
