@@ -21,11 +21,12 @@
 #![forbid(unsafe_code)]
 
 mod cli;
+#[cfg(feature = "all")]
 mod network;
+#[cfg(feature = "all")]
 mod serial;
 
 use afbc_scenario::OwnLaw;
-use clap_complete::CompleteEnv;
 use std::process::ExitCode;
 
 /// Runs the command line with these laws beside the built-in ones: in every command that flies, in scenario and vehicle
@@ -40,7 +41,8 @@ pub fn main_with(laws: impl IntoIterator<Item = OwnLaw>) -> ExitCode {
         return ExitCode::from(2);
     }
     // Ends the program if a shell asks what could stand next.
-    CompleteEnv::with_factory(cli::Cli::program).complete();
+    #[cfg(feature = "all")]
+    clap_complete::CompleteEnv::with_factory(cli::Cli::program).complete();
     match cli::Cli::read().run() {
         Ok(code) => code,
         Err(failure) => {

@@ -32,7 +32,7 @@ pub use error::Error;
 pub use file::parse;
 pub use fly::{fly, merge};
 pub use folder::{CampaignFolder, Rows};
-pub use manifest::{Drawn, Manifest, Shard, hash_of};
+pub use manifest::{Drawn, Manifest, Shard};
 pub use plan::{Campaign, NamedTrajectory, Spread};
 pub use quantity::{QUANTITIES, Quantity};
 pub use row::{Column, FIGURES, Figure, Row};

@@ -3,12 +3,10 @@
 use crate::built_in::built_in;
 use crate::plan::{Campaign, Spread};
 use crate::row::{Column, FIGURES, Row};
-use core::hash::Hasher;
+use afbc_files::seal::hash_of;
 use serde::{Deserialize, Serialize};
 use std::fmt;
-use std::io;
 use std::str::FromStr;
-use twox_hash::XxHash64;
 
 /// One of several parts of a campaign, flown separately.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -148,27 +146,4 @@ fn fingerprint(campaign: &Campaign) -> String {
     let spreads: Vec<_> =
         spreads.iter().map(|spread| (spread.quantity().map(|quantity| quantity.range.name), spread.ends)).collect();
     hash_of(&(env!("CARGO_PKG_VERSION"), flights, seed, scenario, trajectories, spreads))
-}
-
-/// Returns a hash of what decides a result, as it is written. Numbers are written to the last bit; infinity, of an
-/// event without end, as null, which no other number is.
-pub fn hash_of(decides: &impl serde::Serialize) -> String {
-    let mut hasher = Hashed(XxHash64::with_seed(0));
-    let written = serde_json::to_writer(&mut hasher, decides);
-    debug_assert!(written.is_ok(), "nothing in it cannot be written");
-    format!("{:016x}", hasher.0.finish())
-}
-
-/// A hash of what is written.
-struct Hashed(XxHash64);
-
-impl io::Write for Hashed {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.0.write(bytes);
-        Ok(bytes.len())
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        Ok(())
-    }
 }

@@ -81,6 +81,15 @@ pub fn hash_of_file(path: &Path) -> io::Result<String> {
     Ok(out.finish())
 }
 
+/// Returns a hash of what decides a result, as it is written. Numbers are written to the last bit; infinity, of an
+/// event without end, as null, which no other number is.
+pub fn hash_of(decides: &impl serde::Serialize) -> String {
+    let mut out = Hashing::new(io::sink());
+    let written = serde_json::to_writer(&mut out, decides);
+    debug_assert!(written.is_ok(), "nothing in it cannot be written");
+    format!("{:016x}", out.hash.finish())
+}
+
 /// Passes on the data written to it, and hashes them.
 pub(crate) struct Hashing<W> {
     out: W,

@@ -141,7 +141,7 @@ impl Search {
         Planned {
             vehicle: self.vehicle.name.clone(),
             law: self.start.kind().name().into(),
-            fingerprint: afbc_campaign::hash_of(&(&self.training, &self.held_out, conditions, &self.start)),
+            fingerprint: afbc_files::seal::hash_of(&(&self.training, &self.held_out, conditions, &self.start)),
         }
     }
 

@@ -7,7 +7,7 @@ use super::progress::Progress;
 use super::target::Target;
 use super::terminal::{Failure, columns, print, say};
 use super::vehicle::OnVehicle;
-use super::{interrupt, json, manifest};
+use super::{described, interrupt, json, manifest};
 use afbc_campaign::subject::SubjectKind;
 use afbc_campaign::{self as campaign, BUILT_IN, Campaign as Plan, CampaignFolder, Manifest, Shard, Summary, built_in};
 use afbc_files::read::BuiltIn;
@@ -242,7 +242,7 @@ impl Campaigns {
             None => {
                 let all = BUILT_IN.iter().map(BuiltIn::read).collect::<Result<Vec<_>, _>>()?;
                 match self.json.json {
-                    true => json::print_value(&all.iter().map(json::campaign).collect::<Vec<_>>())?,
+                    true => json::print_value(&all.iter().map(described::campaign).collect::<Vec<_>>())?,
                     false => print(&all.iter().map(line).collect::<String>())?,
                 }
             }

@@ -1,9 +1,8 @@
 //! `manifest.json` beside results: what they were made of, by which command, on which machine.
 
 use super::terminal::Failure;
-use afbc_campaign::hash_of;
 use afbc_files::Folder;
-use afbc_files::seal::{self, hash_of_file};
+use afbc_files::seal::{self, hash_of, hash_of_file};
 use afbc_scenario::Scenario;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;

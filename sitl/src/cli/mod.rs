@@ -1,43 +1,83 @@
 //! The command line: one module for each command.
+#![cfg_attr(
+    not(feature = "all"),
+    allow(dead_code, reason = "some of what commands share is used by those left out only")
+)]
 
-mod aboard;
-mod again;
-mod bring_up;
-mod campaign;
-mod compare;
-mod exact;
-mod fleet;
-mod fly;
 mod flying;
-mod hitl;
-mod in_the_loop;
 mod interrupt;
 mod json;
 mod manifest;
-mod mcap;
-mod over_seeds;
-mod page;
 mod paper;
-mod params;
-mod pil;
 mod place;
-mod plan;
-mod plot;
 mod program;
 mod progress;
-mod random;
-mod replay;
-mod results;
-mod rough;
-mod scenarios;
-mod serve;
-mod shell;
-mod suite;
-mod target;
 mod terminal;
-mod tune;
-mod vehicle;
 mod written;
+
+// Beside `sitl paper`.
+#[cfg(feature = "all")]
+mod aboard;
+#[cfg(feature = "all")]
+mod again;
+#[cfg(feature = "all")]
+mod bring_up;
+#[cfg(feature = "all")]
+mod campaign;
+#[cfg(feature = "all")]
+mod commands;
+#[cfg(feature = "all")]
+mod compare;
+#[cfg(feature = "all")]
+mod completion;
+#[cfg(feature = "all")]
+mod described;
+#[cfg(feature = "all")]
+mod exact;
+#[cfg(feature = "all")]
+mod fleet;
+#[cfg(feature = "all")]
+mod fly;
+#[cfg(feature = "all")]
+mod hitl;
+#[cfg(feature = "all")]
+mod in_the_loop;
+#[cfg(feature = "all")]
+mod mcap;
+#[cfg(feature = "all")]
+mod over_seeds;
+#[cfg(feature = "all")]
+mod page;
+#[cfg(feature = "all")]
+mod params;
+#[cfg(feature = "all")]
+mod pil;
+#[cfg(feature = "all")]
+mod plan;
+#[cfg(feature = "all")]
+mod plot;
+#[cfg(feature = "all")]
+mod random;
+#[cfg(feature = "all")]
+mod replay;
+#[cfg(feature = "all")]
+mod results;
+#[cfg(feature = "all")]
+mod rough;
+#[cfg(feature = "all")]
+mod scenarios;
+#[cfg(feature = "all")]
+mod serve;
+#[cfg(feature = "all")]
+mod shell;
+#[cfg(feature = "all")]
+mod suite;
+#[cfg(feature = "all")]
+mod target;
+#[cfg(feature = "all")]
+mod tune;
+#[cfg(feature = "all")]
+mod vehicle;
 
 use clap::{Command as Program, CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::process::ExitCode;
@@ -64,28 +104,12 @@ pub(crate) struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     Paper(paper::Paper),
-    Fly(fly::Fly),
-    Campaign(campaign::Campaign),
-    Merge(campaign::Merge),
-    Compare(compare::Compare),
-    Again(again::Again),
-    Tune(tune::Tune),
-    Check(scenarios::Check),
-    Scenarios(scenarios::Scenarios),
-    Campaigns(campaign::Campaigns),
-    Suites(suite::Suites),
-    Vehicles(vehicle::Vehicles),
-    Params(params::Params),
-    Plot(plot::Plot),
-    Results(results::Results),
-    Replay(replay::Replay),
-    Mcap(mcap::Mcap),
-    Serve(serve::Serve),
-    Pil(pil::Pil),
-    Hitl(hitl::Hitl),
-    BringUp(bring_up::BringUp),
-    Completions(shell::Completions),
-    Man(shell::Man),
+    #[cfg(feature = "all")]
+    #[command(flatten)]
+    Other(commands::Other),
+    #[cfg(not(feature = "all"))]
+    #[command(external_subcommand)]
+    Absent(Vec<String>),
 }
 
 impl Cli {
@@ -104,28 +128,17 @@ impl Cli {
     pub(crate) fn run(self) -> Result<ExitCode, Failure> {
         match self.command.unwrap_or(Command::Paper(self.paper)) {
             Command::Paper(paper) => paper.run(),
-            Command::Fly(fly) => fly.run(),
-            Command::Campaign(campaign) => campaign.run(),
-            Command::Merge(merge) => merge.run(),
-            Command::Compare(compare) => compare.run(),
-            Command::Again(again) => again.run(Self::command()),
-            Command::Tune(tune) => tune.run(),
-            Command::Check(check) => check.run(),
-            Command::Scenarios(scenarios) => scenarios.run(),
-            Command::Campaigns(campaigns) => campaigns.run(),
-            Command::Suites(suites) => suites.run(),
-            Command::Vehicles(vehicles) => vehicles.run(),
-            Command::Params(params) => params.run(),
-            Command::Plot(plot) => plot.run(),
-            Command::Results(results) => results.run(),
-            Command::Replay(replay) => replay.run(),
-            Command::Mcap(mcap) => mcap.run(),
-            Command::Serve(serve) => serve.run(),
-            Command::Pil(pil) => pil.run(),
-            Command::Hitl(hitl) => hitl.run(),
-            Command::BringUp(bring_up) => bring_up.run(),
-            Command::Completions(completions) => completions.run(),
-            Command::Man(man) => man.run(Self::command()),
+            #[cfg(feature = "all")]
+            Command::Other(other) => other.run(Self::command()),
+            #[cfg(not(feature = "all"))]
+            Command::Absent(words) => {
+                let name = words.first().map_or("", String::as_str);
+                Err(format!(
+                    "{name}: this program was built for `paper` alone; `cargo run --release -- {name}` \
+                             builds all commands"
+                )
+                .into())
+            }
         }
     }
 }

@@ -1,76 +1,20 @@
-//! The command line as it is parsed and completed: what is the same for all of its commands.
+//! The command line as it is parsed: what is the same for all of its commands.
 
 use clap::error::{ContextKind, ErrorKind};
 use clap::{Arg, Command, Error};
-use clap_complete::engine::{ArgValueCompleter, CompletionCandidate, PathCompleter, ValueCompleter};
-use std::ffi::OsStr;
 
-use afbc_campaign::suite::SUITES;
-use afbc_campaign::{random, rough};
-use afbc_files::read::BuiltIn;
-use afbc_scenario::contender::{Contender, ControllerKind};
-
-/// Returns `command` and its own commands with arguments that may be negative numbers, and that a shell completes.
+/// Returns `command` and its own commands with arguments that may be negative numbers, and that a shell completes,
+/// where there is more than `paper`.
 ///
 /// `--duration -5` is a wrong duration then, not an unknown option.
 pub(super) fn prepared(command: Command) -> Command {
-    let name = command.get_name().to_owned();
-    command.mut_args(|arg| completed(&name, negative(arg))).mut_subcommands(prepared)
+    #[cfg(feature = "all")]
+    let command = super::completion::completed(command);
+    command.mut_args(negative).mut_subcommands(prepared)
 }
 
 fn negative(arg: Arg) -> Arg {
     if arg.get_action().takes_values() { arg.allow_negative_numbers(true) } else { arg }
-}
-
-/// Returns the argument of `command` with the names that may stand there, and files where those may, too.
-fn completed(command: &str, arg: Arg) -> Arg {
-    let value = arg.get_value_names().and_then(|names| names.first()).map_or("", |name| name.as_str());
-    let (names, is_file): (fn() -> Vec<String>, bool) = match (command, arg.get_id().as_str(), value) {
-        ("scenarios", "name", _) => (scenarios, false),
-        ("campaigns", "name", _) => (campaigns, false),
-        ("suites", "name", _) => (suites, false),
-        ("vehicles", "name", _) => (vehicles, false),
-        (_, "controllers" | "against", _) => (contenders, false),
-        ("tune", "contenders", _) => (laws, false),
-        (_, _, "SCENARIO") => (scenarios, true),
-        (_, _, "CAMPAIGN") => (campaigns, true),
-        (_, _, "SUITE") => (suites, true),
-        (_, _, "VEHICLE") => (vehicles, true),
-        _ => return arg,
-    };
-    arg.add(ArgValueCompleter::new(move |current: &OsStr| {
-        let begins = |name: &String| current.to_str().is_some_and(|current| name.starts_with(current));
-        let files = if is_file { PathCompleter::any().complete(current) } else { Vec::new() };
-        names().into_iter().filter(begins).map(CompletionCandidate::new).chain(files).collect()
-    }))
-}
-
-fn built_in<T>(all: &[BuiltIn<T>]) -> Vec<String> {
-    all.iter().map(|known| known.name.to_owned()).collect()
-}
-
-fn scenarios() -> Vec<String> {
-    built_in(&afbc_scenario::BUILT_IN)
-}
-
-fn campaigns() -> Vec<String> {
-    built_in(&afbc_campaign::BUILT_IN)
-}
-
-fn suites() -> Vec<String> {
-    built_in(&SUITES).into_iter().chain([random::NAME, rough::NAME].map(str::to_owned)).collect()
-}
-
-fn vehicles() -> Vec<String> {
-    built_in(&afbc_vehicles::BUILT_IN)
-}
-
-fn contenders() -> Vec<String> {
-    Contender::all_standard().map(|contender| contender.name).collect()
-}
-
-fn laws() -> Vec<String> {
-    ControllerKind::all().into_iter().map(|kind| kind.name().to_owned()).collect()
 }
 
 /// Returns the error without the advice to take an unknown option for a file's name.

@@ -1,9 +1,9 @@
 //! `sitl scenarios` and `sitl check`.
 
-use super::json;
 use super::json::Json;
 use super::target::Target;
 use super::terminal::{Failure, print};
+use super::{described, json};
 use afbc_campaign::Campaign;
 use afbc_campaign::subject::{Subject, SubjectKind};
 use afbc_files::Output;
@@ -37,7 +37,7 @@ impl Scenarios {
             None => {
                 let all = BUILT_IN.iter().map(BuiltIn::read).collect::<Result<Vec<_>, _>>()?;
                 match self.json.json {
-                    true => json::print_value(&all.iter().map(json::scenario).collect::<Vec<_>>())?,
+                    true => json::print_value(&all.iter().map(described::scenario).collect::<Vec<_>>())?,
                     false => print(&all.iter().map(line).collect::<String>())?,
                 }
             }
@@ -85,9 +85,9 @@ impl Check {
             return Ok(ExitCode::SUCCESS);
         }
         match (self.scenario.any()?, self.json.json) {
-            (Subject::Scenario(scenario), true) => json::print_value(&json::scenario(&scenario))?,
-            (Subject::Campaign(campaign), true) => json::print_value(&json::campaign(&campaign))?,
-            (Subject::Vehicle(vehicle), true) => json::print_value(&json::vehicle(&vehicle))?,
+            (Subject::Scenario(scenario), true) => json::print_value(&described::scenario(&scenario))?,
+            (Subject::Campaign(campaign), true) => json::print_value(&described::campaign(&campaign))?,
+            (Subject::Vehicle(vehicle), true) => json::print_value(&described::vehicle(&vehicle))?,
             (Subject::Scenario(scenario), false) => {
                 let Scenario { name, duration_s, model, contenders, .. } = scenario;
                 print(&format!("{name}: ok, {duration_s} s, {} plant, {}\n", model.name(), titles(&contenders)))?;

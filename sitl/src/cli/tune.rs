@@ -1,11 +1,11 @@
 //! `sitl tune`.
 
 use super::fleet::Fleet;
-use super::json;
 use super::json::Json;
 use super::progress::Progress;
 use super::target::Target;
 use super::terminal::{Failure, print};
+use super::{described, json};
 use afbc::Profile;
 use afbc_files::Output;
 use afbc_scenario::contender::{Contender, ControllerKind};
@@ -145,7 +145,7 @@ impl Tune {
         }
         let SearchResult { before, after, evaluations, .. } = &found;
         match &self.out {
-            _ if self.json.json => json::print_value(&json::tuned(&found, &start.name, self.seed))?,
+            _ if self.json.json => json::print_value(&described::tuned(&found, &start.name, self.seed))?,
             Some(out) => print(&format!(
                 "cost {before:.4} before, {after:.4} after {evaluations} tries; gains in {}\n",
                 out.display()

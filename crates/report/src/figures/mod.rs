@@ -3,9 +3,12 @@
 //! Onsets of gusts are marked, and intervals with a fault or changed parameters are shaded. A contender has the same
 //! colour in every figure.
 
+#[cfg(feature = "campaigns")]
 pub(super) mod campaign;
 mod canvas;
+#[cfg(feature = "campaigns")]
 pub(super) mod compare;
+#[cfg(feature = "replays")]
 pub(super) mod exact;
 pub(super) mod flights;
 mod marks;
@@ -13,6 +16,7 @@ mod palette;
 mod picture;
 mod plotted;
 mod reduce;
+#[cfg(feature = "replays")]
 pub(super) mod replay;
 mod ticks;
 mod time_chart;

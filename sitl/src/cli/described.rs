@@ -1,0 +1,141 @@
+//! Scenarios, campaigns, vehicles and searches as `--json` describes them.
+
+use afbc::Profile;
+use afbc_campaign::Campaign;
+use afbc_scenario::Scenario;
+use afbc_scenario::contender::Contender;
+use afbc_tune::{GainChange, SearchResult, fragment};
+use afbc_vehicles::Vehicle;
+use serde::Serialize;
+
+/// A contender.
+#[derive(Serialize)]
+struct Who<'a> {
+    name: &'a str,
+    controller: &'static str,
+    profile: Option<&'static str>,
+}
+
+fn who<'a>(contenders: &'a [Contender]) -> Vec<Who<'a>> {
+    let who = |contender: &'a Contender| {
+        let (controller, profile) = (contender.kind().name(), contender.profile().map(Profile::name));
+        Who { name: &contender.name, controller, profile }
+    };
+    contenders.iter().map(who).collect()
+}
+
+/// Summary of a scenario.
+#[derive(Serialize)]
+struct ScenarioWords<'a> {
+    kind: &'static str,
+    name: &'a str,
+    description: &'a str,
+    duration_s: f64,
+    plant: &'static str,
+    seed: u64,
+    contenders: Vec<Who<'a>>,
+}
+
+/// Returns the summary of a scenario.
+pub(crate) fn scenario(scenario: &Scenario) -> impl Serialize + '_ {
+    let Scenario { name, description, duration_s, model, seed, contenders, .. } = scenario;
+    ScenarioWords {
+        kind: "scenario",
+        name,
+        description,
+        duration_s: *duration_s,
+        plant: model.name(),
+        seed: *seed,
+        contenders: who(contenders),
+    }
+}
+
+/// Summary of a vehicle.
+#[derive(Serialize)]
+struct VehicleWords<'a> {
+    kind: &'static str,
+    name: &'a str,
+    description: &'a str,
+    rotors: usize,
+    mass_kg: f64,
+}
+
+/// Returns the summary of a vehicle.
+pub(crate) fn vehicle(vehicle: &Vehicle) -> impl Serialize + '_ {
+    let Vehicle { name, description, rotors, parameters, .. } = vehicle;
+    VehicleWords { kind: "vehicle", name, description, rotors: rotors.len(), mass_kg: parameters.mass_kg }
+}
+
+/// Summary of a campaign.
+#[derive(Serialize)]
+struct CampaignWords<'a> {
+    kind: &'static str,
+    name: &'a str,
+    description: &'a str,
+    flights: u64,
+    seed: u64,
+    duration_s: f64,
+    plant: &'static str,
+    contenders: Vec<Who<'a>>,
+    trajectories: Vec<&'a str>,
+    drawn: Vec<Drawn>,
+}
+
+#[derive(Serialize)]
+struct Drawn {
+    name: &'static str,
+    ends: [f64; 2],
+}
+
+/// Returns the summary of a campaign.
+pub(crate) fn campaign(campaign: &Campaign) -> impl Serialize + '_ {
+    let Campaign { name, description, flights, seed, scenario, trajectories, spreads, .. } = campaign;
+    let drawn =
+        spreads.iter().filter_map(|spread| Some(Drawn { name: spread.quantity()?.range.name, ends: spread.ends }));
+    CampaignWords {
+        kind: "campaign",
+        name,
+        description,
+        flights: *flights,
+        seed: *seed,
+        duration_s: scenario.duration_s,
+        plant: scenario.model.name(),
+        contenders: who(&scenario.contenders),
+        trajectories: trajectories.iter().map(|trajectory| trajectory.name.as_str()).collect(),
+        drawn: drawn.collect(),
+    }
+}
+
+/// Result of a search for gains.
+#[derive(Serialize)]
+struct Tuned {
+    controller: &'static str,
+    seed: u64,
+    tries: usize,
+    cost_before: f64,
+    cost_after: f64,
+    gains: Vec<Gain>,
+    contender_toml: String,
+}
+
+#[derive(Serialize)]
+struct Gain {
+    name: String,
+    before: f32,
+    after: f32,
+}
+
+/// Returns the result of a search with this seed for the contender `name`.
+pub(crate) fn tuned(found: &SearchResult, name: &str, seed: u64) -> impl Serialize {
+    let SearchResult { contender, before, after, evaluations, changes } = found;
+    let gain = |GainChange { name, from, to }: &GainChange| Gain { name: name.clone(), before: *from, after: *to };
+    Tuned {
+        controller: contender.kind().name(),
+        seed,
+        tries: *evaluations,
+        cost_before: *before,
+        cost_after: *after,
+        gains: changes.iter().map(gain).collect(),
+        contender_toml: fragment(&Contender { name: format!("{name}-tuned"), ..contender.clone() }),
+    }
+}
