@@ -2,9 +2,7 @@
 
 #![expect(clippy::unwrap_used, reason = "tests")]
 
-mod common;
-
-use common::{command, folder, refused, sitl};
+use crate::common::{command, folder, refused, sitl};
 use std::fs;
 use std::io::{BufRead, BufReader};
 use std::net::UdpSocket;

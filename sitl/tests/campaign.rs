@@ -2,10 +2,8 @@
 
 #![expect(clippy::unwrap_used, reason = "tests")]
 
-mod common;
-
+use crate::common::{command, folder, sitl, succeeds};
 use afbc_campaign::{self as campaign, Campaign, Manifest, Shard, built_in};
-use common::{command, folder, sitl, succeeds};
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Stdio};

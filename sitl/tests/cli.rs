@@ -2,10 +2,8 @@
 
 #![expect(clippy::unwrap_used, reason = "tests")]
 
-mod common;
-
+use crate::common::{command, folder, sitl};
 use afbc_scenario::contender::ControllerKind;
-use common::{command, folder, sitl};
 use std::collections::BTreeMap;
 use std::fs;
 use std::io::{BufRead, BufReader};

@@ -2,11 +2,9 @@
 
 #![expect(clippy::unwrap_used, clippy::indexing_slicing, reason = "tests")]
 
-mod common;
-
+use crate::common::{command, folder, refused, succeeds};
 use afbc_files::seal;
 use afbc_scenario::contender::ControllerKind;
-use common::{command, folder, refused, succeeds};
 use serde_json::Value;
 use std::collections::BTreeSet;
 use std::fs;

@@ -2,9 +2,7 @@
 
 #![expect(clippy::unwrap_used, clippy::indexing_slicing, reason = "tests")]
 
-mod common;
-
-use common::sitl;
+use crate::common::sitl;
 use std::collections::BTreeMap;
 use std::fs;
 use std::os::unix::fs::symlink;
@@ -12,11 +10,11 @@ use std::path::{Path, PathBuf};
 
 /// A folder for each test, with only a scenario, a campaign and a log.
 fn folder(test: &str) -> PathBuf {
-    let folder = common::folder(test);
+    let folder = crate::common::folder(test);
     let hover = "[trajectory]\nkind = \"hover\"\nposition_m = [0, 0, 1]\n";
     fs::write(folder.join("short.toml"), format!("duration_s = 0.5\n{hover}")).unwrap();
     fs::write(folder.join("few.toml"), "flights = 3\nduration_s = 0.5\nscenario = \"short.toml\"\n").unwrap();
-    common::log_at_rest(&folder, 3);
+    crate::common::log_at_rest(&folder, 3);
     let shards = [["campaign", "few.toml", "--shard", "1/2"], ["campaign", "few.toml", "--shard", "2/2"]];
     for (shard, out) in shards.iter().zip(["part-1", "part-2"]) {
         assert_eq!(sitl(&folder, &[&shard[..], &["--out", out]].concat()).status.code(), Some(0));

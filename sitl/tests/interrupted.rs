@@ -3,9 +3,7 @@
 
 #![expect(clippy::unwrap_used, reason = "tests")]
 
-mod common;
-
-use common::{command, folder};
+use crate::common::{command, folder};
 use std::ffi::OsString;
 use std::fs;
 use std::io::{BufRead, BufReader, Read};

@@ -3,9 +3,7 @@
 
 #![expect(clippy::unwrap_used, clippy::indexing_slicing, clippy::panic, reason = "tests")]
 
-mod common;
-
-use common::{folder, sitl};
+use crate::common::{folder, sitl};
 use serde_json::Value;
 use std::collections::BTreeSet;
 use std::fs;
@@ -13,12 +11,12 @@ use std::path::{Path, PathBuf};
 
 /// Returns the output of a successful command.
 fn succeeds(folder: &Path, arguments: &[&str]) -> String {
-    common::succeeds(&sitl(folder, arguments))
+    crate::common::succeeds(&sitl(folder, arguments))
 }
 
 /// Returns the one line of an error.
 fn refused(folder: &Path, arguments: &[&str]) -> String {
-    let said = common::refused(&sitl(folder, arguments));
+    let said = crate::common::refused(&sitl(folder, arguments));
     assert_eq!(said.lines().count(), 1, "{said}");
     said
 }
@@ -213,7 +211,7 @@ fn campaigns() {
 #[test]
 fn replays() {
     let folder = folder("replays");
-    common::log_at_rest(&folder, 14);
+    crate::common::log_at_rest(&folder, 14);
     let replayed = prints(&folder, "Replays", &[&["replay", "rest.csv"]]);
     let file: Value = serde_json::from_slice(&fs::read(folder.join("out/replay-rest/summary.json")).unwrap()).unwrap();
     assert_eq!(replayed, file);

@@ -2,9 +2,7 @@
 
 #![expect(clippy::unwrap_used, reason = "tests")]
 
-mod common;
-
-use common::{command, folder, log_at_rest, refused, sitl, succeeds};
+use crate::common::{command, folder, log_at_rest, refused, sitl, succeeds};
 use std::fs;
 use std::net::UdpSocket;
 use std::os::unix::fs::symlink;

@@ -2,9 +2,7 @@
 
 #![expect(clippy::unwrap_used, reason = "tests")]
 
-mod common;
-
-use common::{folder, refused, sitl, succeeds};
+use crate::common::{folder, refused, sitl, succeeds};
 use std::fs;
 
 /// All values of every vehicle go through both formats and a store, to the bit.

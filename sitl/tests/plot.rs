@@ -2,9 +2,7 @@
 
 #![expect(clippy::unwrap_used, reason = "tests")]
 
-mod common;
-
-use common::{folder, refused, sitl, succeeds};
+use crate::common::{folder, refused, sitl, succeeds};
 use std::fs;
 use std::path::Path;
 

@@ -2,9 +2,7 @@
 
 #![expect(clippy::unwrap_used, clippy::indexing_slicing, reason = "tests")]
 
-mod common;
-
-use common::{folder, log_at_rest, refused, sitl, succeeds};
+use crate::common::{folder, log_at_rest, refused, sitl, succeeds};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;

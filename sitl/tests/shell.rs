@@ -1,9 +1,7 @@
 //! Completions and the manual.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
-mod common;
-
-use common::{command, folder, sitl};
+use crate::common::{command, folder, sitl};
 use std::fs;
 use std::path::Path;
 use std::process::Command;

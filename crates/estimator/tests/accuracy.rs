@@ -1,10 +1,8 @@
 //! Accuracy against truth, with the noise of an ICM-42688-P, and what is left when the tracker goes.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::indexing_slicing, clippy::panic, missing_docs)] // tests
 
-mod common;
-
+use crate::common::{Flight, ICM, MOCAP, OUTDOOR, Rms, double, eight, exp, fly, hover, log, matrix, settings};
 use afbc_estimator::{Measurement, Settings};
-use common::{Flight, ICM, MOCAP, OUTDOOR, Rms, double, eight, exp, fly, hover, log, matrix, settings};
 
 /// Root mean squares of the errors.
 #[derive(Default)]
@@ -16,7 +14,7 @@ struct Errors {
     heading: Rms,
 }
 
-fn measure(sensors: common::Sensors, settings: Settings, seeds: u64) -> Errors {
+fn measure(sensors: crate::common::Sensors, settings: Settings, seeds: u64) -> Errors {
     let truth = fly(eight, 30.0);
     let mut errors = Errors::default();
     for seed in 0..seeds {
@@ -67,7 +65,7 @@ fn without_tracker(gap_ms: usize, seed: u64, settings: Settings) -> f64 {
     let truth = fly(hover, 20.0);
     let mut flight = Flight::with(&truth, ICM, MOCAP, seed, settings);
     let start = afbc_types::State {
-        position_m: common::single(&truth[0].p),
+        position_m: crate::common::single(&truth[0].p),
         attitude_rad: nalgebra::Vector3::new(0.0, 0.0, 0.1),
         ..Default::default()
     };
@@ -145,7 +143,7 @@ fn a_late_tracker() {
 #[test]
 fn an_untold_heading() {
     let truth = fly(|t| (eight(t).0, eight(t).1 - 2.0), 20.0);
-    for (sensors, most) in [(MOCAP, 0.01), (common::Sensors { mag: None, ..OUTDOOR }, 0.05)] {
+    for (sensors, most) in [(MOCAP, 0.01), (crate::common::Sensors { mag: None, ..OUTDOOR }, 0.05)] {
         let mut flight = Flight::new(&truth, ICM, sensors, 6);
         for ms in 0..20_000 {
             let estimate = flight.step_with(
@@ -169,8 +167,8 @@ fn an_untold_heading() {
 /// Told to be on the ground, the filter holds velocity and biases without any aid; otherwise they drift away.
 #[test]
 fn on_the_ground() {
-    let truth = fly(common::rest, 120.0);
-    let nothing = common::Sensors::default();
+    let truth = fly(crate::common::rest, 120.0);
+    let nothing = crate::common::Sensors::default();
     let mut drifts = [0.0, 0.0];
     for (on_ground, drift) in [true, false].into_iter().zip(&mut drifts) {
         let mut flight = Flight::new(&truth, ICM, nothing, 8);
@@ -209,5 +207,5 @@ fn far_away_and_slow() {
 fn rotations() {
     let v = nalgebra::Vector3::new(0.3, -0.5, 0.9);
     assert!((log(&exp(&v)) - v).norm() < 1e-12);
-    assert!((matrix(common::quaternion(&exp(&v))) - exp(&v)).norm() < 1e-6);
+    assert!((matrix(crate::common::quaternion(&exp(&v))) - exp(&v)).norm() < 1e-6);
 }

@@ -3,11 +3,9 @@
 //! By default 30 filters; `FILTERS=10000 SEED=1` makes that many from another seed.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::indexing_slicing, clippy::panic, missing_docs)] // tests
 
-mod common;
-
+use crate::common::{M3, Noise, V3, double, exp, field, quaternion, single};
 use afbc_estimator::{Estimate, Estimator, ImuSample, Measurement, Memory, Settings, Sigmas, Stamped};
 use afbc_types::{Declared, State};
-use common::{M3, Noise, V3, double, exp, field, quaternion, single};
 use nalgebra::SMatrix;
 
 /// One of the things that may be so for a while.
@@ -116,7 +114,7 @@ fn minute(seed: u64) -> (f64, u64) {
         r *= exp(&(rates * 1e-3));
         v += push * 1e-3;
         p += v * 1e-3;
-        let force = r.transpose() * (push + V3::new(0.0, 0.0, common::G)) + trouble.accel_by;
+        let force = r.transpose() * (push + V3::new(0.0, 0.0, crate::common::G)) + trouble.accel_by;
         let mut sample = ImuSample {
             at_us,
             rates_rad_s: single(&(rates + trouble.gyro_by + noise.vector(2e-3))),

@@ -1,10 +1,8 @@
 //! Consistency: the filter's errors are as large as it says, in a hundred flights with other noise and other biases.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::indexing_slicing, clippy::panic, missing_docs)] // tests
 
-mod common;
-
+use crate::common::{Flight, ICM, MOCAP, OUTDOOR, Path, Sensors, eight, fly, rest, settings};
 use afbc_estimator::{Aid, Settings};
-use common::{Flight, ICM, MOCAP, OUTDOOR, Path, Sensors, eight, fly, rest, settings};
 
 const RUNS: usize = 100;
 /// What the outdoor sensors tell.

@@ -1,11 +1,9 @@
 //! Faults of the sensors are refused, told and recovered from.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::indexing_slicing, clippy::panic, missing_docs)] // tests
 
-mod common;
-
+use crate::common::checks::{at_rest, flown, position_error};
+use crate::common::{ICM, MOCAP, NOTHING, Noise, OUTDOOR, V3, double, eight, hover, settings, single};
 use afbc_estimator::{Estimator, ImuSample, Measurement, Memory, Settings, Stamped};
-use common::checks::{at_rest, flown, position_error};
-use common::{ICM, MOCAP, NOTHING, Noise, OUTDOOR, V3, double, eight, hover, settings, single};
 use nalgebra::Vector3;
 
 #[test]

@@ -1,10 +1,8 @@
 //! A vehicle at rest stays where it is, and one that is moved is followed.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::indexing_slicing, clippy::panic, missing_docs)] // tests
 
-mod common;
-
+use crate::common::{Flight, ICM, Imu, MOCAP, NOTHING, OUTDOOR, Path, V3, eight, fly, hover, rest, settings};
 use afbc_estimator::Settings;
-use common::{Flight, ICM, Imu, MOCAP, NOTHING, OUTDOOR, Path, V3, eight, fly, hover, rest, settings};
 
 /// A simulator's sensor: 0.0004 rad/s and 0.002 m/s2 per root of a hertz.
 const COARSE: Imu = Imu { gyro: 4e-4, accel: 2e-3, ..ICM };

@@ -1,12 +1,10 @@
 //! Whatever comes in, and however long: finite estimates, a positive covariance, and no more memory than it has.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::indexing_slicing, clippy::panic, missing_docs)] // tests
 
-mod common;
-
+use crate::common::checks::{positive, sound};
+use crate::common::{ICM, MOCAP, Noise, OUTDOOR, V3, settings, single};
 use afbc_estimator::{Estimate, Estimator, ImuSample, Measurement, Memory, Settings, Sigmas, Stamped};
 use afbc_types::State;
-use common::checks::{positive, sound};
-use common::{ICM, MOCAP, Noise, OUTDOOR, V3, settings, single};
 use nalgebra::Vector3;
 use proptest::prelude::*;
 
@@ -176,11 +174,11 @@ fn hours_leave_it_sound() {
                 at_us,
                 rates_rad_s: single(&(gyro + noise.vector(ICM.gyro / root_dt))),
                 specific_force_m_s2: single(
-                    &(V3::new(0.0, 0.0, common::G) + accel + noise.vector(ICM.accel / root_dt)),
+                    &(V3::new(0.0, 0.0, crate::common::G) + accel + noise.vector(ICM.accel / root_dt)),
                 ),
             };
             if sensors.tracker.is_some() && i % 3 == 0 {
-                let attitude = common::quaternion(&common::exp(&noise.vector(3.5e-3)));
+                let attitude = crate::common::quaternion(&crate::common::exp(&noise.vector(3.5e-3)));
                 let position_m = single(&noise.vector(1e-3));
                 let value =
                     Measurement::Pose { position_m, attitude, position_sigma_m: 1e-3, attitude_sigma_rad: 3.5e-3 };
@@ -201,7 +199,7 @@ fn hours_leave_it_sound() {
                 let height_m = (offset + 0.15 * noise.normal()) as f32;
                 memory
                     .offer(&Stamped { value: Measurement::Height { height_m, sigma_m: 0.15 }, at_us: at_us - 20_000 });
-                let field = single(&(common::field() + noise.vector(0.01)));
+                let field = single(&(crate::common::field() + noise.vector(0.01)));
                 memory.offer(&Stamped {
                     value: Measurement::MagneticField { field, sigma: 0.01 },
                     at_us: at_us - 12_000,

@@ -1,12 +1,10 @@
 //! It starts at rest by itself or says why not, and in the air where it is told.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::indexing_slicing, clippy::panic, missing_docs)] // tests
 
-mod common;
-
+use crate::common::checks::{at_rest, position_error, sound};
+use crate::common::{Flight, ICM, MOCAP, NOTHING, OUTDOOR, eight, fly, settings, single};
 use afbc_estimator::{ImuSample, Sigmas, Unready};
 use afbc_types::State;
-use common::checks::{at_rest, position_error, sound};
-use common::{Flight, ICM, MOCAP, NOTHING, OUTDOOR, eight, fly, settings, single};
 use nalgebra::Vector3;
 
 #[test]

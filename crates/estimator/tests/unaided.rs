@@ -1,9 +1,7 @@
 //! In the air without any aid but the barometer: no position, no velocity, no heading.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::indexing_slicing, clippy::panic, missing_docs)] // tests
 
-mod common;
-
-use common::{Flight, ICM, Imu, NOTHING, Noise, Sensors, V3, fly, settings};
+use crate::common::{Flight, ICM, Imu, NOTHING, Noise, Sensors, V3, fly, settings};
 use core::f64::consts::TAU;
 
 const TIME_S: f64 = 90.0;

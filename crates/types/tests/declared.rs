@@ -24,7 +24,7 @@ parameters! {
 
 /// Three ways, numbered from 1 on.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Way {
+pub(crate) enum Way {
     /// Up.
     Up,
     /// Down.

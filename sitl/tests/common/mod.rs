@@ -2,13 +2,16 @@
 
 #![allow(dead_code, reason = "each test file uses a part")]
 
+use core::panic::Location;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-/// Returns an empty folder for a test of this file.
+/// Returns an empty folder for a test of the calling file.
+#[track_caller]
 pub(crate) fn folder(test: &str) -> PathBuf {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(env!("CARGO_CRATE_NAME")).join(test);
+    let file = Path::new(Location::caller().file()).file_stem().unwrap();
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("sitl").join(file).join(test);
     if folder.exists() {
         fs::remove_dir_all(&folder).unwrap();
     }

@@ -1,0 +1,17 @@
+//! All tests in one program: one each takes longer to build than to run.
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a test that cannot go on should say why"
+)]
+
+mod campaign;
+mod compare;
+mod fingerprint;
+mod mistakes;
+mod random;
+mod rough;
+mod suite;
+mod told;

@@ -1,0 +1,27 @@
+//! All tests in one program: one each takes longer to build than to run.
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a test that cannot go on should say why"
+)]
+
+mod bring_up;
+mod campaign;
+mod cli;
+mod cluster;
+mod common;
+mod compare;
+mod exact;
+mod folders;
+mod interrupted;
+mod machine;
+mod outputs;
+mod params;
+mod plot;
+mod replay;
+mod serve;
+mod shell;
+mod ulog;
+mod vehicles;
