@@ -1,4 +1,4 @@
-//! Interface between firmware and board. A crate in `boards/` implements it and builds an image by
+//! Interface between firmware and board. A crate in `boards/` implements it and builds its images by
 //! [`image!`](crate::image!), the only place where firmware and board meet.
 
 use crate::samples::Sampler;
@@ -28,7 +28,7 @@ pub trait Board: Sized + 'static {
     const CORE_HZ: u32;
     /// Offset of the parameters' sectors \[bytes\].
     const STORE: u32;
-    /// Its name in logs, perhaps with `board-` before it.
+    /// Its name in logs.
     const HARDWARE: &'static str;
     /// True if it has room for minutes of logs only, which are small then
     /// ([`BlackBox::small`](afbc_log::ulog::BlackBox::small)).

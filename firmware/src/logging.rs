@@ -169,14 +169,13 @@ impl LinkLog {
         let blocks = BLOCKS_HELD.init_with(|| [const { LogBlock::EMPTY }; BLOCKS]);
         let (pages, page) = PAGE_CHANNEL.init_with(|| Channel::new(PAGE.init_with(|| [LogPage::EMPTY]))).split();
         let (queue, blocks) = BLOCK_CHANNEL.init_with(|| Channel::new(blocks)).split();
-        let hardware = B::HARDWARE.strip_prefix("board-").unwrap_or(B::HARDWARE);
         let log = LOG.init_with(|| LinkLog {
             server: LogServer::default(),
             stored: KeptLogs::new(Pages(page)),
             writer: LogWriter::new(B::SMALL_LOGS),
             queue: Queue(queue),
             views,
-            hardware,
+            hardware: B::HARDWARE,
         });
         (log, LogEnds { blocks, pages })
     }

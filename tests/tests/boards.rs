@@ -6,7 +6,7 @@
 //! large.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, clippy::panic, missing_docs)] // what is unreadable must stop it
 
-use crate::board_table::{Battery, BoardTable, LogBus, Motor, Stream, Timer, wiring};
+use crate::board_table::{Battery, BoardTable, LogBus, Motor, Stream, Timer, row, wiring};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -14,6 +14,9 @@ use std::path::{Path, PathBuf};
 fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap()
 }
+
+/// What makes an image of a table.
+const TABLES: &str = "chips/stm32f4/src/flight_controller.rs";
 
 /// Returns every Rust file below `folder`, with its text.
 fn sources(folder: &Path) -> Vec<(PathBuf, String)> {
@@ -41,27 +44,32 @@ fn pins(text: &str) -> BTreeSet<String> {
     words.filter(is_pin).map(str::to_owned).collect()
 }
 
+/// In code once in its folder, as a table once in its file.
 #[test]
-fn every_board_is_a_folder_and_meets_the_firmware_once() {
-    let boards: Vec<_> = fs::read_dir(root().join("boards")).unwrap().map(|entry| entry.unwrap().path()).collect();
-    let boards: Vec<_> = boards.iter().filter(|path| path.is_dir()).collect();
-    assert!(boards.len() >= 3, "{boards:?}");
-    for board in boards {
-        let text: String = sources(board).into_iter().map(|(_, text)| text).collect();
-        assert_eq!(text.matches("firmware::image!(").count(), 1, "{}", board.display());
-        let interfaces = text.matches("impl Board for ").count() + text.matches("::flight_controller! {").count();
-        assert_eq!(interfaces, 1, "{}", board.display());
-        assert!(board.join("memory.x").is_file() || root().join("memory.x").is_file(), "{}", board.display());
+fn every_board_meets_the_firmware_once() {
+    let (tables, mut codes) = kinds();
+    codes.push(root().join("boards/emulated"));
+    for board in codes {
+        for met in ["firmware::image!(", "impl Board for "] {
+            let count = |path: &str| fs::read_to_string(board.join(path)).unwrap().matches(met).count();
+            assert_eq!(count("src/main.rs") + count("src/board.rs"), 1, "{}: {met}", board.display());
+        }
     }
+    for (board, table) in tables {
+        let text = fs::read_to_string(&board).unwrap();
+        assert_eq!(text.matches("::flight_controller! {").count(), 1, "{table:?}");
+        assert!(!text.contains("firmware::") && !text.contains("unsafe"), "{}", board.display());
+    }
+    assert!(root().join("memory.x").is_file());
 }
 
 /// A page for each, listed in the book, with what its owner needs.
 #[test]
 fn every_board_has_a_page() {
     let contents = fs::read_to_string(root().join("docs/SUMMARY.md")).unwrap();
-    let folders = fs::read_dir(root().join("boards")).unwrap().map(|entry| entry.unwrap().path());
-    for folder in folders.filter(|path| path.is_dir() && !path.ends_with("emulated")) {
-        let name = folder.file_name().unwrap().to_str().unwrap();
+    let (tables, codes) = kinds();
+    for board in codes.iter().chain(tables.iter().map(|(board, _)| board)) {
+        let name = name_of(board);
         assert!(contents.contains(&format!("(boards/{name}.md)")), "{name}");
         let page = fs::read_to_string(root().join(format!("docs/boards/{name}.md"))).unwrap();
         for wanted in [
@@ -126,20 +134,34 @@ fn code_of(board: &Path) -> String {
     fs::read_to_string(board.join("src/board.rs")).unwrap()
 }
 
-/// Returns the folders of the boards that are a table, with it, and of those that are code.
+/// Returns what is in a folder, if it is there.
+fn within(folder: &Path) -> Vec<PathBuf> {
+    let mut paths: Vec<_> = fs::read_dir(folder).into_iter().flatten().map(|entry| entry.unwrap().path()).collect();
+    paths.sort();
+    paths
+}
+
+/// Returns the files of the boards that are a table, with it, and the folders of those that are code.
 fn kinds() -> (Vec<(PathBuf, BoardTable)>, Vec<PathBuf>) {
-    let folders = fs::read_dir(root().join("boards")).unwrap().map(|entry| entry.unwrap().path());
-    let mut folders: Vec<_> = folders.filter(|path| path.is_dir() && !path.ends_with("emulated")).collect();
-    folders.sort();
-    let (mut tables, mut codes) = (Vec::new(), Vec::new());
-    for folder in folders {
-        match BoardTable::read(&folder) {
-            Some(table) => tables.push((folder, table)),
-            None => codes.push(folder),
-        }
-    }
+    let codes = within(&root().join("boards")).into_iter().filter(|path| path.is_dir() && !path.ends_with("emulated"));
+    let codes: Vec<_> = codes.collect();
+    let tables = codes.iter().flat_map(|folder| within(&folder.join("src/bin")));
+    let tables: Vec<_> = tables.map(|path| (path.clone(), BoardTable::read(&path))).collect();
     assert!(tables.len() >= 6 && codes.len() >= 3, "{tables:?} {codes:?}");
     (tables, codes)
+}
+
+/// Returns the name of a board by the file of its table, or by its folder.
+fn name_of(board: &Path) -> &str {
+    let name = board.file_stem().unwrap().to_str().unwrap();
+    if board.is_dir() { name } else { name.strip_prefix("flight-").unwrap() }
+}
+
+/// Returns the chip of a board, as its package names it.
+fn chip_of(board: &Path) -> String {
+    let manifests = board.ancestors().map(|folder| folder.join("Cargo.toml"));
+    let text = manifests.into_iter().find_map(|manifest| fs::read_to_string(manifest).ok()).unwrap();
+    text.split_once("\nchip = \"").unwrap().1.split('"').next().unwrap().to_owned()
 }
 
 /// Returns the words of `text` that begin with `start`, without it, up to what is no part of a name.
@@ -148,9 +170,9 @@ fn names_after<'a>(text: &'a str, start: &'a str) -> Vec<&'a str> {
     text.split(start).skip(1).map(|rest| rest.split(is_end).next().unwrap()).collect()
 }
 
-/// Returns the interrupt lines that a board's executors take.
-fn executors(board: &Path) -> Vec<String> {
-    let text = fs::read_to_string(board.join("src/main.rs")).unwrap();
+/// Returns the interrupt lines that the executors of `firmware::image!` take, the first in a file.
+fn executors(file: &Path) -> Vec<String> {
+    let text = fs::read_to_string(file).unwrap();
     let image = text.split_once("firmware::image!(").unwrap().1.split_once(");").unwrap().0;
     let words: Vec<_> = image.split([',', '\n']).filter_map(|word| word.split_once(": ")).collect();
     words.iter().map(|(_, line)| line.trim().to_owned()).collect()
@@ -164,6 +186,8 @@ fn assert_once<T: Ord + std::fmt::Debug>(what: Vec<T>, board: &Path) {
 
 #[test]
 fn nothing_is_used_twice() {
+    let of_tables = executors(&root().join(TABLES));
+    assert_eq!(of_tables.len(), 6, "with that of the logs: {of_tables:?}");
     for (board, table) in kinds().0 {
         let BoardTable { link, gnss, radio, escs, imu, i2c, timers, logs, .. } = &table;
         let radio = radio.as_ref().map(|radio| &radio.uart.name);
@@ -179,13 +203,13 @@ fn nothing_is_used_twice() {
         let lines =
             streams.chain(i2c.lines.clone()).chain([&link.name, &gnss.name, &imu.ready.line].map(String::clone));
         let lines = lines.chain(escs.cloned());
-        assert_once(lines.chain(radio.cloned()).chain(executors(&board)).collect(), &board);
+        assert_once(lines.chain(radio.cloned()).chain(of_tables.clone()).collect(), &board);
     }
     for board in kinds().1 {
         let code = code_of(&board);
         let bound = code.split_once("bind_interrupts!(").unwrap().1.split_once("});").unwrap().0;
         let lines = bound.lines().filter_map(|line| line.split_once(" => ")).map(|(line, _)| line.trim().to_owned());
-        assert_once(lines.chain(executors(&board)).collect(), &board);
+        assert_once(lines.chain(executors(&board.join("src/main.rs"))).collect(), &board);
     }
 }
 
@@ -210,11 +234,13 @@ fn every_line_of_external_interrupts_is_that_of_one_pin() {
         assert_eq!(interrupts, *bound, "{}", board.display());
         count += wired.len();
     };
-    for (board, table) in kinds().0 {
+    let (tables, codes) = kinds();
+    let expected = tables.len() + 2 + 2;
+    for (board, table) in tables {
         let ready = &table.imu.ready;
         assert_lines(&board, &[(ready.pin.clone(), ready.channel.clone())], &[ready.line.clone()].into());
     }
-    for board in kinds().1 {
+    for board in codes {
         let code = code_of(&board);
         let wired = code.split("InterruptPin::new(p.").skip(1).map(|rest| {
             let (pin, rest) = rest.split_once(", p.").unwrap();
@@ -223,7 +249,7 @@ fn every_line_of_external_interrupts_is_that_of_one_pin() {
         let bound = handlers(&code).into_iter().filter(|(_, handler)| handler.contains("exti::InterruptHandler"));
         assert_lines(&board, &wired.collect::<Vec<_>>(), &bound.map(|(line, _)| line).collect());
     }
-    assert_eq!(count, 6 + 2 + 2);
+    assert_eq!(count, expected);
 }
 
 /// What a table says twice, it says alike.
@@ -268,7 +294,7 @@ fn streams_have_their_interrupts_and_motors_their_pins() {
 /// memory card's.
 #[test]
 fn every_interrupt_has_the_priority_of_its_purpose() {
-    let table = fs::read_to_string(root().join("chips/stm32f4/src/flight_controller.rs")).unwrap();
+    let table = fs::read_to_string(root().join(TABLES)).unwrap();
     let purposes: BTreeMap<_, _> = [
         ("$link", "UART"),
         ("$gnss", "UART"),
@@ -374,114 +400,82 @@ fn no_board_has_a_bare_uart_or_i2c() {
     assert!(uarts >= 12 && buses >= 4, "{uarts} UARTs, {buses} I2C");
 }
 
-/// From Betaflight's descriptions of the boards (`betaflight/config`): the gyroscope's data in, select, interrupt and
-/// alignment, motors 1 to 4, clock and data of the barometer's bus, first LED but for those at the
-/// debugger's pins, buzzer, pins of the battery's voltage and current with the current's scale.
+/// Each table's file repeats what matters of Betaflight's description of the board (`betaflight/config`), copied by
+/// hand once more: the scale of the current in millivolts per 10 A; an LED, but for those at the debugger's pins;
+/// PINIO1, which is inverted and off while armed; the flash chip, if the board has one that is used.
 #[test]
 fn boards_are_as_betaflight_describes_them() {
-    let tables: BTreeMap<_, _> = kinds().0.into_iter().collect();
-    let described = [
-        (
-            "speedybee-f405-v3",
-            ["PA6", "PA4", "PC4", "CW0"],
-            ["PB6", "PB7", "PB8", "PB9"],
-            ["PB10", "PB11"],
-            ["PC8", "PC5"],
-            (["PC0", "PC1"], 386.0),
-        ),
-        (
-            "speedybee-f405-v4",
-            ["PA6", "PA4", "PC4", "CW90"],
-            ["PB6", "PB7", "PB0", "PB1"],
-            ["PB8", "PB9"],
-            ["PC13", "PC15"],
-            (["PC0", "PC1"], 400.0),
-        ),
-        (
-            "speedybee-f405-mini",
-            ["PA6", "PA4", "PC4", "CW270"],
-            ["PB6", "PB7", "PB1", "PB0"],
-            ["PB8", "PB9"],
-            ["PC13", "PC15"],
-            (["PC0", "PC1"], 250.0),
-        ),
-        (
-            "matek-f405-se",
-            ["PA6", "PA4", "PC4", "CW270"],
-            ["PB7", "PB6", "PB0", "PB1"],
-            ["PB8", "PB9"],
-            ["", "PC15"],
-            (["PC0", "PC1"], 179.0),
-        ),
-        (
-            "matek-f405-std",
-            ["PA6", "PC2", "PC3", "CW180"],
-            ["PC6", "PC7", "PC8", "PC9"],
-            ["PB6", "PB7"],
-            ["PB9", "PC13"],
-            (["PC5", "PC4"], 179.0),
-        ),
-        (
-            "kakute-f4-v2",
-            ["PA6", "PC4", "PC5", "CW270"],
-            ["PB0", "PB1", "PA3", "PA2"],
-            ["PB8", "PB9"],
-            ["PB5", "PC9"],
-            (["PC3", "PC2"], 275.0),
-        ),
-    ];
-    assert_eq!(tables.len(), described.len());
-    for (name, gyroscope, motors, bus, indicator, (battery, current_scale)) in described {
-        let table = &tables[&root().join("boards").join(name)];
-        let imu = &table.imu;
-        assert_eq!([&*imu.into, &imu.select, &imu.ready.pin, &imu.alignment], gyroscope, "{name}");
-        assert_eq!([&*table.imu.clock, &table.imu.out], ["PA5", "PA7"], "{name}");
-        for (number, pin) in (1..).zip(motors) {
-            assert!(table.motors().any(|motor| motor.number == number && motor.pin == pin), "{name}: motor {number}");
-        }
-        assert_eq!([&*table.i2c.clock, &table.i2c.data], bus, "{name}");
-        assert_eq!([table.led.as_deref().unwrap_or_default(), &table.buzzer], indicator, "{name}");
+    for (board, table) in kinds().0 {
+        let name = name_of(&board);
+        let text = fs::read_to_string(&board).unwrap();
+        let rows = text.lines().filter_map(|line| line.strip_prefix("//! | ")?.strip_suffix(" |")?.split_once(" | "));
+        let mut described: BTreeMap<_, _> = rows.map(|(what, pins)| (what, pins.to_owned())).collect();
         let Battery { converter, voltage, current, volts_per_volt, amperes_per_volt } = &table.battery;
-        assert_eq!(([&**voltage, current], &**converter), (battery, "ADC1"), "{name}");
-        // Scales in tenths of a volt per volt, 110 where none is given, and in millivolts per 10 A.
-        assert_eq!(*volts_per_volt, 11.0, "{name}");
-        assert!((amperes_per_volt - 1e4 / current_scale).abs() < 0.05, "{name}");
+        let scale: f64 = described.remove("current's scale").unwrap().parse().unwrap();
+        assert!((amperes_per_volt - 1e4 / scale).abs() < 0.05, "{name}");
+
+        let BoardTable { imu, i2c, led, buzzer, bluetooth, logs, .. } = &table;
+        let motor = |number| table.motors().find(|motor| motor.number == number).unwrap().pin.as_str();
+        let gyroscope = [&*imu.clock, &imu.into, &imu.out, &imu.select, &imu.ready.pin, &imu.alignment];
+        let mut wired = vec![
+            ("gyroscope: clock, data in, data out, select, interrupt, alignment", gyroscope.to_vec()),
+            ("motors 1 to 4", (1..=4).map(motor).collect()),
+            ("barometer: clock, data", vec![&*i2c.clock, &i2c.data]),
+            ("buzzer", vec![&**buzzer]),
+            ("battery: voltage, current", vec![&**voltage, current]),
+        ];
+        wired.extend(led.iter().map(|pin| ("LED", vec![&**pin])));
+        wired.extend(bluetooth.iter().map(|pin| ("PINIO1", vec![&**pin])));
+        wired.extend(logs.iter().filter(|logs| logs.is_flash).map(
+            |LogBus { name, clock, into, out, select, .. }| {
+                ("flash chip: bus, clock, data in, data out, select", vec![&**name, clock, into, out, select])
+            },
+        ));
+        let wired: BTreeMap<_, _> = wired.into_iter().map(|(what, pins)| (what, pins.join(", "))).collect();
+        assert_eq!(wired, described, "{name}");
+        // No scale of the voltage is given: 110 tenths of a volt per volt.
+        assert_eq!((*volts_per_volt, &**converter), (11.0, "ADC1"), "{name}");
         assert_eq!((table.crystal_hz, table.numbering.as_str()), (8_000_000, "BETAFLIGHT"), "{name}");
-        // Its PINIO1, which it inverts and switches off while armed.
-        let bluetooth = match name {
-            "speedybee-f405-v3" => Some("PC3"),
-            "speedybee-f405-v4" | "speedybee-f405-mini" => Some("PB11"),
-            _ => None,
-        };
-        assert_eq!(table.bluetooth.as_deref(), bluetooth, "{name}");
-        // The one whose flash chip is used.
-        let flash = table.logs.as_ref().filter(|logs| logs.is_flash);
-        let flash = flash.map(|LogBus { name, clock, into, out, select, .. }| [name, clock, into, out, select]);
-        let described = (name == "speedybee-f405-mini").then_some(["SPI3", "PB3", "PB4", "PB5", "PC14"]);
-        assert_eq!(flash.map(|words| words.map(String::as_str)), described, "{name}");
     }
 }
 
 const BEGIN: &str = "<!-- wiring: written by WRITE=1 cargo test -p flight-tests --test all boards:: -->\n";
 const END: &str = "<!-- end -->";
+const HEADING: &str = "| board | chip | IMU | barometer | motors |\n|---|---|---|---|---|\n";
 
 #[test]
 fn every_board_that_is_a_table_has_its_page() {
     for (board, table) in kinds().0 {
-        let name = board.file_name().unwrap().to_str().unwrap();
+        let name = name_of(&board);
         let path = root().join("docs/boards").join(name).with_extension("md");
         let page = fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
         let (head, rest) = page.split_once(BEGIN).unwrap();
         let (_, tail) = rest.split_once(END).unwrap();
-        let wired = format!("{head}{BEGIN}{}{END}{tail}", wiring(&table));
-        if std::env::var_os("WRITE").is_some() {
-            fs::write(&path, &wired).unwrap();
-        }
-        assert_eq!(
-            fs::read_to_string(&path).unwrap(),
-            wired,
-            "run WRITE=1 cargo test -p flight-tests --test all boards::"
-        );
+        assert_written(&path, &format!("{head}{BEGIN}{}{END}{tail}", wiring(&table)));
         assert!(page.contains(&format!("cargo xtask fw {name}")), "{}", path.display());
     }
+}
+
+/// Writes a page if that is asked for, and compares it.
+fn assert_written(path: &Path, text: &str) {
+    if std::env::var_os("WRITE").is_some() {
+        fs::write(path, text).unwrap();
+    }
+    assert_eq!(fs::read_to_string(path).unwrap(), text, "run WRITE=1 cargo test -p flight-tests --test all boards::");
+}
+
+/// Rows of boards that are a table are written, those of others follow.
+#[test]
+fn the_list_has_every_board() {
+    let path = root().join("docs/boards.md");
+    let page = fs::read_to_string(&path).unwrap();
+    let (head, rest) = page.split_once(HEADING).unwrap();
+    let (tables, codes) = kinds();
+    let begin = |board: &Path| format!("| [`{}`]", name_of(board));
+    let is_code = |line: &str| codes.iter().any(|board| line.starts_with(&begin(board)));
+    assert_eq!(rest.lines().filter(|line| is_code(line)).count(), codes.len());
+    let others = rest.split_inclusive('\n').skip_while(|line| line.starts_with("| [`") && !is_code(line));
+    let rows = tables.iter().map(|(board, table)| row(name_of(board), &chip_of(board), table));
+    let rows: String = rows.chain(others.map(str::to_owned)).collect();
+    assert_written(&path, &format!("{head}{HEADING}{rows}"));
 }

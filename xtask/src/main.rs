@@ -11,6 +11,7 @@ mod image;
 use clap::builder::{PossibleValue, PossibleValuesParser};
 use clap::{Parser, ValueEnum};
 use image::{Contents, Region, Usage, room};
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
 use std::{env, fs, io};
@@ -18,6 +19,8 @@ use std::{env, fs, io};
 const TARGET: &str = "thumbv7em-none-eabihf";
 /// Chips of which a share of flash and RAM has to stay free \[%\].
 const ROOM: (&str, u64) = ("STM32F405", 25);
+/// What the names of the images of tables begin with.
+const TABLE: &str = "flight-";
 /// USB's vendor and product of the chips' boot loader.
 const BOOT_LOADER: &str = "0483:df11";
 
@@ -65,7 +68,7 @@ enum Programmer {
 /// Which image.
 #[derive(Debug, clap::Args)]
 struct Image {
-    /// A folder in boards/.
+    /// A folder in boards/, or a table of one's src/bin/.
     #[arg(value_parser = named())]
     board: String,
     /// A name in vehicles/, or a path [default: VEHICLE of the environment, or the paper's].
@@ -90,20 +93,29 @@ fn main() -> ExitCode {
 /// Accepts the name of a board.
 fn named() -> PossibleValuesParser {
     // clap keeps names for as long as the program runs.
-    PossibleValuesParser::new(boards().into_iter().map(|name| PossibleValue::new(&*name.leak())))
+    PossibleValuesParser::new(boards().into_keys().map(|name| PossibleValue::new(&*name.leak())))
 }
 
-/// Returns the names of all boards.
-fn boards() -> Vec<String> {
-    let folders = fs::read_dir(root().join("boards")).into_iter().flatten().flatten();
-    let folders = folders.filter(|folder| folder.path().join("Cargo.toml").is_file());
-    let mut names: Vec<_> = folders.map(|folder| folder.file_name().to_string_lossy().into_owned()).collect();
-    names.sort();
-    names
+/// Returns the names of all boards, with the folders of their packages: each folder is a board, and so is each table of
+/// the same chip within, `src/bin/flight-BOARD.rs`.
+fn boards() -> BTreeMap<String, PathBuf> {
+    let within = |folder: &Path| fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
+    let mut boards = BTreeMap::new();
+    for folder in within(&root().join("boards")).filter(|folder| folder.join("Cargo.toml").is_file()) {
+        let mut add = |path: &Path, prefix| {
+            let name = path.file_stem().unwrap_or_default().to_string_lossy();
+            boards.extend(name.strip_prefix(prefix).map(|name| (name.to_owned(), folder.clone())));
+        };
+        add(&folder, "");
+        within(&folder.join("src/bin")).for_each(|table| add(&table, TABLE));
+    }
+    boards
 }
 
-/// A board, as its manifest describes it.
+/// A board, as its package's manifest describes it.
 struct Board {
+    /// Folder of its package.
+    folder: PathBuf,
     /// Name of its package.
     package: String,
     /// Name of its image.
@@ -120,17 +132,21 @@ impl Board {
     }
 
     fn read(name: &str) -> Result<Self, String> {
-        let path = root().join("boards").join(name).join("Cargo.toml");
+        let folder = boards().remove(name).ok_or_else(|| format!("{name}: no such board"))?;
+        let path = folder.join("Cargo.toml");
         let of = |error: &dyn std::fmt::Display| format!("{}: {error}", path.display());
         let text = fs::read_to_string(&path).map_err(|error| of(&error))?;
         let manifest: toml::Table = text.parse().map_err(|error| of(&error))?;
         let text = |value: Option<&toml::Value>| value.and_then(toml::Value::as_str).map(str::to_owned);
         let package = manifest.get("package").ok_or_else(|| of(&"no [package]"))?;
-        let image = manifest.get("bin").and_then(|bins| bins.get(0)).and_then(|bin| bin.get("name"));
+        let own = manifest.get("bin").and_then(|bins| bins.get(0)).and_then(|bin| bin.get("name"));
+        let is_table = !folder.ends_with(name);
         Ok(Board {
             package: text(package.get("name")).ok_or_else(|| of(&"no name"))?,
-            image: text(image).ok_or_else(|| of(&"no [[bin]] with a name"))?,
+            image: if is_table { Some(format!("{TABLE}{name}")) } else { text(own) }
+                .ok_or_else(|| of(&"no [[bin]] with a name"))?,
             chip: text(package.get("metadata").and_then(|of| of.get("board")).and_then(|of| of.get("chip"))),
+            folder,
         })
     }
 }
@@ -191,7 +207,7 @@ impl Image {
 
     /// Reports what it takes of the board's memory.
     fn report(&self, board: &Board, contents: &Contents) -> Result<(), String> {
-        let own = root().join("boards").join(&self.board).join("memory.x");
+        let own = board.folder.join("memory.x");
         let path = if own.is_file() { own } else { root().join("memory.x") };
         let script = fs::read_to_string(&path).map_err(|error| format!("{}: {error}", path.display()))?;
         let usage = contents.usage(&Region::of_script(&script));
@@ -247,13 +263,14 @@ mod tests {
     #[test]
     fn every_board_has_a_package_and_an_image_of_its_own() {
         let mut images = BTreeSet::new();
-        for name in boards() {
+        for (name, folder) in boards() {
             let board = Board::read(&name).expect("complete");
-            assert_eq!(board.package, format!("board-{name}"));
+            assert_eq!(board.package, format!("board-{}", folder.file_name().expect("named").display()));
+            assert!(board.image.starts_with("flight") != (name == "emulated"), "{name}: {}", board.image);
             assert_eq!(board.chip.is_none(), name == "emulated");
             assert!(images.insert(board.image), "{name}");
         }
-        assert!(images.len() >= 3);
+        assert!(images.len() >= 10 && images.contains("flight") && images.contains("flight-matek-f405-se"));
     }
 
     #[test]

@@ -45,7 +45,7 @@ impl Board for Emulated {
     /// As QEMU's STM32F405 counts it: the host derives instructions from it.
     const CORE_HZ: u32 = 168_000_000;
     const STORE: u32 = 0;
-    const HARDWARE: &'static str = env!("CARGO_PKG_NAME");
+    const HARDWARE: &'static str = "emulated";
     const OUTPUTS: usize = ROTORS_MAX;
 
     /// Opens the FIFOs and waits for the first tick's bytes.

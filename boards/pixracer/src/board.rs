@@ -145,7 +145,7 @@ impl Board for Pixracer {
     const CORE_HZ: u32 = clocks::CORE_HZ;
     /// Sectors 1 and 2, of 16 KiB each (`memory.x`).
     const STORE: u32 = 16 * 1024;
-    const HARDWARE: &'static str = env!("CARGO_PKG_NAME");
+    const HARDWARE: &'static str = "pixracer";
     const OUTPUTS: usize = OUTPUTS;
     const INDICATES: bool = true;
     const RADIO_LINK: Option<usize> = Some(3);

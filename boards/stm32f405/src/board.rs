@@ -58,7 +58,7 @@ impl Board for Stm32f405 {
     const CORE_HZ: u32 = clocks::CORE_HZ;
     /// Sectors 1 and 2, of 16 KiB each (`memory.x`).
     const STORE: u32 = 16 * 1024;
-    const HARDWARE: &'static str = env!("CARGO_PKG_NAME");
+    const HARDWARE: &'static str = "stm32f405";
     /// The channels of one timer.
     const OUTPUTS: usize = CHANNELS;
     const BOOT_LOADER: Option<fn() -> !> = Some(boot_loader::restart);

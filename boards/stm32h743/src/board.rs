@@ -138,7 +138,7 @@ impl Board for Stm32h743 {
     type Memory = Words;
     const CORE_HZ: u32 = clocks::CORE_HZ;
     const STORE: u32 = 0;
-    const HARDWARE: &'static str = env!("CARGO_PKG_NAME");
+    const HARDWARE: &'static str = "stm32h743";
     const OUTPUTS: usize = OUTPUTS;
     const INDICATES: bool = true;
     const HAS_LOG: bool = true;

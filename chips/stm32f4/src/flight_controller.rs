@@ -1,7 +1,8 @@
 //! A usual flight controller by a table of its pins.
 
-/// Implements [`Board`](firmware::board::Board) for `FlightController`, a usual flight controller with a STM32F405 or a
-/// relative, and defines `stop_motors`. The crate names all of its dependencies.
+/// Builds the image of a usual flight controller with a STM32F405 or a relative: implements
+/// [`Board`](firmware::board::Board) for it. The program is called `flight-` and the board's name, and its package has
+/// all of the dependencies.
 ///
 /// * `escs` is the UART whose RX is wired to the motor controllers' telemetry, if one is; its TX sends nothing.
 /// * USB is on PA11 and PA12, as on every chip of the kind.
@@ -62,6 +63,7 @@ macro_rules! flight_controller {
             $($task:ident: $timer:ident<$word:ty>, $dma:ident by $line:ident { $($channel:tt),+ },)+
         },
     ) => {
+        use defmt_rtt as _;
         use embassy_stm32::interrupt::{self, InterruptExt, Priority};
         use embassy_stm32::{i2c, pac, peripherals, usart};
 
@@ -105,8 +107,11 @@ macro_rules! flight_controller {
         /// Number of links: a UART, USB, and the radio receiver's UART if there is one.
         const LINKS: usize = 2 $(+ { let _ = stringify!($radio); 1 })?;
 
+        chip_stm32f4::flight_controller!(@image $(card $card)? $(flash $flash)?);
+        chip_stm32::faults!(stop_motors);
+
         /// The board after start-up.
-        pub(crate) struct FlightController {
+        struct FlightController {
             watchdog: embassy_stm32::wdg::IndependentWatchdog<'static, peripherals::IWDG>,
             /// Index of the rotor of each output.
             rotors: [usize; $outputs],
@@ -129,7 +134,7 @@ macro_rules! flight_controller {
                 let escs: &[&str] = &[$(stringify!($escs))?];
                 !escs.is_empty()
             };
-            const HARDWARE: &'static str = env!("CARGO_PKG_NAME");
+            const HARDWARE: &'static str = env!("CARGO_BIN_NAME").split_at("flight-".len()).1;
             const SMALL_LOGS: bool = {
                 let flash: &[&str] = &[$(stringify!($flash))?];
                 !flash.is_empty()
@@ -316,16 +321,28 @@ macro_rules! flight_controller {
             }
         )+
 
-
         #[embassy_executor::task]
         async fn indicator(led: Option<chip_stm32::indicator::Led>, buzzer: chip_stm32::indicator::ActiveBuzzer) -> ! {
             chip_stm32::indicator::run(led, buzzer).await
         }
 
         /// Stops the motors' signals, whatever state the program is in.
-        pub(crate) fn stop_motors() {
+        fn stop_motors() {
             $($(chip_stm32f4::flight_controller!(@stop $channel);)+)+
         }
+    };
+    // The interrupt lines of CAN1 and CAN2, which this firmware does not need.
+    (@image $storage:ident $bus:ident) => {
+        firmware::image!(
+            FlightController, control: CAN2_TX, comms: CAN2_RX0, housekeeping: CAN2_RX1, sampling: CAN1_TX,
+            aiding: CAN1_RX0, logging: CAN1_RX1
+        );
+    };
+    (@image) => {
+        firmware::image!(
+            FlightController, control: CAN2_TX, comms: CAN2_RX0, housekeeping: CAN2_RX1, sampling: CAN1_TX,
+            aiding: CAN1_RX0
+        );
     };
     (@log) => { firmware::logging::NoLog };
     (@log card $card:ident) => { chip_stm32::card::CardLog };

@@ -8,7 +8,7 @@ mod known;
 mod verdict;
 mod work;
 
-pub use boards::{BOARDS, BoardTimes, RateOfUart, default_baud};
+pub use boards::{BOARDS, BoardTimes, RateOfUart, TABLES, default_baud};
 pub use bus::{Script, i2c_ns, spi_clock_hz, spi_ns};
 pub use cycles::{CORTEX_M4F, CORTEX_M7, CoreCycles, CycleLimit, Mix};
 pub use known::KnownLateness;
@@ -40,7 +40,7 @@ pub fn reports(budgets: &str) -> Result<Vec<BoardReport>, Error> {
 fn report(board: &BoardTimes, work: &Work) -> BoardReport {
     let mut text = String::new();
     let core = board.core;
-    let _ = writeln!(text, "### {}\n", board.names);
+    let _ = writeln!(text, "### {}\n", board.name);
     let [best, bound] = [CycleLimit::Best, CycleLimit::Bound].map(|limit| core.per_instruction(limit));
     let _ = writeln!(
         text,
@@ -105,7 +105,7 @@ fn report(board: &BoardTimes, work: &Work) -> BoardReport {
             writeln!(text, "| {} | {count} | {} | {} |", section.what, time(CycleLimit::Best), time(CycleLimit::Bound));
     }
     let wrong = verdicts(board.known, &best, &bound);
-    BoardReport { text, wrong: wrong.iter().map(|wrong| format!("{}: {wrong}", board.names)).collect() }
+    BoardReport { text, wrong: wrong.iter().map(|wrong| format!("{}: {wrong}", board.name)).collect() }
 }
 
 /// A time in microseconds, rounded up to a tenth.

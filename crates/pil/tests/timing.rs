@@ -1,12 +1,18 @@
 //! Times on the buses by hand, boards as `boards/` has them, and the tables of `docs/timing.md`.
-#![allow(clippy::unwrap_used, clippy::expect_used, missing_docs)] // a file that cannot be read must stop the test
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::unwrap_used,
+    missing_docs,
+    reason = "a file that cannot be read must stop the test"
+)]
 
 use pil::response::PeriodicTask;
 use pil::timing::{
-    BOARDS, CORTEX_M4F, CORTEX_M7, CycleLimit, KnownLateness, RateOfUart, TimingRow, Work, default_baud, i2c_ns, page,
-    reports, spi_clock_hz, spi_ns, verdicts,
+    BOARDS, CORTEX_M4F, CORTEX_M7, CycleLimit, KnownLateness, RateOfUart, TABLES, TimingRow, Work, default_baud,
+    i2c_ns, page, reports, spi_clock_hz, spi_ns, verdicts,
 };
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -35,8 +41,8 @@ fn the_tick_is_in_time() {
             let rows = work.rows(board, limit, default_baud());
             let tick = rows.iter().find(|row| row.name.starts_with("control tick")).unwrap();
             let is_in_time = tick.response_ns.is_some_and(|response| Some(response) <= tick.deadline_ns);
-            let has_bound = board.names != "pixracer" || limit == CycleLimit::Best;
-            assert_eq!(is_in_time, has_bound, "{}, {limit:?}", board.names);
+            let has_bound = board.name != "pixracer" || limit == CycleLimit::Best;
+            assert_eq!(is_in_time, has_bound, "{}, {limit:?}", board.name);
         }
     }
 }
@@ -52,10 +58,10 @@ fn the_baud_rate_is_the_highest_that_loses_no_byte() {
             rows.iter().filter(|row| row.is_late()).map(|row| row.name).collect::<Vec<_>>()
         };
         let (as_it_is, twice) = (late(default_baud()), late(2 * default_baud()));
-        assert!(!as_it_is.iter().any(|name| name.contains("byte")), "{}: {as_it_is:?}", board.names);
-        assert_eq!(twice.contains(&"first link: byte received"), board.uart_keeps == 1, "{}: {twice:?}", board.names);
+        assert!(!as_it_is.iter().any(|name| name.contains("byte")), "{}: {as_it_is:?}", board.name);
+        assert_eq!(twice.contains(&"first link: byte received"), board.uart_keeps == 1, "{}: {twice:?}", board.name);
         let half = late(default_baud() / 2);
-        assert!(half.iter().all(|name| *name == "links' task"), "{}: {half:?}", board.names);
+        assert!(half.iter().all(|name| *name == "links' task"), "{}: {half:?}", board.name);
     }
 }
 
@@ -91,8 +97,8 @@ fn what_is_known_is_not_loosened() {
 /// A UART of the STM32F4 keeps one byte (RM0090, 30.3.3), of the STM32H743 sixteen (RM0433, 48.3).
 #[test]
 fn uarts_keep_what_their_manuals_say() {
-    let kept: Vec<_> = BOARDS.iter().map(|board| (board.names.split(',').next().unwrap(), board.uart_keeps)).collect();
-    assert_eq!(kept, [("stm32f405", 1), ("kakute-f4-v2", 1), ("pixracer", 1), ("stm32h743", 16)]);
+    let kept: Vec<_> = BOARDS.iter().map(|board| (board.name, board.uart_keeps)).collect();
+    assert_eq!(kept, [("stm32f405", 1), (TABLES, 1), ("pixracer", 1), ("stm32h743", 16)]);
 }
 
 #[test]
@@ -120,7 +126,7 @@ fn buses_by_hand() {
 /// ICM-42688-P: temperature, force and rates (14 bytes) and a byte of its set-up, each behind a register.
 #[test]
 fn a_script_is_walked() {
-    let board = BOARDS.iter().find(|board| board.names == "stm32h743").unwrap();
+    let board = BOARDS.iter().find(|board| board.name == "stm32h743").unwrap();
     let script = board.scripts().into_iter().find(|script| script.part == "ICM-42688-P").unwrap();
     assert_eq!((script.bytes, script.transfers, script.clock_hz), (17, 2, 12_500_000));
     assert_eq!(script.time_ns, 9_600 + 1_280);
@@ -138,27 +144,33 @@ fn limits_of_the_cores() {
     assert!(CORTEX_M7.per_instruction(CycleLimit::Best) >= 0.5);
 }
 
-/// Every board has a table, with its links and parts.
+/// Every board has its times, with its links and parts.
 #[test]
 fn boards_are_those_of_the_project() {
-    let folders = fs::read_dir(root().join("boards")).unwrap().map(|entry| entry.unwrap().path());
-    let folders = folders.filter(|path| path.is_dir() && !path.ends_with("emulated"));
-    let names: BTreeSet<_> = folders.map(|path| path.file_name().unwrap().to_str().unwrap().to_owned()).collect();
-    let known: BTreeSet<_> = BOARDS.iter().flat_map(|board| board.names.split(", ")).map(str::to_owned).collect();
-    assert_eq!(names, known);
+    let within = |path: &Path| fs::read_dir(path).unwrap().map(|entry| entry.unwrap().path()).collect::<Vec<_>>();
+    let codes: Vec<_> = within(&root().join("boards")).into_iter().filter(|path| path.is_dir()).collect();
+    let mut files: BTreeMap<_, Vec<_>> = BTreeMap::new();
+    for folder in codes.iter().filter(|path| !path.ends_with("emulated")) {
+        let own = folder.file_name().unwrap().to_str().unwrap();
+        let (programs, sources): (Vec<_>, Vec<_>) = within(&folder.join("src")).into_iter().partition(|it| it.is_dir());
+        files.insert(own, vec![sources]);
+        let tables = programs.iter().flat_map(|programs| within(programs)).map(|table| vec![table]);
+        files.entry(TABLES).or_default().extend(tables);
+    }
+    assert!(files[TABLES].len() >= 6);
+    assert!(files.keys().copied().eq(BOARDS.iter().map(|board| board.name).collect::<BTreeSet<_>>()), "{files:?}");
     for board in &BOARDS {
         let parts: BTreeSet<_> = board.scripts().iter().map(|script| name_in_code(script.part)).collect();
-        for name in board.names.split(", ") {
-            let folder = root().join("boards").join(name).join("src");
-            let files = fs::read_dir(folder).unwrap().map(|entry| fs::read_to_string(entry.unwrap().path()).unwrap());
-            let code: String = files.collect();
+        for files in &files[board.name] {
+            let code: String = files.iter().map(|path| fs::read_to_string(path).unwrap()).collect();
             let uses = code.lines().filter_map(|line| line.strip_prefix("use afbc_drivers::"));
             let used: String = uses.collect();
             let words: BTreeSet<_> = used.split(|c: char| !c.is_alphanumeric()).filter(|word| is_part(word)).collect();
-            assert!(words.iter().all(|word| parts.contains(*word)), "{name}: {words:?}, not {parts:?}");
+            assert!(words.iter().all(|word| parts.contains(*word)), "{files:?}: {words:?}, not {parts:?}");
             let is_table = code.contains("flight_controller! {");
+            assert_eq!(is_table, board.name == TABLES, "{files:?}");
             let uarts = if is_table { 1 } else { code.matches("link::config()").count() };
-            assert_eq!(uarts, board.links, "{name}");
+            assert_eq!(uarts, board.links, "{files:?}");
         }
     }
 }

@@ -3,5 +3,5 @@
 mod page;
 mod read;
 
-pub(crate) use page::wiring;
+pub(crate) use page::{row, wiring};
 pub(crate) use read::{Battery, BoardTable, LogBus, Motor, Stream, Timer};

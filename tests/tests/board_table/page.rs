@@ -1,4 +1,4 @@
-//! The table of wires on a board's page.
+//! The table of wires on a board's page, and its row in the list of boards.
 
 use super::read::Radio;
 use super::{BoardTable, Stream};
@@ -102,6 +102,12 @@ pub(crate) fn wiring(board: &BoardTable) -> String {
         writeln!(table, "| {} |", row.join(" | ")).unwrap();
     }
     table
+}
+
+/// Returns its row in the list of boards.
+pub(crate) fn row(name: &str, chip: &str, board: &BoardTable) -> String {
+    let [imu, barometer] = [&board.imu.parts, &board.i2c.barometers].map(|parts| names(parts));
+    format!("| [`{name}`](boards/{name}.md) | {chip} | {imu} | {barometer} | {} |\n", board.outputs)
 }
 
 /// Returns the names of parts as their makers write them.

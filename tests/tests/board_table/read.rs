@@ -128,16 +128,17 @@ pub(crate) struct BoardTable {
 }
 
 impl BoardTable {
-    /// Reads the table in a board's folder; none if it is code.
-    pub(crate) fn read(board: &Path) -> Option<Self> {
-        let text = fs::read_to_string(board.join("src/board.rs")).unwrap();
+    /// Reads the table in a board's file.
+    pub(crate) fn read(board: &Path) -> Self {
+        let text = fs::read_to_string(board).unwrap();
         let file = syn::parse_file(&text).unwrap();
         let tokens = file.items.into_iter().find_map(|item| match item {
             syn::Item::Macro(item) if item.mac.path.segments.last().unwrap().ident == "flight_controller" => {
                 Some(item.mac.tokens)
             }
             _ => None,
-        })?;
+        });
+        let tokens = tokens.unwrap_or_else(|| panic!("{}: no table", board.display()));
         let mut words = Words::of(tokens);
         let crystal_hz = words.after("crystal_hz :").parse().unwrap();
         let link = words.uart("link");
@@ -210,7 +211,7 @@ impl BoardTable {
         }
         words.expect("}");
         assert!(words.0.is_empty(), "{}: {:?}", board.display(), words.0);
-        Some(BoardTable {
+        BoardTable {
             crystal_hz,
             link,
             gnss,
@@ -226,7 +227,7 @@ impl BoardTable {
             outputs,
             numbering,
             timers,
-        })
+        }
     }
 
     /// Returns the motors.

@@ -47,11 +47,14 @@ pub fn default_baud() -> u64 {
     afbc_onboard::Link::default().baud.into()
 }
 
+/// The boards that are a table, with every part that one of them may have.
+pub const TABLES: &str = "flight controllers with an STM32F405";
+
 /// A kind of board.
 #[derive(Debug)]
 pub struct BoardTimes {
-    /// Names of the boards, as in `boards/`, with commas between them.
-    pub names: &'static str,
+    /// Name of the board, as in `boards/`; or what boards that are a table have in common ([`TABLES`]).
+    pub name: &'static str,
     /// Its core.
     pub core: &'static CoreCycles,
     /// Links by UART.
@@ -100,7 +103,7 @@ macro_rules! parts {
 /// All boards. The instructions of tasks are those of the images of 464c7b1.
 pub static BOARDS: [BoardTimes; 4] = [
     BoardTimes {
-        names: "stm32f405",
+        name: "stm32f405",
         core: &CORTEX_M4F,
         links: 1,
         uart_keeps: 1,
@@ -115,7 +118,7 @@ pub static BOARDS: [BoardTimes; 4] = [
         known: &known::COMMON,
     },
     BoardTimes {
-        names: "kakute-f4-v2, matek-f405-se, matek-f405-std, speedybee-f405-mini, speedybee-f405-v3, speedybee-f405-v4",
+        name: TABLES,
         core: &CORTEX_M4F,
         links: 1,
         uart_keeps: 1,
@@ -141,7 +144,7 @@ pub static BOARDS: [BoardTimes; 4] = [
         known: &known::COMMON,
     },
     BoardTimes {
-        names: "pixracer",
+        name: "pixracer",
         core: &CORTEX_M4F,
         links: 2,
         uart_keeps: 1,
@@ -162,7 +165,7 @@ pub static BOARDS: [BoardTimes; 4] = [
         known: &known::PIXRACER,
     },
     BoardTimes {
-        names: "stm32h743",
+        name: "stm32h743",
         core: &CORTEX_M7,
         links: 2,
         uart_keeps: FIFO_H743,

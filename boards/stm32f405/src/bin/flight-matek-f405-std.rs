@@ -1,4 +1,16 @@
 //! Matek F405-STD; `docs/boards/matek-f405-std.md` shows the wiring.
+//!
+//! | Betaflight's description | |
+//! |---|---|
+//! | gyroscope: clock, data in, data out, select, interrupt, alignment | PA5, PA6, PA7, PC2, PC3, CW180 |
+//! | motors 1 to 4 | PC6, PC7, PC8, PC9 |
+//! | barometer: clock, data | PB6, PB7 |
+//! | LED | PB9 |
+//! | buzzer | PC13 |
+//! | battery: voltage, current | PC5, PC4 |
+//! | current's scale | 179 |
+#![no_std]
+#![no_main]
 
 use afbc_drivers::bmi270::Bmi270;
 use afbc_drivers::bmp280::Bmp280;

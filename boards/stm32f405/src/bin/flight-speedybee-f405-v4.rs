@@ -1,4 +1,17 @@
 //! SpeedyBee F405 V4; `docs/boards/speedybee-f405-v4.md` shows the wiring.
+//!
+//! | Betaflight's description | |
+//! |---|---|
+//! | gyroscope: clock, data in, data out, select, interrupt, alignment | PA5, PA6, PA7, PA4, PC4, CW90 |
+//! | motors 1 to 4 | PB6, PB7, PB0, PB1 |
+//! | barometer: clock, data | PB8, PB9 |
+//! | LED | PC13 |
+//! | buzzer | PC15 |
+//! | battery: voltage, current | PC0, PC1 |
+//! | current's scale | 400 |
+//! | PINIO1 | PB11 |
+#![no_std]
+#![no_main]
 
 use afbc_drivers::dps310::Spl06;
 use afbc_drivers::icm426xx::Icm42688p;

@@ -1,4 +1,18 @@
 //! SpeedyBee F405 Mini; `docs/boards/speedybee-f405-mini.md` shows the wiring.
+//!
+//! | Betaflight's description | |
+//! |---|---|
+//! | gyroscope: clock, data in, data out, select, interrupt, alignment | PA5, PA6, PA7, PA4, PC4, CW270 |
+//! | motors 1 to 4 | PB6, PB7, PB1, PB0 |
+//! | barometer: clock, data | PB8, PB9 |
+//! | LED | PC13 |
+//! | buzzer | PC15 |
+//! | battery: voltage, current | PC0, PC1 |
+//! | current's scale | 250 |
+//! | PINIO1 | PB11 |
+//! | flash chip: bus, clock, data in, data out, select | SPI3, PB3, PB4, PB5, PC14 |
+#![no_std]
+#![no_main]
 
 use afbc_drivers::dps310::Dps310;
 use afbc_drivers::icm426xx::Icm42688p;

@@ -1,4 +1,17 @@
 //! SpeedyBee F405 V3; `docs/boards/speedybee-f405-v3.md` shows the wiring.
+//!
+//! | Betaflight's description | |
+//! |---|---|
+//! | gyroscope: clock, data in, data out, select, interrupt, alignment | PA5, PA6, PA7, PA4, PC4, CW0 |
+//! | motors 1 to 4 | PB6, PB7, PB8, PB9 |
+//! | barometer: clock, data | PB10, PB11 |
+//! | LED | PC8 |
+//! | buzzer | PC5 |
+//! | battery: voltage, current | PC0, PC1 |
+//! | current's scale | 386 |
+//! | PINIO1 | PC3 |
+#![no_std]
+#![no_main]
 
 use afbc_drivers::bmi270::Bmi270;
 use afbc_drivers::dps310::Spl06;

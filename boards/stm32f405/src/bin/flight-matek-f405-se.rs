@@ -2,6 +2,17 @@
 //!
 //! The compass shares I2C1 with the barometer: I2C2 would need DMA1's stream 7 as I2C1 does, whose other one, stream 6,
 //! is that of TIM4.
+//!
+//! | Betaflight's description | |
+//! |---|---|
+//! | gyroscope: clock, data in, data out, select, interrupt, alignment | PA5, PA6, PA7, PA4, PC4, CW270 |
+//! | motors 1 to 4 | PB7, PB6, PB0, PB1 |
+//! | barometer: clock, data | PB8, PB9 |
+//! | buzzer | PC15 |
+//! | battery: voltage, current | PC0, PC1 |
+//! | current's scale | 179 |
+#![no_std]
+#![no_main]
 
 use afbc_drivers::bmp280::Bmp280;
 use afbc_drivers::dps310::Dps310;

@@ -1,4 +1,16 @@
 //! Kakute F4 V2; `docs/boards/kakute-f4-v2.md` shows the wiring.
+//!
+//! | Betaflight's description | |
+//! |---|---|
+//! | gyroscope: clock, data in, data out, select, interrupt, alignment | PA5, PA6, PA7, PC4, PC5, CW270 |
+//! | motors 1 to 4 | PB0, PB1, PA3, PA2 |
+//! | barometer: clock, data | PB8, PB9 |
+//! | LED | PB5 |
+//! | buzzer | PC9 |
+//! | battery: voltage, current | PC3, PC2 |
+//! | current's scale | 275 |
+#![no_std]
+#![no_main]
 
 use afbc_drivers::bmp280::Bmp280;
 use afbc_drivers::dps310::Dps310;
