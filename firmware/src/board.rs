@@ -1,4 +1,4 @@
-//! Interface between firmware and board. A crate in `boards/` implements it and builds its images by
+//! Interface between firmware and board. A crate in `firmware/boards/` implements it and builds its images by
 //! [`image!`](crate::image!), the only place where firmware and board meet.
 
 use crate::samples::Sampler;

@@ -3,10 +3,10 @@
 //!
 //! # One firmware, an image per board
 //!
-//! The differences between boards, of whatever chip, are behind the trait [`board::Board`]; each crate in `boards/`
-//! implements it and builds its images. `boards/emulated` has the same control tick, link, supervisor, executors and
-//! time base as the boards that fly, but exchanges bytes with the host once per control tick, so that an emulator can
-//! fly it in lockstep.
+//! The differences between boards, of whatever chip, are behind the trait [`board::Board`]; each crate in
+//! `firmware/boards/` implements it and builds its images. `firmware/boards/emulated` has the same control tick, link,
+//! supervisor, executors and time base as the boards that fly, but exchanges bytes with the host once per control tick,
+//! so that an emulator can fly it in lockstep.
 //!
 //! # Priorities
 //!

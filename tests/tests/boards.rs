@@ -16,7 +16,7 @@ fn root() -> &'static Path {
 }
 
 /// What makes an image of a table.
-const TABLES: &str = "chips/stm32f4/src/flight_controller.rs";
+const TABLES: &str = "firmware/chips/stm32f4/src/flight_controller.rs";
 
 /// Returns every Rust file below `folder`, with its text.
 fn sources(folder: &Path) -> Vec<(PathBuf, String)> {
@@ -48,7 +48,7 @@ fn pins(text: &str) -> BTreeSet<String> {
 #[test]
 fn every_board_meets_the_firmware_once() {
     let (tables, mut codes) = kinds();
-    codes.push(root().join("boards/emulated"));
+    codes.push(root().join("firmware/boards/emulated"));
     for board in codes {
         for met in ["firmware::image!(", "impl Board for "] {
             let count = |path: &str| fs::read_to_string(board.join(path)).unwrap().matches(met).count();
@@ -89,7 +89,7 @@ fn every_board_has_a_page() {
 #[test]
 fn the_firmware_knows_no_board() {
     let manifest = fs::read_to_string(root().join("firmware/Cargo.toml")).unwrap();
-    let firmware = sources(&root().join("firmware"));
+    let firmware = sources(&root().join("firmware/src"));
     assert!(firmware.len() >= 7, "{firmware:?}");
     for (path, text) in firmware {
         assert!(pins(&text).is_empty(), "{}: {:?}", path.display(), pins(&text));
@@ -102,7 +102,7 @@ fn the_firmware_knows_no_board() {
             }
         }
     }
-    for folder in ["boards", "chips", "crates", "firmware", "sitl", "tests"] {
+    for folder in ["crates", "firmware", "sitl", "tests"] {
         for (path, text) in sources(&root().join(folder)) {
             let is_moved = text.lines().any(|line| line.trim_start().starts_with("#[") && line.contains("path = "));
             assert!(!is_moved, "{}", path.display());
@@ -119,7 +119,7 @@ fn the_wiring_is_what_the_board_uses() {
     ] {
         let text = fs::read_to_string(root().join("docs").join(page)).unwrap();
         let table = text.split_once(heading).unwrap().1.split("\n#").next().unwrap();
-        let code = code_of(&root().join("boards").join(board));
+        let code = code_of(&root().join("firmware/boards").join(board));
         let (head, body) = code.split_once("\nuse ").unwrap();
         assert_eq!(pins(body).len(), count, "{board}: {:?}", pins(body));
         // Those of crystal and debugger are fixed by the chip.
@@ -143,7 +143,8 @@ fn within(folder: &Path) -> Vec<PathBuf> {
 
 /// Returns the files of the boards that are a table, with it, and the folders of those that are code.
 fn kinds() -> (Vec<(PathBuf, BoardTable)>, Vec<PathBuf>) {
-    let codes = within(&root().join("boards")).into_iter().filter(|path| path.is_dir() && !path.ends_with("emulated"));
+    let codes =
+        within(&root().join("firmware/boards")).into_iter().filter(|path| path.is_dir() && !path.ends_with("emulated"));
     let codes: Vec<_> = codes.collect();
     let tables = codes.iter().flat_map(|folder| within(&folder.join("src/bin")));
     let tables: Vec<_> = tables.map(|path| (path.clone(), BoardTable::read(&path))).collect();
@@ -382,7 +383,7 @@ fn prioritised(code: &str) -> BTreeMap<String, String> {
 #[test]
 fn no_board_has_a_bare_uart_or_i2c() {
     let (mut uarts, mut buses) = (0, 0);
-    for (path, text) in ["boards", "chips"].iter().flat_map(|folder| sources(&root().join(folder))) {
+    for (path, text) in ["firmware/boards", "firmware/chips"].iter().flat_map(|folder| sources(&root().join(folder))) {
         let calls = |call: &str| text.matches(call).count();
         assert_eq!(calls("usart::Config::default()"), 0, "{}", path.display());
         if text.contains("embassy_stm32::usart::") {
@@ -395,7 +396,7 @@ fn no_board_has_a_bare_uart_or_i2c() {
         assert_eq!(calls("I2c::new(p."), calls("i2c::bus("), "{}", path.display());
         (uarts, buses) = (uarts + calls("BufferedUart::new("), buses + calls("I2c::new(p."));
     }
-    let link = fs::read_to_string(root().join("chips/stm32/src/link.rs")).unwrap();
+    let link = fs::read_to_string(root().join("firmware/chips/stm32/src/link.rs")).unwrap();
     assert!(link.contains("config.rx_pull = Pull::Up;"));
     assert!(uarts >= 12 && buses >= 4, "{uarts} UARTs, {buses} I2C");
 }

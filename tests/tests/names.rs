@@ -69,7 +69,7 @@ fn crates_by_name() -> BTreeMap<String, BTreeSet<String>> {
     let within = |folder: &str| fs::read_dir(root().join(folder)).unwrap().map(|entry| entry.unwrap().path());
     let single = ["firmware", "sitl"].map(|name| root().join(name));
     let mut by_name: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
-    for folder in within("crates").chain(within("boards")).chain(single).filter(|path| path.is_dir()) {
+    for folder in within("crates").chain(within("firmware/boards")).chain(single).filter(|path| path.is_dir()) {
         let owner = folder.file_name().unwrap().to_str().unwrap();
         for file in files(&folder.join("src")) {
             for name in names_of(&fs::read_to_string(file).unwrap()) {

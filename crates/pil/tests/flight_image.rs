@@ -120,7 +120,7 @@ fn it_boots_ticks_and_listens() {
 
 /// The system memory's place (RM0090, table 5), where the chip has its boot loader.
 const SYSTEM_MEMORY: u32 = 0x1FFF_0000;
-/// What the command into the boot loader leaves for the next start (`chips/stm32/src/boot_loader.rs`).
+/// What the command into the boot loader leaves for the next start (`firmware/chips/stm32/src/boot_loader.rs`).
 const WANTED: u32 = 0xB007_4DF0;
 
 #[test]

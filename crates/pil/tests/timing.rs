@@ -1,4 +1,4 @@
-//! Times on the buses by hand, boards as `boards/` has them, and the tables of `docs/timing.md`.
+//! Times on the buses by hand, boards as `firmware/boards/` has them, and the tables of `docs/timing.md`.
 #![allow(
     clippy::expect_used,
     clippy::indexing_slicing,
@@ -148,7 +148,7 @@ fn limits_of_the_cores() {
 #[test]
 fn boards_are_those_of_the_project() {
     let within = |path: &Path| fs::read_dir(path).unwrap().map(|entry| entry.unwrap().path()).collect::<Vec<_>>();
-    let codes: Vec<_> = within(&root().join("boards")).into_iter().filter(|path| path.is_dir()).collect();
+    let codes: Vec<_> = within(&root().join("firmware/boards")).into_iter().filter(|path| path.is_dir()).collect();
     let mut files: BTreeMap<_, Vec<_>> = BTreeMap::new();
     for folder in codes.iter().filter(|path| !path.ends_with("emulated")) {
         let own = folder.file_name().unwrap().to_str().unwrap();

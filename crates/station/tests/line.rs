@@ -10,8 +10,8 @@ use afbc_types::State;
 use common::Bench;
 use std::collections::BTreeMap;
 
-/// Bytes that the board's line has room for, `TX` in `boards/stm32f405/src/board.rs`; a tick's bytes for which there is
-/// none are lost.
+/// Bytes that the board's line has room for, `TX` in `firmware/boards/stm32f405/src/board.rs`; a tick's bytes for
+/// which there is none are lost.
 const RING: usize = 1024;
 
 /// The vehicle on a line of so many baud.

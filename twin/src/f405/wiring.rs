@@ -248,7 +248,7 @@ const KAKUTE: Wiring = Wiring {
     motors: [("M1", TIM3, 3), ("M2", TIM3, 4), ("M3", TIM5, 4), ("M4", TIM5, 3)],
 };
 
-/// `boards/stm32f405`: no sensors.
+/// `firmware/boards/stm32f405`: no sensors.
 const PLAIN: Wiring = Wiring {
     name: "stm32f405",
     link: USART1,

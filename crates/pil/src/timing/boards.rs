@@ -1,5 +1,5 @@
 //! What the times of each board depend on: its core, its links and its parts. `tests/timing.rs` compares it with
-//! `boards/`.
+//! `firmware/boards/`.
 
 use super::bus::{Script, Wire, script};
 use super::cycles::{CORTEX_M4F, CORTEX_M7, CoreCycles};
@@ -53,7 +53,7 @@ pub const TABLES: &str = "flight controllers with an STM32F405";
 /// A kind of board.
 #[derive(Debug)]
 pub struct BoardTimes {
-    /// Name of the board, as in `boards/`; or what boards that are a table have in common ([`TABLES`]).
+    /// Name of the board, as in `firmware/boards/`; or what boards that are a table have in common ([`TABLES`]).
     pub name: &'static str,
     /// Its core.
     pub core: &'static CoreCycles,

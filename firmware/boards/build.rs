@@ -1,4 +1,4 @@
-//! Linker arguments of a board's image. Set here, so that building from the workspace's root works and the host's
+//! Linker arguments of a board's images. Set here, so that building from the workspace's root works and the host's
 //! crates are not affected.
 
 use std::path::Path;
@@ -6,7 +6,7 @@ use std::path::Path;
 fn main() {
     let board = Path::new(env!("CARGO_MANIFEST_DIR"));
     let [own, sections] = [board.join("memory.x"), board.with_file_name("link.x")];
-    let root = board.ancestors().nth(2).expect("the workspace's root");
+    let root = board.ancestors().nth(3).expect("the workspace's root");
     for file in [&own, &sections, &root.join("memory.x")] {
         println!("cargo:rerun-if-changed={}", file.display());
     }

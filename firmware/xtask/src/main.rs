@@ -68,7 +68,7 @@ enum Programmer {
 /// Which image.
 #[derive(Debug, clap::Args)]
 struct Image {
-    /// A folder in boards/, or a table of one's src/bin/.
+    /// A folder in firmware/boards/, or a table of one's src/bin/.
     #[arg(value_parser = named())]
     board: String,
     /// A name in vehicles/, or a path [default: VEHICLE of the environment, or the paper's].
@@ -101,7 +101,7 @@ fn named() -> PossibleValuesParser {
 fn boards() -> BTreeMap<String, PathBuf> {
     let within = |folder: &Path| fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
     let mut boards = BTreeMap::new();
-    for folder in within(&root().join("boards")).filter(|folder| folder.join("Cargo.toml").is_file()) {
+    for folder in within(&root().join("firmware/boards")).filter(|folder| folder.join("Cargo.toml").is_file()) {
         let mut add = |path: &Path, prefix| {
             let name = path.file_stem().unwrap_or_default().to_string_lossy();
             boards.extend(name.strip_prefix(prefix).map(|name| (name.to_owned(), folder.clone())));
@@ -246,7 +246,7 @@ fn run(command: &mut Command) -> Result<(), String> {
 
 /// The workspace's root.
 fn root() -> &'static Path {
-    Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap_or(Path::new("."))
+    Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(2).unwrap_or(Path::new("."))
 }
 
 #[cfg(test)]

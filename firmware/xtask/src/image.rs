@@ -274,7 +274,7 @@ mod tests {
     /// Data sheets: STM32F405RG, 1 MiB of flash and 192 KiB of RAM; STM32H743VI, of which the first bank is used.
     #[test]
     fn regions_are_the_chips() {
-        let f405 = Region::of_script(include_str!("../../memory.x"));
+        let f405 = Region::of_script(include_str!("../../../memory.x"));
         let total = |regions: &[Region], is_flash| {
             regions
                 .iter()
