@@ -3,7 +3,7 @@
 //! state. For arbitrary bytes and for frames within frames, they deliver the same as an independent reference.
 #![no_main]
 
-#[path = "../../crates/link/tests/reference/mod.rs"]
+#[path = "../../../crates/link/tests/reference/mod.rs"]
 mod reference;
 
 use libfuzzer_sys::fuzz_target;
