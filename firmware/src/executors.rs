@@ -7,7 +7,7 @@ use core::sync::atomic::{AtomicU16, Ordering};
 use cortex_m::interrupt::InterruptNumber;
 use cortex_m::peripheral::SCB;
 use cortex_m::peripheral::scb::{SystemHandler, VectActive};
-use embassy_executor::{InterruptExecutor, SendSpawner, Spawner};
+use embassy_executor::{InterruptExecutor, SendSpawner, SpawnError, SpawnToken, Spawner};
 
 /// Interrupt priorities; lower numbers preempt higher ones. A chip has at least sixteen, in the upper four bits.
 pub mod priority {
@@ -55,6 +55,20 @@ pub fn dispense_with(usb: impl InterruptNumber) {
 /// If it has not.
 pub fn housekeeping() -> SendSpawner {
     HOUSEKEEPING.spawner()
+}
+
+/// Returns a task to be spawned.
+///
+/// # Panics
+/// If it has been spawned before.
+pub fn once<S>(task: Result<SpawnToken<S>, SpawnError>) -> SpawnToken<S> {
+    // Out of line, since every task would have a message of its own.
+    #[cold]
+    #[inline(never)]
+    fn again() -> ! {
+        panic!("a task is spawned twice")
+    }
+    task.unwrap_or_else(|_| again())
 }
 
 /// True in a task that is not needed in flight.

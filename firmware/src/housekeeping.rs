@@ -1,6 +1,6 @@
 //! Low-priority work: logging, and monitoring of the stack.
 
-use crate::{comms, control};
+use crate::{comms, control, executors};
 use core::sync::atomic::{AtomicU32, Ordering};
 use cortex_m_rt::STACK_PAINT_VALUE;
 use embassy_executor::SendSpawner;
@@ -18,7 +18,7 @@ pub fn stack_bytes() -> u32 {
 
 /// Starts the task.
 pub fn spawn(spawner: SendSpawner) {
-    spawner.spawn(task().expect("spawned once"));
+    spawner.spawn(executors::once(task()));
 }
 
 #[embassy_executor::task]

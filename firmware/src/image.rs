@@ -61,7 +61,7 @@ macro_rules! image {
         // Spawned from within its executor, where futures need not be Send, as those of transfers are not.
         #[embassy_executor::task]
         async fn start_sampling(sampler: <$board as $crate::board::Board>::Sampler) {
-            let task = sampling(sampler).expect("spawned once");
+            let task = $crate::executors::once(sampling(sampler));
             $crate::executors::spawner().await.spawn(task);
         }
 
@@ -72,7 +72,7 @@ macro_rules! image {
 
         #[embassy_executor::task]
         async fn start_aiding(aids: <$board as $crate::board::Board>::Aids) {
-            let task = aiding(aids).expect("spawned once");
+            let task = $crate::executors::once(aiding(aids));
             $crate::executors::spawner().await.spawn(task);
         }
 
@@ -89,7 +89,7 @@ macro_rules! image {
             blocks: $crate::logging::LogEnds,
             log: &'static mut <$board as $crate::board::Board>::Log,
         ) {
-            let task = logging(blocks, log).expect("spawned once");
+            let task = $crate::executors::once(logging(blocks, log));
             $crate::executors::spawner().await.spawn(task);
         }
 
@@ -100,18 +100,18 @@ macro_rules! image {
         ) {
             // Once, and not in every task that it goes through.
             static LOG: $crate::StaticCell<<$board as $crate::board::Board>::Log> = $crate::StaticCell::new();
-            spawner.spawn(start_logging(blocks, LOG.init(log)).expect("spawned once"));
+            spawner.spawn($crate::executors::once(start_logging(blocks, LOG.init(log))));
         }
 
         fn spawn_aiding(spawner: embassy_executor::SendSpawner, aids: <$board as $crate::board::Board>::Aids) {
-            spawner.spawn(start_aiding(aids).expect("spawned once"));
+            spawner.spawn($crate::executors::once(start_aiding(aids)));
         }
 
         fn spawn_sampling(
             spawner: embassy_executor::SendSpawner,
             sampler: <$board as $crate::board::Board>::Sampler,
         ) {
-            spawner.spawn(start_sampling(sampler).expect("spawned once"));
+            spawner.spawn($crate::executors::once(start_sampling(sampler)));
         }
 
         // Out of line, so that their stacks are not used at the same time.
@@ -121,7 +121,7 @@ macro_rules! image {
             flight: &'static mut $crate::vehicle::Flight,
             board: $board,
         ) {
-            spawner.spawn(control(flight, board).expect("spawned once"));
+            spawner.spawn($crate::executors::once(control(flight, board)));
         }
 
         #[inline(never)]
@@ -130,7 +130,7 @@ macro_rules! image {
             parts: &'static mut $crate::comms::CommsParts,
             links: <$board as $crate::board::Board>::Links,
         ) {
-            spawner.spawn(comms(parts, links).expect("spawned once"));
+            spawner.spawn($crate::executors::once(comms(parts, links)));
         }
 
         #[inline(never)]
@@ -138,7 +138,7 @@ macro_rules! image {
             spawner: embassy_executor::SendSpawner,
             keeper: $crate::parameters::Keeper<<$board as $crate::board::Board>::Memory>,
         ) {
-            spawner.spawn(parameters(keeper).expect("spawned once"));
+            spawner.spawn($crate::executors::once(parameters(keeper)));
         }
 
         // Here, too, since its type has the clock of the board's core in it.

@@ -234,12 +234,12 @@ impl Board for Pixracer {
         );
 
         let motors = Motors::new(p.TIM1, pin(p.PE9), pin(p.PE11), pin(p.PE13), pin(p.PE14), p.DMA2_CH5, Irqs);
-        control.spawn(motors_1_to_4(motors).expect("spawned once"));
+        control.spawn(executors::once(motors_1_to_4(motors)));
         let motors = Motors::new(p.TIM4, None, pin(p.PD13), pin(p.PD14), None, p.DMA1_CH6, Irqs);
-        control.spawn(motors_5_and_6(motors).expect("spawned once"));
+        control.spawn(executors::once(motors_5_and_6(motors)));
 
         let (led, buzzer) = (Led::new(p.PB1), PassiveBuzzer::new(p.TIM2, p.PA15));
-        executors::housekeeping().spawn(indicator(led, buzzer).expect("spawned once"));
+        executors::housekeeping().spawn(executors::once(indicator(led, buzzer)));
 
         // A debugger that halts the core halts the watchdog.
         pac::DBGMCU.apb1fzr().modify(|freeze| freeze.set_iwdg(true));

@@ -22,7 +22,7 @@ use embassy_stm32::usart::{self, BufferedUart};
 use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_stm32::{bind_interrupts, dma, pac};
 use firmware::board::{Board, BoardLink, Parts};
-use firmware::executors::priority;
+use firmware::executors::{self, priority};
 use firmware::samples::NoSensors;
 use firmware::vehicle::ROTORS;
 use static_cell::StaticCell;
@@ -78,7 +78,7 @@ impl Board for Stm32f405 {
 
         let motors = Motors::new(p.TIM8, pin(p.PC6), pin(p.PC7), pin(p.PC8), pin(p.PC9), p.DMA2_CH1, Irqs);
         interrupt::DMA2_STREAM1.set_priority(Priority::from(priority::MOTOR_DMA));
-        control.spawn(self::motors(motors).expect("spawned once"));
+        control.spawn(executors::once(self::motors(motors)));
 
         // A debugger that halts the core halts the watchdog.
         pac::DBGMCU.apb1fzr().modify(|freeze| freeze.set_iwdg(true));

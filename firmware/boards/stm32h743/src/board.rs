@@ -170,7 +170,7 @@ impl Board for Stm32h743 {
         let line = BufferedUart::new(p.UART8, p.PE0, p.PE1, tx, rx, Irqs, escs::config());
         let line = line.expect("the baud rate divides the clock");
         interrupt::UART8.set_priority(Priority::from(priority::UART));
-        executors::housekeeping().spawn(escs::listen(line).expect("spawned once"));
+        executors::housekeeping().spawn(executors::once(escs::listen(line)));
 
         let config = chip_stm32::sensors::spi(SPI_HZ);
         let first = Spi::new(p.SPI1, p.PA5, p.PD7, p.PA6, p.DMA1_CH3, p.DMA1_CH2, Irqs, config);
@@ -210,10 +210,10 @@ impl Board for Stm32h743 {
 
         let motors = Motors::new(p.TIM5, pin(p.PA0), pin(p.PA1), pin(p.PA2), pin(p.PA3), p.DMA1_CH0, Irqs);
         let motors = motors.answering(Lines::new(pac::GPIOA, [0, 1, 2, 3]));
-        control.spawn(motors_1_to_4(motors).expect("spawned once"));
+        control.spawn(executors::once(motors_1_to_4(motors)));
         let motors = Motors::new(p.TIM4, pin(p.PD12), pin(p.PD13), pin(p.PD14), pin(p.PD15), p.DMA1_CH1, Irqs);
         let motors = motors.answering(Lines::new(pac::GPIOD, [12, 13, 14, 15]));
-        control.spawn(motors_5_to_8(motors).expect("spawned once"));
+        control.spawn(executors::once(motors_5_to_8(motors)));
         interrupt::DMA1_STREAM0.set_priority(Priority::from(priority::MOTOR_DMA));
         interrupt::DMA1_STREAM1.set_priority(Priority::from(priority::MOTOR_DMA));
 
@@ -222,7 +222,7 @@ impl Board for Stm32h743 {
         interrupt::SDMMC1.set_priority(Priority::from(priority::LOGGING));
 
         let (led, buzzer) = (Led::new(p.PE3), PassiveBuzzer::new(p.TIM2, p.PA15));
-        executors::housekeeping().spawn(indicator(led, buzzer).expect("spawned once"));
+        executors::housekeeping().spawn(executors::once(indicator(led, buzzer)));
 
         // A debugger that halts the core halts the watchdog.
         pac::DBGMCU.apb4fzr1().modify(|freeze| freeze.set_iwdg1(true));

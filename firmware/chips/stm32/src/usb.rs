@@ -56,7 +56,7 @@ pub fn start(
     let driver = Driver::new_fs(core, line, plus, minus, PACKETS.init([0; 2 * PACKET_MAX]), config);
     Interrupt::OTG_FS.set_priority(Priority::from(priority::HOUSEKEEPING));
     executors::dispense_with(Interrupt::OTG_FS);
-    executors::housekeeping().spawn(wait(driver).expect("spawned once"));
+    executors::housekeeping().spawn(executors::once(wait(driver)));
     UsbPort(())
 }
 
@@ -87,7 +87,7 @@ async fn wait(driver: Driver<'static, USB_OTG_FS>) {
 /// Prepares the port's task. Out of line, to be identified in the image.
 #[inline(never)]
 fn claim(driver: Driver<'static, USB_OTG_FS>) -> SpawnToken<impl Sized> {
-    port(driver).expect("spawned once")
+    executors::once(port(driver))
 }
 
 #[embassy_executor::task]

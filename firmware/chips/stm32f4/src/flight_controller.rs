@@ -196,7 +196,8 @@ macro_rules! flight_controller {
                     let config = chip_stm32::escs::config();
                     let line = BufferedUart::new(p.$escs, p.$escs_rx, p.$escs_tx, tx, rx, Irqs, config);
                     let line = line.expect("the baud rate divides the clock");
-                    firmware::executors::housekeeping().spawn(chip_stm32::escs::listen(line).expect("spawned once"));
+                    let task = firmware::executors::once(chip_stm32::escs::listen(line));
+                    firmware::executors::housekeeping().spawn(task);
                 )?
 
                 let kernel_hz = embassy_stm32::rcc::frequency::<peripherals::$spi>().0;
@@ -231,13 +232,13 @@ macro_rules! flight_controller {
 
                 $(
                     let motors = chip_stm32f4::flight_controller!(@motors p, $timer, $dma, $($channel),+);
-                    control.spawn($task::run(motors).expect("spawned once"));
+                    control.spawn(firmware::executors::once($task::run(motors)));
                 )+
 
                 $(Line::of(p.$bluetooth).hold_low();)?
                 let led = None$(.or(Some(chip_stm32::indicator::Led::new(p.$led))))?;
                 let buzzer = chip_stm32::indicator::ActiveBuzzer::new(p.$buzzer);
-                firmware::executors::housekeeping().spawn(indicator(led, buzzer).expect("spawned once"));
+                firmware::executors::housekeeping().spawn(firmware::executors::once(indicator(led, buzzer)));
 
                 // A debugger that halts the core halts the watchdog.
                 pac::DBGMCU.apb1fzr().modify(|freeze| freeze.set_iwdg(true));
