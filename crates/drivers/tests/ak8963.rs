@@ -1,7 +1,8 @@
 //! MPU-9250 with AK8963 against their registers.
 
 use crate::rig::mpu_registers::{Magnetometer, Registers};
-use crate::rig::{Rig, reads, refuses_another, run, survives_all_troubles};
+use crate::rig::suite::{Pace, Suite};
+use crate::rig::{Rig, reads, run};
 use afbc_drivers::PartFault;
 use afbc_drivers::ak8963::{Mpu9250Ak8963, Mpu9250Reading};
 use nalgebra::Vector3;
@@ -38,13 +39,9 @@ fn news(readings: &[afbc_types::Stamped<Mpu9250Reading>]) -> usize {
 }
 
 #[test]
-fn every_fault_is_noticed_and_survived() {
-    survives_all_troubles(Mpu9250Ak8963::default, both, true, 60_000, right);
-}
-
-#[test]
-fn another_part_is_named() {
-    refuses_another(Mpu9250Ak8963::default(), Registers::new(0x70), 0x70);
+fn it_passes_the_suite() {
+    let (others, pace) = (vec![(Registers::new(0x70), 0x70)], Pace::Interrupts(1_000, 600));
+    Suite { part: &Mpu9250Ak8963::default, model: &both, right, notice_us: 60_000, others, pace }.passes();
 }
 
 #[test]

@@ -1,12 +1,12 @@
 //! BMI270 against its registers, as BST-BMI270-DS000 has them.
 
 use crate::bmi270_model::Bmi270Registers;
-use crate::rig::{Model, Rig, comes_back_at_once, noise, reads, refuses_another, run, survives_all_troubles};
+use crate::rig::suite::{Pace, Suite, reads_the_whole_range};
+use crate::rig::{Model, Rig, noise, reads, run};
 use afbc_drivers::bmi270::Bmi270;
 use afbc_drivers::{InertialReading, PartFault, Registers as _, SensorPart, SpiRegisters, Step};
 use embassy_futures::block_on;
 use embedded_hal_async::spi::{ErrorType, Operation, SpiDevice};
-use nalgebra::Vector3;
 
 impl Model for Bmi270Registers {
     fn read(&mut self, now_us: u64, register: u8, into: &mut [u8]) {
@@ -56,44 +56,15 @@ fn right(reading: &InertialReading) -> bool {
 }
 
 #[test]
-fn every_fault_is_noticed_and_survived() {
-    survives_all_troubles(Bmi270::default, || part(0x24), true, 60_000, right);
-    comes_back_at_once(Bmi270::default, || part(0x24), right);
-}
-
-#[test]
-fn another_part_is_named() {
-    refuses_another(Bmi270::default(), part(0x43), 0x43);
-}
-
-#[test]
-fn there_are_1600_readings_a_second_at_their_interrupts() {
-    let rig = Rig::new(part(0x24));
-    let mut driver = rig.driver(Bmi270::default());
-    let (readings, faults) = run(&mut driver, &rig, 1_000_000);
-    let times: Vec<u64> = readings.iter().map(|reading| reading.at_us).collect();
-    assert!(times.len() > 1_400 && times.windows(2).all(|pair| pair[1] - pair[0] == 625), "{times:?}, {faults:?}");
-}
-
-#[test]
-fn its_full_range_is_read() {
-    let rig = Rig::new(part(0x24));
-    rig.with(|part| part.cas = 0);
-    let mut driver = rig.driver(Bmi270::default());
-    let cases = [(1990.0, 15.9, -40.0), (-1990.0, -15.9, 85.0), (2500.0, 15.0, 23.0), (-1900.0, -20.0, 23.0)];
-    for (rate, force, temperature) in cases {
-        rig.with(|part| {
-            (part.rates_deg_s, part.force_g, part.temperature_c) = ([rate; 3], [force; 3], temperature);
-        });
-        let _ = run(&mut driver, &rig, 100_000);
-        let (readings, _) = run(&mut driver, &rig, 10_000);
-        let reading = readings.last().expect("readings").value;
-        let [rate, force] = [rate.clamp(-2000.0, 2000.0).to_radians(), force.clamp(-16.0, 16.0) * 9.80665];
-        let InertialReading { rates_rad_s, specific_force_m_s2, temperature_c } = reading;
-        assert!((rates_rad_s - Vector3::from_element(rate as f32)).amax() < 0.02, "{rates_rad_s}");
-        assert!((specific_force_m_s2 - Vector3::from_element(force as f32)).amax() < 0.05, "{specific_force_m_s2}");
-        assert!((temperature_c - temperature as f32).abs() < 0.01, "{temperature_c}");
-    }
+fn it_passes_the_suite() {
+    let (others, pace) = (vec![(part(0x43), 0x43)], Pace::Interrupts(625, 1_400));
+    Suite { part: &Bmi270::default, model: &|| part(0x24), right, notice_us: 60_000, others, pace }.passes();
+    let mut model = part(0x24);
+    model.cas = 0;
+    let set = |part: &mut Bmi270Registers, rates, force, temperature_c| {
+        (part.rates_deg_s, part.force_g, part.temperature_c) = (rates, force, temperature_c);
+    };
+    reads_the_whole_range(Bmi270::default(), model, set, ([-40.0, 85.0, 23.0, 23.0], 0.01));
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! BMP280 against its registers, as BST-BMP280-DS001 has them, and its whole-number compensation.
 
-use crate::rig::{Model, Rig, noise, refuses_another, run, survives_all_troubles};
+use crate::rig::suite::{Pace, Suite, reads_pressures};
+use crate::rig::{Model, noise};
 use afbc_drivers::PressureReading;
 use afbc_drivers::bmp280::Bmp280;
 
@@ -141,32 +142,20 @@ fn the_model_has_the_data_sheets_example() {
 }
 
 #[test]
-fn every_fault_is_noticed_and_survived() {
+fn it_passes_the_suite() {
     for trim in SETS {
-        survives_all_troubles(Bmp280::default, || Registers::new(0x58, trim), false, 700_000, right);
+        let others = vec![(Registers::new(0x60, trim), 0x60)];
+        let (part, model, pace) = (&Bmp280::default, &|| Registers::new(0x58, trim), Pace::Polled(440..=446));
+        Suite { part, model, right, notice_us: 700_000, others, pace }.passes();
     }
 }
 
 #[test]
-fn another_part_is_named() {
-    refuses_another(Bmp280::default(), Registers::new(0x60, SETS[0]), 0x60);
-}
-
-#[test]
 fn true_pressures_and_temperatures_are_read() {
+    let points =
+        [(30_010.0, -39.9), (30_010.0, 84.9), (109_990.0, -39.9), (109_990.0, 84.9), (101_325.0, 25.0), (7e4, 0.0)];
     for trim in SETS {
-        for (pressure_pa, temperature_c) in
-            [(30_010.0, -39.9), (30_010.0, 84.9), (109_990.0, -39.9), (109_990.0, 84.9), (101_325.0, 25.0), (7e4, 0.0)]
-        {
-            let rig = Rig::new(Registers { pressure_pa, temperature_c, ..Registers::new(0x58, trim) });
-            let (readings, faults) = run(&mut rig.driver(Bmp280::default()), &rig, 500_000);
-            let what = format!("{trim:?}, {pressure_pa} Pa, {temperature_c} C");
-            assert!(readings.len() >= 20 && faults.is_empty(), "{what}: {faults:?}");
-            for reading in readings {
-                let PressureReading { pressure_pa: pa, temperature_c: c } = reading.value;
-                assert!((f64::from(pa) - pressure_pa).abs() < 3.0, "{what}: {pa}");
-                assert!((f64::from(c) - temperature_c).abs() < 0.03, "{what}: {c}");
-            }
-        }
+        let model = |pressure_pa, temperature_c| Registers { pressure_pa, temperature_c, ..Registers::new(0x58, trim) };
+        reads_pressures(Bmp280::default, model, &points, [3.0, 0.03], 20);
     }
 }

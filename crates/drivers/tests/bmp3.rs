@@ -1,6 +1,7 @@
 //! BMP388 and BMP390 against their registers, as BST-BMP388-DS001 has them.
 
-use crate::rig::{Model, Rig, noise, refuses_another, run, survives_all_troubles};
+use crate::rig::suite::{Pace, Suite, reads_no_pressure_beyond, reads_pressures};
+use crate::rig::{Model, Rig, noise, run};
 use afbc_drivers::bmp3::{Bmp388, Bmp390};
 use afbc_drivers::{PartFault, PressureReading};
 
@@ -168,49 +169,31 @@ fn right(reading: &PressureReading) -> bool {
 }
 
 #[test]
-fn every_fault_is_noticed_and_survived() {
-    survives_all_troubles(Bmp388::default, || Registers::new(0x50, SETS[0]), false, 600_000, right);
-    survives_all_troubles(Bmp390::default, || Registers::new(0x60, SETS[1]), false, 600_000, right);
+fn both_pass_the_suite() {
+    let (others, pace) = (vec![(Registers::new(0x60, SETS[0]), 0x60)], Pace::Polled(498..=502));
+    let (part, model) = (&Bmp388::default, &|| Registers::new(0x50, SETS[0]));
+    Suite { part, model, right, notice_us: 600_000, others, pace }.passes();
+    let (others, pace) = (vec![(Registers::new(0x58, SETS[0]), 0x58)], Pace::Polled(498..=502));
+    let (part, model) = (&Bmp390::default, &|| Registers::new(0x60, SETS[1]));
+    Suite { part, model, right, notice_us: 600_000, others, pace }.passes();
 }
 
 #[test]
-fn another_part_is_named() {
-    refuses_another(Bmp388::default(), Registers::new(0x60, SETS[0]), 0x60);
-    refuses_another(Bmp390::default(), Registers::new(0x58, SETS[0]), 0x58);
+fn pressures_and_temperatures_of_the_whole_range_are_read_and_none_beyond() {
+    let points =
+        [(30_010.0, -39.9), (30_010.0, 84.9), (124_990.0, -39.9), (124_990.0, 84.9), (101_325.0, 25.0), (7e4, 0.0)];
+    for trim in SETS {
+        let model = |pressure_pa, temperature_c| Registers { pressure_pa, temperature_c, ..Registers::new(0x50, trim) };
+        // 1.5 Pa of noise and half of a last bit of 19.
+        reads_pressures(Bmp388::default, model, &points, [1.5 + 1.0, 0.02], 11);
+    }
+    let model = |pressure_pa, temperature_c| Registers { pressure_pa, temperature_c, ..Registers::new(0x50, SETS[0]) };
+    reads_no_pressure_beyond(Bmp388::default, model, [29_900.0, 125_100.0]);
 }
 
 #[test]
 fn the_checksum_is_that_of_its_catalogue() {
     assert_eq!(crc8(b"123456789"), 0x4B);
-}
-
-#[test]
-fn true_pressures_and_temperatures_are_read_with_every_calibration() {
-    for trim in SETS {
-        for (pressure_pa, temperature_c) in
-            [(30_010.0, -39.9), (30_010.0, 84.9), (124_990.0, -39.9), (124_990.0, 84.9), (101_325.0, 25.0), (7e4, 0.0)]
-        {
-            let rig = Rig::new(Registers { pressure_pa, temperature_c, ..Registers::new(0x50, trim) });
-            let (readings, faults) = run(&mut rig.driver(Bmp388::default()), &rig, 500_000);
-            let what = format!("{trim:?}, {pressure_pa} Pa, {temperature_c} C");
-            assert!(readings.len() > 10 && faults.is_empty(), "{what}: {faults:?}");
-            for reading in readings {
-                let PressureReading { pressure_pa: pa, temperature_c: c } = reading.value;
-                // 1.5 Pa of noise and half of a last bit of 19.
-                assert!((f64::from(pa) - pressure_pa).abs() < 1.5 + 1.0, "{what}: {pa}");
-                assert!((f64::from(c) - temperature_c).abs() < 0.02, "{what}: {c}");
-            }
-        }
-    }
-}
-
-#[test]
-fn there_are_50_readings_a_second() {
-    let rig = Rig::new(Registers::new(0x50, SETS[0]));
-    let mut driver = rig.driver(Bmp388::default());
-    let _ = run(&mut driver, &rig, 100_000);
-    let (readings, faults) = run(&mut driver, &rig, 10_000_000);
-    assert!(faults.is_empty() && (498..=502).contains(&readings.len()), "{} readings, {faults:?}", readings.len());
 }
 
 #[test]
@@ -223,14 +206,5 @@ fn a_damaged_calibration_is_refused() {
             assert!(readings.is_empty() && !faults.is_empty(), "byte {byte}, bit {bit}");
             assert!(faults.iter().all(|fault| *fault == PartFault::Calibration), "{faults:?}");
         }
-    }
-}
-
-#[test]
-fn beyond_its_range_there_is_no_reading() {
-    for (pressure_pa, temperature_c) in [(29_900.0, 25.0), (125_100.0, 25.0), (1e5, -40.5), (1e5, 85.5)] {
-        let rig = Rig::new(Registers { pressure_pa, temperature_c, ..Registers::new(0x50, SETS[0]) });
-        let (readings, faults) = run(&mut rig.driver(Bmp388::default()), &rig, 500_000);
-        assert!(readings.is_empty() && faults.iter().all(|fault| *fault == PartFault::Range), "{faults:?}");
     }
 }

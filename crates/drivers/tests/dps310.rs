@@ -1,6 +1,7 @@
 //! DPS310 and SPL06-001 against their registers, as Infineon's data sheet V1.2 has them.
 
-use crate::rig::{Model, Rig, noise, refuses_another, run, survives_all_troubles};
+use crate::rig::suite::{Pace, Suite, reads_no_pressure_beyond, reads_pressures};
+use crate::rig::{Model, Rig, noise, run};
 use afbc_drivers::dps310::{Dps310, Spl06};
 use afbc_drivers::{PartFault, PressureReading};
 
@@ -205,48 +206,29 @@ fn right(reading: &PressureReading) -> bool {
 }
 
 #[test]
-fn every_fault_is_noticed_and_survived() {
-    survives_all_troubles(Dps310::default, || Registers::new(false), false, 1_000_000, right);
-    survives_all_troubles(Spl06::default, || Registers::new(true), false, 1_000_000, right);
-}
-
-#[test]
-fn another_part_is_named() {
+fn both_pass_the_suite() {
     // The SPL07-003, whose coefficients are more.
-    refuses_another(Dps310::default(), Registers { identity: 0x11, ..Registers::new(false) }, 0x11);
-    refuses_another(Spl06::default(), Registers { identity: 0x11, ..Registers::new(true) }, 0x11);
+    let others = |is_spl06| vec![(Registers { identity: 0x11, ..Registers::new(is_spl06) }, 0x11)];
+    let (others, pace, notice_us) = ([false, true].map(others), || Pace::Polled(318..=322), 1_000_000);
+    let [of_dps310, of_spl06] = others;
+    let (part, model) = (&Dps310::default, &|| Registers::new(false));
+    Suite { part, model, right, notice_us, others: of_dps310, pace: pace() }.passes();
+    let (part, model) = (&Spl06::default, &|| Registers::new(true));
+    Suite { part, model, right, notice_us, others: of_spl06, pace: pace() }.passes();
 }
 
 #[test]
-fn true_pressures_and_temperatures_are_read_with_every_set_of_coefficients() {
+fn pressures_and_temperatures_of_the_whole_range_are_read_and_none_beyond() {
+    let points =
+        [(30_010.0, -39.9), (30_010.0, 84.9), (119_990.0, -39.9), (119_990.0, 84.9), (101_325.0, 25.0), (7e4, 0.0)];
     for set in SETS {
-        for (pressure_pa, temperature_c) in
-            [(30_010.0, -39.9), (30_010.0, 84.9), (119_990.0, -39.9), (119_990.0, 84.9), (101_325.0, 25.0), (7e4, 0.0)]
-        {
-            let rig = Rig::new(Registers { set, pressure_pa, temperature_c, ..Registers::new(false) });
-            let (readings, faults) = run(&mut rig.driver(Dps310::default()), &rig, 500_000);
-            assert!(
-                readings.len() > 5 && faults.is_empty(),
-                "{set:?}, {pressure_pa} Pa, {temperature_c} C: {faults:?}"
-            );
-            for reading in readings {
-                let PressureReading { pressure_pa: pa, temperature_c: c } = reading.value;
-                // 0.3 Pa of noise and the last bit.
-                let lsb_pa = f64::from(set[3].abs()) / SCALES[4];
-                assert!((f64::from(pa) - pressure_pa).abs() < 0.5 + lsb_pa, "{set:?}: {pa} for {pressure_pa} Pa");
-                assert!((f64::from(c) - temperature_c).abs() < 0.02, "{set:?}: {c} for {temperature_c} C");
-            }
-        }
+        let model = |pressure_pa, temperature_c| Registers { set, pressure_pa, temperature_c, ..Registers::new(false) };
+        // 0.3 Pa of noise and the last bit.
+        let lsb_pa = f64::from(set[3].abs()) / SCALES[4];
+        reads_pressures(Dps310::default, model, &points, [0.5 + lsb_pa, 0.02], 6);
     }
-}
-
-#[test]
-fn a_pressure_is_read_once_32_times_a_second() {
-    let rig = Rig::new(Registers::new(false));
-    let mut driver = rig.driver(Dps310::default());
-    let _ = run(&mut driver, &rig, 500_000);
-    let (readings, faults) = run(&mut driver, &rig, 10_000_000);
-    assert!(faults.is_empty() && (318..=322).contains(&readings.len()), "{} readings, {faults:?}", readings.len());
+    let model = |pressure_pa, temperature_c| Registers { pressure_pa, temperature_c, ..Registers::new(false) };
+    reads_no_pressure_beyond(Dps310::default, model, [29_900.0, 120_100.0]);
 }
 
 #[test]
@@ -255,15 +237,6 @@ fn temperature_is_of_the_sensor_that_the_coefficients_are_for() {
         let rig = Rig::new(Registers { source, ..Registers::new(false) });
         let (readings, faults) = run(&mut rig.driver(Dps310::default()), &rig, 500_000);
         assert!(faults.is_empty() && readings.iter().all(|reading| right(&reading.value)), "{readings:?}");
-    }
-}
-
-#[test]
-fn beyond_its_range_there_is_no_reading() {
-    for (pressure_pa, temperature_c) in [(29_900.0, 25.0), (120_100.0, 25.0), (1e5, -40.5), (1e5, 85.5)] {
-        let rig = Rig::new(Registers { pressure_pa, temperature_c, ..Registers::new(false) });
-        let (readings, faults) = run(&mut rig.driver(Dps310::default()), &rig, 500_000);
-        assert!(readings.is_empty() && faults.iter().all(|fault| *fault == PartFault::Range), "{faults:?}");
     }
 }
 

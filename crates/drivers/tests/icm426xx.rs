@@ -1,8 +1,9 @@
 //! ICM-42688-P and ICM-42605 against their registers, as DS-000347 has them, and as silicon is known to differ: the
 //! adaptive full-scale range freezes the gyroscope.
 
-use crate::rig::{Model, Rig, Trouble, comes_back_at_once, noise, reads, refuses_another, run, survives_all_troubles};
-use afbc_drivers::icm426xx::{Icm426xx, Icm42605, Icm42688p};
+use crate::rig::suite::{Pace, Suite, reads_the_whole_range};
+use crate::rig::{Model, Rig, Trouble, noise, reads, run};
+use afbc_drivers::icm426xx::{Icm426xx, Icm42688p};
 use afbc_drivers::{InertialReading, PartFault};
 use embassy_futures::block_on;
 
@@ -198,48 +199,21 @@ fn right(reading: &InertialReading) -> bool {
     reads(reading, [10.0, -250.0, 0.5], [0.1, -0.2, 1.0], 31.0)
 }
 
-#[test]
-fn every_fault_is_noticed_and_survived() {
-    survives_all_troubles(|| Icm42688p::<false> {}, || Registers::new(0x47), true, 60_000, right);
-    survives_all_troubles(|| Icm42605::<false> {}, || Registers::new(0x42), true, 60_000, right);
-    survives_all_troubles(|| Icm42688p::<true> {}, || Registers::new(0x47), true, 60_000, right);
+fn passes<const IDENTITY: u8, const POLLED: bool>(other: u8) {
+    let (part, model) = (&|| Icm426xx::<IDENTITY, POLLED> {}, &|| Registers::new(IDENTITY));
+    let others = vec![(Registers::new(other), other)];
+    let pace = Pace::Interrupts(if POLLED { 250 } else { 1_000 }, 900);
+    Suite { part, model, right, notice_us: 60_000, others, pace }.passes();
+    let set = |part: &mut Registers, rates, force, _| (part.rates_deg_s, part.force_g) = (rates, force);
+    reads_the_whole_range(part(), model(), set, ([31.0; 4], 0.1));
 }
 
 #[test]
-fn a_wire_that_comes_and_goes_costs_little() {
-    comes_back_at_once(|| Icm42688p::<false> {}, || Registers::new(0x47), right);
-    comes_back_at_once(|| Icm42605::<true> {}, || Registers::new(0x42), right);
-}
-
-#[test]
-fn another_part_is_named() {
-    refuses_another(Icm42688p::<false> {}, Registers::new(0x42), 0x42);
-    refuses_another(Icm42605::<false> {}, Registers::new(0x47), 0x47);
-}
-
-#[test]
-fn there_is_a_reading_every_millisecond_at_its_interrupt() {
-    let rig = Rig::new(Registers::new(0x47));
-    let mut driver = rig.driver(Icm42688p::<false> {});
-    let (readings, _) = run(&mut driver, &rig, 1_000_000);
-    let times: Vec<u64> = readings.iter().map(|reading| reading.at_us).collect();
-    assert!(times.len() > 900 && times.windows(2).all(|pair| pair[1] - pair[0] == 1_000), "{times:?}");
-    assert!(times.iter().all(|at_us| at_us % 1_000 == 0), "of the interrupt, not of the transfer: {times:?}");
-}
-
-#[test]
-fn its_full_range_is_read() {
-    let rig = Rig::new(Registers::new(0x47));
-    let mut driver = rig.driver(Icm42688p::<false> {});
-    for (rate, force) in [(1990.0, 15.9), (-1990.0, -15.9), (2500.0, 20.0)] {
-        rig.with(|part| (part.rates_deg_s, part.force_g) = ([rate; 3], [force; 3]));
-        let _ = run(&mut driver, &rig, 100_000);
-        let (readings, _) = run(&mut driver, &rig, 10_000);
-        let InertialReading { rates_rad_s, specific_force_m_s2, .. } = readings.last().expect("readings").value;
-        let [rate, force] = [rate.clamp(-2000.0, 2000.0).to_radians(), force.clamp(-16.0, 16.0) * 9.80665];
-        assert!((rates_rad_s.x - rate as f32).abs() < 0.02, "{rates_rad_s}");
-        assert!((specific_force_m_s2.x - force as f32).abs() < 0.05, "{specific_force_m_s2}");
-    }
+fn all_pass_the_suite() {
+    passes::<0x47, false>(0x42);
+    passes::<0x47, true>(0x42);
+    passes::<0x42, false>(0x47);
+    passes::<0x42, true>(0x47);
 }
 
 /// The part shows the rates of the moment, at any rate of turn.

@@ -1,10 +1,10 @@
 //! IST8310 against its registers, as its data sheet has them.
 
-use crate::rig;
+use crate::rig::suite::{Pace, Suite, reads_fields};
+use crate::rig::{Model, Rig, Trouble, noise, run};
 use afbc_drivers::ist8310::Ist8310;
 use afbc_drivers::{MagneticReading, PartFault};
 use nalgebra::Vector3;
-use rig::{Model, Rig, noise, refuses_another, run, survives_all_troubles};
 
 /// Forward, right, down.
 const FIELD_UT: [f64; 3] = [22.0, -3.0, 42.0];
@@ -97,9 +97,19 @@ fn right(reading: &MagneticReading) -> bool {
 }
 
 #[test]
-fn every_fault_is_noticed_and_survived() {
+fn it_passes_the_suite() {
+    let others = vec![(Registers { identity: 0x08, ..Registers::new() }, 0x08)];
+    let pace = Pace::Polled(950..=1_000);
     // After a reset it measures on, worse: its registers tell, of which one is read every 16 cycles.
-    survives_all_troubles(|| Ist8310, Registers::new, false, 1_500_000, right);
+    Suite { part: &|| Ist8310, model: &Registers::new, right, notice_us: 1_500_000, others, pace }.passes();
+}
+
+#[test]
+fn fields_of_the_whole_range_are_read_and_none_beyond() {
+    let inside = [[1_599.0, -1_599.0, 2_479.0], [-1_599.0, 1_599.0, -2_479.0], [0.5, -0.5, 1.0]];
+    let beyond = [[1_610.0, 0.0, 0.0], [0.0, -1_610.0, 0.0], [0.0, 0.0, 2_490.0], [0.0, 0.0, -2_600.0]];
+    let fields = [&inside[..], &beyond];
+    reads_fields(Ist8310, Registers::new(), |part, field_ut| part.field_ut = field_ut, is_field, fields);
 }
 
 #[test]
@@ -107,41 +117,9 @@ fn after_a_reset_it_soon_measures_as_before() {
     let rig = Rig::new(Registers::new());
     let mut driver = rig.driver(Ist8310);
     let _ = run(&mut driver, &rig, 500_000);
-    rig.set(rig::Trouble::Reset);
+    rig.set(Trouble::Reset);
     let (_, faults) = run(&mut driver, &rig, 2_000_000);
     assert!(faults.iter().any(|fault| matches!(fault, PartFault::Register(_))), "{faults:?}");
     let (readings, faults) = run(&mut driver, &rig, 2_000_000);
     assert!(faults.is_empty() && readings.iter().all(|reading| right(&reading.value)), "{faults:?}");
-}
-
-#[test]
-fn another_part_is_named() {
-    refuses_another(Ist8310, Registers { identity: 0x08, ..Registers::new() }, 0x08);
-}
-
-#[test]
-fn there_are_some_95_readings_a_second() {
-    let rig = Rig::new(Registers::new());
-    let mut driver = rig.driver(Ist8310);
-    let _ = run(&mut driver, &rig, 100_000);
-    let (readings, faults) = run(&mut driver, &rig, 10_000_000);
-    assert!(faults.is_empty() && (950..=1_000).contains(&readings.len()), "{} readings, {faults:?}", readings.len());
-}
-
-#[test]
-fn fields_of_the_whole_range_are_read_and_none_beyond() {
-    let rig = Rig::new(Registers::new());
-    let mut driver = rig.driver(Ist8310);
-    for field_ut in [[1_599.0, -1_599.0, 2_479.0], [-1_599.0, 1_599.0, -2_479.0], [0.5, -0.5, 1.0]] {
-        rig.with(|part| part.field_ut = field_ut);
-        let _ = run(&mut driver, &rig, 100_000);
-        let (readings, faults) = run(&mut driver, &rig, 200_000);
-        assert!(faults.is_empty() && readings.iter().all(|reading| is_field(&reading.value, field_ut)), "{readings:?}");
-    }
-    for field_ut in [[1_610.0, 0.0, 0.0], [0.0, -1_610.0, 0.0], [0.0, 0.0, 2_490.0], [0.0, 0.0, -2_600.0]] {
-        rig.with(|part| part.field_ut = field_ut);
-        let _ = run(&mut driver, &rig, 100_000);
-        let (readings, faults) = run(&mut driver, &rig, 500_000);
-        assert!(readings.is_empty() && faults.iter().all(|fault| *fault == PartFault::Range), "{readings:?}");
-    }
 }

@@ -1,6 +1,7 @@
 //! LIS3MDL against its registers, as DS9463 has them.
 
-use crate::rig::{Model, Rig, noise, refuses_another, run, survives_all_troubles};
+use crate::rig::suite::{Pace, Suite, reads_fields};
+use crate::rig::{Model, Rig, noise, run};
 use afbc_drivers::lis3mdl::Lis3mdl;
 use afbc_drivers::{MagneticReading, PartFault};
 use embassy_futures::block_on;
@@ -125,38 +126,15 @@ fn right(reading: &MagneticReading) -> bool {
 }
 
 #[test]
-fn every_fault_is_noticed_and_survived() {
-    survives_all_troubles(|| Lis3mdl, Registers::new, false, 500_000, right);
-}
-
-#[test]
-fn another_part_is_named() {
-    refuses_another(Lis3mdl, Registers { identity: 0x40, ..Registers::new() }, 0x40);
-}
-
-#[test]
-fn a_field_is_read_once_80_times_a_second() {
-    let rig = Rig::new(Registers::new());
-    let mut driver = rig.driver(Lis3mdl);
-    let _ = run(&mut driver, &rig, 100_000);
-    let (readings, faults) = run(&mut driver, &rig, 10_000_000);
-    assert!(faults.is_empty() && (798..=802).contains(&readings.len()), "{} readings, {faults:?}", readings.len());
+fn it_passes_the_suite() {
+    let others = vec![(Registers { identity: 0x40, ..Registers::new() }, 0x40)];
+    let pace = Pace::Polled(798..=802);
+    Suite { part: &|| Lis3mdl, model: &Registers::new, right, notice_us: 500_000, others, pace }.passes();
 }
 
 #[test]
 fn fields_of_the_whole_range_are_read_and_none_beyond() {
-    let rig = Rig::new(Registers::new());
-    let mut driver = rig.driver(Lis3mdl);
-    for field_ut in [[399.0, -399.0, 0.5], [-399.0, 399.0, -0.5], [0.2, 0.5, 399.0], [48.0, 16.0, -30.0]] {
-        rig.with(|part| part.field_ut = field_ut);
-        let _ = run(&mut driver, &rig, 50_000);
-        let (readings, faults) = run(&mut driver, &rig, 200_000);
-        assert!(faults.is_empty() && readings.iter().all(|reading| is_field(&reading.value, field_ut)), "{readings:?}");
-    }
-    for field_ut in [[402.0, 0.0, 0.0], [0.0, -470.0, 0.0], [0.0, 0.0, 900.0]] {
-        rig.with(|part| part.field_ut = field_ut);
-        let _ = run(&mut driver, &rig, 50_000);
-        let (readings, faults) = run(&mut driver, &rig, 500_000);
-        assert!(readings.is_empty() && faults.iter().all(|fault| *fault == PartFault::Range), "{readings:?}");
-    }
+    let inside = [[399.0, -399.0, 0.5], [-399.0, 399.0, -0.5], [0.2, 0.5, 399.0], [48.0, 16.0, -30.0]];
+    let fields = [&inside[..], &[[402.0, 0.0, 0.0], [0.0, -470.0, 0.0], [0.0, 0.0, 900.0]]];
+    reads_fields(Lis3mdl, Registers::new(), |part, field_ut| part.field_ut = field_ut, is_field, fields);
 }

@@ -1,43 +1,29 @@
 //! The family of the MPU-6000 against its registers.
 
 use crate::rig::mpu_registers::Registers;
-use crate::rig::{Rig, comes_back_at_once, reads, refuses_another, run, survives_all_troubles};
+use crate::rig::suite::{Pace, Suite, reads_the_whole_range};
+use crate::rig::{Rig, reads, run};
 use afbc_drivers::mpu::{Icm20602, Icm20608, Icm20689, Mpu, Mpu6000, Mpu6500, Mpu9250};
 use afbc_drivers::{InertialReading, PartFault, SensorPart};
 use embassy_futures::block_on;
-use nalgebra::Vector3;
 
 fn right(reading: &InertialReading) -> bool {
     reads(reading, [10.0, -250.0, 0.5], [0.1, -0.2, 1.0], 31.0)
 }
 
 fn is_right<const IDENTITY: u8>() {
-    let part = || Mpu::<IDENTITY> {};
-    survives_all_troubles(part, || Registers::new(IDENTITY), true, 60_000, right);
-    comes_back_at_once(part, || Registers::new(IDENTITY), right);
-    refuses_another(part(), Registers::new(IDENTITY ^ 0x55), IDENTITY ^ 0x55);
+    let (part, model) = (&|| Mpu::<IDENTITY> {}, &|| Registers::new(IDENTITY));
+    let (other, pace) = (IDENTITY ^ 0x55, Pace::Interrupts(1_000, 600));
+    let others = vec![(Registers::new(other), other)];
+    Suite { part, model, right, notice_us: 60_000, others, pace }.passes();
+    let set = |part: &mut Registers, rates, force, temperature_c| {
+        (part.rates_deg_s, part.force_g, part.temperature_c) = (rates, force, temperature_c);
+    };
+    reads_the_whole_range(part(), model(), set, ([-39.0, 85.0, 25.0, 0.0], 0.01));
 
-    let rig = Rig::new(Registers::new(IDENTITY));
-    let mut driver = rig.driver(part());
-    let (readings, faults) = run(&mut driver, &rig, 1_000_000);
-    let times: Vec<u64> = readings.iter().map(|reading| reading.at_us).collect();
-    assert!(faults.is_empty() && times.len() > 600 && times.windows(2).all(|pair| pair[1] - pair[0] == 1_000));
+    let rig = Rig::new(model());
+    let _ = run(&mut rig.driver(part()), &rig, 1_000_000);
     assert!(rig.with(|part| part.is_i2c_off), "{}", Mpu::<IDENTITY>::NAME);
-
-    let cases = [(1990.0, 15.9, -39.0), (-1990.0, -15.9, 85.0), (2500.0, 15.0, 25.0), (-1900.0, -20.0, 0.0)];
-    for (rate, force, temperature) in cases {
-        rig.with(|part| {
-            (part.rates_deg_s, part.force_g, part.temperature_c) = ([rate; 3], [force; 3], temperature);
-        });
-        let _ = run(&mut driver, &rig, 5_000);
-        let (readings, _) = run(&mut driver, &rig, 10_000);
-        let reading = readings.last().expect("readings").value;
-        let [rate, force] = [rate.clamp(-2000.0, 2000.0).to_radians(), force.clamp(-16.0, 16.0) * 9.80665];
-        let InertialReading { rates_rad_s, specific_force_m_s2, temperature_c } = reading;
-        assert!((rates_rad_s - Vector3::from_element(rate as f32)).amax() < 0.02, "{rates_rad_s}");
-        assert!((specific_force_m_s2 - Vector3::from_element(force as f32)).amax() < 0.05, "{specific_force_m_s2}");
-        assert!((temperature_c - temperature as f32).abs() < 0.02, "{temperature_c}");
-    }
 }
 
 #[test]

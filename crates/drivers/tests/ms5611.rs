@@ -1,6 +1,7 @@
 //! MS5611 against its commands, as ENG_DS_MS5611-01BA03_B3 has them.
 
-use crate::rig::{Model, Rig, noise, run, survives_all_troubles};
+use crate::rig::suite::{Pace, Suite, reads_no_pressure_beyond, reads_pressures};
+use crate::rig::{Model, Rig, noise, run};
 use afbc_drivers::ms5611::Ms5611;
 use afbc_drivers::{PartFault, PressureReading, SensorPart};
 
@@ -131,8 +132,30 @@ fn right(reading: &PressureReading) -> bool {
 }
 
 #[test]
-fn every_fault_is_noticed_and_survived() {
-    survives_all_troubles(Ms5611::default, || Part5611::new(SETS[0]), false, 500_000, right);
+fn it_passes_the_suite() {
+    let (part, model, pace) = (&Ms5611::default, &|| Part5611::new(SETS[0]), Pace::Polled(500..=550));
+    // It has no identity.
+    Suite { part, model, right, notice_us: 500_000, others: Vec::new(), pace }.passes();
+}
+
+#[test]
+fn pressures_and_temperatures_of_the_whole_range_are_read_and_none_beyond() {
+    let points = [
+        (1_010.0, -39.9),
+        (119_990.0, -39.9),
+        (1_010.0, 84.9),
+        (119_990.0, 84.9),
+        (101_325.0, 20.01),
+        (101_325.0, 19.9),
+        (50_000.0, -10.0),
+        (30_000.0, -15.5),
+    ];
+    for set in SETS {
+        let model = |pressure_pa, temperature_c| Part5611 { pressure_pa, temperature_c, ..Part5611::new(set) };
+        reads_pressures(Ms5611::default, model, &points, [3.0, 0.03], 11);
+    }
+    let model = |pressure_pa, temperature_c| Part5611 { pressure_pa, temperature_c, ..Part5611::new(SETS[0]) };
+    reads_no_pressure_beyond(Ms5611::default, model, [950.0, 120_100.0]);
 }
 
 #[test]
@@ -155,40 +178,6 @@ fn the_checksum_is_that_of_the_makers_example() {
 }
 
 #[test]
-fn true_pressures_and_temperatures_are_read_with_every_prom() {
-    for set in SETS {
-        for (pressure_pa, temperature_c) in [
-            (1_010.0, -39.9),
-            (119_990.0, -39.9),
-            (1_010.0, 84.9),
-            (119_990.0, 84.9),
-            (101_325.0, 20.01),
-            (101_325.0, 19.9),
-            (50_000.0, -10.0),
-            (30_000.0, -15.5),
-        ] {
-            let rig = Rig::new(Part5611 { pressure_pa, temperature_c, ..Part5611::new(set) });
-            let (readings, faults) = run(&mut rig.driver(Ms5611::default()), &rig, 500_000);
-            let what = format!("{set:?}, {pressure_pa} Pa, {temperature_c} C");
-            assert!(readings.len() > 10 && faults.is_empty(), "{what}: {faults:?}");
-            for reading in readings {
-                let PressureReading { pressure_pa: pa, temperature_c: c } = reading.value;
-                assert!((f64::from(pa) - pressure_pa).abs() < 3.0, "{what}: {pa}");
-                assert!((f64::from(c) - temperature_c).abs() < 0.03, "{what}: {c}");
-            }
-        }
-    }
-}
-
-#[test]
-fn there_are_some_50_readings_a_second() {
-    let rig = Rig::new(Part5611::new(SETS[1]));
-    let mut driver = rig.driver(Ms5611::default());
-    let (readings, faults) = run(&mut driver, &rig, 10_000_000);
-    assert!(faults.is_empty() && (500..=550).contains(&readings.len()), "{} readings, {faults:?}", readings.len());
-}
-
-#[test]
 fn a_damaged_prom_is_refused() {
     for word in 0..8 {
         for bit in (0..16).filter(|bit| word < 7 || !(4..8).contains(bit)) {
@@ -198,14 +187,5 @@ fn a_damaged_prom_is_refused() {
             assert!(readings.is_empty() && !faults.is_empty(), "word {word}, bit {bit}");
             assert!(faults.iter().all(|fault| *fault == PartFault::Calibration), "{faults:?}");
         }
-    }
-}
-
-#[test]
-fn beyond_its_range_there_is_no_reading() {
-    for (pressure_pa, temperature_c) in [(950.0, 25.0), (120_100.0, 25.0), (1e5, -40.5), (1e5, 85.5)] {
-        let rig = Rig::new(Part5611 { pressure_pa, temperature_c, ..Part5611::new(SETS[0]) });
-        let (readings, faults) = run(&mut rig.driver(Ms5611::default()), &rig, 500_000);
-        assert!(readings.is_empty() && faults.iter().all(|fault| *fault == PartFault::Range), "{faults:?}");
     }
 }

@@ -1,8 +1,9 @@
 //! QMC5883L against its registers, as its data sheet 1.0 has them.
 
-use crate::rig::{Model, Rig, noise, refuses_another, run, survives_all_troubles};
+use crate::rig::suite::{Pace, Suite, reads_fields};
+use crate::rig::{Model, noise};
+use afbc_drivers::MagneticReading;
 use afbc_drivers::qmc5883l::Qmc5883l;
-use afbc_drivers::{MagneticReading, PartFault};
 use nalgebra::Vector3;
 
 const FIELD_UT: [f64; 3] = [22.0, -3.0, -42.0];
@@ -109,45 +110,19 @@ fn right(reading: &MagneticReading) -> bool {
 }
 
 #[test]
-fn every_fault_is_noticed_and_survived() {
-    survives_all_troubles(|| Qmc5883l, Registers::new, false, 500_000, right);
-}
-
-#[test]
-fn another_part_is_named() {
-    refuses_another(Qmc5883l, Registers { identity: 0x80, ..Registers::new() }, 0x80);
-}
-
-#[test]
-fn a_field_is_read_once_100_times_a_second() {
-    let rig = Rig::new(Registers::new());
-    let mut driver = rig.driver(Qmc5883l);
-    let _ = run(&mut driver, &rig, 100_000);
-    let (readings, faults) = run(&mut driver, &rig, 10_000_000);
-    assert!(faults.is_empty() && (995..=1_005).contains(&readings.len()), "{} readings, {faults:?}", readings.len());
+fn it_passes_the_suite() {
+    let others = vec![(Registers { identity: 0x80, ..Registers::new() }, 0x80)];
+    let pace = Pace::Polled(995..=1_005);
+    Suite { part: &|| Qmc5883l, model: &Registers::new, right, notice_us: 500_000, others, pace }.passes();
 }
 
 #[test]
 fn fields_of_the_whole_range_are_read_and_none_beyond() {
-    let rig = Rig::new(Registers::new());
-    let mut driver = rig.driver(Qmc5883l);
-    for field_ut in [[799.0, -799.0, 0.5], [-799.0, 799.0, -0.5], [0.2, 0.5, 799.0], [48.0, 16.0, -30.0]] {
-        rig.with(|part| part.field_ut = field_ut);
-        let _ = run(&mut driver, &rig, 50_000);
-        let (readings, faults) = run(&mut driver, &rig, 200_000);
-        assert!(faults.is_empty() && readings.iter().all(|reading| is_field(&reading.value, field_ut)), "{readings:?}");
-    }
+    let inside = [FIELD_UT, [799.0, -799.0, 0.5], [-799.0, 799.0, -0.5], [0.2, 0.5, 799.0], [48.0, 16.0, -30.0]];
     // 8 to 10.9 gauss fit into its words; beyond, it flags an overflow.
-    for ut in [820.0, -1_050.0, 1_200.0, -5_000.0] {
-        for axis in 0..3 {
-            rig.with(|part| part.field_ut[axis] = ut);
-            let _ = run(&mut driver, &rig, 50_000);
-            let (readings, faults) = run(&mut driver, &rig, 500_000);
-            assert!(readings.is_empty() && faults.iter().all(|fault| *fault == PartFault::Range), "{readings:?}");
-            rig.with(|part| part.field_ut = FIELD_UT);
-            let _ = run(&mut driver, &rig, 300_000);
-            let (readings, faults) = run(&mut driver, &rig, 200_000);
-            assert!(faults.is_empty() && readings.iter().all(|reading| right(&reading.value)), "{faults:?}");
-        }
-    }
+    let beyond = [820.0, -1_050.0, 1_200.0, -5_000.0].into_iter().flat_map(|ut| {
+        (0..3).map(move |axis| std::array::from_fn(|other| if other == axis { ut } else { FIELD_UT[other] }))
+    });
+    let fields = [&inside[..], &beyond.collect::<Vec<_>>()];
+    reads_fields(Qmc5883l, Registers::new(), |part, field_ut| part.field_ut = field_ut, is_field, fields);
 }

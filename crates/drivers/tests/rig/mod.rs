@@ -2,6 +2,7 @@
 //! wrong between them.
 
 pub mod mpu_registers;
+pub mod suite;
 
 use afbc_drivers::{BusError, Driver, InertialReading, PartFault, PartTiming, Registers, SensorPart};
 use afbc_types::Stamped;
@@ -234,7 +235,7 @@ pub fn run<P: SensorPart, M: Model>(
 /// The table of faults: each is noticed within `notice_us`, no reading of a part that answers nothing passes for one,
 /// and within a second after its end the part reads right again. `interrupts` is true if the part's interrupt is used,
 /// `right` tells a right reading.
-pub fn survives_all_troubles<P: SensorPart, M: Model>(
+fn survives_all_troubles<P: SensorPart, M: Model>(
     part: impl Fn() -> P,
     model: impl Fn() -> M,
     interrupts: bool,
@@ -291,7 +292,7 @@ pub fn survives_all_troubles<P: SensorPart, M: Model>(
 /// A part whose wire comes and goes reads again within 5 ms each time, and right; one that was reset meanwhile is set
 /// up
 /// again.
-pub fn comes_back_at_once<P: SensorPart, M: Model>(
+fn comes_back_at_once<P: SensorPart, M: Model>(
     part: impl Fn() -> P,
     model: impl Fn() -> M,
     right: impl Fn(&P::Reading) -> bool,
@@ -325,7 +326,7 @@ pub fn comes_back_at_once<P: SensorPart, M: Model>(
 }
 
 /// Another part's answers are refused by name.
-pub fn refuses_another<P: SensorPart, M: Model>(part: P, model: M, identity: u8) {
+fn refuses_another<P: SensorPart, M: Model>(part: P, model: M, identity: u8) {
     let rig = Rig::new(model);
     let (readings, faults) = run(&mut rig.driver(part), &rig, 500_000);
     assert!(readings.is_empty() && faults.iter().all(|fault| *fault == PartFault::Identity(identity)), "{faults:?}");
