@@ -1,4 +1,5 @@
-//! The guidance alone, on a vehicle that does exactly as the setpoint says: take off, fly to a place, hold there.
+//! Flies the guidance alone, with a vehicle that follows the setpoint exactly: takes off, flies to a place, holds
+//! there.
 //! `cargo run -p afbc-guidance --example guidance_alone`.
 #![allow(clippy::unwrap_used, reason = "an example whose settings are not valid should say so")]
 
@@ -37,7 +38,7 @@ fn main() {
         if let Some((_, answer)) = guided.answer {
             println!("{ms:5} ms: answer {answer:?}");
         }
-        // On the ground the setpoint is where the vehicle stands.
+        // While armed on the ground, the setpoint is where the vehicle stands.
         if let (true, Some(setpoint)) = (ms > 1500, guided.setpoint) {
             (state.position_m, state.velocity_m_s) = (setpoint.position_m, setpoint.velocity_m_s);
         }

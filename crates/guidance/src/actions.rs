@@ -1,9 +1,9 @@
-//! What may follow from each cause: the choices of the [safety net](crate::net)'s parameters, numbered as in PX4.
+//! Actions that each cause of the [safety net](crate::net) can have. The numbers are PX4's.
 
 use crate::table::FailsafeAction;
 use afbc_types::Choice;
 
-/// Declares choices, each with its words in the order of their numbers, and what follows.
+/// Declares choices: each has its words in the order of their numbers, and the failsafe action of each word.
 macro_rules! choices {
     ($(
         $(#[$doc:meta])*
@@ -29,7 +29,7 @@ macro_rules! choices {
         }
 
         impl $Choice {
-            /// Returns what follows.
+            /// Returns the failsafe action of this choice.
             pub const fn action(self) -> FailsafeAction {
                 match self { $( $Choice::$Variant => FailsafeAction::$action, )* }
             }
@@ -38,7 +38,7 @@ macro_rules! choices {
 }
 
 choices! {
-    /// What follows from a flight outside the geofence.
+    /// Action when the vehicle is outside the geofence.
     FenceAction from 0 {
         Nothing "nothing" => None,
         Warn "warn" => Warn,
@@ -47,26 +47,26 @@ choices! {
         Terminate "terminate" => Land,
         Land "land" => Land,
     }
-    /// What follows from a lost station.
+    /// Action when the ground station is lost.
     StationAction from 0 {
         Nothing "nothing" => None,
         Hold "hold" => Hold,
         Return "return" => Return,
         Land "land" => Land,
     }
-    /// What follows from lost targets in offboard mode.
+    /// Action when the targets are lost in offboard mode.
     TargetsAction from 0 {
         Land "land" => Land,
         Hold "hold" => Hold,
         Return "return" => Return,
     }
-    /// What follows from lost sticks in a mode that they fly.
+    /// Action when the sticks are lost in a manual mode.
     SticksAction from 1 {
         Hold "hold" => Hold,
         Return "return" => Return,
         Land "land" => Land,
     }
-    /// What follows from a failed sensor.
+    /// Action when a sensor has failed.
     SensorsAction from 0 {
         Nothing "nothing" => None,
         Warn "warn" => Warn,
@@ -74,7 +74,8 @@ choices! {
         Return "return" => Return,
         Land "land" => Land,
     }
-    /// What follows from a critical battery; in `return-then-land`, the vehicle lands with an almost empty one.
+    /// Action when the battery is critical. With `return-then-land`, the vehicle returns, and lands once the battery is
+    /// almost empty.
     BatteryAction from 0 {
         Warn "warn" => Warn,
         Return "return" => Return,

@@ -1,12 +1,12 @@
-//! Charge of the battery, from its voltage without load: the voltage that it would have without the current through its
+//! Charge of the battery from its open-circuit voltage: the measured voltage plus the drop over the internal
 //! resistance.
 
 use afbc_control::math::{max, min};
 
-/// Time constant of the charge \[s\].
+/// Time constant of the charge's low-pass filter \[s\].
 const SMOOTH_S: f32 = 2.0;
-/// Largest voltage of a cell, as in Betaflight, and smallest of one that counts as one, by which the number of cells is
-/// found \[V\].
+/// Range of a cell's voltage by which the cells are counted \[V\]: the largest as in Betaflight, and the smallest that
+/// is accepted.
 const CELL_V: core::ops::Range<f32> = 3.0..4.3;
 
 /// A battery's measurements.
@@ -15,23 +15,23 @@ const CELL_V: core::ops::Range<f32> = 3.0..4.3;
 pub struct BatteryReading {
     /// Voltage \[V\].
     pub voltage_v: f32,
-    /// Current; 0 if it is not measured \[A\].
+    /// Current; 0 if not measured \[A\].
     pub current_a: f32,
-    /// Charge, 0 to 1, if the battery's monitor knows it.
+    /// State of charge, 0 to 1, if the battery monitor reports one.
     pub charge: Option<f32>,
 }
 
 impl BatteryReading {
-    /// Returns the number of cells that a battery at rest has by its voltage; 0 of what is no battery.
+    /// Returns the number of cells of an unloaded battery, found from its voltage; 0 if the voltage fits no battery.
     pub(crate) fn cells(&self) -> u8 {
-        // Saturates: no number of cells is larger than 24.
+        // The conversion saturates. No battery has more than 24 cells.
         let cells = (self.voltage_v / CELL_V.end) as u8;
         let cells = if cells < 24 { cells + 1 } else { 0 };
         if self.voltage_v >= CELL_V.start * f32::from(cells) { cells } else { 0 }
     }
 }
 
-/// What is known of a battery's cells.
+/// Properties of the battery's cells. A `number` of 0 means: use the monitor's charge.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Cells {
     pub(crate) number: u32,
@@ -41,7 +41,7 @@ pub(crate) struct Cells {
 }
 
 impl Cells {
-    /// Returns the charge, 0 to 1, by a plausible reading: of so many cells; as it is told if their number is 0.
+    /// Returns the charge, 0 to 1, if the reading is plausible. Uses the monitor's charge if the number of cells is 0.
     fn charge(&self, reading: &BatteryReading) -> Option<f32> {
         let BatteryReading { voltage_v, current_a, charge } = *reading;
         if self.number == 0 {
@@ -52,7 +52,7 @@ impl Cells {
         plausible.then(|| max(min((cell_v - self.empty_v) / (self.full_v - self.empty_v), 1.0), 0.0))
     }
 
-    /// Updates a filtered charge; `None` stays so until the first plausible reading.
+    /// Updates the filtered charge, which is `None` until the first plausible reading.
     pub(crate) fn update(&self, charge: &mut Option<f32>, reading: Option<&BatteryReading>, dt_s: f32) {
         let Some(now) = reading.and_then(|reading| self.charge(reading)) else { return };
         let before = charge.unwrap_or(now);

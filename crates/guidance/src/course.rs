@@ -1,4 +1,4 @@
-//! Hold, take-off, landing and return.
+//! Flight modes hold, take-off, landing and return.
 
 use crate::limiter::LimiterTarget;
 use crate::mode_io::{ModeInputs, ModeOutput};
@@ -6,24 +6,24 @@ use afbc_control::math::{max, min, wrap_angle};
 use afbc_types::ResetDelta;
 use nalgebra::{Vector2, Vector3};
 
-/// Distance from home at which it descends \[m\].
+/// Distance from home at which a return begins to descend \[m\].
 const OVER_HOME_M: f32 = 1.0;
-/// Height to go at which a climb is over \[m\].
+/// Remaining height at which a climb counts as complete \[m\].
 const CLIMBED_M: f32 = 0.3;
-/// Shares of the height, by which the vehicle may be below the end of a take-off.
+/// Share of the climb by which the vehicle may still be short when a take-off counts as complete.
 const TAKEN_OFF_SHARE: f32 = 0.1;
 
-/// Holds a place: where the vehicle stops, or one that was ordered.
+/// Memory of mode hold: holds an ordered place, or the place where the vehicle stops.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Hold {
     pub(crate) at_m: Option<Vector3<f32>>,
-    /// Heading; none for the present one \[rad\].
+    /// Heading \[rad\]; `None` keeps the present one.
     pub(crate) yaw_rad: Option<f32>,
     pub(crate) speed_m_s: Option<f32>,
 }
 
 impl Hold {
-    /// Shifts a place that has been reached, and its heading, with an estimate that has been set anew.
+    /// Shifts the place and heading by an estimator reset, if the setpoint is within `within_m` of the place.
     pub(crate) fn shift(&mut self, reset: &ResetDelta, present_m: Option<Vector3<f32>>, within_m: f32) {
         let (Some(at_m), Some(present_m)) = (&mut self.at_m, present_m) else { return };
         if (*at_m - present_m).norm_squared() <= within_m * within_m {
@@ -32,7 +32,7 @@ impl Hold {
         }
     }
 
-    /// Holds where the vehicle stops.
+    /// Returns the target: first a stop, unless a place was ordered, then a hold.
     pub(crate) fn fly(&mut self, inputs: &ModeInputs<'_>) -> LimiterTarget {
         if self.at_m.is_none() && inputs.stands() {
             self.at_m = Some(inputs.present.position_m);
@@ -43,7 +43,7 @@ impl Hold {
     }
 }
 
-/// Climbs to a place above.
+/// Memory of a take-off: climbs vertically to a place.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Takeoff {
     pub(crate) to_m: Vector3<f32>,
@@ -51,17 +51,17 @@ pub(crate) struct Takeoff {
 }
 
 impl Takeoff {
-    /// Begins where the setpoint is.
+    /// Starts a take-off at the present setpoint.
     pub(crate) fn new(inputs: &ModeInputs<'_>, height_m: f32) -> Self {
         Takeoff::above(inputs.present.position_m, height_m)
     }
 
-    /// Begins at `from_m`.
+    /// Starts a take-off at `from_m`.
     pub(crate) fn above(from_m: Vector3<f32>, height_m: f32) -> Self {
         Takeoff { to_m: from_m + Vector3::new(0.0, 0.0, height_m), from_m: from_m.z }
     }
 
-    /// Shifts it with an estimate that has been set anew.
+    /// Shifts the take-off by an estimator reset.
     pub(crate) fn shift(&mut self, reset: &ResetDelta) {
         self.to_m += reset.position_m;
         self.from_m += reset.position_m.z;
@@ -76,14 +76,14 @@ impl Takeoff {
     }
 }
 
-/// Descends where the vehicle is, or over a place.
+/// Memory of a landing: descends over a place, or where the vehicle stops.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Land {
     pub(crate) over_m: Option<Vector3<f32>>,
 }
 
 impl Land {
-    /// Shifts it with an estimate that has been set anew.
+    /// Shifts the landing by an estimator reset.
     pub(crate) fn shift(&mut self, reset: &ResetDelta) {
         self.over_m = self.over_m.map(|over_m| over_m + reset.position_m);
     }
@@ -97,12 +97,12 @@ impl Land {
     }
 }
 
-/// Climbs, flies home, or to another place that is nearer, and lands.
+/// Memory of a return: climbs, flies to home or a nearer rally point, and lands.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Return {
     height_m: f32,
     to_m: Vector2<f32>,
-    /// Where it climbs; none while it stops.
+    /// Place of the climb; not set while the vehicle still stops.
     hold: Hold,
     stage: Stage,
 }
@@ -110,7 +110,7 @@ pub(crate) struct Return {
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Stage {
     Climbs,
-    /// Towards home, with this heading.
+    /// Flies home with this heading \[rad\].
     Flies(f32),
     Descends,
 }
@@ -121,19 +121,19 @@ impl Return {
         let off_m = to_m - position_m.xy();
         let near = off_m.norm_squared() <= inputs.flying.near_home_m * inputs.flying.near_home_m;
         let safe_m = inputs.home_m.z + inputs.flying.return_height_m;
-        // A return must not itself leave the geofence.
+        // A return must not itself cross the geofence's ceiling.
         let height_m = if near { position_m.z } else { min(max(position_m.z, safe_m), inputs.ceiling_m) };
         Return { height_m, to_m, hold: Hold::default(), stage: Stage::Climbs }
     }
 
-    /// Shifts where it stops with an estimate that has been set anew; home stays where it is.
+    /// Shifts the place of the climb by an estimator reset. Home does not move.
     pub(crate) fn shift(&mut self, reset: &ResetDelta, present_m: Option<Vector3<f32>>, within_m: f32) {
-        // It climbs there.
+        // The vehicle may still be below the place: compare horizontally only.
         let level_m = present_m.zip(self.hold.at_m).map(|(present, at)| Vector3::new(present.x, present.y, at.z));
         self.hold.shift(reset, level_m, within_m);
     }
 
-    /// True once it has stopped and climbed.
+    /// True once the vehicle has stopped and climbed.
     pub(crate) fn is_on_its_way(&self) -> bool {
         self.stage != Stage::Climbs
     }
@@ -144,11 +144,11 @@ impl Return {
             Stage::Climbs => {
                 let mut aim = self.hold.fly(inputs);
                 let short_m = |z: f32| self.height_m - z;
-                // The vehicle, too: one that cannot climb must not fly home at the height it has.
+                // The vehicle must have climbed, too: one that cannot climb must not fly home too low.
                 if short_m(inputs.present.position_m.z) < CLIMBED_M && short_m(inputs.state.position_m.z) < 1.0 {
                     self.stage = Stage::Flies(inputs.towards(&home_m));
                 }
-                // It climbs while it stops.
+                // Climbs while still stopping.
                 aim.position_m.z = self.height_m;
                 ModeOutput::fly(aim)
             }

@@ -1,4 +1,4 @@
-//! The tick of the guidance: watches, answers, decides the mode, and flies it.
+//! One tick of the guidance: runs the failsafe checks, answers orders, decides the flight mode and flies it.
 
 mod flying;
 mod orders;
@@ -22,63 +22,63 @@ use afbc_flight_core::{Mode, RateTarget, Reasons, Refusal, Request, Stamped};
 use afbc_types::{Declared, OutOfRange, ResetDelta, Setpoint, State};
 use nalgebra::Vector3;
 
-/// Time between two requests to disarm \[s\].
+/// Time between two disarm requests \[s\].
 const REQUEST_S: f32 = 0.1;
 
-/// What the guidance sees of the vehicle in a tick.
+/// Inputs of a tick of the guidance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GuidanceInputs<'a> {
     /// Time since power-up \[us\].
     pub now_us: u64,
     /// Time since the last tick \[s\].
     pub dt_s: f32,
-    /// Fresh state; none if there is none, or the vehicle does not know where it is.
+    /// Fresh state; none if there is none or the position is not known.
     pub state: Option<&'a State>,
-    /// By how much that has been set anew in this tick, if it has.
+    /// Estimator reset of this tick, if there was one.
     pub reset: Option<&'a ResetDelta>,
     /// Mode of the flight core.
     pub core: Mode,
-    /// True if the vehicle is in the air, by the flight core.
+    /// True if the flight core reports the vehicle in the air.
     pub airborne: bool,
-    /// True if it has been at rest for as long as arming wants it, by the flight core.
+    /// True if the flight core reports that the vehicle has been at rest long enough to arm.
     pub rested: bool,
     /// The battery's measurements.
     pub battery: Option<BatteryReading>,
     /// Sensors that have failed.
     pub sensors: FailedSensors,
-    /// What the rotors give.
+    /// Thrust of the rotors.
     pub lift: Lift,
 }
 
-/// What the guidance wants in a tick.
+/// Outputs of a tick of the guidance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Guided {
     /// Setpoint for the flight core; none without a state.
     pub setpoint: Option<Setpoint>,
-    /// True if the vehicle is armed and stays on the ground, or touches it to land: its motors idle.
+    /// True if the motors shall idle: the vehicle is armed and stays on the ground, or touches it while landing.
     pub idle_on_ground: bool,
-    /// A request to the flight core, repeated until it is granted.
+    /// Request to the flight core, repeated until granted.
     pub request: Option<Request>,
-    /// Ticket and answer of the first of [`Orders::given`].
+    /// Ticket of the oldest order in [`Orders::given`], and the answer to it.
     pub answer: Option<(u8, Result<(), OrderRefusal>)>,
     /// Flight mode.
     pub mode: FlightMode,
-    /// Announcements of this tick.
+    /// Announcements.
     pub notices: Notices,
-    /// Number of the mission's item that is wanted in [`Orders::leg`]: until it is done, also while the mode flies that
-    /// ends it.
+    /// Number of the mission item that [`Orders::leg`] must contain. After an item that ends the mission with another
+    /// mode, its number stays here until that mode has landed.
     pub wanted: u16,
-    /// Number of an item that is done in this tick.
+    /// Number of the mission item completed in this tick.
     pub reached: Option<u16>,
-    /// Home \[m\].
+    /// Home position \[m\].
     pub home_m: Option<Vector3<f32>>,
-    /// What made the safety net act; none once a pilot or a station has selected another mode.
+    /// Failsafe cause that selected the present mode; none once a pilot or a station has selected another mode.
     pub failsafe: Option<Cause>,
-    /// What the guidance has against arming, as it was while the vehicle was disarmed.
+    /// Reasons of the guidance against arming, as of the last disarmed tick.
     pub against: Reasons,
     /// Charge of the battery, 0 to 1.
     pub charge: Option<f32>,
-    /// True while it flies a circle that was ordered.
+    /// True while flying an ordered orbit.
     pub orbits: bool,
 }
 
@@ -89,7 +89,7 @@ pub struct Guidance {
     memory: Memory,
 }
 
-/// What changes from tick to tick.
+/// Memory of the guidance between ticks.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Memory {
     limiter: Limiter,
@@ -98,43 +98,44 @@ struct Memory {
     mission: Mission,
     watch: Watch,
     home_m: Option<Vector3<f32>>,
-    /// True if home was ordered, and arming does not change it.
+    /// True if home was set by order. Then arming does not change it.
     home_ordered: bool,
-    /// Ordered speed; infinite for none \[m/s\].
+    /// Ordered speed limit; infinite for none \[m/s\].
     speed_m_s: f32,
-    /// Aim of the last tick, which goes on through a gap of the state.
+    /// Target of the last tick, flown on while the state is missing.
     aim: LimiterTarget,
-    /// Correction of attitude and thrust while these are flown.
+    /// Correction of attitude and thrust in modes that command these.
     trim: Trim,
-    /// Rates that the sticks command in mode acro.
+    /// Body rates that the sticks command in mode acro.
     rates: Option<RateTarget>,
     was_armed: bool,
-    /// True if there was a state in the last tick.
+    /// True if the last tick had a state.
     was_seen: bool,
-    /// True if the mode has changed since the last tick.
+    /// True if the mode has just changed, and has not yet been flown.
     enters: bool,
-    /// True if it has been in the air since it was armed.
+    /// True if the vehicle has been in the air since it was armed.
     flown: bool,
     failsafe: Option<Cause>,
-    /// What the flight core's descent has interrupted, until it is resumed or another mode is chosen.
+    /// Mode that the flight core's descent interrupted; kept until it resumes or another mode is selected.
     interrupted: Option<Interrupted>,
-    /// Item of the mission that is done once the vehicle has landed.
+    /// Mission item that counts as done once the vehicle has landed.
     lands_item: Option<u16>,
-    /// Time on the ground with the motors idling, waiting to leave the ground, since the last request \[s\].
+    /// Time for which the motors have idled on the ground \[s\].
     ground_s: f32,
-    /// Time for which a landing vehicle has not sunk to its setpoint \[s\].
+    /// Time for which a landing vehicle has been held up above its setpoint, time for which a take-off has not left the
+    /// ground, and time since the last disarm request \[s\].
     touch_s: f32,
     lift_s: f32,
     request_s: f32,
-    /// Where it stood, and true if it has left that place since \[m\].
+    /// Place where the vehicle last stood on the ground \[m\], and whether it has left that place since.
     stood_m: Vector3<f32>,
     left: bool,
-    /// True if it has announced that it stops the motors.
+    /// True once the disarming on the ground has been announced.
     disarms: bool,
     against: Reasons,
 }
 
-/// A mode as it was flown.
+/// State of an interrupted mode, to be resumed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Interrupted {
     mode: FlightMode,
@@ -144,10 +145,10 @@ struct Interrupted {
     speed_m_s: f32,
 }
 
-/// What a mode remembers.
+/// Memory of the present mode.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Plan {
-    /// Not begun.
+    /// Not started yet.
     New,
     Hold(Hold),
     Orbit(Orbit),
@@ -158,7 +159,7 @@ enum Plan {
 }
 
 impl Guidance {
-    /// Makes the guidance of a vehicle that is disarmed.
+    /// Makes the guidance of a disarmed vehicle.
     ///
     /// # Errors
     /// The first parameter out of range.
@@ -195,10 +196,10 @@ impl Guidance {
         Ok(Guidance { settings, memory })
     }
 
-    /// Changes the parameters; those of the limiter apply from the next tick on.
+    /// Changes the parameters. The limiter's parameters apply from the next tick.
     ///
     /// # Errors
-    /// The first parameter out of range; then nothing changes.
+    /// The first parameter out of range; nothing has changed then.
     pub fn set(&mut self, settings: Settings) -> Result<(), OutOfRange> {
         settings.validate()?;
         self.memory.limiter.set(settings.limits);
@@ -211,7 +212,7 @@ impl Guidance {
         &self.settings
     }
 
-    /// Returns the rates that the flight core flies in place of the setpoint, in mode acro.
+    /// Returns the body rates that the flight core flies instead of the setpoint, in mode acro.
     pub fn rates(&self) -> Option<&RateTarget> {
         self.memory.rates.as_ref()
     }
@@ -221,7 +222,7 @@ impl Guidance {
         self.memory.mode
     }
 
-    /// Runs one tick, to be called every millisecond. Cannot fail.
+    /// Runs one tick. Call it every millisecond. Cannot fail.
     #[must_use = "the vehicle flies by it"]
     #[inline]
     pub fn tick(&mut self, given: &GuidanceInputs<'_>, orders: &Orders) -> Guided {
@@ -232,7 +233,7 @@ impl Guidance {
 impl Memory {
     #[inline]
     fn tick(&mut self, settings: &Settings, given: &GuidanceInputs<'_>, orders: &Orders) -> Guided {
-        // False of NaN.
+        // The comparison is false for NaN.
         let dt_s = if given.dt_s > 0.0 { min(max(given.dt_s, 1e-4), 0.02) } else { 0.001 };
         let state = given.state.filter(|state| state.is_plausible());
         let armed = given.core.armed();
@@ -242,14 +243,14 @@ impl Memory {
         if let Some(reset) = given.reset.filter(|_| self.was_seen) {
             self.shift(reset, settings.flying.within_m);
         }
-        // Before `decide`, which forgets that the vehicle was still disarmed in the last tick.
+        // Must precede `decide`, which updates `was_armed`.
         self.find_home(state, given.rested, armed);
-        // Before orders, which may choose an item of another mission.
+        // Must precede the orders, which may select an item of the new mission.
         if orders.leg.is_some_and(|leg| self.mission.begins_anew(leg.upload)) {
             self.lands_item = None;
         }
 
-        // Watches.
+        // Failsafe checks.
         let target = fresh_target(orders, given.now_us, settings.flying.targets_lost_s);
         let sticks = fresh_sticks(orders, given.now_us, settings.flying.sticks_lost_s);
         let findings = Findings {
@@ -260,7 +261,7 @@ impl Memory {
             home_m: self.home_m,
             battery: given.battery.as_ref(),
             sensors: given.sensors,
-            // What does not fit 32 bits, 71 minutes, is beyond any COM_DL_LOSS_T.
+            // Saturates at 71 minutes in 32 bits, longer than any COM_DL_LOSS_T.
             silent_us: orders
                 .heard_us
                 .map(|heard_us| u32::try_from(given.now_us.saturating_sub(heard_us)).unwrap_or(u32::MAX)),
@@ -274,7 +275,7 @@ impl Memory {
             armed,
             airborne,
             positioned: state.is_some(),
-            // With a state that has come back, orders count again.
+            // Once the state is back, orders count again, even while the flight core still descends.
             descends: findings.descends && state.is_none(),
             mission: orders.leg.is_some_and(|leg| !matches!(leg.item, Item::None)),
             targets: target.is_some(),
@@ -283,7 +284,7 @@ impl Memory {
         };
 
         // Decides the mode.
-        // Once per approach: otherwise each tick until it stands would begin the mode anew.
+        // Only when the cause is new: otherwise each tick until the vehicle stops would restart the mode.
         let leaves = findings.fence.leaves && net::is_new(new, Cause::Fence);
         let back = state.is_some() && !findings.descends;
         self.decide(settings, &seen, cause, new, [leaves, back], &mut notices);
@@ -304,7 +305,7 @@ impl Memory {
                 None
             }
         };
-        // Without a state the flight core decides alone in the air, and on the ground the motors idle.
+        // Without a state, the flight core alone decides in the air, and the motors idle on the ground.
         let (setpoint, idle_on_ground) = flight.unwrap_or((None, armed && !airborne));
         if !armed {
             self.against = self.against(settings, given, state, findings.fence.outside);
@@ -327,9 +328,9 @@ impl Memory {
         }
     }
 
-    /// Changes the mode, if the safety net or the end of a flight asks for it, and announces the causes in the set
-    /// `new`; `leaves` is true if the vehicle begins to leave the uploaded geofence, and `back` if it knows where it is
-    /// and the flight core does not descend.
+    /// Changes the mode if a failsafe or the end of a flight requires it, and announces the causes in the set `new`.
+    /// `leaves`: the vehicle has just begun to leave the uploaded geofence. `back`: the position is known, and the
+    /// flight core does not descend.
     #[inline]
     fn decide(
         &mut self,
@@ -364,8 +365,8 @@ impl Memory {
         }
     }
 
-    /// Home is where the vehicle has first been at rest for as long as arming wants it, since stations arm as soon as
-    /// there is a home; and where it is armed.
+    /// Sets home when the vehicle has first been at rest long enough to arm, since stations arm as soon as there is a
+    /// home. Sets it again at arming, unless home was ordered.
     fn find_home(&mut self, state: Option<&State>, rested: bool, armed: bool) {
         let Some(state) = state else { return };
         if self.home_m.is_none() && rested || armed && !self.was_armed && !self.home_ordered {
@@ -373,9 +374,9 @@ impl Memory {
         }
     }
 
-    /// Shifts with the vehicle's state, which has been set anew, what is meant from where the vehicle is: the setpoint,
-    /// a place that it holds or stops at, the end of a take-off. A place that was ordered, or is an item of a mission,
-    /// stays where it is, and is flown to; one that has been reached is held.
+    /// Shifts everything relative to the vehicle by an estimator reset: the setpoint, the place of a hold or stop, the
+    /// end of a take-off. Ordered places and mission items do not move, and are flown to; one already reached moves
+    /// along and is held.
     #[cold]
     #[inline(never)]
     fn shift(&mut self, reset: &ResetDelta, within_m: f32) {
@@ -392,18 +393,18 @@ impl Memory {
         }
     }
 
-    /// Counts the times.
+    /// Updates the `flown` flag and the time since the last disarm request.
     fn time(&mut self, airborne: bool, dt_s: f32) {
         self.flown |= airborne;
         self.request_s = min(self.request_s + dt_s, REQUEST_S);
     }
 
-    /// Begins on the ground again.
+    /// Resets the flight's memory after disarming.
     fn disarmed(&mut self, notices: &mut Notices) {
         (self.flown, self.failsafe, self.speed_m_s) = (false, None, f32::INFINITY);
         (self.ground_s, self.lift_s) = (0.0, 0.0);
         self.mission.resume(0);
-        // Nothing is armed in mode land or return. A mode that sticks fly stays as it was selected.
+        // A vehicle cannot be armed in mode land or return, so hold replaces them. Manual modes stay selected.
         if !self.mode.is_manual() && self.mode != FlightMode::Hold {
             self.change(FlightMode::Hold, ModeReason::Disarmed, notices);
         }
@@ -420,7 +421,7 @@ impl Memory {
         (self.lands_item, self.interrupted) = (None, None);
     }
 
-    /// Goes on with what an outage of the state has interrupted, at the vehicle's present place.
+    /// Resumes the mode that a loss of the state interrupted, from the vehicle's present place.
     #[cold]
     #[inline(never)]
     fn resume(&mut self, flown: &Interrupted, notices: &mut Notices) {
@@ -429,8 +430,8 @@ impl Memory {
         (self.lands_item, self.speed_m_s) = (flown.lands_item, flown.speed_m_s);
     }
 
-    /// Stops a vehicle that is about to leave the uploaded fence, in a mode that is strong enough not to be replaced:
-    /// in hold it flies no further to where it was ordered, and a return across the fence lands.
+    /// Stops a vehicle about to cross the uploaded geofence in a mode that the failsafe action does not replace: a
+    /// flight in hold stops, and a return lands.
     fn stop_at_fence(&mut self, action: FailsafeAction, notices: &mut Notices) {
         if action < FailsafeAction::Hold {
             return;
@@ -444,7 +445,7 @@ impl Memory {
         self.failsafe = Some(Cause::Fence);
     }
 
-    /// Returns the request that stops the motors of a vehicle on the ground.
+    /// Returns a disarm request for a vehicle on the ground, if it shall disarm.
     #[allow(clippy::too_many_arguments, reason = "parts of the tick")]
     fn disarms(
         &mut self,
@@ -483,7 +484,7 @@ impl Memory {
         Some(Request::Disarm)
     }
 
-    /// Returns what speaks against arming that the flight core does not see itself.
+    /// Returns the reasons against arming that only the guidance knows.
     fn against(
         &self,
         settings: &Settings,
@@ -502,14 +503,14 @@ impl Memory {
     }
 }
 
-/// Returns the newest target, if it is plausible and no older than this.
+/// Returns the newest target, if plausible and not older than `lost_s`.
 #[inline]
 fn fresh_target(orders: &Orders, now_us: u64, lost_s: f32) -> Option<&Stamped<OffboardTarget>> {
     let target = orders.target.as_ref().filter(|target| is_fresh(target, now_us, lost_s))?;
     targets::is_plausible(&target.value).then_some(target)
 }
 
-/// Returns the newest position of the sticks, if it is plausible and no older than this.
+/// Returns the newest sticks, if plausible and not older than `lost_s`.
 #[inline]
 fn fresh_sticks(orders: &Orders, now_us: u64, lost_s: f32) -> Option<Sticks> {
     let sticks = orders.sticks.filter(|sticks| is_fresh(sticks, now_us, lost_s))?;

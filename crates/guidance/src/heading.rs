@@ -1,30 +1,29 @@
-//! Motion of the heading, within rate and acceleration.
+//! Smooth motion of the heading (yaw) to its target, with limits of rate and acceleration.
 
 use afbc_control::math::{max, min, sqrt, wrap_angle};
 
-/// Rate of decay of a small error \[1/s\].
+/// Decay rate of a small heading error \[1/s\].
 const APPROACH_1_S: f32 = 2.0;
-/// Rate of decay of a small error of the rate \[1/s\].
+/// Decay rate of a small error of the yaw rate \[1/s\].
 const SETTLE_1_S: f32 = 8.0;
-/// Share of the largest acceleration with which it brakes.
+/// Share of the largest acceleration used for braking.
 const BRAKING: f32 = 0.7;
-/// Share of the largest rate that is aimed at.
+/// Share of the rate limit that the heading aims at.
 const AIM: f32 = 0.99;
-/// Errors of angle, and of its rate, at which a heading counts as reached and is the wanted one to the bit
-/// \[rad, rad/s\].
+/// Errors of heading and rate below which the target counts as reached, and is then copied exactly \[rad, rad/s\].
 const REACHED_RAD: f32 = 1e-3;
 const REACHED_RAD_S: f32 = 5e-3;
 
-/// What the heading tends to.
+/// Target of the heading.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Turn {
-    /// A heading, which turns at a rate \[rad, rad/s\].
+    /// Heading that itself turns at a rate \[rad, rad/s\].
     To(f32, f32),
-    /// A rate \[rad/s\].
+    /// Yaw rate without a heading \[rad/s\].
     By(f32),
 }
 
-/// Heading and two derivatives.
+/// Heading with its first two derivatives.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Heading {
     pub(crate) yaw_rad: f32,
@@ -32,7 +31,7 @@ pub(crate) struct Heading {
     pub(crate) acceleration_rad_s2: f32,
 }
 
-/// Limits.
+/// Limits of yaw rate and acceleration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Turning {
     pub(crate) rate_rad_s: f32,
@@ -40,12 +39,12 @@ pub(crate) struct Turning {
 }
 
 impl Heading {
-    /// A heading at rest.
+    /// Makes a heading at rest.
     pub(crate) fn new(yaw_rad: f32) -> Self {
         Heading { yaw_rad, rate_rad_s: 0.0, acceleration_rad_s2: 0.0 }
     }
 
-    /// Advances it by a step.
+    /// Advances the heading by one step.
     pub(crate) fn advance(&mut self, turn: &Turn, limits: &Turning, dt_s: f32) {
         let most = AIM * limits.rate_rad_s;
         let bounded = |value: f32, most: f32| max(min(value, most), -most);
@@ -54,7 +53,7 @@ impl Heading {
             Turn::To(yaw, rate) => {
                 let error = wrap_angle(yaw - self.yaw_rad);
                 let off = rate - self.rate_rad_s;
-                // The remaining step is smaller than what the law sees.
+                // The remaining step is too small to matter to the law.
                 let near = error.abs() <= REACHED_RAD + off.abs() * dt_s && off.abs() <= REACHED_RAD_S;
                 if near && rate.abs() <= limits.rate_rad_s {
                     *self = Heading { yaw_rad: yaw, rate_rad_s: rate, acceleration_rad_s2: 0.0 };

@@ -1,4 +1,4 @@
-//! Guidance: what the vehicle shall do next, as a setpoint for the law.
+//! Guidance: turns flight modes, orders, targets and sticks into a setpoint for the control law.
 //!
 //! A station, a companion computer or a pilot selects a [flight mode](FlightMode) and gives [orders](Order), targets
 //! and sticks. Frames and units are those of [`afbc_types`]. Every mode, transition and failsafe is described in
@@ -7,9 +7,9 @@
 //! # Reading order
 //!
 //! 1. [`guidance`]: the tick.
-//! 2. [`mode`], [`order`]: what may be asked for; [`table`]: the transitions between modes.
-//! 3. [`limiter`]: how any target becomes a smooth flight.
-//! 4. [`net`], [`fence`], [`battery`], [`notice`]: what is watched and announced.
+//! 2. [`mode`], [`order`]: flight modes and orders; [`table`]: the transitions between modes.
+//! 3. [`limiter`]: turns any target into a smooth flight.
+//! 4. [`net`], [`fence`], [`battery`], [`notice`]: failsafe checks and announcements.
 //! 5. [`settings`]: the parameters.
 #![no_std]
 

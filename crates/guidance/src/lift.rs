@@ -1,32 +1,33 @@
-//! Attitude and thrust as a setpoint: position and velocity are the vehicle's own, and the acceleration is what this
-//! attitude and thrust cause,
+//! Attitude and thrust targets as a setpoint. Position and velocity are the vehicle's own, and the acceleration is the
+//! one that this attitude and thrust cause:
 //!
 //! ```text
 //! a = R e3 T/m - g e3
 //! ```
 //!
-//! so that a law needs no input besides the setpoint. The law adds what it has learnt, of wind for instance; a `Trim`
-//! subtracts that.
+//! Thus a law needs no input besides the setpoint. The law adds its learnt disturbances, such as wind; a `Trim`
+//! subtracts them.
 
 use crate::settings::Limits;
 use afbc_control::math::{cos, max, min, sin, sqrt};
 use afbc_types::{Setpoint, State};
 use nalgebra::{Vector2, Vector3};
 
-/// Time in which the climb or sink rate reaches its limit, at most \[s\].
+/// Time constant of the fastest approach to the limit of climb or sink rate \[s\].
 const LIMIT_S: f32 = 0.25;
-/// Smallest vertical thrust, in weights, by which a tilt is computed.
+/// Smallest vertical thrust used for computing a tilt, as a share of the weight.
 const VERTICAL_MIN: f32 = 0.2;
-/// Time constants with which tilts follow the law's, and with which tilt and thrust are corrected \[s\].
+/// Time constants \[s\]: of the expected tilt, which models the law's response, and of the corrections of tilt and
+/// thrust.
 const FOLLOWS_S: f32 = 0.1;
 const TILT_S: f32 = 0.3;
 const THRUST_S: f32 = 0.2;
-/// Share of the largest thrust from which on nearly all is given.
+/// Share of the largest thrust above which the thrust counts as exhausted.
 const EXHAUSTED_SHARE: f32 = 0.9;
-/// Largest correction, horizontally and vertically \[m/s2\].
+/// Largest correction, horizontal and vertical \[m/s2\].
 const TRIM_M_S2: f32 = 5.0;
 
-/// What the rotors give.
+/// Thrust that the rotors can give and have given.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lift {
     /// Largest thrust of all rotors, divided by the mass \[m/s2\].
@@ -38,15 +39,14 @@ pub struct Lift {
 }
 
 impl Lift {
-    /// True if the rotors give nearly all that they can.
+    /// True if the rotors give nearly their largest thrust.
     pub(crate) fn is_exhausted(&self) -> bool {
         self.given_m_s2.is_some_and(|given_m_s2| given_m_s2 > EXHAUSTED_SHARE * self.most_m_s2)
     }
 
-    /// Returns the setpoint of a vehicle in `state` whose thrust along the unit vector `up` accelerates it by
-    /// `thrust_m_s2`.
+    /// Returns the setpoint of a vehicle in `state` with the thrust per mass `thrust_m_s2` along the unit vector `up`.
     pub(crate) fn setpoint(&self, state: &State, up: Vector3<f32>, thrust_m_s2: f32) -> Setpoint {
-        // `clamp` panics if its ends are the wrong way round.
+        // `clamp` panics if its lower end exceeds its upper end.
         let thrust_m_s2 = thrust_m_s2.clamp(0.0, self.most_m_s2.max(0.0));
         let acceleration_m_s2 = up * thrust_m_s2 - Vector3::new(0.0, 0.0, self.gravity_m_s2);
         Setpoint {
@@ -57,7 +57,8 @@ impl Lift {
         }
     }
 
-    /// Returns a setpoint of attitude and thrust, the latter changed so that climb and sink rate stay within `limits`.
+    /// Returns a setpoint of attitude and thrust, with the thrust changed so that climb and sink rate stay within
+    /// `limits`.
     pub(crate) fn limited(&self, setpoint: &Setpoint, state: &State, limits: &Limits) -> Setpoint {
         let [[x, y, z]] = setpoint.acceleration_m_s2.data.0;
         let climb_m_s = state.velocity_m_s.z;
@@ -68,23 +69,23 @@ impl Lift {
         }
         let (was_m_s2, is_m_s2) = (z + self.gravity_m_s2, max(within_m_s2 + self.gravity_m_s2, 0.0));
         let share = is_m_s2 / max(was_m_s2, VERTICAL_MIN * self.gravity_m_s2);
-        // Less thrust keeps the tilt; more must not push the vehicle sideways by more than was asked for.
+        // Less thrust keeps the tilt. More thrust must not increase the horizontal acceleration beyond the target's.
         let lean_m_s2 = Vector2::new(x, y) * min(share, 1.0);
         let acceleration_m_s2 = Vector3::new(lean_m_s2.x, lean_m_s2.y, is_m_s2 - self.gravity_m_s2);
         Setpoint { acceleration_m_s2, ..*setpoint }
     }
 }
 
-/// Correction of an acceleration by which attitude and thrust become those that were asked for.
+/// Correction of the acceleration that makes the flown attitude and thrust match the target.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Trim {
-    /// Tilt that the vehicle should have by now, as tangents; none at the beginning.
+    /// Tilt that the vehicle should have by now, as tangents; none at first.
     expected: Option<Vector2<f32>>,
     correction_m_s2: Vector3<f32>,
 }
 
 impl Trim {
-    /// Advances by one step, and returns `setpoint` with the correction.
+    /// Advances by one step, and returns `setpoint` with the correction added.
     pub(crate) fn advance(&mut self, lift: &Lift, state: &State, setpoint: &Setpoint, dt_s: f32) -> Setpoint {
         let thrust_m_s2 = setpoint.acceleration_m_s2 + Vector3::new(0.0, 0.0, lift.gravity_m_s2);
         let vertical_m_s2 = max(thrust_m_s2.z, VERTICAL_MIN * lift.gravity_m_s2);
@@ -104,7 +105,7 @@ impl Trim {
     }
 }
 
-/// Returns the tangents of the tilt along x and y of the earth frame.
+/// Returns the tangents of the tilt along earth x and y.
 fn tilt(attitude_rad: &Vector3<f32>) -> Vector2<f32> {
     let [[roll, pitch, yaw]] = attitude_rad.data.0;
     let (forward, left) = (sin(pitch) * cos(roll), -sin(roll));

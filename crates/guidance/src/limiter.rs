@@ -1,8 +1,8 @@
-//! Trajectory limiter: makes a smooth flight of any target, within limits of speed, acceleration and jerk.
+//! Trajectory limiter: turns any target into a smooth flight within limits of speed, acceleration and jerk.
 //!
-//! Targets that are a flight themselves, whose position, velocity and acceleration fit one another and the limits, pass
-//! unchanged to the bit, once the limiter has caught up. Between two messages of such a stream it goes on with their
-//! velocity, acceleration, and the jerk between the last two.
+//! A stream of targets passes through unchanged, to the bit, if it is itself a flight: its position, velocity and
+//! acceleration fit one another and the limits, and the limiter has caught up with it. Between two messages of such a
+//! stream, the limiter extrapolates with the velocity, the acceleration, and the jerk between the last two messages.
 
 use crate::heading::{Heading, Turn, Turning};
 use crate::settings::Limits;
@@ -11,36 +11,38 @@ use afbc_control::math::{max, min, sqrt, wrap_angle};
 use afbc_types::{Declared, OutOfRange, ResetDelta, Setpoint, State};
 use nalgebra::{Vector1, Vector2, Vector3};
 
-/// Time constant over which a passing stream's misfits add up \[s\].
+/// Time constant with which the accumulated misfits of a passing stream decay \[s\]. A misfit is the difference between
+/// a target and the present motion extrapolated to the target's time.
 const MISFIT_S: f32 = 0.5;
-/// Misfits up to which it passes: of the position \[m\], also as a time at its speed \[s\], and of the velocity
-/// \[m/s\].
+/// Largest accumulated misfits of a passing stream: of position, as a distance \[m\] plus a time at the stream's speed
+/// \[s\], and of velocity \[m/s\].
 const MISFIT_M: f32 = 0.03;
 const MISFIT_TIME_S: f32 = 0.02;
 const MISFIT_M_S: f32 = 0.15;
-/// Difference of the acceleration that is not a matter of jerk \[m/s2\].
+/// Largest difference of acceleration that need not be explained by jerk \[m/s2\].
 const MISFIT_M_S2: f32 = 0.1;
-/// Distance and speed at which a moving stream is caught up with \[m, m/s\], also as a time at its speed and
-/// acceleration \[s\].
+/// Errors at which the limiter has caught up with a moving target: position \[m\] and velocity \[m/s\], plus a time at
+/// the target's speed and acceleration \[s\].
 const CAUGHT_M: f32 = 5e-3;
 const CAUGHT_M_S: f32 = 0.02;
 const CAUGHT_TIME_S: f32 = 2e-3;
-/// Likewise, acceleration \[m/s2\], for a target at rest.
+/// Errors at which the limiter has caught up with a target at rest: position \[m\], velocity \[m/s\], acceleration
+/// \[m/s2\].
 const STANDS_M: f32 = 1e-4;
 const STANDS_M_S: f32 = 1e-3;
 const STANDS_M_S2: f32 = 0.01;
-/// Longest time between two messages of one stream \[s\].
+/// Longest time between two messages of the same stream \[s\].
 const INTERVAL_MAX_S: f32 = 0.5;
 
-/// A target; NaN where nothing is given. Without position and velocity the acceleration counts; with nothing at all it
-/// stops.
+/// A target; NaN where nothing is given. The acceleration alone counts if neither position nor velocity is given. If
+/// nothing is given, the vehicle stops.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LimiterTarget {
     /// Position \[m\].
     pub position_m: Vector3<f32>,
-    /// Velocity, with a position that of the target \[m/s\].
+    /// Velocity to fly at or, if a position is given, the velocity at which that position moves \[m/s\].
     pub velocity_m_s: Vector3<f32>,
-    /// Acceleration, likewise \[m/s2\].
+    /// Acceleration, of the moving position if one is given \[m/s2\].
     pub acceleration_m_s2: Vector3<f32>,
     /// Heading \[rad\].
     pub yaw_rad: f32,
@@ -48,16 +50,16 @@ pub struct LimiterTarget {
     pub yaw_rate_rad_s: f32,
     /// Largest horizontal speed of approach \[m/s\].
     pub speed_m_s: f32,
-    /// Likewise upwards and downwards \[m/s\].
+    /// Largest speed of approach upwards \[m/s\].
     pub up_m_s: f32,
-    /// See [`up_m_s`](Self::up_m_s).
+    /// Largest speed of approach downwards \[m/s\].
     pub down_m_s: f32,
-    /// Time of the message, if it is one of a stream \[us\].
+    /// Time of the message \[us\], if the target is one of a stream.
     pub sent_us: Option<u64>,
 }
 
 impl LimiterTarget {
-    /// A target without anything given: stop.
+    /// Makes a target with nothing given: the vehicle stops.
     pub fn stop(speed_m_s: f32, up_m_s: f32, down_m_s: f32) -> Self {
         let none = Vector3::repeat(f32::NAN);
         LimiterTarget {
@@ -74,7 +76,7 @@ impl LimiterTarget {
     }
 }
 
-/// The limiter, and what it has made so far.
+/// The limiter with its present motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limiter {
     limits: Limits,
@@ -84,13 +86,13 @@ pub struct Limiter {
     stream: Option<Stream>,
 }
 
-/// The limited motion.
+/// Present limited motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Now {
     horizontal: Motion<2>,
     vertical: Motion<1>,
     heading: Heading,
-    /// Sums of the misfits of a stream that passes; none if none does.
+    /// Accumulated misfits of a passing stream; none while no stream passes.
     misfit: Option<Misfit>,
 }
 
@@ -100,7 +102,7 @@ struct Misfit {
     velocity_m_s: Vector3<f32>,
 }
 
-/// A target with all its parts.
+/// A target whose position, velocity and acceleration are all known.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Complete {
     position_m: Vector3<f32>,
@@ -108,24 +110,24 @@ struct Complete {
     acceleration_m_s2: Vector3<f32>,
 }
 
-/// A stream of targets.
+/// A stream of target messages.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Stream {
     sent_us: u64,
-    /// The newest, and where it has got to since.
+    /// Newest message, and the target extrapolated from it to the present.
     last: Complete,
     present: Complete,
-    /// Time since the newest, and between it and the one before \[s\].
+    /// Time since the newest message, and between the last two messages \[s\].
     since_s: f32,
     interval_s: f32,
-    /// Jerk between these two.
+    /// Jerk between the last two messages \[m/s3\].
     jerk_m_s3: Vector3<f32>,
-    /// True if position and velocity of the last two fit each other.
+    /// True if the last two messages fit each other in position and velocity.
     fits: bool,
 }
 
 impl Limiter {
-    /// Makes it for these limits.
+    /// Makes a limiter with these limits.
     ///
     /// # Errors
     /// The first limit out of range.
@@ -144,12 +146,12 @@ impl Limiter {
         }
     }
 
-    /// Changes the limits, which must be valid; the motion goes on.
+    /// Changes the limits, which must be valid. The present motion continues.
     pub(crate) fn set(&mut self, limits: Limits) {
         *self = Limiter { now: self.now, stream: self.stream, ..Limiter::of(limits) };
     }
 
-    /// Begins at the vehicle's state, with its velocity as far as the limits allow.
+    /// Restarts at the vehicle's position with its velocity, capped to the limits.
     pub fn anchor(&mut self, state: &State) {
         let (position, velocity) = (state.position_m, state.velocity_m_s);
         let Limits { speed_m_s, up_m_s, down_m_s, .. } = self.limits;
@@ -163,12 +165,12 @@ impl Limiter {
         self.stream = None;
     }
 
-    /// Begins at the vehicle's state at rest.
+    /// Restarts at the vehicle's position, at rest.
     pub fn rest(&mut self, state: &State) {
         self.anchor(&State { velocity_m_s: Vector3::zeros(), ..*state });
     }
 
-    /// Shifts the motion with an estimate that has been set anew.
+    /// Shifts the motion by an estimator reset.
     pub(crate) fn shift(&mut self, reset: &ResetDelta) {
         if let Some(now) = &mut self.now {
             now.horizontal.position += reset.position_m.xy();
@@ -177,7 +179,8 @@ impl Limiter {
         }
     }
 
-    /// Keeps the horizontal motion and the heading with the vehicle, which flies these without a setpoint.
+    /// Sets the horizontal motion to the vehicle's own, for modes that fly it without the limiter. The heading
+    /// continues.
     pub fn follow(&mut self, state: &State) {
         let capped_m_s = capped(state.velocity_m_s.xy(), self.limits.speed_m_s);
         if let Some(now) = &mut self.now {
@@ -185,7 +188,7 @@ impl Limiter {
         }
     }
 
-    /// Returns the present setpoint; none before the first [`anchor`](Self::anchor).
+    /// Returns the present setpoint; `None` before the first [`anchor`](Self::anchor).
     pub fn setpoint(&self) -> Option<Setpoint> {
         let Now { horizontal: h, vertical: v, heading, .. } = self.now.as_ref()?;
         let joined = |h: Vector2<f32>, v: Vector1<f32>| Vector3::new(h.x, h.y, v.x);
@@ -201,12 +204,12 @@ impl Limiter {
         })
     }
 
-    /// True while the targets pass unchanged.
+    /// True while the targets pass through unchanged.
     pub fn passes(&self) -> bool {
         self.now.as_ref().is_some_and(|now| now.misfit.is_some())
     }
 
-    /// Advances by one step towards `aim`, whose given values are plausible; nothing before the first
+    /// Advances by one step towards `aim`, whose given values must be plausible. Does nothing before the first
     /// [`anchor`](Self::anchor).
     pub fn advance(&mut self, aim: &LimiterTarget, dt_s: f32) {
         let complete = complete(aim);
@@ -236,7 +239,7 @@ impl Limiter {
         };
         let Limits { yaw_rate_rad_s, yaw_acceleration_rad_s2, .. } = *limits;
         let turning = Turning { rate_rad_s: yaw_rate_rad_s, acceleration_rad_s2: yaw_acceleration_rad_s2 };
-        // Before a stream may pass: the heading keeps to its own limits then, too.
+        // Must come before a stream may pass: the heading is limited then, too.
         now.heading.advance(&turn, &turning, dt_s);
         if let Some(target) = &target
             && now.pass(target, jerk_m_s3, limits, interval_s, dt_s)
@@ -244,7 +247,7 @@ impl Limiter {
             return;
         }
         let (p, v, a) = match target {
-            // An acceleration that does not belong to a flight would only drive it away.
+            // An acceleration that fits no flight would only drive the vehicle away from the target.
             Some(target) if !fits => (target.position_m, target.velocity_m_s, Vector3::zeros()),
             Some(target) => (target.position_m, target.velocity_m_s, target.acceleration_m_s2),
             None => (aim.position_m, aim.velocity_m_s, aim.acceleration_m_s2),
@@ -270,7 +273,8 @@ impl Limiter {
     }
 }
 
-/// Returns a target that has a position, with zeros for what is not given of the rest.
+/// Returns the target with missing velocities and accelerations set to zero; `None` if a part of the position is
+/// missing.
 fn complete(aim: &LimiterTarget) -> Option<Complete> {
     let or_zero = |vector: Vector3<f32>| vector.map(|value| if value.is_nan() { 0.0 } else { value });
     let LimiterTarget { position_m, velocity_m_s, acceleration_m_s2, .. } = *aim;
@@ -282,7 +286,7 @@ fn complete(aim: &LimiterTarget) -> Option<Complete> {
     })
 }
 
-/// Returns the goal of one or two coordinates, any of which may be NaN.
+/// Returns the goal of one or two coordinates. A vector with any NaN counts as not given.
 fn goal<const D: usize>(
     position: nalgebra::SVector<f32, D>,
     velocity: nalgebra::SVector<f32, D>,
@@ -313,7 +317,7 @@ impl Complete {
 }
 
 impl Stream {
-    /// Begins a stream with this message.
+    /// Starts a stream with this message.
     fn new(target: &Complete, sent_us: u64) -> Self {
         Stream {
             sent_us,
@@ -326,9 +330,9 @@ impl Stream {
         }
     }
 
-    /// Advances the stream by one step, with a message if `sent_us` is news.
+    /// Advances the stream by one step. The target is a new message if `sent_us` has changed.
     fn advance(&mut self, target: &Complete, sent_us: u64, dt_s: f32, jerk_max_m_s3: f32) {
-        // Counted in ticks: `sent_us` only tells messages apart, and is no time where a circle numbers its aims.
+        // Counts ticks, because `sent_us` only tells messages apart: an orbit sends a running number in it.
         self.since_s += dt_s;
         if self.sent_us == sent_us {
             if self.fits {
@@ -336,7 +340,7 @@ impl Stream {
             }
             return;
         }
-        // Above zero, by which a change of the acceleration is divided: this tick at least has passed.
+        // Positive, since at least this tick has passed: safe to divide by.
         let interval_s = self.since_s;
         if interval_s > INTERVAL_MAX_S {
             *self = Stream::new(target, sent_us);
@@ -359,7 +363,7 @@ impl Stream {
 }
 
 impl Now {
-    /// True if `target` passes unchanged: then it is the present motion.
+    /// True if `target` passes unchanged. Then the present motion is set to it.
     fn pass(
         &mut self,
         target: &Complete,
@@ -379,7 +383,8 @@ impl Now {
         let off_m_s = target.velocity_m_s - velocity_m_s - acceleration_m_s2 * dt_s;
         let off_m_s2 = target.acceleration_m_s2 - acceleration_m_s2;
         let within = |vector: &Vector3<f32>, most: f32| vector.norm_squared() <= most * most;
-        // What the largest jerk makes of the acceleration from one message to the next, and some room, is no misfit.
+        // A change of acceleration that the largest jerk can cause between two messages, with a reserve of 25 %, is no
+        // misfit.
         let jerk_m_s2 = 1.25 * limits.jerk_max_m_s3 * max(interval_s, dt_s);
         let stands = target.velocity_m_s == Vector3::zeros() && target.acceleration_m_s2 == Vector3::zeros();
         let misfit = match self.misfit {
@@ -417,7 +422,7 @@ impl Now {
     }
 }
 
-/// True if speed and acceleration of a target are within the limits.
+/// True if the target's speed and acceleration are within the limits.
 fn allowed(target: &Complete, limits: &Limits) -> bool {
     let Complete { velocity_m_s: v, acceleration_m_s2: a, .. } = target;
     let within = |vector: Vector2<f32>, most: f32| vector.norm_squared() <= most * most;

@@ -1,4 +1,4 @@
-//! Execution of a mission, item by item. The items themselves are the link's: the guidance names the one that it wants.
+//! Flies a mission, item by item. The communication code holds the items: the guidance requests each by its number.
 
 use crate::course::{Hold, Takeoff};
 use crate::limiter::LimiterTarget;
@@ -13,40 +13,40 @@ use afbc_types::ResetDelta;
 use core::f32::consts::{PI, TAU};
 use nalgebra::{Vector2, Vector3};
 
-/// Speed of the setpoint at which it has stopped at a waypoint \[m/s\].
+/// Speed of the setpoint below which it counts as stopped at a waypoint \[m/s\].
 const STOPPED_M_S: f32 = 0.3;
-/// Angle to go \[rad\], and rate \[rad/s\], at which a turn is done.
+/// Remaining angle \[rad\] and rate \[rad/s\] below which a turn is complete.
 const TURNED_RAD: f32 = 0.03;
 const TURNED_RAD_S: f32 = 0.05;
-/// Angle by which the heading is led on \[rad\].
-// Below half a turn, since the heading always takes the shorter way.
+/// Largest angle by which the commanded heading leads the present one \[rad\]. Below half a turn, since the limiter
+/// takes the shorter way.
 const LED_RAD: f32 = 2.0;
 
-/// A mission in progress.
+/// Memory of a mission in progress.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Mission {
-    /// Number of the item that is wanted.
+    /// Number of the requested item.
     pub(crate) wanted: u16,
-    /// The item in progress, by number and upload.
+    /// Item in progress.
     begun: Option<Begun>,
     upload: Option<u16>,
-    /// Speed of the last item that changes it \[m/s\].
+    /// Speed limit set by the last speed item \[m/s\].
     speed_m_s: Option<f32>,
     hold: Hold,
-    /// Where it heads \[m\].
+    /// Region of interest that the vehicle heads for \[m\].
     looks_at_m: Option<Vector2<f32>>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Begun {
     number: u16,
-    /// Heading, or the angle that is left to turn \[rad\].
+    /// Heading at a waypoint, or the remaining angle of a turn \[rad\].
     yaw_rad: f32,
     course: Course,
     stayed_s: f32,
 }
 
-/// How an item in progress is flown.
+/// Course of the item in progress.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Course {
     Straight,
@@ -63,37 +63,37 @@ impl Course {
     }
 }
 
-/// What a mission does in a tick.
+/// Output of a mission in a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Progress {
     pub(crate) output: ModeOutput,
-    /// Number of an item that is done.
+    /// Number of an item completed in this tick.
     pub(crate) reached: Option<u16>,
-    /// Mode that an item ends the mission with; its number counts as done when that mode has landed.
+    /// Mode with which an item ends the mission, and the item's number, which counts as done once that mode has landed.
     pub(crate) then: Option<(FlightMode, u16)>,
-    /// True if the item lies outside the geofence, or makes no sense.
+    /// True if the item lies outside the geofence or is not plausible.
     pub(crate) refused: bool,
 }
 
 impl Mission {
-    /// Goes on with the item `number`.
+    /// Continues with the item `number`.
     pub(crate) fn resume(&mut self, number: u16) {
         (self.wanted, self.begun) = (number, None);
     }
 
-    /// Pauses: the item begins anew when the mode is selected again.
+    /// Pauses the mission. The present item restarts when the mode is selected again.
     pub(crate) fn pause(&mut self) {
         (self.begun, self.hold) = (None, Hold::default());
     }
 
-    /// Shifts a climb straight up with an estimate that has been set anew; places of items stay where they are.
+    /// Shifts a climb in progress by an estimator reset. Places of items do not move.
     pub(crate) fn shift(&mut self, reset: &ResetDelta) {
         if let Some(Begun { course: Course::Takeoff(takeoff), .. }) = &mut self.begun {
             takeoff.shift(reset);
         }
     }
 
-    /// Begins at the first item if this is another mission than before; returns whether it is.
+    /// Restarts at the first item if `upload` is another mission than before. Returns whether it is.
     pub(crate) fn begins_anew(&mut self, upload: u16) -> bool {
         let other = self.upload.is_some_and(|before| before != upload);
         if other {
@@ -103,7 +103,7 @@ impl Mission {
         other
     }
 
-    /// Advances by a tick, inside the cylinder of `net`.
+    /// Advances by a tick. Refuses items outside the cylinder of `net`.
     pub(crate) fn fly(&mut self, leg: Option<&Leg>, inputs: &ModeInputs<'_>, net: &Net) -> Progress {
         if let Some(leg) = leg {
             self.begins_anew(leg.upload);
@@ -112,7 +112,7 @@ impl Mission {
             &ModeInputs { speed_m_s: min(inputs.speed_m_s, self.speed_m_s.unwrap_or(f32::INFINITY)), ..*inputs };
         let none = Progress { output: ModeOutput::fly(inputs.stop()), reached: None, then: None, refused: false };
         let Some(leg) = leg.filter(|leg| leg.number == self.wanted) else {
-            // Until it comes, it stays where it is; a mission that is no more is over.
+            // Stay in place until the requested item arrives. The mission is over if there is none any more.
             let done = leg.is_none();
             return Progress { output: ModeOutput { done, ..ModeOutput::fly(self.hold.fly(inputs)) }, ..none };
         };
@@ -149,7 +149,7 @@ impl Mission {
                 let yaw_rad = if yaw_rad.is_nan() { begun.yaw_rad } else { yaw_rad };
                 let aim = LimiterTarget { yaw_rad, ..inputs.to(position_m) };
                 let within_m = if within_m > 0.0 { within_m } else { inputs.flying.within_m };
-                // Once reached, it stays reached: wind that pushes the vehicle away does not begin the time anew.
+                // The waypoint stays reached: wind that pushes the vehicle away does not restart the time.
                 if begun.stayed_s > 0.0 || inputs.is_at(&position_m, within_m) && (fly_through || is_slow(inputs)) {
                     begun.stayed_s += inputs.dt_s;
                 }
@@ -184,12 +184,12 @@ impl Mission {
                 }
                 progress
             }
-            // Never: a mission that is no more is not flown.
+            // Unreachable: a cleared mission is not flown.
             Item::None => none,
         }
     }
 
-    /// Climbs to a height over home.
+    /// Climbs straight up to a height of the local frame.
     fn take_off(&mut self, leg: &Leg, height_m: f32, inputs: &ModeInputs<'_>, none: Progress) -> Progress {
         let begun = self.begin(leg, inputs, |inputs| climb_to(height_m, inputs));
         let takeoff = begun.course.takeoff();
@@ -198,14 +198,14 @@ impl Mission {
         self.go_on(leg, output, at_m, none)
     }
 
-    /// Flies over a place at the height that it has, and lands; where it is if the place is NaN.
+    /// Flies over the place at the present height, then lands. Lands where the vehicle is if the place is NaN.
     fn land(&mut self, leg: &Leg, position_m: &Vector3<f32>, inputs: &ModeInputs<'_>, none: Progress) -> Progress {
         let lands = Some((FlightMode::Land, leg.number));
         if is_here(position_m) {
             return Progress { then: lands, ..none };
         }
         let height_m = inputs.present.position_m.z;
-        // A climb by nothing keeps the height at which the item began.
+        // A take-off of zero height stores the height at which the item began.
         let begun = self.begin(leg, inputs, |inputs| Course::Takeoff(Takeoff::new(inputs, 0.0)));
         let height_m = begun.course.takeoff().map_or(height_m, |start| start.to_m.z);
         let over_m = Vector3::new(position_m.x, position_m.y, height_m);
@@ -213,7 +213,7 @@ impl Mission {
         Progress { output: ModeOutput::fly(inputs.to(over_m)), then, ..none }
     }
 
-    /// Flies round a centre, as fast as it may; counter-clockwise if the radius is positive.
+    /// Flies circles around a centre at the highest allowed speed; counter-clockwise if the radius is positive.
     fn circle(
         &mut self,
         leg: &Leg,
@@ -242,16 +242,16 @@ impl Mission {
         self.go_on(leg, output, None, none)
     }
 
-    /// Turns by an angle, which counts as the item begins.
+    /// Turns by an angle, counted from the start of the item.
     fn turn(&mut self, leg: &Leg, to_turn_rad: f32, inputs: &ModeInputs<'_>, none: Progress) -> Progress {
         let first = self.begun.is_none_or(|begun| begun.number != leg.number);
         let present = inputs.present;
         let begun = self.begin(leg, inputs, |_| Course::Straight);
-        // By the rate of the setpoint: a difference of headings does not show more than half a turn.
+        // Subtract the setpoint's own rotation: a difference of headings cannot show more than half a turn.
         begun.yaw_rad = if first { to_turn_rad } else { begun.yaw_rad - present.yaw_rate_rad_s * inputs.dt_s };
         let left_rad = begun.yaw_rad;
         let turned = left_rad.abs() < TURNED_RAD && present.yaw_rate_rad_s.abs() < TURNED_RAD_S;
-        // On the ground nothing turns, and the item would never be done.
+        // On the ground the vehicle cannot turn, and the item would never finish.
         let mut progress = self.stay(leg, inputs, turned || !inputs.airborne, none);
         if let Shaping::Limited(aim) = &mut progress.output.shaping {
             aim.yaw_rad = wrap_angle(present.yaw_rad + min(max(left_rad, -LED_RAD), LED_RAD));
@@ -259,14 +259,14 @@ impl Mission {
         progress
     }
 
-    /// Stays where it is, until it is `done`.
+    /// Holds the present place until `done`.
     fn stay(&mut self, leg: &Leg, inputs: &ModeInputs<'_>, done: bool, none: Progress) -> Progress {
         let output = ModeOutput { done, ..ModeOutput::fly(self.hold.fly(inputs)) };
         let at_m = self.hold.at_m;
         self.go_on(leg, output, at_m, none)
     }
 
-    /// Returns the item in progress, begun if it was another one.
+    /// Returns the item in progress. Starts `leg` if another item was in progress.
     fn begin(
         &mut self,
         leg: &Leg,
@@ -285,7 +285,7 @@ impl Mission {
         })
     }
 
-    /// Wants the next item, if this one is done; the mission is done with its last one.
+    /// Requests the next item if this one is done. The mission is done with its last item.
     fn go_on(&mut self, leg: &Leg, output: ModeOutput, at_m: Option<Vector3<f32>>, none: Progress) -> Progress {
         let done = output.done && leg.is_last;
         let reached = output.done.then_some(leg.number);
@@ -298,7 +298,7 @@ impl Mission {
 }
 
 impl Begun {
-    /// Climbs, if it began on the ground.
+    /// Climbs, if the item began on the ground. Returns `None` once the climb is done.
     fn climb(&mut self, inputs: &ModeInputs<'_>) -> Option<ModeOutput> {
         let output = self.course.takeoff()?.fly(inputs);
         if output.done {
@@ -308,22 +308,22 @@ impl Begun {
     }
 }
 
-/// From the ground it climbs first.
+/// Returns a straight course, preceded by a climb if the vehicle is on the ground.
 fn from_ground(inputs: &ModeInputs<'_>) -> Course {
     if inputs.airborne {
         return Course::Straight;
     }
-    // A take-off that no item asks for must not lead out of the geofence.
+    // This take-off, which no item asks for, must not leave the geofence.
     let room_m = max(inputs.ceiling_m - inputs.present.position_m.z, 0.0);
     Course::Takeoff(Takeoff::new(inputs, min(inputs.flying.takeoff_height_m, room_m)))
 }
 
-/// Climbs straight up to a height of the local frame, if that is above.
+/// Returns a climb straight up to a height of the local frame, or of zero height if the vehicle is higher.
 fn climb_to(height_m: f32, inputs: &ModeInputs<'_>) -> Course {
     Course::Takeoff(Takeoff::new(inputs, max(height_m - inputs.present.position_m.z, 0.0)))
 }
 
-/// Returns the angle to turn by from `present_rad`, positive to the left \[rad\].
+/// Returns the angle to turn from `present_rad`, positive to the left \[rad\].
 fn to_turn(yaw_rad: f32, relative: bool, direction: i8, present_rad: f32) -> f32 {
     if relative {
         return match direction {
@@ -332,7 +332,7 @@ fn to_turn(yaw_rad: f32, relative: bool, direction: i8, present_rad: f32) -> f32
         };
     }
     let shorter_rad = wrap_angle(yaw_rad - present_rad);
-    // Half a degree the wrong way is not a whole turn the other way.
+    // Half a degree in the wrong direction must not become a whole turn.
     match direction {
         1.. if shorter_rad < -PI / 360.0 => shorter_rad + TAU,
         ..=-1 if shorter_rad > PI / 360.0 => shorter_rad - TAU,
@@ -345,14 +345,14 @@ fn is_slow(inputs: &ModeInputs<'_>) -> bool {
     inputs.present.velocity_m_s.norm_squared() < STOPPED_M_S * STOPPED_M_S
 }
 
-/// True of a place that means where the vehicle is.
+/// True if the place is NaN, which means "where the vehicle is".
 fn is_here(position_m: &Vector3<f32>) -> bool {
     position_m.x.is_nan() || position_m.y.is_nan()
 }
 
 impl Item {
-    /// Checks that it can be flown: its numbers, and that its place is inside the cylinder of `net` around home, if
-    /// that is known.
+    /// Checks that the item can be flown: its numbers are plausible and, if home is known, its place is inside the
+    /// cylinder of `net` around home.
     ///
     /// # Errors
     /// [`OrderRefusal::OutOfRange`] or [`OrderRefusal::OutsideFence`].
@@ -364,7 +364,7 @@ impl Item {
         if home_m.is_none_or(inside) { Ok(()) } else { Err(OrderRefusal::OutsideFence) }
     }
 
-    /// Returns the place that it flies to \[m\].
+    /// Returns the place that the item flies to \[m\], if it has one.
     fn place(&self, home_m: &Vector3<f32>) -> Option<Vector3<f32>> {
         match *self {
             Item::TakeOff { height_m } => Some(Vector3::new(home_m.x, home_m.y, height_m)),
@@ -377,10 +377,10 @@ impl Item {
         }
     }
 
-    /// True if every number can be flown; NaN only where that means something.
+    /// True if every number can be flown. NaN is accepted where it has a meaning.
     fn is_plausible(&self) -> bool {
         let is_whole = |place_m: &Vector3<f32>| place_m.iter().all(|value| is_within(*value));
-        // Heights of a landing and of a region do not matter.
+        // The height of a landing or of a region of interest is not used.
         let is_flat = |place_m: &Vector3<f32>| is_place(&Vector3::new(place_m.x, place_m.y, f32::NAN));
         match self {
             Item::TakeOff { height_m } => is_within(*height_m),

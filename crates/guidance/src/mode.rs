@@ -1,15 +1,15 @@
-//! Flight modes.
+//! Flight modes, with PX4's names.
 
-/// What determines the setpoint. The names are PX4's.
+/// Flight mode: determines the setpoint.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum FlightMode {
-    /// Holds position and heading ("loiter").
+    /// Holds position and heading (PX4: "loiter").
     #[default]
     Hold,
-    /// Climbs to the take-off height above where it stands, then [`Hold`](Self::Hold).
+    /// Climbs to the take-off height above the ground, then [`Hold`](Self::Hold).
     Takeoff,
-    /// Descends where it is, and disarms on the ground.
+    /// Descends vertically, and disarms on the ground.
     Land,
     /// Climbs to the return height, flies home and lands.
     Return,
@@ -17,13 +17,13 @@ pub enum FlightMode {
     Mission,
     /// Follows the targets of a companion computer.
     Offboard,
-    /// The sticks give velocities; centred, it holds.
+    /// Sticks command velocities. Centred sticks hold position.
     Position,
-    /// The sticks give roll, pitch, climb rate and rate of the heading.
+    /// Sticks command roll, pitch, climb rate and yaw rate.
     Altitude,
-    /// The sticks give roll, pitch, thrust and rate of the heading.
+    /// Sticks command roll, pitch, thrust and yaw rate.
     Stabilised,
-    /// The sticks give the rates about the body's axes, and the thrust.
+    /// Sticks command body rates and thrust.
     Acro,
 }
 
@@ -42,7 +42,7 @@ impl FlightMode {
         FlightMode::Acro,
     ];
 
-    /// Returns the name that people know.
+    /// Returns the mode's name for users, in lower case.
     pub const fn name(self) -> &'static str {
         match self {
             FlightMode::Hold => "hold",
@@ -58,7 +58,7 @@ impl FlightMode {
         }
     }
 
-    /// True if a pilot's sticks fly it.
+    /// True if the pilot's sticks fly this mode.
     pub const fn is_manual(self) -> bool {
         matches!(self, FlightMode::Position | FlightMode::Altitude | FlightMode::Stabilised | FlightMode::Acro)
     }

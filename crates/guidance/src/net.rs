@@ -1,7 +1,7 @@
-//! The safety net: what it watches, and which action each finding has.
+//! The safety net: detects the causes of failsafes and selects the action.
 //!
-//! The strongest action of all findings counts; of several findings with the same action the first in the order of
-//! [`Cause::ALL`] is named.
+//! The strongest action of all present causes is taken. Among causes with the same action, the first in the order of
+//! [`Cause::ALL`] is reported.
 
 use crate::actions::{BatteryAction, FenceAction, SensorsAction, StationAction, SticksAction, TargetsAction};
 use crate::battery::{BatteryReading, Cells};
@@ -12,7 +12,7 @@ use crate::table::FailsafeAction;
 use afbc_types::{Range, parameters};
 use nalgebra::Vector3;
 
-/// Distance inside the geofence at which it no longer counts as left \[m\].
+/// Distance inside the geofence's boundary at which a breach ends \[m\].
 const FENCE_MARGIN_M: f32 = 1.0;
 
 parameters! {
@@ -77,14 +77,14 @@ parameters! {
     }
     together(net) {
         let most = |range: Range, most: f32| Range { max: most.into(), ..range };
-        // The charge is a share of the difference of both, which must not be zero.
+        // The range of the voltage is a divisor and must not be zero.
         most(Net::BAT1_V_EMPTY.range, net.full_v - 0.05).check(net.empty_v)?;
         most(Net::BAT_CRIT_THR.range, net.low).check(net.critical)?;
         most(Net::BAT_EMERGEN_THR.range, net.critical).check(net.emergency)
     }
 }
 
-/// Sensors that have failed, one bit each.
+/// Sensors that have failed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct FailedSensors {
     /// Gyroscope or accelerometer.
@@ -93,20 +93,20 @@ pub struct FailedSensors {
     pub barometer: bool,
     /// Magnetometer.
     pub magnetometer: bool,
-    /// Receiver of satellite navigation.
+    /// GNSS receiver.
     pub gnss: bool,
-    /// Tracker.
+    /// External position tracker, such as motion capture.
     pub tracker: bool,
 }
 
 impl FailedSensors {
-    /// True if one has failed.
+    /// True if any sensor has failed.
     pub const fn any(self) -> bool {
         self.inertial || self.barometer || self.magnetometer || self.gnss || self.tracker
     }
 }
 
-/// What the net looks at in a tick.
+/// Inputs of the safety net in a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Findings<'a> {
     pub(crate) mode: FlightMode,
@@ -116,22 +116,22 @@ pub(crate) struct Findings<'a> {
     pub(crate) home_m: Option<Vector3<f32>>,
     pub(crate) battery: Option<&'a BatteryReading>,
     pub(crate) sensors: FailedSensors,
-    /// Time since the station in control was heard \[us\]; none if it never was.
+    /// Time since the controlling ground station was last heard \[us\]; none if never.
     pub(crate) silent_us: Option<u32>,
     pub(crate) targets: bool,
     pub(crate) sticks: bool,
-    /// The uploaded geofence.
+    /// State of the uploaded geofence.
     pub(crate) fence: FenceView,
     pub(crate) dt_s: f32,
 }
 
-/// What the net has found.
+/// Memory of the safety net between ticks.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Watch {
     charge: Option<f32>,
-    /// Number of cells by the voltage; 0 if there is no battery.
+    /// Number of cells found from the voltage; 0 without a battery.
     cells: u8,
-    /// Set of causes that hold, a bit each.
+    /// Causes present, one bit each.
     holds: u16,
 }
 
@@ -145,17 +145,17 @@ impl Watch {
         self.charge
     }
 
-    /// True if there is a battery to be watched.
+    /// True if the battery is monitored.
     pub(crate) fn is_watched(&self, net: &Net) -> bool {
         net.cells > 0 || self.charge.is_some()
     }
 
-    /// True if the cause holds.
+    /// True if the cause is present.
     pub(crate) fn holds(&self, cause: Cause) -> bool {
         self.holds & bit(cause) != 0
     }
 
-    /// Looks, and returns the strongest action with its cause, and the set of causes that are new.
+    /// Runs all checks. Returns the strongest action, its cause, and the set of new causes.
     pub(crate) fn look(
         &mut self,
         net: &Net,
@@ -163,15 +163,15 @@ impl Watch {
         notices: &mut Notices,
     ) -> (FailsafeAction, Cause, u16) {
         if !seen.armed {
-            // While it is connected there are no fewer: an empty battery of six cells must not become a full one of
-            // five.
+            // The count never falls while a battery is connected: an empty battery of six cells must not count as a
+            // full one of five.
             let cells = seen.battery.map_or(0, BatteryReading::cells);
             self.cells = if cells == 0 { 0 } else { self.cells.max(cells) };
             if cells == 0 {
                 self.charge = None;
             }
         }
-        // A number that is set counts, else what the monitor tells.
+        // A configured number of cells has precedence, then the monitor's charge, then the number found.
         let number = match seen.battery {
             _ if net.cells > 0 => net.cells,
             Some(BatteryReading { charge: Some(_), .. }) => 0,
@@ -183,7 +183,7 @@ impl Watch {
         self.holds = 0;
         let mut note = |cause: Cause, holds: bool| self.holds |= if holds { bit(cause) } else { 0 };
         note(Cause::Descent, seen.armed && seen.descends);
-        // A battery does not recover in flight.
+        // A low battery stays low in flight, even if its voltage recovers.
         let below = |threshold: f32| self.charge.is_some_and(|charge| charge < threshold);
         let was = |cause: Cause| seen.armed && before & bit(cause) != 0;
         note(Cause::BatteryEmergency, below(net.emergency) || was(Cause::BatteryEmergency));
@@ -199,7 +199,7 @@ impl Watch {
         let new = self.holds & !before;
         let over = before & !self.holds;
         if over != 0 && seen.armed {
-            // Batteries do not recover, and targets and sticks are not looked at any more once the mode is another.
+            // Low batteries do not recover. Targets and sticks are not checked once the mode has changed.
             for cause in [Cause::Descent, Cause::Fence, Cause::Sensors, Cause::Station] {
                 if over & bit(cause) != 0 {
                     notices.push(Notice::Over(cause));
@@ -213,8 +213,8 @@ impl Watch {
         (if seen.armed { action } else { FailsafeAction::None }, cause, new)
     }
 
-    /// Returns the strongest action with its cause; `positioned` is true if the vehicle knows where it is, and may be
-    /// ordered what to do while the flight core still descends.
+    /// Returns the strongest action with its cause. `positioned`: the position is known, so a descent of the flight
+    /// core demands nothing, and orders count.
     fn strongest(&self, net: &Net, positioned: bool) -> (FailsafeAction, Cause) {
         let counts = |cause: &Cause| self.holds(*cause) && !(positioned && *cause == Cause::Descent);
         let found = Cause::ALL.into_iter().filter(counts);
@@ -225,12 +225,12 @@ impl Watch {
     }
 }
 
-/// True if the cause is in the set.
+/// True if `cause` is in the set `new`.
 pub(crate) fn is_new(new: u16, cause: Cause) -> bool {
     new & bit(cause) != 0
 }
 
-/// Announces the causes in the set `new` that have an action, but one.
+/// Announces the causes in the set `new` that have an action, except `but`.
 pub(crate) fn announce(net: &Net, new: u16, but: Option<Cause>, notices: &mut Notices) {
     for cause in Cause::ALL {
         if new & bit(cause) != 0 && Some(cause) != but && net.action(cause) > FailsafeAction::None {
@@ -240,7 +240,7 @@ pub(crate) fn announce(net: &Net, new: u16, but: Option<Cause>, notices: &mut No
 }
 
 impl Net {
-    /// Returns the action of a cause.
+    /// Returns the action configured for a cause.
     pub fn action(&self, cause: Cause) -> FailsafeAction {
         match cause {
             Cause::Descent => FailsafeAction::Land,
@@ -255,20 +255,21 @@ impl Net {
         }
     }
 
-    /// True if the vehicle is outside the geofence, or was and is hardly inside.
+    /// True if the vehicle is outside the geofence. If it `was`, it must come back inside by a margin.
     fn is_outside(&self, seen: &Findings<'_>, was: bool) -> bool {
-        // What cannot be seen is taken for unchanged.
+        // Without a position, keep the last result.
         let (Some(position_m), Some(home_m)) = (seen.position_m, seen.home_m) else { return was };
         let margin = if was { FENCE_MARGIN_M } else { 0.0 };
         !self.encloses(&home_m, &position_m, margin)
     }
 
-    /// Returns the height above home up to which a vehicle is well inside the geofence; infinite without one \[m\].
+    /// Returns the height above home up to which a vehicle is well inside the geofence; infinite without a limit \[m\].
     pub(crate) fn ceiling_m(&self) -> f32 {
         if self.fence_height_m > 0.0 { inner(self.fence_height_m, FENCE_MARGIN_M) } else { f32::INFINITY }
     }
 
-    /// True if a place lies inside the geofence, by at least `margin_m` of a fence that is larger than that.
+    /// True if a place lies inside the geofence. Each dimension of the fence is reduced by `margin_m`, but at most to
+    /// half.
     pub(crate) fn encloses(&self, home_m: &Vector3<f32>, place_m: &Vector3<f32>, margin_m: f32) -> bool {
         let off_m = place_m - home_m;
         let (radius_m, height_m) = (inner(self.fence_radius_m, margin_m), inner(self.fence_height_m, margin_m));
@@ -278,7 +279,7 @@ impl Net {
     }
 }
 
-/// Returns the size of a fence less a margin, at least half of it.
+/// Returns the size of a fence less a margin, but at least half the size.
 fn inner(size_m: f32, margin_m: f32) -> f32 {
     if size_m > 2.0 * margin_m { size_m - margin_m } else { 0.5 * size_m }
 }

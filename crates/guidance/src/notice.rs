@@ -1,34 +1,34 @@
-//! What the guidance announces.
+//! Announcements of the guidance to pilot and ground station.
 
 use crate::mode::FlightMode;
 use core::fmt;
 
-/// What the safety net watches.
+/// Cause of a failsafe.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Cause {
-    /// The flight core descends: the state is lost.
+    /// The flight core descends because the state is lost.
     Descent,
-    /// Charge below the lowest threshold.
+    /// Charge below the emergency threshold.
     BatteryEmergency,
     /// Charge below the critical threshold.
     BatteryCritical,
-    /// Charge below the first threshold.
+    /// Charge below the low threshold.
     BatteryLow,
     /// Outside the geofence, or about to leave it.
     Fence,
     /// A sensor has failed.
     Sensors,
-    /// The station in control is silent.
+    /// The controlling ground station is silent.
     Station,
-    /// The targets of the companion computer are missing.
+    /// No fresh targets of the companion computer.
     Targets,
-    /// The sticks of the pilot are missing.
+    /// No fresh sticks of the pilot.
     Sticks,
 }
 
 impl Cause {
-    /// Every cause, by decreasing precedence among those with the same action.
+    /// All causes. Among those with the same action, an earlier one has precedence.
     pub const ALL: [Cause; 9] = [
         Cause::Descent,
         Cause::BatteryEmergency,
@@ -41,7 +41,7 @@ impl Cause {
         Cause::Sticks,
     ];
 
-    /// Returns it in words.
+    /// Returns the cause in words.
     pub const fn name(self) -> &'static str {
         match self {
             Cause::Descent => "no state, flight core descends",
@@ -57,29 +57,29 @@ impl Cause {
     }
 }
 
-/// Why the mode changes.
+/// Reason for a change of mode.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum ModeReason {
-    /// It was ordered.
+    /// The mode was ordered.
     Ordered,
-    /// The last mode has done its work.
+    /// The last mode has finished.
     Done,
-    /// An item of the mission.
+    /// An item of the mission selects the mode.
     Mission,
-    /// There is no mission any more.
+    /// The mission was cleared.
     Cleared,
     /// The vehicle has not left the ground.
     NoLift,
-    /// The motors have stopped.
+    /// The vehicle was disarmed.
     Disarmed,
-    /// The state is back after an outage, and with it what was flown before.
+    /// The state is back after a loss, and the interrupted mode resumes.
     Back,
-    /// The safety net.
+    /// The safety net selects the mode.
     Failsafe(Cause),
 }
 
 impl ModeReason {
-    /// Returns it in words.
+    /// Returns the reason in words.
     pub const fn name(self) -> &'static str {
         match self {
             ModeReason::Ordered => "ordered",
@@ -94,39 +94,39 @@ impl ModeReason {
     }
 }
 
-/// Urgency, with MAVLink's numbers.
+/// Urgency, with the numbers of MAVLink's `MAV_SEVERITY`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Severity {
-    /// Act now.
+    /// Needs action now.
     Critical = 2,
     /// Something has failed.
     Error = 3,
     /// Something may fail.
     Warning = 4,
-    /// Unusual.
+    /// Unusual, but no error.
     Notice = 5,
-    /// Usual.
+    /// Normal operation.
     Info = 6,
 }
 
-/// An announcement; its text by [`Display`](fmt::Display) has at most 50 characters.
+/// An announcement. Its text by [`Display`](fmt::Display) has at most 50 characters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Notice {
-    /// The mode is another.
+    /// The mode has changed.
     Mode(FlightMode, ModeReason),
-    /// The safety net has found something, which does not change the mode.
+    /// The safety net has found a cause that does not change the mode.
     Found(Cause),
-    /// It is over.
+    /// A cause has ended.
     Over(Cause),
-    /// The guidance stops the motors of a vehicle that stands on the ground.
+    /// The guidance disarms a vehicle on the ground.
     Disarms,
-    /// An item of the mission lies outside the geofence, or makes no sense.
+    /// A mission item lies outside the geofence or is not plausible.
     ItemRefused,
 }
 
 impl Notice {
-    /// Returns how urgent it is.
+    /// Returns the announcement's urgency.
     pub const fn severity(self) -> Severity {
         match self {
             Notice::Mode(_, ModeReason::Failsafe(cause)) | Notice::Found(cause) => match cause {
@@ -143,7 +143,7 @@ impl Notice {
 }
 
 impl Notice {
-    /// Returns its text in parts, for those who write without the library's formatting.
+    /// Returns the text in parts, for callers that do not use `core::fmt`.
     pub const fn parts(self) -> [&'static str; 3] {
         match self {
             Notice::Mode(mode, reason) => [mode.name(), ": ", reason.name()],
@@ -164,19 +164,19 @@ impl fmt::Display for Notice {
 /// Largest number of announcements in a tick.
 pub const NOTICES_MAX: usize = 8;
 
-/// The announcements of a tick, oldest first, without gaps.
+/// The announcements of a tick, oldest first.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Notices([Option<Notice>; NOTICES_MAX]);
 
 impl Notices {
-    /// Adds one; dropped if there are [`NOTICES_MAX`] already.
+    /// Adds an announcement; drops it if there are already [`NOTICES_MAX`].
     pub(crate) fn push(&mut self, notice: Notice) {
         if let Some(place) = self.0.iter_mut().find(|place| place.is_none()) {
             *place = Some(notice);
         }
     }
 
-    /// Returns them.
+    /// Returns the announcements, oldest first.
     pub fn iter(&self) -> impl Iterator<Item = Notice> {
         self.0.iter().map_while(|notice| *notice)
     }

@@ -1,4 +1,4 @@
-//! Circles around a place.
+//! Orbits: circles around a place.
 
 use crate::limiter::LimiterTarget;
 use crate::mode_io::{ModeInputs, ModeOutput};
@@ -8,57 +8,57 @@ use afbc_control::math::{cos, max, min, sin, sqrt, wrap_angle};
 use core::f32::consts::{FRAC_PI_2, PI};
 use nalgebra::Vector3;
 
-/// Radii that are flown \[m\].
+/// Accepted radii \[m\].
 pub(crate) const RADIUS_M: core::ops::RangeInclusive<f32> = 1.0..=1000.0;
-/// Radius of a circle that has none of its own \[m\].
+/// Radius of an orbit for which none is given \[m\].
 pub const ORBIT_RADIUS_M: f32 = 10.0;
-/// Shares of the acceleration of an approach that the circle may need, and with which it becomes faster.
+/// Shares of the acceleration of an approach: the largest centripetal one, and the one along the circle.
 const SHARE: f32 = 0.8;
 const ALONG: f32 = 0.3;
-/// Distance from the circle, horizontally and vertically, at which the vehicle begins to go around \[m\].
+/// Distance from the circle, horizontally and vertically, at which the orbit starts \[m\].
 const NEAR_M: f32 = 0.5;
-/// Distance from where it should be on the circle at which it waits for the vehicle \[m\].
+/// Distance between the setpoint and the orbit's moving place beyond which that place waits \[m\].
 const LATE_M: f32 = 2.0;
 
-/// A circle, and how far it has been flown.
+/// An orbit and its progress.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Orbit {
     pub(crate) centre_m: Vector3<f32>,
     pub(crate) radius_m: f32,
-    /// Speed along it, positive if it goes to the left \[m/s\].
+    /// Speed along the circle, positive counter-clockwise (to the left) \[m/s\].
     pub(crate) speed_m_s: f32,
     pub(crate) heading: OrbitHeading,
-    /// Angle to fly; infinite for ever \[rad\].
+    /// Angle to fly; infinite for an endless orbit \[rad\].
     pub(crate) angle_rad: f32,
     pub(crate) round: Round,
 }
 
-/// How far a circle has been flown.
+/// Progress of an orbit.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Round {
-    /// Direction from the centre; none until the circle is reached \[rad\].
+    /// Direction from the centre to the present place; none until the circle is reached \[rad\].
     at_rad: Option<f32>,
     turned_rad: f32,
-    /// Speed so far, without its direction \[m/s\].
+    /// Present speed, without sign \[m/s\].
     speed_m_s: f32,
-    /// Number of places on it that it has aimed at.
+    /// Running number of the targets made.
     aims: u32,
 }
 
-/// Returns the largest speed on a circle \[m/s\].
+/// Returns the largest speed on a circle of this radius \[m/s\].
 pub(crate) fn speed_max_m_s(limits: &Limits, radius_m: f32) -> f32 {
-    // A circle takes the acceleration v^2/r.
+    // The centripetal acceleration is v^2/r.
     min(limits.speed_m_s, sqrt(SHARE * limits.acceleration_m_s2 * radius_m))
 }
 
 impl Orbit {
-    /// Flies it; done when the angle has been flown.
+    /// Flies the orbit. Done when its angle has been flown.
     pub(crate) fn fly(&mut self, inputs: &ModeInputs<'_>) -> ModeOutput {
         let Orbit { centre_m, radius_m, speed_m_s, .. } = *self;
         let present = inputs.present.position_m;
         let off_m = present - centre_m;
         let Some(before_rad) = self.round.at_rad else {
-            // To the nearest point of the circle.
+            // Fly to the nearest point of the circle.
             let at_rad = libm::atan2f(off_m.y, off_m.x);
             let to_m = centre_m + Vector3::new(cos(at_rad), sin(at_rad), 0.0) * radius_m;
             let near = inputs.is_at(&to_m, NEAR_M);
@@ -75,12 +75,12 @@ impl Orbit {
         let side = if speed_m_s < 0.0 { -1.0 } else { 1.0 };
         let (speed_m_s, along_m_s2) = (side * now_m_s, side * (now_m_s - before_m_s) / inputs.dt_s);
         let rate_rad_s = speed_m_s / radius_m;
-        // By the mean speed of the step: otherwise place and velocity would not fit each other.
+        // Step by the mean speed: otherwise position and velocity would not fit each other.
         let step_rad = 0.5 * (before_m_s + now_m_s) * side / radius_m * inputs.dt_s;
         let at_rad = wrap_angle(before_rad + step_rad);
         self.round.at_rad = Some(at_rad);
         self.round.turned_rad += step_rad.abs();
-        // It may wrap: it only tells an aim from the last one.
+        // The number may wrap around: it only tells this target from the last one.
         self.round.aims = self.round.aims.wrapping_add(1);
         let (s, c) = (sin(at_rad), cos(at_rad));
         let yaw_rad = self.yaw_rad(at_rad);
@@ -90,17 +90,17 @@ impl Orbit {
                 + Vector3::new(-s, c, 0.0) * along_m_s2,
             yaw_rad,
             yaw_rate_rad_s: if yaw_rad.is_nan() { f32::NAN } else { rate_rad_s },
-            // A stream whose parts fit one another.
+            // The target is one of a stream that fits together, so that it passes the limiter unchanged.
             sent_us: Some(self.round.aims.into()),
             ..inputs.to(place(at_rad))
         };
-        // It catches up with its place on the circle.
+        // Leave the approach enough speed to catch up with the place on the circle.
         let aim =
             LimiterTarget { speed_m_s: max(aim.speed_m_s, min(speed_m_s.abs() + 1.0, inputs.limits.speed_m_s)), ..aim };
         ModeOutput { done: self.round.turned_rad >= self.angle_rad, ..ModeOutput::fly(aim) }
     }
 
-    /// Returns the heading at a place on the circle; NaN keeps it.
+    /// Returns the heading at a place on the circle; NaN keeps the present one.
     fn yaw_rad(&self, at_rad: f32) -> f32 {
         match self.heading {
             OrbitHeading::Centre => wrap_angle(at_rad + PI),

@@ -1,89 +1,89 @@
-//! What a station, a companion computer or a pilot may ask for.
+//! Orders, targets, sticks and mission items that a station, a companion computer or a pilot may send.
 
 use crate::fence::FenceView;
 use crate::mode::FlightMode;
 use afbc_flight_core::{Queue, Stamped};
 use nalgebra::{UnitQuaternion, Vector2, Vector3};
 
-/// Where the vehicle heads on a circle: `ORBIT_YAW_BEHAVIOUR` of MAVLink.
+/// Heading on an orbit: MAVLink's `ORBIT_YAW_BEHAVIOUR`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum OrbitHeading {
-    /// To the centre.
+    /// Towards the centre.
     #[default]
     Centre,
-    /// Where it headed before.
+    /// As before the orbit.
     Kept,
     /// Along the circle.
     Along,
 }
 
-/// Something to be done, answered once.
+/// A command that is answered once.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Order {
-    /// Fly in this mode.
+    /// Select this mode.
     Select(FlightMode),
-    /// Take off to this height above where it stands, or to that of the parameters \[m\].
+    /// Take off to this height above the ground; `None` for the parameter's height \[m\].
     TakeOff(Option<f32>),
-    /// Fly to this place and hold there; NaN keeps a coordinate \[m\].
+    /// Fly to this place and hold there. A NaN coordinate keeps its present value \[m\].
     GoTo {
         /// Place in the local frame \[m\].
         position_m: Vector3<f32>,
-        /// Heading; NaN keeps it \[rad\].
+        /// Heading; NaN keeps the present one \[rad\].
         yaw_rad: f32,
-        /// Horizontal speed; none for that of the parameters \[m/s\].
+        /// Horizontal speed; `None` for the parameter's \[m/s\].
         speed_m_s: Option<f32>,
     },
-    /// Fly a circle in mode hold.
+    /// Fly an orbit in mode hold.
     Orbit {
-        /// Its centre, at its height; NaN keeps a coordinate \[m\].
+        /// Centre, at the orbit's height. A NaN coordinate keeps its present value \[m\].
         centre_m: Vector3<f32>,
-        /// Its radius, positive if it goes to the left \[m\].
+        /// Radius, positive to fly counter-clockwise (to the left) \[m\].
         radius_m: f32,
-        /// Speed along it; NaN for that of the parameters \[m/s\].
+        /// Speed along the circle; NaN for the parameter's \[m/s\].
         speed_m_s: f32,
-        /// Angle to fly; 0 for ever \[deg\].
+        /// Angle to fly; 0 for an endless orbit \[deg\].
         angle_deg: u16,
-        /// Where the vehicle heads.
+        /// Heading on the orbit.
         heading: OrbitHeading,
     },
-    /// Fly at most at this horizontal speed, until the mode changes \[m/s\].
+    /// Limit the horizontal speed until the mode changes \[m/s\].
     Speed(f32),
-    /// Home is here, or at this place of the local frame \[m\].
+    /// Set home to this place of the local frame, or to the present one \[m\].
     Home(Option<Vector3<f32>>),
-    /// Go on with the mission at this item.
+    /// Continue the mission at this item.
     Resume(u16),
 }
 
-/// Why an order is not carried out. The numbers are part of the link's protocol, beside those of
+/// Reason for refusing an order. The numbers are part of the link's protocol, together with those of
 /// [`Refusal`](afbc_flight_core::Refusal).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum OrderRefusal {
-    /// The vehicle does not know where it is.
+    /// The position is not known.
     NoPosition = 32,
     /// The mode needs an armed vehicle.
     NotArmed = 33,
     /// The vehicle is on the ground.
     OnGround = 34,
-    /// The vehicle flies already.
+    /// The vehicle is already flying.
     InFlight = 35,
     /// No fresh targets of a companion computer.
     NoTargets = 36,
     /// No fresh sticks of a pilot.
     NoSticks = 37,
-    /// No mission, or no such item.
+    /// No mission, or no item of this number.
     NoMission = 38,
     /// The place is outside the geofence.
     OutsideFence = 39,
     /// A number is out of range.
     OutOfRange = 40,
-    /// A failsafe has the vehicle, and this mode is not above it.
+    /// A failsafe is active, and this mode does not replace it.
     Failsafe = 41,
 }
 
-/// A companion computer's target.
+/// A target from a companion computer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum OffboardTarget {
@@ -93,7 +93,7 @@ pub enum OffboardTarget {
     Attitude(AttitudeTarget),
 }
 
-/// A target of position, velocity or acceleration: NaN where there is none.
+/// A target of position, velocity or acceleration; NaN where not given.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct MotionTarget {
@@ -107,7 +107,8 @@ pub struct MotionTarget {
     pub yaw_rad: f32,
     /// Rate of the heading \[rad/s\].
     pub yaw_rate_rad_s: f32,
-    /// True if position and axes are those of the vehicle, level: forward, left, up.
+    /// True if the target is in the vehicle's level frame: forward, left and up, from the vehicle's position and
+    /// heading.
     pub body: bool,
 }
 
@@ -117,13 +118,13 @@ pub struct MotionTarget {
 pub struct AttitudeTarget {
     /// Attitude.
     pub attitude: UnitQuaternion<f32>,
-    /// Rate of the heading, NaN if the heading is the attitude's \[rad/s\].
+    /// Yaw rate; NaN to fly the attitude's heading \[rad/s\].
     pub yaw_rate_rad_s: f32,
-    /// Thrust, 0 to 1 of the most that the rotors give.
+    /// Thrust as a share of the rotors' largest, 0 to 1.
     pub thrust: f32,
 }
 
-/// A pilot's sticks, -1 to 1: to the right, forward, up, to the right.
+/// Positions of a pilot's sticks, -1 to 1.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Sticks {
@@ -137,11 +138,11 @@ pub struct Sticks {
     pub yaw: f32,
 }
 
-/// An item of a mission, in the local frame.
+/// A mission item. Places are in the local frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Item {
-    /// Take off to this height \[m\], local frame.
+    /// Take off to a height.
     TakeOff {
         /// Height in the local frame \[m\].
         height_m: f32,
@@ -150,52 +151,52 @@ pub enum Item {
     Waypoint {
         /// Place in the local frame \[m\].
         position_m: Vector3<f32>,
-        /// Heading; NaN: towards the place \[rad\].
+        /// Heading; NaN heads towards the place \[rad\].
         yaw_rad: f32,
-        /// Time to stay there \[s\].
+        /// Time to stay at the place \[s\].
         hold_s: f32,
-        /// Distance at which it counts as reached; 0 for that of the parameters \[m\].
+        /// Distance at which the place counts as reached; 0 for the parameter's \[m\].
         within_m: f32,
-        /// True if the vehicle need not stop there.
+        /// True if the vehicle need not stop at the place.
         fly_through: bool,
     },
-    /// Land at a place; NaN: where it is.
+    /// Land at a place; NaN to land where the vehicle is.
     Land {
         /// Place in the local frame \[m\].
         position_m: Vector3<f32>,
     },
     /// Return home and land.
     Return,
-    /// Change the horizontal speed \[m/s\].
+    /// Set the horizontal speed \[m/s\].
     Speed(f32),
-    /// Stay where it is for a time \[s\].
+    /// Hold the place for a time \[s\].
     Wait(f32),
     /// Fly circles around a place.
     Turns {
-        /// Their centre in the local frame \[m\].
+        /// Centre in the local frame \[m\].
         centre_m: Vector3<f32>,
-        /// Their radius, positive if they go to the left; 0 for the usual one \[m\].
+        /// Radius, positive to fly counter-clockwise (to the left); 0 for the default \[m\].
         radius_m: f32,
-        /// Their number.
+        /// Number of turns.
         turns: f32,
     },
-    /// Turn where it is.
+    /// Turn in place.
     Yaw {
         /// Heading, or the angle to turn by, positive to the left \[rad\].
         yaw_rad: f32,
-        /// True if it is an angle to turn by.
+        /// True if `yaw_rad` is an angle to turn by.
         relative: bool,
-        /// Direction to turn in: to the left if positive, to the right if negative, the shorter one if 0.
+        /// Direction: left if positive, right if negative, the shorter one if 0.
         direction: i8,
     },
-    /// Head for a place from now on, in whatever follows; NaN: no longer \[m\].
+    /// Set a region of interest that all later items head for; NaN ends it \[m\].
     Look {
         /// Place in the local frame \[m\].
         at_m: Vector3<f32>,
     },
-    /// Go on with the item of this number.
+    /// Continue with the item of this number.
     Jump(u16),
-    /// Nothing: there is no mission any more.
+    /// No item: the mission was cleared.
     None,
     /// Climb straight up to a place's height, then fly there.
     TakeOffTo {
@@ -204,36 +205,36 @@ pub enum Item {
     },
 }
 
-/// The item of a mission that the guidance [wants](crate::Order::Resume), and what follows.
+/// Mission item that the guidance has [requested](crate::Order::Resume).
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Leg {
     /// Number of the item.
     pub number: u16,
-    /// Which upload of the mission it belongs to.
+    /// Number of the upload of the mission, which tells missions apart.
     pub upload: u16,
     /// The item.
     pub item: Item,
-    /// True if none follows.
+    /// True for the mission's last item.
     pub is_last: bool,
 }
 
-/// What the link brings for the guidance.
+/// Everything that the communication code passes to the guidance in a tick.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Orders {
-    /// Newest target.
+    /// Newest target of a companion computer.
     pub target: Option<Stamped<OffboardTarget>>,
-    /// Newest sticks.
+    /// Newest sticks of a pilot.
     pub sticks: Option<Stamped<Sticks>>,
-    /// Item of the mission that was wanted last.
+    /// Mission item requested last.
     pub leg: Option<Leg>,
-    /// Time at which the station in control was last heard; none before \[us\].
+    /// Time at which the controlling station was last heard; `None` if never \[us\].
     pub heard_us: Option<u64>,
-    /// What is known of the uploaded geofence; none if there is none.
+    /// State of the uploaded geofence; `None` without one.
     pub fence: Option<FenceView>,
-    /// Where a return lands: the nearest of home and rally points; none for home \[m\].
+    /// Place where a return lands: the nearest of home and the rally points; `None` for home \[m\].
     pub safe_m: Option<Vector2<f32>>,
-    /// Orders; a tick of the guidance answers the oldest.
+    /// Pending orders. Each tick of the guidance answers the oldest.
     pub given: Queue<Order>,
 }

@@ -1,4 +1,4 @@
-//! Parameters of the guidance. Those whose meaning is that of PX4's have PX4's name, numbers of actions included.
+//! Parameters of the guidance. Where the meaning is PX4's, so are the name and the numbers of the actions.
 
 use crate::fence::Braking;
 use crate::net::Net;
@@ -48,14 +48,14 @@ parameters! {
 }
 
 impl Limits {
-    /// Returns with what the vehicle stops before a geofence.
+    /// Returns the limits that the vehicle brakes with before a geofence.
     pub const fn braking(&self) -> Braking {
         Braking::new(self.acceleration_m_s2, self.jerk_m_s3)
     }
 }
 
 parameters! {
-    /// How the modes fly.
+    /// Parameters of the flight modes.
     #[derive(Clone, Copy, Debug, PartialEq)]
     #[cfg_attr(feature = "serde", derive(serde::Serialize))]
     pub struct Flying {

@@ -1,16 +1,17 @@
-//! Third-order motion towards a goal that may move, within speed, acceleration and jerk of its own.
+//! Third-order motion towards a goal that may itself move, with limits of speed, acceleration and jerk.
 //!
-//! The distance e to the goal gives the speed of approach f, its error x the acceleration g:
+//! The distance e to the goal determines the speed of approach f. The error x of the velocity determines the
+//! acceleration g:
 //!
 //! ```text
-//! f(e) = sqrt(c^2 + 2 B e) - c     c = 2 B^2/J'     stopping from it takes e, and at most B
-//! g(x) = sqrt(d^2 + 2 J" x) - d    d = J"/k2        likewise, with at most J"
+//! f(e) = sqrt(c^2 + 2 B e) - c     c = 2 B^2/J'     a stop from f(e) takes the distance e, decelerating with at most B
+//! g(x) = sqrt(d^2 + 2 J" x) - d    d = J"/k2        the same one derivative higher, with a jerk of at most J"
 //! ```
 //!
-//! B, J' and J" are shares of the largest acceleration A and jerk J, so that there is something left to correct with.
-//! Near the goal this is a linear system with the rates k1 = B/c, k2 = 4 k1 and k3 = 5 k2, which does not
-//! overshoot. The speed of approach by the stopping distance is that of PX4's `computeMaxSpeedFromDistance`; the
-//! cascade of two such functions is ArduPilot's (`shape_pos_vel_accel`), in vectors, so that a flight from rest is
+//! B, J' and J" are shares of the largest acceleration A and jerk J; the rest is a reserve for corrections. Near the
+//! goal the motion is a linear system with the rates k1 = B/c, k2 = 4 k1 and k3 = 5 k2, and does not overshoot. PX4's
+//! `computeMaxSpeedFromDistance` also takes the speed of approach from the stopping distance. ArduPilot's
+//! `shape_pos_vel_accel` also cascades two such functions; here they act on vectors, so that a flight from rest is
 //! straight.
 
 use afbc_control::math::{max, min, sqrt};
@@ -22,13 +23,13 @@ const BRAKING: f32 = 0.7;
 const EASING: f32 = 0.9;
 /// J" as a share of J.
 const SETTLING: f32 = 0.55;
-/// Largest k1 \[1/s\]: a step of a millisecond must be short to the fastest of the three.
+/// Largest k1 \[1/s\]: a time step of 1 ms must be short compared with 1/k3, the shortest of the three time constants.
 const APPROACH_MAX_1_S: f32 = 12.0;
-/// Share of a speed limit that is aimed at, since the speed settles to it from both sides.
+/// Share of a speed limit used as the aim, since the speed may overshoot slightly.
 const AIM: f32 = 0.98;
 
-/// Position and three derivatives. The position is kept in two parts, since a step far from the origin is smaller than
-/// what a single number resolves there.
+/// Position and three derivatives. The position is kept in two parts, since far from the origin a step is smaller than
+/// the resolution of one number.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Motion<const D: usize> {
     pub(crate) position: SVector<f32, D>,
@@ -39,13 +40,13 @@ pub(crate) struct Motion<const D: usize> {
 }
 
 impl<const D: usize> Motion<D> {
-    /// Makes a motion without acceleration.
+    /// Makes a motion without acceleration or jerk.
     pub(crate) fn new(position: SVector<f32, D>, velocity: SVector<f32, D>) -> Self {
         let zero = SVector::zeros();
         Motion { position, below: zero, velocity, acceleration: zero, jerk: zero }
     }
 
-    /// Makes a motion with all its parts.
+    /// Makes a motion from position, velocity, acceleration and jerk.
     pub(crate) fn moving(
         position: SVector<f32, D>,
         velocity: SVector<f32, D>,
@@ -55,12 +56,12 @@ impl<const D: usize> Motion<D> {
         Motion { acceleration, jerk, ..Motion::new(position, velocity) }
     }
 
-    /// Returns the distance to `position`.
+    /// Returns the vector to `position`.
     pub(crate) fn to(&self, position: &SVector<f32, D>) -> SVector<f32, D> {
         (position - self.position) - self.below
     }
 
-    /// Advances it by a step at constant `jerk`.
+    /// Advances the motion by a step of constant `jerk`.
     pub(crate) fn advance(&mut self, jerk: SVector<f32, D>, dt_s: f32) {
         let Motion { velocity, acceleration, .. } = *self;
         self.below += (velocity + (acceleration * 0.5 + jerk * (dt_s / 6.0)) * dt_s) * dt_s;
@@ -73,12 +74,12 @@ impl<const D: usize> Motion<D> {
     }
 }
 
-/// What a motion tends to.
+/// Goal of a motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Goal<const D: usize> {
-    /// None if the velocity is wanted only.
+    /// `None` if only velocity or acceleration is given.
     pub(crate) position: Option<SVector<f32, D>>,
-    /// None if the acceleration is wanted only.
+    /// `None` if only the acceleration is given.
     pub(crate) velocity: Option<SVector<f32, D>>,
     pub(crate) acceleration: SVector<f32, D>,
     pub(crate) jerk: SVector<f32, D>,
@@ -87,21 +88,22 @@ pub(crate) struct Goal<const D: usize> {
 /// Limits that may change from tick to tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Reach {
-    /// Largest speed of approach, in positive and in negative direction, for one coordinate; for two the first counts.
+    /// Largest speed of approach, in positive and in negative direction; for a vector of two coordinates, the first
+    /// counts.
     pub(crate) approach: (f32, f32),
-    /// Largest speed, likewise.
+    /// Largest speed, in positive and in negative direction.
     pub(crate) speed: (f32, f32),
-    /// Largest acceleration and jerk together with those of the goal.
+    /// Largest acceleration and jerk, including the goal's.
     pub(crate) acceleration: f32,
     pub(crate) jerk: f32,
 }
 
-/// Constants of the shape.
+/// Constants of the motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Shape {
     acceleration: f32,
     jerk: f32,
-    /// B, c, J", d, 1/k2, k3
+    /// B, c, J", d, 1/k2 and k3 of the module's documentation.
     braking: f32,
     c: f32,
     settling: f32,
@@ -111,7 +113,7 @@ pub(crate) struct Shape {
 }
 
 impl Shape {
-    /// Makes it for this acceleration and jerk, both positive.
+    /// Makes the constants for this largest acceleration and jerk, both positive.
     pub(crate) fn new(acceleration: f32, jerk: f32) -> Self {
         let braking = BRAKING * acceleration;
         let k1 = min(EASING * jerk / (2.0 * braking), APPROACH_MAX_1_S);
@@ -121,7 +123,7 @@ impl Shape {
             acceleration,
             jerk,
             braking,
-            // 2 B^2/J', unless the jerk would allow more than the largest k1: then it is larger.
+            // Equals 2 B^2/J', unless k1 is at its limit: then larger.
             c: braking / k1,
             settling,
             d: settling / k2,
@@ -130,18 +132,18 @@ impl Shape {
         }
     }
 
-    /// Returns the deceleration with which it stops from this speed: g up to A.
+    /// Returns the deceleration of a stop from this speed: g(speed), at most A.
     pub(crate) fn braking(&self, speed: f32) -> f32 {
         min(sqrt(self.d * self.d + 2.0 * self.settling * speed) - self.d, self.acceleration)
     }
 
-    /// Returns the distance in which it stops from this speed, when it decelerates by `braking` already: the speed goes
-    /// down with A as far as g allows, and the deceleration builds up with J.
+    /// Returns the distance of a stop from this speed for a vehicle that already decelerates by `braking`. The
+    /// deceleration first builds up with J to A, and decreases along g near the end.
     pub(crate) fn stop(&self, speed: f32, braking: f32) -> f32 {
         let Shape { acceleration, jerk, settling, d, .. } = *self;
         let missing = max(acceleration - braking, 0.0);
         let builds_up_s = missing * missing / (2.0 * acceleration * jerk);
-        // Where g is A; below it, the integral of x/g(x).
+        // Speed at which g reaches A. Below it, the distance is the integral of x/g(x).
         let gentle = min((acceleration + 2.0 * d) * acceleration / (2.0 * settling), speed);
         let root = sqrt(d * d + 2.0 * settling * gentle);
         let end = (root * root * root - d * d * d) / (6.0 * settling * settling) + d * gentle / (2.0 * settling);
@@ -152,7 +154,7 @@ impl Shape {
     pub(crate) fn advance<const D: usize>(&self, motion: &mut Motion<D>, goal: &Goal<D>, reach: &Reach, dt_s: f32) {
         let (wanted, change) = self.wanted(motion, goal, reach);
         let x = wanted - motion.velocity;
-        // g(x)/x and g'
+        // g(x)/x and the derivative g'.
         let root = sqrt(self.d * self.d + 2.0 * self.settling * sqrt(x.norm_squared()));
         let (gain, slope) = (2.0 * self.settling / (self.d + root), self.settling / root);
         let given = if goal.velocity.is_some() { goal.acceleration } else { SVector::zeros() };
@@ -160,23 +162,24 @@ impl Shape {
         let (own, rise) = if own.norm_squared() <= self.acceleration * self.acceleration {
             (own, (change - (motion.acceleration - given)) * slope)
         } else {
-            // At its limit it does not change.
+            // At its limit, the acceleration is constant.
             (capped(own, self.acceleration), SVector::zeros())
         };
         let wanted = capped(given + own, reach.acceleration);
         let jerk = match self.guarded(wanted, motion, reach) {
-            // What the goal says does not fit the limit of speed.
+            // Near the speed limit, the goal's jerk is dropped.
             Some((wanted, rise)) => rise + (wanted - motion.acceleration) * self.k3,
             None => goal.jerk + capped(rise + (wanted - motion.acceleration) * self.k3, self.jerk),
         };
         let jerk = capped(jerk, reach.jerk);
         let next = capped(motion.acceleration + jerk * dt_s, reach.acceleration);
-        // A motion whose acceleration is larger than now allowed gives way at the rate of the jerk.
+        // If the acceleration exceeds a limit that has just been lowered, it decreases with the largest jerk.
         let jerk = capped((next - motion.acceleration) / dt_s, reach.jerk);
         motion.advance(jerk, dt_s);
     }
 
-    /// Returns an acceleration that lets the speed stay within its limit, if `wanted` does not, and how it changes.
+    /// Returns an acceleration that keeps the speed within its limit, and its derivative; `None` if `wanted` does that
+    /// already.
     fn guarded<const D: usize>(
         &self,
         wanted: SVector<f32, D>,
@@ -187,13 +190,13 @@ impl Shape {
         if size_squared <= 0.0 {
             return None;
         }
-        // How far the velocity is from the limit, in the direction of the acceleration.
+        // Distance of the velocity from the limit, along the acceleration.
         let size = sqrt(size_squared);
         let along = motion.velocity.dot(&wanted) / size;
         let most = AIM * side(&wanted, reach.speed);
         let across_squared = motion.velocity.norm_squared() - along * along;
         let room = max(sqrt(max(most * most - across_squared, 0.0)) - along, 0.0);
-        // As g, with the largest jerk.
+        // As g, but with the largest jerk.
         let settling = SETTLING * reach.jerk;
         let d = settling * self.inverse_k2;
         let root = sqrt(d * d + 2.0 * settling * room);
@@ -201,7 +204,7 @@ impl Shape {
         (size > most).then(|| (wanted * (most / size), motion.acceleration * (-settling / root)))
     }
 
-    /// Returns the wanted velocity, and how it changes beside the goal's acceleration.
+    /// Returns the wanted velocity, and its derivative without the goal's acceleration.
     fn wanted<const D: usize>(
         &self,
         motion: &Motion<D>,
@@ -210,7 +213,7 @@ impl Shape {
     ) -> (SVector<f32, D>, SVector<f32, D>) {
         let zero = SVector::zeros();
         let Some(velocity) = goal.velocity else {
-            // The velocity for which g is this acceleration, up to the limit.
+            // The velocity for which g gives this acceleration, up to the limit.
             let size = sqrt(goal.acceleration.norm_squared());
             let ahead = motion.velocity + goal.acceleration * ((2.0 * self.d + size) / (2.0 * self.settling));
             return (capped(ahead, AIM * side(&ahead, reach.approach)), zero);
@@ -221,7 +224,7 @@ impl Shape {
         let e = motion.to(&position);
         let distance_squared = e.norm_squared();
         let root = sqrt(self.c * self.c + 2.0 * self.braking * sqrt(distance_squared));
-        // f/e and f'
+        // f(e)/e and the derivative f'.
         let (share, slope) = (2.0 * self.braking / (root + self.c), self.braking / root);
         let approach = e * share;
         let most = AIM * side(&e, reach.approach);
@@ -237,12 +240,12 @@ impl Shape {
     }
 }
 
-/// Returns the first of two limits for a vector in positive direction, the second for one in negative direction.
+/// Returns the limit for the vector's direction: the first for positive, the second for negative coordinates.
 fn side<const D: usize>(vector: &SVector<f32, D>, (up, down): (f32, f32)) -> f32 {
     if vector.iter().all(|coordinate| *coordinate < 0.0) && D == 1 { down } else { up }
 }
 
-/// Returns a vector shortened to the length `most`, if it is longer.
+/// Returns the vector, shortened to the length `most` if longer.
 pub(crate) fn capped<const D: usize>(vector: SVector<f32, D>, most: f32) -> SVector<f32, D> {
     let squared = vector.norm_squared();
     if squared <= most * most { vector } else { vector * (most / sqrt(max(squared, f32::MIN_POSITIVE))) }

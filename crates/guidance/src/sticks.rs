@@ -1,4 +1,4 @@
-//! Modes that a pilot's sticks fly.
+//! Manual modes: turns the pilot's sticks into a mode's output.
 
 use crate::lift::Lift;
 use crate::limiter::LimiterTarget;
@@ -11,17 +11,17 @@ use afbc_flight_core::RateTarget;
 use afbc_types::Setpoint;
 use nalgebra::Vector3;
 
-/// Stick at which an armed vehicle on the ground takes off.
+/// Throttle above which an armed vehicle on the ground takes off.
 const LIFTS: f32 = 0.1;
-/// Sticks up to this count as centred.
+/// Largest deflection that counts as centred.
 const CENTRE: f32 = 0.03;
 
-/// True if every stick is between -1 and 1.
+/// True if every stick is within -1 to 1.
 pub(crate) fn is_plausible(sticks: &Sticks) -> bool {
     [sticks.roll, sticks.pitch, sticks.throttle, sticks.yaw].iter().all(|stick| stick.abs() <= 1.0)
 }
 
-/// Returns what the sticks want in a mode that is [manual](FlightMode::is_manual).
+/// Returns the output of a [manual](FlightMode::is_manual) mode for these sticks.
 pub(crate) fn fly(mode: FlightMode, sticks: &Sticks, inputs: &ModeInputs<'_>, lift: &Lift) -> ModeOutput {
     let centred = |stick: f32| if stick.abs() <= CENTRE { 0.0 } else { stick };
     let (forward, left) = (centred(sticks.pitch), -centred(sticks.roll));
@@ -50,7 +50,7 @@ pub(crate) fn fly(mode: FlightMode, sticks: &Sticks, inputs: &ModeInputs<'_>, li
         }
         FlightMode::Acro => {
             let Flying { acro_roll_deg_s, acro_pitch_deg_s, acro_yaw_deg_s, .. } = inputs.flying;
-            // Not centred: the pilot's curves have what dead zone they want.
+            // Without the dead band around the centre: the pilot's transmitter may add its own.
             let rates_deg_s =
                 [sticks.roll * acro_roll_deg_s, sticks.pitch * acro_pitch_deg_s, -sticks.yaw * acro_yaw_deg_s];
             let thrust = thrust_m_s2() / lift.most_m_s2;

@@ -1,27 +1,27 @@
-//! Transitions of the flight mode: what may be selected, and what is forced. Pure functions; the table is in
-//! docs/modes.md.
+//! Transition table of the flight modes: which mode may be selected, and which is forced. Pure functions; docs/modes.md
+//! has the table.
 
 use crate::mode::FlightMode;
 use crate::order::OrderRefusal;
 
-/// What the safety net does, from the weakest to the strongest.
+/// Action of the safety net, from the weakest to the strongest.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum FailsafeAction {
-    /// Nothing.
+    /// No action.
     #[default]
     None,
-    /// An announcement.
+    /// Announcement only.
     Warn,
-    /// [`FlightMode::Hold`].
+    /// Forces [`FlightMode::Hold`].
     Hold,
-    /// [`FlightMode::Return`]; on the ground it disarms.
+    /// Forces [`FlightMode::Return`]; on the ground, disarms.
     Return,
-    /// [`FlightMode::Land`]; on the ground it disarms.
+    /// Forces [`FlightMode::Land`]; on the ground, disarms.
     Land,
 }
 
 impl FailsafeAction {
-    /// Returns the mode that it forces.
+    /// Returns the mode that the action forces, if any.
     pub const fn mode(self) -> Option<FlightMode> {
         match self {
             FailsafeAction::None | FailsafeAction::Warn => None,
@@ -31,7 +31,7 @@ impl FailsafeAction {
         }
     }
 
-    /// True if `mode` does at least as much.
+    /// True if `mode` is at least as strong as the action.
     pub const fn is_done_by(self, mode: FlightMode) -> bool {
         let does = match mode {
             FlightMode::Land => FailsafeAction::Land,
@@ -39,12 +39,12 @@ impl FailsafeAction {
             FlightMode::Hold => FailsafeAction::Hold,
             _ => FailsafeAction::Warn,
         };
-        // By number: the order that is derived is not const.
+        // Compared by number, since the derived order is not const.
         does as u8 >= self as u8
     }
 }
 
-/// What the transitions depend on.
+/// Conditions of the transitions.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct TransitionInputs {
     /// The flight core is armed.
@@ -53,29 +53,29 @@ pub struct TransitionInputs {
     pub airborne: bool,
     /// The vehicle knows where it is.
     pub positioned: bool,
-    /// The flight core descends, and no state has come back.
+    /// The flight core descends, and no state has come back yet.
     pub descends: bool,
-    /// There is an item of a mission.
+    /// There is a mission.
     pub mission: bool,
     /// There are fresh targets of a companion computer.
     pub targets: bool,
     /// There are fresh sticks of a pilot.
     pub sticks: bool,
-    /// What the safety net demands.
+    /// Action that the safety net demands.
     pub held: FailsafeAction,
 }
 
 impl TransitionInputs {
-    /// Returns what flight core and safety net demand together.
+    /// Returns the action demanded by flight core and safety net together.
     fn demanded(&self) -> FailsafeAction {
         if self.armed && self.descends { FailsafeAction::Land } else { self.held }
     }
 }
 
-/// Returns whether `mode` may be selected.
+/// Checks whether `mode` may be selected.
 ///
 /// # Errors
-/// The first reason against it.
+/// The first condition that is not met.
 pub fn select(mode: FlightMode, seen: &TransitionInputs) -> Result<(), OrderRefusal> {
     use FlightMode::{Acro, Altitude, Hold, Land, Mission, Offboard, Position, Return, Stabilised, Takeoff};
     let unless = |holds: bool, declined: OrderRefusal| if holds { Err(declined) } else { Ok(()) };
@@ -83,7 +83,7 @@ pub fn select(mode: FlightMode, seen: &TransitionInputs) -> Result<(), OrderRefu
     unless(mode != Land && !seen.positioned, OrderRefusal::NoPosition)?;
     match mode {
         Hold => Ok(()),
-        // Disarmed, it would stay a mode that nothing is armed in.
+        // A disarmed vehicle would stay in this mode, in which it cannot be armed.
         Land => unless(!seen.armed, OrderRefusal::NotArmed),
         Takeoff => unless(seen.airborne, OrderRefusal::InFlight),
         Return => unless(!seen.airborne, OrderRefusal::OnGround),
@@ -93,10 +93,10 @@ pub fn select(mode: FlightMode, seen: &TransitionInputs) -> Result<(), OrderRefu
     }
 }
 
-/// Returns the mode that is forced on an armed vehicle in `mode`, if another one is.
+/// Returns the mode forced on an armed vehicle; `None` if `mode` is already strong enough.
 pub fn forced(mode: FlightMode, seen: &TransitionInputs) -> Option<FlightMode> {
     let demanded = seen.demanded();
-    // On the ground it stays there.
+    // On the ground, stronger actions than hold do not change the mode.
     let demanded = if seen.airborne || seen.descends { demanded } else { demanded.min(FailsafeAction::Hold) };
     demanded.mode().filter(|_| seen.armed && !demanded.is_done_by(mode))
 }

@@ -1,4 +1,4 @@
-//! Offboard: targets of a companion computer.
+//! Mode offboard: follows the targets of a companion computer.
 
 use crate::lift::Lift;
 use crate::limiter::LimiterTarget;
@@ -9,25 +9,25 @@ use afbc_flight_core::Stamped;
 use afbc_types::Setpoint;
 use nalgebra::Vector3;
 
-/// Largest values that are taken \[m, m/s, m/s2, rad, rad/s\].
+/// Largest accepted values of position, velocity, acceleration, angle and rate \[m, m/s, m/s2, rad, rad/s\].
 const MOST: [f32; 5] = [1e5, 1e3, 1e2, 1e3, 1e2];
-/// Height above the vehicle \[m\] and speed upwards \[m/s\] at which a target means to take off; likewise the share of
-/// the weight that a thrust carries.
+/// A target means take-off if it is this far above the vehicle \[m\], or moves up this fast \[m/s\] (as an
+/// acceleration: m/s2), or if its thrust carries this share of the weight.
 const LIFTS_M: f32 = 0.1;
 const LIFTS_M_S: f32 = 0.05;
 const LIFTS_SHARE: f32 = 0.8;
 
-/// Follows targets.
+/// Memory of mode offboard.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Targets {
-    /// Place of the last target that was relative to the vehicle, and the time of its message \[m, us\].
+    /// Last target in body coordinates: time of its message \[us\], place \[m\] and heading \[rad\] in the local frame.
     body: Option<(u64, Vector3<f32>, f32)>,
 }
 
-/// True if every value of a target is plausible or NaN where that is allowed.
+/// True if every value is plausible, or NaN where allowed.
 pub(crate) fn is_plausible(target: &OffboardTarget) -> bool {
     let [position, velocity, acceleration, angle, rate] = MOST;
-    // True of infinite numbers, not of NaN.
+    // True for infinite numbers, false for NaN.
     let is_beyond = |value: f32, most: f32| value.abs() > most;
     let all = |vector: &Vector3<f32>, most: f32| !vector.iter().any(|value| is_beyond(*value, most));
     match target {
@@ -62,7 +62,7 @@ impl Targets {
             let (s, c) = (sin(inputs.present.yaw_rad), cos(inputs.present.yaw_rad));
             let turned = |v: Vector3<f32>| Vector3::new(c * v.x - s * v.y, s * v.x + c * v.y, v.z);
             (velocity_m_s, acceleration_m_s2) = (turned(velocity_m_s), turned(acceleration_m_s2));
-            // The place was meant from where the vehicle was.
+            // The place is relative to the vehicle at the arrival of the message. Keep it for later ticks.
             let (sent_us, place_m, place_yaw_rad) = self.body.filter(|(sent_us, ..)| *sent_us == at_us).unwrap_or((
                 at_us,
                 inputs.state.position_m + turned(position_m),
@@ -77,7 +77,8 @@ impl Targets {
         } else {
             up_m > LIFTS_M
         };
-        // Who sends a whole trajectory has begun it. One that is not given is NaN, and so is the sum; none is infinite.
+        // A sender of a complete trajectory has begun it, so take off. The sum is NaN if any part is not given;
+        // plausible parts are finite.
         let complete = !(position_m + velocity_m_s + acceleration_m_s2).sum().is_nan();
         let lifts = lifts || complete;
         let aim = LimiterTarget {
@@ -86,11 +87,11 @@ impl Targets {
             acceleration_m_s2,
             yaw_rad: aim_yaw_rad,
             yaw_rate_rad_s,
-            // Places relative to the vehicle of each moment are no trajectory that could pass.
+            // Body-frame places follow the vehicle, and form no trajectory that could pass the limiter.
             sent_us: (!motion.body).then_some(at_us),
             ..inputs.stop()
         };
-        // A companion computer is not bound to the usual speed.
+        // Offboard targets are not bound to the cruise speed.
         let aim = LimiterTarget { speed_m_s: min(inputs.limits.speed_m_s, inputs.speed_m_s), ..aim };
         ModeOutput { lifts, ..ModeOutput::fly(aim) }
     }

@@ -1,5 +1,5 @@
-//! How modes and flights end, what bars the next one, and where the setpoint begins: with a vehicle that is where the
-//! test puts it.
+//! Tests how modes and flights end, what bars the next arming, and where the setpoint restarts. The test places the
+//! vehicle.
 
 use crate::fixture::*;
 use afbc_flight_core::landing::LEFT_M;
@@ -8,7 +8,7 @@ use afbc_guidance::*;
 use afbc_types::{Setpoint, State};
 use nalgebra::Vector3;
 
-/// When the motors stop, a mode that flies by itself becomes hold, and what was ordered is forgotten.
+/// After disarming, an autonomous mode becomes hold, and orders are forgotten.
 #[test]
 fn after_a_flight_it_holds() {
     for (mode, becomes) in [
@@ -31,8 +31,8 @@ fn after_a_flight_it_holds() {
     }
 }
 
-/// On the ground it asks for the motors to stop: at once when it lands, after a while otherwise, and ten times per
-/// second until they do; never in the air, nor if the time is zero.
+/// On the ground the guidance requests disarming: at once when landing, otherwise after a time, repeated ten times per
+/// second until granted. It never does so in the air, nor if the time is zero.
 #[test]
 fn it_asks_to_disarm_on_the_ground() {
     let asks = |fixture: &mut Fixture, ticks: u32| -> Vec<u32> {
@@ -53,7 +53,7 @@ fn it_asks_to_disarm_on_the_ground() {
     assert!(times.len() == 4 && (998..=1002).contains(times.first().unwrap()), "{times:?}");
     assert!(times.iter().zip(times.iter().skip(1)).all(|(one, next)| (99..=101).contains(&(next - one))), "{times:?}");
     assert_eq!(fixture.said, [Notice::Disarms]);
-    // After a flight it is another time, from the touch-down on.
+    // After a flight another time applies, from touchdown on.
     fixture.airborne = true;
     assert_eq!(asks(&mut fixture, 3000), []);
     fixture.airborne = false;
@@ -61,7 +61,7 @@ fn it_asks_to_disarm_on_the_ground() {
     assert!((498..=502).contains(times.first().unwrap()), "{times:?}");
     assert_eq!(fixture.said, [Notice::Disarms; 2]);
     assert_eq!(asks(&mut armed(timed(0.0, 0.0)), 5000), [], "never");
-    // Disarmed in between, the time begins anew.
+    // Disarming in between restarts the time.
     let mut fixture = armed(timed(1.0, 0.5));
     assert_eq!(asks(&mut fixture, 900), []);
     fixture.core = Mode::Disarmed;
@@ -74,15 +74,14 @@ fn it_asks_to_disarm_on_the_ground() {
     assert_eq!(asks(&mut fixture, 500), []);
     fixture.airborne = false;
     assert_eq!(asks(&mut fixture, 150), [1, 101]);
-    // One that shall take off does not wait.
+    // A vehicle that is about to take off does not wait.
     let mut fixture = armed(timed(0.5, 0.5));
     fixture.run(10);
     fixture.order(Order::TakeOff(None)).unwrap();
     assert_eq!(asks(&mut fixture, 2000), []);
 }
 
-/// What speaks against arming besides what the flight core sees: a battery that is not known or low, sensors, the
-/// fence.
+/// The guidance's own reasons against arming: battery unknown or low, failed sensors, outside the fence.
 #[test]
 fn what_bars_arming_has_its_limits() {
     let bars = |change: &dyn Fn(&mut Fixture)| {
@@ -108,7 +107,7 @@ fn what_bars_arming_has_its_limits() {
         fixture.state.as_mut().unwrap().position_m.y = 15.0;
     });
     assert_eq!(both, [Refusal::SensorFailed, Refusal::OutsideFence]);
-    // Not watched without cells, and never known before the first reading.
+    // A battery without cells is not monitored. With cells, its charge is unknown before the first plausible reading.
     assert!(Fixture::new(Settings::DEFAULT).run(1100).against.is_empty());
     let net = Net { cells: 3, ..Net::DEFAULT };
     let mut fixture = Fixture::new(Settings { net, ..Settings::DEFAULT });
@@ -116,12 +115,13 @@ fn what_bars_arming_has_its_limits() {
     assert!(fixture.run(1100).against.iter().eq([Refusal::BatteryLow]));
 }
 
-/// The setpoint begins anew at a vehicle that is farther from it than its leash, or than a short one when the mode
-/// changes or the state returns, both longer by a second's way; likewise at one that then moves otherwise. One that
-/// passes unchanged, as a place that is held, does not.
+/// The setpoint restarts at a vehicle farther away than a limit, which is tighter when the mode changes or the state
+/// returns, and grows by the distance flown in a second. On such a change it also restarts if the velocity differs. A
+/// setpoint that passes the limiter unchanged, such as a held place, does not restart.
 #[test]
 fn the_setpoint_keeps_to_the_vehicle() {
-    // A vehicle beside its setpoint by this and a second's way, times a share, at another velocity by this.
+    // Places the vehicle at `off` plus a second's distance, times `share`, from its setpoint, with a velocity off by
+    // `other_m_s`.
     let begins_anew = |off: Vector3<f32>, share: f32, other_m_s: Vector3<f32>, change: &dyn Fn(&mut Fixture)| {
         let mut fixture = Fixture::flying(Settings::DEFAULT);
         let order = Order::GoTo { position_m: Vector3::new(1.0, 90.0, 8.0), yaw_rad: NAN, speed_m_s: Some(0.5) };
@@ -171,8 +171,8 @@ fn the_setpoint_keeps_to_the_vehicle() {
     assert!((fixture.setpoint().position_m - Vector3::new(1.0, 2.0, 8.0)).norm() < 0.01, "a place that is held");
 }
 
-/// A take-off that does not leave the ground is given up after ten seconds: on the ground it rests, and one that the
-/// flight core believes in the air without having left, with rotors that give all they can, lands.
+/// A take-off that does not leave the ground is given up after 10 s. On the ground the vehicle then idles. If the
+/// flight core reports it in the air, but it has not moved and the rotors are exhausted, it lands.
 #[test]
 fn a_takeoff_without_lift_is_given_up() {
     let takes_off = |airborne: bool, given_m_s2: Option<f32>, up_m: f32| {
@@ -196,25 +196,26 @@ fn a_takeoff_without_lift_is_given_up() {
     assert!(after.is_some_and(|ticks| (9_990..10_010).contains(&ticks)), "{after:?}");
     assert_eq!((mode, rests), (FlightMode::Land, false));
     assert_eq!(said, [Notice::Mode(FlightMode::Land, ModeReason::NoLift)]);
-    // With thrust to spare it flies, unless it does not follow: the setpoint is a metre away a second later.
+    // With thrust in reserve it counts as flying, unless it does not follow: the setpoint is 1 m away after about a
+    // second.
     for given_m_s2 in [Some(1.7 * G), None] {
         let (after, mode, ..) = takes_off(true, given_m_s2, 0.0);
         assert!(after.is_some_and(|ticks| (10_500..12_000).contains(&ticks)), "{after:?}");
         assert_eq!(mode, FlightMode::Land);
     }
-    // Off the ground it flies.
+    // Off the ground it is flying.
     assert_eq!(takes_off(true, exhausted, 1.1 * LEFT_M).0, None);
-    // Not in the air it has not left, wherever its tracker says that it is.
+    // If the flight core reports it on the ground, a position change alone does not count as leaving.
     assert!(takes_off(false, None, 1.1 * LEFT_M).0.is_some());
 }
 
-/// A landing vehicle that stays above its setpoint stands on the ground: its motors idle for a while, unless it falls.
-/// Without an inertial sensor its motion follows from its thrust, and a descent of the flight core has a setpoint of
-/// its own: then this is left out.
+/// A landing vehicle that stays above its setpoint has touched the ground: its motors idle for a while, unless it
+/// falls. The check is off without an inertial sensor, since the motion then follows from the thrust, and while the
+/// flight core descends.
 #[test]
 fn a_touch_idles_the_motors_of_a_landing_vehicle() {
-    // Ticks after which the motors idle, and number of ticks for which they do, of a vehicle that stops sinking, has
-    // this velocity until they idle, and then that one.
+    // Returns the first tick with idle motors and their number. The vehicle stops following its setpoint, and sinks
+    // with one velocity until the motors idle, and another afterwards.
     let idles = |inertial: bool, core: Mode, [before, after]: [f32; 2], mode: FlightMode| {
         let mut fixture = Fixture::flying(Settings::DEFAULT);
         fixture.sensors.inertial = inertial;
@@ -238,7 +239,7 @@ fn a_touch_idles_the_motors_of_a_landing_vehicle() {
         (first, count)
     };
     let land = |velocities: [f32; 2]| idles(false, Mode::Flying, velocities, FlightMode::Land);
-    // It falls behind by 0.3 m within some 0.4 s at 0.7 m/s, and 0.1 s count.
+    // At 0.7 m/s, it falls behind by 0.3 m within about 0.4 s, and the check takes 0.1 s.
     let (first, count) = land([0.0; 2]);
     assert!(first.is_some_and(|first| (450..700).contains(&first)), "{first:?}");
     assert!((2990..=3010).contains(&count), "{count}");
@@ -251,7 +252,7 @@ fn a_touch_idles_the_motors_of_a_landing_vehicle() {
     assert_eq!(idles(false, Mode::Flying, [0.0; 2], FlightMode::Hold).0, None, "no landing");
 }
 
-/// What a mode has reached, hold keeps: the end of a take-off, or the last waypoint.
+/// Hold keeps the place that a mode has reached: the end of a take-off, or the last waypoint.
 #[test]
 fn what_is_reached_is_held() {
     let mut fixture = Fixture::new(Settings::DEFAULT);
@@ -268,14 +269,14 @@ fn what_is_reached_is_held() {
     fixture.select(FlightMode::Mission).unwrap();
     fixture.run(12_000);
     assert_eq!((fixture.guidance.mode(), fixture.place()), (FlightMode::Hold, end), "not where it was within 1.5 m");
-    // An item that cannot be flown ends a mission where it is.
+    // An item that cannot be flown ends the mission at the present place.
     fixture.orders.leg = Some(Leg { number: 0, upload: 2, item: Item::Speed(NAN), is_last: true });
     fixture.said.clear();
     fixture.select(FlightMode::Mission).unwrap();
     fixture.run(3000);
     assert_eq!((fixture.guidance.mode(), fixture.place()), (FlightMode::Hold, end));
     assert!(fixture.said.contains(&Notice::ItemRefused), "{:?}", fixture.said);
-    // On the ground a hold is where the vehicle stands.
+    // On the ground, hold is where the vehicle stands.
     fixture.airborne = false;
     fixture.state = Some(at(3.0, 3.0, 3.0));
     fixture.run(10);
@@ -284,7 +285,7 @@ fn what_is_reached_is_held() {
     assert_eq!(fixture.place(), Vector3::new(3.0, 3.0, 3.0));
 }
 
-/// An ending of a mission in the air leaves the setpoint where it is; on the ground it stays there.
+/// A mission may end in another mode, in the air and on the ground.
 #[test]
 fn a_mission_may_end_in_another_mode() {
     for airborne in [true, false] {
@@ -302,8 +303,8 @@ fn a_mission_may_end_in_another_mode() {
     }
 }
 
-/// With the sticks in altitude mode position and velocity are the vehicle's horizontally, the height is held, and the
-/// lean is what the sticks say.
+/// In altitude mode, horizontal position and velocity are the vehicle's own, the height is held, and the sticks command
+/// the lean.
 #[test]
 fn leaning_keeps_to_the_vehicle_horizontally() {
     let mut fixture = Fixture::flying(Settings::DEFAULT);
@@ -314,7 +315,7 @@ fn leaning_keeps_to_the_vehicle_horizontally() {
         fixture.orders.sticks = Some(Stamped { value, at_us: fixture.now_us });
         let x = 1.0 + tick as f32 * 2e-3;
         let mut state = State { velocity_m_s: Vector3::new(2.0, 0.1, 0.0), ..at(x, 2.0, 8.1) };
-        // As the sticks want.
+        // The tilt that the sticks command.
         state.attitude_rad.y = 0.3;
         fixture.state = Some(state);
         if tick == 0 {
@@ -330,7 +331,7 @@ fn leaning_keeps_to_the_vehicle_horizontally() {
     assert!((setpoint.acceleration_m_s2 - Vector3::new(lean, 0.0, 0.0)).norm() < 0.05, "{setpoint:?}");
 }
 
-/// A mission that is cleared ends in hold, in the air and on the ground, and cannot be selected any more.
+/// A cleared mission ends in hold, in the air and on the ground, and cannot be selected any more.
 #[test]
 fn a_mission_that_is_cleared_is_not_flown_on() {
     for airborne in [true, false] {
@@ -358,7 +359,7 @@ fn a_mission_that_is_cleared_is_not_flown_on() {
     }
 }
 
-/// The item that is chosen of a new mission is flown, whatever was flown before it.
+/// An item selected in a new mission is flown, whatever was flown before.
 #[test]
 fn an_item_is_chosen_of_the_mission_that_there_is() {
     let mut fixture = Fixture::flying(Settings::DEFAULT);

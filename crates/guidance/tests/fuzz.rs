@@ -1,4 +1,4 @@
-//! Whatever comes in, setpoints are finite and within the limits.
+//! For arbitrary inputs, setpoints are finite and within the limits.
 
 use afbc_flight_core::{Mode, Queue, Stamped, Ticketed};
 use afbc_guidance::*;
@@ -6,7 +6,7 @@ use afbc_types::{Setpoint, State};
 use nalgebra::{Quaternion, Unit, Vector3};
 use proptest::prelude::*;
 
-/// Any number, often one that is no good.
+/// Any number, often an invalid one.
 fn any_number() -> impl Strategy<Value = f32> {
     prop_oneof![
         6 => -20.0_f32..20.0,
@@ -21,7 +21,7 @@ fn vector() -> impl Strategy<Value = Vector3<f32>> {
     [any_number(), any_number(), any_number()].prop_map(Vector3::from)
 }
 
-/// A state that is usually near the last one.
+/// A plausible state, an arbitrary one, or none.
 fn state() -> impl Strategy<Value = Option<State>> {
     let sane = ([-50.0_f32..50.0, -50.0_f32..50.0, 0.0_f32..50.0], [-9.0_f32..9.0, -9.0_f32..9.0, -3.0_f32..3.0])
         .prop_map(|(p, v)| State { position_m: p.into(), velocity_m_s: v.into(), ..State::default() });
@@ -112,7 +112,7 @@ fn item() -> impl Strategy<Value = Item> {
     ]
 }
 
-/// Some ticks with the same input.
+/// Several ticks with the same input.
 #[derive(Clone, Debug)]
 struct Spell {
     ticks: u16,
@@ -203,7 +203,7 @@ fn check(
     let Setpoint { velocity_m_s: v, acceleration_m_s2: a, .. } = setpoint;
     prop_assert!(v.xy().norm() <= limits.speed_m_s * hair, "{:?}", setpoint);
     prop_assert!(v.z <= limits.up_m_s * hair && -v.z <= limits.down_m_s * hair, "{:?}", setpoint);
-    // On the ground a landing vehicle is asked for little thrust, level, with a correction.
+    // While landing, the setpoint may command a thrust well below the weight.
     let lands = matches!(guided.mode, FlightMode::Land | FlightMode::Return);
     let off = a + Vector3::new(0.0, 0.0, 0.7 * sight.lift.gravity_m_s2);
     let settles = lands && off.xy().norm() <= 5.0 * hair && off.z.abs() <= 5.0 * hair;

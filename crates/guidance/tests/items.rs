@@ -1,4 +1,4 @@
-//! Circles, waits, turns and jumps; and what the uploaded geofence stops.
+//! Tests of orbits, waits, turns and jumps, and of stops at the uploaded geofence.
 
 use crate::bench::{Bench, motion, settings};
 use afbc_flight_core::Mode;
@@ -15,7 +15,7 @@ fn turned(from_rad: f32, to_rad: f32) -> f32 {
     (to_rad - from_rad + 3.0 * PI).rem_euclid(TAU) - PI
 }
 
-/// At its radius, its speed and its height, in its direction, and heading where it shall.
+/// An orbit keeps its radius, speed, height, direction and heading.
 #[test]
 fn a_circle_is_flown_as_ordered() {
     let centre = Vector3::new(20.0, 10.0, 6.0);
@@ -44,7 +44,7 @@ fn a_circle_is_flown_as_ordered() {
                 assert!(turned(wanted, bench.state.attitude_rad.z).abs() < 0.1, "{heading:?}");
             }
             assert!((gone - 20.0 * speed / radius).abs() < 0.1, "{gone}");
-            // Any other order ends it.
+            // Any other order ends the orbit.
             bench.select(FlightMode::Hold).unwrap();
             assert!(!bench.tick().orbits);
         }
@@ -58,7 +58,7 @@ fn a_circle_ends_after_its_angle() {
     bench.run_until(60.0, |guided| guided.orbits);
     let took = bench.run_until(60.0, |guided| !guided.orbits);
     bench.run(5.0);
-    // From the nearest point of the circle, a quarter to the left.
+    // A quarter turn to the left, from the nearest point of the circle.
     let centre = Vector3::new(20.0, 10.0, 6.0);
     let near = -centre.xy().normalize();
     let end = centre.xy() + nalgebra::Vector2::new(-near.y, near.x) * 10.0;
@@ -88,12 +88,12 @@ fn a_circle_that_cannot_be_flown_is_refused() {
     };
     let around = |centre_m| Order::Orbit { centre_m, radius_m, speed_m_s, angle_deg, heading };
     assert_eq!(bench.order(around(Vector3::new(2e5, 0.0, 5.0))), Err(OrderRefusal::OutOfRange));
-    // Where it is, at the usual speed.
+    // Around the present place, at the default speed.
     let here = bench.state.position_m;
     assert_eq!(bench.order(around(Vector3::repeat(f32::NAN))), Ok(()));
     bench.run(20.0);
     assert!(((bench.state.position_m - here).xy().norm() - 10.0).abs() < 0.5);
-    // The cylinder around home.
+    // The fence around home.
     let fenced = Settings { net: Net { fence_radius_m: 25.0, ..Net::DEFAULT }, ..settings() };
     let mut bench = Bench::hovering(fenced);
     assert_eq!(bench.order(around(Vector3::new(16.0, 0.0, 5.0))), Err(OrderRefusal::OutsideFence));
@@ -110,7 +110,7 @@ fn waypoint(x: f32, y: f32) -> Item {
     }
 }
 
-/// A mission that flies.
+/// Returns a bench that flies a mission.
 fn flying(items: Vec<Item>) -> Bench {
     let mut bench = Bench::hovering(settings());
     bench.items = items;
@@ -128,7 +128,7 @@ fn a_mission_waits_where_it_is() {
     bench.run_until(30.0, |guided| guided.reached == Some(2));
 }
 
-/// Two circles and a half around a place, from where it comes.
+/// Two and a half circles around a place, starting where the vehicle arrives.
 #[test]
 fn a_mission_flies_circles() {
     for radius_m in [8.0, -8.0, 0.0] {
@@ -153,7 +153,7 @@ fn a_mission_flies_circles() {
     }
 }
 
-/// Headings and angles, each way round.
+/// Absolute headings and relative angles, in both directions.
 #[test]
 fn a_mission_turns() {
     let yaw = |yaw_rad, relative, direction| Item::Yaw { yaw_rad, relative, direction };
@@ -180,13 +180,13 @@ fn a_mission_turns() {
             assert!(bench.now_us < 100_000_000, "{item:?}");
         }
         assert!((seen - gone).abs() < 0.06, "{item:?}: {seen}");
-        // And keeps it.
+        // The heading is kept.
         bench.run(0.9);
         assert!(turned(last, bench.state.attitude_rad.z).abs() < 0.05);
     }
 }
 
-/// From the item on, until it is over.
+/// The region of interest counts from its item until another one ends it.
 #[test]
 fn a_mission_looks_at_a_place() {
     let at_m = Vector3::new(10.0, 20.0, 0.0);
@@ -216,7 +216,7 @@ fn go(x: f32) -> Order {
     Order::GoTo { position_m: Vector3::new(x, 0.0, 5.0), yaw_rad: f32::NAN, speed_m_s: None }
 }
 
-/// A vehicle that is about to leave stops, in every mode that would go on; with warnings only it flies on.
+/// A vehicle about to leave the fence stops in every mode that would go on. With a warning only, it flies on.
 #[test]
 fn the_uploaded_fence_stops_what_would_leave_it() {
     let leaves = Some(FenceView { leaves: true, outside: false });
@@ -233,19 +233,19 @@ fn the_uploaded_fence_stops_what_would_leave_it() {
         if action.action() == FailsafeAction::Hold {
             assert_eq!((mode, bench.state.velocity_m_s.norm() < 0.05), (FlightMode::Hold, true));
             assert_eq!(bench.said, [Notice::Found(Cause::Fence)]);
-            // Back inside.
+            // It may fly back inside.
             bench.order(go(5.0)).unwrap();
             bench.orders.fence = Some(FenceView::default());
             bench.run(15.0);
             assert!((bench.state.position_m.x - 5.0).abs() < 0.1);
         }
-        // A circle, too.
+        // An orbit stops, too.
         let mut bench = Bench::hovering(with);
         bench.order(orbit(10.0, 2.0, 0, OrbitHeading::Centre)).unwrap();
         bench.run(5.0);
         bench.orders.fence = leaves;
         assert_eq!(bench.tick().orbits, !stops, "{action:?}");
-        // A mission and targets are replaced by what is stronger.
+        // The failsafe replaces a mission.
         bench.orders.fence = None;
         let mut bench = flying(vec![waypoint(80.0, 0.0)]);
         bench.guidance.set(with).unwrap();
@@ -255,7 +255,7 @@ fn the_uploaded_fence_stops_what_would_leave_it() {
     }
 }
 
-/// A return that has stopped and climbed, and would cross the fence then, lands; one that only stops does not.
+/// A return that would cross the fence lands, if it has stopped and climbed. One that still stops does not.
 #[test]
 fn a_return_across_the_fence_lands() {
     for (wait_s, lands) in [(0.5, false), (12.0, true)] {
@@ -285,7 +285,7 @@ fn outside_the_uploaded_fence_nothing_takes_off() {
     bench.aim(OffboardTarget::Motion(motion(Vector3::new(1.0, 0.0, 5.0))));
 }
 
-/// The nearest safe place is where a return lands, once begun whatever is nearer then.
+/// A return lands at the safe place that was nearest when it began.
 #[test]
 fn a_return_lands_at_the_nearest_safe_place() {
     let mut bench = Bench::hovering(settings());

@@ -1,5 +1,5 @@
-//! The trajectory limiter: its limits hold, its outputs fit one another, it arrives without overshoot, and what is a
-//! flight already passes unchanged.
+//! The trajectory limiter keeps its limits, its outputs are consistent, it arrives without overshoot, and a feasible
+//! stream passes unchanged.
 
 use afbc_guidance::{Limiter, LimiterTarget, Limits};
 use afbc_types::{Setpoint, State};
@@ -8,7 +8,7 @@ use proptest::prelude::*;
 
 const DT_S: f32 = 1e-3;
 
-/// Limits of vehicles from nimble to slow.
+/// Limits of vehicles from agile to slow.
 fn limits() -> impl Strategy<Value = Limits> {
     (0.5_f32..20.0, 0.3_f32..6.0, 0.2_f32..4.0, 0.5_f32..10.0, 0.5_f32..8.0, 0.3_f32..5.0).prop_map(
         |(speed_m_s, up_m_s, down_m_s, acceleration_m_s2, vertical_acceleration_m_s2, jerk_s)| Limits {
@@ -39,7 +39,7 @@ fn anchored(limits: Limits, state: &State) -> Limiter {
     limiter
 }
 
-/// Checks a setpoint against the limits, and against the one before: each derivative is that of the last.
+/// Checks a setpoint against the limits, and its derivatives against the setpoint before.
 fn check(limits: &Limits, last: &Setpoint, next: &Setpoint) -> Result<(), TestCaseError> {
     let hair = 1.0 + 1e-4;
     let Setpoint { velocity_m_s: v, acceleration_m_s2: a, jerk_m_s3: j, .. } = next;
@@ -51,7 +51,7 @@ fn check(limits: &Limits, last: &Setpoint, next: &Setpoint) -> Result<(), TestCa
     prop_assert!(j.xy().norm() <= limits.jerk_max_m_s3 * hair && j.z.abs() <= limits.jerk_max_m_s3 * hair, "{j:?}");
     prop_assert!(next.yaw_rate_rad_s.abs() <= limits.yaw_rate_rad_s * hair);
     prop_assert!(next.yaw_acceleration_rad_s2.abs() <= limits.yaw_acceleration_rad_s2 * hair);
-    // A step at constant jerk. What is left is the resolution of single precision, and the moment of arrival.
+    // A step of constant jerk. The tolerances cover single precision and the moment of arrival.
     let size_m = last.position_m.map(f32::abs).max().max(1.0);
     let off_m = next.position_m - last.position_m - (last.velocity_m_s + last.acceleration_m_s2 * (0.5 * DT_S)) * DT_S;
     prop_assert!(off_m.norm() < 1.5e-4 + 4e-7 * size_m, "{last:?} {next:?}");
@@ -62,7 +62,7 @@ fn check(limits: &Limits, last: &Setpoint, next: &Setpoint) -> Result<(), TestCa
     Ok(())
 }
 
-/// Time that a flight takes at most, with some to settle \[s\].
+/// Returns an upper bound of a flight's duration, including settling \[s\].
 fn time_s(limits: &Limits, from_m: &Vector3<f32>, to_m: &Vector3<f32>) -> f32 {
     let way_m = to_m - from_m;
     let one = |way_m: f32, speed: f32, acceleration: f32| {
@@ -76,7 +76,7 @@ fn time_s(limits: &Limits, from_m: &Vector3<f32>, to_m: &Vector3<f32>) -> f32 {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 48, ..ProptestConfig::default() })]
 
-    /// From rest: straight, without overshoot, to the place itself.
+    /// From rest, the flight is straight, does not overshoot, and ends exactly at the place.
     #[test]
     fn a_jump_is_a_flight(limits in limits(), from_m in place(100.0), to_m in place(100.0), yaw in -7.0_f32..7.0) {
         let mut limiter = anchored(limits, &State { position_m: from_m, ..State::default() });
@@ -88,7 +88,7 @@ proptest! {
             check(&limits, &last, &next)?;
             let at_m = next.position_m - from_m;
             let across_m = (at_m.x * way_m.y - at_m.y * way_m.x) / way_m.xy().norm().max(1e-3);
-            // A hundred-thousandth of the way is the resolution of its direction, summed up.
+            // The tolerance covers the accumulated rounding of the direction.
             prop_assert!(across_m.abs() < 1e-3 + 2e-5 * way_m.xy().norm(), "{across_m} m beside the line");
             let beyond_m = at_m.xy().dot(&way_m.xy().normalize()) - way_m.xy().norm();
             prop_assert!(beyond_m < 0.01, "{beyond_m} m too far");
@@ -102,7 +102,7 @@ proptest! {
         prop_assert!(yaw_error.min(core::f32::consts::TAU - yaw_error) < 2e-3);
     }
 
-    /// Whatever is asked for in whatever motion, the limits hold.
+    /// The limits hold for any targets, at any motion.
     #[test]
     fn limits_hold_while_targets_change(
         limits in limits(),
@@ -133,7 +133,7 @@ proptest! {
         }
     }
 
-    /// A flight that fits the limits, sent at any rate, is caught up with and passes to the bit, through jitter too.
+    /// A feasible trajectory, sent at any rate, is caught up with and passes to the bit, even with jitter.
     #[test]
     fn a_feasible_stream_passes_unchanged(
         radius_m in 1.0_f32..20.0,
@@ -167,7 +167,7 @@ proptest! {
             let late = if jitter { (tick / interval * 7) % 3 } else { 0 };
             let is_news = tick >= sent + interval + late || tick == 0;
             if is_news {
-                // What it says is true at its time, which is up to 2 ms before.
+                // The message describes the time of sending, up to 2 ms ago.
                 (sent, target) = (tick - late, at((tick - late) as f32 * DT_S));
                 target.sent_us = Some(u64::from(sent));
             }
@@ -193,13 +193,13 @@ proptest! {
     }
 }
 
-/// What does not fit together does not pass: small steps add up, and a jump is flown.
+/// A stream that does not fit together does not pass: small misfits add up, and jumps are flown.
 #[test]
 fn a_stream_that_is_no_flight_does_not_pass() {
     let limits = Limits::DEFAULT;
     let mut limiter = anchored(limits, &State::default());
     for tick in 0..3000_u32 {
-        // 1 cm per tick: 10 m/s, without saying so, and 40 m/s2.
+        // 1 cm per tick means 10 m/s, but the message says zero velocity.
         let position_m = Vector3::new(0.01 * tick as f32, 0.0, 0.0);
         let velocity_m_s = Vector3::zeros();
         limiter.advance(
@@ -211,7 +211,7 @@ fn a_stream_that_is_no_flight_does_not_pass() {
     assert!(!limiter.passes() && setpoint.acceleration_m_s2.norm() > 0.1, "{setpoint:?}");
 }
 
-/// Far from the origin, single precision resolves less than the way of a step.
+/// Far from the origin, a step is smaller than the resolution of single precision.
 #[test]
 fn it_arrives_far_from_the_origin() {
     for far_m in [1e3, 3e4, 9e4] {

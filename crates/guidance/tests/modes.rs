@@ -1,4 +1,4 @@
-//! Every mode, flown by a point mass, ends where it should.
+//! A point mass flies every mode, and each ends where it should.
 
 use crate::bench::{Bench, motion, settings};
 use afbc_flight_core::Mode;
@@ -118,7 +118,7 @@ fn flies_a_mission() {
         bench.tick();
         fastest_m_s = fastest_m_s.max(bench.state.velocity_m_s.xy().norm());
         let guided = bench.last.unwrap();
-        // Its last item is current until it has landed: stations take 0 for a mission that begins.
+        // The last item stays requested until the landing: 0 would tell stations that the mission restarts.
         if guided.mode == FlightMode::Land && !bench.reached.contains(&4) {
             assert_eq!(guided.wanted, 4);
             landed_ticks += 1;
@@ -171,7 +171,7 @@ fn offboard_takes_off_follows_and_holds_when_targets_end() {
     assert_eq!(bench.select(FlightMode::Offboard), Ok(()));
     send(&mut bench, target, 15.0);
     assert!((bench.state.position_m - target.position_m).norm() < 0.01, "{:?}", bench.state);
-    // Velocity along the body, turned by the heading.
+    // Body-frame velocity, turned by the heading.
     let none = Vector3::repeat(f32::NAN);
     let velocity = MotionTarget { velocity_m_s: Vector3::new(2.0, 0.0, 0.0), yaw_rad: 0.0, body: true, ..motion(none) };
     send(&mut bench, velocity, 4.0);
@@ -201,7 +201,7 @@ fn attitude_and_thrust_become_an_acceleration() {
     assert!(bench.state.velocity_m_s.norm() < 0.05, "{:?}", bench.state);
 }
 
-/// Rates are commanded in acro mode alone, and in the air.
+/// Body rates are commanded in acro mode only.
 #[test]
 fn acro_commands_rates() {
     let mut bench = Bench::hovering(settings());
@@ -223,7 +223,7 @@ fn acro_commands_rates() {
     fly(&mut bench, 1);
     assert_eq!(bench.guidance.rates(), None);
     assert_eq!(bench.select(FlightMode::Acro), Ok(()));
-    // Without sticks it holds, by the setpoint.
+    // When the sticks are lost, it holds by a setpoint again.
     bench.run(1.0);
     assert_eq!((bench.guidance.mode(), bench.guidance.rates()), (FlightMode::Hold, None));
 }

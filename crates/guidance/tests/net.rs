@@ -1,4 +1,4 @@
-//! The safety net: every cause with every action, alone and in pairs; announcements; checks before arming.
+//! Tests of the safety net: every cause with every action, alone and in pairs; announcements; checks before arming.
 
 use crate::bench::{Bench, motion, settings};
 use afbc_flight_core::{Mode, Refusal};
@@ -6,7 +6,7 @@ use afbc_guidance::*;
 use afbc_types::{Choice, Declared, State};
 use nalgebra::Vector3;
 
-/// Causes that a test can bring about in flight, with the numbers of their parameter and the mode of each.
+/// Returns causes that a test can trigger in flight, each with its parameter's choices and the action of each choice.
 fn causes() -> Vec<(Cause, Vec<(usize, FailsafeAction)>)> {
     use FailsafeAction::{Hold, Land, None, Return, Warn};
     vec![
@@ -41,7 +41,7 @@ fn charge(charge: f32) -> Option<BatteryReading> {
     Some(BatteryReading { voltage_v: 3.0 * (3.6 + 0.45 * charge), current_a: 0.0, charge: None })
 }
 
-/// A vehicle in offboard mode, far from the fence, with everything as it should be.
+/// Returns a vehicle in offboard mode, far from the fence, without any cause for a failsafe.
 fn offboard(settings: Settings) -> Bench {
     let mut bench = Bench::hovering(settings);
     bench.battery = charge(0.8);
@@ -52,7 +52,7 @@ fn offboard(settings: Settings) -> Bench {
     bench
 }
 
-/// Flies on, with targets that come.
+/// Flies on while targets keep arriving.
 fn stream(bench: &mut Bench, time_s: f32) {
     for tick in 0..(time_s * 1000.0) as u32 {
         if let (0, Some(target)) = (tick % 100, bench.orders.target) {
@@ -73,7 +73,7 @@ fn bring_about(bench: &mut Bench, cause: Cause) {
     }
 }
 
-/// Flies for a time in which every cause is found, without what it does about the fence.
+/// Flies long enough for every cause to be found. Keeps the vehicle outside the fence if it was.
 fn find(bench: &mut Bench) {
     let outside = bench.state.position_m.x > 30.5;
     for tick in 0..14_000 {
@@ -117,13 +117,13 @@ fn every_cause_does_what_its_parameter_says_and_is_announced_once() {
     }
 }
 
-/// Of two causes the stronger action counts, whichever comes first.
+/// Of two causes, the stronger action wins in either order.
 #[test]
 fn of_every_pair_the_stronger_action_counts() {
     for (first, of_first) in causes() {
         for (second, of_second) in causes() {
             let one_parameter = |cause| matches!(cause, Cause::BatteryCritical | Cause::BatteryEmergency);
-            // Targets are lost in offboard mode only, which another cause may have ended.
+            // Targets can be lost in offboard mode only, which the first cause may have ended.
             if first == second || one_parameter(first) && one_parameter(second) || second == Cause::Targets {
                 continue;
             }
@@ -182,7 +182,7 @@ fn on_the_ground_a_failsafe_disarms() {
     }
 }
 
-/// Also of a vehicle that has stood armed for a while.
+/// The announcement comes once, also if the vehicle has stood armed for a while.
 #[test]
 fn a_disarming_is_announced_once_however_long_it_has_stood() {
     for waits_s in [0.05, 3.0] {
@@ -198,7 +198,7 @@ fn a_disarming_is_announced_once_however_long_it_has_stood() {
     }
 }
 
-/// Neither a take-off, nor the climb of a mission or a return, leads out of the fence.
+/// No take-off, and no climb of a mission or return, leaves the fence.
 #[test]
 fn climbs_stay_below_the_fence() {
     let mut settings = quiet();
@@ -228,7 +228,7 @@ fn climbs_stay_below_the_fence() {
     assert!(bench.highest_m > 4.5 && bench.highest_m < 5.5, "{}", bench.highest_m);
 }
 
-/// A station that was never heard is not lost: a vehicle may fly by sticks or by its companion alone.
+/// A station that was never heard is not lost: pilots may fly with sticks or a companion computer only.
 #[test]
 fn a_station_that_never_was_is_not_lost() {
     let mut bench = Bench::new(quiet());
@@ -240,7 +240,7 @@ fn a_station_that_never_was_is_not_lost() {
     assert!(bench.core.armed() && bench.guidance.mode() == FlightMode::Hold);
 }
 
-/// The voltage of a loaded battery sags by what its resistance takes; it is not empty for that.
+/// A loaded battery's voltage sags over its resistance, which does not count as a lower charge.
 #[test]
 fn the_charge_is_that_without_load() {
     let settings = quiet();
@@ -254,7 +254,7 @@ fn the_charge_is_that_without_load() {
         assert!((charge - 0.3).abs() < 0.01, "{charge}");
         assert!(bench.said.is_empty(), "{:?}", bench.said);
     }
-    // A gust of current is not an empty battery, nor is a reading of nonsense.
+    // Neither a brief voltage drop nor an invalid reading counts as an empty battery.
     let mut bench = offboard(settings);
     bench.battery = Some(BatteryReading { voltage_v: f32::NAN, current_a: 0.0, charge: None });
     stream(&mut bench, 2.0);
@@ -312,7 +312,7 @@ fn the_flight_cores_descent_is_a_landing_that_no_order_ends() {
     }
 }
 
-/// After an outage it goes on from where the vehicle is, not from where the setpoint was.
+/// After an outage of the state, the setpoint starts at the vehicle, not at the old setpoint.
 #[test]
 fn after_an_outage_the_setpoint_begins_at_the_vehicle() {
     let mut bench = offboard(quiet());
@@ -324,7 +324,7 @@ fn after_an_outage_the_setpoint_begins_at_the_vehicle() {
     assert!((setpoint.position_m - Vector3::new(-3.0, 4.0, 6.0)).norm() < 0.05, "{setpoint:?}");
 }
 
-/// What the flight core sees itself is not the guidance's business.
+/// Conditions that the flight core checks are not among the guidance's reasons.
 #[test]
 fn the_guidance_bars_arming_for_its_own_reasons_only() {
     let here = State::default();
@@ -364,12 +364,12 @@ fn the_guidance_bars_arming_for_its_own_reasons_only() {
     ] {
         assert_eq!(against(&bench, &sight), expected, "{sight:?}");
     }
-    // Armed, it stays as it was.
+    // Once armed, the reasons stay as they were.
     let armed = GuidanceInputs { core: Mode::Flying, sensors: gnss, ..well };
     assert_eq!(against(&bench, &armed), []);
 }
 
-/// Home is found where the flight core says that the vehicle has been at rest, and not before.
+/// Home is set once the flight core reports the vehicle at rest, and not before.
 #[test]
 fn home_is_where_the_vehicle_has_rested() {
     let mut guidance = Guidance::new(quiet()).unwrap();

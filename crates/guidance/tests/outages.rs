@@ -1,5 +1,5 @@
-//! Outages of the state: what was flown goes on when it is over, or the vehicle has landed, and no order is refused for
-//! an outage that is over. The flight core's part is its own table of transitions.
+//! Outages of the state: afterwards the interrupted mode resumes, unless the vehicle has landed, and orders are
+//! accepted again. The flight core's part comes from its own transition table.
 
 use crate::bench::{Bench, motion, settings};
 use afbc_flight_core::Mode;
@@ -8,7 +8,7 @@ use afbc_guidance::*;
 use nalgebra::Vector3;
 use proptest::prelude::*;
 
-/// Modes that go on until another one is chosen; the order that begins each.
+/// Modes that last until another is selected.
 const FLOWN: [FlightMode; 8] = [
     FlightMode::Hold,
     FlightMode::Takeoff,
@@ -19,7 +19,7 @@ const FLOWN: [FlightMode; 8] = [
     FlightMode::Altitude,
     FlightMode::Stabilised,
 ];
-/// What is ordered while the state is known.
+/// Modes that may be ordered while the state is known.
 const ORDERED: [FlightMode; 6] = [
     FlightMode::Hold,
     FlightMode::Return,
@@ -34,12 +34,12 @@ struct Flight {
     bench: Bench,
     age_us: u32,
     steady_us: u32,
-    /// What it should fly once the state is known.
+    /// Mode expected while the state is known.
     wanted: FlightMode,
 }
 
 impl Flight {
-    /// Flies 40 m above the ground and far from home, in a mode that does not end by itself.
+    /// Flies 40 m above the ground, far from home, in a mode that does not end by itself.
     fn new(mode: FlightMode) -> Self {
         let mut bench = Bench::new(settings());
         bench.run(1.5);
@@ -65,7 +65,7 @@ impl Flight {
         flight
     }
 
-    /// Targets and sticks that always come.
+    /// Keeps targets and sticks fresh.
     fn aim(&mut self) {
         self.bench.aim(OffboardTarget::Motion(motion(Vector3::new(-9000.0, 0.0, 40.0))));
         let sticks = Sticks { roll: 0.0, pitch: 0.1, throttle: 0.0, yaw: 0.0 };
@@ -89,7 +89,7 @@ impl Flight {
         let bench = &mut self.bench;
         bench.sees = sees;
         (self.age_us, self.steady_us) = if sees { (0, self.steady_us + 1000) } else { (self.age_us + 1000, 0) };
-        // The guidance sees the mode of the last tick.
+        // The guidance sees the flight core's mode of the last tick.
         let guided = bench.tick();
         bench.core = bench.core.next(&SupervisorInputs {
             request: None,
@@ -129,7 +129,7 @@ impl Flight {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 48, ..ProptestConfig::default() })]
 
-    /// Outages of 0.2 to 60 s, again and again, and orders between them.
+    /// Repeated outages of 0.2 to 60 s, with orders in between.
     #[test]
     fn what_was_flown_goes_on_after_every_outage(
         flown in proptest::sample::select(FLOWN.to_vec()),
@@ -154,7 +154,7 @@ proptest! {
     }
 }
 
-/// Heard of an outage of 6 s in a mission: what happens, and what goes on.
+/// Announcements around an outage of 6 s during a mission.
 #[test]
 fn an_outage_is_announced_from_its_beginning_to_its_end() {
     let mut flight = Flight::new(FlightMode::Mission);
@@ -166,7 +166,7 @@ fn an_outage_is_announced_from_its_beginning_to_its_end() {
     assert_eq!(flight.bench.said, [descent, Notice::Over(Cause::Descent), back]);
 }
 
-/// Whoever orders a landing during the outage, or while the vehicle descends after it, gets that landing.
+/// A landing ordered during the outage, or during the descent after it, is not replaced by the interrupted mode.
 #[test]
 fn a_landing_that_was_ordered_stays_one() {
     for sees in [false, true] {
@@ -180,7 +180,7 @@ fn a_landing_that_was_ordered_stays_one() {
     }
 }
 
-/// A flight to a place, at an ordered speed, and a return by failsafe go on as what they were.
+/// A flight to a place at an ordered speed, and a failsafe return, resume unchanged.
 #[test]
 fn what_is_resumed_is_what_it_was() {
     let mut flight = Flight::new(FlightMode::Hold);

@@ -1,5 +1,4 @@
-//! A state that is set anew: the vehicle does not move by it where it holds, climbs or lands, and flies on to places
-//! that were ordered from where it is.
+//! Estimator resets: the vehicle does not move while it holds, climbs or lands, and still flies to the ordered places.
 
 use crate::bench::{Bench, settings};
 use afbc_guidance::*;
@@ -7,10 +6,11 @@ use afbc_types::ResetDelta;
 use nalgebra::{Vector2, Vector3};
 use proptest::prelude::*;
 
-/// Farthest that the vehicle may move by a reset \[m\].
+/// Largest movement that a reset may cause \[m\].
 const MOVES_M: f32 = 0.1;
 
-/// Sets the state anew; returns by how much the setpoint then is nearer to or farther from the vehicle than before.
+/// Resets the estimate. Returns the change of the setpoint relative to the vehicle, of position \[m\] plus heading
+/// \[rad\].
 fn reset(bench: &mut Bench, delta: ResetDelta) -> f32 {
     let off_m = |bench: &Bench| {
         let setpoint = bench.last.unwrap().setpoint.unwrap();
@@ -29,7 +29,7 @@ fn jump() -> impl Strategy<Value = ResetDelta> {
         .prop_map(|(by, yaw_rad)| ResetDelta { position_m: Vector3::from(by) / 3.0_f32.sqrt(), yaw_rad })
 }
 
-/// The same, but so that places a few metres above the ground stay there.
+/// Limits the vertical reset, so that places a few metres above the ground stay above it.
 fn above_ground(delta: ResetDelta) -> ResetDelta {
     let [[x, y, z]] = delta.position_m.data.0;
     ResetDelta { position_m: Vector3::new(x, y, z.min(3.0)), ..delta }
@@ -39,7 +39,8 @@ fn go_to(position_m: Vector3<f32>, yaw_rad: f32) -> Order {
     Order::GoTo { position_m, yaw_rad, speed_m_s: None }
 }
 
-/// A mode that holds, by its number: as it stopped, where it was ordered to, with a heading, by centred sticks.
+/// Returns a bench that holds: 0 where it stopped, 1 at an ordered place, 2 with a heading, 3 and 4 with centred
+/// sticks.
 fn holding(which: usize) -> Bench {
     let mut bench = Bench::hovering(settings());
     bench.orders.sticks = None;
@@ -62,7 +63,7 @@ fn centre(bench: &mut Bench) {
     bench.orders.sticks = Some(afbc_flight_core::Stamped { value, at_us: bench.now_us });
 }
 
-/// Flies on, with sticks that come if any did.
+/// Flies on. Keeps the sticks fresh if there are any.
 fn run(bench: &mut Bench, time_s: f32) {
     for _ in 0..(time_s * 10.0) as u32 {
         if bench.orders.sticks.is_some() {
@@ -75,7 +76,7 @@ fn run(bench: &mut Bench, time_s: f32) {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 64, ..ProptestConfig::default() })]
 
-    /// Held places and headings go with the state, by any number of resets.
+    /// Held places and headings move along with any number of resets.
     #[test]
     fn what_is_held_does_not_move(
         which in 0_usize..5,
@@ -95,8 +96,8 @@ proptest! {
         prop_assert!(turned < 0.02, "{} rad", turned);
     }
 
-    /// On the way, at any time, the setpoint makes no jump beside the state; then the vehicle is where it was ordered
-    /// to be: a place of the frame, or a height above where it stood.
+    /// A reset during a flight causes no jump of the setpoint relative to the vehicle. The flight still ends at the
+    /// ordered place of the local frame, or at the ordered height above the ground.
     #[test]
     fn what_was_ordered_is_reached_from_there(delta in jump(), after_s in 0.1_f32..4.0, takes_off: bool) {
         let mut bench = if takes_off {
@@ -124,14 +125,14 @@ proptest! {
         }
     }
 
-    /// A landing goes straight down, wherever the state says that is.
+    /// A landing goes straight down despite a reset.
     #[test]
     fn a_landing_goes_straight_down(delta in jump(), after_s in 0.1_f32..3.0) {
         let mut bench = holding(1);
         let true_m = bench.true_m();
         bench.select(FlightMode::Land).unwrap();
         bench.run(after_s);
-        // The bench's ground is that of its state.
+        // The bench's ground does not move with a reset: keep the height.
         let level = ResetDelta { position_m: Vector3::new(delta.position_m.x, delta.position_m.y, 0.0), ..delta };
         reset(&mut bench, level);
         bench.run(20.0);
@@ -140,7 +141,7 @@ proptest! {
         prop_assert!(off_m.norm() < MOVES_M, "{:?}", off_m);
     }
 
-    /// A mission's waypoints stay where they are.
+    /// A mission's waypoints do not move with a reset.
     #[test]
     fn waypoints_stay_where_they_are(delta in jump(), after_s in 0.5_f32..6.0) {
         let mut bench = Bench::hovering(settings());
@@ -159,7 +160,7 @@ proptest! {
     }
 }
 
-/// A first state after an outage tells where the vehicle is; it is no reset of what was known.
+/// The first state after an outage is no reset of an earlier one.
 #[test]
 fn the_first_state_after_an_outage_shifts_nothing() {
     let mut bench = holding(1);

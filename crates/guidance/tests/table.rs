@@ -1,5 +1,5 @@
-//! The table of docs/modes.md, written out once more, for every mode and all conditions; and random walks of a whole
-//! vehicle, whose every change of mode must be one of the table's and be announced.
+//! Compares the transitions with a second version of the table in docs/modes.md, for every mode and all conditions.
+//! Random walks check that every change of mode is in the table and announced.
 
 use crate::bench::{Bench, motion, settings};
 use afbc_flight_core::{Mode, Stamped, Ticketed};
@@ -29,7 +29,7 @@ fn all() -> impl Iterator<Item = TransitionInputs> {
     })
 }
 
-/// The rows of the table: what a mode needs, with the answer if it is missing, in this order.
+/// Returns the table's row of a mode: its conditions in order, each with the refusal if not met.
 fn needs(mode: FlightMode, seen: &TransitionInputs) -> Vec<(bool, OrderRefusal)> {
     let position = (seen.positioned, OrderRefusal::NoPosition);
     match mode {
@@ -45,7 +45,7 @@ fn needs(mode: FlightMode, seen: &TransitionInputs) -> Vec<(bool, OrderRefusal)>
     }
 }
 
-/// Strength of what a mode does about a failure.
+/// Returns the strength of a mode as a response to a failure.
 fn strength(mode: FlightMode) -> usize {
     match mode {
         FlightMode::Land => 4,
@@ -107,7 +107,7 @@ fn every_text_is_short_and_every_severity_one_of_mavlinks() {
     }
 }
 
-/// A step of a random walk.
+/// One step of a random walk.
 #[derive(Clone, Copy, Debug)]
 enum Step {
     Arm,
@@ -119,7 +119,7 @@ enum Step {
     Sees(bool),
     Battery(f32),
     Sensor(bool),
-    /// The flight core descends: without a state, or with one that has just come back.
+    /// The flight core descends. False: without a state; true: with a state that has just come back.
     Descends(bool),
     Mission(u8),
     Wind(f32),
@@ -175,7 +175,7 @@ fn mission(kind: u8) -> Vec<Item> {
     }
 }
 
-/// A tick, and what may have changed the mode in it, by a model that knows the vehicle from outside.
+/// Runs a tick, and checks the changes of mode against a model that sees the vehicle from outside.
 fn follow(bench: &mut Bench, asked: Option<Order>) -> Result<(), TestCaseError> {
     let (before, was_armed) = (bench.guidance.mode(), bench.core.armed());
     let said = bench.said.len();
@@ -188,7 +188,7 @@ fn follow(bench: &mut Bench, asked: Option<Order>) -> Result<(), TestCaseError> 
             _ => None,
         })
         .collect();
-    // Every transition is announced, and what is announced is a transition.
+    // Every transition is announced, and every announcement is a transition.
     let mut mode = before;
     for (next, reason) in &changes {
         prop_assert!(*next != mode, "{:?} announced twice", next);
@@ -212,7 +212,7 @@ fn follow(bench: &mut Bench, asked: Option<Order>) -> Result<(), TestCaseError> 
     }
     prop_assert_eq!(mode, guided.mode, "announced {:?}", changes);
     prop_assert_eq!(asked.is_some(), guided.answer.is_some());
-    // An order that is declined has no effect.
+    // A refused order has no effect.
     if let Some((_, Err(_))) = guided.answer {
         prop_assert!(changes.iter().all(|(_, reason)| *reason != ModeReason::Ordered));
     }
@@ -220,11 +220,11 @@ fn follow(bench: &mut Bench, asked: Option<Order>) -> Result<(), TestCaseError> 
         let ended = changes.iter().any(|(_, reason)| *reason != ModeReason::Ordered);
         prop_assert!(guided.mode == wanted || ended);
     }
-    // It rests only where it stands, and asks to stop the motors only there.
+    // Motors idle only when armed, and disarming is requested on the ground only.
     prop_assert!(!guided.idle_on_ground || was_armed);
     if bench.airborne() {
         prop_assert!(guided.request.is_none());
-        // Where it touches the ground.
+        // In the air, idle motors mean a touchdown during a landing.
         let lands = matches!(guided.mode, FlightMode::Land | FlightMode::Return);
         prop_assert!(!guided.idle_on_ground || lands && bench.state.position_m.z < 0.1, "{:?}", bench.state);
     }
@@ -237,7 +237,8 @@ fn follow(bench: &mut Bench, asked: Option<Order>) -> Result<(), TestCaseError> 
 proptest! {
     #![proptest_config(ProptestConfig { cases: 60, ..ProptestConfig::default() })]
 
-    /// Random orders and failures, then quiet: it is disarmed on the ground, or flies where it should.
+    /// After random orders and failures and a quiet minute, the vehicle is disarmed on the ground, or flies as it
+    /// should.
     #[test]
     fn random_walks_follow_the_table(steps in steps()) {
         let mut settings = settings();

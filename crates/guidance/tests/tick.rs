@@ -1,5 +1,5 @@
-//! The tick of the guidance with a vehicle that is where the test puts it: orders with their bounds, times, home, and
-//! gaps. What ends is in `endings.rs`.
+//! Tests of the guidance's tick with a vehicle placed by the test: bounds of orders, timeouts, home, and gaps of the
+//! state. `endings.rs` has the ends of modes and flights.
 
 use crate::fixture::*;
 use afbc_flight_core::{Mode, Request, Stamped};
@@ -7,7 +7,7 @@ use afbc_guidance::*;
 use afbc_types::State;
 use nalgebra::Vector3;
 
-/// Numbers in their ranges only, to the ends of these.
+/// Orders accept numbers within their ranges, ends included.
 #[test]
 fn orders_take_numbers_within_their_ranges() {
     let fixture = Fixture::flying(Settings::DEFAULT);
@@ -55,7 +55,7 @@ fn orders_take_numbers_within_their_ranges() {
     assert_eq!(Fixture { state: None, ..fixture.clone() }.order(Order::Home(None)), Err(OrderRefusal::NoPosition));
 }
 
-/// A take-off begins where the vehicle stands, and what would leave the fence is declined.
+/// A take-off starts where the vehicle stands, and is refused if it would leave the fence.
 #[test]
 fn takeoffs_end_inside_the_fence() {
     let mut fixture = Fixture::new(fenced(20.0, 6.0));
@@ -64,7 +64,7 @@ fn takeoffs_end_inside_the_fence() {
     fixture.run(10);
     assert_eq!(fixture.would(Order::TakeOff(Some(5.9))), Ok(()));
     assert_eq!(fixture.would(Order::TakeOff(Some(6.1))), Err(OrderRefusal::OutsideFence));
-    // Home is at 3 m; from 1 m more, less is left.
+    // Home is at a height of 3 m. From 1 m higher, 1 m less is left.
     fixture.state = Some(at(1.0, 2.0, 4.0));
     fixture.run(10);
     assert_eq!(fixture.would(Order::TakeOff(Some(4.9))), Ok(()));
@@ -80,7 +80,7 @@ fn takeoffs_end_inside_the_fence() {
     assert_eq!((fixture.guidance.mode(), fixture.place()), (FlightMode::Hold, Vector3::new(1.0, 2.0, 8.5)));
 }
 
-/// Coordinates that are not given are kept: those of the place that is held, or where the setpoint is.
+/// Coordinates that are not given are kept from the held place, or else from the setpoint.
 #[test]
 fn a_place_keeps_what_is_not_given() {
     let mut fixture = Fixture::flying(Settings::DEFAULT);
@@ -89,7 +89,7 @@ fn a_place_keeps_what_is_not_given() {
     assert_eq!(fixture.order(go(NAN, NAN, 9.0)), Ok(()));
     fixture.run(20_000);
     assert_eq!(fixture.place(), Vector3::new(1.0, 30.0, 9.0), "the place that it was on its way to");
-    // Not held any more once another mode has flown.
+    // The place is forgotten once another mode has flown.
     fixture.orders.target = None;
     assert_eq!(fixture.select(FlightMode::Land), Ok(()));
     fixture.run(1500);
@@ -97,7 +97,7 @@ fn a_place_keeps_what_is_not_given() {
     assert_eq!(fixture.order(go(NAN, NAN, 12.0)), Ok(()));
     fixture.run(15_000);
     assert!((fixture.place() - Vector3::new(here.x, here.y, 12.0)).norm() < 1e-3, "{:?}", fixture.place());
-    // Heading and speed of the order.
+    // Heading and speed as ordered.
     let mut fixture = Fixture::flying(Settings::DEFAULT);
     let order = Order::GoTo { position_m: Vector3::new(60.0, 2.0, 8.0), yaw_rad: 0.7, speed_m_s: Some(2.0) };
     assert_eq!(fixture.order(order), Ok(()));
@@ -113,7 +113,7 @@ fn a_place_keeps_what_is_not_given() {
     assert!(fixture.setpoint().velocity_m_s.x > 4.5, "the cruise speed again");
 }
 
-/// The same mode again changes nothing, but for a hold: it holds where it is now.
+/// Selecting the same mode again changes nothing, except that hold stops at the present place.
 #[test]
 fn selecting_a_hold_again_stops() {
     let mut fixture = Fixture::flying(Settings::DEFAULT);
@@ -123,7 +123,7 @@ fn selecting_a_hold_again_stops() {
     fixture.run(8000);
     assert!(fixture.place().x < 25.0, "{:?}", fixture.place());
     assert_eq!(fixture.said, [], "no other mode");
-    // A failsafe's return stays one.
+    // A failsafe's return still counts as a failsafe when a return is selected.
     let net = Net { station_lost_s: 1.0, station_action: StationAction::Return, ..Net::DEFAULT };
     let mut fixture = Fixture::flying(Settings { net, ..Settings::DEFAULT });
     fixture.orders.heard_us = Some(fixture.now_us);
@@ -135,7 +135,7 @@ fn selecting_a_hold_again_stops() {
     assert_eq!(fixture.tick().failsafe, None, "ordered");
 }
 
-/// Home is where it was first at rest for a second, and where it is armed, unless home was ordered.
+/// Home is where the vehicle first rested for a second, then where it is armed, unless home was ordered.
 #[test]
 fn home_is_where_it_rests_and_is_armed() {
     let mut fixture = Fixture::new(Settings::DEFAULT);
@@ -154,7 +154,7 @@ fn home_is_where_it_rests_and_is_armed() {
     assert_eq!(ordered.run(10).home_m, Some(place));
     assert_eq!(ordered.order(Order::Home(None)), Ok(()));
     assert_eq!(ordered.tick().home_m, Some(Vector3::new(7.0, 8.0, 9.0)));
-    // Never at rest: none before it is armed.
+    // A vehicle that never rests gets its home at arming.
     let mut fixture = Fixture::new(Settings::DEFAULT);
     fixture.state = Some(State { velocity_m_s: Vector3::new(1.0, 0.0, 0.0), ..at(1.0, 2.0, 3.0) });
     assert_eq!(fixture.run(3000).home_m, None);
@@ -162,7 +162,7 @@ fn home_is_where_it_rests_and_is_armed() {
     assert!(fixture.tick().home_m.is_some());
 }
 
-/// Time steps that make no sense count as a millisecond, and long ones are cut.
+/// Implausible time steps count as 1 ms, and long ones are shortened.
 #[test]
 fn strange_time_steps_are_replaced() {
     let asks_after = |dt_s: f32| {
@@ -179,7 +179,7 @@ fn strange_time_steps_are_replaced() {
     }
 }
 
-/// Sticks and targets count until they are too old, and if they are plausible.
+/// Sticks and targets count if they are plausible and not too old.
 #[test]
 fn sticks_and_targets_age() {
     let sticks = |age_us: u64, roll: f32| {
@@ -209,7 +209,7 @@ fn sticks_and_targets_age() {
     assert_eq!((target(501_000, 1.0), target(0, 2e5)), (Err(OrderRefusal::NoTargets), Err(OrderRefusal::NoTargets)));
 }
 
-/// A state that is not plausible is none.
+/// An implausible state counts as missing.
 #[test]
 fn an_implausible_state_is_none() {
     let mut fixture = Fixture::flying(Settings::DEFAULT);
@@ -224,7 +224,7 @@ fn an_implausible_state_is_none() {
     assert!(!fixture.tick().idle_on_ground);
 }
 
-/// Through a gap of the state the motion goes on as it was, in the air only.
+/// During a gap of the state, the motion continues in the air, but not on the ground.
 #[test]
 fn the_motion_goes_on_through_a_gap() {
     for airborne in [true, false] {
@@ -235,7 +235,7 @@ fn the_motion_goes_on_through_a_gap() {
         let seen = fixture.state.unwrap();
         (fixture.state, fixture.airborne) = (None, airborne);
         fixture.run(400);
-        // As far as it has gone meanwhile.
+        // Distance flown meanwhile.
         let gone = before.velocity_m_s * 0.4;
         let way = if airborne { gone } else { Vector3::zeros() };
         fixture.state = Some(State { position_m: seen.position_m + gone, ..seen });

@@ -1,4 +1,4 @@
-//! Stops against the limiter that flies them, and geometry against definitions.
+//! Compares predicted stopping paths with flights of the limiter, and the geometry with definitions.
 #![allow(clippy::indexing_slicing, clippy::unwrap_used, reason = "tests")]
 
 extern crate std;
@@ -29,7 +29,7 @@ fn limits() -> impl Strategy<Value = Limits> {
     })
 }
 
-/// A polygon that does not cross itself: a star around the middle.
+/// A star-shaped polygon around the origin, which does not cross itself.
 fn star() -> impl Strategy<Value = Vec<Vector2<f32>>> {
     prop::collection::vec(2.0_f32..20.0, 3..12).prop_map(|radii| {
         let turn = core::f32::consts::TAU / radii.len() as f32;
@@ -56,7 +56,7 @@ fn at(state: Vector2<f32>, velocity: Vector2<f32>) -> State {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 1000, ..ProptestConfig::default() })]
 
-    /// The limiter stops on the way that is predicted, after any flight, and not much earlier.
+    /// The limiter stops on the predicted path, after any flight, and not much earlier.
     #[test]
     fn a_stop_ends_as_predicted(
         limits in limits(),
@@ -82,7 +82,7 @@ proptest! {
             let now = limiter.setpoint().unwrap();
             let now_m = now.position_m.xy();
             let off_m = distance(now_m, path.from_m, path.via_m).min(distance(now_m, path.via_m, path.to_m));
-            // Half of the margin, of which the vehicle needs the rest.
+            // Half of the margin: the vehicle needs the other half.
             prop_assert!(off_m < 0.5 * MARGIN_M + path.beside_m, "{off_m} m off {path:?}");
             if now.velocity_m_s.norm() < 1e-3 {
                 break;
@@ -93,7 +93,7 @@ proptest! {
         prop_assert!(predicted_m < 1.6 * flown_m + 0.1 * v.norm() + 1.0, "{predicted_m} m of {flown_m} m");
     }
 
-    /// The distance of two ways is that of their nearest points, found by trying.
+    /// The distance of a path from an edge is that of its nearest point, found by sampling.
     #[test]
     fn a_way_nears_an_edge_as_its_points_do(
         (a, b) in (place(), place()),
@@ -107,12 +107,12 @@ proptest! {
         };
         let nearest = (0..=2000).map(|share| distance(points(share), a, b)).fold(f32::MAX, f32::min);
         let now = distance(from, a, b);
-        // Away from the limits, which are sharp.
+        // Skip cases close to the thresholds.
         let approach = now - nearest;
         prop_assume!((nearest - MARGIN_M).abs() > 0.05 && (approach - (0.1 * (now - 0.2)).max(1e-3)).abs() > 0.05);
         let nears = nearest < MARGIN_M && approach > 0.1 * (now - 0.2);
         prop_assert_eq!(path.nears_edge(a, b), nears, "{} m, {} m", now, nearest);
-        // Circles by the definition.
+        // The same for circles, by definition.
         let centre = a;
         let off = |outside: f32, point: Vector2<f32>| (outside * ((point - centre).norm() - 8.0)).max(0.0);
         for (outside, nears) in [(1.0, path.nears_disc(centre, 8.0)), (-1.0, path.nears_rim(centre, 8.0))] {
@@ -125,12 +125,12 @@ proptest! {
         }
     }
 
-    /// Stars are areas, and a place is inside one if it is nearer to the middle than the boundary in its direction.
+    /// Every star is a valid area. A place is inside if a triangle of the middle and an edge contains it.
     #[test]
     fn a_star_holds_what_is_within_it(polygon in star(), place in place()) {
         prop_assert_eq!(check_polygon(polygon.len(), |it| polygon[it]), Ok(()));
         let within = edges(&polygon).any(|(a, b)| {
-            // In the triangle of the middle and the edge.
+            // In the triangle of the middle and this edge.
             let middle = Vector2::zeros();
             area(middle, a, place) >= 0.0 && area(a, b, place) >= 0.0 && area(b, middle, place) >= 0.0
         });
@@ -139,7 +139,7 @@ proptest! {
         prop_assert!(near || (passed % 2 == 1) == within, "{place}");
     }
 
-    /// Two vertices exchanged make edges cross, or leave the area as it is.
+    /// Swapping two vertices makes edges cross, or leaves the polygon valid.
     #[test]
     fn edges_that_cross_are_found(polygon in star(), first in 0..12_usize, second in 0..12_usize) {
         let mut changed = polygon.clone();
@@ -149,7 +149,7 @@ proptest! {
             (one + 2..count).any(|other| {
                 let (a, b) = (changed[one], changed[(one + 1) % count]);
                 let (c, d) = (changed[other], changed[(other + 1) % count]);
-                // By solving for the point in common.
+                // Solve for the intersection.
                 let (r, s) = (b - a, d - c);
                 let whole = r.perp(&s);
                 let (t, u) = ((c - a).perp(&s) / whole, (c - a).perp(&r) / whole);
@@ -168,17 +168,17 @@ fn what_is_no_area_is_refused() {
     assert_eq!(check(&[]), Some(PolygonFault::TooFew));
     assert_eq!(check(&[[0.0, 0.0], [9.0, 0.0], [9.0, 9.0]]), None);
     assert_eq!(check(&[[0.0, 0.0], [9.0, 0.0], [9.0, 0.05]]), Some(PolygonFault::Degenerate));
-    // There and back.
+    // An edge that folds back.
     assert_eq!(check(&[[0.0, 0.0], [9.0, 0.0], [4.0, 0.0]]), Some(PolygonFault::Degenerate));
     // A vertex on another edge, and a bow tie.
     let touching = [[0.0, 0.0], [9.0, 0.0], [9.0, 9.0], [4.0, 0.0], [0.0, 9.0]];
     assert_eq!(check(&touching), Some(PolygonFault::Crossing));
     assert_eq!(check(&[[0.0, 0.0], [9.0, 9.0], [9.0, 0.0], [0.0, 9.0]]), Some(PolygonFault::Crossing));
-    // A vertex between two others of one line is none too many.
+    // A vertex in the middle of a straight edge is allowed.
     assert_eq!(check(&[[0.0, 0.0], [4.0, 0.0], [9.0, 0.0], [9.0, 9.0]]), None);
 }
 
-/// A vehicle that stands near a boundary, flies along it or away from it does not leave.
+/// A vehicle that stands near a boundary, flies along it or away from it does not count as leaving.
 #[test]
 fn only_what_leads_to_the_boundary_counts() {
     let (a, b) = (Vector2::new(-50.0, 0.0), Vector2::new(50.0, 0.0));
@@ -191,7 +191,7 @@ fn only_what_leads_to_the_boundary_counts() {
         assert!(!nears(y, [0.0, 0.0]) && !nears(y, [8.0, 0.0]) && !nears(y, [1.0, 2.0]), "{y} m");
         assert!(nears(y, [0.0, -2.0]), "{y} m");
     }
-    // 10 m/s take 17 m to stop with 3 m/s2, and some for jerk and reaction.
+    // A stop from 10 m/s with 3 m/s2 takes 17 m, plus some for jerk and reaction.
     assert!(nears(20.0, [0.0, -10.0]) && !nears(32.0, [0.0, -10.0]));
     assert!(nears(0.05, [0.0, -0.02]), "nor slowly");
 }

@@ -1,4 +1,4 @@
-//! Flies the mode: what it wants, limited, as a setpoint.
+//! Flies the mode: passes its output through the limiter and returns a setpoint.
 
 use super::{GuidanceInputs, Memory, Plan};
 use crate::course::{Hold, Land, Return, Takeoff};
@@ -17,19 +17,21 @@ use afbc_flight_core::{Mode, Stamped};
 use afbc_types::{Setpoint, State};
 use nalgebra::{Vector2, Vector3};
 
-/// Time after which a take-off that has not left the ground is given up \[s\].
+/// Time after which a take-off is given up if the vehicle has not left the ground \[s\].
 const NO_LIFT_S: f32 = 10.0;
-/// Distance \[m\] from the vehicle, and time at its speed \[s\], at which the setpoint begins anew at the vehicle.
+/// The setpoint restarts at the vehicle if it is farther away than this distance \[m\], plus this time at its speed
+/// \[s\].
 const LEASH_M: f32 = 5.0;
 const LEASH_S: f32 = 1.0;
-/// Likewise after an outage of the state, and when the mode changes \[m, m/s\].
+/// Tighter limits of position and velocity after a loss of the state or a change of mode \[m, m/s\].
 const ANEW_M: f32 = 1.0;
 const ANEW_M_S: f32 = 1.5;
-/// A landing vehicle touches the ground once it has been above its setpoint by this much \[m\], for this long \[s\],
-/// and does not sink faster than this \[m/s\], or than this share of its setpoint's speed: an estimated vertical speed
-/// may be off by tenths. Then its motors idle for so long at most \[s\]: by then it has been found on the ground, or
-/// its velocity is not what it seems. In the air it falls, and soon sinks faster than this \[m/s\], which ends it; a
-/// vehicle that drops from the edge of its feet does not.
+/// Touchdown detection. A landing vehicle touches the ground once it has been above its setpoint by `TOUCHES_M` \[m\]
+/// for `TOUCHES_S` \[s\] without sinking faster than `TOUCHES_M_S` \[m/s\] or `TOUCHES_SHARE` of its setpoint's speed,
+/// since an estimated vertical speed may be off by tenths of a metre per second. Then its motors idle for at most
+/// `SETTLES_S` \[s\]: by then the land detector has confirmed the landing, or the velocity is wrong. If it was a false
+/// detection in the air, the vehicle soon sinks faster than `FALLS_M_S` \[m/s\], which ends it. A vehicle that drops
+/// from the edge of its feet stays slower.
 const TOUCHES_M: f32 = 0.3;
 const TOUCHES_S: f32 = 0.1;
 const TOUCHES_M_S: f32 = 0.25;
@@ -38,7 +40,7 @@ const SETTLES_S: f32 = 3.0;
 const FALLS_M_S: f32 = 1.0;
 
 impl Memory {
-    /// Flies the mode; returns the setpoint, and whether the vehicle rests on the ground.
+    /// Flies the mode. Returns the setpoint, and whether the motors idle on the ground.
     #[allow(clippy::too_many_arguments, reason = "parts of the tick")]
     pub(super) fn fly(
         &mut self,
@@ -55,7 +57,7 @@ impl Memory {
         let armed = given.core.armed();
         let airborne = armed && given.airborne;
         if !armed {
-            // A disarmed vehicle that is armed now would hold its present position.
+            // Keep the setpoint at the vehicle, so that arming holds the present position.
             self.limiter.rest(state);
             (self.enters, self.was_seen) = (false, true);
             (self.left, self.stood_m) = (false, state.position_m);
@@ -63,7 +65,7 @@ impl Memory {
             return Some((self.limiter.setpoint(), false));
         }
         if given.core == Mode::Descending {
-            // It flies down by itself: what follows begins where the vehicle is then.
+            // The flight core descends by itself: a later mode must start at the vehicle.
             self.limiter.anchor(state);
         }
         self.follow_vehicle(state);
@@ -98,17 +100,18 @@ impl Memory {
                 return Some((self.limiter.setpoint(), true));
             }
         }
-        // What is observed without an inertial sensor follows from the thrust, so that it would fall.
+        // Skip the check without an inertial sensor: the observed motion then follows from the thrust, so a vehicle
+        // with idle motors would appear to fall.
         let lands = output.lands && !given.sensors.inertial && given.core == Mode::Flying;
         if lands && self.touches(state, &present, dt_s) {
-            // A law would push itself about: the moments for a level attitude, which the ground resists, have priority
-            // over little thrust.
+            // Idle instead of running the law: its moments for a level attitude, which the ground resists, have
+            // priority over low thrust, and would push the vehicle about.
             return Some((Some(present), true));
         }
         Some((self.shaped(output.shaping, settings, &inputs, &given.lift), false))
     }
 
-    /// Changes to hold, where what was wanted has been reached.
+    /// Changes to hold at the place that the mode has reached.
     fn hold_what_is_reached(&mut self, shaping: &Shaping, notices: &mut Notices) {
         let at_m = match (&self.plan, shaping) {
             (Plan::Takeoff(takeoff), _) => Some(takeoff.to_m),
@@ -119,9 +122,9 @@ impl Memory {
         (self.plan, self.enters) = (Plan::Hold(Hold { at_m, ..Hold::default() }), false);
     }
 
-    /// True once a take-off has not left the ground for [`NO_LIFT_S`]. Rotors that carry a share of the weight make the
-    /// flight core report that the vehicle is airborne. It is not if the thrust is exhausted or it does not follow its
-    /// setpoint.
+    /// True once a take-off has not left the ground for [`NO_LIFT_S`]. Rotors that carry part of the weight make the
+    /// flight core report a vehicle in the air. It is still on the ground if the thrust is exhausted or the vehicle
+    /// does not follow its setpoint.
     fn cannot_lift(&mut self, given: &GuidanceInputs<'_>, state: &State, airborne: bool, dt_s: f32) -> bool {
         let off_m = abs_max(&(state.position_m - self.stood_m));
         let behind = |to: Setpoint| abs_max(&(to.position_m - state.position_m)) > ANEW_M;
@@ -130,13 +133,13 @@ impl Memory {
             !self.left && (!airborne || given.lift.is_exhausted() || self.limiter.setpoint().is_some_and(behind));
         self.lift_s = if lifts { self.lift_s + dt_s } else { 0.0 };
         let gives_up = self.lift_s > NO_LIFT_S;
-        // Given up once: the mode that follows is not given up in its turn.
+        // Give up only once: the mode that follows shall not be given up as well.
         self.left |= gives_up;
         gives_up
     }
 
-    /// Returns the setpoint for what the mode wants, within the limits; none if it is not plausible.
-    // Always: copying the setpoint out of a call costs the tick sixty instructions.
+    /// Returns the limited setpoint for the mode's output; none if it is not plausible.
+    // Always inlined: copying the setpoint out of a call costs sixty instructions per tick.
     #[inline(always)]
     fn shaped(
         &mut self,
@@ -150,14 +153,14 @@ impl Memory {
             Shaping::Limited(aim) => {
                 (self.aim, self.trim) = (aim, Trim::default());
                 self.limiter.advance(&self.aim, dt_s);
-                // Only the position can become implausible: the limiter bounds all else.
+                // Only the position can become implausible: the limiter bounds the rest.
                 self.limiter.setpoint().filter(|setpoint| abs_max(&setpoint.position_m) <= 1e5)
             }
             Shaping::Leaning(aim, [x, y]) => {
                 self.aim = aim;
                 self.limiter.advance(&aim, dt_s);
                 self.limiter.follow(state);
-                // The height is held by feedback.
+                // The limiter's feedback holds the height, so the thrust is not trimmed.
                 let lift = &Lift { given_m_s2: None, ..*lift };
                 let leaning = self.limiter.setpoint().map(|setpoint| Setpoint {
                     position_m: Vector3::new(state.position_m.x, state.position_m.y, setpoint.position_m.z),
@@ -169,7 +172,8 @@ impl Memory {
             }
             Shaping::Direct(setpoint) => {
                 self.limiter.anchor(state);
-                // Through a gap of the state, or in the mode that follows, the vehicle's own motion goes on to a stop.
+                // If the state is lost, or the next mode has no target yet, the vehicle's present motion ends in a
+                // stop.
                 self.aim = inputs.stop();
                 let setpoint = lift.limited(&setpoint, state, &settings.limits);
                 let setpoint = self.trim.advance(lift, state, &setpoint, dt_s);
@@ -178,13 +182,14 @@ impl Memory {
             Shaping::Turning(target) => {
                 self.limiter.anchor(state);
                 (self.aim, self.rates) = (inputs.stop(), Some(target));
-                // The law flies by it in the first 100 ms after an outage, before the vehicle counts as flying again.
+                // The law flies this setpoint in the first 100 ms after a loss of the state, before the flight core
+                // counts the vehicle as flying again.
                 Some(Setpoint::hold(state))
             }
         }
     }
 
-    /// True if a landing vehicle stands on the ground. In the air it would sink, and this would end.
+    /// True if a landing vehicle stands on the ground. In the air it would sink, which ends this.
     fn touches(&mut self, state: &State, present: &Setpoint, dt_s: f32) -> bool {
         let touches = |time_s: f32| (TOUCHES_S..TOUCHES_S + SETTLES_S).contains(&time_s);
         let slow_m_s = max(TOUCHES_M_S, -TOUCHES_SHARE * present.velocity_m_s.z);
@@ -195,13 +200,13 @@ impl Memory {
         touches(self.touch_s)
     }
 
-    /// Lets the limiter begin at the vehicle, if it is far from it.
+    /// Restarts the limiter at the vehicle, if the setpoint is too far from it.
     fn follow_vehicle(&mut self, state: &State) {
         let (enters, returns) = (self.enters, !self.was_seen);
         (self.enters, self.was_seen) = (false, true);
         let Some(present) = self.limiter.setpoint() else { return self.limiter.anchor(state) };
         let off_m = present.position_m - state.position_m;
-        // Below the ground it presses the vehicle onto it.
+        // A setpoint below the ground presses a landing vehicle onto it: ignore the height.
         let lands = matches!(self.mode, FlightMode::Land | FlightMode::Return) && off_m.z < 0.0;
         let off_m = if lands { Vector3::new(off_m.x, off_m.y, 0.0) } else { off_m };
         let off_m_s = present.velocity_m_s - state.velocity_m_s;
@@ -215,7 +220,7 @@ impl Memory {
         }
     }
 
-    /// Returns what the mode wants.
+    /// Returns the output of the present mode.
     #[allow(clippy::too_many_arguments, reason = "parts of the tick")]
     fn output(
         &mut self,
@@ -236,7 +241,7 @@ impl Memory {
                 match &mut self.plan {
                     Plan::Hold(hold) => ModeOutput::fly(hold.fly(inputs)),
                     Plan::Orbit(orbit) => orbit.fly(inputs),
-                    // Never: the plan has just been made that of the mode. The same below.
+                    // Unreachable: `plan` was just set for this mode. The same in the other modes.
                     _ => ModeOutput::fly(inputs.stop()),
                 }
             }
@@ -307,7 +312,7 @@ impl Memory {
         if let Some((mode, number)) = progress.then {
             self.change(mode, ModeReason::Mission, notices);
             self.mission.resume(0);
-            // No new beginning for the limiter: the setpoint goes on from the mission's.
+            // `enters` stays false, so that the setpoint continues from the mission's without a restart.
             (self.lands_item, self.enters) = (Some(number), false);
             return ModeOutput { lifts: inputs.airborne, ..ModeOutput::fly(inputs.stop()) };
         }

@@ -1,4 +1,4 @@
-//! Carries out orders, or says why not.
+//! Carries out orders or refuses them.
 
 use super::{Memory, Plan};
 use crate::course::{Hold, Takeoff};
@@ -14,7 +14,7 @@ use afbc_types::State;
 use nalgebra::Vector3;
 
 impl Memory {
-    /// Carries out an order, or says why not.
+    /// Carries out an order, or returns the reason for refusing it.
     pub(super) fn order(
         &mut self,
         settings: &Settings,
@@ -76,11 +76,12 @@ impl Memory {
         if let Some(state) = state.filter(|_| mode == FlightMode::Takeoff) {
             self.must_be_inside(settings, &(state.position_m + height_m))?;
         }
-        // Selected again, a mode goes on as it is; only a hold begins anew, and so ends a flight or a circle in it.
+        // Selecting the present mode again changes nothing, except that hold restarts, which ends a flight or an orbit
+        // in it.
         if mode != self.mode || mode == FlightMode::Hold {
             self.ordered(mode, notices);
         }
-        // A landing that an outage began has been ordered now.
+        // A landing that began with a loss of the state now counts as ordered.
         if self.interrupted.take().is_some() {
             self.failsafe = None;
         }
@@ -111,7 +112,7 @@ impl Memory {
         Ok(())
     }
 
-    /// Flies to a place, whose coordinates are kept where they are NaN, and holds there.
+    /// Flies to a place and holds there. A NaN coordinate keeps its present value.
     fn go_to(
         &mut self,
         settings: &Settings,
@@ -131,7 +132,7 @@ impl Memory {
         Ok(())
     }
 
-    /// Flies a circle, whose speed and radius are as ordered, and not yet checked.
+    /// Flies an orbit. Checks the ordered speed and radius first.
     fn orbit(
         &mut self,
         settings: &Settings,
@@ -143,17 +144,17 @@ impl Memory {
         let most_m_s = orbit::speed_max_m_s(&settings.limits, radius_m);
         let usual_m_s = min(most_m_s, settings.flying.cruise_m_s);
         let speed_m_s = if wanted.speed_m_s.is_nan() { usual_m_s } else { wanted.speed_m_s };
-        // False of NaN.
+        // The comparison is false for NaN.
         let flown = orbit::RADIUS_M.contains(&radius_m) && (0.05..=most_m_s).contains(&speed_m_s);
         if !flown || !is_place(&wanted.centre_m) {
             return Err(OrderRefusal::OutOfRange);
         }
         let centre_m = or_kept(&wanted.centre_m, &self.can_go(seen)?);
         let radius = Vector3::new(radius_m, 0.0, 0.0);
-        // The cylinder around home: its farthest point.
+        // Check the orbit's farthest point from home against the fence's cylinder.
         let away_m = self.home_m.map_or(radius, |home_m| {
             let off_m = (centre_m - home_m).xy();
-            // Around home itself every point is as far.
+            // Around home itself, every point is equally far.
             let far_m = off_m.try_normalize(1e-3).map_or(radius.xy(), |ahead| ahead * radius_m);
             Vector3::new(far_m.x, far_m.y, 0.0)
         });
@@ -164,7 +165,7 @@ impl Memory {
         Ok(())
     }
 
-    /// Returns the place that a flight to another one in mode hold begins at, or why there is none \[m\].
+    /// Returns the start of a flight to another place in mode hold \[m\], or the reason why none is possible.
     fn can_go(&self, seen: &TransitionInputs) -> Result<Vector3<f32>, OrderRefusal> {
         if !seen.armed {
             return Err(OrderRefusal::NotArmed);
@@ -175,7 +176,7 @@ impl Memory {
         table::select(FlightMode::Hold, seen)?;
         let present = self.limiter.setpoint().ok_or(OrderRefusal::NoPosition)?;
         Ok(match &self.plan {
-            // What an order leaves out is kept of the last one, however far the vehicle has got on its way there.
+            // Coordinates that an order leaves out are kept from the place ordered before, even if not yet reached.
             Plan::Hold(Hold { at_m: Some(at_m), .. }) if self.mode == FlightMode::Hold => *at_m,
             _ => present.position_m,
         })
@@ -195,12 +196,12 @@ impl Memory {
     }
 }
 
-/// Returns a place with the coordinates of another where its own are NaN.
+/// Returns `place_m` with its NaN coordinates taken from `kept_m`.
 fn or_kept(place_m: &Vector3<f32>, kept_m: &Vector3<f32>) -> Vector3<f32> {
     place_m.zip_map(kept_m, |new, kept| if new.is_nan() { kept } else { new })
 }
 
-/// True of a horizontal speed to fly at; false of NaN \[m/s\].
+/// True if this is a valid horizontal speed; false for NaN \[m/s\].
 fn is_speed(speed_m_s: f32) -> bool {
     speed_m_s > 0.0 && speed_m_s <= 1e3
 }

@@ -1,11 +1,12 @@
-//! A step of the heading compared with its law in double precision.
+//! Compares a step of the heading with its law in double precision.
 
 use super::*;
 use core::f64::consts::{PI, TAU};
 use proptest::prelude::*;
 
-/// The wanted acceleration: the rate settles to that of the approach, whose derivative is known in advance; the
-/// approach is the speed from which it stops in time, f(e) = sqrt(c^2 + 2 B |e|) - c, within 99 % of the largest rate.
+/// Returns the wanted acceleration in double precision. The rate settles to the rate of approach, whose derivative is
+/// fed forward. The rate of approach is the one from which the heading stops in time, f(e) = sqrt(c^2 + 2 B |e|) - c,
+/// up to 99 % of the largest rate.
 fn acceleration(heading: &Heading, turn: &Turn, limits: &Turning) -> f64 {
     let (rate, most) = (f64::from(heading.rate_rad_s), 0.99 * f64::from(limits.rate_rad_s));
     let largest = f64::from(limits.acceleration_rad_s2);
@@ -64,7 +65,7 @@ proptest! {
         }
         let expected = acceleration(&before, &turn, &limits);
         let found = f64::from(heading.acceleration_rad_s2);
-        // The limit of the rate is met from both sides: there, what is known in advance jumps.
+        // At the rate limit the feed-forward jumps, so compare with a tolerance.
         prop_assert!((found - expected).abs() < 2e-3 * (1.0 + expected.abs()), "{found}, not {expected}");
         let dt = f64::from(dt_s);
         prop_assert!((f64::from(heading.rate_rad_s - rate) - found * dt).abs() < 1e-6);
@@ -75,7 +76,7 @@ proptest! {
     }
 }
 
-/// A heading counts as reached within its tolerances, and not beyond.
+/// A heading counts as reached within the tolerances, and not beyond.
 #[test]
 fn it_is_reached_within_tolerances_only() {
     let limits = Turning { rate_rad_s: 1.0, acceleration_rad_s2: 2.0 };

@@ -1,4 +1,4 @@
-//! Attitude and thrust as accelerations, by rotation matrices and in double precision.
+//! Compares attitude and thrust setpoints with rotation matrices in double precision.
 
 use super::*;
 use nalgebra::{Rotation3, Vector3};
@@ -15,17 +15,18 @@ fn lift(most: f32) -> Lift {
 }
 
 proptest! {
-    /// The tangents of the tilt are those of the thrust's direction.
+    /// The computed tilt matches the direction of the thrust.
     #[test]
     fn the_tilt_is_that_of_the_thrust(roll in -1.2..1.2f32, pitch in -1.2..1.2f32, yaw in -3.1..3.1f32) {
         let up = Rotation3::from_euler_angles(f64::from(roll), f64::from(pitch), f64::from(yaw)) * Vector3::z();
         let expected = up.xy() / up.z.max(0.2);
         let found = tilt(&Vector3::new(roll, pitch, yaw)).map(f64::from);
-        // The sines of the crate are good to 1e-4.
+        // The crate's sines are accurate to 1e-4.
         prop_assert!((found - expected).norm() < 1e-3 * (1.0 + expected.norm()), "{found:?}, not {expected:?}");
     }
 
-    /// Thrust along a direction, less gravity, within what the rotors give; the rest is the vehicle's own.
+    /// The acceleration is thrust minus gravity, with the thrust limited to the rotors' range. The rest is the
+    /// vehicle's own.
     #[test]
     fn a_setpoint_is_thrust_less_gravity(
         position_m in vector(9.0), velocity_m_s in vector(3.0), yaw in -3.0..3.0f32, up in vector(1.0),
@@ -46,8 +47,9 @@ proptest! {
         prop_assert_eq!(setpoint, expected);
     }
 
-    /// The vertical acceleration is that which reaches the limit of climb or sink rate within a quarter of a second, at
-    /// most; the tilt stays unless there is too little thrust to compute it by, and no lean grows.
+    /// The vertical acceleration is limited to that which reaches the limit of climb or sink rate in 0.25 s. The tilt
+    /// stays the same, unless too little vertical thrust is left to compute it. The horizontal acceleration never
+    /// grows.
     #[test]
     fn climb_and_sink_rate_are_limited(
         acceleration in vector(15.0), climb in -6.0..6.0f32, up in 0.5..4.0f32, down in 0.5..4.0f32,
@@ -71,8 +73,7 @@ proptest! {
         prop_assert!((found.acceleration_m_s2 - expected).norm() < 1e-3, "{found:?}, not {expected:?}");
     }
 
-    /// The correction integrates what the tilt lacks of that which follows the wanted one, and what the thrust lacks,
-    /// each within its limit.
+    /// The correction integrates the errors of tilt and thrust, each within its limit.
     #[test]
     fn a_trim_integrates_what_is_lacking(
         steps in prop::collection::vec(
@@ -104,7 +105,7 @@ proptest! {
             upwards = (upwards + lacks * dt / 0.2).clamp(-5.0, 5.0);
             let corrected = acceleration_m_s2.map(f64::from) + Vector3::new(sideways.x, sideways.y, upwards);
             let off = found.acceleration_m_s2.map(f64::from) - corrected;
-            // Errors of the sines, summed up.
+            // Accumulated errors of the sines.
             errors += 1e-3 * (1.0 + vertical * dt / 0.3);
             prop_assert!(off.norm() < errors, "{found:?}, not {corrected:?}");
             prop_assert_eq!(Setpoint { acceleration_m_s2, ..found }, setpoint);

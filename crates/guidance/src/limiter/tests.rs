@@ -1,5 +1,5 @@
-//! Which targets pass unchanged: streams with an independent account of their misfits, and every tolerance on both
-//! sides.
+//! Checks which targets pass unchanged: streams against an independent account of their misfits, and every tolerance on
+//! both sides.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 use super::*;
@@ -23,7 +23,7 @@ fn size(vector: Vector3<f32>) -> f32 {
     vector.norm()
 }
 
-/// A vector of this length, that has parts along every axis.
+/// Returns a vector of this length with parts along every axis.
 fn oblique(length: f32) -> Vector3<f32> {
     Vector3::new(0.6, -0.48, 0.64) * length
 }
@@ -31,7 +31,7 @@ fn oblique(length: f32) -> Vector3<f32> {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 1000, ..ProptestConfig::default() })]
 
-    /// Between two messages a stream that is a flight goes on with constant jerk.
+    /// Between two messages, a stream that fits together is extrapolated with constant jerk.
     #[test]
     fn a_stream_goes_on_between_messages(begin in any_complete(), jerk in vector(30.0), steps in 1..40u32) {
         let first = Stream {
@@ -44,7 +44,7 @@ proptest! {
             fits: true,
         };
         let mut stream = first;
-        // Long steps, so that every term is seen.
+        // Long steps make every term visible.
         for _ in 0..steps {
             stream.advance(&begin, 5, 0.02, 100.0);
         }
@@ -54,21 +54,21 @@ proptest! {
         prop_assert!(size(acceleration_m_s2 - begin.acceleration_m_s2 - jerk * t) < 1e-3);
         let velocity = begin.velocity_m_s + begin.acceleration_m_s2 * t + jerk * (0.5 * t * t);
         prop_assert!(size(velocity_m_s - velocity) < 2e-3);
-        // A step's part of the jerk is left out: half of it per step, of a third of its effect.
+        // The integration neglects the part of the jerk within a step: hence the tolerance.
         let position = begin.position_m
             + begin.velocity_m_s * t
             + begin.acceleration_m_s2 * (0.5 * t * t)
             + jerk * (t * t * t / 6.0);
         prop_assert!(size(position_m - position) < 2e-3 + size(jerk) * t * 0.02 * 0.02);
         prop_assert_eq!((stream.last, stream.jerk_m_s3, stream.fits), (begin, jerk, true));
-        // What is no flight stays where it is.
+        // A stream that does not fit together is not extrapolated.
         let mut still = Stream { fits: false, ..first };
         still.advance(&begin, 5, 0.02, 100.0);
         prop_assert_eq!(still.present, begin);
     }
 
-    /// Two messages fit each other if the second's position and velocity are those to which the first's motion leads
-    /// with a steady change, within half of what passes later; then the jerk is that between them.
+    /// Two messages fit if the first's motion leads to the second's position and velocity with a linear change of the
+    /// acceleration. The tolerance is half of that of a passing stream. If they fit, the jerk is that between them.
     #[test]
     fn two_messages_fit_by_the_trapezium_rule(
         first in any_complete(), speed in vector(3.0), change in vector(1.0), interval_s in 0.005..0.49f32,
@@ -108,9 +108,9 @@ fn after_a_pause_a_stream_begins_anew() {
     }
 }
 
-/// A motion that is `off` a target in position, velocity and acceleration, one step before it.
+/// Returns a motion one step before `target` that misses it by these amounts in position, velocity and acceleration.
 fn now(target: &Complete, off_m: f32, off_m_s: f32, off_m_s2: f32, misfit: Option<Misfit>) -> Now {
-    // It will have moved by a step when it is compared.
+    // It is compared after one more step.
     let acceleration = target.acceleration_m_s2 - oblique(off_m_s2);
     let velocity = target.velocity_m_s - oblique(off_m_s) - acceleration * DT_S;
     let position = target.position_m - oblique(off_m) - (velocity + acceleration * (0.5 * DT_S)) * DT_S;
@@ -147,7 +147,7 @@ fn moving(speed_m_s: f32, acceleration_m_s2: f32) -> Complete {
 
 const NO_MISFIT: Misfit = Misfit { position_m: Vector3::new(0.0, 0.0, 0.0), velocity_m_s: Vector3::new(0.0, 0.0, 0.0) };
 
-/// Each tolerance by itself: a hair less passes, a hair more does not.
+/// Checks each tolerance by itself: slightly less passes, slightly more does not.
 fn is_tolerance(target: &Complete, limits: &Limits, interval_s: f32, misfit: Option<Misfit>, most: [f32; 3]) {
     for (kind, most) in most.into_iter().enumerate() {
         for (share, expected) in [(0.0, true), (0.97, true), (1.03, false), (30.0, false)] {
@@ -167,7 +167,8 @@ fn a_target_at_rest_is_caught_up_with_to_a_tenth_of_a_millimetre() {
     is_tolerance(&moving(0.0, 0.0), &limits, 0.02, None, [STANDS_M, STANDS_M_S, STANDS_M_S2]);
 }
 
-/// The tolerances of a moving target grow with speed, acceleration, and what the jerk may do between two messages.
+/// The tolerances of a moving target grow with its speed and acceleration, and with the change by the largest jerk
+/// between two messages.
 #[test]
 fn a_moving_target_is_caught_up_with_within_its_tolerances() {
     let limits = Limits { jerk_max_m_s3: 20.0, ..Limits::DEFAULT };
@@ -181,8 +182,8 @@ fn a_moving_target_is_caught_up_with_within_its_tolerances() {
     }
 }
 
-/// The misfits of a stream that passes add up, and fade with their time constant: a steady one of a share of the limit
-/// passes as long as the sum stays below it.
+/// The misfits of a passing stream add up and decay with their time constant. A steady misfit passes as long as its sum
+/// stays below the limit.
 #[test]
 fn misfits_add_up_and_fade() {
     let limits = Limits::DEFAULT;
@@ -190,7 +191,7 @@ fn misfits_add_up_and_fade() {
     let steps = MISFIT_S / DT_S;
     for (most, of) in [(MISFIT_M + MISFIT_TIME_S, 0), (MISFIT_M_S, 1)] {
         for share in [0.9, 1.1] {
-            // In the long run the sum is this many times the misfit of a step.
+            // In the long run, the sum is `steps` times the misfit of one step.
             let off = share * most / steps;
             let (mut misfit, mut ended) = (Some(NO_MISFIT), None);
             for tick in 0..5000 {
@@ -203,13 +204,13 @@ fn misfits_add_up_and_fade() {
                 misfit = now.misfit;
             }
             assert_eq!(ended.is_some(), share > 1.0, "{of}: {ended:?}");
-            // 1 - exp(-t/T) = 1/1.1
+            // 1 - exp(-t/T) = 1/1.1.
             assert!(ended.is_none_or(|tick| (tick as f32 / steps - 2.4).abs() < 0.1), "{of}: {ended:?}");
         }
     }
 }
 
-/// A target beyond the limits does not pass, along each axis and in each direction for itself.
+/// A target beyond a limit does not pass, for each axis and direction.
 #[test]
 fn what_passes_is_within_the_limits() {
     let limits = Limits {
@@ -236,7 +237,8 @@ fn what_passes_is_within_the_limits() {
     }
 }
 
-/// What is not given of a target with a position is zero; without one it is no flight.
+/// Missing velocities and accelerations of a target with a position are zero. A target without a position is not
+/// complete.
 #[test]
 fn a_target_with_a_position_is_complete() {
     let aim = LimiterTarget::stop(1.0, 1.0, 1.0);
@@ -271,8 +273,8 @@ fn a_goal_is_what_is_given() {
     }
 }
 
-/// It begins at the vehicle with its velocity within the limits, or at rest there; follows it horizontally only; and
-/// goes on when the limits change.
+/// The limiter starts at the vehicle with its velocity within the limits, or at rest. `follow` follows the vehicle
+/// horizontally only. A change of limits does not interrupt the motion.
 #[test]
 fn it_begins_and_goes_on_at_the_vehicle() {
     let limits = Limits { speed_m_s: 5.0, up_m_s: 2.0, down_m_s: 1.0, ..Limits::DEFAULT };
@@ -291,7 +293,7 @@ fn it_begins_and_goes_on_at_the_vehicle() {
         assert_eq!((setpoint.position_m, setpoint.yaw_rad), (state.position_m, 0.7));
         assert!((setpoint.velocity_m_s - Vector3::new(3.0, -4.0, expected)).norm() < 1e-5, "{setpoint:?}");
     }
-    // A motion with all its parts.
+    // A motion in which every derivative differs from zero.
     let aim = LimiterTarget {
         velocity_m_s: Vector3::new(1.0, 2.0, 0.5),
         yaw_rate_rad_s: 0.4,
@@ -316,7 +318,7 @@ fn it_begins_and_goes_on_at_the_vehicle() {
     assert_eq!(rests, Setpoint { position_m: there.position_m, yaw_rad: 0.7, ..Setpoint::default() });
 }
 
-/// A heading that turns is followed at its rate; a rate alone is kept; with neither it stops.
+/// A turning heading is followed at its rate. A rate alone is kept. With neither, the heading stops.
 #[test]
 fn headings_and_rates_are_followed() {
     let turned = |yaw_rad: f32, yaw_rate_rad_s: f32| {
@@ -346,8 +348,7 @@ fn wrap(angle: f32) -> f32 {
     afbc_control::math::wrap_angle(angle)
 }
 
-/// A stream whose messages fit is flown with its accelerations, one whose messages do not without: these would only
-/// drive it away.
+/// Accelerations are flown only if a stream's messages fit together. Otherwise they would only drive the vehicle away.
 #[test]
 fn accelerations_of_what_is_no_flight_do_not_count() {
     let farthest = |interval: u32| {
@@ -368,6 +369,6 @@ fn accelerations_of_what_is_no_flight_do_not_count() {
         farthest_m
     };
     assert!(farthest(100) < 1.02, "{}", farthest(100));
-    // At a thousand messages per second what they say of the velocity changes less than is seen.
+    // At 1000 messages per second, a wrong acceleration changes the velocity too little per message to be detected.
     assert!(farthest(1) > 1.1, "{}", farthest(1));
 }

@@ -1,10 +1,10 @@
-//! The net's findings: thresholds on both sides, each cause by itself.
+//! Tests of the safety net's checks: each cause by itself, with its threshold on both sides.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 use super::*;
 use proptest::prelude::*;
 
-/// Everything as it should be, in flight.
+/// Inputs in flight without any cause for a failsafe.
 fn calm() -> Findings<'static> {
     Findings {
         mode: FlightMode::Hold,
@@ -22,14 +22,14 @@ fn calm() -> Findings<'static> {
     }
 }
 
-/// Returns the causes that hold after a look, with the announcements of what is over.
+/// Runs the checks. Returns the causes present and the announcements of ended ones.
 fn look(watch: &mut Watch, net: &Net, seen: &Findings<'_>) -> (std::vec::Vec<Cause>, Notices) {
     let mut notices = Notices::default();
     let before = watch.holds;
     let (action, cause, new) = watch.look(net, seen, &mut notices);
     let holding: std::vec::Vec<Cause> = Cause::ALL.into_iter().filter(|cause| watch.holds(*cause)).collect();
-    // The strongest action, and the first cause that has it; nothing is done to a disarmed vehicle, nor for a descent
-    // of one that knows where it is.
+    // Expect the strongest action and the first cause that has it. A disarmed vehicle gets no action, nor does a
+    // descent of a vehicle that knows its position.
     let counts = |cause: &&Cause| seen.position_m.is_none() || **cause != Cause::Descent;
     let strongest = holding.iter().filter(counts).map(|cause| net.action(*cause)).max().unwrap_or(FailsafeAction::None);
     assert_eq!(action, if seen.armed { strongest } else { FailsafeAction::None });
@@ -90,7 +90,7 @@ fn each_cause_is_found_by_itself_in_flight() {
     }
 }
 
-/// What is over is announced in flight, of those causes that may be over.
+/// The end of a cause is announced in flight, for causes that can end.
 #[test]
 fn the_end_of_a_cause_is_announced_in_flight() {
     let net = Net { fence_radius_m: 10.0, station_lost_s: 1.0, ..Net::DEFAULT };
@@ -118,7 +118,7 @@ fn the_end_of_a_cause_is_announced_in_flight() {
     assert_eq!(notices.iter().count(), 0, "on the ground");
 }
 
-/// What is new and has an action is announced, but for what has been told already.
+/// New causes that have an action are announced, except one already announced with its mode.
 #[test]
 fn what_is_new_is_announced() {
     let net = Net { fence_action: FenceAction::Nothing, ..Net::DEFAULT };
@@ -134,7 +134,7 @@ fn what_is_new_is_announced() {
     }
 }
 
-/// Hysteresis: outside until it is inside by a margin, and unknown places change nothing.
+/// Hysteresis: the vehicle stays "outside" until it is inside by a margin. Unknown positions change nothing.
 #[test]
 fn a_fence_is_left_and_entered_with_a_margin() {
     let net = Net { fence_radius_m: 10.0, fence_height_m: 20.0, ..Net::DEFAULT };
@@ -168,8 +168,8 @@ fn a_fence_is_left_and_entered_with_a_margin() {
 }
 
 proptest! {
-    /// A place is inside a cylinder about home, less the margin, of which a small fence keeps half its size; a size of
-    /// 0 is no fence.
+    /// The fence is a cylinder around home, less the margin. A small fence keeps at least half its size. A size of 0
+    /// means no fence.
     #[test]
     fn a_fence_is_a_cylinder(
         radius in prop_oneof![Just(0.0f32), 0.5..30.0f32], height in prop_oneof![Just(0.0f32), 0.5..30.0f32],
@@ -187,7 +187,7 @@ proptest! {
         prop_assert_eq!(net.ceiling_m(), ceiling);
     }
 
-    /// The charge is that of the voltage without load, between empty and full.
+    /// The charge follows the voltage without load, linearly between empty and full.
     #[test]
     fn the_charge_follows_the_voltage_without_load(
         voltage_v in 5.0..20.0f32, current_a in -20.0..60.0f32, number in 1..5u32, resistance_ohm in 0.0..0.05f32,
@@ -201,7 +201,7 @@ proptest! {
     }
 }
 
-/// The first plausible reading counts as it is, and what follows with a time constant of 2 s.
+/// The first plausible reading counts as it is, later ones are filtered with a time constant of 2 s.
 #[test]
 fn the_charge_is_filtered() {
     let battery = Cells { number: 1, empty_v: 3.0, full_v: 4.0, resistance_ohm: 0.0 };
@@ -236,8 +236,8 @@ fn the_charge_is_filtered() {
     assert_eq!(charge, before);
 }
 
-/// A charge below a threshold is found, one at it is not; a battery does not recover in flight, but may be replaced on
-/// the ground.
+/// A charge below a threshold is found; a charge equal to it is not. A battery does not recover in flight, but may be
+/// replaced on the ground.
 #[test]
 fn low_batteries_are_found_by_their_thresholds() {
     let net = Net { cells: 1, low: 0.5, critical: 0.25, emergency: 0.0, empty_v: 3.0, full_v: 4.0, ..Net::DEFAULT };

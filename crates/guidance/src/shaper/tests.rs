@@ -1,5 +1,5 @@
-//! The shape compared with its page, in double precision and by the formulas as they stand there, derivatives taken
-//! numerically.
+//! Compares the motion with the formulas of the module's documentation, in double precision and with numeric
+//! derivatives.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 use super::*;
@@ -8,7 +8,7 @@ use proptest::prelude::*;
 
 const DT_S: f32 = 1e-3;
 
-/// The constants of the page.
+/// Constants of the formulas.
 struct Page {
     a: f64,
     j: f64,
@@ -30,7 +30,7 @@ fn shortened<const D: usize>(v: Vec64<D>, most: f64) -> Vec64<D> {
     if v.norm() > most { v.normalize() * most } else { v }
 }
 
-/// Limit in the direction of a vector: of one coordinate, by its sign.
+/// Returns the limit for the vector's direction; for one coordinate, by its sign.
 fn limit<const D: usize>(v: &Vec64<D>, (up, down): (f32, f32)) -> f64 {
     let down_counts = D == 1 && v.iter().all(|x| *x < 0.0);
     f64::from(if down_counts { down } else { up })
@@ -40,20 +40,20 @@ impl Page {
     fn new(a: f32, j: f32) -> Self {
         let (a, j) = (f64::from(a), f64::from(j));
         let (b, eased) = (0.7 * a, 0.9 * j);
-        // c = 2 B^2/J', unless k1 = B/c is too large.
+        // c = 2 B^2/J', unless k1 = B/c would exceed its limit.
         let c = (2.0 * b * b / eased).max(b / 12.0);
         let k2 = 4.0 * b / c;
         let settling = 0.55 * j;
         Page { a, j, b, c, settling, d: settling / k2, k2, k3: 5.0 * k2 }
     }
 
-    /// f(e), along e.
+    /// Returns f(e), along e.
     fn f<const D: usize>(&self, e: &Vec64<D>) -> Vec64<D> {
         let size = e.norm();
         if size == 0.0 { *e } else { e * (((self.c * self.c + 2.0 * self.b * size).sqrt() - self.c) / size) }
     }
 
-    /// g(x), along x, and g'.
+    /// Returns g(x), along x, and the derivative g'.
     fn g<const D: usize>(&self, x: &Vec64<D>) -> (Vec64<D>, f64) {
         let size = x.norm();
         let root = (self.d * self.d + 2.0 * self.settling * size).sqrt();
@@ -61,13 +61,13 @@ impl Page {
         (along, self.settling / root)
     }
 
-    /// The wanted velocity, and how it changes beside the goal's acceleration: the derivative of the approach as long
-    /// as it is not limited.
+    /// Returns the wanted velocity, and its derivative without the goal's acceleration: that of the approach, or zero
+    /// if the approach is limited.
     fn wanted<const D: usize>(&self, motion: &Motion<D>, goal: &Goal<D>, reach: &Reach) -> (Vec64<D>, Vec64<D>) {
         let zero = Vec64::<D>::zeros();
         let v = wide(&motion.velocity);
         let Some(given) = goal.velocity.as_ref().map(wide) else {
-            // x with g(x) as the acceleration.
+            // The x for which g(x) is the given acceleration.
             let a = wide(&goal.acceleration);
             let size = ((a.norm() + self.d).powi(2) - self.d * self.d) / (2.0 * self.settling);
             let ahead = if a.norm() > 0.0 { v + a.normalize() * size } else { v };
@@ -90,7 +90,7 @@ impl Page {
         (shortened(wanted, 0.98 * limit(&wanted, reach.speed)), change)
     }
 
-    /// The jerk of a step.
+    /// Returns the jerk of a step.
     fn jerk<const D: usize>(&self, motion: &Motion<D>, goal: &Goal<D>, reach: &Reach) -> Vec64<D> {
         let (v, a) = (wide(&motion.velocity), wide(&motion.acceleration));
         let (wanted, change) = self.wanted(motion, goal, reach);
@@ -130,7 +130,7 @@ fn pair(most: f32) -> impl Strategy<Value = Vector2<f32>> {
     (-most..most, -most..most).prop_map(|(x, y)| Vector2::new(x, y))
 }
 
-/// A vector of small or large numbers.
+/// Vectors of small, medium and large numbers.
 fn vector(most: f32) -> impl Strategy<Value = Vector2<f32>> {
     prop_oneof![pair(most), pair(0.1 * most), pair(0.003 * most), Just(Vector2::zeros())]
 }
@@ -166,7 +166,7 @@ fn of_one(v: &Vector2<f32>) -> Vector1<f32> {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 3000, ..ProptestConfig::default() })]
 
-    /// A step's jerk is that of the page, for two coordinates and for one with limits of its own in each direction.
+    /// A step's jerk is that of the formulas, for two coordinates, and for one with different limits in each direction.
     #[test]
     fn a_step_is_that_of_the_page(
         motion in any_motion(), goal in any_goal(), reach in any_reach(), a in 0.5..8.0f32, jerk_s in 0.5..60.0f32,
@@ -176,7 +176,7 @@ proptest! {
         let mut moved = motion;
         shape.advance(&mut moved, &goal, &reach, DT_S);
         let expected = page.jerk(&motion, &goal, &reach);
-        // Single precision, 60 times per second times a resolution of 1e-6 of the velocities, and that over a step.
+        // Single precision: velocities are resolved to 1e-6, amplified by the rates up to k3 and divided by a step.
         let hair = 2e-3 * (1.0 + expected.norm()) + 1e-3 * page.k3;
         prop_assert!((wide(&moved.jerk) - expected).norm() < hair, "{:?}, not {expected:?}", moved.jerk);
 
@@ -196,13 +196,12 @@ proptest! {
         prop_assert!((found - expected).norm() < hair + 2e-3 * expected.norm(), "{found:?}, not {expected:?}");
     }
 
-    /// A step is the integral of its jerk, also far from the origin, where the two parts of the position count
-    /// together.
+    /// A step integrates its jerk, also far from the origin, where the position's two parts count together.
     #[test]
     fn a_step_integrates_its_jerk(motion in any_motion(), jerk in pair(100.0), far in -9e4..9e4f32) {
         let mut moved = Motion { position: motion.position.map(|x| x + far), ..motion };
         let begin = wide(&moved.position);
-        // Long steps, so that every term is seen.
+        // Long steps make every term visible.
         let dt = 0.05_f32;
         for _ in 0..20 {
             moved.advance(jerk, dt);

@@ -1,4 +1,4 @@
-//! A point mass on flat ground that follows setpoints, with the flight core's land detector.
+//! A point mass over flat ground that follows setpoints, with the flight core's land detector.
 
 use afbc_control::math::wrap_angle;
 use afbc_flight_core::landing::LandDetector;
@@ -20,10 +20,10 @@ pub(crate) struct Bench {
     pub(crate) now_us: u64,
     pub(crate) battery: Option<BatteryReading>,
     pub(crate) sensors: FailedSensors,
-    /// Whether the station is heard, and the state is seen.
+    /// True while the station is heard, and while the state is visible.
     pub(crate) heard: bool,
     pub(crate) sees: bool,
-    /// Acceleration by the wind \[m/s2\].
+    /// Acceleration by wind \[m/s2\].
     pub wind_m_s2: Vector3<f32>,
     /// The mission.
     pub(crate) items: Vec<Item>,
@@ -31,13 +31,13 @@ pub(crate) struct Bench {
     pub(crate) reached: Vec<u16>,
     pub(crate) answers: Vec<(u8, Result<(), OrderRefusal>)>,
     pub(crate) last: Option<Guided>,
-    /// Highest and farthest place of the flight \[m\].
+    /// Highest place of the flight \[m\].
     pub(crate) highest_m: f32,
-    /// What is set anew in the next tick, and all that has been so far.
+    /// Estimator reset of the next tick, and the sum of all resets so far.
     reset: Option<ResetDelta>,
     resets: ResetDelta,
     thrust_m_s2: f32,
-    /// Time at rest, as the flight core counts it \[us\].
+    /// Time at rest as the flight core would count it \[us\].
     rest_us: u32,
 }
 
@@ -73,7 +73,7 @@ impl Bench {
         }
     }
 
-    /// A bench that hovers in hold, at the take-off height.
+    /// Returns a bench that hovers in hold at the take-off height.
     pub(crate) fn hovering(settings: Settings) -> Self {
         let mut bench = Bench::new(settings);
         bench.run(1.5);
@@ -85,7 +85,7 @@ impl Bench {
         bench
     }
 
-    /// Sets the state anew; the vehicle does not move.
+    /// Resets the estimate without moving the vehicle.
     pub(crate) fn reset(&mut self, by: ResetDelta) {
         self.state.position_m += by.position_m;
         self.state.attitude_rad.z = wrap_angle(self.state.attitude_rad.z + by.yaw_rad);
@@ -94,7 +94,7 @@ impl Bench {
         self.reset = Some(by);
     }
 
-    /// Where the vehicle truly is \[m\], and its true heading \[rad\].
+    /// Returns the true position, without the resets \[m\].
     pub(crate) fn true_m(&self) -> Vector3<f32> {
         self.state.position_m - self.resets.position_m
     }
@@ -113,7 +113,7 @@ impl Bench {
         self.core.armed() && self.landing.airborne()
     }
 
-    /// True if it has been at rest for as long as arming wants it.
+    /// True once it has been at rest long enough to arm.
     pub(crate) fn rested(&self) -> bool {
         self.rest_us >= REST_US
     }
@@ -140,7 +140,7 @@ impl Bench {
         }
     }
 
-    /// Runs until `ends`; the time that it takes.
+    /// Runs until `ends`. Returns the time that this took \[s\].
     pub(crate) fn run_until(&mut self, most_s: f32, ends: impl Fn(&Guided) -> bool) -> f32 {
         for tick in 0..(most_s / DT_S) as u32 {
             if ends(&self.tick()) {
@@ -194,7 +194,7 @@ impl Bench {
         let State { position_m, velocity_m_s, .. } = self.state;
         let idles = !self.core.armed() || guided.idle_on_ground && self.core != Mode::Descending;
         let wanted_m_s2 = match &guided.setpoint {
-            // The flight core flies down by itself.
+            // The flight core descends by itself.
             _ if self.core == Mode::Descending => (Vector3::new(0.0, 0.0, -0.5) - velocity_m_s) * 6.0,
             _ if idles => Vector3::new(0.0, 0.0, -G_M_S2),
             None => Vector3::zeros(),
@@ -207,7 +207,7 @@ impl Bench {
         self.thrust_m_s2 = if idles { 0.0 } else { (wanted_m_s2.z + G_M_S2).clamp(0.0, 2.0 * G_M_S2) };
         let mut acceleration_m_s2 =
             Vector3::new(wanted_m_s2.x, wanted_m_s2.y, self.thrust_m_s2 - G_M_S2) + self.wind_m_s2;
-        // A state that has been set anew says nothing of the ground.
+        // An estimator reset does not move the ground.
         let ground_m = self.resets.position_m.z;
         let on_ground = position_m.z <= ground_m && acceleration_m_s2.z <= 0.0;
         if on_ground {
@@ -235,7 +235,7 @@ impl Bench {
     }
 }
 
-/// A target of position alone, or with velocity and so on by update syntax.
+/// Returns a target of position alone.
 pub(crate) fn motion(position_m: Vector3<f32>) -> MotionTarget {
     let none = Vector3::repeat(f32::NAN);
     MotionTarget {

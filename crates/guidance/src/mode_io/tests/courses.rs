@@ -1,8 +1,8 @@
-//! Hold, take-off, landing and return.
+//! Tests of modes hold, take-off, landing and return.
 
 use super::*;
 
-/// It stops first, and then holds the place where it stands.
+/// A hold first stops, then holds the place of the stop.
 #[test]
 fn a_hold_is_where_it_comes_to_stand() {
     let mut hold = Hold::default();
@@ -13,14 +13,14 @@ fn a_hold_is_where_it_comes_to_stand() {
     assert_eq!(stands.see(|inputs| hold.fly(inputs)).position_m, at_m);
     let later = Stage::at(Vector3::zeros()).see(|inputs| hold.fly(inputs));
     assert!(later.position_m == at_m && later.yaw_rad.is_nan() && later.speed_m_s == 4.0, "{later:?}");
-    // What was ordered.
+    // Place, heading and speed as ordered.
     let mut ordered = Hold { at_m: Some(here()), yaw_rad: Some(0.4), speed_m_s: Some(7.0) };
     let aim = Stage { speed_m_s: 8.0, ..Stage::at(Vector3::zeros()) }.see(|inputs| ordered.fly(inputs));
     assert_eq!((aim.position_m, aim.yaw_rad, aim.speed_m_s), (here(), 0.4, 7.0));
     assert_eq!(Stage { speed_m_s: 3.0, ..Stage::at(here()) }.see(|inputs| ordered.fly(inputs)).speed_m_s, 3.0);
 }
 
-/// Done is a take-off in the air, with a setpoint that stands at its end and a vehicle that is hardly below.
+/// A take-off is done in the air, once the setpoint stands at the end and the vehicle is nearly there.
 #[test]
 fn a_takeoff_ends_at_its_height() {
     let from = Vector3::new(3.0, 4.0, 2.0);
@@ -28,7 +28,7 @@ fn a_takeoff_ends_at_its_height() {
         let takeoff = Stage::at(from).see(|inputs| Takeoff::new(inputs, height));
         let to = from + Vector3::new(0.0, 0.0, height);
         assert_eq!(takeoff.to_m, to);
-        // The vehicle below the end, and the setpoint above or below it.
+        // The vehicle is `below` the end, and the setpoint `off` it.
         let output = |below: f32, off: f32, stage: fn(Stage) -> Stage| {
             let at = Stage::at(to - along(2, below)).apart(along(2, below + off));
             stage(at).see(|inputs| takeoff.fly(inputs))
@@ -45,7 +45,7 @@ fn a_takeoff_ends_at_its_height() {
     }
 }
 
-/// It lands where its setpoint has stopped, however fast it sinks.
+/// A landing is over the place where the horizontal setpoint has stopped, at any sink rate.
 #[test]
 fn a_landing_is_where_it_stops() {
     let mut land = Land::default();
@@ -59,8 +59,8 @@ fn a_landing_is_where_it_stops() {
     assert_eq!(limited(&output).position_m.xy(), here().xy(), "it stays there");
 }
 
-/// It climbs to the return height above home, unless it is near, higher, or under a ceiling; flies there, heading for
-/// home; and descends over it.
+/// A return climbs to the return height above home, unless it is near home, already higher, or below a ceiling. Then it
+/// flies home, heading there, and descends over home.
 #[test]
 fn a_return_climbs_flies_and_descends() {
     let Flying { near_home_m, return_height_m, .. } = flying();
@@ -80,11 +80,11 @@ fn a_return_climbs_flies_and_descends() {
     assert_eq!(climbs(far(3.0), 9.0), 9.0);
     assert_eq!(climbs(near(3.0), f32::INFINITY), 3.0);
 
-    // While it stops it climbs already.
+    // It already climbs while it stops.
     let mut back = Stage::at(far(3.0)).see(|inputs| Return::new(inputs, inputs.home_m.xy()));
     let stops = Stage::at(far(3.0)).moving(Vector3::new(2.0, 0.0, 0.0)).see(|inputs| back.fly(inputs));
     assert!(same(&limited(&stops).position_m, &Vector3::new(f32::NAN, f32::NAN, safe)));
-    // The climb is over if the setpoint is nearly there, and the vehicle within a metre.
+    // The climb is complete if the setpoint is within 0.3 m of the height and the vehicle within 1 m.
     for (setpoint, vehicle, over) in [(0.29, 0.99, true), (0.31, 0.9, false), (0.2, 1.01, false), (-3.0, -3.0, true)] {
         let mut back = Stage::at(far(3.0)).see(|inputs| Return::new(inputs, inputs.home_m.xy()));
         let stage = Stage::at(far(safe - vehicle)).apart(along(2, vehicle - setpoint));
@@ -94,7 +94,7 @@ fn a_return_climbs_flies_and_descends() {
         assert_eq!(aim.position_m.xy() == home.xy(), over, "{setpoint}, {vehicle}");
         assert!(!over || (aim.yaw_rad - towards).abs() < 1e-5 && aim.position_m.z == safe, "{aim:?}");
         if over {
-            // Over home, slowly, it descends.
+            // Over home, and slow, it descends.
             for (off, speed, descends) in [(1.02, 0.0, false), (0.9, 0.31, false), (0.98, 0.29, true)] {
                 let over_home = Vector3::new(home.x, home.y, safe);
                 let stage = Stage::at(over_home + along(0, off)).moving(along(1, speed));

@@ -1,4 +1,4 @@
-//! What sticks, and targets of a companion, ask for.
+//! Tests of the modes that follow sticks or the targets of a companion computer.
 
 use super::*;
 
@@ -23,8 +23,8 @@ fn stick() -> impl Strategy<Value = f32> {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 500, ..ProptestConfig::default() })]
 
-    /// Forward and right as seen from the vehicle, clockwise as seen from above; small deflections are none; throttle
-    /// up and down by the limits of each.
+    /// Sticks command forward and right in the vehicle's frame, and yaw clockwise seen from above. Small deflections
+    /// count as centred. Throttle up and down are scaled by the limits of each direction.
     #[test]
     fn sticks_mean_directions_of_the_vehicle(
         roll in stick(), pitch in stick(), throttle in stick(), yaw in stick(), heading in -3.1..3.1f32,
@@ -65,7 +65,7 @@ proptest! {
         prop_assert!((setpoint.yaw_rate_rad_s + yaw * 1.5).abs() < 1e-5);
         prop_assert_eq!((setpoint.position_m, setpoint.velocity_m_s), (here(), stage.state.velocity_m_s));
 
-        // Body axes: to the right and nose down are positive turns about forward and left, clockwise a negative one.
+        // Body rates: roll to the right and nose down are positive, a clockwise turn is negative.
         let acro = output(FlightMode::Acro);
         let Shaping::Turning(target) = acro.shaping else { panic!("{acro:?}") };
         let full = Vector3::new(all.roll * 100.0, all.pitch * 100.0, -all.yaw * 100.0).map(f32::to_radians);
@@ -78,7 +78,7 @@ proptest! {
     }
 }
 
-/// Rotors that do not lift the weight give what they can.
+/// Rotors too weak to lift the weight give their largest thrust.
 #[test]
 fn weak_rotors_give_what_they_can() {
     let weak = Lift { most_m_s2: 8.0, ..LIFT };
@@ -105,7 +105,7 @@ fn level(thrust: f32) -> AttitudeTarget {
     AttitudeTarget { attitude: UnitQuaternion::identity(), yaw_rate_rad_s: f32::NAN, thrust }
 }
 
-/// Each number within its largest value, or NaN where that means that there is none.
+/// Each value is accepted up to its largest size, and NaN where it means "not given".
 #[test]
 fn targets_are_plausible_within_their_largest_values() {
     let with = |index: usize, value: f32| {
@@ -146,7 +146,7 @@ fn aimed(stage: &Stage, targets: &mut Targets, target: MotionTarget, at_us: u64)
     (output, limited(&output))
 }
 
-/// A target of the local frame is aimed at as it is, as one of a stream, with the largest speed.
+/// A target in the local frame is passed on as it is, as one of a stream, with the largest speed.
 #[test]
 fn a_local_target_is_aimed_at_as_it_is() {
     let v = Vector3::new;
@@ -167,7 +167,7 @@ fn a_local_target_is_aimed_at_as_it_is() {
     }
 }
 
-/// A target of the vehicle's frame: forward and left of its heading, from where it is when the message comes.
+/// A body-frame target is turned by the heading, and fixed relative to the vehicle at the arrival of the message.
 #[test]
 fn a_target_of_the_vehicles_frame_is_turned_and_fixed() {
     let target = MotionTarget {
@@ -186,7 +186,7 @@ fn a_target_of_the_vehicles_frame_is_turned_and_fixed() {
     assert!(near(aim.velocity_m_s, heading * target.velocity_m_s), "{aim:?}");
     assert!(near(aim.acceleration_m_s2, heading * target.acceleration_m_s2), "{aim:?}");
     assert!((aim.yaw_rad - 1.4).abs() < 1e-6 && aim.sent_us.is_none(), "{aim:?}");
-    // The vehicle moves on and turns: the place stays, until the next message.
+    // The vehicle moves on and turns: the place stays until the next message.
     let mut later = Stage::at(here() + Vector3::new(1.0, 0.0, 0.0));
     later.present.yaw_rad = 0.2;
     let (_, again) = aimed(&later, &mut targets, target, 10);
@@ -196,7 +196,7 @@ fn a_target_of_the_vehicles_frame_is_turned_and_fixed() {
     assert!(near(next.position_m, later.state.position_m + turned) && (next.yaw_rad - 0.5).abs() < 1e-6, "{next:?}");
 }
 
-/// A target lifts the vehicle off if it is above it, or upwards where no height is given, or a whole trajectory.
+/// A target lifts the vehicle off if it is above it, or moves upwards without a height, or is a complete trajectory.
 #[test]
 fn targets_above_or_upwards_lift() {
     let stage = Stage { airborne: false, ..Stage::at(here()) };
@@ -207,7 +207,7 @@ fn targets_above_or_upwards_lift() {
     assert!(lifts(climbs(0.06)) && !lifts(climbs(0.04)) && !lifts(climbs(-1.0)));
     let pulls = |up: f32| MotionTarget { acceleration_m_s2: Vector3::new(0.0, 0.0, up), ..motion() };
     assert!(lifts(pulls(0.06)) && !lifts(pulls(0.04)) && !lifts(pulls(-1.0)) && !lifts(motion()));
-    // The height counts before the speed.
+    // The height has precedence over the speed.
     assert!(!lifts(MotionTarget { velocity_m_s: Vector3::new(0.0, 0.0, 1.0), ..above(0.0) }));
     assert!(lifts(MotionTarget { velocity_m_s: Vector3::new(0.0, 0.0, -1.0), ..above(1.0) }));
     let whole = MotionTarget {
@@ -220,8 +220,8 @@ fn targets_above_or_upwards_lift() {
 }
 
 proptest! {
-    /// An attitude and a share of the thrust accelerate along the attitude's z; the heading is the attitude's, or turns
-    /// at a rate.
+    /// An attitude target with a share of the thrust accelerates along the attitude's z axis. The heading is the
+    /// attitude's, or turns at the given rate.
     #[test]
     fn an_attitude_target_accelerates_along_its_z(
         roll in -1.2..1.2f32, pitch in -1.2..1.2f32, yaw in -3.1..3.1f32, rate in prop::option::of(-2.0..2.0f32),

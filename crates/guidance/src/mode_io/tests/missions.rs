@@ -1,4 +1,4 @@
-//! The items of a mission.
+//! Tests of the mission items.
 
 use super::*;
 
@@ -10,22 +10,22 @@ fn waypoint(position_m: Vector3<f32>) -> Item {
     Item::Waypoint { position_m, yaw_rad: f32::NAN, hold_s: 0.0, within_m: 0.0, fly_through: false }
 }
 
-/// A cylinder of a kilometre.
+/// A fence of 1 km around home.
 const NET: Net = Net { fence_radius_m: 1e3, ..Net::DEFAULT };
 
 fn progress(mission: &mut Mission, stage: &Stage, leg: &Leg) -> mission::Progress {
     stage.see(|inputs| mission.fly(Some(leg), inputs, &NET))
 }
 
-/// A mission that wants this item.
+/// Returns a mission that requests this item.
 fn wanting(number: u16) -> Mission {
     let mut mission = Mission::default();
     mission.resume(number);
     mission
 }
 
-/// A waypoint is reached within its distance or that of the parameters, slowly unless it is flown through, and left
-/// after its time.
+/// A waypoint is reached within its own distance or the parameter's. The vehicle must be slow unless it flies through,
+/// and leaves after the hold time.
 #[test]
 fn waypoints_are_reached_within_their_distance() {
     let place = here();
@@ -52,13 +52,13 @@ fn waypoints_are_reached_within_their_distance() {
         assert_eq!(mission.wanted, if reached { 4 } else { 3 }, "{case:?}");
         let aim = limited(&step.output);
         assert_eq!((aim.position_m, aim.speed_m_s), (place, 4.0));
-        // The last one ends the mission, and the first is wanted again.
+        // The last item ends the mission, and the first is requested again.
         let mut mission = wanting(3);
         let last = Leg { is_last: true, ..leg(3, item(within_m, fly_through, 0.0)) };
         assert_eq!(progress(&mut mission, &stage, &last).output.done, reached, "{case:?}");
         assert_eq!(mission.wanted, if reached { 0 } else { 3 }, "{case:?}");
     }
-    // It stays for its time from then on, wherever it drifts; one that is flown through does not.
+    // Once reached, it holds for its time even if it drifts away. A fly-through waypoint does not hold.
     for (hold_s, fly_through, ticks) in [(0.05, false, 50), (0.05, true, 1), (0.0, false, 1)] {
         let mut mission = wanting(0);
         let one = leg(0, item(0.0, fly_through, hold_s));
@@ -72,7 +72,7 @@ fn waypoints_are_reached_within_their_distance() {
     }
 }
 
-/// The heading is the waypoint's, or towards it as seen from where the leg began.
+/// The heading is the waypoint's, or towards the waypoint from the start of the leg.
 #[test]
 fn the_heading_on_the_way_is_towards_the_waypoint() {
     let place = here() + Vector3::new(-30.0, 40.0, 0.0);
@@ -82,11 +82,11 @@ fn the_heading_on_the_way_is_towards_the_waypoint() {
     let aside = Stage::at(here() + along(0, 60.0));
     let then = progress(&mut mission, &aside, &leg(0, waypoint(place)));
     assert_eq!(limited(&then.output).yaw_rad, limited(&first.output).yaw_rad, "as the leg began");
-    // Paused, it begins anew.
+    // After a pause, the leg restarts.
     mission.pause();
     let anew = progress(&mut mission, &aside, &leg(0, waypoint(place)));
     assert!((limited(&anew.output).yaw_rad - f32::atan2(40.0, -90.0)).abs() < 1e-5);
-    // Another item, too.
+    // Another item starts its own leg, too.
     mission.resume(5);
     let other = progress(&mut mission, &Stage::at(here()), &leg(5, waypoint(place)));
     assert_eq!(limited(&other.output).yaw_rad, limited(&first.output).yaw_rad);
@@ -94,7 +94,7 @@ fn the_heading_on_the_way_is_towards_the_waypoint() {
     assert_eq!(limited(&progress(&mut wanting(0), &aside, &leg(0, stated)).output).yaw_rad, 0.3);
 }
 
-/// From the ground a waypoint begins with a climb to the take-off height, or as far as the ceiling allows.
+/// From the ground, a waypoint begins with a climb to the take-off height, or up to the ceiling.
 #[test]
 fn a_waypoint_on_the_ground_begins_with_a_climb() {
     let ground = Vector3::new(2.0, 3.0, 1.0);
@@ -108,18 +108,18 @@ fn a_waypoint_on_the_ground_begins_with_a_climb() {
         let begins = progress(&mut mission, &stage, &one);
         assert!(begins.output.lifts && begins.reached.is_none());
         assert!((limited(&begins.output).position_m - Vector3::new(2.0, 3.0, top)).norm() < 1e-6, "{begins:?}");
-        // At its top the climb is done, and the waypoint's turn has come.
+        // At the top the climb is done, and the next tick flies to the waypoint.
         let climbed = Stage { ceiling_m, ..Stage::at(Vector3::new(2.0, 3.0, top)) };
         let step = progress(&mut mission, &climbed, &one);
         assert_eq!((step.reached, step.output.done), (None, false));
         assert_eq!(progress(&mut mission, &climbed, &one).reached, Some(0));
     }
-    // In the air it does not.
+    // In the air there is no climb.
     let step = progress(&mut wanting(0), &Stage::at(ground), &leg(0, waypoint(ground + along(0, 50.0))));
     assert!(!step.output.lifts);
 }
 
-/// A take-off climbs to its height where it is, or not at all if it is higher, and is reached there.
+/// A take-off climbs vertically to its height, or not at all if already higher, and is reached there.
 #[test]
 fn a_takeoff_item_climbs_to_its_height() {
     for (z, top) in [(1.0, 6.0), (9.0, 9.0)] {
@@ -130,13 +130,13 @@ fn a_takeoff_item_climbs_to_its_height() {
         assert!(step.output.lifts && step.reached.is_none() && limited(&step.output).position_m.z == top, "{step:?}");
         let there = Stage::at(Vector3::new(2.0, 3.0, top));
         assert_eq!(progress(&mut mission, &there, &leg(0, item)).reached, Some(0));
-        // The place is held until the next item comes.
+        // The place is held until the next item arrives.
         let waits = progress(&mut mission, &Stage::at(here()), &leg(0, item));
         assert_eq!((waits.reached, limited(&waits.output).position_m), (None, Vector3::new(2.0, 3.0, top)));
     }
 }
 
-/// Over its place, within a metre and slowly, a landing begins; where it is, at once.
+/// A landing item begins to land over its place, within 1 m and slow; without a place, at once.
 #[test]
 fn a_landing_item_flies_over_its_place() {
     let place = Vector3::new(20.0, 30.0, -7.0);
@@ -163,7 +163,8 @@ fn a_landing_item_flies_over_its_place() {
     assert_eq!(step.then, Some((FlightMode::Return, 2)));
 }
 
-/// A speed counts from its item on, up to what was ordered; another mission begins without it, at its first item.
+/// A speed item counts until another mission begins, up to the ordered speed. Another mission starts at its first item,
+/// without the speed.
 #[test]
 fn a_speed_counts_until_the_mission_is_another() {
     let mut mission = wanting(0);
@@ -182,7 +183,7 @@ fn a_speed_counts_until_the_mission_is_another() {
     assert_eq!(speed(&mut mission, f32::INFINITY, &Leg { upload: 2, ..leg(0, far) }), 4.0);
 }
 
-/// Without the item that is wanted it stays where it is; without a mission, it is done.
+/// Without the requested item the vehicle holds its place. Without a mission, the mode is done.
 #[test]
 fn without_its_item_a_mission_waits_or_is_over() {
     let mut mission = wanting(4);
@@ -193,7 +194,7 @@ fn without_its_item_a_mission_waits_or_is_over() {
     assert!(over.output.done && over.reached.is_none());
 }
 
-/// Items outside of the fence or with impossible numbers are refused.
+/// Items outside the fence or with implausible numbers are refused.
 #[test]
 fn items_that_cannot_be_flown_are_refused() {
     let v = Vector3::new;
@@ -236,7 +237,7 @@ fn items_that_cannot_be_flown_are_refused() {
         assert_eq!(step.refused, refused, "{item:?}");
         assert!(!refused || step.reached.is_none() && step.then.is_none() && mission.wanted == 0);
     }
-    // Without a cylinder, as far as setpoints go.
+    // Without a fence, places are limited by the range of setpoints only.
     for (y_m, flown) in [(8.9e4, Ok(())), (9.1e4, Err(OrderRefusal::OutOfRange))] {
         let far = waypoint(v(1.0, y_m, 3.0), 0.0, 0.0, 0.0);
         assert_eq!(far.check(&Net::DEFAULT, Some(&here())), flown);

@@ -1,5 +1,5 @@
-//! What the modes want with given inputs: sticks, targets, take-off, landing, return and missions, with thresholds on
-//! both sides. Their flights are in the crate's `tests`.
+//! Tests of the modes' outputs for given inputs, with every threshold on both sides. The crate's `tests` folder flies
+//! the modes.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "tests")]
 
 mod courses;
@@ -22,7 +22,7 @@ use proptest::prelude::*;
 const NAN: Vector3<f32> = Vector3::new(f32::NAN, f32::NAN, f32::NAN);
 const LIFT: Lift = Lift { most_m_s2: 25.0, gravity_m_s2: 9.81, given_m_s2: None };
 
-/// Limits and speeds that all differ.
+/// Limits and speeds that all differ from one another.
 fn limits() -> Limits {
     Limits { speed_m_s: 9.0, up_m_s: 3.0, down_m_s: 2.0, yaw_rate_rad_s: 1.5, ..Limits::DEFAULT }
 }
@@ -31,7 +31,7 @@ fn flying() -> Flying {
     Flying { cruise_m_s: 4.0, takeoff_m_s: 1.2, stick_tilt_rad: 0.6, within_m: 0.7, ..Flying::DEFAULT }
 }
 
-/// Vehicle and setpoint, somewhere in the air, and what is true of the rest.
+/// Inputs of a mode: a vehicle and its setpoint in the air.
 #[derive(Clone, Copy, Debug)]
 struct Stage {
     state: State,
@@ -43,7 +43,7 @@ struct Stage {
 }
 
 impl Stage {
-    /// Both at a place, with different headings.
+    /// Vehicle and setpoint at the same place, with different headings.
     fn at(position_m: Vector3<f32>) -> Self {
         let mut state = State { position_m, ..State::default() };
         state.attitude_rad = Vector3::new(0.1, -0.2, 0.8);
@@ -56,7 +56,7 @@ impl Stage {
         Stage { present: Setpoint { velocity_m_s, ..self.present }, ..self }
     }
 
-    /// The setpoint moved away from the vehicle.
+    /// Moves the setpoint away from the vehicle.
     fn apart(self, by_m: Vector3<f32>) -> Self {
         Stage { present: Setpoint { position_m: self.state.position_m + by_m, ..self.present }, ..self }
     }
@@ -85,7 +85,7 @@ fn along(axis: usize, size: f32) -> Vector3<f32> {
     Vector3::from_fn(|row, _| if row == axis { size } else { 0.0 })
 }
 
-/// Equal to the bit, NaN included.
+/// True if both are equal, NaN included.
 fn same(a: &Vector3<f32>, b: &Vector3<f32>) -> bool {
     a.iter().zip(b.iter()).all(|(a, b)| a == b || a.is_nan() && b.is_nan())
 }
@@ -106,7 +106,8 @@ fn the_usual_speed_is_the_cruise_or_what_was_ordered() {
     }
 }
 
-/// It lands slowly below a height above home, twice as high as fast as it may, in between in proportion.
+/// The sink rate is the landing speed below a height above home, the largest at twice that height, and linear in
+/// between.
 #[test]
 fn it_descends_the_slower_the_lower() {
     let Flying { land_m_s, land_slow_m, .. } = flying();
@@ -149,7 +150,7 @@ fn it_stands_if_neither_speed_nor_acceleration_is_left() {
     }
 }
 
-/// Both vehicle and setpoint are at a place, within a circle and a height.
+/// Both vehicle and setpoint must be within a distance of the place, horizontally and vertically.
 #[test]
 fn at_a_place_are_vehicle_and_setpoint() {
     let place = here();
