@@ -1,4 +1,4 @@
-//! The flight core around a law: it arms a vehicle at rest, flies it, and descends when the states stop.
+//! Runs the flight core with a law: arms a vehicle at rest, flies it, and descends when the states stop.
 //! `cargo run -p afbc-flight-core --example flight_core`.
 
 use afbc::{Adaptive, Controller, Profile};
@@ -15,7 +15,7 @@ fn main() -> Result<(), OutOfRange> {
     for ms in 1..=6000_u64 {
         let at_us = 1000 * ms;
         if ms < 4000 {
-            // A tracker's last digits are never still.
+            // The last digits of a real tracker always change.
             let mut value = State::default();
             value.position_m.z = if ms.is_multiple_of(2) { 1e-5 } else { -1e-5 };
             inbox.put_state(Stamped { value, at_us });

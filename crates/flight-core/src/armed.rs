@@ -1,4 +1,4 @@
-//! State of one flight, from arming on, and the setpoints for times without one from the commander.
+//! Memory of one flight, from arming on, and setpoints for when the commander sends none.
 
 use crate::dead_reckoning::{DeadReckoning, Reckoning};
 use crate::descent::{Descent, Drift, shift};
@@ -12,46 +12,46 @@ use crate::tumble::Tumble;
 use afbc_types::{Inputs, ResetDelta, Setpoint, State};
 use nalgebra::Vector3;
 
-/// State of one flight, from arming on.
+/// Memory of one flight, from arming on.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Armed<M> {
     pub(crate) control: M,
     pub(crate) reckoning: Reckoning,
-    /// Motion observed from a tracker's poses, without an inertial sensor.
+    /// Observer of the motion from a tracker's poses, used without an inertial sensor.
     pub(crate) observer: Option<PoseObserver>,
     /// Inputs last applied to the rotors.
     pub(crate) applied: Inputs,
-    /// Inputs of the last tick, if it had no step of the law.
+    /// Inputs of the last tick, if the law did not run in it.
     pub(crate) open_loop: Option<Inputs>,
-    /// What is remembered of turning at a pilot's rates.
+    /// Memory of the rate controller (acro mode).
     pub(crate) turning: RateMemory,
-    /// True if it has turned by them since the law's last step and since it rested on the ground.
+    /// True if the rate controller has run since the law's last step and since the vehicle idled on the ground.
     pub(crate) turns: bool,
-    /// True if it rests on the ground, and the controller's memory is as at take-off.
+    /// True while the vehicle idles on the ground; the controller's memory is then as at take-off.
     pub(crate) idle_on_ground: bool,
     pub(crate) guide: Guide,
     pub(crate) landing: LandDetector,
-    /// Whether it falls, if the state is an estimate by an inertial sensor.
+    /// Fall check, used if the state is an estimate by an inertial sensor.
     pub(crate) fall: FallCheck,
     pub(crate) tumble: Tumble,
     pub(crate) witness: FrozenTrackerCheck,
-    /// True if the tracker contradicted itself or the thrust: its states are ignored for the rest of the flight.
+    /// True if the tracker contradicted itself or the thrust. Its states are then ignored for the rest of the flight.
     pub(crate) distrusts: bool,
 }
 
-/// Setpoints for times without one from the commander.
+/// Setpoints for when the commander sends none.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Guide {
-    /// Setpoint to hold while there is no other.
+    /// Setpoint of a hold.
     pub(crate) hold: Option<Setpoint>,
     pub(crate) descent: Option<Descent>,
-    /// Motion and descent of a vehicle that does not know where it is.
+    /// Horizontal motion and descent of a vehicle that has lost its position.
     pub(crate) position_lost: Option<(Drift, Descent)>,
 }
 
 impl<M: Default> Armed<M> {
-    /// Begins a flight, in the memory of the last one.
-    // Out of line, so that the new memory is not built on the tick's stack and copied.
+    /// Starts a flight in the memory of the last one. Out of line, so that the tick's stack holds no copy of the new
+    /// memory.
     #[cold]
     #[inline(never)]
     pub(crate) fn begin(
@@ -69,7 +69,7 @@ impl<M: Default> Armed<M> {
             open_loop: None,
             turning: RateMemory::default(),
             turns: false,
-            // As after a rest: the law is told that it begins on the ground.
+            // As after idling: tells the law that it starts on the ground.
             idle_on_ground: true,
             guide: Guide::default(),
             landing: LandDetector::new(state, weight_n),
@@ -80,7 +80,7 @@ impl<M: Default> Armed<M> {
         });
     }
 
-    /// Rests on the ground: the law begins afresh when it takes off, as after arming.
+    /// Idles on the ground. The law restarts at take-off, as after arming.
     pub(crate) fn rest(&mut self, dead_reckoning: &DeadReckoning, state: Option<&State>) {
         if !self.idle_on_ground {
             self.forget();
@@ -100,7 +100,7 @@ impl<M: Default> Armed<M> {
 }
 
 impl<M> Armed<M> {
-    /// Advances the dead reckoning over the last period, corrected by a measurement if there is one.
+    /// Advances the dead reckoning over the last period, and corrects it by a measurement if there is one.
     pub(crate) fn reckon(&mut self, dead_reckoning: &DeadReckoning, measured: Option<&State>) {
         dead_reckoning.advance(&mut self.reckoning, &self.applied);
         if let Some(state) = measured {
@@ -110,12 +110,12 @@ impl<M> Armed<M> {
 }
 
 impl Guide {
-    /// Returns state and setpoint of a vehicle that does not know where it is, since `last`: downwards.
+    /// Returns state and setpoint for the descent of a vehicle that has had no position since `last`.
     pub(crate) fn down(&mut self, state: &State, last: Option<&State>, dt_s: f32) -> (State, &Setpoint) {
-        // Both are made of positions: if one comes back, it is held, or descended from, where the vehicle is then.
+        // Hold and descent depend on the position. If it comes back, they restart where the vehicle is then.
         (self.hold, self.descent) = (None, None);
         let (drift, descent) = self.position_lost.get_or_insert_with(|| {
-            // The horizontal position of `state` itself means nothing any more.
+            // The horizontal position of `state` is no longer valid.
             let mut drift = Drift::new(last.unwrap_or(state).position_m.xy(), state);
             let begin = drift.advance(state, 0.0);
             (drift, Descent::new(&begin))
@@ -124,8 +124,7 @@ impl Guide {
         (drift.advance(state, dt_s), descent.setpoint())
     }
 
-    /// Shifts its setpoints with an estimate that has been set anew. Where the position is lost, its horizontal part
-    /// means nothing.
+    /// Shifts the setpoints by an estimator reset. With the position lost, only the vertical part applies.
     #[cold]
     #[inline(never)]
     pub(crate) fn shift(&mut self, reset: &ResetDelta) {
@@ -142,7 +141,7 @@ impl Guide {
         }
     }
 
-    /// Returns the setpoint for a fresh `state`: the descent's, the commander's, or a hold if there is none.
+    /// Returns the setpoint for a fresh `state`: the descent's, the commander's, or a hold if there is neither.
     pub(crate) fn target<'a>(
         &'a mut self,
         mode: Mode,
@@ -156,11 +155,11 @@ impl Guide {
             descent.advance(dt_s);
             return descent.setpoint();
         }
-        // The next descent begins where the vehicle is then.
+        // The next descent starts at the vehicle.
         self.descent = None;
         match setpoint {
             Some(setpoint) => {
-                // The next gap is held where the vehicle is then.
+                // The next hold starts at the vehicle.
                 self.hold = None;
                 setpoint
             }

@@ -1,39 +1,42 @@
 //! Converts a sender's time stamps to the vehicle's clock. Not in the paper.
 //!
 //! The zero of a sender's clock is unknown, and the clock may be slewed, stepped, wrapped or coarse. The offset of a
-//! message, arrival minus stamp, is the difference of the two clocks plus the message's delay. The smallest offset of
-//! the last half to whole second ([`WINDOW_US`]) belongs to the fastest message; the delay of any other message is what
-//! its offset exceeds that by. So the age of a delayed message includes its delay. The delay of the fastest message
-//! itself is unknown, and a delay that lasts longer than the window becomes part of it.
+//! message is its arrival minus its stamp: the difference of the two clocks plus the message's delay. The smallest
+//! offset of the last half to whole second ([`WINDOW_US`]) belongs to the fastest message. Any other message is late by
+//! the excess of its offset over that. Thus the age of a delayed message includes its delay. The delay of the fastest
+//! message itself is unknown, and a delay longer than the window becomes part of the offset.
 //!
 //! | stamp | interpretation |
 //! |---|---|
 //! | up to 2 ms ahead of the fastest | a faster message, now the smallest offset; also tracks a gaining clock |
 //! | further ahead | an outlier, taken as sent on arrival; repeated, a step ahead |
 //! | not above the previous one | out of order, refused; repeated and increasing, a step back or a wrap |
-//! | equal to the previous one, other content | coarse clock: ignored, and the next stamps count with its resolution |
+//! | equal to the previous one, other content | coarse clock: counts as sent on arrival |
 //! | any, after 3 s of silence | a new clock |
 //!
-//! A step ahead takes five stamps in a row, or two among a sender's first messages; a step back three in a row that
-//! increase for 15 ms and whose offsets lie within 3 ms.
+//! A clock with equal stamps counts as coarse for 1 s: a stamp that is early by up to the clock's resolution then is no
+//! delay.
+//!
+//! A step ahead takes five stamps in a row, or two among a sender's first messages. A step back takes three in a row
+//! that increase over 15 ms with offsets within 3 ms.
 
-/// Half of the window in which the fastest message is determined \[us\].
+/// Half of the window that determines the fastest message \[us\].
 pub const WINDOW_US: u64 = 500_000;
-/// Largest time ahead of the fastest message at which a stamp is accepted at once \[us\].
+/// Largest time ahead of the fastest message at which a stamp is accepted \[us\].
 pub const AHEAD_US: u64 = 2_000;
-/// Consecutive messages further ahead than that which mean that the clock was stepped.
+/// The clock counts as stepped ahead after this many messages in a row beyond [`AHEAD_US`].
 pub const AHEAD_COUNT: u8 = 5;
-/// Consecutive messages behind the previous one, and their duration \[us\], which mean that the clock was stepped back.
+/// The clock counts as stepped back after this many messages in a row behind the previous stamp, over [`BACK_US`].
 pub const BACK_COUNT: u8 = 3;
-/// See [`BACK_COUNT`].
+/// Smallest duration of the messages counted by [`BACK_COUNT`] \[us\].
 pub const BACK_US: u64 = 15_000;
-/// Largest difference between the offsets of these messages \[us\].
+/// Largest spread of these messages' offsets \[us\].
 pub const BACK_SPREAD_US: u64 = 3_000;
-/// Like [`AHEAD_COUNT`], among the first [`NEW_COUNT`] messages of a sender, which may have been slow.
+/// As [`AHEAD_COUNT`], among the first [`NEW_COUNT`] messages of a sender, which may all have been late.
 pub const AHEAD_COUNT_NEW: u8 = 2;
-/// See [`AHEAD_COUNT_NEW`].
+/// Number of a sender's first messages to which [`AHEAD_COUNT_NEW`] applies.
 pub const NEW_COUNT: u8 = 10;
-/// Silence after which a clock is forgotten \[us\]; no flight depends on it by then
+/// Silence after which the offsets are forgotten \[us\]. By then no flight depends on the sender
 /// ([`crate::supervisor::GIVE_UP_US`]).
 pub const SILENCE_US: u64 = 3_000_000;
 
@@ -47,34 +50,35 @@ pub struct SourceClock {
 struct Known {
     sent_us: u64,
     arrived_us: u64,
-    /// Number of messages, up to 255.
+    /// Number of messages heard, up to 255.
     heard: u8,
-    /// Smallest offset of the present half window and of the previous one \[us\].
+    /// Smallest offset of the present and of the previous half window \[us\].
     least_us: [i128; 2],
     /// Start of the present half window \[us\].
     half_since_us: u64,
     step: Option<Step>,
-    /// Smallest time between two stamps \[us\], and time until which the clock counts as that coarse.
+    /// Smallest time between two stamps \[us\], and time until which the clock counts as coarse \[us\].
     tick_us: u64,
     coarse_until_us: u64,
 }
 
-/// Consecutive messages that indicate a step of the clock.
+/// Consecutive messages that may indicate a step of the clock.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Step {
     ahead: bool,
     count: u8,
     since_us: u64,
     sent_us: u64,
-    /// Largest offset of messages ahead, or the first of messages behind.
+    /// Largest offset of messages ahead, or first offset of messages behind \[us\].
     offset_us: i128,
 }
 
 impl SourceClock {
-    /// Returns the time \[us\] on the vehicle's clock of a message stamped `sent_us`, which arrived at `arrived_us` of
-    /// the vehicle's clock; never after its arrival. `differs` is true if its content differs from the previous one's.
+    /// Returns the time of a message on the vehicle's clock \[us\], never after its arrival. `sent_us` is the sender's
+    /// stamp, `arrived_us` the arrival on the vehicle's clock. `differs` is true if the content differs from the
+    /// previous message's.
     ///
-    /// `None` if it is a duplicate or out of order, and must be dropped.
+    /// `None` if the message is a duplicate or out of order, and must be dropped.
     pub fn stamp(&mut self, sent_us: u64, arrived_us: u64, differs: bool) -> Option<u64> {
         let heard_lately = |known: &&mut Known| arrived_us.saturating_sub(known.arrived_us) <= SILENCE_US;
         let Some(known) = self.known.as_mut().filter(heard_lately) else {
@@ -100,7 +104,7 @@ impl SourceClock {
             known.arrived_us = arrived_us;
             return Some(arrived_us);
         }
-        // No underflow: older stamps and an equal one have returned above.
+        // Cannot underflow: older and equal stamps have returned above.
         known.tick_us = known.tick_us.min(sent_us - known.sent_us);
         let at_us = known.stamp(sent_us, arrived_us);
         if !goes_on_back {
@@ -110,9 +114,9 @@ impl SourceClock {
     }
 }
 
-/// Returns arrival minus stamp \[us\], for any two times.
+/// Returns arrival minus stamp \[us\].
 fn offset_us(sent_us: u64, arrived_us: u64) -> i128 {
-    // A sender may stamp anything: the difference of two u64 does not fit i64.
+    // Senders may stamp anything, and the difference of two u64 does not fit i64.
     i128::from(arrived_us) - i128::from(sent_us)
 }
 
@@ -130,7 +134,7 @@ impl Known {
         }
     }
 
-    /// Returns the offset of the fastest message in the window.
+    /// Returns the smallest offset in the window.
     fn fastest_us(&self) -> i128 {
         let [present_us, before_us] = self.least_us;
         present_us.min(before_us)
@@ -140,7 +144,7 @@ impl Known {
         self.fastest_us() - offset_us(sent_us, arrived_us) > AHEAD_US.into()
     }
 
-    /// Returns the time of a message that is not older than the previous one, and not far ahead.
+    /// Returns the time of a message that is newer than the previous one, and not far ahead.
     fn stamp(&mut self, sent_us: u64, arrived_us: u64) -> u64 {
         let offset_us = offset_us(sent_us, arrived_us);
         (self.sent_us, self.arrived_us) = (sent_us, arrived_us);
@@ -152,24 +156,24 @@ impl Known {
         } else {
             self.least_us = [offset_us.min(present_us), before_us];
         }
-        // Never negative, since this offset is in the window by now; one that does not fit is as late as can be.
+        // Never negative: this offset is in the window. Larger than u64 means as late as can be.
         let late_us = u64::try_from(offset_us - self.fastest_us()).unwrap_or(u64::MAX);
-        // A coarse stamp is up to a step of its clock too early, which is no delay.
+        // A coarse stamp may be early by up to the clock's resolution, which is no delay.
         let doubt_us = if arrived_us < self.coarse_until_us { self.tick_us } else { 0 };
         arrived_us.saturating_sub(late_us.saturating_sub(doubt_us))
     }
 
-    /// Counts a message that is too far ahead. The last one of a step begins a new window.
+    /// Counts a message that is too far ahead. The last one of a step starts a new window.
     fn steps_ahead(&mut self, sent_us: u64, arrived_us: u64) {
         let offset_us = offset_us(sent_us, arrived_us);
         let goes_on = |step: &Step| step.ahead && sent_us >= step.sent_us;
         let new = Step { ahead: true, count: 0, since_us: arrived_us, sent_us, offset_us };
         let step = self.step.filter(goes_on).unwrap_or(new);
-        // The slowest: by the fastest, one outlier among them would make all that follow look late.
+        // Use the slowest: with the fastest, one outlier among them would make all later messages look late.
         let slowest_us = step.offset_us.max(offset_us);
-        // No overflow: at the fifth a step is over.
+        // Cannot overflow: the step is complete at the fifth message.
         let (count, needed) = (step.count + 1, if self.heard < NEW_COUNT { AHEAD_COUNT_NEW } else { AHEAD_COUNT });
-        // The stamp of an outlier is not kept: the next right one would count as out of order.
+        // Do not keep an outlier's stamp: the next correct one would count as out of order.
         self.arrived_us = arrived_us;
         self.step = Some(Step { count, sent_us, offset_us: slowest_us, ..step });
         if count >= needed {
@@ -178,17 +182,17 @@ impl Known {
         }
     }
 
-    /// True if a message continues the messages of a clock that was set back.
+    /// True if a message continues a series of messages of a clock that was set back.
     fn goes_on_back(&self, sent_us: u64, arrived_us: u64) -> bool {
         self.step.is_some_and(|step| {
-            // Messages that were held up arrive together, and their offsets differ by the times between their stamps.
+            // Messages that were held up arrive together, so their offsets differ by the times between their stamps.
             let spread_us = (offset_us(sent_us, arrived_us) - step.offset_us).unsigned_abs();
             !step.ahead && sent_us > step.sent_us && spread_us <= BACK_SPREAD_US.into()
         })
     }
 
-    /// Counts a message that is older than the previous one, or continues such messages; true if the clock was stepped
-    /// back.
+    /// Counts a message that is older than the previous one, or continues such a series. Returns true if the clock was
+    /// stepped back.
     fn steps_back(&mut self, sent_us: u64, arrived_us: u64) -> bool {
         let offset_us = offset_us(sent_us, arrived_us);
         let new = Step { ahead: false, count: 0, since_us: arrived_us, sent_us, offset_us };

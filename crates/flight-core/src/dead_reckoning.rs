@@ -1,26 +1,26 @@
-//! Flight without measurements. The whole state comes over the link, so during an outage only the last measurement and
-//! the commands to the rotors since are known. Not in the paper.
+//! Flight without measurements. The whole state comes over the link, so an outage leaves only the last measurement and
+//! the commands sent to the rotors since. Not in the paper.
 //!
-//! Roll and pitch are dead-reckoned from the last measurement,
+//! Roll and pitch are dead-reckoned from the last measurement by
 //!
 //! ```text
 //! d^2 x/dt^2 = (l/I) (U_a - U_trim),   lag dU_a/dt = U - U_a
 //! ```
 //!
-//! where U_a is what [rotors with a lag](crate::motor::Response) have made of the inputs (without it, laws whose inputs
-//! lead the rotors lose a vehicle whose states come every 10 ms), and held by a critically damped law on the reckoned
-//! angle, which stops the rotation measured last:
+//! where U_a are the inputs delayed by the [rotors' lag](crate::motor::Response). Without this lag, laws whose inputs
+//! lead the rotors lose a vehicle whose states come every 10 ms. A critically damped law holds the reckoned angle and
+//! stops the last measured rotation:
 //!
 //! ```text
 //! U = U_trim - (I/l) (w^2 (x - x_held) + 2 w dx/dt)
 //! ```
 //!
-//! U_trim are the inputs that keep the vehicle as it is: they compensate off-centre mass, wind and weight. For roll and
-//! pitch they are observed in flight, from the difference between measured and reckoned rates; for thrust and yaw they
-//! are the mean of the recent inputs. Yaw is not controlled further: its authority is too small to spend thrust on it.
+//! U_trim are the inputs in equilibrium: they compensate an off-centre mass, wind and weight. For roll and pitch they
+//! are observed in flight, from the difference between measured and reckoned rates; for thrust and yaw they are the
+//! mean of the recent inputs. Yaw is not controlled further: its authority is too small to spend thrust on it.
 //!
-//! Errors of the trim make the true attitude diverge from the reckoned one as t^2, so this works for fractions of a
-//! second, and for the two seconds of the descent that follows.
+//! Errors of the trim make the true attitude diverge from the reckoned one as t^2. Dead reckoning therefore works for
+//! fractions of a second, plus the two seconds of the descent that follows.
 
 use crate::motor::Response;
 use afbc_control::math::{max, min, settled};
@@ -31,25 +31,25 @@ use nalgebra::{Vector2, Vector3};
 pub const HOLD_RAD_S: f32 = 10.0;
 /// Time constant of the trim \[s\].
 pub const TRIM_S: f32 = 1.0;
-/// Largest difference between measured and reckoned rate that the trim uses per measurement, to ignore jumps \[rad/s\].
+/// Largest difference between measured and reckoned rate used by the trim, so that jumps have little effect \[rad/s\].
 pub const INNOVATION_MAX_RAD_S: f32 = 0.1;
-/// Share of the trimmed thrust while descending blind: 1 m/s2 downwards.
+/// Share of the trimmed thrust in a blind descent, which accelerates by 1 m/s2 downwards.
 pub const DESCENT_THRUST: f32 = 0.9;
 
-/// Fixed parameters: the nominal vehicle's response.
+/// Constants: the response of the nominal vehicle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DeadReckoning {
-    /// l/Ix, l/Iy \[rad/s2 per N\].
+    /// Angular acceleration per roll and pitch input: l/Ix, l/Iy \[rad/s2 per N\].
     authority: Vector2<f32>,
-    /// Ix/l, Iy/l
+    /// Inverse of `authority`: Ix/l, Iy/l \[N per rad/s2\].
     inverse_authority: Vector2<f32>,
-    /// (d/b)/Iz \[rad/s2 per N\].
+    /// Angular acceleration per yaw input: (d/b)/Iz \[rad/s2 per N\].
     pub(crate) yaw_authority: f32,
-    /// m g \[N\].
+    /// Weight m g \[N\].
     pub(crate) weight_n: f32,
     pub(crate) gravity_m_s2: f32,
     pub(crate) dt_s: f32,
-    /// Share of the way from U_a to U that the rotors go in a step.
+    /// Share of the difference U - U_a that the rotors make up in a step.
     pub(crate) rotor_share: f32,
 }
 
@@ -60,17 +60,17 @@ pub struct Reckoning {
     pub held_rad: Vector2<f32>,
     /// Dead-reckoned roll and pitch \[rad\].
     pub angle_rad: Vector2<f32>,
-    /// Their dead-reckoned rates \[rad/s\].
+    /// Dead-reckoned rates of roll and pitch \[rad/s\].
     pub rate_rad_s: Vector2<f32>,
-    /// U_a of roll and pitch \[N\].
+    /// Lagged roll and pitch inputs U_a \[N\].
     pub acting_n: Vector2<f32>,
-    /// U_trim
+    /// Trim U_trim.
     pub trim: Inputs,
 }
 
 impl Reckoning {
-    /// Returns the state between two measurements, with dead-reckoned roll, pitch and their rates. With 100 states per
-    /// second, each 10 ms late, AFBC would lose the vehicle on the last measured rates.
+    /// Returns the state between two measurements, with dead-reckoned roll, pitch and rates. With the last measured
+    /// rates instead, AFBC would lose a vehicle with 100 states per second, each 10 ms late.
     #[inline]
     #[must_use]
     pub fn between(&self, state: &State) -> State {
@@ -84,7 +84,7 @@ impl Reckoning {
 }
 
 impl DeadReckoning {
-    /// Creates it for a nominal vehicle with valid parameters, stepped every `dt_s` seconds.
+    /// Makes the dead reckoning of a nominal vehicle with valid parameters, stepped every `dt_s` seconds.
     pub fn new(vehicle: &Parameters, rotors: &Response, dt_s: f32) -> Self {
         DeadReckoning {
             authority: vehicle.effectiveness().xy(),
@@ -105,7 +105,7 @@ impl DeadReckoning {
         Reckoning { held_rad: angle_rad, angle_rad, rate_rad_s, acting_n: Vector2::zeros(), trim }
     }
 
-    /// Advances the dead reckoning by one step with the inputs asked of the rotors.
+    /// Advances the dead reckoning by one step with the inputs commanded to the rotors.
     pub fn advance(&self, reckoning: &mut Reckoning, applied: &Inputs) {
         let asked_n = Vector2::new(applied.roll_n, applied.pitch_n);
         let acting_n = reckoning.acting_n;
@@ -115,12 +115,13 @@ impl DeadReckoning {
         reckoning.angle_rad += reckoning.rate_rad_s * self.dt_s;
     }
 
-    /// Restarts from a measurement, and corrects the trim by its difference from the reckoning.
+    /// Restarts from a measurement, and corrects the trim by the difference from the reckoning.
     pub fn measure(&self, reckoning: &mut Reckoning, state: &State) {
         let rate_rad_s = state.rates_rad_s.xy();
         let innovation =
             (rate_rad_s - reckoning.rate_rad_s).map(|rate| min(max(rate, -INNOVATION_MAX_RAD_S), INNOVATION_MAX_RAD_S));
-        // A wrong trim shows in proportion to the time since the last measurement, so that TRIM_S holds at any rate.
+        // The error of a wrong trim grows with the time since the last measurement, so TRIM_S holds at any measurement
+        // rate.
         let learnt = self.inverse_authority.component_mul(&innovation) / TRIM_S;
         reckoning.trim.roll_n -= learnt.x;
         reckoning.trim.pitch_n -= learnt.y;
@@ -129,8 +130,8 @@ impl DeadReckoning {
         reckoning.held_rad = reckoning.angle_rad;
     }
 
-    /// Filters the law's thrust and yaw into the trim. A sample counts at most twice the weight in thrust and a tenth
-    /// of it in yaw, so that transients have little effect.
+    /// Filters the law's thrust and yaw into the trim. Each sample is limited to twice the weight in thrust and a tenth
+    /// of the weight in yaw, so that transients have little effect.
     pub fn trim(&self, reckoning: &mut Reckoning, applied: &Inputs) {
         let share = self.dt_s / TRIM_S;
         let yaw_max = 0.1 * self.weight_n;

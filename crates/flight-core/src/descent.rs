@@ -1,5 +1,5 @@
-//! Descent with states that have returned, or without a position: straight down from where the vehicle was seen, until
-//! landing is detected ([`crate::landing`]). Not in the paper.
+//! Descent after states have returned, or without a position: straight down from the vehicle's last known place until
+//! the landing is detected ([`crate::landing`]). Not in the paper.
 
 use afbc_control::math::{settled, wrap_angle};
 use afbc_types::{ResetDelta, Setpoint, State};
@@ -7,7 +7,7 @@ use nalgebra::{Vector2, Vector3};
 
 /// Speed of the descent \[m/s\].
 pub const SINK_M_S: f32 = 0.5;
-/// A descent in progress.
+/// Descent in progress.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Descent {
     setpoint: Setpoint,
@@ -26,7 +26,7 @@ impl Descent {
         self.setpoint.position_m.z -= SINK_M_S * dt_s;
     }
 
-    /// Shifts it with an estimate that has been set anew.
+    /// Shifts the descent by an estimator reset.
     pub(crate) fn shift(&mut self, reset: &ResetDelta) {
         shift(&mut self.setpoint, reset);
     }
@@ -37,44 +37,45 @@ impl Descent {
     }
 }
 
-/// Shifts a setpoint with an estimate that has been set anew.
+/// Shifts a setpoint by an estimator reset.
 pub(crate) fn shift(setpoint: &mut Setpoint, reset: &ResetDelta) {
     setpoint.position_m += reset.position_m;
     setpoint.yaw_rad = wrap_angle(setpoint.yaw_rad + reset.yaw_rad);
 }
 
-/// Times with which the estimated velocity loses its meaning, and with which what was made of it, and the way, fade
-/// \[s\].
+/// Time constants \[s\] with which three things fade after the loss of the position: the trust in the estimated
+/// velocity, the velocity shown to the law, and the distance shown to the law.
 const TRUST_S: f32 = 2.0;
 const VELOCITY_S: f32 = 2.0;
 const WAY_S: f32 = 1.0;
-/// Largest change of the estimated velocity in a tick that is a motion, and no correction \[m/s\].
+/// Largest change of the estimated velocity in a tick that counts as motion; a larger one is an estimator correction
+/// \[m/s\].
 const STEP_MAX_M_S: f32 = 0.2;
 
-/// Horizontal motion of a vehicle that has lost its position, as the law sees it.
+/// Horizontal motion shown to the law of a vehicle that has lost its position.
 ///
-/// At first it is that of the estimate, so that the law brakes as usual. It fades within seconds, like the estimate's
-/// meaning: the law then sees no error, and holds what it has learnt of the wind. Were the setpoint to stand at once, a
-/// velocity error that no tilt changes would make it lean, and learn, ever more.
+/// At first it is the estimate's motion, so that the law brakes as usual. It fades to zero within seconds, as the
+/// estimate becomes worthless. The law then sees no error, and keeps the wind that it has learnt. If the setpoint stood
+/// still at once instead, a velocity error that no tilt can change would make the law lean, and learn, ever more.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Drift {
-    /// Where it was seen last.
+    /// Last known place.
     place_m: Vector2<f32>,
     way_m: Vector2<f32>,
     velocity_m_s: Vector2<f32>,
     estimated_m_s: Vector2<f32>,
-    /// Share of a change of the estimated velocity that counts.
+    /// Trust in the estimate: the share of a change of its velocity that counts.
     trust: f32,
 }
 
 impl Drift {
-    /// Begins at `place_m`, where the vehicle was seen last, with the velocity of `state`.
+    /// Starts at the last known place `place_m`, with the velocity of `state`.
     pub fn new(place_m: Vector2<f32>, state: &State) -> Self {
         let velocity_m_s = state.velocity_m_s.xy();
         Drift { place_m, way_m: Vector2::zeros(), velocity_m_s, estimated_m_s: velocity_m_s, trust: 1.0 }
     }
 
-    /// Advances by one step, and returns `state` with this horizontal motion.
+    /// Advances by one step, and returns `state` with the faded horizontal motion.
     pub fn advance(&mut self, state: &State, dt_s: f32) -> State {
         let estimated_m_s = state.velocity_m_s.xy();
         let change_m_s = estimated_m_s - self.estimated_m_s;

@@ -1,53 +1,53 @@
-//! Replies of motor controllers on bidirectional DSHOT: what comes back over the motor's own wire after a frame.
+//! Replies of motor controllers (ESCs) in bidirectional DSHOT, sent over the motor's own wire after each frame.
 //!
 //! The idle line is high, and frames are inverted, with a complemented checksum
-//! ([`DshotFrame::bidirectional`](crate::dshot::DshotFrame::bidirectional)). Some 30 us after one, a motor controller
-//! answers with 21 bits at 5/4 of the frame's rate: a low start bit, then sixteen bits in groups of four, each group as
-//! five bits of a group code (GCR) of which a one is a change of level. The sixteen bits are twelve of content and a
-//! complemented checksum. The content is the period of an electrical revolution, or, between periods, another quantity
-//! (extended telemetry, EDT).
+//! ([`DshotFrame::bidirectional`](crate::dshot::DshotFrame::bidirectional)). About 30 us after a frame, the motor
+//! controller replies with 21 bits at 5/4 of the frame's bit rate: a low start bit, then sixteen bits in groups of
+//! four. Each group is sent as five bits of a group code (GCR), in which a one is a change of level. The sixteen bits
+//! are twelve bits of content and a complemented checksum. The content is the period of an electrical revolution or,
+//! between periods, another quantity (extended telemetry, EDT).
 
-/// Bits of a reply on the wire, the start bit included.
+/// Number of bits in a reply, including the start bit.
 pub const REPLY_BITS: u32 = 21;
-/// Changes of level in a reply, at most, the start bit's included.
+/// Largest number of level changes in a reply, including the start bit's.
 pub const EDGES_MAX: usize = REPLY_BITS as usize + 1;
 
-/// A reply's bits are to the frame's as these are to each other.
+/// Ratio of a reply's bit rate to the frame's.
 pub const RATE_RATIO: [u32; 2] = [5, 4];
 
-/// A period that no rotor has: it stands.
+/// Content that reports a stopped motor.
 const STOPPED: u16 = 0xFFF;
 const US_PER_MINUTE: u32 = 60_000_000;
 
-/// What a motor controller has replied.
+/// Content of a motor controller's reply.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DshotReply {
-    /// Period of an electrical revolution \[us\]; none of a motor that stands.
+    /// Period of an electrical revolution \[us\]; `None` if the motor is stopped.
     Period(Option<u32>),
     /// Temperature \[deg C\].
     Temperature(u8),
-    /// Voltage of the supply \[0.25 V\].
+    /// Supply voltage \[0.25 V\].
     Voltage(u8),
     /// Current \[A\].
     Current(u8),
-    /// Anything else of extended telemetry, with its type: 4 to 6 debugging, 7 state and events; 0 for a period of
-    /// zero, which no motor has.
+    /// Other extended telemetry: its type, 4 to 6 for debugging and 7 for state and events, and its value. Type 0 is a
+    /// period of zero, which no motor has.
     Other(u8, u8),
 }
 
-/// Why bits are no reply.
+/// Reason why bits are not a valid reply.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ReplyError {
-    /// The line has changed too seldom, too often, or at times that are none of a bit's.
+    /// The line has changed too rarely, too often, or at times that fit no bit.
     Timing,
-    /// Five bits are none of the code's groups.
+    /// Five bits are not a group of the code.
     Group,
     /// The checksum is wrong.
     Checksum,
 }
 
 impl DshotReply {
-    /// Reads twelve bits of content.
+    /// Decodes the twelve bits of content.
     const fn of(content: u16) -> Self {
         let (exponent, mantissa) = ((content >> 9) as u32, (content & 0x1FF) as u32);
         let low = (content & 0xFF) as u8;
@@ -58,12 +58,12 @@ impl DshotReply {
             0x4 => DshotReply::Voltage(low),
             0x6 => DshotReply::Current(low),
             kind @ (0x8 | 0xA | 0xC | 0xE) => DshotReply::Other(kind / 2, low),
-            // Periods are written with the highest bit of the mantissa set, or no exponent.
+            // A period has the highest bit of the mantissa set, or an exponent of 0. That tells it from telemetry.
             _ => DshotReply::Period(Some(mantissa << exponent)),
         }
     }
 
-    /// Reads a reply from its sixteen bits.
+    /// Decodes a reply from its sixteen bits.
     ///
     /// # Errors
     /// A wrong checksum.
@@ -74,10 +74,10 @@ impl DshotReply {
         }
     }
 
-    /// Reads a reply from the twenty bits of its code, the first one highest.
+    /// Decodes a reply from its twenty code bits, the first as the highest.
     ///
     /// # Errors
-    /// The first thing that is wrong.
+    /// The first fault found.
     pub fn from_code(code: u32) -> Result<Self, ReplyError> {
         let mut bits = 0_u16;
         for group in [15, 10, 5, 0].map(|at| code >> at & 0x1F) {
@@ -89,19 +89,19 @@ impl DshotReply {
         Self::from_bits(bits)
     }
 
-    /// Reads a reply from the times of the line's changes, in counts of a timer whose count wraps with the type's; the
-    /// first is that of the start bit. `bit_counts` are the counts of a reply's bit: four fifths of a frame's. Each
-    /// bit's length may be off by a third or so; what comes after the reply's last bit is left out.
+    /// Decodes a reply from the times of the line's level changes, in counts of a 16-bit timer that wraps. The first
+    /// change is the start bit's. `bit_counts` is the length of a reply's bit, four fifths of a frame's. Bits may be
+    /// too long or short by about a third. Changes after the reply's last bit are ignored.
     ///
     /// # Errors
-    /// The first thing that is wrong.
+    /// The first fault found.
     pub fn from_edges(edges: &[u16], bit_counts: u16) -> Result<Self, ReplyError> {
         let mut times = edges.iter();
         let (Some(mut last), 1..) = (times.next(), bit_counts) else { return Err(ReplyError::Timing) };
         let (mut code, mut at) = (0_u32, 0_u32);
         for time in times {
             let counts = u32::from(time.wrapping_sub(*last));
-            // Not divided by zero: a length of 0 has been refused above.
+            // Not zero: `bit_counts` was checked above.
             let bits = (counts + u32::from(bit_counts) / 2) / u32::from(bit_counts);
             if bits == 0 {
                 return Err(ReplyError::Timing);
@@ -110,20 +110,20 @@ impl DshotReply {
             if at >= REPLY_BITS {
                 break;
             }
-            // A shift by 0 to 19: the start bit, at 0, is no part of the code.
+            // Shifts by 0 to 19. The start bit, at 0, is not part of the code.
             code |= 1 << (REPLY_BITS - 1 - at);
             last = time;
         }
         Self::from_code(code)
     }
 
-    /// Reads the replies on several lines from samples of all of them, `per_bit` in each bit of a reply: `lines` are
-    /// the places of their bits in a sample, below 16. A noisy line takes no longer than a reply.
+    /// Decodes the replies on several lines of a port from samples of the port, taken `per_bit` times per reply bit.
+    /// `lines` are the lines' bit positions in a sample, below 16. A noisy line takes no longer than a reply.
     pub fn from_port<const N: usize>(samples: &[u16], lines: [u8; N], per_bit: u16) -> [Result<Self, ReplyError>; N] {
         let lines = lines.map(|line| 1_u16.checked_shl(line.into()).unwrap_or_default());
         let mut edges = [[0_u16; EDGES_MAX]; N];
         let mut counts = [0_usize; N];
-        // They rest high.
+        // The idle lines are high.
         let (mut last, mut open) = (u16::MAX, lines.iter().fold(0, |open, line| open | line));
         for (time, levels) in (0_u16..).zip(samples) {
             let changed = (levels ^ last) & open;
@@ -137,7 +137,7 @@ impl DshotReply {
                 }
                 match edges.get_mut(*count) {
                     Some(edge) => (*edge, *count) = (time, *count + 1),
-                    // More than a reply has.
+                    // More changes than a reply has: ignore the line from now on.
                     None => (*count, open) = (0, open & !line),
                 }
             }
@@ -152,7 +152,8 @@ impl DshotReply {
         replies
     }
 
-    /// Returns the electrical speed \[rev/min\] that it tells, if it does: a motor's times its pairs of poles.
+    /// Returns the electrical speed \[rev/min\], if the reply has it. It is the motor's speed times its number of pole
+    /// pairs.
     #[must_use]
     pub fn speed_rev_min(self) -> Option<u32> {
         match self {
@@ -162,22 +163,22 @@ impl DshotReply {
         }
     }
 
-    /// Returns the sixteen bits with which a motor controller replies for an electrical speed \[rev/min\].
+    /// Returns the sixteen bits of a reply that reports an electrical speed \[rev/min\].
     #[must_use]
     pub fn bits_of_speed(speed_rev_min: u32) -> u16 {
         let period_us = US_PER_MINUTE.checked_div(speed_rev_min).unwrap_or(u32::MAX);
-        // The least exponent with which it fits into nine bits.
+        // The smallest exponent for which the mantissa fits nine bits.
         let exponent = (u32::BITS - period_us.leading_zeros()).saturating_sub(9);
         let content = if exponent > 7 { STOPPED } else { (exponent << 9 | period_us >> exponent) as u16 };
         content << 4 | !(content ^ content >> 4 ^ content >> 8) & 0xF
     }
 
-    /// Returns the levels of the line for sixteen bits, the start bit highest.
+    /// Returns the line's levels for the sixteen bits of a reply. The start bit is the highest of the 21.
     #[must_use]
     pub fn line_of_bits(bits: u16) -> u32 {
         let nibbles = [12, 8, 4, 0].map(|at| usize::from(bits >> at & 0xF));
         let code = nibbles.iter().fold(0, |code, at| code << 5 | GROUPS.get(*at).copied().unwrap_or_default());
-        // From the low start bit on, each one is a change.
+        // The start bit is low. From there on, each one is a level change.
         let (mut line, mut level) = (0, 0);
         for at in (0..REPLY_BITS - 1).rev() {
             level ^= code >> at & 1;
@@ -186,16 +187,16 @@ impl DshotReply {
         line
     }
 
-    /// Reads a reply from levels of the line at equal times, `per_bit` of them in each bit of it.
+    /// Decodes a reply from samples of the line at equal intervals, `per_bit` per reply bit.
     ///
     /// # Errors
-    /// The first thing that is wrong.
+    /// The first fault found.
     pub fn from_samples(levels: impl IntoIterator<Item = bool>, per_bit: u16) -> Result<Self, ReplyError> {
         let mut edges = [0_u16; EDGES_MAX];
         let (mut count, mut level) = (0_usize, true);
         for (time, next) in (0_u16..=u16::MAX).zip(levels) {
             if next != level {
-                // One too many is found when they are read.
+                // Excess changes are found when the edges are decoded.
                 let Some(edge) = edges.get_mut(count) else { return Err(ReplyError::Timing) };
                 (*edge, level, count) = (time, next, count + 1);
             }
@@ -204,6 +205,6 @@ impl DshotReply {
     }
 }
 
-/// Five bits for each four, none with more than two zeros in a row.
+/// Group code: five bits for each four, none with more than two zeros in a row.
 const GROUPS: [u32; 16] =
     [0x19, 0x1B, 0x12, 0x13, 0x1D, 0x15, 0x16, 0x17, 0x1A, 0x09, 0x0A, 0x0B, 0x1E, 0x0D, 0x0E, 0x0F];

@@ -6,9 +6,8 @@
 //! | a constant pose with a changing twist | displacement compared with the twist's integral over 0.25 s |
 //! | a vehicle at rest in the air without thrust | [`crate::landing`] |
 //!
-//! A repeated state does not count as a measurement: its age increases. After either of the other two the tracker is
-//! distrusted for the rest of the flight. A constant pose with noise cannot be distinguished from a vehicle that
-//! hovers.
+//! A repeated state does not count as a measurement, so the state's age increases. After either of the other two, the
+//! tracker is distrusted for the rest of the flight. A constant pose with noise cannot be told from a hovering vehicle.
 
 use afbc_control::math::abs_max;
 use afbc_types::State;
@@ -16,11 +15,11 @@ use nalgebra::Vector3;
 
 /// Time over which displacements are compared \[us\].
 pub const WINDOW_US: u32 = 250_000;
-/// Smallest displacement by the twist, along any axis, for a comparison \[m\].
+/// Smallest displacement along any axis, by the twist, for a comparison \[m\].
 pub const TRAVEL_M: f32 = 0.15;
-/// Smallest rotation by the twist, about body x or y, for a comparison \[rad\].
+/// Smallest rotation about body x or y, by the twist, for a comparison \[rad\].
 pub const TURN_RAD: f32 = 0.15;
-/// Share of that up to which a pose counts as constant.
+/// Share of the twist's displacement or rotation below which the pose counts as constant.
 pub const STANDS_SHARE: f32 = 0.2;
 
 /// Compares pose and twist over windows of [`WINDOW_US`].
@@ -28,12 +27,12 @@ pub const STANDS_SHARE: f32 = 0.2;
 pub struct FrozenTrackerCheck {
     /// Time of the last state \[us\].
     last_us: u64,
-    /// Time since the window began \[us\].
+    /// Time since the start of the window \[us\].
     window_us: u32,
-    /// Pose at its beginning.
+    /// Pose at the start of the window.
     position_m: Vector3<f32>,
     attitude_rad: Vector3<f32>,
-    /// Integral of the velocity \[m\] and of the rates \[rad\] over the window.
+    /// Integrals of velocity \[m\] and body rates \[rad\] over the window.
     travel_m: Vector3<f32>,
     turn_rad: Vector3<f32>,
 }
@@ -46,11 +45,11 @@ impl FrozenTrackerCheck {
         FrozenTrackerCheck { last_us: at_us, window_us: 0, position_m, attitude_rad, travel_m: zero, turn_rad: zero }
     }
 
-    /// Processes a state measured at `at_us`; true if the pose is constant although the twist is not zero.
+    /// Processes a state measured at `at_us`. Returns true if the pose is constant although the twist is not zero.
     #[inline]
     pub fn contradicts(&mut self, state: &State, at_us: u64) -> bool {
-        // After a longer gap the motion in between is unknown.
-        // The difference of a state older than the last one wraps to such a gap.
+        // After a longer gap, the motion in between is unknown. For a state older than the last one, the difference
+        // wraps to such a gap.
         let elapsed_us = u32::try_from(at_us.wrapping_sub(self.last_us)).unwrap_or(u32::MAX);
         if elapsed_us > WINDOW_US {
             *self = FrozenTrackerCheck::new(state, at_us);
@@ -69,13 +68,13 @@ impl FrozenTrackerCheck {
         contradicts
     }
 
-    /// True if the pose is that of the window's beginning although the twist is not zero.
+    /// True if the pose has not changed since the start of the window although the twist is not zero.
     fn stands(&self, state: &State) -> bool {
         let stands = |moved: Vector3<f32>, claimed: Vector3<f32>, least: f32| {
             let claimed = abs_max(&claimed);
             claimed > least && abs_max(&moved) < STANDS_SHARE * claimed
         };
-        // Roll and pitch are constant in a tilted vehicle that rotates about its own z.
+        // Roll and pitch stay constant in a tilted vehicle that rotates about its own z axis.
         let level = |v: Vector3<f32>| Vector3::new(v.x, v.y, 0.0);
         let (moved_m, turned_rad) = (state.position_m - self.position_m, state.attitude_rad - self.attitude_rad);
         stands(moved_m, self.travel_m, TRAVEL_M)

@@ -1,4 +1,4 @@
-//! Inputs of a tick: the newest state, pose and setpoint, with their times, and requests.
+//! Inputs of a tick: newest state, pose and setpoint with their times, and requests.
 
 use crate::rate_control::RateTarget;
 use crate::reasons::Reasons;
@@ -6,23 +6,23 @@ use crate::supervisor::{Refusal, Request};
 use afbc_types::{Pose, ResetDelta, Setpoint, Stamped, State};
 use heapless::Deque;
 
-/// Something asked for, with a ticket that identifies its answer.
+/// A request with a ticket that identifies its answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Ticketed<T> {
-    /// What is asked for.
+    /// The request.
     pub value: T,
     /// Returned with the answer, and not used otherwise.
     pub ticket: u8,
 }
 
-/// Values in the order of arrival; a tick answers one.
+/// Requests in the order of arrival; each tick answers one.
 pub type Queue<T> = Deque<Ticketed<T>, QUEUE_MAX>;
 
-/// Largest number of values in a [`Queue`].
+/// Capacity of a [`Queue`].
 pub const QUEUE_MAX: usize = 4;
 
-/// Newest inputs, written by the link and taken by the control tick. Implausible values are rejected here, so the tick
+/// Newest inputs, written by the link and taken by the control tick. The inbox rejects implausible values, so the tick
 /// need not check them.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -34,12 +34,12 @@ pub struct Inbox {
     missing: Option<Refusal>,
     pose: Option<Stamped<Pose>>,
     setpoint: Option<Stamped<Setpoint>>,
-    /// True if the vehicle rests on the ground.
+    /// True if the vehicle idles on the ground.
     idle_on_ground: Option<bool>,
-    /// Of this tick alone, from the guidance: not merged, taken or recorded.
+    /// Rates of this tick only, from the guidance: not merged, taken or recorded.
     #[cfg_attr(feature = "serde", serde(skip))]
     rates: Option<RateTarget>,
-    /// Likewise: by how much the vehicle's own estimate has been set anew.
+    /// Estimator reset of this tick only: not merged, taken or recorded.
     #[cfg_attr(feature = "serde", serde(skip))]
     reset: Option<ResetDelta>,
     inhibited: Reasons,
@@ -69,15 +69,15 @@ impl Inbox {
         }
     }
 
-    /// Stores a state of the vehicle's own estimate, which is always [plausible](State::is_plausible), in place of any
-    /// other.
+    /// Stores a state of the vehicle's own estimate, which is always [plausible](State::is_plausible). It replaces any
+    /// other state.
     pub fn locate(&mut self, state: Stamped<State>) {
         (self.state, self.own, self.position_lost, self.missing) = (Some(state), true, None, None);
     }
 
-    /// Stores a state of the vehicle's own estimate, which `missing` something and does not know where it is: attitude,
-    /// rates, height and vertical velocity may be used, the horizontal position and velocity may not. It replaces any
-    /// other state. Without one, what the link says stands.
+    /// Stores a state of the vehicle's own estimate without a position; `missing` says what the estimate lacks.
+    /// Attitude, rates, height and vertical velocity are valid, horizontal position and velocity are not. It replaces
+    /// any other state. If `state` is `None`, a state from the link stays.
     pub fn put_position_lost(&mut self, state: Option<Stamped<State>>, missing: Refusal) {
         self.position_lost = state;
         if self.position_lost.is_some() {
@@ -86,9 +86,9 @@ impl Inbox {
         self.missing = Some(missing);
     }
 
-    /// Stores a tracker's pose for the vehicle's own estimate, stamped by a [`Tracker`](crate::Tracker), if it is
-    /// [plausible](Pose::is_plausible). The flight core uses one that the estimate [leaves](Self::clear_pose), which it
-    /// does without an inertial sensor ([`crate::observer`]).
+    /// Stores a tracker's pose for the vehicle's own estimator, stamped by a [`Tracker`](crate::Tracker), if it is
+    /// [plausible](Pose::is_plausible). The flight core uses a pose that the estimator does not
+    /// [remove](Self::clear_pose), which happens without an inertial sensor ([`crate::observer`]).
     pub fn put_pose(&mut self, pose: Stamped<Pose>) {
         if pose.value.is_plausible() {
             self.pose = Some(pose);
@@ -102,19 +102,19 @@ impl Inbox {
         }
     }
 
-    /// Marks whether an armed vehicle rests on the ground: its motors idle, and the law does not fly, until the mark is
-    /// taken away. A vehicle that counts as airborne, which has just touched the ground, keeps what its law has learnt.
+    /// Sets whether an armed vehicle idles on the ground: its motors idle and the law does not run until the mark is
+    /// cleared. A vehicle that still counts as airborne, because it has just touched down, keeps the law's memory.
     pub fn set_idle_on_ground(&mut self, idle_on_ground: bool) {
         self.idle_on_ground = Some(idle_on_ground);
     }
 
-    /// True if an armed vehicle on the ground [rests](Self::set_idle_on_ground) there.
+    /// True if an armed vehicle [idles](Self::set_idle_on_ground) on the ground.
     pub fn idle_on_ground(&self) -> bool {
         self.idle_on_ground == Some(true)
     }
 
-    /// Sets the rates that a pilot commands in this tick in place of the setpoint, if any: a flying vehicle whose state
-    /// is known turns by them, and is not found tumbling. Implausible ones count as none.
+    /// Sets the body rates that a pilot commands in this tick instead of a setpoint, if any. A flying vehicle with a
+    /// known state flies these rates, and is not checked for tumbling. Implausible rates count as none.
     #[inline]
     pub fn command_rates(&mut self, target: Option<&RateTarget>) {
         self.rates = None;
@@ -128,7 +128,7 @@ impl Inbox {
         self.rates.as_ref()
     }
 
-    /// Notes by how much the vehicle's own estimate has been set anew in this tick, if it has.
+    /// Sets the reset of the vehicle's own estimate in this tick, if there was one.
     #[inline]
     pub fn hand_over(&mut self, reset: Option<&ResetDelta>) {
         self.reset = None;
@@ -137,17 +137,17 @@ impl Inbox {
         }
     }
 
-    /// Returns by how much the vehicle's own estimate [has been set anew](Self::hand_over).
+    /// Returns the [reset](Self::hand_over) of the vehicle's own estimate.
     pub fn reset(&self) -> Option<&ResetDelta> {
         self.reset.as_ref()
     }
 
-    /// Sets what speaks against arming besides what the flight core checks itself.
+    /// Sets the reasons against arming found outside the flight core.
     pub fn inhibit(&mut self, reasons: Reasons) {
         self.inhibited = reasons;
     }
 
-    /// Returns what else [speaks against arming](Self::inhibit).
+    /// Returns the reasons against arming [found outside the flight core](Self::inhibit).
     pub fn inhibited(&self) -> Reasons {
         self.inhibited
     }
@@ -162,22 +162,22 @@ impl Inbox {
         self.own
     }
 
-    /// Returns the newest state of a vehicle that [does not know where it is](Self::put_position_lost).
+    /// Returns the newest state [without a position](Self::put_position_lost).
     pub fn position_lost(&self) -> Option<&Stamped<State>> {
         self.position_lost.as_ref()
     }
 
-    /// Returns what the vehicle's estimate misses; none if it has none of its own.
+    /// Returns what the vehicle's estimate lacks; `None` if nothing, or without an estimate of its own.
     pub fn missing(&self) -> Option<Refusal> {
         self.missing
     }
 
-    /// Returns the newest plausible pose, if it has not been [taken](Self::take) before.
+    /// Returns the newest plausible pose, if not yet [taken](Self::take).
     pub fn pose(&self) -> Option<&Stamped<Pose>> {
         self.pose.as_ref()
     }
 
-    /// Removes the pose: an estimator has taken it.
+    /// Removes the pose, after an estimator has used it.
     pub fn clear_pose(&mut self) {
         self.pose = None;
     }
@@ -197,7 +197,7 @@ impl Inbox {
         self.requests.iter().any(|asked| asked.value == Request::Kill)
     }
 
-    /// Merges `news` into this inbox.
+    /// Merges newer inputs into this inbox.
     pub fn merge(&mut self, news: &Inbox) {
         self.state = news.state.or(self.state);
         self.position_lost = news.position_lost.or(self.position_lost);
@@ -213,8 +213,8 @@ impl Inbox {
         }
     }
 
-    /// Queues a request; each tick answers one. False if [`QUEUE_MAX`] are queued already: then it is dropped, unless
-    /// it is [`Request::Kill`], which replaces the newest one.
+    /// Queues a request; each tick answers one. If the queue is full, drops the request and returns false. A
+    /// [`Request::Kill`] replaces the newest request instead.
     pub fn request(&mut self, asked: Ticketed<Request>) -> bool {
         if asked.value == Request::Kill && self.requests.is_full() {
             self.requests.pop_back();
@@ -222,24 +222,24 @@ impl Inbox {
         self.requests.push_back(asked).is_ok()
     }
 
-    /// Returns a copy for the next tick, and removes the pose and the oldest request.
+    /// Returns a copy for the next tick. Removes the pose and the oldest request.
     pub fn take(&mut self) -> Inbox {
         let mut taken = Inbox::EMPTY;
         self.take_into(&mut taken);
         taken
     }
 
-    /// Does as [`take`](Self::take), in place of the copy for the last tick.
+    /// As [`take`](Self::take), but overwrites the copy for the last tick.
     #[inline]
     pub fn take_into(&mut self, taken: &mut Inbox) {
         (taken.state, taken.own) = (self.state, self.own);
-        // Hardly ever there: only the mark is copied.
+        // Rarely set: otherwise, copy the `None` only.
         match &self.position_lost {
             Some(position_lost) => taken.position_lost = Some(*position_lost),
             None => taken.position_lost = None,
         }
         taken.missing = self.missing;
-        // Rarely there, and only once.
+        // Rarely set, and taken once.
         match &self.pose {
             Some(pose) => {
                 taken.pose = Some(*pose);
@@ -252,7 +252,7 @@ impl Inbox {
             None => taken.setpoint = None,
         }
         (taken.idle_on_ground, taken.inhibited) = (self.idle_on_ground, self.inhibited);
-        // Rarely there.
+        // Requests are rare: skip the copy without any.
         if !(self.requests.is_empty() && taken.requests.is_empty()) {
             taken.requests.clone_from(&self.requests);
             self.requests.pop_front();
@@ -260,7 +260,7 @@ impl Inbox {
     }
 }
 
-/// Puts a setpoint in the place of another one.
+/// Replaces a setpoint in place.
 fn replace(old: &mut Option<Stamped<Setpoint>>, new: &Stamped<Setpoint>) {
     match old {
         Some(old) => {
@@ -271,7 +271,7 @@ fn replace(old: &mut Option<Stamped<Setpoint>>, new: &Stamped<Setpoint>) {
     }
 }
 
-/// Copies field by field, since the copy of a large struct is a call of a slow loop.
+/// Copies field by field, since copying a large struct calls a slow loop.
 fn copy(from: &Setpoint, to: &mut Setpoint) {
     let Setpoint { position_m, velocity_m_s, acceleration_m_s2, jerk_m_s3, snap_m_s4, .. } = from;
     to.position_m = *position_m;

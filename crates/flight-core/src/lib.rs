@@ -1,22 +1,22 @@
 //! The flight core around a control law: arming, failsafes, and motor gating.
 //!
-//! [`afbc_types`] defines frames and units. All decisions in flight are made here, and run on the host too; firmware
-//! and simulator are shells that fill an [`Inbox`], call [`FlightCore::tick`] every millisecond and output its
+//! [`afbc_types`] defines frames and units. This crate makes all decisions in flight, and runs on the host too.
+//! Firmware and simulator are shells that fill an [`Inbox`], call [`FlightCore::tick`] every millisecond and output its
 //! [`TickOutcome`].
 //!
 //! # Reading order
 //!
-//! 1. [`tick`]: the control tick; [`memory`]: what persists between ticks.
-//! 2. [`supervisor`]: the four modes and their transitions; [`refusal`], [`reasons`]: what speaks
-//!    against a request, and against arming.
-//! 3. [`inbox`]: the inputs of a tick and their ages; [`tracker`], [`clock`]: selection of states, and the time of
+//! 1. [`tick`]: the control tick; [`memory`]: the memory between ticks.
+//! 2. [`supervisor`]: the four modes and their transitions; [`refusal`], [`reasons`]: reasons for refusing requests and
+//!    arming.
+//! 3. [`inbox`]: the inputs of a tick and their ages; [`tracker`], [`clock`]: selection of states, and the times of
 //!    their measurement.
 //! 4. [`landing`], [`tumble`], [`frozen_tracker`]: detection of landing, tumbling and frozen trackers.
 //! 5. [`dead_reckoning`]: flight without measurements; [`observer`]: flight on poses alone; [`descent`]: descent with
 //!    measurements.
 //! 6. [`rate`]: supervision of the tick rate.
-//! 7. [`motor`]: throttle curve; [`protocol`]: the way to the motor controllers, by [`dshot`] or [`pulse`], and
-//!    back, by [`dshot_reply`].
+//! 7. [`motor`]: throttle curve; [`protocol`]: output to the motor controllers by [`dshot`] or [`pulse`], and their
+//!    replies by [`dshot_reply`].
 #![no_std]
 
 mod armed;

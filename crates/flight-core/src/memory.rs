@@ -1,4 +1,4 @@
-//! What persists between ticks: the newest state, how long it has been fresh, steady and at rest, and the flight.
+//! Memory between ticks: the newest state, for how long states have been fresh and the vehicle at rest, and the flight.
 
 use crate::armed::Armed;
 use crate::dead_reckoning::DeadReckoning;
@@ -12,7 +12,7 @@ use crate::tumble::Tumble;
 use afbc_control::{FlightController, Trace};
 use afbc_types::{Pose, Stamped, State};
 
-/// State of a vehicle that persists between ticks.
+/// Memory of the flight core between ticks.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FlightCoreMemory<M> {
     pub(crate) mode: Mode,
@@ -46,12 +46,12 @@ impl<M> FlightCoreMemory<M> {
         self.mode.armed() && self.flight.as_ref().is_some_and(|flight| flight.landing.airborne())
     }
 
-    /// True if the vehicle has been at rest for as long as arming wants it.
+    /// True if the vehicle has been at rest long enough to arm.
     pub fn rested(&self) -> bool {
         self.rest_us >= REST_US
     }
 
-    /// Records that the clock has failed and another has taken over: the vehicle is not armed again.
+    /// Records that the clock has failed and another has taken over. The vehicle can then not be armed again.
     pub fn distrust_clock(&mut self) {
         self.rate.distrust();
     }
@@ -61,7 +61,8 @@ impl<M> FlightCoreMemory<M> {
         self.flight.as_ref().map(|flight| &flight.control)
     }
 
-    /// Returns the trace of the last tick with the controller `C`: only inputs while blind, zeros while disarmed.
+    /// Returns the trace of the last tick with the controller `C`: inputs only in a tick without the law, zeros while
+    /// disarmed.
     pub fn trace<C: FlightController<N, Memory = M>, const N: usize>(&self) -> Trace {
         match &self.flight {
             Some(Armed { open_loop: Some(inputs), .. }) if self.mode.armed() => {
@@ -76,7 +77,7 @@ impl<M> FlightCoreMemory<M> {
 }
 
 impl<M: Default> FlightCoreMemory<M> {
-    /// Lets a law begin afresh in flight, as after arming; for a change of the law.
+    /// Clears the law's memory in flight, as at arming. For a change of the law.
     pub fn forget_law(&mut self) {
         if let Some(flight) = &mut self.flight {
             flight.control = M::default();
@@ -84,7 +85,7 @@ impl<M: Default> FlightCoreMemory<M> {
     }
 }
 
-/// Extrapolates the state by `age_us` with its velocities and rates; as in the paper's model, body rates replace the
+/// Extrapolates the state by `age_us` with its velocities and rates. As in the paper's model, body rates stand for the
 /// derivatives of the angles.
 pub(crate) fn extrapolated(state: &State, age_us: u32) -> State {
     // The vehicle's own estimate always has age 0.
@@ -100,17 +101,18 @@ pub(crate) fn extrapolated(state: &State, age_us: u32) -> State {
 }
 
 impl<M> FlightCoreMemory<M> {
-    /// Stores the inbox's state if it is newer than the present one, not already stale (states that are always late do
-    /// not count as states), and not from a frozen tracker. True if it was stored.
+    /// Stores the inbox's state. Ignores it if it is not newer than the present one, already stale (states that are
+    /// always late do not count), or from a frozen tracker. Returns true if it was stored.
     pub(crate) fn take_state(&mut self, inbox: &Inbox, now_us: u64) -> bool {
-        // What is observed is stamped now, and gives way to the link's states, which are always a little older.
+        // An observed state is stamped now, so let states from the link, which are always a little older, replace it.
         let gives_way = self.is_observing() && !inbox.is_own();
         let newer = |state: &&Stamped<State>| {
             state.age_us(now_us) <= COAST_US && (gives_way || self.state.is_none_or(|held| state.at_us > held.at_us))
         };
         let Some(state) = inbox.state().filter(newer) else { return false };
         let armed = self.mode.armed();
-        // An estimate watches its trackers itself, and may approach what they say faster than it moves.
+        // The vehicle's own estimator monitors its trackers itself, and may converge to them faster than its velocity
+        // says.
         let watched = armed && !inbox.is_own();
         if let Some(flight) = self.flight.as_mut().filter(|flight| watched && flight.landing.airborne()) {
             let repeated = self.state.is_some_and(|held| held.value == state.value);
@@ -129,24 +131,24 @@ impl<M> FlightCoreMemory<M> {
         self.mode.armed() && self.flight.as_ref().is_some_and(|flight| flight.observer.is_some())
     }
 
-    /// Stores the state that is observed from poses which no estimator has taken, unless the inbox had a newer one
-    /// (`is_new`). True if there is one.
+    /// Stores a state observed from poses that no estimator has used, unless the inbox had a newer state (`is_new`).
+    /// Returns true if there is one.
     #[inline]
     pub(crate) fn observe(&mut self, dead_reckoning: &DeadReckoning, inbox: &Inbox, now_us: u64, is_new: bool) -> bool {
-        // As long as an estimator works, it takes all poses.
+        // A working estimator takes all poses.
         (inbox.pose().is_some() || self.is_observing()) && self.observe_pose(dead_reckoning, inbox, now_us, is_new)
     }
 
-    /// The same, if there is a pose or an observer.
+    /// As [`observe`](Self::observe), if there is a pose or an observer.
     #[cold]
     #[inline(never)]
     fn observe_pose(&mut self, dead_reckoning: &DeadReckoning, inbox: &Inbox, now_us: u64, is_new: bool) -> bool {
         let armed = self.mode.armed();
         let (Some(flight), Some(held)) = (self.flight.as_mut().filter(|_| armed), self.state) else { return false };
         let age_us = held.age_us(now_us);
-        // Whole states over the link are flown on as they are, also between two of them.
+        // Complete states from the link are preferred, also in the ticks between two of them.
         let is_linked = is_new || flight.observer.is_none() && !inbox.is_own() && age_us <= COAST_US;
-        // A tracker whose states contradict the vehicle has no better poses.
+        // A distrusted tracker's poses are no better than its states.
         if is_linked || flight.distrusts {
             flight.observer = None;
             return false;
@@ -179,15 +181,14 @@ impl<M> FlightCoreMemory<M> {
         state.is_some()
     }
 
-    /// Notes the time of the newest attitude.
+    /// Updates the time of the newest attitude.
     pub(crate) fn orient(&mut self, inbox: &Inbox) {
         let newest = inbox.position_lost().map(|state| state.at_us).max(self.state.map(|state| state.at_us));
-        // `None` is less than any time.
+        // `None` compares as less than any time.
         self.oriented_us = self.oriented_us.max(newest);
     }
 
-    /// Updates the detectors with a fresh state, or with that of a vehicle without a position, or none, and with the
-    /// inbox's marks.
+    /// Updates the detectors with a fresh state, a state without a position, or none, and with the inbox's marks.
     pub(crate) fn watch(
         &mut self,
         fresh: Option<&State>,
@@ -213,7 +214,7 @@ impl<M> FlightCoreMemory<M> {
             (Some(state), _) => {
                 match inbox.rates() {
                     None => flight.tumble.advance(state, gap_us),
-                    // A pilot who commands rates turns it over.
+                    // A pilot who commands rates may turn the vehicle over.
                     Some(_) => flight.tumble = Tumble::default(),
                 }
                 flight.landing.advance(state, flight.applied.thrust_n, gap_us, dt_s);
@@ -234,7 +235,7 @@ impl<M> FlightCoreMemory<M> {
     }
 }
 
-/// Looks for the ground by an inertial sensor's estimate. Out of line, for the ticks without one.
+/// Runs the fall check on the vehicle's own estimate. Out of line, to keep ticks without an own estimate fast.
 #[inline(never)]
 fn check_fall(fall: &mut FallCheck, landing: &mut LandDetector, thrust_n: f32, state: &State, dt_s: f32) {
     if fall.stands(&state.velocity_m_s, landing.thrust_share(thrust_n), dt_s) {

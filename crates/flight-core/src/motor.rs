@@ -3,22 +3,22 @@
 use afbc_control::math::{max, min, sqrt};
 use afbc_types::{Declared, OutOfRange, RotorSpeeds, parameters};
 
-/// Smallest throttle that turns a motor; 1 to 47 are commands, 0 stops it.
+/// Smallest throttle that turns a motor. 0 stops it, 1 to 47 are commands.
 pub const THROTTLE_MIN: u16 = 48;
 /// Full throttle.
 pub const THROTTLE_MAX: u16 = 2047;
 
 parameters! {
-    /// The thrust curve of a motor with its controller and propeller. At throttle u in 0..1, the share of the largest
+    /// Thrust curve of a motor with its controller and propeller. At throttle u in 0..1, the share of the largest
     /// thrust is
     ///
     /// ```text
     /// F / F_max = (omega / omega_max)^2 = k u^2 + (1 - k) u
     /// ```
     ///
-    /// with k like PX4's `THR_MDL_FAC`: for 1 the speed is proportional to the throttle, for 0 the thrust is. By
-    /// default full throttle gives 1000 rad/s, of which the paper's vehicle needs 200 to hover; to be measured for a
-    /// real vehicle. Not in the paper.
+    /// with k like PX4's `THR_MDL_FAC`: for k = 1 the speed is proportional to the throttle, for k = 0 the thrust is.
+    /// By default full throttle gives 1000 rad/s; the paper's vehicle hovers at 200. Measure the curve of a real
+    /// vehicle. Not in the paper.
     #[derive(Clone, Copy, Debug, PartialEq)]
     #[cfg_attr(feature = "serde", derive(serde::Serialize))]
     pub struct Curve {
@@ -35,9 +35,9 @@ parameters! {
 }
 
 parameters! {
-    /// How rotors follow their commands: d omega/dt = (omega_commanded - omega)/tau. Flight without measurements
-    /// ([`crate::dead_reckoning`]) and on poses alone ([`crate::observer`]) predicts with it; laws have gains of their
-    /// own for it. Not in the paper.
+    /// Response of the rotors to their commands: d omega/dt = (omega_commanded - omega)/tau. Flight without
+    /// measurements ([`crate::dead_reckoning`]) and on poses alone ([`crate::observer`]) predicts with it. Laws have
+    /// their own parameters for it. Not in the paper.
     #[derive(Clone, Copy, Debug, PartialEq)]
     #[cfg_attr(feature = "serde", derive(serde::Serialize))]
     pub struct Response {
@@ -48,7 +48,7 @@ parameters! {
 }
 
 impl Response {
-    /// Returns the share of the way to their command that rotors go in a step of `dt_s`.
+    /// Returns the share of the difference to their command that rotors make up in a step of `dt_s`.
     pub(crate) fn share(&self, dt_s: f32) -> f32 {
         min(dt_s / self.time_constant_s, 1.0)
     }
@@ -63,17 +63,17 @@ pub struct Motor {
     inverse_speed_max: f32,
 }
 
-/// Steps of throttle between the smallest and the largest.
+/// Number of throttle steps from the smallest to the largest.
 const SPAN: u16 = THROTTLE_MAX - THROTTLE_MIN;
 
-/// Converts a throttle in 0..1 to steps above [`THROTTLE_MIN`], rounded. 0 for smaller values and NaN.
-// To 32 bits, which the processor's own conversion saturates to.
+/// Converts a throttle in 0..1 to steps above [`THROTTLE_MIN`], rounded. Returns 0 for smaller values and NaN. Uses 32
+/// bits, to which the processor's own conversion saturates.
 fn steps(u: f32) -> u32 {
     (u * f32::from(SPAN) + 0.5) as u32
 }
 
 impl Motor {
-    /// Creates a motor with this curve.
+    /// Makes a motor with this curve.
     ///
     /// # Errors
     /// The first value out of range.
@@ -82,29 +82,29 @@ impl Motor {
         Ok(Motor { curve, idle: steps(curve.idle), inverse_speed_max: 1.0 / curve.speed_max_rad_s })
     }
 
-    /// Returns the throttle of every motor: 0 if disarmed, 48 to 2047 if armed.
+    /// Returns the throttles of all motors: 0 if disarmed, 48 to 2047 if armed.
     pub fn throttles<const N: usize>(&self, armed: bool, speeds: &RotorSpeeds<N>) -> [u16; N] {
         let speeds: [f32; N] = speeds.0.into();
         speeds.map(|speed| if armed { self.throttle(speed) } else { 0 })
     }
 
-    /// Returns the throttle \[48 to 2047\] of an armed motor for `speed_rad_s`, which never decreases with the speed.
-    /// Idle for anything but positive numbers, full throttle above the largest speed.
+    /// Returns the throttle \[48 to 2047\] of an armed motor for `speed_rad_s`. It never decreases with the speed.
+    /// Anything but a positive number gives idle, a speed above the largest gives full throttle.
     pub fn throttle(&self, speed_rad_s: f32) -> u16 {
         let ratio = speed_rad_s * self.inverse_speed_max;
-        // The speed is proportional to the throttle.
+        // With k = 1, the speed is proportional to the throttle.
         let u = if self.curve.linearity == 1.0 { ratio } else { self.inverse_curve(max(ratio, 0.0)) };
         steps(u).max(self.idle).min(SPAN.into()) as u16 + THROTTLE_MIN
     }
 
-    /// Returns u in 0..1 with k u^2 + (1 - k) u = `ratio`^2, by the form of the quadratic's root that is valid for k =
-    /// 0. 0 for NaN.
+    /// Returns u in 0..1 with k u^2 + (1 - k) u = `ratio`^2, by the form of the quadratic formula that is also valid
+    /// for k = 0. Returns 0 for NaN.
     fn inverse_curve(&self, ratio: f32) -> f32 {
         let share = ratio * ratio;
         let k = self.curve.linearity;
         let linear = 1.0 - k;
         let denominator = linear + sqrt(linear * linear + 4.0 * k * share);
-        // Zero for a rotor at rest with k = 1.
+        // The denominator is zero for a rotor at rest with k = 1.
         if denominator > 0.0 { 2.0 * share / denominator } else { 0.0 }
     }
 }

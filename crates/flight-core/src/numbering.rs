@@ -1,12 +1,13 @@
-//! Which rotor is which motor on a flight controller for X frames.
+//! Assignment of motor outputs to rotors, for flight controllers that number their outputs for an X frame.
 //!
-//! Such a controller numbers its outputs by the corners of an X. Four rotors with one in each corner are driven by
-//! their corners, in whatever order the vehicle's file lists them; of any other frame, output n drives rotor n.
+//! Such a controller numbers its outputs by the corners of the X. If the vehicle has four rotors, one in each corner,
+//! an output drives the rotor in its corner, in whatever order the vehicle's file lists the rotors. For any other
+//! frame, output n drives rotor n.
 
 use afbc_types::Rotor;
 use core::array;
 
-/// A corner of an X frame, seen from above, forward up.
+/// A corner of an X frame, seen from above with the front up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[expect(missing_docs, reason = "named after what they are")]
 pub enum Corner {
@@ -16,16 +17,16 @@ pub enum Corner {
     FrontLeft,
 }
 
-/// Motors 1 to 4 as Betaflight numbers them.
+/// Corners of motors 1 to 4 in Betaflight.
 pub const BETAFLIGHT: [Corner; 4] = [Corner::RearRight, Corner::FrontRight, Corner::RearLeft, Corner::FrontLeft];
-/// Motors 1 to 4 as ArduPilot and PX4 number them.
+/// Corners of motors 1 to 4 in ArduPilot and PX4.
 pub const ARDUPILOT: [Corner; 4] = [Corner::FrontRight, Corner::RearLeft, Corner::FrontLeft, Corner::RearRight];
 
-/// Least distance from the body's x and y axes of a rotor in a corner \[arm lengths\].
+/// Smallest distance of a corner's rotor from the body's x and y axes \[arm lengths\].
 const ASIDE: f32 = 0.1;
 
-/// Returns the index of the rotor that each output drives, first output first; beyond the vehicle's rotors for an
-/// output without one.
+/// Returns the index of the rotor that each output drives. For an output without a rotor, the index is beyond the
+/// vehicle's rotors.
 #[must_use]
 pub fn rotors_of_outputs<const N: usize, const OUTPUTS: usize>(
     numbering: [Corner; 4],
@@ -34,13 +35,13 @@ pub fn rotors_of_outputs<const N: usize, const OUTPUTS: usize>(
     let rotor_in = |corner| rotors.iter().position(|rotor| self::corner(rotor) == Some(corner));
     let is_x = N == numbering.len() && numbering.iter().all(|corner| rotor_in(*corner).is_some());
     array::from_fn(|output| match numbering.get(output) {
-        // There is one: every corner of an X has been looked for.
+        // Always found: `is_x` has checked every corner.
         Some(corner) if is_x => rotor_in(*corner).unwrap_or(output),
         _ => output,
     })
 }
 
-/// Returns the corner that a rotor is in.
+/// Returns the corner of a rotor, if it is in one.
 fn corner(rotor: &Rotor) -> Option<Corner> {
     let (ahead, left) = (rotor.x > ASIDE, rotor.y > ASIDE);
     let (behind, right) = (rotor.x < -ASIDE, rotor.y < -ASIDE);

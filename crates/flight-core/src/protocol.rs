@@ -1,11 +1,11 @@
-//! How throttles get to the motor controllers.
+//! Protocols of the motor controllers (ESCs).
 
 use crate::dshot::DshotRate;
 use crate::pulse::PulseFormat;
 use afbc_types::{Choice, parameters};
 
 parameters! {
-    /// The outputs to the motor controllers. Not in the paper.
+    /// Output to the motor controllers. Not in the paper.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct MotorOutputs {
         /// Protocol of the motor controllers, from the next start on.
@@ -14,18 +14,18 @@ parameters! {
     }
 }
 
-/// A protocol of motor controllers.
+/// A protocol of the motor controllers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MotorProtocol {
-    /// DSHOT, 600 kbit/s.
+    /// DSHOT at 600 kbit/s.
     Dshot600,
-    /// DSHOT, 300 kbit/s.
+    /// DSHOT at 300 kbit/s.
     Dshot300,
-    /// DSHOT, 150 kbit/s.
+    /// DSHOT at 150 kbit/s.
     Dshot150,
-    /// A pulse of 125 to 250 us in each tick.
+    /// One pulse of 125 to 250 us per tick.
     OneShot125,
-    /// A pulse of 1000 to 2000 us, 400 times a second.
+    /// A pulse of 1000 to 2000 us, 400 times per second.
     Pwm400,
 }
 
@@ -40,17 +40,17 @@ impl Choice for MotorProtocol {
     const WORDS: &'static [&'static str] = &["dshot600", "dshot300", "dshot150", "oneshot125", "pwm400"];
 }
 
-/// What a timer sends.
+/// Signal that a timer generates for a protocol.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MotorSignal {
-    /// Frames of bits.
+    /// Frames of bits, by DMA.
     Frames(DshotRate),
-    /// Pulses, which need no DMA.
+    /// Pulses, without DMA.
     Pulses(PulseFormat),
 }
 
 impl MotorProtocol {
-    /// Returns what a timer sends.
+    /// Returns the signal that a timer generates.
     pub const fn signal(self) -> MotorSignal {
         match self {
             MotorProtocol::Dshot600 => MotorSignal::Frames(DshotRate::Dshot600),

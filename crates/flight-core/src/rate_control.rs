@@ -1,70 +1,70 @@
-//! Control of the body's rates in place of the law: acro mode. Not in the paper.
+//! Rate controller of acro mode: controls body rates instead of the law. Not in the paper.
 //!
-//! With the error e = Omega_d - Omega, the rotors are asked for the angular acceleration
+//! With the error e = Omega_d - Omega, the commanded angular acceleration is
 //!
 //! ```text
 //! u = k_1 e - k_2 a + z + I^-1 (Omega x I Omega),   tau da/dt = u_given - a,   dz/dt = k_i e s
 //! ```
 //!
-//! a is what the rotors give by now, as far as their nominal lag tau tells, and z learns what the nominal model does
-//! not know, with s = 1 - (e/E)^2 that ends at 0. With e and a alone the loop is s^2 + (1 + k_2)/tau s + k_1/tau,
-//! whose poles are put at w with damping D by
-//! k_1 = w^2 tau and k_2 = 2 D w tau - 1. It is a loop of its own, like PX4's: an attitude to track, which the laws
-//! need, is what a pilot in acro mode does not command.
+//! a is the angular acceleration that the rotors give by now, from their nominal lag tau. z learns constant moments
+//! that the nominal model lacks. The weight s = 1 - (e/E)^2, at least 0, stops the learning at large errors. With e and
+//! a alone, the loop's polynomial is s^2 + (1 + k_2)/tau s + k_1/tau. The gains k_1 = w^2 tau and k_2 = 2 D w tau - 1
+//! place its poles at w with damping D. Like PX4's, it is a loop of its own: the laws track an attitude, which a pilot
+//! in acro mode does not command.
 
 use crate::motor::Response;
 use afbc_control::{Action, Mixer, math};
 use afbc_types::{Inputs, Parameters, State};
 use nalgebra::Vector3;
 
-/// w tau, at most: slow rotors follow as far as their model is right.
+/// Largest w tau. Faster loops with slow rotors would need an exact model.
 const AGAINST_LAG: f32 = 1.5;
-/// Largest w \[rad/s\]: what filters and delays of gyroscopes leave.
+/// Largest w \[rad/s\], limited by the filters and delays of gyroscopes.
 const BANDWIDTH_MAX: f32 = 25.0;
-/// D.
+/// Damping D.
 const DAMPING: f32 = 0.8;
-/// k_i as a share of w squared: z follows in half a second.
+/// k_i as a share of w^2: z converges in half a second.
 const LEARNS: f32 = 0.05;
-/// Error from which on nothing is learnt \[rad/s\]: the vehicle is still turning up to the rate.
+/// E: error above which nothing is learnt \[rad/s\], since the vehicle is still accelerating to the rate.
 const LEARNS_RAD_S: f32 = 1.5;
 /// Largest |z| \[rad/s2\].
 const LEARNT_MAX: f32 = 50.0;
 
-/// Rates about the body's axes and a thrust that a pilot commands.
+/// Body rates and thrust that a pilot commands.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct RateTarget {
-    /// Omega_d, body frame \[rad/s\].
+    /// Desired rates Omega_d, body frame \[rad/s\].
     pub rates_rad_s: Vector3<f32>,
-    /// Thrust as a share of the most that the rotors give, 0 to 1.
+    /// Thrust as a share of the rotors' largest, 0 to 1.
     pub thrust: f32,
 }
 
 impl RateTarget {
-    /// True if every number is one, and the rates are at most 1e3 rad/s.
+    /// True if all numbers are finite, the rates are at most 1e3 rad/s, and the thrust is within 0 to 1.
     pub(crate) fn is_plausible(&self) -> bool {
         self.rates_rad_s.iter().all(|rate| rate.abs() <= 1e3) && (0.0..=1.0).contains(&self.thrust)
     }
 }
 
-/// The controller of one vehicle.
+/// Rate controller of one vehicle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct RateControl {
     inertia_kg_m2: Vector3<f32>,
     /// Inputs per angular acceleration \[N s2/rad\].
     inputs_per: Vector3<f32>,
-    /// k_1 \[1/s\], k_2, k_i \[1/s2\].
+    /// Gains k_1 \[1/s\], k_2, k_i \[1/s2\].
     gains: [f32; 3],
-    /// Share of the way to their command that the rotors go in a tick.
+    /// Share of the difference to their command that the rotors make up in a tick.
     follows: f32,
     dt_s: f32,
 }
 
-/// What it remembers of a vehicle.
+/// Memory of the rate controller between ticks.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct RateMemory {
-    /// a \[rad/s2\].
+    /// Angular acceleration a that the rotors give by now \[rad/s2\].
     given: Vector3<f32>,
-    /// z \[rad/s2\].
+    /// Learnt angular acceleration z \[rad/s2\].
     pub(crate) learnt: Vector3<f32>,
 }
 
@@ -76,14 +76,15 @@ impl RateControl {
         RateControl {
             inertia_kg_m2: parameters.inertia_kg_m2,
             inputs_per: parameters.effectiveness().map(|effectiveness| 1.0 / effectiveness),
-            // k_2 is negative for rotors faster than the poles ask; the loop's own damping, (1 + k_2)/tau, is not.
+            // k_2 is negative for rotors faster than the poles require. The loop's damping (1 + k_2)/tau stays
+            // positive.
             gains: [squared * lag_s, 2.0 * DAMPING * bandwidth * lag_s - 1.0, LEARNS * squared],
             follows: rotors.share(dt_s),
             dt_s,
         }
     }
 
-    /// Runs a step for a vehicle in `state`.
+    /// Runs one step for a vehicle in `state`.
     pub(crate) fn advance<const N: usize>(
         &self,
         mixer: &Mixer<N>,
@@ -99,14 +100,14 @@ impl RateControl {
         let [roll_n, pitch_n, yaw_n] = wanted_rad_s2.component_mul(&self.inputs_per).into();
         let thrust_n = target.thrust * mixer.thrust_max_n();
         let action = mixer.action(&Inputs { roll_n, pitch_n, yaw_n, thrust_n });
-        // What saturated rotors do not give is no moment that the model does not know: z would wind up.
+        // Do not learn while rotors saturate: the missing moment is no model error, and z would wind up.
         if !action.health.saturated {
             let size = error.norm_squared() / (LEARNS_RAD_S * LEARNS_RAD_S);
             let more = error * (k_i * self.dt_s * math::max(1.0 - size, 0.0));
             *learnt = (*learnt + more).map(|learnt| math::max(math::min(learnt, LEARNT_MAX), -LEARNT_MAX));
         }
         let Inputs { roll_n, pitch_n, yaw_n, .. } = action.given;
-        // What makes up for z and for the gyroscopic moment turns nothing, and is no part of a.
+        // The part that compensates z and the gyroscopic moment does not accelerate the body, and is not part of a.
         let reached = Vector3::new(roll_n, pitch_n, yaw_n).component_div(&self.inputs_per) - *learnt - gyroscopic;
         *given += (reached - *given) * self.follows;
         action

@@ -1,20 +1,20 @@
-//! Everything that speaks against arming, as a set.
+//! Set of reasons against arming.
 
 use crate::refusal::Refusal;
 
-/// Reasons against arming, in the order of [`Refusal::ARMING`].
+/// Set of reasons against arming, listed in the order of [`Refusal::ARMING`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Reasons(u32);
 
 impl Reasons {
-    /// Nothing.
+    /// No reasons.
     pub const NONE: Self = Reasons(0);
 
-    /// Adds a reason, if it applies.
+    /// Adds a reason if it applies.
     pub const fn note(&mut self, applies: bool, reason: Refusal) {
         if applies {
-            // Below 32: the link's numbers from there on are refusals of the guidance.
+            // Flight-core reasons are below 32. From 32 on, the link's numbers are refusals of the guidance.
             self.0 |= 1 << reason as u32;
         }
     }
@@ -25,17 +25,17 @@ impl Reasons {
         Reasons(self.0 | others.0)
     }
 
-    /// True if nothing speaks against it.
+    /// True if there is no reason.
     pub const fn is_empty(self) -> bool {
         self.0 == 0
     }
 
-    /// True if this one is among them.
+    /// True if the set contains this reason.
     pub const fn contains(self, reason: Refusal) -> bool {
         self.0 & (1 << reason as u32) != 0
     }
 
-    /// Returns them in order.
+    /// Returns the reasons in order.
     pub fn iter(self) -> impl Iterator<Item = Refusal> {
         Refusal::ARMING.into_iter().filter(move |reason| self.contains(*reason))
     }
@@ -43,14 +43,14 @@ impl Reasons {
     /// Returns the answer to [`Request::Arm`](crate::Request::Arm).
     ///
     /// # Errors
-    /// The first of them in the order of [`Refusal::ARMING`], or else any.
+    /// The first reason in the order of [`Refusal::ARMING`], or else any other one.
     pub fn verdict(self) -> Result<(), Refusal> {
         if self.is_empty() {
             return Ok(());
         }
-        // What is not in the order is a reason all the same.
+        // A reason that is not in the order still counts.
         let any = || Refusal::ALL.into_iter().find(|reason| self.contains(*reason));
-        // A bit of no refusal can only have been read from a log.
+        // Only a log can contain a bit without a reason.
         Err(self.iter().next().or_else(any).unwrap_or(Refusal::Unhealthy))
     }
 }

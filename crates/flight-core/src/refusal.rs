@@ -1,23 +1,23 @@
-//! Why a request is refused.
+//! Reasons for refusing a request.
 
-/// Why a request is refused; for arming, the first reason that applies, in the order of [`Refusal::ARMING`]. The
-/// numbers are part of the link's protocol.
+/// Reason for refusing a request. For arming, the first that applies in the order of [`Refusal::ARMING`]. The numbers
+/// are part of the link's protocol.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Refusal {
     /// The vehicle is armed.
     AlreadyArmed = 1,
-    /// No plausible state within 20 ms.
+    /// No plausible state within the last 20 ms.
     StateStale = 2,
     /// Roll or pitch above [`ArmingLimits::tilt_max_rad`](crate::ArmingLimits::tilt_max_rad).
     TiltTooLarge = 3,
-    /// No plausible setpoint within 500 ms.
+    /// No plausible setpoint within the last 500 ms.
     SetpointMissing = 4,
-    /// The distance to the setpoint exceeds
+    /// The setpoint is farther away than
     /// [`ArmingLimits::setpoint_distance_max_m`](crate::ArmingLimits::setpoint_distance_max_m).
     SetpointTooFar = 5,
-    /// Rate or timing of the control tick is wrong or unknown ([`crate::rate`]), or its clock has failed.
+    /// The control tick's rate or timing is wrong or unknown ([`crate::rate`]), or its clock has failed.
     Unhealthy = 6,
     /// Within the last second, speed or rate exceeded
     /// [`ArmingLimits::speed_max_m_s`](crate::ArmingLimits::speed_max_m_s) or
@@ -27,26 +27,26 @@ pub enum Refusal {
     InFlight = 8,
     /// The vehicle is not armed.
     NotArmed = 9,
-    /// A later request has stopped the motors.
+    /// A later request in the queue stops the motors.
     Overtaken = 10,
-    /// The vehicle's own estimate has not found its level: no samples, or it is moved.
+    /// The vehicle's own estimator has no attitude: no samples, or the vehicle is being moved.
     AttitudeUnknown = 11,
-    /// The vehicle's own estimate has no heading.
+    /// The vehicle's own estimator has no heading.
     HeadingUnknown = 12,
-    /// The vehicle's own estimate has no position.
+    /// The vehicle's own estimator has no position.
     PositionUnknown = 13,
-    /// The battery is low, or is to be watched and not known.
+    /// The battery is low, or monitored but unknown.
     BatteryLow = 14,
     /// A sensor has failed.
     SensorFailed = 15,
     /// The vehicle is outside its geofence.
     OutsideFence = 16,
-    /// The flight mode is not one to start from.
+    /// The flight mode does not allow arming.
     WrongMode = 17,
 }
 
 impl Refusal {
-    /// Every reason.
+    /// All reasons.
     pub const ALL: [Refusal; 17] = [
         Refusal::AlreadyArmed,
         Refusal::StateStale,
@@ -67,8 +67,8 @@ impl Refusal {
         Refusal::WrongMode,
     ];
 
-    /// The reasons against arming, the first ones first: what is not known, what the flight core sees, what
-    /// [others](crate::Inbox::inhibit) have against it.
+    /// Reasons against arming in order of precedence: unknown quantities, then the flight core's checks, then those
+    /// [from outside](crate::Inbox::inhibit).
     pub const ARMING: [Refusal; 14] = [
         Refusal::AlreadyArmed,
         Refusal::AttitudeUnknown,

@@ -1,4 +1,4 @@
-//! Arming and failsafes: requests, the four modes, and their transitions.
+//! Arming and failsafes: requests, the four modes and their transitions.
 
 pub use crate::refusal::Refusal;
 
@@ -6,23 +6,23 @@ use crate::reasons::Reasons;
 use afbc_control::math::abs_max;
 use afbc_types::{Setpoint, State, parameters};
 
-/// Age above which a state is stale, and the law may not fly on it \[us\].
+/// Age above which a state is stale, so that the law must not fly on it \[us\].
 pub const COAST_US: u32 = 20_000;
-/// Time for which states must have been fresh for coasting to end \[us\], so that the mode does not flicker.
+/// Time for which states must be fresh to end coasting \[us\], so that the mode does not flicker.
 pub const STEADY_US: u32 = 100_000;
 /// Age of the state at which coasting ends and the vehicle descends \[us\].
 pub const DESCEND_US: u32 = 250_000;
-/// Time for which states must have been fresh for a descent to end \[us\]: what recovers only for moments must not make
+/// Time for which states must be fresh to end a descent \[us\]. A tracker that recovers only for moments must not make
 /// the vehicle descend and climb repeatedly.
 pub const RESUME_US: u32 = 1_000_000;
-/// Age of the attitude at which the motors stop \[us\]: two seconds of blind descent.
+/// Age of the attitude at which the motors stop \[us\]: after two seconds of blind descent.
 pub const GIVE_UP_US: u32 = 2_250_000;
-/// Age of the setpoint at which the vehicle holds its position instead \[us\].
+/// Age of the setpoint above which the vehicle holds its position instead \[us\].
 pub const SETPOINT_STALE_US: u32 = 500_000;
 /// Time at rest required for arming \[us\].
 pub const REST_US: u32 = 1_000_000;
 
-/// Flight mode.
+/// Mode of the flight core.
 ///
 /// ```text
 ///              Arm, and ready                age > 20 ms
@@ -39,14 +39,15 @@ pub const REST_US: u32 = 1_000_000;
 ///    +--- Kill, tumbled, or attitude's age > 2.25 s, from anywhere; Disarm, from anywhere on the ground
 /// ```
 ///
-/// `age` is that of the newest plausible state. The mode at power-up is Disarmed. In Coasting and Descending the law
-/// flies while the state is fresh. A vehicle that knows its attitude but not where it is, is held level and descends
-/// without drifting away on purpose ([`crate::descent`]), for as long as it takes; otherwise it is flown blind
+/// `age` is the age of the newest plausible state. The mode at power-up is Disarmed. In Coasting and Descending the law
+/// flies while the state is fresh. A vehicle that knows its attitude but not its position is held level and descends
+/// without drifting on purpose ([`crate::descent`]), for as long as it takes. Otherwise it is flown blind
 /// ([`crate::dead_reckoning`]).
 ///
-/// States that return are used to descend under control ([`crate::descent`]). Once they have been fresh for
-/// [`RESUME_US`] and the vehicle sinks by them, the setpoint is flown again: a tracker that recovers only for moments
-/// must not make it descend and climb repeatedly, and one that stands on the ground has landed.
+/// If states return during a descent, the law flies the descent with them ([`crate::descent`]). Once they have been
+/// fresh for [`RESUME_US`] and show the vehicle moving, the setpoint is flown again. The wait keeps a tracker that
+/// recovers only for moments from making the vehicle descend and climb repeatedly. A vehicle that stands on the ground
+/// has landed.
 ///
 /// The numbers are part of the link's protocol.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -59,7 +60,7 @@ pub enum Mode {
     Flying = 1,
     /// The state is stale, or was a moment ago.
     Coasting = 2,
-    /// Descending in order to disarm.
+    /// Descending to land and disarm.
     Descending = 3,
 }
 
@@ -67,18 +68,17 @@ pub enum Mode {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Request {
-    /// Start the motors: they idle for a tick, then the law flies.
+    /// Start the motors: they idle for one tick, then the law flies.
     Arm,
     /// Stop the motors of a vehicle on the ground.
     Disarm,
-    /// Stop the motors immediately, also in flight; takes precedence over other requests.
+    /// Stop the motors immediately, even in flight. Takes precedence over other requests.
     Kill,
-    /// Engage the controller again after it has switched to its fallback law: the rotors hold for a tick, then it
-    /// flies.
+    /// Return from the fallback law to the controller's own law: the rotors hold for one tick, then that law flies.
     Engage,
 }
 
-/// Why a flight ended. The numbers are part of the link's protocol.
+/// Reason for the end of a flight. The numbers are part of the link's protocol.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum EndReason {
@@ -115,7 +115,7 @@ parameters! {
 }
 
 impl ArmingLimits {
-    /// No limit except that of plausible values, for a simulated vehicle that is held until it flies.
+    /// No limits beyond those of plausible values, for a simulated vehicle that is held until it flies.
     pub const NONE: Self = ArmingLimits {
         tilt_max_rad: Self::TILT_MAX.range.max as f32,
         setpoint_distance_max_m: Self::DIST_MAX.range.max as f32,
@@ -129,7 +129,7 @@ impl ArmingLimits {
             && abs_max(&state.rates_rad_s) <= self.rate_max_rad_s
     }
 
-    /// Returns everything that speaks against arming a disarmed vehicle. What depends on an unknown state is left out.
+    /// Returns all reasons against arming a disarmed vehicle. Without a state, leaves out the checks that need one.
     pub fn against(&self, vehicle: &ArmingInputs<'_>) -> Reasons {
         let mut reasons = vehicle.inhibited;
         match vehicle.state {
@@ -143,7 +143,7 @@ impl ArmingLimits {
                 });
                 reasons.note(far, Refusal::SetpointTooFar);
             }
-            // What the estimate misses is why there is no state, and says more than that there is none.
+            // The quantity that the estimator lacks is the cause of the missing state, and tells more.
             None => reasons.note(true, vehicle.missing.unwrap_or(Refusal::StateStale)),
         }
         reasons.note(vehicle.setpoint.is_none(), Refusal::SetpointMissing);
@@ -153,44 +153,43 @@ impl ArmingLimits {
     }
 }
 
-/// State of a vehicle to be armed.
+/// State of a vehicle that is to be armed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ArmingInputs<'a> {
     /// State, if plausible and fresh.
     pub state: Option<&'a State>,
-    /// What the vehicle's own estimate misses, if it has one and misses something.
+    /// Quantity that the vehicle's own estimator lacks, if any.
     pub missing: Option<Refusal>,
     /// Setpoint, if plausible and fresh.
     pub setpoint: Option<&'a Setpoint>,
     /// True if the control tick's rate is healthy.
     pub healthy: bool,
-    /// Time for which it has been [at rest](ArmingLimits::at_rest) \[us\].
+    /// Time for which the vehicle has been [at rest](ArmingLimits::at_rest) \[us\].
     pub rest_us: u32,
-    /// What else speaks against arming, by [`Inbox::inhibit`](crate::Inbox::inhibit).
+    /// Reasons found outside the flight core, from [`Inbox::inhibit`](crate::Inbox::inhibit).
     pub inhibited: Reasons,
 }
 
 /// Inputs of the supervisor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SupervisorInputs {
-    /// The request to be answered in this tick.
+    /// Request to answer in this tick.
     pub request: Option<Request>,
-    /// True if a queued request is [`Request::Kill`].
+    /// True if any queued request is [`Request::Kill`].
     pub kill: bool,
-    /// Verdict on [`ArmingLimits::against`].
+    /// Verdict of [`ArmingLimits::against`].
     pub ready: Result<(), Refusal>,
     /// Age of the newest plausible state \[us\]; `u32::MAX` if there is none.
     pub state_age_us: u32,
-    /// Age of the newest attitude \[us\]: that of the state, or less if the vehicle knows its attitude but not where
-    /// it is.
+    /// Age of the newest attitude \[us\]. Less than the state's if the vehicle knows its attitude but not its position.
     pub attitude_age_us: u32,
     /// Time for which no state has been stale \[us\].
     pub steady_us: u32,
     /// False if the vehicle is on the ground ([`crate::landing`]).
     pub airborne: bool,
-    /// True if it does not move, as on the ground, where it may not have been found yet.
+    /// True if the vehicle does not move. It may be on the ground, even if the landing is not yet detected.
     pub stands: bool,
-    /// True if it is upside down or spinning without recovery ([`crate::tumble`]).
+    /// True if the vehicle is upside down or spinning without recovery ([`crate::tumble`]).
     pub tumbled: bool,
 }
 
@@ -200,7 +199,7 @@ impl Mode {
         !matches!(self, Mode::Disarmed)
     }
 
-    /// Returns why the flight ends, if it does, by the diagram of [`Mode`].
+    /// Returns the reason for the end of the flight, if it ends, by the diagram of [`Mode`].
     pub fn end(self, observed: &SupervisorInputs) -> Option<EndReason> {
         match self {
             Mode::Disarmed => None,
@@ -219,7 +218,7 @@ impl Mode {
         if self.end(observed).is_some() { Mode::Disarmed } else { self.onward(observed) }
     }
 
-    /// Returns the next mode, if no flight ends.
+    /// Returns the next mode, assuming that the flight does not end.
     pub(crate) fn onward(self, observed: &SupervisorInputs) -> Mode {
         let age_us = observed.state_age_us;
         match self {
@@ -240,7 +239,7 @@ impl Mode {
     /// Returns the answer to `request` in this mode.
     ///
     /// # Errors
-    /// The reason for refusing it.
+    /// The reason for refusing the request.
     pub fn answer(self, request: Request, observed: &SupervisorInputs) -> Result<(), Refusal> {
         match request {
             Request::Kill => Ok(()),
@@ -248,7 +247,7 @@ impl Mode {
             Request::Arm if self.armed() => Err(Refusal::AlreadyArmed),
             Request::Arm => observed.ready,
             Request::Disarm if self.armed() && observed.airborne => Err(Refusal::InFlight),
-            // Also of a disarmed vehicle: a station repeats a command whose answer was lost.
+            // Accepted for a disarmed vehicle, too: a station repeats a command whose answer was lost.
             Request::Disarm => Ok(()),
             Request::Engage if !self.armed() => Err(Refusal::NotArmed),
             Request::Engage => Ok(()),

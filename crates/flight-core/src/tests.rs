@@ -1,4 +1,4 @@
-//! Tests of single parts, in the crate itself so that they are built once for all.
+//! Unit tests inside the crate, in one place so that they are built once.
 
 extern crate std;
 

@@ -1,4 +1,4 @@
-//! The control tick: takes the newest inputs, supervises, controls, gates the motors, checks the rate.
+//! The control tick: takes the newest inputs, supervises, controls, gates the motors and checks the tick rate.
 
 use crate::armed::Armed;
 use crate::dead_reckoning::DeadReckoning;
@@ -16,10 +16,10 @@ use afbc_types::{Declared, Inputs, OutOfRange, Parameters, Range, RotorForces, R
 use core::mem;
 use nalgebra::Vector3;
 
-/// Accepted time step of a law: the tick's \[s\].
+/// Accepted time step of a law, equal to the tick's \[s\].
 pub const DT: Range = Range::new("dt_s", 0.001, 0.001);
 
-/// A vehicle with its controller. Constant; everything that changes in flight is in [`FlightCoreMemory`].
+/// Flight core with its controller. Constant: everything that changes in flight is in [`FlightCoreMemory`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FlightCore<C, const N: usize = 4> {
     controller: C,
@@ -40,20 +40,20 @@ pub struct TickHealth {
     pub state_age_us: u32,
     /// True if there is no plausible setpoint younger than 500 ms; an armed vehicle then holds its position.
     pub setpoint_stale: bool,
-    /// True if the state is [observed](crate::observer) from a tracker's poses, since the inertial sensor has failed.
+    /// True if the state is [observed](crate::observer) from a tracker's poses, because the inertial sensor has failed.
     pub observed: bool,
-    /// States since power-up refused as frozen ([`crate::frozen_tracker`]), up to `u32::MAX`.
+    /// Number of states refused as frozen since power-up ([`crate::frozen_tracker`]), up to `u32::MAX`.
     pub frozen_states: u32,
 }
 
-/// The answer to a request.
+/// Answer to a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RequestAnswer {
     /// Ticket of the request.
     pub ticket: u8,
     /// The request.
     pub request: Request,
-    /// Done, or the reason for refusing it.
+    /// Ok if done, otherwise the reason for refusing.
     pub result: Result<(), Refusal>,
 }
 
@@ -65,50 +65,50 @@ pub struct TickOutcome<const N: usize = 4> {
     pub motors: RotorSpeeds<N>,
     /// Force of each rotor \[N\].
     pub forces: RotorForces<N>,
-    /// Flight mode.
+    /// Mode of the flight core.
     pub mode: Mode,
     /// Health of the flight core.
     pub health: TickHealth,
     /// Answer to this tick's request.
     pub answer: Option<RequestAnswer>,
-    /// Why the flight ended, if it did in this tick.
+    /// Reason for the end of the flight, if it ended in this tick.
     pub ended: Option<EndReason>,
-    /// What spoke against arming in this tick, by which [`Request::Arm`] was or would have been answered.
+    /// Reasons against arming in this tick, which decide the answer to [`Request::Arm`].
     pub against: Reasons,
 }
 
-/// What an armed vehicle acts on in a tick.
+/// Inputs of an armed vehicle's action in a tick.
 struct Situation<'a> {
     mode: Mode,
-    /// State of this tick, if it is known.
+    /// State of this tick, if known.
     fresh: Option<&'a State>,
-    /// True if that is measured in this tick.
+    /// True if the state was measured or observed in this tick.
     measured: bool,
-    /// State without a position, if that is all that is known.
+    /// State without a position, if no other is known.
     position_lost: Option<&'a State>,
-    /// The commander's setpoint, if it is not stale.
+    /// The commander's setpoint, if not stale.
     setpoint: Option<&'a Setpoint>,
     airborne: bool,
-    /// True if the controller is asked to engage its law again.
+    /// True if the controller shall engage its law again.
     engages: bool,
 }
 
 impl<C: FlightController<N>, const N: usize> FlightCore<C, N> {
-    /// Creates a vehicle with these nominal parameters, the paper's rotors, and `controller`, which must be built for
-    /// them.
+    /// Makes a flight core for these nominal parameters and the paper's rotors. `controller` must be built for the same
+    /// parameters.
     ///
     /// # Errors
-    /// The first parameter or limit out of range; also if the controller's time step is not 1 ms, or its rotors cannot
+    /// The first parameter or limit out of range. Also if the controller's time step is not 1 ms, or the rotors cannot
     /// lift the vehicle [with a margin](afbc_control::mixer::HOVER_MARGIN).
     pub fn new(parameters: Parameters, limits: ArmingLimits, controller: C) -> Result<Self, OutOfRange> {
         Self::with_rotors(parameters, &Response::DEFAULT, limits, controller)
     }
 
-    /// The same with rotors that respond like this.
+    /// As [`new`](Self::new), for rotors with this response.
     ///
     /// # Errors
-    /// Likewise, and the rotors' time constant.
-    // Always: out of line, its result is on the stack of the firmware's start-up twice.
+    /// As [`new`](Self::new), and the rotors' time constant out of range.
+    // Always inlined: otherwise the result is twice on the stack of the firmware's start-up.
     #[inline(always)]
     pub fn with_rotors(
         parameters: Parameters,
@@ -131,25 +131,24 @@ impl<C: FlightController<N>, const N: usize> FlightCore<C, N> {
         })
     }
 
-    /// Runs one tick, to be called every millisecond. `now_us` is the time since power-up, which never goes back.
-    /// Cannot fail.
-    // Always: copying the outcome out of a call costs a hundred instructions.
+    /// Runs one tick. Call it every millisecond. `now_us` is the time since power-up, and never goes back. Cannot fail.
+    // Always inlined: copying the outcome out of a call costs a hundred instructions.
     #[inline(always)]
     #[must_use = "the motors need its speeds"]
     pub fn tick(&self, memory: &mut FlightCoreMemory<C::Memory>, now_us: u64, inbox: &Inbox) -> TickOutcome<N> {
         let dt_s = self.controller.dt_s();
         // Takes the newest inputs.
-        // First: the detectors below count with the time since the last tick.
+        // Must come first: the detectors below use the time since the last tick.
         memory.rate.tick(now_us);
         let is_new = memory.take_state(inbox, now_us);
         let observing = memory.observe(&self.dead_reckoning, inbox, now_us, is_new);
         let measured = is_new || observing;
         let state_age_us = memory.state.map_or(u32::MAX, |state| state.age_us(now_us));
-        // A state may be 20 ms old: the law is to act on where the vehicle is, not on where it was.
+        // A state may be 20 ms old, but the law must act on the vehicle's present state.
         let fresh =
             memory.state.filter(|_| state_age_us <= COAST_US).map(|state| extrapolated(&state.value, state_age_us));
         let fresh = fresh.as_ref();
-        // For its 20 ms the last state with a position still counts.
+        // The last state with a position is preferred while it is fresh.
         let position_lost = inbox.position_lost().filter(|_| fresh.is_none()).and_then(|state| upright(state, now_us));
         memory.orient(inbox);
         memory.watch(fresh, position_lost.as_ref(), inbox, &self.limits, dt_s);
@@ -170,7 +169,7 @@ impl<C: FlightController<N>, const N: usize> FlightCore<C, N> {
         let asked = inbox.asked();
         let observed = SupervisorInputs {
             request: asked.map(|asked| asked.value),
-            // An empty queue, which is the rule, is not searched.
+            // Usually the queue is empty and need not be searched.
             kill: asked.is_some() && inbox.kills(),
             ready: against.verdict(),
             state_age_us,
@@ -180,24 +179,25 @@ impl<C: FlightController<N>, const N: usize> FlightCore<C, N> {
             stands: flight.as_ref().is_some_and(|flight| flight.landing.stands()),
             tumbled: flight.as_ref().is_some_and(|flight| flight.tumble.is_lost()),
         };
-        // By the mode before the transition: an armed vehicle would refuse the very request that has armed it.
+        // Answered for the mode before the transition: afterwards, the request that armed the vehicle would be refused.
         let answer = asked.map(|asked| {
             let result = mode.answer(asked.value, &observed);
             RequestAnswer { ticket: asked.ticket, request: asked.value, result }
         });
         let done = |request| answer.is_some_and(|answer| answer.request == request && answer.result.is_ok());
         let ended = mode.end(&observed);
-        // A vehicle that hovered counts as at rest: once its motors have stopped in the air, a delayed request to arm
-        // must not start them again.
+        // A hovering vehicle counts as at rest. Once its motors have stopped in the air, a delayed request to arm must
+        // not restart them.
         if ended.is_some() && observed.airborne {
             *rest_us = 0;
         }
-        // Not `next`, which would look a second time for the end of the flight.
+        // Not `next`, which would check the end of the flight a second time.
         *mode = if ended.is_some() { Mode::Disarmed } else { mode.onward(&observed) };
         let mode = *mode;
-        // The tick of arming only sets up the flight, and the motors idle: a step would take too long.
+        // The tick of arming only sets up the flight, with motors idling: a step of the law as well would take too
+        // long.
         let arms = done(Request::Arm);
-        // There is a state: without one, `against` refuses to arm.
+        // A state is always known here: without one, arming is refused.
         if let (true, Some(state)) = (arms, fresh) {
             Armed::begin(flight, &self.dead_reckoning, self.weight_n, state, now_us);
         }
@@ -231,7 +231,7 @@ impl<C: FlightController<N>, const N: usize> FlightCore<C, N> {
         TickOutcome { motors, forces, mode, health, answer, ended, against }
     }
 
-    /// Returns the action of an armed vehicle; `last` is its newest state, however old.
+    /// Returns the action of an armed vehicle. `last` is its newest state of any age.
     #[inline(always)]
     fn act(
         &self,
@@ -244,7 +244,7 @@ impl<C: FlightController<N>, const N: usize> FlightCore<C, N> {
         let dt_s = self.controller.dt_s();
         if inbox.idle_on_ground() {
             if airborne {
-                // It touches the ground, or the law goes on with what it knows.
+                // Touched the ground, but not confirmed: the law keeps its memory.
                 flight.applied = Inputs::default();
             } else {
                 flight.rest(&self.dead_reckoning, fresh.or(position_lost));
@@ -254,14 +254,15 @@ impl<C: FlightController<N>, const N: usize> FlightCore<C, N> {
         if let Some(reset) = inbox.reset() {
             flight.guide.shift(reset);
         }
-        // Untold, a law that observes moments makes up for what the feet hold, and tips over when they let go.
+        // Otherwise, a law that observes moments would compensate the ground's reaction on the feet, and tip over on
+        // leaving the ground.
         if mem::take(&mut flight.idle_on_ground) && !airborne {
             self.controller.on_ground(&mut flight.control);
         }
-        // An extrapolated state has the rates of the last measurement, to which the reckoning must not be set back.
+        // Extrapolated states have the rates of the last measurement, and would set the reckoning back.
         flight.reckon(&self.dead_reckoning, fresh.filter(|_| measured).or(position_lost));
         if engages && self.controller.engage(&mut flight.control) {
-            // The tick of engaging has no step: the rotors keep their inputs.
+            // No step of the law in the tick of engaging: the rotors keep their inputs.
             return self.open_loop(flight, flight.applied);
         }
         if let (Some(target), Some(state), Mode::Flying) = (inbox.rates(), fresh, mode) {
@@ -272,18 +273,19 @@ impl<C: FlightController<N>, const N: usize> FlightCore<C, N> {
                 let between = (!measured).then(|| flight.reckoning.between(state));
                 let state = between.as_ref().unwrap_or(state);
                 let target = flight.guide.target(mode, state, setpoint, dt_s);
-                // The inbox only holds plausible values.
+                // The inbox contains plausible values only.
                 self.controller.decide(&mut flight.control, state, target, true)
             }
             (None, Some(state)) => {
-                // With its horizontal velocity, which `upright` leaves out: the drift begins with it.
+                // Use the estimate's horizontal velocity, which `upright` removes, as the start of the drift.
                 let state = inbox.position_lost().map_or(state, |position_lost| &position_lost.value);
                 let (state, target) = flight.guide.down(state, last.map(|last| &last.value), dt_s);
                 self.controller.position_lost(&mut flight.control);
                 self.controller.decide(&mut flight.control, &state, target, true)
             }
             (None, None) => {
-                // Not taken into the trim, of which these inputs are made: a blind descent would lower it ever further.
+                // Do not update the trim, from which these inputs are made: a blind descent would lower it further and
+                // further.
                 let action = self.blind_action(flight, mode);
                 flight.applied = action.given;
                 return action;
@@ -295,12 +297,12 @@ impl<C: FlightController<N>, const N: usize> FlightCore<C, N> {
         action
     }
 
-    /// Returns the action that turns the vehicle as a pilot commands. The law begins afresh afterwards.
-    // Out of line, for the ticks of the law.
+    /// Returns the action that flies a pilot's body rates. The law restarts afterwards.
+    // Out of line, to keep the law's ticks fast.
     #[cold]
     #[inline(never)]
     fn turn(&self, flight: &mut Armed<C::Memory>, state: &State, target: &RateTarget) -> Action<N> {
-        // From the ground, too, of which the law has been told: it is to end in the air.
+        // Clears the law's memory, with the notice that it is on the ground: the law will restart in the air.
         if !mem::replace(&mut flight.turns, true) {
             flight.forget();
             flight.turning = RateMemory::default();
@@ -310,10 +312,10 @@ impl<C: FlightController<N>, const N: usize> FlightCore<C, N> {
         action
     }
 
-    /// Returns the action without a state.
+    /// Returns the action without any state.
     #[inline(always)]
     fn blind_action<M>(&self, flight: &mut Armed<M>, mode: Mode) -> Action<N> {
-        // When states come back, it descends from where it is then, not from where it was seen last.
+        // When states return, the descent restarts at the vehicle, not at the last known place.
         (flight.guide.descent, flight.guide.position_lost) = (None, None);
         let inputs = match mode {
             Mode::Descending => self.dead_reckoning.descend(&flight.reckoning),
@@ -330,8 +332,8 @@ impl<C: FlightController<N>, const N: usize> FlightCore<C, N> {
     }
 }
 
-/// Returns the state of a vehicle that does not know where it is, if it is fresh: it stands over the origin as far as
-/// the law can see, so that nothing drives it sideways but what the law has learnt of the wind.
+/// Returns a fresh state without a position, with horizontal position and velocity set to zero. Thus nothing drives the
+/// vehicle sideways except what the law has learnt of the wind.
 fn upright(state: &Stamped<State>, now_us: u64) -> Option<State> {
     (state.age_us(now_us) <= COAST_US).then(|| {
         let State { position_m, velocity_m_s, .. } = state.value;

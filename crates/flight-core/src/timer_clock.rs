@@ -1,16 +1,16 @@
-//! The clock of a timer that sends to motor controllers.
+//! Clock of a timer that outputs motor signals.
 
 use afbc_types::{OutOfRange, Range};
 
-/// Accepted clock of the timer \[Hz\]: DSHOT's pulses are within 4 % of a bit, and its periods fit the timer.
+/// Accepted clock of the timer \[Hz\]. DSHOT's pulses are then accurate to 4 % of a bit, and its periods fit the timer.
 pub const TIMER_CLOCK: Range = Range::new("timer_hz", 8e6, 500e6);
 
-/// A clock in [`TIMER_CLOCK`].
+/// A clock within [`TIMER_CLOCK`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TimerClock(u32);
 
 impl TimerClock {
-    /// Accepts a clock \[Hz\].
+    /// Makes a clock \[Hz\].
     ///
     /// # Errors
     /// If it is outside [`TIMER_CLOCK`].
@@ -19,7 +19,7 @@ impl TimerClock {
         Ok(TimerClock(timer_hz))
     }
 
-    /// Returns it \[Hz\].
+    /// Returns the clock \[Hz\].
     pub const fn hz(self) -> u32 {
         self.0
     }

@@ -1,4 +1,5 @@
-//! Realistic clock faults of trackers, each in a minute of hover: the modes of the flight, and the ages of its states.
+//! Realistic faults of a tracker's clock, each during a minute of hover. Checks the modes of the flight and the ages of
+//! its states.
 
 use afbc::{Adaptive, Controller, Profile};
 use afbc_flight_core::clock::{BACK_SPREAD_US, BACK_US, NEW_COUNT, SILENCE_US};
@@ -14,7 +15,7 @@ use proptest::prelude::*;
 const ARM_US: u64 = 2_000_000;
 const EVENT_US: u64 = 10_000_000;
 const END_US: u64 = 70_000_000;
-/// The tracker measures 100 times per second; a state needs a millisecond to arrive.
+/// Period of the tracker's measurements (100 Hz), and delay of their arrival \[us\].
 const PERIOD_US: u64 = 10_000;
 const DELAY_US: u64 = 1_000;
 
@@ -31,12 +32,12 @@ struct Sent {
 struct Seen {
     /// Modes in flight, in order.
     modes: Vec<Mode>,
-    /// Largest error of the age of a state that was used \[us\].
+    /// Largest age error of a used state \[us\].
     age_error_us: u64,
     refused: Refused,
 }
 
-/// The state of a hovering vehicle with a tracker's noise.
+/// State of a hovering vehicle with a tracker's noise.
 fn hovering(measured_us: u64) -> State {
     let mut state = State::default();
     state.position_m.z = (measured_us / 1000 * 7919 % 1000) as f32 * 1e-8;
@@ -56,7 +57,7 @@ fn play(mut sent: Vec<Sent>) -> Seen {
         while let Some(sent) = sent.next_if(|sent| sent.arrives_us <= now_us) {
             let state = hovering(sent.measured_us);
             if let Some(state) = tracker.stamp(sent.sender, sent.stamp_us, now_us, state) {
-                // The delay of the fastest state is unknown to the clock.
+                // The clock cannot know the fastest state's delay.
                 let error_us = state.at_us.abs_diff(sent.measured_us + DELAY_US);
                 seen.age_error_us = seen.age_error_us.max(error_us);
                 inbox.put_state(state);
@@ -82,14 +83,14 @@ fn stamped(clock: impl Fn(u64) -> u64) -> Vec<Sent> {
     (0..END_US).step_by(PERIOD_US as usize).map(at).collect()
 }
 
-/// True time plus this much from the event on.
+/// A clock that steps by `by_us` at the event.
 fn steps(by_us: i64) -> Vec<Sent> {
     stamped(
         move |t| if t < EVENT_US { (t + HOUR_US).wrapping_add(0) } else { (t + HOUR_US).wrapping_add_signed(by_us) },
     )
 }
 
-/// A single stamp that is this much ahead.
+/// A clock with a single stamp ahead.
 fn once_ahead(by_us: u64) -> Vec<Sent> {
     stamped(move |t| if t == EVENT_US { t + by_us } else { t })
 }
@@ -112,13 +113,13 @@ fn jitters(by_us: u64) -> Vec<Sent> {
     sent
 }
 
-/// Two senders with separate clocks, the first of which falls silent.
+/// Two senders with separate clocks. The first one falls silent.
 fn two(until_us: u64) -> Vec<Sent> {
     let mut sent = stamped(|t| t);
     sent.retain(|sent| sent.measured_us < until_us);
     let mut other = stamped(|t| t / 3 + 77 * HOUR_US);
     for sent in &mut other {
-        // As frequent as the first one's and between them, with another zero of the clock.
+        // At the same rate as the first, between its states, with another zero of the clock.
         sent.stamp_us = sent.measured_us + 77 * HOUR_US;
         sent.sender = 2;
         sent.measured_us += 4_000;
@@ -130,12 +131,12 @@ fn two(until_us: u64) -> Vec<Sent> {
 }
 
 const HOUR_US: u64 = 3_600_000_000;
-/// A Saturday in 2026, as microseconds since 1970.
+/// A Saturday in 2026, in microseconds since 1970.
 const WALL_US: u64 = 1_795_000_000_000_000;
 
 use Mode::{Coasting, Flying};
 
-/// A clock, the modes that follow, and the largest error of an age \[us\].
+/// Name of the clock fault, its states, the resulting modes, and the largest age error \[us\].
 type Case = (&'static str, fn() -> Vec<Sent>, &'static [Mode], u64);
 
 #[rustfmt::skip]
@@ -192,7 +193,7 @@ fn ordinary_clocks_end_no_flight() {
     assert!(failures.is_empty(), "\n{failures}");
 }
 
-/// Milliseconds sent as microseconds look like a delay that grows by 10 ms per state: the vehicle does not arm.
+/// Milliseconds sent as microseconds look like a delay that grows by 10 ms per state, so the vehicle does not arm.
 #[test]
 fn a_clock_that_counts_milliseconds_prevents_arming() {
     assert_eq!(play(stamped(|t| t / 1000)).modes, [Mode::Disarmed]);
@@ -249,8 +250,8 @@ fn posed(measured_us: u64) -> Sighting {
     Sighting::Pose(Pose::of(&hovering(measured_us), PoseSigmas::UNKNOWN))
 }
 
-/// A tracker that sends each measurement twice, as state and as pose, is used once, and its clock is not taken for a
-/// coarse one: a late measurement is known to be late.
+/// A tracker that sends each measurement as state and as pose is used once per measurement. Its clock does not count as
+/// coarse, so a late measurement is recognised as late.
 #[test]
 fn a_state_and_a_pose_of_one_moment_are_one() {
     let mut tracker = Tracker::default();
@@ -263,7 +264,7 @@ fn a_state_and_a_pose_of_one_moment_are_one() {
     assert_eq!(tracker.sight(1, 1_000_000, 1_030_000, posed(1_000_000), POSE_AGE_MAX_US), Some(1_000_000));
 }
 
-/// Slow trackers do not take turns: as long as a pose may be old, its sender stays in use.
+/// Slow trackers do not alternate: a sender stays in use as long as its poses may be old.
 #[test]
 fn a_slow_tracker_stays_in_use() {
     let mut tracker = Tracker::default();
@@ -288,7 +289,7 @@ fn a_frozen_sender_gives_way() {
 
 #[test]
 fn delay_beyond_the_fastest_message_is_age() {
-    // The sender's clock is 1 s ahead; messages take 2 ms, one of them 50 ms.
+    // The sender's clock is 1 s ahead. Messages take 2 ms, one of them 50 ms.
     let mut clock = SourceClock::default();
     for (sent, arrived, stamp) in [
         (1_000_000, 2_000, Some(2_000)),
@@ -322,7 +323,7 @@ fn after_a_long_silence_a_clock_is_new() {
     assert_eq!(clock.stamp(7, 1_002 + SILENCE_US, true), Some(1_002 + SILENCE_US));
 }
 
-/// A clock that has been heard for long, of which each message takes a millisecond; returns it with its next stamp.
+/// Returns a clock heard for a long time, whose messages arrive without delay, and its next stamp.
 fn steady() -> (SourceClock, u64) {
     let mut clock = SourceClock::default();
     for us in (0..1_000_000).step_by(10_000) {
@@ -331,8 +332,8 @@ fn steady() -> (SourceClock, u64) {
     (clock, 1_000_000)
 }
 
-/// Five in a row are a step ahead, in the order of their stamps; a stamp that goes back among them makes the counting
-/// begin anew. Then the slowest of them counts, so that none of them has been late, and the next step takes five again.
+/// Five stamps in a row, in increasing order, are a step ahead. A decreasing stamp restarts the count. After the step
+/// the slowest of them is the reference, so none of them counts as late. The next step again takes five.
 #[test]
 fn a_step_ahead_takes_five_stamps_in_a_row() {
     let ahead = |offs_us: &[u64]| {
@@ -341,7 +342,7 @@ fn a_step_ahead_takes_five_stamps_in_a_row() {
             let arrived_us = now_us + index as u64 * 10_000;
             assert_eq!(clock.stamp(HOUR_US + off_us, arrived_us, true), Some(arrived_us), "taken as sent on arrival");
         }
-        // Stamps of the old clock are out of order once it has been stepped.
+        // Once stepped, the old clock's stamps are out of order.
         let next_us = now_us + offs_us.len() as u64 * 10_000;
         let mut old = clock;
         let stepped = old.stamp(next_us, next_us, true).is_none();
@@ -353,12 +354,12 @@ fn a_step_ahead_takes_five_stamps_in_a_row() {
     assert!(ahead(&[0, 30_000, 20_000, 40_000, 50_000, 60_000, 70_000]).2);
     assert!(ahead(&[0, 0, 0, 0, 0]).2, "the same again is not back");
 
-    // The third was 8 ms slower: so may the next one be, to the same effect.
+    // The third was 8 ms slower. The next may be just as slow without counting as late.
     let (mut clock, next_us, stepped) = ahead(&[0, 10_000, 12_000, 30_000, 40_000]);
     assert!(stepped);
     let said = clock.stamp(HOUR_US + 50_000 - 8_000, next_us, true);
     assert_eq!(said, Some(next_us), "as slow as the slowest");
-    // Nor are two of the next ones enough for another step, since the sender is not new.
+    // The sender is no longer new, so two stamps are not enough for another step.
     for index in 1..=2 {
         assert!(clock.stamp(3 * HOUR_US, next_us + index * 10_000, true).is_some());
     }
@@ -366,7 +367,7 @@ fn a_step_ahead_takes_five_stamps_in_a_row() {
     assert!(clock.stamp(HOUR_US + 80_000 - 8_000, later_us, true).is_some(), "not stepped");
 }
 
-/// Among the first ten messages of a sender two are enough, and from the eleventh on they are not.
+/// Among a sender's first ten messages two are enough; from the eleventh on they are not.
 #[test]
 fn a_new_sender_steps_ahead_with_two() {
     for heard in 1..=14_u64 {
@@ -383,7 +384,7 @@ fn a_new_sender_steps_ahead_with_two() {
     }
 }
 
-/// Three stamps back that increase and fit each other, over 15 ms, are a step; others are out of order.
+/// A step back takes three stamps that increase and fit each other, over 15 ms. Others are out of order.
 #[test]
 fn a_step_back_takes_three_that_increase() {
     let back = |messages: &[(u64, u64)]| {
@@ -395,20 +396,20 @@ fn a_step_back_takes_three_that_increase() {
     assert!(!back(&[(0, 0), (BACK_US, BACK_US)]), "two");
     assert!(!back(&[(0, 0), (16_000, 16_000), (15_500, 18_000)]), "back among them");
     assert!(!back(&[(0, 0), (8_000, 8_000), (8_000, 16_000)]), "the same again");
-    // Offsets within 3 ms of the first one's.
+    // Offsets must be within 3 ms of the first one's.
     assert!(back(&[(0, 0), (8_000, 8_000), (16_000, 16_000 + BACK_SPREAD_US)]));
     assert!(!back(&[(0, 0), (8_000, 8_000), (16_000, 16_001 + BACK_SPREAD_US)]));
     assert!(back(&[(0, 0), (8_000, 8_000), (16_000 + BACK_SPREAD_US, 16_000)]));
     assert!(!back(&[(0, 0), (8_000, 8_000), (16_001 + BACK_SPREAD_US, 16_000)]));
 }
 
-/// The clocks of four senders are tracked; a fifth one replaces the one that has been silent longest.
+/// Four senders' clocks are tracked. A fifth sender replaces the one silent for longest.
 #[test]
 fn the_sender_that_is_silent_longest_is_forgotten() {
     for silent in 1..=4_u16 {
         let mut tracker = Tracker::default();
         let says = |tracker: &mut Tracker, sender: u16, sent_us: u64, arrived_us: u64| {
-            // Whether it is late is told by the count, since another one is in use.
+            // The count of late states tells whether this one was late, since another sender is in use.
             let late = tracker.refused().late;
             let _ = tracker.stamp(sender, sent_us, arrived_us, hovering(sent_us));
             tracker.refused().late > late
@@ -417,14 +418,14 @@ fn the_sender_that_is_silent_longest_is_forgotten() {
         for (index, sender) in [1_u16, 2, 3, 4].into_iter().enumerate() {
             says(&mut tracker, sender, index as u64 * 1_000, index as u64 * 1_000);
         }
-        // Heard once more, the first of them last.
+        // Each is heard once more, in an order that starts after `silent`.
         for (index, sender) in order.enumerate() {
             let now_us = 20_000 + index as u64 * 1_000;
             says(&mut tracker, if sender == silent { 1 + silent % 4 } else { sender }, now_us, now_us);
         }
         says(&mut tracker, 5, 30_000, 30_000);
         for sender in 1..=5 {
-            // Sent 30 ms ago: late of a sender whose clock is known.
+            // Sent 30 ms ago: late only for a sender whose clock is known.
             let late = says(&mut tracker.clone(), sender, 40_000, 70_000);
             assert_eq!(late, sender != silent, "sender {sender}, silent {silent}");
         }
@@ -441,8 +442,7 @@ proptest! {
         }
     }
 
-    /// With a good clock and any delays, a state's age is never overestimated beyond the difference to the fastest one
-    /// of the last second.
+    /// With a good clock and any delays, a state's age is overestimated by no more than its delay.
     #[test]
     fn an_age_is_no_more_than_the_delay(
         steps in prop::collection::vec((1u64..50_000, 0u64..300_000), 1..100),
@@ -459,7 +459,7 @@ proptest! {
         }
     }
 
-    /// A single wrong stamp, in any direction, does not end the flight.
+    /// A single wrong stamp in any direction does not end the flight.
     #[test]
     fn a_single_wrong_stamp_is_tolerated(wrong in any::<u64>(), at in 200u64..400) {
         let (mut clock, mut worst_us) = (SourceClock::default(), 0);
@@ -471,12 +471,12 @@ proptest! {
                 None => prop_assert!(n == at, "state {n} was refused"),
             }
         }
-        // A stamp that is slightly behind counts as late.
+        // A stamp slightly behind counts as late.
         prop_assert!(worst_us <= PERIOD_US + 2_000, "{worst_us} us");
     }
 
-    /// After any step of a clock, states are used again within 50 ms, and their age is overestimated by at most a step
-    /// back of less than a period.
+    /// After any step of a clock, states are used again within 50 ms. A step back by less than a period overestimates
+    /// their age by at most that step.
     #[test]
     fn the_flight_continues_after_any_step(step in any::<i64>(), period_us in 1_000u64..20_000) {
         let mut clock = SourceClock::default();

@@ -1,15 +1,15 @@
-//! Replies on bidirectional DSHOT, against an encoder of their description: bits, codes, edges and samples.
+//! Tests bidirectional DSHOT replies with an independent encoder: bits, codes, edges and samples.
 
 use afbc_flight_core::dshot_reply::{DshotReply, EDGES_MAX, REPLY_BITS, ReplyError};
 use proptest::collection::vec;
 use proptest::prelude::*;
 
-/// The sixteen bits of twelve: the checksum is the complement of the exclusive or of three groups.
+/// Appends the checksum to twelve bits: the complement of the exclusive or of three nibbles.
 fn checked(content: u16) -> u16 {
     content << 4 | (15 - ((content % 16) ^ (content / 16 % 16) ^ (content / 256)))
 }
 
-/// Levels of the 21 bits on the wire, by the code's table as its description prints it: 0 to F.
+/// Returns the levels of the 21 bits on the wire, from the code's table as published, for nibbles 0 to F.
 fn levels(bits: u16) -> Vec<bool> {
     let table = [
         "11001", "11011", "10010", "10011", "11101", "10101", "10110", "10111", "11010", "01001", "01010", "01011",
@@ -26,7 +26,7 @@ fn levels(bits: u16) -> Vec<bool> {
     levels
 }
 
-/// Times of the changes, with bits of `counts` each, from the start bit on.
+/// Returns the times of the level changes from the start bit on, with `counts` per bit.
 fn edges(levels: &[bool], counts: f64) -> Vec<f64> {
     let before = std::iter::once(true).chain(levels.iter().copied());
     let line: Vec<bool> = before.chain([true]).collect();
@@ -38,7 +38,8 @@ fn samples(levels: &[bool], per_bit: usize, before: usize, after: usize) -> Vec<
     std::iter::repeat_n(true, before).chain(bits).chain(std::iter::repeat_n(true, after)).collect()
 }
 
-/// Content as motor controllers write a period: nine bits, shifted as far as it takes.
+/// Returns a period's content as motor controllers write it, nine bits shifted as far as needed, and the period that
+/// remains after rounding.
 fn period_content(period_us: u32) -> (u16, u32) {
     let exponent = (0..8).find(|exponent| period_us >> exponent < 512).unwrap();
     ((exponent << 9 | period_us >> exponent) as u16, period_us >> exponent << exponent)
@@ -52,8 +53,8 @@ proptest! {
         prop_assert!(period_us - told_us <= period_us / 256);
     }
 
-    /// A reply is read from edges that are up to a third of a bit off, at a rate that is up to 4 % off, wherever the
-    /// timer's count stands; and from samples.
+    /// Replies are decoded from edges up to a third of a bit off, at a rate up to 4 % off, for any count of the timer,
+    /// and from samples.
     #[test]
     fn replies_are_read(
         content in 0_u16..4_096, rate in 0.96..1.04_f64, bit in 20_u16..1_000, start in any::<u16>(),
@@ -72,7 +73,7 @@ proptest! {
         prop_assert_eq!(DshotReply::from_samples(taken, per_bit as u16), Ok(wanted));
     }
 
-    /// Lines that are sampled together are read as each alone, whatever is on the others.
+    /// Lines sampled together are decoded as if alone, for any signal on the others.
     #[test]
     fn lines_are_read_together(
         contents in prop::array::uniform4(0_u16..4_096), waits in prop::array::uniform4(0_usize..90),
@@ -97,7 +98,7 @@ proptest! {
         let _ = DshotReply::from_port(&samples, places, per_bit);
     }
 
-    /// A controller's reply for a speed is that of the period's description.
+    /// A reply made for a speed has the content of its period.
     #[test]
     fn speeds_come_back(speed in 924_u32..2_000_000) {
         let bits = DshotReply::bits_of_speed(speed);
@@ -109,7 +110,7 @@ proptest! {
         prop_assert_eq!(line, wanted);
     }
 
-    /// Noise is read without harm; what passes has a checksum that fits.
+    /// Noise causes no panic.
     #[test]
     fn noise_does_no_harm(
         edges in vec(any::<u16>(), 0..40), levels in vec(any::<bool>(), 0..300), bit in any::<u16>(),
@@ -119,8 +120,8 @@ proptest! {
     }
 }
 
-/// Every single wrong bit of the code is refused, in every reply. A single wrong level between right ones is two wrong
-/// bits of the code; of 1000 of those, five make other groups whose checksum fits, which no receiver can tell.
+/// Every single wrong code bit is detected, in every reply. A single wrong level makes two code bits wrong. In about 5
+/// of 1000 cases these form other valid groups with a matching checksum, which no receiver can detect.
 #[test]
 fn every_wrong_level_is_noticed() {
     let (mut tried, mut missed) = (0, 0);
@@ -171,7 +172,7 @@ fn what_is_no_reply_is_refused() {
     assert_eq!(DshotReply::from_samples([true; 100], 5), Err(ReplyError::Timing));
     assert_eq!(DshotReply::from_samples((0..100).map(|at| at % 2 == 0), 1), Err(ReplyError::Timing));
     assert_eq!(DshotReply::from_bits(0), Err(ReplyError::Checksum));
-    // A plain checksum is that of a frame to a motor controller, not of its reply.
+    // A plain checksum belongs to a frame for a motor controller, not to its reply.
     assert_eq!(DshotReply::from_bits(0x1230), Err(ReplyError::Checksum));
     assert_eq!(DshotReply::from_code(0), Err(ReplyError::Group));
 }

@@ -1,4 +1,4 @@
-//! The request to engage reaches the controller once, only in flight, and is answered.
+//! Tests that the request to engage reaches the controller once, only in flight, and is answered.
 
 use afbc_control::{Action, FlightController, Mixer, Trace};
 use afbc_flight_core::{
@@ -6,7 +6,7 @@ use afbc_flight_core::{
 };
 use afbc_types::{Inputs, Parameters, RotorForces, RotorSpeeds, Setpoint, State};
 
-/// A controller that counts how often it is engaged, and gives the weight as thrust.
+/// A controller that counts its engagements, and gives the weight as thrust.
 struct Counter(Mixer);
 
 impl FlightController for Counter {
@@ -71,7 +71,7 @@ impl Bench {
         }
     }
 
-    /// Requests engaging in this mode; true if that reached the controller.
+    /// Requests engaging in this mode. Returns true if the controller was engaged.
     fn engages(&mut self, tracked: bool, mode: Mode) -> bool {
         let before = self.memory.control().copied();
         let outcome = self.tick(tracked, Some(Request::Engage));

@@ -1,5 +1,5 @@
-//! A link that drops, delays, corrupts or reorders frames, one fault per case: MAVLink frames through decoder and tick.
-//! The vehicle rests at its setpoint; closed loops are tested elsewhere.
+//! Tests of a link that drops, delays, corrupts or reorders frames, one fault per case: MAVLink frames pass through
+//! decoder and tick. The vehicle rests at its setpoint; other tests close the loop.
 
 use afbc::{Adaptive, Controller, Profile};
 use afbc_flight_core::{
@@ -20,7 +20,7 @@ const END_MS: u64 = FAULT_MS + 4_000;
 /// A frame in transit.
 #[derive(Clone)]
 struct Frame {
-    /// Time of arrival since the beginning of the fault \[ms\].
+    /// Time of arrival, from the start of the fault \[ms\].
     at_ms: i64,
     kind: Kind,
     bytes: Vec<u8>,
@@ -33,7 +33,7 @@ enum Kind {
     Command,
 }
 
-/// Frames of an undisturbed flight: a state per millisecond, a setpoint every 100 ms, one command.
+/// Returns the frames of an undisturbed flight: a state per millisecond, a setpoint every 100 ms, one command.
 fn flight() -> Vec<Frame> {
     let mut sender = Sender::new(STATION);
     let mut frames = Vec::new();
@@ -45,7 +45,7 @@ fn flight() -> Vec<Frame> {
         if ms % 100 == 0 {
             push(Kind::Setpoint, Uplink::Setpoint(Setpoint::default()));
         }
-        // With a clock that is 7 s ahead.
+        // The sender's clock is 7 s ahead.
         push(
             Kind::State,
             Uplink::State { sent_us: 7_000_000 + ms * 1000, state: standing(ms), sigmas: PoseSigmas::UNKNOWN },
@@ -57,20 +57,20 @@ fn flight() -> Vec<Frame> {
     frames
 }
 
-/// The state of a vehicle at rest with a tracker's noise.
+/// State of a vehicle at rest with a tracker's noise.
 fn standing(ms: u64) -> State {
     let mut state = State::default();
     state.position_m.z = (ms * 7919 % 1000) as f32 * 1e-8;
     state
 }
 
-/// A frame with a message from the station.
+/// Returns a frame with a message from the station.
 fn frame(at_ms: i64, message: Uplink) -> Frame {
     let bytes = Sender::new(Address { component: 1, ..STATION }).send(&message, &mut [0; FRAME_MAX]).to_vec();
     Frame { at_ms, kind: Kind::Command, bytes }
 }
 
-/// Result of a case, from the beginning of the fault on.
+/// Result of a case, from the start of the fault.
 #[derive(Debug, Default)]
 struct Seen {
     /// Start of each mode \[ms\].
@@ -80,7 +80,7 @@ struct Seen {
     setpoint_stale: bool,
 }
 
-/// Plays the frames at their times, those of the same millisecond in the given order.
+/// Plays the frames at their times. Frames of the same millisecond keep their order.
 fn play(mut frames: Vec<Frame>) -> Seen {
     frames.sort_by_key(|frame| frame.at_ms);
     let (parameters, settings) = (Parameters::PAPER.to_f32(), Profile::Flight.settings());
@@ -113,7 +113,7 @@ fn play(mut frames: Vec<Frame>) -> Seen {
         }
         let outcome = vehicle.tick(&mut memory, now_us, &inbox.take());
 
-        // Motor gating, in every tick of every case.
+        // Motor gating, checked in every tick of every case.
         let still = outcome.motors == RotorSpeeds::default();
         assert!(outcome.mode.armed() || still, "motors turn while disarmed");
         assert!(outcome.motors.0.iter().all(|speed| speed.is_finite() && *speed >= 0.0));
@@ -151,7 +151,7 @@ fn delay_states(frames: &mut Vec<Frame>, when: std::ops::Range<i64>, by: impl Fn
     });
 }
 
-/// Changes the payload and corrects the checksum.
+/// Changes the payload, and corrects the checksum.
 fn rewrite(frame: &mut Frame, change: impl Fn(&mut [u8])) {
     let end = frame.bytes.len() - 2;
     change(&mut frame.bytes[10..end]);
@@ -171,7 +171,7 @@ const FOREVER: std::ops::Range<i64> = 0..i64::MAX;
 use Command::Kill;
 use Mode::{Coasting, Descending, Disarmed, Flying};
 
-/// A fault, the modes that follow with their first millisecond, and a further check.
+/// A fault, the resulting modes with their first milliseconds, and a further check.
 type Case = (&'static str, fn(&mut Vec<Frame>), &'static [(i64, Mode)], fn(&Seen) -> bool);
 
 #[rustfmt::skip]
@@ -205,8 +205,8 @@ const CASES: &[Case] = &[
 
     // Delayed frames.
     ("15 ms late are nothing", |f| delay_states(f, FOREVER, |_| 15), &[(0, Flying)], |_| true),
-    // After a second the delay cannot be distinguished from a clock that was set back, and the vehicle is seen to be at
-    // rest.
+    // After a second, the delay looks like a clock that was set back, so the states count again, and the vehicle is
+    // found at rest.
     ("30 ms late are as good as none at first", |f| delay_states(f, FOREVER, |_| 30),
         &[(0, Flying), (20, Coasting), (250, Descending), (1727, Disarmed)], |_| true),
     ("a queue that builds up and empties", |f| delay_states(f, 0..100, |at| at.min(100 - at)),

@@ -1,4 +1,4 @@
-//! Order of requests, rejection of implausible values, and ages.
+//! Tests of the inbox: order of requests, rejection of implausible values, and ages.
 
 use afbc_flight_core::inbox::QUEUE_MAX;
 use afbc_flight_core::{Inbox, Reasons, Refusal, Request, Stamped, Ticketed};
@@ -9,7 +9,7 @@ fn asked(request: Request, ticket: usize) -> Ticketed<Request> {
     Ticketed { value: request, ticket: ticket as u8 }
 }
 
-/// One per tick, in order, whether requested directly or posted.
+/// One request per tick, in order, whether queued directly or merged.
 #[test]
 fn requests_wait_for_their_turn() {
     let all = [Request::Arm, Request::Disarm, Request::Engage, Request::Kill];
@@ -57,7 +57,7 @@ fn implausible_values_do_not_enter_the_inbox() {
     assert_eq!((inbox.state(), inbox.setpoint()), (Some(&good.0), Some(&good.1)), "the last good ones stay");
 }
 
-/// Each pose is seen by one tick, the newest one first, and an implausible one by none.
+/// Each pose is seen by one tick, and the newest one only. An implausible pose is seen by none.
 #[test]
 fn a_pose_is_taken_once() {
     let at = |x, at_us| Stamped { value: Pose { position_m: Vector3::new(x, 0.0, 0.0), ..Pose::default() }, at_us };
@@ -92,7 +92,7 @@ fn a_stamp_from_the_future_is_infinitely_old() {
     assert_eq!(stamped.age_us(999), u32::MAX);
 }
 
-/// Every value of a setpoint reaches the tick, also in place of the last one.
+/// Every value of a setpoint reaches the tick, also when it replaces the last one.
 #[test]
 fn a_setpoint_is_taken_whole() {
     let vector = |first: f32| Vector3::new(first, first + 0.1, first + 0.2);
@@ -117,7 +117,7 @@ fn a_setpoint_is_taken_whole() {
     }
 }
 
-/// The vehicle's own estimate, one that does not know where it is, and the link's state: each replaces the others.
+/// Own estimate, own estimate without a position, and state from the link: each replaces the others.
 #[test]
 fn one_state_stands_at_a_time() {
     let at = |at_us| Stamped { value: State::default(), at_us };
@@ -138,7 +138,7 @@ fn one_state_stands_at_a_time() {
     assert_eq!((inbox.position_lost(), inbox.missing()), (None, None));
     inbox.put_state(at(5));
     assert!(!inbox.is_own());
-    // An estimate with nothing at all leaves what the link says.
+    // An estimate without any state leaves the link's.
     inbox.put_position_lost(None, Refusal::AttitudeUnknown);
     assert_eq!(
         (inbox.state(), inbox.position_lost(), inbox.missing()),
@@ -146,7 +146,7 @@ fn one_state_stands_at_a_time() {
     );
 }
 
-/// News replace what they bring, and leave the rest.
+/// Merging replaces the values that the newer inbox has, and keeps the rest.
 #[test]
 fn news_are_merged() {
     let at = |at_us| Stamped { value: State::default(), at_us };

@@ -1,4 +1,4 @@
-//! Rotor speed to throttle, frame and waveform.
+//! Tests of throttles, DSHOT frames and waveforms.
 
 use afbc_flight_core::dshot::{DshotFrame, DshotRate, Timing};
 use afbc_flight_core::motor::{Curve, Motor};
@@ -17,7 +17,8 @@ fn timing(timer_hz: u32, rate: DshotRate) -> Timing {
 
 #[test]
 fn throttle_by_hand() {
-    // (k, speed, throttle): u = s for k = 1; u = s^2 for k = 0; 0.5 u^2 + 0.5 u = s^2 for k = 0.5.
+    // Columns: k, speed, throttle. With the speed's share s, u = s for k = 1; u = s^2 for k = 0; 0.5 u^2 + 0.5 u = s^2
+    // for k = 0.5.
     for (k, speed, throttle) in [
         (1.0, 0.0, 48),
         (1.0, 500.0, 1048), // 48 + 0.5 * 1999 = 1047.5
@@ -76,17 +77,17 @@ fn frames_by_hand() {
     ] {
         assert_eq!(DshotFrame::new(throttle).bits(), bits, "{throttle}");
     }
-    // 1046 with telemetry: 0x82D, checksum 8 ^ 2 ^ D = 7. A stopped motor's controller can be asked, too.
+    // 1046 with telemetry: 0x82D, checksum 8 ^ 2 ^ D = 7. Telemetry can be requested with a stopped motor, too.
     assert_eq!(DshotFrame::new(1046).asking().bits(), 0x82D7);
     assert_eq!(DshotFrame::new(1046).asking().asking().bits(), 0x82D7);
     assert_eq!(DshotFrame::new(0).asking().bits(), 0x0011);
-    // 1046 on bidirectional DSHOT: checksum not 6 but 9.
+    // 1046 in bidirectional DSHOT: checksum 9 instead of 6.
     assert_eq!(DshotFrame::new(1046).bidirectional().bits(), 0x82C9);
 }
 
 #[test]
 fn the_waveform_of_a_frame() {
-    // The timers of an STM32F405 at 168 MHz: 84 MHz on the first bus, 140 counts per bit.
+    // An STM32F405 at 168 MHz: timers of the first bus at 84 MHz, 140 counts per bit.
     let timing = timing(84_000_000, DshotRate::Dshot600);
     assert_eq!(timing.period(), 140);
     let (one, zero) = (105, 53);
@@ -102,7 +103,7 @@ fn the_waveform_of_a_frame() {
 
 #[test]
 fn pulses_last_as_long_as_they_should_at_every_usual_clock() {
-    // Periods and pulses of DSHOT [ns].
+    // Period and pulse lengths of DSHOT [ns].
     let rates = [
         (DshotRate::Dshot600, [1666.7, 1250.0, 625.0]),
         (DshotRate::Dshot300, [3333.3, 2500.0, 1250.0]),
@@ -135,7 +136,7 @@ proptest! {
         prop_assert!(motor.throttle(slow) <= motor.throttle(fast));
     }
 
-    /// The curve converts the throttle back to the speed, to within half a step.
+    /// The curve converts the throttle back to the speed, within half a step.
     #[test]
     fn inverts_the_curve(speed in 0.0f32..1000.0, k in 0.0f32..=1.0) {
         let u_of = |steps: f64| (steps / 1999.0).clamp(0.0, 1.0);
@@ -157,7 +158,7 @@ proptest! {
         prop_assert_eq!((bits ^ bits >> 4 ^ bits >> 8 ^ bits >> 12) & 0xF, 0);
     }
 
-    /// Bidirectional frames differ in their checksums alone.
+    /// Bidirectional frames differ in their checksums only.
     #[test]
     fn rows_become_bidirectional(
         throttles in prop::array::uniform4(0u16..=2047), asked in prop::option::of(0_usize..4),

@@ -1,10 +1,10 @@
-//! Which output drives which rotor, by corners as the pages of Betaflight and ArduPilot draw them.
+//! Tests which output drives which rotor, with the corners from Betaflight's and ArduPilot's documentation.
 
 use afbc_flight_core::numbering::{ARDUPILOT, BETAFLIGHT, rotors_of_outputs};
 use afbc_types::{PLUS, Rotor};
 use proptest::prelude::*;
 
-/// Signs of x (forward) and y (left) where motors 1 to 4 are: Betaflight's "Quad X" and ArduPilot's "X".
+/// Signs of x (forward) and y (left) of motors 1 to 4: Betaflight's "Quad X" and ArduPilot's "X".
 const BETAFLIGHTS: [[f32; 2]; 4] = [[-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0], [1.0, 1.0]];
 const ARDUPILOTS: [[f32; 2]; 4] = [[1.0, -1.0], [-1.0, 1.0], [1.0, 1.0], [-1.0, -1.0]];
 
@@ -13,7 +13,7 @@ fn rotor([x, y]: [f32; 2]) -> Rotor {
 }
 
 proptest! {
-    /// Whatever the order in a vehicle's file, each motor is that of its corner.
+    /// In any order of the vehicle's file, each motor drives the rotor in its corner.
     #[test]
     fn an_x_is_driven_by_its_corners(order in Just([0, 1, 2, 3]).prop_shuffle(), x in 0.2_f32..1.5, y in 0.2_f32..1.5) {
         let rotors = order.map(|at: usize| rotor([BETAFLIGHTS[at][0] * x, BETAFLIGHTS[at][1] * y]));
@@ -30,10 +30,10 @@ proptest! {
 #[test]
 fn another_frame_is_driven_by_number() {
     assert_eq!(rotors_of_outputs(BETAFLIGHT, &PLUS), [0, 1, 2, 3]);
-    // Three in one corner.
+    // Three rotors in one corner.
     let crowded = [[1.0, 1.0], [0.9, 0.9], [0.8, 0.8], [-1.0, -1.0]].map(rotor);
     assert_eq!(rotors_of_outputs(BETAFLIGHT, &crowded), [0, 1, 2, 3]);
-    // Two of the six are aside, four in the corners of an X.
+    // Six rotors: two at the sides, four in the corners of an X.
     let six = [[0.0, -1.0], [0.0, 1.0], [0.9, 0.5], [-0.9, -0.5], [0.9, -0.5], [-0.9, 0.5]].map(rotor);
     assert_eq!(rotors_of_outputs(ARDUPILOT, &six), [0, 1, 2, 3, 4, 5]);
 }

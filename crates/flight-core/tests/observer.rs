@@ -1,5 +1,5 @@
-//! The observer alone, and inside the flight core with whatever inputs. `crates/sim/tests/observer.rs` compares it with
-//! the plant.
+//! Tests the observer alone, and inside the flight core with arbitrary inputs. `crates/sim/tests/observer.rs` compares
+//! it with the plant.
 
 use afbc::monitor::Bounds;
 use afbc::{Guarded, Profile, guarded};
@@ -18,7 +18,7 @@ fn dead_reckoning() -> DeadReckoning {
     DeadReckoning::new(&Parameters::PAPER.to_f32(), &Response::DEFAULT, 0.001)
 }
 
-/// Does as a control tick.
+/// Runs one tick of observer and dead reckoning.
 fn tick(
     observer: &mut PoseObserver,
     dead_reckoning: &DeadReckoning,
@@ -35,8 +35,8 @@ fn tick(
 }
 
 proptest! {
-    /// A vehicle that hovers in a wind that pushes it steadily, and yaws: position, velocity and yaw rate are found
-    /// exactly from any start, however often poses come and however late they are.
+    /// A vehicle hovers with a yaw rate in a wind that pushes it steadily. From any start, position, velocity and yaw
+    /// rate are found exactly, for any rate and delay of the poses.
     #[test]
     fn steady_motion_is_found_exactly(
         period_ms in 1..50u64,
@@ -73,7 +73,7 @@ proptest! {
             tick(&mut observer, &dead_reckoning, &mut reckoning, pose, now_us);
         }
         let (seen, truth) = (observer.state().expect("plausible"), truth(end_us));
-        // Rounding of positions up to 30 m is 2e-6 m, of a velocity from them 1e-4 m/s.
+        // Positions up to 30 m are rounded to 2e-6 m, velocities from them to 1e-4 m/s.
         prop_assert!((seen.position_m - truth.position_m).amax() < 1e-3, "{seen:?}, not {truth:?}");
         prop_assert!((seen.velocity_m_s - truth.velocity_m_s).amax() < 5e-3, "{seen:?}, not {truth:?}");
         let turn_rad = (seen.attitude_rad - truth.attitude_rad).map(|angle| angle.sin());
@@ -82,7 +82,7 @@ proptest! {
     }
 }
 
-/// Any number of a link or a sensor that passes the inbox.
+/// Any number that a link or a sensor may send.
 fn number(most: f32) -> impl Strategy<Value = f32> {
     prop_oneof![4 => -1.0..1.0f32, 1 => -most..most, 1 => Just(most), 1 => Just(-most), 1 => Just(f32::NAN)]
 }
@@ -108,7 +108,7 @@ fn any_pose() -> impl Strategy<Value = Pose> {
     )
 }
 
-/// What reaches the flight core in a tick.
+/// Input of the flight core in a tick.
 #[derive(Clone, Debug)]
 enum Event {
     Estimate(State),
@@ -131,7 +131,7 @@ fn event() -> impl Strategy<Value = Event> {
 
 type Memory = FlightCoreMemory<guarded::Memory<4>>;
 
-/// A vehicle that flies on its own estimate, at rest.
+/// Returns a vehicle at rest, flying on its own estimate.
 fn flying() -> (FlightCore<Guarded>, Memory, Inbox, u64) {
     let (vehicle, settings) = (Parameters::PAPER.to_f32(), Profile::Flight.settings());
     let gains = Profile::Flight.gains();
@@ -155,8 +155,7 @@ fn flying() -> (FlightCore<Guarded>, Memory, Inbox, u64) {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(256))]
 
-    /// Whatever comes, in whatever order and of whatever time: the state is plausible and the rotors' speeds are
-    /// finite.
+    /// For any inputs, in any order and with any times, the state is plausible and the rotor speeds are finite.
     #[test]
     fn nothing_that_arrives_makes_the_outcome_infinite(events in prop::collection::vec(event(), 1..60)) {
         let (vehicle, mut memory, mut inbox, mut now_us) = flying();
@@ -164,7 +163,7 @@ proptest! {
             let mut ticks = 1;
             let at = |age_us: u64| now_us.wrapping_sub(age_us);
             match event {
-                // An estimate is always plausible.
+                // An own estimate is always plausible.
                 Event::Estimate(value) => {
                     if value.is_plausible() {
                         inbox.locate(Stamped { value, at_us: now_us + 1_000 });
@@ -189,7 +188,7 @@ proptest! {
     }
 }
 
-/// Without poses the state ages as ever: for 0.1 s the last one counts, and then nothing is told.
+/// Without poses, the last one counts for 0.1 s. Then the state ages as usual.
 #[test]
 fn without_poses_it_is_blind() {
     let (vehicle, mut memory, mut inbox, mut now_us) = flying();

@@ -1,4 +1,5 @@
-//! Pulses of PWM and OneShot125, by what motor controllers accept: 1000 to 2000 us and 125 to 250 us.
+//! Tests of PWM and OneShot125 pulses against the ranges that motor controllers accept: 1000 to 2000 us and 125 to 250
+//! us.
 
 use afbc_flight_core::protocol::{MotorProtocol, MotorSignal};
 use afbc_flight_core::pulse::{PulseFormat, PulseTiming};
@@ -8,7 +9,7 @@ use proptest::prelude::*;
 
 /// Clocks of the chips' timers \[Hz\].
 const CLOCKS: [u32; 4] = [84_000_000, 168_000_000, 200_000_000, 240_000_000];
-/// Format, shortest and longest pulse, and period \[us\].
+/// Format, with shortest pulse, longest pulse and period \[us\].
 const FORMATS: [(PulseFormat, [f64; 3]); 2] =
     [(PulseFormat::PWM400, [1000.0, 2000.0, 2500.0]), (PulseFormat::ONESHOT125, [125.0, 250.0, 2000.0])];
 
@@ -16,19 +17,19 @@ fn timing(timer_hz: u32, format: PulseFormat) -> PulseTiming {
     PulseTiming::new(TimerClock::new(timer_hz).expect("valid"), format)
 }
 
-/// Time of a count \[us\].
+/// Returns the time of one count \[us\].
 fn count_us(timer_hz: u32, timing: &PulseTiming) -> f64 {
     f64::from(timing.divider()) * 1e6 / f64::from(timer_hz)
 }
 
 #[test]
 fn compare_values_by_hand() {
-    // 84 MHz by 4 gives 21 counts per us, of which 2500 us fit 16 bits: 52,500.
+    // 84 MHz divided by 4 gives 21 counts per us: 2500 us are 52,500 counts, which fit 16 bits.
     let pwm = timing(84_000_000, PulseFormat::PWM400);
     assert_eq!((pwm.divider(), pwm.period()), (4, 52_500));
     // 1047.5 is the middle of 48 to 2047.
     let compare = [(0, 21_000), (48, 21_000), (1047, 31_495), (1048, 31_505), (2047, 42_000)];
-    // 168 MHz by 6 gives 28 per us: 56,000 in 2 ms.
+    // 168 MHz divided by 6 gives 28 counts per us: 56,000 in 2 ms.
     let one_shot = timing(168_000_000, PulseFormat::ONESHOT125);
     assert_eq!((one_shot.divider(), one_shot.period()), (6, 56_000));
     for (throttle, counts) in compare {
@@ -50,7 +51,7 @@ fn every_protocol_has_a_word_and_is_its_own() {
 }
 
 proptest! {
-    /// Ends and period are right to half a count, which is at most a 32,000th of the period.
+    /// Shortest pulse, longest pulse and period are right to half a count, which is at most a 32,000th of the period.
     #[test]
     fn ends_are_right(timer_hz in prop_oneof![prop::sample::select(&CLOCKS), 8_000_000u32..=500_000_000]) {
         for (format, [shortest_us, longest_us, period_us]) in FORMATS {
@@ -65,8 +66,8 @@ proptest! {
         }
     }
 
-    /// More throttle is never a shorter pulse, every throttle is in range and ends before the period, and its length is
-    /// on the line between the ends.
+    /// More throttle never gives a shorter pulse. Every pulse is in range, ends before the period, and its length is
+    /// linear in the throttle.
     #[test]
     fn lengths_are_linear(timer_hz in prop::sample::select(&CLOCKS), a in 48u16..=2047, b in 48u16..=2047) {
         for (format, [shortest_us, longest_us, _]) in FORMATS {
@@ -81,7 +82,7 @@ proptest! {
         }
     }
 
-    /// What is no throttle stops the motor.
+    /// An invalid throttle stops the motor.
     #[test]
     fn anything_else_is_a_stop(throttle in prop_oneof![0u16..48, 2048u16..]) {
         for (format, _) in FORMATS {

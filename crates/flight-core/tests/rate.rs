@@ -1,4 +1,4 @@
-//! Limits of the rate, and ticks at wrong times.
+//! Tests of the rate supervision: limits of the rate, and ticks at wrong times.
 
 use afbc_flight_core::rate::{Counter, EARLY_US, LATE_US, RateReport, TICKS_MAX, TICKS_MIN, WINDOW_US};
 use proptest::prelude::*;
@@ -10,7 +10,7 @@ fn after(period_us: f64, seconds: f64) -> RateReport {
     (0..=ticks).map(|tick| *counter.tick((tick as f64 * period_us) as u64)).last().unwrap_or_default()
 }
 
-/// Returns the reports for ticks with these gaps, the first at 0.
+/// Returns the reports of ticks with these gaps, the first tick at 0.
 fn reports(gaps_us: impl IntoIterator<Item = u64>) -> Vec<RateReport> {
     let (mut counter, mut now_us) = (Counter::default(), 0);
     let first = *counter.tick(now_us);
@@ -95,8 +95,8 @@ fn a_clock_that_has_failed_is_never_healthy_again() {
 }
 
 proptest! {
-    /// Healthy is exactly: a full second was counted with 997 to 1003 ticks, and every gap that ended within the last
-    /// second was right.
+    /// The rate is healthy exactly if the last full second had 997 to 1003 ticks, and every gap that ended within the
+    /// last second was right.
     #[test]
     fn health_depends_on_rate_and_gaps(
         stretches in prop::collection::vec(
@@ -110,7 +110,8 @@ proptest! {
         for gap in &gaps {
             times.push(times.last().unwrap_or(&0) + gap);
         }
-        // The rate: whole seconds, each from the first tick that is a second after the start of the last one.
+        // Expected rate: windows of a second, each from the first tick at least a second after the start of the last
+        // window.
         let (mut start, mut rate) = (0, None);
         let mut last_off = None;
         for (index, (&now, report)) in times.iter().zip(&reports).enumerate() {
@@ -130,7 +131,7 @@ proptest! {
         }
     }
 
-    /// One missing or additional tick anywhere in the last second prevents arming, and none before that second does.
+    /// One missing or additional tick within the last second prevents arming; an earlier one does not.
     #[test]
     fn one_wrong_gap_is_enough_to_be_unhealthy(
         at in 0usize..2000,
@@ -144,13 +145,13 @@ proptest! {
         prop_assert!(reports.last().is_some_and(RateReport::healthy));
     }
 
-    /// A tick is alive as long as the clock advances, whatever its rate.
+    /// A tick is alive as long as the clock advances, at any rate.
     #[test]
     fn alive_while_time_moves(gaps in prop::collection::vec(1u64..3_000_000, 1..300)) {
         prop_assert!(reports(gaps).iter().all(|report| report.alive));
     }
 
-    /// No times cause a panic; a clock that stands still or goes back is dead and not healthy.
+    /// No times cause a panic. A clock that stands still or goes back is neither alive nor healthy.
     #[test]
     fn any_times(times in prop::collection::vec(any::<u64>(), 1..200)) {
         let mut counter = Counter::default();

@@ -1,4 +1,4 @@
-//! An armed vehicle that rests on the ground: its motors idle, it counts as on the ground, and the law begins afresh.
+//! An armed vehicle idles on the ground: its motors idle, it counts as on the ground, and the law restarts at take-off.
 
 use afbc::reference::ReferenceModel;
 use afbc::{Adaptive, Controller, Profile, Settings};
@@ -31,7 +31,7 @@ struct Bench {
 }
 
 impl Bench {
-    /// An armed vehicle, in the tick after that of arming.
+    /// Returns an armed vehicle, one tick after arming.
     fn armed(rests: bool) -> Self {
         let limits = ArmingLimits::default();
         let vehicle = FlightCore::new(Parameters::PAPER.to_f32(), limits, controller()).expect("valid");
@@ -67,7 +67,7 @@ impl Bench {
         self.tick(true)
     }
 
-    /// Flies on, every bit as the law alone with this memory.
+    /// Flies on, and compares every bit with the law alone, starting from this memory.
     fn flies_as(&mut self, mut memory: Validated<Adapted>, case: &str) {
         let controller = controller();
         for tick in 0..200 {
@@ -85,7 +85,7 @@ fn target() -> Setpoint {
     Setpoint { position_m: Vector3::new(0.3, -0.2, 0.5), ..Setpoint::default() }
 }
 
-/// The estimate of a vehicle that stands may wander by metres; nothing takes off for that.
+/// The estimate of a standing vehicle may drift by metres without a take-off.
 #[test]
 fn motors_idle_and_it_stays_on_the_ground() {
     let mut bench = Bench::armed(true);
@@ -103,8 +103,8 @@ fn motors_idle_and_it_stays_on_the_ground() {
     assert_eq!((outcome.mode, outcome.ended), (Mode::Disarmed, Some(EndReason::Disarmed)));
 }
 
-/// Without the mark the first step is that of a law that was never stepped, and is told that it stands, bit for bit; so
-/// it is after a rest between two flights.
+/// When the mark is cleared, the law takes its first step like a new law on the ground, bit for bit. It does so, too,
+/// after idling between two flights.
 #[test]
 fn the_law_begins_afresh_when_it_takes_off() {
     for flown in [0, 300] {
@@ -120,7 +120,7 @@ fn the_law_begins_afresh_when_it_takes_off() {
     }
 }
 
-/// A pilot who takes off at rates hands a law over in the air: it begins as one that was never told of the ground.
+/// After a take-off in acro mode, the law starts in the air, like one that was never told to be on the ground.
 #[test]
 fn after_a_take_off_at_rates_the_law_begins_in_the_air() {
     let mut bench = Bench::armed(true);
@@ -136,8 +136,8 @@ fn after_a_take_off_at_rates_the_law_begins_in_the_air() {
     bench.flies_as(Validated::default(), "in the air");
 }
 
-/// A vehicle that counts as airborne, and touches the ground by the guidance's account, idles; its law goes on
-/// afterwards with what it knew.
+/// A vehicle that counts as airborne, but touches the ground according to the guidance, idles its motors. Afterwards
+/// its law continues with its memory.
 #[test]
 fn in_the_air_the_mark_idles_the_motors() {
     let (mut bench, idle) = (Bench::armed(false), controller().mixer().action(&Inputs::default()));
@@ -164,7 +164,7 @@ fn in_the_air_the_mark_idles_the_motors() {
     assert_eq!(refused, Some(Err(Refusal::InFlight)));
 }
 
-/// Supervision goes on: kills, tumbles and outages of the state end the rest.
+/// Supervision continues: kills, tumbles and outages of the state end the idling.
 #[test]
 fn a_resting_vehicle_is_supervised() {
     assert_eq!(Bench::armed(true).ask(Request::Kill).ended, Some(EndReason::Killed));

@@ -1,5 +1,5 @@
-//! Detection of a vehicle that has tipped over, stands or falls, and of a frozen tracker, each with made-up states.
-//! `tests/tests/frozen.rs` has closed loops.
+//! Tests of the detection of tipped-over, standing and falling vehicles and of frozen trackers, each with made-up
+//! states. `tests/tests/frozen.rs` closes the loop.
 
 use afbc_control::{Action, FlightController, Mixer, Trace};
 use afbc_flight_core::landing::LandDetector;
@@ -46,7 +46,7 @@ struct Bench {
     inbox: Inbox,
     now_us: u64,
     thrust_n: f32,
-    /// Position from integrating its velocity.
+    /// Position from integrating the velocity \[m\].
     travelled_m: Vector3<f32>,
 }
 
@@ -66,7 +66,7 @@ impl Bench {
         }
     }
 
-    /// Runs a tick in which this state is measured, with a tracker's noise.
+    /// Runs a tick in which this state is measured with a tracker's noise.
     fn tick(&mut self, state: State) -> TickOutcome {
         let mut value = state;
         self.travelled_m += state.velocity_m_s * 1e-3;
@@ -89,7 +89,7 @@ impl Bench {
         assert!(self.inbox.request(Ticketed { value: request, ticket: 9 }));
     }
 
-    /// Runs `ms` ticks in this state; returns when and why the flight ended, if it did.
+    /// Runs `ms` ticks in this state. Returns when and why the flight ended, if it did.
     fn wait(&mut self, ms: u64, state: State) -> Option<(u64, EndReason)> {
         (1..=ms).find_map(|ms| self.tick(state).ended.map(|end| (ms, end)))
     }
@@ -101,7 +101,7 @@ impl Bench {
         result
     }
 
-    /// A bench with a vehicle in the air.
+    /// Returns a bench with a vehicle in the air.
     fn flying() -> Self {
         let mut bench = Bench::new();
         assert_eq!(bench.wait(1500, State::default()), None);
@@ -119,7 +119,7 @@ fn climbing(m_s: f32) -> State {
     State { velocity_m_s: Vector3::new(0.0, 0.0, m_s), ..State::default() }
 }
 
-/// On its side or back for a second, in any direction.
+/// A vehicle on its side or back for a second is disarmed, in any direction.
 #[test]
 fn a_vehicle_that_lies_is_disarmed() {
     for roll_rad in [1.45, 2.0, 3.1, -1.6, -3.1] {
@@ -134,7 +134,7 @@ fn a_vehicle_that_lies_is_disarmed() {
 fn a_vehicle_that_leans_or_rights_itself_is_not_disarmed() {
     let mut bench = Bench::flying();
     assert_eq!(bench.wait(20_000, rolled(1.2)), None);
-    // On its back for a moment, then recovering for longer than a second.
+    // On its back for a moment, then righting itself for more than a second.
     assert_eq!(bench.wait(300, rolled(3.1)), None);
     for step in 0..1600 {
         assert_eq!(bench.wait(1, rolled(3.1 - step as f32 * 1e-3)), None, "{step} ms");
@@ -155,7 +155,7 @@ fn a_vehicle_that_spins_is_disarmed() {
         let (ms, end) = ended.expect("over and over");
         assert!(end == EndReason::Tumbled && ms < 2_500, "{rate_rad_s} rad/s: {ms} ms");
     }
-    // Rotation about its own z is allowed.
+    // Rotation about its own z axis is allowed.
     let mut bench = Bench::flying();
     let spinning = State { rates_rad_s: Vector3::new(0.0, 0.0, 12.0), ..State::default() };
     assert_eq!(bench.wait(5_000, spinning), None);
@@ -179,7 +179,7 @@ fn nothing_that_moves_or_turns_is_armed() {
     }
 }
 
-/// A delayed Arm arrives after the motors were stopped in the air.
+/// A delayed request to arm arrives after the motors were stopped in the air.
 #[test]
 fn a_late_arm_does_not_start_a_falling_vehicle() {
     let mut bench = Bench::flying();
@@ -190,7 +190,7 @@ fn a_late_arm_does_not_start_a_falling_vehicle() {
         assert_eq!(bench.answer(Request::Arm, falling), Err(Refusal::NotAtRest), "{ms} ms");
         assert_eq!(bench.tick(falling).mode, Mode::Disarmed);
     }
-    // Nor at the moment when it comes to rest.
+    // Arming is refused even at the moment when the vehicle comes to rest.
     assert_eq!(bench.answer(Request::Arm, State::default()), Err(Refusal::NotAtRest));
     assert_eq!(bench.wait(u64::from(REST_US / 1000), State::default()), None);
     assert_eq!(bench.answer(Request::Arm, State::default()), Ok(()));
@@ -206,11 +206,11 @@ fn disarming_is_for_the_ground() {
     bench.wait(5000, State::default());
     assert_eq!(bench.answer(Request::Disarm, State::default()), Ok(()));
 
-    // In the air, also at rest.
+    // In the air, even at rest.
     let mut bench = Bench::flying();
     assert_eq!(bench.answer(Request::Disarm, State::default()), Err(Refusal::InFlight));
     assert_eq!(bench.tick(State::default()).mode, Mode::Flying);
-    // Landed: it descends, stops, and its thrust is low.
+    // Landing: it descends, stops, and its thrust is low.
     assert_eq!(bench.wait(1000, climbing(0.6)), None);
     assert_eq!(bench.wait(1000, climbing(-0.6)), None);
     assert_eq!(bench.answer(Request::Disarm, climbing(-0.6)), Err(Refusal::InFlight));
@@ -221,7 +221,7 @@ fn disarming_is_for_the_ground() {
     assert_eq!(bench.answer(Request::Disarm, State::default()), Ok(()));
 }
 
-/// An exactly repeated state is no measurement, in the air only.
+/// An exactly repeated state is no measurement, but only in the air.
 #[test]
 fn a_repeated_state_is_as_old_as_its_first() {
     let mut bench = Bench::new();
@@ -244,7 +244,7 @@ fn a_repeated_state_is_as_old_as_its_first() {
     }
 }
 
-/// A noisy constant pose with a moving twist, along and about every axis.
+/// A constant pose with noise and a moving twist is distrusted, along and about every axis.
 #[test]
 fn a_constant_pose_with_a_moving_twist_is_distrusted() {
     for axis in 0..5 {
@@ -254,7 +254,7 @@ fn a_constant_pose_with_a_moving_twist_is_distrusted() {
             0..3 => frozen.velocity_m_s[axis] = -1.0,
             _ => frozen.rates_rad_s[axis - 3] = 1.0,
         }
-        // Its speed puts it in the air; detection takes two windows at most.
+        // Its speed makes it count as airborne. The detection takes at most two windows.
         let stands = |bench: &mut Bench| {
             bench.travelled_m = Vector3::zeros();
             bench.tick(frozen)
@@ -266,7 +266,7 @@ fn a_constant_pose_with_a_moving_twist_is_distrusted() {
     }
 }
 
-/// After an outage, a constant pose in the air while the thrust decreases is no landing.
+/// A constant pose in the air with decreasing thrust is no landing.
 #[test]
 fn a_vehicle_that_hangs_without_thrust_has_not_landed() {
     let mut bench = Bench::flying();
@@ -279,8 +279,7 @@ fn a_vehicle_that_hangs_without_thrust_has_not_landed() {
 }
 
 proptest! {
-    /// For any states and requests: no motor turns while disarmed, arming requires rest, and a plain Disarm never ends
-    /// a flight in the air.
+    /// For any states and requests, no motor turns while disarmed, and arming requires rest.
     #[test]
     fn any_flight(
         script in prop::collection::vec((0u8..8, -4.0f32..4.0, -4.0f32..4.0, 0.0f32..10.0, 1u64..600), 1..40),
@@ -318,7 +317,7 @@ proptest! {
     }
 }
 
-/// A position that comes back in the moment of the touch-down sees no descent any more: there was one.
+/// If the position returns at the moment of touchdown, the states show no descent. The descent before counts.
 #[test]
 fn a_descent_without_a_position_counts_when_the_position_comes_back() {
     let (weight_n, gap_us, dt_s) = (10.0, 1000, 1e-3);

@@ -1,4 +1,4 @@
-//! Every transition of the mode, every answer, and every reason against arming.
+//! Tests every transition of the mode, every answer, and every reason against arming.
 
 use afbc_flight_core::supervisor::{
     ArmingInputs, COAST_US, DESCEND_US, GIVE_UP_US, REST_US, RESUME_US, STEADY_US, SupervisorInputs,
@@ -14,7 +14,7 @@ const REQUESTS: [Option<Request>; 5] =
 /// Ages on both sides of each limit.
 const AGES_US: [u32; 8] = [0, COAST_US, COAST_US + 1, DESCEND_US, DESCEND_US + 1, GIVE_UP_US, GIVE_UP_US + 1, u32::MAX];
 
-/// In the air with long fresh states and no request.
+/// In the air, with states fresh for long and no request.
 const CALM: SupervisorInputs = SupervisorInputs {
     request: None,
     kill: false,
@@ -44,7 +44,7 @@ fn all() -> impl Iterator<Item = (Mode, SupervisorInputs)> {
                 (mode, seen)
             })
         })
-        // The attitude is known for as long as the state, or longer.
+        // The attitude is as old as the state, or newer.
         .flat_map(|(mode, seen)| {
             AGES_US
                 .into_iter()
@@ -59,7 +59,7 @@ fn disarmed_at_power_up() {
     assert!(!Mode::default().armed());
 }
 
-/// Transitions in flight by the age of the state alone: a row for each mode, a column for each age of `AGES_US`.
+/// Transitions in flight by the age of the state alone: a row per mode, a column per age of `AGES_US`.
 #[test]
 fn in_flight_the_age_decides() {
     use Mode::{Coasting, Descending, Disarmed, Flying};
@@ -74,7 +74,7 @@ fn in_flight_the_age_decides() {
             for ready in [Ok(()), Err(Refusal::TiltTooLarge)] {
                 let observed = SupervisorInputs { ready, state_age_us, attitude_age_us: state_age_us, ..CALM };
                 assert_eq!(mode.next(&observed), expected, "{mode:?}, {observed:?}");
-                // With an attitude the descent takes as long as it takes.
+                // With a known attitude, the descent may take as long as it needs.
                 let attitude_lost = SupervisorInputs { attitude_age_us: GIVE_UP_US, ..observed };
                 let given_up = state_age_us > GIVE_UP_US && mode.armed();
                 let next = if given_up { Descending } else { expected };
@@ -92,7 +92,7 @@ fn coasting_ends_once_states_have_been_fresh_for_a_while() {
     }
 }
 
-/// Neither states that come for moments nor a vehicle that stands on the ground end a descent.
+/// A descent is not ended by states that return only for moments, nor by a vehicle that stands on the ground.
 #[test]
 fn a_descent_ends_once_states_have_been_fresh_for_a_second_in_the_air() {
     for (steady_us, stands, expected) in [
@@ -107,7 +107,7 @@ fn a_descent_ends_once_states_have_been_fresh_for_a_second_in_the_air() {
     }
 }
 
-/// The diagram once more: what ends a flight, in order of precedence.
+/// Reasons for the end of a flight, in order of precedence.
 #[test]
 fn a_flight_ends_for_the_reason_of_highest_precedence() {
     for (mode, seen) in all() {
@@ -182,15 +182,15 @@ fn readiness_names_the_first_reason_against_it() {
         let (state, setpoint) = (state.as_ref(), setpoint.as_ref());
         let standing = ArmingInputs { state, missing: None, setpoint, healthy, rest_us, inhibited: Reasons::NONE };
         assert_eq!(limits.against(&standing).verdict(), expected, "{standing:?}");
-        // What others have against it comes last.
+        // Reasons from outside the flight core come last.
         let inhibited = ArmingInputs { inhibited: Refusal::OutsideFence.into(), ..standing };
         assert_eq!(limits.against(&inhibited).verdict(), expected.and(Err(Refusal::OutsideFence)));
-        // An estimate of one's own says what it misses.
+        // An own estimate names what it lacks.
         let missing = Some(Refusal::HeadingUnknown);
         let unknown = ArmingInputs { state: None, missing, ..standing };
         assert_eq!(limits.against(&unknown).verdict(), Err(Refusal::HeadingUnknown));
     }
-    // All of them are told, in order.
+    // All reasons are listed in order.
     let (state, setpoint) = (tilted(1.0, 0.0, 0.0), at(9.0, 0.0, 0.0));
     let standing = ArmingInputs {
         state: state.as_ref(),
@@ -272,7 +272,7 @@ fn reasons_are_a_set_in_the_order_of_arming() {
     }
 }
 
-/// Whatever reason is noted speaks against arming, in the order or not.
+/// Any noted reason prevents arming, even if it is not in the order.
 #[test]
 fn any_reason_speaks_against_arming() {
     for reason in Refusal::ALL {

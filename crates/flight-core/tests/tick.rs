@@ -1,4 +1,4 @@
-//! The control tick compared with the law's step, and blind flight with a plant.
+//! Compares the control tick with the law's step, and tests blind flight with a plant.
 
 use afbc::reference::ReferenceModel;
 use afbc::{Adaptive, Controller, Profile, Settings};
@@ -15,7 +15,7 @@ use proptest::prelude::*;
 
 type Adapted = afbc::Cascade<afbc::AdaptiveEstimate>;
 
-/// Without a reference model, errors are distances from the setpoint.
+/// Settings without a reference model, so that errors are distances from the setpoint.
 fn settings() -> Settings {
     Settings { reference: ReferenceModel::DEFAULT, ..Profile::Flight.settings() }
 }
@@ -59,7 +59,7 @@ impl Bench {
         assert!(self.inbox.request(Ticketed { value: request, ticket: 3 }));
     }
 
-    /// A bench that has been flying at `state` towards `setpoint` for a tick.
+    /// Returns a bench that has flown at `state` towards `setpoint` for one tick.
     fn flying(state: State, setpoint: Setpoint) -> Self {
         let mut bench = Bench::new();
         for _ in 0..1001 {
@@ -71,7 +71,7 @@ impl Bench {
         bench
     }
 
-    /// A bench that has been carried by its rotors long enough to be in the air, with a tracker's noise.
+    /// Returns a bench in the air, carried by its rotors for long enough, with a tracker's noise.
     fn airborne(state: State, setpoint: Setpoint) -> Self {
         let mut bench = Bench { noise_m: 1e-6, ..Bench::flying(state, setpoint) };
         for _ in 0..CARRIED_US / 1000 {
@@ -121,7 +121,7 @@ fn disarmed_motors_are_off_and_arming_waits_for_the_rate() {
     assert!(bench.tick(Some(State::default()), Some(near())).motors.0.min() > 0.0);
 }
 
-/// In flight, a tick is the step of a law that began on the ground, bit for bit.
+/// In flight, a tick equals the step of a law that started on the ground, bit for bit.
 #[test]
 fn flying_is_the_laws_step() {
     let mut bench = Bench::flying(State::default(), near());
@@ -164,7 +164,7 @@ fn the_estimates_of_one_flight_are_not_those_of_the_next() {
     assert_eq!(bench.memory.control().expect("flown").estimates, fresh);
 }
 
-/// The tick in which each mode begins; estimates are frozen while the vehicle is blind.
+/// Modes by the age of the state. The law's estimates are frozen while the vehicle is blind.
 #[test]
 fn a_lost_state_leads_to_coasting_descending_and_stopping() {
     let mut bench = Bench::airborne(State::default(), near());
@@ -228,7 +228,7 @@ impl Roll {
 }
 
 /// The state is lost while the vehicle rolls at 1 rad/s. Without control it would reach 0.35 rad after coasting and 2.3
-/// rad when the motors stop, and with the unknown external moment it would be upside down long before.
+/// rad when the motors stop. With the unknown external moment it would be upside down long before.
 #[test]
 fn coasting_stops_the_rotation_and_descending_levels() {
     for outside_n in [0.0, 0.02, -0.02] {
@@ -270,11 +270,11 @@ fn without_a_setpoint_the_vehicle_stays_where_it_is() {
     let outcome = bench.tick(Some(here), None);
     assert!(outcome.health.setpoint_stale);
     assert_eq!((outcome.mode, bench.trace().errors.x.e1), (Mode::Flying, 0.0));
-    // The position is held as it was at that moment.
+    // The position of that moment is held.
     let moved = State { position_m: Vector3::new(1.25, 2.0, 3.0), ..State::default() };
     bench.tick(Some(moved), None);
     assert_eq!(bench.trace().errors.x.e1, -0.25);
-    // A returning setpoint is followed, near enough that no speed limit cuts the error.
+    // A returning setpoint is flown. It is near enough that no speed limit reduces the error.
     bench.tick(Some(moved), Some(near()));
     assert_eq!(bench.trace().errors.x.e1, 0.3 - 1.25);
 }
@@ -289,7 +289,7 @@ fn a_state_that_comes_back_leads_the_descent_for_a_second() {
         let mut state = State { position_m: Vector3::new(1.0, 2.0, 3.0), ..State::default() };
         state.velocity_m_s.z = -SINK_M_S;
         for tick in 1..=1300 {
-            // A gap that coasting would bridge begins the second anew.
+            // A gap that coasting would bridge restarts the second.
             let lost = gap && (500..522).contains(&tick);
             let outcome = bench.tick((!lost).then_some(state), Some(near()));
             let resumed_at = if gap { 1521 } else { 1000 };
@@ -298,7 +298,7 @@ fn a_state_that_comes_back_leads_the_descent_for_a_second() {
             state.position_m.z -= SINK_M_S * 1e-3;
         }
         if !gap {
-            // The commander's setpoint is flown again, and the next descent begins where the vehicle is then.
+            // The commander's setpoint is flown again, and the next descent starts at the vehicle.
             assert!((bench.trace().errors.x.e1 - (near().position_m.x - 1.0)).abs() < 1e-3);
             for _ in 0..300 {
                 bench.tick(None, Some(near()));
@@ -327,7 +327,7 @@ fn a_state_that_comes_back_near_the_ground_leads_the_descent_there() {
         state.position_m.z -= SINK_M_S * 1e-3;
     }
     state.velocity_m_s.z = 0.0;
-    // It stops on the ground. Thrust must be low as well, and both for a second.
+    // It stops on the ground. The thrust must be low as well, both for a second.
     let mut uncarried_ms = 0;
     let ended = (0..3000).find_map(|_| {
         uncarried_ms += u32::from(bench.trace().inputs.thrust_n < 0.6 * WEIGHT_N);
@@ -360,7 +360,7 @@ fn only_a_law_at_the_ticks_rate_flies() {
 }
 
 proptest! {
-    /// With any inputs at any time, motors get valid speeds, zero when disarmed, and nothing panics.
+    /// With any inputs at any time, the motors get valid speeds, zero when disarmed, and nothing panics.
     #[test]
     fn any_inputs(
         script in prop::collection::vec(
@@ -394,8 +394,8 @@ proptest! {
     }
 }
 
-/// What speaks against arming in a tick is what the wish to arm is answered, whether there is one or not; and at rest
-/// is what arming takes for it.
+/// The reasons against arming reported in a tick match the answer to a request to arm, whether there is one or not. "At
+/// rest" is reported as arming requires it.
 #[test]
 fn the_reasons_of_a_tick_are_its_answer() {
     let mut bench = Bench::new();

@@ -1,5 +1,4 @@
-//! The detectors of tumbling, frozen trackers and landing, each by itself: their thresholds, on both sides, and their
-//! times, to the tick.
+//! Tests of the detectors of tumbling, frozen trackers and landing: thresholds on both sides, times to the tick.
 #![allow(clippy::expect_used, reason = "a test that cannot go on should say why")]
 
 use crate::fall_check::{FALL_M_S, FALL_MAX_M_S, FALL_SHARE, FallCheck};
@@ -25,12 +24,12 @@ fn tilted(roll: f32, pitch: f32) -> State {
     State { attitude_rad: Vector3::new(roll, pitch, 1.0), ..State::default() }
 }
 
-/// Rolled so that the cosine of the tilt is this.
+/// Returns a state rolled to a tilt with this cosine.
 fn cosine(cosine: f32) -> State {
     tilted(cosine.acos(), 0.0)
 }
 
-/// Processes this state for so many ticks.
+/// Processes this state for so many ticks. Returns true if the vehicle counts as lost.
 fn last(tumble: &mut Tumble, state: &State, ticks: u32) -> bool {
     for _ in 0..ticks {
         tumble.advance(state, GAP_US);
@@ -38,11 +37,11 @@ fn last(tumble: &mut Tumble, state: &State, ticks: u32) -> bool {
     tumble.is_lost()
 }
 
-/// Ticks until it is lost: the first one begins.
+/// Ticks until a tumbling vehicle is lost: the first one starts the time.
 const LOST: u32 = LOST_US / GAP_US + 2;
 
 proptest! {
-    /// Lost are exactly those that are on their side or back for a second, whatever roll and pitch make of it.
+    /// A vehicle is lost exactly if it lies on its side or back for a second, at any combination of roll and pitch.
     #[test]
     fn the_tilt_decides(roll in -3.1..3.1f32, pitch in -3.1..3.1f32) {
         let upright = roll.cos() * pitch.cos() - TILT_COSINE_MIN;
@@ -52,7 +51,7 @@ proptest! {
         prop_assert_eq!(last(&mut tumble, &tilted(roll, pitch), 1), upright < 0.0);
     }
 
-    /// So are those that spin about body x and y together, at any attitude; the rate about z does not count.
+    /// A vehicle is lost if it spins about body x and y together, at any attitude. The rate about z does not count.
     #[test]
     fn the_spin_decides(rate in 0.0..20.0f32, about in -3.1..3.1f32, z in -50.0..50.0f32, roll in -1.0..1.0f32) {
         prop_assume!((rate - SPIN_RAD_S).abs() > 1e-3);
@@ -69,18 +68,18 @@ fn it_is_recovered_once_it_has_been_upright_long_enough() {
         let mut tumble = Tumble::default();
         last(&mut tumble, &cosine(0.0), 400);
         assert!(!last(&mut tumble, &State::default(), upright), "not while it is upright");
-        // Tips over again: its second is long over, or begins anew.
+        // Tips over again: its second is over, or starts again.
         assert_eq!(last(&mut tumble, &cosine(0.0), 1), !recovered);
         assert_eq!(last(&mut tumble, &cosine(0.0), LOST - 2), !recovered);
         assert!(last(&mut tumble, &cosine(0.0), 1));
     }
 }
 
-/// A vehicle that comes up from its lowest tilt begins anew, as long as it neither spins nor has tipped over again.
+/// A vehicle that comes up from its lowest tilt gets another second, unless it spins or has tipped over again.
 #[test]
 fn coming_up_gives_another_second() {
     let spinning = State { rates_rad_s: Vector3::new(0.0, SPIN_RAD_S + 1.0, 0.0), ..cosine(-0.5) };
-    // The lowest cosine, that which it comes up to, and whether this counts.
+    // Lowest cosine, state that it comes up to, and whether this counts.
     for (lowest, state, counts) in [
         (-1.0, cosine(-0.79), true),
         (-1.0, cosine(-0.81), false),
@@ -89,17 +88,17 @@ fn coming_up_gives_another_second() {
         (-1.0, spinning, false),
     ] {
         let mut tumble = Tumble::default();
-        // On the way down, too.
+        // The way down takes part of the second, too.
         last(&mut tumble, &cosine(0.0), 100);
         last(&mut tumble, &cosine(lowest), LOST - 200);
         last(&mut tumble, &state, 99);
         assert!(!tumble.is_lost());
         assert_eq!(last(&mut tumble, &state, 1), !counts, "from {lowest} to {:?}", state.attitude_rad);
-        // It counts from there on, once.
+        // The new second starts there, and is granted only once.
         assert!(!counts || !last(&mut tumble, &state, LOST - 101), "from {lowest}");
         assert!(last(&mut tumble, &state, 1));
     }
-    // After it was upright for a moment it does not count.
+    // Coming up does not count after a moment upright.
     let mut tumble = Tumble::default();
     last(&mut tumble, &cosine(-1.0), 300);
     last(&mut tumble, &State::default(), 100);
@@ -108,7 +107,7 @@ fn coming_up_gives_another_second() {
     assert!(last(&mut tumble, &cosine(0.0), 1));
 }
 
-/// Ticks without a state count as the last state, and find nothing.
+/// Ticks without a state count as if the last state continued, but do not start a tumble.
 #[test]
 fn a_blind_tumble_goes_on() {
     let mut tumble = Tumble::default();
@@ -119,7 +118,7 @@ fn a_blind_tumble_goes_on() {
     assert!(!tumble.is_lost());
     tumble.advance_blind(GAP_US);
     assert!(tumble.is_lost());
-    // Upright again, and blind for the rest of the time that this takes.
+    // Upright again, and blind for the rest of the recovery time.
     last(&mut tumble, &State::default(), 2);
     (0..UPRIGHT_US / GAP_US).for_each(|_| tumble.advance_blind(GAP_US));
     last(&mut tumble, &State::default(), 1);
@@ -129,7 +128,7 @@ fn a_blind_tumble_goes_on() {
 
 // --- Frozen trackers. ---
 
-/// Somewhere, so that the pose at the beginning of a window is not zero.
+/// A state whose pose is not zero.
 fn somewhere() -> State {
     State {
         position_m: Vector3::new(3.0, -2.0, 1.0),
@@ -139,8 +138,8 @@ fn somewhere() -> State {
     }
 }
 
-/// Sends states for `windows` windows, in which the pose moves by these shares of what the twist says; true if they
-/// contradict.
+/// Sends states for `windows` windows, with the pose moving by the shares `moves` and `turns` of the twist. Returns
+/// true if a contradiction is found.
 fn contradicts(twist: &State, moves: f32, turns: f32, period_us: u32, windows: u32) -> bool {
     let (begin, begin_us) = (somewhere(), 7_000_000_u64);
     let mut witness = FrozenTrackerCheck::new(&begin, begin_us);
@@ -158,7 +157,7 @@ fn contradicts(twist: &State, moves: f32, turns: f32, period_us: u32, windows: u
     })
 }
 
-/// Velocity or rate by which the twist moves this far in a window.
+/// Returns the velocity or rate that moves this far in a window.
 fn per_window(size: f32) -> f32 {
     size / (WINDOW_US as f32 * 1e-6)
 }
@@ -187,7 +186,7 @@ fn a_pose_must_follow_the_twist() {
                 assert!(!turns(0.98 * TURN_RAD, 0.0, 0.0), "axis {axis}, {period_us} us");
                 assert_eq!(turns(1.0, below, 0.0), tilts, "axis {axis}, {period_us} us");
                 assert!(!turns(1.0, above, 0.0), "axis {axis}, {period_us} us");
-                // A rotation about its own z turns roll and pitch into each other.
+                // A yaw rate turns roll and pitch into each other: a large one prevents the comparison.
                 if tilts {
                     assert!(turns(1.0, 0.0, 0.9 * TURN_RAD) && turns(1.0, 0.0, -0.9 * TURN_RAD));
                     assert!(!turns(1.0, 0.0, 1.1 * TURN_RAD) && !turns(1.0, 0.0, -1.1 * TURN_RAD));
@@ -197,7 +196,7 @@ fn a_pose_must_follow_the_twist() {
     }
 }
 
-/// A heading that changes does not make up for roll and pitch that stand.
+/// A changing heading does not hide constant roll and pitch.
 #[test]
 fn only_roll_and_pitch_are_compared() {
     let mut witness = FrozenTrackerCheck::new(&somewhere(), 0);
@@ -209,7 +208,7 @@ fn only_roll_and_pitch_are_compared() {
     assert!(found);
 }
 
-/// After a gap longer than a window nothing is compared with what was before it.
+/// After a gap longer than a window, nothing is compared with the state before it.
 #[test]
 fn a_gap_begins_a_window() {
     let fast = State { velocity_m_s: Vector3::new(2.0, 0.0, 0.0), ..somewhere() };
@@ -219,7 +218,7 @@ fn a_gap_begins_a_window() {
     assert!(!witness.contradicts(&fast, 6 + window_us), "a gap");
     assert!(!witness.contradicts(&fast, 5 + 2 * window_us), "not yet a window since");
     assert!(witness.contradicts(&fast, 6 + 2 * window_us));
-    // What has stood in one window may move in the next.
+    // A pose that was constant in one window may move in the next.
     let mut witness = FrozenTrackerCheck::new(&somewhere(), 0);
     assert!(witness.contradicts(&fast, window_us));
     let moved = State { position_m: somewhere().position_m + Vector3::new(0.5, 0.0, 0.0), ..fast };
@@ -243,7 +242,7 @@ impl Land {
         Land(LandDetector::new(&somewhere(), WEIGHT_N))
     }
 
-    /// A detector of a vehicle that hovers where its climb has taken it.
+    /// Returns the detector of a vehicle that hovers after a climb.
     fn hovering() -> Self {
         let mut land = Land::new();
         land.run(10, &moving(along(2, 1.0)), WEIGHT_N);
@@ -252,7 +251,7 @@ impl Land {
         land
     }
 
-    /// Runs so many ticks; true if the vehicle is in the air then.
+    /// Runs so many ticks. Returns true if the vehicle is in the air afterwards.
     fn run(&mut self, ticks: u32, state: &State, thrust_n: f32) -> bool {
         for _ in 0..ticks {
             self.0.advance(state, thrust_n, GAP_US, DT_S);
@@ -260,7 +259,7 @@ impl Land {
         self.0.airborne()
     }
 
-    /// Returns the number of the tick after which it is on the ground.
+    /// Returns the number of ticks until it is on the ground.
     fn lands(&mut self, state: &State, thrust_n: f32) -> Option<u32> {
         (1..=5000).find(|_| !self.run(1, state, thrust_n))
     }
@@ -272,13 +271,13 @@ fn it_is_in_the_air_once_it_has_been_carried() {
     let mut land = Land::new();
     assert!(!land.run(ticks - 1, &somewhere(), enough_n));
     assert!(land.run(1, &somewhere(), enough_n));
-    // Without interruption.
+    // The time must not be interrupted.
     let mut land = Land::new();
     land.run(ticks - 1, &somewhere(), enough_n);
     land.run(1, &somewhere(), CARRY_SHARE * WEIGHT_N);
     assert!(!land.run(ticks - 1, &somewhere(), enough_n) && land.run(1, &somewhere(), enough_n));
     assert!(!Land::new().run(5000, &somewhere(), CARRY_SHARE * WEIGHT_N), "too little");
-    // Blind ticks count as those before.
+    // Blind ticks continue the times.
     let mut land = Land::new();
     land.run(1, &somewhere(), enough_n);
     (2..ticks).for_each(|_| land.0.advance_blind(GAP_US));
@@ -298,7 +297,7 @@ fn it_is_in_the_air_once_it_has_left() {
     }
 }
 
-/// It has landed after a second at rest without being carried, if it was seen to sink before.
+/// A vehicle has landed after a second at rest without being carried, if it was seen to descend before.
 #[test]
 fn it_has_landed_after_a_second_at_rest() {
     for sinks in [1.01 * SINKS_M_S, 0.99 * SINKS_M_S] {
@@ -307,13 +306,13 @@ fn it_has_landed_after_a_second_at_rest() {
         let landed = land.lands(&somewhere(), 0.1 * WEIGHT_N);
         assert_eq!(landed, (sinks > SINKS_M_S).then_some(STILL_US / GAP_US + 1), "{sinks} m/s");
     }
-    // Neither sideways nor upwards is a descent.
+    // Sideways or upward motion is no descent.
     for up in [along(0, -1.0), along(1, -1.0), along(2, 1.0)] {
         let mut land = Land::hovering();
         land.run(1, &moving(up), WEIGHT_N);
         assert_eq!(land.lands(&somewhere(), 0.1 * WEIGHT_N), None);
     }
-    // A motion along any axis, thrust, or a tick without a state in between begins the second anew.
+    // Motion along any axis, thrust, or a tick without a state restarts the second.
     let disturb: [&dyn Fn(&mut Land); 5] = [
         &|land| assert!(land.run(1, &moving(along(0, 1.01 * STILL_M_S)), 0.0)),
         &|land| assert!(land.run(1, &moving(along(1, -1.01 * STILL_M_S)), 0.0)),
@@ -331,7 +330,7 @@ fn it_has_landed_after_a_second_at_rest() {
     }
 }
 
-/// A vehicle that has not left the place where it stood lands without a descent, and may take off again from there.
+/// A vehicle that has not left its resting place lands without a descent, and may take off from there again.
 #[test]
 fn what_was_carried_only_lands_where_it_stood() {
     let mut land = Land::new();
@@ -344,7 +343,7 @@ fn what_was_carried_only_lands_where_it_stood() {
     assert!(land.run(1, &far, 0.0));
 }
 
-/// The usual thrust is the mean in the air: what carries a heavy vehicle is more.
+/// The usual thrust is the mean in the air, larger for a heavy vehicle.
 #[test]
 fn the_usual_thrust_is_learnt_in_the_air() {
     let mut land = Land::new();
@@ -356,7 +355,7 @@ fn the_usual_thrust_is_learnt_in_the_air() {
     let usual_n = WEIGHT_N * (2.0 - (-seconds / USUAL_S).exp());
     let carries = |thrust_n: f32| {
         let mut land = Land(land.0);
-        // For a moment: it is a mean.
+        // No longer than needed: the usual thrust is a mean, which decays meanwhile.
         land.run(STILL_US / GAP_US - 5, &somewhere(), 0.0);
         let thrust_n = thrust_n * (-(STILL_US as f32) * 1e-6 / USUAL_S).exp();
         land.run(1, &somewhere(), thrust_n);
@@ -365,8 +364,8 @@ fn the_usual_thrust_is_learnt_in_the_air() {
     assert!(carries(1.01 * CARRY_SHARE * usual_n) && !carries(0.99 * CARRY_SHARE * usual_n), "{usual_n} N");
 }
 
-/// At rest in the air without thrust, without a descent before, is what a frozen tracker says; a descent counts until
-/// the vehicle has hovered after it.
+/// A state at rest in the air without thrust, with no descent before, is that of a frozen tracker. A descent counts
+/// until the vehicle has hovered after it.
 #[test]
 fn rest_in_the_air_without_thrust_contradicts() {
     let mut land = Land::hovering();
@@ -380,28 +379,28 @@ fn rest_in_the_air_without_thrust_contradicts() {
         let mut land = Land::hovering();
         land.run(1, &moving(along(2, -1.0)), WEIGHT_N);
         land.run(hovers, &somewhere(), WEIGHT_N);
-        // What follows is carried no more; one tick in motion begins its times.
+        // From now on it is not carried. One tick of motion restarts the times.
         land.run(1, &moving(along(0, 2.0 * STILL_M_S)), 0.1 * WEIGHT_N);
         land.run(FROZEN_US / GAP_US + 1, &somewhere(), 0.1 * WEIGHT_N);
         assert_eq!(land.0.contradicts(), forgotten, "{hovers} ms");
         assert_eq!(land.lands(&somewhere(), 0.1 * WEIGHT_N).is_none(), forgotten, "{hovers} ms");
     }
-    // One that has not left is none.
+    // A vehicle that has not left its resting place does not contradict.
     let mut land = Land::new();
     land.run(CARRIED_US / GAP_US, &somewhere(), WEIGHT_N);
     land.run(FROZEN_US / GAP_US + 100, &somewhere(), 0.0);
     assert!(!land.0.contradicts());
 }
 
-/// Ticks after which a vehicle that stood still, and whose rotors then give this share of the usual thrust, is found
-/// standing, if its vertical velocity is off by `bias_m_s`; it accelerates by `acceleration_m_s2` from then on.
+/// Returns the number of ticks until a vehicle counts as standing. Its rotors give this share of the usual thrust, its
+/// vertical velocity is off by `bias_m_s`, and it accelerates by `acceleration_m_s2`.
 fn held(share: f32, acceleration_m_s2: f32, bias_m_s: f32) -> Option<u32> {
     let mut fall = FallCheck::default();
     assert!(!fall.stands(&along(2, bias_m_s), 1.0, DT_S));
     (1..=900).find(|tick| fall.stands(&along(2, bias_m_s + acceleration_m_s2 * *tick as f32 * DT_S), share, DT_S))
 }
 
-/// What neither its rotors carry nor falls, stands, whatever its velocity is off by.
+/// A vehicle that its rotors do not carry, and that does not fall, stands, even with an error in its velocity.
 #[test]
 fn what_does_not_fall_stands() {
     for (share, bias_m_s) in [(0.0, 0.0), (0.3, 0.0), (0.3, -0.4), (0.3, 0.4), (0.5, -0.4)] {
@@ -409,13 +408,13 @@ fn what_does_not_fall_stands() {
         assert!((ticks - FALL_M_S / (9.81 * (1.0 - share)) / DT_S).abs() < 3.0, "{share}: {ticks} ticks");
     }
     assert_eq!(held(CARRY_SHARE * 1.05, 0.0, 0.0), None, "carried");
-    // It falls, by more or less than the share that counts.
+    // It falls with slightly more or less than the deciding share of a free fall.
     for share in [0.0, 0.3, 0.5] {
         let falls = |of_it: f32| held(share, -of_it * 9.81 * (1.0 - share), 0.5);
         assert_eq!(falls(FALL_SHARE + 0.1), None);
         assert!(falls(FALL_SHARE - 0.1).is_some());
     }
-    // Fast ones may be carried by their drag, or roll.
+    // Fast vehicles may be carried by their drag, or roll on wheels.
     for axis in 0..3 {
         for (size, stands) in [(1.01, false), (0.99, true), (-1.01, false), (-0.99, true)] {
             let (mut fall, velocity_m_s) = (FallCheck::default(), along(axis, size * FALL_MAX_M_S));
@@ -425,7 +424,7 @@ fn what_does_not_fall_stands() {
     }
 }
 
-/// Nor has it landed if its rotors are slow to follow, and its velocity is as old as a state may be.
+/// A falling vehicle does not count as standing, even with slow rotors and the oldest usable velocity.
 #[test]
 fn what_falls_late_does_not_stand() {
     for (lag_s, from_m_s) in [(0.02, -0.3), (0.07, -0.3), (0.1, -0.3), (0.1, -1.0), (0.1, 0.5)] {
@@ -440,7 +439,7 @@ fn what_falls_late_does_not_stand() {
     }
 }
 
-/// A vehicle that has sunk lands when it touches down; one that has not has not.
+/// After a touchdown, a vehicle counts as landed only if it was seen to descend.
 #[test]
 fn a_touch_down_ends_a_descent() {
     for (sinks, airborne) in [(1.01 * SINKS_M_S, false), (0.99 * SINKS_M_S, true)] {
@@ -451,7 +450,7 @@ fn a_touch_down_ends_a_descent() {
     }
 }
 
-/// At rest by the mark it stands where it is, if that is known, as if it had never flown but for its usual thrust.
+/// A vehicle idling on the ground stands at its present place, if known. Everything but the usual thrust is reset.
 #[test]
 fn a_resting_vehicle_stands_where_it_is() {
     let there = State { position_m: somewhere().position_m + along(1, 20.0), ..somewhere() };
@@ -468,12 +467,12 @@ fn a_resting_vehicle_stands_where_it_is() {
         let mut gone = land.0;
         gone.advance(&left, 0.0, GAP_US, DT_S);
         assert!(gone.airborne());
-        // All times begin anew.
+        // All times restart.
         assert!(!land.run(CARRIED_US / GAP_US - 1, &stands, WEIGHT_N) && land.run(1, &stands, WEIGHT_N));
     }
 }
 
-/// Without a velocity the thrust alone decides, and the descent counts for the states that come back.
+/// Without a velocity, the thrust alone decides. The descent also counts for states that return.
 #[test]
 fn a_vehicle_adrift_lands_by_its_thrust() {
     let mut land = Land::hovering();
@@ -486,10 +485,10 @@ fn a_vehicle_adrift_lands_by_its_thrust() {
     assert_eq!(runs(&mut land, 4000, WEIGHT_N), None, "carried");
     let mut back = Land(land.0);
     assert_eq!(runs(&mut land, 4000, 0.1 * WEIGHT_N), Some(STILL_US / GAP_US + 1));
-    // It did not hover meanwhile: the descent counts.
+    // It did not hover meanwhile, so the descent counts.
     assert!(back.run(1, &somewhere(), WEIGHT_N));
     assert_eq!(back.lands(&somewhere(), 0.1 * WEIGHT_N), Some(STILL_US / GAP_US + 1));
-    // On the ground it stays there.
+    // On the ground it stays on the ground.
     let mut land = Land::new();
     land.0.advance_adrift(&moving(Vector3::new(3.0, -4.0, -5.0)), 0.1 * WEIGHT_N, GAP_US, DT_S);
     assert!(!land.0.airborne());

@@ -1,5 +1,5 @@
-//! Inputs of the law in a tick, by a law that notes them: the state and setpoint of every tick, for late, missing and
-//! lost states, and for poses instead of states.
+//! Checks the law's inputs with a law that records them: state and setpoint of every tick, for late, missing and lost
+//! states, and for poses instead of states.
 #![allow(clippy::expect_used, clippy::indexing_slicing, reason = "a test that cannot go on should say why")]
 
 use super::std::vec::Vec;
@@ -18,7 +18,7 @@ use nalgebra::Vector3;
 
 const WEIGHT_N: f32 = 0.486 * 9.81;
 
-/// A law that notes what it is told, and asks for the same inputs always.
+/// A law that records its inputs, and always commands the same.
 struct Notes {
     mixer: Mixer,
     asks: Inputs,
@@ -28,10 +28,10 @@ struct Notes {
 struct Noted {
     received: Option<(State, Setpoint)>,
     steps: u32,
-    /// Steps that were announced to be without a position, and true if the next one is.
+    /// Number of steps announced as without a position, and whether the next one is announced.
     position_lost: u32,
     announced: bool,
-    /// Times that it was told to stand on the ground, before its first step and later.
+    /// Number of times it was told to be on the ground, before its first step and later.
     on_ground: [u32; 2],
 }
 
@@ -80,7 +80,7 @@ fn asks(thrust: f32) -> Inputs {
     Inputs { thrust_n: thrust * WEIGHT_N, roll_n: 0.01, pitch_n: -0.02, yaw_n: 0.0 }
 }
 
-/// The vehicle's motion: constant velocity and rates.
+/// Motion of the vehicle with constant velocity and rates.
 fn at(us: u64) -> State {
     let s = us as f32 * 1e-6;
     State {
@@ -111,22 +111,22 @@ impl Bench {
         self.vehicle.tick(&mut self.memory, self.now_us, &self.inbox.take())
     }
 
-    /// Runs a tick in which the link brings the state of so long ago.
+    /// Runs a tick in which the link delivers the state of `age_us` ago.
     fn linked(&mut self, age_us: u64) -> TickOutcome {
         self.tick(|inbox, now_us| put_linked(inbox, now_us - age_us))
     }
 
-    /// Runs a tick with an estimate of the vehicle's own.
+    /// Runs a tick with the vehicle's own estimate.
     fn own(&mut self) -> TickOutcome {
         self.tick(|inbox, now_us| inbox.locate(Stamped { value: at(now_us), at_us: now_us }))
     }
 
-    /// Runs a tick with an estimate that does not know where it is.
+    /// Runs a tick with an own estimate without a position.
     fn position_lost(&mut self, value: State) -> TickOutcome {
         self.tick(|inbox, at_us| inbox.put_position_lost(Some(Stamped { value, at_us }), Refusal::PositionUnknown))
     }
 
-    /// Runs a tick with the pose of so long ago.
+    /// Runs a tick with the pose of `age_us` ago.
     fn posed(&mut self, age_us: u64) -> TickOutcome {
         self.tick(|inbox, now_us| {
             let at_us = now_us - age_us;
@@ -138,7 +138,7 @@ impl Bench {
         self.tick(|_, _| {})
     }
 
-    /// A bench in the air, flown on states of the link or on an estimate of its own.
+    /// Returns a bench in the air, flying on states from the link or on its own estimate.
     fn flying(asks: Inputs, own: bool) -> Self {
         let mut bench = Bench::new(asks);
         let mut run = |ticks: u32| {
@@ -182,7 +182,8 @@ fn off(seen: &State, expected: &State) -> f32 {
     offs.iter().map(Vector3::amax).fold(0.0, f32::max)
 }
 
-/// A law that begins on the ground is told so, once, and again after a rest there; one that goes on in the air is not.
+/// The law is told once when it starts on the ground, and again after idling there. A law that continues in the air is
+/// not told.
 #[test]
 fn the_law_is_told_where_it_begins() {
     let mut bench = Bench::flying(asks(1.0), true);
@@ -209,15 +210,15 @@ fn the_law_is_told_where_it_begins() {
     assert_eq!((bench.noted().on_ground, bench.noted().steps), ([1, 0], 100));
 }
 
-/// A late state is carried on to the present by its velocity and rates; so a vehicle that moves steadily is told where
-/// it is, however late its states are.
+/// A late state is extrapolated to the present by its velocity and rates. The law thus gets the true state of a
+/// steadily moving vehicle, however late its states are.
 #[test]
 fn late_states_are_carried_on_to_the_present() {
     for late_us in [0, 1000, 7000, 13_500, u64::from(COAST_US)] {
         let mut bench = Bench::flying(asks(1.0), false);
         for tick in 0..50 {
             let outcome = bench.linked(late_us);
-            // From the first one on that is newer than the last before.
+            // Skip states that are older than the last one before this loop: they are ignored.
             if tick > late_us / 1000 {
                 assert_eq!(u64::from(outcome.health.state_age_us), late_us);
                 let (state, setpoint) = bench.received();
@@ -232,8 +233,8 @@ fn late_states_are_carried_on_to_the_present() {
     assert_eq!(bench.received().0, at(bench.now_us), "as it is, to the bit");
 }
 
-/// Between two states roll and pitch are reckoned from the inputs, all else is carried on; when the state is stale the
-/// law is told nothing.
+/// Between two states, roll and pitch are reckoned from the inputs and the rest is extrapolated. The law does not run
+/// on a stale state.
 #[test]
 fn between_states_roll_and_pitch_are_reckoned() {
     for own in [false, true] {
@@ -241,7 +242,8 @@ fn between_states_roll_and_pitch_are_reckoned() {
         let dead_reckoning = DeadReckoning::new(&Parameters::PAPER.to_f32(), &Response::DEFAULT, 1e-3);
         let given = asks(1.0);
         let last = at(bench.now_us);
-        // Inputs constant for long: the rotors give them, and the trim has learnt what the constant rates say.
+        // Inputs constant for long: the rotors have reached them, and the trim has learnt most of what explains the
+        // constant rates.
         let mut reckoning = dead_reckoning.start(&last);
         reckoning.acting_n = nalgebra::Vector2::new(given.roll_n, given.pitch_n);
         let steps = bench.steps();
@@ -257,7 +259,7 @@ fn between_states_roll_and_pitch_are_reckoned() {
                 ..there
             };
             assert!(off(&state, &expected) < 1e-5, "{age_ms} ms: {state:?}, not {expected:?}");
-            // With a trim that is 78 % learnt after 1.5 s.
+            // The trim is 78 % learnt after 1.5 s.
             let learnt = 1.0 - (-1.5_f32).exp();
             let t = age_ms as f32 * 1e-3;
             for (axis, input, authority) in [(0, given.roll_n, 0.25 / 0.0038), (1, given.pitch_n, 0.25 / 0.0038)] {
@@ -279,7 +281,7 @@ fn between_states_roll_and_pitch_are_reckoned() {
     }
 }
 
-/// Only newer states count, of those that are no older than 20 ms on arrival.
+/// A state counts only if it is newer than the last one and no older than 20 ms on arrival.
 #[test]
 fn an_older_state_does_not_replace_a_newer_one() {
     let mut bench = Bench::flying(asks(1.0), false);
@@ -300,7 +302,7 @@ fn an_older_state_does_not_replace_a_newer_one() {
     assert!(late(&mut bench, u64::from(COAST_US)) && !late(&mut bench, u64::from(COAST_US) + 1));
 }
 
-/// Coasting holds the thrust, and descending blind gives less; forces are those of these inputs.
+/// Coasting holds the thrust, a blind descent reduces it, and the forces match these inputs.
 #[test]
 fn blind_inputs_reach_the_motors() {
     let mut bench = Bench::flying(asks(1.1), false);
@@ -315,7 +317,7 @@ fn blind_inputs_reach_the_motors() {
             trims.push(inputs.thrust_n / share);
         }
     }
-    // A mean of 1 s over the 1.5 s of flight, from the weight on.
+    // A mean over 1 s after 1.5 s of flight, starting at the weight.
     let trim_n = WEIGHT_N * (1.1 - 0.1 * (-1.5_f32).exp());
     assert!(trims.iter().all(|thrust_n| (thrust_n - trim_n).abs() < 0.01 * WEIGHT_N), "{trims:?}");
 }
@@ -326,8 +328,8 @@ impl Bench {
     }
 }
 
-/// A vehicle that does not know where it is: the law is told the last place and the fading estimated motion, and a
-/// setpoint that sinks there; height, vertical velocity and attitude as they are.
+/// Without a position, the law sees the last place with a fading estimated motion, and a setpoint that descends there.
+/// Height, vertical velocity and attitude are passed unchanged.
 #[test]
 fn without_a_position_the_law_sees_a_fading_motion_and_the_vehicle_sinks() {
     let mut bench = Bench::flying(asks(1.0), true);
@@ -335,7 +337,7 @@ fn without_a_position_the_law_sees_a_fading_motion_and_the_vehicle_sinks() {
         let seen = *bench.memory.state().expect("seen");
         let began_us = bench.now_us;
         let noted = bench.noted();
-        // While the state is fresh it counts; the estimate's position and velocity are those of nowhere.
+        // The last state with a position counts while fresh. The estimate's horizontal position and velocity are wrong.
         let wrong = |now_us: u64| State {
             position_m: Vector3::new(500.0, -700.0, at(now_us).position_m.z),
             velocity_m_s: Vector3::new(1.0, -2.0, -0.05),
@@ -372,7 +374,7 @@ fn without_a_position_the_law_sees_a_fading_motion_and_the_vehicle_sinks() {
             assert_eq!(bench.noted().position_lost - noted.position_lost, (ms - begin + 1) as u32, "announced");
             let descends = ms * 1000 > u64::from(DESCEND_US);
             assert_eq!(outcome.mode, if descends { Mode::Descending } else { Mode::Coasting });
-            // The second time the vehicle finds itself before it descends.
+            // In the first round, the position returns before the descent begins.
             if flight == 0 && ms == 150 {
                 break;
             }
@@ -384,7 +386,7 @@ fn without_a_position_the_law_sees_a_fading_motion_and_the_vehicle_sinks() {
             assert_eq!((bench.memory.mode(), bench.received().1), (Mode::Flying, target()));
         }
     }
-    // What comes back during the descent is descended on from where the vehicle is.
+    // If the position returns during the descent, the descent continues from the present place.
     let _ = bench.own();
     let here = at(bench.now_us);
     assert_eq!(bench.received().0, here);
@@ -392,8 +394,8 @@ fn without_a_position_the_law_sees_a_fading_motion_and_the_vehicle_sinks() {
     assert!((bench.received().1.position_m - sinks).amax() < 1e-5, "{:?}", bench.received().1);
 }
 
-/// As long as the attitude is known the descent goes on, and with a stale one it ends. The thrust decides the landing,
-/// whatever the estimate says of speed and place.
+/// The descent goes on while the attitude is known, and ends when it is stale. The thrust decides the landing, whatever
+/// speed and place the estimate reports.
 #[test]
 fn a_vehicle_adrift_lands_by_its_thrust_or_gives_up() {
     let fast =
@@ -417,21 +419,21 @@ fn a_vehicle_adrift_lands_by_its_thrust_or_gives_up() {
     );
     ms += bench.now_us / 1000 - 3000;
     assert_eq!(ended, EndReason::Landed);
-    // A second without thrust, at the latest when it descends; the usual thrust is that of the weight.
+    // A second without thrust, at the latest from the start of the descent. The usual thrust is the weight.
     assert!(ms <= u64::from(DESCEND_US + STILL_US) / 1000 + 30 && USUAL_S > 1.0, "{ms} ms");
-    // On its side it is lost.
+    // A vehicle on its side is lost.
     let mut bench = Bench::flying(asks(1.0), true);
     let over = State { attitude_rad: Vector3::new(2.0, 0.0, 0.0), ..State::default() };
     let ended = (0..3000).find_map(|_| bench.position_lost(over).ended);
     assert_eq!(ended, Some(EndReason::Tumbled));
 }
 
-/// Poses count once states are stale, and only then; the motion that is observed begins as the last state said, and a
-/// state of the link replaces it.
+/// Poses are used once states are stale, and only then. The observed motion starts from the last state, and a state
+/// from the link replaces it.
 #[test]
 fn poses_replace_states_that_are_missing_and_give_way_to_them() {
     let mut bench = Bench::flying(Inputs { thrust_n: WEIGHT_N, ..Inputs::default() }, false);
-    // The link's states with poses beside them: the states count.
+    // States from the link arrive along with poses: the states count.
     for ms in 0..200 {
         let outcome = bench.tick(|inbox, now_us| {
             if ms % 10 == 0 {
@@ -448,20 +450,20 @@ fn poses_replace_states_that_are_missing_and_give_way_to_them() {
         assert_eq!(health.observed, stale, "{ms} ms");
         assert_eq!(health.state_age_us, if stale { 0 } else { ((age_ms + ms) * 1000) as u32 });
         if stale {
-            // Until the push of its tilt is known, a tenth of gravity.
+            // Until the disturbance is learnt, the tilt causes an error of a tenth of gravity.
             let state = bench.received().0;
             assert!(off(&state, &at(bench.now_us)) < 0.4, "{ms} ms: {state:?}, not {:?}", at(bench.now_us));
         }
     }
-    // A state of the link, older than what is observed now.
+    // A state from the link, older than the observed one.
     let outcome = bench.linked(3000);
     assert_eq!((outcome.health.observed, outcome.health.state_age_us), (false, 3000));
     assert_eq!(bench.memory.state(), Some(&at(bench.now_us - 3000)));
     assert!(!bench.posed(1000).health.observed, "as long as it is fresh");
 }
 
-/// An estimate of the vehicle's own that fails is replaced at once, since it would have taken the pose; it takes over
-/// again with its next state.
+/// Poses replace a failed own estimate at once, since a working one would have taken them. The estimate's next state
+/// replaces the poses.
 #[test]
 fn poses_replace_an_estimate_at_once() {
     let mut bench = Bench::flying(Inputs { thrust_n: WEIGHT_N, ..Inputs::default() }, true);
@@ -471,7 +473,7 @@ fn poses_replace_an_estimate_at_once() {
         assert!(off(&bench.received().0, &at(bench.now_us)) < 0.4, "{:?}", bench.received().0);
         assert_eq!(outcome.mode, Mode::Flying);
     }
-    // Poses that are too old or unsure are as good as none.
+    // Poses that are too old or too uncertain are not used.
     for ms in 1..=120 {
         let outcome = bench.posed(60_000);
         assert_eq!(outcome.health.observed, ms <= 96, "{ms} ms");
@@ -481,13 +483,13 @@ fn poses_replace_an_estimate_at_once() {
     assert_eq!(bench.memory.state(), Some(&at(bench.now_us)));
     assert!(!bench.nothing().health.observed, "it was replaced");
 
-    // A disarmed vehicle observes nothing.
+    // A disarmed vehicle does not observe.
     assert!(bench.inbox.request(Ticketed { value: Request::Kill, ticket: 0 }));
     let _ = bench.own();
     (0..50).for_each(|_| assert!(!bench.posed(4000).health.observed));
 }
 
-/// The estimate's states are not watched for frozen ones, as those of a link are.
+/// Unlike states from a link, the own estimate's are not checked for repetition.
 #[test]
 fn an_estimate_may_repeat_itself() {
     for own in [false, true] {
@@ -500,13 +502,13 @@ fn an_estimate_may_repeat_itself() {
             });
         }
         let health = bench.nothing().health;
-        // The link's last one is still there to be refused once more.
+        // The link's last state is still there and is refused once more.
         let expected = if own { (0, 1000) } else { (11, 11_000) };
         assert_eq!((health.frozen_states, health.state_age_us), expected, "own: {own}");
     }
 }
 
-/// Disarmed, nothing is traced, nothing is in the air, and the last flight's memory remains; a clock that has failed is
+/// A disarmed vehicle has no trace and is not in the air, but keeps the last flight's memory. A failed clock is
 /// reported.
 #[test]
 fn after_a_flight_its_memory_remains_and_no_trace() {

@@ -1,5 +1,5 @@
-//! Dead reckoning, the observer and the descent without a position, each compared with the differential equations of
-//! its page, solved in closed form or in double precision and by other means.
+//! Compares dead reckoning, observer and descent without a position with the differential equations in their modules'
+//! documentation, solved in closed form or in double precision.
 #![allow(clippy::expect_used, reason = "a test that cannot go on should say why")]
 
 use super::std::vec;
@@ -16,7 +16,7 @@ use proptest::prelude::*;
 
 const DT_S: f32 = 1e-3;
 
-/// A vehicle that responds differently about every axis.
+/// A vehicle that responds differently about each axis.
 fn parameters() -> Parameters<f32> {
     Parameters { inertia_kg_m2: Vector3::new(0.004, 0.007, 0.012), arm_m: 0.2, ..Parameters::PAPER.to_f32() }
 }
@@ -30,7 +30,7 @@ fn weight_n() -> f32 {
     mass_kg * gravity_m_s2
 }
 
-/// l/Ix, l/Iy, (d/b)/Iz \[rad/s2 per N\].
+/// Returns l/Ix, l/Iy, (d/b)/Iz \[rad/s2 per N\].
 fn authority() -> Vector3<f32> {
     let Parameters { inertia_kg_m2: i, arm_m: l, drag_factor_n_m_s2: d, thrust_factor_n_s2: b, .. } = parameters();
     Vector3::new(l / i.x, l / i.y, d / b / i.z)
@@ -91,7 +91,7 @@ proptest! {
         let rate = (asked_n - trim_n) * t - asked_n * (lag * lost);
         let angle = (asked_n - trim_n) * (0.5 * t * t) - asked_n * (lag * t - lag * lag * lost);
         let (rate, angle) = (a.component_mul(&rate), a.component_mul(&angle));
-        // One step of a millisecond is the error of the steps.
+        // Tolerance for the error of 1 ms steps.
         let step = a.component_mul(&(asked_n.abs() + trim_n.abs())).amax() * DT_S + 1e-4;
         let rates = start.rates_rad_s.xy();
         prop_assert!((reckoning.rate_rad_s - rates - rate).amax() < step);
@@ -102,8 +102,8 @@ proptest! {
         prop_assert!((reckoning.acting_n - asked_n * lost).amax() < 0.03);
     }
 
-    /// A measurement is believed, and the trim takes the inputs that explain what the reckoning has missed, of each
-    /// axis for itself, but no jump.
+    /// A measurement replaces the reckoned state. The trim of each axis changes by the inputs that explain the
+    /// difference, but not by a jump.
     #[test]
     fn a_measurement_corrects_the_trim_by_what_was_missed(
         start in any_state(), measured in any_state(), trim_n in pair(0.3), missed in pair(0.3),
@@ -123,7 +123,7 @@ proptest! {
         prop_assert_eq!((reckoning.trim.yaw_n, reckoning.trim.thrust_n), (0.02, weight_n()));
     }
 
-    /// Thrust and yaw of the trim tend to the inputs with a time constant of a second, within limits.
+    /// Thrust and yaw of the trim converge to the inputs with a time constant of 1 s, within limits.
     #[test]
     fn thrust_and_yaw_of_the_trim_are_means(thrust in -1.0..4.0f32, yaw in -0.3..0.3f32, ticks in 1..3000u32) {
         let (dead_reckoning, weight_n) = (dead_reckoning(), weight_n());
@@ -140,8 +140,8 @@ proptest! {
         prop_assert_eq!((reckoning.trim.roll_n, reckoning.trim.pitch_n), (0.0, 0.0));
     }
 
-    /// A vehicle with ideal rotors, flown by these inputs, comes to rest at the held angles, or level, without
-    /// overshoot: critically damped.
+    /// A vehicle with ideal rotors, flown by these inputs, reaches the held angles, or level, with the response of a
+    /// critically damped system.
     #[test]
     fn a_blind_vehicle_is_held_critically_damped(
         start in any_state(), trim_n in pair(0.3), yaw_n in -0.1..0.1f32, held in pair(0.3), descends in any::<bool>(),
@@ -168,7 +168,7 @@ proptest! {
         }
     }
 
-    /// Between two measurements only roll, pitch and their rates are reckoned.
+    /// Between two measurements, only roll, pitch and their rates are reckoned.
     #[test]
     fn between_measurements_roll_and_pitch_are_reckoned(state in any_state(), other in any_state()) {
         let between = dead_reckoning().start(&other).between(&state);
@@ -196,8 +196,8 @@ fn a_descent_sinks_straight_down() {
 }
 
 proptest! {
-    /// The motion that is told begins as estimated and fades with 2 s, and its way with 1 s besides; a change of the
-    /// estimate counts the less, the later it comes; a jump is none. The rest of the state is told as it is.
+    /// The shown velocity starts at the estimate's and fades with 2 s; the shown distance fades with an additional 1 s.
+    /// A later change of the estimate counts less, a jump not at all. The rest of the state is unchanged.
     #[test]
     fn the_motion_of_a_vehicle_adrift_fades(
         state in any_state(), place_m in pair(50.0), change in 0.0..0.19f32, towards in -3.1..3.1f32,
@@ -235,7 +235,7 @@ proptest! {
     }
 }
 
-/// Many small changes count, however far they lead; a jump does so in no direction, and what follows it does again.
+/// Many small changes add up in any direction. A jump does not count, but changes after it do.
 #[test]
 fn a_jump_of_the_estimate_is_no_motion() {
     let reckoned = |steps: &[[f32; 2]]| {
@@ -258,20 +258,19 @@ fn a_jump_of_the_estimate_is_no_motion() {
 
 // --- The observer. ---
 
-/// The vehicle of the observer's page in double precision, with rotation matrices, in steps of a hundredth of the
-/// observer's.
+/// The vehicle in the observer's documentation, in double precision, with rotation matrices, in steps of 10 us.
 struct Truth {
     position_m: Vector3<f64>,
     velocity_m_s: Vector3<f64>,
     attitude: Rotation3<f64>,
     rates_rad_s: Vector3<f64>,
-    /// T_a, and U_a about every axis \[N\].
+    /// Lagged thrust T_a and inputs U_a about every axis \[N\].
     thrust_n: f64,
     acting_n: Vector3<f64>,
 }
 
 impl Truth {
-    /// Flies for a millisecond.
+    /// Flies for 1 ms.
     fn fly(&mut self, applied: &Inputs, trim: &Inputs) {
         let (weight_n, gravity, dt, lag) = (f64::from(weight_n()), f64::from(parameters().gravity_m_s2), 1e-5, 0.02);
         let least = f64::from(TRIM_SHARE.0) * weight_n;
@@ -296,14 +295,14 @@ fn angle_between(state: &State, attitude: &UnitQuaternion<f32>) -> f32 {
     2.0 * turn.imag().norm()
 }
 
-/// Returns a pose where and as the state is.
+/// Returns the pose of a state.
 fn pose_of(state: &State, at_us: u64) -> Stamped<Pose> {
     Stamped { value: Pose::of(state, PoseSigmas::UNKNOWN), at_us }
 }
 
 proptest! {
-    /// Without poses the observer predicts what the vehicle of its page does, whatever the inputs, the trim and the
-    /// attitude. Rotors that need more than the weight to hover count as weaker, by as much as is accepted.
+    /// Without poses, the observer predicts the documented vehicle's motion, for any inputs, trim and attitude. Rotors
+    /// that need more than the weight to hover count as weaker, within the accepted range.
     #[test]
     fn the_prediction_solves_its_equations(
         start in any_state(),
@@ -338,7 +337,7 @@ proptest! {
         }
         let state = observer.state().expect("plausible");
         let attitude = UnitQuaternion::from_rotation_matrix(&truth.attitude.cast::<f32>());
-        // A step of 1 ms where the lag is 20 ms.
+        // The tolerance covers 1 ms steps with a lag of 20 ms.
         let spun = (truth.rates_rad_s.cast::<f32>() - start.rates_rad_s).norm();
         let off = (state.rates_rad_s - truth.rates_rad_s.cast::<f32>()).norm();
         prop_assert!(off < 0.02 + 0.03 * spun, "{state:?}, not {:?}", truth.rates_rad_s);
@@ -350,7 +349,7 @@ proptest! {
         prop_assert!(off_m < 0.01 + 0.005 * sped_m_s, "{state:?}, not {:?}", truth.position_m);
     }
 
-    /// A pose that is where the prediction has been at its own time changes nothing, however late it is.
+    /// A pose equal to the prediction for its own time changes nothing, however late it is.
     #[test]
     fn a_late_pose_is_compared_with_the_prediction_for_its_time(
         start in any_state(), thrust in 0.6..1.5f32, late_ms in 0..=u64::from(LATE_US / 1000), axes in triple(0.05),
@@ -359,7 +358,7 @@ proptest! {
         let trim = hover();
         let applied = Inputs { thrust_n: thrust * weight_n(), roll_n: axes.x, pitch_n: axes.y, yaw_n: axes.z };
         let mut reckoning = Reckoning { trim, acting_n: axes.xy(), ..dead_reckoning.start(&start) };
-        // Rotors that give what is asked already: accelerations are constant but for the rotation.
+        // The rotors have reached their commands: accelerations are constant except for the rotation.
         let mut observer = PoseObserver::new(&start, &applied, 0);
         let mut was = vec![start];
         let now_ms = 60;
@@ -372,15 +371,15 @@ proptest! {
         let then = was.iter().rev().nth(late_ms as usize).expect("recorded");
         observer.correct(&pose_of(then, (now_ms - late_ms) * 1000), now_ms * 1000);
         let after = observer.state().expect("plausible");
-        // What is not predicted: the acceleration turns with the vehicle within the 50 ms.
+        // The tolerance covers the acceleration's rotation with the vehicle within 50 ms, which is neglected.
         prop_assert!((after.position_m - before.position_m).amax() < 2e-3, "{after:?}, not {before:?}");
         prop_assert!((after.velocity_m_s - before.velocity_m_s).amax() < 0.02, "{after:?}, not {before:?}");
         prop_assert!(angle_between(&before, &after.quaternion()) < 2e-3, "{after:?}, not {before:?}");
         prop_assert!((after.rates_rad_s - before.rates_rad_s).amax() < 0.05, "{after:?}, not {before:?}");
     }
 
-    /// What a pose corrects is the share of its difference that the page gives, for any time between two poses, and for
-    /// a late one what the velocity's correction has meant since.
+    /// A pose corrects by the documented shares of the difference, for any time between two poses. A late pose also
+    /// corrects the position by the change of velocity since.
     #[test]
     fn a_pose_corrects_by_the_shares_of_the_fading_memory(
         start in any_state(), off_m in triple(0.015), turn_rad in triple(0.015), flipped in any::<bool>(),
@@ -411,7 +410,7 @@ proptest! {
         prop_assert!((seen.rates_rad_s - rates).amax() < 1e-4 + 2e-3 * rates.amax(), "{seen:?}, not {rates:?}");
         let expected = start.quaternion() * UnitQuaternion::from_scaled_axis(turned);
         prop_assert!(angle_between(&seen, &expected) < 2e-4, "{seen:?}, not {expected:?}");
-        // d shows in the next step, beside what the small tilt does.
+        // d shows in the next step, together with the effect of the small tilt.
         let push = off_m * ((1.0 - 1.0 / (1.0 + POSITION_RAD_S * t)).powi(3) / (t * t));
         observer.advance(&dead_reckoning, &dead_reckoning.start(&start), &hover());
         let tilt = observer.state().expect("plausible").quaternion() * Vector3::z() - Vector3::z();
@@ -421,8 +420,8 @@ proptest! {
     }
 }
 
-/// An outlier along or about any axis counts as much as the largest difference that is none, and the third in a row
-/// is followed; one good pose between them makes the counting begin anew.
+/// An outlier along or about any axis counts as the largest accepted difference. The third in a row is followed. A good
+/// pose in between resets the count.
 #[test]
 fn an_outlier_counts_little_until_it_repeats() {
     let (period_us, hold) = (10_000_u64, State::default());
@@ -450,31 +449,31 @@ fn an_outlier_counts_little_until_it_repeats() {
             let (least_m, least_rad, least_m_s) = moved(&least);
             let close = |a: f32, b: f32| (a - b).abs() < 2e-3 * b.abs() + 1e-5;
             assert!(close(far_m, least_m) && close(far_m_s, least_m_s), "axis {axis}: {one:?}, not {least:?}");
-            // The axis of a large rotation is that of its sine.
+            // A large rotation is compared by its sine.
             assert!(close(far_rad, least_rad), "axis {axis}: {one:?}, not {least:?}");
             let twice = after(&[far; 2]);
             let where_it_is = |seen: &State| seen.position_m.amax().max(seen.attitude_rad.amax());
             assert!(where_it_is(&twice) < 3.0 * most, "axis {axis}: {twice:?}");
             let followed = after(&[far; OUTLIERS_MAX as usize]);
             let (reached, wanted) = (where_it_is(&followed), where_it_is(&far));
-            // A rotation is set to first order.
+            // A large turn is set to first order only: hence the wide tolerance.
             assert!((reached - wanted).abs() < if axis < 3 { 1e-4 } else { 0.3 * wanted }, "axis {axis}: {followed:?}");
             let interrupted = after(&[far, far, hold, far, far]);
             assert!(where_it_is(&interrupted) < 6.0 * most, "axis {axis}: {interrupted:?}");
-            // Then the counting begins anew, from where it is now.
+            // Then the count restarts, from the present place.
             let back = after(&[far, far, far, hold, hold]);
             assert!(where_it_is(&back) > 10.0 * most, "axis {axis}: {back:?}");
         }
     }
 }
 
-/// Whatever pushes the vehicle counts up to a limit, along each axis.
+/// The disturbance is limited along each axis.
 #[test]
 fn the_push_is_limited() {
     let (dead_reckoning, hold) = (dead_reckoning(), State::default());
     let mut observer = PoseObserver::new(&hold, &hover(), 0);
     for index in 1..200u64 {
-        // Always ahead of the vehicle by what is no outlier.
+        // Poses always ahead of the vehicle, but not by an outlier.
         let mut ahead = observer.state().expect("plausible");
         ahead.position_m += Vector3::new(0.04, -0.04, 0.04);
         observer.correct(&pose_of(&ahead, index * 10_000), index * 10_000);

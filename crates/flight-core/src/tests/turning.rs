@@ -1,4 +1,4 @@
-//! Turning at a pilot's rates.
+//! Tests of the rate controller.
 #![allow(clippy::expect_used, reason = "a test that cannot go on should say why")]
 
 use crate::motor::Response;
@@ -8,7 +8,8 @@ use afbc_types::{Inputs, Parameters, State};
 use nalgebra::Vector3;
 use proptest::prelude::*;
 
-/// A rigid body whose rotors lag, under this control; the last state after so many milliseconds.
+/// Simulates a rigid body with lagging rotors under rate control. Returns the state after `ms` milliseconds and the
+/// largest rates.
 fn turn(lag_s: f32, true_lag_s: f32, push_rad_s2: Vector3<f32>, target: &RateTarget, ms: u32) -> (State, Vector3<f32>) {
     let parameters = Parameters::PAPER.to_f32();
     let mixer = Mixer::<4>::new(parameters, 3.0).expect("valid");
@@ -30,8 +31,8 @@ fn turn(lag_s: f32, true_lag_s: f32, push_rad_s2: Vector3<f32>, target: &RateTar
 }
 
 proptest! {
-    /// Rates are reached, about all axes at once, by rotors that are faster or slower than their model, and against
-    /// moments that nobody knows. Yaw has a tenth of the authority.
+    /// Rates are reached about all axes at once, with rotors faster or slower than their model, and against unknown
+    /// moments. Yaw has a tenth of the authority.
     #[test]
     fn rates_are_reached(
         lag_s in 0.005f32..0.1,
@@ -68,7 +69,7 @@ proptest! {
     }
 }
 
-/// What it has learnt does not grow while the rotors are at their limits, nor while the vehicle turns up to the rate.
+/// Nothing is learnt while rotors saturate, or while the vehicle is still accelerating to the rate.
 #[test]
 fn limits_teach_nothing() {
     let parameters = Parameters::PAPER.to_f32();
