@@ -1,11 +1,11 @@
-//! The mixer of an X frame: `cargo run -p afbc-control --example x_frame`.
+//! Allocates inputs with the mixer of an X frame: `cargo run -p afbc-control --example x_frame`.
 #![allow(clippy::unwrap_used, reason = "an example whose parameters are not valid should say so")]
 
 use afbc_control::Mixer;
 use afbc_types::{Airframe, Inputs, Parameters, Rotor};
 
 fn main() {
-    // Front right, front left, rear left, rear right, in arm lengths; adjacent rotors spin in opposite directions.
+    // Front right, front left, rear left, rear right, in arm lengths. Adjacent rotors spin in opposite directions.
     let c = core::f32::consts::FRAC_1_SQRT_2;
     let rotor = |x, y, pushes_left| Rotor { x, y, pushes_left };
     let rotors = [rotor(c, -c, true), rotor(c, c, false), rotor(-c, c, true), rotor(-c, -c, false)];

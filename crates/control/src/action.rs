@@ -9,18 +9,19 @@ use afbc_types::{Inputs, ROTORS_MAX, RotorForces, RotorSpeeds};
 #[must_use = "the motors need its rotor speeds"]
 #[non_exhaustive]
 pub struct Action<const N: usize = 4> {
-    /// Rotor speeds omega_i, always finite and never negative.
+    /// Rotor speeds omega_i, finite and never negative.
     pub speeds: RotorSpeeds<N>,
     /// Rotor forces F_i, within the rotors' limits.
     pub forces: RotorForces<N>,
-    /// U1..U4 of those forces.
+    /// Inputs U1..U4 that these forces give.
     pub given: Inputs,
     /// Faults of the step.
     pub health: Health,
 }
 
 impl<const N: usize> Action<N> {
-    /// An action from a plausible state and setpoint: rotor forces with their speeds and the inputs that they give.
+    /// Makes the action of a step with a plausible state and setpoint, from rotor speeds, forces and the inputs that
+    /// they give.
     #[inline]
     pub fn new(speeds: RotorSpeeds<N>, forces: RotorForces<N>, given: Inputs, saturated: bool) -> Self {
         Action { speeds, forces, given, health: Health { saturated, ..Health::default() } }
@@ -39,15 +40,15 @@ impl<const N: usize> Action<N> {
 #[non_exhaustive]
 pub struct Health {
     /// The measurement was missing or implausible (see [`State::is_plausible`](afbc_types::State::is_plausible)). The
-    /// last plausible one was used instead and no estimate changed; if there was none yet, the rotors stay stopped.
+    /// last plausible state was used instead, and no estimate changed. Without one, the rotors stay stopped.
     pub state_rejected: bool,
-    /// The setpoint was implausible. The last plausible one was used instead; if there was none yet, the position at
-    /// that moment is held.
+    /// The setpoint was implausible. The last plausible one was used instead. Without one, the position at that moment
+    /// is held.
     pub setpoint_rejected: bool,
     /// A rotor force was limited.
     pub saturated: bool,
-    /// Reason why a fallback law flies instead of the controller's own, if one does: at most 50 characters, for a
-    /// station's status text. With `serde` it is written, but not read.
+    /// Reason why a fallback law flies instead of the controller's own, if so: at most 50 characters, for a station's
+    /// status text. `serde` writes this field, but does not read it.
     #[cfg_attr(feature = "serde", serde(skip_deserializing))]
     pub fallback: Option<&'static str>,
 }

@@ -1,4 +1,4 @@
-//! Second-order command filter: a smooth reference with two derivatives from a raw command. Not in the paper.
+//! Second-order command filter: turns a raw command into a smooth reference with two derivatives. Not in the paper.
 //!
 //! (12) needs d phi_d/dt and d theta_d/dt, which the paper does not provide. The filter is critically damped,
 //!
@@ -6,7 +6,7 @@
 //! d^2 x/dt^2 = w^2 (command - x) - 2 w dx/dt
 //! ```
 //!
-//! and is advanced by its exact solution for a command held over the step, so it is stable at any bandwidth.
+//! The filter steps by its exact solution for a command held over the step, so it is stable at any bandwidth.
 
 use crate::math;
 use afbc_types::{OutOfRange, Range};
@@ -22,7 +22,7 @@ pub const RATE_MAX: Range = Range::new("tilt_rate_max_rad_s", 0.1, 1e6);
 pub struct CommandFilter {
     bandwidth: f32,
     dt: f32,
-    /// exp(-w dt)
+    /// Decay per step, exp(-w dt).
     decay: f32,
     rate_max: f32,
 }
@@ -32,15 +32,15 @@ pub struct CommandFilter {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Filtered {
-    /// x \[rad\].
+    /// Filtered angle x \[rad\].
     pub angle: f32,
-    /// dx/dt \[rad/s\].
+    /// Its rate dx/dt \[rad/s\].
     pub rate: f32,
 }
 
 impl CommandFilter {
-    /// Makes a filter of the given bandwidth \[rad/s\], advanced every `dt_s` seconds (valid in
-    /// [`crate::Settings::DT`]).
+    /// Makes a filter of this bandwidth \[rad/s\] with a time step of `dt_s` seconds, which must be within
+    /// [`crate::Settings::DT`].
     ///
     /// # Errors
     /// If the bandwidth is outside [`BANDWIDTH`].
@@ -50,7 +50,7 @@ impl CommandFilter {
         Ok(CommandFilter { bandwidth: bandwidth_rad_s, dt: dt_s, decay, rate_max: f32::INFINITY })
     }
 
-    /// Returns the same filter with a rate of at most `rate_max_rad_s`.
+    /// Returns the filter with the rate limited to `rate_max_rad_s`.
     ///
     /// # Errors
     /// If the rate is outside [`RATE_MAX`].
@@ -59,7 +59,7 @@ impl CommandFilter {
         Ok(CommandFilter { rate_max: rate_max_rad_s, ..self })
     }
 
-    /// Returns d^2 x/dt^2 under `command` \[rad/s2\]; zero in the direction of the rate limit while at it.
+    /// Returns d^2 x/dt^2 under `command` \[rad/s2\]. At the rate limit, an acceleration beyond it is zero.
     #[inline]
     pub fn acceleration(&self, state: &Filtered, command: f32) -> f32 {
         let acceleration = self.bandwidth * (self.bandwidth * (command - state.angle) - 2.0 * state.rate);
@@ -67,7 +67,7 @@ impl CommandFilter {
         if limited { 0.0 } else { acceleration }
     }
 
-    /// Returns the state one step later, with `command` held meanwhile.
+    /// Returns the state one step later, with `command` held during the step.
     #[inline]
     #[must_use]
     pub fn advance(&self, state: &Filtered, command: f32) -> Filtered {
@@ -75,7 +75,7 @@ impl CommandFilter {
         let slope = state.rate + self.bandwidth * offset;
         let angle = math::settled(command + (offset + slope * self.dt) * self.decay);
         let rate = math::settled((state.rate - self.bandwidth * slope * self.dt) * self.decay);
-        // Within one step, a fast filter reaches its command and comes to rest.
+        // A fast filter may reach its command and stop within one step: check the distance as well as the rate.
         let travel = angle - state.angle;
         let fastest = if rate.abs() > self.rate_max { rate } else { travel };
         if rate.abs() <= self.rate_max && travel.abs() <= self.rate_max * self.dt {

@@ -1,4 +1,4 @@
-//! Interface of all controllers: one test harness, tuner and campaign fly any of them.
+//! Interface of all controllers, so that the same test harness, tuner and campaign can fly any of them.
 
 use crate::screen::Validated;
 use crate::{Action, Health, Mixer, Trace};
@@ -6,8 +6,8 @@ use afbc_types::{Setpoint, State};
 
 /// A controller: computes the speeds of `N` rotors from the measured state and the setpoint.
 ///
-/// A controller is validated when it is built and immutable from then on; everything that changes in flight is in its
-/// memory. [`step`](FlightController::step) must be called every [`dt_s`](FlightController::dt_s) seconds.
+/// A controller is validated when it is built, and immutable afterwards. Everything that changes in flight is in its
+/// memory. Call [`step`](FlightController::step) every [`dt_s`](FlightController::dt_s) seconds.
 ///
 /// ```
 /// use afbc_control::{Action, FlightController, Mixer, Validated, Trace};
@@ -43,7 +43,7 @@ use afbc_types::{Setpoint, State};
 /// # Ok::<(), OutOfRange>(())
 /// ```
 pub trait FlightController<const N: usize = 4> {
-    /// State of the controller between steps.
+    /// Memory of the controller between steps.
     type Memory: Copy + Default + core::fmt::Debug + 'static;
 
     /// Returns the time between steps \[s\].
@@ -53,21 +53,21 @@ pub trait FlightController<const N: usize = 4> {
     fn mixer(&self) -> &Mixer<N>;
 
     /// Computes the action of one step from a plausible state and setpoint ([`State::is_plausible`],
-    /// [`Setpoint::is_plausible`]). If the state is not `fresh` but repeated, no estimate, integral or filter of
-    /// measurements is updated. Does not fail or panic; the rotor speeds are finite and within their limits.
+    /// [`Setpoint::is_plausible`]). If the state is repeated instead of `fresh`, no estimate, integral or measurement
+    /// filter is updated. Does not fail or panic. The rotor speeds are finite and within their limits.
     fn decide(&self, memory: &mut Self::Memory, state: &State, setpoint: &Setpoint, fresh: bool) -> Action<N>;
 
-    /// Announces that the vehicle stands on the ground, from where it is to take off. What its feet hold against is not
-    /// to be learnt.
+    /// Announces that the vehicle stands on the ground before a take-off. The law must not learn the moments with which
+    /// the ground holds the feet.
     fn on_ground(&self, _memory: &mut Self::Memory) {}
 
-    /// Announces that the horizontal motion of the next state is not measured: a vehicle that does not know where it is
-    /// reckons it. Nothing may be observed from it.
+    /// Announces that the position is lost: the horizontal motion of the next state is reckoned instead of measured.
+    /// The law must not learn from it.
     fn position_lost(&self, _memory: &mut Self::Memory) {}
 
-    /// Performs one step from a measurement that may be missing, implausible or not finite:
-    /// [`FlightController::decide`] behind a [`Screen`](crate::Screen). [`Action::health`] reports rejected input.
-    // Inlined always: copying the action out of a call costs a tenth of a closed-loop step.
+    /// Runs one step from a measurement that may be missing, implausible or not finite: [`FlightController::decide`]
+    /// behind a [`Screen`](crate::Screen). [`Action::health`] reports rejected inputs.
+    // Always inlined: copying the action out of a call costs a tenth of a closed-loop step.
     #[inline(always)]
     fn step(&self, memory: &mut Validated<Self::Memory>, measured: Option<&State>, setpoint: &Setpoint) -> Action<N> {
         let mut screened = Health::default();
@@ -84,7 +84,7 @@ pub trait FlightController<const N: usize = 4> {
     /// Returns the internal signals of the last step.
     fn trace(memory: &Self::Memory) -> Trace;
 
-    /// Returns control from a fallback law to the controller's own, without a jump of the inputs. True if the fallback
+    /// Returns from a fallback law to the controller's own, without a jump of the inputs. Returns true if the fallback
     /// was active; otherwise nothing changes.
     fn engage(&self, _memory: &mut Self::Memory) -> bool {
         false

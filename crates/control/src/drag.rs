@@ -1,26 +1,26 @@
-//! Drag that the vehicle's file knows of, for laws that make up for it.
+//! Known drag from the vehicle's file, for laws that compensate it.
 //!
 //! ```text
 //! a = -(k_r sqrt(T/T_h) P + k_b |v|) v        P = 1 - z_b z_b'
 //! ```
 //!
-//! with z_b the direction of the thrust: blades drag in the plane of the rotors, and in proportion to their speed;
-//! Faessler, Franchi, Scaramuzza, *Differential flatness of quadrotor dynamics subject to rotor drag for accurate
-//! tracking of high-speed trajectories*, RA-L 3(2), 2018. The body's drag grows with the square of the speed. Of the
-//! wind nothing is known: v is the speed over the ground.
+//! where z_b is the direction of the thrust. Blade drag acts in the rotor plane, in proportion to the blades' speed
+//! (Faessler, Franchi, Scaramuzza, *Differential flatness of quadrotor dynamics subject to rotor drag for accurate
+//! tracking of high-speed trajectories*, RA-L 3(2), 2018). Body drag grows with the square of the speed. The wind is
+//! unknown, so v is the speed over the ground.
 
 use crate::math;
 use afbc_types::parameters;
 use nalgebra::Vector3;
 
-/// Speed below which that of the body is none \[m/s\].
+/// Smallest speed used as a divisor in the derivative of the body drag \[m/s\].
 const SPEED_MIN_M_S: f32 = 0.01;
-/// Smallest thrust that drag turns \[m/s2\], and smallest share of it left beside the drag along it.
+/// Smallest thrust used as a divisor \[m/s2\], and smallest share of it left after the drag along the thrust.
 const THRUST_MIN_M_S2: f32 = 1.0;
 const SHARE_MIN: f32 = 0.3;
 
 parameters! {
-    /// Drag per mass. The default is none.
+    /// Drag per mass. The default is no drag.
     #[derive(Clone, Copy, Debug, PartialEq)]
     #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
     #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -38,14 +38,14 @@ parameters! {
 }
 
 impl KnownDrag {
-    /// None.
+    /// No drag.
     pub const NONE: Self = Self::DEFAULT;
-    /// That of the paper's vehicle with the drag in `vehicles/paper.toml`; a test compares them.
+    /// Drag of the paper's vehicle in `vehicles/paper.toml`, to which a test compares it.
     pub const PAPER: Self =
         KnownDrag { rotor_drag_1_s: 0.394_782_78, body_drag_1_m: 0.012_602_881, rotor_height_m: 0.02 };
 
-    /// Returns the acceleration by drag \[m/s2\] at `velocity_m_s` with the thrust along the unit vector `up`, and
-    /// `share` of the hover thrust.
+    /// Returns the acceleration due to drag \[m/s2\] at `velocity_m_s`, with the thrust along the unit vector `up` and
+    /// at `share` of the hover thrust.
     #[inline]
     pub fn acceleration(&self, velocity_m_s: &Vector3<f32>, up: &Vector3<f32>, share: f32) -> Vector3<f32> {
         let in_plane = velocity_m_s - up * up.dot(velocity_m_s);
@@ -54,19 +54,20 @@ impl KnownDrag {
         in_plane * -rotors - velocity_m_s * body
     }
 
-    /// Returns the moment per mass about the axes of the body \[m2/s2\] by which the drag of the rotors, above the
-    /// centre of mass, turns a vehicle at this velocity in the body's axes.
+    /// Returns the moment per mass about the body axes \[m2/s2\] due to blade drag, which acts above the centre of
+    /// mass. The velocity is in body coordinates.
     #[inline]
     pub fn moment(&self, velocity_body_m_s: &Vector3<f32>, share: f32) -> Vector3<f32> {
         let lever = self.rotor_height_m * self.rotor_drag_1_s * math::sqrt(math::max(share, 0.0));
         Vector3::new(lever * velocity_body_m_s.y, -lever * velocity_body_m_s.x, 0.0)
     }
 
-    /// Returns jerk and snap of the thrust per mass f \[m/s3, m/s4\] that give a vehicle a velocity with these three
-    /// derivatives; the thrust is `thrust_m_s2` along `up`, and `share` of that of hover.
+    /// Returns jerk and snap of the thrust per mass f \[m/s3, m/s4\] that give the velocity these three derivatives.
+    /// The thrust is `thrust_m_s2` along `up`, and `share` of the hover thrust.
     ///
-    /// With u = f/|f| and k = k_r sqrt(T/T_h), f makes up for the blades' drag k P v = k (v - c u), c = u v, and for
-    /// that of the body, b(v), whose derivative along a is b'(a). So u, which turns with f, is in its derivatives:
+    /// Let u = f/|f| and k = k_r sqrt(T/T_h). f must compensate the blade drag k P v = k (v - c u) with c = u v, and
+    /// the body drag b(v), whose derivative along a is b'(a). The direction u turns with f, so its derivatives appear
+    /// in those of f:
     ///
     /// ```text
     /// df/dt    =  q - k (c du/dt + w u) + dk/dt P v                 q = j + k a + b'(a)    w = v du/dt + u a
@@ -75,7 +76,7 @@ impl KnownDrag {
     /// d2u/dt2  =  P (d2f/dt2 - 2 d|f|/dt du/dt) / |f|
     /// ```
     ///
-    /// In the second, what is along u, which turns nothing, and the second derivative of b are left out.
+    /// In the second derivative, the terms along u, which turn nothing, and the second derivative of b are neglected.
     #[inline]
     pub fn followed(
         &self,
@@ -94,12 +95,12 @@ impl KnownDrag {
         let across = |of: Vector3<f32>| of - up * up.dot(&of);
         let c = up.dot(velocity_m_s);
         let force = math::max(thrust_m_s2, THRUST_MIN_M_S2);
-        // c is negative in a descent: the divisor is kept positive.
+        // c is negative in a descent: keep the divisor positive.
         let per_force = 1.0 / math::max(force + rotors * c, force * SHARE_MIN);
-        // The turn depends on dk/dt, and dk/dt on the turn: first without, then with it.
+        // The turn depends on dk/dt, and dk/dt on the turn: compute the turn without, then with dk/dt.
         let turn = across(q) * per_force;
         let w = velocity_m_s.dot(&turn) + up.dot(a);
-        // Blades drag by the root of the thrust, which changes, too.
+        // Blade drag grows with the root of the thrust, which changes as well.
         let thrust_dot = up.dot(&q) - rotors * w;
         let rotors_dot = 0.5 * rotors * thrust_dot / force;
         let in_plane = across(*velocity_m_s);

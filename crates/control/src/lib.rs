@@ -1,19 +1,18 @@
-//! Parts shared by all quadrotor controllers: the interface between controller and harness, flight core or firmware,
-//! and the building blocks of controllers.
+//! Common parts of all quadrotor controllers: the interface to harness, flight core and firmware, and building blocks.
 //!
 //! Frames, units and the meaning of "(n)" are defined in [`afbc_types`].
 //!
 //! * [`FlightController`]: a step from state and setpoint to an [`Action`], and a [`Trace`] of its internal signals.
-//!   Control laws are in the crates `afbc` and `afbc-peers`; a new law needs this crate only.
-//! * [`Validated`]: a controller's memory behind a screen that rejects implausible input.
+//!   Control laws are in the crates `afbc` and `afbc-peers`. A new law needs only this crate.
+//! * [`Validated`]: a controller's memory behind a screen that rejects implausible inputs.
 //! * [`mixer`]: control allocation, from U1..U4 to rotor forces and speeds, and back.
 //! * [`command_filter`]: a smooth reference with two derivatives.
-//! * [`drag`]: what is known of drag, for laws that make up for it.
+//! * [`drag`]: known drag, for laws that compensate it.
 //! * [`smoothing`]: low-pass filters on the inputs.
 //! * [`math`]: all transcendental functions, with bit-identical results on host and target.
 //!
-//! Features `serde` and `defmt`, off by default, are those of [`afbc_types`]; here they also cover actions, health
-//! and traces.
+//! The features `serde` and `defmt`, off by default, are those of [`afbc_types`], and also cover actions, health and
+//! traces.
 #![no_std]
 
 mod action;

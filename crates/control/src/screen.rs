@@ -14,7 +14,7 @@ pub struct Validated<M> {
 }
 
 impl<M> Validated<M> {
-    /// Returns the screen and the memory behind it.
+    /// Returns the screen and the controller's memory.
     #[inline]
     pub(crate) fn parts(&mut self) -> (&mut Screen, &mut M) {
         (&mut self.screen, &mut self.control)
@@ -29,9 +29,9 @@ pub struct Screen {
 }
 
 impl Screen {
-    /// Returns the given state and setpoint where they are plausible, otherwise the last ones that were. Without any
-    /// plausible setpoint so far, the setpoint holds the present position; without any plausible state so far, the
-    /// result is `None`. `health` reports what was rejected.
+    /// Returns state and setpoint if plausible, and otherwise replaces them by the last plausible ones. Without a
+    /// plausible setpoint so far, the setpoint holds the present position. Without a plausible state so far, returns
+    /// `None`. `health` reports rejected inputs.
     #[inline]
     pub fn pass(
         &mut self,
@@ -49,7 +49,7 @@ impl Screen {
             self.setpoint = Some(*setpoint);
         }
         let state = self.state.as_ref()?;
-        // Kept, not made anew in each step: it must not follow a vehicle that drifts away.
+        // Kept over the steps: the hold must not follow a vehicle that drifts away.
         Some((state, self.setpoint.get_or_insert_with(|| Setpoint::hold(state))))
     }
 }

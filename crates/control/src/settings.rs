@@ -1,10 +1,10 @@
-//! Settings of every controller besides vehicle parameters and gains.
+//! Settings of every controller, in addition to vehicle parameters and gains.
 
 use crate::drag::KnownDrag;
 use afbc_types::parameters;
 
 parameters! {
-    /// Settings of every controller besides vehicle parameters and gains.
+    /// Settings of every controller, in addition to vehicle parameters and gains.
     #[derive(Clone, Copy, Debug, PartialEq)]
     #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
     #[cfg_attr(feature = "defmt", derive(defmt::Format))]

@@ -1,18 +1,18 @@
-//! Filters on the inputs: a low-pass against noise of the measurements, and a lead that makes up for the rotors' lag.
-//! Not in the paper.
+//! Filters on the inputs: a low-pass against measurement noise, and a lead that compensates the rotors' lag. Not in the
+//! paper.
 //!
 //! ```text
 //! U = (1 + T s) / (1 + s/w)^2 U_law        without T for U3
 //! ```
 //!
-//! At w = 300 rad/s and steps of 1 ms, white noise changes U from step to step by 6 % of what it does without the
-//! low-pass, for 7 ms of lag beside the rotors' 20 ms. The lead takes T of lag away.
+//! At w = 300 rad/s and steps of 1 ms, the low-pass reduces the step-to-step changes of U by white noise to 6 %. It
+//! adds 7 ms of lag to the rotors' 20 ms. The lead removes a lag of T.
 
 use crate::math;
 use afbc_types::{Declared, Inputs, OutOfRange, parameters};
 
 parameters! {
-    /// Bandwidths w of the filters, 0 for none, and their lead.
+    /// Bandwidths w of the filters, and their lead.
     #[derive(Clone, Copy, Debug, PartialEq)]
     #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
     #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -33,11 +33,11 @@ parameters! {
 }
 
 impl Smoothing {
-    /// Hand-tuned for rotors that lag by 20 ms, from which a search starts.
+    /// Hand-tuned filters for rotors that lag by 20 ms, from which a search starts.
     pub const BY_HAND: Self =
         Smoothing { smooth_tilt_rad_s: 200.0, smooth_yaw_rad_s: 120.0, smooth_lift_rad_s: 120.0, lead_s: 0.02 };
 
-    /// Returns the filters of a vehicle that is `slowness` times slower.
+    /// Returns the filters for a vehicle that is `slowness` times slower.
     #[must_use]
     pub fn slowed(self, slowness: f32) -> Self {
         Smoothing {
@@ -49,16 +49,17 @@ impl Smoothing {
     }
 }
 
-/// The filters. Constant; everything that changes in flight is in [`Smoothed`].
+/// Constants of the filters. The memory is in [`Smoothed`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Smoother {
-    /// Share k of U1 and U2, of U3 and of U4 that is replaced per step; none without any filter.
+    /// Share of the difference that each low-pass makes up per step, for U1 and U2, for U3, and for U4; `None` without
+    /// any filter.
     shares: Option<[f32; 3]>,
-    /// T w of U1 and U2, and of U4; 0 without a filter.
+    /// T w for U1 and U2, and for U4; 0 without a filter.
     leads: [f32; 2],
 }
 
-/// Memory of the filters: the inputs behind the first low-pass, and behind both.
+/// Memory of the filters: the inputs after the first low-pass, and after both.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Smoothed {
     once: Inputs,
@@ -66,10 +67,10 @@ pub struct Smoothed {
 }
 
 impl Smoother {
-    /// Makes the filters, advanced every `dt_s` seconds (valid in [`crate::Settings::DT`]).
+    /// Makes the filters with a time step of `dt_s` seconds, which must be within [`crate::Settings::DT`].
     ///
     /// # Errors
-    /// The first bandwidth out of range.
+    /// The first bandwidth or lead out of range.
     pub fn new(smoothing: &Smoothing, dt_s: f32) -> Result<Self, OutOfRange> {
         smoothing.validate()?;
         let bandwidths = [smoothing.smooth_tilt_rad_s, smoothing.smooth_yaw_rad_s, smoothing.smooth_lift_rad_s];
@@ -80,8 +81,8 @@ impl Smoother {
         })
     }
 
-    /// Returns the filtered inputs; the first, and those that are not finite, are returned as they are.
-    // Always inlined: what is returned in memory is read back before it has been written.
+    /// Returns the filtered inputs. Returns the first inputs, and inputs that are not finite, unchanged.
+    // Always inlined: a result returned in memory would be read back before it has been written.
     #[inline(always)]
     pub fn advance(&self, last: &mut Option<Smoothed>, inputs: &Inputs) -> Inputs {
         let Some([tilt, yaw, lift]) = self.shares else { return *inputs };
@@ -104,7 +105,7 @@ impl Smoother {
         };
         *twice = filtered(twice, &led);
         let given = *twice;
-        // A memory that is not finite would never be finite again.
+        // Clear a memory that is not finite: it would never recover.
         if (given.roll_n + given.pitch_n + given.yaw_n + given.thrust_n).is_finite() {
             return given;
         }

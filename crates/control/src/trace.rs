@@ -11,7 +11,7 @@ use afbc_types::{Inputs, PerAxis};
 pub struct Trace {
     /// Demanded U1..U4, before rotor limits.
     pub inputs: Inputs,
-    /// u5, u6: demanded acceleration along x and y \[m/s2\].
+    /// Virtual controls u5, u6: demanded accelerations along x and y \[m/s2\].
     pub virtual_m_s2: [f32; 2],
     /// Desired roll and pitch \[rad\].
     pub desired_rad: [f32; 2],
@@ -21,15 +21,15 @@ pub struct Trace {
     pub errors: PerAxis<Errors>,
 }
 
-/// Tracking errors of one subsystem, in m or rad, and seconds.
+/// Tracking errors of one subsystem, in m or rad, and their rates per second.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Errors {
-    /// e_1 (9)
+    /// Tracking error e_1 of (9).
     pub e1: f32,
-    /// d e_1/dt = d x_1d/dt - x_2
+    /// Its derivative, d e_1/dt = d x_1d/dt - x_2.
     pub e1_dot: f32,
-    /// e_2 (12); 0 for laws without it.
+    /// Error e_2 of (12); 0 for laws without it.
     pub e2: f32,
 }

@@ -1,4 +1,4 @@
-//! All tests in one program: one each takes longer to build than to run.
+//! One binary for all tests: separate ones would take longer to build than to run.
 #![allow(missing_docs, reason = "a test that cannot go on should say why")]
 
 mod command_filter;

@@ -1,4 +1,4 @@
-//! Properties of the command filter at every bandwidth and step that is accepted.
+//! Properties of the command filter at all accepted bandwidths and time steps.
 #![allow(clippy::unwrap_used, missing_docs)] // a filter that cannot be built must stop the test
 
 use afbc_control::Settings;
@@ -6,10 +6,10 @@ use afbc_control::command_filter::{BANDWIDTH, CommandFilter, Filtered};
 use core::f32::consts::FRAC_PI_2;
 use proptest::prelude::*;
 
-/// Rounding error of one `f32` operation, relative.
+/// Relative rounding error of one `f32` operation.
 const U: f64 = 1.0 / (1 << 24) as f64;
 
-/// Any accepted bandwidth and step, log-uniform, with the bounds drawn often.
+/// Any accepted bandwidth and time step, log-uniform, with the bounds drawn often.
 fn bandwidth_and_step() -> impl Strategy<Value = (f32, f32)> {
     let over = |range: afbc_types::Range| {
         prop_oneof![
@@ -25,11 +25,11 @@ fn filtered() -> impl Strategy<Value = Filtered> {
     (-1.6_f32..1.6, -20.0_f32..20.0).prop_map(|(angle, rate)| Filtered { angle, rate })
 }
 
-/// The exact solution of d^2 x/dt^2 = w^2 (command - x) - 2 w dx/dt after time t, in `f64`.
+/// Returns the exact solution of d^2 x/dt^2 = w^2 (command - x) - 2 w dx/dt after time t, in `f64`.
 fn exact(w: f64, t: f64, state: &Filtered, command: f32) -> [f64; 2] {
     let (c, v) = (f64::from(command), f64::from(state.rate));
     let offset = f64::from(state.angle) - c;
-    // The general solution c + (A + B t) exp(-w t) with its derivative.
+    // The general solution is c + (A + B t) exp(-w t).
     let (a, b) = (offset, v + w * offset);
     let decay = (-w * t).exp();
     [c + (a + b * t) * decay, (b - w * (a + b * t)) * decay]
@@ -43,15 +43,15 @@ proptest! {
         let next = CommandFilter::new(w, dt).unwrap().advance(&state, command);
         let (w, dt) = (f64::from(w), f64::from(dt));
         let [angle, rate] = exact(w, dt, &state, command);
-        // Magnitudes of the summands: |command|, |offset|, w dt |offset|, dt |rate|, with 8 roundings, and the relative
-        // error of the decay: 1.2e-7 + u w dt for its rounded argument.
+        // Sum the magnitudes of the terms |command|, |offset|, w dt |offset| and dt |rate|, with 8 roundings each. The
+        // decay has a relative error of 1.2e-7, plus u w dt for its rounded argument.
         let offset = f64::from(state.angle - command).abs();
         let slope = f64::from(state.rate).abs() + w * offset;
         let decay = (-w * dt).exp();
         let relative = 8.0 * U + 1.2e-7 + U * w * dt;
         let angle_size = f64::from(command.abs()) + (offset + slope * dt) * decay;
         let rate_size = (f64::from(state.rate).abs() + w * slope * dt) * decay;
-        // Rounding of the offset itself: u of both angles, which enters both sums.
+        // The offset itself is rounded: u times both angles, which enters both sums.
         let carried = U * (f64::from(state.angle.abs()) + f64::from(command.abs())) * (1.0 + w * dt) * decay;
         prop_assert!(
             (f64::from(next.angle) - angle).abs() <= relative * angle_size + carried,
@@ -63,7 +63,7 @@ proptest! {
         );
     }
 
-    /// `rate` is the derivative of `angle` and `acceleration` that of `rate`, checked by differences of filter steps.
+    /// `rate` is the derivative of `angle`, and `acceleration` that of `rate`, checked by differences of filter steps.
     #[test]
     fn rate_and_acceleration_are_derivatives(w in 1.0_f32..60.0, state in filtered(), command in -1.6_f32..1.6) {
         let dt = 1e-3_f32;
@@ -93,8 +93,8 @@ proptest! {
         // exp(-25) (1 + 25) is 4e-10 of the initial offset.
         let steps = (25.0 / (f64::from(w) * f64::from(dt))).ceil() as u32 + 1;
         let settled = (0..steps).fold(state, |state, _| filter.advance(&state, command));
-        // The rest is rounding: each step rounds the command's magnitude once, and a slow filter (w dt = 1e-4)
-        // accumulates the rounding errors of one time constant, 1/(w dt) steps.
+        // The remaining error is rounding: each step rounds the command's magnitude once, and a slow filter (w dt =
+        // 1e-4) accumulates the errors of one time constant, 1/(w dt) steps.
         let lasting = 2.0 * U * f64::from(command.abs()) * (1.0 + 2.0 / (f64::from(w) * f64::from(dt)));
         let left = 4e-10 * (20.0 / f64::from(w) + 4.0);
         prop_assert!(
@@ -107,7 +107,7 @@ proptest! {
         );
     }
 
-    /// A critically damped filter that starts at rest never overshoots a command, whatever w dt is.
+    /// A critically damped filter that starts at rest never overshoots, for any w dt.
     #[test]
     fn it_does_not_overshoot((w, dt) in bandwidth_and_step(), from in -1.6_f32..1.6, command in -1.6_f32..1.6) {
         let filter = CommandFilter::new(w, dt).unwrap();
@@ -119,8 +119,8 @@ proptest! {
         }
     }
 
-    /// Commands within +-pi/2, as (40) gives them, keep angle and rate bounded in any order: the filter's impulse
-    /// response w^2 t exp(-w t) is positive with area 1, and the absolute area of its derivative is 2 w / e.
+    /// Commands within +-pi/2, as from (40), keep angle and rate bounded in any order: the filter's impulse response
+    /// w^2 t exp(-w t) is positive with area 1, and the absolute area of its derivative is 2 w / e.
     #[test]
     fn bounded_commands_keep_it_bounded(
         (w, dt) in bandwidth_and_step(),
@@ -140,8 +140,8 @@ proptest! {
         }
     }
 
-    /// A rate limit bounds rate and travel, does not change a slow filter by a bit, and never keeps the filter from
-    /// reaching its command.
+    /// A rate limit bounds the rate and the distance per step, leaves a slower filter unchanged to the bit, and lets
+    /// the filter reach its command.
     #[test]
     fn a_rate_limit_limits(
         (w, dt) in bandwidth_and_step(),
@@ -161,12 +161,13 @@ proptest! {
         if unlimited.rate.abs() <= limit && (unlimited.angle - state.angle).abs() <= limit * dt {
             prop_assert_eq!(next, unlimited);
         } else {
-            // It goes where the free filter would: with its rate, or to where that has come to rest.
+            // It moves in the direction of the unlimited filter: along that filter's rate, or to the place where that
+            // filter stops.
             let onward = if unlimited.rate.abs() > limit { unlimited.rate } else { unlimited.angle - state.angle };
             prop_assert_eq!(next.rate, limit.copysign(onward));
             prop_assert!((f64::from(next.angle) - f64::from(state.angle)) * f64::from(onward) >= 0.0);
         }
-        // At the limit with the command beyond it, the rate is constant.
+        // At the limit, with the command beyond it, the rate is constant.
         let pressed = Filtered { angle: command - limit - 1.0, rate: limit };
         let presses = free.acceleration(&pressed, command) > 0.0;
         prop_assert_eq!(

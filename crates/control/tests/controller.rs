@@ -1,5 +1,5 @@
-//! What every controller gets from the interface: a screen before each step, and answers for a law without a
-//! fallback.
+//! Tests of the interface's defaults for every controller: a screen before each step, and the answers of a law without
+//! a fallback.
 #![allow(clippy::indexing_slicing, clippy::unwrap_used, missing_docs)] // what cannot be built must stop the test
 
 use afbc_control::{Action, FlightController, Health, Mixer, Trace, Validated};
@@ -7,10 +7,10 @@ use afbc_types::{Inputs, PLUS, Parameters, ROTORS_MAX, Setpoint, State};
 use nalgebra::Vector3;
 use proptest::prelude::*;
 
-/// Carries a thrust, and remembers what it was told.
+/// A controller that gives a constant thrust and records its inputs.
 struct Listener(Mixer);
 
-/// What the controller was told in its last step, and how often.
+/// Inputs of the last step, and number of steps.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Seen {
     steps: u32,
@@ -46,7 +46,7 @@ fn listener() -> Listener {
     Listener(Mixer::new(Parameters::PAPER.to_f32(), 3.0).unwrap())
 }
 
-/// A number that is plausible, or one that is not.
+/// A plausible number, or sometimes an implausible one.
 fn number() -> impl Strategy<Value = f32> {
     prop_oneof![12 => -3.0_f32..3.0, 1 => prop::sample::select(vec![f32::NAN, f32::INFINITY, 1e6, -1e6])]
 }
@@ -70,8 +70,8 @@ fn setpoint() -> impl Strategy<Value = Setpoint> {
 }
 
 proptest! {
-    /// The law is told the last plausible state and setpoint, and whether the state is new; before there is a state, it
-    /// is told nothing and the rotors stand still; before there is a setpoint, it holds where it is.
+    /// The law gets the last plausible state and setpoint, and whether the state is new. Without any state, it does not
+    /// run, and the rotors stand still. Without any setpoint, it holds the position.
     #[test]
     fn a_law_sees_what_is_plausible(steps in prop::collection::vec((state(), setpoint()), 1..40)) {
         let (listener, mut memory) = (listener(), Validated::default());
@@ -103,7 +103,7 @@ proptest! {
     }
 }
 
-/// A law without a fallback need not say so.
+/// A law without a fallback need not implement `engage`.
 #[test]
 fn a_plain_law_has_no_fallback() {
     let (listener, mut memory) = (listener(), Validated::default());
@@ -114,7 +114,7 @@ fn a_plain_law_has_no_fallback() {
     assert_eq!(memory, before);
 }
 
-/// Faults come from the rotors that saturate, and from nothing else.
+/// An action reports saturation exactly if rotors saturate, and no other fault.
 #[test]
 fn an_action_says_whether_it_saturates() {
     let mixer = listener().0;
@@ -127,7 +127,7 @@ fn an_action_says_whether_it_saturates() {
     }
 }
 
-/// For logs of any vehicle: its own rotors first, then zeros.
+/// A padded action, for logs of any vehicle, has the vehicle's own rotors first, then zeros.
 #[test]
 fn a_padded_action_is_the_same_for_its_own_rotors() {
     let inputs = Inputs { roll_n: 0.3, pitch_n: -0.2, yaw_n: 0.1, thrust_n: 20.0 };

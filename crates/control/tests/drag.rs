@@ -1,5 +1,5 @@
-//! Known drag: what it adds to the derivatives of the thrust, against finite differences, and its moment, against that
-//! of a force above the centre of mass.
+//! Compares known drag's part of the thrust's derivatives with finite differences, and its moment with that of a force
+//! above the centre of mass.
 
 use afbc_control::drag::KnownDrag;
 use nalgebra::{Unit, Vector3};
@@ -18,7 +18,7 @@ fn drag() -> impl Strategy<Value = KnownDrag> {
 }
 
 proptest! {
-    /// It takes energy, whatever the attitude, and the share of the blades acts in the plane of the rotors.
+    /// Drag removes energy at any attitude, and blade drag acts in the rotor plane.
     #[test]
     fn it_slows_down(drag in drag(), v in vector(8.0), up in vector(1.0), share in 0.0_f32..2.0) {
         prop_assume!(up.norm() > 0.1);
@@ -36,9 +36,9 @@ proptest! {
     }
 }
 
-/// Against finite differences, in double precision, of the thrust that a vehicle needs on 2,000 paths: what drag adds
-/// to jerk and snap of the thrust is there but for a part. What is along the thrust in the second derivative turns
-/// nothing.
+/// Compares jerk and snap of the thrust with finite differences in double precision of the thrust needed on 2,000
+/// paths. They contain nearly all that drag adds. The second derivative is compared without its part along the thrust,
+/// which turns nothing.
 #[test]
 fn jerk_and_snap_are_those_of_the_thrust_on_the_path() {
     let mut seed = 1_u64;
@@ -53,7 +53,7 @@ fn jerk_and_snap_are_those_of_the_thrust_on_the_path() {
         let drag = KnownDrag { rotor_drag_1_s: rotors as f32, body_drag_1_m: body as f32, rotor_height_m: 0.0 };
         let [v, a, jerk, snap] =
             [8.0, 4.0, 6.0, 20.0].map(|size| Vector3::from_fn(|_, _| size * (2.0 * uniform() - 1.0)));
-        // Thrust and drag determine each other.
+        // Thrust and drag determine each other: iterate.
         let thrust = |t: f64| {
             let v = v + a * t + jerk * (t * t / 2.0) + snap * (t * t * t / 6.0);
             let free = a + jerk * t + snap * (t * t / 2.0) + Vector3::z() * GRAVITY + v * (body * v.norm());

@@ -1,23 +1,23 @@
-//! Largest error of every function of `afbc_control::math` over its documented range, against `f64`. The bounds are
-//! the documented figures.
+//! Tests the largest error of every function of `afbc_control::math` over its documented range, against `f64`. The
+//! bounds are the documented figures.
 
 use afbc_control::math;
 use afbc_control::nalgebra::Vector3;
 use core::f32::consts::{FRAC_PI_2, PI};
 use proptest::prelude::*;
 
-/// Every `stride`-th finite `f32` bit pattern of both signs: equally dense at all magnitudes.
+/// Returns every `stride`-th finite `f32` bit pattern of both signs: equally dense at all magnitudes.
 fn bit_sweep(stride: usize) -> impl Iterator<Item = f32> {
     (0..f32::INFINITY.to_bits()).step_by(stride).flat_map(|bits| [f32::from_bits(bits), -f32::from_bits(bits)])
 }
 
-/// Even steps from `from` to `to`, both included.
+/// Returns even steps from `from` to `to`, both included.
 fn even_sweep(from: f32, to: f32, count: u32) -> impl Iterator<Item = f32> {
     (0..=count)
         .map(move |i| (f64::from(from) + (f64::from(to) - f64::from(from)) * f64::from(i) / f64::from(count)) as f32)
 }
 
-/// The largest error and its position.
+/// Returns the largest error and its position.
 fn worst(points: impl Iterator<Item = f32>, error: impl Fn(f32) -> f64) -> (f64, f32) {
     points.fold((0.0, 0.0), |(largest, at), x| {
         let e = error(x);
@@ -30,8 +30,8 @@ fn absolute(ours: fn(f32) -> f32, exact: fn(f64) -> f64) -> impl Fn(f32) -> f64 
     move |x| (f64::from(ours(x)) - exact(f64::from(x))).abs()
 }
 
-/// Asserts that the largest error is at most `bound` and at least half of it, so that the documented figure can
-/// become wrong in neither direction.
+/// Asserts that the largest error is at most `bound` and at least half of it, so that the documented figure is neither
+/// too small nor too large.
 fn assert_figure(name: &str, (error, at): (f64, f32), bound: f64) {
     println!("{name}: {error:.4e} at {at:e}, documented {bound:e}");
     assert!(error <= bound, "{name}: error {error:e} at {at:e} is above the documented {bound:e}");
@@ -98,7 +98,7 @@ fn tan_and_tilt_cosine_are_as_exact_as_documented() {
     assert_figure("tilt_cosine", worst(even_sweep(-FRAC_PI_2, FRAC_PI_2, 1_000_000), alone), 1e-4);
     let both =
         |x: f32| (f64::from(math::tilt_cosine(x, 1.3 * x)) - f64::from(x).cos() * f64::from(1.3 * x).cos()).abs();
-    // Two cosines, each exact to 1.7e-4.
+    // Two cosines, each accurate to 1.7e-4.
     assert!(worst(even_sweep(-700.0, 700.0, 1_000_000), both).0 <= 3.4e-4);
 }
 
@@ -118,7 +118,7 @@ fn atan_is_as_exact_as_documented() {
 
 #[test]
 fn sqrt_is_correctly_rounded() {
-    // The square root of an f32 in f64, rounded to f32, is the correctly rounded one: 53 >= 2 * 24 + 2 bits.
+    // Rounding the f64 square root of an f32 to f32 gives the correctly rounded result: 53 >= 2 * 24 + 2 bits.
     for x in bit_sweep(211).filter(|x| *x >= 0.0) {
         let exact = f64::from(x).sqrt() as f32;
         assert_eq!(math::sqrt(x).to_bits(), exact.to_bits(), "sqrt({x:e})");
@@ -132,7 +132,7 @@ fn sine_and_cosine_are_as_exact_as_documented() {
     assert_figure("cos", worst(points(), absolute(math::cos, f64::cos)), 1.7e-4);
 }
 
-/// The smaller and the larger of two, and of a number and NaN the number, if it comes second.
+/// They return the smaller and the larger number, and the second argument if the first is NaN.
 #[test]
 fn min_and_max_choose_one_of_both() {
     for (a, b) in [(-2.0, 3.0), (3.0, -2.0), (-1.0, -0.5), (0.25, 7.0), (5.0, 5.0), (f32::NEG_INFINITY, 1e-45)] {
@@ -144,10 +144,10 @@ fn min_and_max_choose_one_of_both() {
 }
 
 proptest! {
-    // Points between those of the sweeps.
+    // Random points in addition to those of the sweeps above.
     #![proptest_config(ProptestConfig { cases: 20_000, failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// The largest coordinate of either sign, wherever it is.
+    /// The largest coordinate is found for either sign and any position.
     #[test]
     fn the_largest_coordinate_is_that_of_amax(v in prop::array::uniform3(-1e3_f32..1e3)) {
         let v = Vector3::from(v);
@@ -172,9 +172,8 @@ proptest! {
     fn wrapping_moves_an_angle_by_whole_turns_into_plus_minus_pi(x in -2000.0_f32..2000.0) {
         let wrapped = math::wrap_angle(x);
         prop_assert!(wrapped.abs() <= PI, "{x} wraps to {wrapped}");
-        // The f32 value of a turn is off by 1.75e-7, and at most 318 turns fit into the range; the product is rounded
-        // at
-        // 2000 (6.1e-5), and so is the difference. Near an odd multiple of pi, as much again is clipped.
+        // The f32 value of a turn is off by 1.75e-7, and at most 318 turns fit into the range. The product is rounded
+        // at 2000 (6.1e-5), and so is the difference. Near an odd multiple of pi, as much again is clipped.
         let turns = (f64::from(x) - f64::from(wrapped)) / core::f64::consts::TAU;
         prop_assert!((turns - turns.round()).abs() * core::f64::consts::TAU <= 2.6e-4, "{x} wraps to {wrapped}");
     }

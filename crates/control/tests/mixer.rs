@@ -1,8 +1,8 @@
 //! Properties of the mixer: inversion, limits under any input, and the order of priority.
 //!
 //! Some mutants of `mixer.rs` survive because they change no result: another number for `ASKED_MAX * ASKED_MAX` (a
-//! shortcut past a clamp that does not change anything below `ASKED_MAX`), `least < most` (scales by 1) and `yaw >= 0`
-//! (zero yaw takes no room).
+//! shortcut past a clamp that changes nothing below `ASKED_MAX`), `least < most` (scales by 1) and `yaw >= 0` (zero yaw
+//! takes no room).
 #![allow(clippy::indexing_slicing, clippy::unwrap_used, missing_docs)] // what cannot be built must stop the test
 
 use afbc_control::Settings;
@@ -12,7 +12,7 @@ use core::f32::consts::{FRAC_PI_2, FRAC_PI_4, TAU};
 use nalgebra::{SMatrix, SVector, Vector4};
 use proptest::prelude::*;
 
-/// Rounding error of one `f32` operation, relative.
+/// Relative rounding error of one `f32` operation.
 const U: f32 = 1.0 / (1 << 24) as f32;
 
 fn mixer_of<const N: usize>(rotors: [Rotor; N], force_max_n: f32) -> Mixer<N> {
@@ -32,7 +32,7 @@ fn list(inputs: &Inputs) -> [f32; 4] {
     [inputs.roll_n, inputs.pitch_n, inputs.yaw_n, inputs.thrust_n]
 }
 
-/// `N` rotors on a circle with alternating directions of rotation, the first at `first_rad` from +x.
+/// Returns `N` rotors on a circle with alternating directions of rotation, the first at `first_rad` from +x.
 fn circle<const N: usize>(first_rad: f32) -> [Rotor; N] {
     core::array::from_fn(|i| {
         let angle = first_rad + TAU * i as f32 / N as f32;
@@ -52,7 +52,7 @@ const UNEVEN: [Rotor; 4] = [
     Rotor { x: -0.9, y: 0.6, pushes_left: false },
 ];
 
-/// Two triangles, a quarter turn apart: equal shares of a pure thrust, but no rotor opposite another.
+/// Two triangles, a quarter turn apart: equal shares of a pure thrust, but no two rotors opposite each other.
 const TRIANGLES: [Rotor; 6] = [
     Rotor { x: 1.0, y: 0.0, pushes_left: true },
     Rotor { x: 0.0, y: 1.0, pushes_left: false },
@@ -62,8 +62,8 @@ const TRIANGLES: [Rotor; 6] = [
     Rotor { x: 0.866_025_4, y: -0.5, pushes_left: false },
 ];
 
-/// Properties of every allocation on every frame: forces within limits, nothing missing of an input that was not
-/// demanded, and unallocated = U - B F.
+/// Checks every allocation on every frame: forces are within limits, inputs that were not demanded are not reported as
+/// missing, and unallocated = U - B F.
 fn check<const N: usize>(
     mixer: &Mixer<N>,
     limit: f32,
@@ -74,7 +74,7 @@ fn check<const N: usize>(
     let given = list(&mixer.inputs(&got.forces));
     for ((asked, given), missing) in list(asked).into_iter().zip(given).zip(list(&got.unallocated)) {
         let asked = if asked.is_nan() { 0.0 } else { asked.clamp(-1e9, 1e9) };
-        // Forces are rounded at the scale of the limit, the difference at its own.
+        // Forces have rounding errors in proportion to the limit, the difference in proportion to its own size.
         let allowed = 4e-6 * limit + 4.0 * U * asked.abs();
         prop_assert!((asked - given - missing).abs() <= allowed, "{asked} - {given} is not {missing}");
     }
@@ -96,7 +96,7 @@ fn uneven() -> impl Strategy<Value = [Rotor; 4]> {
     })
 }
 
-/// The largest share, at most 1, for which `fits` holds; it holds for 0.
+/// Returns the largest share up to 1 for which `fits` holds. It holds for 0.
 fn largest(fits: impl Fn(f64) -> bool) -> f64 {
     if fits(1.0) {
         return 1.0;
@@ -109,12 +109,12 @@ fn largest(fits: impl Fn(f64) -> bool) -> f64 {
     low
 }
 
-/// The vehicle of the paper with other rotors.
+/// Returns the paper's vehicle with other rotors.
 fn airframe<const N: usize>(rotors: [Rotor; N]) -> Airframe<N> {
     Airframe { rotors, parameters: Parameters::PAPER.to_f32() }
 }
 
-/// U1..U4 of the paper's frame, (6).
+/// Returns U1..U4 of the paper's frame, (6).
 fn six(forces: &RotorForces) -> Inputs {
     let [f1, f2, f3, f4] = forces.0.into();
     Inputs { roll_n: f3 - f1, pitch_n: f4 - f2, yaw_n: f1 - f2 + f3 - f4, thrust_n: f1 + f2 + f3 + f4 }
@@ -124,9 +124,9 @@ fn anything() -> impl Strategy<Value = Inputs> {
     prop::array::uniform4(prop_oneof![prop::num::f32::ANY, -100.0_f32..100.0]).prop_map(inputs)
 }
 
-/// Checks forces against the order of priority, with expected ones found by bisection in `f64`: as much roll and pitch,
-/// in their proportion, as fits at any thrust, but needs none above the demand and the largest raised thrust; of those
-/// thrusts the closest to the demand; then as much yaw as fits.
+/// Checks forces against the order of priority, with expected ones found by bisection in `f64`. Roll and pitch come
+/// first, in their proportion, as large as fits at any thrust up to the larger of the demand and the raised limit. Then
+/// comes the closest such thrust to the demand, then as much yaw as fits.
 fn serves_in_order<const N: usize>(
     frame: [Rotor; N],
     asked: [f32; 4],
@@ -137,10 +137,11 @@ fn serves_in_order<const N: usize>(
     let effectiveness = SMatrix::<f64, 4, N>::from_columns(&columns.map(Vector4::from));
     let inverse = effectiveness.transpose() * (effectiveness * effectiveness.transpose()).try_inverse().unwrap();
     let share: SVector<f64, N> = inverse.column(3).into();
-    // Frames with a tiny share of a rotor, or with nearly dependent inputs, round more than the tolerance below.
+    // Exclude frames with a tiny share of a rotor or nearly dependent inputs, whose rounding exceeds the tolerance
+    // below.
     prop_assume!(share.min() > 0.05 && inverse.abs().max() < 3.0);
     let (wanted, limit_n) = (Vector4::from(asked.map(f64::from)), f64::from(limit));
-    // Where all four inputs fit, they are given in full, which other tests check; at the boundary either is right.
+    // If all four inputs fit, they are given in full, which other tests check. At the boundary, either result is right.
     let exact = inverse * wanted;
     prop_assume!(exact.min() < -1e-4 || exact.max() > limit_n + 1e-4);
     let tilt = inverse.column(0) * wanted.x + inverse.column(1) * wanted.y;
@@ -164,8 +165,8 @@ fn serves_in_order<const N: usize>(
     let mixer = mixer_of(frame, limit).with_raised_thrust_max_n(raised);
     let got = mixer.allocate(&inputs(asked));
     check(&mixer, limit, &inputs(asked), &got)?;
-    // Forces are rounded at the scale of the largest intermediate value, at most 8 N times four entries of the
-    // inverse; yaw's share by that over the yaw forces.
+    // The forces' rounding errors are in proportion to the largest intermediate value, at most 8 N times four entries
+    // of the inverse. The error of yaw's share is that error divided by the yaw forces.
     for (got, wanted) in got.forces.0.iter().zip(&forces) {
         prop_assert!(
             (f64::from(*got) - wanted).abs() <= 1e-4 * (1.0 + limit_n),
@@ -181,7 +182,7 @@ fn any_frame<const N: usize>(rotors: [Rotor; N], shares: &[f32; 8], asked: &Inpu
     let mixer = mixer_of(rotors, limit);
     check(&mixer, limit, asked, &mixer.allocate(asked))?;
 
-    // The least-norm forces of some inputs, if within limits.
+    // Inputs of some forces within the limits, which are therefore feasible.
     let forces = SVector::<f32, N>::from_iterator(shares.iter().map(|share| limit * share));
     let wanted = mixer.inputs(&RotorForces(forces));
     let got = mixer.allocate(&wanted);
@@ -203,14 +204,14 @@ proptest! {
         let mixer = mixer(31.0);
         let allocation = mixer.allocate(&wanted);
         let total: f32 = forces.iter().sum();
-        // A force is a sum of three terms of at most the total, each rounded twice; so is an input.
+        // A force is a sum of three terms, each at most the total and rounded twice; so is an input.
         for (got, force) in allocation.forces.0.iter().zip(forces) {
             prop_assert!((got - force).abs() <= 6.0 * U * total, "{got} for {force}");
         }
         for (got, wanted) in list(&six(&allocation.forces)).into_iter().zip(list(&wanted)) {
             prop_assert!((got - wanted).abs() <= 24.0 * U * total, "{got} for {wanted}");
         }
-        // A zero force may come out as a tiny negative number and be clipped; no other force may.
+        // A zero force may be computed as a tiny negative number and clipped; no other force may.
         prop_assert!(!allocation.saturated || forces.iter().any(|force| *force <= 6.0 * U * total));
     }
 
@@ -254,7 +255,7 @@ proptest! {
         let mixer = mixer(1e4);
         let forces = RotorForces(Vector4::from(force));
         let speeds = mixer.speeds(&forces);
-        // Forward: 1/b, the product and the root, which halves errors; back: two products.
+        // Forward: 1/b, the product, and the root, which halves errors. Back: two products.
         for (back, force) in mixer.forces(&speeds).0.iter().zip(force) {
             prop_assert!((back - force).abs() <= 6.0 * U * force, "{back} for {force}");
         }
@@ -278,8 +279,8 @@ proptest! {
         }
     }
 
-    /// Four rotors: roll and pitch in full if any forces within limits give them (found by trying all thrusts and
-    /// yaws); then thrust as close as possible; yaw never reversed, and in full if there is room.
+    /// Four rotors: roll and pitch are given in full if any forces within limits allow it. Then thrust is as close as
+    /// possible. Yaw is never reversed, and given in full if there is room.
     #[test]
     fn roll_and_pitch_come_first_then_thrust_then_yaw(
         frame in prop::sample::select(vec![PLUS, cross()]),
@@ -305,7 +306,7 @@ proptest! {
             "{roll}, {pitch} are not {share} of {asked:?}"
         );
 
-        // Unsaturated: given in full, which other tests check.
+        // Unsaturated demands are given in full, which other tests check.
         if !got.saturated {
             return Ok(());
         }
@@ -315,7 +316,7 @@ proptest! {
             yaw * asked[2] >= -1e-5 * limit && yaw.abs() <= asked[2].abs() + 1e-5 * limit,
             "{yaw} for {asked:?}"
         );
-        // As much yaw as keeps the pair of rotors with the widest difference within the limit it is moved towards.
+        // As much yaw as keeps the pair of rotors with the widest difference within the limit it moves towards.
         let pair = |p: &Rotor, q: &Rotor| difference(p, q).abs() * share / 2.0;
         let (up, down) =
             if (asked[2] > 0.0) == a.pushes_left { (pair(&a, &c), pair(&b, &d)) } else { (pair(&b, &d), pair(&a, &c)) };
@@ -323,7 +324,7 @@ proptest! {
         prop_assert!(near(yaw.abs(), asked[2].abs().min(4.0 * room)), "{yaw} with {room} for {asked:?}");
     }
 
-    /// The same order on frames without symmetry, and on one whose rotors have equal shares but no opposite ones.
+    /// The same order on frames without symmetry, and on one with equal shares but no opposite rotors.
     #[test]
     fn uneven_frames_serve_in_the_same_order(
         frame in uneven(),
@@ -337,8 +338,8 @@ proptest! {
         serves_in_order(TRIANGLES, asked, limit, raised)?;
     }
 
-    /// Roll and pitch raise no thrust above the limit and the demand, keep their proportion, and are given as without
-    /// the limit where they need no more.
+    /// Roll and pitch raise the thrust up to the limit or the demand at most, and keep their proportion. They are given
+    /// as without the limit if they need no more thrust.
     #[test]
     fn roll_and_pitch_raise_the_thrust_to_the_limit_at_most(
         frame in prop_oneof![Just(PLUS), Just(cross()), uneven()],
@@ -349,7 +350,7 @@ proptest! {
         let limited = free.with_raised_thrust_max_n(raised);
         let (whole, got) = (free.allocate(&asked), limited.allocate(&asked));
         check(&limited, 3.0, &asked, &got)?;
-        // A NaN is not more.
+        // A NaN demand does not raise the limit.
         let most = raised.max(asked.thrust_n);
         prop_assert!(got.given.thrust_n <= most * (1.0 + 4.0 * U), "{got:?} for {asked:?}, at most {most}");
         if !whole.saturated || whole.given.thrust_n <= most * (1.0 - 4.0 * U) {
@@ -378,7 +379,7 @@ proptest! {
         prop_assert!(all >= second - 1e-4, "{second}, then {all} for infinite roll");
     }
 
-    /// Unallocated input of one axis is not reported for others, whose adaptation must go on.
+    /// Unallocated input of one axis is not reported for other axes, whose adaptation must go on.
     #[test]
     fn rounding_is_not_reported_as_missing(roll in -0.5_f32..0.5, pitch in -0.5_f32..0.5, yaw in 6.0_f32..50.0) {
         let missing = mixer(3.0).allocate(&inputs([roll, pitch, yaw, 4.8])).unallocated;
@@ -387,7 +388,7 @@ proptest! {
     }
 }
 
-/// In this case rounding once left negative room for zero yaw, 0/0, and every rotor stopped.
+/// In this case, rounding once left negative room for zero yaw, which gave 0/0, and every rotor stopped.
 #[test]
 fn zero_yaw_without_room_does_not_stop_the_rotors() {
     let frame = [
@@ -406,7 +407,7 @@ fn nan_becomes_no_force_and_infinity_the_largest() {
     let all = mixer.allocate(&inputs([0.0, 0.0, 0.0, f32::NAN]));
     assert_eq!(all.forces.0, Vector4::zeros());
     assert!(all.saturated);
-    // The other inputs are given.
+    // The other inputs are still given.
     let roll = mixer.allocate(&inputs([f32::NAN, 0.0, 0.0, 8.0]));
     assert_eq!(roll.forces.0, Vector4::repeat(2.0));
     assert!(roll.saturated);
@@ -418,8 +419,8 @@ fn nan_becomes_no_force_and_infinity_the_largest() {
 }
 
 proptest! {
-    /// The largest U1 and the largest U2 at hover are given in full, alone and in both directions, and a little more of
-    /// either saturates in one of them; a vehicle that the rotors do not lift has none.
+    /// The largest U1 or U2 at hover is given in full, alone and in both directions. Slightly more saturates in one of
+    /// them. A vehicle that the rotors cannot lift has no authority.
     #[test]
     fn tilt_authority_is_the_largest_tilt_input_at_hover(
         frame in prop_oneof![Just(PLUS), Just(cross()), uneven()], weight_n in 0.5_f32..30.0,
@@ -440,14 +441,14 @@ proptest! {
                 continue;
             }
             prop_assert_eq!(saturates(0.999), [false; 2], "{} N are not given", most_n);
-            // What saturates without any more has no room.
+            // If hovering saturates with any more input, there is no room.
             let room = hover.forces.0.min().min(3.0 - hover.forces.0.max());
             prop_assert!(room < 1e-3 || most_n > 1e-4, "{most_n} N with {room} N of room");
             prop_assert!(room < 1e-3 || saturates(1.001).contains(&true), "more than {most_n} N is given");
         }
     }
 
-    /// Rotors must give 1.3 times what carries the vehicle; the refusal names the force that would do, rounded up.
+    /// Rotors must give 1.3 times the force that carries the vehicle. The error names the sufficient force, rounded up.
     #[test]
     fn hover_takes_rotors_with_a_margin(
         frame in prop_oneof![Just(PLUS), Just(cross()), uneven()], weight_n in 0.5_f32..30.0, limit in 0.1_f32..12.0,
@@ -456,7 +457,7 @@ proptest! {
         prop_assume!(mixer.is_ok());
         let mixer = mixer.unwrap();
         prop_assert_eq!(mixer.thrust_max_n(), 4.0 * limit);
-        // Each rotor's share of a pure thrust that none limits.
+        // Each rotor's share of a pure thrust without limits.
         let free = Mixer::new(airframe(frame), 1e4).unwrap();
         let share = free.allocate(&inputs([0.0, 0.0, 0.0, 1.0])).forces.0.max();
         let needed_n = HOVER_MARGIN * weight_n * share;
@@ -474,7 +475,7 @@ proptest! {
         }
     }
 
-    /// Of NaN nothing is given, in any input; of what is larger than any rotor gives, the same as of 1e9 N.
+    /// NaN in any input counts as zero. An input larger than any rotor gives counts as 1e9 N.
     #[test]
     fn what_is_too_large_to_matter_is_no_more(asked in prop::array::uniform4(-8.0_f32..8.0), index in 0..4_usize) {
         let mixer = mixer_of(UNEVEN, 3.0);
@@ -494,7 +495,7 @@ proptest! {
         }
     }
 
-    /// omega of (6): the rotors that push to positive yaw less the others.
+    /// omega of (6): speeds of rotors that push to positive yaw minus those of the others.
     #[test]
     fn the_residual_is_that_of_6(speeds in prop::array::uniform4(0.0_f32..1e3)) {
         let [w1, w2, w3, w4] = speeds;
@@ -512,7 +513,7 @@ fn the_largest_raised_thrust_is_a_share_of_the_weight() {
         mixer.allocate(&inputs([3.0, 0.0, 0.0, 1.0])).given.thrust_n
     };
     let settings = Settings { rotor_force_max_n: 10.0, ..Settings::DEFAULT };
-    // Two rotors of 0 and 3 N; the other two carry as much together.
+    // Two rotors give 0 and 3 N; the other two give as much together.
     assert_eq!(thrust_n(settings), 6.0);
     let share = 0.8;
     let limited = thrust_n(Settings { raised_thrust_max: share, ..settings });
@@ -544,7 +545,7 @@ fn a_frame_that_cannot_fly_is_refused_by_name() {
     assert_eq!(refused(PLUS.map(|rotor| Rotor { pushes_left: true, ..rotor })), AUTHORITY);
     assert_eq!(refused(circle::<3>(0.1)), AUTHORITY);
     assert_eq!(refused(PLUS.map(|rotor| Rotor { x: 0.0, y: 0.0, ..rotor })), AUTHORITY);
-    // On one line through the centre, at any angle and size.
+    // All on one line through the centre, at any angle and size.
     for angle in [0.0_f32, 0.3, 0.8, 1.1, FRAC_PI_2, 2.9] {
         for size in [1e-3_f32, 1.0, 7.3] {
             let at = |r: f32, pushes_left| Rotor { x: r * angle.cos(), y: r * angle.sin(), pushes_left };
@@ -554,7 +555,7 @@ fn a_frame_that_cannot_fly_is_refused_by_name() {
             );
         }
     }
-    // The centre of mass lies outside the rotors: one would have to pull down to hover.
+    // The centre of mass is outside the rotors: one would have to pull down to hover.
     assert_eq!(refused(cross().map(|rotor| Rotor { x: rotor.x + 1.2, ..rotor })), THRUST_SHARE);
     // A small frame is accepted.
     assert!(Mixer::new(airframe(PLUS.map(|r| Rotor { x: 0.01 * r.x, y: 0.01 * r.y, ..r })), 3.0).is_ok());

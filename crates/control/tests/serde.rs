@@ -1,4 +1,4 @@
-//! Feature `serde`: values survive a round trip, and their format is what files and other programs rely on.
+//! Tests of feature `serde`: values survive a round trip, and keep the format that files and other programs rely on.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs, reason = "tests")]
 
 use afbc_control::{Action, Errors, Health, Mixer, Settings, Trace};

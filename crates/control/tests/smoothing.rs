@@ -1,4 +1,4 @@
-//! Properties of the low-pass filters on the inputs.
+//! Properties of the filters on the inputs.
 #![allow(clippy::unwrap_used, missing_docs)] // filters that cannot be built must stop the test
 
 use afbc_control::{Settings, Smoother, Smoothing};
@@ -25,8 +25,8 @@ fn inputs() -> impl Strategy<Value = Inputs> {
 }
 
 proptest! {
-    /// The response to a step: with q = exp(-w dt) and k = 1 - q, n steps leave q^n (1 + n k (1 - T w)) of it, and of
-    /// U3, which has no lead, q^n (1 + n k).
+    /// Step response: with q = exp(-w dt) and k = 1 - q, a share of q^n (1 + n k (1 - T w)) is left after n steps. For
+    /// U3, which has no lead, q^n (1 + n k) is left.
     #[test]
     fn the_filters_have_two_poles_and_a_lead(
         w in prop_oneof![1.0_f32..1e4, Just(0.0)], lead_s in prop_oneof![Just(0.0_f32), 0.0_f32..0.1],
@@ -59,7 +59,7 @@ proptest! {
         }
     }
 
-    /// A vehicle that is k times slower has the same filters on a clock that is k times slower.
+    /// The filters of a vehicle that is k times slower act the same on a clock that is k times slower.
     #[test]
     fn slower_filters_are_the_same_on_a_slower_clock(
         tilt in 1.0_f32..500.0, yaw in 1.0_f32..500.0, lift in 1.0_f32..500.0, lead_s in 0.0_f32..0.1,
@@ -77,11 +77,11 @@ proptest! {
                 prop_assert!((a - b).abs() <= allowed, "{a} became {b}");
             }
         }
-        // A tuned number of each kind, and no filter stays none.
+        // Without filters, slowing changes nothing.
         prop_assert_eq!(Smoothing::DEFAULT.slowed(slowness), Smoothing::DEFAULT);
     }
 
-    /// White noise of the inputs changes them from step to step as the impulse response k^2 (n + 1) q^n does.
+    /// White noise of the inputs is reduced from step to step as by the impulse response k^2 (n + 1) q^n.
     #[test]
     fn noise_becomes_as_much_less_as_the_filter_says(w in prop_oneof![Just(300.0_f32), 100.0_f32..500.0], seed: u64) {
         let smoother = Smoother::new(&smoothing(w, 0.0), 0.001).unwrap();
@@ -92,7 +92,7 @@ proptest! {
             random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
             let inputs = Inputs { pitch_n: (random >> 40) as f32 / (1 << 24) as f32 - 0.5, ..Inputs::default() };
             let now = [inputs, smoother.advance(&mut last, &inputs)];
-            // What the first input leaves has gone by then.
+            // By then, the first input's effect has decayed.
             let counts = if step > 1000 { 1.0 } else { 0.0 };
             raw += counts * f64::from(now[0].pitch_n - before[0].pitch_n).powi(2);
             filtered += counts * f64::from(now[1].pitch_n - before[1].pitch_n).powi(2);
@@ -106,7 +106,7 @@ proptest! {
         prop_assert!((w - 300.0).abs() > 1.0 || (0.055..0.06).contains(&wanted), "{wanted}");
     }
 
-    /// Twice the inputs are twice the filtered inputs, however large; and one input has no effect on another.
+    /// Twice the inputs give twice the filtered inputs, at any size, and no input affects another.
     #[test]
     fn the_filters_are_linear_and_apart(
         w in 1.0_f32..500.0, lead_s in 0.0_f32..0.02, inputs in prop::collection::vec(inputs(), 2..20),
@@ -128,7 +128,7 @@ proptest! {
         }
     }
 
-    /// An input that is not finite passes, and leaves nothing behind.
+    /// An input that is not finite passes, and leaves no trace in the memory.
     #[test]
     fn nothing_stays_of_an_input_that_is_not_finite(
         w in 1.0_f32..1e4, before in inputs(), after in inputs(), which in 0..3,
@@ -142,7 +142,7 @@ proptest! {
     }
 }
 
-/// Without bandwidths the inputs pass to the bit, and a bandwidth out of range is refused by its name.
+/// Without bandwidths, the inputs pass unchanged. A bandwidth out of range is refused by its name.
 #[test]
 fn no_filter_is_no_filter() {
     let none = Smoother::new(&Smoothing::DEFAULT, 0.001).unwrap();
