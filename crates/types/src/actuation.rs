@@ -3,17 +3,17 @@
 use crate::{ROTORS_MAX, Rotor};
 use nalgebra::SVector;
 
-/// The inputs U1..U4 of (6), all in newtons: sums and differences of rotor forces, not moments.
+/// Inputs U1..U4 of (6), all in newtons: sums and differences of rotor forces, not moments.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Inputs {
-    /// U1 = sum of y_i F_i / l, F3 - F1 on the paper's frame; the moment about body x is l U1.
+    /// U1 = sum of y_i F_i / l; F3 - F1 on the paper's frame. The moment about body x is l U1.
     pub roll_n: f32,
-    /// U2 = -(sum of x_i F_i) / l, F4 - F2 on the paper's frame; the moment about body y is l U2.
+    /// U2 = -(sum of x_i F_i) / l; F4 - F2 on the paper's frame. The moment about body y is l U2.
     pub pitch_n: f32,
-    /// U3: the forces of the rotors that push to positive yaw less those of the others, F1 - F2 + F3 - F4 on the
-    /// paper's frame; the moment about body z is (d/b) U3.
+    /// U3: forces of the rotors that push to positive yaw, minus those of the others; F1 - F2 + F3 - F4 on the paper's
+    /// frame. The moment about body z is (d/b) U3.
     pub yaw_n: f32,
     /// U4 = sum of F_i, along body z.
     pub thrust_n: f32,
@@ -45,7 +45,7 @@ fn padded<const N: usize>(values: &SVector<f32, N>) -> SVector<f32, ROTORS_MAX> 
 pub struct RotorForces<const N: usize = 4>(pub SVector<f32, N>);
 
 impl<const N: usize> Default for RotorForces<N> {
-    /// All rotors at zero force.
+    /// Returns zero force for all rotors.
     fn default() -> Self {
         RotorForces(SVector::zeros())
     }
@@ -58,7 +58,7 @@ impl<const N: usize> Default for RotorForces<N> {
 pub struct RotorSpeeds<const N: usize = 4>(pub SVector<f32, N>);
 
 impl<const N: usize> Default for RotorSpeeds<N> {
-    /// All rotors stopped.
+    /// Returns zero speed for all rotors.
     fn default() -> Self {
         RotorSpeeds(SVector::zeros())
     }

@@ -8,9 +8,9 @@ const NORM_SQUARED_ERROR_MAX: f32 = 0.1;
 
 impl State {
     /// Returns the state of a vehicle whose attitude is given as a quaternion from body (FLU) to earth (z up)
-    /// coordinates; position and velocity are in the earth frame, rates in the body frame, as in the crate's
-    /// [conventions](crate). Yaw is within \[-pi, pi\]. `None` if the quaternion is no rotation (its squared norm is
-    /// not within 0.9 to 1.1) or the state is not plausible ([`State::is_plausible`]).
+    /// coordinates. Position and velocity are in the earth frame, rates in the body frame, as in the crate's
+    /// [conventions](crate). Yaw is within \[-pi, pi\]. Returns `None` if the quaternion is not a rotation (squared
+    /// norm not within 0.9 to 1.1), or if the state is not plausible ([`State::is_plausible`]).
     ///
     /// ```
     /// use afbc_types::State;
@@ -33,11 +33,11 @@ impl State {
         (is_rotation(attitude) && state.is_plausible()).then_some(state)
     }
 
-    /// Returns the attitude as a unit quaternion from body to earth coordinates, of either sign.
+    /// Returns the attitude as a unit quaternion from body to earth coordinates. Its sign may be either.
     pub fn quaternion(&self) -> UnitQuaternion<f32> {
         let half = self.attitude_rad.map(|angle| sin_cos(0.5 * angle));
         let ((sx, cx), (sy, cy), (sz, cz)) = (half.x, half.y, half.z);
-        // Rounded sines and cosines leave a length that is only nearly 1.
+        // Normalise, since rounded sines and cosines give a length that is only nearly 1.
         UnitQuaternion::new_normalize(Quaternion::new(
             cx * cy * cz + sx * sy * sz,
             sx * cy * cz - cx * sy * sz,
@@ -49,12 +49,12 @@ impl State {
 
 /// True if a quaternion's squared norm is within 0.9 to 1.1.
 pub(crate) fn is_rotation(attitude: &Quaternion<f32>) -> bool {
-    // False of a NaN.
+    // The comparison is false for NaN.
     (attitude.norm_squared() - 1.0).abs() <= NORM_SQUARED_ERROR_MAX
 }
 
-/// Returns roll, pitch and yaw \[rad\] of the z-y-x sequence for a quaternion of any norm but zero. Roll and yaw are
-/// within \[-pi, pi\], pitch within \[-pi/2, pi/2\]. The arctangent (of y, x) and the square root are the caller's.
+/// Returns roll, pitch and yaw \[rad\] of the z-y-x sequence for a quaternion of any norm except zero. Roll and yaw are
+/// within \[-pi, pi\], pitch within \[-pi/2, pi/2\]. The caller provides the arctangent (of y, x) and the square root.
 ///
 /// In half angles, with c and s the cosine and sine of half the pitch,
 ///
@@ -63,8 +63,9 @@ pub(crate) fn is_rotation(attitude: &Quaternion<f32>) -> bool {
 /// x + z = (c - s) sin((roll + yaw)/2)      x - z = (c + s) sin((roll - yaw)/2)
 /// ```
 ///
-/// so accuracy does not depend on pitch; at +-90 degrees, where only a sum of roll and yaw is defined, the result is
-/// still a valid decomposition. Bernardes and Viollet, *Quaternion to Euler angles conversion*, PLoS ONE 17(11), 2022.
+/// so the accuracy does not depend on the pitch. At +-90 degrees, where only a sum of roll and yaw is defined, the
+/// result is still a valid decomposition. Bernardes and Viollet, *Quaternion to Euler angles conversion*, PLoS ONE
+/// 17(11), 2022.
 #[inline]
 pub fn euler_angles(
     attitude: &Quaternion<f32>,
@@ -80,7 +81,7 @@ pub fn euler_angles(
     Vector3::new(wrap(half_sum + half_difference), pitch, wrap(half_sum - half_difference))
 }
 
-/// Wraps an angle within two turns of zero to within half a turn.
+/// Wraps an angle between -3 pi and 3 pi to \[-pi, pi\].
 fn wrap(angle: f32) -> f32 {
     use core::f32::consts::{PI, TAU};
     if angle > PI {

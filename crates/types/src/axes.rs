@@ -14,11 +14,11 @@ pub enum Axis {
     Pitch,
     /// i = 3: psi, driven by U3.
     Yaw,
-    /// i = 4: height, driven by U4.
+    /// i = 4: height z, driven by U4.
     Z,
-    /// i = 5: driven by the virtual control u5.
+    /// i = 5: x, driven by the virtual control u5.
     X,
-    /// i = 6: driven by the virtual control u6.
+    /// i = 6: y, driven by the virtual control u6.
     Y,
 }
 
@@ -26,7 +26,7 @@ impl Axis {
     /// All six subsystems, in the paper's order.
     pub const ALL: [Axis; 6] = [Axis::Roll, Axis::Pitch, Axis::Yaw, Axis::Z, Axis::X, Axis::Y];
 
-    /// Lower-case name, as in scenario files and logs.
+    /// Returns the name in lower case, as in scenario files and logs.
     pub const fn name(self) -> &'static str {
         match self {
             Axis::Roll => "roll",
@@ -38,7 +38,7 @@ impl Axis {
         }
     }
 
-    /// Returns the next axis in the paper's order; after the last, the first.
+    /// Returns the next axis in the paper's order; the first one after the last.
     #[must_use]
     pub const fn next(self) -> Self {
         match self {
@@ -67,13 +67,13 @@ pub struct PerAxis<T> {
 }
 
 impl<T> PerAxis<T> {
-    /// Calls `make` for each axis.
+    /// Makes a value for each axis by calling `make`.
     pub fn from_fn(mut make: impl FnMut(Axis) -> T) -> Self {
         let Ok(made) = Self::try_from_fn(|axis| Ok::<T, Infallible>(make(axis)));
         made
     }
 
-    /// Calls `make` for each axis until one call fails.
+    /// Makes a value for each axis by calling `make`, until one call fails.
     ///
     /// # Errors
     /// The first error of `make`.
@@ -88,7 +88,7 @@ impl<T> PerAxis<T> {
         })
     }
 
-    /// Applies `change` to each axis' value.
+    /// Applies `change` to each axis' value, and returns the results.
     #[must_use]
     pub fn map<U>(&self, mut change: impl FnMut(&T) -> U) -> PerAxis<U> {
         PerAxis::from_fn(|axis| change(&self[axis]))

@@ -14,14 +14,13 @@ pub struct Declaration {
     pub id: &'static str,
     /// Group inside the visited struct, in lower case: an axis, or a sub-table of a file. Usually empty.
     pub group: &'static str,
-    /// Key with unit, as in scenario files, and accepted range.
+    /// Accepted range, with the key including the unit, as in scenario files.
     pub range: Range,
-    /// Unit symbol such as `m/s2`; `1` for a plain number, `number` for a whole one and for a choice, empty for a
-    /// switch.
+    /// Unit symbol such as `m/s2`; `1` for a plain number, `number` for a whole number or a choice, empty for a switch.
     pub unit: &'static str,
-    /// True if the tuner may choose the value; otherwise the vehicle or its task determines it.
+    /// True if the tuner may choose the value. Otherwise the vehicle or its task determines it.
     pub tuned: bool,
-    /// Meaning, from the field's documentation.
+    /// Meaning, taken from the field's documentation.
     pub meaning: &'static str,
 }
 
@@ -32,7 +31,7 @@ impl Declaration {
         Declaration { group, ..self }
     }
 
-    /// Returns the name on a ground station and in flash, at most 16 characters: `prefix`, group, id and, for a vector,
+    /// Returns the name for ground stations and flash, at most 16 characters: `prefix`, group, id and, for a vector,
     /// the coordinate. Examples: `V_MASS`, `V_INERTIA_X`, `A_ROLL_GAMMA`.
     pub const fn name(&self, prefix: &'static str, coordinate: Option<char>) -> Name {
         Name { prefix, group: self.group, id: self.id, coordinate }
@@ -67,15 +66,16 @@ impl fmt::Display for Name {
 /// Value of a parameter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Value<'a> {
-    /// One number, or the three of a vector, in `f32`.
+    /// One number, or the three numbers of a vector, in `f32`.
     Single(&'a [f32]),
-    /// One number, or the three of a vector, in `f64`.
+    /// One number, or the three numbers of a vector, in `f64`.
     Double(&'a [f64]),
     /// A whole number.
     Whole(u32),
     /// On or off.
     Switch(bool),
-    /// One of several words, by its index in them. Its number is the index above the smallest of the range.
+    /// One of several words, as an index into the words. The parameter's number is the index plus the smallest number
+    /// of the range.
     Choice(usize, &'static [&'static str]),
 }
 
@@ -95,7 +95,7 @@ pub enum ValueMut<'a> {
 }
 
 impl Value<'_> {
-    /// Returns the one number, or the three of a vector; nothing for a switch or a choice.
+    /// Returns the number, or the three numbers of a vector; nothing for a switch or a choice.
     pub fn numbers(&self) -> impl Iterator<Item = f64> {
         let (single, double, whole): (&[f32], &[f64], _) = match *self {
             Value::Single(numbers) => (numbers, &[], None),
@@ -107,7 +107,7 @@ impl Value<'_> {
     }
 }
 
-/// Action on each visited parameter; an error ends the visit. Implemented by closures and called statically, so that
+/// Action on each visited parameter. An error ends the visit. Closures implement it and are called statically, so that
 /// the firmware's stack analysis can follow the call.
 pub trait Visit<E>: FnMut(&Declaration, Value<'_>) -> Result<(), E> {}
 
@@ -118,19 +118,19 @@ pub trait VisitMut<E>: FnMut(&Declaration, ValueMut<'_>) -> Result<(), E> {}
 
 impl<E, F: FnMut(&Declaration, ValueMut<'_>) -> Result<(), E>> VisitMut<E> for F {}
 
-/// Checks the range of a parameter. Out of line, and with the error put aside, since both would be there once for each
-/// parameter.
+/// Checks the range of a parameter. Out of line, with the error stored in `refused`, so that the code exists only once
+/// instead of once per parameter.
 #[inline(never)]
 fn in_range(declaration: &Declaration, value: &Value<'_>, refused: &mut Result<(), OutOfRange>) -> Result<(), ()> {
     *refused = value.numbers().try_for_each(|number| declaration.range.check(number));
     if refused.is_ok() { Ok(()) } else { Err(()) }
 }
 
-/// Calls `visit` with a parameter of a group. Out of line: copies of declarations, one for each parameter, would fill
-/// the flash.
+/// Calls `visit` with a parameter of a group. Out of line: a copy of the declaration for each parameter would fill the
+/// flash.
 ///
 /// # Errors
-/// That of `visit`.
+/// The error that `visit` returns.
 #[inline(never)]
 pub fn show_in_group<E>(
     group: &'static str,
@@ -155,19 +155,19 @@ pub trait Declared {
     /// The first error that `visit` returns.
     fn visit_mut<E>(&mut self, visit: &mut impl VisitMut<E>) -> Result<(), E>;
 
-    /// Checks parameters that limit one another; each must already be in its own range.
+    /// Checks parameters that limit each other. Each must already be in its own range.
     ///
     /// # Errors
-    /// The first parameter outside the range that another one sets.
+    /// The first parameter outside the range set by another one.
     fn together(&self) -> Result<(), OutOfRange>;
 
-    /// Checks every parameter's range, then the parameters that limit one another.
+    /// Checks every parameter's range, then the parameters that limit each other.
     ///
     /// # Errors
     /// The first parameter out of range.
     fn validate(&self) -> Result<(), OutOfRange> {
         let mut refused = Ok(());
-        // Its error only ends the visit; what was refused is in `refused`.
+        // The visit's error only ends the visit. The reason is in `refused`.
         let _ = self.visit(&mut |declaration, value| in_range(declaration, &value, &mut refused));
         refused?;
         self.together()
@@ -204,7 +204,7 @@ pub trait Field {
     /// The first error that `visit` returns.
     fn show<E>(&self, declaration: &Declaration, visit: &mut impl Visit<E>) -> Result<(), E>;
 
-    /// As [`show`](Self::show), to change it.
+    /// As [`show`](Self::show), with mutable access.
     ///
     /// # Errors
     /// The first error that `visit` returns.
@@ -213,10 +213,10 @@ pub trait Field {
 
 /// Number type of a parameter: `f32` in the controller, `f64` in the plant model.
 pub trait Number: nalgebra::Scalar + Copy + Into<f64> + Mul<Output = Self> + Div<Output = Self> {
-    /// Wraps one number, or the three of a vector, as a [`Value`].
+    /// Wraps one number, or the three numbers of a vector, as a [`Value`].
     fn value(numbers: &[Self]) -> Value<'_>;
 
-    /// Wraps one number, or the three of a vector, as a [`ValueMut`].
+    /// Wraps one number, or the three numbers of a vector, as a [`ValueMut`].
     fn value_mut(numbers: &mut [Self]) -> ValueMut<'_>;
 }
 
@@ -240,7 +240,7 @@ impl Number for f64 {
     }
 }
 
-/// Implements [`Field`] for a type with these values.
+/// Implements [`Field`] for a type, given its value and mutable value.
 macro_rules! field {
     ([$($T:ident)?] $Type:ty, |$this:ident| $value:expr, $value_mut:expr) => {
         impl $(<$T: Number>)? Field for $Type {
@@ -272,7 +272,7 @@ impl<T: Field> Field for PerAxis<T> {
     }
 }
 
-/// An enum of which a parameter may be: files write its words, stations and flash its numbers.
+/// An enum that may be a parameter: files write its words, ground stations and flash its numbers.
 pub trait Choice: Copy + PartialEq + 'static {
     /// Every variant, in the order of the numbers.
     const ALL: &'static [Self];
@@ -281,9 +281,9 @@ pub trait Choice: Copy + PartialEq + 'static {
     /// Number of the first variant.
     const FIRST: u8 = 0;
 
-    /// Returns the place in [`ALL`](Self::ALL).
+    /// Returns the variant's index in [`ALL`](Self::ALL).
     fn index(self) -> usize {
-        // ALL has every variant, so this one is always found.
+        // Always found, since ALL has every variant.
         Self::ALL.iter().position(|one| *one == self).unwrap_or_default()
     }
 
@@ -307,25 +307,24 @@ pub trait Choice: Copy + PartialEq + 'static {
     }
 }
 
-/// Returns the numbers of a choice.
+/// Returns the range of a choice's numbers.
 pub const fn numbers<C: Choice>() -> RangeInclusive<f64> {
     let first = C::FIRST as f64;
     first..=first + C::ALL.len() as f64 - 1.0
 }
 
-/// Declares a struct of parameters: name, meaning, unit, accepted range and default of each, and whether it is
-/// tuned.
+/// Declares a struct of parameters, each with name, meaning, unit, accepted range, default and whether it is tuned.
 ///
 /// * `#[parameter(ID, "unit", min..=max)]`, with `, tuned` at the end if the tuner may choose it: a number, a vector
-///   whose three numbers have the same range, or a [`PerAxis`](crate::PerAxis) of either; with the unit `number`, a
+///   with the same range for its three numbers, or a [`PerAxis`](crate::PerAxis) of either. With the unit `number`, a
 ///   `u32`.
 /// * `#[switch(ID)]`: a `bool`.
 /// * `#[choice(ID)]`: a [`Choice`](crate::Choice).
-/// * `#[group("")]`: a declared struct whose parameters join this struct's; with a name, they form a group.
+/// * `#[group("")]`: a declared struct whose parameters join this struct's. With a name, they form a group.
 /// * A field without any of these attributes is not a parameter.
 ///
 /// The struct gets [`Declared`](crate::Declared), `DEFAULT`, [`Default`] and one constant per parameter, named by its
-/// id. The optional `together` block is checked in addition to the ranges.
+/// id. The optional `together` block checks parameters that limit each other, after the ranges.
 ///
 /// ```
 /// use afbc_types::{Declared, Range, parameters};
@@ -416,14 +415,14 @@ macro_rules! parameters {
             }
 
             fn together(&self) -> Result<(), $crate::OutOfRange> {
-                // `let _` only names `$group`, which makes this repeat for the fields with a group and for no others.
+                // `let _` only mentions `$group`, so that this repeats for fields with a group only.
                 $( $( let _ = $group; $crate::Declared::together(&self.$field)?; )? )*
                 $( let $this = self; $together?; )?
                 Ok(())
             }
         }
     };
-    // Parameters that join.
+    // A group without a name: its parameters join the struct's.
     (@group "", $visit:ident, $field:expr, $visitor:ident) => {
         $crate::Declared::$visit($field, $visitor)?;
     };
@@ -439,7 +438,7 @@ macro_rules! parameters {
         };
         $crate::Declared::visit_mut($field, within)?;
     };
-    // A field without attribute: not a parameter.
+    // A field without an attribute is not a parameter.
     (@declare $field:ident [$($doc:literal)*]) => {};
     (@declare $field:ident [$($doc:literal)*] $id:ident, $unit:literal, $range:expr, [$($tuned:ident)?]) => {
         #[doc = concat!("Declaration of `", stringify!($field), "`.")]

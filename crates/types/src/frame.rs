@@ -8,7 +8,7 @@ pub const ROTORS_MAX: usize = 8;
 /// Accepted number of rotors.
 pub const ROTORS: Range = Range::new("rotors", 4.0, ROTORS_MAX as f64);
 
-/// Accepted position of a rotor along x and along y, in arm lengths.
+/// Accepted coordinate of a rotor's position, in arm lengths.
 pub const ROTOR_POSITION: Range = Range::new("rotor_position", -10.0, 10.0);
 
 /// Position of a rotor, and the direction in which it turns the body.
@@ -16,11 +16,11 @@ pub const ROTOR_POSITION: Range = Range::new("rotor_position", -10.0, 10.0);
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Rotor<T = f32> {
-    /// Along body x, in [arm lengths](crate::Parameters::arm_m).
+    /// Position along body x, in [arm lengths](crate::Parameters::arm_m).
     pub x: T,
-    /// Along body y, in arm lengths.
+    /// Position along body y, in arm lengths.
     pub y: T,
-    /// True if its drag pushes the body to positive yaw: seen from above, the rotor turns clockwise.
+    /// True if the rotor's drag pushes the body to positive yaw: seen from above, the rotor turns clockwise.
     pub pushes_left: bool,
 }
 
@@ -54,14 +54,14 @@ impl Rotor<f64> {
     }
 }
 
-/// A vehicle as a controller knows it: nominal parameters and the positions of its `N` rotors.
+/// A vehicle as controllers know it: nominal parameters and the positions of its `N` rotors.
 ///
-/// [`Parameters`] alone stand for a vehicle with the paper's frame.
+/// [`Parameters`] alone convert to a vehicle with the paper's frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Airframe<const N: usize = 4> {
     /// Nominal parameters.
     pub parameters: Parameters,
-    /// In the order of the motors' outputs.
+    /// Rotors, in the order of the motor outputs.
     pub rotors: [Rotor; N],
 }
 
@@ -84,8 +84,8 @@ impl<const N: usize> Airframe<N> {
     }
 }
 
-/// Evaluates an expression in which `N` is the number of rotors, 4 to 8, as a constant: selects the code for the number
-/// of rotors that a file states.
+/// Evaluates an expression with the constant `N` equal to the number of rotors, 4 to 8. Selects the code for a number
+/// of rotors that is known only at run time, such as from a file.
 ///
 /// ```
 /// let room = afbc_types::with_rotors!(6, N => [0.0_f32; N].len());
@@ -99,7 +99,7 @@ macro_rules! with_rotors {
             5 => $crate::with_rotors!(@ 5, $N => $body),
             6 => $crate::with_rotors!(@ 6, $N => $body),
             7 => $crate::with_rotors!(@ 7, $N => $body),
-            // Eight: other numbers have been refused by `ROTORS`.
+            // Eight: `ROTORS` has refused all other numbers.
             _ => $crate::with_rotors!(@ 8, $N => $body),
         }
     };

@@ -1,5 +1,5 @@
-//! Types shared by all crates: state, setpoint, control inputs, rotor speeds and physical parameters with their
-//! accepted ranges, attitudes as quaternions, and a macro that declares parameters ([`parameters!`]).
+//! Types shared by all crates: state, setpoint, control inputs, rotor speeds, physical parameters with their accepted
+//! ranges, attitudes as quaternions, and a macro that declares parameters ([`parameters!`]).
 //!
 //! # Conventions
 //!
@@ -17,13 +17,13 @@
 //!   negatively about body z), rotors 2 and 4 to negative yaw.
 //! * **Subsystems** i = 1..6 of the paper's (7): roll, pitch, yaw, z, x, y. See [`PerAxis`].
 //!
-//! "(n)" with a number is always an equation of Yacef, Bouhali, Hamerlain, *Adaptive Fuzzy Backstepping Control for
-//! Trajectory Tracking of Unmanned Aerial Quadrotor*, as corrected in `docs/paper.md`.
+//! "(n)" with a number always refers to an equation of Yacef, Bouhali, Hamerlain, *Adaptive Fuzzy Backstepping Control
+//! for Trajectory Tracking of Unmanned Aerial Quadrotor*, as corrected in `docs/paper.md`.
 //!
 //! # Features
 //!
-//! Both are off by default and work without std: `serde` reads and writes states, setpoints, inputs, rotor forces,
-//! rotor speeds and physical parameters; `defmt` logs them on a board.
+//! Both features are off by default and work without std. `serde` reads and writes states, setpoints, inputs, rotor
+//! forces, rotor speeds and physical parameters; `defmt` logs them on a board.
 #![no_std]
 
 mod actuation;

@@ -1,10 +1,10 @@
-//! Place of a sensor on the vehicle.
+//! Mounting of a sensor on the vehicle.
 
 use crate::{Number, parameters, sin_cos};
 use nalgebra::{Matrix3, Vector3};
 
 parameters! {
-    /// Mounting of the inertial sensor: the truth in `f64` in the plant, what flight software knows of it in `f32`.
+    /// Mounting of the inertial sensor: the true one in `f64` in the plant, the known one in `f32` in flight software.
     #[derive(Clone, Copy, Debug, PartialEq)]
     #[cfg_attr(feature = "serde", derive(serde::Serialize))]
     #[cfg_attr(feature = "serde", serde(bound = "T: crate::Number + serde::Serialize"))]
@@ -19,7 +19,7 @@ parameters! {
 }
 
 impl Mounting {
-    /// At the centre of mass, along the body's axes.
+    /// Sensor at the centre of mass, along the body's axes.
     pub const PLAIN: Self = {
         let zero = Vector3::new(0.0, 0.0, 0.0);
         Mounting { position_m: zero, attitude_rad: zero }
@@ -38,7 +38,7 @@ impl Mounting {
 }
 
 impl<T: Number> Mounting<T> {
-    /// True if it changes nothing: the sensor is at the centre of mass, along the body's axes.
+    /// True if the sensor is at the centre of mass, along the body's axes, so that the mounting changes nothing.
     #[must_use]
     pub fn is_plain(&self) -> bool {
         self.position_m.iter().chain(&self.attitude_rad).all(|&part| part.into() == 0.0)
@@ -46,7 +46,7 @@ impl<T: Number> Mounting<T> {
 }
 
 impl Mounting<f64> {
-    /// The same mounting in flight software's precision.
+    /// Returns the mounting in flight software's precision.
     #[must_use]
     pub fn to_f32(&self) -> Mounting {
         Mounting { position_m: self.position_m.cast(), attitude_rad: self.attitude_rad.cast() }

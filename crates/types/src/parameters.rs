@@ -4,8 +4,8 @@ use crate::{Number, parameters};
 use nalgebra::Vector3;
 
 parameters! {
-    /// Physical parameters of a quadrotor, Sections II and IV. The control law holds its nominal values in `f32`, the
-    /// plant its true values in `f64`. The ranges admit vehicles from palm size to those that carry a person.
+    /// Physical parameters of a quadrotor, Sections II and IV. The control law has their nominal values in `f32`, the
+    /// plant their true values in `f64`. The ranges admit vehicles from palm size up to passenger drones.
     #[derive(Clone, Copy, Debug, PartialEq)]
     #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
     #[cfg_attr(feature = "serde", serde(bound = "T: crate::Number + serde::Serialize + serde::de::DeserializeOwned"))]
@@ -36,13 +36,14 @@ parameters! {
 }
 
 impl<T: Number> Parameters<T> {
-    /// Weight m g \[N\].
+    /// Returns the weight m g \[N\].
     #[must_use]
     pub fn weight_n(&self) -> T {
         self.mass_kg * self.gravity_m_s2
     }
 
-    /// l/Ix, l/Iy, (d/b)/Iz: angular acceleration about each body axis per newton of U1, U2, U3 \[rad/s2 per N\].
+    /// Returns l/Ix, l/Iy, (d/b)/Iz: angular acceleration about each body axis per newton of U1, U2, U3 \[rad/s2 per
+    /// N\].
     #[must_use]
     pub fn effectiveness(&self) -> Vector3<T> {
         let (l, i) = (self.arm_m, &self.inertia_kg_m2);
@@ -55,7 +56,7 @@ impl Parameters<f64> {
     /// The vehicle of Section IV.
     pub const PAPER: Self = Self::DEFAULT;
 
-    /// The same parameters in the controller's precision.
+    /// Returns the parameters in the controller's precision.
     pub fn to_f32(&self) -> Parameters<f32> {
         Parameters {
             mass_kg: self.mass_kg as f32,

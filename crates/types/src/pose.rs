@@ -1,10 +1,10 @@
-//! Measured position and attitude, and how good they are.
+//! Measured position and attitude, and their standard deviations.
 
 use crate::attitude::is_rotation;
 use crate::motion::{POSITION_MAX_M, State, within};
 use nalgebra::{Quaternion, Vector3};
 
-/// A tracker's pose. Frames as in the crate's [conventions](crate).
+/// Pose measured by an external tracker. Frames as in the crate's [conventions](crate).
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Pose {
@@ -12,12 +12,12 @@ pub struct Pose {
     pub position_m: Vector3<f32>,
     /// Quaternion w, x, y, z from body to earth coordinates, of either sign, with a squared norm within 0.9 to 1.1.
     pub attitude: [f32; 4],
-    /// Standard deviations.
+    /// Standard deviations of position and attitude.
     pub sigmas: PoseSigmas,
 }
 
 impl Default for Pose {
-    /// At the origin, level.
+    /// Returns the level pose at the origin.
     fn default() -> Self {
         Pose { position_m: Vector3::zeros(), attitude: [1.0, 0.0, 0.0, 0.0], sigmas: PoseSigmas::UNKNOWN }
     }
@@ -46,18 +46,18 @@ impl Pose {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct PoseSigmas {
-    /// Of each coordinate of the position \[m\]; none if unknown.
+    /// Standard deviation of each coordinate of the position \[m\]; `None` if unknown.
     pub position_m: Option<f32>,
-    /// Of the attitude about each axis \[rad\]; none if unknown.
+    /// Standard deviation of the attitude about each axis \[rad\]; `None` if unknown.
     pub attitude_rad: Option<f32>,
 }
 
 impl PoseSigmas {
-    /// Nothing known.
+    /// Unknown standard deviations.
     pub const UNKNOWN: Self = PoseSigmas { position_m: None, attitude_rad: None };
 
-    /// Returns the square roots of the largest variances along and about the three axes \[m2, rad2\]. They are unknown
-    /// if all three are zero, or one is negative or not finite.
+    /// Makes standard deviations from the variances along and about the three axes \[m2, rad2\]: the square root of the
+    /// largest one. The result is unknown if all three variances are zero, or if one is negative or not finite.
     pub fn from_variances(position: [f32; 3], attitude: [f32; 3]) -> Self {
         PoseSigmas { position_m: largest_sigma(position), attitude_rad: largest_sigma(attitude) }
     }

@@ -7,7 +7,7 @@ use core::ops::RangeInclusive;
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Range {
-    /// Name with unit, as in scenario files: `mass_kg`.
+    /// Name with unit, as in scenario files, such as `mass_kg`.
     pub name: &'static str,
     /// Smallest accepted value.
     pub min: f64,
@@ -16,21 +16,21 @@ pub struct Range {
 }
 
 impl Range {
-    /// Makes a range; `min <= max`.
+    /// Makes a range; `min` must not exceed `max`.
     pub const fn new(name: &'static str, min: f64, max: f64) -> Self {
         Range { name, min, max }
     }
 
-    /// Makes a range from an interval, as a declaration writes it.
+    /// Makes a range from an interval, as written in a declaration.
     pub const fn over(name: &'static str, interval: RangeInclusive<f64>) -> Self {
         Range { name, min: *interval.start(), max: *interval.end() }
     }
 
-    /// Checks that `value` is finite and within the range, to `f32` precision: a bound read from a file in decimal must
+    /// Checks that `value` is finite and within the range, to `f32` precision: a decimal bound read from a file must
     /// pass after rounding to the controller's precision.
     ///
     /// # Errors
-    /// [`OutOfRange`] otherwise, NaN included.
+    /// [`OutOfRange`] if not, including for NaN.
     pub fn check(&self, value: impl Into<f64>) -> Result<(), OutOfRange> {
         let value = value.into();
         let rounded = value as f32;

@@ -1,18 +1,18 @@
-//! Errors of a vehicle's own sensors, as a calibration has found them.
+//! Calibration of the vehicle's own sensors.
 
 use crate::parameters;
 use nalgebra::{Matrix3, Vector3};
 
 parameters! {
-    /// What flight software corrects of its sensors. With the reading x, the offset o and the matrix S,
+    /// Corrections that flight software applies to its sensors. With the reading x, the offset o and the matrix S,
     ///
     /// ```text
     /// corrected = S (x - o)
     /// ```
     ///
-    /// where S is the identity for the gyroscope, diagonal for the accelerometer, symmetric for the magnetometer.
+    /// where S is the identity for the gyroscope, diagonal for the accelerometer and symmetric for the magnetometer.
     /// Gyroscope and accelerometer are corrected in the sensor's axes, before its [`Mounting`](crate::Mounting) turns
-    /// them; the magnetometer, whose iron is the vehicle's, in the body frame.
+    /// them. The magnetometer is corrected in the body frame, since the disturbing iron is in the vehicle.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct SensorCalibration {
         /// Offset of the gyroscope, sensor axes.
@@ -37,7 +37,7 @@ parameters! {
 }
 
 impl SensorCalibration {
-    /// True if neither gyroscope nor accelerometer is corrected.
+    /// True if gyroscope and accelerometer need no correction.
     #[must_use]
     pub fn leaves_imu(&self) -> bool {
         let offsets = self.gyro_offset_rad_s.iter().chain(&self.accel_offset_m_s2);

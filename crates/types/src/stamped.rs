@@ -11,10 +11,10 @@ pub struct Stamped<T> {
 }
 
 impl<T> Stamped<T> {
-    /// Returns its age at `now_us`, at most `u32::MAX` (71 minutes). A stamp in the future is invalid and counts as
-    /// that old.
+    /// Returns the age at `now_us`, at most `u32::MAX` (71 minutes). A stamp in the future is invalid, and also counts
+    /// as `u32::MAX` old.
     pub fn age_us(&self, now_us: u64) -> u32 {
-        // The difference to a stamp in the future wraps to nearly 2^64, which no `u32` holds.
+        // For a stamp in the future, the difference wraps to nearly 2^64, which does not fit `u32`.
         u32::try_from(now_us.wrapping_sub(self.at_us)).unwrap_or(u32::MAX)
     }
 }

@@ -1,4 +1,4 @@
-//! Quaternions against Euler angles, with `f64` rotation matrices as the oracle.
+//! Compares quaternions with Euler angles, with `f64` rotation matrices as the reference.
 #![allow(clippy::expect_used, missing_docs, reason = "a test that cannot go on should say why")]
 
 use afbc_types::State;
@@ -6,7 +6,7 @@ use core::f32::consts::{FRAC_PI_2, PI};
 use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 
-/// Rz(psi) Ry(theta) Rx(phi), from the definition in the crate's conventions, in `f64`.
+/// Returns Rz(psi) Ry(theta) Rx(phi) from the definition in the crate's conventions, in `f64`.
 fn r_earth_body(attitude: &Vector3<f32>) -> Matrix3<f64> {
     let [phi, theta, psi] = attitude.map(f64::from).into();
     let about = |axis, angle| *Rotation3::from_axis_angle(&axis, angle).matrix();
@@ -17,12 +17,12 @@ fn rotation_of(q: &Quaternion<f32>) -> Matrix3<f64> {
     *UnitQuaternion::from_quaternion(q.cast()).to_rotation_matrix().matrix()
 }
 
-/// A state at rest at the origin.
+/// Returns a state at rest at the origin.
 fn with_attitude(attitude: &Quaternion<f32>) -> Option<State> {
     State::from_quaternion(Vector3::zeros(), Vector3::zeros(), attitude, Vector3::zeros())
 }
 
-/// The conventions in numbers: w comes first, angles are right-handed, z is up, x forward, y left.
+/// The conventions in numbers: w comes first, angles are right-handed, x is forward, y left, z up.
 #[test]
 fn known_attitudes() {
     let half = core::f32::consts::FRAC_1_SQRT_2;
@@ -60,7 +60,7 @@ fn what_is_not_a_rotation_is_rejected() {
             assert_eq!(with_attitude(&attitude), None, "{attitude:?}");
         }
     }
-    // Implausible motion with a valid attitude.
+    // A valid attitude with implausible motion.
     let (zero, level) = (Vector3::zeros(), Quaternion::identity());
     for wrong in [f32::NAN, f32::INFINITY, 2e5] {
         let wrong = Vector3::new(0.0, wrong, 0.0);
@@ -70,7 +70,7 @@ fn what_is_not_a_rotation_is_rejected() {
     }
 }
 
-/// Quaternions of norm about 1; half of them within 1e-3 rad of a pitch of 90 degrees.
+/// Quaternions of norm 1; half of them within 1e-3 rad of a pitch of 90 degrees.
 fn attitudes() -> impl Strategy<Value = Quaternion<f32>> {
     let any = prop::array::uniform4(-1.0f32..1.0)
         .prop_filter("not too short", |q| q.iter().map(|c| c * c).sum::<f32>() > 0.01)
@@ -87,7 +87,7 @@ fn attitudes() -> impl Strategy<Value = Quaternion<f32>> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(2000))]
 
-    /// The Euler angles are the same rotation as the quaternion at every attitude, and lie within their ranges.
+    /// The Euler angles are the same rotation as the quaternion at every attitude, and within their ranges.
     #[test]
     fn euler_angles_are_the_same_rotation(q in attitudes(), scale in 0.96f32..1.04) {
         let angles = with_attitude(&(q * scale)).expect("a rotation").attitude_rad;
@@ -104,8 +104,8 @@ proptest! {
         prop_assert!(difference < 2e-6, "{difference}");
     }
 
-    /// A state converted to a quaternion and back is the same rotation, however close to a pitch of 90 degrees;
-    /// everything else is unchanged.
+    /// A state converted to a quaternion and back is the same rotation, even close to a pitch of 90 degrees. Everything
+    /// else is unchanged.
     #[test]
     fn states_survive_a_round_trip(
         q in attitudes(),

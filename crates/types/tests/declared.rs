@@ -1,4 +1,4 @@
-//! Structs made by [`parameters!`].
+//! Tests of structs made by [`parameters!`].
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs)] // tests
 
 use afbc_types::{Axis, Choice, Declared, PerAxis, Range, Value, ValueMut, parameters};
@@ -22,7 +22,7 @@ parameters! {
     }
 }
 
-/// Three ways, numbered from 1 on.
+/// A choice of three, numbered from 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Way {
     /// Up.
@@ -82,7 +82,7 @@ parameters! {
     }
 }
 
-/// Returns name, key and numbers of each parameter in the order of the visit; a switch is 0 or 1.
+/// Returns name, key and numbers of each parameter in the order of the visit. A switch is 0 or 1.
 fn listed(group: &impl Declared) -> Vec<(String, &'static str, Vec<f64>)> {
     let mut list = Vec::new();
     let Ok(()) = group.visit(&mut |declaration, value| {
@@ -126,8 +126,8 @@ fn a_declaration_holds_all_that_was_written() {
     assert_eq!(Inner::default(), Inner { first_m: 0.1, second: -0.5 });
 }
 
-/// Returns `Outer` with the number `target`, `coordinate` just outside an end of its range; `None` if there is no
-/// such number.
+/// Returns `Outer` with the number `coordinate` of parameter `target` just outside one end of its range; `None` if
+/// there is no such number.
 fn past(target: usize, coordinate: usize, above: bool) -> Option<(Outer, Range)> {
     let (mut group, mut at, mut found) = (Outer::DEFAULT, 0, None);
     let Ok(()) = group.visit_mut(&mut |declaration, value| {
@@ -160,7 +160,7 @@ fn every_number_out_of_range_is_named() {
             checked += 1;
         }
     }
-    // Three numbers of the vector, four of the nested structs and a whole one, both ends; six axes, one end.
+    // Both ends for three numbers of the vector, four of the nested structs and a whole number; one end for six axes.
     assert_eq!(checked, 2 * (3 + 4 + 1) + 6);
     let nan = Outer { vector_kg_m2: Vector3::new(1.0, f64::NAN, 1.0), ..Outer::DEFAULT };
     assert_eq!(nan.validate().unwrap_err().range, Outer::VECTOR.range);
@@ -179,7 +179,7 @@ fn parameters_that_limit_one_another_are_checked_at_every_depth() {
         assert_eq!(axes.validate(), Ok(()));
         axes[axis].second = 0.2;
         assert_eq!(axes.validate(), Err(error));
-        // A range is checked before parameters that limit one another, wherever it is.
+        // Ranges are checked before parameters that limit each other, at any depth.
         axes[axis.next()].first_m = 2.0;
         assert_eq!(axes.validate().unwrap_err().range, Inner::FIRST.range);
     }
@@ -202,7 +202,7 @@ fn a_visitor_changes_what_it_is_shown_and_may_stop() {
     assert_eq!((axes.yaw, axes.z), (Inner::DEFAULT, Inner::DEFAULT));
 }
 
-/// Words have indices, of which one beyond them changes nothing.
+/// Choices are set by the index of their word. An index beyond the words changes nothing.
 #[test]
 fn a_choice_is_one_of_its_words() {
     let mut group = Outer::DEFAULT;

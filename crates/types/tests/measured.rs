@@ -1,4 +1,4 @@
-//! What is measured: poses and their uncertainty, corrections of sensors, ages, ranges.
+//! Tests of measurements: poses and their uncertainty, sensor corrections, ages and ranges.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs)] // tests
 
 use afbc_types::{Pose, PoseSigmas, Range, SensorCalibration, Setpoint, Stamped, State};
@@ -9,14 +9,14 @@ fn vector(most: f32) -> impl Strategy<Value = Vector3<f32>> {
     prop::array::uniform3(-most..most).prop_map(Vector3::from)
 }
 
-/// A number that may be none of a standard deviation or a variance.
+/// A number that may be invalid as a standard deviation or a variance.
 fn number() -> impl Strategy<Value = f32> {
     let edges = [0.0, -0.0, f32::NAN, f32::INFINITY, -1.0, f32::MIN_POSITIVE, f32::MAX];
     prop_oneof![3 => 0.0_f32..4.0, 1 => prop::sample::select(edges.to_vec())]
 }
 
 proptest! {
-    /// A pose is plausible if its place, its rotation and its known standard deviations are.
+    /// A pose is plausible if its position, its rotation and its known standard deviations are.
     #[test]
     fn a_pose_is_plausible_by_each_of_its_parts(
         place in 0..3_usize,
@@ -30,7 +30,7 @@ proptest! {
         let [position_m, attitude_rad] = sigmas;
         let sigmas = PoseSigmas { position_m, attitude_rad };
         let mut pose = Pose::of(&state, sigmas);
-        // The same rotation as the state's, and the rest as it was told.
+        // The pose has the same rotation as the state, and keeps the standard deviations.
         let [w, x, y, z] = pose.attitude;
         let same = State::from_quaternion(Vector3::zeros(), Vector3::zeros(), &nalgebra::Quaternion::new(w, x, y, z),
             Vector3::zeros()).unwrap();
@@ -40,7 +40,7 @@ proptest! {
         pose.attitude = pose.attitude.map(|part| part * scale);
         let known = |sigma: Option<f32>| sigma.is_none_or(|sigma| sigma.is_finite() && sigma > 0.0);
         let squared = f64::from(scale) * f64::from(scale);
-        // Rounding decides near the bounds.
+        // Skip values at the bounds, where rounding decides.
         prop_assume!([0.9, 1.1].iter().all(|bound| (squared - bound).abs() >= 1e-5));
         let wanted = far_m.abs() <= 1e5
             && (squared - 1.0).abs() <= 0.1
@@ -49,7 +49,7 @@ proptest! {
         prop_assert_eq!(pose.is_plausible(), wanted);
     }
 
-    /// The standard deviation is the root of the largest variance, if all are possible and one is not zero.
+    /// The standard deviation is the root of the largest variance, if all are possible and one is positive.
     #[test]
     fn the_largest_variance_counts(
         position in prop::array::uniform3(number()), attitude in prop::array::uniform3(number()),
@@ -69,7 +69,7 @@ proptest! {
         }
     }
 
-    /// A sensor that errs as the calibration says is corrected to what there was.
+    /// The calibration restores the true value from a reading with its errors.
     #[test]
     fn a_correction_takes_the_error_back(
         truth in vector(60.0),
@@ -94,11 +94,11 @@ proptest! {
         prop_assume!(matrix.determinant().abs() > 0.01);
         let read = matrix.try_inverse().unwrap() * truth.cast() + mag_offset_ut.cast();
         let off = (calibration.field(&read.cast()).cast() - truth.cast::<f64>()).amax();
-        // A reading of some thousands is rounded.
+        // Readings of some thousands are rounded.
         prop_assert!(off < 1e-6 * (read.amax() + 1_000.0) * 6.0, "{off}");
     }
 
-    /// The inertial sensor is left as it is only if nothing of it is corrected.
+    /// The inertial sensor counts as uncorrected only if nothing of it is corrected.
     #[test]
     fn any_correction_of_the_inertial_sensor_shows(place in 0..9_usize, by in 1e-6_f32..0.1) {
         let mut calibration = SensorCalibration { mag_offset_ut: Vector3::repeat(by), ..SensorCalibration::DEFAULT };
@@ -109,7 +109,7 @@ proptest! {
         prop_assert!(!calibration.leaves_imu());
     }
 
-    /// The age is the time since, as far as it can be told; of what lies ahead it cannot.
+    /// The age is the elapsed time, at most `u32::MAX`. A future stamp has the age `u32::MAX`.
     #[test]
     fn an_age_is_the_time_since(at_us: u64, since_us in prop_oneof![any::<u64>(), 0..10_000_000_000_u64]) {
         let stamped = Stamped { value: (), at_us };
@@ -123,7 +123,7 @@ proptest! {
         }
     }
 
-    /// A setpoint that holds a state is where that is, as it points, and at rest.
+    /// A setpoint that holds a state has the state's position and heading, and is at rest.
     #[test]
     fn holding_is_at_rest(
         position_m in vector(1e3), velocity_m_s in vector(1e3), attitude_rad in vector(3.0), rates_rad_s in vector(1e3),
@@ -132,7 +132,7 @@ proptest! {
         prop_assert_eq!(held, Setpoint { position_m, yaw_rad: attitude_rad.z, ..Setpoint::default() });
     }
 
-    /// A range takes what lies within it, its ends included, and names what it refuses.
+    /// A range accepts values within it, ends included, and names a value that it refuses.
     #[test]
     fn a_range_names_what_it_refuses(ends in [-1e3_f32..1e3, -1e3_f32..1e3], value in -2e3_f64..2e3, at in 0..4_u8) {
         let (min, max) = (ends[0].min(ends[1]), ends[0].max(ends[1]));

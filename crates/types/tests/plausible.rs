@@ -1,10 +1,10 @@
-//! Which states and setpoints are plausible, each number on its own.
+//! Tests which states and setpoints are plausible, one number at a time.
 #![allow(clippy::indexing_slicing, missing_docs)] // tests
 
 use afbc_types::{Setpoint, State};
 use proptest::prelude::*;
 
-/// Largest sizes by their documentation, in the order of the fields.
+/// Largest documented sizes, in the order of the fields.
 const STATE_MAX: [f32; 12] = [1e5, 1e5, 1e5, 1e3, 1e3, 1e3, 1e3, 1e3, 1e3, 1e3, 1e3, 1e3];
 const SETPOINT_MAX: [f32; 18] =
     [1e5, 1e5, 1e5, 1e3, 1e3, 1e3, 1e3, 1e3, 1e3, 1e5, 1e5, 1e5, 1e7, 1e7, 1e7, 1e3, 1e3, 1e3];
@@ -33,7 +33,7 @@ fn setpoint(numbers: [f32; 18]) -> Setpoint {
     }
 }
 
-/// Any number, half of them at a bound or just beyond it.
+/// Any number, often at a bound or just beyond it.
 fn number() -> impl Strategy<Value = f32> {
     let edges: Vec<f32> =
         [1e3_f32, 1e5, 1e7].into_iter().flat_map(|most| [most, most.next_up(), -most, most.next_down()]).collect();
@@ -41,7 +41,7 @@ fn number() -> impl Strategy<Value = f32> {
 }
 
 proptest! {
-    /// Plausible is what has every number finite and within its bound, the bound included.
+    /// A state or setpoint is plausible if every number is finite and within its bound, bounds included.
     #[test]
     fn every_number_within_its_bound(numbers in prop::array::uniform18(number())) {
         let within = |numbers: &[f32], most: &[f32]| numbers.iter().zip(most).all(|(x, most)| x.abs() <= *most);
@@ -50,7 +50,7 @@ proptest! {
         prop_assert_eq!(state(first).is_plausible(), within(&first, &STATE_MAX));
     }
 
-    /// One number decides: all others at their bounds.
+    /// One number decides, with all others at their bounds.
     #[test]
     fn one_number_is_enough(place in 0_usize..18, number in number(), signs in prop::array::uniform18(any::<bool>())) {
         let mut numbers = core::array::from_fn(|i| if signs[i] { SETPOINT_MAX[i] } else { -SETPOINT_MAX[i] });

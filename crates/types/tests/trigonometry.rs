@@ -1,4 +1,4 @@
-//! Sine and cosine against those in double precision.
+//! Compares sine and cosine with double precision.
 #![allow(missing_docs)]
 
 use afbc_types::sin_cos;

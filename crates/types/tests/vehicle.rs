@@ -1,4 +1,4 @@
-//! What the physical parameters of a vehicle mean, by the definitions of mechanics, in `f64`.
+//! Tests the meaning of a vehicle's physical parameters against definitions of mechanics, in `f64`.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs)] // tests
 
 use afbc_types::{
@@ -15,7 +15,7 @@ fn vector(most: f64) -> impl Strategy<Value = Vector3<f64>> {
     prop::array::uniform3(-most..most).prop_map(Vector3::from)
 }
 
-/// A vehicle of a size that is not the paper's.
+/// A vehicle of a different size than the paper's.
 fn parameters() -> impl Strategy<Value = Parameters<f64>> {
     let factors = (1e-6_f64..1e-2, 1e-8_f64..1e-3, 1e-7_f64..1e-2);
     (0.1_f64..50.0, 0.05_f64..2.0, prop::array::uniform3(1e-4_f64..10.0), factors, 1.0_f64..20.0).prop_map(
@@ -39,7 +39,7 @@ fn close(a: f64, b: f64) -> bool {
 }
 
 proptest! {
-    /// The inputs turn the vehicle as the forces at their places do, and as the drag of the rotors does.
+    /// The inputs turn the vehicle like the forces at their places and the rotors' drag.
     #[test]
     fn inputs_are_the_moments_of_the_forces(
         vehicle in parameters(),
@@ -59,14 +59,14 @@ proptest! {
         let wanted = moment.component_div(&vehicle.inertia_kg_m2);
         let [x, y, z] = [inputs.roll_n, inputs.pitch_n, inputs.yaw_n].map(f64::from);
         let turns = vehicle.effectiveness().component_mul(&Vector3::new(x, y, z));
-        // 60 arms and newtons, each rounded.
+        // Six forces of up to 9 N at up to 10 arm lengths, each product rounded to 1e-6.
         let scale = vehicle.effectiveness() * (6.0 * 90.0 * 1e-6);
         prop_assert!((0..3).all(|i| (turns[i] - wanted[i]).abs() <= scale[i]), "{turns} for {wanted}");
         prop_assert!((f64::from(inputs.thrust_n) - thrust_n).abs() <= 1e-4);
         prop_assert!(close(vehicle.weight_n(), vehicle.mass_kg * vehicle.gravity_m_s2));
     }
 
-    /// In single precision each parameter and rotor is itself, and an airframe has as many rotors as it is to have.
+    /// Parameters and rotors are rounded to single precision, and an airframe has exactly its number of rotors.
     #[test]
     fn single_precision_rounds(vehicle in parameters(), rotors in prop::collection::vec(rotor(), 0..9)) {
         let single = vehicle.to_f32();
@@ -105,7 +105,7 @@ proptest! {
         }
     }
 
-    /// What is padded is itself, and zeros behind it.
+    /// Padding keeps the values and appends zeros.
     #[test]
     fn padding_is_zeros(values in prop::array::uniform5(any::<u16>().prop_map(f32::from))) {
         let wanted: [f32; ROTORS_MAX] = core::array::from_fn(|i| values.get(i).copied().unwrap_or(0.0));
@@ -113,7 +113,7 @@ proptest! {
         prop_assert_eq!(RotorSpeeds::<5>(values.into()).padded(), RotorSpeeds::<ROTORS_MAX>(wanted.into()));
     }
 
-    /// A sensor's axes are the body's turned by its roll, then its pitch, then its yaw.
+    /// A sensor's axes are the body's axes, turned by its roll, then its pitch, then its yaw.
     #[test]
     fn a_mounting_turns_as_the_conventions_say(position_m in vector(10.0), attitude_rad in vector(7.0)) {
         let mounting = Mounting::<f64> { position_m, attitude_rad };
@@ -127,7 +127,7 @@ proptest! {
         prop_assert_eq!((single.position_m, single.attitude_rad), (position_m.cast(), attitude_rad.cast()));
     }
 
-    /// A mounting changes nothing only if each of its numbers is zero.
+    /// A mounting changes nothing only if all of its numbers are zero.
     #[test]
     fn a_plain_mounting_is_all_zeros(place in 0..6_usize, by in 1e-6_f32..1.0) {
         let mut mounting = Mounting::PLAIN;
@@ -144,7 +144,7 @@ fn no_rotor_turns_or_pushes_at_first() {
     assert_eq!(RotorSpeeds::<4>::default(), RotorSpeeds([0.0; 4].into()));
 }
 
-/// On the paper's frame the inputs are the sums and differences of (6).
+/// On the paper's frame, the inputs are the sums and differences of (6).
 #[test]
 fn the_papers_frame() {
     let Inputs { roll_n, pitch_n, yaw_n, thrust_n } = Inputs::of(&PLUS, &[1.0, 2.0, 4.0, 8.0]);
@@ -155,7 +155,7 @@ fn the_papers_frame() {
     assert!((vehicle - wanted).amax() < rounding * wanted.amax());
 }
 
-/// Each axis is its own place, by its name and by its number, and after the last comes the first.
+/// Each axis has its own place by name and by number. The first axis follows the last.
 #[test]
 fn axes_are_in_the_papers_order() {
     let names = ["roll", "pitch", "yaw", "z", "x", "y"];
