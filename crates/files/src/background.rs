@@ -1,12 +1,12 @@
-//! Writing in the background: whoever writes waits for no disk and no reader.
+//! Writing in the background, so that a slow disk or reader never delays the caller.
 
 use std::io::{self, Write};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// Writes to a file, a pipe or a terminal in a thread of its own, so that a slow disk, or a reader who reads nothing,
-/// stops nobody else.
+/// Writes to a file, a pipe or a terminal in its own thread, so that a slow disk or a stalled reader delays nobody
+/// else.
 #[derive(Debug)]
 pub struct BackgroundWriter(Arc<Shared>);
 
@@ -14,7 +14,7 @@ pub struct BackgroundWriter(Arc<Shared>);
 struct Shared {
     state: Mutex<State>,
     changed: Condvar,
-    /// Most bytes that wait.
+    /// Largest number of bytes in the queue, including those being written.
     room: usize,
 }
 
@@ -24,17 +24,17 @@ struct State {
     /// Number of bytes that are being written.
     writing: usize,
     failure: Option<io::Error>,
-    /// True once nothing more will come.
+    /// True once the writer was closed: nothing more will be queued.
     is_closed: bool,
     /// True once the thread has ended.
     is_over: bool,
 }
 
 impl BackgroundWriter {
-    /// Begins to write to `out`, for which at most `room` bytes wait.
+    /// Starts a thread that writes to `out`, with room for at most `room` queued bytes.
     ///
     /// # Errors
-    /// If the system has no thread for it.
+    /// If the system cannot start the thread.
     pub fn new(out: impl Write + Send + 'static, room: usize) -> io::Result<Self> {
         let shared = Arc::new(Shared { state: Mutex::default(), changed: Condvar::new(), room });
         let writer = Arc::clone(&shared);
@@ -42,8 +42,8 @@ impl BackgroundWriter {
         Ok(BackgroundWriter(shared))
     }
 
-    /// Takes all of `bytes`, or nothing if there is no room for them or writing has failed; returns whether it has.
-    /// Never waits.
+    /// Queues all of `bytes` and returns true. Returns false, and queues nothing, if there is no room, writing has
+    /// failed or the writer is closed. Never waits.
     pub fn offer(&self, bytes: &[u8]) -> bool {
         let mut state = self.0.lock();
         let takes = state.goes_on() && state.has_room(bytes.len(), self.0.room);
@@ -54,32 +54,32 @@ impl BackgroundWriter {
         takes
     }
 
-    /// Waits until there is room for so many bytes, or writing has failed.
+    /// Waits until there is room for this many bytes, writing has failed or the writer is closed.
     pub fn wait_for_room(&self, bytes: usize) {
         let full = |state: &mut State| state.goes_on() && !state.has_room(bytes, self.0.room);
         drop(self.0.changed.wait_while(self.0.lock(), full));
     }
 
-    /// Returns why writing has failed, if it has.
+    /// Returns the error that stopped writing, if any.
     pub fn failure(&self) -> Option<io::Error> {
         self.0.lock().failure.as_ref().map(copied)
     }
 
-    /// Lets the thread end once it has written what waits.
+    /// Closes the writer: its thread ends once it has written the queue.
     pub fn close(&self) {
         self.0.lock().is_closed = true;
         self.0.changed.notify_all();
     }
 
-    /// True once all is written, or writing has failed, after [`close`](Self::close).
+    /// True once the thread has ended: after [`close`](Self::close) with everything written, or after a failure.
     pub fn is_over(&self) -> bool {
         self.0.lock().is_over
     }
 
-    /// Closes it and waits until all is written, for so long at most.
+    /// Closes the writer and waits until everything is written, at most for the time `within`.
     ///
     /// # Errors
-    /// Why not everything is written.
+    /// If writing failed, or time ran out.
     pub fn finish(&self, within: Option<Duration>) -> io::Result<()> {
         self.close();
         let deadline = within.map(|within| Instant::now() + within);
@@ -96,7 +96,7 @@ impl BackgroundWriter {
     }
 }
 
-/// Takes all at once, or fails: never waits.
+/// Queues all bytes at once or fails; never waits.
 impl Write for BackgroundWriter {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         let too_slow = || io::Error::other("the disk is too slow");
@@ -119,7 +119,7 @@ impl Shared {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Writes what comes until there is nothing more.
+    /// Writes queued bytes until the writer is closed and the queue is empty, or until writing fails.
     fn write(&self, mut out: impl Write) {
         let mut bytes = Vec::new();
         loop {
@@ -142,7 +142,7 @@ impl Shared {
             }
             self.changed.notify_all();
         }
-        // Before anybody hears that it is over: a file that is closed is whole.
+        // Closes the file before anybody sees that the thread has ended, so that the file is complete by then.
         drop(out);
         self.lock().is_over = true;
         self.changed.notify_all();
@@ -154,14 +154,15 @@ impl State {
         self.failure.is_none() && !self.is_closed
     }
 
-    /// True if so many more bytes may wait. Where none do, any number may: nothing is too long for ever.
+    /// True if `more` bytes fit into the queue. An empty queue takes a piece of any size, so that no piece is too large
+    /// forever.
     fn has_room(&self, more: usize, room: usize) -> bool {
         let held = self.waiting.len() + self.writing;
         held == 0 || held.saturating_add(more) <= room
     }
 }
 
-/// Returns the same error once more.
+/// Returns a copy of the error.
 fn copied(error: &io::Error) -> io::Error {
     let text = || io::Error::new(error.kind(), error.to_string());
     error.raw_os_error().map_or_else(text, io::Error::from_raw_os_error)
@@ -173,7 +174,7 @@ mod tests {
     use super::*;
     use std::sync::mpsc::{Receiver, Sender, channel};
 
-    /// A reader who reads so many pieces as are let through.
+    /// A reader that reads one piece for each message in the channel.
     struct Reader(Receiver<()>, Sender<Vec<u8>>);
 
     impl Write for Reader {
@@ -193,7 +194,8 @@ mod tests {
         (BackgroundWriter::new(Reader(wait, put), room).unwrap(), go, taken)
     }
 
-    /// While nobody reads, as much waits as there is room for, whatever the pieces; all of it arrives, in order.
+    /// While nobody reads, the queue fills up to its room, whatever the size of the pieces. Everything queued arrives,
+    /// in order.
     #[test]
     fn what_waits_is_bounded_and_arrives() {
         for piece in [1, 7, 100] {
@@ -221,7 +223,7 @@ mod tests {
         assert!(writer.write(&[0]).unwrap_err().to_string().contains("too slow"));
         let late = writer.finish(Some(Duration::from_millis(1))).unwrap_err();
         assert_eq!(late.kind(), io::ErrorKind::TimedOut);
-        // Whoever reads is gone.
+        // The reader is gone.
         drop(go);
         writer.wait_for_room(10);
         assert_eq!(writer.finish(None).unwrap_err().kind(), io::ErrorKind::StorageFull);

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::{fmt, io};
 
-/// Why a folder or file could not be written.
+/// Reason why a folder or file could not be written.
 #[derive(Debug)]
 pub enum Error {
     /// A folder or file that could not be written.
@@ -17,16 +17,16 @@ pub enum Error {
     Foreign {
         /// Path of the folder or file.
         path: PathBuf,
-        /// Its owner, in words.
+        /// The owner, in words.
         whose: String,
     },
     /// Another program is writing into the folder.
     Busy(PathBuf),
-    /// A single file that is there already.
+    /// A single file that exists already.
     Exists {
         /// Path of the file.
         path: PathBuf,
-        /// The option that names it.
+        /// Command-line option that names the file.
         option: &'static str,
         /// True if the command has `--force`.
         forcible: bool,
@@ -35,16 +35,16 @@ pub enum Error {
     File {
         /// Path of the file.
         path: PathBuf,
-        /// The option that names it.
+        /// Command-line option that names the file.
         option: &'static str,
-        /// What is wrong.
+        /// Description of the problem.
         problem: String,
     },
     /// The file that records the owner of a folder is damaged.
     Damaged {
         /// Path of the file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// Description of the problem.
         problem: String,
     },
 }

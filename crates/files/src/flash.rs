@@ -1,4 +1,4 @@
-//! Flash in a file.
+//! Flash memory simulated in a file.
 
 use crate::place::place;
 use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash};
@@ -10,17 +10,17 @@ use std::sync::mpsc::{SyncSender, sync_channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, JoinHandle};
 
-/// Bytes of a sector, as the STM32F405's first ones.
+/// Size of a sector, that of the first sectors of an STM32F405 \[bytes\].
 const SECTOR: usize = 16 * 1024;
 const SECTORS: usize = 2;
 
-/// Two sectors of flash in a file, for a store of parameters.
+/// Two sectors of flash in a file, for the parameter store.
 ///
-/// A write is on the disk before it returns, unless it is [in the background](Self::in_background). A program that is
-/// killed leaves what a cut of power leaves in a chip.
+/// A write is on the disk before it returns, unless the flash writes [in the background](Self::in_background). A killed
+/// program leaves the same state in the file as a power cut leaves in a chip.
 #[derive(Debug)]
 pub struct Flash {
-    /// What is in the file, or will be: nobody else writes it.
+    /// Content of the file, including queued writes. The file is locked, so nobody else changes it.
     bytes: Vec<u8>,
     disk: Disk,
 }
@@ -31,10 +31,11 @@ enum Disk {
     Background(Writer),
 }
 
-/// Most writes that wait for a slow disk: a station sets one parameter after the other, each a few writes.
+/// Largest number of writes queued for a slow disk. Setting a parameter takes a few writes, and a ground station may
+/// set all of them in a row.
 const WAITING_MAX: usize = 4096;
 
-/// Writes in a thread of its own, in their order, each on the disk before the next. It ends when all is written.
+/// Background thread that writes in order, each write on the disk before the next. It ends when everything is written.
 #[derive(Debug)]
 struct Writer {
     queue: Option<SyncSender<(u32, Vec<u8>)>>,
@@ -42,7 +43,7 @@ struct Writer {
     thread: Option<JoinHandle<()>>,
 }
 
-/// Why writing in the background has failed. Nothing is written after a failure.
+/// The error that stopped background writing. Nothing is written after a failure.
 #[derive(Clone, Debug, Default)]
 pub struct FlashFailure(Arc<Mutex<Failure>>);
 
@@ -53,7 +54,7 @@ struct Failure {
 }
 
 impl FlashFailure {
-    /// Returns it, once.
+    /// Returns the error, the first time only.
     pub fn take(&self) -> Option<FlashError> {
         self.lock().untold.take().map(FlashError::File)
     }
@@ -64,7 +65,7 @@ impl FlashFailure {
 }
 
 impl Writer {
-    /// Begins to write by `put`.
+    /// Starts a thread that writes with `put`.
     fn new(mut put: impl FnMut(u32, &[u8]) -> io::Result<()> + Send + 'static) -> io::Result<Self> {
         let (queue, waiting) = sync_channel::<(u32, Vec<u8>)>(WAITING_MAX);
         let failure = FlashFailure::default();
@@ -80,11 +81,11 @@ impl Writer {
         Ok(Writer { queue: Some(queue), failure, thread: Some(thread) })
     }
 
-    /// Lets it be written; never waits.
+    /// Queues a write; never waits.
     fn put(&self, offset: u32, bytes: &[u8]) -> io::Result<()> {
         let sent = self.queue.as_ref().map(|queue| queue.try_send((offset, bytes.to_vec())));
         let mut failure = self.failure.lock();
-        // What follows a gap could be of no use.
+        // A write was lost; later writes would be of no use, so writing stops for good.
         failure.has_failed |= !matches!(sent, Some(Ok(())));
         if failure.has_failed { Err(io::Error::other("the disk is too slow, or has failed")) } else { Ok(()) }
     }
@@ -93,17 +94,17 @@ impl Writer {
 impl Drop for Writer {
     fn drop(&mut self) {
         self.queue = None;
-        // The thread has no result.
+        // The thread returns no result.
         self.thread.take().map(JoinHandle::join);
     }
 }
 
-/// Why a [`Flash`] failed.
+/// Error of a [`Flash`].
 #[derive(Debug)]
 pub enum FlashError {
-    /// Outside the file, or not aligned.
+    /// The address is outside the file, or not aligned.
     Place(NorFlashErrorKind),
-    /// The file.
+    /// The file could not be read or written.
     File(io::Error),
 }
 
@@ -129,22 +130,23 @@ impl NorFlashError for FlashError {
 }
 
 impl Flash {
-    /// Opens the file at `path`, or makes it with both sectors erased. No other program can open it meanwhile.
+    /// Opens the file at `path`, or creates it with both sectors erased. The file is locked against other programs.
     ///
     /// # Errors
-    /// If it cannot be written, is in use, or has another size.
+    /// If it cannot be written, is in use, or has the wrong size.
     pub fn open(path: &Path) -> io::Result<Self> {
         if !path.exists() {
-            // Whole at once: a program that is killed here leaves no store of another size, which would be refused.
+            // Creates the whole file at once: a program killed here leaves no file of the wrong size, which would be
+            // refused later.
             place(path, |out| out.write_all(&[0xFF; SECTORS * SECTOR]))?;
         }
         Flash::known(path)
     }
 
-    /// Opens the file at `path`, which exists.
+    /// Opens the file at `path`, which must exist.
     ///
     /// # Errors
-    /// As [`Flash::open`].
+    /// The same as for [`Flash::open`].
     pub fn known(path: &Path) -> io::Result<Self> {
         let mut file = OpenOptions::new().read(true).write(true).open(path)?;
         file.try_lock().map_err(|error| match error {
@@ -161,11 +163,11 @@ impl Flash {
         Ok(Flash { bytes, disk: Disk::File(file) })
     }
 
-    /// Writes in the background from now on: no write waits for the disk. All is on it once this is dropped, unless
-    /// that fails.
+    /// Writes in the background from now on, so that no write waits for the disk. Dropping the flash waits until
+    /// everything is on the disk, unless writing fails.
     ///
     /// # Errors
-    /// If the system has no thread for it.
+    /// If the system cannot start the thread.
     pub fn in_background(self) -> io::Result<(Self, FlashFailure)> {
         let writer = match self.disk {
             Disk::File(mut file) => Writer::new(move |offset, bytes| put(&mut file, offset, bytes))?,
@@ -220,7 +222,7 @@ impl NorFlash for Flash {
         Ok(self.put(from, &vec![0xFF; (to - from) as usize])?)
     }
 
-    /// Clears bits, as flash does.
+    /// Clears bits only, like real flash.
     fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), FlashError> {
         check_write(self, offset, bytes.len())?;
         let mut held = vec![0; bytes.len()];
@@ -239,7 +241,8 @@ mod tests {
     /// Offset and bytes of a write.
     type Written = (u32, Vec<u8>);
 
-    /// Flash on a disk that takes a write for each `true`, and fails for a `false`; and what it has taken.
+    /// Returns a flash with a test disk, the channel that controls the disk and the writes it has received. The disk
+    /// takes one write per `true` and fails on `false`.
     fn slow() -> (Flash, Sender<bool>, Receiver<Written>) {
         let ((go, wait), (put, taken)) = (channel(), channel());
         let writer = Writer::new(move |offset, bytes: &[u8]| match wait.recv() {
@@ -250,7 +253,7 @@ mod tests {
         (flash, go, taken)
     }
 
-    /// A disk that takes nothing holds nobody up: what is written is read at once, and written in its order later.
+    /// A stalled disk delays nobody: written data can be read at once, and reach the disk in order later.
     #[test]
     fn no_write_waits_for_a_slow_disk() {
         let (flash, go, taken) = slow();
@@ -258,7 +261,7 @@ mod tests {
         flash.erase(0, SECTOR as u32).unwrap();
         let places: Vec<u32> = (0..100).map(|place| 4 * ((7 * place) % 100)).collect();
         places.iter().for_each(|place| flash.write(*place, &[*place as u8; 4]).unwrap());
-        // Bits are cleared only.
+        // A write can only clear bits.
         flash.write(4, &[1; 4]).unwrap();
         let mut read = [0; 8];
         flash.read(4, &mut read).unwrap();
@@ -271,7 +274,7 @@ mod tests {
         assert_eq!(all.last().unwrap().1, [0; 4]);
     }
 
-    /// A failure is told once, and nothing is written behind the gap; so is a disk that takes nothing for ever.
+    /// A failure is reported once, and nothing is written after it. A full queue is a failure, too.
     #[test]
     fn a_failure_is_told_once() {
         let (flash, go, taken) = slow();

@@ -10,79 +10,79 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-/// File in every folder that this program writes, which records the command and its files.
+/// File in every output folder that records the command and the files it wrote.
 const MARKER: &str = ".sitl.json";
 /// File that is locked while a program writes into the folder.
 const LOCK: &str = ".sitl.lock";
 
 #[derive(Serialize, Deserialize)]
 struct Marker {
-    /// The command, as after `sitl` on the command line.
+    /// The command line after `sitl`.
     command: String,
-    /// Name of the scenario or campaign flown.
+    /// Name of the scenario or campaign.
     name: String,
     #[serde(flatten)]
     own: OwnFiles,
     checksum: String,
 }
 
-/// Files of a command.
+/// Files written by one command.
 #[derive(Default, Serialize, Deserialize)]
 struct OwnFiles {
-    /// Names of the files that it has written, or is about to write.
+    /// Names of the files that the command has written, or is about to write.
     files: BTreeSet<String>,
-    /// Hashes of those that are complete. A file of which there is none has its own checksum, or was being written when
-    /// the program was killed.
+    /// Hashes of the complete files. A file without a hash has its own checksum, or was being written when the program
+    /// was killed.
     #[serde(default)]
     hashes: BTreeMap<String, String>,
 }
 
-/// An output folder that belongs to one command. Files appear in it whole or not at all.
+/// An output folder that belongs to one command. Each file appears in it complete or not at all.
 ///
-/// Files that the command has not written, or that were changed since, are never replaced or removed, unless by force.
-/// While a folder is open, no other program can open it.
+/// Files of others, and files that were changed since the command wrote them, are never replaced or removed, unless
+/// with `--force`. While a folder is open, no other program can open it.
 #[derive(Debug)]
 pub struct Folder {
     path: PathBuf,
     command: String,
     name: String,
     force: bool,
-    /// Holds the lock until it is closed; none of a folder that was only found.
+    /// Lock file, locked until it is closed. None if the folder was only examined.
     _lock: Option<File>,
-    /// Held while the marker is read and written.
+    /// Locked while the marker file is read and written.
     marking: Mutex<()>,
 }
 
 impl Folder {
-    /// Opens the folder at `path` for the results of `sitl <command>` for `name`, created with its parents if needed.
-    /// With `force`, files of the same names may be replaced.
+    /// Opens the folder at `path` for the results of `sitl <command>` for `name`. Creates the folder and its parents if
+    /// needed. With `force`, files with the same names may be replaced.
     ///
     /// # Errors
-    /// If it cannot be written, is in use, is neither empty nor the command's own, or has a file that was changed since
-    /// the command wrote it; nothing has been changed then.
+    /// If the folder cannot be written, is in use, is neither empty nor the command's own, or has a file that was
+    /// changed since the command wrote it. Nothing is changed then.
     pub fn open(path: &Path, command: &str, name: &str, force: bool) -> Result<Self, Error> {
         Folder::find(path, command, name, force)?;
         fs::create_dir_all(path).map_err(|source| Error::Write { path: path.into(), source })?;
-        // Without truncation: with `force`, it may be somebody else's file.
+        // Does not truncate: with `force`, the file may belong to somebody else.
         let lock = File::options().write(true).create(true).truncate(false).open(path.join(LOCK));
         let lock = lock.map_err(|source| Error::Write { path: path.join(LOCK), source })?;
         match lock.try_lock() {
             Err(TryLockError::WouldBlock) => return Err(Error::Busy(path.into())),
-            // Some network file systems have no locks: there, two programs must not use the same folder.
+            // Some network file systems have no locks; there, two programs must not use the same folder.
             Err(TryLockError::Error(_)) | Ok(()) => {}
         }
-        // Again: until now another program may have written into it.
+        // Checks again: another program may have written into the folder before it was locked.
         let folder = Folder { _lock: Some(lock), ..Folder::find(path, command, name, force)? };
-        // Under the lock: none of a program that still runs is among them.
+        // Only under the lock: no running program owns any of the temporary files.
         sweep(path);
         folder.add::<&str>(&[])?;
         Ok(folder)
     }
 
-    /// As [`open`](Self::open), without creating, changing or locking anything.
+    /// Checks the folder like [`open`](Self::open), without creating, changing or locking anything.
     ///
     /// # Errors
-    /// If it is neither empty nor the command's own, or has a file that was changed since.
+    /// If it is neither empty nor the command's own, or has a file that was changed since the command wrote it.
     pub fn find(path: &Path, command: &str, name: &str, force: bool) -> Result<Self, Error> {
         let (command, name) = (command.into(), name.into());
         let folder = Folder { path: path.into(), command, name, force, _lock: None, marking: Mutex::default() };
@@ -96,12 +96,12 @@ impl Folder {
         }
     }
 
-    /// Returns its path.
+    /// Returns the folder's path.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Returns the error that its file `name` could not be written.
+    /// Returns the error for a failure to write the file `name`.
     pub fn error(&self, name: &str, source: io::Error) -> Error {
         Error::Write { path: self.path.join(name), source }
     }
@@ -110,12 +110,12 @@ impl Folder {
         Error::Foreign { path: self.path.clone(), whose }
     }
 
-    /// Returns the files that the command has written here before; by force, those of any command.
+    /// Returns the files that the command has written here before; with `force`, those of any command.
     fn own(&self) -> Result<OwnFiles, Error> {
         match self.marker() {
             Ok(Some(Marker { command, own, .. })) if self.force || command == self.command => Ok(own),
             _ if self.force => Ok(OwnFiles::default()),
-            // A command that was interrupted before it had anything to write is in nobody's way.
+            // A folder of an interrupted command that has written nothing is free.
             Ok(_) if self.is_empty()? => Ok(OwnFiles::default()),
             Ok(Some(Marker { command, name, .. })) => {
                 Err(self.foreign(format!("holds what `sitl {command}` made of {name}")))
@@ -125,7 +125,7 @@ impl Folder {
         }
     }
 
-    /// True of a file that is not as the command has left it; one that is gone is not.
+    /// True if the file differs from what the command wrote. A removed file does not count as changed.
     fn is_changed(&self, own: &OwnFiles, name: &str) -> bool {
         own.hashes.get(name).is_some_and(|then| match seal::hash_of_file(&self.path.join(name)) {
             Ok(now) => now != *then,
@@ -142,7 +142,7 @@ impl Folder {
         };
         seal::verify(&mut io::Cursor::new(&bytes))?;
         let marker: Marker = serde_json::from_slice(&bytes)?;
-        // They will be removed some day, so none may be outside the folder.
+        // These files may be removed later, so a name must not lead outside the folder.
         let is_plain = |name: &String| Path::new(name).file_name().is_some_and(|plain| plain == name.as_str());
         if marker.own.files.iter().chain(marker.own.hashes.keys()).all(is_plain) {
             Ok(Some(marker))
@@ -160,15 +160,15 @@ impl Folder {
         Ok(entries.flatten().all(|entry| entry.file_name().to_string_lossy().starts_with(HIDDEN)))
     }
 
-    /// Records `names` as the command's own, before they are written.
+    /// Records `names` as the command's own, before the files are written.
     ///
     /// # Errors
-    /// If one of them exists and is not the command's.
+    /// If one of the files exists and is not the command's.
     pub fn add<N: AsRef<str>>(&self, names: &[N]) -> Result<(), Error> {
         self.change(|own| {
             for name in names.iter().map(N::as_ref) {
                 let path = self.path.join(name);
-                // Of the link itself: one that leads nowhere is somebody's, too.
+                // Checks the link itself, since a dangling link is also somebody's file.
                 if own.files.insert(name.into()) && !self.force && fs::symlink_metadata(&path).is_ok() {
                     let whose = format!("in the way, and not from `sitl {}`", self.command);
                     return Err(Error::Foreign { path, whose });
@@ -178,29 +178,30 @@ impl Folder {
         })
     }
 
-    /// As [`add`](Self::add), and removes all other files that the command has written here before, since they belong
-    /// to earlier results.
+    /// Records `names` like [`add`](Self::add), and removes all other files of the command, since they belong to
+    /// earlier results.
     pub fn only<N: AsRef<str>>(&self, names: &[N]) -> Result<(), Error> {
         let before = self.own()?;
         self.add(names)?;
         let now: BTreeSet<String> = names.iter().map(|name| name.as_ref().into()).collect();
-        // Meanwhile the marker names old and new files: what a killed program leaves is still the command's own.
+        // The marker now names old and new files, so that everything a killed program leaves is still the command's
+        // own.
         for stale in before.files.difference(&now) {
             let path = self.path.join(stale);
-            // By force, files of others may be among them, and folders of campaigns.
+            // With `force`, these may include files of others and folders of campaigns.
             let is_file = fs::symlink_metadata(&path).is_ok_and(|data| !data.is_dir());
             if is_file && !self.is_changed(&before, stale) {
                 fs::remove_file(path).map_err(|source| self.error(stale, source))?;
             }
         }
         self.change(|own| {
-            // Those to come are written over, and their hashes are not known until then.
+            // The files will be overwritten; their hashes are not known until then.
             *own = OwnFiles { files: now, hashes: BTreeMap::new() };
             Ok(())
         })
     }
 
-    /// Changes what the marker says of the files.
+    /// Changes the list of files in the marker.
     fn change(&self, change: impl FnOnce(&mut OwnFiles) -> Result<(), Error>) -> Result<(), Error> {
         let _alone = self.marking.lock().unwrap_or_else(PoisonError::into_inner);
         let mut own = self.own()?;
@@ -211,8 +212,8 @@ impl Folder {
         place(&path, |out| seal::json(out, &marker)).map_err(|source| Error::Write { path, source })
     }
 
-    /// Lets `fill` write a file under a temporary name, and then renames it; an interrupted or failed run leaves the
-    /// previous file. A file with its final name is on the disk, even after a power cut.
+    /// Lets `fill` write a file under a temporary name, then renames the file. A failed or interrupted run leaves the
+    /// previous file. Once a file has its final name it is on the disk, even after a power cut.
     pub fn place(
         &self,
         name: &str,

@@ -1,6 +1,7 @@
-//! Files. [`read`]: TOML files, whose mistakes are reported in one line each. The rest is what commands write: folders
-//! of results and single files, which appear whole or not at all, carry a checksum and never replace files of others;
-//! files and pipes that are written in the background. Flash in a file.
+//! File access. [`read`] reads TOML files and reports each mistake in one line.
+//!
+//! The rest writes: folders of results and single files. They appear complete or not at all, carry a checksum and never
+//! replace files of others. There are also writers in the background and flash simulated in a file.
 #![forbid(unsafe_code)]
 
 mod background;

@@ -7,28 +7,29 @@ use std::fs::{self, File};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-/// A single file that a command is going to write. One that exists is never replaced, unless by force.
+/// A single file that a command is going to write. An existing file is never replaced, unless with `--force`.
 #[derive(Clone, Debug)]
 pub struct Output {
     path: PathBuf,
     option: &'static str,
-    /// Whether to replace what is there; none if the command cannot be told to.
+    /// Whether to replace an existing file; none if the command has no `--force`.
     force: Option<bool>,
 }
 
 impl Output {
-    /// Checks that `option` names a file that is not there, in a folder that is. Nothing is created or changed.
+    /// Checks that the file named by `option` does not exist yet, and that its folder does. Creates and changes
+    /// nothing.
     ///
     /// # Errors
-    /// If it is there, or cannot be.
+    /// If the file exists, or cannot be created.
     pub fn new(path: &Path, option: &'static str) -> Result<Self, Error> {
         Output { path: path.into(), option, force: None }.checked()
     }
 
-    /// As [`new`](Self::new), for a command with `--force`: if that is given, a file that is there will be replaced.
+    /// Checks like [`new`](Self::new), for a command with `--force`: with `force`, an existing file will be replaced.
     ///
     /// # Errors
-    /// As [`new`](Self::new).
+    /// The same as for [`new`](Self::new).
     pub fn forcible(path: &Path, option: &'static str, force: bool) -> Result<Self, Error> {
         Output { path: path.into(), option, force: Some(force) }.checked()
     }
@@ -41,7 +42,7 @@ impl Output {
         if self.path.is_dir() || self.path.file_name().is_none() {
             return Err(self.failed("it is a folder"));
         }
-        // Of the link itself: one that leads nowhere is somebody's, too.
+        // Checks the link itself, since a dangling link is also somebody's file.
         match fs::symlink_metadata(&self.path) {
             Ok(_) if self.force != Some(true) => Err(self.exists()),
             _ => Ok(self),
@@ -56,7 +57,7 @@ impl Output {
         Error::File { path: self.path.clone(), option: self.option, problem: problem.into() }
     }
 
-    /// Says that the file cannot be written.
+    /// Returns the error for a file that could not be written.
     #[must_use]
     pub fn unwritten(&self, error: &io::Error) -> Error {
         match error.kind() {
@@ -65,25 +66,25 @@ impl Output {
         }
     }
 
-    /// Returns its path.
+    /// Returns the file's path.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Lets `fill` write the whole file, which appears whole or not at all.
+    /// Lets `fill` write the whole file, which appears complete or not at all.
     ///
     /// # Errors
-    /// If it cannot be written, or has appeared meanwhile.
+    /// If the file cannot be written, or has appeared meanwhile.
     pub fn place(&self, fill: impl FnOnce(&mut (dyn Write + Send)) -> io::Result<()>) -> Result<(), Error> {
         let placed = if self.force == Some(true) { place(&self.path, fill) } else { fresh(&self.path, fill) };
         placed.map_err(|error| self.unwritten(&error))
     }
 
-    /// Creates the file, for a log that is written bit by bit. Even by force it must not be there. It is remembered
-    /// for [`remove_created`](crate::remove_created) and [`remove_empty`](crate::remove_empty).
+    /// Creates the file for incremental writing, such as a log. Fails if the file exists, even with `--force`.
+    /// Remembers it for [`remove_created`](crate::remove_created) and [`remove_empty`](crate::remove_empty).
     ///
     /// # Errors
-    /// If it cannot be created, or has appeared meanwhile.
+    /// If the file cannot be created, or has appeared meanwhile.
     pub fn create(&self) -> Result<File, Error> {
         let file = File::create_new(&self.path).map_err(|error| self.unwritten(&error))?;
         remember(&self.path);

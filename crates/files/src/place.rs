@@ -1,4 +1,4 @@
-//! Atomic writing of files: whole or not at all.
+//! Atomic writing: a file appears complete or not at all.
 
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
@@ -7,21 +7,21 @@ use std::path::Path;
 /// Prefix of the names of temporary files.
 pub(crate) const HIDDEN: &str = ".sitl.";
 
-/// Lets a function write to a file.
+/// Writer that is passed to a function which fills a file.
 type Fill<'a> = &'a mut (dyn Write + Send);
 
-/// Writes the file at `path` as [`Folder::place`](crate::Folder::place) does, in place of any other.
+/// Writes the file at `path` atomically like [`Folder::place`](crate::Folder::place); replaces an existing file.
 ///
 /// # Errors
-/// If it cannot be written; what was there before is there still.
+/// If the file cannot be written; an existing file stays as it was.
 pub fn place(path: &Path, fill: impl FnOnce(Fill<'_>) -> io::Result<()>) -> io::Result<()> {
     by_way_of(path, fill, |temporary| fs::rename(temporary, path))
 }
 
-/// As [`place`], where there must be no file.
+/// Writes the file at `path` atomically like [`place`]; fails if it exists.
 pub(crate) fn fresh(path: &Path, fill: impl FnOnce(Fill<'_>) -> io::Result<()>) -> io::Result<()> {
     by_way_of(path, fill, |temporary| match fs::hard_link(temporary, path) {
-        // Some file systems have no links.
+        // Some file systems have no hard links.
         Err(error) if error.kind() != io::ErrorKind::AlreadyExists => {
             File::create_new(path)?;
             fs::rename(temporary, path)
@@ -30,7 +30,7 @@ pub(crate) fn fresh(path: &Path, fill: impl FnOnce(Fill<'_>) -> io::Result<()>) 
     })
 }
 
-/// Lets `fill` write a temporary file beside `path`, and `settle` give it its name.
+/// Lets `fill` write a temporary file next to `path`, then lets `settle` give it its final name.
 fn by_way_of(
     path: &Path,
     fill: impl FnOnce(Fill<'_>) -> io::Result<()>,
@@ -38,18 +38,18 @@ fn by_way_of(
 ) -> io::Result<()> {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let temporary = path.with_file_name(format!("{HIDDEN}{name}.{}.tmp", std::process::id()));
-    // A killed program of the same process id may have left one; usually there is nothing to remove.
+    // A killed program with the same process id may have left a temporary file; usually there is none.
     let _ = fs::remove_file(&temporary);
     let written = File::create_new(&temporary).and_then(|file| {
         let mut out = BufWriter::new(Disk { file, failure: None });
         let filled = fill(&mut out).and_then(|()| out.flush());
-        // Taken apart, since a buffer that is dropped after a failure would be written once more.
+        // Takes the buffer apart: dropping it after a failure would try to write again.
         let (disk, _) = out.into_parts();
         filled.map_err(|error| disk.cause(error))?;
         disk.file.sync_all()
     });
     written.and_then(|()| settle(&temporary)).inspect_err(|_| {
-        // Nothing more can be done if this fails too.
+        // A failure here is ignored: nothing more can be done.
         let _ = fs::remove_file(&temporary);
     })
 }
@@ -60,13 +60,13 @@ pub fn sweep(dir: &Path) {
         let name = entry.file_name();
         let name = name.to_string_lossy();
         if name.starts_with(HIDDEN) && name.ends_with(".tmp") {
-            // A file that cannot be removed does no harm.
+            // Ignores files that cannot be removed; they do no harm.
             let _ = fs::remove_file(entry.path());
         }
     }
 }
 
-/// A file that records why writing to it failed.
+/// A file that records the error of a failed write.
 pub struct Disk {
     /// The file.
     pub file: File,
@@ -75,7 +75,7 @@ pub struct Disk {
 }
 
 impl Disk {
-    /// Returns the system's error, if there was one: libraries wrap it so that its kind is lost.
+    /// Returns the system's own error if there was one, since libraries wrap errors and lose their kind.
     pub fn cause(&self, error: io::Error) -> io::Error {
         self.failure.map_or(error, io::Error::from_raw_os_error)
     }

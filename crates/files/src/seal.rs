@@ -1,6 +1,7 @@
 //! A checksum inside the file that it protects, so that copies are protected too.
 //!
-//! Near its end the file holds `xxh64:` and 16 digits: its own XXH64, computed with 16 zeros in their place.
+//! Near its end the file holds `xxh64:` and 16 digits: the file's own XXH64, computed with zeros in place of the
+//! digits.
 
 use core::hash::Hasher;
 use std::fs::File;
@@ -12,30 +13,30 @@ use twox_hash::XxHash64;
 pub const OPEN: &str = "xxh64:0000000000000000";
 const TAG: &[u8] = b"xxh64:";
 const ZEROS: &[u8; 16] = b"0000000000000000";
-/// Number of bytes at the end within which the tag lies.
+/// Number of bytes at the end of a file that must contain the tag.
 const TAIL: usize = 4096;
 
-/// Returns where the digits of the last tag begin.
+/// Returns the offset of the last tag's digits.
 fn digits(tail: &[u8]) -> Option<usize> {
     let tag = tail.windows(OPEN.len()).rposition(|window| window.starts_with(TAG))?;
     Some(tag + TAG.len())
 }
 
-/// Seals the data written to it, which contains [`OPEN`] near its end.
+/// Writer that seals its data, which must contain [`OPEN`] near the end.
 pub struct Sealing<W> {
     out: W,
     hash: XxHash64,
-    /// The last bytes so far, which may contain the digits.
+    /// Last bytes so far, held back since they may contain the tag.
     held: Vec<u8>,
 }
 
 impl<W: Write> Sealing<W> {
-    /// Creates a writer that seals its output to `out`.
+    /// Creates a writer that seals the data and writes them to `out`.
     pub fn new(out: W) -> Self {
         Sealing { out, hash: XxHash64::with_seed(0), held: Vec::new() }
     }
 
-    /// Fills in the checksum.
+    /// Fills in the checksum and writes the rest.
     pub fn finish(mut self) -> io::Result<()> {
         self.hash.write(&self.held);
         let sum = format!("{:016x}", self.hash.finish());
@@ -48,7 +49,7 @@ impl<W: Write> Sealing<W> {
 impl<W: Write> Write for Sealing<W> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         self.held.extend_from_slice(bytes);
-        // In large pieces, since the end that is kept is moved each time.
+        // Writes in large pieces, since each time the held bytes are moved.
         if self.held.len() > 16 * TAIL {
             let rest = self.held.split_off(self.held.len() - TAIL);
             self.hash.write(&self.held);
@@ -71,7 +72,7 @@ pub fn json(out: &mut dyn Write, value: &impl serde::Serialize) -> io::Result<()
     out.finish()
 }
 
-/// Returns the XXH64 of a file, as a tag like a seal's.
+/// Returns the XXH64 of a file, in the format of a seal.
 ///
 /// # Errors
 /// If it cannot be read.
@@ -81,8 +82,8 @@ pub fn hash_of_file(path: &Path) -> io::Result<String> {
     Ok(out.finish())
 }
 
-/// Returns a hash of what decides a result, as it is written. Numbers are written to the last bit; infinity, of an
-/// event without end, as null, which no other number is.
+/// Returns a hash of everything that decides a result, computed over its JSON. Numbers are exact. Infinity, for an
+/// event without end, is written as null, like no other number.
 pub fn hash_of(decides: &impl serde::Serialize) -> String {
     let mut out = Hashing::new(io::sink());
     let written = serde_json::to_writer(&mut out, decides);
@@ -90,7 +91,7 @@ pub fn hash_of(decides: &impl serde::Serialize) -> String {
     format!("{:016x}", out.hash.finish())
 }
 
-/// Passes on the data written to it, and hashes them.
+/// Writer that passes its data on and hashes them.
 pub(crate) struct Hashing<W> {
     out: W,
     hash: XxHash64,
@@ -101,7 +102,7 @@ impl<W> Hashing<W> {
         Hashing { out, hash: XxHash64::with_seed(0) }
     }
 
-    /// Returns the hash, as [`hash_of_file`] does.
+    /// Returns the hash in the format of [`hash_of_file`].
     pub(crate) fn finish(self) -> String {
         format!("xxh64:{:016x}", self.hash.finish())
     }
@@ -166,14 +167,14 @@ mod tests {
         out
     }
 
-    /// Checked for all lengths around that of the held bytes and all ways to cut the data into pieces.
+    /// Checks lengths around the size of the held bytes, and two ways to cut the data into pieces.
     #[test]
     fn no_flipped_bit_passes() {
         for (before, after) in [(0, 0), (1, 9), (TAIL - 30, 8), (16 * TAIL, 100), (40 * TAIL + 1, TAIL - 50)] {
             let bytes = sealed(before, after, 1000);
             assert_eq!(bytes, sealed(before, after, 77_777));
             verify(&mut Cursor::new(&bytes)).unwrap();
-            // Every bit of the end, and some of the others.
+            // Every bit of the last 300 bytes, and some of the others.
             let positions = (0..bytes.len()).filter(|at| at + 300 > bytes.len() || at % 1009 == 0);
             for (at, bit) in positions.flat_map(|at| (0..8).map(move |bit| (at, bit))) {
                 let mut flipped = bytes.clone();

@@ -1,4 +1,4 @@
-//! What is written never replaces what others have, in folders and single files.
+//! Writing never replaces files of others, in folders or as single files.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs, reason = "tests")]
 
 use afbc_files::{Error, Folder, Output};
@@ -23,10 +23,10 @@ fn names(folder: &Path) -> Vec<String> {
     names
 }
 
-/// Puts something in the way.
+/// Function that puts something in the way, at a path.
 type Make = fn(&Path);
 
-/// What may be in the way of a file; the target of links is beside it.
+/// Things that may be in the way of a file. Links point to a target in the same folder.
 const IN_THE_WAY: [(&str, Make); 4] = [
     ("file", |path| fs::write(path, "mine").unwrap()),
     ("empty", |path| fs::write(path, "").unwrap()),
@@ -48,7 +48,7 @@ fn nothing_is_replaced_unless_by_force() {
         }
         assert_eq!((fs::symlink_metadata(&path).unwrap().file_type(), fs::read(&path).ok()), before);
         let forced = Output::forcible(&path, "--it", true).unwrap();
-        // Without success it is as it was.
+        // A failure leaves the file as it was.
         forced.place(|_| Err(io::ErrorKind::StorageFull.into())).unwrap_err();
         assert_eq!((fs::symlink_metadata(&path).unwrap().file_type(), fs::read(&path).ok()), before);
         assert!(matches!(forced.create(), Err(Error::Exists { .. })), "logs are not forced");
@@ -64,7 +64,7 @@ fn nothing_is_replaced_unless_by_force() {
     assert_eq!(names(&folder), ["empty", "file", "link", "lost", "target"]);
 }
 
-/// What was checked may appear before it is written: it is not replaced then, either.
+/// A file that appears between the check and the write is not replaced, either.
 #[test]
 fn what_appears_meanwhile_is_kept() {
     let folder = folder("meanwhile");
@@ -102,12 +102,12 @@ fn results_are_replaced_by_the_same_command_as_long_as_nobody_has_changed_them()
         let error = refused("fly x");
         assert!(error.contains(&format!("{name}: changed since `sitl fly x` wrote it")), "{error}");
         assert_eq!(fs::read(path.join(name)).unwrap(), b"fly y");
-        // As it was, or gone, it is nobody's again.
+        // A file that is restored or gone does not count as changed.
         fs::write(path.join(name), "fly x").unwrap();
         written(&path, "fly x", false, &files).unwrap();
         fs::remove_file(path.join(name)).unwrap();
     }
-    // By force another command takes over, also what it does not write; what was changed is left.
+    // With `force`, another command takes over all files, including those that it does not write. Changed files stay.
     written(&path, "fly x", false, &files).unwrap();
     fs::write(path.join("b.json"), "mine").unwrap();
     written(&path, "fly z", true, &["a.csv"]).unwrap();
@@ -116,7 +116,7 @@ fn results_are_replaced_by_the_same_command_as_long_as_nobody_has_changed_them()
     assert!(refused("fly x").contains("holds what `sitl fly z` made of it"));
 }
 
-/// A command that was interrupted before it wrote anything is in nobody's way.
+/// A folder of a command that was interrupted before it wrote anything is free for any command.
 #[test]
 fn a_folder_without_results_is_anybodys() {
     let folder = folder("interrupted").join("results");

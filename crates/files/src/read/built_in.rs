@@ -1,4 +1,4 @@
-//! Files that come with the program, which are also templates.
+//! Built-in files, which also serve as templates.
 
 use super::error::FileError;
 use super::words::nearest;
@@ -10,12 +10,12 @@ pub struct BuiltIn<T: 'static> {
     pub name: &'static str,
     /// Text of the file.
     pub text: &'static str,
-    /// Parses it, given the file's name for errors, its text and its name.
+    /// Function that parses the file, given its name for error messages, its text and its name.
     parse: fn(&str, &str, &str) -> Result<T, FileError>,
 }
 
 impl<T> BuiltIn<T> {
-    /// Creates the file `text` called `name`, which `parse` reads.
+    /// Creates the built-in file `name` with the content `text`, parsed by `parse`.
     pub const fn new(
         name: &'static str,
         text: &'static str,
@@ -27,17 +27,17 @@ impl<T> BuiltIn<T> {
     /// Parses the file.
     ///
     /// # Errors
-    /// Does not occur: a test reads every file.
+    /// Never fails in practice: a test reads every built-in file.
     pub fn read(&self) -> Result<T, FileError> {
         (self.parse)(&format!("built-in {}", self.name), self.text, self.name)
     }
 
-    /// Returns the one of `all` called `name`.
+    /// Returns the built-in file called `name`.
     pub fn named(all: &'static [Self], name: &str) -> Option<&'static Self> {
         all.iter().find(|built_in| built_in.name == name)
     }
 
-    /// Returns the one of `all` whose name is similar to `name`.
+    /// Returns the built-in file whose name is most similar to `name`, if any is similar.
     pub fn similar(all: &'static [Self], name: &str) -> Option<&'static Self> {
         nearest(name, all.iter().map(|built_in| built_in.name)).and_then(|known| Self::named(all, known))
     }

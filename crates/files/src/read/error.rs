@@ -16,36 +16,36 @@ struct Mistake {
     line: Option<usize>,
     key: String,
     problem: String,
-    /// Where the file that was being read has it, if it is in one part of it.
+    /// Place in the file being read; none if the mistake concerns the file as a whole.
     place: Option<Box<Place>>,
 }
 
-/// Where a mistake is in a file.
+/// Position of a mistake in a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Place {
     pub(crate) file: String,
     /// Dotted key.
     pub(crate) key: String,
-    /// Byte of the text, and its line.
+    /// Byte offset in the text; `line` is the line with that byte.
     pub(crate) at: usize,
     pub(crate) line: usize,
-    /// Where the table of the key begins.
+    /// Byte offset at which the key's table begins.
     pub(crate) table: usize,
     pub(crate) fault: Fault,
 }
 
-/// What is wrong with a key.
+/// Kind of mistake.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Fault {
-    /// Its value.
+    /// The value is wrong.
     Value,
-    /// Its value is none of the options: of the most similar one, or of all.
+    /// The value is none of the options. Holds the most similar option, or all of them.
     Choice(Vec<&'static str>),
-    /// It is not there.
+    /// The key is missing.
     Missing,
-    /// Nobody knows it; what it should be called, if it is misspelt.
+    /// The key is unknown. Holds the correct key if this looks like a misspelling.
     Unknown(Option<&'static str>),
-    /// How its value goes with those under these dotted keys, or without any with the others of its table.
+    /// The value conflicts with the values of these dotted keys; if the list is empty, with the others in its table.
     Clash(&'static [&'static str]),
 }
 
@@ -69,7 +69,7 @@ impl FileError {
         FileError { first, others: Vec::new() }
     }
 
-    /// Returns all mistakes of a file as one error, in its order. There must be one.
+    /// Joins all mistakes of a file into one error, in the order of the lines. `errors` must not be empty.
     pub(crate) fn all(errors: Vec<FileError>) -> Self {
         let mistakes = errors.into_iter().flat_map(|FileError { first, others }| [first].into_iter().chain(others));
         let mut mistakes: Vec<Mistake> = mistakes.collect();
@@ -79,7 +79,7 @@ impl FileError {
         FileError { first, others: mistakes.collect() }
     }
 
-    /// Returns both errors as one.
+    /// Joins both errors into one, without repeating a mistake.
     #[must_use]
     pub fn and(mut self, other: FileError) -> Self {
         let more = [other.first].into_iter().chain(other.others);
@@ -94,18 +94,18 @@ impl FileError {
         self.first.line
     }
 
-    /// Returns where the first mistake is.
+    /// Returns the position of the first mistake.
     pub(crate) fn place(&self) -> Option<&Place> {
         self.first.place.as_deref()
     }
 
-    /// Says what is wrong with the key of the first mistake.
+    /// Sets the kind of the first mistake.
     pub(crate) fn because(mut self, fault: Fault) -> Self {
         self.first.place.iter_mut().for_each(|place| place.fault = fault.clone());
         self
     }
 
-    /// Changes where the mistakes are, which does not show.
+    /// Changes the positions of the mistakes; the message stays the same.
     pub(crate) fn placed(mut self, change: impl Fn(&mut Option<Box<Place>>)) -> Self {
         change(&mut self.first.place);
         self.others.iter_mut().for_each(|other| change(&mut other.place));
@@ -113,10 +113,10 @@ impl FileError {
     }
 }
 
-/// A file's name, as given by the user, and its text.
+/// A file's name and text.
 #[derive(Clone, Copy, Debug)]
 pub struct Source<'a> {
-    /// Name as given.
+    /// Name as the user gave it.
     pub file: &'a str,
     /// The whole text.
     pub text: &'a str,

@@ -9,19 +9,19 @@ use std::io::{self, Read};
 use std::path::Path;
 use toml::de::DeTable;
 
-/// Longest name.
+/// Largest length of a name \[bytes\].
 const NAME_LENGTH: usize = 64;
 /// Largest file accepted \[bytes\].
 const FILE_SIZE: u64 = 1 << 20;
 
-/// Returns the text of a file of this `kind`, which also has built-in files.
+/// Returns the text of a file of this `kind`; error messages point to the built-in files of that kind.
 ///
 /// # Errors
 /// If it cannot be read, is too large, or is not text.
 pub fn text(path: &Path, kind: &str) -> Result<String, FileError> {
     let read = || {
         let mut text = String::new();
-        // One byte more than is accepted shows that a file is too large, however large it is.
+        // Reads one byte more than the limit: enough to detect a file that is too large, whatever its size.
         let read = File::open(path)?.take(FILE_SIZE + 1).read_to_string(&mut text)?;
         if read as u64 > FILE_SIZE { Err(io::ErrorKind::FileTooLarge.into()) } else { Ok(text) }
     };
@@ -39,19 +39,19 @@ pub fn text(path: &Path, kind: &str) -> Result<String, FileError> {
     })
 }
 
-/// A valid file of a kind.
+/// A valid example of a kind of file.
 #[derive(Clone, Copy, Debug)]
 pub struct Example {
-    /// What `sitl` prints it by.
+    /// `sitl` command that prints the example.
     pub command: &'static str,
-    /// Its text, from which required tables are taken to read on behind a mistake in one.
+    /// Text of the example. Reading on after a mistake takes missing tables from it.
     pub text: &'static str,
 }
 
 /// Parses the `text` of a TOML file with `read`.
 ///
 /// # Errors
-/// If it is not TOML; or every mistake that `read` finds, going on behind each of them.
+/// If the text is not TOML, or if `read` finds mistakes: the error holds all of them.
 pub fn document<T>(
     file: &str,
     text: &str,
@@ -62,11 +62,11 @@ pub fn document<T>(
     read_all(source, parsed(source, sample)?, sample.text, read)
 }
 
-/// As [`document`], where a table of the list `list` may say `like = "NAME"`: it takes over what an earlier one of this
-/// name says and it does not, except the keys `own`.
+/// Parses a document like [`document`], with inheritance: a table in the list `list` may say `like = "NAME"`. It then
+/// takes the keys that it lacks from the earlier table of that name, except the keys `own`.
 ///
 /// # Errors
-/// As [`document`]. A `like` that names no earlier table is left for `read` to refuse.
+/// Like [`document`]. A `like` that names no earlier table is left for `read` to refuse.
 pub fn document_with_heirs<T>(
     file: &str,
     text: &str,
@@ -83,10 +83,10 @@ pub fn document_with_heirs<T>(
 /// Parses the text.
 ///
 /// # Errors
-/// Every place that is not TOML.
+/// Every TOML syntax error.
 fn parsed<'t>(source: Source<'t>, sample: Example) -> Result<DeTable<'t>, FileError> {
     let (document, errors) = DeTable::parse_recoverable(source.text);
-    // Keys of a table that is there twice are there twice as well.
+    // In a table that occurs twice, every key is a duplicate as well: only the table is reported.
     let (mut twice, mut told) = (Vec::new(), Vec::new());
     for error in &errors {
         let at = error.span().unwrap_or_default().start;
@@ -99,12 +99,12 @@ fn parsed<'t>(source: Source<'t>, sample: Example) -> Result<DeTable<'t>, FileEr
         told.push(error);
     }
     let mut errors: Vec<_> = told.into_iter().map(|error| syntax(source, error, sample.command)).collect();
-    // Behind one on a line, the others follow from it.
+    // Keeps the first error of each line; later errors on the line follow from it.
     errors.dedup_by_key(|error| error.line());
     if errors.is_empty() { Ok(document.into_inner()) } else { Err(FileError::all(errors)) }
 }
 
-/// Returns name and description; the name is `name` if the file has none.
+/// Returns name and description. The name defaults to `name`.
 ///
 /// # Errors
 /// If the name cannot be part of a file name, or the description has several lines.
@@ -121,7 +121,7 @@ pub fn title(root: &mut Table<'_>, name: &str) -> Result<[String; 2], FileError>
     Ok([name, description])
 }
 
-/// Returns the head of the table that the byte `at` is in, and its line; empty before the first.
+/// Returns the header of the table around byte `at`, and its line; empty before the first header.
 fn head(text: &str, at: usize) -> (&str, usize) {
     let line = text.bytes().take(at).filter(|byte| *byte == b'\n').count();
     let lines = text.lines().enumerate().take(line + 1);
@@ -129,7 +129,7 @@ fn head(text: &str, at: usize) -> (&str, usize) {
     heads.last().map_or(("", 0), |(number, text)| (text, number + 1))
 }
 
-/// Returns the error of a text that is not TOML.
+/// Returns the error for a TOML syntax error.
 fn syntax(source: Source<'_>, error: &toml::de::Error, sample: &str) -> FileError {
     let span = error.span().unwrap_or_default();
     let near = source.text.get(span.clone()).and_then(|text| text.lines().next()).unwrap_or_default();

@@ -1,17 +1,18 @@
-//! Tables of a list that take over what an earlier one of the list says.
+//! Inheritance between the tables of a list by the key `like`.
 
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-/// Key of the earlier table's name.
+/// Key that names the earlier table.
 pub const LIKE: &str = "like";
 
-/// Gives every table of the list `list` what the earlier one named by its key `like` says: keys that it lacks itself,
-/// in tables key by key, except those in `own`. A table with another `kind` keeps to itself. Spans stay, so that an
-/// error refers to the line that says it. A name that nothing earlier has changes nothing; the reader refuses it.
+/// Lets every table of the list `list` inherit from the earlier table that its key `like` names. The table takes the
+/// keys that it lacks, except those in `own`; subtables are merged key by key. A table with another `kind` takes
+/// nothing. Spans are kept, so that an error points to the line that says the value. A `like` that names no earlier
+/// table changes nothing; the reader refuses it.
 pub(crate) fn inherit(document: &mut DeTable<'_>, list: &str, own: &[&str]) {
     let Some(DeValue::Array(tables)) = document.get_mut(list).map(Spanned::get_mut) else { return };
-    // In their order, so that what an heir has taken over goes on to its own heirs.
+    // Goes in order, so that inherited keys are inherited further.
     for index in 1..tables.len() {
         let (earlier, rest) = tables.split_at_mut(index);
         let Some(DeValue::Table(heir)) = rest.first_mut().map(Spanned::get_mut) else { continue };

@@ -1,4 +1,4 @@
-//! Reading on behind a mistake, so that one error tells every mistake of a file.
+//! Reading on after a mistake, so that one error reports every mistake of a file.
 
 use super::error::{Fault, FileError, Place, Source};
 use super::heirs::LIKE;
@@ -6,21 +6,24 @@ use super::table::{Overlooked, Table};
 use toml::Spanned;
 use toml::de::{DeArray, DeTable, DeValue};
 
-/// Keys that decide which others a table has.
+/// Keys that decide which other keys a table has.
 const DECIDING: [&str; 6] = ["kind", LIKE, "controller", "axis", "parameter", "failure"];
-/// Largest number of mistakes that are told.
+/// Largest number of mistakes reported.
 const MOST: usize = 50;
 /// Largest number of times that a file is read.
 const READINGS: usize = 10 * MOST;
-/// Largest number of readings to learn how well an option fits.
+/// Largest number of readings for rating one option.
 const TRIALS: usize = 12;
 
-/// Reads `document`. Behind a mistake it is mended, and read again for the next one: a misspelt key is renamed, a wrong
-/// choice of what a table is becomes the option that fits best, anything else is taken out, and what is then missing is
-/// any value, comes from `template`, a valid file, or leaves its table out as well.
+/// Reads `document`. After each mistake it mends the document and reads again, to find the next mistake.
+///
+/// - A misspelt key is renamed.
+/// - A wrong value of a key that decides the kind of its table becomes the option that fits best.
+/// - Anything else is removed. A key that is missing then gets any value, or its value in `template`, a valid file;
+///   failing both, its table is removed, too.
 ///
 /// # Errors
-/// Every mistake, in the order of the file, but none that only follows from mending another.
+/// All mistakes in the order of the file, without those that only follow from mending another.
 pub(crate) fn read_all<'d, T>(
     source: Source<'d>,
     document: DeTable<'d>,
@@ -51,31 +54,31 @@ pub(crate) fn read_all<'d, T>(
     Err(FileError::all(mistakes))
 }
 
-/// A document, mended so far.
+/// Working copy of a document, with the mistakes mended so far.
 #[derive(Clone)]
 struct Draft<'d> {
     document: DeTable<'d>,
     mended: Mended,
 }
 
-/// What has been mended so far.
+/// Record of the mends so far.
 #[derive(Clone, Default)]
 struct Mended {
-    /// Dotted keys, with where the list items begin that they are in.
+    /// Mended dotted keys, each with the byte offsets of the list items around it.
     keys: Vec<(String, Vec<usize>)>,
     overlooked: Overlooked,
-    /// Dotted keys that came from the template.
+    /// Dotted keys taken from the template.
     given: Vec<String>,
 }
 
-/// True if `inner` is the dotted key `outer`, or one in it. All are in the document, whose key is empty.
+/// True if the dotted key `inner` is `outer` or inside it. The empty key is the document, which contains all keys.
 fn is_within(inner: &str, outer: &str) -> bool {
     let rest = inner.strip_prefix(outer);
     outer.is_empty() || rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
 }
 
-/// True if one of two dotted keys is in the other, wherever in `key` the `other` begins: a scenario may be part of a
-/// file.
+/// True if one of two dotted keys is inside the other, after dropping any number of leading parts of `key`: a scenario
+/// may be part of a larger file.
 fn concerns(key: &str, other: &str) -> bool {
     let rests = key.match_indices('.').filter_map(|(at, _)| key.get(at + 1..));
     core::iter::once(key).chain(rests).any(|key| is_within(key, other) || is_within(other, key))
@@ -89,7 +92,7 @@ impl<'d> Draft<'d> {
         Table::root(source, &self.document, &self.mended.overlooked)
     }
 
-    /// True if a mistake may only follow from what was mended.
+    /// True if a mistake may be a mere consequence of an earlier mend.
     fn explains(&self, place: &Place) -> bool {
         let (items, mended) = (items(&self.document, place), &self.mended);
         let among = match &place.fault {
@@ -105,8 +108,8 @@ impl<'d> Draft<'d> {
             || mended.given.iter().any(|given| is_within(&place.key, given))
     }
 
-    /// Returns it with the option that fits best in the place of a wrong or missing one, if that decides what a table
-    /// is: the one that leaves the least wrong in this table.
+    /// Replaces a wrong or missing value of a key that decides the kind of its table. The new value is the option that
+    /// leaves the fewest mistakes in this table. Returns the new draft; none for other mistakes.
     fn decided<T>(
         &self,
         place: &Place,
@@ -124,7 +127,7 @@ impl<'d> Draft<'d> {
             let (mut trial, mut weight, mut is_read) = (chosen.clone(), 0, false);
             for _ in 0..TRIALS.min(*left) {
                 *left -= 1;
-                // Whatever comes next is of another table.
+                // Any further mistake is outside this table.
                 is_read = true;
                 let Err(error) = read(trial.root(source)) else { break };
                 let found = error.place().filter(|found| found.file == source.file);
@@ -136,7 +139,7 @@ impl<'d> Draft<'d> {
                 is_read = false;
                 let is_own = found.table_key() == place.table_key();
                 weight += if trial.explains(&found) { 0 } else { found.fault.weight(is_own) };
-                // What is of no use as a whole does not fit.
+                // An option that makes the whole table wrong does not fit.
                 if found.key == place.table_key() || !trial.mend(&found, template) {
                     break;
                 }
@@ -146,7 +149,7 @@ impl<'d> Draft<'d> {
         rated.min_by_key(|(weight, _)| *weight).map(|(_, chosen)| chosen)
     }
 
-    /// Returns it with `option` under the key, if that is one that decides what its table is.
+    /// Returns a draft with `option` under the key; none if the key does not decide the kind of its table.
     fn choosing(&self, place: &Place, option: &'static str) -> Option<Self> {
         let mut draft = self.clone();
         let keys: Vec<&str> = place.key.split('.').collect();
@@ -158,7 +161,7 @@ impl<'d> Draft<'d> {
         Some(draft)
     }
 
-    /// Mends the mistake; false if that cannot be.
+    /// Mends the mistake; returns false if it cannot be mended.
     fn mend(&mut self, place: &Place, template: &DeTable<'static>) -> bool {
         let items = items(&self.document, place);
         let Draft { document, mended } = self;
@@ -181,7 +184,7 @@ impl<'d> Draft<'d> {
             }
             return true;
         }
-        // Without one of these nobody knows what the rest of its table means.
+        // Other keys can be removed; without a deciding key, the rest of its table has no meaning.
         let decides = DECIDING.contains(last);
         if !decides && !mended.overlooked.keys.contains(&overlooked) {
             mended.overlooked.keys.push(overlooked);
@@ -190,7 +193,7 @@ impl<'d> Draft<'d> {
             }
             return true;
         }
-        // From the key outwards, until something can be taken out or put in.
+        // Goes from the key outwards until a key can be removed or taken from the template.
         let deepest = keys.len() - usize::from(decides && keys.len() > 1);
         (1..=deepest).rev().any(|depth| {
             let Some((outer, is_inner)) = keys.get(..depth).map(|outer| (outer, depth < keys.len())) else {
@@ -204,7 +207,7 @@ impl<'d> Draft<'d> {
 }
 
 impl Mended {
-    /// Puts what the template has under the dotted key into `table`, once.
+    /// Copies the template's value of the dotted key into `table`, once per key.
     fn give<'d>(&mut self, table: &mut DeTable<'d>, keys: &[&str], template: &DeTable<'static>) -> bool {
         let dotted = keys.join(".");
         let Some((last, parents)) = keys.split_last().filter(|_| !self.given.contains(&dotted)) else { return false };
@@ -217,8 +220,8 @@ impl Mended {
 }
 
 impl Fault {
-    /// How much it says that a table is meant to be another: any number of wrong values says less than a wrong key, and
-    /// of keys further in than one of its own.
+    /// Returns how strongly a mistake suggests that the table is meant to be another kind. A wrong key outweighs any
+    /// number of wrong values; a wrong key of the table itself outweighs those in subtables.
     const fn weight(&self, is_own: bool) -> usize {
         match self {
             Fault::Missing | Fault::Unknown(_) if is_own => TRIALS * TRIALS,
@@ -229,13 +232,13 @@ impl Fault {
 }
 
 impl Place {
-    /// The dotted key of the table that the key is in.
+    /// Returns the dotted name of the key's table.
     fn table_key(&self) -> &str {
         self.key.rsplit_once('.').map_or("", |(table, _)| table)
     }
 }
 
-/// Takes out what is under `key`: of a list of tables only the one that holds `item`, if it is given.
+/// Removes the value under `key`. In a list of tables, removes only the item around byte `item`, if given.
 fn take_out(table: &mut DeTable<'_>, key: &str, item: Option<usize>) -> bool {
     if let (Some(at), Some(DeValue::Array(list))) = (item, table.get_mut(key).map(Spanned::get_mut))
         && let Some(index) = index_at(list, at).filter(|_| list.len() > 1)
@@ -247,7 +250,7 @@ fn take_out(table: &mut DeTable<'_>, key: &str, item: Option<usize>) -> bool {
     table.remove(key).is_some()
 }
 
-/// Returns the table under the dotted key; in a list of tables the one that holds the byte `at`.
+/// Returns the table under the dotted key; in a list of tables, the item around byte `at`.
 fn table_at<'t, 'd>(mut table: &'t mut DeTable<'d>, keys: &[&str], at: usize) -> Option<&'t mut DeTable<'d>> {
     for key in keys {
         table = match table.get_mut(*key)?.get_mut() {
@@ -265,7 +268,7 @@ fn table_at<'t, 'd>(mut table: &'t mut DeTable<'d>, keys: &[&str], at: usize) ->
     Some(table)
 }
 
-/// Returns where the items of lists begin in which the place is.
+/// Returns the byte offsets at which the list items around the place begin.
 fn items(document: &DeTable<'_>, place: &Place) -> Vec<usize> {
     let (mut table, mut items) = (document, Vec::new());
     let keys: Vec<&str> = place.key.split('.').collect();
@@ -288,7 +291,7 @@ fn items(document: &DeTable<'_>, place: &Place) -> Vec<usize> {
     items
 }
 
-/// Returns the item of a list that holds the byte `at`.
+/// Returns the index of the list item around byte `at`.
 fn index_at(list: &DeArray<'_>, at: usize) -> Option<usize> {
     list.iter().rposition(|item| item.span().start <= at)
 }

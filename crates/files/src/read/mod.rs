@@ -1,4 +1,4 @@
-//! Reading of TOML files, and of files of parameters, with errors of one line.
+//! Reading of TOML files and parameter files, with one-line error messages.
 
 mod built_in;
 mod error;

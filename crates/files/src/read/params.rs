@@ -1,7 +1,7 @@
-//! Files of parameters by name, as ground stations write them: QGroundControl's `.params` and MAVProxy's `.parm`.
+//! Parameter files as ground stations write them: QGroundControl's `.params` and MAVProxy's `.parm`.
 //!
-//! Both are lines of fields. QGroundControl's has five: system, component, name, value, type; MAVProxy's has two: name
-//! and value. `#` begins a comment. Either is read, whatever the file is called.
+//! Each line holds fields. QGroundControl's have five: system, component, name, value, type. MAVProxy's have two: name
+//! and value. `#` begins a comment. Both formats are recognised by the number of fields, not by the file name.
 
 use crate::read::{FileError, Source};
 use core::fmt::Write;
@@ -13,23 +13,23 @@ pub struct ParameterEntry {
     pub name: String,
     /// Value.
     pub value: f32,
-    /// Where its line begins in the text.
+    /// Byte offset of its line in the text.
     pub at: usize,
 }
 
-/// Format of a file.
+/// Format of a parameter file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
-    /// QGroundControl's.
+    /// QGroundControl's format.
     Qgc,
-    /// MAVProxy's.
+    /// MAVProxy's format.
     Mavproxy,
 }
 
 /// Reads the parameters in `text`, the contents of `file`.
 ///
 /// # Errors
-/// One line on the first line of the file that is wrong.
+/// One line about the first wrong line of the file.
 pub fn read(file: &str, text: &str) -> Result<Vec<ParameterEntry>, FileError> {
     let (mut entries, mut at) = (Vec::<ParameterEntry>::new(), 0);
     for line in text.split_inclusive('\n') {
@@ -57,7 +57,8 @@ pub fn read(file: &str, text: &str) -> Result<Vec<ParameterEntry>, FileError> {
     Ok(entries)
 }
 
-/// Returns a file of parameters: name, value, MAV_PARAM_TYPE. Its values are read back to the bit.
+/// Returns the text of a parameter file. Entries are name, value, MAV_PARAM_TYPE; reading the text returns exactly the
+/// same values.
 pub fn written<N: core::fmt::Display>(
     format: Format,
     vehicle: &str,
@@ -70,7 +71,7 @@ pub fn written<N: core::fmt::Display>(
         Format::Mavproxy => format!("# {vehicle}\n"),
     };
     for (name, value, kind) in entries {
-        // Writing to a string does not fail.
+        // Writing to a string cannot fail.
         let _ = match format {
             Format::Qgc => writeln!(text, "1\t1\t{name}\t{value}\t{kind}"),
             Format::Mavproxy => writeln!(text, "{name:<16} {value}"),

@@ -1,26 +1,26 @@
-//! Which character separates the values of a text file.
+//! Detection of the character that separates the values of a text file.
 
-/// Separators, the usual one first.
+/// Possible separators, the most common first.
 const SEPARATORS: [char; 3] = [',', ';', '\t'];
 
-/// How values of a file are separated and written.
+/// Format of a file of separated values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Separated {
-    /// What is between two values.
+    /// Character between two values.
     pub separator: u8,
 }
 
 impl Separated {
-    /// Returns how the file `text` is separated: by commas, semicolons or tabs, whichever its first line has most of.
+    /// Detects the separator of the file `text`: comma, semicolon or tab, whichever is most frequent in its first line.
     pub fn of(text: &[u8]) -> Self {
         let head = text.split(|byte| *byte == b'\n').next().unwrap_or_default();
         let count = |separator: &char| head.iter().filter(|byte| char::from(**byte) == *separator).count();
-        // Of equals the last is the maximum: the usual one.
+        // On a tie, the last one wins: the comma, since the order is reversed.
         let most = SEPARATORS.iter().rev().max_by_key(|separator| count(separator)).copied().unwrap_or(',');
         Separated { separator: most as u8 }
     }
 
-    /// Returns a number; where no comma separates, one may be the decimal sign.
+    /// Parses a number. Unless the comma is the separator, it may be the decimal sign.
     pub fn number(self, text: &str) -> Option<f64> {
         let number = text.trim().parse().ok();
         number.or_else(|| text.trim().replace(',', ".").parse().ok().filter(|_: &f64| self.separator != b','))

@@ -1,4 +1,4 @@
-//! Typed access to TOML: every value is checked as it is read, and unknown keys are refused.
+//! Typed access to TOML: checks every value as it is read and refuses unknown keys.
 
 use super::error::{Fault, FileError, Place, Source};
 use super::words::{self, nearest, one_of};
@@ -10,25 +10,25 @@ use toml::de::{DeTable, DeValue};
 /// Largest length of an array of tables that is searched in each step of a flight.
 const MOST: usize = 100;
 
-/// What the reader overlooks since it was told: dotted keys, and where their tables begin.
+/// Mistakes already reported, which the reader overlooks: dotted keys with the byte offsets of their tables.
 #[derive(Clone, Default)]
 pub(crate) struct Overlooked {
-    /// Those that were taken out: a reader that needs them gets any value.
+    /// Removed keys. A reader that needs one gets any value.
     pub(crate) keys: Vec<(String, usize)>,
-    /// Those that do not go with others.
+    /// Keys whose value conflicts with others.
     pub(crate) clashes: Vec<(String, usize)>,
 }
 
-/// One table of a document, and its keys read so far.
+/// One table of a document, with a record of the keys read so far.
 pub struct Table<'a> {
     source: Source<'a>,
-    /// Its dotted name; empty for the document.
+    /// Dotted name; empty for the document.
     path: String,
-    /// Its start, to which errors about missing keys refer.
+    /// Byte offset of the table, to which errors about missing keys point.
     start: usize,
     entries: &'a DeTable<'a>,
     read: Vec<&'static str>,
-    /// Declared keys among those read, with their unit symbols.
+    /// Declared keys among the read keys, with their unit symbols.
     units: Vec<(&'static str, &'static str)>,
     overlooked: &'a Overlooked,
 }
@@ -39,7 +39,7 @@ impl<'a> Table<'a> {
         Table { source, path: String::new(), start: 0, entries, read: Vec::new(), units: Vec::new(), overlooked }
     }
 
-    /// What errors call the file.
+    /// Returns the file's name in error messages.
     pub fn file(&self) -> &'a str {
         self.source.file
     }
@@ -57,18 +57,19 @@ impl<'a> Table<'a> {
         Ok(number.unwrap_or(any(range)))
     }
 
-    /// Reads every key of `parameters` that is present; the others keep their values. Each group has a table of its
-    /// own.
+    /// Reads every key of `parameters` without a group that is present; the others keep their values. Each group has
+    /// its own table.
     pub fn declared(&mut self, parameters: &mut impl Declared) -> Result<(), FileError> {
         self.declared_in("", parameters)
     }
 
-    /// Reads every key of this group of `parameters` that is present; the others keep their values.
+    /// Reads every present key of this group of `parameters`; the others keep their values.
     pub fn declared_in(&mut self, group: &str, parameters: &mut impl Declared) -> Result<(), FileError> {
         self.declared_where(parameters, |declaration| declaration.group == group)
     }
 
-    /// Reads every key of `parameters` that is present, except `elsewhere`; the others keep their values.
+    /// Reads every present key of `parameters` without a group, except the key `elsewhere`; the others keep their
+    /// values.
     pub fn declared_but(&mut self, elsewhere: &str, parameters: &mut impl Declared) -> Result<(), FileError> {
         self.declared_where(parameters, |Declaration { group, range, .. }| group.is_empty() && range.name != elsewhere)
     }
@@ -83,7 +84,7 @@ impl<'a> Table<'a> {
             if !wanted(declaration) {
                 return Ok(());
             }
-            // Before the value is read, whose error names the unit.
+            // Must precede reading the value, since an error names the unit.
             self.units.push((range.name, unit));
             match value {
                 ValueMut::Single([number]) => self.number(range)?.into_iter().for_each(|read| *number = read as f32),
@@ -127,7 +128,7 @@ impl<'a> Table<'a> {
         let bounds = format!("it must lie within {} to {}", words::number(range.min), words::number(range.max));
         let outside = |number: &str| self.refuse(value, range.name, format!("{number} is out of range: {bounds}"));
         match value.get_ref() {
-            // Without conversion to a float, which would round it.
+            // Avoids conversion to a float, which would round large numbers.
             DeValue::Integer(integer) => {
                 let number = i128::from_str_radix(integer.as_str(), integer.radix()).ok();
                 let number = number.filter(|number| (min..=max).contains(number)).and_then(|n| u64::try_from(n).ok());
@@ -146,7 +147,7 @@ impl<'a> Table<'a> {
         }
     }
 
-    /// Returns the interval `[low, high]` under `range.name`, or both ends from a single number, if present.
+    /// Returns the interval `[low, high]` under `range.name`, if present. A single number gives both ends.
     pub fn interval(&mut self, range: &Range) -> Result<Option<[f64; 2]>, FileError> {
         let Some(value) = self.value(range.name) else { return Ok(None) };
         let number = |value| self.number_in(value, range.name, range);
@@ -182,7 +183,7 @@ impl<'a> Table<'a> {
         }
     }
 
-    /// Returns the three numbers under `key`, which are required, each within `range`.
+    /// Returns the three numbers under the required `key`, each within `range`.
     pub fn need_vector(&mut self, key: &'static str, range: &Range) -> Result<Vector3<f64>, FileError> {
         let any = (!self.knows(key)).then(|| Vector3::repeat(any(range)));
         let vector = self.vector(key, [range; 3])?.or(any);
@@ -241,7 +242,8 @@ impl<'a> Table<'a> {
         })
     }
 
-    /// Returns the options named in the list under `key`, at least one and none twice, if present.
+    /// Returns the options named in the list under `key`, if present. The list must not be empty or name an option
+    /// twice.
     pub fn choices<T: Copy + PartialEq>(
         &mut self,
         key: &'static str,
@@ -278,7 +280,7 @@ impl<'a> Table<'a> {
         self.table_in(value, key, &format!("one table: [{}]", self.dotted(key))).map(Some)
     }
 
-    /// Returns the table under `key`, if present and a table.
+    /// Returns the table under `key`, if there is one and it is a table.
     pub fn table_if(&mut self, key: &'static str) -> Result<Option<Table<'a>>, FileError> {
         let is_table = self.entries.get(key).is_some_and(|value| value.get_ref().is_table());
         if is_table { self.table(key) } else { Ok(None) }
@@ -327,12 +329,13 @@ impl<'a> Table<'a> {
         Err(self.unknown(key, start, &cure, instead))
     }
 
-    /// Returns an error if `key` is present, since it belongs elsewhere.
+    /// Returns an error with `problem` if `key` is present.
     pub fn forbid(&self, key: &str, problem: &str) -> Result<(), FileError> {
         if self.has(key) { Err(self.fault_at(key, problem)) } else { Ok(()) }
     }
 
-    /// Returns an error of another file, which `key` names: mistakes of this one are looked for behind it.
+    /// Places an error of another file, which `key` names, at that key. Reading of this file then continues after the
+    /// key.
     pub fn through(&self, key: &str, error: FileError) -> FileError {
         let at = self.entries.get(key).map_or(self.start, |value| value.span().start);
         let (file, line, key) = (self.source.file.to_owned(), self.source.line(at), self.dotted(key));
@@ -344,12 +347,12 @@ impl<'a> Table<'a> {
         })
     }
 
-    /// Refuses how the value under `key` goes with those under the dotted keys `with`, or without any with the others
-    /// of this table. Nothing is refused if one of these is wrong by itself, or where this has been told: the reader
-    /// goes on, to find what else is wrong.
+    /// Reports that the value under `key` conflicts with those under the dotted keys `with`; if `with` is empty, with
+    /// the others of this table. A conflict that was reported before is ignored, so that reading goes on to the next
+    /// mistake.
     ///
     /// # Errors
-    /// The problem.
+    /// The conflict with its `problem`.
     pub fn clash(&self, key: &str, with: &'static [&'static str], problem: impl Into<String>) -> Result<(), FileError> {
         let clash = (self.dotted(key), self.start);
         if self.overlooked.clashes.contains(&clash) {
@@ -370,7 +373,8 @@ impl<'a> Table<'a> {
         FileError::at(self.source, at, self.dotted(key), problem).placed(in_table)
     }
 
-    /// False if the key was taken out, for its value was wrong: then any value will do, and nothing follows from it.
+    /// False if the key was removed because its value was wrong. Any value will do then, and no mistake must follow
+    /// from it.
     pub fn knows(&self, key: &str) -> bool {
         let dotted = self.dotted(key);
         !self.overlooked.keys.iter().any(|(key, table)| *table == self.start && *key == dotted)
@@ -385,13 +389,13 @@ impl<'a> Table<'a> {
         }
     }
 
-    /// Returns the unit of `key` in words, as [`words::unit`].
+    /// Returns the unit of `key` in words, like [`words::unit`].
     fn unit(&self, key: &str) -> String {
         let symbol = self.units.iter().find(|(declared, _)| *declared == key).map_or("", |(_, symbol)| symbol);
         words::unit(key, symbol)
     }
 
-    /// Suggests `key` for a misspelt one.
+    /// Returns the suggestion of `key` in place of a misspelt key.
     fn did_you_mean(&self, key: &str) -> String {
         format!("did you mean {key}{}?", self.unit(key))
     }
@@ -484,7 +488,7 @@ impl<'a> Table<'a> {
     }
 }
 
-/// Returns a value in this range, at best one.
+/// Returns the number within the range that is nearest to 1.
 fn any(range: &Range) -> f64 {
     1.0_f64.clamp(range.min, range.max)
 }

@@ -2,10 +2,10 @@
 
 use afbc_types::{OutOfRange, Value};
 
-/// Smallest similarity of two words for "did you mean".
+/// Smallest similarity of two words (Jaro-Winkler) for a suggestion "did you mean".
 const LIKENESS: f64 = 0.8;
 
-/// Units by the endings of keys, longest ending first.
+/// Units by the ending of the key, longest ending first.
 const UNITS: [(&str, &str); 24] = [
     ("_kg_m3", "kilograms per cubic metre"),
     ("_n_s2_m", "newton seconds squared per metre"),
@@ -33,8 +33,8 @@ const UNITS: [(&str, &str); 24] = [
     ("_w", "watts"),
 ];
 
-/// Returns ` (kilograms)` for `mass_kg`; for a key that does not end in a unit, its declared symbol as in ` (1/s)`, if
-/// any.
+/// Returns the unit of a key in words, such as ` (kilograms)` for `mass_kg`. A key without such an ending gets its
+/// declared symbol, such as ` (1/s)`, if any.
 pub fn unit(key: &str, symbol: &str) -> String {
     match UNITS.iter().find(|(ending, _)| key.ends_with(ending)) {
         Some((_, words)) => format!(" ({words})"),
@@ -43,12 +43,12 @@ pub fn unit(key: &str, symbol: &str) -> String {
     }
 }
 
-/// Formats a number, in decimal notation where that is short.
+/// Formats a number; in decimal notation from 1e-4 to 1e7.
 pub fn number(value: f64) -> String {
     if value == 0.0 || (1e-4..1e7).contains(&value.abs()) { format!("{value}") } else { format!("{value:e}") }
 }
 
-/// Formats a declared value as a file writes it, to the last bit.
+/// Formats a declared value as in a file, exactly.
 pub fn value(value: &Value<'_>) -> String {
     match *value {
         Value::Single([number]) => format!("{number:?}"),
@@ -64,7 +64,7 @@ pub fn value(value: &Value<'_>) -> String {
 /// Formats an out-of-range error of a controller or plant.
 pub fn out_of_range(error: &OutOfRange) -> String {
     let OutOfRange { value, range } = error;
-    // With f32 precision, since a decimal in a file may have been converted to f32.
+    // Uses f32 precision, since a decimal in a file may have been converted to f32.
     let (value, min, max) = (*value as f32, number(range.min), number(range.max));
     format!("{} = {value}, out of range: it must lie within {min} to {max}", range.name)
 }
@@ -76,7 +76,7 @@ pub fn nearest<'w>(word: &str, words: impl Iterator<Item = &'w str>) -> Option<&
     (likeness >= LIKENESS).then_some(best)
 }
 
-/// Returns the cure for a word that is none of `known`: the most similar one, or else all of them.
+/// Returns a suggestion for a word that is not in `known`: the most similar known word, or else all of them.
 pub fn cure<'w>(word: &str, known: impl Iterator<Item = &'w str> + Clone) -> String {
     match nearest(word, known.clone()) {
         Some(similar) => format!("did you mean {similar}?"),
