@@ -1,9 +1,9 @@
-//! A vehicle file of one's own, with gains by rule: `cargo run -p afbc-vehicles --example own_vehicle`.
+//! Reads a vehicle file with gains computed by rule: `cargo run -p afbc-vehicles --example own_vehicle`.
 
 use afbc::Profile;
 use afbc_files::read::FileError;
 
-/// What has to be measured or taken from data sheets; every key is in `docs/vehicles.md`.
+/// Values to be measured or taken from data sheets; `docs/vehicles.md` describes every key.
 const FILE: &str = r#"
 description = "a quadrotor of 0.8 kg on 10 inch propellers"
 
@@ -47,7 +47,7 @@ fn main() -> Result<(), FileError> {
     let gains = vehicle.gains(Profile::Flight);
     println!("{}: rotors lag by {} s", vehicle.name, vehicle.lag_s());
     println!("gains of roll: {:?}", gains.roll);
-    // A mistake is one line with place and cure.
+    // A mistake is reported in one line with its place and a remedy.
     let wrong = FILE.replace("mass_kg = 0.8", "mass_kg = -0.8");
     let mistake = afbc_vehicles::parse("mine.toml", &wrong, "mine").err().map(|mistake| mistake.to_string());
     println!("{}", mistake.as_deref().unwrap_or("no mistake found"));

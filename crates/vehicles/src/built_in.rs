@@ -1,4 +1,4 @@
-//! Vehicles that come with the program.
+//! Built-in vehicles.
 
 use crate::file::parse;
 use crate::vehicle::Vehicle;
@@ -14,12 +14,12 @@ pub static BUILT_IN: [BuiltIn<Vehicle>; 6] = [
     BuiltIn::new("f550", include_str!("../../../vehicles/f550.toml"), parse),
 ];
 
-/// The built-in vehicle called `name`.
+/// Returns the built-in vehicle called `name`.
 pub fn built_in(name: &str) -> Option<&'static BuiltIn<Vehicle>> {
     BuiltIn::named(&BUILT_IN, name)
 }
 
-/// What to say of a `name` that is no built-in vehicle's.
+/// Returns the error message for a `name` that is not a built-in vehicle.
 pub fn unknown(name: &str) -> String {
     let cure = match BuiltIn::similar(&BUILT_IN, name) {
         Some(known) => format!("did you mean {}?", known.name),

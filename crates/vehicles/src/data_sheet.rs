@@ -1,15 +1,15 @@
-//! Parts of a vehicle, as their data sheets say: from what is simulated to what an estimator knows of it.
+//! Estimator settings from the data sheets of a vehicle's simulated sensors.
 
 use afbc_estimator::{DataSheet, Settings, Triad};
 use afbc_plant::InstrumentSuite;
 use afbc_plant::instruments::{Imu, Magnetometer};
 
-/// Returns the estimator's settings for an inertial sensor with these aids on a vehicle of so many rotors, if its
-/// samples are `step_s` apart.
+/// Returns the estimator's settings for this inertial sensor and the other instruments of `suite`, on a vehicle with
+/// this number of rotors, with samples every `step_s`.
 #[must_use]
 pub fn settings(suite: &InstrumentSuite, imu: &Imu, rotors: usize, gravity_m_s2: f64, step_s: f64) -> Settings {
     let Imu { gyro, accel, harmonics, .. } = imu;
-    // Of all rotors in hover, if the first harmonic of one has this amplitude.
+    // Vibration of all rotors in hover, from the amplitude of one rotor's first harmonic.
     let vibration = |amplitude: f64| amplitude * libm::sqrt(0.5 * rotors as f64) * harmonics.norm();
     Settings::for_parts(&DataSheet {
         gyro: Triad {
@@ -46,7 +46,7 @@ pub fn settings(suite: &InstrumentSuite, imu: &Imu, rotors: usize, gravity_m_s2:
     })
 }
 
-/// Error of the heading by hard and soft iron and the motors' field \[rad\].
+/// Returns the heading error from hard iron, soft iron and the motors' magnetic field \[rad\].
 fn iron(part: &Magnetometer) -> f64 {
     let parts = [part.hard_iron_ut, part.soft_iron * part.strength_ut, part.motor_ut.xy().amax()];
     let field_ut = libm::sqrt(parts.iter().map(|part| part * part).sum());

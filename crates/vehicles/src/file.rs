@@ -1,4 +1,4 @@
-//! Vehicle files.
+//! Reading of vehicle files.
 
 use crate::data_sheet;
 use crate::parts::{self, DragConditions, FORCE_MAX};
@@ -18,15 +18,15 @@ use core::convert::Infallible;
 use nalgebra::Vector3;
 use std::path::Path;
 
-/// Accepted position of a rotor \[m\]; in arm lengths it must lie within [`ROTOR_POSITION`], too.
+/// Accepted position of a rotor \[m\]. In arm lengths, it must also lie within [`ROTOR_POSITION`].
 const POSITION: Range = Range::new("position_m", -100.0, 100.0);
 /// Largest relative difference between `arm_m` and the mean distance of the rotors.
 const ARM_TOLERANCE: f64 = 0.01;
-/// Time step for which drag and ground are checked \[s\]; a scenario checks them again for its own.
+/// Time step for checking drag and ground \[s\]; a scenario checks them again with its own step.
 const STEP_S: f64 = 0.001;
-/// Cure for drag that no law makes up for.
+/// Remedy for drag that is out of range for the laws' feed-forward.
 const CHECK: &str = "check mass_kg, thrust_factor_n_s2 and what is in [drag]";
-/// Cure for a vehicle that does not hover with a margin.
+/// Remedy for a vehicle that cannot hover with a margin.
 const UNFIT: &str = "AFBC would not fly it with a margin: stronger or quicker rotors, less mass, or gains of its own";
 
 /// Reads and checks the vehicle file at `path`.
@@ -39,7 +39,8 @@ pub fn load(path: &Path) -> Result<Vehicle, FileError> {
     parse(&path.display().to_string(), &text, &stem)
 }
 
-/// Reads and checks a vehicle from its `text`. Errors call it `file`; `name` is its name if it gives none itself.
+/// Reads and checks a vehicle from its `text`. Error messages call the file `file`. The vehicle is called `name` if the
+/// text gives no name.
 ///
 /// # Errors
 /// Every mistake, each as one line.
@@ -97,7 +98,7 @@ fn read(mut root: Table<'_>, file: &str, text: &str, name: &str) -> Result<Vehic
         text: text.into(),
         file: file.into(),
     };
-    // Before drag and ground, whose checks would refuse the same vehicle for a less useful reason.
+    // Comes before drag and ground: their checks would refuse the same vehicle with a less useful message.
     if let Err(error) = vehicle.check() {
         let with = &["vehicle", "rotors", "rotor", "gains"];
         root.clash("vehicle", with, format!("{}; {UNFIT}", out_of_range(&error)))?;
@@ -115,10 +116,10 @@ fn read(mut root: Table<'_>, file: &str, text: &str, name: &str) -> Result<Vehic
     Ok(vehicle)
 }
 
-/// Returns what laws know of the drag of a vehicle with `count` rotors.
+/// Returns the drag that laws compensate, for a vehicle with `count` rotors.
 fn known_drag(drag: &Drag, vehicle: &Parameters<f64>, count: usize) -> KnownDrag {
     let Parameters { mass_kg, gravity_m_s2, thrust_factor_n_s2, .. } = *vehicle;
-    // The sum of all speeds in hover, n sqrt(m g/(n b)). Of the body, half the density times the mean of both areas.
+    // Sum of all rotor speeds in hover, n sqrt(m g/(n b)). Body drag: half the density times the mean of both areas.
     let all_rad_s = libm::sqrt(count as f64 * mass_kg * gravity_m_s2 / thrust_factor_n_s2);
     KnownDrag {
         rotor_drag_1_s: (drag.blade_n_s2_m * all_rad_s / mass_kg) as f32,
@@ -150,7 +151,7 @@ fn need<'a>(root: &mut Table<'a>, key: &'static str) -> Result<Table<'a>, FileEr
     root.table(key)?.ok_or_else(|| root.missing(key, &format!("add [{key}], as in vehicles/paper.toml")))
 }
 
-/// Reads `[vehicle]`, where only gravity has a default.
+/// Reads `[vehicle]`. Every key but gravity is required.
 fn masses(mut table: Table<'_>) -> Result<Parameters<f64>, FileError> {
     let mut parameters = Parameters::PAPER;
     table.declared(&mut parameters)?;
@@ -201,7 +202,7 @@ fn frame(root: &mut Table<'_>, arm_m: f64) -> Result<(Vec<Rotor<f64>>, f64), Fil
     Ok((rotors, mean(|at_m| at_m.z)))
 }
 
-/// Reads `[rotors]` and `[battery]`; returns them with the largest force of a rotor \[N\].
+/// Reads `[rotors]` and `[battery]`; returns the rotors and the largest force of one rotor \[N\].
 fn actuators(root: &mut Table<'_>, parameters: &Parameters<f64>) -> Result<(Rotors, f64), FileError> {
     let table = need(root, "rotors")?;
     table.require(&Rotors::LAG.range)?;
@@ -212,7 +213,7 @@ fn actuators(root: &mut Table<'_>, parameters: &Parameters<f64>) -> Result<(Roto
     Ok((rotors, force_max_n))
 }
 
-/// Reads `[motor]`, where nothing has a default.
+/// Reads `[motor]`. Every key is required.
 fn motor(mut table: Table<'_>) -> Result<Curve, FileError> {
     let mut curve = Curve::DEFAULT;
     table.declared(&mut curve)?;
@@ -221,7 +222,7 @@ fn motor(mut table: Table<'_>) -> Result<Curve, FileError> {
     Ok(curve)
 }
 
-/// Reads `[imu]`: its mounting, and the part, if the table names one or its figures.
+/// Reads `[imu]`. Returns the mounting, and the sensor if the table names a part or states its noise figures.
 fn imu(root: &mut Table<'_>) -> Result<(Mounting<f64>, Option<Imu>), FileError> {
     let mut mounting = Mounting::DEFAULT;
     let Some(mut table) = root.table("imu")? else { return Ok((mounting, None)) };
@@ -230,7 +231,7 @@ fn imu(root: &mut Table<'_>) -> Result<(Mounting<f64>, Option<Imu>), FileError> 
     let is_known = named.is_some() || parts::TRIADS.iter().any(|triad| table.holds_table(triad));
     let mut part = named.unwrap_or_default();
     if is_known {
-        // What nobody is told is a scenario's.
+        // The lever arm is refused here; only a scenario may set it.
         table.declared_but(Imu::LEVER.range.name, &mut part)?;
         parts::groups(&mut table, &mut part, &parts::TRIADS)?;
     }
@@ -238,9 +239,9 @@ fn imu(root: &mut Table<'_>) -> Result<(Mounting<f64>, Option<Imu>), FileError> 
     Ok((mounting, is_known.then_some(part)))
 }
 
-/// Reads `[estimator]`: what it leaves out is as the data sheet of the inertial sensor asks for, if the vehicle's file
-/// has one, or else at its default. Gravity is that of the vehicle, or the nearest at which the estimator starts.
-/// Returns the names of what it states, too.
+/// Reads `[estimator]`. Missing keys get values from the data sheet of the inertial sensor, if the vehicle's file has
+/// one, or else the defaults. Gravity is the vehicle's, clamped to the estimator's range. Also returns the names of the
+/// keys that the table states.
 fn estimation(
     root: &mut Table<'_>,
     parameters: &Parameters<f64>,
@@ -265,8 +266,8 @@ fn estimation(
     Ok((estimation, stated))
 }
 
-/// Reads `[gains.flight.afbc.AXIS]` and `[gains.flight.cascade]`; the gains of other laws are read where the laws are
-/// known.
+/// Reads `[gains.flight.afbc.AXIS]` and `[gains.flight.cascade]`. The gains of other laws are read elsewhere, since
+/// this crate does not know the laws.
 fn gains(root: &mut Table<'_>, gains: &mut PerAxis<Gains>, settings: &mut Settings) -> Result<(), FileError> {
     let Some(mut all) = root.table("gains")? else { return Ok(()) };
     let Some(mut flight) = all.table(Profile::Flight.name())? else { return all.finish() };

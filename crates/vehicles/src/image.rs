@@ -1,4 +1,4 @@
-//! A vehicle as Rust, for the firmware's build script.
+//! Vehicle as Rust source, for the firmware's build script.
 
 use crate::vehicle::Vehicle;
 use afbc_onboard::Configuration;
@@ -7,9 +7,8 @@ use serde_json::{Value, json};
 use std::fmt::Write;
 
 impl Vehicle {
-    /// Returns the constants `NAME`, `ROTORS` and `CONFIGURATION` as Rust: what the
-    /// [configuration](Self::configuration) holds, value by value. The link is left at its defaults, since it is not
-    /// the vehicle's.
+    /// Returns Rust source with the constants `NAME`, `ROTORS` and `CONFIGURATION`; the last assigns every value of the
+    /// [configuration](Self::configuration). The link keeps its defaults, since it belongs to the board.
     pub fn image(&self) -> String {
         let (name, count) = (&self.name, self.rotors.len());
         let mut text = format!(
@@ -21,12 +20,12 @@ impl Vehicle {
         text + "    it\n};\n"
     }
 
-    /// Returns the values of the configuration, by field.
+    /// Returns the values of the configuration as a JSON object, by field.
     fn values<const N: usize>(&self) -> Value {
-        // As many rotors as there are: with_rotors.
+        // Cannot fail: `with_rotors!` passes the vehicle's own number of rotors.
         let Ok(configuration) = self.configuration::<N>() else { return Value::Null };
-        // Errors of sensors are one vehicle's, not its kind's, and so are motor controllers; link and radio are the
-        // board's.
+        // Left out: sensor calibration and motor controllers, which belong to an individual vehicle, and link and
+        // radio, which belong to the board.
         let Configuration {
             airframe,
             settings,
@@ -52,7 +51,7 @@ impl Vehicle {
     }
 }
 
-/// Assigns every value to its place.
+/// Writes an assignment for every value in `value`.
 fn each_value(place: &str, value: &Value, text: &mut String) {
     let literal = match value {
         Value::Object(fields) => {
@@ -67,15 +66,15 @@ fn each_value(place: &str, value: &Value, text: &mut String) {
         },
         value => literal(value),
     };
-    // Writing to a string does not fail.
+    // Writing to a string cannot fail.
     let _ = writeln!(text, "    {place} = {literal};");
 }
 
-/// Returns a number, a switch, or the word of a choice.
+/// Returns the Rust literal of a number, a switch or a choice.
 fn literal(value: &Value) -> String {
     match (value, value.as_f64()) {
         (Value::Number(number), Some(wide)) if number.is_f64() => {
-            // The shortest decimal that is the same number.
+            // Writes the shortest decimal that gives the same number.
             let narrow = wide as f32;
             if f64::from(narrow) == wide { format!("{narrow:?}") } else { format!("{wide:?}") }
         }

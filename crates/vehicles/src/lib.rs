@@ -1,6 +1,6 @@
-//! Vehicles as data: a file for each, in `vehicles/` at the workspace's root, read and checked here.
+//! Vehicles as data. Each has a file in `vehicles/` at the workspace's root; this crate reads and checks these files.
 //!
-//! The format is described, key by key, in `docs/vehicles.md`. Frames, units and signs are those of [`afbc_types`].
+//! `docs/vehicles.md` describes every key of the format. Frames, units and signs are those of [`afbc_types`].
 #![forbid(unsafe_code)]
 
 mod built_in;

@@ -1,6 +1,5 @@
-//! The tables that vehicle files and scenario files share: `[vehicle]`, `[rotors]`, `[battery]`, `[drag]`, `[ground]`,
-//! instruments.
-//! Each function takes what a table leaves out from a default.
+//! Tables shared by vehicle files and scenario files: `[vehicle]`, `[rotors]`, `[battery]`, `[drag]`, `[ground]` and
+//! instruments. Each function takes missing keys from a default.
 
 use afbc_files::read::words::out_of_range;
 use afbc_files::read::{FileError, Table};
@@ -8,15 +7,15 @@ use afbc_plant::instruments::Preset;
 use afbc_plant::{Battery, Contact, Drag, Frame, GroundEffect, Rotors};
 use afbc_types::{Declared, OutOfRange, Parameters, Range};
 
-/// Accepted largest force of a rotor \[N\]; the speed that goes with it must be in range too.
+/// Accepted largest force of a rotor \[N\]; the corresponding speed must also be in range.
 pub const FORCE_MAX: Range = Range::new("force_max_n", 0.001, 10_000.0);
 
-/// What drag depends on: the vehicle, its fastest rotor, and the step of the simulation.
+/// Quantities against which drag is checked.
 #[derive(Clone, Copy, Debug)]
 pub struct DragConditions<'a> {
     /// True parameters.
     pub parameters: &'a Parameters<f64>,
-    /// Where the rotors are.
+    /// Positions of the rotors.
     pub frame: &'a Frame,
     /// Largest speed of a rotor \[rad/s\].
     pub rotor_max_rad_s: f64,
@@ -24,35 +23,35 @@ pub struct DragConditions<'a> {
     pub step_s: f64,
 }
 
-/// What rotors, drag and ground depend on.
+/// Tables and keys that rotors, drag and ground depend on.
 const ALL: &[&str] =
     &["vehicle", "truth", "rotors", "rotor", "drag", "ground", "settings", "profile", "controllers", "contender"];
 
-/// Refuses `table` on account of how its numbers go together, and with those under the dotted keys `with`.
+/// Reports a failed check of how the table's values fit together and fit the values under the dotted keys `with`.
 fn together(
     table: &Table<'_>,
     with: &'static [&'static str],
     checked: Result<(), OutOfRange>,
 ) -> Result<(), FileError> {
-    // First, for an unknown key may be a misspelt one of these.
+    // Unknown keys come first, since one may be a misspelling of a key in the check.
     table.finish()?;
     checked.or_else(|error| table.clash(error.range.name, with, format!("{}; change it", out_of_range(&error))))
 }
 
-/// What `table` says of `parameters`, each in its range and all together.
+/// Reads `table` into `parameters`; checks each value and all of them together.
 ///
 /// # Errors
-/// One line on the first thing that is wrong, here and below.
+/// One line about the first mistake.
 pub fn declared(table: Option<Table<'_>>, parameters: &mut impl Declared) -> Result<(), FileError> {
     let Some(mut table) = table else { return Ok(()) };
     table.declared(parameters)?;
     together(&table, &[], parameters.validate())
 }
 
-/// Masses, arm, inertia and rotor factors.
+/// Reads masses, arm, inertia and rotor factors.
 ///
 /// # Errors
-/// One line on the first thing that is wrong, here and below.
+/// One line about the first mistake.
 pub fn parameters(table: Option<Table<'_>>, default: Parameters<f64>) -> Result<Parameters<f64>, FileError> {
     let mut parameters = default;
     if let Some(mut table) = table {
@@ -62,10 +61,10 @@ pub fn parameters(table: Option<Table<'_>>, default: Parameters<f64>) -> Result<
     Ok(parameters)
 }
 
-/// Lag, delay and limits of the rotors of a vehicle with these true parameters.
+/// Reads lag, delay and limits of the rotors of a vehicle with the true parameters `truth`.
 ///
 /// # Errors
-/// As [`parameters`].
+/// The same as for [`parameters`].
 pub fn rotors(table: Option<Table<'_>>, default: Rotors, truth: &Parameters<f64>) -> Result<Rotors, FileError> {
     let mut rotors = default;
     if let Some(mut table) = table {
@@ -76,7 +75,7 @@ pub fn rotors(table: Option<Table<'_>>, default: Rotors, truth: &Parameters<f64>
     Ok(rotors)
 }
 
-/// The largest speed, if it is given by the force that goes with it.
+/// Sets the largest speed from `force_max_n`, if the table gives the largest force instead of the speed.
 fn max_by_force(table: &mut Table<'_>, rotors: &mut Rotors, truth: &Parameters<f64>) -> Result<(), FileError> {
     let max = &Rotors::MAX.range;
     let Some(force_n) = table.number(&FORCE_MAX)? else { return Ok(()) };
@@ -94,10 +93,10 @@ fn max_by_force(table: &mut Table<'_>, rotors: &mut Rotors, truth: &Parameters<f
     Ok(())
 }
 
-/// Reads `[battery]`; what it does not say is as in `default`.
+/// Reads `[battery]`; missing keys are as in `default`.
 ///
 /// # Errors
-/// As [`parameters`].
+/// The same as for [`parameters`].
 pub fn battery(mut table: Table<'_>, default: Battery) -> Result<Battery, FileError> {
     let mut battery = default;
     table.declared(&mut battery)?;
@@ -105,10 +104,10 @@ pub fn battery(mut table: Table<'_>, default: Battery) -> Result<Battery, FileEr
     Ok(battery)
 }
 
-/// What the air does. A key called `elsewhere` is not accepted; none is called "".
+/// Reads `[drag]`. The key called `elsewhere` is refused; "" refuses none.
 ///
 /// # Errors
-/// As [`parameters`].
+/// The same as for [`parameters`].
 pub fn drag(
     mut table: Table<'_>,
     default: Drag,
@@ -122,10 +121,10 @@ pub fn drag(
     Ok(drag)
 }
 
-/// Feet and propellers near the ground. A key called `elsewhere` is not accepted; none is called "".
+/// Reads `[ground]`: feet and ground effect. The key called `elsewhere` is refused; "" refuses none.
 ///
 /// # Errors
-/// As [`parameters`].
+/// The same as for [`parameters`].
 pub fn ground(
     mut table: Table<'_>,
     (mut contact, mut effect): (Contact, GroundEffect),
@@ -135,21 +134,21 @@ pub fn ground(
 ) -> Result<(Contact, Option<GroundEffect>), FileError> {
     table.declared_but(elsewhere, &mut contact)?;
     table.declared_but(GroundEffect::ROT_HEIGHT.range.name, &mut effect)?;
-    // The height is given once, so that feet and propellers cannot disagree about it.
+    // The height is given only once, so that feet and propellers cannot disagree about it.
     effect.rotor_height_m = contact.rotor_height_m;
     let with_effect = table.boolean("ground_effect")?.unwrap_or(true);
     together(&table, ALL, contact.validate_for(truth, step_s))?;
     Ok((contact, with_effect.then_some(effect)))
 }
 
-/// Groups of an inertial sensor.
+/// Tables within the table of an inertial sensor.
 pub const TRIADS: [&str; 2] = ["gyro", "accel"];
 
-/// Reads an instrument by the name of a part, or as a table, with a table for each of its groups, that may name one.
-/// What a table leaves out is as in `base`, or perfect.
+/// Reads an instrument under `key`: either the name of a part, or a table with one subtable per group. The table may
+/// name a part, too. Missing keys are as in that part, else as in `base`, else those of a perfect instrument.
 ///
 /// # Errors
-/// As [`parameters`].
+/// The same as for [`parameters`].
 pub fn instrument<T: Declared + Default + Copy>(
     table: &mut Table<'_>,
     key: &'static str,
@@ -168,18 +167,18 @@ pub fn instrument<T: Declared + Default + Copy>(
     Ok(Some(settings))
 }
 
-/// The part that a table names, if it does.
+/// Returns the part that the table names, if any.
 ///
 /// # Errors
-/// As [`parameters`].
+/// The same as for [`parameters`].
 pub fn preset<T: Copy>(table: &mut Table<'_>, presets: &[Preset<T>]) -> Result<Option<T>, FileError> {
     Ok(table.choice("part", presets, |preset| preset.name)?.map(|preset| preset.settings))
 }
 
-/// The groups of a part, each a table.
+/// Reads the subtables of a part, one per group.
 ///
 /// # Errors
-/// As [`parameters`].
+/// The same as for [`parameters`].
 pub fn groups<T: Declared>(table: &mut Table<'_>, part: &mut T, groups: &[&'static str]) -> Result<(), FileError> {
     groups.iter().try_for_each(|group| {
         let Some(mut table) = table.table(group)? else { return Ok(()) };

@@ -1,4 +1,4 @@
-//! A vehicle as its file describes it.
+//! A vehicle as described by its file.
 
 use afbc::adaptive::Gains;
 use afbc::guarded::Guarded;
@@ -19,14 +19,14 @@ use afbc_types::{
 };
 use core::convert::Infallible;
 
-/// Table of the settings of AFBC's cascade, beside those of the laws' gains.
+/// Name of the table in the file with the settings of AFBC's cascade; it is next to the tables of the laws' gains.
 pub const CASCADE: &str = "cascade";
 /// A valid vehicle file.
 pub(crate) const SAMPLE: Example =
     Example { command: "vehicles paper", text: include_str!("../../../vehicles/paper.toml") };
 
-/// A vehicle as its file describes it. Written by serde, it is what the vehicle is, wherever its file lies, whatever
-/// that is called and whatever comments it has.
+/// A vehicle as described by its file. Its serialised form holds everything that decides how it flies, but not the
+/// file's name, location and comments.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Vehicle {
     /// Short name.
@@ -41,30 +41,31 @@ pub struct Vehicle {
     pub rotors: Vec<Rotor<f64>>,
     /// Largest force of one rotor \[N\].
     pub force_max_n: f64,
-    /// Rotors with their lag, limits and battery; drag and ground. The air is still.
+    /// Rotors with lag, limits and battery; drag and ground contact. Still air.
     pub realism: Realism,
     /// Throttle curve of the motors.
     pub curve: Curve,
     /// Mounting of the inertial sensor.
     pub imu: Mounting<f64>,
-    /// The inertial sensor's part, if the file names it or its figures. The estimator's settings follow, with which it
-    /// is written.
+    /// Inertial sensor, if the file names a part or states its noise figures. Not serialised: the estimator's settings
+    /// follow from it and are.
     #[serde(skip)]
     pub imu_part: Option<Imu>,
     /// Settings of the firmware's estimator.
     pub estimation: Estimation,
-    /// Names of those that the file states, whatever the parts are.
+    /// Names of the estimator settings that the file states; they override those derived from parts.
     pub estimation_stated: Vec<&'static str>,
     /// Limits for arming the firmware.
     pub arming: ArmingLimits,
     /// Settings of the firmware's modes, limits and safety net.
     pub guidance: afbc_guidance::Settings,
-    /// Gains of AFBC in the profile `flight`: by rule ([`Profile::gains_for`]), or as the file says.
+    /// AFBC's gains in the profile `flight`: by rule ([`Profile::gains_for`]) unless the file states them.
     pub flight_gains: PerAxis<Gains>,
-    /// Settings of AFBC's cascade in the profile `flight`: by rule ([`Profile::settings_for`]), or as the file says.
+    /// Settings of AFBC's cascade in the profile `flight`: by rule ([`Profile::settings_for`]) unless the file states
+    /// them.
     pub flight_settings: Settings,
-    /// Text and name of the file, from which the gains of other laws are read: into the laws that fly it, with which
-    /// they are written.
+    /// Text and name of the file, from which other laws read their gains. Not serialised: the laws that fly serialise
+    /// their gains.
     #[serde(skip)]
     pub(crate) text: String,
     #[serde(skip)]
@@ -72,18 +73,19 @@ pub struct Vehicle {
 }
 
 impl Vehicle {
-    /// Lag of the rotors \[s\].
+    /// Returns the rotors' time constant \[s\].
     pub fn lag_s(&self) -> f32 {
         self.realism.rotors.time_constant_s as f32
     }
 
-    /// How the rotors respond, as flight software knows it: their [lag](Self::lag_s), or the nearest that is accepted.
+    /// Returns the rotors' response for the flight software: their [time constant](Self::lag_s), clamped to the
+    /// accepted range.
     pub fn response(&self) -> Response {
         let range = Response::LAG.range;
         Response { time_constant_s: self.realism.rotors.time_constant_s.clamp(range.min, range.max) as f32 }
     }
 
-    /// Returns `settings` with what the file states of the estimator in their place.
+    /// Returns `settings`, overridden by the estimator settings that the file states.
     #[must_use]
     pub fn stated_over(&self, mut settings: Estimation) -> Estimation {
         let mut stated: Vec<(&str, Vec<f64>)> = Vec::new();
@@ -102,7 +104,7 @@ impl Vehicle {
         settings
     }
 
-    /// Gains of AFBC in `profile`.
+    /// Returns AFBC's gains in `profile`.
     pub fn gains(&self, profile: Profile) -> PerAxis<Gains> {
         if profile == Profile::Flight {
             return self.flight_gains;
@@ -110,7 +112,7 @@ impl Vehicle {
         profile.gains_for(&self.parameters.to_f32(), self.lag_s())
     }
 
-    /// Settings of AFBC's cascade in `profile`.
+    /// Returns the settings of AFBC's cascade in `profile`.
     pub fn settings(&self, profile: Profile) -> Settings {
         if profile == Profile::Flight {
             return self.flight_settings;
@@ -118,8 +120,8 @@ impl Vehicle {
         profile.settings_for(self.force_max_n as f32, self.lag_s())
     }
 
-    /// Returns what flight software knows of the vehicle: the firmware's image, the same code in simulation, and a
-    /// station's file of parameters.
+    /// Returns the flight software's configuration of the vehicle. The firmware's image, the simulation and a ground
+    /// station's parameter file use it.
     ///
     /// # Errors
     /// If it does not have `N` rotors.
@@ -142,13 +144,14 @@ impl Vehicle {
         })
     }
 
-    /// Returns the vehicle with the gains of other laws from the file `file` that holds `text`.
+    /// Returns the vehicle with the file from which other laws read their gains replaced by `file`, which holds `text`.
     #[must_use]
     pub fn with_law_gains(self, file: &str, text: &str) -> Self {
         Vehicle { file: file.into(), text: text.into(), ..self }
     }
 
-    /// Calls `read` with the gains of the profile `flight` in the file, a table per law, if there are any.
+    /// Calls `read` with the table `[gains.flight]` of the file, which has one table per law. Returns none without such
+    /// a table.
     ///
     /// # Errors
     /// Those of `read`.
@@ -162,7 +165,7 @@ impl Vehicle {
     /// Checks that AFBC can fly the vehicle with a margin, under its monitor.
     ///
     /// # Errors
-    /// The first parameter, setting or gain out of range; the rotors must lift the vehicle and turn it with a margin
+    /// The first parameter, setting or gain out of range. The rotors must lift and turn the vehicle with a margin
     /// ([`Guarded::new`]).
     pub fn check(&self) -> Result<(), OutOfRange> {
         let (settings, gains) = (self.settings(Profile::Flight), self.flight_gains);

@@ -1,4 +1,4 @@
-//! Vehicle files: the built-in ones, and what is wrong with others, in one line.
+//! Vehicle files: the built-in ones are valid, and mistakes in others are reported in one line each.
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, missing_docs)]
 
 use afbc::Profile;
@@ -6,7 +6,7 @@ use afbc_estimator::Settings as Estimation;
 use afbc_types::{Declared, Value};
 use afbc_vehicles::{BUILT_IN, Vehicle, built_in, parse};
 
-/// The file without the gains found for the vehicle.
+/// Returns a built-in file's text without the tuned gains at its end.
 fn text(name: &str) -> &'static str {
     built_in(name).unwrap().text.split("# Gains found by").next().unwrap()
 }
@@ -35,7 +35,8 @@ fn every_built_in_vehicle_is_valid_and_named_after_its_file() {
     }
 }
 
-/// The paper's vehicle in the profile flight is what the firmware flew before there were vehicle files, to the bit.
+/// The paper's vehicle in the profile `flight` has exactly the gains that the firmware had before there were vehicle
+/// files.
 #[test]
 fn the_papers_vehicle_has_the_profiles_gains() {
     let paper = built_in("paper").unwrap().read().unwrap();
@@ -48,14 +49,15 @@ fn the_papers_vehicle_has_the_profiles_gains() {
     assert_eq!(paper.rotors, afbc_types::PLUS.map(|rotor| rotor.to_f64()).to_vec());
 }
 
-/// What laws are told of drag is what the plant's drag does to the vehicle in hover.
+/// The drag given to the laws matches the plant's drag on the vehicle in hover.
 #[test]
 fn drag_of_the_file_is_known_per_mass() {
     for known in &BUILT_IN {
         let vehicle = known.read().unwrap();
         let (stated, drag) = (vehicle.settings(Profile::Flight).common.drag, vehicle.realism.drag.unwrap());
         let p = &vehicle.parameters;
-        // Blades drag in proportion to the speeds of all rotors: each has a share of the weight.
+        // Blade drag is proportional to the sum of the rotor speeds; in hover, each rotor carries an equal share of the
+        // weight.
         let count = vehicle.rotors.len() as f64;
         let each_rad_s = (p.mass_kg * p.gravity_m_s2 / count / p.thrust_factor_n_s2).sqrt();
         let blades = drag.blade_n_s2_m * each_rad_s * count / p.mass_kg;
@@ -76,7 +78,7 @@ fn what_cannot_hover_with_a_margin_is_refused_by_name() {
     let sluggish =
         refused(&changed("iris", "inertia_kg_m2 = [0.0089, 0.0164, 0.0193]", "inertia_kg_m2 = [0.0089, 0.029, 0.03]"));
     assert!(sluggish.contains("hover_authority_rad_s2"), "{sluggish}");
-    // All rotors turn one way: no yaw apart from thrust.
+    // All rotors turn the same way, so yaw cannot be controlled apart from thrust.
     let spinless = refused(&text("paper").replace("\"ccw\"", "\"cw\""));
     assert!(spinless.contains("rotor_authority"), "{spinless}");
 }
@@ -120,7 +122,7 @@ fn gains_of_the_file_replace_those_of_the_rule() {
     assert_eq!(own.gains(Profile::Paper), rule.gains(Profile::Paper));
 }
 
-/// Whatever is done to a line, either it is still a vehicle that flies, or lines that name the file say what is wrong.
+/// After any damage to a line, the file is still a vehicle that can fly, or every error line names the file.
 #[test]
 fn damaged_files_are_told_line_by_line() {
     let values = ["", "nan", "-1e300", "1e300", "\"\\n\"", "[]", "{}", "true", "[0, 0]", "1e-12", "{ a.b = [[1]] }"];
@@ -150,7 +152,7 @@ fn damaged_files_are_told_line_by_line() {
     assert!(refusals > 2500 && accepted > 100, "{refusals} refused, {accepted} accepted");
 }
 
-/// Every setting of an estimator, by key.
+/// Returns every setting of an estimator with its key.
 fn settings(estimation: &Estimation) -> Vec<(&'static str, f32)> {
     let mut settings = Vec::new();
     let Ok(()) = estimation.visit(&mut |declaration, value| {
@@ -161,7 +163,7 @@ fn settings(estimation: &Estimation) -> Vec<(&'static str, f32)> {
     settings
 }
 
-/// Limits for arming and the guidance are the file's, with words for choices, and are checked together.
+/// Arming limits and guidance settings come from the file, with words for choices, and are checked together.
 #[test]
 fn arming_and_guidance_are_the_files() {
     let with = |tables: &str| format!("{}\n{tables}\n", text("iris"));
@@ -189,7 +191,7 @@ fn arming_and_guidance_are_the_files() {
     }
 }
 
-/// The image is told each declared value of the configuration, and the rotors.
+/// The image assigns every declared value of the configuration, and three values per rotor.
 #[test]
 fn an_image_holds_each_value_of_the_configuration() {
     fn count(group: &impl Declared) -> usize {
@@ -214,8 +216,8 @@ fn an_image_holds_each_value_of_the_configuration() {
     }
 }
 
-/// Each setting of the estimator can be given alone, up to the ends of its range, and beyond them is refused. Gravity
-/// is the vehicle's.
+/// Each estimator setting can be stated alone, up to the ends of its range; beyond them it is refused. Gravity must
+/// come from `[vehicle]`.
 #[test]
 fn the_estimators_settings_are_the_files() {
     let without = parse("my.toml", text("iris"), "my").unwrap().estimation;
@@ -266,8 +268,8 @@ fn the_estimators_settings_are_the_files() {
     assert_eq!(differing.count(), example.lines().count() - 1);
 }
 
-/// A part in `[imu]` tells the estimator its data sheet, and vibration as the file states it; `[estimator]` goes
-/// before.
+/// A part named in `[imu]` sets the estimator's noise from its data sheet, and vibration from the file. `[estimator]`
+/// overrides both.
 #[test]
 fn the_inertial_sensors_data_sheet_reaches_the_estimator() {
     let iris = |imu: &str| changed("iris", "[imu]", &format!("[imu]\n{imu}"));
@@ -278,7 +280,7 @@ fn the_inertial_sensors_data_sheet_reaches_the_estimator() {
     let [fine, middling, poor] = parts.map(|it| it.gyro_noise_rad_s_rthz);
     assert!(fine < poor && middling < poor && poor != usual.gyro_noise_rad_s_rthz, "{fine} {middling} {poor}");
     assert_eq!(parts.map(|it| it.gyro_range_rad_s), [2000.0_f64.to_radians() as f32; 3]);
-    // What the part does not say stays.
+    // Settings that the part does not affect keep their defaults.
     assert_eq!(
         parts.map(|it| (it.gnss_noise_m, it.mag_slow_rad, it.baro_walk_m_rts)),
         [(usual.gnss_noise_m, usual.mag_slow_rad, usual.baro_walk_m_rts,); 3]
@@ -299,7 +301,7 @@ fn the_inertial_sensors_data_sheet_reaches_the_estimator() {
     }
 }
 
-/// Where the inertial sensor is and how the rotors respond reach flight software as the file says.
+/// The inertial sensor's mounting and the rotors' time constant reach the flight software as stated in the file.
 #[test]
 fn mounting_and_lag_are_the_files() {
     for known in &BUILT_IN {
