@@ -1,7 +1,7 @@
 //! CRSF, the protocol of Crossfire and ExpressLRS receivers: 416,666 or 420,000 baud, 8N1.
 //!
-//! A frame is the address, the number of bytes that follow, the type, the payload and a checksum of type and payload
-//! (CRC-8, polynomial 0xD5). Source: TBS's specification of the protocol, revision 11.
+//! A frame consists of the address, the number of remaining bytes, the type, the payload and a checksum of type and
+//! payload (CRC-8, polynomial 0xD5). Source: TBS's specification of the protocol, revision 11.
 
 use crate::channels::{Channels, PACKED};
 use core::ops::RangeInclusive;
@@ -10,11 +10,11 @@ use heapless::Vec;
 
 /// Bytes of the longest frame.
 pub(crate) const FRAME_MAX: usize = 64;
-/// Address of a flight controller, with which frames begin.
+/// Address of a flight controller; every frame begins with it.
 pub(crate) const ADDRESS: u8 = 0xC8;
-/// Bytes before those that the length counts.
+/// Bytes that the length field does not count: address and length.
 const HEADER: usize = 2;
-/// Accepted lengths: type and checksum at least.
+/// Accepted values of the length field: at least type and checksum.
 const LENGTHS: RangeInclusive<usize> = 2..=FRAME_MAX - HEADER;
 
 const LINK_STATISTICS: u8 = 0x14;
@@ -22,10 +22,10 @@ const RC_CHANNELS_PACKED: u8 = 0x16;
 
 static CHECKSUM: Crc<u8, Table<1>> = Crc::<u8, Table<1>>::new(&CRC_8_DVB_S2);
 
-/// Pulse lengths that the sticks of a transmitter give \[us\]: 172 to 1811 in a frame.
+/// Pulse lengths at the ends of a transmitter's sticks \[us\]: 172 to 1811 in a frame.
 pub const CRSF_MICROSECONDS: RangeInclusive<u16> = 988..=2012;
 
-/// A frame that is read.
+/// A decoded frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CrsfFrame {
     /// RC_CHANNELS_PACKED (0x16).
@@ -34,19 +34,19 @@ pub enum CrsfFrame {
     LinkStatistics(LinkStatistics),
 }
 
-/// How well the receiver hears the transmitter.
+/// Quality of the radio link from transmitter to receiver.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LinkStatistics {
-    /// Received power on the better antenna \[dBm\].
+    /// Received power on the active antenna \[dBm\].
     pub rssi_dbm: i16,
-    /// Packets that arrive \[%\].
+    /// Share of packets received \[%\].
     pub quality_percent: u8,
-    /// Signal to noise \[dB\].
+    /// Signal-to-noise ratio \[dB\].
     pub snr_db: i8,
 }
 
 impl CrsfFrame {
-    /// Reads a frame whose checksum is right; none if it is of another type, or too short.
+    /// Decodes a frame with a valid checksum; returns none for another type or a payload that is too short.
     fn read(kind: u8, payload: &[u8]) -> Option<Self> {
         match kind {
             RC_CHANNELS_PACKED => {
@@ -55,17 +55,17 @@ impl CrsfFrame {
             }
             LINK_STATISTICS => {
                 let [first, second, quality_percent, snr, antenna, ..] = *payload.first_chunk::<10>()?;
-                // Of two antennas, the second is active if the number says so.
+                // Antenna number 1 means that the second of two antennas is active.
                 let rssi = if antenna == 1 { second } else { first };
                 let snr_db = i8::from_le_bytes([snr]);
-                // The protocol sends the power without its sign, which is negative.
+                // The protocol sends the power in dBm without its minus sign.
                 Some(CrsfFrame::LinkStatistics(LinkStatistics { rssi_dbm: -i16::from(rssi), quality_percent, snr_db }))
             }
             _ => None,
         }
     }
 
-    /// Returns the frame's bytes, as a receiver sends them: for tests and simulated receivers.
+    /// Encodes the frame as a receiver does; for tests and simulated receivers.
     pub fn encode(&self) -> Vec<u8, FRAME_MAX> {
         match self {
             CrsfFrame::Channels(channels) => framed(RC_CHANNELS_PACKED, &channels.pack(from_us)),
@@ -81,7 +81,7 @@ impl CrsfFrame {
     }
 }
 
-/// Frames a payload; empty if it is too long for a frame.
+/// Builds a frame around a payload; returns no bytes if the payload is too long.
 pub(crate) fn framed(kind: u8, payload: &[u8]) -> Vec<u8, FRAME_MAX> {
     let mut bytes = Vec::new();
     let mut digest = CHECKSUM.digest();
@@ -95,36 +95,36 @@ pub(crate) fn framed(kind: u8, payload: &[u8]) -> Vec<u8, FRAME_MAX> {
     if written { bytes } else { Vec::new() }
 }
 
-/// TICKS_TO_US of the specification.
+/// Converts raw ticks to microseconds: TICKS_TO_US of the specification.
 fn to_us(ticks: u16) -> u16 {
-    // 880 to 2159: eleven bits.
+    // Eleven bits give 880 to 2159 us.
     ((i32::from(ticks) - 992) * 5 / 8 + 1500) as u16
 }
 
-/// The inverse: ticks that are read as this pulse again.
+/// Converts microseconds to ticks, so that [`to_us`] returns the same pulse again.
 fn from_us(us: u16) -> u16 {
     let off_us = i32::from(us) - 1500;
     let ticks = (off_us.abs() * 8 + 4) / 5 * off_us.signum();
     (ticks + 992).clamp(0, 2047) as u16
 }
 
-/// Pause after which no frame goes on \[us\]: the longest takes 1.5 ms. Without it, what is left of a frame that lost a
-/// byte and the next frame would have a right checksum once in 256 times.
+/// Pause that ends an incomplete frame \[us\]; the longest frame takes 1.5 ms. Without this limit, the rest of a frame
+/// that lost a byte, joined with the next frame, would pass the checksum once in 256 times.
 pub const CRSF_GAP_US: u64 = 2_000;
 
-/// Finds frames in a receiver's bytes.
+/// Decoder of a receiver's byte stream.
 #[derive(Clone, Debug, Default)]
 pub struct CrsfDecoder {
-    /// What may be the beginning of a frame.
+    /// Bytes that may be the beginning of a frame.
     held: Vec<u8, FRAME_MAX>,
-    /// When the last bytes came \[us\].
+    /// Arrival time of the last bytes \[us\].
     last_us: u64,
     good_frames: u32,
     bad_frames: u32,
 }
 
 impl CrsfDecoder {
-    /// Takes bytes that came one after the other, the last of them at `now_us`, and gives each frame that is of use.
+    /// Takes received bytes, the last of which arrived at `now_us`, and passes each decoded frame to `take`.
     pub fn feed(&mut self, bytes: &[u8], now_us: u64, mut take: impl FnMut(CrsfFrame)) {
         if bytes.is_empty() {
             return;
@@ -135,23 +135,23 @@ impl CrsfDecoder {
         }
         self.last_us = now_us;
         for byte in bytes {
-            // There is room: a frame of the longest length has been taken out.
+            // Cannot overflow: a frame of maximum length was removed already.
             let _ = self.held.push(*byte);
             while self.advance(&mut take) {}
         }
     }
 
-    /// Number of frames with a right checksum.
+    /// Returns the number of frames with a valid checksum.
     pub fn good_frames(&self) -> u32 {
         self.good_frames
     }
 
-    /// Number of beginnings of frames whose length or checksum was wrong.
+    /// Returns the number of frames with a wrong length or checksum, or cut short by a pause.
     pub fn bad_frames(&self) -> u32 {
         self.bad_frames
     }
 
-    /// Takes out a frame or a byte that begins none; false if more bytes are needed.
+    /// Removes one frame, or one byte that cannot begin a frame. Returns false if more bytes are needed.
     fn advance(&mut self, take: &mut impl FnMut(CrsfFrame)) -> bool {
         let Some((address, rest)) = self.held.split_first() else { return false };
         if *address != ADDRESS {
@@ -164,7 +164,7 @@ impl CrsfDecoder {
             return self.drop_first(1);
         }
         let Some((content, _)) = rest.split_at_checked(length) else { return false };
-        // Always: the accepted lengths have a type and a checksum.
+        // Never fails: the accepted lengths include type and checksum.
         let Some(([kind, payload @ ..], checksum)) = content.split_last().map(|(last, content)| (content, *last))
         else {
             return self.drop_first(1);
@@ -173,7 +173,7 @@ impl CrsfDecoder {
         digest.update(&[*kind]);
         digest.update(payload);
         if digest.finalize() != checksum {
-            // A frame may begin within what was taken for one.
+            // The next frame may begin among these bytes.
             self.bad_frames = self.bad_frames.saturating_add(1);
             return self.drop_first(1);
         }

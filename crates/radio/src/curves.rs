@@ -1,4 +1,4 @@
-//! Curves of the sticks, with PX4's names and formulae: from the way of a stick to the share of what it commands.
+//! Stick curves with PX4's names and formulae: from a stick's deflection to the commanded share.
 
 use afbc_guidance::{FlightMode, Sticks};
 use afbc_types::parameters;
@@ -36,8 +36,8 @@ parameters! {
 }
 
 impl StickCurves {
-    /// Returns what sticks command in a mode, -1 to 1, of their ways, -1 to 1. Modes that fly by themselves take no
-    /// sticks; for them nothing is changed.
+    /// Returns the command, -1 to 1, for stick deflections, -1 to 1, in a mode. Modes that do not use sticks leave them
+    /// unchanged.
     #[must_use]
     pub fn shape(&self, mode: FlightMode, sticks: &Sticks) -> Sticks {
         let Sticks { roll, pitch, throttle, yaw } = *sticks;
@@ -57,20 +57,20 @@ impl StickCurves {
     }
 }
 
-/// Mixes a line and a cubic curve: `expo` of the latter.
+/// Mixes a linear and a cubic curve; `expo` is the cubic share.
 fn expo(stick: f32, expo: f32) -> f32 {
     (1.0 - expo) * stick + expo * stick * stick * stick
 }
 
-/// [`expo`] of the way beyond `dead_zone`.
+/// Applies [`expo`] to the deflection beyond `dead_zone`.
 fn expo_dead_zone(stick: f32, share: f32, dead_zone: f32) -> f32 {
-    // As in PX4, some of the way is left.
+    // Leaves some travel outside the dead zone, as PX4 does.
     let dead_zone = dead_zone.min(0.99);
     let beyond = (stick.abs() - dead_zone).max(0.0);
     expo((beyond / (1.0 - dead_zone)).min(1.0), share).copysign(stick)
 }
 
-/// [`expo`], bent further: it reaches 1 at the end of the way only.
+/// Applies [`expo`] and a further bend that holds the command back until the end of the travel.
 fn super_expo(stick: f32, share: f32, bend: f32) -> f32 {
     expo(stick, share) * (1.0 - bend) / (1.0 - stick.abs() * bend)
 }

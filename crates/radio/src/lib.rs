@@ -1,12 +1,12 @@
-//! Radio control: from a receiver's bytes to what the pilot wants.
+//! Radio control: from a receiver's bytes to the pilot's commands.
 //!
-//! * [`CrsfDecoder`] and [`SbusDecoder`] find the frames of a receiver in its bytes; a frame has [`Channels`].
-//! * [`RadioLink`] decides from frames and time whether the pilot is heard.
-//! * [`RadioPilot`] turns channels into sticks, requests and orders, by [`RadioSettings`], which have PX4's names.
-//! * [`CrsfTelemetry`] is what goes back to the pilot's transmitter.
+//! * [`CrsfDecoder`] and [`SbusDecoder`] decode a receiver's bytes into frames of [`Channels`].
+//! * [`RadioLink`] decides from frames and time whether the link is up.
+//! * [`RadioPilot`] turns channels into sticks, requests and orders, using [`RadioSettings`] with PX4's names.
+//! * [`CrsfTelemetry`] encodes telemetry for the pilot's transmitter.
 //!
-//! No input and output, no clock: the caller brings bytes and times. Nothing here fails on any bytes; what is no frame
-//! is left out.
+//! The crate does no input or output and has no clock: the caller passes bytes and times. Any bytes are accepted;
+//! invalid frames are skipped.
 //!
 //! ```
 //! use afbc_radio::{CRSF_MICROSECONDS, Channels, CrsfDecoder, CrsfFrame, RadioLink};

@@ -1,10 +1,10 @@
-//! What the pilot wants.
+//! The pilot's commands from sticks and switches.
 //!
-//! * The arming switch arms when it is switched on, with the throttle not above its centre, and disarms when it is
-//!   switched off. That it is on when the pilot is first heard, or is heard again, arms nothing.
-//! * The kill switch stops the motors as long as it is on, before anything else.
-//! * The mode is that of the switches when it arms, and changes when one of them is moved, or, in a mode that flies by
-//!   itself, when a stick is moved. A pilot who is heard again takes nothing over by that alone.
+//! * The arming switch arms when it is switched on with the throttle at or below its centre, and disarms when it is
+//!   switched off. A switch that is already on when the link comes up arms nothing.
+//! * The kill switch stops the motors while it is on, with priority over everything else.
+//! * On arming, the mode is that of the switches. It changes when one of them is moved. In an autonomous mode, it also
+//!   changes when a stick is moved. A regained link alone changes no mode.
 
 use crate::channels::Channels;
 use crate::link::RadioLink;
@@ -13,50 +13,50 @@ use crate::switches::{Debounced, is_on};
 use afbc_flight_core::Request;
 use afbc_guidance::{FlightMode, Order, Sticks};
 
-/// Throttle above which a vehicle is not armed: in the modes that sticks fly it would take off.
+/// Throttle above which arming is refused \[-1 to 1\]: in manual modes, the vehicle would take off.
 const THROTTLE_UP: f32 = 0.1;
 
-/// What the pilot's orders depend on.
+/// Vehicle state that the pilot's commands depend on.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PilotInputs {
     /// Time since power-up \[us\].
     pub now_us: u64,
     /// True if the vehicle is armed.
     pub armed: bool,
-    /// The flight mode.
+    /// Current flight mode.
     pub mode: FlightMode,
 }
 
-/// What the pilot wants now.
+/// The pilot's commands of one step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PilotOutput {
-    /// The sticks, if they count.
+    /// Stick positions, if the receiver's sticks are in use.
     pub sticks: Option<Sticks>,
-    /// A request to the flight core.
+    /// Request to the flight core.
     pub request: Option<Request>,
-    /// An order to the guidance.
+    /// Order to the guidance.
     pub order: Option<Order>,
-    /// What the pilot should know.
+    /// Message to the pilot.
     pub notice: Option<PilotNotice>,
 }
 
-/// What the pilot should know.
+/// Messages to the pilot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PilotNotice {
-    /// The pilot is heard.
+    /// The radio link is up.
     Heard,
-    /// The pilot is not heard any more.
+    /// The radio link is lost.
     Lost,
     /// Not armed: the throttle is up.
     ThrottleUp,
     /// Not armed: the kill switch is on.
     KillSwitchOn,
-    /// Not armed: the pilot has only just been heard again.
+    /// Not armed: the radio link has only just come back.
     JustHeard,
 }
 
 impl PilotNotice {
-    /// Returns what a station or a transmitter shows.
+    /// Returns the text for a ground station or transmitter.
     pub const fn text(self) -> &'static str {
         match self {
             PilotNotice::Heard => "radio: heard",
@@ -68,23 +68,23 @@ impl PilotNotice {
     }
 }
 
-/// Follows sticks and switches.
+/// State of the pilot's sticks and switches.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct RadioPilot {
-    /// Time of the last frame that was looked at; none while the pilot is not heard \[us\].
+    /// Arrival time of the last processed frame; none while the link is down \[us\].
     seen_us: Option<u64>,
     arm: Debounced<bool>,
     kill: Debounced<bool>,
     return_home: Debounced<bool>,
     hold: Debounced<bool>,
     mode: Debounced<FlightMode>,
-    /// A mode that flies by itself, and where the sticks were when it began.
+    /// The current autonomous mode, and the stick positions when it began.
     by_itself: Option<(FlightMode, Sticks)>,
 }
 
 impl RadioPilot {
-    /// Looks at a receiver, after each frame and every 20 ms at least.
-    // Out of line: called in five places, it would take a kilobyte of flash in each.
+    /// Processes the receiver's channels. To be called after each frame and at least every 20 ms.
+    // Not inlined: with five callers, each copy would cost a kilobyte of flash.
     #[inline(never)]
     pub fn step(&mut self, settings: &RadioSettings, link: &mut RadioLink, inputs: &PilotInputs) -> PilotOutput {
         let now_us = inputs.now_us;
@@ -96,7 +96,7 @@ impl RadioPilot {
             *self = RadioPilot::default();
             return PilotOutput { notice, ..PilotOutput::default() };
         };
-        // Seen twice, one frame would move a switch, which takes two.
+        // Skips a frame that was processed already: a switch needs two frames, and the same one must not count twice.
         if self.seen_us == link.at_us() {
             return PilotOutput::default();
         }
@@ -111,7 +111,7 @@ impl RadioPilot {
         let sticks = Sticks {
             roll: stick(roll),
             pitch: stick(pitch),
-            // Without a throttle it holds its height.
+            // A missing throttle channel counts as centred, which holds the height.
             throttle: settings.channel(channels, throttle).map_or(0.0, |(calibration, us)| calibration.centred(us)),
             yaw: stick(yaw),
         };
@@ -133,7 +133,7 @@ impl RadioPilot {
         if killing && inputs.armed {
             output.request = Some(Request::Kill);
         }
-        // Sticks and modes wait for a steady link; stopping the motors, above, does not.
+        // Sticks and modes wait for a steady link; the commands above that stop the motors do not.
         if !is_steady {
             return output;
         }
@@ -149,7 +149,7 @@ impl RadioPilot {
         output
     }
 
-    /// Returns an order if a switch or a stick was moved that changes the mode, or if it arms.
+    /// Returns an order if a switch or stick that changes the mode was moved, or if the vehicle is being armed.
     fn select(
         &mut self,
         settings: &RadioSettings,
@@ -164,7 +164,7 @@ impl RadioPilot {
         let changes = [self.return_home.put(return_home), self.hold.put(hold)];
         let is_moved = changes.iter().any(|change| matches!(change, Some((Some(_), _))));
         let is_selected = matches!(mode.and_then(|mode| self.mode.put(mode)), Some((Some(_), _)));
-        // A vehicle that arms flies as the switches say.
+        // On arming, the switches decide the mode.
         let mode = match (is_moved || is_selected || arms, self.return_home.get(), self.hold.get()) {
             (false, ..) => self.taken_over(settings, inputs, sticks),
             (true, Some(true), _) => Some(FlightMode::Return),
@@ -174,7 +174,7 @@ impl RadioPilot {
         mode.map(Order::Select)
     }
 
-    /// Returns the mode in which the sticks take over from one that flies by itself.
+    /// Returns position mode if a moved stick ends an autonomous mode.
     fn taken_over(&mut self, settings: &RadioSettings, inputs: &PilotInputs, sticks: &Sticks) -> Option<FlightMode> {
         if inputs.mode.is_manual() || !inputs.armed || !settings.overrides() {
             self.by_itself = None;
@@ -192,7 +192,7 @@ impl RadioPilot {
         ];
         let is_moved = off.iter().any(|off| off.abs() > settings.modes.override_share);
         if is_moved {
-            // Once: refused, it is not asked for in every frame.
+            // Restarts from the new position, so that a refused order is not repeated in every frame.
             self.by_itself = Some((inputs.mode, *sticks));
         }
         is_moved.then_some(FlightMode::Position)

@@ -27,7 +27,7 @@ parameters! {
     }
     together(channel) {
         let ChannelCalibration { min_us, max_us, .. } = *channel;
-        // Half the room of a stick on either side at least, so that nothing is divided by zero.
+        // Leaves at least half of the usual stick travel on either side, so that nothing is divided by zero.
         Range { max: (max_us - 300.0).into(), ..ChannelCalibration::MIN.range }.check(min_us)?;
         let room = Range { min: min_us.into(), max: max_us.into(), ..ChannelCalibration::TRIM.range };
         room.check(channel.trim_us)
@@ -120,7 +120,7 @@ parameters! {
     together(modes) {
         for (declaration, number) in SwitchModes::DECLARED.iter().zip(modes.numbers()) {
             if mode_of(number).is_none() {
-                // Slow position (9) there is none of.
+                // PX4's slow position mode (9) does not exist here.
                 let next = f64::from(number) + 1.0;
                 Range { min: next, ..declaration.range }.check(number as f32)?;
             }
@@ -129,7 +129,7 @@ parameters! {
     }
 }
 
-/// A protocol of receivers.
+/// Protocol of a receiver.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RadioProtocol {
     /// CRSF: Crossfire, ExpressLRS.
@@ -162,7 +162,7 @@ parameters! {
     }
     together(receiver) {
         let least = match receiver.source {
-            // PX4's first come, first served there is none of.
+            // PX4's modes 2 and 3, which choose between receiver and joystick, do not exist here.
             2 | 3 => 4.0,
             _ => 0.0,
         };
@@ -171,12 +171,12 @@ parameters! {
 }
 
 impl RadioReceiver {
-    /// True if the sticks of the receiver count.
+    /// True if the receiver's sticks are in use.
     pub fn takes_receiver(&self) -> bool {
         matches!(self.source, 0 | 5)
     }
 
-    /// True if the sticks of a station count, where the receiver's do not go first.
+    /// True if a ground station's joystick is in use, at least while the receiver's sticks are not available.
     pub fn takes_joystick(&self) -> bool {
         matches!(self.source, 1 | 5)
     }
@@ -213,7 +213,7 @@ parameters! {
     }
 }
 
-/// Returns the mode of a number of PX4's.
+/// Returns the flight mode with PX4's number.
 fn mode_of(number: u32) -> Option<FlightMode> {
     Some(match number {
         0 | 8 => FlightMode::Stabilised,
@@ -244,16 +244,16 @@ impl SwitchModes {
         [self.first, self.second, self.third, self.fourth, self.fifth, self.sixth]
     }
 
-    /// Returns the mode of a switch that is `stick` of its way from the centre, -1 to 1.
+    /// Returns the mode of a switch position, -1 to 1.
     pub(crate) fn mode(&self, stick: f32) -> Option<FlightMode> {
         let position = ((stick + 1.0) * 3.0) as usize;
-        // The very end of the way would be a seventh position.
+        // The upper end of the travel would be a seventh position.
         self.numbers().get(position.min(5)).copied().and_then(mode_of)
     }
 }
 
 impl ChannelCalibration {
-    /// Returns a pulse as a share of the way from `trim_us`, -1 to 1.
+    /// Returns a pulse as a share of the travel from `trim_us`, -1 to 1.
     fn share(&self, us: u16, trim_us: f32) -> f32 {
         let off_us = f32::from(us) - trim_us;
         let is_below = off_us < 0.0;
@@ -266,12 +266,12 @@ impl ChannelCalibration {
         if is_below == (self.direction < 0.0) { share } else { -share }
     }
 
-    /// Returns a stick, -1 to 1.
+    /// Returns the position of a stick, -1 to 1.
     pub(crate) fn stick(&self, us: u16) -> f32 {
         self.share(us, self.trim_us)
     }
 
-    /// Returns a stick or switch whose centre is between its ends, -1 to 1.
+    /// Returns the position of a stick or switch centred between its ends, -1 to 1.
     pub(crate) fn centred(&self, us: u16) -> f32 {
         self.share(us, 0.5 * (self.min_us + self.max_us))
     }
@@ -282,20 +282,20 @@ impl RadioSettings {
         [&self.channel_1, &self.channel_2, &self.channel_3, &self.channel_4]
     }
 
-    /// Returns a channel's calibration and pulse.
+    /// Returns the calibration and pulse of a channel.
     pub(crate) fn channel(&self, channels: &Channels, number: u32) -> Option<(&ChannelCalibration, u16)> {
         let index = usize::try_from(number).ok()?.checked_sub(1)?;
-        // Further ones are for switches, which need no calibration.
+        // Channels above 4 are switches and use the default calibration.
         let calibration = self.calibrations().get(index).copied().unwrap_or(&ChannelCalibration::DEFAULT);
         Some((calibration, channels.channel(number)?))
     }
 
-    /// True if the sticks, moved, end a mode that flies by itself.
+    /// True if moved sticks end an autonomous mode.
     pub(crate) fn overrides(&self) -> bool {
         self.modes.overrides && self.receiver.takes_receiver()
     }
 
-    /// True if the receiver shows by a channel that it hears nothing.
+    /// True if the failsafe channel shows that the receiver has lost the transmitter.
     pub(crate) fn has_failed(&self, channels: &Channels) -> bool {
         let RadioFunctions { failsafe, throttle, failsafe_us, .. } = self.functions;
         let number = if failsafe == 0 { throttle } else { failsafe };
@@ -303,7 +303,7 @@ impl RadioSettings {
             return false;
         };
         let us = f32::from(us);
-        // A threshold within the way of the channel is none: moving there would lose the pilot.
+        // A threshold within the channel's range is ignored: moving the stick past it would look like a lost link.
         failsafe_us < calibration.min_us && us < failsafe_us || failsafe_us > calibration.max_us && us > failsafe_us
     }
 }

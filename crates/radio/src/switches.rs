@@ -3,7 +3,7 @@
 use crate::channels::Channels;
 use crate::settings::RadioSettings;
 
-/// A position that counts once two frames in a row have it: SBUS has no checksum.
+/// A switch position that changes only after two equal frames in a row, since SBUS has no checksum.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Debounced<T> {
     value: Option<T>,
@@ -17,8 +17,8 @@ impl<T> Default for Debounced<T> {
 }
 
 impl<T: Copy + PartialEq> Debounced<T> {
-    /// Takes the position of a new frame; returns the old and the new one if it has changed. The old one is none when
-    /// the pilot has just been heard.
+    /// Takes the position in a new frame. Returns the old and new position if it has changed. The old position is none
+    /// if the link has just come up.
     pub(crate) fn put(&mut self, position: T) -> Option<(Option<T>, T)> {
         let is_sure = self.next == Some(position);
         self.next = Some(position);
@@ -33,7 +33,7 @@ impl<T: Copy + PartialEq> Debounced<T> {
     }
 }
 
-/// True if a switch is on; none if there is none.
+/// Returns whether a switch is on; none if its channel is missing.
 pub(crate) fn is_on(settings: &RadioSettings, channels: &Channels, number: u32, share: f32) -> Option<bool> {
     let (calibration, us) = settings.channel(channels, number)?;
     let way = 0.5 * (calibration.centred(us) + 1.0);

@@ -1,12 +1,12 @@
-//! CRSF telemetry: what the pilot's transmitter shows and says. Numbers are big-endian; source as of [`crate::crsf`].
+//! CRSF telemetry, shown and spoken by the pilot's transmitter. Numbers are big-endian. Source: see [`crate::crsf`].
 
 use crate::crsf::{FRAME_MAX, framed};
 use heapless::Vec;
 
-/// Characters of a flight mode that transmitters show.
+/// Largest number of characters of a flight mode that transmitters show.
 const MODE_MAX: usize = 14;
 
-/// A frame to the transmitter.
+/// A telemetry frame to the transmitter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum CrsfTelemetry<'a> {
     /// BATTERY_SENSOR (0x08).
@@ -20,7 +20,7 @@ pub enum CrsfTelemetry<'a> {
         /// Charge left, 0 to 1.
         left: f32,
     },
-    /// ATTITUDE (0x1E), of axes forward, right, down.
+    /// ATTITUDE (0x1E), with axes forward, right, down.
     Attitude {
         /// Roll, pitch, yaw \[rad\].
         angles_rad: [f32; 3],
@@ -35,9 +35,9 @@ pub enum CrsfTelemetry<'a> {
         speed_m_s: f32,
         /// Course over ground \[rad\].
         course_rad: f32,
-        /// Height above the sea \[m\].
+        /// Height above mean sea level \[m\].
         height_m: f32,
-        /// Satellites.
+        /// Number of satellites.
         satellites: u8,
     },
 }
@@ -47,10 +47,10 @@ impl CrsfTelemetry<'_> {
     pub fn encode(&self) -> Vec<u8, FRAME_MAX> {
         let mut payload: Vec<u8, FRAME_MAX> = Vec::new();
         let mut put = |bytes: &[u8]| {
-            // Short enough, each of them.
+            // Never fails: every payload fits.
             let _ = payload.extend_from_slice(bytes);
         };
-        // `as` saturates, and takes what is no number as 0.
+        // `as` saturates and converts NaN to 0.
         let kind = match *self {
             CrsfTelemetry::Battery { voltage_v, current_a, drawn_mah, left } => {
                 put(&((voltage_v * 10.0 + 0.5) as u16).to_be_bytes());
@@ -61,7 +61,7 @@ impl CrsfTelemetry<'_> {
                 0x08
             }
             CrsfTelemetry::Attitude { angles_rad: [roll, pitch, yaw] } => {
-                // In the protocol's order.
+                // Order of the protocol: pitch, roll, yaw.
                 for angle_rad in [pitch, roll, yaw] {
                     let ticks = angle_rad * 10_000.0;
                     put(&((if ticks < 0.0 { ticks - 0.5 } else { ticks + 0.5 }) as i16).to_be_bytes());
@@ -75,11 +75,11 @@ impl CrsfTelemetry<'_> {
             }
             CrsfTelemetry::Gps { place_1e7deg, speed_m_s, course_rad, height_m, satellites } => {
                 place_1e7deg.iter().for_each(|degrees| put(&degrees.to_be_bytes()));
-                // A tenth of km/h.
+                // Unit 0.1 km/h.
                 put(&((speed_m_s * 36.0 + 0.5) as u16).to_be_bytes());
                 let course = course_rad.to_degrees() * 100.0;
                 put(&((if course < 0.0 { course + 36_000.0 } else { course }) as u16).to_be_bytes());
-                // Counted from 1000 m below the sea, since the number has no sign.
+                // The number is unsigned and counts from 1000 m below sea level.
                 put(&((height_m + 1000.0) as u16).to_be_bytes());
                 put(&[satellites]);
                 0x02

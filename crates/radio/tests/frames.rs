@@ -1,4 +1,4 @@
-//! Frames of receivers, beside other people's encoders and decoders, and bytes that are none.
+//! Receivers' frames, compared with other implementations, and invalid bytes.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, clippy::panic)]
 
 use afbc_radio::{
@@ -6,7 +6,7 @@ use afbc_radio::{
 };
 use proptest::prelude::*;
 
-/// Pulses that eleven bits of CRSF can say.
+/// Pulses that CRSF's eleven bits can represent.
 fn channels() -> impl Strategy<Value = Channels> {
     prop::array::uniform16(880u16..=2154).prop_map(Channels::of)
 }
@@ -17,7 +17,7 @@ fn crsf(bytes: &[u8]) -> Vec<CrsfFrame> {
     frames
 }
 
-/// Returns the frames of bytes in pieces, each with the pause before it.
+/// Decodes pieces of bytes, each with the pause before it; returns the frames.
 fn sbus(pieces: &[(u64, &[u8])]) -> Vec<SbusFrame> {
     let (mut decoder, mut frames, mut now_us) = (SbusDecoder::default(), Vec::new(), 0);
     for (pause_us, piece) in pieces {
@@ -28,7 +28,7 @@ fn sbus(pieces: &[(u64, &[u8])]) -> Vec<SbusFrame> {
 }
 
 proptest! {
-    /// As `crsf`, another implementation, writes them.
+    /// Compares with `crsf`, another implementation, as the encoder.
     #[test]
     fn crsf_channels_are_those_of_another_encoder(ticks in prop::array::uniform16(0u16..=2047)) {
         let packet = crsf::Packet::RcChannels(crsf::RcChannels(ticks));
@@ -41,7 +41,7 @@ proptest! {
     fn crsf_channels_are_read_as_they_were_written(channels in channels()) {
         let frame = CrsfFrame::Channels(channels);
         prop_assert_eq!(crsf(&frame.encode()), [frame]);
-        // And by the other implementation.
+        // The other implementation decodes them, too.
         let mut parser = crsf::PacketParser::<64>::new();
         parser.push_bytes(&frame.encode());
         let Some(Ok((_, crsf::Packet::RcChannels(read)))) = parser.next_packet() else { panic!("no packet") };
@@ -50,8 +50,8 @@ proptest! {
         }
     }
 
-    /// A checksum of eight bits finds one wrong bit, and any that lie within eight in the order in which it takes them,
-    /// from the highest bit of each byte on.
+    /// An 8-bit checksum detects any single wrong bit, and any group of wrong bits within eight consecutive bits
+    /// (highest bit of each byte first).
     #[test]
     fn a_spoilt_crsf_frame_is_none(channels in channels(), at in 16usize..200, burst in 1u8..) {
         let mut bytes = CrsfFrame::Channels(channels).encode();
@@ -61,7 +61,7 @@ proptest! {
         prop_assert_eq!(crsf(&bytes), []);
     }
 
-    /// Every frame is found, in whatever pieces it comes, after anything that begins no frame.
+    /// Every frame is found, however the bytes are split, after noise without a start byte.
     #[test]
     fn crsf_frames_are_found_in_noise(
         frames in prop::collection::vec((channels(), prop::collection::vec(0u8..0xC8, 0..80)), 1..6),
@@ -79,7 +79,7 @@ proptest! {
         prop_assert_eq!(decoder.good_frames() as usize, frames.len());
     }
 
-    /// What was cut short costs no frame after the pause.
+    /// A frame that was cut short does not harm the next frame after the pause.
     #[test]
     fn a_cut_crsf_frame_costs_no_other(first in channels(), second in channels(), kept in 1usize..26) {
         let [first, second] = [first, second].map(CrsfFrame::Channels);
@@ -90,7 +90,7 @@ proptest! {
         prop_assert_eq!(decoder.bad_frames(), 1);
     }
 
-    /// Bytes that are nothing are no trouble, and no more than a few are taken for frames.
+    /// Random bytes do no harm, and only few are taken for frames.
     #[test]
     fn any_bytes_are_read(bytes in prop::collection::vec(any::<u8>(), 0..2000), piece in 1usize..90) {
         let (mut crsf, mut sbus) = (CrsfDecoder::default(), SbusDecoder::default());
@@ -101,7 +101,7 @@ proptest! {
         prop_assert!(crsf.good_frames() as usize <= bytes.len() / 4);
     }
 
-    /// As `sbus-rs`, another implementation, reads them.
+    /// Compares with `sbus-rs`, another implementation, as the decoder.
     #[test]
     fn sbus_frames_are_those_of_another_decoder(
         us in prop::array::uniform16(875u16..=2154), frame_lost: bool, failsafe: bool,
@@ -116,13 +116,13 @@ proptest! {
         }
     }
 
-    /// A frame begins after a pause alone: the same bytes elsewhere are none.
+    /// A frame begins only after a pause; the same bytes elsewhere are ignored.
     #[test]
     fn sbus_frames_begin_after_a_pause(us in prop::array::uniform16(1000u16..=2000), early in 1usize..24) {
         let frame = SbusFrame { channels: Channels::of(us), frame_lost: false, failsafe: false };
         let bytes = frame.encode();
         let (head, tail) = bytes.split_at(early);
-        // A byte of a channel may be a header, too.
+        // A channel byte equal to the header could begin a frame.
         prop_assume!(tail[0] != 0x0F);
         prop_assert_eq!(sbus(&[(7_000, head), (500, tail)]), [frame]);
         prop_assert_eq!(sbus(&[(7_000, head), (7_000, tail), (500, &bytes)]), []);
@@ -130,8 +130,8 @@ proptest! {
     }
 }
 
-/// Feeds a receiver's frames, 15 ms apart, and bytes of others 2.5 ms after each; returns the decoder and whether the
-/// pilot is heard.
+/// Feeds frames 15 ms apart, each followed after 2.5 ms by the bytes `between`. Returns the decoder and whether the
+/// link is up.
 fn listen(frames: impl Iterator<Item = [u8; 25]>, between: &[u8]) -> (SbusDecoder, bool) {
     let (mut decoder, mut link, mut now_us) = (SbusDecoder::default(), RadioLink::default(), 0);
     for frame in frames {
@@ -139,7 +139,7 @@ fn listen(frames: impl Iterator<Item = [u8; 25]>, between: &[u8]) -> (SbusDecode
         for (pause_us, bytes) in [(0, &frame[..]), (2_500, between)] {
             let bad = decoder.bad_frames();
             decoder.feed(bytes, now_us + pause_us, |frame| link.take(&frame.channels, now_us));
-            // As the vehicle does.
+            // Counts bad frames like the vehicle does.
             if decoder.bad_frames() != bad {
                 link.refuse();
             }
@@ -161,7 +161,7 @@ fn the_footers_of_known_receivers_count_at_once() {
         bytes[24] = footer;
         assert_eq!(sbus(&[(7_000, &bytes)]).len(), 1, "{footer:#04x}");
     }
-    // Eleven bits of its first channel: 0x401.
+    // The first channel's eleven bits are 0x401.
     assert_eq!(sbus(&[(7_000, &R7003SB)])[0].channels.us[0], (0x401 * 5 / 8 + 875) as u16);
 }
 
@@ -173,16 +173,16 @@ fn a_footer_that_a_receiver_repeats_counts() {
             bytes[24] = footer;
             bytes
         };
-        // The same in each frame, or with a slot that is counted in two or four bits.
+        // The same footer in each frame, or with a slot number counted in two or four bits.
         for slots in [1, 4, 16] {
             let frames = |count: u8| (0..count).map(move |number| with(footer.wrapping_add((number % slots) << 4)));
             let (decoder, heard) = listen(frames(11), &[]);
             assert!(heard && decoder.good_frames() >= 10, "{footer:#04x}: {decoder:?}");
-            // Sensors that answer in SBUS2's slots.
+            // With sensors that answer in SBUS2's slots.
             assert!(listen(frames(11), &[0x03, 0x84, 0x2F]).1, "{footer:#04x} with sensors");
         }
     }
-    // What changes in every frame is no receiver's.
+    // A footer that changes in every frame is not a receiver's.
     let odd = |count: u8| (0..count).map(|number| (number % 2 * 5 + 1) | (number << 4));
     let frames = odd(200).map(|footer| {
         let mut bytes = R7003SB;
@@ -205,7 +205,7 @@ fn a_footer_or_flag_that_is_none_spoils_a_frame() {
     }
 }
 
-/// Values by hand, by the specification's table.
+/// Values computed by hand from the specification's table.
 #[test]
 fn link_statistics_are_read() {
     let payload = [80, 70, 99, (-5i8) as u8, 1, 2, 3, 90, 98, 4];
@@ -226,7 +226,7 @@ fn link_statistics_are_read() {
     assert_eq!(crsf(raw.data()), [CrsfFrame::LinkStatistics(expected)]);
 }
 
-/// Payloads by the specification: big-endian, its units, pitch before roll.
+/// Payloads as specified: big-endian, in the protocol's units, pitch before roll.
 #[test]
 fn telemetry_is_laid_out_as_specified() {
     let payload = |telemetry: CrsfTelemetry<'_>| {
@@ -249,7 +249,7 @@ fn telemetry_is_laid_out_as_specified() {
     };
     let expected = [0x02, 0x1C, 0x12, 0xE3, 0xC0, 0xFA, 0xEF, 0x00, 0xC0, 0x01, 0x68, 0x69, 0x78, 0x05, 0xB0, 17];
     assert_eq!(payload(gps), expected);
-    // Numbers that are none, or too large, say the nearest that can be said.
+    // NaN becomes 0; numbers that are too large or negative become the nearest possible value.
     let odd = CrsfTelemetry::Battery { voltage_v: f32::NAN, current_a: -1.0, drawn_mah: f32::INFINITY, left: 7.0 };
     assert_eq!(payload(odd), [0x08, 0, 0, 0, 0, 0xFF, 0xFF, 0xFF, 100]);
 }

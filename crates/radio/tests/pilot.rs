@@ -1,4 +1,4 @@
-//! Sticks, switches and losses: what a pilot gets.
+//! The pilot's commands from sticks and switches, and after a lost link.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing)]
 
 use afbc_flight_core::Request;
@@ -24,7 +24,7 @@ struct Rig {
 }
 
 impl Rig {
-    /// Sticks centred, throttle down, switches off; heard.
+    /// Creates a rig with sticks centred, throttle down and switches off; no frame has been received yet.
     fn new() -> Self {
         let mut settings = RadioSettings::DEFAULT;
         settings.functions.kill = KILL as u32 + 1;
@@ -43,7 +43,7 @@ impl Rig {
         rig
     }
 
-    /// So many frames pass; returns what the pilot wants after each.
+    /// Receives this number of frames; returns the pilot's output after each.
     fn frames(&mut self, count: u32) -> Vec<PilotOutput> {
         (0..count)
             .map(|_| {
@@ -54,7 +54,7 @@ impl Rig {
             .collect()
     }
 
-    /// Nothing is heard for a time.
+    /// Lets this time pass without frames; returns the pilot's outputs.
     fn silence(&mut self, us: u64) -> Vec<PilotOutput> {
         let end_us = self.inputs.now_us + us;
         let mut outputs = Vec::new();
@@ -103,7 +103,7 @@ fn a_switch_that_was_on_arms_nothing() {
     assert_eq!(requests(&rig.frames(200)), []);
     rig.switch(ARM, false);
     assert_eq!(requests(&rig.switch(ARM, true)), [Request::Arm]);
-    // Nor when the pilot is heard again, or with a vehicle that has disarmed by itself.
+    // The switch arms nothing either when the link comes back, or after the vehicle has disarmed by itself.
     assert_eq!(requests(&rig.frames(100)), []);
     assert_eq!(notices(&rig.silence(1_000_000)), [PilotNotice::Lost]);
     assert_eq!(requests(&rig.frames(500)), []);
@@ -129,7 +129,7 @@ fn nothing_arms_with_the_throttle_up_or_the_kill_switch_on() {
     assert_eq!(requests(&rig.switch(ARM, true)), [Request::Arm]);
 }
 
-/// Within two frames, and for as long as it is on; before an order to disarm.
+/// The kill switch acts from the second frame, for as long as it is on, with priority over disarming.
 #[test]
 fn the_kill_switch_goes_first() {
     let mut rig = Rig::heard();
@@ -143,7 +143,7 @@ fn the_kill_switch_goes_first() {
     assert_eq!(requests(&rig.frames(10)), []);
 }
 
-/// One frame alone moves no switch: SBUS has no checksum.
+/// A single frame moves no switch, since SBUS has no checksum.
 #[test]
 fn one_frame_moves_no_switch() {
     let mut rig = Rig::heard();
@@ -162,7 +162,7 @@ fn one_frame_moves_no_switch() {
 fn switches_select_modes() {
     let mut rig = Rig::new();
     assert_eq!(orders(&rig.frames(20)), []);
-    // It flies as the switch says when it arms.
+    // On arming, the switch selects the mode.
     let outputs = rig.switch(ARM, true);
     assert_eq!(requests(&outputs), [Request::Arm]);
     assert_eq!(orders(&outputs), [Order::Select(FlightMode::Stabilised)]);
@@ -173,13 +173,14 @@ fn switches_select_modes() {
         assert_eq!(orders(&rig.frames(5)), [Order::Select(mode)]);
     }
     assert_eq!(orders(&rig.switch(RETURN, true)), [Order::Select(FlightMode::Return)]);
-    // The return goes first.
+    // The return switch has priority over the mode switch.
     rig.channels.us[MODE] = 1420;
     assert_eq!(orders(&rig.frames(5)), [Order::Select(FlightMode::Return)]);
     assert_eq!(orders(&rig.switch(RETURN, false)), [Order::Select(FlightMode::Altitude)]);
 }
 
-/// A pilot who is heard again takes nothing over before a switch or stick is moved, and none for half a second.
+/// After a lost link is regained, sticks are ignored for half a second. The mode stays until a switch or stick is
+/// moved.
 #[test]
 fn a_pilot_who_comes_back_waits() {
     let mut rig = Rig::heard();
@@ -203,7 +204,7 @@ fn moved_sticks_end_a_mode_that_flies_by_itself() {
     assert_eq!(orders(&rig.frames(20)), []);
     rig.channels.us[1] = 1600;
     assert_eq!(orders(&rig.frames(20)), []);
-    // Once, also if it is refused.
+    // The order is given only once, even if it is refused.
     rig.channels.us[1] = 1700;
     assert_eq!(orders(&rig.frames(50)), [Order::Select(FlightMode::Position)]);
     rig.inputs.mode = FlightMode::Position;
@@ -233,7 +234,7 @@ fn sticks_are_calibrated() {
     assert_eq!(sticks([1765, 1245, 1780, 1745]), Sticks { roll: 0.5, pitch: 0.5, throttle: 0.5, yaw: 0.479_591_84 });
 }
 
-/// A receiver that holds its channels at a throttle which no transmitter sends.
+/// A failsafe throttle below the transmitter's range counts as a lost link.
 #[test]
 fn a_failsafe_by_the_throttle_is_a_loss() {
     let mut rig = Rig::heard();
@@ -245,7 +246,7 @@ fn a_failsafe_by_the_throttle_is_a_loss() {
     assert!(outputs.iter().all(|output| output.sticks.is_none()));
 }
 
-/// COM_RC_IN_MODE: whose sticks count; switches always do.
+/// COM_RC_IN_MODE selects whose sticks count; the receiver's switches always do.
 #[test]
 fn sticks_count_by_their_source() {
     for (source, receivers, joysticks) in [(0, true, false), (1, false, true), (4, false, false), (5, true, true)] {
@@ -264,7 +265,7 @@ fn sticks_count_by_their_source() {
     }
 }
 
-/// A channel that is not there centres its stick, holds the height, and switches nothing.
+/// A missing channel centres its stick, holds the height and switches nothing.
 #[test]
 fn missing_channels_command_nothing() {
     let mut rig = Rig::heard();
@@ -283,7 +284,7 @@ fn modes_that_there_are_none_of_are_refused() {
     assert_eq!(SwitchModes { fourth: 6, ..SwitchModes::DEFAULT }.validate(), Ok(()));
 }
 
-/// Bytes of a receiver for so many frames of this flight, arming included.
+/// Returns a receiver's bytes for four switch positions in turn, arming included, 15 frames each.
 fn recorded(frame: impl Fn(&Channels) -> Vec<u8>) -> Vec<Vec<u8>> {
     let mut rig = Rig::new();
     let mut frames = Vec::new();
@@ -294,12 +295,12 @@ fn recorded(frame: impl Fn(&Channels) -> Vec<u8>) -> Vec<Vec<u8>> {
     frames
 }
 
-/// Number of bytes that the next test draws; `RADIO_BYTES` for others.
+/// Returns the number of bytes that the next test draws; `RADIO_BYTES` overrides it.
 fn byte_count() -> usize {
     std::env::var("RADIO_BYTES").map_or(2_000_000, |count| count.parse().unwrap())
 }
 
-/// Random bytes, bytes of frames in any order, and frames with flipped bits: nothing arms, disarms or kills.
+/// Random bytes, parts of frames and frames with flipped bits never arm, disarm or kill.
 #[test]
 fn noise_commands_nothing() {
     let crsf = recorded(|channels| CrsfFrame::Channels(*channels).encode().to_vec());
@@ -327,7 +328,7 @@ fn noise_commands_nothing() {
                     let mut spoilt = frame.clone();
                     let first = draw(spoilt.len());
                     spoilt[first] ^= 1 << draw(8);
-                    // The header of SBUS is all that shows it.
+                    // Spoils the SBUS header too, since SBUS has no checksum to detect the flipped bit.
                     if !is_crsf {
                         spoilt[0] ^= 1 << draw(8);
                     }
@@ -359,8 +360,7 @@ fn noise_commands_nothing() {
 }
 
 proptest! {
-    /// Whatever the channels say, in whatever order: sticks are between their ends, and there is no arming without a
-    /// switch that was off and throttle that is down.
+    /// For any sequence of channels, sticks stay in range, and arming needs the arming switch on and the throttle down.
     #[test]
     fn any_channels_are_flown(
         frames in prop::collection::vec((prop::array::uniform16(700u16..2300), 0u64..60_000), 1..200), armed: bool,

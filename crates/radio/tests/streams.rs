@@ -1,4 +1,4 @@
-//! Receivers as a stream: every whole frame is read and counted, whatever is between frames.
+//! Receivers as byte streams: every complete frame is decoded and counted, whatever lies between frames.
 #![allow(clippy::indexing_slicing, missing_docs, reason = "tests")]
 
 use afbc_radio::{CRSF_GAP_US, Channels, CrsfDecoder, CrsfFrame, SbusDecoder};
@@ -6,7 +6,7 @@ use proptest::prelude::*;
 
 const RC_CHANNELS_PACKED: u8 = 0x16;
 
-/// CRC-8 of polynomial 0xD5, bit by bit.
+/// Computes the CRC-8 of polynomial 0xD5 bit by bit.
 fn crc8(bytes: &[u8]) -> u8 {
     bytes.iter().fold(0, |crc, byte| {
         (0..8).fold(crc ^ byte, |crc: u8, _| if crc & 0x80 == 0 { crc << 1 } else { crc << 1 ^ 0xD5 })
@@ -18,7 +18,7 @@ fn frame(kind: u8, payload: &[u8]) -> Vec<u8> {
     [&[0xC8, content.len() as u8 + 1], &content[..], &[crc8(&content)]].concat()
 }
 
-/// Sixteen channels of eleven bits, the lowest first.
+/// Packs sixteen channels of eleven bits, lowest bit first.
 fn packed(ticks: &[u16; 16]) -> Vec<u8> {
     let bits: Vec<bool> = ticks.iter().flat_map(|ticks| (0..11).map(move |bit| ticks >> bit & 1 == 1)).collect();
     bits.chunks(8).map(|bits| bits.iter().rev().fold(0, |byte, bit| byte << 1 | u8::from(*bit))).collect()
@@ -27,7 +27,7 @@ fn packed(ticks: &[u16; 16]) -> Vec<u8> {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 500, failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// Frames of every length and kind, one byte or many at a time, with bytes between them that begin none.
+    /// Tests frames of every length and type, one byte or many at a time, with bytes between them that begin no frame.
     #[test]
     fn every_whole_frame_is_counted(
         frames in prop::collection::vec((any::<u8>(), prop::collection::vec(any::<u8>(), 0..=60), 0..4_usize), 1..12),
@@ -43,14 +43,14 @@ proptest! {
         prop_assert_eq!((decoder.good_frames(), decoder.bad_frames()), (frames.len() as u32, 0));
     }
 
-    /// The channels are those in the frame, 1500 us at 992 ticks and five eighths of a microsecond for each.
+    /// The channels match the frame: 992 ticks are 1500 us, and a tick is five eighths of a microsecond.
     #[test]
     fn channels_are_read(ticks in prop::array::uniform16(0..2_048_u16), is_later in any::<bool>(), cut in 1..25_usize) {
         let bytes = frame(RC_CHANNELS_PACKED, &packed(&ticks));
         // Rounded towards the centre.
         let us = ticks.map(|ticks| (1500.0 + (0.625 * (f64::from(ticks) - 992.0)).trunc()) as u16);
         let (mut decoder, mut read) = (CrsfDecoder::default(), Vec::new());
-        // A frame whose beginning comes too early is not put together with the rest.
+        // The rest of a frame is not joined to its beginning after a long pause.
         let (head, rest) = bytes.split_at(cut);
         let later_us = if is_later { CRSF_GAP_US } else { CRSF_GAP_US - 1 };
         decoder.feed(head, 10_000, |frame| read.push(frame));
@@ -63,7 +63,7 @@ proptest! {
     }
 }
 
-/// SBUS has no checksum: frames that are cut short, or do not end as one, are counted, and all others too.
+/// SBUS has no checksum. Frames that are cut short or have a wrong footer count as bad, all others as good.
 #[test]
 fn sbus_frames_are_counted() {
     let whole = [&[0x0F][..], &[0x55; 22], &[0x00, 0x00]].concat();
@@ -79,11 +79,11 @@ fn sbus_frames_are_counted() {
         decoder.feed(&bytes, now_us, |_| ());
         wanted[usize::from(!is_whole)] += 1;
     }
-    // The next frame shows that one was cut short.
+    // A frame that was cut short is counted when the next frame arrives.
     assert_eq!([decoder.good_frames(), decoder.bad_frames()], wanted);
 }
 
-/// A length that no frame has is bad at once, and costs no frame after it.
+/// An invalid length is counted as bad at once and does not harm the next frame.
 #[test]
 fn lengths_of_no_frame_are_passed_over() {
     for length in (0..=u8::MAX).filter(|length| !(2..=62).contains(length)) {

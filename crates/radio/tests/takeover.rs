@@ -1,11 +1,11 @@
-//! Sticks end a mode that flies by itself when one of them is moved far enough from where it was when the mode began.
+//! A stick ends an autonomous mode when it is moved far enough from its position at the beginning of the mode.
 #![allow(clippy::indexing_slicing, missing_docs, reason = "tests")]
 
 use afbc_guidance::{FlightMode, Order};
 use afbc_radio::{Channels, PilotInputs, RadioLink, RadioPilot, RadioSettings};
 use proptest::prelude::*;
 
-/// Share of the way of a stick: of 500 us to either side of 1500 us, the first 10 us count for nothing.
+/// Returns the deflection of a stick: 500 us to either side of 1500 us, with a dead band of 10 us.
 fn share(us: u16) -> f64 {
     let off_us = f64::from(us) - 1500.0;
     off_us.signum() * ((off_us.abs() - 10.0) / 490.0).clamp(0.0, 1.0)

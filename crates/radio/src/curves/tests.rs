@@ -5,9 +5,9 @@ use super::*;
 use afbc_types::Declared;
 use proptest::prelude::*;
 
-/// By PX4's formulae (src/lib/mathlib/math/Functions.hpp), worked out by hand:
-/// `expo(x, e) = (1 - e) x + e x^3`, `deadzone(x, d) = (x - sign(x) d) / (1 - d)` outside of it,
-/// `superexpo(x, e, g) = expo(x, e) (1 - g) / (1 - |x| g)`.
+/// Values computed by hand from PX4's formulae (src/lib/mathlib/math/Functions.hpp): `expo(x, e) = (1 - e) x + e x^3`,
+/// `deadzone(x, d) = (x - sign(x) d) / (1 - d)` outside the dead zone, `superexpo(x, e, g) = expo(x, e) (1 - g) / (1 -
+/// |x| g)`.
 #[test]
 fn values_by_hand() {
     let near = |found: f32, expected: f32| assert!((found - expected).abs() < 1e-6, "{found}, not {expected}");
@@ -23,11 +23,11 @@ fn values_by_hand() {
     near(super_expo(0.5, 0.69, 0.7), 0.111_346_15);
     near(super_expo(-0.5, 0.69, 0.7), -0.111_346_15);
     near(super_expo(0.8, 0.0, 0.95), 0.04 / 0.24);
-    // A dead zone of the whole way is one of 0.99.
+    // A dead zone of 1 is limited to 0.99.
     near(expo_dead_zone(1.0, 0.0, 1.0), 1.0);
 }
 
-/// Every mode, with every stick at another place, so that an exchange shows.
+/// Tests every mode with four different stick deflections, so that swapped sticks are noticed.
 #[test]
 fn every_mode_has_its_curves() {
     let curves = StickCurves {
@@ -41,7 +41,7 @@ fn every_mode_has_its_curves() {
         acro_yaw_super_expo: 0.9,
     };
     let sticks = Sticks { roll: 0.4, pitch: -0.6, throttle: 0.8, yaw: -0.7 };
-    // (0.4 - 0.2) / 0.8 = 0.25, and 0.5, 0.75, 0.625.
+    // Deflections beyond the dead zone: (0.4 - 0.2) / 0.8 = 0.25; likewise 0.5, 0.75 and 0.625.
     let [roll, pitch] = [0.25f32, -0.5].map(|way| 0.8 * way + 0.2 * way * way * way);
     let (throttle, yaw) = (0.6 * 0.75 + 0.4 * 0.421_875, -(0.2 * 0.625 + 0.8 * 0.244_140_63));
     let position = Sticks { roll, pitch, throttle, yaw };
@@ -68,7 +68,7 @@ fn every_mode_has_its_curves() {
 }
 
 proptest! {
-    /// Odd, never falling, from end to end, and never more than the way itself but for the dead zone's end.
+    /// Every curve is odd, never decreases, reaches both ends and never exceeds the deflection itself.
     #[test]
     fn curves_lead_from_end_to_end(
         [share, bend, dead_zone] in prop::array::uniform3(0.0f32..=0.95),

@@ -1,4 +1,4 @@
-//! Channels against their description in whole microseconds, at every bound and beside it.
+//! Compares channel scaling with its description in whole microseconds, at and next to every bound.
 #![allow(clippy::indexing_slicing, reason = "tests")]
 
 extern crate std;
@@ -21,12 +21,12 @@ fn calibration() -> impl Strategy<Value = ChannelCalibration> {
     )
 }
 
-/// Pulses on the bounds, beside them and anywhere.
+/// Returns pulses on the bounds, next to them and anywhere between.
 fn pulse() -> impl Strategy<Value = u16> {
     (0..15_u16, prop_oneof![Just(0), Just(1), 0..100_u16]).prop_map(|(hundreds, more)| 800 + 100 * hundreds + more)
 }
 
-/// Share of the way beyond the dead band, of this room from the trim to either end, in the channel's direction.
+/// Returns the share of the travel beyond the dead band, from the trim to either end, in the channel's direction.
 fn described(channel: &ChannelCalibration, us: u16, trim_us: f64) -> f64 {
     let [min_us, max_us, dead_us] = [channel.min_us, channel.max_us, channel.dead_band_us].map(f64::from);
     let off_us = f64::from(us) - trim_us;
@@ -47,7 +47,7 @@ proptest! {
         prop_assert!((switch - described(&channel, us, middle_us)).abs() < 1e-6, "{switch}");
     }
 
-    /// A switch is on beyond its share of the way, or below a negative one; exactly there it is off.
+    /// A switch is on above its threshold, or below a negative one; exactly at the threshold it is off.
     #[test]
     fn a_switch_is_on_beyond_its_share(number in 0..=20_u32, us in pulse(), tenths in -4..=4_i8) {
         let settings = RadioSettings::DEFAULT;
@@ -61,14 +61,14 @@ proptest! {
             return Ok(());
         }
         let us = if number == 5 { us } else { 1_500 };
-        // Of the default channel: half way at 1500 us, to either end beyond 10 us of it.
+        // Position with the default calibration: one half at 1500 us, with a dead band of 10 us on either side.
         let way = 0.5 + 0.5 * described(&ChannelCalibration::DEFAULT, us, 1_500.0);
         let beyond = if share < 0.0 { f64::from(-share) - way } else { way - f64::from(share) };
         prop_assume!(beyond == 0.0 || beyond.abs() > 1e-6);
         prop_assert_eq!(found, Some(beyond > 0.0));
     }
 
-    /// A receiver has lost the pilot by a pulse beyond a threshold that the sticks cannot reach.
+    /// The link is lost by a pulse beyond a threshold that the sticks cannot reach.
     #[test]
     fn a_threshold_beyond_the_way_tells_a_lost_link(
         channel in calibration(),
@@ -92,13 +92,13 @@ proptest! {
     }
 }
 
-/// Six equal parts of the way, each with its end, have the six modes in their order.
+/// Six equal parts of the travel select the six modes in order.
 #[test]
 fn six_positions_have_six_modes() {
     let modes = SwitchModes { first: 0, second: 1, third: 2, fourth: 3, fifth: 4, sixth: 5, ..SwitchModes::DEFAULT };
     for step in 0..=600_i16 {
         let wanted = mode_of((u32::from(step.unsigned_abs()) / 100).min(5));
-        // In the middle of hundredths: no position's end is met by rounding alone.
+        // Tests between whole hundredths, so that rounding alone cannot reach the end of a position.
         let stick = (f32::from(step) + if step < 600 { 0.5 } else { 0.0 }) / 300.0 - 1.0;
         assert_eq!(modes.mode(stick), wanted, "{step}");
     }
