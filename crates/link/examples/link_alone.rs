@@ -1,5 +1,5 @@
-//! The link alone: a heartbeat as bytes, then out of a stream with noise around it:
-//! `cargo run -p afbc-link --example link_alone`.
+//! Uses the link alone: encodes a heartbeat, then decodes it from a stream that begins with noise. Run it with `cargo
+//! run -p afbc-link --example link_alone`.
 
 use afbc_link::{Address, Decoder, FRAME_MAX, Sender, Uplink};
 
@@ -12,7 +12,7 @@ fn main() {
     let mut stream = b"noise".to_vec();
     stream.extend_from_slice(frame);
     let mut decoder = Decoder::<Uplink>::new(vehicle);
-    // In pieces of any size, as a port delivers them.
+    // Pieces of any size, as a port delivers them.
     for piece in stream.chunks(7) {
         decoder.feed(piece, |from, message| println!("from {from:?}: {message:?}"));
     }

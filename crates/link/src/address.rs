@@ -1,4 +1,4 @@
-//! Sender and receiver of a message.
+//! Addresses of senders and receivers.
 
 /// MAVLink address of a sender or a receiver.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]

@@ -9,21 +9,21 @@ use mavlink::dialects::common::{COMMAND_ACK_DATA, MavResult};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Answer {
-    /// Carried out.
+    /// The command was carried out.
     Accepted,
-    /// Refused for now, with the number of the reason in `result_param2`.
+    /// Refused for now; `result_param2` holds the number of the reason.
     Refused(i32),
-    /// Invalid parameters.
+    /// The command has invalid parameters.
     Denied,
-    /// Unknown command.
+    /// The command is unknown.
     Unsupported,
-    /// Outcome unknown.
+    /// The command failed, or its outcome is unknown.
     Failed,
-    /// Another answer will follow.
+    /// The command is still running; another answer will follow.
     InProgress,
 }
 
-/// Number, result, progress, `result_param2`, receiver.
+/// Fields: command, result, progress, `result_param2`, receiver.
 const ACK: Layout<COMMAND_ACK_DATA, (u16, u8, u8, i32, Address)> = Layout::NEW;
 
 const ACCEPTED: u8 = MavResult::MAV_RESULT_ACCEPTED as u8;
@@ -32,14 +32,14 @@ const DENIED: u8 = MavResult::MAV_RESULT_DENIED as u8;
 const UNSUPPORTED: u8 = MavResult::MAV_RESULT_UNSUPPORTED as u8;
 const FAILED: u8 = MavResult::MAV_RESULT_FAILED as u8;
 const IN_PROGRESS: u8 = MavResult::MAV_RESULT_IN_PROGRESS as u8;
-/// Progress that is not known.
+/// Value for unknown progress.
 const SOME: u8 = u8::MAX;
 
 pub(crate) fn format() -> MessageFormat {
     ACK.format()
 }
 
-/// Returns command, answer and receiver. Any command, of any dialect.
+/// Returns command, answer and receiver. Accepts any command of any dialect.
 pub(crate) fn read(payload: &[u8]) -> Result<(u16, Answer, Address), Fault> {
     let (command, result, _, reason, to) = ACK.read(payload);
     let answer = match result {

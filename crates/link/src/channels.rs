@@ -1,4 +1,5 @@
-//! Channels of radio control: a station's in place of a receiver's, and those that the vehicle has.
+//! Radio control channels: those that a ground station sends in place of a receiver, and those that the vehicle
+//! reports.
 
 use crate::address::Address;
 use crate::message::{MessageFormat, PAYLOAD_MAX};
@@ -8,24 +9,24 @@ use mavlink::dialects::common::{RC_CHANNELS_DATA, RC_CHANNELS_OVERRIDE_DATA};
 
 /// Number of channels of both messages.
 pub const RADIO_CHANNELS: usize = 18;
-/// Channels of RC_CHANNELS_OVERRIDE that have been there from the beginning.
+/// Number of channels in the original RC_CHANNELS_OVERRIDE; the others are extension fields.
 const FIRST: usize = 8;
-/// A channel of RC_CHANNELS_OVERRIDE that is left alone, and one of RC_CHANNELS that is not there.
+/// Value for a channel that RC_CHANNELS_OVERRIDE leaves unchanged, and for a missing channel of RC_CHANNELS.
 const NOTHING: u16 = u16::MAX;
-/// One of the later channels of RC_CHANNELS_OVERRIDE that is given back.
+/// Value that releases one of the later channels of RC_CHANNELS_OVERRIDE.
 const RELEASED: u16 = u16::MAX - 1;
 
-/// RC_CHANNELS_OVERRIDE (70): pulses in place of a receiver's.
+/// RC_CHANNELS_OVERRIDE (70): pulses that replace a receiver's.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ChannelsOverride {
     raw_us: [u16; RADIO_CHANNELS],
 }
 
-/// Channels 1 to 8, receiver, channels 9 to 18.
+/// Fields: channels 1 to 8, receiver, channels 9 to 18.
 const OVERRIDE: Layout<RC_CHANNELS_OVERRIDE_DATA, ([u16; FIRST], Address, [u16; RADIO_CHANNELS - FIRST])> = Layout::NEW;
 
 impl ChannelsOverride {
-    /// The message that sets each channel to a pulse, or gives it back where that is 0 \[us\].
+    /// Creates the message that overrides each channel with a pulse \[us\]; 0 releases the channel.
     pub fn new(us: [u16; RADIO_CHANNELS]) -> Self {
         let mut raw_us = us;
         let later = raw_us.iter_mut().skip(FIRST);
@@ -33,11 +34,12 @@ impl ChannelsOverride {
         ChannelsOverride { raw_us }
     }
 
-    /// Returns the pulse that the message sets a channel to, 0 if it gives it back; none if it leaves it alone \[us\].
+    /// Returns the pulse that overrides a channel \[us\], 0 if the message releases the channel, none if it leaves it
+    /// unchanged. `place` counts from 0.
     pub fn channel(&self, place: usize) -> Option<u16> {
         match *self.raw_us.get(place)? {
             NOTHING => None,
-            // Of the later channels, 0 is what a sender of eight has there.
+            // A sender that knows only eight channels leaves the later ones 0.
             0 if place >= FIRST => None,
             RELEASED if place >= FIRST => Some(0),
             raw => Some(raw),
@@ -62,18 +64,18 @@ impl ChannelsOverride {
     }
 }
 
-/// RC_CHANNELS (65): the channels that the vehicle has of a pilot.
+/// RC_CHANNELS (65): the pilot's channels as the vehicle receives them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RadioChannels {
     /// Time since power-up \[ms\].
     pub time_ms: u32,
     /// Pulses; 0 where there is no channel \[us\].
     pub us: [u16; RADIO_CHANNELS],
-    /// How well the pilot is received, 0 to 254; 255 if unknown.
+    /// Signal strength, 0 to 254; 255 if unknown.
     pub rssi: u8,
 }
 
-/// Time, channels, their number, strength.
+/// Fields: time, channels, number of channels, signal strength.
 const CHANNELS: Layout<RC_CHANNELS_DATA, (u32, [u16; RADIO_CHANNELS], u8, u8)> = Layout::NEW;
 
 /// Format of RC_CHANNELS.

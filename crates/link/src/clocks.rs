@@ -1,4 +1,4 @@
-//! Clocks and round trips: TIMESYNC, PING and SYSTEM_TIME, in both directions.
+//! Clocks and round-trip times: TIMESYNC, PING and SYSTEM_TIME, in both directions.
 
 use crate::address::Address;
 use crate::message::{Fault, MessageFormat, PAYLOAD_MAX};
@@ -11,11 +11,11 @@ use mavlink::dialects::common::{PING_DATA, SYSTEM_TIME_DATA, TIMESYNC_DATA};
 pub enum Clock {
     /// TIMESYNC (111).
     Sync {
-        /// Time of the answering clock, 0 in a question \[ns\].
+        /// Time of the answering clock; 0 in a request \[ns\].
         answered_ns: i64,
-        /// Time of the asking clock \[ns\].
+        /// Time of the requesting clock \[ns\].
         asked_ns: i64,
-        /// The receiver; all zeros from senders that do not name one.
+        /// Receiver; zeros if the sender names none.
         to: Address,
     },
     /// PING (4).
@@ -24,7 +24,7 @@ pub enum Clock {
         time_us: u64,
         /// Number of the ping.
         number: u32,
-        /// All zeros in a question, the asker in an answer.
+        /// Zeros in a request; in an answer, the address of the requester.
         to: Address,
     },
     /// SYSTEM_TIME (2).

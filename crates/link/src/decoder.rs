@@ -1,4 +1,4 @@
-//! Decodes a stream of bytes into messages.
+//! Decoding of a byte stream into messages.
 
 use crate::address::Address;
 use crate::framing::{HEADER, Header, SIGNED, SIGNED_FRAME_MAX, START, checksum};
@@ -25,9 +25,9 @@ pub struct Counters {
     pub unsupported: u32,
     /// Frames dropped for [`Fault::Elsewhere`].
     pub elsewhere: u32,
-    /// Bytes that belonged to no frame with a correct checksum.
+    /// Bytes outside all frames with a correct checksum.
     pub skipped_bytes: u32,
-    /// Frames that did not arrive, or had a wrong or unknown checksum, from the gaps in each sender's sequence numbers.
+    /// Frames that are missing from the sequence numbers of a sender: lost, or with a wrong or unknown checksum.
     pub lost: u32,
 }
 
@@ -76,47 +76,48 @@ fn add(counter: &mut u32, count: u32) {
 /// Decodes the messages of one direction from a stream.
 ///
 /// # What is delivered
-/// Frames of a message that the direction carries, with the right checksum, which the receiver accepts:
-/// [`Decoder::feed`] those without a signature. Of a longer message, which a newer dialect has extended, the fields
-/// that are not known here are read as if they were not there.
+/// The decoder delivers frames of messages that the direction carries, if they have a correct checksum and are
+/// accepted. [`Decoder::feed`] accepts frames without a signature. Additional fields at the end of a message, from a
+/// newer dialect, are ignored.
 ///
 /// # Frames within frames
-/// Frames may contain other frames that are addressed to other systems: TUNNEL, FILE_TRANSFER_PROTOCOL, LOG_DATA.
-/// Nothing is delivered from within
+/// Frames may contain frames for other systems: TUNNEL, FILE_TRANSFER_PROTOCOL, LOG_DATA. Nothing is delivered from
+/// within
 ///
-/// 1. a frame with the right checksum, whatever follows it. The checksum can be verified for every message of MAVLink's
+/// 1. a frame with a correct checksum, whatever follows it. The checksum can be verified for every message of MAVLink's
 ///    `common` dialect, carried or not, signed or not, of any length and to any target;
 /// 2. any other frame, of another dialect or with a wrong checksum, if a start byte follows it.
 ///
-/// If anything else follows, its start byte is taken for noise: it is skipped, and the search goes on behind it. No
+/// If anything else follows, the frame's start byte counts as noise: it is skipped, and the search goes on after it. No
 /// decoder can distinguish a frame whose first bytes were damaged from noise before the frames that it contains.
 /// MAVLink 1 frames are noise.
 ///
 /// # Effect of noise
-/// A stray start byte holds back what follows until as many bytes as it announces, plus one, have arrived: at most 281
-/// bytes, 3.1 ms of a busy line at 921,600 baud. It costs frames only if the last of these bytes happens to be a start
-/// byte (rule 2), and then only those that lie wholly within the others: one that reaches beyond them is delivered. So
-/// every frame that begins at least 280 bytes after the last noise arrives.
+/// A stray start byte seems to announce a frame. It delays the following bytes until all of that frame and one more
+/// byte have arrived: at most 281 bytes, 3.1 ms of a busy line at 921,600 baud. It costs frames only if the last of
+/// these bytes happens to be a start byte (rule 2), and then only frames that lie completely within the announced one;
+/// a frame that extends beyond it is delivered. So every frame that begins at least 280 bytes after the last noise
+/// arrives.
 ///
 /// A truncated frame is noise, too. If its last byte is missing and was 0xFD, the first byte of the next frame
 /// completes it, and the rest of the next frame is noise.
 ///
-/// A checksum of 16 bits accepts one of 65,536 damaged frames, as always in MAVLink.
+/// A 16-bit checksum accepts one of 65,536 damaged frames, as always in MAVLink.
 ///
-/// In a stream without noise nothing is lost, and frames that can be checked are delivered with their last byte, unless
-/// several frames in a row cannot be checked and contain start bytes, which may hold them back as above.
+/// In a stream without noise nothing is lost, and a frame that can be verified is delivered with its last byte. Several
+/// frames in a row that cannot be verified and contain start bytes may delay the next one as above.
 ///
 /// # Cost
-/// Memory for the longest frame and one byte. In a stream of intact frames each byte costs a copy and one step of the
-/// checksum; in general, three steps for each start byte among the 280 bytes before it. In the worst case all of these
-/// fall due at once.
+/// Memory for the longest frame and one byte. In a stream of intact frames, each byte costs a copy and one step of the
+/// checksum. In general, each byte costs three steps for each start byte among the 280 bytes before it. In the worst
+/// case, all of these steps are due at once.
 pub struct Decoder<M> {
     receiver: Address,
     buffer: [u8; HELD_MAX],
     length: usize,
-    /// Number of bytes to be held before the next decision.
+    /// Number of bytes needed in the buffer before the next decision.
     needed: usize,
-    /// Number of bytes at the front of the buffer that belong to a frame whose contents are skipped (rule 2).
+    /// Number of bytes at the front of the buffer that belong to a frame whose content is skipped (rule 2).
     sealed: usize,
     /// Sender and sequence number of the last frame.
     last: Option<(Address, u8)>,
@@ -125,18 +126,18 @@ pub struct Decoder<M> {
     messages: PhantomData<fn() -> M>,
 }
 
-/// Size of the longest frame and the byte behind it.
+/// Size of the longest frame and the byte after it.
 const HELD_MAX: usize = SIGNED_FRAME_MAX + 1;
 
-/// What the buffer begins with.
+/// Content at the front of the buffer.
 enum Front<M> {
-    /// Too little to decide before so many bytes are held.
+    /// Undecided until this number of bytes is in the buffer.
     Incomplete(usize),
-    /// No frame, or one to be skipped.
+    /// Not a frame, or a frame to be skipped with this fault.
     Garbage(Option<Fault>),
-    /// A frame of `length` bytes that is damaged or cannot be checked, followed by a start byte.
+    /// A frame of `length` bytes that is damaged or cannot be verified, followed by a start byte.
     Opaque { length: usize, fault: Fault },
-    /// A frame with the right checksum, which begins behind the first `skipped` bytes.
+    /// A frame with a correct checksum, which begins after `skipped` bytes.
     Intact { skipped: usize, header: Header, message: Result<M, Fault> },
 }
 
@@ -156,25 +157,25 @@ impl<M: Message> Decoder<M> {
         }
     }
 
-    /// The same of a stream that comes over a wire, from somebody who holds the vehicle.
+    /// Returns the decoder for a stream over a wire, from somebody who has the vehicle at hand.
     #[must_use]
     pub fn wired(self) -> Self {
         Decoder { is_wired: true, ..self }
     }
 
-    /// True if its stream comes over a wire.
+    /// True if the stream comes over a wire.
     pub fn is_wired(&self) -> bool {
         self.is_wired
     }
 
-    /// Takes the next bytes of the stream and delivers every message that they complete, with its sender, unless its
-    /// frame is signed.
+    /// Takes the next bytes of the stream. Delivers every message that they complete, with its sender, unless its frame
+    /// is signed.
     pub fn feed(&mut self, bytes: &[u8], deliver: impl FnMut(Address, M)) {
         self.feed_accepted(bytes, |frame| frame.stamp().is_none(), deliver);
     }
 
-    /// The same for frames that `accept` accepts, which is asked once about each frame of a message that the direction
-    /// carries; others count as [`Fault::Unsupported`].
+    /// Takes bytes like [`feed`](Self::feed), but delivers the frames that `accept` accepts. `accept` is called once
+    /// for each valid frame that the direction carries; refused ones count as [`Fault::Unsupported`].
     pub fn feed_accepted(
         &mut self,
         bytes: &[u8],
@@ -184,7 +185,7 @@ impl<M: Message> Decoder<M> {
         self.feed_whole(bytes, accept, |from, message, _| deliver(from, message));
     }
 
-    /// The same, and delivers the payload with each message.
+    /// Takes bytes like [`feed_accepted`](Self::feed_accepted); delivers the payload with each message.
     pub fn feed_whole(
         &mut self,
         bytes: &[u8],
@@ -192,7 +193,7 @@ impl<M: Message> Decoder<M> {
         mut deliver: impl FnMut(Address, M, &[u8]),
     ) {
         for &byte in bytes {
-            // There is room, since `advance` always removes something from a full buffer.
+            // Cannot overflow: `advance` always removes something from a full buffer.
             if let Some(next) = self.buffer.get_mut(self.length) {
                 *next = byte;
                 self.length += 1;
@@ -208,7 +209,7 @@ impl<M: Message> Decoder<M> {
         &self.counters
     }
 
-    /// Handles everything in the buffer that can be decided.
+    /// Processes everything in the buffer that can be decided.
     fn advance(
         &mut self,
         accept: &mut impl FnMut(&ReceivedFrame<'_>) -> bool,
@@ -231,7 +232,7 @@ impl<M: Message> Decoder<M> {
                 }
                 Front::Intact { skipped, header, message } => {
                     add(&mut self.counters.skipped_bytes, skipped as u32);
-                    // A signature costs a hash: it is not looked at for what is dropped anyway.
+                    // `accept` may check the signature, which costs a hash, so it is called only for valid messages.
                     let message = message.and_then(|message| {
                         let frame = self.buffer.get(skipped..skipped + header.frame_length()).unwrap_or_default();
                         let frame = ReceivedFrame::new(header.from, header.id, frame, header.unsigned_length());
@@ -262,7 +263,7 @@ impl<M: Message> Decoder<M> {
         }
         let Some(header) = held.first_chunk().map(Header::read) else { return Front::Incomplete(HEADER) };
         let length = header.frame_length();
-        // It lies wholly within a sealed frame, from which nothing is delivered.
+        // The frame would lie completely within a skipped frame, from which nothing is delivered.
         if length <= self.sealed {
             return Front::Garbage(None);
         }
@@ -270,12 +271,12 @@ impl<M: Message> Decoder<M> {
         if let Some(message) = self.read(frame, &header) {
             return Front::Intact { skipped: 0, header, message };
         }
-        // Content of a sealed frame that is no frame is no fault.
+        // Content of a skipped frame that is not a frame is no fault.
         if self.sealed > 0 {
             return Front::Garbage(None);
         }
         let fault = if M::format(header.id).is_some() { Fault::BadChecksum } else { Fault::Unknown };
-        // The byte behind it decides: only a start byte makes a frame of what cannot be checked.
+        // The byte after the frame decides: without a verified checksum, only a following start byte makes it a frame.
         match held.get(length) {
             None => Front::Incomplete(length + 1),
             Some(&START) => Front::Opaque { length, fault },
@@ -283,9 +284,9 @@ impl<M: Message> Decoder<M> {
         }
     }
 
-    /// The held bytes begin with an incomplete frame of `length` bytes, or within sealed bytes with what may be one
-    /// that reaches beyond them. If the frame behind the sealed bytes is now complete and intact, there is no such
-    /// frame.
+    /// Decides about an incomplete frame of `length` bytes at the front of the buffer. Within a skipped frame, it may
+    /// extend beyond that frame, or be mere content. If the frame after the skipped bytes is complete and intact, it is
+    /// mere content.
     fn behind_sealed(&self, held: &[u8], length: usize) -> Front<M> {
         if self.sealed == 0 {
             return Front::Incomplete(length);
@@ -297,23 +298,23 @@ impl<M: Message> Decoder<M> {
         read.map_or(incomplete, |(header, message)| Front::Intact { skipped: self.sealed, header, message })
     }
 
-    /// Returns the message in `frame`, if the frame's checksum is known and right.
+    /// Returns the message in `frame` if the frame's checksum can be verified and is correct.
     fn read(&self, frame: &[u8], header: &Header) -> Option<Result<M, Fault>> {
         let end = HEADER + usize::from(header.length);
         let (summed, payload) = (frame.get(1..end)?, frame.get(HEADER..end)?);
         let sent = frame.get(end..)?.first_chunk().copied().map(u16::from_le_bytes)?;
         let format = M::format(header.id);
         let extra_crc = format.map(|format| format.extra_crc).or_else(|| dialect_extra_crc(header.id))?;
-        // The checksum first: also of what is refused, the content is not searched for frames.
+        // The checksum is verified first, so that the content of an unsupported frame is not searched for frames.
         (checksum(summed, extra_crc) == sent).then(|| match format {
             None => Err(Fault::Unknown),
             Some(_) if header.incompatible & !SIGNED != 0 => Err(Fault::Unsupported),
-            // A newer dialect has appended fields, which no reader here may see.
+            // Cuts off fields that a newer dialect has appended.
             Some(format) => M::read(header.id, payload.get(..format.length_max).unwrap_or(payload), self.receiver),
         })
     }
 
-    /// Skips the first byte and everything up to the next possible start of a frame.
+    /// Skips the first byte and everything up to the next start byte.
     fn skip_to_start(&mut self) {
         let held = self.buffer.get(..self.length).unwrap_or_default();
         let skipped = 1 + held.iter().skip(1).take_while(|&&byte| byte != START).count();
@@ -321,7 +322,7 @@ impl<M: Message> Decoder<M> {
         self.remove(skipped);
     }
 
-    /// Drops the first `count` bytes held.
+    /// Removes the first `count` bytes of the buffer.
     fn remove(&mut self, count: usize) {
         if let Some(held) = self.buffer.get_mut(..self.length) {
             let count = count.min(held.len());
@@ -331,13 +332,13 @@ impl<M: Message> Decoder<M> {
         }
     }
 
-    /// Counts the gap in the sequence numbers before a frame. Out-of-order and duplicate frames are no gap.
+    /// Counts the gap in the sequence numbers before a frame. Out-of-order and duplicate frames leave no gap.
     fn count_lost(&mut self, header: &Header) {
         let gap = match self.last {
             Some((from, sequence)) if from == header.from => header.sequence.wrapping_sub(sequence).wrapping_sub(1),
             _ => 0,
         };
-        // Numbers have 8 bits and wrap: the upper half of the differences stands for frames that are older.
+        // Sequence numbers have 8 bits: a difference of 128 or more means an older frame.
         if gap < 128 {
             add(&mut self.counters.lost, u32::from(gap));
             self.last = Some((header.from, header.sequence));
@@ -345,9 +346,9 @@ impl<M: Message> Decoder<M> {
     }
 }
 
-/// Returns the checksum's seed for any message of the `common` dialect.
+/// Returns the checksum's seed for a message of the `common` dialect; none for other messages.
 fn dialect_extra_crc(id: u32) -> Option<u8> {
-    /// The one message whose seed is 0, which otherwise means "not in the dialect".
+    /// Id of the only message with the seed 0, which otherwise means "not in the dialect".
     const COMPONENT_INFORMATION: u32 = 395;
     match MavMessage::extra_crc(id) {
         0 if id != COMPONENT_INFORMATION => None,

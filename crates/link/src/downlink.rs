@@ -38,11 +38,11 @@ pub enum Downlink {
         armed: bool,
         /// True if a failsafe is active or has just ended: MAV_STATE_CRITICAL.
         failsafe: bool,
-        /// The vehicle's mode, its `custom_mode`.
+        /// Mode of the vehicle: `custom_mode`.
         mode: u32,
     },
-    /// HIL_ACTUATOR_CONTROLS (93): commanded rotor speeds. The message's range is -1..1: each control is omega_i /
-    /// [`Downlink::SPEED_FULL_SCALE_RAD_S`], a power of two, so that the speed is transmitted without rounding.
+    /// HIL_ACTUATOR_CONTROLS (93): commanded rotor speeds. Each control, whose range is -1..1, is omega_i /
+    /// [`Downlink::SPEED_FULL_SCALE_RAD_S`]. The full scale is a power of two, so that speeds are not rounded.
     Rotors {
         /// Time since power-up \[us\].
         time_us: u64,
@@ -71,7 +71,7 @@ pub enum Downlink {
     },
     /// COMMAND_ACK (77).
     Answer {
-        /// Number of the command that is answered.
+        /// Number of the answered command.
         command: u16,
         /// The answer.
         answer: Answer,
@@ -87,15 +87,15 @@ pub enum Downlink {
     },
     /// DEBUG_FLOAT_ARRAY (350) named "health".
     Health(HealthArray),
-    /// What stations show.
+    /// Telemetry for display by ground stations.
     Telemetry(Telemetry),
-    /// POSITION_TARGET_LOCAL_NED (85): what the vehicle follows, at a time since power-up \[ms\].
+    /// POSITION_TARGET_LOCAL_NED (85): time since power-up \[ms\] and the target that the vehicle follows.
     Followed(u32, PositionTarget),
-    /// MISSION_* for `to`.
+    /// MISSION_* message to a ground station.
     Mission {
         /// The message.
         message: Mission,
-        /// The station.
+        /// Receiver.
         to: Address,
     },
     /// TIMESYNC, PING, SYSTEM_TIME.
@@ -116,14 +116,14 @@ pub enum Downlink {
     ParameterError {
         /// The error.
         error: ParameterError,
-        /// Who asked.
+        /// Address of the requester.
         to: Address,
     },
-    /// The answer to a question about what the vehicle does not have.
+    /// Refusal of a request for a service that the vehicle does not have.
     Refusal {
-        /// The answer.
+        /// The refusal.
         refusal: QuestionRefusal,
-        /// Who asked, if the message names it.
+        /// Address of the requester, if the message names it.
         to: Address,
     },
 }
@@ -300,5 +300,5 @@ fn read_position(data: LOCAL_POSITION_NED_DATA) -> Downlink {
     }
 }
 
-/// Extension fields of STATUSTEXT, which number the parts of longer texts.
+/// Length of STATUSTEXT's extension fields, which number the parts of longer texts \[bytes\].
 const TEXT_EXTENSION: usize = 3;

@@ -5,8 +5,8 @@
 //! payload (length)  checksum (2)  [signature (13)]
 //! ```
 //!
-//! <https://mavlink.io/en/guide/serialization.html>. Frames with incompatibility flags other than that for a signature
-//! are not supported.
+//! See <https://mavlink.io/en/guide/serialization.html>. Frames with other incompatibility flags than the one for a
+//! signature are not supported.
 
 use crate::address::Address;
 use crate::message::{Message, PAYLOAD_MAX};
@@ -59,7 +59,7 @@ impl Header {
     }
 }
 
-/// Computes CRC-16/MCRF4XX over a frame without its first byte and checksum, followed by the message's seed.
+/// Returns the CRC-16/MCRF4XX of a frame without its first byte and checksum, followed by the message's seed.
 pub(crate) fn checksum(bytes: &[u8], extra_crc: u8) -> u16 {
     let accumulate = |crc: u16, byte: &u8| {
         let low = byte ^ crc as u8;
@@ -69,7 +69,7 @@ pub(crate) fn checksum(bytes: &[u8], extra_crc: u8) -> u16 {
     accumulate(bytes.iter().fold(0xFFFF, accumulate), &extra_crc)
 }
 
-/// Encodes messages as numbered frames.
+/// Encoder of messages as numbered frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Sender {
     from: Address,
@@ -82,14 +82,14 @@ impl Sender {
         Sender { from, sequence: 0 }
     }
 
-    /// Writes `message` as a frame to the beginning of `buffer` and returns it.
+    /// Encodes `message` at the beginning of `buffer` and returns the frame.
     #[must_use = "the bytes are yet to be sent"]
     pub fn send<'a>(&mut self, message: &impl Message, buffer: &'a mut [u8; FRAME_MAX]) -> &'a [u8] {
         let length = self.write(message, 0, buffer);
         buffer.get(..length).unwrap_or_default()
     }
 
-    /// The same with a signature, if there is a key and a stamp for it.
+    /// Encodes a frame like [`send`](Self::send), with a signature if `signer` gives a key and a stamp.
     #[must_use = "the bytes are yet to be sent"]
     pub fn send_signed<'a>(
         &mut self,
@@ -98,7 +98,7 @@ impl Sender {
         buffer: &'a mut [u8; SIGNED_FRAME_MAX],
     ) -> &'a [u8] {
         let Some((frame, _)) = buffer.split_first_chunk_mut() else { return &[] };
-        // The flag goes in first: checksum and signature are over it, too.
+        // The flag is set first, since checksum and signature cover it.
         let mut length = self.write(message, if signer.is_some() { SIGNED } else { 0 }, frame);
         if let Some((key, stamp)) = signer {
             let signature = key.sign(frame.get(..length).unwrap_or_default(), stamp);
@@ -110,7 +110,7 @@ impl Sender {
         buffer.get(..length).unwrap_or_default()
     }
 
-    /// Writes a frame with these incompatibility flags, without a signature; returns its length.
+    /// Writes an unsigned frame with these incompatibility flags; returns its length.
     fn write(&mut self, message: &impl Message, incompatible: u8, buffer: &mut [u8; FRAME_MAX]) -> usize {
         let (head, rest) = buffer.split_at_mut(HEADER);
         let Some((payload, _)) = rest.split_first_chunk_mut::<PAYLOAD_MAX>() else { return 0 };

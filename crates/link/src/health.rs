@@ -5,8 +5,8 @@ use crate::message::{Fault, MessageFormat, PAYLOAD_MAX, extension, parse, put_ex
 use afbc_types::{Axis, PerAxis};
 use mavlink::dialects::common::DEBUG_FLOAT_ARRAY_DATA;
 
-/// State of the flight core and the link, in the order of the array's elements. Counts are sent as `f32`, exact up to
-/// 2^24.
+/// State of the flight core and the link, in the order of the array's elements. Counts are sent as `f32`, so they are
+/// exact up to 2^24.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct HealthArray {
     /// Time since power-up \[us\].
@@ -15,40 +15,40 @@ pub struct HealthArray {
     pub tick_us: f32,
     /// Longest duration of a control tick so far \[us\].
     pub tick_max_us: f32,
-    /// Ticks in the last second \[Hz\].
+    /// Number of ticks in the last second \[Hz\].
     pub rate_hz: f32,
-    /// Ticks since power-up that came late or early.
+    /// Number of ticks since power-up that were late or early.
     pub late_ticks: u32,
-    /// Ticks in which a rotor was commanded a force outside its limits.
+    /// Number of ticks in which a rotor force outside its limits was commanded.
     pub saturated_ticks: u32,
     /// Age of the newest state \[us\].
     pub state_age_us: f32,
-    /// Norm of each subsystem's Theta_hat.
+    /// Norm of Theta_hat of each subsystem.
     pub theta_norm: PerAxis<f32>,
-    /// Each subsystem's delta_hat.
+    /// delta_hat of each subsystem.
     pub delta: PerAxis<f32>,
     /// Reception counts of the link.
     pub link: Counters,
-    /// Commands since power-up that were neither carried out nor answered, because more arrived at once than could be.
+    /// Number of commands since power-up that were neither carried out nor answered, since too many arrived at once.
     pub unanswered: u32,
-    /// States that were not used.
+    /// Number of states that were not used.
     pub states_refused: StatesRefused,
 }
 
-/// States since power-up that were not used, by reason.
+/// Number of states since power-up that were not used, by reason.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct StatesRefused {
     /// Out of order or duplicate.
     pub overtaken: u32,
     /// Too old on arrival.
     pub late: u32,
-    /// From another sender than the one in use.
+    /// From a sender other than the one in use.
     pub elsewhere: u32,
-    /// Repeating the last one in flight, or from a tracker that is no longer trusted.
+    /// Repeats the last one in flight, or comes from a tracker that is no longer trusted.
     pub frozen: u32,
 }
 
-/// Elements of DEBUG_FLOAT_ARRAY, its only extension field.
+/// Number of elements of DEBUG_FLOAT_ARRAY, which are its only extension field.
 const ELEMENTS: usize = 58;
 const NAME: &str = "health";
 

@@ -1,4 +1,4 @@
-//! What the inertial sensor and the magnetometer read.
+//! Readings of the inertial sensor and the magnetometer.
 
 use crate::address::Address;
 use crate::frames::flip;
@@ -8,8 +8,8 @@ use mavlink::MessageData;
 use mavlink::dialects::common::HIGHRES_IMU_DATA;
 use nalgebra::Vector3;
 
-/// HIGHRES_IMU (105), in the body frame of [`afbc_types`]. A message by itself, so that the image of a board without
-/// sensors has none of it: a station decodes the bytes by a [`Decoder`](crate::Decoder) of it, too.
+/// HIGHRES_IMU (105), in the body frame of [`afbc_types`]. It is a separate direction, so that boards without sensors
+/// contain none of its code; a ground station needs another [`Decoder`](crate::Decoder) for it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct InertialSample {
     /// Time since power-up \[us\].
@@ -18,16 +18,16 @@ pub struct InertialSample {
     pub specific_force_m_s2: Vector3<f32>,
     /// p, q, r \[rad/s\].
     pub rates_rad_s: Vector3<f32>,
-    /// Magnetic field, if there is a reading \[uT\].
+    /// Magnetic field, if it was measured \[uT\].
     pub field_ut: Option<Vector3<f32>>,
 }
 
-/// Time; force, rates, field; pressures, height; temperature; what was updated.
+/// Fields: time; force, rates, field; pressures and altitude; temperature; flags of updated fields.
 const SAMPLE: Layout<HIGHRES_IMU_DATA, (u64, [[f32; 3]; 3], [f32; 3], f32, u16)> = Layout::NEW;
-/// HIGHRES_IMU_UPDATED_FLAGS: three axes each.
+/// HIGHRES_IMU_UPDATED_FLAGS, three axes each.
 const INERTIAL: u16 = 0o77;
 const FIELD: u16 = 0o700;
-/// Microtesla of the message's unit.
+/// Microtesla per gauss, the message's unit.
 const UT_PER_GAUSS: f32 = 100.0;
 
 impl Message for InertialSample {

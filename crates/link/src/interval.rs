@@ -1,4 +1,4 @@
-//! Rates of messages: MESSAGE_INTERVAL, and REQUEST_DATA_STREAM of older stations with DATA_STREAM.
+//! Message rates: MESSAGE_INTERVAL, and the older REQUEST_DATA_STREAM with DATA_STREAM.
 
 use crate::address::Address;
 use crate::message::{MessageFormat, PAYLOAD_MAX};
@@ -8,13 +8,13 @@ use mavlink::dialects::common::{DATA_STREAM_DATA, MESSAGE_INTERVAL_DATA, REQUEST
 /// MESSAGE_INTERVAL (244).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Interval {
-    /// Number of the message.
+    /// Id of the message.
     pub message: u32,
-    /// Time between two; -1: never, 0: not available \[us\].
+    /// Interval; -1: never, 0: not available \[us\].
     pub interval_us: i32,
 }
 
-/// REQUEST_DATA_STREAM (66), or its answer, DATA_STREAM (67): all messages of a group.
+/// REQUEST_DATA_STREAM (66) or its answer DATA_STREAM (67): rate of a group of messages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct DataStream {
     /// `MAV_DATA_STREAM`.
@@ -24,10 +24,10 @@ pub struct DataStream {
 }
 
 const INTERVAL: Layout<MESSAGE_INTERVAL_DATA, (i32, u16)> = Layout::NEW;
-/// Rate, receiver, group, start.
+/// Fields: rate, receiver, group, start.
 const STREAM: Layout<REQUEST_DATA_STREAM_DATA, (u16, Address, u8, u8)> = Layout::NEW;
 
-/// Rate, group, on.
+/// Fields: rate, group, on.
 const GROUP: Layout<DATA_STREAM_DATA, (u16, u8, u8)> = Layout::NEW;
 
 impl Interval {

@@ -3,15 +3,15 @@
 //! # Reading order
 //!
 //! 1. [`frames`]: conversion between the wire's frames (z down) and the workspace's (z up).
-//! 2. [`Uplink`]: messages to the vehicle. [`Downlink`]: messages from it. Both can be written and read, since the
-//!    simulator is the other end. [`Transfer`]: files and logs of vehicles with storage.
-//! 3. [`Sender`]: encodes messages. [`Decoder`]: decodes bytes, in any pieces and with anything between the frames, and
-//!    counts what it drops in [`Counters`].
+//! 2. [`Uplink`]: messages to the vehicle. [`Downlink`]: messages from the vehicle. Both can be read and written, since
+//!    the simulator is the other end. [`Transfer`]: files and logs of vehicles with storage.
+//! 3. [`Sender`]: encodes messages. [`Decoder`]: decodes bytes in pieces of any size, with anything between the frames,
+//!    and counts dropped frames in [`Counters`].
 //!
-//! Layouts, checksum seeds and enumerations come from the `mavlink` crate's `common` dialect; only the messages named
-//! here reach the image. Signatures are SHA-256's, by the `hmac-sha256` crate: [`Key`], [`ReceivedFrame`].
+//! Layouts, checksum seeds and enumerations come from the `mavlink` crate's `common` dialect. The firmware contains
+//! only the messages named here. Signatures use SHA-256 of the `hmac-sha256` crate: [`Key`], [`ReceivedFrame`].
 //!
-//! No input makes the crate panic or block; memory is one frame.
+//! No input makes the crate panic or block. Its memory is one frame.
 //!
 //! ```
 //! use afbc_link::{Address, Decoder, FRAME_MAX, Sender, Uplink};

@@ -1,4 +1,4 @@
-//! Messages of one direction of the link.
+//! Interface of the messages of one direction.
 //!
 //! MAVLink 2 appends extension fields to some messages. The `mavlink` crate omits them here, since its feature for them
 //! requires std. The few that are needed are read and written as bytes.
@@ -6,31 +6,31 @@
 use crate::address::Address;
 use mavlink::{MavlinkVersion, MessageData};
 
-/// Longest payload.
+/// Longest payload \[bytes\].
 pub(crate) const PAYLOAD_MAX: usize = 255;
 
-/// Properties of a message needed before its payload is read.
+/// Properties of a message that are needed before its payload is read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MessageFormat {
     /// Seed of the checksum, `CRC_EXTRA`.
     pub extra_crc: u8,
-    /// Longest payload that is read \[bytes\]. Shorter ones are padded with zeros, as MAVLink 2 requires, and the rest
-    /// of longer ones is left out.
+    /// Number of payload bytes that are read. Shorter payloads are padded with zeros, as MAVLink 2 requires; the rest
+    /// of longer ones is ignored.
     pub length_max: usize,
 }
 
 impl MessageFormat {
-    /// The format of `D`, with `extension` bytes of extension fields.
+    /// Returns the format of `D` with `extension` bytes of extension fields.
     pub(crate) const fn of<D: MessageData>(extension: usize) -> Self {
         MessageFormat { extra_crc: D::EXTRA_CRC, length_max: D::ENCODED_LEN + extension }
     }
 }
 
-/// Why a frame is dropped.
+/// Reason for dropping a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Fault {
-    /// Wrong checksum: the frame was corrupted, or truncated and completed by the bytes that followed.
+    /// Wrong checksum: the frame was corrupted, or was truncated and completed by later bytes.
     BadChecksum,
     /// The direction does not carry this message.
     Unknown,
@@ -38,9 +38,9 @@ pub enum Fault {
     Malformed,
     /// A number is not finite or not physically plausible.
     Implausible,
-    /// Understood, but not supported by this vehicle.
+    /// The message is valid, but this vehicle does not support it.
     Unsupported,
-    /// Addressed to another system.
+    /// The message is for another system.
     Elsewhere,
 }
 
@@ -49,13 +49,13 @@ pub trait Message: Sized {
     /// Returns the format of the message numbered `id`, if this direction carries it.
     fn format(id: u32) -> Option<MessageFormat>;
 
-    /// Reads a payload that arrived intact, for the address `receiver`.
+    /// Reads an intact payload for the receiver with address `receiver`.
     ///
     /// # Errors
-    /// The reason for which it is dropped.
+    /// The reason for dropping the message.
     fn read(id: u32, payload: &[u8], receiver: Address) -> Result<Self, Fault>;
 
-    /// Writes the payload; returns the message's number and the payload's length.
+    /// Writes the payload; returns the message id and the payload's length.
     fn write(&self, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8);
 }
 
@@ -74,7 +74,7 @@ pub(crate) fn extension<D: MessageData, const N: usize>(payload: &[u8]) -> [u8; 
     field(payload, D::ENCODED_LEN)
 }
 
-/// Returns the `N` bytes of a payload from `offset` on, padded with zeros.
+/// Returns the `N` bytes of a payload at `offset`, padded with zeros.
 pub(crate) fn field<const N: usize>(payload: &[u8], offset: usize) -> [u8; N] {
     let mut field = [0; N];
     for (byte, sent) in field.iter_mut().zip(payload.iter().skip(offset)) {
@@ -88,7 +88,7 @@ pub(crate) fn put<D: MessageData>(data: &D, payload: &mut [u8; PAYLOAD_MAX]) -> 
     (D::ID, data.ser(MavlinkVersion::V2, payload) as u8)
 }
 
-/// Writes the message `data` and its extension fields, without trailing zeros.
+/// Writes the message `data` with its extension fields, without trailing zeros.
 pub(crate) fn put_extended<D: MessageData>(
     data: &D,
     extension: impl IntoIterator<Item = u8>,

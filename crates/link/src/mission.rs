@@ -12,7 +12,7 @@ use mavlink::dialects::common::{
     MISSION_WRITE_PARTIAL_LIST_DATA,
 };
 
-/// What a list of items is, `MAV_MISSION_TYPE`.
+/// Kind of a list of items: `MAV_MISSION_TYPE`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Plan(pub u8);
 
@@ -23,25 +23,24 @@ impl Plan {
     pub const FENCE: Plan = Plan(1);
     /// Rally points.
     pub const RALLY: Plan = Plan(2);
-    /// All of these, to be cleared.
+    /// All of these; only for clearing.
     pub const ALL: Plan = Plan(255);
 }
 
-/// An item as it crosses the wire: MISSION_ITEM_INT (73) without its receiver, or MISSION_ITEM (39), whose degrees and
-/// metres are rounded to the same units.
+/// An item as sent: MISSION_ITEM_INT (73) without its receiver, or MISSION_ITEM (39) converted to the same units.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct MissionItem {
-    /// Its number, from 0 on.
+    /// Sequence number, from 0.
     pub number: u16,
-    /// `MAV_CMD`.
+    /// Command of the item, `MAV_CMD`.
     pub command: u16,
-    /// `MAV_FRAME` of the place.
+    /// `MAV_FRAME` of the position.
     pub frame: u8,
-    /// True if it is the one flown, or to be flown.
+    /// True for the current item.
     pub is_current: bool,
-    /// True if the next item follows by itself.
+    /// Autocontinue: true if the next item follows without a command.
     pub goes_on: bool,
-    /// The command's first four parameters; NaN: not given.
+    /// First four parameters of the command; NaN: not given.
     pub parameters: [f32; 4],
     /// Latitude \[1e-7 deg\], or x \[1e-4 m\] in a local frame.
     pub x: i32,
@@ -54,15 +53,15 @@ pub struct MissionItem {
 /// A message of the mission protocol.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Mission {
-    /// MISSION_COUNT (44): so many items follow, or can be requested.
+    /// MISSION_COUNT (44): number of items that follow or can be requested.
     Count(u16, Plan),
-    /// MISSION_REQUEST_LIST (43): how many are there?
+    /// MISSION_REQUEST_LIST (43): requests the number of items.
     List(Plan),
-    /// MISSION_REQUEST_INT (51), or MISSION_REQUEST (40), which asks for the same: send this item.
+    /// MISSION_REQUEST_INT (51), or the equivalent MISSION_REQUEST (40): requests an item.
     Request(u16, Plan),
-    /// MISSION_ITEM_INT (73), or MISSION_ITEM (39), which says the same.
+    /// MISSION_ITEM_INT (73), or the equivalent MISSION_ITEM (39).
     Item(MissionItem, Plan),
-    /// MISSION_REQUEST_PARTIAL_LIST (37), or MISSION_WRITE_PARTIAL_LIST (38): a part of a list.
+    /// MISSION_REQUEST_PARTIAL_LIST (37) or MISSION_WRITE_PARTIAL_LIST (38): a range of items.
     Part(Part, Plan),
     /// MISSION_ACK (47) with a `MAV_MISSION_RESULT`.
     Ack(MissionResult, Plan),
@@ -70,25 +69,25 @@ pub enum Mission {
     Clear(Plan),
     /// MISSION_SET_CURRENT (41).
     SetCurrent(u16),
-    /// MISSION_CURRENT (42), for everyone.
+    /// MISSION_CURRENT (42), to everyone.
     Current(MissionCurrent),
-    /// MISSION_ITEM_REACHED (46), for everyone.
+    /// MISSION_ITEM_REACHED (46), to everyone.
     Reached(u16),
 }
 
-/// A part of a list of items.
+/// A range of a list of items.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Part {
-    /// True if it is to be written, and not read.
+    /// True to write the range, false to read it.
     pub writes: bool,
-    /// First and last number.
+    /// Numbers of the first and the last item.
     pub numbers: [i16; 2],
 }
 
 /// Content of MISSION_CURRENT.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct MissionCurrent {
-    /// Number of the item flown, or to be flown.
+    /// Number of the current item.
     pub number: u16,
     /// Number of items.
     pub total: u16,
@@ -105,15 +104,15 @@ pub struct MissionResult(pub u8);
 impl MissionResult {
     /// Done.
     pub const ACCEPTED: Self = MissionResult(0);
-    /// Generic error, not accepting mission commands at all right now.
+    /// Generic error: mission commands are not accepted at present.
     pub const ERROR: Self = MissionResult(1);
     /// The frame of an item is not supported.
     pub const UNSUPPORTED_FRAME: Self = MissionResult(2);
-    /// The command of an item, or the kind of plan, is not supported.
+    /// The command of an item, or the kind of list, is not supported.
     pub const UNSUPPORTED: Self = MissionResult(3);
-    /// More items than there is room for.
+    /// There is no room for this many items.
     pub const NO_SPACE: Self = MissionResult(4);
-    /// A number of an item is invalid: the first parameter; the following ones count on.
+    /// The first parameter of an item is invalid; the next numbers stand for the other parameters.
     pub const INVALID_PARAM1: Self = MissionResult(6);
     /// The latitude of an item is invalid.
     pub const INVALID_X: Self = MissionResult(10);
@@ -121,17 +120,17 @@ impl MissionResult {
     pub const INVALID_Y: Self = MissionResult(11);
     /// The altitude of an item is invalid.
     pub const INVALID_Z: Self = MissionResult(12);
-    /// An item that was not asked for.
+    /// The item was not the requested one.
     pub const INVALID_SEQUENCE: Self = MissionResult(13);
-    /// Refused: another station is in control, or is uploading.
+    /// Refused, since another station is in control or is uploading.
     pub const DENIED: Self = MissionResult(14);
-    /// The transfer was given up.
+    /// The transfer was cancelled.
     pub const CANCELLED: Self = MissionResult(15);
 }
 
 type ToAddress<D, W> = Layout<D, (W, Address, u8)>;
 
-// Some messages end with identifiers of the plan, which are not used.
+// Some messages end with ids of the plan, which are not used.
 const COUNT: Layout<MISSION_COUNT_DATA, (u16, Address, u8, u32)> = Layout::NEW;
 const READ_PART: ToAddress<MISSION_REQUEST_PARTIAL_LIST_DATA, [i16; 2]> = Layout::NEW;
 const WRITE_PART: ToAddress<MISSION_WRITE_PARTIAL_LIST_DATA, [i16; 2]> = Layout::NEW;
@@ -143,9 +142,9 @@ const CLEAR: Layout<MISSION_CLEAR_ALL_DATA, (Address, u8)> = Layout::NEW;
 const SET_CURRENT: Layout<MISSION_SET_CURRENT_DATA, (u16, Address)> = Layout::NEW;
 const CURRENT: Layout<MISSION_CURRENT_DATA, (u16, u16, u8, u8, [u32; 3])> = Layout::NEW;
 const REACHED: Layout<MISSION_ITEM_REACHED_DATA, (u16,)> = Layout::NEW;
-/// Parameters, x, y, z; number, command, receiver; frame, current, autocontinue, kind of plan.
+/// Fields: parameters, x, y, z; number, command, receiver; frame, current, autocontinue, kind of list.
 const ITEM: Layout<MISSION_ITEM_INT_DATA, ([f32; 4], [i32; 2], f32, u16, u16, Address, [u8; 3], u8)> = Layout::NEW;
-/// The same, with x and y as numbers.
+/// The fields of [`ITEM`], with x and y as floats.
 const FLOAT_ITEM: Layout<MISSION_ITEM_DATA, ([f32; 4], [f32; 2], f32, u16, u16, Address, [u8; 3], u8)> = Layout::NEW;
 
 impl Mission {
@@ -179,7 +178,7 @@ impl Mission {
                 let (to, plan) = LIST.read(payload);
                 (Mission::List(Plan(plan)), to)
             }
-            // The older request has the same fields, and the same answer: MISSION_ITEM_INT.
+            // MISSION_REQUEST has the same fields and is answered the same, by MISSION_ITEM_INT.
             MISSION_REQUEST_INT_DATA::ID | MISSION_REQUEST_DATA::ID => {
                 let (number, to, plan) = REQUEST_INT.read(payload);
                 (Mission::Request(number, Plan(plan)), to)
@@ -227,7 +226,7 @@ impl Mission {
         })
     }
 
-    /// Writes the message for the receiver `to`, where it names one.
+    /// Writes the message to the receiver `to`, if the message names one.
     pub(crate) fn write(&self, to: Address, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
         match *self {
             Mission::Count(count, plan) => COUNT.write(&(count, to, plan.0, 0), payload),
@@ -251,17 +250,18 @@ impl Mission {
     }
 }
 
-/// Returns degrees, or metres in one of the local frames, in the units of MISSION_ITEM_INT.
+/// Converts degrees, or metres in a local frame, to the units of MISSION_ITEM_INT.
 fn in_units(number: f32, frame: u8) -> i32 {
     let units = if LOCAL_FRAMES.contains(&frame) { 1e4 } else { 1e7 };
-    // Not given: no place at 0.
+    // Not given, which is not the same as 0.
     if number.is_nan() {
         return Place::AS_IT_IS;
     }
-    // Beyond any place, and short of the number that says that none is given.
+    // Clamped to beyond any position, but below the value for "not given".
     let scaled = (f64::from(number) * units).clamp(-2e9, 2e9);
     (scaled + if scaled < 0.0 { -0.5 } else { 0.5 }) as i32
 }
 
-/// MAV_FRAME_LOCAL_NED, LOCAL_ENU, LOCAL_OFFSET_NED, BODY_NED, BODY_OFFSET_NED, BODY_FRD, LOCAL_FRD, LOCAL_FLU.
+/// Local frames: MAV_FRAME_LOCAL_NED, LOCAL_ENU, LOCAL_OFFSET_NED, BODY_NED, BODY_OFFSET_NED, BODY_FRD, LOCAL_FRD,
+/// LOCAL_FLU.
 const LOCAL_FRAMES: [u8; 8] = [1, 4, 7, 8, 9, 12, 20, 21];

@@ -1,34 +1,34 @@
-//! Modes that the vehicle offers and has: AVAILABLE_MODES and CURRENT_MODE.
+//! The vehicle's available and current modes: AVAILABLE_MODES and CURRENT_MODE.
 
 use crate::message::{MessageFormat, PAYLOAD_MAX};
 use crate::wire::Layout;
 use mavlink::dialects::common::{AVAILABLE_MODES_DATA, CURRENT_MODE_DATA};
 
-/// AVAILABLE_MODES (435): one of the modes.
+/// AVAILABLE_MODES (435): one of the available modes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct AvailableMode {
-    /// Number of modes.
+    /// Number of available modes.
     pub count: u8,
-    /// Its place among them, from 1 on.
+    /// Index of this mode, from 1.
     pub place: u8,
-    /// `MAV_STANDARD_MODE`, 0 if it is none of these.
+    /// `MAV_STANDARD_MODE`; 0 if it is none of them.
     pub standard: u8,
-    /// Its `custom_mode` in HEARTBEAT.
+    /// `custom_mode` in HEARTBEAT.
     pub custom: u32,
     /// `MAV_MODE_PROPERTY`.
     pub properties: u32,
-    /// Name, with zeros behind it.
+    /// Name, padded with zeros.
     pub name: [u8; 35],
 }
 
 /// CURRENT_MODE (436).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct CurrentMode {
-    /// `MAV_STANDARD_MODE`, 0 if it is none of these.
+    /// `MAV_STANDARD_MODE`; 0 if it is none of them.
     pub standard: u8,
     /// `custom_mode` in HEARTBEAT.
     pub custom: u32,
-    /// The one that was asked for last.
+    /// `custom_mode` of the mode that was requested last.
     pub intended: u32,
 }
 

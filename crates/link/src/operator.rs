@@ -1,34 +1,34 @@
-//! Who is in control: CHANGE_OPERATOR_CONTROL and its answer.
+//! Control of the vehicle: CHANGE_OPERATOR_CONTROL and its answer.
 
 use crate::message::{Fault, MessageFormat, PAYLOAD_MAX};
 use crate::wire::Layout;
 use mavlink::MessageData;
 use mavlink::dialects::common::{CHANGE_OPERATOR_CONTROL_ACK_DATA, CHANGE_OPERATOR_CONTROL_DATA};
 
-/// What a station asks for by CHANGE_OPERATOR_CONTROL (5). Version and passkey are ignored.
+/// A ground station's request by CHANGE_OPERATOR_CONTROL (5). Version and passkey are ignored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum ControlRequest {
-    /// To be in control.
+    /// Take control.
     Take,
-    /// To be so no longer.
+    /// Release control.
     Release,
 }
 
 /// CHANGE_OPERATOR_CONTROL_ACK (6).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct ControlAnswer {
-    /// System that asked.
+    /// System id of the requesting station.
     pub station: u8,
-    /// What it asked for.
+    /// The request.
     pub control: ControlRequest,
     /// False if another station is in control.
     pub granted: bool,
 }
 
-/// System, request, version, passkey.
+/// Fields: system, request, version, passkey.
 const CHANGE: Layout<CHANGE_OPERATOR_CONTROL_DATA, (u8, u8, u8, [u8; 25])> = Layout::NEW;
 const ANSWER: Layout<CHANGE_OPERATOR_CONTROL_ACK_DATA, (u8, u8, u8)> = Layout::NEW;
-/// "Already under control."
+/// Answer "already under control".
 const REFUSED: u8 = 3;
 
 impl ControlRequest {
@@ -36,7 +36,7 @@ impl ControlRequest {
         CHANGE.format()
     }
 
-    /// Returns the message and the system that it is for.
+    /// Returns the request and the id of its target system.
     pub(crate) fn read(payload: &[u8]) -> Result<(Self, u8), Fault> {
         let (system, control, ..) = CHANGE.read(payload);
         Ok((Self::of(control)?, system))
@@ -71,7 +71,7 @@ impl ControlAnswer {
     }
 }
 
-/// Number of CHANGE_OPERATOR_CONTROL.
+/// Id of CHANGE_OPERATOR_CONTROL.
 pub(crate) const CHANGE_ID: u32 = CHANGE_OPERATOR_CONTROL_DATA::ID;
-/// Number of CHANGE_OPERATOR_CONTROL_ACK.
+/// Id of CHANGE_OPERATOR_CONTROL_ACK.
 pub(crate) const ANSWER_ID: u32 = CHANGE_OPERATOR_CONTROL_ACK_DATA::ID;

@@ -1,4 +1,4 @@
-//! Parameters, in both directions.
+//! Parameter protocol, in both directions.
 
 use crate::address::Address;
 use crate::message::{Fault, MessageFormat, PAYLOAD_MAX};
@@ -8,15 +8,15 @@ use mavlink::dialects::common::{
     PARAM_ERROR_DATA, PARAM_REQUEST_LIST_DATA, PARAM_REQUEST_READ_DATA, PARAM_SET_DATA, PARAM_VALUE_DATA,
 };
 
-/// Name of a parameter, with zeros behind it; none at full length.
+/// Name of a parameter, padded with zeros; at full length there are none.
 pub type ParameterName = [u8; 16];
 
-/// A station's message about parameters.
+/// A ground station's message about parameters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ParameterRequest {
     /// PARAM_REQUEST_LIST (21).
     List,
-    /// PARAM_REQUEST_READ (20) by its place in the list.
+    /// PARAM_REQUEST_READ (20) by index.
     ReadPlace(u16),
     /// PARAM_REQUEST_READ (20) by name.
     ReadName(ParameterName),
@@ -42,16 +42,16 @@ pub struct ParameterValue {
     pub kind: u8,
     /// Number of parameters.
     pub count: u16,
-    /// Place in the list; `u16::MAX` for none.
+    /// Index in the list; `u16::MAX` for none.
     pub place: u16,
 }
 
 /// PARAM_ERROR (345).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ParameterError {
-    /// Name asked for, or zeros.
+    /// Requested name, or zeros.
     pub name: ParameterName,
-    /// Place asked for; -1 for none.
+    /// Requested index; -1 for none.
     pub place: i16,
     /// `MAV_PARAM_ERROR`.
     pub error: u8,
@@ -79,7 +79,7 @@ impl ParameterRequest {
             PARAM_REQUEST_LIST_DATA::ID => (ParameterRequest::List, LIST.read(payload).0),
             PARAM_REQUEST_READ_DATA::ID => {
                 let (place, to, name) = READ.read(payload);
-                // -1: by name.
+                // -1 means that the name counts.
                 let place = u16::try_from(place).map(ParameterRequest::ReadPlace);
                 (place.unwrap_or(ParameterRequest::ReadName(name)), to)
             }

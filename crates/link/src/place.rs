@@ -1,41 +1,41 @@
-//! Places on the earth.
+//! Positions on the earth.
 
-/// What a height is measured from.
+/// Reference of a height.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Datum {
     /// Mean sea level.
     Sea,
     /// The home position.
     Home,
-    /// Where the vehicle is.
+    /// The vehicle's present position.
     Here,
 }
 
-/// A height.
+/// A height with its reference.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Height {
-    /// Height \[m\]; NaN: any, or as it is.
+    /// Height \[m\]; NaN: not given.
     pub metres: f32,
-    /// Above what.
+    /// Reference of the height.
     pub above: Datum,
 }
 
-/// A place on the earth.
+/// A position on the earth. Coordinates that are not given mean "unchanged".
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Place {
-    /// Latitude \[1e-7 deg\]; [`Place::AS_IT_IS`]: as it is.
+    /// Latitude \[1e-7 deg\]; [`Place::AS_IT_IS`] if not given.
     pub latitude_e7: i32,
-    /// Longitude \[1e-7 deg\]; [`Place::AS_IT_IS`]: as it is.
+    /// Longitude \[1e-7 deg\]; [`Place::AS_IT_IS`] if not given.
     pub longitude_e7: i32,
     /// Height.
     pub height: Height,
 }
 
 impl Place {
-    /// A coordinate that is not given.
+    /// Value of a coordinate that is not given.
     pub const AS_IT_IS: i32 = i32::MAX;
 
-    /// True if latitude and longitude exist, or are not given, and the height is below 100 km or not given.
+    /// True if latitude and longitude are valid or not given, and the height is within 100 km or not given.
     pub fn is_plausible(&self) -> bool {
         let within = |value: i32, max: i32| value == Self::AS_IT_IS || (-max..=max).contains(&value);
         let height_m = self.height.metres;
@@ -45,7 +45,7 @@ impl Place {
     }
 }
 
-/// Returns what heights are measured from in a global `MAV_FRAME`; none for other frames.
+/// Returns the reference of heights in a global `MAV_FRAME`; none for other frames.
 pub(crate) fn datum(frame: u8) -> Option<Datum> {
     match frame {
         0 | 5 => Some(Datum::Sea),
@@ -54,7 +54,7 @@ pub(crate) fn datum(frame: u8) -> Option<Datum> {
     }
 }
 
-/// Returns the `MAV_FRAME` of a height.
+/// Returns the `MAV_FRAME` for a reference of heights.
 pub(crate) const fn frame(datum: Datum) -> u8 {
     match datum {
         Datum::Sea => 0,
@@ -62,8 +62,8 @@ pub(crate) const fn frame(datum: Datum) -> u8 {
     }
 }
 
-/// Returns an angle in degrees as an integer of 1e-7 degrees; NaN is not given, others out of range stay so.
+/// Converts degrees to units of 1e-7 degrees. NaN becomes "not given"; other invalid angles stay invalid.
 pub(crate) fn e7(degrees: f32) -> i32 {
-    // Beyond any angle, and short of the number that says that none is given.
+    // Clamped to beyond any angle, but below the value for "not given".
     if degrees.is_nan() { Place::AS_IT_IS } else { (f64::from(degrees) * 1e7).clamp(-2e9, 2e9) as i32 }
 }

@@ -1,7 +1,7 @@
-//! MAVLink 2 signatures: link, time and the first 48 bits of SHA-256 over key, frame, link and time.
+//! MAVLink 2 signatures: link id, timestamp and the first 48 bits of SHA-256 over key, frame, link id and timestamp.
 //!
-//! <https://mavlink.io/en/guide/message_signing.html>. What is accepted is the receiver's to decide: it keeps the
-//! times.
+//! See <https://mavlink.io/en/guide/message_signing.html>. This module does not decide which signatures to accept: the
+//! receiver does, since it keeps the timestamps.
 
 use crate::address::Address;
 use crate::message::{MessageFormat, PAYLOAD_MAX};
@@ -11,14 +11,14 @@ use hmac_sha256::Hash;
 use mavlink::MessageData;
 use mavlink::dialects::common::SETUP_SIGNING_DATA;
 
-/// Bytes of a signature.
+/// Length of a signature \[bytes\].
 pub(crate) const SIGNATURE: usize = 13;
-/// Bytes of a signature before its code: link, and time of 48 bits.
+/// Length of link id and 48-bit timestamp at the beginning of a signature \[bytes\].
 const STAMP: usize = 7;
-/// Largest time of a signature.
+/// Largest timestamp.
 pub const TIME_MAX: u64 = (1 << 48) - 1;
 
-/// A secret key. Not shown by `Debug`.
+/// A secret key, which `Debug` does not print.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub struct Key(pub [u8; 32]);
 
@@ -29,13 +29,13 @@ impl fmt::Debug for Key {
 }
 
 impl Key {
-    /// Returns the first bytes of the key's own SHA-256: what is kept beside it to find that it is whole.
+    /// Returns the first bytes of the SHA-256 of the key alone. They are stored with the key to detect damage.
     pub fn check(&self) -> [u8; 4] {
         first(&Hash::hash(&self.0))
     }
 
-    /// Returns the code of a signature over `frame`, from its first byte to its checksum. Out of line: once in an
-    /// image.
+    /// Returns the hash part of a signature over `frame`, which is given from its first byte to its checksum. Not
+    /// inlined, so that the firmware contains it only once.
     #[inline(never)]
     fn code(&self, frame: &[u8], stamp: &[u8]) -> [u8; SIGNATURE - STAMP] {
         let mut hash = Hash::new();
@@ -45,7 +45,7 @@ impl Key {
         first(&hash.finalize())
     }
 
-    /// Returns the signature of `frame` under this stamp.
+    /// Returns the signature of `frame` with this link id and timestamp.
     pub(crate) fn sign(&self, frame: &[u8], stamp: Stamp) -> [u8; SIGNATURE] {
         let stamp = stamp.to_bytes();
         let code = self.code(frame, &stamp);
@@ -59,13 +59,13 @@ fn first<const N: usize>(digest: &[u8]) -> [u8; N] {
     digest.first_chunk().copied().unwrap_or([0; N])
 }
 
-/// Link and time of a signature.
+/// Link id and timestamp of a signature.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Stamp {
-    /// Number of the sender's link.
+    /// Link id of the sender.
     pub link: u8,
-    /// Time since the beginning of 2015 UTC \[10 us\], up to [`TIME_MAX`]. Larger than that of any frame that the
-    /// sender has sent by this link before.
+    /// Timestamp since the beginning of 2015 UTC \[10 us\], up to [`TIME_MAX`]. It must increase with each frame that
+    /// the sender sends over this link.
     pub time_10us: u64,
 }
 
@@ -80,12 +80,12 @@ impl Stamp {
     }
 }
 
-/// A frame with the right checksum, to be trusted or not.
+/// A frame with a correct checksum, passed to the receiver to accept or refuse.
 #[derive(Clone, Copy, Debug)]
 pub struct ReceivedFrame<'a> {
     /// Sender.
     pub from: Address,
-    /// Number of the message.
+    /// Message id.
     pub id: u32,
     /// The frame, from its first byte to its checksum.
     bytes: &'a [u8],
@@ -93,47 +93,47 @@ pub struct ReceivedFrame<'a> {
 }
 
 impl<'a> ReceivedFrame<'a> {
-    /// A frame whose first `unsigned` bytes reach to its checksum.
+    /// Creates the received frame; its first `unsigned` bytes end with the checksum.
     pub(crate) fn new(from: Address, id: u32, frame: &'a [u8], unsigned: usize) -> Self {
         let (bytes, rest) = frame.split_at_checked(unsigned).unwrap_or((frame, &[]));
         ReceivedFrame { from, id, bytes, signature: rest.first_chunk() }
     }
 
-    /// Returns link and time of its signature; none if it has none.
+    /// Returns link id and timestamp of the frame's signature; none if it is not signed.
     pub fn stamp(&self) -> Option<Stamp> {
         self.signature?.first_chunk().copied().map(Stamp::from_bytes)
     }
 
-    /// True if it has a signature, made with this key.
+    /// True if the frame has a signature made with this key.
     pub fn is_signed_by(&self, key: &Key) -> bool {
         let Some((stamp, sent)) = self.signature.map(|signature| signature.split_at(STAMP)) else { return false };
         let code = key.code(self.bytes, stamp);
-        // All of it, however early it differs: the time tells nothing.
+        // Compares all bytes, so that the time taken does not reveal the first difference.
         code.len() == sent.len() && code.iter().zip(sent).fold(0, |differs, (a, b)| differs | (a ^ b)) == 0
     }
 }
 
-/// SETUP_SIGNING (256): a key for this vehicle, or none.
+/// SETUP_SIGNING (256): sets or removes the vehicle's key.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SetupSigning {
-    /// The key; none to sign nothing any more, sent as zeros.
+    /// New key; none to stop signing, sent as zeros.
     pub key: Option<Key>,
-    /// The sender's time ([`Stamp::time_10us`]).
+    /// Timestamp of the sender ([`Stamp::time_10us`]).
     pub time_10us: u64,
 }
 
-/// Time, system, component, key.
+/// Fields: time, system, component, key.
 const SETUP: Layout<SETUP_SIGNING_DATA, (u64, Address, [u8; 32])> = Layout::NEW;
 
 impl SetupSigning {
-    /// Number of the message.
+    /// Message id.
     pub const ID: u32 = SETUP_SIGNING_DATA::ID;
 
     pub(crate) fn format() -> MessageFormat {
         SETUP.format()
     }
 
-    /// Returns the message and the system that it is for.
+    /// Returns the message and its receiver.
     pub(crate) fn read(payload: &[u8]) -> (Self, Address) {
         let (time_10us, to, key) = SETUP.read(payload);
         (SetupSigning { key: (key != [0; 32]).then_some(Key(key)), time_10us: time_10us.min(TIME_MAX) }, to)

@@ -1,4 +1,4 @@
-//! Targets of a companion computer, and a pilot's sticks.
+//! Targets from a companion computer, and a pilot's sticks from a ground station.
 
 use crate::address::Address;
 use crate::channels::ChannelsOverride;
@@ -14,24 +14,26 @@ use mavlink::dialects::common::{
 };
 use nalgebra::Vector3;
 
-/// What a motion's coordinates refer to, by `MAV_FRAME`. Axes of the vehicle are level: forward, left, up.
+/// Reference of a target's coordinates, from `MAV_FRAME`. The vehicle's axes are horizontal and vertical: forward,
+/// left, up.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Axes {
-    /// MAV_FRAME_LOCAL_NED: place and axes of the local frame.
+    /// MAV_FRAME_LOCAL_NED: position and axes of the local frame.
     #[default]
     Local,
-    /// MAV_FRAME_LOCAL_OFFSET_NED: places count from where the vehicle is, with the local frame's axes.
+    /// MAV_FRAME_LOCAL_OFFSET_NED: position relative to the vehicle, axes of the local frame.
     Offset,
-    /// MAV_FRAME_BODY_NED: places of the local frame; velocity and acceleration along the vehicle's axes.
+    /// MAV_FRAME_BODY_NED: position in the local frame; velocity and acceleration along the vehicle's axes.
     Body,
-    /// MAV_FRAME_BODY_OFFSET_NED or MAV_FRAME_BODY_FRD: all along the vehicle's axes, places from where it is.
+    /// MAV_FRAME_BODY_OFFSET_NED or MAV_FRAME_BODY_FRD: everything along the vehicle's axes, position relative to the
+    /// vehicle.
     BodyOffset,
 }
 
-/// A target of motion; NaN where there is none.
+/// A target of position, velocity and acceleration; NaN for each number that is not given.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PositionTarget {
-    /// What the coordinates refer to.
+    /// Reference of the coordinates.
     pub axes: Axes,
     /// Position \[m\].
     pub position_m: Vector3<f32>,
@@ -39,9 +41,9 @@ pub struct PositionTarget {
     pub velocity_m_s: Vector3<f32>,
     /// Acceleration \[m/s2\].
     pub acceleration_m_s2: Vector3<f32>,
-    /// Heading, always that of the earth frame \[rad\].
+    /// Heading, always in the earth frame \[rad\].
     pub yaw_rad: f32,
-    /// Rate of the heading \[rad/s\].
+    /// Yaw rate \[rad/s\].
     pub yaw_rate_rad_s: f32,
 }
 
@@ -59,7 +61,7 @@ impl From<&Setpoint> for PositionTarget {
 }
 
 impl PositionTarget {
-    /// A target of nothing.
+    /// A target that gives nothing.
     pub const NONE: Self = {
         let none = Vector3::new(f32::NAN, f32::NAN, f32::NAN);
         let (position_m, velocity_m_s, acceleration_m_s2) = (none, none, none);
@@ -67,8 +69,8 @@ impl PositionTarget {
         PositionTarget { axes: Axes::Local, position_m, velocity_m_s, acceleration_m_s2, yaw_rad, yaw_rate_rad_s }
     };
 
-    /// Returns the setpoint of a target that names a position of the local frame and a heading: what else it does not
-    /// name is zero.
+    /// Returns the setpoint of a target that gives a position in the local frame and a heading; other numbers that are
+    /// not given become zero.
     pub fn setpoint(&self) -> Option<Setpoint> {
         let or_zero = |value: f32| if value.is_nan() { 0.0 } else { value };
         let setpoint = Setpoint {
@@ -80,7 +82,7 @@ impl PositionTarget {
             // The message has no jerk, snap or angular acceleration.
             ..Setpoint::default()
         };
-        // A velocity along the vehicle's axes is none of the local frame's.
+        // A velocity along the vehicle's axes cannot be used in the local frame.
         let is_local = match self.axes {
             Axes::Local => true,
             Axes::Body => self.velocity_m_s.iter().chain(&self.acceleration_m_s2).all(|number| number.is_nan()),
@@ -89,14 +91,14 @@ impl PositionTarget {
         (is_local && setpoint.is_plausible()).then_some(setpoint)
     }
 
-    /// The setpoint of a target that names everything in the local frame.
+    /// Returns the setpoint of a target that gives every number in the local frame.
     pub(crate) fn complete(&self) -> Option<Setpoint> {
         let numbers = [&self.position_m, &self.velocity_m_s, &self.acceleration_m_s2].into_iter().flatten();
         let all = numbers.chain([&self.yaw_rad, &self.yaw_rate_rad_s]).all(|number| number.is_finite());
         (all && self.axes == Axes::Local).then(|| self.setpoint()).flatten()
     }
 
-    /// Returns the numbers of the message, and what is to be ignored.
+    /// Returns the numbers of the message, and its type mask of ignored numbers.
     fn fields(&self) -> ([Vector3<f32>; 3], [f32; 2], u16) {
         let vectors = [self.position_m, self.velocity_m_s, self.acceleration_m_s2].map(flip);
         let yaw = [-self.yaw_rad, -self.yaw_rate_rad_s];
@@ -106,13 +108,13 @@ impl PositionTarget {
         (vectors.map(|vector| vector.map(or_zero)), yaw.map(or_zero), mask)
     }
 
-    /// Reads numbers of which `mask` ignores some. Neither forces nor a target of nothing are supported.
+    /// Reads a target from numbers and their type mask. Forces are not supported, nor is a target that gives nothing.
     fn read(axes: Axes, vectors: [[f32; 3]; 3], yaw: [f32; 2], mask: u16) -> Result<Self, Fault> {
         if mask & FORCE != 0 || mask & NOTHING == NOTHING {
             return Err(Fault::Unsupported);
         }
         let bits = [[0, 1, 2], [3, 4, 5], [6, 7, 8]];
-        // Of what is not ignored, every number must be one; no NaN is taken for "none".
+        // A number that is not ignored must be finite, so that a NaN from the sender does not count as "not given".
         let unless = |bit: u16, value: f32| match mask & (1 << bit) {
             0 if value.is_finite() => Ok(value),
             0 => Err(Fault::Implausible),
@@ -127,7 +129,7 @@ impl PositionTarget {
         let [heading, rate] = yaw;
         (read.yaw_rad, read.yaw_rate_rad_s) = (-unless(10, heading)?, -unless(11, rate)?);
         let or_zero = |number: f32| if number.is_nan() { 0.0 } else { number };
-        // What is ignored counts as zero, which is plausible, so that only the rest is judged.
+        // Ignored numbers count as zero, so that only the others are checked.
         let whole = Setpoint {
             position_m: read.position_m.map(or_zero),
             velocity_m_s: read.velocity_m_s.map(or_zero),
@@ -140,43 +142,43 @@ impl PositionTarget {
     }
 }
 
-/// Bit of the mask: forces instead of accelerations.
+/// Bit of the type mask: forces instead of accelerations.
 const FORCE: u16 = 1 << 9;
-/// All bits of the mask that ignore something.
+/// All bits of the type mask that ignore a number.
 const NOTHING: u16 = 0b1101_1111_1111;
 
-/// An attitude and a thrust.
+/// A target of attitude and thrust.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AttitudeAndThrust {
-    /// Attitude: quaternion w, x, y, z from body to earth, a rotation of any norm but zero.
+    /// Attitude as a quaternion w, x, y, z from body to earth, of any nonzero norm.
     pub attitude: [f32; 4],
-    /// Rate of the heading; NaN where there is none \[rad/s\].
+    /// Yaw rate; NaN if not given \[rad/s\].
     pub yaw_rate_rad_s: f32,
     /// Thrust, 0 to 1.
     pub thrust: f32,
 }
 
-/// MANUAL_CONTROL (69), -1 to 1. A throttle of 500 on the wire is 0, as stations send it; a positive yaw turns to the
-/// right, as they mean it, against the words of the specification.
+/// MANUAL_CONTROL (69), -1 to 1. A throttle of 500 on the wire is 0, as ground stations send it. Positive yaw turns to
+/// the right; this is what ground stations mean, although the specification says otherwise.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ManualControl {
-    /// To the right.
+    /// Roll to the right.
     pub roll: f32,
-    /// Forward.
+    /// Pitch forward.
     pub pitch: f32,
-    /// Up.
+    /// Throttle up.
     pub throttle: f32,
-    /// Clockwise, seen from above.
+    /// Yaw clockwise, seen from above.
     pub yaw: f32,
 }
 
-/// A target or a pilot's sticks.
+/// A target from a companion computer, or a pilot's sticks.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ExternalTarget {
-    /// SET_POSITION_TARGET_LOCAL_NED (84) of which something is ignored, or in another frame than
-    /// MAV_FRAME_LOCAL_NED: else it is [`Uplink::Setpoint`](crate::Uplink::Setpoint).
+    /// SET_POSITION_TARGET_LOCAL_NED (84) with ignored numbers, or in a frame other than MAV_FRAME_LOCAL_NED. A
+    /// complete one in that frame is [`Uplink::Setpoint`](crate::Uplink::Setpoint).
     Motion(PositionTarget),
-    /// SET_POSITION_TARGET_GLOBAL_INT (86): a place instead of the position, each coordinate of which may be ignored.
+    /// SET_POSITION_TARGET_GLOBAL_INT (86): a position on the earth, each coordinate of which may be ignored.
     Place(Place, PositionTarget),
     /// SET_ATTITUDE_TARGET (82) with attitude and thrust. Body rates without an attitude are unsupported.
     Attitude(AttitudeAndThrust),
@@ -186,19 +188,19 @@ pub enum ExternalTarget {
     Channels(ChannelsOverride),
 }
 
-/// Time, nine numbers, heading and its rate, mask, receiver, frame.
+/// Fields: time, nine numbers, heading and yaw rate, type mask, receiver, frame.
 type MotionFields = (u32, [[f32; 3]; 3], [f32; 2], u16, Address, u8);
 const MOTION: Layout<SET_POSITION_TARGET_LOCAL_NED_DATA, MotionFields> = Layout::NEW;
 type PlaceFields = (u32, [i32; 2], f32, [[f32; 3]; 2], [f32; 2], u16, Address, u8);
 const PLACE: Layout<SET_POSITION_TARGET_GLOBAL_INT_DATA, PlaceFields> = Layout::NEW;
-/// Time, quaternion, rates, thrust, receiver, mask, thrust in three dimensions.
+/// Fields: time, quaternion, rates, thrust, receiver, type mask, thrust in three dimensions.
 type AttitudeFields = (u32, [f32; 4], [f32; 3], f32, Address, u8, [f32; 3]);
 const ATTITUDE: Layout<SET_ATTITUDE_TARGET_DATA, AttitudeFields> = Layout::NEW;
-/// x, y, z, r; buttons, receiver; further buttons and axes.
+/// Fields: x, y, z, r; buttons, receiver; further buttons and axes.
 const STICKS: Layout<MANUAL_CONTROL_DATA, ([i16; 4], u16, u8, u16, u8, [i16; 8])> = Layout::NEW;
 const TARGET: Layout<POSITION_TARGET_LOCAL_NED_DATA, (u32, [[f32; 3]; 3], [f32; 2], u16, u8)> = Layout::NEW;
 
-/// An axis of MANUAL_CONTROL that the sender does not have.
+/// Value of an axis of MANUAL_CONTROL that the sender does not have.
 const NO_AXIS: i16 = i16::MAX;
 /// MAV_FRAME_LOCAL_NED.
 const LOCAL_NED: u8 = 1;
@@ -215,7 +217,7 @@ impl ExternalTarget {
         })
     }
 
-    /// Returns the message for a vehicle that `is_meant`.
+    /// Reads the message; `is_meant` tells whether a receiver is this vehicle.
     pub(crate) fn read(id: u32, payload: &[u8], is_meant: impl Fn(Address) -> bool) -> Result<Self, Fault> {
         let mine = |to| if is_meant(to) { Ok(()) } else { Err(Fault::Elsewhere) };
         match id {
@@ -230,7 +232,7 @@ impl ExternalTarget {
                     _ => return Err(Fault::Unsupported),
                 };
                 let motion = PositionTarget::read(axes, vectors, yaw, mask)?;
-                // Not both in one: the place would be the earth's, the velocity the vehicle's.
+                // A position in the local frame and motion along the vehicle's axes cannot be combined.
                 let moves = motion.velocity_m_s.iter().chain(&motion.acceleration_m_s2).any(|it| it.is_finite());
                 if axes == Axes::Body && moves && motion.position_m.iter().any(|it| it.is_finite()) {
                     return Err(Fault::Unsupported);
@@ -242,7 +244,7 @@ impl ExternalTarget {
                     PLACE.read(payload);
                 mine(to)?;
                 let above = datum(frame).ok_or(Fault::Unsupported)?;
-                // Finite, to be checked below.
+                // The position is passed as zeros here and checked below.
                 let motion = PositionTarget::read(Axes::Local, [[0.0; 3], velocity, acceleration], yaw, mask)?;
                 let unless = |bit: u16, value: i32| if mask & (1 << bit) == 0 { value } else { Place::AS_IT_IS };
                 let metres = if mask & 4 == 0 { altitude_m } else { f32::NAN };
@@ -259,7 +261,7 @@ impl ExternalTarget {
             SET_ATTITUDE_TARGET_DATA::ID => {
                 let (_, attitude, [_, _, yaw_rate], thrust, to, mask, _) = ATTITUDE.read(payload);
                 mine(to)?;
-                // Throttle or attitude ignored, or thrust in three dimensions.
+                // Refuses ignored thrust or attitude, and thrust in three dimensions.
                 if mask & 0b1110_0000 != 0 {
                     return Err(Fault::Unsupported);
                 }
@@ -279,7 +281,7 @@ impl ExternalTarget {
                     return Err(Fault::Unsupported);
                 }
                 let [pitch, roll, up, yaw] = axes.map(|axis| (f32::from(axis) / 1000.0).clamp(-1.0, 1.0));
-                // Below 0 is thrust to the other side, which no multirotor here has.
+                // Below 0 would be thrust in the opposite direction, which no vehicle here has.
                 Ok(ExternalTarget::Sticks(ManualControl { roll, pitch, throttle: 2.0 * up.max(0.0) - 1.0, yaw }))
             }
             RC_CHANNELS_OVERRIDE_DATA::ID => {
@@ -315,7 +317,7 @@ impl ExternalTarget {
             ExternalTarget::Channels(channels) => channels.write(payload),
             ExternalTarget::Sticks(ManualControl { roll, pitch, throttle, yaw }) => {
                 let up = (throttle + 1.0) / 2.0;
-                // To the nearest, without the platform's rounding.
+                // Rounds to the nearest integer, without the platform's rounding function.
                 let axis = |value: f32| (value * 1000.0 + if value < 0.0 { -0.5 } else { 0.5 }) as i16;
                 STICKS.write(&([*pitch, *roll, up, *yaw].map(axis), 0, 0, 0, 0, [0; 8]), payload)
             }
@@ -335,7 +337,7 @@ pub(crate) fn write_motion(motion: &PositionTarget, payload: &mut [u8; PAYLOAD_M
     MOTION.write(&(0, vectors.map(Into::into), yaw, mask, Address::default(), frame), payload)
 }
 
-/// Format of POSITION_TARGET_LOCAL_NED (85), which reports what the vehicle follows.
+/// Returns the format of POSITION_TARGET_LOCAL_NED (85), which reports the target that the vehicle follows.
 pub(crate) fn followed_format() -> MessageFormat {
     TARGET.format()
 }

@@ -1,12 +1,11 @@
-//! The texts among messages that were sent.
+//! Extraction of the texts from sent messages.
 
 use crate::framing::{HEADER, Header, START};
 use mavlink::MessageData as _;
 use mavlink::dialects::common::STATUSTEXT_DATA;
 
-/// Returns severity (0 emergency to 7 debug) and content of each STATUSTEXT among the whole frames that a [`Sender`]
-/// has
-/// written, one behind the other. For whoever writes a log beside the link: checksums are not looked at.
+/// Returns severity (0 emergency to 7 debug) and text of each STATUSTEXT among complete frames that a [`Sender`] has
+/// written one after another. Used to write the texts to a log. Checksums are not verified.
 ///
 /// [`Sender`]: crate::Sender
 pub fn sent_texts(mut frames: &[u8]) -> impl Iterator<Item = (u8, &str)> {
@@ -24,10 +23,10 @@ pub fn sent_texts(mut frames: &[u8]) -> impl Iterator<Item = (u8, &str)> {
     })
 }
 
-/// Longest text \[bytes\]; what follows are extensions.
+/// Longest text \[bytes\]; extension fields follow it.
 const TEXT_MAX: usize = 50;
 
-/// Reads a payload, whose zeros at the end are not sent.
+/// Reads a payload; trailing zeros are not sent.
 fn read(payload: &[u8]) -> Option<(u8, &str)> {
     let (severity, text) = payload.split_first()?;
     let text = text.get(..TEXT_MAX.min(text.len()))?.split(|byte| *byte == 0).next()?;
@@ -41,7 +40,7 @@ mod tests {
 
     const ME: Address = Address { system: 1, component: 1 };
 
-    /// Texts of any length are found among other frames, signed or not; a cut frame ends them.
+    /// Texts of any length are found among other frames, signed or not; a truncated frame ends the search.
     #[test]
     fn texts_are_found() {
         let all = "A text of fifty characters, which is the longest !";

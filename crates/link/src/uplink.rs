@@ -27,37 +27,37 @@ pub enum Uplink {
     Heartbeat,
     /// ODOMETRY (331): the full state, from motion capture, a companion computer or the simulator.
     ///
-    /// Supported in frame MAV_FRAME_LOCAL_NED or MAV_FRAME_LOCAL_FRD with child frame MAV_FRAME_BODY_FRD, otherwise
-    /// [`Fault::Unsupported`]; so is a quality of -1, "odometry has failed". The covariance of the
+    /// Supported are the frames MAV_FRAME_LOCAL_NED and MAV_FRAME_LOCAL_FRD with the child frame MAV_FRAME_BODY_FRD.
+    /// Other frames are [`Fault::Unsupported`], and so is a quality of -1, "odometry has failed". The covariance of the
     /// velocity is ignored.
     State {
         /// Time of the measurement on the sender's clock \[us\].
         sent_us: u64,
         /// Plausible state in the frames of [`afbc_types`].
         state: State,
-        /// Standard deviations of its pose, from the covariance as for [`Uplink::Pose`].
+        /// Standard deviations of the pose, computed from the covariance as for [`Uplink::Pose`].
         sigmas: PoseSigmas,
     },
-    /// VISION_POSITION_ESTIMATE (102) or ATT_POS_MOCAP (138): a pose, for vehicles with an estimate of their own.
-    /// Written as ATT_POS_MOCAP.
+    /// VISION_POSITION_ESTIMATE (102) or ATT_POS_MOCAP (138): a pose, for vehicles with their own estimator. Written as
+    /// ATT_POS_MOCAP.
     ///
-    /// Standard deviations are the square roots of the covariance's largest variance of x, y, z, and of roll, pitch,
-    /// yaw. Both are unknown if the covariance is missing or begins with NaN; each is if its variances are all zero or
-    /// one of them is negative or not finite. The reset counter is ignored.
+    /// There are two standard deviations: one from the largest variance of x, y, z, and one from the largest of roll,
+    /// pitch, yaw. Both are unknown if the covariance is missing or begins with NaN. One of them is unknown if its
+    /// three variances are all zero, or if one is negative or not finite. The reset counter is ignored.
     Pose {
         /// Time of the measurement on the sender's clock \[us\].
         sent_us: u64,
         /// Plausible pose in the frames of [`afbc_types`].
         pose: Pose,
     },
-    /// SET_POSITION_TARGET_LOCAL_NED (84) in MAV_FRAME_LOCAL_NED of which nothing is ignored. The yaw acceleration,
-    /// jerk and snap, which the message lacks, are zero.
+    /// SET_POSITION_TARGET_LOCAL_NED (84) in MAV_FRAME_LOCAL_NED without ignored numbers. Yaw acceleration, jerk and
+    /// snap, which the message lacks, are zero.
     Setpoint(Setpoint),
     /// Any other target, or a pilot's sticks.
     Target(ExternalTarget),
     /// COMMAND_LONG (76), COMMAND_INT (75), SET_MODE (11) or SET_HOME_POSITION (243).
     Command(Command),
-    /// MISSION_*.
+    /// MISSION_* messages.
     Mission(Mission),
     /// PARAM_REQUEST_LIST, PARAM_REQUEST_READ, PARAM_SET.
     Parameter(ParameterRequest),
@@ -69,7 +69,7 @@ pub enum Uplink {
     Control(ControlRequest),
     /// SETUP_SIGNING (256).
     Signing(SetupSigning),
-    /// A question about what the vehicle may not have.
+    /// A request for an optional service.
     Question(Question),
 }
 
@@ -128,7 +128,7 @@ impl Message for Uplink {
                 let (message, to) = Mission::read(id, payload)?;
                 meant_for(receiver, to).map(|()| Uplink::Mission(message))
             }
-            // Questions are for everyone; answers are of use to the asker only, who decides.
+            // Requests are for everyone. Answers concern only the requester; the caller checks this.
             _ if Clock::format(id).is_some() => Clock::read(id, payload).map(Uplink::Clock),
             _ if Question::format(id).is_some() => {
                 let (question, to) = Question::read(id, payload)?;
@@ -173,12 +173,12 @@ impl Message for Uplink {
     }
 }
 
-/// Returns [`Fault::Elsewhere`] if the message's target is not `receiver`.
+/// Returns [`Fault::Elsewhere`] if `target` is not `receiver`.
 fn meant_for(receiver: Address, target: Address) -> Result<(), Fault> {
     if receiver.is_meant_by(target) { Ok(()) } else { Err(Fault::Elsewhere) }
 }
 
-/// Extension fields of ODOMETRY: reset counter, type of the estimator, quality as `i8`.
+/// Length of ODOMETRY's extension fields \[bytes\]: reset counter, type of estimator, quality as `i8`.
 const ODOMETRY_EXTENSION: usize = 3;
 
 fn read_odometry(data: &ODOMETRY_DATA, extension: [u8; ODOMETRY_EXTENSION]) -> Result<Uplink, Fault> {
@@ -214,13 +214,13 @@ fn write_odometry(sent_us: u64, state: &State, sigmas: &PoseSigmas) -> ODOMETRY_
     data
 }
 
-/// Bytes of the covariance of a pose: the upper triangle of six by six numbers, row by row.
+/// Length of a pose's covariance \[bytes\]: the upper triangle of six by six numbers, row by row.
 const COVARIANCE: usize = 4 * 21;
-/// Extension fields of VISION_POSITION_ESTIMATE: covariance, reset counter.
+/// Length of VISION_POSITION_ESTIMATE's extension fields \[bytes\]: covariance, reset counter.
 const POSE_EXTENSION: usize = COVARIANCE + 1;
 
 fn read_vision(data: &VISION_POSITION_ESTIMATE_DATA, payload: &[u8]) -> Result<Uplink, Fault> {
-    // Looked at as angles: of absurd ones, too, a quaternion would be a rotation.
+    // Checks the angles, since even absurd angles would give a valid quaternion.
     let level = State { attitude_rad: Vector3::new(data.roll, -data.pitch, -data.yaw), ..State::default() };
     if !level.is_plausible() {
         return Err(Fault::Implausible);
@@ -245,7 +245,7 @@ fn write_mocap(sent_us: u64, pose: &Pose) -> ATT_POS_MOCAP_DATA {
     ATT_POS_MOCAP_DATA { time_usec: sent_us, q: flip_turn(pose.attitude), x, y, z }
 }
 
-/// Returns the standard deviations in the covariance with which the extension fields of `D` begin.
+/// Returns the standard deviations from the covariance at the beginning of the extension fields of `D`.
 fn extended_sigmas<D: MessageData>(payload: &[u8]) -> PoseSigmas {
     let number = |place| f32::from_le_bytes(field(payload, D::ENCODED_LEN + 4 * place));
     sigmas(&core::array::from_fn(number))
@@ -256,7 +256,7 @@ fn sigmas(covariance: &[f32; 21]) -> PoseSigmas {
     if x.is_nan() { PoseSigmas::UNKNOWN } else { PoseSigmas::from_variances([x, y, z], [roll, pitch, yaw]) }
 }
 
-/// Returns a diagonal covariance; zeros stand for what is unknown.
+/// Returns a diagonal covariance; zeros where the standard deviation is unknown.
 fn covariance(sigmas: &PoseSigmas) -> [f32; 21] {
     let [position, attitude] = [sigmas.position_m, sigmas.attitude_rad].map(|sigma| sigma.map_or(0.0, |it| it * it));
     core::array::from_fn(|place| match place {

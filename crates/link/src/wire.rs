@@ -1,17 +1,16 @@
-//! Fields as they cross the wire: little-endian, without gaps, in the order of MAVLink's serialisation.
-//!
-//! Messages that the `mavlink` crate cannot carry in full are described by a tuple of their fields, extension fields
-//! last. Only number and checksum seed are the crate's.
+//! Serialisation of fields: little-endian, without gaps, in MAVLink's order. Messages that the `mavlink` crate cannot
+//! read and write completely are described as a tuple of their fields, extension fields last. Only their id and
+//! checksum seed come from the crate.
 
 use crate::address::Address;
 use crate::message::{MessageFormat, PAYLOAD_MAX};
 use core::marker::PhantomData;
 use mavlink::MessageData;
 
-/// Bytes of a payload, followed by zeros.
+/// Bytes of a payload; zeros follow after its end.
 pub(crate) struct Source<'a>(core::slice::Iter<'a, u8>);
 
-/// A payload that is being written.
+/// Payload being written.
 pub(crate) struct Sink<'a> {
     rest: core::iter::Enumerate<core::slice::IterMut<'a, u8>>,
     /// Length without trailing zeros.
@@ -23,20 +22,20 @@ impl Sink<'_> {
         if let Some((place, to)) = self.rest.next() {
             *to = byte;
             if byte != 0 {
-                // Fits: a payload has 255 bytes at most.
+                // Fits into a byte: a payload has at most 255 bytes.
                 self.length = (place + 1) as u8;
             }
         }
     }
 }
 
-/// A value of fixed size.
+/// A field of fixed size.
 pub(crate) trait Wire: Sized {
     /// Size \[bytes\].
     const LEN: usize;
-    /// Reads it; what the payload lacks is zero.
+    /// Reads the field; bytes missing from the payload are zero.
     fn take(source: &mut Source<'_>) -> Self;
-    /// Writes it.
+    /// Writes the field.
     fn give(&self, sink: &mut Sink<'_>);
 }
 
@@ -83,7 +82,7 @@ impl Wire for Address {
     }
 }
 
-/// Bytes that are not read, and zero where they are written.
+/// Bytes that are skipped when reading and zero when writing.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Unused<const N: usize>;
 
@@ -91,7 +90,7 @@ impl<const N: usize> Wire for Unused<N> {
     const LEN: usize = N;
 
     fn take(source: &mut Source<'_>) -> Self {
-        // By one at least, which no message needs.
+        // Skips at least one byte; no message has a field of length 0.
         source.0.nth(N.saturating_sub(1));
         Unused
     }
@@ -132,11 +131,11 @@ tuples! {
     (a A) (b B) (c C) (d D) (e E) (f F) (g G) (h H) (i I) (j J);
 }
 
-/// Layout of the message that the `mavlink` crate calls `D`.
+/// Field layout of the message `D` of the `mavlink` crate.
 pub(crate) struct Layout<D, W>(PhantomData<fn() -> (D, W)>);
 
 impl<D: MessageData, W: Wire> Layout<D, W> {
-    /// The layout. Compiles only if the fields are at least those that the `mavlink` crate knows.
+    /// The layout. Compiles only if it covers at least the fields that the `mavlink` crate knows.
     pub(crate) const NEW: Self = {
         assert!(D::ENCODED_LEN <= W::LEN && W::LEN <= PAYLOAD_MAX);
         Layout(PhantomData)
@@ -150,7 +149,7 @@ impl<D: MessageData, W: Wire> Layout<D, W> {
         W::take(&mut Source(payload.iter()))
     }
 
-    /// Writes the fields without trailing zeros; returns number and length, at least one byte.
+    /// Writes the fields without trailing zeros; returns message id and length, at least one byte.
     pub(crate) fn write(&self, fields: &W, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
         let mut sink = Sink { rest: payload.iter_mut().enumerate(), length: 1 };
         fields.give(&mut sink);

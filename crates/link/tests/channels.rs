@@ -1,4 +1,4 @@
-//! Channels of radio control on the wire, beside the generated dialect.
+//! Radio control channels on the wire, compared with the specification.
 
 use afbc_link::{
     Address, ChannelsOverride, Decoder, Downlink, ExternalTarget, FRAME_MAX, RADIO_CHANNELS, RadioChannels, Sender,
@@ -16,7 +16,7 @@ fn sent(message: &Uplink) -> Vec<Uplink> {
     heard
 }
 
-/// What the specification says of a raw value of a channel, from 0.
+/// Returns a channel's pulse by the specification; `place` counts from 0, `before` is the receiver's pulse.
 fn expected(place: usize, raw: u16, before: u16) -> u16 {
     match (place < 8, raw) {
         (_, 65_535) => before,
@@ -34,11 +34,11 @@ proptest! {
         let heard = sent(&message);
         prop_assert_eq!(&heard, &[message]);
         let [Uplink::Target(ExternalTarget::Channels(channels))] = heard[..] else { panic!("{heard:?}") };
-        // Of the last ten, 0 is given back.
+        // For the last ten channels, 0 was written as "released".
         prop_assert_eq!(core::array::from_fn(|place| channels.channel(place).unwrap_or(1234)), us);
     }
 
-    /// Frames of the generated dialect, with channels that are left alone or given back.
+    /// Payloads written from the specification, with channels that are left unchanged or released.
     #[test]
     fn others_overrides_are_read(
         raw in prop::array::uniform18(prop_oneof![
@@ -46,7 +46,7 @@ proptest! {
         ]),
         before in prop::array::uniform18(0u16..2200),
     ) {
-        // Channels 1 to 8, receiver, channels 9 to 18: the order of the wire.
+        // Wire order: channels 1 to 8, receiver, channels 9 to 18.
         let mut payload = Vec::new();
         raw[..8].iter().for_each(|us| payload.extend(us.to_le_bytes()));
         payload.extend([1, 1]);
@@ -75,7 +75,7 @@ proptest! {
         let frame = Sender::new(VEHICLE).send(&message, &mut buffer).to_vec();
         decoder.feed(&frame, |_, message: Downlink| heard.push(message));
         prop_assert_eq!(&heard, &[message]);
-        // Number of channels, after time and eighteen of them; trailing zeros are not sent.
+        // The number of channels follows the time and eighteen channels; trailing zeros are not sent.
         let payload = &frame[10..frame.len() - 2];
         let count = us.iter().rposition(|us| *us != 0).map_or(0, |last| last + 1);
         prop_assert_eq!(payload.get(40).copied().unwrap_or(0), count as u8);

@@ -1,5 +1,5 @@
-//! How the seven parameters of a command are read, as MAVLink's common dialect numbers them, and that none which asks
-//! for something else is ignored in silence. A test of `afbc-station`, of the same name, asks what the vehicle does.
+//! Reading of a command's seven parameters, as numbered in MAVLink's common dialect. No parameter that requests
+//! something is silently ignored. A test of the same name in `afbc-station` checks what the vehicle does.
 
 use crate::wire::{raw, read, theirs};
 use afbc_link::{Command, Datum, Height, Place, Storage, Uplink};
@@ -8,7 +8,7 @@ use proptest::prelude::*;
 
 const NAN: f32 = f32::NAN;
 
-/// COMMAND_LONG (76): seven numbers, the command, and its receiver.
+/// Returns the command read from a COMMAND_LONG (76): seven numbers, command and receiver.
 fn long(id: u16, parameters: [f32; 7]) -> Command {
     let mut payload = [0; 33];
     for (bytes, number) in payload.chunks_exact_mut(4).zip(parameters) {
@@ -21,12 +21,12 @@ fn long(id: u16, parameters: [f32; 7]) -> Command {
     }
 }
 
-/// The first two numbers, all others 0.
+/// Returns the command with these first two numbers; the others are 0.
 fn two(id: u16, first: f32, second: f32) -> Command {
     long(id, [first, second, 0.0, 0.0, 0.0, 0.0, 0.0])
 }
 
-/// Commands with a valid set of numbers, and which of the seven they use.
+/// Returns commands with valid numbers, and the indices of the numbers that they use.
 fn valid() -> Vec<([f32; 7], Command, &'static [usize])> {
     let place = Place { latitude_e7: 470_000_000, longitude_e7: 80_000_000, height: at(500.0, Datum::Sea) };
     let (here, none): (_, &[usize]) = ([47.0, 8.0, 500.0], &[]);
@@ -62,7 +62,7 @@ fn first([a, b, c, d]: [f32; 4]) -> [f32; 7] {
     [a, b, c, d, 0.0, 0.0, 0.0]
 }
 
-/// Every number that a command does not use may be 0 or NaN; any other denies it.
+/// Every number that a command does not use may be 0 or NaN; any other value denies the command.
 #[test]
 fn no_number_is_ignored_in_silence() {
     for (parameters, expected, used) in valid() {
@@ -81,7 +81,7 @@ fn no_number_is_ignored_in_silence() {
 
 #[test]
 fn numbers_that_are_none_of_a_commands_deny_it() {
-    // (command, first and second number)
+    // (command, pairs of first and second number)
     for (id, numbers) in [
         (262, vec![(-1.0, 0.0), (256.0, 0.0), (0.5, 0.0), (NAN, 0.0)]),
         (510, vec![(-1.0, 0.0), (0.5, 0.0), (16_777_217.5, 0.0), (NAN, 0.0)]),
@@ -113,7 +113,7 @@ fn what_leaves_something_alone_is_read_so() {
         assert_eq!(two(245, 0.0, plans), Command::Storage(Storage::Load));
         assert_eq!(two(245, 2.0, plans), Command::Storage(Storage::Reset));
     }
-    // Never, at the usual rate, and at a rate; to nobody else.
+    // An interval of never, the default rate or a given rate; p7 selects the receiver and must be 0, 1 or 2.
     for (number, interval_us) in [(-1.0, -1), (-7.0, -1), (0.0, 0), (NAN, 0), (2e4, 20_000)] {
         assert_eq!(two(511, 30.0, number), Command::SetInterval { message: 30, interval_us });
     }
@@ -126,7 +126,7 @@ fn what_leaves_something_alone_is_read_so() {
             assert_eq!(read, if is_known { known } else { Command::Denied(id) }, "{id} to {to}");
         }
     }
-    // Through the air or over the ground, the throttle as it is; -2 is the usual speed, and the usual throttle.
+    // Airspeed or ground speed with unchanged throttle; -2 is the default speed or throttle.
     for kind in [0.0, 1.0] {
         for throttle in [0.0, -1.0, -2.0, NAN] {
             assert_eq!(long(178, first([kind, 5.0, throttle, 0.0])), Command::Speed(5.0));
@@ -136,7 +136,7 @@ fn what_leaves_something_alone_is_read_so() {
     }
 }
 
-/// SET_HOME_POSITION (243), which old stations send, has millimetres above the sea.
+/// SET_HOME_POSITION (243), which old ground stations send, has millimetres above the sea.
 #[test]
 fn a_home_of_old_stations_is_a_place_above_the_sea() {
     let [latitude, longitude] = [470_000_000, -80_000_000];
@@ -155,7 +155,7 @@ fn a_home_of_old_stations_is_a_place_above_the_sea() {
     }
 }
 
-/// The angle of a circle to its end, in whole degrees, the next one of half a degree.
+/// The angle of an orbit is rounded to whole degrees.
 #[test]
 fn a_circles_angle_is_rounded() {
     for (angle_deg, rounded) in [(0.0_f32, 0), (0.4, 0), (0.6, 1), (89.6, 90), (359.4, 359), (720.3, 720)] {
@@ -166,7 +166,7 @@ fn a_circles_angle_is_rounded() {
 }
 
 proptest! {
-    /// Places of COMMAND_LONG come in degrees, within 1e-7 degrees.
+    /// Positions in COMMAND_LONG are given in degrees; they are converted within 1e-7 degrees.
     #[test]
     fn degrees_become_whole_numbers(latitude in -89.0..89.0_f32, longitude in -179.0..179.0_f32) {
         let read = long(192, [-1.0, 0.0, 0.0, NAN, latitude, longitude, 500.0]);

@@ -1,4 +1,5 @@
-//! Commands by the `mavlink` crate's own serialiser: each parameter's meaning, and what is denied.
+//! Commands written by the `mavlink` crate's own serialiser: the meaning of each parameter, and the commands that are
+//! denied.
 
 use crate::wire::{bytes, raw, read, theirs};
 use afbc_link::telemetry::OrbitStatus;
@@ -34,7 +35,7 @@ fn commands() {
         let reboot = MavCmd::MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN;
         assert_eq!(read(reboot, 1.0, 0.0), Command::Reboot(Reboot::Program));
         assert_eq!(read(reboot, 3.0, 0.0), Command::Reboot(Reboot::BootLoader));
-        // Nothing, shut down, and what is neither.
+        // These values ask for nothing, for a shutdown, or are invalid.
         for param1 in [0.0, 2.0, 2.5, 4.0, -1.0, f32::NAN] {
             assert_eq!(read(reboot, param1, 0.0), Command::Denied(246));
         }
@@ -45,8 +46,8 @@ fn commands() {
     }
 }
 
-/// MAV_CMD_PREFLIGHT_CALIBRATION (241) by its parameters, as MAVLink's common dialect numbers them, and with those that
-/// MAVSDK leaves out, which are NaN.
+/// Parameters of MAV_CMD_PREFLIGHT_CALIBRATION (241), as numbered in MAVLink's common dialect. MAVSDK sends NaN for the
+/// parameters that it does not use.
 #[test]
 fn calibrations_are_read() {
     let read = |parameters: [f32; 7]| {
@@ -82,7 +83,7 @@ fn calibrations_are_read() {
             assert_eq!(read(parameters), Command::Calibrate(asked));
         }
     }
-    // Every other value of every parameter, and two at once: pressure, radio, airspeed, temperature, simple.
+    // Every other value of each parameter, and two parameters at once: pressure, radio, airspeed, temperature, simple.
     for place in 0..7 {
         for value in [-1.0, 0.5, 1.0, 2.0, 3.0, 4.0, f32::INFINITY] {
             let mut parameters = [0.0; 7];
@@ -95,8 +96,8 @@ fn calibrations_are_read() {
     }
 }
 
-/// A mode in parts, as MAVSDK sends it, and as a whole number, as MAVProxy and pymavlink do. Neither is taken for the
-/// other, and what is neither is denied.
+/// Modes come in parts, as MAVSDK sends them, or complete, as MAVProxy and pymavlink do. Neither form is taken for the
+/// other, and anything else is denied.
 #[test]
 fn modes_come_in_parts_or_whole() {
     let set_mode = |param1, param2, param3| {
@@ -122,7 +123,7 @@ fn modes_come_in_parts_or_whole() {
     }
 }
 
-/// Commands of any number, in a dialect or not, are read with their sender, so that they can be answered.
+/// Commands of any number, known or not, are read, so that they can be answered.
 #[test]
 fn every_command_is_read() {
     for id in 0..=u16::MAX {
@@ -134,7 +135,7 @@ fn every_command_is_read() {
             assert_eq!(matches!(expected, Command::Other(_)), !known, "{id}");
             assert_eq!(expected == Command::Disarm, id == 400);
             assert_eq!(expected == Command::Engage, id == 31_010);
-            // Without its trailing zeros.
+            // The same without trailing zeros.
             let again = read::<Uplink>(&raw(message, &payload[..30], extra_crc));
             assert_eq!(format!("{again:?}"), format!("{:?}", Ok::<_, Counters>(Uplink::Command(expected))));
             assert_eq!(expected.id(), id);
@@ -142,7 +143,7 @@ fn every_command_is_read() {
     }
 }
 
-/// Radius and speed give the direction together; NaN is the usual one, and what cannot be flown is denied.
+/// The signs of radius and speed give the direction together. NaN means the default, and impossible orbits are denied.
 #[test]
 fn circles_are_read_and_reported() {
     let (x, y, z, nan) = (473_977_420, 85_455_940, 12.5, f32::NAN);
@@ -168,7 +169,7 @@ fn circles_are_read_and_reported() {
     for [p1, p2, p3, p4] in [
         [f32::INFINITY, 2.0, 0.0, 0.0],
         [10.0, f32::INFINITY, 0.0, 0.0],
-        // By the sticks, and by nothing there is.
+        // Yaw by radio control, and invalid yaw behaviours.
         [10.0, 2.0, 4.0, 0.0],
         [10.0, 2.0, 6.0, 0.0],
         [10.0, 2.0, 0.5, 0.0],

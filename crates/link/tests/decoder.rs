@@ -31,13 +31,13 @@ fn messages() -> impl Strategy<Value = Uplink> {
     ]
 }
 
-/// Frames of `messages` from one sender.
+/// Returns the frames of `messages` from one sender.
 fn frames(messages: &[Uplink]) -> Vec<Vec<u8>> {
     let mut sender = Sender::new(STATION);
     messages.iter().map(|message| sender.send(message, &mut [0; FRAME_MAX]).to_vec()).collect()
 }
 
-/// Decoded messages of `chunks`, and the counts.
+/// Decodes `chunks`; returns the messages and counts.
 fn decode<'a>(chunks: impl IntoIterator<Item = &'a [u8]>) -> (Vec<Uplink>, Counters) {
     let mut decoder = Decoder::new(VEHICLE);
     let mut messages = Vec::new();
@@ -47,24 +47,24 @@ fn decode<'a>(chunks: impl IntoIterator<Item = &'a [u8]>) -> (Vec<Uplink>, Count
     (messages, *decoder.counters())
 }
 
-/// The longest frame there is \[bytes\]: with a signature.
+/// Length of the longest frame, which is signed \[bytes\].
 const LONGEST: usize = 280;
 
-/// Enough bytes to decide about everything before them.
+/// Enough bytes for the decoder to decide about everything before them.
 const FLUSH: [u8; LONGEST + 1] = [0; LONGEST + 1];
 
-/// The `CRC_EXTRA` of a message of the `common` dialect.
+/// Returns the `CRC_EXTRA` of a message of the `common` dialect.
 fn known_seed(id: u32) -> Option<u8> {
-    // COMPONENT_INFORMATION, and every message that the `mavlink` crate knows.
+    // All messages that the `mavlink` crate knows; only COMPONENT_INFORMATION has the seed 0.
     Some(MavMessage::extra_crc(id)).filter(|&seed| seed != 0 || id == 395)
 }
 
-/// The `CRC_EXTRA` of a message of the `common` dialect or of an invented other one.
+/// Returns the `CRC_EXTRA` of a message of the `common` dialect, or of an invented dialect.
 fn seed(id: u32) -> u8 {
     known_seed(id).unwrap_or(99)
 }
 
-/// The message in a frame that is not signed, without the fields that a newer dialect has appended.
+/// Returns the message in an unsigned frame, without fields that a newer dialect has appended.
 fn message_in(id: u32, payload: &[u8]) -> Option<Uplink> {
     let known = match id {
         0 => 9,
@@ -80,13 +80,13 @@ fn message_in(id: u32, payload: &[u8]) -> Option<Uplink> {
     Uplink::read(id, &payload[..payload.len().min(known)], VEHICLE).ok()
 }
 
-/// Messages in `stream` to be delivered according to the specification and the decoder's rules.
+/// Returns the messages that must be delivered from `stream` by the specification and the decoder's rules.
 fn expected(stream: &[u8]) -> Vec<Uplink> {
     let frames = reference::frames(stream, known_seed).into_iter();
     frames.filter(|frame| frame.flags == 0).filter_map(|frame| message_in(frame.id, &frame.payload)).collect()
 }
 
-/// Payloads with whole frames, parts of frames, start bytes and noise.
+/// Returns payloads of whole frames, parts of frames, start bytes and noise.
 fn nesting_payloads() -> impl Strategy<Value = Vec<u8>> {
     let noise = prop::collection::vec(prop_oneof![3 => any::<u8>(), 1 => Just(0xFD), 1 => Just(0)], 0..40);
     let frame = messages().prop_map(|message| frames(&[message]).concat()).boxed();
@@ -102,9 +102,9 @@ fn nesting_payloads() -> impl Strategy<Value = Vec<u8>> {
     })
 }
 
-/// A frame, and its message if it must be delivered: carried messages, FILE_TRANSFER_PROTOCOL among them; others, from
-/// TUNNEL and LOG_DATA to ones of no dialect, signed and unsigned; carried ones that are signed or longer; any of
-/// these damaged behind the header.
+/// Returns a frame, and its message if it must be delivered. Includes messages that the direction carries; other
+/// messages, from TUNNEL and LOG_DATA to unknown dialects, signed or not; carried messages that are signed or longer;
+/// and all of these with damage after the header.
 fn top_level() -> impl Strategy<Value = (Vec<u8>, Option<Uplink>)> {
     let carried = messages().prop_map(|message| (frames(&[message]).concat(), Some(message))).boxed();
     let id = prop_oneof![
@@ -121,7 +121,7 @@ fn top_level() -> impl Strategy<Value = (Vec<u8>, Option<Uplink>)> {
     let flags = prop_oneof![2 => Just(0), 2 => Just(1), 1 => any::<u8>()];
     let other = (id, flags, nesting_payloads(), any::<u8>())
         .prop_map(|(id, flags, payload, sequence)| {
-            // One that is carried is delivered itself, and nothing from within it.
+            // A carried message is delivered itself; nothing within it is.
             let message = if flags == 0 { message_in(id, &payload) } else { None };
             let frame = Frame { flags, sequence, system: 255, component: 190, id, payload };
             (frame.bytes(seed(id)), message)
@@ -139,7 +139,7 @@ fn top_level() -> impl Strategy<Value = (Vec<u8>, Option<Uplink>)> {
     prop_oneof![2 => carried, 2 => other, 1 => damaged]
 }
 
-/// Any content of a line: frames of all kinds, whole or cut at either end, noise.
+/// Returns any content of a line: frames of all kinds, whole or cut at either end, and noise.
 fn streams() -> impl Strategy<Value = Vec<u8>> {
     let index = any::<prop::sample::Index>;
     let cut = (top_level(), index(), index()).prop_map(|((bytes, _), from, to)| {
@@ -153,7 +153,7 @@ fn streams() -> impl Strategy<Value = Vec<u8>> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(1000))]
 
-    /// Arbitrary bytes cause no panic and no hang, and every byte is counted.
+    /// Arbitrary bytes cause no panic and no endless loop, and the counts are consistent.
     #[test]
     fn arbitrary_bytes_do_no_harm(bytes in prop::collection::vec(any::<u8>(), 0..2000)) {
         let (messages, counters) = decode([bytes.as_slice()]);
@@ -161,7 +161,7 @@ proptest! {
         prop_assert!(counters.skipped_bytes as usize <= bytes.len());
     }
 
-    /// The same for bytes that often look like the start of a frame.
+    /// Bytes that often look like the start of a frame do no harm either.
     #[test]
     fn bytes_that_resemble_frames_do_no_harm(
         bytes in prop::collection::vec(
@@ -173,7 +173,7 @@ proptest! {
         prop_assert_eq!(messages.len(), counters.received as usize);
     }
 
-    /// The result does not depend on how the stream is cut into pieces.
+    /// The result does not depend on how the stream is split.
     #[test]
     fn the_division_of_the_stream_makes_no_difference(
         messages in prop::collection::vec(messages(), 1..20),
@@ -196,7 +196,7 @@ proptest! {
         prop_assert_eq!(&decode(pieces), &whole);
     }
 
-    /// A frame behind any noise arrives before 280 bytes have followed the noise.
+    /// A frame after any noise arrives before 280 bytes have followed the noise.
     #[test]
     fn a_frame_behind_noise_arrives(noise in prop::collection::vec(any::<u8>(), 0..600), message in messages()) {
         let frame = frames(&[message]).concat();
@@ -205,8 +205,8 @@ proptest! {
         prop_assert!(counters.skipped_bytes as usize >= noise.len());
     }
 
-    /// Noise, including truncated frames, costs no frame that begins 280 bytes or more behind it, and nothing is
-    /// delivered that was not sent.
+    /// Noise, including truncated frames, costs no frame that begins at least 280 bytes after it. Nothing is delivered
+    /// that was not sent.
     #[test]
     fn noise_costs_no_frame_beyond_its_reach(
         before in messages(),
@@ -218,7 +218,8 @@ proptest! {
         let sent = frames(&[&[before, cut], after.as_slice()].concat());
         let part = &sent[1][..keep.index(sent[1].len())];
         for (noise, cut_only) in [(part, true), (&noise, false)] {
-            // Otherwise the next frame is noise, too: `a_truncated_frame_may_be_completed_by_the_start_of_the_next`.
+            // Excludes noise that the next frame's start byte completes to a valid frame.
+            // `a_truncated_frame_may_be_completed_by_the_start_of_the_next` tests that case.
             let intact = |end: &[u8]| reference::frames(&[noise, end].concat(), known_seed).len();
             prop_assume!(intact(&[]) == intact(&[0xFD]));
             let stream = [sent[0].as_slice(), noise, &sent[2..].concat(), &FLUSH].concat();
@@ -233,7 +234,7 @@ proptest! {
             prop_assert_eq!(messages[0], before);
             prop_assert!(messages.ends_with(far), "{} of {} and {}", messages.len(), near.len(), far.len());
             if cut_only {
-                // The truncated frame may have been completed by the first bytes of what follows.
+                // The first bytes after the truncated frame may have completed it.
                 let mut rest = [&[before, cut], after.as_slice()].concat().into_iter();
                 prop_assert!(messages.iter().all(|message| rest.any(|sent| sent == *message)));
                 prop_assert!(counters.lost as usize <= 1 + near.len());
@@ -241,8 +242,7 @@ proptest! {
         }
     }
 
-    /// In a stream of complete frames, the carried ones are delivered, each with its last byte or the first ones of the
-    /// next frame, and nothing from within a frame.
+    /// In a stream of complete frames, exactly the carried ones are delivered, and nothing from within a frame.
     #[test]
     fn a_frame_within_a_frame_is_not_looked_at(top in prop::collection::vec(top_level(), 0..20)) {
         let last = frames(&[Uplink::Heartbeat]).concat();
@@ -257,22 +257,22 @@ proptest! {
         prop_assert_eq!(decode([stream.as_slice()]).0, sent);
     }
 
-    /// A frame that cannot be checked does not delay the next one, whatever its content.
+    /// A frame that cannot be verified does not delay the next one, whatever its content.
     #[test]
     fn a_foreign_frame_does_not_delay_the_next((stranger, _) in top_level(), message in messages()) {
         let frame = frames(&[message]).concat();
         prop_assert_eq!(decode([stranger.as_slice(), &frame]).0.last().copied(), Some(message));
     }
 
-    /// The decoder delivers the same as the reference, for any content of the line.
+    /// The decoder delivers the same messages as the reference decoder, for any content of the line.
     #[test]
     fn the_reference_delivers_the_same(stream in streams()) {
         prop_assert_eq!(decode([stream.as_slice()]).0, expected(&stream));
     }
 }
 
-/// Found by chance: a frame whose checksum ends in 0xFD loses its last byte, and the first byte of the next frame
-/// completes it. The next frame then lacks its first byte.
+/// Found by a random test: a frame whose checksum ends in 0xFD loses its last byte, and the first byte of the next
+/// frame completes it. The next frame then lacks its first byte.
 #[test]
 fn a_truncated_frame_may_be_completed_by_the_start_of_the_next() {
     let x = 33.915_356;
@@ -285,8 +285,8 @@ fn a_truncated_frame_may_be_completed_by_the_start_of_the_next() {
     assert_eq!(counters.lost, 1);
 }
 
-/// Found by `scripts/soak`: a checksum of 16 bits is right by chance once in 65,536 times. Here a truncated request is
-/// completed by bytes of the next frame to a valid one, which is delivered.
+/// Found by `scripts/soak`: a 16-bit checksum is correct by chance once in 65,536 times. Here, bytes of the next frame
+/// complete a truncated command to another valid frame, which is delivered.
 #[test]
 fn a_truncated_frame_may_become_another_by_chance() {
     let state =
@@ -301,7 +301,7 @@ fn a_truncated_frame_may_become_another_by_chance() {
     assert_ne!(messages[1], state);
 }
 
-/// Every change of a single byte: the frame is not taken for another one, and its neighbours arrive.
+/// After any change of a single byte, the frame is dropped and its neighbours arrive.
 #[test]
 fn a_corrupted_frame_is_dropped() {
     let state = State { position_m: Vector3::new(1.0, 2.0, 3.0), ..State::default() };
@@ -327,7 +327,7 @@ fn a_corrupted_frame_is_dropped() {
     }
 }
 
-/// A frame with any payload and the right checksum.
+/// Returns a frame with any payload and the correct checksum.
 fn raw(id: u32, flags: u8, payload: &[u8], extra_crc: u8) -> Vec<u8> {
     let mut frame = vec![0xFD, payload.len() as u8, flags, 0, 0, 255, 190];
     frame.extend_from_slice(&id.to_le_bytes()[..3]);
@@ -365,14 +365,14 @@ fn each_cause_has_its_count() {
         (&elsewhere, Counters { elsewhere: 1, ..one }),
     ];
     for (frame, expected) in cases {
-        // The next frame is read as soon as it is complete.
+        // The next frame is delivered as soon as it is complete.
         let (messages, counters) = decode([frame.as_slice(), &heartbeat]);
         assert_eq!((messages.last(), counters), (Some(&Uplink::Heartbeat), expected));
     }
 }
 
-/// A message of a newer dialect, which has appended fields, is read without them: every message of either direction,
-/// at any length, signed or not.
+/// A message with fields appended by a newer dialect is read without them. Tests every message of either direction, at
+/// several lengths, signed and unsigned.
 #[test]
 fn fields_that_a_newer_dialect_appends_are_left_out() {
     fn one<M: Message + core::fmt::Debug>(id: u32) {
@@ -418,8 +418,9 @@ fn gaps_between_sequence_numbers_are_counted() {
     assert_eq!(decode([sent[9].as_slice(), &foreign, &sent[10]]).1.lost, 0, "two senders");
 }
 
-/// TUNNEL, FILE_TRANSFER_PROTOCOL and LOG_DATA for another system that contain a request to disarm, whatever follows;
-/// the same in a frame of a message of no dialect, signed or damaged, if a frame follows.
+/// TUNNEL, FILE_TRANSFER_PROTOCOL and LOG_DATA for another system, containing a disarm command: nothing within is
+/// delivered, whatever follows. In a frame of an unknown dialect or a damaged one, nothing is delivered if a frame
+/// follows.
 #[test]
 fn a_frame_that_carries_another_is_skipped_whole() {
     let disarm = frames(&[Uplink::Command(Command::Disarm)]).concat();
@@ -444,7 +445,7 @@ fn a_frame_that_carries_another_is_skipped_whole() {
     }
 }
 
-/// Messages that this direction does not carry cost neither a frame nor time, and do not count as lost.
+/// Messages that this direction does not carry cost no frame and no delay, and do not count as lost.
 #[test]
 fn a_stream_with_foreign_frames_loses_no_message() {
     let mut decoder = Decoder::new(VEHICLE);
@@ -452,7 +453,7 @@ fn a_stream_with_foreign_frames_loses_no_message() {
     for round in 0..=u8::MAX {
         for (sequence, id) in [(0, 66), (1, 21), (2, 110), (4, 42_000)] {
             let sequence = round.wrapping_mul(5).wrapping_add(sequence);
-            // Start bytes whose announced frames end beyond this frame.
+            // Start bytes that announce frames beyond the end of this frame.
             let payload = [[0xFD, 5].repeat(20), vec![round; 100]].concat();
             let stranger = Frame { flags: 0, sequence, system: 255, component: 190, id, payload };
             decoder.feed(&stranger.bytes(seed(id)), |_, message: Uplink| panic!("{message:?}"));
@@ -466,6 +467,6 @@ fn a_stream_with_foreign_frames_loses_no_message() {
             }
         }
     }
-    // Messages of another dialect cannot be checked and count as lost.
+    // Messages of another dialect cannot be verified and count as lost.
     assert_eq!(decoder.counters().lost, 255);
 }

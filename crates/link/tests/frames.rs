@@ -1,4 +1,4 @@
-//! Conversion of frames: known attitudes, and `f64` rotation matrices as the oracle.
+//! Conversion between frames, compared with known attitudes and with `f64` rotation matrices.
 
 use afbc_link::frames::{Odometry, flip};
 use afbc_types::State;
@@ -6,7 +6,7 @@ use core::f32::consts::{FRAC_PI_2, PI};
 use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 
-/// Rz(psi) Ry(theta) Rx(phi), from the definition in `afbc-types`, in `f64`.
+/// Returns Rz(psi) Ry(theta) Rx(phi) in `f64`, from the definition in `afbc-types`.
 fn r_earth_body(attitude: &Vector3<f32>) -> Matrix3<f64> {
     let [phi, theta, psi] = attitude.map(f64::from).into();
     let about = |axis, angle| *Rotation3::from_axis_angle(&axis, angle).matrix();
@@ -17,7 +17,7 @@ fn rotation_of(q: &Quaternion<f32>) -> Matrix3<f64> {
     *UnitQuaternion::from_quaternion(q.cast()).to_rotation_matrix().matrix()
 }
 
-/// A state at rest at the origin.
+/// Returns a state at rest at the origin with this attitude.
 fn with_attitude(attitude: [f32; 4]) -> Odometry {
     let zero = Vector3::zeros();
     Odometry { position_m: zero, attitude, velocity_m_s: zero, rates_rad_s: zero }
@@ -26,7 +26,7 @@ fn with_attitude(attitude: [f32; 4]) -> Odometry {
 #[test]
 fn known_attitudes() {
     let half = core::f32::consts::FRAC_1_SQRT_2;
-    // (the wire's quaternion, its meaning there, roll, pitch and yaw in the workspace's frames)
+    // (quaternion on the wire, its meaning, roll, pitch and yaw in the workspace's frames)
     let cases = [
         ([1.0, 0.0, 0.0, 0.0], "level, nose north", [0.0, 0.0, 0.0]),
         ([half, 0.0, 0.0, half], "nose east: to the right", [0.0, 0.0, -FRAC_PI_2]),
@@ -48,14 +48,14 @@ fn positive_pitch_of_ours_tilts_the_thrust_forwards() {
     let state = State { attitude_rad: Vector3::new(0.0, 0.1, 0.0), ..State::default() };
     let thrust_earth = r_earth_body(&state.attitude_rad) * Vector3::z();
     assert!(thrust_earth.x > 0.0);
-    // On the wire the nose is down: the body's x axis points towards positive z (down).
+    // On the wire the nose is down: the body's x axis has a component along positive z (down).
     let [w, x, y, z] = Odometry::from_state(&state).attitude;
     assert!((rotation_of(&Quaternion::new(w, x, y, z)) * Vector3::x()).z > 0.0);
 }
 
 #[test]
 fn velocity_is_in_the_child_frame() {
-    // Nose east, flying forwards at 1 m/s and sinking at 2 m/s: towards -y and -z in the workspace's frame.
+    // Nose east, flying forward at 1 m/s and sinking at 2 m/s, which is along -y and -z in the workspace's frame.
     let half = core::f32::consts::FRAC_1_SQRT_2;
     let mut odometry = with_attitude([half, 0.0, 0.0, half]);
     odometry.velocity_m_s = Vector3::new(1.0, 0.0, 2.0);
@@ -86,14 +86,15 @@ fn what_is_no_rotation_is_refused() {
     assert_eq!(far.to_state(), None);
 }
 
-/// Largest change of a velocity by being turned into the body frame and back \[m/s\]. A turn v + 2w(q x v) + 2q x (q x
-/// v) rounds some ten times, each time by at most half of EPSILON of the speed, and twice as much comes from |q|, which
-/// is 1 to two roundings and counts squared: 8 EPSILON of the speed per turn.
+/// Returns the largest rounding error of a velocity that is rotated into the body frame and back \[m/s\]. A rotation v
+/// + 2w(q x v) + 2q x (q x v) rounds about ten times, each by at most half of EPSILON times the speed. Twice as much
+/// comes from |q|, which is 1 within two roundings and enters squared. In total, 8 EPSILON times the speed per
+/// rotation.
 fn rotated_twice(state: &State) -> f32 {
     16.0 * f32::EPSILON * state.velocity_m_s.norm()
 }
 
-/// Found by the property below when its bound was an absolute number.
+/// Found by `states_survive_the_link` when its bound was an absolute number.
 #[test]
 fn a_fast_state_survives_the_link() {
     let state = State {
@@ -109,7 +110,7 @@ fn a_fast_state_survives_the_link() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(2000))]
 
-    /// A state is converted to the wire and back with rounding errors only.
+    /// Conversion to the wire and back changes a state only by rounding.
     #[test]
     fn states_survive_the_link(
         position in prop::array::uniform3(-1e3f32..1e3),

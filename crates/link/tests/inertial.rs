@@ -1,4 +1,4 @@
-//! HIGHRES_IMU, against the `mavlink` crate's own reading of it.
+//! HIGHRES_IMU, compared with the `mavlink` crate's own decoding.
 
 use afbc_link::{Address, Decoder, Downlink, FRAME_MAX, InertialSample, Sender};
 use mavlink::dialects::common::HIGHRES_IMU_DATA;
@@ -18,7 +18,7 @@ fn sample(field_ut: Option<Vector3<f32>>) -> InertialSample {
     }
 }
 
-/// Forward, right, down; gauss; only what there is counts as updated.
+/// Axes are forward, right, down; the field is in gauss; only measured fields count as updated.
 #[test]
 fn it_is_what_others_read() {
     for (field_ut, [x, y, z], updated) in
@@ -36,7 +36,7 @@ fn it_is_what_others_read() {
     }
 }
 
-/// What is sent is read again, by its own decoder only; what is not finite, or not said to be measured, is dropped.
+/// A sample survives encoding and decoding, only by its own decoder. Samples with infinite or NaN numbers are dropped.
 #[test]
 fn it_is_read_again() {
     let mut buffer = [0; FRAME_MAX];
@@ -57,7 +57,7 @@ fn it_is_read_again() {
 }
 
 proptest! {
-    /// No bytes make it panic, or come out as anything but a message of finite numbers.
+    /// Any bytes cause no panic, and give only samples of finite numbers.
     #[test]
     fn any_bytes_are_taken(bytes in prop::collection::vec(any::<u8>(), 0..600)) {
         let mut decoder = Decoder::<InertialSample>::new(STATION);

@@ -1,4 +1,4 @@
-//! Every message of both directions: whatever payload is understood, what was understood of it can be sent on.
+//! For every message of both directions: a payload that can be read can also be written with the same content.
 
 use afbc_link::{Address, Command, Decoder, Downlink, FRAME_MAX, Message, Sender, Transfer, Uplink};
 use core::fmt::Debug;
@@ -6,12 +6,12 @@ use proptest::prelude::*;
 
 const VEHICLE: Address = Address { system: 1, component: 1 };
 
-/// Numbers of all messages of a direction.
+/// Returns the ids of all messages of a direction.
 fn ids<M: Message>() -> Vec<u32> {
     (0..20_000).filter(|id| M::format(*id).is_some()).collect()
 }
 
-/// Bytes of which many are floating-point numbers of moderate size, or small integers.
+/// Returns bytes that often contain floating-point numbers of moderate size, or small integers.
 fn payloads() -> impl Strategy<Value = Vec<u8>> {
     let word = prop_oneof![
         any::<u32>().prop_map(u32::to_le_bytes),
@@ -27,7 +27,7 @@ fn payloads() -> impl Strategy<Value = Vec<u8>> {
     })
 }
 
-/// Checks the messages of a direction with this payload; returns how many were understood.
+/// Reads this payload as each message of a direction and writes each result again; returns the number of readable ones.
 fn check<M: Message + Debug>(payload: &[u8]) -> usize {
     let understood = ids::<M>().into_iter().filter_map(|id| {
         let length = M::format(id).expect("known").length_max;
@@ -39,7 +39,7 @@ fn check<M: Message + Debug>(payload: &[u8]) -> usize {
             let bytes = Sender::new(VEHICLE).send(&message, &mut buffer);
             let mut again = Vec::new();
             Decoder::<M>::new(VEHICLE).feed(bytes, |_, message| again.push(message));
-            // As text, since NaN differs from itself.
+            // Compares as text, since NaN differs from itself.
             assert_eq!(format!("{again:?}"), format!("{:?}", [&message]));
         })
         .count()
@@ -54,7 +54,7 @@ proptest! {
         prop_assert!(check::<Downlink>(&payload) > 10, "telemetry has no invalid numbers");
     }
 
-    /// Parameters of any kind: a command is what it is, denied or unknown, and is so again.
+    /// For any parameters, a command stays the same when it is written and read again, also if denied or unknown.
     #[test]
     fn commands_survive(
         numbers in prop::array::uniform7(prop_oneof![
@@ -77,7 +77,7 @@ proptest! {
     }
 }
 
-/// Each direction carries what docs/station.md names, and not more: a message that is forgotten there fails.
+/// Each direction carries exactly the messages that docs/station.md lists; a change must be made in both places.
 #[test]
 fn the_messages_are_these() {
     assert_eq!(

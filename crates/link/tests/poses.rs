@@ -1,4 +1,4 @@
-//! Poses of a tracker: bytes from the specification, frames with `f64` rotation matrices as the oracle, covariances.
+//! Poses of a tracker: bytes from the specification, conversion compared with `f64` rotation matrices, covariances.
 
 use afbc_link::{Address, Counters, Decoder, FRAME_MAX, Sender, Uplink};
 use afbc_types::{Pose, PoseSigmas, State};
@@ -8,12 +8,12 @@ use proptest::prelude::*;
 const STATION: Address = Address { system: 255, component: 190 };
 const VEHICLE: Address = Address { system: 1, component: 1 };
 
-/// Number and checksum's seed of VISION_POSITION_ESTIMATE, ATT_POS_MOCAP and ODOMETRY.
+/// Id and checksum seed of VISION_POSITION_ESTIMATE, ATT_POS_MOCAP and ODOMETRY.
 const VISION: (u32, u8) = (102, 158);
 const MOCAP: (u32, u8) = (138, 109);
 const ODOMETRY: (u32, u8) = (331, 91);
 
-/// The one message of a frame with this payload, or the counts.
+/// Returns the only message in a frame with this payload, or the counts.
 fn read((id, seed): (u32, u8), payload: &[u8]) -> Result<Uplink, Counters> {
     let mut frame = vec![0xFD, payload.len() as u8, 0, 0, 0, 255, 190];
     frame.extend_from_slice(&id.to_le_bytes()[..3]);
@@ -34,7 +34,7 @@ fn receive(frame: &[u8]) -> Result<Uplink, Counters> {
     }
 }
 
-/// Time 77 us and the numbers.
+/// Returns a payload with the time 77 us, followed by the numbers.
 fn payload(numbers: &[f32]) -> Vec<u8> {
     let numbers = numbers.iter().flat_map(|number| number.to_le_bytes());
     77_u64.to_le_bytes().into_iter().chain(numbers).collect()
@@ -55,17 +55,17 @@ fn sigmas(message: Result<Uplink, Counters>) -> PoseSigmas {
     }
 }
 
-/// All messages that carry a pose, level at the origin, with this covariance.
+/// Returns the readings of all messages with a pose, level at the origin, with this covariance.
 fn with_covariance(covariance: &[f32; 21]) -> [Result<Uplink, Counters>; 3] {
     let vision = payload(&[[0.0; 6].as_slice(), covariance].concat());
     let mocap = payload(&[&[1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0], covariance.as_slice()].concat());
     let odometry = [&[0.0; 3], [1.0, 0.0, 0.0, 0.0].as_slice(), &[0.0; 6], covariance, &[0.0; 21]].concat();
-    // MAV_FRAME_LOCAL_NED, MAV_FRAME_BODY_FRD.
+    // Frames MAV_FRAME_LOCAL_NED and MAV_FRAME_BODY_FRD.
     let odometry = [payload(&odometry), vec![1, 12]].concat();
     [read(VISION, &vision), read(MOCAP, &mocap), read(ODOMETRY, &odometry)]
 }
 
-/// Upper triangle, row by row, of a matrix with this diagonal and `other` everywhere else.
+/// Returns the upper triangle, row by row, of a matrix with this diagonal and `other` everywhere else.
 fn triangle(diagonal: [f32; 6], other: f32) -> [f32; 21] {
     let cells = (0..6).flat_map(|row| (row..6).map(move |column| (row, column)));
     let mut places = cells.map(|(row, column)| if row == column { diagonal[row] } else { other });
@@ -74,7 +74,7 @@ fn triangle(diagonal: [f32; 6], other: f32) -> [f32; 21] {
 
 #[test]
 fn known_poses() {
-    // (roll, pitch and yaw on the wire, their meaning there, the directions of nose and left wing in x, y, z of ours)
+    // (roll, pitch and yaw on the wire, their meaning, directions of nose and left wing in the workspace's x, y, z)
     let quarter = core::f32::consts::FRAC_PI_2;
     let cases = [
         ([0.0; 3], "level, nose north", [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]),
@@ -101,7 +101,7 @@ fn rotation([w, x, y, z]: [f32; 4]) -> Matrix3<f64> {
     *UnitQuaternion::from_quaternion(q).to_rotation_matrix().matrix()
 }
 
-/// A pose at rest, as a vehicle's tracker sends it by each of the messages, is the same pose.
+/// The same pose at rest, sent by each of the messages, gives the same result.
 #[test]
 fn all_messages_agree() {
     let state = State {
@@ -130,7 +130,7 @@ fn the_largest_variance_counts() {
     for place in 0..3 {
         let mut diagonal = [0.01, 0.01, 0.01, 0.0004, 0.0004, 0.0004];
         (diagonal[place], diagonal[3 + place]) = (0.25, 0.0625);
-        // What is not on the diagonal does not count, whatever it is.
+        // Numbers off the diagonal do not count, whatever they are.
         for other in [0.0, 99.0, -99.0, f32::NAN] {
             for message in with_covariance(&triangle(diagonal, other)) {
                 let expected = PoseSigmas { position_m: Some(0.5), attitude_rad: Some(0.25) };
@@ -147,7 +147,7 @@ fn an_unusable_covariance_is_unknown() {
         for place in 0..6 {
             let mut diagonal = known;
             diagonal[place] = bad;
-            // NaN in the first place means that all is unknown.
+            // NaN in the first place means that the whole covariance is unknown.
             let none = place == 0 && bad.is_nan();
             let expected = PoseSigmas {
                 position_m: Some(1.0).filter(|_| place >= 3),
@@ -186,7 +186,7 @@ fn each_number_of_a_pose_that_is_not_finite_is_counted() {
     }
 }
 
-/// As long as the specification says, shorter without trailing zeros, or longer by what a newer dialect appends.
+/// Payloads may have the specified length, be shorter without trailing zeros, or longer by fields of a newer dialect.
 #[test]
 fn lengths() {
     for (message, longest, first) in [(VISION, 117, 0.0_f32), (MOCAP, 120, 1.0)] {
@@ -200,7 +200,7 @@ fn lengths() {
         payload.push(7);
         assert_eq!(pose(read(message, &payload)), Pose::default());
     }
-    // The reset counter is the last byte.
+    // The last byte is the reset counter.
     let mut payload = payload(&[0.0; 27]);
     payload.push(200);
     assert_eq!(pose(read(VISION, &payload)), Pose::default());
@@ -209,7 +209,7 @@ fn lengths() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(2000))]
 
-    /// A pose is read as it was written, to the bit.
+    /// A pose survives writing and reading exactly.
     #[test]
     fn poses_survive_the_link(
         sent_us: u64,
@@ -226,7 +226,7 @@ proptest! {
         prop_assert_eq!(receive(Sender::new(STATION).send(&sent, &mut [0; FRAME_MAX])), Ok(sent));
     }
 
-    /// Half a turn about x on both sides of the wire's rotation matrix Rz(yaw) Ry(pitch) Rx(roll).
+    /// The result is the wire's rotation matrix Rz(yaw) Ry(pitch) Rx(roll) with half a turn about x on both sides.
     #[test]
     fn angles_mean_the_wires_rotation(
         position in prop::array::uniform3(-1e3f32..1e3),

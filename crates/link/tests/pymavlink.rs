@@ -1,5 +1,5 @@
-//! Frames of MAVLink's reference implementation (`reference/frames.py`): read as they should be, and written again
-//! with the same bytes.
+//! Frames from MAVLink's reference implementation (`reference/frames.py`) are read correctly, and written again with
+//! the same bytes.
 
 use afbc_link::telemetry::{
     ActuatorOutputs, AttitudeQuaternion, BatteryStatus, EstimatorStatus, Fix, GlobalOrigin, GlobalPosition, Home,
@@ -24,7 +24,7 @@ fn frame(name: &str) -> Vec<u8> {
     (0..hex.len()).step_by(2).map(|at| u8::from_str_radix(&hex[at..at + 2], 16).expect("hex")).collect()
 }
 
-/// Checks that the frame is read as `expected`; as text, since NaN differs from itself.
+/// Checks that the frame is read as `expected`. Compares as text, since NaN differs from itself.
 fn check<M: Message + core::fmt::Debug>(name: &str, expected: &M) {
     let mut heard = Vec::new();
     let mut decoder = Decoder::<M>::new(VEHICLE);
@@ -32,7 +32,7 @@ fn check<M: Message + core::fmt::Debug>(name: &str, expected: &M) {
     assert_eq!(format!("{heard:?}"), format!("{:?}", [(STATION, expected)]), "{name}: {:?}", decoder.counters());
 }
 
-/// Checks that `message` is read from the frame, and gives the same frame.
+/// Checks that the frame is read as `message`, and that writing `message` gives the same frame.
 fn check_both(name: &str, message: &Downlink) {
     check(name, message);
     assert_eq!(Sender::new(STATION).send(message, &mut [0; FRAME_MAX]), frame(name), "{name}");
@@ -148,7 +148,7 @@ fn places_are_read_and_written() {
     let (place_e7, altitude_mm, time_us) = ([1, 2], 3, 99);
     both("<GPS_GLOBAL_ORIGIN", Telemetry::Origin(GlobalOrigin { place_e7, altitude_mm, time_us }));
     let (position_m, attitude) = (Vector3::new(4.0, -5.0, -6.0), [1.0, 0.0, -0.0, -0.0]);
-    // Read alone: zeros change their signs with the frames.
+    // Only reading is tested, since the conversion changes the signs of zeros.
     check(
         "<HOME_POSITION",
         &Downlink::Telemetry(Telemetry::Home(Home { place_e7, altitude_mm, position_m, attitude, time_us })),

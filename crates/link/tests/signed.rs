@@ -1,4 +1,5 @@
-//! Signatures: those of MAVLink's reference implementation (`reference/signed.py`), and what a changed bit does.
+//! Signatures match those of MAVLink's reference implementation (`reference/signed.py`), and any changed bit is
+//! detected.
 
 use afbc_link::{Address, Decoder, Downlink, Key, Message, SIGNED_FRAME_MAX, Sender, Stamp, Uplink};
 use proptest::prelude::*;
@@ -28,7 +29,7 @@ fn signed() -> Vec<Signed> {
     lines.map(read).collect()
 }
 
-/// Decodes with this key; returns the stamps and messages.
+/// Decodes with this key; returns link ids, timestamps and messages.
 fn decode<M: Message>(frame: &[u8], key: Key) -> Vec<(Stamp, M)> {
     let (mut stamps, mut messages) = (Vec::new(), Vec::new());
     let accept = |frame: &afbc_link::ReceivedFrame<'_>| {
@@ -48,13 +49,13 @@ fn check<M: Message + core::fmt::Debug>(signed: &Signed) {
     let heard = decode::<M>(bytes, *key);
     let [(stamp, message)] = &heard[..] else { panic!("{name}: {heard:?}") };
     assert_eq!(stamp.time_10us, *time_10us, "{name}");
-    // The key's other 31 bytes are right.
+    // A key that differs in one bit is refused.
     let mut other = *key;
     other.0[31] ^= 1;
     assert!(decode::<M>(bytes, other).is_empty(), "{name}");
-    // Nothing is delivered of it without a key.
+    // Without a key, nothing is delivered from the frame.
     Decoder::<M>::new(VEHICLE).feed(bytes, |_, message| panic!("{name}: {message:?}"));
-    // The same message gives the same frame, if it is written with the same fields.
+    // Signing the message again gives the same frame, except for messages that this crate writes with other fields.
     if !matches!(*name, "HEARTBEAT" | "SET_MODE" | "SETUP_SIGNING") {
         let mut buffer = [0; SIGNED_FRAME_MAX];
         assert_eq!(Sender::new(STATION).send_signed(message, Some((key, *stamp)), &mut buffer), bytes, "{name}");
@@ -81,7 +82,7 @@ fn a_key_that_is_all_zero_is_none() {
 }
 
 proptest! {
-    /// Any change of any bit of a signed frame, its signature or its key is found.
+    /// Any changed bit in a signed frame, its signature or its key is detected.
     #[test]
     fn a_changed_bit_is_found(
         key in any::<[u8; 32]>(),

@@ -1,5 +1,5 @@
-//! Targets of a companion and items of a mission by the `mavlink` crate's own serialiser: which numbers a mask takes
-//! away, and which are refused.
+//! Targets of a companion computer and mission items, written by the `mavlink` crate's own serialiser: which numbers a
+//! type mask removes, and which numbers are refused.
 
 use crate::wire::{read, theirs};
 use afbc_link::{ExternalTarget, Mission, Uplink};
@@ -9,7 +9,7 @@ use mavlink::dialects::common::{
 };
 use proptest::prelude::*;
 
-/// An attitude, a rate of yaw, a thrust; with this mask.
+/// Returns the target read for an attitude, yaw rate and thrust with this type mask.
 fn attitude(q: [f32; 4], body_yaw_rate: f32, thrust: f32, mask: u8) -> Option<ExternalTarget> {
     let type_mask = AttitudeTargetTypemask::from_bits_retain(mask);
     let data = SET_ATTITUDE_TARGET_DATA { q, body_yaw_rate, thrust, type_mask, ..SET_ATTITUDE_TARGET_DATA::DEFAULT };
@@ -19,7 +19,7 @@ fn attitude(q: [f32; 4], body_yaw_rate: f32, thrust: f32, mask: u8) -> Option<Ex
     }
 }
 
-/// A place with velocity, acceleration and yaw; with this mask.
+/// Returns the target read for a position with this type mask; velocity, acceleration and yaw are 0.
 fn place(mask: u16, [lat_int, lon_int]: [i32; 2], alt: f32) -> Option<ExternalTarget> {
     let data = SET_POSITION_TARGET_GLOBAL_INT_DATA {
         lat_int,
@@ -36,7 +36,7 @@ fn place(mask: u16, [lat_int, lon_int]: [i32; 2], alt: f32) -> Option<ExternalTa
 }
 
 const LEVEL: [f32; 4] = [1.0, 0.0, 0.0, 0.0];
-/// Rates of roll and pitch are ignored; bit 2 is that of yaw.
+/// Type mask that ignores the rates of roll and pitch; bit 2 ignores the yaw rate.
 const NO_RATES: u8 = 0b11;
 const NO_YAW_RATE: u8 = 0b100;
 
@@ -53,20 +53,20 @@ fn a_rate_that_is_ignored_may_be_anything() {
         let Some(ExternalTarget::Attitude(target)) = ignored else { panic!("{ignored:?}") };
         assert!(target.yaw_rate_rad_s.is_nan());
     }
-    // Without thrust, without attitude, and with thrust along all axes it is no target.
+    // A target without thrust, without attitude, or with thrust along all axes is not supported.
     for mask in [0b10_0000, 0b100_0000, 0b1000_0000] {
         assert!(attitude(LEVEL, 0.0, 0.5, NO_RATES | mask).is_none(), "{mask:b}");
     }
     for (thrust, is_taken) in [(0.0, true), (1.0, true), (-0.01, false), (1.01, false), (f32::NAN, false)] {
         assert_eq!(attitude(LEVEL, 0.0, thrust, NO_RATES).is_some(), is_taken, "{thrust}");
     }
-    // Of a quaternion near one, whose length is to be mended; not of one that is none.
+    // A quaternion's norm may be off by a factor of two; beyond that it is refused.
     for (w, is_taken) in [(1.0, true), (0.51, true), (1.99, true), (0.49, false), (2.01, false), (f32::NAN, false)] {
         assert_eq!(attitude([w, 0.0, 0.0, 0.0], 0.0, 0.5, NO_RATES).is_some(), is_taken, "{w}");
     }
 }
 
-/// Bits 0 to 2 of the mask take latitude, longitude and height away, 3 to 8 velocity and acceleration, 10 and 11 yaw.
+/// Type mask: bits 0 to 2 remove latitude, longitude and height, 3 to 8 velocity and acceleration, 10 and 11 yaw.
 #[test]
 fn a_mask_takes_away_what_it_says() {
     const NO_MOTION: u16 = 0b1101_1111_1000;
@@ -87,14 +87,14 @@ fn a_mask_takes_away_what_it_says() {
             assert!(motion.yaw_rad.is_nan() && motion.yaw_rate_rad_s.is_nan());
         }
     }
-    // A height that counts is a number; one that is ignored need be none.
+    // A used height must be a number; an ignored one may be NaN.
     assert!(place(NO_MOTION, [470_000_000, 80_000_000], f32::NAN).is_none());
     assert!(place(NO_MOTION | 4, [470_000_000, 80_000_000], f32::NAN).is_some());
 }
 
 proptest! {
-    /// Old stations send degrees, and metres of a local frame, as floating-point numbers: to the nearest unit, on both
-    /// sides of zero.
+    /// Old ground stations send degrees, or metres in a local frame, as floats. They are rounded to the nearest unit on
+    /// both sides of zero.
     #[test]
     fn items_of_old_stations_are_rounded(x in -90.0..90.0_f32, y in -180.0..180.0_f32, seq: u16, current in 0..2_u8) {
         for (frame, units) in [(MavFrame::MAV_FRAME_GLOBAL_RELATIVE_ALT, 1e7), (MavFrame::MAV_FRAME_LOCAL_NED, 1e4)] {

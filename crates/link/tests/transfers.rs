@@ -1,4 +1,4 @@
-//! Files and logs on the wire, beside the `mavlink` crate's own idea of them.
+//! Files and logs on the wire, compared with the `mavlink` crate's decoding.
 
 use afbc_link::{
     Address, ComponentMetadata, Decoder, FRAME_MAX, FileOpcode, FilePacket, LogData, LogEntry, LogMessage, LogRequest,
@@ -12,7 +12,7 @@ use proptest::prelude::*;
 const VEHICLE: Address = Address { system: 1, component: 1 };
 const STATION: Address = Address { system: 255, component: 190 };
 
-/// Returns the message as the `mavlink` crate reads it, after it has been read back by this one.
+/// Checks that this crate decodes the message it wrote; returns the message as the `mavlink` crate decodes it.
 fn as_others_read(message: &Transfer) -> MavMessage {
     let mut buffer = [0; FRAME_MAX];
     let frame = Sender::new(VEHICLE).send(message, &mut buffer);
@@ -36,7 +36,7 @@ fn files_have_the_protocols_payload() {
         panic!("another")
     };
     assert_eq!((read.target_network, read.target_system, read.target_component), (0, 255, 190));
-    // Number, session, operation, size, operation that is answered, "burst complete", padding, offset, data.
+    // Sequence number, session, opcode, size, requested opcode, "burst complete", padding, offset, data.
     let head = [0x34, 0x12, 7, 128, 239, 15, 1, 0, 0xEF, 0xCD, 0xAB, 0x89];
     assert_eq!(read.payload[..12], head);
     assert_eq!(read.payload[12..], data);
@@ -68,11 +68,11 @@ fn metadata_has_its_address() {
     assert_eq!((read.time_boot_ms, read.general_metadata_file_crc), (9, 0xDEAD_BEEF));
     assert_eq!(read.general_metadata_uri.to_str().expect("text"), uri);
     assert_eq!(read.peripherals_metadata_file_crc, 0);
-    // A longer address is cut.
+    // A longer URI is cut off.
     assert!(ComponentMetadata::at(&"x".repeat(200), 0).uri.iter().all(|byte| *byte == b'x'));
 }
 
-/// Requests that have no answer reach the vehicle, too: LOG_ERASE (121) and LOG_REQUEST_END (122).
+/// The vehicle also reads requests without an answer: LOG_ERASE (121) and LOG_REQUEST_END (122).
 #[test]
 fn logs_are_erased_and_ended_by_request() {
     for (request, id) in [(LogRequest::Erase, 121), (LogRequest::End, 122)] {
@@ -88,7 +88,7 @@ fn logs_are_erased_and_ended_by_request() {
 }
 
 proptest! {
-    /// Each message comes with the payload that it was read from, wherever the bytes are cut and whatever is between.
+    /// Each message is delivered with its own payload, however the stream is split and whatever noise is in it.
     #[test]
     fn payloads_come_with_their_messages(data in vec(any::<u8>(), 0..239), noise in vec(any::<u8>(), 0..40), cut: u8) {
         let packet = FilePacket::request(5, FileOpcode::WRITE_FILE, 1, 77, 0).with(&data);
@@ -96,7 +96,7 @@ proptest! {
         let mut buffer = [0; FRAME_MAX];
         let mut sender = Sender::new(STATION);
         for _ in 0..2 {
-            // A start byte would hold back what follows.
+            // Removes start bytes from the noise, since they would delay the following frames.
             stream.extend(noise.iter().filter(|byte| **byte != 0xFD));
             stream.extend_from_slice(sender.send(&Transfer::File { packet, to: VEHICLE }, &mut buffer));
             stream.extend_from_slice(sender.send(&Uplink::Heartbeat, &mut buffer));

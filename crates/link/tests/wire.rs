@@ -1,5 +1,5 @@
-//! Bytes on the wire compared with the `mavlink` crate's own serialiser, and with the specification where that crate
-//! has none: extension fields, masks, frames, targets.
+//! Bytes on the wire, compared with the `mavlink` crate's own serialiser, and with the specification for anything that
+//! the crate lacks: extension fields, masks, frames, targets.
 
 use afbc_link::{
     Address, Answer, Axes, Command, Counters, Decoder, Downlink, ExternalTarget, FRAME_MAX, HealthArray, MavCmd,
@@ -21,14 +21,14 @@ pub fn bytes(message: &impl Message) -> Vec<u8> {
     Sender::new(STATION).send(message, &mut [0; FRAME_MAX]).to_vec()
 }
 
-/// A frame encoded by the `mavlink` crate.
+/// Returns a frame encoded by the `mavlink` crate.
 pub fn theirs(data: &impl MessageData) -> Vec<u8> {
     let mut raw = MAVLinkV2MessageRaw::new();
     raw.serialize_message_data(MavHeader { system_id: 255, component_id: 190, sequence: 0 }, data);
     raw.raw_bytes().to_vec()
 }
 
-/// The one message in `bytes`, or the counts.
+/// Returns the only message in `bytes`, or the counts.
 pub fn read<M: Message + Clone>(bytes: &[u8]) -> Result<M, Counters> {
     let mut decoder = Decoder::<M>::new(VEHICLE);
     let mut messages = Vec::new();
@@ -40,7 +40,7 @@ pub fn read<M: Message + Clone>(bytes: &[u8]) -> Result<M, Counters> {
     messages.pop().ok_or(*decoder.counters())
 }
 
-/// A frame with any payload and the right checksum, built from the specification.
+/// Returns a frame with any payload and the correct checksum, built from the specification.
 pub fn raw(id: u32, payload: &[u8], extra_crc: u8) -> Vec<u8> {
     let mut frame = vec![0xFD, payload.len() as u8, 0, 0, 0, 255, 190];
     frame.extend_from_slice(&id.to_le_bytes()[..3]);
@@ -89,7 +89,7 @@ fn bytes_are_the_mavlink_crates() {
         COMMAND_LONG_DATA { command: MavCmd::MAV_CMD_COMPONENT_ARM_DISARM, param1: 1.0, ..COMMAND_LONG_DATA::DEFAULT };
     assert_eq!(bytes(&Uplink::Command(Command::Arm)), theirs(&command));
 
-    // Command 31010, which has no parameters.
+    // Command 31010 has no parameters.
     let command = COMMAND_LONG_DATA { command: MavCmd::MAV_CMD_USER_1, ..COMMAND_LONG_DATA::DEFAULT };
     let engage = Uplink::Command(Command::Engage);
     assert_eq!(bytes(&engage), theirs(&command));
@@ -115,7 +115,7 @@ fn answers_carry_their_extension_fields() {
         to: Address { system: 255, component: 190 },
     };
     let frame = bytes(&answer);
-    // Command 400, temporarily rejected, no progress, result_param2, target.
+    // Command 400, temporarily rejected, no progress, result_param2, receiver.
     assert_eq!(frame[10..20], [0x90, 0x01, 1, 0, 4, 3, 2, 1, 255, 190]);
     assert_eq!(read(&frame), Ok(answer));
 }
@@ -183,7 +183,7 @@ fn odometry_in_another_frame_or_failed_is_unsupported() {
 
     let mut payload = [0; 233];
     odometry().ser(mavlink::MavlinkVersion::V2, &mut payload);
-    // Reset counter, type of the estimator, quality in percent: -1 means that odometry has failed.
+    // Reset counter, type of estimator, quality in percent; -1 means that odometry has failed.
     payload[230..].copy_from_slice(&[5, 2, 80]);
     let good = raw(ODOMETRY_DATA::ID, &payload, ODOMETRY_DATA::EXTRA_CRC);
     assert!(matches!(self::read(&good), Ok(Uplink::State { .. })));
@@ -261,9 +261,9 @@ fn every_type_mask_means_what_the_specification_says() {
             Ok(Uplink::Target(ExternalTarget::Motion(motion))) => motion,
             other => panic!("{mask:#b}: {other:?}"),
         };
-        // As text, since NaN differs from itself.
+        // Compares as text, since NaN differs from itself.
         assert_eq!(format!("{motion:?}"), format!("{expected:?}"), "{mask:#b}");
-        // Position and heading make a setpoint.
+        // A setpoint needs position and heading.
         let needed = bit(0) || bit(1) || bit(2) || bit(10);
         let or_zero = |number: f32| if number.is_nan() { 0.0 } else { number };
         let setpoint = Setpoint {
@@ -301,7 +301,7 @@ fn targets_in_frames_of_the_vehicle_are_read() {
             other => panic!("{other:?}"),
         }
     };
-    // Velocity alone, position alone, both.
+    // Only velocity, only position, both.
     let [velocity, position, both] = [0b1111_1100_0111, 0b1101_1111_1000, 0b1101_1100_0000];
     for mask in [velocity, position, both].map(|mask: u16| mask & !(1 << 9)) {
         assert_eq!(axes(F::MAV_FRAME_LOCAL_OFFSET_NED, mask), Ok(Axes::Offset));
@@ -362,14 +362,14 @@ const SEVERITIES: [MavSeverity; 8] = [
 ];
 
 proptest! {
-    /// Rotor speeds are transmitted without losing a bit.
+    /// Rotor speeds are transmitted exactly.
     #[test]
     fn rotor_speeds_are_exact(speeds in prop::array::uniform8(0.0f32..32_768.0), time_us: u64, armed: bool) {
         let rotors = Downlink::Rotors { time_us, armed, speeds: RotorSpeeds(SVector::from(speeds)) };
         prop_assert_eq!(read(&bytes(&rotors)), Ok(rotors));
     }
 
-    /// Every other message is read as it was written, except for the rounding of a state (`tests/frames.rs`).
+    /// Every other message survives writing and reading, except for the rounding of a state (`tests/frames.rs`).
     #[test]
     fn messages_survive_the_link(
         v in prop::array::uniform3(-1e3f32..1e3),

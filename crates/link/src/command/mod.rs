@@ -1,4 +1,4 @@
-//! Commands, which are answered.
+//! Commands, each of which is answered.
 
 mod read;
 mod write;
@@ -7,78 +7,78 @@ use crate::place::{Height, Place};
 pub(crate) use read::{format, read};
 pub(crate) use write::write;
 
-/// Something asked for by COMMAND_LONG (76), COMMAND_INT (75), SET_MODE (11) or SET_HOME_POSITION (243), answered by
-/// [`Downlink::Answer`](crate::Downlink::Answer).
+/// A command, answered by [`Downlink::Answer`](crate::Downlink::Answer). It arrives as COMMAND_LONG (76), COMMAND_INT
+/// (75), SET_MODE (11) or SET_HOME_POSITION (243).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Command {
-    /// MAV_CMD_COMPONENT_ARM_DISARM (400) with 1. It cannot be forced.
+    /// MAV_CMD_COMPONENT_ARM_DISARM (400) with 1. Arming cannot be forced.
     Arm,
     /// MAV_CMD_COMPONENT_ARM_DISARM (400) with 0.
     Disarm,
-    /// MAV_CMD_COMPONENT_ARM_DISARM (400) with 0, forced (param2 = 21196): also in flight.
+    /// MAV_CMD_COMPONENT_ARM_DISARM (400) with 0, forced (param2 = 21196): stops the motors, even in flight.
     Kill,
     /// MAV_CMD_USER_1 (31010): engage AFBC again after its monitor has tripped.
     Engage,
-    /// MAV_CMD_USER_2 (31011): run the sensors' own tests.
+    /// MAV_CMD_USER_2 (31011): run the sensors' self-tests.
     SelfTest,
-    /// MAV_CMD_NAV_TAKEOFF (22), where the vehicle is. The height is above where it stands in COMMAND_LONG, which has
-    /// no frame, and NaN or 0 stand for that of the parameters.
+    /// MAV_CMD_NAV_TAKEOFF (22) at the vehicle's position. In COMMAND_LONG, which has no frame, the height counts from
+    /// the vehicle's position; there, NaN or 0 means the height in the parameters.
     TakeOff(Height),
-    /// MAV_CMD_NAV_LAND (21), where the vehicle is.
+    /// MAV_CMD_NAV_LAND (21) at the vehicle's position.
     Land,
     /// MAV_CMD_NAV_RETURN_TO_LAUNCH (20).
     Return,
-    /// MAV_CMD_DO_SET_MODE (176) or SET_MODE, with a custom mode as in HEARTBEAT; the command's param2 and param3 are
-    /// its main and sub mode.
+    /// MAV_CMD_DO_SET_MODE (176) or SET_MODE, with a custom mode as in HEARTBEAT. The command has its main mode in
+    /// param2 and its sub mode in param3.
     SelectMode(u32),
     /// MAV_CMD_DO_SET_STANDARD_MODE (262).
     SelectStandardMode(u8),
     /// MAV_CMD_DO_REPOSITION (192).
     Reposition {
-        /// Where to.
+        /// Destination.
         place: Place,
-        /// Heading; NaN keeps it \[rad\].
+        /// Heading; NaN keeps the present one \[rad\].
         yaw_rad: f32,
-        /// Horizontal speed; none for the usual \[m/s\].
+        /// Horizontal speed; none for the default \[m/s\].
         speed_m_s: Option<f32>,
-        /// True if the mode may change for it (MAV_DO_REPOSITION_FLAGS_CHANGE_MODE).
+        /// True if the vehicle may change its mode (MAV_DO_REPOSITION_FLAGS_CHANGE_MODE).
         changes_mode: bool,
     },
     /// MAV_CMD_DO_ORBIT (34).
     Orbit {
-        /// Its centre, at the height that is flown.
+        /// Centre of the circle, with the height of the flight.
         place: Place,
-        /// Radius, positive if it goes to the right; NaN for the usual one \[m\].
+        /// Radius, positive for clockwise; NaN for the default \[m\].
         radius_m: f32,
-        /// Speed along it; NaN for the usual one \[m/s\].
+        /// Speed along the circle; NaN for the default \[m/s\].
         speed_m_s: f32,
-        /// Angle to fly; 0 for ever \[deg\].
+        /// Angle to fly; 0 to fly without end \[deg\].
         angle_deg: u16,
-        /// `ORBIT_YAW_BEHAVIOUR`, without control by radio.
+        /// `ORBIT_YAW_BEHAVIOUR`, except the one that leaves yaw to radio control.
         heading: u8,
     },
-    /// MAV_CMD_DO_CHANGE_SPEED (178) of the horizontal speed \[m/s\].
+    /// MAV_CMD_DO_CHANGE_SPEED (178): horizontal speed \[m/s\].
     Speed(f32),
-    /// MAV_CMD_DO_SET_HOME (179): here, or at a place; or SET_HOME_POSITION.
+    /// MAV_CMD_DO_SET_HOME (179) or SET_HOME_POSITION; none for the vehicle's present position.
     Home(Option<Place>),
-    /// MAV_CMD_MISSION_START (300) with this item, up to the other one; none for the last of the mission.
+    /// MAV_CMD_MISSION_START (300): number of the first item and of the last; none for the end of the mission.
     StartMission(u16, Option<u16>),
-    /// MAV_CMD_DO_SET_MISSION_CURRENT (224) of this item; none for the present one. True resets the mission.
+    /// MAV_CMD_DO_SET_MISSION_CURRENT (224): item number, none for the present item; true resets the mission.
     SetCurrent(Option<u16>, bool),
     /// MAV_CMD_SET_MESSAGE_INTERVAL (511).
     SetInterval {
-        /// Number of the message.
+        /// Id of the message.
         message: u32,
-        /// Time between two; 0: the default, -1: never \[us\].
+        /// Interval; 0: the default, -1: never \[us\].
         interval_us: i32,
     },
     /// MAV_CMD_GET_MESSAGE_INTERVAL (510).
     GetInterval(u32),
     /// MAV_CMD_REQUEST_MESSAGE (512).
     RequestMessage {
-        /// Number of the message.
+        /// Id of the message.
         message: u32,
-        /// Its second parameter, which some messages use.
+        /// Second parameter of the command, which some messages use.
         index: u32,
     },
     /// MAV_CMD_REQUEST_PROTOCOL_VERSION (519).
@@ -89,41 +89,41 @@ pub enum Command {
     Reboot(Reboot),
     /// MAV_CMD_PREFLIGHT_STORAGE (245) of the parameters.
     Storage(Storage),
-    /// MAV_CMD_PREFLIGHT_CALIBRATION (241), one at a time.
+    /// MAV_CMD_PREFLIGHT_CALIBRATION (241), one calibration at a time.
     Calibrate(CalibrationRequest),
     /// MAV_CMD_RUN_PREARM_CHECKS (401).
     CheckArming,
-    /// MAV_CMD_LOGGING_START (2510) of a ULog (param1 = 0).
+    /// MAV_CMD_LOGGING_START (2510) in the format ULog (param1 = 0).
     StartLogStream,
     /// MAV_CMD_LOGGING_STOP (2511).
     StopLogStream,
-    /// One of these commands, by number, with an invalid parameter: answered with "denied".
+    /// One of the commands above, by number, with an invalid parameter. It is answered with "denied".
     Denied(u16),
-    /// Any other command, by number, of any dialect: answered with "unsupported".
+    /// Any other command of any dialect, by number. It is answered with "unsupported".
     Other(u16),
 }
 
-/// What runs after a reboot.
+/// Program to run after a reboot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Reboot {
-    /// The same program: 1.
+    /// The same program (param1 = 1).
     Program,
-    /// The boot loader, which waits for another program: 3.
+    /// The boot loader, which waits for a new program (param1 = 3).
     BootLoader,
 }
 
-/// What is done with the stored parameters.
+/// Action on the stored parameters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Storage {
-    /// Read them.
+    /// Read the stored parameters.
     Load,
-    /// Write them.
+    /// Store the parameters.
     Save,
     /// Restore the defaults.
     Reset,
 }
 
-/// What is calibrated.
+/// Calibration to run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum CalibrationRequest {
     /// The gyroscope (param1 = 1).
@@ -132,9 +132,9 @@ pub enum CalibrationRequest {
     Magnetometer,
     /// The accelerometer, on six sides (param5 = 1).
     Accelerometer,
-    /// The mounting of the inertial sensor, level (param5 = 2).
+    /// The level mounting of the inertial sensor (param5 = 2).
     Level,
-    /// Nothing any more (all parameters 0).
+    /// Cancels a running calibration (all parameters 0).
     Cancel,
 }
 
@@ -164,15 +164,15 @@ pub(crate) const STOP_LOG_STREAM: u16 = 2_511;
 pub(crate) const ENGAGE: u16 = 31_010;
 pub(crate) const SELF_TEST: u16 = 31_011;
 
-/// Value of param2 of MAV_CMD_COMPONENT_ARM_DISARM that forces it.
+/// Value of param2 of MAV_CMD_COMPONENT_ARM_DISARM that forces the command.
 pub(crate) const FORCED: f32 = 21196.0;
-/// Bit of `base_mode` that makes the custom mode count.
+/// Bit of `base_mode` that makes the custom mode valid.
 pub(crate) const CUSTOM_MODE: u32 = 1;
-/// MAV_DO_REPOSITION's and MAV_CMD_DO_CHANGE_SPEED's "as usual".
+/// Value for the default, in MAV_CMD_DO_REPOSITION and MAV_CMD_DO_CHANGE_SPEED.
 pub(crate) const USUAL: f32 = -1.0;
 
 impl Command {
-    /// Numbers of the commands that are understood.
+    /// Numbers of the supported commands.
     pub const KNOWN: [u16; 25] = [
         RETURN,
         LAND,
@@ -201,7 +201,7 @@ impl Command {
         SELF_TEST,
     ];
 
-    /// Returns the MAVLink command's number, for its answer.
+    /// Returns the number of the MAVLink command, for its answer.
     pub fn id(self) -> u16 {
         match self {
             Command::Arm | Command::Disarm | Command::Kill => ARM_DISARM,

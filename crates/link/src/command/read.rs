@@ -13,18 +13,18 @@ use crate::wire::{Layout, Unused};
 use mavlink::MessageData;
 use mavlink::dialects::common::{COMMAND_INT_DATA, COMMAND_LONG_DATA, SET_HOME_POSITION_DATA, SET_MODE_DATA};
 
-/// Seven parameters, number, receiver, confirmation.
+/// Fields: seven parameters, command, receiver, confirmation.
 pub(super) const LONG: Layout<COMMAND_LONG_DATA, ([f32; 7], u16, Address, u8)> = Layout::NEW;
-/// Four parameters, x, y, z, number, receiver, frame, current, autocontinue.
+/// Fields: four parameters, x, y, z, command, receiver, frame, current, autocontinue.
 pub(super) const INT: Layout<COMMAND_INT_DATA, ([f32; 4], [i32; 2], f32, u16, Address, u8, [u8; 2])> = Layout::NEW;
-/// Custom mode, system, base mode.
+/// Fields: custom mode, system, base mode.
 const MODE: Layout<SET_MODE_DATA, (u32, u8, u8)> = Layout::NEW;
-/// Latitude, longitude, altitude \[mm\]; attitude and approach; system, time.
+/// Fields: latitude, longitude, altitude \[mm\]; attitude and approach; system, time.
 const PLACE: Layout<SET_HOME_POSITION_DATA, ([i32; 3], Unused<40>, u8, Unused<8>)> = Layout::NEW;
 
-/// Speed that is no limit \[m/s\].
+/// Speed that stands for no limit \[m/s\].
 const SPEED_MAX_M_S: f32 = 1e3;
-/// MAV_CMD_DO_CHANGE_SPEED's "as usual again".
+/// Value of MAV_CMD_DO_CHANGE_SPEED that returns to the default speed.
 const DEFAULT: f32 = -2.0;
 
 pub(crate) fn format(id: u32) -> Option<MessageFormat> {
@@ -37,13 +37,14 @@ pub(crate) fn format(id: u32) -> Option<MessageFormat> {
     })
 }
 
-/// Returns the command and its receiver. None is dropped: all are answered.
+/// Returns the command and its receiver. No command is dropped, since each must be answered.
 pub(crate) fn read(id: u32, payload: &[u8]) -> Result<(Command, Address), Fault> {
     match id {
         COMMAND_LONG_DATA::ID => {
             let (parameters, id, to, _) = LONG.read(payload);
             let [.., latitude, longitude, metres] = parameters;
-            // It has no frame: stations send heights of places above the sea, and of a take-off above the ground.
+            // COMMAND_LONG has no frame. Ground stations send heights above the sea, except for a take-off, whose
+            // height is above the ground.
             let above = if id == TAKE_OFF { Datum::Here } else { Datum::Sea };
             let place =
                 Place { latitude_e7: e7(latitude), longitude_e7: e7(longitude), height: Height { metres, above } };
@@ -74,7 +75,7 @@ pub(crate) fn read(id: u32, payload: &[u8]) -> Result<(Command, Address), Fault>
 
 fn command(id: u16, parameters: [f32; 7], place: Option<Place>) -> Command {
     let [p1, p2, ..] = parameters;
-    // Whatever else it says: nothing may keep the motors running.
+    // Ignores all other parameters: nothing may keep the motors running.
     if id == ARM_DISARM && p1 == 0.0 && p2 == FORCED {
         return Command::Kill;
     }
@@ -87,8 +88,8 @@ fn command(id: u16, parameters: [f32; 7], place: Option<Place>) -> Command {
     command.unwrap_or(Command::Denied(id))
 }
 
-/// Returns which parameters of a known command are used, a bit each from the first on. All others must be neutral, so
-/// that nothing that a station asks for is ignored in silence.
+/// Returns the used parameters of a known command, as one bit each, lowest bit for the first. All others must be
+/// neutral, so that no request of a ground station is silently ignored.
 fn used(id: u16, first: f32) -> u8 {
     match id {
         RETURN | LAND | CHECK_ARMING | STOP_LOG_STREAM | ENGAGE | SELF_TEST => 0,
@@ -98,7 +99,7 @@ fn used(id: u16, first: f32) -> u8 {
         SELECT_MODE | SPEED => 0b111,
         SET_INTERVAL | REQUEST_MESSAGE => 0b100_0011,
         TAKE_OFF => 0b100_0001,
-        // Here, or at a place.
+        // The present position, or a given one.
         HOME if first == 1.0 => 0b1,
         HOME => 0b111_0001,
         REPOSITION => 0b111_1011,
@@ -107,17 +108,18 @@ fn used(id: u16, first: f32) -> u8 {
     }
 }
 
-/// True of a parameter that asks for nothing.
+/// True for a value that requests nothing.
 fn is_neutral(value: f32) -> bool {
     value == 0.0 || value.is_nan()
 }
 
-/// The same where -1 asks for nothing, too.
+/// True for a value that requests nothing, including -1.
 fn is_neutral_or_minus(value: f32) -> bool {
     is_neutral(value) || value == -1.0
 }
 
-/// Returns the known command with these parameters, the last three of which are a place; none if one is invalid.
+/// Returns a known command with these parameters; the last three are also given as `place`. Returns none if a parameter
+/// is invalid.
 fn known(id: u16, parameters: [f32; 7], place: Option<Place>) -> Option<Command> {
     let [p1, p2, p3, p4, _, _, p7] = parameters;
     let plausible = place.filter(Place::is_plausible);
@@ -127,7 +129,7 @@ fn known(id: u16, parameters: [f32; 7], place: Option<Place>) -> Option<Command>
         ARM_DISARM if p1 == 0.0 => Command::Disarm,
         ENGAGE => Command::Engage,
         SELF_TEST => Command::SelfTest,
-        // -1: no pitch.
+        // -1 means no pitch.
         TAKE_OFF if is_neutral_or_minus(p1) => Command::TakeOff(take_off(place?.height)?),
         LAND => Command::Land,
         RETURN => Command::Return,
@@ -141,14 +143,14 @@ fn known(id: u16, parameters: [f32; 7], place: Option<Place>) -> Option<Command>
         REPOSITION => {
             let is_usual = p1 < 0.0 || is_neutral(p1);
             let speed_m_s = if is_usual { None } else { Some(speed(p1)?) };
-            // A heading relative to the present one is not flown.
+            // A heading relative to the present one is not supported.
             let changes_mode = if p2 == 1.0 { true } else { Some(false).filter(|_| is_neutral(p2))? };
             let yaw_rad = if p4.is_nan() { p4 } else { Some(-p4).filter(|yaw| yaw.abs() <= 1e3)? };
             Command::Reposition { place: plausible?, yaw_rad, speed_m_s, changes_mode }
         }
         ORBIT => orbit([p1, p2, p3, p4], plausible?)?,
-        // 0 and 1: through the air and above the ground; climb and descent have limits of their own.
-        // -1 and -2 leave the throttle alone, and -2 as a speed is the usual one again.
+        // p1: only 0 (airspeed) and 1 (ground speed), since climb and descent have their own limits. p3: -1 and -2
+        // leave the throttle unchanged. p2: -2 returns to the default speed.
         SPEED if (p1 == 0.0 || p1 == 1.0) && (is_neutral_or_minus(p3) || p3 == DEFAULT) => {
             Command::Speed(if p2 == DEFAULT { SPEED_MAX_M_S } else { speed(p2)? })
         }
@@ -162,7 +164,7 @@ fn known(id: u16, parameters: [f32; 7], place: Option<Place>) -> Option<Command>
         SET_CURRENT if p2 == 1.0 || is_neutral(p2) => {
             Command::SetCurrent(if p1 == -1.0 { None } else { Some(number(p1)?) }, p2 == 1.0)
         }
-        // Everything is sent to everyone, the one that asks included.
+        // p7, the receiver of the messages, is checked but not used: messages go to everyone, including the requester.
         SET_INTERVAL | REQUEST_MESSAGE if ![0.0, 1.0, 2.0].contains(&or_zero(p7)) => return None,
         SET_INTERVAL => Command::SetInterval { message: whole(p1)?, interval_us: interval(or_zero(p2))? },
         GET_INTERVAL => Command::GetInterval(whole(p1)?),
@@ -171,7 +173,7 @@ fn known(id: u16, parameters: [f32; 7], place: Option<Place>) -> Option<Command>
         REQUEST_CAPABILITIES if p1 == 1.0 => Command::RequestCapabilities,
         REBOOT if p1 == 1.0 => Command::Reboot(Reboot::Program),
         REBOOT if p1 == 3.0 => Command::Reboot(Reboot::BootLoader),
-        // Plans are not stored: -1 leaves them alone, and 0 has nothing to read.
+        // p2 concerns stored missions, which do not exist: -1 leaves them unchanged, 0 reads none.
         STORAGE if !is_neutral_or_minus(p2) => return None,
         STORAGE if p1 == 0.0 => Command::Storage(Storage::Load),
         STORAGE if p1 == 1.0 => Command::Storage(Storage::Save),
@@ -183,10 +185,10 @@ fn known(id: u16, parameters: [f32; 7], place: Option<Place>) -> Option<Command>
     })
 }
 
-/// Returns a circle: only one that the sticks would turn on is none.
+/// Returns an orbit; none if a parameter is invalid. The yaw behaviour that needs radio control is refused.
 fn orbit([radius, speed, heading, angle_rad]: [f32; 4], place: Place) -> Option<Command> {
     let within = |number: f32, most: f32| number.is_nan() || number.abs() <= most;
-    // Backwards is the other way round.
+    // Backwards is the same as the other direction of rotation.
     let radius_m = if speed < 0.0 { -radius } else { radius };
     let angle_deg = or_zero(angle_rad).to_degrees();
     let heading = u8::try_from(whole(or_zero(heading))?).ok().filter(|heading| [0, 1, 2, 3, 5].contains(heading))?;
@@ -195,7 +197,7 @@ fn orbit([radius, speed, heading, angle_rad]: [f32; 4], place: Place) -> Option<
     flown.then_some(Command::Orbit { place, radius_m, speed_m_s: speed.abs(), angle_deg, heading })
 }
 
-/// Returns what is calibrated: a single parameter says it, and all others are 0 or NaN.
+/// Returns the requested calibration: exactly one parameter selects it, all others must be 0 or NaN.
 fn calibration(parameters: [f32; 7]) -> Command {
     let asked = match parameters.map(or_zero) {
         [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0] => CalibrationRequest::Gyroscope,
@@ -212,26 +214,26 @@ fn or_zero(number: f32) -> f32 {
     if number.is_nan() { 0.0 } else { number }
 }
 
-/// Returns the number of an item.
+/// Returns the number of a mission item.
 fn number(number: f32) -> Option<u16> {
     u16::try_from(whole(number)?).ok()
 }
 
-/// Returns a whole number up to 2^24.
+/// Returns an integer up to 2^24.
 fn whole(number: f32) -> Option<u32> {
-    // Up to there each whole number is an f32 of its own.
+    // Every integer up to 2^24 is exact in an f32.
     let whole = number as u32;
     ((0.0..=16_777_216.0).contains(&number) && whole as f32 == number).then_some(whole)
 }
 
-/// Returns a whole `custom_mode`, as MAVProxy's and pymavlink's `mode NUMBER` send it: larger than any main mode, since
-/// its lower half is 0.
+/// Returns a complete `custom_mode`, as MAVProxy and pymavlink send it for `mode NUMBER`. It is larger than any main
+/// mode, since its lower half is 0.
 fn entire_mode(number: f32) -> Option<u32> {
     let mode = number as u32;
     (mode as f32 == number && mode != 0 && mode & 0xFFFF == 0).then_some(mode)
 }
 
-/// Returns an interval \[us\]; all negative ones are "never".
+/// Returns an interval \[us\]; negative values mean never.
 fn interval(number: f32) -> Option<i32> {
     (number.abs() <= 2e9).then_some(if number < 0.0 { -1 } else { number as i32 })
 }
@@ -245,7 +247,7 @@ fn is_whole(place: &Place) -> bool {
     ![latitude_e7, longitude_e7].contains(&Place::AS_IT_IS) && height.metres.is_finite()
 }
 
-/// Returns the height of a take-off: NaN for that of the parameters.
+/// Returns the height of a take-off; NaN for the height in the parameters.
 fn take_off(height: Height) -> Option<Height> {
     let usual = height.metres.is_nan() || (height.metres == 0.0 && height.above == Datum::Here);
     let metres = if usual { f32::NAN } else { height.metres };

@@ -1,4 +1,4 @@
-//! Writing of commands, to everyone.
+//! Writing of commands, addressed to everyone.
 
 use super::read::{INT, LONG};
 use super::{CalibrationRequest, Command, FORCED, Reboot, Storage, USUAL};
@@ -6,7 +6,7 @@ use crate::address::Address;
 use crate::message::PAYLOAD_MAX;
 use crate::place::{Datum, Height, Place, frame};
 
-/// Writes COMMAND_LONG, or COMMAND_INT where there is a place or a height above the sea or home.
+/// Writes COMMAND_LONG, or COMMAND_INT for a command with a place or a height above the sea or home.
 pub(crate) fn write(command: Command, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
     let nowhere = |height| Place { latitude_e7: 0, longitude_e7: 0, height };
     let (first, place) = match command {
@@ -24,7 +24,7 @@ pub(crate) fn write(command: Command, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, 
             let parameters = [p1, p2, 0.0, 0.0, fifth, 0.0, 0.0];
             return LONG.write(&(parameters, command.id(), Address::default(), 0), payload);
         }
-        // No parameter of any command may be infinite.
+        // Infinity is invalid for every parameter of every command.
         Command::Denied(id) => return LONG.write(&([f32::INFINITY; 7], id, Address::default(), 0), payload),
         Command::Disarm
         | Command::CheckArming

@@ -6,21 +6,21 @@ use crate::wire::Layout;
 use mavlink::MessageData;
 use mavlink::dialects::common::{REQUEST_EVENT_DATA, RESPONSE_EVENT_ERROR_DATA};
 
-/// REQUEST_EVENT (412): events that a station has missed.
+/// REQUEST_EVENT (412): a ground station requests events that it has missed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct EventRequest {
-    /// First and last number.
+    /// Sequence numbers of the first and the last event.
     pub numbers: [u16; 2],
 }
 
 /// RESPONSE_EVENT_ERROR (413).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct EventError {
-    /// Number of the event.
+    /// Sequence number of the event.
     pub number: u16,
-    /// Oldest one that there is.
+    /// Sequence number of the oldest available event.
     pub oldest: u16,
-    /// `MAV_EVENT_ERROR_REASON`: 0, it is not available any more.
+    /// `MAV_EVENT_ERROR_REASON`: 0, no longer available.
     pub reason: u8,
 }
 

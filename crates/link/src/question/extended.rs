@@ -1,5 +1,5 @@
-//! Extended parameters, those of cameras: PARAM_EXT_REQUEST_READ, PARAM_EXT_REQUEST_LIST and PARAM_EXT_SET, with
-//! PARAM_EXT_VALUE and PARAM_EXT_ACK, without their values.
+//! Extended parameters, which cameras have: PARAM_EXT_REQUEST_READ, PARAM_EXT_REQUEST_LIST and PARAM_EXT_SET, with
+//! PARAM_EXT_VALUE and PARAM_EXT_ACK. Their values are ignored.
 
 use crate::address::Address;
 use crate::message::{MessageFormat, PAYLOAD_MAX};
@@ -10,10 +10,10 @@ use mavlink::dialects::common::{
     PARAM_EXT_VALUE_DATA,
 };
 
-/// Name of an extended parameter, with zeros behind it; none at full length.
+/// Name of an extended parameter, padded with zeros; at full length there are none.
 pub type ExtendedName = [u8; 16];
 
-/// What is asked of extended parameters.
+/// Request about extended parameters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ExtendedRequest {
     /// PARAM_EXT_REQUEST_LIST (321).
@@ -22,7 +22,7 @@ pub enum ExtendedRequest {
     Read {
         /// Name.
         name: ExtendedName,
-        /// Place in the list; -1: by name.
+        /// Index in the list; -1 if the name counts.
         place: i16,
     },
     /// PARAM_EXT_SET (323).
@@ -34,7 +34,7 @@ pub enum ExtendedRequest {
     },
 }
 
-/// What is reported of them.
+/// Answer about extended parameters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ExtendedAnswer {
     /// PARAM_EXT_VALUE (322).
@@ -45,7 +45,7 @@ pub enum ExtendedAnswer {
         kind: u8,
         /// Number of parameters.
         count: u16,
-        /// Place in the list; `u16::MAX` for none.
+        /// Index in the list; `u16::MAX` for none.
         place: u16,
     },
     /// PARAM_EXT_ACK (324).
@@ -65,7 +65,7 @@ pub(super) const SET_ID: u32 = PARAM_EXT_SET_DATA::ID;
 pub(super) const VALUE_ID: u32 = PARAM_EXT_VALUE_DATA::ID;
 pub(super) const ACK_ID: u32 = PARAM_EXT_ACK_DATA::ID;
 
-/// A value.
+/// Value of a parameter.
 type Text = Unused<128>;
 
 const READ: Layout<PARAM_EXT_REQUEST_READ_DATA, (i16, Address, ExtendedName)> = Layout::NEW;

@@ -1,4 +1,4 @@
-//! Files: FILE_TRANSFER_PROTOCOL, whose payload is a protocol of its own.
+//! Requests of FILE_TRANSFER_PROTOCOL (MAVLink FTP) and their refusal.
 
 use crate::address::Address;
 use crate::message::{Fault, MessageFormat, PAYLOAD_MAX};
@@ -6,31 +6,31 @@ use crate::wire::{Layout, Unused};
 use mavlink::MessageData;
 use mavlink::dialects::common::FILE_TRANSFER_PROTOCOL_DATA;
 
-/// A request: what is to be done, without the data.
+/// An FTP request without its data.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FileOperation {
-    /// Number of the request.
+    /// Sequence number of the request.
     pub sequence: u16,
-    /// Number of the session.
+    /// Session id.
     pub session: u8,
-    /// `MAV_FTP_OPCODE`, below 128.
+    /// Opcode of the request: `MAV_FTP_OPCODE`, below 128.
     pub operation: u8,
-    /// First byte.
+    /// Offset of the first byte.
     pub offset: u32,
 }
 
-/// A response that refuses an operation.
+/// An FTP response that refuses an operation (NAK).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FileRefusal {
-    /// Number of the request, plus one.
+    /// Sequence number of the request, plus one.
     pub sequence: u16,
-    /// Number of the session.
+    /// Session id.
     pub session: u8,
-    /// The operation that is refused.
+    /// Refused operation.
     pub operation: u8,
-    /// First byte.
+    /// Offset of the first byte.
     pub offset: u32,
-    /// Why.
+    /// Reason.
     pub error: FtpError,
 }
 
@@ -52,16 +52,16 @@ impl FtpError {
 }
 
 impl FileOperation {
-    /// First of the operations that are answers.
+    /// First opcode of responses.
     const ANSWERS: u8 = 128;
 }
 
-/// Operation of an answer that refuses, followed by one byte that says why.
+/// Opcode of a NAK, whose data is one byte with the error.
 const NAK: u8 = 129;
 pub(super) const ID: u32 = FILE_TRANSFER_PROTOCOL_DATA::ID;
 
-/// Network, receiver, number, session, operation, size of the data, operation that is answered, "burst complete",
-/// padding; offset; data.
+/// Fields: network, receiver, sequence number; session, opcode, data size, requested opcode, "burst complete", padding;
+/// offset; data.
 const FILE: Layout<FILE_TRANSFER_PROTOCOL_DATA, (u8, Address, u16, [u8; 6], u32, u8, Unused<238>)> = Layout::NEW;
 
 pub(super) fn format() -> MessageFormat {
@@ -69,7 +69,7 @@ pub(super) fn format() -> MessageFormat {
 }
 
 impl FileOperation {
-    /// Reads a request; an answer is none, and is not answered.
+    /// Reads a request. Responses are refused, since they are not to be answered.
     pub(super) fn read(payload: &[u8]) -> Result<(Self, Address), Fault> {
         let (_, to, sequence, [session, operation, ..], offset, ..) = FILE.read(payload);
         if operation >= Self::ANSWERS {

@@ -1,4 +1,5 @@
-//! Logs: LOG_REQUEST_LIST, LOG_REQUEST_DATA, LOG_ERASE and LOG_REQUEST_END, with LOG_ENTRY and LOG_DATA; LOGGING_ACK.
+//! Requests about logs, with the answers of a vehicle without logs. Messages: LOG_REQUEST_LIST, LOG_REQUEST_DATA,
+//! LOG_ERASE, LOG_REQUEST_END, LOG_ENTRY, LOG_DATA, LOGGING_ACK.
 
 use crate::address::Address;
 use crate::message::{MessageFormat, PAYLOAD_MAX};
@@ -9,48 +10,48 @@ use mavlink::dialects::common::{
     LOGGING_ACK_DATA,
 };
 
-/// What is asked of the logs.
+/// Request about logs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LogRequest {
     /// LOG_REQUEST_LIST (117).
     List {
-        /// First number.
+        /// First log id.
         first: u16,
-        /// Last number.
+        /// Last log id.
         last: u16,
     },
     /// LOG_REQUEST_DATA (119).
     Data {
-        /// Number of the log.
+        /// Log id.
         log: u16,
-        /// First byte.
+        /// Offset of the first byte.
         offset: u32,
         /// Number of bytes.
         bytes: u32,
     },
-    /// LOG_ERASE (121): of all logs. Not answered.
+    /// LOG_ERASE (121): erases all logs. Not answered.
     Erase,
-    /// LOG_REQUEST_END (122): nothing more is to be sent. Not answered.
+    /// LOG_REQUEST_END (122): ends the transfer. Not answered.
     End,
-    /// LOGGING_ACK (268): the part of a streamed log with this number has arrived. Not answered.
+    /// LOGGING_ACK (268): the part of a streamed log with this sequence number has arrived. Not answered.
     Received(u16),
 }
 
-/// What is reported of the logs.
+/// Answer about logs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LogAnswer {
     /// LOG_ENTRY (118).
     Entry {
-        /// Number of the log.
+        /// Log id.
         log: u16,
-        /// How many there are, and the last number.
+        /// Number of logs, and the last log id.
         logs: [u16; 2],
     },
     /// LOG_DATA (120), without the data.
     Data {
-        /// Number of the log.
+        /// Log id.
         log: u16,
-        /// First byte.
+        /// Offset of the first byte.
         offset: u32,
         /// Number of bytes; 0 at the end of the log.
         bytes: u8,
@@ -70,7 +71,7 @@ const DATA_REQUEST: Layout<LOG_REQUEST_DATA_DATA, (u32, u32, u16, Address)> = La
 const ERASE: Layout<LOG_ERASE_DATA, (Address,)> = Layout::NEW;
 const END: Layout<LOG_REQUEST_END_DATA, (Address,)> = Layout::NEW;
 const RECEIVED: Layout<LOGGING_ACK_DATA, (u16, Address)> = Layout::NEW;
-/// Time, size; number of the log, number of logs, last number.
+/// Fields: time and size; log id; number of logs and last log id.
 const ENTRY: Layout<LOG_ENTRY_DATA, (Unused<8>, u16, [u16; 2])> = Layout::NEW;
 const DATA: Layout<LOG_DATA_DATA, (u32, u16, u8, Unused<90>)> = Layout::NEW;
 

@@ -1,6 +1,5 @@
-//! Questions about what not every vehicle has, and their answers: one service per file.
-//!
-//! Of each only what a refusal needs is read and written.
+//! Requests for services that not every vehicle has, and their refusals; one file per service. Only the fields that a
+//! refusal needs are read and written.
 
 mod event;
 mod extended;
@@ -23,10 +22,10 @@ pub use serial::Serial;
 pub use terrain::Terrain;
 pub use unanswered::UnansweredWish;
 
-/// A question.
+/// A request for an optional service.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Question {
-    /// LOG_REQUEST_LIST (117), LOG_REQUEST_DATA (119), LOG_ERASE (121), LOG_REQUEST_END (122).
+    /// LOG_REQUEST_LIST (117), LOG_REQUEST_DATA (119), LOG_ERASE (121), LOG_REQUEST_END (122), LOGGING_ACK (268).
     Log(LogRequest),
     /// FILE_TRANSFER_PROTOCOL (110).
     File(FileOperation),
@@ -34,24 +33,24 @@ pub enum Question {
     Extended(ExtendedRequest),
     /// REQUEST_EVENT (412).
     Event(EventRequest),
-    /// SERIAL_CONTROL (126) that wants a response.
+    /// SERIAL_CONTROL (126) that requires a response.
     Serial(Serial),
     /// TERRAIN_CHECK (135).
     Terrain(Terrain),
-    /// SET_GPS_GLOBAL_ORIGIN (48), without the place: it is answered with GPS_GLOBAL_ORIGIN.
+    /// SET_GPS_GLOBAL_ORIGIN (48), without the position. It is answered with GPS_GLOBAL_ORIGIN.
     Origin,
-    /// GPS_RTCM_DATA, PLAY_TUNE, FOLLOW_TARGET and the like, which no message answers.
+    /// GPS_RTCM_DATA, PLAY_TUNE, FOLLOW_TARGET and similar messages, which have no answer.
     Unanswered(UnansweredWish),
 }
 
-/// The answer to a [`Question`].
+/// The refusal of a [`Question`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum QuestionRefusal {
-    /// LOG_ENTRY (118), LOG_DATA (120), neither of which names a receiver.
+    /// LOG_ENTRY (118) or LOG_DATA (120), which name no receiver.
     Log(LogAnswer),
     /// FILE_TRANSFER_PROTOCOL (110).
     File(FileRefusal),
-    /// PARAM_EXT_VALUE (322), PARAM_EXT_ACK (324), neither of which names a receiver.
+    /// PARAM_EXT_VALUE (322) or PARAM_EXT_ACK (324), which name no receiver.
     Extended(ExtendedAnswer),
     /// RESPONSE_EVENT_ERROR (413).
     Event(EventError),
@@ -62,7 +61,7 @@ pub enum QuestionRefusal {
 }
 
 const ORIGIN_ID: u32 = SET_GPS_GLOBAL_ORIGIN_DATA::ID;
-/// Place, system; time, which is not read.
+/// Fields: position, system; time. Position and time are ignored.
 const ORIGIN: Layout<SET_GPS_GLOBAL_ORIGIN_DATA, (Unused<12>, u8, Unused<8>)> = Layout::NEW;
 
 impl Question {
@@ -81,7 +80,7 @@ impl Question {
         })
     }
 
-    /// Returns the question and its receiver.
+    /// Returns the request and its receiver.
     pub(crate) fn read(id: u32, payload: &[u8]) -> Result<(Self, Address), Fault> {
         Ok(match id {
             log::LIST_ID | log::DATA_REQUEST_ID | log::ERASE_ID | log::END_ID | log::RECEIVED_ID => {
@@ -147,7 +146,7 @@ impl QuestionRefusal {
         })
     }
 
-    /// Returns the answer and its receiver.
+    /// Returns the refusal and its receiver.
     pub(crate) fn read(id: u32, payload: &[u8]) -> Result<(Self, Address), Fault> {
         Ok(match id {
             log::ENTRY_ID | log::DATA_ID => (QuestionRefusal::Log(LogAnswer::read(id, payload)), Address::default()),

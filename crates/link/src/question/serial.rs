@@ -6,7 +6,7 @@ use crate::wire::{Layout, Unused};
 use mavlink::MessageData;
 use mavlink::dialects::common::SERIAL_CONTROL_DATA;
 
-/// SERIAL_CONTROL (126), without its data but for what a vehicle without a shell says.
+/// SERIAL_CONTROL (126). Its data are ignored, except that a vehicle without a shell sends a text.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Serial {
     /// `SERIAL_CONTROL_DEV`.
@@ -15,13 +15,13 @@ pub struct Serial {
     pub bytes: u8,
 }
 
-/// `SERIAL_CONTROL_FLAG`: a reply.
+/// `SERIAL_CONTROL_FLAG`: this is a reply.
 pub(super) const REPLY: u8 = 1;
-/// `SERIAL_CONTROL_FLAG`: a reply is wanted.
+/// `SERIAL_CONTROL_FLAG`: a reply is required.
 pub(super) const RESPOND: u8 = 2;
 pub(super) const ID: u32 = SERIAL_CONTROL_DATA::ID;
 
-/// Baud rate, time limit, device, flags, number of bytes, data, receiver.
+/// Fields: baud rate, timeout, device, flags, number of bytes, data, receiver.
 const SERIAL: Layout<SERIAL_CONTROL_DATA, (u32, u16, u8, u8, u8, [u8; LENGTH], Unused<60>, Address)> = Layout::NEW;
 const LENGTH: usize = Serial::NO_SHELL.len();
 
@@ -30,12 +30,12 @@ pub(super) fn format() -> MessageFormat {
 }
 
 impl Serial {
-    /// What a vehicle without a shell says.
+    /// Text sent by a vehicle without a shell.
     pub const NO_SHELL: [u8; 10] = *b"no shell\r\n";
-    /// Number of the shell among the devices.
+    /// Number of the shell in `SERIAL_CONTROL_DEV`.
     pub const SHELL: u8 = 10;
 
-    /// Reads one with this of the two flags, and without the other.
+    /// Reads a message that has this one of the two flags, and not the other.
     pub(super) fn read(payload: &[u8], flag: u8) -> Result<(Self, Address), Fault> {
         let (_, _, device, flags, bytes, _, _, to) = SERIAL.read(payload);
         if flags & (REPLY | RESPOND) != flag {
@@ -44,7 +44,7 @@ impl Serial {
         Ok((Serial { device, bytes }, to))
     }
 
-    /// Returns the receiver of a line for the shell that wants no reply, if it is one.
+    /// Returns the receiver of a shell line that requires no reply; none for other messages.
     pub(super) fn read_line(payload: &[u8]) -> Option<Address> {
         let (_, _, device, flags, bytes, _, _, to) = SERIAL.read(payload);
         (device == Self::SHELL && flags & (REPLY | RESPOND) == 0 && bytes > 0).then_some(to)
@@ -57,7 +57,7 @@ impl Serial {
     }
 }
 
-/// Writes a line for the shell that wants no reply.
+/// Writes a shell line that requires no reply.
 pub(super) fn write_line(payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
     SERIAL.write(&(0, 0, Serial::SHELL, 0, 1, [b'\n'; LENGTH], Unused, Address::default()), payload)
 }

@@ -1,11 +1,11 @@
-//! Heights of the terrain: TERRAIN_CHECK and TERRAIN_REPORT.
+//! Terrain heights: TERRAIN_CHECK and TERRAIN_REPORT.
 
 use crate::message::{MessageFormat, PAYLOAD_MAX};
 use crate::wire::{Layout, Unused};
 use mavlink::MessageData;
 use mavlink::dialects::common::{TERRAIN_CHECK_DATA, TERRAIN_REPORT_DATA};
 
-/// TERRAIN_CHECK (135), or TERRAIN_REPORT (136) of a place whose height is not known.
+/// TERRAIN_CHECK (135), or TERRAIN_REPORT (136) for a position of unknown height.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Terrain {
     /// Latitude and longitude \[1e-7 degrees\].
@@ -16,7 +16,7 @@ pub(super) const CHECK_ID: u32 = TERRAIN_CHECK_DATA::ID;
 pub(super) const REPORT_ID: u32 = TERRAIN_REPORT_DATA::ID;
 
 const CHECK: Layout<TERRAIN_CHECK_DATA, ([i32; 2],)> = Layout::NEW;
-/// Place; heights, spacing of the grid (0: none), blocks pending and loaded.
+/// Fields: position; heights, grid spacing (0: unknown), blocks pending and loaded.
 const REPORT: Layout<TERRAIN_REPORT_DATA, ([i32; 2], Unused<14>)> = Layout::NEW;
 
 pub(super) fn check_format() -> MessageFormat {

@@ -1,4 +1,4 @@
-//! Messages that nothing answers and that the vehicle has no use for, so that it can say so.
+//! Messages that have no answer and that the vehicle cannot use. They are read so that the vehicle can say so.
 
 use super::serial;
 use crate::address::Address;
@@ -8,23 +8,23 @@ use mavlink::MessageData;
 use mavlink::dialects::common::{FOLLOW_TARGET_DATA, GPS_INJECT_DATA_DATA, GPS_RTCM_DATA_DATA, PLAY_TUNE_DATA};
 use mavlink::dialects::common::{PLAY_TUNE_V2_DATA, TuneFormat};
 
-/// What a message without an answer asks for.
+/// Content of an unusable message without an answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum UnansweredWish {
-    /// Corrections for the satellite receiver: GPS_RTCM_DATA (233), GPS_INJECT_DATA (123).
+    /// GNSS corrections: GPS_RTCM_DATA (233), GPS_INJECT_DATA (123).
     Corrections,
     /// A tune: PLAY_TUNE (258), PLAY_TUNE_V2 (400).
     Tune,
     /// Following a target: FOLLOW_TARGET (144).
     Follow,
-    /// A line for the shell, without the flag that wants a reply: SERIAL_CONTROL (126).
+    /// A shell line without the flag that requires a reply: SERIAL_CONTROL (126).
     Shell,
 }
 
 const INJECT: Layout<GPS_INJECT_DATA_DATA, (Address, Unused<111>)> = Layout::NEW;
-/// Receiver, tune; the rest of it, which is an extension.
+/// Fields: receiver, tune; more of the tune in an extension field.
 const TUNE: Layout<PLAY_TUNE_DATA, (Address, Unused<30>, Unused<200>)> = Layout::NEW;
-/// Kind of tune, receiver, tune.
+/// Fields: format of the tune, receiver, tune.
 const TUNE_V2: Layout<PLAY_TUNE_V2_DATA, (u32, Address, Unused<248>)> = Layout::NEW;
 
 impl UnansweredWish {
@@ -39,7 +39,7 @@ impl UnansweredWish {
         })
     }
 
-    /// Returns the wish and its receiver.
+    /// Returns the kind of message and its receiver.
     pub(super) fn read(id: u32, payload: &[u8]) -> (Self, Address) {
         match id {
             GPS_INJECT_DATA_DATA::ID => (UnansweredWish::Corrections, INJECT.read(payload).0),

@@ -1,54 +1,55 @@
-//! Motor controllers, four in a message.
+//! ESC telemetry, four ESCs per message.
 
 use crate::message::{MessageFormat, PAYLOAD_MAX};
 use crate::wire::Layout;
 use mavlink::MessageData;
 use mavlink::dialects::common::{ESC_INFO_DATA, ESC_STATUS_DATA};
 
-/// Motor controllers of a message.
+/// Number of ESCs per message.
 pub const ESCS_PER_MESSAGE: usize = 4;
 
-/// ESC_STATUS (291): what four motor controllers measure.
+/// ESC_STATUS (291): measurements of four ESCs.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct EscStatus {
-    /// Number of the first of them, from 0.
+    /// Index of the message's first ESC, from 0.
     pub first: u8,
     /// Time since power-up \[us\].
     pub time_us: u64,
     /// Speed of each motor \[rev/min\].
     pub speeds_rpm: [i32; ESCS_PER_MESSAGE],
-    /// Voltage of each \[V\].
+    /// Voltage of each ESC \[V\].
     pub voltages_v: [f32; ESCS_PER_MESSAGE],
-    /// Current of each \[A\].
+    /// Current of each ESC \[A\].
     pub currents_a: [f32; ESCS_PER_MESSAGE],
 }
 
-/// ESC_INFO (290): how four motor controllers are, without their counts of errors, which are sent as 0.
+/// ESC_INFO (290): condition of four ESCs. Error counts are always sent as 0.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct EscInfo {
-    /// Number of the first of them, from 0.
+    /// Index of the message's first ESC, from 0.
     pub first: u8,
     /// Time since power-up \[us\].
     pub time_us: u64,
-    /// Number of answers since power-up, modulo 65,536.
+    /// Number of answers from ESCs since power-up, modulo 65,536.
     pub counter: u16,
-    /// Number of motor controllers of the vehicle.
+    /// Number of ESCs of the vehicle.
     pub count: u8,
-    /// A bit for each of the vehicle's that answers.
+    /// One bit for each of the vehicle's ESCs, set if it answers.
     pub online: u8,
-    /// `ESC_FAILURE_FLAGS` of each.
+    /// `ESC_FAILURE_FLAGS` of each ESC.
     pub failures: [u16; ESCS_PER_MESSAGE],
-    /// Temperature of each; `i16::MAX` if unknown \[0.01 deg C\].
+    /// Temperature of each ESC; `i16::MAX` if unknown \[0.01 deg C\].
     pub temperatures_cc: [i16; ESCS_PER_MESSAGE],
 }
 
 /// `ESC_CONNECTION_TYPE_DSHOT`.
 const DSHOT: u8 = 5;
 
-/// Time, speeds, voltages, currents, index.
+/// Fields: time, speeds, voltages, currents, index of the first ESC.
 type StatusFields = (u64, [i32; ESCS_PER_MESSAGE], [f32; ESCS_PER_MESSAGE], [f32; ESCS_PER_MESSAGE], u8);
 const STATUS: Layout<ESC_STATUS_DATA, StatusFields> = Layout::NEW;
-/// Time; errors; counter; failures, temperatures; index, count, connection, flags.
+/// Fields: time; error counts; counter; failures, temperatures; index of the first ESC, number of ESCs, connection
+/// type, online bits.
 type InfoFields = (u64, [u32; ESCS_PER_MESSAGE], u16, [u16; ESCS_PER_MESSAGE], [i16; ESCS_PER_MESSAGE], [u8; 4]);
 const INFO: Layout<ESC_INFO_DATA, InfoFields> = Layout::NEW;
 

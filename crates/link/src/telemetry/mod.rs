@@ -1,4 +1,4 @@
-//! What a station shows of the vehicle, in the frames of [`afbc_types`] unless a field says otherwise.
+//! Telemetry for display by ground stations, in the frames of [`afbc_types`] unless a field says otherwise.
 
 mod esc;
 mod motion;
@@ -21,7 +21,7 @@ pub use orbit::OrbitStatus;
 pub use place::{Fix, GlobalOrigin, GlobalPosition, Home};
 pub use system::{ActuatorOutputs, BatteryStatus, EstimatorStatus, SystemStatus, Version};
 
-/// A message of telemetry.
+/// A telemetry message.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Telemetry {
@@ -57,7 +57,7 @@ pub enum Telemetry {
     EscStatus(EscStatus),
     /// ESC_INFO (290).
     EscInfo(EscInfo),
-    /// PROTOCOL_VERSION (300): MAVLink 2 alone.
+    /// PROTOCOL_VERSION (300): only MAVLink 2.
     Protocol,
 }
 

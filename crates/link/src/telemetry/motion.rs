@@ -1,4 +1,4 @@
-//! Attitude, and a pilot's summary.
+//! Attitude, and the summary for a pilot's display.
 
 use crate::frames::{flip, flip_turn};
 use crate::message::{MessageFormat, PAYLOAD_MAX};
@@ -21,9 +21,9 @@ pub struct AttitudeQuaternion {
 /// VFR_HUD (74).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct VfrHud {
-    /// Horizontal speed above the ground \[m/s\]; sent as airspeed, too.
+    /// Ground speed, horizontal \[m/s\]; also sent as airspeed.
     pub speed_m_s: f32,
-    /// Altitude above the sea, or in the local frame if that is unknown \[m\].
+    /// Altitude above mean sea level, or in the local frame if that is unknown \[m\].
     pub altitude_m: f32,
     /// Climb rate \[m/s\].
     pub climb_m_s: f32,
@@ -34,7 +34,7 @@ pub struct VfrHud {
 }
 
 const ATTITUDE: Layout<ATTITUDE_QUATERNION_DATA, (u32, [f32; 4], [f32; 3], [f32; 4])> = Layout::NEW;
-/// Airspeed, ground speed, altitude, climb rate; heading, throttle.
+/// Fields: airspeed, ground speed, altitude, climb rate; heading, throttle.
 const SUMMARY: Layout<VFR_HUD_DATA, ([f32; 4], i16, u16)> = Layout::NEW;
 
 pub(super) fn format(id: u32) -> Option<MessageFormat> {

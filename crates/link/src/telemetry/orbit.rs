@@ -1,4 +1,4 @@
-//! Circles that are flown.
+//! Orbit being flown.
 
 use crate::message::{MessageFormat, PAYLOAD_MAX};
 use crate::wire::Layout;
@@ -10,7 +10,7 @@ use mavlink::dialects::common::ORBIT_EXECUTION_STATUS_DATA;
 pub struct OrbitStatus {
     /// Time since power-up \[us\].
     pub time_us: u64,
-    /// Radius, positive if it goes to the right \[m\].
+    /// Radius, positive for clockwise \[m\].
     pub radius_m: f32,
     /// Latitude and longitude of the centre \[1e-7 deg\].
     pub place_e7: [i32; 2],
@@ -18,7 +18,7 @@ pub struct OrbitStatus {
     pub altitude_m: f32,
 }
 
-/// Time; radius, place, altitude; frame.
+/// Fields: time; radius, place, altitude; frame.
 const ORBIT: Layout<ORBIT_EXECUTION_STATUS_DATA, (u64, f32, [i32; 2], f32, u8)> = Layout::NEW;
 /// MAV_FRAME_GLOBAL_INT.
 const FRAME: u8 = 5;

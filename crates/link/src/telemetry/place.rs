@@ -1,4 +1,4 @@
-//! Where the vehicle is on the earth.
+//! The vehicle's position on the earth.
 
 use crate::frames::{flip, flip_turn};
 use crate::message::{MessageFormat, PAYLOAD_MAX};
@@ -35,7 +35,7 @@ pub struct Fix {
     pub place_e7: [i32; 2],
     /// Altitude above the sea \[mm\].
     pub altitude_mm: i32,
-    /// `GPS_FIX_TYPE`: 0 no receiver, 1 no fix, 3 in three dimensions.
+    /// `GPS_FIX_TYPE`: 0 no receiver, 1 no fix, 3 three-dimensional.
     pub kind: u8,
     /// Number of satellites; 255 if unknown.
     pub satellites: u8,
@@ -54,15 +54,15 @@ pub struct Home {
     pub place_e7: [i32; 2],
     /// Altitude above the sea \[mm\].
     pub altitude_mm: i32,
-    /// Place in the local frame \[m\].
+    /// Position in the local frame \[m\].
     pub position_m: Vector3<f32>,
-    /// Attitude there: quaternion w, x, y, z.
+    /// Attitude at home: quaternion w, x, y, z.
     pub attitude: [f32; 4],
     /// Time since power-up \[us\].
     pub time_us: u64,
 }
 
-/// GPS_GLOBAL_ORIGIN (49): where the local frame's origin is.
+/// GPS_GLOBAL_ORIGIN (49): position of the local frame's origin.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct GlobalOrigin {
     /// Latitude and longitude \[1e-7 deg\].
@@ -73,12 +73,12 @@ pub struct GlobalOrigin {
     pub time_us: u64,
 }
 
-/// Time, latitude, longitude; two altitudes; velocity; heading.
+/// Fields: time, latitude, longitude; altitudes above the sea and home; velocity; heading.
 const GLOBAL: Layout<GLOBAL_POSITION_INT_DATA, (u32, [i32; 2], [i32; 2], [i16; 3], u16)> = Layout::NEW;
-/// Time, place, altitude; dilutions, speed, course; kind, satellites; altitude above the ellipsoid, four
-/// uncertainties, yaw.
+/// Fields: time, position, altitude; dilutions of precision, speed, course; fix type, satellites; altitude above the
+/// ellipsoid, four uncertainties, yaw.
 const FIX: Layout<GPS_RAW_INT_DATA, (u64, [i32; 2], i32, [u16; 4], [u8; 2], i32, [u32; 4], u16)> = Layout::NEW;
-/// Place, altitude; x, y, z; attitude; direction of the approach; time.
+/// Fields: position, altitude; x, y, z; attitude; direction of the approach; time.
 const HOME: Layout<HOME_POSITION_DATA, ([i32; 2], i32, [f32; 3], [f32; 4], [f32; 3], u64)> = Layout::NEW;
 const ORIGIN: Layout<GPS_GLOBAL_ORIGIN_DATA, ([i32; 2], i32, u64)> = Layout::NEW;
 
@@ -115,7 +115,7 @@ impl Fix {
 
     pub(super) fn write(&self, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
         let Fix { time_us, place_e7, altitude_mm, kind, satellites, sigma_mm, speed_cm_s, course_cdeg } = *self;
-        // Dilutions are unknown.
+        // The dilutions of precision are unknown.
         let numbers = [u16::MAX, u16::MAX, speed_cm_s, course_cdeg];
         let [horizontal, vertical] = sigma_mm;
         let sigma = [horizontal, vertical, 0, 0];

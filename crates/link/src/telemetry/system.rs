@@ -11,21 +11,21 @@ use mavlink::dialects::common::{
 /// SYS_STATUS (1).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SystemStatus {
-    /// What is there, what is used and what is well, as `MAV_SYS_STATUS_SENSOR`.
+    /// Sensors present, as `MAV_SYS_STATUS_SENSOR`.
     pub present: u32,
-    /// What is used.
+    /// Sensors in use, as `MAV_SYS_STATUS_SENSOR`.
     pub enabled: u32,
-    /// What is well.
+    /// Healthy sensors, as `MAV_SYS_STATUS_SENSOR`.
     pub healthy: u32,
-    /// Load of the processor by the control tick \[0.1 %\].
+    /// Processor load of the control tick \[0.1 %\].
     pub load_permille: u16,
     /// Voltage of the battery \[mV\]; `u16::MAX` if unknown.
     pub voltage_mv: u16,
     /// Current of the battery \[0.01 A\]; -1 if unknown.
     pub current_ca: i16,
-    /// Charge that is left \[%\]; -1 if unknown.
+    /// Remaining charge \[%\]; -1 if unknown.
     pub remaining_percent: i8,
-    /// Frames dropped since power-up.
+    /// Number of frames dropped since power-up.
     pub dropped_frames: u16,
 }
 
@@ -38,13 +38,13 @@ pub struct BatteryStatus {
     pub current_ca: i16,
     /// Charge drawn so far \[mA h\]; -1 if unknown.
     pub consumed_mah: i32,
-    /// Charge that is left \[%\]; -1 if unknown.
+    /// Remaining charge \[%\]; -1 if unknown.
     pub remaining_percent: i8,
     /// `MAV_BATTERY_CHARGE_STATE`: 0 unknown, 1 ok, 2 low, 3 critical.
     pub charge: u8,
 }
 
-/// ESTIMATOR_STATUS (230), without the ratios of the innovations, which are sent as 0.
+/// ESTIMATOR_STATUS (230). Innovation test ratios are always sent as 0.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct EstimatorStatus {
     /// Time since power-up \[us\].
@@ -62,7 +62,7 @@ pub struct ActuatorOutputs {
     pub time_us: u64,
     /// Number of outputs in use.
     pub active: u32,
-    /// Throttles, 0 to 1, of as many.
+    /// Throttle of each output, 0 to 1.
     pub throttles: [f32; 8],
 }
 
@@ -71,31 +71,33 @@ pub struct ActuatorOutputs {
 pub struct Version {
     /// `MAV_PROTOCOL_CAPABILITY`.
     pub capabilities: u64,
-    /// Number of the board, 0 if unknown.
+    /// Id of the board; 0 if unknown.
     pub uid: u64,
-    /// Version of the software: major, minor, patch, and 255 for a release.
+    /// Software version: major, minor, patch, and 255 for a release.
     pub software: [u8; 4],
-    /// First bytes of the commit it was built from; zeros if unknown.
+    /// First bytes of the commit that was built; zeros if unknown.
     pub commit: [u8; 8],
 }
 
-/// Three sets of sensors; load, voltage; current; six counts; charge; three sets of further sensors.
+/// Fields: sensors present, enabled, healthy; load, voltage; current; six counts; remaining charge; extended sensor
+/// sets.
 const SYSTEM: Layout<SYS_STATUS_DATA, ([u32; 3], [u16; 2], i16, [u16; 6], i8, [u32; 3])> = Layout::NEW;
-/// Charge and energy used; temperature; cells; current; number, function, type; charge left; time left; state; further
-/// cells; mode; faults.
+/// Fields: consumed charge and energy; temperature; cells; current; id, function, type; remaining charge; remaining
+/// time; charge state; further cells; mode; faults.
 type BatteryFields = (([i32; 2], i16, [u16; 10], i16), [u8; 3], i8, i32, u8, [u16; 4], u8, u32);
 const BATTERY: Layout<BATTERY_STATUS_DATA, BatteryFields> = Layout::NEW;
 const LANDED: Layout<EXTENDED_SYS_STATE_DATA, (u8, u8)> = Layout::NEW;
-/// Time, six ratios, two uncertainties, flags.
+/// Fields: time, six test ratios, two uncertainties, flags.
 const ESTIMATOR: Layout<ESTIMATOR_STATUS_DATA, (u64, [f32; 6], [f32; 2], u16)> = Layout::NEW;
 const OUTPUTS: Layout<ACTUATOR_OUTPUT_STATUS_DATA, (u64, u32, [f32; 8], [f32; 24])> = Layout::NEW;
-/// Capabilities, number; software; versions of middleware, system, board; vendor, product; commits; long number.
+/// Fields: capabilities, board id; software; versions of middleware, system, board; vendor, product; commits; long
+/// board id.
 type VersionFields = ([u64; 2], [u8; 4], [u32; 3], [u16; 2], [u8; 8], [u8; 16], [u8; 18]);
 const VERSION: Layout<AUTOPILOT_VERSION_DATA, VersionFields> = Layout::NEW;
-/// Version, lowest, highest; hashes of specification and library.
+/// Fields: version, minimum, maximum; hashes of specification and library.
 const PROTOCOL: Layout<PROTOCOL_VERSION_DATA, ([u16; 3], [u8; 16])> = Layout::NEW;
 
-/// A cell that is not there, and a temperature that is unknown.
+/// Values for a missing cell and an unknown temperature.
 const NO_CELL: u16 = u16::MAX;
 const NO_TEMPERATURE: i16 = i16::MAX;
 
@@ -146,7 +148,7 @@ impl BatteryStatus {
 
     pub(super) fn write(&self, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
         let BatteryStatus { voltage_mv, current_ca, consumed_mah, remaining_percent, charge } = *self;
-        // All cells as one.
+        // The voltage of all cells is sent as one cell.
         let mut cells = [NO_CELL; 10];
         cells.iter_mut().take(1).for_each(|cell| *cell = voltage_mv);
         let numbers = ([consumed_mah, -1], NO_TEMPERATURE, cells, current_ca);
@@ -190,17 +192,17 @@ impl Version {
     }
 }
 
-/// Reads the state from EXTENDED_SYS_STATE.
+/// Returns the landed state in EXTENDED_SYS_STATE.
 pub(super) fn read_landed(payload: &[u8]) -> u8 {
     LANDED.read(payload).1
 }
 
-/// Writes EXTENDED_SYS_STATE of a vehicle that does not change its kind.
+/// Writes EXTENDED_SYS_STATE; the VTOL state is always undefined.
 pub(super) fn write_landed(state: u8, payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
     LANDED.write(&(0, state), payload)
 }
 
 pub(super) fn write_protocol(payload: &mut [u8; PAYLOAD_MAX]) -> (u32, u8) {
-    // In hundredths: this version, the oldest and the newest are 2.0.
+    // In hundredths: version, minimum and maximum are 2.0.
     PROTOCOL.write(&([200, 200, 200], [0; 16]), payload)
 }

@@ -1,30 +1,30 @@
-//! Where a component's metadata is: COMPONENT_METADATA, and COMPONENT_INFORMATION before it.
+//! Location of a component's metadata: COMPONENT_METADATA, and the older COMPONENT_INFORMATION.
 
 use crate::message::PAYLOAD_MAX;
 use crate::wire::{Layout, Unused};
 use mavlink::dialects::common::{COMPONENT_INFORMATION_DATA, COMPONENT_METADATA_DATA};
 
-/// Longest address of a file \[bytes\].
+/// Longest URI \[bytes\].
 const URI_MAX: usize = 100;
 
-/// Where the general metadata is.
+/// Location of the general metadata file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ComponentMetadata {
     /// Time since power-up \[ms\].
     pub time_ms: u32,
-    /// CRC-32 of the file, as the file protocol calculates it.
+    /// CRC-32 of the file, as in MAVLink FTP.
     pub crc: u32,
-    /// Address of the file, with zeros behind it.
+    /// URI of the file, padded with zeros.
     pub uri: [u8; URI_MAX],
 }
 
 pub(super) const METADATA: Layout<COMPONENT_METADATA_DATA, ([u32; 2], [u8; URI_MAX])> = Layout::NEW;
-/// Time, checksum, checksum of the peripherals' file; address, address of the peripherals' file.
+/// Fields: time, checksum, checksum of the peripherals' file; URI, URI of the peripherals' file.
 pub(super) const INFORMATION: Layout<COMPONENT_INFORMATION_DATA, ([u32; 3], [u8; URI_MAX], Unused<URI_MAX>)> =
     Layout::NEW;
 
 impl ComponentMetadata {
-    /// Metadata at an address of up to 100 bytes.
+    /// Creates the message for a metadata file with a URI of up to 100 bytes.
     pub fn at(uri: &str, crc: u32) -> Self {
         let mut metadata = ComponentMetadata { time_ms: 0, crc, uri: [0; URI_MAX] };
         metadata.uri.iter_mut().zip(uri.bytes()).for_each(|(to, byte)| *to = byte);

@@ -1,11 +1,11 @@
-//! A packet of the file protocol: FILE_TRANSFER_PROTOCOL with its data.
+//! Packets of MAVLink FTP: FILE_TRANSFER_PROTOCOL with its data.
 
 use crate::address::Address;
 use crate::message::PAYLOAD_MAX;
 use crate::wire::Layout;
 use mavlink::dialects::common::FILE_TRANSFER_PROTOCOL_DATA;
 
-/// Most bytes of data in a packet.
+/// Largest number of data bytes in a packet.
 pub const FILE_DATA_MAX: usize = 239;
 
 /// `MAV_FTP_OPCODE`.
@@ -34,40 +34,40 @@ impl FileOpcode {
     pub const NAK: Self = FileOpcode(129);
 }
 
-/// A request or a response.
+/// An FTP request or response.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FilePacket {
-    /// Number of the request; of its response, the next one.
+    /// Sequence number; a response has the request's number plus one.
     pub sequence: u16,
-    /// Number of the session.
+    /// Session id.
     pub session: u8,
-    /// What it is.
+    /// Opcode of the packet.
     pub opcode: FileOpcode,
-    /// The operation that is answered; of a request, none.
+    /// Requested opcode in a response; none in a request.
     pub answered: FileOpcode,
-    /// True of the last packet of a burst.
+    /// True for the last packet of a burst.
     pub burst_complete: bool,
-    /// First byte in the file, or first entry of the directory.
+    /// Offset of the first byte in the file, or index of the first directory entry.
     pub offset: u32,
-    /// Number of bytes: of the data, or wanted.
+    /// Number of data bytes in the packet, or requested.
     pub size: u8,
-    /// The data, with whatever behind it.
+    /// Data; bytes beyond `size` have no meaning.
     pub bytes: [u8; FILE_DATA_MAX],
 }
 
-/// Network, receiver, number; session, operation, size, operation that is answered, "burst complete", padding; offset;
-/// data.
+/// Fields: network, receiver, sequence number; session, opcode, size, requested opcode, "burst complete", padding;
+/// offset; data.
 pub(super) const LAYOUT: Layout<FILE_TRANSFER_PROTOCOL_DATA, (u8, Address, u16, [u8; 6], u32, [u8; FILE_DATA_MAX])> =
     Layout::NEW;
 
 impl FilePacket {
-    /// A request without data.
+    /// Creates a request without data.
     pub const fn request(sequence: u16, opcode: FileOpcode, session: u8, offset: u32, size: u8) -> Self {
         let (answered, burst_complete, bytes) = (FileOpcode::NONE, false, [0; FILE_DATA_MAX]);
         FilePacket { sequence, session, opcode, answered, burst_complete, offset, size, bytes }
     }
 
-    /// The same with as much of `data` as fits.
+    /// Returns the packet with as much of `data` as fits.
     #[must_use]
     pub fn with(mut self, data: &[u8]) -> Self {
         let fits = data.get(..FILE_DATA_MAX).unwrap_or(data);
@@ -77,12 +77,12 @@ impl FilePacket {
         self
     }
 
-    /// Returns its data; none if it claims more than there can be.
+    /// Returns the packet's data; none if `size` is larger than possible.
     pub fn data(&self) -> Option<&[u8]> {
         self.bytes.get(..self.size.into())
     }
 
-    /// Reads the payload of the message; returns the receiver, too.
+    /// Reads the payload of the message; returns the packet and its receiver.
     pub fn read(payload: &[u8]) -> (Self, Address) {
         let (_, to, sequence, [session, opcode, size, answered, complete, _], offset, bytes) = LAYOUT.read(payload);
         let (opcode, answered) = (FileOpcode(opcode), FileOpcode(answered));

@@ -1,4 +1,4 @@
-//! Logs: LOG_ENTRY and LOG_DATA with their contents.
+//! Logs with their data: LOG_ENTRY and LOG_DATA.
 
 use crate::address::Address;
 use crate::message::{Fault, Message, MessageFormat, PAYLOAD_MAX};
@@ -6,38 +6,38 @@ use crate::wire::Layout;
 use mavlink::MessageData;
 use mavlink::dialects::common::{LOG_DATA_DATA, LOG_ENTRY_DATA};
 
-/// Most bytes in one LOG_DATA.
+/// Largest number of data bytes in one LOG_DATA.
 pub const LOG_DATA_MAX: usize = 90;
 
-/// LOG_ENTRY (118): one of the logs.
+/// LOG_ENTRY (118): description of one log.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LogEntry {
-    /// Its number, from 0 on.
+    /// Log id, from 0.
     pub log: u16,
-    /// How many there are.
+    /// Number of logs.
     pub count: u16,
-    /// The last number.
+    /// Last log id.
     pub last: u16,
-    /// When it was written, since 1970; 0 if that is unknown \[s\].
+    /// Time of the log since 1970; 0 if unknown \[s\].
     pub utc_s: u32,
-    /// Its size \[bytes\].
+    /// Size of the log \[bytes\].
     pub size: u32,
 }
 
 /// LOG_DATA (120): a part of a log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LogData {
-    /// Number of the log.
+    /// Log id.
     pub log: u16,
     /// Offset of the first byte.
     pub offset: u32,
-    /// Number of bytes; less than [`LOG_DATA_MAX`] in the last part.
+    /// Number of bytes; fewer than [`LOG_DATA_MAX`] in the last part.
     pub count: u8,
     /// The bytes.
     pub data: [u8; LOG_DATA_MAX],
 }
 
-/// Time, size; number, number of logs, last number.
+/// Fields: time, size; log id, number of logs, last log id.
 pub(super) const ENTRY: Layout<LOG_ENTRY_DATA, ([u32; 2], [u16; 3])> = Layout::NEW;
 pub(super) const DATA: Layout<LOG_DATA_DATA, (u32, u16, u8, [u8; LOG_DATA_MAX])> = Layout::NEW;
 
@@ -64,13 +64,13 @@ impl LogData {
     }
 }
 
-/// A message about logs: what a vehicle sends that has logs and no other files.
+/// A message about logs, for vehicles that have logs but no other files.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[allow(clippy::large_enum_variant, reason = "one at a time")]
 pub enum LogMessage {
-    /// One of the logs.
+    /// Description of a log.
     Entry(LogEntry),
-    /// A part of one.
+    /// A part of a log.
     Data(LogData),
 }
 

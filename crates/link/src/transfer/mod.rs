@@ -1,6 +1,5 @@
-//! Files and logs with their data: what vehicles with storage send beside [`Downlink`](crate::Downlink).
-//!
-//! A type of its own, so that the messages of a vehicle without storage stay small.
+//! Files and logs with their data, from vehicles with storage. They are separate from [`Downlink`](crate::Downlink), so
+//! that the messages of a vehicle without storage stay small.
 
 mod component;
 mod file;
@@ -27,7 +26,7 @@ pub enum Transfer {
     File {
         /// The packet.
         packet: FilePacket,
-        /// Who asked.
+        /// Address of the requester.
         to: Address,
     },
     /// LOG_ENTRY (118) or LOG_DATA (120).
@@ -36,7 +35,7 @@ pub enum Transfer {
     LogPart(StreamedLog),
     /// COMPONENT_METADATA (397).
     Metadata(ComponentMetadata),
-    /// COMPONENT_INFORMATION (395), its predecessor, with nothing of peripherals.
+    /// COMPONENT_INFORMATION (395), the predecessor, without metadata of peripherals.
     Information(ComponentMetadata),
 }
 

@@ -1,33 +1,33 @@
-//! A log while it is made: LOGGING_DATA and LOGGING_DATA_ACKED.
+//! Streaming of a log while it is recorded: LOGGING_DATA and LOGGING_DATA_ACKED.
 
 use crate::address::Address;
 use crate::message::PAYLOAD_MAX;
 use crate::wire::Layout;
 use mavlink::dialects::common::{LOGGING_DATA_ACKED_DATA, LOGGING_DATA_DATA};
 
-/// Most bytes in one part of a streamed log.
+/// Largest number of bytes in one part of a streamed log.
 pub const STREAM_DATA_MAX: usize = 249;
-/// What stands for "no record begins here".
+/// Value for "no record begins in this part".
 const NONE: u8 = u8::MAX;
 
-/// LOGGING_DATA (266) or LOGGING_DATA_ACKED (267): a part of a log that is made while it is sent.
+/// LOGGING_DATA (266) or LOGGING_DATA_ACKED (267): a part of a log that is streamed while it is recorded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct StreamedLog {
-    /// Who gets it.
+    /// Receiver.
     pub to: Address,
-    /// Its number; both messages are counted together.
+    /// Sequence number, which both messages share.
     pub sequence: u16,
     /// Number of bytes.
     pub length: u8,
-    /// Where in it the first record begins, if one does.
+    /// Offset at which the first record begins, if one does.
     pub first_record: Option<u8>,
-    /// The bytes.
+    /// Data; bytes beyond `length` have no meaning.
     pub data: [u8; STREAM_DATA_MAX],
-    /// True of LOGGING_DATA_ACKED, which LOGGING_ACK answers.
+    /// True for LOGGING_DATA_ACKED, which the receiver must acknowledge by LOGGING_ACK.
     pub to_be_acknowledged: bool,
 }
 
-/// Number; receiver, length, first record, bytes.
+/// Fields: sequence number; receiver, length, first record, data.
 type Fields = (u16, Address, u8, u8, [u8; STREAM_DATA_MAX]);
 pub(super) const SENT: Layout<LOGGING_DATA_DATA, Fields> = Layout::NEW;
 pub(super) const ACKED: Layout<LOGGING_DATA_ACKED_DATA, Fields> = Layout::NEW;

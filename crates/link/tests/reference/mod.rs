@@ -1,8 +1,8 @@
-//! Reference decoder, to compare `afbc_link::Decoder` with: finds the frames of a whole stream at once. It was written
-//! from MAVLink's specification (<https://mavlink.io/en/guide/serialization.html>) and the rules in the decoder's
-//! documentation only.
+//! Reference decoder for comparison with `afbc_link::Decoder`. It finds the frames of a whole stream at once. It was
+//! written only from MAVLink's specification (<https://mavlink.io/en/guide/serialization.html>) and the rules in the
+//! decoder's documentation.
 
-/// A frame with the right checksum.
+/// A frame with a correct checksum.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Frame {
     /// Incompatibility flags.
@@ -14,7 +14,7 @@ pub struct Frame {
     pub payload: Vec<u8>,
 }
 
-/// CRC-16/MCRF4XX, bit by bit.
+/// Computes the CRC-16/MCRF4XX bit by bit.
 pub fn crc(bytes: impl IntoIterator<Item = u8>) -> u16 {
     bytes.into_iter().fold(0xFFFF, |crc, byte| {
         (0..8).fold(crc ^ u16::from(byte), |crc, _| if crc & 1 == 1 { (crc >> 1) ^ 0x8408 } else { crc >> 1 })
@@ -22,7 +22,7 @@ pub fn crc(bytes: impl IntoIterator<Item = u8>) -> u16 {
 }
 
 impl Frame {
-    /// Returns the frame's bytes; a signature is not valid.
+    /// Returns the frame's bytes; a signature is filled with arbitrary bytes.
     pub fn bytes(&self, seed: u8) -> Vec<u8> {
         let Frame { flags, sequence, system, component, id, payload } = self;
         let mut bytes = vec![0xFD, payload.len() as u8, *flags, 0, *sequence, *system, *component];
@@ -34,13 +34,13 @@ impl Frame {
         bytes
     }
 
-    /// Returns where the frame that begins at `at` ends, if its header is complete.
+    /// Returns the end of a frame that begins at `at`; none if its header is incomplete.
     fn end(stream: &[u8], at: usize) -> Option<usize> {
         let header = stream.get(at..at + 10)?;
         Some(at + 10 + usize::from(header[1]) + 2 + if header[2] & 1 == 1 { 13 } else { 0 })
     }
 
-    /// Returns the frame at `at`, if it is complete and its checksum is right.
+    /// Returns the frame at `at`, if it is complete and its checksum is correct.
     fn read(stream: &[u8], at: usize, seed: &impl Fn(u32) -> Option<u8>) -> Option<Self> {
         let frame = stream.get(at..Self::end(stream, at)?)?;
         let id = u32::from_le_bytes([frame[7], frame[8], frame[9], 0]);
@@ -52,8 +52,8 @@ impl Frame {
     }
 }
 
-/// True if `stream` contains a frame with the right checksum that nobody sent: one that reaches across one of the
-/// `joints` between sent pieces. A checksum of 16 bits is right by chance once in 65,536 times.
+/// True if `stream` contains a frame with a correct checksum that nobody sent, which crosses one of the `joints`
+/// between sent pieces. A 16-bit checksum is correct by chance once in 65,536 times.
 pub fn any_by_chance(stream: &[u8], joints: &[usize], seed: impl Fn(u32) -> Option<u8>) -> bool {
     (0..stream.len()).filter(|&at| stream[at] == 0xFD).any(|at| {
         let end = Frame::end(stream, at).unwrap_or(at);
@@ -61,10 +61,10 @@ pub fn any_by_chance(stream: &[u8], joints: &[usize], seed: impl Fn(u32) -> Opti
     })
 }
 
-/// Returns all frames of `stream` with the right checksum that do not lie within another frame. `seed` gives a
-/// message's `CRC_EXTRA`, if it is known.
+/// Returns all frames of `stream` with a correct checksum that are not within another frame. `seed` returns a message's
+/// `CRC_EXTRA`, if known.
 pub fn frames(stream: &[u8], seed: impl Fn(u32) -> Option<u8>) -> Vec<Frame> {
-    // Position; end of the last frame that could not be checked; how much of the stream was needed to get here.
+    // Position; end of the last frame that could not be verified; number of bytes needed for the decisions so far.
     let (mut at, mut sealed, mut known) = (0, 0, 0);
     let mut frames = Vec::new();
     while at < stream.len() {
@@ -74,7 +74,7 @@ pub fn frames(stream: &[u8], seed: impl Fn(u32) -> Option<u8>) -> Vec<Frame> {
             continue;
         }
         let Some(end) = Frame::end(stream, at) else {
-            // The header is cut off by the end of the stream; the rest is shorter than a frame.
+            // The end of the stream cuts off the header; the rest is shorter than a frame.
             break;
         };
         known = known.max(at + 10);
@@ -82,7 +82,7 @@ pub fn frames(stream: &[u8], seed: impl Fn(u32) -> Option<u8>) -> Vec<Frame> {
             at += 1;
             continue;
         }
-        // Of two possible frames, here and behind the sealed bytes, the one that is complete first.
+        // Two frames are possible, here and after the skipped bytes: the one that is complete first counts.
         if at < sealed
             && let Some(other) = Frame::end(stream, sealed)
             && (known..end).contains(&other)
