@@ -1,12 +1,12 @@
-//! MPU-9250 with the magnetometer AK8963 in its package, by SPI (RM-MPU-9250A, MS1356).
+//! MPU-9250 with the magnetometer AK8963 in its package, over SPI (RM-MPU-9250A, MS1356).
 //!
-//! The MPU-9250 is as in [`crate::mpu`]. It is the master of a bus of its own, on which it has the AK8963 measure 100
-//! times a second (every tenth sample: it reads the last measurement, then writes CNTL1 for the next), +-4912 uT in 16
-//! bits. A measurement takes 7 to 9 ms, so the field is up to 11 ms older than the reading that has it. As each
-//! measurement is ordered anew, a magnetometer that was reset goes on by itself.
+//! [`crate::mpu`] describes the MPU-9250. Its auxiliary I2C master operates the AK8963: every tenth sample it reads the
+//! last measurement, then writes CNTL1 for the next. This gives 100 measurements per second of +-4912 uT in 16 bits. A
+//! measurement takes 7 to 9 ms, so the field is up to 11 ms older than the reading that contains it. Each measurement
+//! is commanded anew, so a magnetometer that was reset recovers by itself.
 //!
-//! One transfer reads both. A magnetometer that is missing, damaged or saturated is told in
-//! [`Mpu9250Reading::magnetic`], and never costs a reading of the IMU; its sensitivity is read at set-up alone.
+//! One transfer reads both. [`Mpu9250Reading::magnetic`] reports a magnetometer that is missing, damaged or saturated;
+//! this never costs an IMU reading. The magnetometer's sensitivity is read only at set-up.
 
 use crate::bus::SpiFormat;
 use crate::mpu::{ACCEL_XOUT_H, I2C_IF_DIS, LENGTH, Mpu9250, USER_CTRL};
@@ -17,19 +17,19 @@ use nalgebra::Vector3;
 /// MPU-9250 with AK8963.
 #[derive(Clone, Copy, Debug)]
 pub struct Mpu9250Ak8963 {
-    /// Factors of the magnetometer's axes, or why there are none.
+    /// Sensitivity factors of the magnetometer's axes, or the fault that prevented reading them.
     adjustment: Result<Vector3<f32>, PartFault>,
     last: [u8; MAGNETIC_LENGTH],
-    /// Readings since the last measurement of the field.
+    /// Number of readings since the last new measurement of the field.
     age: u32,
 }
 
-/// What both read.
+/// Reading of both parts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mpu9250Reading {
     /// Rates, specific force and temperature.
     pub inertial: InertialReading,
-    /// Field along the axes of the IMU, if it was measured anew, or what is wrong with the magnetometer.
+    /// New measurement of the field along the IMU's axes, if any, or the magnetometer's fault.
     pub magnetic: Result<Option<MagneticReading>, PartFault>,
 }
 
@@ -48,11 +48,11 @@ const I2C_SLV4_CTRL: u8 = 0x34;
 const I2C_SLV1_DO: u8 = 0x64;
 const I2C_MST_DELAY_CTRL: u8 = 0x67;
 
-/// Bit of USER_CTRL.
+/// Bit of USER_CTRL that enables the auxiliary I2C master.
 const I2C_MST_EN: u8 = 0x20;
-/// Bit of I2C_SLVx_CTRL, beside the number of bytes.
+/// Enable bit of I2C_SLVx_CTRL, combined with the number of bytes.
 const EN: u8 = 0x80;
-/// Bit of I2C_SLVx_ADDR.
+/// Read bit of I2C_SLVx_ADDR.
 const READ: u8 = 0x80;
 
 // Registers of the AK8963.
@@ -64,24 +64,24 @@ const CNTL2: u8 = 0x0B;
 const ASAX: u8 = 0x10;
 
 const IDENTITY: u8 = 0x48;
-/// Bit of ST1: a measurement has not been read.
+/// Bit of ST1: new measurement available.
 const DRDY: u8 = 0x01;
-/// Bits of ST2: the field is too strong, the measurement has 16 bits.
+/// Bits of ST2: magnetic overflow; 16-bit output.
 const HOFL: u8 = 0x08;
 const BITM: u8 = 0x10;
-/// Values of CNTL1, with 16 bits.
+/// Values of CNTL1, with 16-bit output.
 const POWER_DOWN: u8 = 0x10;
 const SINGLE: u8 = 0x11;
 const FUSE_ROM: u8 = 0x1F;
-/// Length of ST1, the field and ST2.
+/// Length of ST1, field and ST2 \[bytes\].
 const MAGNETIC_LENGTH: usize = 8;
-/// Strongest field that it reads.
+/// Largest field that the part can measure.
 const LSB_MAX: f32 = 32760.0;
 const UT_PER_LSB: f32 = 0.15;
-/// Readings without a measurement after which the magnetometer is late.
+/// Number of readings without a new measurement after which the magnetometer is reported as late.
 const AGE_MAX: u32 = 100;
 
-/// Joins two scripts whose lengths add up to `N`.
+/// Joins two scripts; `N` must be the sum of their lengths.
 const fn join<const N: usize>(first: &[Step], second: &[Step]) -> [Step; N] {
     let mut all = [Step::Wait(0); N];
     let (mut places, mut steps, mut others) = (all.as_mut_slice(), first, second);
@@ -97,11 +97,11 @@ const fn join<const N: usize>(first: &[Step], second: &[Step]) -> [Step; N] {
     all
 }
 
-/// The magnetometer's part of the set-up, register by register: those of the bus do not take blocks.
+/// Set-up of the magnetometer, one register per write: the registers of the auxiliary I2C do not accept blocks.
 const MAGNETOMETER: &[Step] = &[
     Step::Write(USER_CTRL, I2C_MST_EN | I2C_IF_DIS),
-    Step::Set(I2C_MST_CTRL, 0x1D), // 400 kHz, a stop between reads
-    // Single writes to it: reset, then access to its fuses.
+    Step::Set(I2C_MST_CTRL, 0x1D), // 400 kHz, stop between reads
+    // Single writes to the magnetometer: reset, then access to its fuse ROM.
     Step::Set(I2C_SLV4_ADDR, ADDRESS),
     Step::Write(I2C_SLV4_REG, CNTL2),
     Step::Write(I2C_SLV4_DO, 1),
@@ -111,7 +111,7 @@ const MAGNETOMETER: &[Step] = &[
     Step::Write(I2C_SLV4_DO, FUSE_ROM),
     Step::Write(I2C_SLV4_CTRL, EN),
     Step::Wait(5_000),
-    // Sensitivity and identity.
+    // Reads sensitivity and identity.
     Step::Write(I2C_SLV0_ADDR, READ | ADDRESS),
     Step::Write(I2C_SLV0_REG, ASAX),
     Step::Write(I2C_SLV1_ADDR, READ | ADDRESS),
@@ -120,13 +120,14 @@ const MAGNETOMETER: &[Step] = &[
     Step::Write(I2C_SLV1_CTRL, EN | 1),
     Step::Wait(5_000),
     Step::Read(ACCEL_XOUT_H, LENGTH + 4),
-    // None is enabled: where they put their answers is forgotten.
+    // Disables both slaves before they are set up anew, since their places among the data registers depend on the order
+    // of enabling.
     Step::Write(I2C_SLV0_CTRL, 0),
     Step::Write(I2C_SLV1_CTRL, 0),
     Step::Set(I2C_SLV4_DO, POWER_DOWN),
     Step::Write(I2C_SLV4_CTRL, EN),
     Step::Wait(5_000),
-    // Every tenth sample reads a measurement and orders the next.
+    // Every tenth sample reads a measurement and commands the next.
     Step::Set(I2C_SLV4_CTRL, 9),
     Step::Set(I2C_MST_DELAY_CTRL, 0b11),
     Step::Set(I2C_SLV0_ADDR, READ | ADDRESS),
@@ -134,7 +135,7 @@ const MAGNETOMETER: &[Step] = &[
     Step::Set(I2C_SLV1_ADDR, ADDRESS),
     Step::Set(I2C_SLV1_REG, CNTL1),
     Step::Set(I2C_SLV1_DO, SINGLE),
-    // Not read back: the part may stop a slave that does not acknowledge.
+    // Not read back: the MPU may disable a slave that does not acknowledge.
     Step::Write(I2C_SLV0_CTRL, EN | 8),
     Step::Write(I2C_SLV1_CTRL, EN | 1),
 ];
@@ -167,11 +168,11 @@ impl SensorPart for Mpu9250Ak8963 {
 }
 
 impl Mpu9250Ak8963 {
-    /// Takes ST1, the field and ST2, as they were read for the last time.
+    /// Takes the last read ST1, field and ST2.
     fn magnetic(&mut self, answer: [u8; MAGNETIC_LENGTH]) -> Result<Option<MagneticReading>, PartFault> {
         let adjustment = self.adjustment?;
         let [st1, field @ .., st2] = answer;
-        // An answer stands until the next one; noise makes them differ.
+        // The MPU keeps the last answer until the next one; noise makes two measurements differ.
         let is_new = st1 & DRDY != 0 && answer != self.last;
         (self.last, self.age) = (answer, if is_new { 0 } else { self.age.saturating_add(1) });
         if !is_new {
@@ -185,12 +186,12 @@ impl Mpu9250Ak8963 {
             return Err(PartFault::Range);
         }
         let field = field.component_mul(&adjustment) * UT_PER_LSB;
-        // Its x is the IMU's y, its y the IMU's x, and its z points the other way.
+        // The magnetometer's x is the IMU's y, its y is the IMU's x, and its z points the opposite way.
         Ok(Some(MagneticReading { field_ut: Vector3::new(field.y, field.x, -field.z) }))
     }
 }
 
-/// Returns the factors of the axes.
+/// Returns the sensitivity factors of the axes.
 fn adjustment(asa: [u8; 3], identity: u8) -> Result<Vector3<f32>, PartFault> {
     match identity {
         IDENTITY => (),

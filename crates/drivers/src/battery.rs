@@ -1,44 +1,45 @@
-//! A battery's voltage and current, at two pins of a converter: a divider, and the amplifier of a shunt or a Hall
-//! sensor, on the board or in a power module.
+//! A battery's voltage and current, measured at two ADC pins. A divider scales the voltage; the amplifier of a shunt or
+//! a Hall sensor, on the board or in a power module, gives the current.
 //!
-//! | fault | found by | then |
+//! | fault | detected by | result |
 //! |---|---|---|
-//! | nothing connected, the divider broken | less than 0.05 V at the pin of the voltage | no reading |
-//! | shorted to the supply, a battery beyond the divider | the last hundredth of the range | no reading |
-//! | the same of the current's pin, at its upper end | the last hundredth of the range | a reading without a current |
-//! | no converter | no reading for 2 s, which who reads it sees | no reading |
+//! | nothing connected, the divider broken | voltage pin below 0.05 V | no reading |
+//! | voltage pin shorted to supply, or battery voltage too high | last hundredth of the range | no reading |
+//! | current pin shorted to supply, or current too high | last hundredth of the range | a reading without a current |
+//! | ADC failed | no reading for 2 s, to be checked by the caller | no reading |
 //!
-//! Readings are filtered with a time constant of [`FILTER_S`], anew after each fault.
+//! Readings are low-pass filtered with the time constant [`FILTER_S`]. The filter restarts after each fault.
 
 use crate::part::PartFault;
 
-/// Time constant of the filter \[s\]: several periods of the motor controllers, and less than a battery sags in.
+/// Time constant of the filter \[s\]: several periods of the motor controllers, but shorter than the battery's voltage
+/// sag.
 pub const FILTER_S: f32 = 0.2;
-/// Least voltage at the pin of the voltage \[V\].
+/// Lowest plausible voltage at the voltage pin \[V\].
 const LEAST_V: f32 = 0.05;
-/// Shares of the converter's range beyond which it is at its end.
+/// Share of the ADC's range above which a pin counts as saturated.
 const SHARE_MAX: f32 = 0.99;
 
-/// Voltages at the pins \[V\].
+/// Voltages at the ADC pins \[V\].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BatteryPins {
-    /// That of the battery's voltage.
+    /// Voltage pin.
     pub voltage_v: f32,
-    /// That of its current, if it is measured.
+    /// Current pin, if the current is measured.
     pub current_v: Option<f32>,
 }
 
-/// What a volt at the pins stands for.
+/// Scale factors from pin voltages to the battery.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BatteryScale {
-    /// Volts of the battery.
+    /// Battery volts per volt at the pin.
     pub volts_per_volt: f32,
-    /// Amperes, from 0 at 0 V.
+    /// Battery amperes per volt at the pin; 0 A at 0 V.
     pub amperes_per_volt: f32,
 }
 
 impl BatteryScale {
-    /// Returns this scale with those of the numbers `told` that are above 0.
+    /// Returns this scale with the given factors that are above 0; the others stay.
     #[must_use]
     pub fn changed(self, [volts_per_volt, amperes_per_volt]: [f32; 2]) -> Self {
         let told = |told: f32, own| if told > 0.0 { told } else { own };
@@ -48,34 +49,34 @@ impl BatteryScale {
         }
     }
 
-    /// Returns voltage \[V\] and current \[A\] of the battery.
+    /// Returns the battery's voltage \[V\] and current \[A\].
     #[must_use]
     pub fn read(&self, pins: &BatteryPins) -> (f32, Option<f32>) {
         (pins.voltage_v * self.volts_per_volt, pins.current_v.map(|volts| volts * self.amperes_per_volt))
     }
 }
 
-/// Makes readings of a converter's numbers.
+/// Converts ADC samples to readings.
 #[derive(Clone, Copy, Debug)]
 pub struct BatterySensor {
-    /// Voltage at the end of the converter's range \[V\].
+    /// Full-scale voltage of the ADC \[V\].
     range_v: f32,
-    /// Newest reading, with its time \[us\].
+    /// Newest reading and its time \[us\].
     last: Option<(u64, BatteryPins)>,
 }
 
 impl BatterySensor {
-    /// One on a converter of this range \[V\].
+    /// Creates a sensor for an ADC with this full-scale voltage \[V\].
     #[must_use]
     pub const fn new(range_v: f32) -> Self {
         BatterySensor { range_v, last: None }
     }
 
-    /// Takes the numbers of voltage and current, of which `end` is the converter's largest, and returns the filtered
-    /// voltages at the pins.
+    /// Takes samples of voltage and current, on an ADC whose largest number is `end`. Returns the filtered pin
+    /// voltages.
     ///
     /// # Errors
-    /// The voltage is none of a battery.
+    /// If the voltage cannot be a battery's.
     pub fn take(&mut self, at_us: u64, numbers: [u16; 2], end: u16) -> Result<BatteryPins, PartFault> {
         let [voltage, current] = numbers.map(|number| f32::from(number) / f32::from(end.max(1)));
         let (least, most) = (LEAST_V / self.range_v, SHARE_MAX);

@@ -1,14 +1,15 @@
-//! Bosch BMI270, by SPI (BST-BMI270-DS000).
+//! Bosch BMI270, over SPI (BST-BMI270-DS000).
 //!
-//! +-2000 deg/s and +-16 g, both at 1.6 kHz behind filters of the part in their performance mode, oversampled twice
-//! (OSR2), which halves the bandwidth of its normal filters. The interrupt INT1 is a pulse, active high, for each
+//! +-2000 deg/s and +-16 g, both at 1.6 kHz. The part's filters run in performance mode with two-fold oversampling
+//! (OSR2), which halves the bandwidth of its normal filters. The interrupt INT1 gives an active-high pulse for each
 //! sample.
 //!
-//! The part works only after a configuration of 8 KiB was loaded into it, which takes 7 ms at 10 MHz. It is Bosch's
-//! (Copyright 2023 Bosch Sensortec GmbH, BSD-3-Clause, `bmi270_config_file` of its `BMI270_SensorAPI`), as the crate
-//! `bmi2` has it. A sender over DMA must take the block from flash in one transfer.
+//! The part works only after a configuration of 8 KiB was loaded, which takes 7 ms at 10 MHz. It is Bosch's (Copyright
+//! 2023 Bosch Sensortec GmbH, BSD-3-Clause, `bmi270_config_file` of its `BMI270_SensorAPI`), taken from the crate
+//! `bmi2`. With DMA, the block must be sent from flash in one transfer.
 //!
-//! The axis x of the gyroscope senses a little of z; the part tells how much (GYR_CAS), and the reading is corrected.
+//! The gyroscope's x axis is slightly sensitive to z. The register GYR_CAS gives the cross-sensitivity, and the reading
+//! is corrected.
 
 use crate::bus::SpiFormat;
 use crate::part::{PartFault, SelfTest, SensorPart, Step};
@@ -19,16 +20,16 @@ use bmi2::config::BMI270_CONFIG_FILE;
 /// BMI270.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Bmi270 {
-    /// How much of z is in x of the gyroscope.
+    /// Cross-sensitivity of the gyroscope's x axis to z.
     zx: f32,
-    /// Temperature at the last cycle.
+    /// Temperature in the last cycle.
     temperature_c: Option<f32>,
 }
 
 const CHIP_ID: u8 = 0x00;
 const DATA_8: u8 = 0x0C;
 const INTERNAL_STATUS: u8 = 0x21;
-/// On page 0 of the features, the one after a reset.
+/// On feature page 0, which is selected after a reset.
 const GYR_CAS: u8 = 0x3C;
 const ACC_CONF: u8 = 0x40;
 const ACC_RANGE: u8 = 0x41;
@@ -44,10 +45,10 @@ const PWR_CONF: u8 = 0x7C;
 const PWR_CTRL: u8 = 0x7D;
 const CMD: u8 = 0x7E;
 
-/// Bits of INTERNAL_STATUS, and what they are when the configuration works.
+/// Mask of INTERNAL_STATUS, and its value once the configuration works.
 const MESSAGE: u8 = 0x0F;
 const INIT_OK: u8 = 1;
-/// A temperature that has not been measured yet.
+/// Raw value of a temperature that has not been measured yet.
 const INVALID: i16 = i16::MIN;
 const RAD_S_PER_LSB: f32 = 2000.0 / 32768.0 * core::f32::consts::PI / 180.0;
 const M_S2_PER_LSB: f32 = 16.0 / 32768.0 * 9.806_65;
@@ -58,10 +59,10 @@ impl SensorPart for Bmi270 {
     const SPI: Option<SpiFormat> = Some(SpiFormat { read: 0x80, write: 0, dummies: 1, clock_hz: 10_000_000 });
     const I2C: &'static [u8] = &[];
     const STUCK_AFTER: u32 = 20;
-    /// Of the accelerometer, as the data sheet has it: pushed to either side in turn, at 16 g and 1.6 kHz. The
-    /// gyroscope's needs another feature of the configuration, and is not run.
+    /// Self-test of the accelerometer as in the data sheet: deflection to either side in turn, at 16 g and 1.6 kHz. The
+    /// gyroscope's self-test needs another feature of the configuration and is not run.
     const SELF_TEST: Option<SelfTest<InertialReading>> = Some(SelfTest {
-        // Enabled, large, to the negative side.
+        // Enabled, large amplitude, negative direction.
         quiet: &[Step::Write(ACC_SELF_TEST, 0b1001), Step::Wait(50_000)],
         trims: &[],
         between: &[],
@@ -75,36 +76,36 @@ impl SensorPart for Bmi270 {
         },
     });
     const SETUP: &'static [Step] = &[
-        Step::Await(CHIP_ID, 0, 0, 0), // reads once: the edge of the select line turns I2C into SPI
+        Step::Await(CHIP_ID, 0, 0, 0), // dummy read: the edge of chip select switches from I2C to SPI
         Step::Wait(450),
         Step::Write(CMD, 0xB6), // soft reset, back to I2C
         Step::Wait(2_000),
         Step::Await(CHIP_ID, 0, 0, 0),
         Step::Wait(450),
         Step::Identify(CHIP_ID, &[0x24]),
-        Step::Set(PWR_CONF, 0), // no power saving, which would lose writes
+        Step::Set(PWR_CONF, 0), // power saving off, since it would lose writes
         Step::Wait(450),
         Step::Write(INIT_CTRL, 0),
         Step::WriteAll(INIT_DATA, &BMI270_CONFIG_FILE),
         Step::Write(INIT_CTRL, 1),
         Step::Wait(20_000),
         Step::Await(INTERNAL_STATUS, MESSAGE, INIT_OK, 150),
-        Step::Set(ACC_CONF, 0x9C),       // performance, OSR2, 1.6 kHz
+        Step::Set(ACC_CONF, 0x9C),       // performance mode, OSR2, 1.6 kHz
         Step::Set(ACC_RANGE, 3),         // 16 g
-        Step::Set(GYR_CONF, 0xDC),       // performance of noise and filter, OSR2, 1.6 kHz
+        Step::Set(GYR_CONF, 0xDC),       // performance mode for noise and filter, OSR2, 1.6 kHz
         Step::Set(GYR_RANGE, 0),         // 2000 deg/s
         Step::Set(INT1_IO_CTRL, 0b1010), // output, push-pull, active high
         Step::Set(INT_LATCH, 0),
         Step::Set(INT_MAP_DATA, 0b100), // data ready on INT1
         Step::Set(PWR_CTRL, 0b1110),    // accelerometer, gyroscope, temperature
-        Step::Wait(50_000),             // until the gyroscope turns steadily; it reads 0 before
+        Step::Wait(50_000),             // gyroscope start-up; it reads 0 before
         Step::Read(GYR_CAS, 1),
     ];
     const CYCLE: &'static [Step] = &[Step::Ready(1_250), Step::Read(DATA_8, 12), Step::Read(INTERNAL_STATUS, 3)];
 
     fn take(&mut self, register: u8, answer: &[u8]) -> Result<Option<InertialReading>, PartFault> {
         match (register, answer) {
-            // Seven bits with a sign, in 1/512.
+            // Signed seven-bit number in units of 1/512.
             (GYR_CAS, &[cas]) => self.zx = f32::from((cas << 1).cast_signed() >> 1) / 512.0,
             (INTERNAL_STATUS, &[status, t0, t1]) => {
                 if status & MESSAGE != INIT_OK {
@@ -117,7 +118,7 @@ impl SensorPart for Bmi270 {
                 let force = little(force.try_into().map_err(|_| PartFault::Bus)?);
                 let mut rates = little([r0, r1, r2, r3, r4, r5]);
                 rates.x = (rates.x - self.zx * rates.z).clamp(-32768.0, 32767.0);
-                // None in the first cycle: status and temperature are read behind the data.
+                // None in the first cycle: status and temperature are read after the data.
                 return Ok(self.temperature_c.map(|temperature_c| InertialReading {
                     rates_rad_s: rates * RAD_S_PER_LSB,
                     specific_force_m_s2: force * M_S2_PER_LSB,

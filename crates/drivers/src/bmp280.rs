@@ -1,26 +1,26 @@
-//! Bosch BMP280, by I2C (BST-BMP280-DS001).
+//! Bosch BMP280, over I2C (BST-BMP280-DS001).
 //!
-//! 300 to 1100 hPa and -40 to 85 degrees C, some 40 times a second: a temperature of one sample and a pressure of 8,
-//! without the part's own filter. It has no interrupt and no flag of a new reading, so each is ordered (forced mode).
-//! The coefficients have no checksum, so they are read twice. What is set stays set but for one register, which is read
-//! in each cycle: after a reset it reads differently.
+//! 300 to 1100 hPa and -40 to 85 degrees C, about 40 times per second: one sample of temperature and 8 of pressure,
+//! without the part's own filter. The part has no interrupt and no data-ready flag, so each measurement is commanded
+//! (forced mode). The coefficients have no checksum, so they are read twice. One register is set to a value other than
+//! its default and checked in each cycle, to detect a reset.
 //!
-//! By SPI, a write clears the highest bit of its register's address, which [`SpiFormat`] cannot say.
+//! Not over SPI: there, writes use register addresses with the highest bit cleared, which [`SpiFormat`] cannot express.
 
 use crate::bus::SpiFormat;
 use crate::part::{PartFault, SensorPart, Step};
 use crate::reading::{PressureReading, in_range};
 
-/// The part.
+/// BMP280.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Bmp280 {
-    /// The coefficients as they were read last.
+    /// Raw coefficients as last read.
     raw: [u8; CALIBRATION_LENGTH],
-    /// What they mean, if they were read twice alike.
+    /// Decoded coefficients, if two reads agreed.
     coefficients: Option<Coefficients>,
 }
 
-/// As the data sheet's table 17 names them.
+/// Coefficients, named as in table 17 of the data sheet.
 #[derive(Clone, Copy, Debug)]
 struct Coefficients {
     t1: f32,
@@ -37,7 +37,7 @@ struct Coefficients {
     p9: f32,
 }
 
-/// dig_T1 to dig_P9.
+/// Address of the coefficients dig_T1 to dig_P9.
 const CALIBRATION: u8 = 0x88;
 const CALIBRATION_LENGTH: usize = 24;
 const ID: u8 = 0xD0;
@@ -49,16 +49,16 @@ const PRESS_MSB: u8 = 0xF7;
 
 const IDENTITY: u8 = 0x58;
 const SOFT_RESET: u8 = 0xB6;
-/// Bits of STATUS: it measures, it copies its calibration.
+/// Bits of STATUS: measuring; copying the calibration.
 const MEASURING: u8 = 0x08;
 const IM_UPDATE: u8 = 0x01;
-/// Temperature once, pressure 8 times, now.
+/// Value of CTRL_MEAS: temperature once, pressure 8 times, forced mode.
 const FORCED: u8 = 0b0011_0001;
-/// Filter off. The pause between measurements, which are ordered here, means nothing: it tells that the part was reset.
+/// Filter off. The standby time has no effect in forced mode; it only differs from its default, to detect a reset.
 const CONFIG_VALUE: u8 = 0b0010_0000;
 /// Longest measurement: 1.25 + 2.3 + 8 * 2.3 + 0.575 ms (section 3.8.1).
 const MEASUREMENT_US: u32 = 22_600;
-/// What has not been measured reads.
+/// Raw value without a measurement.
 const SKIPPED: u32 = 0x80000;
 const RANGE_PA: [f32; 2] = [30_000.0, 110_000.0];
 const RANGE_C: [f32; 2] = [-40.0, 85.0];
@@ -71,7 +71,7 @@ impl SensorPart for Bmp280 {
     const STUCK_AFTER: u32 = 20;
     const SETUP: &'static [Step] = &[
         Step::Write(RESET, SOFT_RESET),
-        Step::Wait(3_000), // 2 ms, and some
+        Step::Wait(3_000), // 2 ms and a margin
         Step::Identify(ID, &[IDENTITY]),
         Step::Await(STATUS, IM_UPDATE, 0, 10),
         Step::Read(CALIBRATION, CALIBRATION_LENGTH),
@@ -82,7 +82,7 @@ impl SensorPart for Bmp280 {
         Step::Write(CTRL_MEAS, FORCED),
         Step::Wait(MEASUREMENT_US),
         Step::Await(STATUS, MEASURING, 0, 5),
-        Step::Await(CONFIG, 0xFF, CONFIG_VALUE, 0), // not reset
+        Step::Await(CONFIG, 0xFF, CONFIG_VALUE, 0), // checks that no reset has occurred
         Step::Read(PRESS_MSB, 6),
     ];
 
@@ -125,7 +125,7 @@ impl Coefficients {
         }
     }
 
-    /// Section 8.1, with the powers of 2 gathered. A `p1` of 0 gives no number, which is out of range.
+    /// Computes section 8.1 with the powers of 2 combined. A `p1` of 0 gives NaN or infinity, which is out of range.
     fn compensate(&self, pressure: f32, temperature: f32) -> PressureReading {
         let Coefficients { t1, t2, t3, p1, p2, p3, p4, p5, p6, p7, p8, p9 } = *self;
         let above = temperature / 16_384.0 - t1 / 1_024.0;

@@ -1,8 +1,8 @@
-//! Bosch BMP388 and BMP390, by SPI or I2C (BST-BMP388-DS001 and BST-BMP390-DS002, both with the same registers).
+//! Bosch BMP388 and BMP390, over SPI or I2C (BST-BMP388-DS001 and BST-BMP390-DS002). Both have the same registers.
 //!
-//! 300 to 1250 hPa and -40 to 85 degrees C at 50 Hz: pressures of 8 samples and temperatures of one, as many as that
-//! rate leaves time for. The part's own filter is off: it would only add delay. The interrupt is not used, the ready
-//! flags are. The coefficients have a CRC-8 in the register before them, which the maker's self-test checks.
+//! 300 to 1250 hPa and -40 to 85 degrees C at 50 Hz: 8 samples of pressure and one of temperature, the most that this
+//! rate has time for. The part's own filter is off, since it would only add delay. The ready flags are polled; the
+//! interrupt is not used. The coefficients have a CRC-8 in the register before them, as in Bosch's self-test.
 
 use crate::bus::SpiFormat;
 use crate::part::{PartFault, SensorPart, Step};
@@ -13,14 +13,14 @@ pub type Bmp388 = Bmp3<0x50>;
 /// BMP390.
 pub type Bmp390 = Bmp3<0x60>;
 
-/// A part of the family, by what its register CHIP_ID says.
+/// A part of the family, with the given value of CHIP_ID.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Bmp3<const IDENTITY: u8> {
-    /// Those of a calibration whose CRC is right.
+    /// Coefficients, if their CRC is correct.
     coefficients: Option<Coefficients>,
 }
 
-/// As the data sheet's section 9.1 names and scales them.
+/// Coefficients, named and scaled as in section 9.1 of the data sheet.
 #[derive(Clone, Copy, Debug)]
 struct Coefficients {
     t1: f32,
@@ -46,13 +46,13 @@ const PWR_CTRL: u8 = 0x1B;
 const OSR: u8 = 0x1C;
 const ODR: u8 = 0x1D;
 const CONFIG: u8 = 0x1F;
-/// The CRC, which the data sheet does not name, and after it NVM_PAR_T1 to NVM_PAR_P11.
+/// The CRC, which the data sheet does not name, followed by NVM_PAR_T1 to NVM_PAR_P11.
 const CALIBRATION: u8 = 0x30;
 const CALIBRATION_LENGTH: usize = 22;
 const CMD: u8 = 0x7E;
 
 const SOFTRESET: u8 = 0xB6;
-/// drdy_temp and drdy_press.
+/// Bits of STATUS: drdy_temp and drdy_press.
 const DRDY: u8 = 0x60;
 const RANGE_PA: [f32; 2] = [30_000.0, 125_000.0];
 const RANGE_C: [f32; 2] = [-40.0, 85.0];
@@ -65,19 +65,19 @@ impl<const IDENTITY: u8> SensorPart for Bmp3<IDENTITY> {
     const STUCK_AFTER: u32 = 20;
     const SETUP: &'static [Step] = &[
         Step::Write(CMD, SOFTRESET),
-        Step::Wait(5_000), // 2 ms, and some
+        Step::Wait(5_000), // 2 ms and a margin
         Step::Identify(CHIP_ID, &[IDENTITY]),
         Step::Read(CALIBRATION, CALIBRATION_LENGTH),
         Step::Set(OSR, 0b000_011), // temperature once, pressure 8 times
         Step::Set(ODR, 0x02),      // 50 Hz
         Step::Set(CONFIG, 0),
-        Step::Set(PWR_CTRL, 0x33), // both, normal mode
+        Step::Set(PWR_CTRL, 0x33), // pressure and temperature, normal mode
     ];
     const CYCLE: &'static [Step] = &[Step::Wait(17_000), Step::Await(STATUS, DRDY, DRDY, 23), Step::Read(DATA_0, 6)];
 
     fn take(&mut self, register: u8, answer: &[u8]) -> Result<Option<PressureReading>, PartFault> {
         if register == CALIBRATION {
-            // A damaged calibration must not leave that of the last set-up in use.
+            // Discards the coefficients of the last set-up, which must not stay in use if the new ones are damaged.
             self.coefficients = None;
             let (&check, trim) = answer.split_first().ok_or(PartFault::Bus)?;
             if crc(trim) != check {
@@ -128,12 +128,12 @@ impl Coefficients {
     }
 }
 
-/// Returns a power of 2, of -126 to 127.
+/// Returns two to this power, which must be within -126 to 127.
 const fn exp2(power: i32) -> f32 {
     f32::from_bits(((127 + power) << 23).cast_unsigned())
 }
 
-/// CRC-8 of SAE J1850: 0x1D, from all ones, inverted.
+/// Returns the CRC-8 of SAE J1850: polynomial 0x1D, initially all ones, inverted.
 fn crc(bytes: &[u8]) -> u8 {
     !bytes
         .iter()

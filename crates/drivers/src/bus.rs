@@ -1,47 +1,48 @@
-//! Registers behind SPI or I2C.
+//! Register access over SPI or I2C.
 
 use embedded_hal_async::i2c::I2c;
 use embedded_hal_async::spi::{Operation, SpiDevice};
 
 /// Longest answer to a [`Step::Read`](crate::Step::Read) \[bytes\].
 pub const READ_MAX: usize = 32;
-/// Longest block that I2C writes \[bytes\].
+/// Longest block for a write over I2C \[bytes\].
 const BLOCK_MAX: usize = 31;
 
-/// A part's registers.
+/// Registers of a part.
 #[allow(async_fn_in_trait, reason = "used generically, never boxed")]
 pub trait Registers {
-    /// Reads from `register` on.
+    /// Reads consecutive registers, beginning with `register`.
     ///
     /// # Errors
-    /// The transfer fails.
+    /// If the transfer fails.
     async fn read(&mut self, register: u8, into: &mut [u8]) -> Result<(), BusError>;
 
-    /// Writes from `register` on, in one transfer; without bytes it is a command.
+    /// Writes consecutive registers, beginning with `register`, in one transfer. Without bytes, sends `register` as a
+    /// command.
     ///
     /// # Errors
-    /// The transfer fails.
+    /// If the transfer fails.
     async fn write(&mut self, register: u8, bytes: &[u8]) -> Result<(), BusError>;
 }
 
-/// A transfer has failed: no answer, a collision, an overrun.
+/// A failed transfer: no acknowledgement, lost arbitration or an overrun.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BusError;
 
-/// How a part is read over SPI.
+/// Frame format of a part on SPI.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SpiFormat {
-    /// Bits of the first byte that make a read of it.
+    /// Bits set in the first byte of a read.
     pub read: u8,
-    /// Bits of the first byte that make a write of several registers of it.
+    /// Bits set in the first byte of a write.
     pub write: u8,
-    /// Bytes that the part sends in front of its answer, at most 1.
+    /// Dummy bytes before the answer, at most 1.
     pub dummies: usize,
-    /// Highest clock at which all of its registers work \[Hz\].
+    /// Highest clock for all registers \[Hz\].
     pub clock_hz: u32,
 }
 
-/// Registers behind SPI. Mode 3 suits every part of this crate.
+/// Registers behind SPI. All parts of this crate work in mode 3.
 #[derive(Debug)]
 pub struct SpiRegisters<D> {
     device: D,
@@ -49,7 +50,7 @@ pub struct SpiRegisters<D> {
 }
 
 impl<D> SpiRegisters<D> {
-    /// The registers of a device.
+    /// Creates access to the registers of a device.
     pub fn new(device: D, format: SpiFormat) -> Self {
         SpiRegisters { device, format }
     }
@@ -57,7 +58,7 @@ impl<D> SpiRegisters<D> {
 
 impl<D: SpiDevice> Registers for SpiRegisters<D> {
     async fn read(&mut self, register: u8, into: &mut [u8]) -> Result<(), BusError> {
-        // One transfer, since each costs a DMA's set-up.
+        // A single transfer, since each one costs a DMA set-up.
         let mut frame = [0; 2 + READ_MAX];
         let head = 1 + self.format.dummies;
         let frame = frame.get_mut(..head + into.len()).ok_or(BusError)?;
@@ -72,7 +73,7 @@ impl<D: SpiDevice> Registers for SpiRegisters<D> {
         match *bytes {
             [] => self.device.write(&[head]).await,
             [byte] => self.device.write(&[head, byte]).await,
-            // In two parts, so that a block stays where it is: the BMI270's has 8 KiB.
+            // Two operations, so that a block is not copied: the BMI270's has 8 KiB.
             _ => self.device.transaction(&mut [Operation::Write(&[head]), Operation::Write(bytes)]).await,
         }
         .map_err(|_| BusError)
@@ -83,12 +84,12 @@ impl<D: SpiDevice> Registers for SpiRegisters<D> {
 #[derive(Debug)]
 pub struct I2cRegisters<I> {
     bus: I,
-    /// Seven bits.
+    /// Seven-bit address.
     address: u8,
 }
 
 impl<I> I2cRegisters<I> {
-    /// The registers of the part at `address`, of seven bits.
+    /// Creates access to the part at the seven-bit `address`.
     pub fn new(bus: I, address: u8) -> Self {
         I2cRegisters { bus, address }
     }

@@ -1,13 +1,14 @@
-//! A part's interrupt, and the board's clock while none comes: a broken wire costs a little time, no part.
+//! Reading at a part's data-ready interrupt, or by the board's clock if no interrupt comes. A broken interrupt wire
+//! thus costs only a little delay.
 
 use crate::driver::PartTiming;
 use embassy_futures::select::{Either, select};
 
-/// The pin of a part's interrupt.
+/// Pin of a data-ready interrupt.
 #[allow(async_fn_in_trait, reason = "used generically, never boxed")]
 pub trait Edge {
-    /// Waits for the next edge, and returns its time since power-up \[us\]. Edges count from the call on; it may be
-    /// given up.
+    /// Waits for the next edge and returns its time since power-up \[us\]. Only edges after the call count. The future
+    /// may be dropped.
     async fn next(&mut self) -> u64;
 }
 
@@ -17,41 +18,41 @@ impl<E: Edge> Edge for &mut E {
     }
 }
 
-/// The timing of a part whose interrupt is wired.
+/// Timing of a part whose interrupt is wired.
 ///
-/// A part that measures as often as it is wanted is read at each of its edges. One that measures more often is read
-/// once in a period of the board's clock, at the first edge after its beginning: so no reading is left out and none is
-/// there twice. Either reading has the time of its edge.
+/// A part that measures at the wanted rate is read at each edge. A faster part is read once per period of the board's
+/// clock, at the first edge in the period, so that there is exactly one reading per period. A reading has the time of
+/// its edge.
 ///
-/// When no edge comes within two periods, the part is read by the clock, at the beginning of each period, without a
-/// time of its own, until there is an edge again. An edge that comes within a quarter of the time of a sample after the
-/// last one is noise on the wire, and counts as none.
+/// If no edge comes within two periods, the part is read at the beginning of each period, without an interrupt time,
+/// until there is an edge again. An edge within a quarter of a sample time after the last edge is noise and is ignored.
 #[derive(Debug)]
 pub struct DataReady<E, C> {
     edge: E,
     clock: C,
-    /// Period of the clock \[us\].
+    /// Period of the board's clock \[us\].
     period_us: u32,
-    /// True if the last wait has met an edge.
+    /// True if the last wait ended with a valid edge.
     is_wired: bool,
-    /// Time of the edge for which the last wait has waited.
+    /// Time of the edge found by the last wait.
     edge_us: Option<u64>,
-    /// Time of the last edge.
+    /// Time of the last edge, valid or not.
     last_us: Option<u64>,
 }
 
 impl<E: Edge, C: PartTiming> DataReady<E, C> {
-    /// A part with this pin, on a board whose `clock` is ready at the beginning of every period of so many \[us\].
+    /// Creates the timing of a part with this pin. The board's `clock` is ready at the beginning of every period of
+    /// `period_us`.
     pub fn new(edge: E, clock: C, period_us: u32) -> Self {
         DataReady { edge, clock, period_us, is_wired: false, edge_us: None, last_us: None }
     }
 
-    /// True if the last wait has met an edge.
+    /// True if the last wait ended with a valid edge.
     pub fn is_wired(&self) -> bool {
         self.is_wired
     }
 
-    /// Waits for an edge, at most until so many periods have begun.
+    /// Waits for an edge, at most until this number of periods has begun.
     async fn edge(&mut self, us: u32, periods: u32) -> Option<u64> {
         let DataReady { edge, clock, .. } = self;
         let end = async {
@@ -75,14 +76,14 @@ impl<E: Edge, C: PartTiming> PartTiming for DataReady<E, C> {
         self.clock.wait(us).await;
     }
 
-    /// Waits as the type says; `us` is twice the time of a sample.
+    /// Waits as described at [`DataReady`]; `us` is twice the sample time.
     async fn ready(&mut self, us: u32) -> bool {
         let is_faster = us < self.period_us.saturating_mul(2);
         self.edge_us = None;
         if is_faster && self.is_wired {
             self.clock.ready(us).await;
         }
-        // Two in all: a faster part has waited for one of them already. Without edges the clock alone counts.
+        // Two periods in all: a faster part has already waited for one of them. Without edges, only the clock counts.
         let periods = if self.is_wired && !is_faster { 2 } else { 1 };
         let edge_us = self.edge(us, periods).await;
         let sample_us = u64::from(us / 2);
@@ -90,7 +91,7 @@ impl<E: Edge, C: PartTiming> PartTiming for DataReady<E, C> {
             |edge_us: u64| self.last_us.is_some_and(|last_us| edge_us < last_us.saturating_add(sample_us / 4));
         match edge_us {
             Some(edge_us) if is_noise(edge_us) => {
-                // Bounded, whatever the wire does.
+                // Waits for the clock, so that noise on the wire cannot cause readings without limit.
                 self.clock.ready(us).await;
                 self.is_wired = false;
             }

@@ -1,14 +1,15 @@
-//! Infineon DPS310 (data sheet V1.2) and Goertek SPL06-001, by SPI or I2C. Both have the same core and the same
-//! identity, so a board has to know which one it has.
+//! Infineon DPS310 (data sheet V1.2) and Goertek SPL06-001, over SPI or I2C. Both have the same core and the same
+//! identity, so the board must know its part.
 //!
 //! 300 to 1200 hPa and -40 to 85 degrees C. Pressure at 32 Hz, each the mean of 16 samples (about 0.35 Pa rms);
-//! temperature at 8 Hz, of 4 samples: 0.95 s of measuring a second, within the 1 s of section 4.4. No filter beyond
-//! that mean. The interrupt is not used, the ready flag is. The coefficients have no checksum, so they are read twice.
+//! temperature at 8 Hz, the mean of 4 samples. Measuring takes 0.95 s per second, within the 1 s of section 4.4. No
+//! further filter. The ready flag is polled; the interrupt is not used. The coefficients have no checksum, so they are
+//! read twice.
 //!
 //! | | DPS310 | SPL06-001 |
 //! |---|---|---|
-//! | sensor that the coefficients are for | as TMP_COEF_SRCE says | that of the pressure element |
-//! | temperature fuses | enabled by five writes, as Infineon's library does | |
+//! | temperature sensor of the coefficients | selected by TMP_COEF_SRCE | the one in the pressure element |
+//! | temperature fuses | enabled by five writes, as in Infineon's library | no writes needed |
 
 use crate::bus::SpiFormat;
 use crate::part::{PartFault, SensorPart, Step};
@@ -19,16 +20,16 @@ pub type Dps310 = Dps3xx<false>;
 /// SPL06-001.
 pub type Spl06 = Dps3xx<true>;
 
-/// One of the two, a SPL06-001 if that is true.
+/// A DPS310, or an SPL06-001 if `IS_SPL06`.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Dps3xx<const IS_SPL06: bool> {
-    /// The coefficients as they were read last.
+    /// Raw coefficients as last read.
     raw: [u8; COEF_LENGTH],
-    /// What they mean, if they were read twice alike.
+    /// Decoded coefficients, if two reads agreed.
     coefficients: Option<Coefficients>,
 }
 
-/// As sections 4.9.1 and 4.9.2 name them.
+/// Coefficients, named as in sections 4.9.1 and 4.9.2.
 #[derive(Clone, Copy, Debug)]
 struct Coefficients {
     c0: f32,
@@ -54,22 +55,22 @@ const COEF_SRCE: u8 = 0x28;
 
 const PROD_ID: u8 = 0x10;
 const COEF_LENGTH: usize = 18;
-/// 32 a second, each of 16 samples.
+/// 32 Hz, 16 samples.
 const PRS_CFG_VALUE: u8 = 0x54;
-/// 8 a second, each of 4 samples.
+/// 8 Hz, 4 samples.
 const TMP_CFG_VALUE: u8 = 0x32;
-/// The sensor in the pressure element; in COEF_SRCE, the one that the coefficients are for.
+/// Selects the temperature sensor in the pressure element; in COEF_SRCE, the sensor that the coefficients are for.
 const TMP_EXT: u8 = 0x80;
-/// Demanded of pressures of more than 8 samples.
+/// Result shift, required for pressures of more than 8 samples.
 const P_SHIFT: u8 = 0x04;
 const COEF_RDY: u8 = 0x80;
 const SENSOR_RDY: u8 = 0x40;
 const TMP_RDY: u8 = 0x20;
 const PRS_RDY: u8 = 0x10;
-/// Pressure and temperature, again and again.
+/// Continuous measurement of pressure and temperature.
 const CONTINUOUS: u8 = 0x07;
 const SOFT_RST: u8 = 0x09;
-/// Table 9 for 16 and for 4 samples.
+/// Scale factors of table 9 for 16 and for 4 samples.
 const KP: f32 = 253_952.0;
 const KT: f32 = 3_670_016.0;
 const RANGE_PA: [f32; 2] = [30_000.0, 120_000.0];
@@ -77,12 +78,12 @@ const RANGE_C: [f32; 2] = [-40.0, 85.0];
 
 const DPS310: &[Step] = &[
     Step::Write(RESET, SOFT_RST),
-    Step::Wait(3_000), // it answers nothing before
+    Step::Wait(3_000), // no answers before
     Step::Identify(ID, &[PROD_ID]),
     Step::Await(MEAS_CFG, COEF_RDY | SENSOR_RDY, COEF_RDY | SENSOR_RDY, 100),
     Step::Read(COEF, COEF_LENGTH),
     Step::Read(COEF, COEF_LENGTH),
-    // Undocumented: some parts read a wrong temperature without.
+    // Undocumented; without these writes, some parts read a wrong temperature.
     Step::Write(0x0E, 0xA5),
     Step::Write(0x0F, 0x96),
     Step::Write(0x62, 0x02),
@@ -91,7 +92,7 @@ const DPS310: &[Step] = &[
     Step::Set(PRS_CFG, PRS_CFG_VALUE),
     Step::SetLike(TMP_CFG, TMP_CFG_VALUE, TMP_EXT, COEF_SRCE),
     Step::Set(CFG_REG, P_SHIFT),
-    Step::Write(MEAS_CFG, CONTINUOUS), // reads back with flags
+    Step::Write(MEAS_CFG, CONTINUOUS), // not `Set`: reads back with flags
     Step::Await(MEAS_CFG, TMP_RDY, TMP_RDY, 100),
 ];
 const SPL06: &[Step] = &[
@@ -132,7 +133,7 @@ impl<const IS_SPL06: bool> SensorPart for Dps3xx<IS_SPL06> {
 }
 
 impl Coefficients {
-    /// As table 18 packs them.
+    /// Decodes the coefficients, packed as in table 18.
     fn new(raw: [u8; COEF_LENGTH]) -> Self {
         let [b0, b1, b2, b3, b4, b5, b6, b7, b8, b9, b10, b11, b12, b13, b14, b15, b16, b17] = raw;
         Coefficients {
@@ -158,7 +159,7 @@ impl Coefficients {
     }
 }
 
-/// Returns the number, in two's complement, that the highest bits of four bytes are.
+/// Returns the two's complement number in the highest `bits` bits of four bytes.
 fn signed(bytes: [u8; 4], bits: u32) -> f32 {
     (i32::from_be_bytes(bytes) >> (32 - bits)) as f32
 }

@@ -1,81 +1,82 @@
-//! Runs the scripts of a part, watches it, and sets it up again after faults.
+//! Runs a part's scripts, monitors the part and sets it up again after faults.
 
 use crate::bus::{BusError, READ_MAX, Registers};
 use crate::part::{PartFault, SensorPart, Step};
 use afbc_types::Stamped;
 use embassy_futures::select::{Either, select};
 
-/// Faults in a row after which a part is set up again.
+/// Number of consecutive faults after which a part is set up again.
 pub const FAULTS_MAX: u32 = 10;
 /// Pause before a part is set up again \[us\].
 pub const PAUSE_US: u32 = 100_000;
-/// Time between two looks whether a part that did not answer does again \[us\].
+/// Interval at which a part that did not answer is checked \[us\].
 const LOOK_US: u32 = 2_000;
-/// Pause after the second fault in a row and each further one \[us\]: the next attempt would follow at once, and a task
-/// of the sensors' priority leaves the others no time.
+/// Pause after the second and each further consecutive fault \[us\]. Without it the next attempt would follow at once,
+/// and a task of the sensors' priority would starve the others.
 const RETRY_US: u32 = 1_000;
-/// Pause after each step of a set-up \[us\]: a control tick that is due goes first, for the steps together take longer
-/// than it may be late.
+/// Pause after each step of a set-up \[us\]. It lets a due control tick run, since all steps together take longer than
+/// a tick may be late.
 const GIVE_WAY_US: u32 = 10;
-/// Longest transfer \[us\], and what each of its bytes adds \[us\]: 1 MHz.
+/// Time limit of a transfer \[us\], and its extra time per byte \[us\], for a clock of 1 MHz.
 const TRANSFER_US: u32 = 10_000;
 const BYTE_US: u32 = 8;
-/// Cycles in a row without a reading.
+/// Largest number of consecutive cycles without a reading.
 const CYCLES_MAX: u32 = 100;
-/// Cycles between two looks at a register that was set.
+/// Number of cycles between two checks of a register's value.
 const CYCLES_A_LOOK: u32 = 16;
-/// Shortest answer of equal bits that is none \[bytes\].
+/// Length from which an answer of equal bits counts as silence \[bytes\].
 const SILENCE_LENGTH: usize = 3;
-/// Time between two looks at a register for which a script waits \[us\].
+/// Interval at which a script polls a register \[us\].
 const AWAIT_US: u32 = 1_000;
 
-/// Time and the interrupt of a part, as its board has them.
+/// Board's clock and a part's interrupt.
 #[allow(async_fn_in_trait, reason = "used generically, never boxed")]
 pub trait PartTiming {
-    /// Time since power-up \[us\].
+    /// Returns the time since power-up \[us\].
     fn now_us(&self) -> u64;
 
-    /// Waits for at least so long.
+    /// Waits for at least this time.
     async fn wait(&self, us: u32);
 
-    /// Waits for the part's interrupt, at most so long, and returns true if it has come. A part whose interrupt is not
-    /// wired waits that long and returns true.
+    /// Waits for the part's interrupt, at most for the time `us`, and returns true if it has come. If no interrupt is
+    /// wired, waits for the whole time and returns true.
     async fn ready(&mut self, us: u32) -> bool {
         self.wait(us).await;
         true
     }
 
-    /// Returns the time of the interrupt for which [`ready`](Self::ready) has waited \[us\]; none if there was none.
+    /// Returns the time of the interrupt that ended the last [`ready`](Self::ready) \[us\]; none if there was no
+    /// interrupt.
     fn ready_us(&self) -> Option<u64> {
         None
     }
 }
 
-/// A part on a bus.
+/// Driver of a part on a bus.
 #[derive(Debug)]
 pub struct Driver<P, B, T> {
     part: P,
     bus: B,
     timing: T,
-    /// True if it has been set up.
+    /// True while the part is set up.
     is_up: bool,
-    /// True if it was, to the end, and nothing has been set since.
+    /// True if the last set-up was complete and its settings have not been changed since.
     was_set_up: bool,
-    /// Faults in a row, and the last one.
+    /// Number of consecutive faults, and the last fault.
     faults: u32,
     last_fault: Option<PartFault>,
-    /// Cycles since the last look, and number of registers looked at.
+    /// Number of cycles since the last register check, and the checked step's index.
     cycles: u32,
     looks: usize,
-    /// Time of the interrupt of this cycle \[us\].
+    /// Time of the interrupt in this cycle \[us\].
     ready_us: Option<u64>,
     last: [u8; READ_MAX],
-    /// Equal answers in a row.
+    /// Number of consecutive equal answers.
     equals: u32,
 }
 
 impl<P: SensorPart, B: Registers, T: PartTiming> Driver<P, B, T> {
-    /// A part that is yet to be set up, by the first [`Driver::reading`].
+    /// Creates the driver. The first [`Driver::reading`] sets the part up.
     pub fn new(part: P, bus: B, timing: T) -> Self {
         Driver {
             part,
@@ -93,17 +94,17 @@ impl<P: SensorPart, B: Registers, T: PartTiming> Driver<P, B, T> {
         }
     }
 
-    /// True if it has been set up and reads without a fault.
+    /// True if the part is set up and reads without a fault.
     pub fn works(&self) -> bool {
         self.is_up && self.faults == 0
     }
 
-    /// Returns the next reading, with the time of the part's interrupt or, without one, of the beginning of the
-    /// transfer. Sets the part up before the first one and, after a pause, after [`FAULTS_MAX`] faults in a row, unless
-    /// it only did not answer and is found as it was set up.
+    /// Returns the next reading, with the time of the part's interrupt, or without one the time at which the transfer
+    /// began. Sets the part up before the first reading. After [`FAULTS_MAX`] consecutive faults, pauses and sets the
+    /// part up again, unless the part only failed to answer and then still has its settings.
     ///
     /// # Errors
-    /// The fault that this cycle, or the set-up, met. Call it again.
+    /// The fault of this cycle or of the set-up. The caller may simply call it again.
     pub async fn reading(&mut self) -> Result<Stamped<P::Reading>, PartFault> {
         let result = self.attempt().await;
         match &result {
@@ -117,7 +118,7 @@ impl<P: SensorPart, B: Registers, T: PartTiming> Driver<P, B, T> {
         result
     }
 
-    /// Has it set up by the next reading, without a pause.
+    /// Makes the next reading set the part up, without a pause.
     pub(crate) fn forget(&mut self) {
         (self.is_up, self.was_set_up, self.faults, self.equals, self.ready_us) = (false, false, 0, 0, None);
     }
@@ -137,13 +138,13 @@ impl<P: SensorPart, B: Registers, T: PartTiming> Driver<P, B, T> {
         Err(PartFault::Late)
     }
 
-    /// Pauses after faults. A part that did not answer is looked at meanwhile: if it answers again with everything as
-    /// it was set, its wire had failed and not the part, and true is returned at once.
+    /// Pauses after faults. Meanwhile it checks a part that did not answer: if the part answers again with all its
+    /// settings, only its wiring had failed. Then it returns true at once.
     async fn comes_back(&mut self) -> bool {
         if self.faults == 0 {
             return false;
         }
-        // Not one that is late or stuck: it may answer with everything as it was set, and only a set-up helps.
+        // Not for a part that is late or stuck: its registers may be correct, but only a set-up helps.
         let did_not_answer = matches!(
             self.last_fault,
             Some(
@@ -158,7 +159,7 @@ impl<P: SensorPart, B: Registers, T: PartTiming> Driver<P, B, T> {
         while self.timing.now_us() < end_us {
             self.timing.wait(LOOK_US).await;
             if self.is_as_set().await.unwrap_or(false) {
-                // A fault stays: the part does not count as working before it has read.
+                // One fault stays, so that the part does not count as working before it has given a reading.
                 (self.is_up, self.faults, self.cycles) = (true, 1, 0);
                 return true;
             }
@@ -166,7 +167,7 @@ impl<P: SensorPart, B: Registers, T: PartTiming> Driver<P, B, T> {
         false
     }
 
-    /// True if it is the part, and everything is as it was set; false if neither can be read.
+    /// True if identity and settings of the part are unchanged; false if its script checks neither.
     async fn is_as_set(&mut self) -> Result<bool, PartFault> {
         let mut is_seen = false;
         for (at, step) in P::SETUP.iter().enumerate() {
@@ -180,7 +181,7 @@ impl<P: SensorPart, B: Registers, T: PartTiming> Driver<P, B, T> {
         Ok(is_seen)
     }
 
-    /// Runs the set-up, and reads back what was set.
+    /// Runs the set-up and reads the settings back.
     pub(crate) async fn set_up(&mut self) -> Result<(), PartFault> {
         self.was_set_up = false;
         for step in P::SETUP {
@@ -191,7 +192,7 @@ impl<P: SensorPart, B: Registers, T: PartTiming> Driver<P, B, T> {
             self.look(at).await?;
             self.timing.wait(GIVE_WAY_US).await;
         }
-        // It works when it reads. What has stuck stays so until its reading changes.
+        // One fault stays until the first reading. The count of equal answers stays until a reading changes.
         (self.is_up, self.was_set_up, self.faults, self.cycles) = (true, true, self.faults.min(1), 0);
         Ok(())
     }
@@ -201,23 +202,24 @@ impl<P: SensorPart, B: Registers, T: PartTiming> Driver<P, B, T> {
         self.cycles += 1;
         if self.cycles >= CYCLES_A_LOOK {
             let at = (self.looks + 1) % P::SETUP.len().max(1);
-            // What differs is looked at again in the next cycle, for a part may read on with a lost set-up.
+            // A wrong register is checked again in the next cycle, since a part may go on reading with its settings
+            // lost.
             self.look(at).await?;
             (self.cycles, self.looks) = (0, at);
         }
         let mut complete = None;
         for step in P::CYCLE {
-            // To the script's end: a step behind the reading may find that the part has failed.
+            // Runs the whole script: a step after the reading may detect a failure.
             complete = self.step(step).await?.or(complete);
         }
         Ok(complete)
     }
 
-    /// Reads back the register that a step of the set-up set, if it did.
+    /// Reads back the register of a set-up step, if the step is one that is read back.
     async fn look(&mut self, at: usize) -> Result<(), PartFault> {
         let Some(step) = P::SETUP.get(at) else { return Ok(()) };
         let Some(register) = register_set_by(step) else { return Ok(()) };
-        // A script may set a register twice.
+        // Skips a register that a later step sets again.
         if P::SETUP.iter().skip(at + 1).any(|later| register_set_by(later) == Some(register)) {
             return Ok(());
         }
@@ -225,7 +227,7 @@ impl<P: SensorPart, B: Registers, T: PartTiming> Driver<P, B, T> {
         if self.byte(register).await? == value { Ok(()) } else { Err(PartFault::Register(register)) }
     }
 
-    /// Returns the value that a step of the set-up gives its register.
+    /// Returns the value that a set-up step writes to its register.
     async fn value(&mut self, step: &Step) -> Result<u8, PartFault> {
         Ok(match *step {
             Step::Set(_, value) => value,
@@ -238,7 +240,7 @@ impl<P: SensorPart, B: Registers, T: PartTiming> Driver<P, B, T> {
         match *step {
             Step::Identify(register, identities) => {
                 let identity = self.byte(register).await?;
-                // The list first: the identity of a QMC5883L is all ones.
+                // Compares with the list first, since the identity of a QMC5883L is 0xFF.
                 match identity {
                     _ if identities.contains(&identity) => (),
                     0x00 | 0xFF => return Err(PartFault::Silent),
@@ -302,7 +304,7 @@ impl<P: SensorPart, B: Registers, T: PartTiming> Driver<P, B, T> {
     }
 }
 
-/// Returns the register that a step sets and that is read back, if it does.
+/// Returns the register that a step sets and that is read back; none for other steps.
 fn register_set_by(step: &Step) -> Option<u8> {
     match *step {
         Step::Set(register, _) | Step::SetLike(register, ..) => Some(register),
@@ -310,7 +312,7 @@ fn register_set_by(step: &Step) -> Option<u8> {
     }
 }
 
-/// Waits for a transfer, but not for one that never ends.
+/// Waits for a transfer, with a time limit.
 async fn transfer(
     timing: &impl PartTiming,
     length: usize,

@@ -1,45 +1,44 @@
-//! Telemetry of motor controllers (ESCs) over one serial line that all of them share: KISS's protocol, which BLHeli_32
-//! and AM32 speak too.
+//! Telemetry of ESCs over one serial line that they share, in KISS's protocol, which BLHeli_32 and AM32 also use.
 //!
-//! A controller answers a DSHOT frame whose telemetry bit is set with ten bytes at [`BAUD`], high bytes first:
-//! temperature, voltage, current, charge, electrical speed and a CRC-8. Nothing in them says which controller it was:
-//! one is asked at a time ([`EscLine`]). An answer that comes after the next one has been asked would be taken for that
-//! one's, and so would all that follow: after a question without an answer, and now and then in any case, nobody is
-//! asked until the line is silent.
+//! An ESC answers a DSHOT frame that has the telemetry bit set. The answer is ten bytes at [`BAUD`], high bytes first:
+//! temperature, voltage, current, charge, electrical speed and a CRC-8. It does not say which ESC sent it, so one ESC
+//! is asked at a time ([`EscLine`]). An answer that comes after the next request would be assigned to the wrong ESC,
+//! and so would all later ones. After a request without an answer, and also after every 64 requests, no ESC is asked
+//! until the line has been silent.
 
 use heapless::Vec;
 
 /// Baud rate of the line; 8 bits, no parity, one stop bit.
 pub const BAUD: u32 = 115_200;
-/// Bytes of an answer.
+/// Length of an answer \[bytes\].
 pub const ANSWER_LEN: usize = 10;
-/// Longest time from a question to the end of its answer \[us\]: the answer takes 870, controllers begin it within
-/// a millisecond or two, and the question waits for the next frame.
+/// Longest time from a request to the end of its answer \[us\]: the request waits for the next frame, ESCs begin to
+/// answer within a millisecond or two, and the answer takes 870 us.
 const ANSWER_US: u64 = 6_000;
-/// Time without a byte after which no answer is on its way any more \[us\], and the number of questions after which the
-/// line must have been silent for so long.
+/// Time without a byte after which no answer can be under way \[us\], and the number of requests after which such a
+/// silence is required.
 const SILENCE_US: u64 = 4_000;
 const QUESTIONS: u8 = 64;
-/// Longest pause between two bytes of an answer \[us\]: 20 bytes' time.
+/// Longest pause between two bytes of an answer \[us\]: the time of 20 bytes.
 const PAUSE_US: u64 = 2_000;
 
-/// What a motor controller has told.
+/// Telemetry of one ESC.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct EscReading {
     /// Temperature \[deg C\].
     pub temperature_c: i8,
-    /// Voltage of the supply \[0.01 V\].
+    /// Supply voltage \[0.01 V\].
     pub voltage_cv: u16,
     /// Current \[0.01 A\].
     pub current_ca: u16,
     /// Charge drawn since power-up \[mA h\].
     pub consumed_mah: u16,
-    /// Electrical speed \[100 rev/min\]: a motor's times its pairs of poles.
+    /// Electrical speed \[100 rev/min\]: motor speed times number of pole pairs.
     pub erpm_hundreds: u16,
 }
 
 impl EscReading {
-    /// Reads an answer; none if its checksum is wrong.
+    /// Decodes an answer; returns none if its checksum is wrong.
     #[must_use]
     pub fn from_bytes(bytes: &[u8; ANSWER_LEN]) -> Option<Self> {
         let [temperature, v1, v0, i1, i0, q1, q0, n1, n0, checksum] = *bytes;
@@ -54,7 +53,7 @@ impl EscReading {
         (crc8(content) == checksum).then_some(reading)
     }
 
-    /// Returns the answer as a controller sends it.
+    /// Encodes the answer as an ESC sends it.
     #[must_use]
     pub fn to_bytes(&self) -> [u8; ANSWER_LEN] {
         let EscReading { temperature_c, voltage_cv, current_ca, consumed_mah, erpm_hundreds } = *self;
@@ -65,38 +64,37 @@ impl EscReading {
         [temperature, v1, v0, i1, i0, q1, q0, n1, n0, checksum]
     }
 
-    /// Returns the speed of the rotor of a motor with so many magnetic poles \[rad/s\].
+    /// Returns the rotor speed of a motor with this number of magnetic poles \[rad/s\].
     #[must_use]
     pub fn speed_rad_s(&self, poles: u32) -> f32 {
         rotor_rad_s(u32::from(self.erpm_hundreds) * 100, poles)
     }
 
-    /// Returns the electrical speed of a rotor that turns with `speed_rad_s`, as a controller tells it: rounded down to
-    /// 100 rev/min, and no more than the largest that it can tell.
+    /// Returns the electrical speed of a rotor that turns at `speed_rad_s`, as an ESC reports it: rounded down to 100
+    /// rev/min and limited to the largest 16-bit number.
     #[must_use]
     pub fn erpm_hundreds_of(speed_rad_s: f32, poles: u32) -> u16 {
-        // Half as many pairs as poles, 60 s a minute, by the hundred: 60/(2 100). The cast saturates.
+        // Pole pairs are half the poles; 60 s per minute; per hundred: 60/(2 100). The cast saturates.
         (speed_rad_s * (0.3 / core::f32::consts::TAU) * poles as f32) as u16
     }
 }
 
-/// Returns the speed of the rotor of a motor with so many magnetic poles \[rad/s\] that has this electrical speed
-/// \[rev/min\].
+/// Returns the rotor speed \[rad/s\] of a motor with this number of magnetic poles at an electrical speed \[rev/min\].
 #[must_use]
 pub fn rotor_rad_s(electrical_rev_min: u32, poles: u32) -> f32 {
-    // A revolution a minute in rad/s, and two poles a pair.
+    // One revolution per minute in rad/s; a pair has two poles.
     const RAD_S: f32 = core::f32::consts::TAU / 60.0;
     electrical_rev_min as f32 * (2.0 * RAD_S) / poles.max(2) as f32
 }
 
-/// CRC-8 with polynomial x^8 + x^2 + x + 1, from 0, the highest bit first.
+/// Returns the CRC-8 with polynomial x^8 + x^2 + x + 1, initially 0, highest bit first.
 fn crc8(bytes: &[u8]) -> u8 {
     bytes.iter().fold(0, |crc, byte| {
         (0..8).fold(crc ^ byte, |crc, _| if crc & 0x80 != 0 { (crc << 1) ^ 0x07 } else { crc << 1 })
     })
 }
 
-/// The line of several controllers: says whom to ask, and whose answer it was.
+/// Telemetry line of several ESCs: decides which one to ask, and assigns the answers.
 ///
 /// ```
 /// use afbc_drivers::esc_telemetry::{EscLine, EscReading};
@@ -111,23 +109,23 @@ fn crc8(bytes: &[u8]) -> u8 {
 #[derive(Clone, Debug)]
 pub struct EscLine {
     controllers: u8,
-    /// The one that is asked next.
+    /// ESC to be asked next.
     next: u8,
-    /// The one that has been asked, and when \[us\].
+    /// ESC that was asked, and the time \[us\].
     asked: Option<(u8, u64)>,
     answer: Vec<u8, ANSWER_LEN>,
-    /// When the last byte came \[us\].
+    /// Arrival time of the last byte \[us\].
     heard_us: u64,
-    /// Since when the line is silent, while that is waited for \[us\].
+    /// Beginning of the silence that is being waited for \[us\].
     silent_us: Option<u64>,
-    /// Questions since the last silence.
+    /// Number of requests since the last required silence.
     questions: u8,
     bad_answers: u32,
     missing_answers: u32,
 }
 
 impl EscLine {
-    /// A line of so many controllers, of which none has been asked.
+    /// Creates a line with this number of ESCs; none has been asked.
     #[must_use]
     pub const fn new(controllers: u8) -> Self {
         EscLine {
@@ -143,8 +141,8 @@ impl EscLine {
         }
     }
 
-    /// Returns whom to ask now, each in turn: none while an answer is expected, or silence. To be called before each
-    /// frame; a frame that is sent without the question loses an answer, nothing more.
+    /// Returns the ESC to ask now, each in turn. Returns none while an answer or silence is awaited. To be called
+    /// before each DSHOT frame. If a frame is sent without the request, one answer is lost, nothing more.
     pub fn ask(&mut self, now_us: u64) -> Option<u8> {
         if let Some((_, asked_us)) = self.asked {
             if now_us.saturating_sub(asked_us) < ANSWER_US {
@@ -171,20 +169,19 @@ impl EscLine {
         Some(controller)
     }
 
-    /// Takes a byte that came at `now_us`; returns what a controller has told, once its answer is whole. Bytes that
-    /// nobody asked for are dropped, and the next question waits for silence; an answer whose checksum is wrong is
-    /// dropped too.
+    /// Takes a byte that arrived at `now_us`; returns an ESC's telemetry once its answer is complete. Drops bytes that
+    /// nobody asked for, and then requires silence before the next request. Drops answers with a wrong checksum.
     pub fn take(&mut self, now_us: u64, byte: u8) -> Option<(u8, EscReading)> {
         let Some((controller, _)) = self.asked else {
             self.silent_us = Some(now_us);
             return None;
         };
-        // A byte was lost: nothing but the pause marks where an answer begins.
+        // A byte was lost: only the pause shows where an answer begins.
         if now_us.saturating_sub(self.heard_us) > PAUSE_US {
             self.answer.clear();
         }
         self.heard_us = now_us;
-        // There is room: a whole answer ends the question, and the next one clears it.
+        // Cannot overflow: a complete answer ends the request, and the next request clears it.
         let _ = self.answer.push(byte);
         let answer: &[u8; ANSWER_LEN] = self.answer.as_slice().try_into().ok()?;
         let reading = EscReading::from_bytes(answer);
@@ -195,13 +192,13 @@ impl EscLine {
         reading.map(|reading| (controller, reading))
     }
 
-    /// Number of answers since power-up whose checksum was wrong.
+    /// Returns the number of answers since power-up with a wrong checksum.
     #[must_use]
     pub fn bad_answers(&self) -> u32 {
         self.bad_answers
     }
 
-    /// Number of questions since power-up that were not answered in time.
+    /// Returns the number of requests since power-up that were not answered in time.
     #[must_use]
     pub fn missing_answers(&self) -> u32 {
         self.missing_answers

@@ -1,17 +1,17 @@
-//! An I2C that is brought back after trouble.
+//! An I2C bus that is recovered after failures.
 //!
-//! A part that was being read when the processor was reset, or when a glitch cost it a clock, holds the data line until
-//! it has been clocked, and no controller begins a transfer meanwhile. A controller whose transfer was given up may not
-//! begin another one either: that of the STM32F4 waits for ever, and its driver sends no STOP.
+//! If the processor was reset during a read, or a glitch cost a part a clock pulse, the part holds the data line low
+//! until it is clocked. No controller begins a transfer meanwhile. A controller whose transfer was aborted may also
+//! block: the STM32F4's waits forever, and its driver sends no STOP.
 
 use embedded_hal_async::i2c::{ErrorType, I2c, Operation};
 
-/// Clocks after which a part has sent what is left of a byte, and has seen that nobody acknowledges it.
+/// Clock pulses after which a part has sent the rest of a byte and has seen that nobody acknowledges it.
 const CLOCKS: u32 = 9;
-/// Half clocks for which a part may hold the clock line.
+/// Largest number of half clocks for which a part may stretch the clock.
 const STRETCHES: u32 = 10;
 
-/// A line of an I2C.
+/// A line of an I2C bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum I2cLine {
     /// SCL.
@@ -20,38 +20,38 @@ pub enum I2cLine {
     Data,
 }
 
-/// The lines of a controller of I2C, driven by hand.
+/// Lines of an I2C controller, driven by software.
 pub trait I2cLines {
-    /// Takes both lines from the controller, and releases them.
+    /// Takes both lines from the controller and releases them.
     fn take(&mut self);
 
-    /// Pulls a line low, or releases it, and waits for half a clock.
+    /// Pulls a line low or releases it, then waits for half a clock.
     fn drive(&mut self, line: I2cLine, is_released: bool);
 
-    /// True if nothing pulls the clock line low.
+    /// True if the clock line is high.
     fn is_clock_high(&self) -> bool;
 
-    /// Gives the lines back to the controller, which forgets what it was doing.
+    /// Gives the lines back to the controller and resets it.
     fn restart(&mut self);
 }
 
-/// A bus that is recovered before its first transfer, and before the one after each that failed or was given up.
+/// An I2C bus that is recovered before its first transfer, and after each transfer that failed or was aborted.
 #[derive(Debug)]
 pub struct RecoveringI2c<C, L> {
     controller: C,
     lines: L,
-    /// True if the last transfer came to its end.
+    /// True if the last transfer succeeded.
     is_in_order: bool,
 }
 
 impl<C, L: I2cLines> RecoveringI2c<C, L> {
-    /// The bus of a controller and its lines, in whatever state they and their parts are.
+    /// Creates the bus from a controller and its lines, whatever state they and the parts are in.
     pub fn new(controller: C, lines: L) -> Self {
         RecoveringI2c { controller, lines, is_in_order: false }
     }
 
-    /// Recovers the bus if it must be. It is not in order until the transfer has ended: from one that is given up,
-    /// nothing comes back.
+    /// Recovers the bus if needed. Marks it as needing recovery until the transfer succeeds, since an aborted transfer
+    /// never reports back.
     fn begin(&mut self) {
         if !core::mem::take(&mut self.is_in_order) {
             recover(&mut self.lines);
@@ -86,8 +86,8 @@ impl<C: I2c, L: I2cLines> I2c for RecoveringI2c<C, L> {
     }
 }
 
-/// Frees the lines and restarts the controller. The first START ends what a part was taking in, lest the clocks be
-/// taken for more of it; the clocks end what one was sending; START and STOP leave the bus idle.
+/// Frees the lines and restarts the controller. The first START aborts a write to a part, so that it does not take the
+/// clock pulses for data. The clock pulses end a read from a part. START and STOP leave the bus idle.
 fn recover(lines: &mut dyn I2cLines) {
     lines.take();
     start(lines);
@@ -103,14 +103,14 @@ fn recover(lines: &mut dyn I2cLines) {
     lines.restart();
 }
 
-/// Begins a transfer, with both lines released before, and the data line after it.
+/// Sends a START. Expects both lines released; leaves the clock low and the data line released.
 fn start(lines: &mut dyn I2cLines) {
     lines.drive(I2cLine::Data, false);
     lines.drive(I2cLine::Clock, false);
     lines.drive(I2cLine::Data, true);
 }
 
-/// Releases the clock line, and waits while a part stretches the clock.
+/// Releases the clock line and waits while a part stretches the clock.
 fn release_clock(lines: &mut dyn I2cLines) {
     for _ in 0..STRETCHES {
         lines.drive(I2cLine::Clock, true);

@@ -1,11 +1,11 @@
-//! TDK ICM-42688-P and ICM-42605, by SPI (DS-000347 and DS-000292, both with the same registers).
+//! TDK ICM-42688-P and ICM-42605, over SPI (DS-000347 and DS-000292). Both have the same registers.
 //!
 //! +-2000 deg/s and +-16 g, each behind the part's own second-order filter of 250 Hz, which is also the anti-alias
-//! filter for readings at 1 kHz. The interrupt INT1 is a pulse, active high, for each sample. The part measures at 1
-//! kHz or, for readings by the board's clock, at 4 kHz, so that a reading is never older than 0.25 ms.
+//! filter for readings at 1 kHz. The interrupt INT1 gives an active-high pulse for each sample. The part measures at 1
+//! kHz. For readings by the board's clock it measures at 4 kHz, so that a reading is never older than 0.25 ms.
 //!
-//! The parts have an adaptive full-scale range (AFSR) of which the data sheets say nothing. It is on after a reset, and
-//! freezes the gyroscope for 1 to 2 ms whenever a rate crosses about 100 deg/s. It is switched off here, as by
+//! The parts have an adaptive full-scale range (AFSR), which the data sheets do not mention. It is on after a reset,
+//! and freezes the gyroscope for 1 to 2 ms whenever a rate crosses about 100 deg/s. This driver switches it off, like
 //! Betaflight, ArduPilot (issue 25025) and PX4 (issue 22254).
 
 use crate::bus::SpiFormat;
@@ -18,7 +18,7 @@ pub type Icm42688p<const POLLED: bool = false> = Icm426xx<0x47, POLLED>;
 /// ICM-42605.
 pub type Icm42605<const POLLED: bool = false> = Icm426xx<0x42, POLLED>;
 
-/// A part of the family, by what its register WHO_AM_I says and whether it is read by the board's clock.
+/// A part of the family, with the given value of WHO_AM_I; `POLLED` if it is read by the board's clock.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Icm426xx<const IDENTITY: u8, const POLLED: bool>;
 
@@ -37,19 +37,19 @@ const INT_SOURCE0: u8 = 0x65;
 const SELF_TEST_CONFIG: u8 = 0x70;
 const WHO_AM_I: u8 = 0x75;
 const REG_BANK_SEL: u8 = 0x76;
-/// Of bank 1 and of bank 2.
+/// In bank 1 and in bank 2.
 const XG_ST_DATA: u8 = 0x5F;
 const XA_ST_DATA: u8 = 0x3B;
 
-/// INTF_CONFIG1 as after a reset (0x91), but for its two upper bits, by which the adaptive full-scale range is off.
+/// INTF_CONFIG1 as after a reset (0x91), except the two upper bits, which switch AFSR off.
 const AFSR_OFF: u8 = 0x51;
-/// Bits of INT_CONFIG1: a pulse of 8 us without a guard after it, as the data sheet demands at 4 kHz. It also demands
-/// that INT_ASYNC_RESET is off.
+/// Bits of INT_CONFIG1: a pulse of 8 us without a minimum pause after it, as required at 4 kHz. The data sheet also
+/// requires INT_ASYNC_RESET to be off.
 const SHORT_PULSE: u8 = 0x60;
 
-/// Length of temperature, specific force and rates.
+/// Length of temperature, specific force and rates \[bytes\].
 const LENGTH: usize = 14;
-/// What an axis reads that has not been measured yet.
+/// Raw value of an axis that has not been measured yet.
 const INVALID: f32 = -32768.0;
 const RAD_S_PER_LSB: f32 = 2000.0 / 32768.0 * core::f32::consts::PI / 180.0;
 const M_S2_PER_LSB: f32 = 16.0 / 32768.0 * 9.806_65;
@@ -60,7 +60,7 @@ impl<const IDENTITY: u8, const POLLED: bool> SensorPart for Icm426xx<IDENTITY, P
     const SPI: Option<SpiFormat> = Some(SpiFormat { read: 0x80, write: 0, dummies: 0, clock_hz: 24_000_000 });
     const I2C: &'static [u8] = &[];
     const STUCK_AFTER: u32 = 20;
-    /// By TDK's own driver for the family: 250 deg/s and 2 g, all six axes at once; what the factory has written is in
+    /// As in TDK's own driver for the family: 250 deg/s and 2 g, all six axes at once. The factory's responses are in
     /// banks 1 and 2.
     const SELF_TEST: Option<SelfTest<InertialReading>> = Some(SelfTest {
         quiet: &[
@@ -78,20 +78,20 @@ impl<const IDENTITY: u8, const POLLED: bool> SensorPart for Icm426xx<IDENTITY, P
     });
     const SETUP: &'static [Step] = &[
         Step::Write(REG_BANK_SEL, 0),
-        Step::Write(DEVICE_CONFIG, 1), // soft reset, of which the mode of SPI stays
+        Step::Write(DEVICE_CONFIG, 1), // soft reset; the SPI mode stays
         Step::Wait(2_000),
         Step::Identify(WHO_AM_I, &[IDENTITY]),
-        Step::Set(INTF_CONFIG0, 0x30), // big endian, nothing held: as after a reset
+        Step::Set(INTF_CONFIG0, 0x30), // big endian, no held values: as after a reset
         Step::Set(INTF_CONFIG1, AFSR_OFF),
         Step::Set(INT_CONFIG, 0b011), // INT1 pulsed, push-pull, active high
         Step::Set(INT_CONFIG1, SHORT_PULSE),
         Step::Set(INT_SOURCE0, 0b1000),
-        // 2000 deg/s and 16 g, at 4 kHz or 1 kHz, behind a filter of a sixteenth or a quarter of the rate.
+        // 2000 deg/s and 16 g, at 4 kHz or 1 kHz; filter bandwidth a sixteenth or a quarter of the rate.
         Step::Set(GYRO_CONFIG0, if POLLED { 0x04 } else { 0x06 }),
         Step::Set(ACCEL_CONFIG0, if POLLED { 0x04 } else { 0x06 }),
         Step::Set(GYRO_ACCEL_CONFIG0, if POLLED { 0x55 } else { 0x11 }),
         Step::Set(PWR_MGMT0, 0x0F), // both in low-noise mode
-        Step::Wait(45_000),         // until the gyroscope turns steadily
+        Step::Wait(45_000),         // gyroscope start-up
     ];
     const CYCLE: &'static [Step] = &[Step::Ready(if POLLED { 500 } else { 2_000 }), Step::Read(TEMP_DATA1, LENGTH)];
 

@@ -1,16 +1,16 @@
-//! iSentek IST8310, by I2C (its data sheet).
+//! iSentek IST8310, over I2C (its data sheet).
 //!
-//! +-1600 uT, along z +-2480 uT, which is what its 16 bits hold of 2500; about 95 measurements a second, each commanded
-//! and the mean of 16 samples. DRDY is not used, the flag of its register is. Its z is reversed, which makes the axes
-//! right-handed: forward, right and down if x is forward and the part's face up. The part's cross-axis table is left
-//! alone: a calibration of the compass covers it.
+//! +-1600 uT; along z +-2480 uT, since 16 bits do not cover the part's 2500 uT. About 95 measurements per second, each
+//! commanded and the mean of 16 samples. The data-ready flag is polled; the pin DRDY is not used. The reading's z is
+//! reversed, which makes the axes right-handed: forward, right and down if x is forward and the part's face is up. The
+//! part's cross-axis table is not used, since a compass calibration covers it.
 
 use crate::bus::SpiFormat;
 use crate::part::{PartFault, SensorPart, Step};
 use crate::reading::{MagneticReading, little};
 use nalgebra::Vector3;
 
-/// The part.
+/// IST8310.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Ist8310;
 
@@ -26,13 +26,13 @@ const PDCNTL: u8 = 0x42;
 const DRDY: u8 = 0x01;
 const SINGLE_MEASUREMENT: u8 = 0x01;
 const SRST: u8 = 0x01;
-/// 16 bits for x, y and z, and the bits that are not these.
+/// 16-bit output for x, y and z, and the mask of the other bits.
 const BITS_16: u8 = 0x70;
 const OTHERS_OF_CNTL3: u8 = !BITS_16;
-/// 16 samples for y and for x and z, and the bits that are not these.
+/// 16 samples for y and for x and z, and the mask of the other bits.
 const AVERAGE_16: u8 = 0b100_100;
 const OTHERS_OF_AVGCNTL: u8 = 0xC0;
-/// Normal pulses, which the data sheet asks for, and the bits that are not these.
+/// Normal pulses, which the data sheet requires, and the mask of the other bits.
 const PULSE_NORMAL: u8 = 0xC0;
 const OTHERS_OF_PDCNTL: u8 = 0x3F;
 const UT_PER_LSB: f32 = 1.0 / 13.2;
@@ -43,7 +43,7 @@ impl SensorPart for Ist8310 {
     const NAME: &'static str = "IST8310";
     const SPI: Option<SpiFormat> = None;
     const I2C: &'static [u8] = &[0x0E, 0x0C, 0x0D, 0x0F];
-    const STUCK_AFTER: u32 = 50; // it is quiet
+    const STUCK_AFTER: u32 = 50; // a quiet part
     const SETUP: &'static [Step] = &[
         Step::Write(CNTL2, SRST),
         Step::Wait(10_000),

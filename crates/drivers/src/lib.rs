@@ -1,23 +1,24 @@
-//! Drivers of the sensors that flight controllers have.
+//! Drivers for the sensors of flight controllers.
 //!
-//! A [`SensorPart`] is data and arithmetic: the scripts that set it up and read it, as [`Step`]s on its registers, and
-//! what the answers mean. A [`Driver`] runs the scripts over any `embedded-hal-async` bus ([`SpiRegisters`],
-//! [`I2cRegisters`]), stamps each reading with the time of the part's interrupt, and watches the part:
+//! A [`SensorPart`] is data and arithmetic: the scripts that set the part up and read it, as [`Step`]s on its
+//! registers, and the decoding of its answers. A [`Driver`] runs the scripts over any `embedded-hal-async` bus
+//! ([`SpiRegisters`], [`I2cRegisters`]), stamps each reading with the time of the part's interrupt, and monitors the
+//! part:
 //!
-//! | fault | found by | then |
+//! | fault | detected by | reaction |
 //! |---|---|---|
-//! | another part | identity, at set-up | set-up again after 0.1 s |
-//! | nothing answers | all bits of an answer of three bytes or more are equal | set-up after 10 faults |
-//! | set-up lost (reset, brown-out) | one register that was set is read back every 16 readings | the same |
-//! | transfer fails or never ends | the bus, 10 ms and 8 us a byte | the same; [I2C is recovered](RecoveringI2c) |
-//! | no interrupt | twice the time of a sample | set-up after 10 faults; or read by the clock ([`data_ready`]) |
-//! | never ready | 100 cycles | the same |
-//! | readings do not change | [`SensorPart::STUCK_AFTER`] equal answers | the same |
-//! | answers that no working part gives | [`SensorPart::take`] | the same |
+//! | wrong part | identity, at set-up | set-up again after 0.1 s |
+//! | nothing answers | all bits equal in an answer of three bytes or more | set-up after 10 faults |
+//! | settings lost (reset, brown-out) | one register read back every 16 readings | set-up after 10 faults |
+//! | transfer fails or never ends | bus error, or 10 ms and 8 us per byte | set-up after 10 faults; [`RecoveringI2c`] |
+//! | no interrupt | twice the sample time | set-up after 10 faults, or reading by the clock ([`data_ready`]) |
+//! | never ready | 100 cycles | set-up after 10 faults |
+//! | readings do not change | [`SensorPart::STUCK_AFTER`] equal answers | set-up after 10 faults |
+//! | answers that no working part gives | [`SensorPart::take`] | set-up after 10 faults |
 //!
 //! Every fault is returned; none is hidden by a repeated reading.
 //!
-//! | what | parts |
+//! | sensor | modules |
 //! |---|---|
 //! | IMU | [`bmi270`], [`icm426xx`], [`mpu`] |
 //! | IMU and magnetometer | [`ak8963`] |
@@ -25,7 +26,7 @@
 //! | magnetometer | [`ist8310`], [`lis3mdl`], [`qmc5883l`] |
 //! | GNSS receiver | [`ublox`], [`nmea`] |
 //! | battery | [`battery`] |
-//! | motor controllers | [`esc_telemetry`] |
+//! | ESC telemetry | [`esc_telemetry`] |
 #![no_std]
 #![forbid(unsafe_code)]
 

@@ -1,13 +1,13 @@
-//! ST LIS3MDL, by SPI or I2C (DS9463).
+//! ST LIS3MDL, over SPI or I2C (DS9463).
 //!
-//! +-4 gauss (400 uT) at 80 Hz in ultra-high-performance mode, the quietest. Its temperature is not used, nor is DRDY:
-//! the flag of its register is. A field beyond the range is a fault ([`PartFault::Range`]).
+//! +-4 gauss (400 uT) at 80 Hz in ultra-high-performance mode, which has the least noise. The data-ready flag is
+//! polled; the pin DRDY and the temperature are not used. A field beyond the range is a fault ([`PartFault::Range`]).
 
 use crate::bus::SpiFormat;
 use crate::part::{PartFault, SelfTest, SensorPart, Step};
 use crate::reading::{MagneticReading, little};
 
-/// The part.
+/// LIS3MDL.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Lis3mdl;
 
@@ -20,12 +20,12 @@ const CTRL_REG5: u8 = 0x24;
 const STATUS_REG: u8 = 0x27;
 const OUT_X_L: u8 = 0x28;
 
-/// Makes I2C count the address up; on SPI it is the bit of a read, which is set anyway.
+/// Address auto-increment on I2C. On SPI this is the read bit, which is set anyway.
 const INCREMENT: u8 = 0x80;
 const SOFT_RST: u8 = 0x04;
 const ZYXDA: u8 = 0x08;
 const UT_PER_LSB: f32 = 100.0 / 6842.0;
-/// At 12 gauss.
+/// Scale at 12 gauss.
 const UT_PER_LSB_12: f32 = 100.0 / 2281.0;
 const RANGE_UT: f32 = 400.0;
 
@@ -35,7 +35,7 @@ impl SensorPart for Lis3mdl {
     const SPI: Option<SpiFormat> = Some(SpiFormat { read: 0xC0, write: 0x40, dummies: 0, clock_hz: 10_000_000 });
     const I2C: &'static [u8] = &[0x1E, 0x1C];
     const STUCK_AFTER: u32 = 20;
-    /// As the data sheet has it: at 12 gauss and 80 Hz, a field of the part's own on each axis.
+    /// As in the data sheet: at 12 gauss and 80 Hz, the part applies a field of its own to each axis.
     const SELF_TEST: Option<SelfTest<MagneticReading>> = Some(SelfTest {
         quiet: &[Step::Write(CTRL_REG1, 0x1C), Step::Write(CTRL_REG2, 0x40), Step::Wait(20_000)],
         trims: &[],
@@ -44,7 +44,7 @@ impl SensorPart for Lis3mdl {
         skipped: 1,
         averaged: 5,
         axes: |reading| {
-            // `take` has counted by the scale of the set-up, 4 gauss; the test measures at 12.
+            // `take` has used the scale of 4 gauss from the set-up; the test measures at 12 gauss.
             let field = reading.field_ut * (UT_PER_LSB_12 / UT_PER_LSB);
             [field.x, field.y, field.z, 0.0, 0.0, 0.0]
         },
@@ -60,7 +60,7 @@ impl SensorPart for Lis3mdl {
         Step::Set(CTRL_REG1, 0b0111_1100), // x and y ultra-high-performance, 80 Hz
         Step::Set(CTRL_REG2, 0b0000_0000), // 4 gauss
         Step::Set(CTRL_REG4, 0b0000_1100), // z ultra-high-performance, low byte first
-        Step::Set(CTRL_REG5, 0b0100_0000), // bytes of one measurement
+        Step::Set(CTRL_REG5, 0b0100_0000), // data blocked until both bytes are read
         Step::Set(CTRL_REG3, 0b0000_0000), // continuous
     ];
     const CYCLE: &'static [Step] =

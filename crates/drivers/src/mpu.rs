@@ -1,8 +1,8 @@
-//! TDK InvenSense's family of the MPU-6000, by SPI.
+//! TDK InvenSense's family of the MPU-6000, over SPI.
 //!
-//! +-2000 deg/s and +-16 g at 1 kHz. The interrupt INT is a pulse of 50 us, active high, for each sample.
+//! +-2000 deg/s and +-16 g at 1 kHz. The interrupt INT gives an active-high pulse of 50 us for each sample.
 //!
-//! | part | register map | filter of the rates | of the forces | clock of SPI |
+//! | part | register map | gyroscope filter | accelerometer filter | SPI clock |
 //! |---|---|---|---|---|
 //! | MPU-6000 | RM-MPU-6000A | 256 Hz, 0.98 ms | 260 Hz | 1 MHz |
 //! | MPU-6500 | RM-MPU-6500A | 184 Hz, 2.9 ms | 218 Hz, 1.9 ms | 1 MHz |
@@ -11,12 +11,14 @@
 //! | ICM-20608-G | RM-000030 | 176 Hz | 218 Hz | 8 MHz |
 //! | ICM-20689 | DS-000143 | 176 Hz | 218 Hz | 8 MHz |
 //!
-//! The filters are the widest that each part has at 1 kHz (DLPF_CFG). The MPU-6000 alone divides the 8 kHz of its
-//! widest one; the others give samples at 8 kHz with theirs (250 Hz), which is why they are slower here. The parts
-//! called MPU allow more than 1 MHz for their readings alone: here a reading of theirs takes 0.12 ms.
+//! The filters are the widest that each part has at 1 kHz (DLPF_CFG). Only the MPU-6000 can divide the 8 kHz of its
+//! widest filter down to 1 kHz. The others always give 8 kHz with their widest filter (250 Hz), so they use the next
+//! narrower filter. The parts called MPU allow more than 1 MHz only for sensor registers; at 1 MHz, a reading takes
+//! 0.12 ms.
 //!
-//! The interface I2C is switched off, lest the traffic of other parts on the bus be taken for it: in USER_CTRL, in the
-//! ICM-20602 in I2C_IF. Early MPU-6000 (revision C, of 2011) read half of the force and are not told from others.
+//! The part's I2C interface is switched off, so that it cannot react to other parts' traffic on the bus: in USER_CTRL,
+//! or in I2C_IF for the ICM-20602. Early MPU-6000 (revision C, of 2011) read half the specific force and cannot be told
+//! from later ones.
 
 use crate::bus::SpiFormat;
 use crate::part::{PartFault, SelfTest, SelfTestResponse, SensorPart, Step};
@@ -27,7 +29,7 @@ use crate::self_test::{as_at_the_factory, numbers};
 pub type Mpu6000 = Mpu<0x68>;
 /// MPU-6500.
 pub type Mpu6500 = Mpu<0x70>;
-/// MPU-9250 without its magnetometer, for which there is [`crate::ak8963::Mpu9250Ak8963`].
+/// MPU-9250 without its magnetometer; [`crate::ak8963::Mpu9250Ak8963`] reads both.
 pub type Mpu9250 = Mpu<0x71>;
 /// ICM-20602.
 pub type Icm20602 = Mpu<0x12>;
@@ -36,14 +38,14 @@ pub type Icm20608 = Mpu<0xAF>;
 /// ICM-20689.
 pub type Icm20689 = Mpu<0x98>;
 
-/// A part of the family, by what its register WHO_AM_I says.
+/// A part of the family, with the given value of WHO_AM_I.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Mpu<const IDENTITY: u8>;
 
-/// Without a name. ICM-20602 and ICM-20608 measure y of the force wrongly by up to 2.7 m/s2 when it holds another
-/// value, says ArduPilot's driver.
+/// Unnamed register. According to ArduPilot's driver, ICM-20602 and ICM-20608 measure y of the specific force wrongly
+/// by up to 2.7 m/s2 if it holds another value.
 const REGISTER_17: u8 = 0x11;
-/// What the factory has written: of the MPU-6000, and of MPU-6500 and MPU-9250.
+/// Factory's self-test responses: two registers of the MPU-6000, then two of MPU-6500 and MPU-9250.
 const SELF_TEST_X: u8 = 0x0D;
 const SELF_TEST_A: u8 = 0x10;
 const SELF_TEST_X_GYRO: u8 = 0x00;
@@ -63,14 +65,14 @@ const PWR_MGMT_2: u8 = 0x6C;
 const I2C_IF: u8 = 0x70;
 const WHO_AM_I: u8 = 0x75;
 
-/// Bit of USER_CTRL that switches I2C off. Some parts clear it when that is done: it is not read back.
+/// Bit of USER_CTRL that switches I2C off. Not read back, since some parts then clear it.
 pub(crate) const I2C_IF_DIS: u8 = 0x10;
-/// Length of specific force, temperature and rates.
+/// Length of specific force, temperature and rates \[bytes\].
 pub(crate) const LENGTH: usize = 14;
 const RAD_S_PER_LSB: f32 = 2000.0 / 32768.0 * core::f32::consts::PI / 180.0;
 const M_S2_PER_LSB: f32 = 16.0 / 32768.0 * 9.806_65;
 
-/// Returns the step if it applies.
+/// Returns the step if it applies, or else a step that does nothing.
 const fn only(applies: bool, step: Step) -> Step {
     if applies { step } else { Step::Wait(0) }
 }
@@ -81,7 +83,7 @@ impl<const IDENTITY: u8> Mpu<IDENTITY> {
     const IS_20608: bool = IDENTITY == 0xAF;
     const IS_ICM: bool = Self::IS_20602 || Self::IS_20608 || IDENTITY == 0x98;
     const I2C_OFF: Step = if Self::IS_20602 { Step::Write(I2C_IF, 0x40) } else { Step::Write(USER_CTRL, I2C_IF_DIS) };
-    /// What the thermometer counts \[1/K\], and the temperature at which it reads 0 \[degrees C\].
+    /// Scale of the thermometer \[1/K\], and the temperature at which it reads 0 \[degrees C\].
     const THERMOMETER: (f32, f32) = match IDENTITY {
         0x68 => (340.0, 36.53),
         0x70 | 0x71 => (333.87, 21.0),
@@ -89,7 +91,7 @@ impl<const IDENTITY: u8> Mpu<IDENTITY> {
     };
 }
 
-/// Self-test of MPU-6500 and MPU-9250 (AN-MPU-9250A-03): 250 deg/s and 2 g behind the filters of 92 Hz, all six axes at
+/// Self-test of MPU-6500 and MPU-9250 (AN-MPU-9250A-03): 250 deg/s and 2 g with the filters of 92 Hz, all six axes at
 /// once.
 const SELF_TEST: SelfTest<InertialReading> = SelfTest {
     quiet: &[
@@ -108,8 +110,8 @@ const SELF_TEST: SelfTest<InertialReading> = SelfTest {
     passes: |response| as_at_the_factory(response, [0.225, 0.675]),
 };
 
-/// Self-test of the MPU-6000, as its register map has it: 250 deg/s and 8 g, within 14 % of what the factory has
-/// written in numbers of five bits.
+/// Self-test of the MPU-6000 as in its register map: 250 deg/s and 8 g. The response must be within 14 % of the
+/// factory's, which is stored in five-bit codes.
 const SELF_TEST_6000: SelfTest<InertialReading> = SelfTest {
     quiet: &[Step::Write(GYRO_CONFIG, 0), Step::Write(ACCEL_CONFIG, 0x10), Step::Wait(20_000)],
     trims: &[(Step::Wait(0), SELF_TEST_X), (Step::Wait(0), SELF_TEST_A)],
@@ -121,17 +123,16 @@ const SELF_TEST_6000: SelfTest<InertialReading> = SelfTest {
 fn within_14_percent(response: &SelfTestResponse) -> bool {
     let [[x, y, z], [low, ..]] = response.trims;
     let rate = |trim: u8, sign: f32| expected(trim & 0x1F, sign * 25.0 * 131.0, 1.046);
-    // 0.34 to 0.92 g in 30 steps.
+    // Codes 1 to 31 stand for 0.34 to 0.92 g.
     let force = |trim: u8, low: u8| expected((trim >> 3) & 0x1C | low & 3, 0.34 * 4096.0, 1.033_737);
     let expected = [rate(x, 1.0), rate(y, -1.0), rate(z, 1.0), force(x, low >> 4), force(y, low >> 2), force(z, low)];
     response.change.iter().zip(expected).all(|(change, expected)| {
-        // What the factory has not written is not judged.
+        // Axes without a factory response are not tested.
         expected.is_none_or(|expected| (change / expected - 1.0).abs() <= 0.14)
     })
 }
 
-/// Returns the response that a number of the factory's stands for: `first` for 1, and `factor` more for each further
-/// one; none for 0.
+/// Returns the response for a factory code: `first` for 1, times `factor` for each further step; none for 0.
 fn expected(trim: u8, first: f32, factor: f32) -> Option<f32> {
     let steps = trim.checked_sub(1)?;
     Some((0..steps).fold(first, |response, _| response * factor))
@@ -146,7 +147,7 @@ impl<const IDENTITY: u8> SensorPart for Mpu<IDENTITY> {
         0x12 => "ICM-20602",
         0xAF => "ICM-20608-G",
         0x98 => "ICM-20689",
-        _ => unreachable!(), // it does not compile
+        _ => unreachable!(), // an unknown identity does not compile
     };
     const SPI: Option<SpiFormat> = {
         let clock_hz = if Self::IS_20602 { 10_000_000 } else { 8_000_000 };
@@ -155,14 +156,14 @@ impl<const IDENTITY: u8> SensorPart for Mpu<IDENTITY> {
     };
     const I2C: &'static [u8] = &[];
     const STUCK_AFTER: u32 = 20;
-    // The others keep what the factory found in places that differ.
+    // The other parts store the factory's responses in other places.
     const SELF_TEST: Option<SelfTest<InertialReading>> = match IDENTITY {
         0x68 => Some(SELF_TEST_6000),
         0x70 | 0x71 => Some(SELF_TEST),
         _ => None,
     };
     const SETUP: &'static [Step] = &[
-        Self::I2C_OFF, // which ends what the part may be doing as a master, too
+        Self::I2C_OFF, // also ends anything that the part may be doing as an I2C master
         Step::Wait(10_000),
         Step::Write(PWR_MGMT_1, 0x80), // reset
         Step::Wait(100_000),
@@ -170,19 +171,19 @@ impl<const IDENTITY: u8> SensorPart for Mpu<IDENTITY> {
         only(!Self::IS_ICM, Step::Write(SIGNAL_PATH_RESET, 0b111)),
         only(!Self::IS_ICM, Step::Wait(100_000)),
         Self::I2C_OFF,
-        Step::Set(PWR_MGMT_1, 1), // awake, by the clock of the gyroscope
+        Step::Set(PWR_MGMT_1, 1), // awake, clocked by the gyroscope
         Step::Wait(10_000),
-        Self::I2C_OFF, // an ICM that slept has lost it
+        Self::I2C_OFF, // an ICM loses it while asleep
         Step::Set(PWR_MGMT_2, 0),
-        Step::Set(CONFIG, if Self::IS_6000 { 0 } else { 1 }), // the filter of the rates
+        Step::Set(CONFIG, if Self::IS_6000 { 0 } else { 1 }), // gyroscope filter
         Step::Set(SMPLRT_DIV, if Self::IS_6000 { 7 } else { 0 }),
         Step::Set(GYRO_CONFIG, 0x18),                       // 2000 deg/s, filtered
         Step::Set(ACCEL_CONFIG, 0x18),                      // 16 g
-        only(!Self::IS_6000, Step::Set(ACCEL_CONFIG_2, 1)), // the filter of the forces
+        only(!Self::IS_6000, Step::Set(ACCEL_CONFIG_2, 1)), // accelerometer filter
         only(Self::IS_20602 || Self::IS_20608, Step::Set(REGISTER_17, 0xC9)),
         Step::Set(INT_PIN_CFG, 0), // pulsed, push-pull, active high
         Step::Set(INT_ENABLE, 1),  // data ready
-        Step::Wait(50_000),        // until the gyroscope turns steadily
+        Step::Wait(50_000),        // gyroscope start-up
     ];
     const CYCLE: &'static [Step] = &[Step::Ready(2_000), Step::Read(ACCEL_XOUT_H, LENGTH)];
 

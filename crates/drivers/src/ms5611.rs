@@ -1,21 +1,21 @@
-//! TE Connectivity MS5611-01BA03, by SPI or I2C (ENG_DS_MS5611-01BA03_B3).
+//! TE Connectivity MS5611-01BA03, over SPI or I2C (ENG_DS_MS5611-01BA03_B3).
 //!
-//! 10 to 1200 mbar and -40 to 85 degrees C, some 50 times a second: a temperature and a pressure, each of 4096 samples
-//! (1.2 Pa rms), with the second-order compensation of cold. It has no interrupt, no identity and no registers, only
-//! commands. Its PROM has a CRC-4, and the word with it is read in each cycle: after a reset that nobody asked for it
-//! reads differently. A MS5607 has the same commands, but reads a quite different pressure.
+//! 10 to 1200 mbar and -40 to 85 degrees C, about 50 times per second: a temperature and a pressure, each of 4096
+//! samples (1.2 Pa rms), with the second-order compensation for cold. The part has no interrupt, no identity and no
+//! registers, only commands. Its PROM has a CRC-4; the PROM word with the CRC is read in each cycle, since it reads
+//! differently after an unexpected reset. An MS5607 has the same commands, but would read a quite different pressure.
 
 use crate::bus::SpiFormat;
 use crate::part::{PartFault, SensorPart, Step};
 use crate::reading::{PressureReading, in_range};
 
-/// The part.
+/// MS5611.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Ms5611 {
     prom: [u16; 8],
-    /// C1 to C6 of a PROM whose CRC is right.
+    /// C1 to C6, if the PROM's CRC is correct.
     coefficients: Option<[i64; 6]>,
-    /// This cycle's D2.
+    /// D2 (temperature) of this cycle.
     d2: Option<i64>,
 }
 
@@ -27,7 +27,7 @@ const CONVERT_D2_4096: u8 = 0x58;
 const PROM_READ: u8 = 0xA0;
 const PROM_READ_LAST: u8 = 0xAE;
 
-/// Longest conversion of 4096 samples, 9.04 ms, and a clock's error \[us\].
+/// Longest conversion of 4096 samples, 9.04 ms, with a margin for clock error \[us\].
 const CONVERSION_US: u32 = 9_300;
 const RANGE_PA: [f32; 2] = [1_000.0, 120_000.0];
 const RANGE_C: [f32; 2] = [-40.0, 85.0];
@@ -39,9 +39,9 @@ impl SensorPart for Ms5611 {
     const I2C: &'static [u8] = &[0x77, 0x76];
     const STUCK_AFTER: u32 = 20;
     const SETUP: &'static [Step] = &[
-        Step::Wait(CONVERSION_US), // a conversion may be under way
+        Step::Wait(CONVERSION_US), // a conversion may be running
         Step::WriteAll(RESET, &[]),
-        Step::Wait(5_000), // it reloads its PROM in 2.8 ms
+        Step::Wait(5_000), // reloads its PROM in 2.8 ms
         Step::Read(PROM_READ, 2),
         Step::Read(PROM_READ + 2, 2),
         Step::Read(PROM_READ + 4, 2),
@@ -72,7 +72,7 @@ impl SensorPart for Ms5611 {
 
 impl Ms5611 {
     fn take_prom(&mut self, command: u8, value: u16) -> Result<(), PartFault> {
-        // Each cycle begins with the PROM: what a broken one has left must not pass for this one's temperature.
+        // Each cycle begins with the PROM. The temperature of an incomplete cycle must not be used for this one.
         self.d2 = None;
         let at = usize::from(command.wrapping_sub(PROM_READ) / 2);
         let word = self.prom.get_mut(at).ok_or(PartFault::Bus)?;
@@ -80,7 +80,7 @@ impl Ms5611 {
         match command {
             PROM_READ_LAST if is_known && *word == value => return Ok(()),
             PROM_READ_LAST if is_known => return Err(PartFault::Calibration),
-            PROM_READ => self.coefficients = None, // set up again
+            PROM_READ => self.coefficients = None, // new set-up
             _ => (),
         }
         *word = value;
@@ -92,7 +92,7 @@ impl Ms5611 {
 
     fn take_adc(&mut self, value: i64) -> Result<Option<PressureReading>, PartFault> {
         let coefficients = self.coefficients.ok_or(PartFault::Calibration)?;
-        // What an interrupted or missing conversion gives.
+        // An interrupted or missing conversion gives 0.
         if value == 0 {
             return Err(PartFault::Silent);
         }
@@ -104,7 +104,7 @@ impl Ms5611 {
     }
 }
 
-/// Returns C1 to C6 of a sound PROM.
+/// Returns C1 to C6 if the PROM is valid.
 fn coefficients(prom: [u16; 8]) -> Result<[i64; 6], PartFault> {
     let [first, c1, c2, c3, c4, c5, c6, last] = prom;
     if prom.iter().all(|&word| word == 0) || prom.iter().all(|&word| word == 0xFFFF) {
@@ -122,7 +122,7 @@ fn coefficients(prom: [u16; 8]) -> Result<[i64; 6], PartFault> {
     Ok([c1, c2, c3, c4, c5, c6].map(i64::from))
 }
 
-/// The data sheet's figures 2 and 3, in the whole numbers that they are in.
+/// Computes figures 2 and 3 of the data sheet in its integer arithmetic.
 fn compensate([c1, c2, c3, c4, c5, c6]: [i64; 6], d1: i64, d2: i64) -> PressureReading {
     let dt = d2 - (c5 << 8);
     let mut temp = 2_000 + ((dt * c6) >> 23);
@@ -140,7 +140,7 @@ fn compensate([c1, c2, c3, c4, c5, c6]: [i64; 6], d1: i64, d2: i64) -> PressureR
         temp -= (dt * dt) >> 31;
     }
     PressureReading {
-        // The data sheet cuts it to whole pascals.
+        // The data sheet truncates to whole pascals; this keeps the fraction.
         pressure_pa: (((d1 * sens) >> 21) - off) as f32 / 32_768.0,
         temperature_c: temp as f32 / 100.0,
     }

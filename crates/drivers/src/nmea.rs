@@ -1,9 +1,11 @@
-//! GNSS receivers that speak NMEA 0183: every one does, without being configured. An epoch is a fix (GGA) and the speed
-//! and course of the same time (RMC), in either order, as makers differ; other sentences are left out. Both must say
-//! that they are measured: dead reckoning, a place put in by hand and a simulator's are an epoch without a fix.
+//! GNSS receivers that speak NMEA 0183, which every one does without configuration. An epoch is a position (GGA) and
+//! the speed and course of the same time (RMC), in either order, since makers differ. Other sentences are ignored. Both
+//! sentences must say that they are measured. Dead reckoning, a manual position and a simulator's position count as an
+//! epoch without a fix.
 //!
-//! The sentences do not say how good a fix is: its standard deviations are taken from the dilution of precision and
-//! [`RANGE_SIGMA_M`]. Nor do they have a vertical speed: it is the mean change of the altitude over some [`CLIMB_S`].
+//! The sentences do not state the accuracy of a fix. Its standard deviations are computed from the dilution of
+//! precision and [`RANGE_SIGMA_M`]. The sentences do not state the vertical speed either. It is computed as the
+//! low-pass filtered change of the altitude, with the time constant [`CLIMB_S`].
 
 mod sentence;
 
@@ -12,30 +14,30 @@ use afbc_types::sin_cos;
 use nalgebra::Vector3;
 use sentence::{Fix, Framed, Framing, Motion, Sentence};
 
-/// Standard deviation of a satellite's range, with which the dilution of precision gives that of a position \[m\]: a
-/// single-frequency receiver under an open sky.
+/// Standard deviation of a satellite's range, for a single-frequency receiver under an open sky \[m\]. Multiplied by
+/// the dilution of precision, it gives the standard deviation of a position.
 pub const RANGE_SIGMA_M: f32 = 2.5;
-/// Ratio of vertical to horizontal dilution, usually.
+/// Typical ratio of vertical to horizontal dilution of precision.
 const VERTICAL: f32 = 1.5;
-/// Standard deviation of the velocity to the north, and to the east \[m/s\]: what PX4 takes for receivers that do not
-/// say (`EKF2_GPS_V_NOISE`).
+/// Standard deviation of the velocity to the north, and to the east \[m/s\]: PX4's value for receivers that do not
+/// state it (`EKF2_GPS_V_NOISE`).
 const SPEED_SIGMA_M_S: f32 = 0.3;
-/// Standard deviation of the vertical speed \[m/s\]: white noise of 1 m in the altitudes of a receiver with 10 fixes a
-/// second leaves 0.9 m/s, and the mean lags 1 m/s behind a vehicle that climbs faster by 1 m/s2.
+/// Standard deviation of the vertical speed \[m/s\]. With 10 fixes per second and white altitude noise of 1 m, the
+/// filtered speed has 0.9 m/s; at a vertical acceleration of 1 m/s2 it lags by 1 m/s.
 const CLIMB_SIGMA_M_S: f32 = 1.5;
-/// Time constant of the vertical speed, and longest time between two altitudes that it takes \[s\].
+/// Time constant of the vertical speed, and longest time between two altitudes that it uses \[s\].
 pub const CLIMB_S: f32 = 1.0;
 const PAUSE_S: f32 = 2.0;
-/// A knot \[m/s\].
+/// One knot \[m/s\].
 const KNOT_M_S: f32 = 1852.0 / 3600.0;
-/// Milliseconds of a day.
+/// Milliseconds per day.
 const DAY_MS: u32 = 86_400_000;
 
-/// Makes fixes of the bytes of a receiver.
+/// Decodes a receiver's bytes into fixes.
 #[derive(Default)]
 pub struct NmeaDecoder {
     framing: Framing,
-    /// The halves of an epoch that is not complete.
+    /// Sentences of an incomplete epoch.
     fix: Option<Fix>,
     motion: Option<Motion>,
     /// Time of day \[ms\], altitude \[m\] and vertical speed \[m/s\] of the last fix.
@@ -45,30 +47,30 @@ pub struct NmeaDecoder {
 }
 
 impl NmeaDecoder {
-    /// One that has read nothing.
+    /// Creates a decoder that has read nothing.
     #[must_use]
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Begins a sentence anew, after bytes of another protocol.
+    /// Discards the current sentence, after bytes of another protocol.
     pub fn begin(&mut self) {
         self.framing = Framing::default();
     }
 
-    /// Number of sentences that were whole.
+    /// Returns the number of valid sentences.
     #[must_use]
     pub fn good_sentences(&self) -> u32 {
         self.good_sentences
     }
 
-    /// Number of sentences that were damaged: a bad line, or the wrong baud rate.
+    /// Returns the number of damaged sentences, caused by a bad line or a wrong baud rate.
     #[must_use]
     pub fn bad_sentences(&self) -> u32 {
         self.bad_sentences
     }
 
-    /// Takes a byte, and returns the fix that it completes: `Some(None)` for an epoch without a fix.
+    /// Takes a byte and returns the fix that it completes; `Some(None)` is an epoch without a fix.
     pub fn take(&mut self, byte: u8) -> Option<Option<FixReading>> {
         let sentence = match self.framing.take(byte)? {
             Framed::Whole(body) => Sentence::read(body),
@@ -89,7 +91,7 @@ impl NmeaDecoder {
         if !is_measured {
             return Some(None);
         }
-        // Halves of two epochs: the older one is overwritten once its successor comes.
+        // Sentences of two epochs: the older sentence is overwritten when its successor comes.
         let (fix, motion) = (self.fix?, self.motion?);
         if fix.time_ms != motion.time_ms {
             return None;
@@ -98,7 +100,7 @@ impl NmeaDecoder {
         Some(self.reading(&fix, &motion))
     }
 
-    /// Returns what an epoch's halves say; none if no receiver can have it.
+    /// Combines the sentences of an epoch; returns none if the numbers are impossible.
     fn reading(&mut self, fix: &Fix, motion: &Motion) -> Option<FixReading> {
         let thousandths = |number: i32| number as f32 / 1000.0;
         let (altitude_m, sigma_m) = (thousandths(fix.altitude_mm), thousandths(fix.dilution) * RANGE_SIGMA_M);
@@ -107,7 +109,7 @@ impl NmeaDecoder {
             Some((last_ms, last_m, climb_m_s)) => {
                 let passed_s = ((fix.time_ms + DAY_MS).saturating_sub(last_ms) % DAY_MS) as f32 / 1000.0;
                 if passed_s <= PAUSE_S {
-                    // The share of a step in a first-order filter, times the change in it.
+                    // Step of a first-order filter: its share, times the difference from the present value.
                     climb_m_s + (altitude_m - last_m - passed_s * climb_m_s) / (passed_s + CLIMB_S)
                 } else {
                     0.0

@@ -1,115 +1,116 @@
-//! What a part is: scripts of register accesses, and arithmetic on what they read. No I/O.
+//! Description of a part: scripts of register accesses, and the decoding of their answers. No I/O.
 
 use crate::bus::SpiFormat;
 use core::fmt;
 
-/// A step of a script.
+/// One step of a script.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Step {
-    /// Expects one of the values in a register: the part's identity.
+    /// Checks that a register, the part's identity, holds one of these values.
     Identify(u8, &'static [u8]),
-    /// Writes a byte to a register whose value is read back, after the script and then again and again in flight: a
-    /// part that was reset meanwhile has lost it.
+    /// Writes a byte to a register. The value is read back after the script and repeatedly in flight, since a part that
+    /// was reset has lost it.
     Set(u8, u8),
-    /// Sets a register, as [`Step::Set`], to a value and those bits of a mask that another register, or it itself,
-    /// holds: register, value, mask, the other register.
+    /// Sets a register like [`Step::Set`], keeping some bits of another register or of the register itself. Fields:
+    /// register, value, mask of the kept bits, the register they are read from.
     SetLike(u8, u8, u8, u8),
-    /// Writes a byte to a register that is not read back.
+    /// Writes a byte to a register, without reading it back.
     Write(u8, u8),
-    /// Writes bytes from a register on, in one transfer; none are a command.
+    /// Writes bytes to consecutive registers in one transfer; without bytes, sends a command.
     WriteAll(u8, &'static [u8]),
-    /// Reads so many bytes from a register on, at most [`READ_MAX`](crate::READ_MAX), for [`SensorPart::take`]. Three
-    /// and more whose bits are all equal are no answer; one or two may well be.
+    /// Reads this number of bytes from consecutive registers for [`SensorPart::take`], at most
+    /// [`READ_MAX`](crate::READ_MAX). Three or more bytes whose bits are all equal count as no answer; one or two may
+    /// be genuine.
     Read(u8, usize),
-    /// Waits until the bits of a mask in a register have a value: register, mask, value, at most so many milliseconds.
+    /// Polls a register until its masked bits have a value. Fields: register, mask, value, time limit \[ms\].
     Await(u8, u8, u8, u32),
-    /// Waits so long \[us\].
+    /// Waits for this time \[us\].
     Wait(u32),
-    /// Waits for the part's interrupt, at most so long \[us\], which is twice the time of a sample; without one, for
-    /// that time.
+    /// Waits for the part's interrupt, at most for this time \[us\], which is twice the sample time. Without a wired
+    /// interrupt, waits for the whole time.
     Ready(u32),
 }
 
-/// The test of a part that reads `R`.
+/// Self-test of a part with readings `R`.
 #[derive(Clone, Copy, Debug)]
 pub struct SelfTest<R> {
-    /// Sets the part up for readings without the stimulus, or with the opposite one; after [`SensorPart::SETUP`].
+    /// Steps after [`SensorPart::SETUP`] for readings without stimulus, or with the opposite one.
     pub quiet: &'static [Step],
-    /// Before the stimulus: the register of the first of three bytes that the factory has written, after a step.
+    /// Factory's responses, read before the stimulus: a step, then the first of three one-byte registers.
     pub trims: &'static [(Step, u8)],
-    /// After these.
+    /// Steps after reading the factory's responses.
     pub between: &'static [Step],
-    /// Applies the stimulus.
+    /// Steps that apply the stimulus.
     pub stimulated: &'static [Step],
-    /// Readings of each kind that are left out, and those that are averaged.
+    /// Number of readings skipped, without and with stimulus each.
     pub skipped: u32,
-    /// See above.
+    /// Number of readings averaged, without and with stimulus each.
     pub averaged: u32,
-    /// Returns a reading as the test counts it: rates and specific force in the part's numbers, or a field \[uT\].
+    /// Converts a reading for the test: rates and specific force in raw numbers, or a field \[uT\].
     pub axes: fn(&R) -> [f32; 6],
-    /// True if the response is one that the data sheet allows.
+    /// True if the data sheet allows the response.
     pub passes: fn(&SelfTestResponse) -> bool,
 }
 
-/// What a test has found.
+/// Result of a self-test.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SelfTestResponse {
     /// Mean reading without the stimulus.
     pub quiet: [f32; 6],
-    /// By how much it changes with the stimulus.
+    /// Change of the mean reading by the stimulus.
     pub change: [f32; 6],
-    /// What the factory has written.
+    /// Factory's responses, in codes.
     pub trims: [[u8; 3]; 2],
 }
 
-/// A part of a data sheet.
+/// A kind of sensor part, described by its data sheet.
 pub trait SensorPart {
-    /// What it reads.
+    /// Type of its readings.
     type Reading: Copy;
-    /// Its name.
+    /// Name of the part.
     const NAME: &'static str;
-    /// How it is read over SPI; `None` if it has I2C alone.
+    /// Frame format on SPI; `None` if the part is used only on I2C.
     const SPI: Option<SpiFormat>;
-    /// Its addresses on I2C, of seven bits, the usual one first; none if it has SPI alone.
+    /// Seven-bit addresses on I2C, the usual one first; empty if the part is used only on SPI.
     const I2C: &'static [u8];
-    /// Sets it up from any state that it may be in.
+    /// Script that sets the part up from any state.
     const SETUP: &'static [Step];
-    /// Takes one reading, or a part of it.
+    /// Script that takes one reading, or a part of one.
     const CYCLE: &'static [Step];
-    /// So many equal readings in a row are a stuck part.
+    /// Number of consecutive equal readings that means a stuck part.
     const STUCK_AFTER: u32;
-    /// Its own test, if it has one that is run here.
+    /// Self-test, if the part has one that is supported.
     const SELF_TEST: Option<SelfTest<Self::Reading>> = None;
 
-    /// Takes the answer to a [`Step::Read`] of `register`, and returns the reading that it completes.
+    /// Takes the answer to a [`Step::Read`] of `register`; returns the reading that it completes, if any.
     ///
     /// # Errors
-    /// The answer is not one that a working part gives.
+    /// If no working part gives this answer.
     fn take(&mut self, register: u8, answer: &[u8]) -> Result<Option<Self::Reading>, PartFault>;
 }
 
-/// What is wrong with a part.
+/// Fault of a part.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PartFault {
-    /// A transfer has failed.
+    /// A transfer failed.
     Bus,
-    /// Nothing answers: every bit reads the same.
+    /// No answer: all bits read the same.
     Silent,
-    /// Another part answers: what it says it is.
+    /// Wrong part; holds its identity.
     Identity(u8),
-    /// A register does not hold what was written to it.
+    /// A register does not hold the value written to it.
     Register(u8),
-    /// The part does not become ready.
+    /// The part does not become ready in time.
     Late,
-    /// What it reads does not change.
+    /// The readings do not change.
     Stuck,
-    /// What it reads is outside of what it can measure.
+    /// The reading is outside the part's range.
     Range,
-    /// Its factory calibration is damaged, or is none.
+    /// The factory calibration is damaged or missing.
     Calibration,
-    /// It has failed its own test.
+    /// The part failed its self-test.
     SelfTest,
-    /// It has lost readings: its buffer is full.
+    /// The part lost readings, since its buffer was full.
     Overflow,
 }
 

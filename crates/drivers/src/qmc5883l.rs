@@ -1,18 +1,18 @@
-//! QST QMC5883L, by I2C (data sheet 1.0).
+//! QST QMC5883L, over I2C (data sheet 1.0).
 //!
-//! +-8 gauss (800 uT) at 100 Hz, each the mean of 512 samples, the narrowest of the part's filters. The period of its
-//! set and reset pulses is the one that the data sheet recommends. DRDY is not used, the flag of its register is.
-//! A field beyond the range is a fault ([`PartFault::Range`]); beyond 10.9 gauss the part flags it itself.
+//! +-8 gauss (800 uT) at 100 Hz, each the mean of 512 samples, the narrowest of the part's filters. The set/reset
+//! period is the one that the data sheet recommends. The data-ready flag is polled; the pin DRDY is not used. A field
+//! beyond the range is a fault ([`PartFault::Range`]); beyond 10.9 gauss the part itself flags an overflow.
 
 use crate::bus::SpiFormat;
 use crate::part::{PartFault, SensorPart, Step};
 use crate::reading::{MagneticReading, little};
 
-/// The part.
+/// QMC5883L.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Qmc5883l;
 
-// The data sheet numbers them only.
+// Registers; the data sheet only numbers them.
 const DATA_OUTPUT_X_LSB: u8 = 0x00;
 const STATUS: u8 = 0x06;
 const CONTROL_1: u8 = 0x09;
@@ -35,11 +35,11 @@ impl SensorPart for Qmc5883l {
     const SETUP: &'static [Step] = &[
         Step::Write(CONTROL_2, SOFT_RST),
         Step::Wait(1_000),
-        Step::Identify(CHIP_ID, &[0xFF]), // what a missing part reads, too: the rest of the set-up tells them apart
+        Step::Identify(CHIP_ID, &[0xFF]), // a missing part reads 0xFF, too; the rest of the set-up tells them apart
         Step::Set(SET_RESET_PERIOD, 0x01),
         Step::Set(CONTROL_1, 0b00_01_10_01), // 512 samples, 8 gauss, 100 Hz, continuous
     ];
-    // With the data, the flags that belong to them.
+    // Reads the data together with their flags.
     const CYCLE: &'static [Step] =
         &[Step::Wait(8_000), Step::Await(STATUS, DRDY, DRDY, 12), Step::Read(DATA_OUTPUT_X_LSB, 7)];
 

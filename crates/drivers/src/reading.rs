@@ -1,21 +1,21 @@
-//! What parts read, in SI units and the part's own axes.
+//! Readings of parts, in SI units and the part's own axes.
 
 use crate::part::PartFault;
 use core::ops::RangeInclusive;
 use nalgebra::Vector3;
 
-/// What an IMU reads.
+/// Reading of an IMU.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InertialReading {
     /// Rates about the part's axes \[rad/s\].
     pub rates_rad_s: Vector3<f32>,
-    /// Specific force along them, upwards at rest \[m/s2\].
+    /// Specific force along the part's axes, upwards at rest \[m/s2\].
     pub specific_force_m_s2: Vector3<f32>,
     /// Temperature of the part \[degrees C\].
     pub temperature_c: f32,
 }
 
-/// What a barometer reads.
+/// Reading of a barometer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PressureReading {
     /// Static pressure \[Pa\].
@@ -24,14 +24,14 @@ pub struct PressureReading {
     pub temperature_c: f32,
 }
 
-/// What a magnetometer reads.
+/// Reading of a magnetometer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MagneticReading {
     /// Field along the part's axes \[uT\].
     pub field_ut: Vector3<f32>,
 }
 
-/// What a GNSS receiver reads.
+/// Reading of a GNSS receiver.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FixReading {
     /// Latitude, north positive \[degrees\].
@@ -50,19 +50,19 @@ pub struct FixReading {
     pub speed_sigma_m_s: f32,
     /// Standard deviation of the velocity down \[m/s\].
     pub climb_sigma_m_s: f32,
-    /// Satellites in use.
+    /// Number of satellites in use.
     pub satellites: u8,
 }
 
-/// Limits of GNSS receivers, as u-blox has them: altitude \[m\], speed along an axis \[m/s\].
+/// Limits of u-blox receivers: altitude \[m\], speed along an axis \[m/s\].
 const ALTITUDES_M: RangeInclusive<f64> = -10_000.0..=80_000.0;
 const SPEED_MAX_M_S: f32 = 500.0;
-/// Standard deviations beyond which a fix is none: of the position \[m\], of the velocity \[m/s\].
+/// Largest standard deviations of a usable fix: position \[m\], velocity \[m/s\].
 const SIGMA_MAX_M: f32 = 200.0;
 const SIGMA_MAX_M_S: f32 = 20.0;
 
 impl FixReading {
-    /// Passes a fix that a receiver can have, and that is accurate enough to be one.
+    /// Returns the fix if its numbers are possible for a receiver and it is accurate enough.
     pub(crate) fn possible(self) -> Option<Self> {
         let is_sigma = |sigma: f32, most: f32| sigma > 0.0 && sigma <= most;
         let is_possible = self.latitude_deg.abs() <= 90.0
@@ -77,19 +77,19 @@ impl FixReading {
     }
 }
 
-/// Returns three numbers of two bytes each, the higher first.
+/// Decodes three big-endian 16-bit numbers.
 pub(crate) fn big(bytes: [u8; 6]) -> Vector3<f32> {
     let [a, b, c, d, e, f] = bytes;
     Vector3::new(i16::from_be_bytes([a, b]), i16::from_be_bytes([c, d]), i16::from_be_bytes([e, f])).map(f32::from)
 }
 
-/// Returns three numbers of two bytes each, the lower first.
+/// Decodes three little-endian 16-bit numbers.
 pub(crate) fn little(bytes: [u8; 6]) -> Vector3<f32> {
     let [a, b, c, d, e, f] = bytes;
     Vector3::new(i16::from_le_bytes([a, b]), i16::from_le_bytes([c, d]), i16::from_le_bytes([e, f])).map(f32::from)
 }
 
-/// Passes a barometer's reading that is within the ranges of its data sheet.
+/// Returns a barometer's reading if it is within the ranges of its data sheet.
 pub(crate) fn in_range(
     reading: PressureReading,
     [min_pa, max_pa]: [f32; 2],

@@ -1,8 +1,8 @@
-//! Tests that parts have of their own: a stimulus on what senses, whose response the data sheet bounds.
+//! Built-in self-tests of parts: a stimulus to the sensing element, whose response the data sheet bounds.
 //!
-//! For a vehicle that is at rest on the ground, and of which nobody needs a reading: a test takes up to half a second,
-//! and the part is set up again after it. An [`Mpu`](crate::mpu) or [`Icm426xx`](crate::icm426xx) that is turned or
-//! shaken meanwhile fails.
+//! Only for a vehicle at rest on the ground that needs no readings meanwhile: a test takes up to half a second, and the
+//! part is set up again afterwards. An [`Mpu`](crate::mpu) or [`Icm426xx`](crate::icm426xx) fails if it is turned or
+//! shaken during the test.
 
 use crate::bus::Registers;
 use crate::driver::{Driver, PartTiming};
@@ -10,14 +10,14 @@ use crate::part::{PartFault, SelfTest, SelfTestResponse, SensorPart, Step};
 use crate::reading::InertialReading;
 
 impl<P: SensorPart, B: Registers, T: PartTiming> Driver<P, B, T> {
-    /// Sets the part up and runs its test, if it has one. The next reading sets it up again.
+    /// Sets the part up and runs its self-test, if it has one. The next reading sets the part up again.
     ///
     /// # Errors
-    /// [`PartFault::SelfTest`] if it fails, or what has kept it from being run.
+    /// [`PartFault::SelfTest`] if the test fails, or the fault that prevented it.
     pub async fn self_test(&mut self) -> Result<(), PartFault> {
         let Some(test) = &P::SELF_TEST else { return Ok(()) };
         let result = self.respond(test).await;
-        // Before an error is returned: a test that was broken off leaves the part stimulated.
+        // Before an error is returned: an aborted test leaves the stimulus on.
         self.forget();
         if (test.passes)(&result?) { Ok(()) } else { Err(PartFault::SelfTest) }
     }
@@ -73,22 +73,22 @@ impl<P: SensorPart, B: Registers, T: PartTiming> Driver<P, B, T> {
     }
 }
 
-/// Returns rates and specific force of a part in its numbers, of which 32768 are 2000 deg/s and 16 g at set-up.
+/// Returns a part's rates and specific force in raw numbers, where 32768 is 2000 deg/s and 16 g as at set-up.
 pub(crate) fn numbers(reading: &InertialReading) -> [f32; 6] {
     let rates = reading.rates_rad_s * (32768.0 / 2000.0 * 180.0 / core::f32::consts::PI);
     let force = reading.specific_force_m_s2 * (32768.0 / 16.0 / 9.806_65);
     [rates.x, rates.y, rates.z, force.x, force.y, force.z]
 }
 
-/// A response of TDK's parts at 250 deg/s and 2 g: the numbers of a degree a second and of a g, largest rate at rest,
-/// least response of a rate that the factory has not written \[deg/s\], and bounds of that of a force \[g\].
+/// Responses of TDK's parts at 250 deg/s and 2 g, in raw numbers and units: raw number of 1 deg/s and of 1 g, largest
+/// rate at rest \[deg/s\], and smallest rate response without a factory response \[deg/s\].
 const PER_DEG_S: f32 = 131.0;
 const PER_G: f32 = 16_384.0;
 const REST_MAX_DEG_S: f32 = 20.0;
 const RATE_MIN_DEG_S: f32 = 60.0;
 
-/// True if a part of TDK's, whose factory has written what it responded there, responds likewise: a rate by more than
-/// half of that, a force by half to one and a half of it. `bounds_g` is for a force that the factory has not written.
+/// True if a TDK part responds like it did at the factory. A rate must respond by more than half of the factory's
+/// response, a force by 0.5 to 1.5 of it. `bounds_g` are the limits for a force without a factory response.
 pub(crate) fn as_at_the_factory(response: &SelfTestResponse, bounds_g: [f32; 2]) -> bool {
     let SelfTestResponse { quiet, change, trims: [rates, forces] } = response;
     let [min_g, max_g] = bounds_g;
@@ -104,7 +104,7 @@ pub(crate) fn as_at_the_factory(response: &SelfTestResponse, bounds_g: [f32; 2])
     rates_pass && forces_pass
 }
 
-/// Returns the response that a byte of the factory's stands for; none if it has written none.
+/// Returns the response for a factory code; none for 0, which means no factory response.
 fn expected(trim: u8) -> Option<f32> {
     let steps = trim.checked_sub(1)?;
     Some((0..steps).fold(2_620.0, |response, _| response * 1.01))

@@ -1,25 +1,30 @@
-//! u-blox receivers, by their binary protocol (UBX), and any other by NMEA.
+//! u-blox receivers with their binary protocol (UBX), and any other receiver with NMEA.
 //!
-//! [`UbxReceiver`] finds the baud rate, asks for the version, and configures the receiver in RAM: navigation solutions
-//! (NAV-PVT) ten times a second, five from the eighth generation, no NMEA, the dynamic model of an aircraft with less
-//! than 4 g, 115,200 baud unless the line is faster. A solution brings the velocity in all axes, and how good position
-//! and velocity are by the receiver's own account: `hAcc`, `vAcc` and `sAcc` are taken as standard deviations along
-//! each axis. Sources: u-blox's interface descriptions of M8 (UBX-13003221), M9 (UBX-19035940) and M10 (UBX-21035062).
+//! [`UbxReceiver`] finds the baud rate, polls the version and configures the receiver in RAM:
 //!
-//! | fault | found by | then |
+//! - navigation solutions (NAV-PVT) at 10 Hz, or at 5 Hz for the eighth generation and earlier,
+//! - no NMEA,
+//! - the dynamic model of an aircraft with less than 4 g,
+//! - 115,200 baud unless the line is faster.
+//!
+//! A solution has the velocity in all axes and the receiver's own accuracy estimates. `hAcc`, `vAcc` and `sAcc` are
+//! taken as standard deviations along each axis. Sources: u-blox's interface descriptions of M8 (UBX-13003221), M9
+//! (UBX-19035940) and M10 (UBX-21035062).
+//!
+//! | fault | detected by | reaction |
 //! |---|---|---|
-//! | the wrong baud rate, no receiver | no whole message in 1.1 s | the next baud rate |
-//! | no answer to the poll of the version, but NMEA | three polls | fixes by NMEA, and a poll every 5 s |
-//! | a step of the configuration refused or not answered | three times | left out; without NAV-PVT, NMEA |
-//! | garbled, lost or foreign bytes | the checksum, a pause of 0.2 s | a frame within the damaged one is found |
-//! | silence, a reset | 1 s without a solution, 3 s without NMEA | looked for and configured, first where it was |
-//! | no fix, or one that the receiver does not trust | `fixType`, `flags`, `flags3` | an epoch without a fix |
-//! | impossible numbers | the receivers' limits; accuracies of 0, or beyond 200 m and 20 m/s | the same |
+//! | wrong baud rate, no receiver | no valid message in 1.1 s | next baud rate |
+//! | no answer to the version poll, but NMEA | three polls | fixes from NMEA, and a poll every 5 s |
+//! | configuration step refused or not answered | three times | step skipped; without NAV-PVT, NMEA |
+//! | garbled, lost or foreign bytes | checksum, pause of 0.2 s | search for a frame within the damaged one |
+//! | silence, reset | 1 s without a solution, 3 s without NMEA | search and configure, first at the last baud rate |
+//! | no fix, or one that the receiver does not trust | `fixType`, `flags`, `flags3` | epoch without a fix |
+//! | impossible numbers | receivers' limits; accuracies of 0, or beyond 200 m and 20 m/s | epoch without a fix |
 //!
-//! A fix has the time of the first byte of its frame, or of its epoch in NMEA, less [`DELAY_US`].
+//! The time of a fix is the arrival of the first byte of its frame, or of its epoch in NMEA, minus [`DELAY_US`].
 //!
-//! The crate `ublox` was not taken: it panics on frames with a right checksum and numbers that it does not know. The
-//! tests compare messages and keys with it.
+//! The crate `ublox` is not used, since it panics on frames with a correct checksum and unknown numbers. The tests
+//! compare messages and keys with it.
 
 mod configuration;
 mod frame;
@@ -32,36 +37,37 @@ use configuration::{ACK_ACK, ACK_NAK, FAST_BAUD, Interface, MON_VER, NAV_PVT, Wo
 pub use frame::UbxCommand;
 use frame::{FrameDecoder, MessageId};
 
-/// Age of a solution when the first byte of its frame arrives \[us\]: 0.12 s, which ArduPilot's flight logs show until
-/// a frame is there, less the time of a frame.
+/// Age of a solution when the first byte of its frame arrives \[us\]: the 0.12 s that ArduPilot's flight logs show for
+/// a complete frame, minus the time of a frame.
 pub const DELAY_US: u64 = 110_000;
-/// Baud rates of receivers, in the order in which they are tried after those where one was used and found, or at first
-/// the usual ones of configured and of new receivers.
+/// Baud rates in the order of the search. The rates where the receiver was last used and last found come before them;
+/// at first, these are the usual ones of configured and of new receivers.
 pub const BAUDS: [u32; 6] = [9_600, 57_600, 38_400, 115_200, 230_400, 460_800];
 const NEW_BAUD: u32 = 38_400;
-/// Times that something is asked, and the time for an answer \[us\]. Together they are longer than an epoch of NMEA.
+/// Number of times that something is asked, and the time for an answer \[us\]. Together they are longer than an epoch
+/// of NMEA.
 const ASK_MAX: u8 = 3;
 const ASK_US: u64 = 370_000;
 /// Time for a receiver to change its baud rate \[us\].
 const CHANGE_US: u64 = 100_000;
-/// Time to another try after a refusal \[us\].
+/// Pause after a refusal before asking again \[us\].
 const REFUSED_US: u64 = 50_000;
-/// Time between two polls of a receiver that is used by NMEA \[us\].
+/// Time between two polls of a receiver used with NMEA \[us\].
 const POLL_US: u64 = 5_000_000;
-/// Time without a solution, and without an epoch of NMEA, after which the receiver is looked for \[us\].
+/// Time without a solution, and without an epoch of NMEA, after which the receiver is searched for \[us\].
 const SOLUTION_SILENT_US: u64 = 1_000_000;
 const NMEA_SILENT_US: u64 = 3_000_000;
-/// Pause between two epochs of NMEA, at least \[us\].
+/// Smallest pause between two epochs of NMEA \[us\].
 const EPOCH_PAUSE_US: u64 = 20_000;
-/// Bits of a byte on the line.
+/// Number of bits per byte on the line.
 const BYTE_BITS: u64 = 10;
 
-/// What is to be done with the UART.
+/// Action for the caller's UART.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ReceiverAction {
-    /// Change its baud rate, after what was sent has left.
+    /// Change the UART's baud rate, after everything sent has left.
     Baud(u32),
-    /// Send this.
+    /// Send this command.
     Send(UbxCommand),
 }
 
@@ -69,17 +75,17 @@ pub enum ReceiverAction {
 enum Phase {
     /// Tries a baud rate.
     Searches,
-    /// Is at this step of the configuration.
+    /// Sends this step of the configuration.
     Configures(Interface, u8),
-    /// Waits for an answer over the line that this step changed.
+    /// Waits for an answer at the baud rate that this step has set.
     Confirms(Interface, u8),
-    /// Is configured.
+    /// The receiver is configured and sends solutions.
     Solves,
-    /// Takes what comes without being configured.
+    /// The receiver is not configured; uses its NMEA.
     Nmea,
 }
 
-/// What the receiver has said.
+/// Decoded message of the receiver.
 enum Message {
     Version(Interface),
     Answer(MessageId, bool),
@@ -87,35 +93,35 @@ enum Message {
     Other,
 }
 
-/// A receiver on a UART, without I/O: the UART's bytes go to [`take`](Self::take), and [`poll`](Self::poll) says what
-/// to do with it.
+/// A GNSS receiver on a UART, without I/O: the caller passes the UART's bytes to [`take`](Self::take), and
+/// [`poll`](Self::poll) returns the actions for the UART.
 pub struct UbxReceiver {
     frames: FrameDecoder,
     nmea: NmeaDecoder,
     phase: Phase,
-    /// The UART's baud rate, and whether it is still to be set.
+    /// The UART's baud rate, and whether the caller has yet to set it.
     baud: u32,
     sets_baud: bool,
-    /// Baud rates at which the receiver was used, and was found before it was configured.
+    /// Baud rates at which the receiver was last used, and at which it was found before being configured.
     used_baud: u32,
     found_baud: u32,
-    /// Place of the baud rate in the order of the search.
+    /// Index of the next baud rate in the search.
     place: usize,
-    /// How often was asked, whether with a refusal, and when to ask again \[us\].
+    /// Number of times asked.
     asked: u8,
-    /// Answers that may still come to the last step, which was asked for more than once.
+    /// Number of answers that may still arrive for the last step, which was sent more than once.
     owed: u8,
     refused: bool,
     ask_us: u64,
-    /// Its baud rate could not be changed.
+    /// True if the receiver's baud rate could not be changed.
     keeps_baud: bool,
-    /// Newest epoch, newest solution and newest byte \[us\].
+    /// Times of the newest epoch, the newest solution and the newest byte \[us\].
     heard_us: u64,
     solved_us: Option<u64>,
     byte_us: u64,
-    /// First byte of this epoch of NMEA \[us\].
+    /// Time of the first byte of this epoch of NMEA \[us\].
     epoch_us: u64,
-    /// Good sentences before this baud rate was tried.
+    /// Number of good sentences before this baud rate was tried.
     sentences: u32,
     searches: u32,
 }
@@ -127,7 +133,7 @@ impl Default for UbxReceiver {
 }
 
 impl UbxReceiver {
-    /// One of which nothing is known.
+    /// Creates a receiver of which nothing is known.
     #[must_use]
     pub fn new() -> Self {
         UbxReceiver {
@@ -153,34 +159,34 @@ impl UbxReceiver {
         }
     }
 
-    /// True while it is configured and sends navigation solutions.
+    /// True while the receiver is configured and sends navigation solutions.
     #[must_use]
     pub fn is_configured(&self) -> bool {
         self.phase == Phase::Solves
     }
 
-    /// Number of damaged frames and sentences: a bad line, or the wrong baud rate.
+    /// Returns the number of damaged frames and sentences, caused by a bad line or a wrong baud rate.
     #[must_use]
     pub fn damaged(&self) -> u32 {
         self.frames.damaged().saturating_add(self.nmea.bad_sentences())
     }
 
-    /// Number of times that it fell silent and was looked for again.
+    /// Returns the number of times that the receiver fell silent and was searched for.
     #[must_use]
     pub fn searches(&self) -> u32 {
         self.searches
     }
 
-    /// Takes a byte that arrived at `at_us`, and returns the fix that it completes with the time at which it was true:
-    /// no value for an epoch without a fix.
+    /// Takes a byte that arrived at `at_us`. Returns the fix that it completes, with the time of the fix; the value is
+    /// none for an epoch without a fix.
     pub fn take(&mut self, at_us: u64, byte: u8) -> Option<Stamped<Option<FixReading>>> {
         let byte_us = BYTE_BITS * 1_000_000 / u64::from(self.baud.max(1));
         let mut fix = None;
         self.frames.push(at_us, byte);
         while let Some((first_us, message)) = self.frames.next(byte_us, read) {
-            // No byte of it belongs to a sentence.
+            // Bytes of a frame belong to no sentence.
             self.nmea.begin();
-            // Sentences behind a frame begin an epoch, however short the pause between.
+            // Sentences after a frame begin a new epoch, however short the pause.
             self.byte_us = 0;
             match message {
                 Message::Version(interface) => self.identified(interface, at_us),
@@ -192,7 +198,7 @@ impl UbxReceiver {
                 Message::Other => (),
             }
         }
-        // An epoch that has a solution must not come a second time, by its sentences.
+        // Once solutions come, sentences of the same epoch are ignored.
         let solves = self.solved_us.is_some_and(|solved_us| at_us.saturating_sub(solved_us) < SOLUTION_SILENT_US);
         if solves || self.phase == Phase::Solves { fix } else { self.take_nmea(at_us, byte) }
     }
@@ -207,10 +213,10 @@ impl UbxReceiver {
         Some(Stamped { value, at_us: self.epoch_us.saturating_sub(DELAY_US) })
     }
 
-    /// Returns what is to be done at `now_us`, one thing after the other until there is nothing; to be called again
-    /// after [`take`](Self::take), and every 50 ms.
+    /// Returns the next action at `now_us`. To be called until it returns none, after each [`take`](Self::take) and
+    /// every 50 ms.
     pub fn poll(&mut self, now_us: u64) -> Option<ReceiverAction> {
-        // The other phases ask, and end by answers that do not come.
+        // The other phases time out by unanswered requests.
         let silent_us = match self.phase {
             Phase::Solves => SOLUTION_SILENT_US,
             Phase::Nmea => NMEA_SILENT_US,
@@ -245,7 +251,7 @@ impl UbxReceiver {
                         (self.asked, self.ask_us) = (self.asked + 1, now_us.saturating_add(ASK_US));
                         return Some(ReceiverAction::Send(command));
                     }
-                    // A refusal shows that the line works, and so will sentences; silence may be the wrong baud rate.
+                    // A refusal shows that the line works, so NMEA will, too. Silence may mean a wrong baud rate.
                     Some((_, Worth::Needed)) if self.refused => self.take_as_it_is(now_us),
                     Some((_, Worth::Needed)) => self.search(now_us),
                     Some(_) => self.enter_next(interface, number, 0, now_us),
@@ -270,7 +276,7 @@ impl UbxReceiver {
         step(interface, number, baud)
     }
 
-    /// Uses it by NMEA, and asks later.
+    /// Uses the receiver with NMEA, and polls it again later.
     fn take_as_it_is(&mut self, now_us: u64) {
         self.enter(Phase::Nmea, now_us);
         self.ask_us = now_us.saturating_add(POLL_US);
@@ -281,7 +287,7 @@ impl UbxReceiver {
         (self.asked, self.owed, self.refused, self.ask_us) = (0, 0, false, now_us);
     }
 
-    /// Looks for a receiver, first where it was.
+    /// Searches for the receiver, first at its last baud rate.
     fn search(&mut self, now_us: u64) {
         self.searches = self.searches.saturating_add(1);
         self.try_place(0, now_us);
@@ -290,16 +296,16 @@ impl UbxReceiver {
     fn try_place(&mut self, place: usize, now_us: u64) {
         let places = [self.used_baud, self.found_baud].into_iter().chain(BAUDS);
         self.baud = places.clone().nth(place).unwrap_or(FAST_BAUD);
-        // The first two are not tried twice.
+        // When the search wraps around, it skips the first two places, which repeat rates of the list.
         self.place = if place + 1 < places.count() { place + 1 } else { 2 };
         (self.sets_baud, self.solved_us, self.sentences) = (true, None, self.nmea.good_sentences());
         self.enter(Phase::Searches, now_us);
     }
 
-    /// Concludes from what was heard at this baud rate without an answer.
+    /// Decides how to go on after a baud rate at which the receiver did not answer.
     fn conclude(&mut self, now_us: u64) {
         if self.solved_us.is_some() {
-            // It was configured before, and does not hear.
+            // The receiver sends solutions but does not hear the requests: it was configured before.
             self.enter(Phase::Solves, now_us);
         } else if self.nmea.good_sentences() != self.sentences {
             self.take_as_it_is(now_us);
@@ -311,7 +317,7 @@ impl UbxReceiver {
     fn identified(&mut self, interface: Interface, now_us: u64) {
         match self.phase {
             Phase::Searches | Phase::Nmea => {
-                // A fast rate may be what was set here before; a reset takes the receiver back to its own.
+                // A fast rate may have been set by this driver; after a reset, the receiver returns to its own.
                 if self.baud < FAST_BAUD {
                     self.found_baud = self.baud;
                 }
@@ -329,13 +335,13 @@ impl UbxReceiver {
         if self.step(interface, number).is_none_or(|(command, _)| command.id() != to) {
             return;
         }
-        // All keys have the same command: first come the answers to earlier steps, or to one that sets the baud rate.
+        // All keys use the same command. Answers to earlier steps, or to the one that set the baud rate, come first.
         if self.owed > 0 {
             self.owed -= 1;
         } else if self.asked == 0 || matches!(self.phase, Phase::Confirms(..)) {
-            // To nothing that is known.
+            // An answer to no known request.
         } else if accepted {
-            // A refusal is asked about again, and was the answer to what came before.
+            // After a refusal the step was sent again, and the refusal answered the earlier request.
             let owed = if self.refused { 0 } else { self.asked.saturating_sub(1) };
             self.enter_next(interface, number, owed, now_us);
         } else {
@@ -343,17 +349,17 @@ impl UbxReceiver {
         }
     }
 
-    /// Begins the step after this one, while so many answers may still come.
+    /// Begins the next step; `owed` answers to this one may still arrive.
     fn enter_next(&mut self, interface: Interface, number: u8, owed: u8, now_us: u64) {
         self.enter(Phase::Configures(interface, number.saturating_add(1)), now_us);
-        // Each message has answers of its own.
+        // Each message type is acknowledged separately, so no answers are owed.
         self.owed = if interface == Interface::Keys { owed } else { 0 };
     }
 }
 
 fn read(id: MessageId, payload: &[u8]) -> Message {
     match (id, payload) {
-        // The poll itself, echoed, has no payload.
+        // An echo of the poll itself has no payload.
         (MON_VER, [_, ..]) => Message::Version(Interface::of(payload)),
         (ACK_ACK | ACK_NAK, &[class, number]) => Message::Answer([class, number], id == ACK_ACK),
         (NAV_PVT, _) => solution::read(payload).map_or(Message::Other, Message::Solution),

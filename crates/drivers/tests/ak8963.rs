@@ -1,4 +1,4 @@
-//! MPU-9250 with AK8963 against their registers.
+//! MPU-9250 with AK8963, tested on models of their registers.
 
 use crate::rig::mpu_registers::{Magnetometer, Registers};
 use crate::rig::suite::{Pace, Suite};
@@ -7,10 +7,10 @@ use afbc_drivers::PartFault;
 use afbc_drivers::ak8963::{Mpu9250Ak8963, Mpu9250Reading};
 use nalgebra::Vector3;
 
-/// Along the IMU's axes.
+/// Field along the IMU's axes.
 const FIELD_UT: [f64; 3] = [20.0, -7.0, 44.0];
 
-/// The same along the magnetometer's axes, as the product specification draws them.
+/// Returns the same vector along the magnetometer's axes, as drawn in the product specification.
 fn turned([x, y, z]: [f64; 3]) -> [f64; 3] {
     [y, x, -z]
 }
@@ -64,7 +64,7 @@ fn its_full_range_is_read_whatever_its_sensitivity() {
         rig.with(|part| part.magnetometer.as_mut().expect("one").adjustment = adjustment);
         let mut driver = rig.driver(Mpu9250Ak8963::default());
         for field in [[0.0; 3], [2000.0, 1500.0, -1400.0], [-1400.0, -1500.0, 2000.0], [4.0, 4800.0, -3.0]] {
-            // Half of the sensitivity is half of the range.
+            // Half the sensitivity means half the range.
             let field = if adjustment[0] == 1 { field.map(|field| field / 2.0) } else { field };
             rig.with(|part| part.magnetometer.as_mut().expect("one").field_ut = turned(field));
             let _ = run(&mut driver, &rig, 500_000);

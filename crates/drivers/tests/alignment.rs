@@ -1,4 +1,4 @@
-//! Alignments against turns, and against what ArduPilot and Betaflight say of boards.
+//! Alignment matrices compared with rotations, and with ArduPilot's and Betaflight's descriptions of boards.
 
 use afbc_drivers::InertialReading;
 use afbc_drivers::alignment::{CW0, CW0_FLIP, CW90, CW90_FLIP, CW180, CW180_FLIP, CW270, CW270_FLIP, turned};
@@ -19,15 +19,15 @@ const ALL: [(&str, Matrix3<f32>, f32, bool); 8] = [
 #[test]
 fn each_is_the_turn_that_its_name_says() {
     for (name, to_body, quarters, is_flipped) in ALL {
-        // Clockwise seen from above is negative about z.
+        // Clockwise as seen from above is a negative rotation about z.
         let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), -quarters * FRAC_PI_2);
         let flip = Rotation3::from_axis_angle(&Vector3::y_axis(), if is_flipped { PI } else { 0.0 });
         assert!(((turn * flip).matrix() - to_body).amax() < 1e-6, "{name}: {to_body}");
     }
 }
 
-/// The part whose arrow (x) points to the right feels gravity upwards on its z whichever way it is turned, a push
-/// forward on its y, and a roll to the right as a turn about its y.
+/// A part whose x axis points to the right senses gravity upwards on its z, a push forward on its y, and a roll to the
+/// right as a rotation about its y.
 #[test]
 fn a_reading_is_turned_as_a_whole() {
     let reading = InertialReading {
@@ -40,7 +40,7 @@ fn a_reading_is_turned_as_a_whole() {
     assert_eq!(force, Vector3::new(2.0, 0.0, 9.8));
 }
 
-/// ArduPilot's rotations, of a vector in axes forward, right, down.
+/// Applies an ArduPilot rotation to a vector with axes forward, right, down.
 fn ardupilot(rotation: &str, [x, y, z]: [f32; 3]) -> [f32; 3] {
     match rotation {
         "NONE" => [x, y, z],
@@ -56,9 +56,8 @@ fn ardupilot(rotation: &str, [x, y, z]: [f32; 3]) -> [f32; 3] {
     }
 }
 
-/// What Betaflight and ArduPilot, which have axes of their own, say of the same part of a board is the same.
-/// ArduPilot's older driver of InvenSense's parts, which MPU and ICM-20xxx have, exchanges x and y and turns z over
-/// before it rotates.
+/// Betaflight and ArduPilot have their own axes, but their descriptions of a board must agree. ArduPilot's older driver
+/// for InvenSense parts (MPU and ICM-20xxx) first swaps x and y and negates z.
 #[test]
 fn betaflight_and_ardupilot_agree_on_every_board_that_both_describe() {
     let boards = [
@@ -67,7 +66,7 @@ fn betaflight_and_ardupilot_agree_on_every_board_that_both_describe() {
         ("SpeedyBee F405 Mini", CW270, "PITCH_180_YAW_90", false),
         ("Matek F405-STD", CW180, "YAW_90", true),
         ("Kakute F4", CW270, "YAW_180", true),
-        // By ArduPilot alone.
+        // Only ArduPilot describes these.
         ("Pixracer", CW180_FLIP, "ROLL_180_YAW_90", true),
         ("Matek H743, first", CW0_FLIP, "YAW_180", false),
         ("Matek H743, second", CW90_FLIP, "YAW_270", false),

@@ -1,5 +1,5 @@
-//! Whatever barometers and magnetometers answer, their drivers do not panic, and what they read is within the range of
-//! the part's data sheet.
+//! Drivers of barometers and magnetometers never panic, and their readings stay within the data sheet's range, whatever
+//! the part answers.
 
 use afbc_drivers::bmp3::{Bmp388, Bmp390};
 use afbc_drivers::bmp280::Bmp280;
@@ -14,7 +14,7 @@ use proptest::array::uniform8;
 use proptest::collection::vec;
 use proptest::prelude::*;
 
-/// Registers and answers of any length, many of them those of a script.
+/// Returns registers with answers of any length; many are reads of the part's scripts.
 fn answers<P: SensorPart>() -> impl Strategy<Value = Vec<(u8, Vec<u8>)>> {
     let reads = P::SETUP.iter().chain(P::CYCLE).filter_map(|step| match step {
         Step::Read(register, length) => Some((*register, *length)),
@@ -42,7 +42,7 @@ fn fields(readings: &[MagneticReading], max_ut: [f32; 3]) {
     }
 }
 
-/// Gives an answer with each value of the bits of a mask in one of its bytes, until the part takes its checksum.
+/// Tries all values of the masked bits in one byte, until the part accepts the checksum.
 fn with_checksum<P: SensorPart>(part: &mut P, register: u8, answer: &mut [u8], at: usize, mask: u8) {
     let is_taken = (0..=mask).any(|check| {
         answer[at] = answer[at] & !mask | check;
@@ -73,7 +73,7 @@ proptest! {
         fields(&give(&mut Lis3mdl, &lis3mdl), [400.0; 3]);
     }
 
-    /// A barometer whose calibration is any that its checksum is right for.
+    /// Barometers with random calibrations whose checksum is correct.
     #[test]
     fn any_calibration_is_survived(
         coefficients in vec(any::<u8>(), 18),
@@ -114,14 +114,14 @@ proptest! {
     }
 }
 
-/// The extremes of its whole numbers, where they are longest.
+/// Extreme coefficients and samples, which give the largest intermediate integers.
 #[test]
 fn the_largest_numbers_of_a_ms5611_fit() {
     for bits in 0..64_u32 {
         let word = |at: u32| if bits >> at & 1 == 1 { 0xFFFF } else { 1_u16 };
         let mut part = Ms5611::default();
         for (at, command) in (0..7).zip((0xA0..).step_by(2)) {
-            // The first is no coefficient.
+            // The first word is not a coefficient.
             assert_eq!(part.take(command, &word(if at == 0 { 0 } else { at - 1 }).to_be_bytes()), Ok(None));
         }
         let mut last = [0x12, 0x30];

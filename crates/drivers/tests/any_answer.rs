@@ -1,4 +1,5 @@
-//! No answer of an IMU, and nothing in its registers, makes a driver panic or read what the part cannot measure.
+//! For any register content and any answer of an IMU, its driver does not panic and reads nothing beyond the part's
+//! range.
 
 use crate::rig::{Model, Rig, run};
 use afbc_drivers::ak8963::Mpu9250Ak8963;
@@ -8,7 +9,7 @@ use afbc_drivers::mpu::{Icm20602, Icm20608, Icm20689, Mpu6000, Mpu6500, Mpu9250}
 use afbc_drivers::{InertialReading, PartFault, READ_MAX, SensorPart, Step};
 use proptest::prelude::*;
 
-/// A part that passes its set-up; everything else in its registers is anything.
+/// A part that passes its set-up; all its other registers hold random bytes.
 struct Anything {
     registers: Vec<Option<u8>>,
     is_kept: Vec<bool>,
@@ -55,7 +56,7 @@ impl Model for Anything {
     }
 }
 
-/// The ranges of all of these parts.
+/// Checks the ranges that all these parts share.
 fn check(reading: &InertialReading, name: &str) -> Result<(), TestCaseError> {
     let InertialReading { rates_rad_s, specific_force_m_s2, temperature_c } = reading;
     prop_assert!(rates_rad_s.iter().all(|rate| rate.abs() <= 2000.01_f32.to_radians()), "{name}: {rates_rad_s}");
@@ -68,7 +69,7 @@ fn survives<P: SensorPart + Default>(
     bytes: &[u8],
     check: impl Fn(&P::Reading) -> Result<(), TestCaseError>,
 ) -> Result<(), TestCaseError> {
-    // Answers, of any register and length.
+    // Answers of any register and length.
     let mut part = P::default();
     for (at, length) in bytes.iter().zip(bytes.iter().skip(1)) {
         let answer: Vec<u8> =
@@ -77,7 +78,7 @@ fn survives<P: SensorPart + Default>(
             check(&reading)?;
         }
     }
-    // Those that its scripts ask for.
+    // Answers to the reads of the scripts.
     for step in P::SETUP.iter().chain(P::CYCLE).chain(P::CYCLE) {
         if let Step::Read(register, length) = *step {
             prop_assert!(length <= READ_MAX);
@@ -87,7 +88,7 @@ fn survives<P: SensorPart + Default>(
             }
         }
     }
-    // Registers, with its driver.
+    // Random registers, read by the driver.
     let rig = Rig::new(Anything::new::<P>(bytes));
     let mut driver = rig.driver(P::default());
     let (readings, faults) = run(&mut driver, &rig, 500_000);
@@ -116,7 +117,7 @@ proptest! {
         survives::<Mpu9250Ak8963>(&bytes, |reading| {
             check(&reading.inertial, Mpu9250Ak8963::NAME)?;
             if let Ok(Some(magnetic)) = reading.magnetic {
-                // +-4914 uT, by the greatest factor.
+                // +-4914 uT, times the largest sensitivity factor.
                 prop_assert!(magnetic.field_ut.amax() <= 4914.1 * 1.5, "{}", magnetic.field_ut);
             }
             Ok(())
@@ -136,7 +137,7 @@ proptest! {
 
 #[test]
 fn a_part_that_passes_its_set_up_is_read() {
-    // That the property is about readings at all.
+    // Makes sure that the properties above are tested with readings at all.
     fn readings<P: SensorPart + Default>() -> usize {
         let bytes: Vec<u8> = (0..251_u32).map(|at| (at * at * 37 + 11) as u8).collect();
         let rig = Rig::new(Anything::new::<P>(&bytes));

@@ -1,23 +1,23 @@
-//! A battery's voltage and current from a converter's numbers.
+//! A battery's voltage and current from ADC samples.
 
 use afbc_drivers::PartFault;
 use afbc_drivers::battery::{BatteryPins, BatteryScale, BatterySensor, FILTER_S};
 use proptest::prelude::*;
 
 const RANGE_V: f32 = 3.3;
-/// The Matek H743's, by ArduPilot's description of the board.
+/// Scale of the Matek H743, as ArduPilot describes the board.
 const MATEK: BatteryScale = BatteryScale { volts_per_volt: 11.0, amperes_per_volt: 40.0 };
 /// Time between two readings \[us\].
 const STEP_US: u64 = 50_000;
 
-/// A converter's number for a battery.
+/// Returns the ADC samples for a battery.
 fn numbers(voltage_v: f32, current_a: f32, end: u16) -> [u16; 2] {
     let share = [voltage_v / MATEK.volts_per_volt, current_a / MATEK.amperes_per_volt].map(|volts| volts / RANGE_V);
     share.map(|share| (share.clamp(0.0, 1.0) * f32::from(end)) as u16)
 }
 
 proptest! {
-    /// Any battery is read to a step of the converter, of 12 bits or 16.
+    /// Any battery is read with the resolution of the ADC, of 12 or 16 bits.
     #[test]
     fn what_is_there_is_read(voltage in 0.6..35.0_f32, current in 0.0..130.0_f32, wide in any::<bool>()) {
         let end = if wide { u16::MAX } else { 4095 };
@@ -27,7 +27,7 @@ proptest! {
         prop_assert!((amperes.expect("measured") - current).abs() < 132.0 / f32::from(end) + 1e-3);
     }
 
-    /// Any numbers at any times: a reading within the range, or none.
+    /// Any samples at any times give a reading within the range, or none.
     #[test]
     fn any_number_is_survived(all in prop::collection::vec((any::<[u16; 2]>(), any::<u16>(), any::<u64>()), 1..30)) {
         let mut sensor = BatterySensor::new(RANGE_V);
@@ -39,7 +39,7 @@ proptest! {
     }
 }
 
-/// A step is followed with the time constant, at whichever rate it is read.
+/// A step in voltage is followed with the filter's time constant, at any sampling rate.
 #[test]
 fn readings_are_filtered() {
     for step_us in [20_000, STEP_US, 100_000] {
@@ -50,13 +50,13 @@ fn readings_are_filtered() {
         for step in 1..=(FILTER_S * 1e6) as u64 / step_us {
             volts = read(step * step_us, 14.8);
         }
-        // Of an exponential 0.37 is left; a filter of finite steps leaves more.
+        // An exponential leaves 0.37 after one time constant; a filter with finite steps leaves more.
         let left = (volts - 14.8) / 2.0;
         assert!((0.36..0.46).contains(&left), "{step_us} us: {left}");
     }
 }
 
-/// The table of faults.
+/// Cases of the fault table in the module's documentation.
 #[test]
 fn faults_are_no_reading() {
     let good = numbers(16.0, 20.0, 65_535);
@@ -76,13 +76,13 @@ fn faults_are_no_reading() {
         if fault[1] == 65_535 {
             assert_eq!(at.expect("a voltage").current_v, None);
         }
-        // Afterwards the fault is not in the filter.
+        // The faulty sample has not entered the filter.
         let after = sensor.take(2 * STEP_US, good, 65_535).expect("a battery");
         assert!((after.voltage_v - before.voltage_v).abs() < 1e-4);
     }
 }
 
-/// A vehicle's own divider and amplifier take the place of the board's, each for itself.
+/// The vehicle's own scales of voltage and current replace the board's independently.
 #[test]
 fn scales_are_changed() {
     assert_eq!(MATEK.changed([-1.0, 0.0]), MATEK);

@@ -1,4 +1,4 @@
-//! BMI270 against its registers, as BST-BMI270-DS000 has them.
+//! BMI270, tested on a model of its registers (BST-BMI270-DS000).
 
 use crate::bmi270_model::Bmi270Registers;
 use crate::rig::suite::{Pace, Suite, reads_the_whole_range};
@@ -30,7 +30,7 @@ fn part(identity: u8) -> Bmi270Registers {
     Bmi270Registers::new(identity, noise)
 }
 
-/// The least differences of the data sheet: 16, -15 and 10 g.
+/// The data sheet's minimum differences are 16, -15 and 10 g.
 #[test]
 fn its_self_test_passes_when_it_is_pushed_far_enough() {
     for (pushes_g, passes) in [
@@ -79,7 +79,7 @@ fn a_wrong_crosstalk_of_the_gyroscope_is_corrected() {
 
 #[test]
 fn a_part_whose_configuration_is_lost_is_late() {
-    // Nothing that is read back is lost, and all the same it does not work.
+    // All registers that are read back are intact, but the part does not work.
     let rig = Rig::new(part(0x24));
     let mut driver = rig.driver(Bmi270::default());
     let _ = run(&mut driver, &rig, 500_000);
@@ -88,7 +88,7 @@ fn a_part_whose_configuration_is_lost_is_late() {
     assert!(readings.is_empty() && faults.contains(&PartFault::Late), "{faults:?}");
 }
 
-/// What a device was sent, for a transfer.
+/// Bytes sent to the device in the last transfer.
 struct Sent(Vec<u8>);
 
 impl ErrorType for Sent {

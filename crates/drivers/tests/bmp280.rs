@@ -1,19 +1,19 @@
-//! BMP280 against its registers, as BST-BMP280-DS001 has them, and its whole-number compensation.
+//! BMP280, tested on a model of its registers and its integer compensation (BST-BMP280-DS001).
 
 use crate::rig::suite::{Pace, Suite, reads_pressures};
 use crate::rig::{Model, noise};
 use afbc_drivers::PressureReading;
 use afbc_drivers::bmp280::Bmp280;
 
-/// dig_T1 to T3 and P1 to P9.
+/// Coefficients dig_T1 to dig_T3 and dig_P1 to dig_P9.
 type Trim = [i64; 12];
-/// That of the data sheet's example (section 3.12), and one of another part.
+/// Coefficients of the data sheet's example (section 3.12), and of another part.
 const SETS: [Trim; 2] = [
     [27_504, 26_435, -1_000, 36_477, -10_685, 3_024, 2_855, 140, -7, 15_500, -14_600, 6_000],
     [28_009, 25_654, 50, 39_145, -10_750, 3_024, 5_667, -120, -7, 15_500, -14_600, 6_000],
 ];
 
-/// Section 3.11.3: temperature \[0.01 C\] and, for the pressure, the same finer.
+/// Section 3.11.3: returns the temperature \[0.01 C\] and its finer value for the pressure.
 fn temperature(trim: &Trim, raw: i64) -> (i64, i64) {
     let [t1, t2, t3, ..] = *trim;
     let first = (((raw >> 3) - (t1 << 1)) * t2) >> 11;
@@ -22,7 +22,7 @@ fn temperature(trim: &Trim, raw: i64) -> (i64, i64) {
     ((fine * 5 + 128) >> 8, fine)
 }
 
-/// The same: pressure \[1/256 Pa\].
+/// Section 3.11.3: returns the pressure \[1/256 Pa\].
 fn pressure(trim: &Trim, raw: i64, fine: i64) -> i64 {
     let [_, _, _, p1, p2, p3, p4, p5, p6, p7, p8, p9] = *trim;
     let warm = fine - 128_000;
@@ -38,14 +38,14 @@ struct Registers {
     trim: Trim,
     config: u8,
     up_us: u64,
-    /// When the last measurement is done, if one was ordered.
+    /// Time at which the commanded measurement ends, if there is one.
     done_us: Option<u64>,
     data: [u8; 6],
     pressure_pa: f64,
     temperature_c: f64,
 }
 
-/// What has not been measured.
+/// Data registers without a measurement.
 const SKIPPED: [u8; 6] = [0x80, 0, 0, 0x80, 0, 0];
 
 impl Registers {
@@ -62,7 +62,7 @@ impl Registers {
         }
     }
 
-    /// Data of a measurement at this time: pressure of 19 bits and temperature of 16, without filter.
+    /// Returns the data of a measurement at this time, without filter: 19 bits of pressure and 16 of temperature.
     fn measured(&self, now_us: u64) -> [u8; 6] {
         let solve = |falls: bool, of: &dyn Fn(i64) -> f64, value: f64| {
             let (mut low, mut high) = (0, 0xF_FFFF);
@@ -114,7 +114,7 @@ impl Model for Registers {
             0xE0 if byte == 0xB6 => self.reset(now_us),
             0xF4 => {
                 assert_eq!(byte & 0b11, 0b01, "forced");
-                // Section 3.8.1, the longest: 2^(osrs - 1) samples of each.
+                // Longest time by section 3.8.1, with 2^(osrs - 1) samples of each.
                 let samples = |osrs: u8| if osrs == 0 { 0 } else { 1_u64 << (osrs - 1) };
                 let us = 1_250 + 2_300 * samples(byte >> 5) + 2_300 * samples(byte >> 2 & 7) + 575;
                 self.done_us = Some(now_us + us);
@@ -133,7 +133,7 @@ fn right(reading: &PressureReading) -> bool {
     (reading.pressure_pa - 101_325.0).abs() < 3.0 && (reading.temperature_c - 25.0).abs() < 0.03
 }
 
-/// The data sheet's example: 519888 and 415148 are 25.08 C and 100653.27 Pa.
+/// The data sheet's example: raw values 519888 and 415148 are 25.08 C and 100653.27 Pa.
 #[test]
 fn the_model_has_the_data_sheets_example() {
     let (hundredths, fine) = temperature(&SETS[0], 519_888);

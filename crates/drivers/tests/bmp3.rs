@@ -1,15 +1,15 @@
-//! BMP388 and BMP390 against their registers, as BST-BMP388-DS001 has them.
+//! BMP388 and BMP390, tested on a model of their registers (BST-BMP388-DS001).
 
 use crate::rig::suite::{Pace, Suite, reads_no_pressure_beyond, reads_pressures};
 use crate::rig::{Model, Rig, noise, run};
 use afbc_drivers::bmp3::{Bmp388, Bmp390};
 use afbc_drivers::{PartFault, PressureReading};
 
-/// NVM_PAR_T1 to T3 and P1 to P11.
+/// Coefficients NVM_PAR_T1 to T3 and P1 to P11.
 type Trim = [i64; 14];
-/// Their lengths \[bytes\].
+/// Lengths of the coefficients \[bytes\].
 const LENGTHS: [usize; 14] = [2, 2, 1, 2, 2, 1, 1, 2, 2, 1, 1, 2, 1, 1];
-/// A common part's, and some at the ends of their registers.
+/// Coefficients of a typical part, and some at the limits of their registers.
 const SETS: [Trim; 4] = [
     [27_772, 18_933, -10, -56, -1_010, 35, 0, 25_209, 30_267, 3, -6, 16_442, 31, -60],
     [27_400, 19_100, -7, -180, -1_300, 35, 1, 24_600, 29_800, -13, 4, 12_000, 20, -40],
@@ -17,7 +17,7 @@ const SETS: [Trim; 4] = [
     [50_000, 30_000, -128, -32_768, -32_768, -128, -128, 65_535, 0, -128, -128, -32_768, -128, -128],
 ];
 
-/// CRC-8/SAE-J1850 as a division of the bits.
+/// Computes CRC-8/SAE-J1850 by bitwise division.
 fn crc8(bytes: &[u8]) -> u8 {
     let mut remainder: u8 = 0xFF;
     for bit in bytes.iter().flat_map(|byte| (0..8).rev().map(move |bit| byte >> bit & 1)) {
@@ -33,12 +33,12 @@ fn crc8(bytes: &[u8]) -> u8 {
 struct Registers {
     identity: u8,
     trim: Trim,
-    /// From 0x30 on: the CRC and the trim.
+    /// Registers from 0x30 on: CRC and coefficients.
     calibration: Vec<u8>,
     registers: [u8; 128],
     up_us: u64,
     measuring_us: Option<u64>,
-    /// When pressure and temperature were read.
+    /// Times at which pressure and temperature were last read.
     read_us: [u64; 2],
     pressure_pa: f64,
     temperature_c: f64,
@@ -63,14 +63,14 @@ impl Registers {
         part
     }
 
-    /// Section 9.2: temperature \[C\] of a raw one.
+    /// Section 9.2: returns the temperature of a raw value \[C\].
     fn temperature(&self, raw: f64) -> f64 {
         let [t1, t2, t3, ..] = self.trim.map(|value| value as f64);
         let above = raw - t1 * 256.0;
         above * t2 / 2_f64.powi(30) + above.powi(2) * t3 / 2_f64.powi(48)
     }
 
-    /// Section 9.3: pressure \[Pa\] of a raw one.
+    /// Section 9.3: returns the pressure of a raw value \[Pa\].
     fn pressure(&self, raw: f64, t: f64) -> f64 {
         let [_, _, _, p1, p2, p3, p4, p5, p6, p7, p8, p9, p10, p11] = self.trim.map(|value| value as f64);
         let out1 = p5 * 8.0 + p6 / 64.0 * t + p7 / 256.0 * t.powi(2) + p8 / 32_768.0 * t.powi(3);
@@ -83,7 +83,7 @@ impl Registers {
         out1 + out2 + out3 + raw.powi(3) * p11 / 2_f64.powi(65)
     }
 
-    /// Time of a measurement and period of the output.
+    /// Returns the duration of a measurement and the output period.
     fn timing_us(&self) -> (u64, u64) {
         let osr = self.registers[0x1C];
         (234 + 392 + (2_020 << (osr & 7)) + 163 + (2_020 << (osr >> 3 & 7)), 5_000 << self.registers[0x1D])
@@ -92,12 +92,12 @@ impl Registers {
     fn done_us(&self, now_us: u64) -> Option<u64> {
         let (us, period_us) = self.timing_us();
         let first_us = self.measuring_us? + us;
-        // Section 3.9: what takes longer than its period is refused.
+        // Section 3.9: a measurement that takes longer than the period is refused.
         let elapsed_us = now_us.checked_sub(first_us).filter(|_| us <= period_us)?;
         Some(first_us + elapsed_us / period_us * period_us)
     }
 
-    /// Raw values, without filter of 16 bits and one for each doubling of the samples.
+    /// Returns the raw values without filter: 16 bits, and one more for each doubling of the samples.
     fn data(&self, now_us: u64) -> [u8; 6] {
         let Some(done_us) = self.done_us(now_us) else { return [0, 0, 0x80, 0, 0, 0x80] };
         let osr = self.registers[0x1C];

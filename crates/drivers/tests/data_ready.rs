@@ -1,4 +1,4 @@
-//! A part's interrupt on a wire that works, breaks, comes back, or is noisy, in a time of its own.
+//! Reading at a part's interrupt in simulated time, over a wire that works, breaks, recovers or is noisy.
 
 use afbc_drivers::PartTiming;
 use afbc_drivers::data_ready::{DataReady, Edge};
@@ -12,7 +12,7 @@ const PERIOD_US: u64 = 1_000;
 /// Time of a transfer \[us\].
 const TRANSFER_US: u64 = 60;
 
-/// The time, and those for which someone waits \[us\].
+/// The current time, and the times that futures wait for \[us\].
 #[derive(Clone, Default)]
 struct Time(Rc<RefCell<(u64, Vec<u64>)>>);
 
@@ -33,7 +33,7 @@ impl Time {
         .await;
     }
 
-    /// Runs something, whose time passes while it waits.
+    /// Runs a future; time passes while it waits.
     fn run<T>(&self, future: impl Future<Output = T>) -> T {
         let mut future = pin!(future);
         loop {
@@ -61,7 +61,7 @@ impl PartTiming for Time {
     }
 }
 
-/// A wire, by the time of its next edge after another time.
+/// An interrupt wire; the function returns the next edge after a time.
 struct Wire<F>(Time, F);
 
 impl<F: Fn(u64) -> Option<u64>> Edge for Wire<F> {
@@ -72,7 +72,8 @@ impl<F: Fn(u64) -> Option<u64>> Edge for Wire<F> {
     }
 }
 
-/// Reads for so long a part whose samples take `sample_us`; returns when each reading began, and its own time.
+/// Reads a part with samples every `sample_us`, for the time `us`. Returns when each reading began, and its interrupt
+/// time.
 fn readings(sample_us: f64, us: u64, wire: impl Fn(u64) -> Option<u64>) -> Vec<(u64, Option<u64>)> {
     let time = Time::default();
     let mut timing = DataReady::new(Wire(time.clone(), wire), time.clone(), PERIOD_US as u32);
@@ -86,7 +87,7 @@ fn readings(sample_us: f64, us: u64, wire: impl Fn(u64) -> Option<u64>) -> Vec<(
     all
 }
 
-/// Edges of a part whose samples take `sample_us`.
+/// Returns the edges of a part with samples every `sample_us`.
 fn edges(sample_us: f64) -> impl Fn(u64) -> Option<u64> {
     move |after_us| {
         let next = (after_us as f64 / sample_us).floor() as u64 + 1;
@@ -97,10 +98,10 @@ fn edges(sample_us: f64) -> impl Fn(u64) -> Option<u64> {
 #[test]
 fn each_sample_of_a_part_as_fast_as_the_clock_is_read_at_its_edge() {
     for sample_us in [990.0, 999.7, 1_000.0, 1_001.3, 1_010.0] {
-        // The part says what it should take.
+        // The driver passes the nominal sample time.
         let read = readings(1_000.0, 10_000_000, edges(sample_us));
         let samples = (10_000_000.0 / sample_us) as usize;
-        // The first ones come by the clock, while an edge falls into the time of a transfer.
+        // The first readings come by the clock, while each edge falls into a transfer and is missed.
         let first = read.iter().position(|(_, edge_us)| edge_us.is_some()).expect("met");
         assert!(first <= 60, "{sample_us}: {first}");
         assert!(read.len().abs_diff(samples) <= 2, "{sample_us}: {} of {samples}", read.len());
@@ -119,7 +120,7 @@ fn a_faster_part_is_read_once_in_a_period_at_its_first_edge() {
     }
 }
 
-/// Without a wire it is read at the beginning of every period, as by the clock alone.
+/// Without a wire, the part is read at the beginning of every period, as by the clock alone.
 #[test]
 fn a_part_without_a_wire_is_read_by_the_clock() {
     for sample_us in [250.0, 625.0, 1_000.0] {
@@ -129,8 +130,9 @@ fn a_part_without_a_wire_is_read_by_the_clock() {
     }
 }
 
-/// Whenever a wire breaks, the next reading comes within two periods and a transfer, a gap that nobody takes for a
-/// failure (`ImuSelector` waits 3 ms); then in every period; and when the wire is back, at its edges.
+/// Whenever a wire breaks, the next reading comes within two periods and a transfer, which counts as no failure
+/// (`ImuSelector` waits 3 ms). After that there is a reading in every period. Once the wire is back, readings follow
+/// its edges.
 #[test]
 fn a_broken_wire_costs_two_periods_and_no_part() {
     for sample_us in [250.0, 625.0, 1_000.0] {
@@ -150,7 +152,7 @@ fn a_broken_wire_costs_two_periods_and_no_part() {
     }
 }
 
-/// A floating wire beside a motor's does not take the processor's time.
+/// Noise on a floating wire next to a motor's does not use up the processor's time.
 #[test]
 fn noise_on_the_wire_makes_at_most_three_readings_in_a_period() {
     for (sample_us, noise_us) in [(250.0, 1), (250.0, 20), (1_000.0, 1), (1_000.0, 20), (1_000.0, 170), (625.0, 90)] {

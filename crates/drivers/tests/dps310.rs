@@ -1,16 +1,17 @@
-//! DPS310 and SPL06-001 against their registers, as Infineon's data sheet V1.2 has them.
+//! DPS310 and SPL06-001, tested on a model of their registers (Infineon's data sheet V1.2).
 
 use crate::rig::suite::{Pace, Suite, reads_no_pressure_beyond, reads_pressures};
 use crate::rig::{Model, Rig, noise, run};
 use afbc_drivers::dps310::{Dps310, Spl06};
 use afbc_drivers::{PartFault, PressureReading};
 
-/// Table 16: time of a measurement of 1, 2, 4 ... 128 samples.
+/// Table 16: durations of a measurement with 1, 2, 4 ... 128 samples.
 const TIMES_US: [u64; 8] = [3_600, 5_200, 8_400, 14_800, 27_600, 53_200, 104_400, 206_800];
-/// Table 9.
+/// Scale factors of table 9.
 const SCALES: [f64; 8] =
     [524_288.0, 1_572_864.0, 3_670_016.0, 7_864_320.0, 253_952.0, 516_096.0, 1_040_384.0, 2_088_960.0];
-/// c0, c1, c00, c10, c01, c11, c20, c21, c30: a common part's, small ones, and some at the ends of their registers.
+/// Coefficients c0, c1, c00, c10, c01, c11, c20, c21, c30: of a typical part, small ones, and some at the limits of
+/// their registers.
 const SETS: [[i32; 9]; 5] = [
     [207, -255, 81_507, -57_266, -2_837, 1_316, -9_612, 71, -1_529],
     [204, -258, 75_000, -52_000, -2_000, 300, 200, -20, -5],
@@ -23,16 +24,16 @@ struct Registers {
     is_spl06: bool,
     identity: u8,
     set: [i32; 9],
-    /// Bit 7 of COEF_SRCE.
+    /// Bit 7 of COEF_SRCE: the temperature sensor of the coefficients.
     source: u8,
-    /// Temperature is wrong until the fuses are enabled.
+    /// True if the temperature is wrong until the fuses are enabled.
     has_bad_fuses: bool,
-    /// The coefficients read differently each time.
+    /// True if the coefficients read differently each time.
     coefficients_flicker: bool,
     registers: [u8; 128],
     since_us: u64,
     measuring_us: Option<u64>,
-    /// When pressure and temperature were read.
+    /// Times at which pressure and temperature were last read.
     read_us: [u64; 2],
     reads: u8,
     pressure_pa: f64,
@@ -72,25 +73,25 @@ impl Registers {
         bytes
     }
 
-    /// Samples code, period and time of a measurement of pressure (0) or temperature (1).
+    /// Returns samples code, period and duration of a measurement of pressure (0) or temperature (1).
     fn timing(&self, what: usize) -> (usize, u64, u64) {
         let config = self.registers[0x06 + what];
         let samples = usize::from(config & 0xF);
         (samples, 1_000_000 >> (config >> 4 & 7), TIMES_US[samples])
     }
 
-    /// When the last measurement was complete.
+    /// Returns the end of the last complete measurement.
     fn done_us(&self, what: usize, now_us: u64) -> Option<u64> {
         let [pressure, temperature] = [self.timing(0), self.timing(1)];
         let busy = [pressure, temperature].iter().map(|(_, period_us, us)| us * (1_000_000 / period_us)).sum::<u64>();
         assert!(busy < 1_000_000, "section 4.4: too many measurements a second, {busy} us");
         let (_, period_us, us) = [pressure, temperature][what];
-        // Temperature is measured after pressure.
+        // The temperature is measured after the pressure.
         let first_us = self.measuring_us? + us + if what == 1 { pressure.2 } else { 0 };
         Some(first_us + now_us.checked_sub(first_us)? / period_us * period_us)
     }
 
-    /// Result registers: section 4.9 solved for the raw values.
+    /// Returns the result registers: raw values from section 4.9 solved backwards.
     fn result(&self, what: usize, now_us: u64) -> [u8; 3] {
         let Some(done_us) = self.done_us(what, now_us) else { return [0x80, 0, 0] };
         let [c0, c1, c00, c10, c01, c11, c20, c21, c30] = self.set.map(f64::from);
@@ -112,7 +113,7 @@ impl Registers {
         }
         let (samples, ..) = self.timing(what);
         let raw = ([low, t][what] * SCALES[samples]).round() as i64;
-        // Without its shift, a sum of more than 8 samples does not fit.
+        // Without the result shift, a sum of more than 8 samples overflows.
         let raw = if samples > 3 && self.registers[0x09] & (4 << what) == 0 { raw << (samples - 3) } else { raw };
         let [.., a, b, c] = raw.to_be_bytes();
         [a, b, c]
@@ -164,7 +165,7 @@ impl Registers {
 impl Model for Registers {
     fn read(&mut self, now_us: u64, register: u8, into: &mut [u8]) {
         self.reads = self.reads.wrapping_add(1);
-        // It has no access in the first 2.5 ms.
+        // No register access in the first 2.5 ms.
         let answers = now_us - self.since_us >= 2_500;
         for (register, byte) in (usize::from(register)..).zip(into) {
             *byte = if answers { self.byte(now_us, register) } else { 0xFF };
@@ -177,7 +178,7 @@ impl Model for Registers {
                 0x06 | 0x07 | 0x09 => self.registers[register] = byte,
                 0x08 => {
                     assert!(byte == 0 || byte == 7, "mode {byte:#x}");
-                    // Before it is ready it measures nothing.
+                    // A sensor that is not ready yet does not start measuring.
                     let is_ready = now_us - self.since_us >= 12_000;
                     self.measuring_us = (byte == 7 && is_ready).then_some(now_us);
                 }

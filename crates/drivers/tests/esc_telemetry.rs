@@ -1,11 +1,11 @@
-//! Telemetry of motor controllers: bytes, checksums, turns.
+//! ESC telemetry: bytes, checksums and the order of requests.
 
 use afbc_drivers::esc_telemetry::{ANSWER_LEN, EscLine, EscReading};
 use proptest::collection::vec;
 use proptest::prelude::*;
 use std::collections::VecDeque;
 
-/// CRC-8 by division of polynomials, a bit at a time, as KISS's description has it.
+/// Computes the CRC-8 by polynomial division, bit by bit, as in KISS's description.
 fn remainder(bytes: &[u8]) -> u8 {
     let mut register: u16 = 0;
     for bit in bytes.iter().flat_map(|byte| (0..8).rev().map(move |at| byte >> at & 1)).chain([0; 8]) {
@@ -17,7 +17,7 @@ fn remainder(bytes: &[u8]) -> u8 {
     register as u8
 }
 
-/// The fields of an answer by their places, apart from the code under test.
+/// Encodes an answer independently of the code under test.
 fn encode(temperature: i8, words: [u16; 4]) -> [u8; ANSWER_LEN] {
     let mut bytes = vec![temperature as u8];
     for word in words {
@@ -43,7 +43,7 @@ proptest! {
         prop_assert_eq!(reading.to_bytes(), bytes);
     }
 
-    /// A CRC of eight bits finds every single flipped bit, every two in ten bytes, and every burst of up to eight.
+    /// The CRC-8 detects every flipped bit, every two in ten bytes, and every burst of up to eight.
     #[test]
     fn flipped_bits_are_found(
         (_, bytes) in any_answer(), first in 0..80_usize, second in 0..80_usize, burst in 1..=255_u16,
@@ -60,7 +60,7 @@ proptest! {
         prop_assert!(burnt == bytes || EscReading::from_bytes(&burnt).is_none());
     }
 
-    /// Whatever comes, no answer is another controller's, and none is made of noise but by a checksum that fits.
+    /// No answer is assigned to another ESC, and noise counts as an answer only if its checksum fits.
     #[test]
     fn noise_is_no_answer(bytes in vec(any::<u8>(), 0..400), pauses in vec(0..3_000_u64, 400)) {
         let (mut line, mut now_us, mut fits) = (EscLine::new(4), 0, 0);
@@ -81,8 +81,8 @@ proptest! {
         prop_assert!(fits <= bytes.len() / ANSWER_LEN);
     }
 
-    /// Answers that come too late, while frames wait and controllers are slow, may be taken for another's; once all
-    /// answer in time again, none is from 0.4 s on, and none ever was if they are lost and not late.
+    /// Late answers, caused by delayed frames and slow ESCs, may be assigned to the wrong ESC. This ends within 0.4 s
+    /// after all ESCs answer in time again. Lost answers never cause a wrong assignment.
     #[test]
     fn late_answers_do_not_stay_in_wrong_turns(
         late_ms in vec(prop_oneof![19 => Just(0), 1 => 5..40_u64], 400),
@@ -96,7 +96,7 @@ proptest! {
         for tick in 0..3_000_u64 {
             let now_us = tick * 1_000;
             let is_trouble = tick < 1_000;
-            // What came since the last tick, before the next is asked.
+            // Bytes received since the last tick come before the next request.
             while answers.front().is_some_and(|(at_us, _)| *at_us <= now_us) {
                 let (_, who) = answers.pop_front().unwrap();
                 let bytes = EscReading { voltage_cv: who.into(), ..EscReading::default() }.to_bytes();
@@ -118,7 +118,7 @@ proptest! {
                     continue;
                 }
                 let delay_us = begins_us + if is_trouble && !loses { late_us } else { 0 };
-                // One at a time on the line.
+                // Only one answer at a time on the line.
                 let free_us = answers.back().map_or(0, |(end_us, _)| *end_us);
                 answers.push_back(((frame_us + delay_us).max(free_us) + 870, who));
             }
@@ -126,7 +126,7 @@ proptest! {
         prop_assert!(right >= 180, "{} in the last second", right);
     }
 
-    /// The speed of any motor comes back within what the telemetry resolves, and never faster.
+    /// Any motor's speed survives encoding and decoding within the resolution, and is never rounded up.
     #[test]
     fn speeds_come_back(speed_rad_s in 0.0..4_000.0_f32, pairs in 1..=20_u32) {
         let poles = 2 * pairs;
@@ -140,7 +140,7 @@ proptest! {
     }
 }
 
-/// The check value over "123456789" in catalogues of CRCs.
+/// Check value of CRC catalogues, over "123456789".
 #[test]
 fn the_checksum_is_crc_8_smbus() {
     let mut bytes = [0; ANSWER_LEN];
@@ -150,14 +150,14 @@ fn the_checksum_is_crc_8_smbus() {
     assert_eq!((reading.temperature_c, reading.voltage_cv, reading.erpm_hundreds), (0x31, 0x3233, 0x3839));
 }
 
-/// 14 poles at 10,000 rev/min: 70,000 electrical.
+/// A motor of 14 poles at 10,000 rev/min turns at 70,000 electrical rev/min.
 #[test]
 fn a_usual_motor() {
     let reading = EscReading { erpm_hundreds: 700, ..EscReading::default() };
     assert!((reading.speed_rad_s(14) - 1047.2).abs() < 0.1);
 }
 
-/// Each controller in turn; one that does not answer costs ten milliseconds, a wrong answer its own turn.
+/// ESCs are asked in turn. One that does not answer costs ten milliseconds, a wrong answer only its own turn.
 #[test]
 fn each_is_asked_in_turn() {
     let mut line = EscLine::new(3);
@@ -165,7 +165,7 @@ fn each_is_asked_in_turn() {
     let mut heard = Vec::new();
     for tick in 0..1_000_u64 {
         let now_us = 1_000 * tick;
-        // The second is dead.
+        // The second ESC is dead.
         let asked = line.ask(now_us);
         if let Some(controller) = asked.filter(|controller| *controller != 1) {
             let mut answer = answer;
@@ -180,7 +180,7 @@ fn each_is_asked_in_turn() {
     }
     let count = |who| heard.iter().filter(|other| **other == who).count();
     assert_eq!(count(1), 0);
-    // A round takes 12 ms, and 4 ms of silence come after 64 questions; a fifth of the answers at most are spoilt.
+    // A round takes 12 ms, with 4 ms of silence after 64 requests. At most a fifth of the answers are spoilt.
     assert!(count(0) >= 60 && count(2) >= 60, "{} {}", count(0), count(2));
     assert!(line.missing_answers() >= 80 && line.bad_answers() > 0);
 }
@@ -192,7 +192,7 @@ fn a_line_without_controllers_asks_nobody() {
     assert_eq!(line.take(5, 1), None);
 }
 
-/// Half an answer, then a pause: the next bytes begin another.
+/// After half an answer and a pause, the next bytes begin a new answer.
 #[test]
 fn half_an_answer_is_forgotten() {
     let mut line = EscLine::new(1);

@@ -1,4 +1,4 @@
-//! The bytes that cross SPI and I2C, as the parts' data sheets draw them.
+//! Bytes on SPI and I2C, compared with the parts' data sheets.
 
 use afbc_drivers::bmp3::Bmp388;
 use afbc_drivers::dps310::Dps310;
@@ -10,7 +10,7 @@ use embedded_hal_async::i2c::{self, I2c};
 use embedded_hal_async::spi::{self, SpiDevice};
 use std::convert::Infallible;
 
-/// What was written in a transaction, and how much was read after it; it reads 1, 2, 3.
+/// For each transaction, the bytes written and the number of bytes read after them. Reads return 1, 2, 3.
 #[derive(Default)]
 struct Wires(Vec<(Vec<u8>, usize)>);
 
@@ -61,7 +61,7 @@ impl I2c for &mut Wires {
     }
 }
 
-/// Reads two bytes of a register, sets it, and sends a command.
+/// Reads two bytes from a register, writes the register and sends a command.
 fn crossing(mut registers: impl Registers, register: u8) {
     let mut answer = [0; 2];
     block_on(registers.read(register, &mut answer)).expect("no errors");
@@ -80,13 +80,13 @@ fn on_spi<P: SensorPart>(register: u8) -> Vec<(Vec<u8>, usize)> {
 fn spi_is_framed_as_each_part_has_it() {
     let common = vec![(vec![0x80], 2), (vec![0x00, 0x55], 0), (vec![0x00], 0)];
     assert_eq!(on_spi::<Dps310>(0x00), common);
-    // A byte that is none before what it answers.
+    // A dummy byte before the answer.
     assert_eq!(on_spi::<Bmp388>(0x04)[0], (vec![0x84, 0], 2));
     assert_eq!(on_spi::<Bmp388>(0x1B)[1], (vec![0x1B, 0x55], 0));
-    // Commands, not registers.
+    // Commands instead of registers.
     assert_eq!(on_spi::<Ms5611>(0xA2)[0], (vec![0xA2], 2));
     assert_eq!(on_spi::<Ms5611>(0x48)[2], (vec![0x48], 0));
-    // A bit that counts the address up, and on I2C another.
+    // Address auto-increment, which has different bits on SPI and I2C.
     assert_eq!(on_spi::<Lis3mdl>(0x28 | 0x80)[0], (vec![0xE8], 2));
     assert_eq!(on_spi::<Lis3mdl>(0x20)[1], (vec![0x60, 0x55], 0));
 }

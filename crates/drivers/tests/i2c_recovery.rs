@@ -1,5 +1,5 @@
-//! A bus whose part holds the data line, and whose controller is left in mid-transfer: both at the level of the two
-//! lines, as UM10204 has them, and as the STM32F4's controller is known to behave.
+//! Recovery of a bus whose part holds the data line and whose controller is stuck in a transfer. Both are modelled at
+//! the level of the two lines: the bus as in UM10204, and the known behaviour of the STM32F4's controller.
 
 use crate::qmc5883l::Registers as Compass;
 use crate::rig::{Rig, run};
@@ -11,37 +11,37 @@ use embedded_hal_async::i2c::{ErrorKind, ErrorType, I2c, Operation};
 use std::cell::RefCell;
 use std::rc::Rc;
 
-/// State of the part within a transfer.
+/// Transfer that the part is in the middle of.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Amid {
     Nothing,
-    /// It sends these bits, the first of them on the line, and then looks for an acknowledgement. One that does not
-    /// heed START and STOP meanwhile ends by the acknowledgement that does not come.
+    /// Sends bits, the first of them on the line, then waits for an acknowledgement. If `heeds` is false, the part
+    /// ignores START and STOP until an acknowledgement is missing.
     Sends {
         bits: u8,
         left: u8,
         heeds: bool,
     },
-    /// It takes bits in, and acknowledges the eighth.
+    /// Receives bits and acknowledges after the eighth.
     Takes {
         taken: u8,
     },
 }
 
-/// Lines, part and controller.
+/// State of lines, part and controller.
 #[derive(Debug)]
 struct Bus {
     amid: Amid,
-    /// Levels to which the master drives the lines.
+    /// True for a line that the controller has released.
     is_clock_released: bool,
     is_data_released: bool,
-    /// Bytes that the part has taken in by mistake.
+    /// Number of bytes that the part has received by mistake.
     mistaken: u32,
-    /// For how many looks the part holds the clock line.
+    /// Number of attempts to release the clock for which the part holds it low.
     stretches: u32,
-    /// True if the controller has a transfer that was not ended.
+    /// True if the controller is stuck in an unfinished transfer.
     is_locked: bool,
-    /// In the middle of what the next transfer breaks off.
+    /// State in which the next transfer is interrupted, if any.
     breaks: Option<Amid>,
     recoveries: u32,
 }
@@ -68,7 +68,7 @@ impl Bus {
         match (clock, self.is_clock_released) {
             (false, true) => self.rises(),
             (true, false) => self.falls(),
-            // START and STOP.
+            // START or STOP.
             (true, true) if self.is_data_high() != data && !matches!(self.amid, Amid::Sends { heeds: false, .. }) => {
                 self.amid = Amid::Nothing;
             }
@@ -76,7 +76,7 @@ impl Bus {
         }
     }
 
-    /// The part reads the data line.
+    /// Rising clock edge: the part reads the data line.
     fn rises(&mut self) {
         match &mut self.amid {
             Amid::Sends { left: 0, .. } if self.is_data_released => self.amid = Amid::Nothing,
@@ -85,11 +85,11 @@ impl Bus {
         }
     }
 
-    /// The part changes the data line.
+    /// Falling clock edge: the part changes the data line.
     fn falls(&mut self) {
         match &mut self.amid {
             Amid::Sends { bits, left, .. } if *left > 0 => (*bits, *left) = (*bits << 1, *left - 1),
-            // Acknowledged: the next byte.
+            // Acknowledged: sends the next byte.
             Amid::Sends { left, .. } => *left = 8,
             Amid::Takes { taken } if *taken == 8 => {
                 self.mistaken += 1;
@@ -100,7 +100,7 @@ impl Bus {
     }
 }
 
-/// The controller of a bus with a part that the rig has.
+/// Controller of a bus with the rig's part.
 #[derive(Clone)]
 struct Port {
     bus: Rc<RefCell<Bus>>,
@@ -133,7 +133,7 @@ impl I2c for Port {
         if let Some(amid) = amid {
             (self.bus.borrow_mut().amid, self.bus.borrow_mut().is_locked) = (amid, true);
         }
-        // No controller begins on a bus that is held, nor while it waits for the end of another transfer.
+        // A controller cannot begin while the bus is held or an earlier transfer has not ended.
         if self.bus.borrow().is_locked || self.bus.borrow().amid != Amid::Nothing {
             return pending().await;
         }
@@ -172,7 +172,7 @@ impl I2cLines for Port {
     }
 }
 
-/// Everything that a part may be in the middle of.
+/// Returns every state in which a part can be interrupted.
 fn all_amid() -> Vec<Amid> {
     let sends = (0..=8).flat_map(|left| {
         let bits = [0x00, 0xFF, 0x55, 0xAA, 0x0F, 0xF0];
@@ -188,7 +188,7 @@ fn driver(port: &Port) -> CompassDriver {
     Driver::new(Qmc5883l, I2cRegisters::new(bus, 0x0D), port.rig.clone())
 }
 
-/// The first reading comes in whichever state a reset of the watchdog has left the part.
+/// The first reading succeeds in whatever state a watchdog reset has left the part.
 #[test]
 fn a_bus_is_recovered_at_the_start() {
     for amid in all_amid() {
@@ -198,20 +198,20 @@ fn a_bus_is_recovered_at_the_start() {
             port.bus.borrow_mut().stretches = stretches;
             let mut driver = driver(&port);
             assert!(block_on(driver.reading()).is_ok(), "{amid:?}");
-            // In order, it is left alone.
+            // A working bus is not recovered again.
             for _ in 0..100 {
                 assert!(block_on(driver.reading()).is_ok(), "{amid:?}");
             }
             assert_eq!(port.bus.borrow().recoveries, 1, "{amid:?}");
-            // A byte that was begun is not completed with what recovers the bus, unless it waited for no more than the
-            // clock of its acknowledgement.
+            // Recovery does not complete a byte that the part was receiving, unless only the clock of its
+            // acknowledgement was missing.
             let begun = matches!(amid, Amid::Takes { taken } if taken < 8);
             assert!(!begun || port.bus.borrow().mistaken == 0, "{amid:?}");
         }
     }
 }
 
-/// A transfer that is broken off costs one fault, and the next one is right.
+/// An interrupted transfer costs one fault; the next reading is correct.
 #[test]
 fn a_bus_is_recovered_after_a_transfer_that_was_given_up() {
     let rig = Rig::new(Compass::new());
@@ -228,7 +228,7 @@ fn a_bus_is_recovered_after_a_transfer_that_was_given_up() {
     assert_eq!(port.bus.borrow().recoveries as usize, 1 + all_amid().len());
 }
 
-/// A part that holds the clock line for longer than a recovery waits costs a recovery more, and no more.
+/// A part that holds the clock longer than a recovery waits costs one more recovery.
 #[test]
 fn a_clock_line_that_is_held_is_waited_for() {
     let rig = Rig::new(Compass::new());

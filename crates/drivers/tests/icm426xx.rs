@@ -1,5 +1,5 @@
-//! ICM-42688-P and ICM-42605 against their registers, as DS-000347 has them, and as silicon is known to differ: the
-//! adaptive full-scale range freezes the gyroscope.
+//! ICM-42688-P and ICM-42605, tested on a model of their registers (DS-000347). The model includes undocumented
+//! behaviour: the adaptive full-scale range freezes the gyroscope.
 
 use crate::rig::suite::{Pace, Suite, reads_the_whole_range};
 use crate::rig::{Model, Rig, Trouble, noise, reads, run};
@@ -7,18 +7,18 @@ use afbc_drivers::icm426xx::{Icm426xx, Icm42688p};
 use afbc_drivers::{InertialReading, PartFault};
 use embassy_futures::block_on;
 
-/// Bank 0; other banks are selected and then left alone.
+/// Registers of bank 0; of banks 1 and 2, only the self-test data.
 struct Registers {
     identity: u8,
     bank: u8,
     registers: [u8; 128],
-    /// Since when gyroscope and accelerometer run.
+    /// Times at which gyroscope and accelerometer were switched on.
     on_us: [Option<u64>; 2],
     rates_deg_s: [f64; 3],
-    /// How far each rate swings to both sides of that, once in 0.1 s \[deg/s\].
+    /// Amplitude of each rate's oscillation, with a period of 0.1 s \[deg/s\].
     swing_deg_s: f64,
     force_g: [f64; 3],
-    /// What the factory has written of the self-test, and how much of it each axis responds.
+    /// Factory's self-test codes, and each axis' response relative to them.
     trims: [[u8; 3]; 2],
     responds: [f64; 6],
 }
@@ -39,7 +39,7 @@ impl Registers {
         32768.0 / (full / f64::from(1 << (config >> 5)))
     }
 
-    /// Period of the output \[us\].
+    /// Returns the output period \[us\].
     fn period_us(&self) -> u64 {
         match self.registers[0x4F] & 0xF {
             0x3 => 125,
@@ -51,14 +51,14 @@ impl Registers {
         }
     }
 
-    /// True turn rate of an axis \[deg/s\].
+    /// Returns the true turn rate of an axis \[deg/s\].
     fn rate_deg_s(&self, axis: usize, at_us: u64) -> f64 {
         let turns = at_us as f64 / 100e3 + axis as f64 / 3.0;
         self.rates_deg_s[axis] + self.swing_deg_s * (turns * std::f64::consts::TAU).sin()
     }
 
-    /// Time of the sample that the gyroscope still shows: of its newest one, unless the adaptive full-scale range is on
-    /// and a rate has crossed 100 deg/s within 2 ms. No data sheet has it (ArduPilot's issue 25025).
+    /// Returns the time of the sample that the gyroscope shows. It is the newest, unless AFSR is on and a rate has
+    /// crossed 100 deg/s within 2 ms. No data sheet mentions this (ArduPilot's issue 25025).
     fn shown_us(&self, sample_us: u64) -> u64 {
         let is_fast = |at_us| (0..3).any(|axis| self.rate_deg_s(axis, at_us).abs() > 100.0);
         let adapts = self.registers[0x4D] & 0xC0 != 0x40;
@@ -152,21 +152,21 @@ impl Model for Registers {
 
     fn next_interrupt_us(&self, now_us: u64) -> Option<u64> {
         let routed = self.registers[0x65] & 8 != 0 && self.registers[0x14] & 3 == 3 && self.registers[0x64] & 0x10 == 0;
-        // From 4 kHz on, a pulse of 100 us and the guard of as much after it must be off.
+        // From 4 kHz on, the pulse of 100 us and the equally long pause after it must be off.
         let is_apart = self.period_us() > 250 || self.registers[0x64] & 0x60 == 0x60;
         let on = self.on_us.iter().any(Option::is_some);
         (routed && is_apart && on).then(|| (now_us / self.period_us() + 1) * self.period_us())
     }
 }
 
-/// The response, in numbers at 250 deg/s and 2 g, that a byte of the factory's stands for.
+/// Returns the response for a factory code, in raw numbers at 250 deg/s and 2 g.
 fn factory(trim: u8) -> f64 {
     2620.0 * 1.01_f64.powi(i32::from(trim) - 1)
 }
 
 #[test]
 fn its_self_test_passes_as_at_the_factory_and_the_part_reads_on() {
-    // A rate responds by half at least, a force by half to one and a half.
+    // Passes if a rate responds by at least half, a force by 0.5 to 1.5.
     for (axis, response, passes) in [
         (0, 1.0, true),
         (1, -0.55, true),
@@ -187,7 +187,7 @@ fn its_self_test_passes_as_at_the_factory_and_the_part_reads_on() {
         let right = |reading: &InertialReading| reads(reading, [1.0, -19.0, 0.5], [0.1, -0.2, 1.0], 31.0);
         assert!(faults.is_empty() && readings.len() > 100 && readings.iter().all(|reading| right(&reading.value)));
     }
-    // One that turns, and one that does not answer.
+    // A part that is turning, and one that does not answer.
     let rig = Rig::new(Registers::new(0x47));
     rig.with(|part| part.rates_deg_s = [0.0, 0.0, 25.0]);
     assert_eq!(block_on(rig.driver(Icm42688p::<true> {}).self_test()), Err(PartFault::SelfTest));
@@ -216,7 +216,7 @@ fn all_pass_the_suite() {
     passes::<0x42, true>(0x47);
 }
 
-/// The part shows the rates of the moment, at any rate of turn.
+/// The part shows the current rates during any motion.
 fn follows_every_turn<const IDENTITY: u8, const POLLED: bool>() {
     for (middle, swing) in [(0.0, 90.0), (0.0, 150.0), (100.0, 20.0), (-100.0, 5.0), (-300.0, 600.0), (0.0, 1900.0)] {
         let rig = Rig::new(Registers::new(IDENTITY));
@@ -224,7 +224,7 @@ fn follows_every_turn<const IDENTITY: u8, const POLLED: bool>() {
         let mut driver = rig.driver(Icm426xx::<IDENTITY, POLLED> {});
         let (mut readings, faults) = run(&mut driver, &rig, 500_000);
         assert!(faults.is_empty() && readings.len() > 400, "{middle}, {swing}: {faults:?}");
-        // A part that was reset meanwhile is set up the same way.
+        // A part that was reset meanwhile gets the same settings.
         rig.set(Trouble::Reset);
         rig.set(Trouble::None);
         let _ = run(&mut driver, &rig, 300_000);
@@ -236,7 +236,7 @@ fn follows_every_turn<const IDENTITY: u8, const POLLED: bool>() {
                 assert!(off_deg_s.abs() < 0.3, "{middle}, {swing}: {off_deg_s} at {} us", reading.at_us);
             }
         }
-        // The bits beside it are the clock's, and stay what they are after a reset.
+        // The other bits of the register, which concern the clock, keep their reset values.
         assert_eq!(rig.with(|part| part.registers[0x4D]), 0x51);
     }
 }

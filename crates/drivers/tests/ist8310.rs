@@ -1,4 +1,4 @@
-//! IST8310 against its registers, as its data sheet has them.
+//! IST8310, tested on a model of its registers (its data sheet).
 
 use crate::rig::suite::{Pace, Suite, reads_fields};
 use crate::rig::{Model, Rig, Trouble, noise, run};
@@ -6,14 +6,14 @@ use afbc_drivers::ist8310::Ist8310;
 use afbc_drivers::{MagneticReading, PartFault};
 use nalgebra::Vector3;
 
-/// Forward, right, down.
+/// Field along forward, right and down.
 const FIELD_UT: [f64; 3] = [22.0, -3.0, 42.0];
 
 struct Registers {
     identity: u8,
     registers: [u8; 128],
     up_us: u64,
-    /// When the measurement under way is complete.
+    /// Time at which the current measurement ends.
     done_us: Option<u64>,
     data: [u8; 6],
     is_ready: bool,
@@ -36,7 +36,7 @@ impl Registers {
         let averages = [self.registers[0x41] & 7, self.registers[0x41] >> 3 & 7, self.registers[0x41] & 7];
         for (axis, ut) in [x, y, -down].into_iter().enumerate() {
             let lsb_per_ut = if self.registers[0x0D] & (0x10 << axis) == 0 { 3.3 } else { 13.2 };
-            // With fewer samples it is noisier, and with other pulses wrong.
+            // Fewer samples are noisier, and other pulses give a wrong scale.
             let noise_ut = 0.2 * f64::from(1 << (4 - averages[axis])) * noise(done_us, axis as u64);
             let gain = if self.registers[0x42] & 0xC0 == 0xC0 { 1.0 } else { 0.9 };
             let lsb = ((gain * ut + noise_ut) * lsb_per_ut).round().clamp(-32768.0, 32767.0) as i16;
@@ -69,7 +69,7 @@ impl Model for Registers {
             match register {
                 _ if now_us < self.up_us => (),
                 0x0A if byte & 0xF == 1 => {
-                    // 16 samples at most 166 times a second.
+                    // A measurement of 16 samples takes 6 ms, which allows at most 166 per second.
                     let samples = 1_u64 << (self.registers[0x41] & 7).max(self.registers[0x41] >> 3 & 7);
                     self.done_us = Some(now_us + 1_000 + 312 * samples);
                 }
@@ -82,7 +82,7 @@ impl Model for Registers {
 
     fn reset(&mut self, now_us: u64) {
         self.registers = [0; 128];
-        // Bits that are nobody's, and those of a reset.
+        // Reset values, including bits without a meaning.
         (self.registers[0x0D], self.registers[0x42]) = (0x02, 0x41);
         (self.up_us, self.done_us, self.is_ready) = (now_us + 15_000, None, false);
     }

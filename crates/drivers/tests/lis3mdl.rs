@@ -1,4 +1,4 @@
-//! LIS3MDL against its registers, as DS9463 has them.
+//! LIS3MDL, tested on a model of its registers (DS9463).
 
 use crate::rig::suite::{Pace, Suite, reads_fields};
 use crate::rig::{Model, Rig, noise, run};
@@ -15,7 +15,7 @@ struct Registers {
     since_us: u64,
     measured: u64,
     field_ut: [f64; 3],
-    /// The field of the self-test.
+    /// Field applied by the self-test.
     own_ut: [f64; 3],
 }
 
@@ -46,7 +46,7 @@ impl Registers {
         self.measured = measured;
         let lsb_per_gauss = [6_842.0, 3_421.0, 2_281.0, 1_711.0][usize::from(self.registers[0x21] >> 5 & 3)];
         for axis in 0..3 {
-            // Worse modes are noisier.
+            // Lower-performance modes are noisier.
             let mode = if axis == 2 { self.registers[0x23] >> 2 } else { self.registers[0x20] >> 5 } & 3;
             let noise_ut = 0.4 * f64::from(4 - mode) * noise(now_us, axis as u64);
             let own_ut = if self.registers[0x20] & 1 != 0 { self.own_ut[axis] } else { 0.0 };
@@ -62,7 +62,7 @@ impl Registers {
 impl Model for Registers {
     fn read(&mut self, now_us: u64, register: u8, into: &mut [u8]) {
         self.measure(now_us);
-        // Without the bit that I2C demands, the address stays.
+        // Without the auto-increment bit of I2C, the address stays.
         let counts = register & 0x80 != 0;
         let mut register = usize::from(register & 0x3F);
         for byte in into {
@@ -99,7 +99,7 @@ fn is_field(reading: &MagneticReading, field_ut: [f64; 3]) -> bool {
     (reading.field_ut - Vector3::from(field_ut.map(|ut| ut as f32))).amax() < 0.45
 }
 
-/// The data sheet's: 1 to 3 gauss along x and y, 0.1 to 1 along z.
+/// The data sheet's limits: 1 to 3 gauss along x and y, 0.1 to 1 gauss along z.
 #[test]
 fn its_self_test_passes_within_the_bounds() {
     for (own_ut, passes) in [

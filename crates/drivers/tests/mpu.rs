@@ -1,4 +1,4 @@
-//! The family of the MPU-6000 against its registers.
+//! The MPU-6000 family, tested on a model of their registers.
 
 use crate::rig::mpu_registers::Registers;
 use crate::rig::suite::{Pace, Suite, reads_the_whole_range};
@@ -72,10 +72,10 @@ fn tested<P: SensorPart>(part: P, identity: u8, trims: [[u8; 4]; 2], responses: 
     result
 }
 
-/// RM-MPU-6000A: 25 deg/s and 0.34 g, times powers; y of the rates is negative.
+/// RM-MPU-6000A: responses are powers of a factor times 25 deg/s and 0.34 g; the rate about y is negative.
 #[test]
 fn the_self_test_of_the_mpu_6000_passes_within_14_percent() {
-    // XG 17, YG 1, ZG 31; XA 22 = 0b10110, YA 9 = 0b01001, ZA 31.
+    // Codes: XG 17, YG 1, ZG 31; XA 22 = 0b10110, YA 9 = 0b01001, ZA 31.
     let trims = [[0; 4], [0b101 << 5 | 17, 0b010 << 5 | 1, 0b111 << 5 | 31, 0b10 << 4 | 0b01 << 2 | 0b11]];
     let force = |number: i32| 0.34 * (0.92_f64 / 0.34).powf(f64::from(number - 1) / 30.0);
     let expected = [25.0 * 1.046_f64.powi(16), -25.0, 25.0 * 1.046_f64.powi(30), force(22), force(9), force(31)];
@@ -92,8 +92,8 @@ fn the_self_test_of_the_mpu_6000_passes_within_14_percent() {
     }
 }
 
-/// AN-MPU-9250A-03: a rate by more than half of what the factory found, a force by half to one and a half; without what
-/// the factory found, 60 deg/s, and 0.225 to 0.675 g.
+/// AN-MPU-9250A-03: a rate responds by more than half of the factory's response, a force by 0.5 to 1.5 of it. Without a
+/// factory response, a rate needs 60 deg/s and a force 0.225 to 0.675 g.
 #[test]
 fn the_self_test_of_the_mpu_6500_and_mpu_9250_passes_as_at_the_factory() {
     let number = |trim: i32| 2620.0 * 1.01_f64.powi(trim - 1);

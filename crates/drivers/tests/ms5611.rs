@@ -1,11 +1,11 @@
-//! MS5611 against its commands, as ENG_DS_MS5611-01BA03_B3 has them.
+//! MS5611, tested on a model of its commands (ENG_DS_MS5611-01BA03_B3).
 
 use crate::rig::suite::{Pace, Suite, reads_no_pressure_beyond, reads_pressures};
 use crate::rig::{Model, Rig, noise, run};
 use afbc_drivers::ms5611::Ms5611;
 use afbc_drivers::{PartFault, PressureReading, SensorPart};
 
-/// C1 to C6: the example of figure 2, a common part's, small and large ones.
+/// Coefficients C1 to C6: the example of figure 2, a typical part's, small and large ones.
 const SETS: [[u16; 6]; 4] = [
     [40_127, 36_924, 23_317, 23_282, 33_464, 28_312],
     [46_546, 42_845, 29_751, 29_457, 32_745, 29_059],
@@ -13,7 +13,7 @@ const SETS: [[u16; 6]; 4] = [
     [65_535, 60_000, 35_000, 35_000, 40_000, 40_000],
 ];
 
-/// CRC-4 bit by bit: the remainder of the words, but for the last byte, by x4 + x + 1.
+/// Computes the CRC-4 bit by bit: the remainder of all words without the last byte, divided by x4 + x + 1.
 fn crc4(words: [u16; 8]) -> u16 {
     let mut remainder = 0;
     let bits = words.iter().flat_map(|word| (0..16).rev().map(move |bit| word >> bit & 1)).take(120);
@@ -29,9 +29,9 @@ fn crc4(words: [u16; 8]) -> u16 {
 
 struct Part5611 {
     prom: [u16; 8],
-    /// Since when the PROM is in its register.
+    /// Time from which the PROM can be read.
     loaded_us: Option<u64>,
-    /// Command, its end, and whether its result is spoilt or gone.
+    /// Command, its end, and whether its result is spoilt or already read.
     conversion: Option<(u8, u64, bool)>,
     pressure_pa: f64,
     temperature_c: f64,
@@ -45,7 +45,7 @@ impl Part5611 {
         Part5611 { prom, loaded_us: None, conversion: None, pressure_pa: 101_325.0, temperature_c: 20.5 }
     }
 
-    /// Figures 2 and 3, first order and second, in real numbers: temperature \[C\], offset, sensitivity.
+    /// Figures 2 and 3 in floating point, first and second order: returns temperature \[C\], offset and sensitivity.
     fn of(&self, d2: f64) -> (f64, f64, f64) {
         let [_, c1, c2, c3, c4, c5, c6, _] = self.prom.map(f64::from);
         let dt = d2 - c5 * 256.0;
@@ -99,7 +99,7 @@ impl Model for Part5611 {
                     Some((of, end_us, false)) if end_us <= now_us => self.result(of, end_us),
                     _ => 0,
                 };
-                // Read too early or twice, it is wrong.
+                // A second read, or one that comes too early, gives a wrong result.
                 self.conversion = self.conversion.map(|(of, end_us, _)| (of, end_us, true));
                 answer.extend(&value.to_be_bytes()[1..]);
             }
@@ -113,7 +113,7 @@ impl Model for Part5611 {
         match command {
             0x1E => (self.loaded_us, self.conversion) = (Some(now_us + 2_800), None),
             0x40..=0x48 | 0x50..=0x58 if command & 1 == 0 => {
-                // The longest times.
+                // Longest conversion times.
                 let us = [600, 1_170, 2_280, 4_540, 9_040][usize::from(command & 0xF) / 2];
                 let is_spoilt = self.conversion.is_some_and(|(_, end_us, _)| now_us < end_us);
                 self.conversion = Some((command, now_us + us, is_spoilt));
@@ -173,7 +173,7 @@ fn the_data_sheets_example_is_read() {
 
 #[test]
 fn the_checksum_is_that_of_the_makers_example() {
-    // AN520.
+    // Example of AN520.
     assert_eq!(crc4([0x3132, 0x3334, 0x3536, 0x3738, 0x3940, 0x4142, 0x4344, 0x4500]), 0xB);
 }
 

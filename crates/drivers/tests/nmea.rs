@@ -1,15 +1,15 @@
-//! Fixes of a receiver, from sentences written by hand.
+//! Fixes decoded from hand-written NMEA sentences.
 
 use afbc_drivers::FixReading;
 use afbc_drivers::nmea::{NmeaDecoder, RANGE_SIGMA_M};
 use proptest::prelude::*;
 
-/// A sentence with its checksum.
+/// Adds the checksum to a sentence.
 fn sentence(text: &str) -> String {
     format!("${text}*{:02X}\r\n", text.bytes().fold(0, |sum, byte| sum ^ byte))
 }
 
-/// An angle as NMEA writes it, with the sign's letter.
+/// Formats an angle as in NMEA, with the letter of its sign.
 fn angle(degrees: f64, digits: usize, letters: [char; 2]) -> String {
     let ten_thousandths = (degrees.abs() * 60.0 * 1e5).round() as u64;
     let (whole, minutes) = (ten_thousandths / 6_000_000, ten_thousandths % 6_000_000);
@@ -28,7 +28,7 @@ fn epoch(time_s: f64, [latitude, longitude, altitude]: [f64; 3], speed_m_s: f64,
         + &sentence(&format!("GNVTG,{course_deg:.2},T,,M,{knots:.3},N,,K,A"))
 }
 
-/// The same, with speed and course in front, as u-blox sends them.
+/// Moves the sentence with speed and course to the front, as u-blox sends it.
 fn motion_first(epoch: &str) -> String {
     let mut sentences: Vec<&str> = epoch.split_inclusive("\r\n").collect();
     sentences.rotate_right(2);
@@ -40,7 +40,7 @@ fn fixes(decoder: &mut NmeaDecoder, text: &str) -> Vec<Option<FixReading>> {
 }
 
 proptest! {
-    /// Any place, speed and course is read back.
+    /// Any position, speed and course is decoded correctly.
     #[test]
     fn what_is_sent_is_read(
         latitude in -89.0..89.0_f64, longitude in -179.9..179.9_f64, altitude in -400.0..8000.0_f64,
@@ -72,12 +72,12 @@ proptest! {
         let down = f64::from(fix.velocity_ned_m_s.z);
         prop_assert!((down + climb).abs() < 0.15, "{down} and {climb}");
         prop_assert!((fix.horizontal_sigma_m - 0.9 * RANGE_SIGMA_M).abs() < 1e-6);
-        // The vertical speed is a mean of altitudes, and known less well.
+        // The vertical speed is filtered from altitudes, so its standard deviation is larger.
         prop_assert!(fix.climb_sigma_m_s > fix.speed_sigma_m_s);
         prop_assert_eq!((fix.satellites, decoder.bad_sentences()), (10, 0));
     }
 
-    /// A wire garbled anyhow gives no panic, and no fix with a number that is none.
+    /// A garbled line causes no panic, and no fix with impossible numbers.
     #[test]
     fn noise_is_survived(
         mut bytes in prop::collection::vec(any::<u8>(), 0..400), start in 0_usize..300, flip in any::<u8>(),
@@ -91,13 +91,13 @@ proptest! {
             prop_assert!(fix.latitude_deg.abs() <= 90.0 && fix.longitude_deg.abs() <= 180.0);
             prop_assert!(fix.altitude_m.is_finite());
         }
-        // And a line that is good again is read.
+        // A line that works again is read.
         let _ = fixes(&mut decoder, "\r\n");
         let again = epoch(45_001.0, [47.0, -8.5, 500.0], 3.0, 90.0) + &epoch(45_002.0, [47.0, -8.5, 500.0], 3.0, 90.0);
         prop_assert!(!fixes(&mut decoder, &again).is_empty());
     }
 
-    /// Fields of any content, with a right checksum.
+    /// Fields with any content and a correct checksum.
     #[test]
     fn odd_fields_are_survived(text in "[0-9A-Z.,*$ -]{0,80}", kind in 0_usize..4) {
         let head = ["GNGGA", "GNRMC", "GPVTG", "GP"][kind];
@@ -108,7 +108,7 @@ proptest! {
 }
 
 proptest! {
-    /// Another reader finds the same in the same sentences, with as many decimal places as receivers write.
+    /// Another decoder gives the same result, with any number of decimal places.
     #[test]
     fn another_reader_agrees(
         time_ms in 0_u32..86_400_000, [latitude, longitude] in [0_u64..5_400_000_000, 0..10_800_000_000],
@@ -191,7 +191,7 @@ fn epochs_that_do_not_belong_together_are_no_fix() {
     assert_eq!(fixes(&mut decoder, &format!("{fix}$GPGSV{motion}")), []);
 }
 
-/// An epoch in either order, by the fields that say how good it is.
+/// Returns an epoch in either order, with the given quality fields.
 fn judged(quality: &str, dilution: &str, status: &str, mode: Option<&str>, motion_comes_first: bool) -> String {
     let place = "4807.03800,N,01131.00000,E";
     let mode = mode.map(|mode| format!(",{mode}")).unwrap_or_default();
@@ -202,14 +202,14 @@ fn judged(quality: &str, dilution: &str, status: &str, mode: Option<&str>, motio
     if motion_comes_first { motion_first(&epoch) } else { epoch }
 }
 
-/// Dead reckoning, a place put in by hand, a simulator's and one that the receiver calls none are no fix, whichever of
-/// the two sentences says so. The epoch is told nevertheless: a receiver without a fix is not silent.
+/// Dead reckoning, a manual position, a simulator's position and an invalid one are no fix, whichever of the two
+/// sentences says so. The epoch is still reported, since a receiver without a fix is not silent.
 #[test]
 fn what_is_not_measured_is_no_fix() {
     let qualities = ["", "0", "1", "2", "3", "4", "5", "6", "7", "8", "9", "10", "A", "-1"];
     let modes = ["", "A", "D", "F", "P", "R", "E", "M", "N", "S", "X", "AA"].map(Some);
     for quality in qualities {
-        // Receivers before NMEA 2.3 have no mode.
+        // Receivers before NMEA 2.3 send no mode.
         for mode in modes.into_iter().chain([None]) {
             for (status, motion_comes_first) in [("A", false), ("A", true), ("V", false), ("V", true)] {
                 let text = judged(quality, "0.9", status, mode, motion_comes_first);
@@ -221,14 +221,15 @@ fn what_is_not_measured_is_no_fix() {
             }
         }
     }
-    // As a receiver in a tunnel sends it.
+    // As sent by a receiver in a tunnel.
     let tunnel = "$GNGGA,123519.00,4807.038000,N,01131.000000,E,6,00,0.9,545.4,M,46.9,M,,*78\r\n\
         $GNRMC,123519.00,A,4807.038000,N,01131.000000,E,22.4,84.4,230394,,,E*48\r\n";
     assert_eq!(fixes(&mut NmeaDecoder::new(), tunnel).into_iter().flatten().count(), 0);
 }
 
 proptest! {
-    /// No fix is worse than 200 m, or faster or higher than a receiver can tell; nor is one that claims to be perfect.
+    /// A fix is refused if it is worse than 200 m, claims to be perfect, or is faster or higher than a receiver can
+    /// report.
     #[test]
     fn impossible_numbers_are_an_epoch_without_a_fix(
         hundredths in prop_oneof![Just(0), 1_u32..12_000, Just(9_999)],
@@ -249,7 +250,7 @@ proptest! {
         prop_assert_eq!(read[0].is_some(), possible, "{}: {:?}", text, read);
     }
 
-    /// The head of a proprietary sentence begins with a P, has any length, and may end like a head that is known.
+    /// Proprietary sentences begin with P, have any length, and may end like a known sentence.
     #[test]
     fn only_heads_of_a_talker_and_a_kind_are_read(head in "[A-Z0-9]{0,7}", kind in 0_usize..2) {
         let known = ["GGA", "RMC"][kind];
@@ -257,7 +258,7 @@ proptest! {
         for text in [head.clone(), format!("P{head}{known}"), format!("{head}{known}")] {
             let talks = text.len() == 5 && text.ends_with(known) && !text.starts_with('P')
                 && text.bytes().take(2).all(|byte| byte.is_ascii_uppercase());
-            // Without a fix, and not valid: the shortest of which the decoder tells.
+            // No fix and not valid: the shortest sentence that the decoder reports.
             let read = fixes(&mut decoder, &sentence(&format!("{text},123519.00,V,,,,0,,")));
             prop_assert_eq!(read.len(), usize::from(talks), "{}", text);
         }
@@ -265,7 +266,7 @@ proptest! {
     }
 }
 
-/// A proprietary sentence within an epoch is not taken for its motion.
+/// A proprietary sentence within an epoch is not taken for RMC.
 #[test]
 fn a_proprietary_sentence_spoils_no_epoch() {
     let good = judged("1", "0.9", "A", Some("A"), false);

@@ -1,4 +1,4 @@
-//! QMC5883L against its registers, as its data sheet 1.0 has them.
+//! QMC5883L, tested on a model of its registers (data sheet 1.0).
 
 use crate::rig::suite::{Pace, Suite, reads_fields};
 use crate::rig::{Model, noise};
@@ -11,13 +11,13 @@ const FIELD_UT: [f64; 3] = [22.0, -3.0, -42.0];
 pub(crate) struct Registers {
     identity: u8,
     data: [u8; 6],
-    /// DOR, OVL, DRDY.
+    /// Status bits DOR, OVL and DRDY.
     status: u8,
     control: [u8; 3],
-    /// Data are protected from their first byte read until their last.
+    /// True while the data are locked: after the first byte is read, until the last one is.
     is_locked: bool,
     since_us: u64,
-    /// Measurements since then.
+    /// Number of measurements since `since_us`.
     measured: u64,
     field_ut: [f64; 3],
 }
@@ -43,7 +43,7 @@ impl Registers {
             return;
         }
         let lsb_per_gauss = if self.control[0] & 0x10 == 0 { 12_000.0 } else { 3_000.0 };
-        // Without the pulses of its period an old magnetisation stays.
+        // Without the set/reset pulses, an old magnetisation stays.
         let offset_ut = if self.control[2] == 1 { 0.0 } else { 15.0 };
         let lsb = std::array::from_fn::<f64, 3, _>(|axis| {
             let lsb = (self.field_ut[axis] + offset_ut) / 100.0 * lsb_per_gauss;
@@ -101,7 +101,7 @@ impl Model for Registers {
 }
 
 fn is_field(reading: &MagneticReading, field_ut: [f64; 3]) -> bool {
-    // Four and a half bits.
+    // The tolerance is four and a half bits.
     (reading.field_ut - Vector3::from(field_ut.map(|ut| ut as f32))).amax() < 0.16
 }
 

@@ -1,4 +1,5 @@
-//! u-blox receivers: found, configured and watched, on a line with faults; messages as another implementation has them.
+//! u-blox receivers are found, configured and monitored on a faulty line; their messages match another
+//! implementation's.
 
 use crate::ublox_model::{Generation, Model, Truth, frame, solution};
 use afbc_drivers::FixReading;
@@ -10,30 +11,30 @@ const MS: u64 = 1000;
 const SECOND: u64 = 1000 * MS;
 const GENERATIONS: [Generation; 3] = [Generation::Six, Generation::Eight, Generation::Ten];
 
-/// What the line does to bytes on their way from the receiver.
+/// Faults of the line from the receiver.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Line {
     Good,
-    /// One in so many bytes has a flipped bit, is lost, or comes twice.
+    /// One in this many bytes has a flipped bit.
     Flips(u64),
     Loses(u64),
     Repeats(u64),
-    /// None passes.
+    /// No byte passes.
     Cut,
 }
 
-/// A receiver, the line and the driver, in steps of a millisecond.
+/// A receiver model, the line and the driver, in steps of a millisecond.
 struct Bench {
     model: Model,
     driver: UbxReceiver,
     line: Line,
-    /// The number of the command to come that is lost on its way.
+    /// Number of further commands before one is lost, if any.
     loses_command: Option<usize>,
     /// The UART's baud rate.
     baud: u32,
     now_us: u64,
     random: u64,
-    /// Fixes, with their times.
+    /// Fixes with their times.
     fixes: Vec<Stamped<Option<FixReading>>>,
 }
 
@@ -59,7 +60,7 @@ impl Bench {
         self.random
     }
 
-    /// Passes a byte to the driver as it arrives.
+    /// Passes an arriving byte through the line to the driver.
     fn arrive(&mut self, at_us: u64, byte: u8) {
         let byte = if self.model.baud == self.baud { byte } else { self.random() as u8 };
         let (struck, bit) = (self.random(), self.random() % 8);
@@ -101,7 +102,7 @@ impl Bench {
         }
     }
 
-    /// Runs until it is configured, `most_us` at most.
+    /// Runs until the receiver is configured, at most for `most_us`.
     #[track_caller]
     fn configure(&mut self, most_us: u64) {
         let begun_us = self.now_us;
@@ -111,7 +112,7 @@ impl Bench {
         }
     }
 
-    /// Forgets the fixes, runs, and returns the new ones.
+    /// Runs for a time and returns the fixes of that time.
     fn fixes(&mut self, for_us: u64) -> Vec<Stamped<Option<FixReading>>> {
         self.fixes.clear();
         self.run(for_us);
@@ -119,7 +120,7 @@ impl Bench {
     }
 }
 
-/// A fix that is the truth to the last digit.
+/// Asserts that a fix matches the truth to the last digit.
 fn assert_true(fix: &FixReading, truth: &Truth) {
     let Truth { place, altitude_mm, velocity_mm_s, accuracies: [h, v, s], .. } = *truth;
     let [latitude_deg, longitude_deg] = place.map(|angle| f64::from(angle) * 1e-7);
@@ -134,7 +135,7 @@ fn assert_true(fix: &FixReading, truth: &Truth) {
     }
 }
 
-/// At every baud rate that it may have, and then as it was told.
+/// A receiver is found at every baud rate and gets all settings.
 #[test]
 fn a_receiver_is_found_and_configured() {
     for generation in [Generation::Eight, Generation::Ten] {
@@ -149,7 +150,7 @@ fn a_receiver_is_found_and_configured() {
             assert_eq!(fixes.len() as u64, 10 * SECOND / period_us);
             for fix in &fixes {
                 assert_true(fix.value.as_ref().expect("a fix"), &Truth::ZURICH);
-                // The time of the epoch.
+                // The fix has the time of its epoch.
                 let late_us = fix.at_us % period_us;
                 assert!(late_us.min(period_us - late_us) <= 2 * MS, "{} us", fix.at_us);
             }
@@ -158,7 +159,7 @@ fn a_receiver_is_found_and_configured() {
     }
 }
 
-/// A new receiver of the usual kind flies within three seconds, one that a restart finds configured within one.
+/// A new receiver of the usual kind is configured within three seconds, an already configured one within one second.
 #[test]
 fn the_usual_ones_are_found_first() {
     let mut bench = Bench::new(Model::new(Generation::Ten));
@@ -167,7 +168,7 @@ fn the_usual_ones_are_found_first() {
     bench.configure(SECOND);
 }
 
-/// One that knows no UBX, or none that is of use, at every baud rate.
+/// A receiver without UBX or without usable UBX messages is used with NMEA, at every baud rate.
 #[test]
 fn others_are_used_by_nmea() {
     for deaf in [true, false] {
@@ -185,7 +186,7 @@ fn others_are_used_by_nmea() {
     }
 }
 
-/// A receiver whose answers were lost when it was found is configured later; meanwhile there are fixes.
+/// A receiver whose answers were lost at first is configured later. Meanwhile there are fixes.
 #[test]
 fn a_receiver_that_hears_again_is_configured() {
     let mut model = Model::new(Generation::Ten);
@@ -208,7 +209,7 @@ fn a_configured_one_that_does_not_hear_is_used() {
     assert_eq!(bench.fixes(5 * SECOND).len(), 50);
 }
 
-/// What is refused is left out.
+/// Refused settings are skipped.
 #[test]
 fn refusals_are_survived() {
     for (generation, number) in [(Generation::Eight, 0x24), (Generation::Eight, 0x08), (Generation::Eight, 0x00)] {
@@ -232,8 +233,8 @@ fn refusals_are_survived() {
     }
 }
 
-/// A receiver that answers so late that it is asked twice, on a line that loses one of the commands: no answer to an
-/// earlier command counts as one to the next.
+/// Answers so late that each command is sent twice, on a line that loses one command: no answer to an earlier command
+/// counts for the next.
 #[test]
 fn late_answers_are_not_taken_for_later_ones() {
     for generation in [Generation::Eight, Generation::Ten] {
@@ -254,10 +255,10 @@ fn late_answers_are_not_taken_for_later_ones() {
     }
 }
 
-/// Something that happens in flight.
+/// Function that causes a fault.
 type Fault = fn(&mut Bench);
 
-/// In flight, for ten seconds; what is read meanwhile is right or nothing, and after it all is as before.
+/// For ten seconds of a fault in flight, every fix is correct; afterwards everything is as before.
 #[test]
 fn faults_in_flight_end() {
     let faults: [(&str, Fault); 12] = [
@@ -287,7 +288,7 @@ fn faults_in_flight_end() {
             bench.run(SECOND);
             fault(&mut bench);
             for fix in bench.fixes(10 * SECOND) {
-                // NMEA knows the same place to a digit less, and no accuracies.
+                // NMEA gives the same position with one digit less, and no accuracies.
                 let fix = fix.value.expect("a fix");
                 assert!(
                     (fix.latitude_deg - 47.397_742).abs() < 1e-6 && (fix.altitude_m - 488.0).abs() < 0.06,
@@ -309,7 +310,7 @@ fn faults_in_flight_end() {
     }
 }
 
-/// After a reset the fixes are back in three seconds and the receiver is configured in four.
+/// After a reset, fixes return within three seconds, and the receiver is configured within four.
 #[test]
 fn a_reset_costs_seconds() {
     for generation in [Generation::Eight, Generation::Ten] {
@@ -323,7 +324,7 @@ fn a_reset_costs_seconds() {
     }
 }
 
-/// Epochs without a fix, and such as no receiver can have.
+/// Epochs without a fix, and fixes with impossible numbers.
 #[test]
 fn no_fix_is_none() {
     let good = Truth::ZURICH;
@@ -377,14 +378,14 @@ fn take_all(driver: &mut UbxReceiver, at_us: u64, bytes: &[u8]) -> Vec<Stamped<O
 }
 
 proptest! {
-    /// Any solution is read back, in all places of noise, and by the crate `ublox` alike.
+    /// Any solution is decoded correctly after any noise, and the crate `ublox` decodes the same.
     #[test]
     fn what_is_sent_is_read(truth in any_truth(), noise in prop::collection::vec(any::<u8>(), 0..60)) {
         let payload = solution(3 * SECOND, &truth);
         let sent = frame([0x01, 0x07], &payload);
         let mut driver = UbxReceiver::new();
         let mut bytes = noise;
-        // A frame that the noise seems to begin is given up after the longest one's bytes.
+        // Zeros for a frame that the noise may seem to begin: it ends after at most the longest frame's length.
         bytes.extend([0; 400]);
         bytes.extend(&sent);
         let fixes = take_all(&mut driver, 5 * SECOND, &bytes);
@@ -410,7 +411,7 @@ proptest! {
         prop_assert_eq!(fix.satellites, other.num_satellites());
     }
 
-    /// No frame with a changed byte is a fix; the next one is found, also within the damaged one.
+    /// A frame with a changed byte gives no fix. The next frame is found, even within the damaged one.
     #[test]
     fn a_wrong_checksum_is_no_fix(
         truth in any_truth(), at in 0_usize..100, change in 1_u8..=255, cut in 0_usize..100, cuts in any::<bool>(),
@@ -431,7 +432,7 @@ proptest! {
         fixes.iter().for_each(|fix| assert_true(fix.value.as_ref().expect("a fix"), &truth));
     }
 
-    /// Any bytes at any times, with anything done meanwhile: no panic, and no fix beyond what a receiver measures.
+    /// Any bytes and calls at any times cause no panic, and no fix beyond a receiver's limits.
     #[test]
     fn noise_is_survived(
         pieces in prop::collection::vec((prop::collection::vec(any::<u8>(), 0..80), any::<u32>(), 0_u8..6), 0..60),
@@ -466,7 +467,7 @@ proptest! {
     }
 }
 
-/// Commands that a receiver of each generation gets, until it is configured.
+/// Returns the commands that a receiver of this generation gets until it is configured.
 fn commands(generation: Generation, baud: u32) -> Vec<Vec<u8>> {
     let mut model = Model::at(generation, baud);
     let (mut driver, mut now_us, mut all) = (UbxReceiver::new(), 0, Vec::new());
@@ -489,7 +490,7 @@ fn commands(generation: Generation, baud: u32) -> Vec<Vec<u8>> {
     all
 }
 
-/// The commands are those that the crate `ublox` makes.
+/// The commands match those of the crate `ublox`.
 #[test]
 fn commands_are_as_another_implementation_has_them() {
     use ublox::cfg_val::CfgVal;
@@ -533,7 +534,7 @@ fn commands_are_as_another_implementation_has_them() {
         time_ref: cfg_rate::AlignmentToReferenceTime::Gps,
     };
     let mut all = commands(Generation::Eight, 9_600);
-    // Of what it gets with the model, the mask and the model's number matter; the rest is not taken.
+    // Only the mask and the model's number matter in this command; the receiver ignores the rest.
     let dynamics = all.remove(2);
     assert_eq!(dynamics[..9], nav5.into_packet_bytes()[..9]);
     let expected = [

@@ -1,52 +1,52 @@
-//! Sentences of NMEA 0183: their framing with a checksum, and what of a fix and a motion is read from their fields.
+//! NMEA 0183 sentences: framing with checksum, and the fields of position and motion.
 //!
-//! Numbers are read as integers of their last decimal place: parsing floating point takes tables that a flash of 1 MiB
-//! misses, and double precision that these chips do not have.
+//! Numbers are read as integers in units of their last decimal place. Floating-point parsing would need large tables in
+//! flash and double precision, which these chips do not have.
 
 use heapless::Vec;
 
-/// Longest sentence between `$` and `*` that is read: NMEA allows 79 bytes, some receivers write more.
+/// Longest sentence read, without `$` and checksum: NMEA allows 79 bytes, some receivers write more.
 const LENGTH: usize = 100;
-/// Qualities in GGA of a fix that is measured: by satellites alone (1), with corrections (2, 3, and 9 of NovAtel), by
-/// the carrier (4, 5). Dead reckoning (6), a place put in by hand (7) and a simulator's (8) are none.
+/// GGA qualities of a measured fix: satellites alone (1), with corrections (2, 3, and NovAtel's 9), carrier phase (4,
+/// 5). Not measured are dead reckoning (6), a manual position (7) and a simulator (8).
 const MEASURED: &[u8] = b"123459";
-/// Ten-millionths of a minute in a degree.
+/// One degree in ten-millionths of a minute.
 const DEGREE: i32 = 600_000_000;
 
-/// Puts sentences together, byte by byte.
+/// Assembles sentences byte by byte.
 #[derive(Default)]
 pub(super) struct Framing {
     body: Vec<u8, LENGTH>,
     place: Place,
 }
 
-/// Where in a sentence the next byte stands.
+/// Position of the next byte in a sentence.
 #[derive(Clone, Copy, Default)]
 enum Place {
-    /// In none.
+    /// Outside any sentence.
     #[default]
     Outside,
     Body,
-    /// Before the first or second digit of the checksum.
+    /// Checksum; holds its first digit once it was read.
     Checksum(Option<u8>),
 }
 
-/// What a byte completes.
+/// Result of a byte that ends a sentence.
 #[derive(Debug, PartialEq)]
 pub(super) enum Framed<'a> {
-    /// A sentence with a right checksum, without `$` and checksum.
+    /// Body of a sentence with a correct checksum, without `$` and checksum.
     Whole(&'a [u8]),
     Damaged,
 }
 
 impl Framing {
-    /// Takes a byte.
+    /// Takes a byte; returns the sentence that it completes or shows to be damaged.
     pub(super) fn take(&mut self, byte: u8) -> Option<Framed<'_>> {
         let damaged = match (self.place, byte) {
             (place, b'$') => {
                 self.body.clear();
                 self.place = Place::Body;
-                // Whatever has begun has not ended.
+                // A sentence that has begun is cut off.
                 !matches!(place, Place::Outside)
             }
             (Place::Outside, _) => false,
@@ -54,7 +54,7 @@ impl Framing {
                 self.place = Place::Checksum(None);
                 false
             }
-            // No other byte is part of a text, and each begins one only at a start.
+            // Other bytes cannot be part of a sentence.
             (Place::Body, b' '..=b'~') => self.body.push(byte).is_err(),
             (Place::Body, _) => true,
             (Place::Checksum(upper), _) => match (hexadecimal(byte), upper) {
@@ -86,12 +86,12 @@ fn hexadecimal(digit: u8) -> Option<u8> {
     }
 }
 
-/// A sentence that belongs to an epoch.
+/// A sentence used for an epoch.
 #[derive(Debug, PartialEq)]
 pub(super) enum Sentence {
-    /// GGA; none without a fix that is measured.
+    /// GGA; none without a measured fix.
     Fix(Option<Fix>),
-    /// RMC; none if it is not valid, or not measured.
+    /// RMC; none if not valid or not measured.
     Motion(Option<Motion>),
 }
 
@@ -103,9 +103,9 @@ pub(super) struct Fix {
     pub(super) latitude: Angle,
     pub(super) longitude: Angle,
     pub(super) satellites: u8,
-    /// Horizontal dilution of precision, in thousandths.
+    /// Horizontal dilution of precision \[0.001\].
     pub(super) dilution: i32,
-    /// Above the geoid \[mm\].
+    /// Altitude above the geoid \[mm\].
     pub(super) altitude_mm: i32,
 }
 
@@ -114,23 +114,23 @@ pub(super) struct Fix {
 pub(super) struct Motion {
     /// Time of day \[ms\].
     pub(super) time_ms: u32,
-    /// Over the ground, in thousandths of a knot.
+    /// Speed over ground \[0.001 knots\].
     pub(super) speed: i32,
-    /// From the north, clockwise \[0.001 deg\]; 0 if the receiver gives none, as at rest.
+    /// Course from the north, clockwise \[0.001 deg\]; 0 if the receiver gives none, as at rest.
     pub(super) course: i32,
 }
 
-/// An angle to the north or east.
+/// A latitude or longitude.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Angle {
     degrees: i32,
-    /// Ten-millionths of a minute.
+    /// Minutes \[1e-7 minutes\].
     minutes: i32,
     is_negative: bool,
 }
 
 impl Angle {
-    /// Returns it in degrees.
+    /// Returns the angle in degrees.
     pub(super) fn degrees(self) -> f64 {
         let degrees = f64::from(self.degrees) + f64::from(self.minutes) / f64::from(DEGREE);
         if self.is_negative { -degrees } else { degrees }
@@ -138,11 +138,10 @@ impl Angle {
 }
 
 impl Sentence {
-    /// Reads one from any talker, of two letters; none for other kinds, and for what makers send of their own, whose
-    /// head begins with a P (`PGRMC`).
-    ///
+    /// Parses a sentence of any two-letter talker. Returns none for other kinds, and for proprietary sentences, which
+    /// begin with P (`PGRMC`).
     /// # Errors
-    /// If a field that is needed is no number, or out of range.
+    /// If a required field is not a number or out of range.
     pub(super) fn read(body: &[u8]) -> Result<Option<Self>, ()> {
         let mut fields = body.split(|byte| *byte == b',');
         let kind = match fields.next() {
@@ -158,7 +157,7 @@ impl Sentence {
     }
 }
 
-/// The fields that are left.
+/// Fields not yet read.
 struct Fields<I>(I);
 
 impl<'a, I: Iterator<Item = &'a [u8]>> Fields<I> {
@@ -166,7 +165,7 @@ impl<'a, I: Iterator<Item = &'a [u8]>> Fields<I> {
         self.0.next()
     }
 
-    /// Reads GGA: `Some(None)` without a fix.
+    /// Parses GGA; `Some(None)` without a measured fix.
     fn fix(&mut self) -> Option<Option<Fix>> {
         let time = self.next()?;
         let [latitude, north, longitude, east] = [self.next()?, self.next()?, self.next()?, self.next()?];
@@ -184,16 +183,16 @@ impl<'a, I: Iterator<Item = &'a [u8]>> Fields<I> {
         Some(Some(fix))
     }
 
-    /// Reads RMC: `Some(None)` if it is not valid, or not measured.
+    /// Parses RMC; `Some(None)` if it is not valid or not measured.
     fn motion(&mut self) -> Option<Option<Motion>> {
         let time = self.next()?;
         if self.next()? != b"A" {
             return Some(None);
         }
-        // The place is GGA's.
+        // Skips the position, which GGA gives.
         let speed = self.0.nth(4)?;
         let course = self.next()?;
-        // Behind date and variation; receivers before NMEA 2.3 do not tell.
+        // The mode follows date and magnetic variation; receivers before NMEA 2.3 do not send it.
         if !matches!(self.0.nth(3), None | Some(b"" | b"A" | b"D" | b"F" | b"P" | b"R")) {
             return Some(None);
         }
@@ -205,7 +204,7 @@ impl<'a, I: Iterator<Item = &'a [u8]>> Fields<I> {
     }
 }
 
-/// Reads a decimal number in units of its `places`-th decimal place; further ones are cut off.
+/// Parses a decimal number in units of its `places`-th decimal place; further places are cut off.
 fn decimal(text: &[u8], places: usize) -> Option<i32> {
     let (is_negative, digits) = match text {
         [b'-', digits @ ..] => (true, digits),
@@ -225,7 +224,7 @@ fn decimal(text: &[u8], places: usize) -> Option<i32> {
     Some(if is_negative { -number } else { number })
 }
 
-/// Reads `hhmmss.sss`, in milliseconds of the day; a leap second is one of the next day's first.
+/// Parses `hhmmss.sss` into milliseconds of the day. A leap second (60) counts as the first second of the next minute.
 fn time_of_day(text: &[u8]) -> Option<u32> {
     let number: u32 = decimal(text, 3)?.try_into().ok()?;
     let (hours, minutes, milliseconds) = (number / 10_000_000, number / 100_000 % 100, number % 100_000);
@@ -233,7 +232,7 @@ fn time_of_day(text: &[u8]) -> Option<u32> {
     is_time.then_some((hours * 60 + minutes) * 60_000 + milliseconds)
 }
 
-/// Reads `dddmm.mmmmm` and a letter of two.
+/// Parses `dddmm.mmmmm` and one of two direction letters.
 fn angle(text: &[u8], letter: &[u8], [positive, negative]: [u8; 2], most: i32) -> Option<Angle> {
     let point = text.iter().position(|byte| *byte == b'.').unwrap_or(text.len());
     let (degrees, minutes) = text.split_at_checked(point.checked_sub(2)?)?;
@@ -286,7 +285,7 @@ mod tests {
                 None => (),
             }
         }
-        // The checksum of `GPX` is 0x4F, of `A` 0x41.
+        // The checksum of `GPX` is 0x4F, that of `A` is 0x41.
         assert_eq!((whole, damaged), (1, 6));
         let long: Vec<u8, 200> = core::iter::once(b'$').chain([b'A'; 150]).collect();
         assert_eq!(long.iter().filter(|byte| framing.take(**byte) == Some(Framed::Damaged)).count(), 1);

@@ -1,19 +1,19 @@
-//! Frames: two bytes that begin it, class, number, length of the payload, payload, and Fletcher's checksum of all
-//! between.
+//! UBX frames: two sync bytes, class, id, payload length, payload, and Fletcher's checksum over everything after the
+//! sync bytes.
 
-/// Longest payload that is taken: a version with ten extensions. A longer one, which no configured receiver sends, is
-/// noise, so that a damaged length holds up what follows for a third of a second at most.
+/// Longest accepted payload: a version with ten extensions. Configured receivers send no longer one, so a longer length
+/// is noise. A damaged length thus delays the following frames by a third of a second at most.
 pub(super) const PAYLOAD_MAX: usize = 340;
 const BEGIN: [u8; 2] = [0xB5, 0x62];
-/// Bytes around a payload.
+/// Bytes of a frame without its payload.
 const AROUND: usize = 8;
-/// Pause within a frame after which its rest is not waited for \[us\].
+/// Pause within a frame after which the frame is abandoned \[us\].
 const PAUSE_US: u64 = 200_000;
 
-/// Class and number of a message.
+/// Class and id of a message.
 pub(super) type MessageId = [u8; 2];
 
-/// A frame to be sent.
+/// A UBX frame to be sent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct UbxCommand {
     bytes: [u8; UbxCommand::LENGTH_MAX],
@@ -23,10 +23,10 @@ pub struct UbxCommand {
 impl UbxCommand {
     /// Longest command \[bytes\].
     pub const LENGTH_MAX: usize = Self::PAYLOAD_MAX + AROUND;
-    /// Longest payload.
+    /// Longest payload of a command \[bytes\].
     const PAYLOAD_MAX: usize = 36;
 
-    /// One with this payload, of 36 bytes at most.
+    /// Creates a command with this payload of at most 36 bytes.
     pub(super) fn new(id: MessageId, payload: &[u8]) -> Self {
         let length = payload.len().min(Self::PAYLOAD_MAX) as u16;
         let summed = id.into_iter().chain(length.to_le_bytes()).chain(payload.iter().copied().take(length.into()));
@@ -36,20 +36,20 @@ impl UbxCommand {
         command
     }
 
-    /// Returns its bytes.
+    /// Returns the frame's bytes.
     #[must_use]
     pub fn as_bytes(&self) -> &[u8] {
         self.bytes.get(..self.length).unwrap_or_default()
     }
 
-    /// Returns class and number.
+    /// Returns class and id.
     pub(super) fn id(&self) -> MessageId {
         let [_, _, class, number, ..] = self.bytes;
         [class, number]
     }
 }
 
-/// Returns Fletcher's checksum of 8 bits (RFC 1145).
+/// Returns Fletcher's 8-bit checksum (RFC 1145).
 fn checksum(bytes: impl Iterator<Item = u8>) -> [u8; 2] {
     bytes.fold([0, 0], |[a, b]: [u8; 2], byte| {
         let a = a.wrapping_add(byte);
@@ -57,23 +57,23 @@ fn checksum(bytes: impl Iterator<Item = u8>) -> [u8; 2] {
     })
 }
 
-/// What the bytes at hand begin with.
+/// Content at the beginning of the buffer.
 enum Front<T> {
-    /// Part of a frame.
+    /// Incomplete frame.
     Part,
-    /// So many bytes of noise.
+    /// This number of bytes of noise.
     Noise(usize),
     /// A frame with a wrong checksum.
     Damaged,
-    /// A frame of so many bytes.
+    /// A complete frame with its length and decoded message.
     Whole(usize, T),
 }
 
-/// Finds frames among bytes.
+/// Finds frames in a stream of bytes.
 pub(super) struct FrameDecoder {
     bytes: [u8; PAYLOAD_MAX + AROUND],
     length: usize,
-    /// Times of the first and of the newest of them \[us\].
+    /// Arrival times of the first and the newest byte in the buffer \[us\].
     first_us: u64,
     newest_us: u64,
     damaged: u32,
@@ -83,7 +83,7 @@ impl FrameDecoder {
     pub(super) const NEW: Self =
         FrameDecoder { bytes: [0; PAYLOAD_MAX + AROUND], length: 0, first_us: 0, newest_us: 0, damaged: 0 };
 
-    /// Number of frames with a wrong checksum.
+    /// Returns the number of frames with a wrong checksum.
     pub(super) fn damaged(&self) -> u32 {
         self.damaged
     }
@@ -97,15 +97,15 @@ impl FrameDecoder {
             self.first_us = at_us;
         }
         self.newest_us = at_us;
-        // There is room: `next` takes out whatever is as long as a frame can be.
+        // Cannot overflow: `next` removes anything as long as the longest frame.
         if let Some(place) = self.bytes.get_mut(self.length) {
             *place = byte;
             self.length += 1;
         }
     }
 
-    /// Returns what `read` makes of the next whole frame, with the time of its first byte, where a byte takes
-    /// `byte_us`. To be called after each byte until there is none.
+    /// Decodes the next complete frame with `read`; returns it with the arrival time of its first byte. `byte_us` is
+    /// the time of one byte. To be called after each byte until it returns none.
     pub(super) fn next<T>(&mut self, byte_us: u64, read: impl Fn(MessageId, &[u8]) -> T) -> Option<(u64, T)> {
         loop {
             match front(self.bytes.get(..self.length)?, &read) {
@@ -131,7 +131,7 @@ impl FrameDecoder {
             held.rotate_left(count);
             self.length -= count;
         }
-        // Bytes have no times of their own: those that are left came one behind the other.
+        // Bytes have no times of their own: the remaining ones are assumed to have arrived back to back.
         self.first_us = self.newest_us.saturating_sub(byte_us * self.length.saturating_sub(1) as u64);
     }
 }

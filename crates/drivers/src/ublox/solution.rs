@@ -1,19 +1,19 @@
-//! What NAV-PVT says: a navigation solution.
+//! Decoding of NAV-PVT, a navigation solution.
 
 use crate::reading::FixReading;
 use nalgebra::Vector3;
 
-/// Lengths of its payload, of the seventh generation and of later ones.
+/// Payload lengths of the seventh generation and of later ones.
 const LENGTHS: [usize; 2] = [84, 92];
-/// `fixType`: in three dimensions, without and with dead reckoning.
+/// `fixType`: three-dimensional, without and with dead reckoning.
 const IN_SPACE: [u8; 2] = [3, 4];
-/// Bit of `flags`: within the receiver's own limits of accuracy.
+/// Bit of `flags`: within the receiver's own accuracy limits.
 const IS_GOOD: u8 = 1;
-/// Bit of `flags3`: no position.
+/// Bit of `flags3`: position invalid.
 const IS_NO_PLACE: u8 = 1;
 
-/// Returns the fix of a payload: none if it has another length, `Some(None)` for an epoch without a fix, or with one
-/// that no receiver can have.
+/// Decodes a payload. Returns none for another length, and `Some(None)` for an epoch without a fix or with impossible
+/// numbers.
 pub(super) fn read(payload: &[u8]) -> Option<Option<FixReading>> {
     LENGTHS.contains(&payload.len()).then(|| fix(payload))
 }

@@ -1,41 +1,41 @@
-//! The registers of a BMI270, as BST-BMI270-DS000 has them. The models of boards use it too.
+//! Register model of a BMI270 (BST-BMI270-DS000). The models of boards use it, too.
 
-/// FNV-1a of `bmi270_config_file` in Bosch's `BMI270_SensorAPI`.
+/// FNV-1a hash of `bmi270_config_file` in Bosch's `BMI270_SensorAPI`.
 const CONFIGURATION: u64 = 0xA3AB_E71B_91DB_4895;
 
-/// Its registers.
+/// Registers and state of the part.
 #[derive(Clone, Debug)]
 pub struct Bmi270Registers {
     noise: fn(u64, u64) -> f64,
     identity: u8,
-    /// What was written.
+    /// Register contents as written.
     pub registers: [u8; 128],
-    /// The interface is SPI; I2C until the select line rises.
+    /// True if the interface is SPI. It is I2C until the first edge of chip select.
     pub is_spi: bool,
-    /// When it was reset last.
+    /// Time of the last reset.
     pub reset_us: u64,
-    /// When power saving was switched off.
+    /// Time at which power saving was switched off.
     pub awake_us: Option<u64>,
-    /// The configuration, as far as it has come.
+    /// The part of the configuration loaded so far.
     pub loaded: Vec<u8>,
-    /// When the configuration was started, and whether it is the right one.
+    /// Time at which the configuration was started, and whether it is correct.
     pub started_us: Option<(u64, bool)>,
-    /// Since when gyroscope and accelerometer run.
+    /// Times at which gyroscope and accelerometer were switched on.
     pub on_us: [Option<u64>; 2],
-    /// Factor of z in x of the gyroscope, in 1/512.
+    /// Cross-sensitivity of the gyroscope's x to z \[1/512\].
     pub cas: i8,
-    /// What it feels.
+    /// True turn rates.
     pub rates_deg_s: [f64; 3],
-    /// Likewise.
+    /// True specific force.
     pub force_g: [f64; 3],
-    /// Likewise.
+    /// True temperature.
     pub temperature_c: f64,
-    /// How far the self-test pushes each axis to a side \[g\].
+    /// Deflection of each axis by the self-test \[g\].
     pub pushes_g: [f64; 3],
 }
 
 impl Bmi270Registers {
-    /// A part with this identity, whose words have a noise of time [us] and number.
+    /// Creates a part with this identity. `noise` gives the noise for a time \[us\] and an axis.
     pub fn new(identity: u8, noise: fn(u64, u64) -> f64) -> Self {
         let mut part = Bmi270Registers {
             noise,
@@ -57,7 +57,7 @@ impl Bmi270Registers {
         part
     }
 
-    /// Period of the output \[us\], in the performance mode.
+    /// Returns the output period in performance mode \[us\].
     fn period_us(&self) -> u64 {
         let rate = self.registers[0x42] & 0xF;
         assert!((0x6..=0xD).contains(&rate), "rate {rate:#x}");
@@ -108,7 +108,7 @@ impl Bmi270Registers {
 }
 
 impl Bmi270Registers {
-    /// Reads from a register on.
+    /// Reads consecutive registers.
     pub fn read(&mut self, now_us: u64, register: u8, into: &mut [u8]) {
         if now_us < self.reset_us + 2_000 || !self.is_spi {
             self.is_spi |= now_us >= self.reset_us + 2_000;
@@ -130,7 +130,7 @@ impl Bmi270Registers {
         }
     }
 
-    /// Writes from a register on.
+    /// Writes consecutive registers.
     pub fn write(&mut self, now_us: u64, register: u8, bytes: &[u8]) {
         if now_us < self.reset_us + 2_000 || !self.is_spi {
             self.is_spi |= now_us >= self.reset_us + 2_000;
@@ -143,7 +143,7 @@ impl Bmi270Registers {
                 self.registers[0x7C] = *value;
                 self.awake_us = (value & 1 == 0).then_some(self.awake_us.unwrap_or(now_us));
             }
-            // Other writes are lost while power is saved.
+            // Other writes are lost during power saving.
             _ if !is_awake => (),
             (0x59, [0]) => {
                 self.loaded.clear();
@@ -157,7 +157,7 @@ impl Bmi270Registers {
                 self.started_us = Some((now_us, self.loaded.len() == 8192 && hash == CONFIGURATION));
                 self.registers[0x59] = *value;
             }
-            // A block stays on this register; it is taken once INIT_CTRL has been 0.
+            // Blocks stay on this register. They are accepted after INIT_CTRL was set to 0.
             (0x5E, _) if self.registers[0x59] == 0 => self.loaded.extend_from_slice(bytes),
             (0x7D, [value]) => {
                 self.registers[0x7D] = *value;
@@ -174,7 +174,7 @@ impl Bmi270Registers {
         }
     }
 
-    /// Forgets everything, as after a dip of the supply.
+    /// Loses everything, as after a brown-out.
     pub fn reset(&mut self, now_us: u64) {
         self.registers = [0; 128];
         for (register, value) in [(0x40, 0xA8), (0x41, 0x02), (0x42, 0xA9), (0x59, 0x90), (0x7C, 0x03)] {
@@ -185,7 +185,7 @@ impl Bmi270Registers {
         self.loaded.clear();
     }
 
-    /// Time of the next interrupt after `now_us`; none if its pin is not set up.
+    /// Returns the time of the next interrupt after `now_us`; none if the pin is not set up.
     pub fn next_interrupt_us(&self, now_us: u64) -> Option<u64> {
         let routed =
             self.registers[0x58] & 4 != 0 && self.registers[0x53] & 0b1110 == 0b1010 && self.registers[0x55] == 0;

@@ -1,5 +1,5 @@
-//! A bus with the register-level model of a part, whose time passes while a driver waits, and everything that can go
-//! wrong between them.
+//! Test bus with a register model of a part. Time passes while the driver waits, and every kind of fault can be
+//! simulated.
 
 pub mod mpu_registers;
 pub mod suite;
@@ -12,42 +12,42 @@ use nalgebra::Vector3;
 use std::cell::RefCell;
 use std::rc::Rc;
 
-/// The registers of a part, as its data sheet has them.
+/// Register model of a part, as in its data sheet.
 pub trait Model {
-    /// Reads from a register on.
+    /// Reads consecutive registers.
     fn read(&mut self, now_us: u64, register: u8, into: &mut [u8]);
-    /// Writes from a register on.
+    /// Writes consecutive registers.
     fn write(&mut self, now_us: u64, register: u8, bytes: &[u8]);
-    /// Forgets everything, as after a dip of the supply.
+    /// Loses everything, as after a brown-out.
     fn reset(&mut self, now_us: u64);
-    /// Time of the next interrupt after `now_us`; none if its pin is not set up.
+    /// Returns the time of the next interrupt after `now_us`; none if the pin is not set up.
     fn next_interrupt_us(&self, _now_us: u64) -> Option<u64> {
         None
     }
 }
 
-/// What goes wrong.
+/// Simulated fault.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Trouble {
     /// Nothing.
     None,
-    /// Every byte reads like this: a wire is off, or the part is dead.
+    /// Every byte reads as this value: a broken wire or a dead part.
     Reads(u8),
     /// The bus reports errors.
     BusErrors,
     /// Transfers never end.
     Hangs,
-    /// Answers repeat themselves.
+    /// Each register repeats its last answer.
     Frozen,
     /// The part was reset.
     Reset,
-    /// The interrupt is missing.
+    /// The interrupt does not come.
     NoInterrupt,
-    /// One bit of a transaction's answer is flipped, one transaction in so many.
+    /// One in this many transactions has a flipped bit in its answer.
     Flips(u32),
 }
 
-/// All troubles that a driver must notice.
+/// Faults that a driver must detect.
 pub const NOTICED: [Trouble; 7] = [
     Trouble::Reads(0x00),
     Trouble::Reads(0xFF),
@@ -62,7 +62,7 @@ struct World<M> {
     model: M,
     now_us: u64,
     trouble: Trouble,
-    /// When it ends by itself.
+    /// Time at which the fault ends by itself.
     ends_us: u64,
     answers: Vec<(u8, Vec<u8>)>,
     transactions: u32,
@@ -72,7 +72,7 @@ struct World<M> {
 }
 
 impl<M> World<M> {
-    /// Ends what ends by itself.
+    /// Ends the fault when its time is over.
     fn pass(&mut self) {
         if self.now_us >= self.ends_us {
             self.trouble = Trouble::None;
@@ -80,7 +80,7 @@ impl<M> World<M> {
     }
 }
 
-/// Time from an interrupt to the driver \[us\].
+/// Delay from an interrupt to the driver \[us\].
 const LATENCY_US: u64 = 7;
 
 /// Bus, interrupt and clock of a part.
@@ -93,7 +93,7 @@ impl<M> Clone for Rig<M> {
 }
 
 impl<M: Model> Rig<M> {
-    /// A rig with a part.
+    /// Creates a rig with a part.
     pub fn new(model: M) -> Self {
         let (now_us, trouble, answers) = (1_000, Trouble::None, Vec::new());
         Rig(Rc::new(RefCell::new(World {
@@ -108,12 +108,12 @@ impl<M: Model> Rig<M> {
         })))
     }
 
-    /// A driver of the part.
+    /// Returns a driver for the part.
     pub fn driver<P: SensorPart>(&self, part: P) -> Driver<P, Rig<M>, Rig<M>> {
         Driver::new(part, self.clone(), self.clone())
     }
 
-    /// What goes wrong from now on.
+    /// Sets the fault from now on.
     pub fn set(&self, trouble: Trouble) {
         let mut world = self.0.borrow_mut();
         if trouble == Trouble::Reset {
@@ -123,19 +123,19 @@ impl<M: Model> Rig<M> {
         (world.trouble, world.ends_us) = (trouble, u64::MAX);
     }
 
-    /// What goes wrong for so long.
+    /// Sets the fault for this time.
     pub fn set_for(&self, trouble: Trouble, us: u64) {
         self.set(trouble);
         let mut world = self.0.borrow_mut();
         world.ends_us = world.now_us + us;
     }
 
-    /// Changes the part.
+    /// Accesses the part's model.
     pub fn with<T>(&self, change: impl FnOnce(&mut M) -> T) -> T {
         change(&mut self.0.borrow_mut().model)
     }
 
-    /// The time \[us\].
+    /// Returns the time \[us\].
     pub fn now_us(&self) -> u64 {
         self.0.borrow().now_us
     }
@@ -215,7 +215,7 @@ impl<M: Model> PartTiming for Rig<M> {
     }
 }
 
-/// Reads until so much time has passed; returns readings and faults.
+/// Reads until this much time has passed; returns readings and faults.
 pub fn run<P: SensorPart, M: Model>(
     driver: &mut Driver<P, impl Registers, Rig<M>>,
     rig: &Rig<M>,
@@ -276,7 +276,7 @@ fn survives_all_troubles<P: SensorPart, M: Model>(
             P::NAME
         );
     }
-    // Single flipped bits cannot all be seen; they must not stop it.
+    // Not every flipped bit can be detected, but the driver must go on.
     for one_in in [3, 10, 100] {
         let rig = Rig::new(model());
         let mut driver = rig.driver(part());
@@ -309,7 +309,7 @@ fn comes_back_at_once<P: SensorPart, M: Model>(
                 assert!(readings.iter().all(|reading| right(&reading.value)), "{}: {trouble:?}", P::NAME);
                 let again: Vec<_> = readings.iter().filter(|reading| reading.at_us > back_us).collect();
                 let late_us = again.first().expect("a reading").at_us - back_us;
-                // A transfer that hangs is given up after 10 ms.
+                // A hanging transfer is given up after 10 ms.
                 let most_us = if trouble == Trouble::Hangs { 15_000 } else { 5_000 };
                 assert!(late_us < most_us, "{}: {trouble:?} for {silent_us} us: after {late_us} us", P::NAME);
                 assert!(again.len() > 10, "{}: {trouble:?} for {silent_us} us: {}", P::NAME, again.len());
@@ -332,7 +332,7 @@ fn refuses_another<P: SensorPart, M: Model>(part: P, model: M, identity: u8) {
     assert!(readings.is_empty() && faults.iter().all(|fault| *fault == PartFault::Identity(identity)), "{faults:?}");
 }
 
-/// True if an IMU reads this motion, but for its noise.
+/// True if an IMU's reading is this motion, within its noise.
 pub fn reads(reading: &InertialReading, rates_deg_s: [f64; 3], force_g: [f64; 3], temperature_c: f64) -> bool {
     let rates_rad_s = Vector3::from(rates_deg_s).map(f64::to_radians).cast::<f32>();
     let force_m_s2 = (Vector3::from(force_g) * 9.80665).cast::<f32>();
@@ -341,7 +341,7 @@ pub fn reads(reading: &InertialReading, rates_deg_s: [f64; 3], force_g: [f64; 3]
         && (f64::from(reading.temperature_c) - temperature_c).abs() < 0.1
 }
 
-/// Numbers that differ from one time to the next, in -1..1, as noise.
+/// Returns repeatable noise from -1 to 1, which differs for each time and axis.
 pub fn noise(now_us: u64, axis: u64) -> f64 {
     let x = (now_us.wrapping_mul(31) + axis).wrapping_mul(0x9E37_79B9_7F4A_7C15);
     ((x ^ (x >> 29)).wrapping_mul(0xBF58_476D_1CE4_E5B9) >> 11) as f64 / (1_u64 << 52) as f64 - 1.0

@@ -1,25 +1,24 @@
-//! Registers of the MPU-6000 and its successors, and of the AK8963 behind the MPU-9250, as RM-MPU-6000A, RM-MPU-6500A,
-//! RM-MPU-9250A, DS-000176, RM-000030, DS-000143 and MS1356 have them.
+//! Register model of the MPU-6000 and its successors, and of the MPU-9250's AK8963. Sources: RM-MPU-6000A,
+//! RM-MPU-6500A, RM-MPU-9250A, DS-000176, RM-000030, DS-000143 and MS1356.
 
 use super::{Model, noise};
 
-/// A part, by its identity.
+/// A part with the given identity.
 pub(crate) struct Registers {
     identity: u8,
     registers: [u8; 128],
     reset_us: u64,
-    /// Since when it is awake.
+    /// Time at which the part woke up.
     awake_us: Option<u64>,
     pub(crate) is_i2c_off: bool,
     pub(crate) rates_deg_s: [f64; 3],
     pub(crate) force_g: [f64; 3],
     pub(crate) temperature_c: f64,
     pub(crate) magnetometer: Option<Magnetometer>,
-    /// What the factory has written of the self-test, from register 0 and 13 on, and what the axes respond
-    /// \[deg/s, g\].
+    /// Factory's self-test codes in the registers from 0 and from 13 on, and the axes' responses \[deg/s, g\].
     pub(crate) trims: [[u8; 4]; 2],
     pub(crate) responses: [f64; 6],
-    /// Samples that the master of the auxiliary bus has seen.
+    /// Number of samples processed by the auxiliary I2C master.
     samples: u64,
     external: [u8; 24],
     /// First byte of each slave's answer in `external`, once it has answered.
@@ -52,10 +51,10 @@ impl Registers {
         matches!(self.identity, 0x12 | 0xAF | 0x98)
     }
 
-    /// Returns all registers to what they are after power-up; the magnetometer keeps its own.
+    /// Resets all registers but the magnetometer's to their power-up values.
     fn reset_itself(&mut self, now_us: u64) {
         self.registers = [0; 128];
-        // MPU-6500 and MPU-9250 wake up by themselves, by their automatic clock.
+        // MPU-6500 and MPU-9250 wake up by themselves, with an automatic clock source.
         let wakes = matches!(self.identity, 0x70 | 0x71);
         self.registers[0x6B] = match self.identity {
             0x68 | 0xAF | 0x98 => 0x40,
@@ -70,12 +69,12 @@ impl Registers {
         (self.external, self.slots) = ([0; 24], [None; 4]);
     }
 
-    /// Time until registers can be used after a reset \[us\].
+    /// Returns the time from a reset until registers can be used \[us\].
     fn restart_us(&self) -> u64 {
         if self.is_icm() { 11_000 } else { 100_000 }
     }
 
-    /// Period of samples \[us\].
+    /// Returns the sample period \[us\].
     fn period_us(&self) -> u64 {
         let (filter, divider) = (self.registers[0x1A] & 7, u64::from(self.registers[0x19]) + 1);
         let is_fast = matches!(filter, 0 | 7);
@@ -103,7 +102,7 @@ impl Registers {
         let gyr = 65536.0 / 500.0 / f64::from(1 << (self.registers[0x1B] >> 3 & 3));
         let clamp = |lsb: f64| lsb.round().clamp(-32768.0, 32767.0) as i16;
         for axis in 0..3 {
-            // Not in any data sheet: what ArduPilot's driver found about a register without a name.
+            // Not in any data sheet: ArduPilot's finding about an unnamed register.
             let is_off = axis == 1 && matches!(self.identity, 0x12 | 0xAF) && self.registers[0x11] != 0xC9;
             let is_pushed = |register: usize| f64::from(self.registers[register] >> (7 - axis) & 1);
             let pushed_g = self.responses[3 + axis] * is_pushed(0x1C);
@@ -123,7 +122,7 @@ impl Registers {
         bytes
     }
 
-    /// Lets the master of the auxiliary bus do what is due.
+    /// Lets the auxiliary I2C master process the samples that are due.
     fn advance(&mut self, now_us: u64) {
         let period_us = self.period_us();
         let due = now_us / period_us;
@@ -133,7 +132,7 @@ impl Registers {
             return;
         }
         for sample in first..=due {
-            // The bus at 400 kHz takes a while after the sample.
+            // Transfers at 400 kHz end some time after the sample.
             let at_us = sample * period_us + 200;
             let delay = u64::from(self.registers[0x34] & 0x1F) + 1;
             if (0..4).all(|slave| self.registers[0x27 + 3 * slave] & 0x80 == 0) {
@@ -208,13 +207,13 @@ impl Model for Registers {
                 self.registers[0x6B] = byte;
                 self.awake_us = (byte & 0x47 != 0x40 && byte & 0x40 == 0).then_some(self.awake_us.unwrap_or(now_us));
             }
-            // An ICM that sleeps takes these alone.
+            // A sleeping ICM accepts only these registers.
             _ if self.is_icm() && sleeps && !matches!(register, 0x37 | 0x38 | 0x6C) => (),
             0x3A..=0x60 | 0x75 => (),
             0x68 => assert_eq!(byte & !7, 0),
             0x6A => {
                 self.is_i2c_off |= byte & 0x10 != 0 && self.identity != 0x12;
-                // The bits that reset clear themselves, and in these two parts the one that switches I2C off.
+                // The reset bits clear themselves. In the MPU-6500 and MPU-9250, so does the bit that switches I2C off.
                 let clears = if matches!(self.identity, 0x70 | 0x71) { 0x1F } else { 0x0F };
                 self.registers[0x6A] = byte & !clears;
             }
@@ -222,7 +221,7 @@ impl Model for Registers {
                 self.is_i2c_off = byte & 0x40 != 0;
                 self.registers[0x70] = byte;
             }
-            // The MPU-6000 has no second register for the accelerometer.
+            // The MPU-6000 has no second accelerometer register.
             0x1D if self.identity == 0x68 => (),
             _ => self.registers[usize::from(register)] = byte,
         }
@@ -241,18 +240,18 @@ impl Model for Registers {
     }
 }
 
-/// AK8963.
+/// Register model of an AK8963.
 pub(crate) struct Magnetometer {
     registers: [u8; 0x13],
-    /// When the measurement that runs will be complete.
+    /// Time at which the current measurement ends.
     ends_us: Option<u64>,
-    /// Whether it acknowledges its address.
+    /// True if the part acknowledges its address.
     pub(crate) answers: bool,
     pub(crate) identity: u8,
     pub(crate) adjustment: [u8; 3],
-    /// Along its own axes.
+    /// Field along the magnetometer's own axes.
     pub(crate) field_ut: [f64; 3],
-    /// Time that a measurement takes \[us\].
+    /// Duration of a measurement \[us\].
     pub(crate) takes_us: u64,
 }
 
@@ -272,7 +271,7 @@ impl Magnetometer {
         die
     }
 
-    /// Returns its registers to what they are after power-up.
+    /// Resets the registers to their power-up values.
     pub(crate) fn reset(&mut self) {
         (self.registers, self.ends_us) = ([0; 0x13], None);
     }
@@ -285,7 +284,7 @@ impl Magnetometer {
         let Some(ends_us) = self.ends_us.filter(|&ends_us| now_us >= ends_us) else { return };
         self.ends_us = None;
         let is_wide = self.registers[0x0A] & 0x10 != 0;
-        // Back to power-down.
+        // Returns to power-down.
         self.registers[0x0A] &= 0x10;
         let sum: f64 = self.field_ut.iter().map(|field| field.abs()).sum();
         for axis in 0..3 {

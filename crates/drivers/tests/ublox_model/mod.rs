@@ -1,20 +1,20 @@
-//! A u-blox receiver behind its UART, from the interface descriptions (M8 UBX-13003221, M10 UBX-21035062): what it
-//! answers, what it sends of its own accord, and what a reset undoes.
+//! Model of a u-blox receiver on a UART, from the interface descriptions (M8 UBX-13003221, M10 UBX-21035062): its
+//! answers, its periodic messages and the effects of a reset.
 
 use std::collections::VecDeque;
 
-/// Generations, which differ in how they are configured.
+/// Receiver generations, which are configured differently.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Generation {
-    /// By messages; no NAV-PVT.
+    /// Configured by messages; no NAV-PVT.
     Six,
-    /// By messages.
+    /// Configured by messages.
     Eight,
-    /// By keys.
+    /// Configured by keys.
     Ten,
 }
 
-/// What it measures, in its own units.
+/// True state that the receiver measures, in its own units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Truth {
     /// Latitude and longitude \[1e-7 degrees\].
@@ -45,41 +45,41 @@ impl Truth {
 /// Time from an epoch to the first byte of its solution \[us\].
 pub(crate) const DELAY_US: u64 = 110_000;
 
-/// The receiver.
+/// Model of the receiver.
 #[derive(Clone, Debug)]
 pub(crate) struct Model {
     generation: Generation,
     new_baud: u32,
-    /// Of its UART, now.
+    /// Current baud rate of its UART.
     pub(crate) baud: u32,
     pub(crate) nmea: bool,
     pub(crate) solves: bool,
     pub(crate) period_us: u64,
     pub(crate) dynamic_model: u8,
-    /// Does not hear; refuses the messages of these numbers.
+    /// True if the receiver ignores all input; `refuses` are the message ids that it refuses.
     pub(crate) deaf: bool,
     pub(crate) refuses: Vec<u8>,
-    /// How long after a command its answer is sent.
+    /// Delay from a command to its answer.
     pub(crate) answers_after_us: u64,
     pub(crate) truth: Truth,
     epoch_us: u64,
-    /// Epochs whose messages are to be sent, with what was true then.
+    /// Epochs whose messages are not sent yet, with the truth at their time.
     due: VecDeque<(u64, Truth)>,
     heard: Vec<u8>,
     now_us: u64,
-    /// Answers that are to be sent, and when.
+    /// Answers to be sent, with their times.
     answers: VecDeque<(u64, [u8; 2], [u8; 2])>,
-    /// Bytes that are to be sent.
+    /// Bytes to be sent.
     pub(crate) says: VecDeque<u8>,
 }
 
 impl Model {
-    /// One as it is delivered, with its usual baud rate.
+    /// Creates a receiver as delivered, with its usual baud rate.
     pub(crate) fn new(generation: Generation) -> Self {
         Self::at(generation, if generation == Generation::Ten { 38_400 } else { 9_600 })
     }
 
-    /// One that starts at this baud rate.
+    /// Creates a receiver that starts at this baud rate.
     pub(crate) fn at(generation: Generation, new_baud: u32) -> Self {
         let mut model = Model {
             generation,
@@ -104,14 +104,14 @@ impl Model {
         model
     }
 
-    /// Forgets its configuration, which was in RAM.
+    /// Resets the receiver; its configuration in RAM is lost.
     pub(crate) fn reset(&mut self) {
         (self.baud, self.nmea, self.solves) = (self.new_baud, true, false);
         (self.period_us, self.dynamic_model) = (1_000_000, 0);
         (self.due, self.heard, self.says) = Default::default();
     }
 
-    /// Goes on to `now_us`: measures, and sends what is due.
+    /// Advances to `now_us`: measures, and sends the messages that are due.
     pub(crate) fn advance(&mut self, now_us: u64) {
         self.now_us = now_us;
         while self.answers.front().is_some_and(|(due_us, ..)| *due_us <= now_us) {
@@ -128,7 +128,7 @@ impl Model {
         }
     }
 
-    /// Sends an epoch.
+    /// Sends the messages of an epoch.
     pub(crate) fn report(&mut self, epoch_us: u64, truth: &Truth) {
         if self.nmea {
             self.says.extend(sentences(epoch_us, truth).bytes());
@@ -142,7 +142,7 @@ impl Model {
         self.says.extend(frame(id, payload));
     }
 
-    /// Hears a byte at its own baud rate.
+    /// Receives a byte at the receiver's baud rate.
     pub(crate) fn hear(&mut self, byte: u8) {
         if self.deaf {
             return;
@@ -184,7 +184,7 @@ impl Model {
         self.answers.push_back((self.now_us + self.answers_after_us, answer, id));
     }
 
-    /// Texts of 30 bytes after a hardware version of 10.
+    /// Returns texts of 30 bytes each; the second, the hardware version, has 10.
     fn version(&self) -> Vec<u8> {
         let texts: &[&str] = match self.generation {
             Generation::Six => &["7.03 (45969)", "00040007"],
@@ -201,10 +201,10 @@ impl Model {
         texts.iter().enumerate().flat_map(pad).collect()
     }
 
-    /// Follows a CFG message; none for an unknown one.
+    /// Applies a CFG message; returns none for an unknown one.
     fn configure(&mut self, number: u8, payload: &[u8]) -> Option<()> {
         match (self.generation == Generation::Ten, number, payload) {
-            // VALSET, without a transaction, in RAM.
+            // VALSET without a transaction, in RAM.
             (true, 0x8A, [0, 1, _, _, items @ ..]) => self.set(items),
             (false, 0x01, [0x01, 0x07, rate]) if self.generation != Generation::Six => {
                 self.solves = *rate > 0;
@@ -216,7 +216,7 @@ impl Model {
                 }
                 Some(())
             }
-            // First UART, 8N1; a bit is reserved.
+            // UART 1, 8N1; one reserved bit may have either value.
             (false, 0x00, [1, _, _, _, 0xC0 | 0xD0, 0x08, 0, 0, a, b, c, d, input, 0, output, 0, _, _, _, _]) => {
                 self.baud = u32::from_le_bytes([*a, *b, *c, *d]);
                 (self.nmea, self.solves) = (output & 2 != 0, self.solves && output & 1 != 0);
@@ -251,7 +251,7 @@ impl Model {
     }
 }
 
-/// A frame: header, payload, and the checksum of all but the first two bytes.
+/// Returns a frame: header, payload, and the checksum of all but the first two bytes.
 pub(crate) fn frame([class, number]: [u8; 2], payload: &[u8]) -> Vec<u8> {
     let [low, high] = (payload.len() as u16).to_le_bytes();
     let mut bytes = vec![0xB5, 0x62, class, number, low, high];
@@ -265,11 +265,11 @@ pub(crate) fn frame([class, number]: [u8; 2], payload: &[u8]) -> Vec<u8> {
     bytes
 }
 
-/// Payload of NAV-PVT.
+/// Returns the payload of NAV-PVT.
 pub(crate) fn solution(epoch_us: u64, truth: &Truth) -> Vec<u8> {
     let Truth { place: [latitude, longitude], altitude_mm, velocity_mm_s, accuracies, fix_type, flags } = *truth;
     let mut bytes = ((epoch_us / 1000) as u32).to_le_bytes().to_vec();
-    // 2026-11-26, 2 h.
+    // Date and time: 2026-11-26 02:00.
     bytes.extend([0xEA, 0x07, 11, 26, 2, 0, 0, 7, 50, 0, 0, 0, 0, 0, 0, 0]);
     bytes.extend([fix_type, flags[0], 0, 14]);
     for number in [longitude, latitude, altitude_mm + 47_000, altitude_mm] {
@@ -290,7 +290,7 @@ pub(crate) fn solution(epoch_us: u64, truth: &Truth) -> Vec<u8> {
     bytes
 }
 
-/// GGA and RMC, with the speed in front, as u-blox sends them.
+/// Returns RMC and GGA, with the speed first, as u-blox sends them.
 fn sentences(epoch_us: u64, truth: &Truth) -> String {
     let Truth { place: [latitude, longitude], altitude_mm, velocity_mm_s: [north, east, _], fix_type, .. } = *truth;
     let sentence = |text: String| format!("${text}*{:02X}\r\n", text.bytes().fold(0, |sum, byte| sum ^ byte));
