@@ -1,5 +1,5 @@
-//! The estimator alone, on an IMU at 1 kHz and a tracker at 100 Hz whose poses arrive 8 ms late:
-//! `cargo run -p afbc-estimator --example estimator_alone`.
+//! Runs the estimator on an IMU at 1 kHz and a tracker at 100 Hz whose poses arrive 8 ms late: `cargo run -p
+//! afbc-estimator --example estimator_alone`.
 #![allow(clippy::unwrap_used, reason = "an example whose settings are not valid should say so")]
 
 use afbc_estimator::{Estimator, ImuSample, Measurement, Memory, Settings, Stamped};
@@ -10,7 +10,7 @@ fn main() {
     let mut memory = Memory::default();
     for ms in 1..=3000_u64 {
         let at_us = 1000 * ms;
-        // A sensor whose last bits stand still counts as stuck.
+        // Without noise the IMU would count as stuck.
         let noise = 1e-3 * (ms % 7) as f32;
         let specific_force_m_s2 = Vector3::new(noise, 0.0, 9.81);
         let sample = ImuSample { at_us, rates_rad_s: Vector3::zeros(), specific_force_m_s2 };

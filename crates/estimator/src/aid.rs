@@ -1,9 +1,10 @@
-//! Aiding sensors: what each said last, and whether it is believed.
+//! Records of the aiding sensors and of the gate: when each aid was fused or rejected, and when a rejected aid is
+//! followed.
 
 use nalgebra::Vector3;
 
-/// What an aiding sensor measures. A fix of several kinds is judged kind by kind: a receiver whose position jumps may
-/// still have a good velocity.
+/// Kind of measurement from an aiding sensor. Each kind in a fix passes its own gate: a receiver whose position jumps
+/// may still measure a good velocity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Aid {
     /// Position from a tracker.
@@ -18,7 +19,7 @@ pub enum Aid {
     GnssVelocity,
     /// Height from a barometer.
     Height,
-    /// Heading, from a magnetometer or given as such.
+    /// Heading, from a magnetometer or measured directly.
     Heading,
 }
 
@@ -35,28 +36,28 @@ impl Aid {
     ];
 }
 
-/// Record of one kind of aid.
+/// Fusion record of one kind of aid.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct AidRecord {
-    /// Normalised innovation squared of the last measurement, whether it was accepted or not: the sum over its scalars
-    /// of innovation^2 / variance. Of a rejected one with three coordinates, it is a lower bound.
+    /// Normalised innovation squared of the last measurement, accepted or rejected: the sum of innovation^2 / variance
+    /// over its scalars. For a rejected measurement of three coordinates it is a lower bound.
     pub nis: f32,
-    /// Number of scalars in `nis`; its expectation.
+    /// Number of scalars summed in `nis`, which is also the expected value of `nis`.
     pub scalars: u8,
     /// Number of measurements fused, up to `u32::MAX`.
     pub accepted: u32,
     /// Number of measurements rejected by the gate, up to `u32::MAX`.
     pub rejected: u32,
-    /// Time of the last measurement that was fused \[us\].
+    /// Time of the last fused measurement \[us\].
     pub accepted_us: Option<u64>,
-    /// Time of the first of the measurements that were all rejected, up to now \[us\].
+    /// Time of the first rejection since the last accepted measurement \[us\].
     pub rejected_since_us: Option<u64>,
-    /// Time of the newest measurement looked at \[us\].
+    /// Time of the newest measurement received \[us\].
     pub(crate) newest_us: Option<u64>,
 }
 
 impl AidRecord {
-    /// True if a measurement of the last `time_us` was fused.
+    /// Returns true if a measurement was fused within the last `time_us`.
     #[must_use]
     pub fn is_live(&self, now_us: u64, time_us: u64) -> bool {
         self.accepted_us.is_some_and(|at_us| now_us.saturating_sub(at_us) <= time_us)
@@ -68,25 +69,25 @@ impl AidRecord {
         self.rejected_since_us = None;
     }
 
-    /// Records a rejection, and returns the time for which there was nothing else \[us\].
+    /// Counts a rejection and returns the time since the first rejection in this row \[us\].
     pub(crate) fn reject(&mut self, at_us: u64) -> u64 {
         self.rejected = self.rejected.saturating_add(1);
         at_us.saturating_sub(*self.rejected_since_us.get_or_insert(at_us))
     }
 }
 
-/// The pose that a tracker repeats.
+/// Detector of a tracker that repeats the same pose.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Repeated {
     pose: Option<(Vector3<f32>, [f32; 4])>,
     since_us: u64,
-    /// Whether what it did to the velocity has been doubted.
+    /// True once the velocity's variance was raised because of this repeated pose.
     pub(crate) doubted: bool,
 }
 
 impl Repeated {
-    /// Returns the time for which a tracker has sent this pose, the same in every bit \[us\]; a position alone has no
-    /// attitude.
+    /// Returns the time for which the tracker has sent exactly this pose \[us\]. Pass zeros as `attitude` for a
+    /// position without attitude.
     pub(crate) fn lasts_us(&mut self, position: &Vector3<f32>, attitude: &[f32; 4], at_us: u64) -> u64 {
         let pose = Some((*position, *attitude));
         if self.pose != pose {
@@ -96,18 +97,18 @@ impl Repeated {
     }
 }
 
-/// When an aid that contradicts the state is followed.
+/// How long an aid must contradict the state before the state is reset to that aid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Trust {
-    /// While nothing else holds the state.
+    /// A short time, because no other aid holds the state.
     Soon,
-    /// After longer, since something else holds it meanwhile.
+    /// The full reacquire time, because another aid holds the state meanwhile.
     Late,
-    /// Not as long as others contradict it.
+    /// Never while the contradicting aids are alive.
     Never,
 }
 
-/// Records of all kinds.
+/// Fusion records of all kinds of aid.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Aids {
     /// Position from a tracker.
@@ -127,7 +128,7 @@ pub struct Aids {
 }
 
 impl Aids {
-    /// Returns the record of one kind.
+    /// Returns the record of this kind of aid.
     #[must_use]
     pub fn of(&self, aid: Aid) -> &AidRecord {
         match aid {
@@ -153,8 +154,8 @@ impl Aids {
         }
     }
 
-    /// Whether an aid that was rejected for a while is to be followed, by what the others that were fused within the
-    /// last `time_us` say; `fast` if a receiver's velocity was.
+    /// Returns when a rejected aid is to be followed, judged by the aids that were fused within the last `time_us`.
+    /// `fast` is true if a receiver's velocity was fused within that time.
     pub(crate) fn trust(&self, aid: Aid, fast: bool, now_us: u64, time_us: u64) -> Trust {
         let live = |other: &AidRecord| other.is_live(now_us, time_us);
         let tracker = live(&self.tracker_position);
@@ -166,19 +167,20 @@ impl Aids {
         match aid {
             Aid::TrackerPosition => never_if(live(&self.gnss_position), fast),
             Aid::GnssPosition => never_if(tracker, fast),
-            // Two that know the height by different means agree that it has not changed.
+            // Barometer and receiver velocity measure the height in different ways. If both agree with the state, the
+            // height is right.
             Aid::GnssHeight => never_if(tracker || fast && live(&self.height), fast),
-            // Its position is off by metres: it holds the velocity, but not for long.
+            // The receiver's position is off by metres, so it holds the velocity only for a short time.
             Aid::GnssVelocity => never_if(tracker, live(&self.gnss_position)),
             Aid::TrackerAttitude => never_if(live(&self.heading), false),
-            // Motion shows a heading: the bank of yaw filters corrects the one that the field contradicts.
+            // Motion shows the heading: the bank of yaw filters resets a heading that contradicts the motion.
             Aid::Heading => never_if(live(&self.tracker_attitude) || fast, true),
-            // A reset of it sets the barometer's offset alone, which no other aid measures.
+            // A height reset changes only the barometer's offset, which no other aid measures.
             Aid::Height => Trust::Soon,
         }
     }
 
-    /// True if position or velocity was fused within the last `time_us`.
+    /// Returns true if a position or velocity was fused within the last `time_us`.
     #[inline]
     pub(crate) fn holds_velocity(&self, now_us: u64, time_us: u64) -> bool {
         [&self.tracker_position, &self.gnss_position, &self.gnss_velocity]
@@ -186,14 +188,14 @@ impl Aids {
             .any(|aid| aid.is_live(now_us, time_us))
     }
 
-    /// True if position was fused within the last `time_us`.
+    /// Returns true if a position was fused within the last `time_us`.
     #[inline]
     pub(crate) fn holds_position(&self, now_us: u64, time_us: u64) -> bool {
         [&self.tracker_position, &self.gnss_position].into_iter().any(|aid| aid.is_live(now_us, time_us))
     }
 }
 
-/// True if an innovation of this size is accepted: nu^2 <= gate^2 s in every coordinate.
+/// Returns true if the innovation passes the gate: nu^2 <= gate^2 s in every coordinate.
 pub(crate) fn passes(innovation: &Vector3<f32>, variance: &Vector3<f32>, gate_squared: f32) -> bool {
     let inside = |nu: f32, s: f32| nu * nu <= gate_squared * s;
     inside(innovation.x, variance.x) && inside(innovation.y, variance.y) && inside(innovation.z, variance.z)

@@ -1,5 +1,5 @@
-//! Start at rest: level from the specific force, bias of the gyroscope from its mean, heading from whichever sensor
-//! measures it.
+//! Alignment at rest: roll and pitch from the specific force, gyroscope bias from the mean rate, heading from a sensor
+//! that measures it.
 
 use crate::measurement::{ImuSample, Measurement};
 use crate::rotation::{atan2, levelling, matrix, normalized, twist};
@@ -8,24 +8,24 @@ use afbc_control::math::{abs_max, sqrt, tilt_cosine};
 use core::fmt;
 use nalgebra::{Quaternion, Vector3};
 
-/// Variance of a heading from which on it counts as unknown \[rad2\].
+/// Heading variance above which the heading counts as unknown \[rad2\].
 pub(crate) const VAGUE: f32 = 0.25;
 
-/// Why the estimator has not started.
+/// Reason why the estimator has not started.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Unready {
-    /// No sample of the inertial sensors within 20 ms.
+    /// No IMU sample within 20 ms.
     #[default]
     NoImu,
-    /// At rest since the first sample, but not yet for long enough. After a refusal its reason stays until the start.
+    /// The vehicle is at rest, but not yet for long enough. After a refusal, that refusal's reason is shown instead.
     Settling,
     /// Rates or specific force change.
     Moving,
-    /// The mean rate is larger than any bias.
+    /// The mean rate is larger than any plausible bias.
     Turning,
-    /// The specific force is not that of rest: falling, accelerating, or a wrong scale.
+    /// The norm of the specific force is not gravity: the vehicle falls or accelerates, or the scale is wrong.
     NotGravity,
-    /// Too far from level.
+    /// The tilt exceeds the limit.
     Tilted,
 }
 
@@ -56,59 +56,60 @@ impl Mean {
         self.squares += deviation.component_mul(&(value - self.mean));
     }
 
-    /// True if no coordinate's standard deviation is above `limit`.
+    /// Returns true if no coordinate's standard deviation exceeds `limit`.
     fn is_still(&self, count: f32, limit: f32) -> bool {
         abs_max(&self.squares) <= limit * limit * count
     }
 }
 
-/// What has been seen since the vehicle came to rest.
+/// Sums over the samples and measurements since the vehicle came to rest.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Align {
     since_us: Option<u64>,
     count: f32,
     rates: Mean,
     force: Mean,
-    /// Means of the first half.
+    /// Mean rates and specific force over the first half of the time at rest.
     half: Option<(Vector3<f32>, Vector3<f32>)>,
-    /// Sum of the magnetic fields, their number, and their variance.
+    /// Sum of the magnetic fields, number of fields, and variance of one field.
     field: (Vector3<f32>, f32, f32),
-    /// Attitude of the tracker, and its standard deviation.
+    /// Newest attitude from the tracker, with its standard deviation.
     pose: Option<(Quaternion<f32>, f32)>,
-    /// Heading given as such, and its standard deviation.
+    /// Newest heading measured directly, with its standard deviation.
     heading: Option<(f32, f32)>,
     pub(crate) why: Unready,
 }
 
-/// The state at rest.
+/// Result of the alignment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Aligned {
     pub(crate) attitude: Quaternion<f32>,
     pub(crate) gyro_bias: Vector3<f32>,
     /// Mean specific force, body frame \[m/s2\].
     pub(crate) force: Vector3<f32>,
-    /// Variance of the heading at the right tilt; none if nothing has measured it.
+    /// Variance of the heading for a known tilt, `None` if no sensor measured the heading.
     pub(crate) heading_variance: Option<f32>,
-    /// Heading per rotation about the earth's x and y, if a magnetic field gave it: its dip makes of a tilt a heading.
+    /// Heading error per rotation about the earth's x and y if a magnetic field gave the heading: the field is
+    /// inclined, so a tilt error turns the measured heading.
     pub(crate) dip: (f32, f32),
-    /// Whether a magnetic field gave the heading.
+    /// True if a magnetic field gave the heading.
     pub(crate) by_field: bool,
-    /// Mean field in the earth frame, if there was one.
+    /// Mean field in the earth frame, if any was measured.
     pub(crate) field: Option<Vector3<f32>>,
-    /// Variances of the means of rates and specific force, per axis.
+    /// Variances per axis of the mean rates and of the mean specific force.
     pub(crate) rates_variance: f32,
     pub(crate) force_variance: f32,
-    /// Length of the time at rest \[s\].
+    /// Time at rest \[s\].
     pub(crate) time_s: f32,
 }
 
 impl Align {
-    /// Begins again, because of `why`.
+    /// Starts the alignment again and stores the reason.
     pub(crate) fn again(&mut self, why: Unready) {
         *self = Align { why, ..Align::default() };
     }
 
-    /// Takes a measurement, for the heading.
+    /// Stores a measurement that shows the heading.
     pub(crate) fn hear(&mut self, measurement: &Measurement) {
         match measurement {
             Measurement::MagneticField { field, sigma } => {
@@ -124,7 +125,7 @@ impl Align {
         }
     }
 
-    /// Takes a sample; returns the state once the vehicle has been at rest for long enough.
+    /// Takes a sample, and returns the alignment once the vehicle has been at rest for long enough.
     pub(crate) fn advance(&mut self, sample: &ImuSample, settings: &Settings) -> Option<Aligned> {
         let Some(since_us) = self.since_us else {
             let why = if self.why == Unready::NoImu { Unready::Settling } else { self.why };
@@ -139,25 +140,25 @@ impl Align {
         self.rates.add(&sample.rates_rad_s, share);
         self.force.add(&sample.specific_force_m_s2, share);
 
-        // A sample far off, or a spread too large, begins anew at once.
+        // One sample far from the mean, or too large a spread, starts the alignment again at once.
         let far = |value: &Vector3<f32>, mean: &Mean, limit: f32| abs_max(&(value - mean.mean)) > 6.0 * limit;
         let moves = far(&sample.rates_rad_s, &self.rates, rate)
             || far(&sample.specific_force_m_s2, &self.force, force)
             || (self.count >= 20.0
                 && !(self.rates.is_still(self.count, rate) && self.force.is_still(self.count, force)));
-        // Slow motion: the means of both halves differ.
+        // Slow motion shows as a difference between the means of the two halves.
         if elapsed_s >= 0.5 * settings.align_s && self.half.is_none() {
             self.half = Some((self.rates.mean, self.force.mean));
         }
-        // The mean of all differs from that of the first half by half of what the halves differ by.
+        // The mean of the whole time differs from the first half's mean by half the difference between the halves.
         let drifts = elapsed_s >= settings.align_s
             && self.half.is_some_and(|(rates, specific)| {
                 abs_max(&(self.rates.mean - rates)) > 0.25 * rate
                     || abs_max(&(self.force.mean - specific)) > 0.25 * force
             });
-        // For the tilt, too, in place of gravity: an error of scale must not look like one.
+        // The tilt check also uses this norm instead of gravity, so that a scale error does not look like a tilt.
         let norm = sqrt(self.force.mean.norm_squared());
-        // From 20 samples on: the mean of fewer is too noisy to refuse a vehicle by it.
+        // With fewer than 20 samples the mean is too noisy to refuse a start.
         let refused = if moves || drifts {
             Some(Unready::Moving)
         } else if abs_max(&self.rates.mean) > settings.gyro_bias_max_rad_s && self.count >= 20.0 {
@@ -173,7 +174,7 @@ impl Align {
             self.again(why);
             return None;
         }
-        // The reason of the last refusal stays, to be read.
+        // `why` keeps the reason of the last refusal for the user.
         (elapsed_s >= settings.align_s).then(|| self.result(norm, elapsed_s, settings)).flatten()
     }
 
@@ -181,13 +182,14 @@ impl Align {
         let level = levelling(&(self.force.mean * (1.0 / norm)))?;
         let (sum, count, variance) = self.field;
         let field = (count > 0.0).then(|| matrix(&level) * (sum * (1.0 / count)));
-        // Turn about z that is missing, and its variance; the tracker before a given heading before the field.
+        // Turn about z that gives the heading, its variance, and whether it is by the field. A tracker's attitude comes
+        // first, then a measured heading, then the field.
         let nose = matrix(&level);
         let given = self.heading.map(|(heading, sigma)| (heading - atan2(nose.m21, nose.m11), sigma * sigma, false));
         let by_field = field.map(|field| {
             let horizontal = field.x * field.x + field.y * field.y;
-            // Minus the declination: the earth's y is west, and declination counts to the east. Without a horizontal
-            // part the variance is infinite, and so vague.
+            // The declination is negated because the earth frame's y points west and declination is positive to the
+            // east. If the field has no horizontal part, the variance is infinite and the heading is unknown.
             (-settings.declination_rad - atan2(field.y, field.x), variance / (count * horizontal), true)
         });
         let pose = self.pose.map(|(attitude, sigma)| (twist(&attitude, &level), sigma * sigma, false));
@@ -199,7 +201,8 @@ impl Align {
             let slope = -field.z / (field.x * field.x + field.y * field.y);
             (slope * field.x, slope * field.y)
         });
-        // The variance of the samples is squares over count; that of their mean is count times smaller again.
+        // `squares / count` is the variance of a sample. The variance of the mean is smaller by another factor of
+        // `count`.
         let of_mean = |mean: &Mean| abs_max(&mean.squares) / (self.count * self.count);
         Some(Aligned {
             attitude: normalized(&(about_z * level)),

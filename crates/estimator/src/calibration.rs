@@ -1,30 +1,30 @@
-//! From the inertial sensor's own samples to those of a sensor at the centre of mass, along the body's axes.
+//! Converts raw IMU samples to those of an error-free IMU at the centre of mass, aligned with the body axes.
 
 use crate::measurement::ImuSample;
 use afbc_types::{Mounting, SensorCalibration};
 use nalgebra::{Matrix3, Vector3};
 
-/// Longest time between two samples whose rates give the angular acceleration \[us\]. With a longer one the lever arm's
-/// part of it, r times that acceleration, is left out.
+/// Longest gap between two samples from which an angular acceleration is computed \[us\]. After a longer gap the lever
+/// arm's term d omega/dt x r is left out.
 const LEVER_GAP_US: u64 = 10_000;
 
-/// Corrects the samples of a mounted inertial sensor. With R from sensor to body axes and the sensor at r,
+/// Corrects the samples of a mounted IMU. With R from sensor to body axes and the sensor at r,
 ///
 /// ```text
 /// omega = R omega_s,   f = R f_s - d omega/dt x r - omega x (omega x r)
 /// ```
 ///
-/// where d omega/dt is the difference from the last sample, and omega_s and f_s are what the sensor reads, less its
-/// [calibrated](SensorCalibration) errors. The default is at the centre of mass, along the body's axes, without errors,
-/// and changes no bit.
+/// where d omega/dt is the difference from the last sample, and omega_s and f_s are the raw readings without their
+/// [calibrated](SensorCalibration) errors. The default is a sensor without errors at the centre of mass, aligned with
+/// the body axes: it returns every sample unchanged, bit by bit.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ImuCalibration(Option<Mounted>);
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Mounted {
-    /// R
+    /// Rotation R from sensor to body axes.
     to_body: Matrix3<f32>,
-    /// r \[m\]
+    /// Position r of the sensor \[m\].
     position_m: Vector3<f32>,
     gyro_offset_rad_s: Vector3<f32>,
     accel_offset_m_s2: Vector3<f32>,
@@ -32,14 +32,14 @@ struct Mounted {
 }
 
 impl ImuCalibration {
-    /// Creates it for a sensor without errors that is mounted like this; its numbers must be
+    /// Creates the correction for an error-free sensor with this mounting. The mounting must be
     /// [valid](afbc_types::Declared::validate).
     #[must_use]
     pub fn new(mounting: &Mounting) -> Self {
         Self::calibrated(mounting, &SensorCalibration::DEFAULT)
     }
 
-    /// The same for a sensor with these errors.
+    /// Creates the correction for a sensor with this mounting and these errors.
     #[must_use]
     pub fn calibrated(mounting: &Mounting, errors: &SensorCalibration) -> Self {
         let SensorCalibration { gyro_offset_rad_s, accel_offset_m_s2, accel_scale, .. } = *errors;
@@ -52,15 +52,15 @@ impl ImuCalibration {
         }))
     }
 
-    /// Returns the rotation from the sensor's axes to the body's.
+    /// Returns the rotation from the sensor axes to the body axes.
     #[must_use]
     pub fn to_body(&self) -> Matrix3<f32> {
         self.0.as_ref().map_or_else(Matrix3::identity, |mounted| mounted.to_body)
     }
 
-    /// Returns what a sensor at the centre of mass would have measured. `last` is what it returned for the sample
-    /// before, none at first, and becomes what it returns.
-    // Only the check is inlined: a sensor without mounting and errors pays for nothing else.
+    /// Returns the sample of a sensor at the centre of mass. `last` keeps the previous corrected sample; it is `None`
+    /// at first.
+    // Only the check is inlined: a sensor without mounting and errors costs no more than that.
     #[inline(always)]
     pub fn apply(&self, last: &mut Option<ImuSample>, sample: ImuSample) -> ImuSample {
         self.0.as_ref().map_or(sample, |mounted| mounted.apply(last, sample))
@@ -71,19 +71,19 @@ impl Mounted {
     #[inline(never)]
     fn apply(&self, last: &mut Option<ImuSample>, sample: ImuSample) -> ImuSample {
         let Mounted { to_body, position_m: r, gyro_offset_rad_s, accel_offset_m_s2, accel_scale } = self;
-        // A sensor's errors are along its own axes: they come off before it is turned.
+        // The errors are along the sensor's own axes, so they are subtracted before the rotation.
         let rates_rad_s = to_body * (sample.rates_rad_s - gyro_offset_rad_s);
         let felt_m_s2 = (sample.specific_force_m_s2 - accel_offset_m_s2).component_mul(accel_scale);
         let since = last.map(|before| (sample.at_us.saturating_sub(before.at_us), rates_rad_s - before.rates_rad_s));
         let acceleration_rad_s2 = match since {
-            // 0 stands for a time that goes back, too: there is nothing to divide by.
+            // 0 also stands for a time that goes back. Both leave nothing to divide by.
             Some((us @ 1..=LEVER_GAP_US, change_rad_s)) => change_rad_s * (1e6 / us as f32),
             _ => Vector3::zeros(),
         };
         let lever_m_s2 = acceleration_rad_s2.cross(r) + rates_rad_s.cross(&rates_rad_s.cross(r));
         let specific_force_m_s2 = to_body * felt_m_s2 - lever_m_s2;
         let corrected = ImuSample { at_us: sample.at_us, rates_rad_s, specific_force_m_s2 };
-        // A sample that is no number spoils no other.
+        // A sample with NaN does not become `last`, so it cannot spoil the next sample.
         *last = Some(corrected).filter(|_| rates_rad_s.norm_squared().is_finite());
         corrected
     }
@@ -102,7 +102,7 @@ mod tests {
     }
 
     proptest! {
-        /// What a rigid body feels elsewhere, in other axes, is brought back, whatever the mounting and the motion.
+        /// The correction recovers the rates and force at the centre of mass for any mounting and motion.
         #[test]
         fn a_sensor_anywhere_is_as_one_at_the_centre(
             position_m in vector(0.3), attitude_rad in vector(3.0), omega in vector(8.0), force in vector(20.0),
@@ -126,7 +126,7 @@ mod tests {
     }
 
     proptest! {
-        /// Errors that a sensor has in its own axes are taken back before its mounting counts.
+        /// Errors along the sensor's own axes are removed before the rotation of the mounting.
         #[test]
         fn errors_are_taken_back_in_the_sensors_axes(
             attitude_rad in vector(3.0), omega in vector(8.0), force in vector(20.0), gyro_offset_rad_s in vector(0.5),

@@ -1,6 +1,6 @@
-//! Covariance of the error, in blocks, and its two operations: prediction and the update by a scalar.
+//! Covariance of the error state in blocks, with its prediction and its update by one scalar.
 //!
-//! The errors are, each added to the nominal state to give the truth,
+//! The errors are defined as truth minus nominal state:
 //!
 //! ```text
 //! theta   rotation in the EARTH frame: R_true = (1 + [theta]x) R                       [rad]
@@ -9,26 +9,26 @@
 //! b       offset of the barometer                                                      [m]
 //! ```
 //!
-//! This is Sola's global angular error (section 7.2) rather than the local one: the attitude then has no transition of
-//! its own, the third component *is* the heading's error at any tilt, so an unknown heading stays in one state, and the
-//! error of a past attitude is that of the present one. When the attitude is corrected, the error is turned with it
-//! ([`Covariance::turn`]), as the local one is by itself; the crate's documentation says what for. Over an interval of
-//! T with the mean rotation R, C = R T, and S the change of velocity by specific force,
+//! This is Sola's global angular error (section 7.2), not the local one. The attitude then has no transition of its
+//! own, and the third component *is* the heading error at any tilt, so an unknown heading stays in one state. A past
+//! attitude has the same error as the present one. When the attitude is corrected, the error is rotated with it
+//! ([`Covariance::turn`]), as a local error is by definition; the crate's documentation says why. Over an interval T
+//! with the mean rotation R, C = R T, and S the velocity change by specific force,
 //!
 //! ```text
 //! theta' = theta - C g        v' = v - S x theta - C a        p' = p + T v
 //! ```
 //!
-//! with all of the right-hand side at the beginning of the interval; terms of the second order in T are left out, as in
-//! PX4's EKF2. The 16th state, the barometer's offset, is one column more; without it, a filter that averages a
-//! barometer is sure of a height that it cannot know.
+//! where all of the right-hand side is at the beginning of the interval. Terms of second order in T are left out, as in
+//! PX4's EKF2. The 16th state, the barometer's offset, is one more column. Without it, a filter that averages a
+//! barometer would claim to know a height that it cannot know.
 
 use crate::errors::{Block, Coordinate, Errors, Interval, Replaced, Row, Slows, minus_cross, subtract_outer};
 use crate::slow::{Columns, Slow};
 use afbc_control::math::{max, min, sqrt};
 use nalgebra::Vector3;
 
-/// Variances that a prediction adds per second.
+/// Process noise: variances that a prediction adds per second.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Growth {
     pub(crate) theta: f32,
@@ -38,8 +38,8 @@ pub(crate) struct Growth {
     pub(crate) baro: f32,
 }
 
-/// The covariance: the upper triangle of blocks, `tv` being the covariance of theta and v. Diagonal blocks are
-/// symmetric.
+/// Covariance matrix, stored as the upper triangle of blocks: `tv` is the covariance of theta and v. Diagonal blocks
+/// are symmetric.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Covariance {
     pub(crate) tt: Block,
@@ -66,7 +66,7 @@ pub(crate) struct Covariance {
     pub(crate) slow: Slow,
 }
 
-/// The matrix (-[s]x)' from the right: each row crossed.
+/// Returns m (-[s]x)': the cross product of each row of `m`.
 #[inline]
 fn crossed_minus(m: &Block, s: &Vector3<f32>) -> Block {
     Block::new(
@@ -82,13 +82,13 @@ fn crossed_minus(m: &Block, s: &Vector3<f32>) -> Block {
     )
 }
 
-/// The product with the transpose of `b`.
+/// Returns a b'.
 #[inline]
 fn by_transpose(a: &Block, b: &Block) -> Block {
     a * b.transpose()
 }
 
-/// Copies the upper triangle to the lower one.
+/// Copies the upper triangle of a block to the lower one.
 #[inline]
 fn mirror(m: &mut Block) {
     m.m21 = m.m12;
@@ -96,7 +96,7 @@ fn mirror(m: &mut Block) {
     m.m32 = m.m23;
 }
 
-/// Adds to the diagonal.
+/// Adds a variance to the diagonal.
 #[inline]
 fn add_diagonal(m: &mut Block, variance: f32) {
     m.m11 += variance;
@@ -104,7 +104,7 @@ fn add_diagonal(m: &mut Block, variance: f32) {
     m.m33 += variance;
 }
 
-/// Sets a row of covariances with the slow errors.
+/// Sets one row of the covariances with the slow errors.
 fn set_row(columns: &mut Columns, at: Coordinate, to: &Slows) {
     for (mut column, to) in columns.column_iter_mut().zip(to) {
         if let Some(number) = column.iter_mut().nth(at as usize) {
@@ -113,17 +113,17 @@ fn set_row(columns: &mut Columns, at: Coordinate, to: &Slows) {
     }
 }
 
-/// Share of a variance that a prediction adds for rounding: each operation moves an entry by up to its last bit, and
-/// where two errors are nearly one, as a height and a barometer's offset are, what is left of them is a few hundred of
-/// these. By this alone a standard deviation grows by a tenth in an hour.
+/// Share of a variance that each prediction adds against rounding. Each operation may change an entry by its last bit.
+/// Where two errors are almost equal, like those of height and barometer offset, their difference is only a few hundred
+/// such bits. This growth alone raises a standard deviation by a tenth in an hour.
 const ROUNDED: f32 = 1.0 / 16_777_216.0;
 
-/// Number of blocks of the upper triangle.
+/// Number of blocks in the upper triangle.
 pub(crate) const BLOCKS: u8 = 15;
-/// Room for rounding in the square of a correlation.
+/// Tolerance for rounding when the square of a correlation is compared with 1.
 const POSSIBLE: f32 = 1.001;
 
-/// Adds a variance to the diagonal, and the share for rounding.
+/// Adds a variance and the share for rounding to the diagonal.
 #[inline]
 fn grown(m: &mut Block, variance: f32) {
     m.m11 += m.m11 * ROUNDED + variance;
@@ -137,7 +137,7 @@ struct Bounds {
     most: f32,
 }
 
-/// (1e-5 rad)^2 and the variance of an angle that may be anything.
+/// From (1e-5 rad)^2 to the variance of a completely unknown angle.
 const THETA: Bounds = Bounds { least: 1e-10, most: 3.3 };
 const VELOCITY: Bounds = Bounds { least: 1e-8, most: 1e4 };
 const POSITION: Bounds = Bounds { least: 1e-9, most: 1e8 };
@@ -145,7 +145,7 @@ const GYRO: Bounds = Bounds { least: 1e-13, most: 0.25 };
 const ACCEL: Bounds = Bounds { least: 1e-9, most: 25.0 };
 const BARO: Bounds = Bounds { least: 1e-8, most: 1e8 };
 
-/// Raises the variances of a block to the least.
+/// Raises the variances of a block to at least `least`.
 #[inline]
 fn raised(block: &mut Block, least: f32) {
     block.m11 = max(block.m11, least);
@@ -153,7 +153,7 @@ fn raised(block: &mut Block, least: f32) {
     block.m33 = max(block.m33, least);
 }
 
-/// Mirrors a diagonal block and raises its variances to the least; true if one is too large.
+/// Mirrors a diagonal block and raises its variances to the minimum. Returns true if one exceeds the maximum.
 #[inline]
 fn held(block: &mut Block, bounds: &Bounds) -> bool {
     mirror(block);
@@ -162,12 +162,12 @@ fn held(block: &mut Block, bounds: &Bounds) -> bool {
 }
 
 impl Covariance {
-    /// Predicts over `interval`: P = F P F' + Q, as three substitutions, position first, in blocks.
+    /// Predicts over `interval`: P = F P F' + Q, as three substitutions in blocks.
     #[inline]
     pub(crate) fn predict(&mut self, interval: &Interval, growth: &Growth) {
         let Interval { time_s, turn, thrust } = interval;
         let (t, c, s) = (*time_s, turn, thrust);
-        // Position first, rotation last: each substitution finds what it adds as it was at the beginning.
+        // Position first, rotation last: each substitution then reads values from the beginning of the interval.
         self.slow.predict(interval);
 
         // p' = p + T v.
@@ -182,7 +182,7 @@ impl Covariance {
         let vv = self.vv + minus_cross(s, &self.tv) - by_transpose(c, &self.va);
         self.tv += crossed_minus(&self.tt, s) - by_transpose(&self.ta, c);
         self.va += minus_cross(s, &self.ta) - c * self.aa;
-        // With the new tv and va: vv is multiplied from the right, too.
+        // Uses the new tv and va: vv is multiplied from the right as well.
         self.vv = vv + crossed_minus(&self.tv.transpose(), s) - by_transpose(&self.va, c);
         self.vp += minus_cross(s, &self.tp) - by_transpose(c, &self.pa);
         self.vg += minus_cross(s, &self.tg) - by_transpose(c, &self.ga);
@@ -201,7 +201,7 @@ impl Covariance {
         self.hold();
     }
 
-    /// Turns the angular error by a rotation of the nominal attitude: theta = r theta.
+    /// Rotates the angular error along with a rotation r of the nominal attitude: theta = r theta.
     #[inline]
     pub(crate) fn turn(&mut self, r: &Block) {
         self.tt = by_transpose(&(r * self.tt), r);
@@ -214,7 +214,7 @@ impl Covariance {
         mirror(&mut self.tt);
     }
 
-    /// Adds the noise of `time_s`, and what rounding may have taken.
+    /// Adds the process noise of `time_s` and the share for rounding.
     #[inline]
     fn grow(&mut self, time_s: f32, growth: &Growth) {
         add_diagonal(&mut self.tt, growth.theta * time_s);
@@ -231,8 +231,9 @@ impl Covariance {
         add_diagonal(&mut self.vv, velocity);
     }
 
-    /// True if no covariance of one block, the one with this number, is larger than both variances allow; block after
-    /// block, a matrix that is none is found within [`BLOCKS`] calls. False of NaN.
+    /// Returns true if every covariance in one block is within the limit that the variances set (a correlation of at
+    /// most 1). A matrix that is no valid covariance is found within [`BLOCKS`] calls, one block per call. NaN returns
+    /// false.
     pub(crate) fn is_possible(&self, number: u8) -> bool {
         let c = self;
         let (block, rows, columns) = match number {
@@ -257,7 +258,7 @@ impl Covariance {
         block.iter().zip(&allowed).all(|(entry, allowed)| entry * entry <= *allowed)
     }
 
-    /// Forgets all covariances, and doubts the variances: they are those of a matrix that was none.
+    /// Deletes all covariances and doubles the variances, since they come from an invalid matrix.
     #[cold]
     #[inline(never)]
     pub(crate) fn decorrelate(&mut self) {
@@ -275,13 +276,13 @@ impl Covariance {
         self.hold();
     }
 
-    /// True if every variance is finite.
+    /// Returns true if every variance is finite.
     pub(crate) fn is_sound(&self) -> bool {
         [&self.tt, &self.vv, &self.pp, &self.gg, &self.aa].into_iter().all(|block| block.trace().is_finite())
             && self.bb.is_finite()
     }
 
-    /// Raises every variance to the least.
+    /// Raises every variance to its minimum.
     #[inline]
     fn raise(&mut self) {
         raised(&mut self.tt, THETA.least);
@@ -292,8 +293,8 @@ impl Covariance {
         self.bb = max(self.bb, BARO.least);
     }
 
-    /// Holds every variance within its bounds, and the diagonal blocks symmetric. Raising a variance, and scaling an
-    /// error down with all its covariances, both leave the matrix positive.
+    /// Limits every variance to its bounds and keeps the diagonal blocks symmetric. Both ways, raising a variance and
+    /// scaling an error down with all its covariances, keep the matrix positive.
     #[inline]
     pub(crate) fn hold(&mut self) {
         let theta = held(&mut self.tt, &THETA);
@@ -307,12 +308,12 @@ impl Covariance {
         }
     }
 
-    /// Scales every error whose variance is too large.
+    /// Scales down every error whose variance is too large.
     #[cold]
     #[inline(never)]
     fn limit(&mut self) {
         let factor = |variance: f32, bounds: &Bounds| {
-            // Just below the bound, so that rounding leaves nothing above it.
+            // Slightly below the bound, so that rounding cannot end above it.
             if variance > bounds.most { sqrt(bounds.most / variance) * 0.9999 } else { 1.0 }
         };
         let of = |m: &Block, bounds: Bounds| {
@@ -320,11 +321,11 @@ impl Covariance {
         };
         let (t, v, p) = (of(&self.tt, THETA), of(&self.vv, VELOCITY), of(&self.pp, POSITION));
         let (g, a, b) = (of(&self.gg, GYRO), of(&self.aa, ACCEL), factor(self.bb, &BARO));
-        // `slow` is not read: variances of slow errors are given, and stay.
+        // `scale` ignores `slow` for variances: the variances of slow errors are given.
         self.scale(&Errors { theta: t, velocity: v, position: p, gyro: g, accel: a, baro: b, slow: Slows::zeros() });
     }
 
-    /// Multiplies each error, and with it its row and its column.
+    /// Multiplies each error by its factor, which scales the error's row and column.
     fn scale(&mut self, by: &Errors) {
         let Errors { theta: t, velocity: v, position: p, gyro: g, accel: a, baro: b, .. } = by;
         let scale = |m: &mut Block, x: &Vector3<f32>, y: &Vector3<f32>| m.component_mul_assign(&(x * y.transpose()));
@@ -351,14 +352,14 @@ impl Covariance {
         self.slow.scale(by);
     }
 
-    /// Forgets what is known of some errors: those with a zero in `keep` lose their variance and all covariances.
+    /// Forgets some errors: those with a zero in `keep` lose their variance and all their covariances.
     pub(crate) fn forget(&mut self, keep: &Errors) {
         self.scale(keep);
     }
 
-    /// Takes an error from a measurement instead of from what is known: the state was set so that the innovation is
-    /// zero. `row` is what the measurement makes of the other errors, and would have 1 for this one: the new error is
-    /// -(row x) less the noise, of `variance`. So it keeps every covariance that it has by them, and no other.
+    /// Replaces one error after the state was reset to a measurement, so that the innovation is zero. `row` is the
+    /// measurement's Jacobian without its 1 for the replaced error. The new error is -(row x) minus the noise, which
+    /// has the variance `variance`. It keeps exactly the covariances that follow from the other errors.
     pub(crate) fn replace(&mut self, which: Replaced, row: &Row, variance: f32) {
         let y = self.times(row);
         let variance = max(row.dot(&y), 0.0) + variance;
@@ -421,7 +422,7 @@ impl Covariance {
             baro: self.tb.dot(&row.theta),
             slow: Slows::zeros(),
         };
-        // A row has few of these parts, and a scalar is fused within a control tick: what is not there is skipped.
+        // Most parts of a row are zero and a scalar must be fused within a control tick, so zero parts are skipped.
         if row.velocity != 0.0 {
             let h = row.velocity;
             y.theta += at.column(&self.tv) * h;
@@ -469,7 +470,7 @@ impl Covariance {
         y
     }
 
-    /// Returns the variances of the row's position and velocity, each by itself.
+    /// Returns the sum of the variances of the row's position and velocity, without their covariance.
     #[inline]
     pub(crate) fn motion_variance(&self, row: &Row) -> f32 {
         let of = |m: &Block| row.coordinate.of(&m.diagonal());
@@ -502,19 +503,19 @@ impl Covariance {
         self.bb -= k.baro * w.baro;
     }
 
-    /// Fuses a scalar whose P h is `y` and whose innovation has the variance `s`, with the optimal gain K = y/s: P - y
-    /// y'/s, which is symmetric to the last bit.
+    /// Fuses a scalar with the optimal gain K = y/s, where y = P h and s is the innovation variance. The result P - y
+    /// y'/s is symmetric to the last bit.
     #[inline]
     pub(crate) fn fuse(&mut self, y: &Errors, s: f32) {
         let w = y.scaled(1.0 / sqrt(s));
         self.subtract(&w, &w);
         self.slow.subtract(&w, &w);
-        // An update only lowers variances: the upper bounds hold by themselves.
+        // An update only lowers variances, so the upper bounds hold.
         self.raise();
     }
 
     /// Fuses a scalar with any gain `k`: P - k y' - y k' + k s k' = P - k w' - w k' with w = y - k s/2. This is
-    /// Joseph's form, positive whatever the gain.
+    /// Joseph's form, which stays positive for any gain.
     pub(crate) fn fuse_with(&mut self, k: &Errors, y: &Errors, s: f32) {
         let half = k.scaled(0.5 * s);
         let w = Errors {
@@ -528,9 +529,9 @@ impl Covariance {
         };
         self.subtract(k, &w);
         self.subtract(&w, k);
-        // Once: the slow errors have no gain of their own.
+        // Subtracted only once, because the slow errors have no gain.
         self.slow.subtract(k, y);
-        // Two products, one after the other: rounding makes the halves of a block differ.
+        // The two products are subtracted one after the other, and rounding makes the halves of a block differ.
         for block in [&mut self.tt, &mut self.vv, &mut self.pp, &mut self.gg, &mut self.aa] {
             mirror(block);
         }
@@ -551,7 +552,7 @@ impl Covariance {
         }
     }
 
-    /// Returns the rows and columns of theta, v, p.
+    /// Returns the rows and columns of theta, v and p.
     pub(crate) fn of_motion(&self) -> [[f32; 9]; 9] {
         let (vt, pt, pv) = (self.tv.transpose(), self.tp.transpose(), self.vp.transpose());
         let blocks = [[&self.tt, &self.tv, &self.tp], [&vt, &self.vv, &self.vp], [&pt, &pv, &self.pp]];
@@ -594,12 +595,12 @@ impl Covariance {
     }
 }
 
-/// The largest standard deviation of three variances.
+/// Returns the largest of three variances as a standard deviation.
 pub(crate) fn largest_sigma(variances: &Vector3<f32>) -> f32 {
     sqrt(max(max(variances.x, variances.y), variances.z))
 }
 
-/// The smaller of a variance and what is possible for an angle.
+/// Limits a variance to that of a completely unknown angle.
 pub(crate) fn angle_variance(variance: f32) -> f32 {
     min(variance, THETA.most)
 }

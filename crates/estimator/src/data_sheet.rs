@@ -1,39 +1,39 @@
-//! Settings from what data sheets say.
+//! Estimator settings from the data sheets of the sensors.
 //!
-//! A vehicle's software knows the data sheets of its parts, not what one specimen has: bias, scale, hard iron, slow
-//! errors of a receiver. Densities of data sheets are one-sided: a random walk grows with half their square. Vibration
-//! is bounded, but to a filter that is corrected every few of its periods it is like a random walk, of a share of it.
+//! Software knows a part's data sheet, but not the bias, scale, hard iron or slow GNSS error of one specimen. Noise
+//! densities in data sheets are one-sided: a random walk grows with half their square. Vibration is bounded, but a
+//! filter that is corrected every few periods sees it as a random walk of a share of its amplitude.
 
 use crate::settings::Settings;
 use libm::sqrt;
 
-/// Rate and acceleration at which errors of scale and alignment count, each for a second.
+/// Rate and acceleration at which scale and alignment errors count, each lasting a second.
 const TURNING_RAD_S: f64 = 0.2;
 const SPEEDING_M_S2: f64 = 1.0;
-/// Share of the vibration that counts as white noise: what the errors of a hundred flights ask for.
+/// Share of the vibration that counts as white noise, fitted to the errors of a hundred flights.
 const SHAKEN: f64 = 0.6;
-/// Time for which a tilt by the gyroscope's misalignment counts as the same \[s\]: what hours of flight ask for.
+/// Time for which a tilt error by the gyroscope's misalignment keeps its value \[s\], fitted to hours of flight.
 const LEANING_S: f64 = 100.0;
 
-/// Figures of a gyroscope, in rad/s, or an accelerometer, in m/s2. Each is a standard deviation unless it says
+/// Figures of a gyroscope in rad/s or of an accelerometer in m/s2. Each is a standard deviation unless stated
 /// otherwise.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Triad {
-    /// One-sided density of white noise \[unit/rtHz\].
+    /// One-sided density of the white noise \[unit/rtHz\].
     pub noise_rthz: f64,
     /// Random walk of the bias after one second \[unit\].
     pub walk: f64,
     /// Bias instability, a first-order Gauss-Markov process \[unit\].
     pub instability: f64,
-    /// Its correlation time \[s\].
+    /// Correlation time of the bias instability \[s\].
     pub instability_time_s: f64,
     /// Constant bias \[unit\].
     pub bias: f64,
     /// Error of each axis's scale factor.
     pub scale: f64,
-    /// Each axis's angles to the other two \[rad\].
+    /// Angles of each axis to the other two \[rad\].
     pub misalignment_rad: f64,
-    /// Largest value that is measured, 0 for no limit \[unit\].
+    /// Largest measurable value, 0 for no limit \[unit\].
     pub range: f64,
     /// Step of the output, 0 for none \[unit\].
     pub lsb: f64,
@@ -41,44 +41,45 @@ pub struct Triad {
     pub vibration: f64,
 }
 
-/// Figures of a vehicle's parts.
+/// Data sheet figures of a vehicle's sensors.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DataSheet {
-    /// The gyroscope's.
+    /// Figures of the gyroscope.
     pub gyro: Triad,
-    /// The accelerometer's.
+    /// Figures of the accelerometer.
     pub accel: Triad,
-    /// Time between two samples of both \[s\].
+    /// Sample period of gyroscope and accelerometer \[s\].
     pub step_s: f64,
     /// Acceleration of free fall \[m/s2\].
     pub gravity_m_s2: f64,
-    /// The barometer's drift \[m\], a first-order Gauss-Markov process, and its correlation time \[s\].
+    /// Drift \[m\] of the barometer, a first-order Gauss-Markov process, and its correlation time \[s\].
     pub barometer: Option<(f64, f64)>,
-    /// The GNSS receiver's noise from fix to fix \[m\], and the correlation time of its slow error \[s\].
+    /// Noise of the GNSS receiver from fix to fix \[m\], and the correlation time of its slow error \[s\].
     pub gnss: Option<(f64, f64)>,
-    /// The heading error by hard and soft iron and the motors' field, and the declination \[rad\].
+    /// Heading error of the magnetometer by hard and soft iron and the motors' field, and the declination \[rad\].
     pub magnetometer: Option<(f64, f64)>,
-    /// True if the tracker and the magnetometer differ from one reading to the next even at rest, as far as there are
-    /// any: one that does not is frozen.
+    /// True if the readings of tracker and magnetometer (those present) change from one to the next even at rest. Then
+    /// a reading that repeats means a frozen sensor.
     pub differs: bool,
 }
 
-/// Root of the sum of squares.
+/// Returns the root of the sum of squares.
 fn root(parts: &[f64]) -> f64 {
     sqrt(parts.iter().map(|part| part * part).sum())
 }
 
-/// What a Gauss-Markov process adds per root of a second.
+/// Returns the random walk per root of a second that a Gauss-Markov process makes.
 fn markov(sigma: f64, time_s: f64) -> f64 {
-    // The noise that drives it has the density 2 sigma^2/time.
+    // The driving noise has the density 2 sigma^2/time.
     sigma * sqrt(2.0 / time_s)
 }
 
 impl Triad {
-    /// Density of all that counts as white noise, at this rate or acceleration, two-sided \[unit/rtHz\].
+    /// Returns the two-sided density of everything that counts as white noise, at the rate or acceleration `moving`
+    /// \[unit/rtHz\].
     fn density(&self, step_s: f64, moving: f64) -> f64 {
-        // Noise of sigma in each sample has the density sigma sqrt(step); the error of rounding is uniform over a step
-        // of the output.
+        // Noise of sigma in each sample has the density sigma sqrt(step). The quantisation error is uniform over one
+        // step of the output.
         let per_root_s = sqrt(step_s);
         let quantisation = self.lsb / sqrt(12.0);
         let [quantisation, vibration] = [quantisation, SHAKEN * self.vibration].map(|sigma| sigma * per_root_s);
@@ -86,27 +87,27 @@ impl Triad {
         root(&[self.noise_rthz / sqrt(2.0), quantisation, vibration, geometry])
     }
 
-    /// True if two samples at rest differ.
+    /// Returns true if two samples at rest differ.
     fn is_noisy(&self, step_s: f64) -> bool {
         self.noise_rthz > 0.0 && self.noise_rthz / sqrt(step_s) > self.lsb
     }
 }
 
 impl Settings {
-    /// Returns the settings for these parts; the rest is at its default.
+    /// Returns the settings for these parts; the other settings keep their defaults.
     #[must_use]
     pub fn for_parts(parts: &DataSheet) -> Self {
         let DataSheet { gyro, accel, step_s, gravity_m_s2, barometer, gnss, magnetometer, differs } = parts;
         let gyro_walk = root(&[gyro.walk, markov(gyro.instability, gyro.instability_time_s)]);
-        // Misaligned axes make of a turn about the vertical a tilt, the same at each turn, which cannot be
-        // distinguished from a bias of the accelerometer.
+        // Misaligned gyroscope axes convert a turn about the vertical into a tilt. The tilt is the same on every turn,
+        // so it cannot be distinguished from an accelerometer bias.
         let leaning = markov(gyro.misalignment_rad * gravity_m_s2, LEANING_S);
         let accel_walk = root(&[accel.walk, markov(accel.instability, accel.instability_time_s), leaning]);
         let accel_bias = root(&[accel.bias, accel.instability, accel.scale * gravity_m_s2]);
         let accel_bias = root(&[accel_bias, accel.misalignment_rad * gravity_m_s2]);
         let range = |range: f64, most: f64| if range > 0.0 { range.min(most) as f32 } else { most as f32 };
         let within = |value: f64, low: f64, high: f64| value.clamp(low, high) as f32;
-        // A perfect sensor at rest says the same again and again.
+        // Without noise, a sensor at rest repeats its sample, so the check for a stuck sensor is switched off.
         let moves = gyro.is_noisy(*step_s) || accel.is_noisy(*step_s);
         let default = Settings::DEFAULT;
         Settings {
@@ -116,7 +117,7 @@ impl Settings {
             gyro_walk_rad_s_rts: within(gyro_walk, 1e-6, 0.01),
             accel_walk_m_s2_rts: within(accel_walk, 1e-5, 0.1),
             accel_bias_m_s2: within(accel_bias, 1e-3, 1.0),
-            // Five sigma: the alignment takes a larger rate for a turn, and refuses it.
+            // Five sigma, because alignment refuses any larger rate as a turn.
             gyro_bias_max_rad_s: within(5.0 * gyro.bias, 0.35, 1.0),
             baro_walk_m_rts: barometer
                 .map_or(default.baro_walk_m_rts, |(drift_m, time_s)| within(markov(drift_m, time_s), 1e-4, 1.0)),
@@ -164,7 +165,7 @@ mod tests {
     }
 
     proptest! {
-        /// Whatever the data sheets say, an estimator starts, and worse parts are never taken to be better.
+        /// Any data sheet gives valid settings, and worse parts never give smaller noise settings.
         #[test]
         fn every_data_sheet_makes_valid_settings(
             gyro in triad(), accel in triad(), barometer in part(), gnss in part(), magnetometer in part(),

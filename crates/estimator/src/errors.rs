@@ -1,12 +1,12 @@
-//! Errors, the rows that measure them, and the block algebra of their covariances.
+//! Error vectors, measurement rows, and the block algebra of their covariances.
 
 use nalgebra::{Matrix3, Vector3, Vector5};
 
-/// A covariance of two errors of three coordinates.
+/// Covariance of two errors with three coordinates each.
 pub(crate) type Block = Matrix3<f32>;
 
-/// One number per slow error: of a GNSS receiver's position along x, y, z, of a magnetometer's heading by fields along
-/// body x, y.
+/// One number per slow error: a GNSS receiver's position error along x, y, z, and a magnetometer's heading error by
+/// fields along body x, y.
 pub(crate) type Slows = Vector5<f32>;
 
 /// One coordinate of a vector.
@@ -30,7 +30,7 @@ impl Coordinate {
         }
     }
 
-    /// Returns the unit vector.
+    /// Returns the unit vector along this coordinate.
     #[inline]
     pub(crate) fn unit(self) -> Vector3<f32> {
         match self {
@@ -40,7 +40,7 @@ impl Coordinate {
         }
     }
 
-    /// Returns this column.
+    /// Returns this column of a block.
     #[inline]
     pub(crate) fn column(self, m: &Block) -> Vector3<f32> {
         match self {
@@ -50,7 +50,7 @@ impl Coordinate {
         }
     }
 
-    /// Returns this row.
+    /// Returns this row of a block.
     #[inline]
     pub(crate) fn row(self, m: &Block) -> Vector3<f32> {
         match self {
@@ -60,7 +60,7 @@ impl Coordinate {
         }
     }
 
-    /// Sets this row.
+    /// Sets this row of a block.
     pub(crate) fn set_row(self, m: &mut Block, to: &Vector3<f32>) {
         match self {
             Coordinate::X => (m.m11, m.m12, m.m13) = (to.x, to.y, to.z),
@@ -69,7 +69,7 @@ impl Coordinate {
         }
     }
 
-    /// Sets this column.
+    /// Sets this column of a block.
     pub(crate) fn set_column(self, m: &mut Block, to: &Vector3<f32>) {
         match self {
             Coordinate::X => (m.m11, m.m21, m.m31) = (to.x, to.y, to.z),
@@ -88,35 +88,36 @@ impl Coordinate {
     }
 }
 
-/// An error that a measurement can replace.
+/// Error that a measurement can replace.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Replaced {
-    /// The third coordinate of the rotation.
+    /// Third coordinate of the rotation error.
     Heading,
     Velocity(Coordinate),
     Position(Coordinate),
-    /// The barometer's offset.
+    /// Barometer offset.
     Offset,
 }
 
-/// Row of a Jacobian: what a scalar measurement makes of the errors. Velocity and position enter by one coordinate.
+/// Row of a Jacobian: the derivative of one scalar measurement by the errors. Only one coordinate of velocity and
+/// position enters.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Row {
     pub(crate) coordinate: Coordinate,
     pub(crate) theta: Vector3<f32>,
     pub(crate) velocity: f32,
     pub(crate) position: f32,
-    /// By the gyroscope's bias, where it counts.
+    /// Derivative by the gyroscope bias, `None` if zero.
     pub(crate) gyro: Option<Vector3<f32>>,
-    /// By the accelerometer's bias, where it counts.
+    /// Derivative by the accelerometer bias, `None` if zero.
     pub(crate) accel: Option<Vector3<f32>>,
-    /// By the barometer's offset.
+    /// Derivative by the barometer offset.
     pub(crate) baro: f32,
-    /// By the slow errors, where they come on top.
+    /// Derivative by the slow errors, `None` if zero.
     pub(crate) slow: Option<Slows>,
 }
 
-/// A row that measures nothing.
+/// Row with all derivatives zero.
 pub(crate) const NO_ROW: Row = Row {
     coordinate: Coordinate::Z,
     theta: Vector3::new(0.0, 0.0, 0.0),
@@ -137,12 +138,12 @@ pub(crate) struct Errors {
     pub(crate) gyro: Vector3<f32>,
     pub(crate) accel: Vector3<f32>,
     pub(crate) baro: f32,
-    /// Of the slow errors, where they are considered; no gain corrects them.
+    /// Numbers of the slow errors. Slow errors are considered in the covariance, but no gain corrects them.
     pub(crate) slow: Slows,
 }
 
 impl Errors {
-    /// Returns every number multiplied.
+    /// Returns all numbers multiplied by `factor`.
     pub(crate) fn scaled(&self, factor: f32) -> Self {
         Errors {
             theta: self.theta * factor,
@@ -157,7 +158,7 @@ impl Errors {
 }
 
 impl Row {
-    /// Returns the product with `errors`.
+    /// Returns the scalar product with `errors`.
     #[inline]
     pub(crate) fn dot(&self, errors: &Errors) -> f32 {
         self.theta.dot(&errors.theta)
@@ -170,18 +171,18 @@ impl Row {
     }
 }
 
-/// What the nominal state did over the interval of a prediction.
+/// Motion of the nominal state over one prediction interval.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Interval {
-    /// T \[s\].
+    /// Length T \[s\].
     pub(crate) time_s: f32,
-    /// C = R T with the mean rotation.
+    /// C = R T with the mean rotation R.
     pub(crate) turn: Block,
-    /// S: change of the velocity by specific force \[m/s\].
+    /// S: velocity change by specific force \[m/s\].
     pub(crate) thrust: Vector3<f32>,
 }
 
-/// -s x, column by column: the matrix -[s]x from the left.
+/// Returns -[s]x m.
 #[inline]
 pub(crate) fn minus_cross(s: &Vector3<f32>, m: &Block) -> Block {
     Block::new(

@@ -1,14 +1,14 @@
-//! What the estimator says.
+//! Output of the estimator: state, standard deviations, validity and counters.
 
 use crate::align::Unready;
 use crate::imu::ImuHealth;
 use afbc_types::State;
 use nalgebra::Vector3;
 
-/// Which parts of the state may be used.
+/// Parts of the state that may be used.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Validity {
-    /// Roll and pitch; body rates with them.
+    /// Roll and pitch, and with them the body rates.
     pub attitude: bool,
     /// Heading.
     pub heading: bool,
@@ -16,103 +16,103 @@ pub struct Validity {
     pub velocity: bool,
     /// Position, all coordinates.
     pub position: bool,
-    /// Height and vertical velocity, which a barometer alone holds.
+    /// Height and vertical velocity, for which a barometer alone is enough.
     pub height: bool,
 }
 
 /// Standard deviations of the errors.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Sigmas {
-    /// Rotation about the earth's x, y, z; the third is the heading's \[rad\].
+    /// Rotation about the earth's x, y, z; the third is the heading \[rad\].
     pub attitude_rad: Vector3<f32>,
     /// Velocity, earth frame \[m/s\].
     pub velocity_m_s: Vector3<f32>,
     /// Position, earth frame \[m\].
     pub position_m: Vector3<f32>,
-    /// Gyroscope's bias, body frame \[rad/s\].
+    /// Gyroscope bias, body frame \[rad/s\].
     pub gyro_bias_rad_s: Vector3<f32>,
-    /// Accelerometer's bias, body frame \[m/s2\].
+    /// Accelerometer bias, body frame \[m/s2\].
     pub accel_bias_m_s2: Vector3<f32>,
-    /// Barometer's offset \[m\].
+    /// Barometer offset \[m\].
     pub height_offset_m: f32,
 }
 
-/// Number of times that a part of the state was set anew rather than corrected; each up to `u32::MAX`. The first
-/// position and heading after the start count, since they jump too.
+/// Number of resets of each part of the state, each up to `u32::MAX`. The first position and the first heading after
+/// the start count as resets, since the state jumps.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Resets {
-    /// Position set to a measurement.
+    /// Resets of the position to a measurement.
     pub position: u32,
-    /// Velocity set to a measurement.
+    /// Resets of the velocity to a measurement.
     pub velocity: u32,
-    /// Heading set to a measurement.
+    /// Resets of the heading to a measurement.
     pub heading: u32,
-    /// The barometer's offset set to a measurement.
+    /// Resets of the barometer offset to a measurement.
     pub height: u32,
-    /// Roll and pitch doubted: their standard deviation raised.
+    /// Increases of the standard deviation of roll and pitch.
     pub tilt: u32,
-    /// The covariance was none any more: all but its variances was forgotten.
+    /// Resets of a covariance matrix that had become invalid; only the variances were kept.
     pub covariance: u32,
-    /// The filter started again after it had diverged or after a gap in the samples.
+    /// Restarts of the filter after divergence or a gap in the samples.
     pub restarts: u32,
 }
 
-/// Number of measurements that were not even looked at, each up to `u32::MAX`.
+/// Number of measurements dropped before the gate, each up to `u32::MAX`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Dropped {
-    /// Not finite, absurd, or with an unusable standard deviation.
+    /// Not finite, outside the plausible range, or with an unusable standard deviation.
     pub implausible: u32,
-    /// Older than 270 ms when its turn came, or than the oldest state kept.
+    /// Older than 270 ms when its turn came, or older than the oldest stored state.
     pub late: u32,
     /// More than 20 ms in the future.
     pub early: u32,
-    /// Not newer than the last one of the same kind.
+    /// Not newer than the last measurement of the same kind.
     pub overtaken: u32,
     /// Pushed out of the full queue.
     pub crowded: u32,
-    /// A magnetic field of another strength or inclination than at the start, or any where the vehicle's own may be as
-    /// large as the earth's.
+    /// Magnetic field whose strength or inclination differs from that at the start. Every field counts if the vehicle's
+    /// own field may be as large as the earth's.
     pub disturbed: u32,
-    /// The pose of a tracker, or the field of a magnetometer, that has repeated it for too long.
+    /// Pose of a tracker or field of a magnetometer that has repeated for too long.
     pub frozen: u32,
 }
 
-/// Counts one more.
+/// Increments a counter without overflow.
 pub(crate) fn count(number: &mut u32) {
     *number = number.saturating_add(1);
 }
 
-/// State, its uncertainty and its validity; new with every call of [`Estimator::step`](crate::Estimator::step).
+/// State, standard deviations and validity. Each call of [`Estimator::step`](crate::Estimator::step) makes a new one.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct Estimate {
-    /// Time of the state: that of the last sample of the inertial sensors \[us\].
+    /// Time of the state, which is the time of the last IMU sample \[us\].
     pub at_us: u64,
-    /// The state. Always finite and [plausible](State::is_plausible); zero before the start. Rates are filtered and
-    /// without bias.
+    /// State, always finite and [plausible](State::is_plausible), zero before the start. Rates are filtered and have no
+    /// bias.
     pub state: State,
-    /// Attitude as a unit quaternion w, x, y, z from body to earth.
+    /// Attitude from body to earth as a unit quaternion w, x, y, z.
     pub attitude: [f32; 4],
-    /// Bias of the gyroscope, body frame \[rad/s\].
+    /// Gyroscope bias, body frame \[rad/s\].
     pub gyro_bias_rad_s: Vector3<f32>,
-    /// Bias of the accelerometer, body frame \[m/s2\].
+    /// Accelerometer bias, body frame \[m/s2\].
     pub accel_bias_m_s2: Vector3<f32>,
-    /// Offset of the barometer: its height less the estimated one \[m\].
+    /// Barometer offset: barometer height minus estimated height \[m\].
     pub height_offset_m: f32,
     /// Standard deviations.
     pub sigmas: Sigmas,
-    /// Which parts may be used.
+    /// Parts of the state that may be used.
     pub validity: Validity,
-    /// True if the vehicle is held at rest ([`Memory::set_on_ground`](crate::Memory::set_on_ground)).
+    /// True if the filter holds the vehicle at rest ([`Memory::set_on_ground`](crate::Memory::set_on_ground)).
     pub at_rest: bool,
-    /// Why the filter has not started; `None` once it runs.
+    /// Reason why the filter has not started, `None` once it runs.
     pub unready: Option<Unready>,
     /// Health of the inertial sensors.
     pub imu: ImuHealth,
-    /// Resets since the memory's beginning.
+    /// Resets since the memory was created.
     pub resets: Resets,
-    /// What measurements have changed in this step: position \[m\].
+    /// Change of the position by measurements in this step \[m\].
     pub moved_m: Vector3<f32>,
-    /// And velocity \[m/s\].
+    /// Change of the velocity by measurements in this step \[m/s\].
     pub moved_m_s: Vector3<f32>,
 }

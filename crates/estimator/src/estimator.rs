@@ -1,4 +1,4 @@
-//! The estimator: what happens in a step.
+//! The estimator and its step: IMU sample, prediction or fusion, output.
 
 use crate::align::Unready;
 use crate::covariance::{BLOCKS, Growth, largest_sigma};
@@ -13,26 +13,26 @@ use afbc_control::math::{max, min, sqrt, wrap_angle};
 use afbc_types::{Declared, OutOfRange, State};
 use nalgebra::Vector3;
 
-/// Time between predictions of the covariance \[us\]; a sample later than this less half a millisecond is due.
+/// Period of the covariance prediction \[us\], less half a millisecond so that the sample at 4 ms is never late.
 const PREDICT_US: u64 = 3_500;
-/// Sample in the future \[us\], sample too old \[us\].
+/// Limits of a sample's time: at most this far in the future, and at most this old \[us\].
 const EARLY_US: u64 = 50_000;
 const OLD_US: u64 = 1_000_000;
-/// Gap between samples that counts as one, and that starts the filter again \[us\].
+/// Gap between samples that adds uncertainty, and gap that restarts the filter \[us\].
 const GAP_US: u64 = 20_000;
 const LOST_US: u64 = 250_000;
-/// What a vehicle may do in a gap: rates \[rad/s\] and accelerations \[m/s2\] that the samples around it do not show.
+/// Motion assumed possible within a gap and unseen by the samples around it: rate \[rad/s\] and acceleration \[m/s2\].
 const GAP_RAD_S: f32 = 0.5;
 const GAP_M_S2: f32 = 3.0;
-/// Time for which an error of the second order lasts \[s\].
+/// Time for which a second-order error keeps its value \[s\].
 const BENT_S: f32 = 0.7;
-/// Time for which a vehicle that is held at rest counts as such \[us\].
+/// Time after the last zero-velocity fusion for which the vehicle still counts as held at rest \[us\].
 const HELD_US: u64 = 500_000;
-/// Variances per second that a clipped sample of the gyroscope adds to the attitude, and one of the accelerometer to
-/// the velocity: 0.8 rad and 2.4 m/s for 30 ms of them. What the other makes of it, the prediction knows.
+/// Variances per second that a clipped gyroscope sample adds to the attitude and a clipped accelerometer sample adds to
+/// the velocity: 0.8 rad and 2.4 m/s for 30 ms of clipping. The prediction derives all other effects from these two.
 const CLIPPED: (f32, f32) = (20.0, 200.0);
 
-/// The estimator. Constant; what changes is in [`Memory`].
+/// The estimator's settings in the form that a step needs. Everything that changes is in [`Memory`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Estimator {
     pub(crate) settings: Settings,
@@ -45,23 +45,23 @@ pub struct Estimator {
     stuck_us: u64,
     /// Direction of magnetic north in the earth frame, whose x is north and y west.
     pub(crate) magnetic_north_rad: f32,
-    /// Its cosine and sine.
+    /// Cosine and sine of `magnetic_north_rad`.
     pub(crate) magnetic_north: (f32, f32),
     pub(crate) inclination_error_max: f32,
-    /// Variance of the heading by the vehicle's own field along a body axis.
+    /// Heading variance that the vehicle's own field along one body axis causes.
     pub(crate) magnetic_variance: f32,
 }
 
 impl Estimator {
-    /// Makes an estimator.
+    /// Creates an estimator.
     ///
     /// # Errors
-    /// The first setting out of range.
+    /// Returns the first setting that is out of range.
     pub fn new(settings: Settings) -> Result<Self, OutOfRange> {
         settings.validate()?;
         let square = |x: f32| x * x;
         let microseconds = |time_s: f32| (time_s * 1e6) as u64;
-        // Never: longer than any time.
+        // 0 means never: a time longer than any flight.
         let or_never = |time_s: f32| if time_s > 0.0 { microseconds(time_s) } else { u64::MAX };
         Ok(Estimator {
             growth: Growth {
@@ -77,7 +77,7 @@ impl Estimator {
             coast_us: microseconds(settings.coast_s),
             frozen_us: or_never(settings.frozen_s),
             stuck_us: or_never(settings.stuck_s),
-            // Minus: the earth's y is west, and declination counts to the east.
+            // Negated: the earth frame's y points west, and declination is positive to the east.
             magnetic_north_rad: wrap_angle(-settings.declination_rad),
             magnetic_north: (libm::cosf(settings.declination_rad), -libm::sinf(settings.declination_rad)),
             inclination_error_max: settings.inclination_error_max_rad,
@@ -92,10 +92,10 @@ impl Estimator {
         &self.settings
     }
 
-    /// Starts in a given state: in the air after a restart, or where a simulation begins. Biases are zero; the
-    /// measurement that comes first sets what is not known: a position with a sigma of 1 km or more, a heading with one
-    /// of 1 rad or more. A state that is not [plausible](State::is_plausible), or a sigma that is negative or not
-    /// finite, changes nothing: false.
+    /// Starts in a given state: in the air after a restart, or at the start of a simulation. Biases are zero. A
+    /// position with a sigma of 1 km or more, or a heading with one of 1 rad or more, counts as unknown: the first
+    /// measurement sets it. Returns false and changes nothing if the state is not [plausible](State::is_plausible) or a
+    /// sigma is negative or not finite.
     pub fn start_at(&self, memory: &mut Memory, now_us: u64, state: &State, sigmas: &Sigmas) -> bool {
         let valid = |v: &Vector3<f32>| v.iter().all(|sigma| (0.0..=1e4).contains(sigma));
         let Sigmas { attitude_rad, velocity_m_s, position_m, gyro_bias_rad_s, accel_bias_m_s2, .. } = sigmas;
@@ -107,10 +107,10 @@ impl Estimator {
         usable
     }
 
-    /// Runs one step, to be called every millisecond: takes the newest sample of the inertial sensors, if there is a
-    /// new one, predicts or fuses, and returns the estimate at the time of that sample. `now_us` is the time since
-    /// power-up. Cannot fail: whatever is given, the estimate is finite.
-    // Always: the caller computes only what it uses of the estimate, and copies none of it.
+    /// Runs one step; call it every millisecond. Takes the newest IMU sample if there is one, predicts the covariance
+    /// or fuses measurements, and returns the estimate at the time of the last sample. `now_us` is the time since
+    /// power-up. The step cannot fail: the estimate is finite for any input.
+    // Always inlined, so that the caller computes only the parts of the estimate that it uses and copies none.
     #[inline(always)]
     #[must_use = "the estimate is its only result"]
     pub fn step(&self, memory: &mut Memory, now_us: u64, imu: Option<&ImuSample>) -> Estimate {
@@ -118,21 +118,21 @@ impl Estimator {
         self.report(memory, now_us)
     }
 
-    /// Returns the estimate that the last [step](Self::step), at `now_us`, has returned.
+    /// Returns the estimate of the last [step](Self::step), which was called at `now_us`.
     #[must_use]
     pub fn estimate(&self, memory: &Memory, now_us: u64) -> Estimate {
         self.report(memory, now_us)
     }
 
-    /// Takes a sample, and predicts or fuses.
+    /// Takes a sample, then predicts or fuses.
     #[inline(never)]
     fn advance(&self, memory: &mut Memory, now_us: u64, imu: Option<&ImuSample>) {
         let predicted = imu.is_some_and(|sample| self.take(memory, now_us, sample));
         memory.moved = (Vector3::zeros(), Vector3::zeros());
         if memory.runs {
-            // Between fixes, since a fix holds a state of before.
+            // Only between fixes, because a fix refers to a stored state.
             if predicted {
-                // The prediction took this step's share of time; the history settles in another.
+                // The prediction has used this step's time; the history settles in a later step.
             } else if memory.fix.is_none() && memory.history.is_unsettled() {
                 memory.history.settle(self.settings.gravity_m_s2);
             } else {
@@ -145,7 +145,7 @@ impl Estimator {
         }
     }
 
-    /// Takes a sample. True if the covariance was predicted.
+    /// Takes a sample. Returns true if the covariance was predicted.
     fn take(&self, memory: &mut Memory, now_us: u64, sample: &ImuSample) -> bool {
         let last_us = memory.monitor.at_us();
         let possible = sample.at_us <= now_us.saturating_add(EARLY_US) && sample.at_us.saturating_add(OLD_US) >= now_us;
@@ -154,7 +154,8 @@ impl Estimator {
             memory.monitor.refuse();
             return false;
         }
-        // Not integrated: the attitude would turn at the repeated rate for as long as the sensor is stuck.
+        // A repeated sample is not integrated: the attitude would turn at the repeated rate for as long as the sensor
+        // is stuck.
         if memory.monitor.repeats(sample, self.stuck_us) {
             return false;
         }
@@ -167,7 +168,7 @@ impl Estimator {
             return false;
         }
         let Some(gap_us) = since_us.filter(|since_us| *since_us < LOST_US) else {
-            // The first sample after a start in the air, or after the loss of the samples or of their time.
+            // First sample after a start in the air, after lost samples or after a jump of the sample clock.
             if last_us.is_some() {
                 memory.restart(sample.at_us);
             }
@@ -197,13 +198,13 @@ impl Estimator {
         due
     }
 
-    /// Predicts the covariance up to the present, and remembers the state.
+    /// Predicts the covariance up to the present and stores the state in the history.
     fn predict(&self, memory: &mut Memory, sample: &ImuSample) {
         let mut interval = memory.interval;
         interval.turn = (memory.rotation + memory.nominal.rotation) * (0.5 * interval.time_s);
         let mut growth = self.growth;
         growth.velocity += self.bent(memory);
-        // Before the prediction: the corrections were made at the interval's beginning.
+        // Rotated before the prediction, because the corrections were made at the beginning of the interval.
         memory.covariance.turn(&matrix(&renormalized(&memory.turned)));
         memory.turned = identity();
         memory.covariance.predict(&interval, &growth);
@@ -226,9 +227,9 @@ impl Estimator {
         }
     }
 
-    /// Returns the variance per second of the velocity that the linear model misses: the acceleration's error of the
-    /// second order in the angles, g theta_tilt theta, for a second. It matters at the start, where levelling has left
-    /// an angle of 0.01 rad and the model's own noise is below 1e-3 m/s2.
+    /// Returns the velocity variance per second that the linear model misses: the second-order acceleration error g
+    /// theta_tilt theta. It matters at the start, when levelling has left an angle error of 0.01 rad and the model's
+    /// own noise is below 1e-3 m/s2.
     fn bent(&self, memory: &Memory) -> f32 {
         let theta = memory.covariance.variances().theta;
         let tilt = max(theta.x, theta.y);
@@ -236,7 +237,7 @@ impl Estimator {
         BENT_S * gravity * gravity * min(tilt * (tilt + min(theta.z, 1.0)), 0.1)
     }
 
-    /// Waits for rest.
+    /// Runs the alignment, and starts the filter when it is complete.
     fn align(&self, memory: &mut Memory, sample: &ImuSample) {
         if let Some(aligned) = memory.align.advance(sample, &self.settings) {
             memory.begin(sample.at_us, &aligned, self);
@@ -244,13 +245,13 @@ impl Estimator {
         }
     }
 
-    /// Before the start, takes the heading from whichever sensor measures it.
+    /// Before the start: passes queued measurements to the alignment, which takes the heading from them.
     fn listen(&self, memory: &mut Memory, now_us: u64) {
         if memory.monitor.health(now_us, &self.settings, self.stuck_us).missing {
             memory.align.again(Unready::NoImu);
         }
         let recent = now_us.saturating_sub(OLD_US);
-        // Of any time: before the start there is no state of the past to wait for.
+        // Measurements of any time are taken: before the start there is no history to wait for.
         while let Some(measurement) = memory.queue.take(|_| true) {
             if measurement.at_us >= recent {
                 memory.align.hear(&measurement.value);
@@ -258,7 +259,7 @@ impl Estimator {
         }
     }
 
-    /// Says what is known.
+    /// Builds the estimate from the memory.
     #[inline(always)]
     fn report(&self, memory: &Memory, now_us: u64) -> Estimate {
         let imu = memory.monitor.health(now_us, &self.settings, self.stuck_us);

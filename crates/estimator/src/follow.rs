@@ -1,7 +1,8 @@
-//! Sets a part of the state to a measurement, where it is not known, or was contradicted for too long.
+//! Resets a part of the state to a measurement, when that part is unknown or was contradicted for too long.
 //!
-//! The new error is then that of the measurement: its noise, and what the other errors make of it. So each reset keeps
-//! the covariances that it has by these, and the matrix stays one ([`crate::covariance::Covariance::replace`]).
+//! The new error is the measurement's: its noise, plus the effect of the other errors on the measurement. A reset keeps
+//! exactly the covariances that follow from these errors, so the matrix stays valid
+//! ([`crate::covariance::Covariance::replace`]).
 
 use crate::errors::{Coordinate, Errors, NO_ROW, Replaced, Row};
 use crate::estimate::count;
@@ -15,18 +16,19 @@ use crate::rotation::{about_z, atan2, identity, matrix, normalized, twist};
 use afbc_control::math::{max, min, wrap_angle};
 use nalgebra::Vector3;
 
-/// Standard deviation of the bank's heading below which it counts \[rad\].
+/// The yaw bank's heading is used only if its standard deviation is below this \[rad\].
 const SURE_RAD: f32 = 0.2;
-/// Difference from the heading that contradicts it, in standard deviations of both and at least \[rad\].
+/// The yaw bank contradicts the heading if both differ by more than this many standard deviations, and by more than
+/// this angle \[rad\].
 const FAR_SIGMAS: f32 = 3.0;
 const FAR_RAD: f32 = 0.35;
-/// Time for which it must \[us\].
+/// Time for which the bank must contradict the heading before a reset \[us\].
 const CONTRADICTED_US: u64 = 2_000_000;
-/// Error of the bank's heading by what it leaves out, the tilt's and the sensor's biases \[rad\].
+/// Error of the bank's heading by effects that it neglects: tilt error and sensor biases \[rad\].
 const HEADED_RAD: f32 = 0.1;
 
 impl Estimator {
-    /// Sets what `part` measures to it.
+    /// Resets the state to the measurement in `part`.
     pub(crate) fn follow(&self, memory: &mut Memory, part: &Part, horizon: &Horizon) {
         let past = horizon.past();
         match &part.target {
@@ -35,7 +37,7 @@ impl Estimator {
                 self.replace_motion(memory, part, horizon);
                 memory.knows.position = true;
                 if part.axes != Axes::Level {
-                    // The barometer's offset was that of another height.
+                    // The barometer's offset belonged to the old height.
                     memory.covariance.forget(&Errors { baro: 0.0, ..KEEP });
                     memory.covariance.hold();
                     memory.knows.height_offset = false;
@@ -55,7 +57,7 @@ impl Estimator {
                 }
             }
             Target::Attitude(attitude) => {
-                // As good as roll and pitch are: they mix with it.
+                // The heading is no better than roll and pitch, because the errors mix.
                 let tilt = memory.covariance.variances().theta.xy().max();
                 self.head(memory, part, horizon, twist(attitude, &past.attitude), part.variance.z + tilt);
             }
@@ -70,8 +72,7 @@ impl Estimator {
         }
     }
 
-    /// Looks at the heading that a receiver's velocity shows, and sets the heading to it if that is unknown, or has
-    /// been contradicted for long enough.
+    /// Resets the heading to the yaw bank's if the heading is unknown or was contradicted for long enough.
     pub(crate) fn follow_bank(&self, memory: &mut Memory, at_us: u64) {
         let Some((by, variance)) = memory.yaw_bank.error().filter(|(_, variance)| *variance < SURE_RAD * SURE_RAD)
         else {
@@ -91,7 +92,8 @@ impl Estimator {
         memory.contradicted_us = None;
         memory.turn_heading(by);
         memory.covariance.replace(Replaced::Heading, &NO_ROW, variance + HEADED_RAD * HEADED_RAD);
-        // The wrong heading has made velocities of accelerations to other sides, and a tilt of them.
+        // The wrong heading has integrated accelerations in wrong directions, which has put errors into velocity and
+        // tilt.
         if memory.knows.heading {
             memory.doubt_velocity(&Vector3::repeat(1.0));
             memory.doubt_tilt();
@@ -99,7 +101,7 @@ impl Estimator {
         memory.knows.heading = true;
     }
 
-    /// Replaces the errors of a position or velocity.
+    /// Replaces the errors of a position or velocity by those of the measurement.
     fn replace_motion(&self, memory: &mut Memory, part: &Part, horizon: &Horizon) {
         let expected = self.expected(memory);
         for at in Coordinate::ALL.into_iter().filter(|at| part.axes.contain(*at)) {
@@ -114,11 +116,11 @@ impl Estimator {
         }
     }
 
-    /// Turns the heading by `by`, and replaces its error by that of `part`, whose noise has this variance.
+    /// Turns the heading by `by`, and replaces its error by that of `part` with the noise variance `variance`.
     fn head(&self, memory: &mut Memory, part: &Part, horizon: &Horizon, by: f32, variance: f32) {
         let turn = about_z(by);
         memory.turn_heading(by);
-        // A field that is too steep for a row turns with the tilt by up to ten times as much.
+        // Without a row (nose or field almost vertical) the heading error is up to ten times the tilt error.
         let tilt = memory.covariance.variances().theta.xy().max();
         let row = horizon.turned(&turn).row(&part.target, Coordinate::Z, &self.expected(memory));
         let (row, variance) = match row {
@@ -132,35 +134,35 @@ impl Estimator {
 }
 
 impl Memory {
-    /// Moves the position by `by`.
+    /// Resets the position by `by`.
     fn put(&mut self, by: &Vector3<f32>) {
         count(&mut self.resets.position);
         self.nominal.move_to(self.nominal.position + by);
-        // The past moves with it, or a late fix would report the same jump once more.
+        // The stored past states shift too; otherwise a late fix would report the same jump again.
         self.history.correct(&identity(), &NONE, &NONE, by);
     }
 
-    /// Changes the velocity by `by`.
+    /// Resets the velocity by `by`.
     fn push(&mut self, by: &Vector3<f32>) {
         count(&mut self.resets.velocity);
         self.nominal.velocity += by;
         self.history.correct(&identity(), &NONE, by, &NONE);
     }
 
-    /// Turns the heading by `by`; its error is to be replaced.
+    /// Resets the heading by `by`. The caller must then replace its error.
     pub(crate) fn turn_heading(&mut self, by: f32) {
         count(&mut self.resets.heading);
         let turn = about_z(by);
         self.nominal.turn_to(normalized(&(turn * self.nominal.attitude)));
-        // That of the covariance's time, too: the next prediction takes the mean of both.
+        // Rotates the attitude at the covariance's time too, since the next prediction averages both.
         self.rotation = matrix(&turn) * self.rotation;
-        // Not into the linear sum, for which the turn may be too large: position and velocity stay.
+        // Not added to the linear sum of corrections, for which the turn may be too large. Position and velocity stay.
         self.history.correct(&turn, &NONE, &NONE, &NONE);
         self.covariance.turn(&matrix(&turn));
         self.yaw_bank.turn_at_once(by);
     }
 
-    /// Doubts the velocity by this variance of each coordinate.
+    /// Adds a variance to each coordinate of the velocity.
     pub(crate) fn doubt_velocity(&mut self, variance: &Vector3<f32>) {
         let vv = &mut self.covariance.vv;
         (vv.m11, vv.m22, vv.m33) = (vv.m11 + variance.x, vv.m22 + variance.y, vv.m33 + variance.z);

@@ -1,7 +1,8 @@
-//! From the queue into the state: one scalar at a time.
+//! Fuses queued measurements into the state, one scalar at a time.
 //!
-//! A scalar z = h'x + noise of variance r corrects by the gain K = P h/s, s = h' P h + r. Scalars of one fix follow one
-//! another, each with the innovation against the state as corrected so far; their innovations' squares over s then add
+//! A scalar z = h'x + noise of variance r corrects the state with the gain K = P h/s, s = h' P h + r. The scalars of a
+//! fix follow one another, and each innovation is relative to the state corrected so far. The sum of innovation^2/s is
+//! then the normalised innovation squared of the whole fix.
 //! up to the normalised innovation squared of the whole fix.
 
 use crate::aid::{Aid, Trust, passes};
@@ -18,47 +19,47 @@ use crate::rotation::{renormalized, small, twist};
 use afbc_control::math::{abs_max, max, min, sqrt};
 use nalgebra::Vector3;
 
-/// Oldest measurement when its turn comes: 250 ms and the time to wait for it \[us\].
+/// Maximum age of a measurement when its turn comes: 250 ms plus the waiting time \[us\].
 const LATE_US: u64 = 270_000;
-/// Time in the future from which on a measurement is refused \[us\].
+/// A measurement further in the future than this is dropped \[us\].
 const EARLY_US: u64 = 20_000;
-/// A scalar leaves at least this share of a variance: in `f32`, what remains of more is rounding.
+/// Smallest share of a variance that remains after one scalar; a smaller remainder would be rounding noise in `f32`.
 const LEFT: f32 = 1e-4;
-/// Rounding of the variance of a past position, in shares of those of the present position and of the way since: it is
-/// their small difference when the velocity is not known.
+/// Rounding error of a past position's variance, as a share of the variances of present position and velocity: with an
+/// unknown velocity, the past variance is a small difference of large numbers.
 const ROUNDING: f32 = 1e-6;
-/// Waiting measurements from which on two scalars are fused in a step.
+/// Two scalars are fused per step when at least this many measurements wait.
 const CROWD: u8 = 3;
-/// Time for which another aid counts as present \[us\].
+/// An aid counts as present if it was fused within this time \[us\].
 const PRESENT_US: u64 = 1_000_000;
-/// Interval of the pseudo-measurements of rest \[us\].
+/// Period of the zero-velocity fusion \[us\].
 const STILL_US: u64 = 200_000;
-/// Their standard deviation on the ground \[m/s\].
+/// Standard deviation of the zero-velocity fusion on the ground \[m/s\].
 const STILL_M_S: f32 = 0.05;
-/// Their standard deviation in the air without any aid \[m/s\]. A vehicle flies at some 5 m/s, and its velocity stays
-/// what it is for some 2.5 s: noise that is correlated over a time tau, taken every T, counts as white noise of
+/// Standard deviation of the zero-velocity fusion in the air without any aid \[m/s\]. A vehicle flies at some 5 m/s and
+/// keeps its velocity for some 2.5 s. Noise with the correlation time tau, sampled every T, acts like white noise of
 /// sqrt(2 tau/T) = 5 times its standard deviation.
 const UNAIDED_M_S: f32 = 25.0;
-/// Largest velocity that may be that of a vehicle at rest, in standard deviations: less than the gate of a measurement,
-/// since one that is driven straight on looks the same to the inertial sensor.
+/// Zero velocity is fused only if the estimated velocity is below this many standard deviations. This is stricter than
+/// the gate, because a vehicle that is driven straight on looks the same to the IMU.
 const STILL_SIGMAS: f32 = 3.0;
-/// Time within which a second reset doubts the attitude \[us\].
+/// A second reset within this time also raises the variance of roll and pitch \[us\].
 const AGAIN_US: u64 = 10_000_000;
-/// Time of rejections after which, at the earliest, an aid that comes back is followed \[us\].
+/// Shortest time of rejections after which an aid that comes back may be followed \[us\].
 const REJECTED_US: u64 = 1_000_000;
-/// Variance of the velocity after a freeze, which has claimed for a while that the vehicle stands still: (0.1 m/s)^2,
-/// since faster ones contradict it \[m2/s2\].
+/// Variance added to the velocity after a frozen tracker, which has claimed for a while that the vehicle stands still:
+/// (0.1 m/s)^2, since the gate rejects it at higher speeds \[m2/s2\].
 const FROZEN_VARIANCE: f32 = 0.01;
 
-/// Share of the mean innovation that a scalar replaces, and the mean, in standard deviations, from which on biases are
-/// doubted: six times that of white ones.
+/// Weight of one scalar in the mean innovation, and the mean in standard deviations above which the bias variances are
+/// raised: six times the mean's deviation for white innovations.
 const LEANS: f32 = 0.05;
 const LEANS_SIGMAS: f32 = 1.0;
-/// Standard deviations of a slow error that an innovation may lean by for that alone.
+/// Additional mean that a slow error may cause, in its standard deviations.
 const SLOW_SIGMAS: f32 = 1.0;
 
 impl Estimator {
-    /// Fuses one scalar, and a second one if measurements pile up; the first scalar of a fix is alone in its step.
+    /// Fuses one scalar, or two if many measurements wait. The first scalar of a fix is alone in its step.
     pub(crate) fn fuse(&self, memory: &mut Memory, now_us: u64) {
         let scalars = if memory.queue.waiting() >= CROWD { 2 } else { 1 };
         for _ in 0..scalars {
@@ -66,26 +67,26 @@ impl Estimator {
             if begins && !self.begin_fix(memory, now_us) {
                 break;
             }
-            // A receiver's velocity has gone through the bank of yaw filters: that is enough for a step.
+            // A receiver's velocity has also updated the bank of yaw filters, which is enough for a step.
             if begins && memory.fix.as_ref().is_some_and(Fix::is_gnss) {
                 break;
             }
             if !self.fuse_scalar(memory) {
                 memory.end_part();
             }
-            // Its beginning has cost the look into the past and the gates: that is enough for a step.
+            // The first scalar has also cost the history lookup and the gates, which is enough for a step.
             if begins {
                 break;
             }
         }
     }
 
-    /// Begins the next fix: the oldest measurement in the queue that is of the past, or a pseudo-measurement of rest;
-    /// false if there is none.
+    /// Begins the next fix: the oldest queued measurement that is not in the future, or a zero-velocity fusion. Returns
+    /// false if there is neither.
     #[inline]
     fn begin_fix(&self, memory: &mut Memory, now_us: u64) -> bool {
         let newest_us = memory.covariance_us;
-        // One that is too early is taken, too, to be dropped: it would occupy the queue until its time comes.
+        // Too early measurements are also taken, to be dropped: they would occupy the queue until their time comes.
         let due = |at_us: u64| at_us <= newest_us || at_us > now_us.saturating_add(EARLY_US);
         let Some(measurement) = memory.queue.take(due) else {
             return self.rest(memory);
@@ -95,20 +96,20 @@ impl Estimator {
             count(&mut memory.dropped.early);
             return false;
         }
-        // The history knows the lowest 32 bits of a time: the limit keeps out what is older than they reach. No
-        // underflow: later ones have returned above.
+        // The history stores the lowest 32 bits of a time, and the limit excludes older times. The subtraction cannot
+        // underflow, because later times have returned above.
         let past = memory.history.at(at_us as u32).filter(|_| newest_us - at_us <= LATE_US);
         let Some(past) = past else {
             count(&mut memory.dropped.late);
             return false;
         };
         let mut parts = parts(&measurement.value);
-        // That of the fix before: the loop below overwrites it.
+        // Time of the previous fix, before the loop overwrites it.
         let fix_us = memory.aids.gnss_position.newest_us;
         for part in &mut parts {
             let Some(aid) = part.and_then(|part| part.aid) else { continue };
             let record = memory.aids.of_mut(aid);
-            // The same measurement, sent twice, would be averaged as two.
+            // A measurement that is sent twice must not be averaged as two.
             if record.newest_us.is_some_and(|newest_us| at_us <= newest_us) {
                 count(&mut memory.dropped.overtaken);
                 *part = None;
@@ -121,7 +122,7 @@ impl Estimator {
                 self.divide(memory, level, at_us.saturating_sub(fix_us.unwrap_or(0)));
                 height.variance = level.variance;
             }
-            // A field of which the vehicle's own may be as large as the earth's gives no heading.
+            // No heading from this field: the vehicle's own field may be as large as the earth's.
             (Measurement::MagneticField { .. }, _) if self.magnetic_variance >= VAGUE => {
                 count(&mut memory.dropped.disturbed);
                 return false;
@@ -162,7 +163,8 @@ impl Estimator {
         any
     }
 
-    /// True if a tracker has repeated this pose for too long. What it said meanwhile is no reason to believe it later.
+    /// Returns true if the tracker has repeated this pose for too long. The repeated poses do not count towards
+    /// following the tracker later.
     #[inline]
     fn is_frozen(&self, memory: &mut Memory, position: &Vector3<f32>, attitude: &[f32; 4], at_us: u64) -> bool {
         let is_frozen = memory.repeated.lasts_us(position, attitude, at_us) > self.frozen_us;
@@ -178,7 +180,7 @@ impl Estimator {
         is_frozen
     }
 
-    /// Divides the variance of a receiver's position, whose last fix was `since_us` before: noise, and the slow error.
+    /// Splits the variance of a receiver's position into noise and slow error. The previous fix was `since_us` earlier.
     fn divide(&self, memory: &mut Memory, part: &mut Part, since_us: u64) {
         let noise = self.settings.gnss_noise_m * self.settings.gnss_noise_m;
         let white = part.variance.map(|variance| min(variance, noise));
@@ -187,8 +189,8 @@ impl Estimator {
         part.variance = white;
     }
 
-    /// Begins a pseudo-measurement of rest if one is due: of a vehicle that stands; or in the air without any aid,
-    /// where it keeps roll and pitch level in the long run.
+    /// Begins a zero-velocity fusion if one is due: for a vehicle at rest, or in the air without any aid, where it
+    /// keeps roll and pitch level in the long run.
     fn rest(&self, memory: &mut Memory) -> bool {
         let at_us = memory.covariance_us;
         if at_us.saturating_sub(memory.still_us) < STILL_US {
@@ -215,7 +217,7 @@ impl Estimator {
         true
     }
 
-    /// Fuses the next scalar; false if the part of the fix that it belongs to is done.
+    /// Fuses the next scalar. Returns false if the current part of the fix is finished.
     #[inline(always)]
     fn fuse_scalar(&self, memory: &mut Memory) -> bool {
         let Some(Fix { at_us, past, parts: [Some(part), ..], next, .. }) = &memory.fix else { return false };
@@ -224,14 +226,14 @@ impl Estimator {
         let Some(past) = memory.history.corrected(past, gravity) else { return false };
         let (at_us, mut part, next) = (*at_us, *part, *next);
         let horizon = Horizon::new(&present, &past, gravity);
-        // On the copy: the next scalar of the part begins with the measurement's own variances.
+        // Changes the copy only: the part's next scalar starts again from the measurement's own variances.
         part.roughen(memory.roughened_since(at_us), horizon.tau_s());
         if next == 0 && !self.admits(memory, at_us, &part, &horizon) {
             return false;
         }
         let coordinate = part.axes.coordinate(next);
         let expected = self.expected(memory);
-        // In place, since the copy of a large struct is a call of a slow loop.
+        // Bound by reference, because copying a large struct calls a slow loop.
         let mut seen = horizon.row(&part.target, coordinate, &expected);
         let Some((innovation, row)) = &mut seen else { return false };
         let innovation = *innovation;
@@ -240,24 +242,24 @@ impl Estimator {
         }
         let slow = row.slow.map_or(0.0, |slow| memory.covariance.slow.of_row(&slow));
         let y = memory.covariance.times(row);
-        // Negative by rounding only.
+        // Negative only by rounding.
         let hph = max(row.dot(&y), 0.0);
         let r = match &part.target {
             Target::Field(field) => field_variance(&horizon.field(field), part.variance.x) + part.rough,
             _ => coordinate.of(&part.variance),
         };
-        // Above zero, since each variance has a floor: it may divide.
+        // Above zero, since each variance has a floor, so the division is safe.
         let s = hph + max(r, max(LEFT * hph, ROUNDING * memory.covariance.motion_variance(row)));
         let nis = innovation * innovation / s;
         let scalars = part.scalars();
-        // Several scalars have passed the gate together, before the first of them changed the state.
+        // The scalars of a fix have passed the gate together, before the first of them changed the state.
         if scalars == 1 && nis > self.gate_squared {
             self.reject(memory, at_us, &part, nis, &horizon);
             return false;
         }
         match part.target {
-            // The field corrects what it measures, the heading, and the gyroscope's bias that turned it: a disturbed
-            // one must not tilt the vehicle.
+            // A field corrects only the heading and the gyroscope bias that turned it: a disturbed field must not tilt
+            // the vehicle.
             Target::Field(_) => {
                 let zero = Vector3::zeros();
                 let k = Errors {
@@ -295,14 +297,14 @@ impl Estimator {
         false
     }
 
-    /// Adds corrections to the state.
+    /// Adds a correction to the state.
     fn correct(&self, memory: &mut Memory, by: &Errors) {
         let limited = |bias: Vector3<f32>, most: f32| bias.map(|x| max(-most, min(x, most)));
         let turn = small(&by.theta);
         let nominal = &mut memory.nominal;
         nominal.turn_to(renormalized(&(turn * nominal.attitude)));
         nominal.velocity += by.velocity;
-        // The correction is of the covariance's time, the state of up to 3 ms later.
+        // The correction belongs to the covariance's time. The nominal state is up to 3 ms newer.
         let moved = by.position + by.velocity * memory.interval.time_s;
         nominal.move_by(&moved);
         nominal.gyro_bias = limited(nominal.gyro_bias + by.gyro, self.settings.gyro_bias_max_rad_s);
@@ -313,7 +315,7 @@ impl Estimator {
         memory.history.correct(&turn, &by.theta, &by.velocity, &by.position);
     }
 
-    /// True if the part of a fix is to be fused. Otherwise it was rejected, or the state was set to it.
+    /// Returns true if the part of a fix is to be fused. Otherwise it was rejected, or the state was reset to it.
     #[inline]
     fn admits(&self, memory: &mut Memory, at_us: u64, part: &Part, horizon: &Horizon) -> bool {
         let variances = memory.covariance.variances();
@@ -332,7 +334,7 @@ impl Estimator {
                 }
                 let tau_s = horizon.tau_s();
                 let along = memory.covariance.vp.diagonal();
-                // Of p_past = p - tau v; what a tilt adds to it, D x theta, is left out.
+                // Variance of p_past = p - tau v. The effect of a tilt error, D x theta, is left out.
                 let variance = variances.position - along * (2.0 * tau_s) + variances.velocity * (tau_s * tau_s);
                 let slow = if part.is_slow() { memory.covariance.slow.of_position(tau_s) } else { Vector3::zeros() };
                 (innovation, (variance + slow).map(|variance| max(variance, 0.0)))
@@ -358,8 +360,8 @@ impl Estimator {
                 let field = horizon.field(field);
                 let Some((strength, inclination)) = reference(&field) else { return false };
                 let (usual, steep) = *memory.field.get_or_insert((strength, inclination));
-                // Sines are compared, which an angle changes by its cosine: but for the floor, a steep field would be
-                // refused for its noise.
+                // The sines of the inclinations are compared, and a sine changes with the cosine of the angle. The
+                // floor keeps a steep field from being refused because of its noise.
                 let slope = self.inclination_error_max * max(0.2, sqrt(1.0 - steep * steep));
                 if (strength - usual).abs() > self.settings.field_error_max * usual
                     || (inclination - steep).abs() > slope
@@ -393,7 +395,7 @@ impl Estimator {
         passes
     }
 
-    /// Returns what is expected of a barometer, and the direction of the magnetic field in the earth frame.
+    /// Returns the expected barometer offset and the expected direction of the magnetic field in the earth frame.
     #[inline]
     pub(crate) fn expected(&self, memory: &Memory) -> Expected {
         let steep = memory.field.map_or(0.0, |(_, steep)| steep);
@@ -408,7 +410,8 @@ impl Estimator {
         }
     }
 
-    /// Records a rejection; after too long, sets the state to the measurement, unless another aid contradicts it.
+    /// Records a rejection. After too long a time, resets the state to the measurement unless another aid contradicts
+    /// that.
     #[cold]
     fn reject(&self, memory: &mut Memory, at_us: u64, part: &Part, nis: f32, horizon: &Horizon) {
         let Some(aid) = part.aid else { return };
@@ -419,7 +422,7 @@ impl Estimator {
         let record = memory.aids.of_mut(aid);
         (record.nis, record.scalars) = (nis, part.scalars());
         let lasted_us = record.reject(at_us);
-        // Of one that has never agreed, since it began.
+        // If the aid was never accepted, the time since its first rejection.
         let alone_us = record.accepted_us.map_or(lasted_us, |accepted_us| at_us.saturating_sub(accepted_us));
         let wait_us = match memory.aids.trust(aid, is_carried, at_us, PRESENT_US) {
             Trust::Never => return,
@@ -430,7 +433,7 @@ impl Estimator {
             return;
         }
         if let Target::Attitude(attitude) = &part.target {
-            // Roll and pitch are the IMU's; a tracker that contradicts them stays rejected.
+            // Roll and pitch come from the IMU. A tracker that contradicts only these stays rejected.
             let turn = twist(attitude, &horizon.past().attitude);
             if turn * turn <= self.gate_squared * (memory.covariance.tt.m33 + part.variance.z) {
                 return;
@@ -439,8 +442,8 @@ impl Estimator {
         if let Target::Position(position) = &part.target
             && !is_carried
         {
-            // An error of the velocity that has grown steadily since the last position has made twice the speed that
-            // leads here.
+            // A velocity error that has grown steadily since the last accepted position is now twice the mean velocity
+            // error.
             let alone_s = max(alone_us as f32 * 1e-6, 0.1);
             let by = part.axes.only(&(position - horizon.past().position)) * (2.0 / alone_s);
             memory.doubt_velocity(&by.component_mul(&by));
@@ -449,20 +452,20 @@ impl Estimator {
         match part.target {
             Target::Position(_) => {
                 self.doubt(memory, at_us);
-                // The same tracker contradicts the attitude too.
+                // The same tracker also contradicts the attitude.
                 if memory.aids.tracker_attitude.rejected_since_us.is_some() && aid == Aid::TrackerPosition {
                     memory.doubt_tilt();
                 }
             }
             Target::Velocity(_) => self.doubt(memory, at_us),
-            // A bias that is not what it was turns the heading away from what measures it.
+            // The gyroscope bias has changed and turns the heading away from the measured one.
             Target::Attitude(_) | Target::Heading(_) | Target::Field(_) => memory.doubt_turn(),
             Target::Height(_) => {}
         }
         self.accept(memory, at_us, part);
     }
 
-    /// Doubts the attitude if this reset is the second within ten seconds.
+    /// Raises the variance of roll and pitch if this reset is the second within ten seconds.
     fn doubt(&self, memory: &mut Memory, at_us: u64) {
         if memory.reset_us.is_some_and(|reset_us| at_us.saturating_sub(reset_us) < AGAIN_US) {
             memory.doubt_tilt();
@@ -472,9 +475,10 @@ impl Estimator {
 }
 
 impl Memory {
-    /// Looks at innovations, in standard deviations, in the long run: those of a right filter are white, so that a mean
-    /// of many is small, but for what a slow error makes of them, of this variance and this one in all. One that is not
-    /// is due to a bias that has changed by more than was told of it.
+    /// Watches the running mean of the innovations in standard deviations. The innovations of a correct filter are
+    /// white, so their mean is small, apart from the effect of a slow error (`slow` is its part of the innovation
+    /// variance `all`). A larger mean shows a bias that has changed by more than its random walk allows, and raises the
+    /// bias variances.
     #[inline]
     fn suspect(&mut self, target: &Target, at: Coordinate, sigmas: f32, (slow, all): (f32, f32)) {
         let [motion, rotation] = &mut self.leaning;
@@ -493,7 +497,7 @@ impl Memory {
         }
     }
 
-    /// Ends the part of the fix that is being fused, and the fix with its last one.
+    /// Ends the current part of the fix, and the whole fix after its last part.
     fn end_part(&mut self) {
         let Some(fix) = &mut self.fix else { return };
         let [_, second, third] = fix.parts;
@@ -504,7 +508,7 @@ impl Memory {
         }
     }
 
-    /// Leaves out the receiver's height, which the position was set to.
+    /// Skips the receiver's height, because the position reset has already used it.
     fn end_height(&mut self, at_us: u64) {
         if let Some(Fix { parts: [_, height @ Some(Part { aid: Some(Aid::GnssHeight), .. }), _], .. }) = &mut self.fix {
             *height = None;
@@ -513,13 +517,13 @@ impl Memory {
     }
 }
 
-/// The share of a receiver's slow error in a coordinate of its position.
+/// Returns the derivative of one position coordinate by the slow errors.
 pub(crate) fn slow_position(at: Coordinate) -> Slows {
     let unit = at.unit();
     Slows::new(unit.x, unit.y, unit.z, 0.0, 0.0)
 }
 
-/// Variance of the direction of a field's horizontal part; that of its coordinates is `variance`.
+/// Returns the variance of the direction of a field's horizontal part; `variance` is that of one field coordinate.
 pub(crate) fn field_variance(field: &Vector3<f32>, variance: f32) -> f32 {
     let horizontal = field.x * field.x + field.y * field.y;
     let floor = 1e-6 * abs_max(field) * abs_max(field);

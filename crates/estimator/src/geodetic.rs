@@ -1,8 +1,8 @@
-//! Local coordinates of a place on the earth.
+//! Conversion between geodetic coordinates and the local frame.
 
 use nalgebra::Vector3;
 
-/// Origin of the local frame: x north, y west, z up, as [`afbc_types`] and the link have it.
+/// Origin of the local frame: x north, y west, z up, as in [`afbc_types`] and on the MAVLink side.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Origin {
     latitude_deg: f64,
@@ -14,14 +14,14 @@ pub struct Origin {
 }
 
 impl Origin {
-    /// Makes the origin at a latitude within +-89 degrees, a longitude within +-180 degrees (north and east positive)
-    /// and an altitude within +-20 km; `None` otherwise.
+    /// Creates the origin for a latitude within +-89 degrees, a longitude within +-180 degrees (north and east
+    /// positive) and an altitude within +-20 km; returns `None` otherwise.
     #[must_use]
     pub fn new(latitude_deg: f64, longitude_deg: f64, altitude_m: f64) -> Option<Self> {
         // WGS 84.
         const RADIUS_M: f64 = 6_378_137.0;
         const ECCENTRICITY_SQUARED: f64 = 6.694_379_990_14e-3;
-        // At a pole a degree of longitude is no distance, by which `global` would divide.
+        // Near a pole a degree of longitude has no length, and `global` would divide by zero.
         let valid = latitude_deg.abs() <= 89.0 && longitude_deg.abs() <= 180.0 && altitude_m.abs() <= 2e4;
         let (sine, cosine) = libm::sincos(latitude_deg.to_radians());
         let flattened = 1.0 - ECCENTRICITY_SQUARED * sine * sine;
@@ -39,7 +39,7 @@ impl Origin {
     }
 
     /// Returns the local coordinates of a place \[m\], on the plane that touches the ellipsoid. The curvature of the
-    /// earth is left out: 1 m of height and less than 1 m aside at 4 km (at 50 degrees of latitude).
+    /// earth is neglected: at 4 km (and 50 degrees of latitude) 1 m of height and less than 1 m horizontally.
     ///
     /// ```
     /// let origin = afbc_estimator::Origin::new(47.0, 8.0, 500.0).unwrap();
@@ -49,9 +49,9 @@ impl Origin {
     /// ```
     #[must_use]
     pub fn local(&self, latitude_deg: f64, longitude_deg: f64, altitude_m: f64) -> Vector3<f32> {
-        // Subtracted in f64: an f32 of degrees does not resolve centimetres.
+        // Subtracted in f64, because an f32 in degrees does not resolve centimetres.
         let mut east_deg = longitude_deg - self.longitude_deg;
-        // Across the date line.
+        // The shorter way across the date line.
         if east_deg > 180.0 {
             east_deg -= 360.0;
         } else if east_deg < -180.0 {
@@ -64,8 +64,8 @@ impl Origin {
         )
     }
 
-    /// Returns latitude and longitude \[degrees\] and altitude \[m\] of a position in the local frame: the inverse of
-    /// [`local`](Self::local).
+    /// Returns latitude and longitude \[degrees\] and altitude \[m\] of a position in the local frame. This is the
+    /// inverse of [`local`](Self::local).
     ///
     /// ```
     /// let origin = afbc_estimator::Origin::new(47.0, 8.0, 500.0).unwrap();

@@ -1,24 +1,24 @@
-//! Past states, so that a measurement meets the state of its own time.
+//! Ring of past states, so that each measurement is compared with the state at its own time.
 //!
-//! Corrections of the present hold for the past too: otherwise the next late measurement would report the same error
-//! again, and have it corrected twice. They are not written into every entry each time. The sum of all corrections is
-//! itself an error, (theta, v, p), that moves by the filter's equations ([`crate::horizon`]):
+//! A correction of the present state also corrects the past states; otherwise the next late measurement would report
+//! the same error again and correct it twice. The corrections are not written into every entry. Their sum is itself an
+//! error (theta, v, p) that follows the filter's equations ([`crate::horizon`]):
 //!
 //! ```text
 //! theta' = theta        v' = v - S x theta        p' = p + T v
 //! ```
 //!
-//! An entry is stored without it. When it is looked up, tau later, it gets the sum of the present taken back to its
-//! time: v + S x theta and p - tau v - D x theta.
+//! Entries are stored without corrections. A lookup of an entry that is tau old adds the present sum, propagated back
+//! to the entry's time: v + S x theta and p - tau v - D x theta.
 
 use crate::rotation::{identity, normalized, renormalized};
 use afbc_control::math::abs_max;
 use nalgebra::{Quaternion, Vector3};
 
-/// Number of entries: 284 ms of 4 ms each, since a measurement of 250 ms may wait for its turn.
+/// Number of entries: 284 ms at 4 ms each, since a measurement of 250 ms may still wait for its turn.
 const ENTRIES: usize = 72;
-/// Corrections of position \[m\] and velocity \[m/s\] above which all entries are rewritten, to keep their last bits,
-/// and of the rotation \[rad\], to keep the sum linear.
+/// Sum of corrections above which all entries are rewritten: position \[m\] and velocity \[m/s\] for precision,
+/// rotation \[rad\] for linearity.
 const SHIFT_MAX: f32 = 8.0;
 const TURN_MAX: f32 = 0.1;
 
@@ -32,12 +32,12 @@ pub(crate) struct Past {
     pub(crate) position: Vector3<f32>,
 }
 
-/// Sum of corrections.
+/// Sum of the corrections.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Shift {
-    /// The rotation, exactly.
+    /// Exact rotation.
     attitude: Quaternion<f32>,
-    /// Rotation since the entries were rewritten.
+    /// Linear rotation since the entries were last rewritten.
     theta: Vector3<f32>,
     velocity: Vector3<f32>,
     position: Vector3<f32>,
@@ -50,11 +50,11 @@ const NOTHING: Past = Past {
     position: Vector3::new(0.0, 0.0, 0.0),
 };
 
-/// The ring of past states.
+/// Ring of past states.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct History {
     entries: [Past; ENTRIES],
-    /// Place of the newest entry.
+    /// Index of the newest entry.
     newest: u32,
     filled: u32,
     shift: Shift,
@@ -69,28 +69,28 @@ impl Default for History {
 }
 
 impl History {
-    /// Forgets all entries.
+    /// Deletes all entries and corrections.
     pub(crate) fn clear(&mut self) {
         self.filled = 0;
         let zero = Vector3::zeros();
         self.shift = Shift { attitude: identity(), theta: zero, velocity: zero, position: zero };
     }
 
-    /// Returns the entry stored `back` entries ago, without corrections.
+    /// Returns the entry stored `back` entries before the newest, without corrections.
     #[inline]
     fn entry(&self, back: u32) -> Option<&Past> {
         let place = if back <= self.newest { self.newest - back } else { self.newest + ENTRIES as u32 - back };
         self.entries.get(place as usize).filter(|_| back < self.filled)
     }
 
-    /// Moves the sum of corrections by `time_s`, in which specific force has changed the velocity by `thrust`.
+    /// Propagates the sum of corrections by `time_s`, in which specific force has changed the velocity by `thrust`.
     pub(crate) fn advance(&mut self, time_s: f32, thrust: &Vector3<f32>) {
         let change = thrust.cross(&self.shift.theta);
         self.shift.position += (self.shift.velocity - change * 0.5) * time_s;
         self.shift.velocity -= change;
     }
 
-    /// Stores the state of the present.
+    /// Stores the present state.
     pub(crate) fn store(&mut self, state: &Past) {
         let raw = Past {
             at_us: state.at_us,
@@ -105,8 +105,8 @@ impl History {
         self.filled = (self.filled + 1).min(ENTRIES as u32);
     }
 
-    /// Adds a correction of the present: the rotation `theta` in the earth frame, which is `turn`, velocity and
-    /// position.
+    /// Adds a correction of the present state: the rotation in the earth frame, exact as `turn` and linear as `theta`,
+    /// velocity and position.
     pub(crate) fn correct(
         &mut self,
         turn: &Quaternion<f32>,
@@ -120,7 +120,7 @@ impl History {
         self.shift.position += position;
     }
 
-    /// True if the corrections have grown so large that [`settle`](Self::settle) is due.
+    /// Returns true if the corrections are so large that [`settle`](Self::settle) is due.
     pub(crate) fn is_unsettled(&self) -> bool {
         abs_max(&self.shift.velocity) > SHIFT_MAX
             || abs_max(&self.shift.position) > SHIFT_MAX
@@ -139,16 +139,16 @@ impl History {
             entry.position += position;
         }
         let zero = Vector3::zeros();
-        // The rotation stays apart: as a quaternion it is exact at any size.
+        // The exact rotation stays in the sum: a quaternion has no limit.
         (self.shift.theta, self.shift.velocity, self.shift.position) = (zero, zero, zero);
     }
 
-    /// Returns the newest entry, without corrections.
+    /// Returns the newest entry without corrections.
     pub(crate) fn newest_raw(&self) -> Option<Past> {
         self.entry(0).copied()
     }
 
-    /// Returns the newest entry, corrected.
+    /// Returns the newest entry with corrections.
     #[inline]
     pub(crate) fn newest(&self) -> Option<Past> {
         self.entry(0).map(|entry| Past {
@@ -159,7 +159,7 @@ impl History {
         })
     }
 
-    /// Returns `raw` with all corrections, `None` before the first entry.
+    /// Returns `raw` with corrections, `None` before the first entry.
     #[inline]
     pub(crate) fn corrected(&self, raw: &Past, gravity: f32) -> Option<Past> {
         let (velocity, position) = self.shift.of(raw, self.entry(0)?, gravity);
@@ -171,7 +171,7 @@ impl History {
         })
     }
 
-    /// Returns the change of velocity by specific force from `raw` up to the newest entry.
+    /// Returns the velocity change by specific force from `raw` to the newest entry.
     pub(crate) fn thrust_since(&self, raw: &Past, gravity: f32) -> Vector3<f32> {
         match (self.newest(), self.corrected(raw, gravity)) {
             (Some(newest), Some(past)) => way(&newest, &past, gravity).1,
@@ -179,11 +179,11 @@ impl History {
         }
     }
 
-    /// Returns the state at `at_us`, interpolated and without corrections, `None` if it is before the oldest or after
-    /// the newest entry.
+    /// Returns the interpolated state at `at_us` without corrections, `None` if it is before the oldest or after the
+    /// newest entry.
     pub(crate) fn at(&self, at_us: u32) -> Option<Past> {
         let newest = self.entry(0)?;
-        // Signed: right also where the 32 bits of the time overflow.
+        // As a signed number the age is right even when the 32-bit time wraps.
         let age = |entry: &Past| entry.at_us.wrapping_sub(at_us) as i32;
         if age(newest) < 0 {
             return None;
@@ -191,7 +191,7 @@ impl History {
         if age(newest) == 0 {
             return Some(*newest);
         }
-        // The oldest entry after that time, by bisection.
+        // Bisection for the last entry before `at_us` and the first one after.
         let (mut later, mut earlier) = (0, self.filled - 1);
         if self.entry(earlier).is_none_or(|oldest| age(oldest) > 0) {
             return None;
@@ -209,7 +209,7 @@ impl History {
 }
 
 impl Shift {
-    /// Returns the corrections of velocity and position at the time of `raw`; both entries are without corrections.
+    /// Returns the corrections of velocity and position at the time of `raw`. Both entries are without corrections.
     #[inline]
     fn of(&self, raw: &Past, newest: &Past, gravity: f32) -> (Vector3<f32>, Vector3<f32>) {
         let (tau_s, thrust, distance) = way(newest, raw, gravity);
@@ -228,15 +228,15 @@ pub(crate) fn way(present: &Past, past: &Past, gravity: f32) -> (f32, Vector3<f3
     (tau_s, thrust, distance)
 }
 
-/// Interpolates: the position with both velocities (Hermite's cubic), the others linearly.
+/// Interpolates between two entries: the position as Hermite's cubic with both velocities, the rest linearly.
 fn between(a: &Past, b: &Past, at_us: u32) -> Past {
-    // Above zero: `at_us` is not before `a`, and before `b`.
+    // Above zero: `at_us` is at or after `a` and before `b`.
     let span_us = b.at_us.wrapping_sub(a.at_us) as f32;
     let x = at_us.wrapping_sub(a.at_us) as f32 / span_us;
     let span_s = span_us * 1e-6;
-    // q and -q are one attitude: the straight line must take the short way.
+    // q and -q are the same attitude; the interpolation must use the nearer one.
     let nearer = if a.attitude.dot(&b.attitude) < 0.0 { -b.attitude } else { b.attitude };
-    // What the velocities add to the straight line between the positions.
+    // Deviation of each end's velocity from the straight line between the positions.
     let chord = b.position - a.position;
     let bend = |velocity: &Vector3<f32>| velocity * span_s - chord;
     let (from, to) = (bend(&a.velocity), bend(&b.velocity));

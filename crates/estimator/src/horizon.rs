@@ -1,8 +1,8 @@
-//! From the error of a past state to that of the present, in closed form.
+//! Innovations and Jacobians of late measurements: maps the error of a past state to the present error in closed form.
 //!
-//! Between the time of a measurement and the present, tau later, the error moves by the filter's own equations
-//! ([`crate::covariance`]). Solved backwards, with C = tau R (the mean rotation), S the change of velocity by specific
-//! force and D the integral of the change still to come,
+//! Between the time of a measurement and the present, tau later, the error follows the filter's own equations
+//! ([`crate::covariance`]). Solved backwards, with C = tau R (the mean rotation), S the velocity change by specific
+//! force and D the position change that S has yet to cause,
 //!
 //! ```text
 //! theta_past = theta + C g
@@ -10,9 +10,9 @@
 //! p_past     = p - tau v - D x theta                             D = tau v - (p - p_past) + g tau^2/2 e_z
 //! ```
 //!
-//! so a late measurement corrects the present as if it had been fused in time and all since had been replayed, but for
-//! the noise of the inertial sensors in between. Left out are the terms of the gyroscope's bias in v and p, 5e-5 m/s
-//! for 1e-3 rad/s and 100 ms, and that of the accelerometer's in p, 1e-4 m for 0.02 m/s2 and 100 ms.
+//! So a late measurement corrects the present as if it had been fused in time and all later samples had been replayed,
+//! apart from the IMU's noise in between. The effects of the gyroscope bias on v and p are left out (5e-5 m/s for 1e-3
+//! rad/s and 100 ms), and that of the accelerometer bias on p (1e-4 m for 0.02 m/s2 and 100 ms).
 
 use crate::errors::{Coordinate, NO_ROW, Row, Slows};
 use crate::history::{Past, way};
@@ -20,45 +20,45 @@ use crate::rotation::{atan2, difference, matrix};
 use afbc_control::math::{max, sqrt, wrap_angle};
 use nalgebra::{Matrix3, Quaternion, Vector3};
 
-/// What a scalar measures.
+/// Measured quantity with its measured value.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Target {
     Position(Vector3<f32>),
     Velocity(Vector3<f32>),
     Attitude(Quaternion<f32>),
-    /// Height with the barometer's offset.
+    /// Barometer height, which includes the barometer's offset.
     Height(f32),
-    /// Direction of the horizontal field, and the field.
+    /// Magnetic field in the body frame; only the direction of its horizontal part is fused.
     Field(Vector3<f32>),
     Heading(f32),
 }
 
-/// What is expected of barometer and magnetometer.
+/// Expected values of barometer and magnetometer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Expected {
-    /// Offset of the barometer \[m\].
+    /// Barometer offset \[m\].
     pub(crate) height_offset: f32,
     /// Magnetic field in the earth frame, of any strength.
     pub(crate) field: Vector3<f32>,
 }
 
-/// A past state seen from the present.
+/// A past state as seen from the present.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Horizon {
     past: Past,
-    /// Rotation at that time.
+    /// Rotation of the past state.
     rotation: Matrix3<f32>,
     tau_s: f32,
-    /// C.
+    /// Matrix C.
     turn: Matrix3<f32>,
-    /// S.
+    /// Velocity change S.
     thrust: Vector3<f32>,
-    /// D.
+    /// Distance D.
     distance: Vector3<f32>,
 }
 
 impl Horizon {
-    /// Looks from `present`, at the time of the covariance, back to `past`.
+    /// Compares `present`, at the covariance's time, with `past`.
     pub(crate) fn new(present: &Past, past: &Past, gravity: f32) -> Self {
         let (tau_s, thrust, distance) = way(present, past, gravity);
         let rotation = matrix(&past.attitude);
@@ -66,7 +66,7 @@ impl Horizon {
         Horizon { past: *past, rotation, tau_s, turn, thrust, distance }
     }
 
-    /// Returns the same after a turn about the vertical.
+    /// Returns this horizon after a turn about the vertical.
     pub(crate) fn turned(&self, turn: &Quaternion<f32>) -> Self {
         let r = matrix(turn);
         Horizon { rotation: r * self.rotation, turn: r * self.turn, ..*self }
@@ -82,23 +82,23 @@ impl Horizon {
         self.tau_s
     }
 
-    /// Returns the field in the earth frame.
+    /// Returns a body frame field in the earth frame.
     pub(crate) fn field(&self, field: &Vector3<f32>) -> Vector3<f32> {
         self.rotation * field
     }
 
-    /// Yaw of the past state.
+    /// Returns the yaw of the past state.
     pub(crate) fn heading(&self) -> f32 {
         atan2(self.rotation.m21, self.rotation.m11)
     }
 
-    /// Returns the innovation of `target` at `coordinate` (the first one for scalars) and its Jacobian; `None` where
-    /// there is no heading: with the nose or the field upright.
+    /// Returns the innovation of `target` at `coordinate` (ignored for single scalars) and its Jacobian, `None` if the
+    /// heading is undefined because the nose or the field is almost vertical.
     pub(crate) fn row(&self, target: &Target, coordinate: Coordinate, expected: &Expected) -> Option<(f32, Row)> {
         let at = coordinate;
         let unit = at.unit();
         let none = Row { coordinate, ..NO_ROW };
-        // An angle: the error's product with `theta`.
+        // Row of an angle, whose innovation is the product of the rotation error with `theta`.
         let angle = |innovation: f32, theta: Vector3<f32>| {
             (innovation, Row { theta, gyro: Some(self.turn.tr_mul(&theta)), ..none })
         };
@@ -121,8 +121,7 @@ impl Horizon {
             }
             Target::Field(field) => {
                 let field = self.field(field);
-                // The Jacobian of the expected field: that of the measured one has its noise, which would look like a
-                // tilt.
+                // The Jacobian uses the expected field: the noise of the measured field would look like a tilt.
                 let theta = upright(&expected.field)?;
                 let north = atan2(expected.field.y, expected.field.x);
                 let (innovation, row) = angle(wrap_angle(north - atan2(field.y, field.x)), theta);
@@ -142,15 +141,16 @@ impl Horizon {
     }
 }
 
-/// What fields along body x and y, in shares of the earth's horizontal field, make of the direction of `north`.
+/// Returns the derivative of the direction of `north` by fields along body x and y, in shares of the earth's horizontal
+/// field.
 pub(crate) fn magnetic(rotation: &Matrix3<f32>, north: &Vector3<f32>) -> Slows {
     let across = Vector3::new(north.y, -north.x, 0.0) * (1.0 / sqrt(max(north.x * north.x + north.y * north.y, 1e-12)));
     let body = rotation.tr_mul(&across);
     Slows::new(0.0, 0.0, 0.0, body.x, body.y)
 }
 
-/// Change of the direction of a vector's horizontal part by a rotation of the earth frame; `None` within 10 degrees of
-/// upright.
+/// Returns the derivative of the direction of a vector's horizontal part by a rotation of the earth frame, `None`
+/// within 10 degrees of vertical.
 fn upright(vector: &Vector3<f32>) -> Option<Vector3<f32>> {
     let horizontal = vector.x * vector.x + vector.y * vector.y;
     if horizontal < 0.03 * vector.norm_squared() {

@@ -1,67 +1,67 @@
-//! Health of the inertial sensors, and the filter on the body rates.
+//! Health of the IMU, and the low-pass filter of the body rates.
 
 use crate::measurement::ImuSample;
 use crate::settings::Settings;
 use afbc_control::math::{abs_max, sqrt, tan};
 use nalgebra::Vector3;
 
-/// Time without a sample after which the IMU is missing \[us\].
+/// Time without a sample after which the IMU counts as missing \[us\].
 pub const MISSING_US: u64 = 20_000;
-/// Time that clipping is reported after a clipped sample \[us\].
+/// Time for which clipping is reported after a clipped sample \[us\].
 const CLIPPED_US: u32 = 200_000;
-/// Share of the squared change that a sample replaces.
+/// Weight of one sample in the mean squared change.
 const SHARE: f32 = 0.01;
 
-/// Health of the inertial sensors.
+/// Health of the IMU.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ImuHealth {
-    /// No sample for 20 ms, or none yet.
+    /// No sample within the last 20 ms, or none yet.
     pub missing: bool,
     /// The same numbers for too long.
     pub stuck: bool,
     /// A coordinate was at the end of its range within the last 200 ms.
     pub clipped: bool,
-    /// Changes more from sample to sample than a vehicle can.
+    /// Rates or specific force change more from sample to sample than a vehicle can.
     pub noisy: bool,
-    /// Samples refused, up to `u32::MAX`: not finite, absurd, or of a time that goes back, stands still or lies in the
-    /// future.
+    /// Number of refused samples, up to `u32::MAX`: values not finite or implausible, or a time that repeats, goes back
+    /// or lies in the future.
     pub refused: u32,
-    /// Change of the specific force from sample to sample, root mean square \[m/s2\].
+    /// Root mean square of the specific force's change from sample to sample \[m/s2\].
     pub vibration_m_s2: f32,
 }
 
 impl ImuHealth {
-    /// True if attitude and rates can be taken from it.
+    /// Returns true if attitude and rates may use the IMU.
     #[must_use]
     pub fn is_usable(&self) -> bool {
         !(self.missing || self.stuck)
     }
 }
 
-/// Which of the two sensors is at the end of its range.
+/// Sensors whose sample is at the end of its range.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Clipped {
     pub(crate) gyro: bool,
     pub(crate) accel: bool,
 }
 
-/// Watches the samples.
+/// Monitor of the IMU samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Monitor {
     last: Option<ImuSample>,
-    /// Since when the numbers are the same \[us\].
+    /// Time of the last change of the numbers \[us\].
     same_us: u64,
     clipped_us: Option<u64>,
     /// Mean squared changes of rates and specific force.
     rates_change: f32,
     force_change: f32,
     refused: u32,
-    /// Refused one after the other.
+    /// Number of samples refused in a row.
     in_a_row: u32,
 }
 
 impl Monitor {
-    /// Time of the last sample taken \[us\].
+    /// Returns the time of the last accepted sample \[us\].
     pub(crate) fn at_us(&self) -> Option<u64> {
         self.last.map(|last| last.at_us)
     }
@@ -76,27 +76,27 @@ impl Monitor {
         self.in_a_row = self.in_a_row.saturating_add(1);
     }
 
-    /// True if so many were refused that the time itself must have changed.
+    /// Returns true if so many samples in a row were refused that the sample clock must have jumped.
     pub(crate) fn is_lost(&self) -> bool {
         self.in_a_row >= 500
     }
 
-    /// True if the numbers have been the same for longer than `stuck_us`.
+    /// Returns true if the numbers have been the same for longer than `stuck_us`.
     #[inline]
     fn is_stuck(&self, stuck_us: u64) -> bool {
         self.last.as_ref().is_some_and(|last| last.at_us.saturating_sub(self.same_us) > stuck_us)
     }
 
-    /// True if a sample only repeats those of a stuck sensor, and counts as missing.
+    /// Returns true if the sample repeats those of a stuck sensor. Such a sample counts as missing.
     pub(crate) fn repeats(&self, sample: &ImuSample, stuck_us: u64) -> bool {
         let same = |last: &ImuSample| {
             last.rates_rad_s == sample.rates_rad_s && last.specific_force_m_s2 == sample.specific_force_m_s2
         };
-        // The time first: six numbers take longer to compare.
+        // The time is compared first, because comparing six numbers takes longer.
         self.is_stuck(stuck_us) && self.last.as_ref().is_some_and(same)
     }
 
-    /// Takes a sample that is not refused, nor repeats those of a stuck sensor. Returns what of it is clipped.
+    /// Accepts a sample that is neither refused nor a repetition of a stuck sensor. Returns what is clipped.
     pub(crate) fn take(&mut self, sample: &ImuSample, settings: &Settings) -> Clipped {
         self.in_a_row = 0;
         if let Some(last) = &self.last {
@@ -140,14 +140,14 @@ impl Monitor {
     }
 }
 
-/// Low-pass filter of second order (Butterworth, bilinear transform) for one kilohertz.
+/// Second-order low-pass filter (Butterworth, bilinear transform) at one kilohertz.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct LowPass {
-    /// b0, a1, a2; b1 = 2 b0, b2 = b0. None for no filter.
+    /// b0, a1, a2; b1 = 2 b0, b2 = b0. `None` for no filter.
     coefficients: Option<(f32, f32, f32)>,
 }
 
-/// Memory of a [`LowPass`]: the transposed direct form's two sums, and the output.
+/// Memory of a [`LowPass`]: the two sums of the transposed direct form, and the output.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Smoothed {
     sums: Option<(Vector3<f32>, Vector3<f32>)>,
@@ -163,14 +163,14 @@ impl LowPass {
         LowPass { coefficients: (cutoff_hz > 0.0).then_some((k * k * norm, a1, a2)) }
     }
 
-    /// Filters one more sample; the first one passes as it is.
+    /// Filters the next sample. The first one passes unchanged.
     #[inline]
     pub(crate) fn advance(&self, memory: &mut Smoothed, input: &Vector3<f32>) {
         let Some((b0, a1, a2)) = self.coefficients else {
             memory.output = *input;
             return;
         };
-        // Those of an input that has always been the same: starting from zero, the output would swing up to it.
+        // Initial sums as after a long constant input; from zero, the output would have to rise first.
         let (first, second) = memory.sums.unwrap_or((input * (1.0 - b0), input * (b0 - a2)));
         let output = input * b0 + first;
         memory.sums = Some((input * (2.0 * b0) - output * a1 + second, input * b0 - output * a2));

@@ -1,115 +1,115 @@
-//! The place of the inertial sensor, as the flight shows it.
+//! Finds the IMU's distance from the centre of mass in flight, and corrects its samples.
 //!
-//! A sensor at r from the centre of mass feels f + d omega/dt x r + omega x (omega x r), and the filter integrates the
-//! velocity of the sensor, v + omega x r. A quick velocity loop makes an attitude of omega x r: with the sensor 5 cm
-//! below the centre of mass that takes as much as the damping of the attitude gives, and the vehicle tumbles. On a
-//! multirotor nothing but a lever makes quick changes of the force along body x and y, for the thrust is along z and
-//! drag follows the velocity. So the lever is found by least squares from forces and angular accelerations, and a
-//! vehicle that begins to swing because of it shows it best.
+//! An IMU at r from the centre of mass measures f + d omega/dt x r + omega x (omega x r), and the filter integrates the
+//! velocity of the IMU, v + omega x r. A fast velocity loop turns omega x r into an attitude command. With the IMU 5 cm
+//! below the centre of mass this cancels the attitude's damping, and the vehicle tumbles. On a multirotor only a lever
+//! makes fast changes of the force along body x and y: the thrust is along z, and drag follows the velocity. So the
+//! lever is found by least squares from forces and angular accelerations. A vehicle that begins to oscillate because of
+//! the lever shows it best.
 //!
-//! Both pass the same filters, so that neither is late: means over two cycles of eight samples, weighted as a triangle;
-//! a Butterworth low-pass filter of fourth order at a third of the rotors' frequency, 15 Hz at most, since the rotors'
-//! vibration looks like a lever; and a high-pass filter of first order at 3.3 Hz, for biases, wind, and drag, which
-//! follows the velocity in a manoeuvre: at half of that it was taken for a lever in two of a hundred take-offs of the
-//! paper's vehicle in winds of up to 5.6 m/s, and now, with the wait below, in two of 1,200; at 4 Hz vehicles with a
-//! lever swing for too long. Only what turns the vehicle with more than 3 rad/s2 counts: no vibration does, and a
-//! vehicle that hovers finds nothing. The force along each axis has a variance of its own, found from what the lever
-//! does not explain. That along z is not heard: the thrust changes it, by far more than any lever does, and turns the
-//! vehicle while it does.
+//! Forces and angular accelerations pass the same filters, so their delays are equal. First a mean over two cycles of
+//! eight samples with triangular weights. Then a fourth-order Butterworth low-pass at a third of the rotor frequency,
+//! 15 Hz at most, because rotor vibration looks like a lever. Then a first-order high-pass at 3.3 Hz against biases,
+//! wind and drag, which follows the velocity in a manoeuvre. With half that corner, drag was taken for a lever in two
+//! of a hundred take-offs of the paper's vehicle in winds of up to 5.6 m/s. With 3.3 Hz and the wait below, that
+//! happens in two of 1,200; at 4 Hz a vehicle with a lever oscillates for too long. Only angular accelerations above 3
+//! rad/s2 count: no vibration reaches that, and a hovering vehicle finds nothing. Each axis has its own force variance,
+//! estimated from the residual. The force along z is not used: the thrust changes it far more than any lever, while it
+//! turns the vehicle.
 
 use crate::measurement::ImuSample;
 use afbc_control::math::{max, min, sqrt, tan};
 use nalgebra::{Matrix3, Vector2, Vector3};
 
-/// Sum of the squares of a sample's rates and force above which it is none: above those of any that is plausible, and
-/// compared in one step.
+/// Limit for the sum of the squared rates and forces of a sample; larger samples are invalid. Every plausible sample is
+/// below it, and one comparison is enough.
 const SQUARES_MAX: f32 = 1.3e7;
-/// Samples in a cycle, of which each does a part of the work, and how long they take.
+/// Samples per cycle, each of which does a part of the work, and the duration of a cycle.
 const CYCLE: u8 = 8;
 const CYCLE_S: f32 = 8e-3;
-/// Longest time between two samples \[us\]; after a longer one the filters begin anew.
+/// Longest gap between two samples \[us\]. After a longer gap the filters start again.
 const GAP_US: u64 = 10_000;
-/// Corner of the low-pass filter: below the rotors' frequency by this factor, and at most so high \[rad/s\].
+/// Corner of the low-pass filter: the rotor frequency divided by this factor, and at most this frequency \[rad/s\].
 const BELOW_ROTORS: f32 = 3.0;
 const CORNER_MAX_RAD_S: f32 = 94.0;
-/// Qualities of a Butterworth filter's sections.
+/// Quality factors of the Butterworth filter's sections.
 const QUALITIES: [f32; 2] = [0.541_196_1, 1.306_563];
-/// Cycles in the air in which the filters settle, 0.3 s: rotors that speed up shake the vehicle below the corner.
+/// Number of cycles in the air before the lever is estimated, 0.3 s: rotors that speed up vibrate below the corner.
 const SETTLES: u8 = 40;
-/// Share of a cycle in what is slow, which is taken off.
+/// Weight of one cycle in the slow part that the high-pass filter subtracts.
 const SLOW: f32 = 0.16;
-/// Squared angular acceleration from which on a force tells anything \[rad2/s4\].
+/// Squared angular acceleration above which a force is used \[rad2/s4\].
 const TELLS: f32 = 9.0;
-/// Standard deviation of a lever before the flight \[m\], and its variance's growth with each force \[m2\].
+/// Standard deviation of the lever before the flight \[m\], and growth of its variance with each force \[m2\].
 const BEFORE_M: f32 = 0.05;
 const WALK_M2: f32 = 1e-7;
-/// Standard deviation of a force at first and at least \[m/s2\].
+/// Initial and smallest standard deviation of a force \[m/s2\].
 const FORCE_FIRST_M_S2: f32 = 0.3;
 const FORCE_LEAST_M_S2: f32 = 0.1;
-/// Share of a cycle in the variance of a force.
+/// Weight of one cycle in the variance of a force.
 const SHARE: f32 = 0.02;
-/// Forces that count as one: the filters leave so many alike.
+/// Number of consecutive forces that count as one, because the filters correlate them.
 const ALIKE: f32 = 5.0;
-/// Standard deviations from which on a force is none of a lever.
+/// Gate in standard deviations: a force with a larger residual is not caused by a lever.
 const GATE: f32 = 5.0;
-/// A lever is sure from so many standard deviations on, and from this length on \[m\].
+/// The lever is used once it exceeds this many standard deviations and this length \[m\].
 const SURE: f32 = 5.0;
 const SURE_M: f32 = 0.01;
-/// Forces in a row after each of which it must be, 0.2 s of two axes: a single manoeuvre is no evidence.
+/// Number of forces in a row that must confirm the lever, 0.2 s of two axes: one manoeuvre is not enough.
 const LASTS: f32 = 50.0;
-/// Largest lever along an axis \[m\], and how fast a correction changes at most \[m/s\].
+/// Largest lever along an axis \[m\], and its largest rate of change \[m/s\].
 const MOST_M: f32 = 0.2;
 const CHANGES_M_S: f32 = 2.0;
 
-/// Finds in flight how far the inertial sensor is from where the vehicle's file says, and corrects its samples by that.
-/// It corrects nothing until it is sure: from 1 cm and five standard deviations on, each axis by itself.
+/// Finds in flight how far the IMU is from the position in the vehicle file, and corrects the samples. An axis is
+/// corrected only once its lever is certain: above 1 cm and five standard deviations.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LeverFinder {
     low_pass: [Section; 2],
     lever: Lever,
-    /// None before the first sample, and after a gap.
+    /// Filters, `None` before the first sample and after a gap.
     filters: Option<Filters>,
-    /// Lever by which samples are corrected \[m\].
+    /// Lever that the correction uses \[m\].
     corrected_m: Vector3<f32>,
     /// Time \[us\] and rates of the last sample.
     last: Option<(u64, Vector3<f32>)>,
 }
 
-/// What is known of the lever.
+/// Estimate of the lever.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Lever {
     lever_m: Vector3<f32>,
     covariance: Matrix3<f32>,
-    /// Variances of what the forces along x and y are beside it.
+    /// Variances of the forces along x and y that the lever does not explain.
     variances: Vector2<f32>,
-    /// Forces in a row after each of which it was known well enough, along each axis.
+    /// Number of forces in a row that have confirmed the lever, per axis.
     lasts: Vector3<f32>,
-    /// 1 along each axis on which it is sure, or else 0.
+    /// 1 for each axis whose lever is certain, otherwise 0.
     sure: Vector3<f32>,
 }
 
 /// Band-pass filters of rates and force, in this order.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Filters {
-    /// Samples of this cycle.
+    /// Number of samples in this cycle.
     part: u8,
-    /// Sums of this cycle's samples, weighted by how late in it they are; and by how early, with the others of the
-    /// cycle before.
+    /// Weighted sums for the triangular mean: `late` has this cycle's samples with rising weights; `sums` has the
+    /// previous cycle's and this cycle's with falling weights.
     late: [Vector3<f32>; 2],
     sums: [Vector3<f32>; 2],
     /// Memories of the low-pass filter's sections.
     memories: [[[Vector3<f32>; 2]; 2]; 2],
-    /// Its outputs, and those of the cycle before.
+    /// Low-pass outputs of this cycle and of the previous one.
     smooth: [Vector3<f32>; 2],
     before: [Vector3<f32>; 2],
-    /// Cycles in the air so far, up to [`SETTLES`].
+    /// Number of cycles in the air so far, up to [`SETTLES`].
     settled: u8,
-    /// Slow parts of angular acceleration and force, and these without them. The force is what the lever leaves.
+    /// Slow and fast parts of angular acceleration and force. The force is the residual after the lever's effect.
     slow: [Vector3<f32>; 2],
     quick: [Vector3<f32>; 2],
 }
 
-/// Section of a low-pass filter (bilinear transform), once in a cycle. b1 = 2 b0, b2 = b0.
+/// Section of the low-pass filter (bilinear transform), run once per cycle. b1 = 2 b0, b2 = b0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Section {
     b0: f32,
@@ -124,7 +124,7 @@ impl Section {
         Section { b0: k * k * norm, a1: 2.0 * (k * k - 1.0) * norm, a2: (1.0 - k / quality + k * k) * norm }
     }
 
-    /// Returns the memory of one whose input has always been the same.
+    /// Returns the memory after a long constant input.
     fn settled(&self, input: &Vector3<f32>) -> [Vector3<f32>; 2] {
         [input * (1.0 - self.b0), input * (self.b0 - self.a2)]
     }
@@ -138,7 +138,7 @@ impl Section {
 }
 
 impl LeverFinder {
-    /// Creates the one of a vehicle whose rotors turn at this speed in hover \[rad/s\].
+    /// Creates the finder for a vehicle whose rotors turn at this speed in hover \[rad/s\].
     #[must_use]
     pub fn new(hover_rad_s: f32) -> Self {
         let corner_rad_s = max(1.0, min(hover_rad_s / BELOW_ROTORS, CORNER_MAX_RAD_S));
@@ -157,29 +157,29 @@ impl LeverFinder {
         }
     }
 
-    /// Returns the lever by which samples are corrected \[m\].
+    /// Returns the lever that the correction uses \[m\].
     #[must_use]
     pub fn corrected_m(&self) -> Vector3<f32> {
         self.corrected_m
     }
 
-    /// Returns the lever as far as it is known, and its standard deviations \[m\].
+    /// Returns the estimated lever and its standard deviations \[m\].
     #[must_use]
     pub fn found_m(&self) -> [Vector3<f32>; 2] {
         [self.lever.lever_m, self.lever.covariance.diagonal().map(|variance| sqrt(max(variance, 0.0)))]
     }
 
-    /// Lets the filters settle anew, as after a jump of the force that no flight has.
+    /// Restarts the filters, for example after a jump of the force that cannot happen in flight.
     pub fn settle(&mut self) {
         self.filters = None;
     }
 
-    /// Takes a sample in the body's axes, and returns it corrected. It learns of one that was taken in the air only: on
-    /// its feet a vehicle turns about them.
+    /// Takes a sample in body axes and returns it corrected. The lever is estimated only in the air: on its feet a
+    /// vehicle turns about them and not about the centre of mass.
     #[inline(never)]
     #[must_use]
     pub fn correct(&mut self, sample: ImuSample, in_the_air: bool) -> ImuSample {
-        // One that is no number spoils no other, and neither does a time that goes back.
+        // A sample with NaN or a time that goes back affects no later sample.
         let squares = sample.rates_rad_s.norm_squared() + sample.specific_force_m_s2.norm_squared();
         let now = (squares < SQUARES_MAX).then_some((sample.at_us, sample.rates_rad_s));
         let since = now.and(core::mem::replace(&mut self.last, now));
@@ -195,7 +195,7 @@ impl LeverFinder {
         self.corrected(sample, us as f32 * 1e-6, &change)
     }
 
-    /// Returns a sample without what the lever adds. A lever that changes takes the velocity along, omega x r.
+    /// Returns the sample without the lever's effect. While the lever changes, its velocity omega x r changes too.
     fn corrected(&mut self, sample: ImuSample, dt_s: f32, change: &Vector3<f32>) -> ImuSample {
         let most_m = CHANGES_M_S * dt_s;
         let missing_m = self.lever.lever_m.component_mul(&self.lever.sure) - self.corrected_m;
@@ -206,7 +206,7 @@ impl LeverFinder {
         ImuSample { specific_force_m_s2: sample.specific_force_m_s2 - lever_m_s2, ..sample }
     }
 
-    /// Does a sample's part of the work.
+    /// Does this sample's part of the work of a cycle.
     fn learn(&mut self, sample: &ImuSample, in_the_air: bool) {
         let inputs = [sample.rates_rad_s, sample.specific_force_m_s2];
         let LeverFinder { low_pass, lever, filters, .. } = self;
@@ -230,9 +230,9 @@ impl LeverFinder {
 }
 
 impl Filters {
-    /// Those whose inputs have always been these.
+    /// Returns the filters after long constant inputs.
     fn settled([first, second]: &[Section; 2], inputs: &[Vector3<f32>; 2]) -> Self {
-        // Of the cycle before, 0 + 1 + ... + 7 times.
+        // Weights of the previous cycle: 0 + 1 + ... + 7.
         let weights = 0.5 * f32::from(CYCLE) * (f32::from(CYCLE) - 1.0);
         let [_, force] = *inputs;
         Filters {
@@ -248,7 +248,7 @@ impl Filters {
         }
     }
 
-    /// Ends a cycle.
+    /// Ends a cycle: runs the low-pass filter on the weighted mean.
     fn low_pass(&mut self, low_pass: &[Section; 2]) {
         self.part = 0;
         self.before = self.smooth;
@@ -262,10 +262,10 @@ impl Filters {
         self.settled = self.settled.saturating_add(1).min(SETTLES);
     }
 
-    /// Takes off what is slow, and of the force what this lever makes of it.
+    /// Removes the slow parts, and subtracts the lever's effect from the force.
     fn high_pass(&mut self, r: &Vector3<f32>) {
         let [[rates, force], [rates_before, force_before]] = [self.smooth, self.before];
-        // Both in the middle between two cycles.
+        // Both values are at the middle between two cycles.
         let omega = (rates + rates_before) * 0.5;
         let acceleration = (rates - rates_before) * (1.0 / CYCLE_S);
         let rest = (force + force_before) * 0.5 - acceleration.cross(r) - omega.cross(&omega.cross(r));
@@ -277,10 +277,10 @@ impl Filters {
 }
 
 impl Lever {
-    /// Takes the force along body x or y: parts 2 and 3 of a cycle.
+    /// Updates the lever with the force along body x (sample 2 of a cycle) or y (sample 3).
     fn hear(&mut self, part: u8, [acceleration, rests]: &mut [Vector3<f32>; 2]) {
         let a = *acceleration;
-        // Of a x r.
+        // Row of the cross product a x r.
         let (row, rest, variance) = match part {
             2 => (Vector3::new(0.0, -a.z, a.y), rests.x, &mut self.variances.x),
             _ => (Vector3::new(a.z, 0.0, -a.x), rests.y, &mut self.variances.y),
@@ -293,12 +293,12 @@ impl Lever {
             let of_row = *p * row;
             let expected = row.dot(&of_row) + ALIKE * *variance;
             if rest * rest < GATE * GATE * expected {
-                // As a square, so that it stays symmetric.
+                // Subtracted as a square, so that the matrix stays symmetric.
                 let root = of_row / sqrt(expected);
                 *p -= root * root.transpose();
                 let before_m = self.lever_m;
                 self.lever_m = (before_m + of_row * (rest / expected)).map(|part| max(-MOST_M, min(MOST_M, part)));
-                // The forces along the other axes are less its change, too.
+                // The force along the other axis must also see the changed lever.
                 let explained = a.cross(&(self.lever_m - before_m));
                 *rests -= explained;
                 left = if part == 2 { rests.x } else { rests.y };

@@ -1,4 +1,4 @@
-//! State estimator of a multirotor: position, velocity, attitude and biases from an IMU and whatever aids it.
+//! State estimator of a multirotor: position, velocity, attitude and biases from an IMU and aiding sensors.
 //!
 //! ```
 //! use afbc_estimator::{Estimator, ImuSample, Measurement, Memory, Settings, Stamped};
@@ -28,95 +28,99 @@
 //!
 //! # The filter
 //!
-//! An error-state Kalman filter (Sola, *Quaternion kinematics for the error-state Kalman filter*, arXiv 1711.02508,
-//! 2017; PX4's EKF2; Mueller, Hamer, D'Andrea, *Fusing ultra-wideband range measurements with accelerometers and rate
-//! gyroscopes for quadrocopter state estimation*, ICRA 2015, which the Crazyflie flies). The [nominal state](nominal)
-//! follows every sample of the inertial sensors. Its error is small, so it is estimated linearly: 15 errors (rotation,
-//! velocity, position, biases of gyroscope and accelerometer) and a 16th, the barometer's offset; five more, the
-//! [slow errors](slow) of a GNSS receiver and of a magnetometer, are considered without being estimated. [Their
-//! covariance](covariance) is predicted every 4 ms from what the samples since then add up to, block by block, since
-//! most of the transition matrix is zeros and ones.
+//! The estimator is an error-state Kalman filter (Sola, *Quaternion kinematics for the error-state Kalman filter*,
+//! arXiv 1711.02508, 2017; PX4's EKF2; Mueller, Hamer, D'Andrea, *Fusing ultra-wideband range measurements with
+//! accelerometers and rate gyroscopes for quadrocopter state estimation*, ICRA 2015, which the Crazyflie flies). The
+//! [nominal state](nominal) follows every IMU sample. Its error is small and is estimated linearly. There are 15 errors
+//! (rotation, velocity, position, biases of gyroscope and accelerometer) and a 16th, the barometer's offset. Five more,
+//! the [slow errors](slow) of a GNSS receiver and a magnetometer, are considered but not estimated. [The
+//! covariance](covariance) is predicted every 4 ms from the sum of the samples since then, block by block, because most
+//! of the transition matrix is zeros and ones.
 //!
-//! **It runs at the present.** Others (EKF2) run the filter at a time in the past, when all measurements are there, and
-//! bridge the rest by a second, simpler predictor. Here state and covariance are those of the newest sample, so an
-//! output is as good as the filter, and there is one of it. A [ring of past states](history) gives each measurement the
-//! state of its own time, up to 250 ms ago, and the filter's equations, solved backwards, [make its
-//! Jacobian](horizon) that of the present errors. What is lost is the noise of the inertial sensors during the delay:
-//! for 100 ms, less than a tenth of any receiver's.
+//! **The filter runs at the present.** EKF2 runs its filter at a delayed time, when all measurements have arrived, and
+//! bridges the delay with a second, simpler predictor. Here state and covariance are those of the newest sample, and
+//! there is only one output. A [ring of past states](history) gives each measurement the state of its own time, up to
+//! 250 ms ago. The filter's equations, solved backwards, turn the measurement's [Jacobian](horizon) into one of the
+//! present errors. Only the IMU's noise during the delay is neglected: for 100 ms, less than a tenth of any receiver's
+//! noise.
 //!
-//! **The rotation error is in the earth frame**, and is carried along when the attitude is corrected. Between
-//! corrections it has no transition of its own, which saves a sixth of the prediction; a heading that nothing has
-//! measured is one large variance, and the tilt's stay small. Carrying it along keeps tilt and accelerometer bias,
-//! which a hovering vehicle cannot tell apart, tied to one another in the body. Without that, every correction of the
-//! heading looks like a manoeuvre, and after hours at rest the filter is sure of a bias that it has never seen. A
-//! little of this remains if the settings are those of the bare part: in ten hours at rest outdoors the standard
-//! deviation of a horizontal bias falls from 0.1 to 0.05 m/s2, where it should stay, and errors reach three of it. With
-//! the default settings they do not reach two (`tests/soundness.rs`).
+//! **The rotation error is in the earth frame**, and is rotated along when the attitude is corrected. Between
+//! corrections it has no transition of its own, which saves a sixth of the prediction. An unmeasured heading is a
+//! single large variance, while the tilt variances stay small. Rotating the error along keeps tilt and accelerometer
+//! bias correlated in the body frame; a hovering vehicle cannot tell the two apart. Without it, every heading
+//! correction would look like a manoeuvre, and after hours at rest the filter would be certain of a bias that it never
+//! observed. A little of this remains with the noise settings of the bare sensor: in ten hours at rest outdoors the
+//! standard deviation of a horizontal bias falls from 0.1 to 0.05 m/s2, although it should stay, and errors reach three
+//! standard deviations. With the default settings they do not reach two (`tests/soundness.rs`).
 //!
-//! **Scalars are fused one by one**, [one per step](fusion), two if measurements pile up, none in a step that predicts:
-//! that bounds the worst step.
+//! **Scalars are fused one by one**: [one per step](fusion), two if measurements pile up, none in a step that predicts.
+//! This bounds the longest step.
 //!
 //! # Sensors
 //!
-//! * A **tracker** and a **GNSS receiver** both measure the position in the earth frame. Their origins must be the same
-//!   (on board `afbc_onboard::EstimatorFrontEnd` sees to that); whichever comes first sets the position, and one that
-//!   contradicts the other is rejected as long as the other is there. A receiver's height has a gate of its own. The
-//!   receiver's antenna is taken to be at the centre of mass, as is the IMU, whose samples [`ImuCalibration`] corrects
-//!   where it is not.
-//! * Of the standard deviation that a receiver reports, [`Settings::gnss_noise_m`] is noise, and the rest an
-//!   [error that stays for minutes](slow), which further fixes do not average: the position is as good as the receiver.
-//! * A tracker that repeats its pose in every bit for [`Settings::frozen_s`] is frozen, and not believed.
-//! * The **barometer**'s offset is a state. It is set so that the first height agrees with the position then: with
-//!   z = 0 at the start, and with the tracker's or the receiver's z from their first fix on. The receiver's height then
-//!   corrects the offset's drift and the barometer the receiver's noise; without either of these two, the barometer
-//!   holds the height, and the standard deviation grows with the offset's random walk.
-//! * The **magnetometer** corrects the heading and the gyroscope's bias, nothing else: a disturbed field cannot tilt
-//!   the vehicle. What iron and currents of the vehicle add to the field, [`Settings::mag_slow_rad`], is a slow error
-//!   too: further fields do not average it, and the heading is as good as that. A field whose strength or inclination
-//!   is not that of the start is not used.
-//! * A **heading** that neither tracker nor magnetometer measures follows from the motion once the vehicle accelerates.
-//!   By positions alone it never counts as valid, since an error of nearly half a turn may stay with a small standard
-//!   deviation; by a receiver's velocity it does.
-//! * **At rest on the ground** the velocity is held at zero, as long as [the inertial sensor shows rest](rest) and the
-//!   motors are known not to carry the vehicle ([`Memory::set_on_ground`]), or that is unknown and it has not moved
-//!   since the alignment. A vehicle carried by hand is followed. In the air without any aid for [`Settings::coast_s`] a
-//!   weak zero keeps roll and pitch level: of 5 m/s that stay for 2.5 s, which is no white noise. The tilt is then as
-//!   good as is said (`tests/unaided.rs`); velocity and position are invalid.
+//! * A **tracker** and a **GNSS receiver** both measure the position in the earth frame and must have the same origin
+//!   (on board, `afbc_onboard::EstimatorFrontEnd` sees to that). The first to arrive sets the position. While one is
+//!   fused, the other is rejected if it contradicts. A receiver's height has its own gate. The receiver's antenna and
+//!   the IMU are assumed at the centre of mass; [`ImuCalibration`] corrects the samples of an IMU elsewhere.
+//! * [`Settings::gnss_noise_m`] of a receiver's reported standard deviation is noise. The rest is a [slow error that
+//!   stays for minutes](slow). More fixes do not average the slow error, so the position is only as good as the
+//!   receiver.
+//! * A tracker that repeats exactly the same pose for [`Settings::frozen_s`] counts as frozen and is not fused.
+//! * The **barometer**'s offset is a state. The first height sets it to agree with the position: z = 0 at the start,
+//!   and the tracker's or receiver's z from the first fix on. Then the receiver's height corrects the offset's drift,
+//!   and the barometer averages the receiver's noise. With neither tracker nor receiver, the barometer holds the
+//!   height, and its standard deviation grows with the offset's random walk.
+//! * The **magnetometer** corrects only the heading and the gyroscope bias, so a disturbed field cannot tilt the
+//!   vehicle. The field of the vehicle's iron and currents, [`Settings::mag_slow_rad`], is a slow error too: it is not
+//!   averaged, and it limits the accuracy of the heading. A field whose strength or inclination differs from that at
+//!   the start is not used.
+//! * A **heading** that neither tracker nor magnetometer measures is found from the motion once the vehicle
+//!   accelerates. From positions alone it never counts as valid, because an error of nearly half a turn may stay with a
+//!   small standard deviation. From a receiver's velocity it does.
+//! * **At rest on the ground** the filter fuses zero velocity, as long as [the IMU shows rest](rest) and the motors are
+//!   known not to carry the vehicle ([`Memory::set_on_ground`]). If that is unknown, it does so until the vehicle first
+//!   moves after the alignment. A vehicle carried by hand is followed. In the air, after [`Settings::coast_s`] without
+//!   any aid, a weak zero velocity keeps roll and pitch level. It assumes speeds of 5 m/s that last for 2.5 s, which is
+//!   not white noise. The tilt then keeps to its stated standard deviation (`tests/unaided.rs`); velocity and position
+//!   are invalid.
 //!
 //! # For a controller
 //!
-//! Each fix makes position and velocity jump, those of an aid that comes back most, and the rotors shake the velocity.
-//! [`OutputFilter`] gives a controller the same state without either. A position or heading that is set anew, it can
-//! hand over instead ([`OutputFilter::handing_over`]), so that setpoints shift with it and the vehicle does not move.
+//! Each fix makes position and velocity jump, most of all when an aid comes back, and the rotors' vibration shakes the
+//! velocity. [`OutputFilter`] gives a controller the state without jumps and vibration. It can also hand over resets of
+//! position and heading ([`OutputFilter::handing_over`]), so that setpoints shift along and the vehicle does not move.
 //!
 //! # When something is wrong
 //!
-//! Each kind of measurement has a gate. One that contradicts the state [is followed](follow) only when nothing that it
-//! could be held against is left ([`aid`]): never while two others agree without it, as barometer and a receiver's
-//! velocity do about its height, and that velocity with the gyroscope about a compass; after [`Settings::reacquire_s`]
-//! without a fused one, while something else holds the state; and after three fifths of [`Settings::coast_s`] where
-//! nothing does, before the state is not valid any more. Its part of the state is then set to it and counted
-//! ([`Resets`]); the new error is that of the measurement, with every covariance that it has by the others' errors. A
-//! second reset within ten seconds doubts roll and pitch too, and one of the heading the gyroscope's bias.
+//! Each kind of measurement has a gate. A rejected measurement [is followed](follow) only if no other aid contradicts
+//! it ([`aid`]). It is never followed while two others agree without it: barometer and receiver velocity about the
+//! receiver's height, or receiver velocity and gyroscope about a compass. While something else holds the state, it is
+//! followed after [`Settings::reacquire_s`] without a fused one. Otherwise it is followed after three fifths of
+//! [`Settings::coast_s`], while the state is still valid. Its part of the state is then reset to the measurement and
+//! counted ([`Resets`]). The new error is that of the measurement, including its covariances with the other errors. A
+//! second reset within ten seconds also raises the variance of roll and pitch, and a heading reset that of the
+//! gyroscope bias.
 //!
-//! **The heading by a receiver's velocity** comes from a [bank of filters](yaw_bank) that take nothing from a compass.
-//! It sets a heading that nobody has told, or that it contradicts for two seconds by more than 20 degrees and three
-//! standard deviations: a compass that is disturbed along the body turns no vehicle away.
+//! **The heading from a receiver's velocity** comes from a [bank of filters](yaw_bank) that never use a compass. The
+//! bank sets an unknown heading. It resets a known one if it contradicts that for two seconds by more than 20 degrees
+//! and three standard deviations. So a compass that is disturbed along the body does not turn the vehicle away.
 //!
-//! Innovations that lean to one side doubt the biases, which have changed by more than was told. A clipped sample adds
-//! to the variance of what was clipped: the accelerometer's to the velocity, the gyroscope's to the attitude. Gaps of
-//! more than 20 ms raise both; after 250 ms without samples, or if the state is not possible any more, the filter
-//! starts again where it is. It has no output that is not finite, whatever is put in, and the covariance stays one
-//! (`tests/anything.rs`): a prediction adds what rounding may have taken, and a block of it that no covariance can have
-//! is found within 60 ms, forgotten and counted.
+//! Innovations with a mean to one side raise the bias variances, since a bias must have changed more than expected. A
+//! clipped accelerometer sample raises the velocity variance, a clipped gyroscope sample the attitude variance, and
+//! gaps of more than 20 ms raise both. After 250 ms without samples, or if the state becomes impossible, the filter
+//! restarts where it is. The output is finite for any input, and the covariance stays valid (`tests/anything.rs`): each
+//! prediction adds variance against rounding, and a block that is no valid covariance is found within 60 ms, reset and
+//! counted.
 //!
 //! # Reading order
 //!
-//! [`measurement`], [`settings`], [`data_sheet`], [`estimate`]: in and out. [`calibration`], [`lever`]: samples to body
-//! axes and the centre of mass.
-//! [`estimator`]: a step. [`align`]: the start. [`rest`]: rest. [`nominal`], [`errors`], [`covariance`]: prediction.
-//! [`history`], [`horizon`], [`queue`], [`fusion`], [`slow`]: measurements. [`aid`], [`follow`], [`yaw_bank`],
-//! [`restart`], [`imu`]: gates, resets, heading, starts, health. [`rotation`], [`geodetic`]: small mathematics.
+//! * Input and output: [`measurement`], [`settings`], [`data_sheet`], [`estimate`].
+//! * Correction of samples to body axes and centre of mass: [`calibration`], [`lever`].
+//! * The step: [`estimator`]. Alignment: [`align`]. Rest: [`rest`].
+//! * Prediction: [`nominal`], [`errors`], [`covariance`].
+//! * Fusion of measurements: [`history`], [`horizon`], [`queue`], [`fusion`], [`slow`].
+//! * Gates, resets, heading, starts, IMU health: [`aid`], [`follow`], [`yaw_bank`], [`restart`], [`imu`].
+//! * Small mathematics: [`rotation`], [`geodetic`].
 #![no_std]
 #![allow(rustdoc::private_intra_doc_links, reason = "the modules' documentation is for their reader")]
 

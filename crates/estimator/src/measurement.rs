@@ -1,26 +1,25 @@
-//! What the sensors say, and which of it is refused at the door.
+//! Input of the estimator: IMU samples and measurements, with their plausibility limits.
 
 use nalgebra::Vector3;
 
-/// A sample of the inertial sensors, in the body frame.
+/// Sample of the IMU in the body frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ImuSample {
-    /// Time at which it was true, on the clock of `now_us` \[us\].
+    /// Time of the measurement, on the clock of `now_us` \[us\].
     pub at_us: u64,
     /// Angular rates \[rad/s\].
     pub rates_rad_s: Vector3<f32>,
-    /// Specific force, that is acceleration less gravity: +9.81 along body z when level and at rest \[m/s2\].
+    /// Specific force, which is acceleration minus gravity: +9.81 along body z when level and at rest \[m/s2\].
     pub specific_force_m_s2: Vector3<f32>,
 }
 
-/// What an aiding sensor measured, in the earth and body frames of [`afbc_types`].
+/// Measurement of an aiding sensor, in the earth and body frames of [`afbc_types`].
 ///
-/// Standard deviations are positive; those below a tenth of a millimetre, of a milliradian or a millimetre per second
-/// count as that much.
+/// Standard deviations are positive. Those below 0.1 mm, 0.1 mrad or 1 mm/s are raised to that.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Measurement {
-    /// A tracker's pose.
+    /// Pose from a tracker.
     Pose {
         /// Position in the earth frame \[m\].
         position_m: Vector3<f32>,
@@ -31,14 +30,14 @@ pub enum Measurement {
         /// Standard deviation of the attitude about each axis \[rad\].
         attitude_sigma_rad: f32,
     },
-    /// A tracker's position alone.
+    /// Position from a tracker, without attitude.
     Position {
         /// Position in the earth frame \[m\].
         position_m: Vector3<f32>,
         /// Standard deviation of each coordinate \[m\].
         sigma_m: f32,
     },
-    /// A GNSS receiver's fix, as local coordinates ([`Origin::local`](crate::Origin::local)).
+    /// Fix of a GNSS receiver in local coordinates ([`Origin::local`](crate::Origin::local)).
     Gnss {
         /// Position in the earth frame \[m\].
         position_m: Vector3<f32>,
@@ -48,26 +47,26 @@ pub enum Measurement {
         horizontal_sigma_m: f32,
         /// Standard deviation of z \[m\].
         vertical_sigma_m: f32,
-        /// Standard deviation of the velocity's x and of its y \[m/s\].
+        /// Standard deviation of the velocity's x and y \[m/s\].
         speed_sigma_m_s: f32,
         /// Standard deviation of the velocity's z \[m/s\].
         climb_sigma_m_s: f32,
     },
-    /// A barometer's height above any fixed reference; its offset is estimated.
+    /// Barometer height above any fixed reference; the estimator finds its offset.
     Height {
         /// Height, upwards \[m\].
         height_m: f32,
-        /// Standard deviation without the slow drift of the offset \[m\].
+        /// Standard deviation of the noise, without the offset's slow drift \[m\].
         sigma_m: f32,
     },
-    /// A magnetometer's field, in the body frame, in any unit that does not change.
+    /// Field of a magnetometer in the body frame, in any fixed unit.
     MagneticField {
         /// Field.
         field: Vector3<f32>,
         /// Standard deviation of each coordinate, in the same unit.
         sigma: f32,
     },
-    /// A heading: the yaw angle, from any source.
+    /// Heading (yaw angle) from any source.
     Heading {
         /// Yaw \[rad\].
         heading_rad: f32,
@@ -85,27 +84,27 @@ const HEADING_MAX_RAD: f32 = 1e3;
 /// Largest coordinate and smallest norm of a field, in any usual unit from tesla to nanotesla.
 const FIELD_MAX: f32 = 1e7;
 const FIELD_MIN: f32 = 1e-7;
-/// Largest standard deviation of anything.
+/// Largest standard deviation of any quantity.
 const SIGMA_MAX: f32 = 1e4;
-/// Accepted deviation of a quaternion's squared norm from 1.
+/// Allowed deviation of a quaternion's squared norm from 1.
 const NORM_SQUARED_ERROR_MAX: f32 = 0.1;
 /// Largest rates \[rad/s\] and specific force \[m/s2\] of a sample.
 const RATE_MAX_RAD_S: f32 = 200.0;
 const FORCE_MAX_M_S2: f32 = 2000.0;
 
-/// True if every coordinate is finite and at most `max` in size.
+/// Returns true if every coordinate is finite and at most `max` in absolute value.
 fn within(vector: &Vector3<f32>, max: f32) -> bool {
-    // False of NaN.
+    // NaN returns false.
     vector.x.abs() <= max && vector.y.abs() <= max && vector.z.abs() <= max
 }
 
-/// True of a usable standard deviation.
+/// Returns true for a usable standard deviation.
 fn is_sigma(sigma: f32) -> bool {
     sigma > 0.0 && sigma <= SIGMA_MAX
 }
 
 impl ImuSample {
-    /// True if every value is finite and at most 200 rad/s and 2000 m/s2 in size.
+    /// Returns true if every value is finite and at most 200 rad/s or 2000 m/s2 in absolute value.
     #[must_use]
     pub fn is_plausible(&self) -> bool {
         within(&self.rates_rad_s, RATE_MAX_RAD_S) && within(&self.specific_force_m_s2, FORCE_MAX_M_S2)
@@ -113,11 +112,11 @@ impl ImuSample {
 }
 
 impl Measurement {
-    /// Numbers of which any of them is made, at most.
+    /// Largest number of values in one measurement.
     pub const NUMBERS: usize = 10;
 
-    /// Returns its kind (1 pose, 2 position, 3 GNSS, 4 height, 5 magnetic field, 6 heading) and its numbers in the
-    /// order of its fields, with zeros up to the end, for logs and wires.
+    /// Returns the kind (1 pose, 2 position, 3 GNSS, 4 height, 5 magnetic field, 6 heading) and the values in the order
+    /// of the fields, padded with zeros. For logs and links.
     pub fn numbers(&self) -> (u8, [f32; Self::NUMBERS]) {
         let (kind, [first, second], [g, h, i, j]): (u8, [Vector3<f32>; 2], [f32; 4]) = match *self {
             Measurement::Pose { position_m, attitude: [w, x, y, z], position_sigma_m, attitude_sigma_rad } => {
@@ -149,7 +148,7 @@ impl Measurement {
         (kind, [first.x, first.y, first.z, second.x, second.y, second.z, g, h, i, j])
     }
 
-    /// Returns the measurement of this kind and these [numbers](Self::numbers); none of an unknown kind.
+    /// Returns the measurement of this kind and these [numbers](Self::numbers), `None` for an unknown kind.
     pub fn of_numbers(kind: u8, [a, b, c, d, e, f, g, h, i, j]: [f32; Self::NUMBERS]) -> Option<Self> {
         let first = Vector3::new(a, b, c);
         Some(match kind {
@@ -175,8 +174,8 @@ impl Measurement {
         })
     }
 
-    /// True if every value is finite and possible: positions up to 50 km, velocities up to 150 m/s per coordinate,
-    /// rotations that are ones, fields that are not zero, standard deviations above 0 and up to 1e4.
+    /// Returns true if every value is finite and plausible: positions up to 50 km and velocities up to 150 m/s per
+    /// coordinate, unit quaternions, fields above zero, standard deviations above 0 and up to 1e4.
     #[must_use]
     pub fn is_plausible(&self) -> bool {
         match self {

@@ -1,4 +1,4 @@
-//! Everything that changes in an estimator.
+//! Memory of the estimator: everything that changes from step to step.
 
 use crate::aid::{Aids, Repeated};
 use crate::align::Align;
@@ -18,12 +18,12 @@ use crate::yaw_bank::YawBank;
 use afbc_types::Stamped;
 use nalgebra::{Matrix3, Quaternion, Vector2, Vector3};
 
-/// Memory of an estimator. The default is that before the first sample.
+/// Memory of an estimator. The default is the memory before the first sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Memory {
     /// True once the filter runs.
     pub(crate) runs: bool,
-    /// Whether the motors cannot carry the vehicle, if that is known.
+    /// Whether the motors cannot carry the vehicle; `None` if unknown.
     pub(crate) on_ground: Option<bool>,
     pub(crate) rest: Rest,
     pub(crate) align: Align,
@@ -31,55 +31,55 @@ pub struct Memory {
     pub(crate) smoothed: Smoothed,
     pub(crate) nominal: Nominal,
     pub(crate) covariance: Covariance,
-    /// Block of the covariance that was looked at last.
+    /// Number of the covariance block that was checked last.
     pub(crate) watched: u8,
-    /// Time of the covariance and of the newest entry of the history \[us\].
+    /// Time of the covariance and of the history's newest entry \[us\].
     pub(crate) covariance_us: u64,
-    /// What happened since then.
+    /// Motion since `covariance_us`.
     pub(crate) interval: Interval,
-    /// Rotation at that time.
+    /// Rotation at `covariance_us`.
     pub(crate) rotation: Matrix3<f32>,
-    /// Corrections of the attitude since that time.
+    /// Product of the attitude corrections since `covariance_us`.
     pub(crate) turned: Quaternion<f32>,
     /// Variances that the next prediction adds for clipped or missing samples: attitude and velocity.
     pub(crate) rough: (f32, f32),
-    /// The same, summed up to now, and the time of the last such sample \[us\].
+    /// Sum of the variances for recent clipped or missing samples, and the time of the last one \[us\].
     pub(crate) lately: ((f32, f32), u64),
     pub(crate) history: History,
-    /// Sum of the horizontal changes of velocity by specific force, which nothing corrects \[m/s\].
+    /// Sum of the horizontal velocity changes by specific force, never corrected \[m/s\].
     pub(crate) pushed: Vector2<f32>,
     pub(crate) yaw_bank: YawBank,
-    /// Time since when the bank contradicts the heading \[us\].
+    /// Time since which the yaw bank contradicts the heading \[us\].
     pub(crate) contradicted_us: Option<u64>,
-    /// Time of the last position that was rejected while a fused velocity carried the one before on, until either is
-    /// believed \[us\].
+    /// Time of the last rejected position while a fused velocity carried the old position on \[us\]. The validity of
+    /// the position depends on it.
     pub(crate) carried_us: Option<u64>,
-    /// What measurements have changed in the last step: position \[m\] and velocity \[m/s\].
+    /// Change of position \[m\] and velocity \[m/s\] by measurements in the last step.
     pub(crate) moved: (Vector3<f32>, Vector3<f32>),
     pub(crate) queue: Queue,
-    /// The fix that is being fused.
+    /// Fix that is being fused.
     pub(crate) fix: Option<Fix>,
-    /// Offset of the barometer \[m\]; meaningful if known.
+    /// Barometer offset \[m\], meaningful once it is known.
     pub(crate) height_offset: f32,
     pub(crate) knows: Known,
-    /// Strength and sine of the inclination of the magnetic field, once known.
+    /// Strength and sine of the inclination of the magnetic field, `None` until measured.
     pub(crate) field: Option<(f32, f32)>,
     pub(crate) aids: Aids,
-    /// Means of the innovations of motion and rotation, along the earth's axes, in standard deviations.
+    /// Mean innovations of motion and rotation along the earth's axes, in standard deviations.
     pub(crate) leaning: [Vector3<f32>; 2],
     pub(crate) repeated: Repeated,
     pub(crate) repeated_field: Repeated,
-    /// Time of the last pseudo-measurement \[us\].
+    /// Time of the last zero-velocity fusion \[us\].
     pub(crate) still_us: u64,
     /// Time at which the vehicle was last held at rest \[us\].
     pub(crate) held_us: Option<u64>,
-    /// Time of the last reset that a rejection caused \[us\].
+    /// Time of the last reset by a rejected aid \[us\].
     pub(crate) reset_us: Option<u64>,
     pub(crate) resets: Resets,
     pub(crate) dropped: Dropped,
 }
 
-/// What has been measured at all since the start.
+/// Parts of the state that were measured since the start.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Known {
     pub(crate) position: bool,
@@ -87,10 +87,10 @@ pub(crate) struct Known {
     pub(crate) height_offset: bool,
 }
 
-/// Time for which rough samples are summed up: longer than any measurement is late \[us\].
+/// Time for which rough samples are summed up, longer than the age of any measurement \[us\].
 const LATELY_US: u64 = 300_000;
 
-/// No time.
+/// Interval of zero length.
 pub(crate) const NO_INTERVAL: Interval = Interval {
     time_s: 0.0,
     turn: Matrix3::new(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
@@ -140,8 +140,8 @@ impl Default for Memory {
 }
 
 impl Memory {
-    /// Hands over a measurement, to be fused by one of the next steps. An implausible one
-    /// ([`Measurement::is_plausible`]) is refused; if eight are waiting, the oldest gives way. Both are counted.
+    /// Queues a measurement, which one of the next steps fuses. An implausible one ([`Measurement::is_plausible`]) is
+    /// refused. If eight measurements wait, the oldest is dropped. Both are counted.
     pub fn offer(&mut self, measurement: &Stamped<Measurement>) {
         if !measurement.value.is_plausible() {
             self.dropped.implausible = self.dropped.implausible.saturating_add(1);
@@ -150,20 +150,20 @@ impl Memory {
         }
     }
 
-    /// Tells whether the motors cannot carry the vehicle: they are off, or idle on the ground. While they cannot, the
-    /// velocity is held at zero whenever the inertial sensor shows rest, which holds attitude, position and biases too;
-    /// a vehicle that is moved by hand is not held. As long as that is unknown, it is held from the alignment until it
-    /// first moves: later, rest may be a hover in calm air.
+    /// Tells the filter whether the motors cannot carry the vehicle (off, or idle on the ground). If they cannot, the
+    /// filter fuses zero velocity whenever the IMU shows rest, which also holds attitude, position and biases. A
+    /// vehicle moved by hand is not held. Without this call, the vehicle is held from the alignment until it first
+    /// moves: later, rest may be a hover in calm air.
     pub fn set_on_ground(&mut self, on_ground: bool) {
         self.on_ground = Some(on_ground);
     }
 
-    /// True if the vehicle stands, as far as motors and inertial sensor show.
+    /// Returns true if IMU and motors show that the vehicle stands.
     pub(crate) fn stands(&self) -> bool {
         self.rest.is_still() && self.on_ground.unwrap_or(self.rest.unmoved)
     }
 
-    /// Adds variances of attitude and velocity for a sample at `at_us` that says less than usual.
+    /// Adds variances of attitude and velocity for a clipped sample or a gap at `at_us`.
     #[cold]
     pub(crate) fn roughen(&mut self, at_us: u64, theta: f32, velocity: f32) {
         self.rough = (self.rough.0 + theta, self.rough.1 + velocity);
@@ -173,31 +173,31 @@ impl Memory {
         self.lately = ((old_theta + theta, old_velocity + velocity), at_us);
     }
 
-    /// Returns the variances of attitude and velocity that such samples have added since `at_us`, at most.
+    /// Returns an upper bound of the variances of attitude and velocity added by clipping and gaps since `at_us`.
     pub(crate) fn roughened_since(&self, at_us: u64) -> (f32, f32) {
         if at_us < self.lately.1 { self.lately.0 } else { (0.0, 0.0) }
     }
 
-    /// Returns the records of the aiding sensors: normalised innovations squared, and what was fused and rejected.
+    /// Returns the fusion records of the aiding sensors.
     #[must_use]
     pub fn aids(&self) -> &Aids {
         &self.aids
     }
 
-    /// Returns the numbers of measurements that were not even looked at.
+    /// Returns the numbers of measurements dropped before the gate.
     #[must_use]
     pub fn dropped(&self) -> &Dropped {
         &self.dropped
     }
 
-    /// True once the filter runs.
+    /// Returns true once the filter runs.
     #[must_use]
     pub fn runs(&self) -> bool {
         self.runs
     }
 
-    /// Returns what the estimate is at the time of the last sample; none before the filter runs. `to_body` is that of
-    /// the inertial sensor ([`ImuCalibration::to_body`](crate::ImuCalibration::to_body)).
+    /// Returns the state at the last IMU sample, `None` before the filter runs. `to_body` is the IMU's rotation
+    /// ([`ImuCalibration::to_body`](crate::ImuCalibration::to_body)).
     #[must_use]
     pub fn inertial(&self, settings: &Settings, to_body: Matrix3<f32>) -> Option<Inertial> {
         let Nominal { rotation, velocity, rates, force, gyro_bias, accel_bias, .. } = self.nominal;
@@ -206,9 +206,9 @@ impl Memory {
         Some(Inertial { at_us, rotation, velocity, rates, force, gyro_bias, accel_bias, gravity, to_body })
     }
 
-    /// Returns the covariance of the errors as rows, symmetric, in the order: rotation in the earth frame \[rad\],
-    /// velocity \[m/s\], position \[m\], gyroscope's bias \[rad/s\], accelerometer's bias \[m/s2\], barometer's offset
-    /// \[m\]. Each error is truth less estimate. For tests and logs; not cheap.
+    /// Returns the covariance of the errors (truth minus estimate) as symmetric rows, in the order: rotation in the
+    /// earth frame \[rad\], velocity \[m/s\], position \[m\], gyroscope bias \[rad/s\], accelerometer bias \[m/s2\],
+    /// barometer offset \[m\]. For tests and logs; the call is slow.
     #[must_use]
     pub fn covariance(&self) -> [[f32; 16]; 16] {
         self.covariance.rows()

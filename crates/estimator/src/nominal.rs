@@ -1,33 +1,33 @@
-//! The nominal state: what the vehicle does by its inertial sensors alone, less their biases.
+//! Nominal state: integrates the IMU samples without their biases.
 //!
 //! ```text
 //! dq/dt = q (x) [0, w - b_g]/2        dv/dt = R(q) (f - b_a) - g e_z        dp/dt = v
 //! ```
 //!
-//! Sola, *Quaternion kinematics for the error-state Kalman filter*, 2017, section 5.3. Each sample is integrated by the
-//! trapezoid rule with the one before, the rotation with the coning term of Savage, *Strapdown Inertial Navigation
-//! Integration Algorithm Design*, 1998, w_1 x w_2 dt^2 / 12.
+//! Sola, *Quaternion kinematics for the error-state Kalman filter*, 2017, section 5.3. Each sample is integrated with
+//! the previous one by the trapezoidal rule. The rotation adds the coning term w_1 x w_2 dt^2 / 12 of Savage,
+//! *Strapdown Inertial Navigation Integration Algorithm Design*, 1998.
 
 use crate::measurement::ImuSample;
 use crate::rotation::{identity, matrix, renormalized, small};
 use nalgebra::{Matrix3, Quaternion, Vector3};
 
-/// The nominal state at the time of the last sample.
+/// Nominal state at the time of the last sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Nominal {
-    /// Body to earth.
+    /// Attitude, body to earth.
     pub(crate) attitude: Quaternion<f32>,
-    /// The same as a matrix.
+    /// Attitude as a matrix.
     pub(crate) rotation: Matrix3<f32>,
-    /// Earth frame \[m/s\].
+    /// Velocity, earth frame \[m/s\].
     pub(crate) velocity: Vector3<f32>,
-    /// Earth frame \[m\].
+    /// Position, earth frame \[m\].
     pub(crate) position: Vector3<f32>,
-    /// What rounding has left out of the position: at 1 km a slow vehicle's millisecond is below the last bit.
+    /// Rounding error of the position sum: at 1 km a slow vehicle's step of a millisecond is below the last bit.
     carry: Vector3<f32>,
-    /// \[rad/s\].
+    /// Gyroscope bias \[rad/s\].
     pub(crate) gyro_bias: Vector3<f32>,
-    /// \[m/s2\].
+    /// Accelerometer bias \[m/s2\].
     pub(crate) accel_bias: Vector3<f32>,
     /// Rates of the last sample without bias, body frame \[rad/s\].
     pub(crate) rates: Vector3<f32>,
@@ -53,38 +53,38 @@ impl Default for Nominal {
 }
 
 impl Nominal {
-    /// At this attitude, at rest at the origin, without biases.
+    /// Creates a state with this attitude, at rest at the origin, without biases.
     pub(crate) fn new(attitude: Quaternion<f32>) -> Self {
         let mut new = Nominal::default();
         new.turn_to(attitude);
         new
     }
 
-    /// Takes the first sample: nothing to integrate yet.
+    /// Takes the first sample, which leaves nothing to integrate yet.
     pub(crate) fn begin(&mut self, sample: &ImuSample) {
         self.rates = sample.rates_rad_s - self.gyro_bias;
         self.force = sample.specific_force_m_s2 - self.accel_bias;
     }
 
-    /// Turns the attitude to `attitude`, a unit quaternion.
+    /// Sets the attitude to a unit quaternion.
     pub(crate) fn turn_to(&mut self, attitude: Quaternion<f32>) {
         self.attitude = attitude;
         self.rotation = matrix(&attitude);
     }
 
-    /// Moves the vehicle by a correction.
+    /// Adds a correction to the position.
     pub(crate) fn move_by(&mut self, by: &Vector3<f32>) {
         self.position += by;
     }
 
-    /// Puts the vehicle to `position`.
+    /// Sets the position.
     pub(crate) fn move_to(&mut self, position: Vector3<f32>) {
         self.position = position;
         self.carry = Vector3::zeros();
     }
 
-    /// Integrates up to `sample`, `dt_s` after the last one. Returns the part of the velocity's change that is due to
-    /// specific force, in the earth frame \[m/s\].
+    /// Integrates up to `sample`, `dt_s` after the last one. Returns the velocity change by specific force in the earth
+    /// frame \[m/s\].
     #[inline]
     pub(crate) fn advance(&mut self, sample: &ImuSample, dt_s: f32, gravity: f32) -> Vector3<f32> {
         let rates = sample.rates_rad_s - self.gyro_bias;
@@ -96,7 +96,7 @@ impl Nominal {
         let change = (before + self.rotation * force) * half;
         let mut velocity = self.velocity + change;
         velocity.z -= gravity * dt_s;
-        // Kahan's summation.
+        // Kahan summation.
         let step = (self.velocity + velocity) * half - self.carry;
         let position = self.position + step;
         self.carry = (position - self.position) - step;
@@ -104,14 +104,14 @@ impl Nominal {
         change
     }
 
-    /// True if every number is finite and the vehicle within reach and of possible speed.
+    /// Returns true if every number is finite and position and speed are possible.
     pub(crate) fn is_sound(&self) -> bool {
         let q = &self.attitude;
         let turned = q.norm_squared();
         let far = afbc_control::math::abs_max(&self.position);
         let fast = afbc_control::math::abs_max(&self.velocity);
         let biases = (self.gyro_bias + self.accel_bias + self.rates + self.force).norm_squared();
-        // False of NaN.
+        // NaN makes the result false.
         let sums = turned + self.position.norm_squared() + self.velocity.norm_squared() + biases;
         sums.is_finite() && (turned - 1.0).abs() < 0.01 && far < 9e4 && fast < 300.0
     }

@@ -1,4 +1,4 @@
-//! What a controller shall not feel of an estimate: jumps of its corrections, and the rotors' vibration.
+//! Output filter: hides correction jumps and rotor vibration of the estimate from a controller.
 
 use crate::estimate::{Estimate, Resets};
 use afbc_control::math::{max, min, sqrt, tan, wrap_angle};
@@ -6,79 +6,79 @@ use afbc_types::{Parameters, ResetDelta, State};
 use core::f32::consts::TAU;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
-/// Times in which what is hidden of position and velocity decays to 1/e \[s\]: twice and once as long as a GNSS
-/// receiver's fixes are apart. While corrections keep one direction, as they do where the tilt is off by a little, the
-/// velocity is off by what they add up to in its time.
+/// Decay times (to 1/e) of the hidden offsets of position and velocity \[s\]: twice and once the period of a GNSS
+/// receiver's fixes. While corrections keep one sign, as with a small tilt error, the output velocity is off by the sum
+/// of the corrections within its decay time.
 const POSITION_DECAY_S: f32 = 0.2;
 const VELOCITY_DECAY_S: f32 = 0.1;
-/// Fastest approach of position \[m/s\] and velocity \[m/s2\]: a receiver that jumps by metres must not look like a
-/// gale.
+/// Largest decay rates of position \[m/s\] and velocity \[m/s2\], so that a receiver that jumps by metres does not look
+/// like a gale.
 const MOST_M_S: f32 = 1.0;
 const MOST_M_S2: f32 = 3.0;
-/// Quality of the notch: wide enough for rotors at different speeds and for a load of half the weight.
+/// Quality factor of the notch: wide enough for rotors at different speeds and for a payload of half the weight.
 const QUALITY: f32 = 1.0;
-/// Corner of the lead before the notch, over the notch's speed: above that of the paths, and so low that what is
-/// quicker than the rotors grows by 15 % only.
+/// Corner frequency of the lead before the notch, divided by the notch frequency. It is above the frequencies of flown
+/// paths, and so low that signals faster than the rotors grow by only 15 %.
 const LEAD: f32 = 0.15;
-/// Rotor speeds in hover that have a notch \[rad/s\]. Quicker rotors shake the velocity less, by the square of their
-/// speed as far as a law makes an attitude of it; slower ones would take a lead of 16 ms or more.
+/// Range of hover rotor speeds that get a notch \[rad/s\]. Faster rotors shake the velocity less: their effect on a
+/// controller's attitude command falls with the square of the speed. Slower rotors would need a lead of 16 ms or more.
 const NOTCH_MIN_RAD_S: f32 = 10.0 * TAU;
 const NOTCH_MAX_RAD_S: f32 = 100.0 * TAU;
 
-/// Time within which forces along body x and y are hidden from the velocity at take-off \[s\], a step of a millisecond,
-/// and by how much less they are hidden with each step in the air, and more with each on the ground.
+/// Time constant for hiding forces along body x and y at take-off \[s\], step time of a millisecond, and change of the
+/// hidden share per step: it rises on the ground and falls in the air.
 const FORCED_S: f32 = 0.4;
 const STEP_S: f32 = 1e-3;
 const UNHIDES: f32 = 1e-3;
-/// Squared specific force that says that something bears the vehicle, from half of gravity on \[m2/s4\].
+/// Squared specific force above which something supports the vehicle: half of gravity \[m2/s4\].
 const BORNE: f32 = 24.0;
 
-/// What quick forces along body x and y make of the velocity: F/m times (T s/(1 + T s))^2/s, T = 0.4 s.
+/// Velocity caused by fast forces along body x and y: F/m times (T s/(1 + T s))^2/s, T = 0.4 s.
 ///
-/// On its feet a vehicle cannot learn where its inertial sensor is ([`crate::LeverFinder`]), but may tumble by it. In
-/// the air no such force but a lever's is quick, so a law may as well not see what they make of the velocity; it would
-/// see a gust of wind later, however. So they are hidden when it has stood for a second, until it has been in the air
-/// for one. A vehicle that falls before its motors turn has not stood.
+/// On its feet a vehicle cannot find the IMU's lever ([`crate::LeverFinder`]), but the lever may make it tumble at
+/// take-off. In the air only a lever makes such fast forces, so a controller need not see the velocity they cause; but
+/// hiding it would delay the reaction to a gust. So the forces are hidden once the vehicle has stood for a second, and
+/// no longer once it has been in the air for a second. A vehicle that is dropped before its motors turn has not stood.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Forced {
-    /// Slow part of the force, in the body's axes \[m/s2\].
+    /// Slow part of the force, in body axes \[m/s2\].
     slow_m_s2: Vector3<f32>,
-    /// In the earth frame \[m/s\].
+    /// Velocity caused by the fast forces, earth frame \[m/s\].
     velocity_m_s: Vector3<f32>,
-    /// Share that is hidden.
+    /// Hidden share, 0 to 1.
     share: f32,
 }
 
-/// Hides the jumps of position and velocity that measurements make: the state goes on as the inertial sensor says, and
-/// approaches the estimate within 0.2 s (velocity 0.1 s), or at 1 m/s and 3 m/s2 from further away, as when an aid
-/// comes back. A law would answer each fix with a kick. A notch removes the rotors' vibration from the velocity, which
-/// a law would turn into commands of attitude and body rate. Attitude and rates pass unchanged.
+/// Hides the jumps of position and velocity that measurements make: a controller would answer each fix with a kick. The
+/// output follows the IMU and approaches the estimate within 0.2 s (velocity 0.1 s), or at 1 m/s and 3 m/s2 after
+/// larger jumps, as when an aid comes back. A notch removes the rotors' vibration from the velocity, which a controller
+/// would turn into commands of attitude and body rate. Attitude and rates pass unchanged.
 ///
-/// Where the position is set anew ([`Estimate::resets`]), the vehicle would fly by as much. A filter that
-/// [hands resets over](Self::handing_over) does not hide these: it tells them, and whoever makes the setpoints shifts
-/// them in the same step.
+/// After a position reset ([`Estimate::resets`]) a vehicle would fly by the jump. A filter that [hands resets
+/// over](Self::handing_over) does not hide resets but reports them, and the source of the setpoints shifts the
+/// setpoints in the same step.
 ///
-/// The default has no notch, hides everything, and is that before the first estimate.
+/// The default has no notch and hides all jumps, and is the state before the first estimate.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct OutputFilter {
     notch: Option<VelocityNotch>,
-    /// Time of the last estimate, if its position was valid \[us\]: its lower 32 bits.
+    /// Time of the last estimate if its position was valid \[us\]: the lower 32 bits.
     last_us: Option<u32>,
-    /// Estimate less the state that was output.
+    /// Estimate minus the output state.
     position_m: Vector3<f32>,
     velocity_m_s: Vector3<f32>,
-    /// What the notch keeps, once there was a velocity.
+    /// Memory of the notch, `None` before the first velocity.
     passed: Option<Passed>,
-    /// True if it hands resets over.
+    /// True if resets are handed over.
     hands_over: bool,
-    /// The last estimate, from the first one on.
+    /// Reset counts and yaw of the last estimate.
     last: Option<Last>,
-    /// What was set anew in the last step.
+    /// Reset that the last step found.
     reset: Option<ResetDelta>,
     forced: Forced,
 }
 
-/// What shows of an estimate that the next one has been set anew.
+/// Reset counts and yaw of an estimate, to detect a reset in the next one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Last {
     positions: u32,
@@ -86,16 +86,16 @@ struct Last {
     yaw_rad: f32,
 }
 
-/// What a notch has kept of its inputs: a low-pass of them, for the lead, and two sums.
+/// Memory of a notch: a low-pass of its input for the lead, and two sums.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Passed {
     slow_m_s: Vector3<f32>,
     sums: [Vector3<f32>; 2],
 }
 
-/// Notch of second order (bilinear transform) at one kilohertz, in the velocity that a controller gets. It would delay
-/// a slow change by 1/(Q omega), 5 ms on the paper's vehicle, which a law takes for a velocity that is off by as much
-/// of the acceleration. A lead before it, 1 + s/(Q omega)/(1 + s/(LEAD omega)), makes up for that.
+/// Second-order notch (bilinear transform) at one kilohertz on the velocity for the controller. Alone it would delay a
+/// slow change by 1/(Q omega), 5 ms on the paper's vehicle, which a controller would see as a velocity error
+/// proportional to the acceleration. A lead before it, 1 + s/(Q omega)/(1 + s/(LEAD omega)), cancels this delay.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VelocityNotch {
     centre_rad_s: f32,
@@ -104,12 +104,12 @@ pub struct VelocityNotch {
     /// b1 = a1.
     b1: f32,
     a2: f32,
-    /// Share of the way to its input that the slow value of the lead goes in a step.
+    /// Weight of a step in the low-pass of the lead.
     share: f32,
 }
 
 impl VelocityNotch {
-    /// Creates the one at this rotor speed; none outside of 10 to 100 Hz \[rad/s\].
+    /// Creates a notch at this rotor speed \[rad/s\], `None` outside of 10 to 100 Hz.
     #[must_use]
     pub fn at(centre_rad_s: f32) -> Option<Self> {
         (NOTCH_MIN_RAD_S..=NOTCH_MAX_RAD_S).contains(&centre_rad_s).then(|| {
@@ -120,22 +120,22 @@ impl VelocityNotch {
         })
     }
 
-    /// Returns the rotor speed that it removes \[rad/s\].
+    /// Returns the rotor speed that the notch removes \[rad/s\].
     #[must_use]
     pub fn centre_rad_s(&self) -> f32 {
         self.centre_rad_s
     }
 
-    /// Changes what `from`, which it follows, has kept: for a constant velocity both sums are b0 - a2 times that
-    /// velocity, which so goes on without a step.
+    /// Converts the memory of the previous notch `from`. For a constant velocity both sums are (b0 - a2) times the
+    /// velocity, so a constant velocity passes without a step.
     fn take_over(&self, from: &Self, passed: &mut Option<Passed>) {
         if let Some(Passed { sums, .. }) = passed {
-            // b0 - a2 is k/Q times the norm: above zero at every speed that has a notch.
+            // b0 - a2 is proportional to k/Q and above zero at every permitted speed.
             *sums = sums.map(|sum| sum * ((self.b0 - self.a2) / (from.b0 - from.a2)));
         }
     }
 
-    /// Filters one more value; the first one passes as it is.
+    /// Filters the next value. The first one passes unchanged.
     #[inline]
     fn pass(&self, passed: &mut Option<Passed>, input: &Vector3<f32>) -> Vector3<f32> {
         let VelocityNotch { b0, b1, a2, share, .. } = *self;
@@ -152,25 +152,25 @@ impl VelocityNotch {
 }
 
 impl OutputFilter {
-    /// Creates the one for a vehicle with these nominal parameters and this number of rotors.
+    /// Creates the filter for a vehicle with these nominal parameters and number of rotors.
     #[must_use]
     pub fn of(vehicle: &Parameters<f32>, rotors: usize) -> Self {
         Self::new(sqrt(vehicle.weight_n() / (rotors as f32 * vehicle.thrust_factor_n_s2)))
     }
 
-    /// Creates the one for rotors that turn at this speed in hover \[rad/s\].
+    /// Creates the filter for rotors that turn at this speed in hover \[rad/s\].
     fn new(hover_rad_s: f32) -> Self {
         OutputFilter { notch: VelocityNotch::at(hover_rad_s), ..OutputFilter::default() }
     }
 
-    /// The same, which hands over what is set anew ([`reset`](Self::reset)).
+    /// Returns this filter with resets handed over ([`reset`](Self::reset)) instead of hidden.
     #[must_use]
     pub fn handing_over(self) -> Self {
         OutputFilter { hands_over: true, ..self }
     }
 
-    /// Returns by how much position and heading were set anew in the last step, if they were, and if it hands that
-    /// over.
+    /// Returns the reset of position and heading in the last step, `None` without a reset or if this filter does not
+    /// hand resets over.
     #[must_use]
     pub fn reset(&self) -> Option<&ResetDelta> {
         self.reset.as_ref()
@@ -182,9 +182,9 @@ impl OutputFilter {
         self.notch.as_ref()
     }
 
-    /// Moves the notch from the next step on, without a step in a constant velocity; nothing without one. Beside
-    /// [`step`](Self::step), and seldom: what the sums know of the vibration is that of the old place for a period or
-    /// two.
+    /// Moves the notch from the next step on; does nothing without a notch. A constant velocity passes without a step.
+    /// Call it seldom and outside of [`step`](Self::step): for a period or two the memory still belongs to the old
+    /// frequency.
     pub fn move_notch(&mut self, to: &VelocityNotch) {
         if let Some(notch) = &mut self.notch {
             to.take_over(notch, &mut self.passed);
@@ -192,8 +192,8 @@ impl OutputFilter {
         }
     }
 
-    /// Takes the specific force of a sample, for the attitude of the estimate then; to be called before
-    /// [`step`](Self::step). Of a vehicle that stands it hides what forces along body x and y make of the velocity.
+    /// Takes the specific force and the attitude of a sample; call it before [`step`](Self::step). Once the vehicle has
+    /// stood, this hides the velocity caused by forces along body x and y.
     pub fn feel(&mut self, specific_force_m_s2: &Vector3<f32>, [w, x, y, z]: [f32; 4], in_the_air: bool) {
         let Forced { slow_m_s2, velocity_m_s, share } = &mut self.forced;
         let stands = !in_the_air && specific_force_m_s2.norm_squared() > BORNE;
@@ -207,13 +207,13 @@ impl OutputFilter {
         }
     }
 
-    /// Hides no forces any more.
+    /// Stops hiding forces.
     pub fn unhide(&mut self) {
         self.forced = Forced::default();
     }
 
-    /// Returns the state to output for this estimate; to be called every millisecond. Nothing is hidden of an estimate
-    /// whose position has not been valid before.
+    /// Returns the state to output for this estimate; call it every millisecond. Nothing is hidden in the first
+    /// estimate with a valid position.
     #[must_use = "the state is its result"]
     #[inline]
     pub fn step(&mut self, estimate: &Estimate) -> State {
@@ -227,12 +227,13 @@ impl OutputFilter {
             *self = OutputFilter { notch, hands_over, last, reset, forced, ..OutputFilter::default() };
             return state;
         }
-        // What is handed over is not hidden.
+        // A reset that is handed over is not hidden as well.
         let moved_m = estimate.moved_m - self.reset.map_or(Vector3::zeros(), |reset| reset.position_m);
         if let Some(last_us) = self.last_us {
             let dt_s = (estimate.at_us as u32).wrapping_sub(last_us) as f32 * 1e-6;
             let stays = |hidden: &Vector3<f32>, decay_s: f32, most: f32| {
-                // Within 0 and 1 after any time: the divisor is at least the decay, and the time at most.
+                // Within 0 and 1 for any time step: the divisor is at least `decay_s`, and the numerator at most
+                // `decay_s`.
                 1.0 - min(dt_s, decay_s) / max(decay_s, sqrt(hidden.norm_squared()) / most)
             };
             self.position_m = self.position_m * stays(&self.position_m, POSITION_DECAY_S, MOST_M_S) + moved_m;
@@ -248,7 +249,7 @@ impl OutputFilter {
         state
     }
 
-    /// Looks for what has been set anew since the last estimate.
+    /// Detects resets since the last estimate.
     #[inline]
     fn look(&mut self, estimate: &Estimate) {
         let Resets { position, heading, .. } = estimate.resets;
@@ -256,7 +257,7 @@ impl OutputFilter {
         if let Some(last) = self.last.replace(now)
             && (last.positions, last.headings) != (position, heading)
         {
-            // A turn of the vehicle within the millisecond counts too: a hundredth of a radian at most.
+            // Includes the vehicle's own turn within the millisecond: a hundredth of a radian at most.
             let yaw_rad = if last.headings == heading { 0.0 } else { wrap_angle(now.yaw_rad - last.yaw_rad) };
             let position_m = if last.positions == position { Vector3::zeros() } else { estimate.moved_m };
             self.reset = Some(ResetDelta { position_m, yaw_rad });
@@ -272,7 +273,8 @@ mod tests {
     use afbc_types::{Parameters, ResetDelta};
     use nalgebra::Vector3;
 
-    /// An estimate of a vehicle at 1 m/s whose position is off by `error_m`, and was moved by `moved_m`.
+    /// Returns an estimate of a vehicle at 1 m/s whose position is off by `error_m` and was moved by `moved_m` in this
+    /// step.
     fn estimate(ms: u64, error_m: f32, moved_m: f32) -> Estimate {
         let mut estimate = Estimate { at_us: 1000 * ms, ..Estimate::default() };
         estimate.validity = Validity { position: true, ..Validity::default() };
@@ -282,7 +284,7 @@ mod tests {
         estimate
     }
 
-    /// Largest velocity told, after eight seconds, of one that turns with 1 m/s at this speed.
+    /// Returns the largest output velocity after eight seconds, for an input of 1 m/s that oscillates at `rad_s`.
     fn told(output_filter: OutputFilter, rad_s: f32) -> f32 {
         let mut output_filter = output_filter;
         let told = (0..10_000).map(|ms: u64| {
@@ -305,7 +307,7 @@ mod tests {
         }
     }
 
-    /// A return from far away is no gale: 1 m/s and no more.
+    /// A jump of metres decays at 1 m/s and no faster.
     #[test]
     fn a_jump_of_metres_is_a_walk() {
         let mut output_filter = OutputFilter::default();
@@ -318,7 +320,8 @@ mod tests {
         assert!(last.is_some_and(|last| (last - 9.999).abs() < 0.01), "{last:?}");
     }
 
-    /// What is set anew is told at once and to the bit, with what it was set by; what was being hidden goes on to fade.
+    /// A reset passes at once and exactly, and is reported with its size. An offset that was already hidden keeps
+    /// decaying.
     #[test]
     fn what_is_handed_over_is_not_hidden() {
         for hands_over in [true, false] {
@@ -327,7 +330,7 @@ mod tests {
             let mut last = None;
             for ms in 0..3000 {
                 let mut estimate = estimate(ms, 0.0, 0.0);
-                // A correction, then a position set anew, then a heading, across the half turn.
+                // A correction, then a position reset, then a heading reset across the half turn.
                 let jumps = [(1000, 0.1), (1050, -40.0)];
                 estimate.state.position_m.x += jumps.iter().filter(|(at, _)| ms >= *at).map(|(_, by)| by).sum::<f32>();
                 estimate.moved_m.x = jumps.iter().filter(|(at, _)| ms == *at).map(|(_, by)| by).sum();
@@ -360,7 +363,7 @@ mod tests {
         }
     }
 
-    /// What is set anew while the position is lost is told too: a descent holds heading and height.
+    /// Resets without a valid position are reported too: a descent holds heading and height.
     #[test]
     fn resets_without_a_position_are_handed_over_too() {
         let mut filter = OutputFilter::default().handing_over();
@@ -374,7 +377,7 @@ mod tests {
         }
     }
 
-    /// A vehicle that accelerates is told as it is.
+    /// An acceleration passes unchanged.
     #[test]
     fn nothing_else_is_eased() {
         let mut output_filter = OutputFilter::default();
@@ -385,8 +388,9 @@ mod tests {
         }
     }
 
-    /// A vehicle that leaves the ground and swings, with its sensor below the centre of mass, is told a quarter of what
-    /// that makes of the velocity; a second later all of it. A force that stays is told within two seconds.
+    /// A vehicle that leaves the ground and oscillates because its IMU is below the centre of mass: the output has a
+    /// quarter of that velocity at first, and all of it a second later. A force that stays is in the output within two
+    /// seconds.
     #[test]
     fn a_lever_is_hidden_at_take_off() {
         let mut output_filter = OutputFilter::default();
@@ -419,7 +423,7 @@ mod tests {
         }
     }
 
-    /// The first fix, and the first after the position was lost, are told at once.
+    /// The first valid position, and the first after a loss, pass at once.
     #[test]
     fn the_first_position_is_not_eased() {
         for mut output_filter in [OutputFilter::default(), OutputFilter::new(200.0)] {
@@ -434,16 +438,17 @@ mod tests {
         }
     }
 
-    /// Gain of the analogue notch, (omega^2 - x^2)/(omega^2 - x^2 + j x omega/Q), times that of the lead, within 2 %.
+    /// The gain is that of the analogue notch, (omega^2 - x^2)/(omega^2 - x^2 + j x omega/Q), times that of the lead,
+    /// within 2 %.
     #[test]
     fn the_notch_hides_the_rotors_and_passes_the_flight() {
         for hover_rad_s in [65.0, 195.0, 600.0_f32] {
             for ratio in [0.1, 0.2, 0.5, 0.8, 1.0, 1.25, 2.0] {
                 let gain = told(OutputFilter::new(hover_rad_s), ratio * hover_rad_s);
-                // As the bilinear transform bends it.
+                // Frequency ratio as warped by the bilinear transform.
                 let ratio_bent = (5e-4 * ratio * hover_rad_s).tan() / (5e-4 * hover_rad_s).tan();
                 let pole = 1.0 - ratio_bent * ratio_bent;
-                // 1 + LEAD/Q (1 - share z^-1/(1 - (1 - share) z^-1)), z = exp(j angle).
+                // Gain of the lead: 1 + LEAD/Q (1 - share z^-1/(1 - (1 - share) z^-1)), z = exp(j angle).
                 let (share, angle) = (2.0 * LEAD * (5e-4 * hover_rad_s).tan(), 1e-3 * ratio * hover_rad_s);
                 let (sin, cos) = angle.sin_cos();
                 let denominator = (1.0 - (1.0 - share) * cos).hypot((1.0 - share) * sin);
@@ -462,7 +467,7 @@ mod tests {
         }
     }
 
-    /// A vehicle that speeds up steadily, or turns slowly, has the velocity that it is said to have.
+    /// A steady acceleration or a slow oscillation passes with the right velocity.
     #[test]
     fn the_notch_delays_no_slow_change() {
         for hover_rad_s in [65.0, 195.0, 600.0] {
@@ -476,7 +481,7 @@ mod tests {
                 let turned_m_s = turn.step(&estimate).velocity_m_s.x - (1.5 * time_s).sin();
                 if ms > 1_000 {
                     assert!(off_m_s.abs() < 1e-3, "{hover_rad_s} rad/s, {ms} ms: {off_m_s} m/s");
-                    // A fifth of what the delay would make of it.
+                    // A fifth of the error that the uncompensated delay would make.
                     let most_m_s = 0.2 * 1.5 / hover_rad_s + 2e-4;
                     assert!(turned_m_s.abs() < most_m_s, "{hover_rad_s} rad/s, {ms} ms: {turned_m_s} m/s");
                 }
@@ -484,8 +489,8 @@ mod tests {
         }
     }
 
-    /// A notch that moves with the rotors hides them as well as one that stands where they are; a constant velocity
-    /// passes unchanged, however often and far it moves.
+    /// A notch that follows the rotor speed removes the vibration as well as a fixed one. A constant velocity passes
+    /// unchanged, however often and far the notch moves.
     #[test]
     fn a_notch_that_moves_follows_and_makes_no_step() {
         let (from, to) = (150.0_f32, 250.0_f32);

@@ -1,4 +1,4 @@
-//! Measurements that wait, and the fix that is being fused.
+//! Queue of waiting measurements, and the fix that is being fused.
 
 use crate::aid::Aid;
 use crate::errors::Coordinate;
@@ -10,10 +10,10 @@ use afbc_control::math::max;
 use afbc_types::Stamped;
 use nalgebra::{Quaternion, Vector3};
 
-/// Number of measurements that may wait.
+/// Capacity of the queue.
 const WAITING_MAX: usize = 8;
 
-/// Measurements, each with the number of its arrival.
+/// Measurements with their arrival numbers.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Queue {
     waiting: [Option<(u32, Stamped<Measurement>)>; WAITING_MAX],
@@ -22,17 +22,17 @@ pub(crate) struct Queue {
 }
 
 impl Queue {
-    /// Number of measurements.
+    /// Returns the number of waiting measurements.
     pub(crate) fn waiting(&self) -> u8 {
         self.count
     }
 
-    /// Appends; true if the oldest one had to give way.
+    /// Appends a measurement. Returns true if the oldest one was dropped for it.
     pub(crate) fn push(&mut self, measurement: &Stamped<Measurement>) -> bool {
         let arrived = self.arrived;
         self.arrived = arrived.wrapping_add(1);
-        // A free place, or else the oldest one's.
-        // The numbers wrap; how far apart those of eight are does not.
+        // Takes a free place, or else the oldest measurement's. Arrival numbers may wrap; the differences between eight
+        // of them stay right.
         let age = |place: &Option<(u32, Stamped<Measurement>)>| {
             place.as_ref().map_or(u32::MAX, |(number, _)| arrived.wrapping_sub(*number))
         };
@@ -43,7 +43,7 @@ impl Queue {
         full
     }
 
-    /// Removes and returns the oldest measurement whose time is `due`.
+    /// Removes and returns the measurement that arrived first among those whose time is `due`.
     pub(crate) fn take(&mut self, due: impl Fn(u64) -> bool) -> Option<Stamped<Measurement>> {
         if self.count == 0 {
             return None;
@@ -59,7 +59,7 @@ impl Queue {
     }
 }
 
-/// The coordinates of a position or velocity that are judged together.
+/// Coordinates of a position or velocity that pass the gate together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Axes {
     /// x, y and z.
@@ -82,7 +82,7 @@ impl Axes {
         }
     }
 
-    /// True of a coordinate that is one of them.
+    /// Returns true if the coordinate belongs to these axes.
     pub(crate) fn contain(self, at: Coordinate) -> bool {
         match self {
             Axes::All => true,
@@ -91,7 +91,7 @@ impl Axes {
         }
     }
 
-    /// Returns the vector with zero in all other coordinates.
+    /// Returns the vector with all other coordinates zero.
     #[inline]
     pub(crate) fn only(self, v: &Vector3<f32>) -> Vector3<f32> {
         match self {
@@ -102,27 +102,27 @@ impl Axes {
     }
 }
 
-/// One kind of aid in a fix: one scalar or three.
+/// Part of a fix with one kind of aid: one to three scalars.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Part {
     pub(crate) aid: Option<Aid>,
     pub(crate) target: Target,
-    /// Of a position or velocity, the coordinates that are fused.
+    /// Coordinates that are fused, for a position or velocity.
     pub(crate) axes: Axes,
-    /// Variances of its scalars; the first one of a single scalar.
+    /// Variances of the scalars; a single scalar uses the first one, a vertical one the third.
     pub(crate) variance: Vector3<f32>,
-    /// Variance of a field's direction that comes on top.
+    /// Variance added to a field's direction after clipped or missing samples.
     pub(crate) rough: f32,
 }
 
 impl Part {
-    /// True of what a GNSS receiver's slow error comes on top of.
+    /// Returns true if a GNSS receiver's slow error affects this part.
     #[inline]
     pub(crate) fn is_slow(&self) -> bool {
         matches!(self.aid, Some(Aid::GnssPosition | Aid::GnssHeight))
     }
 
-    /// Number of scalars.
+    /// Returns the number of scalars.
     #[inline]
     pub(crate) fn scalars(&self) -> u8 {
         match (&self.target, self.axes) {
@@ -132,7 +132,7 @@ impl Part {
         }
     }
 
-    /// Adds to the variances what clipped or missing samples since the measurement have made uncertain.
+    /// Adds the uncertainty from clipped or missing samples since the measurement to the variances.
     #[inline]
     pub(crate) fn roughen(&mut self, (theta, velocity): (f32, f32), tau_s: f32) {
         if theta + velocity > 0.0 {
@@ -148,33 +148,33 @@ impl Part {
     }
 }
 
-/// A measurement that is being fused, scalar by scalar.
+/// Measurement that is being fused, scalar by scalar.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Fix {
     pub(crate) at_us: u64,
-    /// State at its time, without corrections.
+    /// State at the measurement's time, without corrections.
     pub(crate) past: Past,
     pub(crate) parts: [Option<Part>; 3],
     /// Number of the first part's next scalar.
     pub(crate) next: u8,
-    /// Normalised innovation squared of this part so far.
+    /// Normalised innovation squared of the first part so far.
     pub(crate) nis: f32,
 }
 
 impl Fix {
-    /// True of a receiver's.
+    /// Returns true for a GNSS receiver's fix.
     pub(crate) fn is_gnss(&self) -> bool {
         let of_gnss = |part: &Part| part.is_slow() || part.aid == Some(Aid::GnssVelocity);
         self.parts.iter().flatten().any(of_gnss)
     }
 }
 
-/// Smallest standard deviations: position \[m\], velocity \[m/s\], angle \[rad\].
+/// Smallest standard deviations of position \[m\] and angle \[rad\], and of velocity \[m/s\].
 const LEAST: f32 = 1e-4;
 const LEAST_M_S: f32 = 1e-3;
 
-/// Returns the parts of a measurement. The variance of a field is that of its coordinates; its heading's depends on the
-/// attitude.
+/// Returns the parts of a measurement. For a field, the variance is that of its coordinates; the variance of its
+/// heading depends on the attitude.
 pub(crate) fn parts(measurement: &Measurement) -> [Option<Part>; 3] {
     let square = |sigma: f32, least: f32| max(sigma, least) * max(sigma, least);
     let of_axes =
@@ -204,7 +204,7 @@ pub(crate) fn parts(measurement: &Measurement) -> [Option<Part>; 3] {
             let level = |horizontal: f32, vertical: f32| Vector3::new(horizontal, horizontal, vertical);
             let position = level(square(horizontal_sigma_m, LEAST), square(vertical_sigma_m, LEAST));
             let velocity = level(square(speed_sigma_m_s, LEAST_M_S), square(climb_sigma_m_s, LEAST_M_S));
-            // The height by itself: it is the worst of a receiver's, and a barometer can contradict it.
+            // The height is a part of its own: it is a receiver's worst coordinate, and a barometer can contradict it.
             [
                 of_axes(Aid::GnssPosition, Target::Position(position_m), position, Axes::Level),
                 of_axes(Aid::GnssHeight, Target::Position(position_m), position, Axes::Vertical),

@@ -1,9 +1,9 @@
-//! Rest: whether the vehicle stands still, by its inertial sensor.
+//! Detects from the IMU whether the vehicle stands still.
 //!
 //! Rates and specific force are compared with their means since the vehicle came to rest, in blocks of half a second.
-//! The integral of the difference, which is what has turned and moved the vehicle meanwhile, must stay small, as must
-//! its square and each sample. A vehicle that hovers in calm air, or is driven straight on, looks the same: whether
-//! rest counts, [`Memory::stands`](crate::memory::Memory::stands) decides.
+//! The integral of the deviation (the turn and velocity it would mean), the integral of its square and each single
+//! deviation must stay small. A vehicle that hovers in calm air or is driven straight on looks the same;
+//! [`Memory::stands`](crate::memory::Memory::stands) decides whether rest counts.
 
 use crate::measurement::ImuSample;
 use crate::settings::Settings;
@@ -12,32 +12,32 @@ use nalgebra::Vector3;
 
 /// Length of a block \[s\].
 const BLOCK_S: f32 = 0.5;
-/// Number of blocks from which on a vehicle is at rest; the mean of the first one is what the next is compared with.
+/// Number of quiet blocks that means rest. The next block is compared with the first one's mean.
 const ENOUGH: u8 = 2;
-/// Number of blocks whose mean is remembered: bias and temperature change.
+/// Number of blocks in the mean; a longer memory would miss changes of bias and temperature.
 const REMEMBERED: u8 = 8;
-/// Largest deviation of a sample, and of the mean over a block, in shares of the standard deviation allowed at rest:
-/// those of the alignment.
+/// Limits for a single deviation and for a block's mean deviation, as multiples of the standard deviation allowed at
+/// rest, as in the alignment.
 const FAR: f32 = 6.0;
 const SLOW: f32 = 0.25;
 
-/// One of the two sensors.
+/// Rest detector of one sensor.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Watch {
-    /// Mean since the vehicle came to rest; before, the first sample.
+    /// Mean since the vehicle came to rest; before that, the first sample.
     usual: Vector3<f32>,
-    /// Integrals of the deviation and of its square over the block so far.
+    /// Integrals of the deviation and of its square over the current block.
     moved: Vector3<f32>,
     squares: Vector3<f32>,
 }
 
 impl Watch {
-    /// Begins with this mean.
+    /// Starts with this mean.
     fn new(usual: Vector3<f32>) -> Self {
         Watch { usual, ..Watch::default() }
     }
 
-    /// Takes a sample; true if a vehicle at rest, whose standard deviation is `limit` at most, does not show this.
+    /// Takes a sample. Returns true if it shows motion, for a standard deviation of at most `limit` at rest.
     #[inline]
     fn advance(&mut self, value: &Vector3<f32>, dt_s: f32, limit: f32, compares: bool) -> bool {
         let deviation = value - self.usual;
@@ -47,7 +47,8 @@ impl Watch {
         abs_max(&deviation) > FAR * limit || compares && differs
     }
 
-    /// Ends a block of `time_s`, the mean of which counts as `share` of all; true if it spreads by more than `limit`.
+    /// Ends a block of length `time_s`, whose mean enters the long mean with the weight `share`. Returns true if the
+    /// block's standard deviation exceeds `limit`.
     fn end(&mut self, time_s: f32, limit: f32, share: f32) -> bool {
         let mean = self.moved * (1.0 / time_s);
         let variance = self.squares * (1.0 / time_s) - mean.component_mul(&mean);
@@ -56,27 +57,27 @@ impl Watch {
     }
 }
 
-/// What has been seen since the vehicle came to rest.
+/// Memory of the rest detector.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Rest {
     rates: Watch,
     force: Watch,
-    /// Length of the block so far \[s\].
+    /// Length of the current block so far \[s\].
     time_s: f32,
-    /// Number of blocks at rest, as far as it matters.
+    /// Number of quiet blocks, up to [`REMEMBERED`].
     blocks: u8,
-    /// True if it has been at rest since the alignment.
+    /// True if the vehicle has been at rest since the alignment.
     pub(crate) unmoved: bool,
 }
 
 impl Rest {
-    /// Goes on after an alignment at rest, with the means of rates and specific force there.
+    /// Continues from an alignment at rest, with its mean rates and specific force.
     pub(crate) fn aligned(rates: Vector3<f32>, force: Vector3<f32>) -> Self {
         let (rates, force) = (Watch::new(rates), Watch::new(force));
         Rest { rates, force, time_s: 0.0, blocks: ENOUGH, unmoved: true }
     }
 
-    /// True if the vehicle has been at rest for long enough.
+    /// Returns true if the vehicle has been at rest for long enough.
     pub(crate) fn is_still(&self) -> bool {
         self.blocks >= ENOUGH
     }
@@ -88,7 +89,7 @@ impl Rest {
         let (rate, force) = (settings.still_rate_rad_s, settings.still_accel_m_s2);
         let compares = self.blocks > 0;
         self.time_s += dt_s;
-        // Both advance, whatever the other shows: what is right of `||` might not be called.
+        // Both sensors are evaluated first: `||` might skip the second call.
         let turns = self.rates.advance(rates_rad_s, dt_s, rate, compares);
         let mut moves = self.force.advance(specific_force_m_s2, dt_s, force, compares) || turns;
         if self.time_s >= BLOCK_S && !moves {

@@ -1,4 +1,4 @@
-//! Starts, and resets of parts of the state.
+//! Starts and restarts of the filter, and increases of its variances.
 
 use crate::align::Aligned;
 use crate::covariance::{Covariance, angle_variance};
@@ -17,25 +17,25 @@ use afbc_control::math::{abs_max, max};
 use afbc_types::State;
 use nalgebra::{Matrix3, Quaternion, Vector2, Vector3};
 
-/// Variance of an angle that may be anything, pi^2/3.
+/// Variance of a completely unknown angle, pi^2/3.
 const ANY_ANGLE: f32 = 3.28;
-/// Standard deviations of velocity at rest \[m/s\], and of position before it is measured \[m\].
+/// Initial standard deviations of the velocity at rest \[m/s\] and of the position \[m\].
 const REST_M_S: f32 = 2e-3;
 const UNTOLD_M: f32 = 0.01;
-/// Variance of levelling besides its noise \[rad2\].
+/// Variance of levelling apart from noise \[rad2\].
 const LEVEL: f32 = 1e-8;
-/// Tilt that a doubted attitude may be off \[rad\].
+/// Standard deviation added to roll and pitch when the tilt is doubted \[rad\].
 const DOUBT_RAD: f32 = 0.2;
-/// Change of the biases that goes with it: gyroscope \[rad/s\], accelerometer \[m/s2\].
+/// Standard deviations added to the biases with it: gyroscope \[rad/s\], accelerometer \[m/s2\].
 const DOUBT_RAD_S: f32 = 0.02;
 const DOUBT_M_S2: f32 = 0.2;
-/// Change of the biases that a scalar whose kind leans to one side stands for.
+/// Standard deviations added to the biases for each scalar while the mean innovation is too large.
 const LEANING_RAD_S: f32 = 1e-3;
 const LEANING_M_S2: f32 = 0.02;
-/// Share of a doubt about one axis that the others have.
+/// Share of the variance about the vertical that the other axes get.
 const LEANT: f32 = 0.01;
 
-/// Keeps all errors.
+/// Factors that keep all errors.
 pub(crate) const KEEP: Errors = {
     const ONES: Vector3<f32> = Vector3::new(1.0, 1.0, 1.0);
     Errors {
@@ -50,7 +50,7 @@ pub(crate) const KEEP: Errors = {
 };
 pub(crate) const NONE: Vector3<f32> = Vector3::new(0.0, 0.0, 0.0);
 
-/// Diagonal block.
+/// Returns a diagonal block.
 fn diagonal(variances: &Vector3<f32>) -> Matrix3<f32> {
     Matrix3::from_diagonal(variances)
 }
@@ -60,19 +60,19 @@ fn squared(sigma: &Vector3<f32>) -> Vector3<f32> {
 }
 
 impl Memory {
-    /// Starts at rest.
+    /// Starts the filter from an alignment at rest.
     pub(crate) fn begin(&mut self, now_us: u64, aligned: &Aligned, estimator: &Estimator) {
         let settings = &estimator.settings;
         let Settings { gravity_m_s2: gravity, accel_bias_m_s2: bias, .. } = *settings;
         let mut nominal = Nominal::new(aligned.attitude);
         nominal.gyro_bias = aligned.gyro_bias;
-        // Levelling took the accelerometer's bias for a tilt: theta = (-(R a)_y, (R a)_x)/g; and a field took the tilt
-        // for a heading.
+        // Levelling takes the accelerometer bias for a tilt, theta = (-(R a)_y, (R a)_x)/g, and an inclined field turns
+        // that tilt into a heading error.
         let r = nominal.rotation;
         let (x, y) = (-r.row(1) * (1.0 / gravity), r.row(0) * (1.0 / gravity));
         let (dip_x, dip_y) = aligned.dip;
         let by_bias = Matrix3::from_rows(&[x, y, -(x * dip_x + y * dip_y)]);
-        // What is of the second order: the bias along z changes the divisor, the heading's error the direction.
+        // Second-order effects: the bias along z changes the divisor, and the heading error changes the direction.
         let share = bias * bias / (gravity * gravity);
         let own = if aligned.by_field { estimator.magnetic_variance } else { 0.0 };
         let turned = aligned.heading_variance.unwrap_or(0.0) + own;
@@ -102,7 +102,7 @@ impl Memory {
         }
     }
 
-    /// Starts in the state `state`, known as well as `sigmas` say, which are limited to what is possible.
+    /// Starts in the state `state` with the standard deviations `sigmas`, limited to what is possible.
     pub(crate) fn begin_at(&mut self, now_us: u64, state: &State, sigmas: &Sigmas) {
         let mut nominal = Nominal::new(normalized(&state.quaternion().into_inner()));
         nominal.velocity = state.velocity_m_s;
@@ -120,12 +120,12 @@ impl Memory {
         let position = abs_max(&sigmas.position_m) < 1e3;
         self.knows = Known { position, heading, height_offset: false };
         self.field = None;
-        // No interval leads from the last sample to this state: the next one begins.
+        // The last sample does not belong to this state, so the next sample starts the integration.
         self.monitor.forget();
         self.run(now_us, nominal);
     }
 
-    /// Starts again where the filter is or, if that is not finite, at the last state that was.
+    /// Restarts at the present state or, where that is not finite, at the last stored or a zero state.
     #[cold]
     #[inline(never)]
     pub(crate) fn restart(&mut self, now_us: u64) {
@@ -154,7 +154,7 @@ impl Memory {
         self.run(now_us, nominal);
     }
 
-    /// Waits for rest again, and starts from there: what is known was measured in other axes.
+    /// Starts the alignment again, for example because the axes have changed.
     pub fn align_again(&mut self) {
         self.runs = false;
         self.align.again(crate::align::Unready::Moving);
@@ -182,7 +182,7 @@ impl Memory {
         self.remember(now_us);
     }
 
-    /// Stores the present state in the history; the covariance is of the same time.
+    /// Stores the present state in the history; the covariance has the same time.
     pub(crate) fn remember(&mut self, at_us: u64) {
         self.covariance_us = at_us;
         self.history.store(&Past {
@@ -193,29 +193,28 @@ impl Memory {
         });
     }
 
-    /// Adds to the heading, which a magnetometer has measured, the error of the vehicle's own: at the start, where it
-    /// has made no other error yet.
+    /// Adds the error of the vehicle's own field to a heading that a magnetometer has measured at the start.
     fn point(&mut self, (x, y): (f32, f32)) {
         let row = magnetic(&self.nominal.rotation, &Vector3::new(x, y, 0.0));
         self.covariance.tt.m33 += self.covariance.slow.of_row(&row);
         self.covariance.slow.point(&row);
     }
 
-    /// Doubts roll and pitch, after the second reset in a row.
+    /// Raises the variance of roll and pitch, after the second reset in a row.
     pub(crate) fn doubt_tilt(&mut self) {
         count(&mut self.resets.tilt);
         let variance = DOUBT_RAD * DOUBT_RAD;
         let tt = &mut self.covariance.tt;
         tt.m11 += variance;
         tt.m22 += variance;
-        // What made it wrong is often a bias that is not what it was.
+        // The cause is often a bias that has changed.
         self.covariance.gg += diagonal(&Vector3::repeat(DOUBT_RAD_S * DOUBT_RAD_S));
         self.covariance.aa += diagonal(&Vector3::repeat(DOUBT_M_S2 * DOUBT_M_S2));
         self.covariance.hold();
     }
 
-    /// Doubts the biases a little, once for each scalar that asks for it: the gyroscope's, and if the motion shows it,
-    /// not a rotation, the accelerometer's too.
+    /// Raises the bias variances a little, once for each scalar with too large a mean innovation: the gyroscope's, and
+    /// also the accelerometer's if the scalar measures motion rather than rotation.
     #[cold]
     pub(crate) fn doubt_biases(&mut self, turns: bool) {
         self.covariance.gg += diagonal(&Vector3::repeat(LEANING_RAD_S * LEANING_RAD_S));
@@ -225,8 +224,8 @@ impl Memory {
         self.covariance.hold();
     }
 
-    /// Doubts the gyroscope's bias about the vertical, after the heading was set to what contradicted it; and a little
-    /// that about other axes, or a bias that is known along these would drown in the rounding of the doubt.
+    /// Raises the variance of the gyroscope bias about the vertical, after a heading reset. The other axes get a little
+    /// too; otherwise rounding of the large increase would swamp their small variance.
     pub(crate) fn doubt_turn(&mut self) {
         let up = Coordinate::Z.row(&self.nominal.rotation) * DOUBT_RAD_S;
         self.covariance.gg += up * up.transpose() + diagonal(&Vector3::repeat(LEANT * DOUBT_RAD_S * DOUBT_RAD_S));
@@ -234,7 +233,7 @@ impl Memory {
     }
 }
 
-/// Strength and sine of the inclination of a field in the earth frame.
+/// Returns the strength of a field in the earth frame and the sine of its inclination.
 pub(crate) fn reference(field: &Vector3<f32>) -> Option<(f32, f32)> {
     let strength = afbc_control::math::sqrt(field.norm_squared());
     (strength > 0.0).then(|| (strength, field.z / strength))

@@ -1,25 +1,27 @@
 //! Slow errors of sensors: considered, not estimated.
 //!
-//! A GNSS receiver's position is off by noise and by an error d that stays from fix to fix and changes within minutes.
-//! A magnetometer's heading is off by noise and by what iron, magnets and currents of the vehicle add to the field, two
-//! numbers f along body x and y, in shares of the earth's horizontal field, which stay. A filter that takes d or f for
-//! noise averages it, and is soon sure of what it does not know. Here both are consider states (Schmidt; Jazwinski,
-//! *Stochastic Processes and Filtering Theory*, 1970, section 8.4): d a first-order Gauss-Markov process per
-//! coordinate, f constant, of a variance D which is given and stays, and with zero for an estimate. What is kept is the
-//! covariance X of the filter's errors with them. A fix then measures p + d + noise, a field the heading, f's share
-//! across it and noise, with what is known of both; a variance never falls to that of an average, and innovations have
-//! the noise alone, and what the slow error has changed by: for the heading, since the vehicle has turned.
+//! A GNSS receiver's position error is noise plus an error d that stays from fix to fix and changes over minutes. A
+//! magnetometer's heading error is noise plus the effect of the vehicle's iron, magnets and currents: two constants f,
+//! the fields along body x and y in shares of the earth's horizontal field. A filter that takes d or f for noise
+//! averages it, and soon states an accuracy that it does not have. Here d and f are consider states (Schmidt;
+//! Jazwinski, *Stochastic Processes and Filtering Theory*, 1970, section 8.4): d is a first-order Gauss-Markov process
+//! per coordinate, f is constant. Their variance D is given and stays; their estimate stays zero. The filter only keeps
+//! the covariance X of its errors with them. A position fix then measures p + d + noise, and a field measures the
+//! heading, the part of f across the field, and noise. The variance of an error never falls to that of an average.
+//! Innovations only contain the noise and the change of the slow error; for the heading, that change comes from the
+//! vehicle's turns.
 
 use crate::errors::{Block, Errors, Interval, Row, Slows};
 use nalgebra::{Matrix3x5, Vector3};
 
-/// Covariances of an error of three coordinates with the slow errors.
+/// Covariances of a three-coordinate error with the slow errors.
 pub(crate) type Columns = Matrix3x5<f32>;
 
-/// Variances of the slow errors, x, y, z of d and x, y of f, and their covariances with the errors, a column each.
+/// Variances of the slow errors (x, y, z of d; x, y of f) and their covariances with the filter's errors, one column
+/// each.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Slow {
-    /// Diagonal of D; zero as long as no sensor has such an error, and then all else is zero too.
+    /// Diagonal of D. It is zero until a sensor has a slow error; then all covariances are zero too.
     pub(crate) variance: Slows,
     pub(crate) theta: Columns,
     pub(crate) velocity: Columns,
@@ -29,12 +31,12 @@ pub(crate) struct Slow {
     pub(crate) baro: Slows,
 }
 
-/// Multiplies rows.
+/// Multiplies each row by its factor.
 fn scale(m: &mut Columns, by: &Vector3<f32>) {
     m.column_iter_mut().for_each(|mut column| column.component_mul_assign(by));
 }
 
-/// -s x, column by column.
+/// Returns -[s]x m.
 #[inline]
 fn minus_cross(s: &Vector3<f32>, m: &Columns) -> Columns {
     Columns::new(
@@ -57,16 +59,16 @@ fn minus_cross(s: &Vector3<f32>, m: &Columns) -> Columns {
 }
 
 impl Slow {
-    /// True if there is none.
+    /// Returns true if there are no slow errors.
     #[inline]
     pub(crate) fn is_none(&self) -> bool {
         self.variance == Slows::zeros()
     }
 
-    /// Takes the variances of a new fix, since the last of which d has kept `share` of itself. A smaller variance than
-    /// before is that of an error which is partly another one.
+    /// Sets the variances of a new fix; d has kept `share` of its value since the last fix. If the new variance is
+    /// smaller, part of the error is treated as a different one.
     pub(crate) fn follow(&mut self, variance: &Vector3<f32>, share: f32) {
-        // Divides only by what is above another variance, and so not zero.
+        // Divides only by values above another variance, so never by zero.
         let kept =
             variance.zip_map(&self.gnss_variance(), |new, old| if new < old { share * (new / old) } else { share });
         for m in [&mut self.theta, &mut self.velocity, &mut self.position, &mut self.gyro, &mut self.accel] {
@@ -78,32 +80,32 @@ impl Slow {
         self.variance.iter_mut().zip(variance).for_each(|(old, new)| *old = *new);
     }
 
-    /// Variances of d.
+    /// Returns the variances of d.
     pub(crate) fn gnss_variance(&self) -> Vector3<f32> {
         self.variance.fixed_rows::<3>(0).into_owned()
     }
 
-    /// Takes the variance of each coordinate of f.
+    /// Sets the variance of each coordinate of f.
     pub(crate) fn magnetize(&mut self, variance: f32) {
         (self.variance.w, self.variance.a) = (variance, variance);
     }
 
-    /// Takes the heading from a field that measures f by `row`, where no other error has to do with f: its error is
-    /// what f makes of it.
+    /// Sets the heading error after a start by a field that measures f with `row`: the error is entirely caused by f,
+    /// and no other error depends on f.
     pub(crate) fn point(&mut self, row: &Slows) {
         let by = -row.component_mul(&self.variance);
         self.theta.row_mut(2).copy_from(&by.transpose());
     }
 
-    /// Variance that the slow errors add to what measures them by `row`, by itself.
+    /// Returns the variance that the slow errors alone add to a measurement with this row.
     pub(crate) fn of_row(&self, row: &Slows) -> f32 {
         row.component_mul(&self.variance).dot(row)
     }
 
-    /// X = F X, as the covariance's own prediction.
+    /// Predicts X = F X, like the covariance itself.
     #[inline]
     pub(crate) fn predict(&mut self, interval: &Interval) {
-        // With a tracker alone all of it is zero: such a vehicle does not pay for the products.
+        // With a tracker alone everything is zero, so such a vehicle skips the products.
         if self.is_none() {
             return;
         }
@@ -113,7 +115,7 @@ impl Slow {
         self.theta -= turn * self.gyro;
     }
 
-    /// Turns the angular error.
+    /// Rotates the angular error by r.
     #[inline]
     pub(crate) fn turn(&mut self, r: &Block) {
         if !self.is_none() {
@@ -121,7 +123,7 @@ impl Slow {
         }
     }
 
-    /// Multiplies each error.
+    /// Multiplies each error by its factor.
     pub(crate) fn scale(&mut self, by: &Errors) {
         scale(&mut self.theta, &by.theta);
         scale(&mut self.velocity, &by.velocity);
@@ -131,8 +133,8 @@ impl Slow {
         self.baro *= by.baro;
     }
 
-    /// Completes `y` = P h by X h of the slow errors and, if the row measures them, by the errors' covariances with
-    /// them.
+    /// Completes `y` = P h: adds X' h for the slow errors and, if the row measures slow errors, their covariances with
+    /// the other errors.
     #[inline]
     pub(crate) fn complete(&self, row: &Row, y: &mut Errors) {
         if self.is_none() {
@@ -166,7 +168,7 @@ impl Slow {
         }
     }
 
-    /// Subtracts k y' of the slow errors: a gain that leaves them as they are.
+    /// Subtracts k y' from the covariances with the slow errors, which have no gain themselves.
     #[inline]
     pub(crate) fn subtract(&mut self, k: &Errors, y: &Errors) {
         if self.is_none() {
@@ -185,7 +187,7 @@ impl Slow {
         self.baro -= y.slow * k.baro;
     }
 
-    /// Variance that d adds to a position of `tau_s` ago, its covariance with it included.
+    /// Returns the variance that d adds to a position of `tau_s` ago, including its covariance with that position.
     pub(crate) fn of_position(&self, tau_s: f32) -> Vector3<f32> {
         let along = |m: &Columns| Vector3::new(m.m11, m.m22, m.m33);
         self.gnss_variance() + (along(&self.position) - along(&self.velocity) * tau_s) * 2.0

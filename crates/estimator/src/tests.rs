@@ -1,4 +1,4 @@
-//! Covariance and Jacobians against dense `f64` mathematics written independently of them.
+//! Checks covariance and Jacobians against independent dense mathematics in `f64`.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::indexing_slicing, clippy::panic, missing_docs)] // tests
 
 extern crate std;
@@ -21,7 +21,7 @@ use nalgebra::{Matrix3, Quaternion, Rotation3, SMatrix, SVector, UnitQuaternion,
 use proptest::prelude::*;
 use std::vec::Vec;
 
-/// A memory with this covariance, in this attitude.
+/// Returns a memory with this covariance and attitude.
 fn memory(p: &M21, turn: &V3) -> Memory {
     let mut memory = Memory { runs: true, covariance: blocks(p), ..Memory::default() };
     let q = UnitQuaternion::new(*turn).into_inner().coords.map(|x| x as f32);
@@ -35,12 +35,12 @@ fn memory(p: &M21, turn: &V3) -> Memory {
     memory
 }
 
-/// The filter's 16 errors, the slow ones of a receiver and of a magnetometer.
+/// The filter's 16 errors and the 5 slow errors of receiver and magnetometer.
 type M21 = SMatrix<f64, 21, 21>;
 type V21 = SVector<f64, 21>;
 type V3 = Vector3<f64>;
 
-/// Typical sizes of the errors, by three; then the barometer's offset, and the slow errors.
+/// Typical sizes of the errors with three coordinates.
 const SIZES: [f64; 5] = [0.02, 0.3, 0.5, 0.003, 0.08];
 
 fn size(i: usize) -> f64 {
@@ -52,7 +52,7 @@ fn size(i: usize) -> f64 {
     }
 }
 
-/// Blocks of a matrix.
+/// Converts a dense matrix to blocks.
 fn blocks(p: &M21) -> Covariance {
     let block = |i: usize, j: usize| p.fixed_view::<3, 3>(3 * i, 3 * j).map(|x| x as f32).into_owned();
     let slow = |i: usize| p.fixed_view::<3, 5>(3 * i, 16).map(|x| x as f32).into_owned();
@@ -131,7 +131,7 @@ fn dense_row(row: &Row) -> V21 {
     })
 }
 
-/// Largest difference, element by element, in shares of the product of both standard deviations.
+/// Returns the largest difference of an element, relative to the product of both standard deviations.
 fn difference(ours: &M21, theirs: &M21) -> f64 {
     let of = |i, j| (ours[(i, j)] - theirs[(i, j)]).abs() / (theirs[(i, i)] * theirs[(j, j)]).sqrt();
     (0..21).flat_map(|i| (0..21).map(move |j| (i, j))).map(|(i, j)| of(i, j)).fold(0.0, f64::max)
@@ -141,7 +141,7 @@ fn numbers<const N: usize>() -> impl Strategy<Value = [f64; N]> {
     proptest::array::uniform(-1.0..1.0_f64)
 }
 
-/// A positive matrix of errors of the usual sizes, rounded to what the filter can hold.
+/// Draws a positive covariance with errors of typical sizes, rounded to what the filter can store.
 fn covariance() -> impl Strategy<Value = M21> {
     proptest::collection::vec(-1.0..1.0_f64, 21 * 21).prop_map(|x| {
         // The slow errors are independent of each other.
@@ -179,7 +179,7 @@ fn row() -> impl Strategy<Value = Row> {
     )
 }
 
-/// The transition as a dense matrix.
+/// Returns the transition matrix as a dense matrix.
 fn transition(interval: &Interval) -> M21 {
     let mut f = M21::identity();
     let t = f64::from(interval.time_s);
@@ -195,7 +195,7 @@ fn transition(interval: &Interval) -> M21 {
 const GROWTH: Growth = Growth { theta: 1e-6, velocity: 4e-4, gyro: 1e-9, accel: 1e-7, baro: 4e-4 };
 
 proptest! {
-    /// What errors are judged by is the corner of the whole matrix.
+    /// `of_motion` is the upper left corner of the whole matrix.
     #[test]
     fn the_motions_part_is_the_corner_of_the_whole(p in covariance()) {
         let ours = blocks(&p);
@@ -245,7 +245,7 @@ proptest! {
         let considered = |k: V21| V21::from_fn(|i, _| if i < 16 { k[i] } else { 0.0 });
         let theirs = joseph(&considered(p * h / s));
         prop_assert!(difference(&dense(&optimal), &theirs) < 1e-4, "{}", difference(&dense(&optimal), &theirs));
-        // Any other.
+        // Any other gain.
         let k = V21::from_fn(|i, _| if i < 16 { any_gain[i] * size(i) / s.sqrt() } else { 0.0 });
         let part = |i: usize| k.fixed_rows::<3>(3 * i).map(|x| x as f32).into_owned();
         let gain = Errors {
@@ -260,7 +260,7 @@ proptest! {
         prop_assert_eq!(ours, ours.transpose());
     }
 
-    /// A receiver that is surer or less sure of itself than before.
+    /// The matrix stays positive when a receiver's stated accuracy changes.
     #[test]
     fn another_slow_error_leaves_it_positive(p in covariance(), to in numbers::<3>(), share in 0.0..1.0_f64) {
         let variance = vector(to).map(|x| (x * x * 4.0 + 1e-3) as f32);
@@ -273,8 +273,8 @@ proptest! {
         prop_assert!(correlation.symmetric_eigenvalues().min() > -1e-6);
     }
 
-    /// A heading just taken from a field is as wrong as the vehicle's own field makes it, so the next field agrees; and
-    /// it keeps what it has to do with everything else by that.
+    /// A heading that was reset to a field has the error of the vehicle's own field. So the next field agrees with it
+    /// and corrects no other error.
     #[test]
     fn a_field_agrees_with_its_heading(p in covariance(), turn in numbers::<3>(), by in -3.0..3.0_f64) {
         let mut memory = memory(&p, &(vector(turn) * 0.3));
@@ -294,14 +294,13 @@ proptest! {
         let (innovation, row) = seen.unwrap();
         prop_assert!(innovation.abs() < 1e-4, "{innovation}");
         let y = memory.covariance.times(&row);
-        // Innovations have the noise alone, and tell nothing of any error.
+        // The innovation contains only the noise and shows nothing about other errors.
         let noise = f64::from(crate::fusion::field_variance(&field.map(|x| x as f32), 1e-6));
         prop_assert!((f64::from(row.dot(&y)) - noise).abs() < 1e-5, "{}", row.dot(&y));
         prop_assert!(f64::from(y.velocity.norm() + y.position.norm() + y.gyro.norm() + y.accel.norm()) < 1e-4, "{y:?}");
     }
 
-    /// An error that a measurement replaces is what the others make of it, and noise: a linear map of all, so that the
-    /// matrix stays one whatever the row.
+    /// A replaced error is a linear map of the other errors plus noise, so the matrix stays a covariance for any row.
     #[test]
     fn a_replaced_error_is_the_measurements(
         p in covariance(), h in numbers::<21>(), which in 0..8_usize, sigma in 0.01..0.5_f64,
@@ -336,7 +335,7 @@ proptest! {
         prop_assert!(difference(&ours, &theirs) < 1e-4, "{which}: {}", difference(&ours, &theirs));
     }
 
-    /// A covariance that both variances do not allow is found, wherever it is, and forgotten.
+    /// A covariance that exceeds the product of its variances is found in any block and deleted.
     #[test]
     fn what_is_no_covariance_is_found(p in covariance(), i in 0..15_usize, j in 0..15_usize, sign in any::<bool>()) {
         let possible = |c: &Covariance| (0..crate::covariance::BLOCKS).all(|number| c.is_possible(number));
@@ -357,7 +356,7 @@ proptest! {
         prop_assert!((0..16).all(|i| (variances(&ours)[i] / variances(&blocks(&p))[i] - 2.0).abs() < 1e-5));
     }
 
-    /// Too large a variance is cut with all its covariances, so the matrix stays positive.
+    /// Too large a variance is scaled down with its covariances, so the matrix stays positive.
     #[test]
     fn bounds_leave_it_positive(p in covariance(), which in 0..16_usize, factor in 1e3..1e8_f64) {
         let scale = M21::from_diagonal(&V21::from_fn(|i, _| if i == which { factor } else { 1.0 }));
@@ -371,7 +370,7 @@ proptest! {
     }
 }
 
-/// A state in `f64`, with biases.
+/// State with biases in `f64`.
 #[derive(Clone, Copy)]
 struct True {
     r: Rotation3<f64>,
@@ -383,18 +382,18 @@ struct True {
 
 const GRAVITY: f64 = 9.81;
 
-/// What gyroscope and accelerometer show at `t`.
+/// Returns the readings of gyroscope and accelerometer at `t`.
 fn shown(t: f64, a: &[f64; 6]) -> (V3, V3) {
     let rates = V3::new(2.0 * a[0] + (20.0 * t).sin(), 2.0 * a[1], 2.0 * a[2] + 10.0 * t);
     (rates, V3::new(3.0 * a[3], 3.0 * a[4] + 20.0 * t, 10.0 + 4.0 * a[5]))
 }
 
-/// Goes back by `tau`, in steps of 0.1 ms.
+/// Integrates back by `tau`, in steps of 0.1 ms.
 fn back(mut x: True, tau: f64, a: &[f64; 6]) -> True {
     let steps = (tau / 1e-4).round() as usize;
     for i in 0..steps {
         let dt = tau / steps as f64;
-        // The same motion for every tau.
+        // The motion is the same for every tau.
         let (rates, force) = shown(0.3 - (i as f64 + 0.5) * dt, a);
         let before = x.r * Rotation3::new(-(rates - x.g) * dt);
         let middle = x.r * Rotation3::new(-(rates - x.g) * (0.5 * dt));
@@ -406,7 +405,7 @@ fn back(mut x: True, tau: f64, a: &[f64; 6]) -> True {
     x
 }
 
-/// Adds an error.
+/// Adds an error to the state.
 fn moved(x: &True, e: &V21) -> True {
     let part = |i: usize| e.fixed_rows::<3>(3 * i).into_owned();
     True { r: Rotation3::new(part(0)) * x.r, v: x.v + part(1), p: x.p + part(2), g: x.g + part(3), a: x.a + part(4) }
@@ -428,8 +427,8 @@ fn angle(v: &V3) -> f64 {
 }
 
 proptest! {
-    /// The row of every measurement, up to 250 ms old, against the difference that an error of the present makes of the
-    /// past by way of all samples in between, sampled and integrated here.
+    /// Compares every measurement's row, for ages up to 250 ms, with a finite difference: the present error is
+    /// integrated back through all samples in between.
     #[test]
     fn jacobians_are_finite_differences(
         turn in numbers::<3>(), v in numbers::<3>(), p in numbers::<3>(), motion in numbers::<6>(),
@@ -442,10 +441,10 @@ proptest! {
         let at_us = 1_000_000 - tau_ms * 1000;
         let horizon = Horizon::new(&past(&now, 1_000_000), &past(&then, at_us), GRAVITY as f32);
         let field = vector(field) + V3::new(1.0, 0.0, -1.5);
-        // The measured field in the body.
+        // The field that the body measures.
         let body = (then.r.inverse() * field).map(|x| x as f32);
         let expected = Expected { height_offset: 0.0, field: field.map(|x| x as f32) };
-        // Fields of the vehicle, in shares of the horizontal one.
+        // Derivatives by fields of the vehicle, in shares of the horizontal field.
         let level = field.xy().norm();
         let own = |axis: V3| {
             let seen = |share: f64| angle(&(then.r * axis * (level * share) + field));
@@ -470,7 +469,7 @@ proptest! {
                 let row = |target: Target| horizon.row(&target, coordinate, &expected).unwrap().1;
                 let (p_row, v_row) = (row(Target::Position(zero)), row(Target::Velocity(zero)));
                 let a_row = row(Target::Attitude(past(&then, 0).attitude));
-                // Small: the skew part.
+                // Rotation vector of a small rotation: the skew part.
                 let rotated = |x: &True| {
                     let m = (x.r * then.r.inverse()).into_inner();
                     [m.m32 - m.m23, m.m13 - m.m31, m.m21 - m.m12][c] * 0.5
@@ -490,8 +489,8 @@ proptest! {
                     pairs.push(("heading", slope(&nose), dense_row(&row(Target::Heading(0.0)))[i]));
                 }
                 for (name, theirs, ours) in pairs {
-                    // Left out: what the gyroscope's bias does to velocity and position; the mean rotation is that of
-                    // both ends only.
+                    // The rows leave out the effect of the gyroscope bias on velocity and position, and use the mean
+                    // rotation of both ends only.
                     let bound = match (name, i / 3) {
                         ("velocity", 3) => 0.5 * 16.0 * tau * tau,
                         ("position" | "height", 3) => 16.0 * tau * tau * tau / 3.0,
@@ -507,7 +506,8 @@ proptest! {
         }
     }
 
-    /// The innovation of a measurement that is right is nothing, whatever the age.
+    /// The history returns the state of any past time with and without corrections, so a correct measurement has no
+    /// innovation.
     #[test]
     fn history_interpolates(motion in numbers::<6>(), back_us in 0..284_000_u32, by in numbers::<6>()) {
         let now = True {
@@ -531,8 +531,8 @@ proptest! {
         prop_assert!((found.velocity.map(f64::from) - x.v).norm() < 2e-3);
         let q = past(&x, 0).attitude;
         prop_assert!(1.0 - q.dot(&found.attitude).abs() < 1e-6);
-        // Corrections of the present are those of the past that would have led to it: the same samples, gone back from
-        // the corrected state.
+        // A correction of the present must equal the past that would have led to it: the same samples integrated back
+        // from the corrected state.
         let part = |i: usize, size: f64| vector([by[i], by[i + 1], by[i + 2]]) * size;
         let (theta, v, p) = (part(0, 0.02), part(3, 1.0), part(1, 5.0));
         let single = |v: &V3| v.map(|x| x as f32);
@@ -549,7 +549,7 @@ proptest! {
         let settled = history.corrected(&history.at(at_us).unwrap(), g).unwrap();
         prop_assert!((corrected.position - settled.position).norm() < 2e-4 && !history.is_unsettled());
         prop_assert!((corrected.velocity - settled.velocity).norm() < 2e-3);
-        // Nothing before the oldest, nothing after the newest.
+        // Times before the oldest or after the newest entry return `None`.
         prop_assert!(history.at(base.wrapping_add(284_001)).is_none());
         prop_assert!(history.at(u32::MAX - 100_001).is_none());
     }

@@ -1,11 +1,11 @@
-//! Heading by a GNSS receiver's velocity, without a compass: a bank of filters, each with a guess of its own.
+//! Heading from a GNSS receiver's velocity without a compass: a bank of filters with different initial headings.
 //!
-//! The inertial sensor knows how the velocity has changed, but for the heading's error delta: dv = R(delta) dV with its
-//! own horizontal dV. A receiver measures v, so a vehicle that accelerates shows delta. That is not linear, and one
-//! filter may settle on the wrong side; five, a fifth of a turn apart, do not. Each has the state v, delta and the
-//! weight that its innovations give it (a Gaussian sum; PX4's EKF-GSF, which has an attitude of its own for each
-//! instead). It runs at the rate of the fixes, beside the filter, and never takes anything from a compass: so it can
-//! tell when the compass is wrong.
+//! The IMU gives the horizontal velocity change dV in the estimate's frame, which is wrong by the heading error delta:
+//! dv = R(delta) dV. A receiver measures v, so an accelerating vehicle shows delta. This is not linear, and a single
+//! filter may converge to the wrong side; five filters, a fifth of a turn apart, do not. Each has the state v and
+//! delta, and a weight from its innovations (a Gaussian sum, like PX4's EKF-GSF, whose filters also each have their own
+//! attitude). The bank runs once per fix beside the main filter and never uses a compass, so it can tell when the
+//! compass is wrong.
 
 use crate::rotation::atan2;
 use afbc_control::math::{cos, exp, max, sin, sqrt, wrap_angle};
@@ -14,52 +14,52 @@ use nalgebra::Vector2;
 
 /// Number of filters.
 const FILTERS: usize = 5;
-/// Acceleration that the inertial sensor misses by its biases and the tilt's errors: what the velocity's variance grows
-/// by in a second is its square \[m/s2\].
+/// Acceleration error of the IMU by biases and tilt errors. Its square is the growth of the velocity variance per
+/// second \[m/s2\].
 const MISSED_M_S2: f32 = 0.5;
-/// Drift of the heading's error, the gyroscope's bias and scale: per root of a second \[rad\].
+/// Drift of the heading error by the gyroscope's bias and scale, per root of a second \[rad\].
 const DRIFT_RAD: f32 = 0.01;
-/// Smallest standard deviation that a receiver's velocity counts with \[m/s\].
+/// Smallest standard deviation assumed for a receiver's velocity \[m/s\].
 const LEAST_M_S: f32 = 0.3;
-/// Longest time between two fixes that show a change of velocity \[s\].
+/// Longest time between two fixes from which a velocity change is used \[s\].
 const APART_S: f32 = 1.0;
-/// Smallest weight: a guess that was wrong before the heading was set may be right later.
+/// Smallest weight: a filter that was wrong before a heading reset may be right later.
 const LEAST_WEIGHT: f32 = 1e-4;
 
-/// One filter.
+/// One filter of the bank.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Guess {
     velocity: Vector2<f32>,
-    /// Heading less the estimate's \[rad\].
+    /// True heading minus the estimate's heading \[rad\].
     delta: f32,
-    /// Covariance of the velocity, xx, xy, yy; its covariances with delta; delta's variance.
+    /// Covariance: velocity xx, xy, yy in `vv`, velocity with delta in `vd`, delta in `dd`.
     vv: (f32, f32, f32),
     vd: Vector2<f32>,
     dd: f32,
     weight: f32,
 }
 
-/// The bank.
+/// Bank of yaw filters.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct YawBank {
     guesses: [Guess; FILTERS],
-    /// Sum of the inertial sensor's changes of velocity at the last fix, and its time \[us\].
+    /// Sum of the IMU's velocity changes at the last fix, and the fix's time \[us\].
     last: Option<(Vector2<f32>, u64)>,
-    /// Turn of the estimate's heading since then \[rad\].
+    /// Corrections of the estimate's heading since the last fix \[rad\].
     turned: f32,
     begun: bool,
 }
 
 impl YawBank {
-    /// Takes a fix of the velocity, with the variance of each coordinate. `pushed` is the sum of the changes of
-    /// velocity that the inertial sensor has seen up to the fix's time `at_us`, in the estimate's frame.
+    /// Fuses a velocity fix with the variance of each coordinate. `pushed` is the sum of the IMU's velocity changes up
+    /// to the fix's time `at_us`, in the estimate's frame.
     pub(crate) fn fuse(&mut self, pushed: &Vector2<f32>, at_us: u64, velocity: &Vector2<f32>, variance: f32) {
         let variance = max(variance, LEAST_M_S * LEAST_M_S);
         if !self.begun {
             self.begun = true;
             for (k, guess) in self.guesses.iter_mut().enumerate() {
                 let delta = wrap_angle(TAU / FILTERS as f32 * k as f32);
-                // Half of the way to the next.
+                // Half the distance to the next filter.
                 let dd = (0.5 * TAU / FILTERS as f32) * (0.5 * TAU / FILTERS as f32);
                 *guess = Guess { delta, dd, weight: 1.0 / FILTERS as f32, ..Guess::default() };
             }
@@ -82,7 +82,7 @@ impl YawBank {
                     guess.weight = max(guess.weight / sum, LEAST_WEIGHT);
                 }
             }
-            // Nothing is known of the way since the last one.
+            // The velocity change since the last fix is unknown, so each filter starts from this velocity.
             None => {
                 for guess in &mut self.guesses {
                     (guess.velocity, guess.vv, guess.vd) = (*velocity, (variance, 0.0, variance), Vector2::zeros());
@@ -91,19 +91,19 @@ impl YawBank {
         }
     }
 
-    /// Follows a turn of the estimate's heading by `by`.
+    /// Records a heading correction of the estimate by `by`.
     #[inline]
     pub(crate) fn turn(&mut self, by: f32) {
         self.turned = wrap_angle(self.turned + by);
     }
 
-    /// Follows a heading that was set anew: what was pushed since the last fix was so in another frame.
+    /// Records a heading reset. The velocity changes since the last fix are in the old frame and are not used.
     pub(crate) fn turn_at_once(&mut self, by: f32) {
         self.turn(by);
         self.last = None;
     }
 
-    /// Returns the heading's error by all filters, and its variance; none before the first fix.
+    /// Returns the heading error over all filters and its variance, `None` before the first fix.
     pub(crate) fn error(&self) -> Option<(f32, f32)> {
         if !self.begun {
             return None;
@@ -114,18 +114,18 @@ impl YawBank {
             let off = wrap_angle(guess.delta - mean);
             guess.dd + off * off
         };
-        // At least one weight is not below a fifth.
+        // At least one weight is at least a fifth, so the sum is above zero.
         Some((wrap_angle(mean - self.turned), sum(&spread) / max(sum(&|_| 1.0), LEAST_WEIGHT)))
     }
 }
 
 impl Guess {
-    /// v' = v + R(delta) dV.
+    /// Predicts v' = v + R(delta) dV.
     fn predict(&mut self, change: &Vector2<f32>, time_s: f32) {
         let (sine, cosine) = (sin(self.delta), cos(self.delta));
         let turned = Vector2::new(cosine * change.x - sine * change.y, sine * change.x + cosine * change.y);
         self.velocity += turned;
-        // What delta makes of it.
+        // Derivative of the velocity change by delta.
         let slope = Vector2::new(-turned.y, turned.x);
         let (xx, xy, yy) = self.vv;
         let (c, d) = (self.vd, self.dd);
@@ -139,14 +139,14 @@ impl Guess {
         self.dd += DRIFT_RAD * DRIFT_RAD * time_s;
     }
 
-    /// Corrects by a velocity, and returns how likely it was.
+    /// Corrects by a velocity and returns its likelihood.
     fn correct(&mut self, velocity: &Vector2<f32>, variance: f32) -> f32 {
         let (xx, xy, yy) = self.vv;
         let (sxx, syy) = (xx + variance, yy + variance);
-        // At least the square of the measurement's variance.
+        // At least the square of the measurement's variance, so the division is safe.
         let determinant = max(sxx * syy - xy * xy, variance * variance);
         let inverse = 1.0 / determinant;
-        // S^-1 x.
+        // Product of the inverse innovation covariance S^-1 with a vector.
         let solve = |x: f32, y: f32| Vector2::new((syy * x - xy * y) * inverse, (sxx * y - xy * x) * inverse);
         let innovation = velocity - self.velocity;
         let weighted = solve(innovation.x, innovation.y);
@@ -176,7 +176,7 @@ mod tests {
     use nalgebra::Vector2;
     use proptest::prelude::*;
 
-    /// Flies a path whose acceleration changes, with this error of the heading, and returns what the bank says of it.
+    /// Flies accelerations with a heading error of `off`, and returns the bank's heading error and variance.
     fn found(off: f32, accelerations: &[f32], noise: &[f32], bias: f32) -> (f32, f32) {
         let mut bank = YawBank::default();
         let (mut v, mut pushed) = (Vector2::zeros(), Vector2::zeros());
@@ -196,8 +196,8 @@ mod tests {
     }
 
     proptest! {
-        /// Any error of the heading is found by any path that accelerates, whatever the receiver's noise and a bias;
-        /// and the bank says how well it knows.
+        /// The bank finds any heading error from any accelerated path, despite receiver noise and an acceleration bias,
+        /// and its error fits its variance.
         #[test]
         fn any_heading_is_found(
             off in -PI..PI, accelerations in prop::collection::vec(-2.0..2.0_f32, 60),
@@ -210,14 +210,14 @@ mod tests {
             prop_assert!(error < 0.4, "{error}");
         }
 
-        /// One that does not accelerate shows none.
+        /// Without acceleration the heading stays unknown.
         #[test]
         fn a_hover_shows_nothing(off in -PI..PI, noise in prop::collection::vec(-0.2..0.2_f32, 98)) {
             let (_, variance) = found(off, &[0.0; 60], &noise, 0.0);
             prop_assert!(variance > 0.5, "{variance}");
         }
 
-        /// No number that a receiver or a sensor may say makes it one that is none.
+        /// The output stays finite for any input of receiver and IMU.
         #[test]
         fn it_stays_finite(
             steps in prop::collection::vec((-1e4..1e4_f32, -150.0..150.0_f32, 0_u64..3_000_000, 1e-6..1e8_f32), 1..80),

@@ -1,10 +1,10 @@
-//! Accuracy against truth, with the noise of an ICM-42688-P, and what is left when the tracker goes.
+//! Accuracy against the truth with the noise of an ICM-42688-P, and after a loss of the tracker.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::indexing_slicing, clippy::panic, missing_docs)] // tests
 
 use crate::common::{Flight, ICM, MOCAP, OUTDOOR, Rms, double, eight, exp, fly, hover, log, matrix, settings};
 use afbc_estimator::{Measurement, Settings};
 
-/// Root mean squares of the errors.
+/// Root mean square errors.
 #[derive(Default)]
 struct Errors {
     horizontal: Rms,
@@ -21,7 +21,7 @@ fn measure(sensors: crate::common::Sensors, settings: Settings, seeds: u64) -> E
         let mut flight = Flight::with(&truth, ICM, sensors, 77 + seed, settings);
         for ms in 0..30_000 {
             let estimate = flight.step();
-            // After 10 s, against the truth of the same moment: the estimate is of the present.
+            // Compared after 10 s with the truth at the same moment, because the estimate is of the present.
             if ms >= 10_000 {
                 let validity = estimate.validity;
                 assert!(validity.attitude && validity.heading && validity.velocity && validity.position, "{ms} ms");
@@ -37,7 +37,7 @@ fn measure(sensors: crate::common::Sensors, settings: Settings, seeds: u64) -> E
     errors
 }
 
-/// The bounds; with the settings of the part, and with the defaults for any vehicle.
+/// Accuracy with motion capture, for the settings of the bare sensor and the defaults for any vehicle.
 #[test]
 fn motion_capture() {
     for (name, settings) in [("part", settings(&ICM)), ("default", Settings::DEFAULT)] {
@@ -60,7 +60,7 @@ fn outdoor() {
     }
 }
 
-/// The tracker is gone in hover for `gap_ms`; returns the largest error of the position.
+/// Takes the tracker away for `gap_ms` in hover, and returns the largest position error.
 fn without_tracker(gap_ms: usize, seed: u64, settings: Settings) -> f64 {
     let truth = fly(hover, 20.0);
     let mut flight = Flight::with(&truth, ICM, MOCAP, seed, settings);
@@ -90,7 +90,7 @@ fn without_tracker(gap_ms: usize, seed: u64, settings: Settings) -> f64 {
             assert!(error < 5.0 * sigma + 1e-3, "{ms} ms: {error} m, but sigma {sigma} m");
             assert!(estimate.validity.position, "{ms} ms");
         }
-        // Back at once, and no reset.
+        // The position is right again at once, without a reset.
         if ms > 12_000 + gap_ms + 100 {
             assert!(error < 0.005, "{ms} ms: {error} m");
             assert_eq!(estimate.resets.position, 0);
@@ -116,12 +116,12 @@ fn the_tracker_is_gone_in_hover() {
     assert!(one < 0.2 && three < 1.5, "{one} m, {three} m");
 }
 
-/// A tracker that is 250 ms late: in the flown figure, the vehicle is half a metre further on by then.
+/// A tracker that is 250 ms late: on the figure of eight the vehicle has moved half a metre by then.
 #[test]
 fn a_late_tracker() {
     let truth = fly(eight, 16.0);
     let mut flight = Flight::new(&truth, ICM, MOCAP, 5);
-    // Its own 8 to 12 ms on top.
+    // In addition to the tracker's own 8 to 12 ms.
     flight.late_ms = 238.0;
     let (mut position, mut behind) = (Rms::default(), Rms::default());
     for ms in 0..16_000 {
@@ -138,8 +138,8 @@ fn a_late_tracker() {
     assert!(flight.memory.aids().tracker_position.accepted > 1300);
 }
 
-/// A heading that nobody tells is found by flying, from two radians off. By positions alone it is never valid, since
-/// from three it may not be found; a receiver's velocity shows any.
+/// A heading that no sensor measures is found by flying, from an error of two radians. From positions alone it never
+/// becomes valid, since an error of three radians might stay. From a receiver's velocity it does.
 #[test]
 fn an_untold_heading() {
     let truth = fly(|t| (eight(t).0, eight(t).1 - 2.0), 20.0);
@@ -164,7 +164,7 @@ fn an_untold_heading() {
     }
 }
 
-/// Told to be on the ground, the filter holds velocity and biases without any aid; otherwise they drift away.
+/// On the ground without any aid the filter holds velocity and biases if told so; otherwise they drift.
 #[test]
 fn on_the_ground() {
     let truth = fly(crate::common::rest, 120.0);
@@ -186,7 +186,7 @@ fn on_the_ground() {
     assert!(drifts[0] < 0.02 && drifts[1] > 5.0 * drifts[0], "{drifts:?} m/s");
 }
 
-/// At a kilometre, a position in `f32` has steps of 0.06 mm: a slow vehicle must still move.
+/// At a kilometre an `f32` position has steps of 0.06 mm, and a slow vehicle must still move.
 #[test]
 fn far_away_and_slow() {
     let truth = fly(|t| (nalgebra::Vector3::new(2000.0 + 0.02 * t, -1500.0, 50.0), 0.0), 15.0);
@@ -202,7 +202,7 @@ fn far_away_and_slow() {
     assert!(value < 0.005, "{value} m/s");
 }
 
-/// The rotation utilities of the tests themselves.
+/// Checks the rotation functions of the tests themselves.
 #[test]
 fn rotations() {
     let v = nalgebra::Vector3::new(0.3, -0.5, 0.9);

@@ -1,6 +1,6 @@
-//! A minute of whatever can happen to a vehicle's sensors, in any order: the covariance stays one.
+//! Random sensor faults of every kind for a minute: the covariance must stay valid.
 //!
-//! By default 30 filters; `FILTERS=10000 SEED=1` makes that many from another seed.
+//! By default 30 filters; `FILTERS=10000 SEED=1` runs that many from another seed.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::indexing_slicing, clippy::panic, missing_docs)] // tests
 
 use crate::common::{M3, Noise, V3, double, exp, field, quaternion, single};
@@ -8,7 +8,7 @@ use afbc_estimator::{Estimate, Estimator, ImuSample, Measurement, Memory, Settin
 use afbc_types::{Declared, State};
 use nalgebra::SMatrix;
 
-/// One of the things that may be so for a while.
+/// Faults that last for a while.
 #[derive(Clone, Copy, Debug, Default)]
 struct Trouble {
     gnss_out: bool,
@@ -28,12 +28,12 @@ fn numbers(env: &str, otherwise: u64) -> u64 {
     std::env::var(env).ok().map_or(otherwise, |number| number.parse().unwrap())
 }
 
-/// Returns a number in the range, of any order of magnitude.
+/// Draws a number from the range, uniform in its logarithm.
 fn any(noise: &mut Noise, from: f64, to: f64) -> f32 {
     (from * (to / from).powf(noise.uniform())) as f32
 }
 
-/// Settings anywhere within their ranges, most of them near the defaults.
+/// Draws settings within their ranges, most of them near the defaults.
 fn any_settings(noise: &mut Noise) -> Settings {
     let mut settings = Settings::DEFAULT;
     let mut change = |value: &mut f32, from: f64, to: f64| {
@@ -78,7 +78,7 @@ fn any_trouble(noise: &mut Noise) -> Trouble {
     }
 }
 
-/// Returns the least eigenvalue of the correlation matrix; panics if a number is none.
+/// Returns the smallest eigenvalue of the correlation matrix; panics if a number is not finite.
 fn least_eigenvalue(memory: &Memory) -> f64 {
     let rows = memory.covariance();
     let p = SMatrix::<f64, 16, 16>::from_fn(|i, j| f64::from(rows[i][j]));
@@ -87,7 +87,7 @@ fn least_eigenvalue(memory: &Memory) -> f64 {
     SMatrix::<f64, 16, 16>::from_fn(|i, j| p[(i, j)] / (sigma[i] * sigma[j])).symmetric_eigenvalues().min()
 }
 
-/// Runs a filter for a minute, and returns the least eigenvalue of all, with its time.
+/// Runs a filter for a minute, and returns the smallest eigenvalue of all steps with its time.
 fn minute(seed: u64) -> (f64, u64) {
     let noise = &mut Noise::new(seed);
     let settings = any_settings(noise);
@@ -103,7 +103,7 @@ fn minute(seed: u64) -> (f64, u64) {
     for ms in 1..=60_000_u64 {
         let at_us = 1000 * ms;
         if ms > 2000 {
-            // Wanders: what it does changes within half a second.
+            // Random motion that changes within half a second.
             rates = rates * 0.998 + noise.vector(0.03);
             push = push * 0.998 + noise.vector(0.15) - v * 0.001 - p * 0.0003;
             memory.set_on_ground(false);
@@ -162,7 +162,7 @@ fn minute(seed: u64) -> (f64, u64) {
             memory.offer(&Stamped { value, at_us: at_us.saturating_sub(late_us(20_000.0, noise)) });
         }
         if noise.uniform() < 2e-5 {
-            // Started again in the air, where it is.
+            // Started again in the air at the present state.
             let state = State { attitude_rad: estimate.state.attitude_rad, ..estimate.state };
             let _ = estimator.start_at(
                 &mut memory,

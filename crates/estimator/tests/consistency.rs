@@ -1,14 +1,15 @@
-//! Consistency: the filter's errors are as large as it says, in a hundred flights with other noise and other biases.
+//! Consistency: the errors agree with the stated covariance, over a hundred flights with different noise and biases.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::indexing_slicing, clippy::panic, missing_docs)] // tests
 
 use crate::common::{Flight, ICM, MOCAP, OUTDOOR, Path, Sensors, eight, fly, rest, settings};
 use afbc_estimator::{Aid, Settings};
 
 const RUNS: usize = 100;
-/// What the outdoor sensors tell.
+/// Aids of the outdoor sensors.
 const OUTDOOR_AIDS: [Aid; 4] = [Aid::GnssPosition, Aid::GnssVelocity, Aid::Height, Aid::Heading];
 
-/// Bounds of the mean of `count` chi-square numbers with `degrees` of freedom each, of 95 %: normal, since many.
+/// Returns the 95 % bounds for the mean of `count` chi-square numbers with `degrees` of freedom each, in the normal
+/// approximation.
 fn bounds(degrees: f64, count: f64) -> (f64, f64) {
     let half = 1.96 * (2.0 * degrees / count).sqrt();
     (degrees - half, degrees + half)
@@ -20,13 +21,13 @@ fn inside(name: &str, mean: f64, degrees: f64, count: f64) {
     assert!(mean > low && mean < high, "{name}: mean {mean} is not within {low} to {high}");
 }
 
-/// Flies `RUNS` times, with seeds from `first` on; checks NEES of `N` states and NIS of `aids`.
+/// Flies `RUNS` times with seeds from `first` on; checks the NEES of `N` states and the NIS of `aids`.
 fn check<const N: usize>(name: &str, first: usize, sensors: Sensors, settings: Settings, aids: &[Aid]) {
     const TIMES: [usize; 8] = [5000, 6000, 8000, 10_000, 12_000, 14_000, 17_000, 20_000];
     let truth = fly(eight, 20.0);
     let mut nees = [0.0; TIMES.len()];
     let mut squares = [0.0; N];
-    // Of each flight.
+    // One list entry per flight.
     let mut all_nis = vec![Vec::new(); aids.len()];
     let mut rejected = 0;
     for run in 0..RUNS {
@@ -55,13 +56,14 @@ fn check<const N: usize>(name: &str, first: usize, sensors: Sensors, settings: S
         all_nis.iter_mut().zip(nis).for_each(|(all, one)| all.push(one));
         rejected += aids.iter().map(|aid| flight.memory.aids().of(*aid).rejected).sum::<u32>();
     }
-    // Of some 300 000 scalars, 0.2 are beyond five sigma by chance.
+    // Among some 300 000 scalars, 0.2 exceed five sigma by chance.
     assert!(rejected <= 2, "{name}: {rejected}");
     println!("{name}: mean squared error over variance, state by state: {squares:.2?}");
     for (time, mean) in TIMES.iter().zip(&nees) {
         let name = format!("{name}, NEES at {time} ms");
         if sensors.iron.is_some() {
-            // With an uncertain heading the noise for errors of the second order counts: a tenth too much is stated.
+            // With an uncertain heading the noise for second-order errors matters, so the stated variance is a tenth
+            // too large.
             let (_, high) = bounds(N as f64, RUNS as f64);
             println!("{name}: mean {mean:.3}, at most {high:.3}");
             assert!(*mean > 0.85 * N as f64 && *mean < high, "{name}: {mean}");
@@ -69,7 +71,7 @@ fn check<const N: usize>(name: &str, first: usize, sensors: Sensors, settings: S
             inside(&name, *mean, N as f64, RUNS as f64);
         }
     }
-    // One state by itself may be off by chance: 4 sigma of as many independent flights.
+    // A single state may deviate by chance: 4 sigma of this number of independent flights.
     let half = 4.0 * (2.0 / RUNS as f64).sqrt();
     for (state, square) in squares.iter().enumerate() {
         assert!((square - 1.0).abs() < half, "{name}, state {state}: {square}");
@@ -80,9 +82,9 @@ fn check<const N: usize>(name: &str, first: usize, sensors: Sensors, settings: S
         let name = format!("{name}, NIS of {aid:?} per scalar");
         let slow = *aid == Aid::GnssPosition && sensors.slow.is_some();
         if slow || *aid == Aid::Heading && sensors.iron.is_some() {
-            // A slow error is in one innovation as in the next, so a flight counts once.
+            // A slow error is the same in successive innovations, so a flight counts once.
             let spread = flights.iter().map(|(sum, scalars)| (sum / scalars - mean).powi(2)).sum::<f64>();
-            // Three sigma for the vehicle's own field, of which a flight with few turns shows little.
+            // Three sigma for the vehicle's own field, because flights with few turns show little of it.
             let half = if slow { 1.96 } else { 3.0 } * spread.sqrt() / RUNS as f64;
             println!("{name}: mean {mean:.3}, bounds {:.3} to {:.3}", 1.0 - half, 1.0 + half);
             assert!((mean - 1.0).abs() < half && half < 0.2, "{name}: {mean}");
@@ -102,8 +104,8 @@ fn outdoor() {
     check::<16>("outdoor", 1000, OUTDOOR, settings(&ICM), &OUTDOOR_AIDS);
 }
 
-/// A receiver with a slow error that is much larger than its noise: the position's standard deviation is the slow
-/// error's, and the innovations' is the noise's.
+/// A receiver whose slow error is much larger than its noise: the position's standard deviation is that of the slow
+/// error, the innovations' is that of the noise.
 #[test]
 fn outdoor_with_a_slow_error() {
     let gnss = Some((0.4, 0.4, 0.1));
@@ -112,8 +114,8 @@ fn outdoor_with_a_slow_error() {
     check::<16>("outdoor with a slow error", 1000, sensors, settings, &OUTDOOR_AIDS);
 }
 
-/// A vehicle whose own field turns the heading by much more than the noise does, so that the heading's
-/// standard deviation is that field's.
+/// A vehicle whose own field turns the heading much more than the noise does, so that the heading's standard deviation
+/// is that of the own field.
 #[test]
 fn outdoor_with_iron() {
     let sensors = Sensors { iron: Some(0.03), ..OUTDOOR };
@@ -121,8 +123,9 @@ fn outdoor_with_iron() {
     check::<16>("outdoor with iron", 2000, sensors, settings, &OUTDOOR_AIDS);
 }
 
-/// A compass that was calibrated once, somewhere else: nobody knows its hard iron, 0.04 gauss of 0.2 gauss along each
-/// axis. By default the heading is as uncertain as that makes it, at rest, where nothing else tells it, and in flight.
+/// A compass that was calibrated once, elsewhere, with an unknown hard iron of 0.04 gauss along each axis in a
+/// horizontal field of 0.2 gauss. With the defaults, the heading's standard deviation fits this error at rest and in
+/// flight.
 #[test]
 fn a_heading_by_a_compass_is_as_good_as_compasses_are() {
     let sensors = Sensors { iron: Some(0.2), ..OUTDOOR };
@@ -147,7 +150,7 @@ fn a_heading_by_a_compass_is_as_good_as_compasses_are() {
         let mean = squares / f64::from(all);
         println!("{name}: {beyond} of {all} beyond three sigma, mean square {mean:.2}");
         assert!(100 * beyond <= all, "{name}: {beyond} of {all}");
-        // Nor is it a bound that is never reached: the mean square of as many flights, four sigma.
+        // The stated standard deviation is not too large either: mean square within four sigma.
         let half = 4.0 * (2.0 / flights as f64).sqrt();
         assert!((mean - 1.0).abs() < half, "{name}: {mean}");
     }

@@ -1,4 +1,4 @@
-//! Faults of the sensors are refused, told and recovered from.
+//! Sensor faults are detected, reported and recovered from.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::indexing_slicing, clippy::panic, missing_docs)] // tests
 
 use crate::common::checks::{at_rest, flown, position_error};
@@ -16,7 +16,7 @@ fn outliers_are_rejected() {
         15,
         |_, _| true,
         |ms, measurement| {
-            // One pose in ten is elsewhere, half of those turned over instead.
+            // Every tenth pose is wrong, alternately in position and turned over.
             if let Measurement::Pose { position_m, attitude, .. } = &mut measurement.value {
                 let number = measurement.at_us / 10_000;
                 if ms > 4000 && number % 20 == 0 {
@@ -71,11 +71,11 @@ fn a_moved_tracker_is_believed_after_a_while() {
         },
     );
     let reset_ms = reset_ms.unwrap();
-    // Three fifths of the time of coasting.
+    // After three fifths of `coast_s`.
     assert!((8950..9150).contains(&reset_ms), "{reset_ms} ms");
 }
 
-/// A tracker that repeats its pose under new times, as a hovering vehicle's would hardly differ from it.
+/// The tracker repeats one pose with new times. A hovering vehicle's true pose hardly differs from it.
 #[test]
 fn a_frozen_tracker_is_not_believed() {
     let held = core::cell::RefCell::new(None);
@@ -94,7 +94,7 @@ fn a_frozen_tracker_is_not_believed() {
         |ms, estimate, flight| {
             let error = position_error(estimate, flight);
             assert!(!(3000..=8000).contains(&ms) || error < 0.1, "{ms} ms: {error} m");
-            // Lost within the time of coasting, and found again.
+            // The position is lost after `coast_s`, and found again.
             let lost = (11_300..14_000).contains(&ms);
             let turns = ms < 1100 || (11_100..11_300).contains(&ms) || (14_000..14_100).contains(&ms);
             assert!(turns || estimate.validity.position != lost, "{ms} ms");
@@ -103,7 +103,7 @@ fn a_frozen_tracker_is_not_believed() {
         },
     );
     assert!((770..=790).contains(&frozen), "{frozen}");
-    // By default only: a tracker without noise repeats itself.
+    // Only with the default setting: a tracker without noise repeats itself.
     let estimator = |frozen_s| Estimator::new(Settings { frozen_s, ..settings(&ICM) }).unwrap();
     for (frozen_s, all) in [(0.0, true), (Settings::DEFAULT.frozen_s, false)] {
         let (estimate, mut memory) = at_rest(1500, NOTHING, |_, _| ());
@@ -131,7 +131,7 @@ fn a_disturbed_field_turns_nothing() {
         |_, _| true,
         |ms, measurement| {
             if let Measurement::MagneticField { field, .. } = &mut measurement.value {
-                // As strong currents make it.
+                // A disturbance like that of strong currents.
                 if (8000..16_000).contains(&ms) {
                     *field += Vector3::new(0.3, 0.5, 0.2);
                 }
@@ -171,8 +171,8 @@ fn a_receiver_that_jumps_keeps_its_velocity() {
     );
 }
 
-/// A receiver whose position jumps for good while its velocity goes on: nothing is lost, and the position is followed
-/// after 7 s. With the velocity gone too, the position is invalid after 5 s.
+/// A receiver's position jumps for good while its velocity continues: the position stays valid and follows after 7 s.
+/// Without the velocity, it is invalid after 5 s.
 #[test]
 fn a_position_that_is_doubted_is_carried_on_by_a_velocity() {
     for has_velocity in [true, false] {
@@ -223,9 +223,8 @@ fn without_aid_it_stays_level_and_says_what_is_lost() {
     );
 }
 
-/// What a stuck sensor repeats does not turn the estimate: when it comes back, after a short or a long time, the tilt
-/// is off by what it would be off after a silence and by five sigma more, but for what 0.5 rad/s make of it in the
-/// 16 ms in which nobody can tell.
+/// The repeated samples of a stuck IMU do not turn the estimate. When the IMU comes back, the tilt error is at most
+/// that after a silent IMU plus five sigma, plus 0.5 rad/s times the 16 ms before the fault can be detected.
 #[test]
 fn a_sensor_that_was_stuck_is_like_one_that_was_silent() {
     for fails_ms in [100, 200, 400, 3000] {
@@ -288,7 +287,7 @@ fn faults_of_the_imu_are_told() {
         },
     );
     assert!((2015..2025).contains(&stuck_ms.unwrap()), "{stuck_ms:?}");
-    // Dead.
+    // No samples.
     flown(
         hover,
         MOCAP,
@@ -300,7 +299,7 @@ fn faults_of_the_imu_are_told() {
             assert!(ms < 2020 || !estimate.validity.attitude);
         },
     );
-    // Clipped for a while: told, and back afterwards.
+    // Clipped for a while: reported, then recovered.
     flown(
         eight,
         MOCAP,
@@ -388,7 +387,7 @@ fn bad_measurements_are_counted() {
     }
     let _ = step(&mut memory, 1);
     assert_eq!(memory.dropped().implausible, 7);
-    // Too old, far in the future, twice the same, and older than the last one.
+    // Too old, far in the future, the same twice, and older than the last one.
     for at_us in [now_us - 300_000, now_us + 500_000, now_us - 20_000, now_us - 20_000, now_us - 40_000] {
         memory.offer(&Stamped { value: good, at_us });
     }

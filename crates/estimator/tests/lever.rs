@@ -1,4 +1,4 @@
-//! The place of the inertial sensor, found in flights of a rigid body that vibrates.
+//! The IMU's lever is found in flights of a rigid body that vibrates.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs)] // tests
 
 use afbc_estimator::{ImuSample, LeverFinder};
@@ -14,12 +14,12 @@ const G: f64 = 9.81;
 struct Random(Xoshiro256PlusPlus);
 
 impl Random {
-    /// Within -1 and 1.
+    /// Returns a uniform number within -1 and 1.
     fn uniform(&mut self) -> f64 {
         (self.0.next_u64() >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
     }
 
-    /// With a variance of 1.
+    /// Returns a number with variance 1.
     fn normal(&mut self) -> f64 {
         (0..12).map(|_| self.uniform()).sum::<f64>() * 0.5
     }
@@ -29,11 +29,11 @@ impl Random {
     }
 }
 
-/// A multirotor whose attitude goes to one place after the other, as a system of second order does.
+/// A multirotor that steps from attitude to attitude as a second-order system.
 struct Body {
     random: Random,
     hover_rad_s: f64,
-    /// Amplitudes of the vibration of one rotor \[rad/s, m/s2\], and phases by rotor, sensor and axis.
+    /// Amplitudes of one rotor's vibration \[rad/s, m/s2\], and phases by rotor, sensor and axis.
     vibration: [f64; 2],
     phases: [[Vector3<f64>; 2]; 4],
     lever_m: Vector3<f64>,
@@ -71,7 +71,7 @@ impl Body {
         }
     }
 
-    /// A millisecond more, with steps of the attitude and of the climb of this size.
+    /// Simulates one millisecond, with attitude and climb steps of these sizes.
     fn sample(&mut self, tilt_rad: f64, climb_m_s2: f64) -> ImuSample {
         let time_s = self.steps as f64 * STEP_S;
         self.steps += 1;
@@ -80,7 +80,7 @@ impl Body {
             self.aim_rad = self.random.vector(Random::uniform) * tilt_rad;
             self.climb[1] = self.random.uniform() * climb_m_s2;
         }
-        // Quick as a small multirotor, and less so about the vertical.
+        // As fast as a small multirotor, and slower about the vertical.
         let stiffness = Vector3::new(100.0, 100.0, 10.0);
         let damping = Vector3::new(16.0, 16.0, 5.0);
         let off = self.aim_rad - self.angles_rad;
@@ -88,7 +88,7 @@ impl Body {
         self.rates += acceleration * STEP_S;
         self.angles_rad += self.rates * STEP_S;
         self.climb[0] += (self.climb[1] - self.climb[0]) * 10.0 * STEP_S;
-        // Drag, of what the tilt has made of the velocity.
+        // Drag, proportional to the velocity that the tilt causes.
         self.velocity +=
             (Vector3::new(G * self.angles_rad.y, -G * self.angles_rad.x, 0.0) - self.velocity * 0.3) * STEP_S;
         let force = Vector3::new(0.0, 0.0, G + self.climb[0]) - self.velocity * 0.3;
@@ -119,8 +119,8 @@ fn lever() -> impl Strategy<Value = Vector3<f64>> {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 100, failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// How far below or above the sensor is, is found within 1.5 cm in 10 s of manoeuvres; beside the centre, which
-    /// turns about the vertical alone show, as well as it says.
+    /// In 10 s of manoeuvres the vertical distance is found within 1.5 cm. The horizontal ones, which only turns about
+    /// the vertical show well, agree with their standard deviations.
     #[test]
     fn a_lever_is_found(
         seed in any::<u64>(), lever_m in lever(), hover_rad_s in 180.0..1800.0_f64, shaken in 0.0..0.05_f64,
@@ -134,17 +134,17 @@ proptest! {
         let [found_m, sigma_m] = finder.found_m();
         let off_m = found_m.cast::<f64>() - lever_m;
         prop_assert!(off_m.z.abs() < 0.015, "{lever_m} {found_m} {sigma_m}");
-        // Within its standard deviations, but for drag and what turns the vehicle so quickly that filters differ.
+        // Within the standard deviations, apart from drag and turns so fast that the filters' delays matter.
         let stated = off_m.iter().zip(&sigma_m).all(|(off_m, sigma_m)| off_m.abs() < 4.0 * f64::from(*sigma_m) + 0.003);
         prop_assert!(stated, "{lever_m} {found_m} {sigma_m}");
-        // Each axis is corrected by what was found, or not yet.
+        // Each axis is corrected by the found lever, or not yet.
         let corrected_m = finder.corrected_m();
         let mut parts = corrected_m.iter().zip(&found_m);
         let one_or_none = parts.all(|(part, found)| *part == 0.0 || (part - found).abs() < 2e-3);
         prop_assert!(one_or_none, "{corrected_m} {found_m}");
     }
 
-    /// A vehicle that hovers, however it vibrates, finds nothing, and corrects nothing.
+    /// A hovering vehicle finds and corrects nothing, whatever its vibration.
     #[test]
     fn no_vibration_is_a_lever(
         seed in any::<u64>(), hover_rad_s in 180.0..1800.0_f64, shaken in 0.0..0.1_f64, pushed in 0.0..4.0_f64,

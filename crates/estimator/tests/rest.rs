@@ -1,25 +1,26 @@
-//! A vehicle at rest stays where it is, and one that is moved is followed.
+//! A vehicle at rest stays in place, and a vehicle that is moved is followed.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::indexing_slicing, clippy::panic, missing_docs)] // tests
 
 use crate::common::{Flight, ICM, Imu, MOCAP, NOTHING, OUTDOOR, Path, V3, eight, fly, hover, rest, settings};
 use afbc_estimator::Settings;
 
-/// A simulator's sensor: 0.0004 rad/s and 0.002 m/s2 per root of a hertz.
+/// IMU of a simulator: 0.0004 rad/s and 0.002 m/s2 per root of a hertz.
 const COARSE: Imu = Imu { gyro: 4e-4, accel: 2e-3, ..ICM };
 
-/// From rest to rest: 0 to 1 between `from` and `to`, smoothly.
+/// Returns a smooth step from 0 to 1 between `from` and `to`.
 fn step(t: f64, from: f64, to: f64) -> f64 {
     let x = ((t - from) / (to - from)).clamp(0.0, 1.0);
     x * x * x * x * (35.0 - 84.0 * x + 70.0 * x * x - 20.0 * x * x * x)
 }
 
-/// From rest to unit speed between 4 s and 6 s, and on.
+/// Returns the distance at a speed that grows from 0 at 4 s to 1 at 6 s.
 fn begun(t: f64) -> f64 {
     let x = ((t - 4.0) / 2.0).clamp(0.0, 1.0);
     2.0 * x * x * x * x * (2.5 - 3.0 * x + x * x) + (t - 6.0).max(0.0)
 }
 
-/// With no aid, and whether it is told that its motors are off, or nothing: neither velocity nor place nor tilt walks.
+/// Without any aid, velocity, position and tilt do not drift, whether the filter is told that the motors are off or
+/// nothing.
 #[test]
 fn it_stays_where_it_is() {
     let truth = fly(rest, 60.0);
@@ -37,7 +38,7 @@ fn it_stays_where_it_is() {
                 let state = &estimate.state;
                 let (_, first) = *start.get_or_insert((ms, state.attitude_rad));
                 let (speed, away) = (state.velocity_m_s.norm(), state.position_m.norm());
-                // Upwards, the accelerometer's bias of 0.1 m/s2 shows first.
+                // Upwards, the accelerometer bias of 0.1 m/s2 shows first.
                 let most = if ms < 4000 { 0.05 } else { 0.02 };
                 assert!(speed < most && away < 0.1, "seed {seed}, {ms} ms: {speed} m/s, {away} m");
                 let turned = (state.attitude_rad - first).xy().norm().to_degrees();
@@ -47,7 +48,7 @@ fn it_stays_where_it_is() {
     }
 }
 
-/// Carried about, with and without a tremor of the hand, by 3 m and half a turn.
+/// Carries the vehicle by 3 m and half a turn, with a tremor of this amplitude.
 fn carried(t: f64, time_s: f64, tremor_m: f64) -> (V3, f64) {
     let x = step(t, 4.0, 4.0 + time_s);
     let shakes = 4.0 * x * (1.0 - x) * tremor_m;
@@ -67,8 +68,8 @@ fn with_a_tremor(t: f64) -> (V3, f64) {
     carried(t, 6.0, 5e-4)
 }
 
-/// Moved by hand, with the motors off: it is not held, and is found again at its new place without a jump of the
-/// velocity; what the errors are is within what is said of them.
+/// A hand moves the vehicle with its motors off: the filter does not hold it, and holds it again at the new place
+/// without a velocity jump. The errors fit the stated covariance.
 #[test]
 fn a_hand_moves_it() {
     for (path, moves_s) in [(quickly as Path, 2.0), (gently as Path, 10.0), (with_a_tremor as Path, 6.0)] {
@@ -86,7 +87,7 @@ fn a_hand_moves_it() {
                     if t < 2.0 {
                         continue;
                     }
-                    // Noticed before it is fast, and not before the end.
+                    // Motion is noticed before the vehicle is fast, and rest not before the motion ends.
                     let speed = flight.moment().v.norm();
                     assert!(!(estimate.at_rest && speed > 0.15), "{}: at rest at {speed} m/s", name(ms));
                     let settled = !(moves.start..moves.end + 2.0).contains(&t);
@@ -94,7 +95,7 @@ fn a_hand_moves_it() {
                     assert!(!settled || estimate.at_rest == rests, "{}", name(ms));
                     let (e, p) = (flight.errors(&estimate), flight.covariance());
                     place = e.fixed_rows::<3>(6).norm();
-                    // Without an aid it is lost until it stands again.
+                    // Without an aid the position is lost until the vehicle stands again.
                     let lost = sensors.gnss.or(sensors.tracker.map(|(p, a)| (p, p, a))).is_none();
                     let velocity = e.fixed_rows::<3>(3).norm();
                     assert!(velocity < 0.3 || lost && !settled, "{}: off by {velocity} m/s", name(ms));
@@ -116,7 +117,7 @@ fn a_hand_moves_it() {
     }
 }
 
-/// Driven straight on at a walk, its motors off: the inertial sensor shows rest, and the receiver that it is none.
+/// A cart drives straight on at walking speed, motors off: the IMU shows rest, but the receiver shows motion.
 #[test]
 fn a_cart_moves_it() {
     let truth = fly(|t| (V3::new(0.9, 0.4, 0.0) * begun(t), 0.0), 14.0);
@@ -132,8 +133,8 @@ fn a_cart_moves_it() {
     }
 }
 
-/// A vehicle that hovers, or flies straight on in calm air, looks like one at rest: it is not held once it has moved,
-/// if nobody tells, and never if its motors turn.
+/// A vehicle that hovers or flies straight in calm air looks like one at rest. Without ground information it is not
+/// held once it has moved; with motors turning it is never held.
 #[test]
 fn a_hover_is_no_rest() {
     fn cruise(t: f64) -> (V3, f64) {

@@ -1,4 +1,4 @@
-//! Whatever comes in, and however long: finite estimates, a positive covariance, and no more memory than it has.
+//! For any input and any duration: finite estimates, a positive covariance, and limited memory.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::indexing_slicing, clippy::panic, missing_docs)] // tests
 
 use crate::common::checks::{positive, sound};
@@ -8,7 +8,7 @@ use afbc_types::State;
 use nalgebra::Vector3;
 use proptest::prelude::*;
 
-/// Any number: usual ones, large ones, and what is none.
+/// Draws typical numbers, large numbers, NaN and infinities.
 fn any_number() -> impl Strategy<Value = f32> {
     prop_oneof![
         4 => -20.0..20.0_f32,
@@ -56,16 +56,16 @@ fn any_measurement() -> impl Strategy<Value = Measurement> {
     ]
 }
 
-/// Something that happens to an estimator.
+/// Event in the life of an estimator.
 #[derive(Clone, Debug)]
 enum Event {
-    /// Samples like those at rest or in flight, for some milliseconds.
+    /// Samples as at rest or in flight, for some milliseconds.
     Fly(u32, f32),
-    /// One sample of any numbers, at a time off by so much.
+    /// One sample with any numbers, with this time offset.
     Sample(Vector3<f32>, Vector3<f32>, i64),
-    /// A measurement of a time off by so much.
+    /// A measurement with this time offset.
     Measure(Measurement, i64),
-    /// No samples for so long.
+    /// No samples for this time.
     Gap(u32),
     OnGround(bool),
     /// The clock jumps.
@@ -144,10 +144,10 @@ proptest! {
     }
 }
 
-/// Hours at rest, where the accelerometer's bias and the tilt cannot be told apart, on samples of 4 ms: by default a
-/// quarter of an hour of a tracker and two hours outdoors; `HOURS=10` flies ten of each. With the settings of the part,
-/// outdoors, the standard deviation of a horizontal bias is up to a third of the error after ten hours; with the
-/// defaults it is not.
+/// Hours at rest on samples every 4 ms, where accelerometer bias and tilt cannot be told apart. By default a quarter of
+/// an hour with a tracker and one and two hours outdoors; `HOURS=10` runs ten hours of each. Outdoors with the bare
+/// sensor's settings, the standard deviation of a horizontal bias falls to a third of the error after ten hours; with
+/// the defaults it does not.
 #[test]
 fn hours_leave_it_sound() {
     let told: Option<f64> = std::env::var("HOURS").ok().map(|hours| hours.parse().unwrap());
@@ -237,13 +237,13 @@ fn hours_leave_it_sound() {
             }
         }
         println!("{hours} h: beyond 2 sigma, of {checks}: {over:?}");
-        // One in twenty by chance, and by chance more of few.
+        // One in twenty by chance, and more by chance if there are few checks.
         let most = if settings == Settings::DEFAULT { checks / 8 } else { checks };
         assert!(over.iter().all(|over| *over <= most), "{over:?} of {checks}");
     }
 }
 
-/// The RAM that an estimator takes.
+/// RAM size of an estimator.
 #[test]
 fn fits_in_ten_kibibytes() {
     let (estimator, memory) = (size_of::<Estimator>(), size_of::<Memory>());

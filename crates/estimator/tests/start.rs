@@ -1,4 +1,4 @@
-//! It starts at rest by itself or says why not, and in the air where it is told.
+//! The filter starts by itself at rest or reports why not, and starts in the air in a given state.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::indexing_slicing, clippy::panic, missing_docs)] // tests
 
 use crate::common::checks::{at_rest, position_error, sound};
@@ -13,9 +13,9 @@ fn starts_at_rest_level_and_unbiased() {
     assert_eq!(estimate.unready, None);
     let v = estimate.validity;
     assert!(v.attitude && v.heading, "{v:?}");
-    // Levelling is as good as the accelerometer's bias, the heading as the field and the level.
+    // The tilt is as good as the accelerometer bias, the heading as good as field and tilt.
     assert!(estimate.state.attitude_rad.xy().norm() < 0.03 && (estimate.state.attitude_rad.z - 0.3).abs() < 0.08);
-    // Without anyone to tell the heading, it is not valid.
+    // Without a sensor for it, the heading is not valid.
     let (estimate, _) = at_rest(1500, NOTHING, |_, _| ());
     assert_eq!(estimate.unready, None);
     assert!(estimate.validity.attitude && !estimate.validity.heading && !estimate.validity.position);
@@ -26,7 +26,7 @@ fn starts_at_rest_level_and_unbiased() {
 fn tells_why_it_does_not_start() {
     let why = |change: &dyn Fn(usize, &mut ImuSample)| at_rest(3000, NOTHING, change).0.unready;
     assert_eq!(why(&|_, _| ()), None);
-    // Carried about: a slow swing, and turning about the vertical.
+    // Carried about: a slow swing, and a turn about the vertical.
     let swing = |ms: usize, s: &mut ImuSample| {
         let (sine, cosine) = (ms as f32 * 2e-3).sin_cos();
         s.rates_rad_s.x += 0.2 * cosine;
@@ -43,7 +43,7 @@ fn tells_why_it_does_not_start() {
     assert_eq!(why(&|_, s| s.specific_force_m_s2 = Vector3::new(0.0, 0.0, -9.81)), Some(Unready::Tilted));
     assert_eq!(why(&|_, s| s.rates_rad_s.x = f32::NAN), Some(Unready::NoImu));
     assert_eq!(at_rest(500, NOTHING, |_, _| ()).0.unready, Some(Unready::Settling));
-    // It starts a second after the motion has ended.
+    // The filter starts a second after the motion has ended.
     assert_eq!(
         at_rest(3400, NOTHING, |ms, s| if ms < 2000 {
             swing(ms, s)

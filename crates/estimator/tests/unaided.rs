@@ -1,4 +1,4 @@
-//! In the air without any aid but the barometer: no position, no velocity, no heading.
+//! Flights with no aid but the barometer: position, velocity and heading are invalid.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::indexing_slicing, clippy::panic, missing_docs)] // tests
 
 use crate::common::{Flight, ICM, Imu, NOTHING, Noise, Sensors, V3, fly, settings};
@@ -6,8 +6,8 @@ use core::f64::consts::TAU;
 
 const TIME_S: f64 = 90.0;
 
-/// A flight after two seconds of rest: along x and y three waves each, of periods between 3 and 40 s, with a root mean
-/// square of the speed of `speed_m_s`; each of at most 4 m/s2.
+/// Returns a flight after two seconds of rest: three waves each along x and y with periods of 3 to 40 s, a root mean
+/// square speed of `speed_m_s`, and at most 4 m/s2 per wave.
 fn wandering(seed: u64, speed_m_s: f64) -> impl Fn(f64) -> (V3, f64) {
     let mut noise = Noise::new(seed);
     let mut waves = [[(0.0, 0.0, 0.0); 3]; 2];
@@ -31,8 +31,8 @@ fn wandering(seed: u64, speed_m_s: f64) -> impl Fn(f64) -> (V3, f64) {
     }
 }
 
-/// What is said of the tilt is true, whatever the flight: its error is beyond three sigma in less than one of a hundred
-/// times, at a speed of 0.5 m/s as at one of 20 m/s, by a filter that knows its inertial sensor and by the default one.
+/// The tilt error exceeds three sigma in less than one percent of the time, at 0.5 m/s as well as at 20 m/s, with the
+/// true noise settings and with the defaults.
 #[test]
 fn the_tilt_is_as_good_as_is_said() {
     let known = settings(&ICM);
@@ -58,7 +58,7 @@ fn the_tilt_is_as_good_as_is_said() {
             let (nees, beyond) = (nees / count, beyond / count);
             println!("{name}, {speed_m_s} m/s: NEES {nees:.2} of 2, {:.2} % beyond three sigma", 100.0 * beyond);
             assert!(nees < 4.0 && beyond < 0.01, "{name}, {speed_m_s} m/s: {nees}, {beyond}");
-            // The error that the accelerometer's bias makes at the start, and keeps, is not averaged over flights.
+            // The tilt error by the accelerometer bias stays constant in a flight, so it is not averaged over time.
             assert!(nees > 0.3, "{name}, {speed_m_s} m/s: {nees}");
         }
     }

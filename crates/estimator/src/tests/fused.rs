@@ -1,4 +1,4 @@
-//! A measurement from the queue into the state, against a dense Kalman filter in `f64`.
+//! Checks the fusion of a queued measurement against a dense Kalman filter in `f64`.
 
 extern crate std;
 
@@ -18,15 +18,15 @@ use std::vec::Vec;
 
 const NOW_US: u64 = 1_000_000;
 
-/// The standard deviation of each measurement's coordinates.
+/// Standard deviation of each measured coordinate.
 const SIGMA: f64 = 0.05;
 
 fn estimator() -> Estimator {
-    // Slow errors as they are in the covariance: what is reported is all noise, and they stay.
+    // Slow errors stay as they are in the covariance, and a receiver's reported deviation is all noise.
     Estimator::new(Settings { gnss_noise_m: 100.0, mag_slow_rad: 0.0, reacquire_s: 60.0, ..Settings::DEFAULT }).unwrap()
 }
 
-/// Without slow errors, and with small ones of the rotation, for which the filter is linear.
+/// Removes the slow errors and shrinks the rotation errors, so that the filter is linear.
 fn linear(p: M21) -> M21 {
     let scale = V21::from_fn(|i, _| match i {
         0..3 => 0.05,
@@ -37,7 +37,7 @@ fn linear(p: M21) -> M21 {
     dense(&super::blocks(&scaled))
 }
 
-/// What is measured, and what the estimate expects of it: the measurement that is off by `by`.
+/// Returns a measurement that differs from the estimate's expectation by `by`.
 fn measurement(aid: Aid, memory: &Memory, by: V3) -> Measurement {
     let off = by.map(|x| x as f32);
     let n = &memory.nominal;
@@ -86,7 +86,7 @@ fn measurement(aid: Aid, memory: &Memory, by: V3) -> Measurement {
     }
 }
 
-/// The rows of what is measured of the present.
+/// Returns the Jacobian rows of the measurement at the present.
 fn rows(aid: Aid, memory: &Memory) -> Vec<V21> {
     let past = memory.history.newest().unwrap();
     let horizon = Horizon::new(&past, &past, 9.81);
@@ -106,7 +106,7 @@ fn rows(aid: Aid, memory: &Memory) -> Vec<V21> {
     Coordinate::ALL.iter().skip(first).take(count).map(row).collect()
 }
 
-/// Fuses until nothing waits.
+/// Fuses until the queue is empty.
 fn fuse(memory: &mut Memory, value: Measurement) {
     memory.offer(&Stamped { value, at_us: NOW_US });
     memory.still_us = NOW_US;
@@ -127,7 +127,7 @@ const AIDS: [Aid; 7] = Aid::ALL;
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(96))]
 
-    /// Scalar by scalar as by the matrix: state, covariance, and the normalised innovation squared of the whole.
+    /// Fusing scalar by scalar gives the state, covariance and normalised innovation squared of a matrix update.
     #[test]
     fn a_fix_is_a_kalman_update(
         p in covariance(), turn in numbers::<3>(), by in numbers::<3>(), which in 0..7_usize, offset in -3.0..3.0_f64,
@@ -135,7 +135,7 @@ proptest! {
         let (p, aid) = (linear(p), AIDS[which]);
         let mut ours = start(&p, &(vector(turn) * 0.4), offset);
         let before = ours;
-        // Other parts of the same fix tell nothing, but for as much as their noise lets through.
+        // The other parts of the same fix have so much noise that they hardly matter.
         let h = rows(aid, &ours);
         let by = vector(by) * SIGMA;
         fuse(&mut ours, measurement(aid, &before, by));
@@ -151,7 +151,7 @@ proptest! {
         let record = *ours.aids().of(aid);
         prop_assert_eq!((record.accepted, record.rejected, usize::from(record.scalars)), (1, 0, h.len()));
         prop_assert!((f64::from(record.nis) - nis).abs() < 2e-2 * (1.0 + nis), "{} {nis}", record.nis);
-        // The turned rotation error is carried along with the next prediction.
+        // The next prediction will rotate the rotation error, so it is excluded here.
         let unturned = dense(&ours.covariance);
         let sub = |m: &M21| M21::from_fn(|i, j| if i < 16 && j < 16 { m[(i, j)] } else if i == j { 1.0 } else { 0.0 });
         let off = difference(&sub(&unturned), &sub(&q));
@@ -172,12 +172,13 @@ proptest! {
         }
         let offset = f64::from(ours.height_offset - before.height_offset);
         prop_assert!((offset - x[15]).abs() < 0.02 * p[(15, 15)].sqrt(), "{aid:?}: {offset} {}", x[15]);
-        // The past has moved too.
+        // The history was corrected too.
         let newest = ours.history.newest().unwrap();
         prop_assert!((newest.position - now.position).norm() < 1e-4 && (newest.velocity - now.velocity).norm() < 1e-4);
     }
 
-    /// Five sigma of all that is uncertain, along each coordinate, and not more: one just within is fused.
+    /// A scalar just within five standard deviations of the innovation is fused, and one just beyond is not, in each
+    /// coordinate.
     #[test]
     fn the_gate_is_at_five_sigma(p in covariance(), which in 0..7_usize, c in 0..3_usize, sign in any::<bool>()) {
         let (p, aid) = (linear(p), AIDS[which]);
@@ -201,7 +202,7 @@ proptest! {
         }
     }
 
-    /// The gate of a position that is late knows what the velocity's error has made since.
+    /// The gate of a late position includes the effect of the velocity error since then.
     #[test]
     fn the_gate_of_a_late_position(p in covariance(), tau_ms in 4..240_u32, c in 0..3_usize) {
         let p = linear(p);
@@ -234,7 +235,7 @@ proptest! {
     }
 }
 
-/// What a receiver reports is noise up to what is told of it; the rest is slow, and fades from fix to fix.
+/// Of a receiver's variance, `gnss_noise_m` is noise and the rest is slow error, which fades from fix to fix.
 #[test]
 fn a_receivers_variance_is_divided() {
     let settings = Settings { gnss_noise_m: 0.5, gnss_slow_s: 100.0, ..Settings::DEFAULT };
@@ -260,7 +261,7 @@ fn a_receivers_variance_is_divided() {
     }
     let kept = memory.covariance.slow.position;
     assert!(kept.m11 < -1e-4);
-    // Ten seconds later nine tenths are left of it.
+    // After ten seconds, nine tenths of the covariance are left.
     memory.remember(NOW_US + 10_000_000);
     memory.still_us = NOW_US + 10_000_000;
     let mut later = memory;

@@ -1,4 +1,5 @@
-//! The small parts, each against an independent formula: rotations, places, queue, gates, filters, checks at the door.
+//! Checks the small parts against independent formulas: rotations, geodetic conversion, queue, gates, filters,
+//! plausibility.
 
 extern crate std;
 
@@ -23,7 +24,7 @@ fn single(q: &UnitQuaternion<f64>) -> Quaternion<f32> {
     Quaternion::from(q.into_inner().coords.map(|x| x as f32))
 }
 
-/// Angle between two rotations \[rad\].
+/// Returns the angle between two rotations \[rad\].
 fn apart(ours: &Quaternion<f32>, theirs: &UnitQuaternion<f64>) -> f64 {
     let ours = UnitQuaternion::from_quaternion(Quaternion::from(ours.coords.map(f64::from)));
     ours.angle_to(theirs)
@@ -38,7 +39,7 @@ proptest! {
         prop_assert!(apart(&ours, &exact) < 3e-6 && (ours.norm() - 1.0).abs() < 1e-6, "{turn}");
         let dense = exact.to_rotation_matrix().into_inner();
         prop_assert!((matrix(&ours).map(f64::from) - dense).abs().max() < 5e-6);
-        // Of any norm, and nearly of norm one.
+        // From any norm, and from a norm close to one.
         prop_assert!((normalized(&(ours * 3.0)) - ours).norm() < 1e-6);
         prop_assert!((renormalized(&(ours * 1.01)).norm() - 1.0).abs() < 2e-4);
         let from = UnitQuaternion::new(vector(other) * 3.0);
@@ -48,14 +49,14 @@ proptest! {
         prop_assert!((found - by).norm() < 5e-6 * (1.0 + by.norm()), "{found}, not {by}");
         let negative = difference(&-single(&to), &single(&from)).map(f64::from);
         prop_assert!((negative - by).norm() < 5e-6 * (1.0 + by.norm()));
-        // About the vertical, the rest aside.
+        // Twist about the vertical, ignoring the tilt.
         let yaw = other[0] * 3.1;
         let about = UnitQuaternion::new(V3::z() * yaw);
         prop_assert!(apart(&about_z(yaw as f32), &about) < 1e-6);
         prop_assert!((f64::from(twist(&single(&(about * from)), &single(&from))) - yaw).abs() < 2e-5);
     }
 
-    /// It turns the direction given up, by the shortest way.
+    /// Levelling turns the given direction to vertical by the shortest way.
     #[test]
     fn levelling_is_the_shortest_turn(x in numbers::<3>()) {
         let up = vector(x).try_normalize(1e-3);
@@ -71,7 +72,7 @@ proptest! {
         }
     }
 
-    /// Against the tangent plane by way of the earth's centre.
+    /// Compares local coordinates with the tangent plane, computed via the earth's centre.
     #[test]
     fn places_are_those_on_the_ellipsoid(
         latitude in -85.0..85.0_f64, longitude in -180.0..180.0_f64, altitude in -400.0..8000.0_f64,
@@ -102,7 +103,7 @@ proptest! {
         prop_assert!((ours.z - by[2] * 100.0).abs() < 1e-3);
     }
 
-    /// A cubic between two entries is met exactly: Hermite's.
+    /// Hermite interpolation reproduces a cubic between two entries exactly.
     #[test]
     fn what_is_between_entries_is_a_cubic(c in numbers::<12>(), span_us in 4_000..60_000_u32, share in 0.05..0.95_f64) {
         let of = |k: usize, t: f64| {
@@ -124,14 +125,14 @@ proptest! {
         let t = f64::from(after_us) * 1e-6;
         let found = history.at(base.wrapping_add(after_us)).unwrap();
         prop_assert!((found.position.map(f64::from) - of(0, t)).norm() < 2e-6 * (2.0 + of(0, t).norm()));
-        // The velocity is a straight line between the two.
+        // The velocity is linear between the two entries.
         let ends = of(1, 0.0).lerp(&of(1, f64::from(span_us) * 1e-6), f64::from(after_us) / f64::from(span_us));
         prop_assert!((found.velocity.map(f64::from) - ends).norm() < 1e-5 * (2.0 + ends.norm()));
         prop_assert!(apart(&found.attitude, &turn(t)) < 1e-5);
         prop_assert!((found.attitude.norm() - 1.0).abs() < 1e-6 && found.at_us == base.wrapping_add(after_us));
     }
 
-    /// However they come: the oldest arrival that is due goes first, and the oldest one gives way to a ninth.
+    /// For any order of times: the oldest arrival that is due leaves first, and a ninth measurement drops the oldest.
     #[test]
     fn the_queue_is_a_queue(events in proptest::collection::vec((any::<bool>(), 0..20_u64, 0..25_u64), 1..60)) {
         let (mut queue, mut model) = (Queue::default(), Vec::new());
@@ -153,7 +154,7 @@ proptest! {
         }
     }
 
-    /// A constant turn and push, with coning: within the second order of a fine integration.
+    /// Integration of linearly changing rates and force, with coning, agrees with a fine integration to second order.
     #[test]
     fn the_nominal_state_follows_the_samples(w in numbers::<3>(), f in numbers::<3>(), slope in numbers::<6>()) {
         let biases = (Vector3::new(0.01_f32, -0.02, 0.03), Vector3::new(0.2_f32, -0.1, 0.15));
@@ -193,7 +194,7 @@ proptest! {
     }
 }
 
-/// A walk of a fraction of the last bit per step is not lost.
+/// A motion of a fraction of the last bit per step is not lost.
 #[test]
 fn rounding_leaves_no_step_out() {
     let mut nominal = Nominal::new(identity());
@@ -242,7 +243,7 @@ fn an_impossible_state_is_not_sound() {
     assert_eq!((angle_variance(2.0), angle_variance(1e6)), (2.0, 3.3));
 }
 
-/// Gain of an analogue Butterworth filter, 1/sqrt(1 + x^4), as the bilinear transform bends it.
+/// The gain is 1/sqrt(1 + x^4) of an analogue Butterworth filter, with the frequency warped by the bilinear transform.
 #[test]
 fn the_low_pass_is_butterworths() {
     for cutoff_hz in [20.0, 120.0, 300.0_f32] {
@@ -267,7 +268,7 @@ fn the_low_pass_is_butterworths() {
             assert!((gain - expected).abs() < 0.02, "{cutoff_hz} Hz, {ratio}: {gain}, not {expected}");
         }
     }
-    // The first value passes, and without a cutoff all do.
+    // The first value passes unchanged; without a cutoff every value does.
     let mut memory = Smoothed::default();
     LowPass::new(50.0).advance(&mut memory, &Vector3::new(3.0, -2.0, 1.0));
     assert!((memory.output - Vector3::new(3.0, -2.0, 1.0)).norm() < 1e-5);
@@ -291,7 +292,7 @@ fn the_monitor_tells_what_it_sees() {
     assert_eq!(monitor.take(&sample(1_000_000, 0.0, 0.0), &settings), Clipped { gyro: false, accel: false });
     assert!(!monitor.health(1_000_000 + MISSING_US, &settings, stuck_us).missing);
     assert!(monitor.health(1_000_001 + MISSING_US, &settings, stuck_us).missing);
-    // The same again and again: stuck after the time told, and free with the first change.
+    // Repeated samples count as stuck after the set time, and no longer after the first change.
     for ms in 1..=15 {
         assert!(!monitor.repeats(&sample(1_000_000 + 1000 * ms, 0.0, 0.0), stuck_us));
         let _ = monitor.take(&sample(1_000_000 + 1000 * ms, 0.0, 0.0), &settings);
@@ -308,7 +309,7 @@ fn the_monitor_tells_what_it_sees() {
         let _ = freed.take(&other, &settings);
         assert!(!freed.health(1_017_000, &settings, stuck_us).stuck);
     }
-    // Clipped from 98 % of the range on, for 200 ms.
+    // Clipped from 98 % of the range, reported for 200 ms.
     for (rate, force, clips) in [
         (0.97, 0.0, false),
         (0.99, 0.0, true),
@@ -327,7 +328,7 @@ fn the_monitor_tells_what_it_sees() {
         let _ = monitor.take(&super::parts::sample(1_200_000, 0.0, 0.0), &settings);
         assert!(!monitor.health(1_200_000, &settings, stuck_us).clipped);
     }
-    // Refused 500 times in a row, its time must have changed.
+    // After 500 refusals in a row the sample clock must have jumped.
     let mut monitor = Monitor::default();
     for number in 1..=500 {
         monitor.refuse();
@@ -338,7 +339,7 @@ fn the_monitor_tells_what_it_sees() {
     assert!(!monitor.is_lost() && monitor.at_us() == Some(1000));
     monitor.forget();
     assert_eq!(monitor.at_us(), None);
-    // Changes from sample to sample, as a root mean square.
+    // Root mean square of the changes from sample to sample.
     for (rate, force, noisy) in [(1.9, 0.0, false), (2.1, 0.0, true), (0.0, 39.0, false), (0.0, 41.0, true)] {
         let mut monitor = Monitor::default();
         for ms in 0..2000_u64 {
@@ -351,8 +352,8 @@ fn the_monitor_tells_what_it_sees() {
     }
 }
 
-/// An aid that contradicts the state is never followed while two that agree hold it, late while one does, and soon
-/// where nothing else does.
+/// An aid that contradicts the state is never followed while two agreeing aids hold the state, late while one does, and
+/// soon if none does.
 #[test]
 fn what_two_agree_on_is_not_overruled() {
     use Aid::{GnssHeight, GnssPosition, GnssVelocity, Heading, Height, TrackerAttitude, TrackerPosition};
@@ -397,7 +398,7 @@ fn an_aid_is_live_for_a_while() {
     assert_eq!((record.accepted, record.accepted_us, record.rejected_since_us), (1, Some(1000), None));
     assert!(record.is_live(1100, 100) && !record.is_live(1101, 100) && record.is_live(500, 0));
     assert_eq!(record.reject(2000), 0);
-    // What each holds.
+    // Which aids hold position and velocity.
     for live in Aid::ALL {
         let mut aids = Aids::default();
         aids.of_mut(live).accept(1000);
@@ -414,7 +415,7 @@ fn an_aid_is_live_for_a_while() {
         passes(5.0, -10.0, 15.0) && !passes(5.01, 0.0, 0.0) && !passes(0.0, -10.02, 0.0) && !passes(0.0, 0.0, 15.03)
     );
     assert!(!passes(f32::NAN, 0.0, 0.0));
-    // A pose counts as repeated from its first arrival on, and in every bit.
+    // A pose counts as repeated from its first arrival, and only if every bit is equal.
     let mut repeated = Repeated::default();
     let (place, turn) = (Vector3::new(1.0, 2.0, 3.0), [1.0, 0.0, 0.0, 0.0]);
     assert_eq!(repeated.lasts_us(&place, &turn, 1000), 0);
@@ -432,15 +433,15 @@ fn rough_samples_count_for_a_while() {
     memory.roughen(1_300_000, 0.25, 1.0);
     assert_eq!((memory.rough, memory.roughened_since(1_299_999)), ((0.75, 3.0), (0.75, 3.0)));
     assert_eq!(memory.roughened_since(1_300_000), (0.0, 0.0));
-    // Longer ago than any measurement.
+    // The earlier sum is older than any measurement and no longer counts.
     memory.roughen(1_600_001, 0.125, 0.5);
     assert_eq!((memory.rough, memory.roughened_since(1_600_000)), ((0.875, 3.5), (0.125, 0.5)));
-    // An implausible one is counted, and a ninth pushes the first out.
+    // An implausible measurement is counted, and a ninth one pushes out the first.
     for heading_rad in [f32::NAN, 0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0] {
         memory.offer(&Stamped { value: Measurement::Heading { heading_rad, sigma_rad: 0.1 }, at_us: 5 });
     }
     assert_eq!((memory.dropped().implausible, memory.dropped().crowded, memory.queue.waiting()), (1, 1, 8));
-    // Standing: as told, or unmoved.
+    // The vehicle stands if it is told so, or if unknown, until it moves.
     assert!(!memory.stands());
     memory.rest = crate::rest::Rest::aligned(Vector3::zeros(), Vector3::z());
     assert!(memory.stands());
@@ -452,7 +453,7 @@ fn rough_samples_count_for_a_while() {
     assert!(!memory.stands());
 }
 
-/// Every bound, in every coordinate and of either sign.
+/// Every plausibility limit, in every coordinate and with both signs.
 #[test]
 fn the_door_has_bounds() {
     let one = |k: usize, x: f32| Vector3::from_fn(|i, _| if i == k { x } else { 0.0 });
@@ -529,11 +530,11 @@ fn the_door_has_bounds() {
     assert!(!Measurement::MagneticField { field: Vector3::z(), sigma: 1.1e7 }.is_plausible());
     let faint = |x: f32| Measurement::MagneticField { field: Vector3::repeat(-x), sigma: 1.0 }.is_plausible();
     assert!(faint(1.1e-7) && !faint(0.9e-7));
-    // Where there is an origin.
+    // Limits of the origin.
     let is = |latitude, longitude, altitude| Origin::new(latitude, longitude, altitude).is_some();
     assert!(is(88.9, 179.9, 1.9e4) && is(-88.9, -179.9, -1.9e4));
     assert!(!is(89.1, 0.0, 0.0) && !is(-89.1, 0.0, 0.0) && !is(0.0, 180.1, 0.0) && !is(0.0, -180.1, 0.0));
     assert!(!is(0.0, 0.0, 2.1e4) && !is(0.0, 0.0, -2.1e4) && !is(f64::NAN, 0.0, 0.0));
-    // The rotation of a frame is one.
+    // The identity is the identity.
     assert!((Rotation3::from_matrix_unchecked(matrix(&identity())).angle()).abs() < 1e-6);
 }

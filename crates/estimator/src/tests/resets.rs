@@ -1,4 +1,4 @@
-//! Starts and resets against dense `f64` mathematics: each is a linear map of the errors, and new noise.
+//! Checks starts and resets against dense mathematics in `f64`: each is a linear map of the errors plus noise.
 
 extern crate std;
 
@@ -27,7 +27,7 @@ fn three(m: &mut M21, i: usize, j: usize, block: &Matrix3<f64>) {
     m.fixed_view_mut::<3, 3>(i, j).copy_from(block);
 }
 
-/// The present, and the state `tau_s` ago of a vehicle that has moved on straight since.
+/// Returns the horizon of a vehicle that has moved straight on for `tau_s`.
 fn since(memory: &mut Memory, tau_s: f32) -> Horizon {
     let now = memory.history.newest().unwrap();
     let at_us = now.at_us - (tau_s * 1e6) as u32;
@@ -60,7 +60,7 @@ proptest! {
         prop_assert!((memory.history.newest().unwrap().position - before - by).norm() < 1e-5);
         prop_assert!(memory.resets.position == 1 && memory.knows.position);
         prop_assert_eq!(memory.knows.height_offset, axes == Axes::Level);
-        // What is left of the errors by the coordinates that are measured.
+        // Linear map of the errors for the replaced coordinates.
         let mut t = M21::identity();
         for i in coordinates.clone() {
             let mut row = -rows[i];
@@ -76,7 +76,7 @@ proptest! {
         let mut theirs = t * p * t.transpose();
         coordinates.for_each(|i| theirs[(6 + i, 6 + i)] += variance[i]);
         if axes != Axes::Level {
-            // Forgotten, but for the least.
+            // Forgotten, down to the smallest variance.
             theirs[(15, 15)] = 1e-8;
         }
         let ours = dense(&memory.covariance);
@@ -103,14 +103,14 @@ proptest! {
         let mut theirs = t * p * t.transpose();
         (0..3).for_each(|i| theirs[(3 + i, 3 + i)] += variance[i]);
         prop_assert!(difference(&dense(&fast.covariance), &theirs) < 1e-5);
-        // Doubted: what else it may be, on top.
+        // `doubt_velocity` adds to the variance and leaves the velocity.
         let mut doubted = memory(&p, &V3::zeros());
         doubted.doubt_velocity(&variance.map(|x| x as f32));
         let mut theirs = p;
         (0..3).for_each(|i| theirs[(3 + i, 3 + i)] += variance[i]);
         prop_assert!(difference(&dense(&doubted.covariance), &theirs) < 1e-6);
         prop_assert_eq!(doubted.nominal.velocity, before);
-        // The offset's error is that of the height the other way, and noise.
+        // The offset's error is the negative height error plus noise.
         let mut high = memory(&p, &V3::zeros());
         high.knows.height_offset = false;
         let horizon = since(&mut high, 0.0);
@@ -138,7 +138,7 @@ proptest! {
         let (old, entry) = (memory.nominal.rotation, memory.history.newest().unwrap());
         let horizon = since(&mut memory, 0.0);
         let r = UnitQuaternion::new(V3::z() * by);
-        // What shows this turn.
+        // Measurements that show this turn.
         let field = r.inverse() * estimator.expected(&memory).field.map(f64::from);
         let q = (r.into_inner() * Quaternion::from(entry.attitude.coords.map(f64::from))).coords.map(|x| x as f32);
         let target = match which {
@@ -154,7 +154,7 @@ proptest! {
         let now = memory.history.newest().unwrap();
         let along = crate::rotation::twist(&now.attitude, &entry.attitude);
         prop_assert!((f64::from(along) - by).abs() < 1e-4 && memory.knows.heading && memory.resets.heading == 1);
-        // After the turn, the heading's error is what the row of the measurement makes of the others.
+        // After the turn, the heading error follows from the other errors by the measurement's row.
         let row = Horizon::new(&now, &now, 9.81).row(&part.target, Coordinate::Z, &estimator.expected(&memory));
         let mut row = -dense_row(&row.unwrap().1);
         row[2] = 0.0;
@@ -171,7 +171,7 @@ proptest! {
         };
         let ours = dense(&memory.covariance);
         prop_assert!(difference(&ours, &theirs) < 1e-3, "{}", difference(&ours, &theirs));
-        // The gyroscope's bias about the vertical is doubted, and hardly any other.
+        // The variance of the gyroscope bias grows about the vertical and hardly about other axes.
         let before = dense(&memory.covariance);
         memory.doubt_turn();
         let more = dense(&memory.covariance) - before;
@@ -193,7 +193,7 @@ proptest! {
         prop_assert!(difference(&dense(&memory.covariance), &theirs) < 1e-6 && memory.resets.tilt == 1);
     }
 
-    /// The next fix's slow error is the last one's, less what has changed, and no larger than what is told of it.
+    /// The covariance with a slow error keeps its share at the next fix, and shrinks with a smaller variance.
     #[test]
     fn a_slow_error_keeps_its_share(p in covariance(), to in numbers::<3>(), share in 0.0..1.0_f64) {
         let variance = vector(to).map(|x| x * x * 4.0 + 1e-3);
@@ -212,7 +212,7 @@ proptest! {
         prop_assert!(difference(&dense(&ours), &theirs) < 1e-6);
     }
 
-    /// Started at rest on a wrong accelerometer: level, north and their errors are what the biases make of them.
+    /// After a start at rest with a wrong accelerometer, level, north and their covariances follow from the biases.
     #[test]
     fn a_start_at_rest_knows_its_errors(
         tilt in numbers::<2>(), yaw in -3.1..3.1_f64, axis in 0..3_usize, declination in -0.5..0.5_f64,
@@ -225,7 +225,7 @@ proptest! {
         };
         let leans = UnitQuaternion::new(V3::new(0.5 * tilt[0], 0.5 * tilt[1], 0.0));
         let truth = UnitQuaternion::new(V3::z() * yaw) * leans;
-        // North is to the west of the field by the declination, which is positive to the east.
+        // True north is west of the field by the declination, which is positive to the east.
         let field = UnitQuaternion::new(-V3::z() * declination) * V3::new(0.45, 0.0, -0.9);
         let error = V3::from_fn(|i, _| if i == axis { bias } else { 0.0 });
         let gyro = Vector3::new(0.01_f32, -0.02, 0.03);
@@ -249,7 +249,7 @@ proptest! {
         if teller > 0 {
             prop_assert!(c.ta.row(2).norm() < 1e-9, "nobody turns by the tilt: {}", c.ta);
         }
-        // Variances: of the bias, of the noise over the time, and of the heading as told.
+        // Variances: tilt by bias and noise, heading by the sensor that gave it.
         let g2 = 9.81_f64 * 9.81;
         let level = f64::from(c.tt.m11.max(c.tt.m22));
         prop_assert!((level - bias * bias / g2).abs() < 0.1 * bias * bias / g2 + 2e-7, "{level}");
@@ -268,13 +268,13 @@ proptest! {
     }
 }
 
-/// How much of the variance of the vehicle's own field turns the heading: all of it on level ground.
+/// Returns the share of the vehicle's own field variance that turns the heading, which is 1 on level ground.
 fn level_share(memory: &Memory, declination: f64) -> f64 {
     let north = Vector3::new(declination.cos() as f32, -declination.sin() as f32, 0.0);
     f64::from(magnetic(&memory.nominal.rotation, &north).norm_squared())
 }
 
-/// Lets a vehicle at rest in the attitude `truth` align: told by a field (0), a tracker (1) or a heading.
+/// Aligns a vehicle at rest in the attitude `truth`, with the heading from a field (0), a tracker (1) or a heading.
 fn aligned(
     truth: &UnitQuaternion<f64>,
     error: &V3,
@@ -312,7 +312,7 @@ fn aligned(
     None
 }
 
-/// What it is started with in the air is what it has, within what is possible; and what it does not know.
+/// A start in the air takes the given state and standard deviations within their limits, and knows the rest as unknown.
 #[test]
 fn a_start_in_the_air_is_as_told() {
     let mut memory = Memory::default();
@@ -348,7 +348,7 @@ fn a_start_in_the_air_is_as_told() {
     assert!(!memory.knows.heading && !memory.knows.position);
     memory.begin_at(2_000_000, &state, &sigmas(500.0, 1.0));
     assert!(memory.covariance.variances().theta.z <= 3.3);
-    // Started again: where it is, or where it last was something.
+    // A restart keeps the present state, or the last valid one.
     memory.restart(3_000_000);
     assert!((memory.nominal.position - state.position_m).norm() < 1e-6 && memory.resets.restarts == 1);
     let variances = memory.covariance.variances();
@@ -378,7 +378,7 @@ fn a_start_in_the_air_is_as_told() {
 #[test]
 fn an_alignment_has_limits() {
     let settings = Settings::DEFAULT;
-    // Refused at the end of the second, if not before, or started.
+    // Returns the refusal within the first second, `None` if the alignment succeeded.
     let runs = |change: &dyn Fn(u64, &mut ImuSample)| {
         let mut align = Align::default();
         for ms in 0..=1000_u64 {
@@ -399,13 +399,13 @@ fn an_alignment_has_limits() {
     for (k, sign) in [(0, 1.0_f32), (1, -1.0), (2, 1.0)] {
         let moving = Some(Unready::Moving);
         for (share, why) in [(0.9, None), (1.1, moving)] {
-            // Spread; one sample; a slow change.
+            // Too large a spread, one outlier, a slow change.
             assert_eq!(runs(&|ms, s| s.rates_rad_s[k] += shake(ms, share * rate)), why, "{k}, {share}");
             assert_eq!(runs(&|ms, s| s.specific_force_m_s2[k] += shake(ms, share * force)), why, "{k}, {share}");
             let late = |ms: u64| if ms == 900 { 6.0 * share * sign } else { 0.0 };
             assert_eq!(runs(&|ms, s| s.rates_rad_s[k] += late(ms) * rate), why, "{k}, {share}");
             assert_eq!(runs(&|ms, s| s.specific_force_m_s2[k] += late(ms) * force), why, "{k}, {share}");
-            // The mean of all less that of the first half.
+            // The mean of the whole differs from the first half's mean.
             let step = |ms: u64| if ms > 500 { 0.5 * share * sign } else { 0.0 };
             assert_eq!(runs(&|ms, s| s.rates_rad_s[k] += step(ms) * rate), why, "{k}, {share}");
             if k < 2 {
@@ -427,7 +427,7 @@ fn an_alignment_has_limits() {
     }
 }
 
-/// The variance of a mean is that of a sample over their number.
+/// The variance of a mean is a sample's variance divided by their number.
 #[test]
 fn a_mean_is_as_good_as_its_samples() {
     let mut align = Align::default();

@@ -1,4 +1,5 @@
-//! Limits of a step: what is refused, believed, held, rough or valid, each just within and just beyond.
+//! Checks the limits within a step, each just within and just beyond: refusal, following, rest, rough samples,
+//! validity.
 
 use super::memory;
 use super::{M21, V3, V21, covariance, dense, dense_row, difference, numbers, row, vector};
@@ -22,7 +23,7 @@ fn with(settings: Settings) -> Estimator {
     Estimator::new(settings).unwrap()
 }
 
-/// A covariance of these variances: rotation, velocity, position, biases, offset.
+/// Returns a covariance with these variances: rotation, velocity, position, biases, offset.
 fn diagonal(variances: [f64; 6]) -> M21 {
     dense(&super::blocks(&M21::from_diagonal(&V21::from_fn(|i, _| if i < 16 { variances[i / 3] } else { 0.0 }))))
 }
@@ -31,7 +32,7 @@ fn usual() -> M21 {
     diagonal([1e-4, 1e-2, 1e-2, 1e-6, 1e-4, 1e-2])
 }
 
-/// Hands over at `at_us`, and fuses until nothing waits, at `now_us`.
+/// Queues a measurement of time `at_us` and fuses until the queue is empty, at `now_us`.
 fn offer(estimator: &Estimator, memory: &mut Memory, value: Measurement, at_us: u64, now_us: u64) {
     memory.offer(&Stamped { value, at_us });
     memory.still_us = now_us;
@@ -40,7 +41,7 @@ fn offer(estimator: &Estimator, memory: &mut Memory, value: Measurement, at_us: 
     }
 }
 
-/// The state of now, kept for later times too.
+/// Stores the present state at a later time.
 fn later(memory: &mut Memory, at_us: u64) {
     memory.remember(at_us);
 }
@@ -50,7 +51,7 @@ fn place(position_m: Vector3<f32>) -> Measurement {
 }
 
 proptest! {
-    /// The rounding of a past position is measured by these two variances.
+    /// `motion_variance` is the sum of both variances with their squared factors.
     #[test]
     fn a_motions_variance_is_that_of_place_and_speed(p in covariance(), row in row()) {
         let (at, h) = (Coordinate::ALL.iter().position(|c| *c == row.coordinate).unwrap(), dense_row(&row));
@@ -59,7 +60,7 @@ proptest! {
         prop_assert!((ours - theirs).abs() < 1e-5 * (theirs + 1e-9));
     }
 
-    /// A field corrects the heading and the gyroscope's bias, and nothing else, with the right covariance for that.
+    /// A field corrects only heading and gyroscope bias, with the right covariance for this gain.
     #[test]
     fn a_field_turns_and_does_not_tilt(
         p in covariance(), turn in numbers::<3>(), by in -0.1..0.1_f64, declination in -1.0..1.0_f64,
@@ -78,7 +79,7 @@ proptest! {
         let mut memory = memory(&p, &(vector(turn) * 0.3));
         let level = (1.0 - steep * steep).sqrt();
         memory.field = Some((0.5, -steep as f32));
-        // What it shows in the estimated attitude, off by an angle.
+        // Field in the estimated attitude with the heading off by an angle.
         let north = -declination - by;
         let earth = V3::new(level * north.cos(), level * north.sin(), -steep) * 0.5;
         let field = memory.nominal.rotation.map(f64::from).tr_mul(&earth).map(|x| x as f32);
@@ -115,7 +116,7 @@ proptest! {
     }
 }
 
-/// Another strength, or another inclination.
+/// A field of another strength or inclination is dropped.
 #[test]
 fn a_disturbed_field_is_not_looked_at() {
     let settings = Settings { field_error_max: 0.2, inclination_error_max_rad: 0.1, ..Settings::DEFAULT };
@@ -139,14 +140,14 @@ fn a_disturbed_field_is_not_looked_at() {
             }
             let field = Vector3::new((1.0 - z * z).sqrt(), 0.0, z) * (2.0 * strength);
             offer(&with(settings), &mut memory, Measurement::MagneticField { field, sigma: 0.05 }, NOW_US, NOW_US);
-            // Upright within ten degrees, there is no heading in it.
+            // A field within ten degrees of vertical gives no heading.
             let upright = 1.0 - steep * steep < 0.03;
             let accepted = memory.aids().heading.accepted;
             assert_eq!(memory.dropped().disturbed, u32::from(!fused), "{steep}, {strength}, {lift}");
             assert_eq!(accepted, u32::from(fused && !upright), "{steep}, {strength}, {lift}");
         }
     }
-    // The first one is what is usual; and one of a vehicle whose own may be as large tells nothing.
+    // The first field becomes the reference, unless the vehicle's own field may be as large.
     for (slow, heard) in [(0.49, true), (0.51, false)] {
         let mut memory = memory(&usual(), &V3::zeros());
         let value = Measurement::MagneticField { field: Vector3::new(3.0, 0.0, -4.0), sigma: 0.01 };
@@ -156,8 +157,8 @@ fn a_disturbed_field_is_not_looked_at() {
     }
 }
 
-/// Rejected for long enough, with nobody who says otherwise, a measurement is believed; the second within ten seconds
-/// doubts the tilt.
+/// A measurement that was rejected for long enough, and that no other aid contradicts, is followed. A second reset
+/// within ten seconds raises the tilt variance.
 #[test]
 fn what_is_rejected_for_long_is_believed() {
     let estimator = with(Settings { reacquire_s: 1.0, frozen_s: 0.0, ..Settings::DEFAULT });
@@ -206,7 +207,7 @@ fn what_is_rejected_for_long_is_believed() {
                 (Aid::TrackerPosition | Aid::GnssPosition, _) => {
                     let off = (n.position - here - if believed { far } else { Vector3::zeros() }).norm();
                     assert!(off < 1e-3, "{aid:?}: {off}");
-                    // A tracker's jump tells nothing of the velocity.
+                    // Only a tracker's jump raises the velocity variance, because no velocity was fused with it.
                     let doubted = memory.covariance.vv.m11 > 50.0;
                     assert_eq!(doubted, believed && aid == Aid::TrackerPosition);
                 }
@@ -217,7 +218,7 @@ fn what_is_rejected_for_long_is_believed() {
             }
         }
     }
-    // A second one.
+    // A second reset.
     for (after_us, doubts) in [(9_999_000, 1), (10_000_000, 0)] {
         let mut memory = start;
         memory.reset_us = Some(NOW_US + 1_000_000 - after_us.min(NOW_US + 1_000_000));
@@ -231,7 +232,7 @@ fn what_is_rejected_for_long_is_believed() {
     }
 }
 
-/// What is not known is set by the first that tells it, as well as that is.
+/// The first measurement sets an unknown part of the state, with the measurement's variance.
 #[test]
 fn the_first_measurement_sets_what_it_tells() {
     let estimator = with(Settings { declination_rad: 0.3, ..Settings::DEFAULT });
@@ -246,7 +247,8 @@ fn the_first_measurement_sets_what_it_tells() {
     assert!((memory.covariance.bb - 0.05).abs() < 1e-5);
     for (value, yaw, variance) in [
         (Measurement::Heading { heading_rad: 2.0, sigma_rad: 0.1 }, 2.0, 0.01),
-        // North is to the west of the field by the declination; steep by 3 to 4, the tilt's error counts for 9/16.
+        // True north is west of the field by the declination. The field's slope is 3 to 4, so the tilt error counts
+        // with 9/16.
         (
             Measurement::MagneticField { field: Vector3::new(4.0, 0.0, -3.0), sigma: 0.4 },
             -0.3,
@@ -297,7 +299,7 @@ fn late_and_early_ones_are_dropped() {
         offer(&estimator, &mut memory, value, at_us, NOW_US);
         assert_eq!((memory.dropped().early, memory.queue.waiting()), (early, waits), "{at_us}");
     }
-    // One of the same time as the last is overtaken, one of a microsecond later is not.
+    // A measurement of the same time is dropped as overtaken; one a microsecond later is not.
     for (after_us, overtaken) in [(0, 1), (1, 0)] {
         let mut memory = fresh();
         let value = place(memory.nominal.position + Vector3::repeat(0.01));
@@ -308,7 +310,7 @@ fn late_and_early_ones_are_dropped() {
     }
 }
 
-/// Every 0.2 s, if it stands and is slow, or else if nobody else holds the velocity.
+/// Zero velocity is fused every 0.2 s if the vehicle stands and is slow, or if no aid holds the velocity.
 #[test]
 fn rest_is_a_measurement() {
     let estimator = with(Settings { coast_s: 5.0, ..Settings::DEFAULT });
@@ -327,11 +329,11 @@ fn rest_is_a_measurement() {
         memory.still_us = NOW_US - since_us;
         run(&mut memory);
         assert_eq!(memory.held_us, due.then_some(NOW_US));
-        // 1e-4 of 26e-4 is left of it.
+        // The variance ratio is 1e-4 of 26e-4.
         let kept = if due { 25.0 / 26.0 } else { 1.0 };
         assert!((memory.nominal.velocity - slow * kept).norm() < 1e-4, "{}", memory.nominal.velocity);
     }
-    // At three sigma of 0.051 m/s.
+    // The limit is three standard deviations of 0.051 m/s.
     for (speed, held) in [(0.150, true), (0.156, false)] {
         for k in 0..3 {
             let mut memory = still();
@@ -343,7 +345,7 @@ fn rest_is_a_measurement() {
             assert!(held || memory.nominal.velocity[k] == -speed);
         }
     }
-    // In the air, unaided for five seconds, by 3 m/s.
+    // In the air, unaided for five seconds: weak zero velocity on a standard deviation of 3 m/s.
     for (aided_us, weak) in [(5_000_000, false), (5_000_001, true)] {
         let mut memory = memory(&diagonal([1e-6, 9.0, 1e-2, 1e-8, 1e-6, 1e-2]), &V3::zeros());
         memory.nominal.velocity = Vector3::new(4.0, 0.0, 0.0);
@@ -359,7 +361,7 @@ fn rest_is_a_measurement() {
     }
 }
 
-/// Each limit of what is valid, of every coordinate.
+/// Each limit of validity, in every coordinate.
 #[test]
 fn validity_has_limits() {
     let s = Settings::DEFAULT;
@@ -387,7 +389,7 @@ fn validity_has_limits() {
         assert_eq!((v.attitude, v.heading, v.position), (true, is, true));
         for k in 0..3 {
             let v = valid(&|m| set(&mut m.covariance.vv, k, share * s.velocity_sigma_max_m_s));
-            // A barometer holds the height, as long as the vertical velocity is not lost.
+            // A barometer keeps the height valid until the vertical velocity is too uncertain.
             assert_eq!((v.velocity, v.position, v.height), (is, is, is || k < 2), "{k}");
             let v = valid(&|m| set(&mut m.covariance.pp, k, share * s.position_sigma_max_m));
             assert_eq!((v.velocity, v.position, v.height), (true, is, is || k < 2), "{k}");
@@ -416,7 +418,7 @@ fn validity_has_limits() {
         });
         assert_eq!(v, Validity { velocity: false, position: false, height: is, ..all });
     }
-    // At rest as long as it is held.
+    // `at_rest` lasts for half a second after the last zero-velocity fusion.
     for (since_us, is) in [(499_999, true), (500_000, false)] {
         let mut memory = memory(&usual(), &V3::zeros());
         let _ = memory.monitor.take(&sample, &s);
@@ -427,7 +429,7 @@ fn validity_has_limits() {
     }
 }
 
-/// A clipped sample, and one after a gap, leave the state less sure by what a vehicle may do meanwhile.
+/// A clipped sample or a gap raises the variances by the motion that is possible meanwhile.
 #[test]
 fn rough_samples_leave_it_less_sure() {
     let s = Settings::DEFAULT;
@@ -446,12 +448,12 @@ fn rough_samples_leave_it_less_sure() {
         (memory.covariance.tt.m33 - 1e-4, memory.covariance.vv.m33 - 1e-2, memory.resets.restarts)
     };
     let near = |ours: f32, theirs: f32| (ours - theirs).abs() < 0.05 * theirs + 2e-6;
-    // Of the covariance's own growth little.
+    // Little comes from the prediction's own noise.
     let (theta, velocity, _) = run(20_000, 0.0, 0.0);
     assert!(theta < 1e-6 && velocity < 1e-3, "{theta}, {velocity}");
     let (theta, velocity, _) = run(100_000, 0.0, 0.0);
     assert!(near(theta, 0.0025) && near(velocity, 0.09), "{theta}, {velocity}");
-    // Each sensor's clip what it measures: a push says nothing of the attitude.
+    // A clipped sensor raises only the variance of what it measures.
     let (theta, velocity, _) = run(4000, 0.985 * s.gyro_range_rad_s, 0.0);
     assert!(near(theta, 0.08) && velocity < 1e-3, "{theta}, {velocity}");
     let (theta, velocity, _) = run(4000, 0.0, 0.985 * s.accel_range_m_s2);
@@ -459,7 +461,7 @@ fn rough_samples_leave_it_less_sure() {
     assert_eq!((run(249_000, 0.0, 0.0).2, run(250_000, 0.0, 0.0).2), (0, 1));
 }
 
-/// The variance of each scalar, not below the least, and with what rough samples add.
+/// The variance of each scalar: at least the minimum, plus the part for rough samples.
 #[test]
 fn each_part_has_its_variance() {
     let zero = Vector3::zeros();

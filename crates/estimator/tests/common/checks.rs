@@ -1,10 +1,10 @@
-//! What every estimate must be, and flights of a path with something changed.
+//! Checks of every estimate, and flights with changed samples or measurements.
 
 use super::{Flight, ICM, Path, Sensors, double, fly, rest, settings};
 use afbc_estimator::{Estimate, ImuSample, Measurement, Memory, Stamped};
 use nalgebra::SMatrix;
 
-/// Panics unless everything said is finite and the covariance symmetric and positive.
+/// Panics unless the whole estimate is finite and the covariance symmetric and positive.
 pub fn sound(estimate: &Estimate, memory: &Memory) {
     let s = &estimate.sigmas;
     let state = &estimate.state;
@@ -29,7 +29,7 @@ pub fn sound(estimate: &Estimate, memory: &Memory) {
     assert!(memory.covariance().iter().flatten().all(|x| x.is_finite()));
 }
 
-/// Panics unless the covariance is symmetric and positive, up to rounding: 1e-5 of the correlation matrix.
+/// Panics unless the covariance is symmetric and positive, up to rounding of 1e-5 in the correlation matrix.
 pub fn positive(memory: &Memory) {
     let rows = memory.covariance();
     let p = SMatrix::<f64, 16, 16>::from_fn(|i, j| f64::from(rows[i][j]));
@@ -58,7 +58,7 @@ pub fn at_rest(ms: usize, sensors: Sensors, change: impl Fn(usize, &mut ImuSampl
     (last, flight.memory)
 }
 
-/// Flies a path with a change to what the estimator gets; calls `check` with each estimate.
+/// Flies a path with changed samples and measurements; calls `check` with each estimate.
 pub fn flown(
     path: Path,
     sensors: Sensors,

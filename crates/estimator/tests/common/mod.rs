@@ -1,4 +1,4 @@
-//! A synthetic flight in `f64`: truth, inertial samples that fit it exactly, and noisy sensors.
+//! Synthetic flights in `f64`: truth, IMU samples that fit it exactly, and noisy sensors.
 #![allow(dead_code, unreachable_pub, reason = "each test uses a part")]
 
 pub mod checks;
@@ -12,7 +12,7 @@ pub const G: f64 = 9.81;
 pub type V3 = Vector3<f64>;
 pub type M3 = Matrix3<f64>;
 
-/// Seeded normal numbers (Box and Muller).
+/// Seeded normal random numbers (Box and Muller).
 pub struct Noise(Xoshiro256PlusPlus);
 
 impl Noise {
@@ -20,7 +20,7 @@ impl Noise {
         Noise(Xoshiro256PlusPlus::seed_from_u64(seed))
     }
 
-    /// Uniform in [0, 1).
+    /// Returns a uniform number in [0, 1).
     pub fn uniform(&mut self) -> f64 {
         (self.0.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
     }
@@ -39,7 +39,7 @@ pub fn skew(v: &V3) -> M3 {
     M3::new(0.0, -v.z, v.y, v.z, 0.0, -v.x, -v.y, v.x, 0.0)
 }
 
-/// Rotation by a vector (Rodrigues).
+/// Returns the rotation by a vector (Rodrigues).
 pub fn exp(v: &V3) -> M3 {
     let angle = v.norm();
     if angle < 1e-9 {
@@ -49,14 +49,14 @@ pub fn exp(v: &V3) -> M3 {
     M3::identity() + k * angle.sin() + k * k * (1.0 - angle.cos())
 }
 
-/// Vector of a rotation of less than half a turn.
+/// Returns the vector of a rotation of less than half a turn.
 pub fn log(r: &M3) -> V3 {
     let vee = V3::new(r.m32 - r.m23, r.m13 - r.m31, r.m21 - r.m12) * 0.5;
     let angle = vee.norm().atan2((r.trace() - 1.0) * 0.5);
     if angle < 1e-7 { vee } else { vee * (angle / angle.sin()) }
 }
 
-/// Matrix of a quaternion w, x, y, z.
+/// Returns the matrix of a quaternion w, x, y, z.
 pub fn matrix(q: [f32; 4]) -> M3 {
     let [w, x, y, z] = q.map(f64::from);
     M3::new(
@@ -72,7 +72,7 @@ pub fn matrix(q: [f32; 4]) -> M3 {
     )
 }
 
-/// Quaternion w, x, y, z of a rotation.
+/// Returns the quaternion w, x, y, z of a rotation.
 pub fn quaternion(r: &M3) -> [f32; 4] {
     let v = log(r);
     let angle = v.norm();
@@ -101,7 +101,8 @@ pub struct Moment {
 /// Position and yaw over time.
 pub type Path = fn(f64) -> (V3, f64);
 
-/// At rest for two seconds, then growing to a figure of eight of 4 by 2 m with height and heading, 3 m/s at most.
+/// Rests for two seconds, then flies a growing figure of eight of 4 by 2 m with changing height and heading, at most 3
+/// m/s.
 pub fn eight(t: f64) -> (V3, f64) {
     let x = ((t - 2.0) / 4.0).clamp(0.0, 1.0);
     let grown = x * x * x * x * (35.0 - 84.0 * x + 70.0 * x * x - 20.0 * x * x * x);
@@ -110,20 +111,20 @@ pub fn eight(t: f64) -> (V3, f64) {
     (place * grown, 0.8 * grown * (0.5 * phase).sin())
 }
 
-/// At rest.
+/// Rests.
 pub fn rest(_: f64) -> (V3, f64) {
     (V3::zeros(), 0.3)
 }
 
-/// Hover at 2 m from the beginning.
+/// Hovers at 2 m from the beginning.
 pub fn hover(t: f64) -> (V3, f64) {
     (V3::new(0.02 * (0.9 * t).sin(), 0.02 * (1.1 * t).cos(), 2.0 + 0.01 * (0.7 * t).sin()), 0.1)
 }
 
-/// Truth of a flight, a moment per millisecond.
+/// Returns the truth of a flight, one entry per millisecond.
 pub fn fly(path: impl Fn(f64) -> (V3, f64), time_s: f64) -> Vec<Moment> {
     const H: f64 = 1e-3;
-    // Derivatives of the fourth order.
+    // Fourth-order finite differences.
     let velocity =
         |t: f64| (path(t - 2.0 * H).0 - path(t + 2.0 * H).0 + (path(t + H).0 - path(t - H).0) * 8.0) / (12.0 * H);
     let acceleration = |t: f64| {
@@ -143,7 +144,7 @@ pub fn fly(path: impl Fn(f64) -> (V3, f64), time_s: f64) -> Vec<Moment> {
         .map(|i| {
             let t = i as f64 * 1e-3;
             let r = attitudes[i + 1];
-            // In the body, from half of the turn from the sample before to the one after.
+            // Body rates: half of the rotation from the previous to the next sample.
             let rates = log(&(attitudes[i].transpose() * attitudes[i + 2])) / 2e-3;
             let force = r.transpose() * (acceleration(t) + V3::new(0.0, 0.0, G));
             Moment { r, v: velocity(t), p: path(t).0, rates, force }
@@ -151,7 +152,7 @@ pub fn fly(path: impl Fn(f64) -> (V3, f64), time_s: f64) -> Vec<Moment> {
         .collect()
 }
 
-/// Noise of the inertial sensors: densities, walks of the biases and their standard deviations at the start.
+/// Noise of an IMU: densities, random walks of the biases and their standard deviations at the start.
 #[derive(Clone, Copy)]
 pub struct Imu {
     pub gyro: f64,
@@ -162,11 +163,11 @@ pub struct Imu {
     pub accel_bias: f64,
 }
 
-/// ICM-42688-P: 2.8 mdps and 70 ug per root of a hertz; biases of 0.5 dps and 10 mg (of its 20 mg at most).
+/// ICM-42688-P: 2.8 mdps and 70 ug per root of a hertz; biases of 0.5 dps and 10 mg (at most 20 mg).
 pub const ICM: Imu =
     Imu { gyro: 4.9e-5, accel: 6.9e-4, gyro_walk: 1e-5, accel_walk: 1e-4, gyro_bias: 8.7e-3, accel_bias: 0.1 };
 
-/// Settings that tell the filter the truth about `imu`.
+/// Returns settings with the true noise of `imu`.
 pub fn settings(imu: &Imu) -> Settings {
     Settings {
         gyro_noise_rad_s_rthz: imu.gyro as f32,
@@ -175,7 +176,7 @@ pub fn settings(imu: &Imu) -> Settings {
         accel_walk_m_s2_rts: imu.accel_walk as f32,
         accel_bias_m_s2: imu.accel_bias as f32,
         baro_walk_m_rts: 0.02,
-        // All of it.
+        // The whole reported deviation is noise.
         gnss_noise_m: 100.0,
         mag_slow_rad: 0.0,
         ..Settings::DEFAULT
@@ -187,15 +188,15 @@ pub fn settings(imu: &Imu) -> Settings {
 pub struct Sensors {
     /// Pose at 100 Hz, 10 +- 2 ms late: standard deviations of position [m] and attitude [rad].
     pub tracker: Option<(f64, f64)>,
-    /// At 10 Hz, 100 ms late: horizontal, vertical [m], speed [m/s].
+    /// Fix at 10 Hz, 100 ms late: standard deviations of horizontal and vertical position [m] and velocity [m/s].
     pub gnss: Option<(f64, f64, f64)>,
-    /// Slow error of its position, per coordinate [m] with a correlation time [s].
+    /// Slow error of the receiver's position per coordinate [m], with its correlation time [s].
     pub slow: Option<(f64, f64)>,
-    /// Field of the vehicle itself along body x and y, in shares of the earth's horizontal one.
+    /// Field of the vehicle itself along body x and y, in shares of the earth's horizontal field.
     pub iron: Option<f64>,
-    /// At 50 Hz, 20 ms late [m].
+    /// Height at 50 Hz, 20 ms late: standard deviation [m].
     pub baro: Option<f64>,
-    /// At 50 Hz, 10 ms late, of a field of 1 at an inclination of 63 degrees.
+    /// Field at 50 Hz, 10 ms late: standard deviation, for a field of strength 1 and an inclination of 63 degrees.
     pub mag: Option<f64>,
 }
 
@@ -205,12 +206,12 @@ pub const MOCAP: Sensors =
 pub const OUTDOOR: Sensors =
     Sensors { tracker: None, gnss: Some((0.8, 1.2, 0.1)), slow: None, iron: None, baro: Some(0.15), mag: Some(0.01) };
 
-/// Magnetic field in the earth frame: north and down.
+/// Returns the magnetic field in the earth frame: north and down.
 pub fn field() -> V3 {
     V3::new(0.45, 0.0, -0.893)
 }
 
-/// One flight of an estimator.
+/// One flight with an estimator.
 pub struct Flight<'a> {
     pub truth: &'a [Moment],
     pub estimator: Estimator,
@@ -221,17 +222,17 @@ pub struct Flight<'a> {
     pub gyro_bias: V3,
     pub accel_bias: V3,
     pub baro_offset: f64,
-    /// The receiver's slow error; drawn with the first fix.
+    /// The receiver's slow error, drawn with the first fix.
     pub slow: Option<V3>,
     /// Field of the vehicle itself.
     pub iron: V3,
-    /// Delay of all sensors besides their own [ms].
+    /// Extra delay of all sensors [ms].
     pub late_ms: f64,
     /// Index of the next moment.
     pub now: usize,
     /// Measurements under way, with the millisecond of their arrival.
     under_way: Vec<(usize, Stamped<Measurement>)>,
-    /// The last sample.
+    /// The last IMU sample.
     pub sample: ImuSample,
 }
 
@@ -267,7 +268,7 @@ impl<'a> Flight<'a> {
         1_000_000 + self.now as u64 * 1000
     }
 
-    /// Truth at the time of the last step.
+    /// Returns the truth at the time of the last step.
     pub fn moment(&self) -> &Moment {
         &self.truth[self.now - 1]
     }
@@ -324,7 +325,7 @@ impl<'a> Flight<'a> {
         }
     }
 
-    /// Flies one millisecond; `imu` and `deliver` may change or refuse (false) what the estimator gets.
+    /// Flies one millisecond. `imu` and `deliver` may change the estimator's input, or drop it by returning false.
     pub fn step_with(
         &mut self,
         imu: impl FnOnce(&mut ImuSample) -> bool,
@@ -360,7 +361,7 @@ impl<'a> Flight<'a> {
         self.step_with(|_| true, |_| true)
     }
 
-    /// Errors, truth less estimate, in the order of the covariance.
+    /// Returns the errors, truth minus estimate, in the order of the covariance.
     pub fn errors(&self, estimate: &Estimate) -> SVector<f64, 16> {
         let truth = self.moment();
         let theta = log(&(truth.r * matrix(estimate.attitude).transpose()));
@@ -381,7 +382,8 @@ impl<'a> Flight<'a> {
         SMatrix::from_fn(|i, j| f64::from(rows[i][j]))
     }
 
-    /// Normalised estimation error squared of the first `N` errors; panics if the covariance is not positive.
+    /// Returns the normalised estimation error squared of the first `N` errors; panics if the covariance is not
+    /// positive.
     pub fn nees<const N: usize>(&self, estimate: &Estimate) -> f64 {
         let p: SMatrix<f64, N, N> = self.covariance().fixed_view::<N, N>(0, 0).into_owned();
         let e: SVector<f64, N> = self.errors(estimate).fixed_rows::<N>(0).into_owned();
@@ -393,7 +395,7 @@ impl<'a> Flight<'a> {
     }
 }
 
-/// Root of the mean of squares.
+/// Root mean square.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Rms {
     sum: f64,
