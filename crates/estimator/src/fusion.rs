@@ -3,7 +3,6 @@
 //! A scalar z = h'x + noise of variance r corrects the state with the gain K = P h/s, s = h' P h + r. The scalars of a
 //! fix follow one another, and each innovation is relative to the state corrected so far. The sum of innovation^2/s is
 //! then the normalised innovation squared of the whole fix.
-//! up to the normalised innovation squared of the whole fix.
 
 use crate::aid::{Aid, Trust, passes};
 use crate::align::VAGUE;
