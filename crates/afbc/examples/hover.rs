@@ -1,4 +1,4 @@
-//! One step of AFBC, one metre below its setpoint: `cargo run -p afbc --example hover`.
+//! Runs one step of AFBC, one metre below its setpoint: `cargo run -p afbc --example hover`.
 
 use afbc::{Adaptive, Controller, Profile};
 use afbc_control::{FlightController, Validated};

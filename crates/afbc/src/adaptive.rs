@@ -9,7 +9,7 @@ use afbc_control::{Errors, math};
 use afbc_types::{Axis, Declared, OutOfRange, PerAxis, parameters};
 use nalgebra::{Matrix3, Vector3};
 
-/// Smallest hover thrust accepted from the estimate, as a share of the weight.
+/// Smallest accepted estimate of the hover thrust, as a share of the weight.
 const HOVER_SHARE_MIN: f32 = 0.3;
 
 parameters! {
@@ -39,11 +39,11 @@ parameters! {
 }
 
 impl Gains {
-    /// Returns the gains of a subsystem whose input must be `scale` times as large.
+    /// Returns the gains for an input that must be `scale` times as large for the same effect.
     #[must_use]
     pub fn scaled(&self, scale: f32) -> Self {
         let Gains { backstepping, gamma, eta, safeguards, .. } = *self;
-        // The profile `paper` has no bound, which is the end of the range: scaled up, it would be refused.
+        // The profile `paper` has no bound, which is the end of the range. Scaled up, it would be refused.
         let bound = |bound: f32| math::min(bound * scale, Safeguards::THETAMAX.range.max as f32);
         Gains {
             backstepping: backstepping::Gains { alpha2: backstepping.alpha2 * scale, ..backstepping },
@@ -58,9 +58,9 @@ impl Gains {
         }
     }
 
-    /// Returns the gains of a subsystem that is `slowness` times slower: each rate is scaled by its power of time, so
-    /// that errors take the same course, only slower. Bounds of the estimates stay, since disturbances do not slow
-    /// down; epsilon grows, so that the robust term is softer. Not in the paper.
+    /// Returns the gains of a subsystem that is `slowness` times slower: each gain is scaled by the power of time in
+    /// its unit, so that errors follow the same curve, only slower. The bounds of the estimates stay, because
+    /// disturbances do not slow down. epsilon grows, so that the robust term is softer. Not in the paper.
     pub fn slowed(&self, slowness: f32) -> Self {
         let Gains { backstepping, gamma, eta, epsilon, safeguards, .. } = *self;
         let backstepping::Gains { alpha1, alpha2, stiffness } = backstepping;
@@ -73,7 +73,7 @@ impl Gains {
             },
             gamma: gamma / square,
             eta: eta / square,
-            // Not divided: delta_max stays, so the robust term's gain, delta_max/epsilon, falls as alpha_2 does.
+            // Multiplied: delta_max stays, so the gain of the robust term, delta_max/epsilon, falls like alpha_2.
             epsilon: epsilon * slowness,
             safeguards: Safeguards { sigma: safeguards.sigma / slowness, ..safeguards },
             ..*self
@@ -81,24 +81,25 @@ impl Gains {
     }
 }
 
-/// Adaptive estimates of one subsystem. Zero at the start.
+/// Adaptive estimates of one subsystem, zero at the start.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct AdaptiveEstimate {
-    /// Theta_hat: one consequent parameter per fuzzy rule, rows by the Gaussians of the first input, columns by those
-    /// of the second; in the unit of the subsystem's input.
+    /// Theta_hat: one consequent parameter per fuzzy rule. The row is the Gaussian of the first input, the column that
+    /// of the second. In the unit of the subsystem's input.
     pub theta: Matrix3<f32>,
-    /// delta_hat: estimated bound of approximation error and disturbance; in the unit of the subsystem's input.
+    /// delta_hat: estimated bound of approximation error and disturbance, in the unit of the subsystem's input.
     pub delta: f32,
 }
 
-/// Derivatives of an [`AdaptiveEstimate`]; that of Theta_hat, gamma e_2 w(x), in factors ([`Firing`]).
+/// Derivatives of an [`AdaptiveEstimate`]. The derivative of Theta_hat, gamma e_2 w(x), is stored in factors
+/// ([`Firing`]).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rate {
     first: Vector3<f32>,
     second: Vector3<f32>,
-    /// gamma e_2 over the sum of the firing strengths
+    /// gamma e_2 divided by the sum of the firing strengths.
     theta: f32,
     delta: f32,
     leakage: f32,
@@ -115,41 +116,41 @@ impl Rate {
         self.delta
     }
 
-    /// Returns the leakage rate of both estimates, by [`Safeguards`] \[1/s\].
+    /// Returns the leakage rate of both estimates ([`Safeguards`]) \[1/s\].
     pub fn leakage(&self) -> f32 {
         self.leakage
     }
 }
 
-/// Returns the estimate with u_a = `input` for any errors, since the weights of the rules sum to one.
+/// Returns the estimate that gives u_a = `input` for any errors, because the weights of the rules sum to one.
 pub fn even(input: f32) -> AdaptiveEstimate {
     AdaptiveEstimate { theta: Matrix3::repeat(input), delta: 0.0 }
 }
 
-/// Returns the estimate with u_a = `input` for these weights of the rules: as even over the rules as |Theta_hat| <=
-/// `norm_max` allows, but at least as large as the input requires.
+/// Returns an estimate that gives u_a = `input` for these weights. It is as even over the rules as |Theta_hat| <=
+/// `norm_max` allows, but exceeds `norm_max` if the input requires it.
 fn spread(input: f32, weights: &Matrix3<f32>, norm_max: f32) -> AdaptiveEstimate {
-    // The smallest such Theta_hat; the rest of an even one is orthogonal to the weights.
-    // Nine weights that sum to one have a norm of at least a third.
+    // `least` is the smallest such Theta_hat, and `rest`, the rest of the even one, is orthogonal to the weights. Nine
+    // weights that sum to one have a norm of at least a third, so the division is safe.
     let least = weights * (input / weights.norm_squared());
     let rest = Matrix3::repeat(input) - least;
     let room = math::max(norm_max * norm_max - least.norm_squared(), 0.0);
     let square = rest.norm_squared();
-    // room is never negative, so square is positive where it divides.
+    // `room` is never negative, so `square` is positive where it divides.
     let share = if square > room { math::sqrt(room / square) } else { 1.0 };
     AdaptiveEstimate { theta: least + rest * share, delta: 0.0 }
 }
 
-/// Advances the estimate by one step of explicit Euler, with projection into the bounds.
+/// Advances the estimate by one explicit Euler step, with projection onto its bounds.
 #[inline]
 fn advance(estimate: &mut AdaptiveEstimate, rate: &Rate, safeguards: &Safeguards, dt_s: f32) {
     let Safeguards { theta_max, delta_max, .. } = *safeguards;
-    // If the leakage is faster than the step, the estimate becomes zero instead of changing its sign.
+    // If the leakage is faster than the step, the estimate becomes zero and does not change sign.
     let keep = math::max(1.0 - rate.leakage * dt_s, 0.0);
     let theta = estimate.theta * keep + rate.first * (rate.theta * dt_s) * rate.second.transpose();
     let square = theta.norm_squared();
     estimate.theta = if square > theta_max * theta_max { theta * (theta_max / math::sqrt(square)) } else { theta };
-    // It never falls below zero: e and tanh(e_2/epsilon), whose product it grows by, have the same sign.
+    // delta_hat never falls below zero: it grows by the product of e and tanh(e_2/epsilon), which have the same sign.
     estimate.delta = math::min(estimate.delta * keep + rate.delta * dt_s, delta_max);
 }
 
@@ -165,7 +166,7 @@ pub struct Terms {
 }
 
 impl Terms {
-    /// u (20).
+    /// Returns u (20).
     #[inline]
     pub fn sum(&self) -> f32 {
         self.fuzzy + self.robust + self.proportional
@@ -184,14 +185,14 @@ impl Subsystem {
     /// Creates the subsystem with these gains.
     ///
     /// # Errors
-    /// The first gain out of range.
+    /// Returns the first gain that is out of range.
     pub fn new(gains: Gains) -> Result<Self, OutOfRange> {
         gains.validate()?;
         Ok(Subsystem { gains, basis: Basis::new(gains.membership)?, inverse_epsilon: 1.0 / gains.epsilon })
     }
 
-    /// Returns (20), and the derivatives of the estimate by (33), (34) with their [`Safeguards`], both from the present
-    /// estimate. `unallocated` is the part of the input that could not be allocated in the last step.
+    /// Returns the terms of (20) and the derivatives of the estimate by (33), (34) with the [`Safeguards`], both from
+    /// the present estimate. `unallocated` is the part of the input that the last step could not allocate.
     #[inline]
     pub fn law(
         &self,
@@ -213,7 +214,7 @@ impl Subsystem {
         (terms, Rate { first, second, theta: gamma * error * share, delta: eta * error * s, leakage })
     }
 
-    /// Returns u and the derivatives of the estimate, in a form for the step.
+    /// Returns u, and advances the estimate if the context allows it.
     // One copy for all six subsystems, not inlined, so that it can use all registers.
     #[inline(never)]
     fn step(
@@ -232,7 +233,7 @@ impl Subsystem {
     }
 }
 
-/// Returns the inputs of the fuzzy system (22), Section IV: angle and rate for attitude, error and its rate for
+/// Returns the inputs of the fuzzy system (22), Section IV: angle and rate for attitude; error and its derivative for
 /// position.
 fn fuzzy_inputs(axis: Axis, x: [f32; 2], errors: &Errors) -> [f32; 2] {
     match axis {
@@ -251,7 +252,7 @@ impl Adaptive {
     /// Creates the law with these gains.
     ///
     /// # Errors
-    /// The first gain out of range.
+    /// Returns the first gain that is out of range.
     pub fn new(gains: PerAxis<Gains>) -> Result<Self, OutOfRange> {
         let PerAxis { roll, pitch, yaw, z, x, y } = gains;
         Ok(Adaptive {
@@ -271,13 +272,13 @@ impl Adaptive {
         proportional(self.subsystems[axis].gains.backstepping.alpha2, errors)
     }
 
-    /// Returns u_a (22) of the subsystem; `x` is x_1, x_2 of an attitude.
+    /// Returns u_a (22) of the subsystem. `x` is x_1, x_2, used for attitude only.
     pub(crate) fn fuzzy(&self, axis: Axis, x: [f32; 2], errors: &Errors, estimate: &AdaptiveEstimate) -> f32 {
         self.subsystems[axis].basis.weights(fuzzy_inputs(axis, x, errors)).dot(&estimate.theta)
     }
 
-    /// Returns the estimate for which u_a is `fuzzy` with these errors, spread over the rules; `x` is x_1, x_2 of an
-    /// attitude.
+    /// Returns the estimate with u_a = `fuzzy` at these errors, spread over the rules. `x` is x_1, x_2, used for
+    /// attitude only.
     pub(crate) fn resumed(
         &self,
         axis: Axis,
@@ -291,7 +292,7 @@ impl Adaptive {
 }
 
 impl Law for Adaptive {
-    /// What rotors do to a body that turns is part of what is learnt.
+    /// The gyroscopic effect of the rotors is learnt like any other unknown.
     const USES_ROTOR_RESIDUAL: bool = false;
 
     const OBSERVES: bool = true;
@@ -321,7 +322,7 @@ impl Law for Adaptive {
 
     fn approach(&self, axis: Axis, known: Option<&ModelConstants>) -> f32 {
         let gains = &self.subsystems[axis].gains.backstepping;
-        // With nothing known, u_pd is zero where the speed of approach is alpha_1 e_1.
+        // Without a known model, u_pd is zero where the approach speed is alpha_1 e_1.
         known.map_or(gains.alpha1, |model| gains.approach(model.hover_gain(axis)))
     }
 
@@ -330,8 +331,8 @@ impl Law for Adaptive {
     }
 
     fn hover_thrust_n(&self, z: &AdaptiveEstimate, weight_n: f32, known_n: f32) -> f32 {
-        // The rule for zero error and zero speed.
-        // Never near zero, since (40), drag and the observer of forces divide by it.
+        // Theta_hat of the rule for zero error and zero speed. Never near zero, because (40), drag and the force
+        // observer divide by the hover thrust.
         math::max(known_n + z.theta.m22, HOVER_SHARE_MIN * weight_n)
     }
 }
@@ -341,13 +342,13 @@ impl Law for Adaptive {
 mod tests {
     use super::*;
 
-    /// u_a of the estimate for these weights.
+    /// Returns u_a of the estimate for these weights.
     fn fuzzy(estimate: &AdaptiveEstimate, weights: &Matrix3<f32>) -> f32 {
         weights.dot(&estimate.theta)
     }
 
-    /// An estimate that resumes an input gives exactly that input; it is even where that fits into the bound, otherwise
-    /// as even as fits, and never larger than the least one that gives it.
+    /// A resumed estimate gives exactly the requested input. It is even if that fits the bound, otherwise as even as
+    /// fits, and never larger than the smallest estimate with that input.
     #[test]
     fn an_input_is_spread_as_evenly_as_fits() {
         let basis = Basis::new(Membership { centre: 3.0, width: 1.2 }).unwrap();
@@ -364,7 +365,7 @@ mod tests {
                     if 3.0 * input.abs() <= norm_max {
                         assert!((theta - even(input).theta).norm() < 1e-5 * size, "{input} N by {theta}");
                     } else if least_norm(input) < norm_max {
-                        // The bound is used up: evener would be larger.
+                        // The bound is used up; a more even estimate would exceed it.
                         assert!(theta.norm() > 0.999 * norm_max, "{input} N by {theta} with {norm_max}");
                     }
                 }

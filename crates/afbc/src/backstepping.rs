@@ -5,23 +5,24 @@ use crate::model::{Dynamics, ModelConstants};
 use afbc_control::Errors;
 use afbc_types::{Axis, Declared, OutOfRange, Parameters, PerAxis, parameters};
 
-/// Returns the ideal law u*_eq (16) for known f, g and dg/dt, with c e_1 for e_1.
+/// Returns the ideal law u*_eq (16) for known f, g and dg/dt, with c e_1 in place of e_1.
 #[inline]
 pub fn ideal(gains: &Gains, errors: &Errors, x1d_ddot: f32, dynamics: &Dynamics) -> f32 {
     let (Gains { alpha1, stiffness, .. }, Errors { e1, e2, .. }) = (*gains, *errors);
     compensated(stiffness * e1 + alpha1 * (e2 - alpha1 * e1) + x1d_ddot, e2, dynamics)
 }
 
-/// Returns the input for an acceleration, with the compensation of f and dg/dt in (16).
+/// Returns the input for an acceleration, compensating f and dg/dt as in (16).
 #[inline]
 fn compensated(acceleration: f32, e2: f32, dynamics: &Dynamics) -> f32 {
     let Dynamics { f, g, g_dot } = *dynamics;
-    // Only g_4 changes: the other subsystems are spared a division.
+    // Only g_4 changes, so the other subsystems skip the division.
     let drift = if g_dot == 0.0 { 0.0 } else { 0.5 * g_dot / g * e2 };
     (acceleration - f - drift) / g
 }
 
-/// Returns [`ideal`], c e_1 + alpha_1 de_1/dt at the speed limit by [`Tracking::errors`]'s e_2.
+/// Returns [`ideal`]. At the speed limit, where [`Tracking::errors`] uses the approach speed for e_2, c e_1 + alpha_1
+/// de_1/dt becomes alpha_1 e_2.
 #[inline]
 pub(crate) fn known(gains: &Gains, tracking: &Tracking, errors: &Errors, dynamics: &Dynamics) -> f32 {
     if tracking.approach_1_s.is_some() {
@@ -62,11 +63,11 @@ parameters! {
 }
 
 impl Gains {
-    /// Returns the speed of approach per error \[1/s\] at which [`known`] and u_pd are zero, for g of the input:
-    /// position over rate gain.
+    /// Returns the approach speed per error \[1/s\] at which the sum of [`known`] and u_pd is zero, for an input with
+    /// gain g: the position gain divided by the rate gain.
     pub(crate) fn approach(&self, g: f32) -> f32 {
         let gain = self.alpha2 * g;
-        // alpha_1 is positive by its range, and the gain is not negative: no division by zero.
+        // alpha_1 is positive by its range and the gain is not negative, so the divisor is positive.
         (self.stiffness + self.alpha1 * gain) / (self.alpha1 + gain)
     }
 }
@@ -82,7 +83,7 @@ impl Backstepping {
     /// Creates the baseline for a vehicle with these nominal parameters.
     ///
     /// # Errors
-    /// The first parameter or gain out of range.
+    /// Returns the first parameter or gain that is out of range.
     pub fn new(vehicle: &Parameters, gains: PerAxis<Gains>) -> Result<Self, OutOfRange> {
         vehicle.validate()?;
         for axis in Axis::ALL {
@@ -93,7 +94,7 @@ impl Backstepping {
 }
 
 impl Law for Backstepping {
-    /// None: a fixed law has no memory.
+    /// Empty, because a fixed law has no memory.
     type Estimate = ();
 
     #[inline]

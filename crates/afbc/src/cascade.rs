@@ -1,5 +1,5 @@
-//! Six subsystems in one cascade: position gives thrust and desired attitude, attitude gives U1..U3, and all give rotor
-//! speeds. Section III-D, Fig. 2.
+//! Cascade of six subsystems: position gives thrust and desired attitude, attitude gives U1..U3, and the mixer turns
+//! these into rotor speeds. Section III-D, Fig. 2.
 
 use crate::ahead::Ahead;
 use crate::desired::{DesiredAttitude, DesiredMemory, DesiredRollPitch};
@@ -17,7 +17,7 @@ use afbc_control::{Action, Errors, FlightController, Smoothed, Smoother, Trace, 
 use afbc_types::{Airframe, Axis, Declared, Inputs, OutOfRange, PerAxis, Setpoint, State};
 use nalgebra::{Vector2, Vector3};
 
-/// A controller. Constant; everything that changes in flight is in [`Cascade`].
+/// Controller with its constants. Everything that changes in flight is in [`Cascade`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Controller<L, const N: usize = 4> {
     law: L,
@@ -36,7 +36,7 @@ pub struct Controller<L, const N: usize = 4> {
     settings: Settings,
     weight_n: f32,
     mass_kg: f32,
-    /// Largest thrust of all rotors together \[N\].
+    /// Largest total thrust of all rotors \[N\].
     thrust_max_n: f32,
 }
 
@@ -45,41 +45,41 @@ pub struct Controller<L, const N: usize = 4> {
 pub struct Cascade<E> {
     /// Estimates of each subsystem.
     pub estimates: PerAxis<E>,
-    /// What the last step computed.
+    /// Results of the last step.
     pub last: LastStep,
     pub(crate) filters: Filters,
     rotor_residual_rad_s: f32,
 }
 
-/// What a step computes.
+/// Results of a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct LastStep {
     /// Errors of each subsystem.
     pub errors: PerAxis<Errors>,
-    /// Distance of each subsystem from its reference, e_1 without the speed limit \[m or rad\].
+    /// Distance of each subsystem from its reference: e_1 without the speed limit \[m or rad\].
     pub distances: PerAxis<f32>,
     /// Inputs of each subsystem: U1..U4 \[N\], u5, u6 \[m/s2\].
     pub inputs: PerAxis<f32>,
-    /// U1..U4 asked of the mixer, behind the filters.
+    /// U1..U4 after the filters, as given to the mixer.
     pub asked: Inputs,
-    /// See [`Context::unallocated`].
+    /// Part of each input that was not allocated, see [`Context::unallocated`].
     unallocated: PerAxis<f32>,
-    /// eta and d eta/dt: the body's rates as in (6), or with feed-forward what follows from them.
+    /// eta and d eta/dt. As in (6), d eta/dt is the body rates; with feed-forward it follows from them.
     pub(crate) turning: [Vector3<f32>; 2],
 }
 
 /// Memories of the filters and observers around the law.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Filters {
-    /// None before the first step.
+    /// Reference filter, `None` before the first step.
     detours: Option<Detours>,
     pub(crate) forces: Option<ForceObserverMemory>,
     moments: Option<Turning>,
     desired: DesiredMemory,
     smoothed: Option<Smoothed>,
-    /// See [`Ahead`].
+    /// Low-pass of [`Ahead`].
     late: Option<Vector2<f32>>,
-    /// See [`Effort`].
+    /// Memory of [`Effort`].
     more_effort: f32,
     standstill: Standstill,
 }
@@ -87,7 +87,7 @@ pub(crate) struct Filters {
 impl<E> Cascade<E> {
     /// Returns the memory with the estimates of another law, which starts with this rotor residual.
     pub(crate) fn handed_over<F>(&self, estimates: PerAxis<F>, rotor_residual_rad_s: f32) -> Cascade<F> {
-        // Filters and observers go on with the same memory: no input jumps, and what was observed is still made up for.
+        // Filters and observers keep their memory, so no input jumps and observed disturbances stay compensated.
         let Cascade { last, filters, .. } = *self;
         Cascade { estimates, last, filters, rotor_residual_rad_s }
     }
@@ -108,7 +108,7 @@ impl<L: Law, const N: usize> Controller<L, N> {
     /// Creates a controller for a vehicle with these nominal parameters.
     ///
     /// # Errors
-    /// The first parameter or setting out of range.
+    /// Returns the first parameter or setting that is out of range.
     pub fn new(vehicle: impl Into<Airframe<N>>, settings: Settings, law: L) -> Result<Self, OutOfRange> {
         settings.validate()?;
         let vehicle = vehicle.into();
@@ -119,7 +119,7 @@ impl<L: Law, const N: usize> Controller<L, N> {
         let model = ModelConstants::new(&vehicle.parameters);
         let known = settings.feed_forward.then_some(&model);
         let approach = |axis, speed_max_m_s| Approach::new(speed_max_m_s, law.approach(axis, known));
-        // Without feed-forward, or in a law that does not use them, the observers would have no effect.
+        // Without feed-forward, or for a law that does not use them, the observers would have no effect.
         let observes = settings.feed_forward && L::OBSERVES;
         Ok(Controller {
             approach: [
@@ -149,7 +149,7 @@ impl<L: Law, const N: usize> Controller<L, N> {
         })
     }
 
-    /// True if the law is given the known part of its input.
+    /// Returns true if the law gets the known part of its input.
     pub(crate) fn feeds_forward(&self) -> bool {
         self.settings.feed_forward
     }
@@ -162,16 +162,16 @@ impl<L: Law, const N: usize> Controller<L, N> {
     /// Returns the estimated hover thrust U4 \[N\], limited to what the rotors can give.
     pub(crate) fn hover_thrust_n(&self, memory: &Cascade<L::Estimate>) -> f32 {
         let hover_n = self.law.hover_thrust_n(&memory.estimates.z, self.weight_n, self.known_weight_n());
-        // As the commanded thrust is in (40): both thrusts that are divided there have the same limit.
+        // (40) divides the commanded thrust by the hover thrust, so both need the same limit.
         math::min(hover_n, self.thrust_max_n)
     }
 
-    /// Returns the weight \[N\] as far as the law need not learn it.
+    /// Returns the part of the weight \[N\] that the law need not learn.
     fn known_weight_n(&self) -> f32 {
         if self.settings.feed_forward { self.weight_n } else { 0.0 }
     }
 
-    /// True if the vehicle stands on the ground and `freeze_on_ground` is set.
+    /// Returns true if the vehicle stands on the ground and `freeze_on_ground` is set.
     #[inline]
     pub(crate) fn stands(&self, memory: &Cascade<L::Estimate>) -> bool {
         self.settings.freeze_on_ground && memory.filters.standstill.stands()
@@ -187,7 +187,7 @@ impl<L: Law, const N: usize> Controller<L, N> {
         fresh: bool,
     ) -> Action<N> {
         if self.settings.bumpless && memory.filters.desired.is_first() {
-            // What feed-forward knows of the weight must not be learnt as well: it would be carried twice.
+            // The law must not learn the weight that feed-forward already knows, or it would be carried twice.
             self.law.start(&mut memory.estimates, self.weight_n - self.known_weight_n());
         }
         let (hover_n, stands) = (self.hover_thrust_n(memory), self.stands(memory));
@@ -197,12 +197,13 @@ impl<L: Law, const N: usize> Controller<L, N> {
         let Cascade { estimates, last, filters, rotor_residual_rad_s } = memory;
         let reference = self.reference(&mut filters.detours, state, setpoint);
         let attitude = Attitude::of(state);
-        // The last step's, since drag comes before the thrust. A law may ask for less than none; hover_n is positive.
+        // Drag is computed before the thrust, so it uses the last step's. A law may ask for negative thrust; `hover_n`
+        // is positive.
         let share = math::max(last.asked.thrust_n, 0.0) / hover_n;
         let observed_m_s2 = self.observe_forces(&mut filters.forces, state, &attitude, hover_n, [fresh, touches]);
         let gyroscopic_rad_s2 = self.model.gyroscopic(&state.rates_rad_s, *rotor_residual_rad_s);
         let velocity_body_m_s = attitude.in_body(&state.velocity_m_s);
-        // For the observer, which would otherwise find it as a disturbance and make up for it a second time.
+        // Given to the moment observer, which would otherwise compensate the known moments a second time.
         let known_rad_s2 = gyroscopic_rad_s2 + self.drag_turns(&velocity_body_m_s, share);
         let observed_rad_s2 =
             self.observe_moments(&mut filters.moments, &state.rates_rad_s, &known_rad_s2, [fresh, touches]);
@@ -211,7 +212,8 @@ impl<L: Law, const N: usize> Controller<L, N> {
             roll_pitch: attitude.roll_pitch,
             rotor_residual_rad_s: *rotor_residual_rad_s,
             dt_s: self.settings.common.dt_s,
-            // Feet hold against all but the thrust, which is learnt as soon as the vehicle no longer stands (`lift`).
+            // On the ground the feet hold the vehicle against everything but the thrust, so only the thrust is learnt
+            // (`lift`).
             adapt: fresh && !touches,
             unallocated: &last.unallocated,
             observed_m_s2,
@@ -228,14 +230,14 @@ impl<L: Law, const N: usize> Controller<L, N> {
         // Attitude: subsystems 1, 2, 3.
         let mut turn = self.turn(&desired, &reference, &attitude, state);
         if self.settings.feed_forward {
-            // Without the body's measured rates, whose noise the lead would amplify.
+            // Without the measured body rates, whose noise the lead would amplify.
             let more = self.ahead.advance(&mut filters.late, &turn.desired_accelerations.xy());
             turn.accelerations += Vector3::new(more.x, more.y, 0.0);
         }
         let [u1, u2, u3] = self.attitude(&turn, [&state.attitude_rad, &eta_dot], &context, estimates, &mut last.errors);
 
-        // Rotors, which also make up for the moments as they will be when they have followed.
-        // In axes that turn, (R' v)' = R' dv/dt - Omega x R' v: the drag's moment turns with the body.
+        // Rotors. Moments are compensated at their predicted value after the rotor lag. In rotating axes (R' v)' = R'
+        // dv/dt - Omega x R' v, because the drag's moment turns with the body.
         let change = attitude.in_body(&reference.acceleration_m_s2) - state.rates_rad_s.cross(&velocity_body_m_s);
         let ahead_m_s = velocity_body_m_s + change * self.settings.disturbance.disturbance_lag_s;
         let against = self.make_up(&observed_rad_s2, &ahead_m_s, share, touches);
@@ -246,7 +248,8 @@ impl<L: Law, const N: usize> Controller<L, N> {
 
         // For the next step.
         if let Some(forces) = &self.forces {
-            // As given, not as asked: what the rotors' limits take away would be observed as a disturbance.
+            // The thrust as given, not as asked: otherwise the part beyond the rotors' limits would be observed as a
+            // disturbance.
             forces.give(&mut filters.forces, action.given.thrust_n);
         }
         if let Some(moments) = &self.moments {
@@ -254,7 +257,7 @@ impl<L: Law, const N: usize> Controller<L, N> {
         }
         filters.standstill.advance(u4, self.weight_n, state, self.settings.common.dt_s);
         let leaves = touches && !filters.standstill.touches();
-        // The way back from where it has slid is not to be learnt as a disturbance.
+        // The way back after sliding on the ground must not be learnt as a disturbance.
         if let (true, Some(reference), Some(detours)) = (leaves, &self.reference, &mut filters.detours) {
             reference.restart_level(detours, state, setpoint);
         }
@@ -266,7 +269,7 @@ impl<L: Law, const N: usize> Controller<L, N> {
             let [x, y] = desired.beyond_limits_m_s2;
             last.unallocated = PerAxis { roll: roll_n, pitch: pitch_n, yaw: yaw_n, z: thrust_n, x, y };
         }
-        // e_1 of x, y and z is cut at the speed limit, and would hide from the monitor how far away the vehicle is.
+        // e_1 of x, y and z is cut at the speed limit, so the monitor gets the uncut distances.
         let PerAxis { roll, pitch, yaw, .. } = &last.errors;
         let [x, y, z] = (reference.position_m - state.position_m).into();
         last.distances = PerAxis { roll: roll.e1, pitch: pitch.e1, yaw: yaw.e1, z, x, y };
@@ -276,7 +279,7 @@ impl<L: Law, const N: usize> Controller<L, N> {
         action
     }
 
-    /// Returns the reference: the setpoint, or what the reference model makes of it.
+    /// Returns the setpoint, or the output of the reference model for it.
     #[inline(always)]
     fn reference(&self, detours: &mut Option<Detours>, state: &State, setpoint: &Setpoint) -> Setpoint {
         match &self.reference {
@@ -288,7 +291,7 @@ impl<L: Law, const N: usize> Controller<L, N> {
         }
     }
 
-    /// Returns f of x, y and z as observed \[m/s2\]; `fresh` and `touches` as in [`ForceObserver::advance`].
+    /// Returns the observed f of x, y and z \[m/s2\]; `fresh` and `touches` as in [`ForceObserver::advance`].
     #[inline(always)]
     fn observe_forces(
         &self,
@@ -307,8 +310,8 @@ impl<L: Law, const N: usize> Controller<L, N> {
         }
     }
 
-    /// Returns the angular acceleration by the drag of the rotors \[rad/s2\] at this velocity, in the body's axes, and
-    /// `share` of the hover thrust; zero without an observer of moments.
+    /// Returns the angular acceleration by the rotors' drag \[rad/s2\], for this velocity in body axes and `share` of
+    /// the hover thrust. Zero without a moment observer.
     #[inline(always)]
     fn drag_turns(&self, velocity_body_m_s: &Vector3<f32>, share: f32) -> Vector3<f32> {
         match &self.moments {
@@ -317,7 +320,8 @@ impl<L: Law, const N: usize> Controller<L, N> {
         }
     }
 
-    /// Returns f of roll, pitch and yaw as observed \[rad/s2\], beside what is known; likewise.
+    /// Returns the observed f of roll, pitch and yaw \[rad/s2\] in addition to `known_rad_s2`; `fresh` and `touches` as
+    /// in [`MomentObserver::advance`].
     #[inline(always)]
     fn observe_moments(
         &self,
@@ -335,7 +339,7 @@ impl<L: Law, const N: usize> Controller<L, N> {
         }
     }
 
-    /// Returns d eta/dt, or Omega where that is taken for it.
+    /// Returns d eta/dt, or the body rates where the settings take these for d eta/dt.
     #[inline(always)]
     fn eta_dot(&self, state: &State, attitude: &Attitude) -> Vector3<f32> {
         if self.settings.feed_forward && !self.settings.by_rotation {
@@ -345,8 +349,8 @@ impl<L: Law, const N: usize> Controller<L, N> {
         }
     }
 
-    /// Computes the input of one subsystem, and its errors.
-    // Always, so that all subsystems share what they compute.
+    /// Computes the input of one subsystem and its errors.
+    // Always inlined, so that all subsystems share common computations.
     #[inline(always)]
     fn input(
         &self,
@@ -361,7 +365,7 @@ impl<L: Law, const N: usize> Controller<L, N> {
         u
     }
 
-    /// Returns U4 \[N\], u5 and u6 \[m/s2\]: subsystems 4, 5, 6, the first in the context `lift`.
+    /// Returns U4 \[N\], u5 and u6 \[m/s2\]: subsystems 4 (with the context `lift`), 5 and 6.
     #[inline(always)]
     fn position(
         &self,
@@ -384,7 +388,7 @@ impl<L: Law, const N: usize> Controller<L, N> {
         [u4, u5, u6]
     }
 
-    /// Returns what roll, pitch and yaw track.
+    /// Returns errors and reference derivatives for roll, pitch and yaw.
     #[inline(always)]
     fn turn(&self, desired: &DesiredRollPitch, reference: &Setpoint, attitude: &Attitude, state: &State) -> Turn {
         let [roll, pitch] = &desired.filtered;
@@ -423,8 +427,7 @@ impl<L: Law, const N: usize> Controller<L, N> {
         ]
     }
 
-    /// Returns U1..U3 \[N\] that make up for the observed moments, and for that of the drag at this velocity in
-    /// the body's axes.
+    /// Returns U1..U3 \[N\] that compensate the observed moments and the drag's moment at this velocity in body axes.
     #[inline(always)]
     fn make_up(
         &self,
@@ -434,13 +437,13 @@ impl<L: Law, const N: usize> Controller<L, N> {
         touches: bool,
     ) -> [f32; 3] {
         let Some(moments) = &self.moments else { return [0.0; 3] };
-        // Its feet hold a vehicle that touches the ground against the drag, too.
+        // On the ground, the feet also hold the vehicle against the drag.
         let known = if touches { Vector3::zeros() } else { self.drag_turns(velocity_body_m_s, share) };
         moments.against(&(observed_rad_s2 + known))
     }
 
-    /// Returns U1..U4 \[N\] for the mixer: behind the filters, with what makes up for moments, and `effort` times as
-    /// large, which is returned, too.
+    /// Returns U1..U4 \[N\] for the mixer, and the effort factor. The inputs are filtered, the moment compensation is
+    /// added, and U1..U3 are multiplied by the effort factor.
     #[inline(always)]
     fn asked(
         &self,
@@ -450,19 +453,19 @@ impl<L: Law, const N: usize> Controller<L, N> {
         hover_n: f32,
         stands: bool,
     ) -> (Inputs, f32) {
-        // The filter of U3 has no lead that the observer could feed back: its moment may pass it.
+        // The compensation may pass the filter of U3, which has no lead to amplify it.
         let inputs = Inputs { roll_n: u1, pitch_n: u2, yaw_n: u3 + yaw_n, thrust_n: u4 };
         let mut inputs = self.smoother.advance(&mut filters.smoothed, &inputs);
         let mut effort = 1.0;
         if self.moments.is_some() {
             effort = self.effort.advance(&mut filters.more_effort, hover_n);
-            // f_hat of roll and pitch behind the filters: it is smooth already, and the observer would feed back their
-            // lead.
+            // The compensation of roll and pitch is added after the filters: it is smooth already, and the observer
+            // would feed back the filters' lead.
             inputs.roll_n = (inputs.roll_n + roll_n) * effort;
             inputs.pitch_n = (inputs.pitch_n + pitch_n) * effort;
             inputs.yaw_n *= effort;
         }
-        // Moments would increase the thrust and tip over a standing vehicle.
+        // On the ground, moments would increase the thrust and tip over the vehicle.
         let asked = if stands { Inputs { thrust_n: inputs.thrust_n, ..Inputs::default() } } else { inputs };
         (asked, effort)
     }

@@ -1,8 +1,8 @@
-//! Desired roll and pitch: (40) within the limits, behind the command filter, with the derivatives for (12) and (16).
+//! Desired roll and pitch: (40) within the limits, after the command filter, with the derivatives for (12) and (16).
 //! Section III-D.
 //!
-//! The paper takes the derivatives from the filter. With feed-forward they are those of the reference, and the angles
-//! given to the filter are ahead by its lag: its output is then the angle that was meant.
+//! The paper takes the derivatives from the filter. With feed-forward they come from the reference, and the filter's
+//! input leads by the filter's lag, so that its output is the intended angle.
 
 use crate::forward::{Followed, Forward};
 use crate::model::Attitude;
@@ -14,22 +14,22 @@ use afbc_control::math;
 use afbc_types::{OutOfRange, Setpoint};
 use nalgebra::Vector3;
 
-/// Smallest vertical thrust over weight that the tilt is computed with, since a sinking vehicle must not tilt further.
-/// Not in the paper.
+/// Smallest ratio of vertical thrust to weight for the tilt computation, because a sinking vehicle must not tilt
+/// further. Not in the paper.
 pub const VERTICAL_MIN: f32 = 0.3;
 
-/// The computation with its constants; everything that changes in flight is in [`DesiredMemory`].
+/// The computation with its constants. Everything that changes in flight is in [`DesiredMemory`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DesiredAttitude {
     filter: CommandFilter,
-    /// Lag 1/w of the command filter \[s\], and that of its command, which is held for a step.
+    /// Lag 1/w of the command filter \[s\], and delay of its command, which is held for a step.
     lag_s: f32,
     half_step_s: f32,
     forward: Forward,
     drag: KnownDrag,
     gravity_m_s2: f32,
     inverse_gravity: f32,
-    /// Largest thrust of all rotors together \[N\].
+    /// Largest total thrust of all rotors \[N\].
     thrust_max_n: f32,
     tilt_max_rad: f32,
     tilt_max_tan: f32,
@@ -43,9 +43,9 @@ pub struct DesiredAttitude {
 /// Memory of the desired attitude.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct DesiredMemory {
-    /// None before the first step.
+    /// Angles of the last step, `None` before the first one.
     last: Option<LastAngles>,
-    /// None before the first step.
+    /// Jerk filter, `None` before the first step.
     followed: Option<Followed>,
 }
 
@@ -54,19 +54,19 @@ pub struct DesiredMemory {
 struct LastAngles {
     /// phi_d, theta_d of (40) \[rad\].
     rad: [f32; 2],
-    /// The same as given to the command filter.
+    /// Angles given to the command filter \[rad\].
     commanded: [f32; 2],
-    /// What came out of it.
+    /// Output of the command filter.
     filtered: [Filtered; 2],
 }
 
 impl DesiredMemory {
-    /// True before the first step.
+    /// Returns true before the first step.
     pub(crate) fn is_first(&self) -> bool {
         self.last.is_none()
     }
 
-    /// Returns phi_d and theta_d of (40) \[rad\] in the last step, and the same behind the command filter.
+    /// Returns phi_d and theta_d of (40) \[rad\] in the last step, before and after the command filter.
     #[inline]
     pub(crate) fn trace(&self) -> ([f32; 2], [Filtered; 2]) {
         self.last.map_or_else(Default::default, |LastAngles { rad, filtered, .. }| (rad, filtered))
@@ -76,25 +76,25 @@ impl DesiredMemory {
 /// Desired roll and pitch in one step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DesiredRollPitch {
-    /// Roll and pitch with their first derivatives, by the command filter.
+    /// Roll and pitch with their first derivatives, after the command filter.
     pub filtered: [Filtered; 2],
     /// Second derivatives \[rad/s2\].
     pub accelerations_rad_s2: [f32; 2],
-    /// Sine and cosine of the yaw that they are meant for.
+    /// Sine and cosine of the yaw for which roll and pitch are computed.
     pub heading: [f32; 2],
-    /// How the thrust per mass changes as the reference does \[m/s3\].
+    /// Derivative of the thrust per mass that follows from the reference \[m/s3\].
     pub thrust_m_s3: f32,
     /// Part of u5, u6 beyond the limits of tilt and acceleration \[m/s2\].
     pub beyond_limits_m_s2: [f32; 2],
 }
 
 /// Returns desired roll and pitch (40) \[rad\] for the horizontal accelerations u5, u6 \[m/s2\] at yaw psi \[rad\].
-/// `inverse_vertical` is mass over vertical thrust: 1/g in hover, as in (39).
+/// `inverse_vertical` is the mass divided by the vertical thrust: 1/g in hover, as in (39).
 pub fn desired_attitude(u5: f32, u6: f32, yaw_rad: f32, inverse_vertical: f32) -> [f32; 2] {
     Tilt::new(u5, u6, [math::sin(yaw_rad), math::cos(yaw_rad)], inverse_vertical).rad
 }
 
-/// Returns a vector reduced to a norm of `max` in the same direction.
+/// Returns the vector shortened to a norm of at most `max`.
 #[inline]
 fn within([x, y]: [f32; 2], max: f32) -> [f32; 2] {
     let square = x * x + y * y;
@@ -103,10 +103,10 @@ fn within([x, y]: [f32; 2], max: f32) -> [f32; 2] {
 }
 
 impl DesiredAttitude {
-    /// Makes it from valid settings for a vehicle whose rotors give at most `thrust_max_n` together.
+    /// Creates the computation from valid settings, for rotors that give at most `thrust_max_n` together.
     ///
     /// # Errors
-    /// The first bandwidth or rate out of range.
+    /// Returns the first bandwidth or rate that is out of range.
     pub fn new(settings: &Settings, gravity_m_s2: f32, thrust_max_n: f32) -> Result<Self, OutOfRange> {
         let Settings { command_filter_rad_s, limits, tilt_by_thrust, by_rotation, feed_forward, bumpless, .. } =
             *settings;
@@ -130,8 +130,8 @@ impl DesiredAttitude {
         })
     }
 
-    /// Returns roll and pitch for u5, u6 \[m/s2\] and U4 \[N\] of a vehicle with this attitude, hover thrust, and
-    /// tangent of the tilt that it may have at its height, and advances the memory by one step.
+    /// Returns roll and pitch for u5, u6 \[m/s2\] and U4 \[N\], and advances the memory by one step. `low_tan` is the
+    /// tangent of the largest tilt allowed near the ground.
     #[inline(always)]
     pub fn advance(
         &self,
@@ -141,13 +141,13 @@ impl DesiredAttitude {
         attitude: &Attitude,
         [reference, setpoint]: [&Setpoint; 2],
     ) -> DesiredRollPitch {
-        // (40) must not count on more than the rotors can give.
+        // (40) must not count on more thrust than the rotors can give.
         let thrust_n = math::min(u4, self.thrust_max_n);
         let (vertical, inverse_vertical) = self.vertical(thrust_n * attitude.roll_pitch.tilt_cosine(), hover_n);
         let tilt_max_tan = math::min(self.tilt_max_tan, low_tan);
-        // In the same direction.
+        // The direction is kept.
         let [a5, a6] = within([u5, u6], math::min(vertical * tilt_max_tan, self.acceleration_max_m_s2));
-        // With the reference's yaw the desired attitude does not depend on the measured one.
+        // With the reference's yaw, the desired attitude does not depend on the measured yaw.
         let heading = if self.by_rotation {
             [math::sin(reference.yaw_rad), math::cos(reference.yaw_rad)]
         } else {
@@ -164,7 +164,7 @@ impl DesiredAttitude {
             Some((derivatives, _)) => self.ahead(tilt.rad, derivatives),
             None => tilt.rad,
         };
-        // The last step's command, which was held until now: `half_step_s` counts that delay.
+        // The filter takes the last step's command, which was held until now; `half_step_s` accounts for that delay.
         let filtered = match &memory.last {
             Some(LastAngles { commanded: [phi_d, theta_d], filtered: [roll, pitch], .. }) => {
                 [self.filter.advance(roll, *phi_d), self.filter.advance(pitch, *theta_d)]
@@ -203,8 +203,8 @@ impl DesiredAttitude {
         }
     }
 
-    /// Returns the first and second derivatives of roll and pitch \[rad/s, rad/s2\] that follow from the reference, at
-    /// `share` of the hover thrust along `up`, and the first of the thrust per mass \[m/s3\].
+    /// Returns the first and second derivatives of roll and pitch \[rad/s, rad/s2\] that follow from the reference at
+    /// `share` of the hover thrust along `up`, and the first derivative of the thrust per mass \[m/s3\].
     #[inline(always)]
     fn derivatives(
         &self,
@@ -216,15 +216,15 @@ impl DesiredAttitude {
     ) -> ([[f32; 2]; 2], f32) {
         let Setpoint { velocity_m_s: v, acceleration_m_s2: a, jerk_m_s3: jerk, .. } = reference;
         let turn = [reference.yaw_rate_rad_s, reference.yaw_acceleration_rad_s2];
-        // Corners of the setpoint are turned gradually; the reference model has none.
+        // Jumps of the setpoint's jerk are smoothed; the reference model has none.
         let [followed, snap] = self.forward.advance(followed, setpoint);
         let detour = jerk - setpoint.jerk_m_s3;
         let gradual = followed + detour;
-        // Drag turns the thrust as it changes with the velocity.
+        // Drag depends on the velocity, so it turns the thrust as the velocity changes.
         let thrust = [share, share * self.gravity_m_s2];
         let [turning, snap] = self.drag.followed(v, up, thrust, [a, jerk, &snap]);
-        // What a step or a jump of the state adds is not ahead, since it begins at once. Along z, where a_z may fall to
-        // little, it turns nothing: its snap is not known.
+        // The detour after a step or a jump starts at once and is not known ahead. Its vertical part is left out of the
+        // turn: a_z may fall to little, and its snap is unknown.
         let thrust_m_s3 = up.dot(&(turning - detour));
         let turning = turning - Vector3::z() * detour.z;
         let [rates, _] = tilt.turned(&turning, &snap, turn);
@@ -232,12 +232,12 @@ impl DesiredAttitude {
         ([rates, accelerations], thrust_m_s3)
     }
 
-    /// Returns angles that are ahead of these by the lag of the command filter; no tilt exceeds the norm of both.
+    /// Returns angles that lead by the lag of the command filter, shortened to a norm of at most the tilt limit.
     #[inline(always)]
     fn ahead(&self, mut rad: [f32; 2], [rates, accelerations]: [[f32; 2]; 2]) -> [f32; 2] {
         for ((angle, rate), acceleration) in rad.iter_mut().zip(rates).zip(accelerations) {
             let late_s = self.lag_s + self.half_step_s;
-            // (1 + s/w) (1 + s (1/w + dt/2)): the inverse of the filter, with the delay of the hold in one factor.
+            // (1 + s/w) (1 + s (1/w + dt/2)): inverse of the filter, with the hold's delay in one factor.
             *angle += (self.lag_s + late_s) * rate + self.lag_s * late_s * acceleration;
         }
         within(rad, self.tilt_max_rad)

@@ -1,19 +1,20 @@
-//! Observers of what the model does not know: the horizontal acceleration, mostly wind, and moments of weak rotors or
-//! of a payload off the centre. Not in the paper.
+//! Observers of unmodelled disturbances: the horizontal acceleration, mostly wind, and moments, from weak rotors or a
+//! payload off the centre. Not in the paper.
 //!
-//! (16) wants f of x and y, which the model takes for zero: without more, all of it has to be learnt from the error
-//! that it makes. But the vehicle measures its velocity v, and knows what its rotors do:
+//! (16) needs f of x and y, which the model takes as zero. Without an observer all of f must be learnt from the error
+//! that it causes. But the vehicle measures its velocity v and knows its thrust:
 //!
 //! ```text
 //! dv_hat/dt = T/T_h g (R e_z) + a + f_hat + 2w (v - v_hat)  a: known drag; T: thrust behind the rotors' lag
 //! df_hat/dt = w^2 (v - v_hat)                               T_h: learnt hover thrust
 //! ```
 //!
-//! so f_hat is f behind two poles at w. With T over the learnt hover thrust, as in (40), weak rotors are no wind.
+//! f_hat is f behind two poles at w. T is divided by the learnt hover thrust, as in (40), so weak rotors do not look
+//! like wind.
 //!
-//! It is the extended state observer of Han, *From PID to active disturbance rejection control*, IEEE TIE 56(3), 2009,
-//! with both poles at one place, by Gao, *Scaling and bandwidth-parameterization based controller tuning*, ACC 2003, in
-//! the exact discrete form.
+//! This is the extended state observer of Han, *From PID to active disturbance rejection control*, IEEE TIE 56(3),
+//! 2009, with both poles at the same place as in Gao, *Scaling and bandwidth-parameterization based controller tuning*,
+//! ACC 2003, in exact discrete form.
 
 use crate::memory::{Memory, Remembered};
 use afbc_control::Settings;
@@ -22,15 +23,15 @@ use afbc_control::math::{self, max};
 use afbc_types::{Inputs, OutOfRange, Parameters, State, parameters};
 use nalgebra::Vector3;
 
-/// Largest f_hat \[m/s2\]: a wind of some 20 m/s.
+/// Largest f_hat \[m/s2\], that of a wind of some 20 m/s.
 pub const ACCELERATION_MAX_M_S2: f32 = 10.0;
-/// Age of the rates that the observer of moments reckons with, beside the rotors' lag \[s\]: they may be new or 20 ms
+/// Age of the rates that the moment observer assumes, in addition to the rotor lag \[s\]: rates may be new or 20 ms
 /// old.
 pub const AGE_S: f32 = 0.01;
-/// Bandwidth below which what is a jump of the rates does not depend on it \[rad/s\].
+/// Smallest bandwidth used in the jump limit of the rates \[rad/s\].
 const W_MIN_RAD_S: f32 = 1.0;
-/// Largest v - v_hat that is an effect of f, which makes f/(e w) of it at most \[m/s\]; a larger one is a jump of the
-/// state, as after an outage.
+/// Largest v - v_hat that f can cause, at most f/(e w) \[m/s\]. A larger difference is a jump of the state, as after an
+/// outage.
 pub const JUMP_M_S: f32 = 0.1;
 
 parameters! {
@@ -60,7 +61,7 @@ parameters! {
 }
 
 impl DisturbanceObserver {
-    /// Returns the observer of a vehicle that is `slowness` times slower.
+    /// Returns the observer for a vehicle that is `slowness` times slower.
     #[must_use]
     pub(crate) fn slowed(self, slowness: f32, lag_s: f32) -> Self {
         DisturbanceObserver {
@@ -73,13 +74,13 @@ impl DisturbanceObserver {
     }
 }
 
-/// The observer with its constants; everything that changes in flight is in [`ForceObserverMemory`].
+/// Force observer with its constants. Everything that changes in flight is in [`ForceObserverMemory`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ForceObserver {
-    /// Corrections of v_hat \[1\] and f_hat \[1/s\] per step.
+    /// Corrections of v_hat \[1\] and f_hat \[1/s\] per step and velocity difference.
     velocity: f32,
     acceleration: f32,
-    /// Share of the thrust that is replaced per step.
+    /// Share of the filtered thrust that is replaced per step.
     lag: f32,
     dt_s: f32,
     drag: KnownDrag,
@@ -88,30 +89,30 @@ pub struct ForceObserver {
     weight_n: f32,
 }
 
-/// Memory of the observer: v_hat, f_hat along x and y, and T.
+/// Memory of the force observer: v_hat, f_hat along x and y, and T.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ForceObserverMemory {
     velocity_m_s: [f32; 2],
     acceleration_m_s2: [f32; 2],
     thrust_n: f32,
-    /// What has been learnt of the air.
+    /// Learnt relation between velocity and force.
     pub remembered: Remembered,
     /// True if the next velocity is not measured.
     held: bool,
 }
 
 impl ForceObserverMemory {
-    /// Keeps f_hat as it is in the next step.
+    /// Keeps f_hat unchanged in the next step.
     pub fn hold(&mut self) {
         self.held = true;
     }
 }
 
 impl ForceObserver {
-    /// Makes the observer from valid settings for a vehicle; none without a bandwidth.
+    /// Creates the observer from valid settings, `None` if its bandwidth is 0.
     ///
     /// # Errors
-    /// A speed of the memory out of range.
+    /// Returns an error if the speed of the memory is out of range.
     pub fn new(
         settings: &DisturbanceObserver,
         common: &Settings,
@@ -134,8 +135,9 @@ impl ForceObserver {
         }))
     }
 
-    /// Returns f \[m/s2\] of a vehicle in this state with its thrust along `up`: known drag and, along x and y, f_hat,
-    /// which is advanced by one step if the state is `fresh`, and zero of one that `touches` the ground.
+    /// Returns f \[m/s2\] for this state with the thrust along `up`: known drag plus, along x and y, the remembered
+    /// force and f_hat. Advances f_hat by one step if the state is `fresh`. Returns zero while the vehicle `touches`
+    /// the ground.
     #[inline]
     pub fn advance(
         &self,
@@ -153,10 +155,10 @@ impl ForceObserver {
             remembered,
             held: false,
         };
-        // A flight that begins in the air is taken to hover: its rotors give the weight.
+        // A flight that begins in the air is assumed to hover, with a thrust equal to the weight.
         let observed = observed.get_or_insert_with(|| start(self.weight_n, Remembered::default()));
         if touches {
-            // What the rotors do, and what has been learnt of the air, outlast a touch of the ground.
+            // The thrust and the learnt force survive a touch of the ground.
             *observed = start(observed.thrust_n, observed.remembered);
             return Vector3::zeros();
         }
@@ -175,7 +177,7 @@ impl ForceObserver {
         for (((v_hat, f_hat), v), a) in
             velocity_m_s.iter_mut().zip(acceleration_m_s2.iter_mut()).zip(measured).zip(known)
         {
-            // A difference that came about while nothing was measured is no disturbance: f_hat stays.
+            // A difference that arose while the velocity was not measured is no disturbance, so f_hat stays.
             if *held {
                 *v_hat = v;
             } else if fresh {
@@ -195,7 +197,7 @@ impl ForceObserver {
         drag + Vector3::new(x, y, 0.0)
     }
 
-    /// Notes the thrust of all rotors that is commanded in this step \[N\].
+    /// Stores the total thrust commanded in this step \[N\].
     #[inline]
     pub fn give(&self, observed: &mut Option<ForceObserverMemory>, thrust_n: f32) {
         if let Some(observed) = observed {
@@ -204,21 +206,21 @@ impl ForceObserver {
     }
 }
 
-/// The same observer of the body's rates: what turns the vehicle beside its rotors, with g_i of (6).
+/// Observer of the body rates, for moments other than the rotors', with g_i of (6):
 ///
 /// ```text
 /// dOmega_hat/dt = g U + d + f_hat + 2w (Omega - Omega_hat)      U: U1..U3 as carried out, behind the rotors' lag
 /// df_hat/dt     = w^2 (Omega - Omega_hat)
 /// ```
 ///
-/// With f_hat in the place of f, (16) commands what INDI does: the input that was given, and what the acceleration
-/// lacks, each behind the same two poles.
+/// With f_hat in place of f, (16) commands what INDI does: the given input plus the missing acceleration, each behind
+/// the same two poles.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MomentObserver {
-    /// Corrections of Omega_hat \[1\] and f_hat \[1/s\] per step.
+    /// Corrections of Omega_hat \[1\] and f_hat \[1/s\] per step and rate difference.
     rate: Vector3<f32>,
     acceleration: Vector3<f32>,
-    /// Share of the inputs that is replaced per step, and of what is known.
+    /// Shares replaced per step: of the filtered inputs, and of the filtered known acceleration.
     lag: f32,
     age: f32,
     dt_s: f32,
@@ -226,34 +228,34 @@ pub struct MomentObserver {
     effectiveness: Vector3<f32>,
     /// Angular acceleration by a moment per mass \[1/m2\].
     per_moment: Vector3<f32>,
-    /// -1/g of the same.
+    /// -1/g of roll, pitch and yaw.
     ineffectiveness: Vector3<f32>,
-    /// Largest f_hat \[rad/s2\], and largest Omega - Omega_hat that is an effect of it \[rad/s\].
+    /// Largest f_hat \[rad/s2\], and largest Omega - Omega_hat that f_hat can cause \[rad/s\].
     acceleration_max: Vector3<f32>,
     jump: Vector3<f32>,
 }
 
-/// Memory of the observer of moments.
+/// Memory of the moment observer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Turning {
     rates_rad_s: Vector3<f32>,
     acceleration_rad_s2: Vector3<f32>,
-    /// g U \[rad/s2\]
+    /// Angular acceleration g U by the inputs \[rad/s2\].
     given_rad_s2: Vector3<f32>,
-    /// What is known, as old as the rates \[rad/s2\].
+    /// Known angular acceleration, delayed to the age of the rates \[rad/s2\].
     known_rad_s2: Vector3<f32>,
 }
 
 impl MomentObserver {
-    /// Makes the observer from valid settings for a vehicle whose rotors give at most `thrust_max_n` together, advanced
-    /// every `dt_s` seconds; none without a bandwidth.
+    /// Creates the observer from valid settings, for rotors that give at most `thrust_max_n` together, advanced every
+    /// `dt_s` seconds. `None` if both bandwidths are 0.
     pub fn new(settings: &DisturbanceObserver, vehicle: &Parameters, thrust_max_n: f32, dt_s: f32) -> Option<Self> {
         let DisturbanceObserver { disturbance_tilt_rad_s: tilt, disturbance_yaw_rad_s: yaw, .. } = *settings;
         let bandwidth = Vector3::new(tilt, tilt, yaw);
         let rest = bandwidth.map(|w| 1.0 - math::exp(-w * dt_s));
         let lag_s = settings.disturbance_lag_s + AGE_S;
         let effectiveness = vehicle.effectiveness();
-        // As much as the rotors can make up for.
+        // As much as the rotors can compensate.
         let acceleration_max = effectiveness * (0.5 * thrust_max_n);
         (tilt + yaw > 0.0).then(|| MomentObserver {
             rate: rest * 2.0,
@@ -265,14 +267,14 @@ impl MomentObserver {
             per_moment: vehicle.inertia_kg_m2.map(|inertia| vehicle.mass_kg / inertia),
             ineffectiveness: effectiveness.map(|g| -1.0 / g),
             acceleration_max,
-            // A step of f moves Omega - Omega_hat by f t exp(-w t), which is f/(e w) at most.
+            // A step of f moves Omega - Omega_hat by f t exp(-w t), which is at most f/(e w).
             jump: acceleration_max
                 .zip_map(&bandwidth, |most, w| max(most / (core::f32::consts::E * max(w, W_MIN_RAD_S)), 1.0)),
         })
     }
 
-    /// Returns f_hat of roll, pitch and yaw \[rad/s2\] for these rates, beside what is `known` \[rad/s2\], and advances
-    /// it by one step if they are `fresh`; zero of a vehicle that `touches` the ground.
+    /// Returns f_hat of roll, pitch and yaw \[rad/s2\] for these rates, in addition to `known` \[rad/s2\]. Advances
+    /// f_hat by one step if the rates are `fresh`. Returns zero while the vehicle `touches` the ground.
     #[inline]
     pub fn advance(
         &self,
@@ -293,7 +295,8 @@ impl MomentObserver {
             return turning.acceleration_rad_s2;
         }
         let Turning { rates_rad_s: omega_hat, acceleration_rad_s2: f_hat, given_rad_s2: given, known_rad_s2 } = turning;
-        // As old as the rates are taken to be: else every change of what is known would be observed as a moment.
+        // Delayed to the assumed age of the rates; otherwise every change of the known moments would be observed as a
+        // disturbance.
         *known_rad_s2 = (*known_rad_s2 + (known - *known_rad_s2) * self.age).map(math::settled);
         let off = rates_rad_s - *omega_hat;
         let found =
@@ -308,25 +311,24 @@ impl MomentObserver {
         *f_hat
     }
 
-    /// Returns the angular acceleration by a moment per mass \[m2/s2\].
+    /// Returns the angular acceleration \[rad/s2\] by a moment per mass \[m2/s2\].
     #[inline]
     pub fn turns(&self, moment_m2_s2: &Vector3<f32>) -> Vector3<f32> {
         moment_m2_s2.component_mul(&self.per_moment)
     }
 
-    /// Returns U1..U3 \[N\] that make up for an angular acceleration.
+    /// Returns U1..U3 \[N\] that compensate an angular acceleration.
     #[inline]
     pub fn against(&self, acceleration_rad_s2: &Vector3<f32>) -> [f32; 3] {
         acceleration_rad_s2.component_mul(&self.ineffectiveness).into()
     }
 
-    /// Notes U1..U3 that the rotors are commanded to give in this step \[N\], `effort` times as large as for the
-    /// model's rotors.
+    /// Stores U1..U3 commanded in this step \[N\], which are `effort` times as large as for the model's rotors.
     #[inline]
     pub fn give(&self, turning: &mut Option<Turning>, given: &Inputs, effort: f32) {
         if let Some(turning) = turning {
             let given = Vector3::new(given.roll_n, given.pitch_n, given.yaw_n);
-            // What rotors that are known to be weak lack is no moment. effort is bounded away from zero.
+            // Known weakness of the rotors is no moment. `effort` is bounded away from zero.
             let given = given.component_mul(&self.effectiveness) * (1.0 / effort);
             turning.given_rad_s2 =
                 (turning.given_rad_s2 + (given - turning.given_rad_s2) * self.lag).map(math::settled);

@@ -1,22 +1,23 @@
-//! Jerk and snap of the setpoint as rotors can follow them. Not in the paper.
+//! Smooths jumps of the setpoint's jerk so that rotors can follow. Not in the paper.
 //!
-//! A trajectory of minimum jerk turns a corner with a jump of its jerk: roll and pitch would have to begin turning at
-//! once, and the derivatives of (40) say nothing of how. Left to feedback, the turn that is missing becomes an error of
-//! position. So a jump J is taken up by d, along x and y, which decays as the
-//! [command filter](afbc_control::command_filter) of bandwidth w does,
+//! A minimum-jerk trajectory turns a corner with a jump of its jerk. Roll and pitch would have to start turning at
+//! once, and the derivatives of (40) do not contain that jump. If feedback has to supply the missing turn, a position
+//! error results. So a jump J is absorbed by an offset d along x and y, which decays like the [command
+//! filter](afbc_control::command_filter) of bandwidth w:
 //!
 //! ```text
 //! d^2 d/dt^2 = -w^2 d - 2 w dd/dt      dd/dt += J at a jump
 //! ```
 //!
-//! and jerk j - dd/dt and snap s - d^2 d/dt^2 are followed: those of the setpoint, but for a pulse after a corner. No
-//! state enters, and so no noise. A jerk that is never given, as by a link, does not jump.
+//! The law follows the jerk j - dd/dt and the snap s - d^2 d/dt^2, which differ from the setpoint's only in a pulse
+//! after a corner. No measured state is used, so no noise enters. A setpoint source that never sends a jerk, such as a
+//! link, causes no jump.
 
 use afbc_control::command_filter::{CommandFilter, Filtered};
 use afbc_types::{OutOfRange, Setpoint};
 use nalgebra::Vector3;
 
-/// The filter; everything that changes in flight is in [`Followed`].
+/// The filter. Everything that changes in flight is in [`Followed`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Forward {
     filter: CommandFilter,
@@ -24,27 +25,27 @@ pub struct Forward {
     inverse_dt_1_s: f32,
 }
 
-/// What is taken up of jumps.
+/// Memory of the absorbed jumps.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Followed {
     /// d and dd/dt of x and y \[m/s2, m/s3\].
     late: [Filtered; 2],
-    /// The jerk that is expected of the next setpoint \[m/s3\].
+    /// Jerk expected of the next setpoint \[m/s3\].
     expected: [f32; 2],
 }
 
 impl Forward {
-    /// Makes the filter of the given bandwidth \[rad/s\], advanced every `dt_s` seconds.
+    /// Creates the filter with this bandwidth \[rad/s\], advanced every `dt_s` seconds.
     ///
     /// # Errors
-    /// If the bandwidth is out of range.
+    /// Returns an error if the bandwidth is out of range.
     pub fn new(bandwidth_rad_s: f32, dt_s: f32) -> Result<Self, OutOfRange> {
         let filter = CommandFilter::new(bandwidth_rad_s, dt_s)?;
         Ok(Forward { filter, dt_s, inverse_dt_1_s: 1.0 / dt_s })
     }
 
-    /// Returns jerk and snap to follow \[m/s3, m/s4\], those along z unchanged, and advances by one step. In the first
-    /// step nothing jumps.
+    /// Returns the jerk and snap to follow \[m/s3, m/s4\], unchanged along z, and advances the filter by one step. The
+    /// first step sees no jump.
     #[inline(always)]
     pub fn advance(&self, followed: &mut Option<Followed>, setpoint: &Setpoint) -> [Vector3<f32>; 2] {
         let (mut jerk, mut snap) = (setpoint.jerk_m_s3, setpoint.snap_m_s4);

@@ -1,5 +1,5 @@
-//! AFBC under its [monitor](crate::monitor). When the monitor trips, [integral backstepping](crate::integral) takes
-//! over with the last inputs; AFBC is engaged again on command only.
+//! AFBC with a [monitor](crate::monitor). When the monitor trips, [integral backstepping](crate::integral) takes over
+//! with the last inputs. Only a command engages AFBC again.
 
 use crate::adaptive::{self, Adaptive, AdaptiveEstimate};
 use crate::cascade::{Cascade, Controller, LastStep, Settings};
@@ -11,15 +11,15 @@ use crate::trip::Trip;
 use afbc_control::{Action, Errors, FlightController, Mixer, Trace};
 use afbc_types::{Airframe, Axis, OutOfRange, PerAxis, Range, Setpoint, State};
 
-/// Smallest Theta_max of z, in weights. With feed-forward, rotors that produce 45 % of their thrust need 1.2 of it on
-/// the rule of hover. Without, nine rules that each hold the weight give |Theta_hat| = 3 weights, and rotors that
-/// produce 60 % of their thrust 5.
+/// Smallest accepted Theta_max of z, in weights. With feed-forward, rotors that give 45 % of their thrust need 1.2
+/// weights on the hover rule. Without feed-forward, nine rules that each hold the weight give |Theta_hat| = 3 weights,
+/// or 5 for rotors that give 60 % of their thrust.
 const fn hover_theta(feed_forward: bool) -> f32 {
     if feed_forward { 1.8 } else { 5.0 }
 }
 
-/// Accepted angular acceleration about body x and y near hover: the gains of the profile `flight` need half of that of
-/// the paper's vehicle, and fail below 60 rad/s2 (`tests/tests/vehicles.rs`).
+/// Accepted angular acceleration about body x and y near hover. The gains of the profile `flight` need half the value
+/// of the paper's vehicle, and fail below 60 rad/s2 (`tests/tests/vehicles.rs`).
 pub const HOVER_AUTHORITY: Range = Range::new("hover_authority_rad_s2", 80.0, 1e9);
 
 /// AFBC with a monitor and a fallback law.
@@ -34,12 +34,12 @@ pub struct Guarded<const N: usize = 4> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct StandIn<const N: usize> {
     cascade: Cascade<Integral>,
-    /// Its last action. Stored here, since returning it would make the compiler build an action in memory on AFBC's
-    /// path, too.
+    /// Last action. Stored here, because returning it would make the compiler build an action in memory on AFBC's path
+    /// too.
     action: Action<N>,
 }
 
-/// Reason for the trip.
+/// Reason and state of a trip.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Tripped {
     trip: Trip,
@@ -53,7 +53,7 @@ pub struct Memory<const N: usize = 4> {
     afbc: Cascade<AdaptiveEstimate>,
     figures: MonitorFigures,
     tripped: Option<Tripped>,
-    /// The fallback law's memory, from its first step on.
+    /// Memory of the fallback law, `None` before its first step.
     stand_in: Option<StandIn<N>>,
 }
 
@@ -63,25 +63,25 @@ impl<const N: usize> Memory<N> {
         &self.figures
     }
 
-    /// Returns AFBC's estimates; zero while the fallback law flies.
+    /// Returns AFBC's estimates, zero while the fallback law flies.
     pub fn estimates(&self) -> PerAxis<AdaptiveEstimate> {
         if self.tripped.is_some() { PerAxis::default() } else { self.afbc.estimates }
     }
 
-    /// Returns why the monitor tripped, while the fallback law flies.
+    /// Returns the reason of the trip while the fallback law flies.
     pub fn trip(&self) -> Option<Trip> {
         self.tripped.map(|tripped| tripped.trip)
     }
 }
 
 impl<const N: usize> Guarded<N> {
-    /// Creates AFBC with these gains, under a monitor with these bounds.
+    /// Creates AFBC with these gains, and a monitor with these bounds.
     ///
     /// # Errors
-    /// The first parameter, setting, gain or bound out of range; also `rotor_force_max_n` if the rotors cannot lift the
-    /// vehicle [with a margin](afbc_control::mixer::HOVER_MARGIN), `theta_max` of z if it leaves no room
-    /// for hover on weak rotors, and [`HOVER_AUTHORITY`] if the rotors turn the vehicle too slowly.
-    // Always: out of line, its result is on the stack of the firmware's start-up twice.
+    /// Returns the first parameter, setting, gain or bound that is out of range. Also returns `rotor_force_max_n` if
+    /// the rotors cannot lift the vehicle [with a margin](afbc_control::mixer::HOVER_MARGIN), `theta_max` of z if it
+    /// leaves no room for a hover on weak rotors, and [`HOVER_AUTHORITY`] if the rotors turn the vehicle too slowly.
+    // Always inlined: otherwise the result would be on the firmware's start-up stack twice.
     #[inline(always)]
     pub fn new(
         vehicle: impl Into<Airframe<N>>,
@@ -95,7 +95,7 @@ impl<const N: usize> Guarded<N> {
         let mixer = settings.common.mixer(vehicle)?;
         mixer.check_hover(weight_n)?;
         let hover = Range {
-            // Rounded up to four decimals: the figure in the error is short, and accepted when it is entered.
+            // Rounded up to four decimals, so that the number in the error is short and is accepted when entered.
             min: libm::ceil(f64::from(hover_theta(settings.feed_forward) * weight_n) * 1e4) / 1e4,
             ..Safeguards::THETAMAX.range
         };
@@ -111,7 +111,8 @@ impl<const N: usize> Guarded<N> {
         })
     }
 
-    /// Runs one step of the fallback law. Its first step initialises it, since the step that trips has no time to.
+    /// Runs one step of the fallback law. The first call initialises it, because the step that trips has no time for
+    /// that.
     #[cold]
     #[inline(never)]
     fn stand_in<'a>(
@@ -132,8 +133,8 @@ impl<const N: usize> Guarded<N> {
         action
     }
 
-    /// Returns `cascade` with estimates for which AFBC continues with the last inputs. With feed-forward, u_a is what
-    /// was learnt by either law, since both give the same known part.
+    /// Returns `cascade` with estimates with which AFBC continues from the last inputs. With feed-forward, u_a becomes
+    /// the learnt part of either law, since both have the same known part.
     fn resumed<E>(
         &self,
         cascade: &Cascade<E>,
@@ -145,7 +146,7 @@ impl<const N: usize> Guarded<N> {
             let x = match axis {
                 Axis::Roll => [eta.x, eta_dot.x],
                 Axis::Pitch => [eta.y, eta_dot.y],
-                // Of yaw; z, x and y do not use it, since their fuzzy inputs are errors.
+                // Only yaw uses this value: the fuzzy inputs of z, x and y are errors.
                 _ => [eta.z, eta_dot.z],
             };
             let errors = &errors[axis];
@@ -156,7 +157,7 @@ impl<const N: usize> Guarded<N> {
             };
             law.resumed(axis, fuzzy, x, errors, self.monitor.theta_start(axis))
         });
-        // AFBC does not use it.
+        // AFBC does not use the rotor residual.
         cascade.handed_over(estimates, 0.0)
     }
 }
@@ -179,18 +180,18 @@ impl<const N: usize> FlightController<N> for Guarded<N> {
             return *self.stand_in(stand_in, (afbc, tripped), (state, setpoint), fresh);
         }
         let action = self.adaptive.cascade(afbc, state, setpoint, fresh);
-        // On the ground a law may demand negative thrust indefinitely.
+        // On the ground a law may demand negative thrust forever, so the monitor is off.
         if !self.adaptive.stands(afbc)
             && let Some(trip) = self.monitor.watch(figures, afbc, action.health.saturated)
         {
             let rotor_residual_rad_s = self.adaptive.mixer().residual_rad_s(&action.speeds);
-            // AFBC's action is flown once more: a tick has no time for a step of both laws.
+            // AFBC's action is used once more: a tick has no time for a step of both laws.
             *tripped = Some(Tripped { trip, rotor_residual_rad_s });
         }
         action
     }
 
-    // A law that has tripped and not yet handed over hands on what it is told.
+    // Until the fallback law's first step, AFBC's memory takes these notices and hands them over.
     fn on_ground(&self, memory: &mut Memory<N>) {
         match &mut memory.stand_in {
             Some(stand_in) => self.fallback.on_ground(&mut stand_in.cascade),
@@ -218,7 +219,7 @@ impl<const N: usize> FlightController<N> for Guarded<N> {
             Some(StandIn { cascade, .. }) => self.resumed(cascade, |_, _, _, integral| integral.value),
             None => self.resumed(afbc, |axis, x, errors, own| self.adaptive.law().fuzzy(axis, x, errors, own)),
         };
-        // With new figures: an average that has tripped is still beyond its bound.
+        // With new figures, because a mean that has tripped is still beyond its bound.
         *memory = Memory { afbc, ..Memory::default() };
         true
     }

@@ -1,5 +1,5 @@
-//! Backstepping with integral action: the fixed-gain fallback law for AFBC after a trip of the
-//! [monitor](crate::monitor).
+//! Backstepping with integral action: the fixed-gain fallback law after the [monitor](crate::monitor) has switched off
+//! AFBC.
 //!
 //! ```text
 //! u = u*_eq + alpha_2 e_2 + i        di/dt = kappa e_2,  |i| <= i_max
@@ -22,9 +22,9 @@ use afbc_types::{Axis, Declared, OutOfRange, Parameters, PerAxis};
 pub struct Gains {
     /// alpha_1, alpha_2.
     pub backstepping: backstepping::Gains,
-    /// kappa, in the range of AFBC's gamma.
+    /// kappa, with the range of AFBC's gamma.
     pub integral: f32,
-    /// i_max in the subsystem's input, in the range of AFBC's theta_max.
+    /// i_max in the unit of the subsystem's input, with the range of AFBC's theta_max.
     pub integral_max: f32,
 }
 
@@ -40,9 +40,9 @@ impl From<&adaptive::Gains> for Gains {
 pub struct Integral {
     /// The integral i.
     pub value: f32,
-    /// Input to continue with: the next step chooses i for it.
+    /// Input to continue with; the next step chooses i accordingly.
     pub resume: Option<f32>,
-    /// For z: hover thrust U4 that AFBC estimated before the trip \[N\].
+    /// For z: the hover thrust U4 that AFBC had estimated before the trip \[N\].
     pub hover_thrust_n: Option<f32>,
 }
 
@@ -57,7 +57,7 @@ impl IntegralBackstepping {
     /// Creates the law for a vehicle with these nominal parameters.
     ///
     /// # Errors
-    /// The first parameter or gain out of range.
+    /// Returns the first parameter or gain that is out of range.
     pub fn new(vehicle: &Parameters, gains: PerAxis<Gains>) -> Result<Self, OutOfRange> {
         vehicle.validate()?;
         for axis in Axis::ALL {
@@ -82,7 +82,7 @@ impl Law for IntegralBackstepping {
         if let Some(input) = integral.resume.take() {
             integral.value = input - fixed;
         }
-        // Bounded where it is used, since an input to resume may ask for more than the bound, too.
+        // Limited where it is used, because the input to resume may also ask for more than the bound.
         let i = math::min(math::max(integral.value, -integral_max), *integral_max);
         let winds_up = errors.e2 * context.unallocated[axis] > 0.0;
         integral.value = if context.adapt && !winds_up { i + kappa * errors.e2 * context.dt_s } else { i };

@@ -5,7 +5,7 @@ use afbc_control::Errors;
 use afbc_types::{Axis, PerAxis, State};
 use nalgebra::Vector3;
 
-/// Computes a subsystem's input from its errors. AFBC and the baseline differ in this only.
+/// Computes a subsystem's input from its errors. AFBC, its fallback and the baseline differ only in this trait.
 pub trait Law {
     /// True if the law uses [`Context::rotor_residual_rad_s`].
     const USES_ROTOR_RESIDUAL: bool = true;
@@ -21,13 +21,13 @@ pub trait Law {
     fn input(&self, axis: Axis, tracking: &Tracking, context: &Context, estimate: &mut Self::Estimate)
     -> (f32, Errors);
 
-    /// Returns the speed of approach per error e_1 \[1/s\] at which the law holds a constant error.
+    /// Returns the approach speed per error e_1 \[1/s\] at which the law keeps that speed for a constant error.
     fn approach(&self, axis: Axis, known: Option<&ModelConstants>) -> f32;
 
-    /// Initialises the estimates for a start in flight, for a vehicle of this weight.
+    /// Initialises the estimates for a start in flight with this weight.
     fn start(&self, _estimates: &mut PerAxis<Self::Estimate>, _weight_n: f32) {}
 
-    /// Returns the hover thrust U4 \[N\] by the estimate of the z subsystem; the weight for a law without an estimate.
+    /// Returns the hover thrust U4 \[N\] from the estimate of z, or the weight for a law without an estimate.
     fn hover_thrust_n(&self, _z: &Self::Estimate, weight_n: f32, _known_n: f32) -> f32 {
         weight_n
     }
@@ -38,32 +38,32 @@ pub trait Law {
 pub struct Context<'a> {
     /// State used in the step.
     pub state: &'a State,
-    /// Its roll and pitch.
+    /// Sines and cosines of roll and pitch in `state`.
     pub roll_pitch: RollPitch,
-    /// omega of (6), as last commanded \[rad/s\].
+    /// omega of (6) as last commanded \[rad/s\].
     pub rotor_residual_rad_s: f32,
     /// Time step \[s\].
     pub dt_s: f32,
     /// False if estimates must not change.
     pub adapt: bool,
-    /// Part of each subsystem's input that could not be allocated in the last step; zero without anti-windup.
+    /// Part of each subsystem's input that the last step could not allocate; zero without anti-windup.
     pub unallocated: &'a PerAxis<f32>,
-    /// f of x, y and z by drag and, of x and y, as observed by [`crate::disturbance`] \[m/s2\]; zero without an
+    /// f of x, y and z \[m/s2\]: drag, plus for x and y the observed part ([`crate::disturbance`]). Zero without an
     /// observer.
     pub observed_m_s2: Vector3<f32>,
-    /// Nominal model that the law may use; none for the law as printed.
+    /// Nominal model for feed-forward, `None` for the law as printed.
     pub known: Option<&'a ModelConstants>,
 }
 
 impl Context<'_> {
-    /// Returns f, g and dg/dt of a subsystem by `model` in this step.
+    /// Returns f, g and dg/dt of a subsystem from `model` in this step.
     #[inline]
     pub(crate) fn dynamics(&self, model: &ModelConstants, axis: Axis) -> Dynamics {
         model.dynamics_at(axis, &self.state.rates_rad_s, &self.roll_pitch, self.rotor_residual_rad_s)
     }
 
-    /// Returns the same, with f of x, y and z as observed. What is observed of roll, pitch and yaw is made up for
-    /// behind the law.
+    /// Returns f, g and dg/dt with the observed f of x, y and z. The observed moments of roll, pitch and yaw are
+    /// compensated after the law.
     #[inline(always)]
     pub(crate) fn observed(&self, model: &ModelConstants, axis: Axis) -> Dynamics {
         let dynamics = self.dynamics(model, axis);
@@ -72,7 +72,7 @@ impl Context<'_> {
             Axis::X => Dynamics { f: x, ..dynamics },
             Axis::Y => Dynamics { f: y, ..dynamics },
             Axis::Roll | Axis::Pitch | Axis::Yaw => dynamics,
-            // f of z is gravity by the model, which stays; f of x and y is zero there.
+            // The model's f of z is gravity, which stays. Its f of x and y is zero.
             Axis::Z => Dynamics { f: dynamics.f + z, ..dynamics },
         }
     }
@@ -91,13 +91,13 @@ pub struct Tracking {
     pub x1d_dot: f32,
     /// d^2 x_1d/dt^2
     pub x1d_ddot: f32,
-    /// Speed of approach per e_1 \[1/s\] while the speed limit keeps e_1 below the distance.
+    /// Approach speed per e_1 \[1/s\] if the speed limit has cut e_1; otherwise `None`.
     pub approach_1_s: Option<f32>,
 }
 
 impl Tracking {
-    /// Returns (9), (12): e_2 = d x_1d/dt + alpha_1 e_1 - x_2; at the speed limit with the speed of approach for
-    /// alpha_1, so that e_2 and what is learnt from it are zero at that speed.
+    /// Returns (9) and (12): e_2 = d x_1d/dt + alpha_1 e_1 - x_2. At the speed limit, the approach speed per error
+    /// replaces alpha_1, so that e_2 and the adaptation are zero at that speed.
     #[inline]
     pub fn errors(&self, alpha1: f32) -> Errors {
         let Tracking { e1, x1d_dot, x2, approach_1_s, .. } = *self;

@@ -1,5 +1,5 @@
-//! Adaptive fuzzy backstepping control (AFBC) of a quadrotor, after Yacef, Bouhali and Hamerlain, and the classical
-//! backstepping law that is its baseline.
+//! Adaptive fuzzy backstepping control (AFBC) of a quadrotor, after Yacef, Bouhali and Hamerlain, and its baseline,
+//! classical backstepping.
 //!
 //! [`afbc_types`] defines frames, units and the meaning of "(n)"; `docs/paper.md` lists corrections to the paper.
 //!
@@ -15,10 +15,10 @@
 //!
 //! # Properties
 //!
-//! Parameters are checked when a [`Controller`] is built, with errors that name them. After that a step cannot fail,
-//! allocate or panic, has no loop whose length depends on its inputs, and gives the same bits on host and target: all
-//! mathematics comes from [`afbc_control::math`]. Its branches, and so its duration, depend on the inputs: limits,
-//! projection, saturated rotors and the monitor take time only when they act.
+//! Creating a [`Controller`] checks all parameters, and its errors name them. After that a step cannot fail, allocate
+//! or panic. No loop depends on its inputs, and host and target give the same bits, because all mathematics comes from
+//! [`afbc_control::math`]. The branches, and so the duration, depend on the inputs: limits, projection, saturated
+//! rotors and the monitor take time only when they act.
 //!
 //! ```
 //! use afbc::{Adaptive, Controller, Profile};

@@ -1,4 +1,4 @@
-//! Limits of the cascade on the demands of position control. Not in the paper.
+//! Limits on the demands of position control. Not in the paper.
 
 use crate::law::Tracking;
 use afbc_control::command_filter::RATE_MAX;
@@ -33,23 +33,23 @@ impl Limits {
     pub const NONE: Self = Self::DEFAULT;
 }
 
-/// Speed limit of x, y or z: an error of position is no larger than the one that demands the largest speed.
+/// Speed limit of x, y or z: cuts the position error to the one that demands the largest speed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Approach {
     /// Largest e_1 \[m\].
     e1_max_m: f32,
-    /// Speed of approach per e_1 \[1/s\].
+    /// Approach speed per e_1 \[1/s\].
     approach_1_s: f32,
 }
 
 impl Approach {
-    /// Limits the speed of approach of a law that approaches at `approach_1_s` times the error.
+    /// Creates the speed limit for a law with an approach speed of `approach_1_s` times the error.
     pub fn new(speed_max_m_s: f32, approach_1_s: f32) -> Self {
         // A law that does not approach has no limit: the quotient is infinite.
         Approach { e1_max_m: speed_max_m_s / approach_1_s, approach_1_s }
     }
 
-    /// Returns what the law tracks, at x_1, x_2, of the reference with two derivatives: (9) within the limit.
+    /// Returns state, reference and error (9) for the law, with the error cut at the limit.
     #[inline(always)]
     pub fn tracking(&self, [x1, x2]: [f32; 2], [x1d, x1d_dot, x1d_ddot]: [f32; 3]) -> Tracking {
         let distance = x1d - x1;

@@ -1,16 +1,16 @@
-//! Memory of the air: a fuzzy system over the velocity, which keeps what the observer has found for the next time the
-//! vehicle flies as fast. Not in the paper, whose fuzzy systems over errors forget when the error does.
+//! Memory of the air: a fuzzy system over the velocity that keeps the observer's findings for the next flight at the
+//! same velocity. Not in the paper, whose fuzzy systems over errors forget when the error vanishes.
 //!
 //! ```text
 //! f = Theta' w(v_x, v_y) + f_hat        dTheta/dt = gamma f_hat w(v_x, v_y),  |Theta_j| <= Theta_max
 //! ```
 //!
-//! of x and of y, nine rules each, as (22) and (34) with the prediction's error in the place of e_2: f_hat is what the
-//! observer, which knows of the memory, still lacks. With f = Theta*' w and f_hat behind the observer's poles, which
-//! are far faster than gamma, V = |Theta* - Theta|^2/2 gamma falls by (Theta* - Theta)' w f_hat, about f_hat^2. The
-//! part of composite adaptation that learns from prediction: Slotine and Li, *Composite adaptive control of robot
+//! x and y have nine rules each, as in (22) and (34) with the prediction error in place of e_2: f_hat is what the
+//! memory still lacks, because the observer knows the memory. With f = Theta*' w, and f_hat behind the observer's poles
+//! (much faster than gamma), V = |Theta* - Theta|^2/2 gamma falls by (Theta* - Theta)' w f_hat, about f_hat^2. This is
+//! the part of composite adaptation that learns from prediction: Slotine and Li, *Composite adaptive control of robot
 //! manipulators*, Automatica 25(4), 1989; used so by O'Connell et al., *Neural-Fly*, Science Robotics 7(66), 2022. The
-//! other part, from e_2, stays with the fuzzy systems over the errors: the observer would undo it here.
+//! part that learns from e_2 stays in the fuzzy systems over the errors; here the observer would undo it.
 
 use crate::fuzzy::{Basis, Firing, Membership};
 use afbc_control::math;
@@ -19,18 +19,18 @@ use nalgebra::Matrix3;
 
 /// Largest |Theta_j| \[m/s2\].
 pub const THETA_MAX_M_S2: f32 = 10.0;
-/// Width of the Gaussians over their distance.
+/// Width of the Gaussians divided by their distance.
 const WIDTH: f32 = 0.6;
 
-/// The memory with its constants; what it has learnt is [`Remembered`].
+/// Memory with its constants. The learnt parameters are in [`Remembered`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Memory {
     basis: Basis,
-    /// gamma times the step.
+    /// gamma times the time step.
     share: f32,
 }
 
-/// Theta of x and of y \[m/s2\].
+/// Learnt parameters Theta of x and y \[m/s2\].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Remembered {
     /// Theta.
@@ -38,11 +38,11 @@ pub struct Remembered {
 }
 
 impl Memory {
-    /// Makes the memory that learns with `gamma_1_s`, valid, in steps of `dt_s`, with rules for a speed of `speed_m_s`
-    /// along each axis; none without gamma.
+    /// Creates the memory with the rate `gamma_1_s` (valid), the step `dt_s` and outer rules at `speed_m_s` along each
+    /// axis. `None` if gamma is 0.
     ///
     /// # Errors
-    /// A speed out of range.
+    /// Returns an error if the speed is out of range.
     pub fn new(gamma_1_s: f32, speed_m_s: f32, dt_s: f32) -> Result<Option<Self>, OutOfRange> {
         let basis = Basis::new(Membership { centre: speed_m_s, width: WIDTH * speed_m_s })?;
         Ok((gamma_1_s > 0.0).then_some(Memory { basis, share: gamma_1_s * dt_s }))
@@ -60,7 +60,7 @@ impl Memory {
     pub fn learn(&self, remembered: &mut Remembered, weights: &Matrix3<f32>, f_hat_m_s2: [f32; 2]) {
         for (theta, f_hat) in remembered.theta.iter_mut().zip(f_hat_m_s2) {
             *theta = (*theta + weights * (self.share * f_hat)).map(math::settled);
-            // None is beyond its bound if all together are within it, which is one comparison.
+            // If the norm is within the bound, so is every element: one comparison is enough.
             if theta.norm_squared() <= THETA_MAX_M_S2 * THETA_MAX_M_S2 {
                 continue;
             }

@@ -1,10 +1,10 @@
-//! The nominal model (7) that the baseline inverts: f_i, g_i without disturbances (A_F = A_T = 0).
+//! Nominal model (7) for the baseline and the feed-forward: f_i and g_i without disturbances (A_F = A_T = 0).
 
 use afbc_control::{Errors, math};
 use afbc_types::{Axis, Parameters, State};
 use nalgebra::{Matrix3, Vector3};
 
-/// d x_2/dt = f + g u of one subsystem, and dg/dt.
+/// Terms of d x_2/dt = f + g u of one subsystem, and dg/dt.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Dynamics {
     /// f_i \[m/s2 or rad/s2\].
@@ -15,11 +15,11 @@ pub struct Dynamics {
     pub g_dot: f32,
 }
 
-/// Smallest cos(phi) cos(theta) for computing g_4, and cos(theta) for d eta/dt: a tilt of 84 degrees. Not in the paper,
+/// Smallest cos(phi) cos(theta) in g_4, and smallest cos(theta) in d eta/dt: a tilt of 84 degrees. Not in the paper,
 /// which assumes A3 instead.
 pub const TILT_COSINE_MIN: f32 = 0.1;
 
-/// Sines and cosines of roll and pitch, which a step computes once.
+/// Sines and cosines of roll and pitch, computed once per step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RollPitch {
     sin_phi: f32,
@@ -29,7 +29,7 @@ pub struct RollPitch {
 }
 
 impl RollPitch {
-    /// Computes them for a state.
+    /// Computes sines and cosines for a state.
     #[inline(always)]
     pub fn new(state: &State) -> Self {
         RollPitch::of(state.attitude_rad.x, state.attitude_rad.y)
@@ -41,7 +41,7 @@ impl RollPitch {
         self.cos_phi * self.cos_theta
     }
 
-    /// Computes them for these angles.
+    /// Computes sines and cosines for these angles.
     #[inline(always)]
     pub(crate) fn of(phi: f32, theta: f32) -> Self {
         RollPitch {
@@ -69,7 +69,7 @@ impl RollPitch {
         )
     }
 
-    /// Returns Omega for d eta/dt.
+    /// Returns the body rates Omega for d eta/dt.
     #[inline(always)]
     pub(crate) fn body_rates(&self, eta_dot: &Vector3<f32>) -> Vector3<f32> {
         let RollPitch { sin_phi, cos_phi, sin_theta, cos_theta } = *self;
@@ -86,7 +86,7 @@ impl RollPitch {
         eta_dot: &Vector3<f32>,
         eta_ddot: &Vector3<f32>,
     ) -> Vector3<f32> {
-        // The body turns by d phi/dt about its own x, and y and z turn with it; d theta/dt turns psi's axis.
+        // d phi/dt turns the body about its own x, and y and z with it; d theta/dt turns the axis of psi.
         let RollPitch { sin_phi, cos_phi, sin_theta, cos_theta } = *self;
         let [phi, theta, psi] = (*eta_dot).into();
         let turned = theta * psi;
@@ -99,12 +99,12 @@ impl RollPitch {
     }
 }
 
-/// Attitude of the vehicle in one step, with what a step computes of it once.
+/// Attitude of the vehicle in one step, with derived quantities that are computed once.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Attitude {
     /// phi, theta \[rad\].
     pub roll_pitch_rad: [f32; 2],
-    /// Their sines and cosines.
+    /// Sines and cosines of phi and theta.
     pub roll_pitch: RollPitch,
     /// Sine and cosine of psi.
     pub heading: [f32; 2],
@@ -113,7 +113,7 @@ pub struct Attitude {
 }
 
 impl Attitude {
-    /// Computes it for a state.
+    /// Computes the attitude for a state.
     #[inline(always)]
     pub fn of(state: &State) -> Self {
         let [phi, theta, psi] = state.attitude_rad.into();
@@ -128,14 +128,14 @@ impl Attitude {
         self.r_earth_body.column(2).into()
     }
 
-    /// Returns a vector of the earth's axes in those of the body.
+    /// Returns an earth frame vector in body axes.
     #[inline(always)]
     pub fn in_body(&self, earth: &Vector3<f32>) -> Vector3<f32> {
         self.r_earth_body.tr_mul(earth)
     }
 }
 
-/// Returns d eta/dt for the rates of the body, which (6) takes for equal:
+/// Returns d eta/dt for the body rates. (6) takes both for equal.
 ///
 /// ```text
 /// d psi/dt = (q sin phi + r cos phi) / cos theta
@@ -173,7 +173,7 @@ impl ModelConstants {
         let effectiveness = vehicle.effectiveness();
         ModelConstants {
             a1: (iy - iz) / ix,
-            // Rotors that push to positive yaw spin negatively, which gives a_2 and a_4 their signs.
+            // Rotors that push to positive yaw spin negatively, hence the signs of a_2 and a_4.
             a2: rotor_inertia_kg_m2 / ix,
             a3: (iz - ix) / iy,
             a4: -rotor_inertia_kg_m2 / iy,
@@ -203,14 +203,15 @@ impl ModelConstants {
     }
 
     /// Returns the computable terms of a subsystem's Lyapunov function (14), (27): e_1^2 / 2 + e_2^2 / (2 g_i), with
-    /// the paper's weight c = 1 of e_1. The terms of the estimates' errors are left out, since the optimal values are
+    /// the paper's weight c = 1 of e_1. The terms of the estimation errors are left out, because the optimal values are
     /// unknown.
     pub fn lyapunov(&self, axis: Axis, state: &State, errors: &Errors) -> f32 {
         // g_i does not depend on the rotors.
         0.5 * errors.e1 * errors.e1 + 0.5 * errors.e2 * errors.e2 / self.dynamics(axis, state, 0.0).g
     }
 
-    /// Returns f of roll, pitch and yaw \[rad/s2\]: how a body with these rates, and its rotors, turn without a moment.
+    /// Returns f of roll, pitch and yaw \[rad/s2\]: the gyroscopic angular acceleration of body and rotors without any
+    /// moment.
     #[inline(always)]
     pub(crate) fn gyroscopic(&self, rates: &Vector3<f32>, omega: f32) -> Vector3<f32> {
         Vector3::new(
@@ -220,7 +221,7 @@ impl ModelConstants {
         )
     }
 
-    /// Returns the same as [`ModelConstants::dynamics`], for given rates and angles.
+    /// Returns f_i, g_i and dg_i/dt like [`ModelConstants::dynamics`], for given rates and angles.
     #[inline(always)]
     pub(crate) fn dynamics_at(&self, axis: Axis, rates: &Vector3<f32>, at: &RollPitch, omega: f32) -> Dynamics {
         let constant = |f, g| Dynamics { f, g, g_dot: 0.0 };

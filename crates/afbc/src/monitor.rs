@@ -1,4 +1,4 @@
-//! Monitor of AFBC, which trips when its estimates, errors or inputs leave their bounds. Not in the paper.
+//! Monitor of AFBC: trips when estimates, errors or inputs leave their bounds. Not in the paper.
 //!
 //! | figure | of | trips beyond |
 //! |---|---|---|
@@ -7,11 +7,11 @@
 //! | share of steps with a saturated rotor, over 1 s | all | [`Bounds::saturation_share`] |
 //! | reversals of U1..U4 by more than [`Bounds::swing_n`], per second | each input | [`Bounds::swings_hz`] |
 //!
-//! The last is the limit-cycle detector: it counts turning points of the input that are further apart than a threshold.
-//! So it detects chatter between steps as well as slow oscillations, but neither manoeuvres nor smaller noise. Of U3 it
-//! looks at what the vehicle can follow, the mean of six steps behind two low-passes of [`FOLLOWS_RAD_S`]: rotors have
-//! little effect about yaw, so that their vibration, of 25 Hz and more, becomes inputs of the vehicle's weight, which
-//! do not turn it. A law that oscillates about yaw does so below 15 Hz, since the rotors need a time to follow.
+//! The last row detects limit cycles: it counts turning points of an input that are further apart than a threshold. It
+//! finds chatter between steps and slow oscillations, but ignores manoeuvres and smaller noise. Of U3 it counts only
+//! what the vehicle can follow: the mean over six steps after two low-passes of [`FOLLOWS_RAD_S`]. Rotors have little
+//! effect about yaw, so their vibration of 25 Hz and more causes U3 as large as the weight without turning the vehicle.
+//! A law that oscillates about yaw does so below 15 Hz, because of the rotor lag.
 //!
 //! Norms, errors, U3 and rates are updated for one subsystem per step, so each is at most six steps old.
 
@@ -24,17 +24,16 @@ use afbc_types::{Axis, Declared, OutOfRange, Parameters, PerAxis, parameters};
 /// Time over which figures are averaged \[s\].
 pub const WINDOW_S: f32 = 1.0;
 
-/// Corner of the low-passes behind which U3 is looked at \[rad/s\], that of a rotor's lag of 16 ms: quicker changes of
-/// U3 turn no vehicle.
+/// Corner of the low-passes on U3 \[rad/s\], that of a rotor lag of 16 ms: faster changes of U3 do not turn a vehicle.
 pub const FOLLOWS_RAD_S: f32 = 63.0;
 
-/// Steps in which each subsystem is looked at once.
+/// Number of steps in which each subsystem is checked once.
 const ROUND: f32 = 6.0;
 
-/// Largest |Theta_hat| as a share of what carries the vehicle: of the weight for U1..U4, of g for u5, u6.
+/// Largest |Theta_hat| as a share of what carries the vehicle: the weight for U1..U4, g for u5, u6.
 pub const TRIM_SHARE: PerAxis<f32> = PerAxis { roll: 0.75, pitch: 0.75, yaw: 2.2, z: 1.6, x: 2.2, y: 2.2 };
 
-/// Share of its projection's bound that |Theta_hat| must stay below.
+/// Largest |Theta_hat| as a share of its projection's bound.
 const THETA_SHARE: f32 = 0.95;
 
 parameters! {
@@ -64,10 +63,10 @@ parameters! {
 }
 
 impl Bounds {
-    /// Computes bounds for a law with these gains and settings on this vehicle, whose parameters must be valid:
-    /// estimates that are about to rely on their projection, and a limit cycle of half the weight. (With a fifth, noise
-    /// of 20 mrad/s alone would give too many reversals of U3.) With feed-forward, estimates are what the model does
-    /// not know, zero in a nominal hover, and bounded to [`TRIM_SHARE`] of what carries the vehicle, too.
+    /// Computes bounds for a law with these gains and settings on this vehicle, whose parameters must be valid. They
+    /// trip when an estimate is about to reach its projection, and at a limit cycle of half the weight. (With a fifth
+    /// of the weight, noise of 20 mrad/s alone would cause too many reversals of U3.) With feed-forward the estimates
+    /// are zero in a nominal hover, so they are also bounded to [`TRIM_SHARE`].
     pub fn new(gains: &PerAxis<adaptive::Gains>, vehicle: &Parameters, settings: &Settings) -> Self {
         let weight_n = vehicle.weight_n();
         let theta = |axis: Axis| {
@@ -77,7 +76,7 @@ impl Bounds {
         };
         Bounds {
             theta: PerAxis::from_fn(theta),
-            // Projection normally holds delta_hat at its bound; beyond it projection has failed.
+            // Projection normally keeps delta_hat within its bound, so a larger value means that projection has failed.
             delta: PerAxis::from_fn(|axis| 1.001 * gains[axis].safeguards.delta_max),
             swing_n: 0.5 * weight_n,
             ..Self::DEFAULT
@@ -97,7 +96,7 @@ pub struct Norm {
 /// Detector of turning points of one input.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Swing {
-    /// Extreme value in the present direction \[N\].
+    /// Extreme value since the last turning point \[N\].
     extreme: f32,
     /// Present direction: 1 or -1.
     direction: f32,
@@ -112,7 +111,7 @@ impl Default for Swing {
 }
 
 impl Swing {
-    /// Counts a reversal by more than `least`, if this input is one.
+    /// Counts a reversal by more than `least` if this input is one.
     #[inline]
     fn advance(&mut self, input: f32, least: f32) {
         let onward = (input - self.extreme) * self.direction;
@@ -121,12 +120,12 @@ impl Swing {
         } else if onward < -least {
             self.extreme = input;
             self.direction = -self.direction;
-            // It decays at 1/WINDOW_S: n such steps a second settle at n.
+            // `rate_hz` decays at 1/WINDOW_S, so n such increments per second settle at n.
             self.rate_hz += 1.0 / WINDOW_S;
         }
     }
 
-    /// Forgets this share of the reversals; returns how many a second are left.
+    /// Lets this share of the reversals decay; returns the remaining reversals per second.
     #[inline]
     fn forget(&mut self, share: f32) -> f32 {
         self.rate_hz = math::settled(self.rate_hz - share * self.rate_hz);
@@ -134,17 +133,17 @@ impl Swing {
     }
 }
 
-/// The part of an input that a vehicle can follow: the mean of a round behind two low-passes.
+/// Part of an input that the vehicle can follow: the mean over a round after two low-passes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Followed {
     /// Sum of the inputs since the last round \[N\].
     sum_n: f32,
-    /// Input behind one low-pass and behind both \[N\].
+    /// Input after one low-pass and after both \[N\].
     passed_n: [f32; 2],
 }
 
 impl Followed {
-    /// Ends a round, of whose mean this share is followed; returns what was followed so far \[N\].
+    /// Ends a round; its mean enters the low-passes with this share. Returns the output \[N\].
     #[inline]
     fn end_round(&mut self, share: f32) -> f32 {
         let mean = self.sum_n * (1.0 / ROUND);
@@ -156,7 +155,7 @@ impl Followed {
     }
 }
 
-/// Present figures of the monitor.
+/// Figures of the monitor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MonitorFigures {
     /// Norms of the estimates.
@@ -167,7 +166,7 @@ pub struct MonitorFigures {
     pub saturation_share: f32,
     /// Detectors of U1, U2, U3, U4.
     pub swings: [Swing; 4],
-    /// The part of U3 that the vehicle can follow.
+    /// Part of U3 that the vehicle can follow.
     yaw: Followed,
     /// Subsystem updated last.
     axis: Axis,
@@ -181,7 +180,7 @@ impl Default for MonitorFigures {
             saturation_share: 0.0,
             swings: [Swing::default(); 4],
             yaw: Followed::default(),
-            // The last of the round: the first step updates roll.
+            // The last subsystem of a round, so that the first step updates roll.
             axis: Axis::Y,
         }
     }
@@ -195,14 +194,14 @@ impl MonitorFigures {
     }
 }
 
-/// A monitor. Constant; everything that changes in flight is in [`MonitorFigures`].
+/// Monitor with its constants. Everything that changes in flight is in [`MonitorFigures`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Monitor {
     bounds: Bounds,
     theta_squared: PerAxis<f32>,
-    /// Share of an average that is replaced per step.
+    /// Share of a mean that is replaced per step.
     forget: f32,
-    /// Share of U3 that is followed in a round.
+    /// Share of the low-passes on U3 that is replaced per round.
     follow: f32,
 }
 
@@ -210,7 +209,7 @@ impl Monitor {
     /// Creates a monitor that is called every `dt_s` seconds (valid in [`afbc_control::Settings::DT`]).
     ///
     /// # Errors
-    /// The first bound out of range.
+    /// Returns the first bound that is out of range.
     pub fn new(bounds: Bounds, dt_s: f32) -> Result<Self, OutOfRange> {
         bounds.validate()?;
         Ok(Monitor {
@@ -221,12 +220,12 @@ impl Monitor {
         })
     }
 
-    /// Returns the largest |Theta_hat| to start with, which leaves room for adaptation.
+    /// Returns the largest |Theta_hat| for a restart, which leaves room for adaptation.
     pub(crate) fn theta_start(&self, axis: Axis) -> f32 {
         0.75 * self.bounds.theta[axis]
     }
 
-    /// Processes one step; returns why the monitor trips, if it does.
+    /// Processes one step; returns the reason if the monitor trips.
     #[inline]
     pub fn watch(
         &self,
@@ -260,7 +259,7 @@ impl Monitor {
             Axis::Pitch => Some(pitch),
             Axis::Yaw => Some(yaw),
             Axis::Z => Some(thrust),
-            // It has no input of its own: U3's round ends in its step.
+            // X has no input of its own, so the round of U3 ends in its step.
             Axis::X => {
                 yaw.advance(figures.yaw.end_round(self.follow), swing_n);
                 None

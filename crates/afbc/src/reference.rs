@@ -1,17 +1,17 @@
-//! Reference model: turns jumps of the setpoint into motion that the vehicle can follow, so that the error of a step is
-//! not learnt as a disturbance. Not in the paper.
+//! Reference model: smooths jumps of the setpoint into motion that the vehicle can follow, so that the error of a step
+//! is not learnt as a disturbance. Not in the paper.
 //!
-//! The law tracks x_1d = setpoint + d. The detour d takes up every jump of the setpoint, in position and in velocity,
-//! and decays by
+//! The law tracks x_1d = setpoint + d. The detour d absorbs every jump of the setpoint in position and velocity, and
+//! decays by
 //!
 //! ```text
 //! d^3 d/dt^3 = 3w (a_c - d^2 d/dt^2)     a_c = sat(w (v_c - dd/dt), a_max)     v_c = -sat(w/3 d, v_max)
 //! ```
 //!
-//! which is (s + w)^3 d = 0 within the limits; further away, v_c leaves half of a_max for braking. A setpoint that
-//! moves as its derivatives say does not jump: it is tracked as it is, and nothing is added to it. Of a jump, the
-//! detour takes only the part that keeps the reference nearer to the vehicle: after an interruption in which the
-//! vehicle went on, the reference goes on, too.
+//! which is (s + w)^3 d = 0 within the limits. Further away, v_c leaves half of a_max for braking. A setpoint that
+//! moves consistently with its derivatives does not jump, and is tracked unchanged. Of a jump, the detour absorbs only
+//! the part that keeps the reference nearer to the vehicle. So after an interruption in which vehicle and setpoint
+//! moved on, the reference moves on too.
 //!
 //! Reference models of this kind: Ioannou and Sun, *Robust Adaptive Control*, 1996, chapter 5 (model reference
 //! control); Landau 1974 for the error that an adaptive law should see.
@@ -47,7 +47,7 @@ parameters! {
 }
 
 impl ReferenceModel {
-    /// Returns the model of a vehicle that is `slowness` times slower.
+    /// Returns the reference model for a vehicle that is `slowness` times slower.
     #[must_use]
     pub(crate) fn slowed(self, slowness: f32) -> Self {
         ReferenceModel {
@@ -64,7 +64,7 @@ impl ReferenceModel {
 struct Detour {
     /// d, dd/dt, d^2 d/dt^2
     d: [f32; 3],
-    /// Position and velocity expected of the next setpoint.
+    /// Expected position and velocity of the next setpoint.
     expected: [f32; 2],
 }
 
@@ -86,11 +86,12 @@ struct Coordinate {
     approach: f32,
     acceleration_max: f32,
     speed_max: f32,
-    /// d beyond which v_c brakes; there w/3 d brakes with half of a_max.
+    /// Distance beyond which v_c is a braking curve; up to it v_c is w/3 d. At that distance w/3 d brakes with half of
+    /// a_max.
     far: f32,
 }
 
-/// A coordinate of the setpoint with three derivatives.
+/// One coordinate of the setpoint with three derivatives.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Point {
     x: f32,
@@ -99,10 +100,10 @@ struct Point {
     j: f32,
 }
 
-/// The part of `jump` to take off `d`, so that it comes as near as possible to `vehicle`.
+/// Returns the new offset after a jump: of the values between `d` and `d - jump`, the nearest to `vehicle`.
 #[inline]
 fn taken_up(d: f32, jump: f32, vehicle: f32) -> f32 {
-    // With rest the reference stays where it was, with d it jumps along: between them, the nearest to the vehicle.
+    // With `rest` the reference stays where it was; with `d` it jumps with the setpoint.
     let rest = d - jump;
     if jump > 0.0 {
         if vehicle >= d { d } else { math::max(vehicle, rest) }
@@ -121,12 +122,12 @@ impl Coordinate {
         Coordinate { bandwidth, approach, acceleration_max, speed_max, far }
     }
 
-    /// v_c
+    /// Returns v_c.
     #[inline]
     fn speed(&self, d: f32) -> f32 {
         let distance = d.abs();
         let speed = if distance > self.far {
-            // v^2 = a_max (d - far/2) brakes with a_max/2, and meets w/3 d at far in value and slope.
+            // v^2 = a_max (d - far/2) brakes with a_max/2, and meets w/3 d at `far` in value and slope.
             math::sqrt(self.acceleration_max * (distance - 0.5 * self.far))
         } else {
             self.approach * distance
@@ -135,8 +136,8 @@ impl Coordinate {
         if d < 0.0 { speed } else { -speed }
     }
 
-    /// Adds the detour to `point`, for a vehicle at `from` from it with velocity `rate` relative to it, and advances by
-    /// one step; `jump` is the distance of `point` from the one expected.
+    /// Adds the detour to `point` and advances by one step. `jump` is the distance of `point` from the expected
+    /// position; `from` and `rate` are the vehicle's position and velocity relative to `point`.
     #[inline(always)]
     fn advance(&self, detour: &mut Detour, point: Point, [jump, from, rate]: [f32; 3], dt_s: f32) -> Point {
         let Detour { d: [d, d_dot, d_ddot], expected } = detour;
@@ -144,7 +145,7 @@ impl Coordinate {
         *d_dot = taken_up(*d_dot, point.v - expected[1], rate);
         let a_max = self.acceleration_max;
         let a_c = math::limited(self.bandwidth * (self.speed(*d) - *d_dot), a_max);
-        // The detour accelerates the reference as a whole no further than a_max.
+        // The detour may not raise the reference's total acceleration above a_max.
         *d_ddot = if *d_ddot > 0.0 {
             math::min(*d_ddot, math::max(a_max - point.a, 0.0))
         } else {
@@ -152,7 +153,7 @@ impl Coordinate {
         };
         let d_dddot = 3.0 * self.bandwidth * (a_c - *d_ddot);
         let half = 0.5 * dt_s;
-        // To second order: what a first-order step leaves out would count as a jump of a setpoint that accelerates.
+        // To second order: the remainder of a first-order step would count as a jump of an accelerating setpoint.
         *expected = [point.x + dt_s * (point.v + half * point.a), point.v + dt_s * (point.a + half * point.j)];
         let reference = Point { x: point.x + *d, v: point.v + *d_dot, a: point.a + *d_ddot, j: point.j + d_dddot };
         *d = math::settled(*d + dt_s * (*d_dot + half * *d_ddot));
@@ -162,7 +163,7 @@ impl Coordinate {
     }
 }
 
-/// The reference model with its constants; everything that changes in flight is in [`Detours`].
+/// Reference model with its constants. Everything that changes in flight is in [`Detours`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ReferenceFilter {
     xy: Coordinate,
@@ -172,7 +173,7 @@ pub struct ReferenceFilter {
 }
 
 impl ReferenceFilter {
-    /// Makes the model from valid settings, advanced every `dt_s` seconds; none if every bandwidth is 0.
+    /// Creates the model from valid settings, advanced every `dt_s` seconds. `None` if every bandwidth is 0.
     pub fn new(model: &ReferenceModel, limits: &Limits, dt_s: f32) -> Option<Self> {
         let ReferenceModel { reference_acceleration_m_s2: acceleration, .. } = *model;
         let (turn, yaw_rate) = (model.reference_turn_rad_s2, model.reference_yaw_rate_rad_s);
@@ -186,7 +187,7 @@ impl ReferenceFilter {
         })
     }
 
-    /// Returns the memory of a flight that begins with this state and setpoint: the reference starts at the vehicle.
+    /// Returns the memory for a flight that begins with this state and setpoint: the reference starts at the vehicle.
     pub fn start(&self, state: &State, setpoint: &Setpoint) -> Detours {
         let detour = |x1: f32, x2: f32, x: f32, v: f32| Detour { d: [x1 - x, x2 - v, 0.0], expected: [x, v] };
         let (at, speed) = (&state.position_m, &state.velocity_m_s);
@@ -203,7 +204,7 @@ impl ReferenceFilter {
         }
     }
 
-    /// Starts x and y at the vehicle again: one that has slid on the ground returns as after a jump.
+    /// Restarts x and y at the vehicle: after sliding on the ground it returns as after a jump of the setpoint.
     pub fn restart_level(&self, detours: &mut Detours, state: &State, setpoint: &Setpoint) {
         let Detours { x, y, .. } = self.start(state, setpoint);
         (detours.x, detours.y) = (x, y);
@@ -220,7 +221,7 @@ impl ReferenceFilter {
         }
     }
 
-    /// Returns `setpoint` with the detours, and advances them by one step.
+    /// Returns `setpoint` with the detours added, and advances the detours by one step.
     // One copy for both laws, not inlined, so that it can use all registers.
     #[inline(never)]
     pub fn advance(&self, detours: &mut Detours, state: &State, setpoint: &Setpoint) -> Setpoint {

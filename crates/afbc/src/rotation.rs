@@ -1,9 +1,9 @@
-//! Errors of the attitude as a rotation, tilt before yaw. Not in the paper, which takes differences of Euler angles (9)
-//! and d eta/dt for Omega (6): right in hover, and off by a factor beyond 45 degrees of tilt.
+//! Attitude errors as a rotation, with tilt before yaw. Not in the paper, which takes differences of Euler angles (9)
+//! and d eta/dt for Omega (6). That is right in hover, but wrong by a factor beyond 45 degrees of tilt.
 //!
-//! R_d has the roll and pitch of (40), behind the command filter, and the yaw of the reference. With R_e = R' R_d =
-//! R_tilt R_yaw, the shortest turn of the thrust and a turn about it (Brescianini and D'Andrea, *Tilt-prioritized
-//! quadrocopter attitude control*, IEEE TCST 28(2), 2020), n = R_e e_z, and a the angle of R_yaw:
+//! R_d has the roll and pitch of (40) after the command filter, and the yaw of the reference. R_e = R' R_d = R_tilt
+//! R_yaw splits into the shortest turn of the thrust and a turn about the thrust (Brescianini and D'Andrea,
+//! *Tilt-prioritized quadrocopter attitude control*, IEEE TCST 28(2), 2020). With n = R_e e_z and the angle a of R_yaw:
 //!
 //! ```text
 //! e_1  =  [-n_y, n_x, 0] / sqrt((1 + n_z)/2) + [0, 0, 2 sin(a/2)]     twice the sine of half of each angle
@@ -12,16 +12,16 @@
 //! ```
 //!
 //! For small errors de_1/dt = dx_1d/dt - x_2, which is all that Section III needs of (9). Omega_d and its derivative
-//! follow from those of the angles by the kinematics of Euler angles.
+//! follow from the derivatives of the angles by the kinematics of Euler angles.
 
 use crate::model::RollPitch;
 use afbc_control::math;
 use nalgebra::{Matrix3, Vector3};
 
-/// Smallest 1 + cos of an angle that is divided by: errors of more than 164 degrees grow no further.
+/// Smallest divisor 1 + cos of an angle: errors of more than 164 degrees grow no further.
 const HALF_MIN: f32 = 0.04;
 
-/// What roll, pitch and yaw track, about the axes of the body.
+/// Attitude errors and reference derivatives for roll, pitch and yaw, about the body axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Turn {
     /// e_1 \[rad\].
@@ -30,13 +30,13 @@ pub struct Turn {
     pub rates: Vector3<f32>,
     /// d^2 x_1d/dt^2 \[rad/s2\].
     pub accelerations: Vector3<f32>,
-    /// What of it is R_e dOmega_d/dt, without the body's rates \[rad/s2\].
+    /// Part R_e dOmega_d/dt of the accelerations, without the body rates \[rad/s2\].
     pub desired_accelerations: Vector3<f32>,
 }
 
 impl Turn {
-    /// Returns the turn of a body at R, with rates Omega, towards an attitude at `desired` and `heading`, the sine and
-    /// cosine of yaw, whose angles change at `eta_dot` \[rad/s\] and `eta_ddot` \[rad/s2\].
+    /// Returns the errors of a body at R with rates Omega from the desired attitude. `heading` is the sine and cosine
+    /// of the desired yaw; the desired angles change by `eta_dot` \[rad/s\] and `eta_ddot` \[rad/s2\].
     #[inline(always)]
     pub fn new(
         r_earth_body: &Matrix3<f32>,
@@ -54,7 +54,7 @@ impl Turn {
         Turn { error: error(&to_body), rates, accelerations, desired_accelerations }
     }
 
-    /// Returns the same as differences of Euler angles (9), yaw the shorter way, as the paper has it.
+    /// Returns the errors as differences of Euler angles (9), as in the paper, with yaw the shorter way round.
     #[inline(always)]
     pub fn of_angles(
         eta_d: &Vector3<f32>,

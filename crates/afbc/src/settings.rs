@@ -60,16 +60,16 @@ parameters! {
 }
 
 impl Settings {
-    /// Returns the settings with another time step.
+    /// Returns the settings with this time step.
     #[must_use]
     pub const fn with_dt_s(mut self, dt_s: f32) -> Self {
         self.common.dt_s = dt_s;
         self
     }
 
-    /// Returns the settings of a vehicle that is `slowness` times slower: command filter, tilt rate, reference model
-    /// and filters of the inputs follow. Limits of speed and acceleration stay, since they belong to the task. Not in
-    /// the paper.
+    /// Returns the settings for a vehicle that is `slowness` times slower: command filter, tilt rate, observers,
+    /// reference model and input filters slow down. Limits of speed and acceleration stay, because they belong to the
+    /// task. Not in the paper.
     #[must_use]
     pub fn slowed(self, slowness: f32, lag_s: f32) -> Self {
         let Settings { command_filter_rad_s, forward_rad_s, limits, disturbance, reference, smoothing, .. } = self;
@@ -91,7 +91,7 @@ impl Settings {
         self
     }
 
-    /// Returns the settings with another largest rotor force.
+    /// Returns the settings with this largest rotor force.
     #[must_use]
     pub const fn with_rotor_force_max_n(mut self, force_n: f32) -> Self {
         self.common.rotor_force_max_n = force_n;

@@ -1,8 +1,8 @@
-//! Roll and pitch that turn the thrust along a desired acceleration, (40), and their derivatives. Section III-D.
+//! Roll and pitch that point the thrust along a desired acceleration (40), and their derivatives. Section III-D.
 //!
 //! The paper takes the derivatives of phi_d and theta_d from the command filter. Those of the reference are exact
 //! (differential flatness: Mellinger and Kumar, *Minimum snap trajectory generation and control for quadrotors*, ICRA
-//! 2011): with a_z the vertical part of the thrust per mass, and in the direction of yaw
+//! 2011). With the vertical part a_z of the thrust per mass, in axes turned by yaw:
 //!
 //! ```text
 //! s_1 = (a_5 sin psi - a_6 cos psi) / a_z     tan phi   = s_1 cos theta
@@ -12,7 +12,7 @@
 use afbc_control::math;
 use nalgebra::Vector3;
 
-/// Desired roll and pitch, and how they turn with the horizontal acceleration.
+/// Desired roll and pitch with the terms of their derivatives.
 pub struct Tilt {
     sin_psi: f32,
     cos_psi: f32,
@@ -29,8 +29,8 @@ pub struct Tilt {
 }
 
 impl Tilt {
-    /// Computes them for accelerations along x and y \[m/s2\], the sine and cosine of yaw, and the vertical part of the
-    /// thrust per mass \[s2/m\], inverted.
+    /// Computes roll and pitch for accelerations along x and y \[m/s2\], the sine and cosine of yaw, and the inverse of
+    /// the vertical thrust per mass \[s2/m\].
     #[inline(always)]
     pub fn new(u5: f32, u6: f32, [sin_psi, cos_psi]: [f32; 2], inverse_vertical: f32) -> Self {
         let tan_theta = (u5 * cos_psi + u6 * sin_psi) * inverse_vertical;
@@ -51,28 +51,28 @@ impl Tilt {
         }
     }
 
-    /// Returns the first and second derivatives of roll and pitch for those of the acceleration and of yaw.
+    /// Returns the first and second derivatives of roll and pitch.
     ///
-    /// `jerk` \[m/s3\] and `snap` \[m/s4\] are those of the acceleration, `turn` and `turn_dot` those of yaw \[rad/s,
-    /// rad/s2\].
+    /// `jerk` \[m/s3\] and `snap` \[m/s4\] are the derivatives of the acceleration, `turn` and `turn_dot` those of yaw
+    /// \[rad/s, rad/s2\].
     #[inline(always)]
     pub fn turned(&self, jerk: &Vector3<f32>, snap: &Vector3<f32>, [turn, turn_dot]: [f32; 2]) -> [[f32; 2]; 2] {
         let Tilt { sin_psi, cos_psi, slopes: [aside, ahead], tan_phi, cos2_phi, cos_theta, cos2_theta, .. } = *self;
         let heading = |v: &Vector3<f32>| [v.x * sin_psi - v.y * cos_psi, v.x * cos_psi + v.y * sin_psi];
         let ([j1, j2], [s1, s2], over) = (heading(jerk), heading(snap), self.inverse_vertical);
-        // a_z changes as well.
+        // a_z changes too.
         let [j1, j2] = [j1 - aside * jerk.z, j2 - ahead * jerk.z];
         let twice = 2.0 * over * jerk.z;
         let [s1, s2] = [s1 - aside * snap.z - twice * j1, s2 - ahead * snap.z - twice * j2];
-        // The heading turns as well.
+        // The heading turns too.
         let aside_dot = j1 * over + turn * ahead;
         let ahead_dot = j2 * over - turn * aside;
         let aside_ddot = (s1 + turn * j2) * over + turn_dot * ahead + turn * ahead_dot;
         let ahead_ddot = (s2 - turn * j1) * over - turn_dot * aside - turn * aside_dot;
         let theta_dot = cos2_theta * ahead_dot;
-        // (cos^2 theta)' = -2 tan theta cos^2 theta theta', and likewise of phi below.
+        // (cos^2 theta)' = -2 tan theta cos^2 theta theta'; the same holds for phi below.
         let theta_ddot = cos2_theta * ahead_ddot - 2.0 * ahead * theta_dot * theta_dot;
-        // cos theta, and its derivatives over cos theta.
+        // First and second derivative of cos theta, divided by -cos theta.
         let (shrink, shrink_dot) = (ahead * theta_dot, ahead * theta_ddot + theta_dot * theta_dot);
         let tan_phi_dot = cos_theta * aside_dot - tan_phi * shrink;
         let tan_phi_ddot = cos_theta * (aside_ddot - 2.0 * aside_dot * shrink) - tan_phi * shrink_dot;

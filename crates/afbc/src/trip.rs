@@ -1,8 +1,8 @@
-//! Reasons for switching from the adaptive law to its fallback.
+//! Reasons for switching from the adaptive law to the fallback law.
 
 use afbc_types::Axis;
 
-/// Reason why the adaptive law was switched off.
+/// Reason why the monitor switched off the adaptive law.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -16,12 +16,12 @@ pub enum Trip {
     Error(Axis),
     /// Rotors stayed at their limits.
     Saturation,
-    /// An input oscillates persistently; z stands for the thrust.
+    /// An input keeps oscillating; z stands for the thrust.
     LimitCycle(Axis),
 }
 
 impl Trip {
-    /// Returns the reason in words, at most 50 characters.
+    /// Returns the reason as text of at most 50 characters.
     pub const fn reason(self) -> &'static str {
         match self {
             Trip::Theta(Axis::Roll) => "AFBC off: Theta_hat of roll out of bounds",

@@ -1,4 +1,4 @@
-//! What is known ahead makes up for the lag that the filters leave, through the filters themselves.
+//! The shift of predictable inputs compensates the lag that the filters leave, tested through the filters themselves.
 
 use afbc::ahead::Ahead;
 use afbc_control::{Smoother, Smoothing};
@@ -10,8 +10,8 @@ const LAG_S: f32 = 0.033;
 const FILTERS: Smoothing =
     Smoothing { smooth_tilt_rad_s: 160.0, smooth_yaw_rad_s: 290.0, smooth_lift_rad_s: 90.0, lead_s: 0.03 };
 
-/// Behind filters and rotors a ramp is where it was meant to be, but for yaw; without, it trails by what the lead
-/// leaves.
+/// After filters and rotors a ramp of roll, pitch or thrust has no lag. Without the shift, and for yaw, it lags by what
+/// the lead leaves.
 #[test]
 fn a_ramp_arrives_in_time() {
     let ahead = Ahead::new(LAG_S, &FILTERS, 50.0, DT_S);
@@ -40,7 +40,7 @@ fn a_ramp_arrives_in_time() {
         off
     };
     let [tilt, yaw, lift] = [LAG_S + 2.0 / 160.0 - 0.03, LAG_S + 2.0 / 290.0, LAG_S + 2.0 / 90.0 - 0.03];
-    // Filters of steps are faster than those of time by half a step each.
+    // The discrete filters are faster than the continuous ones by half a step each.
     let close = |is: Vector3<f32>, should: Vector3<f32>| (is - should).abs().max() < 2.0 * DT_S;
     let without = arrives(None);
     assert!(close(without, Vector3::new(tilt, yaw, lift)), "{without}");
@@ -48,7 +48,7 @@ fn a_ramp_arrives_in_time() {
     assert!(close(with, Vector3::new(0.0, yaw, 0.0)), "{with}");
 }
 
-/// A lead that makes up for more than the lag is not taken back, and without filters the rotors' lag is left.
+/// A lead larger than the lag is not reversed. Without filters the whole rotor lag is left.
 #[test]
 fn lags_are_not_negative() {
     let led = Ahead::new(0.01, &Smoothing { lead_s: 0.3, ..FILTERS }, 50.0, DT_S);
@@ -61,7 +61,7 @@ fn lags_are_not_negative() {
     assert_eq!(bare.thrust_s, LAG_S);
 }
 
-/// The first is taken as it is: an engaged law does not jump.
+/// The first value causes no change, so an engaged law does not jump.
 #[test]
 fn the_first_is_no_change() {
     let mut late = None;

@@ -1,5 +1,5 @@
-//! The cascade as a composition: what each subsystem is told, what becomes of its input, and what is carried over to
-//! the next step. The laws themselves are compared with their equations in `law.rs` and `integral.rs`.
+//! Composition of the cascade: the context and tracking of each subsystem, the use of its input, and the memory between
+//! steps. `law.rs` and `integral.rs` compare the laws themselves with their equations.
 #![allow(clippy::indexing_slicing, clippy::unwrap_used, missing_docs)] // what cannot be built must stop the test
 
 use crate::common::step;
@@ -14,7 +14,7 @@ use afbc_types::{Axis, Inputs, Parameters, PerAxis, Setpoint, State};
 use nalgebra::{Rotation3, Vector3};
 use proptest::prelude::*;
 
-/// Time over which the path of the acceleration is differentiated \[s\].
+/// Time step for differentiating the acceleration's path \[s\].
 const STEP_S: f64 = 1e-4;
 const GRAVITY_M_S2: f64 = 9.81;
 const WEIGHT_N: f64 = 0.486 * 9.81;
@@ -50,7 +50,7 @@ fn near() -> impl Strategy<Value = (State, Setpoint)> {
     (state, setpoint)
 }
 
-/// The paper's settings with these switches, and limits that may act on the desired attitude.
+/// Draws the paper's settings with random switches, and limits that may cut the desired attitude.
 fn settings() -> impl Strategy<Value = Settings> {
     let limits = (0.3_f32..1.5, 1.0_f32..20.0).prop_map(|(tilt_max_rad, acceleration_max_m_s2)| Limits {
         tilt_max_rad,
@@ -67,13 +67,14 @@ fn settings() -> impl Strategy<Value = Settings> {
     )
 }
 
-/// Roll and pitch of a thrust along this acceleration \[m/s2\] in the earth frame, at this yaw.
+/// Returns roll and pitch of a thrust along this acceleration \[m/s2\] in the earth frame, at this yaw.
 fn leaning(ahead: [f64; 2], vertical: f64, yaw_rad: f64) -> [f64; 2] {
     let thrust = Rotation3::from_euler_angles(0.0, 0.0, -yaw_rad) * Vector3::new(ahead[0], ahead[1], vertical);
     [(-thrust.y / thrust.norm()).asin(), thrust.x.atan2(thrust.z)]
 }
 
-/// A filter step of the equation d^2 x/dt^2 = w^2 (command - x) - 2 w dx/dt in `f64`, in hundred small steps.
+/// Integrates the filter equation d^2 x/dt^2 = w^2 (command - x) - 2 w dx/dt over a step in `f64`, in a hundred
+/// substeps.
 fn filtered([mut x, mut v]: [f64; 2], command: f64, w: f64) -> [f64; 2] {
     let h = 1e-5;
     for _ in 0..100 {
@@ -85,28 +86,28 @@ fn filtered([mut x, mut v]: [f64; 2], command: f64, w: f64) -> [f64; 2] {
     [x, v]
 }
 
-/// d eta/dt of a body that turns at these rates.
+/// Returns d eta/dt for the body rates.
 fn eta_dot(state: &State) -> Vector3<f64> {
     let (eta, rates) = (state.attitude_rad.cast::<f64>(), state.rates_rad_s.cast::<f64>());
     let yaw = (rates.y * eta.x.sin() + rates.z * eta.x.cos()) / eta.y.cos();
     Vector3::new(rates.x + eta.y.sin() * yaw, rates.y * eta.x.cos() - rates.z * eta.x.sin(), yaw)
 }
 
-/// What the cascade carries from one step to the next.
+/// Memory of the cascade between steps.
 #[derive(Clone, Copy, Default)]
 struct Carried {
-    /// Angles that the filter is told.
+    /// Angles commanded to the filter.
     commanded: [f64; 2],
     filtered: Option<[Filtered; 2]>,
-    /// What is taken up of jumps of the jerk, along x and y, with its rate; and the jerk expected next.
+    /// Absorbed jumps of the jerk along x and y, with their rate, and the jerk expected next.
     followed: Option<([[f64; 2]; 2], [f64; 2])>,
-    /// Second derivatives of roll, pitch and yaw behind the low-pass of what is ahead.
+    /// Second derivatives of roll, pitch and yaw after the low-pass of the predictor.
     late: Option<[f64; 3]>,
     unallocated: PerAxis<f32>,
     rotor_residual_rad_s: f32,
 }
 
-/// Flies `law` in its cascade, and compares each subsystem's errors and input with those of the law alone.
+/// Flies `law` in its cascade, and compares each subsystem's errors and input with the law alone.
 fn compose<L: Law + Copy>(
     law: L,
     settings: Settings,
@@ -136,7 +137,7 @@ fn compose<L: Law + Copy>(
             observed_m_s2: Vector3::zeros(),
             known: settings.feed_forward.then_some(&model),
         };
-        // The thrust is ahead by the rotors' lag, since there are no filters, as the reference changes it.
+        // The thrust leads by the rotor lag, because there are no filters, and follows the reference.
         let lag_s = f64::from(settings.disturbance.disturbance_lag_s);
         let up = Rotation3::from_euler_angles(
             f64::from(state.attitude_rad.x),
@@ -155,7 +156,7 @@ fn compose<L: Law + Copy>(
             }
             let (got, scale) = (f64::from(seen[axis]), f64::from(u).abs() + 1.0);
             prop_assert!((got - f64::from(u)).abs() <= 1e-6 * scale + input_slack, "{axis:?}: {got} for {u}");
-            // What is learnt in a step from slightly other errors is slightly other.
+            // Slightly different errors give a slightly different adaptation.
             let learnt = &memory.control.estimates[axis];
             let off = f64::from(apart(&estimates[axis], learnt));
             prop_assert!(off <= 2e-6 + 1e-2 * error_slack, "{axis:?}: {learnt:?} for {:?}", estimates[axis]);
@@ -163,7 +164,7 @@ fn compose<L: Law + Copy>(
             Ok(())
         };
 
-        // Position: straight from state and setpoint.
+        // Position: directly from state and setpoint.
         for (index, axis) in [(2, Axis::Z), (0, Axis::X), (1, Axis::Y)] {
             let tracking = Tracking {
                 x1: state.position_m[index],
@@ -178,7 +179,7 @@ fn compose<L: Law + Copy>(
             check(axis, tracking, [0.0, slack])?;
         }
 
-        // Desired attitude (39), (40), within the limits.
+        // Desired attitude (39), (40) within the limits.
         let eta = state.attitude_rad.cast::<f64>();
         let thrust_max_n = 4.0 * f64::from(settings.common.rotor_force_max_n);
         let vertical = if settings.tilt_by_thrust {
@@ -198,9 +199,9 @@ fn compose<L: Law + Copy>(
         }
         let angles = trace.desired_rad.map(f64::from);
 
-        // Ahead of the filter by its lag, with the derivatives that follow from jerk and snap.
+        // Angles that lead by the filter's lag, with the derivatives that follow from jerk and snap.
         let w = f64::from(settings.command_filter_rad_s);
-        // (40) differentiated along a path through jerk and snap, while yaw turns.
+        // (40) differentiated along a path through jerk and snap, with a turning yaw.
         let along = |t: f64, [jerk, snap]: [[f64; 2]; 2]| {
             let by = |i: usize| jerk[i] * t + snap[i] * (0.5 * t * t);
             let turn =
@@ -210,7 +211,7 @@ fn compose<L: Law + Copy>(
         };
         let of = |v: &Vector3<f32>| [0, 1].map(|i| f64::from(v[i]));
         let (j, s) = (of(&setpoint.jerk_m_s3), of(&setpoint.snap_m_s4));
-        // A jump of the jerk is taken up, and decays by the filter's equation.
+        // A jump of the jerk is absorbed and decays by the filter's equation.
         let w_f = f64::from(settings.forward_rad_s);
         let (then, expected) = carried.followed.unwrap_or(([[0.0; 2]; 2], j));
         let late = [0, 1].map(|i| [then[i][0], then[i][1] + j[i] - expected[i]]);
@@ -228,7 +229,7 @@ fn compose<L: Law + Copy>(
         let mut commanded = angles;
         if settings.feed_forward {
             let rates = [0, 1].map(|i| (after[i] - before[i]) / (2.0 * STEP_S));
-            // Its command is held for a step, which is half of one late.
+            // The command is held for a step, an average delay of half a step.
             let (lag, late) = (1.0 / w, 1.0 / w + 0.5e-3);
             commanded = [0, 1].map(|i| angles[i] + (lag + late) * rates[i] + lag * late * forward[i]);
             let size = commanded[0].hypot(commanded[1]);
@@ -247,14 +248,15 @@ fn compose<L: Law + Copy>(
             prop_assert!((rate - wanted_rate).abs() <= slack * 4.0 * w, "{rate} for {wanted_rate} rad/s");
         }
 
-        // Attitude: from the filter, and from d eta/dt, which is Omega in (6).
+        // Attitude: from the filter and d eta/dt, which is Omega in (6).
         let turning = if settings.feed_forward { eta_dot(state) } else { state.rates_rad_s.cast() };
-        // Over g of roll and pitch, the rounding of the filter's acceleration, and the rotation of the snap.
+        // Allowed error, divided by g of roll and pitch: rounding of the filter's acceleration, and rotation of the
+        // snap.
         let slack = match settings.feed_forward {
             true => [2.0 * ROTATION, 2.0 * ROTATION * 12.0],
             false => [0.0, 4e-7 * w * w / 65.0],
         };
-        // Ahead of the rotors, too.
+        // Shifted by the rotor lag too.
         let yaw_acceleration = f64::from(setpoint.yaw_acceleration_rad_s2);
         let wanted = [forward[0], forward[1], yaw_acceleration];
         let before = carried.late.unwrap_or(wanted);
@@ -286,7 +288,7 @@ fn compose<L: Law + Copy>(
         };
         check(Axis::Yaw, tracking, slack)?;
 
-        // Distances are those from the setpoint, and errors of the attitude.
+        // Distances are from the setpoint for position, and the errors for attitude.
         let (distances, errors) = (&memory.control.last.distances, &trace.errors);
         let away = setpoint.position_m - state.position_m;
         prop_assert_eq!([distances.x, distances.y, distances.z], [away.x, away.y, away.z]);
@@ -295,7 +297,7 @@ fn compose<L: Law + Copy>(
             [errors.roll.e1, errors.pitch.e1, errors.yaw.e1]
         );
 
-        // What is carried over.
+        // Memory for the next step.
         let missing = |asked: f32, given: f32| if action.health.saturated { asked - given } else { 0.0 };
         let (Inputs { roll_n, pitch_n, yaw_n, thrust_n }, given) = (trace.inputs, &action.given);
         if settings.anti_windup {
@@ -350,7 +352,7 @@ proptest! {
         compose(law, settings, &inputs, |a, b| (a.value - b.value).abs())?;
     }
 
-    /// (40): the thrust of these angles is along the wanted acceleration, with the vertical one given.
+    /// (40): at these angles the thrust has the requested horizontal acceleration and the given vertical one.
     #[test]
     fn the_desired_attitude_leans_along_the_acceleration(
         u5 in -20.0_f32..20.0, u6 in -20.0_f32..20.0, yaw_rad in -9.0_f32..9.0, vertical in 2.0_f32..20.0,
@@ -363,8 +365,8 @@ proptest! {
     }
 }
 
-/// The speed limit shortens the error, not the distance that a monitor looks at; and a controller reports its time
-/// step, its mixer and its estimates.
+/// The speed limit cuts the error but not the distance that the monitor sees. A controller reports its time step, mixer
+/// and estimates.
 #[test]
 fn a_controller_reports_what_others_need() {
     let (vehicle, settings) = (Parameters::PAPER.to_f32(), Profile::Paper.settings().with_dt_s(0.004));

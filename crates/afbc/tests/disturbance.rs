@@ -1,4 +1,5 @@
-//! The disturbance observer against its closed solution, and what it must not take for a disturbance.
+//! Compares the disturbance observer with its closed solution, and checks which effects it must not see as a
+//! disturbance.
 
 use afbc::Settings;
 use afbc::disturbance::{ACCELERATION_MAX_M_S2, DisturbanceObserver, ForceObserver, ForceObserverMemory, JUMP_M_S};
@@ -19,11 +20,11 @@ fn weight_n() -> f32 {
     Parameters::PAPER.to_f32().weight_n()
 }
 
-/// A vehicle in flight at this attitude, whose thrust would hold it in hover.
+/// A flying vehicle with this attitude, whose thrust would hold it in hover.
 struct Body {
     state: State,
     memory: Option<ForceObserverMemory>,
-    /// Learnt hover thrust, which is what is commanded \[N\].
+    /// Learnt hover thrust, which is also the commanded thrust \[N\].
     hover_n: f32,
 }
 
@@ -32,7 +33,7 @@ impl Body {
         Body { state: State { attitude_rad, ..State::default() }, memory: None, hover_n }
     }
 
-    /// R e_z from the attitude, by the textbook.
+    /// Returns R e_z from the attitude by the textbook formula.
     fn up(&self) -> Vector3<f32> {
         let [phi, theta, psi] = self.state.attitude_rad.map(f64::from).into();
         let (sin_phi, cos_phi, sin_theta, cos_theta) = (phi.sin(), phi.cos(), theta.sin(), theta.cos());
@@ -41,7 +42,7 @@ impl Body {
         Vector3::new(x, y, cos_theta * cos_phi).cast()
     }
 
-    /// Flies a step under the hover thrust and this disturbance, and returns what is observed.
+    /// Flies one step with the hover thrust and this disturbance, and returns the observer's output.
     fn step(&mut self, observer: &ForceObserver, f_m_s2: [f32; 2]) -> Vector3<f32> {
         let up = self.up();
         let seen = observer.advance(&mut self.memory, &self.state, &up, self.hover_n, [true, false]);
@@ -52,11 +53,11 @@ impl Body {
     }
 }
 
-/// f_hat of a constant f is f behind two poles at w.
+/// For a constant f, f_hat is f behind two poles at w.
 #[test]
 fn a_constant_disturbance_is_found_as_two_poles_say() {
     for w in [5.0, 28.7, 60.0] {
-        // Small enough for v - v_hat to be no jump: at most f/(e w).
+        // Small enough that v - v_hat is no jump: at most f/(e w).
         let (observer, f) = (observer(w), [0.1 * w, -0.03 * w]);
         let mut body = Body::new(Vector3::zeros(), weight_n());
         for step in 0..2000_u16 {
@@ -70,15 +71,15 @@ fn a_constant_disturbance_is_found_as_two_poles_say() {
     }
 }
 
-/// Neither tilt nor weak rotors are a disturbance: the acceleration by tilt is known at any heading, and what rotors
-/// lack is in the learnt hover thrust.
+/// Neither tilt nor weak rotors look like a disturbance: the acceleration by tilt is known at any heading, and the
+/// weakness is in the learnt hover thrust.
 #[test]
 fn what_the_rotors_do_is_no_disturbance() {
     let observer = observer(28.7);
     for (phi, theta, psi) in [(0.3, 0.0, 0.0), (0.0, -0.4, 1.0), (0.2, 0.3, -2.5), (-0.5, 0.1, 3.0)] {
         for hover in [1.0, 1.67] {
             let mut body = Body::new(Vector3::new(phi, theta, psi), hover * weight_n());
-            // The thrust starts at the weight.
+            // The thrust estimate starts at the weight.
             for _ in 0..600 {
                 body.step(&observer, [0.0; 2]);
             }
@@ -107,7 +108,7 @@ fn a_jump_is_no_disturbance() {
     }
 }
 
-/// A repeated state teaches nothing, and on the ground there is no disturbance.
+/// A repeated state changes nothing, and on the ground the disturbance is zero.
 #[test]
 fn it_waits_for_states_and_forgets_on_the_ground() {
     let observer = observer(28.7);
@@ -124,7 +125,7 @@ fn it_waits_for_states_and_forgets_on_the_ground() {
     assert!(look(true, false).x.abs() < 0.01);
 }
 
-/// What a vehicle that does not know where it is makes of its motion shows no wind: that of before stays.
+/// Motion that is only dead-reckoned shows no wind: f_hat keeps its value.
 #[test]
 fn what_is_not_measured_is_not_observed() {
     let observer = observer(28.7);
@@ -142,8 +143,8 @@ fn what_is_not_measured_is_not_observed() {
     assert!((after - before).abs().max() < 0.02, "{after:?}");
 }
 
-/// After an announced gap it goes on from the velocity that it finds: a difference that has come about meanwhile is no
-/// disturbance, and a new disturbance is found as ever.
+/// After an announced gap the observer continues from the present velocity: a difference that arose in the gap is no
+/// disturbance, and a new disturbance is found as usual.
 #[test]
 fn it_observes_again_after_a_gap() {
     let observer = observer(28.7);
@@ -166,7 +167,7 @@ fn it_observes_again_after_a_gap() {
     }
 }
 
-/// A vehicle that is k times slower is observed k times slower: the same course on a clock k times slower.
+/// For a vehicle that is k times slower, the observer follows the same curve k times slower.
 #[test]
 fn a_slower_observer_is_the_same_on_a_slower_clock() {
     let settings =
@@ -179,7 +180,7 @@ fn a_slower_observer_is_the_same_on_a_slower_clock() {
         (0..100_u16)
             .map(|_| {
                 let seen = observer.advance(&mut memory, &state, &up, weight_n(), [true, false]);
-                // Half of the thrust, to whose effect the rotors' lag matters, and no motion.
+                // Half of the thrust and no motion, so that the rotor lag matters.
                 observer.give(&mut memory, 0.5 * weight_n());
                 seen.x
             })
@@ -191,7 +192,7 @@ fn a_slower_observer_is_the_same_on_a_slower_clock() {
 }
 
 proptest! {
-    /// Whatever the states say, f_hat stays finite and within its bound.
+    /// f_hat stays finite and within its bound for any states.
     #[test]
     fn it_is_bounded(
         w in 0.1_f32..200.0,
@@ -214,7 +215,7 @@ proptest! {
     }
 }
 
-/// Drag that is known is not observed: f is that drag at once, and f_hat finds only the rest.
+/// Known drag is in f at once, and f_hat finds only the rest.
 #[test]
 fn known_drag_is_f_from_the_start() {
     let drag = KnownDrag { rotor_drag_1_s: 0.4, body_drag_1_m: 0.02, rotor_height_m: 0.0 };
@@ -231,8 +232,8 @@ fn known_drag_is_f_from_the_start() {
     }
 }
 
-/// What is learnt of a force that depends on the velocity is there when the velocity returns: nothing that the observer
-/// finds, but for what has changed.
+/// A force that depends on the velocity is remembered: when the velocity returns, the observer finds only what has
+/// changed.
 #[test]
 fn what_was_learnt_at_a_velocity_is_remembered() {
     let settings = DisturbanceObserver { disturbance_rad_s: 30.0, memory_1_s: 2.0, ..DisturbanceObserver::DEFAULT };
@@ -244,13 +245,13 @@ fn what_was_learnt_at_a_velocity_is_remembered() {
     );
     let laps = [with, without.unwrap().unwrap()].map(|observer| {
         let mut memory = None;
-        // Largest lack of f in each lap of 6 s with up to 4 m/s.
+        // Largest error of f in each lap of 6 s at up to 4 m/s.
         [(); 20].map(|()| {
             (0..6000_u16).fold(0.0_f32, |worst, step| {
                 let (sin, cos) = (f32::from(step) * DT_S * core::f32::consts::TAU / 6.0).sin_cos();
                 let v = Vector3::new(4.0 * sin, 3.0 * cos, 0.0);
                 let f = v * -0.5;
-                // Thrust that makes exactly this motion with f.
+                // The thrust that makes exactly this motion with f.
                 let a = Vector3::new(4.0 * cos, -3.0 * sin, 0.0) * (core::f32::consts::TAU / 6.0) - f;
                 let up = Vector3::new(a.x / 9.81, a.y / 9.81, 1.0);
                 let state = State { velocity_m_s: v, ..State::default() };

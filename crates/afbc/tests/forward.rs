@@ -1,4 +1,4 @@
-//! Jerk and snap to follow, against the derivatives of the setpoint and the filter in double precision.
+//! Compares the smoothed jerk and snap with the setpoint's derivatives and the filter in double precision.
 
 use afbc::forward::{Followed, Forward};
 use afbc_types::Setpoint;
@@ -7,12 +7,12 @@ use proptest::prelude::*;
 
 const DT_S: f32 = 0.001;
 
-/// A setpoint whose acceleration along x, y and z has these values and derivatives.
+/// Returns a setpoint with these derivatives of acceleration along x, y and z.
 fn setpoint(a: Vector3<f32>, j: Vector3<f32>, s: Vector3<f32>) -> Setpoint {
     Setpoint { acceleration_m_s2: a, jerk_m_s3: j, snap_m_s4: s, ..Setpoint::default() }
 }
 
-/// a, j and s along x of a jump of the jerk by `jump` at time 0, with the snap `s` after it.
+/// Returns a, j and s along x for a jerk that jumps by `jump` at time 0, with the snap `s` after it.
 fn corner(t: f32, jump: f32, snap: f32) -> [f32; 3] {
     [t * (jump + 0.5 * t * snap), jump + t * snap, snap]
 }
@@ -36,7 +36,8 @@ fn a_smooth_setpoint_is_followed_as_it_is() {
 
 #[test]
 fn a_jump_of_the_jerk_is_followed_as_the_filter_says() {
-    // Of x - x_f = e: d^2 e/dt^2 + 2 w de/dt + w^2 e = 0 from e = 0 and de/dt = jump, so e = jump t exp(-w t).
+    // The error e = x - x_f obeys d^2 e/dt^2 + 2 w de/dt + w^2 e = 0 from e = 0 and de/dt = jump, so e = jump t exp(-w
+    // t).
     let (w, jump, snap) = (20.0_f32, 30.0_f32, -40.0_f32);
     let forward = Forward::new(w, DT_S).unwrap();
     let mut followed = None;
@@ -57,7 +58,7 @@ fn a_jump_of_the_jerk_is_followed_as_the_filter_says() {
         let along = jerk.x + pulse.x * DT_S;
         assert!((turned - along).abs() < 1e-2 * jump, "{t}: the snap is the derivative of the jerk");
     }
-    // All of the jump is made up for.
+    // The whole jump is made up for in the end.
     assert!((turned - corner(0.6, jump, snap)[1]).abs() < 0.01 * jump, "{turned}");
 }
 

@@ -10,7 +10,7 @@ const WIDTH: Range = Membership::WIDTH.range;
 /// Rounding error of one `f32` operation, relative.
 const U: f64 = 1.0 / (1 << 24) as f64;
 
-/// Any finite `f32`: random bit patterns, often the extremes.
+/// Draws any finite `f32`: random bit patterns, often the extremes.
 fn finite() -> impl Strategy<Value = f32> {
     let edges = [0.0, f32::from_bits(1), f32::MIN_POSITIVE.next_down(), f32::MIN_POSITIVE, f32::EPSILON, 1.0, f32::MAX];
     prop_oneof![
@@ -21,7 +21,7 @@ fn finite() -> impl Strategy<Value = f32> {
     ]
 }
 
-/// Any accepted membership, often at its bounds.
+/// Draws any accepted membership, often at its bounds.
 fn membership() -> impl Strategy<Value = Membership> {
     let spread =
         prop_oneof![3 => SPREAD.min..=SPREAD.max, 1 => Just(SPREAD.min), 1 => Just(SPREAD.max), 1 => Just(2.5)];
@@ -36,7 +36,7 @@ fn membership() -> impl Strategy<Value = Membership> {
         .prop_filter("accepted", |m| m.validate().is_ok())
 }
 
-/// (18) in `f64`, normalised before the exponential.
+/// Computes (18) in `f64`, normalised before the exponential.
 fn exact(membership: Membership, inputs: [f32; 2]) -> Matrix3<f64> {
     let (c, s) = (f64::from(membership.centre), f64::from(membership.width));
     let logit = |x: f32, j: usize| {
@@ -49,9 +49,9 @@ fn exact(membership: Membership, inputs: [f32; 2]) -> Matrix3<f64> {
     firing / firing.sum()
 }
 
-/// Bound on the relative error of a weight. ln w_i changes by at most twice the change of the exponents k|x| and ln q,
-/// where k|x| has 7 roundings (c, s, two divisions by s, s again, x, the product) and ln q = c^2 / 2s^2 has 5; another
-/// 20 cover the exponentials (2 each) and the products and sums around them.
+/// Returns a bound on the relative error of a weight. ln w_i changes by at most twice the change of the exponents k|x|
+/// and ln q. k|x| has 7 roundings (c, s, two divisions by s, s again, x, the product), and ln q = c^2 / 2s^2 has 5.
+/// Another 20 cover the exponentials (2 each) and the products and sums around them.
 fn relative_bound(membership: Membership, inputs: [f32; 2]) -> f64 {
     let (c, s) = (f64::from(membership.centre), f64::from(membership.width));
     let exponents: f64 = inputs.iter().map(|x| c / (s * s) * f64::from(x.abs())).sum();
@@ -77,7 +77,7 @@ proptest! {
         let (w, exact) = (Basis::new(membership).unwrap().weights(inputs), exact(membership, inputs));
         let bound = relative_bound(membership, inputs);
         for (w, exact) in w.iter().zip(exact.iter()) {
-            // An exponential below the normal numbers of f32 is 0: 2^-126 over a sum of at least q = 1.5e-8.
+            // An exponential below the normal numbers of f32 is 0: 2^-126 divided by a sum of at least q = 1.5e-8.
             let allowed = exact * bound + 8e-31;
             prop_assert!((f64::from(*w) - exact).abs() <= allowed, "{w:e} against {exact:e}, allowed {allowed:e}");
         }
@@ -87,7 +87,7 @@ proptest! {
     fn mirroring_an_input_mirrors_the_weights(membership in membership(), a in finite(), b in finite()) {
         let basis = Basis::new(membership).unwrap();
         let (w, first, second) = (basis.weights([a, b]), basis.weights([-a, b]), basis.weights([a, -b]));
-        // The triples are the same numbers in reverse; their sums may round differently, by 2 roundings each.
+        // The triples are the same numbers in reverse order; their sums may round differently, by 2 roundings each.
         let near = |x: f32, y: f32| (f64::from(x) - f64::from(y)).abs() <= 8.0 * U * f64::from(x) + 1e-44;
         for (i, j) in (0..3).flat_map(|i| (0..3).map(move |j| (i, j))) {
             prop_assert!(near(w[(i, j)], first[(2 - i, j)]), "row {i}, column {j}: {w} against {first}");
@@ -97,8 +97,8 @@ proptest! {
 
     #[test]
     fn far_out_the_outer_rule_takes_all(membership in membership(), far in 200.0_f32..1e30) {
-        // From 200 widths on the next Gaussian is exp(-k x + c^2 / 2s^2) < exp(-200 * 0.1 + 18) of the outer one for
-        // the widest spread, the worst case: less than 0.14. It decreases with x.
+        // Beyond 200 widths the next Gaussian is exp(-k x + c^2 / 2s^2) < exp(-200 * 0.1 + 18) of the outer one for the
+        // widest spread, the worst case: less than 0.14. It decreases with x.
         let basis = Basis::new(membership).unwrap();
         let x = far * membership.width;
         let w = basis.weights([x, -x]);
@@ -109,7 +109,7 @@ proptest! {
 
 #[test]
 fn each_rule_has_its_place() {
-    // First input outermost: rule 3 i + j + 1 is row i, column j, from -c to c.
+    // The first input is the outer index: rule 3 i + j + 1 is row i, column j, from -c to c.
     let membership = Membership { centre: 10.0, width: 2.0 };
     let basis = Basis::new(membership).unwrap();
     for (i, j) in (0..3).flat_map(|i| (0..3).map(move |j| (i, j))) {

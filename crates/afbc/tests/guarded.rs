@@ -1,5 +1,5 @@
-//! AFBC under its monitor: the checks of every step, the switch to the fallback law and back, and that only a command
-//! leads back. `tests/tests/guarded.rs` has closed loops.
+//! AFBC with its monitor: the checks of every step, the switch to the fallback law and back, and that only a command
+//! engages AFBC again. `tests/tests/guarded.rs` has closed loops.
 #![allow(clippy::unwrap_used, missing_docs)] // what cannot be built must stop the test
 
 use crate::common::{Stepped, U, check_step, gains, plausible, setpoint, settings, state, step, value};
@@ -20,8 +20,8 @@ type Flight = Validated<guarded::Memory>;
 
 const WEIGHT_N: f32 = 0.486 * 9.81;
 
-/// The profile's settings without what has a memory between setpoint and law, and between law and rotors; without the
-/// observer of moments, too, for which a vehicle that is held takes up every input with a moment of its own.
+/// Returns the profile's settings without reference model and input filters, whose memory would hide jumps. Also
+/// without the moment observer, which would compensate every input of a vehicle that is held.
 fn direct() -> Settings {
     let settings = Profile::Flight.settings();
     Settings {
@@ -44,18 +44,18 @@ fn bounds() -> Bounds {
     Bounds::new(&Profile::Flight.gains(), &Parameters::PAPER.to_f32(), &direct())
 }
 
-/// Bounds exceeded in the first step with an error of roll: an estimate above zero.
+/// Returns bounds that trip in the first step with an error of roll: any estimate above zero trips.
 fn hair_trigger() -> Bounds {
     Bounds { theta: PerAxis { roll: 0.0, ..bounds().theta }, ..bounds() }
 }
 
-/// Bounds that are never exceeded.
+/// Returns bounds that never trip.
 fn lax() -> Bounds {
     let most = PerAxis::from_fn(|_| 1e9);
     Bounds { theta: most, delta: most, error: most, saturation_share: 1.0, swing_n: 1e4, swings_hz: 1e4 }
 }
 
-/// A state with errors that are not zero, and with a fallback law within its integral's bounds.
+/// Draws a state with errors that keep the fallback law within its integral's bounds.
 fn near() -> impl Strategy<Value = State> {
     prop::array::uniform12(-0.05_f32..0.05).prop_map(|[x, y, z, u, v, w, a, b, c, p, q, r]| State {
         position_m: Vector3::new(x, y, z),
@@ -65,14 +65,14 @@ fn near() -> impl Strategy<Value = State> {
     })
 }
 
-/// Checks for no jump beyond rounding, a few operations on numbers of this size, and one step of learning.
+/// Checks that there is no jump, apart from rounding of a few operations and one step of learning.
 fn same(before: &Stepped, after: &Stepped) -> Result<(), TestCaseError> {
     let (errors, gains) = (before.trace.errors, Profile::Flight.gains());
     let (before, after) = (before.per_axis(), after.per_axis());
     for axis in Axis::ALL {
         let (before, after) = (f64::from(before[axis]), f64::from(after[axis]));
         let learnt = 1e-3 * f64::from(gains[axis].gamma * errors[axis].e2).abs();
-        // What is observed of 1 m/s2 changes by w/e per second, at most.
+        // The observed value of 1 m/s2 changes by at most w/e per second.
         let w = f64::from(direct().disturbance.disturbance_rad_s);
         let observed = if matches!(axis, Axis::X | Axis::Y) { 1e-3 * w / core::f64::consts::E } else { 0.0 };
         let allowed = 16.0 * U * (before.abs() + 20.0) + 1.001 * learnt + observed;
@@ -84,7 +84,7 @@ fn same(before: &Stepped, after: &Stepped) -> Result<(), TestCaseError> {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 500, failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// For any inputs, tripped or not, engaged or not: finite commands within limits, and the screen's flags.
+    /// For any inputs, tripped or not, engaged or not: finite commands within limits, and the right health flags.
     #[test]
     fn any_input_gives_valid_motor_commands(
         gains in gains(),
@@ -120,7 +120,7 @@ proptest! {
         }
     }
 
-    /// Until it trips, it is AFBC bit for bit, and engaging has no effect.
+    /// Until it trips, it equals AFBC bit for bit, and engaging has no effect.
     #[test]
     fn untripped_it_is_the_law(inputs in prop::collection::vec((state(plausible), setpoint(plausible)), 50)) {
         let settings = Profile::Flight.settings();
@@ -144,8 +144,8 @@ proptest! {
         prop_assert_eq!(memory.control.trip(), None);
     }
 
-    /// At a constant state the three steps around a trip, and those around engaging again, have the same inputs: AFBC's
-    /// last, the fallback law's first; the fallback law's last, AFBC's first.
+    /// At a constant state, a trip and an engagement cause no jump: the last inputs of one law equal the first inputs
+    /// of the other.
     #[test]
     fn hand_over_is_bumpless_in_both_directions(state in near(), setpoint in near(), lasting in 0_usize..300) {
         // Otherwise there is no error of roll to trip on.
@@ -173,7 +173,7 @@ proptest! {
         for _ in 0..lasting {
             last_of_fallback = step(&controller, &mut memory, &state, &setpoint);
         }
-        // Otherwise it may stand on the ground by then, where nothing trips.
+        // Otherwise the vehicle may stand on the ground by then, where nothing trips.
         prop_assume!(last_of_fallback.trace.inputs.thrust_n >= LIFT_SHARE * WEIGHT_N);
         controller.engage(&mut memory.control);
         let first_of_afbc = step(&controller, &mut memory, &state, &setpoint);
@@ -181,8 +181,8 @@ proptest! {
         position_is_the_same(&last_of_fallback, &first_of_afbc)?;
     }
 
-    /// Bumpless engagement for attitude, whose reference changes from step to step: held constant by a filter at rest.
-    /// With a law that is given what is known, and with one that learns the weight, too.
+    /// Hand-over without a jump for attitude, whose reference usually changes from step to step, so a filter at rest
+    /// holds it constant. With feed-forward, and with a law that also learns the weight.
     #[test]
     fn hand_over_at_rest_is_bumpless_in_all_axes(
         height in -0.2_f32..0.2, yaw in -0.2_f32..0.2, feed_forward: bool,
@@ -246,7 +246,7 @@ fn the_fallback_takes_over_no_more_than_its_bound() {
     }
 }
 
-/// Standing on the ground with a setpoint below it does not trip, for any time and with any saturation.
+/// Standing on the ground with a setpoint below it never trips, whatever the saturation.
 #[test]
 fn the_ground_does_not_trip() {
     let controller = guarded(bounds());
@@ -257,7 +257,7 @@ fn the_ground_does_not_trip() {
         assert!(command.action.health.saturated);
     }
     assert_eq!(memory.control.trip(), None);
-    // In the air, sinking, it does.
+    // Sinking in the air, it trips.
     let sinking = State { velocity_m_s: Vector3::new(0.0, 0.0, -0.5), ..State::default() };
     for _ in 0..5_000 {
         step(&controller, &mut memory, &sinking, &below);
@@ -274,7 +274,7 @@ fn a_tripped_controller_learns_nothing_and_says_why() {
     while memory.control.trip().is_none() {
         step(&controller, &mut memory, &state, &setpoint);
     }
-    // The monitor has updated each subsystem's norms within the last six steps: adaptation would change them.
+    // The monitor has updated each subsystem's norms within the last six steps, so adaptation would change them.
     let seen = *memory.control.figures();
     assert!(Axis::ALL.iter().any(|axis| seen.norms[*axis].theta_squared > 0.0), "{seen:?}");
     for _ in 0..1000 {
@@ -298,7 +298,7 @@ fn bounds_and_gains_out_of_range_are_refused_by_name() {
     assert_eq!(name(settings.with_dt_s(0.0), gains, bounds()), "dt_s");
 }
 
-/// The error contains the value needed.
+/// The error contains the required value.
 #[test]
 fn a_vehicle_that_cannot_hover_is_refused_by_name() {
     let settings = Profile::Flight.settings();
@@ -318,10 +318,10 @@ fn a_vehicle_that_cannot_hover_is_refused_by_name() {
             }
         }
     }
-    // A light vehicle with that inertia turns too slowly.
+    // A light vehicle with the paper's inertia turns too slowly.
     let light = of_mass(0.05);
     assert_eq!(refusal(light, Profile::Flight.gains_for(&light, afbc::LAG_S)), Some(("hover_authority_rad_s2", 80.0)));
-    // With the gains of the paper's vehicle a heavier one would trip in an ideal hover, if its rotors could lift it.
+    // With the gains of the paper's vehicle a heavier one would trip in an ideal hover, even with strong enough rotors.
     let strong = |mass_kg: f32| {
         let gains = Profile::Flight.gains();
         let settings = settings.with_rotor_force_max_n(100.0);
@@ -332,8 +332,8 @@ fn a_vehicle_that_cannot_hover_is_refused_by_name() {
     assert_eq!((error.range.name, error.range.min), ("theta_max", 17.1283));
 }
 
-/// For the paper's vehicle they are the profile's own, bit for bit; if every input has half the effect, those in the
-/// input's unit are twice as large.
+/// For the paper's vehicle the gains are the profile's own, bit for bit. If every input has half the effect, gains in
+/// the input's unit are twice as large.
 #[test]
 fn gains_are_scaled_by_what_an_input_does() {
     for profile in Profile::ALL {
@@ -354,14 +354,14 @@ fn gains_are_scaled_by_what_an_input_does() {
     }
 }
 
-/// The estimates after engaging are spread over the rules within the monitor's bounds, so it does not trip at once.
+/// After engaging, the estimates are spread over the rules within the monitor's bounds, so it does not trip at once.
 #[test]
 fn engaging_does_not_trip_by_itself() {
     let bounds = bounds();
     for yaw_n in [0.5_f32, 1.5, -1.5, 2.4] {
         let (controller, (_, mut memory)) = (guarded(bounds), tripped(0, 0.0));
         step(&controller, &mut memory, &State::default(), &Setpoint::default());
-        // Held by force: the integral of gamma e_2 grows by 1 mN per step.
+        // The vehicle is held by force: the integral of gamma e_2 grows by 1 mN per step.
         let e2 = 1.0 / Profile::Flight.gains().yaw.gamma;
         let turning = Setpoint { yaw_rate_rad_s: e2.copysign(yaw_n), ..Setpoint::default() };
         for _ in 0..(yaw_n.abs() * 1e3) as usize {
@@ -383,8 +383,8 @@ fn engaging_does_not_trip_by_itself() {
     }
 }
 
-/// A vehicle that does not know where it is tells its law so: the disturbance that it knew stays, whatever the
-/// reckoned motion looks like, with the monitor and without.
+/// When the position is lost, the law keeps its observed disturbance, whatever the dead-reckoned motion looks like,
+/// with and without the monitor.
 #[test]
 fn a_reckoned_motion_shows_no_disturbance() {
     fn push<C: FlightController>(controller: &C, position_lost: bool) -> [f32; 2] {
@@ -416,14 +416,14 @@ fn a_reckoned_motion_shows_no_disturbance() {
     check(&Controller::new(Parameters::PAPER.to_f32(), direct(), law).unwrap());
 }
 
-/// The law that has taken over observes as AFBC does, and is told the same: a reckoned motion is no wind to it either.
+/// The fallback law's observer gets the same notice: a dead-reckoned motion is no wind to it either.
 #[test]
 fn a_reckoned_motion_shows_the_fallback_law_no_disturbance() {
     let controller = guarded(lax());
     let asked = [false, true].map(|position_lost| {
         let ((_, mut memory), mut state) = (tripped(50, 0.0), State::default());
         let mut asked = 0.0;
-        // Pushed, and then not, if the motion is to be believed. On its setpoint: nothing is learnt from errors.
+        // Pushed first, then not, if the motion were measured. On its setpoint, so nothing is learnt from errors.
         for accelerates_m_s2 in [1.0, 0.0] {
             for _ in 0..1000 {
                 if position_lost && accelerates_m_s2 == 0.0 {
@@ -443,19 +443,19 @@ fn a_reckoned_motion_shows_the_fallback_law_no_disturbance() {
     assert!((calm - reckoned - 1.0).abs() < 0.05, "{calm}, {reckoned} m/s2");
 }
 
-/// Large learnt inputs fit the bounds only if they are spread by the weights of the present rules, which are those of
-/// each attitude's own angle and rate: the inputs do not change.
+/// Large learnt inputs fit the bounds only if they are spread by the weights of the present rules, which depend on each
+/// attitude's own angle and rate. The inputs do not change.
 #[test]
 fn engaging_is_bumpless_where_no_even_estimate_fits() {
     let (bounds, (_, mut memory), mut gains) = (bounds(), tripped(0, 0.0), Profile::Flight.gains());
-    // Yaw, which misses what the others miss as well, would be at the rotors' limit first.
+    // Without adaptation of yaw, which would reach the rotors' limit first.
     gains.yaw.gamma = 0.0;
-    // By the thrust, the tilt would step with the hover thrust, which only AFBC learns of.
+    // Without `tilt_by_thrust`: the tilt would jump with the hover thrust, which only AFBC learns.
     let settings = Settings { tilt_by_thrust: false, ..direct() };
     let controller = Guarded::new(Parameters::PAPER.to_f32(), settings, gains, bounds).unwrap();
-    // At rest, where AFBC does not miss the rotors' moments on a body that turns, which only the other law knows.
+    // At rest, where the gyroscopic moment of the rotors is zero: only the fallback law compensates it.
     let state = State { attitude_rad: Vector3::new(-0.16, 0.15, 0.9), ..State::default() };
-    // Jerk asks for angles ahead of those which are held, so that both integrals grow.
+    // The jerk asks for angles ahead of the held ones, so that both integrals grow.
     let (sin, cos) = 0.9_f32.sin_cos();
     let jerk_m_s3 = Vector3::new(cos - sin, sin + cos, 0.0) * 10.0;
     let setpoint = Setpoint { yaw_rad: 0.9, jerk_m_s3, ..Setpoint::default() };
@@ -478,10 +478,10 @@ fn engaging_is_bumpless_where_no_even_estimate_fits() {
     }
 }
 
-/// The fallback law keeps AFBC's learnt hover thrust: the tilt for an acceleration does not change.
+/// The fallback law keeps AFBC's learnt hover thrust, so the tilt for an acceleration does not change.
 #[test]
 fn the_tilt_does_not_step_at_a_trip() {
-    // Acceleration of the thrust by (40) at yaw 0 [m/s2].
+    // Vertical acceleration by the thrust in (40) at yaw 0 [m/s2].
     let vertical = |command: &Stepped| command.trace.virtual_m_s2[0] / command.trace.desired_rad[1].tan();
     let (controller, (before, mut memory)) = (guarded(bounds()), tripped(300, 0.1));
     for _ in 0..20 {
@@ -497,8 +497,8 @@ fn the_tilt_does_not_step_at_a_trip() {
     }
 }
 
-/// A flight of a vehicle that sinks slightly for `steps`, then moves sideways, until errors of z trip it; returns the
-/// step that tripped.
+/// Flies a vehicle that sinks slightly for `steps`, then moves sideways, until errors of z trip. Returns the step that
+/// tripped.
 fn tripped(steps: usize, aside_m: f32) -> (Stepped, Flight) {
     let controller = guarded(bounds());
     let mut memory = Flight::default();
@@ -516,8 +516,7 @@ fn tripped(steps: usize, aside_m: f32) -> (Stepped, Flight) {
     (last, memory)
 }
 
-/// A moment that was observed is made up for by whoever flies next: no input jumps when the monitor trips, nor when
-/// AFBC is engaged again.
+/// The next law keeps compensating an observed moment: no input jumps when the monitor trips or AFBC is engaged again.
 #[test]
 fn what_turns_the_vehicle_is_handed_over() {
     let paper = Parameters::PAPER.to_f32();
@@ -527,7 +526,7 @@ fn what_turns_the_vehicle_is_handed_over() {
     let moment = Vector3::new(3.0, -2.0, 0.5);
     let (calm, hasty) = (trips_after(lax()), trips_after(Bounds { theta: PerAxis::from_fn(|_| 0.0), ..lax() }));
     let (mut memory, mut rates) = (Flight::default(), Vector3::zeros());
-    // Turns as its rotors and the moment say, but stays where it is.
+    // The vehicle turns by its rotors and the moment, but stays in place.
     let mut fly = |controller: &Guarded, engage: bool| {
         if engage {
             assert!(controller.engage(&mut memory.control));

@@ -1,4 +1,4 @@
-//! The fallback law compared with its equations in `f64`, and its proof.
+//! Compares the fallback law with its equations in `f64`, and checks its stability proof.
 #![allow(clippy::unwrap_used, missing_docs)] // a law that cannot be built must stop the test
 
 use afbc::integral::{Gains, Integral, IntegralBackstepping};
@@ -33,8 +33,8 @@ fn gains() -> impl Strategy<Value = Gains> {
     )
 }
 
-/// Runs one step of the subsystem x, with f = 0 and g = 1: u of this law and, of the same errors, u of the baseline,
-/// which is what this law adds its integral to; and e_2.
+/// Runs one step of the subsystem x, with f = 0 and g = 1. Returns u of this law, u of the baseline for the same errors
+/// (to which the integral is added), and e_2.
 fn step(gains: Gains, tracking: &Tracking, unallocated: f32, adapt: bool, integral: &mut Integral) -> [f32; 3] {
     let vehicle = Parameters::PAPER.to_f32();
     let law = IntegralBackstepping::new(&vehicle, PerAxis::from_fn(|_| gains)).unwrap();
@@ -58,8 +58,8 @@ fn step(gains: Gains, tracking: &Tracking, unallocated: f32, adapt: bool, integr
 proptest! {
     #![proptest_config(ProptestConfig { cases: 5_000, failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// u = u*_eq + alpha_2 e_2 + i; then i grows by kappa e_2 dt, but not without a new state, and not towards a limit
-    /// that has been reached; and i stays within +-i_max.
+    /// u = u*_eq + alpha_2 e_2 + i. Then i grows by kappa e_2 dt, but not without a new state, not towards a reached
+    /// limit, and only within +-i_max.
     #[test]
     fn a_step_adds_the_integral_and_then_moves_it(
         gains in gains(), tracking in tracking(), value in -12.0_f32..12.0, adapt: bool,
@@ -76,7 +76,7 @@ proptest! {
         prop_assert_eq!((integral.resume, integral.hover_thrust_n), (None, None));
     }
 
-    /// It continues with the input that it is given, as far as its bound allows, and only once.
+    /// The law continues with the input to resume, once and as far as its bound allows.
     #[test]
     fn it_takes_over_with_the_last_input(gains in gains(), tracking in tracking(), last in -20.0_f32..20.0) {
         let mut integral = Integral { value: 3.0, resume: Some(last), hover_thrust_n: None };
@@ -89,8 +89,8 @@ proptest! {
         prop_assert_eq!(again, u);
     }
 
-    /// V = (c e_1^2 + e_2^2 + (i* - i)^2/kappa)/2 with i* = -d never grows under a constant disturbance d:
-    /// V' = -c alpha_1 e_1^2 - alpha_2 e_2^2.
+    /// V = (c e_1^2 + e_2^2 + (i* - i)^2/kappa)/2 with i* = -d never grows under a constant disturbance d: V' = -c
+    /// alpha_1 e_1^2 - alpha_2 e_2^2.
     #[test]
     fn lyapunov(gains in gains(), tracking in tracking(), value in -5.0_f32..5.0, d in -5.0_f64..5.0) {
         let gains = Gains { integral_max: 10.0, ..gains };
@@ -105,13 +105,13 @@ proptest! {
         let missing = -d - f64::from(value);
         let slope = c * e1 * e1_dot + e2 * e2_dot - missing * i_dot / kappa;
         let wanted = -c * a1 * e1 * e1 - a2 * e2 * e2;
-        // i moves by a small part of itself in a step: its rounding counts over dt and kappa.
+        // i changes by a small part of itself per step, so its rounding error is divided by dt and kappa.
         let allowed = 1e-4 * (1.0 + wanted.abs() + a1 * a1 * e1.abs() * e2.abs()) + 10.0 * 1.2e-6 / 1e-3 / kappa;
         prop_assert!((slope - wanted).abs() <= allowed, "{slope} instead of {wanted}");
     }
 }
 
-/// As fast as AFBC with one rule, within the same bound; and AFBC's hover thrust, or without one the weight.
+/// As fast as AFBC with one rule and the same bound, with AFBC's hover thrust or else the weight.
 #[test]
 fn it_stands_in_for_afbc() {
     let gains = Profile::Flight.gains();

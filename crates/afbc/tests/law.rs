@@ -50,11 +50,11 @@ fn estimate() -> impl Strategy<Value = AdaptiveEstimate> {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 5_000, failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// The effect of (16) with (21) for known f, g and dg/dt. (15) claims V_dot = -alpha_1 e_1^2 - alpha_2 e_2^2 of
-    /// (14), but divides e_1 by g where (14) does not: this is true for g = 1 only, and otherwise e_1 e_2 (1 - 1/g)
-    /// remains. The errors still converge: with the law as printed, half the sum of their squares has the derivative
-    /// -alpha_1 e_1^2 - g alpha_2 e_2^2 + dg/dt e_2^2 / 2g, never positive for a constant g. With the weight c of e_1
-    /// the same holds of (c e_1^2 + e_2^2)/2 and -c alpha_1 e_1^2.
+    /// Checks the Lyapunov derivative under (16) with (21) for known f, g and dg/dt. (15) claims V_dot = -alpha_1 e_1^2
+    /// - alpha_2 e_2^2 for (14), but divides e_1 by g where (14) does not. So the claim holds for g = 1 only; otherwise
+    /// e_1 e_2 (1 - 1/g) remains. The errors still converge: with the law as printed, half the sum of their squares has
+    /// the derivative -alpha_1 e_1^2 - g alpha_2 e_2^2 + dg/dt e_2^2 / 2g, never positive for a constant g. With the
+    /// weight c of e_1 the same holds for (c e_1^2 + e_2^2)/2 and -c alpha_1 e_1^2.
     #[test]
     fn lyapunov(
         tracking in tracking(),
@@ -73,8 +73,8 @@ proptest! {
         let [f, g, g_dot, x1d_ddot, u] = [f, g, g_dot, tracking.x1d_ddot, u].map(f64::from);
         let e1_dot = e2 - a1 * e1; // (13)
         let e2_dot = a1 * (e2 - a1 * e1) + x1d_ddot - f - g * u; // (13)
-        // u is rounded at most 12 times relative to its largest terms; both derivatives contain e_2 g u, the first over
-        // g.
+        // u is rounded at most 12 times relative to its largest terms. Both derivatives contain e_2 g u; the first
+        // divides it by g.
         let terms = c * e1.abs()
             + a1 * e2.abs()
             + a1 * a1 * e1.abs()
@@ -96,8 +96,8 @@ proptest! {
         prop_assert!(g != 1.0 || left_over == 0.0);
     }
 
-    /// At the speed limit e_2 is the lack of speed of approach, and the law changes speed at its rate gain alpha_1 +
-    /// alpha_2 g until e_2 is zero; where the limit begins it is (16) and (21). For x: f = 0, g = 1.
+    /// At the speed limit e_2 is the missing approach speed, and the law changes the speed with the rate gain alpha_1 +
+    /// alpha_2 g until e_2 is zero. Where the limit begins, the law equals (16) and (21). For x: f = 0, g = 1.
     #[test]
     fn at_the_speed_limit_e2_is_the_lack_of_speed(
         tracking in tracking(), alpha1 in 0.01_f32..10.0, alpha2 in 0.1_f32..20.0, stiffness in 0.0_f32..50.0,
@@ -130,9 +130,9 @@ proptest! {
         prop_assert!((f64::from(unlimited) - f64::from(u)).abs() <= allowed, "{unlimited} and {u}");
     }
 
-    /// What the law is told of the model is (16) by that model, in this state, besides what it learns and adds: AFBC
-    /// with drag and what is observed for f of x, y and z, and none of roll, pitch and yaw if that is observed, the
-    /// baseline with the rotors' residual.
+    /// The feed-forward is (16) by the known model in this state, in addition to what the law learns. AFBC uses drag
+    /// and the observed f for x, y and z, and no gyroscopic f for roll, pitch and yaw if that is observed; the baseline
+    /// uses the rotor residual.
     #[test]
     fn what_is_known_is_the_ideal_law_of_the_model(
         tracking in tracking(),
@@ -187,7 +187,7 @@ proptest! {
         }
     }
 
-    /// (12), (13): e_2 is what remains of e_1's dynamics.
+    /// (12), (13): e_2 is the remainder of e_1's dynamics.
     #[test]
     fn errors_obey_13(tracking in tracking(), alpha1 in 0.01_f32..10.0) {
         let errors = tracking.errors(alpha1);
@@ -216,7 +216,7 @@ proptest! {
         let w = Basis::new(gains.membership).unwrap().weights(inputs);
         let products = w.zip_map(&estimate.theta, |w, theta| f64::from(w) * f64::from(theta));
         prop_assert!((f64::from(terms.fuzzy) - products.sum()).abs() <= 10.0 * U * products.abs().sum());
-        // A weighted mean is between the smallest and the largest.
+        // A weighted mean is between the smallest and the largest value.
         let slack = 16.0 * U as f32 * estimate.theta.abs().max();
         prop_assert!(terms.fuzzy >= estimate.theta.min() - slack && terms.fuzzy <= estimate.theta.max() + slack);
 
@@ -240,8 +240,9 @@ proptest! {
         let e2 = f64::from(errors.e2);
         for (rate, w) in rate.theta().iter().zip(w.iter()) {
             let wanted = f64::from(gains.gamma) * e2 * f64::from(*w);
-            // A weight rounds five times, not counting the sums of memberships, which are the same; a rate seven times.
-            // A product of memberships below the normal numbers is off by 1.4e-45, over a sum of at least q^2 = 2e-16.
+            // A weight has five roundings, not counting the sums of memberships, which are the same; a rate has seven.
+            // A product of memberships below the normal numbers is off by 1.4e-45, divided by a sum of at least q^2 =
+            // 2e-16.
             let least = 1e-29 * f64::from(gains.gamma) * e2.abs();
             prop_assert!(
                 (f64::from(*rate) - wanted).abs() <= 12.0 * U * wanted.abs() + least + 1e-44,
@@ -258,7 +259,7 @@ proptest! {
         prop_assert!((f64::from(rate.delta()) - wanted).abs() <= f64::from(gains.eta) * e2.abs() * (1.4e-7 + 5.0 * U));
     }
 
-    /// The six subsystems: their fuzzy inputs (Section IV), Euler's step, and the freeze.
+    /// The six subsystems: their fuzzy inputs (Section IV), the Euler step, and the freeze.
     #[test]
     fn a_step_uses_the_estimate_as_it_stood_and_then_moves_it(
         tracking in tracking(),
@@ -305,8 +306,8 @@ proptest! {
     }
 }
 
-/// Hover thrust: what is known of the weight and what the rule of zero error has learnt, but at least 0.3 of the
-/// weight; for a law that learns nothing the weight. A start in flight knows the weight.
+/// The hover thrust is the known weight plus Theta_hat of the rule for zero error, but at least 0.3 of the weight. It
+/// is the weight for a law that learns nothing, and at a start in flight.
 #[test]
 fn the_hover_thrust_is_what_carries_the_vehicle() {
     let gains = Profile::Paper.gains();
@@ -333,8 +334,8 @@ fn the_hover_thrust_is_what_carries_the_vehicle() {
     assert_eq!(PerAxis { z: AdaptiveEstimate::default(), ..started }, PerAxis::default());
 }
 
-/// The speed at which an error is approached: where what is known and what is added cancel, for the g of each input;
-/// where nothing is known alpha_1.
+/// The approach speed is the speed at which the known part and u_pd cancel, for the g of each input; without a known
+/// model it is alpha_1.
 #[test]
 fn an_error_is_approached_at_the_speed_that_the_law_holds() {
     let (vehicle, gains) = (Parameters::PAPER.to_f32(), Profile::Flight.gains());
@@ -348,7 +349,7 @@ fn an_error_is_approached_at_the_speed_that_the_law_holds() {
         for approach in
             [adaptive.approach(axis, Some(&model)), fixed.approach(axis, None), integral.approach(axis, None)]
         {
-            // e_1 = 1 m, and the vehicle approaches at that speed: no input but that against f.
+            // At e_1 = 1 m and this approach speed, the only input is the one against f.
             let tracking = Tracking { x2: approach, e1: 1.0, ..Tracking::default() };
             let errors = tracking.errors(of.alpha1);
             let u = ideal(&of, &errors, 0.0, &dynamics) + proportional(of.alpha2, &errors);

@@ -21,7 +21,7 @@ fn adaptive(gains: PerAxis<afbc::adaptive::Gains>, settings: Settings) -> Contro
     Controller::new(Parameters::PAPER.to_f32(), settings, Adaptive::new(gains).unwrap()).unwrap()
 }
 
-/// The profile's settings without what has a memory between setpoint and law, and between law and rotors.
+/// Returns the profile's settings without reference model and input filters.
 fn direct() -> Settings {
     Settings { reference: ReferenceModel::DEFAULT, smoothing: Smoothing::DEFAULT, ..Profile::Flight.settings() }
 }
@@ -30,11 +30,11 @@ fn flight(limits: Limits) -> Controller<Adaptive> {
     adaptive(Profile::Flight.gains(), Settings { limits, ..direct() })
 }
 
-/// Tangent of the angle between vertical and thrust in the desired attitude.
+/// Returns the tangent of the angle between vertical and thrust in the desired attitude.
 fn tilt_tangent(command: &Stepped) -> f64 {
     let [phi, theta] = command.trace.desired_rad.map(f64::from);
     let cosine = phi.cos() * theta.cos();
-    // From 1 - cos^2 = sin^2 phi + cos^2 phi sin^2 theta, which is accurate near zero.
+    // Uses 1 - cos^2 = sin^2 phi + cos^2 phi sin^2 theta, which is accurate near zero.
     (phi.sin().powi(2) + (phi.cos() * theta.sin()).powi(2)).sqrt() / cosine
 }
 
@@ -71,8 +71,8 @@ proptest! {
         }
     }
 
-    /// (40) gives the accelerations (u5, u6), reduced to the limits: with the vertical part of the commanded thrust, in
-    /// the same direction, at any yaw.
+    /// (40) gives the accelerations (u5, u6), reduced to the limits in the same direction, with the vertical part of
+    /// the commanded thrust, at any yaw.
     #[test]
     fn limits_cut_the_size_and_keep_the_direction(
         state in state(plausible),
@@ -97,10 +97,10 @@ proptest! {
 
         let [phi, theta] = command.trace.desired_rad.map(f64::from);
         let (forward, left) = (vertical * theta.tan(), -vertical * phi.tan() / theta.cos());
-        // By rotation, roll and pitch are those of an attitude with the setpoint's yaw.
+        // By rotation, roll and pitch belong to an attitude with the setpoint's yaw.
         let (sin, cos) = f64::from(if settings.by_rotation { setpoint.yaw_rad } else { yaw_rad }).sin_cos();
         let got = [forward * cos - left * sin, forward * sin + left * cos];
-        // Rotation, and the rounding of angles near 90 degrees, amplified by their tangent.
+        // Errors of the rotation, and rounding of angles near 90 degrees, amplified by their tangent.
         let steep = (scale * size / vertical).powi(2) + 1.0;
         let allowed = scale * size * ROTATION + 8.0 * U * vertical * steep;
         prop_assert!(
@@ -109,9 +109,10 @@ proptest! {
         );
     }
 
-    /// (12) with e_1 of x, y and z such that the speed of approach is within the limit, in addition to the reference's
-    /// speed: alpha_1 e_1, and with feed-forward position over rate gain. Within it e_1 is the distance.
-    // At the limit e_2 has the speed of approach for alpha_1.
+    /// (12) with e_1 of x, y and z cut so that the approach speed stays within the limit, in addition to the
+    /// reference's speed. The approach speed is alpha_1 e_1, or with feed-forward the position gain divided by the rate
+    /// gain, times e_1. Within the limit e_1 is the distance.
+    // At the limit, e_2 uses the approach speed per error for alpha_1.
     #[test]
     fn errors_ask_for_no_more_than_the_speed_limit(
         gains in gains(),
@@ -146,7 +147,7 @@ proptest! {
         }
     }
 
-    /// Adding whole turns to the setpoint's yaw changes nothing, and the yaw error is wrapped to +-pi.
+    /// Whole turns added to the setpoint's yaw change nothing, and the yaw error is wrapped to +-pi.
     #[test]
     fn the_yaw_error_is_wrapped(yaw in -3.0_f32..3.0, wanted in -3.0_f32..3.0, turns in -20_i32..20) {
         let error = |yaw_rad: f32, wanted_rad: f32| {
@@ -195,7 +196,7 @@ fn a_distant_setpoint_is_approached_at_the_speed_limit() {
     check(&Controller::new(vehicle, settings, IntegralBackstepping::new(&vehicle, integral).unwrap()).unwrap());
 }
 
-/// Attitudes at all angles, upside down included: no division by the cosine of the tilt fails.
+/// Attitudes at all angles, including upside down: no division by the cosine of the tilt fails.
 #[test]
 fn no_attitude_is_singular() {
     let controller = flight(Profile::Flight.settings().limits);

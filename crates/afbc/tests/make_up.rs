@@ -1,4 +1,4 @@
-//! The cascade compensates moments that it observes, and those that it knows, beside the law's own inputs.
+//! The cascade compensates observed and known moments in addition to the law's own inputs.
 
 use crate::common::step;
 use afbc::disturbance::AGE_S;
@@ -10,17 +10,17 @@ use nalgebra::{UnitQuaternion, Vector3};
 use proptest::prelude::*;
 
 const DT_S: f32 = 0.001;
-/// Lag of the rotors that the profile `flight` is for \[s\].
+/// Lag of the rotors for which the profile `flight` is made \[s\].
 const LAG_S: f32 = 0.02;
 
-/// A vehicle that flies along at a constant velocity under the law of the profile `flight`.
+/// A vehicle that flies at a constant velocity with AFBC in the profile `flight`.
 struct Vehicle {
     controller: Controller<Adaptive>,
     smoother: Smoother,
     parameters: Parameters,
     drag: KnownDrag,
     state: State,
-    /// Its rates as they are measured, which are as old as the observer takes them to be \[rad/s\].
+    /// Measured rates, delayed to the age that the observer assumes \[rad/s\].
     seen_rad_s: Vector3<f32>,
     along_m_s: Vector3<f32>,
     /// Thrust and moments that the rotors give.
@@ -28,7 +28,7 @@ struct Vehicle {
 }
 
 impl Vehicle {
-    /// A vehicle in trim: it leans into the drag, and its rotors make up for the drag's moment already.
+    /// Creates a vehicle in trim: it leans into the drag, and its rotors already compensate the drag's moment.
     fn new(drag: KnownDrag, along_m_s: Vector3<f32>) -> Self {
         let flight = Profile::Flight.settings();
         let settings = Settings { common: afbc_control::Settings { drag, ..flight.common }, ..flight };
@@ -57,7 +57,7 @@ impl Vehicle {
         UnitQuaternion::from_euler_angles(roll, pitch, yaw)
     }
 
-    /// Returns by what the drag of the rotors, above the centre of mass, turns it \[rad/s2\].
+    /// Returns the angular acceleration by the drag of the rotors above the centre of mass \[rad/s2\].
     fn drag_turns(&self) -> Vector3<f32> {
         let v = self.attitude().inverse() * self.state.velocity_m_s;
         let force = v * -(self.drag.rotor_drag_1_s * (self.given.thrust_n / self.parameters.weight_n()).sqrt());
@@ -65,7 +65,7 @@ impl Vehicle {
         moment.component_div(&self.parameters.inertia_kg_m2)
     }
 
-    /// Moves for a step under this angular acceleration beside that of the rotors.
+    /// Moves one step under this angular acceleration in addition to the rotors'.
     fn advance(&mut self, asked: &Inputs, moment_rad_s2: &Vector3<f32>) {
         let share = 1.0 - (-DT_S / LAG_S).exp();
         let Inputs { roll_n, pitch_n, yaw_n, thrust_n } = &mut self.given;
@@ -85,8 +85,8 @@ impl Vehicle {
         *attitude_rad = Vector3::new(roll, pitch, yaw);
     }
 
-    /// Flies so many steps under `moment_rad_s2` beside the drag's; returns in each the angular acceleration that is
-    /// asked of the rotors beyond what the law itself asks, and that by the drag \[rad/s2\].
+    /// Flies `steps` steps under `moment_rad_s2` in addition to the drag's moment. Returns for each step the angular
+    /// acceleration asked of the rotors beyond the law's own inputs, and that by the drag \[rad/s2\].
     fn fly(&mut self, steps: u16, moment_rad_s2: &Vector3<f32>) -> Vec<[Vector3<f32>; 2]> {
         let (mut memory, mut smoothed) = (Validated::default(), None);
         let mut made_up = |number: u16| {
@@ -110,7 +110,7 @@ impl Vehicle {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 16, failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// A constant moment, as of a payload off the centre, is made up for as a whole, so that the law need not learn it.
+    /// A constant moment, as of a payload off the centre, is fully compensated, so that the law need not learn it.
     #[test]
     fn a_constant_moment_is_made_up_for(x in 1.0_f32..6.0, y in -6.0_f32..-1.0, z in 0.3_f32..1.0, turned: bool) {
         let moment = Vector3::new(x, y, z) * if turned { -1.0 } else { 1.0 };
@@ -120,14 +120,15 @@ proptest! {
         prop_assert!(off < 0.05, "{made_up:?} for {moment:?}");
     }
 
-    /// The moment of a drag that is known is made up for before it is observed, and not a second time then.
+    /// A known drag's moment is compensated before it is observed, and not a second time afterwards.
     #[test]
     fn a_known_drag_turns_nothing(x in 2.0_f32..5.0, y in -5.0_f32..-2.0, height in 0.02_f32..0.1, below: bool) {
         let rotor_height_m = if below { -height } else { height };
         let drag = KnownDrag { rotor_drag_1_s: 0.4, body_drag_1_m: 0.01, rotor_height_m };
         let flown = Vehicle::new(drag, Vector3::new(x, y, 0.0)).fly(1_500, &Vector3::zeros());
-        // In the first step no thrust is known that the drag could depend on. Until rotors and rates have followed, the
-        // observer sees some of it; without it, or with it twice, all of it would be missing.
+        // In the first step the drag is unknown, because it depends on the last thrust. Until rotors and rates have
+        // followed, the observer sees some of the moment. Without the compensation, or with it twice, the error would
+        // be the whole moment.
         for (number, [made_up, drag]) in flown.into_iter().enumerate().skip(1) {
             let off = (made_up + drag).norm() / drag.norm();
             let most = if number < 300 { 0.6 } else { 0.1 };

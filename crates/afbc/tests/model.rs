@@ -1,4 +1,4 @@
-//! The nominal model (7) compared with rigid-body mechanics in `f64`, and d eta/dt with the rotation that it describes.
+//! Compares the nominal model (7) with rigid-body mechanics in `f64`, and d eta/dt with the rotation that it describes.
 #![allow(clippy::indexing_slicing, clippy::unwrap_used, missing_docs)] // what cannot be built must stop the test
 
 use crate::common::{U, spread, step};
@@ -45,8 +45,8 @@ fn rates() -> impl Strategy<Value = Vector3<f32>> {
     prop::array::uniform3(-5.0_f32..5.0).prop_map(Vector3::from)
 }
 
-/// d eta/dt that the law tracks, from what it traces: d e_1/dt = d x_1d/dt - d eta/dt, with a setpoint that does not
-/// turn.
+/// Returns the d eta/dt that the law uses, from its trace: d e_1/dt = d x_1d/dt - d eta/dt, with a setpoint that does
+/// not turn.
 fn eta_dot(settings: Settings, attitude_rad: Vector3<f32>, rates_rad_s: Vector3<f32>) -> Vector3<f64> {
     let law = Adaptive::new(Profile::Paper.gains()).unwrap();
     let controller = Controller::new(Parameters::PAPER.to_f32(), settings, law).unwrap();
@@ -65,8 +65,8 @@ fn printed(feed_forward: bool) -> Settings {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 2_000, failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// Roll, pitch and yaw: I dOmega/dt = moments - Omega x (I Omega), of the body and of its rotors, whose inertia is
-    /// I_r and whose angular velocity -omega along body z; and each input's moment.
+    /// Roll, pitch and yaw: I dOmega/dt = moments - Omega x (I Omega), for the body and for its rotors, which have the
+    /// inertia I_r and the angular velocity -omega along body z. Also the moment of each input.
     #[test]
     fn attitude_is_that_of_a_rigid_body(vehicle in vehicle(), rates in rates(), omega in -2e3_f32..2e3) {
         let inertia: Vector3<f64> = vehicle.inertia_kg_m2.cast();
@@ -87,7 +87,7 @@ proptest! {
     }
 
     /// z: thrust along body z against gravity, with g_4 from the rotation matrix and its derivative along d eta/dt =
-    /// Omega of (6); x and y: u5 and u6 are the accelerations.
+    /// Omega of (6). x and y: u5 and u6 are the accelerations.
     #[test]
     fn position_is_that_of_a_thrust_along_body_z(vehicle in vehicle(), eta in attitude(1.0), rates in rates()) {
         let (model, mass) = (ModelConstants::new(&vehicle), f64::from(vehicle.mass_kg));
@@ -122,14 +122,14 @@ proptest! {
         let h = 1e-6;
         let exact = (after(h) - after(-h)) / (2.0 * h);
         prop_assume!(exact.amax() < 1e3);
-        // Sine and cosine over cos theta, whose error enters by its square.
+        // Sine and cosine are divided by cos theta, whose error enters by its square.
         let allowed = 4.0 * SINE * rates.abs().sum() / eta.y.cos().powi(2) + 1e-5;
         prop_assert!((got - exact).amax() <= allowed, "{got} for {exact}");
-        // As printed, (6) takes one for the other.
+        // As printed, (6) uses the rates for d eta/dt.
         prop_assert!((eta_dot(printed(false), eta.cast(), rates.cast()) - rates).amax() <= 1e-5);
     }
 
-    /// Near a vertical nose, where yaw has no rate, cos theta counts as 0.1; upside down, too.
+    /// Near a vertical nose, where yaw has no rate, cos theta counts as 0.1, also upside down.
     #[test]
     fn a_vertical_nose_turns_at_a_finite_rate(
         roll in -3.1_f32..3.1, pitch in 1.4709_f32..3.1, up: bool, rates in rates(),
@@ -144,7 +144,7 @@ proptest! {
     }
 }
 
-/// R e_z points where roll and pitch say: the cosine of the tilt, and where (6) counts no less than 0.1 of it.
+/// R e_z agrees with roll and pitch: its z is the cosine of the tilt, of which (6) uses at least 0.1.
 #[test]
 fn the_tilt_is_the_angle_of_body_z() {
     let model = ModelConstants::new(&Parameters::PAPER.to_f32());

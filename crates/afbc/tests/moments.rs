@@ -1,4 +1,4 @@
-//! The observer of moments against its closed solution, and what it must not take for a moment.
+//! Compares the moment observer with its closed solution, and checks which effects it must not see as a moment.
 
 use afbc::disturbance::{AGE_S, DisturbanceObserver, MomentObserver, Turning};
 use afbc_types::{Inputs, Parameters};
@@ -22,7 +22,7 @@ fn effectiveness() -> Vector3<f32> {
     Parameters::PAPER.to_f32().effectiveness()
 }
 
-/// A body whose rotors lag by `lag_s` and give `share` of what they should, under a moment.
+/// A body under a moment, whose rotors lag by `lag_s` and give `share` of their nominal effect.
 struct Body {
     rates: Vector3<f32>,
     input: Vector3<f32>,
@@ -36,7 +36,7 @@ impl Body {
         Body { rates: Vector3::zeros(), input: Vector3::zeros(), lag_s: lag_s + AGE_S, share, memory: None }
     }
 
-    /// Turns for a step under these inputs and moment \[rad/s2\]; returns what is observed.
+    /// Turns one step with these inputs and moment \[rad/s2\]; returns the observer's output.
     fn step(&mut self, observer: &MomentObserver, u: &Vector3<f32>, f: &Vector3<f32>, effort: f32) -> Vector3<f32> {
         let seen = observer.advance(&mut self.memory, &self.rates, &Vector3::zeros(), [true, false]);
         observer.give(&mut self.memory, &Inputs { roll_n: u.x, pitch_n: u.y, yaw_n: u.z, thrust_n: 5.0 }, effort);
@@ -52,7 +52,7 @@ fn without_a_bandwidth_there_is_none() {
     assert!(MomentObserver::new(&none, &Parameters::PAPER.to_f32(), THRUST_MAX_N, DT_S).is_none());
 }
 
-/// f_hat of a constant moment is f behind two poles at w, whatever the rotors do.
+/// For a constant moment f, f_hat is f behind two poles at w, whatever the rotors do.
 #[test]
 fn a_constant_moment_is_found_as_two_poles_say() {
     for w in [15.0, 40.0, 100.0] {
@@ -69,7 +69,7 @@ fn a_constant_moment_is_found_as_two_poles_say() {
     }
 }
 
-/// Rotors that are known to be weak, and rotors of another lag that is known, are no moment.
+/// Known weakness and a known lag of the rotors do not look like a moment.
 #[test]
 fn what_the_rotors_do_is_no_moment() {
     for lag_s in [0.01, 0.02, 0.07] {
@@ -88,8 +88,7 @@ fn what_the_rotors_do_is_no_moment() {
     }
 }
 
-/// A jump of the rates, as after an outage, changes nothing; a repeated state teaches nothing; on the ground there is
-/// no moment.
+/// A jump of the rates, as after an outage, changes nothing, nor does a repeated state; on the ground f_hat is zero.
 #[test]
 fn jumps_and_old_states_teach_nothing() {
     let observer = observer(40.0, 0.02);
@@ -110,7 +109,7 @@ fn jumps_and_old_states_teach_nothing() {
 }
 
 proptest! {
-    /// Whatever the rates say, f_hat stays finite and within what the rotors can make up for.
+    /// For any rates, f_hat stays finite and within what the rotors can compensate.
     #[test]
     fn it_is_bounded(
         w in 0.1_f32..500.0,
@@ -127,7 +126,8 @@ proptest! {
     }
 }
 
-/// What is known is not found, as old as the rates are taken to be, and a moment turns by its mass over inertia.
+/// Known moments are not observed when they are as old as the assumed age of the rates. A moment turns by mass over
+/// inertia.
 #[test]
 fn what_is_known_is_not_observed() {
     let (observer, vehicle) = (observer(60.0, 0.02), Parameters::PAPER.to_f32());

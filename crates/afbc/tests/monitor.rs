@@ -1,4 +1,5 @@
-//! Every figure of the monitor compared with its definition, and every trip, which a healthy flight does not cause.
+//! Compares every figure of the monitor with its definition, and checks every trip, and that a healthy flight does not
+//! trip.
 #![allow(clippy::indexing_slicing, clippy::unwrap_used, missing_docs)] // what cannot be built must stop the test
 
 use afbc::monitor::{Bounds, Monitor, MonitorFigures, TRIM_SHARE};
@@ -27,7 +28,7 @@ struct Seen {
     saturated: bool,
 }
 
-/// A step of a hovering vehicle.
+/// Returns a step of a hovering vehicle.
 fn hover() -> Seen {
     Seen { inputs: PerAxis { z: WEIGHT_N, ..PerAxis::default() }, ..Seen::default() }
 }
@@ -46,7 +47,7 @@ fn look(
     monitor.watch(figures, &cascade, seen.saturated)
 }
 
-/// Returns the first trip in `steps` steps, and after how many.
+/// Returns the first trip within `steps` steps, and its step.
 fn watch(
     monitor: &Monitor,
     steps: usize,
@@ -74,8 +75,8 @@ fn input(axis: Axis, value: f32) -> Seen {
     seen
 }
 
-/// Estimates beyond their bound trip within the six steps of a round, by name, while projection still leaves room for
-/// Theta; those just below never do.
+/// Estimates beyond their bound trip by name within the six steps of a round, while projection still leaves room for
+/// Theta. Estimates just below never trip.
 #[test]
 fn an_estimate_out_of_bounds_trips_within_six_steps() {
     let bounds = bounds();
@@ -119,8 +120,8 @@ fn large_errors_trip_when_they_last() {
     }
 }
 
-/// With feed-forward, bounds are shares of what carries the vehicle, but below the projection's; without, estimates
-/// hold the weight, too, and only the projection bounds them.
+/// With feed-forward, the bounds are shares of what carries the vehicle, below the projection's. Without it, the
+/// estimates also hold the weight, and only the projection bounds them.
 #[test]
 fn bounds_of_estimates_are_shares_of_what_carries_the_vehicle() {
     let (gains, vehicle) = (Profile::Flight.gains(), Parameters::PAPER.to_f32());
@@ -146,16 +147,16 @@ fn lasting_saturation_trips_and_moments_of_it_do_not() {
     // 1 - exp(-t) = 0.9 at 2.303 s.
     let (steps, trip) = with(|_| true).1.unwrap();
     assert!((2295..=2310).contains(&steps) && trip == Trip::Saturation, "{trip:?} after {steps}");
-    // Five of six steps; two whole seconds of every five.
+    // Five of six steps, then two whole seconds of every five.
     let (figures, trip) = with(|i| !i.is_multiple_of(6));
     assert_eq!(trip, None);
     assert!((figures.saturation_share - 5.0 / 6.0).abs() < 0.01, "{}", figures.saturation_share);
     assert_eq!(with(|i| i % 5000 < 2000).1, None);
 }
 
-/// Reversals per second are two per period of an oscillation larger than the threshold; more than the bound trip, by
-/// name: of U3 as fast as a vehicle can follow, since what it cannot is the rotors' vibration, however large; of the
-/// others at any frequency.
+/// There are two reversals per period of an oscillation larger than the threshold. More than the bound trip by name. Of
+/// U3 only oscillations count that a vehicle can follow: faster ones are vibration of the rotors, however large. The
+/// other inputs trip at any frequency.
 #[test]
 fn limit_cycles_are_counted_and_vibration_about_yaw_is_not() {
     let bounds = bounds();
@@ -174,14 +175,14 @@ fn limit_cycles_are_counted_and_vibration_about_yaw_is_not() {
         let trips = |hz: f32, amplitude| {
             let (steps, trip) = sine(axis, hz, amplitude).1.unwrap();
             assert_eq!(trip, Trip::LimitCycle(axis), "{hz} Hz");
-            // 1 - exp(-t) = 16/(2 hz), and the first periods.
+            // 1 - exp(-t) = 16/(2 hz), plus the first periods.
             let within_s = -(1.0 - 16.0 / (2.0 * hz)).ln() + 0.35;
             assert!(steps as f32 * DT_S < within_s, "{axis:?}, {hz} Hz: {steps} steps");
         };
         for (hz, amplitude) in [(9.0, large), (9.0, 100.0 * large), (12.0, 1.5 * large), (15.0, 2.0 * large)] {
             trips(hz, amplitude);
         }
-        // The rotors' vibration, at all the speeds that have a notch.
+        // The rotors' vibration, at all speeds that have a notch.
         for hz in [28.0, 33.0, 50.0, 77.0, 100.0, 166.0, 167.5, 200.0, 330.0] {
             let amplitude = 4.0 * large;
             if axis == Axis::Yaw {
@@ -202,7 +203,8 @@ fn limit_cycles_are_counted_and_vibration_about_yaw_is_not() {
 }
 
 proptest! {
-    /// White noise below the threshold, of U3 four times as much, and estimates and errors within bounds, do not trip.
+    /// White noise below the threshold (four times as much on U3) with estimates and errors within bounds does not
+    /// trip.
     #[test]
     fn a_healthy_flight_does_not_trip(seed: u32, share in 0.0_f32..0.99, saturated: bool) {
         let bounds = bounds();
@@ -228,7 +230,7 @@ proptest! {
         prop_assert_eq!(trip, None);
     }
 
-    /// Updated one subsystem per step, the norms are those of the estimates.
+    /// The norms, updated for one subsystem per step, are those of the estimates.
     #[test]
     fn norms_are_those_of_the_estimates(theta in prop::array::uniform9(-0.1_f32..0.1), delta in 0.0_f32..0.05) {
         let estimate = AdaptiveEstimate { theta: Matrix3::from_row_slice(&theta), delta };

@@ -1,4 +1,4 @@
-//! The profiles: the paper's numbers, the rules behind those of `flight`, and that every one is valid.
+//! Checks the profiles: the paper's numbers, the rules for `flight`, and that every profile is valid.
 #![allow(clippy::indexing_slicing, clippy::unwrap_used, missing_docs)] // what cannot be built must stop the test
 
 use afbc::adaptive::Gains;
@@ -11,7 +11,7 @@ use afbc_types::{Axis, Declared, Parameters, PerAxis};
 use nalgebra::Vector3;
 use proptest::prelude::*;
 
-/// Section IV: alpha_1, alpha_2, gamma and eta of z, and of the other five; Gaussians of attitude and of position.
+/// Section IV: alpha_1, alpha_2, gamma and eta of z and of the other five; Gaussians of attitude and of position.
 #[test]
 fn the_printed_gains_are_those_of_section_iv() {
     let gains = Profile::Paper.gains();
@@ -24,7 +24,7 @@ fn the_printed_gains_are_those_of_section_iv() {
         assert_eq!(membership, Membership { centre, width }, "{axis:?}");
         assert_eq!((epsilon, backstepping.stiffness, safeguards), (0.001, 1.0, Safeguards::NONE), "{axis:?}");
     }
-    // Nothing of what is not in the paper.
+    // Nothing that is not in the paper.
     let Settings { limits, tilt_by_thrust, anti_windup, freeze_on_ground, bumpless, feed_forward, .. } =
         Profile::Paper.settings();
     assert_eq!(limits, Limits::NONE);
@@ -32,14 +32,14 @@ fn the_printed_gains_are_those_of_section_iv() {
     assert_eq!(Profile::Paper.settings_for(2.0, 0.1), Profile::Paper.settings());
 }
 
-/// Scenario files and logs know them by these names.
+/// Scenario files and logs use these names.
 #[test]
 fn every_profile_has_its_name() {
     assert_eq!(Profile::ALL.map(Profile::name), ["paper", "flight"]);
 }
 
-/// Near zero the robust term is a gain delta_hat/epsilon: times g of the input it is half of what a loop takes that
-/// answers after the response times of `docs/flight.md`.
+/// Near zero the robust term has the gain delta_hat/epsilon. Times g of the input, it is half of the limit for a loop
+/// with the response times of `docs/flight.md`.
 #[test]
 fn the_robust_term_leaves_half_of_the_limit() {
     let gains = Profile::Flight.gains();
@@ -61,17 +61,17 @@ fn the_robust_term_leaves_half_of_the_limit() {
     }
 }
 
-/// As slow as the rotors, but no quicker than those it is tuned for.
+/// As slow as the rotors, but no faster than those for which the profile is tuned.
 #[test]
 fn slowness_is_the_delay_over_that_of_the_papers_vehicle() {
     assert_eq!([0.0, 0.5, 1.0].map(|share| slowness(share * LAG_S)), [1.0; 3]);
-    // Of 50 ms, 30 are no rotors' lag.
+    // Of the 50 ms of delay, 30 are not the rotors'.
     assert!([1.5_f32, 2.0, 7.0].iter().all(|k| (slowness(k * 0.05 - 0.03) - k).abs() < 1e-6));
 }
 
 proptest! {
-    /// For every vehicle: an input's effect times its gains is that of the paper's vehicle, so the errors take the same
-    /// course, only slower; what is measured in metres and radians stays.
+    /// For every vehicle, an input's effect times its gains equals that of the paper's vehicle, so the errors follow
+    /// the same curve, only slower. Gains in metres and radians stay.
     #[test]
     fn by_rule_every_vehicle_behaves_as_the_papers(
         mass_kg in 0.1_f32..20.0, arm_m in 0.05_f32..1.0, inertia in prop::array::uniform3(1e-4_f32..1.0),
@@ -99,7 +99,7 @@ proptest! {
                 prop_assert!(near(own.backstepping.stiffness * k * k, of.backstepping.stiffness), "{axis:?}");
                 prop_assert!(near(effect * own.gamma * k * k, of.gamma), "{axis:?}");
                 prop_assert!(near(effect * own.eta * k * k, of.eta), "{axis:?}");
-                // A disturbance of the vehicle's own size, within the accepted range.
+                // A disturbance in proportion to the vehicle, within the accepted range.
                 let bound = |own: f32, of: f32| near(own, (of / effect).min(1e6));
                 prop_assert!(bound(own.safeguards.theta_max, of.safeguards.theta_max), "{axis:?}");
                 prop_assert!(bound(own.safeguards.delta_max, of.safeguards.delta_max), "{axis:?}");
@@ -111,7 +111,7 @@ proptest! {
     }
 }
 
-/// Every profile makes every law of the crate, at the paper's lag and at a slower one.
+/// Every profile builds every law of the crate, at the paper's lag and at a slower one.
 #[test]
 fn every_profile_is_valid() {
     let vehicle = Parameters::PAPER.to_f32();

@@ -27,7 +27,7 @@ fn any_model() -> impl Strategy<Value = ReferenceModel> {
     )
 }
 
-/// A sine along every coordinate: amplitude, rate and phase.
+/// Draws a sine for every coordinate: amplitude, rate and phase.
 fn sines() -> impl Strategy<Value = [(f32, f32, f32); 4]> {
     let sine = || (0.1_f32..1.5, 0.2_f32..3.0, 0.0_f32..6.3);
     [sine(), sine(), sine(), sine()]
@@ -53,14 +53,14 @@ fn on_sines(sines: &[(f32, f32, f32); 4], t: f64) -> Setpoint {
     }
 }
 
-/// A vehicle exactly on the setpoint.
+/// Returns the state of a vehicle exactly on the setpoint.
 fn on(setpoint: &Setpoint) -> State {
     let mut state = State { position_m: setpoint.position_m, velocity_m_s: setpoint.velocity_m_s, ..State::default() };
     (state.attitude_rad.z, state.rates_rad_s.z) = (setpoint.yaw_rad, setpoint.yaw_rate_rad_s);
     state
 }
 
-/// A setpoint that is not far from others, all of its derivatives included.
+/// Draws a setpoint of small size with all derivatives.
 fn setpoint_near() -> impl Strategy<Value = Setpoint> {
     let vector = |size: f32| prop::array::uniform3(-size..size).prop_map(Vector3::from);
     (vector(0.3), vector(0.5), vector(1.0), vector(100.0), prop::array::uniform3(-0.5_f32..0.5)).prop_map(
@@ -85,7 +85,7 @@ fn setpoint_near() -> impl Strategy<Value = Setpoint> {
     )
 }
 
-/// The equations at the head of the model's file for one coordinate: d with two derivatives.
+/// One coordinate by the equations in the head of `reference.rs`: d with two derivatives.
 #[derive(Clone, Copy, Debug)]
 struct Documented {
     w: f64,
@@ -98,7 +98,7 @@ impl Documented {
     fn advance(&mut self, dt_s: f64) {
         let [d, d_dot, d_ddot] = self.d;
         let approach = self.w / 3.0;
-        // Beyond it, v_c^2/2 falls by half of a_max per metre.
+        // Beyond `far`, v_c^2/2 falls by half of a_max per metre.
         let far = 0.5 * self.a_max / approach.powi(2);
         let beyond = (d.abs() - far).max(0.0);
         let speed = ((approach * (d.abs() - beyond)).powi(2) + self.a_max * beyond).sqrt().min(self.v_max);
@@ -112,7 +112,7 @@ impl Documented {
     }
 }
 
-/// Largest differences of position, velocity, acceleration and yaw.
+/// Returns the largest differences of position, velocity, acceleration and yaw.
 fn apart(a: &Setpoint, b: &Setpoint) -> [f32; 4] {
     [
         (a.position_m - b.position_m).amax(),
@@ -125,7 +125,8 @@ fn apart(a: &Setpoint, b: &Setpoint) -> [f32; 4] {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
-    /// A smooth setpoint is the reference, wherever the vehicle is, also one that accelerates more than the model may.
+    /// The reference equals a smooth setpoint, wherever the vehicle is, even if the setpoint accelerates more than the
+    /// model may.
     #[test]
     fn a_smooth_setpoint_is_tracked_as_it_is(model in any_model(), sines in sines(), away in -2.0_f32..2.0) {
         let reference = ReferenceFilter::new(&model, &limits(), DT_S).unwrap();
@@ -141,8 +142,8 @@ proptest! {
         }
     }
 
-    /// After a jump the reference leaves from where it was, moves as its derivatives say within the limits, and arrives
-    /// without running past the setpoint by more than a tenth.
+    /// After a jump the reference starts from its old position, moves consistently with its derivatives within the
+    /// limits, and arrives with less than a tenth of overshoot.
     #[test]
     fn a_jump_becomes_motion_within_the_limits(
         model in any_model(), by in [-20.0_f32..20.0, -20.0_f32..20.0, -20.0_f32..20.0], turn in -3.0_f32..3.0,
@@ -177,8 +178,8 @@ proptest! {
         prop_assert!(x < 1e-2 && v < 1e-2 && a < 1e-1 && yaw < 1e-2, "still away by {x} {v} {a} {yaw}");
     }
 
-    /// From any state the reference starts at the vehicle. Then it goes on as its derivatives say, and follows of each
-    /// jump of the setpoint, in position and in velocity, what brings it nearest to the vehicle.
+    /// The reference starts at the vehicle from any state. Then it moves consistently with its derivatives, and follows
+    /// only the part of each jump, in position and velocity, that brings it nearer to the vehicle.
     #[test]
     fn of_a_jump_it_follows_what_brings_it_nearer_to_the_vehicle(
         model in any_model(), near in prop::collection::vec((setpoint_near(), setpoint_near()), 2..30),
@@ -214,7 +215,8 @@ proptest! {
                 let wanted = nearest(on_x(then), list(setpoint)[i] - on_x(setpoint_then), at);
                 prop_assert!((x - wanted).abs() < 1e-5, "{i}: at {x} instead of {wanted}");
                 let jump = speeds(setpoint)[i] - on_v(setpoint_then, jerks(setpoint_then)[i]);
-                // The setpoint's own jerk is in its next velocity; the detour's is not in the detour's.
+                // The setpoint's next velocity includes the setpoint's jerk; the detour's velocity does not include the
+                // detour's.
                 let own = 0.5 * dt * dt * jerks(setpoint_then)[i];
                 let wanted = nearest(on_v(then, 0.0) + own, jump, speed);
                 prop_assert!((v - wanted).abs() < 1e-5, "{i}: {v} m/s instead of {wanted}");
@@ -223,8 +225,8 @@ proptest! {
         }
     }
 
-    /// With a setpoint that accelerates itself, the reference accelerates no more than the model may or the setpoint
-    /// does.
+    /// With an accelerating setpoint, the reference accelerates no more than the larger of the model's limit and the
+    /// setpoint.
     #[test]
     fn it_accelerates_no_more_than_it_may_or_the_setpoint_does(
         model in any_model(), sines in sines(), by in -20.0_f32..20.0,
@@ -246,8 +248,7 @@ proptest! {
         }
     }
 
-    /// A jump far beyond the limits takes the course of the documented equations, integrated in `f64` with a tenth of
-    /// the step.
+    /// A jump far beyond the limits follows the documented equations, integrated in `f64` with a tenth of the step.
     #[test]
     fn a_large_jump_takes_the_documented_course(
         model in any_model(), by in prop_oneof![0.1_f32..1.0, 1.0_f32..60.0], turn in 0.1_f32..3.0, back: bool,
@@ -279,7 +280,7 @@ proptest! {
             ];
             for ((d, v), exact) in got.into_iter().zip(&mut exact) {
                 let [exact_d, exact_v, _] = exact.d;
-                // A step late by its half, at the speed and the acceleration of the moment.
+                // The discrete model is late by half a step, which is a distance at the present speed and acceleration.
                 let (off_d, off_v) = ((f64::from(d) - exact_d).abs(), (f64::from(v) - exact_v).abs());
                 let size = exact.v_max.min(f64::from(by.max(turn)) * exact.w);
                 prop_assert!(off_d < 4e-3 * size && off_v < 0.02 * size, "{d} {v} for {exact:?} in step {step}");
@@ -290,8 +291,8 @@ proptest! {
         }
     }
 
-    /// Setpoint and vehicle go on while no step is made: so does the reference. A vehicle that stood still meanwhile is
-    /// met where it is.
+    /// During an interruption setpoint and vehicle move on, and so does the reference. If the vehicle stood still, the
+    /// reference is at the vehicle.
     #[test]
     fn after_an_interruption_the_reference_is_near_the_vehicle(
         model in any_model(), sines in sines(), begin in 0.0..3.0, length in 0.1..0.6, stands in any::<bool>(),
@@ -304,11 +305,11 @@ proptest! {
         let vehicle = on(if stands { &first } else { &after });
         let tracked = reference.advance(&mut detours, &vehicle, &after);
         let away = (tracked.position_m - vehicle.position_m).amax();
-        // It is expected a step ahead: 4.5 mm at the greatest speed.
+        // The expected position is a step ahead: 4.5 mm at the greatest speed.
         prop_assert!(away < 5e-3, "{away} m from the vehicle, {} m from the setpoint", apart(&tracked, &after)[0]);
     }
 
-    /// Every reference for plausible setpoints and states is finite.
+    /// The reference is finite for plausible setpoints and states.
     #[test]
     fn no_plausible_input_makes_it_infinite(
         model in any_model(),
@@ -333,7 +334,7 @@ proptest! {
     }
 }
 
-/// The model follows (s + w)^3 within the limits: the exact response to a step of the setpoint.
+/// Within the limits the model is (s + w)^3: the exact response to a step of the setpoint.
 #[test]
 fn a_small_jump_decays_as_the_model_says() {
     let w = 6.0_f64;
@@ -352,7 +353,7 @@ fn a_small_jump_decays_as_the_model_says() {
     assert_eq!((tracked.position_m.y, tracked.yaw_rad), (0.0, 0.0));
 }
 
-/// One bandwidth is enough for a model.
+/// A single bandwidth is enough for a model.
 #[test]
 fn each_bandwidth_makes_a_model() {
     let none = ReferenceModel::DEFAULT;
@@ -365,7 +366,7 @@ fn each_bandwidth_makes_a_model() {
     }
 }
 
-/// Without bandwidths there is no model; a coordinate without one is tracked to the bit.
+/// Without bandwidths there is no model; a coordinate without a bandwidth is tracked exactly.
 #[test]
 fn no_bandwidth_is_no_model() {
     assert!(ReferenceFilter::new(&ReferenceModel::DEFAULT, &Limits::NONE, DT_S).is_none());

@@ -1,4 +1,4 @@
-//! Errors of the attitude by rotation, against quaternions and finite differences in double precision.
+//! Compares the attitude errors by rotation with quaternions and finite differences in double precision.
 
 use afbc::model::RollPitch;
 use afbc::rotation::{Turn, error};
@@ -6,7 +6,7 @@ use afbc_types::State;
 use nalgebra::{Matrix3, Rotation3, Unit, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 
-/// Roll, pitch and yaw within what the law flies.
+/// Draws roll, pitch and yaw within the flown range.
 fn attitude() -> impl Strategy<Value = Vector3<f64>> {
     (-1.2_f64..1.2, -1.2_f64..1.2, -3.0_f64..3.0).prop_map(|(roll, pitch, yaw)| Vector3::new(roll, pitch, yaw))
 }
@@ -31,14 +31,14 @@ fn heading(eta: &Vector3<f64>) -> [f32; 2] {
     [eta.z.sin() as f32, eta.z.cos() as f32]
 }
 
-/// Omega of a body whose angles change at `eta_dot`, from how its attitude changes within `h` seconds.
+/// Returns Omega for angles that change at `eta_dot`, from the change of the attitude within `h` seconds.
 fn turning(eta: &Vector3<f64>, eta_dot: &Vector3<f64>, h: f64) -> Vector3<f64> {
     let at = |t: f64| quaternion(&(eta + eta_dot * t));
     (at(-h).inverse() * at(h)).scaled_axis() / (2.0 * h)
 }
 
 proptest! {
-    /// A tilt about any horizontal axis and a turn about the thrust, one after the other, are told apart.
+    /// A tilt about any horizontal axis and a following turn about the thrust are separated.
     #[test]
     fn tilt_and_yaw_are_distinguished(direction in -3.1_f64..3.1, tilt in 0.0_f64..2.8, yaw in -2.8_f64..2.8) {
         let axis = Vector3::new(direction.cos(), direction.sin(), 0.0);
@@ -48,7 +48,7 @@ proptest! {
         prop_assert!((found - expected).norm() < 3e-5, "{found:?}, not {expected:?}");
     }
 
-    /// A small error is the rotation vector, in the body's axes.
+    /// A small error is the rotation vector in body axes.
     #[test]
     fn a_small_error_is_the_rotation(eta in attitude(), by in vector(0.02)) {
         let body = quaternion(&eta);
@@ -66,7 +66,7 @@ proptest! {
         prop_assert!(found.iter().all(|e| e.abs() <= 2.0005), "{found:?}");
     }
 
-    /// The desired rates and accelerations are those of the desired attitude, in the axes of a body that turns.
+    /// The desired rates and accelerations are those of the desired attitude, in the axes of a turning body.
     #[test]
     fn rates_and_accelerations_are_those_of_the_desired_attitude(
         now in attitude(),
@@ -82,7 +82,7 @@ proptest! {
             &omega.cast(),
             [&eta_dot.cast(), &eta_ddot.cast()],
         );
-        // Rates of the desired attitude in the axes of the body, at a time t.
+        // Rates of the desired attitude in body axes at time t.
         let seen = |t: f64| {
             let (eta, rate) = (desired + eta_dot * t + eta_ddot * (0.5 * t * t), eta_dot + eta_ddot * t);
             let body = quaternion(&now) * UnitQuaternion::from_scaled_axis(omega * t);
@@ -96,7 +96,7 @@ proptest! {
         prop_assert!((found - accelerations).norm() < 3e-3 * scale, "{found:?}, not {accelerations:?}");
     }
 
-    /// Close to the desired attitude, e_1 changes by what the desired rates exceed the body's.
+    /// Close to the desired attitude, e_1 changes by the difference of desired and body rates.
     #[test]
     fn a_small_error_changes_as_the_rates_differ(
         desired in attitude(),

@@ -1,4 +1,4 @@
-//! The safeguards compared with the equations in `safeguards.rs`, in `f64`, and their consequences.
+//! Compares the safeguards with the equations in `safeguards.rs` in `f64`, and checks their consequences.
 #![allow(clippy::indexing_slicing, clippy::unwrap_used, missing_docs)] // what cannot be built must stop the test
 
 use crate::common::{U, gains_of_one};
@@ -14,7 +14,7 @@ use afbc_types::{Axis, Parameters, PerAxis, Setpoint, State};
 use nalgebra::{Matrix3, Vector3};
 use proptest::prelude::*;
 
-/// A subsystem with e_2 = `e2` exactly: e_1 = 0, x_2 = -e_2.
+/// Returns a subsystem's tracking with e_2 = `e2` exactly: e_1 = 0, x_2 = -e_2.
 fn tracking(e2: f32) -> Tracking {
     Tracking { x2: -e2, ..Tracking::default() }
 }
@@ -35,7 +35,7 @@ fn step(gains: Gains, e2: f32, unallocated: f32, dt_s: f32, estimate: &mut Adapt
     law.input(Axis::X, &tracking(e2), &context, estimate).0
 }
 
-/// The adaptation step in `f64`, as documented.
+/// Computes the documented adaptation step in `f64`.
 fn reference(gains: &Gains, e2: f32, unallocated: f32, dt_s: f32, before: &AdaptiveEstimate) -> (Matrix3<f64>, f64) {
     let Safeguards { sigma, kappa, theta_max, delta_max, dead_zone } = gains.safeguards;
     let [sigma, kappa, theta_max, delta_max, dead_zone] =
@@ -63,7 +63,7 @@ fn unallocated() -> impl Strategy<Value = f32> {
     prop_oneof![Just(0.0_f32), -1.0_f32..1.0, Just(f32::INFINITY), Just(f32::NEG_INFINITY)]
 }
 
-/// An estimate within the safeguards' bounds.
+/// Draws an estimate within the safeguards' bounds.
 fn estimate(safeguards: Safeguards) -> impl Strategy<Value = AdaptiveEstimate> {
     (prop::array::uniform9(-1.0_f32..1.0), 0.0_f32..=1.0).prop_map(move |(theta, delta)| AdaptiveEstimate {
         theta: Matrix3::from_row_slice(&theta) * (safeguards.theta_max / 3.0),
@@ -88,7 +88,7 @@ proptest! {
         let mut after = before;
         step(gains, e2, unallocated, dt_s, &mut after);
         let (theta, delta) = reference(&gains, e2, unallocated, dt_s, &before);
-        // Increments rounded some ten times each; 1 - leakage dt is rounded as a whole.
+        // Each increment has some ten roundings; 1 - leakage dt is rounded as a whole.
         let [gamma, eta, dt, e2] = [gains.gamma, gains.eta, dt_s, e2].map(f64::from);
         let learnt = e2.abs() * dt;
         let theta_size = f64::from(before.theta.abs().max()) + gamma * learnt;
@@ -117,7 +117,7 @@ proptest! {
         }
     }
 
-    /// With `NONE` it is Euler's step of (33), (34), bit for bit.
+    /// With `NONE` the step is the Euler step of (33), (34), bit for bit.
     #[test]
     fn no_safeguards_give_the_printed_law(
         gains in gains_of_one(),
@@ -153,14 +153,14 @@ proptest! {
         let mut after = before;
         step(Gains { safeguards, ..gains }, share * dead_zone, 0.0, 0.001, &mut after);
         prop_assert_eq!(after, before);
-        // Beyond it, there is.
+        // Beyond the dead zone, there is adaptation.
         let mut after = AdaptiveEstimate::default();
         let able = Gains { gamma: 1.0, eta: 1.0, safeguards: Safeguards { delta_max: 1.0, ..safeguards }, ..gains };
         step(able, 1.1 * dead_zone, 0.0, 0.02, &mut after);
         prop_assert!(after.theta.min() >= 0.0 && after.theta.max() > 0.0 && after.delta > 0.0);
     }
 
-    /// In the direction of a reached limit there is no adaptation, in the other direction full adaptation.
+    /// There is no adaptation towards a reached limit, and full adaptation away from it.
     #[test]
     fn anti_windup_acts_in_the_saturated_direction(
         (gains, before) in gains_and_estimate(),
@@ -188,7 +188,7 @@ proptest! {
         let fly = |anti_windup, rotor_force_max_n| {
             let settings =
                 Settings { anti_windup, ..Profile::Flight.settings().with_rotor_force_max_n(rotor_force_max_n) };
-            // The observer is told what the rotors gave.
+            // No observer, because the observer gets the thrust that the rotors gave.
             let disturbance = DisturbanceObserver::DEFAULT;
             let settings = Settings { tilt_by_thrust: false, disturbance, ..settings };
             let law = Adaptive::new(Profile::Flight.gains()).unwrap();
@@ -206,7 +206,7 @@ proptest! {
     }
 }
 
-/// Without an error, an estimate decays by exp(-sigma t); under a constant error, delta_hat settles where adaptation
+/// Without an error, an estimate decays by exp(-sigma t). Under a constant error, delta_hat settles where adaptation
 /// and leakage are equal.
 #[test]
 fn leakage_forgets_at_its_rate() {
@@ -243,7 +243,7 @@ fn leakage_forgets_at_its_rate() {
     assert_eq!(estimate, before);
 }
 
-/// A double integrator measured with noise: the printed delta_hat grows throughout the flight, that of the profile
+/// A double integrator measured with noise: delta_hat as printed grows throughout the flight, that of the profile
 /// `flight` settles.
 #[test]
 fn noise_drives_the_printed_delta_hat_and_not_the_hardened() {

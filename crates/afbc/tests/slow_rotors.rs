@@ -1,4 +1,4 @@
-//! Gains and settings for rotors that lag more than those of the paper's vehicle.
+//! Gains and settings for rotors with more lag than those of the paper's vehicle.
 
 use afbc::disturbance::DisturbanceObserver;
 use afbc::{LAG_S, Profile, Settings, slowness};
@@ -16,13 +16,13 @@ fn quick_rotors_change_nothing_and_slow_ones_change_every_gain_by_its_power_of_t
     for quick in [0.0, 0.5 * LAG_S, LAG_S] {
         assert_eq!(slowness(quick), 1.0);
         assert_eq!(Profile::Flight.gains_for(&paper, quick), base);
-        // The observers reckon with the rotors' own lag.
+        // The observers use the rotors' own lag.
         let disturbance = DisturbanceObserver { disturbance_lag_s: quick, ..settings.disturbance };
         assert_eq!(Profile::Flight.settings_for(3.0, quick), Settings { disturbance, ..settings });
     }
     for lag_s in [0.033_f32, 0.072, 0.2] {
         let k = slowness(lag_s);
-        // Of the 50 ms that a loop of the paper's vehicle takes, 20 are its rotors'.
+        // Of the loop's 50 ms on the paper's vehicle, 20 are its rotors'.
         assert!(close(k, (lag_s + 0.03) / 0.05), "{k}");
         let (gains, slow) = (Profile::Flight.gains_for(&paper, lag_s), Profile::Flight.settings_for(2.0, lag_s));
         assert_eq!(slow.disturbance.disturbance_lag_s, lag_s);
@@ -39,7 +39,7 @@ fn quick_rotors_change_nothing_and_slow_ones_change_every_gain_by_its_power_of_t
             assert_eq!(g.safeguards.theta_max, b.safeguards.theta_max);
             assert_eq!(g.safeguards.delta_max, b.safeguards.delta_max);
             assert_eq!(g.membership, b.membership);
-            // Near zero the robust term is a gain of delta_hat/epsilon: it slows down as alpha_2 does.
+            // Near zero the robust term has the gain delta_hat/epsilon, which slows down like alpha_2.
             let robust = |gains: &afbc::adaptive::Gains| gains.safeguards.delta_max / gains.epsilon;
             assert!(close(robust(g) / robust(b), g.backstepping.alpha2 / b.backstepping.alpha2), "{}", axis.name());
         }
@@ -50,8 +50,8 @@ fn quick_rotors_change_nothing_and_slow_ones_change_every_gain_by_its_power_of_t
     }
 }
 
-/// Settings slow down by the power of time in their unit, told from the key; but the step, and what the task asks for,
-/// stay: limits of speed, acceleration and turning.
+/// Each setting is scaled by the power of time in its unit, which its key shows. The time step and the task's limits of
+/// speed, acceleration and turning stay.
 #[test]
 fn every_setting_slows_down_by_its_power_of_time() {
     let numbers = |settings: &Settings| {
@@ -81,7 +81,7 @@ fn every_setting_slows_down_by_its_power_of_time() {
     assert!(numbers(&settings).iter().filter(|(key, before)| power(key) != 0 && *before > 0.0).count() >= 10);
 }
 
-/// The printed law is for rotors without lag, whatever the vehicle's are.
+/// The profile `paper` assumes rotors without lag, whatever the vehicle's rotors are.
 #[test]
 fn the_printed_gains_do_not_slow_down() {
     let paper = Parameters::PAPER.to_f32();

@@ -1,4 +1,4 @@
-//! Standing on the ground: detected from demanded thrust and motion, without adaptation.
+//! Standing on the ground: detected from demanded thrust and motion, and without adaptation.
 #![allow(clippy::unwrap_used, missing_docs)] // a controller that cannot be built must stop the test
 
 use afbc::reference::ReferenceModel;
@@ -17,7 +17,7 @@ fn moving(velocity_m_s: Vector3<f32>) -> State {
     State { velocity_m_s, ..State::default() }
 }
 
-/// Whether a vehicle with these values for `steps` counts as standing.
+/// Returns whether a vehicle with these values for `steps` steps counts as standing.
 fn stands(thrust_n: f32, velocity_m_s: Vector3<f32>, steps: usize) -> bool {
     let mut standstill = Standstill::default();
     for _ in 0..steps {
@@ -59,7 +59,7 @@ fn a_light_vehicle_that_hovers_does_not_stand_and_one_that_lifts_off_no_longer()
     assert!(!standstill.stands() && !rocking.stands());
 }
 
-/// A vehicle on the ground with its setpoint below it, until the setpoint is raised.
+/// A vehicle stands on the ground with its setpoint below it, until the setpoint is raised.
 #[test]
 fn estimates_freeze_on_the_ground_and_thaw_on_lift() {
     let setpoint = |z| Setpoint { position_m: Vector3::new(0.3, 0.0, z), ..Setpoint::default() };
@@ -89,7 +89,7 @@ fn estimates_freeze_on_the_ground_and_thaw_on_lift() {
     assert_ne!(stood, still_standing, "nothing to freeze");
 }
 
-/// For any setpoint and tilt: no moment tips over a standing vehicle until it is to lift off.
+/// For any setpoint and tilt, no moment tips over a standing vehicle until it is to lift off.
 #[test]
 fn a_standing_vehicle_is_not_tipped_over() {
     let law = Adaptive::new(Profile::Flight.gains()).unwrap();
@@ -111,7 +111,7 @@ fn a_standing_vehicle_is_not_tipped_over() {
     assert!(spread(forces(0.4, 400)) > 0.1);
 }
 
-/// From the ground a vehicle touches it until it has risen, rises fast, or has been carried for long.
+/// A vehicle on the ground touches it until it has risen, climbs fast, or its rotors have carried it for long.
 #[test]
 fn a_vehicle_touches_the_ground_until_it_leaves_it() {
     let touches = |state: State, steps| {
@@ -134,7 +134,7 @@ fn a_vehicle_touches_the_ground_until_it_leaves_it() {
     assert!(touches(at(0.0, 0.0), carried_steps - 100) && !touches(at(0.0, 0.0), carried_steps + 100));
 }
 
-/// It may tilt as far as it has risen, until it is high, falls, or has been carried for long.
+/// The allowed tilt grows with the height, until the vehicle is high, falls, or its rotors have carried it for long.
 #[test]
 fn a_vehicle_that_has_just_risen_tilts_little() {
     let after = |z_m: f32, climb_m_s: f32, steps: u32| {

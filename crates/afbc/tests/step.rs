@@ -23,7 +23,7 @@ fn backstepping(gains: PerAxis<Gains>, settings: Settings) -> Controller<Backste
     Controller::new(vehicle, settings, Backstepping::new(&vehicle, gains).unwrap()).unwrap()
 }
 
-/// AFBC's estimates; zero for a law without any.
+/// Returns AFBC's estimates, zero for a law without any.
 fn estimates<L: Law>(memory: &Validated<Cascade<L::Estimate>>) -> PerAxis<AdaptiveEstimate> {
     let adaptive = |estimate: &dyn Any| estimate.downcast_ref().copied().unwrap_or_default();
     PerAxis::from_fn(|axis| adaptive(&memory.control.estimates[axis]))
@@ -40,7 +40,7 @@ fn check_estimates(estimates: &PerAxis<AdaptiveEstimate>) -> Result<(), TestCase
     Ok(())
 }
 
-/// Flies a sequence of arbitrary inputs, with the checks of every step and of rejected inputs.
+/// Flies a sequence of random inputs, with the checks of every step and of rejected inputs.
 fn fly_anything<L: Law>(
     controller: &Controller<L>,
     settings: &Settings,
@@ -106,7 +106,7 @@ proptest! {
         prop_assert_eq!(fly(), fly());
     }
 
-    /// While a state is implausible the step is that of the last plausible state, but without adaptation.
+    /// While a state is implausible, the step uses the last plausible state, without adaptation.
     #[test]
     fn the_last_plausible_state_is_used_instead(
         good in state(plausible),
@@ -130,7 +130,7 @@ proptest! {
         prop_assert_ne!(memory.control.estimates, other.control.estimates, "the plausible twin should have learnt");
     }
 
-    /// While a setpoint is implausible the last plausible one is used, with adaptation; before the first one, the
+    /// While a setpoint is implausible, the last plausible one is used, with adaptation. Before the first one, the
     /// vehicle holds its position.
     #[test]
     fn the_last_plausible_setpoint_is_used_instead(

@@ -1,11 +1,11 @@
-//! Desired roll and pitch turn the thrust along the acceleration, and their derivatives are those of finite differences
+//! Desired roll and pitch point the thrust along the acceleration, and their derivatives agree with finite differences
 //! in double precision.
 
 use afbc::tilt::Tilt;
 use nalgebra::{Rotation3, Vector3};
 use proptest::prelude::*;
 
-/// Roll and pitch of a thrust along `a`, heading along `yaw_rad`, by rotating it into the plane of the heading.
+/// Returns roll and pitch of a thrust along `a` with this yaw, by rotating `a` into the plane of the heading.
 fn angles(a: &Vector3<f64>, yaw_rad: f64) -> [f64; 2] {
     let a = Rotation3::from_axis_angle(&Vector3::z_axis(), -yaw_rad) * a;
     [(-a.y).atan2(a.x.hypot(a.z)), a.x.atan2(a.z)]
@@ -22,7 +22,7 @@ proptest! {
         yaw in -3.0..3.0_f64, turn in -2.0..2.0_f64, turn_dot in -5.0..5.0_f64,
     ) {
         let force = Vector3::new(across.x, across.y, 9.81 + 0.4 * across.z);
-        // A path through them at t = 0.
+        // Path through these derivatives at t = 0.
         let at = |t: f64| {
             let a = force + jerk * t + snap * (0.5 * t * t);
             angles(&a, yaw + turn * t + 0.5 * turn_dot * t * t)

@@ -1,10 +1,10 @@
-//! Reasons of a trip, as a station shows them.
+//! Texts of the trip reasons, as a ground station shows them.
 
 use afbc::Trip;
 use afbc_types::Axis;
 use std::collections::BTreeSet;
 
-/// Each reason is its own, names its subsystem and what went wrong, and fits the status text of a link.
+/// Each reason is unique, names its subsystem and the fault, and fits a status text of the link.
 #[test]
 fn every_reason_says_what_and_where() {
     let of = |make: fn(Axis) -> Trip, word: &'static str| Axis::ALL.map(|axis| (make(axis), word, Some(axis.name())));

@@ -1,4 +1,4 @@
-//! Shared by the tests of the law: arbitrary inputs and settings, and the checks of every step.
+//! Shared test helpers: random inputs and settings, and the checks of every step.
 
 use afbc::adaptive::Gains;
 use afbc::disturbance::DisturbanceObserver;
@@ -13,7 +13,7 @@ use proptest::prelude::*;
 /// Rounding error of one `f32` operation, relative.
 pub(crate) const U: f64 = 1.0 / (1 << 24) as f64;
 
-/// A value from a sensor or a link: mostly of realistic size, often arbitrary.
+/// Draws a value as from a sensor or link: mostly of realistic size, often arbitrary.
 pub(crate) fn value() -> impl Strategy<Value = f32> {
     let edges = [
         f32::NAN,
@@ -37,7 +37,7 @@ pub(crate) fn value() -> impl Strategy<Value = f32> {
     ]
 }
 
-/// A value that is always plausible.
+/// Draws a value that is always plausible.
 pub(crate) fn plausible() -> impl Strategy<Value = f32> {
     prop_oneof![4 => -3.0_f32..3.0, 1 => -1e3_f32..=1e3]
 }
@@ -71,14 +71,14 @@ pub(crate) fn setpoint<S: Strategy<Value = f32> + 'static>(value: fn() -> S) -> 
     )
 }
 
-/// A value in the range of a parameter, often one of its bounds.
+/// Draws a value within a parameter's range, often one of its bounds.
 pub(crate) fn within(declaration: Declaration) -> impl Strategy<Value = f32> {
     let (min, max) = (declaration.range.min as f32, declaration.range.max as f32);
     prop_oneof![4 => min..=max, 1 => Just(min), 1 => Just(max)]
 }
 
-/// A value in the range of a parameter, uniform over orders of magnitude from a millionth of its end on, often one of
-/// its bounds.
+/// Draws a value within a parameter's range, uniform in the logarithm from a millionth of the maximum upwards, often a
+/// bound.
 pub(crate) fn spread(declaration: Declaration) -> impl Strategy<Value = f32> {
     let range = declaration.range;
     let (min, max) = (range.min.max(1e-6 * range.max), range.max);
@@ -198,7 +198,7 @@ pub(crate) fn settings() -> impl Strategy<Value = Settings> {
     prop_oneof![Just(Profile::Paper.settings()), Just(Profile::Flight.settings()), any]
 }
 
-/// Gains for one subsystem.
+/// Draws gains for one subsystem.
 pub(crate) fn gains_of_one() -> impl Strategy<Value = Gains> {
     let membership = (1e-3_f32..100.0, 0.1_f32..=6.0);
     let backstepping =
@@ -215,7 +215,7 @@ pub(crate) fn gains_of_one() -> impl Strategy<Value = Gains> {
         .prop_filter("accepted", |gains| gains.validate().is_ok())
 }
 
-/// Gains for all six subsystems, or a profile's.
+/// Draws gains for all six subsystems, or those of a profile.
 pub(crate) fn gains() -> impl Strategy<Value = PerAxis<Gains>> {
     prop_oneof![
         Just(Profile::Paper.gains()),
@@ -251,7 +251,7 @@ pub(crate) fn step<C: FlightController>(
     Stepped { action, trace: C::trace(&memory.control) }
 }
 
-/// Checks every step: speeds and forces within the rotors' limits, everything finite.
+/// Checks every step: speeds and forces are finite and within the rotors' limits.
 pub(crate) fn check_step(step: &Stepped, settings: &Settings) -> Result<(), TestCaseError> {
     let (limit, Stepped { action, trace }) = (settings.common.rotor_force_max_n, step);
     let fastest = (f64::from(limit) / Parameters::PAPER.thrust_factor_n_s2).sqrt() * (1.0 + 2e-7);
