@@ -1,5 +1,5 @@
-//! Three laws behind one interface, one step each, 0.2 m beside their setpoint:
-//! `cargo run -p afbc-peers --example one_interface`.
+//! Runs one step of three controllers behind one interface, 0.2 m beside their setpoint: `cargo run -p afbc-peers
+//! --example one_interface`.
 
 use afbc_control::{FlightController, Settings, Validated};
 use afbc_peers::{geometric, indi, pid};
@@ -9,7 +9,7 @@ fn step(name: &str, controller: &impl FlightController) {
     let mut setpoint = Setpoint::default();
     setpoint.position_m.x = 0.2;
     let action = controller.step(&mut Validated::default(), Some(&State::default()), &setpoint);
-    // The vehicle shall pitch forward: the rear rotor gives more than the front one.
+    // The vehicle must pitch forward: the rear rotor gives more than the front one.
     assert!(action.forces.0.w > action.forces.0.y);
     println!("{name:9}: rotor forces {:.3?} N", action.forces.0.as_slice());
 }

@@ -1,8 +1,8 @@
 //! Attitudes as rotation matrices, and attitude errors.
 //!
-//! A matrix R turns body coordinates into earth coordinates; its third column is the direction of the thrust. An error
-//! is a small rotation in body coordinates \[rad\], positive where the body must rotate positively to reach the
-//! desired attitude.
+//! A matrix R rotates body coordinates to earth coordinates; its third column is the direction of the thrust. An error
+//! is a small rotation in body coordinates \[rad\], positive where the body must rotate positively to reach the desired
+//! attitude.
 
 use afbc_control::math;
 use nalgebra::{Matrix3, Quaternion, Vector3};
@@ -29,7 +29,7 @@ pub fn r_earth_body(attitude_rad: &Vector3<f32>) -> Matrix3<f32> {
     )
 }
 
-/// Returns the horizontal unit vectors along and to the left of a heading.
+/// Returns the horizontal unit vectors along a heading and to its left.
 #[inline]
 pub(crate) fn heading(yaw_rad: f32) -> [Vector3<f32>; 2] {
     let (s, c) = (math::sin(yaw_rad), math::cos(yaw_rad));
@@ -48,13 +48,13 @@ pub(crate) fn unit(v: &Vector3<f32>) -> Vector3<f32> {
     v * (1.0 / length(v))
 }
 
-/// Returns the attitude whose thrust points along `thrust`, of any length but above the horizon, and whose Euler yaw is
-/// `yaw_rad`: body x is perpendicular to the thrust and to the horizontal left of the heading.
+/// Returns the attitude with its thrust along `thrust` (any length, above the horizon) and the Euler yaw `yaw_rad`.
+/// Body x is perpendicular to the thrust and to the horizontal vector left of the heading.
 #[inline]
 pub fn facing(thrust: &Vector3<f32>, yaw_rad: f32) -> Matrix3<f32> {
     let [_, left] = heading(yaw_rad);
     let z = unit(thrust);
-    // left is level and z is not, so they are never parallel.
+    // `left` is level and `z` is not, so they are never parallel.
     let x = unit(&left.cross(&z));
     Matrix3::from_columns(&[x, z.cross(&x), z])
 }
@@ -89,8 +89,8 @@ pub fn quaternion(r: &Matrix3<f32>) -> Quaternion<f32> {
     scaled * (if scaled.w < 0.0 { -1.0 } else { 1.0 } / length)
 }
 
-/// Returns the attitude error that turns the thrust the shortest way and corrects only the share `yaw_weight` (0 to 1)
-/// of the yaw error \[rad\]. For small errors it is the rotation vector with its third part times `yaw_weight`.
+/// Returns the attitude error \[rad\] that turns the thrust the shortest way and corrects only the share `yaw_weight`
+/// (0 to 1) of the yaw error. For small errors it is the rotation vector with its third part times `yaw_weight`.
 ///
 /// With q = \[q0, q1, q2, q3\] from the body to the desired attitude, split as q = q_tilt q_yaw (Brescianini and
 /// D'Andrea, *Tilt-prioritized quadrocopter attitude control*, IEEE TCST 28(2), 2020):
@@ -112,8 +112,7 @@ pub fn tilt_prioritised_error(r: &Matrix3<f32>, desired: &Matrix3<f32>, yaw_weig
     weighted.imag() * 2.0
 }
 
-/// Returns the same attitude error in two parts, the tilt's in x and y, the yaw's in z \[rad\]:
-/// 2 Im(q_tilt) + 2 Im(q_yaw).
+/// Returns the attitude error in two parts, the tilt's in x and y, the yaw's in z \[rad\]: 2 Im(q_tilt) + 2 Im(q_yaw).
 #[inline]
 pub fn tilt_and_yaw_error(r: &Matrix3<f32>, desired: &Matrix3<f32>) -> Vector3<f32> {
     let q = quaternion(&(r.transpose() * desired));
@@ -121,7 +120,7 @@ pub fn tilt_and_yaw_error(r: &Matrix3<f32>, desired: &Matrix3<f32>) -> Vector3<f
     parts * 2.0
 }
 
-/// q_tilt and 1/n; none for opposite thrusts, where all ways round are equally short and yaw is undefined.
+/// Returns q_tilt and 1/n. `None` for opposite thrusts, where all ways round are equally short and yaw is undefined.
 #[inline]
 fn tilt(q: &Quaternion<f32>) -> Option<(Quaternion<f32>, f32)> {
     let n_squared = q.w * q.w + q.k * q.k;
@@ -133,7 +132,7 @@ fn tilt(q: &Quaternion<f32>) -> Option<(Quaternion<f32>, f32)> {
     Some((Quaternion::new(n_squared * inverse, i, j, 0.0), inverse))
 }
 
-/// Returns -e_R of Lee, Leok and McClamroch: half the vector of R' R_d - R_d' R. Its size is the sine of the angle
+/// Returns -e_R of Lee, Leok and McClamroch: half the vector of R' R_d - R_d' R. Its length is the sine of the angle
 /// between both attitudes.
 #[inline]
 pub fn geometric_error(r: &Matrix3<f32>, desired: &Matrix3<f32>) -> Vector3<f32> {

@@ -1,4 +1,4 @@
-//! The nominal vehicle and its rotors: an action from thrust and angular acceleration.
+//! Nominal vehicle and rotors: converts thrust and angular acceleration to an action.
 
 use crate::attitude::roll_pitch;
 use afbc_control::command_filter::Filtered;
@@ -7,7 +7,7 @@ use afbc_control::{Action, Errors, Settings, Smoothed, Smoother, Smoothing, Trac
 use afbc_types::{Airframe, Declared, Inputs, OutOfRange, PerAxis, RotorSpeeds};
 use nalgebra::{Matrix3, Vector3};
 
-/// The nominal vehicle.
+/// Nominal vehicle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Body<const N: usize> {
     pub(crate) mixer: Mixer<N>,
@@ -18,12 +18,12 @@ pub(crate) struct Body<const N: usize> {
     effectiveness: Vector3<f32>,
 }
 
-/// Demand of a controller on the vehicle, with its internal signals.
+/// Demand of a controller, with its internal signals for the trace.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Demand {
     /// U4 \[N\].
     pub(crate) thrust_n: f32,
-    /// Part of d Omega/dt due to U1..U3 \[rad/s2\].
+    /// Part of d Omega/dt by U1..U3 \[rad/s2\].
     pub(crate) angular_acceleration_rad_s2: Vector3<f32>,
     /// Demanded acceleration, earth frame \[m/s2\].
     pub(crate) acceleration_m_s2: Vector3<f32>,
@@ -36,7 +36,7 @@ pub(crate) struct Demand {
 }
 
 impl<const N: usize> Body<N> {
-    /// Makes the vehicle with these parameters and filters on its inputs.
+    /// Creates the vehicle with these parameters and filters on its inputs.
     pub(crate) fn new(vehicle: &Airframe<N>, settings: &Settings, smoothing: &Smoothing) -> Result<Self, OutOfRange> {
         settings.validate()?;
         let mixer = settings.mixer(*vehicle)?;
@@ -46,7 +46,7 @@ impl<const N: usize> Body<N> {
         Ok(Body { mixer, smoother, mass_kg: vehicle.mass_kg, inertia_kg_m2, effectiveness })
     }
 
-    /// Returns d Omega/dt due to the rotors under `inputs` \[rad/s2\].
+    /// Returns d Omega/dt that the rotors cause with `inputs` \[rad/s2\].
     #[inline]
     pub(crate) fn angular_acceleration(&self, inputs: &Inputs) -> Vector3<f32> {
         Vector3::new(inputs.roll_n, inputs.pitch_n, inputs.yaw_n).component_mul(&self.effectiveness)
@@ -58,14 +58,14 @@ impl<const N: usize> Body<N> {
         -rates.cross(&self.inertia_kg_m2.component_mul(rates)).component_div(&self.inertia_kg_m2)
     }
 
-    /// Returns the rotor speeds at hover \[rad/s\].
+    /// Returns the rotor speeds in hover \[rad/s\].
     pub(crate) fn hover(&self, weight_n: f32) -> RotorSpeeds<N> {
         let inputs = Inputs { thrust_n: weight_n, ..Inputs::default() };
         self.mixer.speeds(&self.mixer.allocate(&inputs).forces)
     }
 
-    /// Returns the action for `demand`, filtered, its trace, and the unallocated part of U1..U3 \[N\].
-    // Always inlined: what is returned in memory is read back before it has been written.
+    /// Returns the action for `demand` after the filters, its trace, and the unallocated part of U1..U3 \[N\].
+    // Always inlined: a result returned in memory would be read back while its stores are still pending.
     #[inline(always)]
     pub(crate) fn act(&self, demand: &Demand, smoothed: &mut Option<Smoothed>) -> (Action<N>, Trace, Vector3<f32>) {
         let wanted = demand.angular_acceleration_rad_s2.component_div(&self.effectiveness);
@@ -78,7 +78,7 @@ impl<const N: usize> Body<N> {
         let [roll, pitch] = desired_rad;
         let [p, q] = [demand.desired_rates_rad_s.x, demand.desired_rates_rad_s.y];
         let [position, velocity, attitude, rates] = demand.errors;
-        // Products of numbers that decay.
+        // Errors that decay become zero, so that later products are no subnormal numbers.
         let errors = |e1, e1_dot| Errors { e1: math::settled(e1), e1_dot: math::settled(e1_dot), e2: 0.0 };
         let action = self.mixer.carry_out(&allocation);
         let mut trace = Trace::default();

@@ -16,14 +16,15 @@
 //!
 //! # Decisions
 //!
-//! * **Error**: e = \[2 Im(q_tilt), 2 Im(q_yaw)\], with k_R of its own for yaw, as in the source.
-//! * **Feed-forward** is the reference's, whatever the vehicle does: Omega_r and dOmega_r/dt are those of the flat
-//!   trajectory (see [`crate::flatness`]), turned into the body frame.
-//! * **Integral**, 0 in the source: its PD law keeps an error under every steady force. As in [`crate::geometric`].
+//! * **Error**: e = \[2 Im(q_tilt), 2 Im(q_yaw)\], with a separate k_R for yaw, as in the source.
+//! * **Feed-forward** uses the reference only, not the vehicle's motion: Omega_r and dOmega_r/dt belong to the flat
+//!   trajectory (see [`crate::flatness`]) and are rotated to the body frame.
+//! * **Integral**: 0 in the source, whose PD law keeps an error under every steady force. Here as in
+//!   [`crate::geometric`].
 //! * **Desaturation**: the source allocates by a quadratic program that gives up thrust first, then yaw, then roll and
 //!   pitch. The mixer that all controllers share gives up yaw first, in closed form.
-//! * **Drag**: the source's model of the rotors' drag is [`KnownDrag`], as far as the vehicle's file states it.
-//! * **What it knows of the rotors**: the time constant [`Gains::rotor_time_constant_s`], like INDI.
+//! * **Drag**: the source's model of rotor drag is [`KnownDrag`], with the coefficients in the vehicle file.
+//! * **Rotor knowledge**: the time constant [`Gains::rotor_time_constant_s`], like INDI.
 
 use crate::attitude::{r_earth_body, unit};
 use crate::body::{Body, Demand};
@@ -37,7 +38,7 @@ use afbc_control::{Action, FlightController, Mixer, Settings, Smoothed, Smoothin
 use afbc_types::{Airframe, Declared, OutOfRange, Setpoint, State, parameters};
 use nalgebra::Vector3;
 
-/// Smallest cosine of the tilt that drag reckons with.
+/// Smallest cosine of the tilt in the thrust for the drag.
 const SHARE_MIN: f32 = 0.25;
 
 parameters! {
@@ -102,7 +103,7 @@ parameters! {
 }
 
 impl Gains {
-    /// The defaults: tuned, with integrals raised by hand.
+    /// Tuned gains (the defaults), with integrals raised by hand.
     pub const TUNED: Self = Self::DEFAULT;
 
     /// Hand-tuned for the paper's vehicle with a rotor lag of 20 ms.
@@ -124,11 +125,11 @@ impl Gains {
         smoothing: Smoothing::DEFAULT,
     };
 
-    /// The law of the source, without integrals. Hand-tuned for the same vehicle.
+    /// Law of the source, without integrals. Hand-tuned for the paper's vehicle with a rotor lag of 20 ms.
     pub const SUN_2022: Self = Gains { position_i_1_s3: 0.0, height_i_1_s3: 0.0, ..Self::PAPER_VEHICLE };
 }
 
-/// The controller. Immutable; what changes in flight is in [`Memory`].
+/// DFBC controller with its constants. Everything that changes in flight is in [`Memory`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Dfbc<const N: usize = 4> {
     body: Body<N>,
@@ -152,10 +153,10 @@ pub struct Memory<const N: usize = 4> {
 }
 
 impl<const N: usize> Dfbc<N> {
-    /// Makes a controller for a vehicle with these nominal parameters.
+    /// Creates a controller for a vehicle with these nominal parameters.
     ///
     /// # Errors
-    /// The first parameter, setting or gain out of range.
+    /// Returns the first parameter, setting or gain that is out of range.
     pub fn new(vehicle: impl Into<Airframe<N>>, settings: Settings, gains: Gains) -> Result<Self, OutOfRange> {
         let vehicle = vehicle.into();
         let body = Body::new(&vehicle, &settings, &gains.smoothing)?;
@@ -207,9 +208,9 @@ impl<const N: usize> FlightController<N> for Dfbc<N> {
             self.attitude.measure(&mut memory.reaction, &self.body.angular_acceleration(&now), &state.rates_rad_s);
         }
 
-        // Position. Drag asks for thrust, and turns it as the velocity changes.
+        // Position. The thrust must also compensate drag, and turns as drag changes with the velocity.
         let up = unit(&r.column(2).into());
-        // Level flight at this tilt takes this thrust over that of hover.
+        // Thrust for level flight at this tilt, as a share of the hover thrust.
         let share = 1.0 / up.z.max(SHARE_MIN);
         let setpoint = &Setpoint {
             acceleration_m_s2: setpoint.acceleration_m_s2 - self.drag.acceleration(&state.velocity_m_s, &up, share),
@@ -220,7 +221,7 @@ impl<const N: usize> FlightController<N> for Dfbc<N> {
 
         // Attitude.
         let limits = &self.position.limits;
-        // Within the limits it points up, as `flat` requires: a free fall has no direction of thrust.
+        // Within the limits it points up, as `flat` requires: in a free fall the thrust would have no direction.
         let flying = limits.apply(&(setpoint.acceleration_m_s2 + limits.gravity()));
         let Attitude { desired, rates_rad_s, angular_acceleration_rad_s2, attitude_error, rate_error } =
             self.attitude.output(&memory.reaction, &r, state, [&specific_force, &flying], setpoint);

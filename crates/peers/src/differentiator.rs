@@ -1,9 +1,9 @@
-//! A signal and its derivative through the same second-order low-pass filter.
+//! Low-pass filter of second order that also gives the derivative of the filtered signal.
 //!
-//! AFBC's [`CommandFilter`] w^2 / (s + w)^2 gives the filtered signal together with its exact derivative, without a
-//! difference quotient. Two signals through filters of equal w are delayed equally, which INDI relies on. The -3 dB
-//! frequency is 0.64 w, the delay at low frequencies 2 / w. White noise of standard deviation sigma per sample becomes
-//! noise of sigma sqrt(dt w^3 / 4) on the derivative.
+//! AFBC's [`CommandFilter`] w^2 / (s + w)^2 gives the filtered signal and its exact derivative, without a difference
+//! quotient. Filters with equal w delay two signals equally, on which INDI relies. The -3 dB frequency is 0.64 w, the
+//! delay at low frequencies 2 / w. White noise with the standard deviation sigma per sample becomes noise of sigma
+//! sqrt(dt w^3 / 4) on the derivative.
 
 use afbc_control::command_filter::{CommandFilter, Filtered};
 use afbc_types::OutOfRange;
@@ -13,7 +13,7 @@ use nalgebra::Vector3;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Differentiator(CommandFilter);
 
-/// State of the filter; starts at the first sample, at rest.
+/// State of the filter. It starts at the first sample with zero derivative.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Smooth {
     axes: Option<[Filtered; 3]>,
@@ -34,15 +34,15 @@ impl Smooth {
 }
 
 impl Differentiator {
-    /// Makes a filter of the given w \[rad/s\], advanced every `dt_s` seconds.
+    /// Creates a filter with this w \[rad/s\], advanced every `dt_s` seconds.
     ///
     /// # Errors
-    /// If w is outside [`afbc_control::command_filter::BANDWIDTH`].
+    /// Returns an error if w is outside [`afbc_control::command_filter::BANDWIDTH`].
     pub fn new(bandwidth_rad_s: f32, dt_s: f32) -> Result<Self, OutOfRange> {
         CommandFilter::new(bandwidth_rad_s, dt_s).map(Differentiator)
     }
 
-    /// Feeds the sample of this step.
+    /// Filters the sample of this step.
     #[inline]
     pub fn advance(&self, smooth: &mut Smooth, sample: &Vector3<f32>) {
         let start = |angle| Filtered { angle, rate: 0.0 };
@@ -50,7 +50,7 @@ impl Differentiator {
         smooth.axes = Some([self.0.advance(&x, sample.x), self.0.advance(&y, sample.y), self.0.advance(&z, sample.z)]);
     }
 
-    /// Returns the second derivative under the input `sample`, per second squared; 0 before the first sample.
+    /// Returns the second derivative with the input `sample`, per second squared; 0 before the first sample.
     #[inline]
     pub fn second_derivative(&self, smooth: &Smooth, sample: &Vector3<f32>) -> Vector3<f32> {
         smooth.axes.map_or(Vector3::zeros(), |[x, y, z]| {

@@ -1,5 +1,5 @@
-//! Attitude control along a specific force with the reference's own rates and angular accelerations, and incremental
-//! inversion of the moments: shared by DFBC and MPC. The equations are in the head of [`crate::dfbc`].
+//! Attitude control along a specific force, with the reference's rates and angular accelerations as feed-forward and
+//! incremental inversion of the moments. Shared by DFBC and MPC; the head of [`crate::dfbc`] has the equations.
 
 use crate::attitude::{facing, tilt_and_yaw_error};
 use crate::differentiator::Differentiator;
@@ -10,14 +10,14 @@ use afbc_control::drag::KnownDrag;
 use afbc_types::{OutOfRange, Setpoint, State};
 use nalgebra::{Matrix3, Vector3};
 
-/// Gains: k_R and k_Omega of tilt and of yaw \[1/s2, 1/s\], and the filter \[rad/s\].
+/// Gains k_R and k_Omega \[1/s2, 1/s\] of tilt and yaw, and bandwidth of the filter \[rad/s\].
 pub(crate) struct Inner {
     pub(crate) tilt: [f32; 2],
     pub(crate) yaw: [f32; 2],
     pub(crate) filter_rad_s: f32,
 }
 
-/// The loop.
+/// Attitude loop.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct FlatAttitude {
     increment: Increment,
@@ -25,10 +25,10 @@ pub(crate) struct FlatAttitude {
     k_omega: Vector3<f32>,
 }
 
-/// What it asks for.
+/// Output of the attitude loop.
 pub(crate) struct Attitude {
     pub(crate) desired: Matrix3<f32>,
-    /// Of the reference, in its frame.
+    /// Rates of the reference, in the reference's frame.
     pub(crate) rates_rad_s: Vector3<f32>,
     pub(crate) angular_acceleration_rad_s2: Vector3<f32>,
     pub(crate) attitude_error: Vector3<f32>,
@@ -36,10 +36,10 @@ pub(crate) struct Attitude {
 }
 
 impl FlatAttitude {
-    /// Makes the loop.
+    /// Creates the attitude loop.
     ///
     /// # Errors
-    /// If the filter is out of range.
+    /// Returns an error if the filter's bandwidth is out of range.
     pub(crate) fn new(gains: &Inner, dt_s: f32) -> Result<Self, OutOfRange> {
         let ([tilt_p, tilt_d], [yaw_p, yaw_d]) = (gains.tilt, gains.yaw);
         Ok(FlatAttitude {
@@ -49,14 +49,14 @@ impl FlatAttitude {
         })
     }
 
-    /// As [`Increment::measure`].
+    /// Filters inputs and rates, see [`Increment::measure`].
     #[inline]
     pub(crate) fn measure(&self, reaction: &mut Reaction, given_rad_s2: &Vector3<f32>, rates_rad_s: &Vector3<f32>) {
         self.increment.measure(reaction, given_rad_s2, rates_rad_s);
     }
 
-    /// Turns the attitude `r` along the first specific force, with the rates that follow from the second, the
-    /// reference's, and the setpoint's jerk, snap and heading.
+    /// Turns the attitude `r` along the specific force `along`. The feed-forward rates follow from the reference's
+    /// specific force and the setpoint's jerk, snap and heading.
     #[inline]
     pub(crate) fn output(
         &self,
@@ -87,8 +87,9 @@ impl FlatAttitude {
     }
 }
 
-/// Returns the setpoint with jerk and snap of the thrust along `up`; `thrust` is its share of that of hover, and the
-/// thrust per mass \[m/s2\]. Drag turns it as the velocity changes.
+/// Returns the setpoint with jerk and snap of the thrust instead of the acceleration: drag turns the thrust as the
+/// velocity changes. `up` is the thrust's direction; `thrust` is its share of the hover thrust, and the thrust per mass
+/// \[m/s2\].
 #[inline]
 pub(crate) fn dragged(drag: &KnownDrag, setpoint: &Setpoint, up: &Vector3<f32>, thrust: [f32; 2]) -> Setpoint {
     let Setpoint { velocity_m_s: v, acceleration_m_s2: a, jerk_m_s3: j, snap_m_s4: s, .. } = setpoint;

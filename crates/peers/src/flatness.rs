@@ -1,9 +1,9 @@
-//! Differential flatness: the attitude, body rates and angular accelerations that follow from a specific force with its
-//! two derivatives and from a heading.
+//! Differential flatness: attitude, body rates and angular accelerations from a specific force with two derivatives and
+//! a heading.
 //!
 //! Mellinger and Kumar, *Minimum snap trajectory generation and control for quadrotors*, ICRA 2011, for an Euler yaw of
-//! psi_d. With s the specific force, c = |s|, R_d = \[b1 b2 b3\], b3 = s / c, b1 perpendicular to the horizontal y_C
-//! left of the heading, x_C along it:
+//! psi_d. With the specific force s, c = |s|, R_d = \[b1 b2 b3\], b3 = s / c, x_C along the heading, y_C horizontal to
+//! its left, and b1 perpendicular to y_C:
 //!
 //! ```text
 //! Omega_1 = -b2 . ds/dt / c,   Omega_2 = b1 . ds/dt / c,   dc/dt = b3 . ds/dt
@@ -18,7 +18,7 @@ use crate::attitude::{facing, heading, length};
 use afbc_types::Setpoint;
 use nalgebra::{Matrix3, Vector3};
 
-/// R_d, Omega_d, dOmega_d/dt; Omega_d and its derivative in the desired frame.
+/// Desired attitude R_d with Omega_d and dOmega_d/dt in the desired frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Desired {
     /// R_d: desired frame to earth.
@@ -29,7 +29,7 @@ pub struct Desired {
     pub rates_dot_rad_s2: Vector3<f32>,
 }
 
-/// A desired attitude and its heading.
+/// Desired attitude and its heading.
 pub(crate) struct Frame {
     pub(crate) r: Matrix3<f32>,
     /// x_C
@@ -41,15 +41,15 @@ pub(crate) struct Frame {
 }
 
 impl Frame {
-    /// The attitude along a specific force that points up.
+    /// Creates the attitude along a specific force that points up.
     #[inline]
     pub(crate) fn new(specific_force: &Vector3<f32>, yaw_rad: f32) -> Self {
         let [along, left] = heading(yaw_rad);
         Frame { r: facing(specific_force, yaw_rad), along, left, per_length: 1.0 / length(specific_force) }
     }
 
-    /// Omega_d for ds/dt and the rate of the heading; its derivative, without products of rates, for d2s/dt2 and the
-    /// heading's acceleration.
+    /// Returns Omega_d for ds/dt and the heading's rate. With d2s/dt2 and the heading's acceleration it returns
+    /// dOmega_d/dt without the products of rates.
     #[inline]
     pub(crate) fn turn(&self, s_dot: &Vector3<f32>, yaw_dot: f32) -> Vector3<f32> {
         let (b1, b2, b3) = (self.r.column(0), self.r.column(1), self.r.column(2));
@@ -59,9 +59,9 @@ impl Frame {
     }
 }
 
-/// Returns the attitude along a specific force, given with its two derivatives \[m/s2\], \[m/s3\], \[m/s4\], at the
-/// setpoint's heading. The specific force must point up.
-// Always inlined: what is returned in memory is read back before it has been written.
+/// Returns the attitude along a specific force with two derivatives \[m/s2, m/s3, m/s4\], at the setpoint's heading.
+/// The specific force must point up.
+// Always inlined: a result returned in memory would be read back while its stores are still pending.
 #[inline(always)]
 pub fn flat(specific_force: [Vector3<f32>; 3], setpoint: &Setpoint) -> Desired {
     let [s, s_dot, s_ddot] = specific_force;

@@ -15,19 +15,20 @@
 //!
 //! # Decisions
 //!
-//! * **Gains** are the paper's over mass and inertia: k_x, k_R in 1/s2, k_v, k_Omega in 1/s. Yaw has its own k_R and
-//!   k_Omega, because its control authority is a sixtieth of roll and pitch; the proof has one number for all axes.
+//! * **Gains** are the paper's divided by mass and inertia: k_x, k_R in 1/s2, k_v, k_Omega in 1/s. Yaw has its own k_R
+//!   and k_Omega, because its control authority is a sixtieth of that of roll and pitch; the proof has one number for
+//!   all axes.
 //! * **R_d, Omega_d and dOmega_d/dt** need two derivatives of s, which contains the measured state. So s first passes a
 //!   critically damped second-order filter w^2/(s + w)^2, which gives the filtered s with ds/dt and d2s/dt2 exactly
-//!   (command filtering, as in AFBC); R_d follows the filtered s. Omega_d then is that of [`crate::flatness`], and
-//!   dOmega_d/dt follows with one more derivative of s and psi_d. Its products of rates are neglected: at 1 rad/s they
-//!   are 1 rad/s2, while k_R e_R is tens. The setpoint's jerk and snap are not used.
+//!   (command filtering, as in AFBC). R_d follows the filtered s. Omega_d is that of [`crate::flatness`], and
+//!   dOmega_d/dt uses one more derivative of s and psi_d. The products of rates are neglected: at 1 rad/s they are 1
+//!   rad/s2, while k_R e_R is tens. The setpoint's jerk and snap are not used.
 //! * **Heading**: b1 is perpendicular to y_C, so that the yaw of R_d is exactly psi_d. The paper projects a freely
-//!   chosen direction; this is one choice of it.
+//!   chosen direction; this is one such choice.
 //! * **Limits**: the paper assumes that s never vanishes and that rotor forces are unlimited; here [`Limits`] bounds s.
-//! * **Integrals**: the position integral is of e_x alone, because the integral of e_v, which the source adds, is e_x
-//!   and thus part of k_x. In the attitude integral, c = k_R / k_Omega. The integrals are bounded by
-//!   +-[`Gains::position_integral_max_m_s2`] and +-20 rad/s2; anti-windup stops them where limits or rotors are
+//! * **Integrals**: the position integral is of e_x alone. The source adds the integral of e_v, which is e_x and thus
+//!   part of k_x. In the attitude integral, c = k_R / k_Omega. The integrals are bounded by
+//!   +-[`Gains::position_integral_max_m_s2`] and +-20 rad/s2. Anti-windup stops them where limits or rotors are
 //!   saturated.
 
 use crate::attitude::{geometric_error, r_earth_body, unit};
@@ -106,7 +107,7 @@ parameters! {
 }
 
 impl Gains {
-    /// The law of 2010, without integrals. Hand-tuned for the paper's vehicle with a rotor lag of 20 ms.
+    /// Law of 2010, without integrals. Hand-tuned for the paper's vehicle with a rotor lag of 20 ms.
     pub const LEE_2010: Self = Gains {
         position_p_1_s2: 16.0,
         position_d_1_s: 8.0,
@@ -126,16 +127,16 @@ impl Gains {
         smoothing: Smoothing::DEFAULT,
     };
 
-    /// With the integrals of 2013, as tuned by `sitl tune` for the paper's vehicle with a rotor lag of 20 ms
+    /// Law with the integrals of 2013, tuned by `sitl tune` for the paper's vehicle with a rotor lag of 20 ms
     /// (`docs/tuning.md`).
     pub const TUNED: Self = Self::DEFAULT;
 
-    /// With the integrals of 2013. Hand-tuned for the paper's vehicle with a rotor lag of 20 ms.
+    /// Law with the integrals of 2013. Hand-tuned for the paper's vehicle with a rotor lag of 20 ms.
     pub const GOODARZI_2013: Self =
         Gains { position_i_1_s3: 25.0, height_i_1_s3: 60.0, tilt_i_1_s2: 20.0, yaw_i_1_s2: 10.0, ..Self::LEE_2010 };
 }
 
-/// The controller. Immutable; what changes in flight is in [`Memory`].
+/// Geometric controller with its constants. Everything that changes in flight is in [`Memory`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Geometric<const N: usize = 4> {
     pub(crate) body: Body<N>,
@@ -165,15 +166,15 @@ pub struct Memory {
     pub(crate) trace: Trace,
 }
 
-/// What the integrals learn from a step.
+/// Errors that the integrals learn from in a step.
 pub(crate) struct Lesson {
     position: TrackingOutput,
     /// -(e_Omega + c e_R) \[rad/s\]
     attitude: Vector3<f32>,
 }
 
-/// Returns the attitude along a specific force, given with its two derivatives \[m/s2\], \[m/s3\], \[m/s4\], at the
-/// setpoint's heading; products of rates are neglected. The specific force must point up.
+/// Returns the attitude along a specific force with two derivatives \[m/s2, m/s3, m/s4\], at the setpoint's heading,
+/// neglecting products of rates. The specific force must point up.
 #[inline]
 pub fn desired(specific_force: [Vector3<f32>; 3], setpoint: &Setpoint) -> Desired {
     let [s, s_dot, s_ddot] = specific_force;
@@ -186,10 +187,10 @@ pub fn desired(specific_force: [Vector3<f32>; 3], setpoint: &Setpoint) -> Desire
 }
 
 impl<const N: usize> Geometric<N> {
-    /// Makes a controller for a vehicle with these nominal parameters.
+    /// Creates a controller for a vehicle with these nominal parameters.
     ///
     /// # Errors
-    /// The first parameter, setting or gain out of range.
+    /// Returns the first parameter, setting or gain that is out of range.
     pub fn new(vehicle: impl Into<Airframe<N>>, settings: Settings, gains: Gains) -> Result<Self, OutOfRange> {
         let vehicle = vehicle.into();
         let body = Body::new(&vehicle, &settings, &gains.smoothing)?;
@@ -217,14 +218,14 @@ impl<const N: usize> Geometric<N> {
         })
     }
 
-    /// Computes the demand of one step, and what the integrals learn from it.
+    /// Computes the demand of one step and the errors for the integrals.
     #[inline]
     pub(crate) fn demand(&self, memory: &mut Memory, state: &State, setpoint: &Setpoint) -> (Demand, Lesson) {
         let position = self.position.output(state, setpoint, &memory.position_integral);
         let specific_force = position.specific_force_m_s2;
 
         // Desired attitude.
-        // Also without a new state, since what it filters is a command, not a measurement.
+        // Advances also without a new state, because the filtered signal is a command, not a measurement.
         self.filter.advance(&mut memory.specific_force, &specific_force);
         let filtered = &memory.specific_force;
         let second = self.filter.second_derivative(filtered, &specific_force);
@@ -255,7 +256,8 @@ impl<const N: usize> Geometric<N> {
         (demand, Lesson { position, attitude: rate_error + self.c.component_mul(&attitude_error) })
     }
 
-    /// Advances the integrals if the state was `fresh`; `unallocated` is that part of U1..U3.
+    /// Advances the integrals if the state was `fresh`. `unallocated` is the part of U1..U3 that the rotors could not
+    /// give.
     #[inline]
     pub(crate) fn learn(&self, memory: &mut Memory, lesson: &Lesson, fresh: bool, unallocated: Vector3<f32>) {
         if fresh {

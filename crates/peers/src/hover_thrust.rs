@@ -1,7 +1,7 @@
-//! Estimate of the thrust that hovering takes, in the manner of PX4's `ZeroOrderHoverThrustEkf`.
+//! Estimates the hover thrust, like PX4's `ZeroOrderHoverThrustEkf`.
 //!
-//! A Kalman filter of one state: h, the hover thrust as a share of the nominal weight, a random walk. Its measurement
-//! is the vertical acceleration a_z under the vertical thrust t, a share of the nominal weight too:
+//! A Kalman filter with one state h, the hover thrust as a share of the nominal weight, modelled as a random walk. The
+//! measurement is the vertical acceleration a_z under the vertical thrust t, also a share of the nominal weight:
 //!
 //! ```text
 //! a_z = g (t / h - 1) + noise of 1 m/s2,   H = d a_z / d h = -g t / h^2
@@ -9,24 +9,24 @@
 //! K = P H / (H^2 P + 1),   h += K sat(a_z - g (t / h - 1)),   P = (1 - K H) P,   0.4 <= h <= 2.5
 //! ```
 //!
-//! In hover it settles to K H = w dt: a low-pass filter of the bandwidth w. PX4's default (`HTE_HT_NOISE` at half
+//! In hover K H settles at w dt: a low-pass filter with the bandwidth w. PX4's default (`HTE_HT_NOISE` at half
 //! throttle) is w = 0.07 1/s.
 //!
-//! Differences from PX4: the noise is constant, PX4's least, where PX4 estimates it; an innovation beyond three
-//! standard deviations counts as three, where PX4 rejects it and, after some of them, raises P; h starts as certain.
+//! Differences from PX4: the noise is constant at PX4's minimum, where PX4 estimates it. An innovation beyond three
+//! standard deviations is cut to three, where PX4 rejects it and, after some rejections, raises P. h starts with P = 0.
 
 use afbc_control::math;
 
-/// Least h.
+/// Smallest h.
 const SHARE_MIN: f32 = 0.4;
 /// Largest h.
 const SHARE_MAX: f32 = 2.5;
 /// Standard deviation of the noise \[m/s2\].
 const NOISE_M_S2: f32 = 1.0;
-/// Largest innovation in its standard deviations: PX4's `HTE_ACC_GATE`.
+/// Largest innovation in its standard deviations, PX4's `HTE_ACC_GATE`.
 const GATE: f32 = 3.0;
 
-/// The estimator. Immutable; what changes in flight is in [`HoverThrust`].
+/// Estimator with its constants. Everything that changes in flight is in [`HoverThrust`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct HoverThrustEstimator {
     gravity_m_s2: f32,
@@ -34,7 +34,7 @@ pub(crate) struct HoverThrustEstimator {
     growth: f32,
 }
 
-/// The estimate; at first the nominal weight.
+/// Estimate of the hover thrust, which starts at the nominal weight.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct HoverThrust {
     /// h - 1
@@ -44,7 +44,7 @@ pub(crate) struct HoverThrust {
 }
 
 impl HoverThrust {
-    /// h: hover thrust over nominal weight.
+    /// Returns h: the hover thrust as a share of the nominal weight.
     #[inline]
     pub(crate) fn share(&self) -> f32 {
         1.0 + self.excess
@@ -52,13 +52,13 @@ impl HoverThrust {
 }
 
 impl HoverThrustEstimator {
-    /// Makes an estimator of the given w, advanced every `dt_s` seconds; with w = 0 h stays 1.
+    /// Creates an estimator with this w, advanced every `dt_s` seconds; with w = 0, h stays 1.
     pub(crate) fn new(bandwidth_1_s: f32, gravity_m_s2: f32, dt_s: f32) -> Self {
         let step = bandwidth_1_s * dt_s / gravity_m_s2 * NOISE_M_S2;
         HoverThrustEstimator { gravity_m_s2, growth: step * step }
     }
 
-    /// Feeds a_z under t = `thrust_share`.
+    /// Fuses a_z under the thrust t = `thrust_share`.
     #[inline]
     pub(crate) fn advance(&self, estimate: &mut HoverThrust, acceleration_m_s2: f32, thrust_share: f32) {
         let (g, h) = (self.gravity_m_s2, estimate.share());
@@ -69,7 +69,7 @@ impl HoverThrustEstimator {
         let most = GATE * math::sqrt(innovation_variance);
         let innovation = (acceleration_m_s2 - g * (thrust_share / h - 1.0)).max(-most).min(most);
         let share = math::min(math::max(h + gain * innovation, SHARE_MIN), SHARE_MAX);
-        // K H is at least 0 and below 1: the variance never falls below zero.
+        // K H is at least 0 and below 1, so the variance never falls below zero.
         *estimate = HoverThrust { excess: share - 1.0, variance: (1.0 - gain * slope) * variance };
     }
 }
@@ -81,7 +81,7 @@ mod tests {
     const G: f32 = 9.81;
     const DT_S: f32 = 0.001;
 
-    /// What a vehicle whose hover thrust is `h` measures under the thrust `t`.
+    /// Returns a_z of a vehicle with the hover thrust `h` under the thrust `t`.
     fn measured(h: f32, t: f32) -> f32 {
         G * (t / h - 1.0)
     }
@@ -96,7 +96,7 @@ mod tests {
                     (0..(time_s / DT_S) as usize).for_each(|_| estimator.advance(&mut estimate, measured(h, t), t));
                     (estimate.share() - h).abs()
                 };
-                // K H = w dt |H| / g, as soon as P has grown for some 1/w: quick for a small h, slow for a large one.
+                // K H = w dt |H| / g after P has grown for some 1/w: fast for a small h, slow for a large one.
                 let (early, late) = (error_at(1.0), error_at(29.0));
                 assert!(h == 1.0 || early > 0.2 * (1.0 - h).abs(), "{early} of {h} after 1 s");
                 assert!(late < 0.005 * h, "{late} of {h} after 30 s");

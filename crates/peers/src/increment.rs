@@ -4,16 +4,17 @@
 //! dOmega/dt = (G u)_f + nu - (dOmega/dt)_f
 //! ```
 //!
-//! Whatever turns the vehicle besides the rotors is in (dOmega/dt)_f - (G u)_f. Both pass the same filter.
+//! Everything that turns the vehicle apart from the rotors is in (dOmega/dt)_f - (G u)_f. Both signals pass the same
+//! filter.
 
 use crate::differentiator::{Differentiator, Smooth};
 use nalgebra::Vector3;
 
-/// The filter of both signals.
+/// Filter of both signals.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Increment(pub(crate) Differentiator);
 
-/// What the rotors give and how the vehicle reacts, filtered.
+/// Filtered effect of the rotors and filtered reaction of the vehicle.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Reaction {
     /// G u \[rad/s2\]
@@ -22,7 +23,8 @@ pub(crate) struct Reaction {
 }
 
 impl Increment {
-    /// Feeds G u and the measured rates of this step; without a new measurement neither, so that both stay synchronous.
+    /// Filters G u and the measured rates of this step. Call it only with a new measurement, so that both stay
+    /// synchronous.
     #[inline]
     pub(crate) fn measure(&self, reaction: &mut Reaction, given_rad_s2: &Vector3<f32>, rates_rad_s: &Vector3<f32>) {
         self.0.advance(&mut reaction.rotor_acceleration, given_rad_s2);

@@ -18,26 +18,26 @@
 //!            dOmega/dt = (G u)_f + nu - (dOmega/dt)_f,  G u = [l/Ix U1, l/Iy U2, (d/b)/Iz U3]
 //! ```
 //!
-//! With exact actuators, the acceleration follows its reference as the actuators follow their command, whatever the
-//! filter; the filter determines how fast a disturbance is detected. Both filters are critically damped,
-//! w^2/(s + w)^2 (see [`crate::differentiator`]); Smeur's is also of second order, with 50 rad/s and a damping of 0.55.
+//! With exact actuators, the acceleration follows its reference as the actuators follow their command, for any filter.
+//! The filter determines how fast a disturbance is detected. Both filters are critically damped, w^2/(s + w)^2 (see
+//! [`crate::differentiator`]); Smeur's is also of second order, with 50 rad/s and a damping of 0.55.
 //!
 //! # Decisions
 //!
 //! * **Feed-forward** is Tal and Karaman's: Omega_d and dOmega_d/dt by [`crate::flatness`] from the setpoint's jerk and
-//!   snap, which are those of the specific force while gravity is constant. They turn the commanded s, not the
-//!   reference's. Where jerk and snap are zero because nobody gives them, R_d follows s by feedback alone.
+//!   snap, which equal the derivatives of the specific force because gravity is constant. They are applied to the
+//!   commanded s, not the reference's. If the setpoint has no jerk and snap, R_d follows s by feedback alone.
 //! * **Rotor model**: a first-order lag of the speed with the time constant [`Gains::rotor_time_constant_s`], initially
 //!   at hover. Its input is the command after rotor limits, so it cannot wind up.
-//! * **What it knows of the rotors**: that time constant, 20 ms by default, which is the lag of the rotors that all
-//!   gains here are for; [`crate::slowed`] scales it for others. It does not know their delay. At lags from half to
-//!   twice what it assumes it still flies (`tests/flights.rs`).
+//! * **Rotor knowledge**: only that time constant, not the delay. The default of 20 ms is the rotor lag for which all
+//!   gains here are tuned; [`crate::slowed`] scales them for others. INDI still flies with lags from half to twice the
+//!   assumed one (`tests/flights.rs`).
 //! * **Not adaptive**: G is nominal. A true effectiveness of k times the nominal raises the loop gain by the factor k.
 //! * **Neglected**: the moment that accelerates the propellers (G2 of the 2016 paper), which this project's plant
 //!   models do not have.
 //! * **The attitude error** is tilt-prioritised, as in [`crate::pid`].
-//! * **On the ground**, the increments find no acceleration to match: thrust rises, within Limits, until the vehicle
-//!   lifts off or the setpoint lies below it. Do not step while disarmed.
+//! * **On the ground**, no acceleration follows the increments, so thrust rises within Limits until the vehicle lifts
+//!   off or the setpoint lies below it. Do not step while disarmed.
 
 use crate::attitude::{r_earth_body, unit};
 use crate::body::{Body, Demand};
@@ -111,7 +111,7 @@ parameters! {
 }
 
 impl Gains {
-    /// As tuned by `sitl tune` for the paper's vehicle with a rotor lag of 20 ms (`docs/tuning.md`).
+    /// Tuned by `sitl tune` for the paper's vehicle with a rotor lag of 20 ms (`docs/tuning.md`).
     pub const TUNED: Self = Self::DEFAULT;
 
     /// Hand-tuned for the paper's vehicle with a rotor lag of 20 ms.
@@ -134,7 +134,7 @@ impl Gains {
     };
 }
 
-/// The controller. Immutable; what changes in flight is in [`Memory`].
+/// INDI controller with its constants. Everything that changes in flight is in [`Memory`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Indi<const N: usize = 4> {
     body: Body<N>,
@@ -161,10 +161,10 @@ pub struct Memory<const N: usize = 4> {
 }
 
 impl<const N: usize> Indi<N> {
-    /// Makes a controller for a vehicle with these nominal parameters.
+    /// Creates a controller for a vehicle with these nominal parameters.
     ///
     /// # Errors
-    /// The first parameter, setting or gain out of range.
+    /// Returns the first parameter, setting or gain that is out of range.
     pub fn new(vehicle: impl Into<Airframe<N>>, settings: Settings, gains: Gains) -> Result<Self, OutOfRange> {
         let vehicle = vehicle.into();
         let body = Body::new(&vehicle, &settings, &gains.smoothing)?;
@@ -206,7 +206,7 @@ impl<const N: usize> FlightController<N> for Indi<N> {
     #[inline]
     fn decide(&self, memory: &mut Memory<N>, state: &State, setpoint: &Setpoint, fresh: bool) -> Action<N> {
         let r = r_earth_body(&state.attitude_rad);
-        // Sines that are off by up to 1.7e-4 do not leave a length of 1.
+        // Normalised, because sines are off by up to 1.7e-4.
         let body_z = unit(&r.column(2).into());
 
         // Present rotor forces by the model, and the measured reaction of the vehicle.
@@ -237,7 +237,7 @@ impl<const N: usize> FlightController<N> for Indi<N> {
             - state.rates_rad_s.cross(&omega_d);
 
         let demand = Demand {
-            // Beyond 90 degrees from it the rotors would have to pull.
+            // If the specific force is more than 90 degrees from body z, the rotors would have to pull.
             thrust_n: self.body.mass_kg * specific_force.dot(&body_z).max(0.0),
             angular_acceleration_rad_s2: self.increment.invert(&memory.reaction, &nu),
             acceleration_m_s2,

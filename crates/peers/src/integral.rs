@@ -11,7 +11,7 @@ pub(crate) fn integrate(integral: &Vector3<f32>, rate: &Vector3<f32>, dt_s: f32,
     (integral + rate * dt_s).map(|i| i.max(-max).min(max))
 }
 
-/// Returns `error`, or 0 if it would drive an integral further towards what is `missing` because of saturation.
+/// Returns `error`, or 0 if it would drive an integral further into the saturation that `missing` shows.
 #[inline]
 pub(crate) fn away_from(error: f32, missing: f32) -> f32 {
     if missing > 0.0 {

@@ -3,7 +3,7 @@
 //! Wu, Cheng, Ackerman, Gahlawat, Lakshmanan, Zhao, Hovakimyan, *L1 adaptive augmentation for geometric tracking
 //! control of quadrotors*, ICRA 2022, and *L1Quad*, IEEE TCST 33(2), 2025: a predictor of velocity and body rates, a
 //! piecewise-constant adaptation law that explains the prediction error within one step, and a low-pass filter between
-//! the estimated uncertainty and the rotors. [`crate::geometric`] is the law that is augmented; in frames with z up:
+//! the estimated uncertainty and the rotors. The augmented law is [`crate::geometric`]. In frames with z up:
 //!
 //! ```text
 //! predictor   dv^/dt     = -g e_z + U4/m R e_z + s_v - a (v^ - v)
@@ -16,18 +16,17 @@
 //!
 //! # Decisions
 //!
-//! * **Matched and unmatched**: the part of s_v along the thrust and all of s_Omega can be cancelled by the rotors, and
-//!   are; the part of s_v across the thrust only explains the prediction error, as in the source. Against that part the
-//!   geometric controller keeps its integrals of the position ([`Gains::BY_HAND`]); the source's has none
-//!   ([`Gains::WU_2022`]).
-//! * **Frame**: s_v is in the earth frame. The source writes it along the body axes, which is the same, since it is
-//!   estimated anew in each step.
-//! * **Rotor lag**: the source takes the rotors for ideal. Here the predictor knows their lag as INDI is
-//!   ([`Gains::rotor_time_constant_s`], 20 ms); 0 is the source's.
-//! * **Bounds**: the estimates are bounded by +-20 m/s2 and +-100 rad/s2 per coordinate, so that a state that jumps, as
-//!   after an outage, does not shake the vehicle. Without a new measurement nothing advances, and the predictor starts
-//!   again at the next.
-//! * **On the ground**, its force counts as uncertainty: see [`crate::indi`].
+//! * **Matched and unmatched**: the rotors can and do cancel the part of s_v along the thrust and all of s_Omega. The
+//!   part of s_v across the thrust only explains the prediction error, as in the source. Against that part the
+//!   geometric controller keeps its position integrals ([`Gains::BY_HAND`]); the source has none ([`Gains::WU_2022`]).
+//! * **Frame**: s_v is in the earth frame. The source uses body axes, which is equivalent, because s_v is estimated
+//!   anew in each step.
+//! * **Rotor lag**: the source assumes ideal rotors. Here the predictor knows the rotor lag
+//!   ([`Gains::rotor_time_constant_s`], 20 ms), like INDI; 0 is the source's assumption.
+//! * **Bounds**: the estimates are bounded by +-20 m/s2 and +-100 rad/s2 per coordinate, so that a jump of the state,
+//!   as after an outage, does not shake the vehicle. Without a new measurement nothing advances, and the predictor
+//!   restarts at the next measurement.
+//! * **On the ground**, the ground's force counts as uncertainty: see [`crate::indi`].
 
 use crate::attitude::{r_earth_body, unit};
 use crate::differentiator::{Differentiator, Smooth};
@@ -67,7 +66,7 @@ parameters! {
 }
 
 impl Gains {
-    /// The geometric controller, with integrals of the position only.
+    /// Geometric controller with position integrals only.
     const BASE: geometric::Gains = geometric::Gains {
         position_p_1_s2: 12.0,
         position_d_1_s: 6.0,
@@ -78,7 +77,7 @@ impl Gains {
         ..geometric::Gains::LEE_2010
     };
 
-    /// The geometric controller as tuned under the adaptation, without integrals of the attitude.
+    /// Geometric controller as tuned with the adaptation, without attitude integrals.
     const TUNED_BASE: geometric::Gains = geometric::Gains {
         position_p_1_s2: 32.67,
         position_d_1_s: 15.58,
@@ -100,7 +99,7 @@ impl Gains {
         ..Self::BASE
     };
 
-    /// As tuned by `sitl tune` for the paper's vehicle with a rotor lag of 20 ms (`docs/tuning.md`).
+    /// Tuned by `sitl tune` for the paper's vehicle with a rotor lag of 20 ms (`docs/tuning.md`).
     pub const TUNED: Self = Self::DEFAULT;
 
     /// Hand-tuned for the paper's vehicle with a rotor lag of 20 ms.
@@ -112,14 +111,14 @@ impl Gains {
         rotor_time_constant_s: 0.02,
     };
 
-    /// The law of the source, on the geometric controller without integrals. Hand-tuned for the same vehicle.
+    /// Law of the source, on the geometric controller without integrals. Hand-tuned for the same vehicle.
     pub const WU_2022: Self = Gains {
         geometric: geometric::Gains { position_i_1_s3: 0.0, height_i_1_s3: 0.0, ..Self::BASE },
         ..Self::BY_HAND
     };
 }
 
-/// The controller. Immutable; what changes in flight is in [`Memory`].
+/// L1 controller with its constants. Everything that changes in flight is in [`Memory`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct L1<const N: usize = 4> {
     geometric: Geometric<N>,
@@ -135,7 +134,7 @@ pub struct L1<const N: usize = 4> {
     moment_filter: Differentiator,
 }
 
-/// Velocity and body rates.
+/// Predicted velocity and body rates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Prediction {
     velocity_m_s: Vector3<f32>,
@@ -147,11 +146,11 @@ struct Prediction {
 pub struct Memory<const N: usize = 4> {
     /// State of the geometric controller.
     pub geometric: geometric::Memory,
-    /// s_v: estimated force over mass beyond the model's, earth frame \[m/s2\].
+    /// s_v: estimated force per mass that the model lacks, earth frame \[m/s2\].
     pub force_m_s2: Vector3<f32>,
-    /// s_Omega: estimated angular acceleration beyond the model's, body frame \[rad/s2\].
+    /// s_Omega: estimated angular acceleration that the model lacks, body frame \[rad/s2\].
     pub moment_rad_s2: Vector3<f32>,
-    /// v^, Omega^; none before the first measurement.
+    /// v^ and Omega^, `None` before the first measurement.
     prediction: Option<Prediction>,
     /// C_1 (s_v . R e_z) \[m/s2\]
     thrust: f32,
@@ -161,10 +160,10 @@ pub struct Memory<const N: usize = 4> {
 }
 
 impl<const N: usize> L1<N> {
-    /// Makes a controller for a vehicle with these nominal parameters.
+    /// Creates a controller for a vehicle with these nominal parameters.
     ///
     /// # Errors
-    /// The first parameter, setting or gain out of range.
+    /// Returns the first parameter, setting or gain that is out of range.
     pub fn new(vehicle: impl Into<Airframe<N>>, settings: Settings, gains: Gains) -> Result<Self, OutOfRange> {
         let vehicle = vehicle.into();
         let geometric = Geometric::new(vehicle, settings, gains.geometric)?;
@@ -183,7 +182,7 @@ impl<const N: usize> L1<N> {
         })
     }
 
-    /// Estimates both uncertainties from the error of the prediction for this step, and filters them.
+    /// Estimates both uncertainties from the prediction error of this step, and filters them.
     #[inline]
     fn adapt(&self, memory: &mut Memory<N>, state: &State, body_z: &Vector3<f32>) {
         if let Some(predicted) = memory.prediction {
@@ -195,7 +194,7 @@ impl<const N: usize> L1<N> {
         self.moment_filter.advance(&mut memory.moment, &memory.moment_rad_s2);
     }
 
-    /// Returns the prediction for the next step, while the rotors give `now`.
+    /// Returns the prediction for the next step, with the rotors giving `now`.
     #[inline]
     fn predict(&self, memory: &Memory<N>, state: &State, body_z: &Vector3<f32>, now: &Inputs) -> Prediction {
         let State { velocity_m_s, rates_rad_s, .. } = *state;
@@ -242,7 +241,7 @@ impl<const N: usize> FlightController<N> for L1<N> {
         self.geometric.learn(&mut memory.geometric, &lesson, fresh, unallocated);
         memory.geometric.trace = trace;
 
-        // Before the prediction, which spans the step that this command begins.
+        // Advanced before the prediction, which spans the step that this command begins.
         self.rotors.advance(&mut memory.rotors, &action.speeds);
         let now = self.rotors.inputs(body, &memory.rotors);
         memory.prediction = fresh.then(|| self.predict(memory, state, &body_z, &now));

@@ -10,13 +10,13 @@
 //! | [`dfbc`] | differential flatness, incremental inversion of the moments | Sun et al. 2022 |
 //! | [`mpc`] | linear model-predictive control, by ADMM | Kamel et al. 2017; TinyMPC, 2024 |
 //!
-//! The head of each file gives the equations, the sources and the decisions made where a source leaves something open.
-//! Frames and units are defined in [`afbc_types`].
+//! The head of each file gives the equations, the sources, and the decisions where a source leaves something open.
+//! [`afbc_types`] defines frames and units.
 //!
 //! # Common to all
 //!
-//! * The interface: an [`afbc_types::State`] and an [`afbc_types::Setpoint`] in, an [`afbc_control::Action`] out, by
-//!   way of U1..U4 and the same [`Mixer`](afbc_control::Mixer), so that no controller has a better allocation than
+//! * Interface: an [`afbc_types::State`] and an [`afbc_types::Setpoint`] in, an [`afbc_control::Action`] out. All
+//!   compute U1..U4 and use the same [`Mixer`](afbc_control::Mixer), so that no controller has a better allocation than
 //!   another.
 //! * [`afbc_control::Settings`]: time step and rotor limit.
 //! * Implausible input is rejected by [`afbc_control::Screen`]; filters and integrators do not advance on a repeated
@@ -25,15 +25,15 @@
 //!   same rotor lag.
 //! * [`limits::Limits`]: thrust within what the rotors give, and tilt below a maximum.
 //! * All mathematics is from [`afbc_control::math`], bit-identical on host and target. Its sine is off by up to 1.7e-4,
-//!   which turns a tilt of 0.1 rad into 0.0998: without an integral a steady-state error of at most 0.002 m/s2, with
-//!   one none.
+//!   so a tilt of 0.1 rad becomes 0.0998. Without an integral this causes a steady-state error of at most 0.002 m/s2,
+//!   with an integral none.
 //!
 //! # Tuning
 //!
 //! Gains are plain structs, declared with their ranges. The tuner searches those marked `tuned`; the others describe
-//! the vehicle and its task (largest tilt, rotor lag). All sets given here are for the vehicle of the paper's Section
-//! IV with a rotor lag of 20 ms: `Gains::PAPER_VEHICLE` and those named after their source are hand-tuned,
-//! `Gains::TUNED` are by `sitl tune` (`docs/tuning.md`).
+//! the vehicle and its task (largest tilt, rotor lag). All gain sets here are for the vehicle of the paper's Section IV
+//! with a rotor lag of 20 ms. `Gains::PAPER_VEHICLE` and sets named after their source are hand-tuned; `sitl tune`
+//! found `Gains::TUNED` (`docs/tuning.md`).
 //!
 //! ```
 //! use afbc_control::{FlightController, Validated, Settings};

@@ -4,14 +4,14 @@ use afbc_control::math;
 use afbc_types::Parameters;
 use nalgebra::Vector3;
 
-/// Least vertical part of the specific force, as a share of gravity: thrust always points up and determines an
-/// attitude.
+/// Smallest vertical part of the specific force, as a share of gravity, so that the thrust always points up and defines
+/// an attitude.
 const VERTICAL_MIN: f32 = 0.1;
-/// Largest vertical part, as a share of the rotors' largest thrust: the rest remains for attitude and sideways
+/// Largest vertical part, as a share of the rotors' largest thrust. The rest remains for attitude and sideways
 /// acceleration.
 const VERTICAL_MAX: f32 = 0.9;
 
-/// Bounds of the specific force, i.e. the thrust vector over mass in the earth frame \[m/s2\].
+/// Bounds of the specific force, the thrust vector per mass in the earth frame \[m/s2\].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limits {
     gravity_m_s2: f32,
@@ -22,11 +22,11 @@ pub struct Limits {
 }
 
 impl Limits {
-    /// Makes the bounds of a vehicle whose rotors give `thrust_max_n` together; parameters and largest tilt must be
+    /// Creates the bounds for a vehicle whose rotors give `thrust_max_n` together. Parameters and largest tilt must be
     /// valid.
     pub fn new(vehicle: &Parameters, thrust_max_n: f32, tilt_max_rad: f32) -> Self {
         let vertical_min_m_s2 = VERTICAL_MIN * vehicle.gravity_m_s2;
-        // A vehicle whose rotors cannot lift it must still have valid bounds.
+        // Even a vehicle whose rotors cannot lift it must have valid bounds.
         let max_m_s2 = (thrust_max_n / vehicle.mass_kg).max(2.0 * vertical_min_m_s2);
         Limits {
             gravity_m_s2: vehicle.gravity_m_s2,
@@ -43,20 +43,20 @@ impl Limits {
         Vector3::new(0.0, 0.0, self.gravity_m_s2)
     }
 
-    /// Returns the vertical part of a specific force within its limits: between 10 % of gravity and 90 % of the rotors'
+    /// Returns the vertical part of a specific force, limited to between 10 % of gravity and 90 % of the rotors'
     /// largest thrust.
     #[inline]
     pub(crate) fn vertical(&self, vertical_m_s2: f32) -> f32 {
         vertical_m_s2.max(self.vertical_min_m_s2).min(self.vertical_max_m_s2)
     }
 
-    /// Returns the closest specific force that the vehicle should give, height before sideways: vertical part between
-    /// 10 % of gravity and 90 % of the rotors' largest thrust, then tilt and length within their limits. Always points
-    /// up.
+    /// Returns the closest allowed specific force, with height before sideways acceleration. The vertical part is
+    /// between 10 % of gravity and 90 % of the rotors' largest thrust; then tilt and length are limited. The result
+    /// always points up.
     #[inline]
     pub fn apply(&self, specific_force: &Vector3<f32>) -> Vector3<f32> {
         let vertical = self.vertical(specific_force.z);
-        // At most 90 % of the largest is vertical: the root is of a positive number.
+        // The vertical part is at most 90 % of the maximum, so the root's argument is positive.
         let left_over = math::sqrt(self.max_m_s2 * self.max_m_s2 - vertical * vertical);
         let bounded = horizontally(specific_force, left_over.min(self.tan_tilt * vertical));
         Vector3::new(bounded.x, bounded.y, vertical)

@@ -1,5 +1,5 @@
-//! Outer loops: from position to acceleration, cascaded (PID, INDI) or with one error (geometric, DFBC), and from
-//! attitude to rates.
+//! Outer loops: position to acceleration, cascaded (PID, INDI) or from one error (geometric, DFBC), and attitude to
+//! rates.
 
 use crate::attitude::tilt_prioritised_error;
 use crate::integral::{away_from, integrate};
@@ -12,14 +12,14 @@ pub(crate) fn xy_and_z(xy: f32, z: f32) -> Vector3<f32> {
     Vector3::new(xy, xy, z)
 }
 
-/// From position to velocity to acceleration: a_d + k_v (v_d + sat(k_p (p_d - p)) - v).
+/// Position loop via velocity to acceleration: a_d + k_v (v_d + sat(k_p (p_d - p)) - v).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct PositionLoop {
     /// k_p \[1/s\]
     pub(crate) position_p: Vector3<f32>,
     /// k_v \[1/s\]
     pub(crate) velocity_p: Vector3<f32>,
-    /// Largest sat(...) \[m/s\].
+    /// Largest speed sat(...) \[m/s\].
     pub(crate) speed_max_m_s: f32,
 }
 
@@ -44,7 +44,7 @@ impl PositionLoop {
     }
 }
 
-/// From position to acceleration: k_x (p_d - p) + k_v (v_d - v) + sat(k_i int (p_d - p)) + a_d.
+/// Position loop directly to acceleration: k_x (p_d - p) + k_v (v_d - v) + sat(k_i int (p_d - p)) + a_d.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct TrackingLoop {
     /// k_x \[1/s2\]
@@ -65,9 +65,9 @@ pub(crate) struct TrackingOutput {
     pub(crate) position_error_m: Vector3<f32>,
     pub(crate) velocity_error_m_s: Vector3<f32>,
     pub(crate) acceleration_m_s2: Vector3<f32>,
-    /// Within limits.
+    /// Specific force within the limits.
     pub(crate) specific_force_m_s2: Vector3<f32>,
-    /// What the limits take from the specific force.
+    /// Part of the specific force that the limits cut off.
     missing_m_s2: Vector3<f32>,
 }
 
@@ -87,7 +87,7 @@ impl TrackingLoop {
         TrackingOutput { position_error_m, velocity_error_m_s, acceleration_m_s2, specific_force_m_s2, missing_m_s2 }
     }
 
-    /// Advances the integral, not towards what the limits took.
+    /// Advances the integral, but not in the direction that the limits cut off.
     #[inline]
     pub(crate) fn learn(&self, integral: &mut Vector3<f32>, output: &TrackingOutput) {
         let allowed = output.position_error_m.zip_map(&output.missing_m_s2, away_from);
@@ -95,10 +95,10 @@ impl TrackingLoop {
     }
 }
 
-/// From attitude to rates: k_a e(R, R_d) + Omega_ff, e tilt-prioritised.
+/// Attitude loop to rates: k_a e(R, R_d) + Omega_ff, with the tilt-prioritised e.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct AttitudeLoop {
-    /// k_a; that of yaw divided by its weight \[1/s\].
+    /// k_a \[1/s\]; the value for yaw is divided by the yaw weight.
     attitude_p: Vector3<f32>,
     yaw_weight: f32,
 }
@@ -112,14 +112,14 @@ pub(crate) struct AttitudeOutput {
 }
 
 impl AttitudeLoop {
-    /// Makes the loop; `yaw_p_1_s` is the gain for small yaw errors, whatever `yaw_weight` is.
+    /// Creates the loop. `yaw_p_1_s` is the gain for small yaw errors, whatever `yaw_weight` is.
     pub(crate) fn new(tilt_p_1_s: f32, yaw_p_1_s: f32, yaw_weight: f32) -> Self {
-        // The error has the weight in it already. By its range it is at least 0.05.
+        // The error already contains the weight, which is at least 0.05 by its range.
         AttitudeLoop { attitude_p: xy_and_z(tilt_p_1_s, yaw_p_1_s / yaw_weight), yaw_weight }
     }
 
-    /// Computes one step in the attitude `r`, towards `desired` with the rates `feed_forward_rad_s` in the body frame.
-    // Always inlined: what is returned in memory is read back before it has been written.
+    /// Computes one step in the attitude `r`, towards `desired`, with `feed_forward_rad_s` in the body frame.
+    // Always inlined: a result returned in memory would be read back while its stores are still pending.
     #[inline(always)]
     pub(crate) fn output(
         &self,

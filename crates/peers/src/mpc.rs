@@ -2,11 +2,11 @@
 //!
 //! The controller is that of Kamel, Stastny, Alexis, Siegwart, *Model predictive control for trajectory tracking of
 //! unmanned aerial vehicles using Robot Operating System*, in Robot Operating System (ROS), Springer 2017: a linear
-//! model whose attitude loop is a lag, an observed disturbance, and bounds on tilt and thrust. The solver is TinyMPC's
-//! (Nguyen, Schoedel, Alavilli, Plancher, Manchester, *TinyMPC: model-predictive control on resource-constrained
-//! microcontrollers*, ICRA 2024). The attitude is [`dfbc`](crate::dfbc)'s. Along each axis, with x = \[p - p_d,
-//! v - v_d, a - a_d\], a the acceleration by the model, u the commanded one less a_d, and N steps of length h:
-//!
+//! model with the attitude loop as a lag, an observed disturbance, and bounds on tilt and thrust. The solver is
+//! TinyMPC's (Nguyen, Schoedel, Alavilli, Plancher, Manchester, *TinyMPC: model-predictive control on
+//! resource-constrained microcontrollers*, ICRA 2024). The attitude loop is that of [`dfbc`](crate::dfbc). Along each
+//! axis, x = \[p - p_d, v - v_d, a - a_d\] with the model's acceleration a, u is the commanded acceleration minus a_d,
+//! and there are N steps of length h:
 //! ```text
 //! model        d(a - a_d)/dt = (u - (a - a_d)) / tau, held over h:   x+ = A x + B u
 //! cost         sum over N of q_p x_1^2 + q_v x_2^2 + u^2, and the cost to go of the last x
@@ -18,18 +18,18 @@
 //!              z_k = u_k + y_k within the bounds,   y_k += u_k - z_k
 //! ```
 //!
-//! with P and K of the Riccati equation for the input weight 1 + rho. The first u is flown.
+//! where P and K solve the Riccati equation for the input weight 1 + rho. The first u is flown.
 //!
 //! # Decisions
 //!
-//! * **The unbounded optimum**, u = -K x of weight 1, is flown while no step of it is at a bound: it is the solution.
-//!   Otherwise [`ITERATIONS`] iterations a step continue the last step's.
-//! * **Bounds** hold for the reference as it is now, since it is not known ahead; height comes before sideways
+//! * **Unbounded optimum**: u = -K x with input weight 1 is the solution, and is flown, if no planned step reaches a
+//!   bound. Otherwise [`ITERATIONS`] iterations per step continue from the last step's.
+//! * **Bounds** use the present reference, because the future one is unknown. Height comes before sideways acceleration
 //!   ([`Limits::apply`]), which couples the axes.
-//! * **The lag** is that of what feedback asks for: the reference's own turning is fed forward, as in [`crate::dfbc`].
-//!   a is the model's: fed back as measured, it trips over weak rotors with a large inertia.
-//! * **Drag** that the vehicle's file states counts as in [`crate::dfbc`]; what else disturbs is observed.
-//! * **What it knows of the rotors**: the time constant [`Gains::rotor_time_constant_s`], like INDI.
+//! * **Lag** applies to the feedback only: the reference's own turning is fed forward, as in [`crate::dfbc`]. a comes
+//!   from the model: fed back as measured, it causes a fall with weak rotors and a large inertia.
+//! * **Drag** stated in the vehicle file is used as in [`crate::dfbc`]; other disturbances are observed.
+//! * **Rotor knowledge**: the time constant [`Gains::rotor_time_constant_s`], like INDI.
 
 use crate::attitude::{r_earth_body, unit};
 use crate::body::{Body, Demand};
@@ -44,13 +44,13 @@ use afbc_control::{Action, FlightController, Mixer, Settings, Smoothed, Smoothin
 use afbc_types::{Airframe, Declared, OutOfRange, Setpoint, State, parameters};
 use nalgebra::{Matrix3, Vector3};
 
-/// Number of steps N that are planned.
+/// Number N of planned steps.
 pub const HORIZON: usize = 12;
-/// Iterations of ADMM in a step with bounds.
+/// Number of ADMM iterations per step when a bound is reached.
 pub const ITERATIONS: usize = 4;
-/// Weight of ADMM's penalty, in units of the weight of u.
+/// Weight of ADMM's penalty, relative to the weight of u.
 const RHO: f32 = 1.0;
-/// Steps of the Riccati equation at construction, which has long settled then.
+/// Iterations of the Riccati equation in the constructor, enough to converge.
 const RICCATI: usize = 400;
 
 parameters! {
@@ -116,7 +116,7 @@ parameters! {
 }
 
 impl Gains {
-    /// As tuned by `sitl tune` for the paper's vehicle with a rotor lag of 20 ms (`docs/tuning.md`).
+    /// Tuned by `sitl tune` for the paper's vehicle with a rotor lag of 20 ms (`docs/tuning.md`).
     pub const TUNED: Self = Self::DEFAULT;
 
     /// Hand-tuned for the paper's vehicle with a rotor lag of 20 ms.
@@ -140,7 +140,7 @@ impl Gains {
     };
 }
 
-/// The model of one axis and what is cached of its Riccati equation, for one weight of the input.
+/// Cached solution of the Riccati equation for one axis and one input weight.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Solution {
     /// K
@@ -151,7 +151,7 @@ struct Solution {
     inverse: f32,
 }
 
-/// The planner of one axis.
+/// Planner of one axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Axis {
     a: Matrix3<f32>,
@@ -161,10 +161,10 @@ struct Axis {
 }
 
 impl Axis {
-    /// Makes the planner for the weights of position and velocity, lag and step.
+    /// Creates the planner for weights of position and velocity, lag `tau` and step `h`.
     fn new(weights: [f32; 2], tau: f32, h: f32) -> Self {
         let kept = math::exp(-h / tau);
-        // Integrals of what the lag keeps of a, and of u.
+        // Integrals of the decaying acceleration and of u over the step.
         let (once, late) = (tau * (1.0 - kept), h - tau * (1.0 - kept));
         let a = Matrix3::new(1.0, h, tau * late, 0.0, 1.0, once, 0.0, 0.0, kept);
         let b = Vector3::new(0.5 * h * h - tau * late, late, 1.0 - kept);
@@ -180,7 +180,7 @@ impl Solution {
     fn new(a: &Matrix3<f32>, b: &Vector3<f32>, q: &Vector3<f32>, weight: f32) -> Self {
         let q = Matrix3::from_diagonal(q);
         let step = |p: &Matrix3<f32>| {
-            // The weight is at least 1 and P not negative: never a division by zero.
+            // The weight is at least 1 and P is not negative, so the divisor is positive.
             let inverse = 1.0 / (weight + b.dot(&(p * b)));
             let gain: Vector3<f32> = (a.tr_mul(p) * b) * inverse;
             (gain, inverse, a - b * gain.transpose())
@@ -189,7 +189,7 @@ impl Solution {
         for _ in 0..RICCATI {
             let (_, _, closed) = step(&p);
             let next = q + a.tr_mul(&(p * closed));
-            // P is symmetric: what rounding takes from that must not build up over the iterations.
+            // Made symmetric again, so that rounding errors do not build up over the iterations.
             p = (next + next.transpose()) * 0.5;
         }
         let (gain, inverse, closed) = step(&p);
@@ -197,7 +197,7 @@ impl Solution {
     }
 }
 
-/// The controller. Immutable; what changes in flight is in [`Memory`].
+/// MPC controller with its constants. Everything that changes in flight is in [`Memory`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mpc<const N: usize = 4> {
     body: Body<N>,
@@ -207,17 +207,17 @@ pub struct Mpc<const N: usize = 4> {
     limits: Limits,
     position_filter: Differentiator,
     rotors: RotorModel<N>,
-    /// Of x and y, and of z.
+    /// Planner of x and y, and planner of z.
     axes: [Axis; 2],
     /// 1 - exp(-dt / tau)
     follows: Vector3<f32>,
     attitude: FlatAttitude,
 }
 
-/// x, or p of ADMM, of each axis.
+/// Vectors x, or p of ADMM, one per axis.
 type Errors = [Vector3<f32>; 3];
 
-/// z and y of ADMM.
+/// Variables z and y of ADMM.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Split {
     z: Vector3<f32>,
@@ -240,10 +240,10 @@ pub struct Memory<const N: usize = 4> {
 }
 
 impl<const N: usize> Mpc<N> {
-    /// Makes a controller for a vehicle with these nominal parameters.
+    /// Creates a controller for a vehicle with these nominal parameters.
     ///
     /// # Errors
-    /// The first parameter, setting or gain out of range.
+    /// Returns the first parameter, setting or gain that is out of range.
     pub fn new(vehicle: impl Into<Airframe<N>>, settings: Settings, gains: Gains) -> Result<Self, OutOfRange> {
         let vehicle = vehicle.into();
         let body = Body::new(&vehicle, &settings, &gains.smoothing)?;
@@ -273,7 +273,7 @@ impl<const N: usize> Mpc<N> {
         })
     }
 
-    /// Returns the first u of the plan from the errors `x` along each axis, with what `allowed` leaves of each u.
+    /// Returns the first u of the plan from the errors `x` of each axis. `allowed` limits each u to the bounds.
     #[inline]
     fn planned(
         &self,
@@ -281,7 +281,7 @@ impl<const N: usize> Mpc<N> {
         x: &Errors,
         allowed: impl Fn(&Vector3<f32>) -> Vector3<f32>,
     ) -> Vector3<f32> {
-        // The unbounded optimum, if it is within all bounds.
+        // Flies the unbounded optimum if it is within all bounds.
         let (mut ahead, mut free) = (*x, true);
         let first = self.fed_back(x, |axis| &axis.unbounded);
         for split in plan.iter_mut() {
@@ -290,7 +290,7 @@ impl<const N: usize> Mpc<N> {
             if !free {
                 break;
             }
-            // Also where ADMM starts from when a bound is reached.
+            // ADMM starts from these values when a bound is reached.
             *split = Split { z: u, y: Vector3::zeros() };
             self.roll_out(&mut ahead, &u);
         }
@@ -299,7 +299,7 @@ impl<const N: usize> Mpc<N> {
         }
 
         let mut flown = first;
-        // Continues the last plan without shifting it: a planned step is far longer than the time between steps.
+        // Continues from the last plan without shifting it: a planned step is much longer than a control step.
         for _ in 0..ITERATIONS {
             let mut forced = [Vector3::zeros(); HORIZON];
             let mut p = Errors::default();
@@ -313,7 +313,7 @@ impl<const N: usize> Mpc<N> {
                 split.y += u - split.z;
                 self.roll_out(&mut ahead, &u);
             }
-            // Not u: before both agree, only z is within the bounds.
+            // z and not u: before both converge, only z is within the bounds.
             flown = plan.first().map_or(first, |split| split.z);
         }
         flown
@@ -332,7 +332,7 @@ impl<const N: usize> Mpc<N> {
         Vector3::new(of(of_x, x), of(of_y, y), of(of_z, z))
     }
 
-    /// Advances x by a planned step under u.
+    /// Advances x by one planned step with input u.
     #[inline]
     fn roll_out(&self, x: &mut Errors, u: &Vector3<f32>) {
         for ((axis, x), u) in self.axes().into_iter().zip(x).zip(u.iter()) {
@@ -340,7 +340,7 @@ impl<const N: usize> Mpc<N> {
         }
     }
 
-    /// Takes p back by a planned step with r, and returns e.
+    /// Propagates p back by one planned step with r, and returns e.
     #[inline]
     fn pulled_back(&self, p: &mut Errors, r: &Vector3<f32>) -> Vector3<f32> {
         let mut forced = Vector3::zeros();
@@ -391,11 +391,11 @@ impl<const N: usize> FlightController<N> for Mpc<N> {
         let u = self.planned(&mut memory.plan, &x, |u| {
             let wanted = balance + u;
             let given = self.limits.apply(&wanted);
-            // What is within the bounds stays as it is to the bit.
+            // A u within the bounds stays exactly the same.
             if (given - wanted).abs().max() <= 1e-4 { *u } else { given - balance }
         });
         let specific_force = self.limits.apply(&(balance + u));
-        // By what the bounds left of u: the model must not run ahead of what is commanded.
+        // Uses u after the bounds: the model must not run ahead of the command.
         memory.lagging = (a + (specific_force - balance - a).component_mul(&self.follows)).map(math::settled);
 
         // Attitude.

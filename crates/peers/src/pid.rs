@@ -1,6 +1,7 @@
-//! Cascaded PID, in the manner of the PX4 autopilot: four loops, each commanding the next.
+//! Cascaded PID like the PX4 autopilot: four loops, each commanding the next.
 //!
-//! With the setpoint's position p_d, velocity v_d, acceleration a_d and yaw psi_d, all errors setpoint minus state:
+//! With the setpoint's position p_d, velocity v_d, acceleration a_d and yaw psi_d, and all errors as setpoint minus
+//! state:
 //!
 //! ```text
 //! position     v_sp = v_d + sat(k_p (p_d - p))
@@ -17,19 +18,23 @@
 //! inputs       U1 = Ix/l dp/dt, U2 = Iy/l dq/dt, U3 = Iz/(d/b) dr/dt
 //! ```
 //!
-//! The tilt comes from the horizontal acceleration and gravity alone, so that an error of the thrust, which i_v or h
-//! makes good, does not change the horizontal acceleration. The estimator of h is in `hover_thrust.rs`.
+//! The tilt comes from the horizontal acceleration and gravity alone. So a thrust error, which i_v or h corrects, does
+//! not change the horizontal acceleration. The estimator of h is in `hover_thrust.rs`.
 //!
 //! Sources: PX4-Autopilot, `mc_pos_control` (PositionControl), `mc_hover_thrust_estimator`, `mc_att_control`
-//! (AttitudeControl) and `lib/rate_control`, read for their structure; the attitude error is Brescianini and D'Andrea's
-//! (see [`crate::attitude`]); the tracking anti-windup of the velocity loop is Rundqwist's, *Anti-reset windup for PID
+//! (AttitudeControl) and `lib/rate_control`, for their structure. The attitude error is Brescianini and D'Andrea's (see
+//! [`crate::attitude`]). The tracking anti-windup of the velocity loop is Rundqwist's, *Anti-reset windup for PID
 //! controllers*, IFAC 1990.
 //!
-//! Differences from PX4: gains of the rate loop are in 1/s, because the moment is scaled by the inertia; thrust is in
-//! newtons, so h is relative to the nominal weight; [`Limits`] keep no margin for horizontal thrust; tracking
-//! anti-windup also covers height, and along x and y it compares with what the tilt gives, not with what tilt and
-//! thrust give together; derivatives are those of [`crate::differentiator`]; the rate integrator is not slowed down at
-//! large errors.
+//! Differences from PX4:
+//!
+//! * Gains of the rate loop are in 1/s, because the inertia scales the moment.
+//! * Thrust is in newtons, so h is relative to the nominal weight.
+//! * [`Limits`] keep no margin for horizontal thrust.
+//! * Tracking anti-windup also covers height. Along x and y it compares with the effect of the tilt, not of tilt and
+//!   thrust together.
+//! * Derivatives are those of [`crate::differentiator`].
+//! * The rate integrator is not slowed down at large errors.
 
 use crate::attitude::{facing, length, r_earth_body};
 use crate::body::{Body, Demand};
@@ -123,7 +128,7 @@ parameters! {
 }
 
 impl Gains {
-    /// As tuned by `sitl tune` for the paper's vehicle with a rotor lag of 20 ms (`docs/tuning.md`).
+    /// Tuned by `sitl tune` for the paper's vehicle with a rotor lag of 20 ms (`docs/tuning.md`).
     pub const TUNED: Self = Self::DEFAULT;
 
     /// Hand-tuned for the paper's vehicle with a rotor lag of 20 ms.
@@ -153,7 +158,7 @@ impl Gains {
     };
 }
 
-/// The controller. Immutable; what changes in flight is in [`Memory`].
+/// PID controller with its constants. Everything that changes in flight is in [`Memory`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pid<const N: usize = 4> {
     body: Body<N>,
@@ -183,11 +188,11 @@ pub struct Memory {
     /// Unallocated part of U1..U3 in the last step \[N\].
     unallocated: Vector3<f32>,
     hover_thrust: HoverThrust,
-    /// U4 given in the last step \[N\]; none before the first.
+    /// U4 given in the last step \[N\], `None` before the first step.
     thrust_n: Option<f32>,
     /// a_sp_z of the last step \[m/s2\].
     climb_m_s2: f32,
-    /// t: vertical thrust over nominal weight, delayed like `velocity`; x and y are 0.
+    /// t: vertical thrust divided by the nominal weight, delayed like `velocity`; x and y are 0.
     thrust_share: Smooth,
     velocity: Smooth,
     rates: Smooth,
@@ -197,10 +202,10 @@ pub struct Memory {
 }
 
 impl<const N: usize> Pid<N> {
-    /// Makes a controller for a vehicle with these nominal parameters.
+    /// Creates a controller for a vehicle with these nominal parameters.
     ///
     /// # Errors
-    /// The first parameter, setting or gain out of range.
+    /// Returns the first parameter, setting or gain that is out of range.
     pub fn new(vehicle: impl Into<Airframe<N>>, settings: Settings, gains: Gains) -> Result<Self, OutOfRange> {
         let vehicle = vehicle.into();
         let body = Body::new(&vehicle, &settings, &gains.smoothing)?;
@@ -231,8 +236,8 @@ impl<const N: usize> Pid<N> {
 }
 
 impl<const N: usize> Pid<N> {
-    /// Estimates the hover thrust anew after a thrust `thrust_n` along a body axis of which `upright` is the vertical
-    /// part; the integral takes over what the new estimate would change.
+    /// Updates the estimated hover thrust after the thrust `thrust_n` along body z, whose vertical part is `upright`.
+    /// The integral compensates the change of the estimate, so the thrust does not jump.
     #[inline]
     fn estimate_hover_thrust(&self, memory: &mut Memory, thrust_n: f32, upright: f32) {
         let gravity_m_s2 = self.limits.gravity().z;
@@ -266,7 +271,7 @@ impl<const N: usize> FlightController<N> for Pid<N> {
         if fresh {
             self.differentiator.advance(&mut memory.velocity, &state.velocity_m_s);
             self.differentiator.advance(&mut memory.rates, &state.rates_rad_s);
-            // Before the first step no thrust has been given that could explain a motion.
+            // Before the first step no thrust was given that could explain a motion.
             if let Some(thrust_n) = memory.thrust_n {
                 self.estimate_hover_thrust(memory, thrust_n, r.m33);
             }
@@ -283,7 +288,7 @@ impl<const N: usize> FlightController<N> for Pid<N> {
         let vertical = self.limits.vertical(h * (acceleration.z + g));
         let wanted = Vector3::new(acceleration.x, acceleration.y, g) * (vertical / g);
         let specific_force = self.limits.apply(&wanted);
-        // Limits keep the vertical part at 10 % of gravity or more: no division by zero.
+        // Limits keep the vertical part at 10 % of gravity or more, so the division is safe.
         let tilted = specific_force * (g / specific_force.z);
         let missing = acceleration - Vector3::new(tilted.x, tilted.y, specific_force.z / h - g);
         let desired = facing(&specific_force, setpoint.yaw_rad);

@@ -1,16 +1,16 @@
-//! Model of the rotors' lag: what the rotors do now, as far as commands and a time constant show.
+//! Model of the rotor lag: present rotor speeds from the commands and a time constant.
 //!
 //! ```text
 //! omega_i += (1 - exp(-dt/tau)) (omega_i commanded - omega_i)
 //! ```
 //!
-//! Initially at hover. The commands are those after rotor limits, so the model cannot wind up.
+//! The speeds start at hover. The commands are those after rotor limits, so the model cannot wind up.
 
 use crate::body::Body;
 use afbc_control::math;
 use afbc_types::{Inputs, RotorSpeeds};
 
-/// The model. Immutable; the speeds are in [`Spin`].
+/// Rotor model with its constants. The speeds are in [`Spin`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct RotorModel<const N: usize> {
     hover: RotorSpeeds<N>,
@@ -18,24 +18,24 @@ pub(crate) struct RotorModel<const N: usize> {
     gain: f32,
 }
 
-/// Speeds of the modelled rotors; none before the first step.
+/// Speeds of the modelled rotors, `None` before the first step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Spin<const N: usize>(Option<RotorSpeeds<N>>);
 
 impl<const N: usize> RotorModel<N> {
-    /// Makes a model with the time constant tau; 0 for no lag.
+    /// Creates a model with this time constant; 0 means no lag.
     pub(crate) fn new(body: &Body<N>, weight_n: f32, time_constant_s: f32, dt_s: f32) -> Self {
         let gain = if time_constant_s > 0.0 { 1.0 - math::exp(-dt_s / time_constant_s) } else { 1.0 };
         RotorModel { hover: body.hover(weight_n), gain }
     }
 
-    /// Returns U1..U4 of the rotors now.
+    /// Returns the present U1..U4 of the rotors.
     #[inline]
     pub(crate) fn inputs(&self, body: &Body<N>, spin: &Spin<N>) -> Inputs {
         body.mixer.inputs(&body.mixer.forces(&spin.0.unwrap_or(self.hover)))
     }
 
-    /// Advances the rotors by a step under these commands.
+    /// Advances the rotor speeds by one step with these commands.
     #[inline]
     pub(crate) fn advance(&self, spin: &mut Spin<N>, commanded: &RotorSpeeds<N>) {
         let rotors = spin.0.unwrap_or(self.hover);

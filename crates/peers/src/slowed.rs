@@ -1,9 +1,9 @@
-//! Gains for rotors with more lag than those that the gains were tuned for.
+//! Scales gains for rotors with more lag than those for which the gains were tuned.
 
 use afbc_types::{Declaration, Declared, ValueMut};
 use core::convert::Infallible;
 
-/// Returns the power of time in a unit.
+/// Returns the exponent of time in a unit.
 fn time_power(unit: &str) -> i32 {
     match unit {
         "s" => 1,
@@ -15,12 +15,12 @@ fn time_power(unit: &str) -> i32 {
     }
 }
 
-/// Id of the time constant of a law's model of the rotors.
+/// Id of the parameter for the rotor model's time constant.
 const ROTOR_LAG: &str = "ROT_LAG";
 
-/// Returns the gains of a vehicle that is `slowness` times slower, with rotors that lag by `lag_s`: each is scaled by
-/// its power of time, within its range, so that errors take the same course, only slower; models of the rotors have
-/// their lag. Limits in m/s, m/s2 and rad stay.
+/// Returns the gains for a vehicle that is `slowness` times slower, with rotors that lag by `lag_s`. Each gain is
+/// scaled by the power of time in its unit, within its range, so that errors follow the same curve, only slower. The
+/// rotor model gets the lag `lag_s`. Limits in m/s, m/s2 and rad stay.
 #[must_use]
 pub fn slowed<G: Declared>(mut gains: G, slowness: f32, lag_s: f32) -> G {
     let scale = |Declaration { id, unit, range, .. }: &Declaration, value: ValueMut<'_>| {
@@ -31,7 +31,7 @@ pub fn slowed<G: Declared>(mut gains: G, slowness: f32, lag_s: f32) -> G {
             if *id == ROTOR_LAG {
                 numbers.iter_mut().for_each(|number| *number = within(lag_s));
             } else if factor != 1.0 {
-                // Unchanged to the bit for the lag that the gains were tuned for.
+                // Unchanged to the last bit for the lag for which the gains were tuned.
                 numbers.iter_mut().for_each(|number| *number = within(*number * factor));
             }
         }

@@ -1,4 +1,4 @@
-//! The answer of a single step to an error: its direction, its symmetry, and its size by formulas in `f64`.
+//! Response of a single step to an error: its direction, its symmetry, and its size by formulas in `f64`.
 
 use crate::harness::steps::{WEIGHT_N, after, dfbc, euler, goodarzi, indi, l1, lee, mpc, pid, vector};
 use crate::harness::{Random, vehicle};
@@ -53,7 +53,7 @@ fn every_error_is_answered_in_the_right_direction() {
         change(&mut state);
         state
     };
-    // Below the setpoint: more thrust. Rising: less.
+    // Below the setpoint: more thrust. Rising: less thrust.
     of_each(&moved(|s| s.position_m.z = -0.1), &hold, |name, (_, c)| assert!(c.inputs.thrust_n > WEIGHT_N, "{name}"));
     of_each(&moved(|s| s.velocity_m_s.z = 0.1), &hold, |name, (_, c)| assert!(c.inputs.thrust_n < WEIGHT_N, "{name}"));
     // Behind the setpoint along x: pitch up to tilt the thrust forward; along y: roll negatively.
@@ -64,7 +64,7 @@ fn every_error_is_answered_in_the_right_direction() {
         assert!(c.desired_rad[0] < 0.0 && c.desired_rad[1] == 0.0 && c.inputs.roll_n <= 0.0, "{name}: {c:?}");
     });
     of_each(&moved(|s| s.velocity_m_s.x = 0.1), &hold, |name, (_, c)| assert!(c.desired_rad[1] < 0.0, "{name}: {c:?}"));
-    // A positive angle or rate is reduced; but to INDI and MPC, a tilt without acceleration is leaning into a wind.
+    // A positive angle or rate is reduced. INDI and MPC take a tilt without acceleration for leaning into the wind.
     let tilted = |name: &str, u: f32| {
         assert!(if ["indi", "mpc"].contains(&name) { u.abs() < 1e-3 } else { u < -1e-2 }, "{name}: {u}")
     };
@@ -74,7 +74,7 @@ fn every_error_is_answered_in_the_right_direction() {
     of_each(&moved(|s| s.rates_rad_s.x = 0.1), &hold, |name, (_, c)| assert!(c.inputs.roll_n < -1e-3, "{name}"));
     of_each(&moved(|s| s.rates_rad_s.y = 0.1), &hold, |name, (_, c)| assert!(c.inputs.pitch_n < -1e-3, "{name}"));
     of_each(&moved(|s| s.rates_rad_s.z = 0.1), &hold, |name, (_, c)| assert!(c.inputs.yaw_n < -1e-3, "{name}"));
-    // Yaw takes the short way round.
+    // Yaw takes the shorter way round.
     let beyond = Setpoint { yaw_rad: -3.1, ..hold };
     of_each(&moved(|s| s.attitude_rad.z = 3.1), &beyond, |name, (_, c)| assert!(c.inputs.yaw_n > 0.0, "{name}"));
     // Feed-forward: a desired acceleration gives a tilt.
@@ -88,7 +88,7 @@ fn every_error_is_answered_in_the_right_direction() {
 fn turning_the_scene_about_the_vertical_changes_nothing_for_the_body() {
     let mut random = Random(1);
     for _ in 0..300 {
-        // Small enough that no limit is active in one frame and not in the other because of rounding.
+        // Small enough that rounding cannot make a limit active in only one of the frames.
         let (position, velocity) = (vector(&mut random, 0.5), vector(&mut random, 0.5));
         let attitude = Rotation3::from_scaled_axis(vector(&mut random, 0.4));
         let rates: Vector3<f32> = vector(&mut random, 0.5).cast();
@@ -118,7 +118,7 @@ fn turning_the_scene_about_the_vertical_changes_nothing_for_the_body() {
                 (a.inputs.pitch_n - b.inputs.pitch_n) * 65.8,
                 (a.inputs.yaw_n - b.inputs.yaw_n) * 1.43,
             );
-            // Four times the error of a sine, 1.2e-3, times the stiffest loop's 330 1/s2.
+            // Four times the sine error, 1.2e-3, times the stiffest loop's 330 1/s2.
             assert!(difference.amax() < 1.6, "{name}: {difference:?} after a turn of {turn}");
             assert!((a.inputs.thrust_n - b.inputs.thrust_n).abs() < 0.03, "{name}: {a:?} {b:?}");
         };
@@ -141,8 +141,8 @@ fn turning_the_scene_about_the_vertical_changes_nothing_for_the_body() {
     }
 }
 
-/// PID's tilt is that of \[a_x, a_y, g\]: whatever the height error does to the thrust, and to the thrust it adds what
-/// the tilt takes from the vertical.
+/// PID's tilt is that of \[a_x, a_y, g\], whatever the height error does to the thrust. The thrust compensates the loss
+/// of vertical force by the tilt.
 #[test]
 fn the_height_of_pid_does_not_tilt_it_and_its_tilt_costs_no_height() {
     let mut random = Random(7);
@@ -173,8 +173,8 @@ fn the_height_of_pid_does_not_tilt_it_and_its_tilt_costs_no_height() {
     }
 }
 
-/// What the law of the head of `dfbc.rs` demands, and what that of `indi.rs` does, in `f64`: on the first step there is
-/// nothing in the filters, and the rotors are at hover.
+/// Compares the demands of DFBC and INDI with the formulas in `dfbc.rs` and `indi.rs` in `f64`. On the first step the
+/// filters are empty and the rotors are at hover.
 #[test]
 fn demanded_accelerations_are_those_of_the_formulas() {
     let effectiveness = Vector3::new(65.789_47, 65.789_47, 1.425_1);
@@ -198,7 +198,7 @@ fn demanded_accelerations_are_those_of_the_formulas() {
         };
         let (r, omega) = (*attitude.matrix(), state.rates_rad_s.cast::<f64>());
         let r_single = r.cast::<f32>();
-        // R' R_d Omega_d, and its derivative by that of each factor, for a specific force.
+        // Returns R' R_d Omega_d for a specific force, and its derivative by the product rule.
         let fed_forward = |s: Vector3<f32>| {
             let flat = flat([s, setpoint.jerk_m_s3, setpoint.snap_m_s4], &setpoint);
             let to_body = r.transpose() * flat.r_earth_desired.cast::<f64>();
@@ -208,7 +208,7 @@ fn demanded_accelerations_are_those_of_the_formulas() {
         let check = |name: &str, trace: &Trace, expected: Vector3<f64>| {
             let u = trace.inputs;
             let demanded = Vector3::new(u.roll_n, u.pitch_n, u.yaw_n).cast::<f64>().component_mul(&effectiveness);
-            // The error of a sine, 1.2e-3, of angles times 250 1/s2, and of rates of 3 rad/s and accelerations.
+            // Allowed error: the sine error, 1.2e-3, for angles times 250 1/s2, rates of 3 rad/s and accelerations.
             let error = (demanded - expected).amax();
             assert!(error < 1.2 + 0.01 * expected.amax(), "{name}: {demanded:?}, not {expected:?}");
         };

@@ -1,4 +1,4 @@
-//! Attitudes, their errors and their rates against formulas in `f64`.
+//! Compares attitudes, attitude errors and rates with formulas in `f64`.
 
 use crate::harness::Random;
 use crate::harness::steps::{euler, vector};
@@ -34,7 +34,7 @@ fn attitude_errors_agree_with_their_formulas() {
         assert!((f64::from(roll) - angles.0).abs() < 3e-3 && (f64::from(pitch) - angles.1).abs() < 3e-3);
         assert!((angles.2 - yaw).abs() < 1e-9, "the yaw of R_d is psi_d");
 
-        // Lee: e_R = (R_d' R - R' R_d)^v / 2; positive for a body turned too far.
+        // Lee: e_R = (R_d' R - R' R_d)^v / 2, positive for a body turned too far.
         let e = r_d.transpose() * exact(&eta) - exact(&eta).transpose() * r_d;
         let e_r = Vector3::new(e[(2, 1)], e[(0, 2)], e[(1, 0)]) / 2.0;
         let ours = -geometric_error(&r, &desired).cast::<f64>();
@@ -65,7 +65,7 @@ fn the_tilt_comes_first_and_yaw_by_its_weight() {
             }
         }
     }
-    // Opposite thrusts with any axis between them.
+    // Opposite thrusts, with different axes between them.
     for axis in [Vector3::x_axis(), Vector3::y_axis(), Unit::new_normalize(Vector3::new(1.0, 2.0, 0.0))] {
         let upside_down = Rotation3::from_axis_angle(&axis, core::f32::consts::PI);
         let e = tilt_prioritised_error(&Matrix3::identity(), upside_down.matrix(), 0.4);
@@ -86,13 +86,13 @@ fn quaternions_match_their_matrices() {
 
 #[test]
 fn desired_rates_are_the_derivative_of_the_desired_attitude() {
-    // A moving specific force and heading; R_d by differences in f64, Omega_d = (R_d' dR_d/dt)^v.
+    // A changing specific force and heading: R_d by differences in f64, Omega_d = (R_d' dR_d/dt)^v.
     for [size, pace] in [[1.0, 1.0], [2.5, 1.0], [2.5, 2.5]] {
         rates_of([size, pace]);
     }
 }
 
-/// The same for specific forces of this size and pace.
+/// Checks the rates for specific forces of this size and pace.
 fn rates_of([size, pace]: [f64; 2]) {
     let force = |t: f64| {
         let t = pace * t;
@@ -124,7 +124,7 @@ fn rates_of([size, pace]: [f64; 2]) {
         let (omega, omega_dot) = (rates(t), derivative(&rates, t));
         let error = (desired.rates_rad_s.cast::<f64>() - omega).amax();
         assert!(error < 2e-3 * omega.norm().max(1.0), "{desired:?} {omega:?}");
-        // With the products of rates nothing is left but the error of a sine.
+        // With the products of rates only the sine error remains.
         let exact = flat(s, &setpoint);
         let same = (exact.r_earth_desired, exact.rates_rad_s) == (desired.r_earth_desired, desired.rates_rad_s);
         assert!(same, "{exact:?} {desired:?}");

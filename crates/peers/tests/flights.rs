@@ -40,7 +40,7 @@ fn mpc() -> Mpc {
     Mpc::new(vehicle(), SETTINGS, mpc::Gains::PAPER_VEHICLE).unwrap()
 }
 
-/// Asserts root mean square errors of x, y, z \[m\] and psi \[rad\] within `bounds`.
+/// Asserts that the root mean square errors of x, y, z \[m\] and psi \[rad\] are within `bounds`.
 #[track_caller]
 fn within(name: &str, figures: &Figures, bounds: [f64; 4]) {
     println!("{name}: {figures:.4?}");
@@ -50,7 +50,7 @@ fn within(name: &str, figures: &Figures, bounds: [f64; 4]) {
     );
 }
 
-/// Stays at rest.
+/// Checks that the vehicle stays at rest.
 fn hovers<C: FlightController>(name: &str, controller: &C) {
     let place = [1.0, -2.0, 3.0];
     let start = at(place.map(f64::from), 0.7);
@@ -71,7 +71,7 @@ fn all_hover() {
     hovers("mpc", &mpc());
 }
 
-/// Arrives, and is at rest after 6 s, for a small step and for one that reaches every limit.
+/// Checks arrival and rest after 6 s, for a small step and for one that reaches every limit.
 fn steps<C: FlightController>(name: &str, controller: &C) {
     let start = at([0.0, 0.0, 2.0], 0.0);
     let figures = fly(controller, Rig::ALL, calm(), start, hover([2.0, 1.0, 3.0], 1.0), [6.0, 12.0]);
@@ -91,7 +91,7 @@ fn all_follow_a_step() {
     steps("mpc", &mpc());
 }
 
-/// 2 m of radius in 6 s, the nose along the velocity: 2.1 m/s, 2.2 m/s2.
+/// A circle of 2 m radius in 6 s with the nose along the velocity: 2.1 m/s, 2.2 m/s2.
 #[test]
 fn all_fly_a_circle() {
     let start = at([2.0, 0.0, 2.0], core::f64::consts::FRAC_PI_2);
@@ -107,8 +107,8 @@ fn all_fly_a_circle() {
     within("mpc", &figures(&mpc(), start), [0.001, 0.001, 0.001, 0.001]);
 }
 
-/// The paper's flight with its gusts and uncertainties of all four sign combinations, with lag, delay and noise, from
-/// 5 s to 60 s.
+/// The paper's flight with its gusts and all four sign combinations of its uncertainties, with lag, delay and noise,
+/// evaluated from 5 s to 60 s.
 #[test]
 fn all_fly_the_papers_flight() {
     for (inertia, thrust) in [(1.75, 0.6), (1.75, 1.4), (0.25, 0.6), (0.25, 1.4)] {
@@ -119,7 +119,7 @@ fn all_fly_the_papers_flight() {
         }
         let environment = || disturbed(inertia, thrust);
         within("pid", &figures(&pid(), environment()), [0.010, 0.013, 0.027, 0.006]);
-        // Without integrals an offset remains: 1.2 m/s2 over k_x is 75 mm.
+        // Without integrals an offset remains: 1.2 m/s2 divided by k_x is 75 mm.
         within("lee", &figures(&lee(), environment()), [0.12, 0.10, 0.20, 0.03]);
         within("goodarzi", &figures(&goodarzi(), environment()), [0.011, 0.015, 0.035, 0.005]);
         within("indi", &figures(&indi(), environment()), [0.005, 0.008, 0.007, 0.002]);
@@ -163,8 +163,8 @@ fn all_catch_a_vehicle_that_was_thrown() {
     within("mpc", &figures(&mpc()), [3e-4; 4]);
 }
 
-/// With rotors of any strength, upright or leaning against a push, PID's estimate of the hover thrust takes over what
-/// its integral holds, and the vehicle does not move for it.
+/// For rotors of any strength, upright or leaning against a push, PID's hover thrust estimate takes over the integral's
+/// part without moving the vehicle.
 #[test]
 fn the_hover_thrust_takes_over_from_the_integral() {
     let place = [0.0, 0.0, 3.0];
@@ -194,7 +194,7 @@ fn the_hover_thrust_takes_over_from_the_integral() {
     }
 }
 
-/// A horizontal figure of eight of 2 m with rising and falling.
+/// Returns a horizontal figure of eight of 2 m that also rises and falls.
 fn eight(period_s: f64) -> impl Fn(f64) -> Setpoint {
     move |t| {
         let w = core::f64::consts::TAU / period_s;
@@ -212,14 +212,14 @@ fn eight(period_s: f64) -> impl Fn(f64) -> Setpoint {
     }
 }
 
-/// Start on a reference.
+/// Returns the motion on the reference.
 fn upon(reference: &Setpoint) -> Motion {
     let mut start = at(reference.position_m.cast().into(), f64::from(reference.yaw_rad));
     start.velocity_m_s = reference.velocity_m_s.cast();
     start
 }
 
-/// Distance from the eight after two of its rounds, largest \[m\].
+/// Returns the largest distance from the figure of eight after two rounds \[m\].
 fn off_the_eight<C: FlightController>(controller: &C, rig: Rig, period_s: f64, adjust: impl Fn(&mut Setpoint)) -> f64 {
     let path = eight(period_s);
     let reference = |t| {
@@ -231,8 +231,8 @@ fn off_the_eight<C: FlightController>(controller: &C, rig: Rig, period_s: f64, a
     fly(controller, rig, calm(), upon(&path(0.0)), reference, times).max_abs.xyz().norm()
 }
 
-/// With ideal rotors nothing but the steps of a millisecond keeps INDI from a flat trajectory; without jerk and snap it
-/// is off by many times as much.
+/// With ideal rotors only the time step of a millisecond keeps INDI off a flat trajectory. Without jerk and snap the
+/// error is many times larger.
 #[test]
 fn jerk_and_snap_keep_indi_on_its_path() {
     let gains = indi::Gains { rotor_time_constant_s: 0.0, ..indi::Gains::PAPER_VEHICLE };
@@ -247,7 +247,7 @@ fn jerk_and_snap_keep_indi_on_its_path() {
     }
 }
 
-/// DFBC too: with ideal rotors nothing keeps it from a flat trajectory; without jerk and snap it is far off.
+/// The same for DFBC: without jerk and snap it is far off.
 #[test]
 fn jerk_and_snap_keep_dfbc_on_its_path() {
     let gains = dfbc::Gains { rotor_time_constant_s: 0.0, ..dfbc::Gains::PAPER_VEHICLE };
@@ -262,7 +262,7 @@ fn jerk_and_snap_keep_dfbc_on_its_path() {
     }
 }
 
-/// What INDI is told of the rotors need not be exact.
+/// INDI tolerates an inexact rotor lag.
 #[test]
 fn indi_flies_rotors_of_half_to_twice_the_lag_it_knows() {
     for lag_s in [0.01, 0.015, 0.02, 0.03, 0.04] {
@@ -271,11 +271,10 @@ fn indi_flies_rotors_of_half_to_twice_the_lag_it_knows() {
     }
 }
 
-/// A vehicle whose mass, inertia and thrust factor differ at random from what the controllers know, pushed by a
-/// constant force and moment.
+/// A vehicle with random factors on mass, inertia and thrust factor, pushed by a constant force and moment.
 struct Stranger {
     factors: [(PlantParameter, f64); 3],
-    /// Against each axis: linear \[m/s2\], then angular \[rad/s2\].
+    /// Push along each axis: linear \[m/s2\], then angular \[rad/s2\].
     push: [f64; 6],
 }
 
@@ -300,7 +299,7 @@ impl Stranger {
     }
 }
 
-/// Every law with an integral or an increment brings every stranger to rest where it should be.
+/// Every law with an integral or an increment brings every such vehicle to rest at its setpoint.
 #[test]
 fn strangers_come_to_rest_where_they_should() {
     fn lands<C: FlightController>(name: &str, controller: &C, stranger: &Stranger) -> C::Memory {
@@ -338,7 +337,7 @@ fn strangers_come_to_rest_where_they_should() {
     }
 }
 
-/// L1 as in its source has no integral: what the rotors can cancel it cancels all the same, what they cannot stays.
+/// L1 as in its source has no integral: it cancels what the rotors can cancel, and the rest stays.
 #[test]
 fn l1_rejects_what_is_matched() {
     let left = |push: [f64; 6], adapting: bool| {

@@ -1,4 +1,4 @@
-//! Gains: declared alike in all laws, and refused by name.
+//! Gains are declared consistently in all laws, and refused by name.
 
 use crate::harness::{SETTINGS, vehicle};
 use afbc_peers::{Dfbc, Geometric, Indi, L1, Mpc, Pid, dfbc, geometric, indi, l1, mpc, pid};
@@ -6,7 +6,7 @@ use afbc_types::{Declaration, Declared, OutOfRange, Range, Value, ValueMut};
 use core::convert::Infallible;
 use std::collections::BTreeMap;
 
-/// Gains of the same key have the same name, unit and range in all controllers.
+/// Gains with the same key have the same name, unit and range in all controllers.
 #[test]
 fn gains_of_one_key_are_declared_alike() {
     let mut declared: BTreeMap<&str, Declaration> = BTreeMap::new();

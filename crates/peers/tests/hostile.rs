@@ -8,7 +8,7 @@ use core::convert::Infallible;
 use nalgebra::Vector3;
 use proptest::prelude::*;
 
-/// Any bits, and often values that pass the screen: small, or exactly at its bounds.
+/// Draws any bits, and often values that pass the screen: small, or exactly at its bounds.
 fn number() -> impl Strategy<Value = f32> {
     prop_oneof![
         1 => any::<u32>().prop_map(f32::from_bits),
@@ -44,7 +44,7 @@ fn motion() -> impl Strategy<Value = (State, Setpoint)> {
     (state, setpoint)
 }
 
-/// Sets each gain anywhere in its range, by the given shares.
+/// Sets each gain within its range, by the given shares.
 fn anywhere(gains: &mut impl Declared, shares: &[f64]) {
     let mut shares = shares.iter();
     let Ok(()) = gains.visit_mut(&mut |declaration, value| {

@@ -1,4 +1,4 @@
-//! What the laws learn from step to step: integrals, L1's disturbances, INDI's increments.
+//! Checks what the laws learn from step to step: integrals, L1's disturbances, INDI's increments.
 
 use crate::harness::steps::{WEIGHT_N, dfbc, goodarzi, indi, l1, pid, vector};
 use crate::harness::{Random, SETTINGS, vehicle};
@@ -10,7 +10,7 @@ use nalgebra::Vector3;
 
 #[test]
 fn an_integrator_does_not_wind_up_against_a_limit() {
-    // Far away sideways and above for 20 s: tilt and thrust stay at their limits.
+    // Far below and beside the setpoint for 20 s: tilt and thrust stay at their limits.
     let state = State { position_m: Vector3::new(-50.0, 0.0, 0.0), ..State::default() };
     let far = Setpoint { position_m: Vector3::new(0.0, 0.0, 500.0), ..Setpoint::default() };
     let mut memory = Validated::<pid::Memory>::default();
@@ -83,11 +83,11 @@ fn l1_starts_its_prediction_again_after_an_outage() {
     let moved = State { velocity_m_s: Vector3::new(1.0, -1.0, -2.0), rates_rad_s: Vector3::repeat(0.5), ..state };
     let _ = l1().step(&mut memory, Some(&moved), &Setpoint::default());
     let l1::Memory { force_m_s2, moment_rad_s2, .. } = memory.control;
-    // In the steps before, the vehicle stood still at hover thrust: nothing was unexplained.
+    // In the steps before, the vehicle stood still at hover thrust, so nothing was unexplained.
     assert!(force_m_s2.amax() < 0.1 && moment_rad_s2.amax() < 0.1, "{force_m_s2:?} {moment_rad_s2:?}");
 }
 
-/// A vehicle that moves as L1's model says, rotors ideal, plus constant accelerations: they are estimated within two
+/// A vehicle moves as L1's model says, with ideal rotors, plus constant accelerations. L1 estimates these within two
 /// steps, up to e^(-a dt) and the bounds.
 #[test]
 fn l1_estimates_what_the_model_does_not_explain() {

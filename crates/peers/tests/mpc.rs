@@ -1,4 +1,4 @@
-//! MPC against the same problem solved in double precision by other means.
+//! Compares MPC with the same problem solved in double precision by another method.
 
 use crate::harness::{Random, SETTINGS, vehicle};
 use afbc_control::{FlightController, Validated};
@@ -7,7 +7,7 @@ use afbc_peers::{Mpc, mpc};
 use afbc_types::{Setpoint, State};
 use nalgebra::{Matrix3, Vector3};
 
-/// The model of one axis, integrated finely, and the weights of its cost.
+/// Finely integrated model of one axis, and the weights of its cost.
 struct Axis {
     a: Matrix3<f64>,
     b: Vector3<f64>,
@@ -29,7 +29,7 @@ impl Axis {
         Axis { a, b: run(Vector3::zeros(), 1.0), weights: weights.map(f64::from) }
     }
 
-    /// Slope of the cost of the plan u from x, over a horizon that outlasts every motion.
+    /// Returns the gradient of the cost for the plan u from x, over a horizon longer than every motion.
     fn slope(&self, mut x: Vector3<f64>, plan: &[f64]) -> Vec<f64> {
         let [p, v] = self.weights;
         let mut path = Vec::new();
@@ -46,7 +46,7 @@ impl Axis {
         slope
     }
 
-    /// The first step of the best plan, by conjugate gradients.
+    /// Returns the first step of the best plan, by conjugate gradients.
     fn best(&self, x: Vector3<f64>) -> f64 {
         const STEPS: usize = 200;
         let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
@@ -78,7 +78,7 @@ fn first(gains: Gains, state: &State, setpoint: &Setpoint) -> Vector3<f64> {
     Vector3::new(x.into(), y.into(), f64::from(trace.inputs.thrust_n) / 0.486 - 9.81)
 }
 
-/// Near the reference no bound is reached: the first step is that of the best plan.
+/// Near the reference no bound is reached, and the first step is that of the best plan.
 #[test]
 fn small_errors_are_answered_by_the_best_plan() {
     let mut random = Random(5);
@@ -97,7 +97,7 @@ fn small_errors_are_answered_by_the_best_plan() {
     }
 }
 
-/// Far from the setpoint what is asked for leads there, within the bounds.
+/// Far from the setpoint the demand leads there, within the bounds.
 #[test]
 fn large_errors_are_answered_within_the_bounds() {
     let gains = Gains::PAPER_VEHICLE;

@@ -1,10 +1,10 @@
-//! Gains for slower rotors: every gain by its power of time, told from its key rather than from its unit.
+//! Gains for slower rotors: each gain scales with its power of time, here taken from its key and not from its unit.
 
 use afbc_peers::{dfbc, geometric, indi, l1, mpc, pid, slowed};
 use afbc_types::Declared;
 use core::convert::Infallible;
 
-/// Key, value and range of every number.
+/// Returns key, value and range of every number.
 fn numbers(gains: &impl Declared) -> Vec<(&'static str, f64, [f64; 2])> {
     let mut numbers = Vec::new();
     let Ok(()) = gains.visit(&mut |declaration, value| {
@@ -15,7 +15,7 @@ fn numbers(gains: &impl Declared) -> Vec<(&'static str, f64, [f64; 2])> {
     numbers
 }
 
-/// The power of time in a key's unit.
+/// Returns the exponent of time in a key's unit.
 fn power(key: &str) -> i32 {
     if key.ends_with("_1_s3") {
         -3
@@ -36,7 +36,7 @@ fn check(gains: &(impl Declared + Clone)) {
     for (slowness, lag_s) in [(1.0_f32, 0.02_f32), (1.0, 0.01), (1.65, 0.033), (3.6, 0.072)] {
         let slow = numbers(&slowed(gains.clone(), slowness, lag_s));
         for ((key, before, [min, max]), (_, after, _)) in numbers(gains).into_iter().zip(slow) {
-            // A model of the rotors has their lag.
+            // The rotor model gets the rotors' lag.
             let models = key == "rotor_time_constant_s";
             let slower = before * f64::from(slowness).powi(power(key));
             let expected = if models { f64::from(lag_s) } else { slower.clamp(min, max) };

@@ -8,7 +8,7 @@ use afbc_types::{Axis, Parameters, RotorSpeeds, Setpoint, State};
 use nalgebra::{Vector3, Vector4};
 use std::collections::VecDeque;
 
-/// 1 kHz and 3 N per rotor.
+/// Settings for 1 kHz and 3 N per rotor.
 pub(crate) const SETTINGS: Settings = Settings { rotor_force_max_n: 3.0, ..Settings::DEFAULT };
 
 pub(crate) fn vehicle() -> Parameters {
@@ -42,7 +42,7 @@ impl Random {
         (self.0.wrapping_mul(0x2545_f491_4f6c_dd1d) >> 11) as f64 / (1u64 << 53) as f64
     }
 
-    /// Returns a normal random number as a sum of twelve uniform ones, tails cut at 6.
+    /// Returns a normal random number as a sum of twelve uniform ones, with tails cut at 6.
     pub(crate) fn normal(&mut self) -> f64 {
         (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
     }
@@ -82,7 +82,7 @@ pub(crate) fn fly<C: FlightController>(
     fly_on(controller, rig, environment, initial, reference, times_s).0
 }
 
-/// The same, with the controller's memory at the end.
+/// Flies like [`fly`], and also returns the controller's memory at the end.
 pub(crate) fn fly_on<C: FlightController>(
     controller: &C,
     rig: Rig,
@@ -138,7 +138,7 @@ pub(crate) fn hover(position_m: [f32; 3], yaw_rad: f32) -> impl Fn(f64) -> Setpo
     move |_| Setpoint { position_m: position_m.into(), yaw_rad, ..Setpoint::default() }
 }
 
-/// A level circle, one turn in `period_s`, the nose along the velocity.
+/// Returns a level circle with one turn in `period_s` and the nose along the velocity.
 pub(crate) fn circle(radius_m: f64, period_s: f64) -> impl Fn(f64) -> Setpoint {
     move |t| {
         let w = core::f64::consts::TAU / period_s;
@@ -158,7 +158,7 @@ pub(crate) fn circle(radius_m: f64, period_s: f64) -> impl Fn(f64) -> Setpoint {
     }
 }
 
-/// The paper's trajectory, Section IV.
+/// Returns the paper's trajectory, Section IV.
 pub(crate) fn paper(t: f64) -> Setpoint {
     let rate = core::f64::consts::PI / 30.0;
     let (s, c) = libm::sincos(rate * t);
@@ -176,7 +176,7 @@ pub(crate) fn paper(t: f64) -> Setpoint {
     }
 }
 
-/// Start of the paper's flight: 1.5 m below the reference, 0.35 rad off.
+/// Returns the start of the paper's flight: 1.5 m below the reference, 0.35 rad off.
 pub(crate) fn paper_start() -> Motion {
     at([0.0, 0.0, 0.5], 0.35)
 }
@@ -185,9 +185,8 @@ pub(crate) fn calm() -> Environment {
     Environment::calm(Parameters::PAPER).unwrap()
 }
 
-/// The paper's disturbances: constant accelerations of 1.2, one axis after the other; inertia and thrust factor are
-/// multiplied by these factors from 20 s to 40 s.
-/// factors from 20 s to 40 s.
+/// Returns the paper's disturbances: constant accelerations of 1.2, one axis after the other, and these factors on
+/// inertia and thrust factor from 20 s to 40 s.
 pub(crate) fn disturbed(inertia: f64, thrust: f64) -> Environment {
     let gusts =
         [(Axis::X, 7.5), (Axis::Roll, 15.0), (Axis::Y, 22.5), (Axis::Pitch, 30.0), (Axis::Z, 37.5), (Axis::Yaw, 45.0)]

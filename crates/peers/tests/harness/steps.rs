@@ -1,4 +1,4 @@
-//! The laws for single steps, and random scenes.
+//! Controllers for single steps, and random scenes.
 
 use super::{Random, SETTINGS, vehicle};
 use afbc_control::{Action, FlightController, Trace, Validated};
@@ -22,7 +22,7 @@ pub(crate) fn indi() -> Indi {
     Indi::new(vehicle(), SETTINGS, indi::Gains::PAPER_VEHICLE).unwrap()
 }
 
-/// L1 on the geometric controller of [`lee`].
+/// Returns L1 on the geometric controller of [`lee`].
 pub(crate) fn l1() -> L1 {
     let gains = l1::Gains { geometric: geometric::Gains::LEE_2010, ..l1::Gains::BY_HAND };
     L1::new(vehicle(), SETTINGS, gains).unwrap()
@@ -51,7 +51,7 @@ pub(crate) fn after<C: FlightController>(
     (action, C::trace(&memory.control))
 }
 
-/// Euler angles of a rotation; nalgebra's are of the same z-y-x sequence.
+/// Returns the Euler angles of a rotation; nalgebra uses the same z-y-x sequence.
 pub(crate) fn euler(r: &Rotation3<f64>) -> Vector3<f32> {
     let (roll, pitch, yaw) = r.euler_angles();
     Vector3::new(roll as f32, pitch as f32, yaw as f32)
