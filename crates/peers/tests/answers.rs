@@ -56,7 +56,7 @@ fn every_error_is_answered_in_the_right_direction() {
     // Below the setpoint: more thrust. Rising: less thrust.
     of_each(&moved(|s| s.position_m.z = -0.1), &hold, |name, (_, c)| assert!(c.inputs.thrust_n > WEIGHT_N, "{name}"));
     of_each(&moved(|s| s.velocity_m_s.z = 0.1), &hold, |name, (_, c)| assert!(c.inputs.thrust_n < WEIGHT_N, "{name}"));
-    // Behind the setpoint along x: pitch up to tilt the thrust forward; along y: roll negatively.
+    // Behind the setpoint along x: a positive pitch (nose down) tilts the thrust forward. Along y: a negative roll.
     of_each(&moved(|s| s.position_m.x = -0.1), &hold, |name, (_, c)| {
         assert!(c.desired_rad[1] > 0.0 && c.desired_rad[0] == 0.0 && c.inputs.pitch_n >= 0.0, "{name}: {c:?}");
     });
