@@ -1,7 +1,7 @@
-//! Time of one step of the plant, ideal and with all effects, and of one measurement by sensors or instruments.
+//! Benchmarks of one plant step, ideal and with all effects, and of one measurement by sensors or instruments.
 //!
-//! `cargo bench -p afbc-plant`. A simple feedback holds the vehicle in its place, so that conditions stay the same. Its
-//! time, with that of [`Plant::motion`], is part of every figure, and measured alone by `feedback_alone`.
+//! Run with `cargo bench -p afbc-plant`. A simple feedback keeps the vehicle in place, so that conditions stay the
+//! same. Every figure includes the time of the feedback and of [`Plant::motion`], which `feedback_alone` measures.
 #![allow(clippy::unwrap_used, missing_docs)] // a plant that cannot be built must stop the bench
 
 use afbc_plant::instruments::{Barometer, Gnss, Imu, Magnetometer, TrackerModel};
@@ -37,7 +37,7 @@ fn weather() -> Wind {
     }
 }
 
-/// Lag, limits, delay, drag, wind with turbulence.
+/// Returns lag, limits, delay, drag, wind with turbulence.
 fn usual() -> Realism {
     Realism { rotors: lag(), drag: Some(Drag::PAPER), wind: weather(), seed: 1, ..Realism::default() }
 }
@@ -55,7 +55,7 @@ fn environment() -> Environment {
     Environment::calm(Parameters::PAPER).unwrap()
 }
 
-/// Returns speeds around hover that keep the vehicle near its place.
+/// Returns speeds around hover that keep the vehicle in place.
 fn feedback(motion: &Motion) -> RotorSpeeds {
     let eta = &motion.attitude_rad;
     let (p, q) = (motion.rates_rad_s.x, motion.rates_rad_s.y);
@@ -131,7 +131,7 @@ fn sensors() -> StateSensor {
     StateSensor::new(&sensing, 1, STEP_S).unwrap()
 }
 
-/// What instruments feel of a vehicle with all effects.
+/// Computation of the instruments' input with all effects.
 #[divan::bench(sample_count = 200, sample_size = 2000)]
 fn truth(bencher: Bencher) {
     let plant = Plant::with_realism(PlantModel::RigidBody, start(), environment(), &everything(), STEP_S).unwrap();

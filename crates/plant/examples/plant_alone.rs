@@ -1,5 +1,5 @@
-//! The simulated vehicle alone, rotors at hover speed, tipped over by a wind of 5 m/s since no controller answers:
-//! `cargo run -p afbc-plant --example plant_alone`.
+//! Flies the simulated vehicle without a controller: rotors at hover speed, tipped over by a wind of 5 m/s. `cargo run
+//! -p afbc-plant --example plant_alone`.
 
 use afbc_plant::{Drag, Environment, Motion, Plant, PlantModel, Realism, Rotors, Wind};
 use afbc_types::{OutOfRange, Parameters, RotorSpeeds};

@@ -40,13 +40,13 @@ parameters! {
     }
 }
 
-/// Effect of a low voltage on the rotors, in proportion to voltage over full voltage.
+/// Effect of a low voltage on the rotors, in proportion to the voltage divided by the full voltage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub enum Sag {
-    /// Reduces the largest speed: speed controllers hold the commanded speed as long as they can.
+    /// Reduces the largest speed: the speed controllers hold the commanded speed as long as they can.
     Ceiling,
-    /// Reduces every speed: speed controllers apply a share of the voltage, without feedback of the speed.
+    /// Reduces every speed: the speed controllers apply a share of the voltage, without speed feedback.
     Speed,
 }
 
@@ -63,7 +63,7 @@ impl Battery {
 /// State of a battery.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Charge {
-    /// Voltage at the terminals, under load \[V\].
+    /// Terminal voltage under load \[V\].
     pub voltage_v: f64,
     /// Current \[A\].
     pub current_a: f64,
@@ -71,7 +71,7 @@ pub struct Charge {
     pub charge: f64,
 }
 
-/// A battery in simulation.
+/// Battery in simulation.
 #[derive(Clone, Debug)]
 pub(crate) struct Discharge {
     battery: Battery,
@@ -88,23 +88,23 @@ impl Discharge {
         discharge
     }
 
-    /// Returns the open-circuit voltage \[V\]; 0 for an empty battery, so that nothing flies on missing charge.
+    /// Returns the open-circuit voltage \[V\], 0 for an empty battery, so that nothing flies without charge.
     fn open_circuit_v(&self) -> f64 {
         let Battery { full_v, empty_v, .. } = self.battery;
         if self.now.charge > 0.0 { empty_v + (full_v - empty_v) * self.now.charge } else { 0.0 }
     }
 
-    /// Sets the remaining charge, as a share of the capacity; the voltage follows under the next load.
+    /// Sets the remaining charge as a share of the capacity. The voltage follows with the next load.
     ///
     /// # Errors
-    /// A share out of range.
+    /// Returns an error if the share is out of range.
     pub(crate) fn charge(&mut self, share: f64) -> Result<(), OutOfRange> {
         Battery::CHARGE.range.check(share)?;
         self.now.charge = share;
         Ok(())
     }
 
-    /// Returns voltage over full voltage, which scales the rotors' speeds.
+    /// Returns the voltage divided by the full voltage, which scales the rotor speeds.
     #[inline]
     pub(crate) fn voltage_share(&self) -> f64 {
         self.now.voltage_v / self.battery.full_v
@@ -116,14 +116,15 @@ impl Discharge {
 
     /// Supplies rotors that draw `rotor_w` of mechanical power for one step.
     ///
-    /// Power P at the terminals draws the smaller current with (V_oc - R I) I = P. Above V_oc^2 / 4R there is none, and
-    /// the battery gives its largest power.
+    /// Power P at the terminals draws the smaller current with (V_oc - R I) I = P. Above V_oc^2 / 4R there is no
+    /// solution, and the battery gives its largest power.
     #[inline]
     pub(crate) fn supply(&mut self, rotor_w: f64) {
         let Battery { resistance_ohm: r, efficiency, avionics_w, .. } = self.battery;
         let power_w = rotor_w / efficiency + avionics_w;
         let v = self.open_circuit_v();
-        // With the root in the divisor: no division by R, which may be 0, and no digits lost where R I is small.
+        // With the root in the divisor there is no division by R, which may be 0, and no loss of digits where R I is
+        // small.
         let current_a = if v > 0.0 { 2.0 * power_w / (v + sqrt((v * v - 4.0 * r * power_w).max(0.0))) } else { 0.0 };
         // At the limit the formula above overshoots; V_oc / 2R is the current of a matched load.
         let current_a = if r > 0.0 { current_a.min(v / (2.0 * r)) } else { current_a };

@@ -1,10 +1,10 @@
-//! The body's axes in the earth frame.
+//! Body axes in the earth frame.
 //!
-//! The plant's rotations are its own, in `f64`: no law is judged by the functions that it turns vectors with.
+//! The plant has its own rotations in `f64`, so that no law is judged by the functions that it uses itself.
 
 use nalgebra::Vector3;
 
-/// The columns of `r_earth_body`. Written out, since a general matrix product takes three times as long.
+/// Columns of `r_earth_body`. Written out, because a general matrix product takes three times as long.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct BodyAxes {
     pub(crate) forward: Vector3<f64>,
@@ -13,7 +13,7 @@ pub(crate) struct BodyAxes {
 }
 
 impl BodyAxes {
-    /// Returns the axes of a body with this unit quaternion, body to earth.
+    /// Returns the axes of a body with this unit quaternion (body to earth).
     #[inline]
     pub(crate) fn of_quaternion(w: f64, x: f64, y: f64, z: f64) -> Self {
         let (x2, y2, z2) = (2.0 * x, 2.0 * y, 2.0 * z);
@@ -36,7 +36,7 @@ impl BodyAxes {
         Vector3::new(self.forward.dot(v), self.left.dot(v), self.up.dot(v))
     }
 
-    /// Returns the height of a vector in body coordinates.
+    /// Returns the earth z coordinate of a vector in body coordinates.
     #[inline]
     pub(crate) fn height(&self, v: &Vector3<f64>) -> f64 {
         self.forward.z * v.x + self.left.z * v.y + self.up.z * v.z

@@ -40,22 +40,23 @@ parameters! {
     }
 }
 
-/// Largest (natural frequency times step)^2 of the stiffest motion, and largest damping rate times step. The
-/// Runge-Kutta method is stable to 8 and 2.78; the margin is for payloads released and inertia changed in flight.
+/// Limits for stable integration: largest (natural frequency times step)^2 of the stiffest motion, and largest damping
+/// rate times step. The Runge-Kutta method is stable up to 8 and 2.78; the margin covers released payloads and changed
+/// inertia.
 const STIFFNESS_PER_STEP_MAX: f64 = 0.5;
 const DAMPING_PER_STEP_MAX: f64 = 1.4;
 
 impl Contact {
-    /// A guess for the paper's vehicle.
+    /// Estimated for the paper's vehicle.
     pub const PAPER: Self = Self::DEFAULT;
 
     /// Checks every parameter for this vehicle and step.
     ///
     /// # Errors
-    /// The first parameter out of range.
+    /// Returns the first parameter that is out of range.
     pub fn validate_for(&self, vehicle: &Parameters<f64>, step_s: f64) -> Result<(), OutOfRange> {
         self.validate()?;
-        // Largest acceleration of a point per unit of force on it, with all four feet at the longest lever.
+        // Largest acceleration of a point per force on it, with all four feet at the longest lever.
         let lever_m = self.ground(vehicle).reach_m;
         let compliance = 1.0 / vehicle.mass_kg + lever_m * lever_m / vehicle.inertia_kg_m2.min();
         let weight_n = vehicle.weight_n();
@@ -66,7 +67,7 @@ impl Contact {
         Range { max: DAMPING_PER_STEP_MAX / per_ratio, ..Self::DAMPING.range }.check(self.damping_ratio)
     }
 
-    /// Returns the ground as seen by this vehicle.
+    /// Returns the ground contact of this vehicle.
     pub(crate) fn ground(&self, vehicle: &Parameters<f64>) -> Ground {
         let stiffness_n_m = vehicle.weight_n() / (4.0 * self.sink_m);
         let (feet, arm) = (self.foot_radius_m, vehicle.arm_m);
@@ -86,38 +87,38 @@ impl Contact {
     }
 }
 
-/// Time in which a falling vehicle may reach the ground for it to count as near, longer than any step \[s\].
+/// A vehicle counts as near if it can fall to the ground within this time, which is longer than any step \[s\].
 const NEAR_S: f64 = 0.04;
 /// Smallest distance that counts as near \[m\].
 const NEAR_M: f64 = 0.02;
 
-/// The ground below one vehicle.
+/// Ground below one vehicle.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Ground {
-    /// k and c of each point.
+    /// Stiffness k and damping c of each point.
     stiffness_n_m: f64,
     damping_n_s_m: f64,
     friction: f64,
-    /// Distance of the farthest point from the centre of mass; higher up, nothing touches the ground.
+    /// Distance of the farthest point from the centre of mass. Above this height nothing touches the ground.
     reach_m: f64,
     /// Feet and rotors, body frame \[m\].
     points: [[Vector3<f64>; 4]; 2],
 }
 
 impl Ground {
-    /// True if a vehicle at this height may touch the ground within a step.
+    /// Returns true if a vehicle at this height may touch the ground within a step.
     #[inline]
     pub(crate) fn is_near(&self, height_m: f64, climb_m_s: f64) -> bool {
         height_m + NEAR_S * climb_m_s.min(0.0) < self.reach_m + NEAR_M
     }
 
-    /// True if any point is below the ground.
+    /// Returns true if any point is below the ground.
     pub(crate) fn touches(&self, height_m: f64, axes: &BodyAxes) -> bool {
         self.points.iter().flatten().any(|point| height_m + axes.height(point) < 0.0)
     }
 
     /// Returns force, earth frame \[N\], and moment, body frame \[N m\], on a moving vehicle at `height_m`.
-    // Not inlined, since it is needed near the ground only.
+    // Not inlined, because it is only called near the ground.
     #[inline(never)]
     pub(crate) fn wrench(
         &self,
@@ -142,7 +143,7 @@ impl Ground {
     fn push(&self, depth_m: f64, velocity_m_s: &Vector3<f64>) -> Vector3<f64> {
         let normal_n = (self.stiffness_n_m * depth_m - self.damping_n_s_m * velocity_m_s.z).max(0.0);
         let slip_m_s = sqrt(velocity_m_s.x * velocity_m_s.x + velocity_m_s.y * velocity_m_s.y);
-        // The larger divisor of the two: viscous up to the limit, without a division by zero.
+        // The larger of two divisors makes the friction viscous up to its limit, without a division by zero.
         let drag = self.damping_n_s_m * self.friction * normal_n
             / (self.damping_n_s_m * slip_m_s).max(self.friction * normal_n).max(f64::MIN_POSITIVE);
         Vector3::new(-drag * velocity_m_s.x, -drag * velocity_m_s.y, normal_n)

@@ -1,4 +1,4 @@
-//! A delay of whole steps.
+//! Delay by whole steps.
 
 use alloc::{vec, vec::Vec};
 
@@ -7,7 +7,7 @@ pub(crate) fn whole_steps(delay_s: f64, step_s: f64) -> usize {
     libm::round(delay_s / step_s) as usize
 }
 
-/// A ring buffer that returns each value a fixed number of steps later.
+/// Ring buffer that returns each value a fixed number of steps later.
 #[derive(Clone, Debug)]
 pub(crate) struct DelayLine<T> {
     ring: Vec<T>,
@@ -28,7 +28,7 @@ impl<T: Copy> DelayLine<T> {
     /// Stores `now` and returns the oldest value.
     #[inline]
     pub(crate) fn pass(&mut self, now: T) -> T {
-        // No slot means no delay.
+        // Without a slot there is no delay.
         let Some(slot) = self.ring.get_mut(self.oldest) else { return now };
         let then = core::mem::replace(slot, now);
         self.oldest += 1;

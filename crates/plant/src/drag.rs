@@ -45,17 +45,17 @@ parameters! {
 /// Airspeed up to which drag is integrated stably \[m/s\].
 pub const AIRSPEED_M_S: f64 = 100.0;
 
-/// Largest product of a drag rate and the step; the Runge-Kutta method is stable to 2.78.
+/// Largest product of a drag rate and the step. The Runge-Kutta method is stable up to 2.78.
 const RATE_PER_STEP_MAX: f64 = 0.5;
 
 impl Drag {
-    /// A guess for the paper's vehicle: blades at 0.4 1/s in hover, a body of about 0.1 m by 0.1 m.
+    /// Estimated for the paper's vehicle: blades at 0.4 1/s in hover, a body of about 0.1 m by 0.1 m.
     pub const PAPER: Self = Self::DEFAULT;
 
-    /// Checks every parameter for a vehicle with this frame and rotor speeds up to `max_rad_s`, and this step.
+    /// Checks every parameter for a vehicle with this frame, rotor speeds up to `max_rad_s`, and this step.
     ///
     /// # Errors
-    /// The first parameter out of range.
+    /// Returns the first parameter that is out of range.
     pub fn validate_for(
         &self,
         vehicle: &Parameters<f64>,
@@ -64,8 +64,8 @@ impl Drag {
         step_s: f64,
     ) -> Result<(), OutOfRange> {
         self.validate()?;
-        // Largest rate at which a force in the rotor plane changes the velocity of its hub: it pushes, tilts and turns
-        // the vehicle.
+        // Largest rate at which a force in the rotor plane changes the velocity of its hub, as the force pushes, tilts
+        // and turns the vehicle.
         let Parameters { mass_kg, arm_m, inertia_kg_m2: i, .. } = vehicle;
         let (height_m, rate_max) = (self.rotor_height_m, RATE_PER_STEP_MAX / step_s);
         let hub_per_kg = 1.0 / mass_kg + height_m * height_m / i.x.min(i.y) + arm_m * arm_m * frame.square_max() / i.z;
@@ -75,7 +75,7 @@ impl Drag {
         Range { max: rate_max * mass_kg / per_area, ..Self::AREA.range }.check(self.area_m2.max())
     }
 
-    /// Returns the drag over one step of a vehicle with arms of `arm_m` and rotors of these speeds \[rad/s\].
+    /// Returns the drag for one step, with arms of `arm_m` and these rotor speeds \[rad/s\].
     #[inline]
     pub(crate) fn held(&self, speeds: &Sums, arm_m: f64) -> HeldDrag {
         let Sums { all, x, y, square, .. } = *speeds;
@@ -93,7 +93,7 @@ impl Drag {
 }
 
 /// Drag at constant rotor speeds, as a function of the motion. The sums over the rotors of k omega_i (1, x_i, y_i,
-/// x_i^2 + y_i^2) are computed in advance.
+/// x_i^2 + y_i^2) are precomputed.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct HeldDrag {
     /// Sum of k omega_i \[N s/m\].
@@ -111,12 +111,12 @@ pub(crate) struct HeldDrag {
 }
 
 impl HeldDrag {
-    /// Returns force \[N\] and moment \[N m\] in body axes at airspeed `w` \[m/s\] of the centre of mass and `rates`
-    /// \[rad/s\].
+    /// Returns force \[N\] and moment \[N m\] in body axes, for the airspeed `w` of the centre of mass \[m/s\] and
+    /// `rates` \[rad/s\].
     #[inline]
     pub(crate) fn wrench(&self, w: &Vector3<f64>, rates: &Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
         let h = self.rotor_height_m;
-        // W + Omega x r in the middle of the rotor plane; hub i moves by r (-y_i, x_i) relative to it.
+        // W + Omega x r in the middle of the rotor plane. Hub i moves by r (-y_i, x_i) relative to it.
         let (x, y, r) = (w.x + rates.y * h, w.y - rates.x * h, rates.z);
         let blade = Vector3::new(
             self.lever_y_n_s * r - self.blade_n_s_m * x,

@@ -1,4 +1,4 @@
-//! Intervals in which something fails at random.
+//! Random intervals in which something fails.
 
 use crate::noise::Noise;
 use afbc_types::parameters;
@@ -34,13 +34,13 @@ impl Outage {
         Outage {
             random,
             begins: 1.0 - exp(-dropouts.rate_hz * step_s),
-            // A mean length of zero ends with probability 1.
+            // With a mean length of zero a dropout ends with probability 1.
             ends: 1.0 - exp(-step_s / dropouts.mean_s),
             now: false,
         }
     }
 
-    /// Returns whether there is a dropout in the next step.
+    /// Returns true if the next step is in a dropout.
     #[inline]
     pub(crate) fn advance(&mut self) -> bool {
         let chance = self.random.uniform();

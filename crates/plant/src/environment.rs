@@ -1,4 +1,4 @@
-//! External disturbances, and changes of the vehicle's parameters over time.
+//! External disturbances, and parameters of the vehicle that change over time.
 
 use crate::frame::Frame;
 use crate::ratios::Ratios;
@@ -13,12 +13,11 @@ use nalgebra::{Vector2, Vector3};
 pub enum GustKind {
     /// The paper's A_i: m/s2 in the earth frame for x, y, z; rad/s2 in the body frame for roll, pitch, yaw.
     Acceleration,
-    /// A physical force \[N\] in the earth frame, or moment \[N m\] in the body frame, divided by the true mass or
-    /// inertia.
+    /// A force \[N\] in the earth frame, or a moment \[N m\] in the body frame, divided by the true mass or inertia.
     Force,
 }
 
-/// A constant push on one axis from `start_s` to `end_s`.
+/// Constant push on one axis from `start_s` to `end_s`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Gust {
@@ -30,11 +29,11 @@ pub struct Gust {
     pub size: f64,
     /// Onset \[s\].
     pub start_s: f64,
-    /// End \[s\]; infinite for a gust that persists.
+    /// End \[s\], infinite for a gust that persists.
     pub end_s: f64,
 }
 
-/// A physical parameter that may change in flight.
+/// Physical parameter that may change in flight.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub enum PlantParameter {
@@ -46,45 +45,46 @@ pub enum PlantParameter {
     ThrustFactor,
     /// d: drag factor.
     DragFactor,
-    /// Moment of the rotors' thrusts about body x: the effect of U1. Below 0: the wrong sign.
+    /// Moment of the rotors' thrusts about body x, the effect of U1. A factor below 0 reverses its sign.
     RollMoment,
-    /// Likewise about body y, the effect of U2.
+    /// Moment of the rotors' thrusts about body y, the effect of U2. A factor below 0 reverses its sign.
     PitchMoment,
     /// Moment of the rotors' drag about body z: the effect of U3.
     YawMoment,
 }
 
-/// Multiplies one parameter by `factor` from `start_s` to `end_s`.
+/// Change that multiplies one parameter by `factor` from `start_s` to `end_s`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct ParameterChange {
-    /// The parameter.
+    /// Parameter that changes.
     pub quantity: PlantParameter,
-    /// Factor; 1 changes nothing.
+    /// Factor on the parameter; 1 changes nothing.
     pub factor: f64,
     /// Start \[s\].
     pub start_s: f64,
-    /// End \[s\]; infinite for a permanent change.
+    /// End \[s\], infinite for a permanent change.
     pub end_s: f64,
 }
 
-/// A point mass carried from `start_s` to `end_s`. It is taken up and released at the vehicle's velocity. Position and
-/// velocity are those of the common centre of mass, and do not jump. Beside the body's z axis it moves that centre away
-/// from the thrust, whose moment follows; products of inertia, and the same shift for drag and ground, are left out.
+/// Point mass carried from `start_s` to `end_s`. The vehicle takes it up and releases it at its own velocity. Position
+/// and velocity are those of the common centre of mass, and do not jump. A payload beside the body's z axis shifts the
+/// centre of mass away from the thrust, and the resulting moment is included. Products of inertia, and the shift's
+/// effect on drag and ground contact, are neglected.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Payload {
     /// Mass \[kg\].
     pub mass_kg: f64,
-    /// Distance below the centre of mass of the vehicle and the payloads listed before; negative for above \[m\].
+    /// Distance below the centre of mass of the vehicle and the payloads listed before it, negative for above \[m\].
     pub below_m: f64,
-    /// Distance ahead of that centre; negative for behind \[m\].
+    /// Distance ahead of that centre of mass, negative for behind \[m\].
     pub ahead_m: f64,
-    /// Distance to the left of it; negative for the right \[m\].
+    /// Distance to the left of that centre of mass, negative for the right \[m\].
     pub left_m: f64,
     /// Start \[s\].
     pub start_s: f64,
-    /// End \[s\]; infinite for a payload that is kept.
+    /// End \[s\], infinite for a payload that is kept.
     pub end_s: f64,
 }
 
@@ -98,8 +98,8 @@ pub const PAYLOAD_AHEAD: Range = Range::new("ahead_m", -10.0, 10.0);
 pub const PAYLOAD_LEFT: Range = Range::new("left_m", -10.0, 10.0);
 
 impl Payload {
-    /// Adds the payload's mass, by the parallel axis theorem m m_p/(m + m_p) times the square of its distance from each
-    /// axis to Ix, Iy and Iz, and its shift of the centre of mass.
+    /// Adds the payload's mass, its inertia (by the parallel axis theorem m m_p/(m + m_p) times the squared distance
+    /// from each axis), and its shift of the centre of mass.
     fn load(&self, vehicle: &mut Parameters<f64>, rig: &mut Rig) {
         let Payload { mass_kg, below_m, ahead_m, left_m, .. } = *self;
         let total_kg = vehicle.mass_kg + mass_kg;
@@ -113,7 +113,7 @@ impl Payload {
     }
 }
 
-/// The vehicle's true parameters with their changes, gusts and payloads.
+/// True parameters of the vehicle with their changes, gusts and payloads.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Environment {
@@ -124,29 +124,29 @@ pub struct Environment {
     payloads: Vec<Payload>,
 }
 
-/// Accepted size of a gust, in its own unit.
+/// Accepted size of a gust, in the gust's unit.
 pub const GUST_SIZE: Range = Range::new("gust", -1e4, 1e4);
 /// Accepted start of a gust or a change \[s\].
 pub const START: Range = Range::new("start_s", 0.0, 1e6);
 
-/// Tolerance when comparing times, far below any step \[s\], since onset and step count may round differently.
+/// Tolerance when comparing times, far below any step \[s\], because onset and step count may round differently.
 const TIME_SLACK_S: f64 = 1e-9;
 
 fn active(start_s: f64, end_s: f64, t: f64) -> bool {
     start_s <= t + TIME_SLACK_S && t + TIME_SLACK_S < end_s
 }
 
-/// How the rotors' wrench reaches the body.
+/// Effect of the rotors' wrench on the body.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Rig {
     /// Factors on the rotors' moments about body x, y, z.
     pub(crate) moments: Vector3<f64>,
-    /// Moments about body x and y that the thrust takes away, per thrust \[m\]: it acts beside the centre of mass.
+    /// Moments about body x and y per thrust \[m\] that result from a centre of mass beside the thrust, subtracted.
     pub(crate) lever_m: Vector2<f64>,
 }
 
 impl Rig {
-    /// As built: the thrust acts through the centre of mass.
+    /// Returns the intact rig: the thrust acts through the centre of mass.
     pub(crate) fn intact() -> Self {
         Rig { moments: Vector3::repeat(1.0), lever_m: Vector2::zeros() }
     }
@@ -167,7 +167,7 @@ pub(crate) struct Segment {
 }
 
 impl Segment {
-    /// A vehicle with these parameters, and the paper's disturbances of it, until a time.
+    /// Creates a segment with these parameters and the paper's disturbances, valid until `until_s`.
     pub(crate) fn new(
         parameters: Parameters<f64>,
         rig: Rig,
@@ -182,7 +182,7 @@ impl Environment {
     /// Creates an environment with still air and constant parameters.
     ///
     /// # Errors
-    /// The first parameter out of range.
+    /// Returns the first parameter that is out of range.
     pub fn calm(nominal: Parameters<f64>) -> Result<Self, OutOfRange> {
         Self::new(nominal, Vec::new(), Vec::new())
     }
@@ -190,7 +190,8 @@ impl Environment {
     /// Creates an environment with gusts, which add up, and parameter changes, which multiply.
     ///
     /// # Errors
-    /// The first parameter out of range, initially or at any time, or the first gust out of [`GUST_SIZE`] or [`START`].
+    /// Returns the first parameter out of range, initially or at any time, or the first gust out of [`GUST_SIZE`] or
+    /// [`START`].
     pub fn new(nominal: Parameters<f64>, changes: Vec<ParameterChange>, gusts: Vec<Gust>) -> Result<Self, OutOfRange> {
         let environment = Environment { nominal, frame: Frame::default(), changes, gusts, payloads: Vec::new() };
         nominal.validate()?;
@@ -205,7 +206,7 @@ impl Environment {
     /// Adds payloads, which are applied after the parameter changes.
     ///
     /// # Errors
-    /// The first payload out of range, or the first parameter out of range at any time with them.
+    /// Returns the first payload out of range, or the first parameter out of range at any time with the payloads.
     pub fn with_payloads(self, payloads: Vec<Payload>) -> Result<Self, OutOfRange> {
         for payload in &payloads {
             PAYLOAD_MASS.check(payload.mass_kg)?;
@@ -218,10 +219,10 @@ impl Environment {
         Ok(environment)
     }
 
-    /// The same changes, gusts and payloads of a vehicle with other parameters.
+    /// Returns the same changes, gusts and payloads for a vehicle with other parameters.
     ///
     /// # Errors
-    /// The first parameter out of range, as it stands or at any time under them.
+    /// Returns the first parameter out of range, initially or at any time with the changes.
     pub fn on(&self, nominal: Parameters<f64>) -> Result<Self, OutOfRange> {
         nominal.validate()?;
         let environment = Environment { nominal, ..self.clone() };
@@ -229,7 +230,7 @@ impl Environment {
         Ok(environment)
     }
 
-    /// The same environment of a vehicle with this frame instead of the paper's.
+    /// Returns the environment for a vehicle with this frame instead of the paper's.
     #[must_use]
     pub fn with_frame(self, frame: Frame) -> Self {
         Environment { frame, ..self }
@@ -238,7 +239,7 @@ impl Environment {
     fn validate_changes(&self) -> Result<(), OutOfRange> {
         let changes = self.changes.iter().flat_map(|c| [c.start_s, c.end_s]);
         let payloads = self.payloads.iter().flat_map(|p| [p.start_s, p.end_s]);
-        // Nothing changes between these times, so no other needs a check.
+        // Nothing changes between these times, so no other time needs a check.
         changes.chain(payloads).try_for_each(|edge| self.segment(edge).parameters.validate())
     }
 
@@ -247,7 +248,7 @@ impl Environment {
         &self.nominal
     }
 
-    /// Where the rotors are.
+    /// Returns the positions of the rotors.
     pub fn frame(&self) -> &Frame {
         &self.frame
     }
@@ -267,7 +268,7 @@ impl Environment {
         &self.payloads
     }
 
-    /// Returns what holds at time `t` \[s\], and until when.
+    /// Returns parameters and disturbances at time `t` \[s\], with the time of the next change.
     pub(crate) fn segment(&self, t: f64) -> Segment {
         let (mut parameters, mut rig) = (self.nominal, Rig::intact());
         for change in self.changes.iter().filter(|c| active(c.start_s, c.end_s, t)) {

@@ -1,4 +1,4 @@
-//! Positions and directions of the rotors, in the form that sums over them need.
+//! Positions and directions of the rotors, prepared for sums over the rotors.
 
 use afbc_types::{OutOfRange, PLUS, Parameters, ROTOR_POSITION, ROTORS, ROTORS_MAX, Rotor, RotorSpeeds};
 use libm::sqrt;
@@ -9,19 +9,19 @@ type Matrix4xX8 = SMatrix<f64, 4, ROTORS_MAX>;
 /// One number per rotor, 0 beyond the number of rotors.
 pub type Lanes = SVector<f64, ROTORS_MAX>;
 
-/// The rotors of a vehicle. The default is the paper's frame, [`PLUS`].
+/// Rotors of a vehicle. The default is the paper's frame, [`PLUS`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Frame {
     count: usize,
-    /// 1 for each rotor.
+    /// 1 for each rotor that exists.
     present: Lanes,
-    /// Of each rotor, as [`Frame::sums`] reads them: 1; 1 if it pushes the body to positive yaw, else -1; its position
-    /// x, y in arm lengths; x^2 + y^2; and 0 to fill a pair.
+    /// Six weights per rotor for [`Frame::sums`]: 1; yaw direction (1 if the rotor pushes the body to positive yaw,
+    /// else -1); position x, y in arm lengths; x^2 + y^2; 0 as padding.
     weights: [[f64; 6]; ROTORS_MAX],
 }
 
-/// Fewest rotors of a vehicle, and by far the most common number: loops over eight take twice as long.
+/// Smallest number of rotors, and by far the most common one: loops over eight take twice as long.
 pub(crate) const FEW: usize = 4;
 
 /// Sums over the rotors, weighted by position and direction.
@@ -38,7 +38,8 @@ pub(crate) struct Sums {
     pub(crate) spin: f64,
 }
 
-/// Returns the sum of squares times speeds, even and odd rotors apart: results of four rotors depend on this order.
+/// Returns the sum of squares times speeds, with even and odd rotors summed separately: results for four rotors depend
+/// on this order.
 #[inline]
 pub(crate) fn power(squares: &Lanes, speeds: &Lanes) -> f64 {
     let products = squares.component_mul(speeds);
@@ -53,10 +54,10 @@ pub(crate) fn power(squares: &Lanes, speeds: &Lanes) -> f64 {
 }
 
 impl Frame {
-    /// Makes the frame of these rotors.
+    /// Creates the frame of these rotors.
     ///
     /// # Errors
-    /// If there are fewer than four or more than eight, or one is out of [`ROTOR_POSITION`].
+    /// Returns an error for fewer than four or more than eight rotors, or a position out of [`ROTOR_POSITION`].
     pub fn new(rotors: &[Rotor<f64>]) -> Result<Self, OutOfRange> {
         ROTORS.check(rotors.len() as f64)?;
         for rotor in rotors {
@@ -76,12 +77,12 @@ impl Frame {
         }
     }
 
-    /// Number of rotors.
+    /// Returns the number of rotors.
     pub fn count(&self) -> usize {
         self.count
     }
 
-    /// Square of the distance of the outermost rotor from body z, in arm lengths.
+    /// Returns the squared distance of the outermost rotor from body z, in arm lengths.
     pub(crate) fn square_max(&self) -> f64 {
         self.weights.iter().fold(0.0, |most, [.., square, _]| square.max(most))
     }
@@ -92,23 +93,23 @@ impl Frame {
         self.present.component_mul(values)
     }
 
-    /// Returns the share of each rotor in a thrust without moments, with the least sum of squares; equal shares if the
-    /// frame allows them.
+    /// Returns each rotor's share of a thrust without moments, with the smallest sum of squares. The shares are equal
+    /// if the frame allows it.
     pub(crate) fn hover_shares(&self) -> Lanes {
         let equal = self.present / self.count as f64;
         let Sums { x, y, spin, .. } = self.sums(&equal);
-        // By the inverse they would be equal but for rounding.
+        // By the inverse the shares would be equal only up to rounding.
         if x == 0.0 && y == 0.0 && spin == 0.0 {
             return equal;
         }
         let columns = self.weights.map(|[one, spin, x, y, ..]| Vector4::new(y, -x, spin, one));
         let b = Matrix4xX8::from_columns(&columns);
         let shares = (b * b.transpose()).try_inverse().map(|inverse| b.transpose() * inverse * Vector4::w());
-        // Rotors only push.
+        // Rotors cannot pull.
         shares.filter(|shares| shares.min() >= 0.0).unwrap_or(equal)
     }
 
-    /// Returns the speeds at which the rotors carry this vehicle \[rad/s\].
+    /// Returns the rotor speeds that carry this vehicle in hover \[rad/s\].
     pub(crate) fn hover_rad_s(&self, vehicle: &Parameters<f64>) -> Lanes {
         self.hover_shares().map(|share| sqrt(vehicle.weight_n() * share / vehicle.thrust_factor_n_s2))
     }
@@ -118,7 +119,7 @@ impl Frame {
         self.present * value
     }
 
-    /// Returns the commanded speeds; a rotor without a command stands still.
+    /// Returns the commanded speeds. A rotor without a command stands still.
     #[inline]
     pub(crate) fn speeds<const N: usize>(&self, speeds: &RotorSpeeds<N>) -> Lanes {
         let of = |count| {
@@ -130,7 +131,7 @@ impl Frame {
         if self.count == FEW { of(FEW) } else { of(self.count) }
     }
 
-    /// Sums `values`, which must be 0 beyond the number of rotors, in the order of the rotors.
+    /// Sums `values` in the order of the rotors. `values` must be 0 beyond the number of rotors.
     #[inline]
     pub(crate) fn sums(&self, values: &Lanes) -> Sums {
         if self.count == FEW { self.sums_of::<FEW>(values) } else { self.sums_of::<ROTORS_MAX>(values) }

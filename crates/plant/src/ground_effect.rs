@@ -21,10 +21,10 @@ parameters! {
 }
 
 impl GroundEffect {
-    /// A guess for the paper's vehicle: propellers of 10 inches.
+    /// Estimated for the paper's vehicle: propellers of 10 inches.
     pub const PAPER: Self = Self::DEFAULT;
 
-    /// Returns the ratio for a vehicle whose centre of mass is at `height_m`.
+    /// Returns the thrust ratio for a vehicle with its centre of mass at `height_m`.
     #[inline]
     pub fn thrust_ratio(&self, height_m: f64) -> f64 {
         let z = (height_m + self.rotor_height_m).max(0.5 * self.rotor_radius_m);

@@ -10,7 +10,8 @@ pub fn rk4<const N: usize>(
     dt: f64,
 ) -> SVector<f64, N> {
     let (mut at, mut k) = (*x, [SVector::zeros(); 4]);
-    // One call of f, which is then part of the loop: a state passed through memory takes as long as a square root.
+    // A single call of f, so that f is inlined into the loop: passing a state through memory takes as long as a square
+    // root.
     for (k, ahead) in k.iter_mut().zip([dt / 2.0, dt / 2.0, dt, 0.0]) {
         *k = f(&at);
         at = x + *k * ahead;

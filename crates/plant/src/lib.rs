@@ -1,13 +1,12 @@
-//! Physics of the vehicle, in `f64`, without any controller: rotor speeds in, motion out.
+//! Physics of the vehicle in `f64`, without any controller: rotor speeds in, motion out.
 //!
-//! There are two models of the vehicle: [`simplified`], the paper's (6), and [`rigid_body`], its (1)-(5) as corrected.
-//! Both take gusts and changing parameters from an [`Environment`], and both are integrated by the classical
+//! There are two models of the vehicle: [`simplified`], the paper's (6), and [`rigid_body`], the paper's (1)-(5) as
+//! corrected. Both take gusts and changing parameters from an [`Environment`]. Both are integrated by the classical
 //! fourth-order Runge-Kutta method with constant rotor speeds during a step.
 //!
-//! This is the paper's plant. [`Realism`] adds optional effects: rotors with lag, limits, delay,
-//! faults and a battery, drag, wind with gusts and turbulence, ground. A [`StateSensor`] measures the motion for a
-//! controller, as a perfect tracker would; [`Instruments`] are the sensors of a real vehicle. Everything is
-//! reproducible from a seed.
+//! This is the paper's plant. [`Realism`] adds optional effects: rotors with lag, limits, delay, faults and a battery;
+//! drag; wind with gusts and turbulence; ground. A [`StateSensor`] measures the motion for a controller like a perfect
+//! tracker; [`Instruments`] are the sensors of a real vehicle. Every flight is reproducible from a seed.
 //!
 //! [`afbc_types`] defines frames, units and the meaning of "(n)". Trigonometry comes from the `libm` crate, so a flight
 //! gives the same bits on every host.

@@ -8,18 +8,18 @@ use nalgebra::Vector3;
 /// Forces and moments that are constant during one step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Load {
-    /// Thrust of all rotors over mass, along body z \[m/s2\].
+    /// Thrust of all rotors per mass, along body z \[m/s2\].
     thrust_m_s2: f64,
     gravity_m_s2: f64,
-    /// Moment of the rotors over inertia, body frame \[rad/s2\].
+    /// Moment of the rotors divided by the inertia, body frame \[rad/s2\].
     rotor_rad_s2: Vector3<f64>,
-    /// \[A_x, A_y, A_z\] \[m/s2\].
+    /// Disturbance \[A_x, A_y, A_z\] \[m/s2\].
     a_force: Vector3<f64>,
-    /// \[A_phi, A_theta, A_psi\] \[rad/s2\].
+    /// Disturbance \[A_phi, A_theta, A_psi\] \[rad/s2\].
     a_moment: Vector3<f64>,
-    /// a_1, a_3, a_5 of (6).
+    /// Coefficients a_1, a_3, a_5 of (6).
     coupling: Vector3<f64>,
-    /// I_r omega over Ix and Iy: a_2 omega, -a_4 omega \[1/s\].
+    /// I_r omega divided by Ix and Iy: a_2 omega, -a_4 omega \[1/s\].
     gyroscopic: [f64; 2],
 }
 
@@ -39,7 +39,7 @@ impl Load {
         Self::ideal(&segment, &Frame::default(), &speeds)
     }
 
-    /// The same on any frame, however its rotors act on the body.
+    /// Computes the load of ideal rotors on any frame, including the segment's moment factors and levers.
     #[inline]
     pub(crate) fn ideal(segment: &Segment, frame: &Frame, speeds_rad_s: &Lanes) -> Self {
         let squares = speeds_rad_s.map(|w| w * w);
@@ -47,9 +47,9 @@ impl Load {
         Self::of_rotors(segment, [&speeds, &squares], 1.0)
     }
 
-    /// Computes the load of rotors from sums over their `speeds` \[rad/s\] and over the `squares` of these \[rad2/s2\],
-    /// already multiplied by their efficiency, from which drag moments and thrusts follow; thrusts are also multiplied
-    /// by `thrust_ratio`.
+    /// Computes the load from sums over the rotors' `speeds` \[rad/s\] and over their `squares` \[rad2/s2\], which
+    /// already include each rotor's efficiency. Thrusts and drag moments follow from the squares; thrusts are also
+    /// multiplied by `thrust_ratio`.
     #[inline]
     pub(crate) fn of_rotors(segment: &Segment, [speeds, squares]: [&Sums; 2], thrust_ratio: f64) -> Self {
         let Segment { parameters, ratios, rig, a_force, a_moment, .. } = segment;
@@ -73,12 +73,12 @@ impl Load {
         }
     }
 
-    /// Returns the thrust of all rotors over mass \[m/s2\].
+    /// Returns the thrust of all rotors per mass \[m/s2\].
     pub(crate) fn thrust_m_s2(&self) -> f64 {
         self.thrust_m_s2
     }
 
-    /// Returns d^2 xi/dt^2 in the earth frame, given the direction of body z in the earth frame \[m/s2\].
+    /// Returns d^2 xi/dt^2 in the earth frame \[m/s2\], given the direction of body z in the earth frame.
     #[inline]
     pub(crate) fn acceleration(&self, body_z: &Vector3<f64>) -> Vector3<f64> {
         body_z * self.thrust_m_s2 - Vector3::new(0.0, 0.0, self.gravity_m_s2) - self.a_force

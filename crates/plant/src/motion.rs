@@ -13,7 +13,7 @@ pub struct Motion {
     pub velocity_m_s: Vector3<f64>,
     /// eta = \[roll, pitch, yaw\] \[rad\].
     pub attitude_rad: Vector3<f64>,
-    /// Omega = \[p, q, r\], body frame \[rad/s\]; in the simplified model d eta/dt.
+    /// Omega = \[p, q, r\], body frame \[rad/s\]; d eta/dt in the simplified model.
     pub rates_rad_s: Vector3<f64>,
 }
 

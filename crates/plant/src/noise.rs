@@ -1,9 +1,9 @@
-//! Seeded random numbers, with the same bits on every machine.
+//! Seeded random numbers with the same bits on every machine.
 //!
-//! Bits come from xoshiro256++ (Blackman, Vigna 2021, *Scrambled linear pseudorandom number generators*), normal
-//! numbers from the ziggurat (Marsaglia, Tsang 2000, *The ziggurat method for generating random variables*, J. Stat.
-//! Softw. 5(8)) with 256 layers. The ziggurat is implemented here because a library's logarithm depends on the features
-//! that other crates of the build enable; this one always uses `libm`.
+//! Bits come from xoshiro256++ (Blackman, Vigna 2021, *Scrambled linear pseudorandom number generators*). Normal
+//! numbers come from the ziggurat (Marsaglia, Tsang 2000, *The ziggurat method for generating random variables*, J.
+//! Stat. Softw. 5(8)) with 256 layers. The ziggurat is implemented here because the logarithm of a library version
+//! would depend on the features that other crates enable; this one always uses `libm`.
 
 use core::fmt;
 use libm::{exp, log};
@@ -40,7 +40,7 @@ pub enum Stream {
     Barometer,
     /// Magnetometer.
     Magnetometer,
-    /// Noise of broken instruments.
+    /// Noise of failed instruments.
     Failures,
 }
 
@@ -58,10 +58,10 @@ impl fmt::Debug for Noise {
 }
 
 impl Noise {
-    /// Creates the numbers of `stream` with `seed`.
+    /// Creates the random numbers of `stream` with `seed`.
     pub fn new(seed: u64, stream: Stream) -> Self {
         let mut bits = Xoshiro256PlusPlus::seed_from_u64(seed);
-        // By the order of the variants: a new one goes last, so that flights of the others keep their numbers.
+        // By the order of the variants: a new one must go last, so that the others keep their numbers.
         for _ in 0..stream as usize {
             bits.jump();
         }
@@ -82,10 +82,10 @@ impl Noise {
         x
     }
 
-    /// Draws as many normal numbers, the same as one after the other, in less time.
+    /// Draws N normal numbers, the same as one after the other, but faster.
     #[inline]
     pub fn normals<const N: usize>(&mut self) -> [f64; N] {
-        // A copy that no call takes the address of stays in registers.
+        // A copy whose address no call takes stays in registers.
         let mut stream = self.clone();
         let numbers = core::array::from_fn(|_| {
             loop {
@@ -107,8 +107,8 @@ impl Noise {
         numbers
     }
 
-    /// Handles the 1.2 % outside of every layer's core: the tail, or the part near the curve. Returns the stream after
-    /// it as well.
+    /// Handles the 1.2 % outside of every layer's core: the tail, or the part near the curve. Also returns the advanced
+    /// stream.
     #[cold]
     #[inline(never)]
     fn beyond(mut self, layer: &Layer, x: f64) -> (Self, Option<f64>) {
@@ -137,13 +137,13 @@ const R: f64 = 3.654_152_885_361_009;
 /// Area of each layer under exp(-x^2/2), the lowest including the tail.
 const AREA: f64 = 4.928_673_233_974_655e-3;
 
-/// One horizontal layer under exp(-x^2/2).
+/// Horizontal layer under exp(-x^2/2).
 #[derive(Clone, Copy)]
 struct Layer {
-    /// Half width over 2^52, one step of the position. The half width is the curve's abscissa at the lower edge; the
-    /// lowest layer is widened to include the tail's area.
+    /// Half width divided by 2^52, one step of the position. The half width is the curve's abscissa at the lower edge;
+    /// the lowest layer is widened to include the tail's area.
     step: f64,
-    /// Half width of the next layer up; within it, every height of this layer is under the curve.
+    /// Half width of the next layer up. Within it, every height of this layer is under the curve.
     width_above: f64,
     /// The curve's height at the half width.
     height: f64,
@@ -151,7 +151,7 @@ struct Layer {
     height_above: f64,
 }
 
-/// Positions between the middle of a layer and its edge.
+/// Number of positions between the middle of a layer and its edge.
 const STEPS: f64 = (1_u64 << 52) as f64;
 
 /// Height of the lowest layer, whose lower edge is not on the curve.
@@ -175,7 +175,7 @@ const fn layers() -> [Layer; 256] {
     layers
 }
 
-/// Returns exp(-x^2/2) from its series at a 64th of the exponent, squared six times.
+/// Returns exp(-x^2/2) from the series at a 64th of the exponent, squared six times.
 const fn gauss(x: f64) -> f64 {
     let small = -0.5 * x * x / 64.0;
     let (mut sum, mut term, mut n) = (1.0, 1.0, 1.0);
@@ -192,7 +192,7 @@ const fn gauss(x: f64) -> f64 {
     sum
 }
 
-/// Returns x > 0 with exp(-x^2/2) = y by Newton's method, starting at `x`, which is somewhat above it.
+/// Returns x > 0 with exp(-x^2/2) = y by Newton's method, starting at `x`, which must be slightly too large.
 const fn gauss_inverse(y: f64, mut x: f64) -> f64 {
     let mut round = 0;
     while round < 20 {
@@ -219,7 +219,7 @@ mod tests {
             close(width * (above.height_above - above.height), AREA, "area");
         }
         assert_eq!(LAYERS.last().map(|top| top.height_above), Some(1.0));
-        // The lowest layer: R exp(-R^2/2), and the tail sqrt(pi/2) erfc(R / sqrt 2).
+        // The lowest layer: R exp(-R^2/2) plus the tail sqrt(pi/2) erfc(R / sqrt 2).
         let tail = libm::sqrt(core::f64::consts::FRAC_PI_2) * libm::erfc(R * core::f64::consts::FRAC_1_SQRT_2);
         close(R * exp(-0.5 * R * R) + tail, AREA, "base");
     }

@@ -1,15 +1,15 @@
-//! What the equations of motion need of a vehicle in every step, computed once.
+//! Parameter ratios for the equations of motion, computed once per change.
 
 use afbc_types::Parameters;
 use nalgebra::Vector3;
 
-/// Ratios of a vehicle's parameters that hold until these change, since divisions are slow.
+/// Ratios of a vehicle's parameters, precomputed because divisions are slow.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Ratios {
-    /// 1/m and diag(I)^-1.
+    /// 1/m, and the diagonal of I^-1.
     pub(crate) per_mass: f64,
     pub(crate) per_inertia: Vector3<f64>,
-    /// a_1, a_3, a_5 of (6).
+    /// Coefficients a_1, a_3, a_5 of (6).
     pub(crate) coupling: Vector3<f64>,
 }
 

@@ -1,4 +1,4 @@
-//! Realistic effects that the paper's vehicle lacks, each optional.
+//! Optional realistic effects that the paper's vehicle lacks.
 
 use crate::battery::Charge;
 use crate::body_axes::BodyAxes;
@@ -16,17 +16,17 @@ use afbc_types::{Declared, OutOfRange, Range};
 use alloc::vec::Vec;
 use nalgebra::Vector3;
 
-/// Accepted range of a step \[s\].
+/// Accepted range of a time step \[s\].
 pub const STEP: Range = Range::new("step_s", 1e-5, 0.02);
 
-/// Effects added by [`Plant::with_realism`](crate::Plant::with_realism). The default adds nothing: the paper's plant,
-/// bit for bit, as long as no rotor is commanded beyond 10,000 rad/s.
+/// Effects added by [`Plant::with_realism`](crate::Plant::with_realism). The default adds nothing: it equals the
+/// paper's plant bit for bit, as long as no rotor is commanded beyond 10,000 rad/s.
 ///
-/// Measurement is separate, in [`StateSensor`](crate::StateSensor), between the plant and its controller.
+/// The measurement is separate: [`StateSensor`](crate::StateSensor), between the plant and its controller.
 ///
-/// During a step, commanded speeds, wind, ground effect and battery voltage are constant at their values at its start,
-/// rotor speeds at those in its middle. Drag and ground contact are evaluated at every stage of the Runge-Kutta method.
-/// All effects apply to both models; the simplified one uses d eta/dt as Omega here as well.
+/// During a step, commanded speeds, wind, ground effect and battery voltage keep their values from its start, and rotor
+/// speeds their values at its middle. Drag and ground contact are evaluated at every stage of the Runge-Kutta method.
+/// All effects apply to both models; the simplified model uses d eta/dt as Omega here as well.
 ///
 /// ```
 /// use afbc_types::{Parameters, RotorSpeeds};
@@ -57,7 +57,7 @@ pub const STEP: Range = Range::new("step_s", 1e-5, 0.02);
 pub struct Realism {
     /// Rotor lag, limits, delay, faults and battery.
     pub rotors: Rotors,
-    /// Blade and body drag. Without it, air has no effect.
+    /// Blade and body drag. Without it, the air has no effect.
     pub drag: Option<Drag>,
     /// Steady wind, gusts and turbulence.
     pub wind: Wind,
@@ -69,14 +69,14 @@ pub struct Realism {
     pub seed: u64,
 }
 
-/// State of rotors, air, ground and battery after one step.
+/// State of rotors, air, ground and battery after a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EffectsState {
     /// Rotor speeds at the end of the step \[rad/s\]; 0 for rotors that the vehicle does not have.
     pub rotor_speeds_rad_s: Lanes,
     /// Velocity of the air, earth frame \[m/s\].
     pub wind_m_s: Vector3<f64>,
-    /// Thrust over its value far from the ground.
+    /// Thrust divided by its value far from the ground.
     pub thrust_ratio: f64,
     /// True if a foot or a rotor touched the ground at the start of the step.
     pub on_ground: bool,
@@ -84,13 +84,13 @@ pub struct EffectsState {
     pub battery: Option<Charge>,
 }
 
-/// [`Realism`] in simulation.
+/// Effects of [`Realism`] in simulation.
 #[derive(Clone, Debug)]
 pub(crate) struct Effects {
     frame: Frame,
     spin: Spin,
     drag: Option<Drag>,
-    /// Drag at the rotor speeds of the last step; none before the first.
+    /// Drag at the rotor speeds of the last step, `None` before the first step.
     held: Option<HeldDrag>,
     weather: Weather,
     ground: Option<Ground>,
@@ -130,7 +130,7 @@ impl Effects {
         })
     }
 
-    /// Computes forces for the step that begins at `time_s` with the vehicle at this position and velocity.
+    /// Computes the forces of the step that begins at `time_s` with this position and velocity.
     #[inline]
     pub(crate) fn begin_step<'a>(
         &'a mut self,
@@ -161,20 +161,20 @@ impl Effects {
         Load::of_rotors(segment, [&speeds, &squares], self.thrust_ratio)
     }
 
-    /// Returns air and ground for a vehicle at this height and climb rate, with the wind and rotors of the last step.
+    /// Returns air and ground for this height and climb rate, with the wind and rotors of the last step.
     #[inline]
     pub(crate) fn surroundings<'a>(&'a self, ratios: &'a Ratios, height_m: f64, climb_m_s: f64) -> Surroundings<'a> {
         Surroundings::new(ratios, self.held.as_ref(), self.wind_m_s, self.near(height_m, climb_m_s))
     }
 
-    /// Returns the ground, unless a step cannot reach it.
+    /// Returns the ground if the vehicle can reach it within a step.
     #[inline]
     fn near(&self, height_m: f64, climb_m_s: f64) -> Option<&Ground> {
         self.ground.as_ref().filter(|ground| ground.is_near(height_m, climb_m_s))
     }
 
     /// # Errors
-    /// The first parameter out of range, here and below; nothing has changed then.
+    /// Returns the first parameter that is out of range, and changes nothing then. The same holds for the next setters.
     pub(crate) fn set_wind(&mut self, wind: &Wind) -> Result<(), OutOfRange> {
         self.weather.change(wind)
     }

@@ -1,4 +1,4 @@
-//! The full rigid body, (1)-(5) as corrected, with a unit quaternion as attitude, free of singularities.
+//! Full rigid body, (1)-(5) as corrected, with a unit quaternion as attitude and so without singularities.
 
 use crate::body_axes::BodyAxes;
 use crate::load::Load;
@@ -10,7 +10,7 @@ use nalgebra::{SVector, Vector3};
 /// State vector: \[x, y, z, their rates, quaternion w x y z (body to earth), p, q, r\].
 pub type Vector = SVector<f64, 13>;
 
-/// Returns the unit quaternion, w x y z, body to earth, of roll, pitch and yaw.
+/// Returns the unit quaternion w, x, y, z (body to earth) of roll, pitch and yaw.
 pub(crate) fn quaternion(attitude_rad: &Vector3<f64>) -> [f64; 4] {
     let half = attitude_rad * 0.5;
     let (s_phi, c_phi) = (sin(half.x), cos(half.x));
@@ -34,7 +34,7 @@ pub fn vector(motion: &Motion) -> Vector {
     x
 }
 
-/// Converts a state vector to the motion; yaw and roll within -pi to pi, pitch within -pi/2 to pi/2.
+/// Converts a state vector to the motion, with yaw and roll within -pi to pi and pitch within -pi/2 to pi/2.
 #[inline]
 pub fn motion(v: &Vector) -> Motion {
     let (w, x, y, z) = (v[6], v[7], v[8], v[9]);
@@ -60,7 +60,7 @@ pub fn euler_rates(attitude_rad: &Vector3<f64>, rates_rad_s: &Vector3<f64>) -> V
     Vector3::new(p + psi_dot * sin(theta), cos(phi) * q - sin(phi) * r, psi_dot)
 }
 
-/// Returns the derivative of the state vector under a constant load.
+/// Returns the derivative of the state vector with a constant load.
 #[inline]
 pub fn derivative(v: &Vector, load: &Load) -> Vector {
     pack(v, &load.acceleration(&body_axes(v).up), &load.angular_acceleration(&Vector3::new(v[10], v[11], v[12])))
@@ -89,14 +89,14 @@ fn pack(v: &Vector, acceleration: &Vector3<f64>, angular_acceleration: &Vector3<
     ])
 }
 
-/// Returns the body's axes from the unit quaternion.
+/// Returns the body axes from the unit quaternion.
 #[inline]
 pub(crate) fn body_axes(v: &Vector) -> BodyAxes {
     BodyAxes::of_quaternion(v[6], v[7], v[8], v[9])
 }
 
 /// Returns [`derivative`] with the forces that depend on position and velocity.
-// Always inlined, like what it calls: a state passed through memory costs a fifth of it.
+// Always inlined, with its callees: passing a state through memory costs a fifth of this function's time.
 #[inline(always)]
 pub(crate) fn derivative_in(v: &Vector, load: &Load, surroundings: &Surroundings) -> Vector {
     let (velocity, rates) = (Vector3::new(v[3], v[4], v[5]), Vector3::new(v[10], v[11], v[12]));

@@ -43,7 +43,7 @@ parameters! {
     }
 }
 
-/// Speeds of the rotors, actual and commanded, before the first command arrives.
+/// Actual and commanded rotor speeds before the first command arrives.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub enum Start {
@@ -58,8 +58,8 @@ impl Choice for Start {
     const WORDS: &'static [&'static str] = &["hover", "idle"];
 }
 
-/// A worn or broken rotor, whose thrust and drag moment are multiplied by `efficiency`. One without any is dead: its
-/// motor does not turn it any more, and it slows down with the rotors' time constant.
+/// Worn or broken rotor, whose thrust and drag moment are multiplied by `efficiency`. With an efficiency of 0 the rotor
+/// is dead: its motor does not drive it, and it slows down with the rotors' time constant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct RotorFault {
@@ -82,7 +82,7 @@ pub mod limits {
 
 impl RotorFault {
     /// # Errors
-    /// The first number out of range, by name.
+    /// Returns the first number that is out of range, by name.
     fn validate(&self) -> Result<(), OutOfRange> {
         limits::ROTOR.check(self.rotor)?;
         limits::EFFICIENCY.check(self.efficiency)?;
@@ -91,10 +91,10 @@ impl RotorFault {
 }
 
 impl Rotors {
-    /// Returns each rotor's share of its thrust at time `t` \[s\], and when that next changes.
+    /// Returns each rotor's share of its thrust at time `t` \[s\], and the time of the next change.
     fn efficiency(&self, frame: &Frame, t: f64) -> (Lanes, f64) {
         let (mut efficiency, mut until_s) = (frame.repeat(1.0), f64::INFINITY);
-        // `check` has refused a rotor 0: the subtraction does not underflow.
+        // `check` refuses a rotor 0, so the subtraction does not underflow.
         for fault in &self.faults {
             if fault.start_s > t + TIME_SLACK_S {
                 until_s = until_s.min(fault.start_s - TIME_SLACK_S);
@@ -118,12 +118,12 @@ pub(crate) struct Drive {
     pub(crate) squares: Lanes,
 }
 
-/// Returns 1 for each rotor that its motor turns; those that the vehicle does not have, have no efficiency either.
+/// Returns 1 for each rotor that its motor drives. Rotors that the vehicle does not have have an efficiency of 0.
 fn driven(efficiency: &Lanes) -> Lanes {
     efficiency.map(|share| if share > 0.0 { 1.0 } else { 0.0 })
 }
 
-/// Checks faults of rotors of a vehicle with this frame.
+/// Checks rotor faults for a vehicle with this frame.
 fn check(faults: &[RotorFault], frame: &Frame) -> Result<(), OutOfRange> {
     faults.iter().try_for_each(|fault| {
         fault.validate()?;
@@ -142,16 +142,16 @@ pub(crate) struct Spin {
     pub(crate) speeds_rad_s: Lanes,
     efficiency: Lanes,
     efficiency_until_s: f64,
-    /// 1 for each rotor that its motor turns.
+    /// 1 for each rotor that its motor drives.
     driven: Lanes,
     battery: Option<Discharge>,
 }
 
 impl Spin {
-    /// Creates rotors that start as [`Start`] says on a vehicle with these parameters.
+    /// Creates rotors for a vehicle with these parameters, with the initial speeds of [`Start`].
     ///
     /// # Errors
-    /// The first parameter out of range.
+    /// Returns the first parameter that is out of range.
     pub(crate) fn new(
         rotors: Rotors,
         vehicle: &Parameters<f64>,
@@ -168,7 +168,7 @@ impl Spin {
         };
         let (efficiency, efficiency_until_s) = rotors.efficiency(frame, 0.0);
         Ok(Spin {
-            // Commands come in `f32`, and so does what is taken for those before the first.
+            // Commands are `f32`, so the commands before the first one are rounded to `f32` too.
             commands: DelayLine::new(whole_steps(rotors.delay_s, step_s), start_rad_s.map(|w| f64::from(w as f32))),
             // At tau = 0 this is exp(-infinity) = 0: no lag.
             half_step: exp(-0.5 * step_s / rotors.time_constant_s),
@@ -183,8 +183,8 @@ impl Spin {
 
     /// Advances the rotors by one step from `t` \[s\] with a constant command.
     ///
-    /// The lag is discretised exactly. The load over the step is that of the speeds in its middle, which is accurate to
-    /// second order. A command that is not a number counts as the smallest speed.
+    /// The lag is discretised exactly. The load over the step is that of the speeds at its middle, which is accurate to
+    /// second order. A command of NaN counts as the smallest speed.
     #[inline]
     pub(crate) fn advance(&mut self, frame: &Frame, command_rad_s: &Lanes, t: f64, drag_factor_n_m_s2: f64) -> Drive {
         if t >= self.efficiency_until_s {
@@ -199,10 +199,10 @@ impl Spin {
                 scale = share;
             }
         }
-        // max first, so that it replaces NaN.
+        // `max` first, so that it replaces NaN.
         let floor = self.rotors.min_rad_s;
         let command = self.commands.pass(*command_rad_s);
-        // min last, so that an empty battery stops even rotors that idle.
+        // `min` last, so that an empty battery stops even idling rotors.
         let target = |w: f64| (w * scale).max(floor).min(ceiling);
         let drive = if frame.count() == frame::FEW {
             self.follow::<{ frame::FEW }>(&command, target)
@@ -210,13 +210,13 @@ impl Spin {
             self.follow::<ROTORS_MAX>(&command, target)
         };
         if let Some(battery) = &mut self.battery {
-            // Drag moment times speed; the energy that accelerates the rotors is returned when they slow down.
+            // Drag moment times speed. The energy that accelerates the rotors is returned when they slow down.
             battery.supply(drag_factor_n_m_s2 * frame::power(&drive.squares, &drive.speeds_rad_s));
         }
         drive
     }
 
-    /// Advances the speeds of the first `N` rotors toward `target` of their commands; there are no others.
+    /// Advances the speeds of the first `N` rotors toward `target` of their commands. There are no other rotors.
     #[inline]
     fn follow<const N: usize>(&mut self, command: &Lanes, target: impl Fn(f64) -> f64) -> Drive {
         let mut drive = Drive { speeds_rad_s: Lanes::zeros(), squares: Lanes::zeros() };
@@ -241,19 +241,19 @@ impl Spin {
     /// Changes the faults.
     ///
     /// # Errors
-    /// The first number out of range; nothing has changed then.
+    /// Returns the first number that is out of range, and changes nothing then.
     pub(crate) fn set_faults(&mut self, frame: &Frame, faults: Vec<RotorFault>) -> Result<(), OutOfRange> {
         check(&faults, frame)?;
         self.rotors.faults = faults;
-        // Whatever the time, the next step looks at the faults again.
+        // Makes the next step evaluate the faults again, at any time.
         self.efficiency_until_s = f64::NEG_INFINITY;
         Ok(())
     }
 
-    /// Sets the battery's charge; false without a battery.
+    /// Sets the battery's charge. Returns false without a battery.
     ///
     /// # Errors
-    /// A share out of range.
+    /// Returns an error if the share is out of range.
     pub(crate) fn set_charge(&mut self, share: f64) -> Result<bool, OutOfRange> {
         self.battery.as_mut().map_or(Ok(false), |battery| battery.charge(share).map(|()| true))
     }

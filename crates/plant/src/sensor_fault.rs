@@ -1,40 +1,40 @@
-//! Faults of the measurement: a coordinate that freezes, is offset, or is scaled, be it by -1.
+//! Faults of the measured state: a coordinate that freezes, has an offset, or is scaled, possibly by -1.
 
 use crate::motion::Motion;
 use afbc_types::Axis;
 use alloc::vec::Vec;
 
-/// What is wrong with a measured coordinate.
+/// Kind of error of a measured coordinate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub enum Misreading {
-    /// Coordinate and rate are multiplied; below 0 is the wrong sign.
+    /// Coordinate and rate are multiplied; a factor below 0 reverses the sign.
     Factor(f64),
-    /// The coordinate is this much too large \[m\] or \[rad\]; its rate is right.
+    /// The coordinate is too large by this much \[m\] or \[rad\]; its rate is right.
     Offset(f64),
-    /// Coordinate and rate stay as they were at the onset.
+    /// Coordinate and rate keep their values from the onset.
     Frozen,
 }
 
-/// A fault from `start_s` to `end_s`.
+/// Fault from `start_s` to `end_s`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct SensorFault {
-    /// x, y, z: that coordinate and its velocity; roll, pitch, yaw: that angle and the rate about the same body axis.
-    /// None for the whole state.
+    /// Affected coordinate: x, y, z with its velocity; or roll, pitch, yaw with the rate about the same body axis.
+    /// `None` for the whole state.
     pub axis: Option<Axis>,
-    /// What is wrong.
+    /// Kind of error.
     pub misreading: Misreading,
     /// Onset \[s\].
     pub start_s: f64,
-    /// End \[s\]; infinite for a fault that stays.
+    /// End \[s\], infinite for a permanent fault.
     pub end_s: f64,
 }
 
-/// The faults of a flight, which act one after the other, as listed.
+/// Faults of a flight, applied one after the other in the listed order.
 #[derive(Clone, Debug, Default)]
 pub struct SensorFaults {
-    /// Each with the motion at its onset.
+    /// Faults, each with the motion at its onset.
     faults: Vec<(SensorFault, Option<Motion>)>,
 }
 
@@ -47,13 +47,13 @@ impl SensorFaults {
         SensorFaults { faults: faults.iter().map(|fault| (*fault, None)).collect() }
     }
 
-    /// True if no sensor ever fails.
+    /// Returns true if there are no faults.
     #[inline]
     pub fn are_none(&self) -> bool {
         self.faults.is_empty()
     }
 
-    /// Returns `motion` at `time_s` as faulty sensors see it. To be called in every step.
+    /// Returns `motion` as faulty sensors measure it at `time_s`. Call it in every step.
     pub fn seen(&mut self, motion: &Motion, time_s: f64) -> Motion {
         let mut seen = *motion;
         let now_s = time_s + TIME_SLACK_S;
@@ -69,7 +69,7 @@ impl SensorFaults {
 }
 
 impl Misreading {
-    /// Changes one coordinate of `seen`, and its rate; `held` is the motion at the onset.
+    /// Changes one coordinate of `seen` and its rate; `held` is the motion at the onset.
     fn apply(self, axis: Axis, seen: &mut Motion, held: &Motion) {
         let [coordinate, rate] = coordinates(seen, axis);
         match self {

@@ -1,4 +1,4 @@
-//! Measurement of the true motion for the controller.
+//! Measurement of the true motion for a controller.
 
 use crate::delay::{DelayLine, whole_steps};
 use crate::dropouts::{Dropouts, Outage};
@@ -33,7 +33,7 @@ impl Deviations {
         Deviations { position_m: size, velocity_m_s: size, attitude_rad: size, rates_rad_s: size }
     }
 
-    /// Draws normal numbers of these standard deviations.
+    /// Draws normal numbers with these standard deviations.
     #[inline]
     fn draw(&self, noise: &mut Noise) -> Motion {
         let [x, y, z, u, v, w, phi, theta, psi, p, q, r] = noise.normals();
@@ -78,13 +78,13 @@ parameters! {
 /// Measurement in one step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StateMeasurement {
-    /// The newest state that has arrived; with a gyro, its rates are those of this step.
+    /// Newest state that has arrived; with `gyro`, its rates are those of this step.
     pub state: State,
-    /// Age of that state, rates of a gyro apart \[s\]; the first state also stands for those before it.
+    /// Age of that state, apart from a gyro's rates \[s\]. The first state also stands for those before it.
     pub age_s: f64,
-    /// False in a dropout: `state` is the last one before it.
+    /// False in a dropout, when `state` is the last one before it.
     pub fresh: bool,
-    /// Whether anything arrived in this step, a state or a gyro's rates; between samples, `state` is held.
+    /// True if a state or a gyro's rates arrived in this step. Between samples `state` is held.
     pub new: bool,
 }
 
@@ -96,23 +96,23 @@ pub struct StateSensor {
     bias: Motion,
     delay: DelayLine<State>,
     delay_s: f64,
-    /// Steps from one sample to the next, and until the next one arrives.
+    /// Number of steps from one sample to the next, and until the next sample arrives.
     period: usize,
     until: usize,
     gyro: bool,
     outage: Option<Outage>,
     step_s: f64,
-    /// The last state that arrived, if any.
+    /// Last state that arrived, if any.
     last: Option<State>,
-    /// Steps since then.
+    /// Number of steps since then.
     since: u32,
 }
 
 impl StateSensor {
-    /// Creates sensors that are read every `step_s`. The seed may be the plant's, since the streams differ.
+    /// Creates sensors that are read every `step_s`. The seed may be the plant's, because the streams differ.
     ///
     /// # Errors
-    /// The first setting out of range.
+    /// Returns the first setting that is out of range.
     pub fn new(sensing: &Sensing, seed: u64, step_s: f64) -> Result<Self, OutOfRange> {
         sensing.validate()?;
         crate::realism::STEP.check(step_s)?;
@@ -121,13 +121,13 @@ impl StateSensor {
         let period = whole_steps(sensing.period_s, step_s).max(1);
         Ok(StateSensor {
             noise: (sensing.noise != Deviations::default()).then_some(sensing.noise),
-            // Drawn even if there is none, so that a bias does not change the noise behind it.
+            // Drawn even if the bias is zero, so that a bias does not change the later noise.
             bias: sensing.bias.draw(&mut random),
             random,
             delay: DelayLine::new(steps, State::default()),
             delay_s: steps as f64 * step_s,
             period,
-            // The sample of the first step, which stands for those before it, arrives so many steps later.
+            // Number of steps until the next sample arrives. The first step's sample also stands for those before it.
             until: steps % period,
             gyro: sensing.gyro,
             outage: sensing
@@ -145,11 +145,11 @@ impl StateSensor {
         &self.bias
     }
 
-    /// Measures `motion`; to be called once per step.
+    /// Measures `motion`. Call it once per step.
     #[inline]
     pub fn measure(&mut self, motion: &Motion) -> StateMeasurement {
         let mut measured = sum(motion, &self.bias);
-        // In every step, sampled or not: the rate of the samples does not change the noise.
+        // Drawn in every step, sampled or not, so that the sampling rate does not change the noise.
         if let Some(spread) = &self.noise {
             measured = sum(&measured, &spread.draw(&mut self.random));
         }

@@ -30,7 +30,7 @@ pub fn motion(x: &Vector) -> Motion {
     }
 }
 
-/// Returns f(X) of (6) under a constant load.
+/// Returns f(X) of (6) with a constant load.
 #[inline]
 pub fn derivative(x: &Vector, load: &Load) -> Vector {
     let Motion { velocity_m_s, rates_rad_s: eta_dot, .. } = motion(x);
@@ -42,7 +42,7 @@ pub fn derivative(x: &Vector, load: &Load) -> Vector {
     x_dot
 }
 
-/// Returns Omega = N(eta) d eta/dt and its derivative from eta and its two derivatives.
+/// Returns Omega = N(eta) d eta/dt and its derivative, from eta and its two derivatives.
 pub(crate) fn body_rates(
     eta: &Vector3<f64>,
     eta_dot: &Vector3<f64>,
@@ -54,7 +54,7 @@ pub(crate) fn body_rates(
         Vector3::new(v.x - s_theta * v.z, c_phi * v.y + s_phi * c_theta * v.z, c_phi * c_theta * v.z - s_phi * v.y)
     };
     let rates = of(eta_dot);
-    // d N/dt d eta/dt: roll turns the last two rows into each other, and pitch changes those that hold theta.
+    // d N/dt d eta/dt: roll turns the last two rows into each other, and pitch changes the elements with theta.
     let (by_roll, by_pitch) = (eta_dot.x, eta_dot.y * eta_dot.z);
     let turning = Vector3::new(
         -c_theta * by_pitch,
@@ -64,7 +64,7 @@ pub(crate) fn body_rates(
     (rates, of(eta_dot_dot) + turning)
 }
 
-/// Returns the body's axes: the columns of Rz(psi) Ry(theta) Rx(phi).
+/// Returns the body axes: the columns of Rz(psi) Ry(theta) Rx(phi).
 #[inline]
 pub(crate) fn body_axes(x: &Vector) -> BodyAxes {
     let (s_phi, c_phi) = (sin(x[6]), cos(x[6]));
@@ -85,13 +85,13 @@ pub(crate) fn body_axes(x: &Vector) -> BodyAxes {
     }
 }
 
-/// Returns [`derivative`] with the forces that depend on position and velocity; d eta/dt replaces Omega here, too.
+/// Returns [`derivative`] with the forces that depend on position and velocity. d eta/dt replaces Omega here, too.
 #[inline]
 pub(crate) fn derivative_in(x: &Vector, load: &Load, surroundings: &Surroundings) -> Vector {
     let (velocity, rates) = (Vector3::new(x[3], x[4], x[5]), Vector3::new(x[9], x[10], x[11]));
     let axes = body_axes(x);
     let (a, angular) = surroundings.accelerations(x[2], &velocity, &axes, &rates);
-    // As in `derivative`, with the known direction of thrust.
+    // As in `derivative`, with the known direction of the thrust.
     let a = a + load.acceleration(&axes.up);
     let angular = angular + load.angular_acceleration(&rates);
     Vector::from([

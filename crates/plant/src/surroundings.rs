@@ -26,7 +26,7 @@ impl<'a> Surroundings<'a> {
         Surroundings { drag, wind_m_s, ground, ratios }
     }
 
-    /// True if there are no such forces.
+    /// Returns true if there are no such forces.
     #[inline]
     pub(crate) fn are_empty(&self) -> bool {
         self.drag.is_none() && self.ground.is_none()

@@ -1,14 +1,14 @@
-//! What instruments feel of the vehicle.
+//! Input of the instruments: the vehicle's true motion.
 
 use crate::body_axes::BodyAxes;
 use crate::frame::Lanes;
 use nalgebra::{Quaternion, Vector3};
 
-/// The vehicle's true motion at one time, with its accelerations and rotors. Made by
-/// [`Plant::truth`](crate::Plant::truth).
+/// True motion of the vehicle at one time, with accelerations and rotor speeds. [`Plant::truth`](crate::Plant::truth)
+/// creates it.
 ///
-/// Accelerations are those of the equations of motion, with all forces of air and ground, under the rotors' load and
-/// the wind of the last step; before the first step, under rotors that hover or stand as they start.
+/// The accelerations follow from the equations of motion with all forces of air and ground, the rotors' load and the
+/// wind of the last step. Before the first step the rotors are at their initial speeds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Truth {
     /// Time \[s\].
@@ -19,7 +19,7 @@ pub struct Truth {
     pub velocity_m_s: Vector3<f64>,
     /// Unit quaternion, body to earth.
     pub attitude: Quaternion<f64>,
-    /// Omega, body frame \[rad/s\]; in the simplified model N(eta) d eta/dt, the rates of its attitude.
+    /// Omega, body frame \[rad/s\]; N(eta) d eta/dt in the simplified model.
     pub rates_rad_s: Vector3<f64>,
     /// d^2 xi/dt^2, earth frame \[m/s2\].
     pub acceleration_m_s2: Vector3<f64>,
@@ -29,14 +29,14 @@ pub struct Truth {
     pub gravity_m_s2: f64,
     /// Rotor speeds \[rad/s\]; 0 for rotors that the vehicle does not have.
     pub rotor_speeds_rad_s: Lanes,
-    /// Speed at which the fastest rotor of the nominal vehicle hovers \[rad/s\].
+    /// Hover speed of the fastest rotor of the nominal vehicle \[rad/s\].
     pub hover_rad_s: f64,
-    /// Thrust of all rotors over the nominal vehicle's weight.
+    /// Thrust of all rotors divided by the nominal vehicle's weight.
     pub thrust_share: f64,
 }
 
 impl Truth {
-    /// Returns the specific force at the centre of mass, body frame \[m/s2\]: acceleration less gravity.
+    /// Returns the specific force at the centre of mass, body frame \[m/s2\]: acceleration minus gravity.
     pub fn specific_force_m_s2(&self) -> Vector3<f64> {
         self.to_body(&(self.acceleration_m_s2 + Vector3::new(0.0, 0.0, self.gravity_m_s2)))
     }

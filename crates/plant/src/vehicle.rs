@@ -1,4 +1,4 @@
-//! One vehicle in one environment, advanced in time.
+//! Plant: one vehicle in one environment, advanced in time.
 
 use crate::body_axes::BodyAxes;
 use crate::environment::{Environment, Segment};
@@ -21,14 +21,14 @@ use nalgebra::{Quaternion, SVector, Vector3};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub enum PlantModel {
-    /// (6), the paper's own simulation model.
+    /// The paper's own simulation model (6).
     Simplified,
-    /// (1)-(5) as corrected.
+    /// The rigid body (1)-(5) as corrected.
     RigidBody,
 }
 
 impl PlantModel {
-    /// Returns the lower-case name, as in scenario files and logs.
+    /// Returns the lower-case name used in scenario files and logs.
     pub const fn name(self) -> &'static str {
         match self {
             PlantModel::Simplified => "simplified",
@@ -52,7 +52,7 @@ impl Body {
         }
     }
 
-    /// Advances by `dt_s` under a constant load.
+    /// Advances by `dt_s` with a constant load.
     #[inline]
     fn advance(&mut self, load: &Load, dt_s: f64) {
         match self {
@@ -64,7 +64,7 @@ impl Body {
         }
     }
 
-    /// Advances by `dt_s` under a constant load and forces that depend on position and velocity.
+    /// Advances by `dt_s` with a constant load and forces that depend on position and velocity.
     #[inline]
     fn advance_in(&mut self, load: &Load, surroundings: &Surroundings, dt_s: f64) {
         match self {
@@ -103,7 +103,7 @@ impl Body {
     }
 }
 
-/// Returns the derivatives of velocity and rates, which begin at row `rates`.
+/// Returns the derivatives of velocity and of the rates, which begin at row `rates`.
 fn halves<const N: usize>(derivative: &SVector<f64, N>, rates: usize) -> (Vector3<f64>, Vector3<f64>) {
     (derivative.fixed_rows::<3>(3).into(), derivative.fixed_rows::<3>(rates).into())
 }
@@ -116,18 +116,18 @@ pub struct Plant {
     segment: Segment,
     /// Boxed, so that the ideal plant stays small.
     effects: Option<Box<Effects>>,
-    /// Load of the last step, or of rotors that hover or start before the first.
+    /// Load of the last step; before the first step, that of the initial rotor speeds.
     load: Load,
-    /// Rotor speeds of the last step, or those that hover, of an ideal plant.
+    /// Rotor speeds of the last step of an ideal plant, initially hover speeds.
     speeds_rad_s: Lanes,
-    /// Speed at which the fastest rotor of the nominal vehicle hovers \[rad/s\].
+    /// Hover speed of the fastest rotor of the nominal vehicle \[rad/s\].
     hover_rad_s: f64,
     steps: u64,
     time_s: f64,
 }
 
 impl Plant {
-    /// Creates a vehicle with the motion `initial` at t = 0, ideal rotors, and no forces but those of the environment.
+    /// Creates a vehicle with the motion `initial` at t = 0, ideal rotors, and only the environment's forces.
     pub fn new(model: PlantModel, initial: Motion, environment: Environment) -> Self {
         let body = Body::new(model, &initial);
         let segment = environment.segment(0.0);
@@ -140,7 +140,7 @@ impl Plant {
     /// Creates a vehicle with realistic rotors, air and ground, for steps of `step_s`.
     ///
     /// # Errors
-    /// The first setting out of range.
+    /// Returns the first setting that is out of range.
     pub fn with_realism(
         model: PlantModel,
         initial: Motion,
@@ -153,8 +153,8 @@ impl Plant {
         Ok(Plant { load: effects.start(&ideal.segment), effects: Some(Box::new(effects)), ..ideal })
     }
 
-    /// Advances the vehicle by `dt_s` with constant commanded rotor speeds; a rotor without a command stands still.
-    /// Every call must use the same `dt_s`, the one that the plant was created for.
+    /// Advances the vehicle by `dt_s` with constant commanded rotor speeds. A rotor without a command stands still.
+    /// Every call must use the `dt_s` for which the plant was created.
     #[inline]
     pub fn step<const N: usize>(&mut self, speeds: &RotorSpeeds<N>, dt_s: f64) {
         let speeds = &self.environment.frame().speeds(speeds);
@@ -180,7 +180,7 @@ impl Plant {
         let Some(effects) = &mut self.effects else { return };
         let (position, velocity) = self.body.place();
         let body = &self.body;
-        // The axes as a closure, since they are needed near the ground only.
+        // The axes are a closure, because they are needed only near the ground.
         let (load, surroundings) =
             effects.begin_step(speeds, &self.segment, self.time_s, &position, &velocity, || body.axes());
         self.load = load;
@@ -191,7 +191,7 @@ impl Plant {
         }
     }
 
-    /// Puts the vehicle where it is held by hand, with this motion from now on.
+    /// Sets the motion of the vehicle, as when a hand holds it.
     pub fn set_motion(&mut self, motion: &Motion) {
         let model = match &self.body {
             Body::Simplified(_) => PlantModel::Simplified,
@@ -200,7 +200,7 @@ impl Plant {
         self.body = Body::new(model, motion);
     }
 
-    /// Returns what instruments feel now: the motion with its accelerations under the forces of the last step.
+    /// Returns the input of the instruments: the present motion with its accelerations by the forces of the last step.
     pub fn truth(&self) -> Truth {
         let Segment { parameters, ratios, .. } = &self.segment;
         let (position_m, velocity_m_s) = self.body.place();
@@ -257,27 +257,26 @@ impl Plant {
         self.segment = self.environment.segment(self.time_s);
     }
 
-    /// Changes the wind from the next step on, also that of an air without drag, which has no effect. An ideal plant
-    /// has no air.
+    /// Changes the wind from the next step on. The wind has no effect without drag. An ideal plant has no air.
     ///
     /// # Errors
-    /// The first parameter out of range; nothing has changed then.
+    /// Returns the first parameter that is out of range, and changes nothing then.
     pub fn set_wind(&mut self, wind: &Wind) -> Result<(), OutOfRange> {
         self.effects.as_mut().map_or(Ok(()), |effects| effects.set_wind(wind))
     }
 
-    /// Changes the rotors' faults from the next step on. Those of an ideal plant do not fail.
+    /// Changes the rotor faults from the next step on. Rotors of an ideal plant do not fail.
     ///
     /// # Errors
-    /// The first number out of range; nothing has changed then.
+    /// Returns the first number that is out of range, and changes nothing then.
     pub fn set_rotor_faults(&mut self, faults: Vec<RotorFault>) -> Result<(), OutOfRange> {
         self.effects.as_mut().map_or(Ok(()), |effects| effects.set_rotor_faults(faults))
     }
 
-    /// Sets the battery's charge, as a share of its capacity; false without a battery.
+    /// Sets the battery's charge as a share of its capacity. Returns false without a battery.
     ///
     /// # Errors
-    /// A share out of range.
+    /// Returns an error if the share is out of range.
     pub fn set_charge(&mut self, share: f64) -> Result<bool, OutOfRange> {
         self.effects.as_mut().map_or(Ok(false), |effects| effects.set_charge(share))
     }

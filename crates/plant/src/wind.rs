@@ -30,10 +30,10 @@ parameters! {
     }
 }
 
-/// A gust that rises as V_m/2 (1 - cos(pi t/T)), holds, and falls like the rise.
+/// Gust that rises as V_m/2 (1 - cos(pi t/T)), holds, and falls like the rise.
 ///
-/// MIL-F-8785C's discrete gust rises over a distance d_m, which a vehicle at airspeed V crosses in T = d_m/V, and
-/// persists: infinite `hold_s`. With a `hold_s` of zero it is the full 1-cosine of CS-25.341.
+/// MIL-F-8785C's discrete gust rises over a distance d_m, which a vehicle at airspeed V crosses in T = d_m/V, and then
+/// persists (infinite `hold_s`). With a `hold_s` of zero it is the full 1-cosine gust of CS-25.341.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct CosineGust {
@@ -59,7 +59,7 @@ pub mod limits {
 
 impl CosineGust {
     /// # Errors
-    /// The first number out of range, by name.
+    /// Returns the first number that is out of range, by name.
     fn validate(&self) -> Result<(), OutOfRange> {
         self.velocity_m_s.iter().try_for_each(|&speed| limits::GUST.check(speed))?;
         limits::START.check(self.start_s)?;
@@ -95,7 +95,7 @@ pub(crate) struct Weather {
 
 impl Weather {
     /// # Errors
-    /// The first parameter out of range.
+    /// Returns the first parameter that is out of range.
     pub(crate) fn new(wind: Wind, seed: u64, step_s: f64) -> Result<Self, OutOfRange> {
         wind.validate()?;
         let (x, y) = (wind.steady_m_s.x, wind.steady_m_s.y);
@@ -105,10 +105,10 @@ impl Weather {
         Ok(Weather { wind, heading, eddies, seed, step_s })
     }
 
-    /// Changes the wind. Turbulence of the same settings goes on, another begins.
+    /// Changes the wind. Turbulence with unchanged settings continues; otherwise it starts anew.
     ///
     /// # Errors
-    /// The first parameter out of range; nothing has changed then.
+    /// Returns the first parameter that is out of range, and changes nothing then.
     pub(crate) fn change(&mut self, wind: &Wind) -> Result<(), OutOfRange> {
         let mut changed = Weather::new(wind.clone(), self.seed, self.step_s)?;
         if wind.turbulence == self.wind.turbulence {
@@ -118,7 +118,7 @@ impl Weather {
         Ok(())
     }
 
-    /// Returns the velocity of the air at time `t` \[s\] at the vehicle, earth frame \[m/s\]. Every call advances one
+    /// Returns the velocity of the air at the vehicle at time `t` \[s\], earth frame \[m/s\]. Every call advances one
     /// step.
     #[inline]
     pub(crate) fn advance(&mut self, t: f64, height_m: f64, velocity_m_s: &Vector3<f64>) -> Vector3<f64> {
@@ -127,7 +127,7 @@ impl Weather {
             air += gust.at(t);
         }
         if let Some(eddies) = &mut self.eddies {
-            // The field drifts with the steady wind.
+            // The turbulence field drifts with the steady wind.
             let steady = &self.wind.steady_m_s;
             let local = eddies.advance(height_m, || sqrt((velocity_m_s - steady).norm_squared()));
             let (c, s) = self.heading;

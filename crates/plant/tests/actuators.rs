@@ -1,4 +1,4 @@
-//! Rotors compared with closed forms, and the battery's energy balance.
+//! Compares rotors with closed-form solutions, and checks the battery's energy balance.
 
 use afbc_plant::{Battery, Charge, Environment, Motion, Plant, PlantModel, Realism, RotorFault, Rotors, Sag, Start};
 use afbc_types::{Parameters, RotorSpeeds};
@@ -47,7 +47,7 @@ fn a_step_of_the_command_is_answered_by_an_exponential() {
     }
 }
 
-/// Velocity due to thrust b omega^2 by time `t`, in closed form: omega = W (1 - exp(-t/tau)).
+/// Velocity by the thrust b omega^2 at time `t` in closed form: omega = W (1 - exp(-t/tau)).
 #[test]
 fn lagging_thrust_is_right_to_second_order() {
     let (tau, w, t) = (0.02_f64, 300.0, 0.1);
@@ -106,7 +106,7 @@ fn a_failing_rotor_loses_its_share_of_thrust_and_moment_at_its_time() {
     (0..10).for_each(|_| plant.step(&command(w), STEP_S));
     assert_eq!(plant.motion().rates_rad_s, Vector3::zeros());
     plant.step(&command(w), STEP_S);
-    // F2 = 0.6 b w^2: less thrust in front pitches the vehicle up, and less moment of rotor 2 yaws it positively.
+    // F2 = 0.6 b w^2: less thrust in front pitches the nose down, and less moment of rotor 2 yaws positively.
     let (lost, rates) = (0.4 * w * w, plant.motion().rates_rad_s);
     assert!((rates.y - P.arm_m * P.thrust_factor_n_s2 * lost / P.inertia_kg_m2.y * STEP_S).abs() < 1e-6, "{rates}");
     assert!((rates.z - P.drag_factor_n_m_s2 * lost / P.inertia_kg_m2.z * STEP_S).abs() < 1e-6, "{rates}");
@@ -129,8 +129,8 @@ fn faults_of_one_rotor_multiply_and_a_dead_rotor_is_dead() {
     assert_eq!(dead.motion(), ideal.motion());
 }
 
-/// A rotor that its motor does not turn any more slows down like one that is commanded to stop, its smallest speed
-/// notwithstanding, and turns again when it is mended.
+/// A dead rotor slows down like one that is commanded to stop, even below its smallest speed, and turns again when it
+/// is repaired.
 #[test]
 fn a_dead_rotor_slows_down() {
     let fault = RotorFault { rotor: 2, efficiency: 0.0, start_s: 0.02 };
@@ -151,7 +151,7 @@ fn battery_of(plant: &Plant) -> Charge {
     plant.telemetry().unwrap().battery.unwrap()
 }
 
-/// All energy from the cells goes to rotors and avionics or heats the battery.
+/// All energy from the cells drives rotors and avionics or heats the battery.
 #[test]
 fn battery_energy_is_accounted_for() {
     let battery = Battery { capacity_a_h: 0.01, ..Battery::THREE_CELLS };

@@ -1,4 +1,4 @@
-//! All tests in one program: one each takes longer to build than to run.
+//! All integration tests in one binary: linking each one separately takes longer than running it.
 #![allow(
     clippy::float_cmp,
     clippy::indexing_slicing,

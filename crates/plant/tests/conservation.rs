@@ -13,7 +13,7 @@ fn vector(size: f64) -> impl Strategy<Value = Vector3<f64>> {
     (-size..size, -size..size, -size..size).prop_map(|(x, y, z)| Vector3::new(x, y, z))
 }
 
-/// Principal inertias of a physical body: each at most the sum of the others, here by a margin.
+/// Draws principal inertias of a physical body: each at most the sum of the other two, here by a margin.
 fn inertia() -> impl Strategy<Value = Vector3<f64>> {
     (0.002_f64..0.01, 0.002_f64..0.01, 0.1_f64..0.9)
         .prop_map(|(x, y, share)| Vector3::new(x, y, (x - y).abs() + share * (x + y - (x - y).abs())))
@@ -30,7 +30,7 @@ fn motion() -> impl Strategy<Value = Motion> {
     )
 }
 
-/// Rotation from body to earth, Rz(psi) Ry(theta) Rx(phi), from the convention of `afbc-types`.
+/// Returns the rotation from body to earth, Rz(psi) Ry(theta) Rx(phi), by the convention of `afbc-types`.
 fn r_earth_body(eta: &Vector3<f64>) -> Matrix3<f64> {
     let (sx, cx) = eta.x.sin_cos();
     let (sy, cy) = eta.y.sin_cos();
@@ -41,7 +41,7 @@ fn r_earth_body(eta: &Vector3<f64>) -> Matrix3<f64> {
     rz * ry * rx
 }
 
-/// Translational and potential energy, rotational energy, angular momentum in the earth frame.
+/// Returns translational and potential energy, rotational energy, and angular momentum in the earth frame.
 fn conserved(p: &Parameters<f64>, m: &Motion) -> (f64, f64, Vector3<f64>) {
     let momentum = p.inertia_kg_m2.component_mul(&m.rates_rad_s);
     let translation = p.mass_kg * (0.5 * m.velocity_m_s.norm_squared() + p.gravity_m_s2 * m.position_m.z);
@@ -64,9 +64,9 @@ proptest! {
         let p = Parameters { inertia_kg_m2: inertia, ..Parameters::PAPER };
         let before = conserved(&p, &start);
         let after = conserved(&p, &fall(p, start, 1000).motion());
-        // Translation is a polynomial of second degree, which the method solves exactly: 1000 steps of rounding remain.
-        // Rotation at 5 rad/s with axis ratios up to 5 turns by at most 0.04 rad per step: at most (0.04)^5/120 = 1e-9
-        // per step, 1e-6 in 1000 steps.
+        // The translation is a polynomial of second degree, which the method solves exactly, so only the rounding of
+        // 1000 steps remains. Rotation at 5 rad/s with axis ratios up to 5 turns by at most 0.04 rad per step: an error
+        // of at most (0.04)^5/120 = 1e-9 per step, 1e-6 in 1000 steps.
         let scale = p.mass_kg * (0.5 * 15.0 * 15.0 + G * 20.0);
         prop_assert!((after.0 - before.0).abs() <= 1e-11 * scale, "{} to {} J", before.0, after.0);
         prop_assert!((after.1 - before.1).abs() <= 1e-6 * before.1, "{} to {} J", before.1, after.1);
@@ -93,7 +93,8 @@ proptest! {
         let rotors = Vector3::new(l * b * (s3 - s1), l * b * (s4 - s2), d * (s1 - s2 + s3 - s4));
         let moment = (rates_dot(&turning) - rates_dot(&still)).component_mul(&inertia);
         let gyroscopic = moment - rotors;
-        // The momentum of rotors 1 and 3 points to negative body z, of 2 and 4 to positive; the moment is -Omega x h.
+        // The momentum of rotors 1 and 3 points to negative body z, that of 2 and 4 to positive; the moment is -Omega x
+        // h.
         let h = Vector3::new(0.0, 0.0, -p.rotor_inertia_kg_m2 * (speeds[0] - speeds[1] + speeds[2] - speeds[3]));
         let scale = rotors.norm() + rates.norm() * h.norm() + 1e-3;
         prop_assert!((gyroscopic + rates.cross(&h)).norm() <= 1e-12 * scale, "{gyroscopic} for {}", -rates.cross(&h));
@@ -109,7 +110,7 @@ proptest! {
         let end = fall(p, start, 1000).motion();
         let (s, c) = ((i.z - i.x) / i.x * rates.z).sin_cos(); // after 1 s
         let exact = Vector3::new(c * rates.x - s * rates.y, s * rates.x + c * rates.y, rates.z);
-        // (5e-3)^5/120 per step, 1000 steps: 3e-11 of the rates.
+        // Error of (5e-3)^5/120 per step, 1000 steps: 3e-11 of the rates.
         prop_assert!(
             (end.rates_rad_s - exact).norm() <= 1e-10 * (1.0 + rates.norm()),
             "{} for {exact}",
@@ -123,7 +124,7 @@ proptest! {
         let v = rigid_body::vector(&start);
         prop_assert!((v.fixed_rows::<4>(6).norm() - 1.0).abs() <= 4.0 * f64::EPSILON);
         let back = rigid_body::motion(&v);
-        // Roll and yaw lose a factor of 1/cos(pitch), at most 6; pitch up to 1.4 rad loses as much to asin.
+        // Roll and yaw lose accuracy by a factor of 1/cos(pitch), at most 6; pitch up to 1.4 rad loses as much in asin.
         prop_assert!(
             (back.attitude_rad - start.attitude_rad).amax() <= 1e-14 * 6.0 * 3.0,
             "{} for {}",
@@ -155,13 +156,13 @@ proptest! {
         let after = rk4(f, &v, DT_S);
         prop_assert!((after.fixed_rows::<4>(6).norm() - 1.0).abs() <= 1e-15 + (0.005_f64).powi(6) / 144.0);
 
-        // Central difference of the Euler angles compared with euler_rates.
+        // Compares a central difference of the Euler angles with `euler_rates`.
         let h = 1e-5;
         let (back, ahead) = (rigid_body::motion(&(v - f(&v) * h)), rigid_body::motion(&(v + f(&v) * h)));
         let mut difference = ahead.attitude_rad - back.attitude_rad;
         difference.apply(|angle| *angle -= core::f64::consts::TAU * (*angle / core::f64::consts::TAU).round());
         let rates = rigid_body::euler_rates(&start.attitude_rad, &start.rates_rad_s);
-        // h^2/6 of a third derivative that grows as (|Omega| / cos(pitch))^3, and rounding over h.
+        // Error of h^2/6 times a third derivative that grows as (|Omega| / cos(pitch))^3, plus rounding divided by h.
         let steep = start.rates_rad_s.norm() / start.attitude_rad.y.cos();
         prop_assert!(
             (difference / (2.0 * h) - rates).amax() <= 1e-10 * (1.0 + steep * steep * steep) + 1e-9,
@@ -170,7 +171,7 @@ proptest! {
         );
     }
 
-    /// Near hover the two models differ in second order only, since N(eta) is the identity up to eta.
+    /// Near hover the two models differ only in second order, because N(eta) is the identity to first order.
     #[test]
     fn the_models_agree_near_hover(
         attitude in vector(1.0),
@@ -191,8 +192,8 @@ proptest! {
             let of = |f: fn(&Motion) -> Vector3<f64>| (f(&a) - f(&b)).norm();
             of(|m| m.position_m) + of(|m| m.velocity_m_s) + of(|m| m.attitude_rad) + of(|m| m.rates_rad_s)
         };
-        // In 0.2 s attitude and rates stay below about 3 times their initial values, the difference of attitudes below
-        // their product over that time: 3 * 3 * 0.2 * 3 axes.
+        // In 0.2 s attitude and rates stay below about 3 times their initial values. The difference of attitudes stays
+        // below their product over that time: 3 * 3 * 0.2 * 3 axes.
         let small = apart(1e-3);
         prop_assert!(small <= 6e-6, "{small:e} apart");
         // Second order: a tenth of the perturbation gives a hundredth of the difference, except for third-order terms.
@@ -229,7 +230,7 @@ fn a_flat_spin_turns_evenly() {
             let yaw = rate * f64::from(step) * DT_S;
             let error = plant.motion().attitude_rad.z - yaw;
             let error = error - core::f64::consts::TAU * (error / core::f64::consts::TAU).round();
-            // (rate dt / 2)^5 / 120 per step, 8e-18 each, so the rounding of 60000 steps dominates.
+            // Error of (rate dt / 2)^5 / 120 per step, 8e-18 each, so the rounding of 60000 steps dominates.
             assert!(error.abs() < 1e-11, "{error:e} rad after {step} steps");
         }
     }
@@ -251,7 +252,7 @@ fn pitching_through_90_degrees_is_nothing_special() {
     }
 }
 
-/// Halving the step divides the error of the method by 16.
+/// Halving the step divides the method's error by 16.
 #[test]
 fn the_integrator_is_of_fourth_order() {
     // A linear oscillator, and a nonlinear equation: dx/dt = -x^2, x(t) = 1/(1 + t).
@@ -270,7 +271,7 @@ fn the_integrator_is_of_fourth_order() {
     }
 }
 
-/// Halving the step of the vehicle does, too: constant rotor speeds, one second of tumbling.
+/// The same for the vehicle: constant rotor speeds, one second of tumbling.
 #[test]
 fn the_vehicle_is_integrated_to_fourth_order() {
     let start = Motion {

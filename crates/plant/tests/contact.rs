@@ -25,7 +25,7 @@ fn run(plant: &mut Plant, seconds: f64) {
     (0..(seconds / STEP_S) as u32).for_each(|_| plant.step(&RotorSpeeds::<4>::default(), STEP_S));
 }
 
-/// Kinetic and potential energy, including the springs: 1/2 k d^2 of each point below the ground.
+/// Returns kinetic and potential energy, including the springs: 1/2 k d^2 of each point below the ground.
 fn energy_j(motion: &Motion) -> f64 {
     let eta = &motion.attitude_rad;
     let r = Rotation3::from_euler_angles(eta.x, eta.y, eta.z);
@@ -204,7 +204,7 @@ fn a_payload_brings_its_mass_and_its_inertia() {
     assert_eq!(Environment::calm(P).unwrap().with_payloads(vec![negative]).unwrap_err().range.name, "payload_mass_kg");
 }
 
-/// Returns linear and angular acceleration, body frame, of a level vehicle in its first step.
+/// Returns linear and angular acceleration of a level vehicle in its first step, body frame.
 fn first_step(environment: Environment, speeds: [f32; 4]) -> (Vector3<f64>, Vector3<f64>) {
     const STEP_S: f64 = 1e-5;
     let mut plant = Plant::new(PlantModel::RigidBody, Motion::default(), environment);
@@ -212,8 +212,8 @@ fn first_step(environment: Environment, speeds: [f32; 4]) -> (Vector3<f64>, Vect
     (plant.motion().velocity_m_s / STEP_S, plant.motion().rates_rad_s / STEP_S)
 }
 
-/// The torque of each rotor about the common centre of two bodies, over their inertia about it, both summed body by
-/// body; with two payloads, over the one after the other.
+/// Compares with the torque of each rotor about the common centre of mass, divided by the inertia about it, both summed
+/// body by body. With two payloads, one is added after the other.
 #[test]
 fn a_payload_beside_the_axis_tilts_the_vehicle() {
     let (ahead_m, left_m) = (0.03, -0.02);
@@ -231,7 +231,7 @@ fn a_payload_beside_the_axis_tilts_the_vehicle() {
     };
     let inertia = P.inertia_kg_m2 + about(Vector3::zeros(), P.mass_kg) + about(place, payload.mass_kg);
     let l = P.arm_m;
-    // The paper's plus: rotors 1 to 4 at -y, +x, +y, -x; the drag of 1 and 3 turns the body positively.
+    // The paper's plus frame: rotors 1 to 4 at -y, +x, +y, -x; the drag of 1 and 3 turns the body positively.
     let places = [[0.0, -l], [l, 0.0], [0.0, l], [-l, 0.0]].map(|[x, y]| Vector3::new(x, y, 0.0));
     let (mut force, mut torque) = (Vector3::zeros(), Vector3::zeros());
     for ((place, speed), turn) in places.iter().zip(speeds).zip([1.0, -1.0, 1.0, -1.0]) {
@@ -251,7 +251,7 @@ fn a_payload_beside_the_axis_tilts_the_vehicle() {
     assert_eq!(Environment::calm(P).unwrap().with_payloads(vec![far]).unwrap_err().range.name, "ahead_m");
 }
 
-/// Moments scaled by the fault are those of the intact vehicle times the factor, the other two as before.
+/// A fault scales one moment of the intact vehicle by its factor and leaves the other two.
 #[test]
 fn a_wrong_sign_turns_one_moment_round() {
     let speeds = [205.0, 210.0, 190.0, 220.0];

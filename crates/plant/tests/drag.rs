@@ -1,4 +1,4 @@
-//! Drag compared with closed forms.
+//! Compares drag with closed-form solutions.
 
 use afbc_plant::{Drag, Environment, Gust, GustKind, Motion, Plant, PlantModel, Realism, Wind};
 use afbc_types::{Axis, Parameters, RotorSpeeds};
@@ -58,7 +58,7 @@ fn blades_slow_a_level_vehicle_exponentially_to_the_winds_speed() {
             let expected = wind + (initial.velocity_m_s - wind) * gone;
             let velocity = plant.motion().velocity_m_s;
             assert!((velocity.xy() - expected.xy()).amax() < 1e-9);
-            // Nothing along the rotor axes, except the rounding of the speeds.
+            // Nothing along the rotor axes, except rounding of the speeds.
             assert!((velocity.z - 0.5).abs() < 1e-4);
         }
     }
@@ -85,7 +85,7 @@ fn drag_above_the_centre_of_mass_turns_the_vehicle_away_from_its_motion() {
 }
 
 /// The hubs move around the centre of mass at r l each, against the blade forces: dr/dt = -4 k omega l^2/Iz r. Only yaw
-/// changes, since hubs at equal speed balance.
+/// changes, because hubs at equal speed balance.
 #[test]
 fn blades_brake_yaw_exponentially() {
     let drag = Drag { blade_n_s2_m: 2.4e-4, rotor_height_m: 0.02, ..none() };
@@ -147,13 +147,13 @@ fn vector(size: f64) -> impl Strategy<Value = Vector3<f64>> {
     (-size..size, -size..size, -size..size).prop_map(|(x, y, z)| Vector3::new(x, y, z))
 }
 
-/// Rotation from body to earth: Rz(psi) Ry(theta) Rx(phi).
+/// Returns the rotation from body to earth: Rz(psi) Ry(theta) Rx(phi).
 fn r_earth_body(eta: &Vector3<f64>) -> Matrix3<f64> {
     *Rotation3::from_euler_angles(eta.x, eta.y, eta.z).matrix()
 }
 
-/// Force and moment of the blades, body axes: the sum over the rotors of k omega_i times the in-plane velocity of each
-/// hub relative to the air, acting at the hub.
+/// Returns force and moment of the blades in body axes: the sum over the rotors of k omega_i times the in-plane
+/// velocity of each hub relative to the air, acting at the hub.
 fn blades(drag: &Drag, motion: &Motion, wind: &Vector3<f64>, speeds: &RotorSpeeds) -> (Vector3<f64>, Vector3<f64>) {
     let (l, h) = (P.arm_m, drag.rotor_height_m);
     let hubs = [(0.0, -l), (l, 0.0), (0.0, l), (-l, 0.0)].map(|(x, y)| Vector3::new(x, y, h));
@@ -169,7 +169,7 @@ fn blades(drag: &Drag, motion: &Motion, wind: &Vector3<f64>, speeds: &RotorSpeed
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
-    /// Galilean invariance: for an observer drifting with the wind, the flight is one in still air.
+    /// Galilean invariance: for an observer who drifts with the wind, the flight is one in still air.
     #[test]
     fn wind_is_motion_of_the_frame(
         velocity in vector(10.0),

@@ -15,7 +15,7 @@ fn change(quantity: PlantParameter, factor: f64, start_s: f64, end_s: f64) -> Pa
     ParameterChange { quantity, factor, start_s, end_s }
 }
 
-/// Velocities and rates of a level vehicle, before the first step and after each.
+/// Returns velocities and rates of a level vehicle, before the first step and after each step.
 fn fly(environment: Environment, speeds: [f32; 4], dt_s: f64, steps: usize) -> Vec<(Vector3<f64>, Vector3<f64>)> {
     let mut plant = Plant::new(PlantModel::Simplified, Motion::default(), environment);
     let mut motion = vec![(Vector3::zeros(), Vector3::zeros())];
@@ -149,8 +149,8 @@ impl ConcatValues for [Vector3<f64>; 2] {
     }
 }
 
-/// A parameter change has the expected effect: acceleration, roll and yaw moment as computed by hand, during the change
-/// only.
+/// A parameter change has the expected effect only while it lasts: acceleration, roll and yaw moment as computed by
+/// hand.
 #[test]
 fn a_parameter_change_acts_while_it_lasts() {
     let (b, d, l, m, i) = (P.thrust_factor_n_s2, P.drag_factor_n_m_s2, P.arm_m, P.mass_kg, P.inertia_kg_m2);
@@ -208,7 +208,7 @@ fn a_change_that_leaves_the_range_is_refused_by_name() {
             Err("thrust_factor_n_s2"),
             "factor {factor}"
         );
-        // (a drag factor may be large)
+        // A drag factor may be large.
         if factor != 1e9 {
             assert_eq!(
                 refused(vec![change(PlantParameter::DragFactor, factor, 0.0, 2.0)]),
@@ -217,7 +217,7 @@ fn a_change_that_leaves_the_range_is_refused_by_name() {
             );
         }
     }
-    // Each alone is valid, both together are not: 0.486 kg times 40 times 40.
+    // Each change alone is valid, both together are not: 0.486 kg times 40 times 40.
     let both = vec![change(PlantParameter::Mass, 40.0, 1.0, 3.0), change(PlantParameter::Mass, 40.0, 2.0, 4.0)];
     assert_eq!(refused(both.clone()), Err("mass_kg"));
     let apart = vec![change(PlantParameter::Mass, 40.0, 1.0, 2.0), change(PlantParameter::Mass, 40.0, 2.0, 4.0)];

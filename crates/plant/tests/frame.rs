@@ -1,5 +1,5 @@
-//! Rotors anywhere: forces and moments of any frame against the sum of r x F, and the same vehicle turned about its z
-//! axis.
+//! Compares forces and moments of any frame with the sum of r x F, and a vehicle with the same vehicle turned about its
+//! z axis.
 
 use afbc_plant::{Drag, Environment, Frame, Motion, Plant, PlantModel, Realism, RotorFault, Rotors};
 use afbc_types::{Parameters, Rotor, RotorSpeeds};
@@ -27,7 +27,7 @@ fn plant(rotors: &[Rotor<f64>], initial: Motion, realism: Option<&Realism>) -> P
 }
 
 proptest! {
-    /// One short step from rest: what turns and lifts the vehicle is the sum over its rotors, and nothing else.
+    /// One short step from rest: the sum over the rotors, and nothing else, turns and lifts the vehicle.
     #[test]
     fn a_frame_gives_the_sum_of_its_rotors(
         rotors in rotors(),
@@ -47,15 +47,15 @@ proptest! {
         let motion = plant.motion();
         let rates = moment.component_div(&P.inertia_kg_m2) * STEP_S;
         let scale = 1.0 + rates.amax();
-        // Within a step the body turns by next to nothing.
+        // Within a step the body hardly turns.
         prop_assert!((motion.rates_rad_s - rates).amax() < 1e-3 * scale * scale, "{} {rates}", motion.rates_rad_s);
         let rise = (force / P.mass_kg - P.gravity_m_s2) * STEP_S;
         let climb = motion.velocity_m_s.z;
         prop_assert!((climb - rise).abs() < 1e-3 * (1.0 + rise.abs()), "{climb} {rise}");
     }
 
-    /// The frame turned about z by an angle, and the body back by it: the same rotors at the same places of the room.
-    /// The vehicle moves as it did, drag and all; I_x is I_y.
+    /// The frame is turned about z by an angle and the body back by it, so the rotors are at the same places. The
+    /// vehicle moves the same, including drag; I_x equals I_y.
     #[test]
     fn a_turned_frame_is_the_same_vehicle(
         rotors in rotors(),

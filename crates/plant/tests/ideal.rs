@@ -1,4 +1,4 @@
-//! The ideal plant does not change when optional effects are added to the code.
+//! Optional effects in the code must not change the ideal plant.
 
 use afbc_plant::integrate::rk4;
 use afbc_plant::{
@@ -53,7 +53,7 @@ fn hash(mut plant: Plant) -> u64 {
     hash
 }
 
-/// Recorded before any effect was added.
+/// Hashes recorded before any effect was added.
 #[test]
 fn flights_of_the_ideal_plant_stay_what_they_were() {
     assert_eq!(hash(Plant::new(PlantModel::Simplified, start(), environment())), 0x0640_40e6_7508_8793);

@@ -1,4 +1,4 @@
-//! The inertial sensor compared with its declared properties, within five standard errors and with fixed seeds.
+//! Compares the IMU with its declared properties, within five standard errors and with fixed seeds.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, clippy::float_cmp, missing_docs)] // tests
 
 use crate::common;
@@ -35,7 +35,7 @@ fn a_perfect_one_reads_the_truth() {
     }
 }
 
-/// Allan variance of means over `m` samples each, without overlap.
+/// Returns the Allan variance of means over `m` samples each, without overlap.
 fn allan(x: &[f64], m: usize) -> f64 {
     let means: Vec<f64> = x.chunks_exact(m).map(mean).collect();
     means.windows(2).map(|w| (w[1] - w[0]).powi(2)).sum::<f64>() / (2.0 * (means.len() - 1) as f64)
@@ -74,7 +74,8 @@ fn noise_has_the_declared_density() {
                 for m in [50, 200, 1000] {
                     let tau_s = m as f64 * STEP_S;
                     let ratio = allan(&x, m) / (density * density / (2.0 * tau_s));
-                    // The differences overlap by half: 3 over the number of them. The filter takes 1 % at 50 ms.
+                    // The differences overlap by half: variance 3 divided by their number. The filter takes 1 % at 50
+                    // ms.
                     let bound = 5.0 * (3.0 / (x.len() / m) as f64).sqrt() + 0.02;
                     assert!((ratio - 1.0).abs() < bound, "{} {filtered} {m}: {ratio}", preset.name);
                 }
@@ -88,8 +89,8 @@ fn noise_has_the_declared_density() {
     }
 }
 
-/// Over many flights the instability has its stationary deviation, at the start as later, and falls to 1/e after its
-/// correlation time.
+/// Over many flights the instability has its stationary deviation, at the start and later, and its correlation falls to
+/// 1/e after the correlation time.
 #[test]
 fn instability_is_stationary_and_correlated() {
     let gyro = Gyroscope { instability_rad_s: 0.01, instability_time_s: 0.05, ..Gyroscope::DEFAULT };
@@ -147,7 +148,7 @@ fn bias_scale_and_misalignment_are_drawn_once_and_the_walk_grows() {
     assert_sigma(&coordinates(walk), 0.1 * (5.0 * STEP_S).sqrt(), "walk");
 }
 
-/// 1 to 3: one rad/s about that axis; else at rest.
+/// Returns one rad/s about axis 1 to 3, or rest for other numbers.
 fn unit(k: u32) -> Vector3<f64> {
     Vector3::from_fn(|i, _| if i + 1 == k as usize { 1.0 } else { 0.0 })
 }
@@ -168,14 +169,14 @@ fn output_is_quantised_and_clipped() {
     }
     let different = samples.iter().map(|s| s.specific_force_m_s2.z.to_bits());
     assert!(different.collect::<std::collections::BTreeSet<_>>().len() > 50);
-    // Clipped on either side, noise or not.
+    // Clipped on either side, with or without noise.
     let falling = |_| Truth { acceleration_m_s2: Vector3::new(50.0, -50.0, 0.0), ..rest() };
     let clipped = common::run(with(Imu { gyro, accel, ..Imu::DEFAULT }), 4, 10, falling);
     assert!(clipped.iter().all(|r| r.imu.unwrap().specific_force_m_s2.xy() == nalgebra::Vector2::new(20.0, -20.0)));
 }
 
-/// A rate that oscillates comes out smaller by the Butterworth filter's gain, at the frequency that the bilinear
-/// transform warps it to; half the power at the cut-off, everything at rest.
+/// An oscillating rate is attenuated by the Butterworth filter's gain at the frequency warped by the bilinear
+/// transform: half the power at the cut-off, no attenuation of a constant.
 #[test]
 fn oscillations_above_the_cut_off_are_attenuated() {
     let cutoff_hz = 80.0;
@@ -198,8 +199,8 @@ fn oscillations_above_the_cut_off_are_attenuated() {
     }
 }
 
-/// A sensor beside the centre of mass feels the acceleration of its own place, told or not, in its own axes: compared
-/// with the second difference of that place's path in a tumbling flight.
+/// A sensor beside the centre of mass measures the acceleration of its own position in its own axes, also with an
+/// unstated lever. Compared with the second difference of that position's path in a tumbling flight.
 #[test]
 fn a_mounted_sensor_feels_its_own_place() {
     const DT_S: f64 = 1e-4;
@@ -235,7 +236,7 @@ fn a_mounted_sensor_feels_its_own_place() {
     }
 }
 
-/// Speeds around hover that keep the vehicle near the origin, on a wandering course.
+/// Returns speeds around hover that keep the vehicle near the origin, on a wandering course.
 fn feedback(motion: &Motion, time_s: f64) -> RotorSpeeds<4> {
     let Motion { position_m: position, velocity_m_s: velocity, attitude_rad: eta, rates_rad_s: rates } = motion;
     let aim = Vector3::new((0.9 * time_s).sin(), (0.7 * time_s).cos() - 1.0, 0.3 * (0.5 * time_s).sin());
@@ -246,9 +247,9 @@ fn feedback(motion: &Motion, time_s: f64) -> RotorSpeeds<4> {
     RotorSpeeds(Vector4::new(up + roll + yaw, up + pitch - yaw, up - roll + yaw, up - pitch - yaw).map(|w| w as f32))
 }
 
-/// Who adds up what a perfect sensor reads, with the mean of each two samples, knows where the vehicle is after ten
-/// seconds of turbulent flight: frames, signs and gravity are one. A step's load is new, so that each sample is late by
-/// at most a step: 1 ms of 5 m/s2 is 5 mm/s.
+/// Integrating the readings of a perfect sensor, with the mean of two successive samples, gives the position after ten
+/// seconds of turbulent flight, so frames, signs and gravity agree. Each sample is late by at most a step, because a
+/// step's load is new: 1 ms of 5 m/s2 is 5 mm/s.
 #[test]
 fn a_perfect_one_navigates() {
     for model in [PlantModel::RigidBody, PlantModel::Simplified] {
@@ -288,8 +289,8 @@ fn a_perfect_one_navigates() {
     }
 }
 
-/// Each rotor shakes the body at k omega/2 pi, with amplitudes that grow with omega^2; there is nothing between the
-/// lines, and the filter attenuates each by its analogue gain.
+/// Each rotor shakes the body at k omega/2 pi, with amplitudes that grow with omega^2. There is nothing between the
+/// lines, and the filter attenuates each line by its analogue gain.
 #[test]
 fn vibration_is_at_the_rotors_harmonics_and_grows_with_the_square_of_the_speed() {
     const STEPS: u32 = 4000;
@@ -336,7 +337,7 @@ fn vibration_is_at_the_rotors_harmonics_and_grows_with_the_square_of_the_speed()
     assert!(quiet.iter().all(|s| s.specific_force_m_s2.xy().norm() == 0.0));
 }
 
-/// Vibration, bias and distortion draw the same white noise as none.
+/// Vibration, bias and distortion do not change the drawn white noise.
 #[test]
 fn settings_do_not_change_the_noise() {
     let noisy = Gyroscope { noise_rad_s_rthz: 1e-4, ..Gyroscope::DEFAULT };

@@ -1,4 +1,4 @@
-//! All instruments together: streams of random numbers, presets, refusals, failures.
+//! All instruments together: random streams, presets, refusals, failures.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, clippy::float_cmp, missing_docs)] // tests
 
 use crate::common;
@@ -10,7 +10,7 @@ use afbc_types::{Declared, Mounting};
 use common::{STEP_S, rest, run, run_with};
 use nalgebra::{Quaternion, Vector3};
 
-/// All of them, with every random property.
+/// Returns all instruments with every random property.
 fn all() -> InstrumentSuite {
     let often = Dropouts { rate_hz: 2.0, mean_s: 0.1 };
     let mut imu = Imu::MPU_6000;
@@ -30,7 +30,7 @@ fn all() -> InstrumentSuite {
     }
 }
 
-/// A climbing, turning motion.
+/// Returns a climbing, turning motion.
 fn moving(k: u32) -> Truth {
     let t = f64::from(k) * STEP_S;
     let attitude = Quaternion::new((0.2 * t).cos(), 0.0, 0.0, (0.2 * t).sin());
@@ -93,7 +93,7 @@ fn readings_never_change() {
 
 const HASH: u64 = 0xd1cd_1699_d4e2_2aba;
 
-/// Every preset is accepted, named once, and more than a perfect instrument.
+/// Every preset is valid, has a unique name, and differs from a perfect instrument.
 #[test]
 fn presets_are_accepted() {
     fn check<T: Declared + Default + PartialEq + core::fmt::Debug>(presets: &[Preset<T>]) -> Vec<&'static str> {
@@ -137,17 +137,17 @@ fn settings_out_of_range_are_refused_by_name() {
     assert_eq!(Instruments::new(&none, &[late], 1, STEP_S).unwrap_err().range.name, "start_s");
 }
 
-/// From step 1000 to step 2000.
+/// Returns a fault from step 1000 to step 2000.
 fn fault(failure: Failure) -> InstrumentFault {
     InstrumentFault { failure, start_s: 1.0, end_s: 2.0, rise_s: 0.0 }
 }
 
-/// Whether a failure acts on what is taken at this time.
+/// Returns true if the fault affects a measurement taken at this time.
 fn acts(time_s: f64) -> bool {
     (0.9999..1.9999).contains(&time_s)
 }
 
-/// Readings of perfect, immediate instruments without and with a failure, step by step.
+/// Compares readings of perfect, immediate instruments without and with a failure, step by step.
 fn compare(failure: Failure, mut check: impl FnMut(u32, &InstrumentReadings, &InstrumentReadings)) {
     let suite = InstrumentSuite {
         imu: Some(Imu::DEFAULT),

@@ -1,4 +1,4 @@
-//! Random numbers compared with their distribution, within five standard errors and with fixed seeds.
+//! Compares random numbers with their distribution, within five standard errors and with fixed seeds.
 
 use afbc_plant::noise::{Noise, Stream};
 
@@ -13,7 +13,7 @@ fn mean(values: impl Iterator<Item = f64>) -> f64 {
     values.sum::<f64>() / N as f64
 }
 
-/// Checks that `found` is a mean of N numbers of variance `variance`.
+/// Checks that `found` is a mean of N numbers with the variance `variance`.
 fn assert_mean(found: f64, expected: f64, variance: f64, what: &str) {
     let bound = 5.0 * (variance / N as f64).sqrt();
     assert!((found - expected).abs() < bound, "{what}: {found} is not {expected} within {bound}");
@@ -63,7 +63,7 @@ fn streams_and_seeds_are_independent_and_reproducible() {
 #[test]
 fn several_at_once_are_those_one_by_one() {
     let (mut at_once, mut one_by_one) = (Noise::new(7, Stream::Imu), Noise::new(7, Stream::Imu));
-    // Long enough for tails and edges of layers.
+    // Enough numbers for tails and edges of layers.
     for _ in 0..100_000 {
         let five: [f64; 5] = at_once.normals();
         assert_eq!(five, [(); 5].map(|()| one_by_one.normal()));

@@ -1,4 +1,4 @@
-//! GNSS receiver, barometer and magnetometer compared with their declared properties, within five standard errors and
+//! Compares GNSS receiver, barometer and magnetometer with their declared properties, within five standard errors and
 //! with fixed seeds.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, clippy::float_cmp, missing_docs)] // tests
 
@@ -52,8 +52,8 @@ fn perfect_ones_read_the_truth() {
     assert_eq!((fixes, heights, fields), (10, 50, 50));
 }
 
-/// Over many flights, the position's error is a stationary Gauss-Markov process with noise on top: the correlation of
-/// fixes one correlation time apart is the slow part's share over e.
+/// Over many flights, the position error is a stationary Gauss-Markov process plus noise: the correlation of fixes one
+/// correlation time apart is the slow part's share divided by e.
 #[test]
 fn gnss_errors_have_their_spread_and_correlation() {
     let settings = Gnss {
@@ -87,7 +87,8 @@ fn gnss_errors_have_their_spread_and_correlation() {
     }
 }
 
-/// A fix is that of its stamp, late by its delay; a loss of signal takes its share and no other fix's error.
+/// A fix belongs to its stamp and arrives after its delay. A loss takes its share of fixes and changes no other fix's
+/// error.
 #[test]
 fn gnss_is_late_and_gets_lost() {
     let settings = Gnss { delay_s: 0.12, jitter_s: 0.01, ..Gnss::DEFAULT };
@@ -105,7 +106,7 @@ fn gnss_is_late_and_gets_lost() {
     let lossy = arrivals(Gnss { noise_m: 0.1, loss: Dropouts { rate_hz: 0.1, mean_s: 1.0 }, ..settings });
     let mut kept = all.iter();
     assert!(lossy.iter().all(|fix| kept.any(|other| other == fix)));
-    // 0.1/(0.1 + 1), over 1000 s in which a state lasts 0.9 s.
+    // Expected share 0.1/(0.1 + 1), over 1000 s in which a state lasts 0.9 s.
     let share = 1.0 - lossy.len() as f64 / all.len() as f64;
     let p = 1.0 / 11.0;
     assert!((share - p).abs() < 5.0 * (p * (1.0 - p) * 2.0 * 0.91 / 1000.0_f64).sqrt(), "{share}");
@@ -174,7 +175,7 @@ fn the_field_is_the_earths() {
     }
 }
 
-/// What is measured is soft * field + hard + motor * thrust, with parts drawn once per flight.
+/// The measurement is soft * field + hard + motor * thrust, with parts drawn once per flight.
 #[test]
 fn iron_and_motors_distort_the_field() {
     let settings = Magnetometer {
@@ -192,12 +193,12 @@ fn iron_and_motors_distort_the_field() {
         let level = UnitQuaternion::identity();
         let idle = at(level, 0.0);
         assert!((at(level, 1.5) - idle - settings.motor_ut * 1.5).norm() < 1e-9);
-        // Three half turns and the level attitude turn the field into four that sum to zero.
+        // Three half turns and the level attitude turn the field into four fields that sum to zero.
         let turned = [Vector3::x_axis(), Vector3::y_axis(), Vector3::z_axis()]
             .map(|axis| UnitQuaternion::from_axis_angle(&axis, core::f64::consts::PI));
         let all = [idle, at(turned[0], 0.0), at(turned[1], 0.0), at(turned[2], 0.0)];
         hard.push((all[0] + all[1] + all[2] + all[3]) / 4.0);
-        // The field along x alone, from the attitudes that keep x: its column of the soft iron.
+        // The field along x alone, from the attitudes that keep x, gives a column of the soft iron.
         let column = (all[0] + all[1] - all[2] - all[3]) / (4.0 * settings.earth_field_ut().x);
         soft.push(column - Vector3::x());
     }

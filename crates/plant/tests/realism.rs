@@ -107,7 +107,7 @@ fn finite(motion: &Motion) -> bool {
     [position_m, velocity_m_s, attitude_rad, rates_rad_s].iter().all(|v| v.iter().all(|x| x.is_finite()))
 }
 
-/// Any 32 bits as a commanded speed, including NaN and infinity.
+/// Draws any 32 bits as a commanded speed, including NaN and infinity.
 fn commands() -> impl Strategy<Value = Vec<[f32; 4]>> {
     let usual = prop::array::uniform4(0.0..500.0_f32);
     let any_bits = prop::array::uniform4(any::<u32>().prop_map(f32::from_bits));

@@ -1,4 +1,4 @@
-//! Faults that grow, reflections, and stamps of a receiver that are wrong: what they add to perfect instruments.
+//! Checks growing faults, reflections, and wrong stamps of a receiver on otherwise perfect instruments.
 #![allow(clippy::unwrap_used, clippy::panic, clippy::float_cmp, missing_docs)] // tests
 
 use crate::common::{STEP_S, assert_correlation, assert_sigma_of, coordinates, rest, rotation, run, run_with};
@@ -16,13 +16,13 @@ fn suite() -> InstrumentSuite {
     }
 }
 
-/// Readings of three seconds with a fault from 1 s on.
+/// Returns the readings of three seconds with a fault from 1 s on.
 fn flown(failure: Failure, rise_s: f64) -> Vec<InstrumentReadings> {
     let fault = InstrumentFault { failure, start_s: 1.0, end_s: f64::INFINITY, rise_s };
     run_with(suite(), &[fault], 1, 3000, |_| rest())
 }
 
-/// The share of a fault that acts at this time, if it takes half a second.
+/// Returns the share of a fault that acts at this time, with a rise of half a second.
 fn share(time_s: f64) -> f64 {
     ((time_s - 1.0) / 0.5).clamp(0.0, 1.0)
 }
@@ -55,7 +55,7 @@ fn a_fault_with_a_rise_grows_evenly_to_its_size() {
     }
 }
 
-/// At once is what a fault was before it could grow; and a share belongs to what has a size.
+/// Without a rise, a fault has its full size at once. Only failures with a size can be scaled.
 #[test]
 fn without_a_rise_a_fault_is_there_at_once() {
     let by_m = Vector3::new(5.0, -3.0, 20.0);
@@ -73,8 +73,8 @@ fn without_a_rise_a_fault_is_there_at_once() {
     assert_eq!(refused.range.name, "rise_s");
 }
 
-/// Over many receivers: a stationary process from the onset on, with its spread and its correlation over time, which is
-/// over when the fault is.
+/// Over many receivers the reflections are a stationary process from the onset on, with their spread and correlation in
+/// time, and end with the fault.
 #[test]
 fn reflections_have_their_spread_and_correlation_and_end() {
     let failure = Failure::GnssMultipath { deviation_m: 5.0, correlation_time_s: 0.5 };
@@ -99,7 +99,7 @@ fn reflections_have_their_spread_and_correlation_and_end() {
     assert_correlation(&pairs, 5.0, (-0.5_f64).exp(), "from fix to fix");
 }
 
-/// A stamp that is wrong shifts the time that the receiver states, not what it measures, nor when a fault acts.
+/// A wrong stamp shifts the stated time, but neither the measurement nor the time at which a fault acts.
 #[test]
 fn a_receivers_stamps_are_late_by_what_is_stated() {
     let with = |stamp_s| {

@@ -1,10 +1,10 @@
-//! Faults of the measurement compared with their words.
+//! Compares faults of the measured state with their descriptions.
 
 use afbc_plant::{Misreading, Motion, SensorFault, SensorFaults};
 use afbc_types::Axis;
 use nalgebra::Vector3;
 
-/// The motion at step `k`, all twelve numbers different.
+/// Returns the motion at step `k`, with twelve different numbers.
 fn motion(k: u32) -> Motion {
     let v = |first: f64| Vector3::new(first, first + 0.1, first + 0.2) + Vector3::repeat(f64::from(k));
     Motion { position_m: v(1.0), velocity_m_s: v(2.0), attitude_rad: v(3.0), rates_rad_s: v(4.0) }
@@ -15,12 +15,12 @@ fn seen(faults: &[SensorFault]) -> Vec<Motion> {
     (0..10).map(|k| faults.seen(&motion(k), 0.1 * f64::from(k))).collect()
 }
 
-/// Steps 3 to 6.
+/// Returns a fault in steps 3 to 6.
 fn fault(axis: Option<Axis>, misreading: Misreading) -> SensorFault {
     SensorFault { axis, misreading, start_s: 0.3, end_s: 0.7 }
 }
 
-/// Places of an axis in a motion: coordinate and rate.
+/// Returns coordinate and rate of an axis in a motion.
 fn coordinates(motion: &mut Motion, axis: Axis) -> [&mut f64; 2] {
     let Motion { position_m: p, velocity_m_s: v, attitude_rad: a, rates_rad_s: w } = motion;
     match axis {
@@ -59,7 +59,7 @@ fn a_whole_state_freezes_and_faults_act_in_their_order() {
     for (k, seen) in (0..).zip(seen(&[frozen])) {
         assert_eq!(seen, motion(if (3..7).contains(&k) { 3 } else { k }));
     }
-    // What is frozen after an offset is frozen with it.
+    // A state that freezes after an offset keeps the offset.
     let both = seen(&[SensorFault { end_s: 0.5, ..fault(Some(Axis::Z), Misreading::Offset(1.0)) }, frozen]);
     assert_eq!(both.iter().map(|motion| motion.position_m.z).nth(6), Some(motion(3).position_m.z + 1.0));
 }

@@ -1,4 +1,4 @@
-//! Sensors compared with their settings.
+//! Compares the sensors with their settings.
 
 use afbc_plant::{Deviations, Dropouts, Motion, Sensing, StateMeasurement, StateSensor};
 use nalgebra::Vector3;
@@ -9,13 +9,13 @@ fn sensors(sensing: Sensing, seed: u64) -> StateSensor {
     StateSensor::new(&sensing, seed, STEP_S).unwrap()
 }
 
-/// A different motion at every step, exact in f32.
+/// Returns a different motion at every step, exact in f32.
 fn motion(k: u16) -> Motion {
     let v = |offset: u16| Vector3::repeat(f64::from(k + offset));
     Motion { position_m: v(0), velocity_m_s: v(1), attitude_rad: v(2), rates_rad_s: v(3) }
 }
 
-/// The twelve coordinates of a measurement at zero motion.
+/// Returns the twelve coordinates of a measurement at zero motion.
 fn numbers(measurement: &StateMeasurement) -> Vec<f64> {
     let s = &measurement.state;
     let groups = [&s.position_m, &s.velocity_m_s, &s.attitude_rad, &s.rates_rad_s];
@@ -87,7 +87,7 @@ fn measurements_arrive_exactly_as_many_steps_later() {
     }
 }
 
-/// At step k there stands the sample of the last whole period that has arrived by then, and a gyro's rates of step k.
+/// At step k the measurement is the newest sample that has arrived by then, with a gyro's rates of step k.
 #[test]
 fn samples_arrive_once_per_period_and_stand_in_between() {
     for (period, late, gyro) in [(10, 0, false), (10, 10, true), (10, 3, true), (7, 20, false), (1, 4, true)] {
@@ -111,8 +111,8 @@ fn samples_arrive_once_per_period_and_stand_in_between() {
     }
 }
 
-/// Sampling draws the same noise as measuring in every step, and a dropout loses what would have arrived in it, with a
-/// gyro's rates.
+/// Sampling draws the same noise as measuring in every step. A dropout loses the sample that would have arrived in it,
+/// and the gyro's rates.
 #[test]
 fn samples_have_the_noise_of_their_step_and_dropouts_lose_them() {
     let noisy = Sensing { noise: Deviations::all(0.01), ..Sensing::default() };
@@ -140,8 +140,9 @@ fn samples_have_the_noise_of_their_step_and_dropouts_lose_them() {
     assert!(lost > 100, "{lost}");
 }
 
-/// A two-state chain: begins with 1 - exp(-rate dt) and ends with 1 - exp(-dt/mean) per step. Over n steps, the share
-/// of time lost has a variance of p (1 - p)/n (1 + r)/(1 - r), with r the chain's correlation per step.
+/// Dropouts are a two-state chain that begins with 1 - exp(-rate dt) and ends with 1 - exp(-dt/mean) per step. Over n
+/// steps, the share of time lost has a variance of p (1 - p)/n (1 + r)/(1 - r), with the chain's correlation r per
+/// step.
 #[test]
 fn dropouts_are_as_frequent_and_as_long_as_asked() {
     let dropouts = Dropouts { rate_hz: 2.0, mean_s: 0.05 };

@@ -1,4 +1,4 @@
-//! The tracker compared with its declared properties, within five standard errors and with fixed seeds.
+//! Compares the tracker with its declared properties, within five standard errors and with fixed seeds.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, clippy::float_cmp, missing_docs)] // tests
 
 use crate::common;
@@ -11,19 +11,19 @@ fn with(tracker: TrackerModel) -> InstrumentSuite {
     InstrumentSuite { tracker: Some(tracker), ..InstrumentSuite::default() }
 }
 
-/// A motion whose position tells its step: x is the number of milliseconds.
+/// Returns a motion whose position shows its step: x is the number of milliseconds.
 fn moving(k: u32) -> Truth {
     let attitude = UnitQuaternion::from_euler_angles(0.2, -0.3, 0.5 + 1e-4 * f64::from(k % 1000)).into_inner();
     Truth { position_m: Vector3::new(f64::from(k), -2.0, 3.0), attitude, ..rest() }
 }
 
-/// Fixes, each with the step of its arrival.
+/// Returns fixes with the step of their arrival.
 fn fixes(tracker: TrackerModel, seed: u64, steps: u32) -> Vec<(u32, TrackerFix)> {
     let readings = run(with(tracker), seed, steps, moving);
     (0..).zip(readings).flat_map(|(k, readings)| readings.tracker.into_iter().map(move |fix| (k, fix))).collect()
 }
 
-/// Step at which a fix was true, by its stamp.
+/// Returns the step at which a fix was measured, by its stamp.
 fn taken(fix: &TrackerFix) -> u32 {
     (fix.true_at_s / STEP_S).round() as u32
 }
@@ -43,8 +43,8 @@ fn a_perfect_one_sends_the_truth_at_once_at_its_rate() {
     }
 }
 
-/// A fix arrives in the first step after its delay, which is uniform within the jitter, and its stamp is the time of
-/// its motion.
+/// A fix arrives in the first step after its delay, which is uniform within the jitter. Its stamp is the time of its
+/// motion.
 #[test]
 fn delays_are_spread_as_declared_and_stamps_show_them() {
     let tracker = TrackerModel { delay_s: 0.0105, jitter_s: 0.004, rate_hz: 250.0, ..TrackerModel::DEFAULT };
@@ -57,14 +57,14 @@ fn delays_are_spread_as_declared_and_stamps_show_them() {
     // Uniform within 6.5 to 14.5 ms, rounded up: 7 to 15 ms.
     assert!(late.iter().all(|late| (0.0069..0.0151).contains(late)));
     let n = late.len() as f64;
-    // Eight whole steps: seven full ones and the ends' halves, so the mean of the ceiling is half a step more.
+    // Eight whole steps: seven full ones and two halves at the ends, so rounding up adds half a step to the mean.
     assert!((mean(&late) - 0.011).abs() < 5.0 * (0.004 / 3.0_f64.sqrt()) / n.sqrt() + 1e-5, "{}", mean(&late));
     let spread: Vec<f64> = late.iter().map(|late| late - 0.011).collect();
     let variance = 0.004_f64.powi(2) / 3.0 + STEP_S * STEP_S / 12.0;
     assert!((common::power(&spread) / variance - 1.0).abs() < 0.05);
-    // Those of one delay arrive in their order, some of these do not.
+    // Fixes with random delays do not always arrive in order.
     assert!(fixes.windows(2).any(|w| w[1].1.true_at_s < w[0].1.true_at_s));
-    // None arrives before its motion.
+    // No fix arrives before its motion.
     let early = self::fixes(TrackerModel { delay_s: 0.001, jitter_s: 0.1, ..tracker }, 2, 10_000);
     assert!(early.iter().any(|(k, fix)| *k == taken(fix)) && early.iter().all(|(k, fix)| *k >= taken(fix)));
     let preset = self::fixes(TrackerModel::MOCAP_100, 2, 100_000);
@@ -81,7 +81,7 @@ fn stamps_have_their_errors() {
     assert!(mean(&errors).abs() < 5.0 * 0.001 / (errors.len() as f64).sqrt());
 }
 
-/// Errors of a fix that arrives at once: position, and rotation about the body's axes.
+/// Returns the errors of fixes that arrive at once: position, and rotation about the body axes.
 fn errors(fixes: &[(u32, TrackerFix)]) -> (Vec<f64>, Vec<f64>) {
     let position = fixes.iter().map(|(k, fix)| fix.position_m - moving(*k).position_m);
     let attitude = fixes.iter().map(|(k, fix)| rotation(moving(*k).attitude.conjugate() * fix.attitude));
@@ -100,7 +100,7 @@ fn noise_has_its_spread_and_outliers_their_share() {
     let dirty = fixes(TrackerModel { outliers: 0.02, outlier_m: 3.0, outlier_rad: 0.1, ..tracker }, 4, 500_000);
     let (mut far, mut turned) = (Vec::new(), Vec::new());
     for ((k, fix), (_, clean)) in dirty.iter().zip(&clean) {
-        // An outlier changes its own fix and no other one's noise.
+        // An outlier changes its own fix and no other fix's noise.
         if fix != clean {
             far.push(fix.position_m - clean.position_m);
             turned.push(rotation(moving(*k).attitude.conjugate() * fix.attitude));
@@ -124,8 +124,8 @@ fn the_frame_is_shifted_and_turned() {
     }
 }
 
-/// Dropouts and freezes take the share of time of a two-state chain; a frozen pose is an old one with a new stamp, and
-/// neither changes the noise of the others.
+/// Dropouts and freezes take the share of time of a two-state chain. A frozen pose is an old one with a new stamp.
+/// Neither changes the noise of other fixes.
 #[test]
 fn dropouts_lose_fixes_and_freezes_repeat_them() {
     let noisy = TrackerModel { position_m: 0.001, ..TrackerModel::DEFAULT };

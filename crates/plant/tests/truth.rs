@@ -1,4 +1,4 @@
-//! What instruments feel, compared with finite differences of the motion and with forces written out.
+//! Compares the instruments' input with finite differences of the motion and with forces written out.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs)] // tests
 
 use afbc_plant::noise::{Noise, Stream};
@@ -16,7 +16,7 @@ fn three(noise: &mut Noise, size: f64) -> Vector3<f64> {
     Vector3::new(noise.normal(), noise.normal(), noise.normal()) * size
 }
 
-/// Drag, wind and turbulence, lag, ground with its effect.
+/// Returns drag, wind and turbulence, lag, and ground with its effect.
 fn stormy(seed: u64) -> Realism {
     Realism {
         rotors: Rotors { time_constant_s: 0.02, max_rad_s: 317.0, ..Rotors::default() },
@@ -36,7 +36,7 @@ fn calm() -> Environment {
     Environment::calm(Parameters::PAPER).unwrap()
 }
 
-/// Random flights: tilted, turning, at heights from which some fall to the ground.
+/// Visits random flights: tilted, turning, at heights from which some fall to the ground.
 fn flights(mut visit: impl FnMut(&mut Plant, &mut Noise)) {
     let mut noise = Noise::new(11, Stream::Scenario);
     for seed in 0..20 {
@@ -50,7 +50,7 @@ fn flights(mut visit: impl FnMut(&mut Plant, &mut Noise)) {
             let gust = Gust { axis: Axis::X, kind: GustKind::Force, size: 0.3, start_s: 0.0, end_s: f64::INFINITY };
             let environment = Environment::new(Parameters::PAPER, Vec::new(), vec![gust]).unwrap();
             for realism in [None, Some(stormy(seed))] {
-                // Steps of 0.1 ms, so that the differences are those of a short time.
+                // Steps of 0.1 ms, so that the differences are taken over a short time.
                 let mut plant = match realism {
                     None => Plant::new(model, initial, environment.clone()),
                     Some(realism) => Plant::with_realism(model, initial, environment.clone(), &realism, 1e-4).unwrap(),
@@ -61,16 +61,16 @@ fn flights(mut visit: impl FnMut(&mut Plant, &mut Noise)) {
     }
 }
 
-/// Returns the rate that turns one attitude into the next in `dt_s`, body frame.
+/// Returns the body rate that turns one attitude into the next in `dt_s`.
 fn turned(before: &Quaternion<f64>, after: &Quaternion<f64>, dt_s: f64) -> Vector3<f64> {
     let between = before.conjugate() * after;
     between.imag() * (2.0 * between.w.signum() / dt_s)
 }
 
-/// In the air, accelerations and rates agree with the differences over a step, as the mean of both its ends. The bound
-/// is half of what one step changes: lagging rotors 0.015 m/s2, turbulence some 0.05 m/s2; without drag, 1 m/s2 would
-/// be missing. On the ground, where dampers act at once when a foot touches, the sum over 10 ms agrees with the change
-/// of velocity within half of some such jumps, 20 m/s2 for 0.1 ms each; without the ground 0.1 m/s would be missing.
+/// In the air, accelerations and rates agree with the differences over a step, as the mean of both ends. The bound is
+/// half of one step's change: lagging rotors 0.015 m/s2, turbulence some 0.05 m/s2; without drag, 1 m/s2 would be
+/// missing. On the ground, dampers act at once when a foot touches. There the sum over 10 ms agrees with the change of
+/// velocity within half of some such jumps, 20 m/s2 for 0.1 ms each; without the ground 0.1 m/s would be missing.
 #[test]
 fn accelerations_and_rates_are_those_of_the_motion() {
     const DT_S: f64 = 1e-4;
@@ -111,7 +111,7 @@ fn accelerations_and_rates_are_those_of_the_motion() {
     assert!(in_air > 50_000 && on_ground > 50, "{in_air} steps in the air, {on_ground} windows on the ground");
 }
 
-/// In free fall nothing is felt, whatever the attitude; thrust is felt along body z alone.
+/// In free fall the specific force is zero at any attitude; with thrust it is along body z alone.
 #[test]
 fn free_fall_is_felt_as_nothing_and_thrust_along_body_z() {
     for model in [PlantModel::RigidBody, PlantModel::Simplified] {
@@ -130,7 +130,7 @@ fn free_fall_is_felt_as_nothing_and_thrust_along_body_z() {
     }
 }
 
-/// At rest on the ground gravity is felt upward, before the first step too, and in a hover before it begins.
+/// At rest on the ground the specific force is gravity upward, also before the first step, and so is it before a hover.
 #[test]
 fn rest_is_felt_as_gravity_upward() {
     let at_rest = |truth: &Truth, bound: f64| {
@@ -170,7 +170,7 @@ fn drag_is_felt() {
     assert!((felt + newton / Parameters::PAPER.mass_kg).abs() < 1e-3, "{felt}");
 }
 
-/// Asking what is felt changes nothing.
+/// Reading the truth changes nothing.
 #[test]
 fn truth_is_only_read() {
     let fly = |ask: bool| {

@@ -1,9 +1,9 @@
-//! Wind compared with MIL-F-8785C: gusts by their shape, turbulence by statistics of long samples.
+//! Compares wind with MIL-F-8785C: gusts by their shape, turbulence by statistics of long samples.
 //!
 //! In a sample of length T of a stationary Gaussian process with autocorrelation rho, the autocovariance at any lag has
-//! a variance of at most 2/T times the integral of rho^2 over all lags (Bartlett 1946), in units of its own variance
-//! squared. That integral is L/V for the longitudinal velocity and 5/8 L/V for the others. Bounds are five standard
-//! errors.
+//! a variance of at most 2/T times the integral of rho^2 over all lags (Bartlett 1946), in units of the process's
+//! variance squared. That integral is L/V for the longitudinal velocity and 5/8 L/V for the others. Bounds are five
+//! standard errors.
 
 use afbc_plant::{CosineGust, Environment, Gust, GustKind, Motion, Plant, PlantModel, Realism, Turbulence, Wind};
 use afbc_types::{Axis, Parameters, RotorSpeeds};
@@ -12,7 +12,7 @@ use nalgebra::Vector3;
 const FOOT_M: f64 = 0.3048;
 const P: Parameters<f64> = Parameters::PAPER;
 
-/// A vehicle that floats in place: weight compensated, rotors off, no drag.
+/// Returns a vehicle that floats in place: weight compensated, rotors off, no drag.
 fn floating(height_m: f64, wind: Wind, seed: u64, step_s: f64) -> Plant {
     let lift =
         Gust { axis: Axis::Z, kind: GustKind::Acceleration, size: -P.gravity_m_s2, start_s: 0.0, end_s: f64::INFINITY };
@@ -54,7 +54,7 @@ fn a_gust_rises_and_falls_as_one_minus_cosine() {
 #[test]
 fn turbulence_has_the_specifications_strength_and_size() {
     let turbulence = Turbulence { wind_20ft_m_s: 10.0, airspeed_floor_m_s: 1.0 };
-    // At 1,000 ft, the upper end of the model, it is isotropic: L = 1,000 ft, sigma = 0.1 W20.
+    // At 1,000 ft, the upper end of the model, turbulence is isotropic: L = 1,000 ft, sigma = 0.1 W20.
     let top = turbulence.at(1000.0 * FOOT_M);
     assert!((top.horizontal_length_m - 304.8).abs() < 1e-9 && (top.vertical_length_m - 304.8).abs() < 1e-9);
     assert!((top.horizontal_m_s - 1.0).abs() < 1e-12 && (top.vertical_m_s - 1.0).abs() < 1e-12);
@@ -67,7 +67,7 @@ fn turbulence_has_the_specifications_strength_and_size() {
     assert!((Turbulence::MODERATE.wind_20ft_m_s - 15.43).abs() < 0.01);
 }
 
-/// Autocovariances of turbulence alone, along, across and up, for a vehicle in steady wind along +y.
+/// Returns autocovariances of turbulence alone, along, across and up, for a vehicle in steady wind along +y.
 fn autocovariances(height_m: f64, wind_m_s: f64, step_s: f64, samples: usize, lags: &[[usize; 3]]) -> Vec<[f64; 3]> {
     let steady_m_s = Vector3::new(0.0, wind_m_s, 0.0);
     let wind = Wind { steady_m_s, gusts: vec![], turbulence: Some(Turbulence::MODERATE) };

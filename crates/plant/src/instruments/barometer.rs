@@ -1,4 +1,4 @@
-//! Barometer.
+//! Barometer in simulation: noise, offset, drift, propeller wash, delay.
 
 use super::markov::Markov;
 use super::schedule::{Clock, Transit};
@@ -46,16 +46,16 @@ parameters! {
     }
 }
 
-/// A height above the origin of the earth frame.
+/// Measured height above the origin of the earth frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HeightFix {
-    /// Time at which it was true \[s\].
+    /// Time of the measurement \[s\].
     pub true_at_s: f64,
     /// Height \[m\].
     pub height_m: f64,
 }
 
-/// A barometer in simulation.
+/// Barometer in simulation.
 #[derive(Clone, Debug)]
 pub(super) struct Pressure {
     barometer: Barometer,
@@ -69,7 +69,7 @@ pub(super) struct Pressure {
 impl Pressure {
     pub(super) fn new(barometer: &Barometer, seed: u64, step_s: f64) -> Self {
         let mut random = Noise::new(seed, Stream::Barometer);
-        // The drift advances once per measurement, of which a step has one at most.
+        // The drift advances once per measurement, and there is at most one measurement per step.
         let period_s = (1.0 / barometer.rate_hz).max(step_s);
         Pressure {
             barometer: *barometer,
@@ -81,7 +81,7 @@ impl Pressure {
         }
     }
 
-    /// Returns the heights that arrive in this step. Each passes `spoil` when it is taken.
+    /// Returns the heights that arrive in this step. A new measurement passes `spoil` first.
     pub(super) fn measure(
         &mut self,
         truth: &Truth,

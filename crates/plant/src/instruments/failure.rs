@@ -1,4 +1,4 @@
-//! Failures of instruments. Each acts on what is taken while it lasts; what is on its way still arrives.
+//! Failures of instruments. A failure affects measurements taken while it lasts; measurements under way still arrive.
 
 use super::barometer::HeightFix;
 use super::gnss::GnssFix;
@@ -12,66 +12,66 @@ use alloc::vec::Vec;
 use libm::{cos, exp, sin, sqrt};
 use nalgebra::{Quaternion, Vector3};
 
-/// What is wrong with an instrument.
+/// Kind of failure of an instrument.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub enum Failure {
-    /// The inertial sensor repeats the sample before the onset.
+    /// The IMU repeats the last sample before the onset.
     ImuStuck,
-    /// The inertial sensor is silent.
+    /// The IMU sends nothing.
     ImuDead,
-    /// The inertial sensor has additional white noise of these standard deviations per sample.
+    /// The IMU has additional white noise with these standard deviations per sample.
     ImuNoisy {
-        /// \[rad/s\].
+        /// Noise of the rates \[rad/s\].
         rates_rad_s: f64,
-        /// \[m/s2\].
+        /// Noise of the specific force \[m/s2\].
         specific_force_m_s2: f64,
     },
-    /// The inertial sensor saturates at these values.
+    /// The IMU saturates at these values.
     ImuClipped {
-        /// \[rad/s\].
+        /// Largest rate \[rad/s\].
         rates_rad_s: f64,
-        /// \[m/s2\].
+        /// Largest specific force \[m/s2\].
         specific_force_m_s2: f64,
     },
-    /// The inertial sensor has an additional bias, in sensor axes.
+    /// The IMU has an additional bias, in sensor axes.
     ImuBiased {
-        /// \[rad/s\].
+        /// Bias of the rates \[rad/s\].
         rates_bias_rad_s: Vector3<f64>,
-        /// \[m/s2\].
+        /// Bias of the specific force \[m/s2\].
         force_bias_m_s2: Vector3<f64>,
     },
     /// The tracker sends nothing.
     TrackerLost,
-    /// The tracker sends the pose before the onset, with new stamps.
+    /// The tracker repeats the last pose before the onset, with new time stamps.
     TrackerFrozen,
     /// The tracker's frame has moved, and turned about its origin.
     TrackerJumped {
-        /// \[m\].
+        /// Displacement of the frame \[m\].
         by_m: Vector3<f64>,
-        /// \[rad\].
+        /// Turn of the frame \[rad\].
         yaw_rad: f64,
     },
     /// The GNSS receiver sends nothing.
     GnssLost,
-    /// The GNSS receiver's position is off.
+    /// The GNSS receiver's position has an offset.
     GnssJumped {
-        /// \[m\].
+        /// Offset of the position \[m\].
         by_m: Vector3<f64>,
     },
-    /// Reflections: an additional error of the GNSS receiver's position that wanders, a first-order Gauss-Markov
-    /// process, of which the receiver does not know.
+    /// The GNSS receiver's position has an additional error by reflections, a first-order Gauss-Markov process that the
+    /// reported accuracy does not include.
     GnssMultipath {
-        /// Its standard deviation, per coordinate \[m\].
+        /// Standard deviation of the error, per coordinate \[m\].
         deviation_m: f64,
-        /// Its correlation time \[s\].
+        /// Correlation time of the error \[s\].
         correlation_time_s: f64,
     },
     /// The barometer sends nothing.
     BarometerLost,
     /// The barometer repeats the height before the onset.
     BarometerStuck,
-    /// The barometer's port is blocked: its noise goes on around the pressure at the onset.
+    /// The barometer's port is blocked: the pressure stays at that of the onset, with the usual noise.
     BarometerBlocked,
     /// The magnetometer sends nothing.
     MagnetometerLost,
@@ -79,13 +79,13 @@ pub enum Failure {
     MagnetometerStuck,
     /// The magnetometer is in an additional field, body frame.
     MagnetometerDisturbed {
-        /// \[uT\].
+        /// Additional field \[uT\].
         field_ut: Vector3<f64>,
     },
 }
 
 impl Failure {
-    /// Each kind, its numbers zero.
+    /// One failure of each kind, with its numbers zero.
     pub const ALL: [Failure; 17] = {
         let zero = Vector3::new(0.0, 0.0, 0.0);
         [
@@ -109,7 +109,7 @@ impl Failure {
         ]
     };
 
-    /// Returns the name, as in scenario files: the instrument, and what is wrong.
+    /// Returns the name used in scenario files: the instrument and the kind of failure.
     pub const fn name(self) -> &'static str {
         match self {
             Failure::ImuStuck => "imu-stuck",
@@ -132,7 +132,7 @@ impl Failure {
         }
     }
 
-    /// Returns this share of it, if it has a size; none for what either is or is not.
+    /// Returns the failure scaled by `share`, `None` for a failure without a size.
     pub fn scaled(self, share: f64) -> Option<Self> {
         Some(match self {
             Failure::ImuNoisy { rates_rad_s, specific_force_m_s2 } => {
@@ -157,17 +157,17 @@ impl Failure {
     }
 }
 
-/// A failure from `start_s` to `end_s`.
+/// Failure from `start_s` to `end_s`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct InstrumentFault {
-    /// What is wrong.
+    /// Kind of failure.
     pub failure: Failure,
     /// Onset \[s\].
     pub start_s: f64,
-    /// End \[s\]; infinite for a failure that stays.
+    /// End \[s\], infinite for a permanent failure.
     pub end_s: f64,
-    /// Time from the onset in which it grows to its size, evenly \[s\]; 0 for at once.
+    /// Time from the onset in which the failure grows evenly to its size \[s\]; 0 for at once.
     pub rise_s: f64,
 }
 
@@ -189,7 +189,7 @@ pub mod limits {
 }
 
 impl InstrumentFault {
-    /// What is wrong at `now_s`, while it grows.
+    /// Returns the failure at `now_s`, scaled while it grows.
     fn at(&self, now_s: f64) -> Failure {
         if now_s >= self.start_s + self.rise_s {
             return self.failure;
@@ -199,7 +199,7 @@ impl InstrumentFault {
     }
 
     /// # Errors
-    /// The first number out of range, by name.
+    /// Returns the first number that is out of range, by name.
     pub(super) fn validate(&self) -> Result<(), OutOfRange> {
         limits::START.check(self.start_s)?;
         limits::RISE.check(self.rise_s)?;
@@ -229,7 +229,7 @@ impl InstrumentFault {
     }
 }
 
-/// What an instrument said before the onset, and where an error that wanders is.
+/// Readings from before the onset, and the present value of a wandering error.
 #[derive(Clone, Copy, Debug, Default)]
 struct Held {
     imu: Option<ImuReading>,
@@ -237,15 +237,15 @@ struct Held {
     height: Option<HeightFix>,
     true_height_m: Option<f64>,
     field: Option<FieldFix>,
-    /// Standard deviations off, and since when \[s\].
+    /// Wandering error in standard deviations, and its time \[s\].
     wander: Option<(Vector3<f64>, f64)>,
 }
 
-/// The failures of a flight, which act one after the other, as listed.
+/// Failures of a flight, applied one after the other in the listed order.
 #[derive(Clone, Debug)]
 pub(super) struct Failures {
     faults: Vec<(InstrumentFault, Held)>,
-    /// The last of each.
+    /// Last reading of each instrument.
     last: Held,
     random: Noise,
 }
@@ -259,7 +259,7 @@ impl Failures {
         Failures { faults, last: Held::default(), random: Noise::new(seed, Stream::Failures) }
     }
 
-    /// Adds one; forgets those that are over when it begins.
+    /// Adds a failure, and forgets failures that end before it begins.
     pub(super) fn add(&mut self, fault: InstrumentFault) {
         self.faults.retain(|(earlier, _)| earlier.end_s > fault.start_s);
         self.faults.push((fault, Held::default()));
@@ -269,7 +269,7 @@ impl Failures {
         self.faults.clear();
     }
 
-    /// Returns the failures that act at `now_s`, each with what it holds.
+    /// Returns the failures active at `now_s`, each with its stored readings.
     fn active(faults: &mut [(InstrumentFault, Held)], now_s: f64) -> impl Iterator<Item = (Failure, &mut Held)> {
         let now_s = now_s + TIME_SLACK_S;
         let active = faults.iter_mut().filter(move |(fault, _)| (fault.start_s..fault.end_s).contains(&now_s));
@@ -298,7 +298,7 @@ impl Failures {
                 _ => {}
             }
         }
-        // As spoilt: what sticks later repeats what was read.
+        // Stored with the failures applied: a sensor that sticks later repeats this reading.
         self.last.imu = Some(seen);
         alive.then_some(seen)
     }
@@ -329,7 +329,7 @@ impl Failures {
 
     pub(super) fn gnss(&mut self, now_s: f64, mut seen: GnssFix) -> Option<GnssFix> {
         let mut alive = true;
-        // By the true time, as the tracker's.
+        // By the true time, as for the tracker.
         for (failure, held) in Self::active(&mut self.faults, now_s) {
             match failure {
                 Failure::GnssLost => alive = false,
@@ -349,7 +349,7 @@ impl Failures {
         alive.then_some(seen)
     }
 
-    /// `true_height_m` is what the height would be without an error.
+    /// Applies the failures to a height. `true_height_m` is the height without any error.
     pub(super) fn barometer(&mut self, true_height_m: f64, mut seen: HeightFix) -> Option<HeightFix> {
         let before = *self.last.height.get_or_insert(seen);
         let mut alive = true;

@@ -1,4 +1,4 @@
-//! GNSS receiver.
+//! GNSS receiver in simulation: noise, slow error, delay, losses.
 
 use super::markov::{Markov, draw};
 use super::schedule::{Clock, Transit};
@@ -52,16 +52,16 @@ parameters! {
     }
 }
 
-/// Position and velocity, earth frame, with the receiver's own opinion of them.
+/// Position and velocity in the earth frame, with the accuracy that the receiver reports.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GnssFix {
-    /// Time at which it was true, as far as the receiver knows \[s\].
+    /// Time of the measurement as stamped by the receiver \[s\].
     pub true_at_s: f64,
     /// Position \[m\].
     pub position_m: Vector3<f64>,
     /// Velocity \[m/s\].
     pub velocity_m_s: Vector3<f64>,
-    /// Reported standard deviation of x and y, each \[m\].
+    /// Reported standard deviation of x and of y \[m\].
     pub horizontal_sigma_m: f64,
     /// Reported standard deviation of z \[m\].
     pub vertical_sigma_m: f64,
@@ -69,7 +69,7 @@ pub struct GnssFix {
     pub velocity_sigma_m_s: f64,
 }
 
-/// A GNSS receiver in simulation.
+/// GNSS receiver in simulation.
 #[derive(Clone, Debug)]
 pub(super) struct Receiver {
     gnss: Gnss,
@@ -84,7 +84,7 @@ impl Receiver {
     pub(super) fn new(gnss: &Gnss, seed: u64, step_s: f64) -> Self {
         let mut random = Noise::new(seed, Stream::Gnss);
         let slow = Vector3::new(gnss.horizontal_m, gnss.horizontal_m, gnss.vertical_m);
-        // Advanced once per fix.
+        // The slow error advances once per fix.
         let period_s = (1.0 / gnss.rate_hz).max(step_s);
         Receiver {
             gnss: *gnss,
@@ -96,18 +96,18 @@ impl Receiver {
         }
     }
 
-    /// Returns the fixes that arrive in this step. Each passes `spoil` when it is taken.
+    /// Returns the fixes that arrive in this step. A new fix passes `spoil` first.
     pub(super) fn measure(&mut self, truth: &Truth, spoil: impl FnOnce(GnssFix) -> Option<GnssFix>) -> Vec<GnssFix> {
         let lost = self.loss.advance();
         if self.clock.ticks() {
-            // Taken even if it is lost, so that a loss changes no other fix's error.
+            // Generated even if it is lost, so that a loss does not change the errors of other fixes.
             let (fix, arrives_s) = self.take(truth);
             spoil(fix).filter(|_| !lost).into_iter().for_each(|fix| self.transit.send(arrives_s, fix));
         }
         self.transit.arrived(truth.time_s)
     }
 
-    /// Returns the fix of this step and when it arrives. Draws the same numbers whatever the settings.
+    /// Returns the fix of this step and its arrival time. Draws the same random numbers for any settings.
     fn take(&mut self, truth: &Truth) -> (GnssFix, f64) {
         let Gnss { horizontal_m, vertical_m, noise_m, velocity_m_s, reported, .. } = self.gnss;
         self.slow.advance(&mut self.random);

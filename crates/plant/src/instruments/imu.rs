@@ -1,4 +1,4 @@
-//! Inertial measurement unit: gyroscope and accelerometer.
+//! Inertial measurement unit in simulation: gyroscope and accelerometer.
 
 use super::mounting::Mounted;
 use super::triad::{Quality, Triad};
@@ -119,7 +119,7 @@ parameters! {
     }
 }
 
-/// One sample, in sensor axes ([`Mounting`]).
+/// Sample of the IMU in sensor axes ([`Mounting`]).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ImuReading {
     /// Time of the sample \[s\].
@@ -130,12 +130,12 @@ pub struct ImuReading {
     pub specific_force_m_s2: Vector3<f64>,
 }
 
-/// True biases of an inertial measurement unit, in sensor axes: constant part, instability and random walk.
+/// True biases of an IMU in sensor axes: sum of constant part, instability and random walk.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ImuBias {
-    /// Of the gyroscope \[rad/s\].
+    /// Bias of the gyroscope \[rad/s\].
     pub rates_rad_s: Vector3<f64>,
-    /// Of the accelerometer \[m/s2\].
+    /// Bias of the accelerometer \[m/s2\].
     pub specific_force_m_s2: Vector3<f64>,
 }
 
@@ -173,7 +173,7 @@ impl Accelerometer {
     }
 }
 
-/// An inertial measurement unit in simulation.
+/// IMU in simulation.
 #[derive(Clone, Debug)]
 pub(super) struct Inertial {
     mounted: Mounted,

@@ -4,20 +4,20 @@ use core::f64::consts::{PI, SQRT_2};
 use libm::{sqrt, tan};
 use nalgebra::Vector3;
 
-/// Second-order Butterworth low-pass of three coordinates, by the bilinear transform with the cut-off kept. None below
-/// half the sampling rate is no filter for the samples.
+/// Second-order Butterworth low-pass of three coordinates, by the bilinear transform with the exact cut-off. A cut-off
+/// at or above half the sampling rate does not filter the samples.
 #[derive(Clone, Debug)]
 pub(super) struct LowPass {
-    /// Infinite without a filter.
+    /// Cut-off, infinite without a filter.
     cutoff_hz: f64,
-    /// b0 = b2 = b1/2, a1, a2; none lets everything pass.
+    /// b0 = b2 = b1/2, a1, a2; `None` passes everything.
     weights: Option<[f64; 3]>,
-    /// State of the transposed direct form II; none before the first value.
+    /// State of the transposed direct form II, `None` before the first value.
     state: Option<[Vector3<f64>; 2]>,
 }
 
 impl LowPass {
-    /// Creates a filter; a cut-off of 0 is none.
+    /// Creates a filter; a cut-off of 0 means no filter.
     pub(super) fn new(cutoff_hz: f64, step_s: f64) -> Self {
         let weights = (cutoff_hz > 0.0 && cutoff_hz * step_s < 0.5).then(|| {
             let k = tan(PI * cutoff_hz * step_s);
@@ -27,7 +27,7 @@ impl LowPass {
         LowPass { cutoff_hz: if cutoff_hz > 0.0 { cutoff_hz } else { f64::INFINITY }, weights, state: None }
     }
 
-    /// Returns the filtered value; the first one counts as having stood for ever.
+    /// Returns the filtered value. The filter starts as if the first value had always been there.
     pub(super) fn pass(&mut self, value: Vector3<f64>) -> Vector3<f64> {
         let Some([b, a1, a2]) = self.weights else { return value };
         let [first, second] = self.state.unwrap_or([value * (1.0 - b), value * (b - a2)]);
@@ -36,7 +36,7 @@ impl LowPass {
         out
     }
 
-    /// Returns the share of an oscillation of this frequency that the analogue filter lets pass to the samples.
+    /// Returns the gain of the analogue filter at this frequency.
     #[inline]
     pub(super) fn share(&self, frequency_hz: f64) -> f64 {
         let ratio = frequency_hz / self.cutoff_hz;

@@ -1,4 +1,4 @@
-//! Magnetometer.
+//! Magnetometer in simulation: earth's field, iron, motor currents, noise, delay.
 
 use super::markov::draw;
 use super::schedule::{Clock, Transit};
@@ -62,16 +62,16 @@ impl Magnetometer {
     }
 }
 
-/// A magnetic field, body frame.
+/// Measured magnetic field, body frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FieldFix {
-    /// Time at which it was true \[s\].
+    /// Time of the measurement \[s\].
     pub true_at_s: f64,
     /// Field \[uT\].
     pub field_ut: Vector3<f64>,
 }
 
-/// A magnetometer in simulation.
+/// Magnetometer in simulation.
 #[derive(Clone, Debug)]
 pub(super) struct Compass {
     magnetometer: Magnetometer,
@@ -97,7 +97,7 @@ impl Compass {
         }
     }
 
-    /// Returns the fields that arrive in this step. Each passes `spoil` when it is taken.
+    /// Returns the fields that arrive in this step. A new measurement passes `spoil` first.
     pub(super) fn measure(&mut self, truth: &Truth, spoil: impl FnOnce(FieldFix) -> Option<FieldFix>) -> Vec<FieldFix> {
         if self.clock.ticks() {
             let fix = FieldFix { true_at_s: truth.time_s, field_ut: self.field_ut(truth) };

@@ -1,16 +1,16 @@
-//! Errors that change slowly.
+//! Gauss-Markov process for errors that change slowly.
 
 use crate::noise::Noise;
 use libm::{exp, sqrt};
 use nalgebra::Vector3;
 
-/// First-order Gauss-Markov process of three independent coordinates, dx/dt = -x/T + w, discretised exactly. Starts in
-/// its stationary distribution.
+/// First-order Gauss-Markov process of three independent coordinates, dx/dt = -x/T + w, discretised exactly. It starts
+/// in its stationary distribution.
 #[derive(Clone, Debug)]
 pub(super) struct Markov {
-    /// exp(-dt/T).
+    /// Decay per step, exp(-dt/T).
     decay: f64,
-    /// Standard deviation of what each step adds.
+    /// Standard deviation of the noise added per step.
     kick: Vector3<f64>,
     /// Present value.
     pub(super) value: Vector3<f64>,

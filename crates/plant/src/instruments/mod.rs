@@ -1,8 +1,8 @@
-//! Instruments of a real vehicle: inertial sensor, tracker, GNSS receiver, barometer, magnetometer.
+//! Instruments of a real vehicle: IMU, tracker, GNSS receiver, barometer, magnetometer.
 //!
-//! Each has its own streams of random numbers, so that its readings do not depend on which others there are, nor on
-//! each other's settings. All are in `f64`; their frames are those of [`afbc_types`], with north along earth x. Presets
-//! of known parts are in [`presets`], failures in [`Failure`].
+//! Each instrument has its own random streams, so its readings do not depend on the presence or settings of other
+//! instruments. All values are `f64`, in the frames of [`afbc_types`] with north along earth x. [`presets`] has known
+//! parts, and [`Failure`] the failures.
 //!
 //! ```
 //! use afbc_types::{Parameters, RotorSpeeds};
@@ -58,11 +58,11 @@ use imu::Inertial;
 use magnetometer::Compass;
 use tracker::Tracking;
 
-/// The instruments that a vehicle has. The default is none.
+/// Instruments of a vehicle. The default has none.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct InstrumentSuite {
-    /// Inertial sensor.
+    /// IMU.
     pub imu: Option<Imu>,
     /// Tracker.
     pub tracker: Option<TrackerModel>,
@@ -78,7 +78,7 @@ impl InstrumentSuite {
     /// Checks every parameter of every instrument.
     ///
     /// # Errors
-    /// The first parameter out of range.
+    /// Returns the first parameter that is out of range.
     pub fn validate(&self) -> Result<(), OutOfRange> {
         self.imu.map_or(Ok(()), |imu| imu.validate())?;
         self.tracker.map_or(Ok(()), |tracker| tracker.validate())?;
@@ -88,18 +88,18 @@ impl InstrumentSuite {
     }
 }
 
-/// What reaches the vehicle in one step.
+/// Readings that reach the vehicle in one step.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct InstrumentReadings {
-    /// Sample of this step; none without a sensor, or from a dead one.
+    /// IMU sample of this step, `None` without an IMU or from a dead one.
     pub imu: Option<ImuReading>,
-    /// Poses that arrive now, in the order of their arrival.
+    /// Poses that arrive in this step, in the order of arrival.
     pub tracker: Vec<TrackerFix>,
-    /// Positions and velocities that arrive now.
+    /// GNSS fixes that arrive in this step.
     pub gnss: Vec<GnssFix>,
-    /// Heights that arrive now.
+    /// Heights that arrive in this step.
     pub barometer: Vec<HeightFix>,
-    /// Fields that arrive now.
+    /// Magnetic fields that arrive in this step.
     pub magnetometer: Vec<FieldFix>,
 }
 
@@ -115,10 +115,10 @@ pub struct Instruments {
 }
 
 impl Instruments {
-    /// Creates instruments that are read every `step_s`. The seed may be the plant's, since the streams differ.
+    /// Creates instruments that are read every `step_s`. The seed may be the plant's, because the streams differ.
     ///
     /// # Errors
-    /// The first setting out of range.
+    /// Returns the first setting that is out of range.
     pub fn new(
         suite: &InstrumentSuite,
         faults: &[InstrumentFault],
@@ -138,7 +138,7 @@ impl Instruments {
         })
     }
 
-    /// Measures the vehicle; to be called once per step, the first time before the first step.
+    /// Measures the vehicle. Call it once per step, the first time before the first step.
     pub fn measure(&mut self, truth: &Truth) -> InstrumentReadings {
         let (failures, height_m) = (&mut self.failures, truth.position_m.z);
         let imu = self.imu.as_mut().and_then(|imu| failures.imu(imu.sample(truth)));
@@ -155,22 +155,22 @@ impl Instruments {
         }
     }
 
-    /// Adds a failure to those that there are.
+    /// Adds a failure to the present ones.
     ///
     /// # Errors
-    /// The first number out of range; nothing has changed then.
+    /// Returns the first number that is out of range, and changes nothing then.
     pub fn fail(&mut self, fault: InstrumentFault) -> Result<(), OutOfRange> {
         fault.validate()?;
         self.failures.add(fault);
         Ok(())
     }
 
-    /// Ends all failures, also those to come.
+    /// Ends all failures, including those that have not begun.
     pub fn clear_faults(&mut self) {
         self.failures.end();
     }
 
-    /// Returns the true biases of the inertial sensor, if there is one, against which estimates of them are judged.
+    /// Returns the true biases of the IMU, if there is one, for comparison with estimates.
     pub fn imu_bias(&self) -> Option<ImuBias> {
         self.imu.as_ref().map(Inertial::bias)
     }

@@ -1,8 +1,8 @@
-//! Known parts, with the source of each figure.
+//! Presets of known parts, with the source of each figure.
 //!
-//! Data sheets state limits or typical deviations of offset, scale and cross-axis sensitivity; each counts as three
-//! standard deviations here. They do not state bias instability and drift in flight: those figures are estimated. What
-//! the vehicle determines, such as vibration, hard iron and propeller wash, is left out, or marked as estimated.
+//! Data sheets state limits or typical deviations of offset, scale and cross-axis sensitivity; here each counts as
+//! three standard deviations. They do not state bias instability and drift in flight, so those figures are estimated.
+//! Effects of the vehicle, such as vibration, hard iron and propeller wash, are left out or marked as estimated.
 
 use super::barometer::Barometer;
 use super::gnss::Gnss;
@@ -18,21 +18,21 @@ const G: f64 = 9.806_65;
 /// Height per pressure near sea level \[m/Pa\].
 const M_PA: f64 = 0.083;
 
-/// A named part.
+/// Named part.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Preset<T> {
-    /// Name in files.
+    /// Name used in files.
     pub name: &'static str,
-    /// Its properties.
+    /// Properties of the part.
     pub settings: T,
 }
 
 impl Imu {
     /// TDK InvenSense ICM-42688-P at 2000 deg/s and 16 g.
     ///
-    /// Data sheet DS-000347, Table 1 (gyroscope: 0.0028 deg/s/rtHz, 16.4 LSB per deg/s, zero-rate 0.5 deg/s, scale
-    /// 0.5 %, cross-axis 1.25 %) and Table 2 (accelerometer: 70 ug/rtHz, 2048 LSB/g, zero-g 20 mg, scale 0.5 %,
-    /// cross-axis 1 %). Filter: its anti-alias filter at 258 Hz, one of its settings.
+    /// Data sheet DS-000347, Table 1 (gyroscope: 0.0028 deg/s/rtHz, 16.4 LSB per deg/s, zero-rate 0.5 deg/s, scale 0.5
+    /// %, cross-axis 1.25 %) and Table 2 (accelerometer: 70 ug/rtHz, 2048 LSB/g, zero-g 20 mg, scale 0.5 %, cross-axis
+    /// 1 %). The anti-alias filter is set to 258 Hz, one of its options.
     pub const ICM_42688_P: Self = Imu {
         gyro: Gyroscope {
             noise_rad_s_rthz: 0.0028 * DEG,
@@ -63,9 +63,9 @@ impl Imu {
 
     /// Bosch Sensortec BMI270 at 2000 deg/s and 16 g.
     ///
-    /// Data sheet BST-BMI270-DS000: gyroscope 0.007 deg/s/rtHz in performance mode, 16.384 LSB per deg/s, zero-rate
-    /// 0.5 deg/s; accelerometer 160 ug/rtHz, 2048 LSB/g, zero-g 20 mg. Estimated: scale 0.4 %, after its component
-    /// retrimming, cross-axis 1 %, a filter of 250 Hz within the 751 Hz that it can be set to.
+    /// Data sheet BST-BMI270-DS000: gyroscope 0.007 deg/s/rtHz in performance mode, 16.384 LSB per deg/s, zero-rate 0.5
+    /// deg/s; accelerometer 160 ug/rtHz, 2048 LSB/g, zero-g 20 mg. Estimated: scale 0.4 % after component retrimming,
+    /// cross-axis 1 %, a filter of 250 Hz (up to 751 Hz can be set).
     pub const BMI270: Self = Imu {
         gyro: Gyroscope {
             noise_rad_s_rthz: 0.007 * DEG,
@@ -136,8 +136,8 @@ impl Imu {
 }
 
 impl TrackerModel {
-    /// A motion-capture system of 100 Hz on a local network: 1 mm, 0.2 degrees, 10 +- 2 ms late. No product's figures;
-    /// those that the estimator's accuracy is stated for.
+    /// Motion-capture system of 100 Hz on a local network: 1 mm, 0.2 degrees, 10 +- 2 ms late. These are no product's
+    /// figures, but those for which the estimator's accuracy is stated.
     pub const MOCAP_100: Self = TrackerModel {
         rate_hz: 100.0,
         delay_s: 0.01,
@@ -155,8 +155,8 @@ impl Gnss {
     /// u-blox M10, four constellations at 10 Hz.
     ///
     /// Data sheet of the module MAX-M10S, UBX-20035208, table of performance: position 1.5 m CEP, which is 1.27 m per
-    /// coordinate, and velocity 0.05 m/s. The position's error is shared among a slow part of 1.2 m and noise of 0.4 m;
-    /// that share, a height 1.5 times worse, its correlation time and a delay of 120 ms are estimated.
+    /// coordinate, and velocity 0.05 m/s. The position error is split into a slow part of 1.2 m and noise of 0.4 m.
+    /// Estimated: that split, a height error 1.5 times larger, the correlation time, and a delay of 120 ms.
     pub const M10: Self = Gnss {
         rate_hz: 10.0,
         delay_s: 0.12,
@@ -176,8 +176,8 @@ impl Gnss {
 impl Barometer {
     /// Infineon DPS310 at 50 Hz, eight times oversampled.
     ///
-    /// Data sheet DPS310: precision 0.4 Pa at this oversampling, 14.8 ms per measurement, relative accuracy 6 Pa, which
-    /// counts as the drift's standard deviation. The wash is estimated.
+    /// Data sheet DPS310: precision 0.4 Pa at this oversampling, 14.8 ms per measurement, relative accuracy 6 Pa, used
+    /// as the standard deviation of the drift. The wash is estimated.
     pub const DPS310: Self = Barometer {
         rate_hz: 50.0,
         delay_s: 0.015,
@@ -189,8 +189,8 @@ impl Barometer {
 
     /// Bosch Sensortec BMP388 at 50 Hz, eight times oversampled.
     ///
-    /// Data sheet BST-BMP388-DS001: relative accuracy 8 Pa, which counts as the drift's standard deviation. Estimated:
-    /// a noise of 1.2 Pa without its filter, 20 ms per measurement, and the wash.
+    /// Data sheet BST-BMP388-DS001: relative accuracy 8 Pa, used as the standard deviation of the drift. Estimated: a
+    /// noise of 1.2 Pa without the part's filter, 20 ms per measurement, and the wash.
     pub const BMP388: Self = Barometer {
         rate_hz: 50.0,
         delay_s: 0.02,
@@ -208,8 +208,8 @@ impl Barometer {
 impl Magnetometer {
     /// iSentek IST8310 at 50 Hz.
     ///
-    /// Data sheet IST8310: 0.3 uT/LSB, range 1600 uT in x and y. Estimated: noise, delay, and what is left of hard and
-    /// soft iron and of the motors' field after calibration.
+    /// Data sheet IST8310: 0.3 uT/LSB, range 1600 uT in x and y. Estimated: noise, delay, and the hard iron, soft iron
+    /// and motor field that remain after calibration.
     pub const IST8310: Self = Magnetometer {
         rate_hz: 50.0,
         delay_s: 0.01,
@@ -224,8 +224,8 @@ impl Magnetometer {
 
     /// QST QMC5883L at 50 Hz and 8 G.
     ///
-    /// Data sheet QMC5883L: 3000 LSB/G, field resolution 2 mG, which counts as its noise. Estimated: delay, and what is
-    /// left of hard and soft iron and of the motors' field after calibration.
+    /// Data sheet QMC5883L: 3000 LSB/G, field resolution 2 mG, used as the noise. Estimated: delay, and the hard iron,
+    /// soft iron and motor field that remain after calibration.
     pub const QMC5883L: Self = Magnetometer { noise_ut: 0.2, range_ut: 800.0, lsb_ut: 100.0 / 3000.0, ..Self::IST8310 };
 
     /// Every preset.

@@ -1,11 +1,11 @@
-//! Sampling and delay of fixes.
+//! Sampling times and delays of measurements.
 
 use alloc::vec::Vec;
 
 /// Tolerance when comparing times, far below any step \[s\].
 const TIME_SLACK_S: f64 = 1e-9;
 
-/// The steps at which a sensor of any rate samples: the first one, then the first after each period.
+/// Sampling clock of a sensor with any rate: the first step, then the first step after each period.
 #[derive(Clone, Debug)]
 pub(super) struct Clock {
     /// Samples per step.
@@ -19,9 +19,9 @@ impl Clock {
         Clock { per_step: rate_hz * step_s, steps: 0, taken: 0 }
     }
 
-    /// Returns whether this step is one of them; to be called in every step.
+    /// Returns true if the sensor samples in this step. Call it in every step.
     pub(super) fn ticks(&mut self) -> bool {
-        // From the count of steps: a sum of periods would drift.
+        // Computed from the count of steps: a sum of periods would drift.
         let due = (self.steps as f64 * self.per_step + TIME_SLACK_S) as u64 + 1;
         self.steps += 1;
         let ticks = due > self.taken;
@@ -30,10 +30,10 @@ impl Clock {
     }
 }
 
-/// Fixes on their way, which arrive in the order of their arrival times.
+/// Measurements under way, which arrive in the order of their arrival times.
 #[derive(Clone, Debug)]
 pub(super) struct Transit<T> {
-    /// Each with its arrival \[s\], in that order.
+    /// Measurements with their arrival times \[s\], sorted by arrival.
     waiting: Vec<(f64, T)>,
 }
 
@@ -42,18 +42,18 @@ impl<T> Transit<T> {
         Transit { waiting: Vec::new() }
     }
 
-    /// Sends a fix that arrives at `arrives_s`.
+    /// Sends a measurement that arrives at `arrives_s`.
     pub(super) fn send(&mut self, arrives_s: f64, fix: T) {
-        // Behind those that arrive at the same time, which were sent earlier.
+        // After those with the same arrival time, which were sent earlier.
         let place = self.waiting.partition_point(|(earlier_s, _)| *earlier_s <= arrives_s);
         self.waiting.insert(place, (arrives_s, fix));
     }
 
-    /// Returns the fixes that have arrived by `now_s`.
+    /// Returns the measurements that have arrived by `now_s`.
     #[inline]
     pub(super) fn arrived(&mut self, now_s: f64) -> Vec<T> {
         let count = self.waiting.partition_point(|(arrives_s, _)| *arrives_s <= now_s + TIME_SLACK_S);
-        // Without an allocation in most steps.
+        // Avoids an allocation in most steps.
         if count == 0 { Vec::new() } else { self.waiting.drain(..count).map(|(_, fix)| fix).collect() }
     }
 }

@@ -1,4 +1,4 @@
-//! Tracker: a motion-capture system.
+//! Tracker in simulation: a motion-capture system with noise, delay, outliers and dropouts.
 
 use super::markov::draw;
 use super::schedule::{Clock, Transit};
@@ -60,18 +60,18 @@ parameters! {
     }
 }
 
-/// A pose, in the tracker's frame.
+/// Measured pose in the tracker's frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TrackerFix {
-    /// Time at which it was true, as far as the tracker knows \[s\].
+    /// Time of the measurement as stamped by the tracker \[s\].
     pub true_at_s: f64,
     /// Position \[m\].
     pub position_m: Vector3<f64>,
-    /// Unit quaternion, body to the tracker's frame.
+    /// Unit quaternion from the body to the tracker's frame.
     pub attitude: Quaternion<f64>,
 }
 
-/// A tracker in simulation.
+/// Tracker in simulation.
 #[derive(Clone, Debug)]
 pub(super) struct Tracking {
     tracker: TrackerModel,
@@ -79,7 +79,7 @@ pub(super) struct Tracking {
     random: Noise,
     loss: Outage,
     freeze: Outage,
-    /// The last pose that was not frozen.
+    /// Last pose that was not frozen.
     last: Option<TrackerFix>,
     transit: Transit<TrackerFix>,
 }
@@ -97,7 +97,7 @@ impl Tracking {
         }
     }
 
-    /// Returns the fixes that arrive in this step. Each passes `spoil` when it is taken.
+    /// Returns the fixes that arrive in this step. A new fix passes `spoil` first.
     pub(super) fn measure(
         &mut self,
         truth: &Truth,
@@ -114,7 +114,7 @@ impl Tracking {
         self.transit.arrived(truth.time_s)
     }
 
-    /// Returns the pose of this step and when it arrives. Draws the same numbers whatever the settings.
+    /// Returns the pose of this step and its arrival time. Draws the same random numbers for any settings.
     fn take(&mut self, truth: &Truth) -> (TrackerFix, f64) {
         let TrackerModel { frame_m, frame_yaw_rad, .. } = self.tracker;
         let random = &mut self.random;

@@ -1,4 +1,4 @@
-//! Three axes of an inertial sensor, gyroscope or accelerometer.
+//! Three axes of a gyroscope or accelerometer.
 
 use super::low_pass::LowPass;
 use super::markov::{Markov, draw};
@@ -6,12 +6,12 @@ use crate::noise::Noise;
 use libm::{rint, sqrt};
 use nalgebra::{Matrix3, Vector3};
 
-/// Properties of a triad, in the unit of what it measures. Zero is none.
+/// Properties of a triad, in the unit of the measured quantity. Zero switches an error off.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Quality {
-    /// One-sided density of white noise, per root of hertz.
+    /// One-sided density of the white noise, per root of hertz.
     pub(super) noise: f64,
-    /// Stationary standard deviation and correlation time \[s\] of the bias instability.
+    /// Stationary standard deviation of the bias instability, and its correlation time \[s\].
     pub(super) instability: f64,
     pub(super) instability_s: f64,
     /// Standard deviation of the bias's random walk after one second.
@@ -27,7 +27,7 @@ pub(super) struct Quality {
     pub(super) cutoff_hz: f64,
 }
 
-/// A triad in simulation: scale and misalignment, bias and noise, then filter, range and quantisation.
+/// Triad in simulation: scale and misalignment, bias and noise, then filter, range and quantisation.
 #[derive(Clone, Debug)]
 pub(super) struct Triad {
     distortion: Matrix3<f64>,
@@ -54,7 +54,7 @@ impl Triad {
             instability: Markov::new(instability, quality.instability_s, step_s, random),
             walk: Vector3::zeros(),
             walk_per_step: quality.walk * sqrt(step_s),
-            // The density up to half the sampling rate.
+            // White noise of this density up to half the sampling rate.
             white: quality.noise * sqrt(0.5 / step_s),
             filter: LowPass::new(quality.cutoff_hz, step_s),
             range: if quality.range > 0.0 { quality.range } else { f64::INFINITY },
@@ -62,12 +62,12 @@ impl Triad {
         }
     }
 
-    /// Returns the present bias: constant, instability and random walk.
+    /// Returns the present bias: sum of constant part, instability and random walk.
     pub(super) fn bias(&self) -> Vector3<f64> {
         self.constant + self.instability.value + self.walk
     }
 
-    /// Measures `truth`, sensor axes, with `vibration`, which has passed the filter.
+    /// Measures `truth` in sensor axes. `vibration` has already passed the filter.
     pub(super) fn measure(
         &mut self,
         truth: &Vector3<f64>,
@@ -78,10 +78,11 @@ impl Triad {
         self.walk += draw(random) * self.walk_per_step;
         let analogue = self.distortion * truth + self.bias() + draw(random) * self.white;
         let (range, lsb) = (self.range, self.lsb);
-        // Behind the filter, which works on samples: vibration above half their rate would pass it as an alias.
+        // Added after the filter, which works on samples: vibration above half the sampling rate would pass it as an
+        // alias.
         (self.filter.pass(analogue) + vibration).map(|value| {
             let value = value.clamp(-range, range);
-            // `rint`, since `round` takes three times as long.
+            // `rint`, because `round` takes three times as long.
             if lsb > 0.0 { rint(value / lsb) * lsb } else { value }
         })
     }

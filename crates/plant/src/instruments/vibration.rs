@@ -1,4 +1,4 @@
-//! Vibration at the rotors' frequencies.
+//! Vibration of the body at the rotor frequencies.
 
 use super::low_pass::LowPass;
 use crate::frame::Lanes;
@@ -8,31 +8,32 @@ use core::f64::consts::TAU;
 use libm::{cos, floor, sin, sincos};
 use nalgebra::Vector3;
 
-/// Harmonics of each rotor's frequency that the body vibrates at.
+/// Number of harmonics of each rotor's frequency.
 const HARMONICS: usize = 3;
 
 /// Cosine and sine of a phase.
 type Phase = (f64, f64);
 
-/// Sum over the rotors of A_k (omega/omega_hover)^2 cos(k theta + phi) on each axis, with theta the rotor's angle and
-/// phases phi that are drawn once. An unbalanced rotor pushes with its mass times omega^2, hence the square.
+/// Vibration as a sum over the rotors of A_k (omega/omega_hover)^2 cos(k theta + phi) on each axis, with the rotor
+/// angle theta and random constant phases phi. The force of an unbalanced rotor is proportional to omega^2, hence the
+/// square.
 #[derive(Clone, Debug)]
 pub(super) struct Vibration {
     /// Angle of each rotor, within 0 to 2 pi \[rad\].
     angle: Lanes,
-    /// Speeds at the last step.
+    /// Rotor speeds at the last step.
     speeds_rad_s: Option<Lanes>,
     /// Phases by rotor, harmonic, sensor (gyroscope, accelerometer) and axis.
     phases: [[[[Phase; 3]; 2]; HARMONICS]; afbc_types::ROTORS_MAX],
-    /// Amplitudes of the harmonics, relative.
+    /// Relative amplitudes of the harmonics.
     harmonics: Vector3<f64>,
-    /// Amplitudes at hover of a rotor's first harmonic, by sensor.
+    /// Amplitude of a rotor's first harmonic at hover, by sensor.
     amplitudes: [f64; 2],
     step_s: f64,
 }
 
 impl Vibration {
-    /// Creates the vibration of amplitudes `[rad/s, m/s2]`.
+    /// Creates the vibration with the amplitudes `[rad/s, m/s2]`.
     pub(super) fn new(amplitudes: [f64; 2], harmonics: Vector3<f64>, seed: u64, step_s: f64) -> Self {
         let mut random = Noise::new(seed, Stream::Vibration);
         let angle = Lanes::from_fn(|_, _| TAU * random.uniform());

@@ -1,4 +1,4 @@
-//! A vehicle as instruments see it, and statistics.
+//! Input of the instruments, and statistics.
 
 use afbc_plant::instruments::InstrumentFault;
 use afbc_plant::{Environment, InstrumentReadings, InstrumentSuite, Instruments, Motion, Plant, PlantModel, Truth};
@@ -7,13 +7,13 @@ use nalgebra::{Quaternion, Vector3};
 
 pub(crate) const STEP_S: f64 = 1e-3;
 
-/// At rest in a hover, level, at the origin.
+/// Returns a level hover at rest at the origin.
 pub(crate) fn rest() -> Truth {
     let environment = Environment::calm(Parameters::PAPER).unwrap();
     Plant::new(PlantModel::RigidBody, Motion::default(), environment).truth()
 }
 
-/// The same at step `k`.
+/// Returns the same motion at step `k`.
 pub(crate) fn at(truth: Truth, k: u32) -> Truth {
     Truth { time_s: f64::from(k) * STEP_S, ..truth }
 }
@@ -22,7 +22,7 @@ pub(crate) fn instruments(suite: InstrumentSuite, seed: u64) -> Instruments {
     Instruments::new(&suite, &[], seed, STEP_S).unwrap()
 }
 
-/// Readings of `steps` steps of a motion.
+/// Returns the readings of `steps` steps of a motion.
 pub(crate) fn run(
     suite: InstrumentSuite,
     seed: u64,
@@ -47,7 +47,7 @@ pub(crate) fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }
 
-/// Mean of the squares.
+/// Returns the mean of the squares.
 pub(crate) fn power(values: &[f64]) -> f64 {
     values.iter().map(|x| x * x).sum::<f64>() / values.len() as f64
 }
@@ -57,14 +57,14 @@ pub(crate) fn assert_sigma(values: &[f64], sigma: f64, what: &str) {
     assert_sigma_of(values, sigma, values.len() as f64, what);
 }
 
-/// The same, with the information of `n` independent ones.
+/// Checks the standard deviation of correlated numbers that are worth `n` independent ones.
 pub(crate) fn assert_sigma_of(values: &[f64], sigma: f64, n: f64, what: &str) {
     let ratio = power(values) / (sigma * sigma);
     let bound = 5.0 * (2.0 / n).sqrt();
     assert!((ratio - 1.0).abs() < bound, "{what}: {ratio} times the variance, bound {bound}");
 }
 
-/// Checks that pairs of normal numbers of standard deviation `sigma` have this correlation, within five standard
+/// Checks that pairs of normal numbers with the standard deviation `sigma` have this correlation, within five standard
 /// errors.
 pub(crate) fn assert_correlation(pairs: &[(f64, f64)], sigma: f64, correlation: f64, what: &str) {
     let n = pairs.len() as f64;
@@ -77,7 +77,7 @@ pub(crate) fn coordinates(vectors: impl IntoIterator<Item = Vector3<f64>>) -> Ve
     vectors.into_iter().flat_map(|v| [v.x, v.y, v.z]).collect()
 }
 
-/// Rotation vector of `q`, near the identity.
+/// Returns the rotation vector of `q`, near the identity.
 pub(crate) fn rotation(q: Quaternion<f64>) -> Vector3<f64> {
     q.imag() * (2.0 * q.w.signum())
 }
