@@ -1,5 +1,5 @@
-//! Values that survive a restart, here in memory in place of flash:
-//! `cargo run -p afbc-store --example values_in_flash`.
+//! Stores a value that survives a restart, here in RAM instead of flash: `cargo run -p afbc-store --example
+//! values_in_flash`.
 #![allow(clippy::unwrap_used, reason = "an example should say what went wrong")]
 
 use afbc_store::{Ram, RecordName, Store};

@@ -1,16 +1,16 @@
-//! A few named values in two sectors of NOR flash: those of a vehicle's parameters that differ from its image's.
+//! Stores a few named values in two sectors of NOR flash: a vehicle's parameters that differ from the image's defaults.
 //!
-//! A value is a record of 28 bytes with a checksum, appended to the active sector; the last one of a name counts. When
-//! the sector is full, the records that count are copied to the other sector, whose header is written last: it makes
-//! that sector the active one. So whatever a cut of power leaves of the last write, the store holds what it held before
-//! or what was to be written, and an erase only ever concerns a sector that does not count.
+//! A value is a record of 28 bytes with a checksum, appended to the active sector. The last record of a name counts.
+//! When the sector is full, its current records are copied to the other sector. That sector's header is written last
+//! and makes it the active one. So after a power cut the store holds either the old values or the new one, and only a
+//! sector that is not active is ever erased.
 //!
-//! **Only [`Store::make_room`] erases**, to be called at start-up: a processor that runs from the same flash stands
-//! still for as long as an erase takes. Until the next start there is room for some hundred changes at least, and
-//! [`Store::set`] then says that there is none.
+//! **Only [`Store::make_room`] erases.** Call it at start-up: a processor that runs from the same flash stops during an
+//! erase. Until the next start there is room for at least some hundred changes; after that [`Store::set`] returns an
+//! error.
 //!
-//! The flash may be anything with the traits of `embedded-storage` and words of at most four bytes, such as a chip's
-//! own, [`Ram`], or a file.
+//! The flash may be anything with the traits of `embedded-storage` and words of at most four bytes: a chip's own flash,
+//! [`Ram`], or a file.
 //!
 //! ```
 //! use afbc_store::{Ram, RecordName, Store};

@@ -1,14 +1,14 @@
-//! Flash in RAM.
+//! Flash simulated in RAM.
 
 use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash};
 use embedded_storage::nor_flash::{check_erase, check_read, check_write};
 
-/// Two sectors of `SECTOR` bytes in RAM, for what need not last.
+/// Two sectors of `SECTOR` bytes in RAM, for values that need not survive a restart.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Ram<const SECTOR: usize>([[u8; SECTOR]; 2]);
 
 impl<const SECTOR: usize> Ram<SECTOR> {
-    /// Both sectors erased.
+    /// Two erased sectors.
     pub const BLANK: Self = Ram([[0xFF; SECTOR]; 2]);
 
     fn range(&mut self, offset: u32, length: usize) -> &mut [u8] {
@@ -46,7 +46,7 @@ impl<const SECTOR: usize> NorFlash for Ram<SECTOR> {
         Ok(())
     }
 
-    /// Clears bits, as flash does.
+    /// Clears bits only, as flash does.
     fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Self::Error> {
         check_write(self, offset, bytes.len())?;
         self.range(offset, bytes.len()).iter_mut().zip(bytes).for_each(|(to, from)| *to &= from);

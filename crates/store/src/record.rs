@@ -1,16 +1,16 @@
-//! Records: what one write leaves in flash.
+//! Records: the unit of writing to the flash.
 
 use core::fmt;
 use crc::{CRC_32_ISO_HDLC, Crc};
 
-/// Longest name, as in MAVLink.
+/// Largest length of a name, as in MAVLink.
 pub const NAME_MAX: usize = 16;
-/// Size of a record \[bytes\], a multiple of a word.
+/// Size of a record \[bytes\], a multiple of a flash word.
 pub(crate) const RECORD: usize = 28;
 
 static CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 
-/// Returns the number by which a store recognises the owner of its values, such as a vehicle's name.
+/// Returns the number that identifies the owner of a store's values, from a name such as the vehicle's.
 pub fn hash(name: &[u8]) -> u32 {
     CRC.checksum(name)
 }
@@ -20,15 +20,15 @@ pub fn hash(name: &[u8]) -> u32 {
 pub struct RecordName([u8; NAME_MAX]);
 
 impl RecordName {
-    /// Name of records that are not about one value.
+    /// Name of records that hold no single value.
     pub(crate) const NONE: RecordName = RecordName([0; NAME_MAX]);
 
-    /// Makes a name; none if `name` is empty, longer than 16 characters, or has other characters.
+    /// Creates a name, `None` if `name` is empty, longer than 16 characters or not printable ASCII.
     pub fn new(name: &str) -> Option<Self> {
         RecordName::of(name.chars())
     }
 
-    /// Makes a name of these characters, as [`RecordName::new`].
+    /// Creates a name from characters, like [`RecordName::new`].
     pub fn of(name: impl Iterator<Item = char>) -> Option<Self> {
         let (mut bytes, mut length) = ([0; NAME_MAX], 0);
         for c in name {
@@ -38,13 +38,13 @@ impl RecordName {
         (length > 0).then_some(RecordName(bytes))
     }
 
-    /// True if values of this name, which begins with an underscore, belong to the board: they outlast a
-    /// [reset](crate::Store::reset) and another owner.
+    /// Returns true if the name begins with an underscore. Such a value belongs to the board and survives a
+    /// [reset](crate::Store::reset) and a change of the owner.
     pub const fn outlasts(&self) -> bool {
         matches!(self.0, [b'_', ..])
     }
 
-    /// Returns the name with zeros behind it.
+    /// Returns the name, padded with zeros.
     pub const fn to_bytes(self) -> [u8; NAME_MAX] {
         self.0
     }
@@ -68,18 +68,18 @@ impl fmt::Debug for RecordName {
     }
 }
 
-/// What a record says.
+/// Content of a record.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Record {
-    /// First of a sector, written last: the sector with the largest `sequence` counts.
+    /// First record of a sector, written last. The sector with the largest `sequence` is active.
     Header { sequence: u32 },
-    /// All values before this record are void; what follows belongs to `owner`.
+    /// Makes all earlier values void; later values belong to `owner`.
     Begin { owner: u32 },
-    /// The value of `name`, as its owner's `edition` understands it; none takes it back.
+    /// Value of `name` in its owner's `edition`. `None` deletes the value.
     Value { name: RecordName, edition: u16, bits: Option<u32> },
 }
 
-/// Kinds of records. Neither 0 nor 0xFFFF, to which torn words tend.
+/// Codes of the record kinds. A torn write tends to 0 or 0xFFFF, so neither is used.
 const HEADER: u16 = 0x4831;
 const BEGIN: u16 = 0x4232;
 const VALUE: u16 = 0x5633;
@@ -104,7 +104,7 @@ impl Record {
         bytes
     }
 
-    /// Reads a record; none if it is blank, torn or no record at all.
+    /// Reads a record, `None` if the bytes are blank, torn or no record.
     pub(crate) fn from_bytes(bytes: &[u8; RECORD]) -> Option<Self> {
         let (body, sum) = bytes.split_last_chunk::<4>()?;
         if CRC.checksum(body) != u32::from_le_bytes(*sum) {

@@ -4,19 +4,19 @@ use crate::record::{RECORD, Record, RecordName};
 use core::fmt;
 use embedded_storage::nor_flash::NorFlash;
 
-/// Sectors of a store.
+/// Number of sectors of a store.
 const SECTORS: u32 = 2;
-/// Share of a sector, in eighths, above which [`Store::make_room`] moves on to the other one.
+/// [`Store::make_room`] moves to the other sector if more than this share of the active one is used, in eighths.
 const FULL_EIGHTHS: u32 = 4;
 
-/// Why a value was not written.
+/// Reason why a value was not written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Error<E> {
-    /// The flash itself.
+    /// The flash reported an error.
     Flash(E),
-    /// The sector is full and the other one is not erased: [`Store::make_room`] at the next start.
+    /// The sector is full and the other one is not erased. [`Store::make_room`] at the next start erases it.
     NeedsErase,
-    /// There are more names than a sector has room for.
+    /// There are more names than a sector can hold.
     Full,
 }
 
@@ -46,18 +46,19 @@ impl<E: fmt::Debug> fmt::Display for Error<E> {
 
 impl<E: fmt::Debug> core::error::Error for Error<E> {}
 
-/// What was in the flash when the store was opened.
+/// State of the flash when the store was opened.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Found {
-    /// Places that hold neither a record nor nothing: what cuts of power have left, or something else than a store.
+    /// Number of places that are neither blank nor a valid record: the result of a power cut, or data of another
+    /// program.
     pub damaged: u32,
-    /// True if there is no store, though the flash is not blank.
+    /// True if there is no store although the flash is not blank.
     pub foreign: bool,
-    /// True if the values belong to another owner, so that none of them counts.
+    /// True if the values belong to another owner and do not count.
     pub of_another: bool,
 }
 
-/// Sector with the records that count.
+/// Active sector, which holds the current records.
 #[derive(Clone, Copy, Debug)]
 struct Active {
     sector: u32,
@@ -68,7 +69,7 @@ struct Active {
     first: u32,
     /// Owner of the values.
     owner: Option<u32>,
-    /// True if a place is damaged.
+    /// True if any place is damaged.
     is_damaged: bool,
 }
 
@@ -83,11 +84,11 @@ pub struct Store<F> {
     found: Found,
 }
 
-/// A sector that is being filled.
+/// Sector that is being filled and is not active yet.
 struct Filling {
     sector: u32,
     owner: u32,
-    /// As in [`Active`].
+    /// Places `next` and `first` as in [`Active`].
     next: u32,
     first: u32,
 }
@@ -95,7 +96,7 @@ struct Filling {
 /// Name, edition and bits of a value.
 type Held = (RecordName, u16, u32);
 
-/// What a place of a sector holds.
+/// Content of one place of a sector.
 enum Place {
     Blank,
     Damaged,
@@ -103,7 +104,7 @@ enum Place {
 }
 
 impl<F: NorFlash> Store<F> {
-    /// Places of a sector, the header's among them.
+    /// Number of places in a sector, including the header's.
     const PLACES: u32 = {
         assert!(
             RECORD.is_multiple_of(F::WRITE_SIZE) && RECORD.is_multiple_of(F::READ_SIZE),
@@ -120,14 +121,14 @@ impl<F: NorFlash> Store<F> {
     /// nothing.
     ///
     /// # Errors
-    /// If the flash cannot be read.
+    /// Returns an error if the flash cannot be read.
     pub fn open(flash: F, start: u32, owner: u32) -> Result<Self, Error<F::Error>> {
         let mut store = Store { flash, start, owner, active: None, found: Found::default() };
         store.find()?;
         Ok(store)
     }
 
-    /// Returns what was in the flash when the store was opened.
+    /// Returns the state of the flash when the store was opened.
     pub fn found(&self) -> Found {
         self.found
     }
@@ -137,11 +138,10 @@ impl<F: NorFlash> Store<F> {
         self.flash
     }
 
-    /// Erases what does not count, so that there is room for at least half a sector of further changes, and leaves out
-    /// what is damaged. To be called at start-up: on a processor that runs from the same flash, each erase stops
-    /// everything.
+    /// Erases the inactive sector, so that there is room for at least half a sector of further changes, and drops
+    /// damaged places. Call it at start-up: on a processor that runs from the same flash, each erase stops everything.
     ///
-    /// # Errors
+    /// Returns an error of the flash.
     /// Of the flash.
     pub fn make_room(&mut self) -> Result<(), Error<F::Error>> {
         match self.active {
@@ -153,10 +153,11 @@ impl<F: NorFlash> Store<F> {
                 self.finish(filling, 1)
             }
             Some(active) => {
-                // A sector that fills up before the next start then has where to move on to, without an erase.
+                // A sector that fills up before the next start can then move to the other one without an erase.
                 self.clear(other(active.sector))?;
                 let fills = active.next > Self::PLACES * FULL_EIGHTHS / 8;
-                // Less header and beginning: if all else counts, a move would free no place, and only wear the flash.
+                // Without header and begin record: if all the rest counts, a move would free no place and only wear the
+                // flash.
                 if active.is_damaged || fills && self.live()? < active.next.saturating_sub(2) {
                     self.move_on(None)?;
                     self.clear(active.sector)?;
@@ -166,10 +167,10 @@ impl<F: NorFlash> Store<F> {
         }
     }
 
-    /// Calls `visit` with the name, edition and bits of every value that counts, except for those that
-    /// [outlast](RecordName::outlasts) the owner.
+    /// Calls `visit` with name, edition and bits of every current value of the owner. Values of the board
+    /// ([`RecordName::outlasts`]) are left out.
     ///
-    /// # Errors
+    /// Returns an error of the flash.
     /// Of the flash.
     pub fn visit(&mut self, mut visit: impl FnMut(RecordName, u16, u32)) -> Result<(), Error<F::Error>> {
         let Some(active) = self.active.filter(|active| active.owner == Some(self.owner)) else { return Ok(()) };
@@ -183,7 +184,7 @@ impl<F: NorFlash> Store<F> {
 
     /// Returns edition and bits of the value of `name`, if it has one.
     ///
-    /// # Errors
+    /// Returns an error of the flash.
     /// Of the flash.
     pub fn get(&mut self, name: RecordName) -> Result<Option<(u16, u32)>, Error<F::Error>> {
         let mine = |active: &Active| name.outlasts() || active.owner == Some(self.owner);
@@ -200,20 +201,21 @@ impl<F: NorFlash> Store<F> {
         Ok(None)
     }
 
-    /// Writes the value of `name`, or takes it back. Erases nothing, and writes nothing that is there already.
+    /// Writes the value of `name`, or deletes it for `None`. Erases nothing, and writes nothing if the value is
+    /// unchanged.
     ///
     /// # Errors
-    /// If it was not written; then what was there before still counts.
+    /// Returns an error if the value was not written. The previous value then still counts.
     pub fn set(&mut self, name: RecordName, edition: u16, bits: Option<u32>) -> Result<(), Error<F::Error>> {
         let held = self.get(name)?;
         if held == bits.map(|bits| (edition, bits)) {
             return Ok(());
         }
-        // Only now do another vehicle's values end: until then its image finds them again.
+        // Only now are another owner's values void: until then its image finds them again.
         if self.active.is_some_and(|active| active.owner != Some(self.owner)) {
             self.reset()?;
         }
-        // Counted only if that many have been written.
+        // The names are counted only if enough records were written for the store to be full.
         let might_be_full = self.active.is_some_and(|active| active.next > Self::NAMES_MAX);
         if held.is_none() && might_be_full && self.live()? >= Self::NAMES_MAX {
             return Err(Error::Full);
@@ -221,16 +223,16 @@ impl<F: NorFlash> Store<F> {
         self.add(Record::Value { name, edition, bits })
     }
 
-    /// Takes back all values, in one record, except for those that [outlast](RecordName::outlasts) it.
+    /// Deletes all values with one record, except the board's ([`RecordName::outlasts`]).
     ///
     /// # Errors
-    /// If it was not written; then all values still count.
+    /// Returns an error if the record was not written. All values then still count.
     pub fn reset(&mut self) -> Result<(), Error<F::Error>> {
         let is_empty = self.active.is_some_and(|it| it.first >= it.next && it.owner == Some(self.owner));
         if is_empty { Ok(()) } else { self.add(Record::Begin { owner: self.owner }) }
     }
 
-    /// Finds the active sector, and what is in it.
+    /// Finds the active sector and its content.
     fn find(&mut self) -> Result<(), Error<F::Error>> {
         let mut blank = true;
         for sector in 0..SECTORS {
@@ -251,7 +253,7 @@ impl<F: NorFlash> Store<F> {
         for place in 1..Self::PLACES {
             let held = self.read(active.sector, place)?;
             if !matches!(held, Place::Blank) {
-                // Behind the last place that is not blank, damaged or not: flash is written once between erases.
+                // After the last place that is not blank, damaged or not: flash is written only once between erases.
                 active.next = place + 1;
             }
             match held {
@@ -271,7 +273,7 @@ impl<F: NorFlash> Store<F> {
         let mut active = self.active.ok_or(Error::NeedsErase)?;
         while active.next < Self::PLACES {
             let place = active.next;
-            // Counted first: a place where a write has failed may not be blank any more, and is not tried again.
+            // Counted before the write: a failed write may leave the place not blank, and it is not tried again.
             active.next += 1;
             self.active = Some(active);
             if self.write(active.sector, place, record)? {
@@ -285,7 +287,7 @@ impl<F: NorFlash> Store<F> {
         self.move_on(Some(record))
     }
 
-    /// Copies what counts to the other sector, with `record` in addition, and makes that one the active one.
+    /// Copies the current records and `record` to the other sector, and makes that sector active.
     fn move_on(&mut self, record: Option<Record>) -> Result<(), Error<F::Error>> {
         let active = self.active.ok_or(Error::NeedsErase)?;
         if !self.is_blank(other(active.sector))? {
@@ -307,11 +309,11 @@ impl<F: NorFlash> Store<F> {
         if let Some(record @ Record::Value { .. }) = record {
             self.append(&mut filling, record)?;
         }
-        // It does not wrap in a flash's life: each step costs an erase, of which a sector endures some 10,000.
+        // The sequence does not wrap in a flash's life: each step costs an erase, and a sector endures some 10,000.
         self.finish(filling, active.sequence.wrapping_add(1))
     }
 
-    /// Begins to fill the blank `sector`.
+    /// Starts to fill the blank `sector`.
     fn begin(&mut self, sector: u32, owner: u32) -> Result<Filling, Error<F::Error>> {
         let mut filling = Filling { sector, owner, next: 1, first: 1 };
         self.append(&mut filling, Record::Begin { owner })?;
@@ -319,7 +321,7 @@ impl<F: NorFlash> Store<F> {
         Ok(filling)
     }
 
-    /// Appends a record to a sector that does not count yet.
+    /// Appends a record to a sector that is not active yet.
     fn append(&mut self, filling: &mut Filling, record: Record) -> Result<(), Error<F::Error>> {
         while filling.next < Self::PLACES {
             filling.next += 1;
@@ -330,10 +332,10 @@ impl<F: NorFlash> Store<F> {
         Err(Error::Full)
     }
 
-    /// Writes the header, which makes the sector the active one.
+    /// Writes the header, which makes the sector active.
     fn finish(&mut self, filling: Filling, sequence: u32) -> Result<(), Error<F::Error>> {
         let Filling { sector, owner, next, first } = filling;
-        // A header that the flash does not take leaves the other sector the active one, and this one to be erased.
+        // If the header cannot be written, the other sector stays active and this one must be erased.
         if !self.write(sector, 0, Record::Header { sequence })? {
             return Err(Error::NeedsErase);
         }
@@ -341,7 +343,7 @@ impl<F: NorFlash> Store<F> {
         Ok(())
     }
 
-    /// Number of values that count.
+    /// Returns the number of current values.
     fn live(&mut self) -> Result<u32, Error<F::Error>> {
         let Some(active) = self.active else { return Ok(0) };
         let mut live = 0;
@@ -352,7 +354,7 @@ impl<F: NorFlash> Store<F> {
         Ok(live)
     }
 
-    /// Returns the value at `place`, if no later one has the same name.
+    /// Returns the value at `place`, if no later record has the same name.
     fn counts(&mut self, active: Active, place: u32) -> Result<Option<Held>, Error<F::Error>> {
         let Place::Holds(Record::Value { name, edition, bits: Some(bits) }) = self.read(active.sector, place)? else {
             return Ok(None);
@@ -380,7 +382,7 @@ impl<F: NorFlash> Store<F> {
         })
     }
 
-    /// Writes a record; false if it does not read as written.
+    /// Writes a record. Returns false if it does not read back as written.
     fn write(&mut self, sector: u32, place: u32, record: Record) -> Result<bool, Error<F::Error>> {
         self.flash.write(self.address(sector, place), &record.to_bytes())?;
         Ok(matches!(self.read(sector, place)?, Place::Holds(held) if held == record))

@@ -1,5 +1,5 @@
-//! A cut of power at every bit of every write and in every erase: what is there afterwards is what was there before,
-//! or what was being written, and the store works on.
+//! A power cut at every bit of every write and in every erase: afterwards the store holds the old values or the new
+//! one, and still works.
 #![allow(clippy::panic, clippy::unwrap_used, clippy::expect_used, clippy::indexing_slicing, missing_docs)] // tests
 
 mod common;
@@ -9,14 +9,14 @@ use common::{Cuttable, Erasing, PowerCut};
 use proptest::prelude::*;
 use std::collections::BTreeMap;
 
-/// Small sectors, so that a few changes fill them: 17 places of a record.
+/// Small sectors, so that a few changes fill them: 17 places.
 const SECTOR: usize = 480;
 const OWNER: u32 = 7;
 
 type Values = BTreeMap<RecordName, (u16, u32)>;
 type Flash = Cuttable<SECTOR>;
 
-/// What a vehicle does with its store.
+/// Action of a vehicle on its store.
 #[derive(Clone, Copy, Debug)]
 enum Act {
     Set(u8, Option<u32>),
@@ -25,7 +25,7 @@ enum Act {
     Restart,
 }
 
-/// The third and seventh outlast a reset.
+/// Returns the name of a value. The third and seventh survive a reset.
 fn name(number: u8) -> RecordName {
     let prefix = if number % 4 == 2 { "" } else { "P" };
     RecordName::new(&format!("{prefix}_NUMBER_{number}")).unwrap()
@@ -43,7 +43,7 @@ fn values(store: &mut Store<Flash>) -> Values {
     values
 }
 
-/// What `act` makes of `values`.
+/// Returns `values` after `act`.
 fn after(mut values: Values, act: Act) -> Values {
     match act {
         Act::Set(number, Some(bits)) => drop(values.insert(name(number), (3, bits))),
@@ -56,7 +56,7 @@ fn after(mut values: Values, act: Act) -> Values {
 
 /// Opens the store and makes room; returns the flash if the power is cut.
 fn boot(flash: Flash) -> Result<Store<Flash>, Flash> {
-    // Nothing is written when it is opened, so the power is still on.
+    // Opening writes nothing, so the power is still on.
     let mut store = Store::open(flash, 0, OWNER).unwrap();
     match store.make_room() {
         Ok(()) => Ok(store),
@@ -65,8 +65,8 @@ fn boot(flash: Flash) -> Result<Store<Flash>, Flash> {
     }
 }
 
-/// Carries out `acts` on `flash` until the power is cut; returns the flash, and what the store may hold then: the
-/// values before the act that was cut, and after it.
+/// Carries out `acts` on `flash` until the power is cut. Returns the flash, and the values that the store may hold
+/// then: those before the interrupted act, and those after it.
 fn live(flash: Flash, acts: &[Act]) -> (Flash, [Values; 2]) {
     let mut held = Values::new();
     let mut store = match boot(flash) {
@@ -101,16 +101,16 @@ fn live(flash: Flash, acts: &[Act]) -> (Flash, [Values; 2]) {
     (store.into_flash(), [held.clone(), held])
 }
 
-/// Checks that the store comes up with one of `allowed`, and works on.
+/// Checks that the store opens with one of `allowed`, and still works.
 fn comes_up(mut flash: Flash, allowed: &[Values; 2], context: &str) {
     flash.power_up();
-    // Before anything is erased, as a program that only reads it would see it.
+    // Before anything is erased, as a program that only reads would see it.
     let mut store = Store::open(flash, 0, OWNER).unwrap();
     let found = values(&mut store);
     assert!(allowed.contains(&found), "{context}: {found:?}, neither of {allowed:?}");
     store.make_room().unwrap();
     assert_eq!(values(&mut store), found, "{context}: room was made");
-    // Every value can be changed, twice, and what is set is there after a start.
+    // Every value can be changed twice, and is there after a restart.
     let mut expected = found;
     for act in (0..6).flat_map(|number| [Act::Set(number, Some(1)), Act::Set(number, Some(u32::from(number) + 10))]) {
         expected = after(expected, act);
@@ -124,7 +124,7 @@ fn comes_up(mut flash: Flash, allowed: &[Values; 2], context: &str) {
     assert_eq!(values(&mut store), expected, "{context}: afterwards");
 }
 
-/// Changes that fill the sectors several times, take values back, restore all and restart in between.
+/// Returns acts that fill the sectors several times, delete values, reset and restart in between.
 fn day() -> Vec<Act> {
     let mut acts: Vec<Act> = (0..24).map(|i| Act::Set(i % 5, Some(u32::from(i) * 0x0101_0101))).collect();
     acts.extend([Act::Set(2, None), Act::Restart, Act::Set(1, Some(0)), Act::Set(1, Some(u32::MAX)), Act::Reset]);
@@ -133,7 +133,7 @@ fn day() -> Vec<Act> {
     acts
 }
 
-/// Bits and steps of `acts`.
+/// Returns the number of bits and erase steps of `acts`.
 fn length(seed: u64, erasing: Erasing, acts: &[Act]) -> u64 {
     live(Flash::new(seed, erasing), acts).0.done
 }
@@ -152,7 +152,7 @@ fn a_cut_at_every_bit_leaves_the_old_value_or_the_new_one() {
     }
 }
 
-/// The start after a cut is cut itself.
+/// The start after a power cut is interrupted as well.
 #[test]
 fn a_cut_during_the_repair_does_no_harm() {
     let acts = day();
@@ -172,7 +172,7 @@ fn a_cut_during_the_repair_does_no_harm() {
     }
 }
 
-/// Sequences drawn.
+/// Draws sequences of acts.
 fn acts() -> impl Strategy<Value = Vec<Act>> {
     let act = prop_oneof![
         12 => (0..8_u8, any::<u32>()).prop_map(|(number, bits)| Act::Set(number, Some(bits))),

@@ -1,4 +1,4 @@
-//! The parts of the store: names, numbers of owners, records as they lie in flash, and the flash in RAM.
+//! Parts of the store: names, owner numbers, layout of records in flash, and the flash in RAM.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs)] // tests
 
 use afbc_store::{Error, Found, NAME_MAX, Ram, RecordName, Store, hash};
@@ -8,14 +8,14 @@ use proptest::prelude::*;
 const SECTOR: usize = 480;
 const RECORD: usize = 28;
 
-/// CRC-32 (ISO-HDLC), bit by bit.
+/// Computes CRC-32 (ISO-HDLC) bit by bit.
 fn crc32(bytes: &[u8]) -> u32 {
     !bytes.iter().fold(!0_u32, |crc, byte| {
         (0..8).fold(crc ^ u32::from(*byte), |crc, _| if crc & 1 == 1 { crc >> 1 ^ 0xEDB8_8320 } else { crc >> 1 })
     })
 }
 
-/// A record: name, value, edition, kind, checksum.
+/// Returns a record: name, value, edition, kind, checksum.
 fn record(name: &str, bits: u32, edition: u16, kind: [u8; 2]) -> Vec<u8> {
     let mut bytes = name.as_bytes().to_vec();
     bytes.resize(NAME_MAX, 0);
@@ -65,7 +65,7 @@ fn name() -> impl Strategy<Value = String> {
 }
 
 proptest! {
-    /// A name is what it was made of, at any width, and outlasts a reset if it begins with an underscore.
+    /// A name keeps its text at any format width, and survives a reset if it begins with an underscore.
     #[test]
     fn a_name_is_its_text(text in name(), width in 0..20_usize) {
         let name = RecordName::new(&text).unwrap();
@@ -83,8 +83,8 @@ proptest! {
         prop_assert_eq!(hash(&bytes), crc32(&bytes));
     }
 
-    /// Records lie in flash as they are described: what another program has written is read, and what is written is
-    /// what another program would read.
+    /// Records have the documented layout: the store reads records of another program, and that program would read the
+    /// store's.
     #[test]
     fn records_lie_in_flash_as_described(
         values in prop::collection::btree_map(name(), (any::<u32>(), any::<u16>()), 1..10),
@@ -111,7 +111,7 @@ proptest! {
         prop_assert!(store.into_flash() == flash);
     }
 
-    /// What lies beside the store's two sectors stays, whatever happens in them.
+    /// Flash beside the store's two sectors stays unchanged.
     #[test]
     fn neighbours_are_left_alone(sets in prop::collection::vec((0..6_u8, any::<u32>()), 1..80)) {
         let flash = Large([vec![0xA5; SECTOR], vec![0; 2 * SECTOR], vec![0x5A; SECTOR]].concat());
@@ -136,7 +136,7 @@ proptest! {
         }
     }
 
-    /// Each place that is damaged is counted, costs its value alone, and is left behind when room is made.
+    /// Each damaged place is counted, loses only its own value, and is dropped when room is made.
     #[test]
     fn damaged_places_are_counted(count in 1..12_u32, damaged in prop::collection::btree_set(0..12_u32, 0..6)) {
         let damaged: Vec<_> = damaged.into_iter().filter(|number| *number < count).collect();
@@ -146,7 +146,7 @@ proptest! {
         store.make_room().unwrap();
         (0..count).for_each(|number| store.set(name(number), 0, Some(number)).unwrap());
         let mut flash = store.into_flash();
-        // Behind header and beginning.
+        // After header and begin record.
         damaged.iter().for_each(|number| flash.0[RECORD * (2 + *number as usize) + 20] ^= 0x10);
         let mut store = Store::open(flash, 0, 1).unwrap();
         prop_assert_eq!(store.found().damaged, damaged.len() as u32);
@@ -160,8 +160,8 @@ proptest! {
         prop_assert!(is_held(&mut store) && store.found() == Found::default());
     }
 
-    /// The flash in RAM clears bits when it is written, sets them when it is erased, and refuses what is outside of it,
-    /// or no whole words.
+    /// The flash in RAM clears bits on a write, sets them on an erase, and refuses addresses outside of it and
+    /// incomplete words.
     #[test]
     fn ram_is_flash(writes in prop::collection::vec((0..250_u32, 0..40_usize, any::<u8>(), any::<bool>()), 1..20)) {
         let (mut ram, mut model) = (Ram::<96>::BLANK, vec![0xFF; 192]);
@@ -191,7 +191,7 @@ proptest! {
     }
 }
 
-/// What a station is told fits its text, and names the flash's own error.
+/// The texts for a ground station have the right length, and `Display` adds the flash's own error.
 #[test]
 fn errors_say_what_to_do() {
     let errors = [Error::Flash("busy"), Error::NeedsErase, Error::Full];

@@ -1,4 +1,4 @@
-//! A store in flash that holds anything at the start, that wears, that fills up, and that has two owners.
+//! Stores with any initial content, wear, full stores, and two owners.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, clippy::panic, missing_docs)] // tests
 
 mod common;
@@ -8,7 +8,7 @@ use common::{Cuttable, Erasing};
 use proptest::prelude::*;
 use std::collections::BTreeMap;
 
-/// A sector of the STM32F405.
+/// Size of a sector of the STM32F405.
 const SECTOR: usize = 16 * 1024;
 
 fn name(number: u32) -> RecordName {
@@ -26,7 +26,7 @@ fn names_are_short_and_printable() {
     assert_ne!(hash(b"paper"), hash(b"racer"));
 }
 
-/// Ten thousand changes of 130 parameters, with a start whenever the store asks for one.
+/// Ten thousand changes of 130 parameters, with a restart whenever the store needs one.
 #[test]
 fn ten_thousand_changes_erase_a_sector_few_times() {
     let mut store = Store::open(blank::<SECTOR>(), 0, 1).unwrap();
@@ -40,12 +40,12 @@ fn ten_thousand_changes_erase_a_sector_few_times() {
             store.set(name(i * 7 % 130), 0, Some(i)).unwrap();
         }
     }
-    // A sector has 583 places, of which 131 are copies: a start makes room for some 900 changes in two sectors.
+    // A sector has 583 places, of which 131 are copies, so a start makes room for some 900 changes in two sectors.
     let erases = store.into_flash().erases;
     assert!(starts <= 13 && erases.iter().all(|erases| *erases <= 13), "{starts} starts, {erases:?} erases");
 }
 
-/// The same with a start after every change: each change may move the store on, but does not.
+/// The same with a restart after every change: most starts must not move the store to the other sector.
 #[test]
 fn a_start_after_every_change_erases_a_sector_few_times() {
     let mut flash = blank::<SECTOR>();
@@ -55,7 +55,7 @@ fn a_start_after_every_change_erases_a_sector_few_times() {
         store.set(name(i % 20), 0, Some(i)).unwrap();
         flash = store.into_flash();
     }
-    // Each time half a sector is full: 292 places, of which 21 are copies.
+    // A move happens when half a sector is full: 292 places, of which 21 are copies.
     assert!(flash.erases.iter().all(|erases| *erases <= 20), "{:?} erases", flash.erases);
 }
 
@@ -86,7 +86,7 @@ fn a_full_store_says_so_and_keeps_what_it_has() {
         done => done,
     };
     (0..most).for_each(|number| set(&mut store, number, Some(number)).unwrap());
-    // In every sector in turn: a new name is refused, known ones can be changed and taken back.
+    // In every sector in turn: a new name is refused, known ones can be changed and deleted.
     for round in 0..40 {
         assert_eq!(set(&mut store, most + round, Some(1)), Err(Error::Full), "{round}");
         set(&mut store, round % most, Some(round)).unwrap();
@@ -102,7 +102,7 @@ fn a_full_store_says_so_and_keeps_what_it_has() {
     let mut store = Store::open(store.into_flash(), 0, 1).unwrap();
     store.visit(|name, _, bits| _ = found.insert(name, bits)).unwrap();
     assert_eq!(found, expected);
-    // Restoring the defaults always makes room.
+    // A reset always makes room.
     store.make_room().unwrap();
     store.reset().unwrap();
     store.visit(|name, _, _| panic!("{name}")).unwrap();
@@ -119,7 +119,7 @@ fn values_of_another_vehicle_do_not_count_and_are_not_lost_by_reading() {
     // Back on the first vehicle, its value is there.
     let mut store = Store::open(other.into_flash(), 0, 1).unwrap();
     assert_eq!((store.found(), store.get(name(0))), (Found::default(), Ok(Some((0, 9)))));
-    // Until the other one sets something.
+    // Until the other vehicle sets something.
     let mut other = Store::open(store.into_flash(), 0, 2).unwrap();
     other.set(name(1), 0, Some(5)).unwrap();
     let mut other = Store::open(other.into_flash(), 0, 2).unwrap();
@@ -128,7 +128,7 @@ fn values_of_another_vehicle_do_not_count_and_are_not_lost_by_reading() {
     assert_eq!((store.found().of_another, store.get(name(0))), (true, Ok(None)));
 }
 
-/// Opens a store in `bytes`, checks that it works, and returns what it held.
+/// Opens a store in `bytes`, checks that it works, and returns its content.
 fn works(bytes: Vec<u8>) -> (Found, Vec<(RecordName, u32)>) {
     let mut store = Store::open(Cuttable { bytes, ..blank::<480>() }, 0, 1).unwrap();
     let (found, mut held) = (store.found(), Vec::new());
@@ -153,7 +153,7 @@ proptest! {
         prop_assert_eq!(works(bytes), (Found { foreign: true, ..Found::default() }, vec![]));
     }
 
-    /// Whatever flips in a store's flash, only values that were written are found.
+    /// Whatever bits flip in a store's flash, only values that were written are found.
     #[test]
     fn flipped_bits_make_no_value(flips in prop::collection::vec(0..960_usize * 8, 1..40), sets in 1..60_u32) {
         let mut store = Store::open(blank::<480>(), 0, 1).unwrap();

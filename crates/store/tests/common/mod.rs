@@ -3,7 +3,7 @@
 
 use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash};
 
-/// The power is off.
+/// Error of a flash without power.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct PowerCut;
 
@@ -13,16 +13,16 @@ impl NorFlashError for PowerCut {
     }
 }
 
-/// How a cut erase leaves a sector.
+/// State in which an interrupted erase leaves a sector.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Erasing {
     /// Bits become 1 from the first to the last.
     Forwards,
-    /// From the last to the first.
+    /// Bits become 1 from the last to the first.
     Backwards,
-    /// In no order: each is 1 with the same chance.
+    /// Bits become 1 in random order.
     Scattered,
-    /// All become 0 first, as in chips that program a sector before they erase it; then 1 in no order.
+    /// All bits become 0 first, as in chips that program a sector before they erase it, and then 1 in random order.
     Zeroed,
 }
 
@@ -30,20 +30,20 @@ impl Erasing {
     pub(crate) const ALL: [Self; 4] = [Self::Forwards, Self::Backwards, Self::Scattered, Self::Zeroed];
 }
 
-/// Steps of an erase that a cut can fall between.
+/// Number of steps of an erase between which the power can be cut.
 const ERASE_STEPS: u64 = 16;
 
-/// Two sectors of `SECTOR` bytes, in words of 4. A write clears the bits of a word in an order of its own, the words
-/// one after the other; the power is cut after `left` of them.
+/// Two sectors of `SECTOR` bytes, in words of 4. A write clears the bits of a word in a random order, one word after
+/// the other. The power is cut after `left` bits.
 #[derive(Clone, Debug)]
 pub(crate) struct Cuttable<const SECTOR: usize> {
     pub(crate) bytes: Vec<u8>,
-    /// Bits that can still be written; none without a cut.
+    /// Bits that can still be written, `None` without a power cut.
     pub(crate) left: Option<u64>,
     pub(crate) erasing: Erasing,
-    /// Bits written, and steps of erases.
+    /// Bits written, plus steps of erases.
     pub(crate) done: u64,
-    /// Erases of each sector.
+    /// Number of erases of each sector.
     pub(crate) erases: [u32; 2],
     pub(crate) off: bool,
     pub(crate) seed: u64,
@@ -55,7 +55,7 @@ impl<const SECTOR: usize> Cuttable<SECTOR> {
         Cuttable { bytes, left: None, erasing, done: 0, erases: [0; 2], off: false, seed: seed | 1 }
     }
 
-    /// The power returns, and is not cut again.
+    /// Restores the power for good.
     pub(crate) fn power_up(&mut self) {
         (self.left, self.off) = (None, false);
     }
@@ -67,7 +67,7 @@ impl<const SECTOR: usize> Cuttable<SECTOR> {
         self.seed
     }
 
-    /// Spends one bit; false if the power is off.
+    /// Spends one bit; returns false if the power is off.
     fn step(&mut self) -> bool {
         self.off |= self.left == Some(0);
         if !self.off {
