@@ -1,4 +1,4 @@
-//! The accelerometer's offset and scale.
+//! Calibration of the accelerometer's offset and scale.
 
 use crate::rest::{Limits, Rest};
 use crate::side::{Side, Sides};
@@ -6,17 +6,18 @@ use crate::{CalibrationEvent, CalibrationFailure, RawSample};
 use afbc_types::Mounting;
 use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 
-/// Time at rest after which the side is known, and whose mean is its specific force \[us\].
+/// Time at rest after which the side is detected, and time over which its mean is taken \[us\].
 const DETECT_US: u64 = 500_000;
 const MEASURE_US: u64 = 2_000_000;
-/// Time for the next side \[us\].
+/// Time allowed for the next side \[us\].
 const PATIENCE_US: u64 = 90_000_000;
-/// Part of gravity that some side must have along each axis of the sensor, in both directions, about their mean.
+/// Smallest part of gravity that some side must have along each sensor axis, in both directions, about the mean of all
+/// sides.
 const ALONG_MIN: f32 = 0.75;
-/// Largest offset: twice that of an MPU-6000, 80 mg \[m/s2\]; largest error of the scale: four times its 3 %.
+/// Largest offset: twice that of an MPU-6000, 80 mg \[m/s2\]. Largest scale error: four times that of an MPU-6000, 3 %.
 const OFFSET_MAX_M_S2: f32 = 2.0;
 const SCALE_ERROR_MAX: f32 = 0.12;
-/// Most steps of the fit, which doubles its digits in each, and the change that ends it.
+/// Largest number of Newton steps, each of which doubles the correct digits, and the change that ends them.
 const STEPS: u8 = 12;
 const PRECISION: f32 = 1e-5;
 
@@ -25,27 +26,27 @@ const PRECISION: f32 = 1e-5;
 pub struct AccelerometerErrors {
     /// Offset, sensor axes \[m/s2\].
     pub offset_m_s2: Vector3<f32>,
-    /// Factors on the readings less the offset, sensor axes.
+    /// Factors on the readings minus the offset, sensor axes.
     pub scale: Vector3<f32>,
 }
 
-/// Measures the accelerometer's errors o and S = diag(s) from the specific forces f that it reads at rest on the six
-/// sides: those with which all have the size of gravity,
+/// Measures the accelerometer's errors o and S = diag(s) from the specific forces f at rest on the six sides: with the
+/// right errors, all corrected forces have the size of gravity,
 ///
 /// ```text
 /// |S (f - o)| = g
 /// ```
 ///
-/// That a side does not point straight down, as a vehicle held by hand, has no effect. The axes of the sensor must be
-/// near those of the body, in any order.
+/// A side need not point straight down, so a vehicle may be held by hand. The sensor's axes must be near the body's
+/// axes, in any order.
 #[derive(Clone, Debug)]
 pub struct AccelerometerCalibration {
     to_body: Matrix3<f32>,
     gravity_m_s2: f32,
-    /// When the last side was done \[us\].
+    /// Time at which the last side was finished \[us\].
     done_us: Option<u64>,
     rest: Rest,
-    /// Side of the present rest, once known; done once measured, or measured before.
+    /// Side of the present rest, once detected; true if the side is finished, now or before.
     detected: Option<(Option<Side>, bool)>,
     pending: Sides,
     read_m_s2: Matrix3x6,
@@ -55,7 +56,7 @@ pub struct AccelerometerCalibration {
 type Matrix3x6 = nalgebra::SMatrix<f32, 3, 6>;
 
 impl AccelerometerCalibration {
-    /// Creates it for a sensor that is mounted like this, and a gravity \[m/s2\].
+    /// Creates the calibration for a sensor with this mounting and this gravity \[m/s2\].
     #[must_use]
     pub fn new(mounting: &Mounting, gravity_m_s2: f32) -> Self {
         AccelerometerCalibration {
@@ -69,7 +70,7 @@ impl AccelerometerCalibration {
         }
     }
 
-    /// Takes a sample; returns the errors, or why there are none.
+    /// Takes a sample. Returns the errors, or the failure, at the end.
     pub fn step(
         &mut self,
         sample: &RawSample,
@@ -80,7 +81,7 @@ impl AccelerometerCalibration {
             sample.at_us
         });
         let rests = sample.is_finite() && self.rest.add(sample, &Limits::HELD);
-        // Between two sides it is to be moved: only what is being measured is spoilt by that.
+        // Between two sides the vehicle is to be moved, so motion is reported only during a measurement.
         if !rests && matches!(self.detected.take(), Some((Some(_), false))) {
             tell(CalibrationEvent::Moved);
         }
@@ -142,8 +143,8 @@ fn fit(read_m_s2: &Matrix3x6, gravity_m_s2: f32) -> Result<AccelerometerErrors, 
         let change = jacobian.lu().solve(&residuals).ok_or(CalibrationFailure::TooFewDirections)?;
         offset += change.fixed_rows::<3>(0);
         scale += change.fixed_rows::<3>(3);
-        // False of NaN.
-        // Wider than what is accepted in the end: a step may go too far on the way.
+        // NaN makes this false.
+        // Wider than the final limits, because an intermediate step may overshoot.
         let is_possible =
             offset.amax() * gravity_m_s2 <= 2.0 * OFFSET_MAX_M_S2 && scale.amin() > 0.5 && scale.amax() < 2.0;
         if !is_possible {

@@ -1,27 +1,27 @@
-//! The ellipsoid on which a magnetometer's readings lie.
+//! Fits the ellipsoid of a magnetometer's readings.
 
 use crate::CalibrationFailure;
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
-/// Unit of the sums, so that their numbers are near one \[uT\].
+/// Unit of the sums \[uT\], so that their numbers are near one.
 const UNIT_UT: f64 = 50.0;
-/// Earth's field, 22 to 67 uT (IGRF-14), and what steel of a building adds or takes \[uT\].
+/// Accepted strength: the earth's field, 22 to 67 uT (IGRF-14), plus the effect of steel in a building \[uT\].
 const STRENGTH_UT: core::ops::RangeInclusive<f64> = 15.0..=100.0;
-/// Largest offset \[uT\]: much more than the earth's field leaves few digits, or drives a sensor to its limit.
+/// Largest offset \[uT\]: a much larger one than the earth's field leaves few digits, or saturates the sensor.
 const OFFSET_MAX_UT: f64 = 400.0;
-/// Largest root mean square of the distance from the ellipsoid, over the field's strength.
+/// Largest root mean square distance from the ellipsoid, divided by the field's strength.
 const RESIDUAL_MAX: f64 = 0.06;
-/// Largest share of the sphere's squared residuals that must be left by the ellipsoid for its five further numbers to
-/// count.
+/// The ellipsoid is used only if its squared residuals are below this share of the sphere's, because it has five more
+/// parameters.
 const WORTH: f64 = 0.8;
-/// Least 27 det C of the directions' second moments C, 1 if they are even, and largest norm of their mean, 0 if even: a
+/// Smallest 27 det C of the directions' second moments C (1 if even), and largest norm of their mean (0 if even). A
 /// ring at a third of the radius has 0.5 and 0.33, half a sphere 1 and 0.5.
 const EVENNESS_MIN: f64 = 0.7;
 const MEAN_MAX: f64 = 0.25;
-/// Least number of readings.
+/// Smallest number of readings.
 const READINGS_MIN: f64 = 30.0;
 
-/// What the readings tell of the magnetometer, as in [`SensorCalibration`](afbc_types::SensorCalibration).
+/// Result of the fit: errors of the magnetometer, as in [`SensorCalibration`](afbc_types::SensorCalibration).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FieldFit {
     /// Offset \[uT\].
@@ -32,18 +32,18 @@ pub struct FieldFit {
     pub off_diagonal: Vector3<f32>,
     /// Strength of the corrected field \[uT\].
     pub strength_ut: f32,
-    /// Root mean square of the distance from the ellipsoid, or from the sphere \[uT\].
+    /// Root mean square distance from the ellipsoid or the sphere \[uT\].
     pub residual_ut: f32,
 }
 
-/// Normal equations of the ellipsoid, without the readings. With x in `UNIT_UT`, a reading fulfils
+/// Normal equations of the ellipsoid; the readings themselves are not kept. With x in `UNIT_UT`, a reading fulfils
 ///
 /// ```text
 /// (1 + u) x^2 + (1 + v) y^2 + (1 - u - v) z^2 + 2 d xy + 2 e xz + 2 f yz + 2 g x + 2 h y + 2 i z + k = 0
 /// ```
 ///
-/// whose nine numbers are found by least squares. That the trace of the quadratic part is 3 is possible for each
-/// ellipsoid, wherever it is; the last four numbers alone, with the others at zero, are a sphere's.
+/// whose nine numbers are found by least squares. Fixing the trace of the quadratic part at 3 is possible for any
+/// ellipsoid at any place. The last four numbers alone, with the others at zero, describe a sphere.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FieldSums {
     normal: SMatrix<f64, 9, 9>,
@@ -59,7 +59,7 @@ impl Default for FieldSums {
 }
 
 impl FieldSums {
-    /// Adds a reading \[uT\]; one that is no number is left out.
+    /// Adds a reading \[uT\]. A reading that is NaN or too large is skipped.
     pub fn add(&mut self, field_ut: &Vector3<f32>) {
         if !field_ut.iter().all(|it| it.abs() < 1e6) {
             return;
@@ -84,7 +84,7 @@ impl FieldSums {
         self.readings += 1.0;
     }
 
-    /// Fits an ellipsoid if it is much better than a sphere, which needs fewer readings to be sound.
+    /// Fits an ellipsoid if it is much better than a sphere, which is reliable with fewer readings.
     ///
     /// # Errors
     /// [`TooFewDirections`](CalibrationFailure::TooFewDirections), [`TooLarge`](CalibrationFailure::TooLarge),
@@ -131,7 +131,7 @@ impl FieldSums {
         let found = normal.cholesky()?.solve(&right);
         let mut numbers = SVector::<f64, 9>::zeros();
         numbers.fixed_rows_mut::<4>(5).copy_from(&found);
-        // At the least squares |A x - b|^2 = b^T b - x^T A^T b, for which no reading need be kept.
+        // At the least squares solution |A x - b|^2 = b^T b - x^T A^T b, which needs no readings.
         Some((numbers, self.right_squared - right.dot(&found)))
     }
 
@@ -141,9 +141,9 @@ impl FieldSums {
         Some((numbers, self.right_squared - self.right.dot(&numbers)))
     }
 
-    /// True if the corrected readings point in all directions.
+    /// Returns true if the corrected readings cover all directions.
     fn covers(&self, centre: &Vector3<f64>, matrix: &Matrix3<f64>, strength: f64) -> bool {
-        // The last row has the sums of what each reading's row has.
+        // The last column has the sums of the elements of all rows.
         let sums = self.normal.column(8) / self.readings;
         let [[a, b, xy2, xz2, yz2, x2, y2, z2, _]] = sums.data.0;
         let squares = -self.right.iter().next_back().copied().unwrap_or(0.0) / self.readings;
@@ -159,7 +159,7 @@ impl FieldSums {
     }
 }
 
-/// A surface |matrix (x - centre)| = strength, in [`UNIT_UT`], whose matrix has the determinant 1.
+/// Surface |matrix (x - centre)| = strength, in [`UNIT_UT`], with a matrix of determinant 1.
 struct Surface {
     centre: Vector3<f64>,
     matrix: Matrix3<f64>,
@@ -167,7 +167,7 @@ struct Surface {
 }
 
 impl Surface {
-    /// Returns the ellipsoid that the nine numbers mean; none if they mean another surface.
+    /// Returns the ellipsoid of these nine numbers, `None` if they describe another surface.
     fn of(numbers: &SVector<f64, 9>) -> Option<Self> {
         let [[u, v, d, e, f, g, h, i, k]] = numbers.data.0;
         let quadratic = Matrix3::new(1.0 + u, d, e, d, 1.0 + v, f, e, f, 1.0 - u - v);
@@ -177,7 +177,7 @@ impl Surface {
         let root = square_root(&quadratic)?;
         let mean = libm::cbrt(root.determinant());
         let strength = libm::sqrt(size) / mean;
-        // False of NaN.
+        // NaN makes this false.
         (size > 0.0 && mean > 0.0 && strength < 1e3).then_some(Surface { centre, matrix: root / mean, strength })
     }
 }

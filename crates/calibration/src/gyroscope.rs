@@ -1,16 +1,16 @@
-//! The gyroscope's offset.
+//! Calibration of the gyroscope's offset.
 
 use crate::rest::{Limits, Rest};
 use crate::{CalibrationEvent, CalibrationFailure, RawSample};
 use nalgebra::Vector3;
 
-/// Time at rest whose mean is the offset \[us\].
+/// Time at rest over which the mean is taken \[us\].
 const MEASURE_US: u64 = 3_000_000;
-/// Time in which that must have succeeded \[us\].
+/// Time allowed for the whole measurement \[us\].
 const PATIENCE_US: u64 = 20_000_000;
 /// Largest offset: more than twice that of an MPU-6000, 20 deg/s \[rad/s\].
 const OFFSET_MAX_RAD_S: f32 = 0.8;
-/// Step of the progress \[%\].
+/// Step of the reported progress \[%\].
 const STEP: u8 = 10;
 
 /// Measures the gyroscope's offset, the mean of its rates while the vehicle stands still. A steady turn about the
@@ -23,7 +23,7 @@ pub struct GyroscopeCalibration {
 }
 
 impl GyroscopeCalibration {
-    /// Takes a sample; returns the offset, sensor axes \[rad/s\], or why there is none.
+    /// Takes a sample. Returns the offset in sensor axes \[rad/s\], or the failure, at the end.
     pub fn step(
         &mut self,
         sample: &RawSample,
@@ -41,7 +41,7 @@ impl GyroscopeCalibration {
                 Err(CalibrationFailure::TooLarge)
             });
         }
-        // Below 100: a rest that is long enough has returned above.
+        // Below 100, because a rest that is long enough has returned above.
         let share = (100 * self.rest.elapsed_us() / MEASURE_US) as u8 / STEP * STEP;
         if share > self.told {
             self.told = share;

@@ -1,20 +1,20 @@
-//! Roll and pitch of the inertial sensor's mounting.
+//! Calibration of roll and pitch of the IMU's mounting.
 
 use crate::rest::{Limits, Rest};
 use crate::{CalibrationEvent, CalibrationFailure, RawSample};
 use afbc_types::{Mounting, SensorCalibration, euler_angles};
 use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion, Vector3};
 
-/// Time at rest whose mean is level \[us\].
+/// Time at rest over which the mean is taken \[us\].
 const MEASURE_US: u64 = 2_000_000;
-/// Time in which that must have succeeded \[us\].
+/// Time allowed for the whole measurement \[us\].
 const PATIENCE_US: u64 = 20_000_000;
-/// Largest tilt that counts as level \[rad\]: 15 degrees. A sensor that is mounted in quite another way needs its
-/// mounting as a parameter first.
+/// Largest tilt that counts as level \[rad\]: 15 degrees. A sensor with a very different mounting needs the mounting
+/// set as a parameter first.
 const TILT_MAX_RAD: f32 = 0.262;
 
-/// Measures how the inertial sensor is tilted in a vehicle that stands level. Its heading in the vehicle does not show
-/// at rest, and stays.
+/// Measures the tilt of the IMU in a vehicle that stands level. The IMU's yaw in the vehicle cannot be measured at
+/// rest, and stays as it is.
 #[derive(Clone, Debug)]
 pub struct LevelCalibration {
     mounting: Mounting,
@@ -25,13 +25,13 @@ pub struct LevelCalibration {
 }
 
 impl LevelCalibration {
-    /// Creates it for a sensor that is thought to be mounted like this, with these errors.
+    /// Creates the calibration for a sensor with this presumed mounting and these errors.
     #[must_use]
     pub fn new(mounting: &Mounting, errors: &SensorCalibration) -> Self {
         LevelCalibration { mounting: *mounting, errors: *errors, began_us: None, rest: Rest::default(), told: false }
     }
 
-    /// Takes a sample; returns roll, pitch and yaw of the mounting \[rad\], or why there are none.
+    /// Takes a sample. Returns roll, pitch and yaw of the mounting \[rad\], or the failure, at the end.
     pub fn step(
         &mut self,
         sample: &RawSample,
@@ -51,8 +51,8 @@ impl LevelCalibration {
         (sample.at_us.saturating_sub(began_us) >= PATIENCE_US).then_some(Err(CalibrationFailure::Moving))
     }
 
-    /// Returns the attitude of the sensor in which what it felt is vertical: C R, where C is the smallest rotation that
-    /// turns the mean force as felt with R to body z.
+    /// Returns the mounting with which the measured force is vertical: C R, where C is the smallest rotation that turns
+    /// the mean force, measured with R, to body z.
     fn attitude(&self) -> Option<Vector3<f32>> {
         let r: Matrix3<f32> = self.mounting.r_body_sensor();
         let up = r * self.errors.specific_force(&self.rest.specific_force_m_s2());

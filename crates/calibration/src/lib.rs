@@ -1,13 +1,13 @@
-//! Calibration of a vehicle's own sensors, by the vehicle itself, on the ground.
+//! Calibration of a vehicle's own sensors on the ground, run by the vehicle itself.
 //!
 //! * [`GyroscopeCalibration`]: the offset, as the mean at rest.
 //! * [`AccelerometerCalibration`]: offset and scale of each axis, from the vehicle at rest on each of its six sides.
-//! * [`LevelCalibration`]: roll and pitch of the inertial sensor's mounting, from the vehicle standing level.
+//! * [`LevelCalibration`]: roll and pitch of the IMU's mounting, from the vehicle standing level.
 //! * [`MagnetometerCalibration`]: offset and matrix, from the vehicle turned about the vertical on each of its sides.
 //!
-//! Each is a state machine that takes a [`RawSample`], tells what happens by [`CalibrationEvent`]s, and returns its
-//! result, or the [`CalibrationFailure`] that ended it. It keeps sums, no samples. Messages, arming and the storage of
-//! results are the caller's.
+//! Each is a state machine that takes a [`RawSample`], reports its progress by [`CalibrationEvent`]s, and returns its
+//! result or the [`CalibrationFailure`] that ended it. It keeps sums, not samples. The caller sends messages, handles
+//! arming and stores results.
 //!
 //! ```
 //! use afbc_calibration::{GyroscopeCalibration, RawSample};
@@ -42,56 +42,56 @@ pub use side::{Side, Sides};
 
 use nalgebra::Vector3;
 
-/// What the sensors have read, uncorrected: the mean over some 20 ms.
+/// Uncorrected sensor readings: the mean over some 20 ms.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RawSample {
-    /// Time of the newest reading, on a clock that does not run backward \[us\].
+    /// Time of the newest reading, on a monotonic clock \[us\].
     pub at_us: u64,
     /// Rates, sensor axes \[rad/s\].
     pub rates_rad_s: Vector3<f32>,
     /// Specific force, sensor axes \[m/s2\].
     pub specific_force_m_s2: Vector3<f32>,
-    /// Magnetic field, body frame, if the magnetometer has been read \[uT\].
+    /// Magnetic field, body frame, if the magnetometer was read \[uT\].
     pub field_ut: Option<Vector3<f32>>,
 }
 
 impl RawSample {
-    /// True if every number is finite.
+    /// Returns true if every number is finite.
     fn is_finite(&self) -> bool {
         let numbers = self.rates_rad_s.iter().chain(&self.specific_force_m_s2);
         numbers.copied().all(f32::is_finite) && self.field_ut.is_none_or(|field| field.iter().all(|it| it.is_finite()))
     }
 }
 
-/// What happens on the way to a result.
+/// Event during a calibration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum CalibrationEvent {
-    /// Share of the work that is done \[%\].
+    /// Finished share of the work \[%\].
     Progress(u8),
-    /// The vehicle has moved where it should rest; it begins again.
+    /// The vehicle has moved where it should rest; the measurement starts again.
     Moved,
-    /// These sides are left: the vehicle is to rest on one of them.
+    /// Remaining sides: the vehicle must be put on one of them.
     Pending(Sides),
     /// The vehicle rests, but on none of its sides.
     Askew,
-    /// It rests on this side, which is measured now.
+    /// The vehicle rests on this side, which is measured now.
     Detected(Side),
-    /// It rests on a side that is done already.
+    /// The vehicle rests on a side that is already finished.
     Repeated(Side),
-    /// It is to be turned about the vertical, a whole turn.
+    /// The vehicle must be turned about the vertical by a whole turn.
     Rotate,
-    /// This side is done.
+    /// This side is finished.
     Done(Side),
 }
 
-/// Why a calibration has failed.
+/// Reason why a calibration has failed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum CalibrationFailure {
     /// The vehicle did not rest.
     Moving,
-    /// Nothing that was asked for has happened in time.
+    /// The requested action did not happen in time.
     TimedOut,
     /// The vehicle was not turned about the vertical.
     NotRotated,
@@ -101,10 +101,10 @@ pub enum CalibrationFailure {
     NotLevel,
     /// Readings do not cover all directions.
     TooFewDirections,
-    /// An error is larger than any sensor of its kind has.
+    /// An error exceeds that of any sensor of this kind.
     TooLarge,
-    /// The field's strength is not that of the earth anywhere.
+    /// The field's strength does not occur anywhere on earth.
     FieldStrength,
-    /// The field differs too much from one place or time to another.
+    /// The field differs too much between places or times.
     FieldUneven,
 }

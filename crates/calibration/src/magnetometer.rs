@@ -1,4 +1,4 @@
-//! The magnetometer's offset and matrix.
+//! Calibration of the magnetometer's offset and matrix.
 
 use crate::ellipsoid::{FieldFit, FieldSums};
 use crate::rest::{Limits, Rest};
@@ -7,51 +7,51 @@ use crate::{CalibrationEvent, CalibrationFailure, RawSample};
 use afbc_types::{Mounting, SensorCalibration};
 use nalgebra::{Matrix3, Vector3};
 
-/// Time at rest after which the side is known \[us\].
+/// Time at rest after which the side is detected \[us\].
 const DETECT_US: u64 = 500_000;
-/// Time for the next side, and for its turn \[us\].
+/// Time allowed for the next side, and for the turn on it \[us\].
 const PATIENCE_US: u64 = 90_000_000;
 const TURN_US: u64 = 40_000_000;
-/// Parts of a turn: a reading is taken in each, and a side is done when most have one.
+/// Number of parts of a turn, in each of which one reading is taken, and number of parts that finish a side.
 const PARTS: u8 = 24;
 const PARTS_MIN: u32 = 22;
-/// Cosine of the largest tilt from the side in which readings are taken.
+/// Readings are taken only if the cosine of the tilt from the side is at least this.
 const ALONG_MIN: f32 = 0.6;
 /// Longest time between samples over which a rate is integrated \[us\].
 const GAP_US: u64 = 100_000;
-/// Time without a reading after which there is no magnetometer \[us\].
+/// Time without a reading after which the magnetometer counts as missing \[us\].
 const SILENT_US: u64 = 1_000_000;
 
 /// Measures the magnetometer's errors while the vehicle is turned about the vertical by a whole turn on each of its six
-/// sides. The gyroscope says how far it is turned, so that readings are spread evenly.
+/// sides. The gyroscope measures the turn, so that readings are spread evenly.
 #[derive(Clone, Debug)]
 pub struct MagnetometerCalibration {
     to_body: Matrix3<f32>,
     errors: SensorCalibration,
     sums: FieldSums,
-    /// When the last side was done, and when the field was last read \[us\].
+    /// Time at which the last side was finished, and time of the last field reading \[us\].
     done_us: Option<u64>,
     read_us: u64,
     last_us: u64,
     rest: Rest,
-    /// True if the present rest has been told of.
+    /// True if the present rest was already reported.
     told: bool,
     turn: Option<Turn>,
     pending: Sides,
 }
 
-/// A turn on a side.
+/// Turn on one side.
 #[derive(Clone, Copy, Debug)]
 struct Turn {
     side: Side,
     began_us: u64,
-    /// Net angle \[turns\], and the parts that have a reading.
+    /// Net angle \[turns\], and the parts that have a reading, one bit each.
     turns: f32,
     parts: u32,
 }
 
 impl MagnetometerCalibration {
-    /// Creates it for an inertial sensor that is mounted like this and has these errors.
+    /// Creates the calibration for an IMU with this mounting and these errors.
     #[must_use]
     pub fn new(mounting: &Mounting, errors: &SensorCalibration) -> Self {
         MagnetometerCalibration {
@@ -68,7 +68,7 @@ impl MagnetometerCalibration {
         }
     }
 
-    /// Takes a sample; returns the errors, or why there are none.
+    /// Takes a sample. Returns the errors, or the failure, at the end.
     pub fn step(
         &mut self,
         sample: &RawSample,
@@ -109,7 +109,7 @@ impl MagnetometerCalibration {
             self.turn = None;
             self.done_us = Some(at_us);
             self.pending = self.pending.without(side);
-            // That it still rests on the side which is announced as done is no news.
+            // The vehicle still rests on the finished side, which need not be reported again.
             self.told = true;
             tell(CalibrationEvent::Done(side));
             tell(CalibrationEvent::Progress(self.pending.done_percent()));

@@ -1,9 +1,9 @@
-//! Whether the vehicle rests, and what its sensors read meanwhile.
+//! Detects rest of the vehicle, and averages the sensors during it.
 
 use crate::RawSample;
 use nalgebra::Vector3;
 
-/// How much samples may differ at rest: largest less smallest, per axis.
+/// Largest difference between samples at rest, per axis.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Limits {
     pub(crate) rates_rad_s: f32,
@@ -11,26 +11,26 @@ pub(crate) struct Limits {
 }
 
 impl Limits {
-    /// On the ground. Means over 20 ms of the noisiest sensor simulated here, an MPU-6000, differ by 0.005 rad/s and
-    /// 0.15 m/s2 in thousands of samples.
+    /// Limits on the ground. Means over 20 ms of an MPU-6000, the noisiest sensor simulated here, differ by 0.005 rad/s
+    /// and 0.15 m/s2 in thousands of samples.
     pub(crate) const STANDING: Self = Limits { rates_rad_s: 0.03, specific_force_m_s2: 0.5 };
-    /// Held by hand.
+    /// Limits when held by hand.
     pub(crate) const HELD: Self = Limits { rates_rad_s: 0.3, specific_force_m_s2: 1.5 };
 }
 
-/// Sums of the samples since the vehicle has come to rest.
+/// Sums of the samples since the vehicle came to rest.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Rest {
     since_us: u64,
     now_us: u64,
     samples: f32,
-    /// Rates and specific force: smallest, largest, sum.
+    /// Smallest, largest and sum of the rates and of the specific force.
     rates: [Vector3<f32>; 3],
     force: [Vector3<f32>; 3],
 }
 
 impl Rest {
-    /// Takes a sample; false if the vehicle has moved, which begins again with this sample.
+    /// Takes a sample. Returns false if the vehicle has moved; the rest then starts again with this sample.
     pub(crate) fn add(&mut self, sample: &RawSample, limits: &Limits) -> bool {
         let mut with = *self;
         with.now_us = sample.at_us;
@@ -41,14 +41,14 @@ impl Rest {
             *self = with;
             return true;
         }
-        // The first sample is a beginning, and no motion.
+        // The first sample starts the rest and shows no motion.
         let moved = self.samples > 0.0;
         let (rates, force) = ([sample.rates_rad_s; 3], [sample.specific_force_m_s2; 3]);
         *self = Rest { since_us: sample.at_us, now_us: sample.at_us, samples: 1.0, rates, force };
         !moved
     }
 
-    /// Returns how long the vehicle has rested \[us\].
+    /// Returns the time for which the vehicle has rested \[us\].
     pub(crate) fn elapsed_us(&self) -> u64 {
         self.now_us.saturating_sub(self.since_us)
     }
@@ -66,7 +66,7 @@ impl Rest {
     }
 }
 
-/// Adds a value; returns the largest difference of an axis.
+/// Adds a value; returns the largest difference between values on one axis.
 fn extend([least, most, sum]: &mut [Vector3<f32>; 3], value: &Vector3<f32>) -> f32 {
     *least = least.inf(value);
     *most = most.sup(value);

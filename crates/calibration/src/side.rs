@@ -2,12 +2,12 @@
 
 use nalgebra::Vector3;
 
-/// Share of the specific force that must be along an axis: within 35 degrees.
+/// Smallest share of the specific force along an axis: within 35 degrees.
 const ALONG_MIN: f32 = 0.82;
 /// Accepted specific force at rest \[m/s2\].
 const AT_REST_M_S2: core::ops::RangeInclusive<f32> = 7.0..=13.0;
 
-/// Which side of the vehicle points to the ground, in the order in which MAVLink's stations list them.
+/// Side of the vehicle that points to the ground, in the order of MAVLink ground stations.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Side {
     /// Tail down: body x up.
@@ -20,15 +20,15 @@ pub enum Side {
     Right,
     /// Upside down: body z down.
     Up,
-    /// As it stands: body z up.
+    /// Upright: body z up.
     Down,
 }
 
 impl Side {
-    /// All of them.
+    /// All sides.
     pub const ALL: [Self; 6] = [Side::Back, Side::Front, Side::Left, Side::Right, Side::Up, Side::Down];
 
-    /// Returns the direction of the vertical on this side, body frame.
+    /// Returns the upward vertical on this side, body frame.
     #[must_use]
     pub fn up(self) -> Vector3<f32> {
         match self {
@@ -41,13 +41,13 @@ impl Side {
         }
     }
 
-    /// Returns the side on which a vehicle rests that feels this specific force, body frame \[m/s2\]; none in between,
-    /// or if it cannot be gravity.
+    /// Returns the side on which a vehicle with this specific force (body frame) rests \[m/s2\]. `None` between sides,
+    /// or if the force cannot be gravity.
     #[must_use]
     pub fn of(specific_force_m_s2: &Vector3<f32>) -> Option<Self> {
         let norm = specific_force_m_s2.norm();
         let is_along = |side: &Side| side.up().dot(specific_force_m_s2) >= ALONG_MIN * norm;
-        // One at most: no two axes can both have more than 0.71 of the norm.
+        // At most one side fits: no two axes can both have more than 0.71 of the norm.
         Side::ALL.into_iter().find(is_along).filter(|_| AT_REST_M_S2.contains(&norm))
     }
 }
@@ -57,33 +57,33 @@ impl Side {
 pub struct Sides(u8);
 
 impl Sides {
-    /// All six.
+    /// All six sides.
     pub const ALL: Self = Sides(0b11_1111);
 
-    /// True if `side` is one of them.
+    /// Returns true if `side` is in the set.
     #[must_use]
     pub fn contains(self, side: Side) -> bool {
         self.0 & 1 << side as u8 != 0
     }
 
-    /// Returns them without `side`.
+    /// Returns the set without `side`.
     #[must_use]
     pub fn without(self, side: Side) -> Self {
         Sides(self.0 & !(1 << side as u8))
     }
 
-    /// Returns the share of the six that is not among them \[%\].
+    /// Returns the share of the six sides that is not in the set \[%\].
     pub(crate) fn done_percent(self) -> u8 {
         (100 - 100 * self.0.count_ones() / 6) as u8
     }
 
-    /// True if there is none.
+    /// Returns true if the set is empty.
     #[must_use]
     pub fn is_empty(self) -> bool {
         self.0 == 0
     }
 
-    /// Returns each of them, in order.
+    /// Returns the sides in the set, in order.
     pub fn iter(self) -> impl Iterator<Item = Side> {
         Side::ALL.into_iter().filter(move |side| self.contains(*side))
     }

@@ -1,4 +1,4 @@
-//! GyroscopeCalibration, accelerometer and level against simulated sensors, whose errors are known.
+//! Tests gyroscope, accelerometer and level calibration with simulated sensors, whose errors are known.
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, missing_docs, reason = "tests")]
 
 mod common;
@@ -24,7 +24,7 @@ fn gyroscope(
     (found, told)
 }
 
-/// Measures the six sides in this order, each askew by so much.
+/// Measures the six sides in this order, each askew by these angles.
 fn six_sides(
     hands: &mut Hands,
     mounting: &Mounting,
@@ -48,8 +48,8 @@ fn six_sides(
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
 
-    /// The bias of any sensor, to five standard deviations of what its noise, instability and random walk leave of a
-    /// mean over 3 s: 0.12 mrad/s of an MPU-6000.
+    /// The bias of any sensor is found to five standard deviations of the error that noise, instability and random walk
+    /// leave in a mean over 3 s: 0.12 mrad/s for an MPU-6000.
     #[test]
     fn a_gyroscopes_offset_is_found(preset in 0..3_usize, seed: u64) {
         let mut hands = Hands::with_imu(PRESETS[preset], seed);
@@ -61,14 +61,14 @@ proptest! {
         prop_assert_eq!(told, progress);
     }
 
-    /// Offset and scale, of a vehicle whose sides are up to 8 degrees askew in hands that tremble. What is left is of
-    /// second order: the products of misalignment, 0.7 % of an MPU-6000, and skew.
+    /// Offset and scale are found for a vehicle whose sides are up to 8 degrees askew in trembling hands. The remaining
+    /// errors are of second order: the products of misalignment, 0.7 % of an MPU-6000, and skew.
     #[test]
     fn an_accelerometers_errors_are_found(
         preset in 0..3_usize, seed: u64, sides in Just(Side::ALL.to_vec()).prop_shuffle(),
         askew in prop::array::uniform12(-0.14..0.14), turned in 0..4_u8,
     ) {
-        // A board turned by quarters.
+        // A board mounted in quarter turns.
         let attitude_rad = Vector3::new(0.0, 0.0, f64::from(turned) * std::f64::consts::FRAC_PI_2);
         let mounting = Mounting { attitude_rad, position_m: Vector3::zeros() };
         let mut hands = Hands::with_imu(Imu { mounting, ..PRESETS[preset] }, seed);
@@ -84,8 +84,9 @@ proptest! {
         }
         prop_assert_eq!(told.first(), Some(&CalibrationEvent::Pending(Sides::ALL)));
         prop_assert_eq!(told.last(), Some(&CalibrationEvent::Progress(100)));
-        // In any attitude the corrected reading has the size of gravity. What is left is misalignment: where all axes
-        // feel the same, a third of the sum of its six elements, 0.053 m/s2 of an MPU-6000; this is five times that.
+        // In any attitude the corrected reading has the size of gravity, apart from misalignment. Where all axes
+        // measure the same, this is a third of the sum of its six elements, 0.053 m/s2 for an MPU-6000; the bound is
+        // five times that.
         let found = SensorCalibration {
             accel_offset_m_s2: errors.offset_m_s2, accel_scale: errors.scale, ..SensorCalibration::DEFAULT
         };
@@ -98,7 +99,7 @@ proptest! {
         }
     }
 
-    /// A perfect sensor with known offset and scale, so that nothing is left but the arithmetic and the noise.
+    /// A perfect sensor with known offset and scale, so that only arithmetic and noise matter.
     #[test]
     fn scale_and_offset_are_exact_without_misalignment(
         offset in prop::array::uniform3(-1.5_f32..1.5), scale in prop::array::uniform3(0.9_f32..1.1),
@@ -122,7 +123,7 @@ proptest! {
         prop_assert!((errors.scale - scale).amax() < 1e-4, "{:?} {scale}", errors);
     }
 
-    /// The mounting's roll and pitch are found, its yaw stays, whatever the error of what was thought.
+    /// Roll and pitch of the mounting are found and its yaw stays, whatever the error of the presumed mounting.
     #[test]
     fn level_is_found(
         thought in prop::array::uniform3(-1.2..1.2), off in prop::array::uniform2(-0.15..0.15), seed: u64,
@@ -135,13 +136,13 @@ proptest! {
         let mut level = LevelCalibration::new(&mounting(&thought).to_f32(), &SensorCalibration::DEFAULT);
         let found = (0..120).find_map(|_| level.step(&hands.sample(), |_| ())).unwrap().unwrap();
         let found = Rotation3::from_euler_angles(found.x, found.y, found.z).cast::<f64>();
-        // What the sensor feels is vertical again, and the smallest turn led there.
+        // The measured force is vertical again, and the smallest turn led there.
         let felt = truth.inverse() * Vector3::z();
         prop_assert!((found * felt - Vector3::z()).norm() < 1e-4);
         prop_assert!((found * thought.inverse()).angle() < 1e-4 + truth.rotation_to(&thought).angle());
     }
 
-    /// Whatever sensors say, nothing panics, and no result is without numbers.
+    /// Nothing panics for any sensor values, and no result contains NaN.
     #[test]
     fn nothing_spoils_a_calibration(
         numbers in prop::collection::vec(prop::num::f32::ANY, 60), step_us in 0..3_000_000_u64,
@@ -166,7 +167,7 @@ proptest! {
     }
 }
 
-/// A vehicle that is moved begins again; one that does not come to rest fails after 20 s.
+/// If the vehicle is moved, the measurement starts again; without rest it fails after 20 s.
 #[test]
 fn a_moving_gyroscope_is_not_calibrated() {
     let mut hands = Hands::with_imu(Imu::ICM_42688_P, 5);
@@ -189,7 +190,7 @@ fn a_moving_gyroscope_is_not_calibrated() {
     assert_eq!(told.iter().filter(|event| **event == CalibrationEvent::Moved).count(), 2);
 }
 
-/// While the vehicle rests, a gyroscope's calibration tells each tenth of its time once, and a level's the half.
+/// At rest, the gyroscope calibration reports each tenth of its time once, and the level calibration the half.
 #[test]
 fn progress_is_told_at_rest() {
     let mut hands = Hands::with_imu(Imu::DEFAULT, 5);
@@ -210,7 +211,8 @@ fn progress_is_told_at_rest() {
     assert!((950_000..1_100_000).contains(&heard_us[0]), "{heard_us:?}");
 }
 
-/// A level that is moved says so, and begins again; one that does not come to rest fails after 20 s, not before.
+/// If the vehicle moves, the level calibration reports it and starts again; without rest it fails after 20 s, not
+/// before.
 #[test]
 fn a_moving_vehicle_has_no_level() {
     let mut hands = Hands::with_imu(Imu::ICM_42688_P, 5);
@@ -227,11 +229,10 @@ fn a_moving_vehicle_has_no_level() {
     assert!((19_900_000..20_200_000).contains(&at_us), "{at_us}");
     assert!(told.contains(&CalibrationEvent::Moved) && !told.contains(&CalibrationEvent::Progress(50)), "{told:?}");
 
-    // The level skips a sample that is not a number, and says that the vehicle has moved. Without one it says no such
-    // thing.
+    // The level calibration skips a NaN sample and reports a motion. Without a NaN sample it reports none.
     for broken in [false, true] {
         let mut hands = Hands::with_imu(Imu::DEFAULT, 5);
-        // The first sample of these hands is a mean of fewer readings, and differs.
+        // The first sample is a mean of fewer readings, and differs.
         hands.sample();
         let (mut level, mut told) = (LevelCalibration::new(&Mounting::PLAIN, &SensorCalibration::DEFAULT), Vec::new());
         let found = (0..115).find_map(|number| {
@@ -264,7 +265,7 @@ fn a_tilted_vehicle_is_not_level() {
     }
 }
 
-/// The accelerometer's calibrated errors count, so that they do not become a tilt.
+/// The calibrated errors of the accelerometer are used, so that they do not become a tilt.
 #[test]
 fn level_knows_the_accelerometers_errors() {
     let accel = Accel { bias_m_s2: 0.5, ..Accel::DEFAULT };
@@ -279,7 +280,7 @@ fn level_knows_the_accelerometers_errors() {
     assert!(tilt(&SensorCalibration::DEFAULT, &mut hands) > 1e-2);
 }
 
-/// A side again, a vehicle between sides, one moved while it is measured, and one that is left alone.
+/// Reports a repeated side, a vehicle between sides, a vehicle moved during a measurement, and a timeout.
 #[test]
 fn what_an_operator_does_wrong_is_told() {
     let mut hands = Hands::with_imu(Imu::ICM_42688_P, 3);
@@ -291,7 +292,7 @@ fn what_an_operator_does_wrong_is_told() {
     let (_, told) = six_sides(&mut hands, &Mounting::PLAIN, &[Side::Down], |_| [0.8, 0.0]);
     assert_eq!(told, [CalibrationEvent::Pending(Sides::ALL), CalibrationEvent::Askew]);
 
-    // Put down elsewhere a second after it was detected.
+    // Put down elsewhere a second after the side was detected.
     let (mut accelerometer, mut told) = (AccelerometerCalibration::new(&Mounting::PLAIN, GRAVITY as f32), Vec::new());
     hands.put(Side::Up, [0.0; 2]);
     (0..60).for_each(|_| assert_eq!(accelerometer.step(&hands.sample(), keep(&mut told)), None));
@@ -307,7 +308,7 @@ fn what_an_operator_does_wrong_is_told() {
     assert_eq!(failed, Some(Err(CalibrationFailure::TimedOut)));
 }
 
-/// A board that is turned by 45 degrees: its axes x and y cannot be separated by the six sides.
+/// On a board turned by 45 degrees, the six sides cannot separate its axes x and y.
 #[test]
 fn a_board_between_the_axes_is_refused() {
     let mounting = Mounting { attitude_rad: Vector3::new(0.0, 0.0, 0.785), position_m: Vector3::zeros() };
@@ -329,10 +330,11 @@ fn a_broken_accelerometer_is_refused() {
     assert!(refused.count() > 3);
 }
 
-/// PX4's names: the side that is down.
+/// Sides have PX4's names: the side that is down.
 #[test]
 fn sides_are_named_by_what_is_down() {
-    // Attitudes by roll and pitch, right-handed about forward and left: nose down, the nose's axis points down.
+    // Attitudes by roll and pitch, right-handed about forward and left. Nose down means that the nose's axis points
+    // down.
     let quarter = std::f64::consts::FRAC_PI_2;
     let expected = [
         (Side::Down, [0.0, 0.0]),

@@ -1,4 +1,4 @@
-//! The magnetometer against simulated sensors, whose errors are known.
+//! Tests the magnetometer calibration with simulated sensors, whose errors are known.
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, missing_docs, reason = "tests")]
 
 mod common;
@@ -18,13 +18,13 @@ fn hands(part: Part, seed: u64) -> Hands {
     Hands::new(&InstrumentSuite { imu, magnetometer: Some(part), ..InstrumentSuite::default() }, seed)
 }
 
-/// A gyroscope calibrated before, as it should be.
+/// Returns the errors of a gyroscope that was calibrated before.
 fn calibrated(hands: &Hands) -> SensorCalibration {
     let gyro_offset_rad_s = hands.instruments.imu_bias().unwrap().rates_rad_s.cast();
     SensorCalibration { gyro_offset_rad_s, ..SensorCalibration::DEFAULT }
 }
 
-/// Turns the vehicle on each side at this rate, with what `spoil` makes of each sample.
+/// Turns the vehicle on each side at this rate; `spoil` may change each sample.
 fn turned(
     hands: &mut Hands,
     sides: &[Side],
@@ -50,11 +50,11 @@ fn turned(
     (found, told)
 }
 
-/// Returns the mean readings in this attitude.
+/// Returns the mean reading in this attitude.
 fn mean(hands: &mut Hands, attitude: Rotation3<f64>) -> Vector3<f32> {
     hands.spin_rad_s = 0.0;
     hands.attitude = attitude.into();
-    // What the attitude before has measured is on its way.
+    // Skips the sample with readings from the previous attitude.
     let _ = hands.sample();
     let fields: Vec<_> = (0..20).filter_map(|_| hands.sample().field_ut).collect();
     fields.iter().sum::<Vector3<f32>>() / fields.len() as f32
@@ -63,8 +63,9 @@ fn mean(hands: &mut Hands, attitude: Rotation3<f64>) -> Vector3<f32> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(16))]
 
-    /// Hard and soft iron of a vehicle full of steel, anywhere on the earth. The corrected field has the same strength
-    /// in every attitude, to three times what the noise of 144 readings leaves, 1 %; the offset is the hard iron's.
+    /// Hard and soft iron of a vehicle full of steel, anywhere on earth. The corrected field has the same strength in
+    /// every attitude, to three times the error that noise leaves with 144 readings, 1 %. The offset is that of the
+    /// hard iron.
     #[test]
     fn hard_and_soft_iron_are_found(
         seed: u64, strength_ut in 25.0..65.0, inclination_rad in -1.4..1.4, hard_iron_ut in 0.0..60.0,
@@ -84,7 +85,7 @@ proptest! {
             let off = found.field(&read).norm() / fit.strength_ut - 1.0;
             prop_assert!(off.abs() < 0.03, "{} of {}", off, fit.strength_ut);
         }
-        // The earth's field is taken back by opposite attitudes; what is left is the hard iron.
+        // Opposite attitudes cancel the earth's field, which leaves the hard iron.
         let half = std::f64::consts::PI;
         let pairs = [Vector3::x(), Vector3::y(), Vector3::z()].map(|it| Rotation3::from_scaled_axis(it * half));
         let four = core::iter::once(Rotation3::identity()).chain(pairs);
@@ -92,7 +93,7 @@ proptest! {
         prop_assert!((hard_ut - fit.offset_ut).norm() < 0.03 * fit.strength_ut, "{} {}", hard_ut, fit.offset_ut);
     }
 
-    /// Exact readings on any ellipsoid: offset and matrix to the arithmetic.
+    /// Exact readings on any ellipsoid give offset and matrix up to rounding.
     #[test]
     fn an_ellipsoid_is_found_exactly(
         offset in prop::array::uniform3(-100.0_f32..100.0), scale in prop::array::uniform3(0.85..1.15_f64),
@@ -120,7 +121,7 @@ proptest! {
         }
     }
 
-    /// Whatever is read, nothing panics, and a fit has numbers.
+    /// For any readings, nothing panics, and a fit contains no NaN.
     #[test]
     fn nothing_spoils_a_fit(numbers in prop::collection::vec(prop::num::f32::ANY, 300), near in prop::bool::ANY) {
         let mut sums = FieldSums::default();
@@ -134,7 +135,7 @@ proptest! {
     }
 }
 
-/// Readings of half a sphere, of a cone, of one side alone.
+/// Readings of half a sphere, of a cone, and of one side alone.
 #[test]
 fn too_few_directions_are_refused() {
     let spiral = |from: f32, to: f32| {
@@ -187,7 +188,7 @@ fn what_is_left_out_is_told() {
     let (found, told) = turned(&mut hands(Part::QMC5883L, 3), &[Side::Down, Side::Down], 0.0, |_, _| ());
     assert_eq!(found, Some(Err(CalibrationFailure::NotRotated)));
     assert_eq!(told.get(1..3), Some([CalibrationEvent::Detected(Side::Down), CalibrationEvent::Rotate].as_slice()));
-    // To and fro by a quarter: half a turn in all is never a whole one.
+    // To and fro by a quarter turn: this never adds up to a whole turn.
     let mut quarters = hands(Part::QMC5883L, 3);
     let mut magnetometer = MagnetometerCalibration::new(&Mounting::PLAIN, &calibrated(&quarters));
     let found = (0..3000).find_map(|number| {
@@ -198,7 +199,7 @@ fn what_is_left_out_is_told() {
     // No magnetometer.
     let (found, _) = turned(&mut hands(Part::QMC5883L, 3), &[Side::Down], 1.0, |_, sample| sample.field_ut = None);
     assert_eq!(found, Some(Err(CalibrationFailure::NoField)));
-    // A side again, and then none.
+    // A repeated side, and then no further one.
     let (found, told) = turned(&mut hands(Part::QMC5883L, 3), &[Side::Up, Side::Down, Side::Up], 1.0, |_, _| ());
     assert_eq!((found, told.last()), (None, Some(&CalibrationEvent::Repeated(Side::Up))));
     let mut askew = hands(Part::QMC5883L, 3);

@@ -8,17 +8,17 @@ use afbc_types::Parameters;
 use nalgebra::{Rotation3, UnitQuaternion, Vector3};
 
 const STEP_S: f64 = 0.001;
-/// Readings of a sample.
+/// Number of readings averaged into a sample.
 const READINGS: u32 = 20;
 pub const GRAVITY: f64 = 9.81;
 
-/// A vehicle in somebody's hands.
+/// Vehicle in somebody's hands.
 pub struct Hands {
     pub instruments: Instruments,
     still: Truth,
     steps: u32,
     pub attitude: UnitQuaternion<f64>,
-    /// Turn about the vertical \[rad/s\].
+    /// Turn rate about the vertical \[rad/s\].
     pub spin_rad_s: f64,
     /// Amplitude of a tremor at 4 Hz about each body axis \[rad\].
     pub tremor_rad: f64,
@@ -42,7 +42,7 @@ impl Hands {
         Hands::new(&InstrumentSuite { imu: Some(imu), ..InstrumentSuite::default() }, seed)
     }
 
-    /// Puts it on a side, askew by roll and pitch of so much.
+    /// Puts the vehicle on a side, askew by this roll and pitch.
     pub fn put(&mut self, side: Side, askew_rad: [f64; 2]) {
         let up: Vector3<f64> = side.up().cast();
         let turn = Rotation3::rotation_between(&up, &Vector3::z());
@@ -73,7 +73,7 @@ impl Hands {
         }
     }
 
-    /// Returns the next 20 ms.
+    /// Returns the sample of the next 20 ms.
     pub fn sample(&mut self) -> RawSample {
         let (mut rates, mut force, mut field, mut fields) = (Vector3::zeros(), Vector3::zeros(), Vector3::zeros(), 0.0);
         for _ in 0..READINGS {
@@ -95,7 +95,7 @@ impl Hands {
         }
     }
 
-    /// Turns it as a hand does, to where `put` is, within half a second.
+    /// Turns the vehicle by hand to the attitude of `put` within half a second.
     pub fn turn_to(&mut self, side: Side, askew_rad: [f64; 2], mut step: impl FnMut(&RawSample)) {
         let (from, spin_rad_s) = (self.attitude, std::mem::take(&mut self.spin_rad_s));
         self.put(side, askew_rad);
@@ -111,7 +111,7 @@ impl Hands {
     }
 }
 
-/// Keeps what is told.
+/// Collects the reported events.
 pub fn keep(told: &mut Vec<CalibrationEvent>) -> impl FnMut(CalibrationEvent) {
     |event| told.push(event)
 }
