@@ -1,6 +1,6 @@
 //! The font: widths and outlines.
 
-use crate::shape::{Place, TextAnchor};
+use afbc_drawing::{Point, TextAnchor, parts};
 use ttf_parser::{Face, OutlineBuilder};
 
 /// Latin, Greek and mathematical characters of DejaVu Sans 2.37; its licence lies beside it.
@@ -9,10 +9,10 @@ const BYTES: &[u8] = include_bytes!("../font/DejaVuSans-subset.ttf");
 /// A piece of an outline, y downwards \[pt\].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Stretch {
-    Move(Place),
-    Line(Place),
+    Move(Point),
+    Line(Point),
     /// A cubic Bézier curve: two controls, end.
-    Curve(Place, Place, Place),
+    Curve(Point, Point, Point),
     Close,
 }
 
@@ -21,28 +21,38 @@ fn face() -> Option<Face<'static>> {
     Face::parse(BYTES, 0).ok()
 }
 
+/// Size of what is lowered, and how far down its base line is, both of the type's size.
+const LOWERED: f64 = 0.75;
+const DOWN: f64 = 0.225;
+
 /// Returns the width of a text \[pt\].
 pub(crate) fn width_pt(text: &str, size_pt: f64) -> f64 {
     let Some(face) = face() else { return 0.0 };
     let advance = |c: char| face.glyph_index(c).and_then(|glyph| face.glyph_hor_advance(glyph)).unwrap_or_default();
-    text.chars().map(|c| f64::from(advance(c))).sum::<f64>() * size_pt / f64::from(face.units_per_em())
+    let width = |(words, is_lowered): (&str, bool)| {
+        words.chars().map(|c| f64::from(advance(c))).sum::<f64>() * if is_lowered { LOWERED } else { 1.0 }
+    };
+    parts(text).into_iter().map(width).sum::<f64>() * size_pt / f64::from(face.units_per_em())
 }
 
 /// Returns the outlines of a text on its base line.
-pub(crate) fn outlines(text: &str, (x, y): Place, size_pt: f64, anchor: TextAnchor, upwards: bool) -> Vec<Stretch> {
+pub(crate) fn outlines(text: &str, (x, y): Point, size_pt: f64, anchor: TextAnchor, upwards: bool) -> Vec<Stretch> {
     let Some(face) = face() else { return Vec::new() };
-    let scale = size_pt / f64::from(face.units_per_em());
+    let full = size_pt / f64::from(face.units_per_em());
     let along = match anchor {
         TextAnchor::Start => 0.0,
         TextAnchor::Middle => -0.5 * width_pt(text, size_pt),
         TextAnchor::End => -width_pt(text, size_pt),
     };
-    let mut pen = Pen { x, y, upwards, along, scale, last: (0.0, 0.0), stretches: Vec::new() };
-    for c in text.chars() {
-        if let Some(glyph) = face.glyph_index(c) {
-            // A space has no outline.
-            let _ = face.outline_glyph(glyph, &mut pen);
-            pen.along += scale * f64::from(face.glyph_hor_advance(glyph).unwrap_or_default());
+    let mut pen = Pen { x, y, upwards, along, down: 0.0, scale: full, last: (0.0, 0.0), stretches: Vec::new() };
+    for (words, is_lowered) in parts(text) {
+        (pen.scale, pen.down) = if is_lowered { (LOWERED * full, DOWN * size_pt) } else { (full, 0.0) };
+        for c in words.chars() {
+            if let Some(glyph) = face.glyph_index(c) {
+                // A space has no outline.
+                let _ = face.outline_glyph(glyph, &mut pen);
+                pen.along += pen.scale * f64::from(face.glyph_hor_advance(glyph).unwrap_or_default());
+            }
         }
     }
     pen.stretches
@@ -55,6 +65,8 @@ struct Pen {
     upwards: bool,
     /// Where the glyph begins along the text \[pt\].
     along: f64,
+    /// How far its base line lies below that of the text \[pt\].
+    down: f64,
     scale: f64,
     /// Last point in the font's units.
     last: (f32, f32),
@@ -62,8 +74,8 @@ struct Pen {
 }
 
 impl Pen {
-    fn place(&self, x: f32, y: f32) -> Place {
-        let (along, up) = (self.along + self.scale * f64::from(x), self.scale * f64::from(y));
+    fn place(&self, x: f32, y: f32) -> Point {
+        let (along, up) = (self.along + self.scale * f64::from(x), self.scale * f64::from(y) - self.down);
         if self.upwards { (self.x - up, self.y - along) } else { (self.x + along, self.y - up) }
     }
 }
@@ -103,11 +115,24 @@ mod tests {
     #[test]
     fn it_has_every_character_of_titles_and_ticks() {
         let face = face();
-        for c in "aZ09 [m/s²] µΔψ₁₀ −0.5·10⁻⁶ ±∞ %°".chars() {
+        for c in "aZ09 [m/s²] µΔψ₁₀ −0.5·10⁻⁰¹²³⁴⁵⁶⁷⁸⁹ ±∞ %°".chars() {
             assert!(face.as_ref().is_some_and(|face| face.glyph_index(c).is_some()), "{c}");
         }
         assert!((width_pt("mm", 10.0) - 2.0 * width_pt("m", 10.0)).abs() < 1e-9);
         assert!((width_pt("10.0", 16.0) - 2.0 * width_pt("10.0", 8.0)).abs() < 1e-9);
+    }
+
+    #[test]
+    fn what_is_lowered_is_smaller_and_below() {
+        assert!((width_pt("x⟨mm⟩", 8.0) - width_pt("x", 8.0) - width_pt("mm", 6.0)).abs() < 1e-9);
+        let lowest = |text: &str| {
+            let stretches = outlines(text, (0.0, 0.0), 8.0, TextAnchor::Start, false);
+            stretches.iter().fold(f64::NEG_INFINITY, |lowest, stretch| match stretch {
+                Stretch::Move((_, y)) | Stretch::Line((_, y)) | Stretch::Curve(_, _, (_, y)) => lowest.max(*y),
+                Stretch::Close => lowest,
+            })
+        };
+        assert!((lowest("H⟨H⟩") - lowest("H") - DOWN * 8.0).abs() < 1e-6);
     }
 
     /// A text lies where its anchor says, whichever way it runs.

@@ -4,7 +4,7 @@ use crate::figure::PaperFigure;
 use crate::layout::laid_out;
 use crate::pdf::pdf;
 use crate::png::png;
-use crate::svg::svg;
+use afbc_drawing::{SvgStyle, SvgUnit};
 use std::path::Path;
 
 /// How a figure is written.
@@ -41,7 +41,11 @@ impl PaperFigure {
     pub fn write(&self, format: FigureFormat) -> Result<Vec<u8>, String> {
         let drawing = laid_out(self)?;
         Ok(match format {
-            FigureFormat::Svg => svg(&drawing, &self.title).into_bytes(),
+            FigureFormat::Svg => {
+                let fonts = "DejaVu Sans, Verdana, sans-serif";
+                let style = SvgStyle { title: &self.title, unit: SvgUnit::Point, fonts, halo: 0.0, dark: &[] };
+                drawing.svg(&style).into_bytes()
+            }
             FigureFormat::Pdf => pdf(&drawing, &self.title),
             FigureFormat::Png { dpi } => png(&drawing, dpi)?,
         })

@@ -2,8 +2,7 @@
 
 use crate::figure::{FigurePanel, PanelLine, PaperFigure};
 use crate::font::width_pt;
-use crate::shape::{Drawing, Place, Rgb, Shape, Stroke, TextAnchor};
-use crate::ticks::Ticks;
+use afbc_drawing::{Drawing, PlotAxis, Point, Rgb, Shape, Stroke, TextAnchor, Ticks};
 
 /// Points in a millimetre.
 const PT_PER_MM: f64 = 72.0 / 25.4;
@@ -24,34 +23,6 @@ const X_APART: f64 = 1.8;
 /// Lengths on and off \[pt\].
 const DASHES: [&[f64]; 5] = [&[], &[4.0, 1.5], &[1.0, 1.2], &[5.0, 1.5, 1.0, 1.5], &[8.0, 2.0]];
 
-/// An axis: where values lie on the paper.
-#[derive(Clone, Copy)]
-struct Axis {
-    low: f64,
-    high: f64,
-    /// Where these are \[pt\].
-    from_pt: f64,
-    to_pt: f64,
-    is_logarithmic: bool,
-}
-
-impl Axis {
-    fn at(&self, value: f64) -> f64 {
-        let share = if self.is_logarithmic {
-            libm::log10(value / self.low) / libm::log10(self.high / self.low)
-        } else {
-            (value - self.low) / (self.high - self.low)
-        };
-        self.from_pt + share * (self.to_pt - self.from_pt)
-    }
-
-    fn ticks(&self, most: usize) -> Ticks {
-        let powers = self.is_logarithmic.then(|| Ticks::logarithmic(self.low, self.high, most));
-        // Between two powers of ten there may be one or none of them.
-        powers.filter(|ticks| ticks.marks.len() > 1).unwrap_or_else(|| Ticks::linear(self.low, self.high, most))
-    }
-}
-
 /// Lays out a figure.
 pub(crate) fn laid_out(figure: &PaperFigure) -> Result<Drawing, String> {
     let PaperFigure { font_pt, x_range, panels, is_logarithmic, .. } = figure;
@@ -71,11 +42,11 @@ pub(crate) fn laid_out(figure: &PaperFigure) -> Result<Drawing, String> {
     let y_ticks: Vec<Ticks> = ranges
         .iter()
         .map(|[low, high]| {
-            let axis = Axis { low: *low, high: *high, from_pt: 0.0, to_pt: 1.0, is_logarithmic: *is_logarithmic };
+            let axis = PlotAxis { low: *low, high: *high, from: 0.0, to: 1.0, is_logarithmic: *is_logarithmic };
             axis.ticks(Y_TICKS)
         })
         .collect();
-    let widest = y_ticks.iter().flat_map(|ticks| &ticks.marks).map(|(_, label)| width_pt(label, *font_pt));
+    let widest = y_ticks.iter().flat_map(Ticks::marks).map(|(_, label)| width_pt(&label, *font_pt));
     let left_pt = 1.5 * font_pt + widest.fold(0.0, f64::max) + TICK_PT + 3.0;
     let right_pt = width_pt_all - 0.9 * font_pt;
     if right_pt - left_pt < 4.0 * font_pt {
@@ -85,15 +56,15 @@ pub(crate) fn laid_out(figure: &PaperFigure) -> Result<Drawing, String> {
     let mut top_pt = legend(figure, left_pt, right_pt, &mut shapes);
     for (index, ((panel, [low_y, high_y]), ticks)) in panels.iter().zip(&ranges).zip(&y_ticks).enumerate() {
         let bottom_pt = top_pt + figure.panel_mm * PT_PER_MM;
-        let x = Axis { low, high, from_pt: left_pt, to_pt: right_pt, is_logarithmic: false };
-        let y = Axis { low: *low_y, high: *high_y, from_pt: bottom_pt, to_pt: top_pt, is_logarithmic: *is_logarithmic };
+        let x = PlotAxis { low, high, from: left_pt, to: right_pt, is_logarithmic: false };
+        let y = PlotAxis { low: *low_y, high: *high_y, from: bottom_pt, to: top_pt, is_logarithmic: *is_logarithmic };
         let last = index + 1 == panels.len();
         frame(figure, panel, [&x, &y], ticks, last, &mut shapes);
         lines(figure, panel, [&x, &y], &mut shapes);
         top_pt = bottom_pt + if last { 0.0 } else { 0.8 * font_pt };
     }
     let height_pt = top_pt + TICK_PT + 3.1 * font_pt;
-    Ok(Drawing { width_pt: width_pt_all, height_pt, shapes })
+    Ok(Drawing { width: width_pt_all, height: height_pt, shapes })
 }
 
 /// Draws the legend, if there is more than one entry, and returns where the panels begin.
@@ -123,7 +94,7 @@ fn legend(figure: &PaperFigure, left_pt: f64, right_pt: f64, shapes: &mut Vec<Sh
             shapes.push(Shape::Area { points, color: entry.color, opacity: BAND, within: None });
         }
         shapes.push(Shape::Line { points: sample.to_vec(), stroke: stroke(figure, entry), within: None });
-        shapes.push(text(&entry.label, (x + 2.6 * font_pt, y), font_pt, TextAnchor::Start));
+        shapes.push(text(&entry.label, (x + 2.6 * font_pt, y), font_pt, TextAnchor::Start, false));
         x += needed + 1.2 * font_pt;
     }
     y + 0.8 * font_pt
@@ -133,61 +104,53 @@ fn legend(figure: &PaperFigure, left_pt: f64, right_pt: f64, shapes: &mut Vec<Sh
 fn frame(
     figure: &PaperFigure,
     panel: &FigurePanel,
-    [x, y]: [&Axis; 2],
+    [x, y]: [&PlotAxis; 2],
     y_ticks: &Ticks,
     is_last: bool,
     shapes: &mut Vec<Shape>,
 ) {
     let font_pt = figure.font_pt;
-    let mut line = |from: Place, to: Place, color, width_pt| {
-        let stroke = Stroke { color, width_pt, dashes: &[] };
+    let mut line = |from: Point, to: Point, color, width_pt| {
+        let stroke = Stroke::solid(color, width_pt);
         shapes.push(Shape::Line { points: vec![from, to], stroke, within: None });
     };
-    let widest = |ticks: &Ticks| ticks.marks.iter().map(|(_, label)| width_pt(label, font_pt)).fold(font_pt, f64::max);
-    let most = |ticks: &Ticks| ((x.to_pt - x.from_pt) / (X_APART * widest(ticks))) as usize;
+    let widest = |ticks: &Ticks| ticks.marks().map(|(_, label)| width_pt(&label, font_pt)).fold(font_pt, f64::max);
+    let most = |ticks: &Ticks| ((x.to - x.from) / (X_APART * widest(ticks))) as usize;
     // How many fit depends on their labels, and the labels on how many there are: a guess gives the width.
     let x_ticks = x.ticks(most(&x.ticks(8)).clamp(2, 10));
-    for (value, _) in &x_ticks.marks {
-        line((x.at(*value), y.from_pt), (x.at(*value), y.to_pt), GRID, GRID_PT);
-        line((x.at(*value), y.from_pt), (x.at(*value), y.from_pt + TICK_PT), INK, FRAME_PT);
+    for at in x_ticks.at.iter().map(|value| x.at(*value)) {
+        line((at, y.from), (at, y.to), GRID, GRID_PT);
+        line((at, y.from), (at, y.from + TICK_PT), INK, FRAME_PT);
     }
-    for (value, _) in &y_ticks.marks {
-        line((x.from_pt, y.at(*value)), (x.to_pt, y.at(*value)), GRID, GRID_PT);
-        line((x.from_pt, y.at(*value)), (x.from_pt - TICK_PT, y.at(*value)), INK, FRAME_PT);
+    for at in y_ticks.at.iter().map(|value| y.at(*value)) {
+        line((x.from, at), (x.to, at), GRID, GRID_PT);
+        line((x.from, at), (x.from - TICK_PT, at), INK, FRAME_PT);
     }
-    let corners = [(x.from_pt, y.to_pt), (x.to_pt, y.to_pt), (x.to_pt, y.from_pt), (x.from_pt, y.from_pt)];
+    let corners = [(x.from, y.to), (x.to, y.to), (x.to, y.from), (x.from, y.from)];
     let points = corners.into_iter().chain(corners.first().copied()).collect();
-    let stroke = Stroke { color: INK, width_pt: FRAME_PT, dashes: &[] };
+    let stroke = Stroke::solid(INK, FRAME_PT);
     shapes.push(Shape::Line { points, stroke, within: None });
-    for (value, label) in &y_ticks.marks {
-        let place = (x.from_pt - TICK_PT - 1.5, y.at(*value) + 0.36 * font_pt);
-        shapes.push(text(label, place, font_pt, TextAnchor::End));
+    for (value, label) in y_ticks.marks() {
+        let place = (x.from - TICK_PT - 1.5, y.at(value) + 0.36 * font_pt);
+        shapes.push(text(&label, place, font_pt, TextAnchor::End, false));
     }
-    let middle = 0.5 * (y.from_pt + y.to_pt);
-    let title = Shape::Text {
-        text: panel.y_title.clone(),
-        place: (1.1 * font_pt, middle),
-        size_pt: font_pt,
-        anchor: TextAnchor::Middle,
-        color: INK,
-        upwards: true,
-    };
-    shapes.push(title);
+    let middle = 0.5 * (y.from + y.to);
+    shapes.push(text(&panel.y_title, (1.1 * font_pt, middle), font_pt, TextAnchor::Middle, true));
     if is_last {
-        for (value, label) in &x_ticks.marks {
+        for (value, label) in x_ticks.marks() {
             // A long number at the right end stays within the figure.
-            let last_pt = figure.width_mm * PT_PER_MM - 0.5 * width_pt(label, font_pt);
-            let place = (x.at(*value).min(last_pt), y.from_pt + TICK_PT + 1.1 * font_pt);
-            shapes.push(text(label, place, font_pt, TextAnchor::Middle));
+            let last_pt = figure.width_mm * PT_PER_MM - 0.5 * width_pt(&label, font_pt);
+            let place = (x.at(value).min(last_pt), y.from + TICK_PT + 1.1 * font_pt);
+            shapes.push(text(&label, place, font_pt, TextAnchor::Middle, false));
         }
-        let place = (0.5 * (x.from_pt + x.to_pt), y.from_pt + TICK_PT + 2.5 * font_pt);
-        shapes.push(text(&figure.x_title, place, font_pt, TextAnchor::Middle));
+        let place = (0.5 * (x.from + x.to), y.from + TICK_PT + 2.5 * font_pt);
+        shapes.push(text(&figure.x_title, place, font_pt, TextAnchor::Middle, false));
     }
 }
 
 /// Draws bands, and then lines.
-fn lines(figure: &PaperFigure, panel: &FigurePanel, [x, y]: [&Axis; 2], shapes: &mut Vec<Shape>) {
-    let within = Some([x.from_pt, y.to_pt, x.to_pt, y.from_pt]);
+fn lines(figure: &PaperFigure, panel: &FigurePanel, [x, y]: [&PlotAxis; 2], shapes: &mut Vec<Shape>) {
+    let within = Some([x.from, y.to, x.to, y.from]);
     let is_seen = |value: &f64| !y.is_logarithmic || *value > 0.0;
     for PanelLine { color, band, .. } in &panel.lines {
         let edge = |edge: usize| {
@@ -212,8 +175,8 @@ fn lines(figure: &PaperFigure, panel: &FigurePanel, [x, y]: [&Axis; 2], shapes: 
 }
 
 /// Leaves out what is not seen beside the point before; the last stays.
-fn thinned(places: impl Iterator<Item = Place>) -> Vec<Place> {
-    let mut kept: Vec<Place> = Vec::new();
+fn thinned(places: impl Iterator<Item = Point>) -> Vec<Point> {
+    let mut kept: Vec<Point> = Vec::new();
     let mut last = None;
     for place in places {
         let is_seen = kept.last().is_none_or(|(x, y)| libm::hypot(place.0 - x, place.1 - y) >= UNSEEN_PT);
@@ -228,11 +191,11 @@ fn thinned(places: impl Iterator<Item = Place>) -> Vec<Place> {
 
 fn stroke(figure: &PaperFigure, line: &PanelLine) -> Stroke {
     let dashes = DASHES.get(line.dash % DASHES.len()).copied().unwrap_or_default();
-    Stroke { color: line.color, width_pt: figure.line_pt, dashes }
+    Stroke { dashes: dashes.into(), ..Stroke::solid(line.color, figure.line_pt) }
 }
 
-fn text(text: &str, place: Place, size_pt: f64, anchor: TextAnchor) -> Shape {
-    Shape::Text { text: text.into(), place, size_pt, anchor, color: INK, upwards: false }
+fn text(text: &str, place: Point, size: f64, anchor: TextAnchor, upwards: bool) -> Shape {
+    Shape::Text { text: text.into(), place, size, anchor, color: INK, upwards, is_bold: false }
 }
 
 fn xs(line: &PanelLine) -> impl Iterator<Item = f64> {

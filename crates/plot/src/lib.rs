@@ -1,6 +1,6 @@
 //! Figures for a paper from logs: columns of CSV, Parquet, ULog and MCAP files, as SVG, PDF or PNG of a given width.
 //!
-//! A [`PaperFigure`] is laid out in points of 1/72 inch as a list of shapes, which each format writes in its own way.
+//! A [`PaperFigure`] is laid out as a drawing in points of 1/72 inch, which each format writes in its own way.
 //! Text is measured by the font in `font/`, whose outlines PDF and PNG draw: no fonts of the machine are used, so the
 //! same figure has the same bytes everywhere, and nothing is left to embed.
 #![forbid(unsafe_code)]
@@ -16,10 +16,7 @@ mod mcap;
 mod parquet;
 mod pdf;
 mod png;
-mod shape;
-mod svg;
 mod table;
-mod ticks;
 mod units;
 
 pub use band::{Band, binned, over_seeds};

@@ -1,7 +1,7 @@
 //! A figure as PDF: vectors only, no fonts to embed.
 
 use crate::font::{Stretch, outlines};
-use crate::shape::{Drawing, Rgb, Shape};
+use afbc_drawing::{Drawing, Rgb, Shape};
 use miniz_oxide::deflate::compress_to_vec_zlib;
 use pdf_writer::types::LineJoinStyle;
 use pdf_writer::{Content, Filter, Finish, Name, Pdf, Rect, Ref, TextStr};
@@ -12,7 +12,7 @@ pub(crate) fn pdf(drawing: &Drawing, title: &str) -> Vec<u8> {
     let mut opacities: Vec<f64> = Vec::new();
     let mut content = Content::new();
     // Y upwards there.
-    content.transform([1.0, 0.0, 0.0, -1.0, 0.0, drawing.height_pt as f32]);
+    content.transform([1.0, 0.0, 0.0, -1.0, 0.0, drawing.height as f32]);
     content.set_line_join(LineJoinStyle::RoundJoin);
     for shape in &drawing.shapes {
         draw(&mut content, shape, &mut opacities);
@@ -21,7 +21,7 @@ pub(crate) fn pdf(drawing: &Drawing, title: &str) -> Vec<u8> {
     pdf.catalog(catalog).pages(pages);
     pdf.pages(pages).kids([page]).count(1);
     let mut own = pdf.page(page);
-    own.media_box(Rect::new(0.0, 0.0, drawing.width_pt as f32, drawing.height_pt as f32));
+    own.media_box(Rect::new(0.0, 0.0, drawing.width as f32, drawing.height as f32));
     own.parent(pages).contents(contents);
     let mut resources = own.resources();
     let mut states = resources.ext_g_states();
@@ -29,6 +29,7 @@ pub(crate) fn pdf(drawing: &Drawing, title: &str) -> Vec<u8> {
         states
             .insert(Name(format!("O{index}").as_bytes()))
             .start::<pdf_writer::writers::ExtGraphicsState<'_>>()
+            .stroking_alpha(*opacity as f32)
             .non_stroking_alpha(*opacity as f32);
     }
     states.finish();
@@ -47,8 +48,9 @@ fn draw(content: &mut Content, shape: &Shape, opacities: &mut Vec<f64>) {
     match shape {
         Shape::Line { points, stroke, within } => {
             clip(content, within);
+            veil(content, stroke.opacity, opacities);
             let [r, g, b] = color(stroke.color);
-            content.set_stroke_rgb(r, g, b).set_line_width(stroke.width_pt as f32);
+            content.set_stroke_rgb(r, g, b).set_line_width(stroke.width as f32);
             content.set_dash_pattern(stroke.dashes.iter().map(|length| *length as f32), 0.0);
             path(content, points);
             content.stroke();
@@ -56,18 +58,16 @@ fn draw(content: &mut Content, shape: &Shape, opacities: &mut Vec<f64>) {
         Shape::Area { points, color: rgb, opacity, within } => {
             clip(content, within);
             let [r, g, b] = color(*rgb);
-            let place = opacities.iter().position(|other| other == opacity).unwrap_or_else(|| {
-                opacities.push(*opacity);
-                opacities.len() - 1
-            });
-            content.set_parameters(Name(format!("O{place}").as_bytes())).set_fill_rgb(r, g, b);
+            veil(content, *opacity, opacities);
+            content.set_fill_rgb(r, g, b);
             path(content, points);
             content.close_path().fill_nonzero();
         }
-        Shape::Text { text, place, size_pt, anchor, color: rgb, upwards } => {
+        // The font has one weight.
+        Shape::Text { text, place, size, anchor, color: rgb, upwards, is_bold: _ } => {
             let [r, g, b] = color(*rgb);
             content.set_fill_rgb(r, g, b);
-            for stretch in outlines(text, *place, *size_pt, *anchor, *upwards) {
+            for stretch in outlines(text, *place, *size, *anchor, *upwards) {
                 match stretch {
                     Stretch::Move((x, y)) => content.move_to(x as f32, y as f32),
                     Stretch::Line((x, y)) => content.line_to(x as f32, y as f32),
@@ -81,6 +81,17 @@ fn draw(content: &mut Content, shape: &Shape, opacities: &mut Vec<f64>) {
         }
     }
     content.restore_state();
+}
+
+/// Lets what is below be seen through what is drawn next.
+fn veil(content: &mut Content, opacity: f64, opacities: &mut Vec<f64>) {
+    if opacity < 1.0 {
+        let place = opacities.iter().position(|other| *other == opacity).unwrap_or_else(|| {
+            opacities.push(opacity);
+            opacities.len() - 1
+        });
+        content.set_parameters(Name(format!("O{place}").as_bytes()));
+    }
 }
 
 fn clip(content: &mut Content, within: &Option<[f64; 4]>) {

@@ -1,7 +1,7 @@
 //! A figure as PNG.
 
 use crate::font::{Stretch, outlines};
-use crate::shape::{Drawing, Place, Shape};
+use afbc_drawing::{Drawing, Point, Shape};
 use tiny_skia::{Color, FillRule, LineJoin, Mask, Paint, PathBuilder, Pixmap, Rect, Stroke, StrokeDash, Transform};
 
 /// Points to the inch.
@@ -12,7 +12,7 @@ const LONGEST_PX: f64 = 20_000.0;
 /// Draws a figure with so many pixels to the inch.
 pub(crate) fn png(drawing: &Drawing, dpi: f64) -> Result<Vec<u8>, String> {
     let scale = dpi / POINTS;
-    let [width, height] = [drawing.width_pt, drawing.height_pt].map(|length| (length * scale).round().max(1.0));
+    let [width, height] = [drawing.width, drawing.height].map(|length| (length * scale).round().max(1.0));
     if width.max(height) > LONGEST_PX {
         return Err(format!("{width} by {height} pixels are too many; choose a smaller --width or --dpi"));
     }
@@ -30,11 +30,10 @@ fn draw(pixels: &mut Pixmap, shape: &Shape, transform: Transform) {
     match shape {
         Shape::Line { points, stroke, within } => {
             let [r, g, b] = stroke.color;
-            paint.set_color_rgba8(r, g, b, 255);
+            paint.set_color_rgba8(r, g, b, (255.0 * stroke.opacity).round() as u8);
             let mask = mask(pixels, within, transform);
             let dash = StrokeDash::new(stroke.dashes.iter().map(|length| *length as f32).collect(), 0.0);
-            let stroke =
-                Stroke { width: stroke.width_pt as f32, line_join: LineJoin::Round, dash, ..Stroke::default() };
+            let stroke = Stroke { width: stroke.width as f32, line_join: LineJoin::Round, dash, ..Stroke::default() };
             if let Some(path) = path(points, false).finish() {
                 pixels.stroke_path(&path, &paint, &stroke, transform, mask.as_ref());
             }
@@ -46,10 +45,11 @@ fn draw(pixels: &mut Pixmap, shape: &Shape, transform: Transform) {
                 pixels.fill_path(&path, &paint, FillRule::Winding, transform, mask.as_ref());
             }
         }
-        Shape::Text { text, place, size_pt, anchor, color: [r, g, b], upwards } => {
+        // The font has one weight.
+        Shape::Text { text, place, size, anchor, color: [r, g, b], upwards, is_bold: _ } => {
             paint.set_color_rgba8(*r, *g, *b, 255);
             let mut path = PathBuilder::new();
-            for stretch in outlines(text, *place, *size_pt, *anchor, *upwards) {
+            for stretch in outlines(text, *place, *size, *anchor, *upwards) {
                 match stretch {
                     Stretch::Move((x, y)) => path.move_to(x as f32, y as f32),
                     Stretch::Line((x, y)) => path.line_to(x as f32, y as f32),
@@ -66,7 +66,7 @@ fn draw(pixels: &mut Pixmap, shape: &Shape, transform: Transform) {
     }
 }
 
-fn path(points: &[Place], closed: bool) -> PathBuilder {
+fn path(points: &[Point], closed: bool) -> PathBuilder {
     let mut path = PathBuilder::new();
     for (index, (x, y)) in points.iter().enumerate() {
         let (x, y) = (*x as f32, *y as f32);

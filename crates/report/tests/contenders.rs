@@ -6,7 +6,7 @@ mod common;
 use afbc_campaign::compare;
 use afbc_report::{self as report, flights};
 use afbc_scenario::Scenario;
-use common::{OWN, flown, folder, gone_alike, hover, labels, named, number, open, svgs, words};
+use common::{OWN, boxes, flown, folder, gone_alike, hover, labels, middle, named, number, open, points, svgs, words};
 use roxmltree::{Document, Node};
 use std::collections::{BTreeSet, HashMap};
 use std::fs;
@@ -15,22 +15,17 @@ use std::fs;
 fn legend(svg: &str, name: &str) -> Option<(String, String)> {
     let svg = Document::parse(svg).unwrap();
     let entry = svg.descendants().find(|node| node.has_tag_name("text") && words(*node) == name)?;
-    let y = number(entry, "y");
+    let y = middle(entry);
     let samples = svg.descendants().filter(|node| node.has_tag_name("polyline"));
     let mut near = samples.filter_map(|line| {
         let points = points(line);
         let right = points.last()?.0;
         let [left, right] = [points.first()?.0, right].map(|x| number(entry, "x") - x);
-        (points.iter().all(|point| point.1 == y) && 0.0 < right && left < 150.0).then_some(line)
+        (points.iter().all(|point| (point.1 - y).abs() < 1.0) && 0.0 < right && left < 150.0).then_some(line)
     });
     let line = near.next_back()?;
     let dashes = line.attribute("stroke-dasharray").unwrap_or("");
     Some((line.attribute("stroke")?.to_owned(), dashes.to_owned()))
-}
-
-fn points(node: Node<'_, '_>) -> Vec<(f64, f64)> {
-    let pair = |text: &str| text.split_once(',').map(|(x, y)| (x.parse().unwrap(), y.parse().unwrap())).unwrap();
-    node.attribute("points").unwrap().split_whitespace().map(pair).collect()
 }
 
 #[test]
@@ -59,13 +54,10 @@ fn a_contender_has_one_color_in_every_report() {
     let rmse = Document::parse(&rmse).unwrap();
     for name in &names {
         let label = rmse.descendants().find(|n| n.has_tag_name("text") && words(*n) == title(name)).unwrap();
-        let middle = number(label, "y");
-        let bars = rmse.descendants().filter(|node| node.has_tag_name("rect") && number(*node, "height") < 200.0);
-        let bar = bars.clone().find(|bar| {
-            let top = number(*bar, "y");
-            top < middle && middle < top + number(*bar, "height")
-        });
-        colors.entry((*name).into()).or_default().insert(bar.unwrap().attribute("fill").unwrap().into());
+        let at = middle(label);
+        let bars = boxes(&rmse);
+        let bar = bars.iter().find(|(_, [_, top, _, height])| *top < at && at < top + height);
+        colors.entry((*name).into()).or_default().insert(bar.unwrap().0.attribute("fill").unwrap().into());
     }
     reports.push((out, backwards.clone()));
     let out = folder("colors-campaign");

@@ -316,7 +316,7 @@ fn pages_fit_a_phone_and_have_a_dark_mode() {
             }
             // The page has the file's figure, on its own background.
             let ground = svg.descendants().find(|node| node.has_tag_name("rect")).unwrap();
-            assert_eq!(ground.attribute("fill"), Some("#FFFFFF"), "{name}");
+            assert_eq!(ground.attribute("fill"), Some("#ffffff"), "{name}");
         }
     }
 }

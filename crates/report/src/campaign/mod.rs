@@ -23,7 +23,7 @@ use std::path::PathBuf;
 /// # Errors
 /// The first file that could not be written, or is not the command's.
 pub fn write(folder: &Folder, summary: &Summary) -> Result<Vec<PathBuf>, Error> {
-    let figures = figures::campaign::draw(summary).map_err(|source| folder.error("figures", source))?;
+    let figures = figures::campaign::draw(summary);
     let svgs = figures.iter().map(|figure| format!("{}.svg", figure.name));
     folder.add(&svgs.chain(["summary.json".into(), "report.html".into()]).collect::<Vec<_>>())?;
     let mut paths = Vec::new();

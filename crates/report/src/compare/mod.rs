@@ -15,7 +15,6 @@ use crate::groups::groups;
 use afbc_campaign::compare::Comparison;
 use afbc_files::{Error, Folder};
 use afbc_sim::flown::Flown;
-use std::io;
 use std::path::PathBuf;
 
 /// Writes everything about `comparisons` into `folder`, replacing all earlier files of its command, and returns the
@@ -36,8 +35,7 @@ pub fn write(folder: &Folder, comparisons: &[Comparison]) -> Result<Vec<PathBuf>
     let flown: Vec<Flown> =
         comparisons.iter().flat_map(|comparison| &comparison.entries).map(|entry| entry.first.clone()).collect();
     let prefixes: Vec<_> = groups(&flown).into_iter().map(|group| group.figure_prefix).collect();
-    let sets = comparisons.iter().map(draw).collect::<io::Result<Vec<_>>>();
-    let sets = sets.map_err(|source| folder.error("figures", source))?;
+    let sets: Vec<Vec<Picture>> = comparisons.iter().map(draw).collect();
     let svgs = prefixes.iter().zip(&sets).flat_map(|(prefix, figures)| {
         figures.iter().map(move |figure| (format!("{prefix}{}.svg", figure.name), &figure.svg))
     });
@@ -70,8 +68,8 @@ pub fn tables(comparisons: &[Comparison], format: TableFormat) -> String {
     comparisons.iter().map(of).collect::<Vec<_>>().join("\n")
 }
 
-fn draw(comparison: &Comparison) -> io::Result<Vec<Picture>> {
+fn draw(comparison: &Comparison) -> Vec<Picture> {
     let flights: Vec<&Flown> = comparison.entries.iter().map(|entry| &entry.first).collect();
-    let flown = figures::flights::named(&flights, &[("fig7-errors", "errors"), ("fig4-trajectory", "trajectory")])?;
-    Ok(figures::compare::draw(comparison)?.into_iter().chain(flown).collect())
+    let flown = figures::flights::named(&flights, &[("fig7-errors", "errors"), ("fig4-trajectory", "trajectory")]);
+    figures::compare::draw(comparison).into_iter().chain(flown).collect()
 }

@@ -25,7 +25,7 @@ use std::path::PathBuf;
 /// # Errors
 /// The first file that could not be written, or is not the command's.
 pub fn write(folder: &Folder, log: &ReplayedLog<'_>) -> Result<Vec<PathBuf>, Error> {
-    let pictures = figures::exact::draw(log.replay).map_err(|source| folder.error("figures", source))?;
+    let pictures = figures::exact::draw(log.replay);
     let svgs: Vec<_> = pictures.iter().map(|picture| format!("{}.svg", picture.name)).collect();
     let names = ["change.csv", "summary.json", "report.html"].into_iter();
     folder.only(&names.chain(svgs.iter().map(String::as_str)).collect::<Vec<_>>())?;

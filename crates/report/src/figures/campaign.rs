@@ -1,16 +1,13 @@
 //! Figures of a campaign: distributions over its flights, and losses against drawn quantities.
 
-use super::canvas::{self, Area, Failure, Ink, WIDTH_PX, marker, text, units};
-use super::palette::{BLACK, FRAME, GREY, GRID};
+use super::canvas::{self, Canvas, Ink, WIDTH_PX};
+use super::panel::{BOTTOM_PX, Frame};
 use super::picture::Picture;
-use super::ticks::{self, Axis, number};
 use crate::words;
 use afbc_campaign::statistics::{Share, percentile};
 use afbc_campaign::{BINS, Count, Drawn, Summary, Tally};
+use afbc_drawing::{PlotAxis, Point, Ticks};
 use core::ops::Range;
-use plotters::prelude::*;
-use plotters::style::text_anchor::HPos;
-use std::io;
 
 /// Largest number of points of a curve.
 const POINTS: usize = 400;
@@ -19,7 +16,6 @@ const X_TICKS: usize = 12;
 const Y_TICKS: usize = 6;
 const LINE_PX: f64 = 1.6;
 const LEFT_PX: f64 = 62.0;
-const BOTTOM_PX: f64 = 42.0;
 const MARGIN_PX: f64 = 16.0;
 /// Free space at the left edge.
 const FREE_PX: f64 = 6.0;
@@ -39,7 +35,7 @@ const INTERVALS_OPACITY: f64 = 0.6;
 const TOP: f64 = 104.0;
 
 /// Draws every figure of a campaign; none without flights.
-pub(crate) fn draw(summary: &Summary) -> io::Result<Vec<Picture>> {
+pub(crate) fn draw(summary: &Summary) -> Vec<Picture> {
     let flights = summary.tallies.first().map_or(0, |tally| tally.count.flights);
     let conditions = format!("{}: {flights} flights each", summary.manifest.name);
     let lost = summary.tallies.iter().any(|tally| tally.count.kept < tally.count.flights);
@@ -61,22 +57,22 @@ pub(crate) fn draw(summary: &Summary) -> io::Result<Vec<Picture>> {
         figure(
             "position-error",
             format!("Share of the flights below each distance from the reference. {interval}{ends}"),
-            errors.draw(summary, &conditions)?,
+            errors.draw(summary, &conditions),
         ),
         figure(
             "smoothness",
             format!("Share{not_lost} with a mean thrust change below each value. {interval}"),
-            smoothness.draw(summary, &conditions)?,
+            smoothness.draw(summary, &conditions),
         ),
         figure(
             "success",
             "Share of flights that were not lost, for each tenth of the drawn values. Bars: 95 % intervals, side by \
              side within a tenth."
                 .into(),
-            spread.then(|| success(summary, &conditions)).transpose()?,
+            spread.then(|| success(summary, &conditions)),
         ),
     ];
-    Ok(figures.into_iter().flatten().collect())
+    figures.into_iter().flatten().collect()
 }
 
 fn is_spread(drawn: &Drawn) -> bool {
@@ -89,14 +85,13 @@ fn legend(summary: &Summary) -> Vec<(String, Ink)> {
     names.iter().map(|name| (*name).to_owned()).zip(canvas::inks(&names, LINE_PX)).collect()
 }
 
-/// Draws title, conditions, and the legend with each contender's mark.
-fn head(area: &Area, title: &str, conditions: &str, legend: &[(String, Ink)]) -> Result<(), Failure> {
-    canvas::head(area, title, conditions, legend)?;
+/// Begins a figure, its legend with each contender's mark.
+fn begun(title: &'static str, conditions: &str, legend: &[(String, Ink)]) -> Canvas {
+    let mut canvas = Canvas::new(title, conditions, legend);
     for (index, ((_, ink), (x_px, y_px))) in legend.iter().zip(canvas::places(legend)).enumerate() {
-        let place = EmptyElement::at((units(x_px + 12.0), units(y_px)));
-        area.draw(&(place + Polygon::new(marker(index, MARK_PX), ink.color.filled())))?;
+        canvas.mark((x_px + 12.0, y_px), index, MARK_PX, ink.color);
     }
-    Ok(())
+    canvas
 }
 
 /// Cumulative distribution over a logarithmic axis.
@@ -111,50 +106,40 @@ type Curve = Vec<(f64, [f64; 3])>;
 
 impl Distribution {
     /// Draws the figure, if any flight has a value.
-    fn draw(&self, summary: &Summary, conditions: &str) -> io::Result<Option<String>> {
-        let Some(range) = self.range(summary) else { return Ok(None) };
+    fn draw(&self, summary: &Summary, conditions: &str) -> Option<String> {
+        let range = self.range(summary)?;
         let curves: Vec<Curve> = summary.tallies.iter().map(|tally| curve((self.values)(tally), &range)).collect();
-        let plot_px = WIDTH_PX - MARGIN_PX - LEFT_PX;
-        let px = |value: f64| libm::log(value / range.start) / libm::log(range.end / range.start) * plot_px;
         let legend = legend(summary);
         let top_px = canvas::head_px(&legend);
-        let svg = canvas::svg(top_px + WIDE_PX, self.title, |area| {
-            head(area, self.title, conditions, &legend)?;
-            let area = area.clone().shrink((0, units(top_px)), (units(WIDTH_PX - MARGIN_PX), units(WIDE_PX)));
-            let mut chart = chart_on(&area, 6.0).build_cartesian_2d(
-                Axis::logarithmic(range.clone(), X_TICKS),
-                Axis::linear(0.0..TOP, ticks::linear(&(0.0..100.0), Y_TICKS).at),
-            )?;
-            mesh(&mut chart, self.label, "flights [%]", &|x| logarithmic(*x))?;
-            let opacity = INTERVAL_OPACITY.min(INTERVALS_OPACITY / legend.len() as f64);
-            for (curve, (_, ink)) in curves.iter().zip(&legend) {
-                let high = curve.iter().map(|(value, [_, _, high])| (*value, *high));
-                let low = curve.iter().rev().map(|(value, [_, low, _])| (*value, *low));
-                let interval = high.chain(low).collect::<Vec<_>>();
-                chart.draw_series([Polygon::new(interval, ink.color.mix(opacity).filled())])?;
+        let mut canvas = begun(self.title, conditions, &legend);
+        let place_px = [(0.0, top_px + 6.0), (WIDTH_PX - MARGIN_PX, top_px + WIDE_PX)];
+        let linear = frame_in(place_px, range, 0.0..TOP);
+        let frame = Frame { x: PlotAxis { is_logarithmic: true, ..linear.x }, ..linear };
+        let (values, shares) = (frame.x.ticks(X_TICKS), Ticks::linear(0.0, 100.0, Y_TICKS));
+        mesh(&mut canvas, &frame, [&values, &shares], [self.label, "flights [%]"]);
+        let opacity = INTERVAL_OPACITY.min(INTERVALS_OPACITY / legend.len() as f64);
+        for (curve, (_, ink)) in curves.iter().zip(&legend) {
+            let high = curve.iter().map(|(value, [_, _, high])| frame.at((*value, *high)));
+            let low = curve.iter().rev().map(|(value, [_, low, _])| frame.at((*value, *low)));
+            canvas.area(high.chain(low).collect::<Vec<_>>(), ink.color, opacity);
+        }
+        for (index, (curve, (_, ink))) in curves.iter().zip(&legend).enumerate() {
+            // A line hidden by later ones is wider, to be visible on both sides of them.
+            let hidden = curves.iter().skip(index + 1).filter(|later| coincide(curve, later, &frame.x)).count();
+            let ink = Ink { width_px: ink.width_px.max(LINE_PX * (1.0 + 1.5 * hidden as f64)), ..*ink };
+            canvas.line(curve.iter().map(|(value, [share, _, _])| frame.at((*value, *share))).collect::<Vec<_>>(), ink);
+        }
+        let mut ends: Vec<Point> = Vec::new();
+        for (index, (curve, (_, ink))) in curves.iter().zip(&legend).enumerate() {
+            let Some((value, [share, _, _])) = curve.last() else { continue };
+            let (mut x_px, y_px) = frame.at((*value, *share));
+            while ends.iter().any(|(x, y)| (x - x_px).abs() < APART_PX && (y - y_px).abs() < APART_PX) {
+                x_px -= APART_PX;
             }
-            for (index, (curve, (_, ink))) in curves.iter().zip(&legend).enumerate() {
-                // A line hidden by later ones is wider, to be visible on both sides of them.
-                let hidden = curves.iter().skip(index + 1).filter(|later| coincide(curve, later, px)).count();
-                let ink = Ink { width_px: ink.width_px.max(LINE_PX * (1.0 + 1.5 * hidden as f64)), ..*ink };
-                let points: Vec<_> = curve.iter().map(|(value, [share, _, _])| (*value, *share)).collect();
-                chart.draw_series([PathElement::new(points, ink.style())])?;
-            }
-            let mut ends: Vec<(f64, f64)> = Vec::new();
-            for (index, (curve, (_, ink))) in curves.iter().zip(&legend).enumerate() {
-                let Some((value, [share, _, _])) = curve.last() else { continue };
-                let (mut x_px, y_px) = (px(*value), share / TOP * WIDE_PX);
-                while ends.iter().any(|(x, y)| (x - x_px).abs() < APART_PX && (y - y_px).abs() < APART_PX) {
-                    x_px -= APART_PX;
-                }
-                ends.push((x_px, y_px));
-                let place = (value * libm::pow(range.end / range.start, (x_px - px(*value)) / plot_px), *share);
-                let mark = Polygon::new(marker(index, MARK_PX), ink.color.filled());
-                chart.draw_series([EmptyElement::at(place) + mark])?;
-            }
-            Ok(())
-        });
-        svg.map(Some)
+            ends.push((x_px, y_px));
+            canvas.mark((x_px, y_px), index, MARK_PX, ink.color);
+        }
+        Some(canvas.svg(top_px + WIDE_PX))
     }
 
     /// Returns the range from the smallest value to a high percentile: the worst few would squeeze the rest.
@@ -184,35 +169,32 @@ fn curve(values: &[f64], range: &Range<f64>) -> Curve {
 }
 
 /// True if one curve hides another: they coincide at half of its points or more.
-fn coincide(curve: &Curve, other: &Curve, px: impl Fn(f64) -> f64) -> bool {
-    let at = |share: f64| other.iter().find(|(_, [of_other, _, _])| *of_other >= share).map(|(value, _)| px(*value));
-    let same = |(value, [share, _, _]): &&(f64, [f64; 3])| at(*share).is_some_and(|x| (x - px(*value)).abs() < SAME_PX);
+fn coincide(curve: &Curve, other: &Curve, axis: &PlotAxis) -> bool {
+    let at = |share: f64| other.iter().find(|(_, [of, ..])| *of >= share).map(|(value, _)| axis.at(*value));
+    let same =
+        |(value, [share, ..]): &&(f64, [f64; 3])| at(*share).is_some_and(|x| (x - axis.at(*value)).abs() < SAME_PX);
     !curve.is_empty() && 2 * curve.iter().filter(same).count() >= curve.len()
 }
 
 /// Draws the share of flights not lost against each drawn quantity, a panel for each.
-fn success(summary: &Summary, conditions: &str) -> io::Result<String> {
+fn success(summary: &Summary, conditions: &str) -> String {
     let legend = legend(summary);
-    let title = "Success";
     let panels: Vec<_> = summary.manifest.drawn.iter().enumerate().filter(|(_, drawn)| is_spread(drawn)).collect();
     // Many contenders side by side need more room.
     let columns = if legend.len() > 6 { 1 } else { 2 };
     let rows = panels.len().div_ceil(columns);
     let head_px = canvas::head_px(&legend);
     let bottom = lowest(summary);
-    canvas::svg(head_px + rows as f64 * PANEL_PX + 8.0, title, |area| {
-        head(area, title, conditions, &legend)?;
-        let width_px = (WIDTH_PX - MARGIN_PX) / columns as f64;
-        for (place, (index, drawn)) in panels.iter().enumerate() {
-            let (column, row) = (place % columns, place / columns);
-            let (x_px, y_px) = (column as f64 * width_px, head_px + row as f64 * PANEL_PX);
-            let panel = area.clone().shrink((units(x_px), units(y_px)), (units(width_px), units(PANEL_PX)));
-            let bins = summary.tallies.iter().map(|tally| tally.by_draw.get(*index));
-            let contenders: Vec<_> = legend.iter().map(|(_, ink)| *ink).zip(bins).collect();
-            success_panel(&panel, drawn, &contenders, bottom, width_px - LEFT_PX)?;
-        }
-        Ok(())
-    })
+    let mut canvas = begun("Success", conditions, &legend);
+    let width_px = (WIDTH_PX - MARGIN_PX) / columns as f64;
+    for (place, (index, drawn)) in panels.iter().enumerate() {
+        let (x_px, y_px) = ((place % columns) as f64 * width_px, head_px + (place / columns) as f64 * PANEL_PX);
+        let place_px = [(x_px, y_px + 10.0), (x_px + width_px, y_px + PANEL_PX)];
+        let bins = summary.tallies.iter().map(|tally| tally.by_draw.get(*index));
+        let contenders: Vec<_> = legend.iter().map(|(_, ink)| *ink).zip(bins).collect();
+        success_panel(&mut canvas, place_px, drawn, &contenders, bottom);
+    }
+    canvas.svg(head_px + rows as f64 * PANEL_PX + 8.0)
 }
 
 /// Returns the lower end of the axis of shares \[%\]: below all intervals.
@@ -222,92 +204,59 @@ fn lowest(summary: &Summary) -> f64 {
     (10.0 * low).floor().min(9.0) * 10.0
 }
 
-/// Draws one panel, `plot_px` wide, with `bottom` as the lower end of its axis.
+/// Draws one panel between two corners, with `bottom` as the lower end of its axis.
 fn success_panel(
-    area: &Area,
+    canvas: &mut Canvas,
+    place_px: [Point; 2],
     drawn: &Drawn,
     contenders: &[(Ink, Option<&[Count; BINS]>)],
     bottom: f64,
-    plot_px: f64,
-) -> Result<(), Failure> {
+) {
     let [low, high] = drawn.ends;
     // As much room above 100 as with an axis from 0.
     let top = 100.0 + (TOP - 100.0) * (1.0 - bottom / 100.0);
-    let values = ticks::linear(&(low..high), Y_TICKS);
-    let mut chart = chart_on(area, 10.0).build_cartesian_2d(
-        Axis::linear(low..high, values.at),
-        Axis::linear(bottom..top, ticks::linear(&(bottom..100.0), Y_TICKS).at),
-    )?;
-    mesh(&mut chart, &words::drawn(&drawn.name), "not lost [%]", &|x| short(*x, values.decimals))?;
+    let frame = frame_in(place_px, low..high, bottom..top);
+    let (values, shares) = (frame.x.ticks(Y_TICKS), Ticks::linear(bottom, 100.0, Y_TICKS));
+    mesh(canvas, &frame, [&values, &shares], [&words::drawn(&drawn.name), "not lost [%]"]);
     // Side by side within a tenth of the range, with a gap to the next.
-    let bin_px = plot_px / BINS as f64;
+    let bin_px = (frame.x.to - frame.x.from) / BINS as f64;
     let apart_px = bin_px / (contenders.len() as f64 + 2.0);
     let mark_px = (0.55 * apart_px).clamp(1.5, MARK_PX);
     for (index, (ink, bins)) in contenders.iter().enumerate() {
         let Some(bins) = bins else { continue };
-        let beside = (index as f64 + 1.5) * apart_px / bin_px;
+        let x_px = |bin: usize| frame.x.from + bin as f64 * bin_px + (index as f64 + 1.5) * apart_px;
         let flown: Vec<(f64, Share)> = bins
             .iter()
             .enumerate()
             .filter(|(_, count)| count.flights > 0)
-            .map(|(bin, count)| (low + (bin as f64 + beside) / BINS as f64 * (high - low), count.share()))
+            .map(|(bin, count)| (x_px(bin), count.share()))
             .collect();
-        let points: Vec<_> = flown.iter().map(|(x, share)| (*x, 100.0 * share.value)).collect();
+        let at = |x_px: f64, share: f64| (x_px, frame.y.at(100.0 * share));
+        let points: Vec<Point> = flown.iter().map(|(x_px, share)| at(*x_px, share.value)).collect();
         let faint = Ink { width_px: 0.75, opacity: 0.4, ..Ink::new(ink.color, LINE_PX) };
-        chart.draw_series([PathElement::new(points.clone(), faint.style())])?;
-        let bar = Ink::new(ink.color, 1.25).style();
-        let ends = |(x, share): &(f64, Share)| [(*x, 100.0 * share.low), (*x, 100.0 * share.high)];
-        chart.draw_series(flown.iter().map(|at| PathElement::new(ends(at), bar)))?;
-        let mark = || Polygon::new(marker(index, mark_px), ink.color.filled());
-        chart.draw_series(points.iter().map(|&at| EmptyElement::at(at) + mark()))?;
+        canvas.line(points.clone(), faint);
+        for (x_px, share) in &flown {
+            canvas.line([at(*x_px, share.low), at(*x_px, share.high)], Ink::new(ink.color, 1.25));
+        }
+        for place in points {
+            canvas.mark(place, index, mark_px, ink.color);
+        }
     }
-    Ok(())
 }
 
-/// Creates a chart with room for labels on the left and below.
-fn chart_on<'a, 'b>(area: &'a Area<'b>, top_px: f64) -> ChartBuilder<'a, 'b, SVGBackend<'b>> {
-    let mut chart = ChartBuilder::on(area);
-    chart
-        .margin_left(units(FREE_PX))
-        .set_label_area_size(LabelAreaPosition::Left, units(LEFT_PX - FREE_PX))
-        .set_label_area_size(LabelAreaPosition::Bottom, units(BOTTOM_PX))
-        .margin_top(units(top_px));
-    chart
+/// Creates a frame between two corners, with room for labels on its left and below.
+fn frame_in([(left, top), (right, bottom)]: [Point; 2], x: Range<f64>, y: Range<f64>) -> Frame {
+    Frame::new([(left + LEFT_PX, top), (right, bottom - BOTTOM_PX)], x, y)
 }
 
-/// Draws frame, grid and labels of a chart.
-fn mesh(
-    chart: &mut ChartContext<'_, SVGBackend<'_>, Cartesian2d<Axis, Axis>>,
-    x_label: &str,
-    y_label: &str,
-    format: &dyn Fn(&f64) -> String,
-) -> Result<(), Failure> {
-    chart
-        .configure_mesh()
-        .x_labels(X_TICKS)
-        .y_labels(X_TICKS)
-        .max_light_lines(0)
-        .bold_line_style(Ink::new(GRID, 0.75).style())
-        .light_line_style(Ink::new(GRID, 0.25).style())
-        .axis_style(Ink::new(FRAME, 0.75).style())
-        .label_style(text(11.0, GREY, HPos::Center))
-        .axis_desc_style(text(12.0, BLACK, HPos::Center))
-        .x_label_formatter(format)
-        .y_label_formatter(&|share| number(*share, 0))
-        .set_all_tick_mark_size(units(3.0))
-        .x_desc(x_label)
-        .y_desc(y_label)
-        .draw()
+/// Draws axes, grid and labels.
+fn mesh(canvas: &mut Canvas, frame: &Frame, [x_ticks, y_ticks]: [&Ticks; 2], [x_title, y_title]: [&str; 2]) {
+    frame.grid(canvas, x_ticks, y_ticks);
+    frame.bottom(canvas, x_ticks.marks().map(|(value, label)| (value, short(label))), x_title);
+    frame.left(canvas, y_ticks, y_title, frame.x.from - LEFT_PX + FREE_PX);
 }
 
-/// Formats a number on a logarithmic axis, without rounding errors of the logarithm.
-fn logarithmic(x: f64) -> String {
-    let power = libm::floor(libm::log10(x));
-    short(x, (1.0 - power).clamp(0.0, 9.0) as usize)
-}
-
-/// Formats a number without trailing zeros.
-fn short(x: f64, decimals: usize) -> String {
-    let text = number(x, decimals);
-    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').into() } else { text }
+/// Returns a number without trailing zeros.
+fn short(number: String) -> String {
+    if number.contains('.') { number.trim_end_matches('0').trim_end_matches('.').into() } else { number }
 }

@@ -1,27 +1,23 @@
-//! Drawing functions shared by all figures.
+//! What a figure is drawn on: shapes in pixels, and what all figures have in common.
 
-use super::palette::{self, BLACK, GREY, WHITE};
+use super::palette::{self, BLACK, GREY};
 use crate::explore::Pen;
-use plotters::coord::Shift;
-use plotters::prelude::*;
-use plotters::style::text_anchor::{HPos, Pos, VPos};
-use std::io;
+use afbc_drawing::{Drawing, Point, Rgb, Shape, Stroke, SvgStyle, SvgUnit, TextAnchor};
 
-/// Drawing units per pixel. The library rounds to whole units, and single pixels would give jagged lines.
-const SCALE: f64 = 4.0;
 /// Width of every figure.
 pub(super) const WIDTH_PX: f64 = 900.0;
 
 /// Smallest width of the lines in a legend.
 const LEGEND_PX: f64 = 2.5;
-
-pub(super) type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
-pub(super) type Failure = DrawingAreaErrorKind<io::Error>;
+/// Width of the outline that separates type from what lies below it.
+const HALO_PX: f64 = 2.5;
+/// How far the base line of type lies below its middle, of its size.
+const MIDDLE: f64 = 0.26;
 
 /// Style of a line.
 #[derive(Clone, Copy, PartialEq)]
 pub(super) struct Ink {
-    pub(super) color: RGBColor,
+    pub(super) color: Rgb,
     pub(super) width_px: f64,
     /// 0 for a solid line, any other number for its own dash pattern.
     pub(super) dash: usize,
@@ -29,21 +25,23 @@ pub(super) struct Ink {
     pub(super) opacity: f64,
 }
 
-/// The dash number is stored in this part of the opacity until the picture is finished, since the library has no
-/// dashes.
-const DASH: f64 = 0.001;
-/// Largest number of dash patterns.
-const DASHES: usize = 50;
-
 impl Ink {
     /// Creates a solid line.
-    pub(super) const fn new(color: RGBColor, width_px: f64) -> Self {
+    pub(super) const fn new(color: Rgb, width_px: f64) -> Self {
         Ink { color, width_px, dash: 0, opacity: 1.0 }
     }
 
-    pub(super) fn style(self) -> ShapeStyle {
-        let opacity = if self.dash > 0 { 1.0 - DASH * self.dash.min(DASHES) as f64 } else { self.opacity };
-        self.color.mix(opacity).stroke_width(units(self.width_px).unsigned_abs())
+    /// Returns lengths on and off in pixels, longer for higher numbers; none for a solid line.
+    fn dashes_px(self) -> Vec<f64> {
+        const PATTERNS: [&[f64]; 5] = [&[7.0, 3.0], &[2.0, 3.0], &[10.0, 3.0, 2.0, 3.0], &[14.0, 5.0], &[4.0, 7.0]];
+        let Some(place) = self.dash.checked_sub(1) else { return Vec::new() };
+        let (pattern, round) = (place % PATTERNS.len(), 1 + place / PATTERNS.len());
+        let lengths = PATTERNS.get(pattern).copied().unwrap_or_default();
+        lengths.iter().map(|px| px * round as f64).collect()
+    }
+
+    fn stroke(self) -> Stroke {
+        Stroke { color: self.color, width: self.width_px, opacity: self.opacity, dashes: self.dashes_px() }
     }
 
     /// Returns the number of columns that a line over an axis of `axis_px` is reduced to: each as wide as the line, and
@@ -54,9 +52,8 @@ impl Ink {
 
     /// Returns the same style for a page's script.
     pub(super) fn pen(self) -> Pen {
-        let dash_px = if self.dash > 0 { dash_lengths_px(self.dash.min(DASHES)) } else { Vec::new() };
         let (colors, width_px) = (palette::both(self.color), self.width_px);
-        Pen { colors, width_px, opacity: self.opacity, dash_px }
+        Pen { colors, width_px, opacity: self.opacity, dash_px: self.dashes_px() }
     }
 }
 
@@ -73,61 +70,103 @@ pub(super) fn inks(names: &[&str], width_px: f64) -> Vec<Ink> {
     names.iter().zip(palette::repeats(names)).map(ink).collect()
 }
 
-/// Returns the attribute that encodes a dash pattern.
-fn dash_opacity(dash: usize) -> String {
-    // With its quotes: otherwise 0.99 would be found in 0.999.
-    format!(" opacity=\"{}\"", 1.0 - DASH * dash as f64)
-}
-
-/// Returns lengths on and off in pixels, longer for higher numbers.
-fn dash_lengths_px(dash: usize) -> Vec<f64> {
-    const PATTERNS: [&[f64]; 5] = [&[7.0, 3.0], &[2.0, 3.0], &[10.0, 3.0, 2.0, 3.0], &[14.0, 5.0], &[4.0, 7.0]];
-    let (pattern, round) = ((dash - 1) % PATTERNS.len(), 1 + (dash - 1) / PATTERNS.len());
-    let lengths = PATTERNS.get(pattern).copied().unwrap_or_default();
-    lengths.iter().map(|px| px * round as f64).collect()
-}
-
-/// Returns the attribute for a dash pattern.
-fn dash_pattern(dash: usize) -> String {
-    let lengths: Vec<_> = dash_lengths_px(dash).iter().map(|px| units(*px).to_string()).collect();
-    format!(" stroke-dasharray=\"{}\"", lengths.join(" "))
-}
-
-/// Converts pixels to drawing units.
-pub(super) fn units(px: f64) -> i32 {
-    (px * SCALE).round() as i32
-}
-
-/// Text of a height in pixels. `⟨d⟩` gives a subscript.
-pub(super) fn text(size_px: f64, color: RGBColor, horizontal: HPos) -> TextStyle<'static> {
-    styled(size_px, color, horizontal, FontStyle::Normal)
-}
-
-fn styled(size_px: f64, color: RGBColor, horizontal: HPos, style: FontStyle) -> TextStyle<'static> {
-    // The library draws type smaller than requested by this factor.
-    let font = FontDesc::new(FontFamily::SansSerif, size_px * SCALE * 1.24, style);
-    TextStyle { font, color: color.to_backend_color(), pos: Pos::new(horizontal, VPos::Center) }
-}
-
 /// Estimates the width of text, without a font to measure.
 pub(super) fn text_width_px(text: &str, size_px: f64) -> f64 {
     0.5 * size_px * text.chars().filter(|c| !matches!(c, '⟨' | '⟩')).count() as f64
 }
 
-/// Draws title, conditions and legend.
-pub(super) fn head(area: &Area, title: &str, conditions: &str, legend: &[(String, Ink)]) -> Result<(), Failure> {
-    let put = |words: &str, x: f64, y: f64, style: TextStyle<'static>| {
-        area.draw(&Text::new(words.to_owned(), (units(x), units(y)), style))
-    };
-    put(title, 14.0, 18.0, styled(15.0, BLACK, HPos::Left, FontStyle::Bold))?;
-    put(&conditions.replace(" -", " −"), WIDTH_PX - 14.0, 18.0, text(11.0, GREY, HPos::Right))?;
-    for ((name, ink), (x, y)) in legend.iter().zip(places(legend)) {
-        let sample = [(units(x), units(y)), (units(x + 24.0), units(y))];
-        let clear = Ink { width_px: ink.width_px.max(LEGEND_PX), ..*ink };
-        area.draw(&PathElement::new(sample, clear.style()))?;
-        put(name, x + 30.0, y, text(12.0, BLACK, HPos::Left))?;
+/// Number of corners, direction of the first in turns, and relative radius of every second one.
+type Polygon = (usize, f64, f64);
+
+/// A picture as it is drawn, from back to front.
+pub(super) struct Canvas {
+    title: &'static str,
+    shapes: Vec<Shape>,
+}
+
+impl Canvas {
+    /// Begins a picture with its title, conditions and legend.
+    pub(super) fn new(title: &'static str, conditions: &str, legend: &[(String, Ink)]) -> Self {
+        let mut canvas = Canvas { title, shapes: Vec::new() };
+        canvas.write(title, (14.0, 18.0), 15.0, TextAnchor::Start, BLACK, true);
+        canvas.text(&conditions.replace(" -", " −"), (WIDTH_PX - 14.0, 18.0), 11.0, TextAnchor::End, GREY);
+        for ((name, ink), (x, y)) in legend.iter().zip(places(legend)) {
+            let clear = Ink { width_px: ink.width_px.max(LEGEND_PX), ..*ink };
+            canvas.line([(x, y), (x + 24.0, y)], clear);
+            canvas.text(name, (x + 30.0, y), 12.0, TextAnchor::Start, BLACK);
+        }
+        canvas
     }
-    Ok(())
+
+    /// Draws a line through points, if there are two.
+    pub(super) fn line(&mut self, points: impl Into<Vec<Point>>, ink: Ink) {
+        let points = points.into();
+        if points.len() > 1 {
+            self.shapes.push(Shape::Line { points, stroke: ink.stroke(), within: None });
+        }
+    }
+
+    /// Fills an area.
+    pub(super) fn area(&mut self, points: impl Into<Vec<Point>>, color: Rgb, opacity: f64) {
+        self.shapes.push(Shape::Area { points: points.into(), color, opacity, within: None });
+    }
+
+    /// Fills the rectangle between two corners.
+    pub(super) fn rectangle(&mut self, [a, b]: [Point; 2], color: Rgb, opacity: f64) {
+        self.area([a, (b.0, a.1), b, (a.0, b.1)], color, opacity);
+    }
+
+    /// Draws a cross.
+    pub(super) fn cross(&mut self, (x, y): Point, arm_px: f64, color: Rgb) {
+        for down in [arm_px, -arm_px] {
+            self.line([(x - arm_px, y - down), (x + arm_px, y + down)], Ink::new(color, 2.0));
+        }
+    }
+
+    /// Draws a dot.
+    pub(super) fn dot(&mut self, place: Point, radius_px: f64, color: Rgb) {
+        self.polygon(place, radius_px, (24, 0.0, 1.0), color);
+    }
+
+    /// Draws the mark of contender number `index`: marks distinguish contenders without colours.
+    pub(super) fn mark(&mut self, place: Point, index: usize, px: f64, color: Rgb) {
+        const SHAPES: [Polygon; 6] =
+            [(16, 0.0, 0.85), (4, 0.125, 1.0), (3, -0.25, 1.0), (4, 0.0, 1.0), (8, 0.0, 0.35), (3, 0.25, 1.0)];
+        let shape = *SHAPES.get(index % SHAPES.len()).unwrap_or(&SHAPES[0]);
+        self.polygon(place, 1.15 * px, shape, color);
+    }
+
+    fn polygon(&mut self, (x, y): Point, radius_px: f64, (corners, turn, second): Polygon, color: Rgb) {
+        let corner = |i: usize| {
+            let (sin, cos) = libm::sincos(core::f64::consts::TAU * (i as f64 / corners as f64 + turn));
+            let out = radius_px * if i % 2 == 1 { second } else { 1.0 };
+            (x + out * cos, y + out * sin)
+        };
+        self.area((0..corners).map(corner).collect::<Vec<_>>(), color, 1.0);
+    }
+
+    /// Writes text whose middle is at the height of `place`. `⟨d⟩` gives a subscript.
+    pub(super) fn text(&mut self, text: &str, place: Point, size_px: f64, anchor: TextAnchor, color: Rgb) {
+        self.write(text, place, size_px, anchor, color, false);
+    }
+
+    fn write(&mut self, text: &str, (x, y): Point, size: f64, anchor: TextAnchor, color: Rgb, is_bold: bool) {
+        let place = (x, y + MIDDLE * size);
+        self.shapes.push(Shape::Text { text: text.to_owned(), place, size, anchor, color, upwards: false, is_bold });
+    }
+
+    /// Writes text that runs upwards, its middle at `place`.
+    pub(super) fn upright(&mut self, text: &str, (x, y): Point, size: f64, color: Rgb) {
+        let (text, place, anchor) = (text.to_owned(), (x + MIDDLE * size, y), TextAnchor::Middle);
+        self.shapes.push(Shape::Text { text, place, size, anchor, color, upwards: true, is_bold: false });
+    }
+
+    /// Returns the picture as SVG.
+    pub(super) fn svg(self, height_px: f64) -> String {
+        let (fonts, dark) = ("Helvetica, Arial, sans-serif", palette::all());
+        let style = SvgStyle { title: self.title, unit: SvgUnit::Pixel, fonts, halo: HALO_PX, dark: &dark };
+        Drawing { width: WIDTH_PX, height: height_px, shapes: self.shapes }.svg(&style)
+    }
 }
 
 /// Returns the height of title and legend.
@@ -136,7 +175,7 @@ pub(super) fn head_px(legend: &[(String, Ink)]) -> f64 {
 }
 
 /// Returns the position of each entry of the legend, line by line.
-pub(super) fn places(legend: &[(String, Ink)]) -> Vec<(f64, f64)> {
+pub(super) fn places(legend: &[(String, Ink)]) -> Vec<Point> {
     let (mut x, mut y) = (14.0, 42.0);
     let place = |(name, _): &(String, Ink)| {
         let width = 30.0 + text_width_px(name, 12.0) + 26.0;
@@ -148,50 +187,4 @@ pub(super) fn places(legend: &[(String, Ink)]) -> Vec<(f64, f64)> {
         here
     };
     legend.iter().map(place).collect()
-}
-
-/// Returns an SVG of a white picture that `draw` has filled.
-pub(super) fn svg(height_px: f64, title: &str, draw: impl FnOnce(&Area) -> Result<(), Failure>) -> io::Result<String> {
-    let mut svg = String::new();
-    let size = (units(WIDTH_PX).unsigned_abs(), units(height_px).unsigned_abs());
-    {
-        let area = SVGBackend::with_string(&mut svg, size).into_drawing_area();
-        area.fill(&WHITE).and_then(|()| draw(&area)).and_then(|()| area.present()).map_err(io::Error::other)?;
-    }
-    // The library's first tag lacks the attributes for drawing units and round corners.
-    let body = svg.split_once('>').map_or("", |(_, body)| body);
-    let body: String = body.lines().map(|line| subscripts(line) + "\n").collect();
-    let body = body.replace(" opacity=\"1\"", "").replace("font-family=\"sans-serif\" ", "");
-    // A white outline separates type from what lies below it.
-    let body = body.replace("<text ", "<text paint-order=\"stroke\" stroke=\"#FFFFFF\" stroke-width=\"10\" ");
-    let body = (1..=DASHES).fold(body, |body, dash| body.replace(&dash_opacity(dash), &dash_pattern(dash)));
-    let style = palette::dark_style(&body);
-    let (width, height) = size;
-    Ok(format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{WIDTH_PX}\" height=\"{height_px}\" \
-         viewBox=\"0 0 {width} {height}\" role=\"img\" stroke-linejoin=\"round\" \
-         font-family=\"Helvetica, Arial, sans-serif\"><title>{title}</title>{style}{body}"
-    ))
-}
-
-/// Replaces each `⟨d⟩` of `line` by a lowered character.
-fn subscripts(line: &str) -> String {
-    let lower = line.replace('⟨', "<tspan dy=\"0.3em\" font-size=\"75%\">");
-    let raised = lower.replace('⟩', "</tspan><tspan dy=\"-0.225em\">");
-    raised + &"</tspan>".repeat(line.matches('⟩').count())
-}
-
-/// Returns the corners of the mark of contender number `index` around its centre, in drawing units: marks distinguish
-/// contenders without colours.
-pub(super) fn marker(index: usize, px: f64) -> Vec<(i32, i32)> {
-    // Number of corners, direction of the first in turns, and relative radius of every second one.
-    const SHAPES: [(usize, f64, f64); 6] =
-        [(16, 0.0, 0.85), (4, 0.125, 1.0), (3, -0.25, 1.0), (4, 0.0, 1.0), (8, 0.0, 0.35), (3, 0.25, 1.0)];
-    let (corners, turn, second) = *SHAPES.get(index % SHAPES.len()).unwrap_or(&SHAPES[0]);
-    let corner = |i: usize| {
-        let (sin, cos) = libm::sincos(core::f64::consts::TAU * (i as f64 / corners as f64 + turn));
-        let out = 1.15 * px * if i % 2 == 1 { second } else { 1.0 };
-        (units(out * cos), units(out * sin))
-    };
-    (0..corners).map(corner).collect()
 }

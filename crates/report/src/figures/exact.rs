@@ -9,7 +9,6 @@ use super::{palette, reduce};
 use crate::explore::{ExplorableScene, Place, rotors_on_a_circle_m};
 use afbc_replay::exact::{ChangeRow, ExactReplay, QUANTITIES};
 use nalgebra::Vector3;
-use std::io;
 
 /// A panel: its label, the column's name, and the factor to its unit.
 type Pane = (&'static str, &'static str, f64);
@@ -44,8 +43,8 @@ const ESTIMATE: [Pane; 6] = [
 ];
 
 /// Draws every figure that has something to show.
-pub(crate) fn draw(replay: &ExactReplay) -> io::Result<Vec<Picture>> {
-    let Some(comparison) = &replay.comparison else { return Ok(Vec::new()) };
+pub(crate) fn draw(replay: &ExactReplay) -> Vec<Picture> {
+    let Some(comparison) = &replay.comparison else { return Vec::new() };
     let rows = &comparison.rows;
     let end_s = rows.last().map_or(0.0, |row| row.time_s);
     let own = Ink::new(palette::color("afbc"), LINE_PX);
@@ -86,9 +85,9 @@ pub(crate) fn draw(replay: &ExactReplay) -> io::Result<Vec<Picture>> {
         );
         let legend = vec![("as flown".to_owned(), REFERENCE), ("changed".to_owned(), own)];
         let chart = Chart { title, conditions: &conditions, marks, end_s, legend, panels };
-        pictures.push(chart.picture(name, caption)?);
+        pictures.push(chart.picture(name, caption));
     }
-    Ok(pictures)
+    pictures
 }
 
 /// The estimate in space, as flown and under the changed settings.

@@ -10,7 +10,6 @@ use afbc_sim::flight::{Estimated, Sample};
 use afbc_sim::flown::Flown;
 use afbc_sim::metrics::tracking_error;
 use nalgebra::Vector4;
-use std::io;
 
 /// A quantity of a log row.
 type Value = fn(&Sample) -> f64;
@@ -55,19 +54,19 @@ const ESTIMATE: [Coordinate; 9] = [
 const INPUTS: [(&str, Input); 4] = [("U₁ [N]", |u| u.x), ("U₂ [N]", |u| u.y), ("U₃ [N]", |u| u.z), ("U₄ [N]", |u| u.w)];
 
 /// The figures of some names, in their order, each under the name after it.
-pub(crate) fn named(flights: &[&Flown], names: &[(&str, &'static str)]) -> io::Result<Vec<Picture>> {
-    let mut figures = draw(flights)?;
+pub(crate) fn named(flights: &[&Flown], names: &[(&str, &'static str)]) -> Vec<Picture> {
+    let mut figures = draw(flights);
     let take = |(figure, name): &(&str, &'static str)| {
         let index = figures.iter().position(|drawn| drawn.name == *figure)?;
         Some(Picture { name, ..figures.swap_remove(index) })
     };
-    Ok(names.iter().filter_map(take).collect())
+    names.iter().filter_map(take).collect()
 }
 
 /// Draws every figure of one scenario's flights; none without flights.
-pub(crate) fn draw(flights: &[&Flown]) -> io::Result<Vec<Picture>> {
+pub(crate) fn draw(flights: &[&Flown]) -> Vec<Picture> {
     // The longest flight covers the most of the reference.
-    let Some(longest) = flights.iter().max_by_key(|flight| flight.run.log.len()) else { return Ok(Vec::new()) };
+    let Some(longest) = flights.iter().max_by_key(|flight| flight.run.log.len()) else { return Vec::new() };
     let scenario = &longest.scenario;
     let last_s = longest.run.log.last().map_or(0.0, |last| last.time_s);
     let end_s = if last_s > 0.0 { last_s } else { scenario.duration_s };
@@ -125,35 +124,29 @@ pub(crate) fn draw(flights: &[&Flown]) -> io::Result<Vec<Picture>> {
     };
     let jumps = if chatter { " Filled band: chatter, the input jumps between its edges." } else { "" };
     let mut pictures = vec![
-        trajectory::picture(&laws, longest, &conditions, with_reference())?,
-        chart(
-            "fig5-outputs",
-            "Position and yaw against their reference.",
-            "Outputs",
-            with_reference(),
-            outputs.into(),
-        )?,
+        trajectory::picture(&laws, longest, &conditions, with_reference()),
+        chart("fig5-outputs", "Position and yaw against their reference.", "Outputs", with_reference(), outputs.into()),
         chart(
             "fig6-attitude",
             "Roll and pitch against the angles demanded by the position loop.",
             "Roll and pitch",
             with_desired.collect(),
             attitude.into(),
-        )?,
-        chart("fig7-errors", "Reference minus vehicle.", "Errors", law_legend().collect(), errors.into())?,
+        ),
+        chart("fig7-errors", "Reference minus vehicle.", "Errors", law_legend().collect(), errors.into()),
         chart(
             "fig8-inputs",
             &format!("Inputs as produced by the rotors.{jumps}"),
             "Inputs",
             law_legend().collect(),
             controls.into(),
-        )?,
+        ),
     ];
     if scenario.instruments.imu.is_some() {
         let caption =
             "The vehicle's own estimate: truth minus estimate, and three times its standard deviation (pale).";
         let panels = estimate.into();
-        pictures.push(chart("fig9-estimate", caption, "Estimate", law_legend().collect(), panels)?);
+        pictures.push(chart("fig9-estimate", caption, "Estimate", law_legend().collect(), panels));
     }
-    Ok(pictures)
+    pictures
 }

@@ -3,8 +3,8 @@
 use super::canvas::text_width_px;
 use super::palette::TINTS;
 use crate::words;
+use afbc_drawing::Rgb;
 use afbc_scenario::Scenario;
-use plotters::style::RGBColor;
 
 /// An event with a label, at a time or over an interval.
 #[derive(Clone, Debug)]
@@ -15,7 +15,7 @@ pub(super) struct Mark {
     /// Whether the interval is shaded; for permanent changes only the onset is shown.
     pub(super) is_band: bool,
     /// Tint of the band, different from those of bands that it overlaps.
-    pub(super) tint: RGBColor,
+    pub(super) tint: Rgb,
     /// Largest number of bands below this one, which determines its width along the trajectory.
     pub(super) depth: usize,
     /// Row of label and band, 0 at the bottom; rows do not overlap in time.

@@ -13,12 +13,12 @@ pub(super) mod exact;
 pub(super) mod flights;
 mod marks;
 mod palette;
+mod panel;
 mod picture;
 mod plotted;
 mod reduce;
 #[cfg(feature = "replays")]
 pub(super) mod replay;
-mod ticks;
 mod time_chart;
 mod trajectory;
 
@@ -26,6 +26,5 @@ pub(super) use picture::Picture;
 
 /// Returns the colour of a contender on white paper, the same in every figure: red, green, blue.
 pub fn contender_color(name: &str) -> [u8; 3] {
-    let plotters::style::RGBColor(red, green, blue) = palette::color(name);
-    [red, green, blue]
+    palette::color(name)
 }

@@ -1,36 +1,35 @@
 //! Colours: one for each controller, the same in every report, each in a light and a dark variant.
 
+use afbc_drawing::{PAPER, Rgb, hex};
 use core::hash::Hasher;
-use plotters::style::RGBColor;
 use twox_hash::XxHash64;
 
 /// A colour for white paper, and its variant for a dark screen.
-type Shades = [RGBColor; 2];
+pub(super) type Shades = [Rgb; 2];
 
 const fn shades(light: u32, dark: u32) -> Shades {
     [rgb(light), rgb(dark)]
 }
 
-const fn rgb(hex: u32) -> RGBColor {
+const fn rgb(hex: u32) -> Rgb {
     let [_, r, g, b] = hex.to_be_bytes();
-    RGBColor(r, g, b)
+    [r, g, b]
 }
 
-pub(super) const WHITE: RGBColor = rgb(0xFFFFFF);
-pub(super) const BLACK: RGBColor = rgb(0x1A1A1A);
-pub(super) const GREY: RGBColor = rgb(0x646464);
-pub(super) const GRID: RGBColor = rgb(0xE2E2E2);
-pub(super) const FRAME: RGBColor = rgb(0x969696);
+pub(super) const BLACK: Rgb = rgb(0x1A1A1A);
+pub(super) const GREY: Rgb = rgb(0x646464);
+pub(super) const GRID: Rgb = rgb(0xE2E2E2);
+pub(super) const FRAME: Rgb = rgb(0x969696);
 /// Colour of the reference.
-pub(super) const WANTED: RGBColor = rgb(0xB0B0B0);
+pub(super) const WANTED: Rgb = rgb(0xB0B0B0);
 /// Colour of onsets and ends.
-pub(super) const EDGE: RGBColor = rgb(0x828282);
+pub(super) const EDGE: Rgb = rgb(0x828282);
 /// Tints of events: overlapping ones differ.
-pub(super) const TINTS: [RGBColor; 5] = [rgb(0xF7EED4), rgb(0xD5E5F2), rgb(0xF6DCDC), rgb(0xDAEFD8), rgb(0xE6DDF4)];
+pub(super) const TINTS: [Rgb; 5] = [rgb(0xF7EED4), rgb(0xD5E5F2), rgb(0xF6DCDC), rgb(0xDAEFD8), rgb(0xE6DDF4)];
 
 /// All colours that belong to no contender.
 const ROLES: [Shades; 12] = [
-    [WHITE, rgb(0x16181D)],
+    [PAPER, rgb(0x16181D)],
     [BLACK, rgb(0xE8E8E8)],
     [GREY, rgb(0xA8ACB3)],
     [GRID, rgb(0x2C3038)],
@@ -77,7 +76,7 @@ const OTHERS: [Shades; 10] = [
 const SEED: u64 = 203;
 
 /// Returns the colour of the contender `name`, independent of other contenders.
-pub(super) fn color(name: &str) -> RGBColor {
+pub(super) fn color(name: &str) -> Rgb {
     if let Some((_, [light, _])) = KNOWN.iter().find(|(known, _)| *known == name) {
         return *light;
     }
@@ -93,30 +92,15 @@ pub(super) fn repeats(names: &[&str]) -> Vec<usize> {
     names.iter().enumerate().map(before).collect()
 }
 
+/// Returns every colour with its variant in the dark.
+pub(super) fn all() -> Vec<Shades> {
+    ROLES.iter().chain(KNOWN.iter().map(|(_, shades)| shades)).chain(&OTHERS).copied().collect()
+}
+
 /// Returns the colour as attributes: on white, and its variant in the dark.
-pub(super) fn both(color: RGBColor) -> [String; 2] {
-    let all = ROLES.iter().chain(KNOWN.iter().map(|(_, shades)| shades)).chain(&OTHERS);
-    let shades = all.into_iter().find(|[light, _]| *light == color);
-    shades.copied().unwrap_or([color; 2]).map(hex)
-}
-
-/// Formats a colour as an attribute.
-fn hex(RGBColor(r, g, b): RGBColor) -> String {
-    format!("#{r:02X}{g:02X}{b:02X}")
-}
-
-/// Returns the style that switches `svg` to dark colours where the reader prefers them, except on paper.
-pub(super) fn dark_style(svg: &str) -> String {
-    let all = ROLES.iter().chain(KNOWN.iter().map(|(_, shades)| shades)).chain(&OTHERS);
-    let mut rules = String::new();
-    for [light, dark] in all.map(|shades| shades.map(hex)) {
-        for part in ["fill", "stroke"] {
-            if svg.contains(&format!("{part}=\"{light}\"")) {
-                rules += &format!("svg [{part}=\"{light}\"]{{{part}:{dark}}}");
-            }
-        }
-    }
-    format!("<style>@media screen and (prefers-color-scheme:dark){{{rules}}}</style>")
+pub(super) fn both(color: Rgb) -> [String; 2] {
+    let known = all().into_iter().find(|[light, _]| *light == color);
+    known.unwrap_or([color; 2]).map(hex)
 }
 
 #[cfg(test)]
@@ -126,7 +110,7 @@ mod tests {
     use afbc_campaign::{BUILT_IN, Campaign};
     use std::collections::HashSet;
 
-    fn linear(RGBColor(r, g, b): RGBColor) -> [f64; 3] {
+    fn linear([r, g, b]: Rgb) -> [f64; 3] {
         [r, g, b].map(|part| {
             let part = f64::from(part) / 255.0;
             if part <= 0.04045 { part / 12.92 } else { libm::pow((part + 0.055) / 1.055, 2.4) }
@@ -138,7 +122,7 @@ mod tests {
     }
 
     /// Contrast ratio of WCAG 2.
-    fn contrast(a: RGBColor, b: RGBColor) -> f64 {
+    fn contrast(a: Rgb, b: Rgb) -> f64 {
         let luminance = |color| times(&[[0.2126, 0.7152, 0.0722], [0.0; 3], [0.0; 3]], linear(color))[0] + 0.05;
         let (a, b) = (luminance(a), luminance(b));
         a.max(b) / a.min(b)
@@ -153,7 +137,7 @@ mod tests {
     ];
 
     /// Smallest distance over all sights, in hundredths of Oklab.
-    fn distance(a: RGBColor, b: RGBColor) -> f64 {
+    fn distance(a: Rgb, b: Rgb) -> f64 {
         let lab = |color, sight| {
             let seen = times(sight, linear(color)).map(|part| part.clamp(0.0, 1.0));
             let cones = times(
@@ -181,7 +165,7 @@ mod tests {
     }
 
     /// L*, a*, b* of what somebody with this sight sees, under daylight (D65).
-    fn lab(color: RGBColor, sight: &[[f64; 3]; 3]) -> [f64; 3] {
+    fn lab(color: Rgb, sight: &[[f64; 3]; 3]) -> [f64; 3] {
         let seen = times(sight, linear(color)).map(|part| part.clamp(0.0, 1.0));
         let xyz = times(
             &[

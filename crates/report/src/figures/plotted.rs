@@ -3,11 +3,11 @@
 use super::canvas::Ink;
 use super::time_chart::{self, Line};
 use super::{palette, reduce};
+use afbc_drawing::Rgb;
 use afbc_sim::flight::Sample;
 use afbc_sim::flown::Flown;
 use afbc_sim::metrics::inputs;
 use nalgebra::Vector4;
-use plotters::style::RGBColor;
 
 /// Line of the reference.
 pub(super) const REFERENCE: Ink = Ink::new(palette::WANTED, 4.0);
@@ -25,7 +25,7 @@ impl Plotted<'_> {
         self.ink
     }
 
-    pub(super) fn color(&self) -> RGBColor {
+    pub(super) fn color(&self) -> Rgb {
         self.ink.color
     }
 

@@ -11,7 +11,6 @@ use afbc_estimator::Estimate;
 use afbc_replay::{LoggedState, Recording, ReplayRow, Replayed};
 use afbc_types::State;
 use nalgebra::{Quaternion, Vector3};
-use std::io;
 
 /// Largest number of resets that are marked.
 const MARKS_MAX: usize = 10;
@@ -69,7 +68,7 @@ fn turn(row: &ReplayRow, of: fn(&Vector3<f64>) -> f64) -> Option<f64> {
 }
 
 /// Draws every figure that has something to show.
-pub(crate) fn draw(recording: &Recording, replayed: &Replayed) -> io::Result<Vec<Picture>> {
+pub(crate) fn draw(recording: &Recording, replayed: &Replayed) -> Vec<Picture> {
     let rows = &replayed.rows;
     let end_s = rows.last().map_or(0.0, |row| row.time_s);
     let own = Ink::new(palette::color("afbc"), LINE_PX);
@@ -118,7 +117,7 @@ pub(crate) fn draw(recording: &Recording, replayed: &Replayed) -> io::Result<Vec
     ] {
         let panels: Vec<Panel> = pairs.into_iter().map(both).collect();
         if lines_drawn(&panels) {
-            pictures.push(chart(name, caption, title, &both_legend, panels)?);
+            pictures.push(chart(name, caption, title, &both_legend, panels));
         }
     }
     let panels: Vec<Panel> = DIFFERENCE.into_iter().map(difference).collect();
@@ -128,9 +127,9 @@ pub(crate) fn draw(recording: &Recording, replayed: &Replayed) -> io::Result<Vec
         let caption = "Log less estimate where both are valid, and three times the estimate's standard deviation \
                        (pale); rotations are about the axes of the earth frame.";
         let legend = [("log less estimate", own), ("3σ", band)];
-        pictures.push(chart("difference", caption, "Difference", &legend, panels)?);
+        pictures.push(chart("difference", caption, "Difference", &legend, panels));
     }
-    Ok(pictures)
+    pictures
 }
 
 /// The log's estimate and ours in space, where both have a position.

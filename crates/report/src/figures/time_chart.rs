@@ -1,16 +1,14 @@
 //! Panels above each other with a common time axis.
 
-use super::canvas::{self, Area, Failure, Ink, WIDTH_PX, text, units};
+use super::canvas::{self, Canvas, Ink, WIDTH_PX};
 use super::marks::{LABEL_PX, Mark, Marks};
-use super::palette::{self, BLACK, EDGE, FRAME, GREY, GRID};
+use super::palette::{self, EDGE, GREY};
+use super::panel::{BOTTOM_PX, FRAME_INK, Frame};
 use super::picture::{CROSS, Picture};
 use super::reduce::{clip, envelope, simplify};
-use super::ticks::{self, Axis, number};
 use crate::explore::{Explorable, ExplorableChart, LegendEntry, Span, TracePanel};
+use afbc_drawing::TextAnchor;
 use core::ops::Range;
-use plotters::prelude::*;
-use plotters::style::text_anchor::HPos;
-use std::io;
 
 /// Width left of the panels, for label and numbers.
 const LEFT_PX: f64 = 74.0;
@@ -20,8 +18,6 @@ const RIGHT_PX: f64 = 16.0;
 /// Height of one panel, including the space between panels.
 const PANEL_PX: f64 = 148.0;
 const GAP_PX: f64 = 12.0;
-/// Height below the panels, for numbers and label of the time axis.
-const BOTTOM_PX: f64 = 42.0;
 const LANE_PX: f64 = 16.0;
 /// Width of a panel's plot.
 pub(super) const PLOT_PX: f64 = WIDTH_PX - LEFT_PX - RIGHT_PX;
@@ -84,7 +80,7 @@ impl Panel {
 
 /// A whole figure.
 pub(super) struct Chart<'a> {
-    pub(super) title: &'a str,
+    pub(super) title: &'static str,
     pub(super) conditions: &'a str,
     /// Events that are marked, for the width of a plot.
     pub(super) marks: Marks,
@@ -95,10 +91,10 @@ pub(super) struct Chart<'a> {
 
 impl Chart<'_> {
     /// Returns the figure; to its caption, what is in it besides lines is added.
-    pub(super) fn picture(&self, name: &'static str, caption: &str) -> io::Result<Picture> {
-        let (svg, words) = (self.svg(&self.marks)?, self.words());
+    pub(super) fn picture(&self, name: &'static str, caption: &str) -> Picture {
+        let (svg, words) = (self.svg(), self.words());
         let explorable = Some(Explorable::Chart(self.explorable()));
-        Ok(Picture { name, caption: format!("{caption}{words}"), svg, explorable })
+        Picture { name, caption: format!("{caption}{words}"), svg, explorable }
     }
 
     /// Explains everything in the figure besides lines.
@@ -159,105 +155,82 @@ impl Chart<'_> {
         }
     }
 
-    fn svg(&self, marks: &Marks) -> io::Result<String> {
-        let head_px = canvas::head_px(&self.legend);
-        let lanes_px = marks.lanes as f64 * LANE_PX;
-        let height_px = head_px + lanes_px + self.panels.len() as f64 * PANEL_PX + BOTTOM_PX;
-        canvas::svg(height_px, self.title, |area| {
-            canvas::head(area, self.title, self.conditions, &self.legend)?;
-            let top_px = head_px + lanes_px;
-            for (i, panel) in self.panels.iter().enumerate() {
-                let y_px = top_px + i as f64 * PANEL_PX;
-                let last = i + 1 == self.panels.len();
-                self.panel(area, panel, y_px, marks, last)?;
-            }
-            labels(area, marks, self.end_s, top_px)
-        })
+    fn svg(&self) -> String {
+        let mut canvas = Canvas::new(self.title, self.conditions, &self.legend);
+        let top_px = canvas::head_px(&self.legend) + self.marks.lanes as f64 * LANE_PX;
+        let bottom_px = top_px + self.panels.len() as f64 * PANEL_PX;
+        for (i, panel) in self.panels.iter().enumerate() {
+            self.panel(&mut canvas, panel, top_px + i as f64 * PANEL_PX, i + 1 == self.panels.len());
+        }
+        self.labels(&mut canvas, top_px);
+        canvas.svg(bottom_px + BOTTOM_PX)
     }
 
     /// Draws one panel with its top at `y_px`; the last one carries the time axis.
-    fn panel(&self, area: &Area, panel: &Panel, y_px: f64, marks: &Marks, last: bool) -> Result<(), Failure> {
+    fn panel(&self, canvas: &mut Canvas, panel: &Panel, y_px: f64, is_last: bool) {
+        let (marks, end_s) = (&self.marks, self.end_s);
         let plot_height_px = PANEL_PX - GAP_PX;
-        let bottom_px = if last { BOTTOM_PX } else { 0.0 };
-        let area =
-            area.clone().shrink((0, units(y_px)), (units(WIDTH_PX - RIGHT_PX), units(plot_height_px + bottom_px)));
         let range = range(&panel.lines, LEAST_ROOM);
         let (low, high) = (range.start, range.end);
-        let (times, values) = (ticks::linear(&(0.0..self.end_s), T_TICKS), ticks::linear(&range, Y_TICKS));
-        let (decimals, time_decimals) = (values.decimals, times.decimals);
-        let mut chart = ChartBuilder::on(&area)
-            .margin_left(units(MARGIN_PX))
-            .set_label_area_size(LabelAreaPosition::Left, units(LEFT_PX - MARGIN_PX))
-            .set_label_area_size(LabelAreaPosition::Bottom, units(bottom_px))
-            .build_cartesian_2d(Axis::linear(0.0..self.end_s, times.at), Axis::linear(range, values.at))?;
+        let corners = [(LEFT_PX, y_px), (WIDTH_PX - RIGHT_PX, y_px + plot_height_px)];
+        let frame = Frame::new(corners, 0.0..end_s, range);
+        let (times, values) = (frame.x.ticks(T_TICKS), frame.y.ticks(Y_TICKS));
 
-        let line = |from, to, ink: Ink| PathElement::new([from, to], ink.style());
         let bands = || marks.changes.iter().chain(&marks.gusts).filter(|mark| mark.is_band);
-        let shade = |mark: &Mark| mark.tint.mix(BAND_OPACITY).filled();
-        chart.draw_series(bands().map(|m| Rectangle::new([(m.start_s, low), (m.end_s, high)], shade(m))))?;
-        let ends = bands().flat_map(|mark| [mark.start_s, mark.end_s]).filter(|t| *t > 0.0 && *t < self.end_s);
-        chart.draw_series(ends.map(|t| line((t, low), (t, high), BAND_END)))?;
-
-        let axis = Ink::new(FRAME, 0.75).style();
-        chart
-            .configure_mesh()
-            .x_labels(T_TICKS)
-            .y_labels(Y_TICKS)
-            .max_light_lines(0)
-            .bold_line_style(Ink::new(GRID, 0.75).style())
-            .light_line_style(Ink::new(GRID, 0.25).style())
-            .axis_style(axis)
-            .label_style(text(11.0, GREY, HPos::Center))
-            .axis_desc_style(text(12.0, BLACK, HPos::Center))
-            .x_label_formatter(&|t| number(*t, time_decimals))
-            .y_label_formatter(&|v| number(*v, decimals))
-            .set_all_tick_mark_size(units(3.0))
-            .x_desc(if last { "t [s]" } else { "" })
-            .y_desc(panel.label)
-            .draw()?;
-
-        chart.draw_series([Rectangle::new([(0.0, low), (self.end_s, high)], axis)])?;
-        if panel.zero && low < 0.0 && 0.0 < high {
-            chart.draw_series([line((0.0, 0.0), (self.end_s, 0.0), Ink::new(FRAME, 0.75))])?;
+        for mark in bands() {
+            let corners = [(mark.start_s, low), (mark.end_s, high)].map(|corner| frame.at(corner));
+            canvas.rectangle(corners, mark.tint, BAND_OPACITY);
         }
-        chart.draw_series(marks.gusts.iter().map(|gust| line((gust.start_s, low), (gust.start_s, high), ONSET)))?;
+        let ends = bands().flat_map(|mark| [mark.start_s, mark.end_s]).filter(|t| *t > 0.0 && *t < end_s);
+        ends.for_each(|t| canvas.line([frame.at((t, low)), frame.at((t, high))], BAND_END));
 
-        let scale = (PLOT_PX / self.end_s, plot_height_px / (high - low));
+        frame.grid(canvas, &times, &values);
+        if is_last {
+            frame.bottom(canvas, times.marks(), "t [s]");
+        }
+        frame.left(canvas, &values, panel.label, MARGIN_PX);
+        frame.outline(canvas);
+        if panel.zero && low < 0.0 && 0.0 < high {
+            canvas.line([frame.at((0.0, 0.0)), frame.at((end_s, 0.0))], FRAME_INK);
+        }
+        for gust in &marks.gusts {
+            canvas.line([frame.at((gust.start_s, low)), frame.at((gust.start_s, high))], ONSET);
+        }
+
+        let scale = (PLOT_PX / end_s, plot_height_px / (high - low));
         for Line { ink, points, lost_s, is_reference } in &panel.lines {
-            let pieces = clip(&envelope(points.iter().copied(), self.end_s, ink.columns(PLOT_PX)), low, high);
-            chart.draw_series(pieces.iter().map(|piece| PathElement::new(simplify(piece, scale, 0.2), ink.style())))?;
+            let pieces = clip(&envelope(points.iter().copied(), end_s, ink.columns(PLOT_PX)), low, high);
+            for piece in &pieces {
+                canvas.line(frame.all(&simplify(piece, scale, 0.2)), *ink);
+            }
             if let (Some(_), false, Some(&(t, v))) = (lost_s, is_reference, points.last()) {
-                let style = Ink::new(ink.color, 2.0).style();
                 // Beyond the panel the position is written: a cross at the edge would mark a wrong one.
-                let beyond = |arrow, edge| {
-                    let words = format!("{arrow} {} ", number(v, decimals));
-                    Text::new(words, (t, edge), text(LABEL_PX, ink.color, HPos::Right))
+                let mut beyond = |arrow, y| {
+                    let words = format!("{arrow} {} ", values.label(v));
+                    canvas.text(&words, (frame.x.at(t), y), LABEL_PX, TextAnchor::End, ink.color);
                 };
-                let edge = LABEL_PX * (high - low) / plot_height_px;
                 match v {
-                    v if v > high => drop(chart.draw_series([beyond('↑', high - edge)])?),
-                    v if v < low => drop(chart.draw_series([beyond('↓', low + edge)])?),
-                    _ => drop(chart.draw_series([Cross::new((t, v), units(4.0), style)])?),
+                    v if v > high => beyond('↑', frame.y.to + LABEL_PX),
+                    v if v < low => beyond('↓', frame.y.from - LABEL_PX),
+                    _ => canvas.cross(frame.at((t, v)), 4.0, ink.color),
                 }
             }
         }
-        Ok(())
     }
-}
 
-/// Draws the labels of the marks on their bands, above the panels.
-fn labels(area: &Area, marks: &Marks, end_s: f64, top_px: f64) -> Result<(), Failure> {
-    for mark in marks.gusts.iter().chain(&marks.changes) {
-        let bottom_px = top_px - 3.0 - mark.lane as f64 * LANE_PX;
-        if mark.is_band {
-            let x = |t: f64| units(LEFT_PX + t / end_s * PLOT_PX);
-            let corners = [(x(mark.start_s), units(bottom_px - LANE_PX + 2.0)), (x(mark.end_s), units(bottom_px))];
-            area.draw(&Rectangle::new(corners, mark.tint.filled()))?;
+    /// Draws the labels of the marks on their bands, above the panels.
+    fn labels(&self, canvas: &mut Canvas, top_px: f64) {
+        for mark in self.marks.gusts.iter().chain(&self.marks.changes) {
+            let bottom_px = top_px - 3.0 - mark.lane as f64 * LANE_PX;
+            if mark.is_band {
+                let x = |t: f64| LEFT_PX + t / self.end_s * PLOT_PX;
+                let corners = [(x(mark.start_s), bottom_px - LANE_PX + 2.0), (x(mark.end_s), bottom_px)];
+                canvas.rectangle(corners, mark.tint, 1.0);
+            }
+            let place = (LEFT_PX + mark.label_px, bottom_px - 0.5 * LANE_PX + 1.0);
+            canvas.text(&mark.label, place, LABEL_PX, TextAnchor::Middle, GREY);
         }
-        let place = (units(LEFT_PX + mark.label_px), units(bottom_px - 0.5 * LANE_PX + 1.0));
-        area.draw(&Text::new(mark.label.clone(), place, text(LABEL_PX, GREY, HPos::Center)))?;
     }
-    Ok(())
 }
 
 /// Returns the range of a panel: all of every flight. A lost flight extends it to at most three times the others'

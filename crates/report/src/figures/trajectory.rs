@@ -1,22 +1,18 @@
 //! The flights in space: a box seen from above its front right corner.
 
-use super::canvas::{self, Area, Failure, Ink, WIDTH_PX, text, units};
+use super::canvas::{self, Canvas, Ink, WIDTH_PX};
 use super::marks::{LABEL_PX, Mark, marks};
 use super::palette::{BLACK, FRAME, GREY, GRID};
 use super::picture::{CROSS, Picture};
 use super::plotted::{Plotted, REFERENCE};
 use super::reduce::simplify;
-use super::ticks::{self, Ticks, number};
 use super::time_chart::{Line, PLOT_PX, range};
-
 use crate::explore::{Explorable, ExplorableScene};
+use afbc_drawing::{Point, Rgb, TextAnchor, Ticks};
 use afbc_sim::flight::Sample;
 use afbc_sim::flown::Flown;
 use nalgebra::Vector3;
-use plotters::prelude::*;
-use plotters::style::text_anchor::HPos;
 use std::collections::HashSet;
-use std::io;
 
 const HEIGHT_PX: f64 = 660.0;
 /// Room for the box, below a legend of one line: left, top, width, height.
@@ -66,7 +62,7 @@ impl View {
     }
 
     /// Returns the pixel of a point.
-    fn at(&self, p: Vector3<f64>) -> (f64, f64) {
+    fn at(&self, p: Vector3<f64>) -> Point {
         let middle = 0.5 * (self.low_m + self.high_m);
         // No edge is zero: there is room around a constant, too.
         let (right, down) = self.direction((p - middle).component_div(&(self.high_m - self.low_m)));
@@ -79,12 +75,7 @@ impl View {
 }
 
 /// Draws the flights of `laws` and the reference of the longest.
-pub(super) fn picture(
-    laws: &[Plotted],
-    longest: &Flown,
-    conditions: &str,
-    mut legend: Vec<(String, Ink)>,
-) -> io::Result<Picture> {
+pub(super) fn picture(laws: &[Plotted], longest: &Flown, conditions: &str, mut legend: Vec<(String, Ink)>) -> Picture {
     let scenario = &longest.scenario;
     let end_s = longest.run.log.last().map_or(0.0, |last| last.time_s);
     let range_along = |axis: Vector3<f64>| {
@@ -107,7 +98,7 @@ pub(super) fn picture(
         }
     }
     changes.sort_by_key(|change| core::cmp::Reverse(change.depth));
-    let (mut dots, mut bands, mut crosses) = (false, false, false);
+    let (mut bands, mut crosses) = (false, false);
     let below_px = canvas::head_px(&legend) - canvas::head_px(&[]);
     let view = View::new(
         Vector3::from(ranges.each_ref().map(|range| range.start)),
@@ -115,33 +106,30 @@ pub(super) fn picture(
         below_px,
     );
 
-    let svg = canvas::svg(HEIGHT_PX + below_px, "Trajectory", |area| {
-        canvas::head(area, "Trajectory", conditions, &legend)?;
-        furniture(area, &view)?;
-        let wanted = || longest.run.log.iter().map(|s| (s.time_s, s.reference.position_m));
-        let shadow = wanted().map(|(_, p)| Vector3::new(p.x, p.y, view.low_m.z));
-        path(area, &view, shadow, Ink::new(FRAME, 0.75))?;
-        for change in &changes {
-            let during = wanted().filter(|(t, _)| change.start_s <= *t && *t <= change.end_s);
-            bands |= path(area, &view, during.map(|(_, p)| p), band(change))?.is_some();
+    let mut canvas = Canvas::new("Trajectory", conditions, &legend);
+    furniture(&mut canvas, &view);
+    let wanted = || longest.run.log.iter().map(|s| (s.time_s, s.reference.position_m));
+    let shadow = wanted().map(|(_, p)| Vector3::new(p.x, p.y, view.low_m.z));
+    path(&mut canvas, &view, shadow, Ink::new(FRAME, 0.75));
+    for change in &changes {
+        let during = wanted().filter(|(t, _)| change.start_s <= *t && *t <= change.end_s);
+        bands |= path(&mut canvas, &view, during.map(|(_, p)| p), band(change));
+    }
+    path(&mut canvas, &view, wanted().map(|(_, p)| p), REFERENCE);
+    for law in laws {
+        let flown = law.flight.run.log.iter().map(|s| s.motion.position_m);
+        path(&mut canvas, &view, flown, law.ink());
+        let end = law.flight.run.log.last().map(|s| s.motion.position_m).filter(|end| view.contains(end));
+        if let (Some(end), Some(_)) = (end, law.flight.run.lost) {
+            crosses = true;
+            canvas.cross(view.at(end), 5.0, law.color());
         }
-        path(area, &view, wanted().map(|(_, p)| p), REFERENCE)?;
-        for law in laws {
-            let flown = law.flight.run.log.iter().map(|s| s.motion.position_m);
-            path(area, &view, flown, law.ink())?;
-            let end = law.flight.run.log.last().map(|s| s.motion.position_m).filter(|end| view.contains(end));
-            if let (Some(end), Some(_)) = (end, law.flight.run.lost) {
-                crosses = true;
-                area.draw(&Cross::new(pixel(view.at(end)), units(5.0), Ink::new(law.color(), 2.0).style()))?;
-            }
-        }
-        let start = scenario.initial.position_m;
-        let gusts =
-            marks.gusts.iter().map(|gust| (scenario.trajectory.at(gust.start_s).position_m, gust.label.as_str()));
-        let seen = dot_all(area, &view, core::iter::once((start, "start")).chain(gusts))?;
-        dots = seen > usize::from(view.contains(&start));
-        Ok(())
-    })?;
+    }
+    let start = scenario.initial.position_m;
+    let gusts = marks.gusts.iter().map(|gust| (scenario.trajectory.at(gust.start_s).position_m, gust.label.as_str()));
+    let seen = dot_all(&mut canvas, &view, core::iter::once((start, "start")).chain(gusts));
+    let dots = seen > usize::from(view.contains(&start));
+    let svg = canvas.svg(HEIGHT_PX + below_px);
     let mut caption = "The flights in space.".to_owned();
     if dots {
         caption += " Dots: position of the reference at the onset of a gust.";
@@ -153,7 +141,7 @@ pub(super) fn picture(
         caption += CROSS;
     }
     let explorable = Some(Explorable::Scene(scene(laws, longest, &view)));
-    Ok(Picture { name: "fig4-trajectory", caption, svg, explorable })
+    Picture { name: "fig4-trajectory", caption, svg, explorable }
 }
 
 /// The same flights for a page's script.
@@ -180,18 +168,10 @@ fn scene(laws: &[Plotted], longest: &Flown, view: &View) -> ExplorableScene {
     scene
 }
 
-fn pixel((x, y): (f64, f64)) -> (i32, i32) {
-    (units(x), units(y))
-}
-
 /// Draws labelled dots at the `places` that are in the box; labels of dots at the same place form a row. Returns the
 /// number of places.
-fn dot_all<'a>(
-    area: &Area,
-    view: &View,
-    places: impl Iterator<Item = (Vector3<f64>, &'a str)>,
-) -> Result<usize, Failure> {
-    let mut dots: Vec<((f64, f64), String)> = Vec::new();
+fn dot_all<'a>(canvas: &mut Canvas, view: &View, places: impl Iterator<Item = (Vector3<f64>, &'a str)>) -> usize {
+    let mut dots: Vec<(Point, String)> = Vec::new();
     let mut count = 0;
     for (place, label) in places.filter(|(place, _)| view.contains(place)) {
         count += 1;
@@ -202,32 +182,27 @@ fn dot_all<'a>(
         }
     }
     for (place, label) in &dots {
-        dot(area, view, *place, label)?;
+        dot(canvas, view, *place, label);
     }
-    Ok(count)
+    count
 }
 
 /// Draws a dot with a label on the side away from the centre.
-fn dot(area: &Area, view: &View, (x, y): (f64, f64), label: &str) -> Result<(), Failure> {
+fn dot(canvas: &mut Canvas, view: &View, (x, y): Point, label: &str) {
     let (dx, dy) = (x - view.middle_px.0, y - view.middle_px.1);
     let away = 15.0 / libm::hypot(dx, dy).max(1.0);
-    area.draw(&Circle::new(pixel((x, y)), units(3.0), BLACK.filled()))?;
-    let side = if dx < 0.0 { HPos::Right } else { HPos::Left };
-    let place = pixel((x + dx * away * 0.7, y + dy * away));
-    area.draw(&Text::new(label.to_owned(), place, text(LABEL_PX, BLACK, side)))
+    canvas.dot((x, y), 3.0, BLACK);
+    let side = if dx < 0.0 { TextAnchor::End } else { TextAnchor::Start };
+    canvas.text(label, (x + dx * away * 0.7, y + dy * away), LABEL_PX, side, BLACK);
 }
 
-/// Draws a path through the box up to where it first leaves it, and returns that point. Repeated laps are drawn once.
-fn path(
-    area: &Area,
-    view: &View,
-    places: impl Iterator<Item = Vector3<f64>>,
-    ink: Ink,
-) -> Result<Option<(f64, f64)>, Failure> {
+/// Draws a path through the box up to where it first leaves it, and returns whether any of it is within. Repeated laps
+/// are drawn once.
+fn path(canvas: &mut Canvas, view: &View, places: impl Iterator<Item = Vector3<f64>>, ink: Ink) -> bool {
     let mut inked = HashSet::new();
     let mut pieces = Vec::new();
     let mut piece = Vec::new();
-    let mut last: Option<(f64, f64)> = None;
+    let mut last: Option<Point> = None;
     for place in places.take_while(|p| view.contains(p)) {
         let (x, y) = view.at(place);
         let cell = (x as i32, y as i32);
@@ -244,18 +219,17 @@ fn path(
     }
     piece.extend(last);
     pieces.push(piece);
-    for piece in pieces.iter().filter(|piece| piece.len() > 1) {
-        let points: Vec<_> = simplify(piece, (1.0, 1.0), 0.15).into_iter().map(pixel).collect();
-        area.draw(&PathElement::new(points, ink.style()))?;
+    for piece in &pieces {
+        canvas.line(simplify(piece, (1.0, 1.0), 0.15), ink);
     }
-    Ok(last)
+    last.is_some()
 }
 
 /// Draws floor and back walls with grid, numbers and names of the axes.
-fn furniture(area: &Area, view: &View) -> Result<(), Failure> {
+fn furniture(canvas: &mut Canvas, view: &View) {
     let (low, high) = (view.low_m, view.high_m);
-    let line = |a: Vector3<f64>, b: Vector3<f64>, color: RGBColor| {
-        area.draw(&PathElement::new([pixel(view.at(a)), pixel(view.at(b))], Ink::new(color, 0.75).style()))
+    let line = |canvas: &mut Canvas, a: Vector3<f64>, b: Vector3<f64>, color: Rgb| {
+        canvas.line([view.at(a), view.at(b)], Ink::new(color, 0.75));
     };
     // For each axis: the edge with the numbers and the parallel one behind it, each as the point at the axis's zero and
     // the direction of grid lines on floor or wall; and the position of the numbers.
@@ -272,29 +246,28 @@ fn furniture(area: &Area, view: &View) -> Result<(), Failure> {
         let (first, last) = (low.dot(&axis), high.dot(&axis));
         let out = view.direction(outward);
         let out_length = libm::hypot(out.0, out.1);
-        let label = |value: f64, away_px: f64, text: String, style: TextStyle<'static>| {
+        let beside = |value: f64, away_px: f64| {
             let (right, down) = view.at(front.0 + axis * value);
             let away = away_px / out_length;
-            area.draw(&Text::new(text, pixel((right + out.0 * away, down + out.1 * away + 4.0)), style))
+            (right + out.0 * away, down + out.1 * away + 4.0)
         };
-        let Ticks { at, decimals } = ticks::linear(&(first..last), TICKS);
-        for value in at {
+        for (value, label) in Ticks::linear(first, last, TICKS).marks() {
             for (edge, way) in [front, back] {
                 let from = edge + axis * value;
-                line(from, from + way.component_mul(&span), GRID)?;
+                line(canvas, from, from + way.component_mul(&span), GRID);
             }
             // The left corner is labelled by the height.
             if axis != x || value - first > 0.04 * (last - first) {
-                label(value, 16.0, number(value, decimals), text(LABEL_PX, GREY, HPos::Center))?;
+                canvas.text(&label, beside(value, 16.0), LABEL_PX, TextAnchor::Middle, GREY);
             }
         }
         for (edge, _) in [front, back] {
-            line(edge + axis * first, edge + axis * last, FRAME)?;
+            line(canvas, edge + axis * first, edge + axis * last, FRAME);
         }
-        label(0.5 * (first + last), 50.0, name.to_owned(), text(12.0, BLACK, HPos::Center))?;
+        canvas.text(name, beside(0.5 * (first + last), 50.0), 12.0, TextAnchor::Middle, BLACK);
     }
     // The three edges of the back walls without numbers.
-    line(Vector3::new(low.x, low.y, high.z), Vector3::new(low.x, high.y, high.z), FRAME)?;
-    line(Vector3::new(low.x, high.y, high.z), Vector3::new(high.x, high.y, high.z), FRAME)?;
-    line(Vector3::new(high.x, high.y, low.z), Vector3::new(high.x, high.y, high.z), FRAME)
+    line(canvas, Vector3::new(low.x, low.y, high.z), Vector3::new(low.x, high.y, high.z), FRAME);
+    line(canvas, Vector3::new(low.x, high.y, high.z), Vector3::new(high.x, high.y, high.z), FRAME);
+    line(canvas, Vector3::new(high.x, high.y, low.z), Vector3::new(high.x, high.y, high.z), FRAME);
 }

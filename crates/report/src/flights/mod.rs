@@ -11,7 +11,6 @@ use crate::claims::Claim;
 use crate::{csv, figures, groups, report, summary};
 use afbc_files::{Error, Folder};
 use afbc_sim::flown::Flown;
-use std::io;
 use std::path::PathBuf;
 
 /// Writes everything about `flown` into `folder`, replacing all earlier files of its command, and returns the paths
@@ -31,10 +30,7 @@ use std::path::PathBuf;
 /// The first file that could not be written, or is not the command's.
 pub fn write(folder: &Folder, flown: &[Flown], claims: &[Claim]) -> Result<Vec<PathBuf>, Error> {
     let groups = groups::groups(flown);
-    let draw = |group: &groups::Group<'_>| figures::flights::draw(&group.flights);
-    // Before any file is removed: a failure to draw leaves the earlier results.
-    let sets = groups.iter().map(draw).collect::<io::Result<Vec<_>>>();
-    let sets = sets.map_err(|source| folder.error("figures", source))?;
+    let sets: Vec<_> = groups.iter().map(|group| figures::flights::draw(&group.flights)).collect();
     let svg_name =
         |group: &groups::Group<'_>, figure: &figures::Picture| format!("{}{}.svg", group.figure_prefix, figure.name);
     let mut names = vec!["summary.json".to_owned(), "report.html".to_owned()];

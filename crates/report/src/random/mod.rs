@@ -18,7 +18,6 @@ use crate::grid::{self, TableFormat};
 use afbc_campaign::compare::Comparison;
 use afbc_files::{Error, Folder};
 use shown::Shown;
-use std::io;
 use std::path::PathBuf;
 
 /// Writes everything about the flights into `folder`, replacing all earlier files of its command, and returns the paths
@@ -33,8 +32,7 @@ use std::path::PathBuf;
 /// The first file that could not be written, or is not the command's.
 pub fn write(folder: &Folder, judged: &Judged<'_>, again: &[Comparison]) -> Result<Vec<PathBuf>, Error> {
     folder.only(&["flights.csv", "random.json", "tables.md", "tables.tex", "report.html"])?;
-    let drawn = again.iter().map(Shown::of).collect::<io::Result<Vec<_>>>();
-    let page = page::page(judged, drawn.map_err(|source| folder.error("figures", source))?);
+    let page = page::page(judged, again.iter().map(Shown::of).collect());
     let [md, tex] = [TableFormat::Markdown, TableFormat::Latex].map(|format| tables(judged, format));
     Ok(vec![
         folder.place("flights.csv", |out| files::csv(out, judged))?,

@@ -4,7 +4,6 @@ use crate::explore::ExplorableScene;
 use crate::figures::{self, Picture};
 use crate::words;
 use afbc_campaign::compare::Comparison;
-use std::io;
 
 /// A flight that is shown in space.
 pub(super) struct Shown {
@@ -14,11 +13,11 @@ pub(super) struct Shown {
 }
 
 impl Shown {
-    pub(super) fn of(again: &Comparison) -> io::Result<Self> {
+    pub(super) fn of(again: &Comparison) -> Self {
         let Comparison { scenario, entries, .. } = again;
         let flights: Vec<_> = entries.iter().map(|entry| &entry.first).collect();
-        let drawn = figures::flights::named(&flights, &[("fig4-trajectory", "trajectory")])?.pop();
+        let drawn = figures::flights::named(&flights, &[("fig4-trajectory", "trajectory")]).pop();
         let (name, conditions) = (scenario.name.clone(), words::conditions(scenario));
-        Ok(Shown { name, conditions, space: drawn.and_then(Picture::into_scene) })
+        Shown { name, conditions, space: drawn.and_then(Picture::into_scene) }
     }
 }

@@ -31,8 +31,7 @@ pub fn folder_name(name: &str) -> String {
 /// # Errors
 /// The first file that could not be written, or is not the command's.
 pub fn write(folder: &Folder, replay: &Replay<'_>) -> Result<Vec<PathBuf>, Error> {
-    let drawn = figures::replay::draw(replay.recording, replay.replayed);
-    let pictures = drawn.map_err(|source| folder.error("figures", source))?;
+    let pictures = figures::replay::draw(replay.recording, replay.replayed);
     let svgs: Vec<_> = pictures.iter().map(|picture| format!("{}.svg", picture.name)).collect();
     let names = ["replay.csv", "summary.json", "report.html"].into_iter();
     folder.only(&names.chain(svgs.iter().map(String::as_str)).collect::<Vec<_>>())?;

@@ -3,7 +3,6 @@
 use crate::explore::ExplorableScene;
 use crate::figures::{self, Picture};
 use afbc_campaign::compare::Comparison;
-use std::io;
 
 /// What the page shows of a flight.
 pub(super) struct Drawn {
@@ -12,10 +11,10 @@ pub(super) struct Drawn {
 }
 
 impl Drawn {
-    pub(super) fn of(comparison: &Comparison) -> io::Result<Self> {
+    pub(super) fn of(comparison: &Comparison) -> Self {
         let flights: Vec<_> = comparison.entries.iter().map(|entry| &entry.first).collect();
         let names = [("fig7-errors", "errors"), ("fig4-trajectory", "trajectory")];
-        let mut pictures = figures::flights::named(&flights, &names)?.into_iter();
-        Ok(Drawn { errors: pictures.next(), space: pictures.next().and_then(Picture::into_scene) })
+        let mut pictures = figures::flights::named(&flights, &names).into_iter();
+        Drawn { errors: pictures.next(), space: pictures.next().and_then(Picture::into_scene) }
     }
 }

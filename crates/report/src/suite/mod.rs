@@ -21,7 +21,6 @@ use afbc_campaign::compare::Comparison;
 use afbc_files::{Error, Folder};
 use cells::FIGURES;
 use drawn::Drawn;
-use std::io;
 use std::path::PathBuf;
 
 /// Writes everything about a suite into `folder`, replacing all earlier files of its command, and returns the paths
@@ -39,8 +38,7 @@ use std::path::PathBuf;
 /// # Errors
 /// The first file that could not be written, or is not the command's.
 pub fn write(folder: &Folder, flown: FlownSuite<'_>) -> Result<Vec<PathBuf>, Error> {
-    let drawn = flown.comparisons.iter().map(Drawn::of).collect::<io::Result<Vec<_>>>();
-    let drawn = drawn.map_err(|source| folder.error("figures", source))?;
+    let drawn: Vec<Drawn> = flown.comparisons.iter().map(Drawn::of).collect();
     let name = |comparison: &Comparison| format!("{}.svg", comparison.scenario.name);
     let svgs: Vec<_> =
         flown.comparisons.iter().zip(&drawn).filter_map(|(c, drawn)| Some((name(c), drawn.errors.as_ref()?))).collect();

@@ -143,7 +143,28 @@ pub(crate) fn words(node: Node<'_, '_>) -> String {
 /// Returns all text in a figure with its position.
 pub(crate) fn labels(svg: &Document<'_>) -> Vec<(String, f64, f64)> {
     let texts = svg.descendants().filter(|node| node.has_tag_name("text"));
-    texts.map(|text| (words(text), number(text, "x"), number(text, "y"))).collect()
+    texts.map(|text| (words(text), number(text, "x"), middle(text))).collect()
+}
+
+/// Returns the height of a text's middle, halfway up its small letters.
+pub(crate) fn middle(text: Node<'_, '_>) -> f64 {
+    number(text, "y") - 0.26 * number(text, "font-size")
+}
+
+pub(crate) fn points(node: Node<'_, '_>) -> Vec<(f64, f64)> {
+    let pair = |text: &str| text.split_once(',').map(|(x, y)| (x.parse().unwrap(), y.parse().unwrap())).unwrap();
+    node.attribute("points").unwrap().split_whitespace().map(pair).collect()
+}
+
+/// Returns every filled rectangle: left, top, width, height.
+pub(crate) fn boxes<'a>(svg: &'a Document<'_>) -> Vec<(Node<'a, 'a>, [f64; 4])> {
+    let areas = svg.descendants().filter(|node| node.has_tag_name("polygon"));
+    let rectangle = |area| {
+        let [a, b, c, d] = points(area).try_into().ok()?;
+        let is_upright = a.1 == b.1 && b.0 == c.0 && c.1 == d.1 && d.0 == a.0;
+        is_upright.then_some((area, [a.0.min(c.0), a.1.min(c.1), (c.0 - a.0).abs(), (c.1 - a.1).abs()]))
+    };
+    areas.filter_map(rectangle).collect()
 }
 
 pub(crate) fn number(node: Node<'_, '_>, attribute: &str) -> f64 {
