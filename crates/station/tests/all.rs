@@ -10,10 +10,12 @@
 
 mod answers;
 mod arming;
+mod calibration;
 mod command_parameters;
 mod commands;
 mod common;
 mod dialect;
+mod escs;
 mod failsafes;
 mod flood;
 mod frames;
@@ -29,6 +31,7 @@ mod parameters;
 mod places;
 mod poses;
 mod rate;
+mod receiver;
 mod reports;
 mod requests;
 mod settings;

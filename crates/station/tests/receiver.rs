@@ -1,0 +1,387 @@
+//! A pilot's receiver beside the stations, from its bytes to requests, orders and texts; and a station's channels in
+//! place of a receiver's.
+
+use crate::common::Bench;
+use afbc_flight_core::{Mode, Refusal, Request};
+use afbc_guidance::{FlightMode, Order, Sticks};
+use afbc_link::{ChannelsOverride, Command, Downlink, ExternalTarget, ManualControl, MavSeverity, Telemetry, Uplink};
+use afbc_onboard::{ControlInputs, Report};
+use afbc_radio::{
+    CHANNELS, Channels, CrsfFrame, LinkStatistics, RadioFunctions, RadioProtocol, RadioReceiver, RadioSettings,
+    SbusFrame, SwitchModes,
+};
+use afbc_station::services::{health::sensor, status::SensorBits, streams::id};
+use afbc_station::{AuxSensors, RadioControl};
+
+const WARNING: MavSeverity = MavSeverity::MAV_SEVERITY_WARNING;
+const INFO: MavSeverity = MavSeverity::MAV_SEVERITY_INFO;
+/// Places of channels.
+const ROLL: usize = 0;
+const THROTTLE: usize = 2;
+const ARM: usize = 4;
+const MODE: usize = 5;
+/// Sticks in their centres, switches off.
+const REST: [u16; 16] =
+    [1500, 1500, 1500, 1500, 1000, 1000, 1000, 1000, 1000, 1000, 1000, 1000, 1000, 1000, 1000, 1000];
+/// Frames that a receiver must have sent in a row before it is believed.
+const FRAMES: usize = 10;
+
+/// A vehicle with a receiver.
+struct Vehicle {
+    bench: Bench,
+    radio: RadioControl,
+    settings: RadioSettings,
+    idle: Report,
+    mode: Mode,
+    flight_mode: FlightMode,
+    texts: Vec<(MavSeverity, String)>,
+}
+
+fn settings(protocol: RadioProtocol) -> RadioSettings {
+    RadioSettings { receiver: RadioReceiver { protocol, ..RadioReceiver::DEFAULT }, ..RadioSettings::DEFAULT }
+}
+
+fn crsf(us: [u16; 16]) -> Vec<u8> {
+    CrsfFrame::Channels(Channels::of(us)).encode().to_vec()
+}
+
+fn sbus(us: [u16; 16], frame_lost: bool, failsafe: bool) -> Vec<u8> {
+    SbusFrame { channels: Channels::of(us), frame_lost, failsafe }.encode().to_vec()
+}
+
+fn with(changes: &[(usize, u16)]) -> [u16; 16] {
+    let mut us = REST;
+    changes.iter().for_each(|(place, value)| us[*place] = *value);
+    us
+}
+
+impl Vehicle {
+    fn new(protocol: RadioProtocol) -> Self {
+        let mut bench = Bench::new();
+        let (idle, _) = bench.step();
+        let (radio, settings) = (RadioControl::default(), settings(protocol));
+        let (mode, flight_mode) = (Mode::Disarmed, FlightMode::Position);
+        Vehicle { bench, radio, settings, idle, mode, flight_mode, texts: Vec::new() }
+    }
+
+    /// Of which the pilot is heard.
+    fn heard(protocol: RadioProtocol) -> Self {
+        let mut vehicle = Vehicle::new(protocol);
+        // The switches' positions are known after two frames more.
+        vehicle.send(FRAMES + 2, REST);
+        assert_eq!(std::mem::take(&mut vehicle.texts), [(INFO, "radio: heard".to_owned())]);
+        vehicle
+    }
+
+    /// Runs a tick with bytes of the receiver; returns its messages and the new inputs.
+    fn tick(&mut self, bytes: &[u8]) -> (Vec<Downlink>, Option<ControlInputs>) {
+        self.bench.now_us += 1000;
+        let mut report = Report { time_us: self.bench.now_us, mode: self.mode, ..self.idle };
+        report.guided.mode = self.flight_mode;
+        let said = self.bench.said(&report);
+        self.texts.extend(said.iter().filter_map(|message| match message {
+            Downlink::Text { severity, text } => Some((*severity, text.to_str().expect("words").to_owned())),
+            _ => None,
+        }));
+        (said, self.bench.comms.pilot(&mut self.radio, bytes, &self.settings))
+    }
+
+    /// Runs ticks without bytes; returns what they bring for the control tick.
+    fn pass(&mut self, ticks: usize) -> Vec<ControlInputs> {
+        (0..ticks).filter_map(|_| self.tick(&[]).1).collect()
+    }
+
+    /// Takes a frame of the receiver, and four ticks.
+    fn frame(&mut self, bytes: &[u8]) -> Vec<ControlInputs> {
+        let first = self.tick(bytes).1;
+        first.into_iter().chain(self.pass(3)).collect()
+    }
+
+    /// Takes as many frames with these channels.
+    fn send(&mut self, frames: usize, us: [u16; 16]) -> Vec<ControlInputs> {
+        let bytes = match self.settings.receiver.protocol {
+            RadioProtocol::Crsf => crsf(us),
+            RadioProtocol::Sbus => sbus(us, false, false),
+        };
+        (0..frames).flat_map(|_| self.frame(&bytes)).collect()
+    }
+
+    /// Takes a station's channels, and four ticks.
+    fn relay(&mut self, us: [u16; CHANNELS]) -> Vec<ControlInputs> {
+        self.bench.hear(Uplink::Target(ExternalTarget::Channels(ChannelsOverride::new(us))));
+        self.pass(4)
+    }
+
+    /// Returns RC_CHANNELS, if it is sent on request.
+    fn channels(&mut self) -> Option<([u16; CHANNELS], u8)> {
+        self.bench.hear(Uplink::Command(Command::RequestMessage { message: id::RC_CHANNELS, index: 0 }));
+        (0..2).flat_map(|_| self.tick(&[]).0).find_map(|message| match message {
+            Downlink::Telemetry(Telemetry::Channels(channels)) => Some((channels.us, channels.rssi)),
+            _ => None,
+        })
+    }
+
+    fn is_heard(&mut self) -> bool {
+        self.channels().is_some()
+    }
+
+    fn said(&self, text: &str) -> usize {
+        self.texts.iter().filter(|(_, said)| said == text).count()
+    }
+}
+
+fn padded(us: [u16; 16]) -> [u16; CHANNELS] {
+    Channels::of(us).us
+}
+
+fn requests(inputs: &[ControlInputs]) -> Vec<(u8, Request)> {
+    inputs.iter().filter_map(|inputs| inputs.inbox.asked()).map(|it| (it.ticket, it.value)).collect()
+}
+
+fn orders(inputs: &[ControlInputs]) -> Vec<(u8, Order)> {
+    inputs.iter().flat_map(|inputs| &inputs.orders.given).map(|it| (it.ticket, it.value)).collect()
+}
+
+fn sticks(inputs: &[ControlInputs]) -> Vec<Sticks> {
+    inputs.iter().filter_map(|inputs| inputs.orders.sticks).map(|sticks| sticks.value).collect()
+}
+
+/// A receiver is believed from its tenth frame in a row on, once; its pilot is lost when no frame has come for half a
+/// second, and both are said.
+#[test]
+fn a_pilot_is_heard_and_lost() {
+    for protocol in [RadioProtocol::Crsf, RadioProtocol::Sbus] {
+        let mut vehicle = Vehicle::new(protocol);
+        assert!(vehicle.send(FRAMES - 1, REST).is_empty());
+        assert_eq!((vehicle.is_heard(), vehicle.texts.len()), (false, 0));
+        let inputs = vehicle.send(1, REST);
+        assert_eq!((inputs.len(), sticks(&inputs).len()), (1, 1), "in the frame's tick");
+        assert_eq!(sticks(&vehicle.send(20, REST)).len(), 20, "the sticks of each frame");
+        assert_eq!(vehicle.texts, [(INFO, "radio: heard".to_owned())]);
+        // Four ticks ago there was a frame.
+        assert!(vehicle.pass(490).is_empty());
+        assert!(vehicle.is_heard());
+        vehicle.pass(30);
+        assert_eq!(vehicle.texts[1..], [(WARNING, "radio: lost".to_owned())]);
+        assert!(!vehicle.is_heard());
+        // What is left of the pilot is nothing: half a second passes until the sticks count again.
+        assert!(sticks(&vehicle.send(100, REST)).is_empty());
+        assert!(!sticks(&vehicle.send(100, REST)).is_empty());
+        assert_eq!((vehicle.said("radio: heard"), vehicle.said("radio: lost")), (2, 1));
+    }
+}
+
+/// What is no frame, and what the receiver has marked as lost, begins the count anew, and is nothing to a pilot who is
+/// heard; a receiver that has given up loses the pilot at once.
+#[test]
+fn bad_frames_begin_the_count_anew() {
+    let mut damaged = crsf(REST);
+    damaged[5] ^= 1;
+    let bad = [
+        (RadioProtocol::Crsf, damaged.clone()),
+        (RadioProtocol::Sbus, sbus(REST, true, false)),
+        (RadioProtocol::Sbus, sbus(REST, false, true)),
+        (RadioProtocol::Sbus, sbus(REST, true, true)),
+        // The end of a frame is missing: the next one begins after a pause.
+        (RadioProtocol::Sbus, sbus(REST, false, false)[..20].to_vec()),
+    ];
+    for (case, (protocol, bytes)) in bad.into_iter().enumerate() {
+        let mut vehicle = Vehicle::new(protocol);
+        // A frame whose end is missing is found out with the next one, which has been counted by then.
+        vehicle.send(FRAMES - 2, REST);
+        vehicle.frame(&bytes);
+        vehicle.send(FRAMES - 1, REST);
+        assert!(!vehicle.is_heard(), "{case}");
+        vehicle.send(2, REST);
+        assert!(vehicle.is_heard(), "{case}");
+        (0..20).for_each(|_| drop(vehicle.frame(&bytes)));
+        let gives_up = [2, 3].contains(&case);
+        assert_eq!(vehicle.is_heard(), !gives_up, "{case}");
+        assert_eq!(vehicle.said("radio: lost"), usize::from(gives_up), "{case}");
+        (0..200).for_each(|_| drop(vehicle.frame(&bytes)));
+        assert_eq!((vehicle.is_heard(), vehicle.said("radio: lost")), (false, 1), "they do not keep the pilot: {case}");
+    }
+}
+
+/// The arming switch asks for what it is moved to, on the pilot's behalf, and orders the mode of the switches.
+#[test]
+fn the_arming_switch_arms_and_disarms() {
+    let mut vehicle = Vehicle::heard(RadioProtocol::Crsf);
+    let inputs = vehicle.send(5, with(&[(ARM, 2000)]));
+    assert_eq!(requests(&inputs), [(254, Request::Arm)]);
+    assert_eq!(orders(&inputs), [(254, Order::Select(FlightMode::Position))]);
+    vehicle.mode = Mode::Flying;
+    assert_eq!(requests(&vehicle.send(5, with(&[(ARM, 2000)]))), []);
+    let inputs = vehicle.send(5, with(&[]));
+    assert_eq!((requests(&inputs), orders(&inputs)), (vec![(254, Request::Disarm)], vec![]));
+    // Of the reasons not to ask, the pilot is told.
+    vehicle.mode = Mode::Disarmed;
+    vehicle.send(5, REST);
+    assert_eq!(requests(&vehicle.send(5, with(&[(ARM, 2000), (THROTTLE, 1800)]))), []);
+    assert_eq!(vehicle.texts, [(WARNING, "radio: not armed, lower the throttle".to_owned())]);
+}
+
+/// With a faulty sensor there is no request, and with switches that select a mode that lands there is nothing at all;
+/// both are said. A flying vehicle takes the same orders.
+#[test]
+fn arming_is_refused_beside_the_flight_core() {
+    let faulty = SensorBits { present: sensor::GYROSCOPE_2, healthy: 0 };
+    let mut vehicle = Vehicle::heard(RadioProtocol::Crsf);
+    vehicle.bench.comms.set_aux_sensors(AuxSensors { sensors: faulty, ..AuxSensors::default() });
+    let inputs = vehicle.send(5, with(&[(ARM, 2000)]));
+    assert_eq!((requests(&inputs), orders(&inputs).len()), (vec![], 1));
+    assert_eq!(vehicle.texts, [(WARNING, "arming refused: IMU 2 is faulty".to_owned())]);
+    // What is faulty stops nobody from disarming.
+    vehicle.mode = Mode::Flying;
+    assert_eq!(requests(&vehicle.send(5, REST)), [(254, Request::Disarm)]);
+    assert_eq!(vehicle.texts.len(), 1);
+
+    for (number, mode, refuses) in
+        [(11, FlightMode::Land, true), (5, FlightMode::Return, true), (4, FlightMode::Hold, false)]
+    {
+        let mut vehicle = Vehicle::heard(RadioProtocol::Crsf);
+        vehicle.settings.modes = SwitchModes { sixth: number, ..SwitchModes::DEFAULT };
+        let inputs = vehicle.send(5, with(&[(MODE, 2000)]));
+        assert_eq!(orders(&inputs), [(254, Order::Select(mode))], "of a disarmed vehicle too");
+        let inputs = vehicle.send(5, with(&[(MODE, 2000), (ARM, 2000)]));
+        let expected = if refuses { vec![] } else { vec![(254, Request::Arm)] };
+        assert_eq!((requests(&inputs), orders(&inputs).len()), (expected, usize::from(!refuses)), "{mode:?}");
+        assert_eq!(vehicle.said(Refusal::WrongMode.reason()), usize::from(refuses));
+        assert!(vehicle.texts.iter().all(|(severity, _)| *severity == WARNING));
+    }
+}
+
+/// The kill switch goes on asking for what it is for, as long as the vehicle is armed.
+#[test]
+fn the_kill_switch_kills() {
+    let mut vehicle = Vehicle::heard(RadioProtocol::Crsf);
+    vehicle.settings.functions = RadioFunctions { kill: 7, ..RadioFunctions::DEFAULT };
+    vehicle.send(5, REST);
+    assert_eq!(requests(&vehicle.send(5, with(&[(6, 2000)]))), []);
+    vehicle.mode = Mode::Flying;
+    let requests = requests(&vehicle.send(3, with(&[(6, 2000)])));
+    assert_eq!(requests, [(254, Request::Kill); 3]);
+}
+
+/// Sticks are shaped for the mode that flies, and stamped with their tick; no station's joystick counts beside them,
+/// until they have been silent for half a second.
+#[test]
+fn sticks_are_shaped_and_go_first() {
+    for flight_mode in FlightMode::ALL {
+        let mut vehicle = Vehicle::heard(RadioProtocol::Crsf);
+        (vehicle.mode, vehicle.flight_mode) = (Mode::Flying, flight_mode);
+        let inputs = vehicle.send(2, with(&[(ROLL, 1755), (THROTTLE, 1245)]));
+        let raw = Sticks { roll: 0.5, pitch: 0.0, throttle: -0.5, yaw: 0.0 };
+        let expected = vehicle.settings.curves.shape(flight_mode, &raw);
+        let Sticks { roll, throttle, .. } = sticks(&inputs)[1];
+        assert!((roll - expected.roll).abs() < 1e-3 && (throttle - expected.throttle).abs() < 1e-3, "{flight_mode:?}");
+        let at_us = inputs[1].orders.sticks.map(|sticks| sticks.at_us);
+        assert_eq!(at_us, Some(vehicle.bench.now_us - 3000));
+    }
+    let mut vehicle = Vehicle::heard(RadioProtocol::Crsf);
+    let joystick =
+        Uplink::Target(ExternalTarget::Sticks(ManualControl { roll: 0.0, pitch: 1.0, throttle: 0.0, yaw: 0.0 }));
+    let counts = |vehicle: &mut Vehicle| {
+        vehicle.bench.inputs = ControlInputs::EMPTY;
+        vehicle.bench.hear(joystick);
+        vehicle.bench.inputs.orders.sticks.is_some()
+    };
+    assert!(!counts(&mut vehicle));
+    vehicle.pass(490);
+    assert!(!counts(&mut vehicle));
+    vehicle.pass(20);
+    assert!(counts(&mut vehicle));
+    // Sticks that do not count are not in its way.
+    let mut vehicle = Vehicle::new(RadioProtocol::Crsf);
+    vehicle.settings.receiver.source = 1;
+    assert!(vehicle.send(2 * FRAMES, REST).is_empty());
+    assert!(vehicle.is_heard() && counts(&mut vehicle));
+}
+
+/// RC_CHANNELS has the receiver's channels, and how well it hears: of 254, what the transmitter's packets make of it;
+/// SBUS does not say.
+#[test]
+fn stations_see_the_channels() {
+    for (quality_percent, rssi) in [(0, 0), (50, 127), (99, 251), (100, 254), (255, 254)] {
+        let mut vehicle = Vehicle::heard(RadioProtocol::Crsf);
+        let link = LinkStatistics { rssi_dbm: -70, quality_percent, snr_db: 5 };
+        vehicle.frame(&CrsfFrame::LinkStatistics(link).encode());
+        assert_eq!(*vehicle.radio.statistics(), link);
+        vehicle.send(1, with(&[(ROLL, 1700)]));
+        assert_eq!(vehicle.channels(), Some((padded(with(&[(ROLL, 1700)])), rssi)));
+    }
+    let mut vehicle = Vehicle::heard(RadioProtocol::Sbus);
+    assert_eq!(vehicle.channels(), Some((padded(REST), 255)));
+    let mut vehicle = Vehicle::new(RadioProtocol::Crsf);
+    assert_eq!(vehicle.channels(), None);
+}
+
+/// While no receiver is heard, a station's channels are read as its would be; that they are there is no news to it,
+/// that they are lost is.
+#[test]
+fn channels_of_a_station_take_the_place_of_a_receivers() {
+    let mut vehicle = Vehicle::new(RadioProtocol::Crsf);
+    (0..FRAMES - 1).for_each(|_| assert!(vehicle.relay(padded(REST)).is_empty()));
+    assert_eq!(sticks(&vehicle.relay(padded(REST))).len(), 1);
+    (0..2).for_each(|_| drop(vehicle.relay(padded(REST))));
+    assert_eq!(vehicle.channels(), Some((padded(REST), 255)));
+    assert_eq!(vehicle.texts, []);
+    let inputs: Vec<_> = (0..5).flat_map(|_| vehicle.relay(padded(with(&[(ARM, 2000)])))).collect();
+    assert_eq!((requests(&inputs), orders(&inputs).len()), (vec![(254, Request::Arm)], 1));
+    vehicle.pass(490);
+    assert_eq!((vehicle.is_heard(), vehicle.texts.len()), (true, 0));
+    vehicle.pass(20);
+    assert_eq!(vehicle.texts, [(WARNING, "radio: lost".to_owned())]);
+    assert!(!vehicle.is_heard());
+
+    // Given back, all of them: lost at once.
+    let mut vehicle = Vehicle::new(RadioProtocol::Crsf);
+    (0..FRAMES).for_each(|_| drop(vehicle.relay(padded(REST))));
+    assert!(vehicle.is_heard());
+    vehicle.relay([0; CHANNELS]);
+    assert!(!vehicle.is_heard());
+    assert_eq!(vehicle.texts, [(WARNING, "radio: lost".to_owned())]);
+}
+
+/// A channel that the station leaves alone stays for half a second, and is then not there; messages that leave all
+/// alone refresh nothing.
+#[test]
+fn a_channel_that_is_left_alone_is_lost_as_a_stick_is() {
+    let mut vehicle = Vehicle::new(RadioProtocol::Crsf);
+    // The time in 32 bits of milliseconds wraps meanwhile.
+    vehicle.bench.now_us = (u64::from(u32::MAX) + 1) * 1000 - 200_000;
+    (0..FRAMES).for_each(|_| drop(vehicle.relay(padded(with(&[(ROLL, 1600)])))));
+    let mut some = padded(REST);
+    some[ROLL] = u16::MAX;
+    let held = |vehicle: &mut Vehicle| vehicle.channels().map(|(us, _)| (us[ROLL], us[1]));
+    (0..120).for_each(|_| drop(vehicle.relay(some)));
+    assert_eq!(held(&mut vehicle), Some((1600, 1500)));
+    (0..8).for_each(|_| drop(vehicle.relay(some)));
+    assert_eq!(held(&mut vehicle), Some((0, 1500)));
+    let inputs = vehicle.relay(some);
+    assert_eq!(sticks(&inputs).first().map(|sticks| sticks.roll), Some(0.0));
+    for _ in 0..130 {
+        assert!(sticks(&vehicle.relay([u16::MAX; CHANNELS])).is_empty());
+    }
+    assert_eq!((vehicle.is_heard(), vehicle.said("radio: lost")), (false, 1));
+}
+
+/// A receiver that hears its pilot ends a station's channels, which begin anew after it.
+#[test]
+fn a_receiver_goes_first() {
+    let mut vehicle = Vehicle::new(RadioProtocol::Crsf);
+    (0..FRAMES).for_each(|_| drop(vehicle.relay(padded(with(&[(ROLL, 1600)])))));
+    vehicle.send(FRAMES, REST);
+    assert_eq!(vehicle.channels(), Some((padded(REST), 0)));
+    for _ in 0..FRAMES {
+        vehicle.bench.hear(Uplink::Target(ExternalTarget::Channels(ChannelsOverride::new(padded(REST)))));
+        assert!(sticks(&vehicle.pass(4)).is_empty(), "those of the receiver alone");
+        vehicle.send(1, REST);
+    }
+    vehicle.pass(510);
+    assert_eq!(vehicle.said("radio: lost"), 1);
+    (0..FRAMES - 1).for_each(|_| drop(vehicle.relay(padded(REST))));
+    assert!(!vehicle.is_heard());
+    vehicle.relay(padded(REST));
+    assert!(vehicle.is_heard());
+}
