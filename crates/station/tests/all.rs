@@ -17,6 +17,7 @@ mod common;
 mod dialect;
 mod escs;
 mod failsafes;
+mod fence;
 mod flood;
 mod frames;
 mod ftp;

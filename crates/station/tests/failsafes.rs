@@ -100,6 +100,43 @@ fn a_disarmed_vehicle_reports_no_failsafe() {
     assert_eq!(fly(&mut bench, 5000, false, false), (vec![], vec![false; 5]));
 }
 
+/// Flight on a tracker's poses is a failsafe and vibration is none; each is told once each time it begins. What the
+/// guidance does of its own is a failsafe too, which it tells itself.
+#[test]
+fn other_states_are_reported_once_each_time() {
+    type Set = fn(&mut Report, bool);
+    let cases: [(Set, &[(MavSeverity, &str)], bool); 3] = [
+        (
+            |report, on| report.health.observed = on,
+            &[(CRITICAL, "inertial sensor failed: flying on tracker's poses")],
+            true,
+        ),
+        (|report, on| report.shaken = on, &[(WARNING, "vibration above 4.9 m/s2: check rotors and mounts")], false),
+        (|report, on| report.guided.failsafe = on, &[], true),
+    ];
+    for (set, expected, is_failsafe) in cases {
+        let mut bench = Bench::new();
+        let (mut report, _) = bench.step();
+        report.mode = Mode::Flying;
+        // More than a second on, then off.
+        for round in 0..4 {
+            let on = round % 2 == 0;
+            set(&mut report, on);
+            let (mut received, mut heartbeats) = (Vec::new(), Vec::new());
+            for _ in 0..2500 {
+                bench.now_us += 1000;
+                report.time_us = bench.now_us;
+                let said = bench.said(&report);
+                received.extend(notices(&said));
+                heartbeats.extend(critical(&said));
+            }
+            let expected = expected.iter().filter(|_| on).map(|(severity, text)| (*severity, (*text).to_owned()));
+            assert_eq!(received, expected.collect::<Vec<_>>());
+            assert_eq!(heartbeats.last(), Some(&(on && is_failsafe)), "{heartbeats:?}");
+        }
+    }
+}
+
 fn modes() -> impl Strategy<Value = (Mode, usize)> {
     let mode = prop_oneof![Just(Mode::Disarmed), Just(Mode::Flying), Just(Mode::Coasting), Just(Mode::Descending)];
     (mode, prop_oneof![1..5usize, 1..1500usize])

@@ -2,6 +2,8 @@
 
 use crate::commands::{Current as _, bench, item, leads_to, orders, origin, refused, step, upload};
 use crate::common::Bench;
+use crate::fence::{Vehicle, way};
+use afbc_flight_core::Mode;
 use afbc_guidance::{FlightMode, Item, Order, OrderRefusal};
 use afbc_link::{Answer, Command, Datum, Downlink, Height, Mission, MissionItem, MissionResult, Place, Plan, Uplink};
 
@@ -114,5 +116,29 @@ fn what_cannot_be_flown_is_refused_at_upload() {
     set(&mut bench, "GF_MAX_HOR_DIST", 20.0);
     for command in [Command::StartMission(0, None), Command::SelectStandardMode(6)] {
         refused(&mut bench, command, Answer::Refused(OrderRefusal::OutOfRange as i32));
+    }
+}
+
+/// What is left of a jump's repetitions counts for a flight: a vehicle that is disarmed begins anew.
+#[test]
+fn jumps_begin_anew_with_each_flight() {
+    let mut vehicle = Vehicle::new();
+    let jump = MissionItem { command: 177, parameters: [0.0, 1.0, 0.0, 0.0], x: 0, y: 0, z: 0.0, ..item(1, 177) };
+    let items = [way(16, [20.0, -20.0]), jump, way(16, [30.0, -20.0])];
+    assert_eq!(vehicle.upload(Plan::MISSION, &items), MissionResult::ACCEPTED);
+    // Returns where the jump leads, which is then made.
+    let jump = |vehicle: &mut Vehicle| {
+        vehicle.leg(2);
+        let leg = vehicle.leg(1);
+        vehicle.report.guided.reached = Some(1);
+        vehicle.pass(1);
+        vehicle.report.guided.reached = None;
+        leg.item
+    };
+    for _ in 0..2 {
+        vehicle.report.mode = Mode::Flying;
+        assert_eq!([(); 3].map(|()| jump(&mut vehicle)), [0, 2, 0].map(Item::Jump));
+        vehicle.report.mode = Mode::Disarmed;
+        vehicle.pass(1);
     }
 }

@@ -4,6 +4,7 @@ use crate::common::Bench;
 use afbc_link::{Address, Answer, Command, Downlink, ParameterName, ParameterRequest, ParameterValue, Storage, Uplink};
 use afbc_onboard::parameters::RecordChange;
 use afbc_station::parameters::{LINK_SHARE, VALUE_BYTES};
+use afbc_station::services::streams::DEFAULTS;
 use afbc_station::{Comms, Setup};
 use afbc_types::State;
 use std::collections::BTreeSet;
@@ -167,4 +168,19 @@ fn a_silent_station_loses_control_after_the_time_that_is_set() {
     bench.hear_from(SECOND, set(HEIGHT, 4.0));
     listen(&mut bench, 20);
     assert_eq!((bench.changes.len(), height(&bench)), (2, 4.0));
+}
+
+/// On a fast link whose streams take all that they get of a tick, values have what these leave.
+#[test]
+fn values_are_sent_beside_full_streams() {
+    let mut bench = Bench::new();
+    bench.comms = Comms::with(Setup { bytes_per_s: 1_000_000, ..Setup::default() });
+    for (message, _) in DEFAULTS {
+        bench.hear(Uplink::Command(Command::SetInterval { message, interval_us: 1_000 }));
+        listen(&mut bench, 1);
+    }
+    listen(&mut bench, 100);
+    bench.hear(Uplink::Parameter(ParameterRequest::List));
+    let places: BTreeSet<_> = listen(&mut bench, 1000).values.iter().map(|value| value.place).collect();
+    assert_eq!(places.len(), usize::from(bench.table.count()));
 }

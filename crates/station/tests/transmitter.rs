@@ -3,6 +3,8 @@
 
 use crate::common::Bench;
 use afbc_link::telemetry::BatteryStatus;
+use afbc_station::services::origin::EarthOrigin;
+use afbc_station::services::status::GnssReceiver;
 use afbc_station::{AuxSensors, RadioControl};
 use afbc_types::State;
 use nalgebra::Vector3;
@@ -59,4 +61,33 @@ fn the_transmitter_is_told_in_turn() {
         }
     }
     assert!(modes.iter().all(|(_, (_, name))| name.ends_with(&[0]) && name.len() > 3));
+}
+
+/// Place, speed over ground, course, height and satellites, in the units of the protocol, once they are known.
+#[test]
+fn the_transmitter_is_told_the_place() {
+    let mut bench = Bench::new();
+    let origin = EarthOrigin::new(EarthOrigin::SIMULATED).expect("possible");
+    let receiver = GnssReceiver { kind: GnssReceiver::FIX_3D, satellites: 17, sigma_mm: [0; 2] };
+    bench.comms.set_aux_sensors(AuxSensors { origin: Some(origin), receiver: Some(receiver), ..AuxSensors::default() });
+    // 3 m/s to the north and 4 m/s to the east.
+    let velocity_m_s = Vector3::new(3.0, -4.0, 1.0);
+    let state = State { position_m: Vector3::new(0.0, 0.0, 12.0), velocity_m_s, ..State::default() };
+    let mut radio = RadioControl::default();
+    let mut told = Vec::new();
+    for _ in 0..1_000 {
+        bench.tick(&state);
+        told.extend(bench.comms.radio_telemetry(&mut radio).map(|frame| parts(&frame)));
+    }
+    let places: Vec<_> = told.iter().filter(|(kind, _)| *kind == 0x02).collect();
+    assert!(places.len() >= 2, "{told:?}");
+    for (_, numbers) in places {
+        assert_eq!(numbers.len(), 15);
+        let [latitude, longitude] = [&numbers[..4], &numbers[4..8]].map(number);
+        assert!((latitude - 473_977_420).abs() <= 2 && (longitude - 85_455_940).abs() <= 2, "{latitude} {longitude}");
+        // 0.1 km/h, 0.01 degrees, metres above -1000.
+        let [speed, course, height] = [&numbers[8..10], &numbers[10..12], &numbers[12..14]].map(number);
+        assert!((speed - 180).abs() <= 1 && (course - 5_313).abs() <= 1, "{speed} {course}");
+        assert_eq!((height, numbers[14]), (1_500, 17));
+    }
 }
