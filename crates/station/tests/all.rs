@@ -24,6 +24,7 @@ mod ftp;
 mod inertial;
 mod kept_clock;
 mod line;
+mod log_server;
 mod log_stream;
 mod log_transfer;
 mod memory;

@@ -242,6 +242,25 @@ fn the_checksum_is_the_protocols() {
     assert_eq!(crc32(crc32(0, b"1234"), b"56789"), 0x2DFD_2D88);
 }
 
+/// While a checksum is calculated, its request again is answered with it, and once; others are answered at once.
+#[test]
+fn a_checksum_is_calculated_once() {
+    let mut bench = Bench::new(&[("a", bytes(50_000, 1))]);
+    let terms = FileTerms { now_us: 0, may_write: true };
+    let calculate = FilePacket::request(3, FileOpcode::CALC_FILE_CRC32, 0, 0, 0).with(b"a");
+    let list = FilePacket::request(5, FileOpcode::LIST_DIRECTORY, 0, 0, 0).with(b"/");
+    assert_eq!(bench.ftp.answer(A, &calculate, &mut bench.store, terms), None);
+    for _ in 0..5 {
+        assert_eq!(bench.ftp.next_packet(&mut bench.store, 0), None, "so much is not read at once");
+        assert_eq!(bench.ftp.answer(A, &calculate, &mut bench.store, terms), None);
+        let listed = bench.ftp.answer(A, &list, &mut bench.store, terms).expect("answered");
+        assert!(result(&list, &listed).is_ok());
+    }
+    let (answer, to) = bench.packet().expect("ready");
+    assert_eq!((result(&calculate, &answer).map(|it| number(&it)), to), (Ok(crc32(0, &bench.store.files["a"])), A));
+    assert_eq!((bench.packet(), bench.store.open_count()), (None, 0));
+}
+
 /// An answer that was lost comes again, byte by byte, and nothing is done twice.
 #[test]
 fn a_repeated_request_gets_the_same_answer() {

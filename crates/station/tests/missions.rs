@@ -119,6 +119,21 @@ fn what_cannot_be_flown_is_refused_at_upload() {
     }
 }
 
+/// Another fence and other rally points leave the mission as it is, and what the guidance has of it.
+#[test]
+fn other_plans_leave_the_mission_alone() {
+    let mut vehicle = Vehicle::new();
+    let place = [20.0, -20.0];
+    assert_eq!(vehicle.upload(Plan::MISSION, &[way(16, place), way(16, place)]), MissionResult::ACCEPTED);
+    let upload = vehicle.leg(1).upload;
+    let disc = MissionItem { frame: 5, z: 0.0, parameters: [5.0, 0.0, 0.0, 0.0], ..way(5004, [40.0, 0.0]) };
+    let rally = MissionItem { frame: 3, parameters: [0.0; 4], ..way(5100, place) };
+    for (plan, item) in [(Plan::FENCE, disc), (Plan::RALLY, rally)] {
+        assert_eq!(vehicle.upload(plan, &[item]), MissionResult::ACCEPTED);
+        assert_eq!([vehicle.leg(0), vehicle.leg(1)].map(|leg| leg.upload), [upload; 2], "{plan:?}");
+    }
+}
+
 /// What is left of a jump's repetitions counts for a flight: a vehicle that is disarmed begins anew.
 #[test]
 fn jumps_begin_anew_with_each_flight() {

@@ -39,6 +39,20 @@ proptest! {
         prop_assert!((true_m.hypot(0.0) - local_m).abs() < 0.01 + sagitta_m * sagitta_m, "{true_m} {local_m}");
     }
 
+    /// The same where longitudes go on from one end.
+    #[test]
+    fn the_way_leads_across_the_antimeridian(
+        east: bool, off_deg in 0.0..0.02f64, latitude_deg in -60.0..60.0f64, y in -5e3..5e3f32,
+    ) {
+        let longitude_deg = if east { 180.0 - off_deg } else { off_deg - 180.0 };
+        let at = Global { latitude_deg, longitude_deg, altitude_m: 100.0 };
+        let origin = EarthOrigin::new(at).expect("possible");
+        let there = Vector3::new(0.0, y, 0.0);
+        let mut place = origin.global(&there);
+        place.longitude_deg -= 360.0 * (place.longitude_deg / 360.0).round();
+        prop_assert!((origin.local(&place) - there).norm() < 2e-3, "{place:?}");
+    }
+
     #[test]
     fn the_way_back_is_the_way(at in places(), x in -5e3..5e3f32, y in -5e3..5e3f32, z in -500.0..500.0f32) {
         let origin = EarthOrigin::new(at).expect("possible");

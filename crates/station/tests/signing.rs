@@ -131,6 +131,30 @@ fn only_what_is_signed_and_new_is_heard() {
     assert!(!locked.hears(&old));
 }
 
+/// Of a key that is not taken everyone is told; of one that is, and of frames that are not signed, nobody is told that.
+#[test]
+fn a_key_that_is_refused_is_told_of() {
+    const REFUSED: &str = "signing key refused: over a wire or signed only";
+    let told = |locked: &mut Locked| {
+        let is_it =
+            |it: &Downlink| matches!(it, Downlink::Text { text, .. } if text.to_str().is_ok_and(|it| it == REFUSED));
+        (0..5).map(|_| frames(&mut locked.bench).1.iter().filter(|it| is_it(it)).count()).sum::<usize>()
+    };
+    let mut locked = Locked::new();
+    locked.set(Some(OTHER), false);
+    assert_eq!((told(&mut locked), told(&mut locked)), (1, 0), "once");
+    locked.bench.hear(command());
+    assert_eq!(told(&mut locked), 0);
+    for (key, by) in [(OTHER, KEY), (KEY, OTHER)] {
+        let setup = SetupSigning { key: Some(key), time_10us: locked.time_10us };
+        let signed = locked.signed(&Uplink::Signing(setup), &by);
+        locked.bench.hear_bytes(&signed);
+        assert_eq!(told(&mut locked), 0);
+    }
+    locked.set(Some(OTHER), true);
+    assert_eq!(told(&mut locked), 0);
+}
+
 #[test]
 fn without_a_key_everything_is_heard_and_nothing_signed() {
     let mut locked = Locked::new();
@@ -275,7 +299,9 @@ fn a_clock_that_is_a_year_ahead_is_set_right_by_a_key() {
 /// Times at the end of the wire's 48 bits are none: frames that are sent go on to have times of their own.
 #[test]
 fn the_end_of_time_is_not_heard() {
-    for time_10us in [afbc_link::TIME_MAX, afbc_link::TIME_MAX - 10, afbc_link::TIME_MAX - 1_000_000_000] {
+    const TEN_YEARS_10US: u64 = 10 * 365 * 24 * HOUR_10US;
+    for before_10us in [0, 10, 1_000_000_000, TEN_YEARS_10US - 10] {
+        let time_10us = afbc_link::TIME_MAX - before_10us;
         for restarts in [false, true] {
             let mut locked = Locked::new();
             if restarts {
@@ -291,6 +317,11 @@ fn the_end_of_time_is_not_heard() {
             assert!(locked.hears(&genuine), "its clock is as it was");
         }
     }
+    // The last time that is one.
+    let mut locked = Locked::new();
+    locked.time_10us = afbc_link::TIME_MAX - TEN_YEARS_10US - 1;
+    let last = locked.signed(&command(), &KEY);
+    assert!(locked.hears(&last));
 }
 
 /// The power is cut between any two records: the key is the old one, the new one, or none that anybody has; a cut never

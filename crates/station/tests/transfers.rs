@@ -232,6 +232,35 @@ fn a_file_is_downloaded_in_bursts() {
     assert!(read == vehicle.store.files["log/a.ulg"]);
 }
 
+/// What telemetry leaves of the line is taken only as far as nothing that falls due is kept back by it.
+#[test]
+fn a_transfer_keeps_nothing_back() {
+    let streamed = id::ATTITUDE_QUATERNION;
+    let by_file = |vehicle: &mut Vehicle| {
+        vehicle.file(STATION, FilePacket::request(1, FileOpcode::OPEN_FILE_RO, 0, 0, 0).with(b"/log/a.ulg"));
+        let ((opened, _), _) = vehicle.until(500, file);
+        vehicle.file(STATION, FilePacket::request(3, FileOpcode::BURST_READ_FILE, opened.session, 0, 239));
+    };
+    let by_log = |vehicle: &mut Vehicle| vehicle.log(STATION, LogRequest::Data { log: 0, offset: 0, bytes: u32::MAX });
+    for begin in [by_file, by_log] as [fn(&mut Vehicle); 2] {
+        let mut vehicle = Vehicle::on(57_600);
+        for (message, _) in DEFAULTS {
+            let interval_us = if message == streamed { 100_000 } else { -1 };
+            vehicle.hear(STATION, &Uplink::Command(Command::SetInterval { message, interval_us }));
+            vehicle.step();
+        }
+        begin(&mut vehicle);
+        // What the line and the transfers' own part have saved up is spent in half a second.
+        (0..500).for_each(|_| drop(vehicle.step()));
+        let before = vehicle.bytes[1];
+        let is_it = |sent: &Sent| matches!(sent, Sent::Usual(Downlink::Telemetry(Telemetry::Attitude(_))));
+        let sent: Vec<_> = (0..5000).filter(|_| vehicle.step().iter().any(is_it)).collect();
+        assert!(vehicle.bytes[1] - before > 20_000, "{} bytes", vehicle.bytes[1] - before);
+        // A heartbeat keeps it back for 5 ms.
+        assert!(sent.len() >= 49 && sent.windows(2).all(|two| (94..=106).contains(&(two[1] - two[0]))), "{sent:?}");
+    }
+}
+
 /// MAVProxy asks for twenty gaps of a log at once.
 #[test]
 fn many_requests_at_once_are_kept() {
