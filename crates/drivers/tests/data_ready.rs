@@ -82,6 +82,7 @@ fn readings(sample_us: f64, us: u64, wire: impl Fn(u64) -> Option<u64>) -> Vec<(
         assert!(time.run(timing.ready((2.0 * sample_us) as u32)), "it is always read");
         all.push((time.now_us(), timing.ready_us()));
         assert_eq!(timing.ready_us().is_some(), timing.is_wired());
+        assert_eq!(timing.now_us(), time.now_us(), "the part's clock is the board's");
         time.run(time.until(time.now_us() + TRANSFER_US));
     }
     all

@@ -81,8 +81,8 @@ proptest! {
         prop_assert!(fits <= bytes.len() / ANSWER_LEN);
     }
 
-    /// Late answers, caused by delayed frames and slow ESCs, may be assigned to the wrong ESC. This ends within 0.4 s
-    /// after all ESCs answer in time again. Lost answers never cause a wrong assignment.
+    /// Late answers, caused by frames that wait for up to 5 ms and by slow ESCs, may be assigned to the wrong ESC. This
+    /// ends within 0.4 s after all ESCs answer in time again. Lost answers never cause a wrong assignment.
     #[test]
     fn late_answers_do_not_stay_in_wrong_turns(
         late_ms in vec(prop_oneof![19 => Just(0), 1 => 5..40_u64], 400),
@@ -92,7 +92,7 @@ proptest! {
     ) {
         let (mut line, mut latched, mut sent) = (EscLine::new(4), None, 0);
         let mut answers = VecDeque::<(u64, u8)>::new();
-        let mut right = 0;
+        let (mut right, mut waited) = (0, 0);
         for tick in 0..3_000_u64 {
             let now_us = tick * 1_000;
             let is_trouble = tick < 1_000;
@@ -108,9 +108,12 @@ proptest! {
             }
             latched = line.ask(now_us).or(latched);
             let frame_us = now_us + 700;
-            if is_trouble && waits[tick as usize % 400] {
+            // Longer than that the question would be given up, and its answer could be taken for the next one's.
+            if is_trouble && waits[tick as usize % 400] && waited < 5 {
+                waited += 1;
                 continue;
             }
+            waited = 0;
             if let Some(who) = latched.take() {
                 sent += 1;
                 let late_us = 1_000 * late_ms[sent % 400];

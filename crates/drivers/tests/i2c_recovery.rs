@@ -239,3 +239,47 @@ fn a_clock_line_that_is_held_is_waited_for() {
     let (readings, faults) = run(&mut driver, &rig, 2_000_000);
     assert!((1..5).contains(&faults.len()) && readings.len() > 50, "{faults:?}, {} readings", readings.len());
 }
+
+/// A controller that counts transactions, of which some fail; and its lines, which count recoveries.
+#[derive(Clone, Default)]
+struct Counted(Rc<RefCell<[u32; 2]>>);
+
+impl ErrorType for Counted {
+    type Error = ErrorKind;
+}
+
+impl I2c for Counted {
+    async fn transaction(&mut self, address: u8, operations: &mut [Operation<'_>]) -> Result<(), ErrorKind> {
+        self.0.borrow_mut()[0] += operations.len() as u32;
+        if address == 0x0D { Ok(()) } else { Err(ErrorKind::Other) }
+    }
+}
+
+impl I2cLines for Counted {
+    fn take(&mut self) {}
+
+    fn drive(&mut self, _: I2cLine, _: bool) {}
+
+    fn is_clock_high(&self) -> bool {
+        true
+    }
+
+    fn restart(&mut self) {
+        self.0.borrow_mut()[1] += 1;
+    }
+}
+
+/// Transactions of any operations reach the controller, and its answer comes back; the first, and each after one that
+/// has failed, finds the bus recovered.
+#[test]
+fn transactions_are_the_controllers() {
+    let counted = Counted::default();
+    let mut bus = RecoveringI2c::new(counted.clone(), counted.clone());
+    for (address, recoveries) in [(0x0D, 1), (0x0D, 1), (0x0E, 1), (0x0D, 2), (0x0D, 2)] {
+        let mut into = [0];
+        let before = counted.0.borrow()[0];
+        let result = block_on(bus.transaction(address, &mut [Operation::Write(&[1]), Operation::Read(&mut into)]));
+        assert_eq!(result.is_ok(), address == 0x0D);
+        assert_eq!(*counted.0.borrow(), [before + 2, recoveries]);
+    }
+}

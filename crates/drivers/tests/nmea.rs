@@ -276,3 +276,16 @@ fn a_proprietary_sentence_spoils_no_epoch() {
     assert_eq!(fixes(&mut decoder, &mixed), fixes(&mut NmeaDecoder::new(), &good));
     assert_eq!(decoder.bad_sentences(), 0);
 }
+
+/// After bytes of another protocol a sentence begins anew: what had come of one before is neither whole nor damaged.
+#[test]
+fn a_sentence_begins_anew_after_another_protocol() {
+    let whole = sentence("GPGSV,1,1,01,05,45,120,40");
+    let (first, rest) = whole.split_at(12);
+    let mut decoder = NmeaDecoder::new();
+    let counts = |decoder: &NmeaDecoder| (decoder.good_sentences(), decoder.bad_sentences());
+    assert_eq!(fixes(&mut decoder, first), []);
+    decoder.begin();
+    assert_eq!((fixes(&mut decoder, rest), counts(&decoder)), (vec![], (0, 0)));
+    assert_eq!((fixes(&mut decoder, &whole), counts(&decoder)), (vec![], (1, 0)));
+}
