@@ -105,7 +105,8 @@ fn a_disarmed_vehicle_reports_no_failsafe() {
 #[test]
 fn other_states_are_reported_once_each_time() {
     type Set = fn(&mut Report, bool);
-    let cases: [(Set, &[(MavSeverity, &str)], bool); 3] = [
+    type Texts = &'static [(MavSeverity, &'static str)];
+    let cases: [(Set, Texts, bool); 3] = [
         (
             |report, on| report.health.observed = on,
             &[(CRITICAL, "inertial sensor failed: flying on tracker's poses")],
