@@ -4,19 +4,21 @@
 //! polygon, a vertex an item, or a circle; a circle of radius 0 is none. A few boundaries are looked at after each tick
 //! ([`FenceWatch`]), so that its cost does not depend on their number.
 
-use crate::services::mission::{Invalid, check_unused};
+use crate::services::items::{Invalid, check_unused};
 use crate::services::origin::LocalChart;
 use afbc_guidance::FenceView;
 use afbc_guidance::fence::{MARGIN_M, PolygonFault, StopPath, check_polygon, distance, passes_edge};
-use afbc_link::{MissionItem, MissionResult};
+use afbc_link::{MavCmd, MissionItem, MissionResult};
 use nalgebra::Vector2;
 
-/// MAV_CMD_NAV_FENCE_RETURN_POINT.
-const RETURN_POINT: u16 = 5000;
-/// MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION and _EXCLUSION.
-const VERTEX: [u16; 2] = [5001, 5002];
-/// MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION and _EXCLUSION.
-const CIRCLE: [u16; 2] = [5003, 5004];
+const RETURN_POINT: u16 = MavCmd::MAV_CMD_NAV_FENCE_RETURN_POINT as u16;
+/// To stay in, and to stay out of.
+const VERTEX: [u16; 2] = [
+    MavCmd::MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION as u16,
+    MavCmd::MAV_CMD_NAV_FENCE_POLYGON_VERTEX_EXCLUSION as u16,
+];
+const CIRCLE: [u16; 2] =
+    [MavCmd::MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION as u16, MavCmd::MAV_CMD_NAV_FENCE_CIRCLE_EXCLUSION as u16];
 /// Largest radius, and distance of an area from the origin \[m\].
 const FAR_M: f32 = 20_000.0;
 /// Boundaries looked at after a tick.

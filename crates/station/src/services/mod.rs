@@ -12,6 +12,7 @@ pub mod files;
 pub mod ftp;
 pub mod health;
 pub mod imus;
+mod items;
 pub mod log_stream;
 pub mod log_transfer;
 pub mod logs;

@@ -1,6 +1,6 @@
 //! Jumps of a mission, which are over after a number of repetitions.
 
-use super::items::{JUMP, JUMPS_MAX};
+use crate::services::items::{JUMP, JUMPS_MAX};
 use afbc_link::MissionItem;
 use heapless::Vec;
 

@@ -4,21 +4,19 @@
 //! An upload takes the place of the plan only once it is complete and every item is valid. Downloads have no state: any
 //! number of stations may read at once. The plans share [`ITEMS_MAX`] items.
 
-mod items;
 mod jumps;
 mod plans;
 mod upload;
 
-pub(super) use items::check_unused;
-pub use items::{ITEMS_MAX, Invalid, check, to_guidance};
+pub use crate::services::items::{ITEMS_MAX, Invalid, check, to_guidance};
 
 use crate::services::fence;
+use crate::services::items::{FAR, check_jumps, check_rally, stop_m};
 use crate::services::origin::EarthOrigin;
 use crate::services::texts::Words;
 use afbc_guidance::{Item, Leg, Net, OrderRefusal};
 use afbc_link::{Address, Mission, MissionCurrent, MissionItem, MissionResult, Plan};
 use heapless::Deque;
-use items::{FAR, check_jumps, check_rally, stop_m};
 use jumps::Jumps;
 use nalgebra::{Vector2, Vector3};
 use plans::PlanItems;

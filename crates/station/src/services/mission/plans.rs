@@ -1,6 +1,6 @@
 //! Room for the items of all plans together: mission, fence and rally points, one after the other.
 
-use super::items::ITEMS_MAX;
+use crate::services::items::ITEMS_MAX;
 use afbc_link::{MissionItem, Plan};
 use heapless::Vec;
 

@@ -1,6 +1,6 @@
 //! An upload in progress.
 
-use super::items::ITEMS_MAX;
+use crate::services::items::ITEMS_MAX;
 use afbc_link::{Address, MissionItem, Plan};
 use heapless::Vec;
 

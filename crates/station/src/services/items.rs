@@ -3,28 +3,29 @@
 use crate::services::origin::{EarthOrigin, LocalChart, resolve};
 use crate::services::texts::Words;
 use afbc_guidance::{Item, is_place};
-use afbc_link::{Datum, Height, MissionItem, MissionResult, Place};
+use afbc_link::{Datum, Height, MavCmd, MissionItem, MissionResult, Place};
 use nalgebra::{Vector2, Vector3};
 
 /// Most items of all plans together.
 pub const ITEMS_MAX: usize = 64;
 
-const WAYPOINT: u16 = 16;
-const LOITER: u16 = 17;
-const LOITER_TURNS: u16 = 18;
-const LOITER_TIME: u16 = 19;
-const RETURN: u16 = 20;
-const LAND: u16 = 21;
-const TAKE_OFF: u16 = 22;
-const LOITER_TO_ALTITUDE: u16 = 31;
-const DELAY: u16 = 93;
-const YAW: u16 = 115;
-pub(super) const JUMP: u16 = 177;
-const SPEED: u16 = 178;
-const LOOK: u16 = 195;
-const LOOK_NOWHERE: u16 = 197;
-const OLD_LOOK: u16 = 201;
-const RALLY_POINT: u16 = 5100;
+const WAYPOINT: u16 = MavCmd::MAV_CMD_NAV_WAYPOINT as u16;
+const LOITER: u16 = MavCmd::MAV_CMD_NAV_LOITER_UNLIM as u16;
+const LOITER_TURNS: u16 = MavCmd::MAV_CMD_NAV_LOITER_TURNS as u16;
+const LOITER_TIME: u16 = MavCmd::MAV_CMD_NAV_LOITER_TIME as u16;
+const RETURN: u16 = MavCmd::MAV_CMD_NAV_RETURN_TO_LAUNCH as u16;
+const LAND: u16 = MavCmd::MAV_CMD_NAV_LAND as u16;
+const TAKE_OFF: u16 = MavCmd::MAV_CMD_NAV_TAKEOFF as u16;
+const LOITER_TO_ALTITUDE: u16 = MavCmd::MAV_CMD_NAV_LOITER_TO_ALT as u16;
+const DELAY: u16 = MavCmd::MAV_CMD_NAV_DELAY as u16;
+const YAW: u16 = MavCmd::MAV_CMD_CONDITION_YAW as u16;
+pub(super) const JUMP: u16 = MavCmd::MAV_CMD_DO_JUMP as u16;
+const SPEED: u16 = MavCmd::MAV_CMD_DO_CHANGE_SPEED as u16;
+const LOOK: u16 = MavCmd::MAV_CMD_DO_SET_ROI_LOCATION as u16;
+const LOOK_NOWHERE: u16 = MavCmd::MAV_CMD_DO_SET_ROI_NONE as u16;
+#[allow(deprecated, reason = "stations still send it")]
+const OLD_LOOK: u16 = MavCmd::MAV_CMD_DO_SET_ROI as u16;
+const RALLY_POINT: u16 = MavCmd::MAV_CMD_NAV_RALLY_POINT as u16;
 
 /// Commands that stations put into missions and that are refused, with their names.
 const NAMES: [(u16, &str); 19] = [
