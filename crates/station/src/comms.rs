@@ -278,7 +278,7 @@ impl Comms {
 
     /// Sends all messages due after a tick, frame by frame, through `send`: at most [`REPORT_MAX`] bytes. `tick_us` is
     /// the duration of the tick.
-    pub fn report<const N: usize>(&mut self, report: &Report<N>, tick_us: f32, send: impl FnMut(&[u8])) {
+    pub fn report<const N: usize>(&mut self, report: &Report<N>, tick_us: f32, mut send: impl FnMut(&[u8])) {
         self.tick += 1;
         self.tick_us_max = self.tick_us_max.max(tick_us);
         let dropped_frames = self.bad_frames();
@@ -296,51 +296,51 @@ impl Comms {
         self.saturated_ticks = report.saturated_ticks;
         self.watch(report);
 
-        let mut outlet = self.outlet(REPORT_MAX, send);
+        self.left = REPORT_MAX;
         let (now_us, armed) = (report.time_us, report.mode.armed());
         if self.dispatcher.streams.rotors() && (self.state_is_news || self.tick.is_multiple_of(ROTORS)) {
             self.state_is_news = false;
             // Not from the budget: whoever asks for them leaves room.
-            outlet.say(&Downlink::Rotors { time_us: now_us, armed, speeds: report.motors.padded() }, &mut self.signing);
+            self.send(&Downlink::Rotors { time_us: now_us, armed, speeds: report.motors.padded() }, &mut send);
         }
-        let Dispatcher { commands, streams, texts, .. } = &mut self.dispatcher;
+        let commands = &mut self.dispatcher.commands;
         let settled = report.answer.and_then(|answer| commands.settle(answer));
         let ordered = report.guided.answer.and_then(|(ticket, result)| commands.settle_order(ticket, result));
         // Whatever the budget says: a station gives up, or repeats, a command that is not answered.
         for answer in settled.into_iter().chain(ordered) {
-            streams.spend(outlet.say(&answer, &mut self.signing));
+            self.say(&answer, &mut send);
         }
-        for answer in core::iter::from_fn(|| commands.next(now_us)).take(ANSWERS_PER_TICK) {
-            streams.spend(outlet.say(&answer, &mut self.signing));
+        for _ in 0..ANSWERS_PER_TICK {
+            let Some(answer) = self.dispatcher.commands.next(now_us) else { break };
+            self.say(&answer, &mut send);
         }
-        while streams.has_room()
-            && outlet.left >= TEXT_MAX
-            && let Some(text) = texts.next()
+        while self.dispatcher.streams.has_room()
+            && self.left >= TEXT_MAX
+            && let Some(text) = self.dispatcher.texts.next()
         {
-            streams.spend(outlet.say(&text, &mut self.signing));
+            self.say(&text, &mut send);
         }
         let (period, phase) = HEARTBEAT;
-        if self.tick % period == phase && outlet.left >= TEXT_MAX {
+        if self.tick % period == phase && self.left >= TEXT_MAX {
             let heartbeat = self.heartbeat();
-            self.dispatcher.streams.spend(outlet.say(&heartbeat, &mut self.signing));
+            self.say(&heartbeat, &mut send);
         }
         for _ in 0..REPLIES_PER_TICK {
             if self.dispatcher.streams.has_room()
-                && outlet.left >= REPLY_MAX
+                && self.left >= REPLY_MAX
                 && let Some(reply) = self.dispatcher.next_reply()
             {
-                self.dispatcher.streams.spend(outlet.say(&reply, &mut self.signing));
+                self.say(&reply, &mut send);
             }
         }
         // The longest of all: how long a message is turns out when it is made, and then it must leave.
-        while outlet.left >= SIGNED_FRAME_MAX
+        while self.left >= SIGNED_FRAME_MAX
             && let Some(requested) = self.dispatcher.streams.next(now_us)
         {
             if let Some(message) = self.compose(requested) {
-                self.dispatcher.streams.spend(outlet.say(&message, &mut self.signing));
+                self.say(&message, &mut send);
             }
         }
-        (self.sender, self.left) = (outlet.sender, outlet.left);
     }
 
     /// Does what stations want of the parameters, to be called after each [`report`](Self::report): sends values, frame
@@ -350,7 +350,7 @@ impl Comms {
     pub fn parameters<const N: usize>(
         &mut self,
         table: &mut ParameterTable<N>,
-        send: impl FnMut(&[u8]),
+        mut send: impl FnMut(&[u8]),
     ) -> Option<RecordChange> {
         let change = self.dispatcher.grant(table);
         // COM_DL_LOSS_T, which is in range.
@@ -361,14 +361,12 @@ impl Comms {
         self.dispatcher.cylinder_m = [net.fence_radius_m, net.fence_height_m];
         let radio = &table.configuration().radio;
         (self.dispatcher.curves, self.dispatcher.takes_joystick) = (radio.curves, radio.receiver.takes_joystick());
-        let mut outlet = self.outlet(self.left, send);
-        let Dispatcher { parameters, streams, now_us, .. } = &mut self.dispatcher;
-        while outlet.left >= VALUE_BYTES as usize + SIGNATURE
+        while self.left >= VALUE_BYTES as usize + SIGNATURE
+            && let Dispatcher { parameters, streams, now_us, .. } = &mut self.dispatcher
             && let Some(value) = parameters.next_value(*now_us, streams.bytes_per_s(), table)
         {
-            streams.spend(outlet.say(&Downlink::Parameter(value), &mut self.signing));
+            self.say(&Downlink::Parameter(value), &mut send);
         }
-        (self.sender, self.left) = (outlet.sender, outlet.left);
         change
     }
 
@@ -391,25 +389,23 @@ impl Comms {
         self.go_on(&mut (server, store), send);
     }
 
-    fn go_on(&mut self, transfers: &mut impl Transferring, send: impl FnMut(&[u8])) {
-        let mut outlet = self.outlet(self.left, send);
-        let Dispatcher { streams, texts, status, now_us, .. } = &mut self.dispatcher;
-        self.share.tick(streams.bytes_per_s());
-        while outlet.left >= SIGNED_FRAME_MAX
-            && (self.share.has_room() || streams.spares(transfers.frame_max()))
-            && let Some(outcome) = transfers.next(*now_us, status.mode.armed())
+    fn go_on(&mut self, transfers: &mut impl Transferring, mut send: impl FnMut(&[u8])) {
+        let (now_us, armed) = (self.dispatcher.now_us, self.dispatcher.status.mode.armed());
+        self.share.tick(self.dispatcher.streams.bytes_per_s());
+        while self.left >= SIGNED_FRAME_MAX
+            && (self.share.has_room() || self.dispatcher.streams.spares(transfers.frame_max()))
+            && let Some(outcome) = transfers.next(now_us, armed)
         {
+            let texts = &mut self.dispatcher.texts;
             match outcome {
                 Outcome::Send(message) => {
-                    let bytes = outlet.say(&message, &mut self.signing);
-                    streams.spend(bytes);
+                    let bytes = self.say(&message, &mut send);
                     self.share.spend(bytes);
                 }
                 Outcome::Say(text, true) => texts.put(MavSeverity::MAV_SEVERITY_WARNING, text),
                 Outcome::Say(text, false) => texts.put(MavSeverity::MAV_SEVERITY_INFO, text),
             }
         }
-        (self.sender, self.left) = (outlet.sender, outlet.left);
     }
 
     /// True while the vehicle is calibrated, or a station wants to see its sensors' samples:
@@ -428,7 +424,7 @@ impl Comms {
         calibrator: &mut Calibrator,
         sample: Option<RawSample>,
         table: &ParameterTable<N>,
-        send: impl FnMut(&[u8]),
+        mut send: impl FnMut(&[u8]),
     ) {
         self.dispatcher.calibrate(calibrator, sample, table);
         if let Some(sample) = sample
@@ -436,16 +432,25 @@ impl Comms {
             && self.left >= SAMPLE_MAX
         {
             self.sample_is_due = false;
-            let mut outlet = self.outlet(self.left, send);
-            let bytes = outlet.say(&corrected(&sample, table.configuration()), &mut self.signing);
-            (self.sender, self.left) = (outlet.sender, outlet.left);
-            self.dispatcher.streams.spend(bytes);
+            self.say(&corrected(&sample, table.configuration()), &mut send);
         }
     }
 
-    /// Returns what sends so many bytes.
-    fn outlet<F: FnMut(&[u8])>(&self, left: usize, send: F) -> Outlet<F> {
-        Outlet { sender: self.sender, now_us: self.dispatcher.now_us, buffer: [0; SIGNED_FRAME_MAX], left, send }
+    /// Sends a message, from the budget of the link; returns its length.
+    fn say(&mut self, message: &impl Message, send: &mut impl FnMut(&[u8])) -> usize {
+        let bytes = self.send(message, send);
+        self.dispatcher.streams.spend(bytes);
+        bytes
+    }
+
+    /// Sends a message; returns its length. Out of line: it is sent from many places.
+    #[inline(never)]
+    fn send(&mut self, message: &impl Message, send: &mut impl FnMut(&[u8])) -> usize {
+        let mut buffer = [0; SIGNED_FRAME_MAX];
+        let frame = self.sender.send_signed(message, self.signing.stamp(self.dispatcher.now_us), &mut buffer);
+        send(frame);
+        self.left = self.left.saturating_sub(frame.len());
+        frame.len()
     }
 
     /// Queues what is to be announced of a tick.
@@ -557,27 +562,6 @@ impl Comms {
             unanswered: self.dispatcher.commands.unanswered(),
             states_refused: StatesRefused { overtaken, late, elsewhere, frozen: health.frozen_states },
         }
-    }
-}
-
-/// What is sent after a tick.
-struct Outlet<F> {
-    sender: Sender,
-    now_us: u64,
-    buffer: [u8; SIGNED_FRAME_MAX],
-    /// Bytes that may still be sent.
-    left: usize,
-    send: F,
-}
-
-impl<F: FnMut(&[u8])> Outlet<F> {
-    /// Sends a message; returns its length. Out of line: it is sent from many places.
-    #[inline(never)]
-    fn say(&mut self, message: &impl Message, signing: &mut Signing) -> usize {
-        let frame = self.sender.send_signed(message, signing.stamp(self.now_us), &mut self.buffer);
-        (self.send)(frame);
-        self.left = self.left.saturating_sub(frame.len());
-        frame.len()
     }
 }
 
