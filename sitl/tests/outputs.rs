@@ -183,7 +183,7 @@ fn results_of_another_command_line_are_kept() {
 fn no_other_code_creates_files() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
     let mut folders = vec![root.join("sitl/src")];
-    let crates = ["bring-up", "campaign", "hil", "page-server", "plot", "replay", "report", "serve", "tune"];
+    let crates = ["campaign", "ground", "hil", "plot", "replay", "report", "serve", "tune"];
     folders.extend(crates.map(|name| root.join("crates").join(name).join("src")));
     let mut found = Vec::new();
     while let Some(folder) = folders.pop() {

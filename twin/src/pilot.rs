@@ -6,8 +6,9 @@ use crate::tour::Tour;
 use crate::wire::Wire;
 use crate::world::Transducers;
 use afbc_flight_core::motor::{THROTTLE_MAX, THROTTLE_MIN};
+use afbc_ground::{Client, Patience};
 use afbc_link::telemetry::EscStatus;
-use afbc_link::{Address, Command, Datum, Decoder, Downlink, FRAME_MAX, Height, Sender, Telemetry, Uplink};
+use afbc_link::{Command, Datum, Decoder, Downlink, Height, Mission, Plan, Telemetry, Uplink};
 use afbc_onboard::Readings;
 use afbc_plant::Motion;
 use afbc_scenario::Scenario;
@@ -16,7 +17,8 @@ use afbc_types::{PoseSigmas, ROTORS_MAX, RotorSpeeds};
 use rigless::machine::flight::Signals;
 use std::error::Error;
 
-const STATION: Address = Address { system: 255, component: 190 };
+/// Time between heartbeats [ms].
+const HEARTBEAT_MS: u64 = 1_000;
 /// Height of the hover above where it stood [m], and its time, if it is not said [ms].
 const HEIGHT_M: f32 = 5.0;
 const HOVER_MS: u64 = 30_000;
@@ -61,8 +63,7 @@ pub struct Pilot {
     stopped_rotor: Option<usize>,
     speed_max_rad_s: f32,
     wire: Wire,
-    sender: Sender,
-    decoder: Decoder<Downlink>,
+    client: Client,
     phase: Phase,
     /// Milliseconds, and when the phase began.
     now_ms: u64,
@@ -104,8 +105,7 @@ impl Pilot {
             // Of `vehicles/paper.toml`, which the images are built for.
             speed_max_rad_s: 1000.0,
             wire,
-            sender: Sender::new(STATION),
-            decoder: Decoder::new(STATION),
+            client: client(),
             phase: Phase::Wakes,
             now_ms: 0,
             since_ms: 0,
@@ -141,7 +141,7 @@ impl Pilot {
             throttles: self.throttles.clone(),
             rotor_speeds_rad_s: self.rotor_speeds_rad_s.clone(),
             wire,
-            decoder: Decoder::new(STATION),
+            client: client(),
             tour: None,
             error: None,
             escs: None,
@@ -173,7 +173,7 @@ impl Pilot {
     /// Has it list, download and erase the vehicle's logs after the flight.
     #[must_use]
     pub fn fetching(self) -> Self {
-        let fetch = Some(Fetch::new(Decoder::new(STATION)));
+        let fetch = Some(Fetch::new(Decoder::new(Client::STATION)));
         Pilot { fetch, hover_ms: self.hover_ms.min(SHORT_HOVER_MS), ..self }
     }
 
@@ -290,34 +290,29 @@ impl Pilot {
     }
 
     fn say(&mut self, message: &Uplink) {
-        let mut frame = [0; FRAME_MAX];
-        let bytes = self.sender.send(message, &mut frame).to_vec();
-        self.wire.send(&bytes);
+        self.client.say(*message);
+        self.send();
+    }
+
+    fn send(&mut self) {
+        self.client.send(|_, frame| self.wire.send(frame));
     }
 
     /// Hears the vehicle.
     fn talk(&mut self) {
         let bytes = self.wire.take();
         let now_ms = self.now_ms;
-        let (armed, heard, prints, escs) = (&mut self.armed, &mut self.heard, self.prints, &mut self.escs);
+        let (armed, escs) = (&mut self.armed, &mut self.escs);
         let (ticks_us, longest_us, late) = (&mut self.ticks_us, &mut self.longest_us, &mut self.late);
         let (tour, position_m) = (&mut self.tour, self.world.plant().motion().position_m.into());
-        let mut answers = Vec::new();
         if let Some(fetch) = self.fetch.as_mut().filter(|_| self.phase == Phase::Fetches) {
             fetch.hear(&bytes, now_ms);
         }
-        self.decoder.feed(&bytes, |_, message| match message {
-            Downlink::Heartbeat { armed: is_armed, .. } => *armed = is_armed,
-            Downlink::Telemetry(Telemetry::EscStatus(status)) => *escs = Some((now_ms, status)),
-            Downlink::Mission { message, .. } => {
-                answers.extend(tour.as_mut().and_then(|tour| tour.hear(&message, now_ms, position_m)));
-            }
-            Downlink::Text { text, .. } => {
-                let text = text.to_str().unwrap_or("?");
-                if prints {
-                    println!("{:7.3} s: {text}", now_ms as f64 * 1e-3);
-                }
-                heard.push((now_ms, text.to_owned()));
+        self.client.hear(&bytes, |_, message| match message {
+            Downlink::Heartbeat { armed: is_armed, .. } => *armed = *is_armed,
+            Downlink::Telemetry(Telemetry::EscStatus(status)) => *escs = Some((now_ms, *status)),
+            Downlink::Mission { message: Mission::Reached(number), .. } => {
+                tour.iter_mut().for_each(|tour| tour.reach(*number, now_ms, position_m));
             }
             Downlink::Health(health) => {
                 if *armed {
@@ -327,12 +322,17 @@ impl Pilot {
             }
             _ => {}
         });
-        if self.now_ms % 1000 == 0 {
-            answers.push(Uplink::Heartbeat);
+        for text in self.client.take_texts() {
+            if self.prints {
+                println!("{:7.3} s: {}", now_ms as f64 * 1e-3, text.text);
+            }
+            self.heard.push((now_ms, text.text));
         }
-        for answer in &answers {
-            self.say(answer);
+        if let (Some(tour), Some(end)) = (&mut self.tour, self.client.take_upload_end()) {
+            tour.end_upload(end);
         }
+        self.client.turn(now_ms);
+        self.send();
     }
 
     /// Leads it through the flight, and watches.
@@ -361,8 +361,12 @@ impl Pilot {
             Phase::Wakes => {
                 let is_ready = self.tour.as_ref().is_none_or(Tour::is_aboard);
                 if second && self.now_ms > 3000 {
-                    let upload = self.tour.as_ref().filter(|_| !is_ready).map(Tour::offer);
-                    self.say(&upload.unwrap_or(Uplink::Command(Command::Arm)));
+                    if is_ready {
+                        self.client.say(Uplink::Command(Command::Arm));
+                    } else {
+                        self.client.upload([(Plan::MISSION, Tour::items())], Patience::ONCE);
+                    }
+                    self.send();
                 }
                 self.armed.then_some(if self.tour.is_some() { Phase::Tours } else { Phase::Climbs })
             }
@@ -425,4 +429,10 @@ impl Pilot {
             self.error = Some(format!("{:?}: it turned over", self.phase));
         }
     }
+}
+
+fn client() -> Client {
+    let mut client = Client::new(Client::STATION);
+    client.beat_every(Some(HEARTBEAT_MS));
+    client
 }

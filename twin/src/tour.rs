@@ -1,17 +1,17 @@
 //! A mission of two minutes, uploaded over the link: a square with changes of height and speed, and a place to stay at.
 
 use crate::check::check;
-use afbc_link::{Mission, MissionItem, MissionResult, Plan, Uplink};
+use afbc_ground::UploadEnd;
+use afbc_link::{MavCmd, MissionItem};
 use std::error::Error;
 
 /// MAV_FRAME_LOCAL_NED, whose origin is where the vehicle stood.
 const LOCAL_NED: u8 = 1;
-/// `MAV_CMD`s.
-const WAYPOINT: u16 = 16;
-const LOITER_TIME: u16 = 19;
-const LAND: u16 = 21;
-const TAKE_OFF: u16 = 22;
-const CHANGE_SPEED: u16 = 178;
+const WAYPOINT: u16 = MavCmd::MAV_CMD_NAV_WAYPOINT as u16;
+const LOITER_TIME: u16 = MavCmd::MAV_CMD_NAV_LOITER_TIME as u16;
+const LAND: u16 = MavCmd::MAV_CMD_NAV_LAND as u16;
+const TAKE_OFF: u16 = MavCmd::MAV_CMD_NAV_TAKEOFF as u16;
+const CHANGE_SPEED: u16 = MavCmd::MAV_CMD_DO_CHANGE_SPEED as u16;
 
 /// What is flown.
 #[derive(Clone, Copy, Debug)]
@@ -82,9 +82,8 @@ impl Leg {
 /// A mission on its way.
 #[derive(Debug, Default)]
 pub struct Tour {
-    is_aboard: bool,
-    /// Why the vehicle does not want it.
-    refusal: Option<MissionResult>,
+    /// How the upload has ended.
+    upload: Option<UploadEnd>,
     /// Numbers of the items that are done, when [ms], and how far from there the vehicle was [m].
     reached: Vec<(u16, u64, Option<f64>)>,
 }
@@ -95,14 +94,19 @@ impl Tour {
         Tour::default()
     }
 
-    /// Begins the upload.
-    pub fn offer(&self) -> Uplink {
-        Uplink::Mission(Mission::Count(LEGS.len() as u16, Plan::MISSION))
+    /// Returns the mission.
+    pub fn items() -> Vec<MissionItem> {
+        (0..).zip(LEGS).map(|(number, leg)| leg.item(number)).collect()
     }
 
     /// True if the vehicle has all of it.
     pub fn is_aboard(&self) -> bool {
-        self.is_aboard
+        self.upload == Some(UploadEnd::Accepted)
+    }
+
+    /// The upload has ended like this.
+    pub fn end_upload(&mut self, end: UploadEnd) {
+        self.upload = Some(end);
     }
 
     /// True if an item is done.
@@ -110,22 +114,10 @@ impl Tour {
         !self.reached.is_empty()
     }
 
-    /// Hears the vehicle, which is at a place then [m], and returns the answer.
-    pub fn hear(&mut self, message: &Mission, now_ms: u64, position_m: [f64; 3]) -> Option<Uplink> {
-        match *message {
-            Mission::Request(number, Plan::MISSION) => {
-                let item = LEGS.get(usize::from(number))?.item(number);
-                return Some(Uplink::Mission(Mission::Item(item, Plan::MISSION)));
-            }
-            Mission::Ack(MissionResult::ACCEPTED, _) => self.is_aboard = true,
-            Mission::Ack(result, _) => self.refusal = Some(result),
-            Mission::Reached(number) => {
-                let off_m = LEGS.get(usize::from(number)).and_then(|leg| leg.off_m(position_m));
-                self.reached.push((number, now_ms, off_m));
-            }
-            _ => {}
-        }
-        None
+    /// The vehicle says that it has reached an item, at this place [m].
+    pub fn reach(&mut self, number: u16, now_ms: u64, position_m: [f64; 3]) {
+        let off_m = LEGS.get(usize::from(number)).and_then(|leg| leg.off_m(position_m));
+        self.reached.push((number, now_ms, off_m));
     }
 
     /// Says how it went.
@@ -141,7 +133,7 @@ impl Tour {
 
     /// Fails if an item was not reached, or out of turn, or far from its place.
     pub fn verdict(&self) -> Result<(), Box<dyn Error>> {
-        check(self.refusal.is_none(), &format!("the mission is accepted: {:?}", self.refusal))?;
+        check(self.is_aboard(), &format!("the mission is accepted: {:?}", self.upload))?;
         let numbers = self.reached.iter().map(|(number, ..)| *number);
         check(numbers.eq(0..LEGS.len() as u16), "every item is reached, one after another")?;
         let are_near = self.reached.iter().all(|(_, _, off_m)| off_m.is_none_or(|off_m| off_m < OFF_M));

@@ -2,31 +2,21 @@
 
 use super::Extremes;
 use afbc_flight_core::Refusal;
+use afbc_ground::{Client, PING, Patience};
 use afbc_guidance::FlightMode;
-use afbc_link::{
-    Address, Answer, Command, Counters, Decoder, Downlink, FRAME_MAX, HealthArray, MavCmd, Sender, Text, Uplink,
-};
+use afbc_link::{Answer, Command, Counters, Downlink, HealthArray, Uplink};
 use afbc_station::services::modes;
 use afbc_station::{BUSY, CALIBRATES};
 use afbc_types::{PoseSigmas, ROTORS_MAX, RotorSpeeds, Setpoint, State};
 use nalgebra::Vector3;
 use std::time::Instant;
 
-/// Usual address of a ground station.
-const ADDRESS: Address = Address { system: 255, component: 190 };
-/// An unsupported command, whose answer measures the round trip.
-const PING: u16 = MavCmd::MAV_CMD_USER_5 as u16;
-
-/// The command whose answer counts.
-const ARM_DISARM: u16 = MavCmd::MAV_CMD_COMPONENT_ARM_DISARM as u16;
 /// HIL_ACTUATOR_CONTROLS, and the time between two, which is that of a tick.
 const ROTORS: Command = Command::SetInterval { message: 93, interval_us: 1_000 };
 
 /// Tracker, commander and ground station.
 pub struct Station {
-    sender: Sender,
-    uplink: Vec<u8>,
-    decoder: Decoder<Downlink>,
+    client: Client,
     heard: ReceivedMessages,
     pinged: Option<Instant>,
     pings: u64,
@@ -50,8 +40,6 @@ pub struct ReceivedMessages {
     pub state_age_max_us: f32,
     /// The answer to the last request to arm or disarm.
     pub answer: Option<Answer>,
-    /// Last text.
-    pub text: Option<Text>,
 }
 
 impl Default for Station {
@@ -64,9 +52,7 @@ impl Station {
     /// Creates a station that has received nothing, and asks for rotor commands.
     pub fn new() -> Self {
         let mut station = Station {
-            sender: Sender::new(ADDRESS),
-            uplink: Vec::new(),
-            decoder: Decoder::new(ADDRESS),
+            client: Client::new(Client::STATION),
             heard: ReceivedMessages::default(),
             pinged: None,
             pings: 0,
@@ -78,12 +64,12 @@ impl Station {
 
     /// Queues the question for a rotor command after each tick, which the vehicle does not send by itself.
     pub fn ask_for_rotors(&mut self) {
-        self.say(&Uplink::Command(ROTORS));
+        self.client.say(Uplink::Command(ROTORS));
     }
 
     /// Queues a message.
     pub fn say(&mut self, message: &Uplink) {
-        self.uplink.extend_from_slice(self.sender.send(message, &mut [0; FRAME_MAX]));
+        self.client.say(*message);
     }
 
     /// Queues a measured state with the time `sent_us` on this side's clock, which must increase.
@@ -109,46 +95,47 @@ impl Station {
     /// Queues a command, and forgets the previous answer.
     pub fn command(&mut self, command: Command) {
         self.heard.answer = None;
-        self.say(&Uplink::Command(command));
+        self.client.command(command, Patience::ONCE);
     }
 
     /// Queues a question, and starts timing its answer.
     pub fn ping(&mut self) {
-        self.say(&Uplink::Command(Command::Other(PING)));
+        self.client.command(PING, Patience::ONCE);
         self.pings += 1;
         self.pinged = Some(Instant::now());
     }
 
     /// Returns all bytes queued since the last call.
     pub fn take(&mut self) -> Vec<u8> {
-        std::mem::take(&mut self.uplink)
+        self.client.take()
     }
 
     /// Processes bytes from the vehicle.
     pub fn hear(&mut self, bytes: &[u8]) {
-        let Station { decoder, heard, pinged, round_trip_ms, .. } = self;
-        decoder.feed(bytes, |_, message| match message {
+        let Station { client, heard, pinged, round_trip_ms, .. } = self;
+        client.hear(bytes, |_, message| match message {
             Downlink::Rotors { armed, speeds, .. } => {
-                (heard.armed, heard.speeds) = (armed, speeds);
+                (heard.armed, heard.speeds) = (*armed, *speeds);
                 heard.rotor_commands += 1;
             }
-            Downlink::Answer { command: PING, .. } => {
+            Downlink::Answer { command, .. } if *command == PING.id() => {
                 if let Some(pinged) = pinged.take() {
                     round_trip_ms.add(pinged.elapsed().as_secs_f64() * 1e3);
                 }
             }
-            Downlink::Position { position_m, .. } => heard.position_m = Some(position_m),
-            Downlink::Answer { command: ARM_DISARM, answer, .. } => heard.answer = Some(answer),
+            Downlink::Position { position_m, .. } => heard.position_m = Some(*position_m),
             Downlink::Health(health) => {
                 if heard.armed {
                     heard.state_age_max_us = heard.state_age_max_us.max(health.state_age_us);
                 }
-                heard.health = Some(health);
+                heard.health = Some(*health);
             }
-            Downlink::Text { text, .. } => heard.text = Some(text),
             // Heartbeats and attitudes are not used.
             _ => {}
         });
+        heard.answer = client.answer(Command::Arm);
+        // A long flight has many texts, which nobody reads here.
+        drop(client.take_texts());
     }
 
     /// Returns what the vehicle has sent.
@@ -158,7 +145,7 @@ impl Station {
 
     /// Returns the reception counts.
     pub fn counters(&self) -> &Counters {
-        self.decoder.counters()
+        self.client.counters()
     }
 
     /// Returns the time from sending a question to its answer \[ms\].

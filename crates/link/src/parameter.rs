@@ -5,7 +5,7 @@ use crate::message::{Fault, MessageFormat, PAYLOAD_MAX};
 use crate::wire::Layout;
 use mavlink::MessageData;
 use mavlink::dialects::common::{
-    PARAM_ERROR_DATA, PARAM_REQUEST_LIST_DATA, PARAM_REQUEST_READ_DATA, PARAM_SET_DATA, PARAM_VALUE_DATA,
+    MavParamType, PARAM_ERROR_DATA, PARAM_REQUEST_LIST_DATA, PARAM_REQUEST_READ_DATA, PARAM_SET_DATA, PARAM_VALUE_DATA,
 };
 
 /// Name of a parameter, padded with zeros; at full length there are none.
@@ -64,6 +64,14 @@ const SET: Layout<PARAM_SET_DATA, ([u8; 4], Address, ParameterName, u8)> = Layou
 const VALUE: Layout<PARAM_VALUE_DATA, ([u8; 4], u16, u16, ParameterName, u8)> = Layout::NEW;
 
 impl ParameterRequest {
+    /// Sets a parameter, of whose name at most 16 letters count, to a number, which is understood for whole ones, too.
+    pub fn set(name: &str, value: f32) -> Self {
+        let mut letters = [0; 16];
+        letters.iter_mut().zip(name.bytes()).for_each(|(to, from)| *to = from);
+        let kind = MavParamType::MAV_PARAM_TYPE_REAL32 as u8;
+        ParameterRequest::Set { name: letters, value: value.to_le_bytes(), kind }
+    }
+
     pub(crate) fn format(id: u32) -> Option<MessageFormat> {
         Some(match id {
             PARAM_REQUEST_LIST_DATA::ID => LIST.format(),

@@ -2,21 +2,16 @@
 
 use crate::plan_file::QgcPlan;
 use crate::vehicle::ServedVehicle;
+use afbc_ground::{Client, CommandState, Patience, UploadEnd};
 use afbc_guidance::FlightMode;
-use afbc_link::{
-    Address, Answer, Command, Decoder, Downlink, FRAME_MAX, Mission, MissionItem, MissionResult, Plan, Sender, Uplink,
-};
+use afbc_link::{Answer, Command, Downlink, Mission, MissionItem, Plan};
 use afbc_station::services::modes::custom;
 
-const STATION: Address = Address { system: 255, component: 190 };
 /// Number of its peer.
 const PEER: u32 = 0;
-/// Commands that it gives.
-const ARM: u16 = 400;
-const START: u16 = 300;
-/// Time within which the vehicle is ready, and answers \[ms\].
+/// Time within which the vehicle is ready, and in which a text follows a refusal \[ms\].
 const READY_MS: u64 = 60_000;
-const ANSWER_MS: u64 = 3_000;
+const TEXT_MS: u64 = 100;
 /// Time between heartbeats, and between two attempts to arm \[ms\].
 const HEARTBEAT_MS: u64 = 1_000;
 /// Time in hold after which a mission that is not complete has been stopped: MISSION_CURRENT comes every second \[ms\].
@@ -51,14 +46,10 @@ pub struct PlanEnd {
 struct Station<'a> {
     vehicle: &'a mut ServedVehicle,
     log: &'a mut dyn FnMut(&str),
-    decoder: Decoder<Downlink>,
+    client: Client,
     now_ms: u64,
-    answers: Vec<(u16, Answer)>,
-    missions: Vec<Mission>,
-    texts: Vec<String>,
     reached: Vec<u16>,
     complete: bool,
-    armed: bool,
     /// Since when it has been in hold \[ms\].
     hold_ms: Option<u64>,
     /// Its speed downwards in the last step, and the largest at which it has come to the ground \[m/s\].
@@ -77,17 +68,15 @@ pub fn fly_plan(
     limit_s: f64,
     log: &mut dyn FnMut(&str),
 ) -> Result<PlanEnd, String> {
+    let mut client = Client::new(Client::STATION);
+    client.beat_every(Some(HEARTBEAT_MS));
     let mut station = Station {
         vehicle,
         log,
-        decoder: Decoder::new(STATION),
+        client,
         now_ms: 0,
-        answers: Vec::new(),
-        missions: Vec::new(),
-        texts: Vec::new(),
         reached: Vec::new(),
         complete: false,
-        armed: false,
         hold_ms: None,
         sinks_m_s: 0.0,
         struck_m_s: 0.0,
@@ -106,17 +95,17 @@ impl Station<'_> {
         self.upload(&plan.fence, Plan::FENCE, "geoFence")?;
         self.upload(&plan.rally, Plan::RALLY, "rallyPoints")?;
         self.upload(&plan.mission, Plan::MISSION, "mission")?;
-        self.order(Command::Arm, ARM)?;
+        self.order(Command::Arm)?;
         let begun_ms = self.now_ms;
-        self.order(Command::StartMission(0, None), START)?;
+        self.order(Command::StartMission(0, None))?;
         let limit_ms = begun_ms + (limit_s * 1e3) as u64;
-        while self.now_ms < limit_ms && self.armed && !self.complete && !self.is_stopped() {
+        while self.now_ms < limit_ms && self.armed() && !self.complete && !self.is_stopped() {
             self.step();
         }
         let flight_s = (self.now_ms - begun_ms) as f64 * 1e-3;
         // Motors that were stopped in the air: how it ends is seen on the ground.
         let fallen_ms = self.now_ms + FALL_MS;
-        while !self.armed && !self.on_ground && self.now_ms < fallen_ms {
+        while !self.armed() && !self.on_ground && self.now_ms < fallen_ms {
             self.step();
         }
         let [roll, pitch, _] = self.vehicle.world().plant().motion().attitude_rad.into();
@@ -124,11 +113,15 @@ impl Station<'_> {
         Ok(PlanEnd {
             reached: std::mem::take(&mut self.reached),
             complete: self.complete,
-            stopped: self.is_stopped() && !self.complete && self.armed,
-            disarmed: !self.armed,
+            stopped: self.is_stopped() && !self.complete && self.armed(),
+            disarmed: !self.armed(),
             fell: lies || self.struck_m_s > FALLS_M_S,
             flight_s,
         })
+    }
+
+    fn armed(&self) -> bool {
+        self.client.vehicle().armed
     }
 
     /// True if the vehicle has left the mission for hold, and does not say that it is complete.
@@ -136,98 +129,83 @@ impl Station<'_> {
         self.hold_ms.is_some_and(|hold_ms| self.now_ms - hold_ms > STOPPED_MS)
     }
 
+    /// Returns the texts that have come since this was last called.
+    fn take_texts(&mut self) -> Vec<String> {
+        self.client.take_texts().into_iter().map(|text| text.text).collect()
+    }
+
     /// Waits until the vehicle would arm.
     fn get_ready(&mut self) -> Result<(), String> {
+        let mut texts = Vec::new();
         while self.now_ms < READY_MS {
-            self.texts.clear();
-            self.say(&Uplink::Command(Command::CheckArming));
-            (0..HEARTBEAT_MS).for_each(|_| self.step());
-            if self.texts.iter().any(|text| text == "ready to arm") {
+            self.client.command(Command::CheckArming, Patience::ONCE);
+            self.wait(HEARTBEAT_MS);
+            texts = self.take_texts();
+            if texts.iter().any(|text| text == "ready to arm") {
                 return Ok(());
             }
         }
-        Err(format!("the vehicle does not get ready: {}", self.texts.join(", ")))
+        Err(format!("the vehicle does not get ready: {}", texts.join(", ")))
     }
 
     fn upload(&mut self, items: &[MissionItem], plan: Plan, part: &str) -> Result<(), String> {
-        self.missions.clear();
-        self.texts.clear();
-        self.say(&Uplink::Mission(Mission::Count(items.len() as u16, plan)));
-        // The vehicle asks for one item after the other.
-        let given_up_ms = self.now_ms + ANSWER_MS + 100 * items.len() as u64;
-        while self.now_ms < given_up_ms {
+        self.take_texts();
+        self.client.upload([(plan, items.to_vec())], Patience::ONCE);
+        loop {
             self.step();
-            for message in std::mem::take(&mut self.missions) {
-                match message {
-                    Mission::Request(number, asked) if asked == plan => {
-                        if let Some(item) = items.get(usize::from(number)) {
-                            self.say(&Uplink::Mission(Mission::Item(*item, plan)));
-                        }
-                    }
-                    Mission::Ack(MissionResult::ACCEPTED, of) if of == plan => return Ok(()),
-                    Mission::Ack(MissionResult(result), of) if of == plan => {
-                        // The text follows.
-                        (0..100).for_each(|_| self.step());
-                        let why = self.texts.last().cloned().unwrap_or_else(|| format!("result {result}"));
-                        return Err(format!("{part}: the vehicle refuses it: {why}; change it in QGroundControl"));
-                    }
-                    _ => (),
-                }
-            }
-        }
-        Err(format!("{part}: the vehicle does not answer"))
-    }
-
-    fn order(&mut self, command: Command, id: u16) -> Result<(), String> {
-        self.answers.clear();
-        self.texts.clear();
-        self.say(&Uplink::Command(command));
-        let given_up_ms = self.now_ms + ANSWER_MS;
-        while self.now_ms < given_up_ms {
-            self.step();
-            match self.answers.iter().find(|(answered, _)| *answered == id).map(|(_, answer)| *answer) {
+            match self.client.take_upload_end() {
                 None => (),
-                Some(Answer::Accepted) => {
-                    self.armed = true;
-                    // Until its heartbeat says so.
-                    (0..HEARTBEAT_MS).for_each(|_| self.step());
-                    return Ok(());
+                Some(UploadEnd::Accepted) => return Ok(()),
+                Some(UploadEnd::Refused(_, result)) => {
+                    self.wait(TEXT_MS);
+                    let why = self.take_texts().pop().unwrap_or_else(|| format!("result {}", result.0));
+                    return Err(format!("{part}: the vehicle refuses it: {why}; change it in QGroundControl"));
                 }
-                Some(answer) => {
-                    (0..100).for_each(|_| self.step());
-                    return Err(format!("the vehicle does not fly: {answer:?}, {}", self.texts.join(", ")));
-                }
+                Some(UploadEnd::Silent(_)) => return Err(format!("{part}: the vehicle does not answer")),
             }
         }
-        Err("the vehicle does not answer".into())
     }
 
-    fn say(&mut self, message: &Uplink) {
-        let mut buffer = [0; FRAME_MAX];
-        self.vehicle.hear(PEER, Sender::new(STATION).send(message, &mut buffer));
+    fn order(&mut self, command: Command) -> Result<(), String> {
+        self.take_texts();
+        self.client.command(command, Patience::ONCE);
+        while self.client.state(command) == Some(CommandState::Waiting) {
+            self.step();
+        }
+        match self.client.answer(command) {
+            Some(Answer::Accepted) => {
+                // Until its heartbeat says so.
+                self.wait(HEARTBEAT_MS);
+                Ok(())
+            }
+            Some(answer) => {
+                self.wait(TEXT_MS);
+                Err(format!("the vehicle does not fly: {answer:?}, {}", self.take_texts().join(", ")))
+            }
+            None => Err("the vehicle does not answer".into()),
+        }
+    }
+
+    fn wait(&mut self, milliseconds: u64) {
+        (0..milliseconds).for_each(|_| self.step());
     }
 
     fn step(&mut self) {
-        if self.now_ms.is_multiple_of(HEARTBEAT_MS) {
-            self.say(&Uplink::Heartbeat);
-        }
-        self.now_ms += 1;
-        let Station { vehicle, log, decoder, now_ms, answers, missions, texts, reached, complete, armed, .. } = self;
+        let Station { vehicle, log, client, now_ms, reached, complete, .. } = self;
+        client.turn(*now_ms);
+        client.send(|_, frame| {
+            vehicle.hear(PEER, frame);
+        });
+        *now_ms += 1;
         let time_s = *now_ms as f64 * 1e-3;
         let bytes = vehicle.step(|text| log(&format!("{time_s:.3} {text}")));
-        decoder.feed(&bytes, |_, message| match message {
-            Downlink::Heartbeat { armed: is_armed, mode, .. } => {
-                *armed = is_armed;
-                let holds = is_armed && mode == custom(FlightMode::Hold);
-                self.hold_ms = holds.then_some(self.hold_ms.unwrap_or(*now_ms));
-            }
-            Downlink::Answer { command, answer, .. } => answers.push((command, answer)),
-            Downlink::Text { text, .. } => texts.push(text.to_str().unwrap_or_default().into()),
-            Downlink::Mission { message: Mission::Reached(number), .. } => reached.push(number),
+        client.hear(&bytes, |_, message| match message {
+            Downlink::Mission { message: Mission::Reached(number), .. } => reached.push(*number),
             Downlink::Mission { message: Mission::Current(current), .. } => *complete = current.state == COMPLETE,
-            Downlink::Mission { message, .. } => missions.push(message),
             _ => (),
         });
+        let holds = client.vehicle().armed && client.vehicle().mode == custom(FlightMode::Hold);
+        self.hold_ms = holds.then_some(self.hold_ms.unwrap_or(*now_ms));
         let plant = vehicle.world().plant();
         let was_on_ground = std::mem::replace(&mut self.on_ground, plant.telemetry().is_some_and(|it| it.on_ground));
         if self.on_ground && !was_on_ground {

@@ -6,7 +6,7 @@ use afbc_scenario::built_in;
 use afbc_serve::{Server, fleet};
 
 const STATION: Address = Address { system: 255, component: 190 };
-const ARM: u16 = 400;
+const ARM: u16 = Command::Arm.id();
 const HOME_POSITION: u32 = 242;
 
 /// Clients arm as soon as position and home are told, as MAVSDK's examples do; they look at nothing else. The vehicle

@@ -3,8 +3,8 @@
 use super::terminal::{Failure, print, say};
 use crate::network::Network;
 use crate::serial::Serial;
-use afbc_bring_up::{BringUpOptions, Verdict, bring_up};
 use afbc_files::Output;
+use afbc_ground::bring_up::{BringUpOptions, BringUpStep, Verdict, bring_up};
 use afbc_hil::Autopilot;
 use afbc_onboard::BAUD;
 use clap::{Args, value_parser};
@@ -78,7 +78,8 @@ impl BringUp {
         }
         let (mut port, connected) = self.connect.open()?;
         let options = BringUpOptions { rest_s: self.rest, is_attended: !self.yes };
-        let mut log = bring_up(port.as_mut(), options, &mut say)?;
+        let mut exchange = |uplink: &[u8], hear: &mut dyn FnMut(&[u8])| Ok(port.exchange(uplink, hear)?);
+        let mut log = bring_up(&mut exchange, options, &mut say)?;
         let head = [
             ("board, as it was said", self.board),
             ("connection", connected),
@@ -88,7 +89,7 @@ impl BringUp {
         ];
         log.head = head.map(|(what, value)| (what.into(), value)).into();
         output.place(|to| to.write_all(log.page().as_bytes()))?;
-        let line = |step: &afbc_bring_up::BringUpStep| {
+        let line = |step: &BringUpStep| {
             let because =
                 if step.reasons.is_empty() { String::new() } else { format!(": {}", step.reasons.join("; ")) };
             format!("{:<24} {}{because}\n", step.name, step.verdict)

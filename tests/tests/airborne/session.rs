@@ -1,53 +1,41 @@
 //! The vehicle on the server, and its stations.
 
 use super::{Tick, Truth};
-use afbc_link::{Address, Command, Decoder, Downlink, FRAME_MAX, Mission, MissionItem, ParameterRequest, Plan, Sender};
-use afbc_link::{Datum, Height, Place, Uplink};
+use afbc_ground::{Client, Patience};
+use afbc_link::{Address, Command, Datum, Decoder, Downlink, Height, MissionItem, Place, Plan, Uplink};
 use afbc_scenario::{Scenario, built_in};
 use afbc_serve::{Server, fleet};
 use afbc_station::services::origin::EarthOrigin;
 use nalgebra::Vector3;
 
-pub const STATION: Address = Address { system: 255, component: 190 };
+pub const STATION: Address = Client::STATION;
 pub const COMPANION: Address = Address { system: 245, component: 191 };
 /// HIL_ACTUATOR_CONTROLS: whether it is armed, and the commands to the rotors, every tick.
 const ROTORS: u32 = 93;
-/// `MAV_PARAM_TYPE_REAL32`.
-const REAL32: u8 = 9;
 /// Time between heartbeats of a station, and between targets of a stream \[ms\].
-const HEARTBEAT_MS: u32 = 500;
+const HEARTBEAT_MS: u64 = 500;
 const TARGET_MS: u32 = 50;
 /// Time between two tries to arm, and after which it is given up \[ms\].
 const TRY_MS: u32 = 250;
 const ARMS_MS: u32 = 30_000;
+/// Time in which the vehicle may ask for an item of a mission again, over links that lose most of it.
+const UPLOAD: Patience = Patience { answer_ms: 60_000, tries: 1 };
 
 /// A ground station or companion computer.
 struct Station {
     address: Address,
-    sender: Sender,
+    client: Client,
     /// False while nothing of it gets through.
     reaches: bool,
     /// Every so many of its frames are broken; 0: none.
     breaks: u32,
     frames: u32,
     stream: Option<Uplink>,
-    mission: Vec<MissionItem>,
-    /// What it is about to send.
-    queue: Vec<Uplink>,
 }
 
 impl Station {
     fn new(address: Address) -> Self {
-        Station {
-            address,
-            sender: Sender::new(address),
-            reaches: true,
-            breaks: 0,
-            frames: 0,
-            stream: None,
-            mission: Vec::new(),
-            queue: Vec::new(),
-        }
+        Station { address, client: Client::new(address), reaches: true, breaks: 0, frames: 0, stream: None }
     }
 }
 
@@ -88,15 +76,12 @@ impl Session {
 
     /// Queues a message of a station for the next tick.
     pub fn say(&mut self, from: Address, message: Uplink) {
-        self.station(from).queue.push(message);
+        self.station(from).client.say(message);
     }
 
     /// Sets a parameter.
     pub fn set(&mut self, name: &str, value: f32) {
-        let mut letters = [0; 16];
-        letters.iter_mut().zip(name.bytes()).for_each(|(to, from)| *to = from);
-        let request = ParameterRequest::Set { name: letters, value: value.to_le_bytes(), kind: REAL32 };
-        self.say(STATION, Uplink::Parameter(request));
+        self.station(STATION).client.set_parameter(name, value);
     }
 
     /// Lets a station fall silent, or be heard again.
@@ -121,9 +106,7 @@ impl Session {
 
     /// Begins the upload of a mission, whose items follow as they are asked for.
     pub fn upload(&mut self, from: Address, items: Vec<MissionItem>) {
-        let count = Mission::Count(items.len() as u16, Plan::MISSION);
-        self.station(from).mission = items;
-        self.say(from, Uplink::Mission(count));
+        self.station(from).client.upload([(Plan::MISSION, items)], UPLOAD);
     }
 
     /// Changes weather or faults, by a line of the server's protocol.
@@ -136,41 +119,39 @@ impl Session {
         let time_ms = self.time_ms;
         let mut sent = Vec::new();
         for (peer, station) in (1..).zip(&mut self.stations) {
-            if station.reaches && time_ms.is_multiple_of(HEARTBEAT_MS) {
-                station.queue.push(Uplink::Heartbeat);
-            }
+            let Station { address, client, reaches, breaks, frames, stream } = station;
+            client.beat_every(reaches.then_some(HEARTBEAT_MS));
+            client.turn(time_ms.into());
             if time_ms.is_multiple_of(TARGET_MS) {
-                station.queue.extend(station.stream);
+                stream.iter().for_each(|target| client.say(*target));
             }
-            for message in station.queue.drain(..) {
-                let mut buffer = [0; FRAME_MAX];
-                let mut frame = station.sender.send(&message, &mut buffer).to_vec();
-                station.frames += 1;
-                if !station.reaches {
-                    continue;
+            client.send(|message, frame| {
+                *frames += 1;
+                if !*reaches {
+                    return;
                 }
-                if station.breaks > 0 && station.frames % station.breaks == 0 {
-                    let place = station.frames as usize * 31 % frame.len();
-                    frame[place] ^= 1 << (station.frames % 8);
+                let mut frame = frame.to_vec();
+                if *breaks > 0 && *frames % *breaks == 0 {
+                    let place = *frames as usize * 31 % frame.len();
+                    frame[place] ^= 1 << (*frames % 8);
                 } else {
-                    sent.push((station.address, message));
+                    sent.push((*address, *message));
                 }
                 self.server.hear(0, peer, &frame);
-            }
+            });
         }
         if !self.garbage.is_empty() {
             self.server.hear(0, 9, &std::mem::take(&mut self.garbage));
         }
         let mut heard = Vec::new();
-        let Session { server, decoder, .. } = self;
-        let _ = server.step(|_, bytes| decoder.feed(bytes, |_, message| heard.push(message)), |_| ());
-        for message in &heard {
-            if let Downlink::Mission { message: Mission::Request(number, Plan::MISSION), to } = *message {
-                let station = self.station(to);
-                let item = station.mission.get(usize::from(number)).copied();
-                station.queue.extend(item.map(|item| Uplink::Mission(Mission::Item(item, Plan::MISSION))));
+        let Session { server, stations, decoder, .. } = self;
+        let mut hear = |from, message| {
+            for station in stations.iter_mut() {
+                station.client.receive(from, &message);
             }
-        }
+            heard.push(message);
+        };
+        let _ = server.step(|_, bytes| decoder.feed(bytes, &mut hear), |_| ());
         self.time_ms += 1;
         Tick { time_ms, sent, heard, truth: self.truth() }
     }

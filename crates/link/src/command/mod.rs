@@ -4,6 +4,7 @@ mod read;
 mod write;
 
 use crate::place::{Height, Place};
+use mavlink::dialects::common::MavCmd;
 pub(crate) use read::{format, read};
 pub(crate) use write::write;
 
@@ -138,31 +139,31 @@ pub enum CalibrationRequest {
     Cancel,
 }
 
-pub(crate) const RETURN: u16 = 20;
-pub(crate) const LAND: u16 = 21;
-pub(crate) const TAKE_OFF: u16 = 22;
-pub(crate) const ORBIT: u16 = 34;
-pub(crate) const SELECT_MODE: u16 = 176;
-pub(crate) const SPEED: u16 = 178;
-pub(crate) const HOME: u16 = 179;
-pub(crate) const REPOSITION: u16 = 192;
-pub(crate) const SET_CURRENT: u16 = 224;
-pub(crate) const CALIBRATE: u16 = 241;
-pub(crate) const STORAGE: u16 = 245;
-pub(crate) const REBOOT: u16 = 246;
-pub(crate) const SELECT_STANDARD_MODE: u16 = 262;
-pub(crate) const START_MISSION: u16 = 300;
-pub(crate) const ARM_DISARM: u16 = 400;
-pub(crate) const CHECK_ARMING: u16 = 401;
-pub(crate) const GET_INTERVAL: u16 = 510;
-pub(crate) const SET_INTERVAL: u16 = 511;
-pub(crate) const REQUEST_MESSAGE: u16 = 512;
-pub(crate) const REQUEST_PROTOCOL: u16 = 519;
-pub(crate) const REQUEST_CAPABILITIES: u16 = 520;
-pub(crate) const START_LOG_STREAM: u16 = 2_510;
-pub(crate) const STOP_LOG_STREAM: u16 = 2_511;
-pub(crate) const ENGAGE: u16 = 31_010;
-pub(crate) const SELF_TEST: u16 = 31_011;
+pub(crate) const RETURN: u16 = MavCmd::MAV_CMD_NAV_RETURN_TO_LAUNCH as u16;
+pub(crate) const LAND: u16 = MavCmd::MAV_CMD_NAV_LAND as u16;
+pub(crate) const TAKE_OFF: u16 = MavCmd::MAV_CMD_NAV_TAKEOFF as u16;
+pub(crate) const ORBIT: u16 = MavCmd::MAV_CMD_DO_ORBIT as u16;
+pub(crate) const SELECT_MODE: u16 = MavCmd::MAV_CMD_DO_SET_MODE as u16;
+pub(crate) const SPEED: u16 = MavCmd::MAV_CMD_DO_CHANGE_SPEED as u16;
+pub(crate) const HOME: u16 = MavCmd::MAV_CMD_DO_SET_HOME as u16;
+pub(crate) const REPOSITION: u16 = MavCmd::MAV_CMD_DO_REPOSITION as u16;
+pub(crate) const SET_CURRENT: u16 = MavCmd::MAV_CMD_DO_SET_MISSION_CURRENT as u16;
+pub(crate) const CALIBRATE: u16 = MavCmd::MAV_CMD_PREFLIGHT_CALIBRATION as u16;
+pub(crate) const STORAGE: u16 = MavCmd::MAV_CMD_PREFLIGHT_STORAGE as u16;
+pub(crate) const REBOOT: u16 = MavCmd::MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN as u16;
+pub(crate) const SELECT_STANDARD_MODE: u16 = MavCmd::MAV_CMD_DO_SET_STANDARD_MODE as u16;
+pub(crate) const START_MISSION: u16 = MavCmd::MAV_CMD_MISSION_START as u16;
+pub(crate) const ARM_DISARM: u16 = MavCmd::MAV_CMD_COMPONENT_ARM_DISARM as u16;
+pub(crate) const CHECK_ARMING: u16 = MavCmd::MAV_CMD_RUN_PREARM_CHECKS as u16;
+pub(crate) const GET_INTERVAL: u16 = MavCmd::MAV_CMD_GET_MESSAGE_INTERVAL as u16;
+pub(crate) const SET_INTERVAL: u16 = MavCmd::MAV_CMD_SET_MESSAGE_INTERVAL as u16;
+pub(crate) const REQUEST_MESSAGE: u16 = MavCmd::MAV_CMD_REQUEST_MESSAGE as u16;
+pub(crate) const REQUEST_PROTOCOL: u16 = MavCmd::MAV_CMD_REQUEST_PROTOCOL_VERSION as u16;
+pub(crate) const REQUEST_CAPABILITIES: u16 = MavCmd::MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES as u16;
+pub(crate) const START_LOG_STREAM: u16 = MavCmd::MAV_CMD_LOGGING_START as u16;
+pub(crate) const STOP_LOG_STREAM: u16 = MavCmd::MAV_CMD_LOGGING_STOP as u16;
+pub(crate) const ENGAGE: u16 = MavCmd::MAV_CMD_USER_1 as u16;
+pub(crate) const SELF_TEST: u16 = MavCmd::MAV_CMD_USER_2 as u16;
 
 /// Value of param2 of MAV_CMD_COMPONENT_ARM_DISARM that forces the command.
 pub(crate) const FORCED: f32 = 21196.0;
@@ -202,7 +203,7 @@ impl Command {
     ];
 
     /// Returns the number of the MAVLink command, for its answer.
-    pub fn id(self) -> u16 {
+    pub const fn id(self) -> u16 {
         match self {
             Command::Arm | Command::Disarm | Command::Kill => ARM_DISARM,
             Command::Engage => ENGAGE,

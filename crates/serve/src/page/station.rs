@@ -1,13 +1,11 @@
 //! The page as a ground station: what it asks of the vehicle by messages, and what it hears.
 
 use crate::Server;
+use afbc_ground::{Client, Patience, UploadEnd};
 use afbc_link::{
-    Address, Answer, Command, Decoder, Downlink, ExternalTarget, FRAME_MAX, MavCmd, MavSeverity, Mission, MissionItem,
-    MissionResult, ParameterRequest, Plan, PositionTarget, Sender, Uplink,
+    Address, Answer, Command, Downlink, ExternalTarget, MavCmd, MavSeverity, MissionItem, Plan, PositionTarget, Uplink,
 };
-use afbc_onboard::parameters::Kind;
 use nalgebra::Vector3;
-use std::collections::VecDeque;
 
 /// Its address: a station's, and a component of its own.
 const ADDRESS: Address = Address { system: 255, component: 191 };
@@ -34,19 +32,13 @@ const NAMES: [(u16, &str); 8] = [
     (MavCmd::MAV_CMD_DO_SET_MODE as u16, "mode"),
     (MavCmd::MAV_CMD_DO_REPOSITION as u16, "go to"),
     (MavCmd::MAV_CMD_MISSION_START as u16, "start mission"),
-    (31_010, "engage"),
+    (Command::Engage.id(), "engage"),
 ];
 
 /// A station.
 pub(crate) struct PageStation {
-    sender: Sender,
-    decoder: Decoder<Downlink>,
-    /// True once it has commanded something: it stays with the vehicle from then on.
-    speaks: bool,
+    client: Client,
     now_ms: u64,
-    /// Plans to be uploaded, the first one now, and when that is given up.
-    uploads: VecDeque<(Plan, Vec<MissionItem>)>,
-    given_up_ms: u64,
     /// What follows once the vehicle is armed, and when that is given up.
     once_armed: Option<(Command, u64)>,
     /// Where it leads a vehicle that does not know where on the earth it is, local frame \[m\].
@@ -58,12 +50,8 @@ pub(crate) struct PageStation {
 impl PageStation {
     pub(crate) fn new() -> Self {
         PageStation {
-            sender: Sender::new(ADDRESS),
-            decoder: Decoder::new(ADDRESS),
-            speaks: false,
+            client: Client::new(ADDRESS),
             now_ms: 0,
-            uploads: VecDeque::new(),
-            given_up_ms: 0,
             once_armed: None,
             target_m: None,
             heard: Vec::new(),
@@ -76,16 +64,24 @@ impl PageStation {
         self.parameter_changes
     }
 
-    fn say(&mut self, server: &mut Server, message: &Uplink) {
-        self.speaks = true;
-        server.hear(VEHICLE, PEER, self.sender.send(message, &mut [0; FRAME_MAX]));
+    /// Hands the vehicle what is to be said. Who has spoken once stays with the vehicle.
+    fn send(&mut self, server: &mut Server) {
+        let mut speaks = false;
+        self.client.send(|_, frame| {
+            speaks = true;
+            server.hear(VEHICLE, PEER, frame);
+        });
+        if speaks {
+            self.client.beat_every(Some(HEARTBEAT_MS));
+        }
     }
 
     /// Gives a command.
     pub(crate) fn command(&mut self, server: &mut Server, command: Command) {
         // What was to follow an earlier command must not follow this one.
         (self.once_armed, self.target_m) = (None, None);
-        self.say(server, &Uplink::Command(command));
+        self.client.command(command, Patience::ONCE);
+        self.send(server);
     }
 
     /// Gives a command that needs an armed vehicle, which is armed first.
@@ -99,47 +95,36 @@ impl PageStation {
     pub(crate) fn lead(&mut self, server: &mut Server, place_m: Vector3<f32>, offboard: Command) {
         self.target_m = Some(place_m);
         // The target first: without a fresh one the vehicle refuses the mode.
-        self.send_target(server);
-        self.say(server, &Uplink::Command(offboard));
+        self.say_target();
+        self.client.command(offboard, Patience::ONCE);
+        self.send(server);
     }
 
-    fn send_target(&mut self, server: &mut Server) {
+    fn say_target(&mut self) {
         if let Some(position_m) = self.target_m {
             let target = PositionTarget { position_m, ..PositionTarget::NONE };
-            self.say(server, &Uplink::Target(ExternalTarget::Motion(target)));
+            self.client.say(Uplink::Target(ExternalTarget::Motion(target)));
         }
     }
 
     /// Sets a parameter.
     pub(crate) fn set(&mut self, server: &mut Server, name: &str, value: f32) {
-        let mut bytes = [0; 16];
-        bytes.iter_mut().zip(name.bytes()).for_each(|(to, from)| *to = from);
-        // As a number: understood for whole ones, too.
-        let value = value.to_le_bytes();
-        let request = ParameterRequest::Set { name: bytes, value, kind: Kind::Real32.number() };
-        self.say(server, &Uplink::Parameter(request));
+        self.client.set_parameter(name, value);
+        self.send(server);
     }
 
     /// Replaces plans, in this order.
     pub(crate) fn upload(&mut self, server: &mut Server, plans: impl IntoIterator<Item = (Plan, Vec<MissionItem>)>) {
-        self.uploads = plans.into_iter().collect();
-        self.begin_upload(server);
-    }
-
-    fn begin_upload(&mut self, server: &mut Server) {
-        self.given_up_ms = self.now_ms + PATIENCE_MS;
-        if let Some((plan, items)) = self.uploads.front() {
-            let (count, plan) = (items.len() as u16, *plan);
-            self.say(server, &Uplink::Mission(Mission::Count(count, plan)));
-        }
+        self.client.upload(plans, Patience::ONCE);
+        self.send(server);
     }
 
     /// Takes what the vehicle has sent in a step.
     pub(crate) fn hear(&mut self, vehicle: usize, bytes: &[u8]) {
         if vehicle == VEHICLE {
-            let PageStation { decoder, heard, .. } = self;
+            let PageStation { client, heard, .. } = self;
             // Telemetry is not decoded, since the page is shown the vehicle itself.
-            decoder.feed_accepted(bytes, |frame| HEARD.contains(&frame.id), |_, message| heard.push(message));
+            client.hear_accepted(bytes, |frame| HEARD.contains(&frame.id), |_, message| heard.push(*message));
         }
     }
 
@@ -149,26 +134,27 @@ impl PageStation {
         // Time may stand still.
         let goes_on = now_ms != self.now_ms;
         self.now_ms = now_ms;
+        self.send(server);
+        // They are shown from what was heard, in its order.
+        drop(self.client.take_texts());
         for message in std::mem::take(&mut self.heard) {
             match message {
                 Downlink::Text { severity, text } => say(severity, text.to_str().unwrap_or_default().into()),
-                Downlink::Answer { command, answer, to } if to == ADDRESS && answer != Answer::Accepted => {
+                Downlink::Answer { command, answer, .. } if answer != Answer::Accepted => {
                     let known = NAMES.iter().find(|(number, _)| *number == command);
                     let name = known.map_or_else(|| format!("command {command}"), |(_, name)| (*name).into());
                     let severity = if answer == Answer::InProgress { INFO } else { REFUSED };
                     say(severity, format!("{name}: {}", in_words(answer)));
                 }
-                Downlink::Mission { message, to } if to == ADDRESS => self.go_on(server, message, say),
                 Downlink::Parameter(_) => self.parameter_changes = self.parameter_changes.wrapping_add(1),
-                Downlink::ParameterError { to, .. } if to == ADDRESS => {
-                    say(REFUSED, "parameter: refused".into());
-                }
+                Downlink::ParameterError { .. } => say(REFUSED, "parameter: refused".into()),
                 _ => (),
             }
         }
-        if !self.uploads.is_empty() && self.now_ms >= self.given_up_ms {
-            self.uploads.clear();
-            say(REFUSED, "plan: the vehicle does not answer".into());
+        match self.client.take_upload_end() {
+            Some(UploadEnd::Refused(_, result)) => say(REFUSED, format!("plan: refused, result {}", result.0)),
+            Some(UploadEnd::Silent(_)) => say(REFUSED, "plan: the vehicle does not answer".into()),
+            Some(UploadEnd::Accepted) | None => (),
         }
         if let Some((command, given_up_ms)) = self.once_armed {
             let armed = server.vehicles().get(VEHICLE).and_then(|it| it.report()).is_some_and(|it| it.mode.armed());
@@ -179,33 +165,10 @@ impl PageStation {
             }
         }
         if goes_on && self.now_ms.is_multiple_of(TARGET_MS) {
-            self.send_target(server);
+            self.say_target();
         }
-        if goes_on && self.speaks && self.now_ms.is_multiple_of(HEARTBEAT_MS) {
-            self.say(server, &Uplink::Heartbeat);
-        }
-    }
-
-    /// Goes on with the upload.
-    fn go_on(&mut self, server: &mut Server, message: Mission, say: &mut dyn FnMut(MavSeverity, String)) {
-        let Some((plan, items)) = self.uploads.front() else { return };
-        let plan = *plan;
-        match message {
-            Mission::Request(number, asked) if asked == plan => {
-                if let Some(item) = items.get(usize::from(number)).copied() {
-                    self.say(server, &Uplink::Mission(Mission::Item(item, plan)));
-                }
-            }
-            Mission::Ack(MissionResult::ACCEPTED, of) if of == plan => {
-                self.uploads.pop_front();
-                self.begin_upload(server);
-            }
-            Mission::Ack(MissionResult(result), of) if of == plan => {
-                self.uploads.clear();
-                say(REFUSED, format!("plan: refused, result {result}"));
-            }
-            _ => (),
-        }
+        self.client.turn(self.now_ms);
+        self.send(server);
     }
 }
 

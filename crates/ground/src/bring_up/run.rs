@@ -1,11 +1,11 @@
 //! The list of steps.
 
-use crate::conversation::Conversation;
-use crate::error::Error;
-use crate::log::BringUpLog;
-use crate::steps;
-use crate::turns;
-use afbc_hil::Autopilot;
+use super::conversation::{Conversation, Exchange};
+use super::error::Error;
+use super::log::BringUpLog;
+use super::steps;
+use super::turns;
+use afbc_link::ParameterValue;
 
 /// Longest wait for the first heartbeat, of which there is one per second, and for the health array \[ms\].
 const SILENT_MS: u64 = 5_000;
@@ -19,25 +19,25 @@ pub struct BringUpOptions {
     pub is_attended: bool,
 }
 
-/// Goes through all steps with the board at the other end of `port`; `tell` is given each line that says what is going
-/// on, or what is to be done by hand.
+/// Goes through all steps with the board at the other end of `exchange`; `tell` is given each line that says what is
+/// going on, or what is to be done by hand.
 ///
 /// # Errors
 /// If nothing can be asked: the board is silent, sends something else, is armed, or the connection fails.
 pub fn bring_up(
-    port: &mut dyn Autopilot,
+    exchange: &mut Exchange<'_>,
     options: BringUpOptions,
     tell: &mut dyn FnMut(&str),
 ) -> Result<BringUpLog, Error> {
-    let mut talk = Conversation::new(port);
-    talk.wait(SILENT_MS, |heard| heard.vehicle.is_some())?;
-    let Some((vehicle, is_armed)) = talk.heard.vehicle else {
+    let mut talk = Conversation::new(exchange);
+    talk.wait(SILENT_MS, |talk| talk.client.vehicle().address.is_some())?;
+    let Some(vehicle) = talk.client.vehicle().address else {
         return Err(if talk.bytes() == 0 { Error::Silent } else { Error::Nonsense(talk.bytes()) });
     };
-    if is_armed {
+    if talk.client.vehicle().armed {
         return Err(Error::Armed);
     }
-    if !talk.wait(SILENT_MS, |heard| heard.health.is_some())? {
+    if !talk.wait(SILENT_MS, |talk| talk.heard.health.is_some())? {
         return Err(Error::Stranger);
     }
     tell(&format!("system {}, component {}", vehicle.system, vehicle.component));
@@ -60,7 +60,19 @@ pub fn bring_up(
     add(steps::arming(&mut talk)?);
     add(steps::link(&mut talk)?);
 
-    log.parameters = talk.heard.parameters.values().cloned().collect();
-    log.texts = talk.heard.texts.iter().map(|(at_ms, text)| (*at_ms as f64 * 1e-3, text.clone())).collect();
+    log.parameters = talk.client.parameters().values().map(name_and_value).collect();
+    let texts = talk.client.vehicle().texts.iter();
+    log.texts = texts.map(|text| (text.at_ms as f64 * 1e-3, text.text.clone())).collect();
     Ok(log)
+}
+
+fn name_and_value(parameter: &ParameterValue) -> (String, String) {
+    let name: Vec<u8> = parameter.name.iter().copied().take_while(|&byte| byte != 0).collect();
+    // MAV_PARAM_TYPE: 9 is a float, even numbers below it are signed.
+    let value = match parameter.kind {
+        9 => f32::from_le_bytes(parameter.value).to_string(),
+        2 | 4 | 6 => i32::from_le_bytes(parameter.value).to_string(),
+        _ => u32::from_le_bytes(parameter.value).to_string(),
+    };
+    (String::from_utf8_lossy(&name).into_owned(), value)
 }

@@ -1,10 +1,10 @@
 //! Turning the board by hand: signs of gyroscope, accelerometer and attitude.
 
-use crate::conversation::Conversation;
-use crate::error::Error;
-use crate::heard::Heard;
-use crate::log::BringUpStep;
-use crate::steps::senses;
+use super::conversation::Conversation;
+use super::error::Error;
+use super::heard::Heard;
+use super::log::BringUpStep;
+use super::steps::senses;
 use nalgebra::Vector3;
 
 /// Longest wait for a hand \[ms\].
@@ -46,12 +46,12 @@ pub(crate) fn turns(
         }
         tell("hold it level");
         let mut level = Turned::default();
-        let is_level = talk.wait(PATIENCE_MS, |heard| level.follow(heard, &Vector3::z()))?;
+        let is_level = talk.wait(PATIENCE_MS, |talk| level.follow(&mut talk.heard, &Vector3::z()))?;
         step.check(is_level, "it was not held level");
         tell(turn.order);
         // Anew, so that the angle counts from level on.
         let mut turned = Turned::default();
-        let is_done = talk.wait(PATIENCE_MS, |heard| turned.follow(heard, &turn.up.into()))?;
+        let is_done = talk.wait(PATIENCE_MS, |talk| turned.follow(&mut talk.heard, &turn.up.into()))?;
         let angle_rad = turned.angle_rad.get(turn.axis).copied().unwrap_or_default() * turn.sign;
         let attitude_rad = talk.heard.attitude_rad.and_then(|attitude_rad| attitude_rad.get(turn.axis).copied());
         let attitude_rad = f64::from(attitude_rad.unwrap_or_default()) * turn.sign;

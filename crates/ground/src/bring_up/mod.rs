@@ -5,9 +5,8 @@
 //!
 //! 1. [`bring_up`]: the list. Its steps are in `steps` and `turns`.
 //! 2. [`BringUpLog`]: what it comes to, and its text.
-//! 3. `conversation`: this side of the link, a millisecond at a time. It has no clock: in lockstep the same vehicle
-//!    gives the same log.
-#![forbid(unsafe_code)]
+//! 3. `conversation`: a [`Client`](crate::Client) at the end of an [`Exchange`], a millisecond at a time. It has no
+//!    clock: in lockstep the same vehicle gives the same log.
 
 mod conversation;
 mod error;
@@ -18,6 +17,7 @@ mod statistics;
 mod steps;
 mod turns;
 
-pub use error::Error;
+pub use conversation::Exchange;
+pub use error::{Error, ExchangeError};
 pub use log::{BringUpLog, BringUpStep, Verdict};
 pub use run::{BringUpOptions, bring_up};

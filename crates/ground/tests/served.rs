@@ -1,8 +1,7 @@
 //! The list with the firmware's code on simulated sensors, in lockstep, and with what is no board.
 #![allow(clippy::unwrap_used, missing_docs, reason = "tests")]
 
-use afbc_bring_up::{BringUpLog, BringUpOptions, Error, Verdict, bring_up};
-use afbc_hil::{Autopilot, Error as HilError};
+use afbc_ground::bring_up::{BringUpLog, BringUpOptions, Error, Verdict, bring_up};
 use afbc_link::{Address, Command, Downlink, FRAME_MAX, Key, SIGNED_FRAME_MAX, Sender, Stamp, Uplink};
 use afbc_scenario::built_in;
 use afbc_serve::{Server, fleet};
@@ -14,31 +13,13 @@ impl Served {
     fn new(scenario: &str) -> Self {
         let scenario = built_in(scenario).unwrap().read().unwrap();
         let mut served = Served(Server::new(&fleet(&scenario, 1).unwrap(), 1).unwrap());
-        for _ in 0..3_000 {
-            served.exchange(&[], &mut |_| ()).unwrap();
-        }
+        (0..3_000).for_each(|_| served.exchange(&[], &mut |_| ()));
         served
     }
-}
 
-impl Autopilot for Served {
-    fn exchange(&mut self, uplink: &[u8], hear: &mut dyn FnMut(&[u8])) -> Result<(), HilError> {
+    fn exchange(&mut self, uplink: &[u8], hear: &mut dyn FnMut(&[u8])) {
         self.0.hear(0, 1, uplink);
         let _ = self.0.step(|_, bytes| hear(bytes), |_| ());
-        Ok(())
-    }
-}
-
-/// A vehicle in the hands of somebody who does what is asked: `tell` writes the order, and the next millisecond obeys.
-struct Held<'a>(Served, &'a std::cell::RefCell<Vec<String>>);
-
-impl Autopilot for Held<'_> {
-    fn exchange(&mut self, uplink: &[u8], hear: &mut dyn FnMut(&[u8])) -> Result<(), HilError> {
-        for line in self.1.borrow_mut().drain(..) {
-            let reply = self.0.0.line(&line);
-            assert!(reply.lines.iter().all(|line| !line.starts_with("error")), "{reply:?}");
-        }
-        self.0.exchange(uplink, hear)
     }
 }
 
@@ -52,11 +33,20 @@ fn obeyed(told: &str, wrong: bool) -> Option<String> {
     side.filter(|_| asked).map(|(_, side)| format!("hold {side}"))
 }
 
+/// Of a vehicle in the hands of somebody who does what is asked: what is told is obeyed in the next millisecond.
 fn with_a_hand(wrong: bool) -> BringUpLog {
-    let orders = std::cell::RefCell::new(Vec::new());
-    let mut held = Held(Served::new("outdoor"), &orders);
+    let orders = std::cell::RefCell::new(Vec::<String>::new());
+    let mut served = Served::new("outdoor");
     let options = BringUpOptions { rest_s: 10, is_attended: true };
-    bring_up(&mut held, options, &mut |told| orders.borrow_mut().extend(obeyed(told, wrong))).unwrap()
+    let mut exchange = |uplink: &[u8], hear: &mut dyn FnMut(&[u8])| {
+        for line in orders.borrow_mut().drain(..) {
+            let reply = served.0.line(&line);
+            assert!(reply.lines.iter().all(|line| !line.starts_with("error")), "{reply:?}");
+        }
+        served.exchange(uplink, hear);
+        Ok(())
+    };
+    bring_up(&mut exchange, options, &mut |told| orders.borrow_mut().extend(obeyed(told, wrong))).unwrap()
 }
 
 fn verdict(log: &BringUpLog, name: &str) -> (Verdict, String) {
@@ -98,7 +88,12 @@ fn alone_it_does_what_needs_no_hand() {
         if !fault.is_empty() {
             served.0.line(fault);
         }
-        bring_up(&mut served, BringUpOptions { rest_s: 5, is_attended: false }, &mut |_| ()).unwrap()
+        let options = BringUpOptions { rest_s: 5, is_attended: false };
+        let mut exchange = |uplink: &[u8], hear: &mut dyn FnMut(&[u8])| {
+            served.exchange(uplink, hear);
+            Ok(())
+        };
+        bring_up(&mut exchange, options, &mut |_| ()).unwrap()
     };
     let log = run("");
     assert!(log.is_well(), "{}", log.page());
@@ -119,15 +114,6 @@ fn alone_it_does_what_needs_no_hand() {
 }
 
 /// Something else at the other end, which sends the same bytes each millisecond.
-struct Other(Vec<u8>);
-
-impl Autopilot for Other {
-    fn exchange(&mut self, _: &[u8], hear: &mut dyn FnMut(&[u8])) -> Result<(), HilError> {
-        hear(&self.0);
-        Ok(())
-    }
-}
-
 #[test]
 fn what_is_no_board_is_named() {
     let beat = |armed| {
@@ -154,7 +140,11 @@ fn what_is_no_board_is_named() {
         (signed, "key of signatures"),
     ] {
         let options = BringUpOptions { rest_s: 1, is_attended: false };
-        let error: Error = bring_up(&mut Other(bytes), options, &mut |_| ()).unwrap_err();
+        let mut exchange = |_: &[u8], hear: &mut dyn FnMut(&[u8])| {
+            hear(&bytes);
+            Ok(())
+        };
+        let error: Error = bring_up(&mut exchange, options, &mut |_| ()).unwrap_err();
         let text = error.to_string();
         assert!(text.contains(wanted) && text.lines().count() == 1, "{text}");
     }

@@ -2,6 +2,9 @@
 
 use std::fmt;
 
+/// Why an [`Exchange`](super::Exchange) has failed.
+pub type ExchangeError = Box<dyn std::error::Error + Send + Sync>;
+
 /// Why there is no log; displayed as one line.
 #[derive(Debug)]
 #[non_exhaustive]
@@ -17,7 +20,7 @@ pub enum Error {
     /// Its frames are signed.
     Signed,
     /// The connection has failed.
-    Connection(afbc_hil::Error),
+    Connection(ExchangeError),
 }
 
 impl fmt::Display for Error {
@@ -47,9 +50,3 @@ impl fmt::Display for Error {
 }
 
 impl std::error::Error for Error {}
-
-impl From<afbc_hil::Error> for Error {
-    fn from(error: afbc_hil::Error) -> Self {
-        Error::Connection(error)
-    }
-}

@@ -1,11 +1,11 @@
 //! Steps in which the board does not move.
 
-use crate::conversation::Conversation;
-use crate::error::Error;
-use crate::heard::Heard;
-use crate::log::BringUpStep;
-use crate::statistics::VectorStatistics;
-use afbc_link::{Answer, Command, InertialSample, MavCmd};
+use super::conversation::Conversation;
+use super::error::Error;
+use super::log::BringUpStep;
+use super::statistics::VectorStatistics;
+use crate::commands::PING;
+use afbc_link::{Answer, Command, InertialSample};
 use nalgebra::Vector3;
 
 /// Messages that are asked for.
@@ -41,9 +41,8 @@ const SELF_TEST_MS: u64 = 3_000;
 /// Version of the firmware.
 pub(crate) fn version(talk: &mut Conversation<'_>) -> Result<BringUpStep, Error> {
     let mut step = BringUpStep::new("version");
-    let number = MavCmd::MAV_CMD_REQUEST_MESSAGE as u16;
-    talk.command(Command::RequestMessage { message: 148, index: 0 }, number)?;
-    talk.wait(1_000, |heard| heard.version.is_some())?;
+    talk.command(Command::RequestMessage { message: 148, index: 0 })?;
+    talk.wait(1_000, |talk| talk.heard.version.is_some())?;
     match talk.heard.version {
         Some(version) => {
             let [major, minor, patch, _] = version.software;
@@ -61,20 +60,21 @@ pub(crate) fn version(talk: &mut Conversation<'_>) -> Result<BringUpStep, Error>
 /// All parameters.
 pub(crate) fn parameters(talk: &mut Conversation<'_>) -> Result<BringUpStep, Error> {
     let mut step = BringUpStep::new("parameters");
-    talk.parameters()?;
-    let (known, count) = (talk.heard.parameters.len(), talk.heard.parameter_count.unwrap_or(0));
+    talk.read_parameters()?;
+    let parameters = talk.client.parameters();
+    let (known, count) = (parameters.values().len(), parameters.count().unwrap_or(0));
     step.found("read", format!("{known} of {count}"));
-    step.check(talk.heard.has_all_parameters() && count > 0, "not all could be read");
+    step.check(parameters.are_complete() && count > 0, "not all could be read");
     Ok(step)
 }
 
 /// What is there, and whether it is well.
 pub(crate) fn sensors(talk: &mut Conversation<'_>) -> Result<BringUpStep, Error> {
     let mut step = BringUpStep::new("sensors");
-    talk.wait(3_000, |heard| heard.system.is_some())?;
+    talk.wait(3_000, |talk| talk.heard.system.is_some())?;
     // Again, after what was unwell at the start.
     talk.heard.system = None;
-    talk.wait(3_000, |heard| heard.system.is_some())?;
+    talk.wait(3_000, |talk| talk.heard.system.is_some())?;
     let Some(system) = talk.heard.system else {
         step.check(false, "no SYS_STATUS");
         return Ok(step);
@@ -99,12 +99,11 @@ pub(crate) fn sensors(talk: &mut Conversation<'_>) -> Result<BringUpStep, Error>
 /// The sensors' own tests, of those that have one.
 pub(crate) fn self_tests(talk: &mut Conversation<'_>) -> Result<BringUpStep, Error> {
     let mut step = BringUpStep::new("self-tests");
-    let told = talk.heard.texts.len();
-    let results = |heard: &Heard| -> Vec<String> {
-        let texts = heard.texts.iter().skip(told).map(|(_, text)| text.clone());
-        texts.filter(|text| text.contains(SELF_TEST)).collect()
+    let told = talk.client.vehicle().texts.len();
+    let results = |talk: &Conversation<'_>| -> Vec<String> {
+        talk.texts_after(told).filter(|text| text.contains(SELF_TEST)).map(str::to_owned).collect()
     };
-    let answer = talk.command(Command::SelfTest, MavCmd::MAV_CMD_USER_2 as u16)?;
+    let answer = talk.command(Command::SelfTest)?;
     match answer {
         Some((Answer::Accepted, _)) => (),
         Some((Answer::Unsupported, _)) => return Ok(step.skipped("this vehicle has none")),
@@ -116,10 +115,10 @@ pub(crate) fn self_tests(talk: &mut Conversation<'_>) -> Result<BringUpStep, Err
     }
     // Until there is no further one.
     let mut count = 0;
-    while talk.wait(SELF_TEST_MS, |heard| results(heard).len() > count)? {
-        count = results(&talk.heard).len();
+    while talk.wait(SELF_TEST_MS, |talk| results(talk).len() > count)? {
+        count = results(talk).len();
     }
-    let results = results(&talk.heard);
+    let results = results(talk);
     if results.is_empty() {
         return Ok(step.skipped("no sensor has told of one"));
     }
@@ -183,8 +182,7 @@ pub(crate) fn senses(talk: &Conversation<'_>) -> bool {
 /// Asks for samples, or for no more.
 pub(crate) fn show_samples(talk: &mut Conversation<'_>, shows: bool) -> Result<(), Error> {
     let interval_us = if shows { SAMPLE_US } else { 0 };
-    let number = MavCmd::MAV_CMD_SET_MESSAGE_INTERVAL as u16;
-    talk.command(Command::SetInterval { message: HIGHRES_IMU, interval_us }, number)?;
+    talk.command(Command::SetInterval { message: HIGHRES_IMU, interval_us })?;
     Ok(())
 }
 
@@ -301,7 +299,7 @@ pub(crate) fn position(
     let patience_s = if is_attended { 300 } else { 10 };
     tell(&format!("waiting for a fix under open sky, {patience_s} s at most"));
     let began_ms = talk.now_ms();
-    let is_fixed = talk.wait(1_000 * patience_s, |heard| heard.fix.is_some_and(|fix| fix.kind >= 3))?;
+    let is_fixed = talk.wait(1_000 * patience_s, |talk| talk.heard.fix.is_some_and(|fix| fix.kind >= 3))?;
     if let Some(fix) = talk.heard.fix {
         let [horizontal_mm, vertical_mm] = fix.sigma_mm;
         step.found("kind of fix", fix.kind);
@@ -344,34 +342,31 @@ pub(crate) fn motors(talk: &Conversation<'_>) -> BringUpStep {
 /// What speaks against arming, which is not tried.
 pub(crate) fn arming(talk: &mut Conversation<'_>) -> Result<BringUpStep, Error> {
     let mut step = BringUpStep::new("checks before arming");
-    let texts = talk.heard.texts.len();
-    let answer = talk.command(Command::CheckArming, MavCmd::MAV_CMD_RUN_PREARM_CHECKS as u16)?;
+    let told = talk.client.vehicle().texts.len();
+    let answer = talk.command(Command::CheckArming)?;
     talk.listen(1_500)?;
     step.check(answer.is_some(), "not answered");
-    let said: Vec<_> = talk.heard.texts.iter().skip(texts).map(|(_, text)| text.clone()).collect();
-    for text in &said {
+    for text in talk.texts_after(told) {
         step.found("it says", text);
     }
-    step.check(!said.is_empty(), "it says nothing");
+    step.check(talk.texts_after(told).next().is_some(), "it says nothing");
     Ok(step)
 }
 
 /// The line.
 pub(crate) fn link(talk: &mut Conversation<'_>) -> Result<BringUpStep, Error> {
-    /// A command that no vehicle knows, so that it is answered at once and changes nothing.
-    const PING: u16 = MavCmd::MAV_CMD_USER_5 as u16;
     const PINGS: u32 = 20;
     let mut step = BringUpStep::new("link");
     show_samples(talk, false)?;
     let (mut worst_ms, mut sum_ms, mut answered) = (0, 0, 0);
     for _ in 0..PINGS {
-        if let Some((_, after_ms)) = talk.command(Command::Other(PING), PING)? {
+        if let Some((_, after_ms)) = talk.command(PING)? {
             (worst_ms, sum_ms, answered) = (worst_ms.max(after_ms), sum_ms + after_ms, answered + 1);
         }
         talk.listen(20)?;
     }
     let elapsed_s = talk.now_ms() as f64 * 1e-3;
-    let heard = *talk.counters();
+    let heard = *talk.client.counters();
     step.found("bytes", format!("{}, {:.0} per second", talk.bytes(), talk.bytes() as f64 / elapsed_s));
     step.found("messages here", format!("{}, {} lost, {} corrupt", heard.received, heard.lost, heard.bad_checksum));
     if let Some(there) = talk.heard.health.map(|health| health.link) {
@@ -379,12 +374,13 @@ pub(crate) fn link(talk: &mut Conversation<'_>) -> Result<BringUpStep, Error> {
         step.found("messages there, on one of its links", counts);
         step.check(there.bad_checksum == 0, "corrupt messages there");
     }
-    step.found("heartbeats", format!("{} in {elapsed_s:.1} s", talk.heard.heartbeats));
+    let heartbeats = talk.client.vehicle().heartbeats;
+    step.found("heartbeats", format!("{heartbeats} in {elapsed_s:.1} s"));
     if answered > 0 {
         step.found("round trip", format!("mean {}, worst {worst_ms} ms", sum_ms / u64::from(answered)));
     }
     step.check(answered == PINGS, format_args!("{} questions unanswered", PINGS - answered));
     step.check(heard.bad_checksum == 0, "corrupt messages here");
-    step.check(f64::from(talk.heard.heartbeats) > 0.8 * elapsed_s - 1.0, "heartbeats are missing");
+    step.check(f64::from(heartbeats) > 0.8 * elapsed_s - 1.0, "heartbeats are missing");
     Ok(step)
 }

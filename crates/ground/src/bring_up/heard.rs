@@ -1,0 +1,52 @@
+//! What the vehicle has said of its sensors and its clock.
+
+use afbc_link::telemetry::{ActuatorOutputs, BatteryStatus, Fix, SystemStatus, Version};
+use afbc_link::{Downlink, HealthArray, InertialSample, Telemetry};
+use nalgebra::Vector3;
+
+/// The newest of each message, and what is counted.
+#[derive(Debug, Default)]
+pub(crate) struct Heard {
+    pub(crate) health: Option<HealthArray>,
+    pub(crate) system: Option<SystemStatus>,
+    pub(crate) fix: Option<Fix>,
+    pub(crate) battery: Option<BatteryStatus>,
+    pub(crate) version: Option<Version>,
+    pub(crate) outputs: Option<ActuatorOutputs>,
+    /// Roll, pitch, yaw \[rad\].
+    pub(crate) attitude_rad: Option<Vector3<f32>>,
+    pub(crate) attitudes: u32,
+    /// Altitudes since they were last taken \[m\].
+    pub(crate) altitudes_m: Vec<f32>,
+    /// Samples since they were last taken.
+    pub(crate) samples: Vec<InertialSample>,
+    /// How often its clock has run backward.
+    pub(crate) restarts: u32,
+}
+
+impl Heard {
+    /// Takes a message.
+    pub(crate) fn take(&mut self, message: &Downlink) {
+        match *message {
+            Downlink::Health(health) => {
+                let before_us = self.health.map_or(0, |health| health.time_us);
+                self.restarts += u32::from(health.time_us < before_us);
+                self.health = Some(health);
+            }
+            Downlink::Attitude { attitude_rad, .. } => {
+                self.attitude_rad = Some(attitude_rad);
+                self.attitudes += 1;
+            }
+            Downlink::Telemetry(telemetry) => match telemetry {
+                Telemetry::System(status) => self.system = Some(status),
+                Telemetry::Fix(fix) => self.fix = Some(fix),
+                Telemetry::Battery(battery) => self.battery = Some(battery),
+                Telemetry::Version(version) => self.version = Some(version),
+                Telemetry::Outputs(outputs) => self.outputs = Some(outputs),
+                Telemetry::Summary(summary) => self.altitudes_m.push(summary.altitude_m),
+                _ => (),
+            },
+            _ => (),
+        }
+    }
+}

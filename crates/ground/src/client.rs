@@ -1,0 +1,201 @@
+//! A station's end of the link.
+
+use crate::commands::{CommandState, Commands};
+use crate::parameters::VehicleParameters;
+use crate::repeated::Patience;
+use crate::uploads::{UploadEnd, Uploads};
+use crate::vehicle::{VehicleState, VehicleText};
+use afbc_link::{
+    Address, Answer, Command, Counters, Decoder, Downlink, FRAME_MAX, MissionItem, ParameterRequest, Plan,
+    ReceivedFrame, Sender, Uplink,
+};
+
+/// A ground station or companion computer at its end of the link to one vehicle.
+///
+/// It has no socket, clock or thread: [`Client::hear`] takes bytes, [`Client::turn`] the time, and [`Client::send`]
+/// hands out what is to be sent.
+pub struct Client {
+    address: Address,
+    sender: Sender,
+    decoder: Decoder<Downlink>,
+    outgoing: Vec<Uplink>,
+    now_ms: Option<u64>,
+    heartbeat_ms: Option<u64>,
+    vehicle: VehicleState,
+    commands: Commands,
+    uploads: Uploads,
+    parameters: VehicleParameters,
+}
+
+impl Client {
+    /// Usual address of a ground station.
+    pub const STATION: Address = Address { system: 255, component: 190 };
+
+    /// Creates one with this address, which has no heartbeat.
+    pub fn new(address: Address) -> Self {
+        Client {
+            address,
+            sender: Sender::new(address),
+            decoder: Decoder::new(address),
+            outgoing: Vec::new(),
+            now_ms: None,
+            heartbeat_ms: None,
+            vehicle: VehicleState::default(),
+            commands: Commands::default(),
+            uploads: Uploads::default(),
+            parameters: VehicleParameters::default(),
+        }
+    }
+
+    /// Has it send a heartbeat whenever its time is a multiple of this \[ms\]; none: never.
+    pub fn beat_every(&mut self, heartbeat_ms: Option<u64>) {
+        self.heartbeat_ms = heartbeat_ms.filter(|period_ms| *period_ms > 0);
+    }
+
+    /// Returns what the vehicle has said of itself.
+    pub fn vehicle(&self) -> &VehicleState {
+        &self.vehicle
+    }
+
+    /// Returns the texts that have come since this was last called.
+    pub fn take_texts(&mut self) -> Vec<VehicleText> {
+        std::mem::take(&mut self.vehicle.texts)
+    }
+
+    /// Returns the vehicle's parameters.
+    pub fn parameters(&self) -> &VehicleParameters {
+        &self.parameters
+    }
+
+    /// Returns the reception counts.
+    pub fn counters(&self) -> &Counters {
+        self.decoder.counters()
+    }
+
+    /// Queues a message.
+    pub fn say(&mut self, message: Uplink) {
+        self.outgoing.push(message);
+    }
+
+    /// Gives a command, and repeats it until it is answered.
+    pub fn command(&mut self, command: Command, patience: Patience) {
+        self.commands.give(command, patience, self.now_ms());
+        self.say(Uplink::Command(command));
+    }
+
+    /// Returns what has become of the last command with the number of this one.
+    pub fn state(&self, command: Command) -> Option<CommandState> {
+        self.commands.state(command)
+    }
+
+    /// Returns the answer to it, once there is one.
+    pub fn answer(&self, command: Command) -> Option<Answer> {
+        match self.commands.state(command) {
+            Some(CommandState::Answered { answer, .. }) => Some(answer),
+            _ => None,
+        }
+    }
+
+    /// Uploads plans one after the other, in the place of any that are still on their way.
+    pub fn upload(&mut self, plans: impl IntoIterator<Item = (Plan, Vec<MissionItem>)>, patience: Patience) {
+        let offer = self.uploads.begin(plans, patience, self.now_ms());
+        self.outgoing.extend(offer.map(Uplink::Mission));
+    }
+
+    /// Returns how the upload has ended, once.
+    pub fn take_upload_end(&mut self) -> Option<UploadEnd> {
+        self.uploads.take_end()
+    }
+
+    /// Reads all parameters, and asks again for those that do not come.
+    pub fn read_parameters(&mut self) {
+        let request = self.parameters.read(self.now_ms());
+        self.say(Uplink::Parameter(request));
+    }
+
+    /// Sets a parameter, of whose name at most 16 letters count: the vehicle answers with its value, or with an error.
+    pub fn set_parameter(&mut self, name: &str, value: f32) {
+        self.say(Uplink::Parameter(ParameterRequest::set(name, value)));
+    }
+
+    /// Goes on to this time: queues what is to be repeated, and the heartbeat.
+    pub fn turn(&mut self, now_ms: u64) {
+        let before_ms = self.now_ms.replace(now_ms);
+        let Client { outgoing, commands, uploads, parameters, .. } = self;
+        commands.turn(now_ms, |command| outgoing.push(Uplink::Command(command)));
+        outgoing.extend(uploads.turn(now_ms).map(Uplink::Mission));
+        parameters.turn(now_ms, |request| outgoing.push(Uplink::Parameter(request)));
+        let beats = self.heartbeat_ms.is_some_and(|period_ms| match before_ms {
+            Some(before_ms) => now_ms / period_ms > before_ms / period_ms,
+            None => now_ms.is_multiple_of(period_ms),
+        });
+        if beats {
+            self.say(Uplink::Heartbeat);
+        }
+    }
+
+    /// Hands out each message that is to be sent, and its frame, in order.
+    pub fn send(&mut self, mut send: impl FnMut(&Uplink, &[u8])) {
+        for message in self.outgoing.drain(..) {
+            send(&message, self.sender.send(&message, &mut [0; FRAME_MAX]));
+        }
+    }
+
+    /// Returns all that is to be sent.
+    pub fn take(&mut self) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        self.send(|_, frame| bytes.extend_from_slice(frame));
+        bytes
+    }
+
+    /// Takes bytes in any pieces, and passes to `see` each message of the vehicle that is for this station or for all.
+    /// Signed frames are left out.
+    pub fn hear(&mut self, bytes: &[u8], see: impl FnMut(Address, &Downlink)) {
+        self.hear_accepted(bytes, |frame| frame.stamp().is_none(), see);
+    }
+
+    /// The same of the frames that `accept` accepts.
+    pub fn hear_accepted(
+        &mut self,
+        bytes: &[u8],
+        accept: impl FnMut(&ReceivedFrame<'_>) -> bool,
+        mut see: impl FnMut(Address, &Downlink),
+    ) {
+        let mut messages = Vec::new();
+        self.decoder.feed_accepted(bytes, accept, |from, message| messages.push((from, message)));
+        for (from, message) in &messages {
+            if self.receive(*from, message) {
+                see(*from, message);
+            }
+        }
+    }
+
+    /// Takes a message that was decoded elsewhere; false if another has sent it, or it is for another station.
+    pub fn receive(&mut self, from: Address, message: &Downlink) -> bool {
+        let now_ms = self.now_ms();
+        let to = match message {
+            Downlink::Answer { to, .. }
+            | Downlink::Mission { to, .. }
+            | Downlink::ParameterError { to, .. }
+            | Downlink::Refusal { to, .. } => *to,
+            _ => Address::default(),
+        };
+        if !self.address.is_meant_by(to) || !self.vehicle.hear(from, message, now_ms) {
+            return false;
+        }
+        match message {
+            Downlink::Answer { command, answer, .. } => self.commands.hear(*command, *answer, now_ms),
+            Downlink::Mission { message, .. } => {
+                let answer = self.uploads.hear(message, now_ms);
+                self.outgoing.extend(answer.map(Uplink::Mission));
+            }
+            Downlink::Parameter(value) => self.parameters.hear(value, now_ms),
+            _ => (),
+        }
+        true
+    }
+
+    fn now_ms(&self) -> u64 {
+        self.now_ms.unwrap_or_default()
+    }
+}

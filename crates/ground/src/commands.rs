@@ -1,0 +1,64 @@
+//! Commands and their answers. MAVLink's answer names the command's number only, so there is one of each at a time.
+
+use crate::repeated::{Due, Patience, Repeated};
+use afbc_link::{Answer, Command, MavCmd};
+use std::collections::BTreeMap;
+
+/// A command that no vehicle knows, so that it is answered at once and changes nothing.
+pub const PING: Command = Command::Other(MavCmd::MAV_CMD_USER_5 as u16);
+
+/// What has become of a command.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CommandState {
+    /// Nothing yet, or the vehicle is at it.
+    Waiting,
+    /// Answered, after this time since the last try.
+    Answered {
+        /// The answer; never [`Answer::InProgress`].
+        answer: Answer,
+        /// Time from the last try, or from the last answer that it is in progress \[ms\].
+        after_ms: u64,
+    },
+    /// Not answered in time.
+    Silent,
+}
+
+struct Given {
+    command: Command,
+    repeated: Repeated,
+    state: CommandState,
+}
+
+#[derive(Default)]
+pub(crate) struct Commands(BTreeMap<u16, Given>);
+
+impl Commands {
+    /// An answer to an earlier command of this number is none to this one.
+    pub(crate) fn give(&mut self, command: Command, patience: Patience, now_ms: u64) {
+        let repeated = Repeated::new(patience, now_ms);
+        self.0.insert(command.id(), Given { command, repeated, state: CommandState::Waiting });
+    }
+
+    pub(crate) fn state(&self, command: Command) -> Option<CommandState> {
+        self.0.get(&command.id()).map(|given| given.state)
+    }
+
+    pub(crate) fn hear(&mut self, id: u16, answer: Answer, now_ms: u64) {
+        let Some(given) = self.0.get_mut(&id).filter(|given| given.state == CommandState::Waiting) else { return };
+        if answer == Answer::InProgress {
+            return given.repeated.goes_on(now_ms);
+        }
+        given.state = CommandState::Answered { answer, after_ms: given.repeated.waited_ms(now_ms) };
+    }
+
+    /// Passes to `say` what is to be repeated.
+    pub(crate) fn turn(&mut self, now_ms: u64, mut say: impl FnMut(Command)) {
+        for given in self.0.values_mut().filter(|given| given.state == CommandState::Waiting) {
+            match given.repeated.due(now_ms) {
+                Due::Nothing => (),
+                Due::Again => say(given.command),
+                Due::GiveUp => given.state = CommandState::Silent,
+            }
+        }
+    }
+}

@@ -1,0 +1,73 @@
+//! The parameters that the vehicle has.
+
+use crate::repeated::{Due, Patience, Repeated};
+use afbc_link::{ParameterRequest, ParameterValue};
+use std::collections::BTreeMap;
+
+/// Time without a further parameter after which the rest is asked for \[ms\], how often that is done, and how many are
+/// asked for at once.
+const STALLED: Patience = Patience { answer_ms: 1_000, tries: 20 };
+const MISSING_MAX: usize = 10;
+
+/// The vehicle's parameters, as far as they are known.
+#[derive(Default)]
+pub struct VehicleParameters {
+    count: Option<u16>,
+    values: BTreeMap<u16, ParameterValue>,
+    download: Option<Repeated>,
+}
+
+impl VehicleParameters {
+    /// Returns how many there are, once the vehicle has said so.
+    pub fn count(&self) -> Option<u16> {
+        self.count
+    }
+
+    /// Returns those that are known, in the vehicle's order.
+    pub fn values(&self) -> impl ExactSizeIterator<Item = &ParameterValue> {
+        self.values.values()
+    }
+
+    /// True once every parameter has come.
+    pub fn are_complete(&self) -> bool {
+        self.count.is_some_and(|count| self.values.len() == usize::from(count))
+    }
+
+    /// True while they are being read.
+    pub fn are_being_read(&self) -> bool {
+        self.download.is_some()
+    }
+
+    pub(crate) fn read(&mut self, now_ms: u64) -> ParameterRequest {
+        (self.count, self.download) = (None, Some(Repeated::new(STALLED, now_ms)));
+        self.values.clear();
+        ParameterRequest::List
+    }
+
+    pub(crate) fn hear(&mut self, value: &ParameterValue, now_ms: u64) {
+        self.count = Some(value.count);
+        if value.place >= value.count || self.values.insert(value.place, *value).is_some() {
+            return;
+        }
+        if self.are_complete() {
+            self.download = None;
+        }
+        self.download.iter_mut().for_each(|download| download.progresses(now_ms));
+    }
+
+    /// Passes to `say` what is to be asked again.
+    pub(crate) fn turn(&mut self, now_ms: u64, mut say: impl FnMut(ParameterRequest)) {
+        match self.download.as_mut().map_or(Due::Nothing, |download| download.due(now_ms)) {
+            Due::Nothing => (),
+            Due::GiveUp => self.download = None,
+            Due::Again => match self.count {
+                // Nothing has come: the request itself was lost.
+                None => say(ParameterRequest::List),
+                Some(count) => {
+                    let missing = (0..count).filter(|place| !self.values.contains_key(place)).take(MISSING_MAX);
+                    missing.map(ParameterRequest::ReadPlace).for_each(say);
+                }
+            },
+        }
+    }
+}

@@ -1,0 +1,68 @@
+//! Questions that are repeated until something comes back.
+
+/// For how long an answer is waited for, and how often the question is asked.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Patience {
+    /// Time until the next try, or until it is given up \[ms\].
+    pub answer_ms: u64,
+    /// Number of tries.
+    pub tries: u32,
+}
+
+impl Patience {
+    /// Asked once, over a link that loses nothing.
+    pub const ONCE: Self = Patience { answer_ms: 3_000, tries: 1 };
+    /// Asked three times.
+    pub const REPEATED: Self = Patience { answer_ms: 1_000, tries: 3 };
+}
+
+/// What is to be done about a question now.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Due {
+    Nothing,
+    Again,
+    GiveUp,
+}
+
+/// A question that has been asked.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Repeated {
+    patience: Patience,
+    tries_left: u32,
+    since_ms: u64,
+    wait_ms: u64,
+}
+
+impl Repeated {
+    pub(crate) fn new(patience: Patience, now_ms: u64) -> Self {
+        let tries_left = patience.tries.saturating_sub(1);
+        Repeated { patience, tries_left, since_ms: now_ms, wait_ms: patience.answer_ms }
+    }
+
+    /// Returns the time since the last try or sign of progress \[ms\].
+    pub(crate) fn waited_ms(&self, now_ms: u64) -> u64 {
+        now_ms.saturating_sub(self.since_ms)
+    }
+
+    /// A part of the answer has come.
+    pub(crate) fn progresses(&mut self, now_ms: u64) {
+        self.since_ms = now_ms;
+    }
+
+    /// The vehicle is at it: nothing needs to be asked again, and it is given the time of all tries for the next sign.
+    pub(crate) fn goes_on(&mut self, now_ms: u64) {
+        (self.tries_left, self.since_ms) = (0, now_ms);
+        self.wait_ms = self.patience.answer_ms.saturating_mul(self.patience.tries.into());
+    }
+
+    pub(crate) fn due(&mut self, now_ms: u64) -> Due {
+        if self.waited_ms(now_ms) < self.wait_ms {
+            return Due::Nothing;
+        }
+        if self.tries_left == 0 {
+            return Due::GiveUp;
+        }
+        (self.tries_left, self.since_ms) = (self.tries_left - 1, now_ms);
+        Due::Again
+    }
+}

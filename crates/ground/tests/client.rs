@@ -1,0 +1,243 @@
+//! What a station can rely on, over links that lose, repeat and delay, and among others who speak on them.
+#![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs, reason = "tests")]
+
+mod line;
+
+use afbc_ground::{Client, CommandState, Patience, UploadEnd};
+use afbc_link::{
+    Address, Answer, Command, Downlink, Mission, MissionItem, MissionResult, ParameterRequest, Plan, Uplink,
+};
+use line::{COMPANION, Line, OTHER_VEHICLE, VEHICLE};
+use proptest::prelude::*;
+
+const STATION: Address = Client::STATION;
+/// Enough for any of the links here.
+const PATIENT: Patience = Patience { answer_ms: 600, tries: 60 };
+const LONG_MS: u64 = 60_000;
+/// Time after which nothing is under way any more, that could be taken for an answer to what follows.
+const UNDER_WAY_MS: u64 = 1_000;
+
+fn items(count: u16) -> Vec<MissionItem> {
+    (0..count)
+        .map(|number| MissionItem { number, command: 16, x: i32::from(number), ..MissionItem::default() })
+        .collect()
+}
+
+fn answer(command: Command, answer: Answer, to: Address) -> Downlink {
+    Downlink::Answer { command: command.id(), answer, to }
+}
+
+fn ack(result: MissionResult, plan: Plan, to: Address) -> Downlink {
+    Downlink::Mission { message: Mission::Ack(result, plan), to }
+}
+
+/// Returns what the client is about to say.
+fn said(client: &mut Client) -> Vec<Uplink> {
+    let mut said = Vec::new();
+    client.send(|message, _| said.push(*message));
+    said
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(48))]
+
+    /// Whatever is lost, repeated, late or said by others: what counts as answered has been carried out.
+    #[test]
+    fn commands_get_through(seed: u64, lost in 0..40_u64, again in 0..40_u64, late_ms in 0..200_u64) {
+        let mut line = Line::new(seed, [lost, again, late_ms]);
+        for (count, command) in (1..).zip([Command::Arm, Command::Land, Command::Arm]) {
+            line.client.command(command, PATIENT);
+            line.run_until(LONG_MS, |client| client.state(command) != Some(CommandState::Waiting));
+            prop_assert_eq!(line.client.answer(command), Some(Answer::Accepted));
+            prop_assert!(line.vehicle.commands.len() >= count);
+            line.run_until(UNDER_WAY_MS, |_| false);
+        }
+    }
+
+    /// What counts as accepted is aboard, all of it and nothing else.
+    #[test]
+    fn plans_get_through(
+        seed: u64, lost in 0..40_u64, again in 0..40_u64, late_ms in 0..200_u64,
+        counts in prop::array::uniform3(0..9_u16),
+    ) {
+        let mut line = Line::new(seed, [lost, again, late_ms]);
+        // Each twice: nothing of the first upload may be taken for the second.
+        for counts in [[5, 0, 2], counts] {
+            let plans = [Plan::FENCE, Plan::RALLY, Plan::MISSION].into_iter().zip(counts.map(items));
+            line.client.upload(plans.clone(), PATIENT);
+            let mut end = None;
+            line.run_until(LONG_MS, |client| { end = end.or(client.take_upload_end()); end.is_some() });
+            // A count that comes again, late, begins another upload at the vehicle, as the protocol has it.
+            prop_assert!(end == Some(UploadEnd::Accepted) || (again > 0 && late_ms > 0), "{:?}", end);
+            for (plan, items) in plans.filter(|_| end == Some(UploadEnd::Accepted)) {
+                prop_assert_eq!(line.vehicle.plan(plan), &items[..]);
+            }
+            prop_assert_eq!(line.client.take_upload_end(), None);
+            line.run_until(UNDER_WAY_MS, |_| false);
+        }
+    }
+
+    #[test]
+    fn parameters_get_through(seed: u64, lost in 0..25_u64, again in 0..40_u64, late_ms in 0..200_u64, value: f32) {
+        let mut line = Line::new(seed, [lost, again, late_ms]);
+        line.client.read_parameters();
+        line.run_until(LONG_MS, |client| !client.parameters().are_being_read());
+        prop_assert!(line.client.parameters().are_complete());
+        let known: Vec<_> = line.client.parameters().values().copied().collect();
+        prop_assert_eq!(&known, &line.vehicle.parameters());
+
+        line.client.set_parameter("P07", value);
+        line.run_until(UNDER_WAY_MS, |_| false);
+        let held = line.vehicle.parameters()[7].value;
+        prop_assert!(held == value.to_le_bytes() || lost > 0);
+    }
+
+    /// At each multiple of the period that has been passed, once.
+    #[test]
+    fn heartbeats_keep_time(period_ms in 1..1_000_u64, steps_ms in prop::collection::vec(0..400_u64, 1..60)) {
+        let mut client = Client::new(STATION);
+        client.beat_every(Some(period_ms));
+        let (mut now_ms, mut beats) = (0, 0);
+        for step_ms in steps_ms {
+            let before_ms = now_ms;
+            client.turn(now_ms);
+            let count = said(&mut client).len();
+            prop_assert!(count <= 1);
+            beats += count;
+            now_ms += step_ms.min(period_ms);
+            prop_assert!(beats as u64 <= 1 + before_ms / period_ms);
+            prop_assert!(beats as u64 > before_ms / period_ms);
+        }
+        client.beat_every(None);
+        client.turn(now_ms + 10 * period_ms);
+        prop_assert_eq!(said(&mut client), []);
+    }
+}
+
+/// Nobody is there: so many tries, so long after each other, and then it is given up.
+#[test]
+fn silence_is_told() {
+    let mut client = Client::new(STATION);
+    let plans = [(Plan::MISSION, items(2))];
+    client.command(Command::Land, Patience::REPEATED);
+    client.upload(plans.clone(), Patience::REPEATED);
+    client.command(Command::Return, Patience::ONCE);
+    let land = Uplink::Command(Command::Land);
+    let count = Uplink::Mission(Mission::Count(2, Plan::MISSION));
+    let mut times = Vec::new();
+    for now_ms in 0..5_000 {
+        client.turn(now_ms);
+        times.extend(said(&mut client).into_iter().map(|message| (now_ms, message)));
+        let waits = |until_ms| if now_ms < until_ms { CommandState::Waiting } else { CommandState::Silent };
+        assert_eq!(client.state(Command::Land), Some(waits(3_000)), "{now_ms}");
+        assert_eq!(client.state(Command::Return), Some(waits(3_000)), "{now_ms}");
+        assert_eq!(client.take_upload_end(), (now_ms == 3_000).then_some(UploadEnd::Silent(Plan::MISSION)));
+    }
+    let once = (0, Uplink::Command(Command::Return));
+    let of = |now_ms| [land, count].map(|message| (now_ms, message));
+    assert_eq!(times, [&of(0)[..], &[once], &of(1_000), &of(2_000)].concat());
+    // What comes too late, or to nobody's question, changes nothing.
+    for command in [Command::Land, Command::Arm] {
+        client.receive(VEHICLE, &answer(command, Answer::Accepted, STATION));
+    }
+    assert_eq!((client.state(Command::Land), client.state(Command::Arm)), (Some(CommandState::Silent), None));
+}
+
+/// The list is asked for until it comes, and then what is missing of it, but not for ever.
+#[test]
+fn missing_parameters_are_asked_for() {
+    let mut line = Line::new(1, [0; 3]);
+    line.client.read_parameters();
+    assert_eq!(said(&mut line.client), [Uplink::Parameter(ParameterRequest::List)]);
+    line.client.turn(1_000);
+    assert_eq!(said(&mut line.client), [Uplink::Parameter(ParameterRequest::List)]);
+    line.client.turn(1_500);
+    let all = line.vehicle.parameters();
+    for value in all.iter().filter(|value| value.place % 2 == 0) {
+        line.client.receive(VEHICLE, &Downlink::Parameter(*value));
+    }
+    line.client.turn(2_499);
+    assert_eq!(said(&mut line.client), []);
+    line.client.turn(2_500);
+    let odd: Vec<_> = (1..all.len() as u16).step_by(2).take(10).collect();
+    assert!(odd.len() == 10);
+    assert_eq!(
+        said(&mut line.client),
+        odd.iter().map(|it| Uplink::Parameter(ParameterRequest::ReadPlace(*it))).collect::<Vec<_>>()
+    );
+    (3..60).for_each(|now_s| line.client.turn(1_000 * now_s));
+    assert!(!line.client.parameters().are_being_read() && !line.client.parameters().are_complete());
+}
+
+/// What is in progress is not repeated, and given more time.
+#[test]
+fn what_is_in_progress_is_waited_for() {
+    let mut client = Client::new(STATION);
+    client.command(Command::SelfTest, Patience::REPEATED);
+    said(&mut client);
+    for now_ms in (0..10_000).step_by(500) {
+        client.turn(now_ms);
+        client.receive(VEHICLE, &answer(Command::SelfTest, Answer::InProgress, STATION));
+        assert_eq!(said(&mut client), [], "{now_ms}");
+    }
+    assert_eq!(client.state(Command::SelfTest), Some(CommandState::Waiting));
+    client.turn(9_700);
+    client.receive(VEHICLE, &answer(Command::SelfTest, Answer::Failed, STATION));
+    let failed = CommandState::Answered { answer: Answer::Failed, after_ms: 200 };
+    assert_eq!(client.state(Command::SelfTest), Some(failed));
+    // The first final answer counts; the next command waits for its own.
+    client.receive(VEHICLE, &answer(Command::SelfTest, Answer::Accepted, STATION));
+    assert_eq!(client.state(Command::SelfTest), Some(failed));
+    client.command(Command::SelfTest, Patience::ONCE);
+    assert_eq!(client.state(Command::SelfTest), Some(CommandState::Waiting));
+}
+
+/// Others' answers are not this station's, whoever they are for, and whoever sends them.
+#[test]
+fn answers_to_others_are_not_heard() {
+    let mut client = Client::new(STATION);
+    let beat = Downlink::Heartbeat { armed: false, failsafe: false, mode: 7 };
+    // A station's own heartbeat, sent back, is no vehicle's.
+    assert!(client.receive(STATION, &beat) && client.vehicle().address.is_none());
+    assert!(client.receive(VEHICLE, &beat));
+    client.command(Command::Arm, Patience::ONCE);
+    client.upload([(Plan::MISSION, items(1))], Patience::ONCE);
+    said(&mut client);
+    let request = |to| Downlink::Mission { message: Mission::Request(0, Plan::MISSION), to };
+    for (from, to) in [(VEHICLE, COMPANION), (OTHER_VEHICLE, STATION)] {
+        let armed = Downlink::Heartbeat { armed: true, failsafe: false, mode: 8 };
+        for message in
+            [answer(Command::Arm, Answer::Denied, to), ack(MissionResult::ERROR, Plan::MISSION, to), request(to)]
+        {
+            assert!(!client.receive(from, &message), "{message:?}");
+        }
+        assert_eq!(client.receive(from, &armed), from == VEHICLE);
+        assert_eq!((client.state(Command::Arm), said(&mut client)), (Some(CommandState::Waiting), Vec::new()));
+        assert_eq!((client.vehicle().armed, client.vehicle().mode), (true, 8));
+        assert_eq!(client.take_upload_end(), None);
+        client.receive(VEHICLE, &beat);
+        client.receive(VEHICLE, &armed);
+    }
+    assert!(client.receive(VEHICLE, &request(STATION)));
+    assert_eq!(said(&mut client), [Uplink::Mission(Mission::Item(items(1)[0], Plan::MISSION))]);
+    assert!(client.receive(VEHICLE, &answer(Command::Arm, Answer::Refused(3), STATION)));
+    assert_eq!(client.answer(Command::Arm), Some(Answer::Refused(3)));
+}
+
+/// A refusal ends the upload, also of the plans that would follow; what was accepted before is no answer to this one.
+#[test]
+fn refused_plans_end_the_upload() {
+    let mut client = Client::new(STATION);
+    client.upload([(Plan::FENCE, items(2)), (Plan::MISSION, items(1))], Patience::ONCE);
+    said(&mut client);
+    client.receive(VEHICLE, &ack(MissionResult::ACCEPTED, Plan::FENCE, STATION));
+    client.receive(VEHICLE, &ack(MissionResult::ERROR, Plan::MISSION, STATION));
+    // Neither is there an item of this number, nor is that plan under way.
+    for message in [Mission::Request(2, Plan::FENCE), Mission::Request(0, Plan::MISSION)] {
+        client.receive(VEHICLE, &Downlink::Mission { message, to: STATION });
+    }
+    assert_eq!((said(&mut client), client.take_upload_end()), (Vec::new(), None));
+    client.receive(VEHICLE, &ack(MissionResult::NO_SPACE, Plan::FENCE, STATION));
+    assert_eq!(client.take_upload_end(), Some(UploadEnd::Refused(Plan::FENCE, MissionResult::NO_SPACE)));
+    assert_eq!(said(&mut client), []);
+}
