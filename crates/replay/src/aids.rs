@@ -1,22 +1,22 @@
-//! Measurements as a log has them, and what the estimator assumes of their errors.
+//! Makes measurements for the estimator from the aiding sensors in a log, with assumed measurement errors.
 
 use crate::recording::{Aiding, SampleSource, Sensor, flip};
 use afbc_estimator::{Measurement, Origin, Stamped};
 use nalgebra::Vector3;
 
-/// Smallest standard deviations of a receiver's position, height \[m\] and velocity \[m/s\], and the largest: receivers
-/// state what is left of their noise, not what is the same for minutes. Those of EKF2.
+/// Limits on the standard deviations of a receiver's position, height \[m\] and velocity \[m/s\]: smallest and largest.
+/// A receiver states only its remaining noise, not the errors that stay constant for minutes. The values are EKF2's.
 const HORIZONTAL_M: (f64, f64) = (0.5, 100.0);
 const VERTICAL_M: (f64, f64) = (1.0, 100.0);
 const SPEED_M_S: (f64, f64) = (0.3, 10.0);
-/// What is taken for a velocity without one \[m/s\].
+/// Standard deviation of the velocity of a fix without a velocity \[m/s\].
 const UNTOLD_M_S: f32 = 1e3;
-/// Noise of a barometer in flight \[m\], and of a magnetometer \[gauss\].
+/// Noise of a barometer in flight \[m\] and of a magnetometer \[gauss\].
 const BAROMETER_M: f32 = 0.5;
 const FIELD_GAUSS: f32 = 0.05;
-/// Least time between two heights or two fields: more of them bring nothing new \[us\].
+/// Shortest time between two heights or two fields \[us\]: samples in between bring nothing new.
 const SPARSE_US: u64 = 15_000;
-/// Largest distance of a fix from the middle one \[degrees\]: 50 km are as far as the estimator goes.
+/// Largest distance of a fix from the median fix \[degrees\]: the estimator covers 50 km.
 const FAR_DEG: f64 = 0.4;
 
 /// A fix of a GNSS receiver.
@@ -25,28 +25,28 @@ pub(crate) struct Fix {
     pub(crate) arrived_us: u64,
     /// Latitude and longitude \[degrees\], altitude \[m\].
     pub(crate) place: [f64; 3],
-    /// North, east, down \[m/s\], if known.
+    /// Velocity north, east, down \[m/s\], if known.
     pub(crate) velocity_m_s: Option<[f64; 3]>,
-    /// Standard deviations as the receiver states them; those that it does not are the smallest.
+    /// Standard deviations that the receiver states; values that it does not state are raised to the lower limit.
     pub(crate) horizontal_m: f64,
     pub(crate) vertical_m: f64,
     pub(crate) speed_m_s: f64,
 }
 
 impl Fix {
-    /// True if the numbers are those of a place.
+    /// Returns true if the coordinates are valid and are not those of a receiver without a fix.
     pub(crate) fn is_place(&self) -> bool {
         let [latitude, longitude, altitude] = self.place;
-        // A receiver without a fix says zero.
+        // A receiver without a fix reports latitude and longitude zero.
         Origin::new(latitude, longitude, altitude).is_some() && (latitude, longitude) != (0.0, 0.0)
     }
 }
 
-/// Returns the first fix that is not far from the middle one.
+/// Returns the first fix that is close to the median of all fixes.
 pub(crate) fn begin(fixes: &[Fix]) -> Option<&Fix> {
     let middle = |of: fn(&Fix) -> f64| {
         let mut all: Vec<f64> = fixes.iter().map(of).collect();
-        // The median, which one absurd fix does not move.
+        // The median, since one absurd fix does not move it.
         all.sort_by(f64::total_cmp);
         all.get(all.len() / 2).copied()
     };
@@ -55,7 +55,7 @@ pub(crate) fn begin(fixes: &[Fix]) -> Option<&Fix> {
     fixes.iter().find(near)
 }
 
-/// Returns fixes as measurements; `delay_us` is the receiver's.
+/// Returns the fixes as measurements; `delay_us` is the receiver's delay.
 pub(crate) fn gnss(fixes: &[Fix], origin: &Origin, delay_us: u64) -> Vec<Aiding> {
     let sigma = |stated: f64, (least, most): (f64, f64)| stated.max(least).min(most) as f32;
     let aiding = |fix: &Fix| {
@@ -74,13 +74,13 @@ pub(crate) fn gnss(fixes: &[Fix], origin: &Origin, delay_us: u64) -> Vec<Aiding>
     fixes.iter().map(aiding).collect()
 }
 
-/// Returns a height as a measurement.
+/// Returns a barometer's height as a measurement.
 pub(crate) fn height(arrived_us: u64, at_us: u64, height_m: f64, delay_us: u64) -> Aiding {
     let value = Measurement::Height { height_m: height_m as f32, sigma_m: BAROMETER_M };
     aided(value, arrived_us, at_us, delay_us)
 }
 
-/// Returns a field as a measurement.
+/// Returns a magnetic field as a measurement.
 pub(crate) fn field(arrived_us: u64, at_us: u64, gauss: [f64; 3], delay_us: u64) -> Aiding {
     let value = Measurement::MagneticField { field: flip(gauss), sigma: FIELD_GAUSS };
     aided(value, arrived_us, at_us, delay_us)
@@ -90,8 +90,8 @@ fn aided(value: Measurement, arrived_us: u64, at_us: u64, delay_us: u64) -> Aidi
     Aiding { arrived_us, measurement: Stamped { value, at_us: at_us.saturating_sub(delay_us) } }
 }
 
-/// Keeps usable measurements in order, heights and fields no more often than they bring anything new; appends them to
-/// `all` and says where they come from. `raw` is the number of samples in the log.
+/// Appends the plausible measurements to `all`, in the order of time, and returns their source. Heights and fields are
+/// thinned out to [`SPARSE_US`]. `raw` is the number of samples in the log.
 pub(crate) fn collect(
     all: &mut Vec<Aiding>,
     sensor: Sensor,
@@ -109,11 +109,11 @@ pub(crate) fn collect(
     SampleSource { sensor, topic: topic.into(), used, skipped: raw.saturating_sub(used) }
 }
 
-/// Keeps samples at least so far apart.
+/// Keeps samples that are at least `apart_us` apart.
 pub(crate) fn sparse<T>(samples: Vec<T>, apart_us: u64, at_us: impl Fn(&T) -> u64) -> Vec<T> {
     let mut last_us: Option<u64> = None;
     let keep = |sample: &T| {
-        // Saturating, since times of a damaged log may be anything.
+        // Saturating, since a damaged log may contain any time.
         let keep = last_us.is_none_or(|last_us| at_us(sample) >= last_us.saturating_add(apart_us));
         if keep {
             last_us = Some(at_us(sample));

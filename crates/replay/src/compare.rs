@@ -1,25 +1,25 @@
-//! How far the log's estimate and ours are apart.
+//! Differences between the log's estimate and ours.
 
 use crate::recording::LoggedState;
 use afbc_estimator::Estimate;
 use nalgebra::{Quaternion, Vector3};
 
-/// The differences of one quantity.
+/// Statistics of the differences in one quantity.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ErrorFigure {
-    /// Number of times at which both are valid.
+    /// Number of times at which the log's value and ours are both valid.
     pub count: u64,
-    /// Number of times at which the log's is, whatever ours.
+    /// Number of compared times at which the log has a value, whether or not ours is valid.
     pub logged: u64,
     squares: f64,
-    /// The largest one.
+    /// Largest difference.
     pub largest: f64,
-    /// Number of coordinates within three of our standard deviations, and of all.
+    /// Number of coordinates within three of our standard deviations, and number of all coordinates.
     within: (u64, u64),
 }
 
 impl ErrorFigure {
-    /// Adds a vector of differences with standard deviations.
+    /// Adds a vector of differences with our standard deviations.
     fn add(&mut self, difference: &[f64], sigma: &[f64]) {
         let square: f64 = difference.iter().map(|part| part * part).sum();
         self.count += 1;
@@ -29,47 +29,47 @@ impl ErrorFigure {
         self.within = (self.within.0 + inside as u64, self.within.1 + difference.len() as u64);
     }
 
-    /// Root mean square; none if nothing could be compared.
+    /// Returns the root mean square; none if nothing could be compared.
     #[must_use]
     pub fn rms(&self) -> Option<f64> {
         (self.count > 0).then(|| libm::sqrt(self.squares / self.count as f64))
     }
 
-    /// Share of the coordinates within three of our standard deviations.
+    /// Returns the share of the coordinates that lie within three of our standard deviations.
     #[must_use]
     pub fn within_ratio(&self) -> Option<f64> {
         let (inside, all) = self.within;
         (all > 0).then(|| inside as f64 / all as f64)
     }
 
-    /// Share of the log's times at which ours was valid.
+    /// Returns the share of the compared times with a value in the log at which our estimate was valid, too.
     #[must_use]
     pub fn valid_ratio(&self) -> Option<f64> {
         (self.logged > 0).then(|| self.count as f64 / self.logged as f64)
     }
 }
 
-/// All differences.
+/// Statistics of the differences in all quantities.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Figures {
     /// Angle between the attitudes \[degrees\].
     pub attitude: ErrorFigure,
-    /// Its part about horizontal axes \[degrees\].
+    /// Roll and pitch part of the angle \[degrees\].
     pub tilt: ErrorFigure,
-    /// Its part about the vertical axis \[degrees\].
+    /// Yaw part of the angle \[degrees\].
     pub heading: ErrorFigure,
     /// Velocity \[m/s\].
     pub velocity: ErrorFigure,
     /// Position \[m\].
     pub position: ErrorFigure,
-    /// Its horizontal part \[m\].
+    /// Horizontal part of the position \[m\].
     pub horizontal: ErrorFigure,
-    /// Its vertical part \[m\].
+    /// Vertical part of the position \[m\].
     pub height: ErrorFigure,
 }
 
 impl Figures {
-    /// Adds the log's state and our estimate of the same time.
+    /// Adds the log's state and our estimate for the same time.
     pub(crate) fn add(&mut self, logged: &LoggedState, ours: &Estimate) {
         let (validity, sigmas) = (&ours.validity, &ours.sigmas);
         let wide = |v: &Vector3<f32>| v.cast::<f64>();
@@ -109,16 +109,16 @@ fn compare(figure: &mut ErrorFigure, valid: bool, difference: &[f64], sigma: &[f
     }
 }
 
-/// Returns the rotation from `ours` to `theirs`, both w, x, y, z from body to earth, as a vector about the axes of the
-/// earth frame \[rad\].
+/// Returns the rotation from `ours` to `theirs` as a vector about the axes of the earth frame \[rad\]. Both are
+/// quaternions w, x, y, z from body to earth.
 pub(crate) fn turn(theirs: &[f32; 4], ours: &[f32; 4]) -> Vector3<f64> {
     let [w, x, y, z] = theirs.map(f64::from);
     let [ow, ox, oy, oz] = ours.map(f64::from);
     let turn = Quaternion::new(w, x, y, z) * Quaternion::new(ow, -ox, -oy, -oz);
-    // The shorter way round: q and -q are the same rotation.
+    // Take the shorter way round: q and -q are the same rotation.
     let turn = if turn.w < 0.0 { -turn } else { turn };
     let sine = turn.vector().norm();
-    // angle/sin(angle/2), whose limit is 2.
+    // angle/sin(angle/2) tends to 2 for a small angle.
     let per_sine = if sine > 1e-9 { 2.0 * libm::atan2(sine, turn.w) / sine } else { 2.0 };
     turn.vector() * per_sine
 }

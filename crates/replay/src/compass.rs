@@ -1,25 +1,26 @@
-//! How far the magnetometer of a recording is from the earth's field.
+//! Checks a recording's magnetometer against the earth's magnetic field.
 
 use crate::earth::Field;
 use crate::recording::{Recording, SampleSource, Sensor};
 use afbc_estimator::{Measurement, Settings};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
-/// Topic of fields that are not calibrated.
+/// Topic of uncalibrated fields.
 const RAW: &str = "sensor_mag";
-/// Age of an attitude of the log at which a field is levelled by it \[us\].
+/// A field is levelled with an attitude of the log that is at most this old \[us\].
 const FRESH_US: u64 = 100_000;
-/// How many times the third part may be as large as both others: nine tenths are within it (Student's distribution of
-/// two degrees of freedom). It need not be larger than usual for that.
+/// Ratio of the assumed error along the field's third, unseen axis to the error seen in the other two: nine tenths are
+/// within this ratio (Student's distribution with two degrees of freedom). The ratio raises the error to the
+/// estimator's default at most.
 const UNSEEN: f32 = 3.0;
-/// Least error of a heading by a magnetometer \[rad\].
+/// Smallest error of a magnetometer's heading \[rad\].
 const LEAST_RAD: f32 = 0.05;
-/// Error of the heading from which on it is reported \[rad\].
+/// A heading error larger than this is reported \[rad\].
 const TOLD_RAD: f32 = 0.35;
 
-/// Sets what the recording's magnetometer makes of the heading. Where its field differs from that of the `earth`, the
-/// two parts that the heading does not change, level and down, show how large the third may be. One that nobody has
-/// calibrated, and that cannot be compared, gives no heading.
+/// Sets the recording's heading error due to its magnetometer. The heading does not change the horizontal and the
+/// downward part of the field, so their differences from the `earth`'s field show how large the error of the third part
+/// may be. A magnetometer that is neither calibrated nor comparable gives no heading.
 pub(crate) fn doubt(recording: &mut Recording, earth: Option<&Field>) {
     let most_rad = Settings::MAG_SLOW.range.max as f32;
     let (Some([level, down]), Some(earth)) = (parts(recording), earth) else {
@@ -27,9 +28,9 @@ pub(crate) fn doubt(recording: &mut Recording, earth: Option<&Field>) {
         recording.mag_slow_rad = recording.sources.iter().any(is_raw).then_some(most_rad);
         return;
     };
-    // The root mean square of the two that are seen stands for the one that is not.
+    // The root mean square of the two visible errors stands for the third.
     let off = libm::hypotf(level - earth.horizontal_gauss, down - earth.down_gauss) * core::f32::consts::FRAC_1_SQRT_2;
-    // Near the magnetic poles nothing is left level.
+    // Near the magnetic poles the field has hardly any horizontal part.
     let error_rad = off / earth.horizontal_gauss.max(1e-3);
     let unseen_rad = (UNSEEN * error_rad).clamp(LEAST_RAD, Settings::DEFAULT.mag_slow_rad);
     recording.mag_slow_rad = Some(error_rad.max(unseen_rad).min(most_rad));
@@ -42,7 +43,7 @@ pub(crate) fn doubt(recording: &mut Recording, earth: Option<&Field>) {
     }
 }
 
-/// Returns the medians of the parts of the field, level and downwards \[gauss\], in the log's attitude.
+/// Returns the medians of the field's horizontal and downward part \[gauss\], levelled by the log's attitude.
 fn parts(recording: &Recording) -> Option<[f32; 2]> {
     let fields = recording.aiding.iter().filter_map(|aiding| {
         let Measurement::MagneticField { field, .. } = aiding.measurement.value else { return None };
@@ -54,7 +55,7 @@ fn parts(recording: &Recording) -> Option<[f32; 2]> {
     Some([middle(level)?, middle(down)?])
 }
 
-/// Returns the direction of the earth's z in the body.
+/// Returns the direction of the earth's z axis in the body frame.
 fn up(recording: &Recording, at_us: u64) -> Option<Vector3<f32>> {
     let states = &recording.states;
     let until = states.partition_point(|state| state.at_us <= at_us);

@@ -1,4 +1,5 @@
-//! The CSV of PX4-ECL's replay tests: `time_us,kind,values`, and its filter's estimate in a file beside it.
+//! Reads the CSV of PX4-ECL's replay tests, with lines `time_us,kind,values`. A second file in the same folder has
+//! EKF2's estimate.
 
 use crate::aids::{self, Fix};
 use crate::order::rising;
@@ -10,21 +11,21 @@ use std::ffi::OsString;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Delay of the receiver, PX4's default \[us\].
+/// Delay of the GNSS receiver \[us\]: PX4's default.
 const GNSS_DELAY_US: u64 = 110_000;
-/// Kinds of lines.
+/// Kinds of lines in the CSV.
 const KINDS: [&str; 13] =
     ["imu", "gps", "baro", "mag", "landed", "airspeed", "flow", "range", "vio", "ev", "drag", "terrain", "wind"];
-/// Length of an excerpt of a bad file.
+/// Number of characters of a bad file that the error message quotes.
 const EXCERPT: usize = 40;
 
-/// Times and values of one kind of line.
+/// Times and values of all lines of one kind.
 type Lines = Vec<(u64, Vec<f64>)>;
 
-/// Reads a log, and the estimate in the file beside it that is called as it, with `_ekf2` at the end.
+/// Reads a log and its estimate. The estimate's file has the log's name with `_ekf2` appended, as in `flight_ekf2.csv`.
 ///
 /// # Errors
-/// What is wrong with it, and what to do.
+/// A message that says what is wrong with the log and what to do.
 pub(crate) fn read(bytes: &[u8], path: &Path) -> Result<Recording, String> {
     let mut lines = lines(bytes)?;
     let mut of = |kind: &str| lines.kinds.remove(kind).unwrap_or_default();
@@ -64,7 +65,7 @@ pub(crate) fn read(bytes: &[u8], path: &Path) -> Result<Recording, String> {
         fix.is_place().then_some(fix)
     };
     let mut fixes: Vec<Fix> = gps.iter().filter_map(fix).collect();
-    // That of the place as written, as EKF2 had it.
+    // The declination belongs to the place as written, as EKF2 used it.
     let written = aids::begin(&fixes).copied();
     if are_exchanged(&fixes) {
         fixes.iter_mut().for_each(|Fix { place: [latitude, longitude, _], .. }| std::mem::swap(latitude, longitude));
@@ -98,8 +99,8 @@ pub(crate) fn read(bytes: &[u8], path: &Path) -> Result<Recording, String> {
     Ok(recording)
 }
 
-/// True if the way of a vehicle is that of its velocity only with latitude and longitude exchanged, as in those of
-/// PX4-ECL's logs that were written in the other order.
+/// Returns true if the fixes agree with the integrated velocity only after latitude and longitude are exchanged. Some
+/// of PX4-ECL's logs were written in that order.
 fn are_exchanged(fixes: &[Fix]) -> bool {
     let (mut way, mut straight, mut exchanged) = (0.0_f64, 0.0_f64, 0.0_f64);
     let mut flown = [0.0; 2];
@@ -112,7 +113,7 @@ fn are_exchanged(fixes: &[Fix]) -> bool {
     };
     for (fix, next) in fixes.iter().zip(fixes.iter().skip(1)) {
         let (Some([north, east, _]), true) = (fix.velocity_m_s, next.arrived_us > fix.arrived_us) else { continue };
-        // Over a long gap one velocity says nothing of the way.
+        // Across a long gap a single velocity does not tell the distance flown.
         let dt_s = ((next.arrived_us - fix.arrived_us) as f64 * 1e-6).min(2.0);
         flown = [flown[0] + north * dt_s, flown[1] + east * dt_s];
         let off =
@@ -124,10 +125,10 @@ fn are_exchanged(fixes: &[Fix]) -> bool {
     way > 5.0 && exchanged < 0.3 * way && straight > 0.3 * way && exchanged < 0.5 * straight
 }
 
-/// A file's lines by kind.
+/// Lines of a file, by kind.
 struct Read {
     kinds: HashMap<String, Lines>,
-    /// Number of the others, and which is the first.
+    /// Number of unreadable lines, and the line number of the first.
     bad: Option<(usize, u64)>,
 }
 
@@ -137,7 +138,7 @@ fn lines(bytes: &[u8]) -> Result<Read, String> {
         return Err(format!("empty; {WANTED}"));
     }
     let mut read = Read { kinds: HashMap::new(), bad: None };
-    // Each kind of line has a number of values of its own.
+    // Each kind of line has its own number of values.
     let mut reader = csv::ReaderBuilder::new().has_headers(false).flexible(true).from_reader(bytes);
     let mut record = csv::ByteRecord::new();
     let mut good = 0_usize;
@@ -156,7 +157,7 @@ fn lines(bytes: &[u8]) -> Result<Read, String> {
         }
         let bad = read.bad.get_or_insert((0, line));
         bad.0 += 1;
-        // A picture or a video has no lines.
+        // Give up early on a file that is no text, such as a picture or a video.
         if good == 0 && bad.0 > 1000 {
             break;
         }
@@ -168,7 +169,7 @@ fn lines(bytes: &[u8]) -> Result<Read, String> {
     Ok(read)
 }
 
-/// Returns kind, time and values of a line.
+/// Returns kind, time and values of a line; none if the line is bad.
 fn entry(record: &csv::ByteRecord) -> Option<(String, (u64, Vec<f64>))> {
     let text = |index: usize| std::str::from_utf8(record.get(index)?).ok().map(str::trim);
     let at_us: u64 = text(0)?.parse().ok()?;
@@ -177,7 +178,7 @@ fn entry(record: &csv::ByteRecord) -> Option<(String, (u64, Vec<f64>))> {
     Some((kind.to_owned(), (at_us, values.collect::<Option<Vec<f64>>>()?)))
 }
 
-/// Reads the estimate beside the log; that it is not there, or no estimate, is reported.
+/// Reads the estimate's file next to the log. A missing or bad estimate is reported as a missing source.
 fn beside(path: &Path, recording: &mut Recording) {
     let file = estimate_path(path);
     let name = file.file_name().unwrap_or_default().to_string_lossy().into_owned();

@@ -1,9 +1,9 @@
-//! Recorded flights through the estimator, beside the estimate in the log.
+//! Runs the estimator on recorded flights and compares its estimate with the log's own.
 //!
-//! [`read`] makes a [`Recording`] of a PX4 ULog or a PX4-ECL CSV, in this project's frames; [`fly`] runs the estimator
-//! over it, a step a millisecond, and compares. Whatever is in a file, nothing here panics: what cannot be used is
-//! skipped, counted and reported. [`exact`] runs a log of this firmware through all of its code.
-//! [`mcap`] converts a ULog for other tools.
+//! [`read`] turns a PX4 ULog or a PX4-ECL CSV into a [`Recording`] in this project's frames. [`fly`] runs the estimator
+//! on a recording, one step per millisecond, and compares. No file makes this crate panic: unusable data are skipped,
+//! counted and reported. [`exact`] replays a log of this firmware through all of its code. [`mcap`] converts a ULog for
+//! other tools.
 #![forbid(unsafe_code)]
 
 mod aids;
@@ -31,7 +31,7 @@ use std::path::Path;
 /// Reads the log at `path`.
 ///
 /// # Errors
-/// One line, if it cannot be read, is not a log, or has no samples of an inertial sensor.
+/// One line, if the file cannot be read, is not a log, or has no IMU samples.
 pub fn read(path: &Path) -> Result<Recording, FileError> {
     let shown = path.display().to_string();
     let failed = |problem: String| FileError::whole(&shown, problem);
@@ -46,10 +46,11 @@ pub fn read(path: &Path) -> Result<Recording, FileError> {
     recording.map_err(failed)
 }
 
-/// Largest log \[bytes\]: days of a flight. What has no end, such as a device, must not fill the memory.
+/// Largest log \[bytes\]: enough for days of flight. The limit keeps an endless file, such as a device, from filling
+/// the memory.
 const LOG_SIZE: u64 = 1 << 30;
 
-/// Returns what is in a file, if it is no larger than a log.
+/// Returns the contents of a file, if it is no larger than [`LOG_SIZE`].
 fn bytes(path: &Path) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     File::open(path)?.take(LOG_SIZE + 1).read_to_end(&mut bytes)?;

@@ -1,22 +1,23 @@
-//! Samples in the order of time.
+//! Brings samples into the order of time.
 
-/// Gap after which a lone rest of the samples does not belong to the same flight \[us\].
+/// Samples that are further apart than this do not belong to the same flight \[us\].
 const APART_US: u64 = 600_000_000;
 
-/// Keeps samples whose times rise strictly: as many as possible, so that one absurd time costs one sample. Returns them
-/// and the number of the others.
+/// Keeps as many samples as possible whose times rise strictly, so that one absurd time costs one sample. Returns these
+/// and the number of dropped samples.
 pub(crate) fn rising<T>(samples: Vec<T>, at_us: impl Fn(&T) -> u64) -> (Vec<T>, usize) {
     let all = samples.len();
     let times: Vec<u64> = samples.iter().map(&at_us).collect();
     let keep = longest_rising(&times);
     let samples: Vec<T> = samples.into_iter().zip(keep).filter_map(|(sample, keep)| keep.then_some(sample)).collect();
-    // Times that rise, but are hours apart, are of a clock that was set, or wrong.
+    // A jump of the times by more than [`APART_US`] comes from a clock that was set or is wrong: only the longest run
+    // is kept.
     let mut runs: Vec<Vec<T>> = Vec::new();
     let mut last_us = None;
     for sample in samples {
         let now_us = at_us(&sample);
         match runs.last_mut() {
-            // They rise, so no difference is negative.
+            // The times rise, so no difference is negative.
             Some(run) if last_us.is_some_and(|last_us| now_us - last_us < APART_US) => run.push(sample),
             _ => runs.push(vec![sample]),
         }
@@ -29,7 +30,8 @@ pub(crate) fn rising<T>(samples: Vec<T>, at_us: impl Fn(&T) -> u64) -> (Vec<T>, 
 
 /// Marks a longest strictly rising subsequence.
 fn longest_rising(times: &[u64]) -> Vec<bool> {
-    // For each length the sample at which a subsequence of it ends soonest, and for each sample the one before it.
+    // `ends` has for each length the sample at which a subsequence of that length ends soonest; `before` has each
+    // sample's predecessor.
     let mut ends: Vec<(u64, usize)> = Vec::new();
     let mut before: Vec<Option<usize>> = Vec::with_capacity(times.len());
     for (index, &time) in times.iter().enumerate() {

@@ -1,4 +1,4 @@
-//! What a log contains, in this project's frames and units.
+//! The contents of a log, in this project's frames and units.
 
 use afbc_estimator::{ImuSample, Measurement, Origin, Settings, Stamped};
 use nalgebra::Vector3;
@@ -23,7 +23,7 @@ pub enum Sensor {
 }
 
 impl Sensor {
-    /// Its name, for people.
+    /// Returns the sensor's name for people.
     #[must_use]
     pub const fn title(self) -> &'static str {
         match self {
@@ -38,25 +38,25 @@ impl Sensor {
     }
 }
 
-/// Where a sensor's samples come from.
+/// Origin of a sensor's samples in the log.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SampleSource {
-    /// Whose.
+    /// Sensor of the samples.
     pub sensor: Sensor,
-    /// Topic or kind of line; that which is missing if there are no samples.
+    /// Topic or kind of line; without any samples, the one that is missing.
     pub topic: String,
     /// Number of samples used.
     pub used: usize,
-    /// Number of samples not used: not finite, out of order, without a fix, or more than are needed.
+    /// Number of samples not used: not finite, out of order, without a fix, or more than needed.
     pub skipped: usize,
 }
 
-/// A measurement and when it arrived.
+/// A measurement and its time of arrival.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Aiding {
-    /// Time of its arrival \[us\].
+    /// Time of arrival \[us\].
     pub arrived_us: u64,
-    /// The measurement with the time at which it was true.
+    /// The measurement with the time of its sample.
     pub measurement: Stamped<Measurement>,
 }
 
@@ -78,11 +78,11 @@ pub struct LoggedState {
 pub struct LoggedReset {
     /// Time \[us\].
     pub at_us: u64,
-    /// What jumped.
+    /// Name of the quantity that jumped.
     pub what: &'static str,
-    /// By how much; not a number if the log does not say.
+    /// Size of the jump; NaN if the log does not state it.
     pub by: f64,
-    /// Its unit.
+    /// Unit of the jump.
     pub unit: &'static str,
 }
 
@@ -91,44 +91,44 @@ pub struct LoggedReset {
 pub struct Recording {
     /// Kind of log.
     pub format: &'static str,
-    /// Samples of the inertial sensor in the order of time, at least one.
+    /// IMU samples in the order of time, at least one.
     pub imu: Vec<ImuSample>,
     /// Measurements in the order of their arrival.
     pub aiding: Vec<Aiding>,
     /// The log's own estimate in the order of time.
     pub states: Vec<LoggedState>,
-    /// Its jumps.
+    /// Jumps of the log's own estimate.
     pub resets: Vec<LoggedReset>,
-    /// From when on the log says that the vehicle is on the ground, or not \[us\].
+    /// Times \[us\] at which the log's landed flag has a new value, and that value.
     pub landed: Vec<(u64, bool)>,
-    /// From when on the log says that the motors are off, or not \[us\].
+    /// Times \[us\] at which the log's disarmed flag has a new value, and that value.
     pub disarmed: Vec<(u64, bool)>,
     /// Origin of all positions, if there is one.
     pub origin: Option<Origin>,
-    /// Whether the log's own positions are from there, or from an origin that it does not state.
+    /// True if the log's positions start at `origin`; false if they start at an origin that the log does not state.
     pub knows_origin: bool,
     /// Direction of magnetic north, positive to the east \[rad\].
     pub declination_rad: f32,
-    /// What the vehicle's own field makes of the heading, where that is known: standard deviation along each of body x
-    /// and y \[rad\].
+    /// Heading error from the vehicle's own magnetic field, if known: standard deviation along each of body x and y
+    /// \[rad\].
     pub mag_slow_rad: Option<f32>,
     /// Settings of the estimator that flew, if the log has them.
     pub settings: Option<Settings>,
-    /// Where everything comes from.
+    /// Sources of the samples.
     pub sources: Vec<SampleSource>,
-    /// What else is to be reported, a sentence each.
+    /// Further remarks for the report, one sentence each.
     pub notes: Vec<String>,
 }
 
 impl Recording {
-    /// Length of the recording \[s\].
+    /// Returns the length of the recording \[s\].
     #[must_use]
     pub fn duration_s(&self) -> f64 {
         let ends = (self.imu.first(), self.imu.last());
         if let (Some(first), Some(last)) = ends { (last.at_us - first.at_us) as f64 * 1e-6 } else { 0.0 }
     }
 
-    /// Median rate of the inertial sensor \[Hz\]; 0 for a single sample.
+    /// Returns the median rate of the IMU \[Hz\]; 0 for a single sample.
     #[must_use]
     pub fn imu_rate_hz(&self) -> f64 {
         let mut steps: Vec<u64> =
@@ -138,25 +138,26 @@ impl Recording {
         median.map_or(0.0, |step_us| 1e6 / step_us as f64)
     }
 
-    /// Parts that the log lacks.
+    /// Returns the sources that the log lacks.
     pub fn missing(&self) -> impl Iterator<Item = &SampleSource> {
         self.sources.iter().filter(|source| source.used + source.skipped == 0)
     }
 
-    /// Parts that are in the log, but of which nothing can be used.
+    /// Returns the sources that are in the log but have no usable sample.
     pub fn unusable(&self) -> impl Iterator<Item = &SampleSource> {
         self.sources.iter().filter(|source| source.used == 0 && source.skipped > 0)
     }
 }
 
-/// A vector of PX4's frames, north-east-down or forward-right-down, in this project's.
+/// Returns a vector of PX4's frames, north-east-down or forward-right-down, in this project's frames.
 pub(crate) fn flip([x, y, z]: [f64; 3]) -> Vector3<f32> {
     Vector3::new(x as f32, -y as f32, -z as f32)
 }
 
-/// A rotation between PX4's frames as one between this project's; none if it is not a rotation.
+/// Returns a rotation between PX4's frames as a rotation between this project's; none if the quaternion is not of unit
+/// length.
 pub(crate) fn flip_rotation([w, x, y, z]: [f64; 4]) -> Option<[f32; 4]> {
     let norm = libm::sqrt(w * w + x * x + y * y + z * z);
-    // False of NaN.
+    // NaN makes this false.
     ((norm - 1.0).abs() < 0.05).then(|| [w, x, -y, -z].map(|part| (part / norm) as f32))
 }

@@ -1,4 +1,4 @@
-//! The estimator over a recording.
+//! Runs the estimator on a recording.
 
 use crate::compare::{Figures, turn};
 use crate::recording::{LoggedState, Recording};
@@ -8,86 +8,88 @@ use nalgebra::{Quaternion, Vector3};
 
 /// Time between two steps \[us\].
 const STEP_US: u64 = 1_000;
-/// Time after the last sample for which there are steps without one \[us\]: nothing happens later.
+/// The estimator goes on stepping without samples for this long after a sample \[us\]: nothing changes later.
 const WAIT_US: u64 = 400_000;
-/// Gap in our estimate over which nothing is compared \[us\].
+/// Nothing is compared across a gap in our estimate that is longer than this \[us\].
 const GAP_US: u64 = 50_000;
 /// Time between two rows if the log has no estimate \[us\].
 const GRID_US: u64 = 20_000;
-/// Time after the start from which on estimates are compared, unless half of what is left is less \[s\].
+/// Estimates are compared from this long after the start on, or from the middle of the remaining log if that is sooner
+/// \[s\].
 const SETTLED_S: f64 = 10.0;
-/// Time at rest after which the start is taken from the log \[us\].
+/// A vehicle at rest starts in the log's state if the estimator has not started by itself after this time \[us\].
 const PATIENT_US: u64 = 5_000_000;
-/// Speed at which a vehicle flies, if the log does not say when it has landed \[m/s\].
+/// Above this speed the vehicle counts as flying, if the log has no landed flag \[m/s\].
 const FLIES_M_S: f32 = 1.0;
-/// Distance at which an origin that is not stated must be another than the first fix \[m\].
+/// If the log's position is further than this from ours, its unstated origin is not the first fix \[m\].
 const ELSEWHERE_M: f32 = 10.0;
-/// Age of a state in the log from which a start is taken \[us\].
+/// Largest age of a logged state from which the estimator is started \[us\].
 const FRESH_US: u64 = 200_000;
 
 /// How the estimator started.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum EstimatorStart {
-    /// At rest, by itself, at this time of the recording \[s\].
+    /// By itself, at rest, at this time of the recording \[s\].
     AtRest(f64),
-    /// In the log's state at this time of the recording \[s\], since it would not start by itself, or the vehicle was
-    /// in the air.
+    /// In the log's state at this time of the recording \[s\]. The reason is set if the estimator did not start by
+    /// itself at rest; it is none if the vehicle was in the air.
     FromLog(f64, Option<Unready>),
-    /// Not at all.
+    /// It did not start.
     Never(Unready),
 }
 
-/// Our estimate at one time, beside the log's.
+/// Our estimate and the log's at one time.
 #[derive(Clone, Copy, Debug)]
 pub struct ReplayRow {
     /// Time from the recording's first sample on \[s\].
     pub time_s: f64,
-    /// This estimator's, interpolated between two samples; none before the start and in gaps.
+    /// Our estimate, interpolated between two IMU samples; none before the start and in gaps.
     pub ours: Option<Estimate>,
-    /// The log's.
+    /// The log's estimate.
     pub logged: LoggedState,
 }
 
 impl ReplayRow {
-    /// Returns the log's attitude less ours as a rotation about the axes of the earth frame \[rad\].
+    /// Returns the rotation from our attitude to the log's, about the axes of the earth frame \[rad\].
     #[must_use]
     pub fn turn_rad(&self) -> Option<Vector3<f64>> {
         Some(turn(&self.logged.attitude?, &self.ours?.attitude))
     }
 }
 
-/// What the estimator made of a recording.
+/// Result of running the estimator on a recording.
 #[derive(Clone, Debug)]
 pub struct Replayed {
     /// Our estimate and the log's over time.
     pub rows: Vec<ReplayRow>,
-    /// Their differences from [`from_s`](Self::from_s) on.
+    /// Differences between both estimates from [`from_s`](Self::from_s) on.
     pub figures: Figures,
-    /// Ten seconds after the start, or half of what is left then if that is less, or as asked for \[s\].
+    /// Time from which estimates are compared: ten seconds after the start, or half of the remaining log if that is
+    /// less, unless the caller chose it \[s\].
     pub from_s: f64,
-    /// By how much the log's positions were moved, which do not state their origin, to agree at that time \[m\].
+    /// Shift of the log's positions to agree with ours at `from_s`, if the log does not state its origin \[m\].
     pub moved_m: Option<Vector3<f32>>,
-    /// How it started.
+    /// How the estimator started.
     pub start: EstimatorStart,
-    /// What was fused.
+    /// Statistics of the fused measurements.
     pub aids: Aids,
-    /// What was not even looked at.
+    /// Statistics of the measurements that were dropped before fusion.
     pub dropped: Dropped,
-    /// Our own resets.
+    /// Resets of our estimate.
     pub resets: Resets,
-    /// Health of the inertial sensor at the end.
+    /// Health of the IMU at the end.
     pub imu: ImuHealth,
 }
 
-/// Runs the estimator over a recording; figures are of the time from `from_s` on, by default
-/// [that](Replayed::from_s) after the start.
+/// Runs the estimator on a recording. Estimates are compared from `from_s` on; its default is described at
+/// [`Replayed::from_s`].
 ///
 /// # Errors
-/// A setting out of range.
+/// Returns the setting that is out of range.
 pub fn fly(recording: &Recording, from_s: Option<f64>) -> Result<Replayed, OutOfRange> {
     let flown = recording.settings.unwrap_or(Settings {
         declination_rad: recording.declination_rad,
-        // White noise is all that EKF2 knows of a receiver.
+        // EKF2 knows only white noise of a receiver.
         gnss_noise_m: Settings::GNSS_NOISE.range.max as f32,
         ..Settings::DEFAULT
     });
@@ -149,8 +151,8 @@ pub fn fly(recording: &Recording, from_s: Option<f64>) -> Result<Replayed, OutOf
     })
 }
 
-/// Moves the log's positions so that they agree with the estimate at the first time that is compared, if they are so
-/// far away then that their origin must be another.
+/// Shifts the log's positions to agree with ours at the first compared time, if they are so far away that their origin
+/// must be a different one. Returns the shift.
 fn moved(rows: &mut [ReplayRow], from_s: f64) -> Option<Vector3<f32>> {
     let both = |row: &ReplayRow| {
         let ours = row.ours.filter(|ours| ours.validity.position)?;
@@ -161,19 +163,19 @@ fn moved(rows: &mut [ReplayRow], from_s: f64) -> Option<Vector3<f32>> {
     Some(by)
 }
 
-/// Returns the last of these values.
+/// Returns the newest value at `now_us`.
 fn last(values: &[(u64, bool)], now_us: u64) -> Option<bool> {
     let until = values.partition_point(|(at_us, _)| *at_us <= now_us);
     values.get(until.checked_sub(1)?).map(|(_, is)| *is)
 }
 
-/// The estimator in the middle of a recording.
+/// State of a running replay.
 struct Run<'a> {
     estimator: Estimator,
     memory: Memory,
     recording: &'a Recording,
     first_us: u64,
-    /// Number of measurements that have arrived.
+    /// Number of measurements that have arrived so far.
     arrived: usize,
     start: EstimatorStart,
 }
@@ -198,7 +200,7 @@ impl Run<'_> {
         estimate
     }
 
-    /// Whether the log says that the vehicle is on the ground or else, where it says nothing of that, disarmed.
+    /// Returns the log's landed flag or, if the log has none, its disarmed flag.
     fn stands(&self, now_us: u64) -> Option<bool> {
         let Recording { landed, disarmed, .. } = self.recording;
         let values = if landed.is_empty() { disarmed } else { landed };
@@ -216,7 +218,7 @@ impl Run<'_> {
         }
     }
 
-    /// Starts in the log's state if the vehicle flies, or has not been at rest for long.
+    /// Starts in the log's state if the vehicle flies, or if it has waited long enough at rest.
     fn start_from_log(&mut self, now_us: u64, why: Unready) {
         let states = &self.recording.states;
         let fresh = |state: &&LoggedState| state.at_us + FRESH_US >= now_us;
@@ -235,7 +237,7 @@ impl Run<'_> {
         let zero = Vector3::zeros();
         let (place, speed) = (position.unwrap_or(zero), velocity.unwrap_or(zero));
         let Some(state) = State::from_quaternion(place, speed, &Quaternion::new(w, x, y, z), zero) else { return };
-        // As good as such estimates usually are; one of 10 km is none, so that the first fix sets the position.
+        // Usual accuracy of such estimates. A position with 10 km counts as unknown, so that the first fix sets it.
         let sigmas = Sigmas {
             attitude_rad: Vector3::new(0.05, 0.05, 0.1),
             velocity_m_s: Vector3::repeat(if velocity.is_some() { 0.5 } else { 5.0 }),
@@ -257,7 +259,7 @@ fn between(before: &Estimate, now: &Estimate, at_us: u64) -> Option<Estimate> {
         return None;
     }
     let (from_us, to_us) = (before.at_us, now.at_us);
-    // Zero is the time of the default, before the first step.
+    // A time of zero is that of the default estimate, before the first step.
     if !(from_us..=to_us).contains(&at_us) || to_us - from_us > GAP_US || from_us == 0 {
         return (to_us == at_us).then_some(*now);
     }
@@ -265,7 +267,7 @@ fn between(before: &Estimate, now: &Estimate, at_us: u64) -> Option<Estimate> {
     let mix = |a: &Vector3<f32>, b: &Vector3<f32>| a + (b - a) * share;
     let quaternion = |q: [f32; 4]| Quaternion::new(q[0], q[1], q[2], q[3]);
     let (a, b) = (quaternion(before.attitude), quaternion(now.attitude));
-    // The shorter way round: q and -q are the same rotation.
+    // Take the shorter way round: q and -q are the same rotation.
     let b = if a.dot(&b) < 0.0 { -b } else { b };
     let mixed = (a * (1.0 - share) + b * share).normalize();
     let mut ours = *now;

@@ -1,23 +1,23 @@
-//! The log's own estimate.
+//! Collects the log's own estimate.
 
 use crate::aids::sparse;
 use crate::order::rising;
 use crate::recording::{LoggedState, SampleSource, Sensor};
 use nalgebra::Vector3;
 
-/// Least time between two states of a kind \[us\].
+/// Shortest time between two kept states of the same kind \[us\].
 const SPARSE_US: u64 = 9_000;
-/// Largest coordinate of a position \[m\] and of a velocity \[m/s\] that is one.
+/// Largest plausible coordinate of a position \[m\] and of a velocity \[m/s\].
 const POSITION_MAX_M: f32 = 1e5;
 const VELOCITY_MAX_M_S: f32 = 1e3;
 
-/// Returns the state of velocity and position; none if neither is usable.
+/// Returns a state with velocity and position; none if neither is usable.
 pub(crate) fn motion(
     at_us: u64,
     velocity: Option<Vector3<f32>>,
     position: Option<Vector3<f32>>,
 ) -> Option<LoggedState> {
-    // False of NaN.
+    // NaN makes this false.
     let within = |v: &Vector3<f32>, most: f32| v.iter().all(|part| part.abs() <= most);
     let velocity_m_s = velocity.filter(|velocity| within(velocity, VELOCITY_MAX_M_S));
     let position_m = position.filter(|position| within(position, POSITION_MAX_M));
@@ -25,7 +25,7 @@ pub(crate) fn motion(
     some.then_some(LoggedState { at_us, attitude: None, velocity_m_s, position_m })
 }
 
-/// Keeps states in the order of time; `raw` is their number in the log.
+/// Brings states into the order of time and thins them out; `raw` is their number in the log.
 pub(crate) fn collect(
     states: Vec<LoggedState>,
     raw: usize,
@@ -37,7 +37,7 @@ pub(crate) fn collect(
     (states, SampleSource { sensor, topic, used, skipped: raw - used })
 }
 
-/// Merges both parts, those of the same time into one.
+/// Merges attitudes and motions; two states of the same time become one.
 pub(crate) fn merged(attitudes: Vec<LoggedState>, motions: Vec<LoggedState>) -> Vec<LoggedState> {
     let mut states: Vec<_> = attitudes.into_iter().chain(motions).collect();
     states.sort_by_key(|state| state.at_us);

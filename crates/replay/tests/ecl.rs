@@ -1,4 +1,4 @@
-//! Logs of PX4-ECL's kind that the test writes itself.
+//! Replays PX4-ECL logs that the test writes itself.
 #![allow(clippy::unwrap_used, missing_docs, reason = "tests")]
 
 mod common;
@@ -7,7 +7,8 @@ use afbc_replay::{Replayed, fly, read};
 use common::{HOME, PER_DEGREE, file, truth};
 use std::fmt::Write;
 
-/// Writes a log of 25 s with longitude and latitude in either order, and an estimate whose origin is `away_m` higher.
+/// Writes a log of 25 s and replays it. `exchanged` swaps longitude and latitude. The origin of the log's estimate is
+/// `away_m` higher than the first fix.
 fn log(name: &str, exchanged: bool, away_m: f64) -> Replayed {
     let head: Vec<_> = (0..10).map(|index| format!("state[{index}]")).collect();
     let (mut log, mut estimate) = (String::new(), format!("Timestamp,{}\n", head.join(",")));
@@ -17,11 +18,11 @@ fn log(name: &str, exchanged: bool, away_m: f64) -> Replayed {
         let (s, c) = now.yaw.0.sin_cos();
         let body = |[n, e, d]: [f64; 3]| [c * n + s * e, c * e - s * n, d];
         let [fx, fy, fz] = body(now.acceleration);
-        // The last bits of a sensor are never still.
+        // The last bits of a real sensor always change.
         let noise = 1e-3 * f64::from(step % 7);
         writeln!(log, "{at_us},imu,{},{fy},{},0,0,{}", fx + noise, fz - 9.81, now.yaw.1).unwrap();
         if step % 5 == 0 {
-            // The declination is that of the place as it is written.
+            // The declination belongs to the place as written.
             let (s, c) = if exchanged { 0.011_f64 } else { 0.059 }.sin_cos();
             let [x, y, z] = body([0.21 * c, 0.21 * s, 0.43]);
             writeln!(log, "{at_us},mag,{x},{y},{z}\n{at_us},baro,{}", HOME[2] - now.position[2]).unwrap();
@@ -44,8 +45,8 @@ fn log(name: &str, exchanged: bool, away_m: f64) -> Replayed {
     fly(&read(&file(&format!("{name}.csv"), log.as_bytes())).unwrap(), None).unwrap()
 }
 
-/// The order of latitude and longitude is found by the velocity; the origin of the estimate, if it cannot be the first
-/// fix, by the first time that is compared. What is only a few metres off is a difference.
+/// The velocity reveals the order of latitude and longitude. An estimate's origin that cannot be the first fix is found
+/// at the first compared time. An offset of a few metres counts as a difference.
 #[test]
 fn order_and_origin_are_found() {
     for exchanged in [false, true] {

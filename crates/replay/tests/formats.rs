@@ -1,4 +1,5 @@
-//! Logs of other versions, by other writers, damaged in one place, or made to take long: as MCAP, and replayed.
+//! ULogs of other versions, by other writers, damaged in one place, or made to take long: each is converted to MCAP and
+//! replayed.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs, reason = "tests")]
 
 mod common;
@@ -9,7 +10,7 @@ use common::{BOOT_US, Kind, Ulog, file, log, records};
 use std::fmt::Write as _;
 use std::io::Cursor;
 
-/// Converts a log; returns what is in the file, and the first and the last time \[us\].
+/// Converts a log; returns its counts, and the first and the last time in the MCAP file \[us\].
 fn converted(name: &str, bytes: &[u8]) -> Result<(McapSummary, [u64; 2]), String> {
     let mut mcap = Vec::new();
     let summary = convert(&file(name, bytes), Cursor::new(&mut mcap)).map_err(|error| error.to_string())?;
@@ -22,13 +23,13 @@ fn short() -> Vec<u8> {
     log(&Kind { duration_s: 3.0, rate_hz: 100, ..Kind::default() })
 }
 
-/// PX4: bit 0 says that data were appended, and any other that a reader which does not know it must stop.
+/// In ULog, incompatible flag 0 means appended data. A reader must refuse a file with any flag that it does not know.
 #[test]
 fn every_unknown_incompatible_flag_is_refused_as_a_newer_format() {
     let whole = short();
     for bit in 1..64 {
         let mut newer = whole.clone();
-        // Behind the header, the record's head and the compatible flags.
+        // The flags follow the header, the record's head and the compatible flags.
         newer[16 + 3 + 8 + bit / 8] |= 1 << (bit % 8);
         let refused = [
             converted("newer.ulg", &newer).unwrap_err(),
@@ -38,14 +39,14 @@ fn every_unknown_incompatible_flag_is_refused_as_a_newer_format() {
             assert!(error.contains("newer.ulg: in a newer format than this program knows"), "{error}");
             assert!(error.contains(&format!("{:#x}", 1_u64 << bit)) && error.lines().count() == 1, "{error}");
         }
-        // Compatible ones do not matter.
+        // Compatible flags do not matter.
         let mut known = whole.clone();
         known[16 + 3 + bit / 8] |= 1 << (bit % 8);
         assert_eq!(converted("known.ulg", &known).unwrap(), converted("whole.ulg", &whole).unwrap());
     }
 }
 
-/// Version 0 has no record of flags; nor need there be parameters.
+/// Version 0 has no flags record, and a log may have no parameters.
 #[test]
 fn logs_without_flags_or_parameters_are_read_whole() {
     let whole = short();
@@ -66,7 +67,7 @@ fn logs_without_flags_or_parameters_are_read_whole() {
     }
 }
 
-/// A logger that dies within a record, and appends to its file after the next start.
+/// A logger dies within a record, and after the next start appends to the same file.
 #[test]
 fn appended_data_are_read() {
     let whole = short();
@@ -79,9 +80,9 @@ fn appended_data_are_read() {
     let lost = all.iter().filter(|(kind, from, _)| *kind == b'D' && (cut.1..after).contains(from)).count() as u64;
     let (expected, found) = (converted("one.ulg", &whole).unwrap().0, converted("appended.ulg", &appended).unwrap().0);
     assert!(found.damaged == 1 && expected.messages > found.messages, "{found:?}");
-    // Each message of the position is a frame, too.
+    // Each position message also makes a frame.
     assert!(expected.messages - found.messages <= 2 * lost, "{expected:?} {found:?} {lost}");
-    // Places that cannot be are none.
+    // Impossible offsets are ignored.
     let mut odd = whole.clone();
     odd[16 + 3 + 8] = 1;
     for (place, byte) in odd[16 + 3 + 16..][..24].iter_mut().enumerate() {
@@ -90,7 +91,7 @@ fn appended_data_are_read() {
     assert_eq!(converted("odd.ulg", &odd).unwrap().0, expected);
 }
 
-/// One wrong time costs one message, and the file is as long as the flight.
+/// One wrong time costs one message, and the file stays as long as the flight.
 #[test]
 fn a_flipped_time_makes_no_file_of_centuries() {
     let whole = short();
@@ -105,14 +106,14 @@ fn a_flipped_time_makes_no_file_of_centuries() {
             assert!(found.damaged <= 1 && found.messages + 2 >= expected.messages, "bit {bit} of {index}: {found:?}");
         }
     }
-    // The last value of a slow topic may be as old as the vehicle is on.
+    // A slow topic's last value may be as old as the vehicle's uptime.
     let mut old = whole.clone();
     old[data[0].1 + 5..][..8].copy_from_slice(&7_u64.to_le_bytes());
     assert_eq!(converted("old.ulg", &old).unwrap(), (expected, [7, last]));
     assert!(first > BOOT_US);
 }
 
-/// A format that names one which is not there costs its own topic.
+/// A format that names an undeclared one costs only its own topic.
 #[test]
 fn a_damaged_format_costs_its_own_topic() {
     let whole = short();
@@ -120,7 +121,7 @@ fn a_damaged_format_costs_its_own_topic() {
     for broken in
         ["lost:uint64_t timestamp;nowhere[2] part;", "lost:lost own;", "lost:float", "lost:", ":float x", "\u{e9}"]
     {
-        // Behind the flags.
+        // Insert the broken format after the flags record.
         let (head, rest) = whole.split_at(16 + 43);
         let mut log = Ulog::new();
         log.bytes = head.to_vec();
@@ -132,7 +133,7 @@ fn a_damaged_format_costs_its_own_topic() {
     }
 }
 
-/// Declares topics, and logs a message of each.
+/// Writes a log with these formats, `times` subscriptions, and two messages for each.
 fn declared(formats: &[String], times: u16) -> Vec<u8> {
     let mut log = Ulog::new();
     formats.iter().for_each(|format| log.record(b'F', format.as_bytes()));
@@ -145,7 +146,7 @@ fn declared(formats: &[String], times: u16) -> Vec<u8> {
     log.bytes
 }
 
-/// Few bytes that declare much: each would take minutes, or all memory, if it were laid out as it says.
+/// A few bytes that declare very much: each would take minutes, or all memory, if laid out as declared.
 #[test]
 fn what_would_take_for_ever_does_not() {
     let nested = |count: usize, many: &str| -> Vec<String> {
@@ -175,7 +176,7 @@ fn what_would_take_for_ever_does_not() {
         assert!(is_told, "{name}");
         read(&file(&format!("{name}.ulg"), &bytes)).map(|_| ()).unwrap_err();
     }
-    // Seven deep are read.
+    // Seven levels of nesting are read.
     let mut log = Ulog::new();
     nested(6, "[2]").iter().for_each(|format| log.record(b'F', format.as_bytes()));
     let id = log.subscribe("m0", 0);

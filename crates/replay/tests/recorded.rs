@@ -1,10 +1,10 @@
-//! Recorded flights against PX4's EKF2 over them. Skipped where the data are absent.
+//! Compares our estimate with PX4's EKF2 on recorded flights. Skipped if the recordings are absent.
 #![allow(clippy::unwrap_used, clippy::panic, missing_docs, reason = "tests")]
 
 use afbc_replay::{EstimatorStart, Recording, fly, read};
 use std::path::Path;
 
-/// Reads a log of the shared data; none, and a line, where it is absent.
+/// Reads a log of the shared data; prints a line and returns none if it is absent.
 fn shared(name: &str) -> Option<Recording> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data").join(name);
     if !path.exists() {
@@ -14,7 +14,7 @@ fn shared(name: &str) -> Option<Recording> {
     Some(read(&path).unwrap())
 }
 
-/// The bounds that the documentation states.
+/// Checks the bounds that the documentation states.
 #[test]
 fn agrees_with_ekf2_on_recorded_flights() {
     for (name, compared) in [("ecl_iris_gps.csv", 200), ("px4_sitl_hover.ulg", 150)] {
@@ -36,12 +36,12 @@ fn agrees_with_ekf2_on_recorded_flights() {
     }
 }
 
-/// The vehicle stands for nine seconds, and has no fix at first: the estimate stays where it is.
+/// The vehicle stands still for nine seconds, at first without a fix: the estimate must not move.
 #[test]
 fn rest_before_the_first_fix_is_rest() {
     for name in ["px4_sitl_hover.ulg", "ecl_iris_gps.csv"] {
         let Some(mut recording) = shared(name) else { continue };
-        // Where nobody tells that it stands, too; and where no fix ever comes.
+        // Also without flags that say that it stands, and without any fix.
         for (stated, fixes) in [(true, true), (false, true), (true, false)] {
             if !stated {
                 recording.landed.clear();
@@ -69,8 +69,8 @@ fn rest_before_the_first_fix_is_rest() {
     }
 }
 
-/// A magnetometer in a field that is not the earth's, which lies level instead of dipping by 74 degrees: its heading
-/// counts as unknown. That of the log's own estimate turns by 12 degrees meanwhile, though the vehicle stands.
+/// The magnetometer's field is not the earth's: it lies level instead of dipping by 74 degrees. So its heading counts
+/// as unknown. The log's own heading turns by 12 degrees although the vehicle stands still.
 #[test]
 fn a_field_that_is_not_the_earths_gives_no_heading() {
     let Some(recording) = shared("sample_log_small.ulg") else { return };

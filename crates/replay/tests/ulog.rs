@@ -1,4 +1,4 @@
-//! PX4 logs that the test writes itself, in old and new layouts, whole and damaged.
+//! Replays PX4 logs that the test writes itself: in old and new layouts, whole and damaged.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs, reason = "tests")]
 
 mod common;
@@ -6,7 +6,7 @@ mod common;
 use afbc_replay::{EstimatorStart, Recording, Replayed, Sensor, fly, read};
 use common::{Kind, file, log, replay};
 
-/// Checks that estimate and truth agree: attitude \[degrees\], velocity \[m/s\], position \[m\].
+/// Checks that estimate and truth agree in attitude \[degrees\], velocity \[m/s\] and position \[m\].
 fn agrees(replayed: &Replayed, what: &str) {
     let f = &replayed.figures;
     let [attitude, velocity, position] = [f.attitude, f.velocity, f.position].map(|figure| figure.rms().unwrap());
@@ -39,7 +39,7 @@ fn old_and_new_layouts_say_the_same() {
     }
 }
 
-/// Heading counts only with a magnetometer, or once the motion shows it; velocity and position only with a receiver.
+/// A heading needs a magnetometer or accelerated motion; velocity and position need a receiver.
 #[test]
 fn a_log_that_lacks_a_topic_flies_on_the_rest() {
     for old in [false, true] {
@@ -59,7 +59,7 @@ fn a_log_that_lacks_a_topic_flies_on_the_rest() {
 
         let (recording, Replayed { figures, .. }) = without("vehicle_magnetometer");
         assert_eq!(missing(&recording), [Sensor::Magnetometer]);
-        // Where the vehicle accelerates, the receiver's velocity shows its heading.
+        // While the vehicle accelerates, the receiver's velocity reveals the heading.
         assert!(figures.heading.rms() < Some(10.0), "{:?}", figures.heading.rms());
         assert!(figures.tilt.rms() < Some(1.0) && figures.position.rms() < Some(1.0), "{figures:?}");
 
@@ -72,12 +72,12 @@ fn a_log_that_lacks_a_topic_flies_on_the_rest() {
         assert_eq!(missing(&recording), [Sensor::Motion]);
         assert!(figures.velocity.rms().is_none() && figures.attitude.rms() < Some(0.5));
     }
-    // Our estimate alone.
+    // A log without any estimate of its own.
     let kind = Kind { without: vec!["vehicle_attitude", "vehicle_local_position"], ..Kind::default() };
     let (recording, replayed) = replay("alone.ulg", &log(&kind));
     assert_eq!(missing(&recording), [Sensor::Attitude, Sensor::Motion]);
     assert!(replayed.rows.iter().any(|row| row.ours.is_some_and(|ours| ours.validity.position)));
-    // A receiver that never has a fix is there, but of no use.
+    // A receiver that never has a fix counts as unusable, not as missing.
     let mut bytes = log(&Kind::default());
     let (recording, _) = replay("fix.ulg", &bytes);
     assert_eq!(recording.unusable().count(), 0);
@@ -86,19 +86,19 @@ fn a_log_that_lacks_a_topic_flies_on_the_rest() {
     assert_eq!(missing(&recording), []);
     assert_eq!(recording.unusable().map(|source| source.sensor).collect::<Vec<_>>(), [Sensor::Gnss]);
     assert!(figures.velocity.rms().is_none() && figures.attitude.rms() < Some(6.0));
-    // Nothing to fly on.
+    // A log without IMU samples.
     let kind = Kind { without: vec!["sensor_combined"], ..Kind::default() };
     let error = read(&file("imu.ulg", &log(&kind))).unwrap_err().to_string();
     assert!(error.contains("imu.ulg") && error.contains("sensor_combined") && error.contains("SDLOG"), "{error}");
 }
 
-/// Sets the kind of fix of every message of a receiver to none: the last byte but one of its records.
+/// Sets the fix type of every GNSS message to 0: the second-to-last byte of its records.
 fn without_fixes(bytes: &mut [u8]) {
     let mut at = 16;
     while at + 3 < bytes.len() {
         let length = usize::from(u16::from_le_bytes([bytes[at], bytes[at + 1]]));
         let end = at + 3 + length;
-        // The second topic of the log, in the new layout.
+        // GNSS is the log's second topic in the new layout.
         if bytes[at + 2] == b'D' && bytes[at + 3..at + 5] == [1, 0] {
             bytes[end - 2] = 0;
         }
@@ -106,7 +106,7 @@ fn without_fixes(bytes: &mut [u8]) {
     }
 }
 
-/// Of a log of 8 s the second half of what follows the start is compared.
+/// In a log of 8 s, estimates are compared in the second half of the time after the start.
 #[test]
 fn a_short_log_is_compared_from_its_middle_on() {
     let (_, replayed) = replay("eight.ulg", &log(&Kind { duration_s: 8.0, ..Kind::default() }));
@@ -122,14 +122,14 @@ fn a_log_that_begins_in_the_air_starts_in_its_own_state() {
         assert!(matches!(replayed.start, EstimatorStart::FromLog(at_s, None) if at_s < 0.5), "{:?}", replayed.start);
         agrees(&replayed, "in the air");
     }
-    // Without an attitude in the log there is no start.
+    // Without an attitude in the log, the estimator does not start in the air.
     let kind = Kind { begins_s: 4.0, without: vec!["vehicle_attitude"], ..Kind::default() };
     let (_, replayed) = replay("air-alone.ulg", &log(&kind));
     assert!(matches!(replayed.start, EstimatorStart::Never(_)), "{:?}", replayed.start);
     assert!(replayed.rows.iter().all(|row| row.ours.is_none()));
 }
 
-/// The log's position jumps by 10 m with its reference: the place is the same, and the reset is told.
+/// The log's position jumps by 10 m together with its reference: the place stays the same, and the reset is reported.
 #[test]
 fn resets_of_the_log_are_reported_and_its_references_followed() {
     let (recording, replayed) = replay("reset.ulg", &log(&Kind { reset_s: 17.0, ..Kind::default() }));
@@ -142,7 +142,7 @@ fn resets_of_the_log_are_reported_and_its_references_followed() {
 
 #[test]
 fn gaps_and_receivers() {
-    // A gap that the estimator bridges, and one after which it starts again.
+    // The estimator bridges the first gap, and starts again after the second.
     let (_, replayed) = replay("gap.ulg", &log(&Kind { gap_s: (8.0, 8.2), ..Kind::default() }));
     assert_eq!(replayed.resets.restarts, 0);
     agrees(&replayed, "gap of 0.2 s");
@@ -157,7 +157,7 @@ fn gaps_and_receivers() {
     assert!(recording.notes.iter().any(|note| note.contains("receivers")), "{:?}", recording.notes);
 }
 
-/// A field of 0.05 gauss that turns with the vehicle would be 13 degrees of heading.
+/// Without the correction, a field of 0.05 gauss that turns with the vehicle would cost 13 degrees of heading.
 #[test]
 fn what_ekf2_knows_of_the_magnetometer_counts() {
     for old in [false, true] {
@@ -166,7 +166,7 @@ fn what_ekf2_knows_of_the_magnetometer_counts() {
     }
 }
 
-/// What is cut off is told; the rest flies.
+/// A cut log is reported, and the rest is replayed.
 #[test]
 fn a_cut_log_is_flown_as_far_as_it_goes() {
     let whole = log(&Kind::default());
@@ -182,7 +182,7 @@ fn a_cut_log_is_flown_as_far_as_it_goes() {
     }
 }
 
-/// Damage costs what it hits.
+/// Damage costs only the records that it hits.
 #[test]
 fn a_damaged_log_is_flown_around_the_damage() {
     let whole = log(&Kind::default());
@@ -198,7 +198,7 @@ fn a_damaged_log_is_flown_around_the_damage() {
     }
 }
 
-/// Whatever is in a file: an error of one line, or an estimate that is finite.
+/// Any file gives an error of one line or a finite estimate.
 #[test]
 fn no_file_panics() {
     let whole = log(&Kind { duration_s: 3.0, rate_hz: 100, ..Kind::default() });
@@ -210,7 +210,7 @@ fn no_file_panics() {
     let mut read_ones = 0;
     for case in 0..400 {
         let mut bytes = whole.clone();
-        // Most of the cases in the definitions, where the parser believes most.
+        // Most cases damage the definitions, which the parser trusts most.
         let within = if case % 3 == 0 { bytes.len() } else { 2500 };
         for _ in 0..=random(8) {
             match random(4) {
@@ -234,13 +234,13 @@ fn no_file_panics() {
     assert!(read_ones > 100, "{read_ones}");
 }
 
-/// Iron that nobody knows of turns the heading: the less the field is the earth's, the less the heading counts, and it
-/// is as wrong as is said. A field that is quite another tells none.
+/// Unknown iron turns the heading. The more the field differs from the earth's, the larger the stated heading error,
+/// and the actual error is within it. A field that differs completely gives no heading.
 #[test]
 fn a_heading_is_as_good_as_the_field() {
     let (mut inside, mut all) = (0, 0);
     for (index, gauss) in [0.0, 0.01, 0.03, 0.05, 0.05, 0.08, 0.1, 0.1, 0.6, 0.6].into_iter().enumerate() {
-        // Directions all around, some of them steep.
+        // Bias directions all around, some of them steep.
         let angle = 2.4 * index as f64;
         let stray = [angle.cos(), angle.sin(), 0.8 - 0.3 * (index % 6) as f64].map(|part| part * gauss);
         let kind = Kind { stray, ..Kind::default() };
@@ -253,7 +253,7 @@ fn a_heading_is_as_good_as_the_field() {
             let sigma = f64::from(ours.sigmas.attitude_rad.z);
             inside += usize::from(turn.z.abs() < 3.0 * sigma);
             all += 1;
-            // Until the vehicle flies, which tells a heading too.
+            // Checked until the vehicle flies: its motion then reveals the heading, too.
             assert!(gauss < 0.5 || ours.at_us > 53_000_000 || !ours.validity.heading, "{stray:?}: {sigma} rad");
         }
     }

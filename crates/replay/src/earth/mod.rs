@@ -1,31 +1,32 @@
-//! The earth's magnetic field by NOAA's World Magnetic Model.
+//! The earth's magnetic field from NOAA's World Magnetic Model.
 
 mod synthesis;
 
 use synthesis::Model;
 
-/// The years that the models cover, as days since 1970: 2020 to 2029.
+/// First and last day that the models cover, counted from 1970: 2020 to 2029.
 const DAYS: (f64, f64) = (18_262.0, 21_914.0);
-/// First day of 2025, when the second model begins.
+/// First day of 2025, from which the second model is used.
 const SECOND_DAY: f64 = 20_089.0;
 const DAYS_A_YEAR: f64 = 365.25;
-/// Heights for which the models are made \[m\].
+/// Range of heights that the models cover \[m\].
 const HEIGHT_M: (f64, f64) = (-1_000.0, 850_000.0);
-/// Beyond this latitude, a kilometre from a pole, there is hardly a direction to the north \[degree\].
+/// Beyond this latitude, about a kilometre from a pole, north is hardly defined \[degree\].
 const LATITUDE_MAX_DEG: f64 = 89.99;
 
 /// The earth's field at a place.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Field {
-    /// Direction of its horizontal part, positive to the east \[rad\].
+    /// Declination, positive to the east \[rad\].
     pub(crate) declination_rad: f32,
-    /// Its horizontal part and its part downwards \[gauss\].
+    /// Horizontal and downward part of the field \[gauss\].
     pub(crate) horizontal_gauss: f32,
     pub(crate) down_gauss: f32,
 }
 
-/// Returns the field at a place and time; none where the model has none, near the poles. A time beyond the model's
-/// counts as its end: the declination changes by 0.2 degrees in a year.
+/// Returns the field at a place and time; none where the model has no field, such as near the poles. A time outside the
+/// models' years is moved to the nearest covered year: the declination changes by 0.2 degrees per year. Without a time,
+/// the field is that of the beginning of 2020.
 pub(crate) fn at(latitude_deg: f64, longitude_deg: f64, altitude_m: f64, utc_us: Option<f64>) -> Option<Field> {
     let days = utc_us.filter(|utc_us| utc_us.is_finite()).map_or(DAYS.0, |utc_us| utc_us / 86_400e6);
     let [north_nt, east_nt, down_nt] = at_day(latitude_deg, longitude_deg, altitude_m, days)?;
@@ -37,9 +38,9 @@ pub(crate) fn at(latitude_deg: f64, longitude_deg: f64, altitude_m: f64, utc_us:
     })
 }
 
-/// Returns the field north, east and down \[nT\] at a place, so many days after the beginning of 1970.
+/// Returns the field north, east and down \[nT\] at a place, `days` days after the beginning of 1970.
 fn at_day(latitude_deg: f64, longitude_deg: f64, altitude_m: f64, days: f64) -> Option<[f64; 3]> {
-    // False of NaN.
+    // NaN makes this false.
     let is_covered = latitude_deg.abs() <= LATITUDE_MAX_DEG
         && longitude_deg.abs() <= 360.0
         && (HEIGHT_M.0..=HEIGHT_M.1).contains(&altitude_m);
@@ -60,8 +61,8 @@ fn at_day(latitude_deg: f64, longitude_deg: f64, altitude_m: f64, days: f64) -> 
 mod tests {
     use super::{at, at_day};
 
-    /// The strength is 0.48 gauss in Zurich, of which 0.21 level. The declination is within 0.3 degrees of what two
-    /// vehicles had stored in their logs: 3.32 in Zurich, 3.99 in Trondheim.
+    /// In Zurich the field's strength is 0.48 gauss, and its horizontal part 0.21 gauss. The declination is within 0.3
+    /// degrees of the values stored in two vehicles' logs: 3.32 in Zurich, 3.99 in Trondheim.
     #[test]
     fn is_that_of_the_place() {
         let zurich = at(47.3977, 8.5456, 488.0, Some(1.7107e15)).map(|field| field.declination_rad.to_degrees());
@@ -73,7 +74,7 @@ mod tests {
             level.is_some_and(|(level, down)| (level - 0.21).abs() < 0.01 && (down - 0.43).abs() < 0.01),
             "{level:?}"
         );
-        // Before and after the model, and without a time.
+        // Times before and after the models' years, and no time.
         for utc_us in [Some(0.0), Some(1e18), Some(f64::NAN), None] {
             assert!(at(47.0, 8.0, 0.0, utc_us).is_some_and(|field| field.declination_rad > 0.03));
         }
@@ -84,8 +85,8 @@ mod tests {
         }
     }
 
-    /// Within 2 nT of what another implementation says, the crate `world_magnetic_model` 1.2025.0: places on all sides
-    /// of the earth, deep and high, in both models' years. That computes in `f32`.
+    /// The field agrees within 2 nT with the crate `world_magnetic_model` 1.2025.0, which computes in `f32`. The places
+    /// are on all sides of the earth, deep and high, and in both models' years.
     #[test]
     fn another_implementation_says_the_same() {
         for (latitude, longitude, height_m, days, expected_nt) in [

@@ -1,4 +1,4 @@
-//! The field of a spherical harmonic model of the earth's magnetic potential at a place.
+//! Evaluates a spherical harmonic model of the earth's magnetic potential at a place.
 //!
 //! V = a sum_n (a/r)^(n+1) sum_m (g cos m lambda + h sin m lambda) P_n^m(sin phi), B = -grad V, with Schmidt's
 //! semi-normalised associated Legendre functions P_n^m, geocentric latitude phi and radius r, longitude lambda, and
@@ -6,19 +6,19 @@
 
 /// Largest degree and order.
 const DEGREES: usize = 12;
-/// Pairs of degree from 1 on and order.
+/// Number of pairs of a degree, from 1 on, and an order.
 const PAIRS: usize = DEGREES * (DEGREES + 3) / 2;
 /// The model's reference radius \[m\].
 const RADIUS_M: f64 = 6_371_200.0;
-/// Semi-major axis of the ellipsoid WGS 84 \[m\], and the square of its eccentricity.
+/// Semi-major axis of the WGS 84 ellipsoid \[m\], and the square of its eccentricity.
 const AXIS_M: f64 = 6_378_137.0;
 const ECCENTRICITY_SQUARED: f64 = 6.694_379_990_14e-3;
 
-/// A model: g, h \[nT\], and their changes \[nT/year\], of each degree and order.
+/// Coefficients of a model: g, h \[nT\] and their changes \[nT/year\] for each degree and order.
 pub(super) struct Model([[f64; 4]; PAIRS]);
 
 impl Model {
-    /// Reads NOAA's table of coefficients; none if it is not whole.
+    /// Reads NOAA's table of coefficients; none if the table is incomplete.
     pub(super) fn read(table: &str) -> Option<Self> {
         let mut rows = [[0.0; 4]; PAIRS];
         let lines = table.lines().filter(|line| !line.starts_with('#'));
@@ -38,9 +38,9 @@ impl Model {
         Some(Model(rows))
     }
 
-    /// Returns the field north, east and down \[nT\] at a place above the ellipsoid, so many years after the epoch.
+    /// Returns the field north, east and down \[nT\] at a place above the ellipsoid, `years` years after the epoch.
     pub(super) fn field(&self, latitude_rad: f64, longitude_rad: f64, height_m: f64, years: f64) -> [f64; 3] {
-        // From the ellipsoid to the sphere.
+        // Convert the geodetic to the geocentric position.
         let (sin, cos) = latitude_rad.sin_cos();
         let across_m = AXIS_M / (1.0 - ECCENTRICITY_SQUARED * sin * sin).sqrt();
         let level_m = (across_m + height_m) * cos;
@@ -66,20 +66,20 @@ impl Model {
                 down -= (n as f64 + 1.0) * along * value;
             }
         }
-        // From the sphere's vertical to that of the ellipsoid.
+        // Rotate from the geocentric to the ellipsoid's vertical.
         let (sin, cos) = (sin.atan2(cos) - latitude_rad).sin_cos();
         [north * cos - down * sin, east, north * sin + down * cos]
     }
 }
 
-/// P_n^m, and its derivative by the colatitude.
+/// P_n^m and its derivative with respect to the colatitude.
 #[derive(Clone, Copy, Default)]
 struct Legendre {
     value: f64,
     slope: f64,
 }
 
-/// Returns the functions of degree n from those of the two degrees before.
+/// Returns the functions of degree n, computed from those of degree n - 1 (`last`) and n - 2 (`before`).
 fn next_degree(
     n: usize,
     last: &[Legendre; DEGREES + 1],

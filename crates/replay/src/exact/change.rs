@@ -1,26 +1,26 @@
-//! A setting that is not as it was.
+//! A setting to change in a replay.
 
 use afbc_scenario::contender::ControllerKind;
 use afbc_store::RecordName;
 use std::fmt;
 use std::str::FromStr;
 
-/// The key that names the law.
+/// Key that selects the law in `KEY=VALUE`.
 const LAW: &str = "law";
 
-/// A setting in place of the one that was flown.
+/// A setting that replaces the one that was flown.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum SettingChange {
-    /// A parameter, as stations know it, from the start on.
+    /// A parameter by its MAVLink name, and its value from the first start on.
     Parameter(RecordName, f32),
-    /// The law: AFBC under its monitor, as in every image, or another with its gains of the profile `flight`.
+    /// The law: AFBC under its monitor, as in every image, or another law with its gains from the profile `flight`.
     Law(ControllerKind),
 }
 
 impl FromStr for SettingChange {
     type Err = String;
 
-    /// Reads `KEY=VALUE`: the name of a parameter and a number, or `law` and the name of a law.
+    /// Reads `KEY=VALUE`: a parameter's name and a number, or `law` and a law's name.
     fn from_str(text: &str) -> Result<Self, String> {
         let (key, value) = text.split_once('=').ok_or("it must be KEY=VALUE, as in MPC_XY_VEL_MAX=4 or law=pid")?;
         let (key, value) = (key.trim(), value.trim());

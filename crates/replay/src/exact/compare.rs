@@ -1,4 +1,4 @@
-//! The flight of a log beside the same one under other settings.
+//! Compares the flight of a log with a replay under changed settings.
 
 use super::change::SettingChange;
 use super::quantities::{QUANTITIES, ReplayQuantity, Values, values};
@@ -7,23 +7,23 @@ use afbc_onboard::Report;
 use afbc_types::ROTORS_MAX;
 use core::f64::consts::{PI, TAU};
 
-/// Ticks for each row: 100 Hz.
+/// Ticks per row: rows have 100 Hz.
 const EVERY: u64 = 10;
 
-/// Difference of one quantity.
+/// Statistics of the differences in one quantity.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct QuantityFigure {
-    /// Ticks at which both flights have it.
+    /// Number of ticks at which both flights have a value.
     pub count: u64,
     squares: f64,
-    /// The largest difference, without its sign.
+    /// Largest absolute difference.
     pub largest: f64,
-    /// When that was, from the first tick of the log on \[s\].
+    /// Time of the largest difference, from the first tick of the log on \[s\].
     pub largest_at_s: f64,
 }
 
 impl QuantityFigure {
-    /// Root mean square; none if nothing could be compared.
+    /// Returns the root mean square; none if nothing could be compared.
     #[must_use]
     pub fn rms(&self) -> Option<f64> {
         (self.count > 0).then(|| libm::sqrt(self.squares / self.count as f64))
@@ -38,30 +38,30 @@ impl QuantityFigure {
     }
 }
 
-/// Values of one tick in the order of [`QUANTITIES`], not a number where there is none.
+/// Values of one tick in the order of [`QUANTITIES`]; a missing value is NaN.
 #[derive(Clone, Copy, Debug)]
 pub struct ChangeRow {
     /// Time from the first tick of the log on \[s\].
     pub time_s: f64,
-    /// As it was.
+    /// Values as flown.
     pub flown: Values,
-    /// Under the other settings.
+    /// Values under the changed settings.
     pub changed: Values,
 }
 
-/// What other settings would have commanded from the same inputs. The vehicle flew as it did: what it would have done
-/// under them is not known.
+/// Compares the commands of changed settings with the commands as flown, from the same inputs. The vehicle flew under
+/// the original settings: how it would have moved under the changed ones is not known.
 #[derive(Clone, Debug)]
 pub struct ChangeComparison {
-    /// The other settings.
+    /// The changed settings.
     pub changes: Vec<SettingChange>,
-    /// Differences in the order of [`QUANTITIES`], of the ticks in which both are armed.
+    /// Differences in the order of [`QUANTITIES`], over the ticks at which both flights are armed.
     pub figures: [QuantityFigure; QUANTITIES.len()],
-    /// Every hundredth of a second.
+    /// Rows at intervals of 0.01 s.
     pub rows: Vec<ChangeRow>,
-    /// Ticks in which the flight core's modes are different.
+    /// Number of ticks at which the flight core's modes differ.
     pub other_mode: u64,
-    /// When that began, from the first tick of the log on \[s\].
+    /// Time of the first different mode, from the first tick of the log on \[s\].
     pub other_mode_s: Option<f64>,
     ticks: u64,
 }
@@ -78,7 +78,7 @@ impl ChangeComparison {
         }
     }
 
-    /// Adds a tick of both.
+    /// Adds one tick of both flights.
     pub(super) fn add(
         &mut self,
         time_s: f64,
@@ -105,7 +105,7 @@ impl ChangeComparison {
 }
 
 impl ChangeRow {
-    /// Returns how far both are apart, in the order of [`QUANTITIES`]; none where one of them is not known.
+    /// Returns the differences in the order of [`QUANTITIES`]; none where either value is missing.
     pub fn differences(&self) -> impl Iterator<Item = Option<f64>> {
         let both = self.flown.iter().zip(&self.changed);
         QUANTITIES.iter().zip(both).map(|(quantity, (flown, changed))| difference(quantity, *flown, *changed))

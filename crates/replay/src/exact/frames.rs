@@ -1,25 +1,25 @@
-//! Frames of an exact log in a file.
+//! Splits a file into the frames of an exact log.
 
 use afbc_log::exact::{FRAME_MAX, FrameError, Record, StartRecord, VERSION, decode};
 
-/// What was looked for in a file.
+/// Result of looking for the start record of a file.
 pub(super) enum Found {
-    /// Its first start.
+    /// The first start record.
     Start(StartRecord),
-    /// None: why not, and what to do.
+    /// No start record: the reason and the cure.
     Refused(String),
 }
 
-/// A frame, without the zero at its end.
+/// A frame without the zero byte that ends it.
 pub(super) struct FileFrame<'b> {
-    /// Its place in the file \[bytes\].
+    /// Offset of the frame in the file \[bytes\].
     pub(super) at: usize,
     pub(super) bytes: &'b mut [u8],
-    /// False for what is left at the end of the file, without a zero.
+    /// False for the rest at the end of the file that no zero byte ends.
     pub(super) is_whole: bool,
 }
 
-/// Returns every frame of a file.
+/// Returns every non-empty frame of a file.
 pub(super) fn each(bytes: &mut [u8]) -> impl Iterator<Item = FileFrame<'_>> {
     let length = bytes.len();
     let mut at = 0;
@@ -30,16 +30,16 @@ pub(super) fn each(bytes: &mut [u8]) -> impl Iterator<Item = FileFrame<'_>> {
     })
 }
 
-/// Returns what a copy of a frame says; none longer than any is read.
+/// Decodes a copy of a frame. A frame longer than [`FRAME_MAX`] counts as damaged.
 fn read(frame: &[u8]) -> Result<Record, FrameError> {
-    // Decoding overwrites a frame, and these are still to be run.
+    // Decoding overwrites a frame, and the replay still needs the original.
     let mut copy = [0; FRAME_MAX];
     let copy = copy.get_mut(..frame.len()).ok_or(FrameError::Damaged)?;
     copy.copy_from_slice(frame);
     decode(copy)
 }
 
-/// Looks for the first start.
+/// Looks for the first start record in a file.
 pub(super) fn look(bytes: &[u8]) -> Found {
     let refused = |problem: &str| Found::Refused(problem.into());
     if bytes.is_empty() {
@@ -65,7 +65,7 @@ pub(super) fn look(bytes: &[u8]) -> Found {
     }
 }
 
-/// True if the first whole frame is one.
+/// Returns true if the first whole frame is one of an exact log.
 pub(super) fn begins(bytes: &[u8]) -> bool {
     let first = bytes.split(|byte| *byte == 0).find(|frame| !frame.is_empty());
     first.is_some_and(|frame| frame.len() < bytes.len() && !matches!(read(frame), Err(FrameError::Damaged)))

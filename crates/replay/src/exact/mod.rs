@@ -1,5 +1,5 @@
-//! The exact log of a flight: the firmware's own code over what every tick took, beside what it gave; and what it would
-//! have given under other settings.
+//! Replays an exact log: runs the firmware's own code on every tick's logged inputs and compares its outputs with the
+//! logged ones. It can also show the outputs under changed settings.
 
 mod change;
 mod compare;
@@ -21,11 +21,12 @@ use frames::Found;
 use std::fs;
 use std::path::Path;
 
-/// Replays the log at `path`, and calls `progress` with the number of bytes done since the last call. The vehicle is
-/// the built-in one that the log names, unless another is given. With `changes`, the flight is also run with them.
+/// Replays the log at `path`. `progress` is called with the number of bytes done since its last call. Without
+/// `vehicle`, the built-in vehicle that the log names is used. With `changes`, the flight is also run under these
+/// changes.
 ///
 /// # Errors
-/// One line, if the log cannot be read, is none, is of another version or of another vehicle; or if a change is
+/// One line, if the log cannot be read, is no exact log, is of another version or of another vehicle, or if a change is
 /// refused.
 pub fn replay(
     path: &Path,
@@ -53,7 +54,7 @@ pub fn replay(
     run::run(&mut bytes, start, players, &mut progress).map_err(failed)
 }
 
-/// Reads the built-in vehicle of this name.
+/// Reads the built-in vehicle with this name.
 fn named(name: &str) -> Result<Result<Vehicle, FileError>, String> {
     let known = built_in(name).ok_or_else(|| {
         format!(
@@ -64,7 +65,7 @@ fn named(name: &str) -> Result<Result<Vehicle, FileError>, String> {
     Ok(known.read())
 }
 
-/// True if these bytes begin as an exact log does.
+/// Returns true if the bytes begin like an exact log.
 pub(crate) fn is_exact(bytes: &[u8]) -> bool {
     frames::begins(bytes)
 }

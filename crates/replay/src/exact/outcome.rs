@@ -1,72 +1,72 @@
-//! What a replay has found.
+//! The result of a replay.
 
 use super::compare::ChangeComparison;
 
-/// A parameter in a log.
+/// A parameter value recorded in a log.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LoggedParameter {
-    /// Time from the first tick of the log on \[s\]; none for one that was so at the first start.
+    /// Time of the change, from the first tick of the log on \[s\]; none for a value in force at the first start.
     pub at_s: Option<f64>,
-    /// Its name; none if all were set to what the image has.
+    /// Name of the parameter; none if all parameters were reset to the image's defaults.
     pub name: Option<String>,
-    /// Its value.
+    /// Value of the parameter.
     pub value: f32,
 }
 
-/// A signal that is not what it was.
+/// A signal of a tick that differs between the log and the replay.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum GivenSignal {
-    /// The flight core's mode, by its number.
+    /// Number of the flight core's mode.
     Mode {
-        /// In the log.
+        /// Value in the log.
         then: u8,
-        /// Now.
+        /// Value in the replay.
         now: u8,
     },
-    /// The estimate of the state.
+    /// The state estimate.
     Estimate,
     /// The rotor speeds.
     Speeds,
-    /// The throttle of a motor, counted from 1.
+    /// Throttle of a motor.
     Throttle {
-        /// Number of the motor.
+        /// Number of the motor, counted from 1.
         motor: usize,
-        /// In the log.
+        /// Value in the log.
         then: u16,
-        /// Now.
+        /// Value in the replay.
         now: u16,
     },
 }
 
-/// Why a replay has ended before the log.
+/// Reason for which a replay ended before the log.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum ReplayFinding {
-    /// A tick gives something else.
+    /// A tick's outputs differ in these signals.
     Given(Vec<GivenSignal>),
-    /// The tick is not in the log.
+    /// A tick is missing in the log.
     Missing,
-    /// The configuration that the tick was the first to fly is not in the log.
+    /// The log lacks the configuration that this tick was the first to use.
     Configuration,
-    /// A parameter before the tick is not known, or makes a vehicle that cannot fly.
+    /// A parameter change before the tick is unknown or makes a vehicle that cannot fly.
     Parameter,
 }
 
-/// The first tick that gives something else, or cannot be run again.
+/// The first tick whose outputs differ or which cannot be run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FirstDifference {
-    /// Start of the processor, counted from 1.
+    /// Number of the processor's start, counted from 1.
     pub start: u32,
-    /// Number of the tick since that start.
+    /// Number of the tick, counted since that start.
     pub tick: u32,
-    /// Time of the tick since that start, or of the last one before it that is in the log \[s\].
+    /// Time of the tick since that start; for a missing tick, the time of the last tick before it \[s\].
     pub at_s: f64,
-    /// Place in the file of the record at which it was found \[bytes\].
+    /// Offset in the file of the record at which the difference was found \[bytes\].
     pub byte: usize,
-    /// What was found.
+    /// Kind of difference.
     pub finding: ReplayFinding,
 }
 
-/// An exact log, replayed.
+/// Result of replaying an exact log.
 #[derive(Clone, Debug)]
 pub struct ExactReplay {
     /// Name of the vehicle.
@@ -75,36 +75,36 @@ pub struct ExactReplay {
     pub law: String,
     /// Number of rotors.
     pub rotors: usize,
-    /// Starts of the processor.
+    /// Number of starts of the processor.
     pub starts: u32,
-    /// Ticks in the log.
+    /// Number of ticks in the log.
     pub ticks: u64,
-    /// Ticks in the log in which the motors were driven.
+    /// Number of ticks in the log in which the motors were driven.
     pub armed_ticks: u64,
-    /// Number of times that it was armed.
+    /// Number of times that the vehicle was armed.
     pub flights: u32,
-    /// Ticks that the log lacks between two others.
+    /// Number of ticks missing between two logged ticks.
     pub lost_ticks: u64,
-    /// Records of what messages have brought.
+    /// Number of records with received messages.
     pub messages: u64,
-    /// Parameters that were not as in the image, at the first start and from then on.
+    /// Parameters that differed from the image at the first start, and all later changes.
     pub parameters: Vec<LoggedParameter>,
     /// Length of the file \[bytes\].
     pub bytes: u64,
-    /// Frames that cannot be read, and the place of the first in the file \[bytes\].
+    /// Number of unreadable frames, and the offset of the first in the file \[bytes\].
     pub damaged: (u64, Option<usize>),
-    /// Bytes at the end of the file that are no whole frame.
+    /// Number of bytes at the end of the file that are no whole frame.
     pub cut_bytes: usize,
-    /// Ticks that were run again with the same result.
+    /// Number of ticks that gave the same result in the replay.
     pub same_ticks: u64,
-    /// The first tick that gives something else, or cannot be run; the log is not run any further.
+    /// The first tick that differs or cannot be run; the replay stops there.
     pub first_difference: Option<FirstDifference>,
-    /// What other settings would have commanded, if they were asked for.
+    /// Comparison with the changed settings, if there are any.
     pub comparison: Option<ChangeComparison>,
 }
 
 impl ExactReplay {
-    /// True if every tick gave the same again, and nothing between them was lost.
+    /// Returns true if every tick gave the same result and no frame is damaged.
     #[must_use]
     pub fn is_same(&self) -> bool {
         self.first_difference.is_none() && self.damaged.0 == 0

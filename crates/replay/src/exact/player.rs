@@ -1,4 +1,4 @@
-//! The firmware's code, of a vehicle with any number of rotors and under any law.
+//! Runs the firmware's code for a vehicle with any number of rotors and under any law.
 
 use super::change::SettingChange;
 use afbc::Profile;
@@ -14,13 +14,13 @@ use afbc_vehicles::Vehicle;
 
 /// Runs the ticks of a log.
 pub(super) trait Player {
-    /// Takes the next record.
+    /// Runs the next record.
     fn take(&mut self, record: &Record) -> ReplayStep<ROTORS_MAX>;
 
-    /// Returns the law's internal signals of the last tick.
+    /// Returns the law's internal signals at the last tick.
     fn trace(&self) -> Trace;
 
-    /// Flies with another parameter.
+    /// Sets a parameter to another value for the whole flight.
     fn change(&mut self, name: RecordName, value: f32) -> Result<(), String>;
 }
 
@@ -47,25 +47,25 @@ impl<const N: usize> Player for Replayer<N, FlownLaw> {
     }
 }
 
-/// The flight of a log, and the same under other settings.
+/// The flight as logged, and the same flight under changed settings.
 pub(super) struct Players {
     pub(super) flown: Box<dyn Player>,
     pub(super) changed: Option<Box<dyn Player>>,
     pub(super) changes: Vec<SettingChange>,
 }
 
-/// Why there are no players.
+/// Reason for which there are no players.
 pub(super) enum Refusal {
-    /// A line on the log.
+    /// A problem with the log.
     Log(String),
-    /// A line of its own.
+    /// A whole line, with its subject before a colon.
     Whole(String),
-    /// A line on the vehicle's file.
+    /// A problem with the vehicle's file.
     File(FileError),
 }
 
 impl Refusal {
-    /// Returns the line for the log that is shown as `log`.
+    /// Returns the error; `log` is the log's name in the message.
     pub(super) fn of(self, log: &str) -> FileError {
         match self {
             Refusal::Log(problem) => FileError::whole(log, problem),
@@ -79,7 +79,7 @@ impl Refusal {
 }
 
 impl Players {
-    /// Makes those of a log of this start.
+    /// Makes the players for a log with this start record.
     pub(super) fn of(vehicle: &Vehicle, start: &StartRecord, changes: &[SettingChange]) -> Result<Self, Refusal> {
         let flown = ControllerKind::named(start.law.as_str());
         let Some(flown) = flown else {
@@ -115,7 +115,7 @@ impl Players {
     }
 }
 
-/// Makes the player of a vehicle under a law.
+/// Makes the player for a vehicle under a law.
 fn player(vehicle: &Vehicle, kind: ControllerKind) -> Result<Box<dyn Player>, Refusal> {
     let refused = |error: OutOfRange| Refusal::Log(format!("the vehicle {}: {}", vehicle.name, out_of_range(&error)));
     let law = match kind {

@@ -1,21 +1,21 @@
-//! What is compared between a flight and the same one under other settings.
+//! The quantities that are compared between a flight and its replay under changed settings.
 
 use afbc_control::Trace;
 use afbc_onboard::Report;
 use afbc_types::ROTORS_MAX;
 
-/// A quantity of a tick.
+/// A quantity that every tick has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ReplayQuantity {
-    /// Name of its column.
+    /// Name of the quantity's column.
     pub name: &'static str,
-    /// What it is.
+    /// Title for people.
     pub title: &'static str,
-    /// Its unit.
+    /// Unit of the quantity.
     pub unit: &'static str,
-    /// True for a heading, whose difference is the shorter way round.
+    /// True for a heading: its difference is taken the shorter way round.
     pub wraps: bool,
-    /// Number of the rotor that it is of, counted from 0, if it is of one.
+    /// Number of the rotor, counted from 0; none if the quantity belongs to no rotor.
     pub rotor: Option<usize>,
 }
 
@@ -34,10 +34,10 @@ const fn of_rotor(name: &'static str, title: &'static str, unit: &'static str, r
 const MOTIONS: usize = 19;
 const COUNT: usize = 2 * ROTORS_MAX + MOTIONS;
 
-/// Values of all quantities; not a number where there is none.
+/// Values of all quantities; a missing value is NaN.
 pub(super) type Values = [f32; COUNT];
 
-/// Every quantity: commands to the motors, what the law demands, its setpoints, the estimate.
+/// All quantities: motor commands, the law's demands, its setpoints and the estimate.
 pub const QUANTITIES: [ReplayQuantity; COUNT] = [
     of_rotor("omega1_rad_s", "rotor 1", "rad/s", 0),
     of_rotor("omega2_rad_s", "rotor 2", "rad/s", 1),
@@ -76,7 +76,7 @@ pub const QUANTITIES: [ReplayQuantity; COUNT] = [
     heading("yaw_rad", "yaw"),
 ];
 
-/// Returns the values of a tick.
+/// Returns the values of all quantities at a tick.
 pub(super) fn values(report: &Report<ROTORS_MAX>, trace: &Trace) -> Values {
     const NONE: [f32; 3] = [f32::NAN; 3];
     let (inputs, [roll, pitch]) = (&trace.inputs, trace.desired_rad);

@@ -1,4 +1,4 @@
-//! Runs a log.
+//! Runs the records of an exact log.
 
 use super::compare::ChangeComparison;
 use super::frames;
@@ -8,24 +8,24 @@ use afbc_log::exact::{FrameError, Given, Record, ReplayDifference, ReplayStep, S
 use afbc_onboard::Report;
 use afbc_types::ROTORS_MAX;
 
-/// Bytes between two calls for progress.
+/// Number of bytes between two calls of `progress`.
 const PROGRESS_BYTES: usize = 1 << 20;
 
-/// A log in the middle of its replay.
+/// State of a running replay.
 struct Run {
     players: Players,
     out: ExactReplay,
-    /// Number of the next tick, when it is awaited, and whether the motors were driven in the last one.
+    /// Number of the next expected tick, and whether the motors were driven in the last tick.
     next: u32,
     is_armed: bool,
-    /// Time of the last tick since its start, and of that start since the first tick of the log \[us\].
+    /// Time of the last tick since its start, and time of that start since the first tick of the log \[us\].
     last_us: u64,
     began_us: i64,
     /// Time of the first tick of the log \[us\].
     first_us: Option<u64>,
 }
 
-/// Runs the frames of a file whose first start is this one.
+/// Runs the frames of a file; `start` is its first start record.
 ///
 /// # Errors
 /// One line, without the file's name.
@@ -69,7 +69,7 @@ pub(super) fn run(
         }
         match decode(frame.bytes) {
             Ok(record) => run.take(at, &record)?,
-            // What a line has caught before the processor's start is no part of the log.
+            // Bytes received before the processor's start are no part of the log.
             Err(_) if run.out.starts == 0 => {}
             Err(FrameError::Foreign(_)) => {
                 return Err(format!(
@@ -91,7 +91,7 @@ pub(super) fn run(
 
 impl Run {
     fn take(&mut self, byte: usize, record: &Record) -> Result<(), String> {
-        // A tick is missing after the last one.
+        // Ticks are missing after the last one.
         let before_us = matches!(record, Record::Tick(tick) if tick.number != self.next).then_some(self.last_us);
         self.count(record);
         if self.out.first_difference.is_some() || self.out.starts == 0 {
@@ -130,10 +130,10 @@ impl Run {
         Ok(())
     }
 
-    /// Notes what the log says, whatever becomes of the replay.
+    /// Counts the log's contents, also after the replay has ended.
     fn count(&mut self, record: &Record) {
         if let Record::Start(_) = record {
-            // As the start before counts: this one begins where that one's last tick was.
+            // Uses the previous start's offset, since this start begins at the time of that start's last tick.
             self.began_us = self.now_us(self.last_us);
             self.out.starts += 1;
             (self.next, self.is_armed) = (0, false);
@@ -171,7 +171,7 @@ impl Run {
 
     /// Returns the time since the first tick of the log \[us\].
     fn now_us(&self, time_us: u64) -> i64 {
-        // Every start begins at zero; only that of the first has to be counted from the first tick of the log on.
+        // Every start counts its time from zero; only the first start's time is counted from the first tick of the log.
         let first_us = if self.out.starts > 1 { 0 } else { self.first_us.unwrap_or_default() };
         self.began_us.saturating_add(time_us.saturating_sub(first_us).try_into().unwrap_or(i64::MAX))
     }
@@ -186,10 +186,10 @@ impl Run {
     }
 }
 
-/// Returns what was found.
+/// Returns the finding for a difference.
 ///
 /// # Errors
-/// One line, if it is not the log of this vehicle.
+/// One line, if the log is not of this vehicle.
 fn finding(difference: ReplayDifference) -> Result<ReplayFinding, String> {
     match difference {
         ReplayDifference::Start(StartRecord { rotors, parameters, vehicle, .. }) => Err(format!(
@@ -207,7 +207,7 @@ fn finding(difference: ReplayDifference) -> Result<ReplayFinding, String> {
     }
 }
 
-/// Returns the signals that differ, causes first.
+/// Returns the signals that differ, causes before effects.
 fn signals(then: &Given, now: &Given) -> Vec<GivenSignal> {
     let mode = (then.mode != now.mode).then_some(GivenSignal::Mode { then: then.mode, now: now.mode });
     let estimate = (then.estimate != now.estimate).then_some(GivenSignal::Estimate);

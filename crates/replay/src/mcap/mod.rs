@@ -1,8 +1,8 @@
-//! A ULog as [MCAP](https://mcap.dev), for Foxglove, PlotJuggler, Rerun and ROS 2's tools.
+//! Converts a ULog to [MCAP](https://mcap.dev) for Foxglove, PlotJuggler, Rerun and ROS 2's tools.
 //!
-//! Each topic of the log is one of the file, with the same fields, units and frames, as ROS 2 writes messages (CDR,
-//! schema in `ros2msg`). Added is what such tools draw by themselves: the vehicle and its setpoint as frames, its
-//! place on a map, its texts.
+//! Each topic of the log becomes one topic of the file, with the same fields, units and frames. Messages are encoded as
+//! in ROS 2 (CDR, schema in `ros2msg`). Messages that these tools draw without any setup are added: frames of the
+//! vehicle and its setpoint, the vehicle's place on a map, and its texts.
 
 mod ros;
 mod times;
@@ -21,21 +21,21 @@ use std::io::{Seek, Write};
 use std::path::Path;
 use topic::McapTopic;
 
-/// What a converted log holds.
+/// Counts of a converted log.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct McapSummary {
-    /// Topics with messages.
+    /// Number of topics with messages.
     pub topics: usize,
-    /// Messages in all.
+    /// Number of messages.
     pub messages: u64,
-    /// Pieces of the log that are damaged, and missing.
+    /// Number of damaged pieces of the log, which the file lacks.
     pub damaged: u64,
 }
 
 /// Converts the ULog at `path`.
 ///
 /// # Errors
-/// One line, if it cannot be read, is not a ULog, or `to` cannot be written.
+/// One line, if the log cannot be read, is not a ULog, or `to` cannot be written.
 pub fn convert(path: &Path, to: impl Write + Seek) -> Result<McapSummary, FileError> {
     let failed = |problem: String| FileError::whole(&path.display().to_string(), problem);
     let bytes = fs::read(path).map_err(|error| failed(format!("cannot be read ({error}); give the path of a log")))?;
@@ -45,9 +45,9 @@ pub fn convert(path: &Path, to: impl Write + Seek) -> Result<McapSummary, FileEr
     write(&bytes, to).map_err(failed)
 }
 
-/// Writes the log in `bytes`.
+/// Writes the log in `bytes` to `to` as MCAP.
 fn write(bytes: &[u8], to: impl Write + Seek) -> Result<McapSummary, String> {
-    // Not compressed: the compressors are in C.
+    // Not compressed, since the compressors are C code.
     let library = concat!("sitl ", env!("CARGO_PKG_VERSION"));
     let options = WriteOptions::new().compression(None).profile("ros2").library(library);
     let writer = options.create(to).map_err(unwritten)?;
@@ -69,7 +69,7 @@ fn write(bytes: &[u8], to: impl Write + Seek) -> Result<McapSummary, String> {
     conversion.finish(damaged)
 }
 
-/// Calls `take` with what each record says; none of a damaged one.
+/// Calls `take` with the content of each record; with none for a damaged one.
 fn entries(bytes: &[u8], mut take: impl FnMut(Option<Entry<'_>>)) -> Result<(), String> {
     let mut reader = LogReader::default();
     each(bytes, |piece, _| match piece {
@@ -99,15 +99,15 @@ fn unwritten(error: McapError) -> String {
     format!("the MCAP file cannot be written ({error}); make room")
 }
 
-/// What is read of the log, and the file that is written.
+/// A conversion in progress: what was read so far, and the file being written.
 struct Conversion<W: Write + Seek> {
     output: Output<W>,
-    /// Topics of the log, by their ids.
+    /// Topics of the log by their ids.
     topics: HashMap<u16, McapTopic>,
     scene: Scene,
     /// Time of the last message that had one \[us\].
     now_us: u64,
-    /// Those at the log's beginning.
+    /// Parameters at the log's beginning.
     parameters: BTreeMap<String, String>,
     information: BTreeMap<String, String>,
 }
@@ -153,7 +153,7 @@ impl<W: Write + Seek> Conversion<W> {
         }
     }
 
-    /// A dropout has no time of its own: it ends with the next message.
+    /// Writes a dropout at the time of the last message: a dropout has no time of its own.
     fn dropout(&mut self, duration_ms: u16) {
         let schema = ["afbc_msgs/msg/Dropout", "uint16 duration_ms\n"];
         self.output.put("/dropout", schema, self.now_us, &duration_ms);
@@ -176,19 +176,19 @@ impl<W: Write + Seek> Conversion<W> {
     }
 }
 
-/// The file that is written.
+/// The MCAP file being written.
 struct Output<W: Write + Seek> {
     writer: Writer<W>,
     /// Channel and number of messages of each topic that has any.
     channels: HashMap<String, (u16, u32)>,
-    /// Number of messages in all.
+    /// Number of messages of all topics.
     messages: u64,
-    /// Why nothing more can be written.
+    /// The first error in writing; nothing is written after it.
     failure: Option<McapError>,
 }
 
 impl<W: Write + Seek> Output<W> {
-    /// Writes a message of a topic with that kind and schema.
+    /// Writes a message of a topic; `schema` holds the schema's name and text.
     fn put(&mut self, topic: &str, schema: [&str; 2], time_us: u64, content: &impl Serialize) {
         if self.failure.is_none() {
             self.failure = self.try_put(topic, schema, time_us, content).err();
@@ -208,7 +208,7 @@ impl<W: Write + Seek> Output<W> {
             self.channels.insert(topic.to_owned(), (channel, 0));
         }
         let Some((channel_id, sequence)) = self.channels.get_mut(topic) else { return Ok(()) };
-        // CDR begins with its kind: little-endian.
+        // CDR data begin with a header that says little-endian.
         let mut bytes = vec![0, 1, 0, 0];
         let content = to_vec::<_, byteorder::LittleEndian>(content);
         bytes.extend(content.map_err(|error| McapError::Io(std::io::Error::other(error)))?);

@@ -1,7 +1,8 @@
-//! What tools for ROS 2 draw by themselves, made from PX4's topics: frames for a 3-D view, a place for a map, texts.
+//! Makes ROS 2 messages from PX4's topics that tools draw without any setup: frames for a 3-D view, a place for a map,
+//! texts.
 //!
-//! Frames are as [REP 103](https://www.ros.org/reps/rep-0103.html) has them: `map` is east-north-up, `base_link` and
-//! `setpoint` are forward-left-up.
+//! Frames follow [REP 103](https://www.ros.org/reps/rep-0103.html): `map` is east-north-up, `base_link` and `setpoint`
+//! are forward-left-up.
 
 use super::topic::time_us;
 use crate::ulog::{FieldType, Format};
@@ -9,17 +10,17 @@ use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use serde::Serialize;
 use std::f64::consts::FRAC_1_SQRT_2;
 
-/// A message beside those of the log.
+/// A message that is added to those of the log.
 pub(super) struct RosMessage {
     pub(super) topic: &'static str,
-    /// Name of its schema.
+    /// Name of the message's schema.
     pub(super) kind: &'static str,
-    /// The schema, with those of its parts.
+    /// Text of the schema, with the schemas of its parts.
     pub(super) schema: &'static str,
     pub(super) content: RosContent,
 }
 
-/// What such a message holds.
+/// Content of an added message.
 #[derive(Serialize)]
 #[serde(untagged)]
 pub(super) enum RosContent {
@@ -52,7 +53,7 @@ const FIX: &str = with_header!(
     "================\nMSG: sensor_msgs/NavSatStatus\nint8 status\nuint16 service\n"
 );
 
-/// `builtin_interfaces/Time`, since power-up.
+/// `builtin_interfaces/Time`, counted from power-up.
 #[derive(Clone, Copy, Serialize)]
 struct Time {
     sec: i32,
@@ -78,9 +79,9 @@ struct Header {
 pub(super) struct FrameTransform {
     header: Header,
     child_frame_id: &'static str,
-    /// \[m\]
+    /// Position \[m\].
     translation: [f64; 3],
-    /// x, y, z, w.
+    /// Quaternion x, y, z, w.
     rotation: [f64; 4],
 }
 
@@ -88,20 +89,20 @@ pub(super) struct FrameTransform {
 #[derive(Serialize)]
 pub(super) struct PlaceFix {
     header: Header,
-    /// 0: there is a fix.
+    /// 0: the receiver has a fix.
     status: i8,
     /// 1: GPS.
     service: u16,
     latitude_deg: f64,
     longitude_deg: f64,
     altitude_m: f64,
-    /// East, north, up \[m2\].
+    /// Order east, north, up \[m2\].
     position_covariance: [f64; 9],
-    /// 2: its diagonal is known.
+    /// 2: the diagonal of the covariance is known.
     position_covariance_type: u8,
 }
 
-/// `rcl_interfaces/Log`: a text to the stations.
+/// `rcl_interfaces/Log`: a text message from the vehicle.
 #[derive(Serialize)]
 pub(super) struct ShownText {
     stamp: Time,
@@ -121,9 +122,10 @@ impl ShownText {
         "uint32 line\n================\nMSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n"
     );
 
-    /// Returns a text of the log, whose level is a digit of syslog's: 0 emergency to 7 debug.
+    /// Makes the message for a text of the log. `level` is a syslog level, 0 (emergency) to 7 (debug), possibly as an
+    /// ASCII digit.
     pub(super) fn of(time_us: u64, level: u8, text: &str) -> Self {
-        // ROS 2 has debug 10, information 20, warning 30, error 40, fatal 50.
+        // ROS 2's levels are debug 10, information 20, warning 30, error 40, fatal 50.
         let level = match level & 7 {
             0..=2 => 50,
             3 => 40,
@@ -149,7 +151,7 @@ impl ParameterChange {
     pub(super) const SCHEMA: &'static str = "string name\nfloat64 value\n";
 }
 
-/// Newest attitudes of the vehicle and of its setpoint, from forward-right-down to north-east-down.
+/// Newest attitudes of the vehicle and of its setpoint, as rotations from forward-right-down to north-east-down.
 #[derive(Default)]
 pub(super) struct Scene {
     attitude: Option<Quaternion<f64>>,
@@ -157,7 +159,7 @@ pub(super) struct Scene {
 }
 
 impl Scene {
-    /// Takes a message of the log, and returns what is to be shown then.
+    /// Takes a message of the log; returns a message to add, if the log's message gives one.
     pub(super) fn update(&mut self, format: &Format, data: &[u8]) -> Option<RosMessage> {
         let fields = Fields { format, data };
         match format.name.as_str() {
@@ -172,7 +174,7 @@ impl Scene {
     }
 }
 
-/// Fields of a message.
+/// Fields of one message.
 struct Fields<'a> {
     format: &'a Format,
     data: &'a [u8],
@@ -203,13 +205,13 @@ impl Fields<'_> {
         Some(Quaternion::new(w?, x?, y?, z?))
     }
 
-    /// Returns a frame with the message's position and this attitude.
+    /// Returns a frame with the message's position and the given attitude.
     fn frame(&self, child_frame_id: &'static str, attitude: Quaternion<f64>) -> Option<RosMessage> {
         let ned = self.vector(["x", "y", "z"])?;
         // NED to ENU is half a turn about the bisector of x and y, FLU to FRD half a turn about x.
         let to_enu = Quaternion::new(0.0, FRAC_1_SQRT_2, FRAC_1_SQRT_2, 0.0);
         let from_flu = Quaternion::new(0.0, 1.0, 0.0, 0.0);
-        // None of a message whose quaternion is zero.
+        // A message whose quaternion is zero gives no frame.
         let rotation = UnitQuaternion::try_new(to_enu * attitude * from_flu, 1e-3)?;
         let frame = FrameTransform {
             header: Header { stamp: self.time()?, frame_id: "map" },

@@ -1,15 +1,16 @@
-//! Times of a log that cannot be: a flipped bit would make the file span centuries.
+//! Finds impossible times in a log: a flipped bit in a time would make the file span centuries.
 
-/// Records behind one that tell whether its time is too late.
+/// Number of following records that decide whether a record's time is too late.
 const NEIGHBOURS: usize = 8;
-/// A record may be logged this much later than one with a later time \[us\]. An earlier time may be as old as it likes:
-/// the last value of a topic is logged when a log begins.
+/// A record may be logged this much later than a record with a later time \[us\]. A time may be arbitrarily old: a
+/// topic's last value is logged when a log begins.
 const LATE_US: u64 = 10_000_000;
-/// Longest gap before the last records, of which few others tell \[us\]; or as long as the log is.
+/// Longest gap allowed before one of the last records, which have too few followers \[us\]. A gap as long as the log so
+/// far is allowed, too.
 const GAP_US: u64 = 60_000_000;
 
-/// Marks the times, in the order of the file, that are far ahead of most of those that follow; for the last ones, far
-/// ahead of the rest.
+/// Marks the times, in the order of the file, that are far ahead of most of the following times. One of the last times
+/// is also marked if it is far ahead of all times before it.
 pub(super) fn ahead(times_us: &[u64]) -> Vec<bool> {
     let mut ends: Option<[u64; 2]> = None;
     let mark = |(index, &time_us): (usize, &u64)| {
@@ -22,7 +23,7 @@ pub(super) fn ahead(times_us: &[u64]) -> Vec<bool> {
         let is_last = |[first_us, last_us]: [u64; 2]| {
             all < NEIGHBOURS && time_us > last_us.saturating_add(GAP_US.max(last_us - first_us))
         };
-        // One record alone tells nothing: its own time may be the wrong one.
+        // A single following record decides nothing, since its own time may be the wrong one.
         let is_ahead = all > 1 && 2 * earlier > all || ends.is_some_and(is_last);
         if !is_ahead {
             let [first_us, last_us] = ends.unwrap_or([time_us; 2]);
@@ -41,7 +42,7 @@ mod tests {
         ahead(times).into_iter().enumerate().filter_map(|(index, mark)| mark.then_some(index)).collect()
     }
 
-    /// Every bit of every time, one at a time: the span hardly grows.
+    /// Flips every bit of every time, one at a time: the log hardly becomes longer.
     #[test]
     fn no_flipped_bit_makes_a_log_long() {
         let good: Vec<u64> = (0..200).map(|index| 300_000_000 + 10_000 * index).collect();
@@ -59,7 +60,7 @@ mod tests {
         }
     }
 
-    /// Gaps of any length, old values of slow topics at the beginning, slow topics alone, and a few messages.
+    /// Gaps of any length, old values of slow topics at the beginning, slow topics alone, and logs of a few messages.
     #[test]
     fn what_real_logs_have_is_kept() {
         let gap: Vec<u64> = (0..100).map(|index| 10_000 * index + if index < 50 { 0 } else { 3_600_000_000 }).collect();

@@ -1,22 +1,22 @@
-//! A topic of the log as one of ROS 2's: the same fields in the same order.
+//! Converts a topic of the log to a topic of ROS 2 with the same fields in the same order.
 
 use crate::ulog::{Field, FieldType as Type, Format, LoggedTopic};
 use serde::ser::{Serialize, SerializeTuple, Serializer};
 use std::collections::HashSet;
 use std::fmt::Write as _;
 
-/// A topic, and where its fields lie in a message of the log.
+/// A topic and the offsets of its fields in a message of the log.
 pub(super) struct McapTopic {
-    /// Name, with a slash first; that of a further instance has its number behind.
+    /// Name after a slash; a second or later instance has its number appended.
     pub(super) name: String,
-    /// Name of its schema.
+    /// Name of the schema.
     pub(super) kind: String,
-    /// Fields, as `ros2msg`.
+    /// Fields in the format `ros2msg`.
     pub(super) schema: String,
     places: Vec<(Type, usize)>,
 }
 
-/// A message: its values in the order of the schema.
+/// A message, whose values are written in the order of the schema.
 pub(super) struct McapSample<'a> {
     places: &'a [(Type, usize)],
     data: &'a [u8],
@@ -28,7 +28,7 @@ pub(super) fn time_us(format: &Format, data: &[u8]) -> Option<u64> {
 }
 
 impl McapTopic {
-    /// Returns the topic of the file for one of the log.
+    /// Makes the topic of the file for a topic of the log.
     pub(super) fn of(topic: &LoggedTopic) -> Self {
         let format = &topic.format;
         let name = match topic.instance {
@@ -44,7 +44,7 @@ impl McapTopic {
         }
     }
 
-    /// Returns a message.
+    /// Makes a message of this topic from the log's bytes.
     pub(super) fn sample<'a>(&'a self, data: &'a [u8]) -> McapSample<'a> {
         McapSample { places: &self.places, data }
     }
@@ -78,7 +78,7 @@ impl Serialize for McapSample<'_> {
     }
 }
 
-/// Returns what ROS 2 calls a type.
+/// Returns ROS 2's name of a type.
 fn ros_type(kind: Type) -> &'static str {
     match kind {
         Type::Int8 => "int8",
@@ -95,8 +95,8 @@ fn ros_type(kind: Type) -> &'static str {
     }
 }
 
-/// Returns the fields as `ros2msg`: `q[0]`, `q[1]` and so on are an array again, and a field of a part, `esc[0].rpm`,
-/// has a name in one piece, `esc_0_rpm`.
+/// Returns the fields in the format `ros2msg`. Fields `q[0]`, `q[1]` and so on become an array. A nested field such as
+/// `esc[0].rpm` becomes `esc_0_rpm`.
 fn schema(fields: &[Field]) -> String {
     let mut schema = String::new();
     let mut names = HashSet::new();
@@ -116,7 +116,7 @@ fn schema(fields: &[Field]) -> String {
     schema
 }
 
-/// Returns the number of values of the array that the fields begin with; 1 if it is none.
+/// Returns the length of the array at the beginning of the fields; 1 if the first field is no array.
 fn array(fields: &[Field]) -> usize {
     let [first, ..] = fields else { return 1 };
     let Some(name) = first.name.strip_suffix("[0]") else { return 1 };
@@ -125,14 +125,14 @@ fn array(fields: &[Field]) -> usize {
     fields.iter().enumerate().take_while(belongs).count().max(1)
 }
 
-/// Returns a name as fields of ROS 2 may have it: letters in lower case, digits, single underscores between them.
+/// Returns a valid ROS 2 field name: lower-case letters and digits, with single underscores between words.
 fn field_name(name: &str) -> String {
     let words = name.split(|c: char| !c.is_ascii_alphanumeric()).filter(|word| !word.is_empty());
     let name = words.map(str::to_ascii_lowercase).collect::<Vec<_>>().join("_");
     if name.starts_with(|c: char| c.is_ascii_lowercase()) { name } else { format!("field_{name}") }
 }
 
-/// Returns a name as types of ROS 2 may have it: `VehicleAttitude`.
+/// Returns a valid ROS 2 type name, such as `VehicleAttitude`.
 fn type_name(name: &str) -> String {
     let words = name.split(|c: char| !c.is_ascii_alphanumeric());
     let capital = |word: &str| {
@@ -143,7 +143,7 @@ fn type_name(name: &str) -> String {
     if name.starts_with(|c: char| c.is_ascii_uppercase()) { name } else { format!("Topic{name}") }
 }
 
-/// Returns the name, or one with a number behind it that is not among the `names` yet.
+/// Returns the name, or the name with a number appended if `names` has it already. Adds the result to `names`.
 fn unlike(name: String, names: &mut HashSet<String>) -> String {
     let numbered = (2_u32..).map(|number| format!("{name}_{number}"));
     let free = std::iter::once(name.clone()).chain(numbered).find(|name| !names.contains(name)).unwrap_or(name);

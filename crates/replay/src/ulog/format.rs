@@ -1,18 +1,18 @@
-//! Formats of messages: the fields that they declare, and where these lie.
+//! Formats of messages: the declared fields and their offsets.
 
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
 use std::rc::Rc;
 
-/// Deepest nesting of messages: PX4 nests two.
+/// Deepest nesting of messages; PX4 nests two.
 const DEPTH: usize = 8;
-/// Longest names, of all fields of a format and of all formats \[bytes\]. A message has at most 65,535 bytes, and PX4's
-/// formats together names of some 200 KB; but few bytes can declare as many fields of fields as they like.
+/// Largest total length of all field names in one format, and in all formats \[bytes\]. PX4's formats together have
+/// names of some 200 KB, but a short nested declaration can name an unlimited number of fields.
 const NAMES_OF_FORMAT: usize = 1 << 21;
 const NAMES_OF_ALL: usize = 1 << 24;
 /// Longest message \[bytes\].
 const LONGEST: usize = u16::MAX as usize;
-/// Fields that only align others begin with this, and the last one of a message is not logged.
+/// Prefix of fields that only align others. A padding field at the end of a message is not logged.
 const PADDING: &str = "_padding";
 
 /// Type of a field.
@@ -62,50 +62,50 @@ impl FieldType {
     }
 }
 
-/// A field of a message, or of a message in it.
+/// A field of a message, or of a nested message.
 #[derive(Debug)]
 pub(crate) struct Field {
     /// Name, such as `q[0]` or `esc[1].rpm`.
     pub(crate) name: String,
     pub(crate) kind: FieldType,
-    /// Place of its first byte in the message.
+    /// Offset of the field's first byte in the message.
     pub(crate) at: usize,
 }
 
-/// Where the fields of a message lie.
+/// Layout of a message.
 #[derive(Debug)]
 pub(crate) struct Format {
     /// Name of the topic.
     pub(crate) name: String,
-    /// Fields in the order of their places, without those that align others.
+    /// Fields in the order of their offsets, without padding.
     pub(crate) fields: Vec<Field>,
     /// Length of a message \[bytes\].
     pub(crate) size: usize,
 }
 
 impl Format {
-    /// Returns the place of a field, if it is of that type.
+    /// Returns the offset of a field, if the field has that type.
     pub(crate) fn place(&self, name: &str, kind: FieldType) -> Option<usize> {
         self.fields.iter().find(|field| field.name == name && field.kind == kind).map(|field| field.at)
     }
 
-    /// Returns the place of the time, which is one only in microseconds.
+    /// Returns the offset of the timestamp, if it is a 64-bit count of microseconds.
     pub(crate) fn timestamp(&self) -> Option<usize> {
         self.place("timestamp", FieldType::UInt64)
     }
 }
 
-/// A field as it is declared.
+/// A field as declared in the log.
 #[derive(Debug, PartialEq, Eq)]
 struct DeclaredField {
     kind: String,
-    /// How many of an array.
+    /// Length of the array, if the field is one.
     many: Option<usize>,
     name: String,
 }
 
 impl DeclaredField {
-    /// Reads `float[4] q`.
+    /// Reads a declaration such as `float[4] q`.
     fn read(text: &str) -> Option<Self> {
         let (kind, name) = text.split_once(' ').filter(|(_, name)| !name.is_empty() && !name.contains(' '))?;
         let (kind, many) = match kind.split_once('[') {
@@ -120,9 +120,9 @@ impl DeclaredField {
 #[derive(Debug)]
 pub(crate) struct Formats {
     declared: HashMap<String, Vec<DeclaredField>>,
-    /// Those that were asked for; none of one that is not whole.
+    /// Layouts that were computed before; none for an incomplete format.
     laid_out: HashMap<String, Option<Rc<Format>>>,
-    /// Names that there may still be \[bytes\].
+    /// Remaining length of all field names \[bytes\].
     left: usize,
 }
 
@@ -133,7 +133,8 @@ impl Default for Formats {
 }
 
 impl Formats {
-    /// Takes a declaration, `topic:type name;type[n] name;`; none if it is damaged, or is not that of before.
+    /// Takes a declaration, `topic:type name;type[n] name;`. Returns none if it is damaged or contradicts an earlier
+    /// one.
     pub(crate) fn declare(&mut self, text: &[u8]) -> Option<()> {
         let (name, fields) = std::str::from_utf8(text).ok()?.split_once(':').filter(|(name, _)| !name.is_empty())?;
         let fields = fields.split(';').filter(|field| !field.is_empty());
@@ -147,7 +148,8 @@ impl Formats {
         }
     }
 
-    /// Returns the format of a topic; none if it, or one in it, is not declared, or if it is too large or too deep.
+    /// Returns the format of a topic; none if the topic or a nested message is not declared, or if the format is too
+    /// large or too deep.
     pub(crate) fn of(&mut self, name: &str) -> Option<Rc<Format>> {
         if let Some(known) = self.laid_out.get(name) {
             return known.clone();
@@ -172,7 +174,7 @@ struct Layout<'a> {
 }
 
 impl Layout<'_> {
-    /// Adds the fields of the message `name`, with `prefix` before their names.
+    /// Adds the fields of the message `name`, whose names get `prefix`.
     fn add(&mut self, name: &str, prefix: &str, depth: usize) -> Option<()> {
         let declared = self.declared;
         let fields = declared.get(name).filter(|_| depth < DEPTH)?;

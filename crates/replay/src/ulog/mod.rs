@@ -1,7 +1,7 @@
-//! PX4's ULog, also that of this firmware's black box.
+//! Reads PX4's ULog, including the logs of this firmware's black box.
 //!
-//! Whatever is in a log, a damaged record costs itself, and not the rest, and nothing takes longer than the file is
-//! long.
+//! A damaged record costs only itself. Reading takes a time that grows with the file's length, whatever the file
+//! contains.
 
 mod format;
 mod own;
@@ -19,7 +19,7 @@ use crate::recording::Recording;
 /// Reads a log.
 ///
 /// # Errors
-/// What is wrong with it, and what to do.
+/// A message that says what is wrong with the log and what to do.
 pub(crate) fn read(bytes: &[u8]) -> Result<Recording, String> {
     let tables = table::read(bytes)?;
     own::recording(&tables)?.map_or_else(|| topics::recording(&tables), Ok)

@@ -1,5 +1,5 @@
-//! Logs of this project's own black box, which have more than PX4's: each measurement as the estimator was offered it,
-//! and the estimator's settings. Over them it does again what it did in flight.
+//! Reads logs of this project's own black box. They hold more than PX4's logs: each measurement as offered to the
+//! estimator, and the estimator's settings. So the replayed estimator repeats what it did in flight.
 
 use super::table::{AFBC_AID, AFBC_ESTIMATOR, Row, SENSOR_COMBINED, Tables, VEHICLE_LOCAL_POSITION};
 use super::topics;
@@ -11,20 +11,20 @@ use afbc_onboard::Configuration;
 use afbc_onboard::parameters::ParameterTable;
 use afbc_store::RecordName;
 
-/// Numbers of a measurement.
+/// Number of numbers that a logged measurement has.
 const NUMBERS: usize = Measurement::NUMBERS;
 /// Prefix of the estimator's parameters.
 const ESTIMATOR: &str = "EST_";
 
-/// Returns what the tables of such a log contain; none if they are another's.
+/// Returns the recording in the tables; none if the log is not this firmware's.
 ///
 /// # Errors
-/// If there is no inertial sensor.
+/// A message, if the log has no IMU samples.
 pub(super) fn recording(tables: &Tables) -> Result<Option<Recording>, String> {
     if !tables.announces(AFBC_ESTIMATOR) {
         return Ok(None);
     }
-    // Of a damaged log nobody knows whether it had some: that is reported with the damage, below.
+    // A damaged log may have lost its IMU samples: that is reported with the damage, below.
     if tables.first(SENSOR_COMBINED).is_empty() && tables.notes.is_empty() {
         return Err("no samples of an inertial sensor: the vehicle flew on states from outside; log one that has an \
                     inertial sensor, as in sitl fly mocap"
@@ -62,17 +62,17 @@ pub(super) fn recording(tables: &Tables) -> Result<Option<Recording>, String> {
     Ok(Some(recording))
 }
 
-/// Returns the estimator's settings by the log's parameters.
+/// Returns the estimator's settings from the log's parameters.
 fn settings(tables: &Tables) -> Settings {
     let mut table = ParameterTable::<4>::new(Configuration::default());
     for (name, value) in tables.parameters().filter(|(name, _)| name.starts_with(ESTIMATOR)) {
-        // One that this version does not have leaves it at its default.
+        // A parameter that this version does not have is ignored.
         let _ = RecordName::new(name).map(|name| table.put(name, value as f32));
     }
     table.configuration().estimation
 }
 
-/// Returns a measurement as it was offered; none of an unknown kind.
+/// Returns a measurement as the estimator was offered it; none if its kind is unknown.
 fn aiding(row: &Row) -> Option<Aiding> {
     let names: [&str; NUMBERS] = [
         "numbers[0]",
@@ -100,7 +100,7 @@ fn sensor_of(measurement: &Measurement) -> Sensor {
     }
 }
 
-/// Returns velocities and positions, in the local frame of the measurements.
+/// Returns velocities and positions in the measurements' local frame.
 fn motions(tables: &Tables) -> (Vec<LoggedState>, SampleSource) {
     let rows = tables.first(VEHICLE_LOCAL_POSITION);
     let state = |row: &Row| {

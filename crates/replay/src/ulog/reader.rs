@@ -1,4 +1,4 @@
-//! What the records of a log say.
+//! Decodes the records of a log.
 
 use super::format::{Format, Formats};
 use std::borrow::Cow;
@@ -11,7 +11,7 @@ use std::rc::Rc;
 #[derive(Debug)]
 pub(crate) struct LoggedTopic {
     pub(crate) format: Rc<Format>,
-    /// Number among several of the same name, from 0 on.
+    /// Number among several instances of the same topic, counted from 0.
     pub(crate) instance: u8,
 }
 
@@ -23,7 +23,7 @@ pub(crate) enum ParameterValue {
 }
 
 impl ParameterValue {
-    /// Returns it as a number.
+    /// Returns the value as a number.
     pub(crate) fn number(self) -> f64 {
         match self {
             ParameterValue::Int32(value) => value.into(),
@@ -41,33 +41,33 @@ impl fmt::Display for ParameterValue {
     }
 }
 
-/// What a record says.
+/// Content of a record.
 pub(crate) enum Entry<'a> {
     /// A message of a topic.
     Message { id: u16, topic: &'a LoggedTopic, data: &'a [u8] },
-    /// A parameter, as at the log's beginning or changed later.
+    /// A parameter; `is_initial` is true before the data section.
     Parameter { name: &'a str, value: ParameterValue, is_initial: bool },
-    /// Something about the vehicle, by type and name.
+    /// Information on the vehicle, such as its hardware.
     Information { kind: &'a str, name: &'a str, value: &'a [u8] },
-    /// A line, with its level as a letter.
+    /// A text message with its ULog level.
     Text { time_us: u64, level: u8, text: Cow<'a, str> },
-    /// The logger has lost this long \[ms\].
+    /// A dropout of this length \[ms\].
     Dropout(u16),
-    /// What readers need not know.
+    /// A record that readers do not need.
     Other,
 }
 
-/// Reads records one after the other. Each stands for itself: a damaged one costs itself alone.
+/// Decodes records one after the other. A damaged record does not affect the others.
 #[derive(Debug, Default)]
 pub(crate) struct LogReader {
     formats: Formats,
     topics: HashMap<u16, LoggedTopic>,
-    /// True behind the definitions.
+    /// True after the definitions section.
     is_in_data: bool,
 }
 
 impl LogReader {
-    /// Returns what a record says; none if it is damaged.
+    /// Returns the content of a record; none if the record is damaged.
     pub(crate) fn entry<'a>(&'a mut self, record: &'a [u8]) -> Option<Entry<'a>> {
         let &[_, _, kind, ref content @ ..] = record else { return None };
         self.is_in_data |= b"ADLCORS".contains(&kind);
@@ -104,7 +104,7 @@ impl LogReader {
         }
     }
 
-    /// Takes the announcement of a topic: instance, id, name.
+    /// Takes a subscription to a topic: instance, id, name.
     fn add(&mut self, content: &[u8]) -> Option<()> {
         let &[instance, low, high, ref name @ ..] = content else { return None };
         let format = self.formats.of(std::str::from_utf8(name).ok()?)?;
@@ -121,7 +121,7 @@ impl LogReader {
     }
 }
 
-/// Returns type, name and value behind a key: its length, `type name`, the value.
+/// Returns type, name and value of a keyed record: the key's length, the key `type name`, the value.
 fn keyed(content: &[u8]) -> Option<(&str, &str, &[u8])> {
     let (length, rest) = content.split_first()?;
     let (key, value) = rest.split_at_checked(usize::from(*length))?;
@@ -132,6 +132,6 @@ fn keyed(content: &[u8]) -> Option<(&str, &str, &[u8])> {
 
 fn text(level: u8, rest: &[u8]) -> Option<Entry<'_>> {
     let (time, text) = rest.split_first_chunk()?;
-    // Part of a line is better than none.
+    // A text with invalid UTF-8 is better than none.
     Some(Entry::Text { time_us: u64::from_le_bytes(*time), level, text: String::from_utf8_lossy(text) })
 }

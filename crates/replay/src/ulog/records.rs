@@ -1,40 +1,40 @@
-//! The records of a file, cut.
+//! Cuts a file into records.
 
-/// First bytes of every log, before its version.
+/// First bytes of every ULog, before its version.
 const MAGIC: [u8; 7] = *b"ULog\x01\x12\x35";
-/// Length of the header: magic, version, time.
+/// Length of the header \[bytes\]: magic, version, time.
 pub(crate) const HEADER: usize = 16;
-/// Number of records one after the other that are no accident.
+/// This many valid records in a row are no accident.
 const CHAIN: usize = 4;
 
-/// True if `bytes` begin as a log does.
+/// Returns true if `bytes` begin like a ULog.
 pub(crate) fn is_ulog(bytes: &[u8]) -> bool {
     bytes.starts_with(&MAGIC)
 }
 
-/// Where records end before the file does.
+/// Where the records of a file end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum End {
-    /// With the last byte.
+    /// The last record ends with the file.
     Whole,
-    /// Within the record that begins at this byte.
+    /// The file ends within the record that begins at this byte.
     Cut(usize),
-    /// With what is no record, from this byte on.
+    /// No record can be found from this byte on.
     Lost(usize),
 }
 
 /// A piece of a file.
 pub(crate) enum Piece<'a> {
-    /// A record, with length and kind.
+    /// A record, including its length and kind.
     Record(&'a [u8]),
-    /// So many bytes that are none.
+    /// This many bytes that are no record.
     Junk(usize),
 }
 
-/// A record's kind, content and whole length, or why there is none.
+/// A record's kind, content and whole length, or the reason for which there is none.
 enum Cut<'a> {
     Record(u8, &'a [u8], usize),
-    /// It is longer than the file.
+    /// The record is longer than the rest of the file.
     Long,
     None,
 }
@@ -49,7 +49,7 @@ fn cut(rest: &[u8]) -> Cut<'_> {
     }
 }
 
-/// True if several records follow one another from here on, or up to the end.
+/// Returns true if several records follow one another from here on, or if all bytes up to the end are records.
 fn chains(mut rest: &[u8]) -> bool {
     for _ in 0..CHAIN {
         match cut(rest) {
@@ -63,13 +63,14 @@ fn chains(mut rest: &[u8]) -> bool {
     true
 }
 
-/// Incompatible flags that are known: data are appended at places that the record of flags names.
+/// The only known incompatible flag: data were appended at the offsets in the flags record.
 const APPENDED: u64 = 1;
 
-/// The places in a file at which its parts begin, and its length: the whole, or more where data were appended.
+/// Returns the offsets at which the file's parts begin, and the file's length. A file with appended data has several
+/// parts.
 ///
 /// # Errors
-/// If it is too short, or says that this reader does not know its format.
+/// A message, if the file is too short or its flags say that this reader does not know its format.
 fn parts(bytes: &[u8]) -> Result<Vec<usize>, String> {
     let after = bytes.get(HEADER..).ok_or("cut within the first 16 bytes; copy it from the vehicle again")?;
     let mut parts = vec![HEADER];
@@ -95,15 +96,15 @@ fn parts(bytes: &[u8]) -> Result<Vec<usize>, String> {
     Ok(parts)
 }
 
-/// Calls `take` with every piece after the header, and the byte at which it begins.
+/// Calls `take` with every piece after the header and the piece's offset in the file.
 ///
 /// # Errors
-/// One line, before anything is taken, if the file is too short or in a newer format.
+/// One line, if the file is too short or in a newer format; `take` is not called then.
 pub(crate) fn each(bytes: &[u8], mut take: impl FnMut(Piece<'_>, usize)) -> Result<End, String> {
     let parts = parts(bytes)?;
     let mut end = End::Whole;
     for (from, to) in parts.iter().zip(parts.iter().skip(1)) {
-        // The writer of a part that is followed by another has died there.
+        // The logger died at the end of a part that is followed by another.
         if let End::Cut(at) | End::Lost(at) = end {
             take(Piece::Junk(from - at), at);
         }

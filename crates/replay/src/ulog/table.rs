@@ -1,11 +1,11 @@
-//! Fields of a log's topics, as numbers.
+//! Collects the needed fields of a log's topics as numbers.
 
 use super::format::{FieldType as Type, Format};
 use super::reader::{Entry, LogReader};
 use super::records::{End, Piece, each};
 use std::collections::{HashMap, HashSet};
 
-/// A topic, and the fields of any of its layouts that are read.
+/// Name of a topic and the fields that are read, in any of the topic's layouts.
 pub(super) type Topic = (&'static str, &'static [&'static str]);
 
 pub(super) const SENSOR_COMBINED: Topic = (
@@ -128,46 +128,46 @@ const TOPICS: [Topic; 13] = [
     AFBC_AID,
 ];
 
-/// A message: its fields in the order of its [`Topic`]; not a number where its layout lacks one.
+/// A message: its fields in the order of its [`Topic`]; NaN for a field that its layout lacks.
 pub(super) struct Row {
     fields: &'static [&'static str],
     values: Box<[f64]>,
 }
 
 impl Row {
-    /// Returns a field; not a number if it is not there.
+    /// Returns a field; NaN if the message lacks it.
     pub(super) fn get(&self, name: &str) -> f64 {
         let index = self.fields.iter().position(|field| *field == name);
         index.and_then(|index| self.values.get(index)).copied().unwrap_or(f64::NAN)
     }
 
-    /// Returns three fields.
+    /// Returns three fields as a vector.
     pub(super) fn vector(&self, names: [&str; 3]) -> [f64; 3] {
         names.map(|name| self.get(name))
     }
 
-    /// Returns its time \[us\].
+    /// Returns the message's time \[us\].
     pub(super) fn timestamp_us(&self) -> u64 {
         self.get("timestamp") as u64
     }
 
-    /// Returns the time at which it was true: that of its sample if the log has it, otherwise that of the row \[us\].
+    /// Returns the time of the sample, or the message's time if the log has no sample time \[us\].
     pub(super) fn sampled_us(&self) -> u64 {
         let (sample, at) = (self.get("timestamp_sample"), self.get("timestamp"));
-        // False of NaN, where the layout has no such field.
+        // NaN makes this false: the layout has no such field.
         if sample > 0.0 && sample <= at && at - sample < 1e6 { sample as u64 } else { at as u64 }
     }
 }
 
-/// What is read of a log.
+/// Contents of a log.
 #[derive(Default)]
 pub(super) struct Tables {
     /// Messages by topic and instance, in the order of the file.
     rows: HashMap<(&'static str, u8), Vec<Row>>,
     parameters: HashMap<String, f64>,
-    /// Topics that the log announces, whether there are messages or not.
+    /// Topics that the log subscribes to, with or without messages.
     announced: HashSet<&'static str>,
-    /// What is to be reported of the file.
+    /// Remarks on the file for the report.
     pub(super) notes: Vec<String>,
 }
 
@@ -180,12 +180,12 @@ impl Tables {
         instances
     }
 
-    /// True if the log announces a topic.
+    /// Returns true if the log has a subscription to the topic.
     pub(super) fn announces(&self, topic: Topic) -> bool {
         self.announced.contains(topic.0)
     }
 
-    /// Returns all parameters, in no order.
+    /// Returns all parameters in arbitrary order.
     pub(super) fn parameters(&self) -> impl Iterator<Item = (&str, f64)> {
         self.parameters.iter().map(|(name, value)| (name.as_str(), *value))
     }
@@ -195,13 +195,13 @@ impl Tables {
         self.instances(topic).first().map_or(&[], |(_, rows)| rows)
     }
 
-    /// Returns a parameter, if the log has it and it is a number.
+    /// Returns a parameter, if the log has it and its value is finite.
     pub(super) fn parameter(&self, name: &str) -> Option<f64> {
         self.parameters.get(name).copied().filter(|value| value.is_finite())
     }
 }
 
-/// Where a topic's fields lie in a message.
+/// Offsets of a topic's fields in a message.
 struct Plan {
     topic: Topic,
     places: Vec<Option<(Type, usize)>>,
@@ -218,7 +218,7 @@ impl Plan {
     }
 }
 
-/// Returns the number at a place of a message.
+/// Returns the number at an offset of a message.
 fn number(data: &[u8], (kind, at): &(Type, usize)) -> Option<f64> {
     let from = data.get(*at..)?;
     Some(match kind {
@@ -236,7 +236,7 @@ fn number(data: &[u8], (kind, at): &(Type, usize)) -> Option<f64> {
     })
 }
 
-/// Which records are read: damage to any other does not matter.
+/// Selects the records that are read: damage to any other record does not matter.
 #[derive(Default)]
 struct Wanted {
     ids: HashSet<[u8; 2]>,
@@ -263,10 +263,10 @@ impl Wanted {
     }
 }
 
-/// Reads the topics above and all parameters.
+/// Reads the [`TOPICS`] and all parameters.
 ///
 /// # Errors
-/// What is wrong with the file, if nothing can be read.
+/// A message that says what is wrong with the file, if nothing can be read.
 pub(super) fn read(bytes: &[u8]) -> Result<Tables, String> {
     let mut tables = Tables::default();
     let mut plans: HashMap<u16, Option<Plan>> = HashMap::new();
@@ -288,7 +288,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Tables, String> {
                     tables.rows.entry((*name, topic.instance)).or_default().push(Row { fields, values });
                 }
             }
-            // The value at the beginning; a later change is another flight's.
+            // Keeps the first value: a later change belongs to another flight.
             Ok(Entry::Parameter { name, value, .. }) => {
                 tables.parameters.entry(name.to_owned()).or_insert(value.number());
             }

@@ -1,4 +1,4 @@
-//! What PX4's topics mean, in their old and new layouts.
+//! Interprets PX4's topics in their old and new layouts.
 
 use super::table::{
     ACTUATOR_ARMED, Row, SENSOR_BARO, SENSOR_COMBINED, SENSOR_GPS, SENSOR_MAG, Tables, Topic, VEHICLE_AIR_DATA,
@@ -11,15 +11,15 @@ use crate::recording::{Aiding, LoggedReset, LoggedState, Recording, SampleSource
 use crate::{compass, earth, states};
 use afbc_estimator::{ImuSample, Origin};
 
-/// Delay of a receiver if the log does not say \[ms\]: PX4's default.
+/// Delay of a receiver that the log does not state \[ms\]: PX4's default.
 const GNSS_DELAY_MS: f64 = 110.0;
-/// A relative time of old layouts that says that there is nothing.
+/// A relative time in old layouts that marks a sample as absent.
 const NOTHING: f64 = i32::MAX as f64;
 
-/// Returns what the tables contain.
+/// Returns the recording in the tables.
 ///
 /// # Errors
-/// If there is no inertial sensor.
+/// A message, if the log has no IMU samples.
 pub(super) fn recording(tables: &Tables) -> Result<Recording, String> {
     let mut recording =
         Recording { format: "PX4 ULog", notes: tables.notes.clone(), knows_origin: true, ..Recording::default() };
@@ -61,13 +61,12 @@ pub(super) fn recording(tables: &Tables) -> Result<Recording, String> {
     Ok(recording)
 }
 
-/// Reads the samples of the inertial sensor. Each is the mean over its time of integration, so it was true in the
-/// middle of that.
+/// Reads the IMU samples. Each sample is the mean over its integration time, so its time is the middle of that.
 pub(super) fn imu(tables: &Tables, samples: &mut Vec<ImuSample>) -> Result<SampleSource, String> {
     let (topic, rows) = (SENSOR_COMBINED.0, tables.first(SENSOR_COMBINED));
     let sample = |row: &Row| {
         let integral = row.get("gyro_integral_dt");
-        // Microseconds, in old layouts seconds.
+        // The integration time is in microseconds; in old layouts in seconds.
         let integral_us = if integral < 1.0 { integral * 1e6 } else { integral };
         let half_us = if (0.0..=1e5).contains(&integral_us) { (0.5 * integral_us) as u64 } else { 0 };
         ImuSample {
@@ -102,18 +101,18 @@ pub(super) fn imu(tables: &Tables, samples: &mut Vec<ImuSample>) -> Result<Sampl
     })
 }
 
-/// Fixes of the receiver with the most of them.
+/// Fixes of the receiver that has the most.
 struct Fixes {
     topic: &'static str,
     fixes: Vec<Fix>,
     raw: usize,
-    /// Time of day of the last fix that has it.
+    /// UTC time of the last message that states it \[us\].
     utc_us: Option<f64>,
 }
 
 impl Fixes {
-    /// `vehicle_gps_position` is what EKF2 has used, of one receiver or several; logs without it have the receivers'
-    /// own `sensor_gps`.
+    /// Reads the fixes from `vehicle_gps_position`, which EKF2 used, from one receiver or several. Logs without that
+    /// topic have the receivers' `sensor_gps`.
     fn read(tables: &Tables, notes: &mut Vec<String>) -> Self {
         let mut best = Fixes { topic: VEHICLE_GPS_POSITION.0, fixes: Vec::new(), raw: 0, utc_us: None };
         for topic in [VEHICLE_GPS_POSITION, SENSOR_GPS] {
@@ -139,9 +138,9 @@ impl Fixes {
     }
 }
 
-/// Returns a fix in three dimensions.
+/// Returns the row as a fix, if it is three-dimensional.
 fn fix(row: &Row) -> Option<Fix> {
-    // Degrees and metres, in old layouts 1e-7 degrees and millimetres.
+    // New layouts have degrees and metres, old ones 1e-7 degrees and millimetres.
     let either = |new: &str, old: &str, scale: f64| {
         let new = row.get(new);
         if new.is_finite() { new } else { row.get(old) * scale }
@@ -152,7 +151,7 @@ fn fix(row: &Row) -> Option<Fix> {
         either("altitude_msl_m", "alt", 1e-3),
     ];
     let velocity_m_s = row.vector(["vel_n_m_s", "vel_e_m_s", "vel_d_m_s"]);
-    // True of NaN: in a layout without the flag a velocity is one.
+    // NaN makes this true: in a layout without the flag every velocity is valid.
     let is_valid = velocity_m_s.iter().all(|speed| speed.is_finite()) && row.get("vel_ned_valid") != 0.0;
     let fix = Fix {
         arrived_us: row.timestamp_us(),
@@ -165,18 +164,18 @@ fn fix(row: &Row) -> Option<Fix> {
     (row.get("fix_type") >= 3.0 && fix.is_place()).then_some(fix)
 }
 
-/// Returns the first reference of the log's own position, so that both have the same origin.
+/// Returns the first reference of the log's local position, so that both estimates have the same origin.
 fn reference(tables: &Tables) -> Option<Origin> {
     tables.first(VEHICLE_LOCAL_POSITION).iter().find_map(own_origin)
 }
 
 fn own_origin(row: &Row) -> Option<Origin> {
     let [latitude, longitude, altitude] = row.vector(["ref_lat", "ref_lon", "ref_alt"]);
-    // Zero until there is one, in old layouts.
+    // In old layouts the reference is zero until it is set.
     Origin::new(latitude, longitude, altitude).filter(|_| (latitude, longitude) != (0.0, 0.0))
 }
 
-/// Heights, from the first topic that has any.
+/// Takes heights from the first topic that has any.
 fn barometer(tables: &Tables, all: &mut Vec<Aiding>, delay_us: u64) -> SampleSource {
     let air = |row: &Row| {
         let height_m = row.get("baro_alt_meter");
@@ -184,7 +183,7 @@ fn barometer(tables: &Tables, all: &mut Vec<Aiding>, delay_us: u64) -> SampleSou
     };
     let sensor = |row: &Row| {
         let height_m = row.get("altitude");
-        // Pascal, in old layouts hectopascal.
+        // Pressure is in pascals; in old layouts in hectopascals.
         let pressure = row.get("pressure");
         let pressure_pa = if pressure < 2000.0 { 100.0 * pressure } else { pressure };
         if height_m.is_finite() { height_m } else { height_of(pressure_pa) }
@@ -205,7 +204,8 @@ fn barometer(tables: &Tables, all: &mut Vec<Aiding>, delay_us: u64) -> SampleSou
     first_usable(&mut candidates, all, Sensor::Barometer)
 }
 
-/// Fields, from the first topic that has any, less what EKF2 had learned of them before, where the log has it.
+/// Takes fields from the first topic that has any, less the bias that EKF2 had learned before the flight, if the log
+/// has it.
 fn magnetometer(tables: &Tables, all: &mut Vec<Aiding>, delay_us: u64) -> SampleSource {
     const GAUSS: [&str; 3] = ["magnetometer_ga[0]", "magnetometer_ga[1]", "magnetometer_ga[2]"];
     let learned = tables.parameter("EKF2_MAGBIAS_ID").is_some_and(|id| id != 0.0);
@@ -231,7 +231,7 @@ fn magnetometer(tables: &Tables, all: &mut Vec<Aiding>, delay_us: u64) -> Sample
     first_usable(&mut candidates, all, Sensor::Magnetometer)
 }
 
-/// Takes the first topic with a usable measurement; that of today is missing if none has.
+/// Takes the first topic with a usable measurement. If there is none, PX4's current topic is reported as missing.
 fn first_usable(candidates: &mut [(Topic, Vec<Aiding>)], all: &mut Vec<Aiding>, sensor: Sensor) -> SampleSource {
     let usable = |aiding: &Aiding| aiding.measurement.value.is_plausible();
     let found = candidates.iter().position(|(_, aiding)| aiding.iter().any(usable)).unwrap_or(0);
@@ -241,19 +241,19 @@ fn first_usable(candidates: &mut [(Topic, Vec<Aiding>)], all: &mut Vec<Aiding>, 
     }
 }
 
-/// Returns the time of a part of an old layout's `sensor_combined`; none where there is nothing new in it.
+/// Returns the time of a sensor's sample in an old layout's `sensor_combined`; none if the row has no new sample.
 fn relative(row: &Row, name: &str) -> Option<u64> {
     let relative_us = row.get(name);
     let at_us = row.get("timestamp") + relative_us;
     (relative_us < NOTHING && relative_us.abs() < 1e6 && at_us >= 0.0).then_some(at_us as u64)
 }
 
-/// Height of a pressure in the standard atmosphere \[m\].
+/// Returns the height of a pressure in the standard atmosphere \[m\].
 fn height_of(pressure_pa: f64) -> f64 {
     44_330.8 * (1.0 - libm::pow(pressure_pa / 101_325.0, 0.190_263))
 }
 
-/// Returns the declination at the first fix; without one, that which the vehicle has stored.
+/// Returns the modelled declination at the first fix; without a fix, the declination stored in the vehicle.
 fn declination(tables: &Tables, earth: Option<&Field>, notes: &mut Vec<String>) -> f32 {
     let stored = tables.parameter("EKF2_MAG_DECL").map(|degrees| degrees.to_radians() as f32);
     let modelled = earth.map(|field| field.declination_rad);
@@ -277,7 +277,7 @@ fn motions(tables: &Tables, origin: Option<&Origin>) -> (Vec<LoggedState>, Sampl
     let state = |row: &Row| {
         let valid = |names: [&str; 2]| names.iter().all(|name| row.get(name) > 0.0);
         let velocity = flip(row.vector(["vx", "vy", "vz"]));
-        // From the reference of this row, which may change.
+        // The position is relative to this row's reference, which may change in flight.
         let reference = || {
             let own = own_origin(row).and(origin)?;
             let [latitude, longitude, altitude] = row.vector(["ref_lat", "ref_lon", "ref_alt"]);
@@ -294,7 +294,7 @@ fn motions(tables: &Tables, origin: Option<&Origin>) -> (Vec<LoggedState>, Sampl
     states::collect(states, rows.len(), Sensor::Motion, VEHICLE_LOCAL_POSITION.0)
 }
 
-/// A counter of resets, what it counts, the jump's coordinates, and their unit.
+/// A reset counter, the counted quantity, the fields of the jump's coordinates, and their unit.
 type Counter = (&'static str, &'static str, &'static [&'static str], &'static str);
 
 const COUNTERS: [Counter; 4] = [
@@ -320,7 +320,7 @@ pub(super) fn resets(tables: &Tables) -> Vec<LoggedReset> {
         let size = |row: &Row| libm::sqrt(parts.iter().map(|part| row.get(part) * row.get(part)).sum());
         count(motion, counter, what, unit, &size);
     }
-    // The angle of a rotation from its w.
+    // The angle of a rotation from its quaternion's w.
     let turn = |row: &Row| 2.0 * libm::acos(row.get("delta_q_reset[0]").abs().min(1.0)).to_degrees();
     count(tables.first(VEHICLE_ATTITUDE), "quat_reset_counter", "attitude", "degrees", &turn);
     resets.sort_by_key(|reset| reset.at_us);

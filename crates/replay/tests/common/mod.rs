@@ -1,38 +1,38 @@
-//! A flight, written as a ULog of any layout.
+//! Writes a simulated flight as a PX4 ULog, for the tests.
 #![allow(dead_code, clippy::indexing_slicing, reason = "each test file uses a part")]
 
 use afbc_replay::{Recording, Replayed, fly, read};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Start of the log's clock \[us\].
+/// Time of the log's start \[us\].
 pub(crate) const BOOT_US: u64 = 50_000_000;
-/// Where the flight begins: latitude, longitude \[degrees\], altitude \[m\].
+/// Place at which the flight begins: latitude, longitude \[degrees\], altitude \[m\].
 pub(crate) const HOME: [f64; 3] = [47.397742, 8.545594, 488.0];
-/// Metres per degree there, of latitude and longitude, on the ellipsoid.
+/// Metres per degree of latitude and of longitude at [`HOME`], on the ellipsoid.
 pub(crate) const PER_DEGREE: [f64; 2] = [111_183.0, 75_512.0];
-/// Declination there \[rad\].
+/// Declination at [`HOME`] \[rad\].
 const DECLINATION_RAD: f64 = 0.059;
 
-/// What a log is like.
+/// Properties of a log.
 #[derive(Clone, Debug)]
 pub(crate) struct Kind {
     pub(crate) old: bool,
     pub(crate) rate_hz: u64,
     pub(crate) duration_s: f64,
-    /// Topics that are left out.
+    /// Topics to leave out.
     pub(crate) without: Vec<&'static str>,
-    /// Time of the flight at which the log begins, 3 s of rest being before 0 \[s\].
+    /// Time of the flight at which the log begins \[s\]. The flight is at rest before 0, from -3 s on by default.
     pub(crate) begins_s: f64,
-    /// Samples of the inertial sensor that are left out, from and to \[s\] of the log.
+    /// Begin and end of a gap in the IMU samples, in the log's time \[s\].
     pub(crate) gap_s: (f64, f64),
-    /// Reset of the log's position, and change of its reference, at this time \[s\].
+    /// Time at which the log's position is reset and its reference changes \[s\].
     pub(crate) reset_s: f64,
-    /// What EKF2 has learned of the magnetometer's y axis \[gauss\].
+    /// Bias of the magnetometer's y axis that EKF2 has learned \[gauss\].
     pub(crate) iron: f64,
-    /// What nobody knows of the magnetometer, in its axes \[gauss\].
+    /// Unknown bias of the magnetometer in its axes \[gauss\].
     pub(crate) stray: [f64; 3],
-    /// Another receiver, first in the log, without a fix.
+    /// Number of receivers; all but the last have no fix.
     pub(crate) receivers: u8,
 }
 
@@ -53,7 +53,8 @@ impl Default for Kind {
     }
 }
 
-/// Position, velocity, acceleration \[m, s\] in north-east-down, and yaw with its rate \[rad\]; level all the time.
+/// Position, velocity, acceleration \[m, s\] in north-east-down, and yaw with its rate \[rad, s\]; the vehicle is
+/// always level.
 pub(crate) struct Truth {
     pub(crate) position: [f64; 3],
     pub(crate) velocity: [f64; 3],
@@ -61,10 +62,10 @@ pub(crate) struct Truth {
     pub(crate) yaw: (f64, f64),
 }
 
-/// The flight: at rest, then on a smooth way.
+/// Returns the flight's state at a time: first at rest, then on a smooth path.
 pub(crate) fn truth(time_s: f64) -> Truth {
     let t = time_s.max(0.0);
-    // size (1 - cos(w t) ) has no jump in the velocity.
+    // size (1 - cos(w t)) has no jump in the velocity.
     let swing = |size: f64, w: f64| {
         let (s, c) = (w * t).sin_cos();
         (size * (1.0 - c), size * w * s, if time_s > 0.0 { size * w * w * c } else { 0.0 })
@@ -143,7 +144,7 @@ enum Value {
 }
 use Value::{B, D, F, I, U};
 
-/// Noise within +-1, the same in every run.
+/// Noise within +-1 that is the same in every run.
 struct Noise(u64);
 
 impl Noise {
@@ -153,7 +154,7 @@ impl Noise {
     }
 }
 
-/// Writes a log.
+/// Writes a log of that kind.
 pub(crate) fn log(kind: &Kind) -> Vec<u8> {
     let mut log = Ulog::new();
     let old = kind.old;
@@ -210,7 +211,7 @@ pub(crate) fn log(kind: &Kind) -> Vec<u8> {
         let at_us = BOOT_US + 200_000 + index * step_us;
         let log_s = (index * step_us) as f64 * 1e-6;
         let time_s = kind.begins_s + log_s;
-        // The samples are means over the time before them.
+        // The samples are means over the step before them.
         let now = truth(time_s - 0.5e-6 * step_us as f64);
         let body = |yaw: f64, [n, e, d]: [f64; 3]| {
             let (s, c) = yaw.sin_cos();
@@ -278,7 +279,7 @@ pub(crate) fn log(kind: &Kind) -> Vec<u8> {
                 values.push(B(0));
             }
             log.data(attitude, at_us, &values);
-            // After the reset the log's reference is 10 m to the north.
+            // After the reset the log's reference is 10 m further north.
             let (moved, count) = if log_s < kind.reset_s { (0.0, 4) } else { (10.0, 5) };
             let [n, e, d] = exact.position;
             let mut values = vec![D(HOME[0] + moved / PER_DEGREE[0]), D(HOME[1]), F(HOME[2]), F(n - moved), F(e), F(d)];
@@ -297,7 +298,7 @@ pub(crate) fn log(kind: &Kind) -> Vec<u8> {
     log.bytes
 }
 
-/// Returns the places of the records of a log: kind, begin, end.
+/// Returns the kind, begin and end of each record of a log.
 pub(crate) fn records(bytes: &[u8]) -> Vec<(u8, usize, usize)> {
     let (mut at, mut records) = (16, Vec::new());
     while at < bytes.len() {
@@ -308,7 +309,7 @@ pub(crate) fn records(bytes: &[u8]) -> Vec<(u8, usize, usize)> {
     records
 }
 
-/// Writes bytes into a file of a test.
+/// Writes bytes into a file for a test and returns its path.
 pub(crate) fn file(name: &str, bytes: &[u8]) -> PathBuf {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("replay");
     fs::create_dir_all(&folder).unwrap();
@@ -317,7 +318,7 @@ pub(crate) fn file(name: &str, bytes: &[u8]) -> PathBuf {
     path
 }
 
-/// Reads and runs a log.
+/// Reads a log and runs the estimator on it.
 pub(crate) fn replay(name: &str, bytes: &[u8]) -> (Recording, Replayed) {
     let recording = read(&file(name, bytes)).unwrap();
     let replayed = fly(&recording, None).unwrap();
