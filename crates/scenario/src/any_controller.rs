@@ -1,4 +1,4 @@
-//! What is known of any law's controller beside its interface, and the one place where all of them are compiled.
+//! Functions of any law's controller beyond the common interface. All controllers are compiled here.
 
 use crate::FlownLaw;
 use crate::laws::{AnyController, AnyControllerMemory};
@@ -8,7 +8,7 @@ use afbc_control::{Action, FlightController};
 use afbc_onboard::{Configuration, FlightLaw, Prepare, Prepared};
 use afbc_types::{Axis, OutOfRange, PerAxis, Setpoint, State};
 
-/// How a controller is made for the firmware's code, and what it decides.
+/// Functions that make a controller for the firmware's code and that compute its decision.
 type Compiled<const N: usize> = (
     fn(&FlownLaw, &Configuration<N>) -> Result<Prepared<N, AnyController<N>>, OutOfRange>,
     fn(&AnyController<N>, &mut AnyControllerMemory<N>, &State, &Setpoint, bool) -> Action<N>,
@@ -18,14 +18,14 @@ const fn compiled<const N: usize>() -> Compiled<N> {
     (<FlownLaw as Prepare<N>>::prepare, <AnyController<N> as FlightController<N>>::decide)
 }
 
-/// Makes the compiler compile them here, for every number of rotors, since crates that use this one share what is
-/// compiled and not inlined. Otherwise each of them would have copies of its own, 40 KB of `decide` for each number.
+/// Makes the compiler compile these functions here for every number of rotors; other crates then share them, since they
+/// are not inlined. Otherwise each crate would have its own copies, with 40 KB of `decide` for each number of rotors.
 #[used]
 static COMPILED: (Compiled<4>, Compiled<5>, Compiled<6>, Compiled<7>, Compiled<8>) =
     (compiled(), compiled(), compiled(), compiled(), compiled());
 
 impl<const N: usize> AnyControllerMemory<N> {
-    /// Returns AFBC's estimates, with or without its monitor; none of another law.
+    /// Returns AFBC's adaptive estimates, with or without its monitor; none for another law.
     #[inline(always)]
     pub fn estimates(&self) -> Option<PerAxis<AdaptiveEstimate>> {
         match self {

@@ -1,4 +1,4 @@
-//! Scenarios that come with the program.
+//! The scenarios that come with the program.
 
 use super::definition::Scenario;
 use super::file::parse;

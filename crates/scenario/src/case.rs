@@ -5,9 +5,9 @@
 pub enum Reading {
     /// Accelerations of 1.2 m/s2 and 1.2 rad/s2 that persist from their onset: the paper's claims hold.
     Persistent,
-    /// Accelerations as above, but for one second each.
+    /// Accelerations of 1.2 m/s2 and 1.2 rad/s2 that last one second each.
     Pulses,
-    /// Physical forces and moments that persist: 1.2 N m is 316 rad/s2 here, and the vehicle is lost.
+    /// Physical forces and moments that persist. 1.2 N m is 316 rad/s2 here, and the vehicle is lost.
     Forces,
 }
 
@@ -25,17 +25,17 @@ impl Reading {
     }
 }
 
-/// Sign of an uncertainty of which only the size is printed (decision 4 in `docs/paper.md`).
+/// Sign of an uncertainty of which the paper prints only the size (decision 4 in `docs/paper.md`).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 pub enum Sign {
-    /// More than nominal.
+    /// The true value is larger than the nominal one.
     Plus,
-    /// Less than nominal.
+    /// The true value is smaller than the nominal one.
     Minus,
 }
 
 impl Sign {
-    /// Returns 1 + or - `size`.
+    /// Returns 1 + `size` or 1 - `size`.
     pub(crate) const fn factor(self, size: f64) -> f64 {
         match self {
             Sign::Plus => 1.0 + size,
@@ -55,14 +55,14 @@ impl Sign {
 /// Signs of the parameter uncertainty.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 pub struct Uncertainty {
-    /// Inertia +-75 %.
+    /// Sign of the inertia's 75 %.
     pub inertia: Sign,
-    /// Thrust factor +-40 %.
+    /// Sign of the thrust factor's 40 %.
     pub thrust: Sign,
 }
 
 impl Uncertainty {
-    /// Inertia up, thrust down: the most difficult, and the default.
+    /// Inertia up, thrust down: the most difficult combination, and the default.
     pub const DEFAULT: Self = Uncertainty { inertia: Sign::Plus, thrust: Sign::Minus };
 
     /// All four combinations, the default first.
@@ -74,7 +74,7 @@ impl Uncertainty {
     ];
 }
 
-/// One variant of the experiment; `None` leaves out gusts or uncertainty.
+/// A variant of the experiment; `None` leaves out gusts or uncertainty.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 pub struct Case {
     /// Reading of the gusts.

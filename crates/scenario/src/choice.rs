@@ -1,4 +1,4 @@
-//! Which contenders fly a scenario.
+//! Chooses the contenders that fly a scenario.
 
 use crate::Scenario;
 use crate::contender::{Contender, has_printed_cascade};
@@ -7,11 +7,11 @@ use afbc_files::read::FileError;
 use afbc_files::read::words::cure;
 
 impl Scenario {
-    /// Keeps the contenders named in `names`, or whose law is, and adds the laws named that no contender flies, with
-    /// their default gains for this vehicle.
+    /// Keeps the contenders whose name or law is in `names`. A named law that no contender flies is added with its
+    /// default gains for this vehicle.
     ///
     /// # Errors
-    /// One line on a name that is unknown, or on a gain or setting out of range on this vehicle.
+    /// One line on an unknown name, or on a gain or setting that is out of range for this vehicle.
     pub fn choose(&mut self, names: &[String]) -> Result<(), FileError> {
         let called = |contender: &Contender, name: &str| contender.name == name || contender.kind().name() == name;
         for name in names {
@@ -29,7 +29,7 @@ impl Scenario {
 
     /// Gives a standard contender the scenario's profile, vehicle and settings. A printed law keeps its own profile.
     fn settled(&self, contender: Contender) -> Result<Contender, FileError> {
-        // A scenario keeps what its profile and [settings] say nowhere but in its contenders.
+        // The scenario's profile and [settings] are stored only in its contenders.
         let first = self.contenders.first();
         let is_printed = first.is_some_and(|first| has_printed_cascade(&first.settings));
         let contender = match is_printed {
@@ -48,7 +48,7 @@ impl Scenario {
     /// Gives a standard contender its gains for this scenario's vehicle.
     ///
     /// # Errors
-    /// One line on what is wrong with the gains in the vehicle's file.
+    /// One line on the mistake in the gains of the vehicle's file.
     pub fn carried(&self, contender: Contender) -> Result<Contender, FileError> {
         let profile = contender.kept_profile();
         match &self.vehicle_file {

@@ -15,33 +15,33 @@ use afbc_types::{
 use afbc_vehicles::Vehicle;
 use core::convert::Infallible;
 
-/// Name of every law's limit on the tilt.
+/// Name of the tilt limit in every law's gains.
 const TILT_MAX: &str = "tilt_max_rad";
-/// Name of AFBC under its monitor, where it stands beside AFBC without.
+/// Name of AFBC with its monitor, where it flies next to AFBC without the monitor.
 pub const MONITORED: &str = "afbc-monitored";
-/// Acceleration of free fall, for a limit \[m/s2\].
+/// Acceleration of gravity, for limits \[m/s2\].
 const G_M_S2: f32 = 9.81;
 
 impl Law {
-    /// Returns a law with the gains of `profile`; profiles differ for AFBC and backstepping only.
+    /// Returns a law with the gains of `profile`; only the gains of AFBC and backstepping depend on the profile.
     pub fn of(kind: ControllerKind, profile: Profile) -> Self {
         Law::beside(kind, &profile.gains())
     }
 
-    /// The law of this kind with its gains for this vehicle: by rule ([`Profile::gains_for`], [`slowed`]) or, in the
-    /// profile `flight`, as the vehicle's file says.
+    /// Returns the law of this kind with its gains for this vehicle. The gains follow by rule ([`Profile::gains_for`],
+    /// [`slowed`]). In the profile `flight`, gains in the vehicle's file replace them.
     ///
     /// # Errors
-    /// One line on what is wrong with the gains in the vehicle's file.
+    /// One line on the mistake in the gains of the vehicle's file.
     pub fn on(kind: ControllerKind, vehicle: &Vehicle, profile: Profile) -> Result<Self, FileError> {
         let law = Law::beside(kind, &vehicle.gains(profile));
-        // Those of the cascade are slowed already.
+        // The gains of laws in the cascade are slowed already.
         let law = if kind.in_cascade() { law } else { slowed(law, slowness(vehicle.lag_s()), vehicle.lag_s()) };
         if profile == Profile::Flight { law_gains(vehicle, law) } else { Ok(law) }
     }
 }
 
-/// Returns name and title of a law of this kind as printed, if the profile `flight` adds to it.
+/// Returns name and title of the printed law of this kind, if the profile `flight` adds to the printed law.
 const fn printed_names(kind: ControllerKind) -> Option<[&'static str; 2]> {
     match kind {
         ControllerKind::Afbc => Some(["afbc-as-printed", "AFBC as printed"]),
@@ -50,7 +50,7 @@ const fn printed_names(kind: ControllerKind) -> Option<[&'static str; 2]> {
     }
 }
 
-/// A named controller with its law, gains and settings.
+/// A controller with its name, law, gains and settings.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Contender {
     /// Name in logs and files; unique within a scenario.
@@ -59,7 +59,7 @@ pub struct Contender {
     pub law: Law,
     /// Time step and rotor limit; for a law in the cascade also the cascade's settings.
     pub settings: Settings,
-    /// Whether AFBC flies under its [monitor](afbc::guarded), with a fallback law; false for every other law.
+    /// True if AFBC flies under its [monitor](afbc::guarded) with a fallback law; false for every other law.
     pub monitored: bool,
 }
 
@@ -70,8 +70,8 @@ impl Contender {
         Contender { name: kind.name().into(), law, settings, monitored: false }
     }
 
-    /// Returns the law of this kind with gains and settings of `profile`, under a name that tells a printed law from
-    /// the one that flies.
+    /// Returns the law of this kind with gains and settings of `profile`. Its name tells a printed law from the one
+    /// that flies.
     pub fn standard(kind: ControllerKind, profile: Profile) -> Self {
         let contender = Contender::of(kind, profile);
         match printed_names(kind).filter(|_| profile == Profile::Paper) {
@@ -80,32 +80,33 @@ impl Contender {
         }
     }
 
-    /// Returns the standard contenders: every law that flies, and those that differ from it as printed.
+    /// Returns the standard contenders: every law as it flies, and the printed laws that differ.
     pub fn all_standard() -> impl Iterator<Item = Contender> {
         let flies = |kind| Contender::standard(kind, Profile::Flight);
         let printed = ControllerKind::PAPER.map(|kind| Contender::standard(kind, Profile::Paper));
         ControllerKind::all().into_iter().map(flies).chain(printed)
     }
 
-    /// Returns the standard contender called `name`: a law's own name is that of the law that flies.
+    /// Returns the standard contender called `name`; a law's plain name means the law as it flies.
     pub fn named(name: &str) -> Option<Self> {
         Contender::all_standard().find(|contender| contender.name == name)
     }
 
-    /// Returns it under AFBC's monitor, if it flies AFBC.
+    /// Returns the contender with AFBC's monitor, if its law is AFBC.
     pub fn monitored(self) -> Self {
         Contender { monitored: self.gains().is_some(), ..self }
     }
 
-    /// Returns it for another vehicle than the paper's: gains equal to a profile's become the profile's for this
-    /// vehicle ([`Profile::gains_for`]); others are unchanged. The peers' laws scale with the vehicle themselves.
+    /// Returns the contender for another vehicle than the paper's. Gains equal to a profile's become the profile's
+    /// gains for this vehicle ([`Profile::gains_for`]); others are unchanged. The peers' laws scale with the vehicle
+    /// themselves.
     pub fn for_vehicle(self, vehicle: &Parameters<f64>) -> Self {
         let Some(profile) = self.gains_of() else { return self };
         Contender { law: Law::beside(self.kind(), &profile.gains_for(&vehicle.to_f32(), LAG_S)), ..self }
     }
 
-    /// Returns it free to tilt as far as `tilt_max_rad`, where it is limited more; the cascade's largest horizontal
-    /// acceleration follows, g tan(tilt).
+    /// Returns the contender with its tilt limit raised to at least `tilt_max_rad`. The cascade's largest horizontal
+    /// acceleration is raised to g tan(tilt).
     #[must_use]
     pub fn free_to_tilt(mut self, tilt_max_rad: f32) -> Self {
         let limits = &mut self.settings.limits;
@@ -113,7 +114,7 @@ impl Contender {
         limits.acceleration_max_m_s2 = limits.acceleration_max_m_s2.max(G_M_S2 * libm::tanf(tilt_max_rad));
         let Ok(()) = self.law.visit_mut(&mut |declaration: &Declaration, value: ValueMut<'_>| {
             if let (TILT_MAX, ValueMut::Single([tilt])) = (declaration.range.name, value) {
-                // No further than the law accepts, or its controller would be refused.
+                // No further than the law's range, or its controller would be refused.
                 *tilt = tilt.max(tilt_max_rad).min(declaration.range.max as f32);
             }
             Ok::<(), Infallible>(())
@@ -121,12 +122,12 @@ impl Contender {
         self
     }
 
-    /// Returns the kind of its law.
+    /// Returns the kind of the contender's law.
     pub const fn kind(&self) -> ControllerKind {
         self.law.kind()
     }
 
-    /// Returns the name for tables and figures, in which a printed law is called so, and a monitored one.
+    /// Returns the title for tables and figures; it marks a printed law and AFBC with its monitor.
     pub fn title(&self) -> &str {
         let kind = self.kind();
         match printed_names(kind) {
@@ -137,8 +138,8 @@ impl Contender {
         }
     }
 
-    /// Returns it under the printed law's name, if it flies that under the name of its law: for results of several
-    /// scenarios, which have no other words for it.
+    /// Returns the contender under the printed law's name, if it flies the printed law under the law's plain name.
+    /// Results of several scenarios need it, since only the name tells the laws apart there.
     #[must_use]
     pub fn named_as_printed(self) -> Self {
         match printed_names(self.kind()).filter(|_| self.is_printed() && self.name == self.kind().name()) {
@@ -147,7 +148,7 @@ impl Contender {
         }
     }
 
-    /// True if the law is the printed one, whatever its gains: without anything that the profile `flight` adds.
+    /// Returns true if the law is the printed one, with any gains but without the additions of the profile `flight`.
     pub fn is_printed(&self) -> bool {
         let guarded = |gains: &adaptive::Gains| gains.safeguards != Safeguards::NONE;
         printed_names(self.kind()).is_some()
@@ -155,26 +156,26 @@ impl Contender {
             && !self.gains().is_some_and(|gains| Axis::ALL.iter().any(|axis| guarded(&gains[*axis])))
     }
 
-    /// Returns the profile that it flies on another vehicle.
+    /// Returns the profile that the contender uses on another vehicle.
     pub fn kept_profile(&self) -> Profile {
         if self.is_printed() { Profile::Paper } else { Profile::Flight }
     }
 
-    /// Returns the profile with these gains and settings, if there is one.
+    /// Returns the profile with the contender's gains and settings; none if no profile has these.
     pub fn profile(&self) -> Option<Profile> {
         self.gains_of().filter(|profile| self.settings == profile.settings())
     }
 
-    /// Returns the profile with these gains, for the paper's vehicle.
+    /// Returns the profile with the contender's gains on the paper's vehicle.
     fn gains_of(&self) -> Option<Profile> {
         let same = |profile: &Profile| self.law == Law::of(self.kind(), *profile);
-        // The peers' gains are the same in every profile.
+        // The peers' gains are the same in every profile, so settings must match, too.
         Profile::ALL
             .into_iter()
             .find(|profile| same(profile) && (self.kind().in_cascade() || self.settings == profile.settings()))
     }
 
-    /// Returns AFBC's gains, if it flies AFBC.
+    /// Returns AFBC's gains; none for another law.
     pub const fn gains(&self) -> Option<&PerAxis<adaptive::Gains>> {
         match &self.law {
             Law::Afbc(gains) => Some(gains),
@@ -187,19 +188,19 @@ impl Contender {
         decimal(self.settings.common.dt_s)
     }
 
-    /// Returns the contender on another vehicle: that vehicle's gains and settings in `profile` replace its own; the
-    /// time step and the monitor stay.
+    /// Returns the contender on another vehicle: the vehicle's gains and settings in `profile` replace the contender's
+    /// own. The time step and the monitor stay.
     ///
     /// # Errors
-    /// One line on what is wrong with the gains in the vehicle's file.
+    /// One line on the mistake in the gains of the vehicle's file.
     pub fn on(self, vehicle: &Vehicle, profile: Profile) -> Result<Self, FileError> {
         let law = Law::on(self.kind(), vehicle, profile)?;
         let settings = vehicle.settings(profile).with_dt_s(self.settings.common.dt_s);
         Ok(Contender { law, settings, ..self })
     }
 
-    /// Returns the contender on another vehicle, its own gains and settings, for the paper's vehicle, scaled [by
-    /// rule](by_rule).
+    /// Returns the contender on another vehicle. Its own gains and settings count as those for the paper's vehicle and
+    /// are scaled [by rule](by_rule).
     #[must_use]
     pub fn by_rule(self, vehicle: &Vehicle) -> Self {
         let slowness = slowness(vehicle.lag_s());
@@ -207,7 +208,7 @@ impl Contender {
         let law = match self.law {
             Law::Afbc(gains) => Law::Afbc(by_rule(gains)),
             Law::Backstepping(own) => {
-                // The rule is for whole sets of AFBC's gains: those added here to make one are dropped after it.
+                // The rule needs a full set of AFBC's gains: the gains added here are dropped afterwards.
                 let gains = Profile::Flight.gains();
                 let gains = PerAxis::from_fn(|axis| adaptive::Gains { backstepping: own[axis], ..gains[axis] });
                 Law::Backstepping(by_rule(gains).map(|gains| gains.backstepping))
@@ -216,15 +217,15 @@ impl Contender {
         };
         let settings =
             self.settings.slowed(slowness, vehicle.lag_s()).with_rotor_force_max_n(vehicle.force_max_n as f32);
-        // What is known of the drag is the vehicle's, whoever's settings are scaled.
+        // The known drag is always the vehicle's own.
         let settings = settings.with_drag(vehicle.flight_settings.common.drag);
         Contender { law, settings, ..self }
     }
 
-    /// Returns the controller of a vehicle with these nominal parameters and rotors.
+    /// Returns the controller for a vehicle with these nominal parameters and rotors.
     ///
     /// # Errors
-    /// The first parameter, gain or setting out of range.
+    /// The first parameter, gain or setting that is out of range.
     pub fn controller<const N: usize>(
         &self,
         parameters: &Parameters<f64>,
@@ -240,11 +241,11 @@ impl Contender {
         }
     }
 
-    /// Builds the controller, as a flight would, to check it.
+    /// Checks the contender by building its controller like a flight does.
     ///
     /// # Errors
-    /// The first parameter, gain or setting out of range; also if the rotors cannot lift the vehicle [with a
-    /// margin](afbc_control::mixer::HOVER_MARGIN).
+    /// The first parameter, gain or setting that is out of range; also an error if the rotors cannot lift the vehicle
+    /// [with a margin](afbc_control::mixer::HOVER_MARGIN).
     pub fn check(&self, parameters: &Parameters<f64>, rotors: &[Rotor<f64>]) -> Result<(), OutOfRange> {
         with_rotors!(rotors.len(), N => {
             self.controller::<N>(parameters, rotors)?.mixer().check_hover(parameters.to_f32().weight_n())
@@ -252,8 +253,8 @@ impl Contender {
     }
 }
 
-/// True if the cascade has none of the additions of the profile `flight`. The numbers that the paper leaves open,
-/// rotors, filters and limits, may be any.
+/// Returns true if the cascade has none of the additions of the profile `flight`. Numbers that the paper leaves open
+/// (rotors, filters and limits) may have any value.
 pub(crate) fn has_printed_cascade(settings: &Settings) -> bool {
     let Settings { common, command_filter_rad_s, forward_rad_s, limits, .. } = *settings;
     *settings == Settings { common, command_filter_rad_s, forward_rad_s, limits, ..Profile::Paper.settings() }

@@ -1,4 +1,4 @@
-//! Definition of a scenario: one vehicle, one trajectory, one environment, the controllers to compare.
+//! Defines a scenario: one vehicle, one trajectory, one environment, and the controllers to compare.
 
 use crate::case::Case;
 use crate::contender::{Contender, ControllerKind};
@@ -18,27 +18,27 @@ use afbc_plant::{
 use afbc_types::{Mounting, OutOfRange, Parameters, Range, Rotor};
 use afbc_vehicles::{Vehicle, data_sheet};
 
-/// Accepted length of a flight \[s\].
+/// Accepted duration of a flight \[s\].
 pub const DURATION: Range = Range::new("duration_s", 0.1, 36_000.0);
 
-/// Accepted roll and pitch of a vehicle to be armed by the flight core \[rad\].
+/// Accepted initial roll and pitch of a vehicle that the flight core must arm \[rad\].
 const ARMING_TILT: Range = Range::new("attitude_rad", -TILT_MAX, TILT_MAX);
 const TILT_MAX: f64 = ArmingLimits::TILT_MAX.range.max;
 
-/// Accepted roll and pitch at the start of a vehicle that estimates its state, which levels itself there \[rad\].
+/// Accepted initial roll and pitch of a vehicle with its own estimator, which levels itself at the start \[rad\].
 const LEVEL: Range = Range::new("attitude_rad", -0.8, 0.8);
 
-/// An interval in which no state arrives, since the link is down.
+/// An interval without states, since the link is down.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Outage {
     /// Start \[s\].
     pub start_s: f64,
-    /// End, from which states arrive again \[s\].
+    /// End of the outage \[s\].
     pub end_s: f64,
 }
 
-/// Everything that determines a flight. Written by serde, it is what decides one, without names of files and their
-/// descriptions: campaigns are recognised by that.
+/// Everything that determines a flight. The serde output contains exactly these quantities, without the names and
+/// descriptions of files: campaigns are recognised by that output.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Scenario {
     /// Short name, used in file names.
@@ -47,35 +47,35 @@ pub struct Scenario {
     /// Description in one line.
     #[serde(skip)]
     pub description: String,
-    /// Variant of the paper's experiment, if it is one.
+    /// Variant of the paper's experiment; none for other scenarios.
     pub case: Option<Case>,
-    /// Length of the flight \[s\].
+    /// Duration of the flight \[s\].
     pub duration_s: f64,
     /// Equations of motion.
     pub model: PlantModel,
     /// Nominal parameters, known to the controllers.
     pub vehicle: Parameters<f64>,
-    /// Its rotors, in the order of their numbers: four to eight.
+    /// Rotors of the vehicle in the order of their numbers: four to eight.
     pub rotors: Vec<Rotor<f64>>,
-    /// The vehicle file that all of this vehicle comes from, if it comes from one.
+    /// Vehicle file with everything about this vehicle; none if there is no such file.
     pub vehicle_file: Option<Vehicle>,
     /// True parameters with their changes, gusts and payloads.
     pub environment: Environment,
-    /// Effects of rotors, air and ground. Its own seed is not used.
+    /// Effects of rotors, air and ground. The seed in here is not used.
     pub realism: Realism,
     /// Properties of the measurement.
     pub sensing: Sensing,
     /// Faults of the measurement.
     pub sensor_faults: Vec<SensorFault>,
-    /// Instruments of the vehicle, for its estimator; their mounting is the vehicle file's.
+    /// Instruments for the vehicle's estimator; their mounting is in the vehicle's file.
     pub instruments: InstrumentSuite,
-    /// What the vehicle's software is told of them.
+    /// Instrument properties that the vehicle's software is told.
     pub told: Told,
     /// Failures of the instruments.
     pub instrument_faults: Vec<InstrumentFault>,
     /// Outages of the link.
     pub outages: Vec<Outage>,
-    /// Whether the controllers fly inside the flight core, as on board.
+    /// True if the controllers fly inside the flight core, as on board.
     pub flight_core: bool,
     /// Seed of all random effects. The same seed gives the same flight.
     pub seed: u64,
@@ -83,7 +83,7 @@ pub struct Scenario {
     pub initial: Motion,
     /// The reference.
     pub trajectory: Trajectory,
-    /// Controllers to compare, each in a flight of its own.
+    /// Controllers to compare, each in its own flight.
     pub contenders: Vec<Contender>,
 }
 
@@ -93,12 +93,12 @@ impl Scenario {
         self.contenders.iter().find(|contender| contender.kind() == kind)
     }
 
-    /// The same flight on another vehicle: everything about the vehicle comes from its file, masses, rotors, battery,
-    /// drag, ground and the gains of `profile`. What happens in flight stays: reference, wind, gusts, faults, changes,
-    /// payloads, sensors, outages.
+    /// Returns the same flight on another vehicle. Everything about the vehicle comes from its file: masses, rotors,
+    /// battery, drag, ground and the gains of `profile`. The events in flight stay: reference, wind, gusts, faults,
+    /// changes, payloads, sensors and outages.
     ///
     /// # Errors
-    /// One line on what is wrong with the gains in the vehicle's file, or on what is out of range on this vehicle.
+    /// One line on the mistake in the gains of the vehicle's file, or on a value that is out of range for this vehicle.
     pub fn on(self, vehicle: &Vehicle, profile: Profile) -> Result<Self, FileError> {
         let unfit = |error: OutOfRange| {
             FileError::whole(&vehicle.name, format!("{} cannot fly it: {}", self.name, out_of_range(&error)))
@@ -123,7 +123,7 @@ impl Scenario {
     /// Checks the scenario by building every flight.
     ///
     /// # Errors
-    /// The first parameter, gain or setting out of range.
+    /// The first parameter, gain or setting that is out of range.
     pub fn check(&self) -> Result<(), OutOfRange> {
         self.check_flight_core()?;
         self.check_estimator()?;
@@ -135,10 +135,10 @@ impl Scenario {
         })
     }
 
-    /// Checks, if the flight core is used, whether it can fly every contender.
+    /// If the flight core is used, checks that it can fly every contender.
     ///
     /// # Errors
-    /// The first time step or tilt out of range.
+    /// The first time step or tilt that is out of range.
     pub fn check_flight_core(&self) -> Result<(), OutOfRange> {
         if !self.flight_core {
             return Ok(());
@@ -150,10 +150,10 @@ impl Scenario {
             .try_for_each(|contender| afbc_flight_core::tick::DT.check(contender.settings.common.dt_s))
     }
 
-    /// Checks, if the vehicle has an inertial sensor, whether its estimator can fly it.
+    /// If the vehicle has an IMU, checks that its estimator can fly the scenario.
     ///
     /// # Errors
-    /// The first time step, tilt or gravity out of range.
+    /// The first time step, tilt or gravity that is out of range.
     fn check_estimator(&self) -> Result<(), OutOfRange> {
         if self.instruments.imu.is_none() {
             return Ok(());
@@ -166,10 +166,10 @@ impl Scenario {
             .try_for_each(|contender| afbc_flight_core::tick::DT.check(contender.settings.common.dt_s))
     }
 
-    /// Returns the time from which on the scenario may take measurements away: by the first fault of a sensor or an
-    /// instrument, the first outage, or from the start if any fail at random. Infinite if it takes none away \[s\].
+    /// Returns the time from which the scenario may take measurements away \[s\]: the first fault of a sensor or
+    /// instrument, or the first outage. It is 0 if measurements fail at random, and infinite if nothing fails.
     pub fn faulty_from_s(&self) -> f64 {
-        // Every field by its name, so that a new instrument that may fail at random is not forgotten here.
+        // Name every field, so that a new instrument that may fail at random cannot be forgotten here.
         let InstrumentSuite { imu: _, tracker, gnss, barometer: _, magnetometer: _ } = &self.instruments;
         let lost =
             tracker.iter().flat_map(|tracker| [tracker.loss, tracker.freeze]).chain(gnss.iter().map(|it| it.loss));
@@ -182,22 +182,23 @@ impl Scenario {
         sensors.chain(instruments).chain(outages).fold(f64::INFINITY, f64::min)
     }
 
-    /// True if another seed gives another flight: noise, biases, dropouts, turbulence or instruments draw from it.
+    /// Returns true if another seed gives another flight: noise, biases, dropouts, turbulence or instruments use the
+    /// seed.
     pub fn is_random(&self) -> bool {
         let Sensing { noise, bias, delay_s: _, period_s: _, gyro: _, dropouts } = self.sensing;
         let exact = [noise, bias].iter().all(|spread| *spread == Deviations::default()) && dropouts.is_none();
         !exact || self.realism.wind.turbulence.is_some() || self.instruments != InstrumentSuite::default()
     }
 
-    /// True if rotors, air and ground are those of the paper's equations.
+    /// Returns true if rotors, air and ground behave as in the paper's equations.
     pub fn is_ideal(&self) -> bool {
         self.realism == Realism { seed: self.realism.seed, ..Realism::default() }
     }
 
-    /// Returns the vehicle at t = 0 for steps of `step_s`; an ideal one if no other effects are set.
+    /// Returns the vehicle at t = 0 for steps of `step_s`; an ideal plant if no other effects are set.
     ///
     /// # Errors
-    /// The first setting out of range.
+    /// The first setting that is out of range.
     pub fn plant(&self, step_s: f64) -> Result<Plant, OutOfRange> {
         let environment = self.environment.clone().with_frame(Frame::new(&self.rotors)?);
         if self.is_ideal() {
@@ -210,7 +211,7 @@ impl Scenario {
     /// Returns the sensors, read every `step_s`; none if they are perfect.
     ///
     /// # Errors
-    /// The first setting out of range.
+    /// The first setting that is out of range.
     pub fn sensors(&self, step_s: f64) -> Result<Option<StateSensor>, OutOfRange> {
         if self.sensing == Sensing::default() && self.sensor_faults.is_empty() {
             return Ok(None);
@@ -218,7 +219,7 @@ impl Scenario {
         StateSensor::new(&self.sensing, self.seed, step_s).map(Some)
     }
 
-    /// Returns what the vehicle is told whatever a campaign draws from here on.
+    /// Returns the instrument properties that the vehicle is told before a campaign draws its variations.
     #[must_use]
     pub fn told_before_draws(&self) -> Told {
         match &self.told {
@@ -227,7 +228,8 @@ impl Scenario {
         }
     }
 
-    /// Returns what the vehicle's software is told of its instruments. Which of them there are, it finds out.
+    /// Returns the instrument properties that the vehicle's software is told. The software finds out itself which
+    /// instruments exist.
     #[must_use]
     pub fn told(&self) -> InstrumentSuite {
         let there = &self.instruments;
@@ -245,8 +247,8 @@ impl Scenario {
         }
     }
 
-    /// Returns the estimator's settings: those that the data sheets of the instruments that it is told of ask for, and
-    /// what the vehicle's file states instead.
+    /// Returns the estimator's settings: derived from the data sheets of the instruments that the vehicle is told, then
+    /// replaced by settings in the vehicle's file.
     #[must_use]
     pub fn estimation(&self, step_s: f64) -> Settings {
         let told = self.told();
@@ -255,13 +257,13 @@ impl Scenario {
         self.vehicle_file.as_ref().map_or(settings, |vehicle| vehicle.stated_over(settings))
     }
 
-    /// Returns how the inertial sensor is mounted, as the vehicle's file says.
+    /// Returns the IMU's mounting from the vehicle's file.
     #[must_use]
     pub fn mounting(&self) -> Mounting<f64> {
         self.vehicle_file.as_ref().map_or(Mounting::DEFAULT, |file| file.imu)
     }
 
-    /// Returns how the rotors respond, as flight software knows it: as the vehicle's file says.
+    /// Returns the rotors' response that flight software knows, from the vehicle's file.
     #[must_use]
     pub fn response(&self) -> Response {
         self.vehicle_file.as_ref().map_or(Response::DEFAULT, |file| file.response())
@@ -270,7 +272,7 @@ impl Scenario {
     /// Returns the instruments, read every `step_s`; none if the vehicle has none.
     ///
     /// # Errors
-    /// The first setting out of range.
+    /// The first setting that is out of range.
     pub fn instruments(&self, step_s: f64) -> Result<Option<Instruments>, OutOfRange> {
         if self.instruments == InstrumentSuite::default() {
             return Ok(None);

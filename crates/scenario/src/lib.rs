@@ -1,7 +1,7 @@
-//! Scenarios: one vehicle, one trajectory, one environment, the contenders to compare.
+//! Scenarios: one vehicle, one trajectory, one environment, and the contenders to compare.
 //!
 //! A scenario comes from [`paper`], from a file ([`load`]) or from the [`built_in()`] ones. A [`contender`] is a
-//! control law of the one list of laws, with its gains. Nothing flies here: that is `afbc-sim`.
+//! control law of the list of laws with its gains. `afbc-sim` flies the scenarios.
 #![forbid(unsafe_code)]
 
 mod any_controller;

@@ -12,23 +12,23 @@ use afbc_plant::{
 use afbc_types::{Axis, OutOfRange, PLUS, Parameters};
 use nalgebra::Vector3;
 
-/// Length of the experiment \[s\].
+/// Duration of the experiment \[s\].
 pub const DURATION_S: f64 = 60.0;
 
-/// Interval of the uncertain parameters \[s\].
+/// Interval in which the parameters deviate \[s\].
 pub const UNCERTAIN_S: [f64; 2] = [20.0, 40.0];
 
-/// Onset of each gust \[s\].
+/// Axis and onset of each gust \[s\].
 pub const GUSTS_S: [(Axis, f64); 6] =
     [(Axis::X, 7.5), (Axis::Roll, 15.0), (Axis::Y, 22.5), (Axis::Pitch, 30.0), (Axis::Z, 37.5), (Axis::Yaw, 45.0)];
 
-/// Size of each gust: m/s2 and rad/s2, or N and N m.
+/// Size of each gust, in m/s2 and rad/s2 or in N and N m.
 const GUST: f64 = 1.2;
 
-/// Returns one variant of the experiment, on one model of the vehicle.
+/// Returns a variant of the experiment with this model of the vehicle.
 ///
 /// # Errors
-/// Does not occur: the paper's parameters are in range.
+/// Never fails: the paper's parameters are in range.
 pub fn scenario(model: PlantModel, case: Case) -> Result<Scenario, OutOfRange> {
     let gusts = case.reading.map_or(Vec::new(), |reading| {
         let (kind, length_s) = match reading {

@@ -1,22 +1,22 @@
-//! What a vehicle's software is told of its instruments, which is not what they do.
+//! Instrument properties that a vehicle's software is told; they may differ from the true ones.
 
 use afbc_plant::InstrumentSuite;
 use afbc_vehicles::Vehicle;
 
-/// What a vehicle's software is told of its instruments.
+/// Source of the instrument properties that a vehicle's software is told.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
 pub enum Told {
-    /// What the vehicle's file says of the inertial sensor, and else what the instruments of the scenario's file do,
-    /// before a campaign draws.
+    /// The IMU properties in the vehicle's file. All others, and the IMU without such an entry, are as in the
+    /// scenario's file before a campaign draws variations.
     #[default]
     Stated,
-    /// What the instruments do, drawn or not.
+    /// The true properties, also after a campaign's draws.
     Drawn,
-    /// This, whatever they do.
+    /// Fixed properties, independent of the true ones.
     Suite(Box<InstrumentSuite>),
 }
 
-/// Returns what these instruments say of themselves; of the inertial sensor what the vehicle's file says, if it does.
+/// Returns the properties that these instruments state. The IMU's come from the vehicle's file, if it has any.
 pub(crate) fn stated(instruments: &InstrumentSuite, vehicle: Option<&Vehicle>) -> InstrumentSuite {
     let part = vehicle.and_then(|vehicle| vehicle.imu_part);
     InstrumentSuite { imu: part.or(instruments.imu), ..*instruments }

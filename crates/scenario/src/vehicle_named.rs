@@ -1,4 +1,4 @@
-//! What a vehicle's name stands for.
+//! Finds a vehicle by its name.
 
 use crate::contender::{ControllerKind, Law};
 use afbc::Profile;
@@ -6,8 +6,8 @@ use afbc_files::read::FileError;
 use afbc_vehicles::{BUILT_IN, Vehicle, built_in, unknown};
 use std::path::Path;
 
-/// Returns the vehicle that `path` stands for, checked, with the gains of its file: a plain name is a built-in one
-/// first, then a file.
+/// Reads and checks the vehicle that `path` names, including the gains in its file. A plain name is first looked up
+/// among the built-in vehicles, then as a file.
 ///
 /// # Errors
 /// The first mistake, as one line.
@@ -21,19 +21,19 @@ pub fn vehicle_named(path: &Path) -> Result<Vehicle, FileError> {
         },
         None => afbc_vehicles::load(path),
     }?;
-    // Gains of every law, so that a slip in a table's name is reported whoever flies.
+    // Reads the gains of every law, so that a misspelt table is reported whichever law flies.
     Law::on(ControllerKind::Afbc, &vehicle, Profile::Flight)?;
     Ok(vehicle)
 }
 
-/// Reads and checks a vehicle from its `text`, with the gains of every law. `file` is its path for errors, `name` its
-/// name if it has no other.
+/// Reads and checks a vehicle from its `text`, with the gains of every law. `file` is its path in errors; `name` is its
+/// name if the text gives none.
 ///
 /// # Errors
 /// Every mistake, each as one line.
 pub fn vehicle_of(file: &str, text: &str, name: &str) -> Result<Vehicle, FileError> {
     let read = afbc_vehicles::parse(file, text, name);
-    // Where the file is wrong elsewhere, gains are checked on a vehicle that is not.
+    // If the file has other mistakes, its gains are checked on a built-in vehicle.
     let base = match &read {
         Ok(vehicle) => Some(vehicle.clone()),
         Err(_) => BUILT_IN.iter().find_map(|known| known.read().ok()),

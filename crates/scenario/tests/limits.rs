@@ -1,5 +1,5 @@
-//! Every reference that a file describes keeps the limits that it was given, and a controller's; anything else is
-//! refused in one line. Velocities and accelerations are taken from differences of positions.
+//! Every reference described by a file keeps its given limits and a controller's limits; anything else is refused in
+//! one line. The tests compute velocities and accelerations from differences of positions.
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "tests")]
 
 use afbc_scenario::trajectory::Trajectory;
@@ -9,7 +9,7 @@ use nalgebra::Vector3;
 use proptest::prelude::*;
 use std::fmt::Write as _;
 
-/// The longest flight \[s\].
+/// Longest flight \[s\].
 const LONGEST_S: f64 = 36_000.0;
 
 /// A place: position and heading.
@@ -26,7 +26,7 @@ fn read(trajectory: &str) -> Result<Trajectory, String> {
     read.map(|scenario| scenario.trajectory)
 }
 
-/// Numbers of every size between these, with either sign.
+/// Numbers of every magnitude between `least` and `most`, with either sign.
 fn sized(least: f64, most: f64) -> impl Strategy<Value = f64> {
     (prop::bool::ANY, least.ln()..most.ln()).prop_map(|(minus, size)| if minus { -size.exp() } else { size.exp() })
 }
@@ -39,7 +39,7 @@ fn anywhere(least_m: f64, most_m: f64) -> impl Strategy<Value = Vector3<f64>> {
     [sized(least_m, most_m), sized(least_m, most_m), sized(least_m, most_m)].prop_map(Vector3::from)
 }
 
-/// Steps to the next place: of any size, nearly none, straight on, back, the other way.
+/// Places whose steps are of any size, nearly zero, straight on, or back.
 fn places() -> impl Strategy<Value = Vec<Place>> {
     let step = prop_oneof![
         2 => anywhere(0.3, 3.0),
@@ -71,18 +71,18 @@ fn minimum_snap(places: &[Place], speed_m_s: f64, acceleration_m_s2: f64) -> Res
     read(&text)
 }
 
-/// Largest speed and acceleration by differences of positions, 2,000 of each piece.
+/// Largest speed and acceleration from differences of positions, 2,000 per piece.
 fn by_differences(trajectory: &Trajectory) -> [f64; 2] {
     let Trajectory::Polynomials(pieces) = trajectory else { panic!("{trajectory:?}") };
     let mut peaks = [0.0_f64; 2];
     for piece in pieces {
-        // Within the piece and about its start, where positions and times are exact to the last bits.
+        // Times within the piece and relative to its start, where positions and times are exact to the last bits.
         let h = piece.duration_s / 2_000.0;
         let places: Vec<_> = (0..=2_000).map(|k| piece.at(piece.start_s + h * f64::from(k)).position_m).collect();
         for three in places.windows(3) {
             let speed = (three[2] - three[0]).norm() / (2.0 * h);
             let acceleration = (three[2] - three[1] * 2.0 + three[0]).norm() / (h * h);
-            // Rounding of positions, and of times, in which the path moves on.
+            // Rounding error of positions, and of times, during which the path moves on.
             let rounding = 4.0 * f64::EPSILON * (three[1].norm() + speed * piece.end_s());
             peaks = [peaks[0].max(speed - rounding / h), peaks[1].max(acceleration - 4.0 * rounding / (h * h))];
         }
@@ -90,7 +90,7 @@ fn by_differences(trajectory: &Trajectory) -> [f64; 2] {
     peaks
 }
 
-/// The smallest turn from one heading to another.
+/// Returns the smallest turn from one heading to another.
 fn short_turn(from_rad: f64, to_rad: f64) -> f64 {
     let turn_rad = (to_rad - from_rad).rem_euclid(TAU);
     if turn_rad > PI { turn_rad - TAU } else { turn_rad }
@@ -99,7 +99,8 @@ fn short_turn(from_rad: f64, to_rad: f64) -> f64 {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 400, failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// Through any places: a path that keeps its limits, ends within a flight and stays near them, or none.
+    /// Through any places there is a path that keeps its limits, ends within a flight and stays near the places; or
+    /// none is returned.
     #[test]
     fn minimum_snap_keeps_its_limits_or_is_refused(
         places in places(),
@@ -117,7 +118,7 @@ proptest! {
         let trajectory = match read {
             Ok(trajectory) => trajectory,
             Err(told) => {
-                // A path through distances that are alike is refused only where it takes too long.
+                // A path through similar distances is refused only if it takes too long.
                 let seconds = 10.0 * (longest_m / speed_m_s + (longest_m / acceleration_m_s2).sqrt()) * 8.0;
                 prop_assert!(longest_m > 5.0 * shortest_m || seconds > LONGEST_S, "{told}");
                 return Ok(());
@@ -134,7 +135,7 @@ proptest! {
             for (at, (position_m, _)) in [start, end].iter().zip(pair) {
                 prop_assert!((at.position_m - position_m).norm() < 1e-6 * longest_m, "{at:?}, not {position_m}");
             }
-            // The short way round from the heading before.
+            // The short way round from the previous heading.
             heading_rad += short_turn(heading_rad, pair[1].1);
             prop_assert!((end.yaw_rad - heading_rad).abs() < 1e-6, "{} not {heading_rad}", end.yaw_rad);
             for k in 0..100 {
@@ -144,7 +145,8 @@ proptest! {
         }
     }
 
-    /// Waypoints of any distances, times and headings: what a controller accepts, the short way round, or none.
+    /// Waypoints with any distances, times and headings give a reference that a controller accepts and that turns the
+    /// short way round; or they are refused.
     #[test]
     fn waypoints_are_for_a_controller_or_are_refused(
         places in places(),
@@ -165,14 +167,14 @@ proptest! {
             for k in 0..=100 {
                 prop_assert!(at(f64::from(k) / 101.0).setpoint().is_plausible());
             }
-            // A blend of 1/2 in the middle of a leg.
+            // In the middle of a leg, half of the turn is done.
             let turned_rad = 2.0 * (at(0.5).yaw_rad - at(0.0).yaw_rad);
             prop_assert!((turned_rad - short_turn(pair[0].1, pair[1].1)).abs() < 1e-6, "{turned_rad}");
         }
     }
 
-    /// Circles, lemniscates and lissajous figures of any size and pace: as fast as asked for, and what a controller
-    /// accepts at any time, or none.
+    /// Circles, lemniscates and Lissajous figures of any size have the requested pace and are accepted by a controller
+    /// at any time; or they are refused.
     #[test]
     fn curves_have_the_pace_asked_for_or_are_refused(
         centre_m in anywhere(1e-3, 1e4),
@@ -205,8 +207,8 @@ proptest! {
     }
 }
 
-/// A lap and a second path put together, whose common point is there twice: at any distance it is refused, by the
-/// waypoint, or flown as fast as allowed and no wider than the lap.
+/// A lap joined with a second path, so that their common point appears twice. At any distance of the two points, the
+/// waypoint is refused, or the path is as fast as allowed and no wider than the lap.
 #[test]
 fn a_doubled_waypoint_is_refused_or_harmless() {
     for (apart_m, is_flown) in
@@ -218,13 +220,13 @@ fn a_doubled_waypoint_is_refused_or_harmless() {
         assert_eq!(read.is_ok(), is_flown, "{apart_m}: {read:?}");
         match read {
             Ok(lap) => assert!(lap.end_s().unwrap() < 25.0, "{lap:?}"),
-            // The sixth waypoint's position.
+            // The error names the sixth waypoint's position.
             Err(told) => assert!(told.starts_with("mine.toml:21: trajectory.waypoint.position_m: "), "{told}"),
         }
     }
 }
 
-/// From 3.1 to -3.1 by 0.083 rad, in every kind that has headings of its own.
+/// From 3.1 to -3.1 the heading turns by 0.083 rad, in every kind with its own headings.
 #[test]
 fn headings_turn_the_short_way_round() {
     let folder = std::path::PathBuf::from(env!("CARGO_TARGET_TMPDIR"));

@@ -1,4 +1,4 @@
-//! Laws from outside the list.
+//! Tests users' laws, which are not in the list.
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "tests")]
 
 use afbc::Profile;
@@ -8,7 +8,7 @@ use afbc_scenario::{OWN_GAINS_MAX, OwnController, OwnGain, OwnLaw, OwnVehicle};
 use afbc_types::{Declared, Inputs, PLUS, Parameters, Setpoint, State};
 use proptest::prelude::*;
 
-/// Gives what it was asked for, and more yaw with each step.
+/// A law that returns fixed inputs, with more yaw at each step.
 struct Counting {
     inputs: Inputs,
     steps: f32,
@@ -27,7 +27,7 @@ fn counting(name: &'static str, inputs: Inputs) -> ControllerKind {
 
 const HOVER: Inputs = Inputs { roll_n: 0.0, pitch_n: 0.0, yaw_n: 0.0, thrust_n: 0.486 * 9.81 };
 
-/// Every flight begins with a law that has not flown, also from a controller that has.
+/// Every flight begins with a law that has not flown, even if the controller has.
 #[test]
 fn each_flight_has_a_law_of_its_own() {
     let contender = Contender::of(counting("counts", HOVER), Profile::Flight);
@@ -44,7 +44,7 @@ fn each_flight_has_a_law_of_its_own() {
 }
 
 proptest! {
-    /// Whatever a law returns, the rotors turn at finite speeds, within their limits.
+    /// Whatever a law returns, the rotors turn at finite speeds within their limits.
     #[test]
     fn no_input_reaches_the_rotors_unchecked(inputs in prop::array::uniform4(prop::num::f32::ANY)) {
         let [roll_n, pitch_n, yaw_n, thrust_n] = inputs;
@@ -58,7 +58,7 @@ proptest! {
     }
 }
 
-/// Names and gains that cannot be are refused by a line that says why.
+/// Invalid names and gains are refused in one line that gives the reason.
 #[test]
 fn what_cannot_be_registered_is_refused() {
     let law = |name| OwnLaw::new(name, |_: &OwnVehicle| Counting { inputs: HOVER, steps: 0.0 });
@@ -79,7 +79,7 @@ fn what_cannot_be_registered_is_refused() {
     assert_eq!(ControllerKind::named("mine"), None);
 }
 
-/// A law may be registered anew while it is made for a flight, as by another thread.
+/// A law may be registered again while it is being made for a flight, as by another thread.
 #[test]
 fn making_a_law_holds_up_no_one() {
     let again = || OwnLaw::new("anew", |_| Counting { inputs: HOVER, steps: 0.0 }).register();
@@ -93,7 +93,7 @@ fn making_a_law_holds_up_no_one() {
     assert!(action.given.thrust_n > 0.0);
 }
 
-/// A scenario file flies it, under its own name or another, and sets its gains; a vehicle's file too.
+/// A scenario file flies a registered law, under its own name or another, and sets its gains; so does a vehicle's file.
 #[test]
 fn files_know_it() {
     let gains = [OwnGain::new("kp_1_s2", "1/s2", 2.0, [0.1, 50.0]), OwnGain::new("ki", "1", 1.0, [0.1, 50.0])];
@@ -116,7 +116,8 @@ fn files_know_it() {
     let refused = afbc_scenario::parse("test.toml", &wrong, "test").unwrap_err().to_string();
     assert!(refused.contains("test.toml:9:") && refused.contains("kp_1_s2"), "{refused}");
 
-    // Slower by the power of time in its unit, unless the vehicle's file says otherwise.
+    // On a slower vehicle, the gain decreases by the power of time in its unit, unless the vehicle's file has its own
+    // value.
     let vehicle = afbc_vehicles::built_in("crazyflie").unwrap();
     let scaled = Contender::of(kind, Profile::Flight).on(&vehicle.read().unwrap(), Profile::Flight).unwrap();
     let [kp, ki] = values(&scaled.law)[..] else { panic!("two gains") };

@@ -1,4 +1,4 @@
-//! Paths of one's own: minimum snap through waypoints, samples and polynomials from files.
+//! Tests users' paths: minimum snap through waypoints, samples and polynomials from files.
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "tests")]
 
 use afbc_scenario::trajectory::minimum_snap::{PaceLimits, distance_m, minimum_snap};
@@ -14,7 +14,7 @@ const LIMITS: PaceLimits = PaceLimits { speed_m_s: 3.0, acceleration_m_s2: 4.0 }
 fn places() -> impl Strategy<Value = Vec<[f64; 4]>> {
     let place = (-20.0..20.0, -20.0..20.0, 0.5..20.0, -3.0..3.0)
         .prop_map(|(x, y, z, yaw): (f64, f64, f64, f64)| [x, y, z, yaw]);
-    // Distances that differ by more than five times may have no path that is near the places.
+    // If distances differ by a factor of more than five, there may be no path close to the places.
     prop::collection::vec(place, 2..12).prop_filter("distances alike", |places| {
         let lengths_m = places.windows(2).map(|pair| distance_m(&pair[0], &pair[1]));
         let (shortest_m, longest_m) = lengths_m.fold((50.0, 0.5), |(a, b), m| (f64::min(a, m), f64::max(b, m)));
@@ -22,13 +22,13 @@ fn places() -> impl Strategy<Value = Vec<[f64; 4]>> {
     })
 }
 
-/// Value of the derivative of this order at `s`, term by term.
+/// Returns the derivative of this order at `s`, computed term by term.
 fn derivative(coefficients: &Coefficients, order: i32, s: f64) -> f64 {
     let falling = |power: i32| (0..order).map(|k| f64::from(power - k)).product::<f64>();
     (order..8).map(|power| coefficients[power as usize] * falling(power) * s.powi(power - order)).sum()
 }
 
-/// Integral of the squared snap of x, y, z, by Simpson's rule.
+/// Returns the integral of the squared snap of x, y, z, by Simpson's rule.
 fn cost(pieces: &[PolynomialPiece]) -> f64 {
     let of_piece = |piece: &PolynomialPiece| {
         let snap = |s: f64| (0..3).map(|i| derivative(&piece.coefficients[i], 4, s).powi(2)).sum::<f64>();
@@ -44,7 +44,8 @@ fn cost(pieces: &[PolynomialPiece]) -> f64 {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
-    /// From rest to rest, through every place, six derivatives continuous, and at one of the limits.
+    /// The path goes from rest to rest through every place, has six continuous derivatives, and reaches one of the
+    /// limits.
     #[test]
     fn minimum_snap_is_smooth_and_as_fast_as_allowed(places in places()) {
         let pieces = minimum_snap(&places, 2.0, LIMITS).unwrap();
@@ -58,7 +59,7 @@ proptest! {
         }
         for (piece, place) in pieces.iter().zip(&places) {
             for (axis, value) in place.iter().enumerate() {
-                // A heading but for whole turns.
+                // Headings are equal up to whole turns.
                 let whole = if axis == 3 { TAU * ((piece.coefficients[axis][0] - value) / TAU).round() } else { 0.0 };
                 prop_assert!((piece.coefficients[axis][0] - value - whole).abs() < 1e-9);
             }
@@ -78,8 +79,8 @@ proptest! {
         prop_assert!(speed > 0.99 * LIMITS.speed_m_s || acceleration > 0.99 * LIMITS.acceleration_m_s2);
     }
 
-    /// No other motion through the same places at the same times has less snap: a bump that moves one piece and keeps
-    /// its ends, with three derivatives, costs more.
+    /// No other motion through the same places at the same times has less snap: a bump in two neighbouring pieces,
+    /// which keeps places and three derivatives at the outer ends, costs more.
     #[test]
     fn no_bump_lessens_the_snap(
         places in places(),
@@ -89,17 +90,18 @@ proptest! {
         let pieces = minimum_snap(&places, 0.0, LIMITS).unwrap();
         let mut bumped = pieces.clone();
         let at = at % bumped.len();
-        // (s (T - s))^4 needs degree eight; two neighbours' knots are moved instead: velocity at the knot between.
+        // A bump (s (T - s))^4 in one piece would need degree eight. Instead the velocity at the knot between two
+        // pieces is changed.
         prop_assume!(at + 1 < bumped.len());
         let [left, right] = [bumped[at].duration_s, bumped[at + 1].duration_s];
         let knot = |t: f64| -> Coefficients {
-            // A septic with velocity 1 at 0, all else zero at both ends.
+            // A septic with velocity 1 at 0 and all other end conditions zero.
             [0.0, 1.0, 0.0, 0.0, -20.0 / t.powi(3), 45.0 / t.powi(4), -36.0 / t.powi(5), 10.0 / t.powi(6)]
         };
         for (i, c) in knot(right).iter().enumerate() {
             bumped[at + 1].coefficients[0][i] += size * c;
         }
-        // The same, mirrored in time, for the piece before.
+        // The same septic, mirrored in time, for the previous piece.
         let mirrored = knot(left);
         let shifted = |power: i32| {
             let binomial = |n: i32, k: i32| (0..k).map(|i| f64::from(n - i) / f64::from(i + 1)).product::<f64>();
@@ -114,7 +116,7 @@ proptest! {
     }
 }
 
-/// A folder for a test's files.
+/// Returns a folder for a test's files.
 fn folder(name: &str) -> PathBuf {
     let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(name);
     fs::create_dir_all(&folder).unwrap();
@@ -129,7 +131,7 @@ fn scenario(folder: &std::path::Path, path: &str, keys: &str) -> Result<Trajecto
     scenario.map(|scenario| scenario.trajectory).map_err(|error| error.to_string())
 }
 
-/// Samples of a known path, with and without derivatives, become a path that follows it, the better the more is known.
+/// Samples of a known path give a path that follows it; the more derivatives are known, the closer.
 #[test]
 fn samples_become_the_path_that_they_come_from() {
     let folder = folder("samples");
@@ -164,7 +166,7 @@ fn samples_become_the_path_that_they_come_from() {
         errors.push((20..180).map(|i| error(0.1 * f64::from(i) + 0.05)).fold(0.0, f64::max));
     }
     assert!(errors[0] < 1e-3 && errors.is_sorted_by(|a, b| a > b), "{errors:?}");
-    // Twice as fast, from another time on: the same places, twice the speed.
+    // With another start and twice the pace: the same places at twice the speed.
     let slow = scenario(&folder, &write(",psi_rad", 1.0), "").unwrap();
     let fast = scenario(&folder, &write(",psi_rad", 1.0), "start_s = 3.0\npace = 2.0").unwrap();
     for t in [0.5, 4.25, 9.75] {
@@ -175,7 +177,7 @@ fn samples_become_the_path_that_they_come_from() {
     }
 }
 
-/// A heading that wraps turns on.
+/// A wrapping heading turns on without a jump.
 #[test]
 fn headings_do_not_jump() {
     let folder = folder("headings");
@@ -192,7 +194,7 @@ fn headings_do_not_jump() {
     }
 }
 
-/// The Crazyflie's polynomials, in its tools' own columns.
+/// Flies the Crazyflie's polynomials with the columns of its tools.
 #[test]
 fn polynomials_are_flown_as_they_are() {
     let folder = folder("polynomials");
@@ -203,7 +205,7 @@ fn polynomials_are_flown_as_they_are() {
     let row = |duration: f64, x: [f64; 3]| {
         format!("{duration},{},{},{},0,0,0,0,0,{}1{}\n", x[0], x[1], x[2], "0,".repeat(8), ",0".repeat(15))
     };
-    // 0.5 t^2 for 2 s, then on at 2 m/s: 2 + 2 t.
+    // x = 0.5 t^2 for 2 s, then on at 2 m/s: 2 + 2 t.
     let text = format!("{head}\n{}{}", row(2.0, [0.0, 0.0, 0.5]), row(1.0, [2.0, 2.0, 0.0]));
     let read = scenario(&folder, &text, "").unwrap();
     assert_eq!(
@@ -216,7 +218,7 @@ fn polynomials_are_flown_as_they_are() {
     assert!(refused.contains("path.csv:3: duration: it begins 0.500 m"), "{refused}");
 }
 
-/// Semicolons with decimal commas, as spreadsheets write where a comma is decimal, and tabs.
+/// Tabs, and semicolons with decimal commas, as spreadsheets write in countries with decimal commas.
 #[test]
 fn a_path_may_be_separated_otherwise() {
     let folder = folder("separated");
@@ -232,7 +234,7 @@ fn a_path_may_be_separated_otherwise() {
     }
 }
 
-/// Whatever is wrong with a file is told in one line with its name, line and column.
+/// A mistake in a file is reported in one line with the file's name, line and column.
 #[test]
 fn what_is_wrong_is_told_in_one_line() {
     let folder = folder("wrong");

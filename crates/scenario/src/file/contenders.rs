@@ -1,4 +1,4 @@
-//! `controllers`, `profile`, `monitor` and `[[contender]]`: the contenders.
+//! Reads the contenders: `controllers`, `profile`, `monitor` and `[[contender]]`.
 
 use super::control::settings;
 use crate::contender::{Contender, ControllerKind, Law};
@@ -11,7 +11,7 @@ use afbc_vehicles::Vehicle;
 /// Longest name of a contender that fits the tables.
 const NAME_LENGTH: usize = 32;
 
-/// The vehicle that contenders fly: one of a file, or the paper's with these nominal parameters.
+/// Vehicle that the contenders fly: from a vehicle file, or the paper's with these nominal parameters.
 #[derive(Clone, Copy)]
 pub(super) enum Flown<'a> {
     File(&'a Vehicle),
@@ -19,7 +19,7 @@ pub(super) enum Flown<'a> {
 }
 
 impl Flown<'_> {
-    /// Gains of AFBC.
+    /// Returns AFBC's gains for the vehicle.
     fn gains(self, profile: Profile) -> PerAxis<adaptive::Gains> {
         match self {
             Flown::File(vehicle) => vehicle.gains(profile),
@@ -34,7 +34,7 @@ impl Flown<'_> {
         }
     }
 
-    /// The law of this kind, AFBC's gains being `afbc`.
+    /// Returns the law of this kind; `afbc` are AFBC's gains.
     fn law(self, kind: ControllerKind, profile: Profile, afbc: &PerAxis<adaptive::Gains>) -> Result<Law, FileError> {
         let law = Law::beside(kind, afbc);
         match self {
@@ -47,14 +47,14 @@ impl Flown<'_> {
     }
 }
 
-/// Defaults of a contender.
+/// Defaults for a contender.
 #[derive(Clone, Copy)]
 struct Defaults<'a> {
     flown: Flown<'a>,
     profile: Profile,
     gains: PerAxis<adaptive::Gains>,
     settings: Settings,
-    /// Whether AFBC flies under its monitor.
+    /// True if AFBC flies under its monitor.
     monitor: bool,
 }
 
@@ -77,9 +77,9 @@ pub(super) fn read(root: &mut Table<'_>, flown: Flown<'_>) -> Result<Vec<Contend
     let defaults = Defaults { flown, profile, gains: axes, settings, monitor };
 
     let tables = root.few_tables("contender")?;
-    // A file that lists contenders of its own wants no others unless it names them.
+    // A file that lists its own contenders has no others unless `controllers` names them.
     let kinds = controllers.unwrap_or(if tables.is_empty() { ControllerKind::PAPER.to_vec() } else { Vec::new() });
-    // The gains may be those of the vehicle's file.
+    // An error may be in the gains of the vehicle's file.
     let of_vehicle = |error| root.through("vehicle", error);
     let contenders = kinds.into_iter().map(|kind| defaults.contender(kind)).collect::<Result<Vec<_>, _>>();
     let mut contenders = contenders.map_err(of_vehicle)?;
@@ -104,7 +104,7 @@ fn contender(mut table: Table<'_>, file: Defaults<'_>, others: &[Contender]) -> 
         Some(profile) => Defaults {
             profile,
             gains: file.flown.gains(profile),
-            // One step serves all contenders, whatever the profile's is.
+            // All contenders use the file's time step, whatever the profile's is.
             settings: file.flown.settings(profile).with_dt_s(file.settings.common.dt_s),
             ..file
         },

@@ -1,10 +1,10 @@
-//! `[settings]` and `[limits]` of a file or a contender.
+//! Reads `[settings]` and `[limits]` of a file or a contender.
 
 use afbc::Settings;
 use afbc_files::read::{FileError, Table};
 
-/// Reads `[settings]` and `[limits]` in `parent`; missing keys are as in `default`. Only the file's own have a time
-/// step.
+/// Reads `[settings]` and `[limits]` in `parent`; missing keys are taken from `default`. Only the file's own settings
+/// may have a time step.
 pub(super) fn settings(parent: &mut Table<'_>, default: Settings, with_step: bool) -> Result<Settings, FileError> {
     let mut settings = default;
     if let Some(mut table) = parent.table("settings")? {

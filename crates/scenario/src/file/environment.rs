@@ -1,4 +1,4 @@
-//! `[[gust]]`, `[[change]]`, `[[payload]]` and `[[outage]]`: events in flight.
+//! Reads the events in flight: `[[gust]]`, `[[change]]`, `[[payload]]` and `[[outage]]`.
 
 use crate::definition::Outage;
 use afbc_files::read::words::out_of_range;
@@ -10,11 +10,11 @@ use afbc_types::{Axis, Parameters, Range};
 
 /// Accepted start of an event \[s\].
 pub(super) const START: Range = Range::new("start_s", 0.0, 36_000.0);
-/// Accepted duration of an event \[s\]; without one it lasts to the end.
+/// Accepted duration of an event \[s\]; an event without a duration lasts to the end.
 pub(super) const LENGTH: Range = Range::new("duration_s", 0.001, 36_000.0);
-/// Accepted factor of a change; the result must also be in range.
+/// Accepted factor of a change; the changed parameter must also be in its range.
 const FACTOR: Range = Range::new("factor", 0.001, 1000.0);
-/// Accepted factor on a moment of the rotors; below 0 it has the wrong sign.
+/// Accepted factor on a moment of the rotors; below 0 the moment has the wrong sign.
 const MOMENT_FACTOR: Range = Range::new("factor", -1000.0, 1000.0);
 /// Accepted mass of a payload \[kg\].
 const PAYLOAD_MASS: Range = Range::new("mass_kg", 0.0, afbc_plant::PAYLOAD_MASS.max);
@@ -30,7 +30,7 @@ const ANGULAR: [(Range, GustKind); 2] = [
     (Range::new("moment_n_m", -10_000.0, 10_000.0), GustKind::Force),
 ];
 
-/// What masses and rotors depend on.
+/// Keys on which masses and rotors depend.
 const ALL: &[&str] = &["truth", "vehicle", "change", "payload"];
 
 /// Reads the environment of a vehicle with these true parameters.
@@ -40,7 +40,7 @@ pub(super) fn read(root: &mut Table<'_>, truth: Parameters<f64>) -> Result<Envir
     let mut environment = Environment::new(truth, Vec::new(), gusts)
         .map_err(|error| root.fault_at("truth", format!("{}; change it", out_of_range(&error))))?;
     for mut table in tables {
-        // Overlapping changes multiply, so each is checked together with those before it.
+        // Overlapping changes multiply, so each change is checked together with the previous ones.
         let mut changes = environment.changes().to_vec();
         changes.push(change(&mut table)?);
         table.finish()?;

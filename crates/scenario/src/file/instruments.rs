@@ -1,5 +1,5 @@
-//! `[instruments]`, `[told]` and `[[instrument_fault]]`: the sensors of a real vehicle, for its estimator, and what it
-//! is told of them.
+//! Reads `[instruments]`, `[told]` and `[[instrument_fault]]`: the sensors of a real vehicle for its estimator, and the
+//! sensor properties that its software is told.
 
 use super::environment::interval;
 use crate::told::{Told, stated};
@@ -8,11 +8,11 @@ use afbc_plant::InstrumentSuite;
 use afbc_plant::instruments::{Barometer, Failure, Gnss, Imu, InstrumentFault, Magnetometer, TrackerModel, limits};
 use afbc_vehicles::{Vehicle, parts};
 
-/// Reads the instruments of `table`; none without it.
+/// Reads the instruments of `table`; without a table there are none.
 pub(super) fn read(table: Option<Table<'_>>) -> Result<InstrumentSuite, FileError> {
     let Some(mut table) = table else { return Ok(InstrumentSuite::default()) };
     let suite = suite(&mut table, &InstrumentSuite::default())?;
-    // First, for an unknown key may be a misspelt imu.
+    // First, since an unknown key may be a misspelt `imu`.
     table.finish()?;
     if suite.imu.is_none() {
         table.clash("imu", &[], "missing; add it, since the other instruments have no effect without it")?;
@@ -20,7 +20,8 @@ pub(super) fn read(table: Option<Table<'_>>) -> Result<InstrumentSuite, FileErro
     Ok(suite)
 }
 
-/// Reads the instruments in `table`; of each, what a table of its own leaves out is as in `base`, or perfect.
+/// Reads the instruments in `table`. Keys that an instrument's own table leaves out are taken from `base`, or are
+/// perfect.
 fn suite(table: &mut Table<'_>, base: &InstrumentSuite) -> Result<InstrumentSuite, FileError> {
     let InstrumentSuite { imu, tracker, gnss, barometer, magnetometer } = *base;
     Ok(InstrumentSuite {
@@ -32,7 +33,7 @@ fn suite(table: &mut Table<'_>, base: &InstrumentSuite) -> Result<InstrumentSuit
     })
 }
 
-/// Reads what the vehicle is told of `instruments`: a table with what differs, or a word.
+/// Reads the properties of `instruments` that the vehicle is told: a table with the differences, or a word.
 pub(super) fn told(
     root: &mut Table<'_>,
     instruments: &InstrumentSuite,

@@ -1,4 +1,4 @@
-//! Scenario files. `docs/scenarios.md` describes each key.
+//! Reads scenario files. `docs/scenarios.md` describes each key.
 
 mod contenders;
 mod control;
@@ -42,7 +42,8 @@ pub fn load(path: &Path) -> Result<Scenario, FileError> {
     parse(&path.display().to_string(), &text, &stem)
 }
 
-/// Reads and checks a scenario from its `text`. `file` is its path for errors, `name` its name if it has no other.
+/// Reads and checks a scenario from its `text`. `file` is its path in errors; `name` is its name if the text gives
+/// none.
 ///
 /// # Errors
 /// Every mistake, each as one line.
@@ -50,10 +51,10 @@ pub fn parse(file: &str, text: &str, name: &str) -> Result<Scenario, FileError> 
     afbc_files::read::document(file, text, SAMPLE, |root| read(root, name, None))
 }
 
-/// Reads the scenario in `root`; `name` and `trajectory` are the defaults.
+/// Reads the scenario in `root`; `name` and `trajectory` are defaults.
 ///
 /// # Errors
-/// The first mistake, as one line. [`afbc_files::read::document`] goes on behind it.
+/// The first mistake, as one line. [`afbc_files::read::document`] then looks for further mistakes.
 pub fn read(mut root: Table<'_>, name: &str, trajectory: Option<&Trajectory>) -> Result<Scenario, FileError> {
     let [name, description] = afbc_files::read::title(&mut root, name)?;
     let duration_s = root.number(&DURATION)?.unwrap_or(DURATION_S);
@@ -120,13 +121,13 @@ pub fn read(mut root: Table<'_>, name: &str, trajectory: Option<&Trajectory>) ->
         contenders,
     };
     root.finish()?;
-    // By itself and first, so that the error says that leaving it out is a cure.
+    // Checked separately and first, so that the error can name leaving out `flight_core` as a cure.
     if let Err(error) = scenario.check_flight_core() {
         let problem = format!("it cannot fly with {}; change that, or leave flight_core out", out_of_range(&error));
         let with = &["initial", "trajectory", "settings", "contender", "controllers", "profile", "vehicle"];
         root.clash("flight_core", with, problem)?;
     }
-    // Final check of combinations that the tables accept.
+    // Final check of combinations that the tables accept one by one.
     if let Err(error) = scenario.check() {
         root.clash(error.range.name, &[], format!("{}; change it", out_of_range(&error)))?;
     }

@@ -1,4 +1,4 @@
-//! `[initial]`: the initial state.
+//! Reads `[initial]`, the initial state.
 
 use crate::trajectory::Reference;
 use afbc_files::read::{FileError, Table};
@@ -6,18 +6,18 @@ use afbc_plant::Motion;
 use afbc_types::Range;
 use nalgebra::Vector3;
 
-/// Accepted coordinates \[m\].
+/// Accepted coordinates of a position \[m\].
 pub(super) const POSITION: Range = Range::new("position_m", -1e4, 1e4);
 /// Accepted speed along each axis \[m/s\].
 const VELOCITY: Range = Range::new("velocity_m_s", -100.0, 100.0);
-/// Accepted roll and pitch \[rad\]: a vehicle at 90 degrees is lost (A3).
+/// Accepted roll and pitch \[rad\]: a vehicle at 90 degrees is lost (assumption A3).
 const TILT: Range = Range::new("attitude_rad", -1.5, 1.5);
 /// Accepted yaw \[rad\].
 const YAW: Range = Range::new("attitude_rad", -100.0, 100.0);
 /// Accepted rate about each axis \[rad/s\].
 const RATES: Range = Range::new("rates_rad_s", -100.0, 100.0);
 
-/// Reads the motion in `table`; missing keys are as at the start of the reference, level and without rates.
+/// Reads the motion in `table`. Missing keys are as at the start of the reference, level and without rates.
 pub(super) fn initial(table: Option<Table<'_>>, start: &Reference) -> Result<Motion, FileError> {
     let default = Motion {
         position_m: start.position_m,

@@ -1,6 +1,6 @@
-//! `kind = "file"`: a path of one's own, from a file of comma-separated values.
+//! Reads `kind = "file"`: the user's own path, from a file of comma-separated values.
 //!
-//! Either samples over time, with the columns of a flight's log, or the polynomials of the Crazyflie's tools
+//! The file has either samples over time, with the columns of a flight log, or polynomials of the Crazyflie's tools
 //! (`duration,x^0,...,x^7,y^0,...,yaw^7`).
 
 use super::reference::{START, flyable};
@@ -14,15 +14,15 @@ use std::path::Path;
 
 /// Key of the file's path.
 const FILE: &str = "file";
-/// Accepted factor of the speed.
+/// Accepted factor on the speed.
 const PACE: Range = Range::new("pace", 0.01, 100.0);
-/// Most lines of a path.
+/// Largest number of lines of a path.
 const LINES: usize = 200_000;
-/// Largest coordinate, and largest angle \[m, rad\].
+/// Largest coordinate and largest angle \[m, rad\].
 const LARGEST: f64 = 10_000.0;
 /// First column of a file of polynomials.
 const DURATION: &str = "duration";
-/// Coordinates, with the names of their columns: value, first and second derivative.
+/// Coordinates with the columns of their value, first and second derivative.
 const COLUMNS: [[&[&str]; 3]; 4] = [
     [&["x_m"], &["vx_m_s"], &["ax_m_s2"]],
     [&["y_m"], &["vy_m_s"], &["ay_m_s2"]],
@@ -30,7 +30,7 @@ const COLUMNS: [[&[&str]; 3]; 4] = [
     [&["yaw_rad", "psi_rad"], &["yaw_rate_rad_s"], &["yaw_acceleration_rad_s2"]],
 ];
 
-/// Reads the path that the table names, relative to the folder of its own file.
+/// Reads the path that the table names, relative to the folder of the scenario's file.
 pub(super) fn read(table: &mut Table<'_>) -> Result<Trajectory, FileError> {
     let named = table.need_text(FILE, "give the path of a file of comma-separated values")?;
     let start_s = table.number(&START)?;
@@ -58,12 +58,12 @@ pub(super) fn read(table: &mut Table<'_>) -> Result<Trajectory, FileError> {
     Ok(path)
 }
 
-/// The piece `pace` times as fast, of a path that begins at `start_s` instead of `first_s`.
+/// Returns a piece flown `pace` times as fast, of a path that begins at `start_s` instead of `first_s`.
 fn paced(piece: &PolynomialPiece, first_s: f64, start_s: f64, pace: f64) -> PolynomialPiece {
     let mut coefficients = piece.coefficients;
     for axis in &mut coefficients {
         let mut factor = 1.0;
-        // With s at `pace` times the speed, the coefficient of s^k takes the k-th power of it.
+        // At `pace` times the speed, the coefficient of s^k is multiplied by pace^k.
         for coefficient in axis {
             *coefficient *= factor;
             factor *= pace;
@@ -73,7 +73,7 @@ fn paced(piece: &PolynomialPiece, first_s: f64, start_s: f64, pace: f64) -> Poly
     PolynomialPiece { start_s, duration_s: piece.duration_s / pace, coefficients }
 }
 
-/// The file.
+/// A path's file.
 struct Lines<'a> {
     source: Source<'a>,
 }
@@ -133,7 +133,7 @@ impl Lines<'_> {
         Ok(through(&samples.knots()))
     }
 
-    /// Reads polynomials, one after the other.
+    /// Reads polynomials that follow one another.
     fn polynomials(&self, head: &StringRecord, rows: &[StringRecord]) -> Result<Vec<PolynomialPiece>, FileError> {
         let names = ["x", "y", "z", "yaw"].map(|axis| (0..COEFFICIENTS).map(move |power| format!("{axis}^{power}")));
         let expected: Vec<String> = core::iter::once(DURATION.to_owned()).chain(names.into_iter().flatten()).collect();
@@ -165,7 +165,7 @@ impl Lines<'_> {
         Ok(pieces)
     }
 
-    /// Checks that a piece begins where, as fast as and with the heading with which the one before ends.
+    /// Checks that a piece begins at the place, velocity and heading at which the previous piece ends.
     fn joined(&self, row: &StringRecord, before: &PolynomialPiece, piece: &PolynomialPiece) -> Result<(), FileError> {
         let [end, begin]: [Reference; 2] = [before.at(before.end_s()), piece.at(piece.start_s)];
         let jump_m = (end.position_m - begin.position_m).norm();
@@ -189,7 +189,7 @@ impl Lines<'_> {
 
     fn number(&self, row: &StringRecord, place: usize, head: &StringRecord) -> Result<f64, FileError> {
         let (text, column) = (row.get(place).unwrap_or_default(), head.get(place).unwrap_or_default());
-        // Derivatives and coefficients may be larger than the places themselves.
+        // Derivatives and coefficients may be larger than coordinates.
         let number = self.form().number(text).filter(|number| number.is_finite() && number.abs() <= 1e3 * LARGEST);
         let number = number.filter(|number| !column.ends_with("_m") || number.abs() <= LARGEST);
         number.ok_or_else(|| {
@@ -218,7 +218,7 @@ impl Lines<'_> {
     }
 }
 
-/// Returns angles without the jumps of a turn.
+/// Returns the angles without jumps of whole turns.
 fn unwrapped(mut angles: Vec<f64>) -> Vec<f64> {
     let mut before = None;
     for angle in &mut angles {

@@ -1,5 +1,5 @@
-//! `[rotors]`, `[[rotor_fault]]`, `[battery]`, `[drag]`, `[wind]` and `[ground]`: effects that the paper's vehicle
-//! lacks.
+//! Reads effects that the paper's vehicle lacks: `[rotors]`, `[[rotor_fault]]`, `[battery]`, `[drag]`, `[wind]` and
+//! `[ground]`.
 
 use super::environment::{LENGTH, START};
 use afbc_files::read::{FileError, Table};
@@ -10,11 +10,11 @@ use afbc_plant::{
 use afbc_types::{Parameters, Range};
 use afbc_vehicles::parts::{self, DragConditions};
 
-/// Accepted time from a gust's rise to its fall \[s\].
+/// Accepted time between a gust's rise and its fall \[s\].
 const HOLD: Range = Range::new("hold_s", 0.0, LENGTH.max);
 
 /// Reads the effects for a vehicle with these true parameters, this frame and at most `count` rotors, in steps of
-/// `step_s`; what the file leaves out is as in `default`.
+/// `step_s`. Missing keys are taken from `default`.
 pub(super) fn read(
     root: &mut Table<'_>,
     default: &Realism,
@@ -49,7 +49,7 @@ pub(super) fn read(
         }
         None => (default.contact, default.ground_effect),
     };
-    // The scenario's seed counts, not this one.
+    // The scenario's seed is used instead of this one.
     Ok(Realism { rotors, drag, wind, contact, ground_effect, seed: 0 })
 }
 

@@ -1,4 +1,4 @@
-//! Limits that every reference has to keep.
+//! Limits that every reference must keep.
 
 use crate::definition::DURATION;
 use crate::trajectory::{Reference, Trajectory};
@@ -8,9 +8,10 @@ use afbc_types::Range;
 /// Accepted start of a path \[s\].
 pub(super) const START: Range = Range::new("start_s", 0.0, 36_000.0);
 
-/// Refuses the key if a controller refuses the reference anywhere, as sampled, or if it ends after the longest flight.
+/// Refuses the key if a controller would refuse a sample of the reference, or if the reference lasts longer than the
+/// longest flight.
 pub(super) fn flyable(table: &Table<'_>, key: &str, trajectory: &Trajectory) -> Result<(), FileError> {
-    // First, for an unknown key may be a misspelt one that changes the path.
+    // First, since an unknown key may be a misspelt one that changes the path.
     table.finish()?;
     let mut refused: Option<Reference> = None;
     trajectory.sample(&mut |at| {
@@ -29,7 +30,8 @@ pub(super) fn flyable(table: &Table<'_>, key: &str, trajectory: &Trajectory) -> 
     Ok(())
 }
 
-/// Returns what a controller refuses of a reference, and the cure: its motion, or its place and heading.
+/// Returns a message on the part of the reference that a controller refuses, with the cure: its motion, or its place
+/// and heading.
 fn excess(at: &Reference) -> String {
     let Reference { velocity_m_s, acceleration_m_s2, jerk_m_s3, snap_m_s4, .. } = *at;
     let Reference { yaw_rad, yaw_rate_rad_s, yaw_acceleration_rad_s2, .. } = *at;

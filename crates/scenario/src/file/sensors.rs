@@ -1,21 +1,21 @@
-//! `[sensors]` and `[[sensor_fault]]`: measurement of the state for the controllers.
+//! Reads `[sensors]` and `[[sensor_fault]]`, the measurement of the state for the controllers.
 
 use super::environment::interval;
 use afbc_files::read::{FileError, Table};
 use afbc_plant::{Deviations, Dropouts, Misreading, Sensing, SensorFault};
 use afbc_types::{Axis, Range};
 
-/// Accepted single number for all coordinates: the range that every coordinate accepts.
+/// Accepted noise and bias, if given as one number for all coordinates.
 const NOISE: Range = Range::new("noise", 0.0, Deviations::ATT.range.max);
 const BIAS: Range = Range::new("bias", 0.0, Deviations::ATT.range.max);
 
 /// Accepted factor on a measured coordinate and its rate.
 const FACTOR: Range = Range::new("factor", -1000.0, 1000.0);
-/// Accepted offsets of a position and an angle.
+/// Accepted offsets of a position and of an angle.
 const OFFSET: Range = Range::new("offset_m", -10_000.0, 10_000.0);
 const TURN: Range = Range::new("offset_rad", -10.0, 10.0);
 
-/// Reads the sensors of `table`; perfect ones without it.
+/// Reads the sensors of `table`; without a table they are perfect.
 pub(super) fn read(table: Option<Table<'_>>) -> Result<Sensing, FileError> {
     let Some(mut table) = table else { return Ok(Sensing::default()) };
     let mut sensing = Sensing::DEFAULT;
@@ -27,7 +27,7 @@ pub(super) fn read(table: Option<Table<'_>>) -> Result<Sensing, FileError> {
     Ok(sensing)
 }
 
-/// Reads one number for all coordinates, or a table with one for each group.
+/// Reads one number for all coordinates, or a table with a number for each group.
 fn spread(table: &mut Table<'_>, all: &Range) -> Result<Deviations, FileError> {
     if !table.holds_table(all.name) {
         return Ok(table.number(all)?.map_or(Deviations::default(), Deviations::all));

@@ -1,4 +1,4 @@
-//! Built-in scenarios compared with the code, and `docs/scenarios.md` with both.
+//! Compares the built-in scenarios with the code, and `docs/scenarios.md` with both.
 
 #![expect(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "tests")]
 
@@ -29,7 +29,7 @@ fn built_in_scenarios_are_valid_and_named_after_their_files() {
     }
 }
 
-/// One section of the page: its example, and the rows of its table with key, range and default.
+/// A section of the page: its example, and the key, range and default in each row of its table.
 struct Section {
     example: String,
     rows: Vec<[String; 3]>,
@@ -50,7 +50,7 @@ fn sections() -> Vec<Section> {
     sections
 }
 
-/// Parses an example, with a trajectory added if it has none, and an inertial sensor if it has other instruments only.
+/// Parses an example. A trajectory is added if the example has none, and an IMU if it has only other instruments.
 fn example(text: &str) -> Result<Scenario, FileError> {
     let hover = "\n[trajectory]\nkind = \"hover\"\nposition_m = [0, 0, 1]\n";
     let added = if text.contains("[trajectory]") { "" } else { hover };
@@ -75,8 +75,8 @@ fn documented_examples_are_valid_and_complete() {
         example(&text).unwrap_or_else(|error| panic!("{error} in\n{text}"));
         for line in text.lines().filter(|line| line.contains(" = ")) {
             let documented = rows.iter().any(|[key, ..]| line.starts_with(&format!("{} = ", key.trim_matches('`'))));
-            // The kind of a trajectory, the profile, and the head of a contender whose gains are the subject are not
-            // in the table.
+            // Not in the table: the kind of a trajectory, the profile, and the head of a contender whose gains are the
+            // subject.
             let head =
                 ["kind", "name", "controller", "profile"].iter().any(|key| line.starts_with(&format!("{key} = ")));
             assert!(documented || head, "{line}");
@@ -93,7 +93,7 @@ fn documented_ranges_are_those_of_the_code() {
             if key == "name" || !range.starts_with(|c: char| c.is_ascii_digit() || c == '-') {
                 continue;
             }
-            // Of "-1.5 to 1.5; yaw -100 to 100" and "0 to 1e9, whole" the first part is used.
+            // Use the first part of ranges such as "-1.5 to 1.5; yaw -100 to 100" and "0 to 1e9, whole".
             let range = range.split([';', ',']).next().unwrap().trim_end_matches(" each");
             let vector = text.contains(&format!("{key} = ["));
             let value = if vector { "[1e300, 1e300, 1e300]" } else { "1e300" };
@@ -128,7 +128,7 @@ fn documented_defaults_are_those_of_the_code() {
     assert!(checked > 35, "{checked}");
 }
 
-/// With any damage to a line of a file, either it is a valid scenario, or there are lines that name the file.
+/// A file with any damaged line is either a valid scenario or gives errors that name the file.
 #[test]
 fn damaged_files_are_told_line_by_line() {
     let values =
@@ -180,7 +180,7 @@ fn contenders_start_from_the_file_or_from_a_profile() {
     assert_eq!(printed.settings, Profile::Paper.settings().with_dt_s(0.002));
     let tuned = pid::Gains { tilt_p_1_s: 9.0, ..pid::Gains::TUNED };
     assert_eq!((pid.law, pid.settings), (Law::Pid(tuned), short.settings));
-    // Without controllers, a contender is alone.
+    // Without `controllers`, a file's own contender is the only one.
     assert_eq!(example("[[contender]]\nname = \"a\"\ncontroller = \"indi\"\n").unwrap().contenders.len(), 1);
 }
 
@@ -208,7 +208,8 @@ fn sensor_faults_and_paces_that_contradict_themselves_are_refused() {
     );
 }
 
-/// Of a reference that no controller accepts, the motion is told, or the heading; so is a path longer than any flight.
+/// An error on a reference that no controller accepts names its motion or its heading. A path longer than any flight is
+/// refused, too.
 #[test]
 fn references_that_no_controller_accepts_are_told() {
     let refused = |keys: &str| example(&format!("[trajectory]\n{keys}")).unwrap_err().to_string();
@@ -223,7 +224,7 @@ fn references_that_no_controller_accepts_are_told() {
     assert!(lasts.contains("speed_max_m_s: it ends at") && lasts.contains("no flight lasts longer"), "{lasts}");
 }
 
-/// The paces of a circle and a lemniscate are those asked for: the largest acceleration and speed of their references.
+/// Circle and lemniscate keep the pace in their keys: the largest acceleration and speed of their references.
 #[test]
 fn a_circle_has_its_acceleration_and_a_lemniscate_its_speed_and_its_size() {
     let circle = "kind = \"circle\"\nradius_m = 2.5\nacceleration_m_s2 = 14.7";

@@ -1,4 +1,4 @@
-//! `[trajectory]`: the reference, a table whose `kind` determines its keys.
+//! Reads `[trajectory]`, the reference; its `kind` determines the other keys.
 
 use super::motion::POSITION;
 use super::path;
@@ -34,7 +34,7 @@ const STEP_TIME: Range = Range::new("at_s", 0.0, 36_000.0);
 const WAYPOINT_TIME: Range = Range::new("time_s", 0.0, 36_000.0);
 /// Accepted largest speed through waypoints \[m/s\].
 const SPEED_MAX: Range = Range::new("speed_max_m_s", 0.01, 100.0);
-/// Accepted largest acceleration there \[m/s2\].
+/// Accepted largest acceleration through waypoints \[m/s2\].
 const ACCELERATION_MAX: Range = Range::new("acceleration_max_m_s2", 0.01, 100.0);
 
 #[derive(Clone, Copy)]
@@ -111,7 +111,7 @@ fn circle(table: &mut Table<'_>) -> Result<Trajectory, FileError> {
     let radius_m = table.need_number(&RADIUS)?;
     let (acceleration_m_s2, period_s) = (table.number(&CENTRIPETAL)?, table.number(&PERIOD)?);
     let yaw_rad = yaw(table)?;
-    // First, for an unknown key may be a misspelt pace.
+    // First, since an unknown key may be a misspelt pace.
     table.finish()?;
     match (acceleration_m_s2, period_s) {
         (Some(_), Some(_)) => {
@@ -130,7 +130,7 @@ fn circle(table: &mut Table<'_>) -> Result<Trajectory, FileError> {
     Ok(circle)
 }
 
-/// Gerono's lemniscate, x = a sin(w t), y = a/2 sin(2 w t), which is fastest in the middle: sqrt(2) a w.
+/// Reads Gerono's lemniscate, x = a sin(w t), y = a/2 sin(2 w t). It is fastest in the middle, at sqrt(2) a w.
 fn lemniscate(table: &mut Table<'_>) -> Result<Trajectory, FileError> {
     let centre_m = table.need_vector("centre_m", &POSITION)?;
     let (half_m, speed_m_s) = (table.need_number(&HALF_LENGTH)?, table.need_number(&SPEED)?);
@@ -158,7 +158,7 @@ fn lissajous(table: &mut Table<'_>) -> Result<Trajectory, FileError> {
 fn waypoints(table: &mut Table<'_>) -> Result<Trajectory, FileError> {
     let (mut waypoints, tables) = (Vec::<Waypoint>::new(), table.tables("waypoint")?);
     if tables.is_empty() && table.knows("waypoint") {
-        // First, for an unknown key may be a misspelt one.
+        // First, since an unknown key may be a misspelt `waypoint`.
         table.finish()?;
         return Err(table.missing("waypoint", "add [[trajectory.waypoint]] with time_s and position_m"));
     }
@@ -169,7 +169,7 @@ fn waypoints(table: &mut Table<'_>) -> Result<Trajectory, FileError> {
             yaw_rad: yaw(&mut table)?,
         };
         table.finish()?;
-        // Nothing follows from a place that nobody knows.
+        // Do not check legs from or to a place or time that could not be read.
         if !table.knows(WAYPOINT_TIME.name) || !table.knows(POSITION.name) {
             continue;
         }
@@ -194,7 +194,7 @@ fn waypoints(table: &mut Table<'_>) -> Result<Trajectory, FileError> {
     Ok(Trajectory::Waypoints(waypoints))
 }
 
-/// Minimum-snap motion through places, from rest to rest, within limits of speed and acceleration.
+/// Reads a minimum-snap path through places, from rest to rest, within limits of speed and acceleration.
 fn through_places(table: &mut Table<'_>) -> Result<Trajectory, FileError> {
     let start_s = table.number(&START)?.unwrap_or(0.0);
     let limits = PaceLimits {

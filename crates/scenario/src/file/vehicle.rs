@@ -1,12 +1,12 @@
-//! `[vehicle]`: the nominal parameters, or the name of a vehicle file.
+//! Reads `[vehicle]`: the nominal parameters, or the name of a vehicle file.
 
 use afbc_files::read::{FileError, Table};
 use afbc_types::Parameters;
 use afbc_vehicles::{Vehicle, parts};
 use std::path::Path;
 
-/// Returns the vehicle that the table names, if it names one, and the nominal parameters: those of that vehicle,
-/// otherwise the paper's with the keys of the table in their place.
+/// Returns the vehicle that the table names, if any, and the nominal parameters. These are the named vehicle's, or else
+/// the paper's with the table's keys in their place.
 pub(super) fn read(table: Option<Table<'_>>) -> Result<(Option<Vehicle>, Parameters<f64>), FileError> {
     let Some(mut table) = table else { return Ok((None, Parameters::PAPER)) };
     let Some(name) = table.text("name")? else {
@@ -22,7 +22,7 @@ pub(super) fn read(table: Option<Table<'_>>) -> Result<(Option<Vehicle>, Paramet
     Ok((Some(vehicle), parameters))
 }
 
-/// Reads a vehicle: a plain name is a built-in one, anything else a file, relative to the folder of the scenario.
+/// Reads a vehicle. A plain name is a built-in vehicle; anything else is a file, relative to the scenario's folder.
 fn named(table: &Table<'_>, name: &str) -> Result<Vehicle, FileError> {
     if name.contains(['/', '\\', '.']) {
         let folder = Path::new(table.file()).parent().unwrap_or(Path::new(""));

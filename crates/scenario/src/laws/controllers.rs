@@ -1,9 +1,9 @@
-//! The macro that makes one type of the controllers of all laws.
+//! The macro that makes one controller type for all laws.
 
-/// Defines the controller of any law, and its memory, from one line per law.
+/// Defines the controller type for all laws and its memory, from one line per law.
 macro_rules! any_controller {
     ($($(#[$doc:meta])* $Name:ident($Controller:ty)),* $(,)?) => {
-        /// The controller of any law, so that what flies is compiled once for all of them.
+        /// The controller of any law: code that flies is compiled once for all laws.
         #[derive(Clone, Debug)]
         #[allow(clippy::large_enum_variant, reason = "one per vehicle")]
         pub enum AnyController<const N: usize> {
@@ -13,11 +13,11 @@ macro_rules! any_controller {
             )*
         }
 
-        /// What the controller of any law changes from step to step.
+        /// Memory of any law's controller, which changes from step to step.
         #[derive(Clone, Copy, Debug, Default)]
         #[allow(clippy::large_enum_variant, reason = "one per vehicle")]
         pub enum AnyControllerMemory<const N: usize> {
-            /// Before the first step.
+            /// Empty memory before the first step.
             #[default]
             None,
             $(
@@ -41,7 +41,7 @@ macro_rules! any_controller {
                 }
             }
 
-            // Not inlined: then it is compiled once, not in each crate that flies.
+            // Not inlined, so that it is compiled only once instead of in each crate that flies.
             #[inline(never)]
             fn decide(&self, memory: &mut Self::Memory, state: &State, setpoint: &Setpoint, fresh: bool) -> Action<N> {
                 self.begin(memory);
@@ -100,7 +100,7 @@ macro_rules! any_controller {
         }
 
         impl<const N: usize> AnyController<N> {
-            /// Makes the memory one of this law.
+            /// Makes an empty memory a memory of this law.
             fn begin(&self, memory: &mut AnyControllerMemory<N>) {
                 if !matches!(memory, AnyControllerMemory::None) {
                     return;

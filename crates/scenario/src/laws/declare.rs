@@ -1,14 +1,14 @@
 //! The macro that expands the [list of laws](super).
 
-/// Declares the control laws, each with
+/// Declares the control laws. Each law has
 ///
 /// * `name`: lower-case name, as in scenario files and logs; `title`: name in tables and figures;
-/// * `prefix`: prefix of its gains' names on a ground station;
-/// * `in_cascade`: whether it is a law of AFBC's cascade, with the cascade's settings and gains for each axis;
-/// * `gains`: their type;
-/// * `tuned`: the tuned gains, given AFBC's;
-/// * `by_hand`: the hand-tuned gains, from which a search starts;
-/// * `controller`: its controller's type, and how it is made.
+/// * `prefix`: prefix of its gains' parameter names on a ground station;
+/// * `in_cascade`: true for a law in AFBC's cascade, with the cascade's settings and gains for each axis;
+/// * `gains`: type of its gains;
+/// * `tuned`: its tuned gains, computed from AFBC's gains;
+/// * `by_hand`: hand-tuned gains, from which a search starts;
+/// * `controller`: type of its controller, and the expression that makes it.
 macro_rules! laws {
     ($(
         #[doc = $doc:literal]
@@ -27,7 +27,7 @@ macro_rules! laws {
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         pub enum ControllerKind {
             $( #[doc = $doc] $Law, )*
-            /// A law from outside the list.
+            /// A registered law, which is not in the list.
             Own(OwnKind),
         }
 
@@ -51,7 +51,7 @@ macro_rules! laws {
                 }
             }
 
-            /// Returns the prefix of its gains' names on a ground station.
+            /// Returns the prefix of the gains' parameter names on a ground station.
             pub const fn prefix(self) -> &'static str {
                 match self {
                     $( ControllerKind::$Law => $prefix, )*
@@ -59,8 +59,8 @@ macro_rules! laws {
                 }
             }
 
-            /// True for a law of AFBC's cascade, with gains for each axis; the others have one set for the whole
-            /// vehicle.
+            /// Returns true for a law in AFBC's cascade, which has gains for each axis; other laws have one set for the
+            /// whole vehicle.
             pub const fn in_cascade(self) -> bool {
                 match self {
                     $( ControllerKind::$Law => $in_cascade, )*
@@ -78,8 +78,8 @@ macro_rules! laws {
         }
 
         impl Law {
-            /// Returns the law of this kind with its tuned gains, given AFBC's `afbc`: those that it shares with AFBC,
-            /// or its own.
+            /// Returns the law of this kind with its tuned gains. Gains that the law shares with AFBC are taken from
+            /// `afbc`.
             pub fn beside(kind: ControllerKind, afbc: &afbc_types::PerAxis<afbc::adaptive::Gains>) -> Self {
                 match kind {
                     $( ControllerKind::$Law => {
@@ -109,8 +109,8 @@ macro_rules! laws {
             /// Returns the law's controller for this vehicle, without a monitor.
             ///
             /// # Errors
-            /// The first parameter, gain or setting out of range.
-            // Not inlined, like what flies.
+            /// The first parameter, gain or setting that is out of range.
+            // Not inlined, like the control step.
             #[inline(never)]
             pub fn controller<const N: usize>(
                 &self,
@@ -128,7 +128,7 @@ macro_rules! laws {
         }
 
         impl afbc_types::Declared for Law {
-            /// Visits each gain; those of a law in the cascade in a group for each axis.
+            /// Visits each gain; the gains of a law in the cascade are in a group for each axis.
             fn visit<E>(&self, visit: &mut impl afbc_types::Visit<E>) -> Result<(), E> {
                 match self {
                     $( Law::$Law(gains) => gains.visit(visit), )*

@@ -1,4 +1,4 @@
-//! `[gains]`: tables of a law's gains, in scenario files and in vehicle files.
+//! Reads tables of a law's gains, `[gains]`, in scenario files and in vehicle files.
 
 use super::{ControllerKind, Law};
 use afbc::fuzzy::Membership;
@@ -7,7 +7,7 @@ use afbc_files::read::{FileError, Table};
 use afbc_types::{Axis, Declared};
 use afbc_vehicles::Vehicle;
 
-/// Gains of which each axis has a table; what is left out stays as it is.
+/// Reads gains with a table for each axis; missing gains stay unchanged.
 pub(crate) fn per_axis(table: Option<Table<'_>>, gains: &mut impl Declared) -> Result<(), FileError> {
     let Some(mut table) = table else { return Ok(()) };
     for axis in Axis::ALL {
@@ -18,15 +18,15 @@ pub(crate) fn per_axis(table: Option<Table<'_>>, gains: &mut impl Declared) -> R
     table.finish()
 }
 
-/// Gains of the whole vehicle, in one table; what is left out stays as it is.
+/// Reads gains of the whole vehicle from one table; missing gains stay unchanged.
 pub(crate) fn whole(table: Option<Table<'_>>, gains: &mut impl Declared) -> Result<(), FileError> {
     table.map_or(Ok(()), |table| group(table, "", gains))
 }
 
-/// One group of gains, which has a table of its own.
+/// Reads one group of gains from its table.
 fn group(mut table: Table<'_>, name: &str, gains: &mut impl Declared) -> Result<(), FileError> {
     table.declared_in(name, gains)?;
-    // Each gain is in its range; what is left to refuse is how centre and width go together.
+    // Each gain is in its range by now; centre and width may still contradict each other.
     table.finish()?;
     gains.together().or_else(|error| {
         let problem = format!("{}; change one of the two", out_of_range(&error));
@@ -34,14 +34,14 @@ fn group(mut table: Table<'_>, name: &str, gains: &mut impl Declared) -> Result<
     })
 }
 
-/// `law` with those of its gains that the file of `vehicle` holds.
+/// Returns `law` with the gains that the vehicle's file has for it.
 ///
 /// # Errors
-/// One line on the first thing that is wrong, such as gains of an unknown law.
+/// One line on the first mistake, such as gains of an unknown law.
 pub(crate) fn law_gains(vehicle: &Vehicle, law: Law) -> Result<Law, FileError> {
     let read = vehicle.law_gains(|mut laws| {
         let mut law = law;
-        // Settings of the cascade are not a law's own.
+        // The cascade's settings do not belong to a law.
         laws.table(afbc_vehicles::CASCADE)?;
         for kind in ControllerKind::all() {
             let table = laws.table(kind.name())?;

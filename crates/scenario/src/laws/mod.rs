@@ -1,4 +1,4 @@
-//! The one list of control laws.
+//! The only list of control laws.
 
 mod controllers;
 mod declare;
@@ -115,17 +115,17 @@ declare::laws! {
 }
 
 impl OwnLaw {
-    /// Makes it one of the laws that fly. A law of the same name is replaced.
+    /// Registers the law, so that it can fly. It replaces a registered law of the same name.
     ///
     /// # Errors
-    /// One line on a name that cannot be one or is a built-in law's, or on a gain out of its range.
+    /// One line on a name that is invalid or a built-in law's, or on a gain that is out of its range.
     pub fn register(self) -> Result<ControllerKind, String> {
         self.keep(&ControllerKind::ALL.map(ControllerKind::name)).map(ControllerKind::Own)
     }
 }
 
 impl ControllerKind {
-    /// Returns every law that can fly: those of the list, then those from outside.
+    /// Returns every law that can fly: those of the list, then the registered ones.
     pub fn all() -> Vec<ControllerKind> {
         ControllerKind::ALL.into_iter().chain(OwnKind::all().into_iter().map(ControllerKind::Own)).collect()
     }
@@ -141,7 +141,7 @@ impl ControllerKind {
         names.join(", ")
     }
 
-    /// Returns the cure for a `name` that no law has, for a message: the most similar one, or all of them.
+    /// Returns a cure for an unknown `name`, for a message: the most similar law's name, or all names.
     pub fn cure(name: &str) -> String {
         match nearest(name, ControllerKind::all().into_iter().map(ControllerKind::name)) {
             Some(similar) => format!("did you mean {similar}?"),
@@ -149,12 +149,12 @@ impl ControllerKind {
         }
     }
 
-    /// The two that the paper compares.
+    /// The two laws that the paper compares.
     pub const PAPER: [ControllerKind; 2] = [ControllerKind::Afbc, ControllerKind::Backstepping];
 }
 
-/// Returns the gains from which AFBC's search starts, an earlier search's rounded, for the settings of the profile
-/// `flight`.
+/// Returns the gains from which AFBC's search starts, for the settings of the profile `flight`. They are the rounded
+/// result of an earlier search.
 fn by_hand() -> PerAxis<adaptive::Gains> {
     PerAxis::from_fn(|axis| {
         let (alpha1, alpha2, stiffness, gamma, eta, delta_max) = match axis {

@@ -1,4 +1,4 @@
-//! Laws from outside the list: registered once, they fly wherever a law of the list does.
+//! Users' own laws, which are not in the list: a registered law flies wherever a law of the list does.
 
 use afbc_control::{Action, FlightController, Mixer, Trace};
 use afbc_types::{
@@ -11,23 +11,24 @@ use core::slice;
 use serde::{Serialize, Serializer};
 use std::sync::{Arc, Mutex, PoisonError, RwLock};
 
-/// Largest number of gains of such a law.
+/// Largest number of gains of a user's law.
 pub const OWN_GAINS_MAX: usize = 32;
-/// Longest name of such a law.
+/// Longest name of a user's law.
 const NAME_LENGTH: usize = 32;
-/// Names that stand for contenders of the list.
+/// Names of standard contenders, which a user's law must not have.
 const TAKEN: [&str; 3] = ["afbc-as-printed", "backstepping-as-printed", "afbc-monitored"];
 
-/// A control law of one's own, flown with the harness's mixer, sensors and losses: U1..U4 from state and setpoint.
+/// A user's control law, which computes U1..U4 from state and setpoint. The harness adds mixer, sensors and the check
+/// for loss.
 ///
-/// What it remembers is its own; for each flight a new one is made.
+/// A new instance is made for each flight, so it may keep its own memory.
 pub trait OwnController: Send {
     /// Computes the demanded U1..U4 \[N\] of one step from a plausible state and setpoint. A state that is not `fresh`
-    /// repeats the last one. An input that is no finite number counts as zero.
+    /// repeats the last one. An input that is not finite counts as zero.
     fn step(&mut self, state: &State, setpoint: &Setpoint, fresh: bool) -> Inputs;
 }
 
-/// What a law knows of the vehicle that it flies.
+/// Data of the vehicle for a user's law.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OwnVehicle {
     /// Nominal parameters.
@@ -38,11 +39,11 @@ pub struct OwnVehicle {
     pub rotor_force_max_n: f32,
     /// Time between steps \[s\].
     pub dt_s: f32,
-    /// The law's gains, in the order in which it declares them; zero beyond.
+    /// Gains of the law, in the order of their declaration; unused entries are zero.
     pub gains: [f32; OWN_GAINS_MAX],
 }
 
-/// A gain of such a law: what scenario files, vehicle files and the tuner know of it.
+/// Declaration of a gain of a user's law, for scenario files, vehicle files and the tuner.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OwnGain {
     declaration: Declaration,
@@ -50,14 +51,14 @@ pub struct OwnGain {
 }
 
 impl OwnGain {
-    /// Declares a gain with its key in files, unit, default and the range in which the tuner searches. On a slower
-    /// vehicle a gain in 1/s, 1/s2, 1/s3 or 1/s4 is smaller by that power, unless the vehicle's file has its own.
+    /// Declares a gain with its key in files, unit, default value and the tuner's search range. On a slower vehicle, a
+    /// gain in 1/s, 1/s2, 1/s3 or 1/s4 is reduced by that power, unless the vehicle's file has its own value.
     pub const fn new(name: &'static str, unit: &'static str, value: f32, [min, max]: [f64; 2]) -> Self {
         let range = Range::new(name, min, max);
         OwnGain { declaration: Declaration { id: name, group: "", range, unit, tuned: true, meaning: "" }, value }
     }
 
-    /// Says what it is.
+    /// Adds the gain's meaning.
     #[must_use]
     pub const fn meaning(self, meaning: &'static str) -> Self {
         OwnGain { declaration: Declaration { meaning, ..self.declaration }, ..self }
@@ -66,7 +67,7 @@ impl OwnGain {
 
 type Maker = dyn Fn(&OwnVehicle) -> Box<dyn OwnController> + Send + Sync;
 
-/// A law of one's own, before it is [registered](Self::register).
+/// A user's law before it is [registered](Self::register).
 pub struct OwnLaw {
     name: &'static str,
     title: &'static str,
@@ -74,12 +75,12 @@ pub struct OwnLaw {
     make: RwLock<Arc<Maker>>,
 }
 
-/// Registered laws.
+/// All registered laws.
 static REGISTERED: Mutex<Vec<OwnKind>> = Mutex::new(Vec::new());
 
 impl OwnLaw {
-    /// Describes a law: its name in files and on the command line, and the controller of a vehicle. `make` is called
-    /// at the start of each flight, on many threads at once.
+    /// Describes a law: its name in files and on the command line, and a function that makes its controller for a
+    /// vehicle. `make` is called at the start of each flight, from many threads at once.
     pub fn new<C: OwnController + 'static>(
         name: &'static str,
         make: impl Fn(&OwnVehicle) -> C + Send + Sync + 'static,
@@ -88,30 +89,30 @@ impl OwnLaw {
         OwnLaw { name, title: name, gains: Vec::new(), make: RwLock::new(Arc::new(make)) }
     }
 
-    /// Gives it a name for tables and figures.
+    /// Adds a title for tables and figures.
     #[must_use]
     pub fn title(self, title: &'static str) -> Self {
         OwnLaw { title, ..self }
     }
 
-    /// Gives it gains, which files may set and the tuner searches.
+    /// Adds gains, which files may set and the tuner searches.
     #[must_use]
     pub fn gains(self, gains: impl Into<Vec<OwnGain>>) -> Self {
         OwnLaw { gains: gains.into(), ..self }
     }
 
-    /// Makes it one of the registered laws, if its name is none of those `taken`.
+    /// Registers the law, if its name is not among those `taken`.
     pub(super) fn keep(self, taken: &[&str]) -> Result<OwnKind, String> {
         self.check(taken).map_err(|problem| format!("law \"{}\": {problem}", self.name.escape_debug()))?;
         let mut all = REGISTERED.lock().unwrap_or_else(PoisonError::into_inner);
         let known = all.iter_mut().find(|known| known.0.name == self.name);
-        // Declared as before: kinds that others hold fly the new code, and nothing more is leaked.
+        // The same declaration again: existing kinds fly the new code, and no more memory is leaked.
         if let Some(OwnKind(same)) = known.as_deref().filter(|known| known.0.is_declared_as(&self)) {
             let make = self.make.into_inner().unwrap_or_else(PoisonError::into_inner);
             *same.make.write().unwrap_or_else(PoisonError::into_inner) = make;
             return Ok(OwnKind(same));
         }
-        // Laws live as long as the program, like those of the list.
+        // Registered laws live as long as the program, like those of the list.
         let kind = OwnKind(Box::leak(Box::new(self)));
         match known {
             Some(known) => *known = kind,
@@ -150,7 +151,7 @@ impl OwnLaw {
 pub struct OwnKind(&'static OwnLaw);
 
 impl OwnKind {
-    /// Every registered law, in the order in which they came.
+    /// Returns every registered law in the order of registration.
     pub(super) fn all() -> Vec<OwnKind> {
         REGISTERED.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
@@ -164,7 +165,7 @@ impl OwnKind {
     }
 
     fn controller(self, vehicle: &OwnVehicle) -> Box<dyn OwnController> {
-        // Not called under the lock: it may wait for whoever registers a law.
+        // Not called under the lock, since `make` may wait for a thread that registers a law.
         let make = Arc::clone(&self.0.make.read().unwrap_or_else(PoisonError::into_inner));
         make(vehicle)
     }
@@ -172,7 +173,7 @@ impl OwnKind {
 
 impl PartialEq for OwnKind {
     fn eq(&self, other: &Self) -> bool {
-        // Each registered law lives at one address; what it does cannot be compared.
+        // Each registered law has one address; its code cannot be compared.
         core::ptr::eq(self.0, other.0)
     }
 }
@@ -193,7 +194,7 @@ pub struct OwnGains {
 }
 
 impl OwnGains {
-    /// The law with the values that it declares.
+    /// Returns the law with the gains' default values.
     pub(super) fn of(kind: OwnKind) -> Self {
         let mut values = [0.0; OWN_GAINS_MAX];
         for (value, gain) in values.iter_mut().zip(&kind.0.gains) {
@@ -206,10 +207,10 @@ impl OwnGains {
         self.kind
     }
 
-    /// Returns its controller on this vehicle.
+    /// Returns the law's controller for this vehicle.
     ///
     /// # Errors
-    /// The first parameter or setting out of range.
+    /// The first parameter or setting that is out of range.
     pub(super) fn controller<const N: usize>(
         &self,
         vehicle: Airframe<N>,
@@ -252,16 +253,16 @@ impl Declared for OwnGains {
     }
 }
 
-/// A law of one's own behind the interface of all controllers.
+/// A user's law with the interface of all controllers.
 pub struct OwnFlight<const N: usize> {
     kind: OwnKind,
     vehicle: OwnVehicle,
     mixer: Mixer<N>,
-    /// The law of the flight that has begun.
+    /// The law's instance for the current flight; none before the first step.
     law: RefCell<Option<Box<dyn OwnController>>>,
 }
 
-/// Whether the flight has begun, and what was demanded last.
+/// True once the flight has begun, and the last demanded inputs.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct OwnMemory {
     begun: bool,
@@ -269,7 +270,7 @@ pub struct OwnMemory {
 }
 
 impl<const N: usize> Clone for OwnFlight<N> {
-    /// Returns one that has not flown.
+    /// Returns a controller that has not flown.
     fn clone(&self) -> Self {
         OwnFlight { kind: self.kind, vehicle: self.vehicle, mixer: self.mixer, law: RefCell::new(None) }
     }
@@ -294,7 +295,7 @@ impl<const N: usize> FlightController<N> for OwnFlight<N> {
 
     fn decide(&self, memory: &mut OwnMemory, state: &State, setpoint: &Setpoint, fresh: bool) -> Action<N> {
         let mut law = self.law.borrow_mut();
-        // An empty memory begins a flight: what the law remembers of an earlier one must not reach it.
+        // An empty memory begins a flight: a new instance must not remember an earlier flight.
         if !core::mem::replace(&mut memory.begun, true) {
             *law = None;
         }

@@ -1,4 +1,4 @@
-//! Consistency of every entry in the list of laws.
+//! Tests the consistency of every entry in the list of laws.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 use super::{ControllerKind, Law};
@@ -16,7 +16,7 @@ fn names_and_prefixes_are_unique() {
     assert_eq!(all.map(ControllerKind::prefix).into_iter().collect::<BTreeSet<_>>().len(), all.len());
 }
 
-/// Gains of laws in the cascade are in one group per axis, those of the others in no group.
+/// Gains of laws in the cascade are in one group per axis; other gains are in no group.
 #[test]
 fn each_law_has_gains_that_fly_the_papers_vehicle() {
     let rotors = PLUS.map(|rotor| rotor.to_f64());
@@ -39,7 +39,7 @@ fn each_law_has_gains_that_fly_the_papers_vehicle() {
     }
 }
 
-/// A contender's own gains by rule are those that a vehicle without gains of its own flies with.
+/// A contender's gains scaled by rule equal those used on a vehicle without its own gains.
 #[test]
 fn gains_by_rule_are_those_that_fly() {
     for vehicle in &afbc_vehicles::BUILT_IN {

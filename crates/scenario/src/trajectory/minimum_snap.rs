@@ -1,51 +1,53 @@
 //! Minimum-snap motion through waypoints: D. Mellinger and V. Kumar, "Minimum Snap Trajectory Generation and Control
 //! for Quadrotors", ICRA 2011.
 //!
-//! The integral of the squared snap over given times is least for pieces of degree seven with six continuous
-//! derivatives at the waypoints, at rest at both ends. Unknown are velocity, acceleration and jerk at the waypoints
-//! between; the continuity of the fourth to sixth derivative makes a block-tridiagonal system of them.
+//! For given times, the integral of the squared snap is least for pieces of degree seven with six continuous
+//! derivatives at the waypoints and rest at both ends. Velocity, acceleration and jerk at the inner waypoints are
+//! unknown. The continuity of the fourth to sixth derivatives gives a block-tridiagonal system for them.
 #![allow(clippy::indexing_slicing, reason = "coordinates of four, derivatives of three")]
 
 use super::nearest_heading;
 use super::polynomial::{COEFFICIENTS, PolynomialPiece, peaks};
 use nalgebra::{Matrix3, SMatrix, Vector3};
 
-/// A matrix with a column for each of x, y, z, yaw, and a row for each of velocity, acceleration, jerk.
+/// Unknowns at a waypoint: columns x, y, z, yaw; rows velocity, acceleration, jerk.
 type Unknown = SMatrix<f64, 3, 4>;
 
-/// A quadrotor's flat output, a waypoint without a time: x, y, z \[m\] and yaw \[rad\].
+/// Flat output of a quadrotor at a waypoint: x, y, z \[m\] and yaw \[rad\].
 pub type FlatOutput = [f64; 4];
 
-/// Largest speed and acceleration that a path may ask for.
+/// Largest speed and acceleration of a path.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PaceLimits {
-    /// Speed \[m/s\].
+    /// Largest speed \[m/s\].
     pub speed_m_s: f64,
-    /// Acceleration \[m/s2\].
+    /// Largest acceleration \[m/s2\].
     pub acceleration_m_s2: f64,
 }
 
-/// Shortest distance between two places that follow each other \[m\]. The time of a leg follows from its length.
+/// Shortest distance between two consecutive places \[m\], since a leg's time follows from its length.
 pub const LEG_MIN_M: f64 = 1e-3;
-/// How far a path may swing away from its places \[longest legs\]. There and back through distances that differ by up
-/// to five times it stays within 3.6; by ten times it comes to 17, and it grows without bound beyond.
+/// Largest distance that a path may swing away from its places \[longest legs\]. On a way there and back whose legs
+/// differ by a factor of up to five, the swing stays within 3.6. At a factor of ten it reaches 17, and it grows without
+/// bound beyond.
 pub const SWING_MAX: f64 = 5.0;
-/// Samples of each piece for its peaks. By Markov's inequality a piece of degree seven exceeds its samples by at most
-/// 1680 / (8 * 512^2), 0.08 %, in speed, and by 0.04 % in acceleration.
+/// Samples per piece for its peaks. By Markov's inequality, a piece of degree seven exceeds its samples by at most 1680
+/// / (8 * 512^2) = 0.08 % in speed, and by 0.04 % in acceleration.
 const SAMPLES: u32 = 512;
-/// Margin of all times over the samples.
+/// Factor on all times that covers peaks between the samples.
 const MARGIN: f64 = 1.001;
 
-/// Why no path goes through places.
+/// Reason for which there is no path through the places.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NoPath {
     /// There are fewer than two places.
     TooFew,
-    /// The leg of this number, counted from 0, is shorter than [`LEG_MIN_M`].
+    /// The leg with this index, counted from 0, is shorter than [`LEG_MIN_M`].
     ShortLeg(usize),
-    /// On the leg of this number the path swings away by more than [`SWING_MAX`]: lengths of legs differ too much.
+    /// On the leg with this index the path swings away by more than [`SWING_MAX`]: the lengths of the legs differ too
+    /// much.
     Swings(usize),
-    /// The lengths of legs differ too much for the arithmetic.
+    /// The lengths of the legs differ too much for the arithmetic.
     Unsolvable,
 }
 
@@ -55,11 +57,11 @@ pub fn distance_m(from: &FlatOutput, to: &FlatOutput) -> f64 {
     libm::sqrt(x * x + y * y + z * z)
 }
 
-/// Returns the motion through `places` from rest at `start_s` to rest, as fast as one scale of all times allows within
-/// `limits`. The heading turns the short way round.
+/// Returns the motion through `places` from rest at `start_s` to rest. All times are scaled by one factor, so that the
+/// motion is as fast as `limits` allow. The heading turns the short way round.
 ///
 /// # Errors
-/// Why there is none.
+/// The reason for which there is no path.
 pub fn minimum_snap(places: &[FlatOutput], start_s: f64, limits: PaceLimits) -> Result<Vec<PolynomialPiece>, NoPath> {
     let places = &unwrapped(places);
     let lengths_m: Vec<f64> = places.iter().zip(places.iter().skip(1)).map(|(from, to)| distance_m(from, to)).collect();
@@ -69,11 +71,11 @@ pub fn minimum_snap(places: &[FlatOutput], start_s: f64, limits: PaceLimits) -> 
     if let Some(leg) = lengths_m.iter().position(|length_m| *length_m < LEG_MIN_M) {
         return Err(NoPath::ShortLeg(leg));
     }
-    // In proportion to the square root of the length, as at constant acceleration: a first guess of the proportions.
+    // A first guess of the times' proportions: the square root of the length, as at constant acceleration.
     let per_metre = limits.acceleration_m_s2.sqrt() / limits.speed_m_s;
     let durations_s: Vec<f64> = lengths_m.iter().map(|length_m| libm::sqrt(*length_m) + length_m * per_metre).collect();
     let first = timed(places, &durations_s, start_s).ok_or(NoPath::Unsolvable)?;
-    // Derivatives of order n scale by the power -n of all times.
+    // A derivative of order n scales with the power -n of all times.
     let [speed, acceleration, ..] = peaks(&first, SAMPLES);
     let scale = MARGIN * (speed / limits.speed_m_s).max(libm::sqrt(acceleration / limits.acceleration_m_s2));
     let durations_s: Vec<f64> = durations_s.iter().map(|duration_s| duration_s * scale).collect();
@@ -87,7 +89,7 @@ pub fn minimum_snap(places: &[FlatOutput], start_s: f64, limits: PaceLimits) -> 
     if is_within { Ok(pieces) } else { Err(NoPath::Unsolvable) }
 }
 
-/// Returns the places with headings whose turns are the short way round.
+/// Returns the places with headings that turn the short way round.
 fn unwrapped(places: &[FlatOutput]) -> Vec<FlatOutput> {
     let mut before_rad = None;
     let turned = |&[x, y, z, yaw_rad]: &FlatOutput| {
@@ -98,14 +100,14 @@ fn unwrapped(places: &[FlatOutput]) -> Vec<FlatOutput> {
     places.iter().map(turned).collect()
 }
 
-/// True if a piece leaves its start by more than [`SWING_MAX`], or is not a number.
+/// Returns true if a piece departs from its start by more than [`SWING_MAX`] longest legs, or if a position is NaN.
 fn swings(piece: &PolynomialPiece, longest_m: f64) -> bool {
     let mut samples = piece.samples(SAMPLES);
     let Some(start) = samples.next() else { return true };
     !samples.all(|at| (at.position_m - start.position_m).norm() <= SWING_MAX * longest_m)
 }
 
-/// Returns the motion through `places` in these times; none if they are too different for the arithmetic.
+/// Returns the motion through `places` with these durations; none if they differ too much for the arithmetic.
 fn timed(places: &[FlatOutput], durations_s: &[f64], start_s: f64) -> Option<Vec<PolynomialPiece>> {
     let between = between(places, durations_s)?;
     let rest = Unknown::zeros();
@@ -127,7 +129,7 @@ fn timed(places: &[FlatOutput], durations_s: &[f64], start_s: f64) -> Option<Vec
     Some(pieces)
 }
 
-/// The septic from value and three derivatives at 0 to those at `t`.
+/// Returns the septic polynomial from value and three derivatives at 0 to value and three derivatives at `t`.
 fn septic([p0, v0, a0, j0]: [f64; 4], [p1, v1, a1, j1]: [f64; 4], t: f64) -> [f64; COEFFICIENTS] {
     let (t2, t3) = (t * t, t * t * t);
     let p = p1 - (p0 + v0 * t + a0 * t2 / 2.0 + j0 * t3 / 6.0);
@@ -147,10 +149,11 @@ fn septic([p0, v0, a0, j0]: [f64; 4], [p1, v1, a1, j1]: [f64; 4], t: f64) -> [f6
     ]
 }
 
-/// How the fourth to sixth derivative at an end of a piece depend on the difference of places, and on velocity,
-/// acceleration and jerk at the same end and at the other one. At the start; at the end, time runs backwards.
+/// Returns how the fourth to sixth derivatives at the start of a piece depend on three inputs. These are the difference
+/// of the end places, the velocity, acceleration and jerk at the start, and the same at the end. For the derivatives at
+/// the end, reverse time.
 fn ends(t: f64) -> ([f64; 3], Matrix3<f64>, Matrix3<f64>) {
-    // Columns of `septic`: the response to one of its arguments.
+    // Columns of `septic`: the response to a unit argument.
     let response = |argument: usize| {
         let mut arguments = [[0.0; 4]; 2];
         arguments[argument / 4][argument % 4] = 1.0;
@@ -164,9 +167,9 @@ fn ends(t: f64) -> ([f64; 3], Matrix3<f64>, Matrix3<f64>) {
     (place, block(1), block(5))
 }
 
-/// Solves for velocity, acceleration and jerk at the places between: Thomas' algorithm on blocks.
+/// Solves for velocity, acceleration and jerk at the inner places, by Thomas' algorithm on blocks.
 fn between(places: &[FlatOutput], durations_s: &[f64]) -> Option<Vec<Unknown>> {
-    // Time reversed, odd derivatives change their sign: of unknowns (1, 2, 3) and of equations (4, 5, 6).
+    // Reversed time changes the sign of odd derivatives: of the unknowns (1, 2, 3) and of the equations (4, 5, 6).
     let odd = Matrix3::from_diagonal(&[-1.0, 1.0, -1.0].into());
     let even = Matrix3::from_diagonal(&[1.0, -1.0, 1.0].into());
     let mut solved: Vec<(Matrix3<f64>, Unknown)> = Vec::new();

@@ -1,6 +1,7 @@
-//! Reference trajectories with analytic derivatives: two of position and heading (assumption A5), and jerk and snap.
+//! Reference trajectories with analytic derivatives: velocity and acceleration of position and heading (assumption A5),
+//! and jerk and snap of the position.
 //!
-//! Trigonometry comes from `libm`, so a flight gives the same bits on every host.
+//! Trigonometry comes from `libm`, so that a flight gives the same bits on every host.
 
 pub mod minimum_snap;
 pub mod polynomial;
@@ -13,7 +14,7 @@ use nalgebra::Vector3;
 pub use polynomial::PolynomialPiece;
 pub use reference::Reference;
 
-/// A position in which to be at rest at a given time.
+/// A position at which the vehicle must be at rest at a given time.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Waypoint {
     /// Time \[s\].
@@ -36,7 +37,7 @@ pub struct Sine {
 }
 
 impl Sine {
-    /// Returns value and four derivatives at time `t`.
+    /// Returns the value and four derivatives at time `t`.
     #[inline]
     fn at(&self, t: f64) -> [f64; 5] {
         let rate = TAU / self.period_s;
@@ -73,7 +74,7 @@ pub enum Trajectory {
         /// Change of yaw at `at_s` \[rad\].
         turn_rad: f64,
     },
-    /// Level circle, counter-clockwise from above, starting at +x of the centre.
+    /// A level circle, counter-clockwise seen from above, starting in direction +x from the centre.
     Circle {
         /// Centre \[m\].
         centre_m: Vector3<f64>,
@@ -95,9 +96,9 @@ pub enum Trajectory {
     },
     /// Minimum-jerk motion from rest to rest between waypoints with increasing times; at rest before the first and
     /// after the last. Position, velocity and acceleration are continuous; the jerk jumps at each waypoint. The heading
-    /// turns by the difference of the two: [`nearest_heading`] makes that the short way round.
+    /// turns by the difference of the waypoints' yaw: [`nearest_heading`] makes that the short way round.
     Waypoints(Vec<Waypoint>),
-    /// Polynomial pieces, each beginning where the one before ends; at rest before the first and after the last.
+    /// Polynomial pieces, each beginning where the previous one ends; at rest before the first and after the last.
     Polynomials(Vec<PolynomialPiece>),
 }
 
@@ -140,7 +141,7 @@ impl Trajectory {
         }
     }
 
-    /// Calls `take` with the reference at [`SAMPLES`] times and more of each period, leg or piece.
+    /// Calls `take` with the reference at [`SAMPLES`] + 1 times of each period, leg or piece.
     pub fn sample(&self, take: &mut dyn FnMut(Reference)) {
         let mut within = |from_s: f64, length_s: f64| {
             (0..=SAMPLES).for_each(|k| take(self.at(from_s + length_s * f64::from(k) / f64::from(SAMPLES))));
@@ -150,7 +151,7 @@ impl Trajectory {
             Trajectory::Hover { .. } => within(0.0, 0.0),
             Trajectory::Step { at_s, .. } => within(0.0, *at_s),
             Trajectory::Circle { period_s, .. } => within(0.0, *period_s),
-            // Each coordinate goes through all of its values in its own period.
+            // Each coordinate takes all of its values within its own period.
             Trajectory::Lissajous { sines, .. } => sines.iter().for_each(|sine| within(0.0, sine.period_s)),
             Trajectory::Waypoints(waypoints) => {
                 waypoints.iter().zip(waypoints.iter().skip(1)).for_each(|(from, to)| {
@@ -163,7 +164,7 @@ impl Trajectory {
         }
     }
 
-    /// Returns the time from which on the reference is at rest, if there is one \[s\].
+    /// Returns the time from which the reference is at rest; none if it never is \[s\].
     pub fn end_s(&self) -> Option<f64> {
         match self {
             Trajectory::Paper | Trajectory::Circle { .. } | Trajectory::Lissajous { .. } => None,
@@ -175,12 +176,12 @@ impl Trajectory {
     }
 }
 
-/// Samples of a period, leg or piece.
+/// Number of steps between samples in a period, leg or piece.
 pub const SAMPLES: u32 = 64;
 /// Period of the paper's trajectory \[s\].
 const PAPER_PERIOD_S: f64 = 60.0;
 
-/// Returns `yaw_rad` with the whole turns that bring it within half a turn of `before_rad`.
+/// Returns `yaw_rad` shifted by whole turns to within half a turn of `before_rad`.
 pub fn nearest_heading(before_rad: f64, yaw_rad: f64) -> f64 {
     yaw_rad - TAU * rint((yaw_rad - before_rad) / TAU)
 }
@@ -203,7 +204,7 @@ fn paper(t: f64) -> Reference {
     }
 }
 
-/// Returns the minimum-jerk reference: 10 s^3 - 15 s^4 + 6 s^5 over each leg.
+/// Returns the minimum-jerk reference, with the blend 10 s^3 - 15 s^4 + 6 s^5 over each leg.
 fn between(waypoints: &[Waypoint], t: f64) -> Reference {
     let next = waypoints.partition_point(|waypoint| waypoint.time_s <= t);
     let before = next.checked_sub(1).and_then(|index| waypoints.get(index));

@@ -1,12 +1,12 @@
-//! References of polynomial pieces: paths that people bring, and smooth ones through waypoints.
+//! References made of polynomial pieces: users' paths, and smooth paths through waypoints.
 
 use super::reference::Reference;
 use nalgebra::Vector3;
 
-/// Number of coefficients: degree 7.
+/// Number of coefficients of a polynomial of degree 7.
 pub const COEFFICIENTS: usize = 8;
 
-/// A polynomial over a time, c0 + c1 s + ... + c7 s^7, s from its start on \[s\].
+/// Coefficients of c0 + c1 s + ... + c7 s^7, where s is the time since the piece's start \[s\].
 pub type Coefficients = [f64; COEFFICIENTS];
 
 /// A piece of a reference: x, y, z \[m\] and yaw \[rad\] as polynomials.
@@ -16,11 +16,11 @@ pub struct PolynomialPiece {
     pub start_s: f64,
     /// Length \[s\].
     pub duration_s: f64,
-    /// x, y, z and yaw.
+    /// Coefficients of x, y, z and yaw.
     pub coefficients: [Coefficients; 4],
 }
 
-/// Value and four derivatives of a polynomial at `s`, by Horner's rule.
+/// Returns value and four derivatives of a polynomial at `s`, by Horner's rule.
 pub fn derivatives(coefficients: &Coefficients, s: f64) -> [f64; 5] {
     let [mut value, mut first, mut second, mut third, mut fourth] = [0.0; 5];
     for coefficient in coefficients.iter().rev() {
@@ -30,12 +30,12 @@ pub fn derivatives(coefficients: &Coefficients, s: f64) -> [f64; 5] {
         first = first * s + value;
         value = value * s + coefficient;
     }
-    // Horner's rule gives the coefficients about s.
+    // Horner's rule gives the Taylor coefficients about s, so multiply by n!.
     [value, first, 2.0 * second, 6.0 * third, 24.0 * fourth]
 }
 
 impl PolynomialPiece {
-    /// Returns the end \[s\].
+    /// Returns the end of the piece \[s\].
     pub fn end_s(&self) -> f64 {
         self.start_s + self.duration_s
     }
@@ -46,7 +46,7 @@ impl PolynomialPiece {
         (0..=count).map(move |k| piece.at(piece.start_s + piece.duration_s * f64::from(k) / f64::from(count)))
     }
 
-    /// Returns the reference at time `t` \[s\], which is moved into the piece.
+    /// Returns the reference at time `t` \[s\], clamped to the piece.
     pub fn at(&self, t: f64) -> Reference {
         let s = (t - self.start_s).clamp(0.0, self.duration_s);
         let [x, y, z, yaw] = self.coefficients.each_ref().map(|coefficients| derivatives(coefficients, s));
@@ -74,7 +74,7 @@ pub(super) fn at(pieces: &[PolynomialPiece], t: f64) -> Reference {
     if flies { reference } else { Reference::rest(reference.position_m, reference.yaw_rad) }
 }
 
-/// Returns the largest speed, acceleration, jerk and snap of pieces \[m, s\], in `samples` of each.
+/// Returns the largest speed, acceleration, jerk and snap of the pieces \[m, s\], sampled at `samples` + 1 times each.
 pub fn peaks(pieces: &[PolynomialPiece], samples: u32) -> [f64; 4] {
     let mut peaks = [0.0_f64; 4];
     for at in pieces.iter().flat_map(|piece| piece.samples(samples)) {
@@ -86,29 +86,29 @@ pub fn peaks(pieces: &[PolynomialPiece], samples: u32) -> [f64; 4] {
     peaks
 }
 
-/// Writes pieces as the Crazyflie's tools do: `duration,x^0,...,x^7,y^0,...,yaw^7`, a line for each.
+/// Formats pieces like the Crazyflie's tools: `duration,x^0,...,x^7,y^0,...,yaw^7`, one line for each piece.
 pub fn written(pieces: &[PolynomialPiece]) -> String {
     let powers = |axis: &str| (0..COEFFICIENTS).map(|power| format!(",{axis}^{power}")).collect::<String>();
     let mut text = format!("duration{}\n", ["x", "y", "z", "yaw"].map(powers).concat());
     for piece in pieces {
         text += &piece.duration_s.to_string();
-        // As Debug writes it: read back to the last bit, and with an exponent, where Display would write all zeros.
+        // Debug format: it reads back to the last bit, and writes an exponent where Display would write many zeros.
         text.extend(piece.coefficients.iter().flatten().map(|coefficient| format!(",{coefficient:?}")));
         text.push('\n');
     }
     text
 }
 
-/// A knot: value, first and second derivative of x, y, z, yaw at a time.
+/// A knot of a path: x, y, z and yaw at a time, with first and second derivatives.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Knot {
     /// Time \[s\].
     pub time_s: f64,
-    /// Of x, y, z and yaw: value, first derivative, second derivative.
+    /// Value, first derivative and second derivative of x, y, z and yaw.
     pub values: [[f64; 3]; 4],
 }
 
-/// Returns the pieces of degree five between knots, which have their values and two derivatives.
+/// Returns pieces of degree five between the knots, with the knots' values and derivatives.
 pub fn through(knots: &[Knot]) -> Vec<PolynomialPiece> {
     let piece = |(a, b): (&Knot, &Knot)| {
         let duration_s = b.time_s - a.time_s;
@@ -121,7 +121,7 @@ pub fn through(knots: &[Knot]) -> Vec<PolynomialPiece> {
     knots.iter().zip(knots.iter().skip(1)).map(piece).collect()
 }
 
-/// The quintic from value and two derivatives at 0 to those at `t`.
+/// Returns the quintic polynomial from value and two derivatives at 0 to value and two derivatives at `t`.
 fn quintic([p0, v0, a0]: [f64; 3], [p1, v1, a1]: [f64; 3], t: f64) -> Coefficients {
     let (d, v, a) = (p1 - p0 - v0 * t - 0.5 * a0 * t * t, v1 - v0 - a0 * t, a1 - a0);
     let (t2, t3) = (t * t, t * t * t);

@@ -1,23 +1,24 @@
-//! The smooth curve through samples.
+//! Makes a smooth curve through samples.
 
 use super::polynomial::Knot;
 
-/// Samples of x, y, z \[m\] and yaw \[rad\] over time, with derivatives if there are any.
+/// Samples of x, y, z \[m\] and yaw \[rad\] over time, with derivatives where known.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PathSamples {
-    /// Rising times \[s\].
+    /// Increasing times \[s\].
     pub time_s: Vec<f64>,
-    /// x, y, z and yaw at each of them.
+    /// Values of x, y, z and yaw at these times.
     pub values: [Vec<f64>; 4],
-    /// Their first derivatives, if known.
+    /// First derivatives, if known.
     pub rates: [Option<Vec<f64>>; 4],
-    /// Their second derivatives, if known; without the first ones they are not used.
+    /// Second derivatives, if known; not used without first derivatives.
     pub accelerations: [Option<Vec<f64>>; 4],
 }
 
 impl PathSamples {
-    /// Returns the samples as knots. Derivatives that are not known are those of the natural cubic spline through the
-    /// values; a second derivative alone is that of the natural cubic spline through the first ones.
+    /// Returns the samples as knots. If the first derivatives are unknown, both derivatives come from the natural cubic
+    /// spline through the values. If only the second ones are unknown, they come from the natural cubic spline through
+    /// the first derivatives.
     pub fn knots(&self) -> Vec<Knot> {
         let axes: Vec<[Vec<f64>; 2]> = (0..4).map(|axis| self.derivatives(axis)).collect();
         let knot = |(i, time_s): (usize, &f64)| {
@@ -32,7 +33,7 @@ impl PathSamples {
         self.time_s.iter().enumerate().map(knot).collect()
     }
 
-    /// First and second derivatives of a coordinate.
+    /// Returns first and second derivatives of a coordinate.
     fn derivatives(&self, axis: usize) -> [Vec<f64>; 2] {
         let known = |of: &[Option<Vec<f64>>; 4]| of.get(axis).cloned().flatten();
         let empty = Vec::new();
@@ -48,13 +49,13 @@ impl PathSamples {
     }
 }
 
-/// First and second derivatives, at its points, of the natural cubic spline through points: Thomas' algorithm on the
+/// Returns first and second derivatives of the natural cubic spline at its points. Thomas' algorithm solves the
 /// continuity of the first derivative.
 fn natural(times: &[f64], values: &[f64]) -> [Vec<f64>; 2] {
     let steps: Vec<f64> = times.iter().zip(times.iter().skip(1)).map(|(a, b)| b - a).collect();
     let slopes: Vec<f64> =
         values.iter().zip(values.iter().skip(1)).zip(&steps).map(|((a, b), h)| (b - a) / h).collect();
-    // Of second derivatives from the left: m_i = known - factor m_(i + 1).
+    // Elimination from the left gives second derivatives m_i = known - factor m_(i + 1).
     let mut eliminated = vec![(0.0, 0.0)];
     for ((h, next_h), (slope, next)) in
         steps.iter().zip(steps.iter().skip(1)).zip(slopes.iter().zip(slopes.iter().skip(1)))
@@ -63,7 +64,7 @@ fn natural(times: &[f64], values: &[f64]) -> [Vec<f64>; 2] {
         let own = 2.0 * (h + next_h) - h * factor;
         eliminated.push((next_h / own, (6.0 * (next - slope) - h * known) / own));
     }
-    // At both ends the second derivative is zero.
+    // The second derivative is zero at both ends.
     eliminated.resize(values.len(), (0.0, 0.0));
     let mut second = vec![0.0; values.len()];
     let mut after = 0.0;
