@@ -1,4 +1,4 @@
-//! AFBC in a closed loop with the plant: `cargo run --example closed_loop`.
+//! Flies AFBC in a closed loop with the plant: `cargo run --example closed_loop`.
 //!
 //! The vehicle is 30 % heavier than the law's model, its rotors lag by 20 ms, and it starts 1 m from its setpoint.
 

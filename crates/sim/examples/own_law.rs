@@ -1,4 +1,5 @@
-//! A new control law, PD on position and attitude, in a closed loop with the plant: `cargo run --example own_law`.
+//! Flies a new control law, PD on position and attitude, in a closed loop with the plant: `cargo run --example
+//! own_law`.
 #![allow(clippy::unwrap_used, reason = "an example whose parameters are not valid should say so")]
 
 use afbc_control::{Action, FlightController, Mixer, Trace};
@@ -6,7 +7,7 @@ use afbc_sim::flight::{LawOnly, World, lockstep};
 use afbc_types::{Inputs, Parameters, Setpoint, State};
 use core::ops::ControlFlow;
 
-/// Fixed parameters; anything that changes in flight belongs in the type `Memory`.
+/// The law's fixed parameters. State that changes in flight belongs in the type `Memory`.
 struct OwnLaw {
     vehicle: Parameters,
     mixer: Mixer,
@@ -28,7 +29,7 @@ impl FlightController for OwnLaw {
         let effectiveness = self.vehicle.effectiveness();
         let (e, e_dot) = (setpoint.position_m - state.position_m, setpoint.velocity_m_s - state.velocity_m_s);
         let acceleration = e * 2.0 + e_dot * 2.5 + setpoint.acceleration_m_s2;
-        // Small angles, heading along x: positive pitch tilts the thrust to +x, positive roll to -y.
+        // For small angles and a heading along x: positive pitch tilts the thrust to +x, positive roll to -y.
         let tilt_rad = [-acceleration.y, acceleration.x].map(|a| (a / gravity_m_s2).clamp(-0.4, 0.4));
         let (eta, omega) = (state.attitude_rad, state.rates_rad_s);
         let moment = |error: f32, rate: f32| 100.0 * error - 18.0 * rate;

@@ -1,11 +1,11 @@
-//! Quantities that every log of a flight has, by the names of their columns.
+//! Columns that every flight log has.
 
 use crate::flight::{Estimated, Sample};
 
-/// A column's name, which ends in its unit, and the value under it.
+/// A column's name, which ends in the unit, and the function that reads its value from a sample.
 pub type SampleColumn = (&'static str, fn(&Sample) -> f64);
 
-/// Time, true motion and reference.
+/// Columns of time, true motion and reference.
 pub const MOTION: [SampleColumn; 25] = [
     ("time_s", |s| s.time_s),
     ("x_m", |s| s.motion.position_m.x),
@@ -34,11 +34,11 @@ pub const MOTION: [SampleColumn; 25] = [
     ("psi_d_acceleration_rad_s2", |s| s.reference.yaw_acceleration_rad_s2),
 ];
 
-/// A column of the vehicle's own estimate.
+/// A column's name and the function that reads its value from the vehicle's own estimate.
 pub type EstimateColumn = (&'static str, fn(&Estimated) -> f32);
 
-/// Errors of the vehicle's own estimate, truth less estimate, and their standard deviations; `rx`, `ry` and `rz` are
-/// the rotation about the axes of the earth frame.
+/// Columns of the estimate's errors, truth minus estimate, and of their standard deviations. `rx`, `ry` and `rz` are
+/// rotations about the axes of the earth frame.
 pub const ESTIMATE: [EstimateColumn; 19] = [
     ("x_estimate_error_m", |e| e.position_error_m.x),
     ("x_estimate_sigma_m", |e| e.position_sigma_m.x),

@@ -1,4 +1,4 @@
-//! A flight with its scenario.
+//! A flight together with its scenario.
 
 use crate::run::Run;
 use afbc_scenario::Scenario;
@@ -6,7 +6,7 @@ use afbc_scenario::Scenario;
 /// One contender's flight of one scenario.
 #[derive(Clone, Debug)]
 pub struct Flown {
-    /// The scenario flown.
+    /// The scenario that was flown.
     pub scenario: Scenario,
     /// The flight.
     pub run: Run,

@@ -1,4 +1,4 @@
-//! Simulation in lockstep: flights of scenarios ([`flight`]) and their results ([`run`], [`metrics`]).
+//! Simulates flights of scenarios in lockstep ([`flight`]) and evaluates their results ([`run`], [`metrics`]).
 #![forbid(unsafe_code)]
 
 pub mod columns;

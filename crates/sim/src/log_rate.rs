@@ -1,17 +1,17 @@
-//! The rate of a flight's log.
+//! Chooses the row rate of a flight's log.
 
 use afbc_scenario::Scenario;
 use afbc_scenario::contender::Contender;
 use std::str::FromStr;
 
-/// Largest number of rows of a log: somewhat more than an hour at 100 Hz.
+/// Largest number of rows in a log: somewhat more than an hour at 100 Hz.
 const ROWS: f64 = 500_000.0;
 /// Largest number of rows at the default rate: ten minutes at 100 Hz, some 26 MB.
 const PLENTY: f64 = 60_000.0;
-/// Default rates; the largest that is possible is used \[Hz\].
+/// Candidates for the default rate, of which the fastest that fits is used \[Hz\].
 const USUAL: [u16; 11] = [100, 50, 40, 25, 20, 10, 8, 5, 4, 2, 1];
 
-/// Log rows per second.
+/// Number of log rows per second.
 #[derive(Clone, Copy, Debug)]
 pub struct LogRate(u16);
 
@@ -33,17 +33,17 @@ impl LogRate {
         LogRate(USUAL.into_iter().find(fits).unwrap_or(1))
     }
 
-    /// Returns a message if the default rate is reduced for a flight of `duration_s`.
+    /// Returns a message if a flight of `duration_s` gets fewer rows per second than usual.
     pub fn thinned(duration_s: f64) -> Option<String> {
         let [full, ..] = USUAL;
         let LogRate(hz) = Self::usual(duration_s);
         (hz < full).then(|| format!("logs of {duration_s} s keep {hz} rows per second; --log-hz {full} keeps more"))
     }
 
-    /// Returns the control steps between rows of figures' logs, the same for all contenders of all `scenarios`.
+    /// Returns the control steps between log rows for figures: one number for all contenders of all `scenarios`.
     ///
     /// # Errors
-    /// If the log of one run would be too long.
+    /// Returns a message if the log of one run would be too long.
     pub fn common(scenarios: &[Scenario]) -> Result<u64, String> {
         let every = |scenario: &Scenario| {
             let usual = Self::usual(scenario.duration_s);
@@ -54,10 +54,10 @@ impl LogRate {
         Ok(every.into_iter().flatten().max().unwrap_or(1))
     }
 
-    /// Returns the control steps between rows, rounded to a whole number.
+    /// Returns the whole number of control steps between log rows.
     ///
     /// # Errors
-    /// If the log of one run would be too long.
+    /// Returns a message if the log would be too long.
     pub fn steps(self, scenario: &Scenario, contender: &Contender) -> Result<u64, String> {
         let LogRate(hz) = self;
         let steps = (1.0 / (f64::from(hz) * contender.step_s())).round().max(1.0);

@@ -5,13 +5,13 @@ pub use afbc_estimator::Aid;
 
 use nalgebra::{Vector3, Vector4};
 
-/// Time from which errors are evaluated \[s\], since flights start far from the reference.
+/// Time from which errors are evaluated, since flights start far from the reference \[s\].
 pub const SETTLED_S: f64 = 5.0;
 
-/// Figures of merit: each vector is \[x, y, z, psi\] in m and rad, or \[U1, U2, U3, U4\] in N.
+/// Figures of merit. Vectors are \[x, y, z, psi\] in m and rad, or \[U1, U2, U3, U4\] in N.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Metrics {
-    /// True if the flight reached [`SETTLED_S`]: of one that did not, only [`Metrics::final_error`] was measured.
+    /// True if the flight reached [`SETTLED_S`]. Otherwise only [`Metrics::final_error`] was measured.
     pub settled: bool,
     /// Root mean square error from [`SETTLED_S`] to the end.
     pub rmse: Vector4<f64>,
@@ -23,37 +23,37 @@ pub struct Metrics {
     pub final_error: Vector4<f64>,
     /// Mean |change of U| per step from [`SETTLED_S`] to the end: a measure of chatter.
     pub mean_abs_delta_u: Vector4<f64>,
-    /// How good the vehicle's own estimate was from [`SETTLED_S`] to the end; none without instruments.
+    /// Accuracy of the vehicle's own estimate from [`SETTLED_S`] to the end; none without instruments.
     pub estimate: Option<EstimateMetrics>,
 }
 
-/// Errors of the vehicle's own estimate: root mean squares of each coordinate.
+/// Accuracy of the vehicle's own estimate: root mean square errors of each coordinate.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct EstimateMetrics {
-    /// Position \[m\].
+    /// Error of the position \[m\].
     pub position_m: Vector3<f64>,
-    /// Velocity \[m/s\].
+    /// Error of the velocity \[m/s\].
     pub velocity_m_s: Vector3<f64>,
-    /// Rotation about the axes of the earth frame; the third is the heading \[rad\].
+    /// Rotation error about the axes of the earth frame, the third being the heading \[rad\].
     pub attitude_rad: Vector3<f64>,
-    /// Mean normalised estimation error squared of these nine; nine if the estimator is consistent.
+    /// Mean normalised estimation error squared of these nine errors: nine if the estimator is consistent.
     pub nees: f64,
     /// Share of the time in which the estimate was valid.
     pub valid_ratio: f64,
-    /// How the measurements agreed with it, in the order of [`Aid::ALL`].
+    /// Agreement of the measurements with the estimate, in the order of [`Aid::ALL`].
     pub aids: [AidMetrics; Aid::ALL.len()],
 }
 
-/// How the measurements of one kind agreed with the estimate.
+/// Agreement of one kind of measurements with the estimate.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct AidMetrics {
-    /// Number of measurements fused.
+    /// Number of fused measurements.
     pub fused: u64,
-    /// Number of their scalars.
+    /// Number of scalars in the fused measurements.
     pub scalars: u64,
     /// Number of measurements that the gate rejected.
     pub rejected: u64,
-    /// Mean normalised innovation squared per scalar of those fused; one if both are consistent.
+    /// Mean normalised innovation squared per fused scalar: one if measurements and estimate are consistent.
     pub nis: f64,
 }
 
@@ -68,7 +68,7 @@ pub struct Accumulator {
     last_error: Vector4<f64>,
     sum_abs_delta_u: Vector4<f64>,
     last_u: Option<Vector4<f64>>,
-    /// Sums of squares, and sums of the rest, of as many steps as have an estimate.
+    /// Sums over the steps with an estimate; errors are summed as squares.
     estimate: EstimateMetrics,
     estimates: u64,
 }
@@ -82,14 +82,14 @@ pub fn tracking_error(sample: &Sample) -> Vector4<f64> {
     Vector4::new(position.x, position.y, position.z, yaw - TAU * libm::rint(yaw / TAU))
 }
 
-/// Returns U1..U4 as produced by the rotors \[N\].
+/// Returns the inputs U1..U4 that the rotors produce \[N\].
 #[inline]
 pub fn inputs(sample: &Sample) -> Vector4<f64> {
     let u = sample.action.given;
     Vector4::new(u.roll_n, u.pitch_n, u.yaw_n, u.thrust_n).cast()
 }
 
-/// True if errors are evaluated at this time.
+/// Returns true if errors are evaluated at this time.
 #[inline]
 pub fn is_settled(time_s: f64) -> bool {
     // A tolerance of half a microsecond, since times are decimal and steps binary.
@@ -97,7 +97,7 @@ pub fn is_settled(time_s: f64) -> bool {
 }
 
 impl Metrics {
-    /// Returns one of the figures from [`SETTLED_S`] to the end, none of a flight that was over before.
+    /// Returns `figure`, one of those evaluated from [`SETTLED_S`] on; none if the flight ended before.
     pub fn measured(&self, figure: f64) -> Option<f64> {
         self.settled.then_some(figure)
     }
@@ -105,7 +105,7 @@ impl Metrics {
 
 impl Accumulator {
     /// Adds one step.
-    // Inlined, so that of a sample only what is read is ever made.
+    // Inlined, so that only the used parts of a sample are ever built.
     #[inline(always)]
     pub fn add(&mut self, sample: &Sample) {
         self.last_error = tracking_error(sample);
@@ -117,7 +117,7 @@ impl Accumulator {
         }
     }
 
-    /// Adds the last error, and the inputs of the same step.
+    /// Adds the last tracking error and the inputs of the same step.
     #[inline(never)]
     fn add_error(&mut self, u: Vector4<f64>) {
         let error = self.last_error;
@@ -155,7 +155,7 @@ impl Accumulator {
         }
     }
 
-    /// Returns the metrics so far; zero where there was nothing to measure.
+    /// Returns the metrics so far; zero where nothing was measured.
     pub fn finish(&self) -> Metrics {
         let mean = |sum: Vector4<f64>, count: u64| if count == 0 { sum } else { sum / count as f64 };
         let EstimateMetrics { position_m, velocity_m_s, attitude_rad, nees, valid_ratio, aids } = self.estimate;
@@ -174,7 +174,7 @@ impl Accumulator {
                 attitude_rad: root(attitude_rad),
                 nees: nees / count,
                 valid_ratio: valid_ratio / count,
-                // An aid of which nothing was fused has a sum of 0: its mean is 0, not NaN.
+                // An aid without fused measurements has a sum of 0: its mean becomes 0, not NaN.
                 aids: aids.map(|aid| AidMetrics { nis: aid.nis / aid.scalars.max(1) as f64, ..aid }),
             }),
         }

@@ -8,24 +8,23 @@ use afbc_types::OutOfRange;
 use core::ops::ControlFlow;
 use nalgebra::Vector4;
 
-/// Steps between looks at whether a flight is over: milliseconds of work.
+/// Steps between two calls of `is_over`: they take milliseconds.
 pub const LOOK_STEPS: u64 = 1024;
 
 /// A flight of a scenario under one contender.
 #[derive(Clone, Debug)]
 pub struct Run {
-    /// The contender.
+    /// Contender that flew.
     pub contender: Contender,
     /// When and why the vehicle was lost, if it was.
     pub lost: Option<Lost>,
     /// When and why AFBC's monitor switched to the fallback law, if it did.
     pub tripped: Option<Tripped>,
-    /// Figures of merit over every step.
+    /// Figures of merit, evaluated over every step.
     pub metrics: Metrics,
-    /// Every `log_every`-th step, and the last one.
+    /// Samples of every `log_every`-th step and of the last step.
     pub log: Vec<Sample>,
-    /// For each row of the log, the lowest and highest U1..U4 \[N\] of all steps since the previous row, since chatter
-    /// is faster than the log.
+    /// Lowest and highest U1..U4 \[N\] since the previous log row, for each row: chatter is faster than the log.
     pub input_extremes: Vec<[Vector4<f64>; 2]>,
 }
 
@@ -39,7 +38,7 @@ pub struct Tripped {
 }
 
 impl Run {
-    /// True if the flight reached the time from which errors are evaluated.
+    /// Returns true if the flight reached the time from which errors are evaluated.
     pub fn is_settled(&self) -> bool {
         self.metrics.settled
     }
@@ -47,15 +46,15 @@ impl Run {
     /// Flies `scenario` under `contender`, logging every `log_every`-th step (at least 1).
     ///
     /// # Errors
-    /// The first parameter, gain or setting out of range; nothing has been flown then.
+    /// Returns the first parameter, gain or setting that is out of range; nothing is flown then.
     pub fn fly(scenario: &Scenario, contender: &Contender, log_every: u64) -> Result<Self, OutOfRange> {
         Run::fly_unless(scenario, contender, log_every, || false)
     }
 
-    /// Flies as [`Run::fly`] does, and ends early once `is_over`, which is asked every [`LOOK_STEPS`].
+    /// Flies like [`Run::fly`], but ends early once `is_over` returns true. It is called every [`LOOK_STEPS`].
     ///
     /// # Errors
-    /// As there.
+    /// The same as for [`Run::fly`].
     pub fn fly_unless(
         scenario: &Scenario,
         contender: &Contender,

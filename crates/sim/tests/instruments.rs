@@ -1,4 +1,4 @@
-//! The instruments in scenario files.
+//! Tests the instruments in scenario files.
 #![allow(clippy::unwrap_used, missing_docs)] // tests
 
 use afbc_files::read::FileError;
@@ -12,8 +12,8 @@ fn example(text: &str) -> Result<Scenario, FileError> {
     parse("example", &format!("{text}{hover}"), "example")
 }
 
-/// A part by its name is its preset; a table begins with its part, or with a perfect instrument, and changes the keys
-/// given, in the groups too.
+/// A part's name alone selects its preset. A table begins with its part's preset, or with a perfect instrument, and
+/// changes only the given keys, also within groups.
 #[test]
 fn instruments_are_parts_or_tables() {
     let read = |text: &str| example(text).unwrap().instruments;
@@ -98,7 +98,7 @@ fn instruments_and_faults_that_do_not_exist_are_refused() {
     }
 }
 
-/// The inertial sensor sits where the vehicle's file says: beside the centre of mass it feels the turning.
+/// The IMU sits where the vehicle's file says: off the centre of mass it feels the centripetal acceleration.
 #[test]
 fn the_inertial_sensor_is_mounted_as_the_vehicle_says() {
     let scenario = |name: &str| {
@@ -111,7 +111,7 @@ fn the_inertial_sensor_is_mounted_as_the_vehicle_says() {
         let read = |truth| scenario.instruments(0.001).unwrap().unwrap().measure(truth).imu.unwrap();
         read(&turning).specific_force_m_s2.z - read(&still).specific_force_m_s2.z
     };
-    // 20 mm above the centre of mass: -omega^2 r, within scale, misalignment and the step of the output.
+    // The IMU is 20 mm above the centre of mass and feels -omega^2 r, within scale error, misalignment and output step.
     assert!((felt(scenario("iris")) + 100.0 * 0.02).abs() < 0.03);
     assert!(felt(scenario("paper")).abs() < 0.01);
     assert!(example("").unwrap().instruments(0.001).unwrap().is_none());

@@ -1,4 +1,5 @@
-//! The inertial sensor off the centre of mass, told and untold: every built-in vehicle takes off, flies and lands.
+//! Mounts the IMU off the centre of mass, with and without telling the vehicle: every built-in vehicle must take off,
+//! fly and land.
 #![allow(clippy::unwrap_used, missing_docs)] // a flight that cannot begin must stop the test
 
 use afbc::Profile;
@@ -14,7 +15,7 @@ use std::thread;
 const LAWS: [ControllerKind; 4] =
     [ControllerKind::Afbc, ControllerKind::Pid, ControllerKind::Geometric, ControllerKind::Mpc];
 
-/// Returns a take-off, a way of 3 m and back with a turn of 1 rad, and a landing, in a breeze.
+/// Returns a scenario in a breeze: take-off, 3 m forth and back with a turn of 1 rad, landing.
 fn there_and_back(vehicle: &Vehicle, kind: ControllerKind) -> Scenario {
     let mut scenario = built_in("mocap").unwrap().read().unwrap();
     let ground = vehicle.realism.contact.unwrap();
@@ -36,8 +37,8 @@ fn there_and_back(vehicle: &Vehicle, kind: ControllerKind) -> Scenario {
     scenario
 }
 
-/// Flies it and returns its last distance from the reference \[m\] and its mean NEES, or why it was lost or handed
-/// over.
+/// Flies the scenario. Returns the final distance from the reference \[m\] and the mean NEES, or an error if the
+/// vehicle was lost or the monitor tripped.
 fn flown(scenario: &Scenario) -> Result<[f64; 2], String> {
     let [contender] = scenario.contenders.as_slice() else { return Err("one contender flies".into()) };
     let (mut distance_m, mut trip, mut nees) = (f64::NAN, None, Vec::new());
@@ -52,8 +53,8 @@ fn flown(scenario: &Scenario) -> Result<[f64; 2], String> {
     }
 }
 
-/// Flies every vehicle under every law with each of these levers, as `mount` mounts it; returns what is wrong, and the
-/// mean of all NEES.
+/// Flies every vehicle under every law with each of the levers; `mount` applies a lever. Returns the failed flights and
+/// the mean of all NEES.
 fn faults(
     levers_m: &[[f64; 3]],
     mount: impl Fn(&mut Vehicle, &mut Vector3<f64>, Vector3<f64>) + Sync,

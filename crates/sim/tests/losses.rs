@@ -1,4 +1,4 @@
-//! Flights that count as lost because the vehicle does not fly although it should, and those that do not.
+//! Tests which flights count as lost because the vehicle does not fly although it should.
 #![allow(clippy::panic, clippy::unwrap_used, missing_docs)] // tests
 
 use afbc_control::{Action, FlightController, Mixer, Trace};
@@ -9,17 +9,17 @@ use afbc_sim::run::Run;
 use afbc_types::{Inputs, Parameters, Setpoint, State};
 use core::ops::{ControlFlow, Range};
 
-/// Rotors and ground of every flight here.
+/// Rotors and ground of every flight in this file.
 const VEHICLE: &str = "rotors = { time_constant_s = 0.02, force_max_n = 3.0 }\nground = {}\nprofile = \"flight\"\n";
 const HOVER: &str = "[trajectory]\nkind = \"hover\"\nposition_m = [0, 0, 1]\n";
-/// Standing on its feet.
+/// Start with the feet on the ground.
 const STANDING: &str = "[initial]\nposition_m = [0, 0, 0.075]\n";
 
 fn scenario(text: &str) -> Scenario {
     parse("losses", &format!("{VEHICLE}{text}"), "losses").unwrap()
 }
 
-/// Flies under AFBC and under PID, which come to the same end.
+/// Flies under AFBC and under PID and checks that both flights end for the same reason.
 fn end(text: &str) -> Option<Lost> {
     let scenario = scenario(text);
     let end = |kind| fly(&scenario, &Contender::of(kind, afbc::Profile::Flight), |_| {}).unwrap();
@@ -33,13 +33,14 @@ fn assert_lost(text: &str, reason: &str, between_s: Range<f64>) {
     assert!(lost.reason == reason && between_s.contains(&lost.time_s), "{lost:?}: {text}");
 }
 
-/// A vehicle that never has a state never starts its motors, with and without a flight core: it falls, and stands.
+/// A vehicle that never gets a state never starts its motors, with and without a flight core: it falls or stays on the
+/// ground.
 #[test]
 fn never_armed() {
     let blind = "duration_s = 9.0\n[[outage]]\nstart_s = 0.0\n";
     for core in ["", "flight_core = true\n"] {
         let flight = |rest: &str| format!("{core}{blind}{rest}");
-        // From 1 m it is on the ground after 0.43 s.
+        // From 1 m the vehicle reaches the ground after 0.43 s.
         assert_lost(&flight(HOVER), "never armed", GROUNDED_S + 0.3..GROUNDED_S + 0.6);
         assert_lost(&flight(&format!("{HOVER}{STANDING}")), "never armed", GROUNDED_S..GROUNDED_S + 0.1);
         let high = "[trajectory]\nkind = \"hover\"\nposition_m = [0, 0, 20]\n";
@@ -51,7 +52,7 @@ fn never_armed() {
 fn never_left_the_ground() {
     let flight = format!("duration_s = 9.0\n{HOVER}{STANDING}[[payload]]\nmass_kg = 1.0\nstart_s = 0.0\n");
     assert_lost(&flight, "never left the ground", GROUNDED_S..GROUNDED_S + 0.2);
-    // A lighter one is lifted.
+    // A lighter payload is lifted.
     assert_eq!(end(&flight.replace("1.0", "0.1")), None);
 }
 
@@ -59,14 +60,14 @@ fn never_left_the_ground() {
 fn on_the_ground_below_its_reference() {
     let flight = format!("duration_s = 12.0\n{HOVER}[[payload]]\nmass_kg = 1.0\nstart_s = 5.0\n");
     assert_lost(&flight, "on the ground below its reference", 5.0 + GROUNDED_S..7.5 + GROUNDED_S);
-    // Not where the reference is hardly higher than the vehicle on its feet.
+    // No loss if the reference is hardly higher than the standing vehicle.
     assert_eq!(end(&flight.replace("[0, 0, 1]", "[0, 0, 0.3]")), None);
-    // Nor where it ends before it counts.
+    // No loss if the flight ends before the time limit.
     assert_eq!(end(&flight.replace("12.0", "7.5")), None);
 }
 
-/// A flight core that brings the vehicle down since the scenario takes its measurements away does what it is for; on
-/// measurements that are too rare without any fault it is of no use.
+/// A failsafe's descent is no loss if the scenario has taken away the measurements. It is a loss if the measurements
+/// are just too rare, without any fault.
 #[test]
 fn a_failsafe_lands_after_a_fault_only() {
     let core = format!("flight_core = true\nduration_s = 15.0\n{HOVER}");
@@ -74,12 +75,12 @@ fn a_failsafe_lands_after_a_fault_only() {
     assert_eq!(end(&format!("{core}[[outage]]\nstart_s = 5.0\nduration_s = 0.24\n")), None);
     let lost = end(&format!("{core}[sensors]\nperiod_s = 0.5\n")).unwrap();
     assert_eq!(lost.reason, "on the ground below its reference");
-    // A fault that comes later is no excuse.
+    // A later fault is no excuse.
     let lost = end(&format!("{core}[sensors]\nperiod_s = 0.5\n[[outage]]\nstart_s = 14.0\n")).unwrap();
     assert_eq!(lost.reason, "on the ground below its reference");
 }
 
-/// Down to the ground, on it for longer than it counts, and up again.
+/// The vehicle descends to the ground, stays there for longer than the time limit, and climbs again.
 #[test]
 fn a_landing_is_no_loss() {
     let waypoints = [(1.0, 1.0), (4.0, 0.05), (12.0, 0.05), (15.0, 1.0)];
@@ -90,7 +91,7 @@ fn a_landing_is_no_loss() {
     assert_eq!(end(&format!("duration_s = 20.0\n[trajectory]\nkind = \"waypoints\"\n{waypoints}")), None);
 }
 
-/// Carries the weight, but for some steps with its motors off, and does nothing else.
+/// A law that carries the weight, switches the motors off for some steps, and does nothing else.
 struct Floats {
     mixer: Mixer,
     off: Range<u32>,
@@ -118,8 +119,8 @@ impl FlightController for Floats {
     }
 }
 
-/// Motors that are off where the vehicle has to rise are a loss; where it has to sink, or as long as it rises, or for a
-/// moment, they are a matter of the law.
+/// Motors off are a loss if the vehicle should rise. They are no loss if it should sink, still rises, or has them off
+/// only briefly.
 #[test]
 fn motors_off_in_the_air() {
     let flown = |trajectory: &str, climb_m_s: f64, off_ms: Range<u32>| {
@@ -138,12 +139,12 @@ fn motors_off_in_the_air() {
     assert_eq!(lost.reason, "motors off in the air");
     assert!((1.0 + OFF_S..1.1 + OFF_S).contains(&lost.time_s), "{lost:?}");
     assert_eq!(flown(&hover(40.0), 0.0, 1000..1450), None);
-    // Above its reference, and on its way up to it.
+    // Above its reference, and while it rises to its reference.
     assert_eq!(flown(&hover(10.0), 0.0, 1000..2500), None);
     assert_eq!(flown(&hover(60.0), 10.0, 1000..1900), None);
 }
 
-/// Errors count from 5 s on: a flight that is over before has no figures, and not figures of zero.
+/// Errors count from 5 s on: a flight that ends before has no figures, instead of figures of zero.
 #[test]
 fn a_flight_over_before_errors_count_has_no_figures() {
     for (duration_s, settled) in [(4.0, false), (6.0, true)] {

@@ -1,4 +1,4 @@
-//! A mounted inertial sensor of the plant, in `f64`, beside what flight software makes of it, in `f32`.
+//! Compares the plant's mounted IMU, in `f64`, with the flight software's calibration, in `f32`.
 #![allow(clippy::unwrap_used, missing_docs)] // tests
 
 use afbc_estimator::{ImuCalibration, ImuSample};
@@ -7,7 +7,7 @@ use afbc_plant::{Environment, InstrumentSuite, Instruments, Motion, Plant, Plant
 use afbc_types::{Mounting, Parameters};
 use nalgebra::Vector3;
 
-/// What a perfect sensor feels anywhere on the vehicle, calibrated, is what the centre of mass feels.
+/// A perfect IMU anywhere on the vehicle reads, after calibration, the motion of the centre of mass.
 #[test]
 fn a_calibrated_sensor_is_at_the_centre_of_mass() {
     const STEP_S: f64 = 0.001;

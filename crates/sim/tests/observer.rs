@@ -1,5 +1,5 @@
-//! The observer of the flight core against the plant, which is another model in `f64`: a vehicle that rolls, pitches,
-//! yaws and climbs, in front of a motion-capture system of 100 Hz that is 12 ms late.
+//! Tests the flight core's pose observer against the plant, a different model in `f64`. The vehicle rolls, pitches,
+//! yaws and climbs. A motion-capture system of 100 Hz with 12 ms delay tracks it.
 #![allow(clippy::unwrap_used, missing_docs)] // tests
 
 use afbc_control::Mixer;
@@ -12,7 +12,7 @@ use afbc_types::{Inputs, Parameters, Pose, PoseSigmas, State};
 use nalgebra::Vector3;
 use std::collections::VecDeque;
 
-/// Errors, root mean squares from 2 s on.
+/// Root mean square errors from 2 s on.
 #[derive(Clone, Copy, Debug, Default)]
 struct Errors {
     position_m: f64,
@@ -21,7 +21,7 @@ struct Errors {
     rates_rad_s: f64,
 }
 
-/// Pseudo-random numbers of a roughly normal distribution.
+/// Returns pseudo-random numbers of a roughly normal distribution.
 fn noise(seed: &mut u64) -> Vector3<f32> {
     let mut uniform = || {
         *seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
@@ -30,12 +30,12 @@ fn noise(seed: &mut u64) -> Vector3<f32> {
     Vector3::from_fn(|_, _| (0..12).map(|_| uniform()).sum())
 }
 
-/// Flies for 10 s under a law of the test's own, which knows the truth, on rotors of 20 ms.
+/// Flies for 10 s with rotors of 20 ms lag, under a law of this test that knows the truth.
 fn flown(scenario: &str, position_sigma_m: f32, attitude_sigma_rad: f32) -> Errors {
     on_rotors(0.02, &Response::DEFAULT, scenario, [position_sigma_m, attitude_sigma_rad])
 }
 
-/// The same on rotors with this lag, which respond as `known` as far as flight software knows.
+/// Flies with rotors of this lag; `known` is the rotor response that the flight software assumes.
 fn on_rotors(lag_s: f32, known: &Response, scenario: &str, sigmas: [f32; 2]) -> Errors {
     let [position_sigma_m, attitude_sigma_rad] = sigmas;
     let text = format!(
@@ -83,7 +83,7 @@ fn on_rotors(lag_s: f32, known: &Response, scenario: &str, sigmas: [f32; 2]) -> 
             steps += 1.0;
         }
 
-        // To and fro, each axis in its own time.
+        // Swing about each axis with a different period.
         let wanted = Vector3::new(0.3 * (3.0 * t).sin(), 0.25 * (2.3 * t).sin(), 0.4 * (1.1 * t).sin());
         let (stiffness, damping) = (Vector3::new(60.0, 60.0, 6.0), Vector3::new(16.0, 16.0, 5.0));
         let turning = stiffness.component_mul(&(wanted - eta)) - damping.component_mul(&w);
@@ -112,18 +112,18 @@ fn velocity_and_rates_are_those_of_the_plant() {
     let noisy = flown("", 0.001, 0.0035);
     let windy = flown("drag = {}\nwind = { steady_m_s = [3.0, 1.0, 0.0], turbulence = \"light\" }", 0.001, 0.0035);
     let weak = flown("change = [{ parameter = \"thrust-factor\", factor = 0.8, start_s = 0.0 }]", 0.001, 0.0035);
-    // A pose taken for one of now, not of 12 ms ago, would be off by 0.011 rad at the 0.9 rad/s of this flight, and by
-    // 0.012 m at its 1 m/s.
+    // Without compensation of its delay, a pose of 12 ms ago would be off by 0.011 rad at this flight's 0.9 rad/s, and
+    // by 0.012 m at its 1 m/s.
     assert!(perfect.attitude_rad < 1e-3 && perfect.rates_rad_s < 0.03, "{perfect:?}");
-    // Velocities are known to a tenth of what is flown, rates to a fifth, attitudes as the tracker knows them, which is
-    // 0.006 rad over three axes.
+    // Bounds: a tenth of the flown velocities, a fifth of the rates, and the tracker's attitude noise, which is 0.006
+    // rad over three axes.
     for errors in [perfect, noisy, windy, weak] {
         assert!(errors.position_m < 0.01 && errors.velocity_m_s < 0.15, "{errors:?}");
         assert!(errors.attitude_rad < 0.007 && errors.rates_rad_s < 0.15, "{errors:?}");
     }
 }
 
-/// Rotors of the Crazyflie's lag and of the racer's, reckoned with as they are, and as if they were the paper's.
+/// The Crazyflie's and the racer's rotor lags: the observer assumes the true lag, then the paper's.
 #[test]
 fn rates_are_observed_better_with_the_vehicles_own_rotors() {
     for (lag_s, gain) in [(0.072, 1.3), (0.033, 1.04)] {

@@ -1,4 +1,4 @@
-//! The start of a scenario, made once for all its contenders.
+//! Tests the start of a scenario, which is made once for all contenders.
 #![allow(clippy::unwrap_used, missing_docs)] // tests
 
 use afbc::Profile;
@@ -21,8 +21,8 @@ position_m = [0, 0, 1]
 const ON_THE_ESTIMATE: &str = "[instruments]\nimu = \"icm-42688-p\"\ntracker = \"mocap-100\"\n";
 const ON_SENSORS: &str = "[sensors]\nnoise = 0.001\n";
 
-/// Every contender flies as it does alone, whoever flew before: on its own estimate, which settles once, and on noisy
-/// sensors.
+/// Every contender flies exactly as it does alone, whoever flew before: on its own estimate, which settles once, and on
+/// noisy sensors.
 #[test]
 fn contenders_do_not_feel_who_flew_before() {
     for (name, sensors) in [("estimate", ON_THE_ESTIMATE), ("sensors", ON_SENSORS)] {
@@ -43,7 +43,7 @@ fn contenders_do_not_feel_who_flew_before() {
             assert_eq!(alone.len(), 301);
             ends.extend(alone.last().map(|(motion, _)| *motion));
         }
-        // The test could tell two flights apart.
+        // Different laws end differently, so the test can tell flights apart.
         assert!(ends.first() == ends.last() && ends.first() != ends.get(1), "{ends:?}");
     }
 }

@@ -1,4 +1,4 @@
-//! Flight of a scenario under one contender.
+//! Flies a scenario under one contender.
 
 use super::in_flight_core::InFlightCore;
 use super::law_only::LawOnly;
@@ -11,11 +11,11 @@ use afbc_scenario::{AnyController, Scenario};
 use afbc_types::{OutOfRange, with_rotors};
 use core::ops::ControlFlow;
 
-/// Flies `scenario` under one contender, and passes every step from t = 0 to the end to `observe`; returns when and why
+/// Flies `scenario` under one contender and passes every step from t = 0 to the end to `observe`. Returns when and why
 /// the vehicle was lost, if it was.
 ///
 /// # Errors
-/// The first parameter, gain or setting out of range; nothing has been flown then.
+/// Returns the first parameter, gain or setting that is out of range; nothing is flown then.
 pub fn fly(
     scenario: &Scenario,
     contender: &Contender,
@@ -27,10 +27,10 @@ pub fn fly(
     })
 }
 
-/// Flies as [`fly`] does, until `observe` ends the flight.
+/// Flies like [`fly`], until `observe` ends the flight.
 ///
 /// # Errors
-/// As there.
+/// The same as for [`fly`].
 pub fn fly_until(
     scenario: &Scenario,
     contender: &Contender,
@@ -39,23 +39,24 @@ pub fn fly_until(
     FlightStart::of(scenario).fly(contender, &mut observe)
 }
 
-/// The start of a scenario, which every contender flies from. A vehicle's own estimate settles before it, once for all.
+/// The start of a scenario, from which every contender flies. The vehicle's own estimate settles only once for all
+/// contenders.
 pub struct FlightStart<'a> {
     scenario: &'a Scenario,
-    /// The world there, once it has been made.
+    /// The world at the start, once it has been made.
     world: Option<World>,
 }
 
 impl<'a> FlightStart<'a> {
-    /// The one of `scenario`.
+    /// Returns the start of `scenario`.
     pub fn of(scenario: &'a Scenario) -> Self {
         FlightStart { scenario, world: None }
     }
 
-    /// Flies under one contender, as [`fly_until`] does.
+    /// Flies under one contender, like [`fly_until`].
     ///
     /// # Errors
-    /// As there.
+    /// The same as for [`fly`].
     pub fn fly(
         &mut self,
         contender: &Contender,
@@ -83,14 +84,15 @@ impl<'a> FlightStart<'a> {
         Ok(end.lost)
     }
 
-    /// Returns the world for steps of `dt_s`.
+    /// Returns the world at the start, for steps of `dt_s`.
     fn world(&mut self, dt_s: f64) -> Result<World, OutOfRange> {
-        // Plant, sensors and estimator are made for one step: a contender with another one needs another world.
+        // Plant, sensors and estimator are made for one step size: a contender with another step size needs another
+        // world.
         let world = match self.world.take().filter(|world| world.dt_s() == dt_s) {
             Some(world) => world,
             None => World::new(self.scenario, dt_s)?,
         };
-        // A copy, since the flight moves it and the next contender needs the start.
+        // Return a copy: the flight moves the world, and the next contender needs the start.
         Ok(self.world.insert(world).clone())
     }
 }

@@ -1,4 +1,5 @@
-//! The vehicle's own estimate, by the [front end](EstimatorFrontEnd) that flies on board, and how good it is.
+//! The vehicle's own estimate in a simulation, made by the [front end](EstimatorFrontEnd) that flies on board, and its
+//! errors.
 
 use super::sensing::{CARRIED_S, Sensing, carried};
 use afbc_estimator::{Aid, Estimate, Estimator, ImuCalibration, OutputFilter};
@@ -9,95 +10,97 @@ use afbc_scenario::Scenario;
 use afbc_types::{OutOfRange, Pose, State};
 use nalgebra::{Quaternion, SMatrix, SVector, Vector3};
 
-/// Time before t = 0 for which a vehicle stands at rest in the attitude of its start, its rotors still, while the
-/// estimator levels itself, finds the gyroscope's bias and hears the other instruments \[s\].
+/// Time before t = 0 for which the vehicle rests in its initial attitude with its rotors still \[s\]. Meanwhile the
+/// estimator levels itself, finds the gyroscope's bias and receives the other instruments.
 pub const REST_S: f64 = 2.0;
-/// Time by which it rests longer, at most, if the estimate is not valid then: nobody starts on none \[s\].
+/// Longest extra rest if the estimate is not valid yet at t = 0 \[s\].
 const WAITS_S: u32 = 5;
 
-/// Height of a vehicle's feet at the start from which on it starts in the air \[m\].
+/// A vehicle starts in the air if its feet are higher than this \[m\].
 const CLEAR_M: f64 = 0.1;
 
-/// Steps between two evaluations of [`Estimated::nees`], which costs as much as the estimator.
+/// Steps between two evaluations of [`Estimated::nees`], which takes as long as the estimator.
 const NEES_EVERY: u64 = 10;
 
-/// An estimate against the truth of the same time. Each error is truth less estimate; rotations are about the axes of
-/// the earth frame, as are their standard deviations.
+/// Errors of an estimate: truth minus estimate at the same time. Rotations and their standard deviations are about the
+/// axes of the earth frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Estimated {
     /// Error of the position \[m\].
     pub position_error_m: Vector3<f32>,
-    /// Its standard deviation, as the estimator states it \[m\].
+    /// Standard deviation of the position, as the estimator states it \[m\].
     pub position_sigma_m: Vector3<f32>,
     /// Error of the velocity \[m/s\].
     pub velocity_error_m_s: Vector3<f32>,
-    /// Its standard deviation \[m/s\].
+    /// Standard deviation of the velocity, as the estimator states it \[m/s\].
     pub velocity_sigma_m_s: Vector3<f32>,
-    /// Error of the attitude, a rotation vector \[rad\].
+    /// Error of the attitude as a rotation vector \[rad\].
     pub attitude_error_rad: Vector3<f32>,
-    /// Its standard deviation \[rad\].
+    /// Standard deviation of the attitude, as the estimator states it \[rad\].
     pub attitude_sigma_rad: Vector3<f32>,
-    /// Normalised estimation error squared of these nine, e^T P^-1 e: nine on the average if the estimator is
-    /// consistent. That of the last multiple of 10 ms.
+    /// Normalised estimation error squared of the nine errors, e^T P^-1 e: nine on average if the estimator is
+    /// consistent. It is evaluated every tenth step and held in between.
     pub nees: f32,
-    /// True if attitude, heading, velocity and position are valid: the pilot has the state.
+    /// True if attitude, heading, velocity and position are valid, so that the pilot has a state.
     pub valid: bool,
-    /// The measurement that was judged in this step, if there was one.
+    /// The measurement that was fused or rejected in this step, if there was one.
     pub innovation: Option<Innovation>,
 }
 
-/// How a measurement agreed with the estimate.
+/// Agreement of a measurement with the estimate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Innovation {
-    /// What it measures.
+    /// Kind of measurement.
     pub aid: Aid,
-    /// Normalised innovation squared, the sum over its scalars: as many as these on the average if both are consistent.
+    /// Normalised innovation squared, summed over the measurement's scalars. Its average equals their number if
+    /// measurement and estimate are consistent.
     pub nis: f32,
-    /// Number of scalars.
+    /// Number of scalars in the measurement.
     pub scalars: u8,
-    /// Whether it was fused; the gate rejected it otherwise.
+    /// True if the measurement was fused, false if the gate rejected it.
     pub fused: bool,
 }
 
-/// Instruments and estimator of a vehicle.
+/// Instruments and estimator of a simulated vehicle.
 #[derive(Clone)]
 pub(super) struct SimulatedEstimator {
     sensing: Sensing,
     front_end: EstimatorFrontEnd,
-    /// What the front end has put into it in this step.
+    /// Inbox with the front end's output of this step.
     inbox: Inbox,
     step_s: f64,
-    /// Steps since the beginning of settling, and how many of these there are before t = 0.
+    /// Number of steps since settling began, and number of settling steps before t = 0.
     steps: u64,
     settling: u64,
-    /// Time of the last look \[s\], if there was one, and what it saw.
+    /// Time of the last look \[s\], if there was one, and its result.
     last_s: Option<f64>,
     seen: Look,
 }
 
-/// What reaches the pilot.
+/// The estimator's output for the pilot.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Look {
     /// The state, if it is valid.
     pub(super) state: Option<State>,
-    /// The state of a vehicle that knows its attitude, but not all of the rest.
+    /// State of a vehicle whose attitude is valid, but not its position or velocity.
     pub(super) position_lost: Option<State>,
-    /// What the estimate misses for a valid state.
+    /// Reason for which there is no valid state.
     pub(super) missing: Option<Refusal>,
-    /// A tracker's pose, once the inertial sensor has failed.
+    /// A tracker's pose, after the IMU has failed.
     pub(super) pose: Option<Aged<Pose>>,
     pub(super) estimated: Estimated,
 }
 
 impl SimulatedEstimator {
-    /// Creates the one of `scenario`, if it has an inertial sensor, which has settled in `truth`.
+    /// Creates the estimator of `scenario`, settled in `truth`; none if the scenario has no IMU.
     ///
     /// # Errors
-    /// The first setting out of range.
+    /// Returns the first setting that is out of range.
     pub(super) fn new(scenario: &Scenario, step_s: f64, truth: &Truth) -> Result<Option<Box<Self>>, OutOfRange> {
         let mut settled = None;
         for waits_s in 0..=WAITS_S {
-            // Anew each time: the carrying has to end at t = 0, so a rest cannot be made longer once it is over.
+            // Start anew with each longer rest: carrying the vehicle to its start must end at t = 0, so a finished rest
+            // cannot be extended.
             let Some(mut navigator) = Self::at_rest(scenario, step_s, f64::from(waits_s))? else { return Ok(None) };
             let is_ready = navigator.settle(truth);
             settled = Some(navigator);
@@ -112,7 +115,7 @@ impl SimulatedEstimator {
         Ok(settled)
     }
 
-    /// Creates one that will rest for `waits_s` longer than usual.
+    /// Creates an unsettled estimator that will rest for `waits_s` longer than [`REST_S`].
     fn at_rest(scenario: &Scenario, step_s: f64, waits_s: f64) -> Result<Option<Box<Self>>, OutOfRange> {
         let Some(sensing) = Sensing::new(scenario, step_s)? else { return Ok(None) };
         let settings = scenario.estimation(step_s);
@@ -131,7 +134,7 @@ impl SimulatedEstimator {
         })))
     }
 
-    /// Lets the vehicle stand at rest, and carries it to its start. True if the estimate is valid then.
+    /// Simulates the vehicle's rest and its way to its start. Returns true if the estimate is valid at the end.
     fn settle(&mut self, start: &Truth) -> bool {
         let mut is_ready = false;
         for step in 0..self.settling {
@@ -144,7 +147,7 @@ impl SimulatedEstimator {
         is_ready
     }
 
-    /// Returns what reaches the pilot, and how good it is. The same again as long as the vehicle is held.
+    /// Returns the estimate for the pilot. While the vehicle is held, the result stays the same.
     pub(super) fn look(&mut self, truth: &Truth) -> &Look {
         if self.last_s != Some(truth.time_s) {
             self.seen = self.see(truth);
@@ -154,7 +157,7 @@ impl SimulatedEstimator {
     }
 
     fn see(&mut self, truth: &Truth) -> Look {
-        // Before the step: a number that is larger after it counts what was judged in it.
+        // Read before the step: a count that grows during the step shows the measurement that was judged.
         let judged = self.judged();
         let estimate = self.step(truth);
         let valid = is_valid(&estimate);
@@ -184,13 +187,13 @@ impl SimulatedEstimator {
         Look { state, position_lost, missing: inbox.missing(), pose, estimated }
     }
 
-    /// Returns the numbers of measurements fused and rejected, by aid.
+    /// Returns the number of fused and of rejected measurements for each aid.
     fn judged(&self) -> [(u32, u32); Aid::ALL.len()] {
         Aid::ALL.map(|aid| self.front_end.memory().aids().of(aid)).map(|record| (record.accepted, record.rejected))
     }
 
-    /// Returns the measurement that was judged since these were `before`. The filter judges one in a step; if it ever
-    /// were two, the first counts.
+    /// Returns the measurement that was fused or rejected since the counts `before`. The filter judges one measurement
+    /// per step; of several, the first is returned.
     fn innovation(&self, before: &[(u32, u32); Aid::ALL.len()]) -> Option<Innovation> {
         let (aid, (accepted, _)) = Aid::ALL.into_iter().zip(before).find(|(aid, (accepted, rejected))| {
             let record = self.front_end.memory().aids().of(*aid);
@@ -208,16 +211,16 @@ impl SimulatedEstimator {
         let readings = self.sensing.read(truth, at_us);
         self.steps += 1;
         self.inbox = Inbox::EMPTY;
-        // Nothing of the default is valid, so that nobody flies on an estimate that there is not.
+        // The default estimate is invalid in all parts, so nobody flies on a missing estimate.
         self.front_end.tick(now_us, readings, &mut self.inbox).unwrap_or_default()
     }
 
-    /// Returns the normalised estimation error squared of rotation, velocity and position; not a number if the
-    /// covariance is not positive.
+    /// Returns the normalised estimation error squared of rotation, velocity and position; NaN if the covariance is not
+    /// positive definite.
     fn nees(&self, estimate: &Estimate, truth: &Truth) -> f64 {
         let rows = self.front_end.memory().covariance_of_motion();
         let at = |i: usize, j: usize| rows.get(i).and_then(|row| row.get(j)).map_or(f64::NAN, |&cell| f64::from(cell));
-        // Scaled, so that units do not matter.
+        // Scale to correlations, so that the units do not matter.
         let covariance = SMatrix::<f64, 9, 9>::from_fn(at);
         let scale = covariance.diagonal().map(libm::sqrt);
         let correlation = covariance.component_div(&(scale * scale.transpose()));
@@ -226,27 +229,28 @@ impl SimulatedEstimator {
     }
 }
 
-/// The clock of a vehicle that settles for so many steps. It begins a step before: no time of it is zero.
+/// Returns the conversion to the clock of a vehicle that settles for `settling` steps. The clock starts one step
+/// earlier, so no time is zero.
 fn clock_us(settling: u64, step_s: f64) -> impl Fn(f64) -> u64 {
     let begins_s = (settling as f64 + 1.0) * step_s;
     move |time_s| ((time_s + begins_s) * 1e6).round().max(0.0) as u64
 }
 
-/// True if a pilot may fly on it.
+/// Returns true if a pilot may fly on the estimate.
 fn is_valid(estimate: &Estimate) -> bool {
     let validity = &estimate.validity;
     validity.attitude && validity.heading && validity.velocity && validity.position
 }
 
-/// Truth less estimate, in the order of the covariance: rotation about the axes of the earth frame \[rad\], velocity
-/// \[m/s\], position \[m\].
+/// Returns truth minus estimate in the order of the covariance: rotation about the axes of the earth frame \[rad\],
+/// velocity \[m/s\], position \[m\].
 fn errors(estimate: &Estimate, truth: &Truth) -> SVector<f64, 9> {
     let [w, x, y, z] = estimate.attitude.map(f64::from);
     let turn = truth.attitude * Quaternion::new(w, -x, -y, -z);
-    // The shorter way round: q and -q are the same rotation.
+    // Take the shorter way round: q and -q are the same rotation.
     let turn = if turn.w < 0.0 { -turn } else { turn };
     let sine = turn.vector().norm();
-    // angle/sin(angle/2), whose limit is 2.
+    // angle/sin(angle/2) tends to 2 for a small angle.
     let per_sine = if sine > 1e-9 { 2.0 * libm::atan2(sine, turn.w) / sine } else { 2.0 };
     let mut errors = SVector::<f64, 9>::zeros();
     errors.fixed_rows_mut::<3>(0).copy_from(&(turn.vector() * per_sine));

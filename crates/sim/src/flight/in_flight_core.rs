@@ -1,4 +1,4 @@
-//! Any controller inside the flight core, as on board, but without board and link.
+//! Flies a controller inside the flight core, as on board, but without board and link.
 
 use super::pilot::Pilot;
 use super::sample::{Sample, estimates};
@@ -11,10 +11,10 @@ use afbc_onboard::Aged;
 use afbc_types::{OutOfRange, Parameters, Setpoint, State};
 use core::convert::Infallible;
 
-/// Ticks before the first step: the flight core arms after it has measured its rate.
+/// Ticks before the first step: the flight core arms only after it has measured its tick rate.
 const TICKS_HELD: u64 = WINDOW_US as u64 / PERIOD_US + 1;
 
-/// A controller inside the flight core: without states it coasts blind, then descends.
+/// A controller inside the flight core. Without states the flight core flies by dead reckoning, then descends.
 pub struct InFlightCore<C: FlightController<N>, const N: usize> {
     vehicle: FlightCore<C, N>,
     mixer: Mixer<N>,
@@ -25,18 +25,18 @@ pub struct InFlightCore<C: FlightController<N>, const N: usize> {
 }
 
 impl<C: FlightController<N>, const N: usize> InFlightCore<C, N> {
-    /// Puts `controller`, which must be built for this vehicle, whose rotors respond like this, into a flight core
-    /// without arming limits.
+    /// Puts `controller` into a flight core without arming limits. The controller must be built for this vehicle;
+    /// `rotors` is its rotors' response.
     ///
     /// # Errors
-    /// If the time step is not 1 ms, the flight core's.
+    /// Returns an error if the controller's time step is not the flight core's 1 ms.
     pub fn new(vehicle: Parameters, rotors: &Response, controller: C) -> Result<Self, OutOfRange> {
         let mixer = *controller.mixer();
         let vehicle = FlightCore::with_rotors(vehicle, rotors, ArmingLimits::NONE, controller)?;
         Ok(InFlightCore { vehicle, mixer, memory: FlightCoreMemory::default(), inbox: Inbox::default(), now_us: 0 })
     }
 
-    /// Runs one tick with what reaches it of `view`.
+    /// Runs one tick with the inputs that `view` shows.
     fn tick(&mut self, view: &View, setpoint: Setpoint) -> Action<N> {
         self.now_us += PERIOD_US;
         let at_us = self.now_us;
@@ -44,7 +44,7 @@ impl<C: FlightController<N>, const N: usize> InFlightCore<C, N> {
         if let Some(Aged { value, age_us }) = view.pose {
             self.inbox.put_pose(Stamped { value, at_us: at_us.saturating_sub(age_us.into()) });
         }
-        // A state that is only held would be taken for fresh; the flight core extrapolates between states by itself.
+        // A held state would count as fresh; the flight core extrapolates between states itself.
         match (view.state.filter(|state| view.new && state.is_plausible()), view.missing) {
             (Some(state), _) => self.inbox.locate(stamped(state)),
             (None, Some(missing)) => self.inbox.put_position_lost(view.position_lost.map(stamped), missing),
@@ -59,7 +59,7 @@ impl<C: FlightController<N>, const N: usize> InFlightCore<C, N> {
         action
     }
 
-    /// Powers up and arms a vehicle that is held in this state.
+    /// Powers up and arms a vehicle that is held in the state of `view`.
     fn arm(&mut self, view: &View, setpoint: Setpoint) {
         for _ in 0..TICKS_HELD {
             let _ = self.tick(view, setpoint);
@@ -72,13 +72,13 @@ impl<C: FlightController<N>, const N: usize> InFlightCore<C, N> {
 impl<C: FlightController<N>, const N: usize> Pilot for InFlightCore<C, N> {
     type Error = Infallible;
 
-    /// Runs one tick. Before the first, once there is a state, the vehicle is held until it has armed.
+    /// Runs one tick. At the first state, the vehicle is held until the flight core has armed.
     fn step(&mut self, world: &mut World) -> Result<Sample, Infallible> {
         let view = world.look();
         let (is_held, setpoint) = (self.now_us == 0, view.reference.setpoint());
         let state = view.state.filter(State::is_plausible);
         if is_held && state.is_some() {
-            // The vehicle is held, so its state is as true in each tick of arming as when it was measured.
+            // The vehicle is held, so its state stays true in every tick of arming.
             self.arm(&View { new: true, pose: None, ..view }, setpoint);
         }
         let mut action = if self.now_us > 0 { self.tick(&view, setpoint) } else { Action::default() };

@@ -1,4 +1,4 @@
-//! A law without the flight core.
+//! Flies a law without the flight core.
 
 use super::pilot::Pilot;
 use super::sample::{Sample, estimates};
@@ -13,7 +13,7 @@ pub struct LawOnly<C: FlightController<N>, const N: usize> {
 }
 
 impl<C: FlightController<N>, const N: usize> LawOnly<C, N> {
-    /// Creates it with a controller that has not flown yet.
+    /// Creates the pilot with a controller that has not flown yet.
     pub fn new(controller: C) -> Self {
         LawOnly { controller, memory: Validated::default() }
     }
@@ -22,7 +22,7 @@ impl<C: FlightController<N>, const N: usize> LawOnly<C, N> {
 impl<C: FlightController<N>, const N: usize> Pilot for LawOnly<C, N> {
     type Error = Infallible;
 
-    // Always inlined: copying a sample in and out of calls costs a fifth of the loop.
+    // Always inlined: copying a sample into and out of calls takes a fifth of the loop's time.
     #[inline(always)]
     fn step(&mut self, world: &mut World) -> Result<Sample, Infallible> {
         let view = world.look();

@@ -24,12 +24,12 @@ pub struct FlightEnd {
     pub interrupted: bool,
 }
 
-/// Flies for `duration_s`, until the vehicle is lost or `observe` ends the flight, and passes it every step from t = 0
-/// on.
+/// Flies for `duration_s`, until the vehicle is lost, or until `observe` or the pilot ends the flight. Passes every
+/// step from t = 0 on to `observe`.
 ///
 /// # Errors
-/// The pilot's error.
-// Always inlined: a flight has one loop, which includes its pilot's step.
+/// Returns the pilot's error.
+// Always inlined, so that each flight has a single loop that includes its pilot's step.
 #[inline(always)]
 pub fn lockstep<P: Pilot>(
     world: &mut World,
@@ -41,7 +41,7 @@ pub fn lockstep<P: Pilot>(
     let mut watch = Watch::new(world.faulty_from_s());
     for step in 0..=steps {
         let sample = pilot.step(world)?;
-        // Before it is judged, so that a log ends with the step in which the vehicle was lost.
+        // Observed before the loss is judged, so that a log includes the step in which the vehicle was lost.
         let interrupted = observe(&sample).is_break();
         let reason = watch.lost(&sample, pilot.descends()).or_else(|| pilot.gave_up());
         let lost = reason.map(|reason| Lost { time_s: sample.time_s, reason });

@@ -1,9 +1,8 @@
-//! When a vehicle counts as lost.
+//! Decides when a vehicle counts as lost.
 //!
-//! It is lost where it cannot be controlled any more, tilted beyond 90 degrees or far away, and where it does not fly
-//! although it should: its reference is in the air, and its motors are off, or it stands on the ground. A flight core
-//! that brings the vehicle down since the scenario takes its measurements away does what it is for; such a flight is
-//! not lost.
+//! A vehicle is lost if it is out of control: tilted beyond 90 degrees, or far from its reference. It is also lost if
+//! its reference is in the air while its motors are off or it stands on the ground. A descent by the flight core's
+//! failsafe is no loss if the scenario has taken away the measurements: that is the failsafe's purpose.
 
 use super::sample::Sample;
 use core::f64::consts::FRAC_PI_2;
@@ -12,39 +11,39 @@ use core::f64::consts::FRAC_PI_2;
 pub const LOST_DISTANCE_M: f64 = 50.0;
 /// Longest time for which a vehicle may fall below its reference with its motors off \[s\].
 pub const OFF_S: f64 = 0.5;
-/// Height of the reference above a vehicle on the ground from which on it should be in the air \[m\].
+/// A vehicle on the ground should be in the air if its reference is higher above it than this \[m\].
 pub const ALOFT_M: f64 = 0.3;
-/// Longest time for which it may be on the ground then \[s\].
+/// Longest time for which a vehicle that should be in the air may be on the ground \[s\].
 pub const GROUNDED_S: f64 = 3.0;
-/// Height above the ground, where it stood, from which on it is in the air \[m\].
+/// A vehicle has left the ground if it rises by more than this \[m\].
 pub const CLEAR_M: f64 = 0.1;
 
-/// What has become of a vehicle so far.
+/// Record of a flight, for judging whether the vehicle is lost.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Watch {
-    /// Time from which on a fault may ground it \[s\].
+    /// Time of the scenario's first fault that may ground the vehicle \[s\].
     faulty_from_s: f64,
-    /// True if it is brought down by its flight core, after a fault.
+    /// True if the flight core has brought the vehicle down after a fault.
     excused: bool,
-    /// True if its motors have been on.
+    /// True if the motors have been on.
     started: bool,
     /// Largest height so far \[m\].
     highest_m: f64,
-    /// Time since which it falls below its reference with its motors off \[s\].
+    /// Time since which the vehicle falls below its reference with its motors off \[s\].
     off_since_s: Option<f64>,
     grounded: Option<Grounded>,
 }
 
-/// On the ground although the reference is in the air.
+/// A stay on the ground while the reference is in the air.
 #[derive(Clone, Copy, Debug)]
 struct Grounded {
     since_s: f64,
-    /// Smallest height since then \[m\].
+    /// Smallest height during the stay \[m\].
     lowest_m: f64,
 }
 
 impl Watch {
-    /// Begins at the start of a flight in which nothing fails before `faulty_from_s`.
+    /// Starts the record of a flight without faults before `faulty_from_s`.
     pub(super) fn new(faulty_from_s: f64) -> Self {
         Watch {
             faulty_from_s,
@@ -56,8 +55,9 @@ impl Watch {
         }
     }
 
-    /// Returns why the vehicle counts as lost, if it does. `descends` is true if its flight core brings it down.
-    // Inlined, so that of a sample only what is read is ever made.
+    /// Returns the reason for which the vehicle counts as lost; none if it does not. `descends` is true while a
+    /// failsafe brings the vehicle down.
+    // Inlined, so that only the used parts of a sample are ever built.
     #[inline(always)]
     pub(super) fn lost(&mut self, sample: &Sample, descends: bool) -> Option<&'static str> {
         match uncontrolled(sample) {
@@ -66,7 +66,7 @@ impl Watch {
         }
     }
 
-    /// Returns why a vehicle that should fly counts as lost, if it does.
+    /// Returns the reason for which a controllable vehicle counts as lost; none if it does not.
     #[inline(always)]
     fn idle(&mut self, sample: &Sample, descends: bool) -> Option<&'static str> {
         let (motion, reference, time_s) = (&sample.motion, &sample.reference, sample.time_s);
@@ -80,14 +80,14 @@ impl Watch {
         if self.excused {
             return None;
         }
-        // A law that lets the vehicle fall does so above its reference, or to end a climb.
+        // A law may turn the motors off above its reference, or to end a climb.
         let falls = off && !touches && below_m > 0.0 && motion.velocity_m_s.z < reference.velocity_m_s.z;
         if !falls && !touches && self.grounded.is_none() {
             self.off_since_s = None;
             return None;
         }
         self.off_since_s = falls.then(|| self.off_since_s.unwrap_or(time_s));
-        // Feet that bounce do not begin the time anew; a climb clear of the ground does.
+        // Bouncing feet do not restart the time; a climb clear of the ground does.
         self.grounded = self.grounded.filter(|grounded| height_m < grounded.lowest_m + CLEAR_M);
         if touches {
             self.grounded.get_or_insert(Grounded { since_s: time_s, lowest_m: height_m });
@@ -98,7 +98,8 @@ impl Watch {
         }
         let off_too_long = self.off_since_s.is_some_and(|since_s| time_s - since_s > OFF_S);
         let grounded = self.grounded.filter(|grounded| time_s - grounded.since_s > GROUNDED_S);
-        // The cause first: what has never armed has its motors off in the air, or stands on the ground, as well.
+        // Report the cause first: a vehicle that never armed also meets the other conditions, motors off or on the
+        // ground.
         match grounded {
             _ if (off_too_long || grounded.is_some()) && !self.started => Some("never armed"),
             _ if off_too_long => Some("motors off in the air"),
@@ -109,7 +110,8 @@ impl Watch {
     }
 }
 
-/// Returns why the vehicle counts as out of control, if it does. Assumption A3 excludes a tilt of 90 degrees.
+/// Returns the reason for which the vehicle is out of control; none if it is under control. The paper's assumption A3
+/// excludes a tilt of 90 degrees.
 #[inline]
 fn uncontrolled(sample: &Sample) -> Option<&'static str> {
     let eta = &sample.motion.attitude_rad;

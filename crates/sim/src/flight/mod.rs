@@ -1,9 +1,9 @@
-//! Lockstep flights: measure, decide, observe, move the vehicle, once per step.
+//! Flies in lockstep: each step measures, decides, observes and moves the vehicle.
 //!
-//! A [`World`] has the plant, its disturbances and its sensors; a vehicle with an inertial sensor estimates its state
-//! itself, by the estimator that flies on board. A [`Pilot`] reads the sensors and commands the rotors:
-//! a law [`LawOnly`], the flight core with a law inside ([`InFlightCore`]), or the firmware at the other end of a link
-//! (`afbc-hil`). [`lockstep`] is the loop around both.
+//! A [`World`] has the plant, its disturbances and its sensors. A vehicle with an IMU estimates its state with the
+//! estimator that flies on board. A [`Pilot`] reads the sensors and commands the rotors. It is a law ([`LawOnly`]), the
+//! flight core with a law inside ([`InFlightCore`]), or the firmware at the other end of a link (`afbc-hil`).
+//! [`lockstep`] is the loop around world and pilot.
 
 mod contender;
 mod estimation;

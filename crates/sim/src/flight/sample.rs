@@ -17,15 +17,15 @@ pub struct Sample {
     pub time_s: f64,
     /// True motion.
     pub motion: Motion,
-    /// Measurement by the sensors; none if they are perfect.
+    /// Measurement by the sensors; none if the sensors are perfect.
     pub measurement: Option<StateMeasurement>,
-    /// The vehicle's own estimate against the truth; none without instruments.
+    /// Errors of the vehicle's own estimate; none without instruments.
     pub estimated: Option<Estimated>,
     /// State of rotors, air and ground after the previous step; none for an ideal plant.
     pub telemetry: Option<EffectsState>,
     /// Reference at this time.
     pub reference: Reference,
-    /// Mode of the flight core, if it flies inside one.
+    /// Mode of the flight core; none without a flight core.
     pub mode: Option<Mode>,
     /// The controller's output; 0 for rotors that the vehicle does not have.
     pub action: Action<ROTORS_MAX>,
@@ -35,7 +35,7 @@ pub struct Sample {
     pub estimates: Option<PerAxis<AdaptiveEstimate>>,
 }
 
-/// Returns AFBC's estimates in the memory of a law of the list; none for another.
+/// Returns AFBC's adaptive estimates, if `memory` is that of an AFBC controller; none for other laws.
 #[inline(always)]
 pub(super) fn estimates<const N: usize>(memory: &dyn Any) -> Option<PerAxis<AdaptiveEstimate>> {
     memory.downcast_ref().and_then(AnyControllerMemory::<N>::estimates)

@@ -1,4 +1,4 @@
-//! What a vehicle's own sensors say: the instruments' readings, as they reach its software.
+//! Reads a simulated vehicle's instruments as its software receives them.
 
 use super::sensor_model;
 use afbc_estimator::{Measurement, Stamped};
@@ -9,29 +9,29 @@ use afbc_types::OutOfRange;
 use nalgebra::Vector3;
 use std::collections::VecDeque;
 
-/// Time for which a vehicle with an estimator of its own stands at its start, and is carried to it, before t = 0 \[s\].
+/// Time before t = 0 for which a vehicle with its own estimator stands and is then carried to its start \[s\].
 pub const STANDS_S: f64 = 4.0;
-/// Time before t = 0 in which a vehicle that has rested is carried to its start, and accelerated to the velocity there
-/// \[s\]: no sensor would notice a jump.
+/// Time before t = 0 for which a rested vehicle is accelerated to its initial position and velocity, so that its
+/// sensors see no jump \[s\].
 pub const CARRIED_S: f64 = 1.0;
 
-/// Instruments of a vehicle, and what of their readings has not reached a tick yet.
+/// Instruments of a vehicle, and the measurements that no tick has taken yet.
 #[derive(Clone)]
 pub(super) struct Sensing {
     instruments: Instruments,
-    /// What the vehicle is told of them.
+    /// The instruments' noise and rates as the vehicle's software is told.
     told: InstrumentSuite,
     outages: Vec<Outage>,
     readings: Readings,
-    /// Measurements that wait for a tick that takes them.
+    /// Measurements that wait for a tick with room for them.
     waiting: VecDeque<Stamped<Measurement>>,
 }
 
 impl Sensing {
-    /// Creates those of `scenario`, if there is an inertial sensor among them.
+    /// Creates the instruments of `scenario`; none if the scenario has no IMU.
     ///
     /// # Errors
-    /// The first setting out of range.
+    /// Returns the first setting that is out of range.
     pub(super) fn new(scenario: &Scenario, step_s: f64) -> Result<Option<Self>, OutOfRange> {
         let instruments = scenario.instruments(step_s)?.filter(|_| scenario.instruments.imu.is_some());
         Ok(instruments.map(|instruments| Sensing {
@@ -47,16 +47,16 @@ impl Sensing {
         &mut self.instruments
     }
 
-    /// Returns what was read last.
+    /// Returns the last readings.
     pub(super) fn readings(&self) -> &Readings {
         &self.readings
     }
 
-    /// Reads the instruments in `truth`, for a tick of that time. `at_us` is the vehicle's clock.
+    /// Reads the instruments in `truth` for the tick at that time. `at_us` converts to the vehicle's clock.
     pub(super) fn read(&mut self, truth: &Truth, at_us: impl Fn(f64) -> u64) -> &Readings {
         let Sensing { instruments, told, outages, readings, waiting } = self;
         let read = instruments.measure(truth);
-        // The tracker is on the ground: what it sends in an outage of the link is lost.
+        // The tracker is on the ground: its measurements are lost while the link is out.
         let heard = !outages.iter().any(|outage| (outage.start_s..outage.end_s).contains(&truth.time_s));
         if let Some(tracker) = told.tracker.filter(|_| heard) {
             waiting.extend(read.tracker.iter().map(|fix| sensor_model::pose(fix, &tracker, &at_us)));
@@ -82,7 +82,7 @@ impl Sensing {
     }
 }
 
-/// Returns the truth of a vehicle that stands where `start` is, its rotors still.
+/// Returns the truth of a vehicle that stands at the place of `start` with its rotors still.
 pub(super) fn still(start: &Truth, time_s: f64) -> Truth {
     Truth {
         time_s,
@@ -96,8 +96,8 @@ pub(super) fn still(start: &Truth, time_s: f64) -> Truth {
     }
 }
 
-/// Returns the truth of a vehicle before t = 0: it stands, and is carried to its start in the last [`CARRIED_S`]. From
-/// there a constant acceleration reaches the start with its velocity just at t = 0.
+/// Returns the truth of a vehicle before t = 0: it stands, and is carried to its start in the last [`CARRIED_S`]. A
+/// constant acceleration reaches the start and its velocity exactly at t = 0.
 pub(super) fn carried(start: &Truth, time_s: f64) -> Truth {
     let moving_s = (time_s + CARRIED_S).max(0.0);
     let acceleration_m_s2 = start.velocity_m_s * if moving_s > 0.0 { 1.0 / CARRIED_S } else { 0.0 };
@@ -110,31 +110,31 @@ pub(super) fn carried(start: &Truth, time_s: f64) -> Truth {
     }
 }
 
-/// Returns the number of steps for which a vehicle stands.
+/// Returns the number of steps for which a vehicle stands before t = 0.
 fn steps(step_s: f64) -> u64 {
     (STANDS_S / step_s).round() as u64
 }
 
-/// Sensors wired to a vehicle that runs its own estimator.
+/// Sensors of a vehicle that runs its own estimator.
 #[derive(Clone)]
 pub(super) struct Wired {
     sensing: Sensing,
     step_s: f64,
-    /// Looks so far.
+    /// Number of looks so far.
     looks: u64,
 }
 
 impl Wired {
-    /// Creates the sensors of `scenario`, if there are any.
+    /// Creates the sensors of `scenario`; none if the scenario has no IMU.
     ///
     /// # Errors
-    /// The first setting out of range.
+    /// Returns the first setting that is out of range.
     pub(super) fn new(scenario: &Scenario, step_s: f64) -> Result<Option<Box<Self>>, OutOfRange> {
         let wired = |sensing| Box::new(Wired { sensing, step_s, looks: 0 });
         Ok(Sensing::new(scenario, step_s)?.map(wired))
     }
 
-    /// The sensors of a vehicle that does not stand still before t = 0.
+    /// Returns the sensors of a vehicle that does not stand still before t = 0.
     pub(super) fn at_once(mut self: Box<Self>) -> Box<Self> {
         self.looks = steps(self.step_s);
         self
@@ -148,23 +148,23 @@ impl Wired {
         self.sensing.instruments_mut()
     }
 
-    /// True if the vehicle still stands before t = 0.
+    /// Returns true if the vehicle still stands before t = 0.
     pub(super) fn stands(&self) -> bool {
         self.looks < steps(self.step_s)
     }
 
-    /// Returns what was read in the last look.
+    /// Returns the readings of the last look.
     pub(super) fn readings(&self) -> &Readings {
         self.sensing.readings()
     }
 
-    /// Reads all sensors; before t = 0 those of a vehicle at rest that is carried to its start.
+    /// Reads all sensors. Before t = 0 they sense a vehicle at rest that is then carried to its start.
     pub(super) fn look(&mut self, truth: &Truth) {
         let step_s = self.step_s;
         let before_s = if self.stands() { self.looks as f64 * step_s - STANDS_S } else { 0.0 };
         let seen = if self.stands() { carried(truth, before_s) } else { *truth };
         self.looks += 1;
-        // The clock begins a step before the first look: no time of it is zero.
+        // The clock starts one step before the first look, so no time is zero.
         let at_us = |time_s: f64| ((time_s + STANDS_S + step_s) * 1e6).round().max(0.0) as u64;
         let _ = self.sensing.read(&seen, at_us);
     }

@@ -1,26 +1,27 @@
-//! Measurements as an estimator gets them, with the standard deviations that receivers state and data sheets that it is
-//! told of, not what was drawn for this flight: slow errors of a receiver, hard iron.
+//! Makes the estimator's measurements from simulated readings. Standard deviations come from the receiver or from the
+//! data sheet that the vehicle is told. Errors drawn for this flight, such as a receiver's slow errors and hard iron,
+//! are not included.
 
 use afbc_estimator::{Measurement, Stamped};
 use afbc_plant::instruments::{Barometer, FieldFix, GnssFix, HeightFix, Magnetometer, TrackerFix, TrackerModel};
 
-/// Speed at which the noise of a tracker's stamps counts \[m/s\].
+/// Assumed speed that turns a tracker's timestamp noise into a position error \[m/s\].
 const STAMPED_M_S: f64 = 1.0;
-/// Smallest standard deviation that is stated, in the unit of each.
+/// Smallest stated standard deviation, in each measurement's unit.
 const SIGMA_MIN: f64 = 1e-4;
 
-/// Root of the sum of squares.
+/// Returns the root of the sum of squares.
 fn root(parts: &[f64]) -> f64 {
     libm::sqrt(parts.iter().map(|part| part * part).sum())
 }
 
-/// Error of quantisation.
+/// Returns the standard deviation of quantisation.
 fn step(lsb: f64) -> f64 {
-    // Standard deviation of an error that is uniform over one step.
+    // The error is uniform over one step.
     lsb / libm::sqrt(12.0)
 }
 
-/// Stamps a value of `time_s` on the clock that `at_us` converts to.
+/// Stamps a value with `time_s`, converted to the vehicle's clock by `at_us`.
 fn timed(value: Measurement, time_s: f64, at_us: impl Fn(f64) -> u64) -> Stamped<Measurement> {
     Stamped { value, at_us: at_us(time_s) }
 }
@@ -29,7 +30,7 @@ fn sigma(parts: &[f64]) -> f32 {
     root(parts).max(SIGMA_MIN) as f32
 }
 
-/// A pose.
+/// Returns a tracker's pose as a measurement.
 pub(super) fn pose(fix: &TrackerFix, tracker: &TrackerModel, at_us: impl Fn(f64) -> u64) -> Stamped<Measurement> {
     let q = fix.attitude.coords;
     let value = Measurement::Pose {
@@ -41,7 +42,7 @@ pub(super) fn pose(fix: &TrackerFix, tracker: &TrackerModel, at_us: impl Fn(f64)
     timed(value, fix.true_at_s, at_us)
 }
 
-/// A fix, as good as the receiver says.
+/// Returns a GNSS fix as a measurement, with the receiver's stated accuracy.
 pub(super) fn gnss(fix: &GnssFix, at_us: impl Fn(f64) -> u64) -> Stamped<Measurement> {
     let speed_sigma_m_s = sigma(&[fix.velocity_sigma_m_s]).max(1e-3);
     let value = Measurement::Gnss {
@@ -55,13 +56,14 @@ pub(super) fn gnss(fix: &GnssFix, at_us: impl Fn(f64) -> u64) -> Stamped<Measure
     timed(value, fix.true_at_s, at_us)
 }
 
-/// A height.
+/// Returns a barometer's height as a measurement.
 pub(super) fn height(fix: &HeightFix, barometer: &Barometer, at_us: impl Fn(f64) -> u64) -> Stamped<Measurement> {
     let sigma_m = sigma(&[barometer.noise_m, step(barometer.lsb_m)]);
     timed(Measurement::Height { height_m: fix.height_m as f32, sigma_m }, fix.true_at_s, at_us)
 }
 
-/// A field with its noise; what hard and soft iron and the motors add is in the settings.
+/// Returns a magnetic field as a measurement with its noise. The estimator's settings cover hard iron, soft iron and
+/// the motors' fields.
 pub(super) fn field(fix: &FieldFix, part: &Magnetometer, at_us: impl Fn(f64) -> u64) -> Stamped<Measurement> {
     let sigma = sigma(&[part.noise_ut, step(part.lsb_ut)]);
     timed(Measurement::MagneticField { field: fix.field_ut.cast(), sigma }, fix.true_at_s, at_us)

@@ -20,9 +20,9 @@ use nalgebra::Vector3;
 #[derive(Clone)]
 pub struct World {
     plant: Plant,
-    /// What the vehicle flies on if it has an inertial sensor; the sensors otherwise.
+    /// Estimator of a vehicle with an IMU; without one, the vehicle flies on `sensors`.
     estimator: Option<Box<SimulatedEstimator>>,
-    /// What a vehicle with its own estimator reads.
+    /// Sensors for a vehicle that runs its own estimator outside this world.
     wired: Option<Box<Wired>>,
     sensors: Option<StateSensor>,
     faults: SensorFaults,
@@ -32,16 +32,16 @@ pub struct World {
     dt_s: f64,
 }
 
-/// What can be seen of the world at one time.
+/// The visible part of the world at one time.
 #[derive(Clone, Copy, Debug)]
 pub struct View {
     /// Time \[s\].
     pub time_s: f64,
     /// True motion.
     pub motion: Motion,
-    /// Measurement by the sensors; none if they are perfect.
+    /// Measurement by the sensors; none if the sensors are perfect.
     pub measurement: Option<StateMeasurement>,
-    /// The vehicle's own estimate against the truth; none without instruments.
+    /// Errors of the vehicle's own estimate; none without instruments.
     pub estimated: Option<Estimated>,
     /// State of rotors, air and ground after the previous step; none for an ideal plant.
     pub telemetry: Option<EffectsState>,
@@ -49,13 +49,13 @@ pub struct View {
     pub reference: Reference,
     /// Newest state that has reached the pilot, held between samples; none in a dropout or an outage.
     pub state: Option<State>,
-    /// Estimate of a vehicle that knows its attitude, but not where it is.
+    /// Estimate of a vehicle whose attitude is valid, but not its position or velocity.
     pub position_lost: Option<State>,
-    /// What the vehicle's own estimate misses for a state; none without instruments.
+    /// Reason for which the vehicle's own estimate has no valid state; none without instruments.
     pub missing: Option<Refusal>,
-    /// Pose of a tracker in front of a vehicle whose inertial sensor has failed.
+    /// Pose from a tracker, for a vehicle whose IMU has failed.
     pub pose: Option<Aged<Pose>>,
-    /// Whether it has just arrived.
+    /// True if the state has just arrived.
     pub new: bool,
 }
 
@@ -63,7 +63,7 @@ impl World {
     /// Creates the world of `scenario` at t = 0, for steps of `dt_s`.
     ///
     /// # Errors
-    /// The first setting of plant or sensors out of range.
+    /// Returns the first setting of plant or sensors that is out of range.
     pub fn new(scenario: &Scenario, dt_s: f64) -> Result<Self, OutOfRange> {
         let plant = scenario.plant(dt_s)?;
         Ok(World {
@@ -79,25 +79,25 @@ impl World {
         })
     }
 
-    /// Creates the world of `scenario` for a vehicle that runs its own estimator. With instruments, it stands where it
-    /// starts for [`STANDS_S`](super::STANDS_S) of looks before t = 0.
+    /// Creates the world of `scenario` for a vehicle that runs its own estimator. With instruments, the vehicle first
+    /// stands at its start for [`STANDS_S`](super::STANDS_S) of looks before t = 0.
     ///
     /// # Errors
-    /// The first setting of plant or sensors out of range.
+    /// Returns the first setting of plant or sensors that is out of range.
     pub fn wired(scenario: &Scenario, dt_s: f64) -> Result<Self, OutOfRange> {
         let wired = Wired::new(scenario, dt_s)?;
         Ok(World {
             wired,
-            // With its instruments the world would run an estimator of its own, beside the vehicle's.
+            // Without instruments, since the world would otherwise run a second estimator.
             ..World::new(&Scenario { instruments: InstrumentSuite::default(), ..scenario.clone() }, dt_s)?
         })
     }
 
-    /// Creates the [wired](Self::wired) world of a vehicle that is released at once, and stands on the ground by its
-    /// own weight if the scenario has one.
+    /// Creates the [wired](Self::wired) world of a vehicle that is released at once. If the scenario has a ground, the
+    /// vehicle stands on it by its own weight.
     ///
     /// # Errors
-    /// As there.
+    /// The same as for [`World::wired`].
     pub fn released(scenario: &Scenario, dt_s: f64) -> Result<Self, OutOfRange> {
         let world = World::wired(scenario, dt_s)?;
         Ok(World { wired: world.wired.map(Wired::at_once), ..world })
@@ -108,32 +108,32 @@ impl World {
         &self.plant
     }
 
-    /// Returns the plant, to change its weather and faults.
+    /// Returns the plant for changing its weather and faults.
     pub fn plant_mut(&mut self) -> &mut Plant {
         &mut self.plant
     }
 
-    /// Returns the instruments of a [wired](Self::wired) world, to let them fail.
+    /// Returns the instruments of a [wired](Self::wired) world for making them fail.
     pub fn instruments_mut(&mut self) -> Option<&mut Instruments> {
         self.wired.as_deref_mut().map(Wired::instruments_mut)
     }
 
-    /// Returns the true biases of the inertial sensor of a [wired](Self::wired) world.
+    /// Returns the true IMU biases in a [wired](Self::wired) world.
     pub fn imu_bias(&self) -> Option<ImuBias> {
         self.wired.as_deref()?.instruments().imu_bias()
     }
 
-    /// Returns what the instruments of a [wired](Self::wired) world read in the last look.
+    /// Returns the instruments' last readings in a [wired](Self::wired) world.
     pub fn readings(&self) -> Option<&Readings> {
         self.wired.as_deref().map(Wired::readings)
     }
 
-    /// True if the vehicle of a [wired](Self::wired) world still stands before t = 0.
+    /// Returns true if the vehicle of a [wired](Self::wired) world still stands before t = 0.
     pub fn stands(&self) -> bool {
         self.wired.as_deref().is_some_and(Wired::stands)
     }
 
-    /// Returns the time from which on the vehicle may lack measurements \[s\].
+    /// Returns the time from which the vehicle may lack measurements \[s\].
     pub(super) fn faulty_from_s(&self) -> f64 {
         self.faulty_from_s
     }
@@ -143,8 +143,8 @@ impl World {
         self.dt_s
     }
 
-    /// Measures, without moving the vehicle.
-    // Always inlined: copying a view in and out of calls costs a fifth of the loop.
+    /// Measures without moving the vehicle.
+    // Always inlined: copying a view into and out of calls takes a fifth of the loop's time.
     #[inline(always)]
     pub fn look(&mut self) -> View {
         let time_s = self.plant.time_s();
@@ -166,7 +166,7 @@ impl World {
             Some(measurement) => measurement.fresh.then_some(measurement.state),
         };
         let reference = self.trajectory.at(time_s);
-        // Most flights have no outage, and their steps do not call cold code.
+        // Checked first, since most flights have no outage and then need no call of cold code.
         let lost = !self.outages.is_empty() && is_lost(&self.outages, time_s);
         let telemetry = self.plant.telemetry();
         let new = measurement.is_none_or(|measurement| measurement.new);
@@ -186,14 +186,15 @@ impl World {
         }
     }
 
-    /// Measures a vehicle that is held by hand: nothing accelerates it but gravity's reaction.
+    /// Measures a vehicle that is held by hand: it has no acceleration, and its sensors feel only the reaction to
+    /// gravity.
     pub fn look_held(&mut self) {
         let zero = Vector3::zeros();
         let truth = Truth { acceleration_m_s2: zero, angular_acceleration_rad_s2: zero, ..self.plant.truth() };
         self.wired.iter_mut().for_each(|wired| wired.look(&truth));
     }
 
-    /// Moves the vehicle by one step with commanded rotor speeds `speeds`.
+    /// Moves the vehicle by one step with the commanded rotor `speeds`.
     #[inline]
     pub fn advance(&mut self, speeds: &RotorSpeeds<ROTORS_MAX>) {
         self.plant.step(speeds, self.dt_s);
@@ -201,7 +202,7 @@ impl World {
 }
 
 impl View {
-    /// Returns the sample of this view and a pilot's output.
+    /// Returns the sample with this view and a pilot's output.
     #[inline(always)]
     pub fn sample<const N: usize>(
         self,
@@ -215,7 +216,7 @@ impl View {
     }
 }
 
-/// Looks at the world with the vehicle's own instruments.
+/// Returns the view through the vehicle's own estimator.
 // Not inlined, so that the step of an ideal flight stays short.
 #[inline(never)]
 fn estimated(estimator: &mut SimulatedEstimator, plant: &Plant, motion: Motion, reference: Reference) -> View {
@@ -236,13 +237,13 @@ fn estimated(estimator: &mut SimulatedEstimator, plant: &Plant, motion: Motion, 
     }
 }
 
-/// True if a state sent at `time_s` is lost in an outage.
+/// Returns true if a state sent at `time_s` is lost in an outage.
 #[cold]
 fn is_lost(outages: &[Outage], time_s: f64) -> bool {
     outages.iter().any(|outage| (outage.start_s..outage.end_s).contains(&time_s))
 }
 
-/// Measures.
+/// Measures the motion with the sensors.
 // Not inlined, so that the step of an ideal flight stays short.
 #[inline(never)]
 fn measure(sensors: &mut StateSensor, motion: &Motion) -> StateMeasurement {
