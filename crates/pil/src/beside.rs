@@ -1,4 +1,4 @@
-//! Counts, in the debugger, the instructions of everything that runs beside the control tick of the `flight` image.
+//! Counts, in the debugger, the instructions of all code that runs alongside the control tick of the `flight` image.
 
 use crate::budget::Linked;
 use crate::exercise::motion;
@@ -7,27 +7,27 @@ use afbc_hil::Station;
 use std::path::Path;
 use std::time::Duration;
 
-/// Longest wait for each function to run.
+/// Longest wait until a counted function runs.
 const PATIENCE: Duration = Duration::from_secs(60);
 
 /// Instruction counts, each the largest of a few samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Beside {
-    /// Encoding one DSHOT frame for each of four motors.
+    /// Encoding of a DSHOT frame for each of four motors.
     pub dshot: u32,
-    /// The time base's interrupt when it wakes the control tick.
+    /// SysTick's interrupt when it wakes the control tick.
     pub systick: u32,
-    /// USART1's interrupt: a byte received, a byte sent, or both.
+    /// USART1's interrupt for a received byte, a sent byte, or both.
     pub byte: u32,
-    /// The link's task, woken once: with bytes to read, a tick to report, or both.
+    /// One run of the links' task: with bytes to read, a tick to report, or both.
     pub wake: u32,
 }
 
 impl Beside {
-    /// Counts while the board receives states.
+    /// Counts the instructions while the board receives states.
     ///
     /// # Errors
-    /// If QEMU or the image is missing, or the image does not reach a function to be counted.
+    /// Fails if QEMU or the image is missing, or if the image does not reach a function to be counted.
     pub fn count(elf: &Path) -> Result<Self, Error> {
         let linked = Linked::read(elf)?;
         let address = |name: &str| {
@@ -37,7 +37,7 @@ impl Beside {
             [address("chip_stm32::motors::encode")?, address("SysTick")?, address("USART1")?, address("CAN2_RX0")?];
         let mut board = EmulatedBoard::boot(elf)?;
         let mut station = Station::default();
-        // Bytes enough for all samples of USART1's interrupt below.
+        // Enough bytes for all samples of USART1's interrupt below.
         for count in 1..=50_u32 {
             let (state, _) = motion(count as f32);
             station.track(u64::from(count), state);
@@ -46,7 +46,7 @@ impl Beside {
         let gdb = board.halt()?;
         gdb.run_to(encode, PATIENCE)?;
         let dshot = gdb.count_function()?;
-        // Few samples: single steps are slower than the processor's real time.
+        // Few samples, since single steps are slower than the processor's real time.
         let mut most = |interrupt: u32, samples: u32| -> Result<u32, Error> {
             let mut most = 0;
             for _ in 0..samples {

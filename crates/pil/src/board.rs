@@ -1,4 +1,4 @@
-//! The `flight` image on an emulated board.
+//! Runs the `flight` image on an emulated board.
 
 use crate::Error;
 use crate::clock_tree::{self, ClockTree, RTC_BKP0R};
@@ -13,17 +13,18 @@ use std::time::Duration;
 
 /// Longest wait in [`EmulatedBoard::receive`].
 const PATIENCE: Duration = Duration::from_millis(100);
-/// Time after which a board that accepts no bytes counts as stuck.
+/// A board that accepts no bytes for this long counts as stuck.
 const WRITE_TIMEOUT: Duration = Duration::from_secs(5);
 
-/// Status register of USART1. The driver clears "transmission complete" by a load and a store of the whole register,
-/// and a byte that arrives in between is lost with its flag: on silicon within 3 cycles of 168 MHz, in QEMU whenever
-/// the store waits for the thread that delivers the byte. The emulated image skips the store.
+/// Status register of USART1. The driver clears "transmission complete" by a load and a store of the whole register. A
+/// byte that arrives in between is lost with its flag. On silicon that needs an arrival within 3 cycles of 168 MHz. In
+/// QEMU it happens whenever the store waits for the thread that delivers the byte. So the store is skipped in the
+/// emulated image.
 const USART1_SR: u32 = 0x4001_1000;
-/// Interrupt control and state register: bit 31 raises a non-maskable interrupt.
+/// Interrupt control and state register, whose bit 31 raises a non-maskable interrupt.
 const ICSR: u32 = 0xE000_ED04;
 
-/// The `flight` image, booted and running as fast as the host allows.
+/// The booted `flight` image, running as fast as the host allows.
 ///
 /// Its clock counts instructions, so a busy host does not make it late. Its idle loop spins instead of sleeping, so
 /// that its time does not run ahead of the host.
@@ -41,7 +42,7 @@ impl EmulatedBoard {
     /// Boots the image; returns when its clocks are set up and it runs.
     ///
     /// # Errors
-    /// If QEMU or the image is missing, or the boot does not finish.
+    /// Fails if QEMU or the image is missing, or if the boot does not finish.
     pub fn boot(elf: &Path) -> Result<Self, Error> {
         EmulatedBoard::boot_with(elf, true)
     }
@@ -49,16 +50,16 @@ impl EmulatedBoard {
     /// Boots the image on a board whose crystal does not start.
     ///
     /// # Errors
-    /// As for [`EmulatedBoard::boot`].
+    /// The same as for [`EmulatedBoard::boot`].
     pub fn boot_without_crystal(elf: &Path) -> Result<Self, Error> {
         EmulatedBoard::boot_with(elf, false)
     }
 
-    /// Boots the image after a reset that left `word` in the first backup register; returns what it leaves there when
-    /// it looks at a vector table at `vectors`, which is not emulated.
+    /// Boots the image after a reset that left `word` in the first backup register. Returns the register's value when
+    /// the image reads the boot loader's vector table at `vectors`; the boot loader itself is not emulated.
     ///
     /// # Errors
-    /// If QEMU or the image is missing, or the image does not go there.
+    /// Fails if QEMU or the image is missing, or if the image does not enter the boot loader.
     pub fn boot_to_loader(elf: &Path, word: u32, vectors: u32) -> Result<u32, Error> {
         let (_qemu, mut gdb) = start(elf)?;
         let mut clock_tree = ClockTree::new(&mut gdb, true)?;
@@ -97,7 +98,7 @@ impl EmulatedBoard {
     /// Stops the crystal; returns when the image has switched to another clock.
     ///
     /// # Errors
-    /// If the image has not enabled the clock security system, or does not switch.
+    /// Fails if the image has not enabled the clock security system or does not switch.
     pub fn lose_crystal(&mut self) -> Result<(), Error> {
         self.gdb.halt()?;
         if !self.clock_tree.lose_crystal() {
@@ -108,10 +109,10 @@ impl EmulatedBoard {
         self.gdb.resume()
     }
 
-    /// Halts the processor and returns the debugger; [`Gdb::resume`] lets it continue.
+    /// Halts the processor and returns the debugger; [`Gdb::resume`] lets the processor continue.
     ///
     /// # Errors
-    /// If the board has ended.
+    /// Fails if the board has ended.
     pub fn halt(&mut self) -> Result<&mut Gdb, Error> {
         self.qemu.check()?;
         self.gdb.halt()?;
@@ -121,16 +122,16 @@ impl EmulatedBoard {
     /// Sends bytes to USART1.
     ///
     /// # Errors
-    /// If the board has ended, or accepts no bytes.
+    /// Fails if the board has ended or accepts no bytes.
     pub fn send(&mut self, bytes: &[u8]) -> Result<(), Error> {
         self.qemu.check()?;
         Ok(self.usart1.write_all(bytes)?)
     }
 
-    /// Returns what USART1 has sent since the last call; waits up to 0.1 s, and returns nothing if nothing comes.
+    /// Returns the bytes that USART1 has sent since the last call. Waits up to 0.1 s; returns no bytes if none come.
     ///
     /// # Errors
-    /// If the board has ended.
+    /// Fails if the board has ended.
     pub fn receive(&mut self) -> Result<Vec<u8>, Error> {
         match self.received.recv_timeout(PATIENCE) {
             Ok(mut bytes) => {
@@ -162,7 +163,7 @@ fn start(elf: &Path) -> Result<(Qemu, Gdb), Error> {
 
 /// Returns the address of the idle loop's sleep instruction.
 fn idle(elf: &Path) -> Result<u32, Error> {
-    // WFI; B to it
+    // WFI, then a branch back to it.
     const LOOP: [u8; 4] = [0x30, 0xBF, 0xFD, 0xE7];
     let bytes = std::fs::read(elf)?;
     let file = object::File::parse(bytes.as_slice()).map_err(|error| Error::Protocol(error.to_string()))?;
@@ -173,7 +174,7 @@ fn idle(elf: &Path) -> Result<u32, Error> {
     Ok(text.address() as u32 + offset as u32)
 }
 
-/// Reads as long as the board sends. QEMU, with its debugger, blocks while nobody reads its output; it sends single
+/// Reads the board's output in a thread. If nobody reads, QEMU blocks together with its debugger: it sends single
 /// bytes, of which a socket buffers only some three hundred.
 fn listen(mut usart1: UnixStream) -> Receiver<Vec<u8>> {
     let (sender, received) = mpsc::channel();

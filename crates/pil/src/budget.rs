@@ -1,7 +1,7 @@
-//! Memory use of a linked image, and for one function its worst-case stack and the panics that it can reach.
+//! Computes an image's memory use and, for a function, its worst-case stack and the panics that it can reach.
 //!
-//! The call graph comes from the machine code itself (Armv7-M manual, A5 to A7): every direct branch that leaves a
-//! function counts as a call, and every instruction that lowers the stack pointer counts for the whole function. Both
+//! The call graph comes from the machine code itself (Armv7-M manual, A5 to A7). Every direct branch that leaves a
+//! function counts as a call. Every instruction that lowers the stack pointer counts for the whole function. Both rules
 //! overestimate.
 
 use crate::Error;
@@ -9,14 +9,14 @@ use object::{Object, ObjectSection, ObjectSymbol, SectionKind, SymbolKind};
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::path::Path;
 
-/// Share of the guidance in a control tick: modes, trajectory limiter, safety net, and the link's orders.
+/// Budget of the guidance within a control tick: modes, trajectory limiter, safety net, and the link's commands.
 pub const GUIDANCE_INSTRUCTIONS_MAX: u32 = 2_300;
-/// Largest number of instructions of a control tick: the worst found by the search ([`crate::worst`]) and a margin. At
-/// 2.5 cycles each, 125 us of the 1000.
+/// Largest number of instructions in a control tick: the worst that the search ([`crate::worst`]) found, plus a margin.
+/// At 2.5 cycles each, it takes 125 us of the 1000 us.
 pub const TICK_INSTRUCTIONS_MAX: u32 = 6_450 + GUIDANCE_INSTRUCTIONS_MAX;
-/// The same of a vehicle that flies on its own estimate.
+/// Largest number of instructions in a control tick with the vehicle's own estimate.
 pub const ESTIMATING_INSTRUCTIONS_MAX: u32 = 16_200 + GUIDANCE_INSTRUCTIONS_MAX;
-/// Largest mean of these.
+/// Largest mean number of instructions in a control tick with the vehicle's own estimate.
 pub const ESTIMATING_INSTRUCTIONS_MEAN: u32 = 9_700 + 2_400;
 
 /// Address range of the flash.
@@ -27,11 +27,11 @@ const FLASH: std::ops::Range<u64> = 0x0800_0000..0x0810_0000;
 pub struct Linked {
     functions: BTreeMap<u32, Function>,
     symbols: BTreeMap<String, u32>,
-    /// The image's log messages, as written in the source.
+    /// Log messages of the image, as written in the source.
     pub log: Vec<String>,
-    /// Bytes of flash: code, constants and initial values.
+    /// Size of code, constants and initial values in the flash \[bytes\].
     pub flash_bytes: u64,
-    /// Bytes of static RAM, without the stack.
+    /// Size of the static RAM without the stack \[bytes\].
     pub ram_bytes: u64,
 }
 
@@ -40,33 +40,34 @@ struct Function {
     name: String,
     stack_bytes: u32,
     calls: BTreeSet<u32>,
-    /// True if it calls through a pointer.
+    /// True if the function calls through a pointer.
     is_indirect: bool,
 }
 
-/// What a function can reach.
+/// Everything that a function can reach by calls.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Reach {
     /// Worst-case stack \[bytes\].
     pub stack_bytes: u32,
-    /// The chain of calls with that stack, outermost first, each with its own share.
+    /// Chain of calls with the deepest stack, outermost first, each with its own stack \[bytes\].
     pub deepest: Vec<(String, u32)>,
-    /// The shortest chain of calls to each function that panics, outermost first. What follows a panic is ignored,
-    /// since it ends whatever ran.
+    /// Shortest chain of calls to each panicking function, outermost first. Calls after a panic are ignored, since a
+    /// panic ends the task.
     pub panics: Vec<Vec<String>>,
-    /// The shortest chain of calls to each function of double precision, which this processor has no instructions for,
-    /// outermost first.
+    /// Shortest chain of calls to each double-precision function, outermost first. This processor has no
+    /// double-precision instructions.
     pub doubles: Vec<Vec<String>>,
-    /// Functions that call through a pointer.
+    /// Names of functions that call through a pointer.
     pub indirect: Vec<String>,
 }
 
-/// Executors' wakers, the targets of all calls through a pointer except those in [`EXECUTORS`] and by [`USB_CALLERS`].
+/// Functions of the executors' wakers. They are the targets of all calls through a pointer, except for those in
+/// [`EXECUTORS`] and by [`USB_CALLERS`].
 const WAKER: [&str; 3] =
     ["embassy_executor::raw::waker::wake", "embassy_executor::raw::waker::clone", "embassy_executor::raw::waker::drop"];
 
-/// Each executor's interrupt, and the tasks that it polls through a pointer, each identified by a function that only it
-/// calls.
+/// Each executor's interrupt and the tasks that it polls through a pointer. A task is identified by a function that
+/// only this task calls.
 const EXECUTORS: [(&str, &[&str]); 3] = [
     ("CAN2_TX", &["firmware::control::tick", "chip_stm32::motors::encode"]),
     ("CAN2_RX0", &["firmware::comms::report"]),
@@ -80,13 +81,13 @@ const EXECUTORS: [(&str, &[&str]); 3] = [
         ],
     ),
 ];
-/// The callers of what a USB class does about requests, by pointer, and these functions.
+/// Functions that call a USB class's request handlers through a pointer, and names of these handlers.
 const USB_CALLERS: [&str; 2] = ["chip_stm32::usb::", "embassy_usb::"];
 const USB_CLASS: [&str; 2] = ["embassy_usb::class::cdc_acm::Control", "embassy_usb::Handler::"];
-/// Name of the function of every task.
+/// Name of every task's poll function.
 const POLL: &str = "embassy_executor::raw::TaskStorage<F>::poll";
 
-/// Interrupts of the flight image by priority, highest first; those of one level do not nest.
+/// Interrupts of the flight image by priority, highest first; interrupts of the same level do not nest.
 pub const LEVELS: [(&str, &[&str]); 7] = [
     ("-2", &["NonMaskableInt"]),
     ("1", &["SysTick"]),
@@ -96,14 +97,14 @@ pub const LEVELS: [(&str, &[&str]); 7] = [
     ("8", &["CAN2_RX0"]),
     ("12", &["CAN2_RX1", "OTG_FS"]),
 ];
-/// Bytes that the processor pushes on an interrupt: 26 words with those of the FPU, and 1 for alignment.
+/// Bytes that the processor pushes on an interrupt: 26 words including the FPU's, and one for alignment.
 pub const FRAME_BYTES: u32 = 108;
 
 impl Linked {
     /// Reads an image.
     ///
     /// # Errors
-    /// If it is missing or not an image.
+    /// Fails if the file is missing or not an image.
     pub fn read(elf: &Path) -> Result<Self, Error> {
         let bytes = std::fs::read(elf).map_err(|_| Error::NoImage(elf.to_owned()))?;
         let file = object::File::parse(bytes.as_slice()).map_err(|error| Error::Protocol(error.to_string()))?;
@@ -122,7 +123,7 @@ impl Linked {
             }
         }
 
-        // $t and $d mark the beginning of code and data within a section.
+        // The symbols $t and $d mark the beginnings of code and data within a section.
         let marks: BTreeMap<u32, bool> = file
             .symbols()
             .filter_map(|symbol| {
@@ -157,15 +158,15 @@ impl Linked {
     /// Returns what the function named `name` can reach.
     ///
     /// # Errors
-    /// If there is no such function, or it can call itself.
+    /// Fails if there is no such function, or if it can call itself.
     pub fn reach(&self, name: &str) -> Result<Reach, Error> {
         self.reach_without(name, &[])
     }
 
-    /// The same as long as none of the functions `omitted` is called.
+    /// Returns what the function can reach as long as none of the functions `omitted` is called.
     ///
     /// # Errors
-    /// As of [`reach`](Self::reach).
+    /// The same as for [`reach`](Self::reach).
     pub fn reach_without(&self, name: &str, omitted: &[&str]) -> Result<Reach, Error> {
         let root = self.find(name).ok_or_else(|| Error::Protocol(format!("the image has no function {name}")))?;
         let omitted = omitted.iter().filter_map(|name| self.find(name)).collect();
@@ -182,7 +183,7 @@ impl Linked {
         })
     }
 
-    /// Returns the shortest chain from `root` to each function that is `sought`. What follows a panic is ignored.
+    /// Returns the shortest chain from `root` to each function that is `sought`. Calls after a panic are ignored.
     fn chains(&self, root: u32, sought: fn(&Function) -> bool) -> Result<Vec<Vec<String>>, Error> {
         let mut chains = Vec::new();
         let mut seen = BTreeSet::from([root]);
@@ -244,7 +245,7 @@ impl Linked {
         self.find(name)
     }
 
-    /// Returns the address of a symbol by its name in the source: `flight::board::RX`.
+    /// Returns the address of a symbol by its name in the source, such as `flight::board::RX`.
     pub fn symbol(&self, name: &str) -> Option<u32> {
         self.symbols.get(name).copied()
     }
@@ -254,12 +255,12 @@ impl Linked {
     }
 }
 
-/// Stack and chain of calls below a function, at the deepest.
+/// Deepest stack of a function with its callees, and the chain of calls.
 type Depth = (u32, Vec<(String, u32)>);
 
 struct Walk<'a> {
     linked: &'a Linked,
-    /// Functions that are not called.
+    /// Functions that count as never called.
     omitted: BTreeSet<u32>,
     depths: BTreeMap<u32, Depth>,
     /// Functions on the current path.
@@ -273,7 +274,7 @@ impl Walk<'_> {
         }
         let function = self.linked.function(address)?;
         if !self.open.insert(address) {
-            // A recursion has no worst case.
+            // The stack of a recursion has no bound.
             return Err(Error::Protocol(format!("{} can call itself", function.name)));
         }
         let (mut below, mut chain) = Depth::default();
@@ -293,12 +294,12 @@ impl Walk<'_> {
 }
 
 impl Function {
-    /// True if a panic begins in this function.
+    /// Returns true if a panic begins in this function.
     fn panics(&self) -> bool {
         self.name.contains("panic") || self.name.ends_with("_fail") || self.name.ends_with("_failed")
     }
 
-    /// True if it is a routine of double precision: `__adddf3`, `__aeabi_dmul`, `__aeabi_f2d`.
+    /// Returns true for a double-precision routine such as `__adddf3`, `__aeabi_dmul` or `__aeabi_f2d`.
     fn is_of_doubles(&self) -> bool {
         let name = self.name.rsplit("::").next().unwrap_or_default();
         name.starts_with("__") && (name.contains("df") || name.starts_with("__aeabi_d") || name.ends_with("2d"))
@@ -345,9 +346,9 @@ impl Function {
 enum Effect {
     /// Lowers the stack pointer by this many bytes.
     Push(u32),
-    /// Branches to its own address + 4 + this, with or without return.
+    /// Branches to its own address + 4 + this offset, with or without return.
     Branch(i32),
-    /// Branches to an address from a register.
+    /// Branches to an address in a register.
     Indirect,
     Other,
 }
@@ -417,7 +418,7 @@ fn immediate(first: u32, second: u32) -> u32 {
     (first >> 10 & 1) << 11 | (second >> 12 & 7) << 8 | second & 0xFF
 }
 
-/// ThumbExpandImm of the Armv7-M manual.
+/// Computes ThumbExpandImm of the Armv7-M manual.
 fn expand(imm12: u32) -> u32 {
     let byte = imm12 & 0xFF;
     match imm12 >> 8 {

@@ -1,8 +1,8 @@
 //! Emulates the status bits of the STM32F4's clock tree, which QEMU lacks.
 //!
-//! An image that starts its crystal waits for the ready bit, here forever. So every access to the registers concerned
-//! stops the processor. It then executes its load or store by a single step, and a load receives the value that silicon
-//! would have returned after the stores so far. The image itself runs unchanged.
+//! An image that starts its crystal waits for the ready bit, in QEMU forever. So the debugger stops the processor at
+//! every access to these registers and single-steps the access. A load then receives the value that silicon would
+//! return after the previous stores. The image itself runs unchanged.
 
 use crate::Error;
 use crate::gdb::{Gdb, PC, Watch};
@@ -27,10 +27,10 @@ const DBGMCU_IDCODE: u32 = 0xE004_2000;
 const SYST_CSR: u32 = 0xE000_E010;
 /// First backup register (26.6.20), which a reset does not change.
 pub const RTC_BKP0R: u32 = 0x4000_2850;
-/// What is at address 0 (9.2.1); 1: the system memory.
+/// Register that selects the memory at address 0 (9.2.1); 1 selects the system memory.
 const SYSCFG_MEMRMP: u32 = 0x4001_3800;
 
-/// Every register watched, with its reset value; option bytes as delivered, on a chip of revision 2.
+/// Watched registers with their reset values. Option bytes are as delivered, and the chip has revision 2.
 const WATCHED: [(u32, u32); 14] = [
     (RCC_CR, 0x0000_0083),
     (RCC_PLLCFGR, 0x2400_3010),
@@ -56,21 +56,21 @@ const SW: u32 = 0b11;
 const CSSF: u32 = 1 << 7;
 const CSSC: u32 = 1 << 23;
 
-/// Longest time from one access of the image to the next.
+/// Longest time between two accesses by the image.
 const PATIENCE: Duration = Duration::from_secs(60);
-/// Number of accesses after which the image counts as caught in a loop.
+/// After this many accesses the image counts as caught in a loop.
 const ACCESSES_MAX: usize = 2000;
 
-/// The registers, as the image sees them.
+/// The watched registers as the image sees them.
 #[derive(Debug)]
 pub(crate) struct ClockTree {
     written: HashMap<u32, u32>,
-    /// Whether the crystal starts.
+    /// True if the crystal starts.
     crystal: bool,
 }
 
 impl ClockTree {
-    /// Returns the reset state. Every access stops the processor from now on.
+    /// Returns the registers in their reset state. From now on, every access to them stops the processor.
     pub(crate) fn new(gdb: &mut Gdb, crystal: bool) -> Result<Self, Error> {
         for (register, _) in WATCHED {
             gdb.watch(watch(register), register)?;
@@ -78,13 +78,13 @@ impl ClockTree {
         Ok(ClockTree { written: HashMap::from(WATCHED), crystal })
     }
 
-    /// Returns what was last written to `register`, or its reset value.
+    /// Returns the last value written to `register`, or its reset value.
     pub(crate) fn register(&self, register: u32) -> u32 {
         self.written.get(&register).copied().unwrap_or(0)
     }
 
-    /// Runs a halted processor from reset until its clocks are set up and SysTick runs, and returns the number of
-    /// accesses. The processor is halted again.
+    /// Runs a halted processor from reset until its clocks are set up and SysTick runs. Returns the number of accesses;
+    /// the processor is halted again.
     pub(crate) fn boot(&mut self, gdb: &mut Gdb) -> Result<usize, Error> {
         self.serve(gdb, SYST_CSR, 1)
     }
@@ -96,8 +96,8 @@ impl ClockTree {
         self.serve(gdb, SYSCFG_MEMRMP, 1)
     }
 
-    /// Stops the crystal and does the hardware's part of the clock security system (RM0090, 7.2.7). True if that raises
-    /// a non-maskable interrupt.
+    /// Stops the crystal and does the hardware's part of the clock security system (RM0090, 7.2.7). Returns true if a
+    /// non-maskable interrupt must be raised.
     pub(crate) fn lose_crystal(&mut self) -> bool {
         self.crystal = false;
         let watched = self.register(RCC_CR) & CSSON != 0;
@@ -118,19 +118,19 @@ impl ClockTree {
         self.serve(gdb, RCC_CFGR, SW)
     }
 
-    /// Runs a halted processor until it sets one of `bits` in the register `last`, and returns the number of accesses.
-    /// The processor is halted again.
+    /// Runs a halted processor until it sets one of `bits` in the register `last`. Returns the number of accesses; the
+    /// processor is halted again.
     fn serve(&mut self, gdb: &mut Gdb, last: u32, bits: u32) -> Result<usize, Error> {
         for accesses in 1..ACCESSES_MAX {
             let Some(address) = gdb.run(PATIENCE)? else {
                 return Err(Error::Protocol("the image waits without accessing the clock tree".into()));
             };
-            // An access to one of its bytes is one to the register.
+            // An access may be to a single byte of the register.
             let register = address & !3;
             let pc = gdb.register(PC)?;
             let access = Access::decode(gdb.memory(pc)?)?;
             if register == RCC_APB2RSTR {
-                // QEMU 10.0 fails an assertion on this store: skip it.
+                // Skip this store, on which QEMU 10.0 fails an assertion.
                 gdb.set_register(PC, pc + access.length)?;
                 continue;
             }
@@ -154,29 +154,29 @@ impl ClockTree {
         Err(Error::Protocol(format!("{ACCESSES_MAX} accesses to the clock tree without an end")))
     }
 
-    /// Returns silicon's answer to a load: every clock is ready as soon as it is on.
+    /// Returns silicon's answer to a load: a clock is ready as soon as it is on.
     fn answer(&self, register: u32) -> u32 {
-        /// Sets the bit `ready` if the bit `on` is set.
+        /// Copies the bit `on` to the bit `ready`.
         fn follow(value: u32, on: u32, ready: u32) -> u32 {
             value & !(1 << ready) | (value >> on & 1) << ready
         }
         let written = self.register(register);
         match register {
-            // HSI, HSE, PLL, PLLI2S.
+            // Ready bits of HSI, HSE, PLL and PLLI2S.
             RCC_CR => {
                 let ready = [0, 16, 24, 26].into_iter().fold(written, |value, on| follow(value, on, on + 1));
                 if self.crystal { ready } else { ready & !(HSEON << 1) }
             }
             // SWS reports SW.
             RCC_CFGR => follow(follow(written, 0, 2), 1, 3),
-            // LSE, LSI.
+            // Ready bits of LSE and LSI.
             RCC_BDCR | RCC_CSR => follow(written, 0, 1),
             _ => written,
         }
     }
 }
 
-/// Runs a halted processor to its first store to `register`, and replaces that instruction by NOPs.
+/// Runs a halted processor to its first store to `register` and replaces that instruction by NOPs.
 pub(crate) fn skip_first_store(gdb: &mut Gdb, register: u32) -> Result<(), Error> {
     gdb.watch(Watch::Write, register)?;
     gdb.run(PATIENCE)?.ok_or_else(|| Error::Protocol(format!("nothing stores to {register:#x}")))?;
@@ -188,7 +188,7 @@ pub(crate) fn skip_first_store(gdb: &mut Gdb, register: u32) -> Result<(), Error
 }
 
 fn watch(register: u32) -> Watch {
-    // SysTick's counter lies next to it and is read all the time.
+    // Watch only writes, since SysTick's counter is next to this register and is read all the time.
     if [RCC_APB2RSTR, SYST_CSR].contains(&register) { Watch::Write } else { Watch::Access }
 }
 
@@ -206,11 +206,11 @@ impl Access {
         let [a, b, c, d] = code;
         let (first, second) = (u16::from_le_bytes([a, b]), u16::from_le_bytes([c, d]));
         let (is_load, register, length) = match first >> 12 {
-            // LDR, STR and their byte and half-word forms with a wide encoding.
+            // LDR and STR in the wide encoding, also of bytes and half-words.
             0xF if first & 0xFE00 == 0xF800 => (first >> 4 & 1 == 1, second >> 12, 4),
-            // Register plus register.
+            // Address: register plus register.
             0x5 => (first >> 9 & 7 >= 3, first & 7, 2),
-            // Register plus offset.
+            // Address: register plus offset.
             0x6..=0x8 => (first >> 11 & 1 == 1, first & 7, 2),
             _ => return Err(Error::Protocol(format!("no load or store: {first:04x} {second:04x}"))),
         };

@@ -1,6 +1,6 @@
-//! Lockstep with the `pil` image.
+//! Runs the `pil` image in lockstep.
 //!
-//! Bytes are exchanged over two FIFOs, in the format of [`ReplyHead`].
+//! Bytes are exchanged over two FIFOs in the format of [`ReplyHead`].
 
 use crate::Error;
 use crate::qemu::{self, Qemu};
@@ -14,62 +14,62 @@ use std::sync::mpsc::{self, Receiver, RecvTimeoutError};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-/// Time on the host after which a tick without an end counts as stuck.
+/// A tick that takes longer than this on the host counts as stuck.
 const PATIENCE: Duration = Duration::from_secs(20);
-/// Interval of the checks that QEMU still runs.
+/// Interval between checks that QEMU still runs.
 const LOOK: Duration = Duration::from_millis(500);
-/// Longest reply accepted \[bytes\].
+/// Longest accepted reply \[bytes\].
 const REPLY_MAX: usize = 4096;
 
-/// Result of one control tick of the firmware.
+/// Result of a control tick of the firmware.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct TickReply {
-    /// Start of the tick, since power-up \[us\].
+    /// Start of the tick since power-up \[us\].
     pub time_us: u64,
-    /// Duration in core cycles, as measured by the firmware.
+    /// Duration in core cycles, as the firmware measures it.
     pub cycles: u32,
-    /// Duration in instructions, which is what the emulator counts.
+    /// Duration in instructions, as the emulator counts them.
     pub instructions: u32,
-    /// Largest stack depth so far, interrupts included, as of the last full second \[bytes\].
+    /// Largest stack depth so far, including interrupts, as of the last full second \[bytes\].
     pub stack_bytes: u32,
     /// Throttles of the motors: 0, or 48 to 2047; 0 where there is no motor.
     pub throttles: [u16; ROTORS_MAX],
-    /// Bytes sent over the link.
+    /// Bytes that the firmware sent over the link.
     pub bytes: Vec<u8>,
 }
 
 impl TickReply {
-    /// Returns the duration as the firmware reports it to stations \[us\].
+    /// Returns the tick's duration as the firmware reports it over MAVLink \[us\].
     pub fn tick_us(&self) -> f32 {
         self.cycles as f32 / qemu::CORE_MHZ as f32
     }
 }
 
-/// The `pil` image, running in lockstep with the host.
+/// The `pil` image in lockstep with the host.
 #[derive(Debug)]
 pub struct Emulator {
     qemu: Qemu,
     to_firmware: File,
     readings: Readings,
     replies: Receiver<io::Result<TickReply>>,
-    /// Writing end of the firmware's FIFO: while it is open, the reader waits for more.
+    /// Writing end of the FIFO from the firmware: while it is open, the reader waits for more.
     hold: Option<File>,
     reader: Option<JoinHandle<()>>,
 }
 
 impl Emulator {
-    /// Starts the image; it waits for the first [exchange](Self::exchange) before its first control tick.
+    /// Starts the image; before its first control tick it waits for the first [exchange](Self::exchange).
     ///
     /// # Errors
-    /// If QEMU or the image is missing, or QEMU does not start.
+    /// Fails if QEMU or the image is missing, or if QEMU does not start.
     pub fn start(elf: &Path) -> Result<Self, Error> {
         Emulator::start_slower(elf, 0)
     }
 
-    /// Starts the image on a processor whose every instruction takes 2^`slower` times as long: 8 ns, 16 ns, 32 ns.
+    /// Starts the image on a processor whose instructions take 2^`slower` times as long: 8 ns, 16 ns, 32 ns.
     ///
     /// # Errors
-    /// As for [`Emulator::start`].
+    /// The same as for [`Emulator::start`].
     pub fn start_slower(elf: &Path, slower: u32) -> Result<Self, Error> {
         let shift = qemu::SHIFT + slower;
         let folder = Qemu::folder()?;
@@ -78,7 +78,7 @@ impl Emulator {
             if !Command::new("mkfifo").arg(&path).status()?.success() {
                 return Err(Error::Protocol(format!("mkfifo {} failed", path.display())));
             }
-            // Opened for reading and writing, a FIFO does not wait for its other end.
+            // Opening a FIFO for reading and writing does not wait for its other end.
             Ok(OpenOptions::new().read(true).write(true).open(path)?)
         };
         let to_firmware = open("to_firmware")?;
@@ -101,15 +101,15 @@ impl Emulator {
         Ok(Emulator { qemu, to_firmware, readings, replies, hold: Some(hold), reader: Some(reader) })
     }
 
-    /// Sets what the vehicle's own sensors read for the next tick alone.
+    /// Sets the vehicle's own sensor readings for the next tick only.
     pub fn sense(&mut self, readings: &Readings) {
         self.readings = *readings;
     }
 
-    /// Runs one control tick: delivers the bytes that arrived before it, and returns what the firmware sent after it.
+    /// Runs one control tick. Delivers `to_firmware` before the tick and returns the firmware's output after it.
     ///
     /// # Errors
-    /// If the firmware panicked, faulted or hangs.
+    /// Fails if the firmware panics, faults or hangs.
     pub fn exchange(&mut self, to_firmware: &[u8]) -> Result<TickReply, Error> {
         let mut frame = core::mem::take(&mut self.readings).to_bytes().to_vec();
         frame.extend_from_slice(&(to_firmware.len() as u32).to_le_bytes());
@@ -133,7 +133,7 @@ impl Emulator {
 
 impl Drop for Emulator {
     fn drop(&mut self) {
-        // With both writing ends closed the reader sees the end of the FIFO.
+        // With both writing ends closed, the reader sees the end of the FIFO.
         self.qemu.kill();
         self.hold = None;
         if let Some(reader) = self.reader.take() {

@@ -4,12 +4,12 @@ use std::fmt;
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// Why an image could not be built, started or flown.
+/// Reason for which an image could not be built, started or flown.
 #[derive(Debug)]
 pub enum Error {
-    /// There is no QEMU for Arm.
+    /// QEMU for Arm is not installed.
     NoQemu,
-    /// This QEMU has no STM32F405, or an unsuitable one.
+    /// This QEMU does not emulate a suitable STM32F405.
     NoMachine,
     /// The Rust toolchain cannot compile for the processor.
     NoTarget,
@@ -23,12 +23,12 @@ pub enum Error {
     Silent(Duration),
     /// Unexpected data from the emulator, its debugger or the image.
     Protocol(String),
-    /// Files, sockets or processes of the host.
+    /// An operation on files, sockets or processes of the host failed.
     Io(std::io::Error),
 }
 
 impl Error {
-    /// True if something has to be installed or built first: a test may be skipped for this error.
+    /// Returns true if something must be installed or built first: tests may be skipped then.
     pub fn is_missing(&self) -> bool {
         matches!(self, Error::NoQemu | Error::NoMachine | Error::NoTarget | Error::NoImage(_))
     }

@@ -1,21 +1,21 @@
-//! A flight with every kind of event, as the bytes that reach the vehicle, for comparisons and budgets.
+//! A test flight with every kind of event, as the bytes that reach the vehicle. Used for comparisons and budgets.
 
 use afbc_hil::Station;
 use afbc_link::{Command, Uplink};
 use afbc_types::{Setpoint, State};
 use nalgebra::Vector3;
 
-/// Tick before which the vehicle is armed.
+/// Tick before which the arm command is sent.
 const ARMED: u64 = 1_500;
-/// Ticks of the whole flight.
+/// Number of ticks in the flight.
 pub const TICKS: u64 = 6_000;
 
-/// Returns the bytes that reach the link before `tick`: a flight with every kind of link fault. To be called for
+/// Returns the bytes that reach the link before `tick`: a flight with every kind of link fault. Must be called for
 /// consecutive ticks from 0 on.
 pub fn bytes_of_tick(station: &mut Station, tick: u64) -> Vec<u8> {
     // At rest until armed.
     let (state, setpoint) = motion(tick.saturating_sub(ARMED) as f32 * 1e-3);
-    // Two gaps: one that is coasted through, one that ends in a descent.
+    // Two gaps in the states: a short one that ends while coasting, and a long one that ends in a descent.
     let tracked = !(2_500..2_600).contains(&tick) && !(4_000..5_000).contains(&tick);
     if tracked {
         station.track(tick * 1000, state);
@@ -23,12 +23,12 @@ pub fn bytes_of_tick(station: &mut Station, tick: u64) -> Vec<u8> {
     if tick.is_multiple_of(10) {
         station.say(&Uplink::Setpoint(setpoint));
     }
-    // Again after the gaps, which end the mode.
+    // Request the mode repeatedly, since the gaps end it.
     if tick > 100 && tick.is_multiple_of(250) {
         station.follow();
     }
     match tick {
-        // The first is refused, since the tick rate is not known yet.
+        // The first request is refused, since the tick rate is not known yet.
         100 | ARMED => station.say(&Uplink::Command(Command::Arm)),
         // The motion does not follow the rotors, so AFBC's monitor trips repeatedly.
         3_000 | 5_200 => station.say(&Uplink::Command(Command::Engage)),
@@ -36,7 +36,7 @@ pub fn bytes_of_tick(station: &mut Station, tick: u64) -> Vec<u8> {
         _ => (),
     }
     let mut bytes = station.take();
-    // Coprime with the other periods, so that faults meet each of their phases.
+    // 97 is coprime with the other periods, so that faults hit each of their phases.
     match tick % 97 {
         13 => bytes.truncate(bytes.len() / 2),
         31 => bytes.extend_from_slice(b"\xFD\xFDnoise\x00\xFF"),
@@ -46,7 +46,7 @@ pub fn bytes_of_tick(station: &mut Station, tick: u64) -> Vec<u8> {
     bytes
 }
 
-/// Returns a motion near hover that excites every subsystem; `t` in seconds.
+/// Returns a motion near hover that excites every subsystem; `t` is in seconds.
 pub fn motion(t: f32) -> (State, Setpoint) {
     let wave = |rate: f32| (rate * t).sin();
     let state = State {

@@ -6,19 +6,19 @@ use std::os::unix::net::UnixStream;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-/// Number of the stack pointer.
+/// Register number of the stack pointer.
 pub const SP: u32 = 13;
-/// Number of the program status register; its lowest 9 bits are the active exception.
+/// Register number of the program status register, whose lowest 9 bits are the active exception.
 pub const XPSR: u32 = 25;
-/// Number of the link register.
+/// Register number of the link register.
 const LR: u32 = 14;
-/// Number of the program counter.
+/// Register number of the program counter.
 pub const PC: u32 = 15;
 
 /// Longest wait for the stub's answer.
 const ANSWER_TIMEOUT: Duration = Duration::from_secs(5);
 
-/// Accesses to watch; the values are the protocol's.
+/// Kinds of accesses to watch; their values are the protocol's.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Watch {
     /// Stores only.
@@ -34,15 +34,15 @@ pub struct Gdb {
 }
 
 impl Gdb {
-    /// Connects to the stub's socket, waiting until it exists, and leaves the processor halted.
+    /// Connects to the stub's socket, once it exists, and leaves the processor halted.
     ///
     /// # Errors
-    /// If there is none after 5 s.
+    /// Fails if there is no socket after 5 s.
     pub fn connect(socket: &Path) -> Result<Self, Error> {
         let stream = connect(socket)?;
         stream.set_read_timeout(Some(ANSWER_TIMEOUT))?;
         let mut gdb = Gdb { stream: BufReader::new(stream) };
-        // QEMU gives access to registers only after their list was requested.
+        // QEMU allows access to registers only after their list was requested.
         gdb.ask("qXfer:features:read:target.xml:0,ffb")?;
         gdb.ask("?")?;
         Ok(gdb)
@@ -51,7 +51,7 @@ impl Gdb {
     /// Reads a core register.
     ///
     /// # Errors
-    /// If the stub refuses.
+    /// Fails if the stub refuses.
     pub fn register(&mut self, number: u32) -> Result<u32, Error> {
         let answer = self.ask(&format!("p{number:x}"))?;
         let bytes = from_hex(&answer)?;
@@ -61,7 +61,7 @@ impl Gdb {
     /// Writes a core register.
     ///
     /// # Errors
-    /// If the stub refuses.
+    /// Fails if the stub refuses.
     pub fn set_register(&mut self, number: u32, value: u32) -> Result<(), Error> {
         self.order(&format!("P{number:x}={:08x}", value.swap_bytes()))
     }
@@ -69,28 +69,28 @@ impl Gdb {
     /// Reads `N` bytes of memory.
     ///
     /// # Errors
-    /// If the stub refuses.
+    /// Fails if the stub refuses.
     pub fn memory<const N: usize>(&mut self, address: u32) -> Result<[u8; N], Error> {
         let answer = self.ask(&format!("m{address:x},{N:x}"))?;
         from_hex(&answer)?.try_into().map_err(|_| Error::Protocol(answer))
     }
 
-    /// Writes to RAM or, unlike a processor, to flash.
+    /// Writes to RAM or, unlike a processor, also to flash.
     ///
     /// # Errors
-    /// If the stub refuses.
+    /// Fails if the stub refuses.
     pub fn set_memory(&mut self, address: u32, bytes: &[u8]) -> Result<(), Error> {
         let hex: String = bytes.iter().map(|byte| format!("{byte:02x}")).collect();
         self.order(&format!("M{address:x},{:x}:{hex}", bytes.len()))
     }
 
-    /// Makes a halted processor store a word, since the stub cannot write device registers. Uses the first bytes of the
-    /// core-coupled memory.
+    /// Makes a halted processor store a word, since the stub cannot write device registers. Overwrites the first bytes
+    /// of the core-coupled memory.
     ///
     /// # Errors
-    /// If the stub refuses.
+    /// Fails if the stub refuses.
     pub fn store(&mut self, address: u32, value: u32) -> Result<(), Error> {
-        // The far end of the stack, which never comes so deep (docs/budgets.md).
+        // The far end of the stack, which is never reached (docs/budgets.md).
         const SCRATCH: u32 = 0x1000_0000;
         // STR r1, [r0]
         self.set_memory(SCRATCH, &[0x01, 0x60])?;
@@ -109,15 +109,15 @@ impl Gdb {
     /// Stops the processor before its next access to the word at `address`.
     ///
     /// # Errors
-    /// If the stub refuses.
+    /// Fails if the stub refuses.
     pub fn watch(&mut self, watch: Watch, address: u32) -> Result<(), Error> {
         self.order(&format!("Z{},{address:x},4", watch as u32))
     }
 
-    /// Undoes [`Gdb::watch`].
+    /// Removes the watchpoint of [`Gdb::watch`].
     ///
     /// # Errors
-    /// If the stub refuses.
+    /// Fails if the stub refuses.
     pub fn unwatch(&mut self, watch: Watch, address: u32) -> Result<(), Error> {
         self.order(&format!("z{},{address:x},4", watch as u32))
     }
@@ -125,16 +125,16 @@ impl Gdb {
     /// Executes one instruction.
     ///
     /// # Errors
-    /// If the stub refuses.
+    /// Fails if the stub refuses.
     pub fn step(&mut self) -> Result<(), Error> {
         self.ask("s").map(drop)
     }
 
-    /// Runs until a watchpoint stops the processor, and returns the address accessed; `None` if it still runs after
-    /// `patience`.
+    /// Runs until a watchpoint stops the processor and returns the accessed address; `None` if the processor still runs
+    /// after `patience`.
     ///
     /// # Errors
-    /// If it stops for another reason.
+    /// Fails if the processor stops for another reason.
     pub fn run(&mut self, patience: Duration) -> Result<Option<u32>, Error> {
         self.send("c")?;
         self.stream.get_ref().set_read_timeout(Some(patience))?;
@@ -144,16 +144,16 @@ impl Gdb {
             Err(Error::Io(e)) if matches!(e.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => return Ok(None),
             stop => stop?,
         };
-        // T05thread:p01.01;awatch:40023800;
+        // Example: T05thread:p01.01;awatch:40023800;
         let address = stop.split(';').find_map(|field| field.split_once("watch:")).map(|(_, address)| address);
         let address = address.and_then(|address| u32::from_str_radix(address, 16).ok());
         address.map(Some).ok_or(Error::Protocol(stop))
     }
 
-    /// Runs a halted processor, which is elsewhere, to the instruction at `address`.
+    /// Runs a halted processor to the instruction at `address`, which must not be its present one.
     ///
     /// # Errors
-    /// If it does not within `patience`.
+    /// Fails if the processor does not get there within `patience`.
     pub fn run_to(&mut self, address: u32, patience: Duration) -> Result<(), Error> {
         self.order(&format!("Z1,{address:x},2"))?;
         self.send("c")?;
@@ -164,27 +164,27 @@ impl Gdb {
         self.order(&format!("z1,{address:x},2"))
     }
 
-    /// Counts the instructions of a halted processor until the present exception ends, with other interrupts held off.
+    /// Counts a halted processor's instructions until the present exception ends, with other interrupts held off.
     ///
     /// # Errors
-    /// If the stub refuses, or there is no end.
+    /// Fails if the stub refuses, or if the exception does not end.
     pub fn count_exception(&mut self) -> Result<u32, Error> {
         let exception = |gdb: &mut Self| Ok::<_, Error>(gdb.register(XPSR)? & 0x1FF);
         let this = exception(self)?;
         self.count_while(|gdb| Ok(exception(gdb)? == this))
     }
 
-    /// Counts the instructions of a halted processor until the function just entered returns.
+    /// Counts a halted processor's instructions until the function just entered returns.
     ///
     /// # Errors
-    /// If the stub refuses, or there is no end.
+    /// Fails if the stub refuses, or if the function does not return.
     pub fn count_function(&mut self) -> Result<u32, Error> {
         let back = self.register(LR)? & !1;
         self.count_while(|gdb| Ok(gdb.register(PC)? != back))
     }
 
     fn count_while(&mut self, mut within: impl FnMut(&mut Self) -> Result<bool, Error>) -> Result<u32, Error> {
-        /// Far more than anything counted takes.
+        /// Far more instructions than any counted code takes.
         const STEPS_MAX: u32 = 100_000;
         for steps in 1..STEPS_MAX {
             self.step()?;
@@ -198,7 +198,7 @@ impl Gdb {
     /// Halts a running processor.
     ///
     /// # Errors
-    /// If it does not halt.
+    /// Fails if the processor does not halt.
     pub fn halt(&mut self) -> Result<(), Error> {
         self.stream.get_mut().write_all(&[0x03])?;
         self.receive().map(drop)
@@ -207,7 +207,7 @@ impl Gdb {
     /// Lets a halted processor run, without waiting for it to stop.
     ///
     /// # Errors
-    /// If the connection fails.
+    /// Fails if the connection breaks.
     pub fn resume(&mut self) -> Result<(), Error> {
         self.send("c")
     }

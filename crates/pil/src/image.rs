@@ -1,4 +1,4 @@
-//! The firmware's images: finding and building them.
+//! Finds and builds the firmware's images.
 
 use crate::Error;
 use std::path::{Path, PathBuf};
@@ -11,7 +11,7 @@ const TARGET: &str = "thumbv7em-none-eabihf";
 pub enum Image {
     /// The image for the board.
     Flight,
-    /// The same code, exchanging bytes with the host once per control tick: for [`crate::Emulator`].
+    /// The same code, which exchanges bytes with the host once per control tick, for [`crate::Emulator`].
     Pil,
 }
 
@@ -26,18 +26,18 @@ impl Image {
     /// Returns the path of the last build.
     ///
     /// # Errors
-    /// [`Error::NoImage`] if there is none.
+    /// Returns [`Error::NoImage`] if there is no build.
     pub fn find(self) -> Result<PathBuf, Error> {
         let target = std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| workspace().join("target"), PathBuf::from);
         let path = target.join(TARGET).join("firmware").join(self.name());
         if path.is_file() { Ok(path) } else { Err(Error::NoImage(path)) }
     }
 
-    /// Builds the image by its cargo alias, for `vehicle` (a name in `vehicles/` or an absolute path) or the default
-    /// one, and returns its path. `FW_TOOLCHAIN`, if set, names the toolchain.
+    /// Builds the image by its cargo alias and returns its path. `vehicle` is a name in `vehicles/` or an absolute
+    /// path; none selects the default vehicle. `FW_TOOLCHAIN`, if set, names the toolchain.
     ///
     /// # Errors
-    /// [`Error::NoTarget`], [`Error::Build`].
+    /// Returns [`Error::NoTarget`] or [`Error::Build`].
     pub fn build(self, vehicle: Option<&Path>) -> Result<PathBuf, Error> {
         let libraries = toolchain("rustc").args(["--print", "target-libdir", "--target", TARGET]).output()?;
         let libraries = PathBuf::from(String::from_utf8_lossy(&libraries.stdout).trim());
@@ -51,7 +51,7 @@ impl Image {
         let mut cargo = toolchain("cargo");
         match vehicle {
             Some(vehicle) => cargo.env("VEHICLE", vehicle),
-            // The host beside it flies the default one.
+            // The host's twin flies the default vehicle.
             None => cargo.env_remove("VEHICLE"),
         };
         let status = cargo.arg(alias).current_dir(workspace()).stdout(Stdio::null()).status()?;
@@ -59,7 +59,7 @@ impl Image {
     }
 }
 
-/// A command of the firmware's toolchain.
+/// Returns a command of the firmware's toolchain.
 fn toolchain(tool: &str) -> Command {
     let mut command = Command::new(tool);
     if let Some(toolchain) = std::env::var_os("FW_TOOLCHAIN") {
@@ -68,7 +68,7 @@ fn toolchain(tool: &str) -> Command {
     command
 }
 
-/// The workspace's root.
+/// Returns the workspace's root.
 fn workspace() -> &'static Path {
     Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))
 }

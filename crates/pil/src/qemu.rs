@@ -1,4 +1,4 @@
-//! Finding and starting QEMU.
+//! Finds and starts QEMU.
 
 use crate::Error;
 use std::ffi::OsStr;
@@ -6,26 +6,26 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::sync::atomic::{AtomicU32, Ordering};
 
-/// QEMU's board with an STM32F405, from version 8.
+/// QEMU's board with an STM32F405, from QEMU 8 on.
 pub(crate) const OLIMEX: &str = "olimex-stm32-h405";
-/// The machine of older versions, whose USART does not send by interrupt.
+/// Machine of older QEMU versions; its USART does not send by interrupt.
 pub(crate) const NETDUINO: &str = "netduinoplus2";
 
-/// Duration of an instruction, as a power of two \[ns\]: 8 ns by default.
+/// Duration of an instruction as a power of two \[ns\]: 8 ns by default.
 pub(crate) const SHIFT: u32 = 3;
 
-/// Returns the arguments that advance time by 2^`shift` ns per instruction, and stop it while the processor waits for
+/// Returns the arguments that advance time by 2^`shift` ns per instruction and stop time while the processor waits for
 /// the host.
 pub(crate) fn count_instructions(shift: u32) -> [String; 2] {
     ["-icount".into(), format!("shift={shift},sleep=off")]
 }
 
-/// Clock of this processor's core \[MHz\].
+/// Core clock of this processor \[MHz\].
 pub(crate) const CORE_MHZ: u32 = 168;
 
-/// Converts core cycles, as counted by SysTick, to instructions of 2^`shift` ns.
+/// Converts core cycles, counted by SysTick, to instructions of 2^`shift` ns.
 pub(crate) fn instructions(cycles: u32, shift: u32) -> u32 {
-    // Rounded: an instruction of 8 ns is 1.344 cycles.
+    // Rounded, since an instruction of 8 ns takes 1.344 cycles.
     let cycles_per_thousand = u64::from(CORE_MHZ << shift);
     ((u64::from(cycles) * 1000 + cycles_per_thousand / 2) / cycles_per_thousand) as u32
 }
@@ -41,14 +41,14 @@ impl Qemu {
     /// Creates an empty folder shared by host and emulator.
     pub(crate) fn folder() -> Result<PathBuf, Error> {
         static COUNT: AtomicU32 = AtomicU32::new(0);
-        // Tests run several at once, in one process and in many.
+        // Tests run several emulators at once, within a process and in several processes.
         let name = format!("pil-{}-{}", std::process::id(), COUNT.fetch_add(1, Ordering::Relaxed));
         let folder = std::env::temp_dir().join(name);
         std::fs::create_dir_all(&folder)?;
         Ok(folder)
     }
 
-    /// Starts `elf` in `folder` on the first of `machines` that this QEMU has, with further arguments.
+    /// Starts `elf` in `folder` on the first of `machines` that this QEMU has, with additional arguments.
     pub(crate) fn start(
         elf: &Path,
         folder: PathBuf,
@@ -98,7 +98,7 @@ impl Drop for Qemu {
     }
 }
 
-/// Returns `QEMU_SYSTEM_ARM`, or else `qemu-system-arm` of the search path.
+/// Returns the program `QEMU_SYSTEM_ARM` or, if that is not set, `qemu-system-arm` in the search path.
 fn program() -> std::ffi::OsString {
     std::env::var_os("QEMU_SYSTEM_ARM").unwrap_or_else(|| "qemu-system-arm".into())
 }

@@ -1,5 +1,6 @@
-//! Times of the firmware on each board: instructions counted, cycles that the cores may take for them, and transfers on
-//! the buses; from them the worst response of each interrupt and task. Writes the tables of `docs/timing.md`.
+//! Computes the firmware's times on each board. Inputs are counted instructions, the cores' cycles per instruction, and
+//! transfers on the buses. The result is the worst response of each interrupt and task, in the tables of
+//! `docs/timing.md`.
 
 mod boards;
 mod bus;
@@ -19,19 +20,19 @@ use crate::Error;
 use crate::response::load;
 use std::fmt::Write as _;
 
-/// The tables of one board, and what is wrong with them.
+/// Tables of one board and the problems found.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct BoardReport {
-    /// Markdown.
+    /// Tables in Markdown.
     pub text: String,
-    /// Rows that are late without being known to be, later than that, or known and in time, each in a line.
+    /// A line for each wrong row: late but not known to be, later than known, or known to be late but in time.
     pub wrong: Vec<String>,
 }
 
-/// Returns the tables of all boards, with the instructions that the page `budgets` has.
+/// Returns the tables of all boards. `budgets` is the page with the instruction counts.
 ///
 /// # Errors
-/// If the page lacks a row.
+/// Fails if the page lacks a row.
 pub fn reports(budgets: &str) -> Result<Vec<BoardReport>, Error> {
     let work = Work::read(budgets)?;
     Ok(BOARDS.iter().map(|board| report(board, &work)).collect())
@@ -108,7 +109,7 @@ fn report(board: &BoardTimes, work: &Work) -> BoardReport {
     BoardReport { text, wrong: wrong.iter().map(|wrong| format!("{}: {wrong}", board.name)).collect() }
 }
 
-/// A time in microseconds, rounded up to a tenth.
+/// Formats a time in microseconds, rounded up to a tenth.
 fn us(ns: u64) -> String {
     let tenths = ns.div_ceil(100);
     format!("{}.{} us", tenths / 10, tenths % 10)
@@ -120,7 +121,7 @@ const END: &str = "<!-- end -->\n";
 /// Returns the page with the tables between its markers.
 ///
 /// # Errors
-/// If it has none.
+/// Fails if the page has no markers.
 pub fn page(text: &str, reports: &[BoardReport]) -> Result<String, Error> {
     let unmarked = || Error::Protocol("docs/timing.md lacks the markers of the tables".into());
     let (before, rest) = text.split_once(BEGIN).ok_or_else(unmarked)?;

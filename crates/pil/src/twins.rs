@@ -1,43 +1,43 @@
-//! Emulated processor and host, compared.
+//! Compares the emulated processor with the host.
 
 use crate::emulator::{Emulator, TickReply};
 use afbc_hil::{Autopilot, Error, Extremes, Host, HostTick};
 use afbc_onboard::Readings;
 
-/// The emulated processor and the same code on the host. The host gets the same bytes at the same times, and every
-/// output of every tick is compared. The loop has no other input, so as long as none differs, the host alone would have
-/// flown the same flight.
+/// Runs the emulated processor and the same code on the host with the same bytes at the same times, and compares every
+/// output of every tick. The loop has no other input. So as long as no output differs, the host alone would have flown
+/// the same flight.
 pub struct Twins {
     emulator: Emulator,
     host: Host,
     comparison: TwinComparison,
 }
 
-/// Result of the comparison.
+/// Result of comparing the emulated processor with the host.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct TwinComparison {
-    /// Control ticks compared.
+    /// Number of compared control ticks.
     pub ticks: u64,
-    /// Armed ticks among them.
+    /// Number of armed ticks among them.
     pub armed_ticks: u64,
-    /// Bits compared: throttles and link bytes.
+    /// Number of compared bits, in throttles and link bytes.
     pub bits: u64,
-    /// Ticks with a bit that differs.
+    /// Number of ticks with a differing bit.
     pub differing_ticks: u64,
-    /// Bits that differ; a byte sent by one side only counts as eight.
+    /// Number of differing bits; a byte that only one side sends counts as eight.
     pub differing_bits: u64,
-    /// The first tick with a bit that differs, counted from 0.
+    /// First tick with a differing bit, counted from 0.
     pub first_difference: Option<u64>,
     /// Instructions of each armed control tick.
     pub instructions: Extremes,
-    /// Ticks that came late or early, by the processor's own clock.
+    /// Number of ticks that came late or early by the processor's own clock.
     pub late_ticks: u32,
-    /// Largest stack depth so far, interrupts included \[bytes\].
+    /// Largest stack depth so far, including interrupts \[bytes\].
     pub stack_bytes: u32,
 }
 
 impl Twins {
-    /// Creates both, disarmed; `host` must have the firmware of the vehicle that the image was built for.
+    /// Creates the disarmed twins. `host` must have the firmware of the vehicle for which the image was built.
     pub fn new(emulator: Emulator, host: Host) -> Self {
         Twins { emulator, host, comparison: TwinComparison::default() }
     }
@@ -57,7 +57,7 @@ impl Autopilot for Twins {
 
     fn exchange(&mut self, uplink: &[u8], hear: &mut dyn FnMut(&[u8])) -> Result<(), Error> {
         let reply = self.emulator.exchange(uplink).map_err(|error| Error::Autopilot(error.into()))?;
-        // The times are the processor's, since they are measured, not computed.
+        // The host gets the processor's times, since these are measured, not computed.
         let tick = self.host.tick(uplink, reply.time_us, reply.tick_us());
         self.comparison.add(&reply, &tick);
         hear(&reply.bytes);

@@ -1,9 +1,9 @@
-//! A search for the control tick with the most instructions: random plausible states first, then hill climbing from the
+//! Searches for the control tick with the most instructions: first random plausible states, then hill climbing from the
 //! worst of them.
 //!
-//! A tick's cost also depends on the law's memory, so this is one long flight: every candidate is flown for a few
-//! ticks, from the estimates that the previous ones left. The search finds a bad tick; it does not prove that there is
-//! no worse one.
+//! A tick's cost also depends on the law's memory. So the search is one long flight: every candidate is flown for a few
+//! ticks and starts from the adaptive estimates that the previous ones left. The search finds a bad tick; it does not
+//! prove that there is no worse one.
 
 use crate::{Emulator, Error};
 use afbc_estimator::Measurement;
@@ -15,56 +15,56 @@ use nalgebra::Vector3;
 use rand_xoshiro::SplitMix64;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 
-/// Ticks for which a candidate and then its mirror image are flown: a tracker with a constant pose and a non-zero twist
-/// is soon distrusted.
+/// Ticks for which a candidate is flown, and then its mirror image. A tracker with constant pose but non-zero velocity
+/// would soon be distrusted.
 const HOLD: u64 = 8;
-/// Ticks at rest before a vehicle is armed.
+/// Ticks at rest before the vehicle is armed.
 const REST: u64 = 1_050;
 /// Numbers per candidate.
 const NUMBERS: usize = 19;
-/// Scale of each number: position \[m\], velocity \[m/s\], attitude \[rad\], rates \[rad/s\]; of the setpoint position
+/// Scale of each number. State: position \[m\], velocity \[m/s\], attitude \[rad\], rates \[rad/s\]. Setpoint: position
 /// \[m\], velocity \[m/s\], yaw \[rad\].
 const SCALES: [f32; NUMBERS] =
     [2.0, 2.0, 2.0, 3.0, 3.0, 3.0, 0.6, 0.6, 3.0, 5.0, 5.0, 5.0, 2.0, 2.0, 2.0, 1.0, 1.0, 1.0, 3.0];
 
-/// The worst tick found.
+/// The worst tick found by a search.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Worst {
-    /// Its instructions.
+    /// Number of instructions in the worst tick.
     pub instructions: u32,
-    /// Index of the candidate in which it occurred.
+    /// Index of the candidate in which the tick occurred.
     pub candidate: u64,
-    /// Number of candidates.
+    /// Number of candidates flown.
     pub candidates: u64,
-    /// Ticks flown with the motors on.
+    /// Number of ticks flown with the motors on.
     pub ticks: u64,
 }
 
-/// What the vehicle flies on.
+/// Source of the state on which the vehicle flies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StateSource {
-    /// States of the link.
+    /// States from the link.
     Link,
-    /// Its own estimate, with more measurements than it can fuse, which agree neither with the samples nor with one
+    /// The vehicle's own estimate. It gets more measurements than it can fuse, which contradict the IMU samples and one
     /// another.
     Estimate,
 }
 
-/// Flies `candidates`, which depend on `seed` only.
+/// Flies `candidates` candidates, which depend only on `seed`, and returns the worst tick.
 ///
 /// # Errors
-/// If the emulator fails, or the vehicle does not arm.
+/// Fails if the emulator fails or the vehicle does not arm.
 pub fn search(emulator: Emulator, source: StateSource, seed: u64, candidates: u64) -> Result<Worst, Error> {
     let random = SplitMix64::seed_from_u64(seed);
     let mut flight = EmulatedFlight { emulator, source, station: Station::default(), tick: 0, random };
     let mut worst = Worst { candidates, ..Worst::default() };
     let (mut summit, mut height) = ([0.0; NUMBERS], 0);
     for candidate in 0..candidates {
-        // The first half is random; the second half climbs.
+        // The first half of the candidates is random; the second half climbs.
         let numbers = if candidate < candidates / 2 { flight.anywhere() } else { flight.near(&summit) };
         let mut instructions = 0;
         for tick in 0..2 * HOLD {
-            // The monitor trips repeatedly, and the safety net leaves the mode.
+            // Repeated, since the monitor trips and the safety net leaves the mode.
             if tick == 0 {
                 flight.station.say(&Uplink::Command(Command::Engage));
                 flight.station.follow();
@@ -78,7 +78,7 @@ pub fn search(emulator: Emulator, source: StateSource, seed: u64, candidates: u6
                 None => flight.arm()?,
             }
         }
-        // Equal ones, too, so that the climb goes on over level ground.
+        // Also accept equal candidates, so that the climb can cross plateaus.
         if instructions >= height {
             (summit, height) = (numbers, instructions);
         }
@@ -100,12 +100,12 @@ struct EmulatedFlight {
 impl EmulatedFlight {
     /// Draws a number in -1..1.
     fn number(&mut self) -> f32 {
-        // 24 bits, which an f32 has exactly.
+        // 24 random bits, which an f32 holds exactly.
         (self.random.next_u64() >> 40) as f32 / (1 << 23) as f32 - 1.0
     }
 
     fn anywhere(&mut self) -> [f32; NUMBERS] {
-        // Some far from hover, some near it.
+        // Some candidates are far from hover, some near it.
         let reach = (self.number() + 1.0) / 2.0;
         [0.0; NUMBERS].map(|_| reach * self.number())
     }
@@ -121,7 +121,7 @@ impl EmulatedFlight {
 
     fn inputs(&mut self, numbers: &[f32; NUMBERS], mirrored: bool) -> (State, Setpoint) {
         let sign = if mirrored { -1.0 } else { 1.0 };
-        // Never twice the same, like measurements.
+        // Noise, since real measurements never repeat exactly.
         let noise = 1e-5 * self.number();
         let mut scaled = numbers.iter().zip(SCALES).map(|(number, scale)| number * scale);
         let mut next = || scaled.next().unwrap_or(0.0);
@@ -151,8 +151,8 @@ impl EmulatedFlight {
         Ok((reply.throttles.iter().any(|throttle| *throttle != 0)).then_some(reply.instructions))
     }
 
-    /// Returns a sample, and measurements of a vehicle in this state, of any age; on the ground mostly those of a
-    /// tracker.
+    /// Returns an IMU sample and measurements of any age for a vehicle in this state. On the ground they are mostly a
+    /// tracker's.
     fn readings(&mut self, state: &State) -> Readings {
         let [noise, other] = [1e-3 * self.number(), 1e-3 * self.number()];
         let force_m_s2 = Vector3::new(noise, other, 9.81) + 0.1 * state.velocity_m_s;
@@ -179,7 +179,7 @@ impl EmulatedFlight {
             Measurement::Heading { heading_rad: state.attitude_rad.z, sigma_rad: 0.1 },
         ];
         if *state == State::default() {
-            // The others now and then, for a silent sensor forbids arming.
+            // The other measurements come now and then, since a silent sensor forbids arming.
             let other = kinds.get(self.tick as usize / 100 % kinds.len()).filter(|_| self.tick.is_multiple_of(100));
             let aids = [Some(pose), other.copied()].map(|value| Some(Aged { value: value?, age_us: 2_000 }));
             return Readings { imu, aids };

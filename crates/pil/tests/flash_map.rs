@@ -1,4 +1,4 @@
-//! The images leave the flash's sectors 1 and 2 to the parameters (`memory.x`).
+//! Checks that the images leave the flash's sectors 1 and 2 to the parameters (`memory.x`).
 #![allow(clippy::unwrap_used, clippy::panic, missing_docs, unreachable_pub, reason = "test")]
 
 mod common;
@@ -9,9 +9,9 @@ use pil::Image;
 use std::fs;
 use std::ops::Range;
 
-/// Sectors 1 and 2.
+/// Address range of sectors 1 and 2.
 const PARAMETERS: Range<u64> = 0x0800_4000..0x0800_C000;
-/// Sector 0.
+/// Address range of sector 0.
 const VECTORS: Range<u64> = 0x0800_0000..0x0800_4000;
 
 #[test]
@@ -20,7 +20,7 @@ fn nothing_is_linked_into_the_sectors_of_the_parameters() {
         let Some(bytes) = start_or_skip(image, |path| Ok(fs::read(path)?)) else { return };
         let file = object::File::parse(bytes.as_slice()).unwrap();
         let overlaps = |start: u64, size: u64| start < PARAMETERS.end && start + size > PARAMETERS.start;
-        // What a programmer writes, initial values of RAM included.
+        // Everything that a programmer writes, including the initial values of RAM.
         for segment in file.segments().filter(|segment| !segment.data().unwrap().is_empty()) {
             let Range { start, end } = {
                 let (at, size) = (segment.address(), segment.data().unwrap().len() as u64);

@@ -1,4 +1,5 @@
-//! The unmodified flight image on an emulated board: boot, ticks, link, and failures of its crystal and its tasks.
+//! Tests the unmodified flight image on an emulated board: boot, ticks, link, and failures of its crystal and its
+//! tasks.
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, missing_docs, unreachable_pub, reason = "test")]
 
 mod common;
@@ -19,22 +20,22 @@ use std::time::{Duration, Instant};
 
 /// Far longer than needed, even on a busy machine.
 const PATIENCE: Duration = Duration::from_secs(120);
-/// Interval between states sent to the board \[us\]: QEMU's USART takes some 8 kB/s.
+/// Interval between states sent to the board \[us\]: QEMU's USART handles some 8 kB/s.
 const EVERY_US: u64 = 30_000;
-/// Accepted as 1 kHz; QEMU's USART delivers bytes faster than any line and may delay a tick.
+/// Tick rates accepted as 1 kHz \[Hz\]: QEMU's USART delivers bytes faster than any line and may delay a tick.
 const RATE_HZ: std::ops::RangeInclusive<f32> = 997.0..=1003.0;
 /// MAV_CMD_COMPONENT_ARM_DISARM.
 const ARM_DISARM: u16 = 400;
 /// SysTick's reload value register.
 const SYST_RVR: u32 = 0xE000_E014;
 
-/// A tracker that keeps sending the same state, and collects the board's messages.
+/// A simulated tracker that keeps sending the same state and collects the board's messages.
 struct Talk {
     board: EmulatedBoard,
     station: Station,
     decoder: Decoder<Downlink>,
     heard: Heard,
-    /// Time of the last state \[us since the board's power-up\].
+    /// Time of the last sent state, on the board's clock \[us\].
     spoke_us: u64,
 }
 
@@ -42,7 +43,7 @@ struct Talk {
 #[derive(Debug, Default)]
 struct Heard {
     heartbeats: u32,
-    /// Time of the newest rotor command, or health \[us since power-up\].
+    /// Newest time in a rotor command or health message \[us since power-up\].
     time_us: u64,
     health: HealthArray,
     answers: HashSet<Answer>,
@@ -55,7 +56,7 @@ impl Talk {
         Talk { board, station: Station::default(), decoder, heard: Heard::default(), spoke_us: 0 }
     }
 
-    /// Talks, with `command` each time, until `enough` is true.
+    /// Sends states, each followed by `command`, until `enough` returns true.
     fn until(&mut self, command: Option<Command>, enough: impl Fn(&Heard) -> bool) {
         let start = Instant::now();
         while !enough(&self.heard) {
@@ -63,7 +64,8 @@ impl Talk {
             let (spoke_us, heard) = (self.spoke_us, &mut self.heard);
             self.decoder.feed(&self.board.receive().unwrap(), |_, message| match message {
                 Downlink::Heartbeat { .. } => heard.heartbeats += 1,
-                // The station's first words ask for rotor commands: until then the time is that of the health.
+                // The station's first message requests rotor commands; until they come, time is taken from the health
+                // messages.
                 Downlink::Health(health) => {
                     heard.time_us = heard.time_us.max(health.time_us);
                     heard.health = health;
@@ -73,8 +75,8 @@ impl Talk {
                 Downlink::Rotors { time_us, .. } => heard.time_us = time_us,
                 _ => (),
             });
-            // By the board's own clock, right after its message. At rest, level, at the setpoint; the state is the last
-            // message before the command, to be fresh when that arrives.
+            // Send by the board's own clock, right after its message. The vehicle is at rest, level, at the setpoint.
+            // The state is the last message before the command, so that it is fresh when the command arrives.
             if heard.time_us >= spoke_us + EVERY_US {
                 let (state, setpoint) = motion(0.0);
                 self.station.say(&Uplink::Setpoint(setpoint));
@@ -86,8 +88,8 @@ impl Talk {
         }
     }
 
-    /// Asks for arming until the only remaining reason for refusal is that the vehicle must report rest for a whole
-    /// second without a gap, which QEMU's USART is too slow for.
+    /// Requests arming until the only remaining refusal is that the vehicle must report rest for a whole second without
+    /// a gap. QEMU's USART is too slow for that.
     fn ask(&mut self) {
         self.until(Some(Command::Arm), |heard| heard.texts.contains(Refusal::NotAtRest.reason()));
     }
@@ -95,15 +97,15 @@ impl Talk {
 
 /// Five wait states, prefetch, both caches.
 const FLASH_ON: u32 = 5 | 1 << 8 | 1 << 9 | 1 << 10;
-/// Bit of RCC_PLLCFGR: the PLL's source is the crystal; its divider.
+/// Bits of RCC_PLLCFGR: the crystal is the PLL's source, and the PLL's divider.
 const PLL_FROM_CRYSTAL: u32 = 1 << 22;
 const PLL_DIVIDER: u32 = 0x3F;
-/// The core runs from the PLL.
+/// Value of RCC_CFGR for a core that runs from the PLL.
 const CORE_FROM_PLL: u32 = 0b10;
 
 #[test]
 fn it_boots_ticks_and_listens() {
-    // Boot only returns if the image's clocks came up.
+    // Boot only returns if the image has set up its clocks.
     let Some(mut board) = start_or_skip(Image::Flight, |elf| EmulatedBoard::boot(&elf)) else { return };
     assert!(board.clock_accesses() > 10, "the clock tree was set up");
     assert_eq!(board.clock_register(FLASH_ACR), FLASH_ON);
@@ -118,9 +120,9 @@ fn it_boots_ticks_and_listens() {
     talk.ask();
 }
 
-/// The system memory's place (RM0090, table 5), where the chip has its boot loader.
+/// Address of the system memory with the chip's boot loader (RM0090, table 5).
 const SYSTEM_MEMORY: u32 = 0x1FFF_0000;
-/// What the command into the boot loader leaves for the next start (`firmware/chips/stm32/src/boot_loader.rs`).
+/// Value of the backup register that requests the boot loader (`firmware/chips/stm32/src/boot_loader.rs`).
 const WANTED: u32 = 0xB007_4DF0;
 
 #[test]
@@ -180,14 +182,14 @@ fn a_panic_of_the_link_does_not_stop_the_tick() {
         gdb.step().unwrap();
     }
     gdb.resume().unwrap();
-    // Bytes sent before the panic, and then nothing: the link's task has ended.
+    // Bytes sent before the panic still arrive, then nothing: the link's task has ended.
     let start = Instant::now();
     while !board.receive().unwrap().is_empty() {
         assert!(start.elapsed() < PATIENCE, "the link still sends");
     }
 }
 
-/// USART1's interrupt.
+/// Exception number of USART1's interrupt.
 const USART1: u32 = 16 + 37;
 
 /// Waking the link's task for every byte would take most of the processor's time on a busy line.
@@ -220,7 +222,7 @@ fn the_flight_image_has_a_log() {
     for line in ["tick {=u32} cycles, longest {=u32}", "started by {=str}"] {
         assert!(linked.log.iter().any(|logged| logged.contains(line)), "{line:?} in {:?}", linked.log);
     }
-    // It logs something at once, and one line per second.
+    // The image logs a line at once, and then one per second.
     let header = linked.symbol("_SEGGER_RTT").unwrap();
     let written = header + 16 + 4 + 4 + 3 * 4;
     let mut said = || {
@@ -238,7 +240,7 @@ fn the_flight_image_has_a_log() {
     }
 }
 
-/// Address range of the stack, in the core-coupled memory (`memory.x`).
+/// Address range of the stack in the core-coupled memory (`memory.x`).
 const STACK: std::ops::Range<u32> = 0x1000_0000..0x1001_0000;
 const HARD_FAULT: u32 = 3;
 
@@ -266,7 +268,7 @@ fn a_stack_that_overflows_ends_in_the_fault_handler() {
     assert!(STACK.contains(&(sp - 4)) && sp > STACK.end - 1024, "a fresh stack: {sp:#x}");
     gdb.resume().unwrap();
 
-    // Bytes sent before it failed, and then nothing.
+    // Bytes sent before the fault still arrive, then nothing.
     while !board.receive().unwrap().is_empty() {
         assert!(start.elapsed() < PATIENCE, "the link still sends");
     }

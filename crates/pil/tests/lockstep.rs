@@ -1,4 +1,4 @@
-//! The `pil` image compared with the host: the same calls, the same bits.
+//! Compares the `pil` image with the host: the same calls must give the same bits.
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, missing_docs, unreachable_pub, reason = "test")]
 
 mod common;
@@ -49,8 +49,8 @@ fn every_run_is_the_same() {
     assert_eq!(differs, None, "index of the first tick that differs");
 }
 
-/// Every stream at its highest rate, states, targets and questions in every tick, on a processor of half the
-/// speed: what the link does never delays a tick, and every tick is reported.
+/// Every stream runs at its highest rate, with states, targets and requests in every tick, also on a processor of half
+/// the speed. The link's work must never delay a tick, and every tick must be reported.
 #[test]
 fn no_tick_is_late_while_every_stream_runs_at_full_rate() {
     for slower in [0, 1] {
@@ -81,7 +81,7 @@ fn no_tick_is_late_while_every_stream_runs_at_full_rate() {
     }
 }
 
-/// The control tick comes exactly once per control period, at its start, whatever the processor's speed: a faster or
+/// The control tick must come exactly once per control period, at its start, on a processor of any speed. A faster or
 /// slower processor creates its tasks at other moments of the first period.
 #[test]
 fn the_tick_keeps_its_time_on_any_processor() {
@@ -91,7 +91,7 @@ fn the_tick_keeps_its_time_on_any_processor() {
         let mut station = Station::default();
         let ticks = (0..2_500).map(|tick| emulator.exchange(&bytes_of_tick(&mut station, tick)).unwrap());
         let times: Vec<u64> = ticks.map(|reply| reply.time_us).collect();
-        // From interrupt to tick, some 300 instructions.
+        // From the interrupt to the tick it takes some 300 instructions.
         let latest_us = 10 << slower;
         for pair in times.windows(2) {
             let gap_us = pair[1] - pair[0];

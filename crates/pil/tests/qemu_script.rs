@@ -1,5 +1,5 @@
-//! `scripts/qemu.sh`, run twice at once, installs once and finishes what an earlier run left unfinished. Apt, dpkg and
-//! QEMU are replaced by stand-ins.
+//! Runs `scripts/qemu.sh` twice at once: it must install only once and finish what an earlier run left unfinished. Apt,
+//! dpkg and QEMU are replaced by stand-ins.
 #![allow(clippy::unwrap_used, clippy::panic, missing_docs, reason = "test")]
 
 use std::fs;

@@ -1,11 +1,11 @@
-//! Response times against published examples, and against a simulation of the same tasks.
+//! Checks response times against published examples and against a simulation of the same tasks.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs)] // a wrong index must stop the test
 
 use pil::response::{PeriodicTask, load, worst_response_ns};
 use rand_xoshiro::SplitMix64;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 
-/// Priority, period, cost.
+/// Makes tasks from rows of priority, period and cost.
 fn tasks(rows: &[(u8, u64, u64)]) -> Vec<PeriodicTask> {
     let task =
         |&(priority, period_ns, cost_ns)| PeriodicTask { priority, period_ns, jitter_ns: 0, cost_ns, blocking_ns: 0 };
@@ -16,8 +16,8 @@ fn responses(tasks: &[PeriodicTask]) -> Vec<Option<u64>> {
     (0..tasks.len()).map(|index| worst_response_ns(tasks, index)).collect()
 }
 
-/// Burns and Wellings, Real-Time Systems and Programming Languages: periods 7, 12, 20, costs 3, 3, 5 respond within 3,
-/// 6 and 20; and 80, 40, 20 with 40, 10, 5 within 80, 15 and 5, at a load of 1.
+/// Examples of Burns and Wellings, Real-Time Systems and Programming Languages. Periods 7, 12, 20 and costs 3, 3, 5
+/// give responses 3, 6, 20. Periods 80, 40, 20 and costs 40, 10, 5 give responses 80, 15, 5 at a load of 1.
 #[test]
 fn textbook_examples() {
     assert_eq!(responses(&tasks(&[(1, 7, 3), (2, 12, 3), (3, 20, 5)])), [Some(3), Some(6), Some(20)]);
@@ -26,8 +26,8 @@ fn textbook_examples() {
     assert!((load(&full) - 1.0).abs() < 1e-12);
 }
 
-/// Lehoczky 1990: periods 70 and 100, costs 26 and 62. The first seven responses of the second are 114, 102, 116, 104,
-/// 118, 106, 94: the fifth is the worst.
+/// Lehoczky 1990: periods 70 and 100, costs 26 and 62. The first seven responses of the second task are 114, 102, 116,
+/// 104, 118, 106, 94: the fifth is the worst.
 #[test]
 fn the_worst_instance_need_not_be_the_first() {
     assert_eq!(responses(&tasks(&[(1, 70, 26), (2, 100, 62)])), [Some(26), Some(118)]);
@@ -38,7 +38,7 @@ fn blocking_and_jitter_add() {
     let mut pair = tasks(&[(1, 10, 2), (2, 100, 5)]);
     pair[0].blocking_ns = 3;
     assert_eq!(responses(&pair), [Some(5), Some(7)]);
-    // Released up to 4 late, the first comes twice within 7.
+    // Released up to 4 late, the first task may run twice within 7.
     pair[0].jitter_ns = 4;
     assert_eq!(responses(&pair), [Some(9), Some(9)]);
 }
@@ -50,7 +50,7 @@ fn more_than_the_processor_has_no_bound() {
     assert_eq!(worst_response_ns(&[], 0), None);
 }
 
-/// Runs tasks from a common release, unit by unit, and returns the worst response of each.
+/// Simulates tasks with a common first release, one time unit after the other, and returns the worst response of each.
 fn simulated(tasks: &[PeriodicTask], end: u64) -> Vec<u64> {
     let mut waiting: Vec<Vec<(u64, u64)>> = vec![Vec::new(); tasks.len()];
     let mut worst = vec![0; tasks.len()];
@@ -71,7 +71,7 @@ fn simulated(tasks: &[PeriodicTask], end: u64) -> Vec<u64> {
     worst
 }
 
-/// With a common release and priorities of their own the analysis is exact.
+/// With a common first release and different priorities, the analysis is exact.
 #[test]
 fn random_tasks_respond_as_simulated() {
     let mut random = SplitMix64::seed_from_u64(1);
@@ -87,7 +87,7 @@ fn random_tasks_respond_as_simulated() {
         if load(&tasks) > 1.0 {
             continue;
         }
-        // The periods repeat together after 120.
+        // 120 is a common multiple of the periods.
         let simulated: Vec<_> = simulated(&tasks, 480).into_iter().map(Some).collect();
         assert_eq!(responses(&tasks), simulated, "{rows:?}");
         compared += 1;

@@ -1,4 +1,5 @@
-//! Times on the buses by hand, boards as `firmware/boards/` has them, and the tables of `docs/timing.md`.
+//! Checks bus times against manual calculations, the boards against `firmware/boards/`, and the tables of
+//! `docs/timing.md`.
 #![allow(
     clippy::expect_used,
     clippy::indexing_slicing,
@@ -31,8 +32,9 @@ fn the_page_has_the_tables() {
     assert_eq!(text, written, "cargo run --release -p pil --bin timing");
 }
 
-/// What the page promises: the motors' frame of a tick has gone out before the next one, except that a Pixracer whose
-/// two links are both full in both directions has no bound; on every board if all fetches hit.
+/// The page promises that a tick's motor frame is sent before the next tick. The only exception is a Pixracer with both
+/// links full in both directions, whose response has no bound. With all fetches hitting the cache, every board is in
+/// time.
 #[test]
 fn the_tick_is_in_time() {
     let work = Work::read(&read("docs/budgets.md")).unwrap();
@@ -47,8 +49,8 @@ fn the_tick_is_in_time() {
     }
 }
 
-/// What the page says of bytes: none is lost, but at twice the baud rate some can be on an STM32F4; and of half of it:
-/// only the links' task may be late then.
+/// The page says that at the default baud rate no byte is lost, but that at twice the rate bytes can be lost on an
+/// STM32F4. At half the rate only the links' task may be late.
 #[test]
 fn the_baud_rate_is_the_highest_that_loses_no_byte() {
     let work = Work::read(&read("docs/budgets.md")).unwrap();
@@ -70,7 +72,7 @@ fn row(name: &'static str, response_us: Option<u64>) -> TimingRow {
     TimingRow { name, task, deadline_ns: Some(10_000), response_ns: response_us.map(|response_us| 1000 * response_us) }
 }
 
-/// Late rows fail the check unless they are known, and no later than known; what is known and in time does, too.
+/// Late rows fail the check unless they are known and no later than known. A known row that is in time fails it, too.
 #[test]
 fn what_is_known_is_not_loosened() {
     let known = |most_us, at_best| KnownLateness { row: "byte", most_us, at_best, reason: "" };
@@ -94,7 +96,7 @@ fn what_is_known_is_not_loosened() {
     assert_eq!(gone, ["byte: known to be late, and no row"]);
 }
 
-/// A UART of the STM32F4 keeps one byte (RM0090, 30.3.3), of the STM32H743 sixteen (RM0433, 48.3).
+/// A UART of the STM32F4 keeps one byte (RM0090, 30.3.3), one of the STM32H743 sixteen (RM0433, 48.3).
 #[test]
 fn uarts_keep_what_their_manuals_say() {
     let kept: Vec<_> = BOARDS.iter().map(|board| (board.name, board.uart_keeps)).collect();
@@ -111,19 +113,20 @@ fn a_page_that_lacks_a_row_is_refused() {
 
 #[test]
 fn buses_by_hand() {
-    // Data sheets' examples: 14 bytes and a register at 1 MHz; a byte of 921,600 baud.
+    // 15 bytes at 1 MHz: 14 data bytes and a register. A byte at 921,600 baud.
     assert_eq!(spi_ns(15, 1_000_000), 120_000);
     assert_eq!(RateOfUart::Link.byte_ns(921_600), 10_850);
     // UM10204: start, address, register, start, address, one byte, stop: 39 bits of 2.5 us.
     assert_eq!(i2c_ns(4, 3), 97_500);
-    // RM0090's baud rates: f/2 to f/256.
+    // Prescalers in RM0090: f/2 to f/256.
     assert_eq!(spi_clock_hz(84_000_000, 24_000_000), 21_000_000);
     assert_eq!(spi_clock_hz(84_000_000, 42_000_000), 42_000_000);
     assert_eq!(spi_clock_hz(84_000_000, 1_000_000), 656_250);
     assert_eq!(spi_clock_hz(84_000_000, 1_000), 328_125);
 }
 
-/// ICM-42688-P: temperature, force and rates (14 bytes) and a byte of its set-up, each behind a register.
+/// A reading of an ICM-42688-P: temperature, force and rates (14 bytes) and a configuration byte, each after a register
+/// address.
 #[test]
 fn a_script_is_walked() {
     let board = BOARDS.iter().find(|board| board.name == "stm32h743").unwrap();
@@ -144,7 +147,7 @@ fn limits_of_the_cores() {
     assert!(CORTEX_M7.per_instruction(CycleLimit::Best) >= 0.5);
 }
 
-/// Every board has its times, with its links and parts.
+/// Every board in `firmware/boards/` has times, with its links and parts.
 #[test]
 fn boards_are_those_of_the_project() {
     let within = |path: &Path| fs::read_dir(path).unwrap().map(|entry| entry.unwrap().path()).collect::<Vec<_>>();
@@ -175,7 +178,7 @@ fn boards_are_those_of_the_project() {
     }
 }
 
-/// Types of parts begin with a letter in upper case and have digits.
+/// Returns true for the name of a part's type: it begins with an upper-case letter and has digits.
 fn is_part(word: &str) -> bool {
     word.starts_with(|c: char| c.is_ascii_uppercase())
         && word.contains(|c: char| c.is_ascii_digit())
@@ -183,7 +186,7 @@ fn is_part(word: &str) -> bool {
         && !word.ends_with("Registers")
 }
 
-/// `Icm42688p` of ICM-42688-P.
+/// Returns the type name of a part, such as `Icm42688p` for ICM-42688-P.
 fn name_in_code(part: &str) -> &str {
     match part {
         "ICM-42688-P" => "Icm42688p",

@@ -1,5 +1,5 @@
-//! Measures the firmware's cost and writes the table of `docs/budgets.md`; with `--check`, searches for the worst tick
-//! from fewer seeds and writes nothing. Fails if a budget is exceeded. Both images must have been built.
+//! Measures the firmware's cost and writes the table of `docs/budgets.md`. With `--check`, it searches for the worst
+//! tick from fewer seeds and writes nothing. Fails if a budget is exceeded. Both images must have been built.
 
 use afbc_hil::Station;
 use pil::beside::Beside;
@@ -10,37 +10,39 @@ use pil::{Emulator, Error, Image};
 use std::path::Path;
 use std::process::ExitCode;
 
-/// The page with the table.
+/// Page with the table.
 const DOCUMENT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/budgets.md");
 const BEGIN: &str = "<!-- budgets: written by cargo run --release -p pil --bin budgets -->\n";
 const END: &str = "<!-- end -->\n";
 
-/// Name of the function that ends the program for the chip's boot loader.
+/// Functions that end the program to start the chip's boot loader.
 const BOOT_LOADER: [&str; 2] = ["chip_stm32::boot_loader::enter", "cortex_m::asm::bootload"];
-/// Functions of the start that run before the links' task is spawned (`firmware::run`), and the interrupt of its
-/// executor, which until then has nothing to do.
+/// Start-up functions that run before the links' task is spawned (`firmware::run`), and the interrupt of that task's
+/// executor, which has nothing to do until then.
 const BEFORE_LINKS: [&str; 2] = ["firmware::read", "firmware::control::make"];
 const LINKS: &str = "CAN2_RX0";
 /// Name of the control tick's function.
 const TICK: &str = "firmware::control::tick";
 
-/// Interrupts whose tasks are not needed in flight: a panic in one of them ends that task alone.
+/// Interrupts whose tasks are not needed in flight: a panic in such a task ends only that task.
 const DISPENSABLE: [&str; 3] = ["CAN2_RX0", "CAN2_RX1", "OTG_FS"];
-/// Panics in the motors' output, all in its driver (`docs/budgets.md` lists them).
+/// Number of panics in the motors' output, all in its driver (`docs/budgets.md` lists them).
 const VITAL_PANICS: u64 = 6;
 
-/// Searches for the worst tick, each from another seed, and their size: what one of them finds is partly luck.
+/// Number of searches for the worst tick, each from another seed, and candidates per search: the result of a single
+/// search is partly luck.
 const SEARCHES: u64 = 8;
-/// Those of `--check`: on 2026-11-27 they found all but three instructions of what eight did, in a quarter of the time.
+/// Number of searches with `--check`. On 2026-11-27 two searches came within three instructions of the result of eight,
+/// in a quarter of the time.
 const SEARCHES_OF_CHECK: u64 = 2;
 const CANDIDATES: u64 = 500;
 
-/// One line of the table.
+/// A line of the table.
 struct Budget {
     what: &'static str,
     unit: &'static str,
     measured: u64,
-    /// The largest value allowed; none if the figure is only informative.
+    /// Largest value allowed; none if the figure is only informative.
     most: Option<u64>,
 }
 
@@ -55,7 +57,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// True if every budget is met.
+/// Returns true if every budget is met.
 fn run() -> Result<bool, Error> {
     let flight = Linked::read(&Image::Flight.find()?)?;
     let tick = flight.reach(TICK)?;
@@ -67,7 +69,7 @@ fn run() -> Result<bool, Error> {
     }
     println!("calls through a pointer, taken for the executor's waker: {}", tick.indirect.join(", "));
 
-    // The deepest chain of start-up, and on top of it one interrupt of each level.
+    // The deepest call chain of start-up, plus one interrupt of each level.
     let start_up = flight.reach("main")?;
     let callers: Vec<_> =
         start_up.indirect.iter().map(String::as_str).filter(|name| !BOOT_LOADER.contains(name)).collect();
@@ -75,7 +77,7 @@ fn run() -> Result<bool, Error> {
         let callers = callers.join(", ");
         return Err(Error::Protocol(format!("start-up calls through a pointer, which no proof follows, in {callers}")));
     }
-    // Before the links' task is there, and from then on.
+    // Stack of start-up before the links' task exists, and afterwards.
     let before = start_up.stack_bytes;
     let after = flight.reach_without("main", &BEFORE_LINKS)?.stack_bytes;
     let mut nested = [before, after];
@@ -151,7 +153,7 @@ fn run() -> Result<bool, Error> {
     Ok(budgets.iter().all(|budget| budget.most.is_none_or(|most| budget.measured <= most)))
 }
 
-/// Returns the instructions of the worst tick of all searches.
+/// Returns the instructions of the worst tick that any search found.
 fn worst(source: StateSource, searches: u64) -> Result<u64, Error> {
     let mut worst = 0;
     for seed in 1..=searches {
@@ -165,7 +167,7 @@ fn worst(source: StateSource, searches: u64) -> Result<u64, Error> {
     Ok(worst)
 }
 
-/// Returns least, mean and worst instructions of the ticks with the motors on, and the deepest stack \[bytes\].
+/// Returns the least, mean and most instructions of a tick with motors on, and the deepest stack \[bytes\].
 fn fly() -> Result<[u64; 4], Error> {
     let mut emulator = Emulator::start(&Image::Pil.find()?)?;
     let mut station = Station::default();
@@ -200,7 +202,7 @@ fn table(budgets: &[Budget]) -> String {
     table
 }
 
-/// Writes the table into the page, between its markers.
+/// Writes the table between the markers of the page.
 fn write(table: &str) -> Result<(), Error> {
     let path = Path::new(DOCUMENT);
     let text = std::fs::read_to_string(path)?;

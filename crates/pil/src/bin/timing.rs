@@ -1,12 +1,12 @@
 //! Computes the worst response times of every board and writes the tables of `docs/timing.md`; with `--check`, compares
-//! them. Fails if one exceeds its deadline and is not known to, or is worse than known.
+//! them. Fails if a response exceeds its deadline and is not known to, or is later than known.
 
 use pil::Error;
 use pil::timing::{page, reports};
 use std::path::Path;
 use std::process::ExitCode;
 
-/// The pages with the counts, and with the times.
+/// Page with the instruction counts, and page with the times.
 const BUDGETS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/budgets.md");
 const DOCUMENT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/timing.md");
 
@@ -21,7 +21,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// True if every response is within its deadline, or known not to be.
+/// Returns true if every response is within its deadline or known to be late.
 fn run() -> Result<bool, Error> {
     let reports = reports(&std::fs::read_to_string(BUDGETS)?)?;
     let mut wrong: Vec<_> = reports.iter().flat_map(|report| report.wrong.iter().cloned()).collect();

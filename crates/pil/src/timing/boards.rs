@@ -1,4 +1,4 @@
-//! What the times of each board depend on: its core, its links and its parts. `tests/timing.rs` compares it with
+//! Data of each board on which its times depend: its core, links and parts. `tests/timing.rs` compares the data with
 //! `firmware/boards/`.
 
 use super::bus::{Script, Wire, script};
@@ -13,24 +13,24 @@ use afbc_drivers::mpu::{Icm20602, Icm20608, Icm20689, Mpu6000, Mpu6500, Mpu9250}
 use afbc_drivers::ms5611::Ms5611;
 use afbc_drivers::qmc5883l::Qmc5883l;
 
-/// Baud of a GNSS receiver, the highest that is tried.
+/// Baud rate of a GNSS receiver: the highest that is tried.
 const GNSS_BAUD: u64 = 230_400;
-/// Bits of a byte on a line: start, eight, stop.
+/// Bits per byte on a line: start, eight data bits, stop.
 const BYTE_BITS: u64 = 10;
-/// Bytes that a UART of the STM32H743 keeps in its FIFO (RM0433, 48.3), which `embassy-stm32` turns on.
+/// FIFO size of a UART of the STM32H743 \[bytes\] (RM0433, 48.3); `embassy-stm32` turns the FIFO on.
 const FIFO_H743: u64 = 16;
 
-/// Bytes of a UART, each with an interrupt.
+/// Byte rate of a UART, with an interrupt for each byte.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RateOfUart {
-    /// A link, at the baud rate of SER_TEL1_BAUD.
+    /// A link, with the baud rate of SER_TEL1_BAUD.
     Link,
     /// A GNSS receiver.
     Gnss,
 }
 
 impl RateOfUart {
-    /// Returns the time of a byte \[ns\], where links have this baud rate.
+    /// Returns the time per byte \[ns\]; `link_baud` is the links' baud rate.
     #[must_use]
     pub fn byte_ns(self, link_baud: u64) -> u64 {
         let baud = match self {
@@ -47,60 +47,60 @@ pub fn default_baud() -> u64 {
     afbc_onboard::Link::default().baud.into()
 }
 
-/// The boards that are a table, with every part that one of them may have.
+/// Name of the boards defined by a pin table, which count as one board with all of their parts.
 pub const TABLES: &str = "flight controllers with an STM32F405";
 
 /// A kind of board.
 #[derive(Debug)]
 pub struct BoardTimes {
-    /// Name of the board, as in `firmware/boards/`; or what boards that are a table have in common ([`TABLES`]).
+    /// Folder name in `firmware/boards/`, or [`TABLES`] for the boards defined by a pin table.
     pub name: &'static str,
-    /// Its core.
+    /// Core of the board.
     pub core: &'static CoreCycles,
-    /// Links by UART.
+    /// Number of links by UART.
     pub links: usize,
-    /// Bytes that a UART keeps until its interrupt has run, beside the one that arrives.
+    /// Bytes that a UART keeps until its interrupt runs, in addition to the byte that is arriving.
     pub uart_keeps: u64,
-    /// True if it has sensors.
+    /// True if the board has sensors.
     pub senses: bool,
-    /// Timers of motors.
+    /// Number of timers with motors.
     pub timers: u64,
-    /// True if it listens to motor controllers that answer on their lines.
+    /// True if the board receives the motor controllers' answers (bidirectional DSHOT).
     pub answers: bool,
-    /// Instructions of the sampling task with all that it can reach, each once.
+    /// Instructions of the sampling task and everything that it can reach, each counted once.
     pub sampling: u64,
-    /// The same of the slow sensors' task.
+    /// Instructions of the slow sensors' task and everything that it can reach, each counted once.
     pub aiding: u64,
-    /// Readings of its parts; of candidates all.
+    /// Functions that return the readings of the board's parts, including all candidates.
     parts: &'static [fn() -> Script],
-    /// The first so many of them are read by the sampling task.
+    /// Number of parts, from the first on, that the sampling task reads.
     pub sampled: usize,
-    /// True if only one of the sampled parts is there.
+    /// True if only one of the sampled parts is on the board.
     pub is_one: bool,
-    /// Rows that may be late.
+    /// Rows that are known to be late.
     pub known: &'static [KnownLateness],
 }
 
 impl BoardTimes {
-    /// Returns the readings of its parts.
+    /// Returns the readings of the board's parts.
     #[must_use]
     pub fn scripts(&self) -> Vec<Script> {
         self.parts.iter().map(|part| part()).collect()
     }
 }
 
-/// APB2 of an STM32F405 or F427, which feeds SPI1 \[Hz\].
+/// Clock of APB2 on an STM32F405 or F427, which feeds SPI1 \[Hz\].
 const SPI1_HZ: u32 = 84_000_000;
-/// APB1, which feeds SPI2 \[Hz\].
+/// Clock of APB1, which feeds SPI2 \[Hz\].
 const SPI2_HZ: u32 = 42_000_000;
-/// SPI of the STM32H743 \[Hz\]: the board divides it by eight.
+/// SPI input clock on the STM32H743 \[Hz\]: the board divides it by eight.
 const SPI_H743_HZ: u32 = 25_000_000;
 
 macro_rules! parts {
     ($($part:ty: $wire:expr),+ $(,)?) => { &[$(|| script::<$part>($wire)),+] };
 }
 
-/// All boards. The instructions of tasks are those of the images of 464c7b1.
+/// All boards. The tasks' instruction counts are from the images of commit 464c7b1.
 pub static BOARDS: [BoardTimes; 4] = [
     BoardTimes {
         name: "stm32f405",

@@ -1,23 +1,23 @@
-//! Times on the buses of sensors and motors.
+//! Computes times on the buses of sensors and motors.
 
 use afbc_drivers::{SensorPart, Step};
 use afbc_flight_core::dshot::DshotRate;
 
-/// Bits of a DSHOT frame, and one without a pulse that ends it.
+/// Bits of a DSHOT frame, plus one without a pulse at the end.
 const FRAME_BITS: u64 = 17;
-/// Time of a frame \[ns\].
+/// Time of a DSHOT frame \[ns\].
 pub(super) const FRAME_NS: u64 = (FRAME_BITS * 1_000_000_000).div_ceil(DshotRate::Dshot600 as u64);
 /// Clock of I2C \[Hz\].
 const I2C_HZ: u32 = 400_000;
 
-/// One reading of a part.
+/// Bus traffic of one reading of a part.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Script {
-    /// Its name.
+    /// Name of the part.
     pub part: &'static str,
-    /// Bytes on the bus, addresses included.
+    /// Bytes on the bus, including addresses.
     pub bytes: u64,
-    /// Transfers.
+    /// Number of transfers.
     pub transfers: u64,
     /// Clock of the bus \[Hz\].
     pub clock_hz: u32,
@@ -25,16 +25,17 @@ pub struct Script {
     pub time_ns: u64,
 }
 
-/// How a part is wired.
+/// Bus of a part.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Wire {
-    /// SPI, fed with a clock \[Hz\].
+    /// SPI with this input clock \[Hz\].
     Spi(u32),
     /// I2C.
     I2c,
 }
 
-/// Returns the fastest clock that a prescaler of 2, 4 ... 256 makes of `kernel_hz`, not above `most_hz` if possible.
+/// Returns the fastest clock not above `most_hz` that a prescaler of 2, 4 ... 256 makes from `kernel_hz`; the slowest
+/// clock if all are above.
 #[must_use]
 pub fn spi_clock_hz(kernel_hz: u32, most_hz: u32) -> u32 {
     (1..8).map(|power| kernel_hz >> power).find(|hz| *hz <= most_hz).unwrap_or(kernel_hz >> 8)
@@ -46,14 +47,14 @@ pub fn spi_ns(bytes: u64, clock_hz: u32) -> u64 {
     (bytes * 8 * 1_000_000_000).div_ceil(clock_hz.into())
 }
 
-/// Returns the time of a transfer over I2C \[ns\]: `bytes` with addresses, nine bits each, and `conditions`: start,
-/// repeated start, stop, a bit each.
+/// Returns the time of an I2C transfer \[ns\]. Each of the `bytes`, addresses included, takes nine bits. Each of the
+/// `conditions` (start, repeated start, stop) takes one.
 #[must_use]
 pub fn i2c_ns(bytes: u64, conditions: u64) -> u64 {
     ((bytes * 9 + conditions) * 1_000_000_000).div_ceil(I2C_HZ.into())
 }
 
-/// Walks the longest cycle of a part that is ready: its script, and one look at a register.
+/// Adds up the longest cycle of a part that is ready, plus one read of a register.
 pub(super) fn script<P: SensorPart>(wire: Wire) -> Script {
     let format = P::SPI;
     let clock_hz = match (wire, format) {
@@ -68,7 +69,7 @@ pub(super) fn script<P: SensorPart>(wire: Wire) -> Script {
                 let bytes = 1 + data + if is_read { dummies } else { 0 };
                 (bytes, spi_ns(bytes, clock_hz))
             }
-            // Address and register; the address again before the answer.
+            // Address and register; a read sends the address again before the answer.
             Wire::I2c => {
                 let bytes = 2 + data + u64::from(is_read);
                 (bytes, i2c_ns(bytes, 2 + u64::from(is_read)))

@@ -1,37 +1,37 @@
-//! Cycles that a core takes for an instruction, at best and at most.
+//! Cycles that a core takes per instruction, at best and at most.
 
-/// Which of the two limits.
+/// Limit for which cycles are computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CycleLimit {
-    /// Every fetch hits a cache, nothing waits for the result before it.
+    /// Every fetch hits a cache, and no instruction waits for a previous result.
     Best,
-    /// No fetch hits a cache, everything waits.
+    /// No fetch hits a cache, and every instruction waits.
     Bound,
 }
 
-/// Shares of kinds of instructions, of a sum of 1.
+/// Shares of the kinds of instructions; 1 is all instructions.
 #[derive(Clone, Copy, Debug)]
 pub struct Mix {
-    /// From memory.
+    /// Share of loads from memory.
     pub load: f64,
-    /// Of these, from constants between the code.
+    /// Share of loads from constants in the code, which `load` includes.
     pub literal: f64,
-    /// To memory.
+    /// Share of stores to memory.
     pub store: f64,
-    /// Of several registers.
+    /// Share of loads and stores of several registers.
     pub multiple: f64,
-    /// Multiply and add, single precision.
+    /// Share of multiplications and additions in single precision.
     pub multiply_add: f64,
-    /// VDIV.F32 and VSQRT.F32.
+    /// Share of VDIV.F32 and VSQRT.F32.
     pub divide: f64,
-    /// Branches and calls, as if all were taken.
+    /// Share of branches and calls, all counted as taken.
     pub branch: f64,
-    /// Mean length \[bytes\].
+    /// Mean length of an instruction \[bytes\].
     pub bytes: f64,
 }
 
-/// Of the 45,156 instructions that the control tick of `speedybee-f405-v4` can reach; the other images differ by 1 %.
-/// 71 % have four bytes.
+/// Mix of the 45,156 instructions that the control tick of `speedybee-f405-v4` can reach; the other images differ by 1
+/// %. 71 % of the instructions have four bytes.
 pub(super) const MIX: Mix = Mix {
     load: 0.20,
     literal: 0.02,
@@ -43,7 +43,7 @@ pub(super) const MIX: Mix = Mix {
     bytes: 3.43,
 };
 
-/// Cycles of each kind.
+/// Cycles per instruction of each kind.
 #[derive(Clone, Copy, Debug)]
 struct Kinds {
     load: f64,
@@ -55,30 +55,32 @@ struct Kinds {
     other: f64,
 }
 
-/// A core with its flash.
+/// Cycles and clock of a core with its flash.
 #[derive(Debug)]
 pub struct CoreCycles {
-    /// Its name.
+    /// Name of the core.
     pub name: &'static str,
-    /// Its clock \[Hz\].
+    /// Clock of the core \[Hz\].
     pub hz: u64,
     best: Kinds,
     bound: Kinds,
-    /// What a fetch brings \[bytes\], and how long the core waits for it \[cycles\].
+    /// Size of a flash line \[bytes\], and the core's wait for it \[cycles\].
     line_bytes: f64,
     line_wait: f64,
     /// True if the next line is fetched while one is executed.
     prefetches: bool,
-    /// True if its cache holds more code than runs between two bytes of a link, and so the interrupt for them.
+    /// True if the cache holds more code than runs between two bytes of a link, so that the byte interrupt's code stays
+    /// cached.
     keeps_interrupts: bool,
-    /// Entry and exit of an interrupt, at best and at most \[cycles\].
+    /// Cycles of entry and exit of an interrupt, at best and at most.
     exception: [u64; 2],
 }
 
-/// Cortex-M4F with the STM32F405's flash at five wait states, in lines of 16 bytes, with its prefetch (RM0090, 3.5.2;
-/// off on chips of revision A). Its cache holds 1 KiB, less than a tick runs between two interrupts. Loads take 1 or 2
-/// cycles, VDIV and VSQRT 14, VFMA 3, a taken branch 1 and 1 to 3 (Arm 100166, tables 3-1 and 7-1); several registers
-/// one each, here four. Entry and exit take 12 each and, with the FPU's registers, 17 more.
+/// Cortex-M4F with the STM32F405's flash: five wait states, lines of 16 bytes, prefetch (RM0090, 3.5.2; off on chips of
+/// revision A). The cache holds 1 KiB, less code than a tick runs between two interrupts. Cycles are from Arm 100166,
+/// tables 3-1 and 7-1: a load takes 1 or 2, VDIV and VSQRT 14, VFMA 3, a taken branch 1 plus 1 to 3. A load or store of
+/// several registers takes one cycle per register, here four. Interrupt entry and exit take 12 each, and 17 more each
+/// with the FPU's registers.
 pub static CORTEX_M4F: CoreCycles = CoreCycles {
     name: "Cortex-M4F, flash with 5 wait states and prefetch",
     hz: 168_000_000,
@@ -91,10 +93,10 @@ pub static CORTEX_M4F: CoreCycles = CoreCycles {
     exception: [24, 64],
 };
 
-/// Cortex-M7 of the STM32H743 with its instruction cache; its data cache is off. Arm gives no cycles: at best half a
-/// cycle for what two pipelines share; at most single issue, a branch mispredicted, a load of 7 cycles (half of them
-/// from the AXI memory at half the clock, half from the stack, which has none) and 16 for a line of 32 bytes from the
-/// flash. These are estimates.
+/// Cortex-M7 of the STM32H743 with instruction cache, without data cache. Arm publishes no cycles, so these are
+/// estimates. At best, dual issue takes half a cycle per instruction. At most, instructions issue singly, every branch
+/// is mispredicted, and a load takes 7 cycles: half of the loads are from AXI memory at half the clock, half from the
+/// stack without waiting. A flash line of 32 bytes takes 16 cycles.
 pub static CORTEX_M7: CoreCycles = CoreCycles {
     name: "Cortex-M7, instruction cache, no data cache",
     hz: 400_000_000,
@@ -108,7 +110,7 @@ pub static CORTEX_M7: CoreCycles = CoreCycles {
 };
 
 impl CoreCycles {
-    /// Returns the cycles of an instruction of a loop that its cache holds.
+    /// Returns the mean cycles per instruction in a loop that the cache holds.
     #[must_use]
     pub fn per_cached(&self, limit: CycleLimit) -> f64 {
         let Kinds { load, store, multiple, multiply_add, divide, branch, other } = match limit {
@@ -125,8 +127,8 @@ impl CoreCycles {
             + rest * other
     }
 
-    /// Returns the cycles of an instruction: at most, with a wait for each branch, each literal and each line, of which
-    /// a prefetch takes the time of the line before it, at one cycle an instruction.
+    /// Returns the mean cycles per instruction. The bound adds a wait for each branch, literal and flash line. A
+    /// prefetch shortens a line's wait by the time of the line before, at one cycle per instruction.
     #[must_use]
     pub fn per_instruction(&self, limit: CycleLimit) -> f64 {
         let line = self.line_bytes / MIX.bytes;
@@ -135,20 +137,20 @@ impl CoreCycles {
         self.per_cached(limit) + if limit == CycleLimit::Bound { waits } else { 0.0 }
     }
 
-    /// Returns the time of instructions, and of those in loops \[ns\].
+    /// Returns the time of `straight` instructions outside of loops and `looped` ones in cached loops \[ns\].
     #[must_use]
     pub fn time_ns(&self, straight: u64, looped: u64, limit: CycleLimit) -> u64 {
         let cycles = straight as f64 * self.per_instruction(limit) + looped as f64 * self.per_cached(limit);
         (cycles * 1e9 / self.hz as f64).ceil() as u64
     }
 
-    /// Returns the time of the instructions of an interrupt for a byte \[ns\].
+    /// Returns the time of a byte interrupt's instructions \[ns\].
     #[must_use]
     pub fn byte_ns(&self, instructions: u64, limit: CycleLimit) -> u64 {
         if self.keeps_interrupts { self.time_ns(0, instructions, limit) } else { self.time_ns(instructions, 0, limit) }
     }
 
-    /// Returns the time of entry to and exit from an interrupt \[ns\].
+    /// Returns the time of an interrupt's entry and exit \[ns\].
     #[must_use]
     pub fn exception_ns(&self, limit: CycleLimit) -> u64 {
         let [best, bound] = self.exception;

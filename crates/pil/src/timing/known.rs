@@ -1,17 +1,17 @@
-//! Rows that are known to be late in the worst case, how late at most, and why that is borne.
+//! Rows that are known to be late in the worst case, with their largest response and the reason for accepting it.
 
 use core::fmt::{Display, Formatter, Result};
 
 /// A row that may be late in the worst case.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct KnownLateness {
-    /// The row's name.
+    /// Name of the row.
     pub row: &'static str,
-    /// Its response at most \[us\]; none if it has no bound.
+    /// Largest accepted response \[us\]; none if the response has no bound.
     pub most_us: Option<u64>,
-    /// True if it is late with every fetch a hit, too.
+    /// True if the row is late even if every fetch hits the cache.
     pub at_best: bool,
-    /// Why that is borne.
+    /// Reason for accepting the lateness.
     pub reason: &'static str,
 }
 
@@ -26,10 +26,10 @@ const fn late(row: &'static str, most_us: Option<u64>, reason: &'static str) -> 
     KnownLateness { row, most_us, at_best: false, reason }
 }
 
-/// Of every board but the Pixracer.
+/// Known lateness of every board but the Pixracer.
 pub(super) static COMMON: [KnownLateness; 1] = [LATE_LINKS];
 
-/// Of the Pixracer, with two links and three parts on one SPI.
+/// Known lateness of the Pixracer, which has two links and three parts on one SPI.
 pub(super) static PIXRACER: [KnownLateness; 4] = [
     late("control tick, to the motors' DMA", None, FULL),
     late("end of the motors' DMA", None, FULL),

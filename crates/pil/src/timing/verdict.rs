@@ -1,9 +1,9 @@
-//! What of the rows is late, and not known to be.
+//! Compares late rows with the known ones.
 
 use super::known::KnownLateness;
 use super::work::TimingRow;
 
-/// Returns a line on each row that is late without being known, later than known, or known and in time.
+/// Returns a line for each row that is late but not known to be, later than known, or known to be late but in time.
 #[must_use]
 pub fn verdicts(known: &[KnownLateness], best: &[TimingRow], bound: &[TimingRow]) -> Vec<String> {
     let mut wrong = Vec::new();
@@ -14,7 +14,7 @@ pub fn verdicts(known: &[KnownLateness], best: &[TimingRow], bound: &[TimingRow]
             (false, Some(_)) => wrong.push(format!("{name}: known to be late, and is in time: delete that")),
             (true, None) => wrong.push(format!("{name}: over its deadline")),
             (true, Some(known)) => {
-                // Without a bound it is later than any.
+                // A response without a bound is later than any limit.
                 let is_later = known
                     .most_us
                     .is_some_and(|most_us| bound.response_ns.is_none_or(|response_ns| response_ns > 1000 * most_us));

@@ -1,4 +1,4 @@
-//! What runs on a board, how often, for how long, and how long it holds interrupts off.
+//! Lists the code that runs on a board: its period, its cost, and how long it disables interrupts.
 
 use super::boards::{BoardTimes, RateOfUart};
 use super::bus::FRAME_NS;
@@ -6,7 +6,7 @@ use super::cycles::{CoreCycles, CycleLimit};
 use crate::Error;
 use crate::response::{PeriodicTask, worst_response_ns};
 
-/// Priorities, as `firmware::executors::priority` has them, divided by 16.
+/// Priorities of `firmware::executors::priority`, divided by 16.
 mod priority {
     pub(super) const TIME: u8 = 1;
     pub(super) const UART: u8 = 2;
@@ -18,40 +18,41 @@ mod priority {
     pub(super) const HOUSEKEEPING: u8 = 12;
 }
 
-/// A period of the control tick \[ns\].
+/// Period of the control tick \[ns\].
 const TICK_NS: u64 = 1_000_000;
-/// End of a DMA transfer, with the waker: their code in the image, each instruction once.
+/// Instructions at the end of a DMA transfer, including the waker: their code in the image, each instruction counted
+/// once.
 const DMA_END: u64 = 120;
-/// I2C's interrupt for an event, likewise.
+/// Instructions of I2C's event interrupt: their code in the image, each instruction counted once.
 const I2C_EVENT: u64 = 40;
-/// Events of a transfer: its start, its addresses, its end.
+/// Events per I2C transfer: its start, its addresses, its end.
 const I2C_EVENTS: u64 = 4;
 /// Period of the fastest slow sensor, the compass \[ns\].
 const AIDING_NS: u64 = 10_000_000;
-/// Results of ticks that wait for the links' task, at most.
+/// Largest number of tick results that wait for the links' task.
 const QUEUE: u64 = 24;
 
-/// Instructions, from `docs/budgets.md`.
+/// Instruction counts from `docs/budgets.md`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Work {
-    /// The limit of the control tick.
+    /// Largest number of instructions allowed in the control tick.
     pub tick: u64,
-    /// The same with the estimate.
+    /// Largest number of instructions allowed in the control tick with the estimate.
     pub estimating: u64,
-    /// DSHOT frames of a timer's motors, counted, as what follows.
+    /// Instructions counted in encoding the DSHOT frames of a timer's motors.
     pub dshot: u64,
-    /// SysTick's interrupt.
+    /// Instructions counted in SysTick's interrupt.
     pub systick: u64,
-    /// A UART's interrupt.
+    /// Instructions counted in a UART's interrupt.
     pub byte: u64,
-    /// The links' task, woken once.
+    /// Instructions counted in one run of the links' task.
     pub wake: u64,
 }
 
-/// A time with interrupts off.
+/// A section of code with interrupts disabled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Section {
-    /// What it is for.
+    /// Purpose of the section.
     pub what: &'static str,
     /// Priority of the task.
     pub priority: u8,
@@ -61,28 +62,28 @@ pub struct Section {
     pub looped: u64,
 }
 
-/// A line of a board's table.
+/// A row of a board's table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TimingRow {
-    /// What runs.
+    /// Name of the task or interrupt.
     pub name: &'static str,
-    /// When.
+    /// Priority, period and cost.
     pub task: PeriodicTask,
     /// Longest response allowed \[ns\]; none if nothing depends on it.
     pub deadline_ns: Option<u64>,
-    /// Longest response, with what follows it on a bus \[ns\]; none without a bound.
+    /// Longest response, including the following bus transfer \[ns\]; none without a bound.
     pub response_ns: Option<u64>,
 }
 
 impl TimingRow {
-    /// True if it may exceed its deadline, or has one and no bound.
+    /// Returns true if the row has a deadline and its response may exceed the deadline or has no bound.
     #[must_use]
     pub fn is_late(&self) -> bool {
         self.deadline_ns.is_some_and(|deadline| self.response_ns.is_none_or(|response| response > deadline))
     }
 }
 
-/// What a row begins with: priority, period, instructions, times of interrupts, time on a bus that follows, deadline.
+/// Input of a row. `interrupts` is the number of interrupt entries, `bus_ns` the time of the bus transfer that follows.
 struct Entry {
     name: &'static str,
     priority: u8,
@@ -93,18 +94,19 @@ struct Entry {
     deadline_ns: Option<u64>,
 }
 
-/// Instructions to read the answers of two of a timer's motor controllers from their samples, whatever those are: 4,700
-/// of an x86-64 at most (callgrind, 2026-11-28); and how long they are sampled \[ns\].
+/// Instructions for decoding the answers of two of a timer's motor controllers from any samples, and sampling time
+/// \[ns\]. On an x86-64, decoding takes at most 4,700 instructions (callgrind, 2026-11-28).
 const ANSWERS: u64 = 5_000;
 const SAMPLED_NS: u64 = 75_000;
-/// The first fix in double precision: twice sine and cosine, 4,817 each, two square roots, some 40 operations.
+/// Instructions for the first fix in double precision: two sine and cosine pairs with 4,817 each, two square roots,
+/// some 40 operations.
 const FIRST_FIX: u64 = 13_000;
 
 impl Work {
-    /// Reads the table of the page.
+    /// Reads the instruction counts from the page's table.
     ///
     /// # Errors
-    /// If it lacks a row.
+    /// Fails if the table lacks a row.
     pub fn read(budgets: &str) -> Result<Self, Error> {
         let cell = |what: &str, column: usize| {
             let row = budgets.lines().find(|line| line.starts_with(&format!("| {what} |")));
@@ -122,18 +124,18 @@ impl Work {
         })
     }
 
-    /// Returns the longest times with interrupts off on a board.
+    /// Returns the longest sections with interrupts disabled on a board.
     #[must_use]
     pub fn sections(&self, board: &BoardTimes) -> Vec<Section> {
         let mut sections = vec![
-            // A copy of 584 bytes.
+            // Copies 584 bytes.
             Section { what: "result of a tick, to the links", priority: priority::CONTROL, straight: 100, looped: 515 },
             Section { what: "timer of a task", priority: priority::HOUSEKEEPING, straight: 216, looped: 0 },
-            // A copy of 64 bytes to an odd address.
+            // Copies 64 bytes to an odd address.
             Section { what: "messages, to USB's ring", priority: priority::COMMS, straight: 200, looped: 233 },
         ];
         if board.senses {
-            // Copies of the frame of fixes, of 48 bytes, and of the origin.
+            // Copies the message of a fix, 48 bytes, and the origin.
             sections.push(Section {
                 what: "a fix, to stations",
                 priority: priority::AIDING,
@@ -144,7 +146,7 @@ impl Work {
         sections
     }
 
-    /// Returns the lines of a board's table, with links of this baud rate.
+    /// Returns the rows of a board's table for links of this baud rate.
     #[must_use]
     pub fn rows(&self, board: &BoardTimes, limit: CycleLimit, link_baud: u64) -> Vec<TimingRow> {
         let core = board.core;
@@ -188,7 +190,7 @@ impl Work {
             instructions: self.systick,
             interrupts: 1,
             bus_ns: 0,
-            // Its successor would be lost.
+            // If SysTick is later, the next one is lost.
             deadline_ns: Some(TICK_NS),
         }];
         let byte = |name, rate: RateOfUart, is_heard: bool| Entry {
@@ -198,7 +200,8 @@ impl Work {
             instructions: self.byte,
             interrupts: 1,
             bus_ns: 0,
-            // Then the one that arrives finds no place; the line waits for those sent.
+            // If a received byte's interrupt is later, the arriving byte has no room. A byte to send has no deadline,
+            // since the line just waits.
             deadline_ns: is_heard.then(|| board.uart_keeps * rate.byte_ns(link_baud)),
         };
         let links = [
@@ -220,7 +223,7 @@ impl Work {
             } else {
                 (times.sum(), transfers.sum())
             };
-            // Both ends of each transfer, and as many runs of the task.
+            // Two DMA ends per transfer, and one run of the task per transfer.
             entries.push(Entry {
                 name: "sampling, with its transfers",
                 priority: priority::SAMPLING,
@@ -249,7 +252,7 @@ impl Work {
                 instructions: tick + self.dshot * board.timers,
                 interrupts: 1,
                 bus_ns: FRAME_NS,
-                // The frame has gone out when the next tick begins.
+                // The frame must have been sent when the next tick begins.
                 deadline_ns: Some(TICK_NS),
             },
             Entry {
@@ -280,7 +283,7 @@ impl Work {
             instructions: self.wake,
             interrupts: 1,
             bus_ns: 0,
-            // Then results of ticks are dropped.
+            // If the links' task is later, tick results are dropped.
             deadline_ns: Some(QUEUE * TICK_NS),
         }]);
         entries.sort_by_key(|entry| entry.priority);
@@ -289,7 +292,7 @@ impl Work {
 }
 
 impl Section {
-    /// Returns how long it takes \[ns\].
+    /// Returns the section's duration \[ns\].
     #[must_use]
     pub fn time_ns(&self, core: &CoreCycles, limit: CycleLimit) -> u64 {
         core.time_ns(self.straight, self.looped, limit)

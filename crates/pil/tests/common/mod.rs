@@ -1,11 +1,11 @@
-//! Shared by the tests of both images.
+//! Helpers for the tests of both images.
 
 use pil::{Error, Image};
 use std::io::Write as _;
 use std::path::PathBuf;
 
-/// Starts the image, or returns none, with a message on the terminal, if the test has to be skipped. Under CI nothing
-/// may be skipped.
+/// Starts the image. Returns none, with a message on the terminal, if the test must be skipped. In CI nothing may be
+/// skipped.
 pub fn start_or_skip<T>(image: Image, start: impl FnOnce(PathBuf) -> Result<T, Error>) -> Option<T> {
     match image.find().and_then(start) {
         Ok(started) => Some(started),
