@@ -1,4 +1,4 @@
-//! A battery's voltage and current at two pins of a converter.
+//! Reads a battery's voltage and current at two ADC pins.
 
 use afbc_drivers::battery::{BatteryScale, BatterySensor};
 use embassy_stm32::adc::{Adc, AdcChannel, AnyAdcChannel, Instance};
@@ -7,13 +7,13 @@ use firmware::aux_sensors;
 
 /// Time between two readings \[ms\].
 const PERIOD_MS: u64 = 50;
-/// Reference of the converter \[V\].
+/// Reference voltage of the ADC \[V\].
 const RANGE_V: f32 = 3.3;
 
-/// Reads a pin once, waiting for it.
+/// Function that reads a pin once and waits for the result.
 pub type Convert<T> = fn(&mut Adc<'static, T>, &mut AnyAdcChannel<'static, T>) -> u16;
 
-/// A converter and its two pins.
+/// An ADC and its two battery pins.
 pub struct BatteryConverter<T: Instance> {
     adc: Adc<'static, T>,
     pins: [AnyAdcChannel<'static, T>; 2],
@@ -23,8 +23,8 @@ pub struct BatteryConverter<T: Instance> {
 }
 
 impl<T: Instance> BatteryConverter<T> {
-    /// One that reads voltage and current at these pins by `convert`, which returns numbers up to `end`; by the board's
-    /// divider and amplifier they mean `scale`.
+    /// Creates the reader of these pins. `convert` returns numbers up to `end`; `scale` describes the board's voltage
+    /// divider and current amplifier.
     pub fn new(
         adc: Adc<'static, T>,
         voltage: impl AdcChannel<T> + 'static,
@@ -35,7 +35,7 @@ impl<T: Instance> BatteryConverter<T> {
         BatteryConverter { adc, pins: [voltage.degrade_adc(), current.degrade_adc()], end, convert, scale }
     }
 
-    /// Reads for ever, and passes each reading on; none if it is none of a battery.
+    /// Reads forever and passes each reading on; passes none on if the reading is not a battery's.
     pub async fn run(mut self) {
         let mut sensor = BatterySensor::new(RANGE_V);
         let mut ticker = Ticker::every(Duration::from_millis(PERIOD_MS));

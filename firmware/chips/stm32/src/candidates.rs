@@ -1,5 +1,5 @@
-//! Parts of which a board has one: boards are sold with one or another, on the same pins. They are tried in turn until
-//! one answers, which is then read for ever.
+//! Tries alternative sensor parts: a board model is sold with different parts on the same pins. The parts are tried in
+//! turn until one answers, which is then read forever.
 
 use crate::sensors::{Device, InterruptPin, Polled, interrupted, run_if_it_answers};
 use afbc_drivers::{Driver, I2cRegisters, InertialReading, PressureReading, SensorPart, SpiRegisters};
@@ -8,13 +8,13 @@ use embassy_time::Timer;
 use embedded_hal_async::i2c::I2c;
 use firmware::self_tests::{FIRST_IMU, sensor};
 
-/// Pause after each part has been tried \[s\].
+/// Pause after all parts have been tried \[s\].
 const PAUSE_S: u64 = 1;
 
-/// IMUs on SPI: a tuple of parts.
+/// A tuple of IMUs on SPI.
 #[allow(async_fn_in_trait, reason = "used generically, never boxed")]
 pub trait ImuCandidates {
-    /// Reads the one that is there, by an SPI that is fed with `kernel_hz`, at the edges of its interrupt.
+    /// Reads the IMU that answers, at the edges of its interrupt. `kernel_hz` is the SPI's input clock.
     async fn run(
         device: &mut Device,
         interrupt: &mut InterruptPin,
@@ -23,10 +23,10 @@ pub trait ImuCandidates {
     );
 }
 
-/// Barometers on I2C, at any of their addresses: a tuple of parts, which is empty if the board has none.
+/// A tuple of barometers on I2C, each with its possible addresses; the empty tuple if the board has none.
 #[allow(async_fn_in_trait, reason = "used generically, never boxed")]
 pub trait BarometerCandidates {
-    /// Reads the one that is there.
+    /// Reads the barometer that answers.
     async fn run(bus: impl I2c + Clone, take: impl FnMut(Stamped<PressureReading>));
 }
 

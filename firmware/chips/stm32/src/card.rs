@@ -1,4 +1,4 @@
-//! A memory card by SPI.
+//! A memory card on SPI.
 
 use crate::sensors::SELECT;
 use afbc_log::storage::embedded_sdmmc::sdcard::spi::AcquireOpts;
@@ -15,13 +15,14 @@ use embedded_hal::delay::DelayNs;
 use embedded_hal::spi::{ErrorType, Operation, SpiDevice};
 use static_cell::StaticCell;
 
-/// Clock while a card starts, at most, and then \[Hz\] (SD Physical Layer Simplified Specification, 4.2.1 and 6.6.6).
+/// Highest clock while a card starts, and afterwards \[Hz\] (SD Physical Layer Simplified Specification, 4.2.1 and
+/// 6.6.6).
 const START_HZ: u32 = 400_000;
 const MOST_HZ: u32 = 25_000_000;
-/// Bytes of clock before the first command: at least 74 bits (6.4.1).
+/// Number of clock bytes before the first command: at least 74 bits (6.4.1).
 const WAKING: usize = 10;
 
-/// Returns the settings of an SPI with a card, whose answers rest high.
+/// Returns the SPI settings for a card; MISO is pulled up, since a card's answers idle high.
 pub fn config(hz: u32) -> spi::Config {
     let mut config = spi::Config::default();
     config.mode = MODE_0;
@@ -30,10 +31,11 @@ pub fn config(hz: u32) -> spi::Config {
     config
 }
 
-/// Keeps logs on a card by SPI.
+/// Keeps logs on a card on SPI.
 pub type CardLog = CardKeeper<'static>;
 
-/// The card behind a select pin, of an SPI fed with `kernel_hz`, by a core of `core_hz`; to be called once.
+/// Creates the log on the card behind a select pin. `kernel_hz` is the SPI's input clock, `core_hz` the core's clock.
+/// Must be called only once.
 ///
 /// # Panics
 /// At a second call.
@@ -47,7 +49,8 @@ pub fn new(
     CardKeeper::new(CARD.init(SpiCard::new(spi, select, kernel_hz, core_hz)))
 }
 
-/// A card that is alone on its SPI. Every call waits for it, by polling: the task must be below all others.
+/// A card that is alone on its SPI. Every call polls until the card is done, so the calling task must have a lower
+/// priority than all others.
 pub struct SpiCard {
     card: SdCard<CardBus, CoreDelay>,
     kernel_hz: u32,
@@ -57,7 +60,7 @@ impl SpiCard {
     fn new(spi: Spi<'static, Blocking, Master>, select: Peri<'static, impl Pin>, kernel_hz: u32, core_hz: u32) -> Self {
         let bus = CardBus { spi, select: Output::new(select, Level::High, SELECT) };
         let delay = CoreDelay { cycles_per_us: core_hz / 1_000_000 };
-        // A card that is there answers the first of them, or the second.
+        // A present card answers the first or the second attempt.
         let options = AcquireOpts { use_crc: true, acquire_retries: 1 };
         SpiCard { card: SdCard::new_with_options(bus, delay, options), kernel_hz }
     }
@@ -78,7 +81,7 @@ impl SpiCard {
 
 impl LogCard for SpiCard {
     fn start(&mut self) -> Result<u32, CardError> {
-        // Another card may be in the slot by now.
+        // The card may have been exchanged.
         self.card.mark_card_uninit();
         let slow_hz = super::sensors::divided(self.kernel_hz, START_HZ);
         self.card.spi(|bus| bus.wake(slow_hz));
@@ -97,8 +100,8 @@ impl LogCard for SpiCard {
     }
 }
 
-/// The bus. The card stays selected from one transfer to the next: a command, its answer and its data are several, and
-/// belong together (7.2).
+/// The SPI bus of the card. The card stays selected between transfers, since a command, its answer and its data belong
+/// together (7.2).
 struct CardBus {
     spi: Spi<'static, Blocking, Master>,
     select: Output<'static>,
@@ -106,18 +109,18 @@ struct CardBus {
 
 impl CardBus {
     fn set_clock(&mut self, hz: u32) {
-        // Nothing can be wrong with it.
+        // These settings are always valid.
         let _ = self.spi.set_config(&config(hz));
     }
 
-    /// Gives a card that has just got its supply the clock that it needs.
+    /// Sends the clock that a card needs after power-up.
     fn wake(&mut self, hz: u32) {
         self.set_clock(hz);
         self.select.set_high();
         let _ = self.spi.blocking_write(&[0xFF_u8; WAKING]);
     }
 
-    /// Ends a call; a card lets go of its line with the next byte of clock.
+    /// Deselects the card; it releases its line with the next byte of clock.
     fn release(&mut self) {
         self.select.set_high();
         let _ = self.spi.blocking_write(&[0xFF_u8]);
@@ -134,14 +137,14 @@ impl SpiDevice for CardBus {
         for operation in operations {
             match operation {
                 Operation::Read(into) => {
-                    // A card takes zeros for a command.
+                    // Send ones, since a card takes zeros for a command.
                     into.fill(0xFF);
                     self.spi.blocking_transfer_in_place(into)?;
                 }
                 Operation::Write(bytes) => self.spi.blocking_write(bytes)?,
                 Operation::Transfer(into, bytes) => self.spi.blocking_transfer(into, bytes)?,
                 Operation::TransferInPlace(bytes) => self.spi.blocking_transfer_in_place(bytes)?,
-                // `embedded_sdmmc` asks for none.
+                // `embedded_sdmmc` requests no delays.
                 Operation::DelayNs(_) => (),
             }
         }
@@ -149,7 +152,7 @@ impl SpiDevice for CardBus {
     }
 }
 
-/// Waits by counting; longer, when something else runs meanwhile.
+/// Delays by counting core cycles; the delay is longer if other code runs meanwhile.
 struct CoreDelay {
     cycles_per_us: u32,
 }

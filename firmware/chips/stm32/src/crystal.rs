@@ -1,4 +1,4 @@
-//! The crystal: its start, and that it has failed.
+//! Checks the crystal's start and records its failure.
 
 use core::sync::atomic::{AtomicBool, Ordering};
 
@@ -7,7 +7,7 @@ const START_MS: u32 = 100;
 
 static FAILED: AtomicBool = AtomicBool::new(false);
 
-/// True if the crystal has failed, at the start or in flight, so that arming must be refused.
+/// Returns true if the crystal has failed, at the start or in flight: arming must be refused then.
 pub fn has_failed() -> bool {
     FAILED.load(Ordering::Relaxed)
 }
@@ -17,8 +17,8 @@ pub fn fail() {
     FAILED.store(true, Ordering::Relaxed);
 }
 
-/// True if a crystal that is turned on already `is_ready` in time; otherwise it has failed. embassy's init would wait
-/// for it forever. The core runs `cycles_per_ms` until the clocks are set up.
+/// Waits until the crystal, already turned on, `is_ready`. Returns false, and records the failure, if it does not start
+/// in time: embassy's init would wait forever. `cycles_per_ms` is the core clock before the clocks are set up.
 pub fn starts(cycles_per_ms: u32, is_ready: impl Fn() -> bool) -> bool {
     let starts = (0..START_MS).any(|_| {
         let ready = is_ready();

@@ -3,7 +3,7 @@
 use core::panic::PanicInfo;
 use core::sync::atomic::{AtomicBool, Ordering};
 
-/// Handles panics and faults of a board whose motors `$stop` stops, in whatever state the program is.
+/// Defines the panic and fault handlers of a board. `$stop` stops the motors and must work in any state of the program.
 #[macro_export]
 macro_rules! faults {
     ($stop:path) => {
@@ -14,7 +14,7 @@ macro_rules! faults {
 
         #[expect(unsafe_code, reason = "nothing may be pushed before the stack pointer is set")]
         mod hard_fault {
-            /// Entered on any fault, possibly with a stack pointer outside the RAM: sets up a new stack first.
+            /// Runs on any fault, possibly with a stack pointer outside the RAM: sets up a new stack first.
             #[unsafe(naked)]
             #[unsafe(no_mangle)]
             extern "C" fn HardFault() -> ! {
@@ -28,14 +28,14 @@ macro_rules! faults {
     };
 }
 
-/// Ends a task that is not needed in flight, or stops the motors and waits for the reset.
+/// Parks a task that is not needed in flight. In any other task, stops the motors and waits for the reset.
 pub fn panic(info: &PanicInfo, stop_motors: fn()) -> ! {
     if firmware::executors::in_dispensable_task() {
         let (file, line) = info.location().map_or(("", 0), |place| (place.file(), place.line()));
         defmt::error!("a task has failed, the flight continues without it: {=str}:{=u32}", file, line);
         park()
     }
-    // Before the log, which panics itself if it was what has panicked.
+    // Stop the motors before logging: the panic may come from the log, and logging would panic again.
     stop_motors();
     defmt::error!("{}", defmt::Display2Format(info));
     wait_for_watchdog()
@@ -50,7 +50,7 @@ pub fn fault(stop_motors: fn()) -> ! {
 
 /// Waits until the watchdog resets the chip, which starts disarmed.
 fn wait_for_watchdog() -> ! {
-    // Else control ticks could go on in between, and feed the watchdog.
+    // Otherwise control ticks could continue and feed the watchdog.
     cortex_m::interrupt::disable();
     loop {
         cortex_m::asm::nop();
@@ -59,18 +59,18 @@ fn wait_for_watchdog() -> ! {
 
 static TASK_FAILED: AtomicBool = AtomicBool::new(false);
 
-/// True if a task that is not needed in flight has panicked.
+/// Returns true if a task that is not needed in flight has panicked.
 pub fn task_has_failed() -> bool {
     TASK_FAILED.load(Ordering::Relaxed)
 }
 
-/// Ends a task that is not needed in flight after its panic; everything of higher priority continues.
+/// Stops a task that is not needed in flight, after its panic; everything of higher priority continues.
 fn park() -> ! {
     TASK_FAILED.store(true, Ordering::Relaxed);
     loop {
         // The task may have panicked with interrupts disabled.
         #[expect(unsafe_code, reason = "it ends a critical section that is never returned to")]
-        // SAFETY: the data that it protected is borrowed by try_borrow everywhere: the inbox, the ticks, the alarms.
+        // SAFETY: all data protected by critical sections is borrowed by try_borrow: the inbox, the ticks, the alarms.
         unsafe {
             cortex_m::interrupt::enable()
         };

@@ -1,4 +1,4 @@
-//! An I2C that is recovered before its first transfer, and after each that failed or was given up.
+//! An I2C bus that is recovered before its first transfer and after each failed or abandoned transfer.
 
 use crate::line::Line;
 use afbc_drivers::{I2cLine, I2cLines, RecoveringI2c};
@@ -6,20 +6,20 @@ use embassy_stm32::i2c::{I2c, Master};
 use embassy_stm32::mode::Async;
 use embassy_time::{Duration, block_for};
 
-/// Half a clock while a bus is recovered \[us\]: 100 kHz, at which every part works.
+/// Half a clock period during recovery \[us\]: 100 kHz, which every part supports.
 const HALF_CLOCK_US: u64 = 5;
 
-/// A bus.
+/// An I2C bus with recovery.
 pub type Bus = RecoveringI2c<I2c<'static, Async, Master>, Lines>;
 
-/// The lines of a controller, and what resets it and leaves it set up.
+/// Lines of an I2C controller, and the function that resets it and restores its settings.
 pub struct Lines {
     clock: Line,
     data: Line,
     restart: fn(),
 }
 
-/// Makes a bus of a controller and its lines.
+/// Makes a bus with recovery. `restart` resets the controller and restores its settings.
 pub fn bus(controller: I2c<'static, Async, Master>, [clock, data]: [Line; 2], restart: fn()) -> Bus {
     RecoveringI2c::new(controller, Lines { clock, data, restart })
 }
@@ -37,7 +37,7 @@ impl I2cLines for Lines {
             I2cLine::Clock => self.clock,
             I2cLine::Data => self.data,
         };
-        // An open drain, which the pin stays.
+        // The pin stays open-drain.
         line.set(is_released);
         block_for(Duration::from_micros(HALF_CLOCK_US));
     }
@@ -47,7 +47,7 @@ impl I2cLines for Lines {
     }
 
     fn restart(&mut self) {
-        // The lines first: a controller that is reset while its lines are low counts the bus as busy.
+        // Give the lines back first: a controller that is reset while its lines are low considers the bus busy.
         self.clock.give_back();
         self.data.give_back();
         (self.restart)();

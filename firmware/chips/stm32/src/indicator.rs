@@ -1,4 +1,4 @@
-//! LED and buzzer.
+//! Drives LED and buzzer.
 
 use embassy_stm32::Peri;
 use embassy_stm32::gpio::{Level, Output, OutputOpenDrain, OutputType, Pin, Speed};
@@ -8,32 +8,32 @@ use embassy_stm32::timer::simple_pwm::{PwmPin, SimplePwm};
 use embassy_stm32::timer::{Ch1, GeneralInstance4Channel, TimerPin};
 use firmware::indication::{self, IndicatorSignals};
 
-/// The tone of a buzzer that has none of its own \[Hz\].
+/// Tone of a passive buzzer \[Hz\].
 const TONE_HZ: u32 = 2_500;
 
-/// An LED between the supply and its pin, which is lit while the pin is low: the usual way.
+/// An LED between supply and pin, the usual wiring: it is lit while the pin is low.
 pub struct Led(OutputOpenDrain<'static>);
 
 impl Led {
-    /// The one at a pin, dark.
+    /// Creates the LED at a pin, dark.
     pub fn new(pin: Peri<'static, impl Pin>) -> Self {
-        // Open drain, for the supply may be 5 V.
+        // Open drain, since the supply may be 5 V.
         Led(OutputOpenDrain::new(pin, Level::High, Speed::Low))
     }
 }
 
 /// A buzzer.
 pub trait Buzzer {
-    /// Sounds, or does not.
+    /// Switches the sound on or off.
     fn sound(&mut self, sounds: bool);
 }
 
-/// A buzzer with a tone of its own, behind a transistor: it sounds while its pin is high, which Betaflight calls
+/// A buzzer with its own oscillator, behind a transistor: it sounds while its pin is high. Betaflight calls this
 /// inverted.
 pub struct ActiveBuzzer(Output<'static>);
 
 impl ActiveBuzzer {
-    /// The one at a pin, silent.
+    /// Creates the buzzer at a pin, silent.
     pub fn new(pin: Peri<'static, impl Pin>) -> Self {
         ActiveBuzzer(Output::new(pin, Level::Low, Speed::Low))
     }
@@ -45,11 +45,11 @@ impl Buzzer for ActiveBuzzer {
     }
 }
 
-/// A buzzer without a tone of its own, at the first channel of a timer; one with a tone sounds, too.
+/// A passive buzzer at the first channel of a timer; an active buzzer sounds there, too.
 pub struct PassiveBuzzer<T: GeneralInstance4Channel>(SimplePwm<'static, T>);
 
 impl<T: GeneralInstance4Channel> PassiveBuzzer<T> {
-    /// The one at a pin, silent.
+    /// Creates the buzzer at a pin, silent.
     pub fn new(timer: Peri<'static, T>, pin: Peri<'static, impl TimerPin<T, Ch1>>) -> Self {
         let pin = PwmPin::new(pin, OutputType::PushPull);
         let counting = CountingMode::EdgeAlignedUp;
@@ -68,7 +68,7 @@ impl<T: GeneralInstance4Channel> Buzzer for PassiveBuzzer<T> {
     }
 }
 
-/// Shows how the vehicle is, for ever: for a task of the lowest priority
+/// Shows the vehicle's status forever. For a task of the lowest priority
 /// ([`housekeeping`](firmware::executors::housekeeping)).
 pub async fn run(mut led: Option<Led>, mut buzzer: impl Buzzer) -> ! {
     let show = |IndicatorSignals { led: lit, buzzer: sounds }| {

@@ -1,4 +1,4 @@
-//! What boards of all STM32 share. A chip's name is a feature of `embassy-stm32` that the board sets.
+//! Code shared by boards with any STM32. The board selects the chip by a feature of `embassy-stm32`.
 #![no_std]
 
 pub mod answers;
@@ -24,11 +24,11 @@ pub mod usb;
 use embassy_stm32::Peri;
 use embassy_stm32::wdg::{self, IndependentWatchdog};
 
-/// The watchdog resets the chip if it is not fed for this long \[us\], by its own oscillator, whose nominal 32 kHz may
-/// be 17 to 47. Motor controllers stop sooner if the processor hangs, after some 20 ms without a frame.
+/// The watchdog resets the chip if it is not fed for this long \[us\]. Its own oscillator has a nominal 32 kHz, in fact
+/// 17 to 47 kHz. If the processor hangs, motor controllers stop sooner, some 20 ms after the last frame.
 const WATCHDOG_US: u32 = 20_000;
 
-/// Prepares the watchdog, which is yet to be unleashed.
+/// Prepares the watchdog without starting it.
 pub fn watchdog<T: wdg::Instance>(peripheral: Peri<'static, T>) -> IndependentWatchdog<'static, T> {
     IndependentWatchdog::new(peripheral, WATCHDOG_US)
 }

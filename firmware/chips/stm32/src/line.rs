@@ -1,11 +1,11 @@
-//! A pin by its registers, beside the driver that has it.
+//! Accesses a pin by its registers, in addition to the driver that owns the pin.
 
 use embassy_stm32::Peri;
 use embassy_stm32::gpio::{AnyPin, Pin};
 use embassy_stm32::pac::gpio::Gpio;
 use embassy_stm32::pac::gpio::vals::{Idr, Moder, Pupdr};
 
-/// A pin's registers.
+/// Registers of a pin.
 #[derive(Clone, Copy)]
 pub struct Line {
     port: Gpio,
@@ -13,24 +13,25 @@ pub struct Line {
 }
 
 impl Line {
-    /// The registers of a pin that a driver is going to have.
+    /// Returns the registers of a pin that will be given to a driver.
     pub fn of(pin: Peri<'_, impl Pin>) -> Self {
         let pin = pin.into::<AnyPin>();
         Line { port: pin.block(), pin: pin.pin().into() }
     }
 
-    /// Takes the pin from its driver for ever, and holds it low.
+    /// Takes the pin from its driver forever and holds it low.
     pub fn hold_low(self) {
         self.set(false);
         self.take();
     }
 
-    /// Takes the pin from its driver: it has the level that was set; an open drain is released by a high one.
+    /// Takes the pin from its driver and makes it an output with the level that was set. On an open-drain pin, high
+    /// releases the line.
     pub(crate) fn take(self) {
         self.mode(Moder::OUTPUT);
     }
 
-    /// Gives the pin back to its driver, which has it as an alternate function.
+    /// Gives the pin back to its driver as an alternate function.
     pub(crate) fn give_back(self) {
         self.mode(Moder::ALTERNATE);
     }
@@ -46,7 +47,7 @@ impl Line {
 
     /// Pulls the pin down instead of up.
     pub(crate) fn pull_down(self) {
-        // Tasks of other priorities change other pins of the port.
+        // Without interrupts, since tasks of other priorities change other pins of the port.
         cortex_m::interrupt::free(|_| self.port.pupdr().modify(|pulls| pulls.set_pupdr(self.pin, Pupdr::PULL_DOWN)));
     }
 

@@ -1,4 +1,4 @@
-//! Links: by UART, with ring buffers that its interrupt fills and empties, and by [`usb`].
+//! Links by UART, with ring buffers that its interrupt fills and empties, and by [`usb`].
 
 use crate::line::Line;
 use crate::usb::{self, UsbPort};
@@ -16,33 +16,34 @@ use embedded_io_async::{BufRead, Write};
 use firmware::board::{self, BoardLink};
 use firmware::ticks::Tick;
 
-/// Bytes that wake the reader \[0.35 ms of a busy line\]. Fewer wake it when the line becomes idle, as after a message,
-/// and it also runs after every control tick. Waking it for every byte would take most of the processor's time.
+/// Number of bytes that wakes the reader: 0.35 ms of a busy line. Fewer bytes wake the reader when the line becomes
+/// idle, as after a message. The reader also runs after every control tick. Waking it for every byte would take most of
+/// the processor's time.
 const READ_MIN: usize = 32;
 
-/// Bytes of the rings of a radio receiver's UART: what goes to it, and what comes within 10 ms.
+/// Sizes of the rings of a radio receiver's UART \[bytes\]: transmit, and receive for 10 ms.
 pub const RADIO_RINGS: [usize; 2] = [128, 512];
 
-/// Returns how any UART is set up: RX is pulled up, so that a line that nothing drives is idle, and no noise is read.
+/// Returns settings common to all UARTs. RX is pulled up, so that an undriven line is idle and no noise is read.
 pub fn uart() -> Config {
     let mut config = Config::default();
     config.rx_pull = Pull::Up;
     config
 }
 
-/// Returns how the UART of a link is set up; its baud rate is a parameter.
+/// Returns the settings for a link's UART; its baud rate is a parameter.
 pub fn config() -> Config {
     let mut config = uart();
     config.eager_reads = Some(READ_MIN);
     config
 }
 
-/// Returns how the UART of a radio receiver is set up until its protocol is known.
+/// Returns the settings for a radio receiver's UART until its protocol is known.
 pub fn radio() -> Config {
     config()
 }
 
-/// Returns how it is set up for SBUS. Without registers that invert, the board has an inverter before the pin.
+/// Returns the settings for SBUS. On chips without inverting UARTs, the board has an inverter before the pin.
 fn sbus() -> Config {
     let mut config = config();
     config.baudrate = 100_000;
@@ -55,10 +56,10 @@ fn sbus() -> Config {
     config
 }
 
-/// What switches the inverter before the radio receiver's pin.
+/// Pin that switches the inverter before the radio receiver's RX.
 static INVERTER: Mutex<CriticalSectionRawMutex, Cell<Option<Output<'static>>>> = Mutex::new(Cell::new(None));
 
-/// Lets SBUS be inverted by this pin, which is low until then; to be called before [`set_sbus`].
+/// Registers the pin that switches SBUS inversion; the pin is low until then. Must be called before [`set_sbus`].
 ///
 /// [`set_sbus`]: board::Transmitter::set_sbus
 pub fn invert_by(pin: Peri<'static, impl Pin>) {
@@ -66,21 +67,21 @@ pub fn invert_by(pin: Peri<'static, impl Pin>) {
     INVERTER.lock(|inverter| inverter.set(Some(pin)));
 }
 
-/// Switches the inverter on, if there is one, for ever.
+/// Switches the inverter on forever, if there is one.
 fn invert() {
     if let Some(mut pin) = INVERTER.lock(Cell::take) {
         pin.set_high();
-        // A pin that is dropped is an input again.
+        // Dropping the pin would make it an input again.
         core::mem::forget(pin);
     }
 }
 
-/// Makes a link of a UART.
+/// Makes a link from a UART.
 pub fn new(uart: BufferedUart<'static>) -> BoardLink<Receiver, Transmitter> {
     split(uart, None)
 }
 
-/// Makes a link of a UART that inverts its line itself for SBUS, which is low while it is idle: RX is pulled down then.
+/// Makes a link from a UART that inverts its line itself for SBUS. An SBUS line idles low, so RX is pulled down then.
 pub fn inverting(uart: BufferedUart<'static>, rx: Line) -> BoardLink<Receiver, Transmitter> {
     split(uart, Some(rx))
 }
@@ -90,23 +91,23 @@ fn split(uart: BufferedUart<'static>, inverts: Option<Line>) -> BoardLink<Receiv
     BoardLink { receiver: Receiver::Uart(receiver), transmitter: Transmitter::Uart(transmitter, inverts) }
 }
 
-/// Makes a link of the USB port.
+/// Makes a link from the USB port.
 pub fn of_usb(_started: UsbPort) -> BoardLink<Receiver, Transmitter> {
     BoardLink { receiver: Receiver::Usb, transmitter: Transmitter::Usb }
 }
 
-/// Receiving side.
+/// Receiving side of a link.
 pub enum Receiver {
-    /// Of a UART.
+    /// A UART.
     Uart(BufferedUartRx<'static>),
-    /// Of the USB port, from its ring.
+    /// The USB port, read from its ring.
     Usb,
 }
 
 impl board::Receiver for Receiver {
     fn receive(&mut self, buffer: &mut [u8]) -> impl Future<Output = usize> {
-        // A new read each time, since polling one that has ended would panic. An overrun loses bytes, which the decoder
-        // notices.
+        // A new read in each poll, since polling a finished one would panic. An overrun loses bytes; the decoder
+        // detects that.
         poll_fn(move |context| {
             let uart = match self {
                 Receiver::Uart(uart) => uart,
@@ -126,11 +127,11 @@ impl board::Receiver for Receiver {
     }
 }
 
-/// Sending side.
+/// Sending side of a link.
 pub enum Transmitter {
-    /// Of a UART, with its RX if it inverts the line itself for SBUS.
+    /// A UART, with its RX line if it inverts the line itself for SBUS.
     Uart(BufferedUartTx<'static>, Option<Line>),
-    /// Of the USB port, through its ring.
+    /// The USB port, written through its ring.
     Usb,
 }
 
@@ -157,7 +158,7 @@ impl board::Transmitter for Transmitter {
 
     fn transmit(&mut self, _tick: &Tick, bytes: &[u8]) -> bool {
         match self {
-            // Accepts all bytes or, if the ring is full, none; the driver does not wake those who wait for room.
+            // Accepts all bytes or, if the ring is full, none; the driver does not wake tasks that wait for room.
             Transmitter::Uart(uart, _) if !bytes.is_empty() => {
                 matches!(poll_once(uart.write(bytes)), Poll::Ready(Ok(_)))
             }

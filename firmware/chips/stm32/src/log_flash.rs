@@ -1,4 +1,4 @@
-//! A flash chip for logs by SPI.
+//! A flash chip for logs on SPI.
 
 use crate::sensors::{SELECT, divided};
 use afbc_log::storage::{FlashKeeper, NorChip};
@@ -12,16 +12,16 @@ use embassy_time::Instant;
 use embedded_hal_bus::spi::{ExclusiveDevice, NoDelay};
 use static_cell::StaticCell;
 
-/// Clock, at most \[Hz\] (W25Q128JV, revision F, 9.6, of the command that reads).
+/// Highest clock \[Hz\] (W25Q128JV, revision F, 9.6, for the read command).
 const MOST_HZ: u32 = 50_000_000;
 
-/// Keeps logs in a chip that is alone on its SPI. Every call waits for it, by polling: the task must be below all
-/// others.
+/// Keeps logs in a chip that is alone on its SPI. Every call polls until the chip is done, so the calling task must
+/// have a lower priority than all others.
 pub type FlashLog = FlashKeeper<'static>;
 
 type Chip = NorChip<ExclusiveDevice<Spi<'static, Blocking, Master>, Output<'static>, NoDelay>>;
 
-/// Returns the settings of its SPI, which is fed with `kernel_hz`.
+/// Returns the SPI settings; `kernel_hz` is the SPI's input clock.
 pub fn config(kernel_hz: u32) -> spi::Config {
     let mut config = spi::Config::default();
     config.mode = MODE_0;
@@ -29,7 +29,7 @@ pub fn config(kernel_hz: u32) -> spi::Config {
     config
 }
 
-/// The chip behind a select pin; to be called once.
+/// Creates the log in the chip behind a select pin. Must be called only once.
 ///
 /// # Panics
 /// At a second call.

@@ -1,6 +1,6 @@
-//! Up to four motors on the channels of a timer: DSHOT, sent by DMA, or pulses. A board has one timer or more for its
-//! motors, each with a task that [runs](Motors::run) it. Where DMA reaches the port of the pins, motor controllers
-//! [answer](crate::answers) on them.
+//! Drives up to four motors on the channels of a timer: by DSHOT, sent by DMA, or by pulses. A board has one or more
+//! timers for its motors, each with a task that [runs](Motors::run) it. Where DMA reaches the pins' port, motor
+//! controllers can [answer](crate::answers) on the same lines.
 
 pub use afbc_flight_core::numbering::{self, rotors_of_outputs};
 pub use afbc_flight_core::protocol::MotorProtocol;
@@ -28,45 +28,45 @@ use embassy_time::{Instant, with_deadline};
 use firmware::escs;
 use firmware::vehicle::ROTORS;
 
-/// Most motors of a timer.
+/// Largest number of motors per timer.
 pub const CHANNELS: usize = 4;
-/// Rows of a frame: sixteen bits, and one without a pulse.
+/// Rows of a frame: sixteen bits and one row without a pulse.
 const FRAME_ROWS: usize = 17;
-/// The channels.
+/// All channels of a timer.
 const EACH: [Channel; CHANNELS] = [Channel::Ch1, Channel::Ch2, Channel::Ch3, Channel::Ch4];
 /// Longest transfer of a frame to the motors before it is aborted \[us\].
 const TRANSFER_MAX_US: u64 = 2_000;
 
-/// Newest throttles of a timer's motors, for its task: 0, or 48 to 2047; 0 where there is no motor.
+/// Newest throttles for a timer's task: 0, or 48 to 2047; 0 where there is no motor.
 pub type Throttles = Signal<CriticalSectionRawMutex, [u16; CHANNELS]>;
 
-/// Protocol of all motors, and whether their controllers answer.
+/// Protocol of all motors, and true if their controllers answer.
 static PROTOCOL: CriticalSectionMutex<Cell<(MotorProtocol, bool)>> =
     CriticalSectionMutex::new(Cell::new((MotorProtocol::Dshot600, false)));
 
-/// Sets the protocol of all motors, and whether their controllers answer where they can be heard, before they get their
+/// Sets the protocol of all motors, and whether controllers on lines with reception answer. Must be called before the
 /// first throttles.
 pub fn set_protocol(protocol: MotorProtocol, answers: bool) {
     PROTOCOL.lock(|cell| cell.set((protocol, answers)));
 }
 
-/// The waveform, with a row for each bit and a column for each channel. A DMA burst of four columns must not cross
-/// 1 KiB.
-// One more than a frame has: after its transfer the last bit is over.
+/// Waveform of a frame: a row per bit and a column per channel. A DMA burst of four columns must not cross a 1 KiB
+/// boundary.
+// One row more than a frame: after its transfer, the last bit has ended.
 #[repr(align(16))]
 struct Rows<W>([[W; CHANNELS]; FRAME_ROWS + 1]);
 
-/// Motors of a timer. `W` is `u16`, or `u32` on a timer of 32 bits: a narrower store would fill both halves of its
+/// Motors of a timer. `W` is `u16`, or `u32` on a 32-bit timer, where a narrower store would fill both halves of the
 /// register.
 pub struct Motors<T: GeneralInstance4Channel, D: UpDma<T>, I, W, A = ()> {
     timer: Timer<'static, T>,
-    /// Held, since a pin that is let go of is no output.
+    /// Kept, since a dropped pin is no longer an output.
     _pins: Pins<T>,
     clock: TimerClock,
     dma: Peri<'static, D>,
     irqs: I,
     rows: Rows<W>,
-    /// Lines on which the controllers answer, if there are such.
+    /// Lines on which the controllers answer; `()` without answers.
     answers: A,
 }
 
@@ -84,7 +84,7 @@ where
     I: Binding<D::Interrupt, dma::InterruptHandler<D>> + Copy,
     W: Word + From<u16> + Into<T::Word>,
 {
-    /// Sets up a timer and its pins, low; a channel without a [`pin`] is none. To be called at the start.
+    /// Sets up a timer and its pins, low; a channel without a [`pin`] has no motor. Must be called at the start.
     ///
     /// # Panics
     /// If the timer's clock is out of range.
@@ -97,14 +97,14 @@ where
         dma: Peri<'static, D>,
         irqs: I,
     ) -> Self {
-        // Not `expect`: to print the error would take a tenth of the flash.
+        // Not `expect`, since printing the error would take a tenth of the flash.
         let Ok(clock) = TimerClock::new(rcc::frequency::<T>().0) else { panic!("the timer's clock is out of range") };
         let timer = Timer::new(timer);
         timer.set_counting_mode(CountingMode::EdgeAlignedUp);
         timer.enable_outputs();
         for channel in EACH {
             timer.set_output_compare_mode(channel, OutputCompareMode::PwmMode1);
-            // A value counts from the next period on: the pulse that is being sent keeps its length.
+            // A new value takes effect in the next period, so that a pulse in progress keeps its length.
             timer.set_output_compare_preload(channel, true);
         }
         timer.set_autoreload_preload(true);
@@ -112,10 +112,10 @@ where
         Motors { timer, _pins: (first, second, third, fourth), clock, dma, irqs, rows, answers: () }
     }
 
-    /// Sends each new set of throttles, and with a frame the question to the motor controller of a rotor that is
-    /// [asked](firmware::escs::asked), if one of the channels drives it: `rotors` are their rotors.
+    /// Sends each new set of throttles. A frame also requests telemetry from the motor controller of the rotor that is
+    /// [asked](firmware::escs::asked), if a channel of this timer drives it. `rotors` are the channels' rotors.
     pub async fn run(&mut self, throttles: &Throttles, rotors: [Option<usize>; CHANNELS]) -> ! {
-        // The protocol has been set when the first come.
+        // The protocol is set before the first throttles arrive.
         let first = throttles.wait().await;
         let (protocol, _) = PROTOCOL.lock(Cell::get);
         match protocol.signal() {
@@ -124,7 +124,7 @@ where
         }
     }
 
-    /// Motors whose controllers answer, if they are to ([`set_protocol`]).
+    /// Adds the lines on which the controllers can answer; they answer if [`set_protocol`] says so.
     pub fn answering(self, lines: Lines) -> Motors<T, D, I, W, Lines> {
         let Motors { timer, _pins, clock, dma, irqs, rows, .. } = self;
         Motors { timer, _pins, clock, dma, irqs, rows, answers: lines }
@@ -138,16 +138,16 @@ where
     I: Binding<D::Interrupt, dma::InterruptHandler<D>> + Copy,
     W: Word + From<u16> + Into<T::Word>,
 {
-    /// Starts the timer, whose outputs stay low until the compare values are other than 0.
+    /// Starts the timer; its outputs stay low while the compare values are 0.
     fn start(&mut self, divider: u16, period: u16) {
         let registers = self.timer.regs_core();
-        // Divider and period are one more than what their registers hold.
+        // The registers hold divider - 1 and period - 1.
         registers.psc().write_value(divider.saturating_sub(1));
         registers.arr().write(|reload| reload.set_arr(period.saturating_sub(1)));
         for channel in EACH {
             self.timer.enable_channel(channel, true);
         }
-        // Takes them over from the preload registers.
+        // Loads the registers from their preload registers.
         self.timer.generate_update_event();
         self.timer.start();
     }
@@ -169,19 +169,19 @@ where
         }
     }
 
-    /// Sends so many of the rows; a frame to each motor takes 28 us at 600 kbit/s.
+    /// Sends the first `count` rows; a frame to each motor takes 28 us at 600 kbit/s.
     async fn send_rows(&mut self, count: usize) {
         let rows = self.rows.0.get(..count).unwrap_or_default().as_flattened();
         let dma = self.dma.reborrow();
         self.timer.enable_update_dma(true);
         let transfer = self.timer.setup_update_dma_burst(dma, self.irqs, Channel::Ch1, Channel::Ch4, rows);
-        // Wrapping, without a check for an overflow after 585,000 years that could panic.
+        // Wrapping, since an overflow check, although it would need 585,000 years, would add a panic.
         let deadline = Instant::from_micros(Instant::now().as_micros().wrapping_add(TRANSFER_MAX_US));
         if with_deadline(deadline, transfer).await.is_err() {
-            // The next frame sets up the stream again.
+            // The next frame sets up the DMA again.
             defmt::warn!("the motors' DMA transfer has stopped");
         }
-        // The timer runs on, and each of its updates would ask for a transfer.
+        // The timer runs on, and each of its updates would request a transfer.
         self.timer.enable_update_dma(false);
     }
 
@@ -192,7 +192,7 @@ where
         loop {
             self.set_compare_values(newest.map(|throttle| timing.compare(throttle)));
             if format.is_one_shot {
-                // Starts the pulses; what the timer takes over at the end of its period is no further one.
+                // Start the pulses now; the zeros, loaded at the end of the period, prevent further pulses.
                 self.timer.generate_update_event();
                 self.set_compare_values([0; CHANNELS]);
             }
@@ -200,7 +200,7 @@ where
         }
     }
 
-    /// Sets the compare values from the next update on.
+    /// Sets the compare values for the time after the next update event.
     fn set_compare_values(&mut self, values: [u16; CHANNELS]) {
         for (channel, value) in EACH.into_iter().zip(values) {
             self.timer.set_compare_value(channel, W::from(value).into());
@@ -215,12 +215,12 @@ where
     I: Binding<D::Interrupt, dma::InterruptHandler<D>> + Copy,
     W: Word + From<u16> + Into<u32> + Into<T::Word>,
 {
-    /// As that of motors [without answers](Motors::run); puts what the controllers [answer](firmware::escs::answered).
+    /// Sends like [`Motors::run`], and passes the controllers' answers to [`answered`](firmware::escs::answered).
     pub async fn exchange(&mut self, throttles: &Throttles, rotors: [Option<usize>; CHANNELS]) -> ! {
         let first = throttles.wait().await;
         let (protocol, answers) = PROTOCOL.lock(Cell::get);
         match protocol.signal() {
-            // Only where a controller is.
+            // Answers are received only if a rotor of the vehicle is on this timer.
             MotorSignal::Frames(rate) if answers && rotors.iter().flatten().any(|rotor| *rotor < ROTORS) => {
                 self.exchange_frames(rate, first, throttles, &rotors).await
             }
@@ -229,7 +229,7 @@ where
         }
     }
 
-    /// Sends frames to which the controllers answer.
+    /// Sends frames and receives the controllers' answers.
     async fn exchange_frames(
         &mut self,
         rate: DshotRate,
@@ -239,7 +239,7 @@ where
     ) -> ! {
         let timing = Timing::new(self.clock, rate);
         let sample_counts = sample_counts(self.clock, rate);
-        // The lines rest high.
+        // Bidirectional DSHOT idles high.
         EACH.iter().for_each(|channel| self.timer.set_output_polarity(*channel, OutputPolarity::ActiveLow));
         self.answers.pull_up();
         self.start(1, timing.period());
@@ -248,12 +248,12 @@ where
             encode(&timing, newest, asked_channel(rotors), &mut self.rows);
             let [frame @ .., _] = &mut self.rows.0;
             timing.complement_checksums(frame);
-            // With a row more than a frame has: then its last bit is over.
+            // Send the extra row, after which the frame's last bit has ended.
             self.send_rows(self.rows.0.len()).await;
             self.set_period(sample_counts);
             let is_sampled = self.sample().await;
             self.set_period(timing.period());
-            // Earlier samples would be taken for an answer to this frame.
+            // After a failed sampling, old samples would be taken for an answer to this frame.
             if is_sampled {
                 for (channel, speed) in self.answers.speeds_rev_min() {
                     if let (Some(Some(rotor)), Some(speed)) = (rotors.get(channel), speed) {
@@ -265,25 +265,25 @@ where
         }
     }
 
-    /// Sets the time between two updates, from now on.
+    /// Sets the time between two updates, effective at once.
     fn set_period(&mut self, counts: u16) {
         self.timer.regs_core().arr().write(|reload| reload.set_arr(counts.saturating_sub(1)));
-        // Takes it over from the preload register.
+        // Loads the register from its preload register.
         self.timer.generate_update_event();
     }
 
-    /// Lets go of the lines, and takes samples of them; 75 us at 600 kbit/s. False if that has failed.
+    /// Releases the lines and samples them, for 75 us at 600 kbit/s. Returns false if the sampling failed.
     #[expect(unsafe_code, reason = "DMA reads the port of the pins")]
     async fn sample(&mut self) -> bool {
         self.answers.let_go(true);
         let (port, samples) = self.answers.sampling();
         let request = self.dma.request();
         let mut channel = dma::Channel::new(self.dma.reborrow(), self.irqs);
-        // One transfer for an update, not a row.
+        // One transfer per update instead of a row's burst.
         self.timer.regs_gp16().dcr().modify(|burst| burst.set_dbl(0));
         self.timer.enable_update_dma(true);
-        // SAFETY: the address is that of a register that may be read at any time, and nobody else writes to the
-        // samples while the transfer lasts, which ends when it is dropped.
+        // SAFETY: the address is that of a register that may be read at any time. Nothing else writes to the samples
+        // during the transfer, which ends at the latest when it is dropped.
         let transfer = unsafe { channel.read(request, port, samples, dma::TransferOptions::default()) };
         let deadline = Instant::from_micros(Instant::now().as_micros().wrapping_add(TRANSFER_MAX_US));
         let is_sampled = with_deadline(deadline, transfer).await.is_ok();
@@ -296,43 +296,46 @@ where
     }
 }
 
-/// Returns the channel whose motor controller is to be asked for its telemetry in the next frame.
+/// Returns the channel whose motor controller is asked for telemetry in the next frame.
 fn asked_channel(rotors: &[Option<usize>; CHANNELS]) -> Option<usize> {
     let channel = |rotor| rotors.iter().position(|other| *other == Some(rotor));
     escs::asked(|rotor| channel(rotor).is_some()).and_then(channel)
 }
 
-/// The output of a motor on a channel, low.
+/// Makes the output pin of a motor's channel, low.
 pub fn pin<T: GeneralInstance4Channel, C: TimerChannel>(
     pin: Peri<'static, impl TimerPin<T, C>>,
 ) -> Option<PwmPin<'static, T, C>> {
     Some(PwmPin::new(pin, OutputType::PushPull))
 }
 
-/// Returns what the outputs send, each for the rotor with its index in `rotors`; 0 if the vehicle does not have it.
+/// Returns the throttle of each output. `rotors` has the rotor index of each output; an output whose rotor the vehicle
+/// lacks gets 0.
 pub fn of_outputs<const OUTPUTS: usize>(rotors: &[usize; OUTPUTS], throttles: &[u16]) -> [u16; OUTPUTS] {
     rotors.map(|rotor| throttles.get(rotor).copied().unwrap_or(0))
 }
 
-/// Returns what the channels of a timer send: what the outputs with these numbers do, 0 for the number 0.
+/// Returns the throttle of each channel of a timer. `motors` has the output number of each channel, counted from 1;
+/// number 0 gets throttle 0.
 pub fn of_channels(motors: [usize; CHANNELS], outputs: &[u16]) -> [u16; CHANNELS] {
     motors.map(|motor| motor.checked_sub(1).and_then(|at| outputs.get(at)).copied().unwrap_or(0))
 }
 
-/// Returns the rotors of the channels of a timer: what the outputs with these numbers drive, none for the number 0.
+/// Returns the rotor of each channel of a timer. `motors` has the output number of each channel, counted from 1; number
+/// 0 has no rotor.
 pub fn rotors_of_channels(motors: [usize; CHANNELS], rotors: &[usize]) -> [Option<usize>; CHANNELS] {
     motors.map(|motor| motor.checked_sub(1).and_then(|at| rotors.get(at)).copied())
 }
 
-/// Encodes a frame for each channel. Out of line, like the control tick, to be counted.
+/// Encodes a frame for each channel. Not inlined, like the control tick, so that its instructions can be counted.
 #[inline(never)]
 fn encode<W: Copy + From<u16>>(timing: &Timing, throttles: [u16; CHANNELS], asked: Option<usize>, rows: &mut Rows<W>) {
     let [frame @ .., _] = &mut rows.0;
     timing.rows(throttles, asked, frame);
 }
 
-/// Holds pins of a port low, whatever state the program is in. Motor controllers then stop by themselves.
+/// Holds pins of a port low, in any state of the program. Motor controllers then stop by themselves.
 pub fn hold_low(port: Gpio, pins: impl IntoIterator<Item = usize>) {
-    // They become plain outputs, whose output register is 0 since start-up.
+    // The pins become plain outputs; the port's output register is 0 since start-up.
     port.moder().modify(|mode| pins.into_iter().for_each(|pin| mode.set_moder(pin, Moder::OUTPUT)));
 }

@@ -1,4 +1,4 @@
-//! A memory card by the chip's own interface to it, over four lines.
+//! A memory card on the chip's SDMMC interface, over four data lines.
 
 use afbc_log::storage::embedded_sdmmc::Block;
 use afbc_log::storage::{CardError, CardKeeper, LogCard};
@@ -10,28 +10,29 @@ use embassy_stm32::time::{Hertz, mhz};
 use embassy_time::{Duration, Instant};
 use static_cell::StaticCell;
 
-/// Clock, at most: the default speed of every card (SD Physical Layer Simplified Specification, 3.9.1). A start begins
-/// with 400 kHz.
+/// Highest clock: the default speed of every card (SD Physical Layer Simplified Specification, 3.9.1). A start begins
+/// at 400 kHz.
 const CLOCK: Hertz = mhz(24);
-/// Longest wait for a transfer: the interface itself gives up after 0.2 to 0.3 s of a card's silence.
+/// Longest wait for a transfer; the interface itself gives up after a card has been silent for 0.2 to 0.3 s.
 const PATIENCE: Duration = Duration::from_secs(1);
 
-/// What DMA transfers from and to: static, since it does not reach the stack.
+/// DMA buffers: static, since DMA does not reach the stack.
 struct Buffers {
     data: DataBlock,
     registers: CmdBlock,
 }
 
-/// Keeps logs on a card by the chip's own interface.
+/// Keeps logs on a card on the SDMMC interface.
 pub type SdCardLog = CardKeeper<'static>;
 
-/// A card. Every call waits for it, by polling: the task must be below all others.
+/// A card on SDMMC. Every call polls until the card is done, so the calling task must have a lower priority than all
+/// others.
 pub struct SdCard {
     device: StorageDevice<'static, 'static, Card>,
     buffers: &'static mut Buffers,
 }
 
-/// The card of this interface; to be called once.
+/// Creates the log on the card of this interface. Must be called only once.
 ///
 /// # Panics
 /// At a second call.
@@ -49,7 +50,8 @@ impl SdCard {
     }
 }
 
-/// Waits for a transfer, by polling. The clock is looked at by hand: its alarms wake tasks only.
+/// Polls a transfer until it has ended or [`PATIENCE`] is over. Embassy's timers cannot limit the wait, since they only
+/// wake tasks.
 fn finish(transfer: impl Future<Output = Result<(), Error>>) -> Result<(), Error> {
     let mut transfer = pin!(transfer);
     let since = Instant::now();

@@ -1,5 +1,5 @@
-//! The sensors of a usual flight controller: an IMU alone on an SPI; barometer, and compass outside, on one I2C; a GNSS
-//! receiver outside; the battery.
+//! Sensors of a usual flight controller: an IMU alone on an SPI, barometer and external compass on one I2C, an external
+//! GNSS receiver, and the battery.
 
 use crate::battery::BatteryConverter;
 use crate::candidates::{BarometerCandidates, ImuCandidates};
@@ -21,10 +21,10 @@ use firmware::self_tests::sensor;
 use firmware::{aux_sensors, samples};
 use nalgebra::Matrix3;
 
-/// The address of a QMC5883L.
+/// I2C address of a QMC5883L.
 const COMPASS_ADDRESS: u8 = 0x0D;
 
-/// An IMU, one of `P`.
+/// The IMU, one of the candidates `P`.
 pub struct Imu<P> {
     device: Device,
     interrupt: InterruptPin,
@@ -34,7 +34,7 @@ pub struct Imu<P> {
 }
 
 impl<P> Imu<P> {
-    /// The IMU on an SPI that is fed with `kernel_hz`, whose axes `to_body` turns into the body's.
+    /// Creates the IMU. `kernel_hz` is the SPI's input clock; `to_body` rotates the IMU's axes to the body's.
     pub fn new(device: Device, interrupt: InterruptPin, kernel_hz: u32, to_body: Matrix3<f32>) -> Self {
         Imu { device, interrupt, kernel_hz, to_body, parts: PhantomData }
     }
@@ -51,7 +51,7 @@ impl<P: ImuCandidates> Sampler for Imu<P> {
     }
 }
 
-/// The slow sensors, with a barometer of `P`.
+/// The slow sensors, with a barometer of the candidates `P`.
 pub struct SlowSensors<P> {
     bus: Bus,
     receiver: BufferedUart<'static>,
@@ -60,7 +60,7 @@ pub struct SlowSensors<P> {
 }
 
 impl<P> SlowSensors<P> {
-    /// Barometer and compass on `bus`, a receiver, and the battery.
+    /// Creates the sensors: barometer and compass on `bus`, the GNSS receiver and the battery.
     pub fn new(bus: Bus, receiver: BufferedUart<'static>, battery: BatteryConverter<ADC1>) -> Self {
         SlowSensors { bus, receiver, battery, parts: PhantomData }
     }
@@ -68,7 +68,7 @@ impl<P> SlowSensors<P> {
 
 impl<P: BarometerCandidates> Sampler for SlowSensors<P> {
     async fn run(self) {
-        // A lock that keeps nothing else out: all that share the bus are in this task.
+        // A lock without synchronisation suffices, since all users of the bus are in this task.
         let bus = Mutex::<NoopRawMutex, _>::new(self.bus);
         let compass = I2cRegisters::new(I2cDevice::new(&bus), COMPASS_ADDRESS);
         join4(

@@ -1,4 +1,4 @@
-//! Buses and clock of sensors.
+//! Buses and timing of sensors.
 
 use afbc_drivers::alignment::CW270_FLIP;
 use afbc_drivers::data_ready::{DataReady, Edge};
@@ -22,13 +22,13 @@ use embedded_hal_async::spi::{ErrorType, Operation, SpiDevice};
 use firmware::self_tests::{self, Asked};
 use nalgebra::Matrix3;
 
-/// Alignment of the compass beside a receiver, which faces down and is turned by 270 degrees in the usual module.
+/// Alignment of the compass in a usual GNSS module: it faces down and is rotated by 270 degrees.
 pub const COMPASS: Matrix3<f32> = CW270_FLIP;
 
-/// The control period \[us\].
+/// Control period \[us\].
 const PERIOD_US: u32 = 1_000;
 
-/// Drive of select pins: PC13 to PC15 may not be driven faster, and an edge of 100 ns is over before the first clock.
+/// Drive strength of select pins: PC13 to PC15 allow no faster one, and an edge of 100 ns ends before the first clock.
 pub const SELECT: Speed = Speed::Low;
 
 /// A part that is alone on its SPI.
@@ -38,24 +38,25 @@ pub struct Device {
 }
 
 impl Device {
-    /// The part behind a select pin, which is high from now on.
+    /// Creates the part behind a select pin, which is high from now on.
     pub fn new(spi: Spi<'static, Async, Master>, select: Peri<'static, impl Pin>) -> Self {
         Device { spi, select: Output::new(select, Level::High, SELECT) }
     }
 
-    /// Sets the fastest clock of an SPI fed with `kernel_hz` that is not above `most_hz`.
+    /// Sets the fastest clock not above `most_hz`; `kernel_hz` is the SPI's input clock.
     pub fn set_clock(&mut self, kernel_hz: u32, most_hz: u32) {
-        // Nothing can be wrong with it.
+        // These settings are always valid.
         let _ = self.spi.set_config(&spi(divided(kernel_hz, most_hz)));
     }
 }
 
-/// Returns the fastest clock that a prescaler of 2, 4 ... 256 makes of `kernel_hz`, not above `most_hz` if possible.
+/// Returns the fastest clock not above `most_hz` that a prescaler of 2, 4 ... 256 makes from `kernel_hz`; the slowest
+/// clock if all are above.
 pub(crate) fn divided(kernel_hz: u32, most_hz: u32) -> u32 {
     (1..8).map(|power| kernel_hz >> power).find(|hz| *hz <= most_hz).unwrap_or(kernel_hz >> 8)
 }
 
-/// A part's select pin while it is low; a transfer that is given up ends it too.
+/// A part's select pin while it is low. Dropping it, also with an abandoned transfer, sets the pin high.
 struct Selected<'a>(&'a mut Output<'static>);
 
 impl Drop for Selected<'_> {
@@ -74,7 +75,7 @@ impl SpiDevice for Device {
     }
 }
 
-/// An SPI that several parts of one task share.
+/// An SPI shared by several parts of one task.
 pub type SharedSpi = Mutex<NoopRawMutex, Spi<'static, Async, Master>>;
 
 /// A part that shares its SPI.
@@ -85,8 +86,8 @@ pub struct SharedDevice<'a> {
 }
 
 impl<'a> SharedDevice<'a> {
-    /// The part behind a select pin; all such pins must be high before the first transfer. Its clock is the fastest of
-    /// an SPI fed with `kernel_hz` that is not above `most_hz`.
+    /// Creates the part behind a select pin; all select pins of the SPI must be high before the first transfer. The
+    /// clock is the fastest not above `most_hz`; `kernel_hz` is the SPI's input clock.
     pub fn new(spi: &'a SharedSpi, select: Output<'static>, kernel_hz: u32, most_hz: u32) -> Self {
         SharedDevice { spi, select, config: self::spi(divided(kernel_hz, most_hz)) }
     }
@@ -98,15 +99,15 @@ impl ErrorType for SharedDevice<'_> {
 
 impl SpiDevice for SharedDevice<'_> {
     async fn transaction(&mut self, operations: &mut [Operation<'_, u8>]) -> Result<(), spi::Error> {
-        // Held to the end of the transfer: meanwhile the clock is this part's.
+        // Locked until the end of the transfer, since the SPI has this part's clock meanwhile.
         let mut spi = self.spi.lock().await;
-        // Nothing can be wrong with it.
+        // These settings are always valid.
         let _ = spi.set_config(&self.config);
         operate(&mut spi, &mut self.select, operations).await
     }
 }
 
-/// Transfers, with the select pin low meanwhile.
+/// Runs the operations with the select pin low.
 async fn operate(
     spi: &mut Spi<'static, Async, Master>,
     select: &mut Output<'static>,
@@ -126,7 +127,7 @@ async fn operate(
     Ok(())
 }
 
-/// Reads a part as [`run`] does if it answers; returns if its first reading fails.
+/// Reads a part like [`run`], but returns if its first reading fails.
 pub async fn run_if_it_answers<P: SensorPart, B: Registers, T: PartTiming>(
     mut driver: Driver<P, B, T>,
     bits: u32,
@@ -142,9 +143,9 @@ pub async fn run_if_it_answers<P: SensorPart, B: Registers, T: PartTiming>(
     }
 }
 
-/// Reads a part for ever, passes on each reading with its time, and logs when it fails and when it works again. Between
-/// two readings it runs the part's own test when that is asked for, if it has one, and puts the result for the sensor
-/// with these bits (`MAV_SYS_STATUS_SENSOR`).
+/// Reads a part forever, passes on each reading with its time, and logs when the part fails and when it works again. If
+/// the part has a self-test, runs it on request between two readings. Reports the result for the sensor with these
+/// `bits` (`MAV_SYS_STATUS_SENSOR`).
 pub async fn run<P: SensorPart, B: Registers, T: PartTiming>(
     mut driver: Driver<P, B, T>,
     bits: u32,
@@ -168,7 +169,7 @@ pub async fn run<P: SensorPart, B: Registers, T: PartTiming>(
                 take(reading);
             }
             Err(fault) => {
-                // Once: a part that has failed is tried again for ever.
+                // Log a fault only once: a failed part is tried again forever.
                 if last != Some(fault) {
                     defmt::warn!("{=str}: {}", P::NAME, defmt::Display2Format(&fault));
                 }
@@ -178,7 +179,7 @@ pub async fn run<P: SensorPart, B: Registers, T: PartTiming>(
     }
 }
 
-/// Returns how SPI is set up for a part, at no more than `clock_hz`.
+/// Returns the SPI settings for a part with this clock.
 pub fn spi(clock_hz: u32) -> spi::Config {
     let mut config = spi::Config::default();
     config.mode = MODE_3;
@@ -186,8 +187,7 @@ pub fn spi(clock_hz: u32) -> spi::Config {
     config
 }
 
-/// Returns how I2C is set up: fast mode, with a time for each transfer that a part which holds the line does not
-/// outlast.
+/// Returns the I2C settings: fast mode, and a timeout that ends a transfer whose part holds the line.
 pub fn i2c() -> i2c::Config {
     let mut config = i2c::Config::default();
     config.frequency = Hertz(400_000);
@@ -195,20 +195,20 @@ pub fn i2c() -> i2c::Config {
     config
 }
 
-/// Lines of external interrupts, each of the pins with its number on all ports.
+/// Number of external interrupt lines; a line serves the pin of the same number on one port.
 const LINES: usize = 16;
-/// Time of the last interrupt of each line, without its upper half \[us\].
+/// Time of the last interrupt of each line, lower 32 bits \[us\].
 static STAMPS: [AtomicU32; LINES] = [const { AtomicU32::new(0) }; LINES];
 
-/// Handler that notes the time of an external interrupt, to be bound in front of embassy's.
+/// Handler that records the time of an external interrupt; it must be bound before embassy's.
 pub struct StampHandler<I>(PhantomData<I>);
 
 impl<I: typelevel::Interrupt> typelevel::Handler<I> for StampHandler<I> {
     #[expect(unsafe_code, reason = "as the trait has it; nothing here is unsafe")]
     unsafe fn on_interrupt() {
-        // The lower half, since this core cannot store 64 bits at once.
+        // Only the lower half, since this core cannot store 64 bits at once.
         let now_us = Instant::now().as_micros() as u32;
-        // Of those that nobody waits for, edges are pending, too.
+        // Masked lines may have pending edges, too.
         let lines = EXTI.pr(0).read().0 & EXTI.imr(0).read().0;
         for (line, stamp) in STAMPS.iter().enumerate() {
             if lines >> line & 1 != 0 {
@@ -218,15 +218,15 @@ impl<I: typelevel::Interrupt> typelevel::Handler<I> for StampHandler<I> {
     }
 }
 
-/// The pin of a part's interrupt, whose edges rise. They are seen while something waits for them, so a noisy wire costs
-/// no more than the waits.
+/// A part's interrupt pin, for rising edges. Edges interrupt only while a task waits for one, so a noisy wire costs no
+/// more than the waits.
 pub struct InterruptPin {
     input: ExtiInput<'static, Async>,
     line: usize,
 }
 
 impl InterruptPin {
-    /// The one at a pin, with the line of the same number.
+    /// Creates the interrupt pin with the external interrupt line of the same number.
     pub fn new<T: ExtiPin + Pin, I: typelevel::Interrupt>(
         pin: Peri<'static, T>,
         line: Peri<'static, T::ExtiChannel>,
@@ -236,7 +236,7 @@ impl InterruptPin {
         T::ExtiChannel: exti::Channel<IRQ = I>,
     {
         let number = usize::from(pin.pin());
-        // Low while the wire is off.
+        // Pulled down, so that a broken wire reads low.
         InterruptPin { input: ExtiInput::new(pin, line, Pull::Down, irqs), line: number }
     }
 }
@@ -246,20 +246,20 @@ impl Edge for InterruptPin {
         self.input.wait_for_rising_edge().await;
         let now_us = Instant::now().as_micros();
         let stamp = STAMPS.get(self.line).map_or(now_us as u32, |stamp| stamp.load(Ordering::Relaxed));
-        // The difference of the lower halves is right, too, if they have wrapped in between.
+        // The difference of the lower halves is right even if they have wrapped in between.
         now_us.saturating_sub(u64::from((now_us as u32).wrapping_sub(stamp)))
     }
 }
 
-/// The timing of a part with an interrupt, which is read by the control period's clock while none comes.
+/// Timing of a part with an interrupt; while none comes, the part is read at every control period.
 pub type Interrupted<E = InterruptPin> = DataReady<E, Polled>;
 
-/// The timing of a part with this pin.
+/// Makes the timing of a part with this interrupt pin.
 pub fn interrupted<E: Edge>(pin: E) -> Interrupted<E> {
     DataReady::new(pin, Polled, PERIOD_US)
 }
 
-/// The clock of a part whose interrupt is not wired: it is read at the start of every control period.
+/// Timing of a part whose interrupt is not wired: it is read at the start of every control period.
 pub struct Polled;
 
 impl PartTiming for Polled {

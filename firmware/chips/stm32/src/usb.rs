@@ -1,7 +1,7 @@
-//! A link by USB: a serial port (CDC-ACM) on the full-speed core, OTG_FS. Baud rates that a host sets have no effect.
+//! A link by USB: a serial port (CDC-ACM) on the full-speed core OTG_FS. Baud rates set by the host have no effect.
 //!
-//! Interrupt and tasks have the lowest priority, since a host waits. A flight goes on without them: the links' task
-//! only touches two rings, and bytes for a host that does not read are dropped.
+//! The USB interrupt and tasks have the lowest priority, since a host waits. A flight does not depend on them: the
+//! links' task only accesses two rings, and bytes for a host that does not read are dropped.
 
 use embassy_executor::SpawnToken;
 use embassy_futures::join::join3;
@@ -19,37 +19,37 @@ use embassy_usb::class::cdc_acm::{self, CdcAcmClass};
 use firmware::executors::{self, priority};
 use static_cell::StaticCell;
 
-/// Vendor and product: pid.codes' for tests, since this project has none of its own.
+/// Vendor and product: pid.codes' test IDs, since this project has none of its own.
 const VENDOR: u16 = 0x1209;
 const PRODUCT: u16 = 0x0001;
-/// Largest packet, of the port and of the control endpoint \[bytes\].
+/// Largest packet of the port and of the control endpoint \[bytes\].
 const PACKET_MAX: usize = 64;
-/// Largest packet sent \[bytes\]: a host would wait for more after one of the largest size.
+/// Largest packet sent \[bytes\]: after a packet of full size, a host would wait for more.
 const SENT_MAX: usize = PACKET_MAX - 1;
-/// A host that has not read for this long gets newer bytes when it reads again.
+/// If a host has not read for this long, the waiting bytes are dropped.
 const STALLED: Duration = Duration::from_millis(100);
-/// Time from the start of the time base to that of USB.
+/// Delay of USB's start after the time base's start.
 const START: Duration = Duration::from_millis(100);
-/// Identification of the cores that the driver knows; one that is not there reads 0.
+/// Core identifications that the driver supports; a missing core reads 0.
 const CORES: [u32; 7] = [0x1000, 0x1100, 0x1200, 0x2000, 0x2100, 0x2300, 0x3100];
 
 /// Bytes from the host.
 pub(crate) static RECEIVED: Pipe<CriticalSectionRawMutex, 256> = Pipe::new();
-/// Bytes for the host: all messages after a tick, and some more.
+/// Bytes for the host: room for all messages after a tick and some more.
 static SENT: Pipe<CriticalSectionRawMutex, 1024> = Pipe::new();
 
-/// The port, once it is started.
+/// Proof that the port was started.
 pub struct UsbPort(());
 
-/// Starts the port of the core with its pins D+ and D-, whose clock must have 48 MHz. The voltage of the bus is not
-/// sensed, since its pin, PA9, is a UART's.
+/// Starts the port on the core's pins D+ and D-; the core's clock must be 48 MHz. The bus voltage is not sensed, since
+/// its pin, PA9, belongs to a UART.
 pub fn start(
     core: Peri<'static, USB_OTG_FS>,
     plus: Peri<'static, impl DpPin<USB_OTG_FS>>,
     minus: Peri<'static, impl DmPin<USB_OTG_FS>>,
     line: impl Binding<<USB_OTG_FS as Instance>::Interrupt, InterruptHandler<USB_OTG_FS>> + 'static,
 ) -> UsbPort {
-    // Packets of the port and of the control endpoint.
+    // Packet buffer of the port and of the control endpoint.
     static PACKETS: StaticCell<[u8; 2 * PACKET_MAX]> = StaticCell::new();
     let mut config = Config::default();
     config.vbus_detection = false;
@@ -60,31 +60,32 @@ pub fn start(
     UsbPort(())
 }
 
-/// Bytes that are copied at once into the ring for the host.
+/// Number of bytes copied at once into the ring for the host.
 pub const PIECE: usize = 64;
 
-/// Queues bytes for the host, all of them or, if it is too far behind, none; returns whether it has.
+/// Queues all bytes for the host and returns true, or queues none and returns false if the ring is too full.
 pub(crate) fn send(mut bytes: &[u8]) -> bool {
-    // The room stays, since only the links' task writes.
+    // The free room cannot shrink, since only the links' task writes.
     if SENT.free_capacity() < bytes.len() {
         return false;
     }
-    // A piece at a time: all interrupts wait for one to be copied. The ring accepts bytes up to its end, then the rest.
+    // Copy in pieces, since all interrupts wait during a copy. The ring accepts bytes up to its end first, then the
+    // rest.
     while let Ok(length @ 1..) = SENT.try_write(bytes.get(..PIECE).unwrap_or(bytes)) {
         bytes = bytes.get(length..).unwrap_or_default();
     }
     true
 }
 
-/// Spawns the port's task from within its executor, where it need not be Send, when the vehicle runs already: nothing
-/// of USB may hold up its start.
+/// Spawns the port's task from within its executor, where the task need not be Send. Waits until the vehicle runs: USB
+/// must not delay its start.
 #[embassy_executor::task]
 async fn wait(driver: Driver<'static, USB_OTG_FS>) {
     Timer::after(START).await;
     executors::spawner().await.spawn(claim(driver));
 }
 
-/// Prepares the port's task. Out of line, to be identified in the image.
+/// Prepares the port's task. Not inlined, so that it can be identified in the image.
 #[inline(never)]
 fn claim(driver: Driver<'static, USB_OTG_FS>) -> SpawnToken<impl Sized> {
     executors::once(port(driver))
@@ -100,7 +101,7 @@ async fn port(driver: Driver<'static, USB_OTG_FS>) {
     config.manufacturer = Some("AFBC");
     config.product = Some("AFBC flight controller");
     config.serial_number = Some(uid::uid_hex());
-    // In mA, the most of USB 2.0: the port feeds the board.
+    // Largest current of USB 2.0 \[mA\]: the port powers the board.
     config.max_power = 500;
     let (mut configuration, mut capabilities, mut control) = ([0; 80], [0; 16], [0; PACKET_MAX]);
     let mut state = cdc_acm::State::new();
@@ -110,8 +111,8 @@ async fn port(driver: Driver<'static, USB_OTG_FS>) {
     join3(device.run(), pass_on(sender), take_in(receiver)).await;
 }
 
-/// True if the core is there, and clears flags by ones: the driver would wait forever for one that does not. Out of
-/// line, to be identified in the image.
+/// Returns true if the core exists and its interrupt flags can be cleared: otherwise the driver would wait forever. Not
+/// inlined, so that it can be identified in the image.
 #[inline(never)]
 fn answers() -> bool {
     rcc::enable_and_reset::<USB_OTG_FS>();
@@ -120,12 +121,12 @@ fn answers() -> bool {
     CORES.contains(&core.cid().read().0) && core.gintsts().read() != ones
 }
 
-/// Sends what the ring holds whenever a host is there.
+/// Sends the ring's bytes whenever a host is connected.
 async fn pass_on<'d>(mut sender: cdc_acm::Sender<'d, Driver<'d, USB_OTG_FS>>) {
     let mut packet = [0; SENT_MAX];
     loop {
         sender.wait_connection().await;
-        // What was for the last host is old.
+        // Bytes for the previous host are outdated.
         SENT.clear();
         let mut connected = true;
         while connected {
@@ -141,7 +142,7 @@ async fn pass_on<'d>(mut sender: cdc_acm::Sender<'d, Driver<'d, USB_OTG_FS>>) {
     }
 }
 
-/// Fills the ring. While it is full, the host waits.
+/// Fills the ring with received bytes. While the ring is full, the host waits.
 async fn take_in<'d>(mut receiver: cdc_acm::Receiver<'d, Driver<'d, USB_OTG_FS>>) {
     let mut packet = [0; PACKET_MAX];
     loop {

@@ -1,5 +1,5 @@
-//! Clocks: 168 MHz, the chip's rated speed, from the crystal or, if that fails, from the chip's own
-//! oscillator; and the flash settings for this speed.
+//! Sets up the clocks: 168 MHz, the chip's rated speed, from the crystal or, if that fails, from the internal
+//! oscillator. Also sets up the flash for this speed.
 //!
 //! The internal oscillator is accurate to 1 % at room temperature. The vehicle can fly on it, with all times up to 1 %
 //! too short or too long, but arming is refused ([`crystal::has_failed`]).
@@ -15,14 +15,14 @@ use embassy_stm32::{Config, Peripherals};
 
 /// Clock of the core \[Hz\].
 pub const CORE_HZ: u32 = 168_000_000;
-/// Input of the PLL \[Hz\]; a crystal has a multiple of it.
+/// Input of the PLL \[Hz\]; the crystal's frequency must be a multiple of it.
 const PLL_INPUT_HZ: u32 = 2_000_000;
-/// Core cycles in a millisecond, before the clocks are set up.
+/// Core cycles per millisecond before the clocks are set up.
 const START_UP_CYCLES_PER_MS: u32 = 16_000;
-/// Polls of the PLL until it counts as broken: at 16 MHz some 3 ms, of which it needs 0.3.
+/// Polls of the PLL until it counts as broken: some 3 ms at 16 MHz; the PLL needs 0.3 ms.
 const LOCK_LOOKS: u32 = 5_000;
 
-/// Sets up clocks and flash of a board with a crystal of `CRYSTAL_HZ`: 4 to 26 MHz, in steps of 2 MHz. To be called
+/// Sets up clocks and flash of a board with a crystal of `CRYSTAL_HZ`: 4 to 26 MHz in steps of 2 MHz. Must be called
 /// once after reset.
 pub fn start<const CRYSTAL_HZ: u32>() -> Peripherals {
     const { assert!(CRYSTAL_HZ.is_multiple_of(PLL_INPUT_HZ) && CRYSTAL_HZ >= 4_000_000 && CRYSTAL_HZ <= 26_000_000) }
@@ -30,20 +30,20 @@ pub fn start<const CRYSTAL_HZ: u32>() -> Peripherals {
     let starts = crystal::starts(START_UP_CYCLES_PER_MS, || RCC.cr().read().hserdy());
     let peripherals = embassy_stm32::init(config::<CRYSTAL_HZ>(starts));
     speed_up_flash();
-    // The clock security system switches to the chip's oscillator and raises an NMI if the crystal fails.
+    // The clock security system switches to the internal oscillator and raises an NMI if the crystal fails.
     RCC.cr().modify(|cr| cr.set_csson(starts));
     peripherals
 }
 
-/// 168 MHz; buses at 168, 42 and 84 MHz; USB at 48.
+/// Returns the clock settings: core 168 MHz, buses 168, 42 and 84 MHz, USB 48 MHz.
 fn config<const CRYSTAL_HZ: u32>(crystal: bool) -> Config {
     let source = if crystal { PllSource::HSE } else { PllSource::HSI };
-    // The chip's own oscillator has 16 MHz.
+    // The internal oscillator has 16 MHz.
     let prediv = if crystal { PllPreDiv::from_bits((CRYSTAL_HZ / PLL_INPUT_HZ) as u8) } else { PllPreDiv::DIV8 };
     let mut config = Config::default();
     config.rcc.hse = crystal.then_some(Hse { freq: Hertz(CRYSTAL_HZ), mode: HseMode::Oscillator });
     config.rcc.pll_src = source;
-    // 336 MHz: half of it for the core, a seventh for USB.
+    // PLL at 336 MHz: a half for the core, a seventh for USB.
     config.rcc.pll =
         Some(Pll { prediv, mul: PllMul::MUL168, divp: Some(PllPDiv::DIV2), divq: Some(PllQDiv::DIV7), divr: None });
     config.rcc.sys = Sysclk::PLL1_P;
@@ -53,13 +53,13 @@ fn config<const CRYSTAL_HZ: u32>(crystal: bool) -> Config {
     config
 }
 
-/// First revision of the chip (Z) with a working flash prefetch; on revision A it corrupts the data.
+/// First chip revision (Z) whose flash prefetch works; on revision A it corrupts the data.
 const REVISION_Z: u16 = 0x1001;
 
-/// Turns on the flash's caches and its prefetch, which embassy leaves off: they hide most of the five wait states.
+/// Turns on the flash's caches and prefetch, which embassy leaves off: they hide most of the five wait states.
 fn speed_up_flash() {
     let acr = FLASH.acr();
-    // Off now, as required for a flush: a boot loader may have used them.
+    // The caches are off now, as a flush requires; a boot loader may have filled them.
     acr.modify(|acr| {
         acr.set_icrst(true);
         acr.set_dcrst(true);
@@ -73,7 +73,7 @@ fn speed_up_flash() {
     });
 }
 
-/// Handles a failed crystal: the core runs at 16 MHz, and is set to 168 MHz again within a control period.
+/// Handles a failed crystal: the core, now at 16 MHz, is set to 168 MHz again within a control period.
 #[allow(unsafe_code, reason = "required by the runtime: this interrupts critical sections")]
 #[cortex_m_rt::exception]
 unsafe fn NonMaskableInt() {
@@ -92,7 +92,7 @@ unsafe fn NonMaskableInt() {
         pll.set_pllm(Pllm::DIV8);
     });
     RCC.cr().modify(|cr| cr.set_pllon(true));
-    // Counted, since the time base stands still during an NMI.
+    // Count polls, since the time base stands still during an NMI.
     if (0..LOCK_LOOKS).any(|_| RCC.cr().read().pllrdy()) {
         RCC.cfgr().modify(|cfgr| cfgr.set_sw(Sw::PLL1_P));
     }

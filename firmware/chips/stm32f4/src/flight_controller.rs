@@ -1,30 +1,31 @@
-//! A usual flight controller by a table of its pins.
+//! Builds a usual flight controller from a table of its pins.
 
-/// Builds the image of a usual flight controller with a STM32F405 or a relative: implements
-/// [`Board`](firmware::board::Board) for it. The program is called `flight-` and the board's name, and its package has
-/// all of the dependencies.
+/// Builds the image of a usual flight controller with an STM32F405 or a relative: implements
+/// [`Board`](firmware::board::Board) for it. The program must be called `flight-` and the board's name, and its package
+/// must have all of the dependencies.
 ///
-/// * `escs` is the UART whose RX is wired to the motor controllers' telemetry, if one is; its TX sends nothing.
-/// * USB is on PA11 and PA12, as on every chip of the kind.
-/// * Each peripheral has its DMA's streams, as `DMA1_CH6` for stream 6, with their interrupts.
-/// * The IMU's interrupt has a pin, the line of the pin's number, as `EXTI5`, and that one's interrupt, as `EXTI9_5`.
-/// * A radio receiver has a UART of its own, if there is one to spare, as the last link. A receiver of SBUS is on the
-///   pad named there, before which the board has an inverter: the chip has none. An inverter that is switched, before a
-///   pad that CRSF is on, too, has a pin, high for SBUS.
-/// * IMU and barometer are [candidates](chip_stm32::candidates): the one that answers is read. How the IMU sits is one
-///   of `afbc_drivers::alignment`.
-/// * The battery's voltage and current are on pins of the converter, by the board's divider and amplifier.
+/// * `escs` is the UART whose RX is wired to the motor controllers' telemetry, if there is one; its TX sends nothing.
+/// * USB is on PA11 and PA12, as on every such chip.
+/// * Each peripheral has the streams of its DMA, such as `DMA1_CH6` for stream 6, with their interrupts.
+/// * The IMU's interrupt has a pin, the EXTI line of the pin's number, such as `EXTI5`, and the line's interrupt, such
+///   as `EXTI9_5`.
+/// * A radio receiver has its own UART as the last link, if there is one to spare. An SBUS receiver is on the pad named
+///   there. The board has an inverter before that pad, since the chip has none. If the pad is also used for CRSF, a pin
+///   switches the inverter: high for SBUS.
+/// * IMU and barometer are [candidates](chip_stm32::candidates): the part that answers is read. The IMU's alignment is
+///   one of `afbc_drivers::alignment`.
+/// * The battery's voltage and current are on ADC pins, scaled by the board's divider and amplifier.
 /// * The buzzer sounds while its pin is high; the LED, if there is one, is lit while its pin is low.
-/// * The enable pin of the board's Bluetooth, if it has one, is held low: it is not used, and sends beside the radio
-///   receiver.
-/// * The memory card for logs, if there is one, has an SPI of its own; `quiet` are the select pins of whatever else is
-///   there. So has the flash chip for logs of a board without a card.
-/// * Motors are so many, numbered as [`numbering`](chip_stm32::motors::numbering) has it. They have a line for each
-///   timer, with the type of its registers, the stream of its updates, and what its channels 1 to 4 drive: the pin, the
-///   same again as port and number, and the number of the motor.
+/// * The enable pin of the board's Bluetooth, if there is one, is held low: Bluetooth is not used and would transmit
+///   near the radio receiver.
+/// * The memory card for logs, if there is one, has its own SPI; `quiet` are the select pins of the other parts on it.
+///   On a board without a card, a flash chip for logs has its own SPI.
+/// * `motors` is the number of outputs and their [`numbering`](chip_stm32::motors::numbering). Each timer has a line
+///   with the width of its registers, the DMA stream of its updates, and its channels 1 to 4. A channel has the motor's
+///   pin, the same pin as port and number, and the number of the motor.
 ///
-/// The compiler checks that a pin belongs to the peripheral, and a stream to the direction; that nothing is used twice;
-/// and, when it links, that no interrupt has two handlers. Priorities follow from what an interrupt is for.
+/// The compiler checks that a pin belongs to its peripheral and a stream to its direction, and that nothing is used
+/// twice. The linker checks that no interrupt has two handlers. Priorities follow from the purpose of each interrupt.
 #[macro_export]
 macro_rules! flight_controller {
     (
@@ -84,7 +85,7 @@ macro_rules! flight_controller {
             OTG_FS => embassy_stm32::usb::InterruptHandler<peripherals::USB_OTG_FS>;
         });
 
-        /// Each interrupt with its priority.
+        /// Interrupts with their priorities.
         const PRIORITIES: &[(interrupt::Interrupt, u8)] = {
             use firmware::executors::priority;
             use interrupt::Interrupt;
@@ -113,7 +114,7 @@ macro_rules! flight_controller {
         /// The board after start-up.
         struct FlightController {
             watchdog: embassy_stm32::wdg::IndependentWatchdog<'static, peripherals::IWDG>,
-            /// Index of the rotor of each output.
+            /// Rotor index of each output.
             rotors: [usize; $outputs],
         }
 
@@ -125,7 +126,7 @@ macro_rules! flight_controller {
             type Log = chip_stm32f4::flight_controller!(@log $(card $card)? $(flash $flash)?);
             type Memory = embassy_stm32::flash::Bank1Region1<'static, embassy_stm32::flash::Blocking>;
             const CORE_HZ: u32 = chip_stm32f4::clocks::CORE_HZ;
-            /// Sectors 1 and 2, of 16 KiB each (`memory.x`).
+            /// Size of sectors 1 and 2, of 16 KiB each (`memory.x`).
             const STORE: u32 = 16 * 1024;
             const OUTPUTS: usize = $outputs;
             const INDICATES: bool = true;
@@ -159,9 +160,10 @@ macro_rules! flight_controller {
                 use chip_stm32::line::Line;
                 use chip_stm32::receiver::TX_RING;
 
-                // Ring buffers of the link and of the receiver.
+                // Ring buffers of the link's UART.
                 static RINGS: [StaticCell<[u8; 1024]>; 2] = [const { StaticCell::new() }; 2];
-                // 15 ms of its fastest line: with more, less than a quarter of a SpeedyBee F405 V4's RAM is free.
+                // Room for 15 ms at the fastest baud rate: with more, less than a quarter of a SpeedyBee F405 V4's RAM
+                // would be free.
                 static GNSS_RX: StaticCell<[u8; 352]> = StaticCell::new();
                 static GNSS_TX: StaticCell<[u8; TX_RING]> = StaticCell::new();
 
@@ -201,7 +203,7 @@ macro_rules! flight_controller {
                 )?
 
                 let kernel_hz = embassy_stm32::rcc::frequency::<peripherals::$spi>().0;
-                // The slowest clock at first: it becomes the part's once one is tried.
+                // The slowest clock at first; each candidate sets its own.
                 let config = chip_stm32::sensors::spi(kernel_hz / 256);
                 let spi = embassy_stm32::spi::Spi::new(
                     p.$spi, p.$sck, p.$mosi, p.$miso, p.$spi_tx, p.$spi_rx, Irqs, config,
@@ -240,7 +242,7 @@ macro_rules! flight_controller {
                 let buzzer = chip_stm32::indicator::ActiveBuzzer::new(p.$buzzer);
                 firmware::executors::housekeeping().spawn(firmware::executors::once(indicator(led, buzzer)));
 
-                // A debugger that halts the core halts the watchdog.
+                // A debugger that halts the core also halts the watchdog.
                 pac::DBGMCU.apb1fzr().modify(|freeze| freeze.set_iwdg(true));
                 let rotors = chip_stm32::motors::rotors_of_outputs(
                     chip_stm32::motors::numbering::$numbering,
@@ -263,7 +265,8 @@ macro_rules! flight_controller {
                         chip_stm32::link::new(link.expect("the baud rate divides the clock")),
                         chip_stm32::link::of_usb(chip_stm32::usb::start(p.USB_OTG_FS, p.PA12, p.PA11, Irqs)),
                         $({
-                            // The pad's name is for the board's page, which a test compares with the table.
+                            // The pad's name is for the board's documentation page; a test compares the page with this
+                            // table.
                             let _: &str = $sbus;
                             chip_stm32::link::new(radio.expect("the baud rate divides the clock"))
                         },)?
@@ -281,7 +284,7 @@ macro_rules! flight_controller {
                 self.watchdog.unleash();
             }
 
-            /// True if the crystal has failed and the chip's own oscillator has taken over.
+            /// Returns true if the crystal has failed and the internal oscillator has taken over.
             fn clock_has_failed(&self) -> bool {
                 chip_stm32::crystal::has_failed()
             }
@@ -307,7 +310,7 @@ macro_rules! flight_controller {
             mod $task {
                 use embassy_stm32::peripherals::{$dma, $timer};
 
-                /// Newest throttles, for the task.
+                /// Newest throttles for the task.
                 pub(super) static THROTTLES: chip_stm32::motors::Throttles = chip_stm32::motors::Throttles::new();
 
                 #[embassy_executor::task]
@@ -327,12 +330,12 @@ macro_rules! flight_controller {
             chip_stm32::indicator::run(led, buzzer).await
         }
 
-        /// Stops the motors' signals, whatever state the program is in.
+        /// Stops the motors' signals, in any state of the program.
         fn stop_motors() {
             $($(chip_stm32f4::flight_controller!(@stop $channel);)+)+
         }
     };
-    // The interrupt lines of CAN1 and CAN2, which this firmware does not need.
+    // The executors use the interrupts of CAN1 and CAN2, which this firmware does not need otherwise.
     (@image $storage:ident $bus:ident) => {
         firmware::image!(
             FlightController, control: CAN2_TX, comms: CAN2_RX0, housekeeping: CAN2_RX1, sampling: CAN1_TX,
@@ -353,7 +356,7 @@ macro_rules! flight_controller {
         @new_log $p:ident, card $card:ident, $sck:ident, $mosi:ident, $miso:ident, $select:ident, $($quiet:ident),*
     ) => {{
         $(
-            // For ever: a pin that is dropped is an input again.
+            // Kept forever, since dropping a pin would make it an input again.
             core::mem::forget(embassy_stm32::gpio::Output::new(
                 $p.$quiet,
                 embassy_stm32::gpio::Level::High,

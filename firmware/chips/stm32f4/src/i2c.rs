@@ -2,8 +2,8 @@
 
 use embassy_stm32::pac::i2c::I2c;
 
-/// Resets a controller that is not set up by its driver again: a transfer that was given up, or a glitch, leaves it
-/// waiting for ever.
+/// Resets a controller and restores the settings of its driver, which does not set it up again. An abandoned transfer
+/// or a glitch can leave the controller waiting forever.
 pub fn restart(i2c: I2c) {
     let (clock, ratio, rise) = (i2c.cr2().read().freq(), i2c.ccr().read(), i2c.trise().read());
     i2c.cr1().write(|cr1| cr1.set_swrst(true));

@@ -1,5 +1,5 @@
-//! What boards with an STM32F405 or a relative (F407, F415, F427) share. The chip's name is a feature of
-//! `embassy-stm32` that the board sets.
+//! Code shared by boards with an STM32F405 or a relative (F407, F415, F427). The board selects the chip by a feature of
+//! `embassy-stm32`.
 #![no_std]
 
 pub mod boot_loader;

@@ -1,18 +1,18 @@
-//! The boot loader in the chip's system memory.
+//! Enters the boot loader in the chip's system memory.
 
 use chip_stm32::boot_loader;
 use embassy_stm32::pac::PWR;
 
-/// Where it begins within the system memory (AN2606, STM32H743).
+/// Address of the boot loader in the system memory (AN2606, STM32H743).
 const VECTORS: usize = 0x1FF0_9800;
 
-/// Restarts the chip into it.
+/// Restarts the chip into the boot loader.
 pub fn restart() -> ! {
     unlock();
     boot_loader::restart()
 }
 
-/// Enters it after a [`restart`]. To be called first after a reset.
+/// Enters the boot loader after a [`restart`]. Must be called first after a reset.
 pub fn enter_if_wanted() {
     unlock();
     boot_loader::enter_if_wanted(VECTORS, || ());

@@ -1,5 +1,6 @@
-//! Clocks: 400 MHz, which chips of every revision reach, from the crystal or, if that fails, from the chip's own
-//! oscillator; and the instruction cache. The data cache stays off, so that DMA and core see the same memory.
+//! Sets up the clocks: 400 MHz, which chips of every revision reach, from the crystal or, if that fails, from the
+//! internal oscillator. Also turns on the instruction cache. The data cache stays off, so that DMA and core see the
+//! same memory.
 //!
 //! The internal oscillator is accurate to 1 % at room temperature. The vehicle can fly on it, with all times up to 1 %
 //! too short or too long, but arming is refused ([`crystal::has_failed`]).
@@ -19,16 +20,16 @@ use embassy_stm32::{Config, Peripherals};
 
 /// Clock of the core \[Hz\].
 pub const CORE_HZ: u32 = 400_000_000;
-/// Input of the PLL \[Hz\], above the 2 MHz up to which its fast oscillator must not be used; a crystal has a multiple
-/// of it.
+/// Input of the PLL \[Hz\]; the crystal's frequency must be a multiple of it. The PLL's fast oscillator must not be
+/// used at 2 MHz or below.
 const PLL_INPUT_HZ: u32 = 4_000_000;
-/// Core cycles in a millisecond, before the clocks are set up.
+/// Core cycles per millisecond before the clocks are set up.
 const START_UP_CYCLES_PER_MS: u32 = 64_000;
-/// Polls of the PLL until it counts as broken: at 64 MHz some 2 ms, of which it needs 0.2.
+/// Polls of the PLL until it counts as broken: some 2 ms at 64 MHz; the PLL needs 0.2 ms.
 const LOCK_LOOKS: u32 = 10_000;
 
-/// Sets up the clocks of a board with a crystal of `CRYSTAL_HZ`: 4 to 48 MHz, in steps of 4 MHz. To be called
-/// once after reset.
+/// Sets up the clocks of a board with a crystal of `CRYSTAL_HZ`: 4 to 48 MHz in steps of 4 MHz. Must be called once
+/// after reset.
 pub fn start<const CRYSTAL_HZ: u32>(scb: &mut SCB) -> Peripherals {
     const { assert!(CRYSTAL_HZ.is_multiple_of(PLL_INPUT_HZ) && CRYSTAL_HZ >= 4_000_000 && CRYSTAL_HZ <= 48_000_000) }
     limit_ram_reads();
@@ -37,33 +38,32 @@ pub fn start<const CRYSTAL_HZ: u32>(scb: &mut SCB) -> Peripherals {
     let peripherals = embassy_stm32::init(config::<CRYSTAL_HZ>(starts));
     trim_usb_clock();
     scb.enable_icache();
-    // The clock security system switches to the chip's oscillator and raises an NMI if the crystal fails.
+    // The clock security system switches to the internal oscillator and raises an NMI if the crystal fails.
     RCC.cr().modify(|cr| cr.set_hsecsson(starts));
     peripherals
 }
 
-/// First revision of the chip (X) whose AXI RAM takes several reads at once: earlier ones (Z, Y) may then answer with
-/// wrong data.
+/// First chip revision (X) whose AXI RAM handles several reads at once; earlier ones (Z, Y) may then return wrong data.
 const REVISION_X: u16 = 0x2001;
 
-/// Lets the AXI RAM take one read after the other on a chip of an early revision, as ES0392 has it ("Reading from AXI
-/// SRAM may lead to data read corruption").
+/// Limits the AXI RAM to one read at a time on a chip of an early revision, as ES0392 requires ("Reading from AXI SRAM
+/// may lead to data read corruption").
 #[expect(unsafe_code, reason = "an address that the register definitions lack")]
 fn limit_ram_reads() {
-    /// AXI_TARG7_FN_MOD, which the register definitions lack, and its bit READ_ISS_OVERRIDE.
+    /// Register AXI_TARG7_FN_MOD, which the register definitions lack, and its bit READ_ISS_OVERRIDE.
     const TARGET_7: *mut u32 = 0x5100_8108 as *mut u32;
     const ONE_READ: u32 = 1;
     if DBGMCU.idc().read().rev_id() < REVISION_X {
-        // SAFETY: a register of the bus matrix that nothing else uses, as the errata sheet has it.
+        // SAFETY: a register of the bus matrix that nothing else uses, as documented in the errata sheet.
         unsafe { TARGET_7.write_volatile(ONE_READ) };
     }
 }
 
-/// 400 MHz; buses at 200 MHz, peripherals' and SPI at 100, timers at 200; USB at 48 by an oscillator of its own, so
-/// that it needs no PLL that the crystal's failure would stop.
+/// Returns the clock settings: core 400 MHz, buses 200 MHz, peripherals and SPI 100 MHz, timers 200 MHz, USB 48 MHz.
+/// USB has its own oscillator, so that a failed crystal does not stop it.
 fn config<const CRYSTAL_HZ: u32>(crystal: bool) -> Config {
     let source = if crystal { PllSource::HSE } else { PllSource::HSI };
-    // The chip's own oscillator has 64 MHz.
+    // The internal oscillator has 64 MHz.
     let prediv = if crystal { PllPreDiv::from_bits((CRYSTAL_HZ / PLL_INPUT_HZ) as u8) } else { PllPreDiv::DIV16 };
     let mut config = Config::default();
     let rcc = &mut config.rcc;
@@ -86,22 +86,22 @@ fn config<const CRYSTAL_HZ: u32>(crystal: bool) -> Config {
     rcc.apb2_pre = APBPrescaler::DIV2;
     rcc.apb3_pre = APBPrescaler::DIV2;
     rcc.apb4_pre = APBPrescaler::DIV2;
-    // The converters run on the chip's own oscillator, which no failure of the crystal stops.
+    // The ADCs run on the internal oscillator, which a failed crystal does not stop.
     rcc.mux.adcsel = mux::Adcsel::PER;
     config
 }
 
-/// Selects the host's frames on OTG_FS, which the manual calls USB2, as what trims USB's clock; embassy selects OTG_HS.
+/// Trims USB's clock by the host's frames on OTG_FS, which the manual calls USB2; embassy selects OTG_HS.
 fn trim_usb_clock() {
-    /// USB2 in the field SYNCSRC.
+    /// Value of the field SYNCSRC for USB2.
     const USB2: Syncsrc = Syncsrc::_RESERVED_3;
-    // The source may change while the counter is off.
+    // The source can be changed only while the counter is off.
     CRS.cr().modify(|cr| cr.set_cen(false));
     CRS.cfgr().modify(|cfgr| cfgr.set_syncsrc(USB2));
     CRS.cr().modify(|cr| cr.set_cen(true));
 }
 
-/// Handles a failed crystal: the core runs at 64 MHz, and is set to 400 MHz again within a few control periods.
+/// Handles a failed crystal: the core, now at 64 MHz, is set to 400 MHz again within a few control periods.
 #[allow(unsafe_code, reason = "required by the runtime: this interrupts critical sections")]
 #[cortex_m_rt::exception]
 unsafe fn NonMaskableInt() {
@@ -120,7 +120,7 @@ unsafe fn NonMaskableInt() {
         pll.set_divm(0, Pllm::DIV16);
     });
     RCC.cr().modify(|cr| cr.set_pllon(0, true));
-    // Counted, since the time base stands still during an NMI.
+    // Count polls, since the time base stands still during an NMI.
     if (0..LOCK_LOOKS).any(|_| RCC.cr().read().pllrdy(0)) {
         RCC.cfgr().modify(|cfgr| cfgr.set_sw(Sw::PLL1_P));
     }

@@ -1,8 +1,8 @@
-//! Parameters in the first two sectors of the flash's second bank, while the code runs from the first: writing and
-//! erasing do not stop the core.
+//! Stores parameters in the first two sectors of the flash's second bank. The code runs from the first bank, so writing
+//! and erasing do not stop the core.
 //!
-//! The chip programs 256 bits at once, with a checksum over them, and only once after an erase. So every word of four
-//! bytes has 32 bytes for itself: a sector of 128 KiB counts as one of 16 KiB.
+//! The chip programs 256 bits at once, with a checksum, and only once after an erase. So every word of four bytes takes
+//! 32 bytes of flash, and a sector of 128 KiB holds 16 KiB.
 
 use core::arch::asm;
 use cortex_m::peripheral::SCB;
@@ -11,26 +11,26 @@ use embassy_stm32::pac;
 use embassy_stm32::peripherals::FLASH;
 use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash};
 
-/// The second bank.
+/// Index and address of the second bank.
 const BANK: usize = 1;
 const BANK_ADDRESS: u32 = 0x0810_0000;
-/// Words of a program operation, of which one is used.
+/// Words per program operation, of which one is used.
 const WORDS: u32 = 8;
-/// Bytes of a word.
+/// Size of a word \[bytes\].
 const WORD: usize = 4;
-/// Sectors, and bytes of each as counted here.
+/// Number of sectors, and usable size of each \[bytes\].
 const SECTORS: u32 = 2;
 const SECTOR: u32 = 128 * 1024 / WORDS;
 /// Keys that unlock a bank.
 const KEYS: [u32; 2] = [0x4567_0123, 0xCDEF_89AB];
-/// Bit of the configuration and control register: loads that fail are ignored while faults are masked.
+/// Bit of the configuration and control register that ignores bus faults of loads while faults are masked.
 const BFHFNMIGN: u32 = 1 << 8;
 
-/// The two sectors, as words of four bytes.
+/// The two sectors as words of four bytes.
 pub struct Words(Peri<'static, FLASH>);
 
 impl Words {
-    /// Takes the flash, to be called at the start.
+    /// Takes the flash. Must be called at the start.
     pub fn new(flash: Peri<'static, FLASH>) -> Self {
         Words(flash)
     }
@@ -61,7 +61,7 @@ impl NorFlash for Words {
     const ERASE_SIZE: usize = SECTOR as usize;
 
     fn erase(&mut self, from: u32, to: u32) -> Result<(), NorFlashErrorKind> {
-        // An end before the beginning wraps to a length beyond the sectors, which is refused.
+        // An end before the start wraps to a length beyond the sectors, which is refused.
         check(from, to.wrapping_sub(from) as usize, SECTOR as usize)?;
         for sector in from / SECTOR..to / SECTOR {
             unlocked(|| {
@@ -105,22 +105,22 @@ fn addresses(offset: u32) -> impl Iterator<Item = u32> {
     (BANK_ADDRESS + offset * WORDS..).step_by(WORD * WORDS as usize)
 }
 
-/// Unlocks the bank, does something with it, waits until that is done, and locks it again.
+/// Unlocks the bank, starts an operation, waits until it is done, and locks the bank again.
 fn unlocked(start: impl FnOnce()) -> Result<(), NorFlashErrorKind> {
     let bank = pac::FLASH.bank(BANK);
     for key in KEYS {
         bank.keyr().write_value(key);
     }
     start();
-    // All stores have reached the flash before its status is read.
+    // Wait until all stores have reached the flash, before reading its status.
     cortex_m::asm::dsb();
-    // Only who writes waits: interrupts are served meanwhile, from the other bank.
+    // Only the caller waits: interrupts run meanwhile from the other bank.
     while {
         let sr = bank.sr().read();
         sr.bsy() || sr.qw()
     } {}
     let sr = bank.sr().read();
-    // Flags stay until they are cleared, and would be taken for a failure of the next operation.
+    // The flags persist until cleared and would be taken for a failure of the next operation.
     bank.ccr().write(|ccr| {
         ccr.set_clr_eop(true);
         ccr.set_clr_wrperr(true);
@@ -138,23 +138,25 @@ fn unlocked(start: impl FnOnce()) -> Result<(), NorFlashErrorKind> {
     if failed { Err(NorFlashErrorKind::Other) } else { Ok(()) }
 }
 
-/// Programs a word and the seven after it, which stay erased. The bank must be ready for it.
+/// Programs a word and the seven words after it, which stay erased. The bank must be unlocked for programming.
 #[expect(unsafe_code, reason = "flash is programmed by stores to its addresses")]
 fn store(address: u32, word: u32) {
     for place in 0..WORDS {
         let value = if place == 0 { word } else { u32::MAX };
-        // SAFETY: within the two sectors, which hold nothing else (`addresses`, memory.x); aligned.
+        // SAFETY: the addresses are aligned and within the two sectors, which hold nothing else (`addresses`,
+        // memory.x).
         unsafe { (address as *mut u32).add(place as usize).write_volatile(value) };
     }
 }
 
-/// Returns a word; zero, which is neither a record nor erased, if a cut of power has left its checksum wrong: to load
-/// such a word is a bus fault, which would end every start.
+/// Returns a word; zero if a power cut has left its checksum wrong. Zero is neither a record nor erased flash. Loading
+/// such a word is a bus fault, which would otherwise end every start.
 #[expect(unsafe_code, reason = "a bus fault must be masked")]
 fn load(address: u32) -> u32 {
-    // SAFETY: the register exists on every Cortex-M7; what is changed is restored below.
+    // SAFETY: the register exists on every Cortex-M7, and the change is undone below.
     let ccr = unsafe { &(*SCB::PTR).ccr };
-    // SAFETY: only this load runs while faults are masked, some ten cycles; it is within the sectors and aligned.
+    // SAFETY: only this load runs while faults are masked, for some ten cycles; its address is aligned and within the
+    // sectors.
     let word = unsafe {
         asm!("cpsid f");
         ccr.modify(|value| value | BFHFNMIGN);

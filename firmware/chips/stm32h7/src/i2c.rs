@@ -2,10 +2,10 @@
 
 use embassy_stm32::pac::i2c::I2c;
 
-/// Resets a controller, which keeps its set-up meanwhile.
+/// Resets a controller; it keeps its settings.
 pub fn restart(i2c: I2c) {
     i2c.cr1().modify(|cr1| cr1.set_pe(false));
-    // The read-back takes the three clocks for which it must be off.
+    // The controller must be off for three clocks, which the read-back takes.
     while i2c.cr1().read().pe() {}
     i2c.cr1().modify(|cr1| cr1.set_pe(true));
 }

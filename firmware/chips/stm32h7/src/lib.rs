@@ -1,5 +1,4 @@
-//! What boards with an STM32H743 share, in whatever package. The chip's name is a feature of `embassy-stm32` that the
-//! board sets.
+//! Code shared by boards with an STM32H743 in any package. The board selects the chip by a feature of `embassy-stm32`.
 #![no_std]
 
 pub mod boot_loader;
