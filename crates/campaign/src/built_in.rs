@@ -1,11 +1,11 @@
-//! Campaigns that come with the program.
+//! Built-in campaigns.
 
 use crate::file::parse;
 use crate::plan::Campaign;
 use afbc_files::read::{BuiltIn, FileError};
 use std::path::Path;
 
-/// Every built-in campaign.
+/// All built-in campaigns.
 pub static BUILT_IN: [BuiltIn<Campaign>; 4] = [
     BuiltIn::new("robustness", include_str!("../campaigns/robustness.toml"), read),
     BuiltIn::new("ablation", include_str!("../campaigns/ablation.toml"), read),

@@ -1,4 +1,4 @@
-//! Comparison of contenders: each of them in each scenario.
+//! Comparison of contenders: every contender flies every scenario.
 
 use crate::statistics::Median;
 use afbc::Profile;
@@ -13,7 +13,7 @@ use afbc_sim::run::{Run, Tripped};
 use afbc_types::OutOfRange;
 use rayon::prelude::*;
 
-/// Returns the default contenders: every law with its profile for flight, and AFBC as printed.
+/// Returns the default contenders: every law with its flight profile, and AFBC also with the paper's profile.
 pub fn standard() -> Vec<Contender> {
     let flying = |kind| Contender::standard(kind, Profile::Flight);
     let printed = Contender::standard(ControllerKind::Afbc, Profile::Paper);
@@ -28,10 +28,11 @@ pub fn standard_and_monitored() -> Vec<Contender> {
     standard().into_iter().chain([guarded]).collect()
 }
 
-/// Returns the contenders `names`, in that order: of `own`, or else the standard ones.
+/// Returns the contenders called `names`, in that order. A name is looked up in `own` first, then among the standard
+/// contenders.
 ///
 /// # Errors
-/// One line on a name that is unknown, or named twice.
+/// One line about a name that is unknown or given twice.
 pub fn choose(own: &[Contender], names: &[String]) -> Result<Vec<Contender>, FileError> {
     let mut chosen: Vec<Contender> = Vec::new();
     for name in names {
@@ -56,11 +57,11 @@ fn unchosen(name: &str, problem: String) -> FileError {
     FileError::whole(&format!("controllers {}", name.escape_debug()), problem)
 }
 
-/// Gives `scenario` these contenders, each with its gains for the scenario's vehicle, and checks them. The scenario's
-/// own stay as its file has them.
+/// Replaces the contenders of `scenario` by `contenders`, each with its gains for the scenario's vehicle, and checks
+/// them. A contender that the scenario already has keeps the gains of the scenario's file.
 ///
 /// # Errors
-/// One line on what is wrong with the gains in the vehicle's file, or the first gain or setting out of range.
+/// One line about the mistake in the vehicle file's gains, or the first gain or setting out of range.
 pub fn fly_under(scenario: &mut Scenario, contenders: &[Contender]) -> Result<(), FileError> {
     let put = |contender: &Contender| match scenario.contenders.iter().any(|own| is_same(own, contender)) {
         true => Ok(contender.clone()),
@@ -70,12 +71,12 @@ pub fn fly_under(scenario: &mut Scenario, contenders: &[Contender]) -> Result<()
     scenario.check().map_err(|error| FileError::whole(&scenario.name, error.to_string()))
 }
 
-/// True if both fly alike, whatever they are called.
+/// True if both contenders fly alike, regardless of their names.
 fn is_same(a: &Contender, b: &Contender) -> bool {
     (&a.law, &a.settings, a.monitored) == (&b.law, &b.settings, b.monitored)
 }
 
-/// Adds these contenders to those of `scenario`, their gains scaled by rule to the scenario's vehicle, and checks them.
+/// Adds the contenders `own` to `scenario`, with gains scaled by rule to the scenario's vehicle, and checks them.
 ///
 /// # Errors
 /// The first gain or setting out of range.
@@ -86,15 +87,15 @@ pub(crate) fn fly_by_rule(scenario: &mut Scenario, own: &[Contender]) -> Result<
     scenario.check().map_err(|error| FileError::whole(&scenario.name, error.to_string()))
 }
 
-/// Allows every contender of `scenario` this tilt, if it is limited more \[rad\].
+/// Raises the tilt limit of every contender of `scenario` to `tilt_max_rad` \[rad\] if it is lower.
 pub(crate) fn free_to_tilt(scenario: &mut Scenario, tilt_max_rad: f64) {
     let contenders = std::mem::take(&mut scenario.contenders).into_iter();
     scenario.contenders = contenders.map(|contender| contender.free_to_tilt(tilt_max_rad as f32)).collect();
 }
 
-/// Returns all contenders of `scenarios`. A law's name stands for the law that flies, with its profile for flight: a
-/// printed law is called so, and one with gains or settings of its own, or the second of a name, gets its scenario's
-/// name too. So it does not matter which scenario comes first.
+/// Returns all different contenders of `scenarios`. A law's plain name is reserved for its standard contender with the
+/// flight profile; a law with the paper's profile is named as printed. A contender with other gains or settings whose
+/// name is taken also carries its scenario's name. So the names do not depend on the order of the scenarios.
 pub fn contenders(scenarios: &[Scenario]) -> Vec<Contender> {
     let own = scenarios.iter().flat_map(|scenario| scenario.contenders.iter().map(move |own| (scenario, own)));
     let all: Vec<_> = own.map(|(scenario, own)| (scenario, own, as_standard(scenario, own))).collect();
@@ -114,7 +115,8 @@ pub fn contenders(scenarios: &[Scenario]) -> Vec<Contender> {
     named
 }
 
-/// Returns the standard contender that `own`, called by its law, is on the vehicle of `scenario`, if it is one.
+/// Returns the standard contender that flies exactly like `own` on the vehicle of `scenario`. Returns none if there is
+/// no such contender, or if `own` is not called by its law's name.
 fn as_standard(scenario: &Scenario, own: &Contender) -> Option<Contender> {
     let kind = own.kind();
     let flies = Contender::standard(kind, Profile::Flight);
@@ -123,12 +125,12 @@ fn as_standard(scenario: &Scenario, own: &Contender) -> Option<Contender> {
     if own.name == kind.name() { [flies].into_iter().chain(printed).find(is_own) } else { None }
 }
 
-/// Number of seeds that a comparison flies, unless another is asked for, where a seed changes anything: the least round
-/// number with which eight laws that all differ from a ninth can be told from chance, by a signed rank test (2/2^10)
-/// under Holm's correction (times 8).
+/// Default number of seeds of a comparison, where a seed changes anything. It is the least round number with which a
+/// signed rank test can tell eight laws that all differ from a ninth from chance: the smallest p is 2/2^10, times 8 by
+/// Holm's correction.
 pub const SEEDS: u64 = 10;
 
-/// Returns the number of seeds that `scenario` is flown with unless another is asked for: one, if no seed changes it.
+/// Returns the default number of seeds for `scenario`: one if no seed changes the flight.
 pub fn usual_seeds(scenario: &Scenario) -> u64 {
     if scenario.is_random() { SEEDS } else { 1 }
 }
@@ -140,7 +142,7 @@ pub struct Comparison {
     pub scenario: Scenario,
     /// One entry for each of the scenario's contenders.
     pub entries: Vec<Entry>,
-    /// Place of the contender that the others are compared with.
+    /// Index of the contender that the others are compared with.
     pub against: usize,
 }
 
@@ -149,7 +151,7 @@ pub struct Comparison {
 pub struct Entry {
     /// The flight with the scenario's own seed, including its log.
     pub first: Flown,
-    /// Results of every flight, that one first.
+    /// Results of all flights, beginning with the first.
     pub flights: Vec<Outcome>,
 }
 
@@ -158,18 +160,18 @@ pub struct Entry {
 pub struct Outcome {
     /// Seed of the flight's noise and weather.
     pub seed: u64,
-    /// When and why the vehicle was lost, if it was.
+    /// Time and reason of the vehicle's loss, if any.
     pub lost: Option<Lost>,
-    /// When and why AFBC's monitor switched to the fallback law, if it did.
+    /// Time and reason of the monitor's switch to the fallback law, if any.
     pub tripped: Option<Tripped>,
-    /// Errors and smoothness up to the end or the loss.
+    /// Errors and smoothness up to the end of the flight or the loss.
     pub metrics: Metrics,
 }
 
 /// Mean and standard deviation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Average {
-    /// The mean.
+    /// Mean value.
     pub mean: f64,
     /// Standard deviation of the sample; 0 for a single value.
     pub deviation: f64,
@@ -177,19 +179,19 @@ pub struct Average {
 
 /// A figure of merit; smaller is better.
 pub struct Measure {
-    /// Name of its column in files.
+    /// Column name in files.
     pub name: &'static str,
     /// Name in tables and figures.
     pub title: &'static str,
     /// Decimals in tables.
     pub digits: usize,
-    /// Factor from the value to the one in tables.
+    /// Factor from the value to the number printed in tables.
     pub scale: f64,
-    /// Computes it from the metrics of a flight.
+    /// Computes the figure from the metrics of a flight.
     pub value: fn(&Metrics) -> f64,
 }
 
-/// The figure that differences between contenders are tested by.
+/// Figure that the test of differences between contenders uses.
 pub const DISTANCE: Measure =
     Measure { name: "rms_m", title: "distance [m]", digits: 5, scale: 1.0, value: |m| m.rmse.xyz().norm() };
 
@@ -227,13 +229,13 @@ impl Entry {
         self.flights.iter().filter(|flight| flight.lost.is_some()).count()
     }
 
-    /// Returns a figure of every flight; infinite for a vehicle that was lost, which is worse than any other.
+    /// Returns a figure of every flight. A lost vehicle counts as infinite, worse than any other.
     pub fn values(&self, value: impl Fn(&Metrics) -> f64) -> Vec<f64> {
         let of = |flight: &Outcome| if flight.lost.is_some() { f64::INFINITY } else { value(&flight.metrics) };
         self.flights.iter().map(of).collect()
     }
 
-    /// Returns the median of a figure over the flights, if that is not a lost one.
+    /// Returns the median of a figure over the flights; none if the median flight is a lost one.
     pub fn median(&self, value: impl Fn(&Metrics) -> f64) -> Option<Median> {
         Median::of(&self.values(value)).filter(|median| median.value.is_finite())
     }
@@ -253,7 +255,7 @@ impl Entry {
 }
 
 impl Comparison {
-    /// Compares the others with the contender called `name`, or else with AFBC, or else with the first.
+    /// Sets the contender that the others are compared with: the one called `name`, else AFBC, else the first.
     #[must_use]
     pub fn against(mut self, name: Option<&str>) -> Self {
         let place = |name| self.entries.iter().position(|entry| entry.contender().name == name);
@@ -261,13 +263,13 @@ impl Comparison {
         self
     }
 
-    /// Returns the median root mean square distance of a contender divided by that of backstepping, if neither is a
-    /// lost one.
+    /// Returns a contender's median root mean square distance divided by backstepping's; none if either median is a
+    /// lost flight.
     pub fn ratio(&self, entry: &Entry) -> Option<f64> {
         let distance = |entry: &Entry| entry.median(DISTANCE.value).map(|median| median.value);
         let classical = |entry: &&Entry| entry.contender().kind() == ControllerKind::Backstepping;
         let ratio = distance(entry)? / distance(self.entries.iter().find(classical)?)?;
-        // Not defined for flights that ended before errors count.
+        // Flights that end before errors count give 0/0.
         Some(ratio).filter(|ratio| ratio.is_finite())
     }
 
@@ -297,9 +299,9 @@ pub fn fly(
     fly_seeds(scenarios.into_iter().map(|scenario| (scenario, seeds)).collect(), log_every, progress)
 }
 
-/// Flies every scenario under each of its contenders, with as many consecutive seeds, from the scenario's own on, on
-/// the current rayon pool; logs every `log_every`-th step of the first flight. Calls `progress` after each flight. The
-/// result does not depend on the number of threads.
+/// Flies every scenario under each of its contenders, on the current rayon pool. Each flies the given number of
+/// consecutive seeds, starting with the scenario's own. Logs every `log_every`-th step of the first flight. Calls
+/// `progress` after each flight. The result does not depend on the number of threads.
 ///
 /// # Errors
 /// The first parameter, gain or setting out of range.
@@ -310,7 +312,7 @@ pub fn fly_seeds(
 ) -> Result<Vec<Comparison>, OutOfRange> {
     let outcome = |scenario: &Scenario, contender: &Contender, number: u64| {
         let scenario = Scenario { seed: scenario.seed + number, ..scenario.clone() };
-        // Only the first flight is drawn; logs of all seeds would only take memory.
+        // Only the first flight is plotted. Logs of the others would only take memory.
         let run = Run::fly(&scenario, contender, if number == 0 { log_every } else { u64::MAX })?;
         progress();
         Ok((Outcome::of(&scenario, &run), (number == 0).then_some(run)))

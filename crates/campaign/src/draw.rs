@@ -1,4 +1,4 @@
-//! Drawing of flights from a seed.
+//! Draws a campaign's flights from its seed.
 
 use crate::plan::{Campaign, NamedTrajectory, Spread};
 use crate::quantity::{self, QUANTITIES, Quantity};
@@ -21,7 +21,7 @@ impl Spread {
         QUANTITIES.get(self.quantity)
     }
 
-    /// Returns the value at `share`, in \[0, 1), of the interval.
+    /// Returns the value at the fraction `share`, in \[0, 1), of the interval.
     fn at(&self, whole: bool, share: f64) -> f64 {
         let [low, high] = self.ends;
         if whole { low + libm::floor(share * (high - low + 1.0)) } else { low + share * (high - low) }
@@ -29,7 +29,7 @@ impl Spread {
 }
 
 impl Campaign {
-    /// Draws flight `flight`: a function of its index and the campaign's seed.
+    /// Draws flight `flight`. The result depends only on the flight's index and the campaign's seed.
     pub fn draw(&self, flight: u64) -> Draw {
         let seed = mix(mix(self.seed).wrapping_add(flight)) >> 11;
         let mut noise = Noise::new(seed, Stream::Scenario);
@@ -41,7 +41,7 @@ impl Campaign {
         Draw { seed, values: self.spreads.iter().map(value).collect() }
     }
 
-    /// Returns the reference of flight `flight`; all are flown in turn.
+    /// Returns the reference trajectory of flight `flight`. The flights take the campaign's trajectories in turn.
     pub fn trajectory(&self, flight: u64) -> Option<&NamedTrajectory> {
         self.trajectories.get((flight % self.trajectories.len().max(1) as u64) as usize)
     }
@@ -54,8 +54,8 @@ impl Campaign {
         self.with(flight, &self.draw(flight))
     }
 
-    /// Checks both ends of every spread on every trajectory; if they are in range, the flights between them normally
-    /// are.
+    /// Checks both ends of every spread on every trajectory. If they are in range, the flights between them normally
+    /// are too.
     ///
     /// # Errors
     /// The first parameter out of range.
@@ -83,7 +83,8 @@ impl Campaign {
     }
 }
 
-/// SplitMix64's output for the state `x` (Steele, Lea, Flood 2014): a bijection that separates neighbours.
+/// Returns SplitMix64's output for the state `x` (Steele, Lea, Flood 2014), a bijection that maps neighbouring numbers
+/// far apart.
 pub(crate) const fn mix(x: u64) -> u64 {
     let x = x.wrapping_add(0x9e37_79b9_7f4a_7c15);
     let x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -95,7 +96,7 @@ pub(crate) const fn mix(x: u64) -> u64 {
 mod tests {
     use super::mix;
 
-    /// The first outputs of the generator's published sequence from state 0.
+    /// Checks the first outputs of the generator's published sequence from state 0.
     #[test]
     fn mix_is_splitmix64() {
         assert_eq!(mix(0), 0xe220_a839_7b1d_cdaf);

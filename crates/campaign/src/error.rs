@@ -1,4 +1,4 @@
-//! Errors of campaigns, as one line each.
+//! Errors of campaigns, each displayed as one line.
 
 use crate::manifest::Shard;
 use afbc_files as files;
@@ -7,7 +7,7 @@ use std::fmt;
 use std::io;
 use std::path::PathBuf;
 
-/// Why a campaign has no results, displayed as one line.
+/// Reason why a campaign has no results.
 #[derive(Debug)]
 pub enum Error {
     /// The draw of a flight is out of range.
@@ -28,20 +28,20 @@ pub enum Error {
     Damaged {
         /// Path of the file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// Description of the damage.
         problem: String,
     },
-    /// The folder holds results of another campaign.
+    /// The folder holds results of another campaign, vehicle, shard or program version.
     Changed(PathBuf),
     /// A shard has no results yet.
     Unfinished(PathBuf),
-    /// Results of different campaigns.
+    /// Two folders hold results of different campaigns.
     Strangers([PathBuf; 2]),
     /// Two folders hold the same shard.
     Twice(Shard, [PathBuf; 2]),
     /// The output folder is one of the shards to be merged.
     IntoPart(PathBuf),
-    /// Shards that no folder holds.
+    /// No folder was given for these shards.
     Missing(Vec<Shard>),
     /// A file or folder could not be written.
     Output(files::Error),

@@ -1,4 +1,4 @@
-//! Campaign files. `docs/campaigns.md` describes each key.
+//! Reader of campaign files. `docs/campaigns.md` describes each key.
 
 use crate::plan::{Campaign, NamedTrajectory, Spread};
 use crate::quantity::{QUANTITIES, Quantity};
@@ -15,16 +15,16 @@ const SAMPLE: Example = Example {
     text: "flights = 1\n[scenario.trajectory]\nkind = \"hover\"\nposition_m = [0, 0, 1]\n",
 };
 
-/// Accepted number of flights.
+/// Accepted numbers of flights.
 const FLIGHTS: Range = Range::new("flights", 1.0, 1e7);
-/// Accepted seeds: whole numbers that no tool rounds.
+/// Accepted seeds: whole numbers up to 2^53 - 1, which no tool rounds.
 const SEED: Range = Range::new("seed", 0.0, 9_007_199_254_740_991.0);
 
-/// Reads and checks a campaign from its `text`. `file` is its path for errors, `name` its name if it has no other, and
-/// `folder` the one to which the paths of scenario files are relative.
+/// Reads and checks a campaign from its `text`. `file` is its path in error messages, `name` its name unless the text
+/// gives one. Paths of scenario files are relative to `folder`.
 ///
 /// # Errors
-/// Every mistake, each as one line.
+/// All mistakes, one line each.
 pub fn parse(file: &str, text: &str, name: &str, folder: &Path) -> Result<Campaign, FileError> {
     afbc_files::read::document(file, text, SAMPLE, |mut root| {
         let [name, description] = afbc_files::read::title(&mut root, name)?;
@@ -53,7 +53,7 @@ pub fn parse(file: &str, text: &str, name: &str, folder: &Path) -> Result<Campai
     })
 }
 
-/// Reads the scenario, by name or as a table, which needs no trajectory of its own if one is given.
+/// Reads the scenario, given by name or as a table. A table needs no trajectory of its own if `trajectory` is given.
 fn scenario(root: &mut Table<'_>, folder: &Path, trajectory: Option<&NamedTrajectory>) -> Result<Scenario, FileError> {
     if let Some(table) = root.table_if("scenario")? {
         return afbc_scenario::read(table, "own", trajectory.map(|named| &named.trajectory));
@@ -68,10 +68,10 @@ fn trajectory(Scenario { name, trajectory, initial, .. }: Scenario) -> NamedTraj
     NamedTrajectory { name, trajectory, initial }
 }
 
-/// Reads the references of the scenarios in the list `trajectories`, if there is one.
+/// Reads the scenarios listed under `trajectories` and returns their trajectories.
 fn trajectories(root: &mut Table<'_>, folder: &Path) -> Result<Vec<NamedTrajectory>, FileError> {
     let Some(names) = root.texts("trajectories")? else {
-        // The scenario may have none of its own if these are wrong.
+        // If the list has mistakes, any trajectory will do, so that the scenario is not blamed for lacking one.
         let any = (!root.knows("trajectories")).then(|| built_in("hover")?.read().ok()).flatten();
         return Ok(any.map(trajectory).into_iter().collect());
     };
@@ -95,7 +95,7 @@ fn trajectories(root: &mut Table<'_>, folder: &Path) -> Result<Vec<NamedTrajecto
     Ok(trajectories)
 }
 
-/// Reads a scenario by name: a plain name is a built-in one, anything else a file.
+/// Reads a scenario by name. A plain name means a built-in scenario, anything else a file.
 pub(crate) fn named(root: &Table<'_>, key: &str, name: &str, folder: &Path) -> Result<Scenario, FileError> {
     if !name.contains(['/', '\\', '.']) {
         let built_in = built_in(name).ok_or_else(|| {
@@ -133,7 +133,7 @@ fn spreads(mut table: Table<'_>, scenario: &Scenario) -> Result<Vec<Spread>, Fil
     Ok(spreads)
 }
 
-/// Returns why drawing this quantity would have no effect, if so.
+/// Returns the reason why drawing this quantity would have no effect, if there is one.
 fn idle(name: &str, scenario: &Scenario) -> Option<&'static str> {
     let still = afbc_plant::Deviations::default();
     let InstrumentSuite { imu, tracker, gnss, barometer, magnetometer } = &scenario.instruments;

@@ -1,4 +1,4 @@
-//! Flying a campaign on many cores, and merging its shards.
+//! Flies a campaign on many cores and merges its shards.
 
 use crate::error::Error;
 use crate::folder::{CampaignFolder, Rows, finished};
@@ -11,10 +11,11 @@ use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Flies the missing flights of `campaign` in `folder` on the current rayon pool. `progress` is called with the number
-/// of flights done so far, including earlier runs. The result does not depend on the number of threads.
+/// Flies the missing flights of `campaign` in `folder` on the current rayon pool. Calls `progress` with the number of
+/// newly finished flights; the first call counts those of earlier runs. The result does not depend on the number of
+/// threads.
 ///
-/// Returns none if `stop` became true before the end; complete chunks are kept.
+/// Returns none if `stop` became true before the end. Complete chunks are kept.
 ///
 /// # Errors
 /// A flight that cannot be flown, or results that cannot be written or are damaged.
@@ -37,7 +38,7 @@ fn flown(
     stop: &AtomicBool,
     progress: &(dyn Fn(u64) + Sync),
 ) -> Result<Summary, Error> {
-    // Also between rows: with many flights, reading and writing them takes its time.
+    // `stop` is also checked between rows, since reading and writing many flights takes time.
     let heard = |row| if stop.load(Ordering::Relaxed) { Err(Error::Stopped) } else { row };
     if let Some(rows) = folder.results()? {
         let mut summary = Summary::new(folder.manifest());
@@ -50,7 +51,7 @@ fn flown(
     Ok(summary.finish())
 }
 
-/// Flies the missing chunks in order, flight by flight.
+/// Flies the flights of the missing chunks in order.
 fn fly_missing(
     campaign: &Campaign,
     folder: &CampaignFolder,
@@ -62,13 +63,13 @@ fn fly_missing(
     let missing = (0..folder.chunks()).filter(|chunk| !kept.contains(chunk));
     let jobs =
         missing.flat_map(|chunk| folder.chunk(chunk).enumerate().map(move |(place, flight)| (chunk, place, flight)));
-    // Each thread takes the next flight; the one that completes a chunk writes it. Only unfinished chunks are in
+    // Each thread takes the next flight, and the thread that completes a chunk writes it. Only unfinished chunks are in
     // memory.
-    // Fused, since every thread asks once more after the last flight. Rows are sorted by their place in the chunk:
-    // threads finish flights in any order, and a file has them in the campaign's.
+    // The iterator is fused, since every thread asks once more after the last flight. Threads finish flights in any
+    // order, so rows are sorted by their place in the chunk.
     let (jobs, begun) = (Mutex::new(jobs.fuse()), Mutex::new(BTreeMap::<u64, BTreeMap<usize, Vec<Row>>>::new()));
     let failed = AtomicBool::new(false);
-    // A lock is poisoned by a panic, which rayon passes on when all threads have ended: until then nothing is begun.
+    // A panic poisons the lock, and rayon passes the panic on when all threads have ended. No flight starts until then.
     let next = || match jobs.lock() {
         Ok(mut jobs) => jobs.next(),
         Err(_) => None,
@@ -95,13 +96,13 @@ fn fly_missing(
     };
     let work = |_: rayon::BroadcastContext<'_>| work().inspect_err(|_| failed.store(true, Ordering::Relaxed));
     let ends = rayon::broadcast(work);
-    // An error takes precedence over an interruption.
+    // Errors take precedence over an interruption.
     let (stopped, others): (Vec<_>, Vec<_>) = ends.into_iter().partition(|end| matches!(end, Err(Error::Stopped)));
     others.into_iter().chain(stopped).collect()
 }
 
-/// Merges all `shards` of one campaign into the folder `out`, with the same bytes that one machine would have written.
-/// With `force`, files of the same names there are replaced.
+/// Merges all `shards` of one campaign into the folder `out`. The files have the same bytes as if one machine had flown
+/// the whole campaign. With `force`, files of the same names in `out` are replaced.
 ///
 /// # Errors
 /// Shards of different campaigns, a missing, unfinished or duplicate shard, and files that cannot be read or written.
@@ -112,7 +113,7 @@ pub fn merge(shards: &[PathBuf], out: &Path, force: bool) -> Result<(CampaignFol
         return Err(Error::IntoPart(part.clone()));
     }
     let mut parts = shards.iter().map(|path| Ok((path, finished(path)?))).collect::<Result<Vec<_>, Error>>()?;
-    // So that two of the same shard are neighbours.
+    // Sorting makes two copies of the same shard neighbours.
     parts.sort_by_key(|(_, rows)| rows.manifest().shard.index);
     let Some((first, manifest)) = parts.first().map(|(path, rows)| (*path, rows.manifest().clone())) else {
         return Err(Error::Missing(vec![Shard::WHOLE]));
@@ -138,7 +139,7 @@ pub fn merge(shards: &[PathBuf], out: &Path, force: bool) -> Result<(CampaignFol
     let contenders = whole.contenders.len();
     let folder = CampaignFolder::open(out, whole, force)?;
     let mut summary = Summary::new(folder.manifest());
-    // Flight i is in shard i modulo the number of shards.
+    // Flight `i` is in the shard at index `i` modulo the number of shards.
     let flights = (0..folder.manifest().flights).flat_map(|flight| core::iter::repeat_n(flight, contenders));
     let mut rows: Vec<Rows> = parts.into_iter().map(|(_, rows)| rows).collect();
     let rows = flights.map(|flight| {

@@ -1,7 +1,7 @@
-//! The folder of a campaign's results, in which finished flights are kept whatever happens.
+//! The folder of a campaign's results. It keeps finished flights even if the program is killed.
 //!
-//! While a campaign is flown, each finished chunk becomes a file, which is on the disk before it gets its name. At the
-//! end all chunks become `results.parquet`. Starting again in the same folder resumes the campaign. Every file has a
+//! Each finished chunk of flights becomes a file. The file is flushed to the disk before it gets its name. At the end,
+//! all chunks are joined in `results.parquet`. Starting again in the same folder resumes the campaign. Every file has a
 //! checksum that is verified before use.
 
 use crate::error::Error;
@@ -22,23 +22,23 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Flights per chunk: seconds of work for one core.
 pub(super) const CHUNK: u64 = 16;
-/// Chunks that are read at once while they are joined.
+/// Number of chunks that are read at once while they are joined.
 const BATCH: u64 = 64;
-/// File of all rows.
+/// Name of the file of all rows.
 const RESULTS: &str = "results.parquet";
-/// File of the manifest, present from the beginning.
+/// Name of the manifest's file, present from the beginning.
 const MANIFEST: &str = "campaign.json";
 const CHUNKS: &str = "chunks";
-/// Command recorded in the folder.
+/// Command that the folder records as its writer.
 const COMMAND: &str = "campaign";
 
-/// The folder of the results of one campaign or shard. It is locked against other programs.
+/// Folder with the results of one campaign or shard, locked against other programs.
 pub struct CampaignFolder {
     place: Place,
     manifest: Manifest,
 }
 
-/// `campaign.json`.
+/// Contents of `campaign.json`.
 #[derive(Serialize, Deserialize)]
 struct Page<M> {
     #[serde(flatten)]
@@ -47,19 +47,19 @@ struct Page<M> {
 }
 
 impl CampaignFolder {
-    /// Opens the folder at `path`, created if needed, for the results of `manifest`. With `force`, files of the same
-    /// names are replaced.
+    /// Opens the folder at `path` for the results of `manifest`, and creates it if needed. With `force`, files of the
+    /// same names are replaced.
     ///
     /// # Errors
-    /// If it cannot be written, is in use, or holds anything other than results of `manifest`; nothing has been changed
-    /// then.
+    /// If the folder cannot be written, is in use, or holds anything other than results of `manifest`. Nothing has been
+    /// changed then.
     pub fn open(path: &Path, manifest: Manifest, force: bool) -> Result<Self, Error> {
         let name = manifest.name.clone();
         Place::find(path, COMMAND, &name, force)?;
         let is_known = match found(&path.join(MANIFEST)) {
             Ok(Some(found)) if manifest.is_same(&found) => true,
             Ok(None) => false,
-            // By force also over a manifest that cannot be read.
+            // `force` also replaces a manifest that cannot be read.
             _ if force => false,
             Ok(Some(_)) => return Err(Error::Changed(path.into())),
             Err(error) => return Err(error),
@@ -68,29 +68,29 @@ impl CampaignFolder {
         place.add(&[MANIFEST, RESULTS, CHUNKS, "summary.json", "report.html"])?;
         let folder = CampaignFolder { place, manifest };
         if force && folder.results().is_err() {
-            // Results of another campaign, or damaged.
+            // The results are damaged or belong to another campaign.
             fs::remove_file(path.join(RESULTS)).map_err(|source| folder.place.error(RESULTS, source))?;
         }
         if !is_known {
             let page = Page { manifest: &folder.manifest, checksum: seal::OPEN.into() };
             folder.place_sealed(MANIFEST, |out| seal::json(out, &page))?;
         }
-        // Only under the lock: no temporary file of a program that still runs is among them.
+        // Sweeping is safe under the lock: no running program owns any of the temporary files.
         files::sweep(&path.join(CHUNKS));
         Ok(folder)
     }
 
-    /// Returns its path.
+    /// Returns the folder's path.
     pub fn path(&self) -> &Path {
         self.place.path()
     }
 
-    /// Returns the folder for other results of the campaign.
+    /// Returns the underlying folder, to write other files of the campaign into.
     pub fn place(&self) -> &Place {
         &self.place
     }
 
-    /// Returns the paths of the files that have checksums of their own: the manifest and all rows.
+    /// Returns the paths of the two files with their own checksums: the manifest and all rows.
     pub fn sealed(&self) -> [PathBuf; 2] {
         [MANIFEST, RESULTS].map(|name| self.path().join(name))
     }
@@ -100,7 +100,7 @@ impl CampaignFolder {
         &self.manifest
     }
 
-    /// Writes a file with a checksum of its own, which says more of damage than the folder's can.
+    /// Writes a file with its own checksum. Such a checksum locates damage better than the folder's.
     fn place_sealed(
         &self,
         name: &str,
@@ -114,7 +114,7 @@ impl CampaignFolder {
         self.manifest.shard.count(self.manifest.flights).div_ceil(CHUNK)
     }
 
-    /// Returns the flights of a chunk, in constant time for any chunk.
+    /// Returns the flights of a chunk. The time does not depend on the chunk's number.
     pub(super) fn chunk(&self, chunk: u64) -> impl Iterator<Item = u64> + use<> {
         let Manifest { shard, flights, .. } = self.manifest;
         (chunk * CHUNK..(chunk + 1) * CHUNK)
@@ -137,7 +137,7 @@ impl CampaignFolder {
         entries.filter_map(move |entry| {
             let name = entry.file_name().into_string().ok()?;
             let chunk = name.strip_suffix(".parquet")?.parse().ok().filter(|chunk| *chunk < chunks)?;
-            // Only the spelling that is written here: "1.parquet" is somebody else's file.
+            // Only the exact spelling counts: "1.parquet" is somebody else's file.
             (name == Self::chunk_name(chunk)).then_some(chunk)
         })
     }
@@ -185,7 +185,7 @@ impl CampaignFolder {
         }
     }
 
-    /// Returns the rows of all chunks, in order, with a few of them in memory.
+    /// Returns the rows of all chunks, in order. Only 64 chunks are in memory at a time.
     pub(super) fn rows(&self) -> impl Iterator<Item = Result<Row, Error>> {
         let chunks = self.chunks();
         (0..chunks).step_by(BATCH as usize).flat_map(move |first| {
@@ -198,22 +198,22 @@ impl CampaignFolder {
         })
     }
 
-    /// Writes one file of `rows`.
+    /// Writes `rows` into `results.parquet` and removes the chunks.
     ///
     /// # Errors
-    /// The first error among the rows, or of writing; then no file is written.
+    /// The first error among the rows, or of writing. No file is written then.
     pub(super) fn write(&self, rows: impl Iterator<Item = Result<Row, Error>>) -> Result<(), Error> {
         let mut failure = None;
         let written = self.place_sealed(RESULTS, |out| {
             write(out, &self.manifest, rows.map_while(|row| row.map_err(|error| failure = Some(error)).ok()))?;
-            // Otherwise an error would leave an incomplete file that looks complete.
+            // Without this error, an incomplete file would look complete.
             if failure.is_some() { Err(io::ErrorKind::InvalidData.into()) } else { Ok(()) }
         });
         if let Some(error) = failure {
             return Err(error);
         }
         written?;
-        // The chunks are no longer needed; one that cannot be removed only takes space. Other files are left alone.
+        // The chunks are no longer needed. A chunk that cannot be removed only takes space. Other files are left alone.
         self.named_chunks().for_each(|chunk| drop(fs::remove_file(self.chunk_path(chunk))));
         let _ = fs::remove_dir(self.path().join(CHUNKS));
         Ok(())
@@ -231,7 +231,7 @@ fn found(path: &Path) -> Result<Option<Manifest>, Error> {
     Ok(Some(page.manifest))
 }
 
-/// Returns the rows of a finished folder with their manifest.
+/// Returns the rows and the manifest of a finished folder.
 pub(super) fn finished(path: &Path) -> Result<Rows, Error> {
     Rows::open(&path.join(RESULTS))?.ok_or_else(|| Error::Unfinished(path.into()))
 }
@@ -241,14 +241,14 @@ fn write(out: &mut (dyn Write + Send), manifest: &Manifest, mut rows: impl Itera
     rows.try_for_each(|row| writer.push(row)).and_then(|()| writer.finish()).map_err(io::Error::other)?.finish()
 }
 
-/// The rows of one file, with errors that name it.
+/// Rows of one file; errors name the file.
 pub struct Rows {
     path: PathBuf,
     rows: Reader<OnDisk>,
 }
 
 impl Rows {
-    /// Opens the rows at `path`, if the file exists, after verifying its checksum.
+    /// Verifies the checksum of the file at `path` and opens its rows. Returns none if there is no such file.
     fn open(path: &Path) -> Result<Option<Self>, Error> {
         let mut file = match File::open(path) {
             Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
@@ -264,7 +264,7 @@ impl Rows {
         self.rows.manifest()
     }
 
-    /// Returns the error that the file ends too early or holds other rows.
+    /// Returns the error for a file that ends too early or holds other rows.
     pub(super) fn incomplete(&self) -> Error {
         damaged(&self.path, "rows are missing")
     }
@@ -278,7 +278,7 @@ impl Iterator for Rows {
     }
 }
 
-/// Returns the error of a file that cannot be read, or is not what was written.
+/// Returns the error for a file that cannot be read or was damaged.
 fn unread(path: &Path, source: io::Error) -> Error {
     match source.kind() {
         io::ErrorKind::InvalidData | io::ErrorKind::UnexpectedEof => damaged(path, source),

@@ -1,9 +1,9 @@
 //! Monte Carlo campaigns: one scenario, flown many times with drawn vehicles, weather and faults.
 //!
-//! Flight `i` is drawn from the campaign's seed and `i` alone, so it can be flown again by itself on any machine. All
-//! contenders fly the same draws. `docs/campaigns.md` describes the format of campaign files. [`compare`] flies
-//! unmodified scenarios under every contender, [`suite`] lists of them; [`random`] and [`rough`] draw
-//! flights over vehicles.
+//! Flight `i` depends only on the campaign's seed and on `i`, so any machine can fly it again by itself. All contenders
+//! fly the same draws. `docs/campaigns.md` describes the format of campaign files. [`compare`] flies unmodified
+//! scenarios under every contender; [`suite`] flies lists of scenarios; [`random`] and [`rough`] draw flights across
+//! vehicles.
 #![forbid(unsafe_code)]
 
 mod built_in;

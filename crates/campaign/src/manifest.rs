@@ -1,4 +1,5 @@
-//! The manifest of a campaign's results, stored next to them and in them.
+//! The manifest, which says which campaign results belong to. It is stored as a file beside the results and inside
+//! them.
 
 use crate::built_in::built_in;
 use crate::plan::{Campaign, Spread};
@@ -8,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::str::FromStr;
 
-/// One of several parts of a campaign, flown separately.
+/// One of several separately flown parts of a campaign.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Shard {
     /// Index of the shard, from 1 on.
@@ -21,9 +22,9 @@ impl Shard {
     /// The whole campaign.
     pub const WHOLE: Shard = Shard { index: 1, of: 1 };
 
-    /// Returns how many of `flights` belong to this shard: every `of`-th.
+    /// Returns how many of `flights` belong to this shard, which takes every `of`-th.
     pub fn count(&self, flights: u64) -> u64 {
-        // Rounded up. No difference is negative, since the index is at most `of`.
+        // The division rounds up. The sum cannot be negative, since the index is at most `of`.
         (flights + self.of - self.index) / self.of
     }
 
@@ -54,7 +55,7 @@ impl fmt::Display for Shard {
 /// A drawn quantity.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Drawn {
-    /// Name, which ends in the unit.
+    /// Name, ending in the unit.
     pub name: String,
     /// Meaning in words.
     pub meaning: String,
@@ -62,7 +63,7 @@ pub struct Drawn {
     pub ends: [f64; 2],
 }
 
-/// Description of the campaign that results belong to.
+/// Description of the campaign and shard that results belong to.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Manifest {
     /// Name of the campaign.
@@ -81,7 +82,7 @@ pub struct Manifest {
     pub trajectories: Vec<String>,
     /// Drawn quantities, in the order of the columns.
     pub drawn: Vec<Drawn>,
-    /// The part of the campaign that these results are.
+    /// The shard that these results cover.
     pub shard: Shard,
 }
 
@@ -105,29 +106,29 @@ impl Manifest {
         }
     }
 
-    /// Returns the columns of numbers.
+    /// Returns the columns of numbers: drawn quantities, then figures.
     pub fn columns(&self) -> Vec<Column> {
         let drawn = self.drawn.iter().map(|drawn| Column { name: drawn.name.clone(), meaning: drawn.meaning.clone() });
         let figures = FIGURES.iter().map(|figure| Column { name: figure.name.into(), meaning: figure.meaning.into() });
         drawn.chain(figures).collect()
     }
 
-    /// Returns the number of `row` in the column `name`.
+    /// Returns the value of `row` in the column `name`.
     pub fn number(&self, row: &Row, name: &str) -> Option<f64> {
         let drawn = self.drawn.iter().position(|drawn| drawn.name == name);
         let figure = || Some(self.drawn.len() + FIGURES.iter().position(|figure| figure.name == name)?);
         row.numbers.get(drawn.or_else(figure)?).copied().flatten()
     }
 
-    /// Returns the campaign's name for `sitl campaign`: that of a built-in one, or of a file named after the campaign.
-    /// The file's folder is left out, so that results do not depend on it.
+    /// Returns the argument by which `sitl campaign` flies this campaign: the name of a built-in one, or the file name
+    /// derived from the campaign's name. The file's folder is left out, so that results do not depend on it.
     pub fn target(&self) -> String {
         let same = |plan: Campaign| fingerprint(&plan) == self.fingerprint;
         let known = built_in(&self.name).and_then(|known| known.read().ok()).is_some_and(same);
         if known { self.name.clone() } else { format!("{}.toml", self.name) }
     }
 
-    /// True if `other` belongs to the same shard of the same campaign, whatever the path of its file.
+    /// True if `other` belongs to the same shard of the same campaign. The path of the campaign's file does not matter.
     pub fn is_same(&self, other: &Manifest) -> bool {
         self.fingerprint == other.fingerprint && self.shard == other.shard
     }
@@ -140,9 +141,9 @@ impl Manifest {
 
 /// Returns a fingerprint that differs between campaigns and between versions of this program.
 fn fingerprint(campaign: &Campaign) -> String {
-    // Every field by its name, so that a new one is not forgotten.
+    // Every field is named, so that the compiler reports a forgotten new one.
     let Campaign { name: _, description: _, flights, seed, scenario, trajectories, spreads } = campaign;
-    // By name, since a quantity's place may change.
+    // The name stands for the quantity, since its index may change.
     let spreads: Vec<_> =
         spreads.iter().map(|spread| (spread.quantity().map(|quantity| quantity.range.name), spread.ends)).collect();
     hash_of(&(env!("CARGO_PKG_VERSION"), flights, seed, scenario, trajectories, spreads))

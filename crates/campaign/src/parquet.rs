@@ -1,4 +1,4 @@
-//! Writing and reading rows as Parquet files.
+//! Writes and reads rows as Parquet files.
 
 use crate::manifest::Manifest;
 use crate::row::Row;
@@ -18,12 +18,12 @@ use std::io::{BufReader, Read, Seek, SeekFrom, Write};
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// Rows per row group, for chunks and for the whole file: a compromise between memory and file size. Chunks have
-/// smaller groups, since many are read at once.
+/// Smallest and largest number of rows in a row group: a compromise between memory and file size. A shard's groups are
+/// smaller, since all shards are read at once when they are merged.
 const GROUP_ROWS: [usize; 2] = [1 << 10, 1 << 16];
 /// Metadata key of the manifest.
 const MANIFEST: &str = "campaign";
-/// Columns before the numbers, with their meaning.
+/// Names and meanings of the columns before the numbers.
 const LABELS: [(&str, &str); 7] = [
     ("flight", "index of the flight, from 0 on; `sitl campaign FILE --flight` flies it again"),
     ("seed", "seed of the flight's noise and weather"),
@@ -61,7 +61,7 @@ pub(super) struct Writer<W: Write + Send> {
 }
 
 impl<W: Write + Send> Writer<W> {
-    /// Creates a file of `manifest`'s rows. The same rows give the same bytes.
+    /// Creates a file for the rows of `manifest`. The same rows give the same bytes.
     pub(super) fn new(out: W, manifest: &Manifest) -> Result<Self> {
         let external = |error: serde_json::Error| ParquetError::External(error.into());
         let meanings: serde_json::Map<_, _> = LABELS
@@ -72,7 +72,7 @@ impl<W: Write + Send> Writer<W> {
         let metadata = vec![
             KeyValue::new(MANIFEST.into(), serde_json::to_string(manifest).map_err(external)?),
             KeyValue::new("columns".into(), serde_json::to_string(&meanings).map_err(external)?),
-            // Last, since it has to be near the end of the file.
+            // The checksum is last, since it has to be near the end of the file.
             KeyValue::new("checksum".into(), seal::OPEN.to_owned()),
         ];
         let properties = WriterProperties::builder()
@@ -91,7 +91,7 @@ impl<W: Write + Send> Writer<W> {
         if self.rows.len() == self.group_rows { self.flush() } else { Ok(()) }
     }
 
-    /// Ends the file.
+    /// Writes the remaining rows and ends the file.
     pub(super) fn finish(mut self) -> Result<W> {
         self.flush()?;
         self.file.into_inner()
@@ -102,7 +102,7 @@ impl<W: Write + Send> Writer<W> {
         let Some(first) = rows.first() else { return Ok(()) };
         let text = |text: &String| ByteArray::from(text.as_str());
         let mut group = self.file.next_row_group()?;
-        // Flights and seeds have at most 53 bits: none becomes negative.
+        // Flights and seeds have at most 53 bits, so none becomes negative.
         put::<Int64Type>(&mut group, rows.iter().map(|row| Some(row.flight.cast_signed())))?;
         put::<Int64Type>(&mut group, rows.iter().map(|row| Some(row.seed.cast_signed())))?;
         put::<ByteArrayType>(&mut group, rows.iter().map(|row| Some(text(&row.contender))))?;
@@ -123,7 +123,7 @@ fn put<T: DataType>(
     values: impl Iterator<Item = Option<T::T>>,
 ) -> Result<()> {
     let Some(mut column) = group.next_column()? else { return Err(shape()) };
-    // Which rows have a value, and the values.
+    // `present` says which rows have a value; `dense` has the values.
     let (mut present, mut dense) = (Vec::new(), Vec::new());
     for value in values {
         present.push(i16::from(value.is_some()));
@@ -133,7 +133,7 @@ fn put<T: DataType>(
     column.close()
 }
 
-/// A file that is open only while it is read: many chunks at once would exceed the system's limit of open files.
+/// A file that is open only while it is being read. Keeping many chunks open would exceed the system's limit.
 pub(super) struct OnDisk {
     pub(super) path: PathBuf,
     pub(super) length: u64,
@@ -161,7 +161,7 @@ impl ChunkReader for OnDisk {
     }
 }
 
-/// Reads rows in order. The file must be verified first: the library may panic on damaged data.
+/// Reads rows in order. The file must be verified first, since the library may panic on damaged data.
 pub(super) struct Reader<R: ChunkReader + 'static> {
     file: SerializedFileReader<R>,
     manifest: Manifest,
@@ -198,7 +198,7 @@ impl<R: ChunkReader + 'static> Reader<R> {
         let mut seeds = take::<Int64Type>(group, 1)?.into_iter();
         let mut contenders = take::<ByteArrayType>(group, 2)?.into_iter();
         let mut trajectories = take::<ByteArrayType>(group, 3)?.into_iter();
-        // Column 4, whether the vehicle was lost, is for other readers: it follows from the reason.
+        // Column 4, `lost`, is for other readers: it follows from the reason.
         let mut losses = take::<ByteArrayType>(group, 5)?.into_iter();
         let mut trips = take::<ByteArrayType>(group, 6)?.into_iter();
         let numbers = (0..columns).map(|column| Ok(take::<DoubleType>(group, LABELS.len() + column)?.into_iter()));
@@ -244,7 +244,7 @@ where
     let (mut present, mut dense) = (Vec::new(), Vec::new());
     column.read_records(rows, Some(&mut present), None, &mut dense)?;
     if !optional {
-        // A column that is required has no definition levels.
+        // A required column has no definition levels.
         present = vec![1; dense.len()];
     }
     if present.len() != rows {

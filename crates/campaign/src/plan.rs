@@ -14,12 +14,12 @@ pub struct Spread {
     pub ends: [f64; 2],
 }
 
-/// A reference, and the initial state of flights along it.
+/// A reference trajectory and the initial state of flights along it.
 #[derive(Clone, Debug, Serialize)]
 pub struct NamedTrajectory {
-    /// Name of the scenario it is from.
+    /// Name of the scenario that the trajectory is from.
     pub name: String,
-    /// The reference.
+    /// Reference trajectory.
     pub trajectory: Trajectory,
     /// Motion at t = 0.
     pub initial: Motion,
@@ -34,12 +34,12 @@ pub struct Campaign {
     pub description: String,
     /// Number of flights of each contender.
     pub flights: u64,
-    /// Seed of every draw.
+    /// Seed of all draws.
     pub seed: u64,
-    /// Everything that is not drawn.
+    /// Scenario with everything that is not drawn.
     pub scenario: Scenario,
-    /// Trajectories flown in turn: flight `i` takes the one at `i` modulo their number. At least one.
+    /// Trajectories flown in turn, at least one. Flight `i` takes the trajectory at index `i` modulo their number.
     pub trajectories: Vec<NamedTrajectory>,
-    /// Quantities drawn, in the order of [`QUANTITIES`](crate::QUANTITIES).
+    /// Drawn quantities, in the order of [`QUANTITIES`](crate::QUANTITIES).
     pub spreads: Vec<Spread>,
 }

@@ -9,19 +9,20 @@ use nalgebra::Vector3;
 
 /// A quantity that a campaign can draw.
 pub struct Quantity {
-    /// Name, which ends in the unit, and accepted range. A `ratio` multiplies the scenario's value.
+    /// Name, ending in the unit, and accepted range. A quantity whose name ends in `ratio` multiplies the scenario's
+    /// value.
     pub range: Range,
     /// Meaning in words.
     pub meaning: &'static str,
     /// True if only whole numbers are drawn.
     pub whole: bool,
-    /// Another quantity without which this one has no effect.
+    /// Name of another quantity without which this one has no effect.
     pub needs: Option<&'static str>,
     /// Applies the value to a flight.
     apply: fn(&mut Assembly, f64),
 }
 
-/// A flight while draws are applied to it.
+/// A flight under construction, while drawn values are applied to it.
 struct Assembly {
     scenario: Scenario,
     truth: Parameters<f64>,
@@ -31,7 +32,7 @@ struct Assembly {
 /// Applies `values` of `quantities`, in the order of [`QUANTITIES`], to `scenario`.
 ///
 /// # Errors
-/// The first parameter that they put out of range.
+/// The first parameter that the values put out of range.
 pub(super) fn apply<'a>(
     scenario: Scenario,
     values: impl Iterator<Item = (&'a Quantity, f64)>,
@@ -67,8 +68,8 @@ const fn whole(quantity: Quantity) -> Quantity {
     Quantity { whole: true, ..quantity }
 }
 
-/// Every quantity. A flight draws one number for each, used or not, in this order, so that adding a quantity to a
-/// campaign does not change the others. New ones are appended.
+/// All quantities. A flight draws one number for each, used or not, in this order, so that adding a quantity to a
+/// campaign does not change the others. New quantities are appended.
 pub static QUANTITIES: [Quantity; 35] = [
     quantity("mass_ratio", 0.01, 100.0, "true mass over the scenario's", |f, x| f.truth.mass_kg *= x),
     quantity("inertia_ratio", 0.01, 100.0, "true Ix, Iy, Iz over the scenario's", |f, x| f.truth.inertia_kg_m2 *= x),
@@ -135,7 +136,7 @@ pub static QUANTITIES: [Quantity; 35] = [
             |f, x| {
                 let wind = &mut f.scenario.realism.wind.steady_m_s;
                 let (sin, cos) = libm::sincos(x);
-                // wind_m_s comes before in the list, and has put the speed along x.
+                // `wind_m_s` comes earlier in the list and has put the speed along x.
                 *wind = Vector3::new(cos, sin, 0.0) * wind.x;
             },
         ),
@@ -179,7 +180,7 @@ pub static QUANTITIES: [Quantity; 35] = [
     whole(quantity("imu_part", 1.0, 3.0, "inertial sensor: 1 ICM-42688-P, 2 BMI270, 3 MPU-6000", |f, x| {
         let chosen = part(&Imu::PRESETS, x);
         f.scenario.instruments.imu.iter_mut().zip(chosen).for_each(|(imu, chosen)| {
-            // Vibration is the vehicle's, whatever part it shakes.
+            // Vibration belongs to the vehicle, whichever sensor it has.
             let gyro = Gyroscope { vibration_rad_s: imu.gyro.vibration_rad_s, ..chosen.gyro };
             let accel = Accelerometer { vibration_m_s2: imu.accel.vibration_m_s2, ..chosen.accel };
             (imu.gyro, imu.accel) = (gyro, accel);
@@ -242,7 +243,7 @@ pub static QUANTITIES: [Quantity; 35] = [
     )),
 ];
 
-/// Returns the part of this number, from 1 on.
+/// Returns the settings of part number `number`, from 1 on.
 fn part<T: Copy>(parts: &[Preset<T>], number: f64) -> Option<T> {
     parts.get((number as usize).checked_sub(1)?).map(|part| part.settings)
 }

@@ -12,24 +12,24 @@ use core::ops::ControlFlow;
 pub struct Row {
     /// Index of the flight.
     pub flight: u64,
-    /// Seed of its noise and weather.
+    /// Seed of the flight's noise and weather.
     pub seed: u64,
     /// Name of the contender.
     pub contender: String,
     /// Name of the trajectory.
     pub trajectory: String,
-    /// Why the vehicle was lost, if it was.
+    /// Reason of the vehicle's loss, if any.
     pub lost_reason: Option<String>,
-    /// Why the contender's monitor switched to the fallback law, if it did.
+    /// Reason of the monitor's switch to the fallback law, if any.
     pub trip_reason: Option<String>,
-    /// Values drawn, then the [`FIGURES`]; none where there was nothing to measure.
+    /// Values drawn, then the [`FIGURES`]; none where nothing could be measured.
     pub numbers: Vec<Option<f64>>,
 }
 
 /// A column of numbers.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Column {
-    /// Name, which ends in the unit.
+    /// Name, ending in the unit.
     pub name: String,
     /// Meaning in words.
     pub meaning: String,
@@ -37,7 +37,7 @@ pub struct Column {
 
 /// A figure of merit.
 pub struct Figure {
-    /// Name, which ends in the unit.
+    /// Name, ending in the unit.
     pub name: &'static str,
     /// Meaning in words.
     pub meaning: &'static str,
@@ -48,12 +48,12 @@ pub struct Figure {
 #[derive(Clone, Debug, Default)]
 struct Tally {
     lost: Option<Lost>,
-    /// When and why the contender's monitor tripped, if it did.
+    /// Time and reason of the monitor's trip, if any.
     tripped: Option<(f64, &'static str)>,
     metrics: Metrics,
     /// Number of steps in which errors were evaluated.
     settled: u64,
-    /// Number of steps, and of those with a rotor at its limit.
+    /// Number of all steps. `saturated` counts those with a rotor at its limit.
     steps: u64,
     saturated: u64,
 }
@@ -63,7 +63,7 @@ impl Tally {
         self.metrics.measured(value)
     }
 
-    /// Returns `value`, a change between two steps, if there were two.
+    /// Returns `value`, a change between two steps, if there were at least two steps with evaluated errors.
     fn changed(&self, value: f64) -> Option<f64> {
         (self.settled > 1).then_some(value)
     }
@@ -73,7 +73,7 @@ const fn figure(name: &'static str, meaning: &'static str, value: fn(&Tally) -> 
     Figure { name, meaning, value }
 }
 
-/// Every figure of merit, in the order of the columns. Errors are evaluated from
+/// All figures of merit, in the order of the columns. Errors are evaluated from
 /// [`SETTLED_S`](afbc_sim::metrics::SETTLED_S) on.
 pub static FIGURES: [Figure; 21] = [
     figure("lost_at_s", "when the vehicle was lost", |o| o.lost.map(|lost| lost.time_s)),
@@ -139,7 +139,7 @@ impl Campaign {
 }
 
 impl Tally {
-    /// Flies, and keeps only sums.
+    /// Flies the contender and keeps only sums.
     fn of(start: &mut FlightStart, contender: &Contender) -> Result<Self, OutOfRange> {
         let mut outcome = Tally::default();
         let mut metrics = Accumulator::default();

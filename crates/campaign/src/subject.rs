@@ -1,4 +1,4 @@
-//! Reads the scenario, campaign or vehicle that a name stands for, built in or in a file.
+//! Reads the scenario, campaign or vehicle with a given name, from a file or from the built-in ones.
 
 use crate::built_in;
 use crate::plan::Campaign;
@@ -8,39 +8,39 @@ use afbc_vehicles::Vehicle;
 use std::path::{Path, PathBuf};
 use toml::de::DeTable;
 
-/// What a file describes.
+/// Kind of object that a file describes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SubjectKind {
-    /// Flown by `sitl fly`.
+    /// A scenario, flown by `sitl fly`.
     Scenario,
-    /// Flown by `sitl campaign`.
+    /// A campaign, flown by `sitl campaign`.
     Campaign,
-    /// Flown by `--vehicle`.
+    /// A vehicle, flown with the option `--vehicle`.
     Vehicle,
 }
 
-/// A scenario, a campaign or a vehicle, read.
+/// A scenario, campaign or vehicle read from its file.
 #[derive(Clone, Debug)]
 pub enum Subject {
-    /// Flown by `sitl fly`.
+    /// A scenario, flown by `sitl fly`.
     Scenario(Scenario),
-    /// Flown by `sitl campaign`.
+    /// A campaign, flown by `sitl campaign`.
     Campaign(Campaign),
-    /// Flown by `--vehicle`.
+    /// A vehicle, flown with the option `--vehicle`.
     Vehicle(Box<Vehicle>),
 }
 
-/// A file found, but not parsed.
+/// A file that was found but not yet parsed.
 struct Found {
     kind: SubjectKind,
     /// The name as given.
     shown: String,
-    /// File name for errors.
+    /// File name in error messages.
     file: String,
     text: String,
-    /// Name of the scenario or campaign, unless it has one of its own.
+    /// Name of the scenario or campaign, unless the text gives another.
     name: String,
-    /// Folder to which paths in it are relative.
+    /// Folder to which paths in the file are relative.
     folder: PathBuf,
 }
 
@@ -48,7 +48,7 @@ struct Found {
 const CAMPAIGN: [&str; 4] = ["flights", "spread", "scenario", "trajectories"];
 /// Top-level keys that only a vehicle has.
 const VEHICLE: [&str; 2] = ["motor", "rotor"];
-/// Top-level key that every scenario and no campaign has.
+/// Top-level key that every scenario has and no campaign has.
 const SCENARIO: &str = "trajectory";
 
 impl SubjectKind {
@@ -60,13 +60,13 @@ impl SubjectKind {
         }
     }
 
-    /// The built-in one of another kind called `name`.
+    /// Returns the built-in object of another kind called `name`.
     fn other(self, name: &str) -> Option<Found> {
         let all = [SubjectKind::Scenario, SubjectKind::Campaign, SubjectKind::Vehicle];
         all.into_iter().filter(|kind| *kind != self).find_map(|kind| kind.built_in(name))
     }
 
-    /// Returns the kind of file by its `text`; none if it could be either.
+    /// Returns the kind of the file with this `text`; none if the keys do not tell.
     fn of(text: &str) -> Option<SubjectKind> {
         let document = DeTable::parse(text).ok()?;
         let has = |key: &str| document.get_ref().contains_key(key);
@@ -96,7 +96,7 @@ impl SubjectKind {
         }
     }
 
-    /// Returns the error that `name` is neither built in nor a file.
+    /// Returns the error for a `name` that is neither built in nor a file.
     pub fn unknown(self, name: &str) -> FileError {
         if let Some(Err(refused)) = self.other(name).map(|found| found.only(self)) {
             return refused;
@@ -111,8 +111,8 @@ impl SubjectKind {
 }
 
 impl Found {
-    /// Finds `path`: a plain name is first a built-in one of this `kind`, then a file, then a built-in one of the other
-    /// kind.
+    /// Finds `path`. A plain name means a built-in object of this `kind`, else a file, else a built-in object of
+    /// another kind.
     fn at(path: &Path, kind: SubjectKind) -> Result<Self, FileError> {
         let plain = path.to_str().filter(|text| !text.contains(['/', '\\', '.']));
         if let Some(found) = plain.and_then(|name| kind.built_in(name)) {
@@ -133,7 +133,7 @@ impl Found {
         })
     }
 
-    /// Returns the file if it is of this kind.
+    /// Returns the file if it is of this kind, or else an error that says how to fly it.
     fn only(self, kind: SubjectKind) -> Result<Self, FileError> {
         let Found { kind: found, shown, .. } = &self;
         let problem = match found {
@@ -163,7 +163,7 @@ impl Found {
 /// Reads and checks the scenario at `path`.
 ///
 /// # Errors
-/// The first error, as one line, also if it is a campaign.
+/// The first error, as one line. A campaign or vehicle is also an error.
 pub fn scenario(path: &Path) -> Result<Scenario, FileError> {
     Found::at(path, SubjectKind::Scenario)?.only(SubjectKind::Scenario)?.scenario()
 }
@@ -171,7 +171,7 @@ pub fn scenario(path: &Path) -> Result<Scenario, FileError> {
 /// Reads and checks the campaign at `path`.
 ///
 /// # Errors
-/// The first error, as one line, also if it is a scenario.
+/// The first error, as one line. A scenario or vehicle is also an error.
 pub fn campaign(path: &Path) -> Result<Campaign, FileError> {
     Found::at(path, SubjectKind::Campaign)?.only(SubjectKind::Campaign)?.campaign()
 }
@@ -179,7 +179,7 @@ pub fn campaign(path: &Path) -> Result<Campaign, FileError> {
 /// Reads and checks the scenario, campaign or vehicle at `path`.
 ///
 /// # Errors
-/// Every mistake, each as one line.
+/// All mistakes, one line each.
 pub fn any(path: &Path) -> Result<Subject, FileError> {
     let found = Found::at(path, SubjectKind::Scenario)?;
     match found.kind {

@@ -1,4 +1,4 @@
-//! Suites: named lists of flights, with what others have published about them. `docs/suites.md` describes the format.
+//! Suites: named lists of flights, with published results for comparison. `docs/suites.md` describes the format.
 
 use crate::compare;
 use crate::file::named;
@@ -11,71 +11,71 @@ use std::path::Path;
 
 const SAMPLE: Example = Example { command: "suites field", text: "" };
 
-/// A suite of flights.
+/// A named list of flights.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Suite {
     /// Short name, used in file names.
     pub name: String,
     /// Description in one line.
     pub description: String,
-    /// Where published figures come from.
+    /// Sources of the published figures.
     pub sources: Vec<Citation>,
-    /// The flights, in order; each scenario's contenders are replaced by those who fly the suite.
+    /// Flights, in order. The contenders of each scenario are replaced by those that fly the suite.
     pub flights: Vec<SuiteFlight>,
 }
 
-/// Where published figures come from.
+/// Source of published figures.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Citation {
-    /// Short name.
+    /// Short name, to which published figures refer.
     pub name: String,
-    /// What it is, and where in it the figures are.
+    /// The publication, and where in it the figures are.
     pub citation: String,
-    /// How those flights differ from these.
+    /// Difference between the published flights and these.
     pub differs: String,
 }
 
 /// A flight of a suite.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SuiteFlight {
-    /// What is flown.
+    /// Scenario to fly.
     pub scenario: Scenario,
-    /// Tilt that every contender is allowed, if it is limited more \[rad\].
+    /// Tilt limit that every contender gets at least \[rad\]; none leaves the limits as they are.
     pub tilt_max_rad: Option<f64>,
-    /// Figures that others have published.
+    /// Published figures of this flight.
     pub published: Vec<Published>,
 }
 
 /// A published figure.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Published {
-    /// Who flew.
+    /// Name of the law that was flown.
     pub law: String,
     /// Root mean square distance from the reference \[m\].
     pub rms_m: f64,
-    /// Place of its source in the suite's list.
+    /// Index of the figure's source in the suite's list.
     pub source: usize,
 }
 
-/// Every built-in suite.
+/// All built-in suites.
 pub static SUITES: [BuiltIn<Suite>; 3] = [
     BuiltIn::new("field", include_str!("../suites/field.toml"), read),
     BuiltIn::new("faults", include_str!("../suites/faults.toml"), read),
     BuiltIn::new("sensors", include_str!("../suites/sensors.toml"), read),
 ];
 
-/// Accepted tilt \[rad\].
+/// Accepted tilt limits \[rad\].
 const TILT_MAX: Range = Range::new("tilt_max_rad", 0.05, 1.2);
-/// Accepted published distance \[m\].
+/// Accepted published distances \[m\].
 const RMS: Range = Range::new("rms_m", 0.0, 1000.0);
-/// Keys of a flight that its heirs do not take over.
+/// Keys of a flight that a flight with `like` does not copy.
 const OWN: [&str; 4] = ["name", "description", "published", LIKE];
 
 impl Suite {
-    /// Returns the scenarios with `contenders`, each with its gains for that scenario's vehicle.
+    /// Returns the suite's scenarios with `contenders`, each with its gains for the scenario's vehicle.
     ///
     /// # Errors
-    /// One line on a gain or setting out of range.
+    /// One line about a gain or setting out of range.
     pub fn under(&self, contenders: &[Contender]) -> Result<Vec<Scenario>, FileError> {
         let put = |flight: &SuiteFlight| {
             let mut scenario = flight.scenario.clone();
@@ -89,8 +89,8 @@ impl Suite {
     }
 }
 
-/// Reads and checks a suite from its `text`. `file` is its path for errors, `name` its name if it has no other, and
-/// `folder` the one to which the paths of scenario files are relative.
+/// Reads and checks a suite from its `text`. `file` is its path in error messages, `name` its name unless the text
+/// gives one. Paths of scenario files are relative to `folder`.
 ///
 /// # Errors
 /// The first mistake, as one line.
@@ -110,7 +110,7 @@ pub fn parse(file: &str, text: &str, name: &str, folder: &Path) -> Result<Suite,
     })
 }
 
-/// Returns the error that no suite is called `name`.
+/// Returns the error for an unknown suite `name`.
 pub fn unknown(name: &str) -> FileError {
     let cure = match BuiltIn::similar(&SUITES, name) {
         Some(known) => format!("did you mean {}?", known.name),
@@ -119,7 +119,7 @@ pub fn unknown(name: &str) -> FileError {
     FileError::whole(name, format!("no such suite; {cure}"))
 }
 
-/// Reads and checks the suite at `path`: a plain name is first a built-in one, then a file.
+/// Reads and checks the suite at `path`. A plain name means a built-in suite, else a file.
 ///
 /// # Errors
 /// The first mistake, as one line.

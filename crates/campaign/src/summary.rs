@@ -4,17 +4,17 @@ use crate::manifest::Manifest;
 use crate::row::Row;
 use crate::statistics::Share;
 
-/// Number of intervals into which the range of a drawn quantity is divided.
+/// Number of equal intervals into which the range of a drawn quantity is divided.
 pub const BINS: usize = 10;
-/// Number of each contender's worst flights that are listed.
+/// Number of worst flights listed for each contender.
 const WORST: usize = 3;
 
-/// Number of flights, and of those without a loss.
+/// Numbers of all flights and of flights without a loss.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Count {
     /// All flights.
     pub flights: u64,
-    /// Flights that were not lost.
+    /// Flights in which the vehicle was not lost.
     pub kept: u64,
 }
 
@@ -24,7 +24,7 @@ impl Count {
         self.kept += u64::from(kept);
     }
 
-    /// Returns the share of flights that were not lost.
+    /// Returns the share of flights in which the vehicle was not lost, with its interval.
     pub fn share(&self) -> Share {
         Share::of(self.kept, self.flights)
     }
@@ -35,16 +35,17 @@ impl Count {
 pub struct Bad {
     /// Index of the flight.
     pub flight: u64,
-    /// Name of its trajectory.
+    /// Name of the flight's trajectory.
     pub trajectory: String,
-    /// When and why the vehicle was lost, if it was.
+    /// Time and reason of the vehicle's loss, if any.
     pub lost: Option<(f64, String)>,
     /// Root mean square distance from the reference \[m\].
     pub rmse_position_m: Option<f64>,
 }
 
 impl Bad {
-    /// Sort key that grows with how bad the flight was: a loss ranks above any error, an early loss above a late one.
+    /// Returns a sort key that grows with how bad the flight was. A loss ranks above any error, an early loss above a
+    /// late one.
     fn badness(&self) -> (bool, f64) {
         match &self.lost {
             Some((time_s, _)) => (true, -time_s),
@@ -58,39 +59,39 @@ impl Bad {
 pub struct Tally {
     /// Name of the contender.
     pub contender: String,
-    /// All of its flights.
+    /// Counts of all flights of the contender.
     pub count: Count,
-    /// Number of flights in which its monitor switched to the fallback law.
+    /// Number of flights in which the contender's monitor switched to the fallback law.
     pub tripped: u64,
     /// Counts for each trajectory, in the campaign's order.
     pub by_trajectory: Vec<Count>,
     /// Counts for each drawn quantity, in [`BINS`] equal parts of its interval.
     pub by_draw: Vec<[Count; BINS]>,
-    /// Root mean square distances from the reference \[m\], sorted; infinite for a flight that was lost.
+    /// Root mean square distances from the reference \[m\], sorted; infinite for lost flights.
     pub rmse_position_m: Vec<f64>,
-    /// Largest distances from the reference \[m\], sorted; infinite for a flight that was lost.
+    /// Largest distances from the reference \[m\], sorted; infinite for lost flights.
     pub max_position_m: Vec<f64>,
-    /// Mean |change of U4| per step \[N\], sorted, of flights that were not lost.
+    /// Mean |change of U4| per step \[N\], sorted, of flights without a loss.
     pub mean_abs_du4_n: Vec<f64>,
-    /// Shares of steps with a rotor at its limit, sorted, of flights that were not lost.
+    /// Fractions of steps with a rotor at its limit, sorted, of flights without a loss.
     pub saturated_ratio: Vec<f64>,
-    /// The worst flights, worst first.
+    /// The worst flights, beginning with the worst.
     pub worst: Vec<Bad>,
 }
 
 /// Results of a campaign.
 #[derive(Clone, Debug)]
 pub struct Summary {
-    /// What the results belong to.
+    /// Description of the campaign and shard.
     pub manifest: Manifest,
     /// Results of each contender, in the campaign's order.
     pub tallies: Vec<Tally>,
 }
 
 impl Summary {
-    /// Creates the summary of no flight.
+    /// Creates an empty summary.
     pub fn new(manifest: &Manifest) -> Self {
-        // Allocated once: this is all that grows with the number of flights.
+        // Allocated at once, since only these lists grow with the number of flights.
         let values = || Vec::with_capacity(manifest.shard.count(manifest.flights) as usize);
         let tally = |contender: &String| Tally {
             contender: contender.clone(),
@@ -138,7 +139,7 @@ impl Summary {
             rmse_position_m: number("rmse_position_m"),
         };
         tally.worst.push(bad);
-        // Stable: of two equally bad flights, the earlier comes first.
+        // The sort is stable: of two equally bad flights, the earlier one comes first.
         tally.worst.sort_by(|a, b| {
             let ((a_lost, a), (b_lost, b)) = (a.badness(), b.badness());
             b_lost.cmp(&a_lost).then(b.total_cmp(&a))
@@ -146,7 +147,7 @@ impl Summary {
         tally.worst.truncate(WORST);
     }
 
-    /// Sorts the values after the last row.
+    /// Sorts the values. To be called after the last row.
     pub fn finish(mut self) -> Self {
         for tally in &mut self.tallies {
             let Tally { rmse_position_m, max_position_m, mean_abs_du4_n, saturated_ratio, .. } = tally;
@@ -158,8 +159,9 @@ impl Summary {
     }
 }
 
-/// Returns which of [`BINS`] equal parts of an interval `value` lies in; the upper end belongs to the last.
+/// Returns the index of the part of the interval, of [`BINS`] equal ones, that `value` lies in. The upper end belongs
+/// to the last part.
 fn bin([low, high]: [f64; 2], value: f64) -> usize {
-    // An interval of one value gives 0/0: the cast makes 0 of NaN, the first part.
+    // An interval of one value gives 0/0 = NaN, which the cast turns into 0, the first part.
     ((value - low) / (high - low) * BINS as f64).clamp(0.0, BINS as f64 - 1.0) as usize
 }

@@ -1,25 +1,25 @@
-//! How the contenders of a comparison differ over the same seeds.
+//! Differences between the contenders of a comparison, seed by seed.
 
 use crate::compare::{Comparison, Entry};
 use crate::statistics::{Median, SignedRank, holm};
 use afbc_sim::metrics::Metrics;
 
-/// How a figure of one contender differs from another's over the same seeds.
+/// Difference of a figure between two contenders over the same seeds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Versus {
     /// Number of seeds.
     pub seeds: usize,
-    /// Median of the differences, this contender's less the other's. A vehicle that was lost is infinitely far.
+    /// Median of the differences, this contender's value minus the other's. A lost vehicle's value is infinite.
     pub difference: Median,
-    /// Whether they are more than chance.
+    /// Signed rank test of the differences.
     pub test: SignedRank,
-    /// Its probability, adjusted for as many contenders of the comparison as are tested.
+    /// The test's probability, adjusted by Holm's method for the number of contenders tested.
     pub p_holm: f64,
 }
 
 impl Comparison {
-    /// Compares a figure of each contender with that of the one at [`Comparison::against`]; none for that one itself,
-    /// or with a single seed.
+    /// Compares a figure of each contender with that of the contender at [`Comparison::against`]. Returns none for that
+    /// contender itself, and for all with a single seed.
     pub fn versus(&self, value: fn(&Metrics) -> f64) -> Vec<Option<Versus>> {
         let Some(against) = self.entries.get(self.against) else { return Vec::new() };
         let others = against.values(value);
@@ -36,7 +36,7 @@ impl Comparison {
     }
 }
 
-/// Returns how much larger `own` is; both lost are level.
+/// Returns `own` minus `other`, or 0 if both are lost.
 fn difference(own: f64, other: f64) -> f64 {
     // The difference of two infinities would be NaN.
     if own == other { 0.0 } else { own - other }

@@ -1,4 +1,4 @@
-//! Campaigns: results do not depend on how they were computed, and no finished flight is lost.
+//! Tests of campaigns: results do not depend on how they were computed, and no finished flight is lost.
 
 #![expect(clippy::unwrap_used, clippy::indexing_slicing, clippy::panic, reason = "tests")]
 
@@ -10,7 +10,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
-/// An empty folder for each test.
+/// Creates an empty folder for a test.
 fn folder(test: &str) -> PathBuf {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("campaign").join(test);
     if folder.exists() {
@@ -20,7 +20,7 @@ fn folder(test: &str) -> PathBuf {
     folder
 }
 
-/// Short flights of two contenders on two courses, some of them lost.
+/// Short flights of two contenders on two trajectories. Some are lost.
 const SMALL: &str = include_str!("small.toml");
 
 fn parse(text: &str) -> Campaign {
@@ -31,7 +31,7 @@ fn small() -> Campaign {
     parse(SMALL)
 }
 
-/// Flies everything missing in `folder` on `threads` cores.
+/// Flies all missing flights in `folder` on `threads` threads.
 fn fly(campaign: &Campaign, path: &Path, shard: Shard, threads: usize) {
     let folder = CampaignFolder::open(path, Manifest::new(campaign, shard), false).unwrap();
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
@@ -43,7 +43,7 @@ fn results_of(path: &Path) -> Vec<u8> {
     fs::read(path.join("results.parquet")).unwrap()
 }
 
-/// The bytes that every other way must give.
+/// Returns the bytes of the results that every other way of flying must also give.
 fn reference(campaign: &Campaign, folder: &Path) -> Vec<u8> {
     let path = folder.join("reference");
     fly(campaign, &path, Shard::WHOLE, 1);
@@ -68,7 +68,7 @@ fn an_interrupted_campaign_goes_on_from_what_is_whole() {
     let reference = reference(&campaign, &folder);
     let path = folder.join("interrupted");
 
-    // Stopped after 100 of 150 flights by one thread: six chunks of 16 are complete, the seventh was begun.
+    // A single thread is stopped after 100 of 150 flights: six chunks of 16 are complete, the seventh was begun.
     {
         let (stop, done) = (AtomicBool::new(false), AtomicU64::new(0));
         let place = CampaignFolder::open(&path, Manifest::new(&campaign, Shard::WHOLE), false).unwrap();
@@ -87,7 +87,7 @@ fn an_interrupted_campaign_goes_on_from_what_is_whole() {
     let kept = chunks();
     assert_eq!(kept.len(), 6);
 
-    // One is damaged, one is of another campaign, four are complete; and a temporary file remains.
+    // One chunk is damaged, one is from another campaign, four are complete. A temporary file remains too.
     let files: Vec<_> = kept.iter().collect();
     fs::write(files[0].0, &files[0].1[..files[0].1.len() / 2]).unwrap();
     let other = folder.join("other");
@@ -107,7 +107,7 @@ fn an_interrupted_campaign_goes_on_from_what_is_whole() {
     }
     assert_eq!(resumed.into_inner(), 64, "the four whole chunks are not flown again");
     assert_eq!(reference, results_of(&path));
-    // Resumed once more: nothing is left to fly.
+    // Resumes once more with nothing left to fly.
     fly(&campaign, &path, Shard::WHOLE, 1);
     assert_eq!(reference, results_of(&path));
 }
@@ -122,7 +122,7 @@ fn shards_come_together_to_what_one_machine_gives() {
         path
     };
     let parts: Vec<_> = (1..=4).map(|index| part(index, 4)).collect();
-    // In any order of the shards.
+    // The shards are given in arbitrary order.
     let order: Vec<_> = [2, 0, 3, 1].into_iter().map(|i: usize| parts[i].clone()).collect();
     let (_, summary) = campaign::merge(&order, &folder.join("merged"), false).unwrap();
     assert_eq!(reference, results_of(&folder.join("merged")));
@@ -173,7 +173,7 @@ fn a_folder_belongs_to_one_campaign_and_one_program() {
     CampaignFolder::open(&folder, Manifest::new(&campaign, Shard::WHOLE), false).unwrap();
 }
 
-/// Two vehicles that differ in one number, and in nothing that the laws are told, have results of their own.
+/// Two vehicles that differ in one number, which no law is told, have different results.
 #[test]
 fn a_folder_belongs_to_one_vehicle() {
     let folder = folder("vehicles");
@@ -195,14 +195,14 @@ fn a_folder_belongs_to_one_vehicle() {
     let parts = ["a", "b"].map(|part| folder.join(part));
     let refused = campaign::merge(&parts, &folder.join("merged"), false).map(|_| ()).unwrap_err().to_string();
     assert!(refused.contains("parts of different campaigns") && !refused.contains('\n'), "{refused}");
-    // The same vehicle from elsewhere, with another comment, is the same.
+    // The same vehicle from another path and with another comment counts as the same.
     let copied = on("/elsewhere/mine.toml", &format!("# mine\n{iris}"));
     fly(&copied, &folder.join("b2"), Shard { index: 2, of: 2 }, 1);
     campaign::merge(&["a", "b2"].map(|part| folder.join(part)), &folder.join("merged"), false).unwrap();
 }
 
-/// An inertial sensor alone tells no place: with its motors off from the start the vehicle falls, and is not kept,
-/// whatever law it has, with and without the flight core.
+/// An inertial sensor alone gives no position, so the motors stay off, the vehicle falls and counts as lost. This holds
+/// for every law, with and without the flight core.
 #[test]
 fn a_vehicle_that_never_flies_is_not_kept() {
     let text = "flights = 2\nduration_s = 5.0\n[scenario]\nvehicle = { name = \"iris\" }\n\
@@ -241,7 +241,7 @@ fn a_flight_flown_again_gives_the_figures_of_its_row() {
     assert!((1..60).contains(&lost), "{lost} lost: a test of both kinds");
 }
 
-/// Returns every row of the first `flights` flights.
+/// Returns all rows of the first `flights` flights.
 fn rows(campaign: &Campaign, flights: u64) -> Vec<Row> {
     (0..flights).flat_map(|flight| campaign.rows(flight).unwrap()).collect()
 }
@@ -251,7 +251,7 @@ fn a_draw_depends_on_seed_and_flight_alone() {
     let campaign = small();
     let again = parse(&SMALL.replace("flights = 150", "flights = 9"));
     assert_eq!(rows(&campaign, 3), rows(&again, 3));
-    // An additional quantity leaves the others unchanged, wherever it stands.
+    // An additional quantity leaves the others unchanged, wherever it is listed.
     let more = parse(&SMALL.replace("[spread]", "[spread]\ninertia_ratio = [0.5, 2.0]\nsensor_delay_s = [0.0, 0.004]"));
     for flight in 0..100 {
         let (few, many) = (campaign.draw(flight), more.draw(flight));
@@ -280,7 +280,7 @@ fn draws_fill_their_intervals_evenly() {
         // The mean of n uniform numbers has a standard deviation of 1 / sqrt(12 n) = 0.004.
         assert!((sum / FLIGHTS as f64 - 0.5).abs() < 0.02, "{sums:?}");
     }
-    // 1250 of each, standard deviation 31.
+    // About 1250 of each, with a standard deviation of 31.
     assert!(rotors.iter().all(|&count| count.abs_diff(1250) < 150), "{rotors:?}");
 }
 
@@ -299,12 +299,12 @@ fn what_is_drawn_reaches_the_vehicle() {
     assert_eq!(rotors.faults.len(), 1);
     assert_eq!((rotors.faults[0].efficiency, f64::from(rotors.faults[0].rotor)), (values[3], values[4]));
     assert_eq!(rotors.faults[0].start_s, values[5]);
-    // Trajectories are flown in turn.
+    // The trajectories are flown in turn.
     assert_eq!(campaign.trajectory(5).unwrap().name, "circle");
     assert_ne!(campaign.flight(4).unwrap().trajectory, flight.trajectory);
 }
 
-/// No file of a campaign is used with any bit flipped or any end cut off.
+/// Refuses files with a flipped bit or a missing end.
 #[test]
 fn damaged_files_are_refused() {
     let folder = folder("damaged");
@@ -326,7 +326,7 @@ fn damaged_files_are_refused() {
     let (results, chunks) = (open(&whole).unwrap(), open(&begun).unwrap());
     let again = || campaign::fly(&campaign, &results, &never, &|_| panic!("it is finished")).map(|_| ());
     let merged = || campaign::merge(&parts, &folder.join("merged"), false).map(|_| ());
-    // Number of flights from which a campaign resumes.
+    // Returns the number of flights that a resumed campaign does not fly again.
     let kept = || {
         let (stop, kept) = (AtomicBool::new(false), AtomicU64::new(0));
         let first = |flights| {
@@ -349,7 +349,7 @@ fn damaged_files_are_refused() {
     assert!(!folder.join("merged").exists());
     drop(results);
     each_damage(&whole.join("campaign.json"), 1, |file| refused(file, open(&whole).map(|_| ())));
-    // Undamaged, everything is read.
+    // Undamaged files are all read.
     drop(chunks);
     fly(&campaign, &begun, Shard::WHOLE, 1);
     assert_eq!(results_of(&begun), results_of(&whole));
@@ -357,8 +357,8 @@ fn damaged_files_are_refused() {
     assert_eq!(results_of(&folder.join("merged")), results_of(&whole));
 }
 
-/// Calls `see` with the file after changing a bit of every `stride`-th byte, every bit of its first and last bytes, and
-/// after truncations; then restores it.
+/// Calls `see` with the file after each damage: a changed bit in every `stride`-th byte, each changed bit of the first
+/// and last bytes, truncations, additional bytes. Then restores the file.
 fn each_damage(path: &Path, stride: usize, mut see: impl FnMut(&Path)) {
     let whole = fs::read(path).unwrap();
     let mut damage = |bytes: &[u8]| {
@@ -408,8 +408,8 @@ fn a_damaged_folder_is_mended_by_what_its_error_says() {
     }
 }
 
-/// The work before the first flight and for each chunk does not grow with the number of flights: a campaign of ten
-/// million that is stopped after its first chunk returns.
+/// The work before the first flight, and per chunk, does not grow with the number of flights. A campaign of ten million
+/// flights that is stopped after its first chunk returns soon.
 #[test]
 fn ten_million_flights_start_with_the_first() {
     let folder = folder("ten-million");
@@ -427,14 +427,14 @@ fn ten_million_flights_start_with_the_first() {
             assert!(pool.install(|| campaign::fly(&campaign, &place, &stop, &progress)).unwrap().is_none());
             flown.into_inner()
         };
-        // Stopped before the first flight, nothing is flown.
+        // A campaign that is stopped before its first flight flies nothing.
         assert_eq!((flown(u64::MAX, true), chunks()), (0, 0));
         assert_eq!((flown(16, false), chunks()), (16, 1));
         assert_eq!((flown(40, false), chunks()), (40, 2));
     }
 }
 
-/// A file that cannot be read is not called damaged, since the advice would be to delete it.
+/// An unreadable file is not called damaged, since the advice would be to delete it.
 #[test]
 fn what_cannot_be_read_is_not_called_damaged() {
     let (folder, campaign) = (folder("unreadable"), parse(&SMALL.replace("= 150", "= 2").replace("= 6.0", "= 0.2")));

@@ -1,4 +1,4 @@
-//! Comparisons over seeds: when a seed matters, and how contenders differ over the same seeds.
+//! Tests of comparisons over seeds: which scenarios a seed changes, and how contenders differ over the same seeds.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs)]
 
 use afbc::Profile;
@@ -22,7 +22,7 @@ fn fly(scenario: Scenario, seeds: u64) -> Comparison {
     compare::fly(vec![scenario], seeds, u64::MAX, &|| ()).unwrap().remove(0)
 }
 
-/// A scenario is flown with several seeds if, and only if, two seeds give two flights.
+/// A scenario's default is several seeds if, and only if, two seeds give two different flights.
 #[test]
 fn a_seed_is_said_to_matter_where_it_does() {
     let still = Scenario { duration_s: 6.0, ..named("hover") };
@@ -50,7 +50,7 @@ fn a_seed_is_said_to_matter_where_it_does() {
     assert!(random >= 4 && fixed >= 4, "{random}, {fixed}");
 }
 
-/// A law's name stands for the law that flies, whichever scenario comes first; a printed law is called so.
+/// A law's name means the law with its flight profile, whichever scenario comes first. A printed law is named so.
 #[test]
 fn a_laws_name_is_that_of_the_law_that_flies_in_any_order() {
     let all: Vec<Scenario> = BUILT_IN.iter().map(|known| known.read().unwrap()).collect();
@@ -73,7 +73,7 @@ fn a_laws_name_is_that_of_the_law_that_flies_in_any_order() {
     assert_eq!(titles, [("afbc-as-printed", afbc), ("backstepping-as-printed", backstepping)]);
 }
 
-/// Of the built-in scenarios only the paper's flies the printed law, and says so.
+/// Of the built-in scenarios, only the paper's flies the printed law, and names it so.
 #[test]
 fn only_the_papers_scenario_flies_the_printed_law() {
     for known in &BUILT_IN {
@@ -86,7 +86,7 @@ fn only_the_papers_scenario_flies_the_printed_law() {
     }
 }
 
-/// A comparison flies a scenario's own contenders as its file has them, on any vehicle.
+/// A scenario's own contenders keep the gains of its file in a comparison, on any vehicle.
 #[test]
 fn own_gains_fly_in_their_own_scenario() {
     let text = "controllers = [\"pid\", \"afbc\"]\n[vehicle]\nname = \"racer\"";
@@ -111,7 +111,7 @@ fn own_gains_fly_in_their_own_scenario() {
 fn differences_are_those_of_the_same_seeds() {
     let kinds = [ControllerKind::Pid, ControllerKind::Afbc, ControllerKind::Indi, ControllerKind::Backstepping];
     let flown = fly(under(Scenario { duration_s: 6.0, ..named("hardware") }, &kinds), 7);
-    // AFBC is the one compared with unless another is.
+    // The default contender to compare with is AFBC.
     assert_eq!(flown.against, 1);
     let flown = flown.against(Some("indi"));
     assert_eq!((flown.against, flown.clone().against(Some("nobody")).against), (2, 1));
@@ -133,16 +133,16 @@ fn differences_are_those_of_the_same_seeds() {
             assert!(p_holm >= test.p);
             tested.push((test.p, p_holm));
         }
-        // The smallest of three counts three times.
+        // Holm's correction multiplies the smallest of three probabilities by three.
         let smallest = tested.iter().min_by(|a, b| a.0.total_cmp(&b.0)).unwrap();
         assert_eq!(smallest.1, (3.0 * smallest.0).min(1.0));
     }
-    // One seed tells nothing.
+    // A single seed gives no comparison.
     let single = fly(flown.scenario, 1);
     assert!(single.versus(DISTANCE.value).iter().all(Option::is_none));
 }
 
-/// A vehicle that is lost is further from the reference than any that is not.
+/// A lost vehicle ranks behind every vehicle that is not lost.
 #[test]
 fn a_lost_vehicle_is_the_worst() {
     let mut falling = Scenario { duration_s: 8.0, ..named("hardware") };
@@ -155,7 +155,7 @@ fn a_lost_vehicle_is_the_worst() {
     assert!(flown.is_best(&flown.entries[1], &DISTANCE) && !flown.is_best(&flown.entries[0], &DISTANCE));
     let versus = flown.clone().against(Some("indi")).versus(DISTANCE.value)[0].unwrap();
     assert_eq!((versus.test.effect, versus.difference.value), (1.0, f64::INFINITY));
-    // Both lost are level.
+    // Two lost vehicles are level.
     flown.entries[1] = flown.entries[0].clone();
     let level = flown.versus(DISTANCE.value)[1].unwrap();
     assert_eq!((level.difference.value, level.test), (0.0, SignedRank { p: 1.0, effect: 0.0 }));

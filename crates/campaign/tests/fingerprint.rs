@@ -1,5 +1,6 @@
-//! The fingerprint of a campaign: every key of its files changes it, and nothing else does. Keys come from the examples
-//! of the documents and from the declarations; the readers' own lists of keys say whether any is missing.
+//! Tests of a campaign's fingerprint: every key of its files changes it, and nothing else does. The keys come from the
+//! examples in the documents and from the declarations. The readers' own lists of keys show whether one is missing
+//! here.
 
 #![expect(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "tests")]
 
@@ -20,14 +21,14 @@ use std::path::Path;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-/// Reads a file, and returns the fingerprint of a campaign with it.
+/// Reads a file of one kind and returns the fingerprint of a campaign with it.
 type Read = fn(&str) -> Result<String, String>;
 
 fn fingerprint(campaign: &Campaign) -> String {
     Manifest::new(campaign, Shard::WHOLE).fingerprint
 }
 
-/// A campaign of `scenario`, its own reference included.
+/// Returns a campaign of `scenario` along the scenario's own reference.
 fn of(scenario: Scenario) -> Campaign {
     let plain = campaign::parse("f", "flights = 1\nscenario = \"hover\"", "f", Path::new("")).unwrap();
     let Scenario { trajectory, initial, .. } = scenario.clone();
@@ -39,20 +40,21 @@ fn campaign_file(text: &str) -> Result<String, String> {
     Ok(fingerprint(&campaign))
 }
 
-/// The examples have a trajectory added if they have none, and an inertial sensor if they have other instruments only.
+/// Returns the fingerprint of a scenario file. An example without a trajectory gets one; an example that has only other
+/// instruments gets an inertial sensor.
 fn scenario_file(text: &str) -> Result<String, String> {
     let hover = "\n[trajectory]\nkind = \"hover\"\nposition_m = [0, 0, 1]\n";
     let added = if text.contains("[trajectory]") { "" } else { hover };
     let alone = text.contains("[instruments.") && !text.contains("[instruments.imu");
     let imu = if alone { "\n[instruments.imu]\n" } else { "" };
-    // Beside the path that an example names.
+    // The path beside which the vehicle file that an example names lies.
     let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../scenario/tests/f");
     let scenario =
         afbc_scenario::parse(file, &format!("{text}{added}{imu}"), "f").map_err(|error| error.to_string())?;
     Ok(fingerprint(&of(scenario)))
 }
 
-/// A scenario under every law, on the vehicle of the file.
+/// Returns the fingerprint of a scenario under every law, on the vehicle of the file.
 fn vehicle_file(text: &str) -> Result<String, String> {
     let vehicle = afbc_vehicles::parse("f", text, "f").map_err(|error| error.to_string())?;
     on(&vehicle).map(|campaign| fingerprint(&campaign))
@@ -65,13 +67,13 @@ fn on(vehicle: &Vehicle) -> Result<Campaign, String> {
     scenario.on(vehicle, Profile::Flight).map(of).map_err(|error| error.to_string())
 }
 
-/// Every value of a file that is no list or table of others.
+/// A value of a file that is neither a list nor a table.
 struct Leaf {
-    /// Its table, dotted, without numbers of lists.
+    /// Dotted name of the value's table, without list indices.
     table: String,
     key: String,
     at: Range<usize>,
-    /// True if the value stands alone, and not in a list.
+    /// True if the value is not an item of a list.
     alone: bool,
     kind: Kind,
 }
@@ -87,13 +89,13 @@ fn join(table: &str, key: &str) -> String {
     if table.is_empty() { key.into() } else { format!("{table}.{key}") }
 }
 
-/// What a file consists of.
+/// Values, tables and keys of a file.
 #[derive(Default)]
 struct Parts {
     leaves: Vec<Leaf>,
-    /// Where each table is written, by its dotted name.
+    /// Dotted name of each table, and the range of its text.
     tables: Vec<(String, Range<usize>)>,
-    /// The keys of each table.
+    /// Keys of each table.
     keys: BTreeMap<String, BTreeSet<String>>,
 }
 
@@ -132,7 +134,7 @@ fn with(text: &str, at: &Range<usize>, new: &str) -> String {
     format!("{}{new}{}", &text[..at.start], &text[at.end..])
 }
 
-/// What else the value of a leaf might be; some of it is refused.
+/// Returns other values to try for a leaf. The reader may refuse some of them.
 fn others(text: &str, leaf: &Leaf, read: Read) -> Vec<String> {
     let old = &text[leaf.at.clone()];
     match leaf.kind {
@@ -147,7 +149,7 @@ fn others(text: &str, leaf: &Leaf, read: Read) -> Vec<String> {
         Kind::Text => {
             let unknown = read(&with(text, &leaf.at, "\"other-one\""));
             let names = unknown.err().unwrap_or_default();
-            // What it may be, as the error says, or a built-in vehicle or scenario.
+            // The error lists the accepted names. A text may also name a built-in vehicle or scenario.
             let listed = names.split('"').skip(1).step_by(2).map(str::to_owned);
             let vehicles = afbc_vehicles::BUILT_IN.iter().map(|known| known.name.to_owned());
             let scenarios = afbc_scenario::BUILT_IN.iter().map(|known| known.name.to_owned());
@@ -157,15 +159,15 @@ fn others(text: &str, leaf: &Leaf, read: Read) -> Vec<String> {
     }
 }
 
-/// Keys that say what a file is called: of campaigns, scenarios and vehicles.
+/// True for keys that only name or describe a campaign, scenario or vehicle.
 fn is_title(leaf: &Leaf) -> bool {
     ["", "scenario"].contains(&leaf.table.as_str()) && ["name", "description"].contains(&leaf.key.as_str())
 }
 
-/// Figures of the inertial sensor in a vehicle's file that its estimator is not told.
+/// Figures of the inertial sensor in a vehicle's file that the estimator does not use.
 const UNUSED: [(&str, &str); 2] = [("imu.gyro", "cutoff_hz"), ("imu.accel", "cutoff_hz")];
 
-/// Changes every value of `text`, and returns for each table the keys that it has.
+/// Changes each value of `text`, checks that this changes the fingerprint, and returns the keys of each table.
 fn each_value_counts(text: &str, read: Read) -> BTreeMap<String, BTreeSet<String>> {
     let plain = read(text).unwrap_or_else(|error| panic!("{error} in\n{text}"));
     let Parts { leaves, keys, .. } = Parts::of(text);
@@ -181,26 +183,27 @@ fn each_value_counts(text: &str, read: Read) -> BTreeMap<String, BTreeSet<String
                 assert_eq!(fingerprint, plain, "it counts: {}", what());
             }
             Some((other, fingerprint)) => assert_ne!(fingerprint, plain, "{other} counts for nothing: {}", what()),
-            // A kind of which every other needs other keys, a name that is listed already, a switch that only goes on.
+            // No other value may be accepted: another kind needs other keys, a name may be listed already, a switch may
+            // only be true.
             None => assert!(matches!(leaf.kind, Kind::Text | Kind::Switch), "no other value of {}", what()),
         }
     }
     keys
 }
 
-/// Adds what the reader says that it knows in each table of `text` to `known`.
+/// Adds the keys that the reader says it knows in each table of `text` to `known`.
 fn ask_for_keys(text: &str, read: Read, known: &mut BTreeMap<String, BTreeSet<String>>) {
     const STRANGE: &str = "q9w8q9w8q9w8";
     let Parts { leaves, keys, tables } = Parts::of(text);
     for path in keys.keys().map(String::as_str).chain([""]) {
-        // After one of its values, after its header, at its end if it is written within braces, or under a new header.
+        // An unknown key is tried after a value, after a header, at the end of an inline table, and under a new header.
         let after = leaves.iter().filter(|leaf| leaf.table == path && leaf.alone).map(|leaf| leaf.at.end);
         let inside = tables.iter().filter(|(table, _)| table == path).flat_map(|(_, at)| [at.end, at.end - 1]);
         let gaps = |at| ["\n", ", "].map(|gap| with(text, &(at..at), &format!("{gap}{STRANGE} = 1")));
         let beside = after.chain(inside).flat_map(gaps);
         let headed = [format!("{text}\n[{path}]\n{STRANGE} = 1\n"), format!("{STRANGE} = 1\n{text}")];
         let own = format!("{}: unknown key; known here: ", join(path, STRANGE));
-        // A table that is written by dotted keys, beside one of its parent's values.
+        // A table of dotted keys gets the unknown key beside a value of its parent.
         let (parent, key) = path.rsplit_once('.').unwrap_or(("", path));
         let parents = leaves.iter().filter(|leaf| leaf.table == parent && leaf.alone).map(|leaf| leaf.at.end);
         let dotted = parents.map(|at| with(text, &(at..at), &format!("\n{key}.{STRANGE} = 1")));
@@ -219,7 +222,7 @@ const REFUSED: [(&str, &str); 4] = [
     ("estimator", "gravity_m_s2"),
 ];
 
-/// Changes every value of every text, and looks whether a key that the reader knows is in none of them.
+/// Changes every value of every text, and checks that each key known to the reader is in at least one text.
 fn each_key_counts<'t>(texts: impl IntoIterator<Item = &'t str>, read: Read) {
     let (mut known, mut seen) = (BTreeMap::new(), BTreeMap::<String, BTreeSet<String>>::new());
     for text in texts {
@@ -237,7 +240,7 @@ fn each_key_counts<'t>(texts: impl IntoIterator<Item = &'t str>, read: Read) {
     assert!(missing.is_empty(), "no text here has {missing:?}");
 }
 
-/// Every declared parameter as lines of a file, at its value.
+/// Returns the declared parameters of a group as lines of a file, with their values.
 fn lines(parameters: &impl Declared, group: &str) -> String {
     let mut lines = String::new();
     let Ok(()) = parameters.visit(&mut |declaration: &Declaration, value: Value<'_>| {
@@ -249,17 +252,17 @@ fn lines(parameters: &impl Declared, group: &str) -> String {
     lines
 }
 
-/// The example of every section of a page.
+/// Returns the TOML examples of a page.
 fn examples(page: &'static str) -> Vec<&'static str> {
     page.split("```toml\n").skip(1).map(|part| part.split("```").next().unwrap()).collect()
 }
 
-/// Axes with gains of their own for a law in the cascade; no other law has any.
+/// Returns the groups of gains of a law: the axes for a law in the cascade, one unnamed group for others.
 fn groups(kind: ControllerKind) -> Vec<&'static str> {
     if kind.in_cascade() { Axis::ALL.map(Axis::name).to_vec() } else { vec![""] }
 }
 
-/// `parameters` without these keys, which are not the file's.
+/// Returns the parameters as lines, except the keys in `elsewhere`, which the file must not set.
 fn lines_but(elsewhere: &[&str], parameters: &impl Declared, group: &str) -> String {
     let all = lines(parameters, group);
     all.lines()
@@ -270,7 +273,7 @@ fn lines_but(elsewhere: &[&str], parameters: &impl Declared, group: &str) -> Str
 
 #[test]
 fn every_key_of_a_scenario_file_counts() {
-    // Alternatives that the examples of the page leave out.
+    // These texts add alternatives that the page's examples leave out.
     let mut contenders = String::new();
     for kind in ControllerKind::ALL {
         let Contender { law, settings, .. } = Contender::of(kind, Profile::Flight);
@@ -299,7 +302,7 @@ fn every_key_of_a_scenario_file_counts() {
 fn every_key_of_a_vehicle_file_counts() {
     let racer = afbc_vehicles::built_in("racer").unwrap();
     let vehicle = racer.read().unwrap();
-    // What this file leaves out.
+    // These keys add what this file leaves out.
     let bare = racer.text.split("# Gains found by").next().unwrap();
     let mut all = format!("name = \"racer\"\n{bare}\n");
     for (table, keys) in [
@@ -323,10 +326,10 @@ fn every_key_of_a_vehicle_file_counts() {
     let settings = vehicle.settings(Profile::Flight);
     let cascade = lines_but(&["dt_s", "rotor_force_max_n"], &settings, "") + &lines(&settings, "limits");
     write!(all, "[gains.flight.cascade]\n{cascade}").unwrap();
-    // Parts, of which the estimator's settings follow where the file has none.
+    // With a named part, the estimator's settings follow from the part unless the file states them.
     let part = bare.replace("[imu]\n", "[imu]\npart = \"bmi270\"\n");
     let imu = Imu::PRESETS[0].settings;
-    // Large enough to be told from the other errors, and from the least that is accepted.
+    // Large enough to stand out from the other errors, and from the least accepted value.
     let gyro = Gyroscope { vibration_rad_s: 0.02, bias_rad_s: 0.1, ..imu.gyro };
     let accel = Accelerometer { vibration_m_s2: 0.5, lsb_m_s2: 0.5, ..imu.accel };
     let imu = Imu { gyro, accel, ..imu };
@@ -338,7 +341,7 @@ fn every_key_of_a_vehicle_file_counts() {
 
 #[test]
 fn every_key_of_a_campaign_file_counts() {
-    // Every quantity, of a measured state and of an estimated one.
+    // All quantities that apply to a measured state, or to an estimated one.
     let spread = |estimated: bool| -> String {
         let mut spread = String::from("[spread]\n");
         for quantity in &campaign::QUANTITIES {
@@ -370,7 +373,7 @@ fn every_key_of_a_campaign_file_counts() {
         }
         ask_for_keys(text, campaign_file, &mut known);
     }
-    // Those of a scenario are tested above.
+    // The tests above cover the keys of a scenario.
     for (table, keys) in known.iter().filter(|(table, _)| !table.starts_with("scenario")) {
         for key in keys {
             assert!(seen.contains(&join(table, key)), "no text here has {}", join(table, key));
@@ -378,7 +381,7 @@ fn every_key_of_a_campaign_file_counts() {
     }
 }
 
-/// What is the same flight has the same fingerprint, whatever its file is called and however it is written.
+/// A fingerprint does not depend on file names, comments or the order of keys.
 #[test]
 fn comments_order_and_names_do_not_count() {
     let iris = afbc_vehicles::built_in("iris").unwrap().text;
@@ -403,7 +406,7 @@ fn comments_order_and_names_do_not_count() {
     assert_eq!(plain, campaign("estimation.toml", &reversed(text), "estimation"));
 }
 
-/// The same file without comments, the keys of each table and the tables in the opposite order; lists keep theirs.
+/// Returns the same file without comments, with its keys and tables in reverse order. Lists keep their order.
 fn reversed(text: &str) -> String {
     fn value(entry: &DeValue<'_>) -> String {
         match entry {
@@ -432,7 +435,7 @@ fn reversed(text: &str) -> String {
     entries.into_iter().rev().map(|(key, entry)| format!("{} = {}\n", key.get_ref(), value(entry.get_ref()))).collect()
 }
 
-/// The smallest change of a number is a change.
+/// The smallest change of a number changes the fingerprint.
 #[test]
 fn numbers_count_to_the_last_bit() {
     let base = campaign::built_in("robustness").unwrap().read().unwrap();
@@ -452,7 +455,7 @@ fn numbers_count_to_the_last_bit() {
         let settings = &mut it.scenario.contenders[0].settings;
         settings.common.rotor_force_max_n = settings.common.rotor_force_max_n.next_up();
     });
-    // Of the vehicle's file, too: where its inertial sensor is, for one.
+    // This includes numbers of the vehicle's file, such as the position of its inertial sensor.
     let mut vehicle = afbc_vehicles::built_in("iris").unwrap().read().unwrap();
     let plain = fingerprint(&on(&vehicle).unwrap());
     let position_m = Vector3::new(0.0, 0.0, f64::MIN_POSITIVE);

@@ -1,4 +1,4 @@
-//! Every mistake of a file is told, with its line and key, and nothing else.
+//! Every mistake in a file is reported with its line and key, and nothing else is.
 
 #![expect(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "tests")]
 
@@ -6,7 +6,7 @@ use afbc_files::read::FileError;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-/// Reads a text as one kind of file.
+/// Reads a text as one kind of file and returns the error, if any.
 type Read = fn(&str) -> Option<FileError>;
 
 fn scenario(text: &str) -> Option<FileError> {
@@ -21,7 +21,7 @@ fn vehicle(text: &str) -> Option<FileError> {
     afbc_scenario::vehicle_of("my.toml", text, "my").err()
 }
 
-/// Every built-in file, and how it is read.
+/// Returns every built-in file with its reader.
 fn files() -> Vec<(&'static str, Read)> {
     let scenarios = afbc_scenario::BUILT_IN.iter().map(|known| (known.text, scenario as Read));
     let campaigns = afbc_campaign::BUILT_IN.iter().map(|known| (known.text, campaign as Read));
@@ -29,7 +29,7 @@ fn files() -> Vec<(&'static str, Read)> {
     scenarios.chain(campaigns).chain(vehicles).collect()
 }
 
-/// Returns the key of a line `key = value`, unless the value goes on.
+/// Returns the key of a line `key = value`, unless the value continues on the next line.
 fn key(line: &str) -> Option<&str> {
     let (key, value) = line.split_once(" = ")?;
     let is_plain = key.bytes().all(|byte| byte.is_ascii_alphanumeric() || byte == b'_');
@@ -38,14 +38,14 @@ fn key(line: &str) -> Option<&str> {
     (is_plain && is_whole).then_some(key)
 }
 
-/// A mistake, which replaces a line of a file.
+/// A mistake made in a line of a file.
 #[derive(Clone, Copy, Debug)]
 enum Slip {
     /// A value of another type.
     Type,
-    /// A number that is out of every range; another type in place of anything else.
+    /// A number beyond every range. For other values, a value of another type.
     Size,
-    /// A line more, with a key that nobody knows.
+    /// An additional line with an unknown key.
     Key,
 }
 
@@ -63,7 +63,7 @@ impl Slip {
     }
 }
 
-/// Numbers that look like chance.
+/// Pseudo-random numbers.
 struct Lot(u64);
 
 impl Lot {
@@ -73,7 +73,7 @@ impl Lot {
     }
 }
 
-/// Puts a slip into each of these lines of a file, and checks that these are told, each once, and nothing else.
+/// Makes the mistakes `slips` in these lines of a file, and checks that each is reported once and nothing else is.
 fn check(read: Read, lines: &[&str], slips: &BTreeMap<usize, Slip>) {
     let (mut made, mut expected) = (String::new(), BTreeSet::new());
     for (place, line) in lines.iter().enumerate() {
@@ -116,10 +116,10 @@ fn every_mistake_is_told_by_itself() {
     }
 }
 
-/// A missing key is one mistake at most, whatever else depends on it.
+/// A missing key gives one error at most, whatever depends on the key.
 #[test]
 fn a_line_less_is_told_once() {
-    // Of a campaign, every quantity that is drawn in vain is one.
+    // Campaign files are left out: without a key, each quantity that then has no effect is an error of its own.
     let is_campaign = |text: &str| afbc_campaign::BUILT_IN.iter().any(|known| known.text == text);
     for (text, read) in files().into_iter().filter(|(text, _)| !is_campaign(text)) {
         let lines: Vec<&str> = text.lines().collect();
@@ -145,7 +145,7 @@ fn every_mistake_is_told_beside_others() {
     }
 }
 
-/// A key that is only misspelt is read by its right name, so that its value is not missing.
+/// A misspelt key is read as the similar known key, so that its value is not reported as missing.
 #[test]
 fn what_follows_from_a_mistake_is_none() {
     for (text, expected) in [

@@ -1,4 +1,4 @@
-//! The suite `random`: the same flights everywhere, fit for any vehicle, within its power.
+//! Tests of the suite `random`: flights are the same everywhere, fit every vehicle and stay within its capability.
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, missing_docs)]
 
 use afbc_campaign::compare::standard_and_monitored;
@@ -16,7 +16,7 @@ fn paper(name: &str, change: impl Fn(String) -> String) -> Vehicle {
     parse("mine.toml", &change(built_in("paper").unwrap().text.into()), name).unwrap()
 }
 
-/// Vehicles of one's own: bare with little lag, weak, in much drag, three times as large.
+/// Returns variants of the paper's vehicle: bare with little lag, weak, with much drag, three times as large.
 fn own() -> Vec<Vehicle> {
     let bare = |text: String| {
         let (before, after) = text.split_once("[battery]").unwrap();
@@ -46,7 +46,7 @@ fn everywhere(seen: Seen) -> Vec<(Vehicle, Vec<DrawnFlight>)> {
     vehicles.map(|vehicle| (vehicle.clone(), random(seen, vec![vehicle]).draw().unwrap())).collect()
 }
 
-/// A flight depends on seed, vehicle and number alone: not on those beside it.
+/// A flight depends only on seed, vehicle and number, not on the other flights.
 #[test]
 fn a_flight_is_the_same_beside_any_others() {
     let all = random(Seen::Truth, fleet()).draw().unwrap();
@@ -59,11 +59,11 @@ fn a_flight_is_the_same_beside_any_others() {
     let seeds: BTreeSet<_> = all.iter().map(|flight| flight.scenario.seed).collect();
     let texts: BTreeSet<_> = all.iter().map(|flight| &flight.scenario.description).collect();
     assert_eq!((names.len(), seeds.len()), (all.len(), all.len()));
-    // Hovers as the file says, or in turbulence, are alike but for their noise.
+    // Some descriptions are equal: hovers without a change, or in turbulence, differ only in their noise.
     assert!(texts.len() > all.len() * 3 / 4, "{}", texts.len());
 }
 
-/// On every vehicle, and for every law, on the truth and on either estimate.
+/// Flights are valid on every vehicle and for every law, with the true state and with both estimates.
 #[test]
 fn every_flight_is_valid_on_every_vehicle() {
     let contenders = standard_and_monitored();
@@ -84,7 +84,7 @@ fn every_flight_is_valid_on_every_vehicle() {
     }
 }
 
-/// Every kind of path and change is drawn, all within their intervals, and the flight has what the change says.
+/// Every kind of path and change is drawn within its interval, and the flight has the drawn change.
 #[test]
 fn what_is_drawn_is_what_flies() {
     let (mut paths, mut changes) = (BTreeSet::new(), BTreeSet::new());
@@ -138,9 +138,9 @@ fn what_is_drawn_is_what_flies() {
     assert_eq!((paths.len(), changes.len()), (4, Change::KINDS.len()));
 }
 
-/// At every millisecond: the thrust for acceleration and air's drag leaves two fifths of what the rotors have beyond
-/// the true weight, the tilt is at most 1 rad, and the acceleration is no faster than the rotors. What a change takes
-/// away leaves 15 %, wherever the vehicle has them.
+/// At every millisecond, the thrust for acceleration leaves two fifths of the thrust beyond the weight, the thrust
+/// against drag is available, and the tilt is at most 1 rad. The path's frequency fits the rotors' lag. A change leaves
+/// 15 % of thrust beyond the weight on every vehicle that has it.
 #[test]
 fn no_flight_asks_for_more_than_the_vehicle_can_do() {
     for (vehicle, flights) in everywhere(Seen::Truth) {
@@ -178,14 +178,14 @@ fn no_flight_asks_for_more_than_the_vehicle_can_do() {
             );
             boldest = boldest.max(*acceleration_m_s2);
         }
-        // And not for much less, though batteries sag and small paths are limited by the rotors' lag.
+        // The demand is not much smaller either, though batteries sag and the rotors' lag limits small paths.
         let most_m_s2 = ((g + 0.6 * (intact_m_s2 - g)).powi(2) - g * g).sqrt().min(1.56 * g);
         let known = built_in(&vehicle.name).is_some();
         assert!(!known || boldest > 0.4 * most_m_s2, "{}: {boldest} of {most_m_s2} m/s2", vehicle.name);
     }
 }
 
-/// Of the acceleration of a path, by how it changes: exact for sines.
+/// Returns the highest frequency of a path's acceleration, from its rate of change. Exact for sines.
 fn fastest_rad_s(trajectory: &Trajectory) -> f64 {
     let at = |ms: u32| -> Reference { trajectory.at(1e-3 * f64::from(ms)) };
     match trajectory {
@@ -201,8 +201,8 @@ fn fastest_rad_s(trajectory: &Trajectory) -> f64 {
     }
 }
 
-/// Waypoints and hovers on the estimate indoors begin on the ground, in the flight core, rotors idle; the others in the
-/// air.
+/// With the estimate indoors, waypoints and hovers begin on the ground with idle rotors, in the flight core. Other
+/// flights begin in the air.
 #[test]
 fn flights_on_the_estimate_begin_on_the_ground_where_they_can() {
     for (vehicle, flights) in everywhere(Seen::Mocap) {
@@ -222,7 +222,7 @@ fn flights_on_the_estimate_begin_on_the_ground_where_they_can() {
     assert!(outdoors.iter().all(|flight| !flight.stands && flight.scenario.initial.position_m.z == 10.0));
 }
 
-/// The paper's vehicle as its file says, flown by AFBC: kept, and as near as it is elsewhere.
+/// AFBC flies random flights of the paper's vehicle without a loss and within 0.1 m of the reference.
 #[test]
 fn flights_are_flown_and_judged() {
     let afbc = standard_and_monitored().remove(0);

@@ -1,4 +1,4 @@
-//! The suite `rough-estimate`: what is drawn, what is told, how it is judged.
+//! Tests of the suite `rough-estimate`: drawn behaviour, the estimator's settings and the judgement.
 
 #![expect(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "tests")]
 
@@ -38,7 +38,7 @@ fn a_flight_is_a_function_of_seed_vehicle_class_and_number() {
     assert!(all.iter().all(|flight| [rough::SHORT_S, rough::LONG_S].contains(&flight.scenario.duration_s)));
 }
 
-/// Whatever is drawn, the vehicle is told what its part's data sheet says, its vibration, and no fault.
+/// The estimator is told the data sheet of its part, the usual vibration and no fault, whatever is drawn.
 #[test]
 fn no_vehicle_is_told_what_is_drawn() {
     let (mut differ, mut calm) = (BTreeSet::new(), BTreeMap::new());
@@ -61,14 +61,14 @@ fn no_vehicle_is_told_what_is_drawn() {
     assert_eq!(differ.len(), CLASSES.len());
 }
 
-/// A flight in which nothing is drawn.
+/// Returns a flight in which nothing is drawn.
 fn nothing(vehicle: &str, place: Venue) -> RoughFlight {
     let vehicles = vehicles().into_iter().filter(|own| own.name == vehicle).collect();
     let drawn = Rough { vehicles, ..rough(1..20, 1) }.draw(&law()).unwrap();
     drawn.into_iter().find(|flight| flight.class == "nothing" && flight.place == place).unwrap()
 }
 
-/// Every class is drawn over its whole range, and beyond nothing of it: by their sizes, as the page states them.
+/// Every class is drawn over most of its range, and never outside, by the sizes that the page states.
 #[test]
 fn each_class_is_drawn_within_its_bounds() {
     let hummingbird = vec![afbc_vehicles::built_in("hummingbird").unwrap().read().unwrap()];
@@ -98,7 +98,7 @@ fn each_class_is_drawn_within_its_bounds() {
     }
 }
 
-/// The page lists the classes as they are drawn.
+/// The page lists all classes with their properties.
 #[test]
 fn the_page_has_every_class() {
     let page = include_str!("../../../docs/suites.md");
@@ -110,7 +110,7 @@ fn the_page_has_every_class() {
     }
 }
 
-/// The size of what was drawn, of its first part.
+/// Returns the size of the first drawn behaviour.
 fn size(flight: &RoughFlight) -> f64 {
     let suite = &flight.scenario.instruments;
     let faults = &flight.scenario.instrument_faults;
@@ -143,7 +143,7 @@ fn size(flight: &RoughFlight) -> f64 {
     }
 }
 
-/// Bounds of the size.
+/// Returns the bounds of the size.
 fn bounds(class: &str) -> [f64; 2] {
     match class {
         "nothing" => [0.0, 0.0],
@@ -173,8 +173,8 @@ fn bounds(class: &str) -> [f64; 2] {
     }
 }
 
-/// The short form: every class on one vehicle, ten seconds each. The result does not depend on the number of threads,
-/// and a vehicle whose sensors do what it is told has a consistent estimate.
+/// Flies every class on one vehicle for ten seconds. The result does not depend on the number of threads. The estimate
+/// is consistent if the sensors behave as the vehicle is told.
 #[test]
 fn every_class_flies_and_has_its_row() {
     let paper = vec![afbc_vehicles::built_in("paper").unwrap().read().unwrap()];
@@ -192,7 +192,7 @@ fn every_class_flies_and_has_its_row() {
     assert_eq!(rows.len(), CLASSES.len() + 2);
     assert_eq!(rows.iter().filter(|row| row.flights == 1).count(), CLASSES.len() + 1);
     assert_eq!(rows.last().map(|row| (row.class, row.flights)), Some((None, CLASSES.len() + 1)));
-    // From 5 to 10 s, a look every 10 ms.
+    // There is one evaluation every 10 ms from 5 to 10 s.
     assert!(one.iter().all(|it| it.judgement.looks <= 501));
     let nothing = &one[0];
     assert_eq!((nothing.flight.class, nothing.judgement.looks, nothing.judgement.lost), ("nothing", 501, None));
@@ -200,7 +200,8 @@ fn every_class_flies_and_has_its_row() {
     assert!(nothing.judgement.within > 0.9, "{:?}", nothing.judgement);
 }
 
-/// Counted by hand: means are over flights that had a valid estimate, and one without a positive covariance is none.
+/// Compares with figures counted by hand. Means are over flights with a valid estimate. Without a positive covariance
+/// the mean is NaN.
 #[test]
 fn rows_are_those_counted_by_hand() {
     let lost = Some(Lost { time_s: 9.0, reason: "tilted beyond 90 degrees" });

@@ -1,4 +1,4 @@
-//! Suite files: what a flight takes over from another, and what is refused.
+//! Tests of suite files: keys that a flight copies from another, and mistakes.
 #![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs)]
 
 use afbc_campaign::compare::standard_and_monitored;
@@ -43,7 +43,7 @@ fn a_flight_takes_over_what_it_does_not_say() {
     assert_eq!(plain.scenario.trajectory, first.scenario.trajectory);
     assert_eq!(plain.scenario.realism.rotors.faults, first.scenario.realism.rotors.faults);
 
-    // Tables key by key, lists as a whole, another kind by itself.
+    // Tables are merged key by key, lists are replaced as a whole, and a table of another kind is replaced too.
     let wider = flown("duration_s = 8.0\ntrajectory = { radius_m = 3.0 }\nrotor_fault = []");
     let said = FIRST.replace("radius_m = 2.0", "radius_m = 3.0").replace("duration_s = 9.0", "duration_s = 8.0");
     let said = suite(&said).unwrap().flights.remove(0);
@@ -52,13 +52,13 @@ fn a_flight_takes_over_what_it_does_not_say() {
     let hover = flown("trajectory = { kind = \"hover\", position_m = [0, 0, 1] }");
     assert_eq!(hover.scenario.trajectory.at(0.0).velocity_m_s.norm(), 0.0);
 
-    // A scenario's flight has the suite's words, if it has any.
+    // A flight of a named scenario has the suite's description, if there is one, or else the scenario's.
     let named = |words: &str| format!("{FIRST}\n[[flight]]\nname = \"second\"\nscenario = \"hardware\"\n{words}");
     let described = |words: &str| suite(&named(words)).unwrap().flights.remove(1).scenario.description;
     assert_eq!(described("description = \"ours\""), "ours");
     assert!(!described("").is_empty());
 
-    // Of an heir, too; and what is written last counts.
+    // A flight may copy from a flight that copies itself. The last value wins.
     let third = second("duration_s = 8.0") + "\n[[flight]]\nname = \"third\"\nlike = \"second\"\ntilt_max_rad = 0.9";
     let third = suite(&third).unwrap().flights.remove(2);
     assert_eq!((third.scenario.duration_s, third.tilt_max_rad), (8.0, Some(0.9)));
@@ -81,7 +81,7 @@ fn every_contender_flies_each_flight_with_the_gains_of_its_vehicle() {
     }
 }
 
-/// Each mistake has a line with the place of what is wrong, be it written in this flight or taken over.
+/// Each mistake gives one line with the place of the value, even if the value was copied from another flight.
 #[test]
 fn mistakes_are_refused_line_by_line() {
     let line = |text: &str| suite(text).unwrap_err().to_string();
@@ -112,7 +112,7 @@ fn mistakes_are_refused_line_by_line() {
             "{line}, not {expected}"
         );
     }
-    // The line is that of the value, which stands in the flight that it was taken over from.
+    // The line number is that of the copied value in the other flight.
     let bad = second("").replace("period_s = 5.0", "period_s = 0.0");
     let at = bad.lines().position(|line| line.contains("period_s")).unwrap() + 1;
     assert!(line(&bad).starts_with(&format!("mine.toml:{at}: ")), "{}", line(&bad));

@@ -1,4 +1,4 @@
-//! Campaigns draw what the instruments do, not what the vehicle is told of them.
+//! Campaigns draw the behaviour of the instruments, not the estimator's knowledge of them.
 
 #![expect(clippy::unwrap_used, clippy::panic, reason = "tests")]
 
@@ -6,7 +6,7 @@ use afbc_campaign::{self as campaign, Campaign, QUANTITIES};
 use afbc_scenario::Told;
 use std::path::Path;
 
-/// A campaign that draws every quantity of the instruments.
+/// Returns a campaign that draws every quantity of the instruments.
 fn all(told: &str) -> Campaign {
     let of_estimate = ["tracker_", "gnss_", "imu_", "vibration", "barometer_", "magnetometer_", "aiding"];
     let mut spread = String::new();
@@ -23,7 +23,8 @@ fn all(told: &str) -> Campaign {
     campaign::parse("all.toml", &text, "all", Path::new("")).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// Over many flights: of the instruments that there are, each is told as the file says, while what they do is drawn.
+/// In many flights, the estimator is told the values of the file for every instrument present, while their behaviour is
+/// drawn.
 #[test]
 fn what_is_told_does_not_depend_on_what_is_drawn() {
     let campaign = all("");
@@ -41,14 +42,14 @@ fn what_is_told_does_not_depend_on_what_is_drawn() {
         differ += usize::from(told != there);
     }
     assert_eq!(differ, 200);
-    // A table of its own says more than the instruments.
+    // A table `told` takes precedence over the instruments.
     let own = all("told = { imu = \"bmi270\" }\n");
     let told = own.flight(3).unwrap().told();
     assert_eq!(told.imu, Some(afbc_plant::instruments::Imu::BMI270));
 }
 
-/// Told what is drawn, as every campaign was before: the settings follow from the instruments of the flight, and the
-/// draws are the same.
+/// With `told = "drawn"`, the estimator's settings follow from the drawn instruments of the flight. The draws are the
+/// same.
 #[test]
 fn a_campaign_that_says_so_tells_what_it_draws() {
     let (untold, told) = (all(""), all("told = \"drawn\"\n"));
@@ -62,7 +63,7 @@ fn a_campaign_that_says_so_tells_what_it_draws() {
     assert!(differ > 190, "{differ}");
 }
 
-/// Of the built-in campaigns those that draw what follows from data sheets tell it.
+/// All built-in campaigns tell the estimator the drawn instruments.
 #[test]
 fn the_built_in_campaigns_keep_what_they_told() {
     for known in &campaign::BUILT_IN {

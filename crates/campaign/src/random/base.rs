@@ -1,4 +1,4 @@
-//! A vehicle with its sensors in still air, and the flights drawn from that.
+//! A vehicle with sensors in still air, from which random flights are drawn.
 
 use super::change::Change;
 use super::flight::{DrawnFlight, Seen};
@@ -17,11 +17,11 @@ use afbc_vehicles::Vehicle;
 use libm::{atan2, hypot, sincos, tan};
 use nalgebra::Vector3;
 
-/// Share of its accelerations that a path asks for at least.
+/// Smallest fraction of the vehicle's possible acceleration that a path asks for.
 const BOLDNESS_MIN: f64 = 0.2;
-/// Height of the paths outdoors, where the estimate of it is metres off \[m\].
+/// Height of outdoor paths, where the height estimate is wrong by metres \[m\].
 const HIGH_M: f64 = 10.0;
-/// Largest tilt at the start of a flight on the estimate \[rad\].
+/// Largest tilt at the start of a flight that uses the vehicle's own estimate \[rad\].
 const LEVEL_RAD: f64 = 0.6;
 
 /// A vehicle with its sensors in still air.
@@ -29,15 +29,15 @@ pub(super) struct Base<'a> {
     vehicle: &'a Vehicle,
     seen: Seen,
     power: Power,
-    /// Without contenders.
+    /// Scenario without contenders.
     scenario: Scenario,
 }
 
 impl<'a> Base<'a> {
-    /// Puts the sensors on `vehicle`.
+    /// Equips `vehicle` with the sensors that `seen` asks for.
     ///
     /// # Errors
-    /// One line on what the vehicle cannot fly.
+    /// One line about the first value that the vehicle cannot fly with.
     pub(super) fn new(vehicle: &'a Vehicle, seen: Seen) -> Result<Self, FileError> {
         let name = seen.scenario();
         let known = built_in(name).ok_or_else(|| FileError::whole(name, "no such scenario"))?.read()?;
@@ -47,19 +47,20 @@ impl<'a> Base<'a> {
         Ok(Base { vehicle, seen, power: Power::of(vehicle), scenario: still.on(vehicle, Profile::Flight)? })
     }
 
-    /// Draws the flight of this seed and number.
+    /// Draws flight `number` of `seed`.
     ///
     /// # Errors
-    /// One line on what the vehicle cannot fly.
+    /// One line about the first value that the vehicle cannot fly with.
     pub(super) fn flight(&self, seed: u64, number: u64) -> Result<DrawnFlight, FileError> {
         let vehicle = self.vehicle;
-        // By the vehicle's name, not its place in a list: others beside it change nothing.
+        // The vehicle's name enters the draw, not its index, so that other vehicles in the list change nothing.
         let of_vehicle = vehicle.name.bytes().fold(mix(seed), |hash, byte| mix(hash ^ u64::from(byte)));
         let bits = mix(of_vehicle.wrapping_add(number)) >> 11;
         let mut noise = Noise::new(bits, Stream::Scenario);
         let boldness = BOLDNESS_MIN + (1.0 - BOLDNESS_MIN) * noise.uniform();
         let change = self.power.fitted(&Change::draw(&mut noise, vehicle));
-        // Outdoors the estimate is metres off: a vehicle that stands on the ground where it is not would tip over.
+        // Outdoors the estimate is wrong by metres, and a vehicle that stands on the ground with a wrong position would
+        // tip over.
         let ground = vehicle.realism.contact.filter(|_| self.seen == Seen::Mocap);
         let stands_m = ground.map(|ground| ground.foot_depth_m - ground.sink_m);
         let height_m = if self.seen == Seen::Outdoor { HIGH_M } else { HEIGHT_M };
@@ -91,11 +92,11 @@ impl<'a> Base<'a> {
     }
 }
 
-/// Returns the motion at the start of `trajectory`, banked as its acceleration asks for.
+/// Returns the motion at the start of `trajectory`, with the bank that its acceleration needs.
 fn start(trajectory: &Trajectory, gravity_m_s2: f64, seen: Seen) -> Motion {
     let reference = trajectory.at(0.0);
     let force = reference.acceleration_m_s2 + Vector3::z() * gravity_m_s2;
-    // A vehicle that has to find its attitude first begins more level.
+    // A vehicle that must find its attitude first starts with less tilt.
     let level_m_s2 = force.xy().norm();
     let most_m_s2 = if seen == Seen::Truth { f64::INFINITY } else { force.z * tan(LEVEL_RAD) };
     let share = if level_m_s2 > most_m_s2 { most_m_s2 / level_m_s2 } else { 1.0 };

@@ -1,12 +1,13 @@
-//! Bisection.
+//! Bisection for the largest number that fits.
 
-/// Returns the largest number up to `most` that `fits`, if smaller ones fit whenever larger ones do; 0 if none does.
+/// Returns the largest number from 0 to `most` that `fits`, or 0 if none does. Assumes that all smaller numbers fit if
+/// a larger one does.
 pub(super) fn largest(most: f64, fits: impl Fn(f64) -> bool) -> f64 {
     if fits(most) {
         return most;
     }
     let (mut low, mut high) = (0.0, most);
-    // Leaves a share of 2^-40 of the interval, less than matters to a flight.
+    // 40 halvings leave 2^-40 of the interval, too little to matter to a flight.
     for _ in 0..40 {
         let middle = 0.5 * (low + high);
         if fits(middle) { low = middle } else { high = middle }

@@ -1,4 +1,4 @@
-//! What a vehicle's file does not state: wind, a payload, a fault.
+//! Changes that a vehicle's file does not state: wind, payload, fault.
 
 use super::bisection::largest;
 use afbc_plant::noise::Noise;
@@ -9,45 +9,45 @@ use afbc_vehicles::Vehicle;
 use core::fmt;
 use nalgebra::Vector3;
 
-/// Time from which on masses and rotors are changed \[s\].
+/// Time at which mass and rotors change \[s\].
 const START_S: f64 = 3.0;
 /// Largest speed of the wind along x and y \[m/s\].
 const WIND_M_S: f64 = 4.0;
-/// Largest additional age of the state \[s\].
+/// Largest additional delay of the state \[s\].
 const AGE_S: f64 = 0.012;
 
-/// A difference between what flies and what the controllers know.
+/// A difference between the simulated vehicle and the one that the controllers know.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Change {
-    /// None.
+    /// No difference.
     Nothing,
     /// Steady wind \[m/s\].
     Wind(Vector3<f64>),
     /// Turbulence.
     Turbulence(Turbulence),
-    /// A payload from 3 s on.
+    /// A payload that is attached at 3 s.
     Payload {
-        /// Its mass over the vehicle's.
+        /// The payload's mass divided by the vehicle's.
         share: f64,
         /// Distance below the centre of mass \[m\].
         below_m: f64,
-        /// Distance ahead of it \[m\].
+        /// Distance ahead of the centre of mass \[m\].
         ahead_m: f64,
-        /// Distance to the left of it \[m\].
+        /// Distance to the left of the centre of mass \[m\].
         left_m: f64,
     },
-    /// Another mass from 3 s on: the factor.
+    /// Factor on the mass from 3 s on.
     Mass(f64),
-    /// A weak rotor from 3 s on.
+    /// A rotor that is weak from 3 s on.
     Rotor {
         /// Number of the rotor, from 1.
         rotor: u8,
-        /// Remaining share of its thrust.
+        /// Remaining fraction of the rotor's thrust.
         efficiency: f64,
     },
-    /// Another drag: the factor.
+    /// Factor on the drag.
     Drag(f64),
-    /// A state that is older by this time \[s\].
+    /// Additional delay of the state \[s\].
     Older(f64),
 }
 
@@ -55,7 +55,7 @@ impl Change {
     /// Names of the kinds, in the order of the variants.
     pub const KINDS: [&str; 8] = ["nothing", "wind", "turbulence", "payload", "mass", "rotor", "drag", "age"];
 
-    /// Returns the name of its kind.
+    /// Returns the name of the change's kind.
     pub const fn kind(&self) -> &'static str {
         let [nothing, wind, turbulence, payload, mass, rotor, drag, age] = Self::KINDS;
         match self {
@@ -70,10 +70,10 @@ impl Change {
         }
     }
 
-    /// Draws one.
+    /// Draws a change.
     pub(super) fn draw(noise: &mut Noise, vehicle: &Vehicle) -> Self {
         let kind = whole(noise, Self::KINDS.len());
-        // As many numbers whatever the kind.
+        // Every kind draws the same number of random values.
         let [a, b, c, d] = [(); 4].map(|()| noise.uniform());
         let between = |low: f64, high: f64, at: f64| low + (high - low) * at;
         let arm_m = vehicle.parameters.arm_m;
@@ -97,7 +97,7 @@ impl Change {
         }
     }
 
-    /// Returns this share of it: 0 is no change.
+    /// Returns the change reduced to this fraction; 0 means no change.
     pub(super) fn scaled(self, share: f64) -> Self {
         let factor = |factor: f64| 1.0 + share * (factor - 1.0);
         match self {
@@ -111,15 +111,15 @@ impl Change {
             Change::Mass(mass) => Change::Mass(factor(mass)),
             Change::Rotor { rotor, efficiency } => Change::Rotor { rotor, efficiency: factor(efficiency) },
             Change::Drag(drag) => Change::Drag(factor(drag)),
-            // An older state takes no thrust, so less of it would leave no more.
+            // A delay costs no thrust, so reducing it would not leave more thrust.
             Change::Nothing | Change::Older(_) => self,
         }
     }
 
-    /// Puts it into a flight.
+    /// Applies the change to a flight.
     ///
     /// # Errors
-    /// The first parameter that it puts out of range.
+    /// The first parameter that the change puts out of range.
     pub(super) fn put(&self, scenario: &mut Scenario) -> Result<(), OutOfRange> {
         let vehicle = scenario.vehicle;
         let (start_s, end_s) = (START_S, f64::INFINITY);
@@ -139,7 +139,7 @@ impl Change {
             Change::Rotor { rotor, efficiency } => {
                 scenario.realism.rotors.faults = vec![RotorFault { rotor, efficiency, start_s }];
             }
-            // The vehicle's file, by which controllers know its drag, stays.
+            // The vehicle's file, which tells the controllers the drag, stays as it is.
             Change::Drag(factor) => scenario.realism.drag = scenario.realism.drag.map(|drag| times(drag, factor)),
             Change::Older(age_s) => {
                 scenario.sensing.delay_s += age_s;
@@ -175,7 +175,7 @@ fn times(drag: Drag, factor: f64) -> Drag {
     Drag { blade_n_s2_m: drag.blade_n_s2_m * factor, area_m2: drag.area_m2 * factor, ..drag }
 }
 
-/// Returns the factor 2, or the smaller one up to which the plant takes this vehicle's drag.
+/// Returns 2, or the largest smaller factor on this vehicle's drag that the plant accepts.
 fn doubled(vehicle: &Vehicle) -> f64 {
     let (Some(drag), Ok(frame)) = (vehicle.realism.drag, Frame::new(&vehicle.rotors)) else { return 1.0 };
     let max_rad_s = vehicle.realism.rotors.max_rad_s;

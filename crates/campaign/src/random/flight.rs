@@ -3,19 +3,19 @@
 use super::change::Change;
 use afbc_scenario::Scenario;
 
-/// What the controllers see.
+/// Source of the state that the controllers see.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Seen {
-    /// The truth with the noise of the built-in scenario `hardware`.
+    /// True state with the noise of the built-in scenario `hardware`.
     Truth,
-    /// The vehicle's own estimate, by the instruments of the built-in scenario `mocap`.
+    /// The vehicle's own estimate from the instruments of the built-in scenario `mocap`.
     Mocap,
-    /// Likewise `outdoor`.
+    /// The vehicle's own estimate from the instruments of the built-in scenario `outdoor`.
     Outdoor,
 }
 
 impl Seen {
-    /// Name of the built-in scenario whose sensors it is.
+    /// Returns the name of the built-in scenario with these sensors.
     pub const fn scenario(self) -> &'static str {
         match self {
             Seen::Truth => "hardware",
@@ -28,7 +28,7 @@ impl Seen {
 /// A drawn flight.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DrawnFlight {
-    /// Seed that it was drawn from.
+    /// Seed that the flight was drawn from.
     pub seed: u64,
     /// Name of the vehicle.
     pub vehicle: String,
@@ -36,14 +36,14 @@ pub struct DrawnFlight {
     pub number: u64,
     /// Kind of path.
     pub path: &'static str,
-    /// Whether it begins on the ground.
+    /// True if the flight begins on the ground.
     pub stands: bool,
     /// Largest speed of the reference \[m/s\].
     pub speed_m_s: f64,
     /// Largest acceleration of the reference \[m/s2\].
     pub acceleration_m_s2: f64,
-    /// What the vehicle's file does not state.
+    /// Difference from the vehicle's file.
     pub change: Change,
-    /// The flight.
+    /// Scenario to fly.
     pub scenario: Scenario,
 }

@@ -1,7 +1,8 @@
-//! The suite `random`: flights drawn over vehicles, and how the contenders stand in them. `docs/suites.md` has the
+//! The suite `random` draws flights across vehicles and ranks the contenders in them. `docs/suites.md` has the
 //! intervals and formulas.
 //!
-//! A flight is a function of seed, vehicle and number alone: it is the same on every machine, beside whatever others.
+//! A flight depends only on seed, vehicle and number. It is the same on every machine, whichever other flights are
+//! drawn.
 
 mod base;
 mod bisection;
@@ -28,20 +29,20 @@ use rayon::prelude::*;
 
 /// Name of the suite.
 pub const NAME: &str = "random";
-/// Number of flights of each vehicle and seed, unless another is asked for.
+/// Default number of flights per vehicle and seed.
 pub const FLIGHTS: u64 = 12;
-/// Tilt that every contender is allowed \[rad\].
+/// Tilt limit that every contender gets at least \[rad\].
 pub const TILT_MAX_RAD: f64 = 1.2;
-/// What to draw.
+/// Selection of the flights to draw.
 #[derive(Clone, Debug)]
 pub struct Random {
-    /// Seeds.
+    /// Seeds from which flights are drawn.
     pub seeds: Range<u64>,
-    /// Number of flights of each vehicle and seed.
+    /// Number of flights per vehicle and seed.
     pub flights: u64,
-    /// What the controllers see.
+    /// Source of the state that the controllers see.
     pub seen: Seen,
-    /// Who flies.
+    /// Vehicles that fly.
     pub vehicles: Vec<Vehicle>,
 }
 
@@ -50,15 +51,15 @@ pub struct Random {
 pub struct FlownDraw {
     /// The flight.
     pub flight: DrawnFlight,
-    /// What became of each of its scenario's contenders.
+    /// Result of each of the scenario's contenders.
     pub outcomes: Vec<Outcome>,
 }
 
 impl Random {
-    /// Draws every flight: by seed, vehicle and number.
+    /// Draws all flights, ordered by seed, vehicle and number.
     ///
     /// # Errors
-    /// One line on what a vehicle cannot fly.
+    /// One line about the first value that a vehicle cannot fly with.
     pub fn draw(&self) -> Result<Vec<DrawnFlight>, FileError> {
         let bases = self.vehicles.iter().map(|vehicle| Base::new(vehicle, self.seen));
         let bases = bases.collect::<Result<Vec<_>, _>>()?;
@@ -68,11 +69,11 @@ impl Random {
         all.into_par_iter().map(|(base, seed, number)| base.flight(seed, number)).collect()
     }
 
-    /// Draws every flight, flown by `contenders`, each with its gains for the vehicle, and then by `own`, whose own
-    /// gains and settings, for the paper's vehicle, are scaled [by rule](Contender::by_rule).
+    /// Draws all flights with their contenders: first `contenders`, each with its gains for the vehicle; then `own`.
+    /// The gains and settings of `own` are for the paper's vehicle and are scaled [by rule](Contender::by_rule).
     ///
     /// # Errors
-    /// As [`Random::draw`]; or one line on a gain or setting out of range.
+    /// Errors of [`Random::draw`], or one line about a gain or setting out of range.
     pub fn under(&self, contenders: &[Contender], own: &[Contender]) -> Result<Vec<DrawnFlight>, FileError> {
         let mut flights = self.draw()?;
         flights.par_iter_mut().try_for_each(|flight| {
@@ -85,7 +86,7 @@ impl Random {
     }
 }
 
-/// Flies every flight under each of its contenders on the current rayon pool, and calls `progress` after each. The
+/// Flies all flights under each of their contenders on the current rayon pool. Calls `progress` after each run. The
 /// result does not depend on the number of threads.
 ///
 /// # Errors
@@ -105,7 +106,7 @@ pub fn fly(flights: Vec<DrawnFlight>, progress: &(dyn Fn() + Sync)) -> Result<Ve
 }
 
 impl FlownDraw {
-    /// Returns what its contenders are judged by.
+    /// Returns the distances by which the contenders are ranked.
     pub fn score(&self) -> Score {
         let rms_m = |outcome: &Outcome| outcome.lost.is_none().then(|| outcome.metrics.rmse.xyz().norm());
         Score { seed: self.flight.seed, rms_m: self.outcomes.iter().map(rms_m).collect() }

@@ -1,4 +1,4 @@
-//! Paths at a size that suits the vehicle, and up to the speed that it can do.
+//! Paths of a size and speed that suit the vehicle.
 
 use super::bisection::largest;
 use super::change::whole;
@@ -15,19 +15,19 @@ pub(super) const DURATION_S: f64 = 20.0;
 const LAST_S: f64 = 18.0;
 /// Largest number of waypoints.
 const WAYPOINTS: usize = 32;
-/// Slowest rate of a path that is flown \[rad/s\]; a vehicle that cannot do it hovers.
+/// Slowest rate of a moving path \[rad/s\]. A vehicle that cannot fly this fast hovers.
 const RATE_MIN: f64 = 0.02;
 /// Fastest rate of a path \[rad/s\].
 const RATE_MAX: f64 = 50.0;
 
-/// A path, without its speed.
+/// A path whose speed is not yet chosen.
 #[derive(Clone, Debug)]
 pub(super) struct Path {
     shape: Shape,
     yaw_rad: f64,
-    /// Height of its centre \[m\].
+    /// Height of the path's centre \[m\].
     height_m: f64,
-    /// Height of the vehicle that stands on the ground, if it begins there \[m\].
+    /// Height of the centre of mass of a vehicle that stands on the ground; none if the path begins in the air \[m\].
     stands_m: Option<f64>,
 }
 
@@ -36,7 +36,8 @@ enum Shape {
     /// x = a sin(w t), y = a/2 sin(2 w t).
     Lemniscate(f64),
     Circle(f64),
-    /// Corners, each with the length of the leg to it, in periods.
+    /// Corners relative to the centre \[m\], each with the yaw there \[rad\] and the duration of the leg to it in
+    /// periods.
     Waypoints(Vec<(Vector3<f64>, f64, f64)>),
     Hover,
 }
@@ -45,8 +46,8 @@ impl Path {
     /// Names of the kinds.
     pub(super) const KINDS: [&str; 4] = ["lemniscate", "circle", "waypoints", "hover"];
 
-    /// Draws a path at this height for a vehicle with this arm. One whose centre of mass is at `stands_m` on the ground
-    /// may begin there.
+    /// Draws a path at height `height_m` for a vehicle with arms of `arm_m`. If the vehicle can stand on the ground,
+    /// with its centre of mass at `stands_m`, waypoints and hovers begin there.
     pub(super) fn draw(noise: &mut Noise, arm_m: f64, height_m: f64, stands_m: Option<f64>) -> Self {
         let kind = whole(noise, Self::KINDS.len());
         let mut between = |low: f64, high: f64| low + (high - low) * noise.uniform();
@@ -72,7 +73,7 @@ impl Path {
         Path { shape, yaw_rad, height_m, stands_m }
     }
 
-    /// Returns the name of its kind.
+    /// Returns the name of the path's kind.
     pub(super) const fn kind(&self) -> &'static str {
         let [lemniscate, circle, waypoints, hover] = Self::KINDS;
         match self.shape {
@@ -83,25 +84,25 @@ impl Path {
         }
     }
 
-    /// True if it begins on the ground.
+    /// True if the path begins on the ground.
     pub(super) const fn stands(&self) -> bool {
         self.stands_m.is_some()
     }
 
-    /// Returns the path at `boldness`, from 0 to 1, of the accelerations that the vehicle can do.
+    /// Returns the trajectory that asks for the fraction `boldness`, 0 to 1, of the possible acceleration.
     pub(super) fn flown(&self, power: &Power, boldness: f64) -> Trajectory {
         let fits = |rate: f64| {
             let trajectory = self.at(rate);
             power.asked_by(&trajectory, &self.times_s(&trajectory)) <= 1.0
         };
-        // Accelerations go with the square of the rate.
+        // Accelerations grow with the square of the rate.
         self.at(sqrt(boldness) * largest(RATE_MAX, fits))
     }
 
-    /// Returns the path at this rate \[rad/s\].
+    /// Returns the trajectory at this rate \[rad/s\].
     fn at(&self, rate: f64) -> Trajectory {
         let centre_m = Vector3::new(0.0, 0.0, self.height_m);
-        // The period is infinite at a rate of 0, at which it is not used.
+        // At a rate of 0 the period is infinite, but not used.
         let (yaw_rad, period_s) = (self.yaw_rad, TAU / rate);
         match &self.shape {
             _ if rate < RATE_MIN => self.rest(centre_m),
@@ -127,7 +128,7 @@ impl Path {
         }
     }
 
-    /// Returns a hover, after the climb to it if it begins on the ground.
+    /// Returns a hover, preceded by a climb if the path begins on the ground.
     fn rest(&self, centre_m: Vector3<f64>) -> Trajectory {
         match self.stands() {
             true => Trajectory::Waypoints(self.before(centre_m)),
@@ -135,7 +136,8 @@ impl Path {
         }
     }
 
-    /// Returns the waypoints before the first corner: at the centre, or on the ground and above it.
+    /// Returns the waypoints before the first corner: the centre, preceded by the place on the ground if the path
+    /// begins there.
     fn before(&self, centre_m: Vector3<f64>) -> Vec<Waypoint> {
         let at = |time_s, position_m| Waypoint { time_s, position_m, yaw_rad: self.yaw_rad };
         match self.stands_m {
@@ -144,12 +146,12 @@ impl Path {
         }
     }
 
-    /// Returns times at which to look at a trajectory: 64 in a period, or in each leg after the climb.
+    /// Returns the times at which a trajectory is checked: 64 per period, or 64 per leg after the climb.
     fn times_s(&self, trajectory: &Trajectory) -> Vec<f64> {
         let within = |from_s: f64, to_s: f64| (0..64).map(move |k| from_s + (to_s - from_s) * f64::from(k) / 64.0);
         match trajectory {
             Trajectory::Lissajous { sines: [sine, ..], .. } => within(0.0, sine.period_s.min(DURATION_S)).collect(),
-            // A circle asks for the same everywhere.
+            // A circle demands the same at every point.
             Trajectory::Circle { .. } => vec![0.0],
             Trajectory::Waypoints(waypoints) => {
                 let legs = waypoints.iter().zip(waypoints.iter().skip(1)).skip(usize::from(self.stands()));

@@ -1,4 +1,4 @@
-//! What a vehicle can do, and what a reference asks of it. `docs/suites.md` has the formulas.
+//! The capability of a vehicle and the demands of a reference on it. `docs/suites.md` has the formulas.
 
 use super::bisection::largest;
 use super::change::Change;
@@ -11,47 +11,48 @@ use afbc_vehicles::Vehicle;
 use core::f64::consts::TAU;
 use libm::{atan2, hypot, sqrt};
 
-/// Share of the thrust beyond the weight that a path may ask for.
+/// Fraction of the thrust beyond the weight that a path may ask for.
 const THRUST_SHARE: f64 = 0.6;
-/// Thrust over weight that every change leaves.
+/// Smallest thrust-to-weight ratio that a change may leave.
 const RESERVE: f64 = 1.15;
 /// Largest tilt that a path may ask for \[rad\].
 const TILT_MAX_RAD: f64 = 1.0;
-/// Share of the angular acceleration from hover that a path may ask for.
+/// Fraction of the angular acceleration available in hover that a path may ask for.
 const TURN_SHARE: f64 = 0.5;
-/// Time that a law takes beyond the rotors' lag \[s\].
+/// Delay of a law in addition to the rotors' lag \[s\].
 const LAW_S: f64 = 0.01;
-/// Fastest frequency of a path, times lag and the time of a law.
+/// Highest frequency of a path, multiplied by the sum of the rotors' lag and the law's delay.
 const FREQUENCY_SHARE: f64 = 1.0 / 3.0;
-/// Height of the paths; turbulence is no stronger above \[m\].
+/// Height of the paths \[m\]. Turbulence is no stronger above.
 pub(super) const HEIGHT_M: f64 = 3.0;
 
-/// What a vehicle can do, as long as nothing holds it up but its rotors.
+/// Capability of a vehicle in the air, which only its rotors carry.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Power {
     gravity_m_s2: f64,
     arm_m: f64,
-    /// Thrust of all rotors on a full battery, over mass \[m/s2\].
+    /// Thrust of all rotors on a full battery, divided by the mass \[m/s2\].
     thrust_m_s2: f64,
-    /// Smaller of the angular accelerations of roll and pitch from hover \[rad/s2\].
+    /// Smaller one of the roll and pitch angular accelerations available in hover \[rad/s2\].
     tilt_rad_s2: f64,
     yaw_rad_s2: f64,
-    /// Fastest frequency of a path \[rad/s\].
+    /// Highest frequency of a path \[rad/s\].
     frequency_rad_s: f64,
-    /// Blade drag per airspeed, over mass \[1/s\], and body drag per square of it \[1/m\].
+    /// Blade drag per airspeed, divided by the mass \[1/s\], and body drag per squared airspeed, divided by the mass
+    /// \[1/m\].
     drag: [f64; 2],
     wind_m_s: f64,
 }
 
 impl Power {
-    /// Returns what `vehicle` can do in still air.
+    /// Returns the capability of `vehicle` in still air.
     pub(super) fn of(vehicle: &Vehicle) -> Self {
         let parameters = &vehicle.parameters;
         let (mass_kg, count) = (parameters.mass_kg, vehicle.rotors.len() as f64);
         let share = vehicle.realism.rotors.battery.map_or(1.0, |battery| speed_share(vehicle, &battery));
         let most_n = vehicle.force_max_n * share * share;
         let hover_n = parameters.weight_n() / count;
-        // Each rotor may give as much more as another gives less.
+        // A rotor may gain as much thrust as another one loses.
         let change_n = (most_n - hover_n).min(hover_n).max(0.0);
         let sum = |lever: fn(&Rotor<f64>) -> f64| vehicle.rotors.iter().map(|rotor| lever(rotor).abs()).sum::<f64>();
         let inertia = &parameters.inertia_kg_m2;
@@ -75,19 +76,19 @@ impl Power {
         }
     }
 
-    /// Returns what it can do under this change.
+    /// Returns the capability under this change.
     #[must_use]
     pub(super) fn under(mut self, change: &Change) -> Self {
         match change {
             Change::Wind(wind_m_s) => self.wind_m_s = wind_m_s.norm(),
-            // Twice the standard deviation.
+            // Two standard deviations of the turbulence.
             Change::Turbulence(turbulence) => self.wind_m_s = 2.0 * turbulence.at(HEIGHT_M).horizontal_m_s,
-            // The rotor on the payload's side carries more.
+            // The rotor on the payload's side carries more than the others.
             Change::Payload { share, ahead_m, left_m, .. } => {
                 self.thrust_m_s2 /= 1.0 + share + 2.0 * share * hypot(*ahead_m, *left_m) / self.arm_m;
             }
             Change::Mass(factor) => self.thrust_m_s2 /= factor,
-            // The others give no more than the weak one, or the vehicle would turn.
+            // The other rotors cannot give more than the weak one without turning the vehicle.
             Change::Rotor { efficiency, .. } => self.thrust_m_s2 *= efficiency,
             Change::Drag(factor) => self.drag = self.drag.map(|drag| drag * factor),
             Change::Nothing | Change::Older(_) => {}
@@ -95,32 +96,33 @@ impl Power {
         self
     }
 
-    /// Returns as much of `change` as leaves a reserve.
+    /// Returns `change`, reduced as far as needed to leave a reserve of thrust.
     pub(super) fn fitted(&self, change: &Change) -> Change {
         change.scaled(largest(1.0, |share| self.under(&change.scaled(share)).hovers()))
     }
 
-    /// True if it hovers with a reserve.
+    /// True if the vehicle can hover with a reserve.
     fn hovers(&self) -> bool {
         let gravity_m_s2 = self.gravity_m_s2;
         self.thrust_m_s2 >= RESERVE * gravity_m_s2 && self.asked(&Reference::default()) <= 1.0
     }
 
-    /// Returns the largest share of what it can do that `trajectory` asks for at one of `times_s`.
+    /// Returns the largest fraction of the capability that `trajectory` asks for at any of `times_s`.
     pub(super) fn asked_by(&self, trajectory: &Trajectory, times_s: &[f64]) -> f64 {
         let frequency = fastest_rad_s(trajectory) / self.frequency_rad_s;
         times_s.iter().map(|time_s| self.asked(&trajectory.at(*time_s))).fold(frequency, f64::max)
     }
 
-    /// Returns the share of what it can do that a reference asks for.
+    /// Returns the fraction of the capability that a reference asks for.
     fn asked(&self, reference: &Reference) -> f64 {
         let g = self.gravity_m_s2;
         let airspeed_m_s = reference.velocity_m_s.norm() + self.wind_m_s;
         let [blades, body] = self.drag;
-        // As if the air always blew against it.
+        // Assumes the worst case: the wind always blows against the vehicle.
         let level = reference.acceleration_m_s2.xy().norm() + (blades + body * airspeed_m_s) * airspeed_m_s;
         let up = g + reference.acceleration_m_s2.z;
-        // Without spare thrust whatever is asked for beyond the weight is far too much, and nothing is divided by zero.
+        // The minimum avoids a division by zero. Without spare thrust, any demand beyond the weight is then far too
+        // large.
         let spare = (self.thrust_m_s2 - g).max(f64::MIN_POSITIVE);
         [
             (hypot(level, up) - g) / (THRUST_SHARE * spare),
@@ -129,13 +131,13 @@ impl Power {
             reference.yaw_acceleration_rad_s2.abs() / (TURN_SHARE * self.yaw_rad_s2),
         ]
         .into_iter()
-        // Nothing asked of nothing is no demand.
+        // 0/0 means that nothing is asked of a capability that the vehicle lacks, which counts as no demand.
         .filter(|share| !share.is_nan())
         .fold(0.0, f64::max)
     }
 }
 
-/// Returns the share of their largest speed that the rotors reach on a full battery which drives all of them.
+/// Returns the fraction of their largest speed that the rotors reach when a full battery drives all of them.
 fn speed_share(vehicle: &Vehicle, battery: &Battery) -> f64 {
     let speed_rad_s = vehicle.realism.rotors.max_rad_s;
     let torque = vehicle.parameters.drag_factor_n_m_s2 * vehicle.rotors.len() as f64;
@@ -143,14 +145,14 @@ fn speed_share(vehicle: &Vehicle, battery: &Battery) -> f64 {
     let half_v = 0.5 * (battery.empty_v + (battery.full_v - battery.empty_v) * battery.initial_charge);
     let reached = |share: f64| {
         let power_w = full_w * share * share * share / battery.efficiency + battery.avionics_w;
-        // The larger root of V^2 - V_open V + R P = 0; beyond the most that the battery can give, half of V_open.
+        // The larger root of V^2 - V_open V + R P = 0. Beyond the battery's largest power, half of V_open.
         let voltage_v = half_v + sqrt((half_v * half_v - battery.resistance_ohm * power_w).max(0.0));
         voltage_v / battery.full_v
     };
     largest(1.0, |share| share <= reached(share))
 }
 
-/// Returns the fastest frequency in a path \[rad/s\].
+/// Returns the highest frequency in a path \[rad/s\].
 fn fastest_rad_s(trajectory: &Trajectory) -> f64 {
     match trajectory {
         Trajectory::Circle { period_s, .. } => TAU / period_s,
@@ -158,12 +160,12 @@ fn fastest_rad_s(trajectory: &Trajectory) -> f64 {
             let moving = sines.iter().filter(|sine| sine.amplitude_m != 0.0);
             moving.map(|sine| TAU / sine.period_s).fold(0.0, f64::max)
         }
-        // The acceleration of a leg is about one period of a sine.
+        // The acceleration along a leg resembles one period of a sine.
         Trajectory::Waypoints(waypoints) => {
             let legs = waypoints.iter().zip(waypoints.iter().skip(1));
             legs.map(|(from, to)| TAU / (to.time_s - from.time_s)).fold(0.0, f64::max)
         }
-        // As if the largest jerk and acceleration were of one sine.
+        // Treats the largest jerk and the largest acceleration as those of a single sine.
         Trajectory::Polynomials(pieces) => {
             let [_, acceleration, jerk, _] = peaks(pieces, SAMPLES);
             if acceleration > 0.0 { jerk / acceleration } else { 0.0 }

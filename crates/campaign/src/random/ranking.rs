@@ -1,19 +1,19 @@
-//! How the contenders stand: who is best, who loses what others keep, and paired differences with intervals.
+//! Ranking of the contenders: best distances, losses that others avoided, and paired differences with intervals.
 
 use crate::statistics::{SignedRank, clustered, holm, percentile};
 use libm::{exp, log};
 use std::collections::BTreeMap;
 
-/// Factor on the least distance up to which another is level with it.
+/// A distance counts as level with the least one up to this factor.
 const LEVEL_FACTOR: f64 = 1.05;
-/// Difference from the least distance up to which another is level with it \[m\].
+/// A distance counts as level with the least one up to this difference \[m\].
 const LEVEL_M: f64 = 2e-4;
-/// Smallest distance, so that it has a logarithm \[m\].
+/// Smallest distance, so that the logarithm exists \[m\].
 const DISTANCE_MIN_M: f64 = 1e-9;
-/// Number of resamples behind an interval.
+/// Number of resamples for an interval.
 pub const RESAMPLES: usize = 4000;
 
-/// What the contenders of a flight are judged by.
+/// Distances by which the contenders of a flight are ranked.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Score {
     /// Seed that the flight was drawn from.
@@ -22,56 +22,56 @@ pub struct Score {
     pub rms_m: Vec<Option<f64>>,
 }
 
-/// How a contender stands.
+/// Result of one contender over all flights.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ranking {
-    /// Number of flights in which it is best, or level with the best.
+    /// Number of flights in which the contender is best, or level with the best.
     pub wins: usize,
     /// Number of vehicles lost.
     pub lost: usize,
-    /// Number of those that some other contender kept.
+    /// Number of vehicles lost in flights that some other contender survived.
     pub lost_alone: usize,
-    /// Median distance over all flights; none if that is a lost one \[m\].
+    /// Median distance over all flights \[m\]; none if the median flight is a lost one.
     pub median_m: Option<f64>,
-    /// Geometric mean of the distances in the flights that it kept; none if there are none \[m\].
+    /// Geometric mean of the distances in the flights without a loss \[m\]; none if there are none.
     pub geometric_m: Option<f64>,
-    /// Difference from the contender that all are compared with; none if there is no flight that both kept.
+    /// Difference from the contender that all are compared with; none if no flight was survived by both.
     pub difference: Option<Difference>,
 }
 
-/// Mean difference of the logarithms of two contenders' distances, in the flights that both kept.
+/// Mean difference of the logarithms of two contenders' distances, over the flights that both survived.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Difference {
-    /// Number of those flights.
+    /// Number of flights that both survived.
     pub flights: usize,
-    /// The mean.
+    /// Mean difference of the logarithms.
     pub mean: f64,
-    /// Ends of its 95 % interval; none for a single cluster.
+    /// Ends of the mean's 95 % confidence interval; none for a single cluster.
     pub interval: Option<[f64; 2]>,
-    /// Whether the clusters' mean differences are more than chance.
+    /// Signed rank test of the clusters' mean differences.
     pub test: SignedRank,
-    /// Its probability, adjusted for as many contenders as are tested.
+    /// The test's probability, adjusted by Holm's method for the number of contenders tested.
     pub p_holm: f64,
 }
 
-/// True if a contender with distance `own_m` is best, or level with the `best_m`.
+/// True if the distance `own_m` is the best or level with the best, `best_m`.
 pub fn is_level(own_m: f64, best_m: f64) -> bool {
     own_m <= (LEVEL_FACTOR * best_m).max(best_m + LEVEL_M)
 }
 
 impl Score {
-    /// Returns the least distance; none if every contender lost the vehicle \[m\].
+    /// Returns the least distance \[m\]; none if every contender lost the vehicle.
     pub fn best_m(&self) -> Option<f64> {
         self.rms_m.iter().flatten().copied().reduce(f64::min)
     }
 
-    /// Returns the distance of a contender; none if it lost the vehicle \[m\].
+    /// Returns the distance of a contender \[m\]; none if it lost the vehicle.
     pub fn of(&self, contender: usize) -> Option<f64> {
         self.rms_m.get(contender).copied().flatten()
     }
 }
 
-/// Returns how each contender of `results` stands, compared with the one at place `against`.
+/// Returns the ranking of each contender of `results`, compared with the contender at index `against`.
 pub fn rankings(results: &[Score], against: usize) -> Vec<Ranking> {
     let contenders = results.first().map_or(0, |result| result.rms_m.len());
     let mut rankings: Vec<Ranking> = (0..contenders).map(|contender| ranking(results, contender, against)).collect();
@@ -103,14 +103,14 @@ fn ranking(results: &[Score], contender: usize, against: usize) -> Ranking {
 }
 
 fn difference(results: &[Score], contender: usize, against: usize) -> Option<Difference> {
-    // Sum and number of the differences of each seed.
+    // Differences of each seed.
     let mut seeds: BTreeMap<u64, Vec<f64>> = BTreeMap::new();
     for result in results {
         if let (Some(own_m), Some(other_m)) = (result.of(contender), result.of(against)) {
             seeds.entry(result.seed).or_default().push(logarithm(own_m) - logarithm(other_m));
         }
     }
-    // A single seed says nothing of what another would give: its flights stand for themselves.
+    // A single seed does not show how seeds differ, so each of its flights becomes a cluster.
     let clusters: Vec<Vec<f64>> = match seeds.len() {
         1 => seeds.into_values().flatten().map(|difference| vec![difference]).collect(),
         _ => seeds.into_values().collect(),
@@ -140,7 +140,8 @@ mod tests {
         assert!((a - b).abs() < 1e-12, "{a} != {b}");
     }
 
-    /// Counted by hand: a flight that all lose is nobody's, and 5 % or 0.2 mm is level.
+    /// Checks figures counted by hand. A flight that all lose counts as nobody's, and distances within 5 % or 0.2 mm
+    /// are level.
     #[test]
     fn the_figures_are_those_counted_by_hand() {
         let results = [
@@ -154,21 +155,21 @@ mod tests {
         assert_eq!((a.wins, a.lost, a.lost_alone), (3, 2, 1));
         assert_eq!((b.wins, b.lost, b.lost_alone), (2, 2, 1));
         assert_eq!((c.wins, c.lost, c.lost_alone), (1, 2, 1));
-        // The third of five; three of b's are kept.
+        // The median is the third of five. `b` survived three flights.
         assert_eq!((a.median_m, b.median_m, c.median_m), (Some(0.04), Some(0.09), Some(0.05)));
         close(a.geometric_m.unwrap(), (0.01_f64 * 0.0003 * 0.04).cbrt());
         close(b.geometric_m.unwrap(), (0.04_f64 * 0.09 * 0.0001).cbrt());
         let test = SignedRank { p: 1.0, effect: 0.0 };
         let own = Difference { flights: 3, mean: 0.0, interval: Some([0.0; 2]), test, p_holm: 1.0 };
         assert_eq!(a.difference, Some(own));
-        // b and a both kept the first and the third.
+        // Both `a` and `b` survived the first and third flights.
         let b = b.difference.unwrap();
         assert_eq!(b.flights, 2);
         close(b.mean, 0.5 * (4.0_f64.ln() - 3.0_f64.ln()));
         let [low, high] = b.interval.unwrap();
         close(low, -(3.0_f64.ln()));
         close(high, 4.0_f64.ln());
-        // c is further in all of three seeds, b in one of two: 2/2^3, and as likely as not.
+        // `c` is further away in all three seeds: p = 2/2^3. `b` is further away in one seed of two: p = 1.
         let c = c.difference.unwrap();
         assert_eq!((c.flights, c.test, c.p_holm), (3, SignedRank { p: 0.25, effect: 1.0 }, 0.5));
         assert_eq!((b.test.p, b.p_holm), (1.0, 1.0));
@@ -182,8 +183,8 @@ mod tests {
         assert_eq!((rankings[2].median_m, rankings[2].geometric_m, rankings[2].difference), (None, None, None));
     }
 
-    /// All flights of a seed are drawn together: with equal ones, the interval is that of one flight per seed. A single
-    /// seed's flights are drawn one by one.
+    /// Flights of one seed form one cluster. With equal copies, the interval equals that of one flight per seed.
+    /// Flights of a single seed are separate clusters.
     #[test]
     fn flights_are_clustered_by_seed() {
         let at = |seed, factor: f64| result(seed, [Some(0.1), Some(0.1 * factor), Some(0.1)]);

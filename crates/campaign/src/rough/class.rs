@@ -1,21 +1,21 @@
-//! Classes of what sensors do that a vehicle is not told.
+//! Classes of sensor behaviour that the suite `rough-estimate` draws.
 
 use super::drawing::Drawing;
 use afbc_plant::instruments::{Failure, TrackerModel};
 use core::f64::consts::PI;
 use nalgebra::Vector3;
 
-/// Where a flight is, which decides what aids its inertial sensor.
+/// Place of a flight, which decides which sensors aid the inertial sensor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Venue {
-    /// In front of a motion-capture system.
+    /// With a motion-capture system.
     Indoors,
     /// With a GNSS receiver and a magnetometer.
     Outdoors,
 }
 
 impl Venue {
-    /// Name of the place.
+    /// Returns the name of the place.
     pub const fn name(self) -> &'static str {
         match self {
             Venue::Indoors => "indoors",
@@ -24,20 +24,21 @@ impl Venue {
     }
 }
 
-/// A class of what sensors do.
+/// A class of sensor behaviour.
 pub struct Class {
-    /// Name.
+    /// Name of the class.
     pub name: &'static str,
     /// Meaning in words.
     pub meaning: &'static str,
-    /// True if the vehicle knows, by data sheets, stamps or silence: the estimate has to be consistent then.
+    /// True if the vehicle knows of the behaviour by data sheets, time stamps or missing data. Its estimate has to be
+    /// consistent then.
     pub known: bool,
-    /// Where the instruments are that it concerns; none for either place.
+    /// Place that has the affected instruments; none for both places.
     pub place: Option<Venue>,
     put: fn(&mut Drawing<'_>),
 }
 
-/// Name of the class of two others at once.
+/// Name of the class that combines two others.
 pub const MIXTURE: &str = "mixture";
 /// Description of the class of mixtures.
 pub const MIXTURE_MEANING: &str = "two of the others at once";
@@ -55,7 +56,7 @@ const fn class(
 const INDOORS: Option<Venue> = Some(Venue::Indoors);
 const OUTDOORS: Option<Venue> = Some(Venue::Outdoors);
 
-/// Every class but [`MIXTURE`].
+/// All classes except [`MIXTURE`].
 pub static CLASSES: [Class; 24] = [
     class("nothing", None, true, "as the vehicle is told", |_| {}),
     class("vibration", None, false, "0.02 to 0.2 rad/s and 1 to 10 m/s2 from a hovering rotor, told 0.02 and 1", |d| {
@@ -162,12 +163,12 @@ pub static CLASSES: [Class; 24] = [
     }),
 ];
 
-/// Names of all classes, in the order of the rows.
+/// Returns the names of all classes, in the order of the rows.
 pub fn names() -> impl Iterator<Item = &'static str> {
     CLASSES.iter().map(|class| class.name).chain([MIXTURE])
 }
 
-/// A bias of gyroscope and accelerometer within these bounds, each in a direction of its own.
+/// Draws a bias of the gyroscope and one of the accelerometer, within these bounds and in independent directions.
 fn biased(d: &mut Drawing<'_>, [rate_min, rate_max]: [f64; 2], [force_min, force_max]: [f64; 2]) -> Failure {
     let rates_bias_rad_s = d.direction() * d.logarithmic(rate_min, rate_max);
     let force_bias_m_s2 = d.direction() * d.logarithmic(force_min, force_max);
@@ -175,12 +176,12 @@ fn biased(d: &mut Drawing<'_>, [rate_min, rate_max]: [f64; 2], [force_min, force
 }
 
 impl Class {
-    /// Draws one of the class into a flight.
+    /// Draws an instance of the class into a flight.
     pub(super) fn put(&self, drawing: &mut Drawing<'_>) {
         (self.put)(drawing);
     }
 
-    /// True if it concerns instruments that there are at `place`.
+    /// True if the affected instruments exist at `place`.
     pub(super) fn is_at(&self, place: Venue) -> bool {
         self.place.is_none_or(|own| own == place)
     }

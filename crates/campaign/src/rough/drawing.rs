@@ -1,4 +1,4 @@
-//! A flight while what its sensors do is drawn.
+//! A flight whose sensor behaviour is being drawn.
 
 use afbc_plant::instruments::{Failure, Gnss, Imu, InstrumentFault, Magnetometer, TrackerModel};
 use afbc_plant::noise::Noise;
@@ -9,10 +9,10 @@ use afbc_types::{Axis, OutOfRange};
 use libm::{exp, log, sqrt};
 use nalgebra::Vector3;
 
-/// Share of a flight, once it counts, within which faults begin.
+/// Faults begin within this first fraction of the part of the flight that counts.
 const EARLY: f64 = 0.5;
 
-/// A flight while what its sensors do is drawn.
+/// A flight whose sensor behaviour is being drawn.
 pub(super) struct Drawing<'a> {
     pub(super) noise: &'a mut Noise,
     pub(super) scenario: &'a mut Scenario,
@@ -20,12 +20,12 @@ pub(super) struct Drawing<'a> {
 }
 
 impl Drawing<'_> {
-    /// Draws a number between two.
+    /// Draws a number uniformly between two bounds.
     pub(super) fn between(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * self.noise.uniform()
     }
 
-    /// Draws a number between two, each octave as likely.
+    /// Draws a number between two bounds, uniform in its logarithm.
     pub(super) fn logarithmic(&mut self, low: f64, high: f64) -> f64 {
         exp(self.between(log(low), log(high)))
     }
@@ -53,24 +53,24 @@ impl Drawing<'_> {
         drawn / sqrt(drawn.norm_squared()).max(1e-9)
     }
 
-    /// Draws how long something lasts: as long as this, up to ten times, or for good.
+    /// Draws a duration: with equal chances, from `least_s` to ten times that, or infinite.
     pub(super) fn lasting(&mut self, least_s: f64) -> f64 {
         let lasts_s = self.logarithmic(least_s, 10.0 * least_s);
         if self.noise.uniform() < 0.5 { lasts_s } else { f64::INFINITY }
     }
 
-    /// Draws when something begins.
+    /// Draws the time at which something begins \[s\].
     fn onset(&mut self) -> f64 {
         SETTLED_S + EARLY * (self.scenario.duration_s - SETTLED_S).max(0.0) * self.noise.uniform()
     }
 
-    /// Adds a fault that lasts so long.
+    /// Adds a fault that lasts `lasts_s` and takes `rise_s` to grow.
     pub(super) fn fault(&mut self, failure: Failure, lasts_s: f64, rise_s: f64) {
         let start_s = self.onset();
         self.scenario.instrument_faults.push(InstrumentFault { failure, start_s, end_s: start_s + lasts_s, rise_s });
     }
 
-    /// Adds a bump.
+    /// Adds a short acceleration gust.
     pub(super) fn bump(&mut self) {
         let (start_s, lasts_s) = (self.onset(), self.between(0.001, 0.005));
         let axis = [Axis::X, Axis::Y, Axis::Z].get((self.noise.uniform() * 3.0) as usize).copied().unwrap_or(Axis::Z);
@@ -94,10 +94,10 @@ impl Drawing<'_> {
         self.scenario.instruments.magnetometer.as_mut().map(change);
     }
 
-    /// Puts the bumps into the flight.
+    /// Puts the gusts into the flight.
     ///
     /// # Errors
-    /// The first one out of range.
+    /// The first gust out of range.
     pub(super) fn finish(self) -> Result<(), OutOfRange> {
         let environment = &self.scenario.environment;
         self.scenario.environment = Environment::new(*environment.nominal(), Vec::new(), self.gusts)?;

@@ -6,18 +6,18 @@ use afbc_scenario::Scenario;
 /// A drawn flight.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RoughFlight {
-    /// Seed that it was drawn from.
+    /// Seed that the flight was drawn from.
     pub seed: u64,
     /// Name of the vehicle.
     pub vehicle: String,
-    /// Name of its class.
+    /// Name of the flight's class.
     pub class: &'static str,
-    /// The classes that were drawn: its own, or the two of a mixture.
+    /// Names of the drawn classes: the flight's class, or the two classes of a mixture.
     pub parts: Vec<&'static str>,
     /// Number among the flights of the same seed, vehicle and class, from 1.
     pub number: u64,
-    /// Where it is.
+    /// Place of the flight, indoors or outdoors.
     pub place: Venue,
-    /// The flight.
+    /// Scenario to fly.
     pub scenario: Scenario,
 }

@@ -1,4 +1,4 @@
-//! The judgement of a flight: its estimate's errors, and how it ended.
+//! The judgement of a flight: errors of the estimate, and how the flight ended.
 
 use afbc_scenario::Scenario;
 use afbc_sim::flight::{Estimated, Lost, Mode, Sample, fly};
@@ -6,31 +6,31 @@ use afbc_sim::metrics::is_settled;
 use afbc_sim::run::Tripped;
 use afbc_types::OutOfRange;
 
-/// Steps between two looks: as often as the normalised error is evaluated.
+/// Steps between two evaluations of the estimate. The normalised error is computed as often.
 const EVERY: u64 = 10;
-/// Standard deviations within which an error should be.
+/// Number of standard deviations within which an error should be.
 const SIGMAS: f32 = 3.0;
 
-/// How good the estimate was in a flight, from the time on at which errors count until the motors stop, and what
-/// failsafes did.
+/// Quality of the estimate and actions of failsafes in a flight. The estimate is evaluated from the time at which
+/// errors count until the motors stop.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Judgement {
-    /// Number of looks.
+    /// Number of evaluations.
     pub looks: u64,
-    /// Number of those at which the estimate was valid; of these are the figures below.
+    /// Number of evaluations with a valid estimate. The errors below are from these evaluations.
     pub valid: u64,
-    /// Mean normalised estimation error squared; nine if the estimate is consistent, not a number if its covariance was
-    /// not positive at any look.
+    /// Mean normalised estimation error squared. It is nine for a consistent estimate, and NaN if the covariance was
+    /// ever not positive.
     pub nees: f64,
-    /// Share of errors, of nine coordinates each, that are within three standard deviations.
+    /// Fraction of the errors, nine coordinates per evaluation, that are within three standard deviations.
     pub within: f64,
-    /// Whether the flight core flew without a fresh state at any time.
+    /// True if the flight core flew without a fresh state at any time.
     pub coasted: bool,
-    /// Whether it descended.
+    /// True if the flight core descended at any time.
     pub descended: bool,
-    /// When and why the monitor handed the vehicle over.
+    /// Time and reason of the monitor's switch to the fallback law, if any.
     pub tripped: Option<Tripped>,
-    /// When and why the vehicle was lost.
+    /// Time and reason of the loss of the vehicle, if any.
     pub lost: Option<Lost>,
 }
 

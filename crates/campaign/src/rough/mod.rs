@@ -1,8 +1,8 @@
-//! The suite `rough-estimate`: flights whose sensors do what the vehicle is not told, and how good its estimate is.
-//! `docs/suites.md` has the classes.
+//! The suite `rough-estimate` flies with sensor behaviour that the vehicle is not told of, and measures the quality of
+//! its estimate. `docs/suites.md` has the classes of behaviour.
 //!
-//! A flight is a function of seed, vehicle, class and number alone: it is the same on every machine, beside whatever
-//! others.
+//! A flight depends only on seed, vehicle, class and number. It is the same on every machine, whichever other flights
+//! are drawn.
 
 mod class;
 mod drawing;
@@ -34,25 +34,25 @@ use rayon::prelude::*;
 pub const NAME: &str = "rough-estimate";
 /// Length of most flights \[s\].
 pub const SHORT_S: f64 = 60.0;
-/// Length of one in [`LONG_ONE_IN`] \[s\].
+/// Length of the long flights \[s\].
 pub const LONG_S: f64 = 600.0;
-/// One flight in so many is long.
+/// One flight in this number is long, on average.
 pub const LONG_ONE_IN: u64 = 10;
 
-/// The flights to draw: how many, of which vehicles, for how long.
+/// Selection of the flights to draw.
 #[derive(Clone, Debug)]
 pub struct Rough {
-    /// Seeds.
+    /// Seeds from which flights are drawn.
     pub seeds: Range<u64>,
-    /// Number of flights of each vehicle, class and seed.
+    /// Number of flights per vehicle, class and seed.
     pub flights: u64,
     /// Length of every flight, instead of [`SHORT_S`] and [`LONG_S`].
     pub duration_s: Option<f64>,
-    /// Who flies.
+    /// Vehicles that fly.
     pub vehicles: Vec<Vehicle>,
 }
 
-/// A vehicle at both places, as its sensors are stated.
+/// A vehicle at both places, with sensors that behave as stated.
 struct Base<'a> {
     vehicle: &'a Vehicle,
     indoors: Scenario,
@@ -60,10 +60,10 @@ struct Base<'a> {
 }
 
 impl Rough {
-    /// Draws every flight, flown by `contender` with its gains for the vehicle.
+    /// Draws all flights, flown by `contender` with its gains for the vehicle.
     ///
     /// # Errors
-    /// One line on what a vehicle cannot fly, or on a gain or setting out of range.
+    /// One line about the first value that a vehicle cannot fly with, or a gain or setting out of range.
     pub fn draw(&self, contender: &Contender) -> Result<Vec<RoughFlight>, FileError> {
         let bases = self.vehicles.iter().map(|vehicle| Base::new(vehicle, contender));
         let bases = bases.collect::<Result<Vec<_>, _>>()?;
@@ -77,7 +77,7 @@ impl Rough {
 
     fn flight(&self, base: &Base<'_>, class: &'static str, seed: u64, number: u64) -> Result<RoughFlight, FileError> {
         let vehicle = &base.vehicle.name;
-        // By the names, not their places in a list: others beside them change nothing.
+        // The names enter the draw, not the indices in the lists, so that other vehicles and classes change nothing.
         let of_names = vehicle.bytes().chain(class.bytes()).fold(mix(seed), |hash, byte| mix(hash ^ u64::from(byte)));
         let bits = mix(of_names.wrapping_add(number)) >> 11;
         let mut noise = Noise::new(bits, Stream::Scenario);
@@ -115,7 +115,7 @@ impl Rough {
     }
 }
 
-/// Draws two different classes that concern instruments of `place`.
+/// Draws two different classes whose instruments exist at `place`.
 fn two(noise: &mut Noise, place: Venue) -> Vec<&'static Class> {
     let mut there: Vec<&Class> = CLASSES.iter().skip(1).filter(|class| class.is_at(place)).collect();
     let mut one = || there.remove((noise.uniform() * there.len() as f64) as usize);
@@ -127,7 +127,7 @@ impl<'a> Base<'a> {
         let at = |text: &str| {
             let mut scenario = afbc_scenario::parse(NAME, text, NAME)?.on(vehicle, Profile::Flight)?;
             compare::fly_under(&mut scenario, core::slice::from_ref(contender))?;
-            // Some vehicles' batteries are empty before ten minutes are over.
+            // Without this, the batteries of some vehicles would be empty before ten minutes are over.
             scenario.realism.rotors.battery = None;
             Ok::<Scenario, FileError>(scenario)
         };
@@ -135,7 +135,7 @@ impl<'a> Base<'a> {
     }
 }
 
-/// Flies every flight on the current rayon pool, and calls `progress` after each. The result does not depend on the
+/// Flies all flights on the current rayon pool. Calls `progress` after each flight. The result does not depend on the
 /// number of threads.
 ///
 /// # Errors

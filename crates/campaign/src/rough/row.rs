@@ -1,4 +1,4 @@
-//! Flights that were flown, and how good the estimate was in each class.
+//! Flown flights and the quality of the estimate in each class.
 
 use super::class::names;
 use super::flight::RoughFlight;
@@ -9,32 +9,32 @@ use super::judgement::Judgement;
 pub struct FlownRough {
     /// The flight.
     pub flight: RoughFlight,
-    /// How it went.
+    /// Quality of the flight's estimate, and its end.
     pub judgement: Judgement,
 }
 
-/// How good the estimate was in the flights of a class.
+/// Quality of the estimate in the flights of a class.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ClassRow {
     /// Name of the class; none for all flights.
     pub class: Option<&'static str>,
     /// Number of flights.
     pub flights: usize,
-    /// Mean over the flights of their normalised error; not a number if any has none.
+    /// Mean of the flights' normalised errors; NaN if any of them is NaN.
     pub nees: f64,
     /// Normalised error of the worst flight.
     pub worst_nees: f64,
-    /// Mean share within three standard deviations, of flights with a valid estimate.
+    /// Mean fraction of errors within three standard deviations, over flights with a valid estimate.
     pub within: f64,
-    /// Share of all looks at which the estimate was valid.
+    /// Fraction of all evaluations at which the estimate was valid.
     pub valid: f64,
     /// Flights in which the flight core flew without a fresh state.
     pub coasted: usize,
-    /// Flights in which it descended.
+    /// Flights in which the flight core descended.
     pub descended: usize,
-    /// Flights in which the monitor handed the vehicle over.
+    /// Flights in which the monitor switched to the fallback law.
     pub tripped: usize,
-    /// Vehicles lost.
+    /// Number of vehicles lost.
     pub lost: usize,
 }
 
@@ -57,7 +57,7 @@ fn row(class: Option<&'static str>, all: &[Judgement]) -> ClassRow {
         class,
         flights: all.len(),
         nees: mean(|it| it.nees),
-        // One that is not a number is the worst.
+        // NaN counts as the worst error.
         worst_nees: judged
             .iter()
             .map(|it| it.nees)

@@ -1,13 +1,13 @@
-//! Medians with intervals that assume nothing about the distribution.
+//! Medians with confidence intervals that assume nothing about the distribution.
 
 use super::CONFIDENCE;
 use libm::{exp, log};
 
-/// A median and an interval for that of all seeds.
+/// A median of the flights, with a confidence interval for the median of all seeds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Median {
-    /// The middle value, or the mean of the middle two. Infinite if it is that of a lost flight; NaN between infinities
-    /// of both signs.
+    /// The middle value, or the mean of the middle two. Infinite if a middle value is a lost flight's; NaN if the
+    /// middle two are infinities of opposite signs.
     pub value: f64,
     /// Two of the values, which enclose the median of all seeds in at least 95 % of all experiments; none for fewer
     /// than six values.
@@ -17,24 +17,25 @@ pub struct Median {
 impl Median {
     /// Returns the median of `values`, which may be infinite; none without values.
     ///
-    /// The interval lies between order statistics of the same rank from both ends, the innermost whose coverage, by the
-    /// binomial distribution, is at least 95 % (David, Nagaraja 2003, *Order statistics*, section 7.1).
+    /// The interval ends have the same rank from the lower and from the upper end. The rank is the largest whose
+    /// coverage, by the binomial distribution, is at least 95 % (David, Nagaraja 2003, *Order statistics*, section
+    /// 7.1).
     pub fn of(values: &[f64]) -> Option<Self> {
         let mut sorted = values.to_vec();
         sorted.sort_by(f64::total_cmp);
         let count = sorted.len();
         let [low, high] = [sorted.get(count.checked_sub(1)? / 2)?, sorted.get(count / 2)?];
-        // Equal infinities have no mean.
+        // Equal values, also infinities, are their own mean.
         let value = if low == high { *low } else { 0.5 * (low + high) };
         let ends = rank(count).and_then(|rank| Some([*sorted.get(rank - 1)?, *sorted.get(count - rank)?]));
         Some(Median { value, interval: ends })
     }
 }
 
-/// Returns the largest rank, from 1 on, for which the values of that rank from both ends enclose the median with the
+/// Returns the largest rank, from 1 on, at which the two values of that rank from both ends enclose the median with the
 /// wanted confidence; none if not even the extremes do.
 fn rank(count: usize) -> Option<usize> {
-    // The chance of exactly `below` values below the median, by its logarithm: 2^-count is soon too small for a number.
+    // Logarithm of the probability that exactly `below` values are below the median. 2^-count itself would underflow.
     let mut logarithm = -(count as f64) * core::f64::consts::LN_2;
     let (mut outside, mut rank) = (0.0, 0);
     for below in 0..count / 2 {
@@ -54,7 +55,7 @@ mod tests {
     use super::*;
     use afbc_plant::noise::{Noise, Stream};
 
-    /// By scipy 1.17.1, `scipy.stats.binom.ppf(0.025, n, 0.5)` of each number.
+    /// Values by scipy 1.17.1: `scipy.stats.binom.ppf(0.025, n, 0.5)` for each number.
     #[test]
     fn ranks_are_those_of_the_binomial_distribution() {
         for (count, expected) in [
@@ -74,8 +75,8 @@ mod tests {
         }
     }
 
-    /// All 2^n ways in which values may fall on both sides of the median: the interval encloses it in at least 95 % of
-    /// them, and the next inner one in fewer.
+    /// Counts all 2^n ways in which values may fall on both sides of the median. The interval encloses the median in at
+    /// least 95 % of them, the next inner interval in fewer.
     #[test]
     fn coverage_is_that_of_all_sides_counted() {
         for count in 6..=16 {
@@ -107,7 +108,7 @@ mod tests {
         assert_eq!(Median::of(&[]), None);
     }
 
-    /// Lost flights are infinitely far, and the median is lost as soon as half of them are.
+    /// Lost flights count as infinite. The median is infinite as soon as half of the flights are lost.
     #[test]
     fn lost_flights_are_the_worst() {
         let lost = f64::INFINITY;

@@ -9,9 +9,9 @@ pub use signed_rank::{SignedRank, holm};
 use afbc_plant::noise::{Noise, Stream};
 use libm::sqrt;
 
-/// 97.5 % quantile of the standard normal distribution: two-sided 95 %.
+/// 97.5 % quantile of the standard normal distribution, for two-sided 95 %.
 const Z: f64 = 1.959_963_984_540_054;
-/// Confidence of every interval, at least.
+/// Least confidence of every interval.
 const CONFIDENCE: f64 = 0.95;
 
 /// A share with Wilson's 95 % score interval, which is also valid near 0 and 1, where few flights are lost.
@@ -35,24 +35,24 @@ impl Share {
         let scale = 1.0 + Z * Z / n;
         let centre = (p + Z * Z / (2.0 * n)) / scale;
         let half = Z / scale * sqrt(p * (1.0 - p) / n + Z * Z / (4.0 * n * n));
-        // At the ends the formula gives the end itself, except for rounding.
+        // At 0 and 1 the formula gives the end itself, except for rounding.
         let low = if hits == 0 { 0.0 } else { (centre - half).max(0.0) };
         let high = if hits == trials { 1.0 } else { (centre + half).min(1.0) };
         Share { value: p, low, high }
     }
 }
 
-/// Returns the percentile of `sorted` values by nearest rank: the smallest value that at least `percent` of them do not
-/// exceed. It is always one of the values. None without values.
+/// Returns the percentile of `sorted` values by nearest rank: the smallest value that at least `percent` of the values
+/// do not exceed. The result is always one of the values; none without values.
 pub fn percentile(sorted: &[f64], percent: f64) -> Option<f64> {
-    // Ranks begin at 1, also that of 0 %.
+    // Ranks begin at 1, even for 0 %.
     let rank = (percent / 100.0 * sorted.len() as f64).ceil().max(1.0) as usize;
     sorted.get(rank - 1).copied()
 }
 
-/// Returns the 95 % interval of the mean of all values in `clusters`, each of which is drawn or not as a whole: the
-/// percentile bootstrap with this many resamples (Davison, Hinkley 1997, *Bootstrap methods and their application*,
-/// sections 3.8 and 5.3). The same values give the same interval. None for fewer than two clusters.
+/// Returns the 95 % confidence interval of the mean of all values in `clusters`, by the percentile bootstrap with this
+/// many resamples. Each cluster is drawn as a whole (Davison, Hinkley 1997, *Bootstrap methods and their application*,
+/// sections 3.8 and 5.3). The same values give the same interval. Returns none for fewer than two clusters.
 pub fn clustered(clusters: &[Vec<f64>], resamples: usize) -> Option<[f64; 2]> {
     if clusters.len() < 2 {
         return None;
@@ -78,7 +78,7 @@ mod tests {
         assert!((a - b).abs() < 5e-5, "{a} != {b}");
     }
 
-    /// Compared with Newcombe 1998, Statistics in Medicine 17, table I, method 3.
+    /// Compares with Newcombe 1998, Statistics in Medicine 17, table I, method 3.
     #[test]
     fn wilson_interval_is_the_published_one() {
         for (hits, trials, low, high) in
@@ -115,8 +115,8 @@ mod tests {
         assert_eq!(percentile(&[0.1, 0.2, f64::INFINITY], 99.0).unwrap(), f64::INFINITY);
     }
 
-    /// Of 0 and 1, a quarter of the resamples are 0, a quarter are 1. Of many values, the interval is that of the
-    /// normal distribution. Clusters count by their size.
+    /// With the values 0 and 1, a quarter of the resamples have mean 0 and a quarter mean 1. With many values, the
+    /// interval is that of the normal distribution. Clusters count by their size.
     #[test]
     fn the_bootstrap_interval_is_the_known_one() {
         assert_eq!(clustered(&[vec![0.0], vec![1.0]], 1000), Some([0.0, 1.0]));
@@ -130,11 +130,12 @@ mod tests {
         let [low, high] = clustered(&single, 4000).unwrap();
         assert!((low - (mean - half)).abs() < 0.1 * half && (high - (mean + half)).abs() < 0.1 * half);
         assert_eq!(clustered(&single, 4000), Some([low, high]));
-        // Ten equal copies of 40 values know no more than the 40: the interval is the wider by the root of 10.
+        // Ten equal copies of 40 values carry no more information than the 40 values, so the interval is wider by a
+        // factor of sqrt(10).
         let copies: Vec<Vec<f64>> = values.iter().take(40).map(|value| vec![*value; 10]).collect();
         let [low, high] = clustered(&copies, 4000).unwrap();
         assert!((high - low) / (2.0 * half) > 2.2, "{low} to {high}");
-        // Two seeds of 9 and 1 flights: the mean of both is 0.9.
+        // Two clusters of 9 and 1 values, whose overall mean is 0.9.
         let [low, high] = clustered(&[vec![1.0; 9], vec![0.0]], 20).unwrap();
         assert_eq!((low, high), (0.0, 1.0));
     }

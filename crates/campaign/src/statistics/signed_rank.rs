@@ -2,29 +2,30 @@
 
 use libm::{erfc, sqrt};
 
-/// Most differences of which every assignment of signs is counted; beyond, ranks are as good as normal.
+/// Largest number of differences for which all assignments of signs are counted. With more, rank sums are nearly
+/// normal.
 const EXACT: usize = 100;
 
-/// Wilcoxon's signed rank test of paired differences: whether they are symmetric about zero.
+/// Wilcoxon's signed rank test, which asks whether paired differences are symmetric about zero.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SignedRank {
-    /// Probability of ranks at least as one-sided if the differences had their signs by chance: two-sided.
+    /// Two-sided probability of a rank sum at least this extreme if the signs were random.
     pub p: f64,
-    /// Matched-pairs rank-biserial correlation (Kerby 2014, *The simple difference formula*): the share of the ranks
-    /// with positive differences less that of those with negative ones. 1 if every difference is positive.
+    /// Matched-pairs rank-biserial correlation (Kerby 2014, *The simple difference formula*): the share of ranks with
+    /// positive differences minus the share with negative ones. 1 if every difference is positive.
     pub effect: f64,
 }
 
 impl SignedRank {
-    /// Tests `differences`, which may be infinite; NaN and zero, of pairs that are level, do not count. Equal sizes
-    /// share the mean of their ranks. Exact, over every assignment of signs, up to a hundred differences, then by the
-    /// normal distribution with the variance of ties (Pratt, Gibbons 1981, *Concepts of nonparametric theory*,
-    /// chapter 3).
+    /// Tests `differences`, which may be infinite. NaN and zero, which stand for level pairs, do not count. Differences
+    /// of equal size share the mean of their ranks. Up to a hundred differences, the probability counts every
+    /// assignment of signs; beyond, it is that of the normal distribution with the variance of ties (Pratt, Gibbons
+    /// 1981, *Concepts of nonparametric theory*, chapter 3).
     pub fn of(differences: &[f64]) -> Self {
         let mut sizes: Vec<(f64, bool)> =
             differences.iter().filter(|d| d.abs() > 0.0).map(|d| (d.abs(), *d > 0.0)).collect();
         sizes.sort_by(|a, b| a.0.total_cmp(&b.0));
-        // Twice the ranks, which are whole numbers.
+        // Ranks are doubled, which makes them whole numbers.
         let (mut ranks, mut ties) = (Vec::with_capacity(sizes.len()), 0.0);
         for level in sizes.chunk_by(|a, b| a.0 == b.0) {
             let (before, count) = (ranks.len(), level.len());
@@ -43,7 +44,7 @@ impl SignedRank {
     }
 }
 
-/// Returns the probability that the `ranks` whose signs, by chance, are positive have at most this `sum`.
+/// Returns the probability that the sum of the positive `ranks` is at most `sum`, if their signs are random.
 fn at_most(ranks: &[usize], sum: usize) -> f64 {
     let mut chance = vec![0.0; sum + 1];
     if let Some(none) = chance.first_mut() {
@@ -52,13 +53,13 @@ fn at_most(ranks: &[usize], sum: usize) -> f64 {
     for rank in ranks {
         let without = chance.clone();
         let with = core::iter::repeat_n(0.0, *rank).chain(without.iter().copied());
-        // By chance each difference is positive with probability 1/2, whatever the others are.
+        // Each difference is positive with probability 1/2, independently of the others.
         chance.iter_mut().zip(without.iter().zip(with)).for_each(|(to, (without, with))| *to = 0.5 * (without + with));
     }
     chance.iter().sum()
 }
 
-/// Returns the two-sided probability by the normal distribution; `sum` is of twice the ranks.
+/// Returns the two-sided probability by the normal distribution. `sum` adds doubled ranks.
 fn normal(count: usize, sum: usize, ties: f64) -> f64 {
     let n = count as f64;
     let variance = n * (n + 1.0) * (2.0 * n + 1.0) / 24.0 - ties / 48.0;
@@ -66,8 +67,8 @@ fn normal(count: usize, sum: usize, ties: f64) -> f64 {
     erfc(from_mean / sqrt(2.0 * variance))
 }
 
-/// Returns the probabilities adjusted for being as many, by Holm's step-down procedure (Holm 1979, *A simple
-/// sequentially rejective multiple test procedure*): all that are then at most a level may be called significant at it.
+/// Returns the probabilities adjusted for their number by Holm's step-down procedure (Holm 1979, *A simple sequentially
+/// rejective multiple test procedure*). All that are then at most 0.05 are significant at the level 0.05.
 pub fn holm(probabilities: &[f64]) -> Vec<f64> {
     let mut sorted: Vec<(usize, f64)> = probabilities.iter().copied().enumerate().collect();
     sorted.sort_by(|a, b| a.1.total_cmp(&b.1));
@@ -95,8 +96,8 @@ mod tests {
         (0..count).map(|_| noise.normal() + shift).collect()
     }
 
-    /// The definition, by brute force: rank sums under all 2^n assignments of signs to the sizes' mean ranks, each
-    /// found by counting.
+    /// Computes p and the effect by definition: rank sums under all 2^n assignments of signs, with mean ranks found by
+    /// counting.
     fn enumerated(differences: &[f64]) -> [f64; 2] {
         let kept: Vec<f64> = differences.iter().copied().filter(|d| *d != 0.0).collect();
         let rank = |of: &f64| {
@@ -120,7 +121,7 @@ mod tests {
         for seed in 0..40 {
             let mut differences = drawn(seed, 1 + seed as usize % 14, 0.5);
             if seed % 3 == 0 {
-                // Ties, zeros, and vehicles lost by one of both.
+                // Adds ties, zeros and vehicles lost by one of the two contenders.
                 differences.iter_mut().for_each(|d| *d = (2.0 * *d).round());
                 differences.extend([lost, -lost]);
             }
@@ -135,11 +136,11 @@ mod tests {
         }
     }
 
-    /// The example of Wilcoxon 1945 in scipy's documentation, and others, by scipy 1.17.1:
-    /// `wilcoxon([6, 8, 14, 16, 23, 24, 28, 29, 41, -48, 49, 56, 60, -67, 75]).pvalue`,
-    /// `wilcoxon(range(1, 11)).pvalue`, `wilcoxon([-1, 2, 3, 4, 5, 6, 7, 8, 9, 10]).pvalue`; and of
-    /// `x = [sin(i * i) + 0.2 for i in range(1, 151)]`, `wilcoxon(x, method="approx").pvalue` and, with ties and zeros,
-    /// `wilcoxon([round(2 * v) for v in x], method="approx").pvalue`.
+    /// Compares with scipy 1.17.1. The first is the example of Wilcoxon 1945 in scipy's documentation, `wilcoxon([6, 8,
+    /// 14, 16, 23, 24, 28, 29, 41, -48, 49, 56, 60, -67, 75]).pvalue`. Then `wilcoxon(range(1, 11)).pvalue` and
+    /// `wilcoxon([-1, 2, 3, 4, 5, 6, 7, 8, 9, 10]).pvalue`. With `x = [sin(i * i) + 0.2 for i in range(1, 151)]`,
+    /// `wilcoxon(x, method="approx").pvalue` and, with ties and zeros, `wilcoxon([round(2 * v) for v in x],
+    /// method="approx").pvalue`.
     #[test]
     fn it_agrees_with_scipy() {
         let maize = [6., 8., 14., 16., 23., 24., 28., 29., 41., -48., 49., 56., 60., -67., 75.];
@@ -155,8 +156,8 @@ mod tests {
         close(SignedRank::of(&ties).p, 0.000_432_203_092_284_870_86, 1e-9);
     }
 
-    /// Where counting ends the normal distribution goes on, and neither depends on the order or, but for the sign of
-    /// the effect, on the direction.
+    /// At the largest exact count, the normal distribution agrees with counting. The result does not depend on the
+    /// order, and reversing all signs only reverses the sign of the effect.
     #[test]
     fn many_differences_are_judged_as_few_are() {
         let differences = drawn(7, EXACT, 0.2);
@@ -172,19 +173,19 @@ mod tests {
         }
     }
 
-    /// Of differences without a direction, no more than the level are called significant at it.
+    /// With random differences, the share of significant results does not exceed the level.
     #[test]
     fn chance_is_seldom_significant() {
         for count in [8, 12, 150] {
             let significant = (0..2000).filter(|seed| SignedRank::of(&drawn(100 + seed, count, 0.0)).p <= 0.05).count();
-            // 5 % of 2000 flips, and three standard deviations.
+            // 5 % of 2000 tests, plus three standard deviations.
             assert!(significant <= 130, "{count}: {significant}");
             let found = (0..200).filter(|seed| SignedRank::of(&drawn(100 + seed, count, 1.5)).p <= 0.05).count();
             assert!(found >= 180, "{count}: {found}");
         }
     }
 
-    /// Holm's own example, and `statsmodels.stats.multitest.multipletests(p, method="holm")[1]` of it.
+    /// Holm's own example, adjusted by `statsmodels.stats.multitest.multipletests(p, method="holm")[1]`.
     #[test]
     fn corrections_are_those_of_holm() {
         let adjusted = holm(&[0.01, 0.04, 0.03, 0.005]);
@@ -193,7 +194,8 @@ mod tests {
         }
         assert_eq!(holm(&[]), Vec::<f64>::new());
         assert_eq!(holm(&[0.7, 0.9]), [1.0, 1.0]);
-        // By definition: the largest, over all that are not larger, of p times the number of those not smaller.
+        // The definition: the largest product, over all q not larger than p, of q and the number of probabilities not
+        // smaller than q.
         let mut noise = Noise::new(5, Stream::Scenario);
         let all: Vec<f64> = (0..20).map(|_| noise.uniform() * noise.uniform()).collect();
         for (p, adjusted) in all.iter().zip(holm(&all)) {
