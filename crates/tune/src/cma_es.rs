@@ -1,11 +1,11 @@
-//! Separable CMA-ES: an evolution strategy that adapts its step along each coordinate.
+//! Separable CMA-ES: an evolution strategy that adapts its step size along each coordinate.
 //!
-//! R. Ros, N. Hansen, *A simple modification in CMA-ES achieving linear time and space complexity*, PPSN X, 2008, with
-//! the constants of N. Hansen, *The CMA evolution strategy: a tutorial*, 2016. A thousand evaluations are too few to
-//! learn a full covariance matrix of some twenty gains, and gains differ mainly in scale.
+//! The algorithm is from R. Ros, N. Hansen, *A simple modification in CMA-ES achieving linear time and space
+//! complexity*, PPSN X, 2008, the constants from N. Hansen, *The CMA evolution strategy: a tutorial*, 2016. A thousand
+//! evaluations are too few to learn a full covariance matrix of some twenty gains, and gains differ mainly in scale.
 //!
-//! Implemented here because libraries use the platform's logarithms and exponentials, and a difference in the last bit
-//! soon changes the whole search. Here the same seed gives the same search on every machine.
+//! Libraries use the platform's logarithms and exponentials, and a difference in the last bit soon changes the whole
+//! search. With this implementation the same seed gives the same search on every machine.
 
 use afbc_plant::noise::{Noise, Stream};
 use libm::{exp, log, sqrt};
@@ -14,7 +14,7 @@ use libm::{exp, log, sqrt};
 #[derive(Clone, Debug)]
 pub(super) struct Search {
     coordinates: Vec<Coordinate>,
-    /// sigma: step size.
+    /// Step size sigma.
     step: f64,
     generation: u32,
     noise: Noise,
@@ -24,11 +24,11 @@ pub(super) struct Search {
 #[derive(Clone, Copy, Debug)]
 struct Coordinate {
     mean: f64,
-    /// Diagonal element of C.
+    /// Diagonal element of the covariance matrix C.
     variance: f64,
-    /// Element of p_sigma: the recent movement of the mean, in steps.
+    /// Element of p_sigma, the recent movement of the mean, measured in steps.
     step_path: f64,
-    /// Element of p_c: the recent movement of the mean, not scaled by the variance.
+    /// Element of p_c, the recent movement of the mean, not scaled by the variance.
     path: f64,
 }
 
@@ -64,7 +64,7 @@ impl Search {
         let weights = weights(ranked.len());
         let effective = 1.0 / weights.iter().map(|weight| weight * weight).sum::<f64>();
 
-        // Learning rates; a diagonal C allows larger ones.
+        // Learning rates. A diagonal C allows larger ones.
         let c_step = (effective + 2.0) / (n + effective + 5.0);
         let damping = 1.0 + c_step + 2.0 * (sqrt((effective - 1.0) / (n + 1.0)) - 1.0).max(0.0);
         let c_path = (4.0 + effective / n) / (n + 4.0 + 2.0 * effective / n);
@@ -83,13 +83,13 @@ impl Search {
             c.step_path = (1.0 - c_step) * c.step_path + push;
             length += c.step_path * c.step_path;
         }
-        // Relative to the expected length of a vector of n normal numbers.
+        // Divided by the expected length of a vector of n normal numbers.
         let length = sqrt(length) / (sqrt(n) * (1.0 - 1.0 / (4.0 * n) + 1.0 / (21.0 * n * n)));
         self.generation += 1;
-        // The path begins at zero: its expected length until it has settled. The power is by libm's exponential and
-        // logarithm, since powers of the platform differ in the last bit.
+        // The path starts at zero. This is its expected length until it has settled. libm computes the power, since the
+        // platform's powers differ in the last bit.
         let begun = sqrt(1.0 - exp(2.0 * f64::from(self.generation) * log(1.0 - c_step)));
-        // While the steps are much too short, p_c is not updated.
+        // p_c is not updated while the steps are much too short.
         let follow = if length / begun < 1.4 + 2.0 / (n + 1.0) { 1.0 } else { 0.0 };
         for (i, c) in self.coordinates.iter_mut().enumerate() {
             let mean_move: f64 = weighted(i, c.mean).map(|(weight, y)| weight * y).sum();
@@ -99,7 +99,7 @@ impl Search {
             c.variance = kept * c.variance + c_one * c.path * c.path + c_mu * spread;
             c.mean += step * mean_move;
         }
-        // At most e-fold in one generation, however far it has moved.
+        // The step size grows by a factor of e at most per generation.
         self.step *= exp((c_step / damping * (length - 1.0)).min(1.0));
     }
 }
@@ -115,7 +115,7 @@ fn weights(points: usize) -> Vec<f64> {
 mod tests {
     use super::*;
 
-    /// Returns `f` at the mean of a search from all ones after `evaluations`.
+    /// Returns `f` at the mean of a search that starts at all ones and takes `evaluations`.
     fn minimum(f: impl Fn(&[f64]) -> f64, n: usize, evaluations: usize) -> f64 {
         let mut search = Search::new(&vec![1.0; n], 0.5, 1);
         for _ in 0..evaluations / search.population() {
@@ -136,7 +136,7 @@ mod tests {
         assert!(minimum(sphere, 1, 400) < 1e-9);
     }
 
-    /// Finds a minimum with scales of the coordinates a factor of 1000 apart.
+    /// The scales of the coordinates differ by a factor of up to 1000.
     #[test]
     fn learns_the_scale_of_each_coordinate() {
         let weight = |i: usize| libm::pow(1e6, i as f64 / 9.0);

@@ -1,5 +1,5 @@
-//! Flights that gains have to survive, whatever they cost: what the training flights, all on the vehicle that the law
-//! knows of, do not show.
+//! Flights that gains must survive whatever their cost. They show weaknesses that the training flights do not, since
+//! those fly the vehicle that the law knows.
 
 use crate::fast;
 use crate::maker::{self, Maker, TrainingFlight};
@@ -17,43 +17,44 @@ use nalgebra::{Vector3, Vector4};
 use rayon::prelude::*;
 use std::error::Error;
 
-/// Flights of the campaign `robustness` that some gains of a low cost lose or hand over to the fallback law.
+/// Flights of the campaign `robustness` in which some gains of a low cost lose the vehicle or trip the monitor.
 const HARD: [u64; 9] = [156, 176, 211, 275, 696, 800, 901, 8555, 9540];
-/// What of such a flight is flown \[s\].
+/// Length of these flights \[s\].
 const HARD_S: f64 = 10.0;
-/// Largest factor of a condition, that of a flight which is lost or in which the monitor trips.
+/// Largest factor of a condition, for a flight that is lost or in which the monitor trips.
 pub(crate) const FAILED: f64 = 2.0;
-/// Largest root mean square error of x, y, z \[m\] and yaw \[rad\] of a vehicle that is in control of itself.
+/// Largest root mean square error of x, y, z \[m\] and yaw \[rad\] at which a vehicle counts as under control.
 const IN_CONTROL: [f64; 4] = [1.3, 1.3, 1.3, 1.3];
 
-/// Any change of the inputs.
+/// No limit on the change of the inputs.
 const ANY: Vector4<f64> = Vector4::new(f64::INFINITY, f64::INFINITY, f64::INFINITY, f64::INFINITY);
 
-/// Random flights on another vehicle than the paper's, and the seed of the first.
+/// Number of random flights on vehicles other than the paper's. `SEED` is the seed of the first.
 const DRAWN: u64 = 6;
 const SEED: u64 = 2700;
 
-/// A flight that gains have to survive.
+/// A flight that gains must survive.
 #[derive(Clone, Debug)]
 pub struct Condition {
-    /// The flight.
+    /// Scenario to fly.
     pub scenario: Scenario,
     /// Largest root mean square error of x, y, z \[m\] and yaw \[rad\] from 5 s on.
     pub rmse: Vector4<f64>,
-    /// Largest distance at the end \[m\].
+    /// Largest distance from the reference at the end \[m\].
     pub end_m: f64,
     /// Largest mean |change per step| of U1..U4 \[N\].
     pub jumps_n: Vector4<f64>,
-    /// Whether it is asked of AFBC only.
+    /// True if the condition applies to AFBC only.
     pub of_afbc: bool,
-    /// Whether the gains are those of the paper's vehicle, flown [by rule](Contender::by_rule) on another one.
+    /// True if the gains are for the paper's vehicle and must be scaled [by rule](Contender::by_rule) to the flight's
+    /// vehicle.
     pub by_rule: bool,
 }
 
-/// Returns the flights that gains of the paper's vehicle have to survive.
+/// Returns the flights that gains of the paper's vehicle must survive.
 ///
 /// # Errors
-/// None occurs: a test flies them.
+/// None in practice, since a test flies these flights.
 pub fn conditions() -> Result<Vec<Condition>, Box<dyn Error>> {
     let mut conditions = vec![
         vehicle("crazyflie", "hover", 1.0)?,
@@ -82,10 +83,10 @@ pub fn conditions() -> Result<Vec<Condition>, Box<dyn Error>> {
     Ok(conditions)
 }
 
-/// Returns the flights that gains of `vehicle` have to survive; of the paper's, those of [`conditions`].
+/// Returns the flights that gains of `vehicle` must survive. For the paper's vehicle, returns those of [`conditions`].
 ///
 /// # Errors
-/// What the vehicle cannot fly: the first number out of range.
+/// The first number out of range, if the vehicle cannot fly such a flight.
 pub fn conditions_on(vehicle: &Vehicle) -> Result<Vec<Condition>, Box<dyn Error>> {
     if maker::is_paper(vehicle) {
         return conditions();
@@ -126,13 +127,13 @@ pub fn conditions_on(vehicle: &Vehicle) -> Result<Vec<Condition>, Box<dyn Error>
     Ok(conditions)
 }
 
-/// A random flight in turbulence on a vehicle that differs from what its law assumes: as the campaign `robustness`
-/// draws them on the paper's, but never beyond what the rotors carry.
+/// Returns a random flight in turbulence on a vehicle that differs from the law's model. The flights resemble the
+/// campaign `robustness`, but never ask for more than the rotors can carry.
 fn drawn(maker: &Maker<'_>, index: u64, time: f64) -> Result<Scenario, Box<dyn Error>> {
     let mut noise = Noise::new(SEED + index, Stream::Scenario);
     let mut between = |low: f64, high: f64| low + (high - low) * noise.uniform();
     let scale = &maker.scale;
-    // One of the two may be at its worst.
+    // Only one of thrust and mass may be at its worst.
     let thrust = between(scale.thrust(0.6), 1.2);
     let mass = between(0.7, scale.mass(1.3)).min((thrust / scale.thrust(0.6)).max(0.7));
     let changes = [
@@ -164,8 +165,8 @@ fn drawn(maker: &Maker<'_>, index: u64, time: f64) -> Result<Scenario, Box<dyn E
     Ok(scenario)
 }
 
-/// A built-in scenario on another built-in vehicle, whose rotors lag `slower` times as much as its law assumes; if they
-/// do, commands and states are late as well.
+/// Returns a built-in scenario on a built-in vehicle whose rotors lag `slower` times as much as the law assumes. If
+/// `slower` exceeds 1, commands and states are also delayed.
 fn vehicle(vehicle: &str, name: &str, slower: f64) -> Result<Condition, Box<dyn Error>> {
     let vehicle = afbc_vehicles::built_in(vehicle).ok_or("no vehicle")?.read()?;
     let mut scenario = built_in(name).ok_or("no scenario")?.read()?.on(&vehicle, Profile::Flight)?;
@@ -174,12 +175,12 @@ fn vehicle(vehicle: &str, name: &str, slower: f64) -> Result<Condition, Box<dyn 
         (scenario.realism.rotors.delay_s, scenario.sensing.delay_s) = (0.004, 0.004);
     }
     scenario.name = format!("{}-{name}", vehicle.name);
-    // Wind keeps a vehicle off.
+    // Wind keeps the vehicle away from the reference.
     let end_m = if name == "wind" { 1.3 } else { 0.05 };
     Ok(Condition { scenario, rmse: IN_CONTROL.into(), end_m, jumps_n: ANY, of_afbc: false, by_rule: true })
 }
 
-/// `hardware` on 100 states per second that are 10 ms late, without a gyroscope, through the flight core.
+/// Returns `hardware` with 100 states per second that are 10 ms late, without a gyroscope, in the flight core.
 fn sampled() -> Result<Condition, Box<dyn Error>> {
     let mut scenario = built_in("hardware").ok_or("no scenario")?.read()?;
     scenario.sensing = Sensing { period_s: 0.01, delay_s: 0.01, ..Sensing::DEFAULT };
@@ -194,7 +195,8 @@ fn sampled() -> Result<Condition, Box<dyn Error>> {
     })
 }
 
-/// An eight of 3 m in light turbulence, as sensed; inputs may change by `jumps_n` a step.
+/// Returns a figure of eight, 3 m long, in light turbulence, with the sensing set by `sense`. The inputs U1 to U4 may
+/// change by `jumps_n` \[N\] per step.
 fn tracked(name: &str, jumps_n: [f64; 4], sense: impl Fn(&mut Sensing)) -> Result<Condition, Box<dyn Error>> {
     let mut scenario = built_in("hardware").ok_or("no scenario")?.read()?;
     let sine = |amplitude_m, period_s| Sine { amplitude_m, period_s, phase_rad: 0.0 };
@@ -214,7 +216,7 @@ fn tracked(name: &str, jumps_n: [f64; 4], sense: impl Fn(&mut Sensing)) -> Resul
     Ok(Condition { scenario, rmse, end_m: 0.1, jumps_n: jumps_n.into(), of_afbc: true, by_rule: false })
 }
 
-/// `mocap` with rotors that shake the inertial sensor twice as much, on the estimate.
+/// Returns `mocap`, flown on the vehicle's own estimate, with twice the usual vibration of the inertial sensor.
 fn shaken() -> Result<Condition, Box<dyn Error>> {
     let mut scenario = built_in("mocap").ok_or("no scenario")?.read()?;
     let imu = scenario.instruments.imu.as_mut().ok_or("no inertial sensor")?;
@@ -230,7 +232,7 @@ fn shaken() -> Result<Condition, Box<dyn Error>> {
     })
 }
 
-/// `hardware` within the bounds that its test sets for AFBC, less what noise makes of them.
+/// Returns `hardware` with limits slightly below those of its test, as a margin for noise.
 fn hardware() -> Result<Condition, Box<dyn Error>> {
     let scenario = built_in("hardware").ok_or("no scenario")?.read()?;
     Ok(Condition {
@@ -244,12 +246,12 @@ fn hardware() -> Result<Condition, Box<dyn Error>> {
 }
 
 impl Condition {
-    /// Returns whether it is asked of this law.
+    /// True if the condition applies to this law.
     pub fn is_asked_of(&self, kind: ControllerKind) -> bool {
         !self.of_afbc || kind == ControllerKind::Afbc
     }
 
-    /// Returns by what this flight multiplies the cost of a contender: 1 if it is survived, and at most 2.
+    /// Returns the factor on a contender's cost: 1 if it meets the condition, and at most 2.
     ///
     /// # Errors
     /// The first parameter, gain or setting out of range.
@@ -267,13 +269,13 @@ impl Condition {
         }
         let errors = run.metrics.rmse.component_div(&self.rmse).max();
         let jumps = run.metrics.mean_abs_delta_u.component_div(&self.jumps_n).max();
-        // What is better than asked for earns nothing.
+        // Results better than the limits are not rewarded.
         let excess = errors.max(run.metrics.final_error.xyz().norm() / self.end_m).max(jumps).max(1.0);
         Ok((excess * excess * excess).min(FAILED))
     }
 }
 
-/// Returns by what `conditions` multiply the cost of a contender: 1 if all of them are met.
+/// Returns the product of the conditions' factors on a contender's cost: 1 if it meets all of them.
 ///
 /// # Errors
 /// The first parameter, gain or setting out of range.

@@ -1,4 +1,4 @@
-//! Fast flights, near what a vehicle can do: lemniscates and circles.
+//! Fast flights, near the limits of a vehicle: lemniscates and circles.
 
 use crate::maker::{Maker, TrainingFlight};
 use crate::scale::Scale;
@@ -13,14 +13,14 @@ use std::error::Error;
 
 /// Names of fast flights begin with one of these.
 const NAMES: [&str; 2] = ["lemniscate", "circle"];
-/// Tilt that each law may use in them \[rad\], as in the suite `field`.
+/// Tilt limit of each law in fast flights \[rad\], as in the suite `field`.
 const TILT_MAX_RAD: f32 = 1.2;
-/// Largest acceleration of Gerono's lemniscate over half its length and the square of its rate.
+/// Largest acceleration on Gerono's lemniscate, divided by its half length and by the square of its rate.
 const LEMNISCATE: f64 = 2.125;
-/// Largest rate of a fast path, times how slow the vehicle is \[rad/s\]. The paper's lemniscate has 1.3.
+/// Largest rate of a fast path \[rad/s\], multiplied by the vehicle's time scale. The paper's lemniscate has 1.3.
 const RATE_RAD_S: f64 = 2.5;
 
-/// Returns the contender as it flies `scenario`: free to tilt, if that is a fast flight.
+/// Returns the contender for `scenario`, with a raised tilt limit if it is a fast flight.
 pub(crate) fn free<'a>(scenario: &Scenario, contender: &'a Contender) -> Cow<'a, Contender> {
     if NAMES.iter().any(|name| scenario.name.starts_with(name)) {
         Cow::Owned(contender.clone().free_to_tilt(TILT_MAX_RAD))
@@ -29,17 +29,18 @@ pub(crate) fn free<'a>(scenario: &Scenario, contender: &'a Contender) -> Cow<'a,
     }
 }
 
-/// A lemniscate at three fifths, and a circle at half of the largest horizontal acceleration.
+/// Returns a lemniscate at 60 % and a circle at 50 % of the largest horizontal acceleration.
 pub(crate) fn training(maker: &Maker<'_>) -> Result<[Scenario; 2], Box<dyn Error>> {
     Ok([lemniscate(maker, "lemniscate", 3.0, 0.6)?, circle(maker, "circle", 2.0, 0.5)?])
 }
 
-/// Another lemniscate and circle.
+/// Returns a lemniscate and a circle of other sizes and speeds.
 pub(crate) fn held_out(maker: &Maker<'_>) -> Result<[Scenario; 2], Box<dyn Error>> {
     Ok([lemniscate(maker, "lemniscate-short", 2.0, 0.5)?, circle(maker, "circle-wide", 3.0, 0.6)?])
 }
 
-/// Returns a lemniscate of this half length, on the paper's vehicle, at `share` of the largest horizontal acceleration.
+/// Returns a lemniscate at the fraction `share` of the largest horizontal acceleration. Its half length is `half_m` on
+/// the paper's vehicle.
 pub(crate) fn lemniscate(
     maker: &Maker<'_>,
     name: &'static str,
@@ -55,13 +56,13 @@ pub(crate) fn lemniscate(
         sines: [sine(half_m, rate), sine(0.5 * half_m, 2.0 * rate), sine(0.0, rate)],
         yaw_rad: 0.0,
     };
-    // A period after errors count, at least.
+    // At least one period after errors begin to count.
     let duration_s = libm::ceil((5.0 + TAU / rate).max(12.0));
     maker.scenario(TrainingFlight { trajectory, ..TrainingFlight::new(name, duration_s) })
 }
 
-/// Returns a circle of this radius, on the paper's vehicle, at `share` of the largest horizontal acceleration, from a
-/// banked start.
+/// Returns a circle at the fraction `share` of the largest horizontal acceleration, with a banked start. Its radius is
+/// `radius_m` on the paper's vehicle.
 pub(crate) fn circle(
     maker: &Maker<'_>,
     name: &'static str,
@@ -74,7 +75,7 @@ pub(crate) fn circle(
     let trajectory =
         Trajectory::Circle { centre_m: Vector3::new(0.0, 0.0, 3.0), radius_m, period_s: TAU / rate, yaw_rad: 0.0 };
     let mut scenario = maker.scenario(TrainingFlight { trajectory, ..TrainingFlight::new(name, 12.0) })?;
-    // The circle begins at +x of its centre, towards which the thrust has to lean.
+    // The circle begins at +x of its centre, and the thrust must lean towards the centre.
     scenario.initial.attitude_rad.y = -maker.scale.tilt_rad(radius_m * rate * rate);
     Ok(scenario)
 }

@@ -1,7 +1,7 @@
-//! Searches for the gains of several laws on several vehicles, kept in a folder.
+//! Searches for the gains of several laws on several vehicles, with results kept in a folder.
 //!
-//! Each finished search is a file of its own, which is on the disk before it gets its name. Starting again in the same
-//! folder does only what is missing. The manifest holds what decides the results.
+//! Each finished search becomes a file. The file is flushed to the disk before it gets its name. Starting again in the
+//! same folder runs only the missing searches. The manifest lists everything that determines the results.
 
 use crate::conditions::{Condition, conditions_on};
 use crate::cost::{costs, mean};
@@ -23,15 +23,15 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 
-/// File of the manifest, present from the beginning.
+/// Name of the manifest's file, present from the beginning.
 const MANIFEST: &str = "manifest.json";
-/// Folder of the gains of each vehicle.
+/// Name of the folder with the gains of each vehicle.
 pub const GAINS: &str = "gains";
-/// Command recorded in the folder, and what it made.
+/// Command that the folder records as its writer. `NAME` is the recorded name of the results.
 const COMMAND: &str = "tune";
 const NAME: &str = "fleet";
 
-/// One law on one vehicle.
+/// A search for the gains of one law on one vehicle.
 pub struct Search {
     vehicle: Vehicle,
     start: Contender,
@@ -40,26 +40,26 @@ pub struct Search {
     conditions: Vec<Condition>,
 }
 
-/// Name and two costs of each flight.
+/// Name of each flight, with its costs before and after the search.
 pub type Costs = Vec<(String, [f64; 2])>;
 
-/// A failure that can cross threads.
+/// An error that can cross threads.
 type Failure = Box<dyn Error + Send + Sync>;
 
-/// What decides the results in a folder.
+/// Everything that determines the results in a folder.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FleetManifest {
     /// Version of the program.
     pub program: String,
-    /// Tries of each search.
+    /// Number of contenders that each search tries.
     pub budget: usize,
     /// Initial step size.
     pub step: f64,
     /// Seed of each search.
     pub seed: u64,
-    /// Where the searches start: `by hand` or `flying`.
+    /// Starting gains of the searches: `by hand` or `flying`.
     pub start: String,
-    /// The searches.
+    /// The folder's searches.
     pub searches: Vec<Planned>,
 }
 
@@ -77,22 +77,22 @@ pub struct Planned {
 /// Result of one search.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FleetOutcome {
-    /// What was searched.
+    /// Description of the search.
     #[serde(flatten)]
     pub planned: Planned,
     /// Number of contenders tried.
     pub tries: usize,
-    /// Cost over the training flights, times the factors of the conditions, of start and result.
+    /// Costs of the starting and the found gains over the training flights, times the factors of the conditions.
     pub cost: [f64; 2],
-    /// Mean cost over the held-out flights of both.
+    /// Mean costs of the starting and the found gains over the held-out flights.
     pub held_out: [f64; 2],
-    /// Cost of each training flight of both.
+    /// Costs of the starting and the found gains in each training flight.
     pub training_flights: Costs,
-    /// Cost of each held-out flight of both.
+    /// Costs of the starting and the found gains in each held-out flight.
     pub held_out_flights: Costs,
-    /// Conditions that the result does not meet.
+    /// Names of the conditions that the found gains do not meet.
     pub unmet: Vec<String>,
-    /// The gains, as tables of a vehicle's file.
+    /// Gains found, as tables of a vehicle file.
     pub gains: String,
 }
 
@@ -105,11 +105,11 @@ struct Page<T> {
 }
 
 impl Search {
-    /// Prepares the search for the gains of this law on `vehicle`, from hand-tuned gains by rule or, if `flying`, from
-    /// those that fly.
+    /// Prepares a search for the gains of a law on `vehicle`. It starts at hand-tuned gains scaled by rule or, if
+    /// `flying`, at the vehicle's present gains.
     ///
     /// # Errors
-    /// What the vehicle cannot fly.
+    /// The first number out of range, if the vehicle cannot fly one of the flights.
     pub fn new(kind: ControllerKind, vehicle: &Vehicle, flying: bool) -> Result<Self, Box<dyn Error>> {
         let start = if flying {
             Contender::of(kind, Profile::Flight).on(vehicle, Profile::Flight)?.monitored()
@@ -129,7 +129,7 @@ impl Search {
         })
     }
 
-    /// Returns its entry in a manifest.
+    /// Returns the search's entry in a manifest.
     pub fn planned(&self) -> Planned {
         let conditions: Vec<_> = self
             .conditions
@@ -145,8 +145,8 @@ impl Search {
         }
     }
 
-    /// Searches. `tried` is called with the number of new tries, and ends the search by returning false: then there is
-    /// no result.
+    /// Searches for gains. Calls `tried` with the number of new tries. If `tried` returns false, the search ends
+    /// without a result.
     fn run(
         &self,
         course: SearchOptions,
@@ -190,7 +190,7 @@ impl Search {
     }
 }
 
-/// Returns `scenario` without what does not decide how a given contender flies it: other contenders, and the gains in
+/// Returns `scenario` without parts that do not affect a given contender's flight: other contenders, and the gains in
 /// the file of `vehicle`.
 fn without_gains(mut scenario: Scenario, vehicle: &Vehicle) -> Scenario {
     scenario.contenders.clear();
@@ -209,10 +209,10 @@ pub struct Results {
 }
 
 impl Results {
-    /// Opens the folder at `path`, created if needed, for the results of `searches`.
+    /// Opens the folder at `path` for the results of `searches`, and creates it if needed.
     ///
     /// # Errors
-    /// One line, if it cannot be written or holds anything else; nothing has been changed then.
+    /// One line if the folder cannot be written or holds anything else. Nothing has been changed then.
     pub fn open(path: &Path, searches: &[Search], course: SearchOptions, flying: bool) -> Result<Self, Box<dyn Error>> {
         let manifest = FleetManifest {
             program: env!("CARGO_PKG_VERSION").into(),
@@ -248,7 +248,7 @@ impl Results {
     /// Returns the result of a search, if it is finished.
     ///
     /// # Errors
-    /// One line, if its file cannot be read, is damaged or not of this search.
+    /// One line if the search's file cannot be read, is damaged or belongs to another search.
     pub fn outcome(&self, search: &Search) -> Result<Option<FleetOutcome>, Box<dyn Error>> {
         let planned = search.planned();
         let path = self.place.path().join(file_name(&planned));
@@ -260,11 +260,11 @@ impl Results {
         }
     }
 
-    /// Searches what is missing, and returns all results in order; none if `stop` ended it. `tried` is called with the
+    /// Runs the missing searches and returns all results in order; none if `stop` ended them. Calls `tried` with the
     /// number of new tries, from several threads.
     ///
     /// # Errors
-    /// The first that occurs; finished searches are kept.
+    /// The first error. Finished searches are kept.
     pub fn complete(
         &self,
         searches: &[Search],
@@ -285,25 +285,25 @@ impl Results {
                 }
                 let done = self.search(search, stop, &tried);
                 if let Err(error) = done {
-                    // The others need not go on for hours: the same command does what is missing.
+                    // The other searches stop too, since the same command later runs what is missing.
                     stop.store(true, Ordering::Relaxed);
                     failure.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
                 }
             }
         };
-        // One search leaves cores idle at the end of each generation, where others fill in.
+        // A single search leaves cores idle at the end of each generation. Other searches use them.
         let drivers = 1 + rayon::current_num_threads().div_ceil(8);
-        // The scope joins them, so handles are of no use.
+        // The scope joins the threads, so their handles are not needed.
         std::thread::scope(|scope| (0..drivers).for_each(|_| drop(scope.spawn(drive))));
         if let Some(error) = failure.into_inner().unwrap_or_else(PoisonError::into_inner) {
             return Err(error);
         }
-        // From the files, so that a search of this run and one of an earlier run are reported alike.
+        // Results are read from the files, so that those of this run and of earlier runs are reported alike.
         let outcomes: Vec<_> = searches.iter().map(|search| self.outcome(search)).collect::<Result<_, _>>()?;
         Ok(outcomes.into_iter().collect())
     }
 
-    /// Does one search and writes its file.
+    /// Runs one search and writes its file.
     fn search(&self, search: &Search, stop: &AtomicBool, tried: &(impl Fn(usize) + Sync)) -> Result<(), Failure> {
         let goes_on = |tries| {
             tried(tries);
@@ -314,10 +314,10 @@ impl Results {
         Ok(place_sealed(&self.place, &file_name(&outcome.planned), |out| put(out, &outcome))?)
     }
 
-    /// Writes the gains of each vehicle among `outcomes`, ready to go into its file; returns the files.
+    /// Writes the gains of each vehicle among `outcomes` as tables for its vehicle file. Returns the paths.
     ///
     /// # Errors
-    /// If one cannot be written.
+    /// If a file cannot be written, or was changed after it was written.
     pub fn write_gains(&self, outcomes: &[FleetOutcome]) -> Result<Vec<PathBuf>, Box<dyn Error>> {
         let folder = self.place.path().join(GAINS);
         fs::create_dir_all(&folder).map_err(|source| files::Error::Write { path: folder.clone(), source })?;
@@ -327,7 +327,7 @@ impl Results {
             let text = self.gains_of(&vehicle, outcomes);
             match fs::read(&path) {
                 Ok(held) if held == text.as_bytes() => {}
-                // The same searches write the same bytes.
+                // The same searches would write the same bytes, so somebody changed the file.
                 Ok(_) => {
                     let cure = "move it, and start again";
                     return Err(format!("{}: changed since it was written; {cure}", path.display()).into());
@@ -340,7 +340,7 @@ impl Results {
         Ok(paths)
     }
 
-    /// Names of the vehicles, in order.
+    /// Returns the names of the vehicles, in order.
     pub fn vehicles(&self) -> Vec<String> {
         let mut names: Vec<String> = Vec::new();
         for planned in &self.manifest.searches {
@@ -351,8 +351,8 @@ impl Results {
         names
     }
 
-    /// Returns the gains of the laws on `vehicle`, as tables of its file. Those of backstepping are left out: it flies
-    /// with AFBC's cascade.
+    /// Returns the gains of the laws on `vehicle`, as tables of its file. Backstepping's gains are left out, since it
+    /// flies with AFBC's cascade.
     pub fn gains_of(&self, vehicle: &str, outcomes: &[FleetOutcome]) -> String {
         let FleetManifest { budget, step, seed, start, program, .. } = &self.manifest;
         let head =
@@ -365,7 +365,7 @@ impl Results {
 }
 
 impl FleetManifest {
-    /// Says what differs.
+    /// Returns the first difference, in words.
     fn differs(&self, wanted: &FleetManifest) -> String {
         let pairs = [
             ("program", self.program.clone(), wanted.program.clone()),
@@ -387,7 +387,7 @@ fn file_name(planned: &Planned) -> String {
     format!("{}.{}.json", planned.vehicle, planned.law)
 }
 
-/// Writes a file with a checksum of its own, which says more of damage than the folder's can.
+/// Writes a file with its own checksum. Such a checksum locates damage better than the folder's.
 fn place_sealed(
     place: &Folder,
     name: &str,
@@ -400,7 +400,7 @@ fn put(out: &mut dyn Write, page: &impl Serialize) -> io::Result<()> {
     seal::json(out, &Page { page, checksum: seal::OPEN.into() })
 }
 
-/// Reads a file with a checksum, if there is one.
+/// Reads a file and verifies its checksum. Returns none if there is no file.
 fn read<T: for<'a> Deserialize<'a>>(path: &Path) -> Result<Option<T>, Box<dyn Error>> {
     let bytes = match fs::read(path) {
         Err(error) if matches!(error.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory) => {

@@ -1,13 +1,13 @@
-//! Flights in which gains are evaluated, made from a vehicle's own data.
+//! Flights that evaluate gains, made from a vehicle's own data.
 //!
 //! Every flight is based on the built-in scenario `hardware`: rotors with a lag of 20 ms, a delay of 1 ms and at most 3
-//! N each, and a noisy state. The first is that scenario itself; each of the others adds one disturbance. Three are
-//! flown on an estimate, with the sensors of the built-in scenarios `mocap` and `outdoor`; three are fast, and one
+//! N each, and a noisy state. The first flight is `hardware` itself; each of the others adds one disturbance. Three
+//! flights use an estimate from the sensors of the built-in scenarios `mocap` and `outdoor`. Three are fast, and one
 //! turns corners.
 //!
-//! On another vehicle rotors, battery, drag and ground are its own, and what happens is scaled by [`Scale`]: times by
-//! how slow it is, lengths and accelerations by what its rotors leave, wind by its drag, losses of thrust and loads so
-//! that the same share of its reserve is left.
+//! On another vehicle, rotors, battery, drag and ground are the vehicle's own. [`Scale`] scales the flights: times by
+//! the rotors' lag, lengths and accelerations by the spare thrust, and wind by the drag. Losses of thrust and payloads
+//! leave the same share of the reserve.
 
 use crate::fast;
 use crate::maker::{Maker, ONSET_S, TrainingFlight, read};
@@ -24,39 +24,39 @@ use afbc_vehicles::Vehicle;
 use nalgebra::Vector3;
 use std::error::Error;
 
-/// Half of this before errors count a reference steps, so that mainly the settling counts, on the paper's vehicle
-/// \[s\].
+/// A step of the reference comes this long before errors count, so that mainly the settling counts, on the paper's
+/// vehicle \[s\].
 const SETTLING_S: f64 = 0.5;
 
 /// Returns the flights used in the search for gains, on the paper's vehicle.
 ///
 /// # Errors
-/// None occurs: a test flies them.
+/// None in practice, since a test flies these flights.
 pub fn training() -> Result<Vec<Scenario>, Box<dyn Error>> {
     Maker::new(None).training()
 }
 
-/// Returns the flights used in the search for gains of `vehicle`. For the paper's vehicle, whatever gains its file has,
-/// they are those of [`training`].
+/// Returns the flights used in the search for gains of `vehicle`. For the paper's vehicle, with any gains in its file,
+/// these are the flights of [`training`].
 ///
 /// # Errors
-/// What the vehicle cannot fly: the first number out of range.
+/// The first number out of range, if the vehicle cannot fly such a flight.
 pub fn training_on(vehicle: &Vehicle) -> Result<Vec<Scenario>, Box<dyn Error>> {
     Maker::new(Some(vehicle)).training()
 }
 
-/// Returns the held-out flights of the paper's vehicle, which are not used in the search, to detect overfitting.
+/// Returns the held-out flights on the paper's vehicle. The search does not use them, so they show overfitting.
 ///
 /// # Errors
-/// None occurs: a test flies them.
+/// None in practice, since a test flies these flights.
 pub fn held_out() -> Result<Vec<Scenario>, Box<dyn Error>> {
     Maker::new(None).held_out()
 }
 
-/// Returns the held-out flights of `vehicle`, as [`training_on`].
+/// Returns the held-out flights on `vehicle`. For the paper's vehicle, these are the flights of [`held_out`].
 ///
 /// # Errors
-/// As [`training_on`].
+/// Those of [`training_on`].
 pub fn held_out_on(vehicle: &Vehicle) -> Result<Vec<Scenario>, Box<dyn Error>> {
     Maker::new(Some(vehicle)).held_out()
 }
@@ -82,7 +82,7 @@ impl Maker<'_> {
             self.scenario(TrainingFlight { change: weak, ..TrainingFlight::new("weak", 8.0) })?,
             self.windy(eight("heavy", heavy))?,
             late,
-            // An outage at the onset of each gust and parameter change, and during a step.
+            // An outage at the onset of each gust and parameter change.
             Scenario {
                 name: "outages".into(),
                 duration_s: 45.0,
@@ -175,12 +175,13 @@ impl Maker<'_> {
         Ok(flights)
     }
 
-    /// Time of the reference's step \[s\].
+    /// Returns the time of the reference's step \[s\].
     fn step_s(&self) -> f64 {
         5.0 - SETTLING_S * self.scale.time
     }
 
-    /// Returns a flight with pushes of at most a tenth of a second, of about `strength` times 2 m/s or 2 rad/s.
+    /// Returns a flight with short pushes of at most 0.1 s. Each changes the velocity by about `strength` times 2 m/s,
+    /// or the rates by about `strength` times 2 rad/s.
     fn upset(&self, name: &'static str, strength: f64) -> Result<Scenario, Box<dyn Error>> {
         let Scale { length, time, .. } = self.scale;
         let (speed, rate) = (length / time, 1.0 / time);
@@ -201,7 +202,7 @@ impl Maker<'_> {
         Ok(Scenario { environment, ..scenario })
     }
 
-    /// Returns a course with corners in wind, from each to the next in one second.
+    /// Returns a course with corners in wind. Each leg takes one second and is followed by a stop of two.
     fn course(&self, name: &'static str, leg_m: f64) -> Result<Scenario, Box<dyn Error>> {
         let Scale { length, time, wind, .. } = self.scale;
         let leg_m = leg_m * length;
@@ -222,7 +223,7 @@ impl Maker<'_> {
         Ok(scenario)
     }
 
-    /// Returns a tour of five corners in still air, from each straight to the next in two seconds.
+    /// Returns a tour of five corners in still air. Each leg takes two seconds, without a stop.
     fn legs(&self, name: &'static str, leg_m: f64) -> Result<Scenario, Box<dyn Error>> {
         let Scale { length, time, .. } = self.scale;
         let corners = [(0.0, 0.0, 0.0), (1.0, 0.2, 0.2), (0.3, -0.8, 0.0), (-0.5, 0.3, -0.2), (0.4, 0.6, 0.1)];
@@ -237,7 +238,7 @@ impl Maker<'_> {
     }
 
     /// Returns a flight in light wind that lands within `length_s`, stays on the ground for 3 s with the reference
-    /// slightly below it, and takes off again.
+    /// slightly below the ground, and takes off again.
     fn landing(&self, name: &'static str, length_s: f64) -> Result<Scenario, Box<dyn Error>> {
         let time = self.scale.time;
         let contact = self.vehicle.and_then(|vehicle| vehicle.realism.contact).unwrap_or(Contact::PAPER);
@@ -260,7 +261,8 @@ impl Maker<'_> {
         Ok(scenario)
     }
 
-    /// Returns `flight` in moderate turbulence with a rotor that gives only this share of its thrust from the onset on.
+    /// Returns `flight` in moderate turbulence with a rotor that loses thrust at the onset. On the paper's vehicle, the
+    /// fraction `efficiency` remains.
     fn rotor(&self, name: &'static str, flight: TrainingFlight, efficiency: f64) -> Result<Scenario, Box<dyn Error>> {
         let mut scenario = self.windy(TrainingFlight { name, ..flight })?;
         let efficiency = self.scale.thrust(efficiency);
@@ -268,12 +270,12 @@ impl Maker<'_> {
         Ok(scenario)
     }
 
-    /// Returns `flight` in moderate turbulence with a fifth of the mass as a payload, this far ahead, from the onset
-    /// on.
+    /// Returns `flight` in moderate turbulence with a payload of a fifth of the mass from the onset on, `ahead_m` ahead
+    /// of the centre of mass on the paper's vehicle.
     fn payload(&self, name: &'static str, flight: TrainingFlight, ahead_m: f64) -> Result<Scenario, Box<dyn Error>> {
         let scenario = self.windy(TrainingFlight { name, ..flight })?;
         let Scale { arm, .. } = self.scale;
-        // Scaled as a mass of +20 % is, so that the load takes the same share of the reserve.
+        // Scaled like 20 % more mass, so that the payload takes the same share of the reserve.
         let share = 0.2 * ((self.scale.mass(1.2) - 1.0) / (1.2 - 1.0));
         let payload = Payload {
             mass_kg: share * scenario.vehicle.mass_kg,
@@ -312,7 +314,7 @@ impl Maker<'_> {
         Ok(scenario)
     }
 
-    /// Returns `flight` in moderate turbulence on an estimate, with the [`instruments`] of the scenario `name`.
+    /// Returns `flight` in moderate turbulence, flown on an estimate from the [`instruments`] of the scenario `name`.
     fn sensed(
         &self,
         name: &'static str,
@@ -328,7 +330,7 @@ impl Maker<'_> {
         Trajectory::Step { from_m, to_m: from_m + by_m, at_s: self.step_s(), yaw_rad: 0.5, turn_rad }
     }
 
-    /// Returns a horizontal figure of eight with the given period.
+    /// Returns a nearly horizontal figure of eight. Its period is `period_s` on the paper's vehicle.
     fn eight(&self, period_s: f64) -> Trajectory {
         let Scale { length, time, .. } = self.scale;
         let period_s = period_s * time;
@@ -338,8 +340,8 @@ impl Maker<'_> {
     }
 }
 
-/// Returns the instruments of the built-in scenario `name`, changed by `change`. The slow error of a receiver, which no
-/// law can know, is left out: it would hide what a law does.
+/// Returns the instruments of the built-in scenario `name`, changed by `change`. The slow error of a GNSS receiver is
+/// left out: no law can know it, and it would hide differences between laws.
 fn instruments(name: &str, change: impl FnOnce(&mut InstrumentSuite)) -> Result<InstrumentSuite, Box<dyn Error>> {
     let mut suite = read(name)?.instruments;
     change(&mut suite);
@@ -348,34 +350,35 @@ fn instruments(name: &str, change: impl FnOnce(&mut InstrumentSuite)) -> Result<
     Ok(suite)
 }
 
-/// Returns `scenario` on an estimate, with the instruments of the scenario `mocap`.
+/// Returns `scenario`, flown on an estimate from the instruments of the scenario `mocap`.
 fn tracked(scenario: Scenario) -> Result<Scenario, Box<dyn Error>> {
     Ok(Scenario { instruments: instruments("mocap", |_| {})?, sensing: Sensing::default(), ..scenario })
 }
 
-/// Returns `scenario` with an outage of the link of 240 ms at each of these times; the flight core coasts through them.
+/// Returns `scenario` with an outage of the link of 240 ms at each of these times. The flight core coasts through the
+/// outages.
 fn blind(scenario: Scenario, starts_s: &[f64]) -> Scenario {
     let outages = starts_s.iter().map(|&start_s| Outage { start_s, end_s: start_s + 0.24 }).collect();
     Scenario { outages, flight_core: true, ..scenario }
 }
 
-/// Returns the battery at the voltage at which the rotors, if it slows them, give this share of their thrust.
+/// Returns the battery with the charge at which the rotors give the fraction `thrust` of their largest thrust.
 fn low_battery(battery: Battery, thrust: f64) -> Battery {
-    // Thrust goes with the square of the voltage.
+    // Thrust grows with the square of the voltage.
     let voltage_v = battery.full_v * libm::sqrt(thrust);
     let charge = (voltage_v - battery.empty_v) / (battery.full_v - battery.empty_v).max(1e-9);
     Battery { initial_charge: charge.clamp(0.05, 1.0), ..battery }
 }
 
-/// What differs from the sensors and rotors of `hardware`.
+/// Differences from the sensors and rotors of `hardware`.
 struct Hardware {
-    /// Whether states come from a tracker of 100 Hz, and rates from a gyroscope.
+    /// True if states come from a tracker at 100 Hz and rates from a gyroscope.
     tracker: bool,
-    /// Age of every state \[s\].
+    /// Delay of every state \[s\].
     state_delay_s: f64,
-    /// Standard deviation of the noise of the rates, rad/s.
+    /// Standard deviation of the rates' noise \[rad/s\].
     rate_noise_rad_s: f64,
-    /// Factor of the time constant of the rotors.
+    /// Factor on the time constant of the rotors.
     lag: f64,
 }
 

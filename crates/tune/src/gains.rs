@@ -1,4 +1,4 @@
-//! A contender's gains as coordinates of a search, and as text for a scenario file.
+//! A contender's gains as coordinates of a search, and as text for scenario and vehicle files.
 
 use afbc::Profile;
 use afbc_files::read::words;
@@ -9,13 +9,14 @@ use afbc_vehicles::{CASCADE, Vehicle};
 use core::convert::Infallible;
 use core::fmt::Write;
 
-/// Axes that share their gains: x and y, and roll and pitch, behave alike.
+/// Axes that share their gains, since they behave alike: x and y, roll and pitch.
 const GROUPS: [&[Axis]; 4] = [&[Axis::Z], &[Axis::X, Axis::Y], &[Axis::Roll, Axis::Pitch], &[Axis::Yaw]];
 
-/// Called with name, range and value of a gain.
+/// Function that is called with the place, range and value of a gain.
 type Visit<'a> = &'a mut dyn FnMut(&str, &Range, &mut f32);
 
-/// Visits every tuned gain of `contender` that is not 0. A gain of 0 switches a part of its law off, and stays 0.
+/// Visits every tuned gain of `contender` except those that are 0. A gain of 0 switches a part of its law off, and
+/// stays 0.
 fn each_tunable(contender: &mut Contender, visit: Visit) {
     let law = &mut contender.law;
     if !law.kind().in_cascade() {
@@ -34,7 +35,7 @@ fn each_of_group(law: &mut Law, group: &[Axis], visit: Visit) {
     let delta_max = |law: &Law| if let Law::Afbc(gains) = law { gains[*first].safeguards.delta_max } else { 0.0 };
     let before = delta_max(law);
     each_tuned(&place, law, |declaration| declaration.group == first.name(), visit);
-    // By rule, epsilon is proportional to the bound on delta_hat: only their ratio determines the limit cycle.
+    // epsilon is by rule proportional to the bound on delta_hat: only their ratio determines the limit cycle.
     if let (Law::Afbc(gains), true) = (&mut *law, before > 0.0) {
         gains[*first].epsilon *= gains[*first].safeguards.delta_max / before;
     }
@@ -68,21 +69,21 @@ fn each_tuned(place: &str, parameters: &mut impl Declared, wanted: impl Fn(&Decl
     });
 }
 
-/// The gains of `contender` as a point: the logarithm of each.
+/// Returns the gains of `contender` as a point, whose coordinates are the gains' logarithms.
 pub(super) fn point(contender: &Contender) -> Vec<f64> {
     let mut logarithms = Vec::new();
     each_tunable(&mut contender.clone(), &mut |_, _, gain| logarithms.push(libm::log(f64::from(*gain))));
     logarithms
 }
 
-/// Returns `start` with the gains of `point`, which is moved into all ranges. Gains are rounded to four digits, so that
-/// the values flown are those written.
+/// Returns `start` with the gains of `point`, which is first clamped to the gains' ranges. Gains are rounded to four
+/// digits, so that the gains flown equal the gains written.
 pub(super) fn contender(start: &Contender, point: &mut [f64]) -> Contender {
     let mut contender = start.clone();
     let mut coordinates = point.iter_mut();
     each_tunable(&mut contender, &mut |_, range, gain| {
         let Some(x) = coordinates.next() else { return };
-        // log(0) is -inf, which does not limit.
+        // A lower bound of log(0) = -inf does not limit the coordinate.
         *x = x.clamp(libm::log(range.min), libm::log(range.max));
         *gain = four_digits(libm::exp(*x).clamp(range.min, range.max));
     });
@@ -93,10 +94,10 @@ fn four_digits(value: f64) -> f32 {
     format!("{value:.3e}").parse().unwrap_or(value as f32)
 }
 
-/// A gain before and after.
+/// A gain before and after a search.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GainChange {
-    /// Axes and key: `x, y alpha1`; of a peer, the key alone.
+    /// Axes and key, as in `x, y alpha1`. For a law with one controller for all axes, the key alone.
     pub name: String,
     /// Value before the search.
     pub from: f32,
@@ -104,7 +105,7 @@ pub struct GainChange {
     pub to: f32,
 }
 
-/// Returns every gain searched, with its values in `start` and `found`.
+/// Returns every searched gain with its values in `start` and `found`.
 pub(super) fn changes(start: &Contender, found: &Contender) -> Vec<GainChange> {
     let mut changes = Vec::new();
     each_tunable(&mut start.clone(), &mut |place, range, gain| {
@@ -126,7 +127,7 @@ struct Key {
     table: String,
     key: &'static str,
     value: String,
-    /// Whether a search may change it.
+    /// True if a search may change the key's value.
     tuned: bool,
 }
 
@@ -163,8 +164,8 @@ pub fn fragment(contender: &Contender) -> String {
     text
 }
 
-/// The gains of `contender`, found on these flights: for the file of the vehicle that they are made for, or else as
-/// `[[contender]]` for a scenario file.
+/// Formats the gains of `contender`, found on these flights: for the vehicle's file if the flights are on a vehicle
+/// from a file, or else as `[[contender]]` for a scenario file.
 pub fn found_text(contender: &Contender, training: &[Scenario]) -> String {
     match training.first().and_then(|scenario| scenario.vehicle_file.as_ref()) {
         Some(vehicle) => vehicle_fragment(contender, vehicle),
@@ -172,8 +173,9 @@ pub fn found_text(contender: &Contender, training: &[Scenario]) -> String {
     }
 }
 
-/// Gains of `contender` as `[gains.flight]` of the file of `vehicle`: every gain that a search may change, so that they
-/// stay what was found when the rule changes, and what else is not by rule.
+/// Formats gains of `contender` as `[gains.flight]` of the file of `vehicle`. Includes every gain that a search may
+/// change, so that a later change of the rule does not change the gains found, and every other gain that differs from
+/// the rule.
 pub(super) fn vehicle_fragment(contender: &Contender, vehicle: &Vehicle) -> String {
     let kind = contender.kind();
     let rule = Contender::of(kind, Profile::Flight).by_rule(vehicle);
@@ -182,7 +184,7 @@ pub(super) fn vehicle_fragment(contender: &Contender, vehicle: &Vehicle) -> Stri
     for key in keys(contender).iter().filter(|key| key.tuned || !base.contains(key)) {
         let place = match key.table.strip_prefix("gains") {
             Some(axis) => format!("gains.flight.{}{axis}", kind.name()),
-            // The cascade is that of AFBC.
+            // Only AFBC writes the cascade's settings.
             None if kind == ControllerKind::Afbc => format!("gains.flight.{CASCADE}"),
             None => continue,
         };
@@ -195,15 +197,15 @@ pub(super) fn vehicle_fragment(contender: &Contender, vehicle: &Vehicle) -> Stri
     text
 }
 
-/// Formats a TOML string; names have no control characters.
+/// Formats a TOML string. Names have no control characters.
 fn quoted(name: &str) -> String {
     format!("\"{}\"", name.replace('\\', "\\\\").replace('"', "\\\""))
 }
 
-/// Returns all keys of a contender in a scenario file, except the time step, which belongs to the file.
+/// Returns all keys of a contender in a scenario file. The time step is left out, since it belongs to the whole file.
 fn keys(contender: &Contender) -> Vec<Key> {
     let mut keys = Vec::new();
-    // Groups of a law's gains are tables within its own; the settings are a table next to them.
+    // Groups of a law's gains are subtables of `gains`. The settings are tables beside it.
     let mut put = |table: String, key, value: Value<'_>, tuned| {
         keys.push(Key { table, key, value: words::value(&value), tuned });
         Ok::<(), Infallible>(())

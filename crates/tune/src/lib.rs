@@ -1,6 +1,6 @@
-//! Search for gains, in the same way for every law: the same flights, cost, search and number of tries.
+//! Search for gains. Every law gets the same flights, cost, search and number of tries.
 //!
-//! `docs/tuning.md` describes it and its results.
+//! `docs/tuning.md` describes the search and its results.
 #![forbid(unsafe_code)]
 
 mod cma_es;

@@ -1,4 +1,4 @@
-//! Scenarios on a vehicle, out of which flights are made: `hardware` with its data.
+//! Builds flights from the scenario `hardware` and a vehicle's data.
 
 use crate::scale::Scale;
 use afbc::Profile;
@@ -11,10 +11,11 @@ use afbc_vehicles::Vehicle;
 use nalgebra::Vector3;
 use std::error::Error;
 
-/// Onset of disturbances \[s\], when errors already count.
+/// Time at which disturbances begin, after errors have begun to count \[s\].
 pub(crate) const ONSET_S: f64 = 6.0;
 
-/// True if `vehicle` is the paper's, whatever gains its file has: its flights are those without a vehicle's file.
+/// True if `vehicle` has the data of the paper's vehicle, with any gains. Its flights are then those made without a
+/// vehicle file.
 pub fn is_paper(vehicle: &Vehicle) -> bool {
     let paper = afbc_vehicles::built_in("paper").and_then(|paper| paper.read().ok());
     paper.is_some_and(|paper| {
@@ -23,9 +24,9 @@ pub fn is_paper(vehicle: &Vehicle) -> bool {
     })
 }
 
-/// Makes flights of one vehicle.
+/// Builder of the flights of one vehicle.
 pub(crate) struct Maker<'a> {
-    /// None is the paper's vehicle on the rotors of `hardware`.
+    /// Vehicle from a file; none for the paper's vehicle with the rotors of `hardware`.
     pub(crate) vehicle: Option<&'a Vehicle>,
     pub(crate) scale: Scale,
 }
@@ -36,7 +37,7 @@ impl<'a> Maker<'a> {
         Maker { vehicle, scale: Scale::of(vehicle) }
     }
 
-    /// Returns `hardware`, whose gusts and weakness are what the vehicle bears.
+    /// Returns `hardware` with gusts and losses of thrust scaled to the vehicle.
     pub(crate) fn hardware(&self) -> Result<Scenario, Box<dyn Error>> {
         let scenario = self.base()?;
         if self.vehicle.is_none() {
@@ -45,7 +46,7 @@ impl<'a> Maker<'a> {
         let Scale { acceleration, time, .. } = self.scale;
         let gust = |gust: &Gust| {
             let turns = matches!(gust.axis, Axis::Roll | Axis::Pitch | Axis::Yaw);
-            // Angles do not scale, and times do: an angular acceleration goes with the inverse square of time.
+            // Angles do not scale but times do, so angular accelerations scale with the inverse square of time.
             Gust { size: gust.size * if turns { 1.0 / (time * time) } else { acceleration }, ..*gust }
         };
         let gusts = scenario.environment.gusts().iter().map(gust).collect();
@@ -58,7 +59,7 @@ impl<'a> Maker<'a> {
         Ok(Scenario { environment, ..scenario })
     }
 
-    /// Returns `hardware` on the vehicle, with its delay of the rotors.
+    /// Returns `hardware` on the vehicle. The rotors' delay is at least that of `hardware`.
     fn base(&self) -> Result<Scenario, FileError> {
         let scenario = read("hardware")?;
         let Some(vehicle) = self.vehicle else { return Ok(scenario) };
@@ -68,7 +69,7 @@ impl<'a> Maker<'a> {
         Ok(scenario)
     }
 
-    /// Gives the paper's vehicle the drag that every other one has already.
+    /// Gives the paper's vehicle its drag. Other vehicles have theirs from their files.
     pub(crate) fn drag(&self, scenario: &mut Scenario) {
         if self.vehicle.is_none() {
             scenario.realism.drag = Some(Drag::PAPER);
@@ -110,12 +111,12 @@ pub(crate) fn read(name: &str) -> Result<Scenario, FileError> {
     built_in(name).ok_or_else(|| FileError::whole(name, "no such scenario"))?.read()
 }
 
-/// A flight of `hardware` without gusts.
+/// Description of a flight based on `hardware` without gusts.
 pub(crate) struct TrainingFlight {
     pub(crate) name: &'static str,
     pub(crate) duration_s: f64,
     pub(crate) trajectory: Trajectory,
-    /// Quantity that changes at the onset for half of the remaining flight, and its factor.
+    /// Quantity that changes at the onset for half of the remaining flight, with its factor.
     pub(crate) change: Option<(PlantParameter, f64)>,
 }
 

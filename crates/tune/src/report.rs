@@ -1,4 +1,4 @@
-//! The result of a search as a piece of a scenario file.
+//! The result of a search as text for a scenario file.
 
 use crate::conditions::Condition;
 use crate::cost::{costs, mean};
@@ -10,12 +10,12 @@ use afbc_types::OutOfRange;
 use core::fmt::Write;
 use std::error::Error;
 
-/// Formats the contender found as `[[contender]]` of a scenario file or, if the flights are on a vehicle of a file, as
-/// `[gains]` of that file, preceded by comments with its cost in each flight, the conditions that it meets, and the
-/// change of each gain from `start`.
+/// Formats the contender found as `[[contender]]` of a scenario file or, if the flights are on a vehicle from a file,
+/// as `[gains]` of that file. Comments before it list the cost of each flight, the conditions met, and the change of
+/// each gain from `start`.
 ///
 /// # Errors
-/// None occurs: both have flown before.
+/// None in practice, since both contenders have flown before.
 pub fn report(
     start: &Contender,
     found: &SearchResult,

@@ -1,4 +1,4 @@
-//! What a vehicle's flights are scaled by, from its own data.
+//! Scales of a vehicle's flights, computed from its own data.
 //!
 //! Every factor is 1 for the paper's vehicle on the rotors of the built-in scenario `hardware`.
 
@@ -8,43 +8,43 @@ use afbc_types::Parameters;
 use afbc_vehicles::Vehicle;
 use libm::{hypot, sqrt, tan};
 
-/// Largest force of a rotor of the paper's vehicle \[N\], and number of its rotors.
+/// Largest force of a rotor of the paper's vehicle \[N\]. `PAPER_ROTORS` is the number of its rotors.
 const PAPER_FORCE_MAX_N: f64 = 3.0;
 const PAPER_ROTORS: f64 = 4.0;
-/// Wind for which vehicles are compared \[m/s\].
+/// Wind speed at which the drag of vehicles is compared \[m/s\].
 const WIND_M_S: f64 = 5.0;
-/// Largest factor of lengths, times the root of the arm's over the paper's.
+/// Largest length factor, to be multiplied by the square root of the arm factor.
 const LENGTH_MAX: f64 = 3.0;
-/// Largest tilt that a fast flight may take \[rad\], and the share of the thrust that it may use.
+/// Largest tilt of a fast flight \[rad\]. `THRUST_SHARE` is the largest fraction of the thrust.
 const TILT_MAX_RAD: f64 = 1.1;
 const THRUST_SHARE: f64 = 0.85;
 
 /// Factors from the paper's vehicle to another one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Scale {
-    /// Factor of times: how much slower the vehicle is, by the lag of its rotors.
+    /// Factor of times: slowness of the vehicle, from the lag of its rotors.
     pub(crate) time: f64,
-    /// Factor of lengths: of horizontal accelerations times the square of `time`, but at most three times the root of
-    /// the arm's.
+    /// Factor of lengths: the factor of horizontal accelerations times the square of `time`, but at most three times
+    /// the square root of `arm`.
     pub(crate) length: f64,
-    /// Factor of accelerations, `length` over the square of `time`.
+    /// Factor of accelerations: `length` divided by the square of `time`.
     pub(crate) acceleration: f64,
-    /// Factor of lengths on the vehicle itself: the arm's.
+    /// Factor of lengths on the vehicle itself: ratio of the arms.
     pub(crate) arm: f64,
-    /// Factor of forces: the weight's.
+    /// Factor of forces: ratio of the weights.
     pub(crate) weight: f64,
-    /// Factor of the wind's speed, at most 1.5: its drag takes no larger share of the horizontal acceleration that the
+    /// Factor of wind speeds, at most 1.5. With it, drag takes no larger share of the horizontal acceleration that the
     /// rotors allow than on the paper's vehicle.
     pub(crate) wind: f64,
-    /// Thrust to weight, with all rotors at their largest force.
+    /// Thrust-to-weight ratio with all rotors at their largest force.
     thrust_to_weight: f64,
-    /// The same after a minute's flight on the vehicle's battery.
+    /// Thrust-to-weight ratio with the battery's charge down to seven eighths.
     sustained: f64,
     gravity_m_s2: f64,
 }
 
 impl Scale {
-    /// The paper's vehicle.
+    /// Returns the factors of the paper's vehicle.
     pub(crate) fn paper() -> Self {
         Scale {
             time: 1.0,
@@ -59,15 +59,15 @@ impl Scale {
         }
     }
 
-    /// Returns the factors of a vehicle; of none, those of the paper's.
+    /// Returns the factors of `vehicle`; for none, those of the paper's vehicle.
     pub(crate) fn of(vehicle: Option<&Vehicle>) -> Self {
         let Some(vehicle) = vehicle else { return Scale::paper() };
         let (own, paper) = (&vehicle.parameters, &Parameters::<f64>::PAPER);
         let thrust_to_weight = vehicle.force_max_n * vehicle.rotors.len() as f64 / own.weight_n();
         let time = f64::from(slowness(vehicle.lag_s()));
         let arm = own.arm_m / paper.arm_m;
-        // What the rotors leave beside the weight, horizontally.
-        // Never zero, or the lengths of all flights would be.
+        // Horizontal acceleration that the thrust allows in addition to carrying the weight. Never zero, since all
+        // lengths would be zero then.
         let left = |ratio: f64, gravity_m_s2| gravity_m_s2 * sqrt((ratio * ratio - 1.0).max(0.1));
         let share = left(thrust_to_weight, own.gravity_m_s2) / left(paper_thrust_to_weight(), paper.gravity_m_s2);
         let length = (share * time * time).min(LENGTH_MAX * sqrt(arm));
@@ -88,8 +88,8 @@ impl Scale {
         }
     }
 
-    /// Returns what a thrust, or what takes thrust, may be multiplied by where it is `factor` on the paper's vehicle:
-    /// as much as leaves the same share of what the thrust exceeds the weight by, and not less than `factor`.
+    /// Returns the factor on the thrust that matches `factor` on the paper's vehicle: both leave the same share of the
+    /// thrust beyond the weight. The result is not less than `factor`.
     pub(crate) fn thrust(&self, factor: f64) -> f64 {
         let (ratio, paper) = (self.sustained, paper_thrust_to_weight());
         if ratio >= paper || factor >= 1.0 {
@@ -99,19 +99,20 @@ impl Scale {
         ((1.0 + share * (ratio - 1.0)) / ratio).clamp(factor, 1.0)
     }
 
-    /// Returns the same for a factor of the mass.
+    /// Returns the factor on the mass that matches `factor` on the paper's vehicle.
     pub(crate) fn mass(&self, factor: f64) -> f64 {
         let light = self.thrust(1.0 / factor);
         if light > 1.0 / factor { 1.0 / light } else { factor }
     }
 
-    /// Largest horizontal acceleration of a fast flight \[m/s2\]: with 85 % of the thrust, and at most 1.1 rad of tilt.
+    /// Returns the largest horizontal acceleration of a fast flight \[m/s2\], which uses 85 % of the thrust and at most
+    /// 1.1 rad of tilt.
     pub(crate) fn horizontal_m_s2(&self) -> f64 {
         let ratio = (THRUST_SHARE * self.thrust_to_weight).max(1.02);
         self.gravity_m_s2 * sqrt(ratio * ratio - 1.0).min(tan(TILT_MAX_RAD))
     }
 
-    /// Tilt that this acceleration takes \[rad\].
+    /// Returns the tilt that this horizontal acceleration needs \[rad\].
     pub(crate) fn tilt_rad(&self, acceleration_m_s2: f64) -> f64 {
         libm::atan2(acceleration_m_s2, self.gravity_m_s2)
     }
@@ -121,7 +122,8 @@ fn paper_thrust_to_weight() -> f64 {
     PAPER_FORCE_MAX_N * PAPER_ROTORS / Parameters::<f64>::PAPER.weight_n()
 }
 
-/// Share of the largest thrust that a battery leaves which is down to seven eighths and carries the vehicle.
+/// Returns the share of the largest thrust that remains when the battery is down to seven eighths of its charge and
+/// carries the vehicle.
 fn sag(vehicle: &Vehicle) -> f64 {
     let Some(battery) = &vehicle.realism.rotors.battery else { return 1.0 };
     let (own, rotors) = (&vehicle.parameters, vehicle.rotors.len() as f64);
@@ -133,7 +135,7 @@ fn sag(vehicle: &Vehicle) -> f64 {
     (share * share).clamp(0.1, 1.0)
 }
 
-/// Horizontal deceleration of a vehicle that hovers, per speed \[1/s\] and per its square \[1/m\].
+/// Returns the horizontal deceleration of a hovering vehicle per airspeed \[1/s\] and per squared airspeed \[1/m\].
 fn rates(drag: &Drag, vehicle: &Parameters<f64>, rotors: f64) -> [f64; 2] {
     let hover_rad_s = sqrt(vehicle.weight_n() / rotors / vehicle.thrust_factor_n_s2);
     let area_m2 = hypot(drag.area_m2.x, drag.area_m2.y) / core::f64::consts::SQRT_2;
@@ -143,9 +145,9 @@ fn rates(drag: &Drag, vehicle: &Parameters<f64>, rotors: f64) -> [f64; 2] {
     ]
 }
 
-/// Speed at which drag of these `rates` decelerates by this much \[m/s\]; infinite without drag.
+/// Returns the airspeed at which drag of these `rates` decelerates by this much \[m/s\]; infinite without drag.
 fn speed([linear, square]: [f64; 2], deceleration_m_s2: f64) -> f64 {
-    // This form of the root also holds for drag without a square, where the usual one is 0/0.
+    // This form of the root also holds for drag without a square term, where the usual form gives 0/0.
     2.0 * deceleration_m_s2 / (linear + sqrt(linear * linear + 4.0 * square * deceleration_m_s2))
 }
 
@@ -159,7 +161,7 @@ mod tests {
         let paper = afbc_vehicles::built_in("paper").unwrap().read().unwrap();
         let scale = Scale::of(Some(&paper));
         let factors = [scale.time, scale.length, scale.acceleration, scale.arm, scale.weight, scale.wind];
-        // The file's largest force comes from a speed.
+        // The file's largest force is computed from a rotor speed, so it differs by rounding.
         assert!(factors.iter().all(|factor| (factor - 1.0).abs() < 1e-12), "{scale:?}");
         let scale = Scale::paper();
         assert_eq!((scale.thrust(0.6), scale.mass(1.3), scale.mass(0.8)), (0.6, 1.3, 0.8));

@@ -9,41 +9,42 @@ use afbc_scenario::contender::Contender;
 use afbc_types::OutOfRange;
 use rayon::prelude::*;
 
-/// Initial step size in the logarithm of every gain of a search from hand-tuned gains: about a third up or down.
+/// Initial step size of a search from hand-tuned gains, in the logarithm of every gain: about a third up or down.
 pub const STEP: f64 = 0.3;
 
-/// How a search goes.
+/// Options of a search.
 #[derive(Clone, Copy, Debug)]
 pub struct SearchOptions {
     /// Number of contenders to try, including the start.
     pub budget: usize,
     /// Initial step size in the logarithm of every gain, such as [`STEP`].
     pub step: f64,
-    /// Seed; the same seed finds the same gains.
+    /// Seed of the search. The same seed finds the same gains.
     pub seed: u64,
 }
 
 /// Result of a search.
 #[derive(Clone, Debug)]
 pub struct SearchResult {
-    /// The best contender; the start, if none was better.
+    /// Best contender found, which is the start if no other was better.
     pub contender: Contender,
-    /// Cost of the start, times the factors of the conditions that it does not meet.
+    /// Cost of the start, times the factors of the conditions.
     pub before: f64,
-    /// The same of the best contender.
+    /// Cost of the best contender, times the factors of the conditions.
     pub after: f64,
     /// Number of contenders tried.
     pub evaluations: usize,
-    /// Every gain searched.
+    /// Every searched gain, before and after.
     pub changes: Vec<GainChange>,
 }
 
-/// Searches for the gains of `start` with the lowest cost over `flights` that meet `conditions`. `progress` is called
-/// with the number of tries and the lowest cost so far, and ends the search by returning false. The result does not
+/// Searches for the gains of `start` that have the lowest cost over `flights` and meet `conditions`. Calls `progress`
+/// with the number of tries and the lowest cost so far; if it returns false, the search ends. The result does not
 /// depend on the number of threads.
 ///
-/// A contender that loses more flights than the best one so far is given up: the flights not flown count as lost at
-/// their start, and no condition as met. So that this comes early, those flights come first that cost `start` most.
+/// A contender that loses more flights than the best one so far is given up. Its remaining flights count as lost at
+/// their start, and its conditions as not met. The flights that cost `start` most come first, so that bad contenders
+/// are given up early.
 ///
 /// # Errors
 /// If `start` cannot fly.
@@ -62,11 +63,11 @@ pub fn search(
     let mut trial = Trial { flights, conditions, order: order(&first.0), bearable: lost(&first.0) };
     let (mut best, mut after, mut evaluations) = (start.clone(), before, 1);
     let mut search = Search::new(&gains::point(start), step, seed);
-    // The mean of the search is often better than any point around it: the last try is reserved for it, once it has
-    // moved.
+    // The mean of the search is often better than any point around it. Once the mean has moved, the last try is
+    // reserved for it.
     let mut kept = 0;
     while evaluations + kept < budget && progress(evaluations, after) {
-        // The last generation has as many points as there are tries left.
+        // The last generation has only as many points as there are tries left.
         let mut points = search.ask();
         points.truncate(budget - kept - evaluations);
         let is_whole = points.len() == search.population();
@@ -86,7 +87,7 @@ pub fn search(
     if evaluations + kept <= budget && kept > 0 {
         let last = gains::contender(start, &mut search.mean());
         evaluations += 1;
-        // An invalid combination of gains is no result.
+        // A mean whose gains are an invalid combination is ignored.
         if let Some(cost) = rate(&last).ok().map(|rated| of(&rated)).filter(|cost| *cost < after) {
             (best, after) = (last, cost);
         }
@@ -96,7 +97,7 @@ pub fn search(
     Ok(SearchResult { contender: best, before, after, evaluations, changes })
 }
 
-/// Returns the indices of flights with these costs, the dearest first.
+/// Returns the indices of the flights by falling cost.
 fn order(costs: &[f64]) -> Vec<usize> {
     let mut order: Vec<_> = (0..costs.len()).collect();
     let cost = |index: &usize| costs.get(*index).copied().unwrap_or(0.0);
@@ -104,18 +105,18 @@ fn order(costs: &[f64]) -> Vec<usize> {
     order
 }
 
-/// Returns how many flights with these costs are lost.
+/// Returns the number of lost flights among these costs.
 fn lost(costs: &[f64]) -> usize {
     costs.iter().filter(|cost| **cost >= LOST).count()
 }
 
-/// What each contender has to fly.
+/// The flights and conditions for each contender.
 struct Trial<'a> {
     flights: &'a [Scenario],
     conditions: &'a [Condition],
-    /// Indices of the flights, as they are flown.
+    /// Indices of the flights in the order in which they are flown.
     order: Vec<usize>,
-    /// Number of flights that may be lost.
+    /// Number of losses up to which a contender is not given up.
     bearable: usize,
 }
 
@@ -129,13 +130,14 @@ struct Rated {
 }
 
 impl Trial<'_> {
-    /// Returns the cost of `contender`, that of each flight, and whether it was given up.
+    /// Returns the cost of `contender`, the cost of each flight, and true if the contender was given up.
     fn rate(&self, contender: &Contender) -> Result<(f64, Vec<f64>, bool), OutOfRange> {
         let mut costs = vec![2.0 * LOST; self.flights.len()];
         let mut losses = 0;
         for &index in &self.order {
             let (Some(scenario), Some(cost)) = (self.flights.get(index), costs.get_mut(index)) else { continue };
-            // One flight after the other: contenders are rated side by side, and one that is given up saves the rest.
+            // Flights run one after the other: contenders already run in parallel, and giving one up saves its
+            // remaining flights.
             *cost = flown(scenario, contender)?;
             losses += usize::from(*cost >= LOST);
             if losses > self.bearable {
@@ -148,7 +150,7 @@ impl Trial<'_> {
     }
 }
 
-/// Returns contenders with the gains of `points` and their costs, best first.
+/// Returns contenders with the gains of `points` and their costs, cheapest first.
 fn rated(start: &Contender, trial: &Trial<'_>, points: Vec<Vec<f64>>) -> Vec<Rated> {
     let rated = |mut point: Vec<f64>| {
         let contender = gains::contender(start, &mut point);

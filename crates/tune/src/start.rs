@@ -1,4 +1,4 @@
-//! Starting points of the search: hand-tuned gains, so that the same command finds the same gains again.
+//! Starting points of the search: hand-tuned gains, so that the same command always finds the same gains.
 
 use crate::maker::is_paper;
 use afbc::disturbance::DisturbanceObserver;
@@ -8,8 +8,8 @@ use afbc_control::Smoothing;
 use afbc_scenario::contender::{Contender, ControllerKind, Law};
 use afbc_vehicles::Vehicle;
 
-/// Returns the law of this kind with hand-tuned gains, limits of the profile `flight` and a hand-tuned cascade; AFBC
-/// under its monitor, as on board.
+/// Returns the law of this kind with hand-tuned gains, the limits of the profile `flight` and a hand-tuned cascade.
+/// AFBC is under its monitor, as on board.
 pub fn by_hand(kind: ControllerKind) -> Contender {
     let contender = Contender { law: Law::by_hand(kind), ..Contender::of(kind, Profile::Flight) };
     let reference = ReferenceModel {
@@ -25,7 +25,7 @@ pub fn by_hand(kind: ControllerKind) -> Contender {
     Contender { settings, ..contender }.monitored()
 }
 
-/// Returns the same on `vehicle`, [by rule](Contender::by_rule).
+/// Returns the hand-tuned contender on `vehicle`, scaled [by rule](Contender::by_rule).
 pub fn by_hand_on(kind: ControllerKind, vehicle: &Vehicle) -> Contender {
     if is_paper(vehicle) { by_hand(kind) } else { by_hand(kind).by_rule(vehicle) }
 }

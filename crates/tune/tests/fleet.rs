@@ -1,4 +1,4 @@
-//! Flights made from a vehicle's own data, searches that do not depend on threads, and a folder that resumes.
+//! Tests of flights made from a vehicle's data, of searches on several threads, and of folders that resume.
 #![allow(clippy::unwrap_used, missing_docs, reason = "what cannot be flown must stop the test")]
 
 use afbc_scenario::Scenario;
@@ -17,7 +17,7 @@ fn vehicle(name: &str) -> Vehicle {
     built_in(name).unwrap().read().unwrap()
 }
 
-/// What a flight is, whatever the gains of its contenders.
+/// Returns a hash of the flights, without their contenders.
 fn print(flights: &[Scenario]) -> String {
     let mut hash = twox_hash::XxHash64::with_seed(0);
     for flight in flights {
@@ -27,7 +27,8 @@ fn print(flights: &[Scenario]) -> String {
     format!("{:016x}", hash.finish())
 }
 
-/// The first 19 and 18 are the flights from before there were others, to the bit; those of its file are the same.
+/// The first 19 training and 18 held-out flights of the paper's vehicle never change by a bit. Those made from the
+/// vehicle's file equal those made without it.
 #[test]
 fn the_papers_flights_stay_what_they_were() {
     let [train, held] = [training().unwrap(), held_out().unwrap()];
@@ -38,7 +39,7 @@ fn the_papers_flights_stay_what_they_were() {
     assert_eq!(held_out_on(&paper).unwrap(), held);
 }
 
-/// Every flight can be flown by every law; at most 23 are for training, of a minute at most.
+/// Every law can fly every flight. There are at most 23 training flights, each of at most a minute.
 #[test]
 fn every_flight_is_valid_on_every_vehicle() {
     for known in &BUILT_IN {
@@ -46,7 +47,7 @@ fn every_flight_is_valid_on_every_vehicle() {
         let mut flights = training_on(&vehicle).unwrap();
         assert!(flights.len() <= 23 && flights.iter().all(|flight| flight.duration_s <= 60.0), "{}", known.name);
         flights.extend(held_out_on(&vehicle).unwrap());
-        // The paper's vehicle's gains fly on other vehicles by rule.
+        // Conditions flown by rule are for the gains of the paper's vehicle, so they are left out here.
         let conditions = conditions_on(&vehicle).unwrap().into_iter().filter(|condition| !condition.by_rule);
         flights.extend(conditions.map(|condition| condition.scenario));
         for flight in flights {
@@ -58,7 +59,7 @@ fn every_flight_is_valid_on_every_vehicle() {
     }
 }
 
-/// INDI by hand and by rule, from which its search starts, flies all but these.
+/// INDI with hand-tuned gains scaled by rule, the start of its search, survives all flights except those listed.
 #[test]
 fn the_start_survives_most_flights() {
     let mut lost = Vec::new();
@@ -78,7 +79,7 @@ fn a_search_does_not_depend_on_the_number_of_threads() {
     let named = |name: &&Scenario| ["weak", "step", "lemniscate", "old"].contains(&name.name.as_str());
     let flights: Vec<_> = training_on(&vehicle).unwrap().iter().filter(named).cloned().collect();
     let start = by_hand_on(ControllerKind::Indi, &vehicle);
-    // Large steps, so that some contenders are given up.
+    // The steps are large, so that some contenders are given up.
     let course = SearchOptions { budget: 24, step: 0.8, seed: 3 };
     let found = [1, 3].map(|threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
@@ -102,8 +103,8 @@ fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
         .collect()
 }
 
-/// A folder whose searches were ended half-way and begun again holds the same bytes as one that was not; and it takes
-/// no other searches.
+/// A folder whose searches were interrupted and resumed holds the same bytes as one without interruption. It refuses
+/// other searches.
 #[test]
 fn an_interrupted_fleet_resumes_to_the_same_bytes() {
     let base = std::env::temp_dir().join(format!("afbc-tune-fleet-{}", std::process::id()));
