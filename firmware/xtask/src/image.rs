@@ -1,4 +1,4 @@
-//! What an image occupies, and the files that programmers take.
+//! Memory usage of a linked image, and its files for flash programmers.
 
 use object::LittleEndian;
 use object::elf::{PT_LOAD, SHF_ALLOC};
@@ -6,11 +6,12 @@ use object::read::elf::{ElfFile32, ProgramHeader as _, SectionHeader as _};
 use std::fmt;
 use std::ops::Range;
 
-/// Bytes of a record of a .hex file.
+/// Data bytes per record of a .hex file.
 const RECORD: usize = 16;
-/// Largest gap within a block \[bytes\]: what aligns sections. Larger ones are not the image's, such as parameters.
+/// Largest gap within a block \[bytes\]. Alignment of sections leaves such gaps; larger gaps belong to something else,
+/// such as the parameters.
 const GAP_MAX: u64 = 256;
-/// Content of erased flash.
+/// Value of erased flash bytes.
 const ERASED: u8 = 0xFF;
 
 /// Contiguous bytes of flash.
@@ -26,14 +27,14 @@ impl Block {
     }
 }
 
-/// What is in a linked image.
+/// Contents of a linked image.
 #[derive(Debug)]
 pub(crate) struct Contents {
-    /// In flash, in the order of addresses.
+    /// Blocks of flash, sorted by address.
     pub(crate) blocks: Vec<Block>,
-    /// Where the program begins.
+    /// Address of the program's entry point.
     entry: u32,
-    /// Addresses of all sections at run time.
+    /// Run-time addresses of all sections.
     sections: Vec<Range<u64>>,
 }
 
@@ -45,7 +46,8 @@ impl Contents {
         for header in file.elf_program_headers() {
             let bytes = header.data(endian, elf).unwrap_or_default();
             if header.p_type(endian) == PT_LOAD && !bytes.is_empty() {
-                // Where it is stored, which is not where initial values are used.
+                // The physical address is where the bytes are stored. Initial values of variables are used at another
+                // address.
                 blocks.push(Block { address: header.p_paddr(endian), bytes: bytes.to_vec() });
             }
         }
@@ -69,7 +71,7 @@ impl Contents {
         for block in &self.blocks {
             let (mut address, mut bytes) = (block.address, block.bytes.as_slice());
             while !bytes.is_empty() {
-                // A record ends where the upper half of the address changes.
+                // A record must end where the upper half of the address changes.
                 let room = 0x1_0000 - (address as usize & 0xFFFF);
                 let (value, rest) = bytes.split_at(bytes.len().min(RECORD).min(room));
                 let half = (address >> 16) as u16;
@@ -85,7 +87,7 @@ impl Contents {
         ihex::create_object_file_representation(&records)
     }
 
-    /// Returns what the image takes of each region: of the flash up to its last byte, of the stack's all.
+    /// Returns the usage of each region. The flash counts as used up to its last byte, the stack as used entirely.
     pub(crate) fn usage(&self, regions: &[Region]) -> Vec<Usage> {
         let used = |region: &Region| match region.name.as_str() {
             "STACK" => region.length,
@@ -102,7 +104,7 @@ impl Contents {
     }
 }
 
-/// Joins blocks across small gaps.
+/// Joins blocks across small gaps, which are filled with erased bytes.
 fn joined(blocks: Vec<Block>) -> Vec<Block> {
     let mut all: Vec<Block> = Vec::new();
     for block in blocks {
@@ -123,12 +125,12 @@ fn joined(blocks: Vec<Block>) -> Vec<Block> {
 pub(crate) struct Region {
     pub(crate) name: String,
     pub(crate) origin: u64,
-    /// Its size \[bytes\].
+    /// Size \[bytes\].
     pub(crate) length: u64,
 }
 
 impl Region {
-    /// Reads those of a linker script, each in a line: `RAM : ORIGIN = 0x20010000, LENGTH = 64K`.
+    /// Reads the regions of a linker script, one per line: `RAM : ORIGIN = 0x20010000, LENGTH = 64K`.
     pub(crate) fn of_script(script: &str) -> Vec<Self> {
         let region = |line: &str| {
             let (name, rest) = line.split_once(':')?;
@@ -149,11 +151,11 @@ impl Region {
     }
 }
 
-/// What an image takes of a region.
+/// Usage of a region by an image.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Usage {
     pub(crate) region: Region,
-    /// Bytes.
+    /// Used bytes.
     pub(crate) used: u64,
 }
 
@@ -164,17 +166,17 @@ impl fmt::Display for Usage {
     }
 }
 
-/// Free bytes of regions together.
+/// Returns the free share of several regions together.
 pub(crate) fn room(of: &[&Usage]) -> Room {
     let length: u64 = of.iter().map(|usage| usage.region.length).sum();
     let used: u64 = of.iter().map(|usage| usage.used).sum();
     Room { percent: 100 * length.saturating_sub(used) / length.max(1) }
 }
 
-/// What is free.
+/// Free share of memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Room {
-    /// In percent, rounded down.
+    /// Free share in percent, rounded down.
     pub(crate) percent: u64,
 }
 
@@ -192,13 +194,13 @@ mod tests {
     use proptest::prelude::*;
     use std::collections::BTreeMap;
 
-    /// Writes an ELF file with segments only, by the ELF specification: header, program headers, contents.
+    /// Writes an ELF file that has only segments: header, program headers, contents (ELF specification).
     fn elf(entry: u32, segments: &[(u32, Vec<u8>)]) -> Vec<u8> {
         let [half, word] =
             [|value: u16| value.to_le_bytes().to_vec(), |value: u16| u32::from(value).to_le_bytes().to_vec()];
         let count = segments.len() as u16;
         let mut file = b"\x7fELF\x01\x01\x01\0\0\0\0\0\0\0\0\0".to_vec();
-        // An executable for Arm.
+        // Executable file, machine Arm.
         [half(2), half(40), word(1)].into_iter().for_each(|field| file.extend(field));
         file.extend(entry.to_le_bytes());
         [word(52), word(0), word(0), half(52), half(32), half(count), half(40), half(0), half(0)]
@@ -207,7 +209,7 @@ mod tests {
         let mut offset = 52 + 32 * segments.len() as u32;
         for (address, bytes) in segments {
             let length = bytes.len() as u32;
-            // PT_LOAD; used in RAM, stored at `address`.
+            // PT_LOAD segments are used in RAM and stored at `address`.
             for field in [1, offset, 0x2000_0000, *address, length, length + 4, 7, 1_u32] {
                 file.extend(field.to_le_bytes());
             }
@@ -217,7 +219,7 @@ mod tests {
         file
     }
 
-    /// Bytes of a .hex file by their addresses, by its specification.
+    /// Reads the bytes of a .hex file by address, following the format's specification.
     fn bytes_of(hex: &str) -> BTreeMap<u32, u8> {
         let (mut bytes, mut upper) = (BTreeMap::new(), 0);
         for line in hex.lines() {
@@ -246,7 +248,8 @@ mod tests {
     }
 
     proptest! {
-        /// The .hex file holds the bytes of the segments where they are stored, and nothing but filling in small gaps.
+        /// The .hex file holds the segments' bytes at their storage addresses, and nothing else except the filling of
+        /// small gaps.
         #[test]
         fn hex_has_what_the_segments_have(parts in vec((0_u32..0x3_0000, vec(any::<u8>(), 1..700)), 1..6)) {
             let (mut next, mut segments) = (0x0800_0000, Vec::new());
@@ -271,7 +274,8 @@ mod tests {
         }
     }
 
-    /// Data sheets: STM32F405RG, 1 MiB of flash and 192 KiB of RAM; STM32H743VI, of which the first bank is used.
+    /// Sizes by the data sheets: the STM32F405RG has 1 MiB of flash and 192 KiB of RAM; of the STM32H743VI, the first
+    /// flash bank is used.
     #[test]
     fn regions_are_the_chips() {
         let f405 = Region::of_script(include_str!("../../../memory.x"));

@@ -1,4 +1,4 @@
-//! The firmware's images by the names of their boards.
+//! Builds and flashes firmware images, selected by the name of the board.
 //!
 //! ```sh
 //! cargo xtask fw stm32h743 --vehicle racer --run
@@ -17,11 +17,11 @@ use std::process::{Command, ExitCode};
 use std::{env, fs, io};
 
 const TARGET: &str = "thumbv7em-none-eabihf";
-/// Chips of which a share of flash and RAM has to stay free \[%\].
+/// Chips for which a share of flash and RAM must stay free \[%\].
 const ROOM: (&str, u64) = ("STM32F405", 25);
-/// What the names of the images of tables begin with.
+/// Prefix of the image names of boards that are tables, `src/bin/flight-BOARD.rs`.
 const TABLE: &str = "flight-";
-/// USB's vendor and product of the chips' boot loader.
+/// USB vendor and product of the chips' boot loader.
 const BOOT_LOADER: &str = "0483:df11";
 
 /// Work on the firmware.
@@ -56,7 +56,7 @@ struct Flash {
     by: Programmer,
 }
 
-/// What flashes an image.
+/// Connection and program that flash an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Programmer {
     /// By USB and dfu-util, a board whose boot loader runs.
@@ -90,14 +90,14 @@ fn main() -> ExitCode {
     })
 }
 
-/// Accepts the name of a board.
+/// Returns a parser that accepts the names of boards.
 fn named() -> PossibleValuesParser {
-    // clap keeps names for as long as the program runs.
+    // clap keeps the names for as long as the program runs, so leaking them is harmless.
     PossibleValuesParser::new(boards().into_keys().map(|name| PossibleValue::new(&*name.leak())))
 }
 
-/// Returns the names of all boards, with the folders of their packages: each folder is a board, and so is each table of
-/// the same chip within, `src/bin/flight-BOARD.rs`.
+/// Returns the names of all boards with the folders of their packages. Each folder is a board, and so is each table
+/// `src/bin/flight-BOARD.rs` within it, for the same chip.
 fn boards() -> BTreeMap<String, PathBuf> {
     let within = |folder: &Path| fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
     let mut boards = BTreeMap::new();
@@ -112,20 +112,20 @@ fn boards() -> BTreeMap<String, PathBuf> {
     boards
 }
 
-/// A board, as its package's manifest describes it.
+/// A board as described by the manifest of its package.
 struct Board {
-    /// Folder of its package.
+    /// Folder of the package.
     folder: PathBuf,
-    /// Name of its package.
+    /// Name of the package.
     package: String,
-    /// Name of its image.
+    /// Name of the image.
     image: String,
-    /// What a probe calls its chip; none if it is emulated.
+    /// probe-rs's name for the chip; none for an emulated board.
     chip: Option<String>,
 }
 
 impl Board {
-    /// Returns the chip of a board that can be flashed.
+    /// Returns the chip of the board, or an error if the board is emulated.
     fn chip(&self, image: &Image) -> Result<&str, String> {
         let emulated = || format!("{} is emulated: fly it by `cargo run --release -- pil`", image.board);
         self.chip.as_deref().ok_or_else(emulated)
@@ -170,11 +170,11 @@ impl Flash {
             run(Command::new("probe-rs").args(["download", "--chip", chip]).arg(elf))?;
             return run(Command::new("probe-rs").args(["reset", "--chip", chip]));
         }
-        // A file for each block, so that what is between them stays: the parameters.
+        // Each block is flashed from its own file, so that the parameters between blocks stay.
         for (index, block) in contents.blocks.iter().enumerate() {
             let path = elf.with_extension(format!("{:08x}.bin", block.address));
             write(&path, &block.bytes)?;
-            // Only with the last one: the boot loader ends then, and starts the program.
+            // Only the last block leaves the boot loader, which then starts the program.
             let leave = if index + 1 == contents.blocks.len() { ":leave" } else { "" };
             let place = format!("{:#010x}{leave}", block.address);
             run(Command::new("dfu-util").args(["-d", BOOT_LOADER, "-a", "0", "-s", &place, "-D"]).arg(path))?;
@@ -184,9 +184,9 @@ impl Flash {
 }
 
 impl Image {
-    /// Builds it; returns its ELF file and what is in it.
+    /// Builds the image. Returns the path of its ELF file and its contents.
     fn build(&self, board: &Board) -> Result<(PathBuf, Contents), String> {
-        // The cargo that runs this, so that a toolchain chosen for it counts here, too.
+        // Uses the same cargo that runs this program, so that a toolchain chosen for one counts for both.
         let mut cargo = Command::new(env::var_os("CARGO").unwrap_or("cargo".into()));
         cargo.current_dir(root()).args(["build", "--profile", "firmware", "--target", TARGET]);
         cargo.args(["--package", &board.package, "--bin", &board.image]).args(&self.options);
@@ -205,7 +205,7 @@ impl Image {
         Ok((elf, contents))
     }
 
-    /// Reports what it takes of the board's memory.
+    /// Prints the image's usage of the board's memory. Fails if the chip's required share is not free.
     fn report(&self, board: &Board, contents: &Contents) -> Result<(), String> {
         let own = board.folder.join("memory.x");
         let path = if own.is_file() { own } else { root().join("memory.x") };
@@ -225,12 +225,11 @@ impl Image {
     }
 }
 
-/// Writes a file.
 fn write(path: &Path, bytes: impl AsRef<[u8]>) -> Result<(), String> {
     fs::write(path, bytes).map_err(|error| format!("{}: {error}", path.display()))
 }
 
-/// Runs a command.
+/// Runs a command. Returns an error that names the program if it fails or is not installed.
 fn run(command: &mut Command) -> Result<(), String> {
     let name = command.get_program().to_string_lossy().into_owned();
     let name = Path::new(&name).file_stem().unwrap_or_default().to_string_lossy();
@@ -244,7 +243,7 @@ fn run(command: &mut Command) -> Result<(), String> {
     }
 }
 
-/// The workspace's root.
+/// Returns the root folder of the workspace.
 fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(2).unwrap_or(Path::new("."))
 }
