@@ -1,5 +1,5 @@
-//! Linker arguments of a board's images. Set here, so that building from the workspace's root works and the host's
-//! crates are not affected.
+//! Sets the linker arguments of a board's images. A build script sets them so that builds from the workspace's root
+//! work and the host's crates are not affected.
 
 use std::path::Path;
 
@@ -10,14 +10,14 @@ fn main() {
     for file in [&own, &sections, &root.join("memory.x")] {
         println!("cargo:rerun-if-changed={}", file.display());
     }
-    // The board's own memory map or, without one, that at the workspace's root, which cortex-m-rt's link.x includes.
+    // Uses the board's own memory map. Without one, cortex-m-rt's link.x includes the map at the workspace's root.
     let scripts = if own.is_file() {
         [&own, &sections].map(|path| path.display().to_string()).to_vec()
     } else {
         println!("cargo:rustc-link-search={}", root.display());
         vec!["link.x".to_owned()]
     };
-    // Sections are not aligned to pages, of which a microcontroller has none.
+    // Sections need no alignment to pages, since a microcontroller has none.
     println!("cargo:rustc-link-arg-bins=--nmagic");
     for script in scripts.into_iter().chain(["defmt.x".to_owned()]) {
         println!("cargo:rustc-link-arg-bins=-T{script}");

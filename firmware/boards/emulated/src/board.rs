@@ -1,7 +1,8 @@
-//! The board of the processor in the loop: the host replaces pins and timers, by semihosting. The processor, including
-//! its time, stops while the host works. Memory is as in the flight image, `memory.x` at the workspace's root.
+//! The emulated board for processor-in-the-loop tests. The host replaces pins and timers through semihosting. The
+//! processor and its clock stop while the host works. The memory map is that of the flight image, `memory.x` at the
+//! workspace's root.
 //!
-//! Two FIFOs, `to_firmware` and `from_firmware`, carry the wire of [`afbc_onboard::ReplyHead`].
+//! Two FIFOs, `to_firmware` and `from_firmware`, carry the wire format of [`afbc_onboard::ReplyHead`].
 
 use afbc_onboard::{Aged, Readings, ReplyHead};
 use afbc_store::Ram;
@@ -22,16 +23,16 @@ use semihosting::io::{Read, Write};
 use semihosting::process::exit;
 use stm32_metapac::Interrupt;
 
-/// Bytes received by the link, at most this many per tick.
+/// Bytes received by the link. At most 4096 may arrive per tick.
 static LINK: Pipe<CriticalSectionRawMutex, 4096> = Pipe::new();
 
-/// Readings of the sensors for the next tick.
+/// Sensor readings for the next tick.
 static READINGS: Signal<CriticalSectionRawMutex, Readings> = Signal::new();
 
 /// Throttles of the last tick.
 static THROTTLES: Mutex<CriticalSectionRawMutex, Cell<[u16; ROTORS_MAX]>> = Mutex::new(Cell::new([0; ROTORS_MAX]));
 
-/// The board.
+/// The emulated board.
 pub(crate) struct Emulated;
 
 impl Board for Emulated {
@@ -40,15 +41,16 @@ impl Board for Emulated {
     type Aids = NoSensors;
     type Links = [BoardLink<Receiver, Transmitter>; 1];
     type Log = firmware::logging::NoLog;
-    /// In RAM: QEMU's flash cannot be written, and every flight begins with the image's parameters.
+    /// Parameters are kept in RAM, since QEMU's flash cannot be written. Every flight begins with the image's
+    /// parameters.
     type Memory = Ram<1024>;
-    /// As QEMU's STM32F405 counts it: the host derives instructions from it.
+    /// Core clock of QEMU's STM32F405. The host computes instruction counts from it.
     const CORE_HZ: u32 = 168_000_000;
     const STORE: u32 = 0;
     const HARDWARE: &'static str = "emulated";
     const OUTPUTS: usize = ROTORS_MAX;
 
-    /// Opens the FIFOs and waits for the first tick's bytes.
+    /// Opens the FIFOs and waits for the bytes of the first tick.
     fn start(_core: &mut cortex_m::Peripherals, _control: SendSpawner) -> Parts<Self> {
         let mut transmitter = Transmitter {
             to_firmware: File::open(c"to_firmware").expect("the host made the FIFO"),
@@ -68,8 +70,8 @@ impl Board for Emulated {
     /// There is no watchdog.
     fn unleash_watchdog(&mut self) {}
 
-    /// Spins. While a processor sleeps, QEMU advances its clock from another thread, and sometimes counts the same time
-    /// twice, so time would depend on the host's load.
+    /// Spins. While a processor sleeps, QEMU advances its clock from another thread and sometimes counts the same time
+    /// twice. Time would then depend on the host's load.
     fn idle() {
         cortex_m::asm::nop();
     }
@@ -79,7 +81,7 @@ impl Board for Emulated {
         false
     }
 
-    /// A panic ends the emulator.
+    /// Always false, since a panic ends the emulator.
     fn task_has_failed(&self) -> bool {
         false
     }
@@ -95,7 +97,7 @@ impl Board for Emulated {
     fn feed_watchdog(&mut self) {}
 }
 
-/// The host's sensors.
+/// Sensors that the host simulates.
 pub(crate) struct Sampler;
 
 impl samples::Sampler for Sampler {
@@ -105,7 +107,8 @@ impl samples::Sampler for Sampler {
             if let Some(Aged { value, age_us }) = imu {
                 samples::put(SampleTime::BeforeTick(age_us), SampleValue::Imu(value));
             }
-            // Without a sample, too: fixes must reach a vehicle whose inertial sensor has failed.
+            // Aiding measurements count without an IMU sample too: fixes must reach a vehicle whose inertial sensor has
+            // failed.
             for Aged { value, age_us } in aids.into_iter().flatten() {
                 samples::put(SampleTime::BeforeTick(age_us), SampleValue::Aid(value));
             }
@@ -129,7 +132,7 @@ pub(crate) struct Transmitter {
 }
 
 impl board::Transmitter for Transmitter {
-    /// Sends the reply, and waits for the next tick's bytes.
+    /// Sends the reply and waits for the bytes of the next tick.
     fn transmit(&mut self, tick: &Tick, bytes: &[u8]) -> bool {
         let head = ReplyHead {
             time_us: tick.report.time_us,
@@ -146,7 +149,8 @@ impl board::Transmitter for Transmitter {
 }
 
 impl Transmitter {
-    /// Passes the host's readings to the next tick, and its bytes to the link. Ends the firmware if the host has ended.
+    /// Passes the host's readings to the next tick, and the received bytes to the link. Ends the firmware if the host
+    /// has ended.
     fn take_bytes(&mut self) {
         let mut readings = [0; Readings::LEN];
         if self.to_firmware.read_exact(&mut readings).is_err() {
@@ -162,7 +166,7 @@ impl Transmitter {
             self.to_firmware.read_exact(part).expect("the host sends what it announced");
             let mut left = &part[..];
             while !left.is_empty() {
-                // A ring accepts bytes up to its end, then the rest.
+                // The ring buffer first accepts bytes up to its end, then the rest.
                 let taken = LINK.try_write(left).expect("the link takes 4096 bytes per tick");
                 left = left.get(taken..).unwrap_or_default();
             }

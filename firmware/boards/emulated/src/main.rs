@@ -1,5 +1,5 @@
-//! The image for the processor in the loop, on QEMU's STM32F405. A panic or fault ends the emulator with a distinct
-//! exit status.
+//! The image for processor-in-the-loop tests on QEMU's STM32F405. A panic ends the emulator with exit status 101, a
+//! fault with 102.
 #![no_std]
 #![no_main]
 

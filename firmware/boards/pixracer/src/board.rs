@@ -66,11 +66,11 @@ use firmware::executors::{self, priority};
 use firmware::vehicle::{CONFIGURATION, ROTORS};
 use static_cell::StaticCell;
 
-/// The crystal \[Hz\].
+/// Frequency of the crystal \[Hz\].
 const CRYSTAL_HZ: u32 = 24_000_000;
-/// Motors: four channels of one timer, two of another.
+/// Number of motor outputs: four channels of TIM1 and two of TIM4.
 const OUTPUTS: usize = 6;
-/// Motor of each channel, from 1.
+/// Motor number of each timer channel, from 1; 0 for none.
 const CHANNELS_OF_TIM1: [usize; 4] = [4, 3, 2, 1];
 const CHANNELS_OF_TIM4: [usize; 4] = [0, 5, 6, 0];
 
@@ -95,7 +95,7 @@ bind_interrupts!(struct Irqs {
     OTG_FS => embassy_stm32::usb::InterruptHandler<USB_OTG_FS>;
 });
 
-/// Each interrupt with its priority.
+/// Interrupts and their priorities.
 const PRIORITIES: [(Interrupt, u8); 17] = [
     (Interrupt::USART2, priority::UART),
     (Interrupt::USART3, priority::UART),
@@ -123,15 +123,16 @@ static GNSS_TX: StaticCell<[u8; TX_RING]> = StaticCell::new();
 static RADIO_TX: StaticCell<[u8; RADIO_RINGS[0]]> = StaticCell::new();
 static RADIO_RX: StaticCell<[u8; RADIO_RINGS[1]]> = StaticCell::new();
 
-/// Newest throttles, for the motors' tasks.
+/// Newest throttles, one signal for each motor task.
 static THROTTLES: [Throttles; 2] = [const { Throttles::new() }; 2];
 
 /// The board after start-up.
 pub(crate) struct Pixracer {
     watchdog: IndependentWatchdog<'static, IWDG>,
-    /// Index of the rotor of each output.
+    /// Index of the rotor at each output.
     rotors: [usize; OUTPUTS],
-    /// Held as they are: both supplies on, the memory on the barometer's SPI not selected.
+    /// Outputs held high: both supplies, and the chip select of the memory on the barometer's SPI, which stays
+    /// deselected.
     _held: [Output<'static>; 3],
 }
 
@@ -143,7 +144,7 @@ impl Board for Pixracer {
     type Log = SdCardLog;
     type Memory = Bank1Region1<'static, Blocking>;
     const CORE_HZ: u32 = clocks::CORE_HZ;
-    /// Sectors 1 and 2, of 16 KiB each (`memory.x`).
+    /// The parameters are in sectors 1 and 2, of 16 KiB each (`memory.x`), so they begin at 16 KiB.
     const STORE: u32 = 16 * 1024;
     const HARDWARE: &'static str = "pixracer";
     const OUTPUTS: usize = OUTPUTS;
@@ -162,7 +163,7 @@ impl Board for Pixracer {
         for (line, priority) in PRIORITIES {
             line.set_priority(Priority::from(priority));
         }
-        // The sensors have their supply before a line to them is high.
+        // The sensors must have their supply before a line to them is high.
         let held = [
             Output::new(p.PE3, Level::High, Speed::Low),
             Output::new(p.PC5, Level::High, Speed::Low),
@@ -177,7 +178,7 @@ impl Board for Pixracer {
         link::invert_by(p.PC13);
         let heater = Line::of(p.PC6.reborrow());
         let radio = BufferedUart::new(p.USART6, p.PC7, p.PC6, tx, rx, Irqs, link::radio());
-        // An idle TX is high.
+        // An idle TX would be high and switch the heater on.
         heater.hold_low();
         let uarts = [first, second, radio];
         let [first, second, radio] = uarts.map(|uart| link::new(uart.expect("the baud rate divides the clock")));
@@ -210,7 +211,7 @@ impl Board for Pixracer {
             barometer: Driver::new(Ms5611::default(), SpiRegisters::new(barometer, format), Polled),
             compass: Driver::new(Qmc5883l, I2cRegisters::new(outside, 0x0D), Polled),
             receiver: receiver.expect("the baud rate divides the clock"),
-            // By the common power module; the board's page has another one's.
+            // Scale of the common power module. The board's page lists another module's.
             battery: BatteryConverter::new(
                 Adc::new(p.ADC1),
                 p.PA2,
@@ -241,7 +242,7 @@ impl Board for Pixracer {
         let (led, buzzer) = (Led::new(p.PB1), PassiveBuzzer::new(p.TIM2, p.PA15));
         executors::housekeeping().spawn(executors::once(indicator(led, buzzer)));
 
-        // A debugger that halts the core halts the watchdog.
+        // While a debugger halts the core, the watchdog is halted too.
         pac::DBGMCU.apb1fzr().modify(|freeze| freeze.set_iwdg(true));
         let rotors = rotors_of_outputs(numbering::ARDUPILOT, &CONFIGURATION.airframe.rotors);
         Parts {
@@ -262,7 +263,7 @@ impl Board for Pixracer {
         self.watchdog.unleash();
     }
 
-    /// True if the crystal has failed and the chip's own oscillator has taken over.
+    /// Returns true if the crystal has failed and the chip's own oscillator has taken over.
     fn clock_has_failed(&self) -> bool {
         crystal::has_failed()
     }
@@ -286,14 +287,14 @@ impl Board for Pixracer {
 #[embassy_executor::task]
 async fn motors_1_to_4(mut motors: Motors<TIM1, DMA2_CH5, Irqs, u16>) {
     let [throttles, _] = &THROTTLES;
-    // No line for their telemetry.
+    // No telemetry line is connected for these motors.
     motors.run(throttles, [None; 4]).await
 }
 
 #[embassy_executor::task]
 async fn motors_5_and_6(mut motors: Motors<TIM4, DMA1_CH6, Irqs, u16>) {
     let [_, throttles] = &THROTTLES;
-    // No line for their telemetry.
+    // No telemetry line is connected for these motors.
     motors.run(throttles, [None; 4]).await
 }
 
@@ -302,7 +303,7 @@ async fn indicator(led: Led, buzzer: PassiveBuzzer<TIM2>) {
     chip_stm32::indicator::run(Some(led), buzzer).await
 }
 
-/// Stops the motors' signals, whatever state the program is in.
+/// Stops the motors' signals in any state of the program.
 pub(crate) fn stop_motors() {
     hold_low(pac::GPIOE, [9, 11, 13, 14]);
     hold_low(pac::GPIOD, [13, 14]);

@@ -1,4 +1,4 @@
-//! The sensors of a Pixracer. IMUs and compass face down; their x points forward.
+//! The sensors of a Pixracer. The IMUs and the internal compass face down; their x axes point forward.
 
 use afbc_drivers::alignment::{CW180_FLIP, turned};
 use afbc_drivers::lis3mdl::Lis3mdl;
@@ -21,16 +21,16 @@ use firmware::samples::Sampler;
 use firmware::self_tests::{FIRST_IMU, SECOND_IMU, sensor};
 use firmware::{aux_sensors, samples};
 
-/// True once a compass outside has been read: then the one inside, beside the currents, is not used.
+/// True once an external compass has been read. The internal compass, near the power currents, is not used then.
 static IS_COMPASS_OUTSIDE: AtomicBool = AtomicBool::new(false);
 
-/// The inertial sensors and the compass inside, on one SPI.
+/// The inertial sensors and the internal compass, on one SPI bus.
 pub(crate) struct Inside {
     pub(crate) spi: Spi<'static, Async, spi::mode::Master>,
     pub(crate) kernel_hz: u32,
-    /// Select pins of ICM-20608-G, MPU-9250 and LIS3MDL.
+    /// Chip selects of ICM-20608-G, MPU-9250 and LIS3MDL.
     pub(crate) selects: [Output<'static>; 3],
-    /// Interrupts of the IMUs.
+    /// Interrupt pins of the IMUs.
     pub(crate) ready: [InterruptPin; 2],
 }
 
@@ -41,7 +41,7 @@ impl Sampler for Inside {
         let spi = SharedSpi::new(self.spi);
         let [first, second, compass] = self.selects;
         let [first_ready, second_ready] = self.ready.map(interrupted);
-        // Without edges, the first one's turn comes first in every control period.
+        // Without interrupt edges, the first IMU is read first in every control period.
         join3(
             run(driver(Icm20608 {}, &spi, first, self.kernel_hz, first_ready), FIRST_IMU, |reading| {
                 samples::put_first_imu(reading.at_us, turned(&reading.value, &CW180_FLIP));
@@ -59,7 +59,7 @@ impl Sampler for Inside {
     }
 }
 
-/// A part on the shared SPI, which is fed with `kernel_hz`.
+/// Returns the driver of a part on the shared SPI bus, whose kernel clock is `kernel_hz`.
 fn driver<'a, P: SensorPart, T: PartTiming>(
     part: P,
     spi: &'a SharedSpi,
@@ -71,7 +71,7 @@ fn driver<'a, P: SensorPart, T: PartTiming>(
     Driver::new(part, SpiRegisters::new(SharedDevice::new(spi, select, kernel_hz, format.clock_hz), format), timing)
 }
 
-/// The slow sensors.
+/// The slow sensors, and the external compass and GNSS receiver.
 pub(crate) struct Aids {
     pub(crate) barometer: Driver<Ms5611, SpiRegisters<Device>, Polled>,
     pub(crate) compass: Driver<Qmc5883l, I2cRegisters<Bus>, Polled>,

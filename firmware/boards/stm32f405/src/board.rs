@@ -27,7 +27,7 @@ use firmware::samples::NoSensors;
 use firmware::vehicle::ROTORS;
 use static_cell::StaticCell;
 
-/// The crystal \[Hz\].
+/// Frequency of the crystal \[Hz\].
 const CRYSTAL_HZ: u32 = 8_000_000;
 
 bind_interrupts!(struct Irqs {
@@ -40,7 +40,7 @@ bind_interrupts!(struct Irqs {
 static RX: StaticCell<[u8; 1024]> = StaticCell::new();
 static TX: StaticCell<[u8; 1024]> = StaticCell::new();
 
-/// Newest throttles, for the motors' task.
+/// Newest throttles for the motor task.
 static THROTTLES: Throttles = Throttles::new();
 
 /// The board after start-up.
@@ -56,10 +56,10 @@ impl Board for Stm32f405 {
     type Log = firmware::logging::NoLog;
     type Memory = Bank1Region1<'static, Blocking>;
     const CORE_HZ: u32 = clocks::CORE_HZ;
-    /// Sectors 1 and 2, of 16 KiB each (`memory.x`).
+    /// The parameters are in sectors 1 and 2, of 16 KiB each (`memory.x`), so they begin at 16 KiB.
     const STORE: u32 = 16 * 1024;
     const HARDWARE: &'static str = "stm32f405";
-    /// The channels of one timer.
+    /// The channels of one timer drive all motors.
     const OUTPUTS: usize = CHANNELS;
     const BOOT_LOADER: Option<fn() -> !> = Some(boot_loader::restart);
 
@@ -80,7 +80,7 @@ impl Board for Stm32f405 {
         interrupt::DMA2_STREAM1.set_priority(Priority::from(priority::MOTOR_DMA));
         control.spawn(executors::once(self::motors(motors)));
 
-        // A debugger that halts the core halts the watchdog.
+        // While a debugger halts the core, the watchdog is halted too.
         pac::DBGMCU.apb1fzr().modify(|freeze| freeze.set_iwdg(true));
         let board = Stm32f405 { watchdog: watchdog(p.IWDG) };
         Parts {
@@ -101,7 +101,7 @@ impl Board for Stm32f405 {
         self.watchdog.unleash();
     }
 
-    /// True if the crystal has failed and the chip's own oscillator has taken over.
+    /// Returns true if the crystal has failed and the chip's own oscillator has taken over.
     fn clock_has_failed(&self) -> bool {
         crystal::has_failed()
     }
@@ -111,7 +111,7 @@ impl Board for Stm32f405 {
     }
 
     fn drive(&mut self, throttles: [u16; ROTORS]) {
-        // An output without a motor stays at 0.
+        // Outputs without a motor stay at 0.
         let mut outputs = [0; CHANNELS];
         outputs.iter_mut().zip(throttles).for_each(|(output, throttle)| *output = throttle);
         THROTTLES.signal(outputs);
@@ -124,11 +124,11 @@ impl Board for Stm32f405 {
 
 #[embassy_executor::task]
 async fn motors(mut motors: Motors<TIM8, DMA2_CH1, Irqs, u16>) {
-    // No line for their telemetry.
+    // No telemetry line is connected for these motors.
     motors.run(&THROTTLES, [None; CHANNELS]).await
 }
 
-/// Stops the motors' signals, whatever state the program is in.
+/// Stops the motors' signals in any state of the program.
 pub(crate) fn stop_motors() {
     hold_low(pac::GPIOC, 6..=9);
 }

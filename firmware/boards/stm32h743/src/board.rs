@@ -58,11 +58,11 @@ use firmware::executors::{self, priority};
 use firmware::vehicle::ROTORS;
 use static_cell::StaticCell;
 
-/// The crystal \[Hz\].
+/// Frequency of the crystal \[Hz\].
 const CRYSTAL_HZ: u32 = 8_000_000;
-/// Clock of the IMUs' buses \[Hz\], an eighth of their kernel's; the parts allow 24 MHz.
+/// Clock of the IMUs' SPI buses \[Hz\], an eighth of their kernel clock. The parts allow 24 MHz.
 const SPI_HZ: u32 = 12_500_000;
-/// Interrupts of the sensors, and of their transfers.
+/// Interrupts of the IMUs and of their transfers. `AID_INTERRUPTS` has those of the other sensors.
 const IMU_INTERRUPTS: [Interrupt; 6] = [
     Interrupt::DMA1_STREAM2,
     Interrupt::DMA1_STREAM3,
@@ -81,7 +81,7 @@ const AID_INTERRUPTS: [Interrupt; 8] = [
     Interrupt::I2C2_EV,
     Interrupt::I2C2_ER,
 ];
-/// Motors: the channels of two timers.
+/// Number of motor outputs: the channels of two timers.
 const OUTPUTS: usize = 2 * CHANNELS;
 
 bind_interrupts!(struct Irqs {
@@ -112,14 +112,14 @@ bind_interrupts!(struct Irqs {
 /// Ring buffers of the links and of the GNSS receiver.
 static RX: [StaticCell<[u8; 1024]>; 3] = [const { StaticCell::new() }; 3];
 static TX: [StaticCell<[u8; 1024]>; 3] = [const { StaticCell::new() }; 3];
-/// The same of the motor controllers' line.
+/// Ring buffers of the ESC telemetry line.
 static ESCS_RX: StaticCell<[u8; escs::RX_RING]> = StaticCell::new();
 static ESCS_TX: StaticCell<[u8; escs::TX_RING]> = StaticCell::new();
 
-/// Newest throttles, for the motors' tasks.
+/// Newest throttles, one signal for each motor task.
 static THROTTLES: [Throttles; 2] = [const { Throttles::new() }; 2];
 
-/// An IMU with its interrupt.
+/// Returns the driver of an IMU with its interrupt pin.
 fn imu<P: SensorPart>(part: P, device: Device, ready: InterruptPin) -> Driver<P, SpiRegisters<Device>, Interrupted> {
     Driver::new(part, SpiRegisters::new(device, P::SPI.expect("an IMU on SPI")), interrupted(ready))
 }
@@ -194,7 +194,7 @@ impl Board for Stm32h743 {
                 Adc::new(p.ADC1),
                 p.PC0,
                 p.PC1,
-                // 16 bits, as the converter has after its reset.
+                // 16 bits is the ADC's resolution after a reset.
                 (u16::MAX, |adc, pin| adc.blocking_read(pin, SampleTime::CYCLES387_5)),
                 BatteryScale { volts_per_volt: 11.0, amperes_per_volt: 40.0 },
             ),
@@ -224,7 +224,7 @@ impl Board for Stm32h743 {
         let (led, buzzer) = (Led::new(p.PE3), PassiveBuzzer::new(p.TIM2, p.PA15));
         executors::housekeeping().spawn(executors::once(indicator(led, buzzer)));
 
-        // A debugger that halts the core halts the watchdog.
+        // While a debugger halts the core, the watchdog is halted too.
         pac::DBGMCU.apb4fzr1().modify(|freeze| freeze.set_iwdg1(true));
         let board = Stm32h743 { watchdog: watchdog(p.IWDG1) };
         Parts { board, sampler, aids, links, memory: Words::new(p.FLASH), log: sd_card::new(interface) }
@@ -238,7 +238,7 @@ impl Board for Stm32h743 {
         self.watchdog.unleash();
     }
 
-    /// True if the crystal has failed and the chip's own oscillator has taken over.
+    /// Returns true if the crystal has failed and the chip's own oscillator has taken over.
     fn clock_has_failed(&self) -> bool {
         crystal::has_failed()
     }
@@ -248,7 +248,7 @@ impl Board for Stm32h743 {
     }
 
     fn drive(&mut self, throttles: [u16; ROTORS]) {
-        // An output without a motor stays at 0.
+        // Outputs without a motor stay at 0.
         let mut outputs = [[0; CHANNELS]; 2];
         outputs.as_flattened_mut().iter_mut().zip(throttles).for_each(|(output, throttle)| *output = throttle);
         THROTTLES.iter().zip(outputs).for_each(|(throttles, outputs)| throttles.signal(outputs));
@@ -276,7 +276,7 @@ async fn indicator(led: Led, buzzer: PassiveBuzzer<TIM2>) {
     chip_stm32::indicator::run(Some(led), buzzer).await
 }
 
-/// Stops the motors' signals, whatever state the program is in.
+/// Stops the motors' signals in any state of the program.
 pub(crate) fn stop_motors() {
     hold_low(pac::GPIOA, 0..=3);
     hold_low(pac::GPIOD, 12..=15);

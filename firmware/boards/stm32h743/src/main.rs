@@ -1,4 +1,4 @@
-//! The image that flies, on an STM32H743VI. Pins, timers and memory are in [`board`].
+//! The flight image for an STM32H743VI. Pins, timers and memory are in [`board`].
 #![no_std]
 #![no_main]
 
@@ -7,8 +7,8 @@ mod sensors;
 
 use defmt_rtt as _;
 
-// The interrupt lines of the display controller, of HDMI, of the JPEG codec, of the camera and of serial audio, which
-// this firmware does not need.
+// The executors run on the interrupt lines of the display controller, HDMI, JPEG codec, camera and serial audio, which
+// this firmware does not use otherwise.
 firmware::image!(
     board::Stm32h743, control: LTDC, comms: LTDC_ER, housekeeping: CEC, sampling: JPEG, aiding: DCMI,
     logging: SAI1

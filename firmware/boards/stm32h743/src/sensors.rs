@@ -1,5 +1,5 @@
-//! The sensors of the Matek H743. Both IMUs face down, the first turned by 180 degrees, the second by 270; their axes,
-//! and the compass's, are turned to the body's (x forward, y left, z up) here.
+//! The sensors of the Matek H743. Both IMUs face down, the first turned by 180 degrees, the second by 270. The readings
+//! of IMUs and compass are rotated here to the body axes (x forward, y left, z up).
 
 use afbc_drivers::alignment::{CW0_FLIP, CW90_FLIP, turned};
 use afbc_drivers::dps310::Dps310;
@@ -39,7 +39,7 @@ impl Sampler for Imus {
     }
 }
 
-/// The slow sensors.
+/// The slow sensors and the GNSS receiver.
 pub(crate) struct Aids {
     pub(crate) compass: Driver<Qmc5883l, I2cRegisters<Bus>, Polled>,
     pub(crate) barometer: Driver<Dps310, I2cRegisters<Bus>, Polled>,

@@ -1,7 +1,7 @@
 //! Matek F405-SE; `docs/boards/matek-f405-se.md` shows the wiring.
 //!
-//! The compass shares I2C1 with the barometer: I2C2 would need DMA1's stream 7 as I2C1 does, whose other one, stream 6,
-//! is that of TIM4.
+//! The compass shares I2C1 with the barometer. I2C2 would need stream 7 of DMA1, which I2C1 uses; I2C1's alternative,
+//! stream 6, belongs to TIM4.
 //!
 //! | Betaflight's description | |
 //! |---|---|
