@@ -1,9 +1,9 @@
-"""Adaptive fuzzy backstepping control (AFBC) of a quadrotor, its peers, and the plant they fly.
+"""Adaptive fuzzy backstepping control (AFBC) of a quadrotor, other control laws, and the plant that they fly.
 
-The same compiled code as `sitl` flies: a flight has the same bits here, there and on a board.
+The package runs the same compiled code as `sitl`. A flight gives the same bits in Python, in `sitl` and on a board.
 
-Frames: earth z up, body x forward, y left, z up; attitudes are Euler angles roll, pitch, yaw (z-y-x). Units are SI and
-stand in every name.
+Frames: earth z up, body x forward, y left, z up. Attitudes are Euler angles roll, pitch, yaw (z-y-x). Units are SI, and
+each name ends in its unit.
 
     >>> import afbc
     >>> flight = afbc.fly("hover", ["afbc"])["afbc"]
@@ -80,10 +80,10 @@ _Named = Scenario | _Path
 
 
 class Law(Protocol):
-    """A law of one's own."""
+    """A control law written by the user."""
 
     def step(self, state: State, setpoint: Setpoint, fresh: bool) -> ArrayLike:
-        """Returns the demanded U1, U2, U3, U4 [N]; a state that is not `fresh` repeats the last one."""
+        """Returns the demanded U1, U2, U3, U4 [N]. A state that is not `fresh` repeats the last one."""
 
 
 _Make = Callable[[OwnVehicle], Law]
@@ -92,7 +92,7 @@ _Controllers = str | Sequence[str] | Mapping[str, _Make | None] | None
 
 @contextmanager
 def _bar(shown: bool, total: int | None, unit: str) -> Iterator[Callable[[int], object] | None]:
-    """Yields what is called with the number done: a bar of tqdm, if that is installed and wanted."""
+    """Yields a function to call with the number of finished units: it moves a tqdm bar. Yields None without a bar."""
     try:
         from tqdm.auto import tqdm
     except ImportError:
@@ -105,9 +105,9 @@ def _bar(shown: bool, total: int | None, unit: str) -> Iterator[Callable[[int], 
 
 
 def frame(columns: Mapping[str, Any]) -> Any:
-    """Returns columns as a data frame: of polars or else of pandas, whichever is installed; the columns otherwise.
+    """Returns columns as a data frame of polars, else of pandas; the columns themselves if neither is installed.
 
-    A flight's log (`frame(flight.columns)`), or what `compare`, `campaign` and `replay` made.
+    `columns` is a flight's log, as in `frame(flight.columns)`. `compare`, `campaign` and `replay` call this themselves.
     """
     columns = _check.mapping("columns", columns, "a mapping of names to arrays is")
     try:
@@ -130,15 +130,15 @@ def register(
     title: str | None = None,
     gains: Mapping[str, float | tuple[float, float, float]] | None = None,
 ) -> None:
-    """Makes a law of one's own fly wherever a built-in one does: in `fly`, `compare`, `campaign` and `tune`, and in
-    scenario and vehicle files.
+    """Registers a law of your own, which then flies wherever a built-in one does: in `fly`, `compare`, `campaign`,
+    `tune`, scenario files and vehicle files.
 
     `make(vehicle)` is called at the start of each flight with an `OwnVehicle`; a class with that constructor will do.
-    It returns an object whose `step(state, setpoint, fresh)` returns the demanded U1, U2, U3, U4 [N] once a time step:
-    U1 and U2 are the moments about body x and y over the arm, U3 the moment about body z over d/b, U4 the thrust. A
-    state that is not `fresh` repeats the last one. `gains` maps a name to (default, smallest, largest) or to a default;
-    the range is where `tune` searches, from a twentieth of the default to twenty times it unless it is given. A law of
-    the same name is replaced.
+    It returns an object whose `step(state, setpoint, fresh)` returns the demanded U1, U2, U3, U4 [N] in every time
+    step. U1 and U2 are the moments about body x and y divided by the arm, U3 is the moment about body z divided by
+    d/b, and U4 is the thrust. A state that is not `fresh` repeats the last one. `gains` maps each name to (default,
+    smallest, largest) or to a default. `tune` searches this range; without one, it searches from a twentieth of the
+    default to twenty times the default. A law of the same name is replaced.
     """
     gains = _check.mapping("gains", {} if gains is None else gains, "a mapping of names to numbers is")
     _afbc.register(name, make, title=title, gains=[(gain, _range(gain, value)) for gain, value in gains.items()])
@@ -158,7 +158,7 @@ def _range(gain: str, value: Any) -> tuple[float, float, float]:
 
 
 def _controllers(controllers: _Controllers) -> list[str] | None:
-    """Registers the laws in a mapping of names, and returns the names."""
+    """Returns the names of the controllers. If a mapping of names to laws is given, registers the laws first."""
     if controllers is None or isinstance(controllers, str):
         return None if controllers is None else [controllers]
     if not isinstance(controllers, Mapping):
@@ -170,7 +170,7 @@ def _controllers(controllers: _Controllers) -> list[str] | None:
 
 
 def _list(scenarios: _Named | Sequence[_Named]) -> list[_Named]:
-    """Returns one scenario, or several, as a list."""
+    """Returns one or several scenarios as a list."""
     if isinstance(scenarios, (str, Scenario, PathLike)):
         return [scenarios]
     return _check.several("scenarios", scenarios, "an afbc.Scenario, a name, a path, or several of them are")
@@ -187,11 +187,11 @@ def fly(
     threads: int | None = None,
     progress: bool = False,
 ) -> dict[str, Flight]:
-    """Flies a scenario, and returns the flights by contender: the same as `sitl fly`, in every bit.
+    """Flies a scenario and returns the flights by contender. They equal those of `sitl fly` in every bit.
 
-    `scenario` is a `Scenario`, the name of a built-in one, or the path of a file. `controllers` are names of its
-    contenders or of laws; a mapping of names to laws of one's own registers these (None for a built-in one). By default
-    all of its contenders fly.
+    `scenario` is a `Scenario`, the name of a built-in one, or the path of a file. `controllers` are names of the
+    scenario's contenders or of laws. A mapping of names to laws of your own registers these (None for a built-in law).
+    By default, all of the scenario's contenders fly.
     """
     names = _controllers(controllers)
     with _bar(progress, len(names) if names else None, "flight") as shown:
@@ -218,9 +218,9 @@ def compare(
 ) -> Any:
     """Flies scenarios under the same contenders, each with `seeds` consecutive seeds, on all cores.
 
-    As `sitl compare`: a scenario flies with ten seeds unless another number is given, or with one if no seed changes
-    it. Returns a data frame (see `frame`) with a row for each flight: scenario, contender, seed, lost_at_s, lost_reason
-    and the figures of merit.
+    The defaults are those of `sitl compare`: ten seeds, or one for a scenario that no seed changes. Returns a data
+    frame (see `frame`) with a row for each flight: scenario, contender, seed, lost_at_s, lost_reason and the figures
+    of merit.
     """
     with _bar(progress, None, "flight") as shown:
         return frame(
@@ -245,11 +245,11 @@ def campaign(
     threads: int | None = None,
     progress: bool = False,
 ) -> Any:
-    """Flies a campaign, built in or of a file: one scenario, many times, with drawn vehicles, weather and faults.
+    """Flies a campaign, built in or from a file: one scenario, many times, with drawn vehicles, weather and faults.
 
-    Returns a data frame with a row for each flight of each contender: what was drawn, and the figures of merit. With
-    `out`, results and report are kept in this folder as `sitl campaign` keeps them, and the same call resumes. `shard`,
-    "I/N" with I from 1 to N, flies every N-th flight only, from the I-th on; `merge` joins all shards.
+    Returns a data frame with a row for each flight of each contender: the drawn values and the figures of merit. With
+    `out`, results and report are kept in this folder, as by `sitl campaign`, and the same call resumes. `shard`, "I/N"
+    with I from 1 to N, flies only every N-th flight, from the I-th on; `merge` merges all shards.
     """
     with _bar(progress, flights, "flight") as shown:
         return frame(
@@ -260,9 +260,9 @@ def campaign(
 
 
 def merge(shards: Sequence[_Path], out: _Path) -> Any:
-    """Joins all shards of a campaign, each in its folder, into the folder `out`: the same bytes as on one machine.
+    """Merges the folders of all shards of a campaign into the folder `out`, with the same bytes as on one machine.
 
-    Returns a data frame as `campaign` does.
+    Returns the data frame that `campaign` would return.
     """
     return frame(_afbc.merge(_check.several("shards", shards, "the folders of all shards are"), out))
 
@@ -279,10 +279,10 @@ def tune(
     threads: int | None = None,
     progress: bool = False,
 ) -> dict[str, Any]:
-    """Searches for gains of a law by CMA-ES, as `sitl tune` does: on the training flights, or on these scenarios.
+    """Searches for gains of a law by CMA-ES, as `sitl tune` does, on the training flights or on the given scenarios.
 
-    Returns a dict: cost `before` and `after`, the number of `evaluations`, the `gains` found, and the `text` for a
-    scenario file. `flying` starts from the gains that fly instead of hand-tuned ones.
+    Returns a dict: costs `before` and `after`, the number of `evaluations`, the `gains` found, and their `text` for a
+    scenario or vehicle file. `flying` starts from the present flight gains instead of hand-tuned ones.
     """
     with _bar(progress, budget, "try") as shown:
         return _afbc.tune(
@@ -299,8 +299,8 @@ def tune(
 
 
 def replay(log: _Path) -> Any:
-    """Runs the estimator over a recorded flight (ULog of PX4 or of this firmware, or a CSV of PX4-ECL).
+    """Runs the estimator over a recorded flight: a ULog of PX4 or of this firmware, or a CSV file of PX4-ECL.
 
-    Returns a data frame: our estimate, its standard deviations, and the log's own estimate.
+    Returns a data frame with our estimate, its standard deviations, and the estimate in the log.
     """
     return frame(_afbc.replay(log))

@@ -1,4 +1,4 @@
-"""Types of the compiled part. Frames: earth z up; body x forward, y left, z up. SI units stand in every name."""
+"""Types of the compiled part. Frames: earth z up; body x forward, y left, z up. Names end in their SI units."""
 
 from collections.abc import Callable, Mapping, Sequence
 from os import PathLike
@@ -44,7 +44,7 @@ _Path = str | PathLike[str]
 _Progress = Callable[[int], object] | None
 
 class AfbcError(ValueError):
-    """Bad input, in the words of the command line: file, place, cure; a line for each mistake of a file."""
+    """Bad input, described as on the command line: file, place and cure, with a line for each mistake of a file."""
 
 @final
 class State:
@@ -71,7 +71,7 @@ class State:
 
 @final
 class Setpoint:
-    """Desired motion, earth frame: position with four derivatives, heading with two."""
+    """Desired motion in the earth frame: position with four derivatives, heading with two."""
 
     def __new__(
         cls,
@@ -103,7 +103,7 @@ class Setpoint:
 
 @final
 class Vehicle:
-    """A vehicle: a built-in one by name, or of a file by path."""
+    """A vehicle: a built-in one by name, or one from a file by path."""
 
     def __new__(cls, name: _Path) -> Self: ...
     @staticmethod
@@ -131,7 +131,7 @@ class Vehicle:
 
 @final
 class Scenario:
-    """One vehicle, one trajectory, one environment, the contenders to compare: built in, or of a file by path."""
+    """A vehicle, trajectory, environment and the contenders to compare: built in by name, or from a file by path."""
 
     def __new__(cls, name: _Path) -> Self: ...
     @staticmethod
@@ -155,9 +155,9 @@ class Scenario:
     def parameters(self) -> dict[str, Any]: ...
     @property
     def polynomials(self) -> list[tuple[float, float, _Array]] | None:
-        """Start [s], length [s] and coefficients, shape (4, 8), of each piece of a path of polynomials."""
+        """Start [s], length [s] and coefficients, shape (4, 8), of each piece of a polynomial path."""
     def reference(self, time_s: ArrayLike) -> dict[str, _Array]:
-        """The reference at these times [s], a column for each coordinate and derivative."""
+        """Returns the reference at these times [s]: a column for each coordinate and derivative."""
 
 @final
 class Flight:
@@ -180,7 +180,7 @@ class Flight:
 
 @final
 class Action:
-    """What a step decided."""
+    """Result of a controller's step."""
 
     @property
     def speeds_rad_s(self) -> _Array: ...
@@ -199,7 +199,7 @@ class Action:
 
 @final
 class Controller:
-    """A law on a vehicle, to be stepped: the very code that flies on a board."""
+    """A control law on a vehicle, step by step. It is the same code that flies on a board."""
 
     def __new__(
         cls,
@@ -258,7 +258,7 @@ class Plant:
 
 @final
 class Batch:
-    """Worlds of one scenario with consecutive seeds, stepped together on all cores without the GIL."""
+    """Simulated worlds of one scenario with consecutive seeds, stepped together on all cores without the GIL."""
 
     def __new__(
         cls,
@@ -283,7 +283,7 @@ class Batch:
 
 @final
 class OwnVehicle:
-    """What a law of one's own knows of the vehicle that it flies."""
+    """Data of the vehicle that a user's law flies."""
 
     @property
     def mass_kg(self) -> float: ...
@@ -310,7 +310,7 @@ class OwnVehicle:
 
 @final
 class Estimator:
-    """Position, velocity, attitude and biases from an inertial sensor and whatever else measures. Times in s."""
+    """Estimates position, velocity, attitude and biases from an inertial sensor and other measurements. Times in s."""
 
     def __new__(cls) -> Self: ...
     def pose(
@@ -353,7 +353,7 @@ class Estimator:
 
 @final
 class Instruments:
-    """The instruments of a scenario's vehicle, with their errors, delays and failures; they read any plant."""
+    """Instruments of a scenario's vehicle, with their errors, delays and failures. They can measure any plant."""
 
     def __new__(
         cls,
@@ -367,7 +367,7 @@ class Instruments:
 
 @final
 class FlightCore:
-    """The flight core of the firmware around a law, tick by tick at 1 kHz: arming, flight, coasting, descent."""
+    """The firmware's flight core around a control law, tick by tick at 1 kHz: arming, flight, coasting, descent."""
 
     def __new__(
         cls,
@@ -398,7 +398,7 @@ class FlightCore:
 
 @final
 class Guidance:
-    """Flight modes, trajectory limiter and safety net of the firmware, step by step."""
+    """The firmware's flight modes, trajectory limiter and safety net, step by step."""
 
     def __new__(cls, vehicle: Vehicle | _Path | None = None, *, dt_s: float = 0.001) -> Self: ...
     def take_off(self, height_m: float | None = None) -> None: ...

@@ -1,4 +1,4 @@
-"""Checks of arguments, which name the argument and say what is needed."""
+"""Checks of arguments. Their errors name the argument and the value that is needed."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ._afbc import AfbcError
 
-#: Seeds: as many as the compiled part takes.
+#: Largest seed that the compiled part accepts.
 SEED_MAX = 2**63 - 1
 
 
@@ -57,7 +57,7 @@ def number(name: str, value: Any, least: float, most: float) -> float:
 
 
 def finite(name: str, values: Any, shape: tuple[int, ...]) -> NDArray[np.float64]:
-    """Returns finite numbers of this shape, as an array of one's own."""
+    """Returns a copy of finite numbers of this shape."""
     try:
         array = np.asarray(values)
     except ValueError:
@@ -85,7 +85,7 @@ def path(name: str, value: Any) -> str:
 
 
 def several(name: str, values: Any, needed: str) -> list[Any]:
-    """Returns what is in a list or the like; a text or a mapping is none."""
+    """Returns the items of a list or another collection. A text or a mapping is refused."""
     if not isinstance(values, Collection) or isinstance(values, (str, bytes, Mapping)):
         raise TypeError(f"{name}: {needed} needed, not {_kind(values)}")
     if isinstance(values, np.ndarray) and values.ndim == 0:
@@ -94,7 +94,7 @@ def several(name: str, values: Any, needed: str) -> list[Any]:
 
 
 def mapping(name: str, values: Any, needed: str) -> Mapping[Any, Any]:
-    """Returns a mapping."""
+    """Returns the value if it is a mapping."""
     if not isinstance(values, Mapping):
         raise TypeError(f"{name}: {needed} needed, not {_kind(values)}")
     return values

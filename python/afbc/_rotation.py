@@ -1,4 +1,4 @@
-"""Attitudes as other people's packages write them: unit quaternions x, y, z, w, body to earth."""
+"""Conversions to and from the attitudes of other packages: unit quaternions x, y, z, w, body to earth."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from numpy.typing import ArrayLike, NDArray
 from ._afbc import AfbcError
 from ._check import finite
 
-#: How far the length of a quaternion may be from 1: further than steps of any integrator take it.
+#: Largest accepted deviation of a quaternion's length from 1. No integrator's steps cause so much.
 OFF = 0.1
 
 
 def euler(quaternion: ArrayLike) -> tuple[float, float, float]:
-    """Returns roll, pitch, yaw [rad] of the z-y-x sequence. A quaternion of another length than 1 is no attitude."""
+    """Returns roll, pitch, yaw [rad] of the z-y-x sequence. Refuses a quaternion whose length is not 1."""
     given = finite("quaternion", quaternion, (4,))
     length = float(np.linalg.norm(given))
     if abs(length - 1.0) > OFF:
@@ -29,7 +29,7 @@ def euler(quaternion: ArrayLike) -> tuple[float, float, float]:
 
 
 def quaternion(attitude_rad: ArrayLike) -> NDArray[np.float64]:
-    """Returns x, y, z, w of roll, pitch, yaw [rad]."""
+    """Returns the quaternion x, y, z, w for roll, pitch, yaw [rad]."""
     roll, pitch, yaw = finite("attitude_rad", attitude_rad, (3,)) / 2
     (cr, sr), (cp, sp), (cy, sy) = ((cos(half), sin(half)) for half in (roll, pitch, yaw))
     return np.array(

@@ -1,4 +1,4 @@
-"""What the environments for learning share: vehicles that follow the reference of a scenario, each in its own world."""
+"""The task that the learning environments share: vehicles follow a scenario's reference, each in its own world."""
 
 from __future__ import annotations
 
@@ -12,33 +12,34 @@ from numpy.typing import NDArray
 from . import _afbc
 from ._check import SEED_MAX, finite, number, path, whole
 
-#: Numbers of an observation besides one for each rotor.
+#: Length of an observation without the last action, which has one number per rotor.
 MOTION = 15
 #: Largest number of vehicles.
 COUNT_MAX = 100_000
 
 
 class Task:
-    """`count` vehicles of one kind, stepped together; what they observe, and what they get for it.
+    """Steps `count` vehicles of one kind together, and computes their observations and rewards.
 
-    Actions, shape (count, rotors): the thrust of each rotor, from -1, none, to 1, the largest. Rotors lag and have
-    limits as the vehicle says.
+    Actions, shape (count, rotors): the thrust of each rotor, from -1 (none) to 1 (largest). The rotors have the lag and
+    limits of the vehicle.
 
     Observations, shape (count, 15 + rotors), earth frame z up, body frame x forward, y left, z up:
 
     | numbers | what | unit |
     |---|---|---|
-    | 0 to 2 | position less the reference's | m |
-    | 3 to 5 | velocity less the reference's | m/s |
-    | 6 to 8 | roll, pitch, heading less the reference's, the last within -pi to pi | rad |
+    | 0 to 2 | position minus the reference's | m |
+    | 3 to 5 | velocity minus the reference's | m/s |
+    | 6 to 8 | roll, pitch, and heading minus the reference's, within -pi to pi | rad |
     | 9 to 11 | body rates | rad/s |
     | 12 to 14 | acceleration of the reference | m/s2 |
     | 15 on | the last action | 1 |
 
-    They are what the scenario's sensors measure; in an outage the last ones stay. Reward of a step, from the true
-    motion: exp(-distance / 1 m) - 0.05 |heading error| / pi - 0.05 mean((action - last action)^2), so that 1 is the
-    most; 0 for the step in which a vehicle is lost. It is lost, and its episode terminated, when it tilts by 90 degrees
-    or is `far_m` away from its reference; an episode is truncated after `duration_s`.
+    Observations come from the scenario's sensors. During an outage, the last measurement stays. The reward of a step is
+    computed from the true motion: exp(-distance / 1 m) - 0.05 |heading error| / pi - 0.05 mean((action - last
+    action)^2). Its maximum is 1, and it is 0 for the step in which a vehicle is lost. A vehicle is lost, which
+    terminates its episode, when it tilts by 90 degrees or is `far_m` away from its reference. An episode is truncated
+    after `duration_s`.
     """
 
     def __init__(
@@ -66,15 +67,15 @@ class Task:
         self.far_m = number("far_m", far_m, 1e-3, 1e6)
         self.spread_m = number("spread_m", spread_m, 0.0, 1e3)
         self.spread_rad = number("spread_rad", spread_rad, 0.0, np.pi)
-        # Squares of the speeds over thrust.
+        # Square of the rotor speed at the largest thrust [rad2/s2].
         self._per_share = vehicle.rotor_force_max_n / vehicle.parameters["thrust_factor_n_s2"]
         self._start = self.batch.true_states[0]
         self.actions = np.zeros((count, self.rotors))
         self._seen = np.zeros((count, 12))
 
     def reset(self, index: int, random: np.random.Generator) -> None:
-        """Starts a vehicle again: from the scenario's start, moved by up to `spread_m` along each axis and turned by up
-        to `spread_rad`, with noise and weather of a seed of their own."""
+        """Restarts a vehicle from the scenario's start, moved by up to `spread_m` along each axis and turned by up to
+        `spread_rad` about each. Noise and weather get a new random seed."""
         whole("index", index, 0, len(self.batch) - 1)
         if not isinstance(random, np.random.Generator):
             raise TypeError(f"random: a numpy.random.Generator is needed, not {type(random).__name__}")
@@ -102,7 +103,7 @@ class Task:
     def step(
         self, actions: NDArray[np.floating]
     ) -> tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], NDArray[np.float64]]:
-        """Moves all vehicles by one action; returns rewards, which are lost, whose time is over, and distances [m]."""
+        """Moves all vehicles by one action. Returns rewards, flags of lost and of timed-out vehicles, distances [m]."""
         shares = np.clip(finite("actions", actions, self.actions.shape), -1.0, 1.0)
         self.batch.step(np.sqrt((1.0 + shares) / 2 * self._per_share), self.steps)
         states, references = self.batch.true_states, self.batch.references
@@ -118,7 +119,7 @@ class Task:
 
 
 def seeds(name: str, given: Any, count: int) -> list[int | None]:
-    """Returns a seed for each of `count` vehicles: of one, the consecutive ones; of a list, those in it."""
+    """Returns a seed for each of `count` vehicles: consecutive ones from a single seed on, or the seeds of a list."""
     if given is None:
         return [None] * count
     if not isinstance(given, (Sequence, np.ndarray)) or isinstance(given, (str, bytes)):
@@ -130,5 +131,5 @@ def seeds(name: str, given: Any, count: int) -> list[int | None]:
 
 
 def _turn(angle: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Returns angles [rad] within -pi to pi."""
+    """Returns the angles [rad] wrapped to -pi to pi."""
     return (angle + np.pi) % (2 * np.pi) - np.pi

@@ -1,9 +1,9 @@
-"""Crazyflow's controllers on our plant: the Crazyflie's Mellinger controller, of the package `drone-controllers`.
+"""Crazyflow's controllers on our plant: the Crazyflie's Mellinger controller from the package `drone-controllers`.
 
     afbc.fly("hover", {"mellinger": afbc.crazyflow.mellinger()}, vehicle="crazyflie")
 
-`drone-controllers` needs `SCIPY_ARRAY_API=1` in the environment before SciPy is imported; imported first, it sets that
-itself. Tried with drone-controllers 0.1.
+`drone-controllers` needs `SCIPY_ARRAY_API=1` in the environment before SciPy is imported. If it is imported before
+SciPy, it sets the variable itself. Tested with drone-controllers 0.1.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ POSITION_HZ, ATTITUDE_HZ = 100, 500
 
 
 class _Mellinger:
-    """Position to attitude to force and torque, each loop at its rate; in between, the last command is held."""
+    """Runs the position loop and the attitude loop, each at its rate. The last command is held in between."""
 
     def __init__(self, drone: str, vehicle: _afbc.OwnVehicle) -> None:
         from drone_controllers import parametrize
@@ -64,10 +64,10 @@ class _Mellinger:
 
 
 def mellinger(drone: str = "cf2x_L250") -> Callable[[_afbc.OwnVehicle], Any]:
-    """Returns Crazyflow's Mellinger controller with its parameters of this drone, as a law of one's own.
+    """Returns Crazyflow's Mellinger controller, with its parameters for this drone, as a law to register.
 
-    What `afbc.register` and `afbc.fly` take. Its position loop runs at 100 Hz, its attitude loop at 500 Hz. The moments
-    are those that it finds for its own drone; our harness allocates them to the rotors.
+    `afbc.register` and `afbc.fly` accept the result. The position loop runs at 100 Hz, the attitude loop at 500 Hz. The
+    moments are computed for the controller's own drone, and our simulator allocates them to the rotors.
     """
     if not isinstance(drone, str):
         raise TypeError(f"drone: the name of a drone is needed, not {type(drone).__name__}")

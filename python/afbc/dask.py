@@ -6,8 +6,8 @@
     with Client("tcp://scheduler:8786") as client:
         afbc.dask.campaign(client, "robustness.toml", shards=64, out="/results/robustness")
 
-The same shards that Slurm and Kubernetes fly (docs/campaigns.md), and the same bytes as on one machine. Tried with
-Dask 2026.8.
+The shards are the same as with Slurm and Kubernetes (docs/campaigns.md), and the results have the same bytes as on one
+machine. Tested with Dask 2026.8.
 """
 
 from __future__ import annotations
@@ -24,18 +24,18 @@ __all__ = ["campaign"]
 
 _Path = str | PathLike[str]
 
-#: Most tasks that a scheduler is asked to hold.
+#: Largest number of tasks that a scheduler gets.
 SHARDS_MAX = 100_000
 
 
 def _shard(campaign: str, shard: str, out: str, flights: int | None, vehicle: str | None) -> str:
-    """Flies a shard on a worker, with one core, since Dask gives each of a worker's threads a task of its own."""
+    """Flies a shard on a worker. It uses one core, since Dask gives each of a worker's threads its own task."""
     _campaign(campaign, flights=flights, vehicle=vehicle, shard=shard, out=out, threads=1)
     return out
 
 
 def _everywhere(named: str, built_in: list[str]) -> str:
-    """Returns the absolute path of a file, which workers in other folders find, or the name of a built-in one."""
+    """Returns a built-in name as it is, or the absolute path of a file, which workers in other folders also find."""
     return fspath(Path(named).resolve()) if named not in built_in and exists(named) else named
 
 
@@ -48,12 +48,12 @@ def campaign(
     flights: int | None = None,
     vehicle: _Path | None = None,
 ) -> Any:
-    """Flies a campaign on the workers of `client`, a `dask.distributed.Client`; returns the data frame of all flights.
+    """Flies a campaign on the workers of `client`, a `dask.distributed.Client`. Returns the data frame of all flights.
 
-    The workers need this package of the same version, and see campaign, vehicle and `out` under the same paths, as on a
-    cluster's shared file system. Finished flights are kept in `out`-parts: a shard whose worker has died goes on where
-    it was on another one, and so does the whole campaign by the same call. Shards, a task each, should be a few times
-    as many as threads of all workers. At the end they are joined into `out`.
+    The workers need the same version of this package, and must see campaign, vehicle and `out` under the same paths, as
+    on a cluster's shared file system. Finished flights are kept in `out`-parts. If a worker dies, another one continues
+    its shard, and the same call resumes a whole campaign. Each shard is a task; there should be a few times as many
+    shards as threads of all workers. At the end, the shards are merged into `out`.
     """
     for method in ("submit", "gather"):
         if not callable(getattr(client, method, None)):

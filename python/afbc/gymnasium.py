@@ -1,13 +1,13 @@
-"""Environments for Gymnasium: one vehicle, or many that are stepped together on all cores without the GIL.
+"""Environments for Gymnasium: one vehicle, or many vehicles stepped together on all cores without the GIL.
 
     env = afbc.gymnasium.FlightEnv("circle", "crazyflie")
     envs = afbc.gymnasium.FlightVectorEnv(1024, "circle", "crazyflie")
 
     gymnasium.make("afbc.gymnasium:afbc/Flight-v0", scenario="circle")
 
-Actions are rotor thrusts, observations errors from the scenario's reference; `afbc.gymnasium.Task` has units, shapes,
-rewards and ends. Vehicle i of the vector environment flies the same bits as a single one with the same seed. Tried with
-Gymnasium 1.4.
+Actions are rotor thrusts; observations are errors relative to the scenario's reference. `afbc.gymnasium.Task` describes
+units, shapes, rewards and the ends of episodes. Vehicle i of the vector environment flies the same bits as a single
+vehicle with the same seed. Tested with Gymnasium 1.4.
 """
 
 from __future__ import annotations
@@ -67,9 +67,9 @@ class FlightEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
 
 
 class FlightVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[np.float64]]):
-    """`num_envs` vehicles, each in a world of its own. `options` are those of `Task`.
+    """`num_envs` vehicles, each in its own world. `options` are those of `Task`.
 
-    A vehicle whose episode has ended starts again at the next step, which ignores its action and pays nothing
+    A vehicle whose episode has ended restarts in the next step, which ignores its action and gives no reward
     (`AutoresetMode.NEXT_STEP`). The info of a step has `distance_m`, shape (num_envs,).
     """
 
@@ -93,7 +93,7 @@ class FlightVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArra
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
-        """Starts all vehicles again, or those of `options["reset_mask"]`; of one seed, vehicle i has `seed + i`."""
+        """Restarts all vehicles, or those of `options["reset_mask"]`. With a single seed, vehicle i has `seed + i`."""
         given = seeds("seed", seed, self.num_envs)
         for index in np.flatnonzero(self._masked(options)):
             if given[index] is not None:
@@ -103,7 +103,7 @@ class FlightVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArra
         return self.task.observe(), {}
 
     def _masked(self, options: dict[str, Any] | None) -> NDArray[np.bool_]:
-        """Returns which vehicles start again."""
+        """Returns a flag for each vehicle that restarts."""
         if options is not None and not isinstance(options, Mapping):
             raise TypeError(f"options: a mapping is needed, not {type(options).__name__}")
         mask = (options or {}).get("reset_mask")

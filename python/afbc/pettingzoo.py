@@ -1,9 +1,9 @@
-"""An environment for PettingZoo: several vehicles, an agent each, all in flight at once.
+"""An environment for PettingZoo: several vehicles in flight at once, each of them an agent.
 
     env = afbc.pettingzoo.FlightParallelEnv(4, "circle", "crazyflie")
 
-Each follows the reference of the scenario in a world of its own: they do not touch or see each other. Actions,
-observations, rewards and ends are those of `afbc.gymnasium.Task`. Tried with PettingZoo 1.27.
+Each vehicle follows the scenario's reference in its own world: vehicles do not touch or see each other. Actions,
+observations, rewards and the ends of episodes are those of `afbc.gymnasium.Task`. Tested with PettingZoo 1.27.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ class FlightParallelEnv(ParallelEnv):
         return self.action_spaces[agent]
 
     def reset(self, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[_Each, _Each]:
-        """Starts all vehicles again; vehicle i has `seed + i`."""
+        """Restarts all vehicles. Vehicle i has the seed `seed + i`."""
         self.agents = list(self.possible_agents)
         for index, own in enumerate(seeds("seed", seed, len(self.agents))):
             if own is not None:
@@ -79,7 +79,7 @@ class FlightParallelEnv(ParallelEnv):
         return each
 
     def _actions(self, actions: dict[str, NDArray[np.float32]]) -> NDArray[np.float64]:
-        """Returns an action for each vehicle; one whose episode has ended is out: its rotors stand still."""
+        """Returns an action for each vehicle. The rotors of a vehicle whose episode has ended stand still."""
         given = mapping("actions", actions, "a mapping of agents to actions is")
         unknown = [agent for agent in given if agent not in self.possible_agents]
         missing = [agent for agent in self.agents if agent not in given]
@@ -93,5 +93,5 @@ class FlightParallelEnv(ParallelEnv):
         return shares
 
     def _of(self, values: Any) -> _Each:
-        """Returns what belongs to each agent that flies."""
+        """Returns the values of the agents that still fly, by agent."""
         return {agent: value for agent, value in zip(self.possible_agents, values) if agent in self.agents}

@@ -1,4 +1,4 @@
-"""RotorPy beside this package: our laws fly its vehicles, winds and trajectories; its controllers fly our plant.
+"""Bridge to RotorPy: our laws fly its vehicles, winds and trajectories, and its controllers fly our plant.
 
     from rotorpy.environments import Environment
     from rotorpy.vehicles.multirotor import Multirotor
@@ -12,8 +12,8 @@
     from rotorpy.controllers.quadrotor_control import SE3Control
     afbc.fly("hover", {"se3": afbc.rotorpy.law(SE3Control)}, vehicle="hummingbird")
 
-Both use the same axes: earth z up, body x forward, y left, z up. What follows needs numpy only; RotorPy is imported by
-whoever flies in it. Tried with RotorPy 3.0.
+Both use the same axes: earth z up, body x forward, y left, z up. This module only needs numpy; import RotorPy to fly in
+it. Tested with RotorPy 3.0.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ _Vehicle = _afbc.Vehicle | str | PathLike[str]
 
 #: RotorPy's gravity [m/s2], which cannot be changed.
 GRAVITY_M_S2 = 9.81
-#: Effects that our plant has not: products of inertia, induced inflow, translational lift, blade flapping.
+#: Parameters of effects that our plant lacks: products of inertia, induced inflow, translational lift, blade flapping.
 _OTHERS = ("Ixy", "Ixz", "Iyz", "k_z", "k_h", "k_flap")
 
 
@@ -54,10 +54,10 @@ def _found(named: _Vehicle) -> _afbc.Vehicle:
 
 
 def parameters(vehicle: _Vehicle) -> dict[str, Any]:
-    """Returns a vehicle of ours as the dictionary that RotorPy's `Multirotor` and its controllers take.
+    """Returns one of our vehicles as the dictionary that RotorPy's `Multirotor` and its controllers take.
 
-    Of four rotors that lag, since RotorPy's do. RotorPy has no inertia of the rotors, no battery, no centre of drag:
-    these are left out, and its ground, if enabled, is its own.
+    The vehicle must have four rotors with a lag, like RotorPy's. RotorPy has no rotor inertia, battery or centre of
+    drag, so these are left out. Its ground, if enabled, is its own.
     """
     vehicle = _found(vehicle)
     of, drag = vehicle.parameters, vehicle.drag or {"blade_n_s2_m": 0.0, "body_n_s2_m2": [0.0] * 3}
@@ -88,9 +88,9 @@ def parameters(vehicle: _Vehicle) -> dict[str, Any]:
 
 
 def to_vehicle(parameters: Mapping[str, Any], name: str = "rotorpy") -> _afbc.Vehicle:
-    """Returns a vehicle of RotorPy's, by its dictionary, as one of ours, with gains by rule (docs/vehicles.md).
+    """Returns a vehicle given by RotorPy's dictionary as one of ours, with gains by rule (docs/vehicles.md).
 
-    Refused if it has effects that our plant has not: pass `params | {"k_z": 0, "k_h": 0}` to fly without them.
+    Refuses effects that our plant lacks. To fly without them, pass `params | {"k_z": 0, "k_h": 0}`.
     """
     parameters = mapping("parameters", parameters, "a dictionary of RotorPy's is")
 
@@ -144,14 +144,14 @@ centre_m = [0.0, 0.0, 0.0]
 
 
 def to_state(state: Mapping[str, Any]) -> _afbc.State:
-    """Returns a state of RotorPy's as one of ours. Its quaternion must have length 1."""
+    """Converts a state of RotorPy's to ours. Its quaternion must have length 1."""
     state = mapping("state", state, "a dictionary of RotorPy's is")
     x, v, w = (finite(f"state[{part!r}]", key("state", state, part), (3,)) for part in ("x", "v", "w"))
     return _afbc.State(x, v, euler(key("state", state, "q")), w)
 
 
 def to_setpoint(flat_output: Mapping[str, Any]) -> _afbc.Setpoint:
-    """Returns RotorPy's flat outputs as a setpoint."""
+    """Converts RotorPy's flat outputs to a setpoint."""
     flat = mapping("flat_output", flat_output, "a dictionary of RotorPy's is")
     vectors, angles = ("x", "x_dot", "x_ddot", "x_dddot", "x_ddddot"), ("yaw", "yaw_dot", "yaw_ddot")
     return _afbc.Setpoint(
@@ -161,7 +161,7 @@ def to_setpoint(flat_output: Mapping[str, Any]) -> _afbc.Setpoint:
 
 
 def state(plant: _afbc.Plant) -> dict[str, Any]:
-    """Returns the true state of our plant as RotorPy's, with wind and rotor speeds: where its vehicle may begin."""
+    """Returns our plant's true state as RotorPy's, with wind and rotor speeds, for use as an initial state."""
     if not isinstance(plant, _afbc.Plant):
         raise TypeError(f"plant: an afbc.Plant is needed, not {type(plant).__name__}")
     vector = plant.true_vector
@@ -176,7 +176,7 @@ def state(plant: _afbc.Plant) -> dict[str, Any]:
 
 
 def flat_output(setpoint: _afbc.Setpoint) -> dict[str, Any]:
-    """Returns a setpoint as RotorPy's flat outputs."""
+    """Converts a setpoint to RotorPy's flat outputs."""
     if not isinstance(setpoint, _afbc.Setpoint):
         raise TypeError(f"setpoint: an afbc.Setpoint is needed, not {type(setpoint).__name__}")
     return {
@@ -192,10 +192,10 @@ def flat_output(setpoint: _afbc.Setpoint) -> dict[str, Any]:
 
 
 class Controller:
-    """A law of ours as a controller of RotorPy's, for `cmd_motor_speeds`, `cmd_motor_thrusts` or `cmd_ctbm`.
+    """One of our laws as a controller for RotorPy, with `cmd_motor_speeds`, `cmd_motor_thrusts` or `cmd_ctbm`.
 
-    Takes what `afbc.Controller` takes. It is stepped once in `dt_s`, so that RotorPy must run with
-    `sim_rate=1 / dt_s`, which is 1000 Hz; another rate is refused. Time that starts again resets it.
+    Takes the arguments of `afbc.Controller`. The law is stepped once every `dt_s`, so RotorPy must run with
+    `sim_rate=1 / dt_s`, which is 1000 Hz; another rate is refused. The law is reset when time starts again.
     """
 
     def __init__(self, law: str = "afbc", vehicle: _Vehicle | None = None, **options: Any) -> None:
@@ -206,7 +206,7 @@ class Controller:
         self._time_s: float | None = None
 
     def update(self, t: float, state: Mapping[str, Any], flat_output: Mapping[str, Any]) -> dict[str, Any]:
-        """Returns rotor speeds [rad/s] and thrusts [N], shape (4,); their sum [N] and moment [N m], shape (3,)."""
+        """Returns rotor speeds [rad/s] and thrusts [N], shape (4,), total thrust [N] and moment [N m], shape (3,)."""
         before, dt_s = self._time_s, self.controller.dt_s
         t = number("t", t, -1e9, 1e9)
         if before is not None and t <= before:
@@ -223,7 +223,7 @@ class Controller:
             "cmd_motor_thrusts": action.forces_n,
             "cmd_thrust": float(inputs[3]),
             "cmd_moment": inputs[:3] * self._lever_m,
-            # Where RotorPy's figures look; no law here commands them as such.
+            # RotorPy's plots need these entries. Our laws do not command these quantities.
             "cmd_q": np.array([0.0, 0.0, 0.0, 1.0]),
             "cmd_w": unknown,
             "cmd_v": unknown,
@@ -232,7 +232,7 @@ class Controller:
 
 
 class Trajectory:
-    """The reference of a scenario as a trajectory of RotorPy's."""
+    """The reference of a scenario as a trajectory for RotorPy."""
 
     def __init__(self, scenario: _afbc.Scenario | str | PathLike[str]) -> None:
         self.scenario = scenario if isinstance(scenario, _afbc.Scenario) else _afbc.Scenario(path("scenario", scenario))
@@ -253,14 +253,14 @@ class Trajectory:
 
 
 class _Law:
-    """A controller of RotorPy's as a law of one's own."""
+    """One of RotorPy's controllers as a law to register."""
 
     def __init__(self, make: Callable[[dict[str, Any]], Any], vehicle: _afbc.OwnVehicle) -> None:
         arm_m, inertia, of_yaw = vehicle.arm_m, vehicle.inertia_kg_m2, float(vehicle.effectiveness[2])
-        # What a newton of U1, U2, U3 gives [N m].
+        # Moments per newton of U1, U2, U3 [m].
         self._lever_m = np.array([arm_m, arm_m, of_yaw * float(inertia[2])])
         self._time_s, self._dt_s = 0.0, float(vehicle.dt_s)
-        # The harness allocates: any frame with these moments will do, here the paper's plus.
+        # Our simulator allocates the moments to the rotors, so any frame will do here: the paper's plus.
         plus = ((0, -1), (1, 0), (0, 1), (-1, 0))
         fastest = (vehicle.rotor_force_max_n / vehicle.thrust_factor_n_s2) ** 0.5
         self.controller = make(
@@ -292,10 +292,10 @@ class _Law:
 
 
 def law(make: Callable[[dict[str, Any]], Any]) -> Callable[[_afbc.OwnVehicle], Any]:
-    """Returns a controller of RotorPy's as a law of one's own, for `afbc.register`, `afbc.fly` and the like.
+    """Returns one of RotorPy's controllers as a law, for `afbc.register`, `afbc.fly` and similar functions.
 
-    `make(parameters)` makes the controller: a class of RotorPy's, or what sets its gains besides. Its `cmd_thrust` and
-    `cmd_moment` fly, allocated to the rotors by our harness.
+    `make(parameters)` makes the controller: one of RotorPy's classes, or a function that also sets its gains. Our
+    simulator allocates its `cmd_thrust` and `cmd_moment` to the rotors.
     """
     if not callable(make):
         raise TypeError(f"make: a controller's class is needed, not {type(make).__name__}")

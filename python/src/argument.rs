@@ -1,4 +1,4 @@
-//! Arguments of calls: whatever is wrong with one is said in a line that names it.
+//! Arguments of calls from Python. The error about a wrong argument is one line that names it.
 
 use crate::error::error;
 use core::convert::Infallible;
@@ -11,12 +11,12 @@ use pyo3::types::{PyFloat, PyList, PyMapping, PyString};
 use pyo3::{Borrowed, PyClass};
 use std::path::PathBuf;
 
-/// Seeds: as many as numpy's whole numbers hold.
+/// Accepted seeds: the non-negative numbers of numpy's int64.
 pub(crate) const SEEDS: RangeInclusive<u64> = 0..=i64::MAX as u64;
-/// Longest text of a wrong argument that is shown.
+/// Largest number of characters of a wrong argument that an error shows.
 const SHOWN: usize = 40;
 
-/// An argument as it was given, or the default in its place: its value is asked for by its name.
+/// An argument as it was given, or its default. The value is converted when asked for by the argument's name.
 pub(crate) enum Given<'py, T> {
     Default(T),
     As(Bound<'py, PyAny>),
@@ -43,7 +43,7 @@ impl<'py, T: Argument<'py>> Given<'py, T> {
     }
 }
 
-/// Returns the value of the argument called `name`, if it was given.
+/// Returns the value of the optional argument called `name`; none if it was not given.
 pub(crate) fn optional<'py, T: Argument<'py> + Clone>(
     given: Option<&Given<'py, T>>,
     name: &str,
@@ -52,7 +52,7 @@ pub(crate) fn optional<'py, T: Argument<'py> + Clone>(
 }
 
 impl Given<'_, u64> {
-    /// Returns the value, a whole number within `range`, of the argument called `name`.
+    /// Returns the value of the argument called `name`, which must be a whole number within `range`.
     pub(crate) fn within(&self, name: &str, range: RangeInclusive<u64>) -> PyResult<u64> {
         let outside = |shown: String| {
             let (least, most) = (range.start(), range.end());
@@ -72,29 +72,29 @@ impl Given<'_, u64> {
     }
 }
 
-/// Returns the number of threads asked for.
+/// Returns the requested number of threads; none for the default.
 pub(crate) fn threads(given: Option<&Given<'_, u64>>) -> PyResult<Option<usize>> {
     given.map(|threads| threads.within("threads", 1..=1024).map(|threads| threads as usize)).transpose()
 }
 
-/// Returns the seed asked for.
+/// Returns the requested seed; none for the scenario's own.
 pub(crate) fn seed(given: Option<&Given<'_, u64>>) -> PyResult<Option<u64>> {
     given.map(|seed| seed.within("seed", SEEDS)).transpose()
 }
 
-/// What a Python object is converted to.
+/// A type that Python objects are converted to.
 pub(crate) trait Argument<'py>: Sized {
     /// Converts the argument called `name`.
     fn of(name: &str, object: &Bound<'py, PyAny>) -> PyResult<Self>;
 }
 
-/// The error that the argument called `name` is of another type than needed.
+/// Returns the error for an argument `name` of a wrong type.
 pub(crate) fn wrong(name: &str, needed: &str, object: &Bound<'_, PyAny>) -> PyErr {
     let kind = object.get_type().name().map_or_else(|_| "this".into(), |name| name.to_string());
     PyTypeError::new_err(format!("{name}: {needed} needed, not {kind}"))
 }
 
-/// The error in place of what a conversion has raised; what the object itself has raised stays as it is.
+/// Returns the error for a failed conversion. An exception from the object's own code stays as it is.
 fn unfit(name: &str, needed: &str, object: &Bound<'_, PyAny>, raised: PyErr) -> PyErr {
     let py = object.py();
     if raised.is_instance_of::<PyTypeError>(py) {
@@ -106,7 +106,7 @@ fn unfit(name: &str, needed: &str, object: &Bound<'_, PyAny>, raised: PyErr) -> 
     }
 }
 
-/// The argument as text, cut to a length that fits in a line.
+/// Returns the argument as text, cut to a length that fits in a line.
 fn shown(object: &Bound<'_, PyAny>) -> String {
     let text = object.repr().map_or_else(|_| "too long a number".into(), |text| text.to_string_lossy().into_owned());
     match text.char_indices().nth(SHOWN) {
@@ -151,7 +151,7 @@ impl<'py, T: Argument<'py>> Argument<'py> for Vec<T> {
     }
 }
 
-/// Values by name, of a mapping or of pairs.
+/// Named values from a mapping or from pairs.
 #[derive(Clone, Default)]
 pub(crate) struct Gains(pub(crate) Vec<(String, f64)>);
 
@@ -178,7 +178,7 @@ impl<'py> Argument<'py> for Gains {
     }
 }
 
-/// Numbers in an array, of any shape.
+/// Numbers of an array of any shape.
 #[derive(Clone)]
 pub(crate) struct Array {
     numbers: Vec<f64>,
@@ -186,7 +186,7 @@ pub(crate) struct Array {
 }
 
 impl Array {
-    /// Returns the numbers of the argument called `name` if they have this shape, of any length where none is wanted.
+    /// Returns the numbers of the argument called `name` if its shape is `wanted`. A length of none accepts any length.
     pub(crate) fn shaped<const D: usize>(self, name: &str, wanted: [Option<usize>; D]) -> PyResult<Vec<f64>> {
         let fits = |(wanted, given): (&Option<usize>, &usize)| wanted.is_none_or(|wanted| wanted == *given);
         if self.shape.len() == D && wanted.iter().zip(&self.shape).all(fits) {
@@ -198,7 +198,7 @@ impl Array {
     }
 }
 
-/// A shape as Python writes it.
+/// Formats a shape as Python writes it.
 fn tuple(lengths: &[String]) -> String {
     match lengths {
         [length] => format!("({length},)"),
@@ -212,7 +212,7 @@ impl<'py> Argument<'py> for Array {
         let py = object.py();
         let needed = "numbers are";
         let array = match object.cast::<PyArrayDyn<f64>>() {
-            // Most are such, of a step that is taken a thousand times a second.
+            // A fast path, since most arguments are such arrays and a step may run a thousand times a second.
             Ok(array) if array.is_c_contiguous() && array.data().is_aligned() => {
                 return Ok(Array { numbers: array.to_vec().map_err(error)?, shape: array.shape().to_vec() });
             }
@@ -228,7 +228,7 @@ impl<'py> Argument<'py> for Array {
                 array
             }
         };
-        // A copy of our own, which nobody writes meanwhile, and whose numbers lie as ours do.
+        // Copies the array: nobody else can write the copy meanwhile, and it is contiguous.
         let array = array.call_method1("astype", ("float64", "C"))?;
         let array = array.cast_into::<PyArrayDyn<f64>>()?;
         Ok(Array { numbers: array.to_vec().map_err(error)?, shape: array.shape().to_vec() })
@@ -237,7 +237,7 @@ impl<'py> Argument<'py> for Array {
 
 impl<'py, const N: usize> Argument<'py> for [f64; N] {
     fn of(name: &str, object: &Bound<'py, PyAny>) -> PyResult<Self> {
-        // The short way of what is right; what is wrong goes the long one.
+        // A fast path for a list of floats. All other arguments take the general path, which also reports errors.
         if let Ok(list) = object.cast_exact::<PyList>()
             && list.len() == N
             && list.iter().all(|item| item.is_instance_of::<PyFloat>())
@@ -250,13 +250,13 @@ impl<'py, const N: usize> Argument<'py> for [f64; N] {
     }
 }
 
-/// Returns the value of the argument called `name` if it is finite.
+/// Returns the value of the argument called `name` if it is finite as a single.
 pub(crate) fn finite(name: &str, value: f64) -> PyResult<f64> {
     let single = value as f32;
     if single.is_finite() { Ok(value) } else { Err(error(format!("{name}: {value} given; a finite number is needed"))) }
 }
 
-/// Returns the value of the argument called `name` if all its numbers are finite.
+/// Returns the values of the argument called `name` if all are finite as singles.
 pub(crate) fn all_finite<const N: usize>(name: &str, values: [f64; N]) -> PyResult<[f64; N]> {
     values.iter().try_for_each(|value| finite(name, *value).map(drop))?;
     Ok(values)

@@ -1,4 +1,4 @@
-//! Many vehicles in one call.
+//! The class `Batch`: many vehicles stepped in one call.
 
 use crate::argument::{Array, Given, SEEDS, optional};
 use crate::error::error;
@@ -13,18 +13,18 @@ use pyo3::exceptions::PyMemoryError;
 use pyo3::prelude::*;
 use rayon::prelude::*;
 
-/// Numbers of a state.
+/// Length of a state vector.
 const STATE: usize = 12;
-/// Numbers of a reference: position, velocity, acceleration, heading.
+/// Length of a reference vector: position, velocity, acceleration, heading.
 const REFERENCE: usize = 10;
-/// Largest number of worlds: some 2 GB.
+/// Largest number of worlds, which take some 2 GB.
 const COUNT_MAX: u64 = 100_000;
 /// Largest number of steps in one call: more than a quarter of an hour at 1 kHz.
 const STEPS_MAX: u64 = 1_000_000;
-/// Steps of one vehicle between looks at Ctrl-C: hundredths of a second.
+/// Number of steps of single vehicles between checks for Ctrl-C, a few hundredths of a second.
 const SLICE: usize = 20_000;
 
-/// Worlds of one scenario with consecutive seeds, stepped together on all cores without the GIL.
+/// Simulated worlds of one scenario with consecutive seeds, stepped together on all cores without the GIL.
 #[pyclass(name = "Batch", module = "afbc")]
 pub(crate) struct PyBatch {
     scenario: Scenario,
@@ -37,7 +37,7 @@ impl PyBatch {
         start(&Scenario { seed, ..self.scenario.clone() }, self.dt_s)
     }
 
-    /// Numbers of every vehicle, in rows of `width`.
+    /// Returns an array with a row of `width` numbers for every vehicle.
     fn rows<'py>(
         &self,
         py: Python<'py>,
@@ -51,7 +51,7 @@ impl PyBatch {
 
 #[pymethods]
 impl PyBatch {
-    /// Makes `count` worlds of a scenario, seeds from the scenario's own or from `seed` on.
+    /// Makes `count` worlds of a scenario. The seeds are consecutive, from `seed` or the scenario's own seed on.
     #[new]
     #[pyo3(
         signature = (count, scenario=None, *, vehicle=None, seed=None, dt_s=Given::Default(0.001)),
@@ -102,14 +102,14 @@ impl PyBatch {
             worlds.par_iter_mut().zip(&speeds).for_each(|((world, view), speeds)| {
                 for _ in 0..steps {
                     world.advance(speeds);
-                    // In every step, not in the last one alone: sensors and estimator go on by being read.
+                    // The world is observed in every step, since sensors and estimator only advance when they are read.
                     *view = world.look();
                 }
             });
         })
     }
 
-    /// Starts vehicle `index` again, with this seed, from the scenario's start or this motion.
+    /// Restarts vehicle `index` with this seed, from the scenario's start or from the motion `state`.
     #[pyo3(signature = (index, seed, state=None))]
     fn reset(&mut self, index: Given<'_, u64>, seed: Given<'_, u64>, state: Option<StateArgument<'_>>) -> PyResult<()> {
         let index = index.within("index", 0..=self.worlds.len() as u64 - 1)? as usize;
@@ -127,7 +127,7 @@ impl PyBatch {
         PyArray1::from_iter(py, self.worlds.iter().map(|(_, view)| view.time_s))
     }
 
-    /// What reaches the controllers, shape (count, 12): position, velocity, attitude, rates; NaN in an outage.
+    /// States that reach the controllers, shape (count, 12): position, velocity, attitude, rates. NaN in an outage.
     #[getter]
     fn states<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         self.rows(py, STATE, |(_, view)| {
@@ -144,7 +144,7 @@ impl PyBatch {
         })
     }
 
-    /// The references, shape (count, 10): position, velocity, acceleration, heading.
+    /// References, shape (count, 10): position, velocity, acceleration, heading.
     #[getter]
     fn references<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         self.rows(py, REFERENCE, |(_, View { reference, .. })| {

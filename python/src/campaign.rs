@@ -1,4 +1,4 @@
-//! Campaigns.
+//! The functions `campaign`, `merge` and `campaigns`.
 
 use crate::argument::{self, Given, optional};
 use crate::error::error;
@@ -12,12 +12,12 @@ use pyo3::types::PyDict;
 use rayon::prelude::*;
 use std::path::PathBuf;
 
-/// Flies a campaign, built in or of a file: one scenario, many times, with drawn vehicles, weather and faults. Returns
-/// a row for each flight of each contender, by columns.
+/// Flies a campaign, built in or from a file: one scenario, many times, with drawn vehicles, weather and faults.
+/// Returns columns with a row for each flight of each contender.
 ///
-/// With `out`, results and report are written into this folder as `sitl campaign` does, finished flights are kept, and
-/// the same call resumes. `flights` flies only the first ones; `shard`, "I/N", every N-th from the I-th on: `merge`
-/// joins the shards.
+/// With `out`, results and report are written into this folder, as by `sitl campaign`. Finished flights are kept, and
+/// the same call resumes. `flights` flies only the first flights. `shard`, "I/N", flies every N-th flight from the I-th
+/// on; `merge` joins the shards.
 #[pyfunction]
 #[pyo3(signature = (campaign, *, flights=None, vehicle=None, shard=None, out=None, threads=None, progress=None))]
 #[expect(clippy::too_many_arguments, reason = "each by its name")]
@@ -75,16 +75,16 @@ pub(crate) fn campaign<'py>(
     columns(py, &manifest, &rows.map_err(error)?)
 }
 
-/// Flies in a folder, and returns what is there then.
+/// Flies a campaign in a folder and returns all its rows.
 fn kept(plan: &Campaign, folder: &CampaignFolder, watch: &Watch) -> Result<Vec<Row>, String> {
-    // The number of flights flown now: of earlier ones only the sum is reported.
+    // Counts the flights flown now; those of earlier runs are reported as one sum.
     let summary = campaigns::fly(plan, folder, watch.stop(), &|done| watch.add(done));
     let summary = summary.map_err(|error| error.to_string())?.ok_or("interrupted; the same call resumes")?;
     concluded(folder, &summary)
 }
 
-/// Joins all shards of a campaign into the folder `out`, with the same bytes as on one machine, as `sitl merge` does.
-/// Returns a row for each flight of each contender, by columns.
+/// Merges all shards of a campaign into the folder `out`, as `sitl merge` does, with the same bytes as on one machine.
+/// Returns columns with a row for each flight of each contender.
 #[pyfunction]
 pub(crate) fn merge<'py>(
     py: Python<'py>,
@@ -103,7 +103,7 @@ pub(crate) fn merge<'py>(
     columns(py, &manifest, &rows)
 }
 
-/// Writes the report of a folder's flights, and returns them.
+/// Writes the report of a folder's flights and returns their rows.
 fn concluded(folder: &CampaignFolder, summary: &Summary) -> Result<Vec<Row>, String> {
     afbc_report::campaign::write(folder.place(), summary).map_err(|error| error.to_string())?;
     let rows = folder.results().map_err(|error| error.to_string())?.ok_or("the results are gone")?;
@@ -125,7 +125,7 @@ fn columns<'py>(py: Python<'py>, manifest: &Manifest, rows: &[Row]) -> PyResult<
     Ok(dict)
 }
 
-/// Names of the built-in campaigns.
+/// Returns the names of the built-in campaigns.
 #[pyfunction]
 #[pyo3(name = "campaigns")]
 pub(crate) fn campaigns_() -> Vec<&'static str> {

@@ -1,4 +1,4 @@
-//! A controller, step by step.
+//! The class `Controller`: a control law, step by step.
 
 use crate::argument::{Gains, Given, optional};
 use crate::error::error;
@@ -19,7 +19,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::sync::{Mutex, PoisonError};
 
-/// What a step decided.
+/// Result of a controller's step.
 #[pyclass(name = "Action", module = "afbc", frozen)]
 pub(crate) struct PyAction {
     action: Action<ROTORS_MAX>,
@@ -27,7 +27,7 @@ pub(crate) struct PyAction {
 }
 
 impl PyAction {
-    /// An action of so many rotors.
+    /// Makes an action for this number of rotors.
     pub(crate) fn new(action: Action<ROTORS_MAX>, rotors: usize) -> Self {
         PyAction { action, rotors }
     }
@@ -47,7 +47,7 @@ impl PyAction {
         PyArray1::from_iter(py, self.action.forces.0.iter().take(self.rotors).map(|force| f64::from(*force)))
     }
 
-    /// U1, U2, U3, U4 of those forces [N], shape (4,).
+    /// Inputs U1, U2, U3, U4 that the forces produce [N], shape (4,).
     #[getter]
     fn inputs_n<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         inputs(py, &self.action.given)
@@ -59,7 +59,7 @@ impl PyAction {
         self.action.health.saturated
     }
 
-    /// True if the state was missing or implausible, and the last one was used.
+    /// True if the state was missing or implausible, so that the last one was used.
     #[getter]
     fn state_rejected(&self) -> bool {
         self.action.health.state_rejected
@@ -71,7 +71,7 @@ impl PyAction {
         self.action.health.setpoint_rejected
     }
 
-    /// Why a fallback law flies, if one does.
+    /// Reason why a fallback law flies; None if none does.
     #[getter]
     fn fallback(&self) -> Option<&'static str> {
         self.action.health.fallback
@@ -82,10 +82,10 @@ fn inputs<'py>(py: Python<'py>, u: &Inputs) -> Bound<'py, PyArray1<f64>> {
     [u.roll_n, u.pitch_n, u.yaw_n, u.thrust_n].map(f64::from).to_pyarray(py)
 }
 
-/// A setpoint as an argument.
+/// Argument that must be a setpoint.
 pub(crate) type SetpointArgument<'py> = Given<'py, Bound<'py, PySetpoint>>;
 
-/// A controller whose number of rotors is known when it is made.
+/// A controller for any number of rotors, which is fixed when it is made.
 trait AnyRotors: Send + Sync {
     fn step(&mut self, state: Option<&PyState>, setpoint: &PySetpoint) -> Action<ROTORS_MAX>;
     fn reset(&mut self);
@@ -94,7 +94,7 @@ trait AnyRotors: Send + Sync {
 }
 
 struct OfRotors<const N: usize> {
-    /// A law of one's own is not shared between threads.
+    /// The mutex makes the controller `Sync`: a user's own law cannot be shared between threads.
     controller: Mutex<AnyController<N>>,
     memory: Validated<AnyControllerMemory<N>>,
 }
@@ -118,7 +118,7 @@ impl<const N: usize> AnyRotors for OfRotors<N> {
     }
 }
 
-/// A law on a vehicle, to be stepped: the very code that flies on a board.
+/// A control law on a vehicle, step by step. It is the same code that flies on a board.
 #[pyclass(name = "Controller", module = "afbc")]
 pub(crate) struct PyController {
     contender: Contender,
@@ -128,8 +128,8 @@ pub(crate) struct PyController {
 
 #[pymethods]
 impl PyController {
-    /// Makes the law `law` for this vehicle, or for the paper's: with the gains of the vehicle's file in the profile
-    /// "flight", or as printed in the profile "paper". `gains` sets some by name, "x.alpha1" or "kp".
+    /// Makes the law `law` for this vehicle, or for the paper's. The profile "flight" takes the gains of the vehicle's
+    /// file, "paper" those of the paper. `gains` sets single gains by name, such as "x.alpha1" or "kp".
     #[new]
     #[pyo3(signature = (law="afbc", vehicle=None, *, profile="flight", monitored=false, gains=None))]
     fn new(
@@ -165,7 +165,7 @@ impl PyController {
         self.contender.step_s()
     }
 
-    /// Its gains by name.
+    /// Gains by name.
     #[getter]
     fn gains<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let dict = PyDict::new(py);
@@ -173,7 +173,7 @@ impl PyController {
         Ok(dict)
     }
 
-    /// Performs a step; without a state the last one is used, and nothing is learnt.
+    /// Performs a step. Without a state, the last one is used and the law does not adapt.
     fn step(&mut self, state: Option<StateArgument<'_>>, setpoint: SetpointArgument<'_>) -> PyResult<PyAction> {
         let (state, setpoint) = (optional(state.as_ref(), "state")?, setpoint.named("setpoint")?);
         let action = self.law.step(state.as_ref().map(Bound::get), setpoint.get());
@@ -183,12 +183,12 @@ impl PyController {
         }
     }
 
-    /// Forgets everything, as before the first step.
+    /// Resets the law to its state before the first step.
     fn reset(&mut self) {
         self.law.reset();
     }
 
-    /// Internal signals of the last step by name: demanded inputs and angles, errors and, of AFBC, estimates.
+    /// Internal signals of the last step by name: demanded inputs and angles, errors and, for AFBC, estimates.
     #[getter]
     fn trace<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let (trace, dict) = (self.law.trace(), PyDict::new(py));
@@ -211,7 +211,7 @@ impl PyController {
     }
 }
 
-/// What names a law with its gains.
+/// Choice of a law and its gains.
 pub(crate) struct Named<'a> {
     pub(crate) law: &'a str,
     pub(crate) profile: &'a str,
@@ -219,7 +219,7 @@ pub(crate) struct Named<'a> {
     pub(crate) gains: Vec<(String, f64)>,
 }
 
-/// The law, and parameters and rotors of the vehicle that it is for, the paper's if none is given.
+/// Returns the law, and parameters and rotors of its vehicle. Without a vehicle, these are the paper's.
 pub(crate) fn made(
     named: &Named<'_>,
     vehicle: Option<&Vehicle>,
@@ -247,7 +247,7 @@ pub(crate) fn made(
     Ok((contender, parameters, rotors))
 }
 
-/// The gains of a contender by name.
+/// Returns the gains of a contender by name.
 pub(crate) fn gains(contender: &Contender) -> Vec<(String, f64)> {
     let mut gains = Vec::new();
     let Ok(()) = contender.law.visit(&mut |declaration: &Declaration, value: Value<'_>| {
@@ -257,7 +257,7 @@ pub(crate) fn gains(contender: &Contender) -> Vec<(String, f64)> {
     gains
 }
 
-/// The name of a gain: its axis, if it is one of an axis, and its key in files.
+/// Returns the name of a gain: its key in files, after its axis if it has one.
 fn full(declaration: &Declaration) -> String {
     match declaration.group {
         "" => declaration.range.name.into(),

@@ -1,4 +1,4 @@
-//! The one exception: what the command line would say.
+//! The exception `AfbcError`, which repeats the command line's error messages.
 
 use pyo3::PyErr;
 use pyo3::create_exception;
@@ -12,10 +12,11 @@ create_exception!(
     "Bad input, in the words of the command line: file, place, cure; a line for each mistake of a file."
 );
 
-/// Returns the exception that says `problem`, in one line whatever names in it hold; mistakes of a file in one each.
+/// Returns the exception for `problem`. The mistakes of a file have a line each; other problems have one line, whatever
+/// the names in them contain.
 pub(crate) fn error(problem: impl Display) -> PyErr {
     let text = problem.to_string();
-    // Mistakes of a file have a line each; any other line break is part of a name.
+    // If each line is a mistake of a file, line breaks stay. Otherwise a line break is part of a name and is escaped.
     let keeps = text.lines().all(is_mistake);
     let escaped = |letter: char| match letter.is_control() && !(keeps && letter == '\n') {
         true => letter.escape_default().to_string(),
@@ -24,7 +25,7 @@ pub(crate) fn error(problem: impl Display) -> PyErr {
     AfbcError::new_err(text.chars().map(escaped).collect::<String>())
 }
 
-/// True of a line that begins with the name of a file and a number of a line.
+/// Returns true if the line begins with a file name and a line number.
 fn is_mistake(line: &str) -> bool {
     line.split_once(':').is_some_and(|(_, rest)| rest.starts_with(|c: char| c.is_ascii_digit()))
 }

@@ -1,4 +1,4 @@
-//! The estimator, step by step.
+//! The class `Estimator`: the state estimator, step by step.
 
 use crate::argument::{Given, all_finite, finite};
 use crate::error::error;
@@ -9,17 +9,17 @@ use numpy::{PyArray1, ToPyArray};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-/// Accepted times [s], so that they fit the clock.
+/// Latest accepted time [s], so that times fit the clock.
 const LATEST_S: f64 = 1e9;
 
-/// Position, velocity, attitude and biases from an inertial sensor and whatever else measures: the one that flies on
-/// board. Each measurement is fused for its own time, up to 0.3 s late.
+/// Estimates position, velocity, attitude and biases from an inertial sensor and other measurements, with the estimator
+/// that flies on board. Each measurement is fused at its own time, up to 0.3 s late.
 #[pyclass(name = "Estimator", module = "afbc")]
 pub(crate) struct PyEstimator {
     estimator: Estimator,
     memory: Memory,
     estimate: Estimate,
-    /// Time of the last step.
+    /// Time of the last step \[us\].
     now_us: u64,
 }
 
@@ -28,7 +28,7 @@ type Number<'py> = Given<'py, f64>;
 /// Three numbers as an argument.
 type Three<'py> = Given<'py, [f64; 3]>;
 
-/// The time of the argument called `name`, on the estimator's clock.
+/// Returns the time of the argument called `name` on the estimator's clock \[us\].
 fn us(time_s: &Number<'_>, name: &str) -> PyResult<u64> {
     let time_s = time_s.named(name)?;
     if (0.0..=LATEST_S).contains(&time_s) {
@@ -37,12 +37,12 @@ fn us(time_s: &Number<'_>, name: &str) -> PyResult<u64> {
     Err(error(format!("{name}: {time_s} given; times lie within 0 to {LATEST_S:e} s")))
 }
 
-/// The finite number of the argument called `name`.
+/// Returns the number of the argument called `name` if it is finite.
 fn number(given: &Number<'_>, name: &str) -> PyResult<f32> {
     Ok(finite(name, given.named(name)?)? as f32)
 }
 
-/// The standard deviation of the argument called `name`.
+/// Returns the standard deviation of the argument called `name` if it is positive.
 fn sigma(given: &Number<'_>, name: &str) -> PyResult<f32> {
     match number(given, name)? {
         value if value > 0.0 => Ok(value),
@@ -50,7 +50,7 @@ fn sigma(given: &Number<'_>, name: &str) -> PyResult<f32> {
     }
 }
 
-/// The finite numbers of the argument called `name`.
+/// Returns the numbers of the argument called `name` if they are finite.
 fn three(given: &Three<'_>, name: &str) -> PyResult<Vector3<f32>> {
     Ok(vector(all_finite(name, given.named(name)?)?))
 }
@@ -75,8 +75,8 @@ impl PyEstimator {
         Ok(PyEstimator { estimator, memory, estimate, now_us: 0 })
     }
 
-    /// Hands over a tracker's pose, true at `at_s`: position [m], attitude as a quaternion w, x, y, z from body to
-    /// earth, and standard deviations [m, rad].
+    /// Adds a tracker's pose, valid at `at_s`: position [m], attitude as a quaternion w, x, y, z from body to earth,
+    /// and standard deviations [m, rad].
     #[pyo3(
         signature = (
             at_s, position_m, attitude, position_sigma_m=Given::Default(0.001), attitude_sigma_rad=Given::Default(0.01)
@@ -101,7 +101,8 @@ impl PyEstimator {
         self.offer(&at_s, pose)
     }
 
-    /// Hands over a fix of a GNSS receiver in local coordinates: position [m], velocity [m/s], standard deviations.
+    /// Adds a fix of a GNSS receiver in local coordinates, valid at `at_s`: position [m], velocity [m/s], standard
+    /// deviations.
     #[pyo3(
         signature = (
             at_s, position_m, velocity_m_s, horizontal_sigma_m=Given::Default(1.5),
@@ -133,7 +134,7 @@ impl PyEstimator {
         self.offer(&at_s, fix)
     }
 
-    /// Hands over a barometer's height [m] above any fixed reference.
+    /// Adds a barometer's height [m] above any fixed reference.
     #[pyo3(
         signature = (at_s, height_m, sigma_m=Given::Default(0.1)),
         text_signature = "($self, at_s, height_m, sigma_m=0.1)"
@@ -143,14 +144,14 @@ impl PyEstimator {
         self.offer(&at_s, Measurement::Height { height_m, sigma_m })
     }
 
-    /// Hands over a magnetometer's field in the body frame, in any unit that does not change.
+    /// Adds a magnetometer's field in the body frame, in any unit, as long as the unit stays the same.
     #[pyo3(signature = (at_s, field, sigma))]
     fn magnetic_field(&mut self, at_s: Number<'_>, field: Three<'_>, sigma: Number<'_>) -> PyResult<()> {
         let (field, sigma) = (three(&field, "field")?, self::sigma(&sigma, "sigma")?);
         self.offer(&at_s, Measurement::MagneticField { field, sigma })
     }
 
-    /// Hands over a heading [rad].
+    /// Adds a heading [rad].
     #[pyo3(
         signature = (at_s, heading_rad, sigma_rad=Given::Default(0.05)),
         text_signature = "($self, at_s, heading_rad, sigma_rad=0.05)"
@@ -160,13 +161,13 @@ impl PyEstimator {
         self.offer(&at_s, Measurement::Heading { heading_rad, sigma_rad })
     }
 
-    /// Says whether the vehicle stands on the ground, where its velocity is held at zero while it rests.
+    /// Sets whether the vehicle stands on the ground. While it rests there, its velocity is held at zero.
     fn set_on_ground(&mut self, on_ground: bool) {
         self.memory.set_on_ground(on_ground);
     }
 
-    /// Performs a step at `now_s` with a sample of the inertial sensor, if there is one: rates [rad/s] and specific
-    /// force [m/s2] in the body frame, true at `now_s`. Returns the state.
+    /// Performs a step at `now_s`, with a sample of the inertial sensor if there is one: rates [rad/s] and specific
+    /// force [m/s2] in the body frame, valid at `now_s`. Returns the state.
     #[pyo3(signature = (now_s, rates_rad_s=None, specific_force_m_s2=None))]
     fn step(
         &mut self,
@@ -193,7 +194,7 @@ impl PyEstimator {
         Ok(PyState(self.estimate.state))
     }
 
-    /// The state of the last step.
+    /// State of the last step.
     #[getter]
     fn state(&self) -> PyState {
         PyState(self.estimate.state)
@@ -215,7 +216,7 @@ impl PyEstimator {
         Ok(dict)
     }
 
-    /// Standard deviations of the errors; of the attitude about the axes of the earth frame.
+    /// Standard deviations of the errors. Those of the attitude are about the axes of the earth frame.
     #[getter]
     fn sigmas<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let (dict, sigmas) = (PyDict::new(py), &self.estimate.sigmas);
@@ -228,7 +229,7 @@ impl PyEstimator {
         Ok(dict)
     }
 
-    /// Which parts of the state may be used.
+    /// Parts of the state that may be used.
     #[getter]
     fn valid<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let (dict, valid) = (PyDict::new(py), &self.estimate.validity);
@@ -240,7 +241,7 @@ impl PyEstimator {
         Ok(dict)
     }
 
-    /// Why it has not started; None once it runs.
+    /// Reason why the estimator has not started; None once it runs.
     #[getter]
     fn unready(&self) -> Option<String> {
         self.estimate.unready.map(|why| why.to_string())

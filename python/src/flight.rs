@@ -1,4 +1,4 @@
-//! Flights and comparisons.
+//! The class `Flight` and the functions `fly` and `compare`.
 
 use crate::argument::{self, Given, optional};
 use crate::error::error;
@@ -21,22 +21,23 @@ use pyo3::sync::PyOnceLock;
 use pyo3::types::PyDict;
 use rayon::prelude::*;
 
-/// One flight under one contender: its log by columns, and its figures of merit.
+/// One flight under one contender: its log as columns, and its figures of merit.
 #[pyclass(name = "Flight", module = "afbc", frozen)]
 pub(crate) struct PyFlight {
     told: Told,
-    /// The flight itself, whose log becomes columns when they are asked for; none where `pickle` has brought them.
+    /// The flight itself, whose log is converted to columns when they are asked for; none if `pickle` restored the
+    /// columns.
     flown: Option<Flown>,
     columns: PyOnceLock<Py<PyDict>>,
 }
 
 /// Time [s] and reason.
 type When = (f64, String);
-/// A figure of merit: its name, and its value if there was something to measure.
+/// Name and value of a figure of merit; no value if nothing could be measured.
 type Figure = (String, Option<f64>);
-/// What a flight tells besides its log: contender, scenario, rows of the log, loss, trip, figures of merit.
+/// Summary of a flight: contender, scenario, rows of the log, loss, trip, figures of merit.
 type Told = (String, String, usize, Option<When>, Option<When>, Vec<Figure>);
-/// What makes a flight again in another process: a function and its arguments.
+/// Function and arguments that restore a flight in another process.
 type Reduced<'py> = (Bound<'py, PyAny>, (Told, Bound<'py, PyDict>));
 
 impl PyFlight {
@@ -50,11 +51,11 @@ impl PyFlight {
     }
 }
 
-/// Makes a flight of what `pickle` has kept of it.
+/// Restores a flight from the data that `pickle` kept.
 #[pyfunction]
 pub(crate) fn _flight(py: Python<'_>, told: Told, columns: Py<PyDict>) -> PyResult<PyFlight> {
     let kept = PyOnceLock::new();
-    // It is new, so that nothing is in it yet.
+    // Cannot fail, since the cell is new and empty.
     let _ = kept.set(py, columns);
     Ok(PyFlight { told, flown: None, columns: kept })
 }
@@ -73,19 +74,19 @@ impl PyFlight {
         &self.told.1
     }
 
-    /// When [s] and why the vehicle was lost; None if it was not.
+    /// Time [s] and reason of the vehicle's loss; None if it was not lost.
     #[getter]
     fn lost(&self) -> Option<When> {
         self.told.3.clone()
     }
 
-    /// When [s] and why AFBC's monitor switched to the fallback law; None if it did not.
+    /// Time [s] and reason of the monitor's switch to the fallback law; None if it did not switch.
     #[getter]
     fn tripped(&self) -> Option<When> {
         self.told.4.clone()
     }
 
-    /// Figures of merit from 5 s on, by name; None where there was nothing to measure.
+    /// Figures of merit from 5 s on, by name; None where nothing could be measured.
     #[getter]
     fn metrics<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let dict = PyDict::new(py);
@@ -93,7 +94,7 @@ impl PyFlight {
         Ok(dict)
     }
 
-    /// The log: an array of a value a row for each column, named as in `sitl`'s CSV file.
+    /// Log of the flight: an array for each column, with one value per row. Columns are named as in `sitl`'s CSV file.
     #[getter]
     fn columns<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let columns = self.columns.get_or_try_init(py, || {
@@ -136,10 +137,11 @@ impl PyFlight {
     }
 }
 
-/// Name of the figure that a flight is shown by.
+/// Name of the figure that `repr` shows.
 const RMS: &str = "rmse_position_m";
 
-/// The figures of merit of a flight by the names that campaigns give them; none before errors are evaluated.
+/// Returns the figures of merit of a flight by the names that campaigns use. Values are none if the flight ended before
+/// errors count.
 fn named(metrics: &Metrics) -> Vec<(&'static str, Option<f64>)> {
     let Metrics { rmse, max_abs, max_distance_m, mean_abs_delta_u: du, estimate, .. } = metrics;
     let settled = |value: f64| metrics.measured(value);
@@ -170,7 +172,7 @@ fn named(metrics: &Metrics) -> Vec<(&'static str, Option<f64>)> {
     named
 }
 
-/// Rows of a log per second.
+/// Returns the rate of log rows.
 fn log_rate(log_hz: Option<&Given<'_, u64>>, scenario: &Scenario) -> PyResult<LogRate> {
     match log_hz.map(|log_hz| log_hz.within("log_hz", 1..=1000)).transpose()? {
         Some(hz) => hz.to_string().parse().map_err(|problem| error(format!("log_hz {hz}: {problem}"))),
@@ -178,7 +180,7 @@ fn log_rate(log_hz: Option<&Given<'_, u64>>, scenario: &Scenario) -> PyResult<Lo
     }
 }
 
-/// Names in the argument `controllers`, if it is given.
+/// Returns the names of the argument `controllers`; none if it was not given.
 fn chosen(controllers: Option<&Given<'_, Vec<String>>>) -> PyResult<Option<Vec<String>>> {
     match optional(controllers, "controllers")? {
         Some(names) if names.is_empty() => {
@@ -188,7 +190,7 @@ fn chosen(controllers: Option<&Given<'_, Vec<String>>>) -> PyResult<Option<Vec<S
     }
 }
 
-/// Flies until it is time to stop.
+/// Flies one flight, unless the work is interrupted.
 fn flown(scenario: &Scenario, contender: &Contender, log_every: u64, watch: &Watch) -> Result<Run, String> {
     let run = Run::fly_unless(scenario, contender, log_every, || watch.is_over()).map_err(|error| error.to_string())?;
     if watch.is_over() {
@@ -198,9 +200,10 @@ fn flown(scenario: &Scenario, contender: &Contender, log_every: u64, watch: &Wat
     Ok(run)
 }
 
-/// Flies a scenario under each of its contenders, or under these laws, and returns the flights by contender.
+/// Flies a scenario under each of its contenders, or under the laws `controllers`, and returns the flights by
+/// contender.
 ///
-/// The same flights as `sitl fly`, in every bit.
+/// The flights equal those of `sitl fly` in every bit.
 #[pyfunction]
 #[pyo3(signature = (
     scenario, controllers=None, *, vehicle=None, seed=None, duration_s=None, log_hz=None, threads=None, progress=None
@@ -238,7 +241,7 @@ pub(crate) fn fly<'py>(
     Ok(dict)
 }
 
-/// Result of a flight of a comparison.
+/// Result of one flight of a comparison.
 struct Outcome<'a> {
     scenario: &'a str,
     contender: &'a str,
@@ -246,7 +249,7 @@ struct Outcome<'a> {
     run: Run,
 }
 
-/// A flight of a comparison: its scenario, contender and seed.
+/// A planned flight of a comparison: scenario, contender and seed.
 type Planned<'a> = (&'a Scenario, &'a Contender, u64);
 
 impl<'a> Outcome<'a> {
@@ -256,9 +259,8 @@ impl<'a> Outcome<'a> {
     }
 }
 
-/// Flies scenarios under the same contenders with `seeds` consecutive seeds each, as `sitl compare` does, and returns a
-/// row for each flight, by columns: scenario, contender, seed, when and why the vehicle was lost, and the figures of
-/// merit.
+/// Flies scenarios under the same contenders with `seeds` consecutive seeds each, as `sitl compare` does. Returns
+/// columns with a row for each flight: scenario, contender, seed, time and reason of a loss, and the figures of merit.
 #[pyfunction]
 #[pyo3(signature = (scenarios, controllers=None, *, vehicle=None, seeds=None, threads=None, progress=None))]
 pub(crate) fn compare<'py>(
@@ -298,7 +300,7 @@ pub(crate) fn compare<'py>(
 /// Largest number of seeds of a comparison, as on the command line.
 const SEEDS_MAX: u64 = 10_000;
 
-/// The flights of a comparison: by scenario, contender and seed.
+/// Returns the flights of a comparison, ordered by scenario, contender and seed.
 fn planned(scenarios: &[Scenario], seeds: Option<u64>) -> PyResult<Vec<Planned<'_>>> {
     let mut planned = Vec::new();
     for scenario in scenarios {
@@ -313,7 +315,7 @@ fn planned(scenarios: &[Scenario], seeds: Option<u64>) -> PyResult<Vec<Planned<'
     Ok(planned)
 }
 
-/// Rows by columns.
+/// Returns the results as columns.
 fn rows<'py>(py: Python<'py>, outcomes: &[Outcome<'_>]) -> PyResult<Bound<'py, PyDict>> {
     let dict = PyDict::new(py);
     dict.set_item("scenario", outcomes.iter().map(|outcome| outcome.scenario).collect::<Vec<_>>())?;

@@ -1,4 +1,4 @@
-//! The flight core around a law, tick by tick.
+//! The class `FlightCore`: the flight core around a control law, tick by tick.
 
 use crate::argument::{Gains, Given, optional};
 use crate::controller::{Named, PyAction, SetpointArgument, made};
@@ -19,7 +19,7 @@ const TICK_US: u64 = 1000;
 const REQUESTS: [(&str, Request); 4] =
     [("arm", Request::Arm), ("disarm", Request::Disarm), ("kill", Request::Kill), ("engage", Request::Engage)];
 
-/// What a tick has brought, for any number of rotors.
+/// Result of a tick, padded to the largest number of rotors.
 struct Ticked {
     action: Action<ROTORS_MAX>,
     mode: Mode,
@@ -28,7 +28,7 @@ struct Ticked {
     ended: Option<String>,
 }
 
-/// A flight core whose number of rotors is known when it is made.
+/// A flight core for any number of rotors, which is fixed when it is made.
 trait AnyCore: Send + Sync {
     fn tick(&mut self, now_us: u64, inbox: &Inbox) -> Ticked;
     fn airborne(&self) -> bool;
@@ -36,7 +36,7 @@ trait AnyCore: Send + Sync {
 }
 
 struct OfRotors<const N: usize> {
-    /// A law of one's own is not shared between threads.
+    /// The mutex makes the core `Sync`: a user's own law cannot be shared between threads.
     core: Mutex<FlightCore<AnyController<N>, N>>,
     mixer: Mixer<N>,
     memory: FlightCoreMemory<<AnyController<N> as FlightController<N>>::Memory>,
@@ -67,7 +67,7 @@ impl<const N: usize> AnyCore for OfRotors<N> {
     }
 }
 
-/// A name in the sources as words: "state stale" of `StateStale`.
+/// Returns a name of the source code as words: "state stale" for `StateStale`.
 pub(crate) fn words(name: &impl Debug) -> String {
     let mut words = String::new();
     for letter in format!("{name:?}").chars() {
@@ -79,7 +79,7 @@ pub(crate) fn words(name: &impl Debug) -> String {
     words
 }
 
-/// The flight core of the firmware around a law, tick by tick at 1 kHz: it arms, flies, coasts and descends without
+/// The firmware's flight core around a control law, tick by tick at 1 kHz. It arms, flies, coasts or descends without
 /// states, and disarms.
 #[pyclass(name = "FlightCore", module = "afbc")]
 pub(crate) struct PyFlightCore {
@@ -92,8 +92,8 @@ pub(crate) struct PyFlightCore {
 
 #[pymethods]
 impl PyFlightCore {
-    /// Makes a flight core around the law `law` for this vehicle, the paper's if none is given, with the arming limits
-    /// and gains of the vehicle's file. `gains` sets some by name, as for `Controller`.
+    /// Makes a flight core around the law `law` for this vehicle, or for the paper's, with the arming limits and gains
+    /// of the vehicle's file. `gains` sets single gains by name, as for `Controller`.
     #[new]
     #[pyo3(signature = (law="afbc", vehicle=None, *, monitored=true, gains=None))]
     fn new(
@@ -120,7 +120,8 @@ impl PyFlightCore {
         Ok(PyFlightCore { core, rotors: rotors.len(), inbox: Inbox::EMPTY, now_us: 0, ticked: None })
     }
 
-    /// Asks for "arm", "disarm", "kill" or "engage" (a law that has handed over) in the next step, which answers.
+    /// Requests "arm", "disarm", "kill" or "engage", which takes back a law that the monitor has replaced. The next
+    /// step answers.
     fn request(&mut self, request: Given<'_, String>) -> PyResult<()> {
         let request = request.named("request")?;
         let known = REQUESTS.iter().find(|(name, _)| *name == request);
@@ -132,7 +133,7 @@ impl PyFlightCore {
         Ok(())
     }
 
-    /// Performs a tick of 1 ms with a fresh state of the vehicle's own estimate, and a setpoint, if there are any. With
+    /// Performs a tick of 1 ms, with a fresh state from the vehicle's own estimate and a setpoint, if given. With
     /// `idle_on_ground`, the motors of an armed vehicle on the ground idle.
     #[pyo3(signature = (state=None, setpoint=None, *, idle_on_ground=false))]
     fn step(
@@ -167,13 +168,13 @@ impl PyFlightCore {
         self.now_us as f64 * 1e-6
     }
 
-    /// "disarmed", "flying", "coasting" (without fresh states) or "descending".
+    /// Mode: "disarmed", "flying", "coasting" (without fresh states) or "descending".
     #[getter]
     fn mode(&self) -> String {
         words(&self.ticked.as_ref().map_or(Mode::Disarmed, |ticked| ticked.mode))
     }
 
-    /// The answer of the last step to a request: "arm: granted", or why not; None if nothing was asked.
+    /// Answer of the last step to a request: "arm: granted" or the reason for the refusal; None without a request.
     #[getter]
     fn answer(&self) -> Option<String> {
         let answer = self.ticked.as_ref()?.answer.as_ref()?;
@@ -181,25 +182,25 @@ impl PyFlightCore {
         Some(format!("{}: {result}", words(&answer.request)))
     }
 
-    /// What speaks against arming.
+    /// Reasons against arming.
     #[getter]
     fn against(&self) -> Vec<String> {
         self.ticked.as_ref().map_or(Vec::new(), |ticked| ticked.against.clone())
     }
 
-    /// Why the flight ended, if it did in the last step.
+    /// Reason why the flight ended in the last step; None if it did not.
     #[getter]
     fn ended(&self) -> Option<String> {
         self.ticked.as_ref()?.ended.clone()
     }
 
-    /// True if the vehicle is in the air, as far as its motion tells.
+    /// True if the vehicle's motion shows that it is in the air.
     #[getter]
     fn airborne(&self) -> bool {
         self.core.airborne()
     }
 
-    /// True if it has been at rest for as long as arming wants it.
+    /// True if the vehicle has been at rest for as long as arming requires.
     #[getter]
     fn rested(&self) -> bool {
         self.core.rested()

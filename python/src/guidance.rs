@@ -1,4 +1,4 @@
-//! Flight modes, step by step.
+//! The class `Guidance`: flight modes, step by step.
 
 use crate::argument::{Given, finite, optional};
 use crate::error::error;
@@ -11,7 +11,7 @@ use afbc_guidance::{FailedSensors, FlightMode, Guidance, GuidanceInputs, Guided,
 use afbc_types::Stamped;
 use pyo3::prelude::*;
 
-/// Modes that are flown by what this class is given.
+/// Modes that work with the inputs of this class.
 const MODES: [FlightMode; 6] = [
     FlightMode::Hold,
     FlightMode::Land,
@@ -27,7 +27,8 @@ const FLYING: [(&str, Mode); 4] = [
     ("descending", Mode::Descending),
 ];
 
-/// Flight modes, trajectory limiter and safety net of the firmware: setpoints from what somebody wants, step by step.
+/// The firmware's flight modes, trajectory limiter and safety net. They turn orders and sticks into setpoints, step by
+/// step.
 #[pyclass(name = "Guidance", module = "afbc")]
 pub(crate) struct PyGuidance {
     guidance: Guidance,
@@ -47,8 +48,7 @@ impl PyGuidance {
 
 #[pymethods]
 impl PyGuidance {
-    /// Makes the guidance with the settings of this vehicle's file, the paper's if none is given, for steps of `dt_s`
-    /// [s].
+    /// Makes the guidance with the settings of this vehicle's file, or of the paper's vehicle, for steps of `dt_s` [s].
     #[new]
     #[pyo3(
         signature = (vehicle=None, *, dt_s=Given::Default(0.001)),
@@ -67,15 +67,15 @@ impl PyGuidance {
         Ok(PyGuidance { guidance, orders: Orders::default(), lift, dt_s, now_us: 0, guided: None })
     }
 
-    /// Orders to take off to a height above where it stands [m], or to that of the settings.
+    /// Orders a take-off to a height above the ground where the vehicle stands [m], by default that of the settings.
     #[pyo3(signature = (height_m=None))]
     fn take_off(&mut self, height_m: Option<Given<'_, f64>>) -> PyResult<()> {
         let height_m = optional(height_m.as_ref(), "height_m")?.map(|height_m| finite("height_m", height_m));
         self.order(Order::TakeOff(height_m.transpose()?.map(|height_m| height_m as f32)))
     }
 
-    /// Orders to fly to a place and to hold there [m]; NaN keeps a coordinate. Heading [rad], the one that it has if
-    /// that is None or NaN, and horizontal speed [m/s] if they are given.
+    /// Orders a flight to a position [m], to hold there. NaN keeps a coordinate. The heading [rad] stays as it is if
+    /// `yaw_rad` is None or NaN. `speed_m_s` is the horizontal speed.
     #[pyo3(signature = (position_m, yaw_rad=None, speed_m_s=None))]
     fn go_to(
         &mut self,
@@ -84,7 +84,7 @@ impl PyGuidance {
         speed_m_s: Option<Given<'_, f64>>,
     ) -> PyResult<()> {
         let position_m = position_m.named("position_m")?;
-        // NaN has a meaning; infinity has none.
+        // NaN has a meaning here; infinity is refused.
         let kept = |name, value: f64| if value.is_nan() { Ok(value) } else { finite(name, value) };
         position_m.iter().try_for_each(|value| kept("position_m", *value).map(drop))?;
         let yaw_rad = kept("yaw_rad", optional(yaw_rad.as_ref(), "yaw_rad")?.unwrap_or(f64::NAN))? as f32;
@@ -94,7 +94,7 @@ impl PyGuidance {
         self.order(Order::GoTo { position_m: vector(position_m), yaw_rad, speed_m_s })
     }
 
-    /// Orders a flight mode: "hold", "land", "return" or, flown by sticks, "position", "altitude", "stabilised".
+    /// Orders a flight mode: "hold", "land", "return", or a mode flown by sticks, "position", "altitude", "stabilised".
     fn select(&mut self, mode: Given<'_, String>) -> PyResult<()> {
         let mode = mode.named("mode")?;
         let known = MODES.into_iter().find(|known| words(known) == mode);
@@ -105,8 +105,8 @@ impl PyGuidance {
         self.order(Order::Select(known))
     }
 
-    /// Sets a pilot's sticks, -1 to 1 each: roll and yaw positive to the right, pitch forward, throttle up, 0 in its
-    /// middle.
+    /// Sets the pilot's sticks, each from -1 to 1. Roll and yaw are positive to the right, pitch forward, throttle up.
+    /// The middle of the throttle is 0.
     fn sticks(
         &mut self,
         roll: Given<'_, f64>,
@@ -125,9 +125,9 @@ impl PyGuidance {
         Ok(())
     }
 
-    /// Performs a step with the state, if it is known, and what a flight core says: its mode ("flying"...), whether the
-    /// vehicle is airborne and rested, and the thrust that it commands over mass [m/s2]. Returns the setpoint, if there
-    /// is one.
+    /// Performs a step with the state, if it is known, and outputs of a flight core: its mode such as "flying", whether
+    /// the vehicle is airborne and rested, and its commanded thrust divided by the mass [m/s2]. Returns the setpoint,
+    /// if there is one.
     #[pyo3(signature = (state, core="flying", *, airborne=true, rested=true, thrust_m_s2=None))]
     fn step(
         &mut self,
@@ -147,7 +147,7 @@ impl PyGuidance {
         })?;
         self.now_us += (self.dt_s * 1e6).round() as u64;
         if let Some(sticks) = &mut self.orders.sticks {
-            sticks.at_us = self.now_us; // they are held where they are
+            sticks.at_us = self.now_us; // the sticks stay where they are
         }
         let inputs = GuidanceInputs {
             now_us: self.now_us,
@@ -167,32 +167,32 @@ impl PyGuidance {
         Ok(guided.setpoint.map(PySetpoint))
     }
 
-    /// The flight mode: "hold", "takeoff", "land", "return"...
+    /// Flight mode, such as "hold", "takeoff", "land" or "return".
     #[getter]
     fn mode(&self) -> String {
         words(&self.guidance.mode())
     }
 
-    /// The answer of the last step to an order: "granted", or why not; None if nothing was ordered.
+    /// Answer of the last step to an order: "granted" or the reason for the refusal; None without an order.
     #[getter]
     fn answer(&self) -> Option<String> {
         let (_, result) = self.guided?.answer?;
         Some(result.map_or_else(|refusal| words(&refusal), |()| "granted".into()))
     }
 
-    /// True if the motors of the armed vehicle idle on the ground.
+    /// True if the motors of the armed vehicle shall idle on the ground.
     #[getter]
     fn idle_on_ground(&self) -> bool {
         self.guided.is_some_and(|guided| guided.idle_on_ground)
     }
 
-    /// What the guidance asks of the flight core: "arm", "disarm"; None for nothing.
+    /// Request of the guidance to the flight core: "arm" or "disarm"; None for no request.
     #[getter]
     fn request(&self) -> Option<String> {
         Some(words(&self.guided?.request?))
     }
 
-    /// Why the safety net acts; None if it does not.
+    /// Reason why the safety net acts; None if it does not.
     #[getter]
     fn failsafe(&self) -> Option<String> {
         Some(words(&self.guided?.failsafe?))

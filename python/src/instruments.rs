@@ -1,4 +1,4 @@
-//! Instruments, reading by reading.
+//! The class `Instruments`: simulated sensors, reading by reading.
 
 use crate::argument::Given;
 use crate::error::error;
@@ -12,8 +12,8 @@ use numpy::{PyArray1, ToPyArray};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
-/// The instruments of a scenario's vehicle: inertial sensor, tracker, GNSS receiver, barometer and magnetometer, those
-/// that it has, with their errors, delays and failures. They read any plant.
+/// Instruments of a scenario's vehicle, with their errors, delays and failures: inertial sensor, tracker, GNSS
+/// receiver, barometer and magnetometer, as far as it has them. They can measure any plant.
 #[pyclass(name = "Instruments", module = "afbc")]
 pub(crate) struct PyInstruments {
     instruments: Instruments,
@@ -33,7 +33,7 @@ fn inertial<'py>(py: Python<'py>, sample: &ImuReading) -> PyResult<Bound<'py, Py
 
 #[pymethods]
 impl PyInstruments {
-    /// Makes the instruments of a scenario, "outdoor" if none is given, that are read every `dt_s` [s].
+    /// Makes the instruments of a scenario, by default "outdoor". They are read every `dt_s` [s].
     #[new]
     #[pyo3(
         signature = (scenario=None, *, vehicle=None, seed=None, dt_s=Given::Default(0.001)),
@@ -53,8 +53,9 @@ impl PyInstruments {
         Ok(PyInstruments { instruments })
     }
 
-    /// Reads them once, in the plant as it is now. Returns what arrives: "imu", a sample or None, and lists of what
-    /// each of "tracker", "gnss", "barometer" and "magnetometer" has measured, with the times for which it was true.
+    /// Reads the instruments once, at the plant's present time. Returns the measurements that arrive: under "imu" a
+    /// sample or None, and under "tracker", "gnss", "barometer" and "magnetometer" lists of measurements. Each has the
+    /// time at which it was true.
     fn measure<'py>(
         &mut self,
         py: Python<'py>,

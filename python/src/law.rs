@@ -1,4 +1,4 @@
-//! Laws of one's own, in Python.
+//! Control laws that users write in Python.
 
 use crate::argument::{Argument, Given, optional, wrong};
 use crate::error::error;
@@ -11,7 +11,7 @@ use pyo3::types::PyDict;
 use std::collections::BTreeSet;
 use std::sync::{Mutex, PoisonError};
 
-/// What a law raised, until it is raised again where the flight was asked for.
+/// Exception that a law raised, kept until the call that flies raises it again.
 static RAISED: Mutex<Option<PyErr>> = Mutex::new(None);
 /// Names that live as long as the program.
 static NAMES: Mutex<BTreeSet<&'static str>> = Mutex::new(BTreeSet::new());
@@ -29,11 +29,11 @@ pub(crate) fn take_error() -> Option<PyErr> {
 }
 
 fn raise(error: PyErr) {
-    // The first one stays: what is raised after it may come of it.
+    // Keeps the first exception, since later ones may follow from it.
     RAISED.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
 }
 
-/// The same text for the rest of the program.
+/// Returns the same text with the lifetime of the program.
 fn kept(name: &str) -> &'static str {
     let mut names = NAMES.lock().unwrap_or_else(PoisonError::into_inner);
     if let Some(known) = names.get(name) {
@@ -44,7 +44,7 @@ fn kept(name: &str) -> &'static str {
     name
 }
 
-/// What a law knows of the vehicle that it flies.
+/// Data of the vehicle that a law flies.
 #[pyclass(name = "OwnVehicle", module = "afbc", frozen)]
 pub(crate) struct PyOwnVehicle {
     vehicle: OwnVehicle,
@@ -69,13 +69,13 @@ impl PyOwnVehicle {
         self.vehicle.parameters.arm_m
     }
 
-    /// Force of a rotor over the square of its speed [N s2].
+    /// Force of a rotor divided by the square of its speed [N s2].
     #[getter]
     fn thrust_factor_n_s2(&self) -> f32 {
         self.vehicle.parameters.thrust_factor_n_s2
     }
 
-    /// Drag moment of a rotor over the square of its speed [N m s2].
+    /// Drag moment of a rotor divided by the square of its speed [N m s2].
     #[getter]
     fn drag_factor_n_m_s2(&self) -> f32 {
         self.vehicle.parameters.drag_factor_n_m_s2
@@ -123,7 +123,7 @@ impl PyOwnVehicle {
 /// Default, smallest and largest value of a gain.
 type Ranged = (f64, f64, f64);
 
-/// A Python object that flies.
+/// A control law written in Python.
 struct PythonLaw(Option<Py<PyAny>>);
 
 impl PythonLaw {
@@ -145,18 +145,19 @@ impl OwnController for PythonLaw {
     fn step(&mut self, state: &State, setpoint: &Setpoint, fresh: bool) -> Inputs {
         self.inputs(state, setpoint, fresh).unwrap_or_else(|error| {
             raise(error);
-            // It flies no more: the vehicle falls, and the flight ends soon.
+            // The law is not called again: the vehicle falls, and the flight ends soon.
             self.0 = None;
             Inputs::default()
         })
     }
 }
 
-/// Makes a law of one's own fly wherever a built-in one does: `fly`, `compare`, `campaign`, `tune`, scenario files.
+/// Registers a law of your own, which then flies wherever a built-in one does: in `fly`, `compare`, `campaign`, `tune`
+/// and scenario files.
 ///
-/// `make(vehicle)` is called at the start of each flight, with an `OwnVehicle`, and returns an object whose
-/// `step(state, setpoint, fresh)` returns the demanded U1, U2, U3, U4 [N] every millisecond. `gains` maps a name to its
-/// default, smallest and largest value; `tune` searches them. A law of the same name is replaced.
+/// `make(vehicle)` is called at the start of each flight with an `OwnVehicle`. It returns an object whose `step(state,
+/// setpoint, fresh)` returns the demanded U1, U2, U3, U4 [N] every millisecond. `gains` maps names to default, smallest
+/// and largest values; `tune` searches them. A law of the same name is replaced.
 #[pyfunction]
 #[pyo3(signature = (name, make, *, title=None, gains=None))]
 pub(crate) fn register(
@@ -183,7 +184,7 @@ pub(crate) fn register(
     law.title(kept(&title)).gains(gains).register().map(drop).map_err(error)
 }
 
-/// Names of the laws: the built-in ones, then those registered.
+/// Returns the names of the laws: the built-in ones, then the registered ones.
 #[pyfunction]
 pub(crate) fn laws() -> Vec<&'static str> {
     ControllerKind::all().into_iter().map(ControllerKind::name).collect()

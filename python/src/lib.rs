@@ -1,7 +1,7 @@
 //! The simulator for Python: `import afbc`.
 //!
-//! What is here only converts; all that flies is in the crates that `sitl` flies, so that both give the same bits.
-//! `python/afbc` has what needs no Rust: data frames, and the types for editors.
+//! This crate only converts arguments and results. All that flies is in the crates that `sitl` uses, so that both give
+//! the same bits. `python/afbc` has the parts that need no Rust: data frames, and types for editors.
 
 mod argument;
 mod batch;
@@ -58,7 +58,7 @@ fn _afbc(module: &Bound<'_, PyModule>) -> PyResult<()> {
     ] {
         module.add_function(function)?;
     }
-    // What `pickle` calls; not for others.
+    // Functions that only `pickle` calls.
     module.setattr("_flight", wrap_pyfunction!(flight::_flight, module)?)?;
     module.setattr("_scenario", wrap_pyfunction!(scenario::_scenario, module)?)?;
     module.setattr("_vehicle", wrap_pyfunction!(vehicle::_vehicle, module)?)

@@ -1,4 +1,4 @@
-//! State and setpoint.
+//! The classes `State` and `Setpoint`.
 
 use crate::argument::Given;
 use afbc_types::{Setpoint, State};
@@ -10,12 +10,12 @@ type Array<'py> = Bound<'py, PyArray1<f64>>;
 type Three<'py> = Given<'py, [f64; 3]>;
 const ZERO: [f64; 3] = [0.0; 3];
 
-/// The three numbers as an array, which hold a single's value exactly.
+/// Returns the three numbers as an array of doubles, which hold singles exactly.
 pub(crate) fn array<'py>(py: Python<'py>, vector: &Vector3<f32>) -> Array<'py> {
     [vector.x, vector.y, vector.z].map(f64::from).to_pyarray(py)
 }
 
-/// The three numbers in the controllers' precision.
+/// Returns the three numbers in single precision, which the controllers use.
 pub(crate) fn vector(numbers: [f64; 3]) -> Vector3<f32> {
     Vector3::from(numbers.map(|number| number as f32))
 }
@@ -76,7 +76,7 @@ impl PyState {
         array(py, &self.0.rates_rad_s)
     }
 
-    /// All twelve numbers in this order, as for an optimiser or a neural network.
+    /// All twelve numbers in this order, as an optimiser or a neural network needs them.
     #[getter]
     fn vector<'py>(&self, py: Python<'py>) -> Array<'py> {
         numbers(&self.0).to_pyarray(py)
@@ -95,17 +95,17 @@ impl PyState {
     }
 }
 
-/// The twelve numbers of a state.
+/// Returns the twelve numbers of a state.
 pub(crate) fn numbers(state: &State) -> [f64; 12] {
     let parts = [&state.position_m, &state.velocity_m_s, &state.attitude_rad, &state.rates_rad_s];
     let mut numbers = parts.into_iter().flat_map(|part| part.iter().map(|number| f64::from(*number)));
     core::array::from_fn(|_| numbers.next().unwrap_or_default())
 }
 
-/// The numbers of a setpoint, in the order of its constructor.
+/// Numbers of a setpoint, in the order of its constructor.
 type Numbers<'py> = (Array<'py>, Array<'py>, Array<'py>, Array<'py>, Array<'py>, f32, f32, f32);
 
-/// Desired motion, earth frame: position with four derivatives, heading with two.
+/// Desired motion in the earth frame: position with four derivatives, heading with two.
 #[pyclass(name = "Setpoint", module = "afbc", frozen, from_py_object)]
 #[derive(Clone, Copy)]
 pub(crate) struct PySetpoint(pub(crate) Setpoint);

@@ -1,4 +1,4 @@
-//! The plant, step by step.
+//! The class `Plant`: the simulated vehicle, step by step.
 
 use crate::argument::{Array, Given, optional};
 use crate::error::error;
@@ -15,7 +15,7 @@ use numpy::{PyArray1, ToPyArray};
 use pyo3::prelude::*;
 
 /// The world of a scenario without its controllers: plant with rotors, air, ground and battery, sensors, link and
-/// reference; faults and gusts come as the scenario says. It is read by `look`, and moved by `step`.
+/// reference. Faults and gusts come as the scenario says. `step` moves it; its attributes show the present time.
 #[pyclass(name = "Plant", module = "afbc")]
 pub(crate) struct PyPlant {
     scenario: Scenario,
@@ -24,24 +24,24 @@ pub(crate) struct PyPlant {
     dt_s: f64,
 }
 
-/// A state as an argument.
+/// Argument that must be a state.
 pub(crate) type StateArgument<'py> = Given<'py, Bound<'py, PyState>>;
 
-/// The time between steps of the argument `dt_s`.
+/// Returns the time between steps of the argument `dt_s`.
 pub(crate) fn step_s(dt_s: &Given<'_, f64>) -> PyResult<f64> {
     let dt_s = dt_s.named("dt_s")?;
     Settings::DT.range.check(dt_s).map_err(error)?;
     Ok(dt_s)
 }
 
-/// The world of `scenario`, and what is seen of it at its start.
+/// Returns the world of `scenario` and its first observation.
 pub(crate) fn start(scenario: &Scenario, dt_s: f64) -> PyResult<(World, View)> {
     let mut world = World::new(scenario, dt_s).map_err(error)?;
     let view = world.look();
     Ok((world, view))
 }
 
-/// The scenario from this motion, if one is given.
+/// Returns the scenario with this motion as its start, if one is given.
 pub(crate) fn begun(scenario: &Scenario, state: Option<&PyState>) -> PyResult<Scenario> {
     let mut scenario = scenario.clone();
     if let Some(PyState(state)) = state {
@@ -59,10 +59,10 @@ pub(crate) fn begun(scenario: &Scenario, state: Option<&PyState>) -> PyResult<Sc
     Ok(scenario)
 }
 
-/// Largest speed that a rotor may be commanded [rad/s]: far beyond what any turns at.
+/// Largest speed that a rotor may be commanded [rad/s], far beyond that of any real rotor.
 const SPEED_MAX_RAD_S: f64 = 1e5;
 
-/// Commands of the rotors, by their speeds.
+/// Returns the commanded rotor speeds, checked.
 pub(crate) fn commands(speeds: &[f64]) -> PyResult<RotorSpeeds<ROTORS_MAX>> {
     if let Some(speed) = speeds.iter().find(|speed| !(0.0..=SPEED_MAX_RAD_S).contains(*speed)) {
         return Err(error(format!("speeds_rad_s: {speed} given; numbers from 0 to {SPEED_MAX_RAD_S} are needed")));
@@ -72,7 +72,7 @@ pub(crate) fn commands(speeds: &[f64]) -> PyResult<RotorSpeeds<ROTORS_MAX>> {
 }
 
 impl PyPlant {
-    /// The truth that instruments measure.
+    /// Returns the true motion that instruments measure.
     pub(crate) fn truth(&self) -> Truth {
         self.world.plant().truth()
     }
@@ -80,7 +80,7 @@ impl PyPlant {
 
 #[pymethods]
 impl PyPlant {
-    /// Makes the world of a scenario, "hover" if none is given, for steps of `dt_s` [s].
+    /// Makes the world of a scenario, by default "hover", for steps of `dt_s` [s].
     #[new]
     #[pyo3(
         signature = (scenario=None, *, vehicle=None, seed=None, dt_s=Given::Default(0.001)),
@@ -98,7 +98,7 @@ impl PyPlant {
         Ok(PyPlant { scenario, world, view, dt_s })
     }
 
-    /// Starts again, with another seed or from another motion if one is given.
+    /// Restarts the world, optionally with another seed or from another motion.
     #[pyo3(signature = (seed=None, state=None))]
     fn reset(&mut self, seed: Option<Given<'_, u64>>, state: Option<StateArgument<'_>>) -> PyResult<()> {
         let state = optional(state.as_ref(), "state")?;
@@ -130,8 +130,8 @@ impl PyPlant {
         self.dt_s
     }
 
-    /// What reaches the controller: the state measured by the scenario's sensors or estimated by the vehicle, held
-    /// between samples; None in a dropout or an outage.
+    /// State that reaches the controller: measured by the scenario's sensors or estimated by the vehicle, and held
+    /// between samples. None in a dropout or an outage.
     #[getter]
     fn state(&self) -> Option<PyState> {
         self.view.state.map(PyState)
@@ -151,7 +151,7 @@ impl PyPlant {
         PyArray1::from_iter(py, parts.into_iter().flat_map(|part| part.iter().copied()))
     }
 
-    /// The scenario's reference at this time.
+    /// Reference of the scenario at this time.
     #[getter]
     fn setpoint(&self) -> PySetpoint {
         PySetpoint(self.view.reference.setpoint())
@@ -164,7 +164,7 @@ impl PyPlant {
         PyArray1::from_iter(py, truth.rotor_speeds_rad_s.iter().take(self.scenario.rotors.len()).copied())
     }
 
-    /// What an accelerometer at the centre of mass feels, body frame [m/s2], shape (3,).
+    /// Reading of a perfect accelerometer at the centre of mass, body frame [m/s2], shape (3,).
     #[getter]
     fn specific_force_m_s2<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         <[f64; 3]>::from(self.world.plant().truth().specific_force_m_s2()).to_pyarray(py)
@@ -177,7 +177,7 @@ impl PyPlant {
         wind.to_pyarray(py)
     }
 
-    /// True if it stands on the ground.
+    /// True if the vehicle stands on the ground.
     #[getter]
     fn on_ground(&self) -> bool {
         self.view.telemetry.is_some_and(|telemetry| telemetry.on_ground)

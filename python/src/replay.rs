@@ -1,4 +1,4 @@
-//! Recorded flights through the estimator.
+//! The function `replay`, which runs the estimator over recorded flights.
 
 use crate::argument::Given;
 use crate::error::error;
@@ -9,8 +9,8 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::path::PathBuf;
 
-/// Runs the estimator over a recorded flight, a ULog of PX4 or of this firmware, and returns its estimate beside the
-/// log's, by the columns of `sitl replay`'s CSV file, NaN where there is none.
+/// Runs the estimator over a recorded flight, a ULog of PX4 or of this firmware. Returns its estimate beside the log's,
+/// in the columns of `sitl replay`'s CSV file. NaN marks missing values.
 #[pyfunction]
 pub(crate) fn replay<'py>(py: Python<'py>, log: Given<'py, PathBuf>) -> PyResult<Bound<'py, PyDict>> {
     let log = log.named("log")?;

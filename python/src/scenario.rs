@@ -1,4 +1,4 @@
-//! Scenarios.
+//! The class `Scenario` and the function `scenarios`.
 
 use crate::argument::{Argument, Array, Given, finite, optional, wrong};
 use crate::error::error;
@@ -16,26 +16,26 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::path::PathBuf;
 
-/// A scenario: one vehicle, one trajectory, one environment, the contenders to compare. Of the built-in ones by name,
-/// or of a file by path; docs/scenarios.md describes the files.
+/// A scenario: one vehicle, one trajectory, one environment and the contenders to compare. It is built in, given by
+/// name, or read from a file, given by path; docs/scenarios.md describes the files.
 #[pyclass(name = "Scenario", module = "afbc", frozen)]
 pub(crate) struct PyScenario {
     pub(crate) scenario: Scenario,
     source: Source,
-    /// What `replace` has changed, in this order.
+    /// Changes made by `replace`, in order.
     changes: Vec<Change>,
 }
 
 /// Start and length [s] of a piece of a path, and its coefficients.
 type Piece<'py> = (f64, f64, Bound<'py, PyArray2<f64>>);
 
-/// What `replace` changes: vehicle, seed, length [s].
+/// A change by `replace`: vehicle, seed, length [s].
 type Change = (Option<Py<PyVehicle>>, Option<u64>, Option<f64>);
 
-/// What `pickle` keeps of a scenario.
+/// Data that `pickle` keeps of a scenario.
 type Kept = (String, String, String, Vec<Change>);
 
-/// A scenario, or what names one.
+/// A scenario, or the name or path of one.
 #[derive(Clone)]
 pub(crate) enum ScenarioArgument<'py> {
     Scenario(Bound<'py, PyScenario>),
@@ -61,8 +61,8 @@ impl ScenarioArgument<'_> {
     }
 }
 
-/// The scenario of the argument `scenario`, or the built-in one called `usual`, on another vehicle or with another seed
-/// if these are given.
+/// Returns the scenario of the argument `scenario`, by default the built-in one called `usual`, with the vehicle and
+/// seed replaced if given.
 pub(crate) fn asked(
     scenario: Option<&Given<'_, ScenarioArgument<'_>>>,
     usual: &str,
@@ -74,7 +74,7 @@ pub(crate) fn asked(
     changed(scenario.scenario()?, vehicle.as_ref(), crate::argument::seed(seed)?, None)
 }
 
-/// The flight on another vehicle, or with another seed or length.
+/// Returns the scenario with the vehicle, seed or length replaced, if given.
 pub(crate) fn changed(
     scenario: Scenario,
     vehicle: Option<&Vehicle>,
@@ -113,7 +113,7 @@ fn copied(py: Python<'_>, (vehicle, seed, duration_s): &Change) -> Change {
     (vehicle.as_ref().map(|vehicle| vehicle.clone_ref(py)), *seed, *duration_s)
 }
 
-/// Makes a scenario of what `pickle` has kept of it.
+/// Restores a scenario from the data that `pickle` kept.
 #[pyfunction]
 pub(crate) fn _scenario(
     py: Python<'_>,
@@ -131,7 +131,7 @@ impl PyScenario {
     #[new]
     fn new(name: Given<'_, PathBuf>) -> PyResult<Self> {
         let path = name.named("name")?;
-        // First as the command line does, whose errors have the path as it was given.
+        // Reads as the command line does first, since its errors show the path as given.
         subject::scenario(&path).map_err(error)?;
         let text = |name: &str| afbc_scenario::built_in(name).map(|known| known.text);
         of(Source::at(&path, "scenario", text).map_err(error)?)
@@ -144,7 +144,7 @@ impl PyScenario {
         of(Source { file: name.into(), text: text.into(), name: name.into() })
     }
 
-    /// Returns it on another vehicle, with another seed, or of another length.
+    /// Returns the scenario with another vehicle, seed or length.
     #[pyo3(signature = (*, vehicle=None, seed=None, duration_s=None))]
     fn replace(
         &self,
@@ -202,20 +202,21 @@ impl PyScenario {
         self.scenario.rotors.len()
     }
 
-    /// Names of its contenders.
+    /// Names of the scenario's contenders.
     #[getter]
     fn contenders(&self) -> Vec<String> {
         self.scenario.contenders.iter().map(|contender| contender.name.clone()).collect()
     }
 
-    /// Nominal masses, inertia, arm and rotor factors by name, in SI.
+    /// Nominal masses, inertia, arm and rotor factors by name, in SI units.
     #[getter]
     fn parameters<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         crate::vehicle::parameters(py, &self.scenario.vehicle)
     }
 
-    /// The polynomials of a path of minimum snap, or of one from a file: for each piece its start [s], its length [s]
-    /// and the coefficients of x, y, z, yaw, lowest power first, over the time since its start. None for others.
+    /// Polynomials of a minimum-snap path, or of one from a file: for each piece its start [s], its length [s] and the
+    /// coefficients of x, y, z, yaw. The lowest power comes first, over the time since the piece's start. None for
+    /// other trajectories.
     #[getter]
     fn polynomials<'py>(&self, py: Python<'py>) -> PyResult<Option<Vec<Piece<'py>>>> {
         let Trajectory::Polynomials(pieces) = &self.scenario.trajectory else { return Ok(None) };
@@ -227,7 +228,8 @@ impl PyScenario {
         pieces.iter().map(piece).collect::<PyResult<_>>().map(Some)
     }
 
-    /// The reference at these times [s]: a column for each coordinate and derivative, named as in a flight's log.
+    /// Returns the reference at these times [s]: a column for each coordinate and derivative, named as in a flight's
+    /// log.
     fn reference<'py>(&self, py: Python<'py>, time_s: Given<'py, Array>) -> PyResult<Bound<'py, PyDict>> {
         let times_s = time_s.named("time_s")?.shaped("time_s", [None])?;
         times_s.iter().try_for_each(|time_s| finite("time_s", *time_s).map(drop))?;
@@ -260,7 +262,7 @@ impl PyScenario {
     }
 }
 
-/// Names of the built-in scenarios.
+/// Returns the names of the built-in scenarios.
 #[pyfunction]
 pub(crate) fn scenarios() -> Vec<&'static str> {
     BUILT_IN.iter().map(|known| known.name).collect()

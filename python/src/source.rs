@@ -1,20 +1,20 @@
-//! Texts of files, by which scenarios and vehicles are made again elsewhere: `pickle` carries them.
+//! Texts of files, from which `pickle` makes scenarios and vehicles again in another process.
 
 use afbc_files::read::FileError;
 use std::path::Path;
 
-/// The text of a file, and what it is called.
+/// The text of a file and its names.
 #[derive(Clone)]
 pub(crate) struct Source {
-    /// Path of the file, to which paths in it are relative.
+    /// Path of the file, to which paths in the text are relative.
     pub(crate) file: String,
     pub(crate) text: String,
-    /// Name of what it describes, unless it gives one itself.
+    /// Name of the scenario or vehicle, unless the text gives one.
     pub(crate) name: String,
 }
 
 impl Source {
-    /// Reads what `path` names: a built-in file of this `kind`, whose text is looked up by its name, or a file.
+    /// Reads a built-in file of this `kind` if `path` is a plain name known to `built_in`, or else the file at `path`.
     pub(crate) fn at(
         path: &Path,
         kind: &str,
@@ -30,7 +30,7 @@ impl Source {
         Ok(Source { file, text, name })
     }
 
-    /// Returns the three texts.
+    /// Returns file, text and name.
     pub(crate) fn into_texts(self) -> (String, String, String) {
         (self.file, self.text, self.name)
     }

@@ -1,4 +1,4 @@
-//! Searches for gains.
+//! The function `tune`, which searches for gains.
 
 use crate::argument::{self, Given, SEEDS, optional};
 use crate::error::error;
@@ -11,11 +11,11 @@ use afbc_tune::{self as search, SearchOptions};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-/// Searches for gains of a law by CMA-ES, as `sitl tune` does: on the training flights, or on these scenarios, for the
-/// paper's vehicle or another.
+/// Searches for gains of a law by CMA-ES, as `sitl tune` does, for the paper's vehicle or another one. The flights are
+/// the training flights, or the given scenarios.
 ///
-/// Returns the costs `before` and `after`, the number of `evaluations`, the `gains` found by name, and the `text` for a
-/// scenario or vehicle file.
+/// Returns the costs `before` and `after`, the number of `evaluations`, the `gains` found by name, and their `text` for
+/// a scenario or vehicle file.
 #[pyfunction]
 #[pyo3(
     signature = (

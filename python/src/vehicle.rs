@@ -1,4 +1,4 @@
-//! Vehicles.
+//! The class `Vehicle` and the function `vehicles`.
 
 use crate::argument::{Argument, Given, wrong};
 use crate::error::error;
@@ -11,14 +11,14 @@ use pyo3::types::PyDict;
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::{Path, PathBuf};
 
-/// A vehicle: of the built-in ones by name, or of a file by path.
+/// A vehicle: a built-in one by name, or one from a file by path.
 #[pyclass(name = "Vehicle", module = "afbc", frozen)]
 pub(crate) struct PyVehicle {
     pub(crate) vehicle: Vehicle,
     source: Source,
 }
 
-/// A vehicle, or what names one.
+/// A vehicle, or the name or path of one.
 #[derive(Clone)]
 pub(crate) enum VehicleArgument<'py> {
     Vehicle(Bound<'py, PyVehicle>),
@@ -44,12 +44,12 @@ impl VehicleArgument<'_> {
     }
 }
 
-/// Returns the vehicle of the argument `vehicle`, if it is given.
+/// Returns the vehicle of the argument `vehicle`; none if it was not given.
 pub(crate) fn given(vehicle: Option<&Given<'_, VehicleArgument<'_>>>) -> PyResult<Option<Vehicle>> {
     crate::argument::optional(vehicle, "vehicle")?.map(|vehicle| vehicle.vehicle()).transpose()
 }
 
-/// Returns the vehicle of the argument `vehicle`, the paper's if none is given.
+/// Returns the vehicle of the argument `vehicle`, by default the paper's.
 pub(crate) fn flown(vehicle: Option<&Given<'_, VehicleArgument<'_>>>) -> PyResult<Vehicle> {
     given(vehicle)?.map_or_else(|| afbc_scenario::vehicle_named(Path::new("paper")).map_err(error), Ok)
 }
@@ -62,7 +62,7 @@ fn of(source: Source) -> PyResult<PyVehicle> {
 
 impl PyVehicle {
     pub(crate) fn at(path: &Path) -> PyResult<Self> {
-        // First as the command line does, whose errors have the path as it was given.
+        // Reads as the command line does first, since its errors show the path as given.
         afbc_scenario::vehicle_named(path).map_err(error)?;
         let text = |name: &str| afbc_vehicles::built_in(name).map(|known| known.text);
         of(Source::at(path, "vehicle", text).map_err(error)?)
@@ -76,7 +76,7 @@ impl PyVehicle {
         PyVehicle::at(&name.named("name")?)
     }
 
-    /// Reads the text of a vehicle file (TOML), as docs/vehicles.md describes it.
+    /// Reads the text of a vehicle file (TOML); docs/vehicles.md describes the format.
     #[staticmethod]
     #[pyo3(signature = (text, name="vehicle"))]
     fn from_toml(text: &str, name: &str) -> PyResult<Self> {
@@ -123,7 +123,7 @@ impl PyVehicle {
         self.vehicle.lag_s()
     }
 
-    /// Positions of the rotors' hubs from the centre of mass, body frame [m], shape (rotors, 3).
+    /// Positions of the rotor hubs relative to the centre of mass, body frame [m], shape (rotors, 3).
     #[getter]
     fn rotor_positions_m<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let (realism, arm_m) = (&self.vehicle.realism, self.vehicle.parameters.arm_m);
@@ -133,8 +133,8 @@ impl PyVehicle {
         PyArray1::from_iter(py, numbers).reshape([self.vehicle.rotors.len(), 3])
     }
 
-    /// Direction of the moment by which each rotor's drag turns the body, shape (rotors,): 1 to positive yaw, by a
-    /// rotor that turns clockwise seen from above; -1 by one that turns counter-clockwise.
+    /// Direction in which the drag of each rotor turns the body, shape (rotors,). It is 1, positive yaw, for a rotor
+    /// that turns clockwise seen from above, and -1 for one that turns counter-clockwise.
     #[getter]
     fn rotor_yaw_signs<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         PyArray1::from_iter(py, self.vehicle.rotors.iter().map(|rotor| if rotor.pushes_left { 1.0 } else { -1.0 }))
@@ -146,9 +146,9 @@ impl PyVehicle {
         (self.vehicle.realism.rotors.min_rad_s, self.vehicle.realism.rotors.max_rad_s)
     }
 
-    /// Drag by name, in SI, or None: `blade_n_s2_m`, the force of one rotor's blades per rotor speed and airspeed in
-    /// its plane; `body_n_s2_m2`, the body's force along x, y, z per square of the airspeed; `centre_m`, where that
-    /// acts.
+    /// Drag by name, in SI units, or None. `blade_n_s2_m` is the force of one rotor's blades divided by rotor speed and
+    /// by the airspeed in the rotor's plane. `body_n_s2_m2` is the body's force along x, y, z divided by the square of
+    /// the airspeed, and `centre_m` the point at which it acts.
     #[getter]
     fn drag<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
         let Some(drag) = &self.vehicle.realism.drag else { return Ok(None) };
@@ -159,7 +159,7 @@ impl PyVehicle {
         Ok(Some(dict))
     }
 
-    /// Nominal masses, inertia, arm and rotor factors by name, in SI.
+    /// Nominal masses, inertia, arm and rotor factors by name, in SI units.
     #[getter]
     fn parameters<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         parameters(py, &self.vehicle.parameters)
@@ -170,7 +170,7 @@ impl PyVehicle {
     }
 }
 
-/// Parameters by name.
+/// Returns the parameters by name.
 pub(crate) fn parameters<'py>(py: Python<'py>, of: &Parameters<f64>) -> PyResult<Bound<'py, PyDict>> {
     let dict = PyDict::new(py);
     dict.set_item("mass_kg", of.mass_kg)?;
@@ -183,20 +183,20 @@ pub(crate) fn parameters<'py>(py: Python<'py>, of: &Parameters<f64>) -> PyResult
     Ok(dict)
 }
 
-/// A hash that equal ones share: that of the name.
+/// Returns a hash of the name, so that equal objects have equal hashes.
 pub(crate) fn hash(name: &str) -> u64 {
     let mut hasher = DefaultHasher::new();
     name.hash(&mut hasher);
     hasher.finish()
 }
 
-/// Makes a vehicle of what `pickle` has kept of it.
+/// Restores a vehicle from the data that `pickle` kept.
 #[pyfunction]
 pub(crate) fn _vehicle(file: String, text: String, name: String) -> PyResult<PyVehicle> {
     of(Source { file, text, name })
 }
 
-/// Names of the built-in vehicles.
+/// Returns the names of the built-in vehicles.
 #[pyfunction]
 pub(crate) fn vehicles() -> Vec<&'static str> {
     BUILT_IN.iter().map(|known| known.name).collect()

@@ -1,4 +1,5 @@
-//! Long work without the GIL: Ctrl-C ends it, progress is shown, and what a law of one's own raised is raised again.
+//! Runs long work without the GIL. Ctrl-C ends it, progress is reported, and an exception of a user's law is raised
+//! again.
 
 use crate::error::error;
 use crate::law;
@@ -10,10 +11,10 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
 use std::time::Duration;
 
-/// How often the interpreter is asked whether it was interrupted.
+/// Period of the checks for an interrupt.
 const PERIOD: Duration = Duration::from_millis(50);
 
-/// How far work has come, and whether it is to end.
+/// Progress of the work, and a request to end it.
 #[derive(Default)]
 pub(crate) struct Watch {
     done: AtomicU64,
@@ -21,22 +22,22 @@ pub(crate) struct Watch {
 }
 
 impl Watch {
-    /// `count` more are done.
+    /// Adds `count` to the finished units of work.
     pub(crate) fn add(&self, count: u64) {
         self.done.fetch_add(count, Ordering::Relaxed);
     }
 
-    /// `count` are done.
+    /// Sets the number of finished units of work.
     pub(crate) fn set(&self, count: u64) {
         self.done.store(count, Ordering::Relaxed);
     }
 
-    /// True if work is to end.
+    /// True if the work shall end.
     pub(crate) fn is_over(&self) -> bool {
         self.stop.load(Ordering::Relaxed)
     }
 
-    /// The flag that becomes true then.
+    /// Returns the flag that requests the end.
     pub(crate) fn stop(&self) -> &AtomicBool {
         &self.stop
     }
@@ -46,10 +47,10 @@ fn threads_of(count: usize) -> PyResult<ThreadPool> {
     rayon::ThreadPoolBuilder::new().num_threads(count).build().map_err(error)
 }
 
-/// Threads that stay, of the process with this number.
+/// Threads kept between calls, with the number of the process that they belong to.
 static KEPT: Mutex<Option<(u32, Arc<ThreadPool>)>> = Mutex::new(None);
 
-/// Threads on all cores. A process that was forked has those of its parent no more, and gets its own.
+/// Returns threads on all cores. The threads of a parent do not exist in a forked process, which gets its own.
 fn kept_threads() -> PyResult<Arc<ThreadPool>> {
     let mut kept = KEPT.lock().unwrap_or_else(PoisonError::into_inner);
     if let Some((_, pool)) = kept.as_ref().filter(|(owner, _)| *owner == process::id()) {
@@ -57,12 +58,12 @@ fn kept_threads() -> PyResult<Arc<ThreadPool>> {
     }
     let pool = Arc::new(threads_of(0)?);
     let before = kept.replace((process::id(), Arc::clone(&pool)));
-    // Nobody answers there any more: it is left as it is.
+    // The parent's pool is never dropped, since its threads would never answer here.
     core::mem::forget(before);
     Ok(pool)
 }
 
-/// Does `work` in `slices` of a whole, on all cores; Ctrl-C ends it between them.
+/// Does work of the size `whole` in parts of at most `slice`, on all cores. Ctrl-C ends it between two parts.
 pub(crate) fn in_slices(py: Python<'_>, whole: u64, slice: u64, mut work: impl FnMut(u64) + Send) -> PyResult<()> {
     let pool = kept_threads()?;
     let mut left = whole;
@@ -75,8 +76,8 @@ pub(crate) fn in_slices(py: Python<'_>, whole: u64, slice: u64, mut work: impl F
     Ok(())
 }
 
-/// Does `work` on a thread of its own, on this many cores if that is said, while this one calls `progress` with what is
-/// done.
+/// Runs `work` on another thread, with `threads` threads or one per core. Meanwhile, this thread calls `progress` with
+/// the number of finished units.
 pub(crate) fn watched<T: Send>(
     py: Python<'_>,
     threads: Option<usize>,
@@ -90,7 +91,7 @@ pub(crate) fn watched<T: Send>(
         let worker = scope.spawn(|| pool.install(|| work(&watch)));
         let (mut shown, mut interrupted) = (0, Ok(()));
         while !worker.is_finished() {
-            // Short until something is done, so that brief work does not wait for a whole period.
+            // The first wait is short, so that brief work does not wait for a whole period.
             py.detach(|| thread::sleep(PERIOD.min(if shown == 0 { PERIOD / 25 } else { PERIOD })));
             let done = watch.done.load(Ordering::Relaxed);
             if interrupted.is_ok() {
